@@ -1,9 +1,7 @@
 //! The crate tactile-force alone: a calibration, and the force and contact in one frame.
 #![allow(clippy::print_stdout)]
 use ndarray::Array2;
-use tactile_force::{
-    CalibrationPair, ForceError, ForceOptions, LinearCalibration, StressCalibration, measure_force,
-};
+use tactile_force::{CalibrationPair, ForceError, ForceOptions, LinearCalibration, measure_force};
 
 fn main() -> Result<(), ForceError> {
     // Known forces and what the frames added up to, loading and unloading.

@@ -14,6 +14,8 @@ pub(super) struct LoadReading {
     pub noise_n: f64,
     /// Error of the force from the calibration.
     pub calibration_n: f64,
+    /// Degrees of freedom of the force's error, where it was estimated.
+    pub degrees_of_freedom: Option<f64>,
     pub radius_m: Option<Estimate>,
     pub indentation_m: Option<Estimate>,
     /// Area of a flat face.
@@ -34,6 +36,7 @@ impl LoadReading {
             force_n: contact.force_n?.value,
             noise_n: contact.force_noise_n,
             calibration_n: contact.force_calibration_n,
+            degrees_of_freedom: contact.force_n?.degrees_of_freedom,
             radius_m: Some(radius_with_floor(
                 radius.value,
                 radius.standard_error,
@@ -94,7 +97,8 @@ pub(super) fn series(
         let rest = (r.calibration_n.powi(2) - (common * r.force_n).powi(2))
             .max(0.0)
             .sqrt();
-        let force = Estimate::new(r.force_n, r.noise_n.hypot(rest));
+        let mut force = Estimate::new(r.force_n, r.noise_n.hypot(rest));
+        force.degrees_of_freedom = r.degrees_of_freedom;
         let mut load = LoadState::new(force);
         load.contact_radius_m = r.radius_m;
         load.indentation_m = r.indentation_m;

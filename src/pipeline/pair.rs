@@ -72,7 +72,7 @@ pub(super) fn of_faces(
     let mut loads = [LoadState::new(Estimate::exact(0.0)); 2];
     for ((load, reading), frame) in loads.iter_mut().zip(readings).zip([from, to]) {
         let force = reading.force_n.ok_or(PipelineError::NoForce { frame })?;
-        load.force_n = Estimate::new(force.value, force.standard_error);
+        load.force_n = force;
         load.contact_area_m2 = reading
             .face
             .map(|face| Estimate::new(face.area_m2.value, face.area_m2.standard_error));

@@ -15,6 +15,7 @@ struct MergedLoad {
     force_variance: f64,
     radius_variance: f64,
     calibration: f64,
+    degrees_of_freedom: Option<f64>,
     indentation_m: Option<Estimate>,
     face_m2: Option<Estimate>,
     mean_strain: Option<Estimate>,
@@ -30,6 +31,7 @@ impl MergedLoad {
             force_variance: reading.force_noise_n.powi(2),
             radius_variance: reading.contact_radius_m.standard_error.powi(2),
             calibration: (reading.force_calibration_n / force.value).abs(),
+            degrees_of_freedom: force.degrees_of_freedom,
             indentation_m: reading
                 .indentation_m
                 .map(|depth| Estimate::new(depth.value, depth.standard_error)),
@@ -57,6 +59,7 @@ impl MergedLoad {
             force_variance: a * a * self.force_variance + b * b * other.force_variance,
             radius_variance: a * a * self.radius_variance + b * b * other.radius_variance,
             calibration: a * self.calibration + b * other.calibration,
+            degrees_of_freedom: fewest(self.degrees_of_freedom, other.degrees_of_freedom),
             indentation_m: mean(self.indentation_m, other.indentation_m),
             face_m2: mean(self.face_m2, other.face_m2),
             mean_strain: mean(self.mean_strain, other.mean_strain),
@@ -68,6 +71,7 @@ impl MergedLoad {
             force_n: self.force_n,
             noise_n: self.force_variance.sqrt(),
             calibration_n: self.calibration * self.force_n,
+            degrees_of_freedom: self.degrees_of_freedom,
             radius_m: Some(radius_with_floor(
                 self.radius_m,
                 self.radius_variance.sqrt(),
@@ -80,6 +84,11 @@ impl MergedLoad {
             mean_strain: self.mean_strain,
         }
     }
+}
+
+/// The smaller of the degrees of freedom that are not infinite.
+fn fewest(one: Option<f64>, other: Option<f64>) -> Option<f64> {
+    one.into_iter().chain(other).reduce(f64::min)
 }
 
 /// At most [`MOST_LOADS`] loads in rising order of force.

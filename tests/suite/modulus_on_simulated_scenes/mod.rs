@@ -136,6 +136,7 @@ fn calibrate(
 }
 
 /// The force with the calibration's degrees of freedom.
+fn force(measured: &ForceMeasurement) -> Estimate {
     measured.force_n
 }
 
