@@ -1,15 +1,17 @@
 //! Critical and acceptance angles of a layer, the paper's (1)–(4).
 //!
-//! Light in a layer of index nᵢ is totally reflected at the ambient of index n₀ < nᵢ beyond the critical angle
-//! θ_c = asin(n₀/nᵢ). Light entering through the layer's edge, perpendicular to its faces, meets them beyond θ_c while its
-//! angle in the ambient stays below the acceptance angle
+//! Light in a layer of index nᵢ is totally reflected at the ambient of index n₀ < nᵢ beyond the
+//! critical angle θ_c = asin(n₀/nᵢ). Light entering through the layer's edge, perpendicular to its
+//! faces, meets them beyond θ_c while its angle in the ambient stays below the acceptance angle
 //!
 //! θᵢ = asin(√(nᵢ² − n₀²)/n₀),
 //!
-//! the paper's asin √(nᵢ² − 1) for air. At nᵢ² ≥ 2n₀² every ray is trapped, at nᵢ ≤ n₀ none: both are answers, not errors.
+//! the paper's asin √(nᵢ² − 1) for air. At nᵢ² ≥ 2n₀² every ray is trapped, at nᵢ ≤ n₀ none: both
+//! are answers, not errors.
 //!
-//! The formulas used are θ_c = atan2(n₀, √((nᵢ − n₀)(nᵢ + n₀))) and θᵢ = atan2(√((nᵢ − n₀)(nᵢ + n₀)), √(2n₀² − nᵢ²)), which keep all
-//! digits where the textbook ones lose half of them: nᵢ near n₀ and near √2 n₀. Whether nᵢ² ≥ 2n₀² is decided exactly.
+//! The formulas used are θ_c = atan2(n₀, √((nᵢ − n₀)(nᵢ + n₀))) and θᵢ = atan2(√((nᵢ − n₀)(nᵢ +
+//! n₀)), √(2n₀² − nᵢ²)), They keep all digits where the textbook ones lose half of them: nᵢ near n₀
+//! and near √2 n₀. Whether nᵢ² ≥ 2n₀² is decided exactly.
 //!
 //! Propagation angles through a stack: n sin θ is the same in every layer.
 
@@ -57,8 +59,9 @@ impl Angle {
     }
 }
 
-/// The critical angle of light in a layer of index `n` against an ambient of index `ambient`: beyond it light is totally
-/// reflected. `None` if the layer's index does not exceed its ambient's: no light is.
+/// The critical angle of light in a layer of index `n` against an ambient of index `ambient`:
+/// beyond it light is totally reflected. `None` if the layer's index does not exceed its ambient's:
+/// no light is.
 ///
 /// # Errors
 /// [`OpticsError::OutOfRange`] for an index that is not positive and finite.
@@ -76,10 +79,12 @@ pub fn critical_angle(n: f64, ambient: f64) -> Result<Option<Angle>, OpticsError
     Ok((n > n0).then(|| Angle::from_legs(n0, (n - n0).sqrt() * (n + n0).sqrt())))
 }
 
-/// The acceptance angle of a layer of index `n` in an ambient of index `ambient`, (1)–(4): of the rays entering through the
-/// layer's edge those are trapped whose angle to the layer's plane, measured in the ambient, is below it.
+/// The acceptance angle of a layer of index `n` in an ambient of index `ambient`, (1)–(4). Of the
+/// rays entering through the layer's edge those are trapped whose angle to the layer's plane,
+/// measured in the ambient, is below it.
 ///
-/// 0 radians where no ray is trapped (n ≤ n₀); a complement of 0 where every ray is (n² ≥ 2n₀²); between them both are positive.
+/// 0 radians where no ray is trapped (n ≤ n₀). A complement of 0 where every ray is (n² ≥ 2n₀²).
+/// Between them both are positive.
 ///
 /// # Errors
 /// [`OpticsError::OutOfRange`] for an index that is not positive and finite.
@@ -116,7 +121,7 @@ pub fn acceptance_angle(n: f64, ambient: f64) -> Result<Angle, OpticsError> {
     })
 }
 
-/// A power of two near `x`, for scaling without rounding; 1 in the range where nothing needs it.
+/// A power of two near `x`, for scaling without rounding, 1 in the range where nothing needs it.
 fn power_of_two_near(x: f64) -> f64 {
     if x > 1e-3 && x < 1e3 {
         return 1.0;
@@ -126,11 +131,13 @@ fn power_of_two_near(x: f64) -> f64 {
 }
 
 /// The angle at which light of invariant `n sin θ` = `invariant` travels in a medium of index `n`:
-/// θ = atan2(s, √((n − s)(n + s))); π/2 at equality. `None` where the invariant exceeds the index: the field decays exponentially
-/// and no light propagates. Near grazing the cosine is the sine of the angle's complement, to all digits.
+/// θ = atan2(s, √((n − s)(n + s))), π/2 at equality. `None` where the invariant exceeds the index:
+/// the field decays exponentially and no light propagates. Near grazing the cosine is the sine of
+/// the angle's complement, to all digits.
 ///
 /// # Errors
-/// [`OpticsError::OutOfRange`] for an index that is not positive or an invariant that is negative, or either not finite.
+/// [`OpticsError::OutOfRange`] for an index that is not positive or an invariant that is negative,
+/// or either not finite.
 ///
 /// ```
 /// use tactile_optics::propagation;
@@ -148,9 +155,9 @@ pub fn propagation(n: f64, invariant: f64) -> Result<Option<Angle>, OpticsError>
 
 /// 2a² − b² for b in [a, 2a], with its sign right on the numbers as they stand.
 ///
-/// Both squares split exactly into a rounded part and its error (fused multiply–add). The rounded parts lie within a
-/// factor of two of each other wherever the sign is in doubt, so their difference is exact; the errors' difference is
-/// kept as a rounded sum and its remainder.
+/// Both squares split exactly into a rounded part and its error (fused multiply–add). The rounded
+/// parts lie within a factor of two of each other wherever the sign is in doubt, so their
+/// difference is exact. The errors' difference is kept as a rounded sum and its remainder.
 fn twice_square_minus_square(a: f64, b: f64) -> f64 {
     let twice = a + a;
     let (p, q) = (twice * a, b * b);

@@ -5,7 +5,8 @@ use num_traits::Float;
 
 use crate::error::{OpticsError, within};
 
-/// A dispersion formula and the range of wavelengths it was fitted on; λ is in micrometres inside the formulas.
+/// A dispersion formula and the range of wavelengths it was fitted on. The wavelength λ is in
+/// micrometres inside the formulas.
 ///
 /// ```
 /// use tactile_optics::Dispersion;
@@ -39,32 +40,34 @@ pub enum Dispersion {
 impl Dispersion {
     /// PDMS (Dow Corning), 5 parts of base to 1 of curing agent: 1.4024 at 589 nm.
     ///
-    /// Least-squares Cauchy fit by us of 36 tabulated values, 0.40–0.75 µm, residual sd 1.8×10⁻⁴, largest 5.5×10⁻⁴
-    /// (X. Zhang et al., Appl. Opt. 59 (2020) 2337–2344, as tabulated by refractiveindex.info).
+    /// Least-squares Cauchy fit by us of 36 tabulated values, 0.40–0.75 µm, residual sd 1.8×10⁻⁴,
+    /// largest 5.5×10⁻⁴ (X. Zhang et al., Appl. Opt. 59 (2020) 2337–2344, as tabulated by
+    /// refractiveindex.info).
     pub const PDMS_5_1: Self = Self::Cauchy {
         coefficients: [1.391435, 3.8065e-3, 0.0],
         range_m: [0.40e-6, 0.75e-6],
     };
-    /// PDMS (Dow Corning), 10:1: 1.3950 at 589 nm; residual sd 2.4×10⁻⁴, largest 4.6×10⁻⁴. Source as for
-    /// [`PDMS_5_1`](Self::PDMS_5_1).
+    /// PDMS (Dow Corning), 10:1: 1.3950 at 589 nm. Residual sd 2.4×10⁻⁴, largest 4.6×10⁻⁴. Source
+    /// as for [`PDMS_5_1`](Self::PDMS_5_1).
     pub const PDMS_10_1: Self = Self::Cauchy {
         coefficients: [1.384091, 3.7890e-3, 0.0],
         range_m: [0.40e-6, 0.75e-6],
     };
-    /// PDMS (Dow Corning), 20:1: 1.4073 at 589 nm; residual sd 1.6×10⁻⁴, largest 3.8×10⁻⁴. Source as for
-    /// [`PDMS_5_1`](Self::PDMS_5_1).
+    /// PDMS (Dow Corning), 20:1: 1.4073 at 589 nm. Residual sd 1.6×10⁻⁴, largest 3.8×10⁻⁴. Source
+    /// as for [`PDMS_5_1`](Self::PDMS_5_1).
     pub const PDMS_20_1: Self = Self::Cauchy {
         coefficients: [1.395397, 4.1179e-3, 0.0],
         range_m: [0.40e-6, 0.75e-6],
     };
-    /// PDMS RTV 615: 1.4303 at 588 nm, 0.35–0.70 µm (F. Schneider et al., Sens. Actuators A 151 (2009) 95–99).
+    /// PDMS RTV 615: 1.4303 at 588 nm, 0.35–0.70 µm (F. Schneider et al., Sens. Actuators A 151
+    /// (2009) 95–99).
     pub const PDMS_RTV615: Self = Self::Sellmeier {
         constant: 0.0,
         terms: [[1.0057, 0.013217], [0.0, 0.0], [0.0, 0.0]],
         range_m: [0.35e-6, 0.70e-6],
     };
-    /// Borosilicate float glass BOROFLOAT 33: 1.4715 at 588 nm, 0.24–1.55 µm (Schott's data of June 2021, Sellmeier fit of
-    /// refractiveindex.info).
+    /// Borosilicate float glass BOROFLOAT 33: 1.4715 at 588 nm, 0.24–1.55 µm (Schott's data of June
+    /// 2021, Sellmeier fit of refractiveindex.info).
     pub const BOROFLOAT_33: Self = Self::Sellmeier {
         constant: 0.3542,
         terms: [

@@ -3,11 +3,13 @@
 //! With c₁, c₂ the cosines and s₁ the sine of incidence,
 //!
 //! * r_s = (n₁c₁ − n₂c₂)/(n₁c₁ + n₂c₂) = (n₁ − n₂)(n₁ + n₂)/(n₁c₁ + n₂c₂)²,
-//! * r_p = (n₂c₁ − n₁c₂)/(n₂c₁ + n₁c₂) = (n₂ − n₁)(n₂ + n₁)(n₂c₁ − n₁s₁)(n₂c₁ + n₁s₁)/(n₂(n₂c₁ + n₁c₂))²,
+//! * r_p = (n₂c₁ − n₁c₂)/(n₂c₁ + n₁c₂) = (n₂ − n₁)(n₂ + n₁)(n₂c₁ − n₁s₁)(n₂c₁ + n₁s₁)/(n₂(n₂c₁ +
+//!   n₁c₂))²,
 //! * T = 4 n₁c₁ n₂c₂/(…)² with the same denominators, never 1 − R.
 //!
-//! The right-hand forms have no cancellation but the one at Brewster's angle, which is the answer's own. n₂c₂ is
-//! √((n₂ − n₁s₁)(n₂ + n₁s₁)); towards grazing, where s₁ has rounded to 1, n₂ − n₁s₁ is taken as (n₂ − n₁) + n₁c₁²/(1 + s₁).
+//! The right-hand forms have no cancellation but the one at Brewster's angle, which is the answer's
+//! own. n₂c₂ is √((n₂ − n₁s₁)(n₂ + n₁s₁)). Towards grazing, where s₁ has rounded to 1, n₂ − n₁s₁ is
+//! taken as (n₂ − n₁) + n₁c₁²/(1 + s₁).
 
 use core::f64::consts::FRAC_PI_2;
 
@@ -32,7 +34,7 @@ use crate::error::{OpticsError, index, within};
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub struct Fresnel {
-    /// Angle of refraction; `None` when reflection is total.
+    /// Angle of refraction. `None` when reflection is total.
     pub refraction: Option<Angle>,
     /// Reflectance of light polarised perpendicular to the plane of incidence.
     pub reflectance_s: f64,
@@ -62,10 +64,12 @@ impl Fresnel {
     }
 }
 
-/// Fresnel's coefficients for light in a medium of index `n1` that meets one of index `n2` at `incidence` (radians, 0 to π/2).
+/// Fresnel's coefficients for light in a medium of index `n1` that meets one of index `n2` at
+/// `incidence` (radians, 0 to π/2).
 ///
 /// # Errors
-/// [`OpticsError::OutOfRange`] for an index that is not positive and finite, or an angle outside 0 to π/2.
+/// [`OpticsError::OutOfRange`] for an index that is not positive and finite, or an angle outside 0
+/// to π/2.
 ///
 /// ```
 /// use tactile_optics::fresnel;
@@ -122,7 +126,8 @@ pub(crate) fn from_sine_and_cosine(n1: f64, n2: f64, sine: f64, cosine: f64) -> 
 
 /// n₂ cos θ₂, or `None` when reflection is total.
 fn refracted_normal(n1: f64, n2: f64, sine: f64, cosine: f64) -> Option<f64> {
-    // n₂ − n₁ sin θ₁; towards grazing incidence the sine has rounded to 1 and the cosine carries the digits.
+    // n₂ − n₁ sin θ₁; towards grazing incidence the sine has rounded to 1 and the cosine carries
+    // the digits.
     let margin = if sine > 0.8 {
         margin_from_cosine(n1, n2, sine, cosine)
     } else {
@@ -131,13 +136,15 @@ fn refracted_normal(n1: f64, n2: f64, sine: f64, cosine: f64) -> Option<f64> {
     (margin >= 0.0).then(|| margin.sqrt() * (n2 + n1 * sine).sqrt())
 }
 
-/// n₂ − n₁ sin θ₁ as (n₂ − n₁) + n₁ cos² θ₁/(1 + sin θ₁), which keeps its digits where sin θ₁ is near 1.
+/// n₂ − n₁ sin θ₁ as (n₂ − n₁) + n₁ cos² θ₁/(1 + sin θ₁), which keeps its digits where sin θ₁ is
+/// near 1.
 fn margin_from_cosine(n1: f64, n2: f64, sine: f64, cosine: f64) -> f64 {
     (n2 - n1) + n1 * (cosine / (1.0 + sine)) * cosine
 }
 
-/// Transmittance of unpolarised light and n₂ cos θ₂, or `None` when reflection is total: the part of Fresnel's formulas that a
-/// ray tracer needs, without angles and without fused multiply–adds (slow where the processor is not known to have them).
+/// Transmittance of unpolarised light and n₂ cos θ₂, or `None` when reflection is total. This is
+/// the part of Fresnel's formulas that a ray tracer needs, without angles and without fused
+/// multiply–adds (slow where the processor is not known to have them).
 pub(crate) fn crossing(n1: f64, n2: f64, sine: f64, cosine: f64) -> Option<(f64, f64)> {
     let margin = margin_from_cosine(n1, n2, sine, cosine);
     if margin <= 0.0 {
@@ -150,8 +157,8 @@ pub(crate) fn crossing(n1: f64, n2: f64, sine: f64, cosine: f64) -> Option<(f64,
     Some((two * a * b * ((s * s).recip() + (p * p).recip()), b))
 }
 
-/// a·b − c·d with one rounding of each product removed (Kahan): the error is below 1.5 ulp of the result
-/// (C.-P. Jeannerod, N. Louvet, J.-M. Muller, Math. Comp. 82 (2013) 2245–2264).
+/// a·b − c·d with one rounding of each product removed (Kahan): the error is below 1.5 ulp of the
+/// result (C.-P. Jeannerod, N. Louvet, J.-M. Muller, Math. Comp. 82 (2013) 2245–2264).
 fn difference_of_products(a: f64, b: f64, c: f64, d: f64) -> f64 {
     let cd = c * d;
     let error = (-c).mul_add(d, cd);

@@ -1,4 +1,5 @@
-//! The LED at the slab's edge: its radiation pattern, and the share of its light that a layer traps.
+//! The LED at the slab's edge: its radiation pattern, and the share of its light that a layer
+//! traps.
 
 use core::f64::consts::{FRAC_2_PI, FRAC_PI_2, PI};
 
@@ -59,10 +60,12 @@ impl Default for Led {
 }
 
 impl Led {
-    /// Intensity ∝ cosᵐ θ for θ below `half_angle`; m = 1 is Lambertian (the default), m = 0 even.
+    /// Intensity ∝ cosᵐ θ for θ below `half_angle`. An exponent of 1 is Lambertian (the default),
+    /// one of 0 even.
     ///
     /// # Errors
-    /// [`OpticsError::OutOfRange`] for an exponent outside 0 to 1000 or a half angle outside (0, π/2].
+    /// [`OpticsError::OutOfRange`] for an exponent outside 0 to 1000 or a half angle outside (0,
+    /// π/2].
     pub fn new(exponent: f64, half_angle: f64) -> Result<Self, OpticsError> {
         within("exponent of the radiation pattern", exponent, 0.0, 1000.0)?;
         within(
@@ -77,20 +80,23 @@ impl Led {
         })
     }
 
-    /// The pattern whose intensity has halved at `angle`, as data sheets state it: m = ln ½ / ln cos(angle).
+    /// The pattern whose intensity has halved at `angle`, as data sheets state it: m = ln ½ / ln
+    /// cos(angle).
     ///
     /// # Errors
-    /// [`OpticsError::OutOfRange`] for an angle outside 0.04 to 1.57 (beyond which m leaves 0 to 1000).
+    /// [`OpticsError::OutOfRange`] for an angle outside 0.04 to 1.57 (beyond which m leaves 0 to
+    /// 1000).
     pub fn from_half_intensity_angle(angle: f64) -> Result<Self, OpticsError> {
         within("half-intensity angle", angle, 0.04, 1.57)?;
         Self::new(0.5_f64.ln() / angle.cos().ln(), FRAC_PI_2)
     }
 
-    /// The share of the LED's light that a layer of this acceptance angle traps, before losses at the entry.
+    /// The share of the LED's light that a layer of this acceptance angle traps, before losses at
+    /// the entry.
     ///
-    /// In a section, ∫₀^θᵢ cosᵐ / ∫₀^h cosᵐ. In space a ray is trapped while its slope out of the layer's plane is below
-    /// S = sin θᵢ: of the directions at θ from the axis that is the part (2/π) asin(min(1, S/sin θ)). Gauss–Legendre
-    /// quadrature, some 10⁻¹² in `f64`.
+    /// In a section, ∫₀^θᵢ cosᵐ / ∫₀^h cosᵐ. In space a ray is trapped while its slope out of the
+    /// layer's plane is below S = sin θᵢ: of the directions at θ from the axis that is the part
+    /// (2/π) asin(min(1, S/sin θ)). Gauss–Legendre quadrature, some 10⁻¹² in `f64`.
     ///
     /// ```
     /// use tactile_optics::{Geometry, Led, acceptance_angle};
@@ -106,7 +112,8 @@ impl Led {
         }
         let flux = |t: f64| t.cos().max(0.0).powf(self.exponent) * t.sin();
         let slope = acceptance.radians.sin();
-        // Beyond θᵢ the trapped part falls with an infinite slope; substituting θ = θᵢ + t² removes it.
+        // Beyond θᵢ the trapped part falls with an infinite slope; substituting θ = θᵢ + t² removes
+        // it.
         let outer = |t: f64| {
             let theta = limit + t * t;
             let part = (slope / theta.sin()).min(1.0).asin() * FRAC_2_PI;
@@ -117,8 +124,9 @@ impl Led {
         trapped / integral(0.0, self.half_angle, flux)
     }
 
-    /// The direction that two numbers in [0, 1) stand for: components along the axis, across it in the slab's plane, and
-    /// along the slab's normal; and the weight of the direction, 1 on average.
+    /// The direction that two numbers in [0, 1) stand for: components along the axis, across it in
+    /// the slab's plane, and along the slab's normal. Returned with the weight of the direction, 1
+    /// on average.
     pub(crate) fn direction(&self, u: f64, v: f64, geometry: Geometry) -> ([f64; 3], f64) {
         let one = 1.0;
         if geometry == Geometry::Section {

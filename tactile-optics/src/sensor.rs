@@ -72,16 +72,17 @@ pub struct SensorSpecification {
     pub grid_elements: f64,
     /// Seconds between frames: 12.5 ms at the paper's 80 frames per second.
     pub temporal_resolution_s: f64,
-    /// The smallest force distinguished from none, in newtons: k σ_pixel √pixels × √2 × newtons per grey level, k the number
-    /// of standard deviations asked for. The √2 is the reference frame's noise, which is as large as the frame's.
+    /// The smallest force distinguished from none, in newtons: k σ_pixel √pixels × √2 × newtons per
+    /// grey level, k the number of standard deviations asked for. The √2 is the reference frame's
+    /// noise, which is as large as the frame's.
     pub force_resolution_n: f64,
     /// Number of forces distinguished between none and the largest.
     pub force_levels: f64,
 }
 
 impl SensorSpecification {
-    /// The sensor's force sensitivity in newtons, 2.5 mN, as the paper's text gives it. Table 1 swaps it with
-    /// [`FINGERTIP_FORCE_SENSITIVITY_N`](Self::FINGERTIP_FORCE_SENSITIVITY_N).
+    /// The sensor's force sensitivity in newtons, 2.5 mN, as the paper's text gives it. Table 1
+    /// swaps it with [`FINGERTIP_FORCE_SENSITIVITY_N`](Self::FINGERTIP_FORCE_SENSITIVITY_N).
     pub const PAPER_FORCE_SENSITIVITY_N: f64 = 2.5e-3;
 
     /// The force sensitivity of a human fingertip in newtons, 20 mN, as the paper's text gives it.
@@ -89,10 +90,12 @@ impl SensorSpecification {
 }
 
 impl SensorSpecification {
-    /// The specification of a sensor whose smallest force stands out by `sigmas` standard deviations of the noise.
+    /// The specification of a sensor whose smallest force stands out by `sigmas` standard
+    /// deviations of the noise.
     ///
     /// # Errors
-    /// [`OpticsError::OutOfRange`] for a parameter that is not positive and finite; the noise may be zero.
+    /// [`OpticsError::OutOfRange`] for a parameter that is not positive and finite. The noise may
+    /// be zero.
     pub fn new(parameters: &SensorParameters, sigmas: f64) -> Result<Self, OpticsError> {
         let p = parameters;
         for (name, value) in [

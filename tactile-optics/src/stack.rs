@@ -1,15 +1,17 @@
-//! A stack of plane layers with the same ambient on both sides, given by the refractive indices from the object's side to the
-//! glass.
+//! A stack of plane layers with the same ambient on both sides, given by the refractive indices
+//! from the object's side to the glass.
 //!
-//! Critical, acceptance and propagation angles are per layer: call [`critical_angle`](crate::critical_angle),
-//! [`acceptance_angle`] or [`propagation`](crate::propagation) on the index wanted.
+//! Critical, acceptance and propagation angles are per layer: call
+//! [`critical_angle`](crate::critical_angle), [`acceptance_angle`] or
+//! [`propagation`](crate::propagation) on the index wanted.
 
 use core::f64::consts::PI;
 
 use crate::angle::{Angle, acceptance_angle};
 use crate::error::{OpticsError, index, within};
 
-/// Transmittance and reflectance of a lossless stack at normal incidence, from [`normal_incidence`].
+/// Transmittance and reflectance of a lossless stack at normal incidence, from
+/// [`normal_incidence`].
 ///
 /// ```
 /// use tactile_optics::normal_incidence;
@@ -32,7 +34,8 @@ pub struct NormalIncidence {
     pub reflectance: f64,
 }
 
-/// The comparison of an LED's cone of light with the acceptance angles of a stack, from [`led_cone`].
+/// The comparison of an LED's cone of light with the acceptance angles of a stack, from
+/// [`led_cone`].
 ///
 /// ```
 /// use tactile_optics::led_cone;
@@ -50,19 +53,23 @@ pub struct LedCone {
     pub full_angle: f64,
     /// The smallest acceptance angle of the layers.
     pub weakest: Angle,
-    /// The largest full angle trapped, twice the weakest layer's acceptance angle, less the cone's. Negative: that much
-    /// too wide. A cone of less than π inside a stack that traps every ray has at least π less its own angle.
+    /// The largest full angle trapped, twice the weakest layer's acceptance angle, less the cone's.
+    /// Negative: that much too wide. A cone of less than π inside a stack that traps every ray has
+    /// at least π less its own angle.
     pub margin: f64,
     /// Whether every ray of the cone is trapped.
     pub trapped: bool,
 }
 
-/// Transmittance and reflectance at normal incidence of layers with these `indices`, ambient to ambient, without interference.
+/// Transmittance and reflectance at normal incidence of layers with these `indices`, ambient to
+/// ambient, without interference.
 ///
-/// Rⱼ/(1 − Rⱼ) = (a − b)²/(4ab) and 1 − Rⱼ = 4ab/(a + b)² at the interface of indices a and b. O(layers).
+/// Rⱼ/(1 − Rⱼ) = (a − b)²/(4ab) and 1 − Rⱼ = 4ab/(a + b)² at the interface of indices a and b.
+/// O(layers).
 ///
 /// # Errors
-/// [`OpticsError::Empty`] without layers, [`OpticsError::OutOfRange`] for an index that is not positive and finite.
+/// [`OpticsError::Empty`] without layers, [`OpticsError::OutOfRange`] for an index that is not
+/// positive and finite.
 ///
 /// ```
 /// use tactile_optics::normal_incidence;
@@ -91,12 +98,12 @@ pub fn normal_incidence(indices: &[f64], ambient: f64) -> Result<NormalIncidence
     })
 }
 
-/// Whether the cone of an LED at the edge of layers with these `indices` is trapped by every layer: its full angle must stay
-/// under 2·min θᵢ.
+/// Whether the cone of an LED at the edge of layers with these `indices` is trapped by every layer:
+/// its full angle must stay under 2·min θᵢ.
 ///
 /// # Errors
-/// [`OpticsError::Empty`] without layers; [`OpticsError::OutOfRange`] for an index that is not positive and finite, or a full
-/// angle outside 0 to π.
+/// [`OpticsError::Empty`] without layers. [`OpticsError::OutOfRange`] for an index that is not
+/// positive and finite, or a full angle outside 0 to π.
 ///
 /// ```
 /// use tactile_optics::led_cone;

@@ -7,7 +7,8 @@ use num_traits::Float;
 
 use crate::error::{OpticsError, within};
 
-/// An object in optical contact with the slab: light that enters it is scattered back evenly or lost.
+/// An object in optical contact with the slab: light that enters it is scattered back evenly or
+/// lost.
 ///
 /// ```
 /// use tactile_optics::surface::{Flat, TopSurface, Touched, TouchingObject};
@@ -21,12 +22,13 @@ use crate::error::{OpticsError, within};
 pub struct TouchingObject {
     /// Refractive index of the object.
     pub index: f64,
-    /// Share of the light entering the object that it scatters back, as a Lambertian emitter in the slab's top layer.
+    /// Share of the light entering the object that it scatters back, as a Lambertian emitter in the
+    /// slab's top layer.
     pub albedo: f64,
 }
 
-/// The shape of the slab's top. Coordinates in metres: x along the LED's axis from the lit edge, y across, z up from
-/// the undeformed top.
+/// The shape of the slab's top. Coordinates in metres: x along the LED's axis from the lit edge, y
+/// across, z up from the undeformed top.
 ///
 /// ```
 /// use tactile_optics::surface::{TopSurface, TouchingObject};
@@ -62,18 +64,18 @@ pub struct TouchingObject {
 /// # Ok::<(), tactile_optics::OpticsError>(())
 /// ```
 pub trait TopSurface {
-    /// Height above the undeformed top, in metres; negative under load.
+    /// Height above the undeformed top, in metres. Negative under load.
     fn height(&self, x: f64, y: f64) -> f64;
     /// Its slopes along x and y.
     fn gradient(&self, x: f64, y: f64) -> [f64; 2];
-    /// A bound on the slope's size anywhere: rays step towards the surface no faster than it allows, so that no intersection is
-    /// missed.
+    /// A bound on the slope's size anywhere: rays step towards the surface no faster than it
+    /// allows, so that no intersection is missed.
     fn steepest(&self) -> f64;
     /// The deepest point below the undeformed top, in metres, as a positive number.
     fn deepest(&self) -> f64;
     /// The range of x outside which the top is flat and untouched.
     fn support(&self) -> [f64; 2];
-    /// The object that touches the slab at a point; `None` where the ambient does.
+    /// The object that touches the slab at a point. `None` where the ambient does.
     fn touching(&self, _x: f64, _y: f64) -> Option<TouchingObject> {
         None
     }
@@ -108,7 +110,8 @@ impl TopSurface for Flat {
     }
 }
 
-/// A round dimple z = −d cos²(πr/2w) for r < w, flat beyond; its steepest slope is πd/2w, halfway down.
+/// A round dimple z = −d cos²(πr/2w) for r < w, flat beyond. Its steepest slope is πd/2w, halfway
+/// down.
 ///
 /// ```
 /// use tactile_optics::surface::{Dimple, TopSurface};
@@ -132,8 +135,8 @@ impl Dimple {
     /// A dimple around `centre_m` (x, y) of half width w and depth d in metres.
     ///
     /// # Errors
-    /// [`OpticsError::OutOfRange`] for a centre that is not finite, a half width that is not positive or a depth that is
-    /// negative.
+    /// [`OpticsError::OutOfRange`] for a centre that is not finite, a half width that is not
+    /// positive or a depth that is negative.
     pub fn new(centre_m: [f64; 2], half_width_m: f64, depth_m: f64) -> Result<Self, OpticsError> {
         for c in centre_m {
             within("centre of the dimple", c, -1e6, 1e6)?;
@@ -216,7 +219,8 @@ impl<S: TopSurface> Touched<S> {
     /// `surface` with `object` touching it within `radius_m` of `centre_m`.
     ///
     /// # Errors
-    /// [`OpticsError::OutOfRange`] for an index that is not positive, an albedo outside 0 to 1, or a circle without meaning.
+    /// [`OpticsError::OutOfRange`] for an index that is not positive, an albedo outside 0 to 1, or
+    /// a circle without meaning.
     pub fn new(
         surface: S,
         object: TouchingObject,
@@ -276,10 +280,12 @@ impl<S: TopSurface> TopSurface for Touched<S> {
     }
 }
 
-/// The first intersection of a ray with the surface inside its support, at a distance along the ray between `from` and `to`.
+/// The first intersection of a ray with the surface inside its support, at a distance along the ray
+/// between `from` and `to`.
 ///
-/// g = height − z is the gap above the ray. It closes no faster than u_z + L·√(u_x² + u_y²) with L the steepest slope, so
-/// a step of gap over that rate never jumps a crossing; steps are taken until the gap is below `tolerance`.
+/// g = height − z is the gap above the ray. It closes no faster than u_z + L·√(u_x² + u_y²) with L
+/// the steepest slope, so a step of gap over that rate never jumps a crossing. Steps are taken
+/// until the gap is below `tolerance`.
 pub(crate) fn march<S: TopSurface + ?Sized>(
     surface: &S,
     position: &[f64; 3],
@@ -311,7 +317,8 @@ pub(crate) fn march<S: TopSurface + ?Sized>(
     approach(gap, [t, g], to, closing, tolerance)
 }
 
-/// Steps from the distance t, where the gap is g, until the gap is below `tolerance`; it closes no faster than `closing`.
+/// Steps from the distance t, where the gap is g, until the gap is below `tolerance`. It closes no
+/// faster than `closing`.
 #[inline]
 fn approach(
     gap: impl Fn(f64) -> f64,
@@ -411,8 +418,8 @@ mod tests {
                 let found = march(&dimple, &p, &u, [0.0, 1.2], tolerance);
                 match (found, scanned(&dimple, &p, &u, 1.2)) {
                     (Meeting::At(t), Some(expected)) => {
-                        // Stopping at a gap of the tolerance is early by it over the closing speed, which is small where
-                        // the ray grazes.
+                        // Stopping at a gap of the tolerance is early by it over the closing speed,
+                        // which is small where the ray grazes.
                         assert!((t - expected).abs() < 1e-5, "{i} {j}: {t} {expected}");
                         met += 1;
                     }

@@ -1,21 +1,23 @@
 //! Ray tracing through the slab: the budget of an LED's light.
 //!
-//! Light enters through the edge x = 0 and travels along x between the top (deformed, possibly touched by an object) and
-//! the bottom, beyond which the camera looks up. At every interface its power is split by Fresnel's coefficients for
-//! unpolarised light and both parts are followed; what leaves the slab is counted. In the undeformed slab light within
-//! the acceptance angle is totally reflected for good. A press breaks this twice: the top's slope turns rays towards the
-//! normal, by twice the slope at each reflection, until they leave; and a touching object lets light out of the top
-//! whatever its angle and scatters it back in all directions, some of them towards the camera.
+//! Light enters through the edge x = 0 and travels along x between the top (deformed, possibly
+//! touched by an object) and the bottom, beyond which the camera looks up. At every interface its
+//! power is split by Fresnel's coefficients for unpolarised light and both parts are followed. What
+//! leaves the slab is counted. In the undeformed slab light within the acceptance angle is totally
+//! reflected for good. A press breaks this twice: the top's slope turns rays towards the normal, by
+//! twice the slope at each reflection, until they leave. A touching object lets light out of the
+//! top whatever its angle and scatters it back in all directions, some of them towards the camera.
 //!
-//! Ray optics only: no interference, no polarisation kept from one interface to the next, no absorption in the layers.
+//! Ray optics only: no interference, no polarisation kept from one interface to the next, no
+//! absorption in the layers.
 //!
-//! Rays start on evenly spread points, so the budget converges much faster than with random ones (nearly as the inverse
-//! of the number of rays for a flat slab). Cost: O(rays × events), events being reflections until the light has left or
-//! falls below the cut-off.
+//! Rays start on evenly spread points, so the budget converges much faster than with random ones
+//! (nearly as the inverse of the number of rays for a flat slab). Cost: O(rays × events), events
+//! being reflections until the light has left or falls below the cut-off.
 //!
-//! Points follow the additive recurrence with the powers of 1/φ_d, φ_d^(d+1) = φ_d + 1 (M. Roberts, "The unreasonable
-//! effectiveness of quasirandom sequences", 2018), in 64-bit fixed point, so that no precision is lost however many
-//! rays are shot; the seed shifts them.
+//! Points follow the additive recurrence with the powers of 1/φ_d, φ_d^(d+1) = φ_d + 1 (M. Roberts,
+//! "The unreasonable effectiveness of quasirandom sequences", 2018), in 64-bit fixed point, so that
+//! no precision is lost however many rays are shot. The seed shifts them.
 
 use core::f64::consts::{FRAC_PI_2, FRAC_PI_6, PI};
 
@@ -64,11 +66,12 @@ pub struct Slab<'a> {
 }
 
 impl<'a> Slab<'a> {
-    /// `layers` from the top down, in an `ambient` index, `length_m` from the lit edge to the far one.
+    /// `layers` from the top down, in an `ambient` index, `length_m` from the lit edge to the far
+    /// one.
     ///
     /// # Errors
-    /// [`OpticsError::Empty`] without layers; [`OpticsError::OutOfRange`] for an index, thickness or length that is not
-    /// positive and finite.
+    /// [`OpticsError::Empty`] without layers. [`OpticsError::OutOfRange`] for an index, thickness
+    /// or length that is not positive and finite.
     pub fn new(layers: &'a [SlabLayer], ambient: f64, length_m: f64) -> Result<Self, OpticsError> {
         if layers.is_empty() {
             return Err(OpticsError::Empty { quantity: "slab" });
@@ -99,8 +102,9 @@ impl<'a> Slab<'a> {
 
 /// Traces the LED's rays through the slab under `surface` and returns the light budget.
 ///
-/// `camera_profile`, if not empty, receives the light reaching the camera by where along the slab it left, in equal bins
-/// from x = 0 to the length; it is overwritten, and its sum is [`LightBudget::camera`].
+/// `camera_profile`, if not empty, receives the light reaching the camera by where along the slab
+/// it left, in equal bins from x = 0 to the length. It is overwritten, and its sum is
+/// [`LightBudget::camera`].
 ///
 /// # Errors
 /// [`OpticsError::OutOfRange`] for a surface deeper than the top layer.
@@ -155,7 +159,7 @@ pub fn trace<S: TopSurface + ?Sized>(
     Ok(tracer.tally.budget(total))
 }
 
-/// A tracer of an empty budget; refuses a surface that reaches below the top layer.
+/// A tracer of an empty budget. Refuses a surface that reaches below the top layer.
 fn new_tracer<'a, 's, S: TopSurface + ?Sized>(
     slab: &'a Slab<'s>,
     surface: &'a S,
@@ -181,7 +185,8 @@ fn new_tracer<'a, 's, S: TopSurface + ?Sized>(
     })
 }
 
-/// The ray inside the slab, at the share `z` of its thickness from the top, and the edge's transmittance.
+/// The ray inside the slab, at the share `z` of its thickness from the top, and the edge's
+/// transmittance.
 fn launch(slab: &Slab<'_>, z: f64, y: f64, outside: [f64; 3]) -> (Ray, f64) {
     let mut depth = z * slab.thickness_m();
     let mut layer = 0;
@@ -234,11 +239,14 @@ pub struct TraceOptions {
 }
 
 impl Default for TraceOptions {
-    /// 4096 rays in space, cut off at 10⁻⁶, a camera that sees 30° around its axis, an LED that is a point.
+    /// 4096 rays in space, cut off at 10⁻⁶, a camera that sees 30° around its axis, an LED that is
+    /// a point.
     fn default() -> Self {
         Self {
             geometry: Geometry::Volume,
-            // The guided share to 2×10⁻⁴ in 20 ms: `cargo bench -p tactile-benches --bench work_precision -- optics` shows what more rays buy.
+            // The guided share to 2×10⁻⁴ in 20 ms:
+            // `cargo bench -p tactile-benches --bench work_precision -- optics` shows what more
+            // rays buy.
             rays: 4096,
             seed: 1,
             cutoff: 1e-6,
@@ -280,7 +288,8 @@ impl TraceOptions {
         Ok(self)
     }
 
-    /// Counts rays that leave the bottom within this angle of its normal (radians) as seen by the camera.
+    /// Counts rays that leave the bottom within this angle of its normal (radians) as seen by the
+    /// camera.
     ///
     /// # Errors
     /// [`OpticsError::OutOfRange`] outside 0 to π/2.
@@ -301,7 +310,7 @@ impl TraceOptions {
     }
 }
 
-/// Shares of the LED's light by where it ended; they add up to 1 to rounding.
+/// Shares of the LED's light by where it ended. They add up to 1 to rounding.
 ///
 /// ```
 /// use tactile_optics::Led;
@@ -397,13 +406,15 @@ impl Tally {
     }
 }
 
-/// Follows the stronger part of one ray and writes its vertices (x, y, z in metres, z from the undeformed top) to
-/// `vertices`; returns how many were written. The ray enters the edge x = 0 in the plane y = 0 at `depth_share` of the
-/// slab's thickness, `angle` radians upwards from the LED's axis. It ends at an edge, where most of its light leaves
-/// through top or bottom, or where `vertices` is full.
+/// Follows the stronger part of one ray and writes its vertices (x, y, z in metres, z from the
+/// undeformed top) to `vertices`. Returns how many were written. The ray enters the edge x = 0 in
+/// the plane y = 0 at `depth_share` of the slab's thickness, `angle` radians upwards from the LED's
+/// axis. It ends at an edge, where most of its light leaves through top or bottom, or where
+/// `vertices` is full.
 ///
 /// # Errors
-/// [`OpticsError::OutOfRange`] for a share outside 0 to 1, an angle beyond a right one, or a surface deeper than the top layer.
+/// [`OpticsError::OutOfRange`] for a share outside 0 to 1, an angle beyond a right one, or a
+/// surface deeper than the top layer.
 ///
 /// ```
 /// use tactile_optics::surface::Flat;
@@ -446,7 +457,8 @@ pub fn path<S: TopSurface + ?Sized>(
     Ok(written)
 }
 
-/// The strongest of the parts into which the next obstacle splits a ray; `None` if more than half of its light leaves there.
+/// The strongest of the parts into which the next obstacle splits a ray. `None` if more than half
+/// of its light leaves there.
 fn stronger_part<S: TopSurface + ?Sized>(tracer: &mut Tracer<'_, '_, S>, ray: Ray) -> Option<Ray> {
     let mut waiting = Branches::new();
     let mut best = tracer.advance(ray, &mut waiting);
@@ -507,7 +519,7 @@ impl<S: TopSurface + ?Sized> Tracer<'_, '_, S> {
         }
     }
 
-    /// Moves the ray to its next obstacle; returns the part that continues, if any.
+    /// Moves the ray to its next obstacle. Returns the part that continues, if any.
     fn advance(&mut self, ray: Ray, branches: &mut Branches) -> Option<Ray> {
         let (distance, next) = self.next(&ray);
         let mut ray = Ray {
@@ -574,8 +586,8 @@ impl<S: TopSurface + ?Sized> Tracer<'_, '_, S> {
         }
     }
 
-    /// Where the ray meets the top before the distance `limit`: the plane z = 0 outside the surface's support, the surface
-    /// itself inside.
+    /// Where the ray meets the top before the distance `limit`: the plane z = 0 outside the
+    /// surface's support, the surface itself inside.
     fn meet_top(&self, ray: &Ray, limit: f64) -> Meeting {
         let zero = 0.0;
         let ([x, _, z], [ux, _, uz]) = (ray.position, ray.direction);
@@ -621,7 +633,8 @@ impl<S: TopSurface + ?Sized> Tracer<'_, '_, S> {
         }
     }
 
-    /// Splits a ray at the top: the transmitted part leaves, or enters the touching object and is scattered back or absorbed.
+    /// Splits a ray at the top: the transmitted part leaves, or enters the touching object and is
+    /// scattered back or absorbed.
     fn top(&mut self, mut ray: Ray, branches: &mut Branches) -> Option<Ray> {
         let [x, y, _] = ray.position;
         let [left, right] = self.surface.support();
@@ -687,7 +700,8 @@ impl<S: TopSurface + ?Sized> Tracer<'_, '_, S> {
         ray.mirrored(&normal, ray.power - transmitted)
     }
 
-    /// Splits a ray at an interface inside the slab: the refracted part continues, the reflected part waits as a branch.
+    /// Splits a ray at an interface inside the slab: the refracted part continues, the reflected
+    /// part waits as a branch.
     fn inside(&mut self, ray: Ray, beyond: usize, branches: &mut Branches) -> Option<Ray> {
         let normal = [0.0, 0.0, 1.0];
         let (n1, n2) = (
@@ -799,7 +813,7 @@ fn sine_between(a: &[f64; 3], b: &[f64; 3]) -> f64 {
     (x * x + y * y + z * z).sqrt().min(1.0)
 }
 
-/// Branches waiting to be followed; a fixed size, so that tracing never allocates.
+/// Branches waiting to be followed. A fixed size, so that tracing never allocates.
 #[derive(Debug)]
 struct Branches {
     rays: [Option<Ray>; 32],
@@ -814,7 +828,7 @@ impl Branches {
         }
     }
 
-    /// Stores a ray; false when the stack is full.
+    /// Stores a ray. False when the stack is full.
     fn push(&mut self, ray: Ray) -> bool {
         let Some(slot) = self.rays.get_mut(self.count) else {
             return false;
@@ -870,7 +884,8 @@ fn unit(bits: u64) -> f64 {
     (bits >> 11) as f64 / 9_007_199_254_740_992.0
 }
 
-/// SplitMix64's finaliser (G. Steele, D. Lea, C. Flood, OOPSLA 2014): a 64-bit number scattered over all bits.
+/// SplitMix64's finaliser (G. Steele, D. Lea, C. Flood, OOPSLA 2014): a 64-bit number scattered
+/// over all bits.
 fn hash(x: u64) -> u64 {
     let x = x.wrapping_add(0x9e37_79b9_7f4a_7c15);
     let x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);

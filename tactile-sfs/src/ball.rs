@@ -35,7 +35,8 @@ pub struct BallFit {
     pub centre_m: [f64; 2],
     /// Radius a of the circle where the cap meets depth zero, in metres.
     pub contact_radius_m: f64,
-    /// Mean absolute difference between heights and cap over the pixels inside that circle, in metres.
+    /// Mean absolute difference between heights and cap over the pixels inside that circle, in
+    /// metres.
     pub mean_absolute_error_m: f64,
     /// Number of those pixels.
     pub pixels: usize,
@@ -44,10 +45,11 @@ pub struct BallFit {
 }
 
 impl BallFit {
-    /// Fits a ball of radius `radius_m` by least squares over the centre and the height of its equator.
+    /// Fits a ball of radius `radius_m` by least squares over the centre and the height of its
+    /// equator.
     ///
-    /// Gauss–Newton, O(pixels) a step. `None` where fewer than 16 pixels have a height, where the heights are wider than
-    /// the ball, where no cap fits, or where the mask of the domain has another shape.
+    /// Gauss–Newton, O(pixels) a step. `None` where fewer than 16 pixels have a height, where they
+    /// are wider than the ball, or where no cap fits. Also for a mask of another shape.
     pub fn of_radius(
         heights: ArrayView2<'_, f64>,
         domain: &Domain<'_, f64>,
@@ -58,8 +60,9 @@ impl BallFit {
 
     /// Fits a ball of the radius with the least mean absolute error.
     ///
-    /// Takes the best of 60 radii, from the half width of the heights to a hundred times that, then a golden-section search
-    /// between its neighbours. 120 fits of a known radius. `None` as for [`of_radius`](Self::of_radius).
+    /// Takes the best of 60 radii, from the half width of the heights to a hundred times that, then
+    /// a golden-section search between its neighbours. 120 fits of a known radius. `None` as for
+    /// [`of_radius`](Self::of_radius).
     pub fn of_any_radius(heights: ArrayView2<'_, f64>, domain: &Domain<'_, f64>) -> Option<Self> {
         let pixels = pixels(heights, domain)?;
         let ([x, y], (rows, columns)) = (domain.pixel_size_m, heights.dim());
@@ -110,7 +113,8 @@ impl fmt::Display for BallFit {
     }
 }
 
-/// The pixels with a height as (x, y, z) in metres. `None` for a domain of another shape, or too few pixels to trust.
+/// The pixels with a height as (x, y, z) in metres. `None` for a domain of another shape, or too
+/// few pixels to trust.
 fn pixels(heights: ArrayView2<'_, f64>, domain: &Domain<'_, f64>) -> Option<Vec<[f64; 3]>> {
     domain.bounding_box(heights.dim()).ok()?;
     let [hx, hy] = domain.pixel_size_m;

@@ -1,7 +1,8 @@
 //! The image and mask of a contact on a coarser grid, ready for reconstruction.
 //!
-//! A contact of 10⁵ pixels carries 200 control points, and nobody asks for the heights between them. Means over blocks
-//! of pixels cost one pass, lower the noise by the block's width, and leave the reconstruction a small grid.
+//! A contact of 10⁵ pixels carries 200 control points, and nobody asks for the heights between
+//! them. Means over blocks of pixels cost one pass, lower the noise by the block's width, and leave
+//! the reconstruction a small grid.
 
 use ndarray::{Array2, ArrayView2, Axis, Slice, Zip, aview_mut1};
 
@@ -19,7 +20,8 @@ use crate::surface::fill_shape;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Binning {
-    /// Blocks as large as the control points allow: at least 16 of them inside the contact for every point.
+    /// Blocks as large as the control points allow: at least 16 of them inside the contact for
+    /// every point.
     #[default]
     Auto,
     /// Blocks of n × n pixels, with 1 for every pixel on its own.
@@ -27,18 +29,20 @@ pub enum Binning {
 }
 
 impl Binning {
-    /// Side of a block in pixels, for a contact of `pixels` with `points` control points. Never less than 1.
+    /// Side of a block in pixels, for a contact of `pixels` with `points` control points. Never
+    /// less than 1.
     pub fn side(self, pixels: usize, points: usize) -> usize {
         match self {
-            // With 16 blocks a point, points stand four or more blocks apart. Finer grids cost time, and neither heights
-            // nor strains become better.
+            // With 16 blocks a point, points stand four or more blocks apart. Finer grids cost
+            // time, and neither heights nor strains become better.
             Self::Auto => (pixels / (16 * points.max(1))).isqrt().max(1),
             Self::Blocks(side) => side.max(1),
         }
     }
 }
 
-/// A contact's signal and mask on a grid of square blocks, with the memory to fill them again without allocating.
+/// A contact's signal and mask on a grid of square blocks, with the memory to fill them again
+/// without allocating.
 ///
 /// ```
 /// use ndarray::{Array2, array};
@@ -64,9 +68,11 @@ pub struct BinnedContact {
 }
 
 impl BinnedContact {
-    /// Takes the mean differences frame − reference of blocks of `side` × `side` pixels, times `scale`.
+    /// Takes the mean differences frame − reference of blocks of `side` × `side` pixels, times
+    /// `scale`.
     ///
-    /// Both images start at the first block. Rows and columns that fill no whole block are left out. O(pixels).
+    /// Both images start at the first block. Rows and columns that fill no whole block are left
+    /// out. O(pixels).
     ///
     /// # Panics
     /// If the images differ in shape.
@@ -94,10 +100,11 @@ impl BinnedContact {
         }
     }
 
-    /// Marks the blocks of the loaded signal of which at least three quarters lie in `mask`. O(pixels).
+    /// Marks the blocks of the loaded signal of which at least three quarters lie in `mask`.
+    /// O(pixels).
     ///
-    /// With fewer, the contact's rim draws the surface down. The mask starts at the first block. It may be smaller than
-    /// the blocks, and beyond it nothing is contact.
+    /// With fewer, the contact's rim draws the surface down. The mask starts at the first block. It
+    /// may be smaller than the blocks, and beyond it nothing is contact.
     pub fn load_mask(&mut self, mask: ArrayView2<'_, bool>, side: usize) {
         let side = side.max(1);
         fill_shape(&mut self.mask, self.signal.dim(), false);
@@ -121,9 +128,10 @@ impl BinnedContact {
 
     /// Removes from the mask the pixels at the rim of a round contact that only the blur lights.
     ///
-    /// A hemisphere has the reflectance √(2d/a) at the distance d from the rim of its contact of radius a. Pixels darker
-    /// than that a quarter of a pixel inside the rim are partly covered, and would be cliffs of the surface. For a signal
-    /// between 0 and 1 on a grid of single pixels. O(pixels).
+    /// A hemisphere has the reflectance √(2d/a) at the distance d from the rim of its contact of
+    /// radius a. Pixels darker than that a quarter of a pixel inside the rim are partly covered,
+    /// and would be cliffs of the surface. For a signal between 0 and 1 on a grid of single pixels.
+    /// O(pixels).
     ///
     /// ```
     /// use ndarray::array;
@@ -135,7 +143,8 @@ impl BinnedContact {
     /// assert_eq!(contact.mask, array![[false, true, true, true]]);
     /// ```
     pub fn trim_rim(&mut self) {
-        // A whole ring less would cost the surface a quarter of its height, and more of a smaller contact's.
+        // A whole ring less would cost the surface a quarter of its height, and more of a smaller
+        // contact's.
         let distance_px = 0.25;
         let pixels = self.mask.iter().filter(|inside| **inside).count();
         let radius_px = (pixels as f64 / core::f64::consts::PI).sqrt();
@@ -146,9 +155,9 @@ impl BinnedContact {
 
     /// Smooths the signal by two passes of a box of `width` pixels along both axes.
     ///
-    /// That is nearly a Gaussian of standard deviation √((width² − 1)/6). `width` is odd, and 1 does nothing. Every value
-    /// moves from the sharp towards the smoothed one by the share `share(smoothed)`. Beyond the edge the last pixel is
-    /// continued. O(pixels × width).
+    /// That is nearly a Gaussian of standard deviation √((width² − 1)/6). `width` is odd, and 1
+    /// does nothing. Every value moves from the sharp towards the smoothed one by the share
+    /// `share(smoothed)`. Beyond the edge the last pixel is continued. O(pixels × width).
     ///
     /// ```
     /// use ndarray::Array2;
@@ -181,8 +190,8 @@ impl BinnedContact {
     }
 }
 
-/// Means over `width` neighbours of a row: the row is added up shifted, which for usual widths takes a fifth of the time of
-/// a running sum, whose every step waits for the one before.
+/// Means over `width` neighbours of a row. The row is added up shifted, which for usual widths
+/// takes a fifth of the time of a running sum, whose every step waits for the one before.
 fn mean_along(row: &mut [f64], line: &mut Vec<f64>, width: usize) {
     let (half, columns) = (width / 2, row.len());
     line.clear();

@@ -7,9 +7,10 @@ use crate::{BoundingBox, PixelScalar, SfsError};
 
 /// The pixels to solve for, their size, and what is known of the heights.
 ///
-/// `mask` selects the pixels whose height is wanted (all without one); nothing outside its bounding box is read or
-/// costs time. `known_heights` fixes heights where it is not NaN, inside the mask or outside it: a height known
-/// outside is a boundary value. Heights have the unit of `pixel_size_m`; [`Default`] is the whole image with heights in pixels.
+/// `mask` selects the pixels whose height is wanted (all without one). Nothing outside its bounding
+/// box is read or costs time. `known_heights` fixes heights where it is not NaN, inside the mask or
+/// outside it: a height known outside is a boundary value. Heights have the unit of `pixel_size_m`.
+/// [`Default`] is the whole image with heights in pixels.
 ///
 /// ```
 /// use ndarray::Array2;
@@ -22,7 +23,7 @@ use crate::{BoundingBox, PixelScalar, SfsError};
 /// ```
 #[derive(Clone, Copy, Debug)]
 pub struct Domain<'a, T> {
-    /// Pixels to solve for; all of them if `None`.
+    /// Pixels to solve for. All of them if `None`.
     pub mask: Option<ArrayView2<'a, bool>>,
     /// Width (x) and height (y) of a pixel in metres.
     pub pixel_size_m: [T; 2],
@@ -91,7 +92,8 @@ impl<'a, T: PixelScalar> Domain<'a, T> {
         Ok(())
     }
 
-    /// Checks the domain against an image of `shape` (rows, columns) and returns the box that holds the mask.
+    /// Checks the domain against an image of `shape` (rows, columns) and returns the box that holds
+    /// the mask.
     ///
     /// ```
     /// use ndarray::array;
@@ -104,8 +106,9 @@ impl<'a, T: PixelScalar> Domain<'a, T> {
     /// ```
     ///
     /// # Errors
-    /// [`SfsError::EmptyImage`], [`SfsError::EmptyMask`], [`SfsError::ShapeMismatch`] of the mask or the known heights,
-    /// [`SfsError::InvalidOption`] for a pixel size that is not positive and finite.
+    /// [`SfsError::EmptyImage`], [`SfsError::EmptyMask`], [`SfsError::ShapeMismatch`] of the mask
+    /// or the known heights, [`SfsError::InvalidOption`] for a pixel size that is not positive and
+    /// finite.
     pub fn bounding_box(&self, shape: (usize, usize)) -> Result<BoundingBox, SfsError> {
         self.check_pixel_size()?;
         let (rows, columns) = shape;

@@ -4,7 +4,8 @@ use ndarray::ArrayView2;
 
 use crate::PixelScalar;
 
-/// An image as the reconstructions take it: real intensities or 8-bit grey levels (0 … 255, not rescaled).
+/// An image as the reconstructions take it: real intensities or 8-bit grey levels (0 … 255, not
+/// rescaled).
 ///
 /// ```
 /// use ndarray::array;

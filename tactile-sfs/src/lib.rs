@@ -1,25 +1,30 @@
 //! Surfaces from one image: shape from shading, slope integration, control points.
 //!
 //! Three traits, each with several implementations: [`SurfaceReconstruction`] (image → heights),
-//! [`SlopeIntegrator`] (slopes → heights) and [`ControlPointSampler`] (surface → points). All work on a [`Domain`]
-//! (mask, pixel size, known heights), for `f32` and `f64`.
+//! [`SlopeIntegrator`] (slopes → heights) and [`ControlPointSampler`] (surface → points). All work
+//! on a [`Domain`] (mask, pixel size, known heights), for `f32` and `f64`.
 //!
-//! Images are indexed `[row, column]`; x is the column, y the row, z points to the viewer; a pixel's coordinate is its
-//! centre. Slopes are p = ∂z/∂x and q = ∂z/∂y. See [`Lighting`] for the sign of the light's direction.
+//! Images are indexed `[row, column]`. Here x is the column, y the row, z points to the viewer. A
+//! pixel's coordinate is its centre. Slopes are p = ∂z/∂x and q = ∂z/∂y. See [`Lighting`] for the
+//! sign of the light's direction.
 //!
 #![doc = include_str!("../README.md")]
 //!
 //! # Equations
-//! Heights $z$, slopes $p = \partial z/\partial x$ and $q = \partial z/\partial y$, light $s$, reflectance $R$; N is the number of pixels.
+//! Heights $z$, slopes $p = \partial z/\partial x$ and $q = \partial z/\partial y$, light $s$,
+//! reflectance $R$. N is the number of pixels.
 //!
 //! - Lambert: $R = n \cdot s$ with $n = (-p, -q, 1)/\sqrt{1 + p^2 + q^2}$.
 //! - Eikonal, frontal light: $|\nabla z| = \sqrt{1/R^2 - 1}$. A few sweeps, O(N).
-//! - Brooks–Horn: least $\int (R - n \cdot s)^2 + \lambda |\nabla n|^2$ over unit normals. O(N log N) a projection.
-//! - Slopes to heights, Poisson: $\Delta z = \partial p/\partial x + \partial q/\partial y$. By cosine transform O(N log N), error $O(h^4)$.
+//! - Brooks–Horn: least $\int (R - n \cdot s)^2 + \lambda |\nabla n|^2$ over unit normals. O(N log
+//!   N) a projection.
+//! - Slopes to heights, Poisson: $\Delta z = \partial p/\partial x + \partial q/\partial y$. By
+//!   cosine transform O(N log N), error $O(h^4)$.
 //! - Frankot–Chellappa: $\hat Z = -i (u \hat P + v \hat Q)/(u^2 + v^2)$, periodic. O(N log N).
-//! - Tsai–Shah: a damped Newton step $z - K f(z)$ on $f = R - n \cdot s$, pixel by pixel. O(N) an iteration.
+//! - Tsai–Shah: a damped Newton step $z - K f(z)$ on $f = R - n \cdot s$, pixel by pixel. O(N) an
+//!   iteration.
 //!
-//! Errors are [`SfsError`]; not converging is a [`SurfaceReport`].
+//! Errors are [`SfsError`]. Not converging is a [`SurfaceReport`].
 #![forbid(unsafe_code)]
 
 mod ball;

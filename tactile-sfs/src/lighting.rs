@@ -3,16 +3,18 @@
 use crate::{PixelScalar, SfsError};
 use tactile_core::Requirement;
 
-/// Distant light on a Lambertian surface: I = ambient + I₀ · max(0, n·s), with I₀ the light's intensity times the albedo.
+/// Distant light on a Lambertian surface: I = ambient + I₀ · max(0, n·s), with I₀ the light's
+/// intensity times the albedo.
 ///
 /// [`Default`] is light from the viewer, ambient 0 and intensity 1 at normal incidence.
 ///
 /// # Convention
 ///
-/// x is the column, y the row (so y points *down* the image), z points from the surface to the viewer. A surface
-/// z(x, y) with slopes p = ∂z/∂x and q = ∂z/∂y has the normal n = (−p, −q, 1)/√(1 + p² + q²). `direction` points
-/// *from the surface to the light*: (1, 0, 1) is a light to the right of the image, 45° above the surface, and it
-/// brightens slopes that fall to the right. Texts whose y points up need the sign of y changed.
+/// x is the column, y the row (so y points *down* the image), z points from the surface to the
+/// viewer. A surface z(x, y) with slopes p = ∂z/∂x and q = ∂z/∂y has the normal n = (−p, −q, 1)/√(1
+/// + p² + q²). `direction` points *from the surface to the light*: (1, 0, 1) is a light to the
+/// right of the image, 45° above the surface. It brightens slopes that fall to the right. Texts
+/// whose y points up need the sign of y changed.
 ///
 /// ```
 /// use tactile_sfs::Lighting;
@@ -44,7 +46,8 @@ impl<T: PixelScalar> Lighting<T> {
     /// Light from `direction` (any length), ambient 0 and intensity 1 at normal incidence.
     ///
     /// # Errors
-    /// [`SfsError::InvalidOption`] for a direction that is zero or not finite, [`SfsError::LightFromBelow`] for z ≤ 0.
+    /// [`SfsError::InvalidOption`] for a direction that is zero or not finite,
+    /// [`SfsError::LightFromBelow`] for z ≤ 0.
     pub fn new(direction: [T; 3]) -> Result<Self, SfsError> {
         let [x, y, z] = direction.map(T::as_f64);
         let length = (x * x + y * y + z * z).sqrt();
@@ -68,8 +71,9 @@ impl<T: PixelScalar> Lighting<T> {
         Ok(Self { ambient, ..self })
     }
 
-    /// I₀, what the surface facing the light adds to the ambient: 255 for a full-range 8-bit frame. Where some part of the surface
-    /// faces the light, a high quantile of the image (0.995 leaves out single bright pixels) less the ambient.
+    /// I₀, what the surface facing the light adds to the ambient: 255 for a full-range 8-bit frame.
+    /// Where some part of the surface faces the light, a high quantile of the image (0.995 leaves
+    /// out single bright pixels) less the ambient.
     ///
     /// # Errors
     /// [`SfsError::InvalidOption`] unless positive and finite.
@@ -106,7 +110,8 @@ impl<T: PixelScalar> Lighting<T> {
         self.ambient + self.normal_intensity * reflectance
     }
 
-    /// Intensity of a surface element with slopes p = ∂z/∂x and q = ∂z/∂y; attached shadows get the ambient.
+    /// Intensity of a surface element with slopes p = ∂z/∂x and q = ∂z/∂y. Attached shadows get the
+    /// ambient.
     ///
     /// ```
     /// use tactile_sfs::Lighting;

@@ -1,4 +1,5 @@
-//! Errors of a surface: of its heights against the truth, or of its shading against the image, a check that needs no truth.
+//! Errors of a surface: of its heights against the truth, or of its shading against the image, a
+//! check that needs no truth.
 
 use ndarray::{Array2, ArrayView2};
 
@@ -109,7 +110,7 @@ pub struct HeightError {
 /// ```
 ///
 /// # Errors
-/// [`SfsError::ShapeMismatch`]; [`SfsError::EmptyMask`] if no pixel can be compared.
+/// [`SfsError::ShapeMismatch`]. [`SfsError::EmptyMask`] if no pixel can be compared.
 pub fn height_error<T: PixelScalar>(
     heights: ArrayView2<'_, T>,
     truth: ArrayView2<'_, T>,
@@ -176,8 +177,9 @@ fn align(pairs: &[(f64, f64)], alignment: Alignment) -> (f64, f64) {
     }
 }
 
-/// Slopes p = ∂z/∂x and q = ∂z/∂y: central differences, one-sided next to missing (NaN) heights or the frame's border,
-/// NaN where the height is missing and 0 along an axis without neighbours. Second order inside, first at borders.
+/// Slopes p = ∂z/∂x and q = ∂z/∂y: central differences, one-sided next to missing (NaN) heights or
+/// the frame's border. NaN where the height is missing and 0 along an axis without neighbours.
+/// Second order inside, first at borders.
 ///
 /// ```
 /// use ndarray::array;
@@ -228,7 +230,7 @@ pub(crate) fn slopes_at<T: PixelScalar>(
     [x, y]
 }
 
-/// Shades a surface; NaN where it has no height.
+/// Shades a surface. NaN where it has no height.
 ///
 /// ```
 /// use ndarray::Array2;
@@ -250,10 +252,11 @@ pub fn render<T: PixelScalar>(
     })
 }
 
-/// Renders a surface and compares it with the image it was made from: rendered minus observed intensity (NaN where there is no
-/// height), and a summary of it in the image's unit.
+/// Renders a surface and compares it with the image it was made from. Returns rendered minus
+/// observed intensity (NaN where there is no height), and a summary of it in the image's unit.
 ///
-/// A small residual does not prove the surface right (convex and concave look alike), a large one proves it wrong.
+/// A small residual does not prove the surface right (convex and concave look alike), a large one
+/// proves it wrong.
 ///
 /// ```
 /// use ndarray::Array2;
@@ -269,7 +272,7 @@ pub fn render<T: PixelScalar>(
 /// ```
 ///
 /// # Errors
-/// [`SfsError::ShapeMismatch`]; [`SfsError::EmptyMask`] if no pixel can be compared.
+/// [`SfsError::ShapeMismatch`]. [`SfsError::EmptyMask`] if no pixel can be compared.
 pub fn reprojection<T: PixelScalar>(
     heights: ArrayView2<'_, T>,
     frame: Frame<'_, T>,

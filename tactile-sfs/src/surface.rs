@@ -26,15 +26,15 @@ pub struct PixelFlags(u8);
 impl PixelFlags {
     /// Nothing to report.
     pub const NONE: Self = Self(0);
-    /// Brighter than the model allows (reflectance above 1); taken as 1.
+    /// Brighter than the model allows (reflectance above 1). Taken as 1.
     pub const SATURATED: Self = Self(1);
-    /// At or below the ambient: the slope is unbounded; it was cut to the method's limit.
+    /// At or below the ambient: the slope is unbounded. It was cut to the method's limit.
     pub const DARK: Self = Self(2);
-    /// The input was NaN or infinite; the pixel was filled in from its neighbours.
+    /// The input was NaN or infinite. The pixel was filled in from its neighbours.
     pub const NON_FINITE: Self = Self(4);
-    /// No known height reaches the pixel; its height is NaN.
+    /// No known height reaches the pixel. Its height is NaN.
     pub const UNREACHED: Self = Self(8);
-    /// Outside the range of a calibration; the nearest end was taken.
+    /// Outside the range of a calibration. The nearest end was taken.
     pub const OUT_OF_RANGE: Self = Self(16);
 
     /// Flags of a reflectance that the model does not explain: above 1, below `least`, not finite.
@@ -113,7 +113,7 @@ pub struct Component<T> {
 pub struct SurfaceReport<T> {
     /// Why the method stopped.
     pub stop: StopReason,
-    /// Iterations (sweeps, conjugate-gradient steps, …) done; 0 for direct methods.
+    /// Iterations (sweeps, conjugate-gradient steps, …) done, 0 for direct methods.
     pub iterations: usize,
     /// Last residual or change, in the unit each method documents.
     pub residual: T,
@@ -141,8 +141,9 @@ impl<T: Default> Default for SurfaceReport<T> {
 
 /// Heights over the frame, in the unit of the pixel size.
 ///
-/// `heights` is NaN outside `mask`. When a surface is used again as output, only the rectangle written last is
-/// cleared, so that a small contact in a large frame stays cheap; heights edited by hand outside of it stay.
+/// `heights` is NaN outside `mask`. When a surface is used again as output, only the rectangle
+/// written last is cleared, so that a small contact in a large frame stays cheap. Heights edited by
+/// hand outside of it stay.
 ///
 /// ```
 /// use ndarray::{Array2, array};
@@ -185,7 +186,8 @@ impl<T: Default> Default for Surface<T> {
 }
 
 impl<T: PixelScalar> Surface<T> {
-    /// A surface from heights, as a reconstruction of a user's own returns it. Pixels that are not finite have no height.
+    /// A surface from heights, as a reconstruction of a user's own returns it. Pixels that are not
+    /// finite have no height.
     ///
     /// Flags and report may be set afterwards: `surface.flags[[row, column]] |= PixelFlags::DARK`.
     ///
@@ -219,8 +221,8 @@ impl<T: PixelScalar> Surface<T> {
         Ok(surface)
     }
 
-    /// Where every reconstruction enters: checks the domain against an image of this shape, empties the surface for it and
-    /// returns the mask's box. On an error the surface is left as it was.
+    /// Where every reconstruction enters: checks the domain against an image of this shape, empties
+    /// the surface for it and returns the mask's box. On an error the surface is left as it was.
     pub(crate) fn enter(
         &mut self,
         shape: (usize, usize),

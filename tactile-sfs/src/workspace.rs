@@ -8,11 +8,12 @@ use crate::PixelScalar;
 
 type Callback = Box<dyn FnMut(Progress) -> ControlFlow<()> + Send + Sync>;
 
-/// Buffers of every method, kept between calls: a second call of the same size does not allocate. The factorisation of
-/// [`MaskedLeastSquares`](crate::MaskedLeastSquares) alone takes its memory anew.
+/// Buffers of every method, kept between calls: a second call of the same size does not allocate.
+/// The factorisation of [`MaskedLeastSquares`](crate::MaskedLeastSquares) alone takes its memory
+/// anew.
 ///
-/// One workspace serves any of the methods. It may also carry a callback that receives the progress of iterative solves
-/// and may stop them.
+/// One workspace serves any of the methods. It may also carry a callback that receives the progress
+/// of iterative solves and may stop them.
 ///
 /// ```
 /// use core::ops::ControlFlow;

@@ -1,4 +1,5 @@
-//! The tests of `tactile-optics`, in one program: the generic code is compiled once for all of them.
+//! The tests of `tactile-optics`, in one program: the generic code is compiled once for all of
+//! them.
 
 mod paper;
 mod recorded;

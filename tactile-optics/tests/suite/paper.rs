@@ -53,7 +53,8 @@ fn the_specification() {
     let sensor = SensorSpecification::new(&camera, 3.0).unwrap();
     assert_eq!(sensor.grid_elements.round(), 6452.0);
     assert_eq!(sensor.temporal_resolution_s, 12.5e-3);
-    // 0.76 grey levels over 1.45 million pixels and a reference as noisy: 1300 grey levels, 0.11 mN.
+    // 0.76 grey levels over 1.45 million pixels and a reference as noisy: 1300 grey levels, 0.11
+    // mN.
     let one_sigma = 0.76 * (2.0 * 1392.0 * 1042.0_f64).sqrt() * 8.7e-8;
     assert!((sensor.force_resolution_n - 3.0 * one_sigma).abs() < 1e-18);
     assert!((sensor.force_levels * 3.0 * one_sigma - 2.0).abs() < 1e-12);

@@ -1,7 +1,9 @@
 //! Answers of an earlier state of this crate, so that a change of its form changes no number.
 //!
-//! `tests/recorded/answers.txt` holds a line for every name. After a change that is meant to alter answers, write it
-//! anew with `RECORD_ANSWERS=1 cargo test -p tactile-optics --test suite recorded` and read the difference before committing.
+//! `tests/recorded/answers.txt` holds a line for every name. After a change that is meant to alter
+//! answers, write it anew with
+//! `RECORD_ANSWERS=1 cargo test -p tactile-optics --test suite recorded` and read the difference
+//! before committing.
 
 use test_support as record;
 
@@ -187,7 +189,8 @@ fn answers_are_those_recorded() {
     answers.all.check(RECORDED, |name, recorded, _| {
         // A sum taken in another order moves the last digits.
         let tolerance = 1e-12;
-        // Coordinates of a path that are zero up to rounding are compared as lengths of the slab's size.
+        // Coordinates of a path that are zero up to rounding are compared as lengths of the slab's
+        // size.
         let floor = if name.contains("path") { 1e-17 } else { 0.0 };
         tolerance * recorded.abs() + floor
     });

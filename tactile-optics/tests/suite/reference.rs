@@ -1,4 +1,5 @@
-//! Agreement with reference numbers computed to 80 digits. Skipped, with a line that says so, where they are absent.
+//! Agreement with reference numbers computed to 80 digits. Skipped, with a line that says so, where
+//! they are absent.
 #![allow(clippy::print_stdout, clippy::print_stderr)]
 use std::path::PathBuf;
 
@@ -147,7 +148,8 @@ fn check_fresnel(case: &Value, score: &mut Score) {
     let found = fresnel(n1, n2, theta).unwrap();
     let total = case["expected"]["status"].as_str() == Some("total");
     if found.refraction.is_none() != total {
-        // One ulp of the angle on either side of the critical one decides; the sine carries half an ulp of its own.
+        // One ulp of the angle on either side of the critical one decides; the sine carries half an
+        // ulp of its own.
         assert!(
             (n1 * theta.sin() - n2).abs() < 2.0 * EPS * n2,
             "{what}: total {} against {total}",

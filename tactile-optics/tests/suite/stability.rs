@@ -95,7 +95,8 @@ fn a_path_stays_in_the_slab_and_ends_where_light_leaves() {
             .iter()
             .all(|v| v[2] <= 0.0 && v[2] >= -5e-3 - 1e-15)
     );
-    // In a slab of 1.2 a ray at 60° is beyond the acceptance angle of 41.6° and leaves at the top, which it meets first.
+    // In a slab of 1.2 a ray at 60° is beyond the acceptance angle of 41.6° and leaves at the top,
+    // which it meets first.
     let thin = [SlabLayer {
         index: 1.2_f64,
         thickness_m: 5e-3,
@@ -171,7 +172,8 @@ proptest! {
     #[test]
     fn energy_is_split_without_loss(n1 in 1.0_f64..3.0, n2 in 1.0_f64..3.0, angle in 0.0_f64..1.57) {
         let f = fresnel(n1, n2, angle).unwrap();
-        // R and T are computed apart; near the critical angle both are steep in the rounding of the sine they share.
+        // R and T are computed apart; near the critical angle both are steep in the rounding of the
+        // sine they share.
         prop_assert!((f.reflectance_s + f.transmittance_s - 1.0).abs() < 1e-13);
         prop_assert!((f.reflectance_p + f.transmittance_p - 1.0).abs() < 1e-13);
         prop_assert!(f.reflectance_p <= f.reflectance_s + 1e-15);
@@ -182,8 +184,8 @@ proptest! {
         let forth = fresnel(n1, n2, angle).unwrap();
         if let Some(refracted) = forth.refraction && refracted.complement > 1e-3 {
             let back = fresnel(n2, n1, refracted.radians).unwrap();
-            // Steep where either side grazes (the way back is then near its critical angle): the relative condition goes as
-            // the inverse square of the complement.
+            // Steep where either side grazes (the way back is then near its critical angle): the
+            // relative condition goes as the inverse square of the complement.
             let grazing = refracted.complement.min(std::f64::consts::FRAC_PI_2 - angle);
             let tolerance = 1e-14 / grazing.powi(2);
             prop_assert!((back.transmittance_s - forth.transmittance_s).abs() < tolerance);

@@ -39,7 +39,8 @@ fn flat(layers: &[SlabLayer], length: f64, options: &TraceOptions) -> LightBudge
     trace(&slab, &Led::default(), &Flat, options, &mut []).unwrap()
 }
 
-/// Energy is conserved to rounding: a ray splits by `transmitted` and `power − transmitted`, the sums are compensated.
+/// Energy is conserved to rounding: a ray splits by `transmitted` and `power − transmitted`, the
+/// sums are compensated.
 fn assert_conserved(budget: &LightBudget) {
     assert!((total(budget) - 1.0).abs() < 1e-13, "{budget:?}");
 }
@@ -53,8 +54,8 @@ fn leaked(b: &LightBudget) -> f64 {
     b.above + b.below + b.camera
 }
 
-/// Guided share of one flat layer in a section by unfolding: a ray at angle θ outside makes ⌊…⌋ reflections, each
-/// keeping the share R. Midpoints over start and angle.
+/// Guided share of one flat layer in a section by unfolding: a ray at angle θ outside makes ⌊…⌋
+/// reflections, each keeping the share R. Midpoints over start and angle.
 fn guided_by_unfolding(n: f64, thickness: f64, length: f64, steps: usize) -> f64 {
     let (mut guided, mut total) = (0.0, 0.0);
     for i in 0..steps {
@@ -111,8 +112,8 @@ fn the_error_falls_faster_than_with_random_rays() {
 
 #[test]
 fn a_long_slab_keeps_the_trapped_share() {
-    // What enters within the acceptance angle stays for ever; of the rest, only rays within 1e-4 rad of it are still on
-    // their way after 40 000 thicknesses.
+    // What enters within the acceptance angle stays for ever; of the rest, only rays within 1e-4
+    // rad of it are still on their way after 40 000 thicknesses.
     let layer = [SlabLayer {
         index: 1.35,
         thickness_m: 1e-3,
@@ -127,8 +128,9 @@ fn a_long_slab_keeps_the_trapped_share() {
         let slab = Slab::new(&layer, 1.0, 1.0).unwrap();
         let found = trace(&slab, &led, &Flat, &options, &mut []).unwrap();
         assert_conserved(&found);
-        // The trapped rays' own losses at the entry differ from the mean: compare shares of lossless entry by an LED
-        // narrow enough that all of it is trapped, and the general one by its bound.
+        // The trapped rays' own losses at the entry differ from the mean: compare shares of
+        // lossless entry by an LED narrow enough that all of it is trapped, and the general one by
+        // its bound.
         let share = led.trapped_share(acceptance, geometry);
         assert!(
             found.guided < share && found.guided > share * (1.0 - found.entry * 1.5),
@@ -182,8 +184,8 @@ fn energy_is_conserved_whatever_the_scene() {
             let mut profile = [0.0; 30];
             let budget = trace(&slab, &Led::default(), &touched, &options, &mut profile).unwrap();
             assert_conserved(&budget);
-            // Light gathers in the dense layers below and meets the inner interfaces near grazing, where it splits often:
-            // thousands of branches of 1e-7 or less a ray.
+            // Light gathers in the dense layers below and meets the inner interfaces near grazing,
+            // where it splits often: thousands of branches of 1e-7 or less a ray.
             assert!(budget.unresolved < 5e-4, "{budget:?}");
             assert!((profile.iter().sum::<f64>() - budget.camera).abs() < 1e-13);
             let again = trace(&slab, &Led::default(), &touched, &options, &mut profile).unwrap();
@@ -214,7 +216,8 @@ fn a_press_lights_up_the_camera_more_the_steeper_it_is_and_most_where_an_object_
         let object = TouchingObject { index, albedo: 0.8 };
         camera(&Touched::new(Flat, object, centre, 3e-3).unwrap())
     };
-    // An object of the ambient's index frees no trapped ray; the denser, the more light enters it and comes back.
+    // An object of the ambient's index frees no trapped ray; the denser, the more light enters it
+    // and comes back.
     assert!(touch(1.0) < flat + 0.02);
     assert!(
         touch(1.2) > touch(1.0) && touch(1.45) > touch(1.2),
@@ -277,7 +280,8 @@ fn light_leaves_where_the_press_is() {
     let brightest = (0..30)
         .max_by(|&a, &b| profile[a].total_cmp(&profile[b]))
         .unwrap();
-    // Scattered 12 mm above the bottom within the camera's cone, light leaves some millimetres around the contact.
+    // Scattered 12 mm above the bottom within the camera's cone, light leaves some millimetres
+    // around the contact.
     assert!((14..=22).contains(&brightest), "{profile:?}");
 }
 

@@ -1,8 +1,9 @@
 //! Frankot & Chellappa 1988: projection of the slopes on the integrable ones in the Fourier domain.
 //!
-//! Ẑ(u, v) = −i (u P̂ + v Q̂)/(u² + v²). The surface is taken as periodic: slopes that do not vanish at the border wrap
-//! round and bend it. Errors of 0.5 instead of 10⁻² are usual then, and [`CosinePoisson`](super::CosinePoisson) is the
-//! better choice. For smooth slopes that vanish at the border it converges faster than any power of h.
+//! Ẑ(u, v) = −i (u P̂ + v Q̂)/(u² + v²). The surface is taken as periodic: slopes that do not
+//! vanish at the border wrap round and bend it. Errors of 0.5 instead of 10⁻² are usual then, and
+//! [`CosinePoisson`](super::CosinePoisson) is the better choice. For smooth slopes that vanish at
+//! the border it converges faster than any power of h.
 
 use std::sync::Arc;
 
@@ -15,8 +16,8 @@ use crate::{Domain, PixelScalar, SfsError, Surface, SurfaceWorkspace};
 
 /// Integration by Fourier projection, periodic in both directions.
 ///
-/// With a mask, the bounding box is solved and slopes outside the mask are taken as 0. The mean height inside the mask
-/// is 0, or what the known heights demand. O(N M log(N M)).
+/// With a mask, the bounding box is solved and slopes outside the mask are taken as 0. The mean
+/// height inside the mask is 0, or what the known heights demand. O(N M log(N M)).
 ///
 /// ```
 /// use ndarray::Array2;
@@ -152,7 +153,8 @@ impl FourierBuffers {
 
     /// Replaces the spectrum C of p + i q by that of z.
     ///
-    /// P̂(u) = (C(u) + C̄(−u))/2 and Q̂(u) = (C(u) − C̄(−u))/2i. The frequencies u and −u are done together.
+    /// P̂(u) = (C(u) + C̄(−u))/2 and Q̂(u) = (C(u) − C̄(−u))/2i. The frequencies u and −u are done
+    /// together.
     fn project(&mut self, &Plans { rows, columns, .. }: &Plans, [hx, hy]: [f64; 2]) {
         let scale = 1.0 / (rows * columns) as f64;
         for r in 0..rows {
@@ -178,7 +180,8 @@ impl FourierBuffers {
     }
 }
 
-/// Angular frequency of a coefficient. 0 at the Nyquist frequency, where the derivative of a real wave vanishes.
+/// Angular frequency of a coefficient. 0 at the Nyquist frequency, where the derivative of a real
+/// wave vanishes.
 fn frequency(index: usize, length: usize, step: f64) -> f64 {
     let signed = match (2 * index).cmp(&length) {
         core::cmp::Ordering::Less => index as f64,

@@ -1,10 +1,12 @@
 //! Weighted least squares on a mask of any shape, by a sparse Cholesky factorisation.
 //!
-//! Minimises Σ w_ij (z_j − z_i − h s̄_ij)² over the edges between neighbouring pixels of the mask. Here s̄ is the mean slope
-//! along the edge: of the cubic (at the border: parabola or line) through the slopes of the pixels in line with it. w_ij is
-//! the harmonic mean of the two pixels' weights. Error O(h⁴) inside. On a full rectangle with equal weights
-//! [`CosinePoisson`] solves the same equations directly, and it is asked to. The border of the mask is free (natural).
-//! Connected parts have nothing to do with each other: each gets mean 0, or is fixed by its own known heights.
+//! Minimises Σ w_ij (z_j − z_i − h s̄_ij)² over the edges between neighbouring pixels of the mask.
+//! Here s̄ is the mean slope along the edge: of the cubic (at the border: parabola or line) through
+//! the slopes of the pixels in line with it. w_ij is the harmonic mean of the two pixels' weights.
+//! Error O(h⁴) inside. On a full rectangle with equal weights [`CosinePoisson`] solves the same
+//! equations directly, and it is asked to. The border of the mask is free (natural). Connected
+//! parts have nothing to do with each other: each gets mean 0, or is fixed by its own known
+//! heights.
 
 use faer::linalg::solvers::Solve;
 use faer::sparse::{SparseColMat, Triplet};
@@ -18,12 +20,14 @@ use crate::{BoundingBox, Domain, PixelFlags, PixelScalar, SfsError, Surface, Sur
 
 /// Weighted least squares integration on a mask.
 ///
-/// Slopes that are NaN or infinite are left out: the edge takes the other pixel's slope alone, or, if both are missing,
-/// a weak zero slope. Such pixels are flagged `NON_FINITE`. Known heights inside the mask are met exactly, and each
-/// connected part without one has mean 0 (`report.components`).
+/// Slopes that are NaN or infinite are left out: the edge takes the other pixel's slope alone, or,
+/// if both are missing, a weak zero slope. Such pixels are flagged `NON_FINITE`. Known heights
+/// inside the mask are met exactly, and each connected part without one has mean 0
+/// (`report.components`).
 ///
-/// The equations are solved directly, with some 30 numbers a pixel in the factor: 0.1 s for 10⁵ pixels. On a full rectangle
-/// with equal weights and no known height Poisson's equation is solved instead, a hundred times faster.
+/// The equations are solved directly, with some 30 numbers a pixel in the factor: 0.1 s for 10⁵
+/// pixels. On a full rectangle with equal weights and no known height Poisson's equation is solved
+/// instead, a hundred times faster.
 ///
 /// ```
 /// use ndarray::{Array2, array};
@@ -50,7 +54,8 @@ impl<T> Default for MaskedLeastSquares<'_, T> {
 }
 
 impl<'a, T: PixelScalar> MaskedLeastSquares<'a, T> {
-    /// Weight of each pixel's slopes, such as the inverse of their variance. 0, NaN or less leave the slopes out.
+    /// Weight of each pixel's slopes, such as the inverse of their variance. 0, NaN or less leave
+    /// the slopes out.
     ///
     /// ```
     /// use ndarray::Array2;
@@ -69,7 +74,8 @@ impl<'a, T: PixelScalar> MaskedLeastSquares<'a, T> {
         }
     }
 
-    /// Whether the fit is Poisson's equation on a rectangle: equal weights, no height known, no hole in the mask.
+    /// Whether the fit is Poisson's equation on a rectangle: equal weights, no height known, no
+    /// hole in the mask.
     fn is_poisson(&self, domain: &Domain<'_, T>, area: BoundingBox) -> bool {
         let full = |mask: ArrayView2<'_, bool>| area.of(mask).iter().all(|&inside| inside);
         self.weights.is_none() && domain.known_heights.is_none() && domain.mask.is_none_or(full)
@@ -82,7 +88,8 @@ impl<'a, T: PixelScalar> MaskedLeastSquares<'a, T> {
         (slope.is_finite() && weight > 0.0 && weight.is_finite()).then_some([slope, weight])
     }
 
-    /// Mean slope and weight of the edge between the middle two of four pixels in line, of which the others may be missing.
+    /// Mean slope and weight of the edge between the middle two of four pixels in line, of which
+    /// the others may be missing.
     fn edge(
         &self,
         slopes: ArrayView2<'_, T>,
@@ -101,7 +108,8 @@ impl<'a, T: PixelScalar> MaskedLeastSquares<'a, T> {
                 [mean, 2.0 * v * w / (v + w)]
             }
             (Some(one), None) | (None, Some(one)) => one,
-            // So weak that it only bridges the gap, and strong enough to keep the equations far from singular.
+            // So weak that it only bridges the gap, and strong enough to keep the equations far
+            // from singular.
             (None, None) => [0.0, 1e-4],
         }
     }
@@ -189,7 +197,8 @@ impl<T: PixelScalar> SlopeIntegrator<T> for MaskedLeastSquares<'_, T> {
 }
 
 impl<T: PixelScalar> MaskedLeastSquares<'_, T> {
-    /// The equations: heights are in the unit of the pixel size, an edge along x weighs (h_y/h_x)² times its own weight.
+    /// The equations: heights are in the unit of the pixel size, an edge along x weighs (h_y/h_x)²
+    /// times its own weight.
     fn assemble(
         &self,
         buffers: &mut MaskedBuffers,
@@ -226,7 +235,8 @@ impl<T: PixelScalar> MaskedLeastSquares<'_, T> {
 }
 
 impl MaskedBuffers {
-    /// Numbers the pixels without a known height, writes the known ones and flags slopes that are not finite.
+    /// Numbers the pixels without a known height, writes the known ones and flags slopes that are
+    /// not finite.
     fn enumerate<T: PixelScalar>(
         &mut self,
         domain: &Domain<'_, T>,
@@ -315,8 +325,8 @@ impl MaskedBuffers {
         }
     }
 
-    /// The heights of the unknowns. A part without a known height is held at height 0 by a spring at its first pixel, which
-    /// exerts no force: the right-hand side of such a part has the sum 0.
+    /// The heights of the unknowns. A part without a known height is held at height 0 by a spring
+    /// at its first pixel. It exerts no force: the right-hand side of such a part has the sum 0.
     fn solve(&mut self) -> Result<Vec<f64>, SfsError> {
         let n = self.pixels.len();
         if n == 0 {

@@ -1,7 +1,7 @@
 //! Slopes to heights: the trait, its implementations, and the constant of integration.
 //!
-//! Heights are solved for in double precision, whatever the type of the slopes: the smallest eigenvalues of the equations
-//! are below single precision in images of usual size.
+//! Heights are solved for in double precision, whatever the type of the slopes: the smallest
+//! eigenvalues of the equations are below single precision in images of usual size.
 
 mod fourier;
 mod masked;
@@ -22,9 +22,9 @@ use crate::{BoundingBox, Domain, PixelScalar, SfsError, Surface, SurfaceWorkspac
 
 /// A way from slopes p = ∂z/∂x and q = ∂z/∂y to heights.
 ///
-/// Slopes are dimensionless (metres per metre), and heights come out in the unit of the pixel size. A height is known up
-/// to a constant: the mean is 0, unless the domain's known heights fix it. Object safe. An implementor writes
-/// [`integrate`](Self::integrate) alone.
+/// Slopes are dimensionless (metres per metre), and heights come out in the unit of the pixel size.
+/// A height is known up to a constant: the mean is 0, unless the domain's known heights fix it.
+/// Object safe. An implementor writes [`integrate`](Self::integrate) alone.
 ///
 /// ```
 /// use ndarray::Array2;
@@ -145,8 +145,8 @@ fn load_row<T: PixelScalar>(
     })
 }
 
-/// Writes heights over the surface's box, row by row, all shifted by a constant: known heights are met on average, or the
-/// mean inside the mask is 0. NaN stands for no height.
+/// Writes heights over the surface's box, row by row, all shifted by a constant: known heights are
+/// met on average, or the mean inside the mask is 0. NaN stands for no height.
 pub(crate) fn write_levelled<T: PixelScalar>(
     heights: &[f64],
     domain: &Domain<'_, T>,

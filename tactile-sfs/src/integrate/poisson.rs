@@ -1,11 +1,13 @@
-//! Poisson's equation with natural (Neumann) borders: cosine transform in one direction, tridiagonal in the other.
+//! Poisson's equation with natural (Neumann) borders: cosine transform in one direction,
+//! tridiagonal in the other.
 //!
-//! Minimises Σ ((z_{c+1} − z_c)/h_x − p̄)² + Σ ((z_{r+1} − z_r)/h_y − q̄)². Here p̄ and q̄ are the means along the edge
-//! between two pixels of the cubic through the slopes of the four pixels in line with it. The equation is
-//! Δ_h z = div_h (p̄, q̄) with zero flux through the frame's border. (The usual mean of two slopes makes surfaces of second
-//! order. Exact rises make them of fourth.) The cosine transform along x turns it into one tridiagonal system per
-//! frequency, (λ_k − δ_y²) ẑ_k = f̂_k, with λ_k = (h_y/h_x)² (2 − 2 cos(π k/N)) for k from 0 to N − 1. Error O(h⁴), O(h³)
-//! in the rises at the border. Cost O(N M log N).
+//! Minimises Σ ((z_{c+1} − z_c)/h_x − p̄)² + Σ ((z_{r+1} − z_r)/h_y − q̄)². Here p̄ and q̄ are the
+//! means along the edge between two pixels of the cubic through the slopes of the four pixels in
+//! line with it. The equation is Δ_h z = div_h (p̄, q̄) with zero flux through the frame's border.
+//! (The usual mean of two slopes makes surfaces of second order. Exact rises make them of fourth.)
+//! The cosine transform along x makes one tridiagonal system per frequency: (λ_k − δ_y²) ẑ_k =
+//! f̂_k, with λ_k = (h_y/h_x)² (2 − 2 cos(π k/N)) for k from 0 to N − 1. Error O(h⁴), O(h³) in the
+//! rises at the border. Cost O(N M log N).
 //!
 //! Only one direction is transformed, because a tridiagonal solve is cheaper than a transform.
 
@@ -19,9 +21,10 @@ use crate::{BoundingBox, Domain, PixelScalar, SfsError, Surface, SurfaceWorkspac
 
 /// Poisson integration over the whole rectangle by a cosine transform and tridiagonal solves.
 ///
-/// With a mask, the bounding box is solved and slopes outside the mask are taken as 0 (flat where nothing touches). For a
-/// free border along the mask use [`MaskedLeastSquares`](super::MaskedLeastSquares). The mean height inside the mask is 0,
-/// or what the known heights demand (one shift for all).
+/// With a mask, the bounding box is solved and slopes outside the mask are taken as 0 (flat where
+/// nothing touches). For a free border along the mask use
+/// [`MaskedLeastSquares`](super::MaskedLeastSquares). The mean height inside the mask is 0, or what
+/// the known heights demand (one shift for all).
 ///
 /// ```
 /// use ndarray::Array2;
@@ -48,7 +51,8 @@ pub(crate) struct PoissonBuffers {
     grid: Vec<f64>,
 }
 
-/// Columns of the spectrum that are solved together: a block of 1000 rows stays in the second-level cache.
+/// Columns of the spectrum that are solved together: a block of 1000 rows stays in the second-level
+/// cache.
 const LANES: usize = 16;
 
 impl<T: PixelScalar> SlopeIntegrator<T> for CosinePoisson {
@@ -146,10 +150,11 @@ impl PoissonBuffers {
         self.transform = Some(transform);
     }
 
-    /// Thomas's algorithm for a block of columns: (λ − δ²) z = −2 f/N, whose factor inverts the transforms.
+    /// Thomas's algorithm for a block of columns: (λ − δ²) z = −2 f/N, whose factor inverts the
+    /// transforms.
     ///
-    /// The diagonal is λ plus the number of neighbours, beside it stands −1. System 0 is singular. Its last pivot is taken
-    /// as 1, which fixes the constant that is shifted away later.
+    /// The diagonal is λ plus the number of neighbours, beside it stands −1. System 0 is singular.
+    /// Its last pivot is taken as 1, which fixes the constant that is shifted away later.
     fn solve_columns(&mut self, left: usize, rows: usize, columns: usize, aspect2: f64) {
         let lanes = LANES.min(columns - left);
         let scale = -2.0 / columns as f64;
@@ -189,8 +194,9 @@ impl PoissonBuffers {
     }
 }
 
-/// Weights of the slopes at −1, 0, 1 and 2 whose sum is the mean slope from pixel 0 to pixel 1, for the edge after pixel
-/// `edge` of a line of `n`: the integral of the cubic through the four, of a parabola at the ends.
+/// Weights of the slopes at −1, 0, 1 and 2 whose sum is the mean slope from pixel 0 to pixel 1, for
+/// the edge after pixel `edge` of a line of `n`. It is the integral of the cubic through the four,
+/// of a parabola at the ends.
 fn edge_weights(edge: usize, n: usize) -> [f64; 4] {
     let weights = match (edge, n) {
         (_, 2) => [0.0, 12.0, 12.0, 0.0],
@@ -204,7 +210,8 @@ fn edge_weights(edge: usize, n: usize) -> [f64; 4] {
 /// Adds the divergence along a line of slopes, times `scale`.
 fn add_rises(p: &[f64], scale: f64, out: &mut [f64]) {
     let n = p.len();
-    // Inside, the difference of the rises on both sides of a pixel is one sum over the five around it.
+    // Inside, the difference of the rises on both sides of a pixel is one sum over the five around
+    // it.
     for (out, p) in out.iter_mut().skip(2).zip(p.windows(5)) {
         *out += scale / 24.0 * (14.0 * (p[3] - p[1]) - (p[4] - p[0]));
     }

@@ -1,7 +1,8 @@
 //! A depth table from one press of a ball of known radius.
 //!
-//! Inside the contact circle of radius a the depth is the spherical cap √(R² − r²) − √(R² − a²). Each grey level of the
-//! signal gets the mean depth of its pixels, made monotone by pooling (isotonic regression, weights = pixels).
+//! Inside the contact circle of radius a the depth is the spherical cap √(R² − r²) − √(R² − a²).
+//! Each grey level of the signal gets the mean depth of its pixels, made monotone by pooling
+//! (isotonic regression, weights = pixels).
 
 use ndarray::Array2;
 
@@ -9,7 +10,7 @@ use super::depth_table::{DepthTable, Signal};
 use crate::{Domain, Frame, PixelScalar, SfsError};
 use tactile_core::Requirement;
 
-/// A depth table and how well the ball fits it; what [`DepthTable::from_ball`] returns.
+/// A depth table and how well the ball fits it. What [`DepthTable::from_ball`] returns.
 ///
 /// ```
 /// use ndarray::Array2;
@@ -45,11 +46,12 @@ pub struct BallCalibration<T> {
 impl<T: PixelScalar> DepthTable<T> {
     /// Calibrates a table from one press of a ball.
     ///
-    /// The contact is the largest connected patch of the domain where the signal exceeds `threshold`; the mask may leave
-    /// out part of it (to test the table on the rest) if `circle` gives centre (px) and radius (m). The table counts depth
-    /// from the contact's outline, where the signal is the threshold: [`zeroed`](DepthTable::zeroed) counts it from no signal.
+    /// The contact is the largest connected patch of the domain where the signal exceeds
+    /// `threshold`. The mask may leave out part of it (to test the table on the rest) if `circle`
+    /// gives centre (px) and radius (m). The table counts depth from the contact's outline, where
+    /// the signal is the threshold: [`zeroed`](DepthTable::zeroed) counts it from no signal.
     ///
-    /// Lengths in metres, signals in grey levels; O(pixels log pixels).
+    /// Lengths in metres, signals in grey levels. O(pixels log pixels).
     ///
     /// ```
     /// use ndarray::Array2;
@@ -64,8 +66,9 @@ impl<T: PixelScalar> DepthTable<T> {
     /// ```
     ///
     /// # Errors
-    /// Those of a wrong domain; [`SfsError::InvalidOption`] for a radius or threshold that is not positive, or a contact
-    /// wider than the ball; [`SfsError::TooFewPixels`] below 100 pixels of contact.
+    /// Those of a wrong domain. [`SfsError::InvalidOption`] for a radius or threshold that is not
+    /// positive, or a contact wider than the ball. [`SfsError::TooFewPixels`] below 100 pixels of
+    /// contact.
     pub fn from_ball(
         frame: Frame<'_, T>,
         signal: Signal<T>,
@@ -158,7 +161,8 @@ fn cap_depths(
     Ok(samples)
 }
 
-/// Mean depth of each signal level (steps of one unit), pooled until depths increase; starts at depth 0 for signal 0.
+/// Mean depth of each signal level (steps of one unit), pooled until depths increase. Starts at
+/// depth 0 for signal 0.
 fn monotone_means(samples: &[(f64, f64)]) -> Vec<(f64, f64)> {
     let mut sorted: Vec<(i64, f64, f64)> = samples
         .iter()
@@ -199,10 +203,11 @@ fn monotone_means(samples: &[(f64, f64)]) -> Vec<(f64, f64)> {
 /// Fewest pixels of contact a calibration makes sense for.
 const FEWEST: usize = 100;
 
-/// Centroid (px) and radius of equal area (m) of the largest connected patch above the threshold: whatever else exceeds
-/// it, uneven light at the frame's edge say, is no contact. O(pixels).
+/// Centroid (px) and radius of equal area (m) of the largest connected patch above the threshold:
+/// whatever else exceeds it, uneven light at the frame's edge say, is no contact. O(pixels).
 ///
-/// Stray pixels are kept from counting by demanding that four of the eight neighbours are above the threshold too.
+/// Stray pixels are kept from counting by demanding that four of the eight neighbours are above the
+/// threshold too.
 fn contact_circle(
     signals: &Array2<f64>,
     threshold: f64,

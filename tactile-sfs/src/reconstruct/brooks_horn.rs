@@ -1,10 +1,11 @@
 //! Brooks & Horn 1985 with the integrability of Frankot & Chellappa 1988.
 //!
-//! Minimises ∫ (R − n·s)² + λ |∇n|² over unit normals by the iteration n ← normalise(n̄ + (R − n̄·s) s/(1 + 4 λ)), n̄ the
-//! mean of the neighbours (the pixel's own equation solved exactly; the printed explicit form diverges for small λ); every few steps
-//! the slopes are projected on the integrable ones (in the Fourier domain, or by another integrator), and the heights are
-//! those of the last projection. Normals have no infinite slopes, so the occluding boundary is an ordinary
-//! boundary condition: there n lies in the image plane and points outwards.
+//! Minimises ∫ (R − n·s)² + λ |∇n|² over unit normals by the iteration n ← normalise(n̄ + (R −
+//! n̄·s) s/(1 + 4 λ)), n̄ the mean of the neighbours. That is the pixel's own equation solved
+//! exactly. The printed explicit form diverges for small λ. Every few steps the slopes are
+//! projected on the integrable ones (in the Fourier domain, or by another integrator), and the
+//! heights are those of the last projection. Normals have no infinite slopes, so the occluding
+//! boundary is an ordinary boundary condition: there n lies in the image plane and points outwards.
 
 use std::sync::Arc;
 
@@ -20,8 +21,8 @@ use crate::{
 
 /// Variational shape from shading with integrability.
 ///
-/// Heights are level with known ones on average, or have mean 0. O(pixels) a step plus O(N M log(N M)) a projection;
-/// `report.residual` is the root mean square misfit of the reflectance.
+/// Heights are level with known ones on average, or have mean 0. O(pixels) a step plus O(N M log(N
+/// M)) a projection. `report.residual` is the root mean square misfit of the reflectance.
 ///
 /// ```
 /// use ndarray::Array2;
@@ -165,7 +166,7 @@ impl<T: PixelScalar> BrooksHorn<T> {
         Ok(())
     }
 
-    /// Steps and projections; the heights of the last one are left in the buffers of the slopes.
+    /// Steps and projections. The heights of the last one are left in the buffers of the slopes.
     fn solve(
         &self,
         integrator: Option<&dyn SlopeIntegrator<T>>,
@@ -199,7 +200,7 @@ impl<T: PixelScalar> BrooksHorn<T> {
         Ok(())
     }
 
-    /// One Jacobi step on the normals; returns the misfit before it.
+    /// One Jacobi step on the normals. Returns the misfit before it.
     fn relax(&self, field: &mut FieldBuffers<T>, area: BoundingBox, frame: (usize, usize)) -> T {
         let light = self.lighting.direction();
         let weight = T::one() / (T::one() + T::of(4.0) * self.smoothness);
@@ -370,7 +371,8 @@ impl<T: PixelScalar> BrooksHorn<T> {
         workspace.slopes.heights.extend(heights);
     }
 
-    /// Projects the slopes on those of the heights that `integrator` finds; where it finds none the heights are NaN.
+    /// Projects the slopes on those of the heights that `integrator` finds. Where it finds none the
+    /// heights are NaN.
     fn integrate(
         &self,
         integrator: &dyn SlopeIntegrator<T>,
@@ -434,7 +436,7 @@ fn follow<T: PixelScalar>(
     }
 }
 
-/// The central difference; one-sided where a neighbour has no height, zero where neither has.
+/// The central difference. One-sided where a neighbour has no height, zero where neither has.
 fn difference(before: f64, here: f64, after: f64, step: f64) -> f64 {
     match (before.is_nan(), after.is_nan()) {
         (false, false) => (after - before) / (2.0 * step),

@@ -1,14 +1,16 @@
 //! Calibrated intensity → depth: a table read off one known indenter.
 //!
-//! Each pixel's signal (its grey level, or its darkening or brightening against a reference image) is looked up in a
-//! calibrated table, linearly between the entries. No neighbour is involved, so nothing accumulates; the price is a
-//! calibration and even illumination.
+//! Each pixel's signal (its grey level, or its darkening or brightening against a reference image)
+//! is looked up in a calibrated table, linearly between the entries. No neighbour is involved, so
+//! nothing accumulates. The price is a calibration and even illumination.
 
 //!
-//! A table calibrated on a ball counts depth from the contact circle. That circle is where the signal crossed a threshold,
-//! often with its radius rounded to a pixel. The surface is already pressed down there: at the rim of a cap of radius R one
-//! pixel h of the contact radius a is h a/√(R² − a²) of depth, everywhere. The signal has a zero of its own, the frame that
-//! equals its reference. Depth is smooth in the signal, so [`DepthTable::zeroed`] reads off the table how deep its zero lies.
+//! A table calibrated on a ball counts depth from the contact circle. That circle is where the
+//! signal crossed a threshold, often with its radius rounded to a pixel. The surface is already
+//! pressed down there: at the rim of a cap of radius R one pixel h of the contact radius a is h
+//! a/√(R² − a²) of depth, everywhere. The signal has a zero of its own, the frame that equals its
+//! reference. Depth is smooth in the signal, so [`DepthTable::zeroed`] reads off the table how deep
+//! its zero lies.
 
 use nalgebra::{Matrix3, Vector3};
 use ndarray::Array2;
@@ -65,8 +67,9 @@ impl<T: PixelScalar> Signal<T> {
 
 /// Depth from a calibration table of (signal, depth) pairs.
 ///
-/// Depth is 0 where the signal does not exceed the contact threshold, so that nothing is where nothing touches.
-/// Signals beyond the last entry get the last depth and the flag `OUT_OF_RANGE`. Cost: O(pixels of the mask's box).
+/// Depth is 0 where the signal does not exceed the contact threshold, so that nothing is where
+/// nothing touches. Signals beyond the last entry get the last depth and the flag `OUT_OF_RANGE`.
+/// Cost: O(pixels of the mask's box).
 ///
 /// ```
 /// use ndarray::array;
@@ -87,7 +90,8 @@ impl<T: PixelScalar> DepthTable<T> {
     /// A table of (signal, depth) pairs, both increasing (depths may repeat).
     ///
     /// # Errors
-    /// [`SfsError::TableTooShort`] below two entries, [`SfsError::TableNotIncreasing`] for values out of order or NaN.
+    /// [`SfsError::TableTooShort`] below two entries, [`SfsError::TableNotIncreasing`] for values
+    /// out of order or NaN.
     pub fn new(entries: &[(T, T)]) -> Result<Self, SfsError> {
         if entries.len() < 2 {
             return Err(SfsError::TableTooShort {
@@ -110,7 +114,7 @@ impl<T: PixelScalar> DepthTable<T> {
         })
     }
 
-    /// What is looked up; the intensity itself by default.
+    /// What is looked up. The intensity itself by default.
     pub fn with_signal(self, signal: Signal<T>) -> Self {
         Self { signal, ..self }
     }
@@ -193,7 +197,8 @@ impl<T: PixelScalar> SurfaceReconstruction<T> for DepthTable<T> {
     ) -> Result<(), SfsError> {
         self.signal.check_reference(frame.dim())?;
         let area = surface.enter(frame.dim(), domain)?;
-        // The table at every whole signal of 8-bit frames, −255 to 255: looking it up takes a fifth of the time.
+        // The table at every whole signal of 8-bit frames, −255 to 255: looking it up takes a fifth
+        // of the time.
         let levels = matches!(frame, Frame::Bytes(_)).then(|| {
             core::array::from_fn::<_, 511, _>(|index| self.pixel(T::of(index as f64 - 255.0)))
         });
@@ -223,12 +228,14 @@ impl<T: PixelScalar> SurfaceReconstruction<T> for DepthTable<T> {
 impl<T: PixelScalar> DepthTable<T> {
     /// The table moved by a constant depth so that zero signal is zero depth.
     ///
-    /// A parabola d = c₀ + c₁ s + c₂ s² is fitted, by least squares, to the entries (s, d) above the threshold of contact;
-    /// they become d − c₀ (or 0 where that is negative), and those at or below it make way for (0, 0). For signals that
-    /// are counted from a reference ([`Signal::Darkening`](crate::Signal), `Brightening`). The threshold, to be set
-    /// before ([`with_contact_threshold`](Self::with_contact_threshold)), should be a tenth of the largest signal or less: the
-    /// parabola is extended from there to zero. Depth must be smooth in the signal there: of light that goes as the power 0.8 or
-    /// 1.2 of the depth the zero is off by 3 or 4 % of the range, which the table does not show. O(entries).
+    /// A parabola d = c₀ + c₁ s + c₂ s² is fitted, by least squares, to the entries (s, d) above
+    /// the threshold of contact. They become d − c₀ (or 0 where that is negative), and those at or
+    /// below it make way for (0, 0). For signals that are counted from a reference
+    /// ([`Signal::Darkening`](crate::Signal), `Brightening`). The threshold, to be set before
+    /// ([`with_contact_threshold`](Self::with_contact_threshold)), should be a tenth of the largest
+    /// signal or less: the parabola is extended from there to zero. Depth must be smooth in the
+    /// signal there. Of light that goes as the power 0.8 or 1.2 of the depth the zero is off by 3
+    /// or 4 % of the range, which the table does not show. O(entries).
     ///
     /// ```
     /// use tactile_sfs::DepthTable;
@@ -241,8 +248,8 @@ impl<T: PixelScalar> DepthTable<T> {
     /// ```
     ///
     /// # Errors
-    /// [`SfsError::TableZero`] for fewer than four entries above the threshold, or where the parabola misses them by more
-    /// than 1 % of their range (root mean square).
+    /// [`SfsError::TableZero`] for fewer than four entries above the threshold, or where the
+    /// parabola misses them by more than 1 % of their range (root mean square).
     pub fn zeroed(mut self) -> Result<Self, SfsError> {
         let kept: Vec<(f64, f64)> = self
             .entries
@@ -258,7 +265,8 @@ impl<T: PixelScalar> DepthTable<T> {
     }
 }
 
-/// Depth of the fitted parabola at signal zero. Entries increase in signal, so the range is positive for two or more.
+/// Depth of the fitted parabola at signal zero. Entries increase in signal, so the range is
+/// positive for two or more.
 fn depth_at_zero(entries: &[(f64, f64)]) -> Result<f64, SfsError> {
     let unfit = |misfit| SfsError::TableZero {
         entries: entries.len(),
@@ -271,7 +279,8 @@ fn depth_at_zero(entries: &[(f64, f64)]) -> Result<f64, SfsError> {
     if entries.len() < 4 {
         return Err(unfit(0.0));
     }
-    // Signals and depths in parts of their largest values keep the normal equations' condition that of the table's shape.
+    // Signals and depths in parts of their largest values keep the normal equations' condition that
+    // of the table's shape.
     let (scale, range) = (last.0, last.1 - first.1);
     let row = |signal: f64| {
         let x = signal / scale;
@@ -287,8 +296,8 @@ fn depth_at_zero(entries: &[(f64, f64)]) -> Result<f64, SfsError> {
         |&(signal, depth): &(f64, f64)| (depth - first.1 - row(signal).dot(&fitted)).powi(2);
     let mean_square = entries.iter().map(square).sum::<f64>() / entries.len() as f64;
     let misfit = mean_square.sqrt();
-    // The one measured table at hand has 0.008. Light that fades exponentially to a seventh has 0.019, and its zero would be
-    // wrong by a twentieth of the range.
+    // The one measured table at hand has 0.008. Light that fades exponentially to a seventh has
+    // 0.019, and its zero would be wrong by a twentieth of the range.
     if misfit > 0.01 * range {
         return Err(unfit(misfit / range));
     }

@@ -23,8 +23,8 @@ use crate::{
 
 /// A way from one image to a surface.
 ///
-/// Object safe: `Box<dyn SurfaceReconstruction<f32>>` lets a user pick at run time. An implementor writes
-/// [`reconstruct`](Self::reconstruct) alone.
+/// Object safe: `Box<dyn SurfaceReconstruction<f32>>` lets a user pick at run time. An implementor
+/// writes [`reconstruct`](Self::reconstruct) alone.
 ///
 /// ```
 /// use ndarray::Array2;
@@ -51,8 +51,8 @@ pub trait SurfaceReconstruction<T: PixelScalar> {
         domain: &Domain<'_, T>,
     ) -> Result<Surface<T>, SfsError>;
 
-    /// The same into `surface`, with its arrays and the buffers of `workspace` used again: the methods of this crate do not
-    /// allocate after the first frame of a stream.
+    /// The same into `surface`, with its arrays and the buffers of `workspace` used again: the
+    /// methods of this crate do not allocate after the first frame of a stream.
     ///
     /// ```
     /// use ndarray::array;
@@ -83,8 +83,8 @@ pub trait SurfaceReconstruction<T: PixelScalar> {
 
     /// The same method with its slopes made into heights by `integrator`.
     ///
-    /// `None`, the default, for a method that goes from the image to heights without slopes. Of the methods here
-    /// [`BrooksHorn`] has slopes.
+    /// `None`, the default, for a method that goes from the image to heights without slopes. Of the
+    /// methods here [`BrooksHorn`] has slopes.
     ///
     /// ```
     /// use std::sync::Arc;

@@ -1,18 +1,23 @@
 //! Tsai & Shah 1994: Newton's method on the reflectance, pixel by pixel.
 //!
-//! With p = (z − z_left)/h_x and q = (z − z_above)/h_y the residual f(z) = R − (s_z − s_x p − s_y q)/√(1 + p² + q²)
-//! is linearised in the pixel's own height. As printed the method breaks where f′ vanishes (at once under frontal
-//! light, where the start z = 0 is stationary), where slopes run away, and along one diagonal, since only left and
-//! upper neighbours count. Tamed here:
+//! With p = (z − z_left)/h_x and q = (z − z_above)/h_y the residual f(z) = R − (s_z − s_x p − s_y
+//! q)/√(1 + p² + q²) is linearised in the pixel's own height. As printed the method breaks where f′
+//! vanishes (at once under frontal light, where the start z = 0 is stationary), and where slopes
+//! run away. It also breaks along one diagonal, since only left and upper neighbours count. Tamed
+//! here:
 //!
-//! - the step is K = f′ S/(W + f′² S) · f, S the pixel's own variance, which shrinks as (1 − K f′) S: a Kalman gain
-//!   instead of 1/f′ (the authors' own remedy), with W as the stated noise of the image;
-//! - slopes used in f and f′ are cut to `max_slope`;
-//! - the start is a gently convex paraboloid with the centre and the axes of the mask, not the stationary plane;
-//! - the four corners are taken in turn (left/right, above/below), so that no diagonal is preferred.
+//! - the step is K = f′ S/(W + f′² S) · f, S the pixel's own variance, which shrinks as (1 − K f′)
+//!   S. This is a Kalman gain instead of 1/f′ (the authors' own remedy), with W as the stated noise
+//!   of the image.
+//! - slopes used in f and f′ are cut to `max_slope`.
+//! - the start is a gently convex paraboloid with the centre and the axes of the mask, not the
+//!   stationary plane.
+//! - the four corners are taken in turn (left/right, above/below), so that no diagonal is
+//!   preferred.
 //!
-//! It is a local method: a few iterations write the fine relief on the start, and the large shape remains that of the
-//! start. The eikonal method is better wherever a height is known, Brooks–Horn where none is.
+//! It is a local method: a few iterations write the fine relief on the start, and the large shape
+//! remains that of the start. The eikonal method is better wherever a height is known, Brooks–Horn
+//! where none is.
 
 use super::FieldBuffers;
 use crate::integrate::write_levelled;
@@ -24,7 +29,7 @@ use tactile_core::Requirement;
 
 /// Shape from shading by Newton's method on each pixel.
 ///
-/// Heights are level with known ones on average, or have mean 0. Cost: O(pixels) an iteration;
+/// Heights are level with known ones on average, or have mean 0. Cost: O(pixels) an iteration.
 /// `report.residual` is the root mean square misfit of the reflectance.
 ///
 /// ```
@@ -45,7 +50,8 @@ pub struct TsaiShah<T> {
 }
 
 impl<T: PixelScalar> TsaiShah<T> {
-    /// 12 iterations, noise variance 10⁻², slopes up to 5, a start that falls with slope 0.5 at the nearest point of its boundary.
+    /// 12 iterations, noise variance 10⁻², slopes up to 5, a start that falls with slope 0.5 at the
+    /// nearest point of its boundary.
     pub fn new(lighting: Lighting<T>) -> Self {
         let (noise, max_slope, start_slope) = (T::of(1e-2), T::of(5.0), T::of(0.5));
         Self {
@@ -57,7 +63,7 @@ impl<T: PixelScalar> TsaiShah<T> {
         }
     }
 
-    /// Number of iterations; more do not make the method converge to the surface.
+    /// Number of iterations. More do not make the method converge to the surface.
     ///
     /// # Errors
     /// [`SfsError::InvalidOption`] for 0.
@@ -77,8 +83,8 @@ impl<T: PixelScalar> TsaiShah<T> {
 }
 
 impl<T: PixelScalar> TsaiShah<T> {
-    /// Slope at the boundary of the paraboloid the iteration starts from: positive for a bump, negative for a hollow, 0 for
-    /// the plane (which frontal light never leaves).
+    /// Slope at the boundary of the paraboloid the iteration starts from: positive for a bump,
+    /// negative for a hollow, 0 for the plane (which frontal light never leaves).
     ///
     /// ```
     /// use ndarray::Array2;
@@ -104,8 +110,9 @@ impl<T: PixelScalar> TsaiShah<T> {
         })
     }
 
-    /// z = −½ s a xᵀ(4C)⁻¹x: the paraboloid whose contours are ellipses of the centre and covariance C of the pixels that
-    /// carry data (a uniform ellipse ends at xᵀC⁻¹x = 4), s its slope at the ends of the minor half axis a = 2 √λ_min(C).
+    /// z = −½ s a xᵀ(4C)⁻¹x: the paraboloid whose contours are ellipses of the centre and
+    /// covariance C of the pixels that carry data (a uniform ellipse ends at xᵀC⁻¹x = 4). Here s is
+    /// its slope at the ends of the minor half axis a = 2 √λ_min(C).
     fn start(&self, field: &mut FieldBuffers<T>, grid: &Grid<T>) {
         let aspect = grid.step[1].as_f64();
         let at = |i: usize| {
@@ -128,7 +135,8 @@ impl<T: PixelScalar> TsaiShah<T> {
             count += 1.0;
         }
         let [cx, cy] = sum.map(|sum| sum / count);
-        // The variance of a pixel's own square keeps masks of one row or column from being singular.
+        // The variance of a pixel's own square keeps masks of one row or column from being
+        // singular.
         let (mut xx, mut xy, mut yy) = (1.0 / 12.0, 0.0, aspect * aspect / 12.0);
         for (x, y) in inside() {
             xx += (x - cx) * (x - cx) / count;
@@ -226,7 +234,7 @@ impl<T: PixelScalar> TsaiShah<T> {
         }
     }
 
-    /// One step at every pixel; the root mean square misfit before it.
+    /// One step at every pixel. Returns the root mean square misfit before it.
     fn iterate(&self, field: &mut FieldBuffers<T>, grid: &Grid<T>, iteration: usize) -> T {
         let sign = |back: bool| if back { T::one() } else { -T::one() };
         let back = [iteration & 1 == 0, iteration & 2 == 0];
@@ -254,7 +262,8 @@ impl<T: PixelScalar> TsaiShah<T> {
         (sum / T::of(count.max(1) as f64)).sqrt()
     }
 
-    /// f = R − n·s, and its derivative by the pixel's own height, of which the slopes change by `per` each.
+    /// f = R − n·s, and its derivative by the pixel's own height, of which the slopes change by
+    /// `per` each.
     #[inline(always)]
     fn residual(&self, reflectance: T, [p, q]: [T; 2], [ax, ay]: [T; 2]) -> (T, T) {
         let [sx, sy, sz] = self.lighting.direction();
@@ -266,7 +275,7 @@ impl<T: PixelScalar> TsaiShah<T> {
     }
 }
 
-/// Height of the neighbour before or after along one axis; the pixel's own at the border.
+/// Height of the neighbour before or after along one axis. The pixel's own at the border.
 fn neighbour<T: PixelScalar>(
     z: &[T],
     i: usize,

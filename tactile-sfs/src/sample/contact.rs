@@ -1,21 +1,23 @@
-//! Points of a round body that meets a plane: to the sub-pixel contour, and with heights that know of the vertical boundary.
+//! Points of a round body that meets a plane: to the sub-pixel contour, and with heights that know
+//! of the vertical boundary.
 //!
-//! Near the boundary z rises as the square root of the distance, and no interpolation of z between pixels follows it. Its
-//! square does: z² = a² − x² − y² for a ball, a smooth function whose zero is the contour. So squares are continued one pixel
-//! beyond the mask, areas count a pixel by the part of it that lies inside the contour, and heights between pixels are
-//! roots of interpolated squares.
+//! Near the boundary z rises as the square root of the distance, and no interpolation of z between
+//! pixels follows it. Its square does: z² = a² − x² − y² for a ball, a smooth function whose zero
+//! is the contour. So squares are continued one pixel beyond the mask, and areas count a pixel by
+//! the part of it inside the contour. Heights between pixels are roots of interpolated squares.
 
 use nalgebra::Point3;
 use ndarray::ArrayView2;
 
-use super::lattice::Weights;
-use super::{ControlPointSampler, SampleBuffers, made_by};
+use super::{ControlPointSampler, SampleBuffers, Weights, made_by};
 use crate::{BoundingBox, Domain, PixelScalar, SfsError, SurfaceWorkspace};
 
-/// Squared slope above which ground counts no steeper (63°), as for [`EquallySpaced`](super::EquallySpaced).
+/// Squared slope above which ground counts no steeper (63°), as for
+/// [`EquallySpaced`](super::EquallySpaced).
 const STEEPEST_SQUARED: f64 = 4.0;
 
-/// The eight neighbours (down, right), and the weight of each one's continuation: a diagonal reaches further.
+/// The eight neighbours (down, right), and the weight of each one's continuation: a diagonal
+/// reaches further.
 const NEIGHBOURS: [(isize, isize, f64); 8] = [
     (0, 1, 1.0),
     (1, 0, 1.0),
@@ -27,12 +29,13 @@ const NEIGHBOURS: [(isize, isize, f64); 8] = [
     (-1, -1, 0.5),
 ];
 
-/// Equally spaced control points on a round body that meets the plane z = 0 at its contour, as a contact does: each stands
-/// for the same area of the surface, and cells and heights run to the contour between the pixels.
+/// Equally spaced control points on a round body that meets the plane z = 0 at its contour, as a
+/// contact does. Each stands for the same area of the surface, and cells and heights run to the
+/// contour between the pixels.
 ///
 /// The points of two loads correspond in contacts of twenty pixels' radius too, where those of
-/// [`EquallySpaced`](super::EquallySpaced) follow the pixels at the boundary. Heights below zero move the plane down to the
-/// lowest. O(pixels of the mask's box).
+/// [`EquallySpaced`](super::EquallySpaced) follow the pixels at the boundary. Heights below zero
+/// move the plane down to the lowest. O(pixels of the mask's box).
 ///
 /// ```
 /// use ndarray::Array2;
@@ -101,7 +104,8 @@ impl<T: PixelScalar> ControlPointSampler<T> for ContactSampler {
     }
 }
 
-/// Squared heights over the mask's box and one pixel around it, in squares of a pixel's width; NaN where unknown.
+/// Squared heights over the mask's box and one pixel around it, in squares of a pixel's width. NaN
+/// where unknown.
 struct Field<T> {
     squares: Vec<f64>,
     columns: usize,
@@ -161,10 +165,11 @@ impl<T: PixelScalar> Field<T> {
         field
     }
 
-    /// Continues the squares to the pixels next to the mask: those of a ball, whose second difference is −2 a pixel squared.
+    /// Continues the squares to the pixels next to the mask: those of a ball, whose second
+    /// difference is −2 a pixel squared.
     ///
-    /// A pixel outside the mask has its middle outside the contour: where the continuation is above zero (a cliff at the
-    /// boundary), the contour is put halfway.
+    /// A pixel outside the mask has its middle outside the contour: where the continuation is above
+    /// zero (a cliff at the boundary), the contour is put halfway.
     fn continue_outwards(&mut self, inner: &mut Vec<f64>) {
         inner.clone_from(&self.squares);
         let at = |row: isize, column: isize| -> f64 {
@@ -179,7 +184,8 @@ impl<T: PixelScalar> Field<T> {
             }
         };
         for row in 0..self.rows {
-            // Whether one of a column's three places about this row has a square; of the columns before, at and after the present one.
+            // Whether one of a column's three places about this row has a square; of the columns
+            // before, at and after the present one.
             let is_reached = |column: usize| {
                 (row.saturating_sub(1)..(row + 2).min(self.rows))
                     .any(|row| !inner[row * self.columns + column].is_nan())
@@ -254,7 +260,8 @@ impl<T: PixelScalar> Field<T> {
                 let along = [beside(column.wrapping_sub(1)), beside(column + 1)];
                 let down = [above[column], below[column]];
                 let (gx, gy) = (difference(here, along), difference(here, down));
-                // The contour crosses the pixel where |square| is below half of what it changes over the pixel.
+                // The contour crosses the pixel where |square| is below half of what it changes
+                // over the pixel.
                 let change = (gx.abs() + gy.abs()).max(f64::MIN_POSITIVE);
                 let cover = if here >= 0.5 * change {
                     1.0
@@ -280,7 +287,7 @@ impl<T: PixelScalar> Field<T> {
         }
     }
 
-    /// The point at a place (x, y) of the field; its height is the root of the bilinear square.
+    /// The point at a place (x, y) of the field. Its height is the root of the bilinear square.
     fn point(&self, [x, y]: [f64; 2]) -> Point3<T> {
         let (left, top) = (x.floor(), y.floor());
         let (right, down) = (x - left, y - top);

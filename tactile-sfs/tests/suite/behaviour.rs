@@ -1,4 +1,5 @@
-//! What every implementation must do: reused workspaces, masks, float types, determinism, callbacks.
+//! What every implementation must do: reused workspaces, masks, float types, determinism,
+//! callbacks.
 use crate::common::{Sampled, sphere};
 use crate::methods::{frontal, integrators, reconstructions};
 use ndarray::Array2;
@@ -207,7 +208,8 @@ fn single_precision_agrees() {
         Alignment::None,
     )
     .unwrap();
-    // cos² loses half the digits of f32 near 1: 10⁻³ of slope at worst near the peak, over a few pixels.
+    // cos² loses half the digits of f32 near 1: 10⁻³ of slope at worst near the peak, over a few
+    // pixels.
     assert!(error.error.max < 2e-2, "{error:?}");
     let [p, q] = [&case.p, &case.q].map(|s| s.mapv(|v| v as f32));
     for (name, method, narrow) in [

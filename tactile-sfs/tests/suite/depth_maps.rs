@@ -20,7 +20,8 @@ fn means_of_blocks_are_those_of_their_pixels() {
     for (side, shape) in [(3, (2, 3)), (1, (8, 9)), (4, (2, 2))] {
         contact.load(images, side, -2.0);
         assert_eq!(contact.signal.dim(), shape);
-        // The mean of a linear function is its value in the block's middle. All sums are exact in f64.
+        // The mean of a linear function is its value in the block's middle. All sums are exact in
+        // f64.
         let middle =
             |start: usize, block: usize| (start + side * block) as f64 + 0.5 * (side as f64 - 1.0);
         for ((r, c), mean) in contact.signal.indexed_iter() {
@@ -56,7 +57,8 @@ fn pixels_too_near_the_rim_of_a_hemisphere_are_trimmed() {
     contact.mask = Array2::from_shape_fn((50, 50), |at| distance(at) < 20.5);
     contact.trim_rim();
     for (at, inside) in contact.mask.indexed_iter() {
-        // The radius from the pixels is half a pixel too large at most: a fortieth of the quarter pixel.
+        // The radius from the pixels is half a pixel too large at most: a fortieth of the quarter
+        // pixel.
         let inner = 20.0 - distance(at);
         assert!(*inside || inner < 0.26, "{at:?}: {inner}");
         assert!(!*inside || inner > 0.23, "{at:?}: {inner}");
@@ -106,7 +108,8 @@ fn an_exact_cap_comes_back() {
     let mask = heights.mapv(|h| h > 0.0);
     let domain = Domain::new(size).unwrap().with_mask(mask.view());
     let known = BallFit::of_radius(heights.view(), &domain, radius).unwrap();
-    // Gauss–Newton stops at 10⁻⁹ of the radius, the search for a radius at a millionth of its bracket.
+    // Gauss–Newton stops at 10⁻⁹ of the radius, the search for a radius at a millionth of its
+    // bracket.
     for (fit, tolerance) in [
         (known, 1e-10),
         (

@@ -1,4 +1,5 @@
-//! Input that is hard or wrong: bad pixels, noise at the rim, domains one pixel wide, options and shapes that make no sense.
+//! Input that is hard or wrong: bad pixels, noise at the rim, domains one pixel wide, options and
+//! shapes that make no sense.
 use crate::common::{Sampled, sphere};
 use crate::methods::{frontal, integrators, reconstructions};
 use ndarray::Array2;
@@ -35,7 +36,8 @@ fn bad_pixels_are_flagged_and_do_little_harm() {
 
 #[test]
 fn noise_at_the_rim_does_not_draw_the_surface_down() {
-    // The solution is a minimum over all rim pixels; with each judged alone, grey levels with a noise of one lose 4 % here.
+    // The solution is a minimum over all rim pixels; with each judged alone, grey levels with a
+    // noise of one lose 4 % here.
     let (radius, mut state) = (60.0_f64, 7_u64);
     let mut uniform = || {
         state = state

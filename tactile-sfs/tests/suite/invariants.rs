@@ -1,11 +1,12 @@
-//! Properties that hold for any contact: where it lies in the frame and what is outside its mask do not matter; and the
-//! estimates and error functions against cases worked out by hand.
+//! Properties that hold for any contact: where it lies in the frame and what is outside its mask do
+//! not matter; and the estimates and error functions against cases worked out by hand.
 
 use ndarray::{Array2, array, s};
 use proptest::prelude::*;
 use tactile_sfs::*;
 
-/// A lumpy frame, its slopes and a mask of the given ellipse, all placed at (top, left) of a larger frame.
+/// A lumpy frame, its slopes and a mask of the given ellipse, all placed at (top, left) of a larger
+/// frame.
 struct Placed {
     image: Array2<f64>,
     p: Array2<f64>,
@@ -152,7 +153,8 @@ fn errors_worked_out_by_hand() {
     ));
 }
 
-/// Exchanging rows and columns, and slopes and pixel sizes with them, exchanges those of the heights.
+/// Exchanging rows and columns, and slopes and pixel sizes with them, exchanges those of the
+/// heights.
 #[test]
 fn a_turned_frame_has_turned_heights() {
     for (rows, columns) in [(64, 37), (37, 64), (30, 45)] {
@@ -177,7 +179,8 @@ fn a_turned_frame_has_turned_heights() {
             let plain = heights(p.view(), q.view(), [1.0, 1.5]);
             let turned = heights(q.t(), p.t(), [1.5, 1.0]);
             let differences = plain.iter().zip(turned.t()).map(|(a, b)| (a - b).abs());
-            // Heights of some tens; both are direct solutions, with the rounding of transforms of 64 points.
+            // Heights of some tens; both are direct solutions, with the rounding of transforms of
+            // 64 points.
             let largest = differences.fold(0.0, f64::max);
             assert!(largest < 1e-10, "{name}, {rows} × {columns}: {largest:e}");
         }

@@ -5,7 +5,8 @@ use tactile_sfs::*;
 
 const N: usize = 4096;
 
-/// A paraboloid of the given radius in pixels around the centre of the frame, its mask and its image of 8 bits.
+/// A paraboloid of the given radius in pixels around the centre of the frame, its mask and its
+/// image of 8 bits.
 fn paraboloid(radius: f32) -> (Array2<f32>, Array2<bool>, Array2<u8>) {
     let square = |(r, c): (usize, usize)| {
         let (x, y) = (c as f32 - 2047.5, r as f32 - 2047.5);
@@ -49,7 +50,8 @@ fn check(radius: f32) {
         Alignment::None,
     )
     .unwrap();
-    // Rounding to 8 bits hides slopes below 0.06 at the top and moves the others by up to 2 %: 1 % of the height.
+    // Rounding to 8 bits hides slopes below 0.06 at the top and moves the others by up to 2 %: 1 %
+    // of the height.
     assert!(
         error.error.mean_absolute < 0.01 * 0.2 * f64::from(radius),
         "{error:?}"

@@ -1,4 +1,5 @@
-//! Against measured data and the surfaces of the shape-from-shading survey; skipped where the data are not there.
+//! Against measured data and the surfaces of the shape-from-shading survey; skipped where the data
+//! are not there.
 #![allow(clippy::print_stdout)]
 
 use std::path::PathBuf;
@@ -150,7 +151,8 @@ impl PressedBall {
         })
     }
 
-    /// A table calibrated on the ball: on a known circle within a mask, or on the contact found at a threshold.
+    /// A table calibrated on the ball: on a known circle within a mask, or on the contact found at
+    /// a threshold.
     fn calibrated(
         &self,
         known: Option<(&Array2<bool>, Circle)>,
@@ -166,8 +168,8 @@ impl PressedBall {
         DepthTable::from_ball(frame, signal, &domain, BALL, threshold, circle).unwrap()
     }
 
-    /// Error of each half of the stated circle by a table of the other half, calibrated on the circle found at a
-    /// threshold: as it is, and zeroed.
+    /// Error of each half of the stated circle by a table of the other half, calibrated on the
+    /// circle found at a threshold: as it is, and zeroed.
     fn held_out(&self, threshold: f64) -> [f64; 2] {
         let found = self.calibrated(None, threshold);
         let circle = (found.centre_px, found.contact_radius_m);
@@ -241,7 +243,8 @@ fn ball_of_9dtact() {
     }
     assert!(sum < 0.04e-3, "{sum}");
 
-    // For comparison: the makers' circle has 67 px, the stated one 67.6, which is 0.051 mm of depth.
+    // For comparison: the makers' circle has 67 px, the stated one 67.6, which is 0.051 mm of
+    // depth.
     let makers = makers.with_signal(ball.signal.clone());
     println!(
         "ball, makers' table: {:.4} mm",
@@ -256,7 +259,8 @@ fn ball_of_9dtact() {
     );
 }
 
-/// Nothing of the stated circle is known: the contact is found at a threshold, and the zero is that of the signal.
+/// Nothing of the stated circle is known: the contact is found at a threshold, and the zero is that
+/// of the signal.
 #[test]
 fn ball_of_9dtact_found_at_any_threshold() {
     let (Some(ball), Some(makers)) = (PressedBall::read(), makers_table()) else {
@@ -272,7 +276,8 @@ fn ball_of_9dtact_found_at_any_threshold() {
         // The makers' published figure; noise alone, with the stated circle, is 0.030 mm.
         assert!(zeroed < 0.0462e-3 && zeroed < raw, "{raw}, {zeroed}");
     }
-    // The makers measured theirs on this image, on a circle whose radius and centre they rounded down to pixels.
+    // The makers measured theirs on this image, on a circle whose radius and centre they rounded
+    // down to pixels.
     let zeroed = makers
         .with_signal(ball.signal.clone())
         .with_contact_threshold(3.0)
@@ -283,7 +288,8 @@ fn ball_of_9dtact_found_at_any_threshold() {
     assert!(error < 0.0462e-3, "{error}");
 }
 
-/// Mean errors of Tsai–Shah's heights, after an offset and after scale and offset, under the survey's three lights.
+/// Mean errors of Tsai–Shah's heights, after an offset and after scale and offset, under the
+/// survey's three lights.
 fn tsai_shah_errors(
     name: &str,
     z: &Array2<f64>,
@@ -343,8 +349,8 @@ fn tsai_shah_is_no_worse_than_the_plain_method_on_mozart() {
 fn tsai_shah_is_no_worse_than_the_plain_method_on_the_vase() {
     let (z, slopes, mask) = vase();
     let errors = tsai_shah_errors("vase", &z, &slopes, &mask);
-    // The plain method has, over several lights and settings, 5.3 to 7.3 px with scale and offset fitted, and 7.4 px
-    // or more (a constant: 7.4) with the offset alone.
+    // The plain method has, over several lights and settings, 5.3 to 7.3 px with scale and offset
+    // fitted, and 7.4 px or more (a constant: 7.4) with the offset alone.
     assert!(
         errors
             .iter()

@@ -88,8 +88,9 @@ fn eikonal_error_falls_faster_than_linearly_from_a_known_peak() {
 
 #[test]
 fn eikonal_from_a_rim_is_right_to_a_fraction_of_a_pixel() {
-    // A vertical rim is found to a small part of a pixel; where the surface meets the plane at an angle (slope 1 here) its
-    // place within the pixel is not in the image, and up to half a pixel of height is lost.
+    // A vertical rim is found to a small part of a pixel; where the surface meets the plane at an
+    // angle (slope 1 here) its place within the pixel is not in the image, and up to half a pixel
+    // of height is lost.
     for ((name, shape), bound) in SHAPES.into_iter().zip([0.1, 0.2, 0.5]) {
         let errors = SIZES.map(|n| rising(n, shape) * n as f64 / 2.0);
         println!("{name}: {errors:.3?} pixels");
@@ -177,7 +178,8 @@ fn pixels_need_not_be_square() {
             Alignment::Offset,
         )
         .unwrap();
-        // Of fourth order, h⁴ = 10⁻⁶ times derivatives of some hundred; rises by the mean of two slopes miss this.
+        // Of fourth order, h⁴ = 10⁻⁶ times derivatives of some hundred; rises by the mean of two
+        // slopes miss this.
         assert!(error.error.max < 2e-4, "{error:?}");
     }
 }

@@ -1,6 +1,8 @@
-//! Answers of every method, compared with recorded ones: a change that is not meant to move a number must not.
+//! Answers of every method, compared with recorded ones: a change that is not meant to move a
+//! number must not.
 //!
-//! `RECORD_ANSWERS=1 cargo test -p tactile-sfs --test suite recorded` writes the record anew; the commit says why numbers moved.
+//! `RECORD_ANSWERS=1 cargo test -p tactile-sfs --test suite recorded` writes the record anew; the
+//! commit says why numbers moved.
 
 use test_support as record;
 
@@ -15,8 +17,8 @@ use tactile_sfs::{
 use self::record::Answers;
 use super::common::{Sampled, ellipsoid, gaussian, paraboloid, sphere, waves};
 
-/// Relative to the largest number of a line: the last bits of square roots and sums in another order, times the few
-/// hundred steps that some methods take.
+/// Relative to the largest number of a line: the last bits of square roots and sums in another
+/// order, times the few hundred steps that some methods take.
 const TOLERANCE: f64 = 1e-12;
 
 const SIDE: usize = 48;

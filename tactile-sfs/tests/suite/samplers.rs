@@ -130,7 +130,8 @@ fn the_same_surface_larger_gives_the_same_points_of_it() {
         .zip(&large)
         .map(|(a, b)| (scaled(a) - b.coords.xy()).norm());
     let mean = apart.sum::<f64>() / 120.0;
-    // Points stand 8 pixels apart; what is left is the error of areas from central differences, second order in the pixel.
+    // Points stand 8 pixels apart; what is left is the error of areas from central differences,
+    // second order in the pixel.
     assert!(mean < 0.01, "{mean}");
 }
 
@@ -157,8 +158,8 @@ fn equal_spacing_is_even_on_the_surface() {
     assert!(spread < 0.2, "{spread}");
 }
 
-/// Points of a ball stand for equal areas, of which ground steeper than 63° counts as if it were no steeper: the share of them within a
-/// radius is an integral, whatever the pixels' shape.
+/// Points of a ball stand for equal areas, of which ground steeper than 63° counts as if it were no
+/// steeper: the share of them within a radius is an integral, whatever the pixels' shape.
 #[test]
 fn points_of_a_contact_stand_for_equal_areas_on_oblong_pixels_too() {
     const RADIUS: f64 = 40.0;
@@ -187,7 +188,8 @@ fn points_of_a_contact_stand_for_equal_areas_on_oblong_pixels_too() {
             let inside = points.iter().filter(|p| distance(p.x, p.y) < within);
             let found = inside.count() as f64 / COUNT as f64;
             let expected = area(within) / area(RADIUS);
-            // A circle cuts some forty cells of the points, of which one may count too many or too few in ten.
+            // A circle cuts some forty cells of the points, of which one may count too many or too
+            // few in ten.
             assert!(
                 (found - expected).abs() < 0.015,
                 "{pixel:?}, {within}: {found} {expected}"

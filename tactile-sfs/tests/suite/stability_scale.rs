@@ -35,8 +35,8 @@ fn integrators() -> [Integrators; 3] {
     ]
 }
 
-/// The unit of length is a factor of the heights; its rounding and that of the sums over 48 × 48 pixels, whose condition is the
-/// number of pixels across, are all that may differ.
+/// The unit of length is a factor of the heights; its rounding and that of the sums over 48 × 48
+/// pixels, whose condition is the number of pixels across, are all that may differ.
 #[test]
 fn integrals_have_no_unit() {
     let mut table = Worst::new("slope integration");
@@ -74,7 +74,8 @@ fn integrals_have_no_unit() {
             .zip(&expected)
             .map(|(z, e)| (f64::from(*z) - e).abs())
             .fold(0.0, f64::max);
-        // An iterative solver in single precision stops at its own tolerance, some hundred roundings.
+        // An iterative solver in single precision stops at its own tolerance, some hundred
+        // roundings.
         table.enter(
             &format!("{name}: f32 against f64"),
             error / size / (f64::from(f32::EPSILON) * 48.0),
@@ -84,7 +85,8 @@ fn integrals_have_no_unit() {
     table.finish();
 }
 
-/// Whatever the image, a surface or a typed error comes back, and no height inside the mask is NaN or infinite.
+/// Whatever the image, a surface or a typed error comes back, and no height inside the mask is NaN
+/// or infinite.
 #[test]
 fn saturated_and_constant_images_have_surfaces() {
     let scene = Sampled::new(24, sphere);

@@ -17,7 +17,8 @@ fn cap() -> Array2<f64> {
     })
 }
 
-/// Largest error of the depth inside the cap, in metres, of a table calibrated at a threshold, as it is and zeroed.
+/// Largest error of the depth inside the cap, in metres, of a table calibrated at a threshold, as
+/// it is and zeroed.
 fn worst(signal_of: impl Fn(f64) -> f64, threshold: f64) -> [f64; 2] {
     let truth = cap();
     let image = truth.mapv(signal_of);
@@ -40,7 +41,8 @@ fn a_zeroed_table_does_not_depend_on_the_threshold_it_was_calibrated_at() {
     let proportional = |depth: f64| 4e4 * depth;
     let bent = |depth: f64| 5e4 * depth - 7e6 * depth * depth;
     for threshold in [2.0, 4.0, 8.0] {
-        // The level of the threshold is 1/40 mm a grey level deep, and as much is missing everywhere.
+        // The level of the threshold is 1/40 mm a grey level deep, and as much is missing
+        // everywhere.
         let [raw, zeroed] = worst(proportional, threshold);
         assert!(raw > 0.8 * threshold / 4e4, "{threshold}: {raw}");
         // A table's step is 25 µm, and its levels are the means of their pixels.

@@ -1,13 +1,15 @@
-//! From the frame to the grid: nodes, angles to the light, known heights, boundary offsets and edges. And from the grid to
-//! the surface.
+//! From the frame to the grid: nodes, angles to the light, known heights, boundary offsets and
+//! edges. And from the grid to the surface.
 //!
-//! Boundary offsets: how far the pixels next to a boundary of known height stand above it, to a fraction of a pixel.
+//! Boundary offsets: how far the pixels next to a boundary of known height stand above it, to a
+//! fraction of a pixel.
 
 use super::{BoundaryCondition, Eikonal, EikonalBuffers, Node};
 use crate::{Domain, Frame, PixelFlags, PixelScalar, SfsError, Surface};
 
 impl<T: PixelScalar> EikonalBuffers<T> {
-    /// Fills the grid and flags the pixels the model does not explain. Returns whether heights are known inside the mask.
+    /// Fills the grid and flags the pixels the model does not explain. Returns whether heights are
+    /// known inside the mask.
     pub(super) fn load(
         &mut self,
         method: &Eikonal<T>,
@@ -92,15 +94,17 @@ impl<T: PixelScalar> EikonalBuffers<T> {
         self.holes.clear();
     }
 
-    /// Gives pixels without a finite intensity the mean of their finite neighbours, from the edge of a hole inwards. A part of
-    /// the mask without any intensity is taken as flat, for want of better; a mask without any is refused.
+    /// Gives pixels without a finite intensity the mean of their finite neighbours, from the edge
+    /// of a hole inwards. A part of the mask without any intensity is taken as flat, for want of
+    /// better. A mask without any is refused.
     fn fill_holes(&mut self, pixels: usize) -> Result<(), SfsError> {
         for _ in 0..pixels {
             let before = self.holes.len();
             if before == 0 {
                 break;
             }
-            // `kept` holds the new values until the pass is over, so that the order does not matter.
+            // `kept` holds the new values until the pass is over, so that the order does not
+            // matter.
             let mut values = core::mem::take(&mut self.kept);
             values.clear();
             values.extend(self.holes.iter().map(|&i| self.mean_around(i)));
@@ -154,7 +158,8 @@ impl<T: PixelScalar> EikonalBuffers<T> {
         };
         let (width, aspect) = (self.width, self.aspect);
         let rest = self.node.len() - 2 * width;
-        // Every node and those after and below it, as slices of one length: no step asks where it is.
+        // Every node and those after and below it, as slices of one length: no step asks where it
+        // is.
         let (sine, cosine) = (&self.sine[width..], &self.cosine[width..]);
         let (sine_right, cosine_right) = (&sine[1..=rest], &cosine[1..=rest]);
         let (sine_below, cosine_below) = (&sine[width..][..rest], &cosine[width..][..rest]);
@@ -193,10 +198,12 @@ impl<T: PixelScalar> EikonalBuffers<T> {
         }
     }
 
-    /// Measures the boundary offset of every unknown pixel of the mask that has a given height outside next to it.
+    /// Measures the boundary offset of every unknown pixel of the mask that has a given height
+    /// outside next to it.
     ///
-    /// The solution is a minimum over the whole boundary: one pixel that noise makes look flatter than it is would draw down
-    /// the whole surface. So the kind of boundary is decided by the majority of the boundary pixels around, and their mean
+    /// The solution is a minimum over the whole boundary: one pixel that noise makes look flatter
+    /// than it is would draw down the whole surface. So the kind of boundary is decided by the
+    /// majority of the boundary pixels around, and their mean
     /// |∇ sin θ| is taken.
     fn measure_offsets(&mut self) {
         for i in self.width..self.node.len() - self.width {
@@ -218,7 +225,8 @@ impl<T: PixelScalar> EikonalBuffers<T> {
         }
     }
 
-    /// Sets the values that sweeps start from: known heights, and boundary heights with their offsets.
+    /// Sets the values that sweeps start from: known heights, and boundary heights with their
+    /// offsets.
     pub(super) fn start(&mut self, convex: bool) {
         let sign = if convex { T::one() } else { -T::one() };
         for i in self.width..self.node.len() - self.width {
@@ -231,7 +239,8 @@ impl<T: PixelScalar> EikonalBuffers<T> {
         }
     }
 
-    /// Lowest (highest for sign −1, negated) height given outside the mask next to a pixel, +∞ if there is none.
+    /// Lowest (highest for sign −1, negated) height given outside the mask next to a pixel, +∞ if
+    /// there is none.
     fn lowest(&self, i: usize, sign: T) -> T {
         let width = self.width;
         let given = |j: usize| match self.node[j] {
@@ -264,7 +273,8 @@ impl<T: PixelScalar> EikonalBuffers<T> {
         ]
     }
 
-    /// At an occluding contour sin θ is continued to 1; elsewhere the boundary is half a pixel away.
+    /// At an occluding contour sin θ is continued to 1. Elsewhere the boundary is half a pixel
+    /// away.
     fn offset_of(&self, i: usize) -> T {
         let (sine, cosine) = (self.sine[i], self.cosine[i]);
         let (gradient, occluding) = self.around(i);
@@ -279,11 +289,13 @@ impl<T: PixelScalar> EikonalBuffers<T> {
         half_step * (sine + boundary_sine) / (cosine + boundary_cosine)
     }
 
-    /// Mean |∇ sin θ| of the boundary pixels around one, and whether most of them lie at an occluding contour.
+    /// Mean |∇ sin θ| of the boundary pixels around one, and whether most of them lie at an
+    /// occluding contour.
     fn around(&self, i: usize) -> (T, bool) {
         // Over as many pixels the boundary's kind and curvature are taken to be the same.
         let window = 4;
-        // The boundary is at most one pixel away, the rest is slack for the error of the extrapolation.
+        // The boundary is at most one pixel away, the rest is slack for the error of the
+        // extrapolation.
         let reach = 1.25;
         let (width, rows) = (self.width, self.node.len() / self.width);
         let span = |middle: usize, length: usize| {
@@ -309,7 +321,8 @@ impl<T: PixelScalar> EikonalBuffers<T> {
         gx * gx / (gx * gx + gy * gy)
     }
 
-    /// Derivative of sin θ along one axis, from the neighbours inside the mask; second order where there are enough.
+    /// Derivative of sin θ along one axis, from the neighbours inside the mask. Second order where
+    /// there are enough.
     fn derivative(&self, i: usize, stride: usize) -> T {
         let inside = |j: Option<usize>| {
             j.filter(|&j| self.node.get(j).is_some_and(|&node| node != Node::Outside))

@@ -1,32 +1,39 @@
 //! The eikonal equation of shading, by fast sweeping.
 //!
-//! Under frontal light a Lambertian surface obeys |∇z| = √(1/R² − 1), R the reflectance. Its viscosity solutions are
-//! shortest-path distances: from known heights z_k upwards, z(x) = min_k (z_k + d(x, k)), or downwards,
-//! z(x) = max_k (z_k − d(x, k)), d the least integral of the slope along a path. These are the two readings of frontal
-//! shading, convex and concave as seen from a known boundary: a bump is the first if its minima and boundary are known
-//! (from any point the steepest descent ends there), and the second if its maxima are. No sign structure is needed:
-//! further known heights never hurt either.
+//! Under frontal light a Lambertian surface obeys |∇z| = √(1/R² − 1), R the reflectance. Its
+//! viscosity solutions are shortest-path distances, d the least integral of the slope along a path.
+//! From known heights z_k upwards, z(x) = min_k (z_k + d(x, k)), or downwards, z(x) = max_k (z_k −
+//! d(x, k)). These are the two readings of frontal shading, convex and concave as seen from a known
+//! boundary. A bump is the first if its minima and boundary are known (from any point the steepest
+//! descent ends there). It is the second if its maxima are. No sign structure is needed: further
+//! known heights never hurt either.
 //!
-//! Three things make it accurate where textbook sweeping (first order in the slope at the pixel) is not:
+//! Three things make it accurate where textbook sweeping (first order in the slope at the pixel) is
+//! not:
 //!
 //! - *Chord rule.* Between neighbours with normal angles θ₁, θ₂ the slope is tan((θ₁ + θ₂)/2) =
-//!   (sin θ₁ + sin θ₂)/(cos θ₁ + cos θ₂): second order, exact on a circular profile, and finite up to a vertical rim.
-//! - *Deferred correction.* A second solve uses the directions of the first to bring the slopes of both axes to the same
-//!   place, which makes smooth parts second order. Where a profile is fitted to the contact its directions are taken, and one solve is enough:
-//!   half a ball of 26 pixels comes out within 0.04 pixels instead of 0.13.
-//! - *Sub-pixel boundary.* The boundary lies between the last pixel of the mask and the next. Where sin θ, continued
-//!   outwards, reaches 1 within that pixel the contour is occluding, and the last pixel is cos θ/|∇ sin θ| above it (the
-//!   radius of curvature is 1/|∇ sin θ|); else the boundary is taken half a pixel away.
+//!   (sin θ₁ + sin θ₂)/(cos θ₁ + cos θ₂): second order, exact on a circular profile, and finite up
+//!   to a vertical rim.
+//! - *Deferred correction.* A second solve uses the directions of the first to bring the slopes of
+//!   both axes to the same place, which makes smooth parts second order. Where a profile is fitted
+//!   to the contact its directions are taken, and one solve is enough. Half a ball of 26 pixels
+//!   comes out within 0.04 pixels instead of 0.13.
+//! - *Sub-pixel boundary.* The boundary lies between the last pixel of the mask and the next. Where
+//!   sin θ, continued outwards, reaches 1 within that pixel the contour is occluding. The last
+//!   pixel then is cos θ/|∇ sin θ| above it (the radius of curvature is 1/|∇ sin θ|). Elsewhere the
+//!   boundary is taken half a pixel away.
 //!
-//! Oblique light makes the equation anisotropic: R √(1 + |∇z|²) + s·∇z = s_z. Each of the four triangles around a pixel
-//! is solved with its causality condition (Kao, Osher & Qian 2004; Qian, Zhang & Zhao 2007).
+//! Oblique light makes the equation anisotropic: R √(1 + |∇z|²) + s·∇z = s_z. Each of the four
+//! triangles around a pixel is solved with its causality condition (Kao, Osher & Qian 2004, Qian,
+//! Zhang & Zhao 2007).
 //!
-//! A fitted profile also tells nearly the order in which a front from the rim reaches the pixels. Every node is upwind of those
-//! that it lowers: visited in the order of their values, all have their final value after one pass (Tsitsiklis 1995, Sethian
-//! 1996). That order is only a start: sweeps follow until nothing changes.
+//! A fitted profile also tells nearly the order in which a front from the rim reaches the pixels.
+//! Every node is upwind of those that it lowers: visited in the order of their values, all have
+//! their final value after one pass (Tsitsiklis 1995, Sethian 1996). That order is only a start:
+//! sweeps follow until nothing changes.
 //!
-//! References: Rouy & Tourin 1992 (viscosity), Zhao 2005 (fast sweeping), Bak, McLaughlin & Renzi 2010 (locking),
-//! Prados & Faugeras 2005 (oblique light).
+//! References: Rouy & Tourin 1992 (viscosity), Zhao 2005 (fast sweeping), Bak, McLaughlin & Renzi
+//! 2010 (locking), Prados & Faugeras 2005 (oblique light).
 
 mod grid;
 mod profile;
@@ -65,7 +72,8 @@ pub enum BoundaryCondition<T> {
     Height(T),
 }
 
-/// Which of the two surfaces with the same shading: convex or concave, as seen from the known heights.
+/// Which of the two surfaces with the same shading: convex or concave, as seen from the known
+/// heights.
 ///
 /// ```
 /// use ndarray::Array2;
@@ -85,24 +93,26 @@ pub enum BoundaryCondition<T> {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum EikonalBranch {
-    /// Convex if no height inside the mask is known; else both are computed and the one whose shading is nearer to the
-    /// image is returned (false folds give the wrong one away).
+    /// Convex if no height inside the mask is known. Else both are computed and the one whose
+    /// shading is nearer to the image is returned (false folds give the wrong one away).
     Auto,
-    /// Heights rise from the known ones, z = min (z_k + d): a bump on its boundary. Right if all minima and the boundary
-    /// are known.
+    /// Heights rise from the known ones, z = min (z_k + d): a bump on its boundary. Right if all
+    /// minima and the boundary are known.
     Convex,
-    /// Heights fall from the known ones, z = max (z_k − d): a hollow under its boundary, or a bump under its known top.
-    /// Right if all maxima are known.
+    /// Heights fall from the known ones, z = max (z_k − d): a hollow under its boundary, or a bump
+    /// under its known top. Right if all maxima are known.
     Concave,
 }
 
 /// Shape from shading by the eikonal equation, for frontal and oblique light.
 ///
-/// Known heights inside the mask hold at the pixel's centre; those outside, next to the mask, are the height the
-/// surface reaches at the mask's border. Pixels no known height reaches are flagged `UNREACHED`.
+/// Known heights inside the mask hold at the pixel's centre. Those outside, next to the mask, are
+/// the height the surface reaches at the mask's border. Pixels no known height reaches are flagged
+/// `UNREACHED`.
 ///
-/// Cost: a few sweeps over the bounding box, O(pixels); `report.iterations` counts them, `report.residual` is the last
-/// change of height. Error on smooth surfaces: at least first order in the pixel, under frontal light nearly second.
+/// Cost: a few sweeps over the bounding box, O(pixels). `report.iterations` counts them,
+/// `report.residual` is the last change of height. Error on smooth surfaces: at least first order
+/// in the pixel, under frontal light nearly second.
 ///
 /// ```
 /// use ndarray::Array2;
@@ -129,7 +139,8 @@ pub struct Eikonal<T> {
 }
 
 impl<T: PixelScalar> Eikonal<T> {
-    /// The method with a free boundary, [`EikonalBranch::Auto`], slopes up to 100, a tolerance of 10⁻⁵ pixels and at most 400 sweeps.
+    /// The method with a free boundary, [`EikonalBranch::Auto`], slopes up to 100, a tolerance of
+    /// 10⁻⁵ pixels and at most 400 sweeps.
     pub fn new(lighting: Lighting<T>) -> Self {
         Self {
             lighting,
@@ -158,10 +169,11 @@ impl<T: PixelScalar> Eikonal<T> {
         Self { branch, ..self }
     }
 
-    /// Whether the shading of the two or three pixels next to the mask's border, blurred and partly covered in a real
-    /// frame, is replaced by that of an elliptical profile fitted to the inside, R² = 1 − x²/a² − y²/b² (Hertz's contact of
-    /// smooth bodies): the surface then starts on the sub-pixel contour of that profile. Where the profile explains less
-    /// than 90 % of the variance of R², and under oblique light, nothing is replaced. O(pixels of the mask's box).
+    /// Whether the shading of the two or three pixels next to the mask's border, blurred and partly
+    /// covered in a real frame, is replaced by that of an elliptical profile fitted to the inside,
+    /// R² = 1 − x²/a² − y²/b² (Hertz's contact of smooth bodies). The surface then starts on the
+    /// sub-pixel contour of that profile. Where the profile explains less than 90 % of the variance
+    /// of R², and under oblique light, nothing is replaced. O(pixels of the mask's box).
     ///
     /// ```
     /// use ndarray::Array2;
@@ -266,7 +278,8 @@ pub(crate) struct EikonalBuffers<T> {
     /// Reflectance R = cos of the angle between normal and light, and the sine of that angle.
     cosine: Vec<T>,
     sine: Vec<T>,
-    /// Given heights: inside the mask at the pixel's centre, outside it at the mask's border. NaN elsewhere.
+    /// Given heights: inside the mask at the pixel's centre, outside it at the mask's border. NaN
+    /// elsewhere.
     given: Vec<T>,
     /// Height of the convex branch, or minus that of the concave one. +∞ where not reached.
     value: Vec<T>,
@@ -276,14 +289,15 @@ pub(crate) struct EikonalBuffers<T> {
     offset: Vec<T>,
     /// 1/(slope · step)² of the edge to the next node in x and in y.
     edges: Vec<[T; 2]>,
-    /// cos²φ of the gradient, whether sweeps use it, and whether a fitted profile has given it before any solution.
+    /// cos²φ of the gradient, whether sweeps use it, and whether a fitted profile has given it
+    /// before any solution.
     along_x: Vec<T>,
     corrected: bool,
     directed: bool,
     /// Nodes whose intensity is not finite.
     holes: Vec<usize>,
-    /// Unknown nodes in the order in which the front is expected to reach them, after a level in the upper half of the
-    /// number. Empty where nothing is expected.
+    /// Unknown nodes in the order in which the front is expected to reach them, after a level in
+    /// the upper half of the number. Empty where nothing is expected.
     front: Vec<u64>,
 }
 
@@ -320,7 +334,8 @@ impl<T: PixelScalar> Eikonal<T> {
     ) -> Result<(), SfsError> {
         surface.enter(frame.dim(), domain)?;
         let known_inside = workspace.eikonal.load(self, frame, domain, surface)?;
-        // Where heights are known here and there lines of equal light need not be those of equal height.
+        // Where heights are known here and there lines of equal light need not be those of equal
+        // height.
         if let Some(profile) = profile.filter(|_| domain.known_heights.is_none()) {
             workspace.eikonal.follow(profile, surface.bounding_box);
         }
@@ -355,8 +370,9 @@ impl<T: PixelScalar> Eikonal<T> {
         Outcome { sweeps, ..second }
     }
 
-    /// Solves one branch into the buffers' values. Under frontal light that takes two solves, the second with the directions
-    /// of the first, unless a fitted profile has given those of a convex surface.
+    /// Solves one branch into the buffers' values. Under frontal light that takes two solves, the
+    /// second with the directions of the first, unless a fitted profile has given those of a convex
+    /// surface.
     fn solve(&self, workspace: &mut SurfaceWorkspace<T>, convex: bool) -> Outcome<T> {
         let grid = &mut workspace.eikonal;
         grid.corrected = convex && grid.directed;
@@ -385,7 +401,8 @@ impl<T: PixelScalar> Eikonal<T> {
             change: T::infinity(),
         };
         let marched = convex && !workspace.eikonal.front.is_empty();
-        // Three passes along an expected front, then sweeps in four directions, which reach any front.
+        // Three passes along an expected front, then sweeps in four directions, which reach any
+        // front.
         for _ in 0..if marched { self.max_sweeps.min(3) } else { 0 } {
             outcome.sweeps += 1;
             if !workspace.eikonal.march(self.tolerance) {
@@ -416,8 +433,8 @@ impl<T: PixelScalar> Eikonal<T> {
 }
 
 impl<T: PixelScalar> EikonalBuffers<T> {
-    /// Sum of squared differences of reflectance over the nodes with four neighbours: the wrong branch has folds, and folds
-    /// shade differently.
+    /// Sum of squared differences of reflectance over the nodes with four neighbours: the wrong
+    /// branch has folds, and folds shade differently.
     fn misfit(&self, value: &[T], sign: T, [x, y, z]: [T; 3]) -> T {
         let (width, half) = (self.width, T::of(0.5) * sign);
         let mut sum = T::zero();
@@ -428,8 +445,8 @@ impl<T: PixelScalar> EikonalBuffers<T> {
                 continue;
             }
             if near.iter().any(|&j| !value[j].is_finite()) {
-                // Nothing to compare. Folds make 0.02 to 0.1 on average, right branches less than 0.005. Under oblique light
-                // the right branch often ends at shadows.
+                // Nothing to compare. Folds make 0.02 to 0.1 on average, right branches less than
+                // 0.005. Under oblique light the right branch often ends at shadows.
                 sum += T::of(0.01);
                 continue;
             }

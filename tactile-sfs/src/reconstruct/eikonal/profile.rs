@@ -1,17 +1,20 @@
 //! The shading next to the boundary of a round contact, from a profile fitted to the inside.
 //!
-//! The last two or three pixels before an occluding boundary are the worst of a frame: partly covered, blurred by the lens,
-//! and where the slope has no end. A surface started there inherits their errors whole. For an elliptical body that the
-//! plane cuts in half, as for Hertz's pressure under any two smooth bodies, R² = 1 − x²/a² − y²/b²: a quadratic function of
-//! the pixel, which the inside determines and which is zero on the contour.
+//! The last two or three pixels before an occluding boundary are the worst of a frame: partly
+//! covered, blurred by the lens, and where the slope has no end. A surface started there inherits
+//! their errors whole. For an elliptical body that the plane cuts in half, as for Hertz's pressure
+//! under any two smooth bodies, R² = 1 − x²/a² − y²/b². That is a quadratic function of the pixel,
+//! which the inside determines and which is zero on the contour.
 //!
-//! At finite strain the pressure departs from Hertz's: R = √(1 − ρ²) (1 − c ρ²) with ρ² = x²/a² + y²/b² and c from −0.3 to
-//! 0.15. The zero of the quadratic then misses the contour by up to a hundredth of a, where the surface is steepest. On a
-//! press simulated by finite elements the heights came out 10 and 14 % too high. So R² = A (1 − ρ²) (1 − c ρ²)² is fitted to
-//! the means of R² along the ellipses of the quadratic, where that explains most of the quadratic's residual.
+//! At finite strain the pressure departs from Hertz's: R = √(1 − ρ²) (1 − c ρ²) with ρ² = x²/a² +
+//! y²/b² and c from −0.3 to 0.15. The zero of the quadratic then misses the contour by up to a
+//! hundredth of a, where the surface is steepest. On a press simulated by finite elements the
+//! heights came out 10 and 14 % too high. So R² = A (1 − ρ²) (1 − c ρ²)² is fitted to the means of
+//! R² along the ellipses of the quadratic, where that explains most of the quadratic's residual.
 //!
-//! Contact detection fits a round profile with the same bend to the frame. This one is its own: it follows ellipses, and it
-//! belongs to the image that is reconstructed, which is averaged over blocks, smoothed and made linear in the pressure.
+//! Contact detection fits a round profile with the same bend to the frame. This one is its own: it
+//! follows ellipses, and it belongs to the image that is reconstructed, which is averaged over
+//! blocks, smoothed and made linear in the pressure.
 
 use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
 use ndarray::{Array2, ArrayView2};
@@ -19,8 +22,9 @@ use ndarray::{Array2, ArrayView2};
 use crate::surface::fill_shape;
 use crate::{BoundingBox, Frame, Lighting, PixelScalar};
 
-/// Pixels nearer than this to the mask's border are replaced: three standard deviations of a lens's blur of 0.8 pixels.
-/// With 1.5 and 3.2 the strain of simulated presses is off by a fifth to a half more (frames of 174 to 696 pixels).
+/// Pixels nearer than this to the mask's border are replaced: three standard deviations of a lens's
+/// blur of 0.8 pixels. With 1.5 and 3.2 the strain of simulated presses is off by a fifth to a half
+/// more (frames of 174 to 696 pixels).
 ///
 /// As far outside the mask pixels may come to lie inside the fitted contour.
 const RING_PX: f64 = 2.3;
@@ -38,7 +42,8 @@ pub(crate) struct ProfileBuffers<T> {
 }
 
 impl<T: PixelScalar> ProfileBuffers<T> {
-    /// Fits the profile and fills `image` and `mask`; `None` where the contact is no ellipse, and nothing is replaced.
+    /// Fits the profile and fills `image` and `mask`. `None` where the contact is no ellipse, and
+    /// nothing is replaced.
     pub(super) fn fill(
         &mut self,
         frame: &Frame<'_, T>,
@@ -118,7 +123,8 @@ pub(super) struct Profile {
 const POWERS: [[usize; 2]; 6] = [[0, 0], [1, 0], [0, 1], [2, 0], [1, 1], [0, 2]];
 
 impl Profile {
-    /// Weighted least squares over the samples, row by row; `None` for too few pixels or too poor a fit.
+    /// Weighted least squares over the samples, row by row. `None` for too few pixels or too poor a
+    /// fit.
     fn fit(samples: &[Sample], area: BoundingBox) -> Option<Self> {
         // Four for each of the six coefficients.
         if samples.len() < 24 {
@@ -150,8 +156,8 @@ impl Profile {
             variance += sample.weight * (sample.squared - mean).powi(2);
             means.add(1.0 - quadratic / top, sample.squared, sample.weight);
         }
-        // Noise of two grey levels in 200 leaves 0.98 of the variance of a round contact of 19 pixels explained. A flat or
-        // textured contact has nothing to do with an ellipse.
+        // Noise of two grey levels in 200 leaves 0.98 of the variance of a round contact of 19
+        // pixels explained. A flat or textured contact has nothing to do with an ellipse.
         if residual > 0.1 * variance {
             return None;
         }
@@ -159,7 +165,7 @@ impl Profile {
         Some(profile)
     }
 
-    /// Sums over the samples; those of a row are of powers of x alone.
+    /// Sums over the samples. Those of a row are of powers of x alone.
     fn moments(&self, samples: &[Sample]) -> Moments {
         let mut moments = Moments::default();
         for row in samples.chunk_by(|a, b| a.at[0] == b.at[0]) {
@@ -181,7 +187,7 @@ impl Profile {
         moments
     }
 
-    /// The quadratic's greatest value; `None` without one.
+    /// The quadratic's greatest value. `None` without one.
     fn top(&self) -> Option<f64> {
         let c = &self.coefficients;
         let determinant = 4.0 * c[3] * c[5] - c[4] * c[4];
@@ -250,7 +256,7 @@ impl Moments {
     }
 }
 
-/// Ellipses on which R² is averaged; a profile hardly bends across one.
+/// Ellipses on which R² is averaged. A profile hardly bends across one.
 const ELLIPSES: usize = 128;
 
 /// Weighted means of R² over s = 1 − q/top, with q the quadratic profile.
@@ -300,8 +306,8 @@ struct Bend {
 }
 
 impl Bend {
-    /// Gauss–Newton from the quadratic itself. `None` where the bend explains less than half of `residual`, the weighted
-    /// squares of the quadratic's misfit.
+    /// Gauss–Newton from the quadratic itself. `None` where the bend explains less than half of
+    /// `residual`, the weighted squares of the quadratic's misfit.
     fn fit(means: &RadialMeans, top: f64, residual: f64) -> Option<Self> {
         let mut bend = Self {
             top,
@@ -321,11 +327,12 @@ impl Bend {
         let [_, scale, c] = bend.parameters.into();
         // Beyond these the fit has left what the inside determines.
         let plausible = (scale - 1.0).abs() < 0.2 && c.abs() < 0.6;
-        // Noise of a grey level in 200 on Hertz's profile loses nothing, contacts by finite elements lose nine tenths.
+        // Noise of a grey level in 200 on Hertz's profile loses nothing, contacts by finite
+        // elements lose nine tenths.
         (plausible && bent < 0.5 * residual).then_some(bend)
     }
 
-    /// R² where the quadratic is `quadratic`; negative outside the contour.
+    /// R² where the quadratic is `quadratic`. Negative outside the contour.
     fn squared_reflectance(&self, quadratic: f64) -> f64 {
         self.value(1.0 - quadratic / self.top)
     }
@@ -347,7 +354,8 @@ impl Bend {
     }
 }
 
-/// The pixels of a mask's box with a border around it, row by row; beyond the frame nothing is inside.
+/// The pixels of a mask's box with a border around it, row by row. Beyond the frame nothing is
+/// inside.
 #[derive(Debug, Default)]
 struct Discs {
     padded: Vec<bool>,
@@ -412,7 +420,8 @@ fn half_width(down: usize) -> usize {
 mod tests {
     use super::*;
 
-    /// Means of R² = (1 − ρ²)(1 − cρ²)² plus `noise` of alternating sign, for a quadratic whose contour lies at ρ² = `contour`.
+    /// Means of R² = (1 − ρ²)(1 − cρ²)² plus `noise` of alternating sign, for a quadratic whose
+    /// contour lies at ρ² = `contour`.
     fn means(c: f64, contour: f64, noise: f64) -> (RadialMeans, f64) {
         let (mut means, mut left) = (RadialMeans::default(), 0.0);
         for k in 0..4000_u32 {

@@ -1,17 +1,19 @@
-//! Gauss–Seidel sweeps of the frontal equation p²/n_x² + q²/n_y² = k, n_x and n_y the slopes of the upwind edges, and of the
-//! oblique equation R √(1 + |∇z|²) + s_x p + s_y q = s_z.
+//! Gauss–Seidel sweeps of the frontal equation p²/n_x² + q²/n_y² = k, n_x and n_y the slopes of the
+//! upwind edges. And of the oblique equation R √(1 + |∇z|²) + s_x p + s_y q = s_z.
 //!
-//! With k = 1 the frontal one is of first order: p and n_x belong to the middle of the edge in x, q and n_y to that of the
-//! edge in y. With the direction φ of the gradient, p²/n_x² + q²/n_y² = cos²φ_x + sin²φ_y, φ_x and φ_y in those two places. A
-//! second solve with k = 1 + cos²φ_x − cos²φ_y, φ from the first, removes that error (deferred correction). A profile fitted
-//! to the light gives φ before anything is solved.
+//! With k = 1 the frontal one is of first order. Here p and n_x belong to the middle of the edge in
+//! x, q and n_y to that of the edge in y. With the direction φ of the gradient, p²/n_x² + q²/n_y² =
+//! cos²φ_x + sin²φ_y, φ_x and φ_y in those two places. A second solve with k = 1 + cos²φ_x −
+//! cos²φ_y, φ from the first, removes that error (deferred correction). A profile fitted to the
+//! light gives φ before anything is solved.
 
 use super::profile::Profile;
 use super::{EikonalBuffers, Node};
 use crate::{BoundingBox, PixelScalar};
 
 impl<T: PixelScalar> EikonalBuffers<T> {
-    /// Sweeps in one of four orders, under `light` or frontal light without one. Returns the largest change.
+    /// Sweeps in one of four orders, under `light` or frontal light without one. Returns the
+    /// largest change.
     pub(super) fn sweep(&mut self, light: Option<[T; 3]>, order: usize, tolerance: T) -> T {
         let width = self.width;
         let rows = self.node.len() / width;
@@ -40,8 +42,9 @@ impl<T: PixelScalar> EikonalBuffers<T> {
         self.active.contains(&true)
     }
 
-    /// Takes the order of the unknown nodes from a profile fitted to the mask's pixels, from its rim to its top, and the
-    /// directions of the gradient. Nothing but the rim is known, and lines of equal light are lines of equal height.
+    /// Takes the order of the unknown nodes from a profile fitted to the mask's pixels, from its
+    /// rim to its top, and the directions of the gradient. Nothing but the rim is known, and lines
+    /// of equal light are lines of equal height.
     pub(super) fn follow(&mut self, profile: &Profile, area: BoundingBox) {
         let aspect2 = self.aspect.as_f64().powi(2);
         let pixel = |i: usize| {
@@ -68,8 +71,9 @@ impl<T: PixelScalar> EikonalBuffers<T> {
         self.directed = true;
     }
 
-    /// Stores cos²φ of the solution's gradient for the second solve. Next to the boundary, where one-sided differences of a
-    /// height that may rise like a square root have no direction, that of ∇ sin θ is taken: both are normal to the boundary.
+    /// Stores cos²φ of the solution's gradient for the second solve. Next to the boundary, where
+    /// one-sided differences of a height that may rise like a square root have no direction, that
+    /// of ∇ sin θ is taken. Both are normal to the boundary.
     pub(super) fn measure_directions(&mut self) {
         let width = self.width;
         for i in width..self.node.len() - width {
@@ -181,8 +185,9 @@ struct UpwindEdge<T> {
     along_x: T,
 }
 
-/// k of the second solve, from means of the node and its neighbours: half of the difference of the neighbours is left. Where
-/// the direction turns within a pixel (along ridges) such means say nothing, and the first order is better.
+/// k of the second solve, from means of the node and its neighbours: half of the difference of the
+/// neighbours is left. Where the direction turns within a pixel (along ridges) such means say
+/// nothing, and the first order is better.
 #[inline(always)]
 fn correction<T: PixelScalar>(x: UpwindEdge<T>, y: UpwindEdge<T>) -> T {
     let turn = T::of(0.5) * (x.along_x - y.along_x);
@@ -202,12 +207,14 @@ fn upwind<T: PixelScalar>(before: UpwindEdge<T>, after: UpwindEdge<T>) -> Upwind
     }
 }
 
-/// Solves A (u − a)² + B (u − b)² = k for the larger root, or along one edge where it is not upwind of both.
+/// Solves A (u − a)² + B (u − b)² = k for the larger root, or along one edge where it is not upwind
+/// of both.
 #[inline(always)]
 fn update<T: PixelScalar>(x: UpwindEdge<T>, y: UpwindEdge<T>, k: T) -> T {
     let d = x.value - y.value;
     let sum = x.metric + y.metric;
-    // Upwind of both if u > max(a, b): the larger of the two seen from the smaller is less than one edge away.
+    // Upwind of both if u > max(a, b): the larger of the two seen from the smaller is less than one
+    // edge away.
     let lower = if d > T::zero() { y } else { x };
     if lower.metric * d * d < k {
         let root = (k * sum - x.metric * y.metric * d * d)
@@ -226,10 +233,10 @@ struct Edge<T> {
     reflectance: T,
 }
 
-/// Steepest ascent the reflectance allows along the unit direction d; +∞ if it allows any.
+/// Steepest ascent the reflectance allows along the unit direction d, or +∞ if it allows any.
 ///
-/// The tangent (d, μ) makes with the light an angle of at least 90° − α, cos α = R:
-/// s·d + s_z μ ≤ √(1 − R²) √(1 + μ²), whose largest μ is returned.
+/// The tangent (d, μ) makes with the light an angle of at least 90° − α, cos α = R.
+/// Hence s·d + s_z μ ≤ √(1 − R²) √(1 + μ²), whose largest μ is returned.
 #[inline(always)]
 fn straight<T: PixelScalar>(reflectance: T, [x, y, z]: [T; 3], d: [T; 2]) -> T {
     let (along, across) = (x * d[0] + y * d[1], x * d[1] - y * d[0]);
@@ -255,7 +262,8 @@ fn straight<T: PixelScalar>(reflectance: T, [x, y, z]: [T; 3], d: [T; 2]) -> T {
     }
 }
 
-/// Solves the equation on the triangle of two neighbours; +∞ if the characteristic does not come from within it.
+/// Solves the equation on the triangle of two neighbours. Returns +∞ if the characteristic does not
+/// come from within it.
 #[inline(always)]
 fn triangle<T: PixelScalar>([x, y, z]: [T; 3], ex: Edge<T>, ey: Edge<T>) -> T {
     let two = T::of(2.0);
