@@ -12,15 +12,23 @@
 //! surface's edges (segment-to-segment). Its normal jumps there: points fixed on the first surface would
 //! carry their whole force from one side of the kink to the other at once, and Newton's method would
 //! cycle; pieces that grow and shrink carry it over continuously.
+//!
+//! A surface's edges in order, for the search of closest points.
+//!
+//! Where the nodes are: reference coordinates and displacements.
+//!
+//! Gaps between a point of a surface and what lies opposite, with their derivatives.
+//!
+//! Contact nodes that touch, or may do so within a load step.
 
-use super::curve::SurfaceCurve;
-use super::element::{GAUSS3, quadratic};
-use super::placement::{Placement, combine};
-use super::rigid::RigidShape;
+use crate::element::{GAUSS3, quadratic};
+use crate::material::Kinematics;
+use crate::model::{Fields, Model, RigidShape};
+use crate::stick::Slip;
 
 /// What a surface may touch.
 #[derive(Debug, Clone)]
-pub(crate) enum Opposite {
+pub enum Opposite {
     /// Another body's surface.
     Surface(SurfaceCurve),
     /// A rigid shape above (+1) or below (−1) the surface.
@@ -36,9 +44,9 @@ pub(crate) enum Opposite {
 
 /// Half of an edge of a contact surface, between two of its nodes.
 #[derive(Debug, Clone)]
-pub(crate) struct ContactSegment {
-    pub(crate) pair: usize,
-    pub(crate) nodes: [usize; 3],
+pub struct ContactSegment {
+    pub pair: usize,
+    pub nodes: [usize; 3],
     /// Parameters of its ends on the edge.
     ends: [f64; 2],
     /// Indices of the contact nodes at its ends.
@@ -47,26 +55,26 @@ pub(crate) struct ContactSegment {
 
 /// A Gauss point of a surface at which a gap is measured.
 #[derive(Debug, Clone)]
-pub(crate) struct ContactPoint {
-    pub(crate) pair: usize,
-    pub(crate) nodes: [usize; 3],
-    pub(crate) shape: [f64; 3],
-    pub(crate) derivative: [f64; 3],
+pub struct ContactPoint {
+    pub pair: usize,
+    pub nodes: [usize; 3],
+    pub shape: [f64; 3],
+    pub derivative: [f64; 3],
     /// Contact nodes whose hat functions reach here, with the functions times the point's reference area.
-    pub(crate) shares: [(usize, f64); 2],
+    pub shares: [(usize, f64); 2],
 }
 
 /// A node of a contact surface, which carries a pressure.
 #[derive(Debug, Clone)]
-pub(crate) struct ContactNode {
-    pub(crate) pair: usize,
-    pub(crate) node: usize,
+pub struct ContactNode {
+    pub pair: usize,
+    pub node: usize,
     /// Reference area of the hat function.
-    pub(crate) weight: f64,
+    pub weight: f64,
     /// Penalty ε: pressure per penetration, Pa/m.
-    pub(crate) penalty: f64,
+    pub penalty: f64,
     /// Distance to its neighbours.
-    pub(crate) spacing: f64,
+    pub spacing: f64,
 }
 
 /// Penalty of contact over the softer body's modulus and the edge's length: a pressure of a third of
@@ -79,7 +87,7 @@ const SLIVER: f64 = 1e-6;
 
 impl ContactSegment {
     /// Gauss points between the cuts, which are parameters on the edge in ascending order.
-    pub(crate) fn points(&self, cuts: &[f64], nodes: &[[f64; 2]]) -> Vec<ContactPoint> {
+    pub fn points(&self, cuts: &[f64], nodes: &[[f64; 2]]) -> Vec<ContactPoint> {
         let [start, end] = self.ends;
         let mut bounds = vec![start];
         bounds.extend(cuts);
@@ -110,7 +118,7 @@ impl ContactSegment {
     }
 
     /// Parameters at which the ends of the opposite edges lie closest.
-    pub(crate) fn cuts(&self, curve: &SurfaceCurve, placement: &Placement<'_>) -> Vec<f64> {
+    fn cuts(&self, curve: &SurfaceCurve, placement: &Placement<'_>) -> Vec<f64> {
         let at = |parameter: f64| {
             let (shape, derivative) = quadratic(parameter);
             let position = combine(&shape, self.nodes, |n| placement.current(n));
@@ -154,7 +162,7 @@ impl ContactSegment {
 }
 
 /// The segments of a surface's edges and their nodes, numbered from `first_node`.
-pub(crate) fn contact_segments(
+pub fn contact_segments(
     pair: usize,
     first_node: usize,
     edges: &[[usize; 3]],
@@ -202,4 +210,510 @@ pub(crate) fn contact_segments(
         }
     }
     (segments, corners)
+}
+
+/// Edges of a surface from the axis outwards.
+#[derive(Debug, Clone)]
+pub struct SurfaceCurve {
+    /// Nodes (inner end, middle, outer end).
+    edges: Vec<[usize; 3]>,
+    /// +1 where the body is on the left of the way outwards: its outward normal is (z', −r').
+    pub side: f64,
+}
+
+/// Weights of an edge's nodes.
+type Weights = [f64; 3];
+
+/// An edge's nodes, and their weights in position, first and second derivative at one parameter.
+#[derive(Debug, Clone, Copy)]
+pub struct CurvePoint {
+    pub nodes: [usize; 3],
+    pub position: Weights,
+    pub first: Weights,
+}
+
+/// Weights of the second derivative, the same everywhere on an edge.
+const BEND: Weights = [1.0, -2.0, 1.0];
+
+impl CurvePoint {
+    /// Weighted sum over the nodes.
+    pub fn sum(&self, weights: &Weights, at: impl Fn(usize) -> [f64; 2]) -> [f64; 2] {
+        let mut sum = [0.0; 2];
+        for (&node, weight) in self.nodes.iter().zip(weights) {
+            let point = at(node);
+            sum[0] += weight * point[0];
+            sum[1] += weight * point[1];
+        }
+        sum
+    }
+}
+
+impl SurfaceCurve {
+    /// From edges ordered along a surface whose radius grows along it.
+    pub fn new(edges: &[[usize; 3]], coordinates: &[[f64; 2]]) -> Self {
+        let outwards = |edge: &[usize; 3]| coordinates[edge[2]][0] > coordinates[edge[0]][0];
+        Self {
+            side: if edges.first().is_some_and(outwards) {
+                1.0
+            } else {
+                -1.0
+            },
+            edges: edges
+                .iter()
+                .map(|edge| {
+                    if outwards(edge) {
+                        *edge
+                    } else {
+                        [edge[2], edge[1], edge[0]]
+                    }
+                })
+                .collect(),
+        }
+    }
+
+    pub fn edges(&self) -> &[[usize; 3]] {
+        &self.edges
+    }
+
+    /// The point of an edge at ξ in [−1, 1].
+    pub fn at(&self, edge: usize, xi: f64) -> CurvePoint {
+        let (position, first) = quadratic(xi);
+        CurvePoint {
+            nodes: self.edges[edge],
+            position,
+            first,
+        }
+    }
+}
+
+/// Where contact is judged: reference coordinates and displacements.
+#[derive(Clone, Copy)]
+pub struct Placement<'a> {
+    pub kinematics: Kinematics,
+    pub nodes: &'a [[f64; 2]],
+    pub displacement: &'a [f64],
+    pub approach: f64,
+}
+
+impl Placement<'_> {
+    /// Where a node is: in linear kinematics at its undeformed radius, as gaps are.
+    pub fn current(&self, node: usize) -> [f64; 2] {
+        let [r, z] = self.nodes[node];
+        let [u, w] = self.moved(node);
+        match self.kinematics {
+            Kinematics::Finite => [r + u, z + w],
+            Kinematics::Linear => [r, z + w],
+        }
+    }
+
+    pub fn moved(&self, node: usize) -> [f64; 2] {
+        [self.displacement[2 * node], self.displacement[2 * node + 1]]
+    }
+}
+
+impl Placement<'_> {
+    /// Deformed area over reference area at a point of an edge with these shape functions (one in linear
+    /// kinematics).
+    pub fn stretch(&self, shape: &[f64; 3], derivative: &[f64; 3], nodes: [usize; 3]) -> f64 {
+        if self.kinematics == Kinematics::Linear {
+            return 1.0;
+        }
+        let area = |at: &dyn Fn(usize) -> [f64; 2]| {
+            let [r, _] = combine(shape, nodes, at);
+            let [dr, dz] = combine(derivative, nodes, at);
+            r * dr.hypot(dz)
+        };
+        area(&|n| self.current(n)) / area(&|n| self.nodes[n])
+    }
+}
+
+/// Weighted sum over an edge's nodes.
+fn combine(shape: &[f64; 3], nodes: [usize; 3], at: impl Fn(usize) -> [f64; 2]) -> [f64; 2] {
+    let mut sum = [0.0; 2];
+    for (n, node) in shape.iter().zip(nodes) {
+        let point = at(node);
+        sum[0] += n * point[0];
+        sum[1] += n * point[1];
+    }
+    sum
+}
+
+/// Stands for the approach among the displacement components of a [`Gap`].
+pub const DRIVER: usize = usize::MAX;
+
+/// A gap and its derivatives by the displacement components `dofs`.
+#[derive(Debug, Clone)]
+pub struct Gap {
+    pub value: f64,
+    pub dofs: Vec<usize>,
+    pub first: Vec<f64>,
+    /// Row after row.
+    pub second: Vec<f64>,
+    /// Axial component of the force by a unit pressure, over the reference area.
+    pub axial: f64,
+}
+
+/// The point of a surface that is closest to another.
+pub struct Nearest {
+    pub at: CurvePoint,
+    /// Parameter on its edge.
+    xi: f64,
+}
+
+/// The average of gaps with weights that sum to `total`.
+fn averaged(gaps: &[(Gap, f64)], total: f64) -> Gap {
+    let mut dofs: Vec<usize> = Vec::with_capacity(24);
+    for (gap, _) in gaps {
+        for dof in &gap.dofs {
+            if !dofs.contains(dof) {
+                dofs.push(*dof);
+            }
+        }
+    }
+    let count = dofs.len();
+    let mut average = Gap {
+        value: 0.0,
+        first: vec![0.0; count],
+        second: vec![0.0; count * count],
+        dofs,
+        axial: 0.0,
+    };
+    for (gap, weight) in gaps {
+        let share = weight / total;
+        average.value += share * gap.value;
+        average.axial += share * gap.axial;
+        let place = |dof: &usize| average.dofs.iter().position(|d| d == dof).unwrap_or(0);
+        let places: Vec<usize> = gap.dofs.iter().map(place).collect();
+        for (i, &a) in places.iter().enumerate() {
+            average.first[a] += share * gap.first[i];
+            for (j, &b) in places.iter().enumerate() {
+                average.second[count * a + b] += share * gap.second[places.len() * i + j];
+            }
+        }
+    }
+    average
+}
+
+impl Placement<'_> {
+    /// The gap of a point, `None` where there is nothing opposite to it.
+    pub fn gap(&self, point: &ContactPoint, opposite: &Opposite) -> Option<Gap> {
+        match opposite {
+            Opposite::Rigid {
+                shape,
+                side,
+                height,
+                driven,
+            } => self.rigid_gap(point, *shape, *side, *height, *driven),
+            Opposite::Surface(curve) => match self.kinematics {
+                Kinematics::Finite => self.surface_gap(point, curve),
+                Kinematics::Linear => self.vertical_gap(point, curve),
+            },
+        }
+    }
+
+    fn rigid_gap(
+        &self,
+        point: &ContactPoint,
+        shape: RigidShape,
+        side: f64,
+        height: f64,
+        driven: bool,
+    ) -> Option<Gap> {
+        let reference = combine(&point.shape, point.nodes, |n| self.nodes[n]);
+        let position = combine(&point.shape, point.nodes, |n| self.current(n));
+        let linear = self.kinematics == Kinematics::Linear;
+        let [profile, slope, bend] =
+            shape.profile(if linear { reference[0] } else { position[0] })?;
+        let (slope, bend) = if linear { (0.0, 0.0) } else { (slope, bend) };
+        let moved = if driven { self.approach } else { 0.0 };
+        // Above the surface (side +1) the shape's pole is its lowest point; below, its highest.
+        let value = side * (height + moved - position[1]) + profile;
+        let mut dofs = Vec::with_capacity(7);
+        let mut first = Vec::with_capacity(7);
+        for (node, n) in point.nodes.iter().zip(&point.shape) {
+            dofs.extend([2 * node, 2 * node + 1]);
+            first.extend([n * slope, -side * n]);
+        }
+        if driven {
+            dofs.push(DRIVER);
+            first.push(side);
+        }
+        let count = dofs.len();
+        let mut second = vec![0.0; count * count];
+        for (i, a) in point.shape.iter().enumerate() {
+            for (j, b) in point.shape.iter().enumerate() {
+                second[2 * i * count + 2 * j] = a * b * bend;
+            }
+        }
+        Some(Gap {
+            value,
+            dofs,
+            first,
+            second,
+            axial: 1.0,
+        })
+    }
+
+    /// The closest point of a deformed surface; `None` beyond its outer end.
+    pub fn nearest(&self, curve: &SurfaceCurve, position: [f64; 2]) -> Option<Nearest> {
+        let mut best: Option<(f64, Nearest, bool)> = None;
+        for (index, edge) in curve.edges().iter().enumerate() {
+            let [a, _, b] = edge.map(|node| self.current(node));
+            let length = (b[0] - a[0]).hypot(b[1] - a[1]);
+            let to_a = (position[0] - a[0]).hypot(position[1] - a[1]);
+            // No point of the edge is nearer than this: edges bulge less than a fifth.
+            if best
+                .as_ref()
+                .is_some_and(|(distance, ..)| to_a - 1.2 * length > *distance)
+            {
+                continue;
+            }
+            let xi = self.closest(curve, index, position);
+            let at = curve.at(index, xi);
+            let [r, z] = at.sum(&at.position, |n| self.current(n));
+            let distance = (position[0] - r).hypot(position[1] - z);
+            if best.as_ref().is_none_or(|(least, ..)| distance < *least) {
+                let beyond = index + 1 == curve.edges().len() && xi >= 1.0;
+                best = Some((distance, Nearest { at, xi }, beyond));
+            }
+        }
+        let (_, nearest, beyond) = best?;
+        (!beyond).then_some(nearest)
+    }
+
+    /// Distance to the closest point of the deformed surface, along its normal.
+    fn surface_gap(&self, point: &ContactPoint, curve: &SurfaceCurve) -> Option<Gap> {
+        let position = combine(&point.shape, point.nodes, |n| self.current(n));
+        let Nearest { at, xi } = self.nearest(curve, position)?;
+        let on_curve = at.sum(&at.position, |n| self.current(n));
+        let along = at.sum(&at.first, |n| self.current(n));
+        let bend = at.sum(&BEND, |n| self.current(n));
+        let offset = [position[0] - on_curve[0], position[1] - on_curve[1]];
+        let metric = along[0] * along[0] + along[1] * along[1];
+        let scale = curve.side / metric.sqrt();
+        let normal = [along[1] * scale, -along[0] * scale];
+        let value = offset[0] * normal[0] + offset[1] * normal[1];
+        let curvature = bend[0] * normal[0] + bend[1] * normal[1];
+        let denominator = metric - value * curvature;
+        let mut relative = Relative::new(point, &at, normal, along);
+        // At a kink between edges, or deep within a strongly bent surface, the closest point does not
+        // slide or is not unique: no second derivative.
+        if xi.abs() < 1.0 && denominator > 0.1 * metric {
+            let bent = curvature / metric;
+            relative.fill_second(|slip_i, turn_i, slip_j, turn_j| {
+                -(slip_i * turn_j
+                    + turn_i * slip_j
+                    + value * turn_i * turn_j
+                    + bent * slip_i * slip_j)
+                    / denominator
+            });
+        }
+        Some(relative.gap(value, normal))
+    }
+
+    /// Parameter of an edge's closest point, within [−1, 1].
+    fn closest(&self, curve: &SurfaceCurve, edge: usize, point: [f64; 2]) -> f64 {
+        let [a, _, b] = curve.edges()[edge].map(|node| self.current(node));
+        let chord = [b[0] - a[0], b[1] - a[1]];
+        let square = chord[0] * chord[0] + chord[1] * chord[1];
+        let along = (point[0] - a[0]) * chord[0] + (point[1] - a[1]) * chord[1];
+        let mut xi = (2.0 * along / square - 1.0).clamp(-1.0, 1.0);
+        // Newton's method on (x − x(ξ)) · x'(ξ) = 0: edges are nearly straight, few steps do.
+        for _ in 0..20 {
+            let at = curve.at(edge, xi);
+            let position = at.sum(&at.position, |n| self.current(n));
+            let slope = at.sum(&at.first, |n| self.current(n));
+            let bend = at.sum(&BEND, |n| self.current(n));
+            let offset = [point[0] - position[0], point[1] - position[1]];
+            let metric = slope[0] * slope[0] + slope[1] * slope[1];
+            let curved = metric - offset[0] * bend[0] - offset[1] * bend[1];
+            // Far from a strongly bent edge the derivative may vanish: the metric alone then.
+            let divisor = if curved > 0.1 * metric {
+                curved
+            } else {
+                metric
+            };
+            let step = (offset[0] * slope[0] + offset[1] * slope[1]) / divisor;
+            let next = (xi + step).clamp(-1.0, 1.0);
+            if (next - xi).abs() < 1e-15 {
+                return next;
+            }
+            xi = next;
+        }
+        xi
+    }
+
+    /// Edge and parameter of a surface's point at a reference radius.
+    pub fn opposite(&self, curve: &SurfaceCurve, radius: f64) -> Option<(usize, f64)> {
+        let edge = curve.edges().iter().position(|edge| {
+            let [a, _, b] = edge.map(|node| self.nodes[node][0]);
+            a <= radius && radius <= b
+        })?;
+        let [a, _, b] = curve.edges()[edge].map(|node| self.nodes[node][0]);
+        let mut xi = 2.0 * (radius - a) / (b - a) - 1.0;
+        for _ in 0..5 {
+            let at = curve.at(edge, xi);
+            let [r, _] = at.sum(&at.position, |n| self.nodes[n]);
+            let [slope, _] = at.sum(&at.first, |n| self.nodes[n]);
+            xi += (radius - r) / slope;
+        }
+        Some((edge, xi))
+    }
+
+    /// Height over the undeformed surface at the same radius, both displaced along z.
+    fn vertical_gap(&self, point: &ContactPoint, curve: &SurfaceCurve) -> Option<Gap> {
+        let reference = combine(&point.shape, point.nodes, |n| self.nodes[n]);
+        let moved = combine(&point.shape, point.nodes, |n| self.moved(n));
+        let (edge, xi) = self.opposite(curve, reference[0])?;
+        let at = curve.at(edge, xi);
+        let [_, z] = at.sum(&at.position, |n| self.nodes[n]);
+        let [_, w] = at.sum(&at.position, |n| self.moved(n));
+        // The outward normal of a surface above points down.
+        let up = -curve.side;
+        let value = up * (reference[1] + moved[1] - z - w);
+        Some(Relative::new(point, &at, [0.0, up], [0.0; 2]).gap(value, [0.0, up]))
+    }
+}
+
+/// Components of the displacement of a point relative to one of a curve, by their nodes'.
+struct Relative {
+    dofs: Vec<usize>,
+    /// Along the normal.
+    first: Vec<f64>,
+    /// Along the curve.
+    slip: Vec<f64>,
+    /// The curve's turning.
+    turn: Vec<f64>,
+    second: Vec<f64>,
+}
+
+impl Relative {
+    fn new(point: &ContactPoint, at: &CurvePoint, normal: [f64; 2], along: [f64; 2]) -> Self {
+        let mut relative = Self {
+            dofs: Vec::with_capacity(12),
+            first: Vec::with_capacity(12),
+            slip: Vec::with_capacity(12),
+            turn: Vec::with_capacity(12),
+            second: vec![0.0; 144],
+        };
+        let own = point
+            .nodes
+            .iter()
+            .zip(point.shape)
+            .map(|(node, n)| (*node, n, 0.0));
+        let weights = at.position.iter().zip(&at.first);
+        let other = at
+            .nodes
+            .iter()
+            .zip(weights)
+            .map(|(node, (n, dn))| (*node, -n, *dn));
+        for (node, n, dn) in own.chain(other) {
+            for k in 0..2 {
+                relative.dofs.push(2 * node + k);
+                relative.first.push(n * normal[k]);
+                relative.slip.push(n * along[k]);
+                relative.turn.push(dn * normal[k]);
+            }
+        }
+        relative
+    }
+
+    fn fill_second(&mut self, value: impl Fn(f64, f64, f64, f64) -> f64) {
+        let count = self.dofs.len();
+        for i in 0..count {
+            for j in 0..count {
+                self.second[count * i + j] =
+                    value(self.slip[i], self.turn[i], self.slip[j], self.turn[j]);
+            }
+        }
+    }
+
+    fn gap(self, value: f64, normal: [f64; 2]) -> Gap {
+        Gap {
+            value,
+            dofs: self.dofs,
+            first: self.first,
+            second: self.second,
+            axial: normal[1].abs(),
+        }
+    }
+}
+
+/// Part of a node's area that has something opposite to it, below which the node is open.
+const LEAST_SHARE: f64 = 0.25;
+
+/// A node of a contact surface that is in contact or may come into it.
+#[derive(Debug, Clone)]
+pub struct Candidate {
+    /// Index of the contact node.
+    pub index: usize,
+    pub gap: Gap,
+    /// λ − ε g: the pressure per reference area if positive.
+    pub pressure: f64,
+    /// From where it sticks, if it does.
+    pub slip: Option<Slip>,
+}
+
+impl Model {
+    /// Where contact is judged at a state.
+    pub fn placement<'a>(&'a self, fields: &'a Fields) -> Placement<'a> {
+        Placement {
+            kinematics: self.kinematics,
+            nodes: &self.nodes,
+            displacement: &fields.displacement,
+            approach: fields.approach,
+        }
+    }
+
+    /// Contact nodes that touch or are nearer than two spacings and `margin`.
+    pub fn candidates(&self, fields: &Fields, margin: f64) -> Vec<Candidate> {
+        let placement = self.placement(fields);
+        let points = self.contact_points(fields);
+        let mut around: Vec<Vec<(Gap, f64)>> = vec![Vec::new(); self.contact_nodes.len()];
+        for point in &points {
+            // Points with nothing opposite to them are open.
+            if let Some(gap) = placement.gap(point, &self.opposites[point.pair]) {
+                let [(first, weight), (second, other)] = point.shares;
+                around[first].push((gap.clone(), weight));
+                around[second].push((gap, other));
+            }
+        }
+        let mut candidates = Vec::new();
+        for (index, (node, around)) in self.contact_nodes.iter().zip(&around).enumerate() {
+            let total: f64 = around.iter().map(|(_, weight)| weight).sum();
+            // A node at a punch's rim has half of its surroundings under it.
+            if total < LEAST_SHARE * node.weight {
+                continue;
+            }
+            let weighted = around.iter().map(|(gap, weight)| gap.value * weight);
+            let value = weighted.sum::<f64>() / total;
+            if value < 2.0 * node.spacing + margin {
+                candidates.push(Candidate {
+                    index,
+                    gap: averaged(around, total),
+                    pressure: fields.multipliers[index] - node.penalty * value,
+                    slip: (fields.anchors.get(index)).and_then(|anchor| {
+                        anchor
+                            .as_ref()
+                            .map(|anchor| anchor.slip(&fields.displacement, fields.approach))
+                    }),
+                });
+            }
+        }
+        candidates
+    }
+
+    /// The points at which gaps are measured at a state.
+    pub fn contact_points(&self, fields: &Fields) -> Vec<ContactPoint> {
+        let placement = self.placement(fields);
+        let mut points = Vec::with_capacity(3 * self.segments.len());
+        for segment in &self.segments {
+            let cuts = match (&self.opposites[segment.pair], self.kinematics) {
+                (Opposite::Surface(curve), Kinematics::Finite) => segment.cuts(curve, &placement),
+                _ => Vec::new(),
+            };
+            points.extend(segment.points(&cuts, &self.nodes));
+        }
+        points
+    }
 }

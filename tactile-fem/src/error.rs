@@ -1,9 +1,10 @@
 //! Checks of inputs.
 
 use tactile_elasticity::ElasticityError;
-pub(crate) use tactile_elasticity::Quantity;
+
+pub use tactile_elasticity::Quantity;
 
 /// `value` if it is finite and above zero.
-pub(crate) fn positive(value: f64, quantity: Quantity) -> Result<f64, ElasticityError> {
+pub fn positive(value: f64, quantity: Quantity) -> Result<f64, ElasticityError> {
     quantity.positive(value)
 }

@@ -67,66 +67,33 @@
 //! X. Meng, Int. J. Numer. Meth. Eng. 62 (2005) 1183.
 #![forbid(unsafe_code)]
 
-mod anchor;
-mod block;
-mod bodies;
-mod candidates;
-mod change;
-mod chord;
-mod condensation;
 mod contact;
-mod curve;
 mod element;
 mod error;
-mod fields;
-mod gap;
-mod guide;
-mod interface;
-mod layout;
-mod load;
 mod material;
 mod mesh;
 mod model;
+mod nearby;
 mod newton;
-mod placement;
 mod press;
-mod pressure;
-mod radius;
 mod recovery;
-mod rigid;
 mod scene;
-mod simplified;
 mod slide;
-mod slot;
 mod sparse;
-mod squeeze;
 mod state;
 mod stick;
-mod stress;
 mod system;
 mod table;
-mod tangent;
 mod vtk;
 
-pub use change::{Found, Neighbourhood};
-pub use guide::{Guide, Layer};
-pub use layout::Layout;
-pub use load::{Load, Outcome, Report, Solution};
-pub use material::Kinematics;
-pub use material::Material;
-#[cfg(test)]
-pub(crate) use mesh::{Boundary, Mesh};
-#[cfg(test)]
-pub(crate) use model::{Model, Support};
-pub use press::{Object, Press};
-pub use pressure::pressure_at;
-pub use pressure::{ContactRadius, PressurePoint};
-#[cfg(test)]
-pub(crate) use rigid::RigidShape;
-pub use scene::{Block, Interface, Lump, Scene};
+pub use material::{Kinematics, Material};
+pub use nearby::{Found, Neighbourhood};
+pub use press::{Guide, Layer, Object, Press};
+pub use scene::{Block, Interface, Load, Lump, Outcome, Report, Scene, Solution};
 pub use slide::Relaxation;
-pub use state::State;
-pub use stress::Stress;
+pub use state::{ContactRadius, PressurePoint, State, Stress, pressure_at};
+pub use system::Layout;
 pub use table::{TableOptions, TableProgress, solve_contact_table};
+
 #[cfg(test)]
 mod tests;

@@ -94,20 +94,20 @@ pub enum Kinematics {
 }
 
 /// The components of the deformation gradient: rr, rz, zr, zz, θθ.
-pub(crate) type Gradient = [f64; 5];
+pub type Gradient = [f64; 5];
 
 /// Stress without its pressure part, and volume change.
-pub(crate) struct Response {
+pub struct Response {
     /// Deviatoric first Piola–Kirchhoff stress.
-    pub(crate) stress: Gradient,
+    pub stress: Gradient,
     /// Volume change J − 1 (the strain's trace in linear kinematics).
-    pub(crate) volume: f64,
+    pub volume: f64,
     /// Its derivative, the cofactor of F.
-    pub(crate) cofactor: Gradient,
+    pub cofactor: Gradient,
 }
 
 /// (1 + v)^(−1/3) to rounding.
-fn inverse_cube_root(v: f64) -> f64 {
+pub fn inverse_cube_root(v: f64) -> f64 {
     // The series' error is below 0.15 v⁴, and twice its square after a step of Newton's method.
     const SERIES: f64 = 0.1;
     let j = 1.0 + v;
@@ -122,7 +122,7 @@ fn inverse_cube_root(v: f64) -> f64 {
 }
 
 /// A material point as deformed: what stress and tangent have in common.
-pub(crate) enum Deformation {
+pub enum Deformation {
     Linear {
         shear: f64,
         /// Displacement gradient.
@@ -142,7 +142,7 @@ pub(crate) enum Deformation {
 
 impl Deformation {
     /// At displacement gradient `h`; `None` where J ≤ 0.
-    pub(crate) fn new(kinematics: Kinematics, shear: f64, h: &Gradient) -> Option<Self> {
+    pub fn new(kinematics: Kinematics, shear: f64, h: &Gradient) -> Option<Self> {
         if kinematics == Kinematics::Linear {
             return Some(Self::Linear { shear, h: *h });
         }
@@ -169,7 +169,7 @@ impl Deformation {
         })
     }
 
-    pub(crate) fn response(&self) -> Response {
+    pub fn response(&self) -> Response {
         match *self {
             Self::Linear { shear, h } => {
                 let trace = h[0] + h[3] + h[4];
@@ -206,7 +206,7 @@ impl Deformation {
     }
 
     /// Derivative of the first Piola–Kirchhoff stress by F at a given pressure (tension positive).
-    pub(crate) fn tangent(&self, pressure: f64) -> [Gradient; 5] {
+    pub fn tangent(&self, pressure: f64) -> [Gradient; 5] {
         match *self {
             Self::Linear { shear, .. } => {
                 let (a, b) = (4.0 / 3.0 * shear, -2.0 / 3.0 * shear);
@@ -254,21 +254,6 @@ impl Deformation {
                 }
                 a
             }
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::inverse_cube_root;
-
-    #[test]
-    fn the_inverse_cube_root_is_one() {
-        for k in -95..300 {
-            let v = 0.01 * f64::from(k);
-            let x = inverse_cube_root(v);
-            // Three products and a sum: a few rounding units.
-            assert!(((1.0 + v) * x * x * x - 1.0).abs() < 2e-15, "{v}: {x}");
         }
     }
 }

@@ -1,24 +1,28 @@
 //! Bodies, materials, supports and contacts: what is to be solved.
+//!
+//! The unknowns of a model.
+//!
+//! An interface whose nodes the bodies share.
+//!
+//! Rigid bodies of revolution.
 
-use super::contact::{ContactNode, ContactSegment, Opposite, contact_segments};
-use super::curve::SurfaceCurve;
-use super::element::Geometry;
-use super::interface::BondedInterface;
-use super::material::{Kinematics, Material};
-use super::mesh::{Boundary, Mesh};
-use super::rigid::RigidShape;
+use crate::contact::{ContactNode, ContactSegment, Opposite, SurfaceCurve, contact_segments};
+use crate::element::{ALL, Geometry};
 use crate::error::Quantity;
+use crate::material::{Kinematics, Material};
+use crate::mesh::{Boundary, Mesh};
+use crate::stick::Anchor;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use tactile_elasticity::ElasticityError;
 
 /// A body of a [`Model`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Body(usize);
+pub struct Body(usize);
 
 /// How a boundary is held.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Support {
+pub enum Support {
     /// No displacement but the support's own: glued to glass or to a stage.
     Bonded,
     /// Free to slide along r: a lubricated stage, or a plane of symmetry.
@@ -27,7 +31,7 @@ pub(crate) enum Support {
 
 /// What a displacement component does.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum Motion {
+pub enum Motion {
     Free,
     Zero,
     /// Moves by the approach times this.
@@ -35,9 +39,9 @@ pub(crate) enum Motion {
 }
 
 #[derive(Debug, Clone)]
-pub(crate) struct Part {
-    pub(crate) regions: core::ops::Range<usize>,
-    pub(crate) boundaries: BTreeMap<Boundary, Vec<[usize; 3]>>,
+pub struct Part {
+    pub regions: core::ops::Range<usize>,
+    pub boundaries: BTreeMap<Boundary, Vec<[usize; 3]>>,
 }
 
 /// An axisymmetric problem: bodies with their materials, supports and contacts.
@@ -45,34 +49,34 @@ pub(crate) struct Part {
 /// The approach δ, one number, moves every boundary that is [driven](Self::drive) by δ along +z.
 /// SI units; the axis of revolution is r = 0; guides lie below z = 0 and objects above.
 #[derive(Debug, Clone)]
-pub(crate) struct Model {
-    pub(crate) kinematics: Kinematics,
-    pub(crate) nodes: Vec<[f64; 2]>,
-    pub(crate) elements: Vec<[usize; 9]>,
+pub struct Model {
+    pub kinematics: Kinematics,
+    pub nodes: Vec<[f64; 2]>,
+    pub elements: Vec<[usize; 9]>,
     /// Material of each element, an index of `materials`.
-    pub(crate) regions: Vec<usize>,
+    pub regions: Vec<usize>,
     /// Shared by the scenes on one mesh whose nodes are moved elsewhere only.
-    pub(crate) geometry: Vec<Arc<Geometry>>,
-    pub(crate) materials: Vec<Material>,
-    pub(crate) parts: Vec<Part>,
+    pub geometry: Vec<Arc<Geometry>>,
+    pub materials: Vec<Material>,
+    pub parts: Vec<Part>,
     /// Of each displacement component, 2 node + (0 for r, 1 for z).
-    pub(crate) motion: Vec<Motion>,
-    pub(crate) opposites: Vec<Opposite>,
-    pub(crate) segments: Vec<ContactSegment>,
-    pub(crate) contact_nodes: Vec<ContactNode>,
+    pub motion: Vec<Motion>,
+    pub opposites: Vec<Opposite>,
+    pub segments: Vec<ContactSegment>,
+    pub contact_nodes: Vec<ContactNode>,
     /// Whether contacts stick.
-    pub(crate) sticks: bool,
+    pub sticks: bool,
     /// A bonded interface whose pressure is wanted.
-    pub(crate) interface: Option<BondedInterface>,
+    pub interface: Option<BondedInterface>,
     /// The node whose axial displacement a node shares.
-    pub(crate) partners: Vec<Option<usize>>,
+    pub partners: Vec<Option<usize>>,
     /// External forces on displacement components, for tests by manufactured solutions.
-    pub(crate) external: Vec<f64>,
+    pub external: Vec<f64>,
 }
 
 impl Model {
     /// An empty model.
-    pub(crate) fn new(kinematics: Kinematics) -> Self {
+    pub fn new(kinematics: Kinematics) -> Self {
         Self {
             kinematics,
             nodes: Vec::new(),
@@ -96,11 +100,7 @@ impl Model {
     ///
     /// # Errors
     /// Materials that are not one a region; an element that is degenerate or turned inside out.
-    pub(crate) fn add(
-        &mut self,
-        mesh: &Mesh,
-        materials: &[Material],
-    ) -> Result<Body, ElasticityError> {
+    pub fn add(&mut self, mesh: &Mesh, materials: &[Material]) -> Result<Body, ElasticityError> {
         if materials.len() != mesh.region_count() {
             return Err(ElasticityError::LengthMismatch {
                 quantity: Quantity::Layers,
@@ -148,17 +148,17 @@ impl Model {
     }
 
     /// Number of elements of all bodies.
-    pub(crate) fn element_count(&self) -> usize {
+    pub fn element_count(&self) -> usize {
         self.elements.len()
     }
 
     /// Materials of a body, by region.
-    pub(crate) fn materials(&self, body: Body) -> &[Material] {
+    pub fn materials(&self, body: Body) -> &[Material] {
         &self.materials[self.parts[body.0].regions.clone()]
     }
 
     /// Edges of a body's boundary, by the model's node numbers.
-    pub(crate) fn edges(&self, body: Body, boundary: Boundary) -> &[[usize; 3]] {
+    pub fn edges(&self, body: Body, boundary: Boundary) -> &[[usize; 3]] {
         self.parts[body.0]
             .boundaries
             .get(&boundary)
@@ -166,17 +166,17 @@ impl Model {
     }
 
     /// Regions of a body among the model's.
-    pub(crate) fn body_regions(&self, body: Body) -> core::ops::Range<usize> {
+    fn body_regions(&self, body: Body) -> core::ops::Range<usize> {
         self.parts[body.0].regions.clone()
     }
 
     /// Holds a boundary in its place.
-    pub(crate) fn hold(&mut self, body: Body, boundary: Boundary, support: Support) {
+    pub fn hold(&mut self, body: Body, boundary: Boundary, support: Support) {
         self.support(body, boundary, support, Motion::Zero);
     }
 
     /// Moves a boundary by the approach along +z.
-    pub(crate) fn drive(&mut self, body: Body, boundary: Boundary, support: Support) {
+    pub fn drive(&mut self, body: Body, boundary: Boundary, support: Support) {
         self.support(body, boundary, support, Motion::Driven(1.0));
     }
 
@@ -192,11 +192,11 @@ impl Model {
     }
 
     /// Lets two bodies' [`Boundary::Contact`] touch without friction, as
-    /// [`Scene::ball_on_guide`](super::Scene::ball_on_guide) does.
+    /// [`Scene::ball_on_guide`](crate::Scene::ball_on_guide) does.
     ///
     /// Gaps are measured from `first`, which had better be the one with the finer mesh or the more
     /// convex of the two.
-    pub(crate) fn contact(&mut self, first: Body, second: Body) {
+    pub fn contact(&mut self, first: Body, second: Body) {
         let curve = SurfaceCurve::new(self.edges(second, Boundary::Contact), &self.nodes);
         let softer = self.softest(first).min(self.softest(second));
         self.add_points(first, Opposite::Surface(curve), softer);
@@ -209,7 +209,7 @@ impl Model {
     /// The nodes of one place do not stay at one radius: where the second body spreads more, the first
     /// feels its pressure somewhat further in, which matters little where the first is the stiffer.
     /// The surfaces are not let part.
-    pub(crate) fn slide(&mut self, first: Body, second: Body) {
+    pub fn slide(&mut self, first: Body, second: Body) {
         let nodes: Vec<usize> = self
             .edges(first, Boundary::Contact)
             .iter()
@@ -239,7 +239,7 @@ impl Model {
     /// Lets a body's [`Boundary::Contact`] touch a rigid body above it without friction, whose pole is
     /// at `height_m` and does not move.
     #[cfg(test)]
-    pub(crate) fn contact_rigid_above(&mut self, body: Body, shape: RigidShape, height_m: f64) {
+    pub fn contact_rigid_above(&mut self, body: Body, shape: RigidShape, height_m: f64) {
         let opposite = Opposite::Rigid {
             shape,
             side: 1.0,
@@ -252,8 +252,8 @@ impl Model {
 
     /// Lets a body's [`Boundary::Contact`] touch a rigid body below it without friction, whose pole
     /// starts at `height_m` and moves by the approach, as
-    /// [`Scene::ball_on_flat`](super::Scene::ball_on_flat) does.
-    pub(crate) fn contact_rigid_below(&mut self, body: Body, shape: RigidShape, height_m: f64) {
+    /// [`Scene::ball_on_flat`](crate::Scene::ball_on_flat) does.
+    pub fn contact_rigid_below(&mut self, body: Body, shape: RigidShape, height_m: f64) {
         let opposite = Opposite::Rigid {
             shape,
             side: -1.0,
@@ -268,13 +268,13 @@ impl Model {
     ///
     /// Loads are then followed in steps that let the approach grow by a tenth: forces hold to a thousandth and contact radii to two,
     /// whatever loads are asked for on the way. At ν near 0 the radius is up to 1.5 % low: the pressure near the rim is not that of sliding.
-    pub(crate) fn forbid_slip(&mut self) {
+    pub fn forbid_slip(&mut self) {
         self.sticks = true;
     }
 
     /// Makes the pressure on a body's [`Boundary::Interface`], above its first `lower` regions, the
     /// pressure of the states.
-    pub(crate) fn bond(&mut self, body: Body, lower: usize) {
+    pub fn bond(&mut self, body: Body, lower: usize) {
         let first = self.body_regions(body).start;
         let edges = self.edges(body, Boundary::Interface);
         let is_lower = |index: usize| (first..first + lower).contains(&self.regions[index]);
@@ -294,5 +294,139 @@ impl Model {
     fn softest(&self, body: Body) -> f64 {
         let moduli = self.materials(body).iter().map(Material::youngs_modulus_pa);
         moduli.fold(f64::INFINITY, f64::min)
+    }
+}
+
+/// The unknowns: displacements, element pressures and the approach.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Fields {
+    /// Component 2 node + (0 for r, 1 for z).
+    pub displacement: Vec<f64>,
+    pub pressures: Vec<[f64; 3]>,
+    pub approach: f64,
+    /// Contact pressures per reference area kept by the augmented Lagrangian.
+    pub multipliers: Vec<f64>,
+    /// Contact pressures per reference area, unknowns of their own as element pressures are.
+    pub contact: Vec<f64>,
+    /// Where contact nodes stick; empty where surfaces slide.
+    pub anchors: Vec<Option<Anchor>>,
+}
+
+impl Fields {
+    pub fn zero(model: &Model) -> Self {
+        Self {
+            displacement: vec![0.0; 2 * model.nodes.len()],
+            pressures: vec![[0.0; 3]; model.elements.len()],
+            approach: 0.0,
+            multipliers: vec![0.0; model.contact_nodes.len()],
+            contact: vec![0.0; model.contact_nodes.len()],
+            anchors: if model.sticks {
+                vec![None; model.contact_nodes.len()]
+            } else {
+                Vec::new()
+            },
+        }
+    }
+
+    pub fn element(&self, nodes: &[usize; 9]) -> [f64; ALL] {
+        core::array::from_fn(|k| self.displacement[2 * nodes[k / 2] + k % 2])
+    }
+}
+
+/// An equilibrium.
+pub struct Equilibrium {
+    pub fields: Fields,
+    pub force: f64,
+}
+
+/// Edges between bonded bodies and the elements on one of its sides.
+#[derive(Debug, Clone)]
+pub struct BondedInterface {
+    /// Nodes from the axis outwards.
+    pub nodes: Vec<usize>,
+    pub edges: Vec<[usize; 3]>,
+    /// Elements of one of the bodies that touch the interface.
+    pub elements: Vec<usize>,
+    /// −1 where that body is the lower one: it is pushed down. +1 for the upper one.
+    pub sign: f64,
+}
+
+impl BondedInterface {
+    pub fn new(
+        edges: &[[usize; 3]],
+        elements: &[[usize; 9]],
+        is_inside: impl Fn(usize) -> bool,
+        sign: f64,
+    ) -> Self {
+        let mut nodes: Vec<usize> = Vec::new();
+        for &node in edges.iter().flatten() {
+            if !nodes.contains(&node) {
+                nodes.push(node);
+            }
+        }
+        let touching = (0..elements.len()).filter(|&index| {
+            is_inside(index) && elements[index].iter().any(|node| nodes.contains(node))
+        });
+        Self {
+            edges: edges.to_vec(),
+            sign,
+            elements: touching.collect(),
+            nodes,
+        }
+    }
+}
+
+/// The shape of a rigid body of revolution, with its lowest point at height zero.
+#[derive(Debug, Clone, Copy, PartialEq)]
+// A flat alone is pressed on objects; the others have the closed forms that tests compare with.
+#[cfg_attr(not(test), allow(dead_code))]
+pub enum RigidShape {
+    /// A plane at right angles to the axis.
+    Flat,
+    /// A sphere of this radius.
+    Sphere {
+        /// Its radius, in metres.
+        radius_m: f64,
+    },
+    /// The paraboloid r² / 2R, of which Hertz's theory speaks.
+    Paraboloid {
+        /// Its radius of curvature at the pole, in metres.
+        radius_m: f64,
+    },
+    /// The flat end of a cylinder.
+    Punch {
+        /// Its radius, in metres.
+        radius_m: f64,
+    },
+    /// A cone.
+    Cone {
+        /// Between its axis and its surface, in radians.
+        half_angle_rad: f64,
+    },
+}
+
+impl RigidShape {
+    /// Height at radius r, its slope and second derivative; `None` beyond the shape.
+    pub fn profile(self, r: f64) -> Option<[f64; 3]> {
+        match self {
+            Self::Flat => Some([0.0; 3]),
+            Self::Punch { radius_m } => (r <= radius_m).then_some([0.0; 3]),
+            Self::Sphere { radius_m } => {
+                let below = radius_m * radius_m - r * r;
+                if below <= 0.0 {
+                    return None;
+                }
+                let root = below.sqrt();
+                let height = r * r / (radius_m + root);
+                Some([height, r / root, radius_m * radius_m / (below * root)])
+            }
+            Self::Paraboloid { radius_m } => {
+                Some([r * r / (2.0 * radius_m), r / radius_m, 1.0 / radius_m])
+            }
+            Self::Cone { half_angle_rad } => {
+                let slope = 1.0 / half_angle_rad.tan();
+                Some([r * slope, slope, 0.0])
+            }
+        }
     }
 }

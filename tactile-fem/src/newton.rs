@@ -1,15 +1,23 @@
 //! Newton's method with load steps chosen by what converges.
+//!
+//! Equilibria by simplified Newton iterations.
+//!
+//! Simplified Newton iterations: with the tangent of an earlier iterate.
+//!
+//! An iteration then evaluates forces alone, a third of an element's work, and factorises nothing: about a fifth
+//! of a full one's time. It converges linearly, by a factor that is proportional to the distance from where the
+//! tangent was taken (P. Deuflhard, *Newton Methods for Nonlinear Problems* (2004), §2.1.2), which for scenes near a
+//! solved one is small.
 
-use super::chord::TOLERANCE;
-use super::contact::Opposite;
-use super::fields::{Equilibrium, Fields};
-use super::layout::Layout;
-use super::load::{Load, Outcome, Report, Solution};
-use super::material::Kinematics;
-use super::model::Model;
-use super::simplified;
-use super::state::State;
-use super::tangent::Goal;
+use crate::contact::Opposite;
+use crate::element::{Elimination, OUTER};
+use crate::material::Kinematics;
+use crate::model::{Equilibrium, Fields, Model};
+use crate::scene::{Load, Outcome, Report, Solution};
+use crate::sparse::Factors;
+use crate::state::State;
+use crate::system::{Goal, Layout, Slot, Tangent};
+use std::sync::Arc;
 
 /// Iterations of a load step before it is halved. Steps that converge take three to ten.
 const MAX_ITERATIONS: usize = 25;
@@ -50,19 +58,14 @@ impl Model {
     ///
     /// A load that is not reached ends the solution: its [`Report`] says so. O(n b²) for each Newton
     /// iteration with n unknowns in a system of half-width b.
-    pub(crate) fn solve(&self, loads: &[Load]) -> Solution {
+    pub fn solve(&self, loads: &[Load]) -> Solution {
         self.solve_near(&mut Layout::new(self), loads, &[])
     }
 
     /// [`Self::solve`] that first tries, for each load, to go there from a guess: the state of a model with
     /// the same elements at about that load. `layout` is this model's or one's with the same elements and supports:
     /// its analysis is used again.
-    pub(crate) fn solve_near(
-        &self,
-        layout: &mut Layout,
-        loads: &[Load],
-        guesses: &[State],
-    ) -> Solution {
+    pub fn solve_near(&self, layout: &mut Layout, loads: &[Load], guesses: &[State]) -> Solution {
         let mut unloaded = Fields::zero(self);
         if self.sticks {
             unloaded.anchors = self.first_anchors(&unloaded);
@@ -284,7 +287,7 @@ impl Solver<'_> {
     fn newton(&mut self, start: Fields, goal: Goal) -> Option<Equilibrium> {
         if let (Goal::Approach(to), true) = (goal, self.model.contact_nodes.is_empty()) {
             let iterations = &mut self.report.iterations;
-            let found = simplified::equilibrium(self.model, self.layout, &start, to, iterations);
+            let found = simplified(self.model, self.layout, &start, to, iterations);
             return found.or_else(|| self.full(start, goal));
         }
         self.full(start, goal)
@@ -393,5 +396,241 @@ impl Solver<'_> {
             }
         }
         true
+    }
+}
+
+/// Tangents on the way to an equilibrium: those that are reached take one to three.
+const MAX_TANGENTS: usize = 7;
+/// Change of the approach, relative, up to which the last tangent is tried.
+const NEAR: f64 = 0.02;
+
+/// Equilibrium at an approach, of a model without contacts; `None` where iterations do not converge. A new tangent is taken
+/// only where those with the last one of `layout` converge slowly.
+fn simplified(
+    model: &Model,
+    layout: &mut Layout,
+    start: &Fields,
+    approach: f64,
+    iterations: &mut usize,
+) -> Option<Equilibrium> {
+    let mut fields = start.clone();
+    let is_near = (approach - fields.approach).abs() <= NEAR * approach.abs();
+    let mut chord = layout.chord.take();
+    if model.kinematics == Kinematics::Finite && !is_near {
+        chord = None;
+    }
+    for _ in 0..MAX_TANGENTS {
+        let is_new = chord.is_none();
+        let tried = match chord.take() {
+            Some(chord) => chord,
+            None => {
+                let system = model.assemble(layout, &fields, 0.0)?;
+                let (tangent, slots, eliminations) = system.into_parts();
+                Arc::new(Chord::new(tangent, slots, eliminations)?)
+            }
+        };
+        match tried.iterate(model, fields, approach, is_new, iterations) {
+            Ending::Balanced(found) => {
+                layout.chord = Some(tried);
+                return Some(found);
+            }
+            Ending::Slow(last) => fields = last,
+        }
+    }
+    None
+}
+
+/// Unbalanced force over element forces at which an equilibrium counts as reached: four digits
+/// below what the forces are wanted to, and well above rounding.
+const TOLERANCE: f64 = 1e-8;
+/// Iterations that may be left at the rate of the last one: more take longer than a new tangent and the two that then do.
+const MOST_LEFT: f64 = 6.0;
+
+/// A factorised tangent of a model without contacts.
+#[derive(Debug)]
+pub struct Chord {
+    slots: Arc<[Slot]>,
+    eliminations: Vec<Elimination>,
+    factors: Factors,
+    /// Change of the equations' unknowns by a unit approach.
+    by_approach: Vec<f64>,
+}
+
+/// How iterations with one tangent end.
+enum Ending {
+    Balanced(Equilibrium),
+    /// They converge no longer, or not fast: the iterate from which a new tangent is to be taken.
+    Slow(Fields),
+}
+
+/// Forces out of balance at some displacements.
+struct Unbalanced {
+    /// Negative residual of the equations, the elements' centres eliminated.
+    right: Vec<f64>,
+    /// Residual of each element's centre.
+    centres: Vec<[f64; 2]>,
+    /// Pressures that would balance each element's volume.
+    pressures: Vec<[f64; 3]>,
+    /// Derivative of the energy by the approach.
+    force: f64,
+    /// Over the root of the sum of squared element forces.
+    imbalance: f64,
+}
+
+impl Chord {
+    /// `None` where the tangent is singular.
+    pub fn new(
+        tangent: Tangent,
+        slots: Arc<[Slot]>,
+        eliminations: Vec<Elimination>,
+    ) -> Option<Self> {
+        let factors = tangent.matrix.factorise().ok()?;
+        let mut by_approach = tangent.driver_column;
+        factors.solve(&mut by_approach).ok()?;
+        Some(Self {
+            slots,
+            eliminations,
+            factors,
+            by_approach,
+        })
+    }
+
+    /// Iterates from `start` at an approach as long as that converges fast.
+    fn iterate(
+        &self,
+        model: &Model,
+        start: Fields,
+        approach: f64,
+        is_new: bool,
+        iterations: &mut usize,
+    ) -> Ending {
+        let mut fields = start;
+        // A full step of Newton's method may raise the imbalance on its way to the solution.
+        let mut may_rise = is_new;
+        // The iterate before and its imbalance.
+        let mut before: Option<(Fields, f64)> = None;
+        loop {
+            let unbalanced = self.unbalanced(model, &fields);
+            let imbalance = (unbalanced.as_ref()).map_or(f64::INFINITY, |found| found.imbalance);
+            if let Some((before, last)) = before
+                && imbalance > TOLERANCE
+            {
+                let rate = imbalance / last;
+                if rate >= 1.0 && !may_rise {
+                    return Ending::Slow(before);
+                }
+                may_rise = false;
+                // At this rate.
+                let left = (TOLERANCE / imbalance).ln() / rate.ln();
+                if !(rate < 1.0 && left < MOST_LEFT) {
+                    return Ending::Slow(fields);
+                }
+            }
+            let Some(unbalanced) = unbalanced else {
+                return Ending::Slow(fields);
+            };
+            let is_there = fields.approach == approach;
+            if is_there && imbalance <= TOLERANCE {
+                return Ending::Balanced(Equilibrium {
+                    force: unbalanced.force,
+                    fields,
+                });
+            }
+            *iterations += 1;
+            let Some(next) = self.step(model, &fields, &unbalanced, approach) else {
+                return Ending::Slow(fields);
+            };
+            // Forces at another approach say nothing of the iterates there.
+            before = is_there.then_some((fields, imbalance));
+            fields = next;
+        }
+    }
+
+    /// `None` where an element is turned inside out.
+    fn unbalanced(&self, model: &Model, fields: &Fields) -> Option<Unbalanced> {
+        let mut found = Unbalanced {
+            right: vec![0.0; self.by_approach.len()],
+            centres: Vec::with_capacity(model.elements.len()),
+            pressures: Vec::with_capacity(model.elements.len()),
+            force: 0.0,
+            imbalance: 0.0,
+        };
+        for (slot, force) in self.slots.iter().zip(&model.external) {
+            if let Slot::Equation(equation) = slot {
+                found.right[*equation] += force;
+            }
+        }
+        let (mut element_squares, mut centre_squares) = (0.0, 0.0);
+        for (index, (nodes, elimination)) in
+            model.elements.iter().zip(&self.eliminations).enumerate()
+        {
+            let material = &model.materials[model.regions[index]];
+            let u = fields.element(nodes);
+            let (mut residual, pressures) = model.geometry[index].balance(
+                model.kinematics,
+                material,
+                &u,
+                &fields.pressures[index],
+                elimination,
+            )?;
+            for (k, residual) in residual[OUTER..].iter_mut().enumerate() {
+                *residual -= model.external[2 * nodes[8] + k];
+                centre_squares += *residual * *residual;
+            }
+            let outer = elimination.outer_residual(&residual);
+            for (k, force) in outer.iter().enumerate() {
+                match self.slots[2 * nodes[k / 2] + k % 2] {
+                    Slot::Nowhere => {}
+                    Slot::Equation(row) => found.right[row] -= force,
+                    Slot::Driver(factor) => found.force += factor * force,
+                }
+                element_squares += force * force;
+            }
+            found.centres.push([residual[OUTER], residual[OUTER + 1]]);
+            found.pressures.push(pressures);
+        }
+        let squares: f64 = found.right.iter().map(|force| force * force).sum();
+        if squares + centre_squares > 0.0 {
+            found.imbalance =
+                ((squares + centre_squares) / element_squares.max(f64::MIN_POSITIVE)).sqrt();
+        }
+        Some(found)
+    }
+
+    fn step(
+        &self,
+        model: &Model,
+        fields: &Fields,
+        unbalanced: &Unbalanced,
+        approach: f64,
+    ) -> Option<Fields> {
+        let mut solution = unbalanced.right.clone();
+        self.factors.solve(&mut solution).ok()?;
+        let step = approach - fields.approach;
+        for (x, by) in solution.iter_mut().zip(&self.by_approach) {
+            *x -= step * by;
+        }
+        let mut next = fields.clone();
+        next.approach = approach;
+        let change = |dof: usize| match self.slots[dof] {
+            Slot::Nowhere => 0.0,
+            Slot::Driver(factor) => factor * step,
+            Slot::Equation(equation) => solution[equation],
+        };
+        for (dof, u) in next.displacement.iter_mut().enumerate() {
+            *u += change(dof);
+        }
+        let eliminations = model.elements.iter().zip(&self.eliminations);
+        for (index, (nodes, elimination)) in eliminations.enumerate() {
+            let outer = core::array::from_fn(|k| change(2 * nodes[k / 2] + k % 2));
+            let centre = elimination.centre(unbalanced.centres[index], &outer);
+            for (k, step) in centre.into_iter().enumerate() {
+                next.displacement[2 * nodes[8] + k] += step;
+            }
+            let changes = elimination.pressure_change(&outer, centre);
+            next.pressures[index] =
+                core::array::from_fn(|k| unbalanced.pressures[index][k] + changes[k]);
+        }
+        Some(next)
     }
 }

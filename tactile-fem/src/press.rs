@@ -1,14 +1,86 @@
+//! Soft layers on glass: what objects are pressed on.
+//!
 //! Objects pressed on a guide or on a rigid flat.
 
-use super::bodies::{ContactMesh, contact_lines};
-use super::guide::Guide;
-use super::material::{Kinematics, Material};
-use super::mesh::{Boundary, Mesh, graded};
-use super::model::{Model, Support};
-use super::rigid::RigidShape;
-use super::scene::{Interface, Scene};
 use crate::error::{Quantity, positive};
+use crate::material::{Kinematics, Material};
+use crate::mesh::{Boundary, ContactMesh, Mesh, contact_lines, graded};
+use crate::model::{Model, RigidShape, Support};
+use crate::scene::{Interface, Scene};
 use tactile_elasticity::ElasticityError;
+
+/// A layer of a [`Guide`].
+///
+/// ```
+/// use tactile_fem::{Layer, Material};
+///
+/// let epidermis = Layer { thickness_m: 2e-3, material: Material::new(136e3, 0.495).unwrap() };
+/// assert_eq!(epidermis.material.youngs_modulus_pa(), 136e3);
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Layer {
+    /// Thickness, in metres.
+    pub thickness_m: f64,
+    /// What it is made of.
+    pub material: Material,
+}
+
+/// A soft guide: bonded layers, the first towards the object, the last bonded to rigid glass.
+///
+/// ```
+/// use tactile_fem::{Guide, Layer, Material};
+///
+/// let layer = |thickness_m, modulus| Layer { thickness_m, material: Material::new(modulus, 0.495).unwrap() };
+/// let guide = Guide::new(vec![layer(2e-3, 136e3), layer(3e-3, 80e3), layer(5e-3, 34e3)], 25e-3).unwrap();
+/// assert_eq!((guide.layers().len(), guide.radius_m()), (3, 25e-3));
+/// assert!(Guide::new(vec![], 25e-3).is_err());
+/// ```
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Guide {
+    layers: Vec<Layer>,
+    radius_m: f64,
+}
+
+impl Guide {
+    /// Layers from the object's side to the glass, and the guide's radius in metres.
+    ///
+    /// # Errors
+    /// No layer; a thickness or a radius that is not positive.
+    pub fn new(layers: Vec<Layer>, radius_m: f64) -> Result<Self, ElasticityError> {
+        positive(radius_m, Quantity::Radius)?;
+        if layers.is_empty() {
+            return Err(ElasticityError::LengthMismatch {
+                quantity: Quantity::Layers,
+                expected: 1,
+                found: 0,
+            });
+        }
+        for layer in &layers {
+            positive(layer.thickness_m, Quantity::Thickness)?;
+        }
+        Ok(Self { layers, radius_m })
+    }
+
+    /// The layers, from the object's side.
+    pub fn layers(&self) -> &[Layer] {
+        &self.layers
+    }
+
+    /// Its radius, in metres.
+    pub fn radius_m(&self) -> f64 {
+        self.radius_m
+    }
+
+    pub(crate) fn thicknesses(&self) -> Vec<f64> {
+        self.layers.iter().map(|layer| layer.thickness_m).collect()
+    }
+
+    pub(crate) fn materials(&self) -> Vec<Material> {
+        self.layers.iter().map(|layer| layer.material).collect()
+    }
+}
 
 /// A soft body of revolution that a sensor presses: its lowest point touches, its far side does not move.
 ///
@@ -50,7 +122,7 @@ pub enum Object {
         height_m: f64,
     },
     /// A cone, its tip towards the sensor, whose base is glued to a stage. On a soft guide one sharper than about 1.1 rad ends early
-    /// with [`Outcome::Stopped`](super::Outcome::Stopped): the strain at its tip has no bound.
+    /// with [`Outcome::Stopped`](crate::Outcome::Stopped): the strain at its tip has no bound.
     Cone {
         /// Between its axis and its surface, in radians.
         half_angle_rad: f64,
@@ -105,7 +177,7 @@ impl Press {
     }
 
     /// On this guide instead of a rigid flat. Contact radii reach 1.3 ball radii and more, until the ball's equator or the guide's thickness ends
-    /// what the bodies take: the solution then ends with [`Outcome::Stopped`](super::Outcome::Stopped).
+    /// what the bodies take: the solution then ends with [`Outcome::Stopped`](crate::Outcome::Stopped).
     ///
     /// ```
     /// use tactile_fem::{Guide, Layer, Load, Material, Object, Press};
@@ -224,7 +296,7 @@ impl Press {
         growth.powf(FINENESS as f64 / self.fineness as f64)
     }
 
-    pub(super) fn object_mesh(&self) -> Mesh {
+    pub(crate) fn object_mesh(&self) -> Mesh {
         match self.object {
             Object::Ball { radius_m } | Object::HalfBall { radius_m } => {
                 Mesh::half_ball(radius_m, self.size())

@@ -1,16 +1,16 @@
 //! Ready models of what a sensor meets.
+//!
+//! Loads, and what a solution reports.
+//!
+//! A cylinder squeezed between two rigid plates.
 
-use super::block::BlockMesh;
-use super::bodies::Inclusion;
-use super::guide::Guide;
-use super::layout::Layout;
-use super::load::{Load, Solution};
-use super::material::{Kinematics, Material};
-use super::mesh::Boundary;
-use super::model::{Model, Support};
-use super::state::State;
-use super::stress::Stress;
 use crate::error::{Quantity, positive};
+use crate::material::{Kinematics, Material};
+use crate::mesh::{BlockMesh, Boundary, Inclusion};
+use crate::model::{BondedInterface, Model, Support};
+use crate::press::{Guide, Object, Press};
+use crate::state::{State, Stress};
+use crate::system::Layout;
 use tactile_elasticity::ElasticityError;
 
 /// Whether two surfaces that are pressed together slide.
@@ -101,7 +101,7 @@ const BLOCK_FINENESS: usize = 5;
 /// ```
 #[derive(Debug, Clone)]
 pub struct Scene {
-    pub(super) model: Model,
+    pub(crate) model: Model,
 }
 
 impl Scene {
@@ -245,5 +245,141 @@ impl Scene {
     /// ```
     pub fn stress(&self, state: &State, point: [f64; 2]) -> Option<Stress> {
         self.model.stress(state, point)
+    }
+}
+
+/// One load: how far the driven boundaries have moved, or with what force.
+///
+/// ```
+/// use tactile_fem::Load;
+///
+/// let loads = [0.2, 0.7, 1.2].map(Load::Force);
+/// assert_eq!(loads[1], Load::Force(0.7));
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum Load {
+    /// The approach δ, in metres.
+    Approach(f64),
+    /// The force on the driven boundaries, in newtons; positive presses.
+    Force(f64),
+}
+
+/// How a solution ended.
+///
+/// ```
+/// use tactile_fem::Outcome;
+///
+/// assert_ne!(Outcome::Solved, Outcome::Stopped { load: 1, approach_m: 1e-3, force_n: 0.2 });
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[non_exhaustive]
+pub enum Outcome {
+    /// Every load has its state.
+    Solved,
+    /// This load was not reached; the states of those before it are given.
+    Stopped {
+        /// Index of the load.
+        load: usize,
+        /// The last approach in equilibrium, in metres.
+        approach_m: f64,
+        /// The force there, in newtons.
+        force_n: f64,
+    },
+}
+
+/// What the solver did.
+///
+/// ```
+/// use tactile_fem::{Load, Material, Object, Outcome, Press};
+///
+/// # fn main() -> Result<(), tactile_elasticity::ElasticityError> {
+/// let press = Press::new(Object::Ball { radius_m: 3e-3 }, Material::new(1e5, 0.495)?)?;
+/// let report = press.scene()?.solve(&[Load::Approach(0.3e-3)]).report;
+/// assert_eq!(report.outcome, Outcome::Solved);
+/// assert!(report.iterations > report.steps);
+/// # Ok(())
+/// # }
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub struct Report {
+    /// Whether all loads were reached.
+    pub outcome: Outcome,
+    /// Load steps that converged.
+    pub steps: usize,
+    /// Load steps given up and taken again in halves.
+    pub rejected_steps: usize,
+    /// Newton iterations, those with an earlier tangent and of rejected steps too.
+    pub iterations: usize,
+}
+
+/// States at the loads that were reached, in order, and a report.
+///
+/// ```
+/// use tactile_fem::{Load, Material, Object, Outcome, Press};
+///
+/// # fn main() -> Result<(), tactile_elasticity::ElasticityError> {
+/// let press = Press::new(Object::Ball { radius_m: 3e-3 }, Material::new(1e5, 0.495)?)?;
+/// let solution = press.scene()?.solve(&[Load::Approach(0.3e-3), Load::Approach(f64::NAN)]);
+/// assert_eq!(solution.states.len(), 1);
+/// assert!(matches!(solution.report.outcome, Outcome::Stopped { load: 1, .. }));
+/// # Ok(())
+/// # }
+/// ```
+#[derive(Debug, Clone, PartialEq)]
+pub struct Solution {
+    /// One state a load.
+    pub states: Vec<State>,
+    /// What the solver did.
+    pub report: Report,
+}
+
+impl Scene {
+    /// A cylinder between two rigid plates to which both faces stick, or on which they slide without friction. One half of it is
+    /// solved: the other is its mirror image, and the approach is that of one plate to the middle, half of the whole squeeze.
+    ///
+    /// The [pressure](crate::State::pressure) is that on the face. Sliding, it is even, and the state is homogeneous; sticking, the sides bulge, the
+    /// pressure depends on the radius and is singular at the rim, where it is the mean over the last element. That the bulging side comes to
+    /// lie on the plate is not followed: at a squeeze of 10 % it does so over some hundredths of the radius.
+    ///
+    /// ```
+    /// use tactile_fem::{Interface, Load, Material, Scene};
+    ///
+    /// let material = Material::new(103e3, 0.495)?;
+    /// let force = |faces| {
+    ///     let scene = Scene::cylinder_between_plates(6e-3, 6e-3, material, faces)?;
+    ///     Ok::<_, tactile_elasticity::ElasticityError>(scene.solve(&[Load::Approach(0.15e-3)]).states[0].force_n())
+    /// };
+    /// assert!(force(Interface::Bonded)? > 1.2 * force(Interface::Frictionless)?);
+    /// # Ok::<(), tactile_elasticity::ElasticityError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// Lengths that are not positive.
+    pub fn cylinder_between_plates(
+        radius_m: f64,
+        height_m: f64,
+        material: Material,
+        faces: Interface,
+    ) -> Result<Self, ElasticityError> {
+        let half = Object::Cylinder {
+            radius_m,
+            height_m: 0.5 * height_m,
+        };
+        let mesh = Press::new(half, material)?.object_mesh();
+        let mut model = Model::new(Kinematics::Finite);
+        let cylinder = model.add(&mesh, &[material])?;
+        let support = match faces {
+            Interface::Bonded => Support::Bonded,
+            Interface::Frictionless => Support::Sliding,
+        };
+        model.drive(cylinder, Boundary::Contact, support);
+        model.hold(cylinder, Boundary::Base, Support::Sliding);
+        let face = model.edges(cylinder, Boundary::Contact);
+        // The only body is above its face.
+        model.interface = Some(BondedInterface::new(face, &model.elements, |_| true, 1.0));
+        Ok(Self::from_model(model))
     }
 }

@@ -10,11 +10,10 @@
 //! whose pressure is normal to the bent face, CalculiX's forces and pressures are lower by 0.3 % at a thirtieth of the
 //! block's height and by about 2 % at a tenth, which the search does not allow for.
 
-use super::layout::Layout;
-use super::load::Load;
-use super::model::Model;
-use super::scene::Scene;
-use super::state::State;
+use crate::model::Model;
+use crate::scene::{Load, Scene};
+use crate::state::State;
+use crate::system::Layout;
 
 /// Rounds of meshing and solving; each leaves about a tenth of the distance before.
 const MAX_ROUNDS: usize = 10;

@@ -16,11 +16,11 @@ use std::sync::Arc;
 
 /// The system cannot be solved: a pivot vanished, or there is no memory for the factors.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Singular;
+pub struct Singular;
 
 /// Where a symmetric matrix has entries, and how it is factorised.
 #[derive(Debug)]
-pub(crate) struct Pattern {
+pub struct Pattern {
     /// Lower half: rows of each column, ascending from the diagonal.
     entries: SymbolicSparseColMat<usize>,
     analysis: SymbolicCholesky<usize>,
@@ -28,7 +28,7 @@ pub(crate) struct Pattern {
 
 impl Pattern {
     /// The pattern of `size` equations that couples each group's with each other.
-    pub(crate) fn new<'a>(
+    pub fn new<'a>(
         size: usize,
         groups: impl Iterator<Item = &'a [usize]>,
     ) -> Result<Self, Singular> {
@@ -64,7 +64,7 @@ impl Pattern {
     }
 
     /// Place of the entry (i, j), which is that of (j, i) too.
-    pub(crate) fn place(&self, i: usize, j: usize) -> Option<usize> {
+    pub fn place(&self, i: usize, j: usize) -> Option<usize> {
         let (row, column) = (i.max(j), i.min(j));
         let range = self.entries.col_range(column);
         let rows = &self.entries.row_idx()[range.clone()];
@@ -72,7 +72,7 @@ impl Pattern {
     }
 
     /// Whether the pattern couples all equations of a group.
-    pub(crate) fn couples(&self, group: &[usize]) -> bool {
+    pub fn couples(&self, group: &[usize]) -> bool {
         let mut pairs =
             (group.iter().enumerate()).flat_map(|(k, &i)| group[..k].iter().map(move |&j| (i, j)));
         pairs.all(|(i, j)| self.place(i, j).is_some())
@@ -81,13 +81,13 @@ impl Pattern {
 
 /// A symmetric matrix.
 #[derive(Debug, Clone)]
-pub(crate) struct Symmetric {
+pub struct Symmetric {
     pattern: Arc<Pattern>,
     values: Vec<f64>,
 }
 
 impl Symmetric {
-    pub(crate) fn zero(pattern: Arc<Pattern>) -> Self {
+    pub fn zero(pattern: Arc<Pattern>) -> Self {
         Self {
             values: vec![0.0; pattern.entries.row_idx().len()],
             pattern,
@@ -95,7 +95,7 @@ impl Symmetric {
     }
 
     /// Adds to the entry (i, j) and so to (j, i), which the pattern must have.
-    pub(crate) fn add(&mut self, i: usize, j: usize, value: f64) {
+    pub fn add(&mut self, i: usize, j: usize, value: f64) {
         let place = self.pattern.place(i, j);
         debug_assert!(place.is_some(), "no entry ({i}, {j})");
         if let Some(place) = place {
@@ -104,7 +104,7 @@ impl Symmetric {
     }
 
     /// Adds to the entry at a place of the pattern.
-    pub(crate) fn add_at(&mut self, place: usize, value: f64) {
+    pub fn add_at(&mut self, place: usize, value: f64) {
         self.values[place] += value;
     }
 
@@ -112,7 +112,7 @@ impl Symmetric {
     ///
     /// Without pivoting: a stable equilibrium's tangent is positive definite; where it is not, the
     /// step that Newton's method then takes is judged by its residual.
-    pub(crate) fn factorise(&self) -> Result<Factors, Singular> {
+    pub fn factorise(&self) -> Result<Factors, Singular> {
         let analysis = &self.pattern.analysis;
         let mut values = vec![0.0; analysis.len_val()];
         let scratch = analysis.factorize_numeric_ldlt_scratch::<f64>(Par::Seq, Default::default());
@@ -136,14 +136,14 @@ impl Symmetric {
 
 /// LDLᵀ factors of a [`Symmetric`] matrix.
 #[derive(Debug)]
-pub(crate) struct Factors {
+pub struct Factors {
     pattern: Arc<Pattern>,
     values: Vec<f64>,
 }
 
 impl Factors {
     /// Solves in place for right-hand sides that follow each other in `x`.
-    pub(crate) fn solve(&self, x: &mut [f64]) -> Result<(), Singular> {
+    pub fn solve(&self, x: &mut [f64]) -> Result<(), Singular> {
         let analysis = &self.pattern.analysis;
         let size = analysis.nrows();
         let count = x.len().checked_div(size).unwrap_or(0);
@@ -161,50 +161,5 @@ impl Factors {
         } else {
             Err(Singular)
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn solves_an_indefinite_system() {
-        let groups: [&[usize]; 4] = [&[0, 3], &[3, 1], &[1, 4], &[4, 2]];
-        let pattern = Pattern::new(5, groups.into_iter()).unwrap();
-        assert!(pattern.couples(&[1, 3]) && !pattern.couples(&[0, 1, 3]));
-        let mut matrix = Symmetric::zero(Arc::new(pattern));
-        let mut dense = nalgebra::DMatrix::<f64>::zeros(5, 5);
-        for (k, group) in groups.iter().enumerate() {
-            let (i, j) = (group[0], group[1]);
-            for (r, c, v) in [(i, i, 3.0), (j, j, -2.0), (i, j, 0.5 + k as f64)] {
-                matrix.add(r, c, v);
-                dense[(r, c)] += v;
-                if r != c {
-                    dense[(c, r)] += v;
-                }
-            }
-        }
-        let truth = nalgebra::DMatrix::from_fn(5, 2, |i, j| 1.0 + i as f64 - 3.0 * j as f64);
-        let mut x: Vec<f64> = (&dense * &truth).iter().copied().collect();
-        matrix.factorise().unwrap().solve(&mut x).unwrap();
-        for (found, expected) in x.iter().zip(&truth) {
-            // Five unknowns of order one: some rounding units.
-            assert!((found - expected).abs() < 1e-12, "{found} {expected}");
-        }
-    }
-
-    #[test]
-    fn a_singular_system_is_reported() {
-        let groups: [&[usize]; 1] = [&[0, 1]];
-        let pattern = Pattern::new(2, groups.into_iter()).unwrap();
-        let mut matrix = Symmetric::zero(Arc::new(pattern));
-        for (i, j, v) in [(0, 0, 1.0), (0, 1, 1.0), (1, 1, 1.0)] {
-            matrix.add(i, j, v);
-        }
-        let solved = matrix
-            .factorise()
-            .and_then(|factors| factors.solve(&mut [1.0, 0.0]));
-        assert_eq!(solved, Err(Singular));
     }
 }

@@ -1,23 +1,294 @@
+//! Where displacement components stand among the equations.
+//!
+//! Numbers of the equations, and the pattern of the tangent.
+//!
+//! The symmetric linear system of a Newton step.
+//!
 //! The linear system of one Newton iteration.
 
-use super::candidates::Candidate;
-use super::condensation::Elimination;
-use super::element::OUTER;
-use super::fields::Fields;
-use super::gap::DRIVER;
-use super::layout::Layout;
-use super::model::Model;
-use super::slot::{Slot, slot};
-use super::sparse::{Singular, Symmetric};
-use super::tangent::{Goal, Tangent};
+use crate::contact::{Candidate, DRIVER};
+use crate::element::{Elimination, OUTER};
+use crate::model::{Fields, Model, Motion};
+use crate::newton::Chord;
+use crate::sparse::{Factors, Pattern, Singular, Symmetric};
+use crate::stick::Slip;
 use std::sync::Arc;
+
+/// Where a displacement component's share of the system goes.
+#[derive(Debug, Clone, Copy)]
+pub enum Slot {
+    Nowhere,
+    Driver(f64),
+    Equation(usize),
+}
+
+/// Where the entries of an element's stiffness, the lower half row by row, stand among the tangent's values;
+/// [`NO_PLACE`] where one of the two components has no equation.
+type Places = [u32; OUTER * (OUTER + 1) / 2];
+
+/// Of entries that are not in the tangent.
+const NO_PLACE: u32 = u32::MAX;
+
+/// The slot of a displacement component of a [`Gap`](super::gap::Gap).
+pub fn slot(slots: &[Slot], dof: usize) -> Slot {
+    if dof == DRIVER {
+        Slot::Driver(1.0)
+    } else {
+        slots[dof]
+    }
+}
+
+/// Equations of a model, and the tangent's pattern as far as contacts have needed it.
+#[derive(Debug, Clone)]
+pub struct Layout {
+    slots: Arc<[Slot]>,
+    pub(crate) equations: usize,
+    /// Equations that are coupled with each other by an element or by a contact.
+    groups: Vec<Vec<usize>>,
+    pattern: Option<Arc<Pattern>>,
+    /// Of each element, in the pattern.
+    places: Arc<[Places]>,
+    /// The tangent taken last, with which a scene nearby converges; elsewhere a new one is taken.
+    pub(crate) chord: Option<Arc<Chord>>,
+}
+
+impl Layout {
+    pub(crate) fn new(model: &Model) -> Self {
+        // The centres, eliminated within their elements, have no equation.
+        let mut is_outer = vec![false; model.nodes.len()];
+        for nodes in &model.elements {
+            for &node in &nodes[..OUTER / 2] {
+                is_outer[node] = true;
+            }
+        }
+        let mut equations = 0;
+        let mut slots: Vec<Slot> = (model.motion.iter().enumerate())
+            .map(|(dof, motion)| {
+                let shares = dof % 2 == 1 && model.partners[dof / 2].is_some();
+                match *motion {
+                    Motion::Driven(factor) => Slot::Driver(factor),
+                    Motion::Free if is_outer[dof / 2] && !shares => {
+                        equations += 1;
+                        Slot::Equation(equations - 1)
+                    }
+                    Motion::Free | Motion::Zero => Slot::Nowhere,
+                }
+            })
+            .collect();
+        for (node, partner) in model.partners.iter().enumerate() {
+            if let Some(partner) = partner {
+                slots[2 * node + 1] = slots[2 * partner + 1];
+            }
+        }
+        let mut layout = Self {
+            slots: slots.into(),
+            equations,
+            groups: Vec::new(),
+            pattern: None,
+            places: Arc::new([]),
+            chord: None,
+        };
+        let elements = model.elements.iter();
+        layout.groups = elements
+            .map(|nodes| {
+                let outer = &nodes[..OUTER / 2];
+                layout.coupled(outer.iter().flat_map(|node| [2 * node, 2 * node + 1]))
+            })
+            .collect();
+        layout
+    }
+
+    /// Slots of all displacement components.
+    pub(crate) fn slots(&self) -> Arc<[Slot]> {
+        Arc::clone(&self.slots)
+    }
+
+    /// Equations among displacement components.
+    fn coupled(&self, dofs: impl Iterator<Item = usize>) -> Vec<usize> {
+        dofs.filter_map(|dof| match slot(&self.slots, dof) {
+            Slot::Equation(equation) => Some(equation),
+            _ => None,
+        })
+        .collect()
+    }
+
+    /// The tangent's pattern with couplings between the components of each contact; the one made
+    /// before where it has them all.
+    pub(crate) fn pattern<'a>(
+        &mut self,
+        elements: &[[usize; 9]],
+        contacts: impl Iterator<Item = &'a [usize]>,
+    ) -> Result<Arc<Pattern>, Singular> {
+        let mut is_new = false;
+        for dofs in contacts {
+            let group = self.coupled(dofs.iter().copied());
+            let known = self.pattern.as_ref();
+            if known.is_none_or(|pattern| !pattern.couples(&group)) {
+                self.groups.push(group);
+                is_new = true;
+            }
+        }
+        if let (Some(pattern), false) = (&self.pattern, is_new) {
+            return Ok(Arc::clone(pattern));
+        }
+        let groups = self.groups.iter().map(Vec::as_slice);
+        let pattern = Arc::new(Pattern::new(self.equations, groups)?);
+        let places = elements.iter().map(|nodes| self.places_of(nodes, &pattern));
+        self.places = places.collect();
+        self.pattern = Some(Arc::clone(&pattern));
+        Ok(pattern)
+    }
+}
+
+impl Layout {
+    /// Places of every element's stiffness in the pattern asked for last.
+    pub(crate) fn places(&self) -> Arc<[Places]> {
+        Arc::clone(&self.places)
+    }
+
+    fn places_of(&self, nodes: &[usize; 9], pattern: &Pattern) -> Places {
+        let equations: [Option<usize>; OUTER] =
+            core::array::from_fn(|k| match self.slots[2 * nodes[k / 2] + k % 2] {
+                Slot::Equation(equation) => Some(equation),
+                _ => None,
+            });
+        let mut places = [NO_PLACE; OUTER * (OUTER + 1) / 2];
+        let pairs = (0..OUTER).flat_map(|i| (0..=i).map(move |j| (i, j)));
+        for (place, (i, j)) in places.iter_mut().zip(pairs) {
+            if let (Some(row), Some(column)) = (equations[i], equations[j]) {
+                let found = pattern.place(row, column);
+                // A tangent of 2³² entries would take 32 GB.
+                *place = found.map_or(NO_PLACE, |found| found as u32);
+            }
+        }
+        places
+    }
+}
+
+/// What a step is to reach.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Goal {
+    Approach(f64),
+    Force(f64),
+}
+
+/// A symmetric linear system with one more unknown, the approach.
+#[derive(Debug, Clone)]
+pub struct Tangent {
+    pub matrix: Symmetric,
+    /// Negative residual.
+    pub right: Vec<f64>,
+    pub driver_column: Vec<f64>,
+    driver_stiffness: f64,
+    /// Residual of the approach.
+    pub force: f64,
+}
+
+impl Tangent {
+    /// Adds an element.
+    fn add_element(
+        &mut self,
+        slots: &[Slot; OUTER],
+        places: &Places,
+        residual: &[f64; OUTER],
+        stiffness: &[[f64; OUTER]; OUTER],
+    ) {
+        if slots.iter().any(|slot| matches!(slot, Slot::Driver(_))) {
+            self.scatter(slots, residual, |i, j| stiffness[i][j]);
+            return;
+        }
+        for (slot, residual) in slots.iter().zip(residual) {
+            if let Slot::Equation(row) = slot {
+                self.right[*row] -= residual;
+            }
+        }
+        let mut places = places.iter();
+        for (i, row) in stiffness.iter().enumerate() {
+            for (value, &place) in row[..=i].iter().zip(places.by_ref()) {
+                if place != NO_PLACE {
+                    self.matrix.add_at(place as usize, *value);
+                }
+            }
+        }
+    }
+
+    /// Adds a spring of this stiffness that holds a contact node at its anchor.
+    fn add_slip(&mut self, slots: &[Slot], slip: &Slip, stiffness: f64) {
+        let slots: Vec<Slot> = slip.dofs.iter().map(|&dof| slot(slots, dof)).collect();
+        let load = stiffness * slip.value;
+        let residual: Vec<f64> = slip.first.iter().map(|by| load * by).collect();
+        self.scatter(&slots, &residual, |i, j| {
+            stiffness * slip.first[i] * slip.first[j]
+        });
+    }
+
+    /// Adds a symmetric contribution of which the lower half is asked.
+    pub fn scatter(
+        &mut self,
+        slots: &[Slot],
+        residual: &[f64],
+        value: impl Fn(usize, usize) -> f64,
+    ) {
+        for (i, &slot) in slots.iter().enumerate() {
+            match slot {
+                Slot::Nowhere => continue,
+                Slot::Equation(row) => self.right[row] -= residual[i],
+                Slot::Driver(factor) => self.force += factor * residual[i],
+            }
+            for (j, &other) in slots[..=i].iter().enumerate() {
+                let value = value(i, j);
+                match (slot, other) {
+                    (Slot::Equation(row), Slot::Equation(column)) => {
+                        self.matrix.add(row, column, value);
+                    }
+                    (Slot::Equation(row), Slot::Driver(factor))
+                    | (Slot::Driver(factor), Slot::Equation(row)) => {
+                        self.driver_column[row] += factor * value;
+                    }
+                    (Slot::Driver(a), Slot::Driver(b)) => {
+                        let times = if i == j { 1.0 } else { 2.0 };
+                        self.driver_stiffness += times * a * b * value;
+                    }
+                    _ => {}
+                }
+            }
+        }
+    }
+
+    /// Solution for a goal: the equations' unknowns and the approach's step.
+    pub fn solve(
+        &self,
+        factors: &Factors,
+        goal: Goal,
+        present: f64,
+    ) -> Result<(Vec<f64>, f64), Singular> {
+        // Two right-hand sides: the residual's, and that of a unit approach.
+        let size = self.right.len();
+        let mut columns = [self.right.as_slice(), &self.driver_column].concat();
+        factors.solve(&mut columns)?;
+        let by_approach = columns.split_off(size);
+        let mut solution = columns;
+        let dot = |a: &[f64], b: &[f64]| -> f64 { a.iter().zip(b).map(|(a, b)| a * b).sum() };
+        let approach = match goal {
+            Goal::Approach(target) => target - present,
+            Goal::Force(target) => {
+                let stiffness = self.driver_stiffness - dot(&self.driver_column, &by_approach);
+                (target - self.force - dot(&self.driver_column, &solution)) / stiffness
+            }
+        };
+        for (x, by) in solution.iter_mut().zip(&by_approach) {
+            *x -= approach * by;
+        }
+        Ok((solution, approach))
+    }
+}
 
 /// Residual and tangent at one state.
 ///
 /// Contact enters each Newton iteration as a linear complementarity problem: gaps are linear in the
 /// step, and which nodes are in contact is found for the step (primal–dual active set) rather than for
 /// the state before it.
-pub(crate) struct System<'a> {
+pub struct System<'a> {
     model: &'a Model,
     slots: Arc<[Slot]>,
     /// Elements' share and the turning of surfaces under their present pressure.
@@ -25,15 +296,15 @@ pub(crate) struct System<'a> {
     /// Force out of balance at the state itself, with the contacts there.
     unbalanced: Vec<f64>,
     /// Derivative of the energy by the approach.
-    pub(crate) force: f64,
+    pub force: f64,
     /// Root of the sum of squared element forces: what residuals are compared with.
-    pub(crate) scale: f64,
+    pub scale: f64,
     eliminations: Vec<Elimination>,
     candidates: Vec<Candidate>,
 }
 
 /// Increments of a Newton step.
-pub(crate) struct Step {
+pub struct Step {
     displacement: Vec<f64>,
     pressures: Vec<[f64; 3]>,
     approach: f64,
@@ -43,7 +314,7 @@ pub(crate) struct Step {
 impl Model {
     /// The system at a state from which the approach may change by `margin`; `None` where an element
     /// is turned inside out.
-    pub(crate) fn assemble(
+    pub fn assemble(
         &self,
         layout: &mut Layout,
         fields: &Fields,
@@ -134,7 +405,7 @@ const MAX_CHANGES: usize = 15;
 
 impl System<'_> {
     /// Unbalanced force over the scale of the forces.
-    pub(crate) fn imbalance(&self, goal: Goal) -> f64 {
+    pub fn imbalance(&self, goal: Goal) -> f64 {
         let squares: f64 = self.unbalanced.iter().map(|f| f * f).sum();
         let driver = match goal {
             Goal::Approach(_) => 0.0,
@@ -147,7 +418,7 @@ impl System<'_> {
     }
 
     /// The Newton step from `fields` towards the goal.
-    pub(crate) fn step(&self, fields: &Fields, goal: Goal) -> Result<Step, Singular> {
+    pub fn step(&self, fields: &Fields, goal: Goal) -> Result<Step, Singular> {
         let mut active: Vec<bool> = self.candidates.iter().map(|c| c.pressure > 0.0).collect();
         let mut changes = 0;
         loop {
@@ -202,7 +473,7 @@ impl System<'_> {
     }
 
     /// The tangent without contacts, and what the elements eliminated.
-    pub(crate) fn into_parts(self) -> (Tangent, Arc<[Slot]>, Vec<Elimination>) {
+    pub fn into_parts(self) -> (Tangent, Arc<[Slot]>, Vec<Elimination>) {
         (self.base, self.slots, self.eliminations)
     }
 
@@ -237,7 +508,7 @@ impl System<'_> {
 
 impl Step {
     /// The fields after the fraction `length` of the step.
-    pub(crate) fn apply(&self, fields: &Fields, length: f64) -> Fields {
+    pub fn apply(&self, fields: &Fields, length: f64) -> Fields {
         let along =
             |a: &[f64; 3], b: &[f64; 3]| core::array::from_fn(|k| a[k] + length * (b[k] - a[k]));
         let displacement = fields.displacement.iter().zip(&self.displacement);

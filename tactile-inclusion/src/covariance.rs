@@ -1,6 +1,6 @@
 //! Covariance of ring means: the sensor's errors and the model's.
 
-use super::specimen::SensorErrors;
+use crate::specimen::SensorErrors;
 use nalgebra::DMatrix;
 use tactile_fem::Interface;
 
@@ -70,7 +70,7 @@ const FRICTIONLESS: ModelErrors = ModelErrors {
 
 /// Which mesh a covariance is for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Resolution {
+pub enum Resolution {
     /// The answer's.
     Answer,
     /// That of the first fits.
@@ -124,12 +124,12 @@ fn ring_kernel(a: f64, b: f64, length: f64) -> f64 {
 
 /// Values of all frames: the pressures of one after the other, then the forces.
 #[derive(Debug, Clone)]
-pub(crate) struct Observed {
-    pub(crate) radii_m: Vec<f64>,
-    pub(crate) values: Vec<f64>,
+pub struct Observed {
+    pub radii_m: Vec<f64>,
+    pub values: Vec<f64>,
     /// White errors; infinite for a force that is not known.
-    pub(crate) white: Vec<f64>,
-    pub(crate) frames: usize,
+    pub white: Vec<f64>,
+    pub frames: usize,
 }
 
 impl Observed {
@@ -143,7 +143,7 @@ impl Observed {
     }
 
     /// Covariance of the values; relative errors are of the values observed.
-    pub(crate) fn covariance(
+    pub fn covariance(
         &self,
         sensor: &SensorErrors,
         interface: Interface,

@@ -1,11 +1,11 @@
 //! What a scan can tell before it is made.
 
-use super::covariance::{Observed, Resolution};
-use super::fit::Problem;
-use super::parameters::LumpParameters;
-use super::profiles::check_approaches;
-use super::search::InclusionSearch;
+use crate::covariance::{Observed, Resolution};
 use crate::error::{Quantity, positive};
+use crate::fit::Problem;
+use crate::forward::LumpParameters;
+use crate::search::InclusionSearch;
+use crate::specimen::check_approaches;
 use tactile_elasticity::ElasticityError;
 
 /// An inclusion assumed for planning a scan.

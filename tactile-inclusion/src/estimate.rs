@@ -41,21 +41,21 @@ impl Estimated {
 }
 
 /// Standard deviations that 95 % of a Gaussian lie within.
-pub(crate) const TWO_SIDED_95: f64 = 1.959_963_984_540_054;
+pub const TWO_SIDED_95: f64 = 1.959_963_984_540_054;
 
 /// A parameter of an inclusion: told, or not.
 ///
 /// ```
-/// use tactile_inclusion::{Estimated, Told};
+/// use tactile_inclusion::{Estimated, Identifiable};
 ///
 /// let range = Estimated { value: 50e3, standard_error: 60e3, interval: [15e3, 200e3] };
-/// assert_eq!(Told::No(range).value(), None);
-/// assert_eq!(Told::Yes(range).value(), Some(50e3));
-/// assert_eq!(Told::No(range).estimate().interval, [15e3, 200e3]);
+/// assert_eq!(Identifiable::No(range).value(), None);
+/// assert_eq!(Identifiable::Yes(range).value(), Some(50e3));
+/// assert_eq!(Identifiable::No(range).estimate().interval, [15e3, 200e3]);
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
-pub enum Told {
+pub enum Identifiable {
     /// Known within 25 % (one standard error) both ways.
     Yes(Estimated),
     /// The data leave it open: what prior and data allow together.
@@ -68,7 +68,7 @@ pub enum Told {
 /// 30 % are left open.
 const OPEN: f64 = 0.25;
 
-impl Told {
+impl Identifiable {
     pub(crate) fn new(estimated: Estimated, is_reliable: bool) -> Self {
         let [low, high] = estimated.interval;
         let reach = (estimated.value / low).max(high / estimated.value).ln();
@@ -109,11 +109,11 @@ impl Told {
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Inclusion {
     /// Diameter D, in metres: the posterior's median.
-    pub diameter_m: Told,
+    pub diameter_m: Identifiable,
     /// Depth of its top d, in metres: the posterior's median.
-    pub depth_m: Told,
+    pub depth_m: Identifiable,
     /// Young's modulus E₁, in pascals: of the best fit, for how stiff it may be at most is often known from the prior alone.
-    pub youngs_modulus_pa: Told,
+    pub youngs_modulus_pa: Identifiable,
     /// Correlations of ln D, ln d and ln E₁.
     pub correlation: [[f64; 3]; 3],
 }

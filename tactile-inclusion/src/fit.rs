@@ -1,19 +1,18 @@
 //! Maximum a posteriori fit of a block's parameters to measured profiles.
 
-use super::forward::{Forward, Prediction, Solved};
-use super::parameters::{Coordinate, LARGEST_POISSON_RATIO, Parameters};
+use crate::forward::{Coordinate, Forward, LARGEST_POISSON_RATIO, Parameters, Prediction, Solved};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 /// What is known of a coordinate beforehand: a Gaussian.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Prior {
-    pub(crate) coordinate: Coordinate,
-    pub(crate) mean: f64,
-    pub(crate) standard_error: f64,
+pub struct Prior {
+    pub coordinate: Coordinate,
+    pub mean: f64,
+    pub standard_error: f64,
 }
 
 impl Prior {
-    pub(crate) fn new(coordinate: Coordinate, (mean, standard_error): (f64, f64)) -> Self {
+    pub fn new(coordinate: Coordinate, (mean, standard_error): (f64, f64)) -> Self {
         Self {
             coordinate,
             mean,
@@ -23,35 +22,35 @@ impl Prior {
 }
 
 /// Measured values with their covariance, and what is known beforehand.
-pub(crate) struct Problem {
-    pub(crate) forward: Forward,
-    pub(crate) measured: Vec<f64>,
-    pub(crate) factor: Cholesky<f64, Dyn>,
-    pub(crate) priors: Vec<Prior>,
+pub struct Problem {
+    pub forward: Forward,
+    pub measured: Vec<f64>,
+    pub factor: Cholesky<f64, Dyn>,
+    pub priors: Vec<Prior>,
 }
 
 /// A local optimum.
 #[derive(Debug, Clone)]
-pub(crate) struct Fit {
-    pub(crate) parameters: Parameters,
+pub struct Fit {
+    pub parameters: Parameters,
     /// Of the coordinates, in the order of the priors.
-    pub(crate) covariance: DMatrix<f64>,
+    pub covariance: DMatrix<f64>,
     /// rᵀ C⁻¹ r.
-    pub(crate) misfit: f64,
+    pub misfit: f64,
     /// The priors' part of the objective.
-    pub(crate) penalty: f64,
+    pub penalty: f64,
     /// Logarithm of the evidence by Laplace's approximation, up to what all models share.
-    pub(crate) evidence: f64,
+    pub evidence: f64,
     /// Its part that is the posterior's volume over the prior's.
-    pub(crate) volume: f64,
-    pub(crate) predicted: Vec<f64>,
-    pub(crate) solved: Solved,
-    pub(crate) converged: bool,
+    pub volume: f64,
+    pub predicted: Vec<f64>,
+    pub solved: Solved,
+    pub converged: bool,
 }
 
 /// When a fit ends.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Ending {
+pub struct Ending {
     /// Distance of the optimum in standard errors below which it has settled; an undamped step that gains less
     /// than its square is the last.
     step: f64,
@@ -63,7 +62,7 @@ pub(crate) struct Ending {
 
 impl Ending {
     /// This ending for a fit that is of use below an objective alone.
-    pub(crate) fn below(self, objective: f64) -> Self {
+    pub fn below(self, objective: f64) -> Self {
         Self {
             needed: objective.min(self.needed),
             ..self
@@ -72,7 +71,7 @@ impl Ending {
 }
 
 /// Of an answer: what is left is far below what the data tell.
-pub(crate) const SETTLED: Ending = Ending {
+pub const SETTLED: Ending = Ending {
     step: 0.2,
     evaluations: 20,
     needed: f64::INFINITY,
@@ -80,7 +79,7 @@ pub(crate) const SETTLED: Ending = Ending {
 
 /// Of the first fits, which a finer mesh moves by more. From a start of the grid, four to eight
 /// evaluations are taken, under the wrong assumption about the face any number.
-pub(crate) const DRAFTED: Ending = Ending {
+pub const DRAFTED: Ending = Ending {
     step: 0.5,
     evaluations: 12,
     needed: f64::INFINITY,
@@ -102,22 +101,22 @@ const PROMISE: f64 = 4.0;
 const UNRESOLVED: f64 = 1.0;
 
 /// A change of the coordinates.
-pub(super) struct Step {
-    pub(super) by: DVector<f64>,
+pub struct Step {
+    pub by: DVector<f64>,
     /// In standard errors, before it is cut to [`LARGEST_STEP`].
-    pub(super) size: f64,
+    pub size: f64,
 }
 
 /// The quadratic model of the objective at some parameters.
-pub(super) struct Normal {
-    pub(super) matrix: DMatrix<f64>,
-    pub(super) gradient: DVector<f64>,
-    pub(super) misfit: f64,
-    pub(super) penalty: f64,
+pub struct Normal {
+    pub matrix: DMatrix<f64>,
+    pub gradient: DVector<f64>,
+    pub misfit: f64,
+    pub penalty: f64,
     /// Whitened derivatives of the values.
-    pub(super) columns: Vec<DVector<f64>>,
-    pub(super) predicted: Vec<f64>,
-    pub(super) solved: Solved,
+    pub columns: Vec<DVector<f64>>,
+    pub predicted: Vec<f64>,
+    pub solved: Solved,
 }
 
 /// Fixes a coordinate's step in the equations of all.
@@ -131,24 +130,24 @@ fn fix(matrix: &mut DMatrix<f64>, gradient: &mut DVector<f64>, k: usize, step: f
 
 impl Fit {
     /// −2 ln of the posterior, up to a constant.
-    pub(crate) fn objective(&self) -> f64 {
+    pub fn objective(&self) -> f64 {
         self.misfit + self.penalty
     }
 }
 
 impl Problem {
-    pub(crate) fn coordinates(&self) -> Vec<Coordinate> {
+    pub fn coordinates(&self) -> Vec<Coordinate> {
         self.priors.iter().map(|prior| prior.coordinate).collect()
     }
 
-    pub(super) fn residual(&self, predicted: &[f64]) -> DVector<f64> {
+    pub fn residual(&self, predicted: &[f64]) -> DVector<f64> {
         DVector::from_iterator(
             self.measured.len(),
             self.measured.iter().zip(predicted).map(|(a, b)| a - b),
         )
     }
 
-    pub(super) fn penalty(&self, parameters: &Parameters) -> f64 {
+    pub fn penalty(&self, parameters: &Parameters) -> f64 {
         let squares = self.priors.iter().map(|prior| {
             let distance = parameters.get(prior.coordinate) - prior.mean;
             (distance / prior.standard_error).powi(2)
@@ -169,7 +168,7 @@ impl Problem {
     ///
     /// Pressures are nearly proportional to the moduli of block and inclusion as long as the guide is
     /// stiffer than they are.
-    pub(crate) fn scaled_start(
+    pub fn scaled_start(
         &self,
         start: &Parameters,
         predicted: &Prediction,
@@ -190,13 +189,13 @@ impl Problem {
         Some((misfit + self.penalty(&parameters), parameters))
     }
 
-    pub(super) fn whitened(&self, vector: DVector<f64>) -> DVector<f64> {
+    pub fn whitened(&self, vector: DVector<f64>) -> DVector<f64> {
         let solved = self.factor.l_dirty().solve_lower_triangular(&vector);
         // A Cholesky factor has a positive diagonal.
         solved.unwrap_or(vector)
     }
 
-    pub(super) fn normal(&self, parameters: &Parameters, near: Option<&Solved>) -> Option<Normal> {
+    pub fn normal(&self, parameters: &Parameters, near: Option<&Solved>) -> Option<Normal> {
         let (prediction, solved) = self.forward.predict_near(parameters, near)?;
         self.normal_at(parameters, prediction, solved)
     }
@@ -234,14 +233,14 @@ impl Problem {
     }
 
     /// Standard errors of the coordinates at some parameters; `None` where there is no solution.
-    pub(crate) fn errors(&self, parameters: &Parameters) -> Option<Vec<f64>> {
+    pub fn errors(&self, parameters: &Parameters) -> Option<Vec<f64>> {
         let covariance = self.normal(parameters, None)?.matrix.cholesky()?.inverse();
         Some(covariance.diagonal().iter().map(|v| v.sqrt()).collect())
     }
 
     /// Levenberg–Marquardt from a start; `None` where the start itself has no solution. `go_on` is asked
     /// before each evaluation.
-    pub(crate) fn fit(
+    pub fn fit(
         &self,
         start: Parameters,
         ending: Ending,
@@ -291,7 +290,7 @@ impl Problem {
     }
 
     /// The damped step towards the quadratic model's optimum, that of a coordinate that is held left out.
-    pub(super) fn step(
+    pub fn step(
         &self,
         parameters: &Parameters,
         normal: &Normal,
@@ -327,7 +326,7 @@ impl Problem {
         Some(Step { by, size })
     }
 
-    pub(super) fn stepped(&self, parameters: &Parameters, step: &DVector<f64>) -> Parameters {
+    pub fn stepped(&self, parameters: &Parameters, step: &DVector<f64>) -> Parameters {
         let steps = self.priors.iter().zip(step.iter());
         steps.fold(*parameters, |moved, (prior, &by)| {
             moved.moved(prior.coordinate, by)
@@ -364,7 +363,7 @@ impl Problem {
     }
 
     /// Objective that goes with an evidence, for a posterior of this volume.
-    pub(crate) fn objective_at(&self, evidence: f64, volume: f64) -> f64 {
+    pub fn objective_at(&self, evidence: f64, volume: f64) -> f64 {
         2.0 * (volume - self.noise() - evidence)
     }
 }

@@ -1,38 +1,237 @@
+//! What a block's pressure depends on.
+//!
+//! How a block's mesh moves with its parameters.
+//!
 //! Interface pressure of a block with an inclusion under a guide, and its derivatives.
 
-use super::motion::{Motion, sizes};
-use super::parameters::{Coordinate, Parameters};
 use std::sync::Arc;
 use tactile_fem::{
     Block, Found, Guide, Interface, Kinematics, Layout, Load, Lump, Material, Outcome,
     PressurePoint, Relaxation, Scene, State, pressure_at,
 };
 
+/// A block's unknowns.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Parameters {
+    pub block_modulus_pa: f64,
+    pub lump: Option<LumpParameters>,
+    /// What the approaches read too little.
+    pub zero_m: f64,
+    pub height_m: f64,
+    /// Of tissue and inclusion.
+    pub poisson_ratio: f64,
+}
+
+/// An inclusion's unknowns.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LumpParameters {
+    pub diameter_m: f64,
+    pub depth_m: f64,
+    pub youngs_modulus_pa: f64,
+}
+
+/// An unknown as the fit sees it: logarithms of lengths and moduli, where errors are nearly Gaussian.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Coordinate {
+    /// ln E₀.
+    BlockModulus,
+    /// ln D.
+    Diameter,
+    /// ln d.
+    Depth,
+    /// ln E₁.
+    LumpModulus,
+    /// Zero of the approaches, in metres.
+    Zero,
+    /// ln H.
+    Height,
+    /// ν.
+    PoissonRatio,
+}
+
+impl Coordinate {
+    /// A change of this coordinate that matters about as much as one of a logarithm by 1.
+    pub fn unit(self) -> f64 {
+        match self {
+            Self::Zero => 1e-3,
+            Self::PoissonRatio => -1e-1,
+            _ => 1.0,
+        }
+    }
+}
+
+/// Relative step of the difference quotients: the truncation error is about as large as the step,
+/// rounding and the unbalanced force of 1e-8 stay a hundred times below.
+const STEP: f64 = 1e-5;
+
+/// Largest Poisson ratio of a fit: the pressure differs from an incompressible block's by 0.1 %, and beyond it
+/// the derivatives by sizes lose digits as the bulk modulus grows.
+pub const LARGEST_POISSON_RATIO: f64 = 0.499;
+
+impl Parameters {
+    pub fn get(&self, coordinate: Coordinate) -> f64 {
+        let lump = |value: fn(&LumpParameters) -> f64| {
+            self.lump.as_ref().map_or(0.0, |lump| value(lump).ln())
+        };
+        match coordinate {
+            Coordinate::BlockModulus => self.block_modulus_pa.ln(),
+            Coordinate::Diameter => lump(|lump| lump.diameter_m),
+            Coordinate::Depth => lump(|lump| lump.depth_m),
+            Coordinate::LumpModulus => lump(|lump| lump.youngs_modulus_pa),
+            Coordinate::Zero => self.zero_m,
+            Coordinate::Height => self.height_m.ln(),
+            Coordinate::PoissonRatio => self.poisson_ratio,
+        }
+    }
+
+    /// These parameters with one coordinate changed by `step`.
+    pub fn moved(&self, coordinate: Coordinate, step: f64) -> Self {
+        let mut moved = *self;
+        let factor = step.exp();
+        match (coordinate, &mut moved.lump) {
+            (Coordinate::BlockModulus, _) => moved.block_modulus_pa *= factor,
+            (Coordinate::Diameter, Some(lump)) => lump.diameter_m *= factor,
+            (Coordinate::Depth, Some(lump)) => lump.depth_m *= factor,
+            (Coordinate::LumpModulus, Some(lump)) => lump.youngs_modulus_pa *= factor,
+            (Coordinate::Diameter | Coordinate::Depth | Coordinate::LumpModulus, None) => {}
+            (Coordinate::Zero, _) => moved.zero_m += step,
+            (Coordinate::Height, _) => moved.height_m *= factor,
+            (Coordinate::PoissonRatio, _) => {
+                moved.poisson_ratio = (moved.poisson_ratio + step).min(LARGEST_POISSON_RATIO);
+            }
+        }
+        moved
+    }
+
+    /// Step of a difference quotient.
+    ///
+    /// By Poisson's ratio it is small against 1 − 2ν: the bulk modulus grows as its reciprocal.
+    pub fn small_step(&self, coordinate: Coordinate) -> f64 {
+        match coordinate {
+            Coordinate::PoissonRatio => -STEP * (1.0 - 2.0 * self.poisson_ratio),
+            _ => STEP * coordinate.unit(),
+        }
+    }
+
+    /// Whether an inclusion comes nearer to the surface or the stage than a fiftieth of its diameter,
+    /// or is as tall as the block allows.
+    pub fn is_at_boundary(&self) -> bool {
+        self.lump.is_some_and(|lump| {
+            let room = self.height_m - lump.depth_m - lump.diameter_m;
+            lump.depth_m.min(room) < 0.02 * lump.diameter_m
+        })
+    }
+}
+
+/// How points of the block move: the inclusion as a rigid circle that grows, the far side with the
+/// height, linearly in between, the face not at all.
+struct Motion {
+    radius: f64,
+    /// Depth of the inclusion's centre.
+    centre: f64,
+    grown: f64,
+    sunk: f64,
+    height: f64,
+    raised: f64,
+    face_radius: f64,
+}
+
+impl Motion {
+    pub fn new(from: &Parameters, to: &Parameters, face_radius: f64) -> Self {
+        let circle = |parameters: &Parameters| {
+            let lump = parameters.lump.map(sizes);
+            lump.map_or([0.0; 2], |[diameter, depth]| {
+                [0.5 * diameter, depth + 0.5 * diameter]
+            })
+        };
+        let ([radius, centre], [radius_after, centre_after]) = (circle(from), circle(to));
+        Self {
+            radius,
+            centre,
+            grown: radius_after - radius,
+            sunk: centre_after - centre,
+            height: from.height_m,
+            raised: to.height_m - from.height_m,
+            face_radius,
+        }
+    }
+
+    pub fn moved(&self, [r, z]: [f64; 2]) -> [f64; 2] {
+        if z <= 0.0 {
+            return [r, z];
+        }
+        let bottom = self.centre + self.radius;
+        let lifted = self.raised * ((z - bottom) / (self.height - bottom)).max(0.0);
+        let [along_r, along_z] = self.by_inclusion([r, z]);
+        [r + along_r, z + along_z + lifted]
+    }
+
+    fn by_inclusion(&self, [r, z]: [f64; 2]) -> [f64; 2] {
+        let offset = z - self.centre;
+        let distance = r.hypot(offset);
+        if self.radius == 0.0 || distance == 0.0 {
+            return [0.0, self.sunk];
+        }
+        let [across, along] = [r / distance, offset / distance];
+        if distance <= self.radius {
+            let growth = self.grown * distance / self.radius;
+            return [growth * across, growth * along + self.sunk];
+        }
+        // The ray from the centre through the point ends at the face, the far side or below the rim.
+        let to_face = if along < 0.0 {
+            self.centre / -along
+        } else {
+            f64::INFINITY
+        };
+        let to_far = if along > 0.0 {
+            (self.height - self.centre) / along
+        } else {
+            f64::INFINITY
+        };
+        let to_rim = if across > 0.0 {
+            self.face_radius / across
+        } else {
+            f64::INFINITY
+        };
+        let end = to_face.min(to_far).min(to_rim);
+        let part = ((end - distance) / (end - self.radius)).max(0.0);
+        [
+            part * self.grown * across,
+            part * (self.grown * along + self.sunk),
+        ]
+    }
+}
+
+/// What the mesh depends on: diameter and depth.
+fn sizes(lump: LumpParameters) -> [f64; 2] {
+    [lump.diameter_m, lump.depth_m]
+}
+
 /// A block of given size under a guide, and where its pressure is wanted.
 #[derive(Debug, Clone)]
-pub(crate) struct Forward {
-    pub(crate) guide: Guide,
-    pub(crate) block_radius_m: f64,
-    pub(crate) interface: Interface,
+pub struct Forward {
+    pub guide: Guide,
+    pub block_radius_m: f64,
+    pub interface: Interface,
     /// Approaches as read, in metres, growing.
-    pub(crate) approaches_m: Vec<f64>,
+    pub approaches_m: Vec<f64>,
     /// Where each frame's pressure is wanted, in metres from the axis.
-    pub(crate) radii_m: Vec<f64>,
+    pub radii_m: Vec<f64>,
     /// Elements along an eighth of the inclusion's circumference.
-    pub(crate) fineness: usize,
+    pub fineness: usize,
     /// Small strain is solved in one iteration: good enough to sort starts.
-    pub(crate) kinematics: Kinematics,
+    pub kinematics: Kinematics,
 }
 
 /// Pressures of all frames, one frame after the other, then their forces.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Prediction {
-    pub(crate) values: Vec<f64>,
+pub struct Prediction {
+    pub values: Vec<f64>,
 }
 
 /// A solved scene, from which scenes nearby are solved in fewer iterations.
 #[derive(Debug, Clone)]
-pub(crate) struct Solved {
+pub struct Solved {
     meshed: Arc<Meshed>,
     /// One for all frames; where surfaces slide, one a frame.
     scenes: Vec<Scene>,
@@ -82,14 +281,14 @@ fn sliding_depth(parameters: &Parameters) -> f64 {
 const SLIDING_ROUNDS: usize = 2;
 
 fn is_near(from: f64, to: f64) -> bool {
-    (to / from).ln().abs() < REACH
+    (to / from).ln().abs() < LARGEST_MESH_CHANGE
 }
 
 /// Largest change of the logarithm of a length by which a mesh is moved.
-const REACH: f64 = 0.3;
+const LARGEST_MESH_CHANGE: f64 = 0.3;
 
 impl Forward {
-    pub(crate) fn observations(&self) -> usize {
+    fn observations(&self) -> usize {
         self.approaches_m.len() * (self.radii_m.len() + 1)
     }
 
@@ -125,12 +324,12 @@ impl Forward {
     }
 
     /// The frames' pressures and forces; `None` where the block cannot be meshed or solved.
-    pub(crate) fn predict(&self, parameters: &Parameters) -> Option<Prediction> {
+    pub fn predict(&self, parameters: &Parameters) -> Option<Prediction> {
         Some(self.predict_near(parameters, None)?.0)
     }
 
     /// As [`Self::predict`], from a scene solved nearby; and this one, solved.
-    pub(crate) fn predict_near(
+    pub fn predict_near(
         &self,
         parameters: &Parameters,
         near: Option<&Solved>,
@@ -228,7 +427,7 @@ impl Forward {
     /// A derivative is the difference of one iteration on the slightly changed block and one on the block
     /// itself, both from the solution with its tangent: one factorisation a frame, one residual for each
     /// coordinate and frame. The iteration on the block itself takes out what the solution leaves unbalanced.
-    pub(crate) fn derivatives(
+    pub fn derivatives(
         &self,
         parameters: &Parameters,
         coordinates: &[Coordinate],

@@ -1,13 +1,26 @@
 //! What the fits under one assumption about the face say.
+//!
+//! Whether a block can be plain, before an inclusion is fitted.
+//!
+//! Rao's score test: with r what the plain block leaves of the measured values, J its derivatives, C and P the
+//! covariances of errors and prior, and s what a given inclusion would add to the pressures, the fall of the
+//! objective by a multiple of s, the plain block's parameters fitted along, is
+//!
+//! $$ \frac{(s^T Q r)^2}{s^T Q s}, \qquad Q = C^{-1} - C^{-1} J (J^T C^{-1} J + P^{-1})^{-1} J^T C^{-1} $$
+//!
+//! and the odds of just that inclusion against none are $\exp(s^T Q r - \tfrac{1}{2} s^T Q s)$ (C. R. Rao, Proc. Cambridge
+//! Philos. Soc. 44 (1948) 50). What is added is that of small strain on a coarse mesh, the same with and without the
+//! inclusion's modulus: its size is right within some ten percent.
 
-use super::covariance::Observed;
-use super::estimate::{
-    Estimated, Inclusion, InclusionEstimate, InclusionWarning, TWO_SIDED_95, Told,
+use crate::covariance::Observed;
+use crate::estimate::{
+    Estimated, Identifiable, Inclusion, InclusionEstimate, InclusionWarning, TWO_SIDED_95,
 };
-use super::fit::{Fit, Problem};
-use super::marginal::Marginal;
-use super::parameters::Coordinate;
-use super::score::Score;
+use crate::fit::{Fit, Problem};
+use crate::forward::Coordinate;
+use crate::ridge::Marginal;
+use crate::search::Start;
+use nalgebra::{DMatrix, DVector};
 use tactile_fem::Interface;
 
 /// Least fall of χ² for an inclusion to count as found, that of six standard errors: what finite elements err by brings it to 25 in
@@ -17,7 +30,7 @@ const LEAST_FALL: f64 = 36.0;
 const LEAST_PROBABILITY: f64 = 0.99;
 /// Fall of the objective without which an inclusion is not that probable, 2 ln(p / (1 − p)): the parameters it adds are
 /// known better afterwards than before, which lowers the evidence further.
-pub(super) const LEAST_GAIN: f64 = 9.2;
+pub const LEAST_GAIN: f64 = 9.2;
 /// Least contrast either way, E₁/E₀ or E₀/E₁: an inclusion nearer to the tissue explains no more than what
 /// its mesh differs by from a plain block's (a contrast of 1.02 to 1.04 in plain blocks by CalculiX).
 const LEAST_CONTRAST: f64 = 1.2;
@@ -25,7 +38,7 @@ const LEAST_CONTRAST: f64 = 1.2;
 const POOR: f64 = 3.1;
 
 /// Whether a fit leaves more than the errors explain.
-pub(super) fn is_poor(misfit: f64, observed: &Observed) -> bool {
+pub fn is_poor(misfit: f64, observed: &Observed) -> bool {
     let freedom = observed.values.len() as f64;
     misfit > freedom + POOR * (2.0 * freedom).sqrt()
 }
@@ -40,23 +53,23 @@ const COORDINATES: [Coordinate; 7] = [
     Coordinate::Depth,
     Coordinate::LumpModulus,
 ];
-pub(super) const BLOCK_COORDINATES: usize = 4;
+pub const BLOCK_COORDINATES: usize = 4;
 
 /// The best fits under one assumption about the face.
-pub(super) struct Hypothesis {
-    pub(super) problem: Problem,
-    pub(super) interface: Interface,
-    pub(super) plain: Fit,
+pub struct Hypothesis {
+    pub problem: Problem,
+    pub interface: Interface,
+    pub plain: Fit,
     /// What inclusions promise, where none was fitted.
-    pub(super) score: Option<Score>,
-    pub(super) lump: Option<Fit>,
+    pub score: Option<Score>,
+    pub lump: Option<Fit>,
     /// Posteriors of the fit with an inclusion, once its ridge is followed.
-    pub(super) marginal: Option<Marginal>,
+    pub marginal: Option<Marginal>,
 }
 
 impl Hypothesis {
     /// Follows the ridge of the fit with an inclusion, where there is more for one than against.
-    pub(super) fn follow(&mut self, go_on: impl FnMut() -> bool) {
+    pub fn follow(&mut self, go_on: impl FnMut() -> bool) {
         if let Some(fit) = self
             .lump
             .as_ref()
@@ -67,12 +80,12 @@ impl Hypothesis {
         }
     }
 
-    pub(super) fn evidence(&self) -> f64 {
+    pub fn evidence(&self) -> f64 {
         self.plain.evidence.max(self.evidence_with())
     }
 
     /// χ² over its degrees of freedom, where that is more than one: what differences of log evidence are too large by.
-    pub(super) fn inflation(&self, observed: &Observed) -> f64 {
+    pub fn inflation(&self, observed: &Observed) -> f64 {
         let best = match &self.lump {
             Some(lump) if lump.evidence > self.plain.evidence => lump,
             _ => &self.plain,
@@ -145,7 +158,7 @@ impl Hypothesis {
     }
 
     /// The answer; `rival` explains the frames about as well, `is_unsolved` that one could not be solved which may have.
-    pub(super) fn estimate(
+    pub fn estimate(
         self,
         observed: &Observed,
         rival: Option<&Self>,
@@ -186,7 +199,7 @@ impl Hypothesis {
             Estimated::within(at, other.map_or(interval, |other| hull(interval, other)))
         };
         let inclusion = found.map(|fit| {
-            let told = |k: usize| Told::new(estimated(BLOCK_COORDINATES + k), is_reliable);
+            let told = |k: usize| Identifiable::new(estimated(BLOCK_COORDINATES + k), is_reliable);
             Inclusion {
                 diameter_m: told(0),
                 depth_m: told(1),
@@ -221,4 +234,54 @@ fn probability(log_odds: f64) -> f64 {
 /// The least interval that holds two.
 fn hull(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
     [a[0].min(b[0]), a[1].max(b[1])]
+}
+
+/// Fall of the objective that a grid's inclusion must promise for inclusions to be fitted. One that is found lowers χ² by 36; its
+/// neighbour in the grid promises half of that or more.
+const LEAST_PROMISE: f64 = 18.0;
+
+/// What a grid of inclusions would change of a plain fit.
+#[derive(Debug, Clone, Copy)]
+pub struct Score {
+    /// Largest fall of the objective.
+    pub promise: f64,
+    /// Logarithm of the odds of an inclusion, those of the grid being equally likely.
+    log_odds: f64,
+}
+
+impl Score {
+    /// Of a fit without inclusion; `None` where it has no derivatives.
+    pub fn new(problem: &Problem, plain: &Fit, grid: &[Start]) -> Option<Self> {
+        let normal = problem.normal(&plain.parameters, Some(&plain.solved))?;
+        let residual = problem.whitened(problem.residual(&normal.predicted));
+        let columns = DMatrix::from_columns(&normal.columns);
+        let precision = normal.matrix.cholesky()?;
+        // What the plain block's own parameters cannot take up.
+        let left = &residual - &columns * precision.solve(&normal.gradient);
+        let mut odds = Vec::new();
+        let mut promise = 0.0f64;
+        for start in grid {
+            let added = (start.added.iter().zip(&normal.predicted)).map(|(part, p)| part * p);
+            let added = problem.whitened(DVector::from_iterator(normal.predicted.len(), added));
+            let shared = columns.tr_mul(&added);
+            let square = added.norm_squared() - shared.dot(&precision.solve(&shared));
+            if square <= 0.0 {
+                continue;
+            }
+            let along = added.dot(&left);
+            promise = promise.max(along.powi(2) / square);
+            odds.push(along - 0.5 * square);
+        }
+        let largest = odds.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let sum: f64 = odds.iter().map(|odds| (odds - largest).exp()).sum();
+        Some(Self {
+            promise,
+            log_odds: largest + (sum / odds.len().max(1) as f64).ln(),
+        })
+    }
+
+    /// Whether an inclusion can be ruled out.
+    pub fn is_plain(&self) -> bool {
+        self.promise < LEAST_PROMISE
+    }
 }

@@ -25,35 +25,21 @@
 //! Assoc. 90 (1995) 773. H. Rue, S. Martino & N. Chopin, J. R. Stat. Soc. B 71 (2009) 319.
 #![forbid(unsafe_code)]
 
-#[cfg(test)]
-mod against_calculix;
 mod covariance;
-#[cfg(test)]
-mod departures;
 mod design;
-mod drafts;
 mod error;
 mod estimate;
 mod fit;
 mod forward;
 mod hypothesis;
-mod marginal;
-mod motion;
-mod parameters;
-mod plain;
-mod profiles;
-mod progress;
 mod ridge;
-mod score;
 mod search;
 mod specimen;
-mod starts;
-#[cfg(test)]
-mod tests;
 
 pub use design::{AssumedInclusion, ExpectedErrors};
-pub use estimate::{Estimated, Inclusion, InclusionEstimate, InclusionWarning, Told};
-pub use profiles::PressureProfile;
-pub use progress::SearchProgress;
-pub use search::InclusionSearch;
-pub use specimen::{SensorErrors, Specimen};
+pub use estimate::{Estimated, Identifiable, Inclusion, InclusionEstimate, InclusionWarning};
+pub use search::{InclusionSearch, SearchProgress};
+pub use specimen::{PressureProfile, SensorErrors, Specimen};
+
+#[cfg(test)]
+mod tests;

@@ -1,24 +1,29 @@
 //! Search for an inclusion.
+//!
+//! Progress of a search.
+//!
+//! First fits without an inclusion, and whether one can be ruled out.
+//!
+//! Inclusions that fits start from.
+//!
+//! First fits under one assumption about the face, and the answer's from them.
 
-use super::covariance::Observed;
-use super::drafts::Draft;
-use super::estimate::InclusionEstimate;
-use super::fit::Prior;
-use super::forward::Forward;
-use super::hypothesis::Hypothesis;
-use super::parameters::{Coordinate, LARGEST_POISSON_RATIO, Parameters};
-use super::plain::Plain;
-use super::profiles::{PressureProfile, check};
-use super::progress::{Counter, SearchProgress};
-use super::specimen::{SensorErrors, Specimen};
+use crate::covariance::{Observed, Resolution};
 use crate::error::Quantity;
+use crate::estimate::InclusionEstimate;
+use crate::fit::{DRAFTED, Fit, Prior, Problem, SETTLED};
+use crate::forward::{
+    Coordinate, Forward, LARGEST_POISSON_RATIO, LumpParameters, Parameters, Prediction,
+};
+use crate::hypothesis::{BLOCK_COORDINATES, Hypothesis, LEAST_GAIN, Score};
+use crate::specimen::{PressureProfile, SensorErrors, Specimen, check};
 use core::ops::ControlFlow;
 use tactile_elasticity::ElasticityError;
 use tactile_fem::{Guide, Interface, Kinematics};
 
 /// Part of the guide's radius within which pressures are used: further out the singular rim rules,
 /// where meshes disagree by percents.
-const REACH: f64 = 0.75;
+const USED_FACE: f64 = 0.75;
 /// Fewer rings do not show an inclusion's shape.
 const MIN_RINGS: usize = 8;
 /// Difference of log evidence above which one assumption about the face is clearly better: 20 to 1 and three times as much again for
@@ -287,7 +292,7 @@ impl InclusionSearch {
         &self,
         radii_m: &[f64],
     ) -> Result<Vec<usize>, ElasticityError> {
-        let limit = REACH * self.guide.radius_m();
+        let limit = USED_FACE * self.guide.radius_m();
         let used: Vec<usize> = (0..radii_m.len())
             .filter(|&k| radii_m[k] <= limit)
             .collect();
@@ -299,5 +304,370 @@ impl InclusionSearch {
             });
         }
         Ok(used)
+    }
+}
+
+/// What a search is doing.
+///
+/// ```
+/// use tactile_inclusion::SearchProgress;
+///
+/// let progress = SearchProgress { done: 3, expected: 30 };
+/// assert!(progress.done < progress.expected);
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct SearchProgress {
+    /// Solutions so far.
+    pub done: usize,
+    /// About how many there will be.
+    pub expected: usize,
+}
+
+/// Counts solutions, reports each and hears whether to go on.
+pub struct Counter<'a> {
+    pub done: usize,
+    pub expected: usize,
+    pub progress: &'a mut dyn FnMut(SearchProgress) -> ControlFlow<()>,
+    cancelled: bool,
+}
+
+impl Counter<'_> {
+    /// Reports a solution; `false` where the search is to end.
+    pub fn step(&mut self) -> bool {
+        if self.cancelled {
+            return false;
+        }
+        self.done += 1;
+        self.expected = self.expected.max(self.done);
+        let progress = SearchProgress {
+            done: self.done,
+            expected: self.expected,
+        };
+        self.cancelled |= (self.progress)(progress).is_break();
+        !self.cancelled
+    }
+}
+
+/// Elements along an eighth of the inclusion's circumference, of a plain block's first fit and of the grid.
+const HOMOGENEOUS_FINENESS: usize = 2;
+/// χ² of the first fit over its degrees of freedom up to which the block may be plain. The meshes' errors bring plain blocks by
+/// CalculiX to 1.5, under the wrong assumption about the face to 2.2; what an inclusion adds above 2 needs no test.
+const DOUBTFUL: f64 = 2.0;
+
+/// Elements along an eighth of the inclusion's circumference for the answer. Of bonded blocks the pressure is within 0.05 %
+/// of a mesh of ten; five leave waves of 0.1 % above a wide shallow inclusion, which move its size and depth by one bound, and where
+/// the face slides χ² by up to ten, enough to take it for one that sticks. On an inclusion that hardly shows the noise errs by
+/// more than five elements do.
+fn answer_fineness(is_certain: bool) -> usize {
+    if is_certain { 7 } else { 5 }
+}
+
+/// A plain block under one assumption about the face.
+pub struct Plain {
+    /// Of the first fits.
+    pub problem: Problem,
+    pub interface: Interface,
+    pub fit: Fit,
+    /// The fit on the answer's mesh and what inclusions promise to add to it, where the block may be plain.
+    pub settled: Option<(Fit, Score)>,
+    pub grid: Vec<Start>,
+}
+
+impl Plain {
+    /// Whether inclusions can be ruled out, were the face as assumed.
+    pub fn is_plain(&self) -> bool {
+        (self.settled.as_ref()).is_some_and(|(_, score)| score.is_plain())
+    }
+
+    /// Starts with their pressures scaled to those observed, the best first.
+    pub fn starts(&self) -> Vec<Parameters> {
+        let mut scaled: Vec<(f64, Parameters)> = (self.grid.iter())
+            .filter_map(|start| (self.problem).scaled_start(&start.parameters, &start.predicted))
+            .collect();
+        scaled.sort_by(|a, b| a.0.total_cmp(&b.0));
+        scaled.into_iter().map(|(_, start)| start).collect()
+    }
+}
+
+impl InclusionSearch {
+    /// The fit of a plain block; `None` where it could not be solved.
+    pub(crate) fn plain(
+        &self,
+        observed: &Observed,
+        approaches_m: &[f64],
+        interface: Interface,
+        counter: &mut Counter<'_>,
+    ) -> Option<Plain> {
+        let guess = self.stiffness(observed, approaches_m);
+        let forward = self.forward(observed, approaches_m, interface, HOMOGENEOUS_FINENESS);
+        let problem = Problem {
+            forward: forward.clone(),
+            measured: observed.values.clone(),
+            factor: (observed.covariance(self.sensor(), interface, Resolution::FirstFits))
+                .cholesky()?,
+            priors: self.block_priors(guess),
+        };
+        let block = self.plain_block(guess);
+        let (_, start) = problem.scaled_start(&block, &forward.predict(&block)?)?;
+        let fit = problem.fit(start, DRAFTED, || counter.step())?;
+        let linear = Forward {
+            kinematics: Kinematics::Linear,
+            ..forward
+        };
+        // A plain block that fits an inclusion's pressures is bent out of what is known of it; starts are not.
+        let known = self.plain_block(fit.parameters.block_modulus_pa);
+        let grid = starts(&linear, &known, counter)?;
+        let settled = if fit.misfit < DOUBTFUL * observed.values.len() as f64 {
+            self.settled(&problem, &fit, observed, &grid, counter)
+        } else {
+            None
+        };
+        Some(Plain {
+            problem,
+            interface,
+            fit,
+            settled,
+            grid,
+        })
+    }
+
+    /// The plain block's fit on the answer's mesh, and what inclusions promise to add to it.
+    fn settled(
+        &self,
+        problem: &Problem,
+        plain: &Fit,
+        observed: &Observed,
+        grid: &[Start],
+        counter: &mut Counter<'_>,
+    ) -> Option<(Fit, Score)> {
+        let interface = problem.forward.interface;
+        let covariance = observed.covariance(self.sensor(), interface, Resolution::Answer);
+        let problem = Problem {
+            forward: Forward {
+                fineness: answer_fineness(false),
+                ..problem.forward.clone()
+            },
+            measured: problem.measured.clone(),
+            factor: covariance.cholesky()?,
+            priors: problem.priors.clone(),
+        };
+        let fit = problem.fit(plain.parameters, SETTLED, || counter.step())?;
+        let score = Score::new(&problem, &fit, grid)?;
+        Some((fit, score))
+    }
+
+    /// Modulus of a plain block by the mean pressure over the mean strain: right within a factor of
+    /// three, from which the fit of ln E₀ converges.
+    fn stiffness(&self, observed: &Observed, approaches_m: &[f64]) -> f64 {
+        let rings = observed.radii_m.len();
+        let last = observed.frames - 1;
+        let pressures = &observed.values[last * rings..observed.frames * rings];
+        let mean = pressures.iter().sum::<f64>() / rings as f64;
+        let strain = approaches_m[last] / self.specimen().height_m();
+        // Below a pascal there is no contact; the fit will say so by its misfit.
+        (0.5 * mean / strain).max(1.0)
+    }
+}
+
+/// Diameters and depths over the face's radius, and contrasts E₁/E₀, that a face can see.
+const DIAMETERS: [f64; 3] = [0.35, 0.65, 1.05];
+const DEPTHS: [f64; 3] = [0.15, 0.3, 0.55];
+const CONTRASTS: [f64; 2] = [2.5, 8.0];
+/// Part of the block's height that an inclusion may reach down to.
+const DEEPEST: f64 = 0.95;
+
+/// An inclusion in a block, and its pressures.
+#[derive(Debug, Clone)]
+pub struct Start {
+    pub parameters: Parameters,
+    pub predicted: Prediction,
+    /// Part by which each value exceeds that of a plain block on the same mesh.
+    pub added: Vec<f64>,
+}
+
+/// The grid of inclusions in a plain block under a face of this radius; `None` where the search is to end.
+pub fn starts(
+    forward: &Forward,
+    plain: &Parameters,
+    counter: &mut Counter<'_>,
+) -> Option<Vec<Start>> {
+    let face_radius_m = forward.guide.radius_m();
+    let mut starts = Vec::new();
+    for diameter in DIAMETERS {
+        for depth in DEPTHS {
+            let lump = |contrast: f64| LumpParameters {
+                diameter_m: diameter * face_radius_m,
+                depth_m: depth * face_radius_m,
+                youngs_modulus_pa: contrast * plain.block_modulus_pa,
+            };
+            if (diameter + depth) * face_radius_m >= DEEPEST * plain.height_m {
+                continue;
+            }
+            let with = |contrast: f64| Parameters {
+                lump: Some(lump(contrast)),
+                ..*plain
+            };
+            if !counter.step() {
+                return None;
+            }
+            let Some(none) = forward.predict(&with(1.0)) else {
+                continue;
+            };
+            for contrast in CONTRASTS {
+                if !counter.step() {
+                    return None;
+                }
+                let parameters = with(contrast);
+                let Some(predicted) = forward.predict(&parameters) else {
+                    continue;
+                };
+                let added = predicted.values.iter().zip(&none.values);
+                starts.push(Start {
+                    parameters,
+                    added: added.map(|(with, none)| with / none - 1.0).collect(),
+                    predicted,
+                });
+            }
+        }
+    }
+    Some(starts)
+}
+
+/// Elements along an eighth of the inclusion's circumference in the first fits with an inclusion.
+const FIRST_FINENESS: usize = 3;
+/// Starts that are fitted. With tempered errors most end in one optimum; a third adds a quarter of the time.
+const FITTED_STARTS: usize = 2;
+/// Difference of the first fits' log evidence beyond which a block is not plain.
+const CERTAIN_EVIDENCE: f64 = 50.0;
+
+/// Difference of the first fits' log evidence beyond which an assumption about the face is given up: this
+/// and a part of the better one's misfit, most of which is the mesh's.
+const HOPELESS_EVIDENCE: f64 = 25.0;
+const HOPELESS_MISFIT: f64 = 0.05;
+
+/// The best first fits under one assumption about the face.
+///
+/// Their covariance has the coarse mesh's error in it: without, the objective is as rough as that, and fits
+/// end far from the truth.
+pub struct Draft {
+    problem: Problem,
+    interface: Interface,
+    plain: Fit,
+    /// The plain block's fit on the answer's mesh, where it may be one.
+    settled: Option<Fit>,
+    score: Option<Score>,
+    lump: Option<Fit>,
+}
+
+impl Draft {
+    /// Without an inclusion.
+    pub fn plain(plain: Plain) -> Self {
+        let (settled, score) = plain.settled.unzip();
+        Self {
+            problem: plain.problem,
+            interface: plain.interface,
+            plain: plain.fit,
+            settled,
+            score,
+            lump: None,
+        }
+    }
+
+    fn better(&self) -> &Fit {
+        match &self.lump {
+            Some(lump) if lump.evidence > self.plain.evidence => lump,
+            _ => &self.plain,
+        }
+    }
+
+    /// Log evidence of the better fit.
+    pub fn evidence(&self) -> f64 {
+        self.better().evidence
+    }
+
+    /// Log evidence of the first fits below which another assumption about the face is given up.
+    fn hopeless(&self) -> f64 {
+        self.evidence() - HOPELESS_EVIDENCE - HOPELESS_MISFIT * self.better().misfit
+    }
+}
+
+impl InclusionSearch {
+    /// The best first fits with an inclusion, from the grid's best starts and from what fits best under `another` assumption.
+    fn draft(
+        &self,
+        observed: &Observed,
+        approaches_m: &[f64],
+        plain: Plain,
+        another: Option<&Draft>,
+        counter: &mut Counter<'_>,
+    ) -> Draft {
+        let starts = plain.starts();
+        let mut draft = Draft::plain(plain);
+        let modulus = draft.plain.parameters.block_modulus_pa;
+        let problem = &mut draft.problem;
+        problem.priors.extend(self.lump_priors(modulus));
+        problem.forward = self.forward(observed, approaches_m, draft.interface, FIRST_FINENESS);
+        let best = another.and_then(|another| Some((another, another.lump.as_ref()?)));
+        let ending = best.map_or(DRAFTED, |(another, lump)| {
+            DRAFTED.below(problem.objective_at(another.hopeless(), lump.volume))
+        });
+        let best = best.map(|(_, lump)| &lump.parameters);
+        draft.lump = (best.into_iter().chain(&starts).take(FITTED_STARTS))
+            .filter_map(|start| problem.fit(*start, ending, || counter.step()))
+            .max_by(|a, b| a.evidence.total_cmp(&b.evidence));
+        draft
+    }
+
+    /// A draft's fits on the answer's mesh, in full where their log evidence exceeds `needed`; `None` where the plain
+    /// block's could not be solved.
+    pub(crate) fn hypothesis(
+        &self,
+        observed: &Observed,
+        approaches_m: &[f64],
+        draft: Draft,
+        needed: f64,
+        counter: &mut Counter<'_>,
+    ) -> Option<Hypothesis> {
+        let Draft {
+            mut problem,
+            interface,
+            plain,
+            settled,
+            score,
+            lump,
+        } = draft;
+        let with_lump = core::mem::take(&mut problem.priors);
+        let gain = (lump.as_ref()).map_or(f64::NEG_INFINITY, |lump| lump.evidence - plain.evidence);
+        let is_certain = gain > CERTAIN_EVIDENCE;
+        let fineness = answer_fineness(is_certain);
+        problem.forward = self.forward(observed, approaches_m, interface, fineness);
+        let covariance = observed.covariance(self.sensor(), interface, Resolution::Answer);
+        problem.factor = covariance.cholesky()?;
+        let plain = match settled {
+            Some(settled) => settled,
+            None if is_certain => plain,
+            None => {
+                problem.priors = with_lump[..BLOCK_COORDINATES].to_vec();
+                problem.fit(plain.parameters, SETTLED, || counter.step())?
+            }
+        };
+        problem.priors = with_lump;
+        let ending = if is_certain {
+            SETTLED
+        } else {
+            SETTLED.below(plain.objective() - LEAST_GAIN)
+        };
+        let lump = lump.and_then(|fit| {
+            let ending = ending.below(problem.objective_at(needed, fit.volume));
+            problem.fit(fit.parameters, ending, || counter.step())
+        });
+        Some(Hypothesis {
+            problem,
+            interface,
+            plain,
+            score,
+            lump,
+            marginal: None,
+        })
     }
 }

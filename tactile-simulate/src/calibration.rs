@@ -1,17 +1,13 @@
 //! The calibration of the sensor: integrated pixel value against the force of a gauge, loading and unloading (Fig. 9).
 
+use crate::camera::{Purpose, row_stream};
+use crate::contact::ContactLaw;
+use crate::error::{SimulateError, not_negative, positive, within};
+use crate::light::Illumination;
+use crate::press::{Elastic, Load, PressScene, Sphere};
 use ndarray::Array2;
 use rand_distr::{Distribution, StandardNormal};
-
 use tactile_imaging::force::{Branch, CalibrationPair};
-
-use super::contact_law::ContactLaw;
-use super::error::{SimulateError, not_negative, positive, within};
-use super::light::Illumination;
-use super::material::{Elastic, Sphere};
-use super::press::PressScene;
-use super::press_options::Load;
-use super::random::{Purpose, row_stream};
 
 /// How a calibration is run.
 ///

@@ -1,13 +1,14 @@
 //! From light to an 8-bit frame: blur, vignetting, photon and read noise, quantisation and saturation.
+//!
+//! One random stream per row of each frame.
 
+use crate::error::{SimulateError, at_least, not_negative, positive, within};
+use crate::light::Illumination;
+use crate::pixel_average::{Patch, Plane};
 use ndarray::{Array2, ArrayView2, Axis};
+use rand::SeedableRng;
 use rand::rngs::ChaCha8Rng;
 use rand_distr::{Distribution, Poisson, StandardNormal};
-
-use super::error::{SimulateError, at_least, not_negative, positive, within};
-use super::light::Illumination;
-use super::pixel_average::{Patch, Plane};
-use super::random::{Purpose, row_stream};
 
 /// From this many electrons on, Poisson noise is drawn from the normal law (skewness 1/√256 = 0.06).
 const NORMAL_FROM_ELECTRONS: f64 = 256.0;
@@ -104,12 +105,12 @@ impl Camera {
     }
 
     /// Area of a pixel on the sensing surface in square metres.
-    pub(super) fn pixel_area_m2(&self) -> f64 {
+    pub(crate) fn pixel_area_m2(&self) -> f64 {
         self.pixel_size_m[0] * self.pixel_size_m[1]
     }
 
     /// The coordinates (x, y) of the frame's middle in pixels.
-    pub(super) fn middle_px(&self) -> [f64; 2] {
+    pub(crate) fn middle_px(&self) -> [f64; 2] {
         [
             (self.shape[1] as f64 - 1.0) / 2.0,
             (self.shape[0] as f64 - 1.0) / 2.0,
@@ -117,7 +118,7 @@ impl Camera {
     }
 
     /// Lens and pixels, as the image plane of a contact.
-    pub(super) fn plane(&self) -> Plane {
+    pub(crate) fn plane(&self) -> Plane {
         let middle = self.middle_px();
         let [width, height] = self.pixel_size_m;
         let corner = (middle[0] * width).hypot(middle[1] * height);
@@ -129,7 +130,7 @@ impl Camera {
     }
 
     /// The centre asked for, or the frame's middle.
-    pub(super) fn centre_px(&self, asked: Option<[f64; 2]>) -> [f64; 2] {
+    pub(crate) fn centre_px(&self, asked: Option<[f64; 2]>) -> [f64; 2] {
         asked.unwrap_or_else(|| self.middle_px())
     }
 
@@ -140,7 +141,7 @@ impl Camera {
     }
 
     /// [`expose`](Self::expose) with the streams of another purpose.
-    pub(super) fn expose_for(
+    pub(crate) fn expose_for(
         &self,
         purpose: Purpose,
         expected_grey: ArrayView2<'_, f64>,
@@ -189,12 +190,12 @@ impl Camera {
     }
 
     /// Pixels that a patch must reach beyond the contact so that the blur has all its light.
-    pub(super) fn blur_reach(&self) -> usize {
+    pub(crate) fn blur_reach(&self) -> usize {
         (4.0 * self.blur_sigma_px).ceil() as usize
     }
 
     /// Blurs a patch in place; light that leaves the patch is lost.
-    pub(super) fn blur(&self, patch: &mut Patch) {
+    pub(crate) fn blur(&self, patch: &mut Patch) {
         let reach = self.blur_reach();
         if reach == 0 {
             return;
@@ -227,7 +228,7 @@ impl Camera {
     }
 
     /// Expected grey levels: background plus the patches of leaked light, times illumination and lens.
-    pub(super) fn compose(
+    pub(crate) fn compose(
         &self,
         leaked_grey: &[Patch],
         illumination: &Illumination,
@@ -292,13 +293,13 @@ impl Camera {
     }
 
     /// An exposure without contact; each `repeat` has its own noise.
-    pub(super) fn expose_reference(&self, seed: u64, repeat: u32) -> Array2<u8> {
+    pub(crate) fn expose_reference(&self, seed: u64, repeat: u32) -> Array2<u8> {
         let dark = self.compose(&[], &Illumination::default());
         self.expose(dark.view(), seed, u64::from(repeat) << 16)
     }
 
     /// An exposure of the light of load `load`; each `repeat` has its own noise.
-    pub(super) fn expose_load(
+    pub(crate) fn expose_load(
         &self,
         light: ArrayView2<'_, f64>,
         seed: u64,
@@ -308,7 +309,7 @@ impl Camera {
         self.expose(light, seed, u64::from(repeat) << 16 | (load as u64 + 1))
     }
 
-    pub(super) fn validate(&self) -> Result<(), SimulateError> {
+    pub(crate) fn validate(&self) -> Result<(), SimulateError> {
         at_least("shape", self.shape[0].min(self.shape[1]), 1)?;
         within(
             "shape",
@@ -331,4 +332,28 @@ impl Camera {
         )?;
         not_negative("read_noise_grey", self.read_noise_grey)
     }
+}
+
+/// What a stream is used for; streams of different uses never meet.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Purpose {
+    /// Noise of the frames of a scene.
+    Frames = 0,
+    /// Noise of the force gauge of a calibration.
+    Gauge = 1,
+    /// Noise of the frames of a calibration.
+    CalibrationFrames = 2,
+    /// Where the bumps of a surface pattern lie.
+    Pattern = 3,
+}
+
+/// The stream of row `row` of frame `frame`. `frame` must stay below 2⁴⁸, `row` below 2¹⁶.
+pub fn row_stream(seed: u64, purpose: Purpose, frame: u64, row: usize) -> ChaCha8Rng {
+    let mut key = [0_u8; 32];
+    key[..8].copy_from_slice(&seed.to_le_bytes());
+    key[8] = purpose as u8;
+    let mut rng = ChaCha8Rng::from_seed(key);
+    rng.set_stream(frame << 16 | row as u64);
+    rng
 }

@@ -1,11 +1,15 @@
 //! A sphere pressed on the waveguide: pressure, contact radius, indentation and surface displacement.
+//!
+//! Where the contact at a force comes from: a closed form or states computed elsewhere.
+//!
+//! A contact computed elsewhere, given as numbers over the radius.
+//!
+//! Contacts by finite elements that come with the crate.
 
+use crate::error::{SimulateError, at_least, finite, not_negative, positive, within};
+use crate::press::{Elastic, Sphere, Waveguide};
+use std::borrow::Cow;
 use std::f64::consts::{FRAC_PI_2, PI};
-
-use super::contact_law::{ContactLaw, far_side_m};
-use super::contact_state::ContactState;
-use super::error::{SimulateError, within};
-use super::material::{Sphere, Waveguide};
 
 /// The contact at one load.
 ///
@@ -48,7 +52,7 @@ impl Contact {
     ///
     /// # Errors
     /// [`SimulateError::OutOfRange`] for a force beyond the last state of a tabulated contact.
-    pub(super) fn new(
+    pub(crate) fn new(
         sphere: &Sphere,
         waveguide: &Waveguide,
         law: &ContactLaw,
@@ -109,7 +113,7 @@ impl Contact {
     }
 
     /// Whether the pressure is Hertz's, p₀ √(1 − r²/a²).
-    pub(super) fn is_hertzian(&self) -> bool {
+    pub(crate) fn is_hertzian(&self) -> bool {
         self.given.is_none()
     }
 
@@ -155,7 +159,7 @@ impl Contact {
 
     /// Vertical displacement in metres of the waveguide's surface at distance `r_m` from the centre, negative under the object:
     /// of a closed form the waveguide's share of the joint displacement under Hertz's pressure, else that of the given state.
-    pub(super) fn waveguide_height_m(&self, r_m: f64) -> f64 {
+    pub(crate) fn waveguide_height_m(&self, r_m: f64) -> f64 {
         match &self.given {
             Some(state) => state.height_at_m(r_m),
             None if self.contact_radius_m == 0.0 => 0.0,
@@ -182,73 +186,413 @@ impl Contact {
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::super::material::Elastic;
-    use super::*;
+/// Where pressure, contact radius and indentation at a force come from.
+///
+/// ```
+/// use tactile_simulate::{ContactLaw, PressOptions, PressScene};
+/// let contact = |law| {
+///     let scene = PressScene::new(PressOptions { law, ..PressOptions::default() })?;
+///     Ok::<_, tactile_simulate::SimulateError>(scene.truth(0).contact)
+/// };
+/// let (hertz, tatara) = (contact(ContactLaw::Hertz)?, contact(ContactLaw::Tatara)?);
+/// assert_eq!(hertz.indentation_m, hertz.contact_radius_m.powi(2) / hertz.sphere_radius_m);
+/// assert_eq!(tatara.contact_radius_m, hertz.contact_radius_m);
+/// assert!(tatara.indentation_m < hertz.indentation_m);
+/// // 0.7 N: a/R is 0.92. Springs in series make the layers too soft.
+/// let solved = contact(ContactLaw::FiniteElements)?;
+/// assert!((solved.contact_radius_m / 2.75e-3 - 1.0).abs() < 0.01 && hertz.contact_radius_m > 1.15 * solved.contact_radius_m);
+/// # Ok::<(), tactile_simulate::SimulateError>(())
+/// ```
+#[derive(Debug, Clone, PartialEq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
+pub enum ContactLaw {
+    /// Hertz (1882): a³ = 3FR/(4E*), δ = a²/R. Small contact, a ≪ R; the simulator obeys it at any load.
+    #[default]
+    Hertz,
+    /// Tatara (1991), first extension of Hertz to a sphere squeezed between two surfaces: Hertz's radius and
+    /// pressure, but the approach is lessened by the displacement that the opposite contact's force causes,
+    /// δ = a²/R − F/(πE₁)·[(1 − ν₁²)/√(a² + 4R²) + 2(1 + ν₁)R²/(a² + 4R²)^{3/2}].
+    /// Only the sphere's own material (E₁, ν₁) enters the correction: the waveguide is loaded on one side.
+    /// His stiffening of rubber and the lateral spread of the contact are not included.
+    ///
+    /// Y. Tatara, J. Eng. Mater. Technol. 113 (1991) 285–291.
+    Tatara,
+    /// Finite elements at finite strain: the contacts of a ball of 3 mm of [`CL2000X`](crate::Elastic::CL2000X) or
+    /// [`CL2003X`](crate::Elastic::CL2003X) on the [default waveguide](crate::Waveguide::default) up to 1.3 N, neo-Hookean and without friction, as
+    /// `examples/contact_states.rs` computes them. Another ball or waveguide is refused: give its contacts as
+    /// [`Tabulated`](Self::Tabulated). Between the states as there.
+    FiniteElements,
+    /// States computed elsewhere, with growing force. A load at a state's force is that state; between two states radius, pressure
+    /// over its mean, and height over F^⅔ at equal r/a are linear in F^⅓; below the first, that one shrinks as Hertz's contact does. A
+    /// load beyond the last state is refused. [`PressScene::calibrate`](crate::PressScene::calibrate), which presses another
+    /// object, takes Hertz's law.
+    Tabulated(Vec<ContactState>),
+}
 
-    fn contact(law: ContactLaw, force_n: f64) -> Contact {
-        let sphere = Sphere {
-            radius_m: 3e-3,
-            material: Elastic::CL2000X,
+impl ContactLaw {
+    pub(crate) fn validate(&self) -> Result<(), SimulateError> {
+        let Self::Tabulated(states) = self else {
+            return Ok(());
         };
-        Contact::new(&sphere, &Waveguide::default(), &law, force_n).unwrap()
-    }
-
-    #[test]
-    fn hertz_relations_hold_among_themselves() {
-        let c = contact(ContactLaw::Hertz, 0.7);
-        let close = |x: f64, y: f64| assert!((x / y - 1.0).abs() < 1e-14, "{x} {y}");
-        let (a, e) = (c.contact_radius_m, c.effective_modulus_pa);
-        close(
-            1.0 / e,
-            0.75 / 103e3 + 0.75 * (2e-3 / 1.36e5 + 3e-3 / 8e4 + 5e-3 / 3.4e4) / 10e-3,
-        );
-        close(a.powi(3), 0.75 * 0.7 * 3e-3 / e);
-        close(c.indentation_m, a * a / 3e-3);
-        close(
-            c.force_n,
-            4.0 / 3.0 * e * 3e-3_f64.sqrt() * c.indentation_m.powf(1.5),
-        );
-        close(c.peak_pressure_pa, 2.0 * a * e / (PI * 3e-3));
-        // Both surfaces' displacement at the centre is the approach.
-        close(
-            -c.waveguide_height_m(0.0),
-            c.waveguide_share * c.indentation_m,
-        );
-    }
-
-    #[test]
-    fn displacement_is_continuous_at_the_rim_and_where_the_series_takes_over() {
-        let c = contact(ContactLaw::Hertz, 0.7);
-        for (r, step) in [
-            (c.contact_radius_m, 1e-9),
-            (50.0 * c.contact_radius_m, 1e-9),
-        ] {
-            let at = |q: f64| c.waveguide_height_m(q);
-            // One-sided values differ by slope × step plus the closed form's cancellation, (r/a)³ ulps.
-            assert!((at(r * (1.0 - step)) / at(r * (1.0 + step)) - 1.0).abs() < 1e-8);
+        at_least("states", states.len(), 1)?;
+        states.iter().try_for_each(ContactState::validate)?;
+        for pair in states.windows(2) {
+            within(
+                "force_n",
+                pair[1].force_n,
+                pair[0].force_n * (1.0 + EQUAL_FORCES),
+                f64::MAX,
+            )?;
         }
-        // Far away: a point force on a half space, F/(π E* r) for both bodies.
-        let r = 1e3 * c.contact_radius_m;
-        let point = c.waveguide_share * c.force_n / (PI * c.effective_modulus_pa * r);
-        assert!((-c.waveguide_height_m(r) / point - 1.0).abs() < 1e-6);
+        Ok(())
     }
 
-    #[test]
-    fn tatara_keeps_the_radius_and_lessens_the_approach() {
-        let (h, t) = (
-            contact(ContactLaw::Hertz, 0.7),
-            contact(ContactLaw::Tatara, 0.7),
-        );
-        assert_eq!(h.contact_radius_m, t.contact_radius_m);
-        assert!(t.indentation_m < h.indentation_m && t.indentation_m > 0.0);
-        // At small load the correction vanishes relative to Hertz's approach, as F against F^(2/3).
-        let ratio = |f| {
-            contact(ContactLaw::Tatara, f).indentation_m
-                / contact(ContactLaw::Hertz, f).indentation_m
-        };
-        let fall = (1.0 - ratio(1e-6)) / (1.0 - ratio(1e-9));
-        assert!((fall - 10.0).abs() < 0.01, "{fall}");
+    /// The largest force with a contact.
+    ///
+    /// # Errors
+    /// [`SimulateError::NoFiniteElements`].
+    pub(crate) fn largest_force_n(
+        &self,
+        sphere: &Sphere,
+        waveguide: &Waveguide,
+    ) -> Result<f64, SimulateError> {
+        let states = self.states(sphere, waveguide)?;
+        let largest = |last: &ContactState| last.force_n * (1.0 + EQUAL_FORCES);
+        Ok(states.map_or(f64::MAX, |s| s.last().map_or(0.0, largest)))
     }
+
+    /// The states of a contact computed elsewhere; none for a closed form.
+    ///
+    /// # Errors
+    /// [`SimulateError::NoFiniteElements`].
+    pub(crate) fn states(
+        &self,
+        sphere: &Sphere,
+        waveguide: &Waveguide,
+    ) -> Result<Option<Cow<'_, [ContactState]>>, SimulateError> {
+        match self {
+            Self::Hertz | Self::Tatara => Ok(None),
+            Self::FiniteElements => {
+                let states = finite_element_states(sphere, waveguide);
+                states
+                    .map(|s| Some(Cow::Owned(s)))
+                    .ok_or(SimulateError::NoFiniteElements)
+            }
+            Self::Tabulated(states) => Ok(Some(Cow::Borrowed(states))),
+        }
+    }
+}
+
+/// What the opposite contact takes off the approach by [`ContactLaw::Tatara`], in metres.
+fn far_side_m(sphere: &Sphere, force_n: f64, a: f64) -> f64 {
+    let (nu, r) = (sphere.material.poisson_ratio, sphere.radius_m);
+    let d = (a * a + 4.0 * r * r).sqrt();
+    force_n / (PI * sphere.material.youngs_modulus_pa)
+        * ((1.0 - nu) * (1.0 + nu) / d + 2.0 * (1.0 + nu) * r * r / (d * d * d))
+}
+
+/// Largest relative difference allowed between a state's force and the integral of its pressure. Finite-element pressures
+/// recovered at nodes miss the force by up to some percent where the mesh is coarse; a wrong unit misses it by far more.
+const LARGEST_FORCE_MISMATCH: f64 = 0.05;
+
+/// Forces that differ by no more than this part are one: a solver meets the force that it was asked for within its tolerance.
+const EQUAL_FORCES: f64 = 1e-9;
+
+/// An axisymmetric contact at one load, computed by other means: finite elements, integral equations, a measurement.
+///
+/// The columns are samples over the distance r from the contact's axis in the deformed configuration. Between samples p² is linear
+/// in r², which is exact for Hertz's √(1 − r²/a²) and follows the square-root fall at any rim; heights are linear in r.
+/// The pressure is scaled to carry `force_n` exactly.
+///
+/// ```
+/// use tactile_simulate::{Camera, ContactLaw, ContactState, Load, PressOptions, PressScene};
+/// let camera = Camera::default().coarser(16);
+/// // A flat-topped pressure: 1.2 N on a disc of 4 mm radius, level in its inner half.
+/// let radius_m: Vec<f64> = (0..=40).map(|k| 1e-4 * f64::from(k)).collect();
+/// let shape = |r: f64| (1.0 - ((r - 2e-3).max(0.0) / 2e-3).powi(2)).sqrt();
+/// let state = ContactState {
+///     force_n: 1.2,
+///     contact_radius_m: 4e-3,
+///     indentation_m: 2e-3,
+///     pressure_pa: radius_m.iter().map(|&r| 29.1e3 * shape(r)).collect(),
+///     height_m: radius_m.iter().map(|&r| -1e-3 * shape(r)).collect(),
+///     radius_m,
+/// };
+/// let options = PressOptions {
+///     law: ContactLaw::Tabulated(vec![state]),
+///     loads: vec![Load::normal(0.6), Load::normal(1.2)],
+///     camera,
+///     ..PressOptions::default()
+/// };
+/// let truth = PressScene::new(options)?.truth(1);
+/// let force_n = truth.pressure_pa().sum() * camera.pixel_size_m.iter().product::<f64>();
+/// assert!((force_n / 1.2 - 1.0).abs() < 2e-3, "{force_n}");
+/// let [middle, off] = [truth.contact.pressure_pa(0.0), truth.contact.pressure_pa(1.5e-3)];
+/// assert!((off / middle - 1.0).abs() < 1e-12, "level in the middle");
+/// # Ok::<(), tactile_simulate::SimulateError>(())
+/// ```
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct ContactState {
+    /// Normal force in newton.
+    pub force_n: f64,
+    /// Radius of the contact in metres; the pressure is taken as 0 from here on.
+    pub contact_radius_m: f64,
+    /// Approach of the two bodies in metres.
+    pub indentation_m: f64,
+    /// Distances from the axis in metres: 0 first, then growing, beyond the contact's rim at the last or at it.
+    pub radius_m: Vec<f64>,
+    /// Contact pressure in pascal at each distance.
+    pub pressure_pa: Vec<f64>,
+    /// Vertical displacement in metres of the waveguide's surface at each distance, negative under the object.
+    pub height_m: Vec<f64>,
+}
+
+impl ContactState {
+    pub(crate) fn validate(&self) -> Result<(), SimulateError> {
+        positive("force_n", self.force_n)?;
+        positive("contact_radius_m", self.contact_radius_m)?;
+        finite("indentation_m", self.indentation_m)?;
+        let samples = self.radius_m.len();
+        at_least("radius_m", samples, 2)?;
+        for (field, found) in [
+            ("pressure_pa", self.pressure_pa.len()),
+            ("height_m", self.height_m.len()),
+        ] {
+            if found != samples {
+                return Err(SimulateError::LengthMismatch {
+                    field,
+                    expected: samples,
+                    found,
+                });
+            }
+        }
+        within("radius_m", self.radius_m[0], 0.0, 0.0)?;
+        for pair in self.radius_m.windows(2) {
+            positive("radius_m", pair[1] - pair[0])?;
+        }
+        // Without the rim inside the table the last sample's pressure would have to be guessed.
+        let last = self.radius_m[samples - 1];
+        within(
+            "contact_radius_m",
+            self.contact_radius_m,
+            0.0,
+            last * (1.0 + 1e-9),
+        )?;
+        for k in 0..samples {
+            not_negative("pressure_pa", self.pressure_pa[k])?;
+            finite("height_m", self.height_m[k])?;
+        }
+        let carried_n = self.carried_force_n();
+        within(
+            "force_n",
+            self.force_n,
+            carried_n * (1.0 - LARGEST_FORCE_MISMATCH),
+            carried_n * (1.0 + LARGEST_FORCE_MISMATCH),
+        )
+    }
+
+    /// The same state with its pressure scaled to carry its force exactly.
+    fn balanced(mut self) -> Self {
+        let scale = self.force_n / self.carried_force_n();
+        self.pressure_pa.iter_mut().for_each(|p| *p *= scale);
+        self
+    }
+
+    /// ∫ p dS as interpolated: with q = p² linear in s = r², π ∫ √q ds over a stretch from q₀ to q₁ is
+    /// (2π/3)·Δs·(q₀ + √(q₀q₁) + q₁)/(√q₀ + √q₁).
+    pub(crate) fn carried_force_n(&self) -> f64 {
+        let rim = self.contact_radius_m;
+        let mut force = 0.0;
+        for pair in self.radius_m.windows(2) {
+            let [from, to] = [pair[0].min(rim), pair[1].min(rim)];
+            let [p0, p1] = [self.sampled_pressure_pa(from), self.sampled_pressure_pa(to)];
+            if p0 + p1 > 0.0 {
+                let mean = (p0 * p0 + p0 * p1 + p1 * p1) / (p0 + p1);
+                force += 2.0 * PI / 3.0 * (to * to - from * from) * mean;
+            }
+        }
+        force
+    }
+
+    /// The sample that begins the stretch in which `r_m` lies.
+    fn stretch(&self, r_m: f64) -> usize {
+        let not_beyond = self.radius_m.partition_point(|&r| r <= r_m);
+        not_beyond.saturating_sub(1).min(self.radius_m.len() - 2)
+    }
+
+    /// Pressure at a distance from the axis, in pascal; 0 from the rim on.
+    pub(crate) fn pressure_at_pa(&self, r_m: f64) -> f64 {
+        if r_m >= self.contact_radius_m {
+            0.0
+        } else {
+            self.sampled_pressure_pa(r_m)
+        }
+    }
+
+    fn sampled_pressure_pa(&self, r_m: f64) -> f64 {
+        let k = self.stretch(r_m);
+        let [q0, q1] = [self.pressure_pa[k].powi(2), self.pressure_pa[k + 1].powi(2)];
+        // The rim mostly lies between two samples: the pressure falls to zero there, not at the sample beyond.
+        let last = self.radius_m[k + 1];
+        let end = if q1 == 0.0 {
+            last.min(self.contact_radius_m)
+        } else {
+            last
+        };
+        let [from, to] = [self.radius_m[k].powi(2), end * end];
+        let t = if to > from {
+            ((r_m * r_m - from) / (to - from)).clamp(0.0, 1.0)
+        } else {
+            1.0
+        };
+        (q0 + t * (q1 - q0)).sqrt()
+    }
+
+    /// Height at a distance from the axis, in metres. Beyond the last sample it falls off as 1/r, a point load's displacement.
+    pub(crate) fn height_at_m(&self, r_m: f64) -> f64 {
+        let last = self.radius_m.len() - 1;
+        if r_m > self.radius_m[last] {
+            return self.height_m[last] * self.radius_m[last] / r_m;
+        }
+        let k = self.stretch(r_m);
+        let [from, to] = [self.radius_m[k], self.radius_m[k + 1]];
+        let t = (r_m - from) / (to - from);
+        self.height_m[k] + t * (self.height_m[k + 1] - self.height_m[k])
+    }
+
+    /// The largest pressure of the table, in pascal.
+    pub(crate) fn peak_pressure_pa(&self) -> f64 {
+        (self.radius_m.iter().copied())
+            .map(|r| self.pressure_at_pa(r))
+            .fold(0.0, f64::max)
+    }
+
+    /// The state at `force_n` > 0 among `states` of growing force: one of them where the force is its own, else between
+    /// two of them, with a, p over its mean, z/F^⅔ and δ/F^⅔ linear in F^⅓. Below
+    /// the first, that one shrunk by Hertz's scaling, a ∝ F^⅓ and z ∝ F^⅔. None above the last.
+    pub(crate) fn at_force(states: &[Self], force_n: f64) -> Option<Self> {
+        let next = states.partition_point(|s| s.force_n < force_n * (1.0 - EQUAL_FORCES));
+        let upper = states.get(next)?;
+        let scale = (force_n / upper.force_n).cbrt();
+        let state = match next.checked_sub(1).map(|k| &states[k]) {
+            _ if (scale - 1.0).abs() < EQUAL_FORCES => Self {
+                force_n,
+                ..upper.clone()
+            },
+            None => upper.scaled(force_n, scale),
+            Some(lower) => {
+                let from = (lower.force_n / upper.force_n).cbrt();
+                Self::between(lower, upper, (scale - from) / (1.0 - from), force_n)
+            }
+        };
+        Some(state.balanced())
+    }
+
+    /// This state scaled to `force_n` by Hertz's laws, with `scale` = (F/F₀)^⅓.
+    fn scaled(&self, force_n: f64, scale: f64) -> Self {
+        Self {
+            force_n,
+            contact_radius_m: self.contact_radius_m * scale,
+            indentation_m: self.indentation_m * scale * scale,
+            radius_m: self.radius_m.iter().map(|r| r * scale).collect(),
+            pressure_pa: self.pressure_pa.iter().map(|p| p * scale).collect(),
+            height_m: self.height_m.iter().map(|z| z * scale * scale).collect(),
+        }
+    }
+
+    /// The state at `force_n`, `t` of the way from `lower` to `upper`, at equal r/a.
+    fn between(lower: &Self, upper: &Self, t: f64, force_n: f64) -> Self {
+        let mix = |of: &dyn Fn(&Self) -> f64| of(lower) + t * (of(upper) - of(lower));
+        // What Hertz's laws leave constant is mixed: z/F^⅔, δ/F^⅔, and p over its mean.
+        let depth = |force_n: f64| force_n.cbrt().powi(2);
+        let mean_pressure = |force_n: f64, radius_m: f64| force_n / (PI * radius_m * radius_m);
+        let contact_radius_m = mix(&|s| s.contact_radius_m);
+        let pressure = |ratio: f64| {
+            let normalised = mix(&|s| {
+                let own_mean = mean_pressure(s.force_n, s.contact_radius_m);
+                s.pressure_at_pa(ratio * s.contact_radius_m) / own_mean
+            });
+            normalised * mean_pressure(force_n, contact_radius_m)
+        };
+        let height = |ratio: f64| {
+            let normalised = mix(&|s| s.height_at_m(ratio * s.contact_radius_m) / depth(s.force_n));
+            normalised * depth(force_n)
+        };
+        let ratios: Vec<f64> = (upper.radius_m.iter())
+            .map(|r| r / upper.contact_radius_m)
+            .collect();
+        Self {
+            force_n,
+            contact_radius_m,
+            indentation_m: mix(&|s| s.indentation_m / depth(s.force_n)) * depth(force_n),
+            radius_m: ratios
+                .iter()
+                .map(|ratio| ratio * contact_radius_m)
+                .collect(),
+            pressure_pa: ratios.iter().map(|&ratio| pressure(ratio)).collect(),
+            height_m: ratios.iter().map(|&ratio| height(ratio)).collect(),
+        }
+    }
+}
+
+/// A row a point: the ball's modulus and radius, its guide's layers, force, contact radius and approach of its state, then distance,
+/// pressure and height. Made by `examples/contact_states.rs`.
+const POINTS: &str = include_str!("finite_elements.csv");
+
+/// R of the balls.
+const RADIUS_M: f64 = 3e-3;
+
+/// The states of a ball on a waveguide, of growing force; None for bodies that were not computed.
+pub fn finite_element_states(sphere: &Sphere, waveguide: &Waveguide) -> Option<Vec<ContactState>> {
+    let known = [Elastic::CL2000X, Elastic::CL2003X].contains(&sphere.material);
+    let elastic = |w: &Waveguide| -> Vec<(f64, Elastic)> {
+        w.layers
+            .iter()
+            .map(|l| (l.thickness_m, l.material))
+            .collect()
+    };
+    let same_guide = elastic(waveguide) == elastic(&Waveguide::default());
+    if !known || !same_guide || sphere.radius_m != RADIUS_M {
+        return None;
+    }
+    let mut states: Vec<ContactState> = Vec::new();
+    for row in POINTS.lines().skip(1) {
+        // The layers, the third column, are the default waveguide's.
+        let cells = row
+            .split(',')
+            .enumerate()
+            .filter(|(column, _)| *column != 2);
+        let numbers: Option<Vec<f64>> = cells.map(|(_, cell)| cell.parse().ok()).collect();
+        let [
+            modulus,
+            _radius,
+            force_n,
+            contact_radius_m,
+            indentation_m,
+            r,
+            pressure,
+            height,
+        ] = numbers?.try_into().ok()?;
+        if modulus != sphere.material.youngs_modulus_pa {
+            continue;
+        }
+        if states.last().is_none_or(|s| s.force_n != force_n) {
+            states.push(ContactState {
+                force_n,
+                contact_radius_m,
+                indentation_m,
+                radius_m: Vec::new(),
+                pressure_pa: Vec::new(),
+                height_m: Vec::new(),
+            });
+        }
+        if let Some(state) = states.last_mut() {
+            state.radius_m.push(r);
+            state.pressure_pa.push(pressure);
+            state.height_m.push(height);
+        }
+    }
+    Some(states)
 }

@@ -1,4 +1,5 @@
 //! What can be wrong with the description of a scene.
+
 use std::fmt;
 
 /// A scene's description was rejected.
@@ -91,7 +92,7 @@ impl fmt::Display for Short {
 }
 
 /// `found` if it lies in `minimum..=maximum`.
-pub(super) fn within(
+pub fn within(
     field: &'static str,
     found: f64,
     minimum: f64,
@@ -110,26 +111,22 @@ pub(super) fn within(
 }
 
 /// Positive and finite.
-pub(super) fn positive(field: &'static str, found: f64) -> Result<(), SimulateError> {
+pub fn positive(field: &'static str, found: f64) -> Result<(), SimulateError> {
     within(field, found, TINY, f64::MAX)
 }
 
 /// Zero or positive, and finite.
-pub(super) fn not_negative(field: &'static str, found: f64) -> Result<(), SimulateError> {
+pub fn not_negative(field: &'static str, found: f64) -> Result<(), SimulateError> {
     within(field, found, 0.0, f64::MAX)
 }
 
 /// Any finite number.
-pub(super) fn finite(field: &'static str, found: f64) -> Result<(), SimulateError> {
+pub fn finite(field: &'static str, found: f64) -> Result<(), SimulateError> {
     within(field, found, f64::MIN, f64::MAX)
 }
 
 /// At least `expected` entries.
-pub(super) fn at_least(
-    field: &'static str,
-    found: usize,
-    expected: usize,
-) -> Result<(), SimulateError> {
+pub fn at_least(field: &'static str, found: usize, expected: usize) -> Result<(), SimulateError> {
     if found >= expected {
         Ok(())
     } else {

@@ -1,13 +1,11 @@
 //! A scene written as the files that the command line reads: images, calibration table and scene description.
 
+use crate::calibration::CalibrationSeries;
+use crate::contact::ContactLaw;
+use crate::press::PressScene;
 use std::path::{Path, PathBuf};
-
-use toml::{Table, Value};
-
-use super::calibration::CalibrationSeries;
-use super::contact_law::ContactLaw;
-use super::press::PressScene;
 use tactile_imaging::io::{ReadError, write_bytes, write_grey_image};
+use toml::{Table, Value};
 
 /// Writes a scene and a calibration of its sensor as files: `reference.png`, `frame_1.png` …, `calibration.csv` (columns `integrated_pixel_value,force_N`) and `scene.toml`
 /// to `folder`, which is made if need be. Returns the path of `scene.toml`.
@@ -56,7 +54,7 @@ pub fn write_folder(
 fn description(scene: &PressScene) -> Table {
     let options = scene.options();
     let size = Value::Array(options.camera.pixel_size_m.map(Value::Float).to_vec());
-    let frame = |(k, load): (usize, &super::Load)| {
+    let frame = |(k, load): (usize, &crate::Load)| {
         let image = Value::String(format!("frame_{}.png", k + 1));
         Value::Table(table([
             ("image", image),
@@ -106,7 +104,7 @@ fn table<const N: usize>(entries: [(&str, Value); N]) -> Table {
 }
 
 /// A layer of the waveguide.
-fn layer(l: &super::material::WaveguideLayer) -> Value {
+fn layer(l: &crate::press::WaveguideLayer) -> Value {
     Value::Table(table([
         ("refractive_index", Value::Float(l.refractive_index)),
         ("thickness_m", Value::Float(l.thickness_m)),

@@ -39,47 +39,32 @@
 mod calibration;
 mod camera;
 mod contact;
-mod contact_law;
-mod contact_state;
 mod error;
-mod finite_elements;
 #[cfg(feature = "scene")]
 mod folder;
-mod leak;
 mod light;
-mod material;
 mod pixel_average;
 mod press;
-mod press_options;
-mod random;
-mod relief;
-mod simulation;
 #[cfg(feature = "fem")]
-mod solved_states;
+mod solved;
 mod stream;
 mod trial;
-mod truth;
 mod uniaxial;
-mod uniaxial_options;
-mod uniaxial_state;
 
 pub use calibration::{CalibrationOptions, CalibrationSeries};
 pub use camera::Camera;
-pub use contact::Contact;
-pub use contact_law::ContactLaw;
-pub use contact_state::ContactState;
+pub use contact::{Contact, ContactLaw, ContactState};
 pub use error::SimulateError;
 #[cfg(feature = "scene")]
 pub use folder::write_folder;
 pub use light::{Illumination, Response};
-pub use material::{Elastic, Sphere, Waveguide, WaveguideLayer};
-pub use press::PressScene;
-pub use press_options::{Gain, Load, PressOptions};
-pub use relief::{FaceOutline, SurfacePattern};
-pub use simulation::PressSimulation;
+pub use press::{
+    Elastic, Gain, Load, PressOptions, PressScene, PressSimulation, PressTruth, Sphere,
+    SurfaceScaling, Waveguide, WaveguideLayer,
+};
 pub use stream::{FrameStream, LoadCycle, StreamedFrame};
 pub use trial::Trial;
-pub use truth::{PressTruth, SurfaceScaling};
-pub use uniaxial::UniaxialScene;
-pub use uniaxial_options::UniaxialOptions;
-pub use uniaxial_state::UniaxialState;
+pub use uniaxial::{FaceOutline, SurfacePattern, UniaxialOptions, UniaxialScene, UniaxialState};
+
+#[cfg(test)]
+mod tests;

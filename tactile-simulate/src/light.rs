@@ -1,6 +1,10 @@
 //! Pressure to light: how much brighter a pressed pixel is.
+//!
+//! Pressure and leaked light of a contact, averaged over pixels.
 
-use super::error::{SimulateError, finite, not_negative, within};
+use crate::contact::Contact;
+use crate::error::{SimulateError, finite, not_negative, within};
+use crate::pixel_average::{Disc, Patch, Plane, Profile, Window};
 
 /// Light that leaks under pressure p, relative to the gain g in grey levels per pascal. All are monotone up to the
 /// largest peak pressure p_max of the scene. Hertz's pressure under the first two is averaged over pixels exactly, everything
@@ -45,7 +49,7 @@ pub enum Response {
 
 impl Response {
     /// κ of g·p·(1 − κ p/p_max).
-    pub(super) fn droop(&self) -> f64 {
+    fn droop(&self) -> f64 {
         match *self {
             Self::Linear | Self::Power { .. } => 0.0,
             Self::Quadratic { droop } => droop,
@@ -53,7 +57,7 @@ impl Response {
     }
 
     /// Light over g·p_max at the pressure `share`·p_max.
-    pub(super) fn light(&self, share: f64) -> f64 {
+    pub(crate) fn light(&self, share: f64) -> f64 {
         match *self {
             Self::Linear => share,
             Self::Quadratic { droop } => share * (1.0 - droop * share),
@@ -61,7 +65,7 @@ impl Response {
         }
     }
 
-    pub(super) fn validate(&self) -> Result<(), SimulateError> {
+    pub(crate) fn validate(&self) -> Result<(), SimulateError> {
         if let Self::Power { exponent } = *self {
             return within("exponent", exponent, 0.25, 4.0);
         }
@@ -101,9 +105,75 @@ impl Default for Illumination {
 }
 
 impl Illumination {
-    pub(super) fn validate(&self) -> Result<(), SimulateError> {
+    pub(crate) fn validate(&self) -> Result<(), SimulateError> {
         not_negative("level", self.level)?;
         finite("tilt", self.tilt[0])?;
         finite("tilt", self.tilt[1])
     }
+}
+
+/// From pressure to light in one scene.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LightLaw {
+    pub response: Response,
+    /// Grey levels per pascal, g.
+    pub grey_per_pascal: f64,
+    /// The scene's largest pressure p_max, to which the response is relative.
+    pub largest_pressure_pa: f64,
+}
+
+impl LightLaw {
+    /// Light at a pressure, in grey levels above the background.
+    pub fn grey_at(&self, pressure_pa: f64) -> f64 {
+        if self.largest_pressure_pa == 0.0 {
+            return 0.0;
+        }
+        let share = pressure_pa / self.largest_pressure_pa;
+        self.grey_per_pascal * self.largest_pressure_pa * self.response.light(share)
+    }
+
+    /// Unblurred light of a contact as a lens that distorts shows it.
+    pub fn bent_patch(
+        &self,
+        contact: &Contact,
+        disc: &Disc,
+        plane: Plane,
+        window: Window,
+    ) -> Patch {
+        disc.average_bent(plane, window, |r_m| self.grey_at(contact.pressure_pa(r_m)))
+    }
+
+    /// Unblurred light of a contact over `window`, in grey levels above the background.
+    pub fn patch(&self, contact: &Contact, disc: &Disc, window: Window) -> Patch {
+        if self.largest_pressure_pa == 0.0 {
+            return Patch::zeros(window);
+        }
+        let exact = contact.is_hertzian() && !matches!(self.response, Response::Power { .. });
+        if !exact {
+            return disc.average_radial(window, |r_m| self.grey_at(contact.pressure_pa(r_m)));
+        }
+        let peak = contact.peak_pressure_pa;
+        let mut patch = disc.average(Profile::Hemisphere, window);
+        patch
+            .values
+            .map_inplace(|v| *v *= self.grey_per_pascal * peak);
+        let droop = self.response.droop() / self.largest_pressure_pa;
+        if droop > 0.0 {
+            let square = disc.average(Profile::Paraboloid, window);
+            patch
+                .values
+                .scaled_add(-self.grey_per_pascal * droop * peak * peak, &square.values);
+        }
+        patch
+    }
+}
+
+/// Pressure of a contact over `window` in pascal.
+pub fn pressure_patch(contact: &Contact, disc: &Disc, window: Window) -> Patch {
+    if !contact.is_hertzian() {
+        return disc.average_radial(window, |r_m| contact.pressure_pa(r_m));
+    }
+    let mut patch = disc.average(Profile::Hemisphere, window);
+    patch.values.map_inplace(|v| *v *= contact.peak_pressure_pa);
+    patch
 }

@@ -1,14 +1,20 @@
 //! The main scene: one sphere pressed on the waveguide at several loads.
+//!
+//! The two bodies in contact: the pressed sphere and the layered waveguide.
+//!
+//! What describes a press: object, waveguide, loads, light and camera.
+//!
+//! All frames of a scene with their truth.
+//!
+//! What a measurement of a simulated press should find, stage by stage.
 
+use crate::camera::Camera;
+use crate::contact::{Contact, ContactLaw};
+use crate::error::{SimulateError, at_least, finite, not_negative, positive, within};
+use crate::light::{Illumination, LightLaw, Response, pressure_patch};
+use crate::pixel_average::{Disc, Patch};
+use nalgebra::{Matrix3, Point3};
 use ndarray::Array2;
-
-use super::contact::Contact;
-use super::contact_law::ContactLaw;
-use super::error::SimulateError;
-use super::leak::LightLaw;
-use super::material::Sphere;
-use super::pixel_average::{Disc, Patch};
-use super::press_options::{Load, PressOptions};
 
 /// A checked scene that makes frames and knows the truth.
 ///
@@ -95,7 +101,7 @@ impl PressScene {
             .expose_load(light.view(), self.options.seed, load, repeat)
     }
 
-    /// Expected grey levels of load `load`, before noise and rounding. Pass it to [`Camera::expose`](super::Camera::expose) to draw many
+    /// Expected grey levels of load `load`, before noise and rounding. Pass it to [`Camera::expose`](crate::Camera::expose) to draw many
     /// exposures of the same light.
     ///
     /// ```
@@ -123,7 +129,7 @@ impl PressScene {
     }
 
     /// The same sensor with another object under one load.
-    pub(super) fn with_press(
+    pub(crate) fn with_press(
         &self,
         object: Sphere,
         law: ContactLaw,
@@ -166,17 +172,17 @@ impl PressScene {
     }
 
     /// From pressure to light.
-    pub(super) fn light(&self) -> &LightLaw {
+    pub(crate) fn light(&self) -> &LightLaw {
         &self.light
     }
 
     /// Contact of load `load`.
-    pub(super) fn contact(&self, load: usize) -> &Contact {
+    pub(crate) fn contact(&self, load: usize) -> &Contact {
         &self.contacts[load]
     }
 
     /// The contact's disc on the image plane.
-    pub(super) fn disc(&self, load: usize) -> Disc {
+    pub(crate) fn disc(&self, load: usize) -> Disc {
         let options = &self.options;
         let middle = options.camera.centre_px(options.centre_px);
         let pixel_size_m = options.camera.pixel_size_m;
@@ -192,7 +198,7 @@ impl PressScene {
     }
 
     /// Blurred light of the contact in grey levels above the background; none without force.
-    pub(super) fn leaked_light(&self, load: usize) -> Option<Patch> {
+    fn leaked_light(&self, load: usize) -> Option<Patch> {
         let (disc, camera) = (self.disc(load), &self.options.camera);
         if disc.radius_m == 0.0 {
             return None;
@@ -208,4 +214,629 @@ impl PressScene {
         camera.blur(&mut patch);
         Some(patch)
     }
+}
+
+/// A linear elastic, isotropic material.
+///
+/// ```
+/// use tactile_simulate::{Elastic, PressOptions, PressScene, Sphere};
+/// let contact = |material| {
+///     let object = Sphere { radius_m: 3e-3, material };
+///     let scene = PressScene::new(PressOptions { object, ..PressOptions::default() })?;
+///     Ok::<_, tactile_simulate::SimulateError>(scene.truth(0).contact)
+/// };
+/// // 1/E* = (1 − ν₁²)/E₁ + (1 − ν₂²)/E₂; the second of the guide's layers in series.
+/// let [soft, rigid] = [contact(Elastic::CL2000X)?, contact(Elastic::RIGID)?];
+/// let of_the_ball = 1.0 / soft.effective_modulus_pa - 1.0 / rigid.effective_modulus_pa;
+/// assert!((of_the_ball / (0.75 / 103e3) - 1.0).abs() < 1e-12);
+/// # Ok::<(), tactile_simulate::SimulateError>(())
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Elastic {
+    /// Young's modulus in pascal; infinite for a rigid body.
+    pub youngs_modulus_pa: f64,
+    /// Poisson's ratio, in (−1, 0.5].
+    pub poisson_ratio: f64,
+}
+
+impl Elastic {
+    /// Versaflex CL2000X: 103 kPa, incompressible (the paper, §5).
+    pub const CL2000X: Self = Self {
+        youngs_modulus_pa: 103e3,
+        poisson_ratio: 0.5,
+    };
+    /// Versaflex CL2003X: 62 kPa, incompressible (the paper, §5).
+    pub const CL2003X: Self = Self {
+        youngs_modulus_pa: 62e3,
+        poisson_ratio: 0.5,
+    };
+    /// A body that does not deform.
+    pub const RIGID: Self = Self {
+        youngs_modulus_pa: f64::INFINITY,
+        poisson_ratio: 0.3,
+    };
+
+    /// (1 − ν²)/E in 1/Pa: what the body adds to 1/E*. Zero for a rigid body.
+    pub(crate) fn plane_strain_compliance(&self) -> f64 {
+        (1.0 - self.poisson_ratio) * (1.0 + self.poisson_ratio) / self.youngs_modulus_pa
+    }
+
+    pub(crate) fn validate(&self) -> Result<(), SimulateError> {
+        within(
+            "youngs_modulus_pa",
+            self.youngs_modulus_pa,
+            f64::MIN_POSITIVE,
+            f64::INFINITY,
+        )?;
+        within(
+            "poisson_ratio",
+            self.poisson_ratio,
+            -1.0 + f64::EPSILON,
+            0.5,
+        )
+    }
+}
+
+/// The object: an elastic sphere.
+///
+/// ```
+/// use tactile_simulate::{Elastic, PressOptions, PressScene, Sphere};
+/// let radius = |radius_m| {
+///     let object = Sphere { radius_m, material: Elastic::CL2003X };
+///     let scene = PressScene::new(PressOptions { object, ..PressOptions::default() })?;
+///     Ok::<_, tactile_simulate::SimulateError>(scene.truth(0).contact.contact_radius_m)
+/// };
+/// assert!((radius(8e-3)? / radius(1e-3)? - 2.0).abs() < 1e-12, "a grows as ∛R");
+/// # Ok::<(), tactile_simulate::SimulateError>(())
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Sphere {
+    /// Radius in metres.
+    pub radius_m: f64,
+    /// What it is made of.
+    pub material: Elastic,
+}
+
+impl Sphere {
+    pub(crate) fn validate(&self) -> Result<(), SimulateError> {
+        positive("radius_m", self.radius_m)?;
+        self.material.validate()
+    }
+}
+
+/// One layer of the waveguide.
+///
+/// ```
+/// use tactile_simulate::{Elastic, PressOptions, PressScene, Waveguide, WaveguideLayer};
+/// let layer = |thickness_m, youngs_modulus_pa| WaveguideLayer {
+///     refractive_index: 1.41,
+///     thickness_m,
+///     material: Elastic { youngs_modulus_pa, poisson_ratio: 0.5 },
+/// };
+/// let waveguide = Waveguide { layers: vec![layer(1e-3, 200e3), layer(3e-3, 100e3)] };
+/// let radius = |waveguide| {
+///     let scene = PressScene::new(PressOptions { waveguide, ..PressOptions::default() })?;
+///     Ok::<_, tactile_simulate::SimulateError>(scene.truth(0).contact.contact_radius_m)
+/// };
+/// assert!(radius(waveguide)? < radius(Waveguide::default())?, "stiffer layers, a smaller contact");
+/// # Ok::<(), tactile_simulate::SimulateError>(())
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct WaveguideLayer {
+    /// Refractive index.
+    pub refractive_index: f64,
+    /// Thickness in metres.
+    pub thickness_m: f64,
+    /// What it is made of.
+    pub material: Elastic,
+}
+
+/// The layered waveguide, from the object's side to the glass.
+///
+/// ```
+/// use tactile_simulate::Waveguide;
+/// // Epidermis, dermis and subcutanea of the paper's sensor: 2, 3 and 5 mm.
+/// let guide = Waveguide::default();
+/// let thickness_m: f64 = guide.layers.iter().map(|layer| layer.thickness_m).sum();
+/// assert!((thickness_m - 10e-3).abs() < 1e-12);
+/// ```
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Waveguide {
+    /// Layers, the one touched first.
+    pub layers: Vec<WaveguideLayer>,
+}
+
+impl Default for Waveguide {
+    /// Epidermis, dermis and subcutanea of the paper (§2.2): PDMS of 2, 3 and 5 mm with indices 1.41, 1.40 and 1.39
+    /// and moduli 1.36×10⁵, 8.0×10⁴ and 3.4×10⁴ Pa (the paper prints 1.4×10² Pa for the first, calling it the
+    /// stiffest; its source has 1.36×10⁵).
+    fn default() -> Self {
+        let layer = |refractive_index, thickness_m, youngs_modulus_pa| WaveguideLayer {
+            refractive_index,
+            thickness_m,
+            material: Elastic {
+                youngs_modulus_pa,
+                poisson_ratio: 0.5,
+            },
+        };
+        Self {
+            layers: vec![
+                layer(1.41, 2e-3, 1.36e5),
+                layer(1.40, 3e-3, 8.0e4),
+                layer(1.39, 5e-3, 3.4e4),
+            ],
+        }
+    }
+}
+
+impl Waveguide {
+    /// The stack seen as one material: the layers in series, E = Σh / Σ(h/E), and Poisson's ratio averaged by
+    /// thickness (0.5 for the paper's stack).
+    pub(crate) fn series(&self) -> Elastic {
+        let height = self.thickness_m();
+        let compliance: f64 = self
+            .layers
+            .iter()
+            .map(|l| l.thickness_m / l.material.youngs_modulus_pa)
+            .sum();
+        let weighted: f64 = self
+            .layers
+            .iter()
+            .map(|l| l.thickness_m * l.material.poisson_ratio)
+            .sum();
+        Elastic {
+            youngs_modulus_pa: height / compliance,
+            poisson_ratio: (weighted / height).min(0.5),
+        }
+    }
+
+    /// Thickness of the whole stack in metres.
+    fn thickness_m(&self) -> f64 {
+        self.layers.iter().map(|l| l.thickness_m).sum()
+    }
+
+    pub(crate) fn validate(&self) -> Result<(), SimulateError> {
+        at_least("layers", self.layers.len(), 1)?;
+        for layer in &self.layers {
+            positive("thickness_m", layer.thickness_m)?;
+            within("refractive_index", layer.refractive_index, 1.0, 10.0)?;
+            layer.material.validate()?;
+        }
+        Ok(())
+    }
+}
+
+/// How many grey levels a pascal makes.
+///
+/// ```
+/// use tactile_simulate::{Camera, Gain, Load, PressOptions, PressScene};
+/// let camera = Camera::default().coarser(16);
+/// let scene = |force_n, gain| {
+///     PressScene::new(PressOptions { camera, gain, loads: vec![Load::normal(force_n)], ..Default::default() })
+/// };
+/// let first = scene(1.2, Gain::PeakGrey(200.0))?;
+/// let peak_pa = first.truth(0).contact.peak_pressure_pa;
+/// assert!((first.truth(0).grey_per_pascal * peak_pa - 200.0).abs() < 1e-9);
+/// let same_sensor = scene(0.3, Gain::GreyPerPascal(first.truth(0).grey_per_pascal))?;
+/// let light = |scene: &PressScene| scene.truth(0).integrated_pixel_value;
+/// assert!((light(&first) / light(&same_sensor) - 4.0).abs() < 1e-9, "light in proportion to force");
+/// # Ok::<(), tactile_simulate::SimulateError>(())
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
+pub enum Gain {
+    /// The largest load's peak pressure lies so many grey levels above the background (before vignetting).
+    PeakGrey(f64),
+    /// Fixed: grey levels per pascal. Use it to share one calibration among scenes.
+    GreyPerPascal(f64),
+}
+
+impl Gain {
+    /// Grey levels per pascal in a scene whose brightest place shows the light of `largest_pa`; 0 where a peak is asked for and nothing is
+    /// lit.
+    pub(crate) fn grey_per_pascal(self, largest_pa: f64) -> f64 {
+        match self {
+            Self::GreyPerPascal(gain) => gain,
+            Self::PeakGrey(grey) if largest_pa > 0.0 => grey / largest_pa,
+            Self::PeakGrey(_) => 0.0,
+        }
+    }
+
+    pub(crate) fn validate(self) -> Result<(), SimulateError> {
+        match self {
+            Self::PeakGrey(value) | Self::GreyPerPascal(value) => not_negative("gain", value),
+        }
+    }
+}
+
+/// One state of load.
+///
+/// ```
+/// use tactile_simulate::{Camera, Load, PressOptions, PressScene};
+/// let camera = Camera::default().coarser(16);
+/// let loads = vec![Load::normal(0.7), Load { shear_n: [0.28, 0.0], ..Load::normal(0.7) }];
+/// let scene = PressScene::new(PressOptions { camera, loads, ..PressOptions::default() })?;
+/// let [x, sheared] = [0, 1].map(|k| scene.truth(k).centre_px[0]);
+/// let moved_m = (sheared - x) * camera.pixel_size_m[0];
+/// assert!((moved_m - 0.7e-3).abs() < 1e-12, "0.28 N over 400 N/m");
+/// # Ok::<(), tactile_simulate::SimulateError>(())
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Load {
+    /// Normal force in newton.
+    pub force_n: f64,
+    /// Shear force (x, y) in newton; it moves the contact by force over [`PressOptions::shear_stiffness_n_per_m`].
+    pub shear_n: [f64; 2],
+    /// Illumination, relative to the reference frame.
+    pub illumination: Illumination,
+}
+
+impl Load {
+    /// A normal force without shear, the illumination unchanged.
+    pub fn normal(force_n: f64) -> Self {
+        Self {
+            force_n,
+            shear_n: [0.0; 2],
+            illumination: Illumination::default(),
+        }
+    }
+}
+
+/// Everything that describes a press; [`PressScene::new`](crate::PressScene::new) checks it.
+///
+/// ```
+/// use tactile_simulate::{Camera, Elastic, Load, PressOptions, PressScene, Sphere};
+/// let options = PressOptions {
+///     object: Sphere { radius_m: 20e-3, material: Elastic::CL2003X },
+///     loads: vec![Load::normal(0.2), Load::normal(0.4)],
+///     camera: Camera::default().coarser(16),
+///     seed: 7,
+///     ..PressOptions::default()
+/// };
+/// let made = PressScene::new(options.clone())?.simulate();
+/// assert!(made.truth.iter().all(|t| t.contact.contact_radius_m < 0.3 * 20e-3), "inside Hertz's range");
+/// assert_eq!(PressScene::new(options)?.simulate().frames, made.frames, "one seed, the same bits");
+/// # Ok::<(), tactile_simulate::SimulateError>(())
+/// ```
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct PressOptions {
+    /// The object.
+    pub object: Sphere,
+    /// The waveguide.
+    pub waveguide: Waveguide,
+    /// Where pressure, radius and indentation at each force come from.
+    pub law: ContactLaw,
+    /// Loads, a frame each.
+    pub loads: Vec<Load>,
+    /// Centre (x, y) of the unsheared contact in pixels; the frame's middle if not given.
+    pub centre_px: Option<[f64; 2]>,
+    /// K_x, K_y of F_x = K_x u_x, F_y = K_y u_y in newton per metre.
+    pub shear_stiffness_n_per_m: [f64; 2],
+    /// Camera, lens, stray light.
+    pub camera: Camera,
+    /// Pressure → light.
+    pub response: Response,
+    /// Grey levels per pascal.
+    pub gain: Gain,
+    /// Seed of the noise.
+    pub seed: u64,
+}
+
+impl Default for PressOptions {
+    /// The paper's experiment (§5): a CL2000X sphere of 3 mm radius at 0.7 N and 1.2 N. The brightest pixel expected is
+    /// 15 + 200 of 255 grey levels: 40 levels, twenty times its noise, are left before saturation.
+    ///
+    /// Hertz's a/R is 1.09 and 1.30 there, far outside small contact; for scenes inside Hertz's range, take a
+    /// larger sphere or smaller loads.
+    fn default() -> Self {
+        Self {
+            object: Sphere {
+                radius_m: 3e-3,
+                material: Elastic::CL2000X,
+            },
+            waveguide: Waveguide::default(),
+            law: ContactLaw::Hertz,
+            loads: vec![Load::normal(0.7), Load::normal(1.2)],
+            centre_px: None,
+            shear_stiffness_n_per_m: [400.0; 2],
+            camera: Camera::default(),
+            response: Response::Linear,
+            gain: Gain::PeakGrey(200.0),
+            seed: 1,
+        }
+    }
+}
+
+impl PressOptions {
+    pub(crate) fn validate(&self) -> Result<(), SimulateError> {
+        self.object.validate()?;
+        self.waveguide.validate()?;
+        self.camera.validate()?;
+        self.response.validate()?;
+        self.law.validate()?;
+        at_least("loads", self.loads.len(), 1)?;
+        within("loads", self.loads.len() as f64, 1.0, 65534.0)?;
+        for load in &self.loads {
+            not_negative("force_n", load.force_n)?;
+            load.illumination.validate()?;
+            for k in 0..2 {
+                finite("shear_n", load.shear_n[k])?;
+                positive("shear_stiffness_n_per_m", self.shear_stiffness_n_per_m[k])?;
+                finite("centre_px", self.centre_px.map_or(0.0, |c| c[k]))?;
+            }
+        }
+        self.gain.validate()
+    }
+}
+
+/// The frames of a scene and their truth.
+///
+/// ```
+/// use tactile_simulate::{Camera, PressOptions, PressScene};
+/// let camera = Camera::default().coarser(16);
+/// let made = PressScene::new(PressOptions { camera, ..PressOptions::default() })?.simulate();
+/// let sum = |frame: &ndarray::Array2<u8>| frame.iter().map(|&v| f64::from(v)).sum::<f64>();
+/// let light = made.frames.iter().map(|frame| sum(frame) - sum(&made.reference)).collect::<Vec<_>>();
+/// assert!((light[1] / light[0] / (1.2 / 0.7) - 1.0).abs() < 0.02, "light in proportion to force");
+/// assert_eq!(made.youngs_modulus_pa, 103e3);
+/// # Ok::<(), tactile_simulate::SimulateError>(())
+/// ```
+#[derive(Debug, Clone)]
+pub struct PressSimulation {
+    /// The frame without contact.
+    pub reference: Array2<u8>,
+    /// One frame per load.
+    pub frames: Vec<Array2<u8>>,
+    /// The truth of each frame.
+    pub truth: Vec<PressTruth>,
+    /// Size of a pixel in metres, x and y.
+    pub pixel_size_m: [f64; 2],
+    /// Young's modulus of the object in pascal: what a measurement should find.
+    pub youngs_modulus_pa: f64,
+}
+
+impl PressScene {
+    /// The frame without contact, and the frames and truth of every load.
+    pub fn simulate(&self) -> PressSimulation {
+        let loads = 0..self.options().loads.len();
+        PressSimulation {
+            reference: self.reference(0),
+            frames: loads.clone().map(|k| self.frame(k, 0)).collect(),
+            truth: loads.map(|k| self.truth(k)).collect(),
+            pixel_size_m: self.options().camera.pixel_size_m,
+            youngs_modulus_pa: self.options().object.material.youngs_modulus_pa,
+        }
+    }
+}
+
+/// The truth of one frame.
+///
+/// ```
+/// use tactile_simulate::{Camera, PressOptions, PressScene};
+/// let camera = Camera::default().coarser(16);
+/// let scene = PressScene::new(PressOptions { camera, ..PressOptions::default() })?;
+/// let (truth, later) = (scene.truth(0), scene.truth(1));
+/// assert!((truth.pressure_pa().sum() * camera.pixel_size_m.iter().product::<f64>() - 0.7).abs() < 1e-9, "the force");
+/// let middle = [32, 43];
+/// assert_eq!(truth.apparent_height_m()[middle], truth.contact.contact_radius_m);
+/// assert!(later.waveguide_height_m()[middle] < truth.waveguide_height_m()[middle], "pressed deeper");
+/// assert_eq!(truth.centre_px, later.centre_px);
+/// // The light above the background, over the grey levels of a pascal, times the area of a pixel: 0.7 N.
+/// let seen_n = truth.integrated_pixel_value / truth.grey_per_pascal * camera.pixel_size_m.iter().product::<f64>();
+/// assert!((seen_n / 0.7 - 1.0).abs() < 1e-9);
+/// assert!((truth.scaling_to(&later).scale - (1.2_f64 / 0.7).cbrt()).abs() < 1e-12);
+/// # Ok::<(), tactile_simulate::SimulateError>(())
+/// ```
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub struct PressTruth {
+    /// Force, contact radius, pressure, indentation.
+    pub contact: Contact,
+    /// The load that made it.
+    pub load: Load,
+    /// Centre (x, y) of the contact in pixels.
+    pub centre_px: [f64; 2],
+    /// Centroid (x, y) of the pressure that lies in the frame, by pixel averages: the centre to some 1e-5 px, unless
+    /// the contact is cut by the frame's edge. NaN when nothing is visible.
+    pub centroid_px: [f64; 2],
+    /// The force that acts inside the frame, in newton.
+    pub visible_force_n: f64,
+    /// Sum over the frame of leaked light in grey levels, without blur, lens, noise and clipping: (grey/Pa)·F/pixel area
+    /// for a linear response.
+    pub integrated_pixel_value: f64,
+    /// Grey levels per pascal (at small pressure).
+    pub grey_per_pascal: f64,
+    /// Pixels whose expected grey level exceeds 255.
+    pub saturated_pixels: usize,
+    /// Size of a pixel in metres, x and y.
+    pub pixel_size_m: [f64; 2],
+    shape: [usize; 2],
+}
+
+impl PressScene {
+    /// The truth of load `load`.
+    ///
+    /// # Panics
+    /// If there is no such load.
+    pub fn truth(&self, load: usize) -> PressTruth {
+        PressTruth::new(self, load)
+    }
+}
+
+impl PressTruth {
+    fn new(scene: &PressScene, load: usize) -> Self {
+        let (contact, options) = (scene.contact(load).clone(), scene.options());
+        let disc = scene.disc(load);
+        let mut truth = Self {
+            contact,
+            load: options.loads[load],
+            centre_px: disc.centre_px,
+            centroid_px: [f64::NAN; 2],
+            visible_force_n: 0.0,
+            integrated_pixel_value: 0.0,
+            grey_per_pascal: scene.grey_per_pascal(),
+            saturated_pixels: saturated_pixels(scene, load),
+            pixel_size_m: disc.pixel_size_m,
+            shape: options.camera.shape,
+        };
+        truth.add_moments(scene.light());
+        truth
+    }
+
+    /// Pressure in pascal, averaged over each pixel; its sum times the pixel's area is the visible force.
+    pub fn pressure_pa(&self) -> Array2<f64> {
+        let mut field = Array2::zeros(self.shape);
+        if self.contact.contact_radius_m > 0.0 {
+            let disc = self.disc();
+            pressure_patch(&self.contact, &disc, disc.window(self.shape, 0)).add_to(&mut field);
+        }
+        field
+    }
+
+    /// Height of the apparent surface in metres at pixel centres (see [`Contact::apparent_height_m`]).
+    pub fn apparent_height_m(&self) -> Array2<f64> {
+        Array2::from_shape_fn(self.shape, |(row, col)| {
+            let [x, y] = self.offset_m(row, col);
+            self.contact.apparent_height_m(x.hypot(y))
+        })
+    }
+
+    /// Vertical displacement in metres of the waveguide's surface at pixel centres, negative under the object.
+    pub fn waveguide_height_m(&self) -> Array2<f64> {
+        Array2::from_shape_fn(self.shape, |(row, col)| {
+            let [x, y] = self.offset_m(row, col);
+            self.contact.waveguide_height_m(x.hypot(y))
+        })
+    }
+
+    /// How the apparent surface moves from this load to a `later` one.
+    pub fn scaling_to(&self, later: &Self) -> SurfaceScaling {
+        SurfaceScaling {
+            from_centre_m: self.centre_m(),
+            to_centre_m: later.centre_m(),
+            scale: later.contact.contact_radius_m / self.contact.contact_radius_m,
+            height_scale: height_scale(&self.contact, &later.contact),
+        }
+    }
+
+    /// The contact's centre (x, y) in metres from the first pixel's centre.
+    pub(crate) fn centre_m(&self) -> [f64; 2] {
+        std::array::from_fn(|k| self.centre_px[k] * self.pixel_size_m[k])
+    }
+
+    /// A pixel's centre relative to the contact's, in metres.
+    fn offset_m(&self, row: usize, col: usize) -> [f64; 2] {
+        let at = [col as f64, row as f64];
+        std::array::from_fn(|k| (at[k] - self.centre_px[k]) * self.pixel_size_m[k])
+    }
+
+    fn disc(&self) -> Disc {
+        let radius_m = self.contact.contact_radius_m;
+        Disc {
+            centre_px: self.centre_px,
+            radius_m,
+            pixel_size_m: self.pixel_size_m,
+        }
+    }
+
+    /// Force, centroid and integrated pixel value of what the frame shows.
+    fn add_moments(&mut self, light: &LightLaw) {
+        if self.contact.contact_radius_m == 0.0 {
+            return;
+        }
+        let disc = self.disc();
+        let window = disc.window(self.shape, 0);
+        let pressure = pressure_patch(&self.contact, &disc, window);
+        let (mut sum, mut sum_x, mut sum_y) = (0.0, 0.0, 0.0);
+        for ((r, c), &v) in pressure.values.indexed_iter() {
+            sum += v;
+            sum_x += v * c as f64;
+            sum_y += v * r as f64;
+        }
+        if sum > 0.0 {
+            let [row0, col0] = pressure.origin;
+            self.centroid_px = [sum_x / sum + col0 as f64, sum_y / sum + row0 as f64];
+        }
+        self.visible_force_n = sum * self.pixel_size_m[0] * self.pixel_size_m[1];
+        self.integrated_pixel_value = light.patch(&self.contact, &disc, window).values.sum();
+    }
+}
+
+/// Pixels whose expected grey level exceeds 255; the frame is made only where one can.
+fn saturated_pixels(scene: &PressScene, load: usize) -> usize {
+    let (options, illumination) = (scene.options(), scene.options().loads[load].illumination);
+    let peak = scene.contact(load).peak_pressure_pa;
+    let brightest = options.camera.background_grey + scene.light().grey_at(peak);
+    let lit = illumination.level + 0.5 * (illumination.tilt[0].abs() + illumination.tilt[1].abs());
+    if brightest * lit <= 255.0 {
+        return 0;
+    }
+    scene
+        .expected_frame(load)
+        .iter()
+        .filter(|&&v| v > 255.0)
+        .count()
+}
+
+/// The map that takes the apparent surface of one load to that of another: it scales about the contact's centre.
+///
+/// The surface read from a press follows Hertz's law, or nearly: a hemisphere of the contact's radius, which grows by (F₂/F₁)^⅓ whatever the
+/// object's modulus. Its strain says nothing about the modulus. At finite strain the surface grows less along z than across.
+///
+/// ```
+/// use nalgebra::Point3;
+/// use tactile_simulate::SurfaceScaling;
+/// let map = SurfaceScaling { from_centre_m: [5e-3, 5e-3], to_centre_m: [6e-3, 5e-3], scale: 1.2, height_scale: 1.1 };
+/// let moved = map.apply(&Point3::new(7e-3, 5e-3, 1e-3));
+/// assert!((moved - Point3::new(8.4e-3, 5e-3, 1.1e-3)).norm() < 1e-15);
+/// let strain = map.green_lagrange_strain();
+/// assert!((strain[(0, 0)] - 0.22).abs() < 1e-15 && (strain[(2, 2)] - 0.105).abs() < 1e-15, "½(s² − 1)");
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub struct SurfaceScaling {
+    /// Centre (x, y) of the first contact in metres from the first pixel's centre.
+    pub from_centre_m: [f64; 2],
+    /// Centre (x, y) of the second contact.
+    pub to_centre_m: [f64; 2],
+    /// a₂/a₁, (F₂/F₁)^⅓ under Hertz's law.
+    pub scale: f64,
+    /// Growth of the apparent heights, by least squares over the contact: a₂/a₁ under Hertz's law.
+    pub height_scale: f64,
+}
+
+impl SurfaceScaling {
+    /// Where a point of the first surface lies on the second.
+    pub fn apply(&self, point: &Point3<f64>) -> Point3<f64> {
+        let [x, y] = std::array::from_fn(|k| {
+            self.to_centre_m[k] + self.scale * (point[k] - self.from_centre_m[k])
+        });
+        Point3::new(x, y, self.height_scale * point.z)
+    }
+
+    /// The Green–Lagrange strain of the map, ½(s² − 1) along each axis.
+    pub fn green_lagrange_strain(&self) -> Matrix3<f64> {
+        let along = [self.scale, self.scale, self.height_scale];
+        Matrix3::from_diagonal(&along.map(|s| 0.5 * (s - 1.0) * (s + 1.0)).into())
+    }
+}
+
+/// k of z₂(ρ) = k z₁(ρ) at equal ρ = r/a, by least squares over the discs.
+fn height_scale(from: &Contact, to: &Contact) -> f64 {
+    const RINGS: i32 = 32;
+    let (mut product, mut square) = (0.0, 0.0);
+    for ring in 0..RINGS {
+        let rho = ((f64::from(ring) + 0.5) / f64::from(RINGS)).sqrt();
+        let [first, second] = [from, to].map(|c| c.apparent_height_m(rho * c.contact_radius_m));
+        product += first * second;
+        square += first * first;
+    }
+    product / square
 }

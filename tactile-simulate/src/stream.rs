@@ -1,14 +1,10 @@
 //! Frames of loading–unloading cycles at camera rate.
 
-use std::f64::consts::PI;
-
+use crate::error::{SimulateError, finite, not_negative, positive, within};
+use crate::light::Illumination;
+use crate::press::{Load, PressScene, PressTruth};
 use ndarray::Array2;
-
-use super::error::{SimulateError, finite, not_negative, positive, within};
-use super::light::Illumination;
-use super::press::PressScene;
-use super::press_options::Load;
-use super::truth::PressTruth;
+use std::f64::consts::PI;
 use tactile_imaging::pipeline::FrameSource;
 
 /// How the load runs through time: rest, then cycles of F(t) = F_max sin²(πt/T).
@@ -149,7 +145,7 @@ impl PressScene {
 
 impl FrameStream {
     /// Load and illumination at a time.
-    pub(super) fn load_at(&self, time_s: f64) -> Load {
+    fn load_at(&self, time_s: f64) -> Load {
         let c = &self.cycle;
         let phase = ((time_s - c.rest_s) / c.period_s).max(0.0);
         let share = (PI * phase).sin().powi(2);

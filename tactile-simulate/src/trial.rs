@@ -1,4 +1,5 @@
 //! A simulated press, measured blindly and laid beside its truth.
+
 use crate::{
     CalibrationOptions, ContactLaw, PressOptions, PressScene, PressSimulation, SimulateError,
     WaveguideLayer,

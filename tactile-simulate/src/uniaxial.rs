@@ -13,16 +13,26 @@
 //! E A₀/(3√3) at λ_z = 1/√3, where this material law ends.
 //!
 //! The frame shows pressure in proportion to the pattern's height, normalised to carry the force.
+//!
+//! What describes the squeezed block: material, face, forces, light and camera.
+//!
+//! Stretch, strain and stress of the squeezed block in closed form; the equations are in [`uniaxial`](super::uniaxial).
+//!
+//! A surface pattern of bumps whose pixel averages are exact.
+//!
+//! On a rectangular face the height is h(X, Y) = h₀ + h₁ Σₖ b((X − Xₖ)/w) b((Y − Yₖ)/w) with b(t) = cos²(πt/2) for |t| < 1,
+//! 0 beyond. It is continuous with its slope, each bump lies wholly on the face, and ∫b = (t + sin(πt)/π)/2 in closed
+//! form makes every pixel's average a product of two differences.
 
+use crate::camera::{Camera, Purpose, row_stream};
+use crate::error::{SimulateError, at_least, finite, not_negative, positive};
+use crate::light::Illumination;
+use crate::pixel_average::{Patch, touched};
+use crate::press::{Elastic, Gain};
 use nalgebra::Point3;
 use ndarray::Array2;
-
-use super::error::SimulateError;
-use super::light::Illumination;
-use super::pixel_average::{Patch, touched};
-use super::relief::{FaceOutline, Relief};
-use super::uniaxial_options::UniaxialOptions;
-use super::uniaxial_state::UniaxialState;
+use rand_distr::{Distribution, Uniform};
+use std::f64::consts::{FRAC_PI_2, PI};
 
 /// A checked scene of uniaxial compression.
 ///
@@ -294,4 +304,368 @@ fn add_product(values: &mut Array2<f64>, height: f64, column: &[f64], line: &[f6
                 .for_each(|(v, &l)| *v += height * c * l);
         }
     }
+}
+
+/// Everything that describes the squeezed block; [`UniaxialScene::new`](crate::UniaxialScene::new) checks it.
+///
+/// ```
+/// use tactile_simulate::{Camera, Elastic, UniaxialOptions, UniaxialScene};
+/// let options = UniaxialOptions {
+///     material: Elastic::CL2003X,
+///     face_m: [10e-3, 14e-3],
+///     forces_n: vec![0.1, 0.4],
+///     camera: Camera::default().coarser(16),
+///     ..UniaxialOptions::default()
+/// };
+/// let state = UniaxialScene::new(options)?.states()[1];
+/// assert!((state.second_piola_zz_pa / state.strain_zz - 62e3).abs() < 1e-6, "Young's modulus");
+/// # Ok::<(), tactile_simulate::SimulateError>(())
+/// ```
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct UniaxialOptions {
+    /// What the block is made of.
+    pub material: Elastic,
+    /// Outline of the face.
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub outline: FaceOutline,
+    /// Sides of the undeformed face (x, y), or axes of its ellipse, in metres.
+    pub face_m: [f64; 2],
+    /// What its surface looks like.
+    pub pattern: SurfacePattern,
+    /// Forces in newton, a frame each; 0 shows no light.
+    pub forces_n: Vec<f64>,
+    /// Centre (x, y) of the face in pixels; the frame's middle if not given.
+    pub centre_px: Option<[f64; 2]>,
+    /// Camera, lens, stray light.
+    pub camera: Camera,
+    /// Grey levels per pascal.
+    pub gain: Gain,
+    /// Seed of noise and pattern.
+    pub seed: u64,
+}
+
+impl Default for UniaxialOptions {
+    /// A CL2000X block of 12 × 12 mm at 0.2, 0.7 and 1.2 N: compressed by 1, 5 and 9 %.
+    fn default() -> Self {
+        Self {
+            material: Elastic::CL2000X,
+            outline: FaceOutline::default(),
+            face_m: [12e-3; 2],
+            pattern: SurfacePattern::default(),
+            forces_n: vec![0.2, 0.7, 1.2],
+            centre_px: None,
+            camera: Camera::default(),
+            gain: Gain::PeakGrey(200.0),
+            seed: 1,
+        }
+    }
+}
+
+impl UniaxialOptions {
+    pub(crate) fn validate(&self) -> Result<(), SimulateError> {
+        self.material.validate()?;
+        positive("youngs_modulus_pa", self.material.youngs_modulus_pa)?;
+        self.pattern.validate()?;
+        self.camera.validate()?;
+        at_least("forces_n", self.forces_n.len(), 1)?;
+        for &force in &self.forces_n {
+            not_negative("force_n", force)?;
+        }
+        for k in 0..2 {
+            positive("face_m", self.face_m[k])?;
+            finite("centre_px", self.centre_px.map_or(0.0, |c| c[k]))?;
+        }
+        self.gain.validate()
+    }
+}
+
+/// Stretch, strain and stress at one force. Compression is negative.
+///
+/// ```
+/// use tactile_simulate::{UniaxialOptions, UniaxialScene};
+/// let scene = UniaxialScene::new(UniaxialOptions::default())?;
+/// let state = scene.states()[2]; // 1.2 N on a block of 103 kPa
+/// assert!((state.second_piola_zz_pa - 103e3 * state.strain_zz).abs() < 1e-9, "S = E e");
+/// assert!((state.cauchy_zz_pa * state.area_m2 + 1.2).abs() < 1e-12, "compression is negative");
+/// let volume = state.stretch_z * state.stretch_lateral.powi(2);
+/// assert!(state.stretch_z < 1.0 && (volume - 1.0).abs() < 0.02, "ν = ½ in small strain");
+/// # Ok::<(), tactile_simulate::SimulateError>(())
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub struct UniaxialState {
+    /// Compressive force in newton.
+    pub force_n: f64,
+    /// λ_z.
+    pub stretch_z: f64,
+    /// λ_t.
+    pub stretch_lateral: f64,
+    /// Green–Lagrange strain e_zz.
+    pub strain_zz: f64,
+    /// Second Piola–Kirchhoff stress S_zz in pascal.
+    pub second_piola_zz_pa: f64,
+    /// Cauchy stress in pascal: the negative of force over the deformed face.
+    pub cauchy_zz_pa: f64,
+    /// Deformed face in square metres.
+    pub area_m2: f64,
+}
+
+impl UniaxialState {
+    pub(crate) fn new(
+        material: &Elastic,
+        area0_m2: f64,
+        force_n: f64,
+    ) -> Result<Self, SimulateError> {
+        let e = material.youngs_modulus_pa;
+        // Nominal stress over modulus: λ(1 − λ²)/2, greatest at 1/√3.
+        let load = force_n / (e * area0_m2);
+        let limit = 1.0 / 27.0_f64.sqrt();
+        if load >= limit {
+            return Err(SimulateError::Overload {
+                force_n,
+                limit_n: limit * e * area0_m2,
+            });
+        }
+        // λ³ − λ + 2·load = 0: the largest of three real roots by the cosine formula.
+        let stretch = 2.0 / 3.0_f64.sqrt() * ((-load / limit).acos() / 3.0).cos();
+        let strain_zz = 0.5 * (stretch - 1.0) * (stretch + 1.0);
+        let stretch_lateral = (1.0 - 2.0 * material.poisson_ratio * strain_zz).sqrt();
+        let area_m2 = area0_m2 * stretch_lateral * stretch_lateral;
+        Ok(Self {
+            force_n,
+            stretch_z: stretch,
+            stretch_lateral,
+            strain_zz,
+            second_piola_zz_pa: e * strain_zz,
+            cauchy_zz_pa: -force_n / area_m2,
+            area_m2,
+        })
+    }
+}
+
+/// The outline of a squeezed face.
+///
+/// ```
+/// use tactile_simulate::{Camera, FaceOutline, UniaxialOptions, UniaxialScene};
+/// let camera = Camera::default().coarser(16);
+/// let disc = UniaxialOptions { outline: FaceOutline::Ellipse, face_m: [12e-3; 2], camera, ..UniaxialOptions::default() };
+/// let scene = UniaxialScene::new(disc)?;
+/// let state = scene.states()[0];
+/// let undeformed = state.area_m2 / state.stretch_lateral.powi(2);
+/// assert!((undeformed / (std::f64::consts::PI * 36e-6) - 1.0).abs() < 1e-12);
+/// # Ok::<(), tactile_simulate::SimulateError>(())
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum FaceOutline {
+    /// A rectangle of the face's sides: a block.
+    #[default]
+    Rectangle,
+    /// The ellipse in it: a cylinder. Bumps that do not lie wholly on it are left out.
+    Ellipse,
+}
+
+impl FaceOutline {
+    /// Area of a face of these sides.
+    fn area_m2(self, size_m: [f64; 2]) -> f64 {
+        let rectangle = size_m[0] * size_m[1];
+        match self {
+            Self::Rectangle => rectangle,
+            Self::Ellipse => 0.25 * PI * rectangle,
+        }
+    }
+
+    /// Whether the box around a point lies on a face of these sides.
+    fn holds(self, at: [f64; 2], half_width_m: f64, size_m: [f64; 2]) -> bool {
+        let reach: [f64; 2] =
+            std::array::from_fn(|k| (at[k].abs() + half_width_m) / (0.5 * size_m[k]));
+        match self {
+            Self::Rectangle => true,
+            Self::Ellipse => reach[0].hypot(reach[1]) <= 1.0,
+        }
+    }
+}
+
+/// Bumps on a plain face.
+///
+/// ```
+/// use tactile_simulate::{Camera, SurfacePattern, UniaxialOptions, UniaxialScene};
+/// let camera = Camera::default().coarser(16);
+/// let pattern = SurfacePattern { bumps: [3, 3], bump_height_m: [0.4e-3, 0.4e-3], ..SurfacePattern::default() };
+/// let scene = UniaxialScene::new(UniaxialOptions { camera, pattern, ..UniaxialOptions::default() })?;
+/// let heights = scene.material_points(60, 60).into_iter().map(|p| p.z);
+/// let (low, high) = heights.fold((f64::MAX, 0.0_f64), |(l, h), z| (l.min(z), h.max(z)));
+/// assert!(low == 0.5e-3 && high > 0.89e-3 && high <= 0.9e-3, "0.4 mm bumps on a 0.5 mm base");
+/// # Ok::<(), tactile_simulate::SimulateError>(())
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct SurfacePattern {
+    /// Height of the plain face in metres.
+    pub base_height_m: f64,
+    /// Height of the bumps above it, the smallest and the largest, in metres.
+    pub bump_height_m: [f64; 2],
+    /// Columns and rows of bumps, one in each cell of a grid, at a random place in its cell.
+    pub bumps: [usize; 2],
+    /// Half width w of a bump as a share of the cell's shorter side, up to ½.
+    pub bump_share: f64,
+}
+
+impl Default for SurfacePattern {
+    /// A 0.5 mm base with 8×8 bumps of 0.3 to 0.6 mm.
+    fn default() -> Self {
+        Self {
+            base_height_m: 0.5e-3,
+            bump_height_m: [0.3e-3, 0.6e-3],
+            bumps: [8, 8],
+            bump_share: 0.4,
+        }
+    }
+}
+
+impl SurfacePattern {
+    pub(crate) fn validate(&self) -> Result<(), SimulateError> {
+        positive("base_height_m", self.base_height_m)?;
+        not_negative("bump_height_m", self.bump_height_m[0])?;
+        crate::error::within(
+            "bump_height_m",
+            self.bump_height_m[1],
+            self.bump_height_m[0],
+            f64::MAX,
+        )?;
+        at_least("bumps", self.bumps[0].min(self.bumps[1]), 1)?;
+        crate::error::within(
+            "bumps",
+            self.bumps[0].max(self.bumps[1]) as f64,
+            1.0,
+            1000.0,
+        )?;
+        crate::error::within("bump_share", self.bump_share, 1e-6, 0.5)
+    }
+
+    /// Places the bumps on a face of `size_m` centred on the origin.
+    pub(crate) fn place(&self, outline: FaceOutline, size_m: [f64; 2], seed: u64) -> Relief {
+        let mut rng = row_stream(seed, Purpose::Pattern, 0, 0);
+        let cell: [f64; 2] = std::array::from_fn(|k| size_m[k] / self.bumps[k] as f64);
+        let half_width_m = self.bump_share * cell[0].min(cell[1]);
+        let mut uniform = |low: f64, high: f64| match Uniform::new_inclusive(low, high) {
+            Ok(law) => law.sample(&mut rng),
+            Err(_) => low, // an interval closed by rounding
+        };
+        let mut bumps = Vec::with_capacity(self.bumps[0] * self.bumps[1]);
+        for row in 0..self.bumps[1] {
+            for col in 0..self.bumps[0] {
+                let at = [col, row];
+                let centre_m = std::array::from_fn(|k| {
+                    let low = -0.5 * size_m[k] + at[k] as f64 * cell[k] + half_width_m;
+                    uniform(low, low + cell[k] - 2.0 * half_width_m)
+                });
+                bumps.push(Bump {
+                    centre_m,
+                    height_m: uniform(self.bump_height_m[0], self.bump_height_m[1]),
+                });
+            }
+        }
+        bumps.retain(|bump: &Bump| outline.holds(bump.centre_m, half_width_m, size_m));
+        Relief {
+            outline,
+            size_m,
+            base_height_m: self.base_height_m,
+            half_width_m,
+            bumps,
+        }
+    }
+}
+
+/// One bump.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Bump {
+    pub centre_m: [f64; 2],
+    pub height_m: f64,
+}
+
+/// A pattern in its place: heights over the material coordinates (X, Y) of the undeformed face.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Relief {
+    outline: FaceOutline,
+    size_m: [f64; 2],
+    base_height_m: f64,
+    half_width_m: f64,
+    pub bumps: Vec<Bump>,
+}
+
+impl Relief {
+    /// Height at a material point; 0 off the face.
+    pub fn height_m(&self, at: [f64; 2]) -> f64 {
+        if (0..2).any(|k| at[k].abs() > 0.5 * self.size_m[k])
+            || !self.outline.holds(at, 0.0, self.size_m)
+        {
+            return 0.0;
+        }
+        let factor = |b: &Bump, k: usize| {
+            let t = (at[k] - b.centre_m[k]) / self.half_width_m;
+            if t.abs() < 1.0 {
+                (FRAC_PI_2 * t).cos().powi(2)
+            } else {
+                0.0
+            }
+        };
+        self.base_height_m
+            + self
+                .bumps
+                .iter()
+                .map(|b| b.height_m * factor(b, 0) * factor(b, 1))
+                .sum::<f64>()
+    }
+
+    /// Volume between the face's plane and its heights, in cubic metres.
+    fn volume_m3(&self) -> f64 {
+        let bumps: f64 = self.bumps.iter().map(|b| b.height_m).sum();
+        self.base_height_m * self.outline.area_m2(self.size_m)
+            + bumps * self.half_width_m * self.half_width_m
+    }
+
+    /// Shares of the cells between `rows` (y) and `columns` (x), edges in material coordinates, that an elliptic face covers: differences of the area of the
+    /// unit disc to the lower left of the cells' corners.
+    fn covered_by_ellipse(&self, rows: &[f64], columns: &[f64]) -> Array2<f64> {
+        let half = self.size_m.map(|side| 0.5 * side);
+        let corner = |row: usize, column: usize| {
+            disc_below(columns[column] / half[0], rows[row] / half[1]) * half[0] * half[1]
+        };
+        let corners = Array2::from_shape_fn((rows.len(), columns.len()), |(r, c)| corner(r, c));
+        Array2::from_shape_fn((rows.len() - 1, columns.len() - 1), |(r, c)| {
+            let covered = corners[[r + 1, c + 1]] - corners[[r + 1, c]] - corners[[r, c + 1]]
+                + corners[[r, c]];
+            let cell = (rows[r + 1] - rows[r]) * (columns[c + 1] - columns[c]);
+            (covered / cell).clamp(0.0, 1.0)
+        })
+    }
+
+    /// ∫ of the plain face's indicator from −∞ to `x` along axis `k`, in metres.
+    fn face_integral(&self, k: usize, x: f64) -> f64 {
+        let half = 0.5 * self.size_m[k];
+        x.clamp(-half, half) + half
+    }
+
+    /// ∫ of a bump's profile from −∞ to `x` along axis `k`, in metres.
+    fn bump_integral(&self, bump: &Bump, k: usize, x: f64) -> f64 {
+        let t = ((x - bump.centre_m[k]) / self.half_width_m).clamp(-1.0, 1.0);
+        0.5 * self.half_width_m * (1.0 + t + (PI * t).sin() / PI)
+    }
+}
+
+/// Area of the unit disc where X ≤ x and Y ≤ y: ∫ (min(y, h) + h) dt over t from −1 to x with h = √(1 − t²), where y ≥ −h.
+pub fn disc_below(x: f64, y: f64) -> f64 {
+    let (x, y) = (x.clamp(-1.0, 1.0), y.clamp(-1.0, 1.0));
+    // ∫ h from 0 to t.
+    let half_disc = |t: f64| 0.5 * (t * (1.0 - t * t).max(0.0).sqrt() + t.asin());
+    // Between −c and c the line Y = y lies inside the disc.
+    let c = (1.0 - y * y).max(0.0).sqrt();
+    let inside = |to: f64| to.clamp(-c, c) + c;
+    let whole = half_disc(x) - half_disc(-1.0);
+    let chord = half_disc(x.clamp(-c, c)) - half_disc(-c);
+    // Where the line is inside: y + h; outside the chord: 2 h above the disc's middle, nothing below it.
+    let beside = whole - chord;
+    y * inside(x) + chord + if y >= 0.0 { 2.0 * beside } else { 0.0 }
 }

@@ -5,7 +5,7 @@ use crate::outputs::Csv;
 use crate::plot::{Colour, Page, Panel};
 use serde_json::{Value, json};
 use tactile_imaging::fem::Interface;
-use tactile_imaging::inclusion::{Estimated, InclusionEstimate, InclusionWarning, Told};
+use tactile_imaging::inclusion::{Estimated, Identifiable, InclusionEstimate, InclusionWarning};
 use tactile_imaging::pipeline::with_error;
 
 /// Asymmetry about the axis above which a lump is off it or more than one: the model is axisymmetric.
@@ -17,10 +17,10 @@ fn interval(estimated: &Estimated, scale: f64, unit: &str) -> String {
     format!("{value} {unit}   (95 %: {low:.3} to {high:.3})")
 }
 
-fn told(told: &Told, scale: f64, unit: &str) -> String {
+fn told(told: &Identifiable, scale: f64, unit: &str) -> String {
     match told {
-        Told::Yes(estimated) => interval(estimated, scale, unit),
-        Told::No(estimated) => {
+        Identifiable::Yes(estimated) => interval(estimated, scale, unit),
+        Identifiable::No(estimated) => {
             let [low, high] = estimated.interval.map(|limit| limit * scale);
             format!("cannot be told from these frames (95 %: {low:.2} to {high:.2} {unit})")
         }

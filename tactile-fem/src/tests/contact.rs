@@ -1,8 +1,6 @@
 //! Contact against Hertz's theory, and its derivatives against differences.
 
-use crate::bodies::contact_lines;
-use crate::mesh::graded;
-use crate::*;
+use super::*;
 
 /// A half space of four hundred contact radii of 0.1, of modulus 1 and ν = 0.45, with its E/(1 − ν²). `lines` resolve the contact.
 fn half_space(lines: &[f64], first: f64, shape: RigidShape) -> (Model, f64) {
@@ -153,7 +151,7 @@ fn a_ball_on_a_bonded_layer_follows_the_linear_theory() {
 
 #[test]
 fn gaps_and_their_derivatives_agree_with_differences() {
-    use crate::gap::DRIVER;
+    use crate::contact::DRIVER;
     let scene = Scene::ball_on_guide(
         1.0,
         Material::new(1.0, 0.45).unwrap(),
@@ -168,7 +166,7 @@ fn gaps_and_their_derivatives_agree_with_differences() {
     )
     .unwrap();
     let model = scene.model();
-    let mut fields = crate::fields::Fields::zero(model);
+    let mut fields = crate::model::Fields::zero(model);
     for (k, u) in fields.displacement.iter_mut().enumerate() {
         let [r, z] = model.nodes[k / 2];
         // Smooth, curved and zero on the axis.

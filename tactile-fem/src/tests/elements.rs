@@ -1,10 +1,10 @@
 //! Patch test, manufactured solutions.
 
 use crate::element::{GAUSS3, map, shape};
-use crate::load::{Load, Outcome};
-use crate::material::{Deformation, Gradient, Kinematics, Material};
+use crate::material::{Deformation, Gradient, Kinematics, Material, inverse_cube_root};
 use crate::mesh::Mesh;
 use crate::model::{Model, Motion};
+use crate::scene::{Load, Outcome};
 
 /// An annulus (0 ≤ r ≤ 1, 0 ≤ z ≤ 1) of n × n elements with its inner nodes displaced.
 fn distorted(n: usize, amplitude: f64) -> Mesh {
@@ -192,5 +192,15 @@ fn a_manufactured_solution_converges_with_the_third_order() {
         let order = (errors[0] / errors[1]).log2();
         // Quadratic displacements: third order, to which this refinement is within a tenth.
         assert!(order > 2.8, "{kinematics:?} {poisson}: {errors:?}");
+    }
+}
+
+#[test]
+fn the_inverse_cube_root_is_one() {
+    for k in -95..300 {
+        let v = 0.01 * f64::from(k);
+        let x = inverse_cube_root(v);
+        // Three products and a sum: a few rounding units.
+        assert!(((1.0 + v) * x * x * x - 1.0).abs() < 2e-15, "{v}: {x}");
     }
 }

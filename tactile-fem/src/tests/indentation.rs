@@ -1,7 +1,6 @@
 //! Moduli from curves of a neo-Hookean sample at finite strain: the interval holds the truth.
 
-use crate::bodies::contact_lines;
-use crate::*;
+use super::*;
 use tactile_elasticity::contact::Bond;
 use tactile_elasticity::curve::{
     Baseline, ContactPoint, CurveOptions, IndentationCurve, Indenter, fit_curve,

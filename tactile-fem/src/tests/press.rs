@@ -1,6 +1,6 @@
 //! Presses of an object on a flat or a guide: against another program, over shapes, proportions and meshes.
 
-use crate::*;
+use super::*;
 use tactile_elasticity::ElasticityError;
 
 /// The paper's three layers.

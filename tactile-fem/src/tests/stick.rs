@@ -1,8 +1,7 @@
 //! Contact without slip against theory, symmetry and finer steps.
 
 use super::contact::{half_space_of, punch_lines};
-use crate::bodies::contact_lines;
-use crate::*;
+use super::*;
 use tactile_elasticity::modulus::{ContactLaw, NoSlipLaw};
 
 /// Stiffness of a flat punch without slip over the one without friction (Spence 1968).

@@ -1,11 +1,11 @@
 //! Errors over all scenes.
 
-use tactile_inclusion::{Inclusion, InclusionEstimate, Told};
+use tactile_inclusion::{Identifiable, Inclusion, InclusionEstimate};
 
 /// Bound on a relative error up to which a parameter can be told.
 const TELLABLE: f64 = 0.3;
 
-pub(crate) fn parameters(inclusion: &Inclusion) -> [Told; 3] {
+pub(crate) fn parameters(inclusion: &Inclusion) -> [Identifiable; 3] {
     [
         inclusion.diameter_m,
         inclusion.depth_m,

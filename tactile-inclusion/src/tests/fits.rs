@@ -1,10 +1,10 @@
 //! The fit and its ridge.
 
-use super::super::SensorErrors;
-use super::super::covariance::{Observed, Resolution};
-use super::super::fit::{Prior, Problem, SETTLED};
-use super::super::parameters::{Coordinate, LARGEST_POISSON_RATIO, LumpParameters, Parameters};
 use super::{block, forward};
+use crate::SensorErrors;
+use crate::covariance::{Observed, Resolution};
+use crate::fit::{Prior, Problem, SETTLED};
+use crate::forward::{Coordinate, LARGEST_POISSON_RATIO, LumpParameters, Parameters};
 use tactile_fem::Interface;
 
 /// Values without noise from a finer mesh than the fit's, with the errors of a first fit.

@@ -1,13 +1,15 @@
 //! The forward model and its derivatives, and what a search refuses.
 
-use super::forward::Forward;
-use super::parameters::{Coordinate, LARGEST_POISSON_RATIO, LumpParameters, Parameters};
-use super::{AssumedInclusion, InclusionSearch, PressureProfile, Specimen, Told};
+use crate::forward::{Coordinate, Forward, LARGEST_POISSON_RATIO, LumpParameters, Parameters};
+use crate::{AssumedInclusion, Identifiable, InclusionSearch, PressureProfile, Specimen};
 use core::ops::ControlFlow;
 use tactile_elasticity::ElasticityError;
 use tactile_fem::{Guide, Interface, Kinematics, Layer, Material};
 
+mod against_calculix;
+mod departures;
 mod fits;
+mod marginal;
 
 fn guide(scale: f64) -> Guide {
     let layer = |thickness_m, modulus: f64| Layer {
@@ -278,13 +280,25 @@ fn more_frames_tell_more_of_an_inclusion() {
 
 #[test]
 fn what_is_not_known_within_a_quarter_both_ways_is_not_told() {
-    let within = |down, up| super::Estimated::within(2f64.ln(), [2f64.ln() - down, 2f64.ln() + up]);
+    let within = |down, up| crate::Estimated::within(2f64.ln(), [2f64.ln() - down, 2f64.ln() + up]);
     let estimated = |error: f64| within(1.96 * error, 1.96 * error);
-    assert!(matches!(Told::new(estimated(0.1), true), Told::Yes(_)));
-    assert!(matches!(Told::new(estimated(0.1), false), Told::No(_)));
-    assert!(matches!(Told::new(estimated(0.26), true), Told::No(_)));
+    assert!(matches!(
+        Identifiable::new(estimated(0.1), true),
+        Identifiable::Yes(_)
+    ));
+    assert!(matches!(
+        Identifiable::new(estimated(0.1), false),
+        Identifiable::No(_)
+    ));
+    assert!(matches!(
+        Identifiable::new(estimated(0.26), true),
+        Identifiable::No(_)
+    ));
     // As wide, but open upwards.
-    assert!(matches!(Told::new(within(0.1, 0.6), true), Told::No(_)));
+    assert!(matches!(
+        Identifiable::new(within(0.1, 0.6), true),
+        Identifiable::No(_)
+    ));
     let interval = estimated(0.1).interval;
     assert!(
         (interval[0] * interval[1] - 4.0).abs() < 1e-12,

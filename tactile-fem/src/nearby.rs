@@ -1,17 +1,12 @@
 //! Scenes near a solved one, on the same mesh: derivatives by parameters.
 
-use super::condensation::Elimination;
-use super::element::Geometry;
-use super::fields::Fields;
-use super::layout::Layout;
-use super::material::Material;
-use super::model::Model;
-use super::pressure::PressurePoint;
-use super::scene::Scene;
-use super::slot::Slot;
-use super::sparse::Factors;
-use super::state::State;
-use super::tangent::Tangent;
+use crate::element::{Elimination, Geometry};
+use crate::material::Material;
+use crate::model::{Fields, Model};
+use crate::scene::Scene;
+use crate::sparse::Factors;
+use crate::state::{PressurePoint, State};
+use crate::system::{Layout, Slot, Tangent};
 use std::sync::Arc;
 use tactile_elasticity::ElasticityError;
 
@@ -190,7 +185,7 @@ impl Model {
     ///
     /// # Errors
     /// An element would be turned inside out.
-    pub(super) fn move_nodes(
+    pub fn move_nodes(
         &mut self,
         moved: impl Fn(usize, [f64; 2]) -> [f64; 2],
     ) -> Result<(), ElasticityError> {

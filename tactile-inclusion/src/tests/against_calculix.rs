@@ -3,8 +3,7 @@
 //! `tests/data/inclusion_calculix.csv` is what `evidence/inclusion_scenes.py` finds, with elements of `size_mm`: a row a load.
 #![allow(clippy::print_stdout)]
 
-use super::forward::Forward;
-use super::parameters::{LumpParameters, Parameters};
+use crate::forward::{Forward, LumpParameters, Parameters};
 use std::collections::BTreeMap;
 use tactile_fem::{Guide, Interface, Kinematics, Layer, Material};
 
@@ -68,7 +67,7 @@ fn guide(radius_m: f64) -> Guide {
 
 #[test]
 fn pressures_within_three_quarters_of_the_face_are_those_of_calculix() {
-    let text = include_str!("../tests/data/inclusion_calculix.csv");
+    let text = include_str!("../../tests/data/inclusion_calculix.csv");
     let mut lines = text.lines();
     let header: Vec<&str> = lines.next().unwrap().split(',').collect();
     for row in lines {

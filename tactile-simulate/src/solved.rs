@@ -1,8 +1,8 @@
 //! What finite elements found, as states that the simulator draws.
 
-use super::contact_state::ContactState;
-use super::error::{SimulateError, at_least, positive};
-use super::material::Elastic;
+use crate::contact::ContactState;
+use crate::error::{SimulateError, at_least, positive};
+use crate::press::Elastic;
 use tactile_imaging::fem::{Interface, Load, Material, Scene, State};
 
 /// ν = ½ has no finite bulk modulus; at this one the volume changes by less than 1e-4 of the pressure over E.
@@ -44,9 +44,9 @@ impl ContactState {
     }
 
     /// The face of a cylinder squeezed between two rigid plates on which its faces slide or to which they stick, neo-Hookean and at finite strain: a state
-    /// for each force, for [`ContactLaw::Tabulated`](super::ContactLaw::Tabulated). Solved anew at each call, some 0.1 s a state: keep the states.
+    /// for each force, for [`ContactLaw::Tabulated`](crate::ContactLaw::Tabulated). Solved anew at each call, some 0.1 s a state: keep the states.
     ///
-    /// Sliding, the state is homogeneous, as in a [`UniaxialScene`](super::UniaxialScene) but for the material law; sticking, the face keeps its size, and
+    /// Sliding, the state is homogeneous, as in a [`UniaxialScene`](crate::UniaxialScene) but for the material law; sticking, the face keeps its size, and
     /// the pressure is higher in the middle of a flat cylinder and at the rim of a tall one. Blocks whose face is no disc have the homogeneous state alone.
     ///
     /// ```

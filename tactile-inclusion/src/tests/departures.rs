@@ -1,9 +1,8 @@
 //! Blocks that are not as the model assumes: an answer with its flag, never a confident wrong one.
 
-use super::forward::Forward;
-use super::parameters::{LumpParameters, Parameters};
-use super::{
-    InclusionEstimate, InclusionSearch, InclusionWarning, PressureProfile, Specimen, Told,
+use crate::forward::{Forward, LumpParameters, Parameters};
+use crate::{
+    Identifiable, InclusionEstimate, InclusionSearch, InclusionWarning, PressureProfile, Specimen,
 };
 use core::ops::ControlFlow;
 use tactile_fem::{Guide, Interface, Kinematics, Layer, Material};
@@ -103,8 +102,10 @@ fn told_is_right(estimate: &InclusionEstimate, truth: LumpParameters) -> bool {
         (inclusion.youngs_modulus_pa, truth.youngs_modulus_pa),
     ];
     pairs.into_iter().all(|(told, truth)| match told {
-        Told::Yes(estimated) => (estimated.interval[0]..=estimated.interval[1]).contains(&truth),
-        Told::No(_) => true,
+        Identifiable::Yes(estimated) => {
+            (estimated.interval[0]..=estimated.interval[1]).contains(&truth)
+        }
+        Identifiable::No(_) => true,
     })
 }
 

@@ -1,6 +1,7 @@
 //! Averages against brute force, their sum, and the reference numbers.
 #![allow(clippy::print_stderr)]
-use super::*;
+use crate::pixel_average::{Disc, Profile, SMOOTH, corner};
+use std::f64::consts::PI;
 
 /// Mean over a pixel by `n`×`n` midpoints.
 fn sampled(disc: &Disc, profile: Profile, row: isize, col: isize, n: usize) -> f64 {

@@ -1,0 +1,67 @@
+//! Marginal posteriors of ridges with a closed form.
+
+use crate::ridge::{Marginal, Node, Ridge};
+use nalgebra::{DMatrix, DVector};
+
+/// Nodes at these deviations of ln E₁, on which another coordinate depends linearly.
+fn ridge(at: &[f64], density: impl Fn(f64) -> f64, laplace: f64) -> Ridge {
+    let node = |x: &f64| Node {
+        density: density(*x),
+        at: DVector::from_vec(vec![-0.5 * x, *x]),
+        covariance: DMatrix::from_diagonal(&DVector::from_vec(vec![0.04, 0.0])),
+    };
+    Ridge {
+        nodes: at.iter().map(node).collect(),
+        index: 1,
+        laplace,
+    }
+}
+
+#[test]
+fn a_gaussian_has_its_own_interval_and_evidence() {
+    let (error, top) = (0.3, -7.0);
+    let at: Vec<f64> = (-2..=2).map(|k| 0.36 * f64::from(k)).collect();
+    let laplace = top + 0.5 * core::f64::consts::TAU.ln() + f64::ln(error);
+    let ridge = ridge(&at, |x| top - 0.5 * (x / error).powi(2), laplace);
+    let marginal = Marginal::new(&ridge).unwrap();
+    let own = 1.96 * error;
+    let other = 1.96 * f64::hypot(0.5 * error, 0.2);
+    for (coordinate, reach) in [(1, own), (0, other)] {
+        let [low, high] = marginal.interval(coordinate);
+        assert!(
+            (high / reach - 1.0).abs() < 0.03,
+            "{coordinate}: {high} {reach}"
+        );
+        assert!(
+            (low / reach + 1.0).abs() < 0.03,
+            "{coordinate}: {low} {reach}"
+        );
+    }
+    assert!(marginal.gain.abs() < 0.03, "{}", marginal.gain);
+    let correlation = marginal.covariance()[(0, 1)] / (0.3 * f64::hypot(0.15, 0.2));
+    assert!((correlation + 0.6).abs() < 0.05, "{correlation}");
+}
+
+#[test]
+fn a_ridge_that_is_open_upwards_reaches_further_there() {
+    // Falls as a Gaussian of 0.2 below and of three times that above: a quarter and three quarters of the probability.
+    let fall = |x: f64| {
+        if x < 0.0 {
+            12.5 * x * x
+        } else {
+            12.5 / 9.0 * x * x
+        }
+    };
+    let nodes = [-0.5, -0.25, 0.0, 0.6, 1.2, 1.8];
+    let marginal = Marginal::new(&ridge(&nodes, |x| -fall(x), 0.0)).unwrap();
+    let [low, high] = marginal.interval(1);
+    // Where the half Gaussians leave a tenth of a quarter, and a thirtieth of three quarters.
+    assert!((low + 0.2 * 1.645).abs() < 0.03, "{low}");
+    assert!((high - 0.6 * 2.128).abs() < 0.06, "{high}");
+    assert!((marginal.median(1) - 0.6 * 0.431).abs() < 0.03);
+}
+
+#[test]
+fn two_nodes_are_no_ridge() {
+    assert!(Marginal::new(&ridge(&[0.0, 1.0], |_| 0.0, 0.0)).is_none());
+}
