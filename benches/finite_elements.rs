@@ -13,7 +13,9 @@ use tactile_imaging::elasticity::contact::{Layer, Waveguide};
 use tactile_imaging::elasticity::modulus::{
     Estimate, LoadSeries, LoadState, ModulusEstimator, TabulatedContact,
 };
-use tactile_imaging::fem::{self, Load, Material, Object, Outcome, Press, TableOptions};
+use tactile_imaging::fem::{
+    self, AppliedLoad, Material, ObjectPress, ObjectShape, Outcome, TableOptions,
+};
 
 const NU: f64 = 0.495;
 const PAPER_LAYERS: [(f64, f64); 3] = [(2e-3, 136e3), (3e-3, 80e3), (5e-3, 34e3)];
@@ -23,7 +25,7 @@ fn material(youngs_modulus_pa: f64) -> Material {
 }
 
 fn paper_guide() -> fem::Guide {
-    let layers = PAPER_LAYERS.map(|(thickness_m, modulus)| fem::Layer {
+    let layers = PAPER_LAYERS.map(|(thickness_m, modulus)| fem::GuideLayer {
         thickness_m,
         material: material(modulus),
     });
@@ -51,13 +53,13 @@ fn timed<R>(job: impl FnOnce() -> R) -> (R, f64) {
 
 /// A ball of 3 mm on the paper's guide up to 1.2 N, on three meshes.
 fn ball_on_guide(is_test: bool) {
-    let ball = Object::Ball { radius_m: 3e-3 };
-    let press = Press::new(ball, material(103e3)).expect("a press");
+    let ball = ObjectShape::Ball { radius_m: 3e-3 };
+    let press = ObjectPress::new(ball, material(103e3)).expect("a press");
     let press = press
         .on_guide(paper_guide())
         .expect("a guide wider than the ball");
     let finest = if is_test { 3 } else { 10 };
-    let loads = [0.2, 0.7, 1.2].map(Load::Force);
+    let loads = [0.2, 0.7, 1.2].map(AppliedLoad::Force);
     let solve = |fineness| {
         let scene = press
             .clone()
@@ -136,13 +138,13 @@ fn another_program() {
     for press in presses {
         let Published { name, loads, .. } = &press;
         let (radius, ball) = (press.radius_m, material(press.youngs_modulus_pa));
-        let object = Object::Ball { radius_m: radius };
-        let mut on = Press::new(object, ball).expect("a ball");
+        let object = ObjectShape::Ball { radius_m: radius };
+        let mut on = ObjectPress::new(object, ball).expect("a ball");
         if !press.on_flat {
             on = on.on_guide(paper_guide()).expect("a wide guide");
         }
         let scene = on.scene();
-        let forces: Vec<Load> = loads.iter().map(|l| Load::Force(l[0])).collect();
+        let forces: Vec<AppliedLoad> = loads.iter().map(|l| AppliedLoad::Force(l[0])).collect();
         let states = scene.expect("a scene").solve(&forces).states;
         assert_eq!(states.len(), loads.len());
         for (state, [force_n, contact_radius_m]) in states.iter().zip(loads) {

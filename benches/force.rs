@@ -11,7 +11,7 @@ use tactile_imaging::force::{
     CalibrationOptions, CalibrationPair, ContactDetector, ContactOptions, DetectorWorkspace,
     ForceMeter, ForceOptions, ForceWorkspace, LinearCalibration, ReferenceFrame,
 };
-use tactile_simulate::{CalibrationOptions as SimulatedRun, Load, PressOptions, PressScene};
+use tactile_simulate::{CalibrationRun as SimulatedRun, PressLoad, PressOptions, PressScene};
 
 struct Scene {
     scene: PressScene,
@@ -27,7 +27,7 @@ fn scene() -> Scene {
 /// A contact so many times as wide as the default ball's: a ∝ R^⅓ under the same force.
 fn scene_of(wider: f64) -> Scene {
     let mut options = PressOptions {
-        loads: vec![Load::normal(0.7)],
+        loads: vec![PressLoad::normal(0.7)],
         ..PressOptions::default()
     };
     options.object.radius_m *= wider.powi(3);

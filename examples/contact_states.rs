@@ -9,8 +9,10 @@
 //! (modulus, radius, layers as thickness:modulus, force, contact radius, approach), then distance from the axis, pressure and height.
 use std::io::{Result, Write, stdout};
 use tactile_imaging::elasticity::ElasticityError;
-use tactile_imaging::fem::{Guide, Layer, Load, Material, Object, Press, State};
-use tactile_simulate::{Elastic, Waveguide};
+use tactile_imaging::fem::{
+    AppliedLoad, Guide, GuideLayer, Material, ObjectPress, ObjectShape, State,
+};
+use tactile_simulate::{Elastic, LightGuide};
 
 const POISSON_RATIO: f64 = 0.4999;
 
@@ -25,15 +27,15 @@ struct Ball {
 impl Ball {
     fn states(&self) -> std::result::Result<Vec<State>, ElasticityError> {
         let material = |modulus| Material::new(modulus, POISSON_RATIO);
-        let ball = Object::Ball {
+        let ball = ObjectShape::Ball {
             radius_m: self.radius_m,
         };
-        let mut press = Press::new(ball, material(self.youngs_modulus_pa)?)?;
+        let mut press = ObjectPress::new(ball, material(self.youngs_modulus_pa)?)?;
         if !self.layers.is_empty() {
             let thickness_m: f64 = self.layers.iter().map(|layer| layer.0).sum();
             let mut layers = Vec::with_capacity(self.layers.len());
             for &(thickness_m, modulus) in &self.layers {
-                layers.push(Layer {
+                layers.push(GuideLayer {
                     thickness_m,
                     material: material(modulus)?,
                 });
@@ -42,7 +44,11 @@ impl Ball {
             let guide = Guide::new(layers, (5.0 * self.radius_m).max(2.8 * thickness_m))?;
             press = press.on_guide(guide)?;
         }
-        let loads: Vec<Load> = self.forces_n.iter().map(|&f| Load::Force(f)).collect();
+        let loads: Vec<AppliedLoad> = self
+            .forces_n
+            .iter()
+            .map(|&f| AppliedLoad::Force(f))
+            .collect();
         Ok(press.scene()?.solve(&loads).states)
     }
 
@@ -91,7 +97,7 @@ fn main() -> Result<()> {
 }
 
 fn papers_layers() -> Vec<(f64, f64)> {
-    (Waveguide::default().layers.iter())
+    (LightGuide::default().layers.iter())
         .map(|l| (l.thickness_m, l.material.youngs_modulus_pa))
         .collect()
 }

@@ -2,7 +2,7 @@
 #![allow(clippy::print_stdout)]
 use std::error::Error;
 use tactile_simulate::Trial;
-use tactile_simulate::{CalibrationOptions, PressOptions};
+use tactile_simulate::{CalibrationRun, PressOptions};
 
 /// Hertz with a rigid sensor, F = 4/3 E* a³/R, and a factor for contacts that are not small against the ball:
 /// 1 + 0.3 (a/R)², as if the ball grew stiffer while it is squeezed.
@@ -14,7 +14,7 @@ fn modulus_pa(force_n: f64, contact_radius_m: f64, ball_radius_m: f64) -> f64 {
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let trial = Trial::new(PressOptions::default(), &CalibrationOptions::default())?;
+    let trial = Trial::new(PressOptions::default(), &CalibrationRun::default())?;
     let pipeline = trial.pipeline()?;
     let mut press = trial.press(&pipeline)?;
     let radius_m = trial.scene.options().object.radius_m;

@@ -4,7 +4,7 @@ use nalgebra::Point3;
 use std::error::Error;
 use tactile_imaging::matching::{MatchError, Matching, PointMatcher};
 
-use tactile_simulate::{CalibrationOptions, PressOptions, Trial};
+use tactile_simulate::{CalibrationRun, PressOptions, Trial};
 
 /// Mutual nearest neighbours of both sets as they lie.
 struct MutualNearest;
@@ -30,7 +30,7 @@ fn nearest(point: &Point3<f64>, set: &[Point3<f64>]) -> Option<usize> {
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let trial = Trial::new(PressOptions::default(), &CalibrationOptions::default())?;
+    let trial = Trial::new(PressOptions::default(), &CalibrationRun::default())?;
     let pipeline = trial.pipeline()?.with_matcher(MutualNearest);
     let mut press = trial.press(&pipeline)?;
     let matched = press.matching(1)?.pairs().count();

@@ -14,8 +14,8 @@ use tactile_imaging::elasticity::contact::ContactTable;
 use tactile_imaging::pipeline::EstimatorChoice;
 use tactile_imaging::scene::{Scene, read_contact_table};
 use tactile_simulate::{
-    CalibrationOptions, Camera, ContactLaw, Elastic, Load, PressOptions, PressScene, Sphere,
-    write_folder,
+    CalibrationRun, Camera, ContactModel, Elastic, ElasticSphere, PressLoad, PressOptions,
+    PressScene, write_folder,
 };
 
 const ESTIMATORS: [(EstimatorChoice, &str); 5] = [
@@ -68,16 +68,16 @@ fn write_sample(folder: &Path, material: Elastic) -> Result<Scene, Box<dyn Error
         ..Camera::default()
     };
     let press = PressScene::new(PressOptions {
-        object: Sphere {
+        object: ElasticSphere {
             radius_m: 3e-3,
             material,
         },
-        loads: [0.7, 1.2].map(Load::normal).to_vec(),
+        loads: [0.7, 1.2].map(PressLoad::normal).to_vec(),
         camera,
-        law: ContactLaw::FiniteElements,
+        law: ContactModel::FiniteElements,
         ..PressOptions::default()
     })?;
-    let calibration = press.calibrate(&CalibrationOptions::default())?;
+    let calibration = press.calibrate(&CalibrationRun::default())?;
     let path = write_folder(&press, &calibration, folder)?;
     Ok(Scene::read(path)?)
 }

@@ -1,12 +1,12 @@
 //! Before a block of tissue is pressed: how well would a lump's size, depth and stiffness be known?
 #![allow(clippy::print_stdout)]
 use std::error::Error;
-use tactile_imaging::fem::{Guide, Interface, Layer, Material};
+use tactile_imaging::fem::{Guide, GuideLayer, Interface, Material};
 use tactile_imaging::inclusion::{AssumedInclusion, InclusionSearch, Specimen};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let layer = |thickness_m, youngs_modulus_pa| {
-        Material::new(youngs_modulus_pa, 0.495).map(|material| Layer {
+        Material::new(youngs_modulus_pa, 0.495).map(|material| GuideLayer {
             thickness_m,
             material,
         })

@@ -5,7 +5,7 @@
 //! ```
 use std::error::Error;
 use std::path::PathBuf;
-use tactile_simulate::{CalibrationOptions, Camera, PressOptions, PressScene, write_folder};
+use tactile_simulate::{CalibrationRun, Camera, PressOptions, PressScene, write_folder};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let folder = std::env::args_os().nth(1).unwrap_or("target/press".into());
@@ -15,9 +15,9 @@ fn main() -> Result<(), Box<dyn Error>> {
         camera,
         ..PressOptions::default()
     })?;
-    let calibration = scene.calibrate(&CalibrationOptions {
+    let calibration = scene.calibrate(&CalibrationRun {
         steps: 8,
-        ..CalibrationOptions::default()
+        ..CalibrationRun::default()
     })?;
     write_folder(&scene, &calibration, &PathBuf::from(folder))?;
     Ok(())

@@ -4,7 +4,7 @@ use ndarray::Array2;
 use std::error::Error;
 use tactile_imaging::pipeline::{FrameSource, Session};
 use tactile_simulate::Trial;
-use tactile_simulate::{CalibrationOptions, Camera, LoadCycle, PressOptions};
+use tactile_simulate::{CalibrationRun, Camera, LoadCycle, PressOptions};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let camera = Camera::default().coarser(4);
@@ -12,7 +12,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         camera,
         ..PressOptions::default()
     };
-    let trial = Trial::new(options, &CalibrationOptions::default())?;
+    let trial = Trial::new(options, &CalibrationRun::default())?;
     // Any source of frames will do; this one simulates loading and unloading.
     let mut source = trial.scene.stream(LoadCycle {
         largest_force_n: 1.2,

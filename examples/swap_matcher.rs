@@ -7,7 +7,7 @@ use tactile_imaging::matching::{
 };
 use tactile_imaging::pipeline::Pipeline;
 use tactile_simulate::Trial;
-use tactile_simulate::{CalibrationOptions, PressOptions};
+use tactile_simulate::{CalibrationRun, PressOptions};
 
 /// The default matcher, of whose pairs only those count that are surely right.
 struct Certain {
@@ -32,7 +32,7 @@ impl PointMatcher<3> for Certain {
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let trial = Trial::new(PressOptions::default(), &CalibrationOptions::default())?;
+    let trial = Trial::new(PressOptions::default(), &CalibrationRun::default())?;
     let certain = Certain {
         inner: AnnealedSoftassign::default(),
         least_confidence: 0.99,

@@ -13,7 +13,7 @@ use tactile_imaging::force::{
 use tactile_imaging::pipeline::{LightContact, Object, Session};
 use tactile_simulate::Trial;
 use tactile_simulate::{
-    CalibrationOptions, Camera, Gain, Load, PressOptions, PressScene, PressSimulation,
+    CalibrationRun, Camera, Gain, PressLoad, PressOptions, PressScene, PressSimulation,
 };
 
 /// Frames of each pipeline that the ratio of times is taken from, in turns: what slows the machine slows both.
@@ -21,7 +21,7 @@ const TURNS: usize = 400;
 const BARREL: f64 = 0.03;
 
 /// The default press seen by a camera with barrel distortion, vignetting and pixels higher than wide.
-fn options(loads: Vec<Load>) -> PressOptions {
+fn options(loads: Vec<PressLoad>) -> PressOptions {
     let camera = Camera::default();
     let [width_m, height_m] = camera.pixel_size_m;
     PressOptions {
@@ -59,7 +59,7 @@ fn sensor(trial: &Trial) -> [Pipeline; 2] {
     let forces = [0.1, 0.3, 0.5, 0.7, 0.9, 1.1, 1.3];
     let made = PressScene::new(PressOptions {
         gain: Gain::GreyPerPascal(trial.scene.truth(0).grey_per_pascal),
-        ..options(forces.map(Load::normal).to_vec())
+        ..options(forces.map(PressLoad::normal).to_vec())
     });
     let made = made.expect("a scene").simulate();
     let frames: Vec<_> = (0..forces.len()).map(|k| histogram(&made, k)).collect();
@@ -100,8 +100,8 @@ fn medians(sessions: &mut [Session; 3], frames: &[Array2<u8>]) -> [Duration; 3] 
 
 /// A frame's force with a calibrated sensor and with the short form of calibration, from the same frames in one run.
 pub(crate) fn calibrated(group: &mut BenchmarkGroup<'_, WallTime>) {
-    let loads = vec![Load::normal(0.7), Load::normal(1.2)];
-    let trial = Trial::new(options(loads), &CalibrationOptions::default()).expect("a trial");
+    let loads = vec![PressLoad::normal(0.7), PressLoad::normal(1.2)];
+    let trial = Trial::new(options(loads), &CalibrationRun::default()).expect("a trial");
     let line = trial.pipeline().expect("a calibrated sensor");
     let [steady, corrected] = sensor(&trial);
     let reference = trial.simulation.reference.view();

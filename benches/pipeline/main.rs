@@ -20,13 +20,13 @@ use tactile_imaging::force::ReferenceFrame;
 use tactile_imaging::pipeline::{Measurement, Press, Stage};
 use tactile_simulate::Trial;
 use tactile_simulate::{
-    CalibrationOptions, Camera, Elastic, Gain, Load, PressOptions, PressScene, PressSimulation,
-    Sphere,
+    CalibrationRun, Camera, Elastic, ElasticSphere, Gain, PressLoad, PressOptions, PressScene,
+    PressSimulation,
 };
 
 fn press(c: &mut Criterion) {
-    let trial = Trial::new(PressOptions::default(), &CalibrationOptions::default())
-        .expect("default options");
+    let trial =
+        Trial::new(PressOptions::default(), &CalibrationRun::default()).expect("default options");
     let pipeline = trial.pipeline().expect("a calibrated sensor");
     let truth = trial.simulation.youngs_modulus_pa;
     let measured = trial
@@ -75,7 +75,7 @@ fn sensor(k: usize) -> Trial {
     } else {
         Elastic::CL2003X
     };
-    let object = Sphere {
+    let object = ElasticSphere {
         radius_m: 3e-3,
         material,
     };
@@ -93,16 +93,19 @@ fn sensor(k: usize) -> Trial {
         .product();
     let wanted_m = (coverage(k) * area_m2 / std::f64::consts::PI).sqrt();
     let unit = PressScene::new(PressOptions {
-        loads: vec![Load::normal(1.0)],
+        loads: vec![PressLoad::normal(1.0)],
         ..base.clone()
     });
     let radius_m = unit.expect("a unit load").truth(0).contact.contact_radius_m;
     let force_n = (wanted_m / radius_m).powi(3);
-    let loads = vec![Load::normal(force_n / 1.2 * 0.7), Load::normal(force_n)];
-    let calibration = CalibrationOptions {
+    let loads = vec![
+        PressLoad::normal(force_n / 1.2 * 0.7),
+        PressLoad::normal(force_n),
+    ];
+    let calibration = CalibrationRun {
         largest_force_n: 1.3 * force_n,
         gauge_noise_n: 1e-3 * force_n,
-        ..CalibrationOptions::default()
+        ..CalibrationRun::default()
     };
     Trial::new(PressOptions { loads, ..base }, &calibration).expect("a sensor")
 }
@@ -310,17 +313,17 @@ fn papers_presses(_: &mut Criterion) {
         30
     };
     for material in [Elastic::CL2000X, Elastic::CL2003X] {
-        let object = Sphere {
+        let object = ElasticSphere {
             radius_m: PressOptions::default().object.radius_m,
             material,
         };
-        let loads = vec![Load::normal(0.7), Load::normal(1.2)];
+        let loads = vec![PressLoad::normal(0.7), PressLoad::normal(1.2)];
         let options = PressOptions {
             object,
             loads,
             ..PressOptions::default()
         };
-        let trial = Trial::new(options, &CalibrationOptions::default()).expect("a sensor");
+        let trial = Trial::new(options, &CalibrationRun::default()).expect("a sensor");
         let pipeline = trial
             .pipeline()
             .expect("a calibrated sensor")

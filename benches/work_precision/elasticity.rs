@@ -6,14 +6,14 @@ use tactile_imaging::elasticity::modulus::{
     Estimate, HertzSphere, LoadSeries, LoadState, ModulusEstimator, SphereBetweenPlates,
     SphereOnWaveguide, TataraSphere,
 };
-use tactile_simulate::{self, ContactLaw, Elastic, PressOptions, PressScene, Sphere};
+use tactile_simulate::{self, ContactModel, Elastic, ElasticSphere, PressOptions, PressScene};
 
 /// The paper's two samples at 0.7 and 1.2 N as finite elements give them, force and contact radius without noise, by every law of a ball.
 /// The bench `finite_elements` times contact tables.
 pub(crate) fn laws(study: &mut Study) {
     study.error_label = "rms error of the modulus, relative";
     const RADIUS_M: f64 = 3e-3;
-    let layers = tactile_simulate::Waveguide::default().layers;
+    let layers = tactile_simulate::LightGuide::default().layers;
     let layers = layers.iter().map(|l| Layer {
         thickness_m: l.thickness_m,
         youngs_modulus_pa: l.material.youngs_modulus_pa,
@@ -56,13 +56,13 @@ pub(crate) fn laws(study: &mut Study) {
         ("layered, finite strain", true, Box::new(layered)),
     ];
     let samples = [Elastic::CL2000X, Elastic::CL2003X].map(|material| {
-        let object = Sphere {
+        let object = ElasticSphere {
             radius_m: RADIUS_M,
             material,
         };
         let options = PressOptions {
             object,
-            law: ContactLaw::FiniteElements,
+            law: ContactModel::FiniteElements,
             ..PressOptions::default()
         };
         let scene = PressScene::new(options).expect("a scene");

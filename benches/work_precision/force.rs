@@ -6,7 +6,7 @@ use tactile_imaging::force::{
     LinearCalibration, ReferenceFrame,
 };
 use tactile_simulate::{
-    CalibrationOptions as SimulatedRun, Camera, Load, PressOptions, PressScene,
+    CalibrationRun as SimulatedRun, Camera, PressLoad, PressOptions, PressScene,
 };
 
 const SEEDS: u32 = 4;
@@ -15,7 +15,7 @@ pub(crate) fn frame(study: &mut Study) {
     study.error_label = "rms error of the contact radius, relative";
     let camera = study.choose(Camera::default().coarser(4), Camera::default());
     let options = PressOptions {
-        loads: vec![Load::normal(0.7)],
+        loads: vec![PressLoad::normal(0.7)],
         camera,
         ..PressOptions::default()
     };

@@ -5,7 +5,7 @@ use tactile_imaging::Pipeline;
 use tactile_imaging::matching::CoherentPointDrift;
 use tactile_imaging::pipeline::Binning;
 use tactile_simulate::Trial;
-use tactile_simulate::{CalibrationOptions, Camera, Load, PressOptions};
+use tactile_simulate::{CalibrationRun, Camera, PressLoad, PressOptions};
 
 /// Presses on one sensor that differ in force and noise: one alone would say what its noise happened to do.
 fn trials(shape: [usize; 2], count: u64) -> Vec<Trial> {
@@ -16,14 +16,14 @@ fn trials(shape: [usize; 2], count: u64) -> Vec<Trial> {
     };
     let trial = |seed: u64| {
         let low = 0.6 + 0.2 * seed as f64 / count as f64;
-        let loads = [low, low / 0.7 * 1.2].map(Load::normal).to_vec();
+        let loads = [low, low / 0.7 * 1.2].map(PressLoad::normal).to_vec();
         let options = PressOptions {
             camera,
             loads,
             seed,
             ..PressOptions::default()
         };
-        Trial::new(options, &CalibrationOptions::default()).expect("valid options")
+        Trial::new(options, &CalibrationRun::default()).expect("valid options")
     };
     (0..count).map(trial).collect()
 }

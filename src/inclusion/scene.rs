@@ -7,7 +7,7 @@ use crate::scene::fields::{Fields, poisson, positive};
 use crate::scene::{SceneError, parse_table, read_pairs};
 use ndarray::Array2;
 use std::path::{Path, PathBuf};
-use tactile_fem::{Guide, Interface, Layer, Material};
+use tactile_fem::{Guide, GuideLayer, Interface, Material};
 use tactile_inclusion::{PressureProfile, Specimen};
 
 /// A block of tissue, the guide pressed onto it, and the frames.
@@ -364,7 +364,7 @@ fn guide(fields: &Fields<'_>) -> Result<Guide, SceneError> {
             .unwrap_or(0.495);
         let material = Material::new(modulus, ratio)
             .map_err(|error| table.unusable("poisson_ratio", &error))?;
-        layers.push(Layer {
+        layers.push(GuideLayer {
             thickness_m: table.number("thickness_m", LENGTH, positive)?,
             material,
         });

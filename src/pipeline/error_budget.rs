@@ -50,9 +50,9 @@ impl fmt::Display for ErrorSource {
 /// The part of a modulus' relative standard error that one input is responsible for; the parts' squares add up to the whole.
 ///
 /// ```
-/// # use tactile_simulate::{Trial, CalibrationOptions, Camera, PressOptions};
+/// # use tactile_simulate::{Trial, CalibrationRun, Camera, PressOptions};
 /// # let camera = Camera::default().coarser(8);
-/// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
+/// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationRun::default())?;
 /// use tactile_imaging::pipeline::{ErrorShare, ErrorSource};
 /// // A ball of 3 mm whose radius is known to 0.3 mm.
 /// let pipeline = trial.pipeline()?.with_settings(|settings| settings.object_radius_error_m = 0.3e-3)?;

@@ -53,9 +53,9 @@ impl From<&ModulusEstimate> for ModulusResult {
 /// What one frame says.
 ///
 /// ```
-/// # use tactile_simulate::{Trial, CalibrationOptions, Camera, PressOptions};
+/// # use tactile_simulate::{Trial, CalibrationRun, Camera, PressOptions};
 /// # let camera = Camera::default().coarser(8);
-/// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
+/// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationRun::default())?;
 /// use tactile_imaging::pipeline::FrameResult;
 /// let pipeline = trial.pipeline()?;
 /// let measurement = trial.press(&pipeline)?.measure();
@@ -99,9 +99,9 @@ pub struct FrameResult {
 /// How the control points of the first and the last frame were matched.
 ///
 /// ```
-/// # use tactile_simulate::{Trial, CalibrationOptions, Camera, PressOptions};
+/// # use tactile_simulate::{Trial, CalibrationRun, Camera, PressOptions};
 /// # let camera = Camera::default().coarser(8);
-/// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
+/// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationRun::default())?;
 /// use tactile_imaging::pipeline::MatchResult;
 /// let pipeline = trial.pipeline()?.with_control_points(60);
 /// let matching: MatchResult = trial.press(&pipeline)?.measure().matching?;
@@ -132,9 +132,9 @@ pub struct MatchResult {
 /// The strain between the first and the last frame.
 ///
 /// ```
-/// # use tactile_simulate::{Trial, CalibrationOptions, Camera, PressOptions};
+/// # use tactile_simulate::{Trial, CalibrationRun, Camera, PressOptions};
 /// # let camera = Camera::default().coarser(8);
-/// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
+/// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationRun::default())?;
 /// use tactile_imaging::pipeline::StrainResult;
 /// let pipeline = trial.pipeline()?.with_control_points(60);
 /// let strain: StrainResult = trial.press(&pipeline)?.measure().strain?;
@@ -163,9 +163,9 @@ pub struct StrainResult {
 /// All results of a press: what a stage computed, or why it could not, whatever became of the others.
 ///
 /// ```
-/// # use tactile_simulate::{Trial, CalibrationOptions, Camera, PressOptions};
+/// # use tactile_simulate::{Trial, CalibrationRun, Camera, PressOptions};
 /// # let camera = Camera::default().coarser(8);
-/// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
+/// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationRun::default())?;
 /// use tactile_imaging::Measurement;
 /// let pipeline = trial.pipeline()?.with_control_points(60);
 /// let measurement: Measurement = trial.press(&pipeline)?.measure();

@@ -16,9 +16,9 @@ pub(crate) const LEAST_MATCHES: usize = 8;
 /// The strain between two frames.
 ///
 /// ```
-/// # use tactile_simulate::{Trial, CalibrationOptions, Camera, PressOptions};
+/// # use tactile_simulate::{Trial, CalibrationRun, Camera, PressOptions};
 /// # let camera = Camera::default().coarser(8);
-/// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
+/// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationRun::default())?;
 /// use tactile_imaging::pipeline::PairStrain;
 /// let pipeline = trial.pipeline()?.with_control_points(60);
 /// let mut press = trial.press(&pipeline)?;

@@ -5,9 +5,9 @@ use std::time::Duration;
 /// A stage of the pipeline.
 ///
 /// ```
-/// # use tactile_simulate::{Trial, CalibrationOptions, Camera, PressOptions};
+/// # use tactile_simulate::{Trial, CalibrationRun, Camera, PressOptions};
 /// # let camera = Camera::default().coarser(8);
-/// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
+/// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationRun::default())?;
 /// use tactile_imaging::pipeline::Stage;
 /// // What a ball's modulus takes: both contacts, and no surface.
 /// let pipeline = trial.pipeline()?;
@@ -163,9 +163,9 @@ pub struct Work {
 /// What was computed, what was skipped and why.
 ///
 /// ```
-/// # use tactile_simulate::{Trial, CalibrationOptions, Camera, PressOptions};
+/// # use tactile_simulate::{Trial, CalibrationRun, Camera, PressOptions};
 /// # let camera = Camera::default().coarser(8);
-/// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
+/// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationRun::default())?;
 /// use tactile_imaging::pipeline::{Report, Stage};
 /// let pipeline = trial.pipeline()?;
 /// let mut press = trial.press(&pipeline)?;

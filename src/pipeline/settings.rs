@@ -13,9 +13,9 @@ pub(crate) const DEFAULT_CONTROL_POINTS: usize = 200;
 /// matches that begin where the last one ended leave strains the same within half their standard error.
 ///
 /// ```
-/// # use tactile_simulate::{Trial, CalibrationOptions, Camera, PressOptions};
+/// # use tactile_simulate::{Trial, CalibrationRun, Camera, PressOptions};
 /// # let camera = Camera::default().coarser(8);
-/// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
+/// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationRun::default())?;
 /// use tactile_imaging::pipeline::Skips;
 /// let none = Skips { equal_frames: false, outside_contact: false, last_answer: false };
 /// let everything = trial.pipeline()?.with_settings(|settings| settings.skips = none)?;

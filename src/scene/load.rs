@@ -38,12 +38,12 @@ pub enum LoadedCalibration {
 ///
 /// ```
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
-/// # use tactile_simulate::{CalibrationOptions, Camera, PressOptions, PressScene, write_folder};
+/// # use tactile_simulate::{CalibrationRun, Camera, PressOptions, PressScene, write_folder};
 /// use tactile_imaging::scene::{LoadedCalibration, Scene};
 /// # let camera = Camera::default().coarser(16);
 /// # let made = PressScene::new(PressOptions { camera, ..PressOptions::default() })?;
 /// # let folder = tempfile::tempdir()?;
-/// # let calibration = CalibrationOptions { steps: 8, ..CalibrationOptions::default() };
+/// # let calibration = CalibrationRun { steps: 8, ..CalibrationRun::default() };
 /// # let path = write_folder(&made, &made.calibrate(&calibration)?, folder.path())?;
 /// let data = Scene::read(&path)?.load()?; // a calibration up to 2 N in 8 steps and back
 /// assert!(data.frames.iter().all(|frame| frame.dim() == data.reference.dim()));

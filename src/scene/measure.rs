@@ -16,12 +16,12 @@ impl Scene {
     ///
     /// ```
     /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
-    /// # use tactile_simulate::{CalibrationOptions, Camera, Load, PressOptions, PressScene, write_folder};
+    /// # use tactile_simulate::{CalibrationRun, Camera, PressLoad, PressOptions, PressScene, write_folder};
     /// use tactile_imaging::scene::Scene;
     /// # let camera = Camera::default().coarser(16);
-    /// # let made = PressScene::new(PressOptions { camera, loads: vec![Load::normal(0.7)], ..Default::default() })?;
+    /// # let made = PressScene::new(PressOptions { camera, loads: vec![PressLoad::normal(0.7)], ..Default::default() })?;
     /// # let folder = tempfile::tempdir()?;
-    /// # let calibration = CalibrationOptions { steps: 8, ..CalibrationOptions::default() };
+    /// # let calibration = CalibrationRun { steps: 8, ..CalibrationRun::default() };
     /// # let path = write_folder(&made, &made.calibrate(&calibration)?, folder.path())?;
     /// let measured = Scene::measure_file(&path)?; // one frame, of a ball pressed with 0.7 N
     /// let force = measured.frames[0].as_ref().expect("a contact").force_n.as_ref().expect("a calibration").value;

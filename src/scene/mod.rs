@@ -184,15 +184,15 @@ pub struct SceneLayer {
 ///
 /// ```
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
-/// # use tactile_simulate::{CalibrationOptions, Camera, PressOptions, PressScene, write_folder};
-/// # use tactile_simulate::{Elastic, Sphere};
+/// # use tactile_simulate::{CalibrationRun, Camera, PressOptions, PressScene, write_folder};
+/// # use tactile_simulate::{Elastic, ElasticSphere};
 /// use tactile_imaging::scene::Scene;
 /// # let camera = Camera::default().coarser(16);
-/// # let object = Sphere { radius_m: 20e-3, material: Elastic::CL2000X };
+/// # let object = ElasticSphere { radius_m: 20e-3, material: Elastic::CL2000X };
 /// # let made = PressScene::new(PressOptions { camera, object, ..PressOptions::default() })?;
 /// # let folder = tempfile::tempdir()?;
-/// # let indenter = Sphere { radius_m: 60e-3, material: Elastic::RIGID };
-/// # let calibration = CalibrationOptions { steps: 8, indenter, ..CalibrationOptions::default() };
+/// # let indenter = ElasticSphere { radius_m: 60e-3, material: Elastic::RIGID };
+/// # let calibration = CalibrationRun { steps: 8, indenter, ..CalibrationRun::default() };
 /// # let path = write_folder(&made, &made.calibrate(&calibration)?, folder.path())?;
 /// let scene = Scene::read(&path)?; // a CL2000X ball, E = 103 kPa, at 0.7 N and 1.2 N
 /// let data = scene.load()?;

@@ -192,7 +192,7 @@ impl Model {
     }
 
     /// Lets two bodies' [`Boundary::Contact`] touch without friction, as
-    /// [`Scene::ball_on_guide`](crate::Scene::ball_on_guide) does.
+    /// [`FemScene::ball_on_guide`](crate::FemScene::ball_on_guide) does.
     ///
     /// Gaps are measured from `first`, which had better be the one with the finer mesh or the more
     /// convex of the two.
@@ -252,7 +252,7 @@ impl Model {
 
     /// Lets a body's [`Boundary::Contact`] touch a rigid body below it without friction, whose pole
     /// starts at `height_m` and moves by the approach, as
-    /// [`Scene::ball_on_flat`](crate::Scene::ball_on_flat) does.
+    /// [`FemScene::ball_on_flat`](crate::FemScene::ball_on_flat) does.
     pub fn contact_rigid_below(&mut self, body: Body, shape: RigidShape, height_m: f64) {
         let opposite = Opposite::Rigid {
             shape,

@@ -3,14 +3,14 @@
 use crate::element::{Elimination, Geometry};
 use crate::material::Material;
 use crate::model::{Fields, Model};
-use crate::scene::Scene;
+use crate::scene::FemScene;
 use crate::sparse::Factors;
 use crate::state::{PressurePoint, State};
 use crate::system::{Layout, Slot, Tangent};
 use std::sync::Arc;
 use tactile_elasticity::ElasticityError;
 
-impl Scene {
+impl FemScene {
     /// This scene with other materials and moved nodes.
     ///
     /// # Errors
@@ -88,7 +88,7 @@ impl Neighbourhood<'_> {
     /// Elements are evaluated anew only where they differ, and without their stiffness.
     ///
     /// `None` where an element is turned inside out.
-    pub fn solve(&self, nearby: &[(&Scene, f64)]) -> Option<Vec<Found>> {
+    pub fn solve(&self, nearby: &[(&FemScene, f64)]) -> Option<Vec<Found>> {
         let size = self.tangent.right.len();
         // The last column is the answer to a unit approach.
         let mut columns = Vec::with_capacity((nearby.len() + 1) * size);

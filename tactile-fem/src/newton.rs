@@ -13,7 +13,7 @@ use crate::contact::Opposite;
 use crate::element::{Elimination, OUTER};
 use crate::material::Kinematics;
 use crate::model::{Equilibrium, Fields, Model};
-use crate::scene::{Load, Outcome, Report, Solution};
+use crate::scene::{AppliedLoad, Outcome, Solution, SolverReport};
 use crate::sparse::Factors;
 use crate::state::State;
 use crate::system::{Goal, Layout, Slot, Tangent};
@@ -47,7 +47,7 @@ const STICK_FIRST_STEP: f64 = 0.002;
 struct Solver<'a> {
     model: &'a Model,
     layout: &'a mut Layout,
-    report: Report,
+    report: SolverReport,
     /// The equilibrium before the last one, for extrapolation.
     before: Option<Equilibrium>,
     last: Equilibrium,
@@ -56,16 +56,21 @@ struct Solver<'a> {
 impl Model {
     /// Solves for the loads in order, each starting from the one before.
     ///
-    /// A load that is not reached ends the solution: its [`Report`] says so. O(n b²) for each Newton
+    /// A load that is not reached ends the solution: its [`SolverReport`] says so. O(n b²) for each Newton
     /// iteration with n unknowns in a system of half-width b.
-    pub fn solve(&self, loads: &[Load]) -> Solution {
+    pub fn solve(&self, loads: &[AppliedLoad]) -> Solution {
         self.solve_near(&mut Layout::new(self), loads, &[])
     }
 
     /// [`Self::solve`] that first tries, for each load, to go there from a guess: the state of a model with
     /// the same elements at about that load. `layout` is this model's or one's with the same elements and supports:
     /// its analysis is used again.
-    pub fn solve_near(&self, layout: &mut Layout, loads: &[Load], guesses: &[State]) -> Solution {
+    pub fn solve_near(
+        &self,
+        layout: &mut Layout,
+        loads: &[AppliedLoad],
+        guesses: &[State],
+    ) -> Solution {
         let mut unloaded = Fields::zero(self);
         if self.sticks {
             unloaded.anchors = self.first_anchors(&unloaded);
@@ -73,7 +78,7 @@ impl Model {
         let mut solver = Solver {
             model: self,
             layout,
-            report: Report {
+            report: SolverReport {
                 outcome: Outcome::Solved,
                 steps: 0,
                 rejected_steps: 0,
@@ -113,8 +118,8 @@ impl Model {
 
 impl Solver<'_> {
     /// Goes to an approach from a guess; whether that succeeded.
-    fn jump(&mut self, guess: &State, load: Load) -> bool {
-        let Load::Approach(approach) = load else {
+    fn jump(&mut self, guess: &State, load: AppliedLoad) -> bool {
+        let AppliedLoad::Approach(approach) = load else {
             return false;
         };
         let found = self.newton(guess.fields.clone(), Goal::Approach(approach));
@@ -126,14 +131,14 @@ impl Solver<'_> {
         is_found
     }
 
-    fn reach(&mut self, load: Load) -> bool {
+    fn reach(&mut self, load: AppliedLoad) -> bool {
         let reached = match load {
-            Load::Approach(approach) => {
+            AppliedLoad::Approach(approach) => {
                 approach.is_finite()
                     && self.walk(|_| approach)
                     && self.advance(Goal::Approach(approach))
             }
-            Load::Force(force) => {
+            AppliedLoad::Force(force) => {
                 force.is_finite()
                     && self.touch(force)
                     && self.walk(|solver| solver.approach_for(force))
@@ -379,7 +384,7 @@ impl Solver<'_> {
     }
 
     /// Updates the contact multipliers at the last equilibrium and balances again.
-    fn augment(&mut self, load: Load) -> bool {
+    fn augment(&mut self, load: AppliedLoad) -> bool {
         for _ in 0..AUGMENTATIONS {
             let mut fields = self.last.fields.clone();
             if self.model.contact_nodes.is_empty() {
@@ -387,8 +392,8 @@ impl Solver<'_> {
             }
             fields.multipliers.clone_from(&fields.contact);
             let goal = match load {
-                Load::Approach(approach) => Goal::Approach(approach),
-                Load::Force(force) => Goal::Force(force),
+                AppliedLoad::Approach(approach) => Goal::Approach(approach),
+                AppliedLoad::Force(force) => Goal::Force(force),
             };
             match self.newton(fields, goal) {
                 Some(found) => self.last = found,

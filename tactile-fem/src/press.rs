@@ -6,20 +6,20 @@ use crate::error::{Quantity, positive};
 use crate::material::{Kinematics, Material};
 use crate::mesh::{Boundary, ContactMesh, Mesh, contact_lines, graded};
 use crate::model::{Model, RigidShape, Support};
-use crate::scene::{Interface, Scene};
+use crate::scene::{FemScene, Interface};
 use tactile_elasticity::ElasticityError;
 
 /// A layer of a [`Guide`].
 ///
 /// ```
-/// use tactile_fem::{Layer, Material};
+/// use tactile_fem::{GuideLayer, Material};
 ///
-/// let epidermis = Layer { thickness_m: 2e-3, material: Material::new(136e3, 0.495).unwrap() };
+/// let epidermis = GuideLayer { thickness_m: 2e-3, material: Material::new(136e3, 0.495).unwrap() };
 /// assert_eq!(epidermis.material.youngs_modulus_pa(), 136e3);
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Layer {
+pub struct GuideLayer {
     /// Thickness, in metres.
     pub thickness_m: f64,
     /// What it is made of.
@@ -29,9 +29,9 @@ pub struct Layer {
 /// A soft guide: bonded layers, the first towards the object, the last bonded to rigid glass.
 ///
 /// ```
-/// use tactile_fem::{Guide, Layer, Material};
+/// use tactile_fem::{Guide, GuideLayer, Material};
 ///
-/// let layer = |thickness_m, modulus| Layer { thickness_m, material: Material::new(modulus, 0.495).unwrap() };
+/// let layer = |thickness_m, modulus| GuideLayer { thickness_m, material: Material::new(modulus, 0.495).unwrap() };
 /// let guide = Guide::new(vec![layer(2e-3, 136e3), layer(3e-3, 80e3), layer(5e-3, 34e3)], 25e-3).unwrap();
 /// assert_eq!((guide.layers().len(), guide.radius_m()), (3, 25e-3));
 /// assert!(Guide::new(vec![], 25e-3).is_err());
@@ -39,7 +39,7 @@ pub struct Layer {
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Guide {
-    layers: Vec<Layer>,
+    layers: Vec<GuideLayer>,
     radius_m: f64,
 }
 
@@ -48,7 +48,7 @@ impl Guide {
     ///
     /// # Errors
     /// No layer; a thickness or a radius that is not positive.
-    pub fn new(layers: Vec<Layer>, radius_m: f64) -> Result<Self, ElasticityError> {
+    pub fn new(layers: Vec<GuideLayer>, radius_m: f64) -> Result<Self, ElasticityError> {
         positive(radius_m, Quantity::Radius)?;
         if layers.is_empty() {
             return Err(ElasticityError::LengthMismatch {
@@ -64,7 +64,7 @@ impl Guide {
     }
 
     /// The layers, from the object's side.
-    pub fn layers(&self) -> &[Layer] {
+    pub fn layers(&self) -> &[GuideLayer] {
         &self.layers
     }
 
@@ -85,16 +85,16 @@ impl Guide {
 /// A soft body of revolution that a sensor presses: its lowest point touches, its far side does not move.
 ///
 /// ```
-/// use tactile_fem::{Load, Material, Object, Press};
+/// use tactile_fem::{AppliedLoad, Material, ObjectShape, ObjectPress};
 ///
 /// let force = |object| {
-///     let scene = Press::new(object, Material::new(100e3, 0.495)?)?.scene()?;
-///     Ok::<_, tactile_elasticity::ElasticityError>(scene.solve(&[Load::Approach(0.2e-3)]).states[0].force_n())
+///     let scene = ObjectPress::new(object, Material::new(100e3, 0.495)?)?.scene()?;
+///     Ok::<_, tactile_elasticity::ElasticityError>(scene.solve(&[AppliedLoad::Approach(0.2e-3)]).states[0].force_n())
 /// };
-/// let ball = force(Object::Ball { radius_m: 3e-3 })?;
-/// let half_ball = force(Object::HalfBall { radius_m: 3e-3 })?;
-/// let cylinder = force(Object::Cylinder { radius_m: 3e-3, height_m: 5e-3 })?;
-/// let cone = force(Object::Cone { half_angle_rad: 1.2, height_m: 2e-3 })?;
+/// let ball = force(ObjectShape::Ball { radius_m: 3e-3 })?;
+/// let half_ball = force(ObjectShape::HalfBall { radius_m: 3e-3 })?;
+/// let cylinder = force(ObjectShape::Cylinder { radius_m: 3e-3, height_m: 5e-3 })?;
+/// let cone = force(ObjectShape::Cone { half_angle_rad: 1.2, height_m: 2e-3 })?;
 /// assert!(half_ball > ball, "glued to its stage it cannot spread");
 /// assert!(cone < ball && ball < cylinder);
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
@@ -102,7 +102,7 @@ impl Guide {
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
-pub enum Object {
+pub enum ObjectShape {
     /// The half of a ball next to the contact. Its equator spreads freely in its plane, as where the ball is pressed the same way from both
     /// sides.
     Ball {
@@ -131,25 +131,25 @@ pub enum Object {
     },
 }
 
-/// An [`Object`] pressed on a rigid flat or on a [`Guide`], without friction unless asked for, with the fineness of its mesh.
+/// An [`ObjectShape`] pressed on a rigid flat or on a [`Guide`], without friction unless asked for, with the fineness of its mesh.
 ///
 /// ```
-/// use tactile_fem::{Guide, Layer, Load, Material, Object, Press};
+/// use tactile_fem::{Guide, GuideLayer, AppliedLoad, Material, ObjectShape, ObjectPress};
 ///
 /// let gel = Material::new(80e3, 0.495)?;
-/// let guide = Guide::new(vec![Layer { thickness_m: 6e-3, material: gel }], 16e-3)?;
-/// let press = Press::new(Object::HalfBall { radius_m: 3e-3 }, Material::new(60e3, 0.495)?)?.on_guide(guide)?;
+/// let guide = Guide::new(vec![GuideLayer { thickness_m: 6e-3, material: gel }], 16e-3)?;
+/// let press = ObjectPress::new(ObjectShape::HalfBall { radius_m: 3e-3 }, Material::new(60e3, 0.495)?)?.on_guide(guide)?;
 /// let coarse = press.clone().with_fineness(4)?.scene()?;
 /// let fine = press.with_fineness(8)?.scene()?;
 /// assert!(fine.element_count() > 2 * coarse.element_count());
-/// let force = |scene: &tactile_fem::Scene| scene.solve(&[Load::Approach(0.5e-3)]).states[0].force_n();
+/// let force = |scene: &tactile_fem::FemScene| scene.solve(&[AppliedLoad::Approach(0.5e-3)]).states[0].force_n();
 /// // Both meshes are fine enough for half a percent of the force.
 /// assert!((force(&coarse) / force(&fine) - 1.0).abs() < 5e-3);
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
 /// ```
 #[derive(Debug, Clone, PartialEq)]
-pub struct Press {
-    object: Object,
+pub struct ObjectPress {
+    object: ObjectShape,
     material: Material,
     guide: Option<Guide>,
     interface: Interface,
@@ -160,12 +160,12 @@ pub struct Press {
 /// 0.2 % from a/R = 0.15 on, with ten the time is four times as long (`cargo bench -p tactile-benches --features fem --bench finite_elements`).
 const FINENESS: usize = 5;
 
-impl Press {
+impl ObjectPress {
     /// An object of one material on a rigid flat.
     ///
     /// # Errors
     /// Lengths that are not positive; a cone's angle not between 0 and π/2.
-    pub fn new(object: Object, material: Material) -> Result<Self, ElasticityError> {
+    pub fn new(object: ObjectShape, material: Material) -> Result<Self, ElasticityError> {
         object.check()?;
         Ok(Self {
             object,
@@ -180,13 +180,13 @@ impl Press {
     /// what the bodies take: the solution then ends with [`Outcome::Stopped`](crate::Outcome::Stopped).
     ///
     /// ```
-    /// use tactile_fem::{Guide, Layer, Load, Material, Object, Press};
+    /// use tactile_fem::{Guide, GuideLayer, AppliedLoad, Material, ObjectShape, ObjectPress};
     ///
     /// # fn main() -> Result<(), tactile_elasticity::ElasticityError> {
-    /// let layer = Layer { thickness_m: 10e-3, material: Material::new(80e3, 0.495)? };
+    /// let layer = GuideLayer { thickness_m: 10e-3, material: Material::new(80e3, 0.495)? };
     /// let guide = Guide::new(vec![layer], 25e-3)?;
-    /// let press = Press::new(Object::Ball { radius_m: 3e-3 }, Material::new(103e3, 0.495)?)?.on_guide(guide)?;
-    /// let state = &press.scene()?.solve(&[Load::Approach(1e-3)]).states[0];
+    /// let press = ObjectPress::new(ObjectShape::Ball { radius_m: 3e-3 }, Material::new(103e3, 0.495)?)?.on_guide(guide)?;
+    /// let state = &press.scene()?.solve(&[AppliedLoad::Approach(1e-3)]).states[0];
     /// // Softer than a rigid flat: less force, at the same approach, than six tenths of Hertz's.
     /// let hertz = 4.0 / 3.0 * 103e3 / (1.0 - 0.495 * 0.495) * 3e-3_f64.sqrt() * 1e-3_f64.powf(1.5);
     /// assert!(state.force_n() > 0.0 && state.force_n() < 0.6 * hertz);
@@ -198,7 +198,7 @@ impl Press {
     /// [`ElasticityError::OutOfRange`] for a guide that is not wider than the object, unless this is a cylinder.
     pub fn on_guide(mut self, guide: Guide) -> Result<Self, ElasticityError> {
         let radius = self.object.radius_m();
-        let may_cover = matches!(self.object, Object::Cylinder { .. });
+        let may_cover = matches!(self.object, ObjectShape::Cylinder { .. });
         if guide.radius_m() <= radius && !may_cover {
             return Err(ElasticityError::OutOfRange {
                 quantity: Quantity::Radius,
@@ -214,12 +214,12 @@ impl Press {
     /// opposite to each other until they part. The time grows several times, as loads are followed in short steps.
     ///
     /// ```
-    /// use tactile_fem::{Interface, Load, Material, Object, Press};
+    /// use tactile_fem::{Interface, AppliedLoad, Material, ObjectShape, ObjectPress};
     ///
-    /// let press = Press::new(Object::Ball { radius_m: 3e-3 }, Material::new(103e3, 0.3)?)?;
+    /// let press = ObjectPress::new(ObjectShape::Ball { radius_m: 3e-3 }, Material::new(103e3, 0.3)?)?;
     /// let force = |interface| {
     ///     let scene = press.clone().with_interface(interface).scene()?;
-    ///     Ok::<_, tactile_elasticity::ElasticityError>(scene.solve(&[Load::Approach(0.1e-3)]).states[0].force_n())
+    ///     Ok::<_, tactile_elasticity::ElasticityError>(scene.solve(&[AppliedLoad::Approach(0.1e-3)]).states[0].force_n())
     /// };
     /// // Without slip a ball on a rigid flat is stiffer by a few per cent, the more the smaller ν.
     /// let ratio = force(Interface::Bonded)? / force(Interface::Frictionless)?;
@@ -252,11 +252,11 @@ impl Press {
     ///
     /// # Errors
     /// [`ElasticityError::DegenerateElement`] where the proportions leave an element without area.
-    pub fn scene(&self) -> Result<Scene, ElasticityError> {
+    pub fn scene(&self) -> Result<FemScene, ElasticityError> {
         let mut model = Model::new(Kinematics::Finite);
         let object = model.add(&self.object_mesh(), &[self.material])?;
         let far_side = match self.object {
-            Object::Ball { .. } => Support::Sliding,
+            ObjectShape::Ball { .. } => Support::Sliding,
             _ => Support::Bonded,
         };
         model.hold(object, Boundary::Base, far_side);
@@ -276,12 +276,12 @@ impl Press {
         if self.interface == Interface::Bonded {
             model.forbid_slip();
         }
-        Ok(Scene { model })
+        Ok(FemScene { model })
     }
 
     fn size(&self) -> ContactMesh {
         let radius = match self.object {
-            Object::Cone { .. } => self.object.side_m(),
+            ObjectShape::Cone { .. } => self.object.side_m(),
             _ => self.object.radius_m(),
         };
         ContactMesh {
@@ -298,17 +298,17 @@ impl Press {
 
     pub(crate) fn object_mesh(&self) -> Mesh {
         match self.object {
-            Object::Ball { radius_m } | Object::HalfBall { radius_m } => {
+            ObjectShape::Ball { radius_m } | ObjectShape::HalfBall { radius_m } => {
                 Mesh::half_ball(radius_m, self.size())
             }
-            Object::Cylinder { radius_m, height_m } => {
+            ObjectShape::Cylinder { radius_m, height_m } => {
                 let first = self.at_rim(radius_m.min(height_m));
                 Mesh::cylinder(
                     &self.rim_lines(radius_m),
                     &graded(0.0, height_m, first, self.growth(1.4)),
                 )
             }
-            Object::Cone {
+            ObjectShape::Cone {
                 half_angle_rad,
                 height_m,
             } => Mesh::cone(half_angle_rad, height_m, self.size()),
@@ -330,7 +330,7 @@ impl Press {
     fn guide_mesh(&self, guide: &Guide) -> Mesh {
         let thickness: f64 = guide.thicknesses().iter().sum();
         let (mut lines, first) = match self.object {
-            Object::Cylinder { radius_m, .. } => {
+            ObjectShape::Cylinder { radius_m, .. } => {
                 let inside = self.rim_lines(radius_m.min(guide.radius_m()));
                 (inside, 2.0 * self.at_rim(radius_m.min(thickness)))
             }
@@ -348,7 +348,9 @@ impl Press {
         let left = guide.radius_m() - last;
         if left > 0.0 {
             let (step, growth) = match self.object {
-                Object::Cylinder { radius_m, .. } => (self.at_rim(radius_m), self.growth(1.25)),
+                ObjectShape::Cylinder { radius_m, .. } => {
+                    (self.at_rim(radius_m), self.growth(1.25))
+                }
                 object => (
                     0.2 * object.radius_m() * FINENESS as f64 / self.fineness as f64,
                     self.growth(1.4),
@@ -361,7 +363,7 @@ impl Press {
     }
 }
 
-impl Object {
+impl ObjectShape {
     fn check(&self) -> Result<(), ElasticityError> {
         match *self {
             Self::Ball { radius_m } | Self::HalfBall { radius_m } => {
@@ -415,18 +417,18 @@ impl Object {
     }
 }
 
-impl Scene {
+impl FemScene {
     /// The half of a ball next to its contact with a rigid flat; its equator slides freely, as it
-    /// does where the ball is pressed the same way from both sides. [`Press`] has other objects.
+    /// does where the ball is pressed the same way from both sides. [`ObjectPress`] has other objects.
     ///
     /// # Errors
     /// A radius that is not positive.
     pub(crate) fn ball_on_flat(radius_m: f64, material: Material) -> Result<Self, ElasticityError> {
-        Press::new(Object::Ball { radius_m }, material)?.scene()
+        ObjectPress::new(ObjectShape::Ball { radius_m }, material)?.scene()
     }
 
     /// The half of a ball on a guide, without friction; the ball's equator slides freely at its
-    /// height, the glass moves by the approach. [`Press`] has other objects.
+    /// height, the glass moves by the approach. [`ObjectPress`] has other objects.
     ///
     /// # Errors
     /// A radius that is not positive; a guide that is not wider than the ball.
@@ -435,7 +437,7 @@ impl Scene {
         material: Material,
         guide: &Guide,
     ) -> Result<Self, ElasticityError> {
-        Press::new(Object::Ball { radius_m }, material)?
+        ObjectPress::new(ObjectShape::Ball { radius_m }, material)?
             .on_guide(guide.clone())?
             .scene()
     }

@@ -8,7 +8,7 @@ use crate::error::{Quantity, positive};
 use crate::material::{Kinematics, Material};
 use crate::mesh::{BlockMesh, Boundary, Inclusion};
 use crate::model::{BondedInterface, Model, Support};
-use crate::press::{Guide, Object, Press};
+use crate::press::{Guide, ObjectPress, ObjectShape};
 use crate::state::{State, Stress};
 use crate::system::Layout;
 use tactile_elasticity::ElasticityError;
@@ -16,14 +16,14 @@ use tactile_elasticity::ElasticityError;
 /// Whether two surfaces that are pressed together slide.
 ///
 /// ```
-/// use tactile_fem::{Block, Guide, Interface, Layer, Load, Material, Scene};
+/// use tactile_fem::{Block, Guide, Interface, GuideLayer, AppliedLoad, Material, FemScene};
 ///
 /// let material = Material::new(1e4, 0.49).unwrap();
 /// let block = Block { height_m: 20e-3, radius_m: 30e-3, material, lump: None };
-/// let guide = Guide::new(vec![Layer { thickness_m: 5e-3, material }], 10e-3).unwrap();
+/// let guide = Guide::new(vec![GuideLayer { thickness_m: 5e-3, material }], 10e-3).unwrap();
 /// let force = |interface| {
-///     let scene = Scene::block_under_guide(&block, &guide, interface).unwrap();
-///     scene.solve(&[Load::Approach(0.2e-3)]).states[0].force_n()
+///     let scene = FemScene::block_under_guide(&block, &guide, interface).unwrap();
+///     scene.solve(&[AppliedLoad::Approach(0.2e-3)]).states[0].force_n()
 /// };
 /// assert!(force(Interface::Bonded) > force(Interface::Frictionless));
 /// ```
@@ -60,17 +60,17 @@ pub struct Lump {
 /// A cylindrical block of tissue whose far side is held.
 ///
 /// ```
-/// use tactile_fem::{Block, Guide, Interface, Layer, Load, Lump, Material, Scene};
+/// use tactile_fem::{Block, Guide, Interface, GuideLayer, AppliedLoad, Lump, Material, FemScene};
 ///
 /// let soft = Material::new(5e3, 0.495).unwrap();
 /// let stiff = Material::new(5e4, 0.495).unwrap();
 /// let lump = Lump { diameter_m: 10e-3, depth_m: 6e-3, material: stiff };
 /// let block = Block { height_m: 30e-3, radius_m: 40e-3, material: soft, lump: Some(lump) };
-/// let layer = Layer { thickness_m: 10e-3, material: stiff };
+/// let layer = GuideLayer { thickness_m: 10e-3, material: stiff };
 /// let guide = Guide::new(vec![layer], 16e-3).unwrap();
-/// let scene = Scene::block_under_guide(&block, &guide, Interface::Bonded).unwrap();
-/// let plain = Scene::block_under_guide(&Block { lump: None, ..block }, &guide, Interface::Bonded).unwrap();
-/// let force = |scene: &Scene| scene.solve(&[Load::Approach(1e-3)]).states[0].force_n();
+/// let scene = FemScene::block_under_guide(&block, &guide, Interface::Bonded).unwrap();
+/// let plain = FemScene::block_under_guide(&Block { lump: None, ..block }, &guide, Interface::Bonded).unwrap();
+/// let force = |scene: &FemScene| scene.solve(&[AppliedLoad::Approach(1e-3)]).states[0].force_n();
 /// assert!(force(&scene) > force(&plain));
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -92,19 +92,19 @@ const BLOCK_FINENESS: usize = 5;
 /// A model ready to be solved, with the pressure between guide and object as its result.
 ///
 /// ```
-/// use tactile_fem::{Load, Material, Object, Press};
+/// use tactile_fem::{AppliedLoad, Material, ObjectShape, ObjectPress};
 ///
-/// let scene = Press::new(Object::Ball { radius_m: 3e-3 }, Material::new(103e3, 0.495).unwrap()).and_then(|press| press.scene()).unwrap();
-/// let solution = scene.solve(&[Load::Force(0.2)]);
+/// let scene = ObjectPress::new(ObjectShape::Ball { radius_m: 3e-3 }, Material::new(103e3, 0.495).unwrap()).and_then(|press| press.scene()).unwrap();
+/// let solution = scene.solve(&[AppliedLoad::Force(0.2)]);
 /// let radius = solution.states[0].contact_radius().unwrap();
 /// assert!((radius.radius_m - 1.51e-3).abs() < 0.02e-3);
 /// ```
 #[derive(Debug, Clone)]
-pub struct Scene {
+pub struct FemScene {
     pub(crate) model: Model,
 }
 
-impl Scene {
+impl FemScene {
     /// A block with or without an inclusion under a guide's face; the block's far side is held, the
     /// guide's glass moves by the approach. [`Block`] and [`Interface`] have examples.
     ///
@@ -194,7 +194,7 @@ impl Scene {
     }
 
     /// Solves for the loads in order.
-    pub fn solve(&self, loads: &[Load]) -> Solution {
+    pub fn solve(&self, loads: &[AppliedLoad]) -> Solution {
         self.model.solve(loads)
     }
 
@@ -203,7 +203,7 @@ impl Scene {
     pub fn solve_near(
         &self,
         layout: &mut Layout,
-        loads: &[Load],
+        loads: &[AppliedLoad],
         near: Option<(&Self, &[State])>,
     ) -> Solution {
         let near = near.filter(|(scene, _)| scene.model.elements == self.model.elements);
@@ -222,8 +222,8 @@ impl Scene {
     /// Number of elements of all bodies.
     ///
     /// ```
-    /// # use tactile_fem::{Material, Object, Press};
-    /// let scene = Press::new(Object::Ball { radius_m: 3e-3 }, Material::new(1e5, 0.495).unwrap()).and_then(|press| press.scene()).unwrap();
+    /// # use tactile_fem::{Material, ObjectShape, ObjectPress};
+    /// let scene = ObjectPress::new(ObjectShape::Ball { radius_m: 3e-3 }, Material::new(1e5, 0.495).unwrap()).and_then(|press| press.scene()).unwrap();
     /// assert!(scene.element_count() > 100);
     /// ```
     pub fn element_count(&self) -> usize {
@@ -237,9 +237,9 @@ impl Scene {
     /// between elements. O(elements).
     ///
     /// ```
-    /// # use tactile_fem::{Load, Material, Object, Press};
-    /// let scene = Press::new(Object::Ball { radius_m: 3e-3 }, Material::new(1e5, 0.495).unwrap()).and_then(|press| press.scene()).unwrap();
-    /// let state = &scene.solve(&[Load::Approach(0.3e-3)]).states[0];
+    /// # use tactile_fem::{AppliedLoad, Material, ObjectShape, ObjectPress};
+    /// let scene = ObjectPress::new(ObjectShape::Ball { radius_m: 3e-3 }, Material::new(1e5, 0.495).unwrap()).and_then(|press| press.scene()).unwrap();
+    /// let state = &scene.solve(&[AppliedLoad::Approach(0.3e-3)]).states[0];
     /// // Pressed along the axis.
     /// assert!(scene.stress(state, [0.1e-3, 1e-3]).unwrap().zz_pa < 0.0);
     /// ```
@@ -251,14 +251,14 @@ impl Scene {
 /// One load: how far the driven boundaries have moved, or with what force.
 ///
 /// ```
-/// use tactile_fem::Load;
+/// use tactile_fem::AppliedLoad;
 ///
-/// let loads = [0.2, 0.7, 1.2].map(Load::Force);
-/// assert_eq!(loads[1], Load::Force(0.7));
+/// let loads = [0.2, 0.7, 1.2].map(AppliedLoad::Force);
+/// assert_eq!(loads[1], AppliedLoad::Force(0.7));
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub enum Load {
+pub enum AppliedLoad {
     /// The approach δ, in metres.
     Approach(f64),
     /// The force on the driven boundaries, in newtons; positive presses.
@@ -292,11 +292,11 @@ pub enum Outcome {
 /// What the solver did.
 ///
 /// ```
-/// use tactile_fem::{Load, Material, Object, Outcome, Press};
+/// use tactile_fem::{AppliedLoad, Material, ObjectShape, Outcome, ObjectPress};
 ///
 /// # fn main() -> Result<(), tactile_elasticity::ElasticityError> {
-/// let press = Press::new(Object::Ball { radius_m: 3e-3 }, Material::new(1e5, 0.495)?)?;
-/// let report = press.scene()?.solve(&[Load::Approach(0.3e-3)]).report;
+/// let press = ObjectPress::new(ObjectShape::Ball { radius_m: 3e-3 }, Material::new(1e5, 0.495)?)?;
+/// let report = press.scene()?.solve(&[AppliedLoad::Approach(0.3e-3)]).report;
 /// assert_eq!(report.outcome, Outcome::Solved);
 /// assert!(report.iterations > report.steps);
 /// # Ok(())
@@ -304,7 +304,7 @@ pub enum Outcome {
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
-pub struct Report {
+pub struct SolverReport {
     /// Whether all loads were reached.
     pub outcome: Outcome,
     /// Load steps that converged.
@@ -318,11 +318,11 @@ pub struct Report {
 /// States at the loads that were reached, in order, and a report.
 ///
 /// ```
-/// use tactile_fem::{Load, Material, Object, Outcome, Press};
+/// use tactile_fem::{AppliedLoad, Material, ObjectShape, Outcome, ObjectPress};
 ///
 /// # fn main() -> Result<(), tactile_elasticity::ElasticityError> {
-/// let press = Press::new(Object::Ball { radius_m: 3e-3 }, Material::new(1e5, 0.495)?)?;
-/// let solution = press.scene()?.solve(&[Load::Approach(0.3e-3), Load::Approach(f64::NAN)]);
+/// let press = ObjectPress::new(ObjectShape::Ball { radius_m: 3e-3 }, Material::new(1e5, 0.495)?)?;
+/// let solution = press.scene()?.solve(&[AppliedLoad::Approach(0.3e-3), AppliedLoad::Approach(f64::NAN)]);
 /// assert_eq!(solution.states.len(), 1);
 /// assert!(matches!(solution.report.outcome, Outcome::Stopped { load: 1, .. }));
 /// # Ok(())
@@ -333,10 +333,10 @@ pub struct Solution {
     /// One state a load.
     pub states: Vec<State>,
     /// What the solver did.
-    pub report: Report,
+    pub report: SolverReport,
 }
 
-impl Scene {
+impl FemScene {
     /// A cylinder between two rigid plates to which both faces stick, or on which they slide without friction. One half of it is
     /// solved: the other is its mirror image, and the approach is that of one plate to the middle, half of the whole squeeze.
     ///
@@ -345,12 +345,12 @@ impl Scene {
     /// lie on the plate is not followed: at a squeeze of 10 % it does so over some hundredths of the radius.
     ///
     /// ```
-    /// use tactile_fem::{Interface, Load, Material, Scene};
+    /// use tactile_fem::{Interface, AppliedLoad, Material, FemScene};
     ///
     /// let material = Material::new(103e3, 0.495)?;
     /// let force = |faces| {
-    ///     let scene = Scene::cylinder_between_plates(6e-3, 6e-3, material, faces)?;
-    ///     Ok::<_, tactile_elasticity::ElasticityError>(scene.solve(&[Load::Approach(0.15e-3)]).states[0].force_n())
+    ///     let scene = FemScene::cylinder_between_plates(6e-3, 6e-3, material, faces)?;
+    ///     Ok::<_, tactile_elasticity::ElasticityError>(scene.solve(&[AppliedLoad::Approach(0.15e-3)]).states[0].force_n())
     /// };
     /// assert!(force(Interface::Bonded)? > 1.2 * force(Interface::Frictionless)?);
     /// # Ok::<(), tactile_elasticity::ElasticityError>(())
@@ -364,11 +364,11 @@ impl Scene {
         material: Material,
         faces: Interface,
     ) -> Result<Self, ElasticityError> {
-        let half = Object::Cylinder {
+        let half = ObjectShape::Cylinder {
             radius_m,
             height_m: 0.5 * height_m,
         };
-        let mesh = Press::new(half, material)?.object_mesh();
+        let mesh = ObjectPress::new(half, material)?.object_mesh();
         let mut model = Model::new(Kinematics::Finite);
         let cylinder = model.add(&mesh, &[material])?;
         let support = match faces {

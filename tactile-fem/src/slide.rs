@@ -11,7 +11,7 @@
 //! block's height and by about 2 % at a tenth, which the search does not allow for.
 
 use crate::model::Model;
-use crate::scene::{Load, Scene};
+use crate::scene::{AppliedLoad, FemScene};
 use crate::state::State;
 use crate::system::Layout;
 
@@ -36,7 +36,7 @@ struct Pair {
     lower: usize,
 }
 
-impl Scene {
+impl FemScene {
     /// Scene and state at an approach with surfaces that slide; those of a bonded interface unchanged.
     ///
     /// `depth_m` is how far below the surface the mesh may move; `near` a solution nearby, on a mesh with
@@ -48,7 +48,7 @@ impl Scene {
         depth_m: f64,
         near: Option<(&Self, &State)>,
     ) -> Option<(Self, State)> {
-        let load = [Load::Approach(approach_m)];
+        let load = [AppliedLoad::Approach(approach_m)];
         let near = near.filter(|(scene, _)| scene.model.elements == self.model.elements);
         let mut scene = match near {
             Some((near, state)) => {

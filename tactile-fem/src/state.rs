@@ -12,10 +12,10 @@ use crate::recovery::ContactProfile;
 /// The deformed bodies at one load.
 ///
 /// ```
-/// use tactile_fem::{Load, Material, Object, Press};
+/// use tactile_fem::{AppliedLoad, Material, ObjectShape, ObjectPress};
 ///
-/// let scene = Press::new(Object::Ball { radius_m: 3e-3 }, Material::new(1e5, 0.495).unwrap()).and_then(|press| press.scene()).unwrap();
-/// let state = &scene.solve(&[Load::Approach(0.3e-3)]).states[0];
+/// let scene = ObjectPress::new(ObjectShape::Ball { radius_m: 3e-3 }, Material::new(1e5, 0.495).unwrap()).and_then(|press| press.scene()).unwrap();
+/// let state = &scene.solve(&[AppliedLoad::Approach(0.3e-3)]).states[0];
 /// assert_eq!(state.approach_m(), 0.3e-3);
 /// assert!(state.force_n() > 0.0);
 /// ```
@@ -71,9 +71,9 @@ impl State {
     /// points of [`Self::pressure`]; constant beyond the last, zero without contact.
     ///
     /// ```
-    /// # use tactile_fem::{Load, Material, Object, Press};
-    /// let scene = Press::new(Object::Ball { radius_m: 3e-3 }, Material::new(1e5, 0.495).unwrap()).and_then(|press| press.scene()).unwrap();
-    /// let state = &scene.solve(&[Load::Approach(0.3e-3)]).states[0];
+    /// # use tactile_fem::{AppliedLoad, Material, ObjectShape, ObjectPress};
+    /// let scene = ObjectPress::new(ObjectShape::Ball { radius_m: 3e-3 }, Material::new(1e5, 0.495).unwrap()).and_then(|press| press.scene()).unwrap();
+    /// let state = &scene.solve(&[AppliedLoad::Approach(0.3e-3)]).states[0];
     /// assert!(state.pressure_at(0.1e-3) > state.pressure_at(0.5e-3));
     /// ```
     pub fn pressure_at(&self, radius_m: f64) -> f64 {
@@ -92,10 +92,10 @@ impl State {
 /// Pressure at a point of a contact or of a bonded interface.
 ///
 /// ```
-/// use tactile_fem::{Load, Material, Object, Press};
+/// use tactile_fem::{AppliedLoad, Material, ObjectShape, ObjectPress};
 ///
-/// let scene = Press::new(Object::Ball { radius_m: 3e-3 }, Material::new(1e5, 0.495).unwrap()).and_then(|press| press.scene()).unwrap();
-/// let state = &scene.solve(&[Load::Approach(0.3e-3)]).states[0];
+/// let scene = ObjectPress::new(ObjectShape::Ball { radius_m: 3e-3 }, Material::new(1e5, 0.495).unwrap()).and_then(|press| press.scene()).unwrap();
+/// let state = &scene.solve(&[AppliedLoad::Approach(0.3e-3)]).states[0];
 /// assert!(state.pressure()[0].pressure_pa > state.pressure()[5].pressure_pa);
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -112,10 +112,10 @@ pub struct PressurePoint {
 /// A contact radius and how far the mesh leaves it open.
 ///
 /// ```
-/// use tactile_fem::{Load, Material, Object, Press};
+/// use tactile_fem::{AppliedLoad, Material, ObjectShape, ObjectPress};
 ///
-/// let scene = Press::new(Object::Ball { radius_m: 3e-3 }, Material::new(1e5, 0.495).unwrap()).and_then(|press| press.scene()).unwrap();
-/// let state = &scene.solve(&[Load::Approach(0.3e-3)]).states[0];
+/// let scene = ObjectPress::new(ObjectShape::Ball { radius_m: 3e-3 }, Material::new(1e5, 0.495).unwrap()).and_then(|press| press.scene()).unwrap();
+/// let state = &scene.solve(&[AppliedLoad::Approach(0.3e-3)]).states[0];
 /// let radius = state.contact_radius().unwrap();
 /// assert!(radius.uncertainty_m < 0.01 * radius.radius_m);
 /// ```
@@ -155,11 +155,11 @@ pub fn pressure_at(points: &[PressurePoint], radius: f64) -> f64 {
 /// The Cauchy stress at a point, in pascals, tension positive; the components rθ and zθ are zero.
 ///
 /// ```
-/// use tactile_fem::{Interface, Load, Material, Scene};
+/// use tactile_fem::{Interface, AppliedLoad, Material, FemScene};
 ///
 /// // A cylinder free to slide between plates, squeezed by a thousandth: σzz = −E/1000 nearly.
-/// let scene = Scene::cylinder_between_plates(2e-3, 2e-3, Material::new(1e5, 0.45)?, Interface::Frictionless)?;
-/// let state = &scene.solve(&[Load::Approach(1e-6)]).states[0];
+/// let scene = FemScene::cylinder_between_plates(2e-3, 2e-3, Material::new(1e5, 0.45)?, Interface::Frictionless)?;
+/// let state = &scene.solve(&[AppliedLoad::Approach(1e-6)]).states[0];
 /// let stress = scene.stress(state, [0.7e-3, 0.4e-3]).expect("a point of the cylinder");
 /// assert!((stress.zz_pa / -100.0 - 1.0).abs() < 5e-3 && stress.rr_pa.abs() < 0.5);
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())

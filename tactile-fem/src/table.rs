@@ -1,7 +1,7 @@
 //! Contact tables by finite elements.
 
 use crate::error::{Quantity, positive};
-use crate::{Guide, Layer, Load, Material, Scene, State};
+use crate::{AppliedLoad, FemScene, Guide, GuideLayer, Material, State};
 use core::ops::ControlFlow;
 use tactile_elasticity::ElasticityError;
 use tactile_elasticity::contact::{Bond, ContactCurve, ContactTable, Waveguide};
@@ -235,27 +235,32 @@ impl Ball {
         Ok(curve)
     }
 
-    fn scene(&self, guide: &Waveguide) -> Result<Scene, ElasticityError> {
+    fn scene(&self, guide: &Waveguide) -> Result<FemScene, ElasticityError> {
         let material = |e, nu: f64| Material::new(e, nu.min(LARGEST_POISSON_RATIO));
         let ball = material(self.youngs_modulus_pa, self.poisson_ratio)?;
         if guide.layers().is_empty() {
-            return Scene::ball_on_flat(self.radius_m, ball);
+            return FemScene::ball_on_flat(self.radius_m, ball);
         }
         let present = guide.layers().iter().filter(|l| l.thickness_m > 0.0);
         let layers: Result<Vec<_>, _> = present
             .map(|l| {
-                Ok::<_, ElasticityError>(Layer {
+                Ok::<_, ElasticityError>(GuideLayer {
                     thickness_m: l.thickness_m,
                     material: material(l.youngs_modulus_pa, l.poisson_ratio)?,
                 })
             })
             .collect();
         let radius = (GUIDE_RADIUS[0] * self.radius_m).max(GUIDE_RADIUS[1] * guide.thickness_m());
-        Scene::ball_on_guide(self.radius_m, ball, &Guide::new(layers?, radius)?)
+        FemScene::ball_on_guide(self.radius_m, ball, &Guide::new(layers?, radius)?)
     }
 
     /// Forces at which the layered law expects contact radii in equal steps.
-    fn loads(&self, guide: &Waveguide, law: &WaveguideLaw, options: &TableOptions) -> Vec<Load> {
+    fn loads(
+        &self,
+        guide: &Waveguide,
+        law: &WaveguideLaw,
+        options: &TableOptions,
+    ) -> Vec<AppliedLoad> {
         let compliance = |e: f64, nu: f64| (1.0 - nu * nu) / e;
         let own = compliance(self.youngs_modulus_pa, self.poisson_ratio);
         let touched = guide.layers().iter().find(|l| l.thickness_m > 0.0);
@@ -268,7 +273,7 @@ impl Ball {
                 (SMALLEST_RATIO + step) * self.radius_m
             })
             .filter_map(|a| law.of_contact_radius(a, other * reduced))
-            .map(|force| Load::Force(reduced * force.value.exp()))
+            .map(|force| AppliedLoad::Force(reduced * force.value.exp()))
             .collect()
     }
 }

@@ -1,21 +1,21 @@
 //! Meshes and states as files that ParaView, VisIt and meshio read.
 
-use crate::scene::Scene;
+use crate::scene::FemScene;
 use crate::state::State;
 use std::io::{Result, Write};
 
 /// VTK's number of the nine-node quadrilateral; its nodes come in the order of ours.
 const BIQUADRATIC_QUAD: u8 = 28;
 
-impl Scene {
+impl FemScene {
     /// Writes the undeformed mesh of all bodies with a state's fields in VTK's legacy text format: at the nodes the displacement (m), in the
     /// elements Young's modulus (Pa) and the Cauchy stress at their centres (Pa, tension positive). x is r, y is z.
     ///
     /// ```
-    /// use tactile_fem::{Load, Material, Object, Press};
+    /// use tactile_fem::{AppliedLoad, Material, ObjectShape, ObjectPress};
     ///
-    /// let scene = Press::new(Object::Ball { radius_m: 3e-3 }, Material::new(1e5, 0.495).unwrap()).and_then(|press| press.scene()).unwrap();
-    /// let state = &scene.solve(&[Load::Approach(0.3e-3)]).states[0];
+    /// let scene = ObjectPress::new(ObjectShape::Ball { radius_m: 3e-3 }, Material::new(1e5, 0.495).unwrap()).and_then(|press| press.scene()).unwrap();
+    /// let state = &scene.solve(&[AppliedLoad::Approach(0.3e-3)]).states[0];
     /// let mut file = Vec::new();
     /// scene.write_vtk(state, &mut file)?;
     /// let text = String::from_utf8(file).unwrap();

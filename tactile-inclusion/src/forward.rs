@@ -6,8 +6,8 @@
 
 use std::sync::Arc;
 use tactile_fem::{
-    Block, Found, Guide, Interface, Kinematics, Layout, Load, Lump, Material, Outcome,
-    PressurePoint, Relaxation, Scene, State, pressure_at,
+    AppliedLoad, Block, FemScene, Found, Guide, Interface, Kinematics, Layout, Lump, Material,
+    Outcome, PressurePoint, Relaxation, State, pressure_at,
 };
 
 /// A block's unknowns.
@@ -234,12 +234,12 @@ pub struct Prediction {
 pub struct Solved {
     meshed: Arc<Meshed>,
     /// One for all frames; where surfaces slide, one a frame.
-    scenes: Vec<Scene>,
+    scenes: Vec<FemScene>,
     states: Vec<State>,
 }
 
 impl Solved {
-    fn scene(&self, frame: usize) -> &Scene {
+    fn scene(&self, frame: usize) -> &FemScene {
         &self.scenes[frame.min(self.scenes.len() - 1)]
     }
 }
@@ -250,7 +250,7 @@ impl Solved {
 /// solutions on one mesh, moved.
 #[derive(Debug, Clone)]
 struct Meshed {
-    scene: Scene,
+    scene: FemScene,
     parameters: Parameters,
     /// Of this mesh's equations, however it is moved.
     layout: Layout,
@@ -297,7 +297,7 @@ impl Forward {
         self.interface == Interface::Frictionless && self.kinematics == Kinematics::Finite
     }
 
-    fn scene(&self, parameters: &Parameters) -> Option<Scene> {
+    fn scene(&self, parameters: &Parameters) -> Option<FemScene> {
         let material = |modulus| Material::new(modulus, parameters.poisson_ratio).ok();
         let lump = match parameters.lump {
             None => None,
@@ -313,7 +313,7 @@ impl Forward {
             material: material(parameters.block_modulus_pa)?,
             lump,
         };
-        Scene::block_with_mesh(
+        FemScene::block_with_mesh(
             &block,
             &self.guide,
             self.interface,
@@ -352,7 +352,8 @@ impl Forward {
         let solved = if self.slides() {
             self.solve_sliding(meshed, &scene, parameters, &approaches, near)?
         } else {
-            let loads: Vec<Load> = approaches.into_iter().map(Load::Approach).collect();
+            let loads: Vec<AppliedLoad> =
+                approaches.into_iter().map(AppliedLoad::Approach).collect();
             let near = near.map(|near| (near.scene(0), near.states.as_slice()));
             let solution = scene.solve_near(&mut meshed.layout.clone(), &loads, near);
             if solution.report.outcome != Outcome::Solved {
@@ -372,7 +373,7 @@ impl Forward {
     fn solve_sliding(
         &self,
         meshed: Arc<Meshed>,
-        scene: &Scene,
+        scene: &FemScene,
         parameters: &Parameters,
         approaches_m: &[f64],
         near: Option<&Solved>,
@@ -396,7 +397,7 @@ impl Forward {
     }
 
     /// The scene of parameters near those of `scene`, on its mesh.
-    fn changed(&self, scene: &Scene, from: &Parameters, to: &Parameters) -> Option<Scene> {
+    fn changed(&self, scene: &FemScene, from: &Parameters, to: &Parameters) -> Option<FemScene> {
         let tissue = self.guide.layers().len();
         let material = |modulus| Material::new(modulus, to.poisson_ratio).ok();
         let mut materials = vec![(tissue, material(to.block_modulus_pa)?)];
@@ -436,7 +437,7 @@ impl Forward {
         let moved: Vec<Parameters> = (coordinates.iter())
             .map(|&coordinate| parameters.moved(coordinate, parameters.small_step(coordinate)))
             .collect();
-        let changed = |scene: &Scene| -> Option<Vec<Scene>> {
+        let changed = |scene: &FemScene| -> Option<Vec<FemScene>> {
             (moved.iter())
                 .map(|moved| self.changed(scene, parameters, moved))
                 .collect()
@@ -453,8 +454,8 @@ impl Forward {
             let scene = solved.scene(frame);
             let neighbourhood = scene.neighbourhood(&mut layout, state)?;
             let approach = |parameters: &Parameters| self.approaches_m[frame] + parameters.zero_m;
-            let solve = |nearby: &[Scene]| {
-                let mut at: Vec<(&Scene, f64)> = (nearby.iter().zip(&moved))
+            let solve = |nearby: &[FemScene]| {
+                let mut at: Vec<(&FemScene, f64)> = (nearby.iter().zip(&moved))
                     .map(|(scene, moved)| (scene, approach(moved)))
                     .collect();
                 at.push((scene, approach(parameters)));

@@ -1,11 +1,10 @@
 #![doc = include_str!("../README.md")]
 //!
 //! # Method
-//! The unknowns are the diameter D, the depth d of the top, the inclusion's modulus E₁ and the block's
-//! E₀; the block's height, Poisson's ratio and the zero of the approaches are known with errors. The
-//! model is [`Scene::block_under_guide`](tactile_fem::Scene::block_under_guide) at finite strain: how the
-//! pressure grows with the approach is what tells size from stiffness, which linear elasticity hardly
-//! can.
+//! The unknowns are the diameter D, the depth d of the top, the inclusion's modulus E₁ and the block's E₀.
+//! The block's height, Poisson's ratio and the zero of the approaches are known with errors. The model is
+//! [`FemScene::block_under_guide`](tactile_fem::FemScene::block_under_guide) at finite strain: size and
+//! stiffness differ in how the pressure grows with the approach, which linear elasticity hardly shows.
 //!
 //! With y the measured ring means and forces, m(φ) the model's, C the covariance of the sensor's and
 //! the model's errors and a Gaussian prior of mean φ₀ and covariance P,
@@ -13,10 +12,12 @@
 //! $$ -2 \ln p(\varphi | y) = (y - m)^T C^{-1} (y - m) + (\varphi - \varphi_0)^T P^{-1} (\varphi - \varphi_0) + c $$
 //!
 //! is minimised over φ = (ln E₀, zero, ln H, ν, ln D, ln d, ln E₁). Its second derivative there gives
-//! errors and correlations, its determinant the evidence (Laplace), whose ratio with and without
-//! inclusion is the odds that there is one. The intervals of D, d and E₁ follow the posterior along ln E₁,
-//! for it is far from Gaussian: beyond some contrast a stiffer inclusion changes the pressure no
-//! more, and a small stiff one is hardly told from a large one that is little stiffer than the tissue. Where bonded and frictionless
+//! errors and correlations, its determinant the evidence (Laplace). The ratio of the evidence with and
+//! without inclusion is the odds that there is one.
+//!
+//! The posterior is far from Gaussian: beyond some contrast a stiffer inclusion changes the pressure no
+//! more, and a small stiff one is hardly different from a large one that is little stiffer than the tissue.
+//! The intervals of D, d and E₁ therefore follow the posterior along ln E₁. Where bonded and frictionless
 //! faces explain the frames about equally well the intervals hold those of both.
 //!
 //! # References

@@ -43,14 +43,14 @@ const RIVAL_EVIDENCE: f64 = 16.0;
 /// and without one.
 ///
 /// ```no_run
-/// use tactile_fem::{Guide, Layer, Material};
+/// use tactile_fem::{Guide, GuideLayer, Material};
 /// use core::ops::ControlFlow;
 /// use tactile_inclusion::{
 ///     AssumedInclusion, InclusionSearch, PressureProfile, SensorErrors, Specimen,
 /// };
 ///
 /// # fn example(radii_m: Vec<f64>, frames: Vec<PressureProfile>) -> Result<(), tactile_elasticity::ElasticityError> {
-/// let layer = Layer { thickness_m: 10e-3, material: Material::new(60e3, 0.495)? };
+/// let layer = GuideLayer { thickness_m: 10e-3, material: Material::new(60e3, 0.495)? };
 /// let guide = Guide::new(vec![layer], 16e-3)?;
 /// let search = InclusionSearch::new(Specimen::new(30e-3, 40e-3)?, guide)?;
 /// // A sensor whose calibration is twice as good as usual.

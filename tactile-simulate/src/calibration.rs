@@ -1,10 +1,10 @@
 //! The calibration of the sensor: integrated pixel value against the force of a gauge, loading and unloading (Fig. 9).
 
 use crate::camera::{Purpose, row_stream};
-use crate::contact::ContactLaw;
+use crate::contact::ContactModel;
 use crate::error::{SimulateError, not_negative, positive, within};
 use crate::light::Illumination;
-use crate::press::{Elastic, Load, PressScene, Sphere};
+use crate::press::{Elastic, ElasticSphere, PressLoad, PressScene};
 use ndarray::Array2;
 use rand_distr::{Distribution, StandardNormal};
 use tactile_imaging::force::{Branch, CalibrationPair};
@@ -12,19 +12,19 @@ use tactile_imaging::force::{Branch, CalibrationPair};
 /// How a calibration is run.
 ///
 /// ```
-/// use tactile_simulate::{CalibrationOptions, Camera, PressOptions, PressScene};
+/// use tactile_simulate::{CalibrationRun, Camera, PressOptions, PressScene};
 /// let camera = Camera::default().coarser(16);
 /// let scene = PressScene::new(PressOptions { camera, ..PressOptions::default() })?;
-/// let options = CalibrationOptions { largest_force_n: 1.0, steps: 4, ..CalibrationOptions::default() };
+/// let options = CalibrationRun { largest_force_n: 1.0, steps: 4, ..CalibrationRun::default() };
 /// let forces = scene.calibrate(&options)?.true_forces_n;
 /// assert_eq!(forces, [0.0, 0.25, 0.5, 0.75, 1.0, 0.75, 0.5, 0.25, 0.0]);
 /// # Ok::<(), tactile_simulate::SimulateError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct CalibrationOptions {
+pub struct CalibrationRun {
     /// What is pressed on the sensor.
-    pub indenter: Sphere,
+    pub indenter: ElasticSphere,
     /// The largest force in newton.
     pub largest_force_n: f64,
     /// Equal steps from 0 to the largest force; the way back takes as many.
@@ -36,10 +36,10 @@ pub struct CalibrationOptions {
     pub hysteresis: f64,
 }
 
-impl Default for CalibrationOptions {
+impl Default for CalibrationRun {
     /// A rigid sphere of 10 mm radius, 0 to 2 N in 20 steps and back, 2 mN of gauge noise, no hysteresis.
     fn default() -> Self {
-        let indenter = Sphere {
+        let indenter = ElasticSphere {
             radius_m: 10e-3,
             material: Elastic::RIGID,
         };
@@ -56,10 +56,10 @@ impl Default for CalibrationOptions {
 /// A whole calibration.
 ///
 /// ```
-/// use tactile_simulate::{CalibrationOptions, Camera, PressOptions, PressScene};
+/// use tactile_simulate::{CalibrationRun, Camera, PressOptions, PressScene};
 /// let camera = Camera::default().coarser(16);
 /// let scene = PressScene::new(PressOptions { camera, ..PressOptions::default() })?;
-/// let series = scene.calibrate(&CalibrationOptions { steps: 8, ..CalibrationOptions::default() })?;
+/// let series = scene.calibrate(&CalibrationRun { steps: 8, ..CalibrationRun::default() })?;
 /// let (light, force) = series.pairs.iter().fold((0.0, 0.0), |sum, p| (sum.0 + p.integrated_pixel_value, sum.1 + p.force_n));
 /// let lens = 1.0 - camera.vignetting; // the most that the corners lose
 /// let slope = force / light / series.newton_per_grey;
@@ -90,10 +90,10 @@ impl PressScene {
     /// ```
     /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
     /// use tactile_imaging::{Object, Pipeline};
-    /// use tactile_simulate::{CalibrationOptions, Camera, PressOptions, PressScene};
+    /// use tactile_simulate::{CalibrationRun, Camera, PressOptions, PressScene};
     /// let camera = Camera::default().coarser(16);
     /// let scene = PressScene::new(PressOptions { camera, ..PressOptions::default() })?;
-    /// let series = scene.calibrate(&CalibrationOptions { steps: 8, ..CalibrationOptions::default() })?;
+    /// let series = scene.calibrate(&CalibrationRun { steps: 8, ..CalibrationRun::default() })?;
     /// let pipeline = Pipeline::from_pairs(&series.pairs, camera.pixel_size_m, Object::sphere(3e-3))?;
     /// let (reference, frame) = (scene.reference(0), scene.frame(0, 0));
     /// let mut press = pipeline.press(reference.view())?;
@@ -106,10 +106,7 @@ impl PressScene {
     /// # Errors
     /// [`SimulateError::OutOfRange`] for an option without meaning; [`SimulateError::CalibrationSaturates`] where a pixel's light is beyond the
     /// camera's range.
-    pub fn calibrate(
-        &self,
-        options: &CalibrationOptions,
-    ) -> Result<CalibrationSeries, SimulateError> {
+    pub fn calibrate(&self, options: &CalibrationRun) -> Result<CalibrationSeries, SimulateError> {
         options.validate()?;
         let (camera, seed) = (self.options().camera, self.options().seed);
         let dark = camera.compose(&[], &Illumination::default());
@@ -149,11 +146,11 @@ impl PressScene {
     /// suits the low pressure of a large or soft object is too high for a small rigid ball.
     ///
     /// ```
-    /// use tactile_simulate::{CalibrationOptions, Camera, Elastic, PressOptions, PressScene, Sphere};
+    /// use tactile_simulate::{CalibrationRun, Camera, Elastic, PressOptions, PressScene, ElasticSphere};
     /// let camera = Camera::default().coarser(16);
-    /// let object = Sphere { radius_m: 20e-3, material: Elastic::CL2003X };
+    /// let object = ElasticSphere { radius_m: 20e-3, material: Elastic::CL2003X };
     /// let scene = PressScene::new(PressOptions { camera, object, ..PressOptions::default() })?;
-    /// let given = CalibrationOptions::default();
+    /// let given = CalibrationRun::default();
     /// assert!(scene.calibrate(&given).is_err());
     /// assert!(scene.calibrate(&scene.unsaturated(given)?).is_ok());
     /// # Ok::<(), tactile_simulate::SimulateError>(())
@@ -164,8 +161,8 @@ impl PressScene {
     /// saturates too.
     pub fn unsaturated(
         &self,
-        mut options: CalibrationOptions,
-    ) -> Result<CalibrationOptions, SimulateError> {
+        mut options: CalibrationRun,
+    ) -> Result<CalibrationRun, SimulateError> {
         options.validate()?;
         // Light grows with the force on both branches.
         let force_n = options.largest_force_n;
@@ -181,15 +178,15 @@ impl PressScene {
     /// The light of an indenter at a normal force.
     fn calibration_light(
         &self,
-        indenter: Sphere,
+        indenter: ElasticSphere,
         force_n: f64,
     ) -> Result<Array2<f64>, SimulateError> {
         // A table belongs to the scene's own object.
         let law = match &self.options().law {
-            ContactLaw::Tabulated(_) | ContactLaw::FiniteElements => ContactLaw::Hertz,
+            ContactModel::Tabulated(_) | ContactModel::FiniteElements => ContactModel::Hertz,
             closed_form => closed_form.clone(),
         };
-        let press = self.with_press(indenter, law, Load::normal(force_n))?;
+        let press = self.with_press(indenter, law, PressLoad::normal(force_n))?;
         Ok(press.expected_frame(0))
     }
 }
@@ -198,7 +195,7 @@ fn is_beyond_range(light: &Array2<f64>) -> bool {
     light.iter().any(|&grey| grey > BRIGHTEST)
 }
 
-impl CalibrationOptions {
+impl CalibrationRun {
     /// Up in equal steps from zero, and down again to zero.
     fn forces(&self) -> impl Iterator<Item = (Branch, f64)> {
         let (steps, largest) = (self.steps, self.largest_force_n);

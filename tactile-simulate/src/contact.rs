@@ -7,7 +7,7 @@
 //! Contacts by finite elements that come with the crate.
 
 use crate::error::{SimulateError, at_least, finite, not_negative, positive, within};
-use crate::press::{Elastic, Sphere, Waveguide};
+use crate::press::{Elastic, ElasticSphere, LightGuide};
 use std::borrow::Cow;
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -15,8 +15,8 @@ use std::f64::consts::{FRAC_PI_2, PI};
 ///
 /// ```
 /// use std::f64::consts::PI;
-/// use tactile_simulate::{Load, PressOptions, PressScene};
-/// let scene = PressScene::new(PressOptions { loads: vec![Load::normal(0.01)], ..PressOptions::default() })?;
+/// use tactile_simulate::{PressLoad, PressOptions, PressScene};
+/// let scene = PressScene::new(PressOptions { loads: vec![PressLoad::normal(0.01)], ..PressOptions::default() })?;
 /// let contact = scene.truth(0).contact;
 /// let (a, r, e) = (contact.contact_radius_m, contact.sphere_radius_m, contact.effective_modulus_pa);
 /// let near = |found: f64, expected: f64| (found / expected - 1.0).abs() < 1e-12;
@@ -27,7 +27,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
-pub struct Contact {
+pub struct SimulatedContact {
     /// Normal force in newton.
     pub force_n: f64,
     /// Radius of the undeformed sphere in metres.
@@ -47,15 +47,15 @@ pub struct Contact {
     given: Option<ContactState>,
 }
 
-impl Contact {
+impl SimulatedContact {
     /// The contact of `sphere` on `waveguide` at `force_n` ≥ 0.
     ///
     /// # Errors
     /// [`SimulateError::OutOfRange`] for a force beyond the last state of a tabulated contact.
     pub(crate) fn new(
-        sphere: &Sphere,
-        waveguide: &Waveguide,
-        law: &ContactLaw,
+        sphere: &ElasticSphere,
+        waveguide: &LightGuide,
+        law: &ContactModel,
         force_n: f64,
     ) -> Result<Self, SimulateError> {
         let largest = law.largest_force_n(sphere, waveguide)?;
@@ -69,7 +69,7 @@ impl Contact {
             });
         }
         Ok(match law {
-            ContactLaw::Tatara => Self {
+            ContactModel::Tatara => Self {
                 indentation_m: hertz.indentation_m
                     - far_side_m(sphere, force_n, hertz.contact_radius_m),
                 ..hertz
@@ -78,7 +78,7 @@ impl Contact {
         })
     }
 
-    fn hertz(sphere: &Sphere, waveguide: &Waveguide, force_n: f64) -> Self {
+    fn hertz(sphere: &ElasticSphere, waveguide: &LightGuide, force_n: f64) -> Self {
         let body = waveguide.series();
         let sphere_compliance = sphere.material.plane_strain_compliance();
         let waveguide_compliance = body.plane_strain_compliance();
@@ -189,24 +189,24 @@ impl Contact {
 /// Where pressure, contact radius and indentation at a force come from.
 ///
 /// ```
-/// use tactile_simulate::{ContactLaw, PressOptions, PressScene};
+/// use tactile_simulate::{ContactModel, PressOptions, PressScene};
 /// let contact = |law| {
 ///     let scene = PressScene::new(PressOptions { law, ..PressOptions::default() })?;
 ///     Ok::<_, tactile_simulate::SimulateError>(scene.truth(0).contact)
 /// };
-/// let (hertz, tatara) = (contact(ContactLaw::Hertz)?, contact(ContactLaw::Tatara)?);
+/// let (hertz, tatara) = (contact(ContactModel::Hertz)?, contact(ContactModel::Tatara)?);
 /// assert_eq!(hertz.indentation_m, hertz.contact_radius_m.powi(2) / hertz.sphere_radius_m);
 /// assert_eq!(tatara.contact_radius_m, hertz.contact_radius_m);
 /// assert!(tatara.indentation_m < hertz.indentation_m);
 /// // 0.7 N: a/R is 0.92. Springs in series make the layers too soft.
-/// let solved = contact(ContactLaw::FiniteElements)?;
+/// let solved = contact(ContactModel::FiniteElements)?;
 /// assert!((solved.contact_radius_m / 2.75e-3 - 1.0).abs() < 0.01 && hertz.contact_radius_m > 1.15 * solved.contact_radius_m);
 /// # Ok::<(), tactile_simulate::SimulateError>(())
 /// ```
 #[derive(Debug, Clone, PartialEq, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
-pub enum ContactLaw {
+pub enum ContactModel {
     /// Hertz (1882): a³ = 3FR/(4E*), δ = a²/R. Small contact, a ≪ R; the simulator obeys it at any load.
     #[default]
     Hertz,
@@ -219,7 +219,7 @@ pub enum ContactLaw {
     /// Y. Tatara, J. Eng. Mater. Technol. 113 (1991) 285–291.
     Tatara,
     /// Finite elements at finite strain: the contacts of a ball of 3 mm of [`CL2000X`](crate::Elastic::CL2000X) or
-    /// [`CL2003X`](crate::Elastic::CL2003X) on the [default waveguide](crate::Waveguide::default) up to 1.3 N, neo-Hookean and without friction, as
+    /// [`CL2003X`](crate::Elastic::CL2003X) on the [default waveguide](crate::LightGuide::default) up to 1.3 N, neo-Hookean and without friction, as
     /// `examples/contact_states.rs` computes them. Another ball or waveguide is refused: give its contacts as
     /// [`Tabulated`](Self::Tabulated). Between the states as there.
     FiniteElements,
@@ -230,7 +230,7 @@ pub enum ContactLaw {
     Tabulated(Vec<ContactState>),
 }
 
-impl ContactLaw {
+impl ContactModel {
     pub(crate) fn validate(&self) -> Result<(), SimulateError> {
         let Self::Tabulated(states) = self else {
             return Ok(());
@@ -254,8 +254,8 @@ impl ContactLaw {
     /// [`SimulateError::NoFiniteElements`].
     pub(crate) fn largest_force_n(
         &self,
-        sphere: &Sphere,
-        waveguide: &Waveguide,
+        sphere: &ElasticSphere,
+        waveguide: &LightGuide,
     ) -> Result<f64, SimulateError> {
         let states = self.states(sphere, waveguide)?;
         let largest = |last: &ContactState| last.force_n * (1.0 + EQUAL_FORCES);
@@ -268,8 +268,8 @@ impl ContactLaw {
     /// [`SimulateError::NoFiniteElements`].
     pub(crate) fn states(
         &self,
-        sphere: &Sphere,
-        waveguide: &Waveguide,
+        sphere: &ElasticSphere,
+        waveguide: &LightGuide,
     ) -> Result<Option<Cow<'_, [ContactState]>>, SimulateError> {
         match self {
             Self::Hertz | Self::Tatara => Ok(None),
@@ -284,8 +284,8 @@ impl ContactLaw {
     }
 }
 
-/// What the opposite contact takes off the approach by [`ContactLaw::Tatara`], in metres.
-fn far_side_m(sphere: &Sphere, force_n: f64, a: f64) -> f64 {
+/// What the opposite contact takes off the approach by [`ContactModel::Tatara`], in metres.
+fn far_side_m(sphere: &ElasticSphere, force_n: f64, a: f64) -> f64 {
     let (nu, r) = (sphere.material.poisson_ratio, sphere.radius_m);
     let d = (a * a + 4.0 * r * r).sqrt();
     force_n / (PI * sphere.material.youngs_modulus_pa)
@@ -306,7 +306,7 @@ const EQUAL_FORCES: f64 = 1e-9;
 /// The pressure is scaled to carry `force_n` exactly.
 ///
 /// ```
-/// use tactile_simulate::{Camera, ContactLaw, ContactState, Load, PressOptions, PressScene};
+/// use tactile_simulate::{Camera, ContactModel, ContactState, PressLoad, PressOptions, PressScene};
 /// let camera = Camera::default().coarser(16);
 /// // A flat-topped pressure: 1.2 N on a disc of 4 mm radius, level in its inner half.
 /// let radius_m: Vec<f64> = (0..=40).map(|k| 1e-4 * f64::from(k)).collect();
@@ -320,8 +320,8 @@ const EQUAL_FORCES: f64 = 1e-9;
 ///     radius_m,
 /// };
 /// let options = PressOptions {
-///     law: ContactLaw::Tabulated(vec![state]),
-///     loads: vec![Load::normal(0.6), Load::normal(1.2)],
+///     law: ContactModel::Tabulated(vec![state]),
+///     loads: vec![PressLoad::normal(0.6), PressLoad::normal(1.2)],
 ///     camera,
 ///     ..PressOptions::default()
 /// };
@@ -545,15 +545,18 @@ const POINTS: &str = include_str!("finite_elements.csv");
 const RADIUS_M: f64 = 3e-3;
 
 /// The states of a ball on a waveguide, of growing force; None for bodies that were not computed.
-pub fn finite_element_states(sphere: &Sphere, waveguide: &Waveguide) -> Option<Vec<ContactState>> {
+pub fn finite_element_states(
+    sphere: &ElasticSphere,
+    waveguide: &LightGuide,
+) -> Option<Vec<ContactState>> {
     let known = [Elastic::CL2000X, Elastic::CL2003X].contains(&sphere.material);
-    let elastic = |w: &Waveguide| -> Vec<(f64, Elastic)> {
+    let elastic = |w: &LightGuide| -> Vec<(f64, Elastic)> {
         w.layers
             .iter()
             .map(|l| (l.thickness_m, l.material))
             .collect()
     };
-    let same_guide = elastic(waveguide) == elastic(&Waveguide::default());
+    let same_guide = elastic(waveguide) == elastic(&LightGuide::default());
     if !known || !same_guide || sphere.radius_m != RADIUS_M {
         return None;
     }

@@ -1,7 +1,7 @@
 //! A scene written as the files that the command line reads: images, calibration table and scene description.
 
 use crate::calibration::CalibrationSeries;
-use crate::contact::ContactLaw;
+use crate::contact::ContactModel;
 use crate::press::PressScene;
 use std::path::{Path, PathBuf};
 use tactile_imaging::io::{ReadError, write_bytes, write_grey_image};
@@ -13,11 +13,11 @@ use toml::{Table, Value};
 /// ```
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// use tactile_imaging::scene::Scene;
-/// use tactile_simulate::{CalibrationOptions, Camera, PressOptions, PressScene, write_folder};
+/// use tactile_simulate::{CalibrationRun, Camera, PressOptions, PressScene, write_folder};
 /// let camera = Camera::default().coarser(16);
 /// let scene = PressScene::new(PressOptions { camera, ..PressOptions::default() })?;
 /// let folder = tempfile::tempdir()?;
-/// let calibration = scene.calibrate(&CalibrationOptions { steps: 4, ..CalibrationOptions::default() })?;
+/// let calibration = scene.calibrate(&CalibrationRun { steps: 4, ..CalibrationRun::default() })?;
 /// let path = write_folder(&scene, &calibration, folder.path())?;
 /// let (read, data) = (Scene::read(&path)?, Scene::read(&path)?.load()?);
 /// assert_eq!(read.frames[1].force_n, Some(1.2));
@@ -54,7 +54,7 @@ pub fn write_folder(
 fn description(scene: &PressScene) -> Table {
     let options = scene.options();
     let size = Value::Array(options.camera.pixel_size_m.map(Value::Float).to_vec());
-    let frame = |(k, load): (usize, &crate::Load)| {
+    let frame = |(k, load): (usize, &crate::PressLoad)| {
         let image = Value::String(format!("frame_{}.png", k + 1));
         Value::Table(table([
             ("image", image),
@@ -72,7 +72,7 @@ fn description(scene: &PressScene) -> Table {
     let layers = Value::Array(options.waveguide.layers.iter().map(layer).collect());
     // A closed form is read by its own law; contacts from elsewhere by the default one.
     let estimator = match options.law {
-        ContactLaw::Hertz | ContactLaw::Tatara => "sphere",
+        ContactModel::Hertz | ContactModel::Tatara => "sphere",
         _ => "best",
     };
     let stages = table([("estimator", Value::String(estimator.to_owned()))]);

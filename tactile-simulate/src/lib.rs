@@ -1,19 +1,18 @@
 #![doc = include_str!("../README.md")]
 //!
 //! # Overview
-//! A scene goes forward only: force → contact pressure → light → photons → 8-bit frame. But for finite elements it shares no code with the
-//! measuring crates, so that a measurement of a simulated frame is a test and not a tautology.
+//! A scene goes forward only: force → contact pressure → light → photons → 8-bit frame. But for finite
+//! elements it shares no code with the measuring crates, so that a measurement of a simulated frame is a
+//! test and not a tautology.
 //!
-//! | module | what it holds |
+//! | module | contents |
 //! |---|---|
-//! | [`material`](Elastic) | the pressed sphere, the waveguide's layers |
-//! | [`contact`](Contact) | sphere on waveguide: pressure, radius, indentation, surface displacement |
-//! | [`contact_state`](ContactState) | contacts computed elsewhere, as tables over the radius |
-//! | `solved_states` | balls and cylinders between plates by the finite elements of `tactile-elasticity` (feature `fem`) |
+//! | [`press`](PressScene) | one sphere pressed at several loads: frames and [`PressTruth`] |
+//! | [`contact`](ContactModel) | sphere on waveguide by closed forms, or contacts computed elsewhere ([`ContactState`]) |
+//! | `solved` | balls and cylinders by the finite elements of `tactile-fem` (feature `fem`) |
 //! | `pixel_average` | exact averages of the contact pressure over pixels |
 //! | [`light`](Response) | pressure → grey levels |
 //! | [`camera`](Camera) | blur, vignetting, photon and read noise, quantisation |
-//! | [`press`](PressScene) | one sphere pressed at several loads: frames and [`PressTruth`] |
 //! | [`calibration`](CalibrationSeries) | light against gauge force, loading and unloading |
 //! | [`stream`](FrameStream) | frames of loading cycles at camera rate, with drifting illumination |
 //! | [`uniaxial`](UniaxialScene) | a patterned block squeezed between plates: stress over strain is the modulus exactly |
@@ -51,16 +50,16 @@ mod stream;
 mod trial;
 mod uniaxial;
 
-pub use calibration::{CalibrationOptions, CalibrationSeries};
+pub use calibration::{CalibrationRun, CalibrationSeries};
 pub use camera::Camera;
-pub use contact::{Contact, ContactLaw, ContactState};
+pub use contact::{ContactModel, ContactState, SimulatedContact};
 pub use error::SimulateError;
 #[cfg(feature = "scene")]
 pub use folder::write_folder;
 pub use light::{Illumination, Response};
 pub use press::{
-    Elastic, Gain, Load, PressOptions, PressScene, PressSimulation, PressTruth, Sphere,
-    SurfaceScaling, Waveguide, WaveguideLayer,
+    Elastic, ElasticSphere, Gain, LightGuide, PressLoad, PressOptions, PressScene, PressSimulation,
+    PressTruth, SurfaceScaling, WaveguideLayer,
 };
 pub use stream::{FrameStream, LoadCycle, StreamedFrame};
 pub use trial::Trial;

@@ -2,7 +2,7 @@
 //!
 //! Pressure and leaked light of a contact, averaged over pixels.
 
-use crate::contact::Contact;
+use crate::contact::SimulatedContact;
 use crate::error::{SimulateError, finite, not_negative, within};
 use crate::pixel_average::{Disc, Patch, Plane, Profile, Window};
 
@@ -76,10 +76,10 @@ impl Response {
 /// Illumination of one frame, relative to the reference frame: it scales background and leaked light alike.
 ///
 /// ```
-/// use tactile_simulate::{Camera, Illumination, Load, PressOptions, PressScene};
+/// use tactile_simulate::{Camera, Illumination, PressLoad, PressOptions, PressScene};
 /// let camera = Camera::default().coarser(16).ideal();
 /// let illumination = Illumination { level: 1.2, tilt: [0.1, 0.0] };
-/// let loads = vec![Load { illumination, ..Load::normal(0.0) }];
+/// let loads = vec![PressLoad { illumination, ..PressLoad::normal(0.0) }];
 /// let light = PressScene::new(PressOptions { camera, loads, ..PressOptions::default() })?.expected_frame(0);
 /// for (column, share) in [(0, 1.15), (43, 1.2), (86, 1.25)] {
 ///     assert!((light[[0, column]] - share * camera.background_grey).abs() < 1e-9);
@@ -135,7 +135,7 @@ impl LightLaw {
     /// Unblurred light of a contact as a lens that distorts shows it.
     pub fn bent_patch(
         &self,
-        contact: &Contact,
+        contact: &SimulatedContact,
         disc: &Disc,
         plane: Plane,
         window: Window,
@@ -144,7 +144,7 @@ impl LightLaw {
     }
 
     /// Unblurred light of a contact over `window`, in grey levels above the background.
-    pub fn patch(&self, contact: &Contact, disc: &Disc, window: Window) -> Patch {
+    pub fn patch(&self, contact: &SimulatedContact, disc: &Disc, window: Window) -> Patch {
         if self.largest_pressure_pa == 0.0 {
             return Patch::zeros(window);
         }
@@ -169,7 +169,7 @@ impl LightLaw {
 }
 
 /// Pressure of a contact over `window` in pascal.
-pub fn pressure_patch(contact: &Contact, disc: &Disc, window: Window) -> Patch {
+pub fn pressure_patch(contact: &SimulatedContact, disc: &Disc, window: Window) -> Patch {
     if !contact.is_hertzian() {
         return disc.average_radial(window, |r_m| contact.pressure_pa(r_m));
     }

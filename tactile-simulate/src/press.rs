@@ -9,7 +9,7 @@
 //! What a measurement of a simulated press should find, stage by stage.
 
 use crate::camera::Camera;
-use crate::contact::{Contact, ContactLaw};
+use crate::contact::{ContactModel, SimulatedContact};
 use crate::error::{SimulateError, at_least, finite, not_negative, positive, within};
 use crate::light::{Illumination, LightLaw, Response, pressure_patch};
 use crate::pixel_average::{Disc, Patch};
@@ -32,7 +32,7 @@ use ndarray::Array2;
 #[derive(Debug, Clone, PartialEq)]
 pub struct PressScene {
     options: PressOptions,
-    contacts: Vec<Contact>,
+    contacts: Vec<SimulatedContact>,
     light: LightLaw,
 }
 
@@ -45,7 +45,7 @@ impl PressScene {
         options.validate()?;
         let contacts = (options.loads.iter())
             .map(|load| {
-                Contact::new(
+                SimulatedContact::new(
                     &options.object,
                     &options.waveguide,
                     &options.law,
@@ -131,9 +131,9 @@ impl PressScene {
     /// The same sensor with another object under one load.
     pub(crate) fn with_press(
         &self,
-        object: Sphere,
-        law: ContactLaw,
-        load: Load,
+        object: ElasticSphere,
+        law: ContactModel,
+        load: PressLoad,
     ) -> Result<Self, SimulateError> {
         self.with_object(object, law, vec![load])
     }
@@ -141,11 +141,11 @@ impl PressScene {
     /// Another object on the same sensor, with the same light, camera and centre: a calibration's balls, for instance.
     ///
     /// ```
-    /// use tactile_simulate::{Camera, ContactLaw, Elastic, Load, PressOptions, PressScene, Sphere};
+    /// use tactile_simulate::{Camera, ContactModel, Elastic, PressLoad, PressOptions, PressScene, ElasticSphere};
     /// let camera = Camera::default().coarser(16);
     /// let scene = PressScene::new(PressOptions { camera, ..PressOptions::default() })?;
-    /// let ball = Sphere { radius_m: 10e-3, material: Elastic::RIGID };
-    /// let other = scene.with_object(ball, ContactLaw::Hertz, vec![Load::normal(0.5)])?;
+    /// let ball = ElasticSphere { radius_m: 10e-3, material: Elastic::RIGID };
+    /// let other = scene.with_object(ball, ContactModel::Hertz, vec![PressLoad::normal(0.5)])?;
     /// assert_eq!(other.truth(0).grey_per_pascal, scene.truth(0).grey_per_pascal);
     /// assert_eq!(other.truth(0).contact.sphere_radius_m, 10e-3);
     /// # Ok::<(), tactile_simulate::SimulateError>(())
@@ -155,9 +155,9 @@ impl PressScene {
     /// [`SimulateError`] for an object or loads without meaning.
     pub fn with_object(
         &self,
-        object: Sphere,
-        law: ContactLaw,
-        loads: Vec<Load>,
+        object: ElasticSphere,
+        law: ContactModel,
+        loads: Vec<PressLoad>,
     ) -> Result<Self, SimulateError> {
         let changed = Self::new(PressOptions {
             object,
@@ -177,7 +177,7 @@ impl PressScene {
     }
 
     /// Contact of load `load`.
-    pub(crate) fn contact(&self, load: usize) -> &Contact {
+    pub(crate) fn contact(&self, load: usize) -> &SimulatedContact {
         &self.contacts[load]
     }
 
@@ -219,9 +219,9 @@ impl PressScene {
 /// A linear elastic, isotropic material.
 ///
 /// ```
-/// use tactile_simulate::{Elastic, PressOptions, PressScene, Sphere};
+/// use tactile_simulate::{Elastic, PressOptions, PressScene, ElasticSphere};
 /// let contact = |material| {
-///     let object = Sphere { radius_m: 3e-3, material };
+///     let object = ElasticSphere { radius_m: 3e-3, material };
 ///     let scene = PressScene::new(PressOptions { object, ..PressOptions::default() })?;
 ///     Ok::<_, tactile_simulate::SimulateError>(scene.truth(0).contact)
 /// };
@@ -281,9 +281,9 @@ impl Elastic {
 /// The object: an elastic sphere.
 ///
 /// ```
-/// use tactile_simulate::{Elastic, PressOptions, PressScene, Sphere};
+/// use tactile_simulate::{Elastic, PressOptions, PressScene, ElasticSphere};
 /// let radius = |radius_m| {
-///     let object = Sphere { radius_m, material: Elastic::CL2003X };
+///     let object = ElasticSphere { radius_m, material: Elastic::CL2003X };
 ///     let scene = PressScene::new(PressOptions { object, ..PressOptions::default() })?;
 ///     Ok::<_, tactile_simulate::SimulateError>(scene.truth(0).contact.contact_radius_m)
 /// };
@@ -292,14 +292,14 @@ impl Elastic {
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Sphere {
+pub struct ElasticSphere {
     /// Radius in metres.
     pub radius_m: f64,
     /// What it is made of.
     pub material: Elastic,
 }
 
-impl Sphere {
+impl ElasticSphere {
     pub(crate) fn validate(&self) -> Result<(), SimulateError> {
         positive("radius_m", self.radius_m)?;
         self.material.validate()
@@ -309,18 +309,18 @@ impl Sphere {
 /// One layer of the waveguide.
 ///
 /// ```
-/// use tactile_simulate::{Elastic, PressOptions, PressScene, Waveguide, WaveguideLayer};
+/// use tactile_simulate::{Elastic, PressOptions, PressScene, LightGuide, WaveguideLayer};
 /// let layer = |thickness_m, youngs_modulus_pa| WaveguideLayer {
 ///     refractive_index: 1.41,
 ///     thickness_m,
 ///     material: Elastic { youngs_modulus_pa, poisson_ratio: 0.5 },
 /// };
-/// let waveguide = Waveguide { layers: vec![layer(1e-3, 200e3), layer(3e-3, 100e3)] };
+/// let waveguide = LightGuide { layers: vec![layer(1e-3, 200e3), layer(3e-3, 100e3)] };
 /// let radius = |waveguide| {
 ///     let scene = PressScene::new(PressOptions { waveguide, ..PressOptions::default() })?;
 ///     Ok::<_, tactile_simulate::SimulateError>(scene.truth(0).contact.contact_radius_m)
 /// };
-/// assert!(radius(waveguide)? < radius(Waveguide::default())?, "stiffer layers, a smaller contact");
+/// assert!(radius(waveguide)? < radius(LightGuide::default())?, "stiffer layers, a smaller contact");
 /// # Ok::<(), tactile_simulate::SimulateError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -337,20 +337,20 @@ pub struct WaveguideLayer {
 /// The layered waveguide, from the object's side to the glass.
 ///
 /// ```
-/// use tactile_simulate::Waveguide;
+/// use tactile_simulate::LightGuide;
 /// // Epidermis, dermis and subcutanea of the paper's sensor: 2, 3 and 5 mm.
-/// let guide = Waveguide::default();
+/// let guide = LightGuide::default();
 /// let thickness_m: f64 = guide.layers.iter().map(|layer| layer.thickness_m).sum();
 /// assert!((thickness_m - 10e-3).abs() < 1e-12);
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Waveguide {
+pub struct LightGuide {
     /// Layers, the one touched first.
     pub layers: Vec<WaveguideLayer>,
 }
 
-impl Default for Waveguide {
+impl Default for LightGuide {
     /// Epidermis, dermis and subcutanea of the paper (§2.2): PDMS of 2, 3 and 5 mm with indices 1.41, 1.40 and 1.39
     /// and moduli 1.36×10⁵, 8.0×10⁴ and 3.4×10⁴ Pa (the paper prints 1.4×10² Pa for the first, calling it the
     /// stiffest; its source has 1.36×10⁵).
@@ -373,7 +373,7 @@ impl Default for Waveguide {
     }
 }
 
-impl Waveguide {
+impl LightGuide {
     /// The stack seen as one material: the layers in series, E = Σh / Σ(h/E), and Poisson's ratio averaged by
     /// thickness (0.5 for the paper's stack).
     pub(crate) fn series(&self) -> Elastic {
@@ -413,10 +413,10 @@ impl Waveguide {
 /// How many grey levels a pascal makes.
 ///
 /// ```
-/// use tactile_simulate::{Camera, Gain, Load, PressOptions, PressScene};
+/// use tactile_simulate::{Camera, Gain, PressLoad, PressOptions, PressScene};
 /// let camera = Camera::default().coarser(16);
 /// let scene = |force_n, gain| {
-///     PressScene::new(PressOptions { camera, gain, loads: vec![Load::normal(force_n)], ..Default::default() })
+///     PressScene::new(PressOptions { camera, gain, loads: vec![PressLoad::normal(force_n)], ..Default::default() })
 /// };
 /// let first = scene(1.2, Gain::PeakGrey(200.0))?;
 /// let peak_pa = first.truth(0).contact.peak_pressure_pa;
@@ -457,9 +457,9 @@ impl Gain {
 /// One state of load.
 ///
 /// ```
-/// use tactile_simulate::{Camera, Load, PressOptions, PressScene};
+/// use tactile_simulate::{Camera, PressLoad, PressOptions, PressScene};
 /// let camera = Camera::default().coarser(16);
-/// let loads = vec![Load::normal(0.7), Load { shear_n: [0.28, 0.0], ..Load::normal(0.7) }];
+/// let loads = vec![PressLoad::normal(0.7), PressLoad { shear_n: [0.28, 0.0], ..PressLoad::normal(0.7) }];
 /// let scene = PressScene::new(PressOptions { camera, loads, ..PressOptions::default() })?;
 /// let [x, sheared] = [0, 1].map(|k| scene.truth(k).centre_px[0]);
 /// let moved_m = (sheared - x) * camera.pixel_size_m[0];
@@ -468,7 +468,7 @@ impl Gain {
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Load {
+pub struct PressLoad {
     /// Normal force in newton.
     pub force_n: f64,
     /// Shear force (x, y) in newton; it moves the contact by force over [`PressOptions::shear_stiffness_n_per_m`].
@@ -477,7 +477,7 @@ pub struct Load {
     pub illumination: Illumination,
 }
 
-impl Load {
+impl PressLoad {
     /// A normal force without shear, the illumination unchanged.
     pub fn normal(force_n: f64) -> Self {
         Self {
@@ -491,10 +491,10 @@ impl Load {
 /// Everything that describes a press; [`PressScene::new`](crate::PressScene::new) checks it.
 ///
 /// ```
-/// use tactile_simulate::{Camera, Elastic, Load, PressOptions, PressScene, Sphere};
+/// use tactile_simulate::{Camera, Elastic, PressLoad, PressOptions, PressScene, ElasticSphere};
 /// let options = PressOptions {
-///     object: Sphere { radius_m: 20e-3, material: Elastic::CL2003X },
-///     loads: vec![Load::normal(0.2), Load::normal(0.4)],
+///     object: ElasticSphere { radius_m: 20e-3, material: Elastic::CL2003X },
+///     loads: vec![PressLoad::normal(0.2), PressLoad::normal(0.4)],
 ///     camera: Camera::default().coarser(16),
 ///     seed: 7,
 ///     ..PressOptions::default()
@@ -508,13 +508,13 @@ impl Load {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct PressOptions {
     /// The object.
-    pub object: Sphere,
+    pub object: ElasticSphere,
     /// The waveguide.
-    pub waveguide: Waveguide,
+    pub waveguide: LightGuide,
     /// Where pressure, radius and indentation at each force come from.
-    pub law: ContactLaw,
+    pub law: ContactModel,
     /// Loads, a frame each.
-    pub loads: Vec<Load>,
+    pub loads: Vec<PressLoad>,
     /// Centre (x, y) of the unsheared contact in pixels; the frame's middle if not given.
     pub centre_px: Option<[f64; 2]>,
     /// K_x, K_y of F_x = K_x u_x, F_y = K_y u_y in newton per metre.
@@ -537,13 +537,13 @@ impl Default for PressOptions {
     /// larger sphere or smaller loads.
     fn default() -> Self {
         Self {
-            object: Sphere {
+            object: ElasticSphere {
                 radius_m: 3e-3,
                 material: Elastic::CL2000X,
             },
-            waveguide: Waveguide::default(),
-            law: ContactLaw::Hertz,
-            loads: vec![Load::normal(0.7), Load::normal(1.2)],
+            waveguide: LightGuide::default(),
+            law: ContactModel::Hertz,
+            loads: vec![PressLoad::normal(0.7), PressLoad::normal(1.2)],
             centre_px: None,
             shear_stiffness_n_per_m: [400.0; 2],
             camera: Camera::default(),
@@ -638,9 +638,9 @@ impl PressScene {
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct PressTruth {
     /// Force, contact radius, pressure, indentation.
-    pub contact: Contact,
+    pub contact: SimulatedContact,
     /// The load that made it.
-    pub load: Load,
+    pub load: PressLoad,
     /// Centre (x, y) of the contact in pixels.
     pub centre_px: [f64; 2],
     /// Centroid (x, y) of the pressure that lies in the frame, by pixel averages: the centre to some 1e-5 px, unless
@@ -700,7 +700,7 @@ impl PressTruth {
         field
     }
 
-    /// Height of the apparent surface in metres at pixel centres (see [`Contact::apparent_height_m`]).
+    /// Height of the apparent surface in metres at pixel centres (see [`SimulatedContact::apparent_height_m`]).
     pub fn apparent_height_m(&self) -> Array2<f64> {
         Array2::from_shape_fn(self.shape, |(row, col)| {
             let [x, y] = self.offset_m(row, col);
@@ -829,7 +829,7 @@ impl SurfaceScaling {
 }
 
 /// k of z₂(ρ) = k z₁(ρ) at equal ρ = r/a, by least squares over the discs.
-fn height_scale(from: &Contact, to: &Contact) -> f64 {
+fn height_scale(from: &SimulatedContact, to: &SimulatedContact) -> f64 {
     const RINGS: i32 = 32;
     let (mut product, mut square) = (0.0, 0.0);
     for ring in 0..RINGS {

@@ -3,7 +3,7 @@
 use crate::contact::ContactState;
 use crate::error::{SimulateError, at_least, positive};
 use crate::press::Elastic;
-use tactile_imaging::fem::{Interface, Load, Material, Scene, State};
+use tactile_imaging::fem::{AppliedLoad, FemScene, Interface, Material, State};
 
 /// ν = ½ has no finite bulk modulus; at this one the volume changes by less than 1e-4 of the pressure over E.
 const LARGEST_POISSON_RATIO: f64 = 0.4999;
@@ -14,11 +14,11 @@ impl ContactState {
     /// The samples are the contact's nodes and its rim, at which the pressure is 0.
     ///
     /// ```
-    /// use tactile_imaging::fem::{self, Material, Press};
+    /// use tactile_imaging::fem::{AppliedLoad, Material, ObjectPress, ObjectShape};
     /// use tactile_simulate::ContactState;
-    /// let ball = fem::Object::Ball { radius_m: 3e-3 };
-    /// let scene = Press::new(ball, Material::new(103e3, 0.49)?)?.scene()?;
-    /// let solved = scene.solve(&[fem::Load::Force(0.2)]);
+    /// let ball = ObjectShape::Ball { radius_m: 3e-3 };
+    /// let scene = ObjectPress::new(ball, Material::new(103e3, 0.49)?)?.scene()?;
+    /// let solved = scene.solve(&[AppliedLoad::Force(0.2)]);
     /// let state = ContactState::from_solved(&solved.states[0]).expect("a contact");
     /// // Hertz: a³ = 3 F R (1 − ν²) / (4 E).
     /// assert!((state.contact_radius_m / 1.49e-3 - 1.0).abs() < 0.03, "{}", state.contact_radius_m);
@@ -44,19 +44,19 @@ impl ContactState {
     }
 
     /// The face of a cylinder squeezed between two rigid plates on which its faces slide or to which they stick, neo-Hookean and at finite strain: a state
-    /// for each force, for [`ContactLaw::Tabulated`](crate::ContactLaw::Tabulated). Solved anew at each call, some 0.1 s a state: keep the states.
+    /// for each force, for [`ContactModel::Tabulated`](crate::ContactModel::Tabulated). Solved anew at each call, some 0.1 s a state: keep the states.
     ///
     /// Sliding, the state is homogeneous, as in a [`UniaxialScene`](crate::UniaxialScene) but for the material law; sticking, the face keeps its size, and
     /// the pressure is higher in the middle of a flat cylinder and at the rim of a tall one. Blocks whose face is no disc have the homogeneous state alone.
     ///
     /// ```
     /// use tactile_imaging::fem::Interface;
-    /// use tactile_simulate::{Camera, ContactLaw, ContactState, Elastic, Load, PressOptions, PressScene};
+    /// use tactile_simulate::{Camera, ContactModel, ContactState, Elastic, PressLoad, PressOptions, PressScene};
     /// let states = |faces| ContactState::of_squeezed_cylinder(6e-3, 6e-3, &Elastic::CL2000X, faces, &[0.5, 1.0]);
     /// let [sliding, sticking] = [states(Interface::Frictionless)?, states(Interface::Bonded)?];
     /// assert!(sliding[1].contact_radius_m > 6.2e-3 && sticking[1].contact_radius_m == 6e-3);
     /// let camera = Camera::default().coarser(8);
-    /// let (law, loads) = (ContactLaw::Tabulated(sticking), vec![Load::normal(0.5), Load::normal(1.0)]);
+    /// let (law, loads) = (ContactModel::Tabulated(sticking), vec![PressLoad::normal(0.5), PressLoad::normal(1.0)]);
     /// let scene = PressScene::new(PressOptions { law, loads, camera, ..PressOptions::default() })?;
     /// assert_eq!(scene.frame(1, 0).dim(), (130, 174));
     /// # Ok::<(), tactile_simulate::SimulateError>(())
@@ -89,10 +89,13 @@ impl ContactState {
         };
         let scene = Material::new(material.youngs_modulus_pa, poisson_ratio)
             .and_then(|material| {
-                Scene::cylinder_between_plates(radius_m, height_m, material, faces)
+                FemScene::cylinder_between_plates(radius_m, height_m, material, faces)
             })
             .map_err(|_| unsolved(0.0))?;
-        let loads: Vec<Load> = forces_n.iter().map(|&force| Load::Force(force)).collect();
+        let loads: Vec<AppliedLoad> = forces_n
+            .iter()
+            .map(|&force| AppliedLoad::Force(force))
+            .collect();
         let states = scene.solve(&loads).states;
         if states.len() < forces_n.len() {
             return Err(unsolved(states.last().map_or(0.0, State::force_n)));

@@ -2,7 +2,7 @@
 
 use crate::error::{SimulateError, finite, not_negative, positive, within};
 use crate::light::Illumination;
-use crate::press::{Load, PressScene, PressTruth};
+use crate::press::{PressLoad, PressScene, PressTruth};
 use ndarray::Array2;
 use std::f64::consts::PI;
 use tactile_imaging::pipeline::FrameSource;
@@ -145,13 +145,13 @@ impl PressScene {
 
 impl FrameStream {
     /// Load and illumination at a time.
-    fn load_at(&self, time_s: f64) -> Load {
+    fn load_at(&self, time_s: f64) -> PressLoad {
         let c = &self.cycle;
         let phase = ((time_s - c.rest_s) / c.period_s).max(0.0);
         let share = (PI * phase).sin().powi(2);
         let level = (1.0 + c.light_drift_per_s * time_s).max(0.0);
         let tilt = c.light_tilt_per_s.map(|rate| rate * time_s);
-        Load {
+        PressLoad {
             force_n: c.largest_force_n * share,
             shear_n: c.largest_shear_n.map(|s| s * share),
             illumination: Illumination { level, tilt },

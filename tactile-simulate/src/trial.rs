@@ -1,7 +1,7 @@
 //! A simulated press, measured blindly and laid beside its truth.
 
 use crate::{
-    CalibrationOptions, ContactLaw, PressOptions, PressScene, PressSimulation, SimulateError,
+    CalibrationRun, ContactModel, PressOptions, PressScene, PressSimulation, SimulateError,
     WaveguideLayer,
 };
 use tactile_imaging::elasticity::contact::{Layer, Waveguide};
@@ -12,10 +12,10 @@ use tactile_imaging::{Object, Pipeline, Press};
 /// A simulated press with the calibration of its sensor: the frames to measure and the truth to compare with.
 ///
 /// ```
-/// use tactile_simulate::{Trial, CalibrationOptions, Camera, PressOptions};
+/// use tactile_simulate::{Trial, CalibrationRun, Camera, PressOptions};
 /// // A coarse camera: 174 × 130 pixels on 30 mm.
 /// let camera = Camera::default().coarser(8);
-/// let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
+/// let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationRun::default())?;
 /// let pipeline = trial.pipeline()?;
 /// let modulus = trial.press(&pipeline)?.modulus()?;
 /// assert!((modulus.youngs_modulus_pa / trial.simulation.youngs_modulus_pa - 1.0).abs() < 0.0538);
@@ -37,10 +37,7 @@ impl Trial {
     ///
     /// # Errors
     /// [`SimulateError`] for options that have no meaning.
-    pub fn new(
-        options: PressOptions,
-        calibration: &CalibrationOptions,
-    ) -> Result<Self, SimulateError> {
+    pub fn new(options: PressOptions, calibration: &CalibrationRun) -> Result<Self, SimulateError> {
         let scene = PressScene::new(options)?;
         let calibration = scene.unsaturated(*calibration)?;
         let pairs = scene.calibrate(&calibration)?.pairs;
@@ -75,7 +72,7 @@ impl Trial {
         let pipeline = Pipeline::from_pairs(&self.pairs, self.simulation.pixel_size_m, object)?;
         let config = StagesConfig {
             estimator: match options.law {
-                ContactLaw::Hertz | ContactLaw::Tatara => EstimatorChoice::Sphere,
+                ContactModel::Hertz | ContactModel::Tatara => EstimatorChoice::Sphere,
                 _ => EstimatorChoice::default(),
             },
             ..StagesConfig::default()

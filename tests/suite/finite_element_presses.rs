@@ -12,8 +12,8 @@ use tactile_imaging::force::CalibrationPair;
 use tactile_imaging::pipeline::{Object, Pipeline};
 use tactile_simulate::Trial;
 use tactile_simulate::{
-    CalibrationOptions, Camera, ContactLaw, ContactState, Elastic, Load, PressOptions, Sphere,
-    Waveguide, WaveguideLayer,
+    CalibrationRun, Camera, ContactModel, ContactState, Elastic, ElasticSphere, LightGuide,
+    PressLoad, PressOptions, WaveguideLayer,
 };
 
 struct Ball {
@@ -113,18 +113,18 @@ impl Ball {
             .map_or(0.0, |state| state.contact_radius_m);
         let pixel_m = 43.1e-6 * (largest_m / 5e-3).max(1.0);
         let options = PressOptions {
-            object: Sphere {
+            object: ElasticSphere {
                 radius_m: self.radius_m,
                 material: Elastic {
                     youngs_modulus_pa: self.youngs_modulus_pa,
                     poisson_ratio: 0.5,
                 },
             },
-            waveguide: Waveguide {
+            waveguide: LightGuide {
                 layers: if layers.is_empty() { rigid } else { layers },
             },
-            law: ContactLaw::Tabulated(self.states.clone()),
-            loads: pair.iter().map(|s| Load::normal(s.force_n)).collect(),
+            law: ContactModel::Tabulated(self.states.clone()),
+            loads: pair.iter().map(|s| PressLoad::normal(s.force_n)).collect(),
             camera: Camera {
                 shape: [520, 696],
                 pixel_size_m: [pixel_m; 2],
@@ -133,15 +133,15 @@ impl Ball {
             seed,
             ..PressOptions::default()
         };
-        let calibration = CalibrationOptions {
-            indenter: Sphere {
+        let calibration = CalibrationRun {
+            indenter: ElasticSphere {
                 radius_m: self.radius_m.max(10e-3),
                 material: Elastic::RIGID,
             },
             largest_force_n: 1.2 * pair[1].force_n,
             // A gauge that suits the range, which loads between a hundredth of a newton and a hundred have.
             gauge_noise_n: 1e-3 * pair[1].force_n,
-            ..CalibrationOptions::default()
+            ..CalibrationRun::default()
         };
         let trial = Trial::new(options, &calibration).unwrap();
         let size = trial.simulation.pixel_size_m;

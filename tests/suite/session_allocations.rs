@@ -1,18 +1,22 @@
 //! A session allocates nothing per frame once its buffers have their size.
 use tactile_imaging::pipeline::Session;
 use tactile_simulate::Trial;
-use tactile_simulate::{CalibrationOptions, Camera, Load, PressOptions};
+use tactile_simulate::{CalibrationRun, Camera, PressLoad, PressOptions};
 
 #[test]
 fn pushing_frames_allocates_nothing_after_warm_up() {
     let camera = Camera::default().coarser(4);
-    let loads = vec![Load::normal(0.3), Load::normal(0.7), Load::normal(1.2)];
+    let loads = vec![
+        PressLoad::normal(0.3),
+        PressLoad::normal(0.7),
+        PressLoad::normal(1.2),
+    ];
     let options = PressOptions {
         camera,
         loads,
         ..PressOptions::default()
     };
-    let trial = Trial::new(options, &CalibrationOptions::default()).unwrap();
+    let trial = Trial::new(options, &CalibrationRun::default()).unwrap();
     let empty = trial.scene.reference(5);
     let pipeline = trial.pipeline().unwrap();
     let mut session = Session::new(&pipeline, &[trial.simulation.reference.view()]).unwrap();
@@ -33,13 +37,13 @@ fn pushing_frames_allocates_nothing_after_warm_up() {
 #[test]
 fn following_strain_allocates_nothing_after_warm_up() {
     let camera = Camera::default().coarser(4);
-    let loads = [0.7, 0.8, 0.95, 1.1, 1.2].map(Load::normal).to_vec();
+    let loads = [0.7, 0.8, 0.95, 1.1, 1.2].map(PressLoad::normal).to_vec();
     let options = PressOptions {
         camera,
         loads,
         ..PressOptions::default()
     };
-    let trial = Trial::new(options, &CalibrationOptions::default()).unwrap();
+    let trial = Trial::new(options, &CalibrationRun::default()).unwrap();
     let pipeline = trial.pipeline().unwrap();
     let mut session = Session::new(&pipeline, &[trial.simulation.reference.view()]).unwrap();
     let mut cycle = trial.simulation.frames.iter().cycle();

@@ -5,7 +5,7 @@
 use crate::hostile::Hostile;
 use ndarray::Array2;
 use tactile_simulate::{
-    CalibrationOptions, Camera, ContactLaw, Gain, Illumination, Load, LoadCycle, PressOptions,
+    CalibrationRun, Camera, ContactModel, Gain, Illumination, LoadCycle, PressLoad, PressOptions,
     PressScene, Response, UniaxialOptions, UniaxialScene,
 };
 
@@ -41,13 +41,13 @@ fn press_checksum(options: PressOptions) -> u64 {
 
 #[test]
 fn presses_keep_their_frames() {
-    let sheared = Load {
+    let sheared = PressLoad {
         shear_n: [0.3, -0.2],
         illumination: Illumination {
             level: 1.03,
             tilt: [0.04, -0.02],
         },
-        ..Load::normal(0.7)
+        ..PressLoad::normal(0.7)
     };
     let scenes = [
         ("default", press(), 0xa136_0fa6_f6de_78fd),
@@ -55,7 +55,7 @@ fn presses_keep_their_frames() {
             "quadratic response, Tatara, another seed",
             PressOptions {
                 response: Response::Quadratic { droop: 0.2 },
-                law: ContactLaw::Tatara,
+                law: ContactModel::Tatara,
                 seed: 99,
                 ..press()
             },
@@ -64,7 +64,7 @@ fn presses_keep_their_frames() {
         (
             "sheared, other lamps, over the edge",
             PressOptions {
-                loads: vec![sheared, Load::normal(0.0)],
+                loads: vec![sheared, PressLoad::normal(0.0)],
                 centre_px: Some([4.3, 60.9]),
                 gain: Gain::GreyPerPascal(0.004),
                 ..press()
@@ -117,10 +117,10 @@ fn blocks_keep_their_frames() {
 #[test]
 fn calibrations_and_streams_keep_their_frames() {
     let scene = PressScene::new(press()).unwrap();
-    let options = CalibrationOptions {
+    let options = CalibrationRun {
         steps: 5,
         hysteresis: 0.02,
-        ..CalibrationOptions::default()
+        ..CalibrationRun::default()
     };
     let pairs = scene.calibrate(&options).unwrap().pairs;
     let light: Vec<f64> = pairs.iter().map(|p| p.integrated_pixel_value).collect();

@@ -2,7 +2,7 @@
 
 use ndarray::Array2;
 use tactile_simulate::{
-    Gain, Illumination, Load, PressOptions, PressScene, PressSimulation, SimulateError,
+    Gain, Illumination, PressLoad, PressOptions, PressScene, PressSimulation, SimulateError,
 };
 
 /// What is wrong with the scene.
@@ -78,29 +78,29 @@ impl Hostile {
         let side = (camera.shape[0] as f64 * camera.pixel_size_m[1])
             .min(camera.shape[1] as f64 * camera.pixel_size_m[0]);
         let unit = PressScene::new(PressOptions {
-            loads: vec![Load::normal(1.0)],
+            loads: vec![PressLoad::normal(1.0)],
             ..base.clone()
         })?;
         let unit_radius = unit.truth(0).contact.contact_radius_m;
         // F = 4E*a³/(3R).
         let force = |radius_m: f64| (radius_m / unit_radius).powi(3);
         let mut options = PressOptions {
-            loads: vec![Load::normal(force(0.2 * side))],
+            loads: vec![PressLoad::normal(force(0.2 * side))],
             centre_px: Some([middle[0] + 0.3, middle[1] - 0.2]),
             gain: Gain::PeakGrey(200.0),
             ..base.clone()
         };
         match self {
-            Self::NoiseOnly => options.loads = vec![Load::normal(0.0)],
+            Self::NoiseOnly => options.loads = vec![PressLoad::normal(0.0)],
             Self::AllSaturated => options.camera.background_grey = 1000.0,
             Self::AllBlack => options.loads[0].illumination.level = 0.0,
             Self::SaturatedContact => options.gain = Gain::PeakGrey(2000.0),
             Self::CutByEdge => options.centre_px = Some([-0.5, middle[1]]),
             Self::InCorner => options.centre_px = Some([-0.5, -0.5]),
             Self::SubPixelContact => {
-                options.loads[0] = Load::normal(force(0.3 * camera.pixel_size_m[0]))
+                options.loads[0] = PressLoad::normal(force(0.3 * camera.pixel_size_m[0]))
             }
-            Self::FillsFrame => options.loads[0] = Load::normal(force(3.0 * side)),
+            Self::FillsFrame => options.loads[0] = PressLoad::normal(force(3.0 * side)),
             Self::BrighterLamps => options.loads[0].illumination.level = 1.05,
             Self::MovedLamps => options.loads[0].illumination.tilt = [0.2, 0.0],
             Self::SeveralContacts | Self::PressedReference => {}
@@ -120,7 +120,7 @@ fn several(base: &PressOptions, force_n: f64) -> Result<PressSimulation, Simulat
         (0.05, [0.45, 0.75]),
     ] {
         let options = PressOptions {
-            loads: vec![Load::normal(share * force_n)],
+            loads: vec![PressLoad::normal(share * force_n)],
             centre_px: Some([at[0] * cols, at[1] * rows]),
             gain: Gain::GreyPerPascal(first.truth(0).grey_per_pascal),
             ..base.clone()
@@ -140,9 +140,9 @@ fn several(base: &PressOptions, force_n: f64) -> Result<PressSimulation, Simulat
 /// Expected grey levels of the first loads of several scenes seen in one frame: their light above that of the sensor alone, added up.
 fn superposed(sensor: &PressScene, scenes: &[PressScene]) -> Result<Array2<f64>, SimulateError> {
     let free = PressScene::new(PressOptions {
-        loads: vec![Load {
+        loads: vec![PressLoad {
             illumination: Illumination::default(),
-            ..Load::normal(0.0)
+            ..PressLoad::normal(0.0)
         }],
         gain: Gain::GreyPerPascal(sensor.truth(0).grey_per_pascal),
         ..sensor.options().clone()

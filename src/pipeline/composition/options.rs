@@ -7,9 +7,9 @@ impl Pipeline {
     /// Sets the number of control points.
     ///
     /// ```
-    /// # use tactile_simulate::{Trial, CalibrationOptions, Camera, PressOptions};
+    /// # use tactile_simulate::{Trial, CalibrationRun, Camera, PressOptions};
     /// # let camera = Camera::default().coarser(8);
-    /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
+    /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationRun::default())?;
     /// let pipeline = trial.pipeline()?.with_control_points(40);
     /// assert_eq!(trial.press(&pipeline)?.control_points(0)?.len(), 40);
     /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -23,9 +23,9 @@ impl Pipeline {
     /// Changes any of the settings; all are checked together.
     ///
     /// ```
-    /// # use tactile_simulate::{Trial, CalibrationOptions, Camera, PressOptions};
+    /// # use tactile_simulate::{Trial, CalibrationRun, Camera, PressOptions};
     /// # let camera = Camera::default().coarser(8);
-    /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
+    /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationRun::default())?;
     /// use tactile_imaging::pipeline::Binning;
     /// let exact = trial.pipeline()?;
     /// let pipeline = exact.clone().with_settings(|settings| {

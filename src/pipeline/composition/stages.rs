@@ -16,9 +16,9 @@ impl Pipeline {
     /// Takes the stages that a configuration names; a surface stage looks at shading.
     ///
     /// ```
-    /// # use tactile_simulate::{Trial, CalibrationOptions, Camera, PressOptions};
+    /// # use tactile_simulate::{Trial, CalibrationRun, Camera, PressOptions};
     /// # let camera = Camera::default().coarser(8);
-    /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
+    /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationRun::default())?;
     /// use tactile_imaging::pipeline::{StagesConfig, StrainChoice};
     /// let config = StagesConfig { strain: StrainChoice::Hencky, ..StagesConfig::default() };
     /// let pipeline = trial.pipeline()?.with_stages(&config)?.with_control_points(60);
@@ -70,9 +70,9 @@ impl Pipeline {
     /// Takes another way from image to surface, looking at `input`.
     ///
     /// ```
-    /// # use tactile_simulate::{Trial, CalibrationOptions, Camera, PressOptions};
+    /// # use tactile_simulate::{Trial, CalibrationRun, Camera, PressOptions};
     /// # let camera = Camera::default().coarser(8);
-    /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
+    /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationRun::default())?;
     /// use tactile_imaging::pipeline::SurfaceInput;
     /// use tactile_imaging::sfs::{BrooksHorn, Lighting};
     /// let variational = BrooksHorn::new(Lighting::default()).with_occluding_boundary(true);
@@ -102,9 +102,9 @@ impl Pipeline {
     /// Takes another way from slopes to heights, inside the reconstruction that the pipeline has by now.
     ///
     /// ```
-    /// # use tactile_simulate::{Trial, CalibrationOptions, Camera, PressOptions};
+    /// # use tactile_simulate::{Trial, CalibrationRun, Camera, PressOptions};
     /// # let camera = Camera::default().coarser(8);
-    /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
+    /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationRun::default())?;
     /// use tactile_imaging::pipeline::{PipelineError, SurfaceInput};
     /// use tactile_imaging::sfs::{BrooksHorn, Lighting, MaskedLeastSquares};
     /// // The default reconstruction solves for heights: it has no slopes.
@@ -142,9 +142,9 @@ impl Pipeline {
     ///
     /// ```
     /// # use tactile_simulate::Trial;
-    /// # use tactile_simulate::{CalibrationOptions, Camera, PressOptions};
+    /// # use tactile_simulate::{CalibrationRun, Camera, PressOptions};
     /// # let camera = Camera::default().coarser(8);
-    /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
+    /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationRun::default())?;
     /// use tactile_imaging::elasticity::modulus::{EstimatorKind, TataraSphere};
     /// let tatara = trial.pipeline()?.with_estimator(TataraSphere::new(3e-3, 0.5)?);
     /// let modulus = trial.press(&tatara)?.modulus()?;
@@ -163,9 +163,9 @@ impl Pipeline {
     /// Takes another choice of control points.
     ///
     /// ```
-    /// # use tactile_simulate::{Trial, CalibrationOptions, Camera, PressOptions};
+    /// # use tactile_simulate::{Trial, CalibrationRun, Camera, PressOptions};
     /// # let camera = Camera::default().coarser(8);
-    /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
+    /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationRun::default())?;
     /// use tactile_imaging::sfs::Random;
     /// let pipeline = trial.pipeline()?.with_sampler(Random { seed: 7 }).with_control_points(40);
     /// let mut press = trial.press(&pipeline)?;
@@ -186,9 +186,9 @@ impl Pipeline {
     /// Takes another matcher, one of your own too, or one chosen at run time.
     ///
     /// ```
-    /// # use tactile_simulate::{Trial, CalibrationOptions, Camera, PressOptions};
+    /// # use tactile_simulate::{Trial, CalibrationRun, Camera, PressOptions};
     /// # let camera = Camera::default().coarser(8);
-    /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
+    /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationRun::default())?;
     /// use tactile_imaging::matching::{LinearAssignment, PointMatcher};
     /// let pipeline = trial.pipeline()?.with_matcher(LinearAssignment::default()).with_control_points(60);
     /// let mut press = trial.press(&pipeline)?;
@@ -208,9 +208,9 @@ impl Pipeline {
     /// Takes another measure of strain.
     ///
     /// ```
-    /// # use tactile_simulate::{Trial, CalibrationOptions, Camera, PressOptions};
+    /// # use tactile_simulate::{Trial, CalibrationRun, Camera, PressOptions};
     /// # let camera = Camera::default().coarser(8);
-    /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
+    /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationRun::default())?;
     /// use tactile_imaging::elasticity::strain::Hencky;
     /// let green = trial.pipeline()?.with_control_points(60);
     /// let hencky = green.clone().with_strain(Hencky);
@@ -229,9 +229,9 @@ impl Pipeline {
     /// Takes another family of warps for the strain.
     ///
     /// ```
-    /// # use tactile_simulate::{Trial, CalibrationOptions, Camera, PressOptions};
+    /// # use tactile_simulate::{Trial, CalibrationRun, Camera, PressOptions};
     /// # let camera = Camera::default().coarser(8);
-    /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
+    /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationRun::default())?;
     /// use tactile_imaging::tps::AffineModel;
     /// let pipeline = trial.pipeline()?.with_warp(AffineModel::General).with_control_points(60);
     /// let mut press = trial.press(&pipeline)?;

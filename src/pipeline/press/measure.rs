@@ -30,9 +30,9 @@ impl Press<'_> {
     /// Runs all stages on all frames. A stage that fails withholds nothing of the others: its error stands in its place.
     ///
     /// ```
-    /// # use tactile_simulate::{Trial, CalibrationOptions, Camera, PressOptions};
+    /// # use tactile_simulate::{Trial, CalibrationRun, Camera, PressOptions};
     /// # let camera = Camera::default().coarser(8);
-    /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
+    /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationRun::default())?;
     /// let pipeline = trial.pipeline()?.with_control_points(60);
     /// let measurement = trial.press(&pipeline)?.measure();
     /// let first = measurement.frames[0].as_ref().expect("a contact");

@@ -50,9 +50,9 @@ struct KnownContact {
 /// Made by [`Pipeline::press`].
 ///
 /// ```
-/// # use tactile_simulate::{Trial, CalibrationOptions, Camera, PressOptions};
+/// # use tactile_simulate::{Trial, CalibrationRun, Camera, PressOptions};
 /// # let camera = Camera::default().coarser(8);
-/// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
+/// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationRun::default())?;
 /// use tactile_imaging::pipeline::Stage;
 /// let pipeline = trial.pipeline()?.with_control_points(60);
 /// let mut press = trial.press(&pipeline)?;

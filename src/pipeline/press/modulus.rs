@@ -30,9 +30,9 @@ impl Press<'_> {
     ///
     /// ```
     /// # use tactile_simulate::Trial;
-    /// # use tactile_simulate::{CalibrationOptions, Camera, PressOptions};
+    /// # use tactile_simulate::{CalibrationRun, Camera, PressOptions};
     /// # let camera = Camera::default().coarser(8);
-    /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
+    /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationRun::default())?;
     /// # let pipeline = trial.pipeline()?;
     /// let series = trial.press(&pipeline)?.load_series()?;
     /// let loads = series.loads();
@@ -60,9 +60,9 @@ impl Press<'_> {
     /// Young's modulus by every estimator that the frames allow, the paper's ratio first.
     ///
     /// ```
-    /// # use tactile_simulate::{Trial, CalibrationOptions, Camera, PressOptions};
+    /// # use tactile_simulate::{Trial, CalibrationRun, Camera, PressOptions};
     /// # let camera = Camera::default().coarser(8);
-    /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
+    /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationRun::default())?;
     /// use tactile_imaging::elasticity::modulus::EstimatorKind;
     /// let pipeline = trial.pipeline()?.with_control_points(60);
     /// let mut press = trial.press(&pipeline)?;

@@ -79,9 +79,9 @@ impl<'a> Press<'a> {
     /// The surface of a frame's contact.
     ///
     /// ```
-    /// # use tactile_simulate::{Trial, CalibrationOptions, Camera, PressOptions};
+    /// # use tactile_simulate::{Trial, CalibrationRun, Camera, PressOptions};
     /// # let camera = Camera::default().coarser(8);
-    /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
+    /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationRun::default())?;
     /// let pipeline = trial.pipeline()?;
     /// let mut press = trial.press(&pipeline)?;
     /// let surface = press.surface(0)?;
@@ -134,9 +134,9 @@ impl<'a> Press<'a> {
     /// Control points on a frame's surface, in metres from the frame's first pixel.
     ///
     /// ```
-    /// # use tactile_simulate::{Trial, CalibrationOptions, Camera, PressOptions};
+    /// # use tactile_simulate::{Trial, CalibrationRun, Camera, PressOptions};
     /// # let camera = Camera::default().coarser(8);
-    /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
+    /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationRun::default())?;
     /// let pipeline = trial.pipeline()?.with_control_points(60);
     /// let mut press = trial.press(&pipeline)?;
     /// let points = press.control_points(0)?;
@@ -167,9 +167,9 @@ impl<'a> Press<'a> {
     /// The matches of the first frame's control points to those of a later frame.
     ///
     /// ```
-    /// # use tactile_simulate::{Trial, CalibrationOptions, Camera, PressOptions};
+    /// # use tactile_simulate::{Trial, CalibrationRun, Camera, PressOptions};
     /// # let camera = Camera::default().coarser(8);
-    /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
+    /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationRun::default())?;
     /// let pipeline = trial.pipeline()?.with_control_points(60);
     /// let mut press = trial.press(&pipeline)?;
     /// let matching = press.matching(1)?;

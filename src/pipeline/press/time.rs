@@ -10,9 +10,9 @@ impl Press<'_> {
     /// Says when a frame was taken, in seconds since the object touched. Frames without a time do not count where time does.
     ///
     /// ```
-    /// # use tactile_simulate::{Trial, CalibrationOptions, Camera, PressOptions};
+    /// # use tactile_simulate::{Trial, CalibrationRun, Camera, PressOptions};
     /// # let camera = Camera::default().coarser(8);
-    /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
+    /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationRun::default())?;
     /// use tactile_imaging::pipeline::PipelineError;
     /// let pipeline = trial.pipeline()?;
     /// let mut press = trial.press(&pipeline)?;

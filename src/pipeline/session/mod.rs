@@ -35,9 +35,9 @@ pub use update::Update;
 /// use std::sync::Arc;
 /// use tactile_imaging::pipeline::Session;
 /// use tactile_simulate::Trial;
-/// use tactile_simulate::{CalibrationOptions, Camera, PressOptions};
+/// use tactile_simulate::{CalibrationRun, Camera, PressOptions};
 /// let camera = Camera::default().coarser(8);
-/// let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
+/// let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationRun::default())?;
 /// let mut session = Session::new(&trial.pipeline()?, &[trial.simulation.reference.view()])?;
 /// for frame in &trial.simulation.frames {
 ///     assert!(session.push(frame.view())?.contact.is_some());

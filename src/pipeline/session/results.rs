@@ -14,10 +14,10 @@ impl Session {
     /// use std::sync::Arc;
     /// use tactile_imaging::pipeline::Session;
     /// use tactile_simulate::Trial;
-    /// use tactile_simulate::{Camera, CalibrationOptions, Load, PressOptions};
+    /// use tactile_simulate::{Camera, CalibrationRun, PressLoad, PressOptions};
     /// let camera = Camera::default().coarser(4);
-    /// let loads = [0.7, 1.0, 1.2].map(Load::normal).to_vec();
-    /// let trial = Trial::new(PressOptions { camera, loads, ..PressOptions::default() }, &CalibrationOptions::default())?;
+    /// let loads = [0.7, 1.0, 1.2].map(PressLoad::normal).to_vec();
+    /// let trial = Trial::new(PressOptions { camera, loads, ..PressOptions::default() }, &CalibrationRun::default())?;
     /// let mut session = Session::new(&trial.pipeline()?, &[trial.simulation.reference.view()])?;
     /// let mut across = Vec::new();
     /// for frame in &trial.simulation.frames {
@@ -54,9 +54,9 @@ impl Session {
     /// # use std::sync::Arc;
     /// # use tactile_imaging::pipeline::Session;
     /// # use tactile_simulate::Trial;
-    /// # use tactile_simulate::{Camera, CalibrationOptions, PressOptions};
+    /// # use tactile_simulate::{Camera, CalibrationRun, PressOptions};
     /// # let camera = Camera::default().coarser(8);
-    /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
+    /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationRun::default())?;
     /// # let mut session = Session::new(&trial.pipeline()?, &[trial.simulation.reference.view()])?;
     /// session.push(trial.simulation.frames[0].view())?;
     /// assert!(session.strain()?.is_none());

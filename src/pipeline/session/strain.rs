@@ -17,9 +17,9 @@ use ndarray::ArrayView2;
 /// # use std::sync::Arc;
 /// # use tactile_imaging::pipeline::Session;
 /// # use tactile_simulate::Trial;
-/// # use tactile_simulate::{Camera, CalibrationOptions, PressOptions};
+/// # use tactile_simulate::{Camera, CalibrationRun, PressOptions};
 /// # let camera = Camera::default().coarser(8);
-/// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
+/// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationRun::default())?;
 /// let mut session = Session::new(&trial.pipeline()?, &[trial.simulation.reference.view()])?;
 /// for frame in &trial.simulation.frames {
 ///     session.push(frame.view())?;

@@ -3,7 +3,9 @@ use crate::failure::Failure;
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 use rand_distr::StandardNormal;
 use tactile_imaging::elasticity::ElasticityError;
-use tactile_imaging::fem::{Block, Guide, Interface, Layer, Load, Lump, Material, Scene};
+use tactile_imaging::fem::{
+    AppliedLoad, Block, FemScene, Guide, GuideLayer, Interface, Lump, Material,
+};
 use tactile_imaging::inclusion::InclusionScene;
 use tactile_imaging::inclusion::{PressureProfile, Specimen};
 
@@ -50,8 +52,8 @@ impl Source {
             }),
         };
         let approaches = [1e-3, 2e-3, 3e-3];
-        let scene = Scene::block_under_guide(&block, &guide, Interface::Bonded)?;
-        let solution = scene.solve(&approaches.map(Load::Approach));
+        let scene = FemScene::block_under_guide(&block, &guide, Interface::Bonded)?;
+        let solution = scene.solve(&approaches.map(AppliedLoad::Approach));
         let width = guide.radius_m() / 60.0;
         let radii_m: Vec<f64> = (0..45).map(|k| (f64::from(k) + 0.5) * width).collect();
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
@@ -92,7 +94,7 @@ impl Source {
 /// A block of tissue as high as two faces, and a guide of three layers, the stiffest towards the tissue.
 pub fn simulated_block() -> Result<(Specimen, Guide), ElasticityError> {
     let layer = |thickness_m, modulus| {
-        Ok(Layer {
+        Ok(GuideLayer {
             thickness_m,
             material: Material::new(modulus, 0.495)?,
         })

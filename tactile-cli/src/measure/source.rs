@@ -12,7 +12,9 @@ use tactile_imaging::io::{Grey, read_grey_image};
 use tactile_imaging::pipeline::{PipelineError, Press};
 use tactile_imaging::scene::{Scene, SceneData};
 use tactile_simulate::Trial;
-use tactile_simulate::{Camera, ContactLaw, Elastic, Load, PressOptions, SimulateError, Sphere};
+use tactile_simulate::{
+    Camera, ContactModel, Elastic, ElasticSphere, PressLoad, PressOptions, SimulateError,
+};
 
 /// Frames with all that is needed to measure them.
 pub enum Source {
@@ -160,16 +162,20 @@ fn options(simulation: &Simulation) -> PressOptions {
         Camera::default()
     };
     PressOptions {
-        object: Sphere {
+        object: ElasticSphere {
             radius_m: simulation.radius_mm * 1e-3,
             material,
         },
-        loads: simulation.forces.iter().map(|&f| Load::normal(f)).collect(),
+        loads: simulation
+            .forces
+            .iter()
+            .map(|&f| PressLoad::normal(f))
+            .collect(),
         camera,
         seed: simulation.seed,
         ..match simulation.physics {
             Physics::FiniteElements => PressOptions {
-                law: ContactLaw::FiniteElements,
+                law: ContactModel::FiniteElements,
                 ..PressOptions::default()
             },
             Physics::Hertz => PressOptions::default(),

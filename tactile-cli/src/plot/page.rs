@@ -12,10 +12,10 @@ use tactile_imaging::pipeline::PipelineError;
 ///
 /// ```
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
-/// # use tactile_simulate::{Trial, CalibrationOptions, Camera, Load, PressOptions};
+/// # use tactile_simulate::{Trial, CalibrationRun, Camera, PressLoad, PressOptions};
 /// # let camera = Camera::default().coarser(16);
-/// # let options = PressOptions { camera, loads: vec![Load::normal(0.7)], ..PressOptions::default() };
-/// # let trial = Trial::new(options, &CalibrationOptions::default())?;
+/// # let options = PressOptions { camera, loads: vec![PressLoad::normal(0.7)], ..PressOptions::default() };
+/// # let trial = Trial::new(options, &CalibrationRun::default())?;
 /// # let pipeline = trial.pipeline()?;
 /// use tactile_cli::plot::{PlotError, save_press_pages};
 /// let file = tempfile::NamedTempFile::new()?;

@@ -16,12 +16,12 @@ const UM: f64 = 1e6;
 ///
 /// ```
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
-/// # use tactile_simulate::{CalibrationOptions, Camera, Load, PressOptions, PressScene};
+/// # use tactile_simulate::{CalibrationRun, Camera, PressLoad, PressOptions, PressScene};
 /// use tactile_imaging::{Object, Pipeline};
 /// use tactile_cli::plot::save_press_pages;
 /// # let camera = Camera::default().coarser(16);
-/// # let scene = PressScene::new(PressOptions { camera, loads: vec![Load::normal(0.7)], ..Default::default() })?;
-/// # let calibration = scene.calibrate(&CalibrationOptions { steps: 8, ..Default::default() })?;
+/// # let scene = PressScene::new(PressOptions { camera, loads: vec![PressLoad::normal(0.7)], ..Default::default() })?;
+/// # let calibration = scene.calibrate(&CalibrationRun { steps: 8, ..Default::default() })?;
 /// # let made = scene.simulate();
 /// let pipeline = Pipeline::from_pairs(&calibration.pairs, made.pixel_size_m, Object::sphere(3e-3))?.with_control_points(40);
 /// let mut press = pipeline.press(made.reference.view())?;

@@ -10,7 +10,7 @@ use ndarray::Array2;
 use std::time::{Duration, Instant};
 use tactile_imaging::pipeline::{FrameSource, PipelineError, Session};
 use tactile_simulate::Trial;
-use tactile_simulate::{Camera, Gain, Load, LoadCycle, PressOptions};
+use tactile_simulate::{Camera, Gain, LoadCycle, PressLoad, PressOptions};
 
 /// Times in seconds and frames.
 type Recording = Vec<(f64, Array2<u8>)>;
@@ -75,7 +75,7 @@ fn press_options(arguments: &Arguments) -> PressOptions {
     let factor = if arguments.simulation.full_size { 1 } else { 4 };
     PressOptions {
         camera: Camera::default().coarser(factor),
-        loads: vec![Load::normal(largest_force_n(arguments))],
+        loads: vec![PressLoad::normal(largest_force_n(arguments))],
         gain: Gain::PeakGrey(200.0),
         ..PressOptions::default()
     }

@@ -38,7 +38,7 @@ fn a_rigid_paraboloid_on_a_half_space_follows_hertz() {
     let lines = contact_lines(0.03, 8, 1.05, 1e9, 0.14);
     let shape = RigidShape::Paraboloid { radius_m: radius };
     let (model, modulus) = half_space(&lines, 0.005, shape);
-    let loads = [0.05_f64, 0.07, 0.1].map(|a| Load::Approach(a * a / radius));
+    let loads = [0.05_f64, 0.07, 0.1].map(|a| AppliedLoad::Approach(a * a / radius));
     let solution = model.solve(&loads);
     assert_eq!(solution.report.outcome, Outcome::Solved);
     for state in &solution.states {
@@ -65,7 +65,7 @@ fn a_flat_punch_on_a_half_space_follows_sneddon() {
     let radius = 0.1;
     let lines = punch_lines(radius, 1e-4);
     let (model, modulus) = half_space(&lines, 2e-4, RigidShape::Punch { radius_m: radius });
-    let state = &model.solve(&[Load::Approach(1e-3)]).states[0];
+    let state = &model.solve(&[AppliedLoad::Approach(1e-3)]).states[0];
     let sneddon = 2.0 * radius * modulus * 1e-3;
     // The end of the half space takes 0.15 % of the approach, the rim's elements the rest.
     let ratio = state.force_n() / sneddon;
@@ -79,7 +79,7 @@ fn a_cone_on_a_half_space_follows_sneddon() {
     let (model, modulus) = half_space(&lines, 2e-3, RigidShape::Cone { half_angle_rad });
     // Contact radius 2 δ tan α / π = 0.1.
     let approach = 0.05 * core::f64::consts::PI / half_angle_rad.tan();
-    let state = &model.solve(&[Load::Approach(approach)]).states[0];
+    let state = &model.solve(&[AppliedLoad::Approach(approach)]).states[0];
     let sneddon = 2.0 / core::f64::consts::PI * modulus * approach.powi(2) * half_angle_rad.tan();
     let ratio = state.force_n() / sneddon;
     assert!((ratio - 1.0).abs() < 5e-3, "{ratio}");
@@ -113,7 +113,7 @@ fn a_ball_on_a_bonded_layer_follows_the_linear_theory() {
     model.drive(layer, Boundary::Base, Support::Bonded);
     model.contact_rigid_above(layer, RigidShape::Paraboloid { radius_m: radius }, 0.0);
     let ratios = [0.2_f64, 0.35, 0.5];
-    let solution = model.solve(&ratios.map(|x| Load::Approach(x * x / radius)));
+    let solution = model.solve(&ratios.map(|x| AppliedLoad::Approach(x * x / radius)));
     assert_eq!(solution.report.outcome, Outcome::Solved);
     for (state, x) in solution.states.iter().zip(ratios) {
         // The exact linear contact at the elements' own Poisson ratio, by its integral equation, at the contact radius of this approach.
@@ -152,11 +152,11 @@ fn a_ball_on_a_bonded_layer_follows_the_linear_theory() {
 #[test]
 fn gaps_and_their_derivatives_agree_with_differences() {
     use crate::contact::DRIVER;
-    let scene = Scene::ball_on_guide(
+    let scene = FemScene::ball_on_guide(
         1.0,
         Material::new(1.0, 0.45).unwrap(),
         &Guide::new(
-            vec![Layer {
+            vec![GuideLayer {
                 thickness_m: 1.0,
                 material: Material::new(1.0, 0.45).unwrap(),
             }],

@@ -4,7 +4,7 @@ use crate::element::{GAUSS3, map, shape};
 use crate::material::{Deformation, Gradient, Kinematics, Material, inverse_cube_root};
 use crate::mesh::Mesh;
 use crate::model::{Model, Motion};
-use crate::scene::{Load, Outcome};
+use crate::scene::{AppliedLoad, Outcome};
 
 /// An annulus (0 ≤ r ≤ 1, 0 ≤ z ≤ 1) of n × n elements with its inner nodes displaced.
 fn distorted(n: usize, amplitude: f64) -> Mesh {
@@ -66,7 +66,7 @@ fn a_homogeneous_strain_is_exact_on_a_distorted_mesh() {
         model.add(&mesh, &[material]).unwrap();
         let field = |[r, z]: [f64; 2]| [0.1 * r, -0.15 * z];
         clamp_to(&mut model, field);
-        let solution = model.solve(&[Load::Approach(1.0)]);
+        let solution = model.solve(&[AppliedLoad::Approach(1.0)]);
         assert_eq!(solution.report.outcome, Outcome::Solved);
         for (node, u) in model.nodes.iter().zip(solution.states[0].displacements()) {
             let exact = field(*node);
@@ -149,7 +149,7 @@ fn manufactured_error(kinematics: Kinematics, poisson: f64, n: usize) -> f64 {
             }
         }
     }
-    let solution = model.solve(&[Load::Approach(1.0)]);
+    let solution = model.solve(&[AppliedLoad::Approach(1.0)]);
     assert_eq!(
         solution.report.outcome,
         Outcome::Solved,

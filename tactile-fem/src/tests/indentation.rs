@@ -30,7 +30,10 @@ fn curve(
         model.forbid_slip();
     }
     let approaches: Vec<f64> = (1..=8).map(|k| approach * f64::from(k) / 8.0).collect();
-    let loads: Vec<Load> = approaches.iter().map(|&d| Load::Approach(d)).collect();
+    let loads: Vec<AppliedLoad> = approaches
+        .iter()
+        .map(|&d| AppliedLoad::Approach(d))
+        .collect();
     let solution = model.solve(&loads);
     assert_eq!(solution.report.outcome, Outcome::Solved);
     let forces: Vec<f64> = solution.states.iter().map(State::force_n).collect();

@@ -5,10 +5,11 @@ use tactile_elasticity::ElasticityError;
 
 /// The paper's three layers.
 fn paper_guide(radius_m: f64) -> Guide {
-    let layers = [(2e-3, 136e3), (3e-3, 80e3), (5e-3, 34e3)].map(|(thickness_m, modulus)| Layer {
-        thickness_m,
-        material: Material::new(modulus, 0.495).unwrap(),
-    });
+    let layers =
+        [(2e-3, 136e3), (3e-3, 80e3), (5e-3, 34e3)].map(|(thickness_m, modulus)| GuideLayer {
+            thickness_m,
+            material: Material::new(modulus, 0.495).unwrap(),
+        });
     Guide::new(layers.to_vec(), radius_m).unwrap()
 }
 
@@ -16,7 +17,7 @@ fn paper_guide(radius_m: f64) -> Guide {
 fn a_ball_on_a_layered_guide_agrees_with_another_program_at_large_contact_radii() {
     let material = |modulus| Material::new(modulus, 0.495).unwrap();
     let guide = paper_guide(25e-3);
-    let scene = Scene::ball_on_guide(3e-3, material(103e3), &guide).unwrap();
+    let scene = FemScene::ball_on_guide(3e-3, material(103e3), &guide).unwrap();
     // Force, contact radius and approach by an independent program: axisymmetric elements at finite
     // strain, neo-Hookean, without friction, extrapolated over its meshes.
     let reference = [
@@ -24,7 +25,7 @@ fn a_ball_on_a_layered_guide_agrees_with_another_program_at_large_contact_radii(
         (0.7, 2.747523e-3, 2.247527e-3),
         (1.2, 3.214206e-3, 3.004672e-3),
     ];
-    let solution = scene.solve(&reference.map(|(force, ..)| Load::Force(force)));
+    let solution = scene.solve(&reference.map(|(force, ..)| AppliedLoad::Force(force)));
     assert_eq!(solution.report.outcome, Outcome::Solved);
     for (state, (force, radius, approach)) in solution.states.iter().zip(reference) {
         assert!((state.force_n() / force - 1.0).abs() < 1e-7);
@@ -41,8 +42,8 @@ fn balls_on_guides_solve_to_contact_radii_beyond_their_own() {
     let material = |modulus| Material::new(modulus, 0.495).unwrap();
     for (radius, modulus, approach) in [(3e-3, 250e3, 1.2), (12e-3, 30e3, 0.7)] {
         let guide = paper_guide(5.0 * radius);
-        let scene = Scene::ball_on_guide(radius, material(modulus), &guide).unwrap();
-        let loads = [0.4, 0.7, 1.0].map(|part| Load::Approach(part * approach * radius));
+        let scene = FemScene::ball_on_guide(radius, material(modulus), &guide).unwrap();
+        let loads = [0.4, 0.7, 1.0].map(|part| AppliedLoad::Approach(part * approach * radius));
         let solution = scene.solve(&loads);
         assert_eq!(solution.report.outcome, Outcome::Solved);
         let ratios: Vec<f64> = (solution.states.iter())
@@ -78,34 +79,37 @@ fn balls_on_guides_solve_to_contact_radii_beyond_their_own() {
 #[test]
 fn objects_of_every_shape_are_pressed_on_a_flat_and_on_a_guide() {
     let gel = Material::new(80e3, 0.495).unwrap();
-    let layer = Layer {
+    let layer = GuideLayer {
         thickness_m: 6e-3,
         material: gel,
     };
     let guide = Guide::new(vec![layer], 12e-3).unwrap();
     let objects = [
-        Object::Ball { radius_m: 3e-3 },
-        Object::HalfBall { radius_m: 3e-3 },
-        Object::Cylinder {
+        ObjectShape::Ball { radius_m: 3e-3 },
+        ObjectShape::HalfBall { radius_m: 3e-3 },
+        ObjectShape::Cylinder {
             radius_m: 2e-3,
             height_m: 3e-3,
         },
-        Object::Cylinder {
+        ObjectShape::Cylinder {
             radius_m: 20e-3,
             height_m: 3e-3,
         },
-        Object::Cone {
+        ObjectShape::Cone {
             half_angle_rad: 1.2,
             height_m: 2e-3,
         },
     ];
     for object in objects {
-        let force = |press: &Press| {
-            let solution = press.scene().unwrap().solve(&[Load::Approach(0.3e-3)]);
+        let force = |press: &ObjectPress| {
+            let solution = press
+                .scene()
+                .unwrap()
+                .solve(&[AppliedLoad::Approach(0.3e-3)]);
             assert_eq!(solution.report.outcome, Outcome::Solved, "{object:?}");
             solution.states[0].force_n()
         };
-        let on_flat = Press::new(object, Material::new(60e3, 0.495).unwrap()).unwrap();
+        let on_flat = ObjectPress::new(object, Material::new(60e3, 0.495).unwrap()).unwrap();
         let on_guide = on_flat.clone().on_guide(guide.clone()).unwrap();
         let [flat, soft] = [force(&on_flat), force(&on_guide)];
         assert!(0.0 < soft && soft < flat, "{object:?}: {soft} {flat}");
@@ -123,21 +127,21 @@ fn objects_of_every_shape_are_pressed_on_a_flat_and_on_a_guide() {
 #[test]
 fn presses_of_other_proportions_are_refused() {
     let gel = Material::new(80e3, 0.495).unwrap();
-    let refused = |object| Press::new(object, gel).unwrap_err();
+    let refused = |object| ObjectPress::new(object, gel).unwrap_err();
     assert!(matches!(
-        refused(Object::Ball { radius_m: f64::NAN }),
+        refused(ObjectShape::Ball { radius_m: f64::NAN }),
         ElasticityError::NotPositive { .. }
     ));
     assert!(matches!(
-        refused(Object::Cone {
+        refused(ObjectShape::Cone {
             half_angle_rad: 1.6,
             height_m: 1e-3
         }),
         ElasticityError::OutOfRange { .. }
     ));
-    let ball = Press::new(Object::Ball { radius_m: 3e-3 }, gel).unwrap();
+    let ball = ObjectPress::new(ObjectShape::Ball { radius_m: 3e-3 }, gel).unwrap();
     assert!(ball.clone().with_fineness(1).is_err());
-    let layer = Layer {
+    let layer = GuideLayer {
         thickness_m: 6e-3,
         material: gel,
     };
@@ -150,8 +154,8 @@ fn presses_of_other_proportions_are_refused() {
 /// The ball's shells stay clear of its core whatever the number of elements.
 #[test]
 fn a_ball_can_be_meshed_at_any_fineness() {
-    let ball = Object::Ball { radius_m: 3e-3 };
-    let press = Press::new(ball, Material::new(103e3, 0.495).unwrap()).unwrap();
+    let ball = ObjectShape::Ball { radius_m: 3e-3 };
+    let press = ObjectPress::new(ball, Material::new(103e3, 0.495).unwrap()).unwrap();
     for fineness in 2..=24 {
         let scene = press.clone().with_fineness(fineness).unwrap().scene();
         assert!(scene.is_ok(), "{fineness}: {:?}", scene.err());
@@ -161,13 +165,13 @@ fn a_ball_can_be_meshed_at_any_fineness() {
 #[test]
 fn a_soft_cylinder_on_a_flat_is_stiffer_than_a_free_column() {
     let (radius_m, height_m, modulus) = (2e-3, 20e-3, 50e3);
-    let cylinder = Object::Cylinder { radius_m, height_m };
-    let press = Press::new(cylinder, Material::new(modulus, 0.3).unwrap()).unwrap();
+    let cylinder = ObjectShape::Cylinder { radius_m, height_m };
+    let press = ObjectPress::new(cylinder, Material::new(modulus, 0.3).unwrap()).unwrap();
     let strain = 1e-3;
     let state = &press
         .scene()
         .unwrap()
-        .solve(&[Load::Approach(strain * height_m)])
+        .solve(&[AppliedLoad::Approach(strain * height_m)])
         .states[0];
     let column = core::f64::consts::PI * radius_m * radius_m * modulus * strain;
     let ratio = state.force_n() / column;
@@ -181,13 +185,13 @@ fn the_rim_of_the_guide_is_not_felt() {
     // The thickest guide beside the ball, where the rim is nearest in thicknesses.
     for (ball, thickness_m) in [(3e-3, 10e-3), (8e-3, 10e-3)] {
         let contact = |guide_radius| {
-            let layer = Layer {
+            let layer = GuideLayer {
                 thickness_m,
                 material: material(60e3),
             };
             let guide = Guide::new(vec![layer], guide_radius).unwrap();
-            let scene = Scene::ball_on_guide(ball, material(100e3), &guide).unwrap();
-            let state = &scene.solve(&[Load::Approach(0.6 * ball)]).states[0];
+            let scene = FemScene::ball_on_guide(ball, material(100e3), &guide).unwrap();
+            let state = &scene.solve(&[AppliedLoad::Approach(0.6 * ball)]).states[0];
             (state.force_n(), state.contact_radius().unwrap().radius_m)
         };
         let table = contact((4.0 * ball).max(2.5 * thickness_m));
@@ -202,9 +206,9 @@ fn the_rim_of_the_guide_is_not_felt() {
 fn a_finer_mesh_moves_the_table_little() {
     let material = |modulus| Material::new(modulus, 0.495).unwrap();
     let guide = paper_guide(25e-3);
-    let press = Press::new(Object::Ball { radius_m: 3e-3 }, material(103e3)).unwrap();
+    let press = ObjectPress::new(ObjectShape::Ball { radius_m: 3e-3 }, material(103e3)).unwrap();
     let press = press.on_guide(guide).unwrap();
-    let loads = [0.05, 0.3, 1.0].map(Load::Force);
+    let loads = [0.05, 0.3, 1.0].map(AppliedLoad::Force);
     let radii = |fineness| -> Vec<f64> {
         let scene = press
             .clone()

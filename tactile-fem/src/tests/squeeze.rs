@@ -1,6 +1,6 @@
 //! Cylinders between plates against homogeneous strain and the stiffness of thin bonded discs.
 
-use crate::{Interface, Load, Material, Scene, State};
+use crate::{AppliedLoad, FemScene, Interface, Material, State};
 use approx::assert_relative_eq;
 use core::f64::consts::PI;
 use tactile_elasticity::ElasticityError;
@@ -9,8 +9,8 @@ const RADIUS_M: f64 = 6e-3;
 
 fn squeezed(aspect: f64, material: Material, faces: Interface, squeeze: f64) -> State {
     let height_m = 2.0 * RADIUS_M * aspect;
-    let scene = Scene::cylinder_between_plates(RADIUS_M, height_m, material, faces).unwrap();
-    let solution = scene.solve(&[Load::Approach(0.5 * squeeze * height_m)]);
+    let scene = FemScene::cylinder_between_plates(RADIUS_M, height_m, material, faces).unwrap();
+    let solution = scene.solve(&[AppliedLoad::Approach(0.5 * squeeze * height_m)]);
     solution.states.into_iter().next().unwrap()
 }
 
@@ -114,7 +114,8 @@ fn a_cylinder_without_size_is_refused() {
     let material = Material::new(1e5, 0.495).unwrap();
     for bad in [0.0, -1e-3, f64::NAN] {
         for [radius, height] in [[bad, 1e-2], [1e-2, bad]] {
-            let scene = Scene::cylinder_between_plates(radius, height, material, Interface::Bonded);
+            let scene =
+                FemScene::cylinder_between_plates(radius, height, material, Interface::Bonded);
             assert!(matches!(scene, Err(ElasticityError::NotPositive { .. })));
         }
     }

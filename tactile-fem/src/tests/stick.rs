@@ -14,7 +14,7 @@ fn a_flat_punch_without_slip_follows_spence() {
     for poisson_ratio in [0.0, 0.3, 0.45] {
         let shape = RigidShape::Punch { radius_m: 0.1 };
         let mut model = half_space_of(poisson_ratio, &punch_lines(0.1, 1e-3), 2e-3, shape);
-        let force = |model: &Model| model.solve(&[Load::Approach(1e-3)]).states[0].force_n();
+        let force = |model: &Model| model.solve(&[AppliedLoad::Approach(1e-3)]).states[0].force_n();
         let slides = force(&model);
         model.forbid_slip();
         let ratio = force(&model) / slides / spence(poisson_ratio);
@@ -31,7 +31,7 @@ fn a_ball_without_slip_is_as_stiff_as_a_punch_of_its_contact() {
     let mut model = half_space_of(poisson_ratio, &lines, 0.005, shape);
     model.forbid_slip();
     let states = model
-        .solve(&[0.009, 0.010, 0.011].map(Load::Approach))
+        .solve(&[0.009, 0.010, 0.011].map(AppliedLoad::Approach))
         .states;
     let stiffness = (states[2].force_n() - states[0].force_n()) / 0.002;
     let radius = states[1].contact_radius().unwrap().radius_m;
@@ -51,7 +51,7 @@ fn over_closed_forms(poisson_ratio: f64, elements: usize) -> [f64; 2] {
     let ratio = |shape, law: &dyn ContactLaw, approach: f64| {
         let mut model = half_space_of(poisson_ratio, &lines, 0.04 / elements as f64, shape);
         model.forbid_slip();
-        let force = model.solve(&[Load::Approach(approach)]).states[0].force_n();
+        let force = model.solve(&[AppliedLoad::Approach(approach)]).states[0].force_n();
         force / (modulus * law.of_indentation(approach, 0.0).unwrap().value.exp())
     };
     let sphere = NoSlipLaw::sphere(1.0, poisson_ratio).unwrap();
@@ -90,10 +90,10 @@ fn study_growing_contacts_without_slip() {
 }
 
 /// A ball of 3 mm on a layer of 6 mm or on a rigid flat.
-fn ball(material: Material, layer: Option<Material>, interface: Interface) -> Scene {
-    let mut press = Press::new(Object::Ball { radius_m: 3e-3 }, material).unwrap();
+fn ball(material: Material, layer: Option<Material>, interface: Interface) -> FemScene {
+    let mut press = ObjectPress::new(ObjectShape::Ball { radius_m: 3e-3 }, material).unwrap();
     if let Some(material) = layer {
-        let layer = Layer {
+        let layer = GuideLayer {
             thickness_m: 6e-3,
             material,
         };
@@ -104,7 +104,7 @@ fn ball(material: Material, layer: Option<Material>, interface: Interface) -> Sc
     press.with_interface(interface).scene().unwrap()
 }
 
-fn solved(scene: &Scene, loads: &[Load]) -> Vec<State> {
+fn solved(scene: &FemScene, loads: &[AppliedLoad]) -> Vec<State> {
     let solution = scene.solve(loads);
     assert_eq!(solution.report.outcome, Outcome::Solved);
     solution.states
@@ -116,7 +116,7 @@ fn a_stiff_guide_holds_as_a_rigid_flat_does() {
     let material = Material::new(103e3, 0.3).unwrap();
     let stiffening = |layer: Option<Material>| {
         let [sticks, slides] = [Interface::Bonded, Interface::Frictionless].map(|interface| {
-            let load = [Load::Approach(0.3e-3)];
+            let load = [AppliedLoad::Approach(0.3e-3)];
             solved(&ball(material, layer, interface), &load)[0].force_n()
         });
         sticks / slides
@@ -134,8 +134,8 @@ fn more_loads_on_the_way_change_little() {
     let gel = |modulus, poisson_ratio| Material::new(modulus, poisson_ratio).unwrap();
     let scene = ball(gel(103e3, 0.3), Some(gel(40e3, 0.495)), Interface::Bonded);
     let at_the_end = |loads: u32| {
-        let part = |k| Load::Approach(1.2e-3 * f64::from(k) / f64::from(loads));
-        let loads: Vec<Load> = (1..=loads).map(part).collect();
+        let part = |k| AppliedLoad::Approach(1.2e-3 * f64::from(k) / f64::from(loads));
+        let loads: Vec<AppliedLoad> = (1..=loads).map(part).collect();
         let state = solved(&scene, &loads).pop().unwrap();
         [state.force_n(), state.contact_radius().unwrap().radius_m]
     };
@@ -148,7 +148,7 @@ fn more_loads_on_the_way_change_little() {
 #[test]
 fn incompressible_bodies_do_not_feel_friction() {
     let gel = |modulus| Material::new(modulus, 0.4999).unwrap();
-    let load = [Load::Approach(0.1e-3)];
+    let load = [AppliedLoad::Approach(0.1e-3)];
     let force = |interface| {
         let scene = ball(gel(103e3), Some(gel(60e3)), interface);
         solved(&scene, &load)[0].force_n()

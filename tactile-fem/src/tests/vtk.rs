@@ -18,8 +18,8 @@ fn a_file_holds_mesh_displacements_and_stresses() {
         .unwrap();
     model.drive(body, Boundary::Base, Support::Sliding);
     model.hold(body, Boundary::Contact, Support::Sliding);
-    let scene = Scene::from_model(model);
-    let state = &scene.solve(&[Load::Approach(1e-5)]).states[0];
+    let scene = FemScene::from_model(model);
+    let state = &scene.solve(&[AppliedLoad::Approach(1e-5)]).states[0];
     let mut file = Vec::new();
     scene.write_vtk(state, &mut file).unwrap();
     let text = String::from_utf8(file).unwrap();
@@ -45,11 +45,11 @@ fn a_file_holds_mesh_displacements_and_stresses() {
 fn a_state_of_another_scene_is_refused() {
     let ball = |radius| {
         let gel = Material::new(1e5, 0.495).unwrap();
-        let object = Object::Ball { radius_m: radius };
-        Press::new(object, gel).unwrap()
+        let object = ObjectShape::Ball { radius_m: radius };
+        ObjectPress::new(object, gel).unwrap()
     };
     let scene = ball(3e-3).with_fineness(3).unwrap().scene().unwrap();
     let other = ball(3e-3).with_fineness(4).unwrap().scene().unwrap();
-    let state = &scene.solve(&[Load::Approach(1e-4)]).states[0];
+    let state = &scene.solve(&[AppliedLoad::Approach(1e-4)]).states[0];
     assert!(other.write_vtk(state, &mut Vec::new()).is_err());
 }

@@ -21,7 +21,7 @@ use rand_distr::StandardNormal;
 use scenes::{SolvedScene, scenes};
 use std::error::Error;
 use std::path::Path;
-use tactile_fem::{Guide, Layer, Material};
+use tactile_fem::{Guide, GuideLayer, Material};
 use tactile_inclusion::{
     AssumedInclusion, ExpectedErrors, InclusionSearch, PressureProfile, SensorErrors, Specimen,
 };
@@ -35,8 +35,8 @@ const SUMMARY_EVERY: usize = 10;
 
 /// The sensor's guide in all scenes.
 fn guide(radius_m: f64) -> Result<Guide, Box<dyn Error>> {
-    let layer = |thickness_m, modulus| -> Result<Layer, Box<dyn Error>> {
-        Ok(Layer {
+    let layer = |thickness_m, modulus| -> Result<GuideLayer, Box<dyn Error>> {
+        Ok(GuideLayer {
             thickness_m,
             material: Material::new(modulus, 0.495)?,
         })

@@ -5,7 +5,7 @@
 
 use crate::forward::{Forward, LumpParameters, Parameters};
 use std::collections::BTreeMap;
-use tactile_fem::{Guide, Interface, Kinematics, Layer, Material};
+use tactile_fem::{Guide, GuideLayer, Interface, Kinematics, Material};
 
 /// A block at one approach.
 struct Load {
@@ -57,7 +57,7 @@ fn load(header: &[&str], row: &str) -> Load {
 }
 
 fn guide(radius_m: f64) -> Guide {
-    let layer = |thickness_m, modulus| Layer {
+    let layer = |thickness_m, modulus| GuideLayer {
         thickness_m,
         material: Material::new(modulus, 0.495).unwrap(),
     };

@@ -5,13 +5,13 @@ use crate::{
     Identifiable, InclusionEstimate, InclusionSearch, InclusionWarning, PressureProfile, Specimen,
 };
 use core::ops::ControlFlow;
-use tactile_fem::{Guide, Interface, Kinematics, Layer, Material};
+use tactile_fem::{Guide, GuideLayer, Interface, Kinematics, Material};
 
 const RINGS: usize = 24;
 const APPROACHES_M: [f64; 2] = [1.5e-3, 3e-3];
 
 fn guide() -> Guide {
-    let layer = |thickness_m, modulus: f64| Layer {
+    let layer = |thickness_m, modulus: f64| GuideLayer {
         thickness_m,
         material: Material::new(modulus, 0.495).unwrap(),
     };

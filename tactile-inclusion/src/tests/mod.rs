@@ -4,7 +4,7 @@ use crate::forward::{Coordinate, Forward, LARGEST_POISSON_RATIO, LumpParameters,
 use crate::{AssumedInclusion, Identifiable, InclusionSearch, PressureProfile, Specimen};
 use core::ops::ControlFlow;
 use tactile_elasticity::ElasticityError;
-use tactile_fem::{Guide, Interface, Kinematics, Layer, Material};
+use tactile_fem::{Guide, GuideLayer, Interface, Kinematics, Material};
 
 mod against_calculix;
 mod departures;
@@ -12,7 +12,7 @@ mod fits;
 mod marginal;
 
 fn guide(scale: f64) -> Guide {
-    let layer = |thickness_m, modulus: f64| Layer {
+    let layer = |thickness_m, modulus: f64| GuideLayer {
         thickness_m,
         material: Material::new(scale * modulus, 0.495).unwrap(),
     };

@@ -1,21 +1,21 @@
 //! Contacts by closed forms, as tables and by finite elements.
 
-use crate::contact::Contact;
-use crate::contact::{ContactLaw, ContactState, finite_element_states};
-use crate::{Elastic, SimulateError, Sphere, Waveguide};
+use crate::contact::SimulatedContact;
+use crate::contact::{ContactModel, ContactState, finite_element_states};
+use crate::{Elastic, ElasticSphere, LightGuide, SimulateError};
 use std::f64::consts::PI;
 
-fn contact(law: ContactLaw, force_n: f64) -> Contact {
-    let sphere = Sphere {
+fn contact(law: ContactModel, force_n: f64) -> SimulatedContact {
+    let sphere = ElasticSphere {
         radius_m: 3e-3,
         material: Elastic::CL2000X,
     };
-    Contact::new(&sphere, &Waveguide::default(), &law, force_n).unwrap()
+    SimulatedContact::new(&sphere, &LightGuide::default(), &law, force_n).unwrap()
 }
 
 #[test]
 fn hertz_relations_hold_among_themselves() {
-    let c = contact(ContactLaw::Hertz, 0.7);
+    let c = contact(ContactModel::Hertz, 0.7);
     let close = |x: f64, y: f64| assert!((x / y - 1.0).abs() < 1e-14, "{x} {y}");
     let (a, e) = (c.contact_radius_m, c.effective_modulus_pa);
     close(
@@ -38,7 +38,7 @@ fn hertz_relations_hold_among_themselves() {
 
 #[test]
 fn displacement_is_continuous_at_the_rim_and_where_the_series_takes_over() {
-    let c = contact(ContactLaw::Hertz, 0.7);
+    let c = contact(ContactModel::Hertz, 0.7);
     for (r, step) in [
         (c.contact_radius_m, 1e-9),
         (50.0 * c.contact_radius_m, 1e-9),
@@ -56,27 +56,33 @@ fn displacement_is_continuous_at_the_rim_and_where_the_series_takes_over() {
 #[test]
 fn tatara_keeps_the_radius_and_lessens_the_approach() {
     let (h, t) = (
-        contact(ContactLaw::Hertz, 0.7),
-        contact(ContactLaw::Tatara, 0.7),
+        contact(ContactModel::Hertz, 0.7),
+        contact(ContactModel::Tatara, 0.7),
     );
     assert_eq!(h.contact_radius_m, t.contact_radius_m);
     assert!(t.indentation_m < h.indentation_m && t.indentation_m > 0.0);
     // At small load the correction vanishes relative to Hertz's approach, as F against F^(2/3).
     let ratio = |f| {
-        contact(ContactLaw::Tatara, f).indentation_m / contact(ContactLaw::Hertz, f).indentation_m
+        contact(ContactModel::Tatara, f).indentation_m
+            / contact(ContactModel::Hertz, f).indentation_m
     };
     let fall = (1.0 - ratio(1e-6)) / (1.0 - ratio(1e-9));
     assert!((fall - 10.0).abs() < 0.01, "{fall}");
 }
 
 /// Hertz's contact as a table of `samples` distances out to 1.5 a.
-fn hertz(force_n: f64, samples: usize) -> (Contact, ContactState) {
-    let sphere = Sphere {
+fn hertz(force_n: f64, samples: usize) -> (SimulatedContact, ContactState) {
+    let sphere = ElasticSphere {
         radius_m: 3e-3,
         material: Elastic::CL2000X,
     };
-    let contact =
-        Contact::new(&sphere, &Waveguide::default(), &ContactLaw::Hertz, force_n).unwrap();
+    let contact = SimulatedContact::new(
+        &sphere,
+        &LightGuide::default(),
+        &ContactModel::Hertz,
+        force_n,
+    )
+    .unwrap();
     let a = contact.contact_radius_m;
     let radius_m: Vec<f64> = (0..samples)
         .map(|k| 1.5 * a * k as f64 / (samples - 1) as f64)
@@ -194,11 +200,11 @@ fn a_table_without_meaning_is_refused() {
 #[test]
 fn every_state_is_a_contact_that_carries_its_force() {
     for material in [Elastic::CL2000X, Elastic::CL2003X] {
-        let ball = Sphere {
+        let ball = ElasticSphere {
             radius_m: 3e-3,
             material,
         };
-        let states = finite_element_states(&ball, &Waveguide::default()).unwrap();
+        let states = finite_element_states(&ball, &LightGuide::default()).unwrap();
         assert_eq!(states.len(), 11);
         for pair in states.windows(2) {
             assert!(pair[0].force_n < pair[1].force_n);
@@ -214,10 +220,10 @@ fn every_state_is_a_contact_that_carries_its_force() {
                 state.force_n
             );
         }
-        let other = Sphere {
+        let other = ElasticSphere {
             radius_m: 4e-3,
             ..ball
         };
-        assert!(finite_element_states(&other, &Waveguide::default()).is_none());
+        assert!(finite_element_states(&other, &LightGuide::default()).is_none());
     }
 }

@@ -1,11 +1,11 @@
 //! A sensor and a press as they are, and as the user states them.
 use nalgebra::DMatrix;
 use tactile_imaging::elasticity::contact::{Layer, Waveguide};
-use tactile_imaging::fem::{self, Guide, Interface, Material, Press};
+use tactile_imaging::fem::{self, Guide, Interface, Material, ObjectPress};
 use tactile_imaging::pipeline::{EstimatorChoice, Measurement, Object, Pipeline, StagesConfig};
 use tactile_simulate::Trial;
 use tactile_simulate::{
-    CalibrationOptions, Camera, ContactLaw, ContactState, Illumination, Load, PressOptions,
+    CalibrationRun, Camera, ContactModel, ContactState, Illumination, PressLoad, PressOptions,
     Response,
 };
 
@@ -119,16 +119,20 @@ fn on_the_guide(
     options: &PressOptions,
 ) -> Vec<ContactState> {
     let material = Material::new(MODULUS_PA, poisson_ratio).unwrap();
-    let layers = options.waveguide.layers.iter().map(|layer| fem::Layer {
-        thickness_m: layer.thickness_m,
-        material: Material::new(layer.material.youngs_modulus_pa, NEARLY_HALF).unwrap(),
-    });
-    let ball = fem::Object::Ball { radius_m: RADIUS_M };
-    let press = Press::new(ball, material).unwrap();
+    let layers = options
+        .waveguide
+        .layers
+        .iter()
+        .map(|layer| fem::GuideLayer {
+            thickness_m: layer.thickness_m,
+            material: Material::new(layer.material.youngs_modulus_pa, NEARLY_HALF).unwrap(),
+        });
+    let ball = fem::ObjectShape::Ball { radius_m: RADIUS_M };
+    let press = ObjectPress::new(ball, material).unwrap();
     let press = press.on_guide(Guide::new(layers.collect(), 28e-3).unwrap());
     let press = press.unwrap().with_interface(interface);
     let scene = press.scene().unwrap();
-    let states = scene.solve(&LOADS_N.map(fem::Load::Force)).states;
+    let states = scene.solve(&LOADS_N.map(fem::AppliedLoad::Force)).states;
     let contact = |state| ContactState::from_solved(state).expect("a contact");
     states.iter().map(contact).collect()
 }
@@ -136,12 +140,12 @@ fn on_the_guide(
 impl World {
     /// Calibrated, pressed and measured as the user states it.
     pub(super) fn measure(&self, stated: &Stated, seed: u64) -> Measurement {
-        let load = |(force_n, level): (f64, f64)| Load {
+        let load = |(force_n, level): (f64, f64)| PressLoad {
             illumination: Illumination {
                 level,
                 ..Illumination::default()
             },
-            ..Load::normal(force_n)
+            ..PressLoad::normal(force_n)
         };
         let mut options = PressOptions {
             camera: self.camera,
@@ -151,16 +155,16 @@ impl World {
             },
             loads: LOADS_N.into_iter().zip(self.levels).map(load).collect(),
             seed,
-            law: ContactLaw::FiniteElements,
+            law: ContactModel::FiniteElements,
             ..PressOptions::default()
         };
         assert_eq!(options.object.material.youngs_modulus_pa, MODULUS_PA);
         if let Some(states) = self.sample.states(&options) {
-            options.law = ContactLaw::Tabulated(states);
+            options.law = ContactModel::Tabulated(states);
         }
-        let calibration = CalibrationOptions {
+        let calibration = CalibrationRun {
             hysteresis: self.hysteresis,
-            ..CalibrationOptions::default()
+            ..CalibrationRun::default()
         };
         let mut trial = Trial::new(options, &calibration).unwrap();
         for pair in &mut trial.pairs {

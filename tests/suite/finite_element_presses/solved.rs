@@ -5,7 +5,7 @@ use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 use std::ops::ControlFlow;
 use std::sync::Arc;
 use tactile_imaging::elasticity::contact::ContactTable;
-use tactile_imaging::fem::{self, Load, Material, Object, Press, TableOptions};
+use tactile_imaging::fem::{self, AppliedLoad, Material, ObjectPress, ObjectShape, TableOptions};
 use tactile_simulate::ContactState;
 
 /// A ball's radius and the layers (thickness, modulus) that it is pressed on; none is a rigid flat.
@@ -61,8 +61,8 @@ pub(super) fn ball(seed: u64) -> Ball {
     });
     let mut ratios = ratios.concat();
     ratios.sort_by(f64::total_cmp);
-    let loads: Vec<Load> = (ratios.iter())
-        .map(|x| Load::Approach(part * x.min(1.15).powi(2) * radius_m))
+    let loads: Vec<AppliedLoad> = (ratios.iter())
+        .map(|x| AppliedLoad::Approach(part * x.min(1.15).powi(2) * radius_m))
         .collect();
     let states = press(radius_m, layers, modulus, fineness)
         .solve(&loads)
@@ -81,15 +81,17 @@ pub(super) fn ball(seed: u64) -> Ball {
     }
 }
 
-fn press(radius_m: f64, layers: &[(f64, f64)], modulus: f64, fineness: usize) -> fem::Scene {
+fn press(radius_m: f64, layers: &[(f64, f64)], modulus: f64, fineness: usize) -> fem::FemScene {
     let material = |modulus| Material::new(modulus, POISSON_RATIO).unwrap();
-    let mut press = Press::new(Object::Ball { radius_m }, material(modulus)).unwrap();
+    let mut press = ObjectPress::new(ObjectShape::Ball { radius_m }, material(modulus)).unwrap();
     if !layers.is_empty() {
         let thickness: f64 = layers.iter().map(|layer| layer.0).sum();
-        let layers = layers.iter().map(|&(thickness_m, modulus)| fem::Layer {
-            thickness_m,
-            material: material(modulus),
-        });
+        let layers = layers
+            .iter()
+            .map(|&(thickness_m, modulus)| fem::GuideLayer {
+                thickness_m,
+                material: material(modulus),
+            });
         // Another rim than the tables' guides have.
         let rim = (5.0 * radius_m).max(3.0 * thickness);
         let guide = fem::Guide::new(layers.collect(), rim).unwrap();

@@ -13,7 +13,9 @@ use tactile_imaging::force::{
     ForceOptions, ForceWorkspace, LinearCalibration, ReferenceFrame, ShearCalibration, ShearPair,
     ShearTracker, StressCalibration, measure_force,
 };
-use tactile_simulate::{Camera, Gain, Illumination, Load, PressOptions, PressScene, PressTruth};
+use tactile_simulate::{
+    Camera, Gain, Illumination, PressLoad, PressOptions, PressScene, PressTruth,
+};
 
 /// A quarter of the default resolution, so that a thousand frames take seconds.
 fn camera() -> Camera {
@@ -26,7 +28,7 @@ fn camera() -> Camera {
 fn press(camera: Camera) -> PressOptions {
     PressOptions {
         camera,
-        loads: vec![Load::normal(0.7)],
+        loads: vec![PressLoad::normal(0.7)],
         centre_px: Some([170.3, 131.8]),
         ..PressOptions::default()
     }
@@ -80,7 +82,7 @@ fn a_thousand_seeds() {
 #[test]
 fn the_full_frame_with_its_vignetting() {
     let scene = PressScene::new(PressOptions {
-        loads: vec![Load::normal(0.7)],
+        loads: vec![PressLoad::normal(0.7)],
         ..PressOptions::default()
     })
     .unwrap();
@@ -140,7 +142,7 @@ fn blur_oblong_pixels_and_small_contacts() {
         (
             "radius of 9 px",
             PressOptions {
-                loads: vec![Load::normal(0.01)],
+                loads: vec![PressLoad::normal(0.01)],
                 ..press(camera())
             },
         ),
@@ -221,9 +223,9 @@ fn faint_contacts_are_found() {
 fn shear_follows_the_centroid() {
     let mut options = press(camera());
     options.loads = (0..4)
-        .map(|k| Load {
+        .map(|k| PressLoad {
             shear_n: [0.02 * f64::from(k), -0.03 * f64::from(k)],
-            ..Load::normal(0.7)
+            ..PressLoad::normal(0.7)
         })
         .collect();
     let scene = PressScene::new(options).unwrap();

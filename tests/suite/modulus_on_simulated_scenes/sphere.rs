@@ -11,7 +11,7 @@ use tactile_imaging::elasticity::modulus::{
     Evidence, HertzSphere, LoadSeries, LoadState, ModulusEstimate, ModulusEstimator,
 };
 use tactile_imaging::force::{ForceMeasurement, ForceMeter, ForceOptions, ForceWorkspace};
-use tactile_simulate::{Camera, Elastic, Gain, Load, PressOptions, PressScene, Sphere};
+use tactile_simulate::{Camera, Elastic, ElasticSphere, Gain, PressLoad, PressOptions, PressScene};
 
 /// Loads of the sphere, and of the ball that calibrates.
 const LOADS: u32 = 12;
@@ -23,7 +23,7 @@ fn waveguide() -> Waveguide {
         youngs_modulus_pa: l.material.youngs_modulus_pa,
         poisson_ratio: l.material.poisson_ratio,
     };
-    let layers = tactile_simulate::Waveguide::default()
+    let layers = tactile_simulate::LightGuide::default()
         .layers
         .iter()
         .map(layer)
@@ -54,12 +54,12 @@ impl Presses {
         let ratio = |k: u32| 0.1 + 0.2 * f64::from(k) / 11.0;
         let pixel_size_m = [0.3 * radius / 96.0; 2];
         let options = PressOptions {
-            object: Sphere {
+            object: ElasticSphere {
                 radius_m: radius,
                 material: soft,
             },
             loads: (0..LOADS)
-                .map(|k| Load::normal(force_at(ratio(k))))
+                .map(|k| PressLoad::normal(force_at(ratio(k))))
                 .collect(),
             camera: Camera {
                 shape: [384, 384],
@@ -76,14 +76,14 @@ impl Presses {
         let largest_force = sphere.options().loads[last].force_n * (1.0 + GAUGE * noise);
         let seen_radius = contact_radius(&sphere, last);
         // Hertz for a rigid ball: a³ = 3FR·c/4 with c the waveguide's compliance (1 − ν²)/E.
-        let rigid = Sphere {
+        let rigid = ElasticSphere {
             radius_m: seen_radius.powi(3) / (0.75 * largest_force * compliance),
             material: Elastic::RIGID,
         };
         let ball = PressScene::new(PressOptions {
             object: rigid,
             loads: (1..=GAUGE_LOADS)
-                .map(|k| Load::normal(largest_force * f64::from(k) / f64::from(GAUGE_LOADS)))
+                .map(|k| PressLoad::normal(largest_force * f64::from(k) / f64::from(GAUGE_LOADS)))
                 .collect(),
             gain: Gain::GreyPerPascal(sphere.truth(0).grey_per_pascal),
             seed: seed + 1_000_000,

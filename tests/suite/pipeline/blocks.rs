@@ -3,7 +3,7 @@
 use nalgebra::Matrix3;
 use tactile_imaging::pipeline::{Binning, ContactSurface};
 use tactile_simulate::Trial;
-use tactile_simulate::{CalibrationOptions, Camera, PressOptions};
+use tactile_simulate::{CalibrationRun, Camera, PressOptions};
 
 /// Half the paper's resolution: contacts of some 80 pixels' radius, whose blocks for 60 points are 4 × 4.
 fn trial() -> Trial {
@@ -16,7 +16,7 @@ fn trial() -> Trial {
         camera,
         ..PressOptions::default()
     };
-    Trial::new(options, &CalibrationOptions::default()).unwrap()
+    Trial::new(options, &CalibrationRun::default()).unwrap()
 }
 
 /// Of Hertz's contact at 0.7 N.

@@ -19,12 +19,12 @@ use tactile_imaging::force::CalibrationPair;
 use tactile_imaging::pipeline::{Object, PipelineError, Press, SkipReason, Skips, Stage};
 use tactile_imaging::sfs::{ControlPointSampler, Domain, EquallySpaced, SfsError};
 use tactile_simulate::Trial;
-use tactile_simulate::{CalibrationOptions, Camera, Elastic, Load, PressOptions, PressScene};
+use tactile_simulate::{CalibrationRun, Camera, Elastic, PressLoad, PressOptions, PressScene};
 
 /// A press seen by a camera of 348 × 260 pixels: a sixteenth of the default's, to be quick.
 fn trial(forces: &[f64], seed: u64) -> Trial {
     let camera = Camera::default().coarser(4);
-    let loads = forces.iter().map(|&f| Load::normal(f)).collect();
+    let loads = forces.iter().map(|&f| PressLoad::normal(f)).collect();
     Trial::new(
         PressOptions {
             camera,
@@ -32,7 +32,7 @@ fn trial(forces: &[f64], seed: u64) -> Trial {
             seed,
             ..PressOptions::default()
         },
-        &CalibrationOptions::default(),
+        &CalibrationRun::default(),
     )
     .unwrap()
 }
@@ -76,7 +76,7 @@ fn both_polymers_come_out_within_the_papers_error() {
         for seed in 0..4 {
             let mut options = trial(&[0.7, 1.2], seed).scene.options().clone();
             options.object.material = material;
-            let trial = Trial::new(options, &CalibrationOptions::default()).unwrap();
+            let trial = Trial::new(options, &CalibrationRun::default()).unwrap();
             let pipeline = trial.pipeline().unwrap();
             let modulus = trial.press(&pipeline).unwrap().modulus().unwrap();
             let error = modulus.youngs_modulus_pa / material.youngs_modulus_pa - 1.0;
@@ -261,14 +261,14 @@ fn a_flat_field_makes_the_force_the_same_in_a_corner() {
     let mut options = trial(&[0.5], 11).scene.options().clone();
     options.centre_px = Some([50.0, 45.0]);
     options.camera.vignetting = 0.15;
-    let corner = Trial::new(options.clone(), &CalibrationOptions::default()).unwrap();
+    let corner = Trial::new(options.clone(), &CalibrationRun::default()).unwrap();
     let scene = PressScene::new(PressOptions {
         centre_px: None,
         ..options
     })
     .unwrap();
     // The sensor is calibrated in the frame's middle.
-    let series = scene.calibrate(&CalibrationOptions::default()).unwrap();
+    let series = scene.calibrate(&CalibrationRun::default()).unwrap();
     let pairs: Vec<_> = series
         .pairs
         .iter()

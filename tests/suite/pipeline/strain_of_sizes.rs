@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use tactile_imaging::pipeline::Flag;
 use tactile_simulate::Trial;
-use tactile_simulate::{CalibrationOptions, Camera, PressOptions};
+use tactile_simulate::{CalibrationRun, Camera, PressOptions};
 
 /// Widths and heights of frames that show the same 30 mm × 22.5 mm.
 const SIZES: [[usize; 2]; 5] = [[174, 130], [348, 260], [464, 347], [696, 521], [1392, 1042]];
@@ -31,7 +31,7 @@ fn trial([width, height]: [usize; 2], seed: u64) -> Trial {
         ]),
         ..PressOptions::default()
     };
-    Trial::new(options, &CalibrationOptions::default()).unwrap()
+    Trial::new(options, &CalibrationRun::default()).unwrap()
 }
 
 /// Whether the measurement itself says that its strain may be wrong.

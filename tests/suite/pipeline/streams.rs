@@ -5,7 +5,7 @@ use ndarray::Array2;
 use tactile_imaging::force::{Estimate, ShearCalibration};
 use tactile_imaging::pipeline::{FrameSource, Session};
 use tactile_simulate::Trial;
-use tactile_simulate::{CalibrationOptions, Camera, Gain, Load, LoadCycle, PressOptions};
+use tactile_simulate::{CalibrationRun, Camera, Gain, LoadCycle, PressLoad, PressOptions};
 
 #[test]
 fn a_session_refines_the_modulus_and_agrees_with_a_press() {
@@ -53,14 +53,14 @@ fn shear_is_the_way_of_the_centroid_since_contact_began() {
     let mut options = trial(&[0.7], 9).scene.options().clone();
     let shear_n = [0.05, -0.08];
     options.loads = vec![
-        Load::normal(0.9),
-        Load {
+        PressLoad::normal(0.9),
+        PressLoad {
             shear_n,
-            ..Load::normal(1.1)
+            ..PressLoad::normal(1.1)
         },
     ];
     let stiffness = options.shear_stiffness_n_per_m;
-    let trial = Trial::new(options, &CalibrationOptions::default()).unwrap();
+    let trial = Trial::new(options, &CalibrationRun::default()).unwrap();
     let calibration = ShearCalibration {
         stiffness_n_per_m: stiffness.map(|value| Estimate::new(value, 0.0)),
         residual_sd_n: [0.0; 2],
@@ -130,7 +130,7 @@ fn drift_of_the_light_is_seen_in_frames_without_contact() {
 #[test]
 fn four_thousand_frames_leave_memory_and_answer_alone() {
     let camera = Camera::default().coarser(16);
-    let (loads, gain) = (vec![Load::normal(1.5)], Gain::PeakGrey(180.0));
+    let (loads, gain) = (vec![PressLoad::normal(1.5)], Gain::PeakGrey(180.0));
     let options = PressOptions {
         camera,
         loads,
@@ -138,7 +138,7 @@ fn four_thousand_frames_leave_memory_and_answer_alone() {
         seed: 3,
         ..PressOptions::default()
     };
-    let trial = Trial::new(options, &CalibrationOptions::default()).unwrap();
+    let trial = Trial::new(options, &CalibrationRun::default()).unwrap();
     let references: Vec<_> = (1..5).map(|k| trial.scene.reference(k)).collect();
     let views: Vec<_> = references.iter().map(|r| r.view()).collect();
     let mut session = Session::new(&trial.pipeline().unwrap(), &views).unwrap();

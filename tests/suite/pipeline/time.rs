@@ -6,7 +6,9 @@ use tactile_imaging::elasticity::relaxation::{StandardLinearSolid, TimeDependenc
 use tactile_imaging::force::Estimate;
 use tactile_imaging::pipeline::{Flag, Measurement, PipelineError};
 use tactile_simulate::Trial;
-use tactile_simulate::{ContactLaw, Elastic, Gain, Load, PressOptions, PressScene, Sphere};
+use tactile_simulate::{
+    ContactModel, Elastic, ElasticSphere, Gain, PressLoad, PressOptions, PressScene,
+};
 
 const TIMES_S: [f64; 8] = [0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0];
 
@@ -22,14 +24,14 @@ fn frame(trial: &Trial, modulus_pa: f64, force_n: f64, gain: f64, repeat: u32) -
         youngs_modulus_pa: modulus_pa,
         ..options.object.material
     };
-    let object = Sphere {
+    let object = ElasticSphere {
         material,
         ..options.object
     };
     let scene = PressScene::new(PressOptions {
         object,
-        law: ContactLaw::Hertz,
-        loads: vec![Load::normal(force_n)],
+        law: ContactModel::Hertz,
+        loads: vec![PressLoad::normal(force_n)],
         gain: Gain::GreyPerPascal(gain * trial.scene.truth(0).grey_per_pascal),
         ..options.clone()
     });

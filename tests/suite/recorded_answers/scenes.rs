@@ -11,7 +11,7 @@ use tactile_imaging::pipeline::{
 use tactile_imaging::scene::Scene;
 use tactile_simulate::Trial;
 use tactile_simulate::{
-    CalibrationOptions, Camera, Elastic, Gain, Load, PressOptions, PressScene, Sphere,
+    CalibrationRun, Camera, Elastic, ElasticSphere, Gain, PressLoad, PressOptions, PressScene,
     UniaxialOptions, UniaxialScene, write_folder,
 };
 
@@ -37,11 +37,14 @@ fn coarse() -> Camera {
 fn trial(forces: &[f64], seed: u64) -> Trial {
     let options = PressOptions {
         camera: coarse(),
-        loads: forces.iter().map(|&force| Load::normal(force)).collect(),
+        loads: forces
+            .iter()
+            .map(|&force| PressLoad::normal(force))
+            .collect(),
         seed,
         ..PressOptions::default()
     };
-    Trial::new(options, &CalibrationOptions::default()).expect("a trial")
+    Trial::new(options, &CalibrationRun::default()).expect("a trial")
 }
 
 fn ball() -> Vec<Answer> {
@@ -294,7 +297,7 @@ fn scene_file() -> Vec<Answer> {
     let mut answers = Answers::of("scene file");
     let options = PressOptions {
         camera: coarse(),
-        object: Sphere {
+        object: ElasticSphere {
             radius_m: 20e-3,
             material: Elastic::CL2003X,
         },
@@ -305,7 +308,7 @@ fn scene_file() -> Vec<Answer> {
     let folder = tempfile::tempdir().expect("a folder");
     // A ball as small as the object would saturate.
     let calibration = made
-        .unsaturated(CalibrationOptions::default())
+        .unsaturated(CalibrationRun::default())
         .and_then(|options| made.calibrate(&options))
         .expect("an indenter that does not saturate");
     let path = write_folder(&made, &calibration, folder.path()).expect("files");

@@ -15,14 +15,14 @@ use tactile_imaging::scene::{LoadedCalibration, Scene};
 use tactile_imaging::sfs::CurvatureAdaptive;
 use tactile_imaging::tps::AffineModel;
 use tactile_simulate::{
-    CalibrationOptions, Camera, Elastic, PressOptions, PressScene, Sphere, write_folder,
+    CalibrationRun, Camera, Elastic, ElasticSphere, PressOptions, PressScene, write_folder,
 };
 
 /// The paper's error: ±5.38 % on both polymers.
 const PAPER_ERROR: f64 = 0.0538;
 
 fn scene_of(material: Elastic, seed: u64) -> PressScene {
-    let object = Sphere {
+    let object = ElasticSphere {
         radius_m: 3e-3,
         material,
     };
@@ -39,7 +39,7 @@ fn a_simulated_scene_on_disk_gives_the_polymers_moduli() {
     for (material, seed) in [(Elastic::CL2000X, 3), (Elastic::CL2003X, 4)] {
         let folder = tempfile::tempdir().unwrap();
         let scene = scene_of(material, seed);
-        let calibration = scene.calibrate(&CalibrationOptions::default()).unwrap();
+        let calibration = scene.calibrate(&CalibrationRun::default()).unwrap();
         let path = write_folder(&scene, &calibration, folder.path()).unwrap();
         let measured = Scene::measure_file(path).unwrap();
         let modulus = measured.youngs_modulus_pa.unwrap();
@@ -211,7 +211,7 @@ fn stages_by_name_are_those_given_as_values() {
         ..PressOptions::default()
     })
     .unwrap();
-    let calibration = made.calibrate(&CalibrationOptions::default()).unwrap();
+    let calibration = made.calibrate(&CalibrationRun::default()).unwrap();
     let path = write_folder(&made, &calibration, folder.path()).unwrap();
     let text = fs::read_to_string(&path).unwrap();
     // Without the simulator's own choice of an estimator.

@@ -14,8 +14,8 @@ use tactile_imaging::force::Branch;
 use tactile_imaging::scene::SceneLayer;
 use tactile_imaging::sensor::{Indenter, LayerInput, SensorCalibration, SensorPress};
 use tactile_simulate::{
-    Camera, ContactLaw, ContactState, Elastic, Illumination, Load, PressOptions, PressScene,
-    Response, Sphere,
+    Camera, ContactModel, ContactState, Elastic, ElasticSphere, Illumination, PressLoad,
+    PressOptions, PressScene, Response,
 };
 
 /// What is not as the short form of a calibration takes it to be.
@@ -199,8 +199,8 @@ impl Simulated {
         let states = rigid_states(&truth, balls[0], &[BALLS[0].1]);
         let scene = PressScene::new(PressOptions {
             object: rigid(balls[0]),
-            law: ContactLaw::Tabulated(states),
-            loads: vec![Load::normal(BALLS[0].1)],
+            law: ContactModel::Tabulated(states),
+            loads: vec![PressLoad::normal(BALLS[0].1)],
             camera,
             response: Response::Power {
                 exponent: effects.exponent,
@@ -225,15 +225,15 @@ impl Simulated {
         }
     }
 
-    fn load(&mut self, force_n: f64) -> Load {
+    fn load(&mut self, force_n: f64) -> PressLoad {
         let level = 1.0 + self.effects.lamps * (2.0 * self.rng.random::<f64>() - 1.0);
         let illumination = Illumination {
             level,
             ..Illumination::default()
         };
-        Load {
+        PressLoad {
             illumination,
-            ..Load::normal(force_n)
+            ..PressLoad::normal(force_n)
         }
     }
 
@@ -277,7 +277,7 @@ impl Simulated {
                 .collect();
             for (k, (force, branch)) in all.into_iter().enumerate() {
                 let (load, place) = (self.load(force), self.place());
-                let law = ContactLaw::Tabulated(states.clone());
+                let law = ContactModel::Tabulated(states.clone());
                 let scene = centred(&self.scene, place);
                 let scene = scene.with_object(rigid(self.balls[ball]), law, vec![load]);
                 let scene = scene.unwrap();
@@ -320,18 +320,18 @@ impl Simulated {
             youngs_modulus_pa: SAMPLE_PA,
             poisson_ratio: poisson,
         };
-        let loads: Vec<Load> = LOADS_N.into_iter().map(|f| self.load(f)).collect();
+        let loads: Vec<PressLoad> = LOADS_N.into_iter().map(|f| self.load(f)).collect();
         let place = self.place();
-        let law = ContactLaw::Tabulated(states);
-        let object = Sphere { radius_m, material };
+        let law = ContactModel::Tabulated(states);
+        let object = ElasticSphere { radius_m, material };
         let scene = centred(&self.scene, place);
         let scene = scene.with_object(object, law, loads).unwrap();
         (0..LOADS_N.len()).map(|k| scene.frame(k, repeat)).collect()
     }
 }
 
-fn rigid(radius_m: f64) -> Sphere {
-    Sphere {
+fn rigid(radius_m: f64) -> ElasticSphere {
+    ElasticSphere {
         radius_m,
         material: Elastic::RIGID,
     }

@@ -4,8 +4,8 @@ mod tabulated;
 
 use ndarray::Array2;
 use tactile_simulate::{
-    CalibrationOptions, Camera, ContactLaw, Elastic, Gain, Illumination, Load, PressOptions,
-    PressScene, Response, SimulateError, Sphere,
+    CalibrationRun, Camera, ContactModel, Elastic, ElasticSphere, Gain, Illumination, PressLoad,
+    PressOptions, PressScene, Response, SimulateError,
 };
 
 /// The default scene on a quarter of the pixels a side.
@@ -137,10 +137,10 @@ fn blur_keeps_force_and_centroid_and_reaches_in_from_beyond_the_edge() {
 fn shear_moves_the_contact_by_force_over_stiffness() {
     let mut options = small();
     options.loads = vec![
-        Load::normal(0.7),
-        Load {
+        PressLoad::normal(0.7),
+        PressLoad {
             shear_n: [0.2, -0.1],
-            ..Load::normal(0.7)
+            ..PressLoad::normal(0.7)
         },
     ];
     options.shear_stiffness_n_per_m = [400.0, 500.0];
@@ -179,7 +179,7 @@ fn a_brighter_gain_saturates_and_the_truth_counts_it() {
 /// A gain that suits a large soft ball's low pressure is too high for a small rigid one: its sums are no longer in proportion to the force.
 #[test]
 fn a_calibration_that_saturates_is_refused_and_says_what_helps() {
-    let large = Sphere {
+    let large = ElasticSphere {
         radius_m: 20e-3,
         material: Elastic::CL2003X,
     };
@@ -188,7 +188,7 @@ fn a_calibration_that_saturates_is_refused_and_says_what_helps() {
         ..small()
     });
     let scene = scene.unwrap();
-    let options = CalibrationOptions::default();
+    let options = CalibrationRun::default();
     let error = scene.calibrate(&options).unwrap_err();
     assert!(
         matches!(error, SimulateError::CalibrationSaturates { force_n } if force_n < 1.0),
@@ -203,7 +203,7 @@ fn a_calibration_that_saturates_is_refused_and_says_what_helps() {
 #[test]
 fn no_force_is_no_light() {
     let mut options = small();
-    options.loads = vec![Load::normal(0.0)];
+    options.loads = vec![PressLoad::normal(0.0)];
     options.camera = options.camera.ideal();
     let made = PressScene::new(options).unwrap().simulate();
     assert_eq!(made.frames[0], made.reference);
@@ -309,7 +309,7 @@ fn every_meaningless_value_is_named() {
     assert!(spoiled(|o| o.response = Response::Quadratic { droop: 0.51 }).is_some());
     assert!(spoiled(|o| o.response = Response::Power { exponent: 0.2 }).is_some());
     assert!(spoiled(|o| o.response = Response::Power { exponent: f64::NAN }).is_some());
-    assert!(spoiled(|o| o.law = ContactLaw::Tabulated(vec![])).is_some());
+    assert!(spoiled(|o| o.law = ContactModel::Tabulated(vec![])).is_some());
     assert!(spoiled(|o| o.centre_px = Some([f64::NAN, 0.0])).is_some());
     let bad = Illumination {
         level: -1.0,
@@ -318,7 +318,7 @@ fn every_meaningless_value_is_named() {
     let mut options = small();
     options.loads[0].illumination = bad;
     assert!(PressScene::new(options).is_err());
-    let rigid = Sphere {
+    let rigid = ElasticSphere {
         radius_m: 1e-3,
         material: Elastic::RIGID,
     };

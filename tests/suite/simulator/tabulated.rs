@@ -1,7 +1,7 @@
 //! Contacts given as tables over the radius.
 use super::{relative, small};
 use tactile_simulate::{
-    ContactLaw, ContactState, Load, LoadCycle, PressOptions, PressScene, SimulateError,
+    ContactModel, ContactState, LoadCycle, PressLoad, PressOptions, PressScene, SimulateError,
 };
 
 /// Hertz's contact of `scene` at `load` as a table of `samples` distances out to 1.3 a.
@@ -30,7 +30,7 @@ fn a_table_of_hertz_is_seen_as_hertz() {
     let exact = PressScene::new(options.clone()).unwrap();
     let states = (0..2).map(|k| tabulated(&exact, k, 81)).collect();
     let table = PressScene::new(PressOptions {
-        law: ContactLaw::Tabulated(states),
+        law: ContactModel::Tabulated(states),
         ..options.clone()
     })
     .unwrap();
@@ -64,9 +64,9 @@ fn a_table_of_hertz_is_seen_as_hertz() {
 #[test]
 fn a_tabulated_contact_refuses_loads_beyond_its_last_state() {
     let scene = PressScene::new(small()).unwrap();
-    let law = ContactLaw::Tabulated(vec![tabulated(&scene, 0, 40)]);
+    let law = ContactModel::Tabulated(vec![tabulated(&scene, 0, 40)]);
     let with = |force_n: f64| {
-        let loads = vec![Load::normal(force_n)];
+        let loads = vec![PressLoad::normal(force_n)];
         let law = law.clone();
         PressScene::new(PressOptions {
             law,

@@ -6,8 +6,8 @@ use crate::hostile::Hostile;
 use proptest::prelude::*;
 use tactile_imaging::force::Branch;
 use tactile_simulate::{
-    CalibrationOptions, Camera, Elastic, Gain, LoadCycle, PressOptions, PressScene, Response,
-    SimulateError, Sphere, write_folder,
+    CalibrationRun, Camera, Elastic, ElasticSphere, Gain, LoadCycle, PressOptions, PressScene,
+    Response, SimulateError, write_folder,
 };
 
 fn camera(rows: usize, cols: usize) -> Camera {
@@ -34,9 +34,9 @@ fn the_calibration_is_linear_and_holds_for_the_object_as_well() {
     let mut options = press(261, 348);
     options.camera.vignetting = 0.0;
     let scene = PressScene::new(options).unwrap();
-    let quiet = CalibrationOptions {
+    let quiet = CalibrationRun {
         gauge_noise_n: 0.0,
-        ..CalibrationOptions::default()
+        ..CalibrationRun::default()
     };
     let series = scene.calibrate(&quiet).unwrap();
     assert_eq!((series.pairs.len(), series.true_forces_n.len()), (41, 41));
@@ -64,11 +64,11 @@ fn the_calibration_is_linear_and_holds_for_the_object_as_well() {
 #[test]
 fn gauge_noise_and_hysteresis_are_as_asked() {
     let scene = PressScene::new(press(66, 87)).unwrap();
-    let options = CalibrationOptions {
+    let options = CalibrationRun {
         steps: 100,
         gauge_noise_n: 0.02,
         hysteresis: 0.1,
-        ..CalibrationOptions::default()
+        ..CalibrationRun::default()
     };
     let series = scene.calibrate(&options).unwrap();
     let both = series.pairs.iter().zip(&series.true_forces_n);
@@ -92,9 +92,9 @@ fn a_bent_response_bends_the_calibration_below_the_line() {
         ..press(130, 174)
     };
     let scene = PressScene::new(options).unwrap();
-    let quiet = CalibrationOptions {
+    let quiet = CalibrationRun {
         gauge_noise_n: 0.0,
-        ..CalibrationOptions::default()
+        ..CalibrationRun::default()
     };
     let series = scene.calibrate(&quiet).unwrap();
     let value = |k: usize| series.pairs[k].integrated_pixel_value;
@@ -149,7 +149,7 @@ fn a_stream_rests_rises_and_falls_at_the_frame_rate() {
 fn a_scene_on_disk_has_the_files_its_description_names() {
     let folder = tempfile::tempdir().unwrap();
     let scene = PressScene::new(press(66, 87)).unwrap();
-    let calibration = scene.calibrate(&CalibrationOptions::default()).unwrap();
+    let calibration = scene.calibrate(&CalibrationRun::default()).unwrap();
     let path = write_folder(&scene, &calibration, &folder.path().join("scene")).unwrap();
     let text = std::fs::read_to_string(&path).unwrap();
     let table: toml::Table = text.parse().unwrap();
@@ -239,8 +239,8 @@ proptest! {
         };
         let material = Elastic { youngs_modulus_pa: modulus, poisson_ratio: 0.4 };
         let scene = PressScene::new(PressOptions {
-            object: Sphere { radius_m: radius, material },
-            loads: vec![tactile_simulate::Load::normal(force)],
+            object: ElasticSphere { radius_m: radius, material },
+            loads: vec![tactile_simulate::PressLoad::normal(force)],
             centre_px: Some([centre.0, centre.1]),
             camera,
             seed,

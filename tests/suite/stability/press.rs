@@ -7,7 +7,7 @@ use tactile_imaging::elasticity::contact::{Layer, Waveguide};
 use tactile_imaging::force::{CalibrationPair, ReferenceFrame};
 use tactile_imaging::pipeline::{EstimatorChoice, Object, StagesConfig};
 use tactile_simulate::Trial;
-use tactile_simulate::{CalibrationOptions, Camera, Gain, Load, PressOptions};
+use tactile_simulate::{CalibrationRun, Camera, Gain, PressLoad, PressOptions};
 
 /// 348 × 260 pixels on 15 mm: the contact is as large in pixels as a camera of 696 × 520 sees it, for 200 control points enough.
 pub(crate) fn camera() -> Camera {
@@ -25,7 +25,7 @@ pub(crate) fn coarse_camera() -> Camera {
 
 /// A press at these forces seen by a camera, its brightest pixel at this grey above the background.
 pub(crate) fn trial(camera: Camera, peak_grey: f64, forces: &[f64]) -> Trial {
-    let loads = forces.iter().map(|&f| Load::normal(f)).collect();
+    let loads = forces.iter().map(|&f| PressLoad::normal(f)).collect();
     let gain = Gain::PeakGrey(peak_grey);
     let options = PressOptions {
         camera,
@@ -35,9 +35,9 @@ pub(crate) fn trial(camera: Camera, peak_grey: f64, forces: &[f64]) -> Trial {
         ..PressOptions::default()
     };
     // The calibration's contact, too, lies wholly within the finer camera's view.
-    let calibration = CalibrationOptions {
+    let calibration = CalibrationRun {
         largest_force_n: 1.5,
-        ..CalibrationOptions::default()
+        ..CalibrationRun::default()
     };
     Trial::new(options, &calibration).expect("a scene")
 }

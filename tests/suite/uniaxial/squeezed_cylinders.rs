@@ -5,7 +5,7 @@ use tactile_imaging::fem::Interface;
 use tactile_imaging::pipeline::{Flag, Measurement};
 use tactile_imaging::{Object, Pipeline};
 use tactile_simulate::{
-    Camera, ContactLaw, ContactState, Elastic, Gain, Load, PressOptions, PressScene,
+    Camera, ContactModel, ContactState, Elastic, Gain, PressLoad, PressOptions, PressScene,
 };
 
 const RADIUS_M: f64 = 6e-3;
@@ -35,8 +35,11 @@ fn measured(
         ..Camera::default()
     };
     let scene = PressScene::new(PressOptions {
-        law: ContactLaw::Tabulated(states),
-        loads: forces.iter().map(|&force| Load::normal(force)).collect(),
+        law: ContactModel::Tabulated(states),
+        loads: forces
+            .iter()
+            .map(|&force| PressLoad::normal(force))
+            .collect(),
         gain: Gain::PeakGrey(200.0),
         camera,
         seed,
