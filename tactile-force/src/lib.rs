@@ -13,7 +13,7 @@
 //! | `drift` | drift of illumination and stray light since the reference was taken |
 //! | `contact` | detection, mask, aperture, sums over the aperture |
 //! | `health` | changes of a sensor since its calibration: brightness, noise, stuck pixels |
-//! | `hertz` | the contact radius from the pressure profile |
+//! | `profile` | the contact radius from the pressure profile |
 //! | `calibration` | pixel value to force and stress, (5) and (6): a line of frame sums, a local curve f |
 //! | `measure`, `batch` | the force of one frame; of many |
 //! | `shear` | (9) to (12) |
@@ -38,11 +38,11 @@ mod error;
 mod face;
 mod frame;
 mod health;
-mod hertz;
 mod lens;
 mod measure;
+mod profile;
+mod region;
 mod shear;
-mod simd;
 
 pub use calibration::{
     Branch, CalibrationFrame, CalibrationOptions, CalibrationPair, CalibrationReport,
@@ -59,9 +59,9 @@ pub use frame::{DifferenceNoise, FlatField, FrameStatistics, NoiseModel, Referen
 pub use health::{
     ChartState, FrameCondition, HealthMonitor, HealthOptions, HealthReport, StuckPixels,
 };
-pub use hertz::{HertzFit, HertzFitOptions, ProfileShape};
 pub use lens::{DotPair, LensFit, LensGeometry};
 pub use measure::{ForceMeasurement, ForceMeter, ForceOptions, ForceWorkspace, measure_force};
+pub use profile::{HertzFit, HertzFitOptions, ProfileShape};
 pub use shear::{ShearCalibration, ShearMeasurement, ShearPair, ShearTracker};
 pub use tactile_core::{BoundingBox, CustomError, Estimate, InvalidOption, Polarity, StopReason};
 pub use {nalgebra, ndarray};

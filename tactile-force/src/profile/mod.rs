@@ -9,21 +9,11 @@
 //! wide or 0.5 % too narrow. Where its misfit stands out of the noise, p(r) = p₀ √(1 − r²/a²) (1 − c r²/a²) is fitted instead, whose radius is
 //! within 0.03 % of that of finite elements (a/R up to 1.1, layers of every depth, rigid flats).
 
-mod blocks;
-mod edge;
-mod equations;
 mod fit;
-mod misfit;
-mod options;
-mod outcome;
-mod profile;
-mod ring;
+mod model;
 mod rings;
-mod variance;
 
-pub use options::HertzFitOptions;
-pub use outcome::{HertzFit, ProfileShape};
-
-pub(crate) use fit::{HertzFitter, Start};
-pub(crate) use rings::Rings;
-pub(crate) use variance::{LEVELS, PixelVariance};
+pub use fit::{
+    HertzFit, HertzFitOptions, HertzFitter, PixelVariance, ProfileShape, Start, VARIANCE_LEVELS,
+};
+pub use rings::Rings;

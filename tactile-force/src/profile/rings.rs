@@ -1,16 +1,16 @@
-//! Pixels gathered into thin rings about a centre.
+//! Pixels gathered into thin rings about a centre, well inside in blocks.
 
-use super::blocks::{Block, Grid};
-use super::ring::{Ring, RingSums};
-use crate::contact::Region;
-use crate::simd::vectorized;
+use std::ops::Range;
+
+use crate::frame::vectorized;
+use crate::region::Region;
 
 /// Rings a quarter of a pixel wide at the contact's edge, one pixel further in and four pixels where the profile hardly bends; reused from fit
 /// to fit.
 ///
 /// Where rings are wide, pixels are added in blocks, with the sums over all pixels of a block: only the ring is that of the block's centre.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Rings {
+pub struct Rings {
     rings: Vec<Ring>,
     /// The longest run of the aperture in every row, and what of it was added in blocks: columns from and to.
     spans: Vec<[usize; 2]>,
@@ -32,13 +32,13 @@ const AT_ONCE: usize = 16;
 
 impl Rings {
     /// Every ring that has pixels.
-    pub(super) fn filled(&self) -> impl Iterator<Item = RingSums> + '_ {
-        self.rings.iter().map(Ring::sums).filter(|r| r.n > 0.0)
+    pub fn filled(&self) -> impl Iterator<Item = &Ring> {
+        self.rings.iter().filter(|ring| ring.place[0] > 0.0)
     }
 
     /// Gathers the pixels of the aperture. The centre is relative to the region's first pixel; `aspect` is the pixel's
     /// height over its width, and distances are in pixel widths. `radius` is about that of the contact.
-    pub(super) fn gather(&mut self, region: &Region, centre: [f64; 2], aspect: f64, radius: f64) {
+    pub fn gather(&mut self, region: &Region, centre: [f64; 2], aspect: f64, radius: f64) {
         let Self {
             rings,
             spans,
@@ -141,12 +141,7 @@ impl Gather<'_> {
 
     /// Adds blocks side by side, of which `row` and `columns` are the first row and all columns.
     #[inline(always)]
-    fn blocks<const SIDE: usize>(
-        &mut self,
-        row: usize,
-        columns: std::ops::Range<usize>,
-        step: usize,
-    ) {
+    fn blocks<const SIDE: usize>(&mut self, row: usize, columns: Range<usize>, step: usize) {
         let width = self.region.columns();
         let lines: [&[[f32; SIDE]]; SIDE] = std::array::from_fn(|k| {
             let first = (row + k) * width;
@@ -177,7 +172,7 @@ impl Gather<'_> {
 
     /// Adds pixels side by side of a row.
     #[inline(always)]
-    fn pixels(&mut self, row: usize, columns: std::ops::Range<usize>) {
+    fn pixels(&mut self, row: usize, columns: Range<usize>) {
         let v = self.grid.v(row as f64);
         let mut start = self.grid.u(columns.start as f64);
         let first = row * self.region.columns();
@@ -226,3 +221,190 @@ impl pulp::NullaryFnOnce for Gather<'_> {
         }
     }
 }
+
+/// Sums over the pixels of one ring; (u, v) is a pixel's place relative to the centre, d its difference. Four by four, so
+/// that a pixel is added with a few wide instructions.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Ring {
+    /// Σ 1, Σ u, Σ v, Σ r².
+    pub place: [f64; 4],
+    /// Σ u², Σ u v, Σ r² u, Σ r² v.
+    pub product: [f64; 4],
+    /// Σ d, Σ d u, Σ d v, Σ d².
+    pub difference: [f64; 4],
+    /// Σ r⁴.
+    pub r4: f64,
+}
+
+impl Ring {
+    #[inline(always)]
+    pub fn add(&mut self, u: f64, v: f64, r2: f64, d: f64) {
+        let place = [1.0, u, v, r2];
+        let product = [u * u, u * v, r2 * u, r2 * v];
+        let difference = [d, d * u, d * v, d * d];
+        for k in 0..4 {
+            self.place[k] += place[k];
+            self.product[k] += product[k];
+            self.difference[k] += difference[k];
+        }
+        self.r4 += r2 * r2;
+    }
+
+    #[inline(always)]
+    pub fn merge(&mut self, other: &Self) {
+        for k in 0..4 {
+            self.place[k] += other.place[k];
+            self.product[k] += other.product[k];
+            self.difference[k] += other.difference[k];
+        }
+        self.r4 += other.r4;
+    }
+}
+
+/// Where blocks lie: a corner of four of them is beside the centre, so that they are the same whichever way the image is mirrored, turned or moved.
+#[derive(Clone, Copy, Debug)]
+pub struct Grid<'a> {
+    /// Column and row of the centre.
+    pub centre: [f64; 2],
+    /// A pixel's height over its width.
+    pub aspect: f64,
+    /// Columns of every row that blocks may use, from and to.
+    pub spans: &'a [[usize; 2]],
+}
+
+impl Grid<'_> {
+    /// A column relative to the centre.
+    #[inline(always)]
+    pub fn u(&self, column: f64) -> f64 {
+        column - self.centre[0]
+    }
+
+    /// A row relative to the centre, in pixel widths.
+    #[inline(always)]
+    pub fn v(&self, row: f64) -> f64 {
+        (row - self.centre[1]) * self.aspect
+    }
+
+    /// The first column (`axis` 0) or row (1) beyond the centre, where a block begins.
+    #[inline(always)]
+    pub fn first(&self, axis: usize) -> isize {
+        self.centre[axis].floor() as isize + 1
+    }
+
+    /// The number of a block counted from the centre to either side, by its first column or row.
+    #[inline(always)]
+    pub fn number<const SIDE: usize>(&self, at: isize, axis: usize) -> usize {
+        let away = (at - self.first(axis)).div_euclid(SIDE as isize);
+        if away < 0 {
+            !away as usize
+        } else {
+            away as usize
+        }
+    }
+
+    /// The columns of whole blocks in rows from `row` on, all of whose pixels lie within a distance of the centre and in the rows' spans.
+    #[inline(always)]
+    pub fn columns<const SIDE: usize>(&self, row: isize, distance: f64) -> Range<usize> {
+        let none = 0..0;
+        let Some(spans) = usize::try_from(row)
+            .ok()
+            .and_then(|row| self.spans.get(row..row + SIDE))
+        else {
+            return none;
+        };
+        let ends = [row, row + SIDE as isize - 1].map(|row| self.v(row as f64).abs());
+        let farthest = ends[0].max(ends[1]);
+        if farthest >= distance {
+            return none;
+        }
+        let half = (distance * distance - farthest * farthest).sqrt();
+        let mut start = (self.centre[0] - half).ceil() as isize;
+        let mut end = (self.centre[0] + half).floor() as isize + 1;
+        for [from, to] in spans {
+            start = start.max(*from as isize);
+            end = end.min(*to as isize);
+        }
+        let first = self.first(0);
+        if start > first || end < first {
+            return none;
+        }
+        let whole = |columns: isize| columns - columns % SIDE as isize;
+        let (left, right) = (first - whole(first - start), first + whole(end - first));
+        left as usize..right as usize
+    }
+}
+
+/// A block of pixels: its differences, and where its centre is relative to that of the contact, in pixel widths.
+#[derive(Clone, Copy, Debug)]
+pub struct Block<const SIDE: usize> {
+    pub pixels: [[f32; SIDE]; SIDE],
+    pub u: f64,
+    pub v: f64,
+    pub aspect: f64,
+}
+
+impl<const SIDE: usize> Block<SIDE> {
+    /// Σ o² and Σ o⁴ over the distances o of a block's columns from its centre.
+    const SQUARES: [f64; 2] = {
+        let (mut sums, mut k) = ([0.0; 2], 0);
+        while k < SIDE {
+            let o = k as f64 - 0.5 * (SIDE as f64 - 1.0);
+            sums = [sums[0] + o * o, sums[1] + o * o * o * o];
+            k += 1;
+        }
+        sums
+    };
+
+    /// What the pixels one by one add to a ring. With u + p and v + q the place of a pixel, sums of odd powers of p and q vanish.
+    #[inline(always)]
+    pub fn sums(&self) -> Ring {
+        let (u, v, side) = (self.u, self.v, SIDE as f64);
+        let n = side * side;
+        let [pp, pppp] = Self::SQUARES;
+        let aspect2 = self.aspect * self.aspect;
+        let [qq, qqqq] = [aspect2 * pp, aspect2 * aspect2 * pppp];
+        let (u2, v2) = (u * u, v * v);
+        // Over one row and one column: the square, of which the block has as many as its side.
+        let (row_uu, column_vv) = (side * u2 + pp, side * v2 + qq);
+        let (uu, vv) = (side * row_uu, side * column_vv);
+        let r2u = u * (uu + 2.0 * side * pp + vv);
+        let r2v = v * (vv + 2.0 * side * qq + uu);
+        let uuuu = side * (side * u2 * u2 + 6.0 * u2 * pp + pppp);
+        let vvvv = side * (side * v2 * v2 + 6.0 * v2 * qq + qqqq);
+        let [d, dp, dq, dd] = self.differences();
+        Ring {
+            place: [n, n * u, n * v, uu + vv],
+            product: [uu, n * u * v, r2u, r2v],
+            difference: [d, d * u + dp, d * v + self.aspect * dq, dd],
+            r4: uuuu + 2.0 * row_uu * column_vv + vvvv,
+        }
+    }
+
+    /// Σ d, Σ d p, Σ d q and Σ d², q in rows.
+    #[inline(always)]
+    fn differences(&self) -> [f64; 4] {
+        let (mut columns, mut squares) = ([0.0; SIDE], [0.0; SIDE]);
+        let mut dq = 0.0;
+        for (k, row) in self.pixels.iter().enumerate() {
+            let mut sum = 0.0;
+            for j in 0..SIDE {
+                let d = f64::from(row[j]);
+                columns[j] += d;
+                squares[j] += d * d;
+                sum += d;
+            }
+            dq += (k as f64 - 0.5 * (SIDE as f64 - 1.0)) * sum;
+        }
+        let (mut d, mut dp, mut dd) = (0.0, 0.0, 0.0);
+        for j in 0..SIDE {
+            d += columns[j];
+            dp += (j as f64 - 0.5 * (SIDE as f64 - 1.0)) * columns[j];
+            dd += squares[j];
+        }
+        [d, dp, dq, dd]
+    }
+}
+
+#[cfg(test)]
+#[path = "rings_tests.rs"]
+mod tests;

@@ -1,0 +1,649 @@
+//! Where the object touches: detection against the noise, and the contact's sums.
+//!
+//! A frame is first tested by the one pass over it ([`FrameStatistics`]). Contact is suspected where
+//! one pixel, or one tile of 8 × 32 pixels, differs from the reference by more than its noise allows
+//! at the stated false-alarm rate *per frame*. Only there a mask is made: smooth if the contact is
+//! faint, threshold, keep the largest component, fill its holes. Sums run over the mask grown by a
+//! margin (the *aperture*) with signed differences, so that the edge, where the signal is below the
+//! noise, is not cut off.
+
+use ndarray::{ArrayView2, Axis, Slice};
+use statrs::function::erf::erfc_inv;
+use tactile_core::{BoundingBox, Estimate, Polarity, Requirement};
+
+use crate::calibration::GreyHistogram;
+use crate::drift::{self, DriftCorrection, FitWorkspace, IlluminationDrift};
+use crate::error::ForceError;
+use crate::frame::{
+    DifferenceNoise, FrameStatistics, PassWorkspace, ReferenceFrame, TILE_COLUMNS, Tiles,
+};
+use crate::health::FrameCondition;
+use crate::region::{Extent, NoiseWorkspace, Region, Run, Sums, gain, greatest};
+
+/// One contact. Its mask stays in the workspace.
+///
+/// ```
+/// use ndarray::Array2;
+/// use tactile_force::{ContactDetector, ContactOptions, Detection, ReferenceFrame};
+///
+/// let mut frame = Array2::from_elem((64, 64), 12_u8);
+/// let reference = ReferenceFrame::new(frame.view())?;
+/// frame.slice_mut(ndarray::s![20..40, 20..40]).fill(90);
+/// frame[[30, 30]] = 255;
+/// let found: Detection = ContactDetector::new(ContactOptions::default())
+///     .detect_with(&mut Default::default(), frame.view(), &reference)?;
+/// let contact = found.contact.expect("contact");
+/// assert_eq!((contact.area_px, contact.peak, contact.touches_edge), (400, 243.0, false));
+/// assert_eq!(contact.saturated_px, 1);
+/// # Ok::<(), tactile_force::ForceError>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Contact {
+    /// Box around the mask.
+    pub bounding_box: BoundingBox,
+    /// Number of pixels of the mask.
+    pub area_px: usize,
+    /// Radius of the circle of the mask's area, √(area/π), in pixels.
+    pub equivalent_radius_px: f64,
+    /// Σ d over the aperture, positive for contact of either polarity.
+    pub integrated_pixel_value: Estimate,
+    /// Intensity centroid [x, y] in pixels, equations (7) and (8).
+    pub centroid_px: [Estimate; 2],
+    /// Greatest difference inside the mask.
+    pub peak: f64,
+    /// Number of pixels of the aperture.
+    pub aperture_px: usize,
+    /// Saturated pixels of the mask (255 if brighter, 0 if darker).
+    pub saturated_px: usize,
+    /// Other patches of contact in the frame's region, each at least a hundredth of this one; they are not part of it.
+    pub other_contacts: usize,
+    /// The aperture reaches the edge of the frame: part of the contact may be missing.
+    pub touches_edge: bool,
+}
+
+/// The result of detection in one frame.
+///
+/// ```
+/// use ndarray::Array2;
+/// use tactile_force::{ContactDetector, ContactOptions, Detection, ReferenceFrame};
+///
+/// let at_rest = Array2::from_elem((64, 64), 12_u8);
+/// let reference = ReferenceFrame::new(at_rest.view())?;
+/// let found: Detection = ContactDetector::new(ContactOptions::default())
+///     .detect_with(&mut Default::default(), at_rest.view(), &reference)?;
+/// assert!(found.contact.is_none() && found.noise.is_none());
+/// assert_eq!(found.statistics.sum, 0);
+/// # Ok::<(), tactile_force::ForceError>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Detection {
+    /// Sums over the whole frame.
+    pub statistics: FrameStatistics,
+    /// The correction of illumination and stray light.
+    pub drift: IlluminationDrift,
+    /// The noise that the errors are computed from; `None` without contact.
+    pub noise: Option<DifferenceNoise>,
+    /// The contact, if there is one.
+    pub contact: Option<Contact>,
+}
+
+/// The options of contact detection.
+///
+/// ```
+/// use tactile_force::{ContactOptions, DriftCorrection, ForceError, Polarity};
+///
+/// let options = ContactOptions::default()
+///     .with_polarity(Polarity::Brighter)
+///     .with_drift(DriftCorrection::Offset)
+///     .with_margin_px(6)
+///     .with_smoothing_px(3)?
+///     .with_minimum_area_px(9)?
+///     .with_saturation_limit(0.05)?
+///     .with_false_alarm_rate(1e-6)?;
+/// assert_ne!(options, ContactOptions::default());
+/// assert!(options.with_false_alarm_rate(0.0).is_err());
+/// # Ok::<(), ForceError>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct ContactOptions {
+    pub(crate) polarity: Polarity,
+    #[cfg_attr(feature = "serde", serde(deserialize_with = "read::false_alarm_rate"))]
+    false_alarm_rate: f64,
+    /// Width of the smoothing box; `None` picks one by the signal.
+    #[cfg_attr(feature = "serde", serde(deserialize_with = "read::smoothing_px"))]
+    smoothing_px: Option<usize>,
+    margin_px: usize,
+    #[cfg_attr(feature = "serde", serde(deserialize_with = "read::minimum_area_px"))]
+    minimum_area_px: usize,
+    drift: DriftCorrection,
+    #[cfg_attr(feature = "serde", serde(deserialize_with = "read::saturation_limit"))]
+    saturation_limit: f64,
+}
+
+impl Default for ContactOptions {
+    /// Brighter contact, one false alarm in a thousand frames, smoothing chosen by the signal, a margin of 4 pixels, at least 4
+    /// pixels of contact, no correction of drift, at most 1 % of the contact saturated.
+    fn default() -> Self {
+        Self {
+            polarity: Polarity::Brighter,
+            false_alarm_rate: 1e-3,
+            smoothing_px: None,
+            // Beyond 4 pixels the blurred edge of a sharp lens is below the noise; more adds noise to the force alone.
+            margin_px: 4,
+            minimum_area_px: 4,
+            drift: DriftCorrection::None,
+            saturation_limit: 0.01,
+        }
+    }
+}
+
+impl ContactOptions {
+    /// Looks for contact that is brighter or darker than the reference.
+    pub fn with_polarity(mut self, polarity: Polarity) -> Self {
+        self.polarity = polarity;
+        self
+    }
+
+    /// Allows a frame without contact to be taken for one with contact with this probability.
+    ///
+    /// # Errors
+    /// A rate that is not above zero and below one.
+    pub fn with_false_alarm_rate(mut self, rate: f64) -> Result<Self, ForceError> {
+        self.false_alarm_rate = Requirement::OpenUnitInterval.check("false_alarm_rate", rate)?;
+        Ok(self)
+    }
+
+    /// Smooths with a box of this odd width in pixels. By default the narrowest is taken that puts the threshold below a tenth
+    /// of the contact's signal (1, no smoothing, for all but faint contacts).
+    ///
+    /// # Errors
+    /// A width that is even.
+    pub fn with_smoothing_px(mut self, width: usize) -> Result<Self, ForceError> {
+        Requirement::Odd.check("smoothing_px", width as f64)?;
+        self.smoothing_px = Some(width);
+        Ok(self)
+    }
+
+    /// Grows the mask by this number of pixels to the aperture that is summed.
+    pub fn with_margin_px(mut self, margin: usize) -> Self {
+        self.margin_px = margin;
+        self
+    }
+
+    /// Takes components of fewer pixels for noise.
+    ///
+    /// # Errors
+    /// An area of zero.
+    pub fn with_minimum_area_px(mut self, area: usize) -> Result<Self, ForceError> {
+        Requirement::AtLeastOne.check("minimum_area_px", area as f64)?;
+        self.minimum_area_px = area;
+        Ok(self)
+    }
+
+    /// Corrects this change of illumination or stray light.
+    pub fn with_drift(mut self, correction: DriftCorrection) -> Self {
+        self.drift = correction;
+        self
+    }
+
+    /// Refuses the force of a contact with a larger share of saturated pixels.
+    ///
+    /// # Errors
+    /// A share outside zero to one.
+    pub fn with_saturation_limit(mut self, share: f64) -> Result<Self, ForceError> {
+        self.saturation_limit = Requirement::UnitInterval.check("saturation_limit", share)?;
+        Ok(self)
+    }
+}
+
+/// Values read from a file pass the same checks as values set in code.
+#[cfg(feature = "serde")]
+mod read {
+    use serde::{Deserialize, Deserializer, de::Error};
+
+    use super::ContactOptions;
+
+    pub fn false_alarm_rate<'de, D: Deserializer<'de>>(d: D) -> Result<f64, D::Error> {
+        let options = ContactOptions::default().with_false_alarm_rate(f64::deserialize(d)?);
+        options
+            .map(|o| o.false_alarm_rate)
+            .map_err(D::Error::custom)
+    }
+
+    pub fn smoothing_px<'de, D: Deserializer<'de>>(d: D) -> Result<Option<usize>, D::Error> {
+        let Some(width) = Option::deserialize(d)? else {
+            return Ok(None);
+        };
+        let options = ContactOptions::default().with_smoothing_px(width);
+        options.map(|o| o.smoothing_px).map_err(D::Error::custom)
+    }
+
+    pub fn minimum_area_px<'de, D: Deserializer<'de>>(d: D) -> Result<usize, D::Error> {
+        let options = ContactOptions::default().with_minimum_area_px(usize::deserialize(d)?);
+        options.map(|o| o.minimum_area_px).map_err(D::Error::custom)
+    }
+
+    pub fn saturation_limit<'de, D: Deserializer<'de>>(d: D) -> Result<f64, D::Error> {
+        let options = ContactOptions::default().with_saturation_limit(f64::deserialize(d)?);
+        options
+            .map(|o| o.saturation_limit)
+            .map_err(D::Error::custom)
+    }
+}
+
+/// Buffers that detection reuses from frame to frame.
+///
+/// ```
+/// use ndarray::Array2;
+/// use tactile_force::{ContactDetector, ContactOptions, Detection, DetectorWorkspace, ReferenceFrame};
+///
+/// let mut frame = Array2::from_elem((64, 64), 12_u8);
+/// let reference = ReferenceFrame::new(frame.view())?;
+/// frame.slice_mut(ndarray::s![20..40, 20..40]).fill(90);
+/// frame.slice_mut(ndarray::s![28..32, 28..32]).fill(12); // a hole, which is filled
+/// let mut workspace = DetectorWorkspace::default();
+/// let _: Detection = ContactDetector::new(ContactOptions::default())
+///     .detect_with(&mut workspace, frame.view(), &reference)?;
+/// let (_, mask) = workspace.mask().expect("contact");
+/// assert_eq!(mask.iter().filter(|inside| **inside == 1).count(), 400);
+/// # Ok::<(), tactile_force::ForceError>(())
+/// ```
+#[derive(Clone, Debug, Default)]
+pub struct DetectorWorkspace {
+    pass: PassWorkspace,
+    pub(crate) region: Region,
+    noise: NoiseWorkspace,
+    /// Sums over the columns of a region.
+    columns: Vec<f64>,
+    drift: FitWorkspace,
+}
+
+impl DetectorWorkspace {
+    /// The mask of the last frame's contact (1 inside, 0 outside) over a region, and the region's place in the frame; `None`
+    /// if there was no contact.
+    pub fn mask(&self) -> Option<(BoundingBox, ArrayView2<'_, u8>)> {
+        let place = self.region.place?;
+        let view =
+            ArrayView2::from_shape((place.rows(), place.columns()), &self.region.pixels).ok()?;
+        Some((place, view))
+    }
+
+    /// Brightness and noise of the last frame outside the contact, against the reference that it was compared with; `None` if no
+    /// frame of the reference's size was. From at most 1,500 tiles of 8 × 32 pixels, evenly over the frame, or all of a smaller one: O(tiles).
+    ///
+    /// ```
+    /// # use ndarray::Array2;
+    /// # use tactile_force::{ContactDetector, ContactOptions, Detection, DetectorWorkspace, ReferenceFrame};
+    /// # let reference = ReferenceFrame::new(Array2::from_elem((160, 160), 50_u8).view())?;
+    /// let mut workspace = DetectorWorkspace::default();
+    /// assert!(workspace.condition(&reference).is_none(), "no frame yet");
+    /// # let dimmed = Array2::from_elem((160, 160), 49_u8);
+    /// let _: Detection =
+    ///     ContactDetector::new(ContactOptions::default()).detect_with(&mut workspace, dimmed.view(), &reference)?;
+    /// let condition = workspace.condition(&reference).expect("a frame");
+    /// assert!((condition.brightness.value - 0.98).abs() < 1e-9);
+    /// # Ok::<(), tactile_force::ForceError>(())
+    /// ```
+    pub fn condition(&mut self, reference: &ReferenceFrame) -> Option<FrameCondition> {
+        let size = reference.image().dim();
+        let tiles = reference.tile_sums(&self.pass.tiles)?;
+        let step = FrameCondition::tile_step(self.pass.tiles.sums.len(), self.pass.tiles.columns);
+        let sd = reference.difference_variance().sqrt();
+        FrameCondition::of(size, tiles.step_by(step), sd, &mut self.drift)
+    }
+
+    /// The grey histogram of the last frame's contact over its aperture, each pixel covering `pixel_area_m2`: a row of the fit of a
+    /// [`PressureCurve`](crate::PressureCurve). `None` if there was no contact.
+    ///
+    /// ```
+    /// use ndarray::Array2;
+    /// use tactile_force::{ContactDetector, ContactOptions, Detection, DetectorWorkspace, ReferenceFrame};
+    ///
+    /// let mut frame = Array2::from_elem((64, 64), 12_u8);
+    /// let reference = ReferenceFrame::new(frame.view())?;
+    /// frame.slice_mut(ndarray::s![20..40, 20..40]).fill(90);
+    /// let mut workspace = DetectorWorkspace::default();
+    /// let found: Detection =
+    ///     ContactDetector::new(ContactOptions::default()).detect_with(&mut workspace, frame.view(), &reference)?;
+    /// let histogram = workspace.grey_histogram(4e-10).expect("a contact");
+    /// let sum = found.contact.expect("a contact").integrated_pixel_value.value;
+    /// assert!((histogram.integral(|grey| grey) / (4e-10 * sum) - 1.0).abs() < 1e-12);
+    /// # Ok::<(), tactile_force::ForceError>(())
+    /// ```
+    pub fn grey_histogram(&self, pixel_area_m2: f64) -> Option<GreyHistogram> {
+        self.region.place?;
+        let columns = self.region.columns();
+        let runs = self.region.aperture.iter();
+        let differences = runs.flat_map(|run| &self.region.difference[run.span(columns)]);
+        Some(GreyHistogram::from_differences(
+            differences.copied(),
+            pixel_area_m2,
+        ))
+    }
+}
+
+/// Finds the contact in frames of one sensor.
+///
+/// ```
+/// use ndarray::Array2;
+/// use tactile_force::{ContactDetector, ContactOptions, DetectorWorkspace, ReferenceFrame};
+///
+/// let reference = ReferenceFrame::new(Array2::from_elem((64, 64), 10).view())?;
+/// let mut frame = Array2::from_elem((64, 64), 10);
+/// frame.slice_mut(ndarray::s![20..30, 30..44]).fill(90);
+/// let detector = ContactDetector::new(ContactOptions::default());
+/// let mut workspace = DetectorWorkspace::default();
+/// let found = detector.detect_with(&mut workspace, frame.view(), &reference)?;
+/// let contact = found.contact.expect("a bright patch");
+/// assert_eq!(contact.area_px, 140);
+/// assert_eq!(contact.centroid_px[0].value, 36.5);
+/// # Ok::<(), tactile_force::ForceError>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ContactDetector {
+    options: ContactOptions,
+}
+
+impl ContactDetector {
+    /// A detector with these options.
+    pub fn new(options: ContactOptions) -> Self {
+        Self { options }
+    }
+
+    /// The statistics of the frame and its contact, if there is one.
+    ///
+    /// # Errors
+    /// The frame has not the reference's size, or too much of the contact is saturated.
+    pub fn detect_with(
+        &self,
+        workspace: &mut DetectorWorkspace,
+        frame: ArrayView2<'_, u8>,
+        reference: &ReferenceFrame,
+    ) -> Result<Detection, ForceError> {
+        reference.check(frame)?;
+        workspace.region.place = None;
+        let sd = reference.difference_variance().sqrt();
+        // Half of the false alarms go to single pixels (either sign), half to tiles.
+        let pixel_limit =
+            (quantile(0.25 * self.options.false_alarm_rate, frame.len()) * sd).min(255.0);
+        let statistics = reference.compare_with(&mut workspace.pass, frame, pixel_limit as u8);
+        let drift = self.drift(workspace, reference, frame.dim(), sd);
+        let none = Detection {
+            statistics,
+            drift,
+            noise: None,
+            contact: None,
+        };
+        let Some(suspect) = self.suspect(
+            &workspace.pass,
+            reference,
+            &statistics,
+            &drift,
+            sd,
+            pixel_limit,
+        ) else {
+            return Ok(none);
+        };
+        let Some(extent) =
+            self.segment(&mut workspace.region, frame, reference, &drift, suspect, sd)
+        else {
+            workspace.region.place = None;
+            return Ok(none);
+        };
+        let peak = peak(&workspace.region);
+        let noise = self.noise(workspace, reference, &drift, peak);
+        let saturated = if self.options.polarity.sign() > 0 && statistics.saturated == 0 {
+            0
+        } else {
+            self.saturated(&workspace.region, frame, extent.area)?
+        };
+        let contact = summarise(
+            &workspace.region,
+            &Sums::over(&workspace.region, &mut workspace.columns),
+            extent,
+            peak,
+            saturated,
+            frame.dim(),
+            &noise,
+        );
+        Ok(Detection {
+            statistics,
+            drift,
+            noise: Some(noise),
+            contact: Some(contact),
+        })
+    }
+
+    fn drift(
+        &self,
+        workspace: &mut DetectorWorkspace,
+        reference: &ReferenceFrame,
+        size: (usize, usize),
+        sd: f64,
+    ) -> IlluminationDrift {
+        if self.options.drift == DriftCorrection::None {
+            return IlluminationDrift::none();
+        }
+        let Some(tiles) = reference.tile_sums(&workspace.pass.tiles) else {
+            return IlluminationDrift::none();
+        };
+        drift::fit(self.options.drift, size, tiles, sd, &mut workspace.drift)
+    }
+
+    /// The mask in a region around the suspect pixels, which grows while the aperture meets its border.
+    fn segment(
+        &self,
+        region: &mut Region,
+        frame: ArrayView2<'_, u8>,
+        reference: &ReferenceFrame,
+        drift: &IlluminationDrift,
+        suspect: BoundingBox,
+        sd: f64,
+    ) -> Option<Extent> {
+        let sign = self.options.polarity.sign() as f32;
+        let mut place = suspect.grown(TILE_COLUMNS, frame.dim());
+        loop {
+            let signal = region.load(frame, reference, place, drift, sign);
+            let z = quantile(self.options.false_alarm_rate, region.difference.len());
+            let width = self
+                .options
+                .smoothing_px
+                .unwrap_or_else(|| smoothing_width(z * sd, f64::from(signal)));
+            let limit = z * sd / width as f64;
+            let extent = region.segment(width, limit as f32, self.options.minimum_area_px);
+            if extent.area < self.options.minimum_area_px {
+                return None;
+            }
+            region.finish(self.options.margin_px);
+            let needed = region
+                .bounds(&region.mask)?
+                .grown(self.options.margin_px + 1, frame.dim());
+            if needed.union(place) == place {
+                return Some(extent);
+            }
+            place = needed.union(place).grown(TILE_COLUMNS, frame.dim());
+        }
+    }
+
+    fn noise(
+        &self,
+        workspace: &mut DetectorWorkspace,
+        reference: &ReferenceFrame,
+        drift: &IlluminationDrift,
+        peak: f32,
+    ) -> DifferenceNoise {
+        let DetectorWorkspace { region, noise, .. } = workspace;
+        let (x, y) = region
+            .bounds(&region.mask)
+            .map_or((0.0, 0.0), |b| b.centre());
+        // Flattening divides signal and noise alike.
+        let (light, uncertain) = reference
+            .flat_field()
+            .map_or((1.0, 0.0), |f| (f.at(x, y), f.variance_at(x, y)));
+        let flat_field = uncertain / (light * light);
+        let background = reference.difference_variance() / (light * light);
+        let [common, scale] = drift.variances(x, y);
+        let gain = match reference.known_gain() {
+            Some(gain) => gain / light,
+            None => gain(region, noise, background, peak),
+        };
+        DifferenceNoise {
+            background,
+            gain,
+            common: common / (light * light),
+            scale,
+            flat_field,
+        }
+    }
+
+    /// Number of saturated pixels of the mask; an error where their share exceeds the limit.
+    fn saturated(
+        &self,
+        region: &Region,
+        frame: ArrayView2<'_, u8>,
+        area: usize,
+    ) -> Result<usize, ForceError> {
+        let frame = region.place.map_or(frame, |place| place.of(frame));
+        let full = if self.options.polarity.sign() > 0 {
+            u8::MAX
+        } else {
+            0
+        };
+        let in_run = |run: &Run| {
+            let row = frame.row(run.row as usize);
+            let row = row.slice_axis(Axis(0), Slice::from(run.start as usize..run.end as usize));
+            match row.to_slice() {
+                Some(pixels) => pixels.iter().filter(|p| **p == full).count(),
+                None => row.iter().filter(|p| **p == full).count(),
+            }
+        };
+        let saturated = region.mask.iter().map(in_run).sum();
+        let (share, limit) = (
+            saturated as f64 / area as f64,
+            self.options.saturation_limit,
+        );
+        if share > limit {
+            Err(ForceError::SaturatedContact { share, limit })
+        } else {
+            Ok(saturated)
+        }
+    }
+}
+
+/// The contact of a region.
+fn summarise(
+    region: &Region,
+    sums: &Sums,
+    extent: Extent,
+    peak: f32,
+    saturated_px: usize,
+    size: (usize, usize),
+    noise: &DifferenceNoise,
+) -> Contact {
+    let place = region.place.unwrap_or(BoundingBox::whole(size));
+    let local = sums.centroid();
+    let origin = [place.column_start as f64, place.row_start as f64];
+    let centroid =
+        |k: usize| Estimate::from_variance(origin[k] + local[k], sums.centroid_variance(k, noise));
+    let aperture = region.bounds(&region.aperture).unwrap_or(place);
+    Contact {
+        bounding_box: region.bounds(&region.mask).unwrap_or(place),
+        area_px: extent.area,
+        equivalent_radius_px: (extent.area as f64 / std::f64::consts::PI).sqrt(),
+        integrated_pixel_value: Estimate::from_variance(sums.sum(), sums.variance(noise)),
+        centroid_px: [centroid(0), centroid(1)],
+        peak: f64::from(peak),
+        aperture_px: region.aperture.iter().map(Run::len).sum(),
+        saturated_px,
+        other_contacts: extent.others,
+        touches_edge: aperture.grown(1, size) != grown_freely(aperture),
+    }
+}
+
+/// Greatest difference in the mask.
+fn peak(region: &Region) -> f32 {
+    let columns = region.columns();
+    region
+        .mask
+        .iter()
+        .map(|run| greatest(&region.difference[run.span(columns)]))
+        .fold(0.0, f32::max)
+}
+
+/// The box one pixel larger on every side, whether or not the frame is; a box at the first row or column cannot be.
+fn grown_freely(b: BoundingBox) -> BoundingBox {
+    BoundingBox {
+        row_start: b.row_start.wrapping_sub(1),
+        row_end: b.row_end + 1,
+        column_start: b.column_start.wrapping_sub(1),
+        column_end: b.column_end + 1,
+    }
+}
+
+/// The narrowest odd box for which the threshold on its mean, limit/width, is a tenth of the signal or less.
+fn smoothing_width(limit: f64, signal: f64) -> usize {
+    let width = (10.0 * limit / signal.max(1.0)).ceil().clamp(1.0, 31.0) as usize;
+    width | 1
+}
+
+impl ContactDetector {
+    /// Box around every tile whose sum exceeds its noise, and every pixel that exceeds its own.
+    fn suspect(
+        &self,
+        pass: &PassWorkspace,
+        reference: &ReferenceFrame,
+        statistics: &FrameStatistics,
+        drift: &IlluminationDrift,
+        sd: f64,
+        pixel_limit: f64,
+    ) -> Option<BoundingBox> {
+        let size = (statistics.rows, statistics.columns);
+        let bright = self.bright_tiles(&pass.tiles, reference, size, drift, sd);
+        // Pixels were compared with their limit before the drift was known; that holds while the drift is well below the limit.
+        let pixels = statistics
+            .bounding_box
+            .filter(|_| drift.greatest_grey(size, reference.mean_grey()) < 0.3 * pixel_limit);
+        bright.into_iter().chain(pixels).reduce(BoundingBox::union)
+    }
+
+    /// Box around every tile whose sum exceeds its noise.
+    fn bright_tiles(
+        &self,
+        tiles: &Tiles,
+        reference: &ReferenceFrame,
+        size: (usize, usize),
+        drift: &IlluminationDrift,
+        sd: f64,
+    ) -> Option<BoundingBox> {
+        let z = quantile(0.5 * self.options.false_alarm_rate, tiles.sums.len()) * sd;
+        let sign = self.options.polarity.sign();
+        let stands_out = |k: usize| {
+            let tile = reference.tile_sum(tiles, k);
+            f64::from(sign) * drift.residual(&tile) > z * tile.pixels.sqrt()
+        };
+        // The last tile of a band is its smallest: a band whose sums stay below that tile's noise has no bright tile.
+        let below_noise = |band: usize| {
+            drift.is_zero() && {
+                let last = reference.tile_sum(tiles, (band + 1) * tiles.columns - 1);
+                f64::from(tiles.greatest(band, sign)) <= z * last.pixels.sqrt()
+            }
+        };
+        (0..tiles.rows)
+            .filter(|&band| !below_noise(band))
+            .flat_map(|band| {
+                (band * tiles.columns..(band + 1) * tiles.columns).filter(|&k| stands_out(k))
+            })
+            .map(|k| tiles.pixels(k, size))
+            .reduce(BoundingBox::union)
+    }
+}
+
+/// The z with P(N > z) = rate / trials for a standard normal N: among `trials` values one exceeds it with
+/// probability at most `rate`.
+fn quantile(rate: f64, trials: usize) -> f64 {
+    let tail = rate / trials.max(1) as f64;
+    std::f64::consts::SQRT_2 * erfc_inv(2.0 * tail)
+}

@@ -1,0 +1,718 @@
+//! Measurement of force and contact in one frame.
+
+use ndarray::{Array2, ArrayView2};
+use tactile_core::statistics::effective_degrees_of_freedom;
+use tactile_core::{BoundingBox, Estimate, Polarity, Requirement};
+
+use crate::calibration::{ForceReading, GreyHistogram, LocalCalibration, StressCalibration};
+use crate::contact::{Contact, ContactDetector, ContactOptions, Detection, DetectorWorkspace};
+use crate::drift::IlluminationDrift;
+use crate::error::ForceError;
+use crate::frame::{DifferenceNoise, FrameStatistics, ReferenceFrame};
+use crate::lens::LensGeometry;
+use crate::profile::{
+    HertzFit, HertzFitOptions, HertzFitter, PixelVariance, Rings, Start, VARIANCE_LEVELS,
+};
+use crate::region::{Region, Run};
+
+/// Measures forces with one sensor: options checked and tables built once.
+///
+/// ```
+/// use ndarray::Array2;
+/// use tactile_force::{CalibrationPair, ForceMeter, ForceWorkspace, LinearCalibration, ReferenceFrame};
+///
+/// let pairs = [0.0, 1e5, 2e5].map(|v| CalibrationPair::loading(v, 1e-5 * v));
+/// let calibration = LinearCalibration::fit(&pairs, &Default::default())?;
+/// let mut frame = Array2::from_elem((64, 64), 12_u8);
+/// let reference = ReferenceFrame::new(frame.view())?;
+/// frame.slice_mut(ndarray::s![20..40, 20..40]).fill(112);
+///
+/// let (meter, mut workspace) = (ForceMeter::new([20e-6; 2], &Default::default())?, ForceWorkspace::default());
+/// let measured = meter.measure_with(&mut workspace, frame.view(), &reference, &calibration)?;
+/// // 400 pixels of 100 grey levels at 10 µN each.
+/// assert!((measured.force_n.value - 0.4_f64).abs() < 1e-9);
+/// # Ok::<(), tactile_force::ForceError>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct ForceMeter {
+    detector: ContactDetector,
+    fitter: HertzFitter,
+    skip_profile: bool,
+    pixel_size_m: [f64; 2],
+    lens: Option<LensGeometry>,
+}
+
+impl ForceMeter {
+    /// A meter for pixels of the given size [x, y].
+    ///
+    /// # Errors
+    /// A pixel size that is not positive and finite.
+    pub fn new(pixel_size_m: [f64; 2], options: &ForceOptions) -> Result<Self, ForceError> {
+        for size in pixel_size_m {
+            Requirement::Positive.check("pixel_size_m", size)?;
+        }
+        Ok(Self {
+            detector: ContactDetector::new(options.contact),
+            fitter: HertzFitter::new(options.hertz),
+            skip_profile: options.skip_profile,
+            pixel_size_m,
+            lens: None,
+        })
+    }
+
+    /// The same meter behind a lens that distorts: the contact's contour and centre are undistorted, areas and stresses take the
+    /// mean size of a pixel over the contact.
+    ///
+    /// ```
+    /// use tactile_force::{ForceMeter, LensGeometry};
+    ///
+    /// let lens = LensGeometry::new([21.6e-6, 22e-6])?.with_distortion([695.5, 520.5], 869.0, [0.03, 0.0])?;
+    /// let meter = ForceMeter::new(lens.pixel_size_m(), &Default::default())?.with_lens(lens);
+    /// # let _ = meter;
+    /// # Ok::<(), tactile_force::ForceError>(())
+    /// ```
+    pub fn with_lens(mut self, lens: LensGeometry) -> Self {
+        self.lens = Some(lens);
+        self
+    }
+
+    /// The same meter without the fit of Hertz's profile, see [`ForceOptions::without_profile`]: for contacts known to be no ball's.
+    ///
+    /// ```
+    /// use tactile_force::ForceMeter;
+    ///
+    /// let meter = ForceMeter::new([20e-6; 2], &Default::default())?.without_profile();
+    /// # let _ = meter;
+    /// # Ok::<(), tactile_force::ForceError>(())
+    /// ```
+    pub fn without_profile(mut self) -> Self {
+        self.skip_profile = true;
+        self
+    }
+
+    /// Measures one frame. A calibration with a [local curve](StressCalibration::local) turns the contact's grey levels into
+    /// pressures: the force is their integral, and the profile is fitted to them.
+    ///
+    /// # Errors
+    /// The frame has not the reference's size, or too much of the contact is saturated.
+    pub fn measure_with(
+        &self,
+        workspace: &mut ForceWorkspace,
+        frame: ArrayView2<'_, u8>,
+        reference: &ReferenceFrame,
+        calibration: &(impl StressCalibration + ?Sized),
+    ) -> Result<ForceMeasurement, ForceError> {
+        let ForceWorkspace {
+            detector,
+            rings,
+            local,
+        } = workspace;
+        local.clear();
+        let found = self.detector.detect_with(detector, frame, reference)?;
+        let (Some(contact), Some(noise)) = (found.contact, found.noise) else {
+            return Ok(ForceMeasurement::without_contact(found));
+        };
+        let pixel = self.pixel_at(&contact);
+        let region = &mut detector.region;
+        let stress = match calibration.local() {
+            Some(curve) => local.convert(curve, region, &contact, noise, pixel.area)?,
+            None => Stress {
+                reading: calibration.read(contact.integrated_pixel_value)?,
+                per_grey_pa: calibration
+                    .stress_per_grey_level_pa(contact.integrated_pixel_value.value, pixel.area),
+            },
+        };
+        let mut profile = None;
+        if !self.skip_profile {
+            let integral = contact.integrated_pixel_value.value;
+            let levels = local.per_grey_pa().unwrap_or(1.0);
+            let start = self.start(region, &contact, pixel, integral * levels);
+            let variance = local.variance(&noise);
+            let sizes = pixel.step;
+            profile = start
+                .and_then(|start| self.fitter.fit_with(rings, region, start, variance, sizes))
+                .map(|fit: HertzFit| match local.per_grey_pa() {
+                    Some(per_grey) => fit.with_levels_scaled(per_grey.recip()),
+                    None => fit,
+                });
+        }
+        // A part of an outline, or one that noise has frayed, says nothing of its shape.
+        let whole = !contact.touches_edge && contact.other_contacts == 0;
+        let clear = contact.peak > CLEAR * noise.background.sqrt();
+        let elongation = (whole && clear)
+            .then(|| elongation(&workspace.detector.region.mask, self.jacobian(&contact)))
+            .flatten();
+        Ok(ForceMeasurement {
+            elongation: elongation,
+            ..self.combine(found, contact, profile, stress, pixel)
+        })
+    }
+
+    /// Metres [x, y] for a step of one pixel along x and along y at a contact, in rows.
+    fn jacobian(&self, contact: &Contact) -> [[f64; 2]; 2] {
+        let Some(lens) = &self.lens else {
+            let [hx, hy] = self.pixel_size_m;
+            return [[hx, 0.0], [0.0, hy]];
+        };
+        let [x, y] = contact.centroid_px.map(|c| c.value);
+        let step = |from: [f64; 2], to: [f64; 2]| {
+            let (from, to) = (lens.to_metres(from), lens.to_metres(to));
+            [to[0] - from[0], to[1] - from[1]]
+        };
+        let along_x = step([x - 0.5, y], [x + 0.5, y]);
+        let along_y = step([x, y - 0.5], [x, y + 0.5]);
+        [[along_x[0], along_y[0]], [along_x[1], along_y[1]]]
+    }
+
+    /// The size of a pixel at a contact.
+    fn pixel_at(&self, contact: &Contact) -> PixelSize {
+        let Some(lens) = &self.lens else {
+            let [hx, hy] = self.pixel_size_m;
+            return PixelSize {
+                step: [hx, hy],
+                area: hx * hy,
+            };
+        };
+        let place = contact.centroid_px.map(|c| c.value);
+        let area = lens.mean_pixel_area_m2(place, contact.equivalent_radius_px);
+        PixelSize {
+            step: lens.pixel_step_m(place),
+            area: area,
+        }
+    }
+
+    /// Where the fit of the profile starts, in pixels of the region; `integral` is in the units of its levels.
+    fn start(
+        &self,
+        region: &Region,
+        contact: &Contact,
+        pixel: PixelSize,
+        integral: f64,
+    ) -> Option<Start> {
+        let place = region.place?;
+        let [x, y] = contact.centroid_px.map(|c| c.value);
+        let [hx, hy] = pixel.step;
+        Some(Start {
+            centre: [x - place.column_start as f64, y - place.row_start as f64],
+            radius: contact.equivalent_radius_px * (hy / hx).sqrt(),
+            integral,
+        })
+    }
+
+    fn combine(
+        &self,
+        found: Detection,
+        contact: Contact,
+        profile: Option<HertzFit>,
+        stress: Stress,
+        pixel: PixelSize,
+    ) -> ForceMeasurement {
+        let Stress {
+            reading,
+            per_grey_pa,
+        } = stress;
+        let [x, y] = contact.centroid_px;
+        let mut centroid_m = [x * pixel.step[0], y * pixel.step[1]];
+        let mut profile = profile;
+        if let Some(lens) = &self.lens {
+            let aspect = pixel.step[1] / pixel.step[0];
+            let seen = profile.map_or(contact.equivalent_radius_px, |p| p.radius_px.value);
+            let centre = [x.value, y.value];
+            let (place, radius_m) = lens.contact_m(centre, seen, aspect);
+            centroid_m[0].value = place[0];
+            centroid_m[1].value = place[1];
+            if let Some(profile) = &mut profile {
+                let undistorted = radius_m / profile.radius_m.value;
+                profile.radius_m = profile.radius_m * undistorted;
+            }
+        }
+        let radius = contact_radius(&contact, profile, pixel.area.sqrt());
+        let brightest = Estimate::new(contact.peak, 1.0);
+        let peak = profile.map_or(brightest, |p| p.peak);
+        ForceMeasurement {
+            force_n: reading.force_n,
+            reading: Some(reading),
+            centroid_m: Some(centroid_m),
+            contact_area_m2: Some((contact.area_px as f64) * pixel.area),
+            contact_radius_m: Some(radius),
+            mean_stress_pa: Some(mean_stress(reading.force_n, radius)),
+            peak_stress_pa: Some(peak * per_grey_pa),
+            contact: Some(contact),
+            profile,
+            elongation: None,
+            statistics: found.statistics,
+            drift: found.drift,
+            noise: found.noise,
+        }
+    }
+}
+
+/// Peak over the noise of one pixel at which a contact's outline is sharp to a pixel.
+const CLEAR: f64 = 20.0;
+
+/// Steps [x, y] of a pixel in metres, and its area.
+#[derive(Clone, Copy, Debug)]
+struct PixelSize {
+    step: [f64; 2],
+    area: f64,
+}
+
+/// Measures the force of one frame against one reference frame. For many frames keep a [`ForceMeter`], a
+/// [`ReferenceFrame`] and a [`ForceWorkspace`].
+///
+/// # Errors
+/// Images of different size or without pixels, a pixel size that is not positive, too much of the contact saturated.
+///
+/// ```
+/// use ndarray::Array2;
+/// use tactile_force::{CalibrationPair, LinearCalibration, measure_force};
+///
+/// let pairs: Vec<_> = (0..5).map(|k| CalibrationPair::loading(1e5 * k as f64, 0.5 * k as f64)).collect();
+/// let calibration = LinearCalibration::fit(&pairs, &Default::default())?;
+/// let reference = Array2::from_elem((200, 200), 12_u8);
+/// let frame = Array2::from_shape_fn((200, 200), |(y, x)| {
+///     let r2 = (x as f64 - 90.3).powi(2) + (y as f64 - 104.8).powi(2);
+///     12 + (150.0 * (1.0 - r2 / 1600.0).max(0.0).sqrt()).round() as u8
+/// });
+/// let measured = measure_force(frame.view(), reference.view(), [20e-6, 20e-6], &calibration, &Default::default())?;
+/// let radius = measured.contact_radius_m.expect("contact");
+/// assert!((radius.value / 800e-6 - 1.0).abs() < 1e-3);
+/// assert!((measured.force_n.value - 2.51).abs() < 0.01);
+/// # Ok::<(), tactile_force::ForceError>(())
+/// ```
+pub fn measure_force(
+    frame: ArrayView2<'_, u8>,
+    reference: ArrayView2<'_, u8>,
+    pixel_size_m: [f64; 2],
+    calibration: &(impl StressCalibration + ?Sized),
+    options: &ForceOptions,
+) -> Result<ForceMeasurement, ForceError> {
+    let meter = ForceMeter::new(pixel_size_m, options)?;
+    let reference = ReferenceFrame::new(reference)?;
+    meter.measure_with(
+        &mut ForceWorkspace::default(),
+        frame,
+        &reference,
+        calibration,
+    )
+}
+
+/// The options of a force measurement.
+///
+/// ```
+/// use tactile_force::{ContactOptions, ForceMeter, ForceOptions, HertzFitOptions, Polarity};
+///
+/// // Force and centroid only, at one false alarm in a million frames.
+/// let contact = ContactOptions::default().with_false_alarm_rate(1e-6)?;
+/// let options = ForceOptions::default().with_contact(contact).without_profile();
+/// assert_eq!(options.polarity(), Polarity::Brighter);
+/// assert!(ForceMeter::new([20e-6; 2], &options).is_ok());
+/// // The profile over a background that is fitted too.
+/// let hertz = HertzFitOptions::default().with_fitted_background();
+/// assert_ne!(ForceOptions::default().with_hertz(hertz), ForceOptions::default());
+/// # Ok::<(), tactile_force::ForceError>(())
+/// ```
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct ForceOptions {
+    contact: ContactOptions,
+    hertz: HertzFitOptions,
+    skip_profile: bool,
+}
+
+impl ForceOptions {
+    /// Finds the contact with these options.
+    pub fn with_contact(mut self, contact: ContactOptions) -> Self {
+        self.contact = contact;
+        self
+    }
+
+    /// Fits the profile with these options.
+    pub fn with_hertz(mut self, hertz: HertzFitOptions) -> Self {
+        self.hertz = hertz;
+        self
+    }
+
+    /// Fits no profile: radius and peak stress then come from the mask.
+    pub fn without_profile(mut self) -> Self {
+        self.skip_profile = true;
+        self
+    }
+
+    /// Whether contact is brighter or darker than the reference.
+    pub fn polarity(&self) -> Polarity {
+        self.contact.polarity
+    }
+}
+
+/// Force, contact and stress measured in one frame.
+///
+/// ```
+/// use ndarray::Array2;
+/// use tactile_force::{CalibrationPair, ForceMeasurement, LinearCalibration, measure_force};
+///
+/// let pairs = [0.0, 1e5, 2e5].map(|v| CalibrationPair::loading(v, 1e-5 * v));
+/// let calibration = LinearCalibration::fit(&pairs, &Default::default())?;
+/// let at_rest = Array2::from_elem((64, 64), 12_u8);
+/// let m: ForceMeasurement =
+///     measure_force(at_rest.view(), at_rest.view(), [20e-6; 2], &calibration, &Default::default())?;
+/// // No contact is an answer, not an error.
+/// assert_eq!((m.force_n.value, m.contact, m.mean_stress_pa), (0.0, None, None));
+/// # Ok::<(), tactile_force::ForceError>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct ForceMeasurement {
+    /// Normal force in newtons, equation (6); zero without contact.
+    pub force_n: Estimate,
+    /// The parts of the force's error, and whether the calibration was used outside its range; `None` without contact.
+    pub reading: Option<ForceReading>,
+    /// The contact; `None` if the frame shows none.
+    pub contact: Option<Contact>,
+    /// The fitted Hertz profile, if it was asked for and could be fitted.
+    pub profile: Option<HertzFit>,
+    /// Centroid [x, y] in metres from the centre of the first pixel, equations (7) and (8).
+    pub centroid_m: Option<[Estimate; 2]>,
+    /// Area of the mask in square metres.
+    pub contact_area_m2: Option<f64>,
+    /// Contact radius in metres: the profile's, else the mask's equivalent radius with half a pixel as its error.
+    pub contact_radius_m: Option<Estimate>,
+    /// F/(π a²) in pascals.
+    pub mean_stress_pa: Option<Estimate>,
+    /// Stress at the centre in pascals: the profile's peak, else the greatest difference, through the calibration.
+    pub peak_stress_pa: Option<Estimate>,
+    /// Longer over shorter half axis of the contact's outline, less one, where that stands out of what whole pixels leave and exceeds
+    /// 0.5 %: pixels that are not as stated, a lens that distorts, or an object that is not round.
+    pub elongation: Option<f64>,
+    /// Sums over the whole frame.
+    pub statistics: FrameStatistics,
+    /// The correction of illumination and stray light.
+    pub drift: IlluminationDrift,
+    /// The noise that the errors are computed from; `None` without contact.
+    pub noise: Option<DifferenceNoise>,
+}
+
+impl ForceMeasurement {
+    fn without_contact(found: Detection) -> Self {
+        Self {
+            force_n: Estimate::default(),
+            reading: None,
+            contact: None,
+            profile: None,
+            centroid_m: None,
+            contact_area_m2: None,
+            contact_radius_m: None,
+            mean_stress_pa: None,
+            peak_stress_pa: None,
+            elongation: None,
+            statistics: found.statistics,
+            drift: found.drift,
+            noise: None,
+        }
+    }
+}
+
+/// The profile's radius, else the mask's with half a pixel as its error; `side` is that of a square pixel of equal area.
+fn contact_radius(contact: &Contact, profile: Option<HertzFit>, side: f64) -> Estimate {
+    let half = 0.5 * side;
+    let of_mask = Estimate::new(contact.equivalent_radius_px * side, half);
+    profile.map_or(of_mask, |p| p.radius_m)
+}
+
+/// F/(π a²) with its standard error.
+fn mean_stress(force: Estimate, radius: Estimate) -> Estimate {
+    let pi = std::f64::consts::PI;
+    let value = force.value / (pi * radius.value * radius.value);
+    let parts = [
+        (force.relative_error().powi(2), force.degrees_of_freedom),
+        (
+            4.0 * radius.relative_error().powi(2),
+            radius.degrees_of_freedom,
+        ),
+    ];
+    let variance = value * value * (parts[0].0 + parts[1].0);
+    let mut stress = Estimate::from_variance(value, variance);
+    stress.degrees_of_freedom = effective_degrees_of_freedom(&parts);
+    stress
+}
+
+/// Buffers that measurements reuse from frame to frame; after the first frames nothing is allocated.
+///
+/// ```
+/// use ndarray::Array2;
+/// use tactile_force::{CalibrationPair, ForceMeter, ForceWorkspace, LinearCalibration, ReferenceFrame};
+///
+/// let pairs = [0.0, 1e5, 2e5].map(|v| CalibrationPair::loading(v, 1e-5 * v));
+/// let calibration = LinearCalibration::fit(&pairs, &Default::default())?;
+/// let mut frame = Array2::from_elem((64, 64), 12_u8);
+/// let reference = ReferenceFrame::new(frame.view())?;
+/// frame.slice_mut(ndarray::s![20..40, 24..48]).fill(90);
+/// let mut workspace = ForceWorkspace::default();
+/// let meter = ForceMeter::new([20e-6; 2], &Default::default())?;
+/// meter.measure_with(&mut workspace, frame.view(), &reference, &calibration)?;
+/// let (place, mask) = workspace.detector.mask().expect("contact");
+/// assert_eq!(mask.iter().filter(|inside| **inside == 1).count(), 20 * 24);
+/// assert!(place.row_start <= 20 && place.row_end >= 40);
+/// // Outside the contact the sensor is as bright as before.
+/// let condition = workspace.detector.condition(&reference).expect("a frame");
+/// assert!((condition.brightness.value - 1.0).abs() < 1e-9);
+/// # Ok::<(), tactile_force::ForceError>(())
+/// ```
+#[derive(Clone, Debug, Default)]
+pub struct ForceWorkspace {
+    /// What the detector keeps of the last frame: mask, grey histogram and background.
+    pub detector: DetectorWorkspace,
+    rings: Rings,
+    local: Local,
+}
+
+impl ForceWorkspace {
+    /// The pressure of the last contact in pascals over its region (zero outside the aperture), and the region's place in the
+    /// frame; `None` without contact, or if the calibration had no [local curve](crate::StressCalibration::local). O(pixels of the region).
+    ///
+    /// ```
+    /// use ndarray::Array2;
+    /// use tactile_force::{
+    ///     Branch, CalibrationFrame, ForceMeter, ForceWorkspace, GreyHistogram, PressureCurve, ReferenceFrame,
+    /// };
+    ///
+    /// // 2 kPa a grey level.
+    /// let disc = |grey: f32| GreyHistogram::from_differences(std::iter::repeat_n(grey, 1000), 4e-10);
+    /// let frames: Vec<_> = [20.0_f32, 40.0, 60.0, 80.0, 100.0]
+    ///     .map(|grey| CalibrationFrame::new(disc(grey), f64::from(grey) * 2e3 * 4e-7, Branch::Loading))
+    ///     .into_iter()
+    ///     .collect::<Result<_, _>>()?;
+    /// let curve = PressureCurve::fit(&frames, &Default::default())?;
+    /// let mut frame = Array2::from_elem((64, 64), 12_u8);
+    /// let reference = ReferenceFrame::new(frame.view())?;
+    /// frame.slice_mut(ndarray::s![20..40, 20..40]).fill(62);
+    /// let mut workspace = ForceWorkspace::default();
+    /// let meter = ForceMeter::new([20e-6; 2], &Default::default())?;
+    /// let measured = meter.measure_with(&mut workspace, frame.view(), &reference, &curve)?;
+    /// let (_, pressure) = workspace.pressure_pa().expect("a contact");
+    /// assert!((f64::from(pressure[[pressure.nrows() / 2, pressure.ncols() / 2]]) / 1e5 - 1.0).abs() < 1e-3);
+    /// let force = pressure.iter().map(|p| f64::from(*p) * 4e-10).sum::<f64>();
+    /// assert!((force / measured.force_n.value - 1.0).abs() < 1e-5);
+    /// # Ok::<(), tactile_force::ForceError>(())
+    /// ```
+    pub fn pressure_pa(&self) -> Option<(BoundingBox, Array2<f32>)> {
+        self.local.per_grey_pa()?;
+        let region = &self.detector.region;
+        let place = region.place?;
+        let columns = region.columns();
+        let mut image = vec![0.0; region.difference.len()];
+        for run in &region.aperture {
+            let span = run.span(columns);
+            image[span.clone()].copy_from_slice(&region.difference[span]);
+        }
+        let image = Array2::from_shape_vec((place.rows(), place.columns()), image).ok()?;
+        Some((place, image))
+    }
+}
+
+/// Steps of a grey level at which the curve is tabulated and pixels are counted: rounding to a sixteenth adds 2 % to the smallest
+/// variance that a grey level can have, that of rounding to whole ones.
+const STEPS: usize = 16;
+/// Entries of the table, from −256 grey levels on.
+const TABLE: usize = 512 * STEPS + 1;
+const LEAST: f32 = -256.0;
+/// Pixels whose places in the table are computed at once, by SIMD instructions.
+const BLOCK: usize = 64;
+
+/// Force of a contact, and pascals per grey level of its integrated pixel value.
+#[derive(Clone, Copy, Debug)]
+struct Stress {
+    reading: ForceReading,
+    per_grey_pa: f64,
+}
+
+/// Buffers of the conversion, and its result for the last contact.
+#[derive(Clone, Debug, Default)]
+struct Local {
+    histogram: GreyHistogram,
+    /// f at every step.
+    table: Vec<f32>,
+    /// Pixels of the aperture at every step.
+    counts: Vec<u32>,
+    converted: Option<Converted>,
+}
+
+#[derive(Clone, Debug)]
+struct Converted {
+    per_grey_pa: f64,
+    /// Variance of a pixel's pressure, at even steps of the pressure.
+    variance: [f64; VARIANCE_LEVELS],
+    step: f64,
+}
+
+impl Local {
+    fn clear(&mut self) {
+        self.converted = None;
+    }
+
+    /// Pascals per grey level over the last contact, if it was converted.
+    fn per_grey_pa(&self) -> Option<f64> {
+        self.converted.as_ref().map(|c| c.per_grey_pa)
+    }
+
+    /// The variance of the pixels that the profile is fitted to.
+    fn variance<'a>(&'a self, noise: &'a DifferenceNoise) -> PixelVariance<'a> {
+        match &self.converted {
+            Some(c) => PixelVariance::Pressure {
+                values: &c.variance,
+                step: c.step,
+            },
+            None => PixelVariance::Grey(noise),
+        }
+    }
+
+    /// Reads the force off the histogram of the aperture and turns the aperture's differences into pressures.
+    fn convert(
+        &mut self,
+        curve: &dyn LocalCalibration,
+        region: &mut Region,
+        contact: &Contact,
+        noise: DifferenceNoise,
+        pixel_area_m2: f64,
+    ) -> Result<Stress, ForceError> {
+        self.tabulate(curve);
+        self.counts.clear();
+        self.counts.resize(TABLE, 0);
+        let columns = region.columns();
+        for run in &region.aperture {
+            let differences = &mut region.difference[run.span(columns)];
+            for block in differences.chunks_mut(BLOCK) {
+                let mut places = [0_u32; BLOCK];
+                for (place, d) in places.iter_mut().zip(&*block) {
+                    *place = place_of(*d);
+                }
+                for (d, place) in block.iter_mut().zip(places) {
+                    let place = (place as usize).min(TABLE - 1);
+                    self.counts[place] += 1;
+                    *d = self.table[place];
+                }
+            }
+        }
+        self.histogram.clear(pixel_area_m2);
+        for (k, count) in self.counts.iter().enumerate().filter(|(_, c)| **c > 0) {
+            self.histogram
+                .add_many(grey_at(k) as f32, f64::from(*count));
+        }
+        let reading = curve.read(&self.histogram, &noise)?;
+        let integral = contact.integrated_pixel_value.value;
+        let per_grey_pa = reading.force_n.value / (integral * pixel_area_m2);
+        self.converted = Some(self.variances(noise, contact.peak, per_grey_pa));
+        Ok(Stress {
+            reading,
+            per_grey_pa,
+        })
+    }
+
+    /// f at every step, linear between whole grey levels as a histogram has it.
+    fn tabulate(&mut self, curve: &dyn LocalCalibration) {
+        self.table.clear();
+        let whole = |grey: usize| curve.value_pa(f64::from(LEAST) + grey as f64);
+        let mut below = whole(0);
+        for grey in 0..512 {
+            let above = whole(grey + 1);
+            let step = (above - below) / STEPS as f64;
+            self.table
+                .extend((0..STEPS).map(|k| (below + step * k as f64) as f32));
+            below = above;
+        }
+        self.table.push(below as f32);
+    }
+
+    /// Variance of a pressure, (slope over the noise)² σ², from zero to a fifth beyond the contact's peak.
+    fn variances(&self, noise: DifferenceNoise, peak: f64, per_grey_pa: f64) -> Converted {
+        let pressure = |grey: f64| {
+            let place = (place_of(grey as f32) as usize).min(TABLE - 1);
+            f64::from(self.table[place])
+        };
+        let highest = pressure(1.2 * peak).max(f64::MIN_POSITIVE);
+        let step = highest / (VARIANCE_LEVELS - 1) as f64;
+        let mut grey = 0.0;
+        let variance = std::array::from_fn(|k| {
+            // Levels rise, and so do the grey levels that they belong to.
+            while pressure(grey) < step * k as f64 && grey < 256.0 {
+                grey += 0.25;
+            }
+            let variance = noise.background + noise.gain * grey;
+            let sd = variance.sqrt();
+            let slope = (pressure(grey + sd) - pressure(grey - sd)) / (2.0 * sd);
+            // A curve that is level over the noise has no less than a thousandth of the mean slope.
+            slope.max(1e-3 * per_grey_pa).powi(2) * variance
+        });
+        Converted {
+            per_grey_pa,
+            variance,
+            step,
+        }
+    }
+}
+
+/// The nearest step of a grey-level difference.
+#[inline]
+fn place_of(difference: f32) -> u32 {
+    ((difference.clamp(-255.0, 255.0) - LEAST) * STEPS as f32 + 0.5) as i32 as u32
+}
+
+/// The grey level of a step.
+fn grey_at(place: usize) -> f64 {
+    f64::from(LEAST) + place as f64 / STEPS as f64
+}
+
+/// Elongation below which an outline counts as a circle: pixels that are not square by half a per cent change a ball's modulus by
+/// less than one.
+const ROUND: f64 = 5e-3;
+/// Standard deviation of an outline's place in pixels: 1/√12 of a step of one pixel.
+const STEP_SD: f64 = 0.29;
+/// Standard errors by which an elongation must stand out.
+const SIGNIFICANT: f64 = 4.0;
+
+/// Ratio of the longer to the shorter half axis of the mask's ellipse of inertia, less one; `None` where it does not stand out of what
+/// whole pixels leave. The Jacobian takes a step [x, y] in pixels to metres: [∂x, ∂y] in rows.
+///
+/// An outline whose N = 2πa places are off by σ each has a second harmonic of σ √(2/N), and an elongation of twice that over a.
+/// O(rows of the mask).
+fn elongation(mask: &[Run], jacobian: [[f64; 2]; 2]) -> Option<f64> {
+    let (mut n, mut x, mut y) = (0.0, 0.0, 0.0);
+    for run in mask {
+        let (len, middle) = pixels(run);
+        n += len;
+        x += len * middle;
+        y += len * f64::from(run.row);
+    }
+    let (x, y) = (x / n, y / n);
+    let (mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0);
+    for run in mask {
+        let (len, middle) = pixels(run);
+        let (u, v) = (middle - x, f64::from(run.row) - y);
+        xx += len * (u * u + len * len / 12.0);
+        xy += len * u * v;
+        yy += len * (v * v + 1.0 / 12.0);
+    }
+    let [[a, b], [c, d]] = jacobian;
+    // J C Jᵀ, its trace and half the difference of its eigenvalues.
+    let moved_xx = a * a * xx + 2.0 * a * b * xy + b * b * yy;
+    let moved_yy = c * c * xx + 2.0 * c * d * xy + d * d * yy;
+    let moved_xy = a * c * xx + (a * d + b * c) * xy + b * d * yy;
+    let mean = 0.5 * (moved_xx + moved_yy);
+    let half = (0.5 * (moved_xx - moved_yy)).hypot(moved_xy);
+    let elongation = ((mean + half) / (mean - half)).sqrt() - 1.0;
+    let radius_px = (n / std::f64::consts::PI).sqrt();
+    let error = 2.0 * STEP_SD / (radius_px * (std::f64::consts::PI * radius_px).sqrt());
+    (elongation > ROUND.max(SIGNIFICANT * error)).then_some(elongation)
+}
+
+/// Number of a run's pixels, and its middle.
+fn pixels(run: &Run) -> (f64, f64) {
+    (
+        run.len() as f64,
+        0.5 * (f64::from(run.start) + f64::from(run.end) - 1.0),
+    )
+}
+
+#[cfg(test)]
+#[path = "measure_tests.rs"]
+mod tests;

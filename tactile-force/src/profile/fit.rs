@@ -1,0 +1,702 @@
+//! Least squares on the rings: the Gauss–Newton iteration for the profile's parameters, and the
+//! misfit beyond the noise.
+
+use nalgebra::{SMatrix, SVector};
+use tactile_core::{Estimate, Requirement, StopReason};
+
+use super::model::{BlurredEdge, Level, Shape, level};
+use super::rings::{Ring, Rings};
+use crate::error::ForceError;
+use crate::frame::DifferenceNoise;
+use crate::region::Region;
+
+/// The parameters of the profile that are known, and the length of the fit.
+///
+/// ```
+/// use tactile_force::{ForceMeter, ForceOptions, HertzFitOptions};
+///
+/// // A lens whose blur is known, over a background that is not.
+/// let hertz = HertzFitOptions::default().with_blur_px(1.2)?.with_fitted_background().with_max_iterations(20)?;
+/// assert!(ForceMeter::new([20e-6; 2], &ForceOptions::default().with_hertz(hertz)).is_ok());
+/// # Ok::<(), tactile_force::ForceError>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct HertzFitOptions {
+    /// Standard deviation of the optical blur; `None` fits it.
+    #[cfg_attr(feature = "serde", serde(deserialize_with = "read::blur_px"))]
+    blur_px: Option<f64>,
+    fit_background: bool,
+    #[cfg_attr(feature = "serde", serde(deserialize_with = "read::max_iterations"))]
+    max_iterations: usize,
+}
+
+impl Default for HertzFitOptions {
+    /// Blur fitted, no background, at most 50 steps.
+    fn default() -> Self {
+        Self {
+            blur_px: None,
+            fit_background: false,
+            // A clean contact takes 5 to 8 steps: `cargo bench -p tactile-benches --bench work_precision` shows the error after 1, 2 and 5.
+            max_iterations: 50,
+        }
+    }
+}
+
+impl HertzFitOptions {
+    /// Takes the standard deviation of the optical blur, in pixels, as known. By default it is fitted.
+    ///
+    /// # Errors
+    /// A blur that is negative or not finite.
+    pub fn with_blur_px(mut self, sd: f64) -> Result<Self, ForceError> {
+        self.blur_px = Some(Requirement::NonNegative.check("blur_px", sd)?);
+        Ok(self)
+    }
+
+    /// Fits a constant background under the profile as well.
+    pub fn with_fitted_background(mut self) -> Self {
+        self.fit_background = true;
+        self
+    }
+
+    /// Takes at most this number of steps.
+    ///
+    /// # Errors
+    /// Zero steps.
+    pub fn with_max_iterations(mut self, steps: usize) -> Result<Self, ForceError> {
+        Requirement::AtLeastOne.check("max_iterations", steps as f64)?;
+        self.max_iterations = steps;
+        Ok(self)
+    }
+}
+
+/// Values read from a file pass the same checks as values set in code.
+#[cfg(feature = "serde")]
+mod read {
+    use serde::{Deserialize, Deserializer, de::Error};
+
+    use super::HertzFitOptions;
+
+    pub fn blur_px<'de, D: Deserializer<'de>>(d: D) -> Result<Option<f64>, D::Error> {
+        let Some(sd) = Option::deserialize(d)? else {
+            return Ok(None);
+        };
+        let options = HertzFitOptions::default().with_blur_px(sd);
+        options.map(|o| o.blur_px).map_err(D::Error::custom)
+    }
+
+    pub fn max_iterations<'de, D: Deserializer<'de>>(d: D) -> Result<usize, D::Error> {
+        let options = HertzFitOptions::default().with_max_iterations(usize::deserialize(d)?);
+        options.map(|o| o.max_iterations).map_err(D::Error::custom)
+    }
+}
+
+/// Whether a fitted contact is that of a ball.
+///
+/// ```
+/// use ndarray::Array2;
+/// use tactile_force::*;
+///
+/// let pairs = [0.0, 1e5, 2e5].map(|v| CalibrationPair::loading(v, 1e-5 * v));
+/// let calibration = LinearCalibration::fit(&pairs, &Default::default())?;
+/// let at_rest = Array2::from_elem((120, 120), 12_u8);
+/// let shape = |level: &dyn Fn(f64) -> f64| -> Result<Option<ProfileShape>, ForceError> {
+///     let frame = Array2::from_shape_fn((120, 120), |(y, x)| {
+///         12 + level((x as f64 - 60.2).hypot(y as f64 - 59.7) / 30.0).round() as u8
+///     });
+///     let m: ForceMeasurement =
+///         measure_force(frame.view(), at_rest.view(), [20e-6; 2], &calibration, &Default::default())?;
+///     Ok(m.profile.map(|p| p.shape))
+/// };
+/// assert_eq!(shape(&|r| 150.0 * (1.0 - r * r).max(0.0).sqrt())?, Some(ProfileShape::Hertz));
+/// // Even pressure, as under a soft pad.
+/// assert_eq!(shape(&|r| if r < 1.0 { 150.0 } else { 0.0 })?, Some(ProfileShape::NotHertz));
+/// # Ok::<(), ForceError>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
+pub enum ProfileShape {
+    /// The pressure is Hertz's, or with a [`bend`](HertzFit::bend) that of a ball at finite strain, to within the misfit that the noise and a smooth
+    /// guide explain.
+    Hertz,
+    /// Not a ball's profile: the misfit stands out of the noise and exceeds 1 % of the peak along the radius, or 3 % around it.
+    /// The contact radius is that of the profile with its `bend`: for a ball at finite strain within 0.03 %, for other objects no more than a
+    /// size.
+    NotHertz,
+}
+
+/// A fitted Hertz profile.
+///
+/// ```
+/// use ndarray::Array2;
+/// use tactile_force::*;
+///
+/// let pairs = [0.0, 1e5, 2e5].map(|v| CalibrationPair::loading(v, 1e-5 * v));
+/// let calibration = LinearCalibration::fit(&pairs, &Default::default())?;
+/// let frame = Array2::from_shape_fn((120, 120), |(y, x)| {
+///     let r = (x as f64 - 60.3).hypot(y as f64 - 57.8) / 30.0;
+///     12 + (150.0 * (1.0 - r * r).max(0.0).sqrt()).round() as u8
+/// });
+/// let at_rest = Array2::from_elem((120, 120), 12);
+/// let measured = measure_force(frame.view(), at_rest.view(), [20e-6; 2], &calibration, &Default::default())?;
+/// let fit: HertzFit = measured.profile.expect("a profile");
+/// assert!((fit.radius_px.value - 30.0).abs() < 0.02);
+/// assert!((fit.centre_px[0].value - 60.3).abs() < 0.01 && (fit.peak.value - 150.0).abs() < 0.3);
+/// assert_eq!(fit.stop, StopReason::Converged);
+/// # Ok::<(), ForceError>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct HertzFit {
+    /// Centre [x, y] in pixels.
+    pub centre_px: [Estimate; 2],
+    /// Contact radius in units of the pixel's width.
+    pub radius_px: Estimate,
+    /// Contact radius in metres.
+    pub radius_m: Estimate,
+    /// Grey-level difference at the centre.
+    pub peak: Estimate,
+    /// Grey-level difference far away; zero if it was not fitted.
+    pub background: Estimate,
+    /// Standard deviation of the blur, in pixels.
+    pub blur_px: f64,
+    /// c of p₀ √(1 − r²/a²) (1 − c r²/a²). Zero where the Hertz profile fits to within the noise; balls of finite strain on soft layers
+    /// press harder at the rim (c < 0, to −0.3), balls flattened on a stiff base less (c > 0, to 0.15).
+    pub bend: Estimate,
+    /// Integral of the profile, 2π/3 A a² (1 − 2c/5) in grey levels × pixels.
+    pub integrated_pixel_value: Estimate,
+    /// Covariance of [peak, background, radius, blur variance, x, y], in grey levels and pixels.
+    pub covariance: [[f64; 6]; 6],
+    /// Residual variance over the noise model's: near 1 if the contact is that of a ball.
+    pub reduced_chi_squared: f64,
+    /// Root mean square misfit of the mean level at each radius, the noise's share subtracted, relative to the peak.
+    pub radial_misfit: f64,
+    /// Root mean square misfit around the centre, the noise's and the radial share subtracted, relative to the peak.
+    pub azimuthal_misfit: f64,
+    /// Whether the misfits are those of a ball.
+    pub shape: ProfileShape,
+    /// Steps taken.
+    pub iterations: usize,
+    /// Why the fit stopped.
+    pub stop: StopReason,
+}
+
+impl HertzFit {
+    /// The fit of a profile in other units of its level, as pressures for grey levels.
+    pub(crate) fn with_levels_scaled(mut self, factor: f64) -> Self {
+        self.peak = self.peak * factor;
+        self.background = self.background * factor;
+        self.integrated_pixel_value = self.integrated_pixel_value * factor;
+        for k in 0..2 {
+            self.covariance[k].iter_mut().for_each(|c| *c = *c * factor);
+            self.covariance
+                .iter_mut()
+                .for_each(|row| row[k] = row[k] * factor);
+        }
+        self
+    }
+}
+
+/// Variance along one axis of a position spread evenly over a pixel.
+const PIXEL: f64 = 1.0 / 12.0;
+/// Greatest bend that is fitted. Balls on soft layers reach −0.3, balls flattened on glass +0.15; beyond ±0.6 the profile is no ball's.
+const LARGEST_BEND: f64 = 0.6;
+/// Share of the misfit that a bend must take away to be believed. Contacts by finite elements lose nine tenths and more; where the light is not
+/// quite proportional, saturates, or is rough, a bend takes away a tenth and makes the radius worse (`cargo test -p tactile-force --test suite
+/// sensor`).
+const EXPLAINED: f64 = 0.5;
+/// Least fall of χ² in a step, as a share, of a profile that is no ball's: there blur and radius wander along a valley without end, and what they
+/// are says nothing.
+const FALLING: f64 = 1e-2;
+/// Steps in which a ball's profile has long settled, however far from it the fit starts.
+const AMPLE: usize = 12;
+
+/// Fits Hertz profiles; holds the table of the blurred edge.
+#[derive(Clone, Debug)]
+pub struct HertzFitter {
+    options: HertzFitOptions,
+    edge: BlurredEdge,
+}
+
+/// Where a fit starts: the contact's centroid, equivalent radius and integral, in pixels of its region.
+#[derive(Clone, Copy, Debug)]
+pub struct Start {
+    pub centre: [f64; 2],
+    pub radius: f64,
+    pub integral: f64,
+}
+
+/// What is fitted, and how pixels count.
+#[derive(Clone, Copy)]
+struct Data<'a> {
+    region: &'a Region,
+    variance: PixelVariance<'a>,
+    /// Height of a pixel over its width.
+    aspect: f64,
+    /// About the contact's, in pixels.
+    radius: f64,
+}
+
+#[derive(Clone, Copy)]
+struct State {
+    shape: Shape,
+    centre: [f64; 2],
+    /// Whether the bend is fitted.
+    bent: bool,
+    iterations: usize,
+    stop: StopReason,
+}
+
+impl HertzFitter {
+    pub fn new(options: HertzFitOptions) -> Self {
+        Self {
+            options,
+            edge: BlurredEdge::new(),
+        }
+    }
+
+    /// Fits the aperture's pixels. `None` if they do not determine the parameters.
+    pub fn fit_with(
+        &self,
+        rings: &mut Rings,
+        region: &Region,
+        start: Start,
+        variance: PixelVariance<'_>,
+        pixel_size_m: [f64; 2],
+    ) -> Option<HertzFit> {
+        let place = region.place?;
+        let aspect = pixel_size_m[1] / pixel_size_m[0];
+        let blur = self.options.blur_px.map_or(0.5, |b| b * b) + PIXEL;
+        let peak =
+            1.5 * start.integral * aspect / (std::f64::consts::PI * start.radius * start.radius);
+        let mut state = State {
+            shape: Shape {
+                peak,
+                background: 0.0,
+                radius: start.radius,
+                blur,
+                bend: 0.0,
+            },
+            centre: start.centre,
+            bent: false,
+            iterations: 0,
+            stop: StopReason::IterationLimit,
+        };
+        let data = Data {
+            region,
+            variance,
+            aspect,
+            radius: start.radius,
+        };
+        self.refine(rings, &data, &mut state)?;
+        let mut equations = self.assemble(rings, &state, variance);
+        let mut misfit = Misfit::of(rings, &self.edge, &state.shape, variance, equations.chi2);
+        if misfit.stands_out
+            && let Some(bent) = self.bend(rings, &data, &state, &misfit)
+        {
+            (state, equations, misfit) = bent;
+        }
+        let origin = [place.column_start as f64, place.row_start as f64];
+        self.report(&state, &equations, misfit, origin, pixel_size_m)
+    }
+
+    /// The profile with a bend, if that explains the misfit of Hertz's.
+    fn bend(
+        &self,
+        rings: &mut Rings,
+        data: &Data<'_>,
+        hertz: &State,
+        misfit: &Misfit,
+    ) -> Option<(State, Equations, Misfit)> {
+        let mut state = State {
+            bent: true,
+            iterations: 0,
+            ..*hertz
+        };
+        self.refine(rings, data, &mut state)?;
+        let equations = self.assemble(rings, &state, data.variance);
+        let chi2 = equations.chi2;
+        let left = Misfit::of(rings, &self.edge, &state.shape, data.variance, chi2);
+        let explained = left.radial < EXPLAINED * misfit.radial;
+        state.iterations += hertz.iterations;
+        (explained && state.shape.bend.abs() < LARGEST_BEND).then_some((state, equations, left))
+    }
+
+    /// Fits and gathers the rings anew until the centre stays. `None` too where it leaves the region by more than the region's size: rings about
+    /// such a centre, of which the pixels say nothing, would be without number.
+    fn refine(&self, rings: &mut Rings, data: &Data<'_>, state: &mut State) -> Option<()> {
+        let place = data.region.place?;
+        let farthest = 2.0 * (place.rows() + place.columns()) as f64;
+        let is_near = |[x, y]: [f64; 2]| x.hypot(y) <= farthest;
+        for _ in 0..5 {
+            if !is_near(state.centre) {
+                return None;
+            }
+            rings.gather(data.region, state.centre, data.aspect, data.radius);
+            let moved = self.descend(rings, state, data.variance, data.aspect)?;
+            if moved < 0.02 {
+                break;
+            }
+        }
+        is_near(state.centre).then_some(())
+    }
+
+    /// Gauss–Newton steps on fixed rings until nothing moves; returns how far the centre went, in pixels.
+    ///
+    /// Weights follow the shape, so χ² may rise by a hair near the end: only a step that makes it clearly worse is halved.
+    fn descend(
+        &self,
+        rings: &Rings,
+        state: &mut State,
+        variance: PixelVariance<'_>,
+        aspect: f64,
+    ) -> Option<f64> {
+        let mut here = self.assemble(rings, state, variance);
+        state.stop = StopReason::IterationLimit;
+        let mut shift = [0.0; 2];
+        while state.iterations < self.options.max_iterations {
+            state.iterations += 1;
+            let step = here.normal.cholesky()?.solve(&here.gradient);
+            // The centre enters linearly on fixed rings: its best shift belongs to the final shape.
+            shift = [step[4], step[5]];
+            let mut trial = self.stepped(state, &step);
+            let mut there = self.assemble(rings, &trial, variance);
+            for halving in 1..10 {
+                if there.chi2 <= here.chi2 * 1.01 {
+                    break;
+                }
+                trial = self.stepped(state, &(step * 0.5_f64.powi(halving)));
+                there = self.assemble(rings, &trial, variance);
+            }
+            let no_ball = state.iterations >= AMPLE && there.is_no_ball(trial.shape.peak);
+            if no_ball && there.chi2 > (1.0 - FALLING) * here.chi2 {
+                // The better of the two, about the centre as it is.
+                if there.chi2 < here.chi2 {
+                    state.shape = trial.shape;
+                }
+                state.stop = StopReason::Converged;
+                return Some(0.0);
+            }
+            let before = std::mem::replace(&mut state.shape, trial.shape);
+            here = there;
+            if settled(&before, &state.shape) {
+                state.stop = StopReason::Converged;
+                break;
+            }
+        }
+        state.centre[0] += shift[0];
+        state.centre[1] += shift[1] / aspect;
+        Some(shift[0].hypot(shift[1]))
+    }
+
+    fn stepped(&self, state: &State, step: &Step) -> State {
+        let shape = &state.shape;
+        let stepped = Shape {
+            peak: shape.peak + step[0],
+            background: shape.background + step[1],
+            radius: (shape.radius + step[2]).clamp(0.5 * shape.radius, 2.0 * shape.radius),
+            blur: if self.options.blur_px.is_some() {
+                shape.blur
+            } else {
+                (shape.blur + step[3]).clamp(PIXEL, 4.0 * shape.blur)
+            },
+            bend: (shape.bend + step[BEND]).clamp(-LARGEST_BEND, LARGEST_BEND),
+        };
+        State {
+            shape: stepped,
+            ..*state
+        }
+    }
+
+    /// Normal equations over all pixels of the rings; rows of parameters that are not fitted are those of the identity.
+    fn assemble(&self, rings: &Rings, state: &State, variance: PixelVariance<'_>) -> Equations {
+        let shape = &state.shape;
+        let mut e = Equations::zeros();
+        for ring in rings.filled() {
+            let n = ring.place[0];
+            let r2 = ring.place[3] / n;
+            let spread = (ring.r4 / n - r2 * r2).max(0.0);
+            let level = level(&self.edge, shape, r2, spread);
+            let weight = 1.0 / variance.at(level.value);
+            e.add(ring, &level, weight, r2, spread);
+        }
+        e.normal.fill_upper_triangle_with_lower_triangle();
+        for k in self.fixed(state) {
+            e.normal.fill_row(k, 0.0);
+            e.normal.fill_column(k, 0.0);
+            e.normal[(k, k)] = 1.0;
+            e.gradient[k] = 0.0;
+        }
+        e
+    }
+
+    /// The parameters that are not fitted.
+    fn fixed(&self, state: &State) -> impl Iterator<Item = usize> + Clone {
+        [
+            (1, !self.options.fit_background),
+            (3, self.options.blur_px.is_some()),
+            (BEND, !state.bent),
+        ]
+        .into_iter()
+        .filter_map(|(parameter, fixed)| fixed.then_some(parameter))
+    }
+
+    /// The parameters' covariance, scaled by the residuals and in pixels along both axes, and the reduced χ².
+    fn covariance(
+        &self,
+        state: &State,
+        equations: &Equations,
+        aspect: f64,
+    ) -> Option<(Normal, f64)> {
+        let mut covariance = equations.normal.cholesky()?.inverse();
+        let fixed = self.fixed(state);
+        for k in fixed.clone() {
+            covariance[(k, k)] = 0.0;
+        }
+        let fitted = 7 - fixed.count();
+        let reduced = equations.chi2 / (equations.pixels - fitted as f64).max(1.0);
+        covariance *= reduced;
+        covariance.row_mut(5).unscale_mut(aspect);
+        covariance.column_mut(5).unscale_mut(aspect);
+        Some((covariance, reduced))
+    }
+
+    fn report(
+        &self,
+        state: &State,
+        equations: &Equations,
+        misfit: Misfit,
+        origin: [f64; 2],
+        pixel_size_m: [f64; 2],
+    ) -> Option<HertzFit> {
+        let aspect = pixel_size_m[1] / pixel_size_m[0];
+        let (covariance, reduced) = self.covariance(state, equations, aspect)?;
+        let s = &state.shape;
+        let radius_px = Estimate::from_variance(s.radius, covariance[(2, 2)]);
+        let centre = |k: usize| {
+            Estimate::from_variance(origin[k] + state.centre[k], covariance[(4 + k, 4 + k)])
+        };
+        Some(HertzFit {
+            centre_px: [centre(0), centre(1)],
+            radius_px,
+            radius_m: radius_px * pixel_size_m[0],
+            peak: Estimate::from_variance(s.peak, covariance[(0, 0)]),
+            background: Estimate::from_variance(s.background, covariance[(1, 1)]),
+            blur_px: (s.blur - PIXEL).max(0.0).sqrt(),
+            bend: Estimate::from_variance(s.bend, covariance[(BEND, BEND)]),
+            integrated_pixel_value: integral(s, &covariance, aspect),
+            covariance: std::array::from_fn(|i| std::array::from_fn(|j| covariance[(i, j)])),
+            reduced_chi_squared: reduced,
+            radial_misfit: misfit.radial,
+            azimuthal_misfit: misfit.azimuthal,
+            shape: misfit.shape,
+            iterations: state.iterations,
+            stop: state.stop,
+        })
+    }
+}
+
+/// Integral of the profile, 2π/3 A a² (1 − 2c/5) over a pixel's area, and its error.
+fn integral(s: &Shape, covariance: &Normal, aspect: f64) -> Estimate {
+    let hertz = 2.0 / 3.0 * std::f64::consts::PI / aspect * s.radius;
+    let volume = hertz * (1.0 - 0.4 * s.bend);
+    let (by_peak, by_radius) = (volume * s.radius, 2.0 * volume * s.peak);
+    let by_bend = -0.4 * hertz * s.radius * s.peak;
+    let mut variance = by_peak * by_peak * covariance[(0, 0)]
+        + 2.0 * by_peak * by_radius * covariance[(0, 2)]
+        + by_radius * by_radius * covariance[(2, 2)];
+    variance += by_bend * by_bend * covariance[(BEND, BEND)]
+        + 2.0 * by_bend * (by_peak * covariance[(0, BEND)] + by_radius * covariance[(2, BEND)]);
+    Estimate::from_variance(volume * s.radius * s.peak, variance)
+}
+
+/// Nothing moves by more than a millionth.
+fn settled(before: &Shape, after: &Shape) -> bool {
+    let close = |a: f64, b: f64, scale: f64| (a - b).abs() <= 1e-6 * scale.abs();
+    close(before.radius, after.radius, after.radius)
+        && close(before.peak, after.peak, after.peak)
+        && close(before.background, after.background, after.peak)
+        && close(before.blur, after.blur, after.blur + after.radius)
+        && close(before.bend, after.bend, 1.0)
+}
+
+/// Peak, background, radius, blur variance, centre's x and y, bend.
+type Normal = SMatrix<f64, 7, 7>;
+type Step = SVector<f64, 7>;
+
+/// Place of the bend among the parameters.
+const BEND: usize = 6;
+/// Root mean square residual, as a share of the peak, beyond which a profile is no ball's: contacts by finite elements have 2 %, flat faces 10 % and
+/// more.
+const NO_BALL: f64 = 0.05;
+/// Squared residuals over the noise's from which on they are the profile's, not the noise's.
+const CLEARLY: f64 = 2.0;
+
+struct Equations {
+    normal: Normal,
+    gradient: Step,
+    chi2: f64,
+    pixels: f64,
+    /// Sum of the pixels' weights.
+    weights: f64,
+}
+
+impl Equations {
+    fn zeros() -> Self {
+        Self {
+            normal: Normal::zeros(),
+            gradient: Step::zeros(),
+            chi2: 0.0,
+            pixels: 0.0,
+            weights: 0.0,
+        }
+    }
+
+    /// Adds one ring's pixels; only the lower triangle of the normal matrix is filled.
+    ///
+    /// Along a ring the model is its level, to first order in r² − mean r²; a shift of the centre changes it by
+    /// −2 (dI/dr²) times the place.
+    fn add(&mut self, ring: &Ring, l: &Level, weight: f64, r2: f64, spread: f64) {
+        let [n, u, v, sum_r2] = ring.place;
+        let [uu, uv, r2u, r2v] = ring.product;
+        let [d, du, dv, dd] = ring.difference;
+        let radial = [
+            (0, l.by_peak),
+            (1, 1.0),
+            (2, l.by_radius),
+            (3, l.by_blur),
+            (BEND, l.by_bend),
+        ];
+        let along = |place: f64, by_r2: f64| l.value * place + l.by_r2 * (by_r2 - r2 * place);
+        let slope = -2.0 * weight * l.by_r2;
+        for (k, &(i, by)) in radial.iter().enumerate() {
+            let a = weight * n * by;
+            for &(j, b) in &radial[..=k] {
+                self.normal[(i, j)] += a * b;
+            }
+            let (x, y) = if i == BEND {
+                ((BEND, 4), (BEND, 5))
+            } else {
+                ((4, i), (5, i))
+            };
+            self.normal[x] += slope * by * u;
+            self.normal[y] += slope * by * v;
+            self.gradient[i] += weight * by * (d - n * l.value);
+        }
+        let square = -2.0 * slope * l.by_r2;
+        self.normal[(4, 4)] += square * uu;
+        self.normal[(5, 4)] += square * uv;
+        self.normal[(5, 5)] += square * (sum_r2 - uu);
+        self.gradient[4] += slope * (du - along(u, r2u));
+        self.gradient[5] += slope * (dv - along(v, r2v));
+        // Along a ring the model itself varies; that is no misfit.
+        let within = n * l.by_r2 * l.by_r2 * spread;
+        self.chi2 += weight * (dd - 2.0 * l.value * d + n * l.value * l.value - within);
+        self.pixels += n;
+        self.weights += weight * n;
+    }
+
+    /// Whether the residuals of a profile of that peak are neither noise nor what finite strain leaves.
+    fn is_no_ball(&self, peak: f64) -> bool {
+        let limit = NO_BALL * peak;
+        self.chi2 > CLEARLY * self.pixels && self.chi2 > limit * limit * self.weights
+    }
+}
+
+/// Radial misfit, as a share of the peak, beyond which a profile is not Hertz's. Blur, whole grey levels and the depth of a guide
+/// ten times the contact leave 0.2 % or less; light ∝ p^1.2 taken for pressure 0.8 %, a flat punch 10 %.
+const RADIAL_LIMIT: f64 = 0.01;
+/// The same around the centre, where the noise model's own error counts: an ellipse of 1.2 to 1 has 4 %.
+const AZIMUTHAL_LIMIT: f64 = 0.03;
+/// Standard deviations by which a sum of squares must exceed that of the noise.
+const SIGNIFICANT: f64 = 5.0;
+
+/// Misfit of a fitted profile as shares of its peak.
+#[derive(Clone, Copy, Debug)]
+struct Misfit {
+    radial: f64,
+    azimuthal: f64,
+    shape: ProfileShape,
+    /// Whether the misfit along the radius stands out of the noise, however small it is.
+    stands_out: bool,
+}
+
+impl Misfit {
+    /// Splits χ² of all pixels into that of the rings' means and the rest. With weights w = 1/σ² the noise adds one a ring and
+    /// one a pixel, so that (χ² − number)/Σw is the mean square of the misfit.
+    fn of(
+        rings: &Rings,
+        edge: &BlurredEdge,
+        shape: &Shape,
+        variance: PixelVariance<'_>,
+        chi2: f64,
+    ) -> Self {
+        let (mut weights, mut radial_chi2, mut count, mut pixels) = (0.0, 0.0, 0.0, 0.0);
+        for ring in rings.filled() {
+            let n = ring.place[0];
+            let r2 = ring.place[3] / n;
+            let spread = (ring.r4 / n - r2 * r2).max(0.0);
+            let level = level(edge, shape, r2, spread).value;
+            let weight = 1.0 / variance.at(level);
+            let residual = ring.difference[0] / n - level;
+            radial_chi2 += weight * n * residual * residual;
+            weights += weight * n;
+            pixels += n;
+            count += 1.0;
+        }
+        let share = |excess: f64| (excess.max(0.0) / weights).sqrt() / shape.peak;
+        let around_chi2 = chi2 - radial_chi2;
+        let radial = share(radial_chi2 - count);
+        let azimuthal = share(around_chi2 - (pixels - count));
+        let stands_out =
+            |chi2: f64, number: f64| chi2 > number + SIGNIFICANT * (2.0 * number).sqrt();
+        let radial_stands_out = stands_out(radial_chi2, count);
+        let not_radial = radial > RADIAL_LIMIT && radial_stands_out;
+        let not_round = azimuthal > AZIMUTHAL_LIMIT && stands_out(around_chi2, pixels - count);
+        Self {
+            radial,
+            azimuthal,
+            shape: if not_radial || not_round {
+                ProfileShape::NotHertz
+            } else {
+                ProfileShape::Hertz
+            },
+            stands_out: radial_stands_out,
+        }
+    }
+}
+
+/// Number of levels at which a tabulated variance is known.
+pub const VARIANCE_LEVELS: usize = 65;
+
+/// Variance of one pixel at a level of the profile.
+#[derive(Clone, Copy, Debug)]
+pub enum PixelVariance<'a> {
+    /// Grey levels: background + gain × level.
+    Grey(&'a DifferenceNoise),
+    /// Pressures: values at `VARIANCE_LEVELS` even steps from zero.
+    Pressure {
+        values: &'a [f64; VARIANCE_LEVELS],
+        step: f64,
+    },
+}
+
+impl PixelVariance<'_> {
+    #[inline]
+    fn at(&self, level: f64) -> f64 {
+        match self {
+            Self::Grey(noise) => noise.background + noise.gain * level.max(0.0),
+            Self::Pressure { values, step } => {
+                let place = (level / step).clamp(0.0, (VARIANCE_LEVELS - 1) as f64);
+                let below = (place as usize).min(VARIANCE_LEVELS - 2);
+                let share = place - below as f64;
+                values[below] + share * (values[below + 1] - values[below])
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+#[path = "fit_tests.rs"]
+mod tests;
