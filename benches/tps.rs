@@ -10,8 +10,8 @@ use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_m
 use nalgebra::{Matrix3, Point3, Vector3};
 use rand::{RngExt, SeedableRng, rngs::SmallRng};
 use tactile_imaging::tps::{
-    Factorization, FitOptions, Kernel, NegR, R2LogR, R3, Smoothing, Spline, ThinPlateSpline,
-    Workspace,
+    Factorization, FitOptions, Kernel, NegR, R2LogR, R3, Smoothing, Spline, SplineWorkspace,
+    ThinPlateSpline,
 };
 
 const SIZES: [usize; 3] = [105, 200, 1000];
@@ -142,7 +142,7 @@ impl Bench for Refit {
         let expected = solved(problem, kernel.clone(), name);
         let factorization = Factorization::new(&problem.sources, &FitOptions::new(kernel.clone()))
             .expect("a factor");
-        let (mut workspace, mut spline) = (Workspace::default(), Spline::default());
+        let (mut workspace, mut spline) = (SplineWorkspace::default(), Spline::default());
         factorization
             .refit_with(&mut workspace, &problem.targets, None, None, &mut spline)
             .expect("a fit");

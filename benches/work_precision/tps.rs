@@ -5,8 +5,8 @@ use crate::study::Study;
 use nalgebra::{Point3, Vector3};
 use rand::{RngExt, SeedableRng, rngs::SmallRng};
 use tactile_imaging::tps::{
-    Factorization, FitOptions, Kernel, NegR, R2LogR, R3, Smoothing, Spline, ThinPlateSpline,
-    Workspace,
+    Factorization, FitOptions, Kernel, NegR, R2LogR, R3, Smoothing, Spline, SplineWorkspace,
+    ThinPlateSpline,
 };
 
 type Points = Vec<Point3<f64>>;
@@ -156,7 +156,7 @@ fn single(study: &mut Study, p: &Problem) {
 
 fn refit(study: &mut Study, p: &Problem) {
     let factorization = Factorization::new(&p.sources, &FitOptions::new(NegR)).expect("a factor");
-    let (mut workspace, mut spline) = (Workspace::default(), Spline::default());
+    let (mut workspace, mut spline) = (SplineWorkspace::default(), Spline::default());
     let job = || {
         factorization
             .refit_with(&mut workspace, &p.targets, None, None, &mut spline)

@@ -7,7 +7,7 @@ use super::strain_error::mean_strain_error;
 use super::surface::ControlPoints;
 use crate::elasticity::field::{StrainField, StrainSummary};
 use crate::elasticity::modulus::{Estimate, LoadSeries, LoadState, UniaxialLoads};
-use crate::tps::{Memory, Pairs};
+use crate::tps::{Pairs, SeriesMemory};
 use nalgebra::{Matrix3, Point3};
 
 /// Fewest matches from which a strain is worked out: twice the four affine terms of a spline in space.
@@ -112,7 +112,7 @@ pub(super) struct MatchedPoints<'a> {
 /// What strains reuse from pair to pair.
 #[derive(Default)]
 pub(super) struct StrainWorkspace {
-    warp: Memory,
+    warp: SeriesMemory,
     sources: Vec<Point3<f64>>,
     targets: Vec<Point3<f64>>,
     weights: Vec<f64>,

@@ -179,7 +179,7 @@ fn warp<const D: usize, K: Kernel>(
         "points": report.points, "queries": warped, "lambda": report.lambda,
         "bending_energy": bending_energy, "condition": report.condition, "rank": report.rank,
         "merged": report.merged, "extents": report.extents, "residual": report.residual, "digits": report.digits,
-        "iterations": report.iterations, "converged": report.converged, "fit_ms": fit_ms,
+        "iterations": report.iterations, "converged": report.converged(), "fit_ms": fit_ms,
         "evaluate_ms": evaluate_ms,
     }));
     console.line(format!(
@@ -212,7 +212,7 @@ fn warp<const D: usize, K: Kernel>(
     if let Some(summary) = outputs.summary() {
         console.line(summary);
     }
-    if !report.converged {
+    if !report.converged() {
         console.note("the iteration was stopped before it reached its tolerance; the residual says how far it came");
     }
     if warped < queries.len() {
@@ -224,7 +224,7 @@ fn warp<const D: usize, K: Kernel>(
     if context.interrupt.requested() {
         return Ok(Exit::Interrupted);
     }
-    if !report.converged {
+    if !report.converged() {
         return Ok(Exit::Partial);
     }
     Ok(Exit::Complete)

@@ -143,7 +143,7 @@ fn through<const D: usize>(
             .then_some(warped)
     };
     let spline = spline(sources, images, None, Smoothing::None);
-    if let Some(warped) = finite(&spline) {
+    if let Some(warped) = finite(&*spline) {
         return (spline, warped);
     }
     let affine = Affine::fit(sources, images, None).unwrap_or_else(|_| Affine::default());

@@ -1,6 +1,6 @@
 //! What a matcher keeps from one target of a series for the next.
 
-use tactile_tps::Memory;
+use tactile_tps::SeriesMemory;
 
 /// Memory of one matcher along a series of targets of one model, for [`PointMatcher::match_next`](crate::PointMatcher::match_next).
 ///
@@ -30,7 +30,7 @@ use tactile_tps::Memory;
 /// # }
 /// ```
 #[derive(Debug, Default)]
-pub struct WarmStart(Memory);
+pub struct WarmStart(SeriesMemory);
 
 impl WarmStart {
     /// The state of type `S` that the last match left here; a default one where there is none, or one of another type.

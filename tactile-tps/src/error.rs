@@ -1,6 +1,10 @@
-//! Errors, each with the numbers that say where.
+//! Errors, each with the numbers that locate it, and the checks of arguments that raise them.
 
+use nalgebra::Point;
+use tactile_core::CustomError;
 use thiserror::Error;
+
+use crate::{Scalar, Smoothing};
 
 /// Everything that can go wrong in this crate.
 ///
@@ -13,7 +17,7 @@ use thiserror::Error;
 /// assert_eq!(error, TpsError::Conflict { first: 0, second: 2 });
 /// assert_eq!(error.to_string(), "source points 0 and 2 coincide but their targets differ: smooth, or drop one");
 /// ```
-#[derive(Clone, Copy, Debug, PartialEq, Error)]
+#[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum TpsError {
     /// There is nothing to fit: no point at all, or none with a weight above zero.
@@ -96,4 +100,93 @@ pub enum TpsError {
         /// Column of the projected matrix whose pivot failed.
         column: usize,
     },
+    /// A user's own model or warp failed.
+    #[error(transparent)]
+    Custom(CustomError),
+}
+
+impl TpsError {
+    /// The failure of a user's own model, as an error or a message.
+    ///
+    /// ```
+    /// use tactile_tps::TpsError;
+    /// let error = TpsError::custom("the network has no weights");
+    /// assert_eq!(error.to_string(), "the network has no weights");
+    /// ```
+    pub fn custom(error: impl Into<Box<dyn std::error::Error + Send + Sync>>) -> Self {
+        Self::Custom(CustomError::new(error))
+    }
+}
+
+/// Names the first point with a coordinate that is not finite.
+pub(crate) fn finite<T: Scalar, const D: usize>(
+    points: &[Point<T, D>],
+    input: &'static str,
+) -> Result<(), TpsError> {
+    let broken = |p: &Point<T, D>| p.iter().any(|x| !x.widen().is_finite());
+    match points.iter().position(broken) {
+        Some(index) => Err(TpsError::NotFinite { input, index }),
+        None => Ok(()),
+    }
+}
+
+/// Arguments that belong together are equally long.
+pub(crate) fn same_count(
+    input: &'static str,
+    expected: usize,
+    found: usize,
+) -> Result<(), TpsError> {
+    if expected == found {
+        return Ok(());
+    }
+    Err(TpsError::Length {
+        input,
+        expected,
+        found,
+    })
+}
+
+/// The output is as long as the input.
+pub(crate) fn same_length(expected: usize, found: usize) -> Result<(), TpsError> {
+    same_count("output slice", expected, found)
+}
+
+/// At least one pair, all finite, with weights that are valid where they are given.
+pub(crate) fn validate_pairs<T: Scalar, const D: usize>(
+    sources: &[Point<T, D>],
+    targets: &[Point<T, D>],
+    weights: Option<&[T]>,
+) -> Result<(), TpsError> {
+    if sources.is_empty() {
+        return Err(TpsError::Empty("source points"));
+    }
+    same_count("target points", sources.len(), targets.len())?;
+    finite(sources, "source points")?;
+    finite(targets, "target points")?;
+    weights.map_or(Ok(()), |weights| validate_weights(weights, sources.len()))
+}
+
+/// One weight a point, finite and not negative, one of them positive.
+pub(crate) fn validate_weights<T: Scalar>(weights: &[T], points: usize) -> Result<(), TpsError> {
+    same_count("weights", points, weights.len())?;
+    let valid = |w: &T| w.widen() >= 0.0 && w.widen().is_finite();
+    if let Some(index) = weights.iter().position(|w| !valid(w)) {
+        let value = weights[index].widen();
+        return Err(TpsError::Weight { index, value });
+    }
+    if weights.iter().all(|w| w.widen() == 0.0) {
+        return Err(TpsError::Empty("weights"));
+    }
+    Ok(())
+}
+
+/// A λ is finite and not negative.
+pub(crate) fn validate_smoothing<T: Scalar>(smoothing: &Smoothing<T>) -> Result<(), TpsError> {
+    match smoothing {
+        Smoothing::Lambda(lambda) if !(lambda.widen() >= 0.0 && lambda.widen().is_finite()) => {
+            let value = lambda.widen();
+            Err(TpsError::Lambda { value })
+        }
+        _ => Ok(()),
+    }
 }

@@ -1,21 +1,774 @@
-//! Sums of kernels over all centres, for blocks of query points at once.
+//! The fitted spline: values, Jacobians and Hessians at one point or many, its parts and its energy.
 //!
-//! Queries are the lanes and centres the outer loop: every query's sum runs over the centres in the same order,
-//! whether it comes alone or among thousands, so the bits are the same.
+//! Queries are the lanes of vectorised loops and centres the outer loop.
+//! Every query's sum runs over the centres in the same order, whether it comes alone or among thousands.
+//! So the bits are the same.
+
+use core::ops::{ControlFlow, Range};
+
+use nalgebra::{Point, SMatrix, SVector};
+#[cfg(feature = "rayon")]
+use rayon::prelude::*;
 
 use crate::{
-    Jet, Kernel,
-    real::{Lane, Scalar},
+    Factorization, FitOptions, FitReport, Kernel, KernelDerivatives, Progress, R2LogR, Scalar,
+    TpsError,
+    error::same_length,
+    lanes::{Job, Lane, dispatch},
 };
 
-/// Queries in a full block; long enough for the compiler to vectorise, short enough for the first-level cache.
+/// Queries in a full block: long enough for the compiler to vectorise, short enough for the first-level cache.
 pub(crate) const BLOCK: usize = 64;
-/// Queries in the blocks that take what is left.
-pub(crate) const TAIL: usize = 8;
+
+/// Queries in the smaller blocks that take the remainder.
+const TAIL: usize = 8;
+
+/// The shift and the scale that bring points to unit size: x̂ = (x − centre) / scale, scale a power of two.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Frame<const D: usize> {
+    centre: [f64; D],
+    pub(crate) scale: f64,
+}
+
+impl<const D: usize> Default for Frame<D> {
+    fn default() -> Self {
+        Self {
+            centre: [0.0; D],
+            scale: 1.0,
+        }
+    }
+}
+
+impl<const D: usize> Frame<D> {
+    /// Centre of the bounding box, and the power of two next to half its longest side (one without `rescale`).
+    pub(crate) fn around<T: Scalar>(points: &[Point<T, D>], rescale: bool) -> Self {
+        let mut low = [f64::INFINITY; D];
+        let mut high = [f64::NEG_INFINITY; D];
+        for point in points {
+            for k in 0..D {
+                low[k] = low[k].min(point[k].widen());
+                high[k] = high[k].max(point[k].widen());
+            }
+        }
+        let halves = (0..D).map(|k| 0.5 * high[k] - 0.5 * low[k]);
+        let half = halves.fold(0.0, f64::max);
+        // The bits of the exponent alone: the power of two that brings `half` into [1, 2).
+        let power = f64::from_bits(half.to_bits() & 0x7ff0_0000_0000_0000);
+        let usable = rescale && power > 0.0 && power.is_finite();
+        Self {
+            centre: core::array::from_fn(|k| 0.5 * low[k] + 0.5 * high[k]),
+            scale: if usable { power } else { 1.0 },
+        }
+    }
+
+    #[inline(always)]
+    pub(crate) fn inside<T: Scalar>(&self, point: &Point<T, D>) -> [f64; D] {
+        core::array::from_fn(|k| (point[k].widen() - self.centre[k]) / self.scale)
+    }
+}
+
+/// The affine part of a spline in its frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct AffinePart<T, const D: usize, const M: usize> {
+    constant: [T; M],
+    gradient: [[T; D]; M],
+}
+
+/// A thin-plate spline from `D`-space to `M`-space: f(x) = a₀ + A x + Σᵢ wᵢ U(|x − xᵢ|).
+///
+/// [`Default`] is the spline that is zero everywhere.
+/// The weights satisfy Σ wᵢ = 0 and Σ wᵢ xᵢᵀ = 0 and minimise Σ weightᵢ |f(xᵢ) − yᵢ|² + λ wᵀKw (Wahba 1990).
+#[derive(Clone, Debug)]
+pub struct Spline<T: Scalar, const D: usize, const M: usize, K = R2LogR> {
+    kernel: K,
+    frame: Frame<D>,
+    /// Centres in the frame, axis by axis.
+    centres: Vec<T>,
+    /// Weights in the frame, output by output.
+    weights: Vec<T>,
+    affine: AffinePart<T, D, M>,
+    /// Largest Σ |wᵢ| of an output.
+    weight: f64,
+    /// Largest target.
+    level: f64,
+    /// How the fit went.
+    pub report: FitReport,
+}
+
+impl<T: Scalar, const D: usize, const M: usize, K: Kernel + Default> Default
+    for Spline<T, D, M, K>
+{
+    /// A spline that is zero everywhere, to be filled by [`Factorization::refit_with`].
+    fn default() -> Self {
+        Self::zero(K::default())
+    }
+}
+
+/// A spline that maps space onto itself.
+///
+/// ```
+/// # use nalgebra::Point3;
+/// # use tactile_tps::{FitOptions, NegR, ThinPlateSpline};
+/// # fn main() -> Result<(), tactile_tps::TpsError> {
+/// let sources = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.3, 0.4, 0.2]].map(Point3::from);
+/// let targets = sources.map(|p| p * 2.0);
+/// let warp: ThinPlateSpline<f64, 3, NegR> = ThinPlateSpline::fit(&sources, &targets, &FitOptions::new(NegR))?;
+/// assert!((warp.jacobian(&Point3::new(0.5, 0.5, 0.5)) - nalgebra::Matrix3::identity() * 2.0).norm() < 1e-13);
+/// # Ok(())
+/// # }
+/// ```
+pub type ThinPlateSpline<T, const D: usize, K = R2LogR> = Spline<T, D, D, K>;
+
+/// A solution in the frame, as a spline takes it over.
+pub(crate) struct Solution<'a, const D: usize, const M: usize> {
+    pub(crate) frame: Frame<D>,
+    /// Coordinates of the centres, axis by axis.
+    pub(crate) axes: &'a [Vec<f64>; D],
+    /// Weights of the centres, output by output.
+    pub(crate) weights: &'a [f64],
+    pub(crate) constant: [f64; M],
+    pub(crate) gradient: [[f64; D]; M],
+    /// Largest target.
+    pub(crate) level: f64,
+}
+
+impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
+    /// Fits the spline that takes `sources` to `targets`.
+    ///
+    /// ```
+    /// use nalgebra::Point2;
+    /// use tactile_tps::{FitOptions, ThinPlateSpline};
+    /// # fn main() -> Result<(), tactile_tps::TpsError> {
+    /// let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
+    /// let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
+    /// let warp = ThinPlateSpline::fit(&sources, &targets, &FitOptions::default())?;
+    /// assert!((warp.apply(&sources[4]) - targets[4]).norm() < 1e-14);
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
+    /// # Errors
+    /// [`TpsError`] for invalid input, coinciding points with different targets, or a kernel that is not definite.
+    pub fn fit(
+        sources: &[Point<T, D>],
+        targets: &[Point<T, M>],
+        options: &FitOptions<T, K>,
+    ) -> Result<Self, TpsError> {
+        Factorization::new(sources, options)?.fit(targets)
+    }
+
+    /// As [`fit`](Self::fit), reporting the progress of an iterative solver to `watch`, which may stop it.
+    ///
+    /// A direct solver does not report. Stopped while it iterates, the fit returns the best spline so far.
+    /// Its report has the residual.
+    ///
+    /// ```
+    /// use core::ops::ControlFlow;
+    /// use nalgebra::Point2;
+    /// use tactile_tps::{FitOptions, Solver, ThinPlateSpline, TpsError};
+    /// # fn main() -> Result<(), tactile_tps::TpsError> {
+    /// let sources: Vec<Point2<f64>> =
+    ///     (0..900).map(|i| Point2::new(f64::from(i % 30), f64::from(i / 30) + 0.3 * f64::from(i % 7))).collect();
+    /// let targets: Vec<_> = sources.iter().map(|p| Point2::new(p.x.sin(), p.y.cos())).collect();
+    /// let options = FitOptions::default().with_solver(Solver::Iterative);
+    /// let spline = ThinPlateSpline::fit_watched(&sources, &targets, &options, |progress| match progress.residual {
+    ///     // Good enough for a first look.
+    ///     Some(residual) if residual < 1e-3 => ControlFlow::Break(()),
+    ///     _ => ControlFlow::Continue(()),
+    /// })?;
+    /// assert!(!spline.report.converged() && spline.report.residual < Some(1e-2));
+    /// let stopped = ThinPlateSpline::fit_watched(&sources, &targets, &options, |_| ControlFlow::Break(()));
+    /// assert_eq!(stopped.err(), Some(TpsError::Stopped));
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
+    /// # Errors
+    /// Those of [`fit`](Self::fit), and [`TpsError::Stopped`] if `watch` returns `Break` before there is a spline.
+    pub fn fit_watched(
+        sources: &[Point<T, D>],
+        targets: &[Point<T, M>],
+        options: &FitOptions<T, K>,
+        mut watch: impl FnMut(&Progress) -> ControlFlow<()>,
+    ) -> Result<Self, TpsError> {
+        Factorization::new_watched(sources, options, &mut watch)?.fit_watched(targets, watch)
+    }
+
+    /// A spline that is zero everywhere, to be filled by a fit.
+    pub(crate) fn zero(kernel: K) -> Self {
+        Self {
+            kernel,
+            frame: Frame::default(),
+            centres: Vec::new(),
+            weights: Vec::new(),
+            affine: AffinePart {
+                constant: [T::zero(); M],
+                gradient: [[T::zero(); D]; M],
+            },
+            weight: 0.0,
+            level: 0.0,
+            report: FitReport::default(),
+        }
+    }
+
+    /// Takes over a solution, reusing memory where it suffices.
+    pub(crate) fn assign(&mut self, kernel: &K, solution: &Solution<'_, D, M>) {
+        self.kernel.clone_from(kernel);
+        self.frame = solution.frame;
+        self.centres.clear();
+        for axis in solution.axes {
+            self.centres.extend(axis.iter().map(|&x| T::narrow(x)));
+        }
+        self.weights.clear();
+        let weights = solution.weights.iter().map(|&w| T::narrow(w));
+        self.weights.extend(weights);
+        self.affine = AffinePart {
+            constant: solution.constant.map(T::narrow),
+            gradient: solution.gradient.map(|row| row.map(T::narrow)),
+        };
+        let sums = self
+            .columns()
+            .1
+            .map(|w| w.iter().map(|x| x.widen().abs()).sum());
+        self.weight = sums.into_iter().fold(0.0, f64::max);
+        self.level = solution.level;
+        self.report.digits = digits::<T>(if self.level > 0.0 {
+            self.rounding(0.0) / self.level
+        } else {
+            0.0
+        });
+    }
+
+    /// Rounding error to expect of the sum at squared distance `s` from the frame's centre.
+    fn rounding(&self, s: f64) -> f64 {
+        // The farthest centre lies a unit or so beyond. Nearer than two units the terms do not shrink.
+        let distance = f64::max(s.sqrt() + 1.0, 2.0);
+        let term = self.kernel.derivatives(distance * distance).value;
+        T::UNIT_ROUNDOFF * self.weight * term.abs()
+    }
+
+    /// Decimal digits that the sum of the spline's terms keeps at a point.
+    ///
+    /// That is −log₁₀ of the rounding error to expect, relative to the value or the targets, whichever is larger.
+    /// Far from the points the number falls: the terms grow faster than the sum.
+    /// Values with few digits are better replaced by those of the [affine part](Self::affine).
+    ///
+    /// ```
+    /// # use nalgebra::Point2;
+    /// # use tactile_tps::{FitOptions, ThinPlateSpline};
+    /// # fn main() -> Result<(), tactile_tps::TpsError> {
+    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
+    /// # let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
+    /// let warp = ThinPlateSpline::fit(&sources, &targets, &FitOptions::default())?;
+    /// let near = warp.digits(&Point2::new(0.5, 0.5));
+    /// let far = warp.digits(&Point2::new(1e6, 1e6));
+    /// assert!(near > 14.0 && far < near);
+    /// # Ok(())
+    /// # }
+    /// ```
+    pub fn digits(&self, point: &Point<T, D>) -> f64 {
+        let size = self
+            .apply(point)
+            .iter()
+            .fold(0.0, |size, x| f64::max(size, x.widen().abs()));
+        let distance_squared = self.frame.inside(point).iter().map(|x| x * x).sum();
+        digits::<T>(self.rounding(distance_squared) / f64::max(size, self.level))
+    }
+
+    /// wᵀKw, summed over the outputs, in the kernel's own units; O(n²).
+    ///
+    /// In the plane with r² ln r, and in space with −r, the integral ∫ |∂²f|² of all second derivatives is 8π times this.
+    ///
+    /// ```
+    /// # use nalgebra::Point2;
+    /// # use tactile_tps::{FitOptions, ThinPlateSpline};
+    /// # fn main() -> Result<(), tactile_tps::TpsError> {
+    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
+    /// # let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
+    /// let warp = ThinPlateSpline::fit(&sources, &targets, &FitOptions::default())?;
+    /// let straight = ThinPlateSpline::fit(&sources, &sources, &FitOptions::default())?;
+    /// assert!(warp.bending_energy() > 1e-4 && straight.bending_energy() < 1e-25);
+    /// # Ok(())
+    /// # }
+    /// ```
+    pub fn bending_energy(&self) -> f64 {
+        let wide = |values: &[T]| values.iter().map(|x| x.widen()).collect::<Vec<f64>>();
+        let (centres, weights) = self.columns();
+        let (centres, weights) = (centres.map(wide), weights.map(wide));
+        let places = centres.each_ref().map(|x| &x[..]);
+        let sum = KernelSum {
+            kernel: &self.kernel,
+            centres: places,
+            weights: weights.each_ref().map(|w| &w[..]),
+        };
+        let mut negative = vec![0.0; M * self.count()];
+        sum.subtract(places, 0..self.count(), &mut negative);
+        let products = weights.iter().flatten().zip(&negative).map(|(w, r)| -w * r);
+        f64::max(products.sum(), 0.0) / self.unit()
+    }
+
+    /// Number of distinct centres.
+    fn count(&self) -> usize {
+        self.centres.len() / D
+    }
+
+    /// The terms of the kernel sum, each with its centre xᵢ and its weight wᵢ in the kernel's units: the distinct source points, in
+    /// their order.
+    ///
+    /// ```
+    /// # use nalgebra::Point2;
+    /// # use tactile_tps::{FitOptions, ThinPlateSpline};
+    /// # fn main() -> Result<(), tactile_tps::TpsError> {
+    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
+    /// # let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
+    /// let warp = ThinPlateSpline::fit(&sources, &targets, &FitOptions::default())?;
+    /// assert!(warp.terms().zip(&sources).all(|((centre, _), source)| (centre - source).norm() < 1e-15));
+    /// let sum: nalgebra::Vector2<f64> = warp.terms().map(|(_, w)| w).sum();
+    /// let moment: nalgebra::Matrix2<f64> = warp.terms().map(|(x, w)| w * x.coords.transpose()).sum();
+    /// assert!(warp.terms().len() == 5 && sum.norm() < 1e-15 && moment.norm() < 1e-15);
+    /// # Ok(())
+    /// # }
+    /// ```
+    pub fn terms(&self) -> impl ExactSizeIterator<Item = (Point<T, D>, SVector<f64, M>)> + '_ {
+        let (n, unit) = (self.count(), self.unit());
+        (0..n).map(move |j| {
+            let inside = |k: usize| self.centres[k * n + j].widen();
+            let centre = Point::from(SVector::from_fn(|k, _| {
+                T::narrow(inside(k) * self.frame.scale + self.frame.centre[k])
+            }));
+            let weight = SVector::from_fn(|k, _| self.weights[k * n + j].widen() / unit);
+            (centre, weight)
+        })
+    }
+
+    /// The affine part x ↦ A x + a₀ beside the kernel sum, in the points' units.
+    ///
+    /// Kernels are scaled to unit size inside. A kernel like r² ln r changes by a multiple of r² by that.
+    /// Its sum is affine by the side conditions and is accounted for here.
+    ///
+    /// ```
+    /// # use nalgebra::Point2;
+    /// # use tactile_tps::{FitOptions, Kernel, R2LogR, ThinPlateSpline};
+    /// # fn main() -> Result<(), tactile_tps::TpsError> {
+    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
+    /// # let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
+    /// let warp = ThinPlateSpline::fit(&sources, &targets, &FitOptions::default())?;
+    /// let (linear, offset) = warp.affine();
+    /// let x = Point2::new(0.7, 0.2);
+    /// let term = |(c, w): (Point2<f64>, nalgebra::Vector2<f64>)| w * R2LogR.derivatives((x - c).norm_squared()).value;
+    /// let by_hand = linear * x.coords + offset + warp.terms().map(term).sum::<nalgebra::Vector2<f64>>();
+    /// assert!((warp.apply(&x).coords - by_hand).norm() < 1e-14);
+    /// # Ok(())
+    /// # }
+    /// ```
+    pub fn affine(&self) -> (SMatrix<f64, M, D>, SVector<f64, M>) {
+        let Frame { centre, scale } = self.frame;
+        let linear = SMatrix::from_fn(|i, j| self.affine.gradient[i][j].widen() / scale);
+        let kernel = |s: f64| self.kernel.derivatives(s).value;
+        let square = kernel(scale * scale) / self.unit() - kernel(1.0);
+        let n = self.count();
+        let offset = SVector::from_fn(|i, _| {
+            let norm = |j: usize| {
+                (0..D)
+                    .map(|k| self.centres[k * n + j].widen().powi(2))
+                    .sum::<f64>()
+            };
+            let second: f64 = (0..n)
+                .map(|j| self.weights[i * n + j].widen() * norm(j))
+                .sum();
+            let shift: f64 = (0..D)
+                .map(|k| self.affine.gradient[i][k].widen() * (centre[k] / scale))
+                .sum();
+            self.affine.constant[i].widen() - shift - square * second
+        });
+        (linear, offset)
+    }
+
+    /// How much larger the kernel is outside than in the frame.
+    fn unit(&self) -> f64 {
+        self.frame.scale.powi(self.kernel.degree().unwrap_or(0))
+    }
+
+    /// Coordinates of the centres and their weights, column by column.
+    fn columns(&self) -> ([&[T]; D], [&[T]; M]) {
+        let n = self.count();
+        (
+            core::array::from_fn(|k| &self.centres[k * n..(k + 1) * n]),
+            core::array::from_fn(|m| &self.weights[m * n..(m + 1) * n]),
+        )
+    }
+
+    /// f(x).
+    ///
+    /// ```
+    /// # use nalgebra::Point2;
+    /// # use tactile_tps::{FitOptions, ThinPlateSpline};
+    /// # fn main() -> Result<(), tactile_tps::TpsError> {
+    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
+    /// # let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
+    /// let warp = ThinPlateSpline::fit(&sources, &targets, &FitOptions::default())?;
+    /// assert!((warp.apply(&sources[4]) - targets[4]).norm() < 1e-14);
+    /// # Ok(())
+    /// # }
+    /// ```
+    pub fn apply(&self, point: &Point<T, D>) -> Point<T, M> {
+        let mut value = [Point::origin()];
+        self.each::<0>(core::slice::from_ref(point), |_, sample| {
+            value[0] = sample.point()
+        });
+        value[0]
+    }
+
+    /// The Jacobian ∂fᵢ/∂xⱼ (row i, column j). At a centre of −r, which has a cusp there, its own term is left out.
+    ///
+    /// ```
+    /// # use nalgebra::Point2;
+    /// # use tactile_tps::{FitOptions, ThinPlateSpline};
+    /// # fn main() -> Result<(), tactile_tps::TpsError> {
+    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
+    /// # let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
+    /// let warp = ThinPlateSpline::fit(&sources, &targets, &FitOptions::default())?;
+    /// let (x, h) = (Point2::new(0.5, 0.5), nalgebra::Vector2::new(1e-5, 0.0));
+    /// let difference = (warp.apply(&(x + h)) - warp.apply(&(x - h))) / 2e-5;
+    /// assert!((warp.jacobian(&x).column(0) - difference).norm() < 1e-9);
+    /// # Ok(())
+    /// # }
+    /// ```
+    pub fn jacobian(&self, point: &Point<T, D>) -> SMatrix<T, M, D> {
+        let mut jacobian = SMatrix::zeros();
+        self.each::<1>(core::slice::from_ref(point), |_, sample| {
+            jacobian = sample.jacobian()
+        });
+        jacobian
+    }
+
+    /// The Hessian of every output. At a centre where the kernel has none its own term is left out.
+    ///
+    /// ```
+    /// # use nalgebra::Point2;
+    /// # use tactile_tps::{FitOptions, ThinPlateSpline};
+    /// # fn main() -> Result<(), tactile_tps::TpsError> {
+    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
+    /// # let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
+    /// let warp = ThinPlateSpline::fit(&sources, &targets, &FitOptions::default())?;
+    /// let (x, h) = (Point2::<f64>::new(0.5, 0.5), nalgebra::Vector2::new(0.0, 1e-5));
+    /// let difference = (warp.jacobian(&(x + h)) - warp.jacobian(&(x - h))) / 2e-5;
+    /// // ∂²fₓ/∂x∂y.
+    /// assert!((warp.hessian(&x)[0][(0, 1)] - difference[(0, 0)]).abs() < 1e-8);
+    /// # Ok(())
+    /// # }
+    /// ```
+    pub fn hessian(&self, point: &Point<T, D>) -> [SMatrix<T, D, D>; M] {
+        let mut hessian = [SMatrix::zeros(); M];
+        self.each::<2>(core::slice::from_ref(point), |_, sample| {
+            hessian = sample.hessian()
+        });
+        hessian
+    }
+
+    /// f at many points, into the caller's memory.
+    ///
+    /// ```
+    /// # use nalgebra::Point2;
+    /// # use tactile_tps::{FitOptions, ThinPlateSpline};
+    /// # fn main() -> Result<(), tactile_tps::TpsError> {
+    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
+    /// # let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
+    /// let warp = ThinPlateSpline::fit(&sources, &targets, &FitOptions::default())?;
+    /// let queries = [Point2::new(0.5, 0.5), Point2::new(0.1, 0.9)];
+    /// let mut values = [Point2::origin(); 2];
+    /// warp.apply_into(&queries, &mut values)?;
+    /// assert_eq!(values[1], warp.apply(&queries[1]));
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
+    /// # Errors
+    /// [`TpsError::Length`] if the slices differ in length.
+    pub fn apply_into(
+        &self,
+        points: &[Point<T, D>],
+        values: &mut [Point<T, M>],
+    ) -> Result<(), TpsError> {
+        same_length(points.len(), values.len())?;
+        self.each::<0>(points, |i, sample| values[i] = sample.point());
+        Ok(())
+    }
+
+    /// Jacobians at many points, into the caller's memory.
+    ///
+    /// ```
+    /// # use nalgebra::Point2;
+    /// # use tactile_tps::{FitOptions, ThinPlateSpline};
+    /// # fn main() -> Result<(), tactile_tps::TpsError> {
+    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
+    /// # let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
+    /// let warp = ThinPlateSpline::fit(&sources, &targets, &FitOptions::default())?;
+    /// let mut jacobians = [nalgebra::Matrix2::zeros(); 5];
+    /// warp.jacobian_into(&sources, &mut jacobians)?;
+    /// assert_eq!(jacobians[3], warp.jacobian(&sources[3]));
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
+    /// # Errors
+    /// [`TpsError::Length`] if the slices differ in length.
+    pub fn jacobian_into(
+        &self,
+        points: &[Point<T, D>],
+        jacobians: &mut [SMatrix<T, M, D>],
+    ) -> Result<(), TpsError> {
+        same_length(points.len(), jacobians.len())?;
+        self.each::<1>(points, |i, sample| jacobians[i] = sample.jacobian());
+        Ok(())
+    }
+
+    /// Values and Jacobians at many points in one pass, into the caller's memory.
+    ///
+    /// ```
+    /// # use nalgebra::Point2;
+    /// # use tactile_tps::{FitOptions, ThinPlateSpline};
+    /// # fn main() -> Result<(), tactile_tps::TpsError> {
+    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
+    /// # let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
+    /// let warp = ThinPlateSpline::fit(&sources, &targets, &FitOptions::default())?;
+    /// let queries = [Point2::new(0.5, 0.5), Point2::new(0.1, 0.9)];
+    /// let (mut values, mut jacobians) = ([Point2::origin(); 2], [nalgebra::Matrix2::zeros(); 2]);
+    /// warp.apply_and_jacobian_into(&queries, &mut values, &mut jacobians)?;
+    /// // Where the warp keeps orientation and does not fold, the determinant is positive.
+    /// assert!(jacobians.iter().all(|j| j.determinant() > 0.5) && (values[0] - queries[0]).norm() < 0.1);
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
+    /// # Errors
+    /// [`TpsError::Length`] if the slices differ in length.
+    pub fn apply_and_jacobian_into(
+        &self,
+        points: &[Point<T, D>],
+        values: &mut [Point<T, M>],
+        jacobians: &mut [SMatrix<T, M, D>],
+    ) -> Result<(), TpsError> {
+        same_length(points.len(), values.len())?;
+        same_length(points.len(), jacobians.len())?;
+        self.each::<1>(points, |i, sample| {
+            values[i] = sample.point();
+            jacobians[i] = sample.jacobian();
+        });
+        Ok(())
+    }
+
+    /// Hands the sample at every point to `sink`, with derivatives up to `ORDER`.
+    fn each<const ORDER: usize>(
+        &self,
+        points: &[Point<T, D>],
+        sink: impl FnMut(usize, Sample<T, D, M>),
+    ) {
+        let (centres, weights) = self.columns();
+        dispatch(Each::<_, _, _, D, M, ORDER> {
+            sum: KernelSum {
+                kernel: &self.kernel,
+                centres,
+                weights,
+            },
+            affine: &self.affine,
+            frame: self.frame,
+            points,
+            sink,
+        });
+    }
+}
+
+/// Queries a thread takes at a time.
+#[cfg(feature = "rayon")]
+const THREAD_QUERIES: usize = 8 * BLOCK;
+
+#[cfg(feature = "rayon")]
+impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
+    /// As [`apply_into`](Self::apply_into), over the threads of the current rayon pool.
+    ///
+    /// ```
+    /// # use nalgebra::Point2;
+    /// # use tactile_tps::{FitOptions, ThinPlateSpline};
+    /// # fn main() -> Result<(), tactile_tps::TpsError> {
+    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
+    /// # let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
+    /// let warp = ThinPlateSpline::fit(&sources, &targets, &FitOptions::default())?;
+    /// let queries: Vec<_> = (0..1000).map(|i| Point2::new(f64::from(i) / 1000.0, 0.5)).collect();
+    /// let mut values = vec![Point2::origin(); 1000];
+    /// warp.par_apply_into(&queries, &mut values)?;
+    /// assert_eq!(values[999], warp.apply(&queries[999]));
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
+    /// # Errors
+    /// [`TpsError::Length`] if the slices differ in length.
+    pub fn par_apply_into(
+        &self,
+        points: &[Point<T, D>],
+        values: &mut [Point<T, M>],
+    ) -> Result<(), TpsError> {
+        same_length(points.len(), values.len())?;
+        let chunks = points
+            .par_chunks(THREAD_QUERIES)
+            .zip(values.par_chunks_mut(THREAD_QUERIES));
+        chunks.try_for_each(|(points, values)| self.apply_into(points, values))
+    }
+
+    /// As [`apply_and_jacobian_into`](Self::apply_and_jacobian_into), over the threads of the current rayon pool.
+    ///
+    /// ```
+    /// # use nalgebra::Point2;
+    /// # use tactile_tps::{FitOptions, ThinPlateSpline};
+    /// # fn main() -> Result<(), tactile_tps::TpsError> {
+    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
+    /// # let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
+    /// let warp = ThinPlateSpline::fit(&sources, &targets, &FitOptions::default())?;
+    /// let queries: Vec<_> = (0..1000).map(|i| Point2::new(f64::from(i) / 1000.0, 0.5)).collect();
+    /// let mut values = vec![Point2::origin(); 1000];
+    /// let mut jacobians = vec![nalgebra::Matrix2::zeros(); 1000];
+    /// warp.par_apply_and_jacobian_into(&queries, &mut values, &mut jacobians)?;
+    /// assert_eq!(jacobians[7], warp.jacobian(&queries[7]));
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
+    /// # Errors
+    /// [`TpsError::Length`] if the slices differ in length.
+    pub fn par_apply_and_jacobian_into(
+        &self,
+        points: &[Point<T, D>],
+        values: &mut [Point<T, M>],
+        jacobians: &mut [SMatrix<T, M, D>],
+    ) -> Result<(), TpsError> {
+        same_length(points.len(), values.len())?;
+        same_length(points.len(), jacobians.len())?;
+        let outputs = values
+            .par_chunks_mut(THREAD_QUERIES)
+            .zip(jacobians.par_chunks_mut(THREAD_QUERIES));
+        points.par_chunks(THREAD_QUERIES).zip(outputs).try_for_each(
+            |(points, (values, jacobians))| self.apply_and_jacobian_into(points, values, jacobians),
+        )
+    }
+}
+
+/// Decimal digits of a number with this relative error, at most those of the type.
+fn digits<T: Scalar>(error: f64) -> f64 {
+    f64::max(error, T::UNIT_ROUNDOFF).log10().min(0.0).abs()
+}
+
+/// A spline's value and derivatives at one point.
+#[derive(Clone, Copy)]
+struct Sample<T, const D: usize, const M: usize> {
+    value: [T; M],
+    gradient: [[T; D]; M],
+    hessian: [[[T; D]; D]; M],
+}
+
+impl<T: Scalar, const D: usize, const M: usize> Sample<T, D, M> {
+    #[inline(always)]
+    fn point(&self) -> Point<T, M> {
+        Point::from(SVector::from(self.value))
+    }
+
+    #[inline(always)]
+    fn jacobian(&self) -> SMatrix<T, M, D> {
+        SMatrix::from_fn(|i, j| self.gradient[i][j])
+    }
+
+    #[inline(always)]
+    fn hessian(&self) -> [SMatrix<T, D, D>; M] {
+        self.hessian
+            .map(|h| SMatrix::from_fn(|i, j| if i >= j { h[i][j] } else { h[j][i] }))
+    }
+}
+
+/// Samples at all points, block by block.
+struct Each<'a, T: Scalar, K, F, const D: usize, const M: usize, const ORDER: usize> {
+    sum: KernelSum<'a, T, K, D, M>,
+    affine: &'a AffinePart<T, D, M>,
+    frame: Frame<D>,
+    points: &'a [Point<T, D>],
+    sink: F,
+}
+
+impl<T, K, F, const D: usize, const M: usize, const ORDER: usize> Job<T>
+    for Each<'_, T, K, F, D, M, ORDER>
+where
+    T: Scalar,
+    K: Kernel,
+    F: FnMut(usize, Sample<T, D, M>),
+{
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Lane<T>>(mut self) {
+        let full = self.points.len() / BLOCK * BLOCK;
+        for start in (0..full).step_by(BLOCK) {
+            self.chunk::<L, BLOCK>(start, BLOCK);
+        }
+        for start in (full..self.points.len()).step_by(TAIL) {
+            self.chunk::<L, TAIL>(start, TAIL.min(self.points.len() - start));
+        }
+    }
+}
+
+impl<T, K, F, const D: usize, const M: usize, const ORDER: usize> Each<'_, T, K, F, D, M, ORDER>
+where
+    T: Scalar,
+    K: Kernel,
+    F: FnMut(usize, Sample<T, D, M>),
+{
+    /// Samples `used` ≤ `W` points from `start` on.
+    #[inline(always)]
+    fn chunk<L: Lane<T>, const W: usize>(&mut self, start: usize, used: usize) {
+        let mut x = [[T::zero(); W]; D];
+        for l in 0..W {
+            let inside = self.frame.inside(&self.points[start + l.min(used - 1)]);
+            (0..D).for_each(|k| x[k][l] = T::narrow(inside[k]));
+        }
+        let mut sums = Lanes::<T, D, M, W>::new();
+        self.sum.block::<L, W, ORDER>(&x, &mut sums);
+        for l in 0..used {
+            let point = core::array::from_fn(|k| x[k][l]);
+            let sample = self.finish::<L, W>(&point, &sums, l);
+            (self.sink)(start + l, sample);
+        }
+    }
+
+    /// Adds the affine part and returns to the units of the points.
+    #[inline(always)]
+    fn finish<L: Lane<T>, const W: usize>(
+        &self,
+        x: &[T; D],
+        sums: &Lanes<T, D, M, W>,
+        l: usize,
+    ) -> Sample<T, D, M> {
+        let (affine, scale) = (self.affine, T::narrow(self.frame.scale));
+        let mut sample = Sample {
+            value: [T::zero(); M],
+            gradient: [[T::zero(); D]; M],
+            hessian: [[[T::zero(); D]; D]; M],
+        };
+        for m in 0..M {
+            let start = L::new(sums.value[m][l]) + L::new(affine.constant[m]);
+            let along = |sum: L, k: usize| L::new(affine.gradient[m][k]).mul_add(L::new(x[k]), sum);
+            sample.value[m] = (0..D).fold(start, along).get();
+            for k in (0..D).filter(|_| ORDER > 0) {
+                sample.gradient[m][k] = (affine.gradient[m][k] + sums.gradient[m][k][l]) / scale;
+                for i in (0..=k).filter(|_| ORDER > 1) {
+                    sample.hessian[m][k][i] = sums.hessian[m][k][i][l] / scale / scale;
+                }
+            }
+        }
+        sample
+    }
+}
 
 /// The kernel sum of a spline, in its frame.
 #[derive(Clone, Copy)]
-pub(crate) struct Sum<'a, T, K, const D: usize, const M: usize> {
+pub(crate) struct KernelSum<'a, T, K, const D: usize, const M: usize> {
     pub(crate) kernel: &'a K,
     /// Coordinates of the centres, axis by axis.
     pub(crate) centres: [&'a [T]; D],
@@ -24,15 +777,15 @@ pub(crate) struct Sum<'a, T, K, const D: usize, const M: usize> {
 }
 
 /// Sums for `W` queries: U, its gradient and its Hessian, as far as the order asked for.
-pub(crate) struct Lanes<T, const D: usize, const M: usize, const W: usize> {
-    pub(crate) value: [[T; W]; M],
-    pub(crate) gradient: [[[T; W]; D]; M],
-    pub(crate) hessian: [[[[T; W]; D]; D]; M],
+struct Lanes<T, const D: usize, const M: usize, const W: usize> {
+    value: [[T; W]; M],
+    gradient: [[[T; W]; D]; M],
+    hessian: [[[[T; W]; D]; D]; M],
 }
 
 impl<T: Scalar, const D: usize, const M: usize, const W: usize> Lanes<T, D, M, W> {
     #[inline(always)]
-    pub(crate) fn new() -> Self {
+    fn new() -> Self {
         let zero = [T::zero(); W];
         Self {
             value: [zero; M],
@@ -50,15 +803,15 @@ impl<T: Scalar, const D: usize, const M: usize, const W: usize> Lanes<T, D, M, W
 
     /// Adds a term's value, gradient 2U'd and, at second order, Hessian 2U' I + 4U'' d dᵀ (derivatives by s = |d|²).
     #[inline(always)]
-    fn add_jet<L: Lane<T>, const ORDER: usize>(
+    fn add_derivatives<L: Lane<T>, const ORDER: usize>(
         &mut self,
         l: usize,
         weight: &[L; M],
         d: &[L; D],
-        jet: Jet<L>,
+        term: KernelDerivatives<L>,
     ) {
-        self.add_value(l, weight, jet.value);
-        let slope = L::from_f64(2.0) * jet.first;
+        self.add_value(l, weight, term.value);
+        let slope = L::from_f64(2.0) * term.first;
         for k in 0..D {
             let along = slope * d[k];
             for m in 0..M {
@@ -66,7 +819,7 @@ impl<T: Scalar, const D: usize, const M: usize, const W: usize> Lanes<T, D, M, W
             }
         }
         if ORDER == 2 {
-            self.add_hessian(l, weight, d, slope, L::from_f64(4.0) * jet.second);
+            self.add_hessian(l, weight, d, slope, L::from_f64(4.0) * term.second);
         }
     }
 
@@ -97,10 +850,10 @@ fn add<T: Scalar, L: Lane<T>>(sum: &mut T, a: L, b: L) {
     *sum = a.mul_add(b, L::new(*sum)).get();
 }
 
-impl<T: Scalar, K: Kernel, const D: usize, const M: usize> Sum<'_, T, K, D, M> {
+impl<T: Scalar, K: Kernel, const D: usize, const M: usize> KernelSum<'_, T, K, D, M> {
     /// Sums up to derivatives of the given `ORDER` (0, 1 or 2) at the queries `x`, axis by axis.
     #[inline(always)]
-    pub(crate) fn block<L: Lane<T>, const W: usize, const ORDER: usize>(
+    fn block<L: Lane<T>, const W: usize, const ORDER: usize>(
         &self,
         x: &[[T; W]; D],
         sums: &mut Lanes<T, D, M, W>,
@@ -118,11 +871,70 @@ impl<T: Scalar, K: Kernel, const D: usize, const M: usize> Sum<'_, T, K, D, M> {
                     s = d[k].mul_add(d[k], s);
                 }
                 if ORDER == 0 {
-                    sums.add_value(l, &weight, self.kernel.jet(s).value);
+                    sums.add_value(l, &weight, self.kernel.derivatives(s).value);
                 } else {
-                    sums.add_jet::<L, ORDER>(l, &weight, &d, self.kernel.jet(s));
+                    sums.add_derivatives::<L, ORDER>(l, &weight, &d, self.kernel.derivatives(s));
                 }
             }
+        }
+    }
+}
+
+impl<K: Kernel, const D: usize, const M: usize> KernelSum<'_, f64, K, D, M> {
+    /// Subtracts the sum at the places of a range, which begins at a multiple of [`BLOCK`], from `residuals`.
+    ///
+    /// `residuals` holds those of all places, output by output.
+    pub(crate) fn subtract(self, places: [&[f64]; D], range: Range<usize>, residuals: &mut [f64]) {
+        dispatch(Subtract {
+            sum: self,
+            places,
+            range,
+            residuals,
+        });
+    }
+}
+
+/// Subtracts the kernel sum at the places of a range, which begins at a multiple of [`BLOCK`].
+struct Subtract<'a, K, const D: usize, const M: usize> {
+    sum: KernelSum<'a, f64, K, D, M>,
+    places: [&'a [f64]; D],
+    range: Range<usize>,
+    /// Of all places, output by output.
+    residuals: &'a mut [f64],
+}
+
+impl<K: Kernel, const D: usize, const M: usize> Job<f64> for Subtract<'_, K, D, M> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Lane<f64>>(mut self) {
+        let Range { start: first, end } = self.range;
+        let full = first + (end - first) / BLOCK * BLOCK;
+        for start in (first..full).step_by(BLOCK) {
+            self.block::<L, BLOCK>(start, BLOCK);
+        }
+        for start in (full..end).step_by(TAIL) {
+            self.block::<L, TAIL>(start, TAIL.min(end - start));
+        }
+    }
+}
+
+impl<K: Kernel, const D: usize, const M: usize> Subtract<'_, K, D, M> {
+    #[inline(always)]
+    fn block<L: Lane<f64>, const W: usize>(&mut self, start: usize, used: usize) {
+        let n = self.places[0].len();
+        let mut x = [[0.0; W]; D];
+        for k in 0..D {
+            x[k][..used].copy_from_slice(&self.places[k][start..start + used]);
+        }
+        let mut sums = Lanes::<f64, D, M, W>::new();
+        self.sum.block::<L, W, 0>(&x, &mut sums);
+        for m in 0..M {
+            let residuals = &mut self.residuals[m * n + start..m * n + start + used];
+            residuals
+                .iter_mut()
+                .zip(&sums.value[m])
+                .for_each(|(r, sum)| *r -= sum);
         }
     }
 }

@@ -1,18 +1,64 @@
 //! Radial kernels.
 
-use crate::real::Real;
+use core::ops::{Add, Div, Mul, Neg, Sub};
+
+/// What a [`Kernel`](crate::Kernel) may do with a number.
+///
+/// Kernels are written once against this trait and run in every arithmetic the crate needs:
+/// `f32`, `f64` and their forms with fused multiplication and addition.
+///
+/// Comparison is allowed. Keep both branches free of side effects and the compiler turns them into a select.
+///
+/// ```
+/// # use tactile_tps::KernelScalar;
+/// /// ln(1 + eˣ), in whatever arithmetic it is called.
+/// fn softplus<R: KernelScalar>(x: R) -> R {
+///     (R::from_f64(1.0) + x.exp()).ln()
+/// }
+/// assert!((softplus(0.0f64) - 2f64.ln()).abs() < 1e-15 && (softplus(0.0f32) - 2f32.ln()).abs() < 1e-6);
+/// ```
+pub trait KernelScalar:
+    Copy
+    + PartialOrd
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Mul<Output = Self>
+    + Div<Output = Self>
+    + Neg<Output = Self>
+{
+    /// The nearest number to `x`.
+    fn from_f64(x: f64) -> Self;
+    /// √x.
+    fn sqrt(self) -> Self;
+    /// Natural logarithm of a positive, finite number. Elsewhere anything but a panic.
+    fn ln(self) -> Self;
+    /// eˣ.
+    fn exp(self) -> Self;
+    /// `self · a + b`, rounded once where that costs nothing extra.
+    ///
+    /// ```
+    /// use tactile_tps::KernelScalar;
+    /// /// Length of a vector, one rounding a term.
+    /// fn length<R: KernelScalar>(components: &[R]) -> R {
+    ///     components.iter().fold(R::from_f64(0.0), |sum, &c| c.mul_add(c, sum)).sqrt()
+    /// }
+    /// assert_eq!(length(&[3.0_f64, 4.0]), 5.0);
+    /// assert_eq!(length(&[0.6_f32, 0.8]), 1.0);
+    /// ```
+    fn mul_add(self, a: Self, b: Self) -> Self;
+}
 
 /// A kernel's value and derivatives with respect to the **squared** distance s = r².
 ///
 /// With d = x − xᵢ the term U(|d|) has the gradient `2 first d` and the Hessian `2 first I + 4 second d dᵀ`.
 ///
 /// ```
-/// # use tactile_tps::{Jet, Kernel, R3};
+/// # use tactile_tps::{KernelDerivatives, Kernel, R3};
 /// // U = s^(3/2) at s = r² = 4.
-/// assert_eq!(R3.jet(4.0), Jet { value: 8.0, first: 3.0, second: 0.375 });
+/// assert_eq!(R3.derivatives(4.0), KernelDerivatives { value: 8.0, first: 3.0, second: 0.375 });
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Jet<R> {
+pub struct KernelDerivatives<R> {
     /// U.
     pub value: R,
     /// dU/ds.
@@ -24,29 +70,30 @@ pub struct Jet<R> {
 /// A radial function U(r) that is conditionally positive definite of order at most two.
 ///
 /// That is: Σᵢⱼ wᵢ wⱼ U(|xᵢ − xⱼ|) > 0 for distinct points and any w ≠ 0 with Σ wᵢ = 0 and Σ wᵢ xᵢ = 0. The three
-/// kernels of the crate are; an implementor writes [`jet`](Self::jet) alone.
+/// kernels of the crate satisfy this. An implementor writes [`derivatives`](Self::derivatives) alone.
 ///
 /// ```
-/// use tactile_tps::{Jet, Kernel, Real};
+/// use tactile_tps::{KernelDerivatives, Kernel, KernelScalar};
 ///
 /// /// −√(r² + c²), Hardy's multiquadric.
 /// #[derive(Clone, Copy, Debug)]
 /// struct Multiquadric(f64);
 ///
 /// impl Kernel for Multiquadric {
-///     fn jet<R: Real>(&self, s: R) -> Jet<R> {
+///     fn derivatives<R: KernelScalar>(&self, s: R) -> KernelDerivatives<R> {
 ///         let root = (s + R::from_f64(self.0 * self.0)).sqrt();
 ///         let first = R::from_f64(-0.5) / root;
-///         Jet { value: -root, first, second: -first * R::from_f64(0.5) / (root * root) }
+///         KernelDerivatives { value: -root, first, second: -first * R::from_f64(0.5) / (root * root) }
 ///     }
 /// }
 /// ```
 pub trait Kernel: Clone + Send + Sync {
-    /// U and its derivatives with respect to s = r² ≥ 0. At s = 0 give the limit of U; a derivative without a
-    /// limit is given as 0, which leaves the point's own term out.
-    fn jet<R: Real>(&self, s: R) -> Jet<R>;
+    /// U and its derivatives with respect to s = r² ≥ 0.
+    ///
+    /// At s = 0 give the limit of U. A derivative without a limit is given as 0, which leaves the point's own term out.
+    fn derivatives<R: KernelScalar>(&self, s: R) -> KernelDerivatives<R>;
 
-    /// The degree k if U(c r) = cᵏ U(r), up to a multiple of r², for every c > 0; `None` if there is none.
+    /// The degree k if U(c r) = cᵏ U(r), up to a multiple of r², for every c > 0. `None` if there is none.
     ///
     /// Points are scaled to unit size inside when there is one. A kernel with a length scale has none.
     ///
@@ -55,7 +102,7 @@ pub trait Kernel: Clone + Send + Sync {
     /// assert_eq!((NegR.degree(), R2LogR.degree()), (Some(1), Some(2)));
     /// // r² ln r at 3 r is 9 r² ln r, up to 9 ln 3 r².
     /// let (s, excess) = (2.0_f64, 9.0 * 3_f64.ln() * 2.0);
-    /// assert!((R2LogR.jet(9.0 * s).value - 9.0 * R2LogR.jet(s).value - excess).abs() < 1e-12);
+    /// assert!((R2LogR.derivatives(9.0 * s).value - 9.0 * R2LogR.derivatives(s).value - excess).abs() < 1e-12);
     /// ```
     fn degree(&self) -> Option<i32> {
         None
@@ -69,8 +116,8 @@ pub trait Kernel: Clone + Send + Sync {
 /// ```
 /// # use tactile_tps::{Kernel, R2LogR};
 /// let r = 2.0f64;
-/// assert!((R2LogR.jet(r * r).value - r * r * r.ln()).abs() < 1e-15);
-/// assert_eq!(R2LogR.jet(0.0).value, 0.0);
+/// assert!((R2LogR.derivatives(r * r).value - r * r * r.ln()).abs() < 1e-15);
+/// assert_eq!(R2LogR.derivatives(0.0).value, 0.0);
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -80,8 +127,8 @@ pub struct R2LogR;
 ///
 /// ```
 /// # use tactile_tps::{Kernel, NegR};
-/// assert_eq!(NegR.jet(9.0).value, -3.0);
-/// assert_eq!(NegR.jet(0.0).first, 0.0); // the cusp, left out
+/// assert_eq!(NegR.derivatives(9.0).value, -3.0);
+/// assert_eq!(NegR.derivatives(0.0).first, 0.0); // the cusp, left out
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -91,7 +138,7 @@ pub struct NegR;
 ///
 /// ```
 /// # use tactile_tps::{Kernel, R3};
-/// assert_eq!((R3.jet(4.0).value, R3.degree()), (8.0, Some(3)));
+/// assert_eq!((R3.derivatives(4.0).value, R3.degree()), (8.0, Some(3)));
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -99,7 +146,7 @@ pub struct R3;
 
 /// `x` where s > 0, else zero.
 #[inline(always)]
-fn off_centre<R: Real>(s: R, x: R) -> R {
+fn off_centre<R: KernelScalar>(s: R, x: R) -> R {
     if s > R::from_f64(0.0) {
         x
     } else {
@@ -109,11 +156,11 @@ fn off_centre<R: Real>(s: R, x: R) -> R {
 
 impl Kernel for R2LogR {
     #[inline(always)]
-    fn jet<R: Real>(&self, s: R) -> Jet<R> {
+    fn derivatives<R: KernelScalar>(&self, s: R) -> KernelDerivatives<R> {
         let half = R::from_f64(0.5);
         let log = off_centre(s, s.ln());
         let half_log = half * log;
-        Jet {
+        KernelDerivatives {
             value: s * half_log,
             first: off_centre(s, half_log + half),
             second: off_centre(s, half / s),
@@ -126,10 +173,10 @@ impl Kernel for R2LogR {
 
 impl Kernel for NegR {
     #[inline(always)]
-    fn jet<R: Real>(&self, s: R) -> Jet<R> {
+    fn derivatives<R: KernelScalar>(&self, s: R) -> KernelDerivatives<R> {
         let r = s.sqrt();
         let first = off_centre(s, R::from_f64(-0.5) / r);
-        Jet {
+        KernelDerivatives {
             value: -r,
             first,
             second: off_centre(s, R::from_f64(-0.5) * first / s),
@@ -142,9 +189,9 @@ impl Kernel for NegR {
 
 impl Kernel for R3 {
     #[inline(always)]
-    fn jet<R: Real>(&self, s: R) -> Jet<R> {
+    fn derivatives<R: KernelScalar>(&self, s: R) -> KernelDerivatives<R> {
         let r = s.sqrt();
-        Jet {
+        KernelDerivatives {
             value: s * r,
             first: R::from_f64(1.5) * r,
             second: off_centre(s, R::from_f64(0.75) / r),

@@ -5,7 +5,7 @@
 //! | to | use |
 //! |---|---|
 //! | fit once | [`ThinPlateSpline::fit`](Spline::fit), or [`Spline::fit`] for other than D outputs |
-//! | fit repeatedly | [`Factorization`] with a [`Workspace`] |
+//! | fit repeatedly | [`Factorization`] with a [`SplineWorkspace`] |
 //! | choose kernel, smoothing, weights | [`FitOptions`], [`Smoothing`], [`Kernel`] |
 //! | propagate the targets' uncertainty to values and Jacobians | [`Factorization::influence_into`], [`Factorization::jacobian_influence_into`] |
 //! | see condition, residual and iterations | [`FitReport`] |
@@ -26,70 +26,23 @@
 // Several arrays share one index in dense linear algebra; zipping them hides it.
 #![allow(clippy::needless_range_loop)]
 
-mod affine;
-mod centres;
-mod cholesky;
-mod column;
-mod double_double;
-mod equations;
 mod error;
 mod evaluate;
-mod factorization;
-mod far;
 mod fit;
-mod influence;
-#[cfg(all(debug_assertions, not(test)))]
-mod instances;
-mod iterative;
 mod kernel;
-mod layout;
-mod logarithm;
-mod memory;
-mod models;
-mod null_space;
+mod lanes;
 mod options;
-mod packed;
-#[cfg(feature = "rayon")]
-mod parallel;
-mod parts;
-mod path;
-mod precise;
-mod product;
-mod progress;
-mod real;
-mod refine;
-mod refit;
-mod report;
-mod residual;
-mod reweight;
-mod sample;
-mod simd;
 mod smoothing;
-mod solve;
-mod span;
-mod spectrum;
-mod spline;
-mod symmetric;
-mod system;
-mod targets;
-mod task;
-mod tiles;
-mod triangular;
-mod tridiagonal;
-mod values;
 mod warp;
 
-pub use affine::Affine;
+pub use nalgebra;
+pub use tactile_core::{CustomError, Progress, StopReason};
+
 pub use error::TpsError;
-pub use factorization::{Factorization, Workspace};
-pub use kernel::{Jet, Kernel, NegR, R2LogR, R3};
-pub use memory::Memory;
-pub use models::AffineModel;
-pub use options::{FitOptions, Solver};
-pub use path::LambdaPath;
-pub use progress::Progress;
-pub use real::{Real, Scalar};
-pub use report::FitReport;
+pub use evaluate::{Spline, ThinPlateSpline};
+pub use fit::{Factorization, LambdaPath, SplineWorkspace};
+pub use kernel::{Kernel, KernelDerivatives, KernelScalar, NegR, R2LogR, R3};
+pub use lanes::Scalar;
+pub use options::{FitOptions, FitReport, Solver};
 pub use smoothing::{RobustFit, RobustSpline, Smoothing, StrainSpline};
-pub use spline::{Spline, ThinPlateSpline};
-pub use warp::{Pairs, Warp, WarpModel};
+pub use warp::{Affine, AffineModel, Pairs, SeriesMemory, Warp, WarpModel};

@@ -1,10 +1,13 @@
-//! Maps of space onto itself, and models that find one from pairs of points.
+//! Maps of space onto itself, models that find one from pairs of points, and the affine ones.
 
-use std::sync::Arc;
+use core::any::Any;
 
-use nalgebra::{Point, SMatrix};
+use nalgebra::{DMatrix, Point, SMatrix, SVector};
 
-use crate::{FitOptions, Kernel, Memory, Scalar, Spline, ThinPlateSpline, TpsError};
+use crate::{
+    FitOptions, Kernel, Scalar, Spline, ThinPlateSpline, TpsError,
+    error::{same_length, validate_pairs},
+};
 
 /// A map of `D`-dimensional space onto itself. Object safe: a `Box<dyn Warp<f64, 3>>` is a warp.
 ///
@@ -70,63 +73,11 @@ pub trait Warp<T: Scalar, const D: usize> {
     }
 }
 
-/// A warp or a model behind a pointer is one: what a pipeline holds and shares.
-macro_rules! forward {
-    ($pointer:ident) => {
-        impl<T: Scalar, const D: usize, W: Warp<T, D> + ?Sized> Warp<T, D> for $pointer<W> {
-            fn apply(&self, point: &Point<T, D>) -> Point<T, D> {
-                (**self).apply(point)
-            }
-            fn jacobian(&self, point: &Point<T, D>) -> SMatrix<T, D, D> {
-                (**self).jacobian(point)
-            }
-            fn apply_into(
-                &self,
-                points: &[Point<T, D>],
-                images: &mut [Point<T, D>],
-            ) -> Result<(), TpsError> {
-                (**self).apply_into(points, images)
-            }
-            fn jacobian_into(
-                &self,
-                points: &[Point<T, D>],
-                jacobians: &mut [SMatrix<T, D, D>],
-            ) -> Result<(), TpsError> {
-                (**self).jacobian_into(points, jacobians)
-            }
-        }
-
-        impl<T: Scalar, const D: usize, M: WarpModel<T, D> + ?Sized> WarpModel<T, D>
-            for $pointer<M>
-        {
-            fn fit(
-                &self,
-                sources: &[Point<T, D>],
-                targets: &[Point<T, D>],
-                weights: Option<&[T]>,
-            ) -> Result<Box<dyn Warp<T, D> + Send + Sync>, TpsError> {
-                (**self).fit(sources, targets, weights)
-            }
-            fn jacobians_through(
-                &self,
-                memory: &mut Memory,
-                pairs: Pairs<'_, T, D>,
-                points: &[Point<T, D>],
-                jacobians: &mut [SMatrix<T, D, D>],
-            ) -> Result<(), TpsError> {
-                (**self).jacobians_through(memory, pairs, points, jacobians)
-            }
-        }
-    };
-}
-forward!(Box);
-forward!(Arc);
-
-/// A family of warps with a rule to choose one from weighted pairs of points. Object safe: a pipeline holds an
-/// `Arc<dyn WarpModel<f64, 3> + Send + Sync>`.
+/// A family of warps with a rule to choose one from weighted pairs of points.
 ///
-/// Where the kind of warp is known, fit it by its own type: [`Spline::fit`], [`Affine::fit`](crate::Affine::fit),
-/// [`Affine::fit_rigid`](crate::Affine::fit_rigid).
+/// Object safe: a pipeline holds an `Arc<dyn WarpModel<f64, 3> + Send + Sync>`.
+/// Where the kind of warp is fixed, fit it by its own type:
+/// [`Spline::fit`], [`Affine::fit`], [`Affine::fit_rigid`].
 ///
 /// ```
 /// # use nalgebra::Point2;
@@ -146,7 +97,7 @@ forward!(Arc);
 /// # }
 /// ```
 pub trait WarpModel<T: Scalar, const D: usize> {
-    /// The warp that takes each source to its target as nearly as the model allows; without weights all count alike.
+    /// The warp that takes each source to its target as nearly as the model allows. Without weights all count alike.
     ///
     /// # Errors
     /// See [`TpsError`].
@@ -157,14 +108,16 @@ pub trait WarpModel<T: Scalar, const D: usize> {
         weights: Option<&[T]>,
     ) -> Result<Box<dyn Warp<T, D> + Send + Sync>, TpsError>;
 
-    /// The Jacobians at `points` of the warp that [`fit`](Self::fit) finds, for one set of pairs of a series: a model may work in what it
-    /// keeps in `memory` ([`Memory`]), and then allocates nothing from the second set on. By default the warp is fitted as if alone.
+    /// The Jacobians at `points` of the warp that [`fit`](Self::fit) finds, for one set of pairs of a series.
+    ///
+    /// A model may work in what it keeps in `memory`, and then allocates nothing from the second set on.
+    /// By default the warp is fitted as if alone.
     ///
     /// ```
     /// use nalgebra::{Matrix2, Point2};
-    /// use tactile_tps::{AffineModel, Memory, Pairs, WarpModel};
+    /// use tactile_tps::{AffineModel, SeriesMemory, Pairs, WarpModel};
     /// let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]].map(Point2::from);
-    /// let (mut memory, mut jacobians) = (Memory::default(), [Matrix2::zeros()]);
+    /// let (mut memory, mut jacobians) = (SeriesMemory::default(), [Matrix2::zeros()]);
     /// for stretch in [1.1_f64, 1.2] {
     ///     let targets = sources.map(|p| Point2::new(stretch * p.x, p.y));
     ///     let pairs = Pairs { sources: &sources, targets: &targets, weights: None };
@@ -178,7 +131,7 @@ pub trait WarpModel<T: Scalar, const D: usize> {
     /// Those of [`fit`](Self::fit), and [`TpsError::Length`] where `points` and `jacobians` differ in number.
     fn jacobians_through(
         &self,
-        memory: &mut Memory,
+        memory: &mut SeriesMemory,
         pairs: Pairs<'_, T, D>,
         points: &[Point<T, D>],
         jacobians: &mut [SMatrix<T, D, D>],
@@ -226,9 +179,7 @@ impl<T: Scalar, const D: usize, K: Kernel> Warp<T, D> for Spline<T, D, D, K> {
         points: &[Point<T, D>],
         jacobians: &mut [SMatrix<T, D, D>],
     ) -> Result<(), TpsError> {
-        same_length(points.len(), jacobians.len())?;
-        self.each::<1>(points, |i, sample| jacobians[i] = sample.jacobian());
-        Ok(())
+        Spline::jacobian_into(self, points, jacobians)
     }
 }
 
@@ -251,15 +202,262 @@ impl<T: Scalar, const D: usize, K: Kernel + 'static> WarpModel<T, D> for FitOpti
     }
 }
 
-/// The output must be as long as the input.
-pub(crate) fn same_length(expected: usize, found: usize) -> Result<(), TpsError> {
-    if expected == found {
-        Ok(())
-    } else {
-        Err(TpsError::Length {
-            input: "output slice",
-            expected,
-            found,
+/// Memory of one method along a series, for [`WarpModel::jacobians_through`] and others like it.
+///
+/// Its content belongs to the method, which asks for its own type with [`state`](Self::state).
+/// A method that finds the state of another one starts anew.
+///
+/// ```
+/// use tactile_tps::SeriesMemory;
+/// let mut memory = SeriesMemory::default();
+/// memory.state::<Vec<f64>>().push(7.0);
+/// assert_eq!(memory.state::<Vec<f64>>(), &[7.0]);
+/// assert_eq!(memory.state::<String>(), "", "another method's");
+/// assert!(memory.state::<Vec<f64>>().is_empty());
+/// ```
+#[derive(Default)]
+pub struct SeriesMemory {
+    state: Option<Box<dyn Any + Send + Sync>>,
+}
+
+impl SeriesMemory {
+    /// The state of type `S` that was left here. A default one where there is none, or one of another type.
+    pub fn state<S: Default + Send + Sync + 'static>(&mut self) -> &mut S {
+        let kept = self.state.take().and_then(|state| state.downcast().ok());
+        let state: Box<S> = kept.unwrap_or_default();
+        match self.state.insert(state).downcast_mut() {
+            Some(state) => state,
+            None => unreachable!("the state was put there as this type"),
+        }
+    }
+}
+
+impl core::fmt::Debug for SeriesMemory {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.debug_struct("SeriesMemory")
+            .field("is_empty", &self.state.is_none())
+            .finish()
+    }
+}
+
+/// The affine map f(x) = A x + b. A rigid motion where A is a rotation. [`Default`] is the identity.
+///
+/// ```
+/// # use nalgebra::{Matrix2, Point2, Vector2};
+/// # use tactile_tps::{Affine, Warp};
+/// let shear = Affine { linear: Matrix2::new(1.0, 0.5, 0.0, 1.0), offset: Vector2::new(0.0, 2.0) };
+/// assert_eq!(shear.apply(&Point2::new(1.0, 4.0)), Point2::new(3.0, 6.0));
+/// assert_eq!(shear.jacobian(&Point2::origin()), shear.linear);
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(
+    feature = "serde",
+    serde(bound = "T: Scalar + serde::Serialize + serde::de::DeserializeOwned")
+)]
+pub struct Affine<T: Scalar, const D: usize> {
+    /// The Jacobian A.
+    pub linear: SMatrix<T, D, D>,
+    /// The image b of the origin.
+    pub offset: SVector<T, D>,
+}
+
+impl<T: Scalar, const D: usize> Default for Affine<T, D> {
+    /// The map that leaves every point where it is.
+    fn default() -> Self {
+        Self {
+            linear: SMatrix::identity(),
+            offset: SVector::zeros(),
+        }
+    }
+}
+
+impl<T: Scalar, const D: usize> Affine<T, D> {
+    /// The map of least Σ wᵢ |A xᵢ + b − yᵢ|²: A = C S⁺ with S = Σ w x xᵀ and C = Σ w y xᵀ about the weighted means.
+    ///
+    /// Along directions that the points do not span the map moves points with their mean (the pseudo-inverse S⁺). O(n).
+    ///
+    /// ```
+    /// # use nalgebra::Point2;
+    /// # use tactile_tps::{Affine, Warp};
+    /// # fn main() -> Result<(), tactile_tps::TpsError> {
+    /// let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
+    /// let targets = sources.map(|p| Point2::new(2.0 * p.x - p.y, p.y + 3.0));
+    /// let map = Affine::fit(&sources, &targets, None)?;
+    /// assert!((map.apply(&Point2::new(5.0, 1.0)) - Point2::new(9.0, 4.0)).norm() < 1e-14);
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
+    /// # Errors
+    /// [`TpsError`] for no points, lengths that differ, or numbers that are not finite.
+    pub fn fit(
+        sources: &[Point<T, D>],
+        targets: &[Point<T, D>],
+        weights: Option<&[T]>,
+    ) -> Result<Self, TpsError> {
+        let moments = Moments::new(sources, targets, weights)?;
+        let (values, vectors) = symmetric_eigen(&moments.scatter);
+        let largest = values.iter().copied().fold(0.0, f64::max);
+        let mut linear = SMatrix::<f64, D, D>::zeros();
+        for (k, &value) in values.iter().enumerate() {
+            // Below this the extent is the rounding of the moments.
+            if value > largest * 1e-13 {
+                let axis = SVector::<f64, D>::from_fn(|i, _| vectors[(i, k)]);
+                linear += moments.cross * axis * axis.transpose() / value;
+            }
+        }
+        Ok(Self {
+            linear: linear.map(T::narrow),
+            offset: moments.offset(&linear),
         })
+    }
+
+    /// The rigid motion of least Σ wᵢ |R xᵢ + b − yᵢ|², R a rotation (no reflection): the one nearest to C = Σ w y xᵀ
+    /// (Kabsch 1976; Umeyama 1991). O(n).
+    ///
+    /// ```
+    /// # use nalgebra::{Point2, Rotation2};
+    /// # use tactile_tps::Affine;
+    /// # fn main() -> Result<(), tactile_tps::TpsError> {
+    /// let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
+    /// let turn = Rotation2::new(0.3);
+    /// let motion = Affine::fit_rigid(&sources, &sources.map(|p| turn * p), None)?;
+    /// assert!((motion.linear - turn.matrix()).norm() < 1e-15);
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
+    /// # Errors
+    /// [`TpsError`] for no points, lengths that differ, or numbers that are not finite.
+    pub fn fit_rigid(
+        sources: &[Point<T, D>],
+        targets: &[Point<T, D>],
+        weights: Option<&[T]>,
+    ) -> Result<Self, TpsError> {
+        let moments = Moments::new(sources, targets, weights)?;
+        let rotation = nearest_rotation(&moments.cross);
+        Ok(Self {
+            linear: rotation.map(T::narrow),
+            offset: moments.offset(&rotation),
+        })
+    }
+}
+
+impl<T: Scalar, const D: usize> Warp<T, D> for Affine<T, D> {
+    fn apply(&self, point: &Point<T, D>) -> Point<T, D> {
+        Point::from(self.linear * point.coords + self.offset)
+    }
+    fn jacobian(&self, _: &Point<T, D>) -> SMatrix<T, D, D> {
+        self.linear
+    }
+}
+
+/// Weighted moments of pairs about their means, in `f64`.
+struct Moments<const D: usize> {
+    source_mean: SVector<f64, D>,
+    target_mean: SVector<f64, D>,
+    cross: SMatrix<f64, D, D>,
+    scatter: SMatrix<f64, D, D>,
+}
+
+impl<const D: usize> Moments<D> {
+    fn new<T: Scalar>(
+        sources: &[Point<T, D>],
+        targets: &[Point<T, D>],
+        weights: Option<&[T]>,
+    ) -> Result<Self, TpsError> {
+        validate_pairs(sources, targets, weights)?;
+        let weight = |i: usize| weights.map_or(1.0, |w| w[i].widen());
+        let vector = |p: &Point<T, D>| p.coords.map(T::widen);
+        let total: f64 = (0..sources.len()).map(weight).sum();
+        let mean = |points: &[Point<T, D>]| {
+            let origin = vector(&points[0]);
+            let sum =
+                |sum: SVector<f64, D>, (i, p)| sum + (vector(p) - origin) * (weight(i) / total);
+            origin + points.iter().enumerate().fold(SVector::zeros(), sum)
+        };
+        let (source_mean, target_mean) = (mean(sources), mean(targets));
+        let (mut cross, mut scatter) = (SMatrix::zeros(), SMatrix::zeros());
+        for (i, (x, y)) in sources.iter().zip(targets).enumerate() {
+            let (x, y) = (vector(x) - source_mean, vector(y) - target_mean);
+            cross += y * x.transpose() * (weight(i) / total);
+            scatter += x * x.transpose() * (weight(i) / total);
+        }
+        Ok(Self {
+            source_mean,
+            target_mean,
+            cross,
+            scatter,
+        })
+    }
+
+    fn offset<T: Scalar>(&self, linear: &SMatrix<f64, D, D>) -> SVector<T, D> {
+        (self.target_mean - linear * self.source_mean).map(T::narrow)
+    }
+}
+
+/// Eigenvalues and vectors of a symmetric `D` × `D` matrix.
+fn symmetric_eigen<const D: usize>(matrix: &SMatrix<f64, D, D>) -> (Vec<f64>, DMatrix<f64>) {
+    let dynamic = DMatrix::from_fn(D, D, |i, j| matrix[(i, j)]);
+    let eigen = dynamic.symmetric_eigen();
+    (
+        eigen.eigenvalues.iter().copied().collect(),
+        eigen.eigenvectors,
+    )
+}
+
+/// The rotation R that maximises tr(Rᵀ C): U diag(1, …, det(U Vᵀ)) Vᵀ of the singular value decomposition.
+fn nearest_rotation<const D: usize>(cross: &SMatrix<f64, D, D>) -> SMatrix<f64, D, D> {
+    let svd = DMatrix::from_fn(D, D, |i, j| cross[(i, j)]).svd(true, true);
+    let (Some(mut u), Some(vt)) = (svd.u, svd.v_t) else {
+        return SMatrix::identity();
+    };
+    if (&u * &vt).determinant() < 0.0 {
+        let smallest = svd.singular_values.imin();
+        u.column_mut(smallest).neg_mut();
+    }
+    let rotation = u * vt;
+    SMatrix::from_fn(|i, j| rotation[(i, j)])
+}
+
+/// The [`WarpModel`] of affine maps: all of them, or rotations and translations alone.
+///
+/// ```
+/// # use nalgebra::{Point2, Vector2};
+/// # use tactile_tps::{AffineModel, Warp, WarpModel};
+/// # fn main() -> Result<(), tactile_tps::TpsError> {
+/// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
+/// let doubled = sources.map(|p| p * 2.0 + Vector2::new(1.0, 2.0));
+/// let warp: Box<dyn Warp<f64, 2> + Send + Sync> = AffineModel::General.fit(&sources, &doubled, None)?;
+/// assert!((warp.apply(&Point2::new(5.0, 1.0)) - Point2::new(11.0, 4.0)).norm() < 1e-14);
+/// let motion = AffineModel::Rigid.fit(&sources, &doubled, None)?;
+/// assert!((motion.jacobian(&Point2::origin()).determinant() - 1.0_f64).abs() < 1e-14);
+/// # Ok(())
+/// # }
+/// ```
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
+pub enum AffineModel {
+    /// Any affine map: [`Affine::fit`].
+    #[default]
+    General,
+    /// A rotation and a translation: [`Affine::fit_rigid`].
+    Rigid,
+}
+
+impl<T: Scalar, const D: usize> WarpModel<T, D> for AffineModel {
+    fn fit(
+        &self,
+        sources: &[Point<T, D>],
+        targets: &[Point<T, D>],
+        weights: Option<&[T]>,
+    ) -> Result<Box<dyn Warp<T, D> + Send + Sync>, TpsError> {
+        let fit = match self {
+            Self::General => Affine::fit,
+            Self::Rigid => Affine::fit_rigid,
+        };
+        Ok(Box::new(fit(sources, targets, weights)?))
     }
 }

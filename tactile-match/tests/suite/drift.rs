@@ -7,7 +7,6 @@ use tactile_match::{
     CoherentPointDrift, DriftWorkspace, MatchError, Matching, Motion, Normalization, PointMatcher,
     StopReason,
 };
-use tactile_tps::Warp;
 
 fn drift<const D: usize>(
     options: CoherentPointDrift,

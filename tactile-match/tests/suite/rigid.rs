@@ -3,7 +3,6 @@
 use crate::common::{Stream, reordered, rotation, scattered};
 use nalgebra::{Point, SVector};
 use tactile_match::{AnnealedSoftassign, Matching, PointMatcher, Transformation};
-use tactile_tps::Warp;
 
 const POINTS: usize = 80;
 const TURN: f64 = 0.4;

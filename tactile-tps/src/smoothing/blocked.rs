@@ -3,8 +3,8 @@
 use nalgebra::{Matrix3, Point3, Vector3};
 
 use crate::{
-    Factorization, FitOptions, LambdaPath, Memory, NegR, Pairs, Smoothing, ThinPlateSpline,
-    TpsError, Warp, WarpModel, Workspace,
+    Factorization, FitOptions, LambdaPath, NegR, Pairs, SeriesMemory, Smoothing, SplineWorkspace,
+    ThinPlateSpline, TpsError, Warp, WarpModel,
 };
 
 /// λ for n points is n/200 times a power of eight, times the points' root mean square radius.
@@ -73,7 +73,7 @@ impl WarpModel<f64, 3> for StrainSpline {
 
     fn jacobians_through(
         &self,
-        memory: &mut Memory,
+        memory: &mut SeriesMemory,
         pairs: Pairs<'_, f64, 3>,
         points: &[Point3<f64>],
         jacobians: &mut [Matrix3<f64>],
@@ -101,7 +101,7 @@ struct Fitter {
     /// For each λ the squared errors of all predicted pairs.
     errors: Vec<Vec<f64>>,
     factorization: Option<Factorization<f64, 3, NegR>>,
-    workspace: Workspace<3>,
+    workspace: SplineWorkspace<3>,
     /// The last one fitted.
     spline: Spline,
 }
@@ -115,7 +115,7 @@ impl Default for Fitter {
             path: None,
             errors: Vec::new(),
             factorization: None,
-            workspace: Workspace::default(),
+            workspace: SplineWorkspace::default(),
             spline: Spline::default(),
         }
     }
@@ -278,7 +278,7 @@ mod tests {
     /// What was fitted before leaves no trace, and nothing is allocated for as many points.
     #[test]
     fn splines_one_after_the_other_are_those_fitted_alone() {
-        let mut memory = Memory::default();
+        let mut memory = SeriesMemory::default();
         let few: Vec<_> = (0..200).map(|i| f64::from(i as u32 % 4)).collect();
         for (n, error, weights) in [
             (200, 0.03, None),

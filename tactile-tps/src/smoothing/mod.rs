@@ -3,7 +3,6 @@
 mod blocked;
 mod robust;
 
-use crate::{Scalar, TpsError};
 pub use blocked::StrainSpline;
 pub use robust::{RobustFit, RobustSpline};
 
@@ -36,14 +35,37 @@ pub enum Smoothing<T> {
     Gcv,
 }
 
-/// A λ must be finite and not negative.
-pub(crate) fn validate_smoothing<T: Scalar>(smoothing: &Smoothing<T>) -> Result<(), TpsError> {
-    match smoothing {
-        Smoothing::Lambda(lambda) if !(lambda.widen() >= 0.0 && lambda.widen().is_finite()) => {
-            Err(TpsError::Lambda {
-                value: lambda.widen(),
-            })
-        }
-        _ => Ok(()),
+/// The λ of least generalised cross-validation, from the spectrum of the matrix with σ on `affine` directions.
+///
+/// V(λ) = n |W^½(y − f)|² / tr(I − H)², both sums over the eigenvalues μ: |W^½(y − f)|² = Σ (λ/(μ + λ))² e
+/// and tr(I − H) = Σ λ/(μ + λ) less the terms of the affine directions.
+/// `energies` are the squared coefficients e = (vᵀb)² of the values in the eigenvectors, summed over the outputs.
+pub(crate) fn least_gcv(values: &[f64], energies: &[f64], affine: usize, shift: f64) -> f64 {
+    let most = values.iter().fold(f64::MIN_POSITIVE, |m, &mu| m.max(mu));
+    let score = |log: f64| {
+        let filter = |mu: f64| 1.0 / (1.0 + mu.max(0.0) / log.exp2());
+        let pairs = values.iter().zip(energies);
+        let rss: f64 = pairs.map(|(&mu, e)| filter(mu).powi(2) * e).sum();
+        let all: f64 = values.iter().map(|&mu| filter(mu)).sum();
+        let trace = all - affine as f64 * filter(shift);
+        values.len() as f64 * rss / (trace * trace)
+    };
+    // From far below what rounding of the matrix allows to where the spline is affine to single precision.
+    minimise(most.log2() - 50.0, most.log2() + 24.0, score).exp2()
+}
+
+/// The least of a function on a grid, then by golden section around it. The larger argument where values are equal.
+fn minimise(low: f64, high: f64, f: impl Fn(f64) -> f64) -> f64 {
+    let steps = 148;
+    let at = |i: usize| low + (high - low) * i as f64 / steps as f64;
+    let scores = (0..=steps).map(|i| (f(at(i)), i));
+    let least = |best: (f64, usize), new: (f64, usize)| if new.0 <= best.0 { new } else { best };
+    let best = scores.fold((f64::INFINITY, 0), least).1;
+    let (mut a, mut b) = (at(best.saturating_sub(1)), at((best + 1).min(steps)));
+    let golden = 0.5 * (5f64.sqrt() - 1.0);
+    for _ in 0..40 {
+        let (c, d) = (b - golden * (b - a), a + golden * (b - a));
+        if f(c) < f(d) { b = d } else { a = c }
     }
+    0.5 * (a + b)
 }

@@ -3,8 +3,7 @@
 use nalgebra::{Point, SMatrix, SVector};
 
 use crate::{
-    FitOptions, Smoothing, ThinPlateSpline, TpsError, Warp, WarpModel, centres::finite,
-    options::validate_weights,
+    FitOptions, Smoothing, ThinPlateSpline, TpsError, Warp, WarpModel, error::validate_pairs,
 };
 
 /// λ that are tried, in units of the squared radius of the points. The last one is affine.
@@ -93,7 +92,7 @@ impl<const D: usize> RobustFit<D> {
         targets: &[Point<f64, D>],
         weights: Option<&[f64]>,
     ) -> Result<Self, TpsError> {
-        validate(sources, targets, weights)?;
+        validate_pairs(sources, targets, weights)?;
         let prior = weights.map_or_else(|| vec![1.0; sources.len()], <[f64]>::to_vec);
         let square = squared_radius(sources);
         let relative_lambda = one_standard_error_lambda(sources, targets, &prior, square)?;
@@ -133,26 +132,6 @@ impl<const D: usize> Warp<f64, D> for RobustFit<D> {
     fn jacobian(&self, point: &Point<f64, D>) -> SMatrix<f64, D, D> {
         self.spline.jacobian(point)
     }
-}
-
-fn validate<const D: usize>(
-    sources: &[Point<f64, D>],
-    targets: &[Point<f64, D>],
-    weights: Option<&[f64]>,
-) -> Result<(), TpsError> {
-    if sources.is_empty() {
-        return Err(TpsError::Empty("source points"));
-    }
-    if targets.len() != sources.len() {
-        return Err(TpsError::Length {
-            input: "target points",
-            expected: sources.len(),
-            found: targets.len(),
-        });
-    }
-    finite(sources, "source points")?;
-    finite(targets, "target points")?;
-    weights.map_or(Ok(()), |weights| validate_weights(weights, sources.len()))
 }
 
 struct HeldOut<const D: usize> {

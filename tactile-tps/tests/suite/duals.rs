@@ -4,7 +4,7 @@ use core::ops::{Add, Div, Mul, Neg, Sub};
 
 use crate::common::{Uniform, bend};
 use nalgebra::{Point, SVector};
-use tactile_tps::{FitOptions, Kernel, NegR, R2LogR, R3, Real, ThinPlateSpline};
+use tactile_tps::{FitOptions, Kernel, KernelScalar, NegR, R2LogR, R3, ThinPlateSpline};
 
 /// x + ε dx, ε² = 0.
 #[derive(Clone, Copy, Debug, PartialEq, PartialOrd)]
@@ -45,7 +45,7 @@ impl Neg for Dual {
     }
 }
 
-impl Real for Dual {
+impl KernelScalar for Dual {
     fn from_f64(x: f64) -> Self {
         Self(x, 0.0)
     }
@@ -80,7 +80,7 @@ fn along<const D: usize, K: Kernel>(
     for (centre, weight) in spline.terms() {
         let distance = (0..D).map(|i| place[i] - Dual(centre[i], 0.0));
         let square = distance.fold(Dual(0.0, 0.0), |s, d| s + d * d);
-        let value = kernel.jet(square).value;
+        let value = kernel.derivatives(square).value;
         (0..D).for_each(|m| sums[m] = sums[m] + Dual(weight[m], 0.0) * value);
     }
     sums

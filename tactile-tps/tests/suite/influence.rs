@@ -3,7 +3,8 @@
 use crate::common::{Uniform, bend, largest, options};
 use nalgebra::{Matrix3, Point, Point1, SMatrix, SVector};
 use tactile_tps::{
-    Factorization, FitOptions, Kernel, NegR, R2LogR, R3, Smoothing, Spline, TpsError, Workspace,
+    Factorization, FitOptions, Kernel, NegR, R2LogR, R3, Smoothing, Spline, SplineWorkspace,
+    TpsError,
 };
 
 type Influences<const D: usize> = (Vec<f64>, Vec<SVector<f64, D>>);
@@ -14,7 +15,7 @@ fn influences<const D: usize, K: Kernel>(
     n: usize,
     x: Point<f64, D>,
 ) -> Influences<D> {
-    let mut workspace = Workspace::default();
+    let mut workspace = SplineWorkspace::default();
     let (mut values, mut slopes) = (vec![0.0; n], vec![SVector::zeros(); n]);
     factorization
         .influence_into(&mut workspace, &[x], &mut values)
@@ -37,7 +38,7 @@ fn against_unit_targets<const D: usize, K: Kernel + Default>(
     let sources = random.points::<D>(n);
     let queries: [Point<f64, D>; 7] = core::array::from_fn(|_| random.point::<D>() * 1.3);
     let factorization = Factorization::new(&sources, &options).expect("a factor");
-    let (mut workspace, mut unit) = (Workspace::default(), Spline::default());
+    let (mut workspace, mut unit) = (SplineWorkspace::default(), Spline::default());
     let mut values = vec![0.0; 7 * n];
     let mut slopes = vec![SVector::zeros(); 7 * n];
     factorization
@@ -144,7 +145,7 @@ fn single_precision_keeps_its_digits() {
     let x = single[7] + SVector::from([0.01f32, 0.02]);
     let single = Factorization::<f32, 2>::new(&single, &FitOptions::default()).expect("a factor");
     let double = Factorization::<f64, 2>::new(&double, &FitOptions::default()).expect("a factor");
-    let (mut workspace, mut a) = (Workspace::default(), vec![0.0; 30]);
+    let (mut workspace, mut a) = (SplineWorkspace::default(), vec![0.0; 30]);
     single
         .influence_into(&mut workspace, &[x], &mut a)
         .expect("a linear map");
@@ -157,14 +158,15 @@ fn what_is_no_linear_map_is_refused() {
     let sources = Uniform(6).points::<2>(12);
     let x = Point::from([0.1, 0.2]);
     let chosen = Factorization::<f64, 2>::new(&sources, &options(R2LogR, Smoothing::Gcv, None));
-    let chosen =
-        chosen
-            .expect("a factor")
-            .influence_into(&mut Workspace::default(), &[x], &mut [0.0; 12]);
+    let chosen = chosen.expect("a factor").influence_into(
+        &mut SplineWorkspace::default(),
+        &[x],
+        &mut [0.0; 12],
+    );
     assert_eq!(chosen, Err(TpsError::DependsOnTargets));
     let factorization =
         Factorization::<f64, 2>::new(&sources, &FitOptions::default()).expect("a factor");
-    let (mut workspace, mut short) = (Workspace::default(), vec![0.0; 11]);
+    let (mut workspace, mut short) = (SplineWorkspace::default(), vec![0.0; 11]);
     let found = factorization.influence_into(&mut workspace, &[x], &mut short);
     assert_eq!(
         found,

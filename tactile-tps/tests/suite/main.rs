@@ -12,5 +12,4 @@ mod path;
 mod properties;
 mod recorded;
 mod reference;
-mod reweight;
 mod stability_scale;

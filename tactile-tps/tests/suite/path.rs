@@ -3,7 +3,7 @@
 use nalgebra::{Point2, Point3};
 use tactile_tps::{
     Factorization, FitOptions, Kernel, LambdaPath, NegR, R2LogR, Smoothing, Solver, Spline,
-    TpsError, Workspace,
+    SplineWorkspace, TpsError,
 };
 
 const LAMBDAS: [f64; 4] = [1e-4, 0.02, 1.0, 300.0];
@@ -182,7 +182,7 @@ fn a_factor_of_other_points_is_not_used() {
             let (weights, none) = (Some(&weights[..]), Some(Smoothing::None));
             factorization
                 .refit_with(
-                    &mut Workspace::default(),
+                    &mut SplineWorkspace::default(),
                     &targets,
                     weights,
                     none,

@@ -4,7 +4,8 @@ use crate::common::{Uniform, bend, fit, for_all, largest, options};
 use nalgebra::{Point, Point2, Point3, Rotation2, Rotation3, SMatrix, SVector};
 use proptest::prelude::*;
 use tactile_tps::{
-    Affine, Factorization, FitOptions, Kernel, NegR, R2LogR, R3, Smoothing, Spline, Warp, Workspace,
+    Affine, Factorization, FitOptions, Kernel, NegR, R2LogR, R3, Smoothing, Spline,
+    SplineWorkspace, Warp,
 };
 
 fn interpolates<const D: usize, K: Kernel>(kernel: K, seed: u64) {
@@ -119,7 +120,7 @@ fn refits_to_the_same<const D: usize, K: Kernel + Default>(kernel: K, seed: u64)
         .collect();
     let factorization =
         Factorization::new(&sources, &FitOptions::new(kernel.clone())).expect("a factor");
-    let (mut workspace, mut refitted) = (Workspace::default(), Spline::default());
+    let (mut workspace, mut refitted) = (SplineWorkspace::default(), Spline::default());
     let query = random.point::<D>();
     for smoothing in [Smoothing::None, Smoothing::Lambda(0.3), Smoothing::Gcv] {
         for weights in [None, Some(&weights[..])] {

@@ -7,7 +7,7 @@ use test_support as record;
 use nalgebra::{Point, Point1, SVector};
 use tactile_tps::{
     Affine, Factorization, FitOptions, Kernel, NegR, R2LogR, R3, Smoothing, Spline,
-    ThinPlateSpline, Warp, Workspace,
+    SplineWorkspace, ThinPlateSpline, Warp,
 };
 
 use self::record::Answers;
@@ -72,7 +72,7 @@ fn fits<const D: usize, K: Kernel + Default>(answers: &mut Answers, kernel: K, n
     let heights: Vec<_> = targets.iter().map(|p| Point1::new(p[0] * p[1])).collect();
     let surface = factorization.fit(&heights).expect("a spline");
     spline(answers, &format!("{name}/height"), &surface);
-    let (mut workspace, mut refitted) = (Workspace::default(), Spline::default());
+    let (mut workspace, mut refitted) = (SplineWorkspace::default(), Spline::default());
     for (case, lambda) in [("refit", 0.02), ("refit_lambda", 0.3)] {
         factorization
             .refit_with(

@@ -11,7 +11,7 @@ use tactile_imaging::elasticity::modulus::{
 };
 use tactile_imaging::elasticity::strain::GreenLagrange;
 use tactile_imaging::force::{self, CalibrationPair, LinearCalibration, StressCalibration};
-use tactile_imaging::tps::{Factorization, FitOptions, Smoothing, Workspace};
+use tactile_imaging::tps::{Factorization, FitOptions, Smoothing, SplineWorkspace};
 
 const AREA_M2: f64 = 4e-5;
 /// Integrated pixel values of the two loads, with the noise of the light.
@@ -101,7 +101,11 @@ impl Experiment {
         let gradients = self.gradients(&self.after);
         let mut influence = vec![SVector::zeros(); self.samples.len() * self.before.len()];
         self.spline
-            .jacobian_influence_into(&mut Workspace::default(), &self.samples, &mut influence)
+            .jacobian_influence_into(
+                &mut SplineWorkspace::default(),
+                &self.samples,
+                &mut influence,
+            )
             .unwrap();
         let influence: Vec<_> = influence.chunks(self.before.len()).collect();
         let displacement: Vec<_> = self

@@ -1,0 +1,892 @@
+//! Source points, factored once for any targets: fits, refits and influences.
+
+use core::ops::ControlFlow;
+
+use nalgebra::{Point, SVector};
+
+use super::{
+    Buffers, Centres, Coefficients, MAX, Setting, System,
+    iterative::{Iterative, Run},
+    largest, relative,
+};
+use crate::{
+    FitOptions, FitReport, Kernel, Progress, R2LogR, Scalar, Smoothing, Spline, StopReason,
+    TpsError,
+    error::{finite, same_count, same_length, validate_smoothing, validate_weights},
+    evaluate::{BLOCK, KernelSum, Solution},
+    lanes::{Job, Lane, dispatch},
+};
+
+/// A callback that receives a fit's progress and may stop it.
+pub(super) type Watch<'a> = dyn FnMut(&Progress) -> ControlFlow<()> + 'a;
+
+/// Source points with their kernel matrix factored: splines to any targets follow in O(n²).
+///
+/// ```
+/// use nalgebra::Point2;
+/// use tactile_tps::{Factorization, FitOptions, ThinPlateSpline};
+/// # fn main() -> Result<(), tactile_tps::TpsError> {
+/// let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
+/// let factorization = Factorization::new(&sources, &FitOptions::default())?;
+/// let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
+/// let spline: ThinPlateSpline<f64, 2> = factorization.fit(&targets)?;
+/// assert!((spline.apply(&sources[4]) - targets[4]).norm() < 1e-14);
+/// # Ok(())
+/// # }
+/// ```
+#[derive(Clone, Debug)]
+pub struct Factorization<T: Scalar, const D: usize, K = R2LogR> {
+    pub(super) kernel: K,
+    pub(super) centres: Centres<D>,
+    system: System<D>,
+    pub(super) weights: Option<Vec<T>>,
+    /// Weight of every centre, empty if all weights are one.
+    pub(super) centre_weights: Vec<f64>,
+    smoothing: Smoothing<T>,
+    rank_tolerance: f64,
+    /// The preconditioner, if the solver iterates. The system is then without a factor.
+    iterative: Option<Iterative<D>>,
+    /// Residual at which iteration stops.
+    tolerance: f64,
+}
+
+/// Buffers that refits reuse.
+///
+/// ```
+/// # use nalgebra::Point2;
+/// # use tactile_tps::{Factorization, FitOptions, Spline, SplineWorkspace};
+/// # fn main() -> Result<(), tactile_tps::TpsError> {
+/// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
+/// let factorization = Factorization::new(&sources, &FitOptions::default())?;
+/// let (mut workspace, mut spline) = (SplineWorkspace::default(), Spline::default());
+/// for step in 1..=3 {
+///     // No allocation from the second round on.
+///     let targets = sources.map(|p| Point2::new(p.x, p.y * f64::from(step)));
+///     factorization.refit_with(&mut workspace, &targets, None, None, &mut spline)?;
+///     assert!((spline.apply(&sources[4]) - targets[4]).norm() < 1e-14);
+/// }
+/// # Ok(())
+/// # }
+/// ```
+#[derive(Clone, Debug, Default)]
+pub struct SplineWorkspace<const D: usize> {
+    buffers: Buffers,
+    system: System<D>,
+    iterative: Iterative<D>,
+    centre_weights: Vec<f64>,
+}
+
+/// A system with what is to be solved with it.
+struct Task<'a, T, const D: usize> {
+    system: &'a System<D>,
+    weights: Option<&'a [T]>,
+    smoothing: Smoothing<T>,
+    /// Measure the residual and refine sooner.
+    careful: bool,
+    /// Where there is no factor.
+    iterative: Option<&'a Iterative<D>>,
+}
+
+/// The affine parts of a solution and how it was found. The weights stand in the buffers.
+pub(super) struct Outcome<const M: usize> {
+    pub(super) affine: [Coefficients; M],
+    /// Largest residual relative to the largest target, where it was measured.
+    pub(super) residual: Option<f64>,
+    pub(super) refinements: usize,
+    /// Steps of conjugate gradients.
+    pub(super) iterations: usize,
+    pub(super) condition: f64,
+    pub(super) stop: StopReason,
+}
+
+impl<const M: usize> Outcome<M> {
+    /// Of a direct solve.
+    pub(super) fn new(affine: [Coefficients; M], condition: f64) -> Self {
+        Self {
+            affine,
+            residual: None,
+            refinements: 0,
+            iterations: 0,
+            condition,
+            stop: StopReason::Direct,
+        }
+    }
+}
+
+impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
+    /// Factors `sources` for the kernel, weights and λ of `options`: O(n³/3) time, O(n²) memory.
+    ///
+    /// With [`Smoothing::Gcv`] the matrix is decomposed instead, at some twenty times the cost.
+    /// Thousands of points, or [`Solver::Iterative`](crate::Solver), are prepared for iteration:
+    /// O(n²) time, O(n) memory.
+    ///
+    /// ```
+    /// # use nalgebra::Point2;
+    /// # use tactile_tps::{Factorization, FitOptions, NegR, TpsError};
+    /// # fn main() -> Result<(), tactile_tps::TpsError> {
+    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
+    /// let factorization = Factorization::new(&sources, &FitOptions::new(NegR))?;
+    /// assert!(factorization.fit(&sources)?.report.points == 5);
+    /// let five_weights = FitOptions::new(NegR).with_weights(vec![1.0; 5])?;
+    /// let error = Factorization::new(&sources[..4], &five_weights).unwrap_err();
+    /// assert_eq!(error, TpsError::Length { input: "weights", expected: 4, found: 5 });
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
+    /// # Errors
+    /// [`TpsError`] for bad input, or a kernel that is not definite on these points.
+    pub fn new(sources: &[Point<T, D>], options: &FitOptions<T, K>) -> Result<Self, TpsError> {
+        Self::new_watched(sources, options, |_| ControlFlow::Continue(()))
+    }
+
+    /// As [`new`](Self::new), reporting the progress of an iterative solver's preparation to `watch`, which may stop it.
+    pub(crate) fn new_watched(
+        sources: &[Point<T, D>],
+        options: &FitOptions<T, K>,
+        mut watch: impl FnMut(&Progress) -> ControlFlow<()>,
+    ) -> Result<Self, TpsError> {
+        let this = Self::without_points(options.kernel.clone());
+        this.refactored(sources, options, &mut watch)
+    }
+
+    /// As [`new`](Self::new), in the memory of this factorisation. O(n³/3).
+    ///
+    /// For points of the same number nothing is allocated.
+    ///
+    /// ```
+    /// # use nalgebra::Point2;
+    /// # use tactile_tps::{Factorization, FitOptions, Spline, TpsError, SplineWorkspace};
+    /// # fn main() -> Result<(), TpsError> {
+    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
+    /// let options = FitOptions::default();
+    /// let mut factorization = Factorization::new(&sources, &options)?;
+    /// let (mut workspace, mut spline) = (SplineWorkspace::default(), Spline::default());
+    /// for step in 1..=3 {
+    ///     let moved = sources.map(|p| p * f64::from(step));
+    ///     factorization = factorization.refactor(&moved, &options)?;
+    ///     factorization.refit_with(&mut workspace, &sources, None, None, &mut spline)?;
+    ///     assert!((spline.apply(&moved[4]) - sources[4]).norm() < 1e-14);
+    /// }
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
+    /// # Errors
+    /// As [`new`](Self::new).
+    pub fn refactor(
+        self,
+        sources: &[Point<T, D>],
+        options: &FitOptions<T, K>,
+    ) -> Result<Self, TpsError> {
+        self.refactored(sources, options, &mut |_| ControlFlow::Continue(()))
+    }
+
+    fn refactored(
+        self,
+        sources: &[Point<T, D>],
+        options: &FitOptions<T, K>,
+        watch: &mut Watch<'_>,
+    ) -> Result<Self, TpsError> {
+        let mut this = self.with_points(sources, options)?;
+        let lambda = this.inner_lambda(this.smoothing);
+        let mut system = core::mem::take(&mut this.system);
+        let iterative = this.iterative.take();
+        let (setting, weights) = (this.setting(), &this.centre_weights[..]);
+        if this.smoothing == Smoothing::Gcv {
+            system.decompose(&setting, weights);
+        } else if options.iterates(this.centres.len()) {
+            let mut iterative = iterative.unwrap_or_default();
+            let built = iterative.build(&setting, weights, lambda, &mut system, watch);
+            if built.is_break() {
+                return Err(TpsError::Stopped);
+            }
+            this.iterative = Some(iterative);
+        } else {
+            system.factor(&setting, weights, lambda)?;
+        }
+        this.system = system;
+        Ok(this)
+    }
+
+    /// No points yet: memory for [`with_points`](Self::with_points).
+    pub(super) fn without_points(kernel: K) -> Self {
+        const { assert!(D >= 1 && D < MAX, "splines have one to three dimensions") };
+        Self {
+            kernel,
+            centres: Centres::default(),
+            system: System::default(),
+            weights: None,
+            centre_weights: Vec::new(),
+            smoothing: Smoothing::None,
+            rank_tolerance: 0.0,
+            iterative: None,
+            tolerance: 0.0,
+        }
+    }
+
+    /// The distinct centres and the options, without a factor for them.
+    pub(super) fn with_points(
+        mut self,
+        sources: &[Point<T, D>],
+        options: &FitOptions<T, K>,
+    ) -> Result<Self, TpsError> {
+        if let Some(weights) = &options.weights {
+            same_count("weights", sources.len(), weights.len())?;
+            self.weights.get_or_insert_default().clone_from(weights);
+        } else {
+            self.weights = None;
+        }
+        self.kernel.clone_from(&options.kernel);
+        self.centres.take(sources, self.kernel.degree().is_some())?;
+        self.centres
+            .weigh(self.weights.as_deref(), &mut self.centre_weights);
+        self.smoothing = options.smoothing;
+        self.rank_tolerance = options.rank_tolerance.widen();
+        self.tolerance = options.tolerance.widen();
+        Ok(self)
+    }
+
+    pub(super) fn setting(&self) -> Setting<'_, K, D> {
+        Setting {
+            kernel: &self.kernel,
+            centres: &self.centres,
+            rank_tolerance: self.rank_tolerance,
+        }
+    }
+
+    /// λ in the frame's units: the kernel scales as length to its degree.
+    pub(super) fn inner_lambda(&self, smoothing: Smoothing<T>) -> f64 {
+        match smoothing {
+            Smoothing::Lambda(lambda) => lambda.widen() / self.unit(),
+            _ => 0.0,
+        }
+    }
+
+    /// How much larger the kernel is outside than in the frame.
+    fn unit(&self) -> f64 {
+        let degree = self.kernel.degree().unwrap_or(0);
+        self.centres.frame.scale.powi(degree)
+    }
+
+    /// Number of source points.
+    fn len(&self) -> usize {
+        self.centres.inputs
+    }
+
+    /// The spline to these targets, with the weights and smoothing of the factorisation.
+    ///
+    /// Measures the residual, and refines the solution where the condition number is large.
+    ///
+    /// ```
+    /// # use nalgebra::Point2;
+    /// # use tactile_tps::{Factorization, FitOptions};
+    /// # fn main() -> Result<(), tactile_tps::TpsError> {
+    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
+    /// let factorization = Factorization::new(&sources, &FitOptions::default())?;
+    /// // Any number of outputs: here a height.
+    /// let heights = sources.map(|p| nalgebra::Point1::new(p.x * p.y));
+    /// let surface = factorization.fit(&heights)?;
+    /// assert!((surface.apply(&sources[3]) - heights[3]).norm() < 1e-14);
+    /// assert!(surface.report.residual < Some(1e-14));
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
+    /// # Errors
+    /// [`TpsError`] for invalid targets.
+    pub fn fit<const M: usize>(
+        &self,
+        targets: &[Point<T, M>],
+    ) -> Result<Spline<T, D, M, K>, TpsError> {
+        self.fit_watched(targets, |_| ControlFlow::Continue(()))
+    }
+
+    /// As [`fit`](Self::fit), reporting the progress of an iterative solver to `watch`.
+    pub(crate) fn fit_watched<const M: usize>(
+        &self,
+        targets: &[Point<T, M>],
+        mut watch: impl FnMut(&Progress) -> ControlFlow<()>,
+    ) -> Result<Spline<T, D, M, K>, TpsError> {
+        let mut spline = Spline::zero(self.kernel.clone());
+        let task = Task {
+            careful: true,
+            ..self.own_task()
+        };
+        self.finish(
+            &task,
+            &mut Buffers::default(),
+            targets,
+            &mut spline,
+            &mut watch,
+        )?;
+        Ok(spline)
+    }
+
+    /// A quick fit with what the factorisation was made with.
+    fn own_task(&self) -> Task<'_, T, D> {
+        Task {
+            system: &self.system,
+            weights: self.weights.as_deref(),
+            smoothing: self.smoothing,
+            careful: false,
+            iterative: self.iterative.as_ref(),
+        }
+    }
+
+    /// New targets, weights and smoothing (`None`: those of the factorisation) for the same sources.
+    ///
+    /// The answer goes into a spline that is already there.
+    /// Nothing is allocated once workspace and spline have grown, but by a new cross-validation.
+    ///
+    /// Unlike [`fit`](Self::fit) it measures no residual, and refines only where the condition number exceeds 10⁸.
+    /// The same weights and λ cost two triangular solves.
+    /// Positive weights leave an interpolating spline as it is, and cost the same.
+    /// Other weights or another λ cost a factorisation, for an iterative solver a new preconditioner.
+    ///
+    /// ```
+    /// # use nalgebra::Point2;
+    /// # use tactile_tps::{Factorization, FitOptions, Smoothing, Spline, SplineWorkspace};
+    /// # fn main() -> Result<(), tactile_tps::TpsError> {
+    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
+    /// let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
+    /// let factorization = Factorization::new(&sources, &FitOptions::default().with_smoothing(Smoothing::Lambda(0.01))?)?;
+    /// let (mut workspace, mut spline) = (SplineWorkspace::default(), Spline::default());
+    /// let mut miss = |weight: f64| {
+    ///     let weights = [1.0, 1.0, 1.0, 1.0, weight];
+    ///     factorization
+    ///         .refit_with(&mut workspace, &targets, Some(&weights), None, &mut spline)
+    ///         .map(|()| (spline.apply(&sources[4]) - targets[4]).norm())
+    /// };
+    /// // Trusted more, the point is met more closely.
+    /// assert!(miss(100.0)? < 0.1 * miss(1.0)?);
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
+    /// # Errors
+    /// [`TpsError`] for invalid targets, weights or smoothing. The spline is then left as it was.
+    pub fn refit_with<const M: usize>(
+        &self,
+        workspace: &mut SplineWorkspace<D>,
+        targets: &[Point<T, M>],
+        weights: Option<&[T]>,
+        smoothing: Option<Smoothing<T>>,
+        spline: &mut Spline<T, D, M, K>,
+    ) -> Result<(), TpsError> {
+        let smoothing = smoothing.unwrap_or(self.smoothing);
+        validate_smoothing(&smoothing)?;
+        if let Some(weights) = weights {
+            validate_weights(weights, self.len())?;
+        }
+        let SplineWorkspace {
+            buffers,
+            system,
+            iterative,
+            centre_weights,
+        } = workspace;
+        let weights = weights.or(self.weights.as_deref());
+        self.centres.weigh(weights, centre_weights);
+        let gcv = smoothing == Smoothing::Gcv;
+        let task = if self.serves(smoothing, centre_weights) {
+            Task {
+                weights,
+                smoothing,
+                ..self.own_task()
+            }
+        } else {
+            self.build(smoothing, centre_weights, system, iterative)?;
+            Task {
+                system,
+                weights,
+                smoothing,
+                careful: false,
+                iterative: (!gcv && self.iterative.is_some()).then_some(&*iterative),
+            }
+        };
+        // Nothing stops a fit without a callback.
+        self.finish(&task, buffers, targets, spline, &mut |_| {
+            ControlFlow::Continue(())
+        })
+    }
+
+    /// Whether the system at hand serves a refit.
+    ///
+    /// An interpolating spline depends on its weights only in which of them are positive.
+    fn serves(&self, smoothing: Smoothing<T>, centre_weights: &[f64]) -> bool {
+        if smoothing == self.smoothing && centre_weights == self.centre_weights {
+            return true;
+        }
+        let interpolates =
+            |smoothing| smoothing != Smoothing::Gcv && self.inner_lambda(smoothing) == 0.0;
+        interpolates(smoothing)
+            && interpolates(self.smoothing)
+            && !centre_weights.contains(&0.0)
+            && !self.centre_weights.contains(&0.0)
+    }
+
+    /// A new factor, spectrum or preconditioner.
+    fn build(
+        &self,
+        smoothing: Smoothing<T>,
+        centre_weights: &[f64],
+        system: &mut System<D>,
+        iterative: &mut Iterative<D>,
+    ) -> Result<(), TpsError> {
+        let (setting, lambda) = (self.setting(), self.inner_lambda(smoothing));
+        if smoothing == Smoothing::Gcv {
+            system.decompose(&setting, centre_weights);
+        } else if self.iterative.is_none() {
+            system.factor(&setting, centre_weights, lambda)?;
+        } else {
+            // Without a callback nothing stops it.
+            let _ = iterative.build(&setting, centre_weights, lambda, system, &mut |_| {
+                ControlFlow::Continue(())
+            });
+        }
+        Ok(())
+    }
+
+    /// Solves and fills the spline, reporting an iteration's progress to `watch`.
+    fn finish<const M: usize>(
+        &self,
+        task: &Task<'_, T, D>,
+        buffers: &mut Buffers,
+        targets: &[Point<T, M>],
+        spline: &mut Spline<T, D, M, K>,
+        watch: &mut Watch<'_>,
+    ) -> Result<(), TpsError> {
+        let (system, centres) = (task.system, &self.centres);
+        let gcv = task.smoothing == Smoothing::Gcv;
+        let mut lambda = self.inner_lambda(task.smoothing);
+        self.check(targets)?;
+        if lambda == 0.0 && !gcv {
+            centres.agree(targets, task.weights)?;
+        }
+        let origin: [f64; M] = core::array::from_fn(|k| targets[0][k].widen());
+        centres.gather(targets, task.weights, &origin, buffers);
+        if gcv {
+            let (needed, found) = (system.affine.q, system.active.len());
+            if found <= needed {
+                return Err(TpsError::TooFewForValidation { needed, found });
+            }
+            let Buffers {
+                targets,
+                work,
+                spare,
+                ..
+            } = buffers;
+            lambda = system.cross_validate::<M>(targets, work, spare);
+        }
+        let outcome: Outcome<M> = match task.iterative {
+            Some(iterative) => Run {
+                kernel: &self.kernel,
+                system,
+                iterative,
+                tolerance: self.tolerance,
+            }
+            .solve(buffers, watch),
+            None => Equations {
+                kernel: &self.kernel,
+                centres,
+                system,
+                lambda,
+            }
+            .solve(buffers, task.careful),
+        };
+        self.record(&outcome, system, lambda, &mut spline.report);
+        let numbers = targets.iter().flat_map(|t| t.iter());
+        let solution = Solution {
+            frame: centres.frame,
+            axes: &centres.axes,
+            weights: &buffers.weights,
+            constant: core::array::from_fn(|k| origin[k] + outcome.affine[k][0]),
+            gradient: outcome.affine.map(|a| system.span.gradient(&a)),
+            level: numbers.fold(0.0, |m, x| f64::max(m, x.widen().abs())),
+        };
+        spline.assign(&self.kernel, &solution);
+        Ok(())
+    }
+
+    /// One finite target for each source.
+    pub(super) fn check<const M: usize>(&self, targets: &[Point<T, M>]) -> Result<(), TpsError> {
+        same_count("target points", self.len(), targets.len())?;
+        finite(targets, "target points")
+    }
+
+    /// Writes a solution's numbers into the report.
+    fn record<const M: usize>(
+        &self,
+        outcome: &Outcome<M>,
+        system: &System<D>,
+        lambda: f64,
+        report: &mut FitReport,
+    ) {
+        let centres = &self.centres;
+        report.points = centres.inputs;
+        report.merged = centres.inputs - centres.len();
+        report.ignored = centres.len() - system.active.len();
+        report.rank = system.affine.q;
+        report.extents.clear();
+        report.extents.extend_from_slice(&system.span.extents);
+        report.lambda = lambda * self.unit();
+        report.condition = outcome.condition;
+        report.residual = outcome.residual;
+        report.refinements = outcome.refinements;
+        report.iterations = outcome.iterations;
+        report.stop = outcome.stop;
+    }
+
+    /// Influence of each target on the spline's value at each point: aⱼ in f(x) = Σⱼ aⱼ yⱼ.
+    ///
+    /// Goes row by row into the caller's memory, `n` entries (one per source point) a point.
+    /// Allocates nothing once the workspace has grown.
+    ///
+    /// The same for every output and all targets, with the weights and λ of the factorisation. Σ aⱼ = 1, and Σ aⱼ xⱼ = x
+    /// where the points span space. Targets with covariances Cⱼ give f(x) the covariance Σ aⱼ² Cⱼ. O(n²) a point.
+    ///
+    /// ```
+    /// use nalgebra::Point2;
+    /// use tactile_tps::{Factorization, FitOptions, SplineWorkspace};
+    /// # fn main() -> Result<(), tactile_tps::TpsError> {
+    /// let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
+    /// let factorization = Factorization::<f64, 2>::new(&sources, &FitOptions::default())?;
+    /// let queries = [Point2::new(0.5, 0.5), sources[1]];
+    /// let mut influence = [0.0; 2 * 5];
+    /// factorization.influence_into(&mut SplineWorkspace::default(), &queries, &mut influence)?;
+    /// let standard_error = 0.01 * influence[..5].iter().map(|a| a * a).sum::<f64>().sqrt();
+    /// assert!((influence[..5].iter().sum::<f64>() - 1.0).abs() < 1e-14 && standard_error < 0.01);
+    /// // At a source point the spline follows its target alone.
+    /// assert!((influence[5 + 1] - 1.0).abs() < 1e-14 && influence[5 + 2].abs() < 1e-14);
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
+    /// # Errors
+    /// [`TpsError::DependsOnTargets`] if λ is left to cross-validation, [`TpsError::NoFactor`] if the solver is iterative,
+    /// [`TpsError::Length`] if `influence` is not of that length.
+    pub fn influence_into(
+        &self,
+        workspace: &mut SplineWorkspace<D>,
+        points: &[Point<T, D>],
+        influence: &mut [T],
+    ) -> Result<(), TpsError> {
+        self.linear(points.len(), influence.len())?;
+        // Four right-hand sides at a time read the factor once.
+        for (points, rows) in points.chunks(4).zip(influence.chunks_mut(4 * self.len())) {
+            let side = |r: usize| Side::value(self, &points[r.min(points.len() - 1)]);
+            let sides: [Side<D>; 4] = core::array::from_fn(side);
+            self.follow(&sides, &mut workspace.buffers, |r, i, a| {
+                if r < points.len() {
+                    rows[r * self.len() + i] = a;
+                }
+            });
+        }
+        Ok(())
+    }
+
+    /// Influence of each target on the Jacobian at each point: bⱼ in J(x) = Σⱼ yⱼ bⱼᵀ.
+    ///
+    /// Goes row by row into the caller's memory, `n` entries (one per source point) a point.
+    /// Allocates nothing once the workspace has grown.
+    ///
+    /// ```
+    /// use nalgebra::{Matrix2, Point2, Vector2};
+    /// use tactile_tps::{Factorization, FitOptions, SplineWorkspace};
+    /// # fn main() -> Result<(), tactile_tps::TpsError> {
+    /// let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
+    /// let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
+    /// let (factorization, x) = (Factorization::<f64, 2>::new(&sources, &FitOptions::default())?, Point2::new(0.5, 0.5));
+    /// let mut influence = [Vector2::zeros(); 5];
+    /// factorization.jacobian_influence_into(&mut SplineWorkspace::default(), &[x], &mut influence)?;
+    /// let sum = targets.iter().zip(&influence).fold(Matrix2::zeros(), |j, (y, b)| j + y.coords * b.transpose());
+    /// assert!((factorization.fit(&targets)?.jacobian(&x) - sum).norm() < 1e-14);
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
+    /// # Errors
+    /// As [`influence_into`](Self::influence_into).
+    pub fn jacobian_influence_into(
+        &self,
+        workspace: &mut SplineWorkspace<D>,
+        points: &[Point<T, D>],
+        influence: &mut [SVector<T, D>],
+    ) -> Result<(), TpsError> {
+        self.linear(points.len(), influence.len())?;
+        for (point, row) in points.iter().zip(influence.chunks_exact_mut(self.len())) {
+            let sides: [Side<D>; D] = core::array::from_fn(|k| Side::slope(self, point, k));
+            self.follow(&sides, &mut workspace.buffers, |k, i, b| row[i][k] = b);
+        }
+        Ok(())
+    }
+
+    /// Whether there is a linear map, and memory for it at these points.
+    fn linear(&self, points: usize, found: usize) -> Result<(), TpsError> {
+        same_length(points * self.len(), found)?;
+        match self.smoothing {
+            Smoothing::Gcv => Err(TpsError::DependsOnTargets),
+            _ if self.iterative.is_some() => Err(TpsError::NoFactor),
+            _ => Ok(()),
+        }
+    }
+
+    /// Solves for the influence of every source point on each right-hand side, and hands each to `sink`.
+    ///
+    /// The value is f(x) = k(x)ᵀw + p(x)ᵀa with (w, a) from the symmetric system A(w, a) = (y, 0).
+    /// So f(x) = α(x)ᵀy for the first part of A(α, β) = (k(x), p(x)): one solve, whatever the targets.
+    /// Derivatives of k and p give those of f.
+    fn follow<const R: usize>(
+        &self,
+        sides: &[Side<D>; R],
+        buffers: &mut Buffers,
+        mut sink: impl FnMut(usize, usize, T),
+    ) {
+        let n = self.centres.len();
+        let Buffers { targets, work, .. } = buffers;
+        targets.clear();
+        targets.resize(R * n, 0.0);
+        for (side, terms) in sides.iter().zip(targets.chunks_exact_mut(n)) {
+            dispatch(Fill {
+                kernel: &self.kernel,
+                axes: &self.centres.axes,
+                side,
+                terms,
+            });
+        }
+        let conditions = sides.each_ref().map(|side| &side.affine);
+        self.system.solve_adjoint(targets, conditions, work);
+        for (r, found) in targets.chunks_exact(n).enumerate() {
+            for i in 0..self.len() {
+                let influence = found[self.centres.centre(i)] * self.share(i);
+                sink(r, i, T::narrow(influence / sides[r].unit));
+            }
+        }
+    }
+
+    /// The part of an input point in the target of its centre.
+    fn share(&self, i: usize) -> f64 {
+        if self.centres.centre_of.is_empty() {
+            return 1.0;
+        }
+        let total = self.centre_weights[self.centres.centre(i)];
+        let weight = self.weights.as_ref().map_or(1.0, |w| w[i].widen());
+        if total > 0.0 { weight / total } else { 0.0 }
+    }
+}
+
+/// One right-hand side: the kernels and affine functions at a point, or their derivative along an axis.
+struct Side<const D: usize> {
+    point: [f64; D],
+    axis: Option<usize>,
+    affine: Coefficients,
+    /// Length of the frame's unit for a derivative, else one.
+    unit: f64,
+}
+
+impl<const D: usize> Side<D> {
+    fn value<T: Scalar, K>(factorization: &Factorization<T, D, K>, point: &Point<T, D>) -> Self {
+        let span = &factorization.system.span;
+        let point = factorization.centres.frame.inside(point);
+        let mut affine = [0.0; MAX];
+        (0..=span.directions).for_each(|c| affine[c] = span.value(c, &point));
+        Self {
+            point,
+            axis: None,
+            affine,
+            unit: 1.0,
+        }
+    }
+
+    fn slope<T: Scalar, K>(
+        factorization: &Factorization<T, D, K>,
+        point: &Point<T, D>,
+        axis: usize,
+    ) -> Self {
+        let (span, frame) = (&factorization.system.span, &factorization.centres.frame);
+        let mut affine = [0.0; MAX];
+        (0..=span.directions).for_each(|c| affine[c] = span.slope(c, axis));
+        Self {
+            point: frame.inside(point),
+            axis: Some(axis),
+            affine,
+            unit: frame.scale,
+        }
+    }
+}
+
+/// Writes a right-hand side's kernel about every centre.
+struct Fill<'a, K, const D: usize> {
+    kernel: &'a K,
+    axes: &'a [Vec<f64>; D],
+    side: &'a Side<D>,
+    terms: &'a mut [f64],
+}
+
+impl<K: Kernel, const D: usize> Job<f64> for Fill<'_, K, D> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Lane<f64>>(self) {
+        let n = self.terms.len();
+        let axes = self.axes.each_ref().map(|axis| &axis[..n]);
+        let point = self.side.point.map(L::new);
+        for (i, term) in self.terms.iter_mut().enumerate() {
+            let d: [L; D] = core::array::from_fn(|k| point[k] - L::new(axes[k][i]));
+            let s = d.iter().fold(L::from_f64(0.0), |s, d| d.mul_add(*d, s));
+            *term = match self.side.axis {
+                None => self.kernel.derivatives(s).value.get(),
+                Some(axis) => (L::from_f64(2.0) * self.kernel.derivatives(s).first * d[axis]).get(),
+            };
+        }
+    }
+}
+
+/// A spline's equations: everything but the targets.
+struct Equations<'a, K, const D: usize> {
+    kernel: &'a K,
+    centres: &'a Centres<D>,
+    system: &'a System<D>,
+    /// λ in the frame's units.
+    lambda: f64,
+}
+
+impl<K: Kernel, const D: usize> Equations<'_, K, D> {
+    /// Solves for the targets in `buffers`, and refines where the condition number is large.
+    ///
+    /// `careful` measures the residual and refines from a lower condition number on.
+    fn solve<const M: usize>(&self, buffers: &mut Buffers, careful: bool) -> Outcome<M> {
+        let Buffers {
+            targets,
+            weights,
+            work,
+            spare,
+            ..
+        } = &mut *buffers;
+        weights.clone_from(targets);
+        let affine = self.system.solve(weights, self.lambda, work, spare);
+        let mut outcome = Outcome::new(affine, self.system.condition(self.lambda));
+        let n = self.centres.len();
+        // For a few points a step of refinement costs next to nothing, and is taken sooner.
+        let threshold = match careful {
+            true if n <= 128 => 10.0 * n as f64,
+            true => 1e6,
+            false => 1e8,
+        };
+        if outcome.condition > threshold {
+            self.refine(buffers, &mut outcome);
+        }
+        if careful && outcome.refinements == 0 {
+            outcome.residual = Some(self.sampled_residual(&outcome.affine, buffers));
+        }
+        outcome
+    }
+
+    /// Iterative refinement, in at most four steps.
+    fn refine<const M: usize>(&self, buffers: &mut Buffers, outcome: &mut Outcome<M>) {
+        let mut last = f64::INFINITY;
+        for _ in 0..4 {
+            outcome.residual = Some(self.residual(&outcome.affine, buffers));
+            let Buffers {
+                weights,
+                residuals,
+                work,
+                spare,
+                ..
+            } = &mut *buffers;
+            let affine: [Coefficients; M] = self.system.solve(residuals, self.lambda, work, spare);
+            let step = largest(residuals) / largest(weights).max(f64::MIN_POSITIVE);
+            // A step that is no shorter than half the one before is rounding.
+            if step.is_nan() || step > 0.5 * last {
+                return;
+            }
+            let pairs = weights.iter_mut().zip(residuals.iter());
+            pairs.for_each(|(w, r)| *w += r);
+            let pairs = outcome.affine.iter_mut().flatten();
+            pairs
+                .zip(affine.iter().flatten())
+                .for_each(|(a, d)| *a += d);
+            outcome.refinements += 1;
+            if step < 1e-8 {
+                return;
+            }
+            last = step;
+        }
+    }
+
+    /// y − K w − λ W⁻¹ w − P a at the centres. Gives its largest entry relative to the largest target.
+    fn residual<const M: usize>(&self, affine: &[Coefficients; M], buffers: &mut Buffers) -> f64 {
+        let n = self.centres.len();
+        let Buffers {
+            targets,
+            weights,
+            residuals,
+            ..
+        } = buffers;
+        residuals.clone_from(targets);
+        let sum = self.sum::<M>(weights);
+        let places = sum.centres;
+        sum.subtract(places, 0..n, residuals);
+        let mut size = 0.0;
+        for (i, &centre) in self.system.active.iter().enumerate() {
+            for m in 0..M {
+                let residual = &mut residuals[m * n + centre];
+                *residual -= self.rest(&affine[m], &weights[m * n..], i);
+                size = f64::max(size, residual.abs());
+            }
+        }
+        relative(size, targets)
+    }
+
+    /// The largest residual at up to one block of centres, spread evenly.
+    fn sampled_residual<const M: usize>(
+        &self,
+        affine: &[Coefficients; M],
+        buffers: &mut Buffers,
+    ) -> f64 {
+        let (n, active) = (self.centres.len(), &self.system.active);
+        let count = active.len().min(BLOCK);
+        let pick = |i: usize| i * active.len() / count;
+        let Buffers {
+            targets,
+            weights,
+            residuals,
+            ..
+        } = buffers;
+        residuals.clear();
+        residuals.resize(M * count, 0.0);
+        let mut places = [[0.0; BLOCK]; D];
+        for (k, axis) in places.iter_mut().enumerate() {
+            (0..count).for_each(|i| axis[i] = self.centres.axes[k][active[pick(i)]]);
+        }
+        let places = places.each_ref().map(|axis| &axis[..count]);
+        self.sum::<M>(weights).subtract(places, 0..count, residuals);
+        let mut size = 0.0;
+        for i in 0..count {
+            for m in 0..M {
+                let target = targets[m * n + active[pick(i)]];
+                let rest = self.rest(&affine[m], &weights[m * n..], pick(i));
+                size = f64::max(size, (target - rest + residuals[m * count + i]).abs());
+            }
+        }
+        relative(size, targets)
+    }
+
+    /// λ W⁻¹ w + P a at an active centre.
+    fn rest(&self, affine: &Coefficients, weights: &[f64], i: usize) -> f64 {
+        let centre = self.system.active[i];
+        let scale = self.system.scales.get(i).copied().unwrap_or(1.0);
+        let point = core::array::from_fn(|k| self.centres.axes[k][centre]);
+        let smooth = self.lambda * (weights[centre] / scale / scale);
+        smooth + self.system.span.polynomial(affine, &point)
+    }
+
+    fn sum<'b, const M: usize>(&'b self, weights: &'b [f64]) -> KernelSum<'b, f64, K, D, M> {
+        let n = self.centres.len();
+        KernelSum {
+            kernel: self.kernel,
+            centres: self.centres.axes.each_ref().map(|axis| &axis[..]),
+            weights: core::array::from_fn(|m| &weights[m * n..(m + 1) * n]),
+        }
+    }
+}

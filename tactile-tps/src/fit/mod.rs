@@ -1,0 +1,1028 @@
+//! The equations of a spline: distinct points, the directions they span, and the matrix to solve with.
+//!
+//! With weights W the equations K w + λW⁻¹w + P a = y, Pᵀw = 0 become, for v = W^-½ w,
+//! S v + W^½P a = W^½ y and (W^½P)ᵀv = 0 with S = W^½KW^½ + λI.
+//! Scaling by rows keeps weights apart that differ by many decades.
+//!
+//! Let W^½P = QR with orthonormal Q, and Π = I − QQᵀ. The solution satisfies v = Πv and ΠSΠ v = Π W^½y.
+//! On the range of Π the matrix ΠSΠ is positive definite.
+//! Adding σQQᵀ makes it definite everywhere without touching the solution.
+//! With σ the mean eigenvalue on the range of Π the condition number stays what it is.
+
+mod factorization;
+mod iterative;
+mod path;
+
+use core::mem::MaybeUninit;
+
+use faer::{
+    Accum, Mat, MatMut, MatRef, Par, Spec,
+    diag::DiagMut,
+    dyn_stack::{MemStack, StackReq},
+    linalg::{cholesky::llt, evd, matmul::matmul},
+};
+use nalgebra::Point;
+
+pub use factorization::{Factorization, SplineWorkspace};
+pub use path::LambdaPath;
+
+use crate::{
+    Kernel, Scalar, TpsError,
+    error::finite,
+    evaluate::Frame,
+    lanes::{Job, Lane, dispatch, dot},
+    smoothing::least_gcv,
+};
+
+/// Affine functions in three dimensions: 1, x, y and z.
+const MAX: usize = 4;
+
+/// Coefficients of an affine function.
+type Coefficients = [f64; MAX];
+
+/// Distinct points in their frame, and which input point went where.
+#[derive(Clone, Debug)]
+struct Centres<const D: usize> {
+    frame: Frame<D>,
+    /// Coordinates in the frame, axis by axis.
+    axes: [Vec<f64>; D],
+    /// First input point of every centre, ascending.
+    first: Vec<usize>,
+    /// Centre of every input point. Empty if they are the same.
+    centre_of: Vec<usize>,
+    /// Rounding of the coordinates, relative to the frame.
+    grain: f64,
+    inputs: usize,
+    /// The input points in the order of their coordinates.
+    order: Vec<usize>,
+}
+
+impl<const D: usize> Default for Centres<D> {
+    fn default() -> Self {
+        Self {
+            frame: Frame::default(),
+            axes: [const { Vec::new() }; D],
+            first: Vec::new(),
+            centre_of: Vec::new(),
+            grain: 0.0,
+            inputs: 0,
+            order: Vec::new(),
+        }
+    }
+}
+
+impl<const D: usize> Centres<D> {
+    /// Takes over points, reusing memory where it suffices.
+    fn take<T: Scalar>(&mut self, points: &[Point<T, D>], rescale: bool) -> Result<(), TpsError> {
+        if points.is_empty() {
+            return Err(TpsError::Empty("source points"));
+        }
+        finite(points, "source points")?;
+        self.frame = Frame::around(points, rescale);
+        self.merge(points);
+        for (k, axis) in self.axes.iter_mut().enumerate() {
+            axis.clear();
+            axis.extend(self.first.iter().map(|&i| self.frame.inside(&points[i])[k]));
+        }
+        let numbers = points.iter().flat_map(|p| p.iter());
+        let largest = numbers.fold(0.0, |m, x| f64::max(m, x.widen().abs()));
+        self.grain = largest / self.frame.scale * T::UNIT_ROUNDOFF;
+        self.inputs = points.len();
+        Ok(())
+    }
+
+    /// Finds the first point of every group of equal ones, and the group of each point.
+    fn merge<T: Scalar>(&mut self, points: &[Point<T, D>]) {
+        let Self {
+            first,
+            centre_of,
+            order,
+            ..
+        } = self;
+        for list in [&mut *first, &mut *order] {
+            list.clear();
+            list.extend(0..points.len());
+        }
+        centre_of.clear();
+        let compare = |&i: &usize, &j: &usize| {
+            let differ = (0..D).map(|k| points[i][k].widen().partial_cmp(&points[j][k].widen()));
+            differ.flatten().find(|o| o.is_ne()).unwrap_or(i.cmp(&j))
+        };
+        order.sort_unstable_by(compare);
+        if order.windows(2).all(|w| points[w[0]] != points[w[1]]) {
+            return;
+        }
+        // The first point of every point's group, then the group's number.
+        centre_of.extend(0..points.len());
+        for pair in order.windows(2) {
+            if points[pair[0]] == points[pair[1]] {
+                centre_of[pair[1]] = centre_of[pair[0]];
+            }
+        }
+        first.retain(|&i| centre_of[i] == i);
+        for leader in centre_of {
+            *leader = first.partition_point(|&i| i < *leader);
+        }
+    }
+
+    /// Replaces `local` by these centres alone, in the same frame.
+    fn select(&self, centres: impl Iterator<Item = usize> + Clone, local: &mut Self) {
+        for (axis, all) in local.axes.iter_mut().zip(&self.axes) {
+            axis.clear();
+            axis.extend(centres.clone().map(|i| all[i]));
+        }
+        local.first.clear();
+        local.first.extend(centres.map(|i| self.first[i]));
+    }
+
+    /// Number of distinct points.
+    fn len(&self) -> usize {
+        self.first.len()
+    }
+
+    /// Centre of input point `i`.
+    fn centre(&self, i: usize) -> usize {
+        self.centre_of.get(i).copied().unwrap_or(i)
+    }
+
+    /// Coinciding points must have equal targets where the spline interpolates.
+    fn agree<T: Scalar, const M: usize>(
+        &self,
+        targets: &[Point<T, M>],
+        weights: Option<&[T]>,
+    ) -> Result<(), TpsError> {
+        let counts = |i: usize| weights.is_none_or(|w| w[i] > T::zero());
+        for second in (0..self.centre_of.len()).filter(|&i| counts(i)) {
+            let centre = self.centre_of[second];
+            let same = |&i: &usize| self.centre_of[i] == centre && counts(i);
+            let first = (self.first[centre]..second).find(same).unwrap_or(second);
+            if targets[first] != targets[second] {
+                return Err(TpsError::Conflict { first, second });
+            }
+        }
+        Ok(())
+    }
+
+    /// Targets at the centres less `origin`, output by output: the weighted mean where points coincide.
+    fn gather<T: Scalar, const M: usize>(
+        &self,
+        targets: &[Point<T, M>],
+        weights: Option<&[T]>,
+        origin: &[f64; M],
+        buffers: &mut Buffers,
+    ) {
+        let n = self.len();
+        buffers.targets.clear();
+        buffers.targets.resize(n * M, 0.0);
+        for (k, column) in buffers.targets.chunks_exact_mut(n).enumerate() {
+            let totals = &mut buffers.work;
+            totals.clear();
+            totals.resize(n, 0.0);
+            for (i, target) in targets.iter().enumerate() {
+                let (centre, weight) = (self.centre(i), weights.map_or(1.0, |w| w[i].widen()));
+                let value = target[k].widen() - origin[k];
+                totals[centre] += weight;
+                if totals[centre] == weight {
+                    column[centre] = value;
+                } else if weight > 0.0 {
+                    column[centre] += (value - column[centre]) * (weight / totals[centre]);
+                }
+            }
+        }
+    }
+
+    /// Weight of every centre, none if all are one.
+    fn weigh<T: Scalar>(&self, weights: Option<&[T]>, sums: &mut Vec<f64>) {
+        sums.clear();
+        if weights.is_none() && self.centre_of.is_empty() {
+            return;
+        }
+        sums.resize(self.len(), 0.0);
+        for i in 0..self.inputs {
+            sums[self.centre(i)] += weights.map_or(1.0, |w| w[i].widen());
+        }
+    }
+}
+
+/// The directions in which points extend, from the singular values of their centred coordinates.
+#[derive(Clone, Debug)]
+struct Span<const D: usize> {
+    /// Number of spanned directions.
+    directions: usize,
+    /// Orthonormal directions, spanned ones first. The coordinate axes if all are spanned.
+    basis: [[f64; D]; D],
+    /// Root mean square extent along each direction relative to the largest, falling.
+    extents: [f64; D],
+}
+
+impl<const D: usize> Default for Span<D> {
+    fn default() -> Self {
+        Self {
+            directions: 0,
+            basis: [[0.0; D]; D],
+            extents: [0.0; D],
+        }
+    }
+}
+
+impl<const D: usize> Span<D> {
+    /// The span of n points, whose coordinates stand in `columns`, axis by axis, and are overwritten.
+    ///
+    /// One-sided rotations (Hestenes 1958) keep small singular values to their own relative precision.
+    /// A direction counts if its extent exceeds the rounding `grain` and the share `tolerance` of the largest.
+    fn new(columns: &mut [f64], grain: f64, tolerance: f64) -> Self {
+        let n = columns.len() / D;
+        for column in columns.chunks_exact_mut(n) {
+            let mean = column.iter().sum::<f64>() / n as f64;
+            column.iter_mut().for_each(|x| *x -= mean);
+        }
+        let axes = core::array::from_fn(|j| core::array::from_fn(|i| f64::from(i == j)));
+        let mut vectors: [[f64; D]; D] = axes;
+        // Three columns need a handful of sweeps: convergence is quadratic.
+        for _ in 0..20 {
+            let mut turned = false;
+            for q in 1..D {
+                for p in 0..q {
+                    turned |= orthogonalise(columns, n, p, q, &mut vectors);
+                }
+            }
+            if !turned {
+                break;
+            }
+        }
+        let size = |k: usize| {
+            let column = &columns[k * n..(k + 1) * n];
+            dot(column, column).sqrt()
+        };
+        let mut order: [usize; D] = core::array::from_fn(|k| k);
+        order.sort_unstable_by(|&i, &j| size(j).total_cmp(&size(i)));
+        let sizes = order.map(size);
+        let rounding = 8.0 * (grain + f64::EPSILON) * (n as f64).sqrt();
+        let noise = f64::max(rounding, tolerance * sizes[0]);
+        let directions = sizes.iter().filter(|size| **size > noise).count();
+        Self {
+            directions,
+            basis: if directions < D {
+                order.map(|k| vectors[k])
+            } else {
+                axes
+            },
+            extents: sizes.map(|size| if sizes[0] > 0.0 { size / sizes[0] } else { 0.0 }),
+        }
+    }
+
+    /// Affine function `c` of [1, x·b₁, …] at a point.
+    fn value(&self, c: usize, point: &[f64; D]) -> f64 {
+        if c == 0 {
+            return 1.0;
+        }
+        (0..D).map(|k| self.basis[c - 1][k] * point[k]).sum()
+    }
+
+    /// Derivative of affine function `c` along an axis.
+    fn slope(&self, c: usize, axis: usize) -> f64 {
+        if c == 0 { 0.0 } else { self.basis[c - 1][axis] }
+    }
+
+    /// The affine function with coefficients `a` at a point.
+    fn polynomial(&self, a: &Coefficients, point: &[f64; D]) -> f64 {
+        (0..=self.directions)
+            .map(|c| a[c] * self.value(c, point))
+            .sum()
+    }
+
+    /// The gradient in coordinates of an affine function.
+    fn gradient(&self, a: &Coefficients) -> [f64; D] {
+        core::array::from_fn(|k| (1..=self.directions).map(|c| a[c] * self.slope(c, k)).sum())
+    }
+}
+
+/// Rotates columns `p` and `q` of length `n` until they are orthogonal, and `vectors` with them. `false` if they are.
+fn orthogonalise<const D: usize>(
+    columns: &mut [f64],
+    n: usize,
+    p: usize,
+    q: usize,
+    vectors: &mut [[f64; D]; D],
+) -> bool {
+    let (left, right) = columns.split_at_mut(q * n);
+    let (left, right) = (&mut left[p * n..(p + 1) * n], &mut right[..n]);
+    let (a, b, c) = (dot(left, left), dot(right, right), dot(left, right));
+    // Rounding of the sums: below it the columns are orthogonal.
+    if c.abs() <= f64::EPSILON * (n as f64).sqrt() * (a * b).sqrt() {
+        return false;
+    }
+    let zeta = (b - a) / (2.0 * c);
+    let tangent = zeta.signum() / (zeta.abs() + (1.0 + zeta * zeta).sqrt());
+    let cosine = 1.0 / (1.0 + tangent * tangent).sqrt();
+    let sine = cosine * tangent;
+    let turn = |x: &mut f64, y: &mut f64| {
+        (*x, *y) = (cosine * *x - sine * *y, sine * *x + cosine * *y);
+    };
+    left.iter_mut().zip(right).for_each(|(x, y)| turn(x, y));
+    let (head, tail) = vectors.split_at_mut(q);
+    head[p]
+        .iter_mut()
+        .zip(&mut tail[0])
+        .for_each(|(x, y)| turn(x, y));
+    true
+}
+
+/// The affine functions at n points: P = QR with orthonormal Q.
+#[derive(Clone, Debug, Default)]
+struct AffineBasis {
+    n: usize,
+    /// Number of affine functions.
+    q: usize,
+    /// Q, column by column.
+    columns: Vec<f64>,
+    r: [[f64; MAX]; MAX],
+}
+
+impl AffineBasis {
+    /// Factors the q columns of length n that `fill` writes, by Gram and Schmidt's rule.
+    ///
+    /// Twice is enough for orthogonality to rounding. Rows keep their own relative precision, which wild weights need.
+    fn factor(&mut self, n: usize, q: usize, fill: impl Fn(usize, &mut [f64])) {
+        (self.n, self.q) = (n, q);
+        self.columns.clear();
+        self.columns.resize(n * q, 0.0);
+        self.r = [[0.0; MAX]; MAX];
+        for k in 0..q {
+            let (done, rest) = self.columns.split_at_mut(k * n);
+            let column = &mut rest[..n];
+            fill(k, column);
+            for _ in 0..2 {
+                for (i, earlier) in done.chunks_exact(n).enumerate() {
+                    let share = dot(earlier, column);
+                    self.r[i][k] += share;
+                    subtract(share, earlier, column);
+                }
+            }
+            let norm = dot(column, column).sqrt();
+            self.r[k][k] = norm;
+            column.iter_mut().for_each(|x| *x /= norm);
+        }
+    }
+
+    fn column(&self, k: usize) -> &[f64] {
+        &self.columns[k * self.n..(k + 1) * self.n]
+    }
+
+    /// b ← Πb. Returns Qᵀb.
+    fn remove(&self, b: &mut [f64]) -> Coefficients {
+        let mut heads = [0.0; MAX];
+        for k in 0..self.q {
+            heads[k] = dot(self.column(k), b);
+        }
+        for k in 0..self.q {
+            subtract(heads[k], self.column(k), b);
+        }
+        heads
+    }
+
+    /// Solves R a = c.
+    fn coefficients(&self, c: &Coefficients) -> Coefficients {
+        let mut a = [0.0; MAX];
+        for i in (0..self.q).rev() {
+            let rest: f64 = (i + 1..self.q).map(|j| self.r[i][j] * a[j]).sum();
+            a[i] = (c[i] - rest) / self.r[i][i];
+        }
+        a
+    }
+
+    /// Solves Rᵀ h = p: the part Qh of a solution with Pᵀv = p.
+    fn conditions(&self, p: &Coefficients) -> Coefficients {
+        let mut h = [0.0; MAX];
+        for i in 0..self.q {
+            let rest: f64 = (0..i).map(|j| self.r[j][i] * h[j]).sum();
+            h[i] = (p[i] - rest) / self.r[i][i];
+        }
+        h
+    }
+}
+
+/// b ← b − factor · a.
+fn subtract(factor: f64, a: &[f64], b: &mut [f64]) {
+    b.iter_mut().zip(a).for_each(|(b, a)| *b -= factor * a);
+}
+
+/// The inputs of a system.
+struct Setting<'a, K, const D: usize> {
+    kernel: &'a K,
+    centres: &'a Centres<D>,
+    /// Share of the largest extent below which a direction counts as not spanned.
+    rank_tolerance: f64,
+}
+
+/// ΠSΠ + σQQᵀ over the centres of positive weight, factored or decomposed.
+#[derive(Clone, Debug, Default)]
+struct System<const D: usize> {
+    /// Centres of positive weight.
+    active: Vec<usize>,
+    /// √weight of each. Empty if all are one.
+    scales: Vec<f64>,
+    span: Span<D>,
+    affine: AffineBasis,
+    /// SQ without λ, column by column.
+    coupling: Vec<f64>,
+    /// σ.
+    shift: f64,
+    /// Lower triangle of the matrix, or its Cholesky factor.
+    matrix: Triangle,
+    spectrum: Option<Spectrum>,
+    condition: f64,
+    scratch: Vec<f64>,
+}
+
+impl<const D: usize> System<D> {
+    /// Factors for centre weights (empty: all one) and λ ≥ 0: n³/3 multiplications and additions.
+    fn factor<K: Kernel>(
+        &mut self,
+        setting: &Setting<'_, K, D>,
+        weights: &[f64],
+        lambda: f64,
+    ) -> Result<(), TpsError> {
+        self.spectrum = None;
+        let size = self.assemble(setting, weights, lambda > 0.0);
+        self.matrix.add_to_diagonal(lambda);
+        if self.matrix.factor().is_err() {
+            // Points nearly coincide, and rounding has left the matrix indefinite. A λ of the size of that rounding
+            // moves values by no more than it. A kernel that is not definite fails again.
+            self.assemble(setting, weights, lambda > 0.0);
+            let rounding = f64::EPSILON * self.active.len() as f64 * (size + lambda);
+            self.matrix.add_to_diagonal(lambda + rounding);
+            self.matrix.factor()?;
+            self.condition = f64::INFINITY;
+            return Ok(());
+        }
+        self.condition = 1.0;
+        if self.active.len() > self.affine.q {
+            let inverse = self.matrix.inverse_norm(&mut self.scratch);
+            self.condition = f64::max(1.0, (size + lambda) * inverse);
+        }
+        Ok(())
+    }
+
+    /// Decomposes for centre weights and any λ > 0: some 10 n³ operations.
+    fn decompose<K: Kernel>(&mut self, setting: &Setting<'_, K, D>, weights: &[f64]) {
+        self.assemble(setting, weights, true);
+        self.spectrum
+            .get_or_insert_default()
+            .decompose(&mut self.matrix);
+    }
+
+    /// Condition number of the matrix, with `lambda` added to a decomposed one.
+    fn condition(&self, lambda: f64) -> f64 {
+        self.spectrum
+            .as_ref()
+            .map_or(self.condition, |spectrum| spectrum.condition(lambda))
+    }
+
+    /// Writes the lower triangle of the matrix without λ. Returns the Frobenius norm of ΠSΠ.
+    fn assemble<K: Kernel>(
+        &mut self,
+        setting: &Setting<'_, K, D>,
+        weights: &[f64],
+        scaled: bool,
+    ) -> f64 {
+        self.choose(setting.centres.len(), weights, scaled);
+        self.outline(setting);
+        let (n, q) = (self.active.len(), self.affine.q);
+        self.matrix.resize(n);
+        self.coupling.clear();
+        self.coupling.resize(n * q, 0.0);
+        self.places(setting.centres);
+        self.scratch.resize((D + 1) * n, 1.0);
+        self.scratch[D * n..][..self.scales.len()].copy_from_slice(&self.scales);
+        dispatch(Assemble::<_, D> {
+            kernel: setting.kernel,
+            places: &self.scratch,
+            basis: &self.affine.columns,
+            matrix: &mut self.matrix,
+            product: &mut self.coupling,
+        });
+        self.project()
+    }
+
+    /// From S to ΠSΠ + σQQᵀ = S − QXᵀ − XQᵀ with X = SQ − ½Q(QᵀSQ + σI).
+    fn project(&mut self) -> f64 {
+        let (n, q) = (self.active.len(), self.affine.q);
+        let head =
+            |i: usize, k: usize| dot(self.affine.column(i), &self.coupling[k * n..(k + 1) * n]);
+        let trace = self.matrix.trace() - (0..q).map(|k| head(k, k)).sum::<f64>();
+        // No point is left where all of them are affine functions' own.
+        let mean = trace / (n - q).max(1) as f64;
+        let shift = if mean > 0.0 && n > q { mean } else { 1.0 };
+        let x = &mut self.scratch;
+        x.clear();
+        x.extend_from_slice(&self.coupling);
+        for k in 0..q {
+            for i in 0..q {
+                let own = if i == k { shift } else { 0.0 };
+                let half = 0.5 * (head(i, k) + own);
+                subtract(half, self.affine.column(i), &mut x[k * n..(k + 1) * n]);
+            }
+        }
+        self.shift = shift;
+        let squares = dispatch(Update {
+            basis: &self.affine.columns,
+            x,
+            matrix: &mut self.matrix,
+        });
+        f64::max(squares - q as f64 * shift * shift, 0.0).sqrt()
+    }
+
+    /// Centres of positive weight, and their scales.
+    fn choose(&mut self, n: usize, weights: &[f64], scaled: bool) {
+        self.active.clear();
+        self.scales.clear();
+        let counts = |i: &usize| weights.get(*i).is_none_or(|&w| w > 0.0);
+        self.active.extend((0..n).filter(counts));
+        if scaled && !weights.is_empty() {
+            let roots = self.active.iter().map(|&i| weights[i].sqrt());
+            self.scales.extend(roots);
+        }
+    }
+
+    /// The coordinates of the active centres, axis by axis, into `scratch`.
+    fn places(&mut self, centres: &Centres<D>) {
+        self.scratch.clear();
+        for axis in &centres.axes {
+            self.scratch.extend(self.active.iter().map(|&i| axis[i]));
+        }
+    }
+
+    /// Finds what the active centres span and the affine functions at them.
+    fn outline<K>(&mut self, setting: &Setting<'_, K, D>) {
+        let centres = setting.centres;
+        self.places(centres);
+        self.span = Span::new(&mut self.scratch, centres.grain, setting.rank_tolerance);
+        let n = self.active.len();
+        let (span, active, scales) = (&self.span, &self.active, &self.scales);
+        self.affine
+            .factor(n, n.min(1 + span.directions), |c, column| {
+                for (i, (value, &centre)) in column.iter_mut().zip(active).enumerate() {
+                    let point = core::array::from_fn(|k| centres.axes[k][centre]);
+                    *value = span.value(c, &point) * scales.get(i).copied().unwrap_or(1.0);
+                }
+            });
+    }
+
+    /// The λ of least generalised cross-validation for values at all centres. The system must be decomposed.
+    fn cross_validate<const M: usize>(
+        &self,
+        y: &[f64],
+        work: &mut Vec<f64>,
+        spare: &mut Vec<f64>,
+    ) -> f64 {
+        let Some(spectrum) = &self.spectrum else {
+            return 0.0;
+        };
+        self.reduce::<M>(y, work);
+        let n = self.active.len();
+        spare.clear();
+        spare.resize(M * n, 0.0);
+        spectrum.coefficients(work, spare);
+        for k in 0..n {
+            spare[k] = (0..M).map(|m| spare[m * n + k].powi(2)).sum();
+        }
+        least_gcv(&spectrum.values, &spare[..n], self.affine.q, self.shift)
+    }
+
+    /// Solves for `M` outputs: `y` holds the values at all centres and receives the weights w. Returns the affine parts.
+    ///
+    /// `lambda` is added to a decomposed system. A factored one has its own.
+    fn solve<const M: usize>(
+        &self,
+        y: &mut [f64],
+        lambda: f64,
+        work: &mut Vec<f64>,
+        spare: &mut Vec<f64>,
+    ) -> [Coefficients; M] {
+        self.solve_by(y, work, |columns| match &self.spectrum {
+            Some(spectrum) => spectrum.solve(columns, lambda, spare),
+            None => self.matrix.solve(columns),
+        })
+    }
+
+    /// As [`solve`](Self::solve), with a solver for the columns of Π W^½y.
+    fn solve_by<const M: usize>(
+        &self,
+        y: &mut [f64],
+        work: &mut Vec<f64>,
+        solver: impl FnOnce(&mut [f64]),
+    ) -> [Coefficients; M] {
+        let n = self.active.len();
+        let mut heads = self.reduce::<M>(y, work);
+        solver(work);
+        for (head, column) in heads.iter_mut().zip(work.chunks_exact_mut(n)) {
+            self.affine.remove(column);
+            for (head, coupling) in head.iter_mut().zip(self.coupling.chunks_exact(n)) {
+                *head -= dot(coupling, column);
+            }
+            *head = self.affine.coefficients(head);
+        }
+        self.scatter(work, y);
+        heads
+    }
+
+    /// Solves for the weights alone: (K + λW⁻¹)w + P a = y, Pᵀw = p for each column of `y`. The system must be factored.
+    ///
+    /// With W^-½w = Qh + z the conditions give h, which moves to the right-hand side of the equations for z.
+    fn solve_adjoint<const R: usize>(
+        &self,
+        y: &mut [f64],
+        p: [&Coefficients; R],
+        work: &mut Vec<f64>,
+    ) {
+        let n = self.active.len();
+        self.reduce::<R>(y, work);
+        let heads = p.map(|p| self.affine.conditions(p));
+        for (head, column) in heads.iter().zip(work.chunks_exact_mut(n)) {
+            for (head, coupling) in head.iter().zip(self.coupling.chunks_exact(n)) {
+                subtract(*head, coupling, column);
+            }
+            self.affine.remove(column);
+        }
+        self.matrix.solve(work);
+        for (head, column) in heads.iter().zip(work.chunks_exact_mut(n)) {
+            self.affine.remove(column);
+            (0..self.affine.q).for_each(|k| subtract(-head[k], self.affine.column(k), column));
+        }
+        self.scatter(work, y);
+    }
+
+    /// Π W^½ y in `work`. Returns QᵀW^½ y, output by output.
+    fn reduce<const M: usize>(&self, y: &[f64], work: &mut Vec<f64>) -> [Coefficients; M] {
+        let n = self.active.len();
+        work.clear();
+        let mut heads = [[0.0; MAX]; M];
+        for (m, values) in y.chunks_exact(y.len() / M).enumerate() {
+            work.extend(self.active.iter().map(|&centre| values[centre]));
+            let column = &mut work[m * n..];
+            column
+                .iter_mut()
+                .zip(&self.scales)
+                .for_each(|(value, scale)| *value *= scale);
+            heads[m] = self.affine.remove(column);
+        }
+        heads
+    }
+
+    /// Spreads the columns of `work`, each entry times its scale, over the centres.
+    fn scatter(&self, work: &[f64], y: &mut [f64]) {
+        let n = self.active.len();
+        let columns = work.len() / n;
+        let centres = y.len() / columns;
+        y.fill(0.0);
+        for (values, column) in y.chunks_exact_mut(centres).zip(work.chunks_exact(n)) {
+            for (i, (&centre, v)) in self.active.iter().zip(column).enumerate() {
+                values[centre] = v * self.scales.get(i).copied().unwrap_or(1.0);
+            }
+        }
+    }
+}
+
+/// The lower triangle of a symmetric matrix, column by column, and its Cholesky factor in the same place.
+#[derive(Clone, Debug, Default)]
+struct Triangle {
+    n: usize,
+    /// Places from one column to the next.
+    stride: usize,
+    data: Vec<f64>,
+    stack: Vec<MaybeUninit<u8>>,
+}
+
+impl Triangle {
+    /// Makes room for a matrix of order n.
+    fn resize(&mut self, n: usize) {
+        self.n = n;
+        self.stride = n.next_multiple_of(8);
+        // Columns a multiple of 512 bytes apart would crowd into the same few sets of the cache.
+        if self.stride.is_multiple_of(64) {
+            self.stride += 8;
+        }
+        self.data.resize(n * self.stride, 0.0);
+    }
+
+    /// Takes over another matrix, without its memory.
+    fn copy_from(&mut self, other: &Self) {
+        (self.n, self.stride) = (other.n, other.stride);
+        self.data.clone_from(&other.data);
+    }
+
+    fn trace(&self) -> f64 {
+        (0..self.n).map(|j| self.data[j * self.stride + j]).sum()
+    }
+
+    fn add_to_diagonal(&mut self, lambda: f64) {
+        (0..self.n).for_each(|j| self.data[j * self.stride + j] += lambda);
+    }
+
+    /// The entries of column `j` from the diagonal on.
+    #[inline(always)]
+    fn column(&mut self, j: usize) -> &mut [f64] {
+        &mut self.data[j * self.stride + j..j * self.stride + self.n]
+    }
+
+    fn view(&self) -> MatRef<'_, f64> {
+        MatRef::from_column_major_slice_with_stride(&self.data, self.n, self.n, self.stride)
+    }
+
+    /// Factors in place. Fails with the column whose pivot is not positive.
+    fn factor(&mut self) -> Result<(), TpsError> {
+        let Self {
+            n,
+            stride,
+            data,
+            stack,
+        } = self;
+        let scratch = llt::factor::cholesky_in_place_scratch::<f64>(*n, Par::Seq, Spec::default());
+        let view = MatMut::from_column_major_slice_with_stride_mut(data, *n, *n, *stride);
+        let factored = llt::factor::cholesky_in_place(
+            view,
+            Default::default(),
+            Par::Seq,
+            memory(stack, scratch),
+            Spec::default(),
+        );
+        match factored {
+            Err(llt::factor::LltError::NonPositivePivot { index }) => {
+                Err(TpsError::NotDefinite { column: index })
+            }
+            Ok(_) => {
+                // An infinite entry gives pivots that are not numbers.
+                let bad = (0..self.n).find(|&j| !self.data[j * self.stride + j].is_finite());
+                bad.map_or(Ok(()), |column| Err(TpsError::NotDefinite { column }))
+            }
+        }
+    }
+
+    /// b ← A⁻¹b for columns of n entries, by the factor.
+    fn solve(&self, b: &mut [f64]) {
+        let columns = b.len() / self.n;
+        let b = MatMut::from_column_major_slice_mut(b, self.n, columns);
+        llt::solve::solve_in_place(self.view(), b, Par::Seq, MemStack::new(&mut []));
+    }
+
+    /// An estimate of the 2-norm of A⁻¹: two steps of inverse iteration from the column of the least pivot.
+    fn inverse_norm(&self, x: &mut Vec<f64>) -> f64 {
+        let pivot = |j: usize| self.data[j * self.stride + j];
+        let start = (1..self.n).fold(
+            0,
+            |least, j| if pivot(j) < pivot(least) { j } else { least },
+        );
+        x.clear();
+        x.resize(self.n, 0.0);
+        x[start] = 1.0;
+        let mut norm = 1.0;
+        for _ in 0..2 {
+            self.solve(x);
+            norm = dot(x, x).sqrt();
+            x.iter_mut().for_each(|x| *x /= norm);
+        }
+        norm
+    }
+}
+
+/// A stack of at least the size asked for, in memory that is kept.
+fn memory(kept: &mut Vec<MaybeUninit<u8>>, size: StackReq) -> &mut MemStack {
+    kept.resize(size.unaligned_bytes_required(), MaybeUninit::uninit());
+    MemStack::new(kept)
+}
+
+/// A = V diag(μ) Vᵀ.
+#[derive(Clone, Debug)]
+struct Spectrum {
+    /// μ, ascending.
+    values: Vec<f64>,
+    vectors: Mat<f64>,
+}
+
+impl Default for Spectrum {
+    fn default() -> Self {
+        Self {
+            values: Vec::new(),
+            vectors: Mat::new(),
+        }
+    }
+}
+
+impl Spectrum {
+    fn decompose(&mut self, matrix: &mut Triangle) {
+        let n = matrix.n;
+        let parameters = Spec::default();
+        let scratch = evd::self_adjoint_evd_scratch::<f64>(
+            n,
+            evd::ComputeEigenvectors::Yes,
+            Par::Seq,
+            parameters,
+        );
+        let mut stack = core::mem::take(&mut matrix.stack);
+        self.values.clear();
+        self.values.resize(n, 0.0);
+        self.vectors.resize_with(n, n, |_, _| 0.0);
+        let done = evd::self_adjoint_evd(
+            matrix.view(),
+            DiagMut::from_slice_mut(&mut self.values),
+            Some(self.vectors.as_mut()),
+            Par::Seq,
+            memory(&mut stack, scratch),
+            parameters,
+        );
+        // Without convergence, which finite symmetric matrices do not fail, the spectrum counts as singular.
+        if done.is_err() {
+            self.values.fill(0.0);
+        }
+        matrix.stack = stack;
+    }
+
+    /// c = Vᵀb, column by column.
+    fn coefficients(&self, b: &[f64], c: &mut [f64]) {
+        self.product(self.vectors.transpose(), b, c);
+    }
+
+    /// c = factor · b, column by column.
+    fn product(&self, factor: MatRef<'_, f64>, b: &[f64], c: &mut [f64]) {
+        let n = self.values.len();
+        let columns = b.len() / n;
+        let b = MatRef::from_column_major_slice(b, n, columns);
+        let c = MatMut::from_column_major_slice_mut(c, n, columns);
+        matmul(c, Accum::Replace, factor, b, 1.0, Par::Seq);
+    }
+
+    /// b ← (A + λI)⁻¹ b, column by column.
+    fn solve(&self, b: &mut [f64], lambda: f64, spare: &mut Vec<f64>) {
+        spare.clear();
+        spare.resize(b.len(), 0.0);
+        self.coefficients(b, spare);
+        for column in spare.chunks_exact_mut(self.values.len()) {
+            let pairs = column.iter_mut().zip(&self.values);
+            pairs.for_each(|(c, mu)| *c /= mu + lambda);
+        }
+        self.product(self.vectors.as_ref(), spare, b);
+    }
+
+    /// 2-norm condition number of A + λI. Infinite where rounding leaves eigenvalues that are not positive.
+    fn condition(&self, lambda: f64) -> f64 {
+        let ends = self.values.first().zip(self.values.last());
+        match ends {
+            None => 1.0,
+            Some((least, most)) if least + lambda > 0.0 => (most + lambda) / (least + lambda),
+            Some(_) => f64::INFINITY,
+        }
+    }
+}
+
+/// Writes the lower triangle of W^½KW^½, and its product with Q while each column is at hand.
+struct Assemble<'a, K, const D: usize> {
+    kernel: &'a K,
+    /// Coordinates axis by axis, then the scales.
+    places: &'a [f64],
+    basis: &'a [f64],
+    matrix: &'a mut Triangle,
+    product: &'a mut [f64],
+}
+
+impl<K: Kernel, const D: usize> Job<f64> for Assemble<'_, K, D> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Lane<f64>>(self) {
+        let n = self.matrix.n;
+        for j in 0..n {
+            let column = self.matrix.column(j);
+            let axes: [&[f64]; D] =
+                core::array::from_fn(|k| &self.places[k * n + j..(k + 1) * n][..column.len()]);
+            let scales = &self.places[D * n + j..(D + 1) * n][..column.len()];
+            let own: [L; D] = core::array::from_fn(|k| L::new(axes[k][0]));
+            let own_scale = L::new(scales[0]);
+            for (i, value) in column.iter_mut().enumerate() {
+                let mut s = L::from_f64(0.0);
+                for k in 0..D {
+                    let d = L::new(axes[k][i]) - own[k];
+                    s = d.mul_add(d, s);
+                }
+                let scale = L::new(scales[i]) * own_scale;
+                *value = (self.kernel.derivatives(s).value * scale).get();
+            }
+            let basis = self.basis.chunks_exact(n);
+            for (basis, product) in basis.zip(self.product.chunks_exact_mut(n)) {
+                add_column::<L>(column, &basis[j..], &mut product[j..]);
+            }
+        }
+    }
+}
+
+/// What one column of a symmetric matrix, from the diagonal on, adds to the product y with v, on both sides of the diagonal.
+#[inline(always)]
+fn add_column<L: Lane<f64>>(column: &[f64], v: &[f64], y: &mut [f64]) {
+    let own = L::new(v[0]);
+    let (mut sums, mut diagonal) = ([0.0; 8], column[0] * v[0]);
+    let columns = column.chunks_exact(8);
+    let rest = columns.remainder().len();
+    let whole = column.len() - rest;
+    for ((a, v), y) in columns.zip(v.chunks_exact(8)).zip(y.chunks_exact_mut(8)) {
+        for l in 0..8 {
+            let a = L::new(a[l]);
+            sums[l] = a.mul_add(L::new(v[l]), L::new(sums[l])).get();
+            y[l] = own.mul_add(a, L::new(y[l])).get();
+        }
+    }
+    for i in whole..column.len() {
+        let a = L::new(column[i]);
+        diagonal -= column[i] * v[i];
+        y[i] = own.mul_add(a, L::new(y[i])).get();
+    }
+    // Both sums have counted the diagonal.
+    y[0] += sums.iter().sum::<f64>() - diagonal;
+}
+
+/// A ← A − QXᵀ − XQᵀ in the lower triangle. Gives the squared Frobenius norm of the whole.
+struct Update<'a> {
+    basis: &'a [f64],
+    x: &'a [f64],
+    matrix: &'a mut Triangle,
+}
+
+impl Job<f64> for Update<'_> {
+    type Output = f64;
+
+    #[inline(always)]
+    fn run<L: Lane<f64>>(self) -> f64 {
+        let n = self.matrix.n;
+        let mut squares = 0.0;
+        for j in 0..n {
+            let column = self.matrix.column(j);
+            let pairs = self.basis.chunks_exact(n).zip(self.x.chunks_exact(n));
+            for (basis, x) in pairs {
+                let (basis, x) = (&basis[j..], &x[j..]);
+                let (by_basis, by_x) = (L::new(-basis[0]), L::new(-x[0]));
+                for ((a, q), x) in column.iter_mut().zip(basis).zip(x) {
+                    let sum = by_x.mul_add(L::new(*q), L::new(*a));
+                    *a = by_basis.mul_add(L::new(*x), sum).get();
+                }
+            }
+            squares += 2.0 * dot(column, column) - column[0] * column[0];
+        }
+        squares
+    }
+}
+
+/// Memory of a solve.
+#[derive(Clone, Debug, Default)]
+struct Buffers {
+    /// Targets at the centres, output by output.
+    targets: Vec<f64>,
+    /// Weights at the centres, output by output: the answer.
+    weights: Vec<f64>,
+    residuals: Vec<f64>,
+    work: Vec<f64>,
+    spare: Vec<f64>,
+    vectors: iterative::Vectors,
+}
+
+/// Largest magnitude.
+fn largest(values: &[f64]) -> f64 {
+    values.iter().fold(0.0, |m, x| f64::max(m, x.abs()))
+}
+
+/// `size` relative to the largest target.
+fn relative(size: f64, targets: &[f64]) -> f64 {
+    let target = largest(targets);
+    if target > 0.0 { size / target } else { size }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Columns of known lengths turned by a known rotation: sizes to rounding, a small one to its own precision.
+    #[test]
+    fn extents_come_to_their_own_precision() {
+        let (c, s) = (0.8, 0.6);
+        let columns = [
+            3.0 * c,
+            -2e-9 * s,
+            0.0,
+            3.0 * s,
+            2e-9 * c,
+            0.0,
+            0.0,
+            0.0,
+            1.0,
+        ];
+        // Each point and its mirror image, so that the mean is zero.
+        let mut both: Vec<f64> = columns
+            .chunks_exact(3)
+            .flat_map(|column| column.iter().copied().chain(column.iter().map(|x| -x)))
+            .collect();
+        let span = Span::<3>::new(&mut both, 0.0, 1e-8);
+        for (found, expected) in span.extents.iter().zip([1.0, 1.0 / 3.0, 2e-9 / 3.0]) {
+            assert!((found / expected - 1.0).abs() < 1e-13, "{found}");
+        }
+        assert_eq!(span.directions, 2);
+        assert!((span.basis[0][0].abs() - c).abs() < 1e-15);
+    }
+}
