@@ -1,17 +1,17 @@
 //! Contact: the points of a surface at which gaps are measured, and the forces that keep them from
 //! closing.
 //!
-//! Gaps g are averaged over the hat functions φ of the first surface's nodes (linear on each half of an
-//! edge): $g_v = \int \varphi_v g / \int \varphi_v$. The pressure per reference area is
-//! $t = \sum_v \varphi_v t_v$ with $t_v = \langle \lambda_v - \varepsilon g_v \rangle$: one pressure for
+//! Gaps g are averaged over the hat functions φ of the first surface's nodes (linear on each half
+//! of an edge): $g_v = \int \varphi_v g / \int \varphi_v$. The pressure per reference area is $t =
+//! \sum_v \varphi_v t_v$ with $t_v = \langle \lambda_v - \varepsilon g_v \rangle$: one pressure for
 //! each node's displacement, a stable pair (pressures linear on each edge, but not continuous,
-//! oscillate). It derives from a potential, so that the tangent is symmetric; λ is updated to t between
-//! equilibria (augmented Lagrangian, Uzawa).
+//! oscillate). It derives from a potential, so that the tangent is symmetric. λ is updated to t
+//! between equilibria (augmented Lagrangian, Uzawa).
 //!
-//! Opposite a deformable surface the integrals are taken piece by piece between the ends of the other
-//! surface's edges (segment-to-segment). Its normal jumps there: points fixed on the first surface would
-//! carry their whole force from one side of the kink to the other at once, and Newton's method would
-//! cycle; pieces that grow and shrink carry it over continuously.
+//! Opposite a deformable surface the integrals are taken piece by piece between the ends of the
+//! other surface's edges (segment-to-segment). Its normal jumps there: points fixed on the first
+//! surface would carry their whole force from one side of the kink to the other at once, and
+//! Newton's method would cycle. Pieces that grow and shrink carry it over continuously.
 //!
 //! A surface's edges in order, for the search of closest points.
 //!
@@ -23,7 +23,7 @@
 
 use crate::element::{GAUSS3, quadratic};
 use crate::material::Kinematics;
-use crate::model::{Fields, Model, RigidShape};
+use crate::model::{ElementModel, Fields, RigidShape};
 use crate::stick::Slip;
 
 /// What a surface may touch.
@@ -55,12 +55,13 @@ pub struct ContactSegment {
 
 /// A Gauss point of a surface at which a gap is measured.
 #[derive(Debug, Clone)]
-pub struct ContactPoint {
+pub struct GapPoint {
     pub pair: usize,
     pub nodes: [usize; 3],
     pub shape: [f64; 3],
     pub derivative: [f64; 3],
-    /// Contact nodes whose hat functions reach here, with the functions times the point's reference area.
+    /// Contact nodes whose hat functions reach here, with the functions times the point's reference
+    /// area.
     pub shares: [(usize, f64); 2],
 }
 
@@ -77,17 +78,9 @@ pub struct ContactNode {
     pub spacing: f64,
 }
 
-/// Penalty of contact over the softer body's modulus and the edge's length: a pressure of a third of
-/// the modulus then leaves a thousandth of an element's penetration before the multipliers' update.
-/// Ten times less needs more updates, ten times more iterations; the Hertz test shows it.
-const PENALTY: f64 = 300.0;
-
-/// Two ends of edges nearer than this part of a segment leave nothing to integrate between them.
-const SLIVER: f64 = 1e-6;
-
 impl ContactSegment {
     /// Gauss points between the cuts, which are parameters on the edge in ascending order.
-    pub fn points(&self, cuts: &[f64], nodes: &[[f64; 2]]) -> Vec<ContactPoint> {
+    pub fn points(&self, cuts: &[f64], nodes: &[[f64; 2]]) -> Vec<GapPoint> {
         let [start, end] = self.ends;
         let mut bounds = vec![start];
         bounds.extend(cuts);
@@ -102,7 +95,7 @@ impl ContactSegment {
                 let [dr, dz] = combine(&derivative, self.nodes, |n| nodes[n]);
                 let area = core::f64::consts::TAU * r * half * gauss * dr.hypot(dz);
                 let hat = (parameter - start) / (end - start);
-                points.push(ContactPoint {
+                points.push(GapPoint {
                     pair: self.pair,
                     nodes: self.nodes,
                     shape,
@@ -119,6 +112,9 @@ impl ContactSegment {
 
     /// Parameters at which the ends of the opposite edges lie closest.
     fn cuts(&self, curve: &SurfaceCurve, placement: &Placement<'_>) -> Vec<f64> {
+        // Two ends of edges nearer than this part of a segment leave nothing to integrate between
+        // them.
+        let sliver = 1e-6;
         let at = |parameter: f64| {
             let (shape, derivative) = quadratic(parameter);
             let position = combine(&shape, self.nodes, |n| placement.current(n));
@@ -131,7 +127,7 @@ impl ContactSegment {
         let (a, b) = (at(start).0, at(end).0);
         let chord = [b[0] - a[0], b[1] - a[1]];
         let square = chord[0] * chord[0] + chord[1] * chord[1];
-        let margin = SLIVER * (end - start);
+        let margin = sliver * (end - start);
         let mut cuts = Vec::new();
         for edge in &curve.edges()[1..] {
             let corner = placement.current(edge[0]);
@@ -169,6 +165,11 @@ pub fn contact_segments(
     nodes: &[[f64; 2]],
     modulus: f64,
 ) -> (Vec<ContactSegment>, Vec<ContactNode>) {
+    // Penalty of contact over the softer body's modulus and the edge's length: a pressure of a
+    // third of the modulus then leaves a thousandth of an element's penetration before the
+    // multipliers' update. Ten times less needs more updates, ten times more iterations; the Hertz
+    // test shows it.
+    let penalty_limit = 300.0;
     let mut segments = Vec::new();
     let mut corners: Vec<ContactNode> = Vec::new();
     for &edge in edges {
@@ -204,7 +205,7 @@ pub fn contact_segments(
             for index in contact_nodes {
                 let corner = &mut corners[index - first_node];
                 corner.spacing = length.max(corner.spacing);
-                corner.penalty = corner.penalty.min(0.5 * PENALTY * modulus / length);
+                corner.penalty = corner.penalty.min(0.5 * penalty_limit * modulus / length);
             }
             segments.push(segment);
         }
@@ -312,8 +313,8 @@ impl Placement<'_> {
 }
 
 impl Placement<'_> {
-    /// Deformed area over reference area at a point of an edge with these shape functions (one in linear
-    /// kinematics).
+    /// Deformed area over reference area at a point of an edge with these shape functions (one in
+    /// linear kinematics).
     pub fn stretch(&self, shape: &[f64; 3], derivative: &[f64; 3], nodes: [usize; 3]) -> f64 {
         if self.kinematics == Kinematics::Linear {
             return 1.0;
@@ -396,7 +397,7 @@ fn averaged(gaps: &[(Gap, f64)], total: f64) -> Gap {
 
 impl Placement<'_> {
     /// The gap of a point, `None` where there is nothing opposite to it.
-    pub fn gap(&self, point: &ContactPoint, opposite: &Opposite) -> Option<Gap> {
+    pub fn gap(&self, point: &GapPoint, opposite: &Opposite) -> Option<Gap> {
         match opposite {
             Opposite::Rigid {
                 shape,
@@ -413,7 +414,7 @@ impl Placement<'_> {
 
     fn rigid_gap(
         &self,
-        point: &ContactPoint,
+        point: &GapPoint,
         shape: RigidShape,
         side: f64,
         height: f64,
@@ -454,7 +455,7 @@ impl Placement<'_> {
         })
     }
 
-    /// The closest point of a deformed surface; `None` beyond its outer end.
+    /// The closest point of a deformed surface. `None` beyond its outer end.
     pub fn nearest(&self, curve: &SurfaceCurve, position: [f64; 2]) -> Option<Nearest> {
         let mut best: Option<(f64, Nearest, bool)> = None;
         for (index, edge) in curve.edges().iter().enumerate() {
@@ -482,7 +483,7 @@ impl Placement<'_> {
     }
 
     /// Distance to the closest point of the deformed surface, along its normal.
-    fn surface_gap(&self, point: &ContactPoint, curve: &SurfaceCurve) -> Option<Gap> {
+    fn surface_gap(&self, point: &GapPoint, curve: &SurfaceCurve) -> Option<Gap> {
         let position = combine(&point.shape, point.nodes, |n| self.current(n));
         let Nearest { at, xi } = self.nearest(curve, position)?;
         let on_curve = at.sum(&at.position, |n| self.current(n));
@@ -496,8 +497,8 @@ impl Placement<'_> {
         let curvature = bend[0] * normal[0] + bend[1] * normal[1];
         let denominator = metric - value * curvature;
         let mut relative = Relative::new(point, &at, normal, along);
-        // At a kink between edges, or deep within a strongly bent surface, the closest point does not
-        // slide or is not unique: no second derivative.
+        // At a kink between edges, or deep within a strongly bent surface, the closest point does
+        // not slide or is not unique: no second derivative.
         if xi.abs() < 1.0 && denominator > 0.1 * metric {
             let bent = curvature / metric;
             relative.fill_second(|slip_i, turn_i, slip_j, turn_j| {
@@ -561,7 +562,7 @@ impl Placement<'_> {
     }
 
     /// Height over the undeformed surface at the same radius, both displaced along z.
-    fn vertical_gap(&self, point: &ContactPoint, curve: &SurfaceCurve) -> Option<Gap> {
+    fn vertical_gap(&self, point: &GapPoint, curve: &SurfaceCurve) -> Option<Gap> {
         let reference = combine(&point.shape, point.nodes, |n| self.nodes[n]);
         let moved = combine(&point.shape, point.nodes, |n| self.moved(n));
         let (edge, xi) = self.opposite(curve, reference[0])?;
@@ -588,7 +589,7 @@ struct Relative {
 }
 
 impl Relative {
-    fn new(point: &ContactPoint, at: &CurvePoint, normal: [f64; 2], along: [f64; 2]) -> Self {
+    fn new(point: &GapPoint, at: &CurvePoint, normal: [f64; 2], along: [f64; 2]) -> Self {
         let mut relative = Self {
             dofs: Vec::with_capacity(12),
             first: Vec::with_capacity(12),
@@ -639,9 +640,6 @@ impl Relative {
     }
 }
 
-/// Part of a node's area that has something opposite to it, below which the node is open.
-const LEAST_SHARE: f64 = 0.25;
-
 /// A node of a contact surface that is in contact or may come into it.
 #[derive(Debug, Clone)]
 pub struct Candidate {
@@ -654,7 +652,7 @@ pub struct Candidate {
     pub slip: Option<Slip>,
 }
 
-impl Model {
+impl ElementModel {
     /// Where contact is judged at a state.
     pub fn placement<'a>(&'a self, fields: &'a Fields) -> Placement<'a> {
         Placement {
@@ -667,6 +665,8 @@ impl Model {
 
     /// Contact nodes that touch or are nearer than two spacings and `margin`.
     pub fn candidates(&self, fields: &Fields, margin: f64) -> Vec<Candidate> {
+        // Part of a node's area that has something opposite to it, below which the node is open.
+        let least_share = 0.25;
         let placement = self.placement(fields);
         let points = self.contact_points(fields);
         let mut around: Vec<Vec<(Gap, f64)>> = vec![Vec::new(); self.contact_nodes.len()];
@@ -682,7 +682,7 @@ impl Model {
         for (index, (node, around)) in self.contact_nodes.iter().zip(&around).enumerate() {
             let total: f64 = around.iter().map(|(_, weight)| weight).sum();
             // A node at a punch's rim has half of its surroundings under it.
-            if total < LEAST_SHARE * node.weight {
+            if total < least_share * node.weight {
                 continue;
             }
             let weighted = around.iter().map(|(gap, weight)| gap.value * weight);
@@ -704,7 +704,7 @@ impl Model {
     }
 
     /// The points at which gaps are measured at a state.
-    pub fn contact_points(&self, fields: &Fields) -> Vec<ContactPoint> {
+    pub fn contact_points(&self, fields: &Fields) -> Vec<GapPoint> {
         let placement = self.placement(fields);
         let mut points = Vec::with_capacity(3 * self.segments.len());
         for segment in &self.segments {

@@ -1,12 +1,12 @@
 //! The element: nine displacement nodes, three discontinuous pressures.
 //!
-//! The perturbed Lagrangian $\int W_{dev} + p (J - 1) - p^2 / 2\kappa$ with p linear in (r, z) within
-//! each element.
+//! The perturbed Lagrangian $\int W_{dev} + p (J - 1) - p^2 / 2\kappa$ with p linear in (r, z)
+//! within each element.
 //!
-//! Elimination of an element's pressures and of its centre node, so that the global system holds the
-//! displacements of the eight outer nodes alone and is symmetric.
+//! Elimination of an element's pressures and of its centre node, so that the global system holds
+//! the displacements of the eight outer nodes alone and is symmetric.
 
-use crate::material::{Deformation, Gradient, Kinematics, Material, Response};
+use crate::material::{Gradient, Kinematics, Material, PointDeformation, StressResponse};
 
 /// Displacement components of the outer nodes (r, z of each).
 pub const OUTER: usize = 16;
@@ -65,7 +65,7 @@ pub struct GaussPoint {
 
 /// The reference configuration of an element.
 #[derive(Debug, Clone)]
-pub struct Geometry {
+pub struct ElementGeometry {
     pub points: [GaussPoint; 9],
     /// Inverse of the pressures' mass matrix.
     inverse_mass: [[f64; 3]; 3],
@@ -105,7 +105,7 @@ pub fn pressure_functions(nodes: &[[f64; 2]; 9], position: [f64; 2]) -> [f64; 3]
     ]
 }
 
-impl Geometry {
+impl ElementGeometry {
     /// `None` where the element is turned inside out or degenerate at a Gauss point.
     pub fn new(nodes: &[[f64; 2]; 9]) -> Option<Self> {
         let mut points: [GaussPoint; 9] = Default::default();
@@ -218,7 +218,7 @@ fn add(sums: &mut [[f64; 9]; 2], times: f64, forces: &[[f64; 9]; 2]) {
 
 impl Sums {
     #[inline]
-    fn add(&mut self, point: &GaussPoint, response: &Response) {
+    fn add(&mut self, point: &GaussPoint, response: &StressResponse) {
         let stress = point.forces(&response.stress);
         let volume = point.forces(&response.cofactor);
         add(&mut self.deviatoric, 1.0, &stress);
@@ -296,18 +296,19 @@ impl Stiffness {
     }
 }
 
-impl Geometry {
-    /// Forces at given displacements; `None` where the element is turned inside out.
+impl ElementGeometry {
+    /// Forces at given displacements. `None` where the element is turned inside out.
     pub fn forces(&self, kinematics: Kinematics, shear: f64, u: &[f64; ALL]) -> Option<Forces> {
         let mut forces = Sums::default();
         for point in &self.points {
-            let deformation = Deformation::new(kinematics, shear, &point.gradient(u))?;
+            let deformation = PointDeformation::new(kinematics, shear, &point.gradient(u))?;
             forces.add(point, &deformation.response());
         }
         Some(forces.forces())
     }
 
-    /// Forces, and the second derivative of the energy by the nodal displacements at fixed pressures, lower half.
+    /// Forces, and the second derivative of the energy by the nodal displacements at fixed
+    /// pressures, lower half.
     fn forces_and_stiffness(
         &self,
         kinematics: Kinematics,
@@ -322,7 +323,7 @@ impl Geometry {
             mixed: [[0.0; 9]; 9],
         };
         for point in &self.points {
-            let deformation = Deformation::new(kinematics, shear, &point.gradient(u))?;
+            let deformation = PointDeformation::new(kinematics, shear, &point.gradient(u))?;
             forces.add(point, &deformation.response());
             let pressure: f64 = (point.pressure.iter().zip(pressures))
                 .map(|(a, b)| a * b)
@@ -358,8 +359,8 @@ pub struct Elimination {
     compliance_inverse: [[f64; 3]; 3],
 }
 
-impl Geometry {
-    /// Stiffness and residual with pressures and centre eliminated; `None` where turned inside out.
+impl ElementGeometry {
+    /// Stiffness and residual with pressures and centre eliminated. `None` where turned inside out.
     pub fn condensed(
         &self,
         kinematics: Kinematics,
@@ -373,8 +374,9 @@ impl Geometry {
         Some(self.eliminate(material.bulk_modulus(), &forces, stiffness, centre_load))
     }
 
-    /// Outer residual and elimination after a slight change of shape and material, by the forces there and
-    /// the stiffness `before`: right to first order in the change. `None` where turned inside out.
+    /// Outer residual and elimination after a slight change of shape and material, by the forces
+    /// there and the stiffness `before`: right to first order in the change. `None` where turned
+    /// inside out.
     pub fn nearby(
         &self,
         kinematics: Kinematics,
@@ -408,11 +410,11 @@ impl Geometry {
         elimination.balanced([0.0; 2])
     }
 
-    /// Residual of all nodes with the pressures eliminated by the tangent `before`, and κM⁻¹∫ψ(J − 1); `None` where turned
-    /// inside out.
+    /// Residual of all nodes with the pressures eliminated by the tangent `before`, and κM⁻¹∫ψ(J −
+    /// 1). `None` where turned inside out.
     ///
-    /// The pressures stay unknowns of their own: with $\partial J/\partial u$ of here in their elimination, a tangent of
-    /// elsewhere would be wrong by κ/μ times the difference.
+    /// The pressures stay unknowns of their own: with $\partial J/\partial u$ of here in their
+    /// elimination, a tangent of elsewhere would be wrong by κ/μ times the difference.
     pub fn balance(
         &self,
         kinematics: Kinematics,

@@ -10,7 +10,7 @@ const LARGEST_POISSON_RATIO: f64 = 0.4999;
 ///
 /// $$ W = \frac{\mu}{2}(J^{-2/3} \mathrm{tr}\, F^T F - 3) + \frac{\kappa}{2} (J - 1)^2, $$
 ///
-/// with $\mu = E / 2(1 + \nu)$, $\kappa = E / 3(1 - 2\nu)$; Hooke's law with the same constants in
+/// with $\mu = E / 2(1 + \nu)$, $\kappa = E / 3(1 - 2\nu)$. Hooke's law with the same constants in
 /// linear kinematics.
 ///
 /// ```
@@ -31,7 +31,7 @@ impl Material {
     /// Young's modulus (Pa) and Poisson ratio.
     ///
     /// # Errors
-    /// A modulus that is not positive; a Poisson ratio outside (−1, 0.4999].
+    /// A modulus that is not positive. a Poisson ratio outside (−1, 0.4999].
     pub fn new(youngs_modulus_pa: f64, poisson_ratio: f64) -> Result<Self, ElasticityError> {
         positive(youngs_modulus_pa, Quantity::YoungsModulus)?;
         if !(poisson_ratio > -1.0 && poisson_ratio <= 0.5) {
@@ -86,10 +86,10 @@ impl Material {
 /// How displacement makes strain, and on which geometry contact is judged.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Kinematics {
-    /// Finite strain; contact on the deformed surfaces.
+    /// Finite strain. Contact on the deformed surfaces.
     #[default]
     Finite,
-    /// Infinitesimal strain and Hooke's law; contact gaps along z on the undeformed surfaces.
+    /// Infinitesimal strain and Hooke's law. Contact gaps along z on the undeformed surfaces.
     Linear,
 }
 
@@ -97,7 +97,7 @@ pub enum Kinematics {
 pub type Gradient = [f64; 5];
 
 /// Stress without its pressure part, and volume change.
-pub struct Response {
+pub struct StressResponse {
     /// Deviatoric first Piola–Kirchhoff stress.
     pub stress: Gradient,
     /// Volume change J − 1 (the strain's trace in linear kinematics).
@@ -122,7 +122,7 @@ pub fn inverse_cube_root(v: f64) -> f64 {
 }
 
 /// A material point as deformed: what stress and tangent have in common.
-pub enum Deformation {
+pub enum PointDeformation {
     Linear {
         shear: f64,
         /// Displacement gradient.
@@ -140,8 +140,8 @@ pub enum Deformation {
     },
 }
 
-impl Deformation {
-    /// At displacement gradient `h`; `None` where J ≤ 0.
+impl PointDeformation {
+    /// At displacement gradient `h`. `None` where J ≤ 0.
     pub fn new(kinematics: Kinematics, shear: f64, h: &Gradient) -> Option<Self> {
         if kinematics == Kinematics::Linear {
             return Some(Self::Linear { shear, h: *h });
@@ -169,7 +169,7 @@ impl Deformation {
         })
     }
 
-    pub fn response(&self) -> Response {
+    pub fn response(&self) -> StressResponse {
         match *self {
             Self::Linear { shear, h } => {
                 let trace = h[0] + h[3] + h[4];
@@ -182,7 +182,7 @@ impl Deformation {
                     h[3] - mean,
                     h[4] - mean,
                 ];
-                Response {
+                StressResponse {
                     stress: e.map(|component| 2.0 * shear * component),
                     volume: trace,
                     cofactor: [1.0, 0.0, 0.0, 1.0, 1.0],
@@ -196,7 +196,7 @@ impl Deformation {
                 invariant,
             } => {
                 let ratio = invariant / (3.0 * (1.0 + volume));
-                Response {
+                StressResponse {
                     stress: core::array::from_fn(|k| scale * (f[k] - ratio * cofactor[k])),
                     volume,
                     cofactor,

@@ -31,7 +31,8 @@ pub enum Boundary {
 pub struct Mesh {
     /// Reference coordinates (r, z) of the nodes, in metres.
     pub nodes: Vec<[f64; 2]>,
-    /// Nodes of each element: corners counter-clockwise, then the middles of the edges in the same order, then the centre.
+    /// Nodes of each element: corners counter-clockwise, then the middles of the edges in the same
+    /// order, then the centre.
     pub elements: Vec<[usize; 9]>,
     pub regions: Vec<usize>,
     pub boundaries: BTreeMap<Boundary, Vec<[usize; 3]>>,
@@ -46,7 +47,7 @@ impl Mesh {
         self.regions.iter().max().map_or(0, |last| last + 1)
     }
 
-    /// A rectangle of one region with elements between the given lines; its top is
+    /// A rectangle of one region with elements between the given lines. Its top is
     /// [`Boundary::Contact`], its bottom [`Boundary::Base`].
     #[cfg(test)]
     pub fn rectangle(r_lines: &[f64], z_lines: &[f64]) -> Self {
@@ -96,7 +97,7 @@ impl Mesh {
         }
     }
 
-    /// Names the edges between elements for which `inside` holds and the others; they run with the
+    /// Names the edges between elements for which `inside` holds and the others. They run with the
     /// elements inside on their left.
     fn name_interface(&mut self, boundary: Boundary, inside: impl Fn(usize) -> bool) {
         let mut outside_middles = std::collections::BTreeSet::new();
@@ -120,7 +121,7 @@ impl Mesh {
     }
 }
 
-/// Puts meshes together from mapped blocks; nodes that coincide are merged.
+/// Puts meshes together from mapped blocks. Nodes that coincide are merged.
 #[derive(Debug, Default)]
 struct MeshBuilder {
     nodes: Vec<[f64; 2]>,
@@ -129,8 +130,8 @@ struct MeshBuilder {
 }
 
 impl MeshBuilder {
-    /// Adds a block of `columns` by `rows` elements whose node (i, j), i ≤ 2 columns, j ≤ 2 rows, is
-    /// at `position(i, j)`; i then j must turn counter-clockwise.
+    /// Adds a block of `columns` by `rows` elements whose node (i, j), i ≤ 2 columns, j ≤ 2 rows,
+    /// is at `position(i, j)`. I then j must turn counter-clockwise.
     pub fn block(
         &mut self,
         columns: usize,
@@ -342,19 +343,16 @@ pub struct ContactMesh {
 }
 
 impl ContactMesh {
-    /// Distance from the pole to the core's corner inside the body: beyond the core's ends, inside the first shell.
+    /// Distance from the pole to the core's corner inside the body: beyond the core's ends, inside
+    /// the first shell.
     fn corner(&self) -> f64 {
         self.inner * (1.0 + 0.8 / self.count as f64).min(1.16)
     }
 }
 
-/// Between a ball's core and the first shell, as a share of an element. With 0.02 the mesh of sixteen elements has one without area, with
-/// 0.05 and 0.2 all from 2 to 24 are sound (the test `a_ball_can_be_meshed_at_any_fineness`); more squeezes the core's corner instead.
-const CORNER_ROOM: f64 = 0.05;
-
 /// A spherical inclusion on the axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Inclusion {
+pub struct InclusionSize {
     pub radius: f64,
     /// From the block's surface to the inclusion's top.
     pub depth: f64,
@@ -375,8 +373,8 @@ struct Pole<S> {
 }
 
 impl<S: Fn(f64) -> [f64; 2]> Pole<S> {
-    /// With shells at `parameters` (those of elements' ends and middles), where `shell` gives node k of 4m + 1 from the surface to
-    /// the axis; boundaries without names.
+    /// With shells at `parameters` (those of elements' ends and middles), where `shell` gives node
+    /// k of 4m + 1 from the surface to the axis. Boundaries without names.
     fn mesh(&self, parameters: &[f64], shell: impl Fn(f64, usize) -> [f64; 2]) -> Mesh {
         let m = self.elements;
         let line = |a: [f64; 2], b: [f64; 2]| -> Vec<[f64; 2]> {
@@ -418,12 +416,17 @@ impl<S: Fn(f64) -> [f64; 2]> Pole<S> {
 }
 
 impl Mesh {
-    /// The half of a ball of radius `radius` on the side of its pole, which is at the origin; the
+    /// The half of a ball of radius `radius` on the side of its pole, which is at the origin. The
     /// ball's centre is at z = `radius`, its equator [`Boundary::Base`].
     ///
     /// Around a core of quadrilaterals at the pole lie shells along circles that meet the axis and
     /// the ball's surface at right angles.
     pub fn half_ball(radius: f64, size: ContactMesh) -> Self {
+        // Between a ball's core and the first shell, as a share of an element. With 0.02 the mesh
+        // of sixteen elements has one without area, with 0.05 and 0.2 all from 2 to 24 are sound
+        // (the test `a_ball_can_be_meshed_at_any_fineness`); more squeezes the core's corner
+        // instead.
+        let corner_room = 0.05;
         let m = size.count;
         let first = size.inner / m as f64;
         // Angles of the shells along the surface; the first lies around the core.
@@ -458,9 +461,10 @@ impl Mesh {
             debug_assert!(c >= 0.0);
             [circle * from_axis.sin(), top - 2.0 * circle * half * half]
         };
-        // The shells are nearer to the pole inside the ball than on its surface: on a fine mesh they would cut the corner.
+        // The shells are nearer to the pole inside the ball than on its surface: on a fine mesh
+        // they would cut the corner.
         let [r, z] = shell(start, 2 * m);
-        let corner = size.corner().min(r.hypot(z) - CORNER_ROOM * first);
+        let corner = size.corner().min(r.hypot(z) - corner_room * first);
         let pole = Pole {
             elements: m,
             core: size.inner / radius,
@@ -505,9 +509,11 @@ impl Mesh {
         mesh
     }
 
-    /// A cone whose tip is at the origin: its side [`Boundary::Contact`], its flat end at z = `height` [`Boundary::Base`].
+    /// A cone whose tip is at the origin: its side [`Boundary::Contact`], its flat end at z =
+    /// `height` [`Boundary::Base`].
     ///
-    /// Around a core of quadrilaterals at the tip lie shells that meet the axis at right angles and flatten towards the base.
+    /// Around a core of quadrilaterals at the tip lie shells that meet the axis at right angles and
+    /// flatten towards the base.
     pub fn cone(half_angle: f64, height: f64, size: ContactMesh) -> Self {
         let m = size.count;
         let (sin, cos) = half_angle.sin_cos();
@@ -526,7 +532,8 @@ impl Mesh {
             }
             distances.push(last + step);
         }
-        // Height on the axis of the shell at a distance along the side: the distance itself near the tip, the cone's at its end.
+        // Height on the axis of the shell at a distance along the side: the distance itself near
+        // the tip, the cone's at its end.
         let on_axis = |s: f64| s / (1.0 + s / side * (1.0 / cos - 1.0));
         let shell = |s: f64, k: usize| -> [f64; 2] {
             let v = 1.0 - k as f64 / (4 * m) as f64;
@@ -558,7 +565,7 @@ impl Mesh {
         mesh
     }
 
-    /// Bonded layers below z = 0, the first on top, of thicknesses `thickness` and radius `radius`;
+    /// Bonded layers below z = 0, the first on top, of thicknesses `thickness` and radius `radius`.
     /// a region each.
     pub fn layered_disc(thickness: &[f64], r_lines: &[f64], first: f64, growth: f64) -> Self {
         let mut builder = MeshBuilder::default();
@@ -597,30 +604,22 @@ pub struct BlockMesh {
     pub disc_radius: f64,
     /// Thickness of the guide's layers, that on the block first.
     pub layers: Vec<f64>,
-    pub inclusion: Option<Inclusion>,
+    pub inclusion: Option<InclusionSize>,
     /// Whether guide and block share the nodes of their interface.
     pub bonded: bool,
-    /// Elements along an eighth of the inclusion's circumference; everything else follows.
+    /// Elements along an eighth of the inclusion's circumference. Everything else follows.
     pub fineness: usize,
 }
 
-/// The guide's mesh and the block's; bonded, both in the first.
+/// The guide's mesh and the block's. Bonded, both in the first.
 pub struct BlockMeshes {
     pub guide: Mesh,
     pub block: Option<Mesh>,
 }
 
-/// Shortest element at the rim of a face that slides, over the face's radius. Shared displacements hold finer ones less and
-/// less as the face sinks in: of 0.02, they turn over at a tenth of the block's height, and the pressure within three
-/// quarters of the face jumps by 1 %. Until then it is that of the finer ones within 0.05 %.
-const SLIDING_RIM: f64 = 0.045;
-/// Elements along an eighth of the inclusion's circumference up to which they hold it: finer meshes have flatter elements at the
-/// rim, and with seven those of 0.045 turn over at some tenths of the height.
-const SLIDING_FINENESS: f64 = 5.0;
-
 impl BlockMesh {
     /// Box around the inclusion that takes a grid of its own: radius, lower and upper height.
-    fn cell(&self) -> Option<(Inclusion, [f64; 3])> {
+    fn cell(&self) -> Option<(InclusionSize, [f64; 3])> {
         let inclusion = self.inclusion?;
         let (radius, depth) = (inclusion.radius, inclusion.depth);
         let below = self.block_height - depth - 2.0 * radius;
@@ -635,6 +634,15 @@ impl BlockMesh {
     }
 
     pub fn build(&self) -> BlockMeshes {
+        // Elements along an eighth of the inclusion's circumference up to which they hold it: finer
+        // meshes have flatter elements at the rim, and with seven those of 0.045 turn over at some
+        // tenths of the height.
+        let sliding_fineness = 5.0;
+        // Shortest element at the rim of a face that slides, over the face's radius. Shared
+        // displacements hold finer ones less and less as the face sinks in: of 0.02, they turn over
+        // at a tenth of the block's height, and the pressure within three quarters of the face
+        // jumps by 1 %. Until then it is that of the finer ones within 0.05 %.
+        let sliding_rim = 0.045;
         let cell = self.cell();
         // Elements of the guide's face from the axis to its rim, finest at the rim where the
         // traction is singular.
@@ -645,7 +653,7 @@ impl BlockMesh {
         let shortest = if self.bonded {
             0.0
         } else {
-            SLIDING_RIM * (self.fineness as f64 / SLIDING_FINENESS).max(1.0)
+            sliding_rim * (self.fineness as f64 / sliding_fineness).max(1.0)
         };
         let first = (0.25 * face).max(shortest * self.disc_radius);
         let mut rim = graded_up_to(self.disc_radius, inner, first, 1.35, face);
@@ -720,7 +728,8 @@ impl BlockMesh {
         let (stage, disc) = (self.block_height, self.disc_radius);
         let is_bonded = self.bonded;
         mesh.name_outer_edges(|[r, z]| {
-            // Positions come from the same expressions as the limits: rounding alone tells them apart.
+            // Positions come from the same expressions as the limits: rounding alone tells them
+            // apart.
             if r <= 0.0 {
                 Boundary::Axis
             } else if z <= glass * (1.0 - 1e-9) {
@@ -740,7 +749,7 @@ impl BlockMesh {
 /// to the box. Regions: `region` outside, `region + 1` inside.
 fn add_cell(
     builder: &mut MeshBuilder,
-    inclusion: Inclusion,
+    inclusion: InclusionSize,
     [width, low, high]: [f64; 3],
     n: usize,
     region: usize,

@@ -7,7 +7,7 @@
 //! Rigid bodies of revolution.
 
 use crate::contact::{ContactNode, ContactSegment, Opposite, SurfaceCurve, contact_segments};
-use crate::element::{ALL, Geometry};
+use crate::element::{ALL, ElementGeometry};
 use crate::error::Quantity;
 use crate::material::{Kinematics, Material};
 use crate::mesh::{Boundary, Mesh};
@@ -16,9 +16,9 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use tactile_elasticity::ElasticityError;
 
-/// A body of a [`Model`].
+/// A body of an [`ElementModel`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Body(usize);
+pub struct BodyIndex(usize);
 
 /// How a boundary is held.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -31,7 +31,7 @@ pub enum Support {
 
 /// What a displacement component does.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Motion {
+pub enum DofMotion {
     Free,
     Zero,
     /// Moves by the approach times this.
@@ -46,21 +46,21 @@ pub struct Part {
 
 /// An axisymmetric problem: bodies with their materials, supports and contacts.
 ///
-/// The approach δ, one number, moves every boundary that is [driven](Self::drive) by δ along +z.
-/// SI units; the axis of revolution is r = 0; guides lie below z = 0 and objects above.
+/// The approach δ, one number, moves every boundary that is [driven](Self::drive) by δ along +z. SI
+/// units. The axis of revolution is r = 0. Guides lie below z = 0 and objects above.
 #[derive(Debug, Clone)]
-pub struct Model {
+pub struct ElementModel {
     pub kinematics: Kinematics,
     pub nodes: Vec<[f64; 2]>,
     pub elements: Vec<[usize; 9]>,
     /// Material of each element, an index of `materials`.
     pub regions: Vec<usize>,
     /// Shared by the scenes on one mesh whose nodes are moved elsewhere only.
-    pub geometry: Vec<Arc<Geometry>>,
+    pub geometry: Vec<Arc<ElementGeometry>>,
     pub materials: Vec<Material>,
     pub parts: Vec<Part>,
     /// Of each displacement component, 2 node + (0 for r, 1 for z).
-    pub motion: Vec<Motion>,
+    pub motion: Vec<DofMotion>,
     pub opposites: Vec<Opposite>,
     pub segments: Vec<ContactSegment>,
     pub contact_nodes: Vec<ContactNode>,
@@ -74,7 +74,7 @@ pub struct Model {
     pub external: Vec<f64>,
 }
 
-impl Model {
+impl ElementModel {
     /// An empty model.
     pub fn new(kinematics: Kinematics) -> Self {
         Self {
@@ -99,8 +99,12 @@ impl Model {
     /// Adds a body with one material a region.
     ///
     /// # Errors
-    /// Materials that are not one a region; an element that is degenerate or turned inside out.
-    pub fn add(&mut self, mesh: &Mesh, materials: &[Material]) -> Result<Body, ElasticityError> {
+    /// Materials that are not one a region. An element that is degenerate or turned inside out.
+    pub fn add(
+        &mut self,
+        mesh: &Mesh,
+        materials: &[Material],
+    ) -> Result<BodyIndex, ElasticityError> {
         if materials.len() != mesh.region_count() {
             return Err(ElasticityError::LengthMismatch {
                 quantity: Quantity::Layers,
@@ -110,7 +114,7 @@ impl Model {
         }
         let mut geometry = Vec::with_capacity(mesh.elements.len());
         for (index, element) in mesh.elements.iter().enumerate() {
-            let element = Geometry::new(&element.map(|node| mesh.nodes[node]));
+            let element = ElementGeometry::new(&element.map(|node| mesh.nodes[node]));
             let element = element.ok_or(ElasticityError::DegenerateElement { element: index })?;
             geometry.push(Arc::new(element));
         }
@@ -123,11 +127,11 @@ impl Model {
         self.materials.extend(materials);
         for node in &mesh.nodes {
             let radial = if node[0] == 0.0 {
-                Motion::Zero
+                DofMotion::Zero
             } else {
-                Motion::Free
+                DofMotion::Free
             };
-            self.motion.extend([radial, Motion::Free]);
+            self.motion.extend([radial, DofMotion::Free]);
             self.external.extend([0.0; 2]);
             self.partners.push(None);
         }
@@ -144,7 +148,7 @@ impl Model {
             regions: region..self.materials.len(),
             boundaries: shifted.collect(),
         });
-        Ok(Body(self.parts.len() - 1))
+        Ok(BodyIndex(self.parts.len() - 1))
     }
 
     /// Number of elements of all bodies.
@@ -153,12 +157,12 @@ impl Model {
     }
 
     /// Materials of a body, by region.
-    pub fn materials(&self, body: Body) -> &[Material] {
+    pub fn materials(&self, body: BodyIndex) -> &[Material] {
         &self.materials[self.parts[body.0].regions.clone()]
     }
 
     /// Edges of a body's boundary, by the model's node numbers.
-    pub fn edges(&self, body: Body, boundary: Boundary) -> &[[usize; 3]] {
+    pub fn edges(&self, body: BodyIndex, boundary: Boundary) -> &[[usize; 3]] {
         self.parts[body.0]
             .boundaries
             .get(&boundary)
@@ -166,26 +170,26 @@ impl Model {
     }
 
     /// Regions of a body among the model's.
-    fn body_regions(&self, body: Body) -> core::ops::Range<usize> {
+    fn body_regions(&self, body: BodyIndex) -> core::ops::Range<usize> {
         self.parts[body.0].regions.clone()
     }
 
     /// Holds a boundary in its place.
-    pub fn hold(&mut self, body: Body, boundary: Boundary, support: Support) {
-        self.support(body, boundary, support, Motion::Zero);
+    pub fn hold(&mut self, body: BodyIndex, boundary: Boundary, support: Support) {
+        self.support(body, boundary, support, DofMotion::Zero);
     }
 
     /// Moves a boundary by the approach along +z.
-    pub fn drive(&mut self, body: Body, boundary: Boundary, support: Support) {
-        self.support(body, boundary, support, Motion::Driven(1.0));
+    pub fn drive(&mut self, body: BodyIndex, boundary: Boundary, support: Support) {
+        self.support(body, boundary, support, DofMotion::Driven(1.0));
     }
 
-    fn support(&mut self, body: Body, boundary: Boundary, support: Support, axial: Motion) {
+    fn support(&mut self, body: BodyIndex, boundary: Boundary, support: Support, axial: DofMotion) {
         for edge in self.edges(body, boundary).to_vec() {
             for node in edge {
                 self.motion[2 * node + 1] = axial;
                 if support == Support::Bonded {
-                    self.motion[2 * node] = Motion::Zero;
+                    self.motion[2 * node] = DofMotion::Zero;
                 }
             }
         }
@@ -196,20 +200,20 @@ impl Model {
     ///
     /// Gaps are measured from `first`, which had better be the one with the finer mesh or the more
     /// convex of the two.
-    pub fn contact(&mut self, first: Body, second: Body) {
+    pub fn contact(&mut self, first: BodyIndex, second: BodyIndex) {
         let curve = SurfaceCurve::new(self.edges(second, Boundary::Contact), &self.nodes);
         let softer = self.softest(first).min(self.softest(second));
         self.add_points(first, Opposite::Surface(curve), softer);
     }
 
-    /// Lets two surfaces that touch from the start slide on each other without friction: nodes at the same
-    /// place share their axial displacement. The pressure on the second body's surface, above the first,
-    /// becomes the pressure of the states.
+    /// Lets two surfaces that touch from the start slide on each other without friction: nodes at
+    /// the same place share their axial displacement. The pressure on the second body's surface,
+    /// above the first, becomes the pressure of the states.
     ///
-    /// The nodes of one place do not stay at one radius: where the second body spreads more, the first
-    /// feels its pressure somewhat further in, which matters little where the first is the stiffer.
-    /// The surfaces are not let part.
-    pub fn slide(&mut self, first: Body, second: Body) {
+    /// The nodes of one place do not stay at one radius: where the second body spreads more, the
+    /// first feels its pressure somewhat further in, which matters little where the first is the
+    /// stiffer. The surfaces are not let part.
+    pub fn slide(&mut self, first: BodyIndex, second: BodyIndex) {
         let nodes: Vec<usize> = self
             .edges(first, Boundary::Contact)
             .iter()
@@ -236,10 +240,10 @@ impl Model {
         self.interface = Some(BondedInterface::new(&shared, &self.elements, is_upper, 1.0));
     }
 
-    /// Lets a body's [`Boundary::Contact`] touch a rigid body above it without friction, whose pole is
-    /// at `height_m` and does not move.
+    /// Lets a body's [`Boundary::Contact`] touch a rigid body above it without friction, whose pole
+    /// is at `height_m` and does not move.
     #[cfg(test)]
-    pub fn contact_rigid_above(&mut self, body: Body, shape: RigidShape, height_m: f64) {
+    pub fn contact_rigid_above(&mut self, body: BodyIndex, shape: RigidShape, height_m: f64) {
         let opposite = Opposite::Rigid {
             shape,
             side: 1.0,
@@ -253,7 +257,7 @@ impl Model {
     /// Lets a body's [`Boundary::Contact`] touch a rigid body below it without friction, whose pole
     /// starts at `height_m` and moves by the approach, as
     /// [`FemScene::ball_on_flat`](crate::FemScene::ball_on_flat) does.
-    pub fn contact_rigid_below(&mut self, body: Body, shape: RigidShape, height_m: f64) {
+    pub fn contact_rigid_below(&mut self, body: BodyIndex, shape: RigidShape, height_m: f64) {
         let opposite = Opposite::Rigid {
             shape,
             side: -1.0,
@@ -264,24 +268,26 @@ impl Model {
         self.add_points(body, opposite, softer);
     }
 
-    /// Forbids slip in all contacts of the model, as with unlimited friction: what touches stays where it first touched until it parts.
+    /// Forbids slip in all contacts of the model, as with unlimited friction: what touches stays
+    /// where it first touched until it parts.
     ///
-    /// Loads are then followed in steps that let the approach grow by a tenth: forces hold to a thousandth and contact radii to two,
-    /// whatever loads are asked for on the way. At ν near 0 the radius is up to 1.5 % low: the pressure near the rim is not that of sliding.
+    /// Loads are then followed in steps that let the approach grow by a tenth: forces hold to a
+    /// thousandth and contact radii to two, whatever loads are asked for on the way. At ν near 0
+    /// the radius is up to 1.5 % low: the pressure near the rim is not that of sliding.
     pub fn forbid_slip(&mut self) {
         self.sticks = true;
     }
 
     /// Makes the pressure on a body's [`Boundary::Interface`], above its first `lower` regions, the
     /// pressure of the states.
-    pub fn bond(&mut self, body: Body, lower: usize) {
+    pub fn bond(&mut self, body: BodyIndex, lower: usize) {
         let first = self.body_regions(body).start;
         let edges = self.edges(body, Boundary::Interface);
         let is_lower = |index: usize| (first..first + lower).contains(&self.regions[index]);
         self.interface = Some(BondedInterface::new(edges, &self.elements, is_lower, -1.0));
     }
 
-    fn add_points(&mut self, body: Body, opposite: Opposite, softer: f64) {
+    fn add_points(&mut self, body: BodyIndex, opposite: Opposite, softer: f64) {
         let edges = self.edges(body, Boundary::Contact).to_vec();
         let pair = self.opposites.len();
         self.opposites.push(opposite);
@@ -291,7 +297,7 @@ impl Model {
         self.contact_nodes.extend(nodes);
     }
 
-    fn softest(&self, body: Body) -> f64 {
+    fn softest(&self, body: BodyIndex) -> f64 {
         let moduli = self.materials(body).iter().map(Material::youngs_modulus_pa);
         moduli.fold(f64::INFINITY, f64::min)
     }
@@ -308,12 +314,12 @@ pub struct Fields {
     pub multipliers: Vec<f64>,
     /// Contact pressures per reference area, unknowns of their own as element pressures are.
     pub contact: Vec<f64>,
-    /// Where contact nodes stick; empty where surfaces slide.
+    /// Where contact nodes stick. Empty where surfaces slide.
     pub anchors: Vec<Option<Anchor>>,
 }
 
 impl Fields {
-    pub fn zero(model: &Model) -> Self {
+    pub fn zero(model: &ElementModel) -> Self {
         Self {
             displacement: vec![0.0; 2 * model.nodes.len()],
             pressures: vec![[0.0; 3]; model.elements.len()],
@@ -406,7 +412,7 @@ pub enum RigidShape {
 }
 
 impl RigidShape {
-    /// Height at radius r, its slope and second derivative; `None` beyond the shape.
+    /// Height at radius r, its slope and second derivative. `None` beyond the shape.
     pub fn profile(self, r: f64) -> Option<[f64; 3]> {
         match self {
             Self::Flat => Some([0.0; 3]),

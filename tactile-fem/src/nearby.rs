@@ -1,8 +1,8 @@
 //! Scenes near a solved one, on the same mesh: derivatives by parameters.
 
-use crate::element::{Elimination, Geometry};
+use crate::element::{ElementGeometry, Elimination};
 use crate::material::Material;
-use crate::model::{Fields, Model};
+use crate::model::{ElementModel, Fields};
 use crate::scene::FemScene;
 use crate::sparse::Factors;
 use crate::state::{PressurePoint, State};
@@ -30,8 +30,8 @@ impl FemScene {
         Ok(Self::from_model(model))
     }
 
-    /// The equations of this scene and of those [changed](Self::changed) from it, analysed; `None` where there is no
-    /// memory for them.
+    /// The equations of this scene and of those [changed](Self::changed) from it, analysed. `None`
+    /// where there is no memory for them.
     pub fn layout(&self) -> Option<Layout> {
         let mut layout = Layout::new(self.model());
         layout
@@ -40,16 +40,16 @@ impl FemScene {
         Some(layout)
     }
 
-    /// What solutions of nearby scenes start from; `None` where the tangent is singular.
+    /// What solutions of nearby scenes start from. `None` where the tangent is singular.
     pub fn neighbourhood<'a>(
         &'a self,
         layout: &mut Layout,
         state: &'a State,
-    ) -> Option<Neighbourhood<'a>> {
+    ) -> Option<SolvedNeighbourhood<'a>> {
         let model = self.model();
         let system = model.assemble(layout, &state.fields, 0.0)?;
         let (tangent, slots, eliminations) = system.into_parts();
-        Some(Neighbourhood {
+        Some(SolvedNeighbourhood {
             model,
             fields: &state.fields,
             factors: tangent.matrix.factorise().ok()?,
@@ -72,8 +72,8 @@ pub struct Found {
 }
 
 /// A state with its tangent.
-pub struct Neighbourhood<'a> {
-    model: &'a Model,
+pub struct SolvedNeighbourhood<'a> {
+    model: &'a ElementModel,
     fields: &'a Fields,
     tangent: Tangent,
     factors: Factors,
@@ -81,7 +81,7 @@ pub struct Neighbourhood<'a> {
     eliminations: Vec<Elimination>,
 }
 
-impl Neighbourhood<'_> {
+impl SolvedNeighbourhood<'_> {
     /// What is found of nearby scenes at their approaches, each by one iteration from the
     /// state with its tangent: the error is of second order in the scenes' difference.
     ///
@@ -111,9 +111,9 @@ impl Neighbourhood<'_> {
         Some(found)
     }
 
-    /// The residual's change from this scene to a nearby one, taken from `right`, and the eliminations of
-    /// the elements that differ.
-    fn change(&self, nearby: &Model, right: &mut [f64]) -> Option<Vec<Option<Elimination>>> {
+    /// The residual's change from this scene to a nearby one, taken from `right`, and the
+    /// eliminations of the elements that differ.
+    fn change(&self, nearby: &ElementModel, right: &mut [f64]) -> Option<Vec<Option<Elimination>>> {
         let model = self.model;
         let mut changes = Vec::with_capacity(model.elements.len());
         for (index, nodes) in model.elements.iter().enumerate() {
@@ -142,10 +142,11 @@ impl Neighbourhood<'_> {
         Some(changes)
     }
 
-    /// Pressure and force on the interface after a step of the equations' unknowns and the approach.
+    /// Pressure and force on the interface after a step of the equations' unknowns and the
+    /// approach.
     fn interface(
         &self,
-        nearby: &Model,
+        nearby: &ElementModel,
         changes: &[Option<Elimination>],
         approach: f64,
         step: impl Fn(usize) -> f64,
@@ -180,7 +181,7 @@ impl Neighbourhood<'_> {
     }
 }
 
-impl Model {
+impl ElementModel {
     /// Moves nodes, each by its index and position. Elements whose nodes stay keep their geometry.
     ///
     /// # Errors
@@ -197,7 +198,7 @@ impl Model {
         }
         for (index, element) in self.elements.iter().enumerate() {
             if element.iter().any(|&node| is_moved[node]) {
-                let geometry = Geometry::new(&element.map(|node| self.nodes[node]))
+                let geometry = ElementGeometry::new(&element.map(|node| self.nodes[node]))
                     .ok_or(ElasticityError::DegenerateElement { element: index })?;
                 self.geometry[index] = Arc::new(geometry);
             }

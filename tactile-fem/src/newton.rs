@@ -4,48 +4,28 @@
 //!
 //! Simplified Newton iterations: with the tangent of an earlier iterate.
 //!
-//! An iteration then evaluates forces alone, a third of an element's work, and factorises nothing: about a fifth
-//! of a full one's time. It converges linearly, by a factor that is proportional to the distance from where the
-//! tangent was taken (P. Deuflhard, *Newton Methods for Nonlinear Problems* (2004), §2.1.2), which for scenes near a
-//! solved one is small.
+//! An iteration then evaluates forces alone, a third of an element's work, and factorises nothing:
+//! about a fifth of a full one's time. It converges linearly, by a factor that is proportional to
+//! the distance from where the tangent was taken (P. Deuflhard, *Newton Methods for Nonlinear
+//! Problems* (2004), §2.1.2), which for scenes near a solved one is small.
 
 use crate::contact::Opposite;
 use crate::element::{Elimination, OUTER};
 use crate::material::Kinematics;
-use crate::model::{Equilibrium, Fields, Model};
+use crate::model::{ElementModel, Equilibrium, Fields};
 use crate::scene::{AppliedLoad, Outcome, Solution, SolverReport};
 use crate::sparse::Factors;
 use crate::state::State;
 use crate::system::{Goal, Layout, Slot, Tangent};
 use std::sync::Arc;
 
-/// Iterations of a load step before it is halved. Steps that converge take three to ten.
-const MAX_ITERATIONS: usize = 25;
-/// Halvings of a load step before the solver stops.
-const MAX_HALVINGS: usize = 10;
-/// Part of a Newton step below which it is given up, where elements are turned inside out before.
-const SHORTEST_STEP: f64 = 0.02;
-/// Updates of the contact multipliers a load.
-const AUGMENTATIONS: usize = 1;
-
-/// Imbalance at a guessed approach below which the force takes over.
-const SWITCH_TO_FORCE: f64 = 1e-2;
-
 /// First step of a contact, over the bodies' height.
 const FIRST_STEP: f64 = 1e-3;
 /// Growth of the approach in one step where two deformable surfaces slide on each other.
 const LARGEST_GROWTH: f64 = 3.0;
-/// Largest step of the approach there, over the bodies' height.
-const LARGEST_STEP: f64 = 0.08;
-/// Growth of the approach in one step where surfaces stick: where a node touches within a step is not known. With 1.2 the force of a ball
-/// depends on the loads before by a thousandth and its contact radius by four, with this by less than half of that (the test
-/// `more_loads_on_the_way_change_little`).
-const STICK_GROWTH: f64 = 1.1;
-/// First step there, over the load's approach: what touches within it slides. With 0.02 a thirtieth of friction's part is lost.
-const STICK_FIRST_STEP: f64 = 0.002;
 
 struct Solver<'a> {
-    model: &'a Model,
+    model: &'a ElementModel,
     layout: &'a mut Layout,
     report: SolverReport,
     /// The equilibrium before the last one, for extrapolation.
@@ -53,18 +33,18 @@ struct Solver<'a> {
     last: Equilibrium,
 }
 
-impl Model {
+impl ElementModel {
     /// Solves for the loads in order, each starting from the one before.
     ///
-    /// A load that is not reached ends the solution: its [`SolverReport`] says so. O(n b²) for each Newton
-    /// iteration with n unknowns in a system of half-width b.
+    /// A load that is not reached ends the solution: its [`SolverReport`] says so. O(n b²) for each
+    /// Newton iteration with n unknowns in a system of half-width b.
     pub fn solve(&self, loads: &[AppliedLoad]) -> Solution {
         self.solve_near(&mut Layout::new(self), loads, &[])
     }
 
     /// [`Self::solve`] that first tries, for each load, to go there from a guess: the state of a model with
-    /// the same elements at about that load. `layout` is this model's or one's with the same elements and supports:
-    /// its analysis is used again.
+    /// the same elements at about that load. `layout` is this model's or one's with the same
+    /// elements and supports: its analysis is used again.
     pub fn solve_near(
         &self,
         layout: &mut Layout,
@@ -117,7 +97,7 @@ impl Model {
 }
 
 impl Solver<'_> {
-    /// Goes to an approach from a guess; whether that succeeded.
+    /// Goes to an approach from a guess. Whether that succeeded.
     fn jump(&mut self, guess: &State, load: AppliedLoad) -> bool {
         let AppliedLoad::Approach(approach) = load else {
             return false;
@@ -148,11 +128,22 @@ impl Solver<'_> {
         reached && self.augment(load)
     }
 
-    /// Goes towards an approach, which may change on the way, in steps that two deformable surfaces take, or surfaces that stick: a
-    /// contact that grows manyfold in one step does not settle, or slides where it should stick.
+    /// Goes towards an approach, which may change on the way, in steps that two deformable surfaces
+    /// take, or surfaces that stick: a contact that grows manyfold in one step does not settle, or
+    /// slides where it should stick.
     fn walk(&mut self, target: impl Fn(&Self) -> f64) -> bool {
+        // First step there, over the load's approach: what touches within it slides. With 0.02 a
+        // thirtieth of friction's part is lost.
+        let stick_first_step = 0.002;
+        // Growth of the approach in one step where surfaces stick: where a node touches within a
+        // step is not known. With 1.2 the force of a ball depends on the loads before by a
+        // thousandth and its contact radius by four, with this by less than half of that (the test
+        // `more_loads_on_the_way_change_little`).
+        let stick_growth = 1.1;
+        // Largest step of the approach there, over the bodies' height.
+        let largest_step = 0.08;
         let (growth, first_part) = match (self.model.sticks, self.slides()) {
-            (true, _) => (STICK_GROWTH, STICK_FIRST_STEP),
+            (true, _) => (stick_growth, stick_first_step),
             (false, true) => (LARGEST_GROWTH, 1.0),
             (false, false) => return true,
         };
@@ -160,7 +151,7 @@ impl Solver<'_> {
         let mut first = (FIRST_STEP * height).min(first_part * target(self).abs());
         loop {
             let here = self.last.fields.approach;
-            let next = (growth * here).min(here + LARGEST_STEP * height).max(first);
+            let next = (growth * here).min(here + largest_step * height).max(first);
             if target(self) <= next {
                 return true;
             }
@@ -198,6 +189,8 @@ impl Solver<'_> {
     }
 
     fn advance(&mut self, goal: Goal) -> bool {
+        // Halvings of a load step before the solver stops.
+        let max_halvings: usize = 10;
         let mut fraction = 1.0;
         let mut halvings = 0;
         loop {
@@ -232,7 +225,7 @@ impl Solver<'_> {
                 None => {
                     self.report.rejected_steps += 1;
                     halvings += 1;
-                    if halvings > MAX_HALVINGS {
+                    if halvings > max_halvings {
                         return false;
                     }
                     fraction *= 0.5;
@@ -288,7 +281,8 @@ impl Solver<'_> {
         })
     }
 
-    /// Equilibrium at the goal; without contacts by simplified Newton iterations where they converge.
+    /// Equilibrium at the goal. Without contacts by simplified Newton iterations where they
+    /// converge.
     fn newton(&mut self, start: Fields, goal: Goal) -> Option<Equilibrium> {
         if let (Goal::Approach(to), true) = (goal, self.model.contact_nodes.is_empty()) {
             let iterations = &mut self.report.iterations;
@@ -299,11 +293,18 @@ impl Solver<'_> {
     }
 
     fn full(&mut self, start: Fields, goal: Goal) -> Option<Equilibrium> {
+        // Imbalance at a guessed approach below which the force takes over.
+        let switch_to_force = 1e-2;
+        // Part of a Newton step below which it is given up, where elements are turned inside out
+        // before.
+        let shortest_step = 0.02;
+        // Iterations of a load step before it is halved. Steps that converge take three to ten.
+        let max_iterations: usize = 25;
         let model = self.model;
         let wanted = goal;
         let mut fields = start;
-        // A force is reached at a guessed approach first: the tangent of a contact that has only begun
-        // is no guide to where a force will be.
+        // A force is reached at a guessed approach first: the tangent of a contact that has only
+        // begun is no guide to where a force will be.
         let mut goal = match goal {
             Goal::Force(force) => Goal::Approach(self.approach_for(force)),
             Goal::Approach(_) => goal,
@@ -314,13 +315,13 @@ impl Solver<'_> {
         };
         let mut system = model.assemble(self.layout, &fields, margin(goal, &fields))?;
         let mut worst = f64::INFINITY;
-        for iteration in 0..MAX_ITERATIONS {
+        for iteration in 0..max_iterations {
             let there = match goal {
                 Goal::Approach(target) => fields.approach == target,
                 Goal::Force(_) => true,
             };
             let imbalance = system.imbalance(goal);
-            if there && goal != wanted && imbalance < SWITCH_TO_FORCE {
+            if there && goal != wanted && imbalance < switch_to_force {
                 goal = wanted;
             }
             if goal == wanted && there && (iteration > 0 || system.scale > 0.0) {
@@ -352,7 +353,7 @@ impl Solver<'_> {
                     break (trial, next);
                 }
                 length *= 0.5;
-                if length < SHORTEST_STEP {
+                if length < shortest_step {
                     return None;
                 }
             };
@@ -385,7 +386,9 @@ impl Solver<'_> {
 
     /// Updates the contact multipliers at the last equilibrium and balances again.
     fn augment(&mut self, load: AppliedLoad) -> bool {
-        for _ in 0..AUGMENTATIONS {
+        // Updates of the contact multipliers a load.
+        let augmentations: usize = 1;
+        for _ in 0..augmentations {
             let mut fields = self.last.fields.clone();
             if self.model.contact_nodes.is_empty() {
                 return true;
@@ -404,27 +407,26 @@ impl Solver<'_> {
     }
 }
 
-/// Tangents on the way to an equilibrium: those that are reached take one to three.
-const MAX_TANGENTS: usize = 7;
-/// Change of the approach, relative, up to which the last tangent is tried.
-const NEAR: f64 = 0.02;
-
-/// Equilibrium at an approach, of a model without contacts; `None` where iterations do not converge. A new tangent is taken
-/// only where those with the last one of `layout` converge slowly.
+/// Equilibrium at an approach, of a model without contacts. `None` where iterations do not
+/// converge. A new tangent is taken only where those with the last one of `layout` converge slowly.
 fn simplified(
-    model: &Model,
+    model: &ElementModel,
     layout: &mut Layout,
     start: &Fields,
     approach: f64,
     iterations: &mut usize,
 ) -> Option<Equilibrium> {
+    // Change of the approach, relative, up to which the last tangent is tried.
+    let near = 0.02;
+    // Tangents on the way to an equilibrium: those that are reached take one to three.
+    let max_tangents: usize = 7;
     let mut fields = start.clone();
-    let is_near = (approach - fields.approach).abs() <= NEAR * approach.abs();
+    let is_near = (approach - fields.approach).abs() <= near * approach.abs();
     let mut chord = layout.chord.take();
     if model.kinematics == Kinematics::Finite && !is_near {
         chord = None;
     }
-    for _ in 0..MAX_TANGENTS {
+    for _ in 0..max_tangents {
         let is_new = chord.is_none();
         let tried = match chord.take() {
             Some(chord) => chord,
@@ -448,8 +450,6 @@ fn simplified(
 /// Unbalanced force over element forces at which an equilibrium counts as reached: four digits
 /// below what the forces are wanted to, and well above rounding.
 const TOLERANCE: f64 = 1e-8;
-/// Iterations that may be left at the rate of the last one: more take longer than a new tangent and the two that then do.
-const MOST_LEFT: f64 = 6.0;
 
 /// A factorised tangent of a model without contacts.
 #[derive(Debug)]
@@ -503,12 +503,15 @@ impl Chord {
     /// Iterates from `start` at an approach as long as that converges fast.
     fn iterate(
         &self,
-        model: &Model,
+        model: &ElementModel,
         start: Fields,
         approach: f64,
         is_new: bool,
         iterations: &mut usize,
     ) -> Ending {
+        // Iterations that may be left at the rate of the last one: more take longer than a new
+        // tangent and the two that then do.
+        let most_left = 6.0;
         let mut fields = start;
         // A full step of Newton's method may raise the imbalance on its way to the solution.
         let mut may_rise = is_new;
@@ -527,7 +530,7 @@ impl Chord {
                 may_rise = false;
                 // At this rate.
                 let left = (TOLERANCE / imbalance).ln() / rate.ln();
-                if !(rate < 1.0 && left < MOST_LEFT) {
+                if !(rate < 1.0 && left < most_left) {
                     return Ending::Slow(fields);
                 }
             }
@@ -552,7 +555,7 @@ impl Chord {
     }
 
     /// `None` where an element is turned inside out.
-    fn unbalanced(&self, model: &Model, fields: &Fields) -> Option<Unbalanced> {
+    fn unbalanced(&self, model: &ElementModel, fields: &Fields) -> Option<Unbalanced> {
         let mut found = Unbalanced {
             right: vec![0.0; self.by_approach.len()],
             centres: Vec::with_capacity(model.elements.len()),
@@ -604,7 +607,7 @@ impl Chord {
 
     fn step(
         &self,
-        model: &Model,
+        model: &ElementModel,
         fields: &Fields,
         unbalanced: &Unbalanced,
         approach: f64,

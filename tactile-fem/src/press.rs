@@ -5,7 +5,7 @@
 use crate::error::{Quantity, positive};
 use crate::material::{Kinematics, Material};
 use crate::mesh::{Boundary, ContactMesh, Mesh, contact_lines, graded};
-use crate::model::{Model, RigidShape, Support};
+use crate::model::{ElementModel, RigidShape, Support};
 use crate::scene::{FemScene, Interface};
 use tactile_elasticity::ElasticityError;
 
@@ -47,7 +47,7 @@ impl Guide {
     /// Layers from the object's side to the glass, and the guide's radius in metres.
     ///
     /// # Errors
-    /// No layer; a thickness or a radius that is not positive.
+    /// No layer. A thickness or a radius that is not positive.
     pub fn new(layers: Vec<GuideLayer>, radius_m: f64) -> Result<Self, ElasticityError> {
         positive(radius_m, Quantity::Radius)?;
         if layers.is_empty() {
@@ -82,7 +82,8 @@ impl Guide {
     }
 }
 
-/// A soft body of revolution that a sensor presses: its lowest point touches, its far side does not move.
+/// A soft body of revolution that a sensor presses: its lowest point touches, its far side does not
+/// move.
 ///
 /// ```
 /// use tactile_fem::{AppliedLoad, Material, ObjectShape, ObjectPress};
@@ -103,8 +104,8 @@ impl Guide {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum ObjectShape {
-    /// The half of a ball next to the contact. Its equator spreads freely in its plane, as where the ball is pressed the same way from both
-    /// sides.
+    /// The half of a ball next to the contact. Its equator spreads freely in its plane, as where
+    /// the ball is pressed the same way from both sides.
     Ball {
         /// Its radius, in metres.
         radius_m: f64,
@@ -114,15 +115,16 @@ pub enum ObjectShape {
         /// Its radius, in metres.
         radius_m: f64,
     },
-    /// A cylinder whose far end is glued to a stage; wider than the guide, a flat plate.
+    /// A cylinder whose far end is glued to a stage. Wider than the guide, a flat plate.
     Cylinder {
         /// Its radius, in metres.
         radius_m: f64,
         /// Its height, in metres.
         height_m: f64,
     },
-    /// A cone, its tip towards the sensor, whose base is glued to a stage. On a soft guide one sharper than about 1.1 rad ends early
-    /// with [`Outcome::Stopped`](crate::Outcome::Stopped): the strain at its tip has no bound.
+    /// A cone, its tip towards the sensor, whose base is glued to a stage. On a soft guide one
+    /// sharper than about 1.1 rad ends early with [`Outcome::Stopped`](crate::Outcome::Stopped):
+    /// the strain at its tip has no bound.
     Cone {
         /// Between its axis and its surface, in radians.
         half_angle_rad: f64,
@@ -131,7 +133,8 @@ pub enum ObjectShape {
     },
 }
 
-/// An [`ObjectShape`] pressed on a rigid flat or on a [`Guide`], without friction unless asked for, with the fineness of its mesh.
+/// An [`ObjectShape`] pressed on a rigid flat or on a [`Guide`], without friction unless asked for,
+/// with the fineness of its mesh.
 ///
 /// ```
 /// use tactile_fem::{Guide, GuideLayer, AppliedLoad, Material, ObjectShape, ObjectPress};
@@ -156,15 +159,16 @@ pub struct ObjectPress {
     fineness: usize,
 }
 
-/// Elements across the core of a contact, 0.06 radii of a ball: with five the contact radius of a ball on a flat is within
-/// 0.2 % from a/R = 0.15 on, with ten the time is four times as long (`cargo bench -p tactile-benches --features fem --bench finite_elements`).
+/// Elements across the core of a contact, 0.06 radii of a ball: with five the contact radius of a
+/// ball on a flat is within 0.2 % from a/R = 0.15 on, with ten the time is four times as long
+/// (`cargo bench -p tactile-benches --features fem --bench finite_elements`).
 const FINENESS: usize = 5;
 
 impl ObjectPress {
     /// An object of one material on a rigid flat.
     ///
     /// # Errors
-    /// Lengths that are not positive; a cone's angle not between 0 and π/2.
+    /// Lengths that are not positive. A cone's angle not between 0 and π/2.
     pub fn new(object: ObjectShape, material: Material) -> Result<Self, ElasticityError> {
         object.check()?;
         Ok(Self {
@@ -176,8 +180,9 @@ impl ObjectPress {
         })
     }
 
-    /// On this guide instead of a rigid flat. Contact radii reach 1.3 ball radii and more, until the ball's equator or the guide's thickness ends
-    /// what the bodies take: the solution then ends with [`Outcome::Stopped`](crate::Outcome::Stopped).
+    /// On this guide instead of a rigid flat. Contact radii reach 1.3 ball radii and more, until
+    /// the ball's equator or the guide's thickness ends what the bodies take: the solution then
+    /// ends with [`Outcome::Stopped`](crate::Outcome::Stopped).
     ///
     /// ```
     /// use tactile_fem::{Guide, GuideLayer, AppliedLoad, Material, ObjectShape, ObjectPress};
@@ -210,8 +215,9 @@ impl ObjectPress {
         Ok(self)
     }
 
-    /// Whether what touches slides, as it does by default, or sticks ([`Interface::Bonded`]): points that have come into contact stay
-    /// opposite to each other until they part. The time grows several times, as loads are followed in short steps.
+    /// Whether what touches slides, as it does by default, or sticks ([`Interface::Bonded`]):
+    /// points that have come into contact stay opposite to each other until they part. The time
+    /// grows several times, as loads are followed in short steps.
     ///
     /// ```
     /// use tactile_fem::{Interface, AppliedLoad, Material, ObjectShape, ObjectPress};
@@ -231,7 +237,8 @@ impl ObjectPress {
         self
     }
 
-    /// The number of elements across the middle of the contact (default 5); elements elsewhere follow. Time grows with its square.
+    /// The number of elements across the middle of the contact (default 5). Elements elsewhere
+    /// follow. Time grows with its square.
     ///
     /// # Errors
     /// [`ElasticityError::OutOfRange`] below 2.
@@ -253,7 +260,7 @@ impl ObjectPress {
     /// # Errors
     /// [`ElasticityError::DegenerateElement`] where the proportions leave an element without area.
     pub fn scene(&self) -> Result<FemScene, ElasticityError> {
-        let mut model = Model::new(Kinematics::Finite);
+        let mut model = ElementModel::new(Kinematics::Finite);
         let object = model.add(&self.object_mesh(), &[self.material])?;
         let far_side = match self.object {
             ObjectShape::Ball { .. } => Support::Sliding,
@@ -291,7 +298,8 @@ impl ObjectPress {
         }
     }
 
-    /// Growth from element to element that is `growth` at the default fineness: over the same length it is the same at any.
+    /// Growth from element to element that is `growth` at the default fineness: over the same
+    /// length it is the same at any.
     fn growth(&self, growth: f64) -> f64 {
         growth.powf(FINENESS as f64 / self.fineness as f64)
     }
@@ -338,7 +346,8 @@ impl ObjectPress {
                 let size = self.size();
                 let radius = self.object.radius_m();
                 let largest = 0.15 * radius * FINENESS as f64 / self.fineness as f64;
-                // The contact may grow to about the ball's own radius; beyond, elements grow freely.
+                // The contact may grow to about the ball's own radius; beyond, elements grow
+                // freely.
                 let end = (1.3 * radius).min(0.5 * (radius + guide.radius_m()));
                 let lines = contact_lines(size.inner, size.count, size.growth, largest, end);
                 (lines, 2.0 * size.inner / size.count as f64)
@@ -405,7 +414,7 @@ impl ObjectShape {
         }
     }
 
-    /// Length of a cone's side; the radius of anything else.
+    /// Length of a cone's side. The radius of anything else.
     fn side_m(&self) -> f64 {
         match *self {
             Self::Cone {
@@ -418,8 +427,9 @@ impl ObjectShape {
 }
 
 impl FemScene {
-    /// The half of a ball next to its contact with a rigid flat; its equator slides freely, as it
-    /// does where the ball is pressed the same way from both sides. [`ObjectPress`] has other objects.
+    /// The half of a ball next to its contact with a rigid flat. Its equator slides freely, as it
+    /// does where the ball is pressed the same way from both sides. [`ObjectPress`] has other
+    /// objects.
     ///
     /// # Errors
     /// A radius that is not positive.
@@ -427,11 +437,11 @@ impl FemScene {
         ObjectPress::new(ObjectShape::Ball { radius_m }, material)?.scene()
     }
 
-    /// The half of a ball on a guide, without friction; the ball's equator slides freely at its
+    /// The half of a ball on a guide, without friction. The ball's equator slides freely at its
     /// height, the glass moves by the approach. [`ObjectPress`] has other objects.
     ///
     /// # Errors
-    /// A radius that is not positive; a guide that is not wider than the ball.
+    /// A radius that is not positive. A guide that is not wider than the ball.
     pub(crate) fn ball_on_guide(
         radius_m: f64,
         material: Material,

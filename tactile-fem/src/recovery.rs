@@ -1,26 +1,20 @@
 //! Smooth pressures and the contact radius from the forces at a contact's nodes.
 //!
-//! Pressures of neighbouring nodes, the ends and the middles of quadratic edges, alternate about the true ones, by some percent near the
-//! contact's edge. What they carry by the hat functions of the edges' ends, displacements that the elements can make, is in equilibrium
-//! with the bodies and does not: these are means of the true pressure, whose squares lie nearly on a straight line over r².
+//! Pressures of neighbouring nodes, the ends and the middles of quadratic edges, alternate about
+//! the true ones, by some percent near the contact's edge. What they carry by the hat functions of
+//! the edges' ends, displacements that the elements can make, is in equilibrium with the bodies and
+//! does not: these are means of the true pressure, whose squares lie nearly on a straight line over
+//! r².
 //!
-//! Pressures of a state: on a contact from its multipliers, on a bonded interface from the elements'
-//! forces.
+//! Pressures of a state: on a contact from its multipliers, on a bonded interface from the
+//! elements' forces.
 
 use crate::element::{GAUSS3, quadratic};
-use crate::model::{BondedInterface, Fields, Model};
+use crate::model::{BondedInterface, ElementModel, Fields};
 use crate::state::{ContactRadius, PressurePoint};
 use core::f64::consts::{PI, TAU};
 use nalgebra::DVector;
 use std::collections::BTreeMap;
-
-/// Outermost edge ends left out of the fit: the contact's edge lies somewhere within the last element, whose pressures and half of its
-/// neighbour's are bent by it.
-const LEFT_OUT: usize = 2;
-/// Where the fit begins, over the outermost node's radius: further in, p² bends more than a parabola.
-const FIT_FROM: f64 = 0.35;
-/// Fewest means that two constants are fitted to.
-const FEWEST_MEANS: usize = 4;
 
 /// Pressures of a contact and its radius.
 pub struct ContactProfile {
@@ -29,8 +23,12 @@ pub struct ContactProfile {
 }
 
 impl ContactProfile {
-    /// From the pressures at all nodes in contact, from the axis outwards, and the force they carry.
+    /// From the pressures at all nodes in contact, from the axis outwards, and the force they
+    /// carry.
     pub fn new(points: Vec<PressurePoint>, force: f64) -> Self {
+        // Outermost edge ends left out of the fit: the contact's edge lies somewhere within the
+        // last element, whose pressures and half of its neighbour's are bent by it.
+        let left_out_limit: usize = 2;
         // A contact of few nodes, or one that does not reach the axis, keeps its pressures.
         if points.len() < 5 || points[0].r_m != 0.0 {
             return Self {
@@ -40,10 +38,10 @@ impl ContactProfile {
         }
         let means = means(&points);
         let fit = |left_out| Fit::new(&points, force, &means, left_out);
-        let fine = fit(LEFT_OUT);
+        let fine = fit(left_out_limit);
         let radius = fine.as_ref().map(|fine| ContactRadius {
             radius_m: fine.square.sqrt(),
-            uncertainty_m: match fit(LEFT_OUT + 1) {
+            uncertainty_m: match fit(left_out_limit + 1) {
                 Some(coarse) => (fine.square.sqrt() - coarse.square.sqrt()).abs(),
                 // Nothing to compare with: half the distance between the outermost nodes.
                 None => 0.5 * (points[points.len() - 1].r_m - points[points.len() - 2].r_m),
@@ -64,7 +62,8 @@ struct Mean {
 }
 
 impl Mean {
-    /// p² at the mean of r². Where p² falls linearly to zero at a², the mean of p is less than p there by var(r²)/8(a² − r²)² of it.
+    /// p² at the mean of r². Where p² falls linearly to zero at a², the mean of p is less than p
+    /// there by var(r²)/8(a² − r²)² of it.
     fn pressure_squared(&self, edge: Option<f64>) -> f64 {
         let to_edge = edge.map_or(f64::INFINITY, |square| square - self.square);
         self.pressure * self.pressure * (1.0 + 0.25 * self.variance / (to_edge * to_edge))
@@ -81,7 +80,8 @@ struct Moments {
 }
 
 impl Moments {
-    /// Adds the stretch between two nodes; N falls or grows linearly between its values there, and so does the pressure.
+    /// Adds the stretch between two nodes. N falls or grows linearly between its values there, and
+    /// so does the pressure.
     fn add(&mut self, nodes: [&PressurePoint; 2], weights: [f64; 2]) {
         let between = |values: [f64; 2], t: f64| values[0] + t * (values[1] - values[0]);
         let radii = nodes.map(|node| node.r_m);
@@ -130,19 +130,26 @@ struct Fit {
 }
 
 impl Fit {
-    /// The constants fit the means inside the contact's outermost elements; a is where the fit carries the same force outside as the
-    /// elements do, which equilibrium makes accurate although their pressures are not. `None` with too few nodes in contact.
+    /// The constants fit the means inside the contact's outermost elements. The radius a is where the fit
+    /// carries the same force outside as the elements do, which equilibrium makes accurate although
+    /// their pressures are not. `None` with too few nodes in contact.
     fn new(points: &[PressurePoint], force: f64, means: &[Mean], left_out: usize) -> Option<Self> {
+        // Fewest means that two constants are fitted to.
+        let fewest_means: usize = 4;
+        // Where the fit begins, over the outermost node's radius: further in, p² bends more than a
+        // parabola.
+        let fit_from = 0.35;
         let last_end = (points.len() - 1) / 2;
         let from = last_end.checked_sub(left_out)?.min(means.len() - 1);
         let outermost = points[points.len() - 1].r_m;
         let fitted: Vec<&Mean> = (means[..=from].iter())
-            .filter(|mean| mean.square >= (FIT_FROM * outermost).powi(2))
+            .filter(|mean| mean.square >= (fit_from * outermost).powi(2))
             .collect();
-        if fitted.len() < FEWEST_MEANS {
+        if fitted.len() < fewest_means {
             return None;
         }
-        // What the function carries that grows from zero at the end before to one at this end and beyond.
+        // What the function carries that grows from zero at the end before to one at this end and
+        // beyond.
         let (inner, start) = (points[2 * from - 2].r_m, points[2 * from].r_m);
         let mut within = Moments::default();
         for k in 0..2 * from {
@@ -195,8 +202,8 @@ impl Fit {
 
     /// π ∫ p ds from `start` squared to a².
     fn outer_force(&self, start: f64) -> f64 {
-        // With t = t₀ x², √(c₀ t + c₁ t²) dt = 2 t₀^{3/2} x² √(c₀ + c₁ t₀ x²) dx, smooth in x: Simpson's rule on 16 intervals is exact to
-        // rounding nearly.
+        // With t = t₀ x², √(c₀ t + c₁ t²) dt = 2 t₀^{3/2} x² √(c₀ + c₁ t₀ x²) dx, smooth in x:
+        // Simpson's rule on 16 intervals is exact to rounding nearly.
         let t0 = 1.0 - start * start / self.square;
         let [c0, c1] = self.constants;
         let value = |x: f64| x * x * (c0 + c1 * t0 * x * x).max(0.0).sqrt();
@@ -257,8 +264,9 @@ fn smooth(points: &[PressurePoint], means: &[Mean], fit: Option<&Fit>) -> Vec<Pr
     smooth
 }
 
-impl Model {
-    /// Force per deformed area at the contact's nodes from the axis outwards, and their axial forces.
+impl ElementModel {
+    /// Force per deformed area at the contact's nodes from the axis outwards, and their axial
+    /// forces.
     pub fn contact_pressure(&self, fields: &Fields) -> (Vec<PressurePoint>, Vec<f64>) {
         let placement = self.placement(fields);
         let candidates = self.candidates(fields, 0.0);
@@ -289,7 +297,7 @@ impl Model {
     }
 }
 
-impl Model {
+impl ElementModel {
     /// Axial forces that press the bodies together at the interface's nodes.
     pub fn interface_forces(&self, interface: &BondedInterface, fields: &Fields) -> DVector<f64> {
         let mut forces = DVector::zeros(interface.nodes.len());
@@ -313,9 +321,9 @@ impl Model {
 
     /// Axial force per projected deformed area on the interface, from the axis outwards.
     ///
-    /// The nodal forces that the elements of one side put in balance are the pressure's moments with
-    /// the shape functions. Forces of single nodes alternate; their sums with the hat function φ of
-    /// each corner do not:
+    /// The nodal forces that the elements of one side put in balance are the pressure's moments
+    /// with the shape functions. Forces of single nodes alternate. Their sums with the hat function
+    /// φ of each corner do not:
     ///
     /// $$ P_a = \frac{f_a}{\int \phi_a 2\pi r dr} = p(\bar r_a) + \tfrac12 \sigma_a^2 p'' + \dots $$
     ///
@@ -418,8 +426,8 @@ impl InterfaceMoments {
     }
 }
 
-/// Second derivative of the mean pressure by the radius, from three neighbours; at the axis from the
-/// mirrored one.
+/// Second derivative of the mean pressure by the radius, from three neighbours. At the axis from
+/// the mirrored one.
 fn second_difference(means: &[HatMean], at: usize) -> Option<f64> {
     let here = means.get(at)?;
     let after = means.get(at + 1)?;

@@ -6,8 +6,8 @@
 
 use crate::error::{Quantity, positive};
 use crate::material::{Kinematics, Material};
-use crate::mesh::{BlockMesh, Boundary, Inclusion};
-use crate::model::{BondedInterface, Model, Support};
+use crate::mesh::{BlockMesh, Boundary, InclusionSize};
+use crate::model::{BondedInterface, ElementModel, Support};
 use crate::press::{Guide, ObjectPress, ObjectShape};
 use crate::state::{State, Stress};
 use crate::system::Layout;
@@ -32,7 +32,8 @@ use tactile_elasticity::ElasticityError;
 pub enum Interface {
     /// The two move together, from the start or from where they first touch.
     Bonded,
-    /// They slide on each other. A guide and a block are not let part: the pressure is positive where they press.
+    /// They slide on each other. A guide and a block are not let part: the pressure is positive
+    /// where they press.
     Frictionless,
 }
 
@@ -86,9 +87,6 @@ pub struct Block {
     pub lump: Option<Lump>,
 }
 
-/// Mesh fineness where nothing else is asked: elements along an eighth of an inclusion's circumference.
-const BLOCK_FINENESS: usize = 5;
-
 /// A model ready to be solved, with the pressure between guide and object as its result.
 ///
 /// ```
@@ -101,22 +99,25 @@ const BLOCK_FINENESS: usize = 5;
 /// ```
 #[derive(Debug, Clone)]
 pub struct FemScene {
-    pub(crate) model: Model,
+    pub(crate) model: ElementModel,
 }
 
 impl FemScene {
-    /// A block with or without an inclusion under a guide's face; the block's far side is held, the
+    /// A block with or without an inclusion under a guide's face. The block's far side is held, the
     /// guide's glass moves by the approach. [`Block`] and [`Interface`] have examples.
     ///
     /// # Errors
-    /// Lengths that are not positive; a block no wider than the guide; an inclusion that is not
+    /// Lengths that are not positive. A block no wider than the guide. An inclusion that is not
     /// inside the block or not narrower than the guide.
     pub fn block_under_guide(
         block: &Block,
         guide: &Guide,
         interface: Interface,
     ) -> Result<Self, ElasticityError> {
-        Self::block_with_mesh(block, guide, interface, BLOCK_FINENESS, Kinematics::Finite)
+        // Mesh fineness where nothing else is asked: elements along an eighth of an inclusion's
+        // circumference.
+        let block_fineness: usize = 5;
+        Self::block_with_mesh(block, guide, interface, block_fineness, Kinematics::Finite)
     }
 
     /// [`Self::block_under_guide`] on a mesh with `fineness` elements along an eighth of the
@@ -163,7 +164,7 @@ impl FemScene {
             block_radius: block.radius_m,
             disc_radius: guide.radius_m(),
             layers: guide.thicknesses(),
-            inclusion: block.lump.map(|lump| Inclusion {
+            inclusion: block.lump.map(|lump| InclusionSize {
                 radius: 0.5 * lump.diameter_m,
                 depth: lump.depth_m,
             }),
@@ -173,7 +174,7 @@ impl FemScene {
         .build();
         let mut tissue = vec![block.material];
         tissue.extend(block.lump.map(|lump| lump.material));
-        let mut model = Model::new(kinematics);
+        let mut model = ElementModel::new(kinematics);
         match meshes.block {
             None => {
                 let materials = [guide.materials(), tissue].concat();
@@ -211,11 +212,11 @@ impl FemScene {
         self.model.solve_near(layout, loads, guesses)
     }
 
-    pub(crate) fn from_model(model: Model) -> Self {
+    pub(crate) fn from_model(model: ElementModel) -> Self {
         Self { model }
     }
 
-    pub(crate) fn model(&self) -> &Model {
+    pub(crate) fn model(&self) -> &ElementModel {
         &self.model
     }
 
@@ -230,11 +231,11 @@ impl FemScene {
         self.model.element_count()
     }
 
-    /// Cauchy stress at the material point with reference coordinates (r, z) in metres. `None` outside the bodies, or for a state of
-    /// another scene.
+    /// Cauchy stress at the material point with reference coordinates (r, z) in metres. `None`
+    /// outside the bodies, or for a state of another scene.
     ///
-    /// From the derivatives of quadratic displacements: second order in the elements' size, discontinuous
-    /// between elements. O(elements).
+    /// From the derivatives of quadratic displacements: second order in the elements' size,
+    /// discontinuous between elements. O(elements).
     ///
     /// ```
     /// # use tactile_fem::{AppliedLoad, Material, ObjectShape, ObjectPress};
@@ -261,7 +262,7 @@ impl FemScene {
 pub enum AppliedLoad {
     /// The approach δ, in metres.
     Approach(f64),
-    /// The force on the driven boundaries, in newtons; positive presses.
+    /// The force on the driven boundaries, in newtons. Positive presses.
     Force(f64),
 }
 
@@ -278,7 +279,7 @@ pub enum AppliedLoad {
 pub enum Outcome {
     /// Every load has its state.
     Solved,
-    /// This load was not reached; the states of those before it are given.
+    /// This load was not reached. The states of those before it are given.
     Stopped {
         /// Index of the load.
         load: usize,
@@ -337,12 +338,15 @@ pub struct Solution {
 }
 
 impl FemScene {
-    /// A cylinder between two rigid plates to which both faces stick, or on which they slide without friction. One half of it is
-    /// solved: the other is its mirror image, and the approach is that of one plate to the middle, half of the whole squeeze.
+    /// A cylinder between two rigid plates to which both faces stick, or on which they slide
+    /// without friction. One half of it is solved: the other is its mirror image, and the approach
+    /// is that of one plate to the middle, half of the whole squeeze.
     ///
-    /// The [pressure](crate::State::pressure) is that on the face. Sliding, it is even, and the state is homogeneous; sticking, the sides bulge, the
-    /// pressure depends on the radius and is singular at the rim, where it is the mean over the last element. That the bulging side comes to
-    /// lie on the plate is not followed: at a squeeze of 10 % it does so over some hundredths of the radius.
+    /// The [pressure](crate::State::pressure) is that on the face. Sliding, it is even, and the
+    /// state is homogeneous. Sticking, the sides bulge, the pressure depends on the radius and is
+    /// singular at the rim, where it is the mean over the last element. That the bulging side comes
+    /// to lie on the plate is not followed: at a squeeze of 10 % it does so over some hundredths of
+    /// the radius.
     ///
     /// ```
     /// use tactile_fem::{Interface, AppliedLoad, Material, FemScene};
@@ -369,7 +373,7 @@ impl FemScene {
             height_m: 0.5 * height_m,
         };
         let mesh = ObjectPress::new(half, material)?.object_mesh();
-        let mut model = Model::new(Kinematics::Finite);
+        let mut model = ElementModel::new(Kinematics::Finite);
         let cylinder = model.add(&mesh, &[material])?;
         let support = match faces {
             Interface::Bonded => Support::Bonded,

@@ -1,33 +1,23 @@
 //! Surfaces that slide far on each other without friction, at one approach.
 //!
-//! [`Model::slide`](super::Model) lets nodes of one place share their axial displacement. As the bodies
-//! spread by different amounts, such nodes part sideways by some tenths of a millimetre, which moves the
-//! pressure by up to 1.1 % at a tenth of the block's height. The upper body's mesh is therefore moved along
-//! its surface until nodes that share a displacement meet in the deformed state.
+//! [`ElementModel::slide`](crate::model::ElementModel::slide) lets nodes of one place share their axial displacement. As the bodies
+//! spread by different amounts, such nodes part sideways by some tenths of a millimetre, which
+//! moves the pressure by up to 1.1 % at a tenth of the block's height. The upper body's mesh is
+//! therefore moved along its surface until nodes that share a displacement meet in the deformed
+//! state.
 //!
-//! The pressure acts along the axis: its radial share p dz/dr on the slightly bent face is left out. CalculiX with faces tied
-//! in the same way agrees (`evidence/inclusion_scenes.py`, the test `inclusion::against_calculix`). With contact pairs,
-//! whose pressure is normal to the bent face, CalculiX's forces and pressures are lower by 0.3 % at a thirtieth of the
-//! block's height and by about 2 % at a tenth, which the search does not allow for.
+//! The pressure acts along the axis: its radial share p dz/dr on the slightly bent face is left
+//! out. CalculiX with faces tied in the same way agrees (`evidence/inclusion_scenes.py`, the test
+//! `inclusion::against_calculix`). With contact pairs, whose pressure is normal to the bent face,
+//! CalculiX's forces and pressures are lower by 0.3 % at a thirtieth of the block's height and by
+//! about 2 % at a tenth, which the search does not allow for.
 
-use crate::model::Model;
+use crate::model::ElementModel;
 use crate::scene::{AppliedLoad, FemScene};
 use crate::state::State;
 use crate::system::Layout;
 
-/// Rounds of meshing and solving; each leaves about a tenth of the distance before.
-const MAX_ROUNDS: usize = 10;
-/// Part of the distance that a round may leave: beyond a tenth of the block's height the rim's nodes of a coarse mesh pass each
-/// other to and fro, which moves the pressure by a thousandth and takes most of a search's time.
-const STALLED: f64 = 0.8;
-/// Distance of nodes over the face's radius at which they meet: pressures change by as large a part.
-const MET: f64 = 2e-6;
-/// Part of the face's radius beyond which nodes count as the rim's, and their distance there: at a tenth of the block's height
-/// rounds leave a half of it instead of a tenth, and the pressure within three quarters of the face changes by a hundredth of it.
-const RIM: f64 = 0.9;
-const RIM_MET: f64 = 5e-5;
-
-/// Largest change of a shift over the distance of two nodes; inside the face it is below 0.1.
+/// Largest change of a shift over the distance of two nodes. Inside the face it is below 0.1.
 const LARGEST_GROWTH: f64 = 0.9;
 
 /// A node of the upper surface and the one of the lower that shares its axial displacement.
@@ -37,10 +27,11 @@ struct Pair {
 }
 
 impl FemScene {
-    /// Scene and state at an approach with surfaces that slide; those of a bonded interface unchanged.
+    /// Scene and state at an approach with surfaces that slide. Those of a bonded interface
+    /// unchanged.
     ///
-    /// `depth_m` is how far below the surface the mesh may move; `near` a solution nearby, on a mesh with
-    /// the same elements, `layout` one of such a mesh. `None` where there is no solution.
+    /// `depth_m` is how far below the surface the mesh may move. `near` a solution nearby, on a
+    /// mesh with the same elements, `layout` one of such a mesh. `None` where there is no solution.
     pub fn slid(
         &self,
         layout: &mut Layout,
@@ -48,6 +39,20 @@ impl FemScene {
         depth_m: f64,
         near: Option<(&Self, &State)>,
     ) -> Option<(Self, State)> {
+        let rim_met = 5e-5;
+        // Part of the face's radius beyond which nodes count as the rim's, and their distance
+        // there: at a tenth of the block's height rounds leave a half of it instead of a tenth, and
+        // the pressure within three quarters of the face changes by a hundredth of it.
+        let rim_limit = 0.9;
+        // Distance of nodes over the face's radius at which they meet: pressures change by as large
+        // a part.
+        let met = 2e-6;
+        // Part of the distance that a round may leave: beyond a tenth of the block's height the
+        // rim's nodes of a coarse mesh pass each other to and fro, which moves the pressure by a
+        // thousandth and takes most of a search's time.
+        let stalled = 0.8;
+        // Rounds of meshing and solving; each leaves about a tenth of the distance before.
+        let max_rounds: usize = 10;
         let load = [AppliedLoad::Approach(approach_m)];
         let near = near.filter(|(scene, _)| scene.model.elements == self.model.elements);
         let mut scene = match near {
@@ -60,12 +65,13 @@ impl FemScene {
             None => self.clone(),
         };
         let guess = near.map_or(&[][..], |(_, state)| core::slice::from_ref(state));
-        let mut solve =
-            |model: &Model, guess: &[State]| model.solve_near(layout, &load, guess).states.pop();
+        let mut solve = |model: &ElementModel, guess: &[State]| {
+            model.solve_near(layout, &load, guess).states.pop()
+        };
         let mut state = solve(&scene.model, guess)?;
         let mut relaxation = Relaxation::default();
         let mut before = f64::INFINITY;
-        for _ in 0..MAX_ROUNDS {
+        for _ in 0..max_rounds {
             let pairs = scene.model.pairs();
             let radius =
                 |node: usize| scene.model.nodes[node][0] + state.fields.displacement[2 * node];
@@ -75,11 +81,11 @@ impl FemScene {
                 .map(|pair| radius(pair.lower))
                 .fold(0.0, f64::max);
             let left = |pair: &Pair| {
-                let is_rim = radius(pair.lower) > RIM * face;
-                apart(pair).abs() / (if is_rim { RIM_MET } else { MET } * face)
+                let is_rim = radius(pair.lower) > rim_limit * face;
+                apart(pair).abs() / (if is_rim { rim_met } else { met } * face)
             };
             let left = pairs.iter().map(left).fold(0.0, f64::max);
-            if left <= 1.0 || left > STALLED * before {
+            if left <= 1.0 || left > stalled * before {
                 break;
             }
             before = left;
@@ -120,8 +126,9 @@ impl FemScene {
         self.shifted(&shifts, depth_m)
     }
 
-    /// This scene with the upper surface's nodes where another scene has them, its shifts times `growth`.
-    fn with_pairs_of(&self, near: &Model, growth: f64, depth_m: f64) -> Option<Self> {
+    /// This scene with the upper surface's nodes where another scene has them, its shifts times
+    /// `growth`.
+    fn with_pairs_of(&self, near: &ElementModel, growth: f64, depth_m: f64) -> Option<Self> {
         let mut shifts = Vec::new();
         for pair in self.model.pairs() {
             let [upper, lower] = [pair.upper, pair.lower].map(|node| near.nodes[node][0]);
@@ -131,8 +138,8 @@ impl FemScene {
         self.shifted(&shifts, depth_m)
     }
 
-    /// This scene with nodes of the upper body moved along r: at the surface by the second of `shifts` at
-    /// the first, none at `depth_m` and at the outer side, linearly in between.
+    /// This scene with nodes of the upper body moved along r: at the surface by the second of
+    /// `shifts` at the first, none at `depth_m` and at the outer side, linearly in between.
     fn shifted(&self, shifts: &[[f64; 2]], depth_m: f64) -> Option<Self> {
         let mut scene = self.clone();
         let model = &mut scene.model;
@@ -168,8 +175,9 @@ impl FemScene {
 
 /// Part of its distance by which each pair's node is moved: a secant's step, pair by pair.
 ///
-/// A move by δ changes a distance by −δ where the face is smooth. At the rim, whose pressure the move
-/// changes, the change is larger, at a tenth of the block's height twice as large: full steps would never end.
+/// A move by δ changes a distance by −δ where the face is smooth. At the rim, whose pressure the
+/// move changes, the change is larger, at a tenth of the block's height twice as large: full steps
+/// would never end.
 #[derive(Debug, Clone, Default)]
 pub struct Relaxation {
     /// Distance before the last move, and the part of it that was moved.
@@ -179,13 +187,15 @@ pub struct Relaxation {
 impl Relaxation {
     /// The part of a distance by which a node is moved, from the last two distances.
     pub fn next(&mut self, distances: impl Iterator<Item = f64>) -> Vec<f64> {
+        // Least part of a distance that is moved.
+        let least_part = 0.2;
         let mut last = core::mem::take(&mut self.last).into_iter();
         for now in distances {
             let part = last.next().map_or(1.0, |(before, part)| {
                 let secant = part * before / (before - now);
                 // Distances that are rounding alone say nothing.
                 if secant.is_finite() {
-                    secant.clamp(LEAST_PART, 1.0)
+                    secant.clamp(least_part, 1.0)
                 } else {
                     1.0
                 }
@@ -196,11 +206,8 @@ impl Relaxation {
     }
 }
 
-/// Least part of a distance that is moved.
-const LEAST_PART: f64 = 0.2;
-
-/// Keeps neighbouring shifts from differing by more than a part of the nodes' distance: at the rim, where
-/// the displacement is singular, elements would be turned inside out.
+/// Keeps neighbouring shifts from differing by more than a part of the nodes' distance: at the rim,
+/// where the displacement is singular, elements would be turned inside out.
 fn limit_growth(shifts: &mut [[f64; 2]]) {
     for k in 1..shifts.len() {
         let [[before, last], [here, shift]] = [shifts[k - 1], shifts[k]];
@@ -209,7 +216,7 @@ fn limit_growth(shifts: &mut [[f64; 2]]) {
     }
 }
 
-impl Model {
+impl ElementModel {
     /// Pairs of nodes that share their axial displacement, from the axis outwards.
     fn pairs(&self) -> Vec<Pair> {
         let partners = self.partners.iter().enumerate();

@@ -1,7 +1,7 @@
 //! Sparse symmetric systems: pattern, LDLᵀ factorisation, solution.
 //!
-//! The analysis (fill-reducing order, elimination tree, supernodes) is made once a pattern and serves
-//! every matrix that has it.
+//! The analysis (fill-reducing order, elimination tree, supernodes) is made once a pattern and
+//! serves every matrix that has it.
 
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::ldlt::factor::LdltRegularization;
@@ -110,7 +110,7 @@ impl Symmetric {
 
     /// LDLᵀ factors.
     ///
-    /// Without pivoting: a stable equilibrium's tangent is positive definite; where it is not, the
+    /// Without pivoting: a stable equilibrium's tangent is positive definite. Where it is not, the
     /// step that Newton's method then takes is judged by its residual.
     pub fn factorise(&self) -> Result<Factors, Singular> {
         let analysis = &self.pattern.analysis;

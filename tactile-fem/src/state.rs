@@ -5,8 +5,8 @@
 //! Stresses at any point of a state.
 
 use crate::element::{ALL, map, pressure_functions, shape};
-use crate::material::{Deformation, Gradient, Kinematics};
-use crate::model::{Equilibrium, Fields, Model};
+use crate::material::{Gradient, Kinematics, PointDeformation};
+use crate::model::{ElementModel, Equilibrium, Fields};
 use crate::recovery::ContactProfile;
 
 /// The deformed bodies at one load.
@@ -28,7 +28,7 @@ pub struct State {
 }
 
 impl State {
-    pub(crate) fn new(model: &Model, equilibrium: &Equilibrium) -> Self {
+    pub(crate) fn new(model: &ElementModel, equilibrium: &Equilibrium) -> Self {
         let (nodes, forces) = model.contact_pressure(&equilibrium.fields);
         let ContactProfile {
             points: mut pressure,
@@ -45,7 +45,7 @@ impl State {
         }
     }
 
-    /// Force on the driven boundaries, in newtons; positive presses.
+    /// Force on the driven boundaries, in newtons. Positive presses.
     pub fn force_n(&self) -> f64 {
         self.force
     }
@@ -61,14 +61,15 @@ impl State {
         pairs.map(|pair| [pair[0], pair[1]]).collect()
     }
 
-    /// Pressure at the elements' ends in contact, or at the nodes of a bonded interface, from the axis outwards; of
-    /// [`PressurePoint`]'s example. Within a contact's outermost two elements it is that of a smooth edge which carries the elements' force.
+    /// Pressure at the elements' ends in contact, or at the nodes of a bonded interface, from the
+    /// axis outwards. Of [`PressurePoint`]'s example. Within a contact's outermost two elements it
+    /// is that of a smooth edge which carries the elements' force.
     pub fn pressure(&self) -> &[PressurePoint] {
         &self.pressure
     }
 
-    /// Pressure at a radius of the deformed interface in metres, by the cubic through the four nearest
-    /// points of [`Self::pressure`]; constant beyond the last, zero without contact.
+    /// Pressure at a radius of the deformed interface in metres, by the cubic through the four
+    /// nearest points of [`Self::pressure`]. Constant beyond the last, zero without contact.
     ///
     /// ```
     /// # use tactile_fem::{AppliedLoad, Material, ObjectShape, ObjectPress};
@@ -80,8 +81,8 @@ impl State {
         pressure_at(&self.pressure, radius_m)
     }
 
-    /// Radius at which the contact pressure falls to zero: near a smooth contact's edge p² is nearly
-    /// linear in r², and the force it carries is known from equilibrium.
+    /// Radius at which the contact pressure falls to zero: near a smooth contact's edge p² is
+    /// nearly linear in r², and the force it carries is known from equilibrium.
     ///
     /// `None` where fewer than some eight nodes are in contact.
     pub fn contact_radius(&self) -> Option<ContactRadius> {
@@ -128,7 +129,7 @@ pub struct ContactRadius {
     pub uncertainty_m: f64,
 }
 
-/// Pressure at a radius, by the cubic through the four nearest points; constant beyond the last.
+/// Pressure at a radius, by the cubic through the four nearest points. Constant beyond the last.
 pub fn pressure_at(points: &[PressurePoint], radius: f64) -> f64 {
     let after = points.partition_point(|point| point.r_m < radius);
     let Some(last) = points.last() else {
@@ -152,7 +153,7 @@ pub fn pressure_at(points: &[PressurePoint], radius: f64) -> f64 {
     sum
 }
 
-/// The Cauchy stress at a point, in pascals, tension positive; the components rθ and zθ are zero.
+/// The Cauchy stress at a point, in pascals, tension positive. The components rθ and zθ are zero.
 ///
 /// ```
 /// use tactile_fem::{Interface, AppliedLoad, Material, FemScene};
@@ -177,9 +178,9 @@ pub struct Stress {
     pub rz_pa: f64,
 }
 
-impl Model {
-    /// Cauchy stress at the material point with reference coordinates (r, z) in metres; Hooke's stress in
-    /// linear kinematics. `None` outside the bodies, or for a state of another model.
+impl ElementModel {
+    /// Cauchy stress at the material point with reference coordinates (r, z) in metres. Hooke's
+    /// stress in linear kinematics. `None` outside the bodies, or for a state of another model.
     pub fn stress(&self, state: &State, point: [f64; 2]) -> Option<Stress> {
         let fields = &state.fields;
         if fields.displacement.len() != 2 * self.nodes.len() {
@@ -195,7 +196,7 @@ impl Model {
         self.element_stress(state, index, [xi, eta])
     }
 
-    /// Cauchy stress within an element, off the axis; `None` where it is turned inside out.
+    /// Cauchy stress within an element, off the axis. `None` where it is turned inside out.
     pub fn element_stress(
         &self,
         state: &State,
@@ -215,7 +216,7 @@ impl Model {
             h[4] += over_r * u[2 * a];
         }
         let material = &self.materials[self.regions[index]];
-        let deformation = Deformation::new(self.kinematics, material.shear_modulus(), &h)?;
+        let deformation = PointDeformation::new(self.kinematics, material.shear_modulus(), &h)?;
         let response = deformation.response();
         let functions = pressure_functions(&nodes, position);
         let pressures = functions.iter().zip(&fields.pressures[index]);
@@ -261,7 +262,7 @@ impl Model {
     }
 }
 
-/// ξ and η of a point by Newton's method; `None` where it leaves the element's surroundings.
+/// ξ and η of a point by Newton's method. `None` where it leaves the element's surroundings.
 fn inverse_map(nodes: &[[f64; 2]; 9], point: [f64; 2]) -> Option<[f64; 2]> {
     let size = (nodes[2][0] - nodes[0][0]).hypot(nodes[2][1] - nodes[0][1]);
     let mut at = [0.0; 2];

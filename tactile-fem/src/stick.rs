@@ -2,18 +2,20 @@
 //!
 //! Contact without slip: what touches stays where it first touched.
 //!
-//! A contact node that carries a pressure after a load step is anchored to the point opposite to it. Let d be its displacement relative
-//! to that point since then and t the surface's direction. The traction τ = ε t·d per reference area holds it back, with the penalty ε
-//! of the normal pressure; it derives from the potential ½ ε (t·d)². t is that of the last load step: the potential is quadratic, and
-//! its tangent symmetric. A node whose pressure has ended is free again after the load step: were it so at once, Newton's method would toss
-//! it between the two states.
+//! A contact node that carries a pressure after a load step is anchored to the point opposite to
+//! it. Let d be its displacement relative to that point since then and t the surface's direction.
+//! The traction τ = ε t·d per reference area holds it back, with the penalty ε of the normal
+//! pressure. It derives from the potential ½ ε (t·d)². t is that of the last load step: the
+//! potential is quadratic, and its tangent symmetric. A node whose pressure has ended is free again
+//! after the load step: were it so at once, Newton's method would toss it between the two states.
 //!
-//! A node that comes into contact within a load step has done so, on the average, in its middle: it is anchored to the mean of its
-//! relative displacements before and after. Nodes that touch unloaded are anchored there.
+//! A node that comes into contact within a load step has done so, on the average, in its middle: it
+//! is anchored to the mean of its relative displacements before and after. Nodes that touch
+//! unloaded are anchored there.
 
 use crate::contact::{ContactNode, DRIVER, Opposite, Placement};
 use crate::material::Kinematics;
-use crate::model::{Fields, Model};
+use crate::model::{ElementModel, Fields};
 
 /// Where a contact node is held.
 #[derive(Debug, Clone, PartialEq)]
@@ -76,24 +78,24 @@ impl Anchor {
     }
 }
 
-/// Part of the nodes' spacing within which two unloaded surfaces count as touching: rounding of coordinates leaves 1e-16 of it.
-const TOUCHING: f64 = 1e-9;
-
-impl Model {
+impl ElementModel {
     /// Anchors of the nodes that touch without load.
     pub fn first_anchors(&self, unloaded: &Fields) -> Vec<Option<Anchor>> {
+        // Part of the nodes' spacing within which two unloaded surfaces count as touching: rounding
+        // of coordinates leaves 1e-16 of it.
+        let touching = 1e-9;
         let mut anchors = vec![None; self.contact_nodes.len()];
         for candidate in self.candidates(unloaded, 0.0) {
             let contact = &self.contact_nodes[candidate.index];
-            if candidate.gap.value <= TOUCHING * contact.spacing {
+            if candidate.gap.value <= touching * contact.spacing {
                 anchors[candidate.index] = self.anchor(contact, unloaded);
             }
         }
         anchors
     }
 
-    /// Anchors after a load step: those of nodes that still press, turned with the surface, and new ones where nodes have come into
-    /// contact.
+    /// Anchors after a load step: those of nodes that still press, turned with the surface, and new
+    /// ones where nodes have come into contact.
     pub fn next_anchors(&self, before: &Fields, after: &Fields) -> Vec<Option<Anchor>> {
         let anchors = after.contact.iter().zip(&after.anchors);
         let contacts = self.contact_nodes.iter().zip(anchors);

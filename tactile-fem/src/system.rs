@@ -8,7 +8,7 @@
 
 use crate::contact::{Candidate, DRIVER};
 use crate::element::{Elimination, OUTER};
-use crate::model::{Fields, Model, Motion};
+use crate::model::{DofMotion, ElementModel, Fields};
 use crate::newton::Chord;
 use crate::sparse::{Factors, Pattern, Singular, Symmetric};
 use crate::stick::Slip;
@@ -22,8 +22,8 @@ pub enum Slot {
     Equation(usize),
 }
 
-/// Where the entries of an element's stiffness, the lower half row by row, stand among the tangent's values;
-/// [`NO_PLACE`] where one of the two components has no equation.
+/// Where the entries of an element's stiffness, the lower half row by row, stand among the
+/// tangent's values. [`NO_PLACE`] where one of the two components has no equation.
 type Places = [u32; OUTER * (OUTER + 1) / 2];
 
 /// Of entries that are not in the tangent.
@@ -48,12 +48,12 @@ pub struct Layout {
     pattern: Option<Arc<Pattern>>,
     /// Of each element, in the pattern.
     places: Arc<[Places]>,
-    /// The tangent taken last, with which a scene nearby converges; elsewhere a new one is taken.
+    /// The tangent taken last, with which a scene nearby converges. Elsewhere a new one is taken.
     pub(crate) chord: Option<Arc<Chord>>,
 }
 
 impl Layout {
-    pub(crate) fn new(model: &Model) -> Self {
+    pub(crate) fn new(model: &ElementModel) -> Self {
         // The centres, eliminated within their elements, have no equation.
         let mut is_outer = vec![false; model.nodes.len()];
         for nodes in &model.elements {
@@ -66,12 +66,12 @@ impl Layout {
             .map(|(dof, motion)| {
                 let shares = dof % 2 == 1 && model.partners[dof / 2].is_some();
                 match *motion {
-                    Motion::Driven(factor) => Slot::Driver(factor),
-                    Motion::Free if is_outer[dof / 2] && !shares => {
+                    DofMotion::Driven(factor) => Slot::Driver(factor),
+                    DofMotion::Free if is_outer[dof / 2] && !shares => {
                         equations += 1;
                         Slot::Equation(equations - 1)
                     }
-                    Motion::Free | Motion::Zero => Slot::Nowhere,
+                    DofMotion::Free | DofMotion::Zero => Slot::Nowhere,
                 }
             })
             .collect();
@@ -112,7 +112,7 @@ impl Layout {
         .collect()
     }
 
-    /// The tangent's pattern with couplings between the components of each contact; the one made
+    /// The tangent's pattern with couplings between the components of each contact. The one made
     /// before where it has them all.
     pub(crate) fn pattern<'a>(
         &mut self,
@@ -286,10 +286,10 @@ impl Tangent {
 /// Residual and tangent at one state.
 ///
 /// Contact enters each Newton iteration as a linear complementarity problem: gaps are linear in the
-/// step, and which nodes are in contact is found for the step (primal–dual active set) rather than for
-/// the state before it.
+/// step, and which nodes are in contact is found for the step (primal–dual active set) rather than
+/// for the state before it.
 pub struct System<'a> {
-    model: &'a Model,
+    model: &'a ElementModel,
     slots: Arc<[Slot]>,
     /// Elements' share and the turning of surfaces under their present pressure.
     base: Tangent,
@@ -304,16 +304,16 @@ pub struct System<'a> {
 }
 
 /// Increments of a Newton step.
-pub struct Step {
+pub struct NewtonStep {
     displacement: Vec<f64>,
     pressures: Vec<[f64; 3]>,
     approach: f64,
     contact: Vec<f64>,
 }
 
-impl Model {
-    /// The system at a state from which the approach may change by `margin`; `None` where an element
-    /// is turned inside out.
+impl ElementModel {
+    /// The system at a state from which the approach may change by `margin`. `None` where an
+    /// element is turned inside out.
     pub fn assemble(
         &self,
         layout: &mut Layout,
@@ -400,9 +400,6 @@ impl Model {
     }
 }
 
-/// Changes of the active set within a Newton iteration; more are rounding's toss between two sets.
-const MAX_CHANGES: usize = 15;
-
 impl System<'_> {
     /// Unbalanced force over the scale of the forces.
     pub fn imbalance(&self, goal: Goal) -> f64 {
@@ -418,7 +415,10 @@ impl System<'_> {
     }
 
     /// The Newton step from `fields` towards the goal.
-    pub fn step(&self, fields: &Fields, goal: Goal) -> Result<Step, Singular> {
+    pub fn step(&self, fields: &Fields, goal: Goal) -> Result<NewtonStep, Singular> {
+        // Changes of the active set within a Newton iteration; more are rounding's toss between two
+        // sets.
+        let max_changes: usize = 15;
         let mut active: Vec<bool> = self.candidates.iter().map(|c| c.pressure > 0.0).collect();
         let mut changes = 0;
         loop {
@@ -466,7 +466,7 @@ impl System<'_> {
                 step.contact[candidate.index] = pressure.max(0.0);
             }
             changes += 1;
-            if settled || changes > MAX_CHANGES {
+            if settled || changes > max_changes {
                 return Ok(step);
             }
         }
@@ -478,7 +478,7 @@ impl System<'_> {
     }
 
     /// Displacements and new pressures of all elements from the equations' solution.
-    fn expand(&self, solution: &[f64], approach: f64) -> Step {
+    fn expand(&self, solution: &[f64], approach: f64) -> NewtonStep {
         let mut displacement: Vec<f64> = self
             .slots
             .iter()
@@ -497,7 +497,7 @@ impl System<'_> {
             displacement[2 * nodes[8] + 1] = centre[1];
             pressures.push(new);
         }
-        Step {
+        NewtonStep {
             displacement,
             pressures,
             approach,
@@ -506,7 +506,7 @@ impl System<'_> {
     }
 }
 
-impl Step {
+impl NewtonStep {
     /// The fields after the fraction `length` of the step.
     pub fn apply(&self, fields: &Fields, length: f64) -> Fields {
         let along =

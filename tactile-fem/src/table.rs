@@ -28,8 +28,9 @@ pub struct TableOptions {
 impl Default for TableOptions {
     /// Seven moduli from 25 to 400 kPa, contact radii up to 1.25 ball radii.
     ///
-    /// Seven moduli leave less in the interpolation than the elements' own scatter of the contact radius does
-    /// (`cargo bench -p tactile-benches --features fem --bench finite_elements` prints both).
+    /// Seven moduli leave less in the interpolation than the elements' own scatter of the contact
+    /// radius does (`cargo bench -p tactile-benches --features fem --bench finite_elements` prints
+    /// both).
     fn default() -> Self {
         Self {
             lowest_pa: 25e3,
@@ -41,7 +42,8 @@ impl Default for TableOptions {
 }
 
 impl TableOptions {
-    /// The smallest and the largest modulus of the ball (Pa), and how many in equal ratios. A rigid flat needs one and takes no other.
+    /// The smallest and the largest modulus of the ball (Pa), and how many in equal ratios. A rigid
+    /// flat needs one and takes no other.
     ///
     /// # Errors
     /// [`ElasticityError::NotPositive`]; [`ElasticityError::OutOfRange`] where the second is not above the first;
@@ -116,27 +118,21 @@ pub struct TableProgress {
     pub total: usize,
 }
 
-/// Contacts a modulus.
-const CONTACTS: usize = 16;
-/// The smallest a/R that is computed: at 0.1 the elements leave 0.5 % of the contact radius.
-const SMALLEST_RATIO: f64 = 0.15;
-/// A contact radius less certain than this is left out: it would miss the force by three times as much.
-const LARGEST_UNCERTAINTY: f64 = 5e-3;
-/// A contact whose force has grown with a higher power of the radius than this since the one before is the last of its curve: the ball has
-/// sunk in to its equator, and polynomials that follow the bend there miss 2 % of the force everywhere instead of 0.6 %.
-const STEEPEST: f64 = 6.0;
-/// Radius of the guide over the ball's and over its own thickness: beyond, its rim is not felt at the contact
-/// (`the_rim_of_the_guide_is_not_felt`).
+/// Radius of the guide over the ball's and over its own thickness: beyond, its rim is not felt at
+/// the contact (`the_rim_of_the_guide_is_not_felt`).
 const GUIDE_RADIUS: [f64; 2] = [4.0, 2.5];
-/// The elements' largest Poisson ratio, taken for ν = ½. It takes 0.1 to 0.2 % off the force at a given radius, less than the elements' own
-/// error; at 0.4999 the first contact of a ball of 25 kPa on a stiffer guide does not converge.
+/// The elements' largest Poisson ratio, taken for ν = ½. It takes 0.1 to 0.2 % off the force at a
+/// given radius, less than the elements' own error. At 0.4999 the first contact of a ball of 25 kPa
+/// on a stiffer guide does not converge.
 const LARGEST_POISSON_RATIO: f64 = 0.499;
 
-/// By finite elements at finite strain, without friction, for a neo-Hookean ball of radius R (m) and Poisson ratio ν on neo-Hookean
-/// layers bonded to rigid glass, or on a rigid flat. ν above 0.499 is computed as 0.499.
+/// By finite elements at finite strain, without friction, for a neo-Hookean ball of radius R (m)
+/// and Poisson ratio ν on neo-Hookean layers bonded to rigid glass, or on a rigid flat. ν above
+/// 0.499 is computed as 0.499.
 ///
-/// `progress` is called before each modulus and after the last, and ends the computation with [`ControlFlow::Break`]. Contacts that the
-/// solver does not reach are left out: [`ContactTable::force_n`] gives None there.
+/// `progress` is called before each modulus and after the last, and ends the computation with
+/// [`ControlFlow::Break`]. Contacts that the solver does not reach are left out:
+/// [`ContactTable::force_n`] gives None there.
 ///
 /// ```
 /// use core::ops::ControlFlow;
@@ -206,6 +202,10 @@ impl Ball {
         law: &WaveguideLaw,
         options: &TableOptions,
     ) -> Result<ContactCurve, ElasticityError> {
+        // A contact whose force has grown with a higher power of the radius than this since the one
+        // before is the last of its curve: the ball has sunk in to its equator, and polynomials
+        // that follow the bend there miss 2 % of the force everywhere instead of 0.6 %.
+        let steepest = 6.0;
         let solution = self.scene(guide)?.solve(&self.loads(guide, law, options));
         let mut curve = ContactCurve {
             youngs_modulus_pa: self.youngs_modulus_pa,
@@ -219,7 +219,7 @@ impl Ball {
             let force = state.force_n();
             if let (Some(before), Some(smaller)) =
                 (curve.force_n.last(), curve.contact_radius_m.last())
-                && (force / before).ln() > STEEPEST * (radius / smaller).ln()
+                && (force / before).ln() > steepest * (radius / smaller).ln()
             {
                 break;
             }
@@ -261,16 +261,20 @@ impl Ball {
         law: &WaveguideLaw,
         options: &TableOptions,
     ) -> Vec<AppliedLoad> {
+        // The smallest a/R that is computed: at 0.1 the elements leave 0.5 % of the contact radius.
+        let smallest_ratio = 0.15;
+        // Contacts a modulus.
+        let contacts: usize = 16;
         let compliance = |e: f64, nu: f64| (1.0 - nu * nu) / e;
         let own = compliance(self.youngs_modulus_pa, self.poisson_ratio);
         let touched = guide.layers().iter().find(|l| l.thickness_m > 0.0);
         let other = touched.map_or(0.0, |l| compliance(l.youngs_modulus_pa, l.poisson_ratio));
         let reduced = 1.0 / (own + other);
-        let last = (CONTACTS - 1) as f64;
-        (0..CONTACTS)
+        let last = (contacts - 1) as f64;
+        (0..contacts)
             .map(|k| {
-                let step = (options.largest_ratio - SMALLEST_RATIO) * k as f64 / last;
-                (SMALLEST_RATIO + step) * self.radius_m
+                let step = (options.largest_ratio - smallest_ratio) * k as f64 / last;
+                (smallest_ratio + step) * self.radius_m
             })
             .filter_map(|a| law.of_contact_radius(a, other * reduced))
             .map(|force| AppliedLoad::Force(reduced * force.value.exp()))
@@ -280,6 +284,9 @@ impl Ball {
 
 /// The contact radius, if the mesh tells it well enough.
 fn certain_radius(state: &State) -> Option<f64> {
+    // A contact radius less certain than this is left out: it would miss the force by three times
+    // as much.
+    let largest_uncertainty = 5e-3;
     let radius = state.contact_radius()?;
-    (radius.uncertainty_m <= LARGEST_UNCERTAINTY * radius.radius_m).then_some(radius.radius_m)
+    (radius.uncertainty_m <= largest_uncertainty * radius.radius_m).then_some(radius.radius_m)
 }

@@ -4,12 +4,13 @@ use crate::scene::FemScene;
 use crate::state::State;
 use std::io::{Result, Write};
 
-/// VTK's number of the nine-node quadrilateral; its nodes come in the order of ours.
+/// VTK's number of the nine-node quadrilateral. Its nodes come in the order of ours.
 const BIQUADRATIC_QUAD: u8 = 28;
 
 impl FemScene {
-    /// Writes the undeformed mesh of all bodies with a state's fields in VTK's legacy text format: at the nodes the displacement (m), in the
-    /// elements Young's modulus (Pa) and the Cauchy stress at their centres (Pa, tension positive). x is r, y is z.
+    /// Writes the undeformed mesh of all bodies with a state's fields in VTK's legacy text format:
+    /// at the nodes the displacement (m), in the elements Young's modulus (Pa) and the Cauchy
+    /// stress at their centres (Pa, tension positive). x is r, y is z.
     ///
     /// ```
     /// use tactile_fem::{AppliedLoad, Material, ObjectShape, ObjectPress};
@@ -25,7 +26,8 @@ impl FemScene {
     /// ```
     ///
     /// # Errors
-    /// Those of `out`; [`InvalidInput`](std::io::ErrorKind::InvalidInput) for a state of another scene.
+    /// Those of `out`. [`InvalidInput`](std::io::ErrorKind::InvalidInput) for a state of another
+    /// scene.
     pub fn write_vtk(&self, state: &State, out: &mut impl Write) -> Result<()> {
         let model = &self.model;
         if state.fields.displacement.len() != 2 * model.nodes.len()

@@ -12,8 +12,8 @@ struct ModelErrors {
     scale: f64,
     /// Of the profile's shape, correlated over [`SHAPE_LENGTH`] times the outermost radius.
     shape: f64,
-    /// What the rim's singular pressure sends inwards, which grows with the square of the radius, at the outermost
-    /// one: codes resolve a singularity differently.
+    /// What the rim's singular pressure sends inwards, which grows with the square of the radius,
+    /// at the outermost one: codes resolve a singularity differently.
     rim: f64,
     /// What elements leave of the pressure within their length, correlated over `element` times the
     /// outermost radius.
@@ -21,23 +21,24 @@ struct ModelErrors {
     element: f64,
     /// Of the forces beyond the pressures': most of it sits at the guide's rim.
     force: f64,
-    /// What the rim sends inwards beyond `rim` as the face sinks in, at the outermost radius and the last frame: it
-    /// grows with the sixth power of the radius and with the load. Half of its variance is correlated over
-    /// `element`: waves of the elements' length.
+    /// What the rim sends inwards beyond `rim` as the face sinks in, at the outermost radius and
+    /// the last frame: it grows with the sixth power of the radius and with the load. Half of its
+    /// variance is correlated over `element`: waves of the elements' length.
     sinking: f64,
     /// The same of the forces.
     sinking_force: f64,
-    /// What the pressure's radial share on the bent face would add, which the model leaves out; in the last frame,
-    /// correlated as the shape, growing with the load.
+    /// What the pressure's radial share on the bent face would add, which the model leaves out. In
+    /// the last frame, correlated as the shape, growing with the load.
     bent: f64,
 }
 
 /// Correlation length of the shape's error over the outermost radius.
 const SHAPE_LENGTH: f64 = 0.4;
 
-/// Against CalculiX, over bonded blocks with and without inclusion: all pressures 0.05 to 0.2 % low,
-/// the shape within 0.1 %, lower by 0.05 to 0.3 % towards the rim, waves of 0.05 to 0.1 % there, forces 0.1 to 1 % low.
-/// What grows as the face sinks in: between meshes of 5 and 10 elements an eighth, 0.1 % at the outermost radius and 0.3 % of the force.
+/// Against CalculiX, over bonded blocks with and without inclusion: all pressures 0.05 to 0.2 %
+/// low, the shape within 0.1 %, lower by 0.05 to 0.3 % towards the rim, waves of 0.05 to 0.1 %
+/// there, forces 0.1 to 1 % low. What grows as the face sinks in: between meshes of 5 and 10
+/// elements an eighth, 0.1 % at the outermost radius and 0.3 % of the force.
 const BONDED: ModelErrors = ModelErrors {
     scale: 2e-3,
     shape: 7e-4,
@@ -50,12 +51,14 @@ const BONDED: ModelErrors = ModelErrors {
     bent: 0.0,
 };
 
-/// The same, without friction: all pressures 0.05 to 0.25 % low, the shape within 0.1 %, lower by up to 0.2 % towards the rim in soft
-/// tissue and by 0.85 % in tissue a third as stiff as the guide, 0.5 % root mean square over eight blocks of
-/// `evidence/inclusion_scenes.py`: four fifths of it go where CalculiX's elements at the rim are made a quarter as long, but
-/// data are as they are. Up to 0.4 % on the axis above a shallow inclusion, forces 0.2 to 1.3 % low. What grows: between rim
-/// elements of 0.02, 0.05 and 0.08 radii, 0.1 to 0.25 % at the outermost radius. The radial share, put in as forces on the nodes at a
-/// tenth of the block's height, bends the profile by 0.15 % across an inclusion, by more above a shallow one.
+/// The same, without friction: all pressures 0.05 to 0.25 % low, the shape within 0.1 %, lower by
+/// up to 0.2 % towards the rim in soft tissue and by 0.85 % in tissue a third as stiff as the
+/// guide, 0.5 % root mean square over eight blocks of `evidence/inclusion_scenes.py`: four fifths
+/// of it go where CalculiX's elements at the rim are made a quarter as long, but data are as they
+/// are. Up to 0.4 % on the axis above a shallow inclusion, forces 0.2 to 1.3 % low. What grows:
+/// between rim elements of 0.02, 0.05 and 0.08 radii, 0.1 to 0.25 % at the outermost radius. The
+/// radial share, put in as forces on the nodes at a tenth of the block's height, bends the profile
+/// by 0.15 % across an inclusion, by more above a shallow one.
 const FRICTIONLESS: ModelErrors = ModelErrors {
     scale: 2e-3,
     shape: 1.2e-3,
@@ -127,7 +130,7 @@ fn ring_kernel(a: f64, b: f64, length: f64) -> f64 {
 pub struct Observed {
     pub radii_m: Vec<f64>,
     pub values: Vec<f64>,
-    /// White errors; infinite for a force that is not known.
+    /// White errors. Infinite for a force that is not known.
     pub white: Vec<f64>,
     pub frames: usize,
 }
@@ -142,7 +145,7 @@ impl Observed {
         sums.into_iter().map(|sum| sum / last).collect()
     }
 
-    /// Covariance of the values; relative errors are of the values observed.
+    /// Covariance of the values. Relative errors are of the values observed.
     pub fn covariance(
         &self,
         sensor: &SensorErrors,

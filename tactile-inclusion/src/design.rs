@@ -52,23 +52,19 @@ pub struct ExpectedErrors {
     pub youngs_modulus: f64,
 }
 
-/// Elements along an eighth of the inclusion's circumference: errors within 2 % of those of a mesh twice as fine; of three
-/// elements, the errors of a small shallow inclusion came out at half.
-const FINENESS: usize = 5;
-
 impl InclusionSearch {
     /// Standard errors of ln D, ln d and ln E₁ that frames at `approaches_m` would leave, were the
     /// assumed inclusion there: the Cramér–Rao bound
     ///
     /// $$ (J^T C^{-1} J + P^{-1})^{-1} $$
     ///
-    /// with what is known of block and sensor. `white_pa` is the white error of each ring's mean: a pixel's over
-    /// the root of the ring's pixels, larger near the axis. The face counts as bonded unless the specimen says
-    /// otherwise. One solution with derivatives.
+    /// with what is known of block and sensor. `white_pa` is the white error of each ring's mean: a
+    /// pixel's over the root of the ring's pixels, larger near the axis. The face counts as bonded
+    /// unless the specimen says otherwise. One solution with derivatives.
     ///
     /// # Errors
-    /// A length, modulus or error that is not positive; approaches that do not grow; not one error for each
-    /// ring; fewer than eight rings within reach; [`ElasticityError::NoSolution`].
+    /// A length, modulus or error that is not positive. Approaches that do not grow. Not one error
+    /// for each ring. Fewer than eight rings within reach. [`ElasticityError::NoSolution`].
     pub fn expected_errors(
         &self,
         assumed: &AssumedInclusion,
@@ -76,6 +72,10 @@ impl InclusionSearch {
         radii_m: &[f64],
         white_pa: &[f64],
     ) -> Result<ExpectedErrors, ElasticityError> {
+        // Elements along an eighth of the inclusion's circumference: errors within 2 % of those of
+        // a mesh twice as fine; of three elements, the errors of a small shallow inclusion came out
+        // at half.
+        let fineness: usize = 5;
         positive(assumed.diameter_m, Quantity::Radius)?;
         positive(assumed.depth_m, Quantity::Distance)?;
         positive(assumed.youngs_modulus_pa, Quantity::YoungsModulus)?;
@@ -105,7 +105,7 @@ impl InclusionSearch {
             depth_m: assumed.depth_m,
             youngs_modulus_pa: assumed.youngs_modulus_pa,
         });
-        let forward = self.forward(&observed, approaches_m, interface, FINENESS);
+        let forward = self.forward(&observed, approaches_m, interface, fineness);
         let predicted = (forward.predict(&parameters)).ok_or(ElasticityError::NoSolution)?;
         observed.white = (0..observed.frames)
             .flat_map(|_| used.iter().map(|&ring| white_pa[ring]))

@@ -23,8 +23,8 @@ pub struct Estimated {
 }
 
 impl Estimated {
-    /// From a logarithm and the ends of its 95 % interval; the standard error is that of a Gaussian with an interval as
-    /// wide.
+    /// From a logarithm and the ends of its 95 % interval. The standard error is that of a Gaussian
+    /// with an interval as wide.
     pub(crate) fn within(logarithm: f64, [low, high]: [f64; 2]) -> Self {
         let value = logarithm.exp();
         Self {
@@ -62,17 +62,17 @@ pub enum Identifiable {
     No(Estimated),
 }
 
-/// Relative standard error above which a parameter cannot be told, on the side where its interval reaches further: a
-/// modulus that may be far higher is not told by being bounded from below. On 162 scenes of `evidence/inclusion_scenes.py`, none of 60
-/// parameters that a sensor cannot know within 30 % was told (`inclusion_study`); the price is that some it could know within 20 to
-/// 30 % are left open.
-const OPEN: f64 = 0.25;
-
 impl Identifiable {
     pub(crate) fn new(estimated: Estimated, is_reliable: bool) -> Self {
+        // Relative standard error above which a parameter cannot be told, on the side where its
+        // interval reaches further: a modulus that may be far higher is not told by being bounded
+        // from below. On 162 scenes of `evidence/inclusion_scenes.py`, none of 60 parameters that a
+        // sensor cannot know within 30 % was told (`inclusion_study`); the price is that some it
+        // could know within 20 to 30 % are left open.
+        let open = 0.25;
         let [low, high] = estimated.interval;
         let reach = (estimated.value / low).max(high / estimated.value).ln();
-        if is_reliable && reach < TWO_SIDED_95 * OPEN {
+        if is_reliable && reach < TWO_SIDED_95 * open {
             Self::Yes(estimated)
         } else {
             Self::No(estimated)
@@ -112,7 +112,8 @@ pub struct Inclusion {
     pub diameter_m: Identifiable,
     /// Depth of its top d, in metres: the posterior's median.
     pub depth_m: Identifiable,
-    /// Young's modulus E₁, in pascals: of the best fit, for how stiff it may be at most is often known from the prior alone.
+    /// Young's modulus E₁, in pascals: of the best fit, for how stiff it may be at most is often
+    /// known from the prior alone.
     pub youngs_modulus_pa: Identifiable,
     /// Correlations of ln D, ln d and ln E₁.
     pub correlation: [[f64; 3]; 3],
@@ -129,9 +130,9 @@ pub struct Inclusion {
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
 pub enum InclusionWarning {
-    /// The best fit leaves more than the errors explain (below 1 chance in 1000): several inclusions,
-    /// one off the axis, or errors larger than stated. Errors are widened by the root of the excess, and
-    /// no parameter counts as told.
+    /// The best fit leaves more than the errors explain (below 1 chance in 1000): several
+    /// inclusions, one off the axis, or errors larger than stated. Errors are widened by the root
+    /// of the excess, and no parameter counts as told.
     PoorFit {
         /// χ² over its degrees of freedom.
         excess: f64,
@@ -140,12 +141,36 @@ pub enum InclusionWarning {
     OneFrame,
     /// The fit ended before it settled.
     NotConverged,
-    /// Bonded and frictionless faces explain the frames about equally well: the better one's values are given, with intervals that
-    /// hold those of both. Or one of them could not be solved, and no parameter counts as told.
+    /// Bonded and frictionless faces explain the frames about equally well: the better one's values
+    /// are given, with intervals that hold those of both. Or one of them could not be solved, and
+    /// no parameter counts as told.
     UncertainInterface,
-    /// The inclusion lies nearer to the surface or to the stage than half an element: the model does
-    /// not reach that far.
+    /// The inclusion lies nearer to the surface or to the stage than half an element: the model
+    /// does not reach that far.
     AtBoundary,
+    /// The pressure is larger on one side of the axis by more than 3 %: an inclusion off the axis,
+    /// several, or a tilted block. The model is symmetric.
+    Asymmetric {
+        /// First harmonic of the pressure around the axis over its mean.
+        asymmetry: f64,
+    },
+}
+
+/// Whether there is an inclusion.
+///
+/// ```
+/// use tactile_inclusion::Verdict;
+/// assert_ne!(Verdict::Absent, Verdict::Uncertain);
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub enum Verdict {
+    /// One was found.
+    Found,
+    /// The frames show none.
+    Absent,
+    /// None was found, but one is more probable than not, or the model does not explain the frames.
+    Uncertain,
 }
 
 /// What a search found.
@@ -166,7 +191,7 @@ pub struct InclusionEstimate {
     pub found: bool,
     /// Young's modulus of the tissue, in pascals.
     pub block_modulus_pa: Estimated,
-    /// The inclusion that explains the frames best; `None` where none was found.
+    /// The inclusion that explains the frames best. `None` where none was found.
     pub inclusion: Option<Inclusion>,
     /// How the face touches the block.
     pub interface: Interface,
@@ -180,4 +205,40 @@ pub struct InclusionEstimate {
     pub fitted_pa: Vec<Vec<f64>>,
     /// Pressure of the plain block that fits best, in pascals.
     pub plain_pa: Vec<Vec<f64>>,
+}
+
+impl InclusionEstimate {
+    /// This estimate with the warning that belongs to an asymmetry of the picture it is from, if
+    /// any.
+    #[must_use]
+    pub fn with_asymmetry(mut self, asymmetry: f64) -> Self {
+        // Asymmetry of a picture above which its symmetric model is in doubt: 1 % is harmless, 6 %
+        // is not.
+        let largest_asymmetry = 0.03;
+        if asymmetry > largest_asymmetry {
+            self.warnings
+                .push(InclusionWarning::Asymmetric { asymmetry });
+        }
+        self
+    }
+
+    /// Whether there is an inclusion. That there is none is certain only where the model explains
+    /// the frames: beside a poor fit, one that did not settle, or an asymmetric picture it is not.
+    pub fn verdict(&self) -> Verdict {
+        let is_model_in_doubt = self.warnings.iter().any(|warning| {
+            matches!(
+                warning,
+                InclusionWarning::PoorFit { .. }
+                    | InclusionWarning::NotConverged
+                    | InclusionWarning::Asymmetric { .. }
+            )
+        });
+        if self.found {
+            Verdict::Found
+        } else if is_model_in_doubt || self.probability > 0.5 {
+            Verdict::Uncertain
+        } else {
+            Verdict::Absent
+        }
+    }
 }

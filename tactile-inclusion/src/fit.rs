@@ -51,8 +51,8 @@ pub struct Fit {
 /// When a fit ends.
 #[derive(Debug, Clone, Copy)]
 pub struct Ending {
-    /// Distance of the optimum in standard errors below which it has settled; an undamped step that gains less
-    /// than its square is the last.
+    /// Distance of the optimum in standard errors below which it has settled. An undamped step that
+    /// gains less than its square is the last.
     step: f64,
     /// Evaluations of the model with its derivatives.
     evaluations: usize,
@@ -88,20 +88,8 @@ pub const DRAFTED: Ending = Ending {
 /// Largest step of a logarithm.
 const LARGEST_STEP: f64 = 0.5;
 
-/// Levenberg's damping: at first, and its bounds. Beyond the largest no step lowers the objective.
-const FIRST_DAMPING: f64 = 1e-3;
-const LEAST_DAMPING: f64 = 1e-6;
-const LARGEST_DAMPING: f64 = 10.0;
-
-/// Gain of the objective that a fit may still promise over that of its quadratic model: along a flat valley steps gain
-/// more than the model at their start says.
-const PROMISE: f64 = 4.0;
-
-/// Distance of the optimum in standard errors that the solutions' tolerance may hide.
-const UNRESOLVED: f64 = 1.0;
-
 /// A change of the coordinates.
-pub struct Step {
+pub struct FitStep {
     pub by: DVector<f64>,
     /// In standard errors, before it is cut to [`LARGEST_STEP`].
     pub size: f64,
@@ -163,11 +151,12 @@ impl Problem {
         misfit + self.penalty(parameters)
     }
 
-    /// A start with the block's modulus scaled so that the pressures agree on the whole, and how far it
-    /// then is from the measured values; `predicted` are the start's. `None` where they do not press.
+    /// A start with the block's modulus scaled so that the pressures agree on the whole, and how
+    /// far it then is from the measured values. `predicted` are the start's. `None` where they do
+    /// not press.
     ///
-    /// Pressures are nearly proportional to the moduli of block and inclusion as long as the guide is
-    /// stiffer than they are.
+    /// Pressures are nearly proportional to the moduli of block and inclusion as long as the guide
+    /// is stiffer than they are.
     pub fn scaled_start(
         &self,
         start: &Parameters,
@@ -232,34 +221,45 @@ impl Problem {
         })
     }
 
-    /// Standard errors of the coordinates at some parameters; `None` where there is no solution.
+    /// Standard errors of the coordinates at some parameters. `None` where there is no solution.
     pub fn errors(&self, parameters: &Parameters) -> Option<Vec<f64>> {
         let covariance = self.normal(parameters, None)?.matrix.cholesky()?.inverse();
         Some(covariance.diagonal().iter().map(|v| v.sqrt()).collect())
     }
 
-    /// Levenberg–Marquardt from a start; `None` where the start itself has no solution. `go_on` is asked
-    /// before each evaluation.
+    /// Levenberg–Marquardt from a start. `None` where the start itself has no solution. `go_on` is
+    /// asked before each evaluation.
     pub fn fit(
         &self,
         start: Parameters,
         ending: Ending,
         mut go_on: impl FnMut() -> bool,
     ) -> Option<Fit> {
+        // Distance of the optimum in standard errors that the solutions' tolerance may hide.
+        let unresolved = 1.0;
+        // Gain of the objective that a fit may still promise over that of its quadratic model:
+        // along a flat valley steps gain more than the model at their start says.
+        let promise = 4.0;
+        let largest_damping = 10.0;
+        let least_damping = 1e-6;
+        // Levenberg's damping: at first, and its bounds. Beyond the largest no step lowers the
+        // objective.
+        let first_damping = 1e-3;
         let mut parameters = start;
         let mut normal = self.normal(&parameters, None)?;
-        let mut damping = FIRST_DAMPING;
+        let mut damping = first_damping;
         let mut evaluations = 1;
         let converged = loop {
-            // How far the quadratic model's optimum is; steps cut short by damping say nothing of it.
+            // How far the quadratic model's optimum is; steps cut short by damping say nothing of
+            // it.
             let left = self.step(&parameters, &normal, 0.0, None)?.size;
-            let promised = normal.misfit + normal.penalty - PROMISE * left.powi(2);
+            let promised = normal.misfit + normal.penalty - promise * left.powi(2);
             if left < ending.step || promised > ending.needed {
                 break true;
             }
-            if damping > LARGEST_DAMPING {
+            if damping > largest_damping {
                 // No step lowers the objective: what is left is the solutions' tolerance.
-                break left < UNRESOLVED;
+                break left < unresolved;
             }
             if evaluations == ending.evaluations || !go_on() {
                 break false;
@@ -277,7 +277,7 @@ impl Problem {
                 Some(found) => {
                     let gain = now - found.misfit - found.penalty;
                     let is_undamped = damping < 1e-2;
-                    damping = (0.1 * damping).max(LEAST_DAMPING);
+                    damping = (0.1 * damping).max(least_damping);
                     (parameters, normal) = (next, found);
                     if is_undamped && gain < ending.step.powi(2) {
                         break true;
@@ -289,14 +289,15 @@ impl Problem {
         self.finished(parameters, normal, converged)
     }
 
-    /// The damped step towards the quadratic model's optimum, that of a coordinate that is held left out.
+    /// The damped step towards the quadratic model's optimum, that of a coordinate that is held
+    /// left out.
     pub fn step(
         &self,
         parameters: &Parameters,
         normal: &Normal,
         damping: f64,
         held: Option<usize>,
-    ) -> Option<Step> {
+    ) -> Option<FitStep> {
         let mut matrix = normal.matrix.clone();
         let mut gradient = normal.gradient.clone();
         for k in 0..matrix.nrows() {
@@ -308,8 +309,8 @@ impl Problem {
         let mut by = matrix.clone().cholesky()?.solve(&gradient);
         let poisson = |prior: &Prior| prior.coordinate == Coordinate::PoissonRatio;
         if let Some(k) = self.priors.iter().position(poisson) {
-            // A step cut short at the limit of ν alone would not lower the objective: the others' steps
-            // are those that go with ν at its limit.
+            // A step cut short at the limit of ν alone would not lower the objective: the others'
+            // steps are those that go with ν at its limit.
             let room = LARGEST_POISSON_RATIO - parameters.poisson_ratio;
             if by[k] > room {
                 fix(&mut matrix, &mut gradient, k, room);
@@ -323,7 +324,7 @@ impl Problem {
         if scaled > LARGEST_STEP {
             by *= LARGEST_STEP / scaled;
         }
-        Some(Step { by, size })
+        Some(FitStep { by, size })
     }
 
     pub fn stepped(&self, parameters: &Parameters, step: &DVector<f64>) -> Parameters {
@@ -355,8 +356,8 @@ impl Problem {
         })
     }
 
-    /// Half the logarithm of the errors' covariance's determinant: assumptions about the face differ in what the
-    /// model errs by.
+    /// Half the logarithm of the errors' covariance's determinant: assumptions about the face
+    /// differ in what the model errs by.
     fn noise(&self) -> f64 {
         let diagonal = self.factor.l_dirty().diagonal();
         diagonal.iter().map(|d| d.ln()).sum()

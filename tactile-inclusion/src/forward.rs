@@ -30,7 +30,8 @@ pub struct LumpParameters {
     pub youngs_modulus_pa: f64,
 }
 
-/// An unknown as the fit sees it: logarithms of lengths and moduli, where errors are nearly Gaussian.
+/// An unknown as the fit sees it: logarithms of lengths and moduli, where errors are nearly
+/// Gaussian.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Coordinate {
     /// ln E₀.
@@ -60,12 +61,8 @@ impl Coordinate {
     }
 }
 
-/// Relative step of the difference quotients: the truncation error is about as large as the step,
-/// rounding and the unbalanced force of 1e-8 stay a hundred times below.
-const STEP: f64 = 1e-5;
-
-/// Largest Poisson ratio of a fit: the pressure differs from an incompressible block's by 0.1 %, and beyond it
-/// the derivatives by sizes lose digits as the bulk modulus grows.
+/// Largest Poisson ratio of a fit: the pressure differs from an incompressible block's by 0.1 %,
+/// and beyond it the derivatives by sizes lose digits as the bulk modulus grows.
 pub const LARGEST_POISSON_RATIO: f64 = 0.499;
 
 impl Parameters {
@@ -107,14 +104,17 @@ impl Parameters {
     ///
     /// By Poisson's ratio it is small against 1 − 2ν: the bulk modulus grows as its reciprocal.
     pub fn small_step(&self, coordinate: Coordinate) -> f64 {
+        // Relative step of the difference quotients: the truncation error is about as large as the
+        // step, rounding and the unbalanced force of 1e-8 stay a hundred times below.
+        let step = 1e-5;
         match coordinate {
-            Coordinate::PoissonRatio => -STEP * (1.0 - 2.0 * self.poisson_ratio),
-            _ => STEP * coordinate.unit(),
+            Coordinate::PoissonRatio => -step * (1.0 - 2.0 * self.poisson_ratio),
+            _ => step * coordinate.unit(),
         }
     }
 
-    /// Whether an inclusion comes nearer to the surface or the stage than a fiftieth of its diameter,
-    /// or is as tall as the block allows.
+    /// Whether an inclusion comes nearer to the surface or the stage than a fiftieth of its
+    /// diameter, or is as tall as the block allows.
     pub fn is_at_boundary(&self) -> bool {
         self.lump.is_some_and(|lump| {
             let room = self.height_m - lump.depth_m - lump.diameter_m;
@@ -125,7 +125,7 @@ impl Parameters {
 
 /// How points of the block move: the inclusion as a rigid circle that grows, the far side with the
 /// height, linearly in between, the face not at all.
-struct Motion {
+struct MeshMotion {
     radius: f64,
     /// Depth of the inclusion's centre.
     centre: f64,
@@ -136,7 +136,7 @@ struct Motion {
     face_radius: f64,
 }
 
-impl Motion {
+impl MeshMotion {
     pub fn new(from: &Parameters, to: &Parameters, face_radius: f64) -> Self {
         let circle = |parameters: &Parameters| {
             let lump = parameters.lump.map(sizes);
@@ -177,7 +177,8 @@ impl Motion {
             let growth = self.grown * distance / self.radius;
             return [growth * across, growth * along + self.sunk];
         }
-        // The ray from the centre through the point ends at the face, the far side or below the rim.
+        // The ray from the centre through the point ends at the face, the far side or below the
+        // rim.
         let to_face = if along < 0.0 {
             self.centre / -along
         } else {
@@ -233,7 +234,7 @@ pub struct Prediction {
 #[derive(Debug, Clone)]
 pub struct Solved {
     meshed: Arc<Meshed>,
-    /// One for all frames; where surfaces slide, one a frame.
+    /// One for all frames. Where surfaces slide, one a frame.
     scenes: Vec<FemScene>,
     states: Vec<State>,
 }
@@ -246,8 +247,8 @@ impl Solved {
 
 /// A scene as it was meshed, before its mesh is moved to other parameters or along the interface.
 ///
-/// The number of elements depends on the parameters in jumps, and with it the mesh's error: a fit compares
-/// solutions on one mesh, moved.
+/// The number of elements depends on the parameters in jumps, and with it the mesh's error: a fit
+/// compares solutions on one mesh, moved.
 #[derive(Debug, Clone)]
 struct Meshed {
     scene: FemScene,
@@ -276,16 +277,11 @@ fn sliding_depth(parameters: &Parameters) -> f64 {
     (parameters.lump).map_or(0.4 * parameters.height_m, |lump| lump.depth_m)
 }
 
-/// Rounds in which the faces of slightly changed blocks are made to meet again: each leaves a tenth of the
-/// distance before.
-const SLIDING_ROUNDS: usize = 2;
-
 fn is_near(from: f64, to: f64) -> bool {
-    (to / from).ln().abs() < LARGEST_MESH_CHANGE
+    // Largest change of the logarithm of a length by which a mesh is moved.
+    let largest_mesh_change = 0.3;
+    (to / from).ln().abs() < largest_mesh_change
 }
-
-/// Largest change of the logarithm of a length by which a mesh is moved.
-const LARGEST_MESH_CHANGE: f64 = 0.3;
 
 impl Forward {
     fn observations(&self) -> usize {
@@ -323,12 +319,12 @@ impl Forward {
         .ok()
     }
 
-    /// The frames' pressures and forces; `None` where the block cannot be meshed or solved.
+    /// The frames' pressures and forces. `None` where the block cannot be meshed or solved.
     pub fn predict(&self, parameters: &Parameters) -> Option<Prediction> {
         Some(self.predict_near(parameters, None)?.0)
     }
 
-    /// As [`Self::predict`], from a scene solved nearby; and this one, solved.
+    /// As [`Self::predict`], from a scene solved nearby. And this one, solved.
     pub fn predict_near(
         &self,
         parameters: &Parameters,
@@ -404,7 +400,7 @@ impl Forward {
         if let Some(lump) = to.lump {
             materials.push((tissue + 1, material(lump.youngs_modulus_pa)?));
         }
-        let motion = Motion::new(from, to, self.guide.radius_m());
+        let motion = MeshMotion::new(from, to, self.guide.radius_m());
         let moved = |node: [f64; 2]| motion.moved(node);
         let is_moved = (from.lump.map(sizes), from.height_m) != (to.lump.map(sizes), to.height_m);
         let moved: Option<&dyn Fn([f64; 2]) -> [f64; 2]> =
@@ -425,15 +421,19 @@ impl Forward {
 
     /// The derivatives of a solved scene's prediction, one column a coordinate.
     ///
-    /// A derivative is the difference of one iteration on the slightly changed block and one on the block
-    /// itself, both from the solution with its tangent: one factorisation a frame, one residual for each
-    /// coordinate and frame. The iteration on the block itself takes out what the solution leaves unbalanced.
+    /// A derivative is the difference of one iteration on the slightly changed block and one on the
+    /// block itself, both from the solution with its tangent: one factorisation a frame, one
+    /// residual for each coordinate and frame. The iteration on the block itself takes out what the
+    /// solution leaves unbalanced.
     pub fn derivatives(
         &self,
         parameters: &Parameters,
         coordinates: &[Coordinate],
         solved: &Solved,
     ) -> Option<Vec<Vec<f64>>> {
+        // Rounds in which the faces of slightly changed blocks are made to meet again: each leaves
+        // a tenth of the distance before.
+        let sliding_rounds: usize = 2;
         let moved: Vec<Parameters> = (coordinates.iter())
             .map(|&coordinate| parameters.moved(coordinate, parameters.small_step(coordinate)))
             .collect();
@@ -465,7 +465,7 @@ impl Forward {
             if self.slides() {
                 let depth_m = sliding_depth(parameters);
                 let mut relaxations = vec![Relaxation::default(); nearby.len()];
-                for _ in 0..SLIDING_ROUNDS {
+                for _ in 0..sliding_rounds {
                     let met = scene.distances(&found[nearby.len()].displacement);
                     for ((nearby, found), relaxation) in
                         nearby.iter_mut().zip(&found).zip(&mut relaxations)

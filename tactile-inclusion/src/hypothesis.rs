@@ -2,15 +2,17 @@
 //!
 //! Whether a block can be plain, before an inclusion is fitted.
 //!
-//! Rao's score test: with r what the plain block leaves of the measured values, J its derivatives, C and P the
-//! covariances of errors and prior, and s what a given inclusion would add to the pressures, the fall of the
-//! objective by a multiple of s, the plain block's parameters fitted along, is
+//! Rao's score test: with r what the plain block leaves of the measured values, J its derivatives,
+//! C and P the covariances of errors and prior, and s what a given inclusion would add to the
+//! pressures, the fall of the objective by a multiple of s, the plain block's parameters fitted
+//! along, is
 //!
 //! $$ \frac{(s^T Q r)^2}{s^T Q s}, \qquad Q = C^{-1} - C^{-1} J (J^T C^{-1} J + P^{-1})^{-1} J^T C^{-1} $$
 //!
-//! and the odds of just that inclusion against none are $\exp(s^T Q r - \tfrac{1}{2} s^T Q s)$ (C. R. Rao, Proc. Cambridge
-//! Philos. Soc. 44 (1948) 50). What is added is that of small strain on a coarse mesh, the same with and without the
-//! inclusion's modulus: its size is right within some ten percent.
+//! and the odds of just that inclusion against none are $\exp(s^T Q r - \tfrac{1}{2} s^T Q s)$ (C.
+//! R. Rao, Proc. Cambridge Philos. Soc. 44 (1948) 50). What is added is that of small strain on a
+//! coarse mesh, the same with and without the inclusion's modulus: its size is right within some
+//! ten percent.
 
 use crate::covariance::Observed;
 use crate::estimate::{
@@ -23,24 +25,17 @@ use crate::search::Start;
 use nalgebra::{DMatrix, DVector};
 use tactile_fem::Interface;
 
-/// Least fall of χ² for an inclusion to count as found, that of six standard errors: what finite elements err by brings it to 25 in
-/// one of 38 plain blocks by CalculiX, 161 of 162 inclusions there to 60 or more and the last, hardly to be found, to 33 (`inclusion_study`).
-const LEAST_FALL: f64 = 36.0;
-/// Least probability for that.
-const LEAST_PROBABILITY: f64 = 0.99;
-/// Fall of the objective without which an inclusion is not that probable, 2 ln(p / (1 − p)): the parameters it adds are
-/// known better afterwards than before, which lowers the evidence further.
+/// Fall of the objective without which an inclusion is not that probable, 2 ln(p / (1 − p)): the
+/// parameters it adds are known better afterwards than before, which lowers the evidence further.
 pub const LEAST_GAIN: f64 = 9.2;
-/// Least contrast either way, E₁/E₀ or E₀/E₁: an inclusion nearer to the tissue explains no more than what
-/// its mesh differs by from a plain block's (a contrast of 1.02 to 1.04 in plain blocks by CalculiX).
-const LEAST_CONTRAST: f64 = 1.2;
-/// Standard deviations by which χ² may exceed its mean: above, 1 chance in 1000, a fit counts as poor.
-const POOR: f64 = 3.1;
 
 /// Whether a fit leaves more than the errors explain.
 pub fn is_poor(misfit: f64, observed: &Observed) -> bool {
+    // Standard deviations by which χ² may exceed its mean: above, 1 chance in 1000, a fit counts as
+    // poor.
+    let poor = 3.1;
     let freedom = observed.values.len() as f64;
-    misfit > freedom + POOR * (2.0 * freedom).sqrt()
+    misfit > freedom + poor * (2.0 * freedom).sqrt()
 }
 
 /// The coordinates as they are fitted: those of the block first.
@@ -84,7 +79,8 @@ impl Hypothesis {
         self.plain.evidence.max(self.evidence_with())
     }
 
-    /// χ² over its degrees of freedom, where that is more than one: what differences of log evidence are too large by.
+    /// χ² over its degrees of freedom, where that is more than one: what differences of log
+    /// evidence are too large by.
     pub fn inflation(&self, observed: &Observed) -> f64 {
         let best = match &self.lump {
             Some(lump) if lump.evidence > self.plain.evidence => lump,
@@ -112,19 +108,30 @@ impl Hypothesis {
 
     /// The fit with an inclusion, where it counts as found at these odds.
     fn found(&self, log_odds: f64) -> Option<&Fit> {
+        // Least contrast either way, E₁/E₀ or E₀/E₁: an inclusion nearer to the tissue explains no
+        // more than what its mesh differs by from a plain block's (a contrast of 1.02 to 1.04 in
+        // plain blocks by CalculiX).
+        let least_contrast = 1.2;
+        // Least probability for that.
+        let least_probability = 0.99;
+        // Least fall of χ² for an inclusion to count as found, that of six standard errors: what
+        // finite elements err by brings it to 25 in one of 38 plain blocks by CalculiX, 161 of 162
+        // inclusions there to 60 or more and the last, hardly to be found, to 33
+        // (`inclusion_study`).
+        let least_fall = 36.0;
         self.lump.as_ref().filter(|fit| {
             let modulus = |coordinate| fit.parameters.get(coordinate);
             let contrast = modulus(Coordinate::LumpModulus) - modulus(Coordinate::BlockModulus);
-            probability(log_odds) > LEAST_PROBABILITY
-                && self.plain.misfit - fit.misfit > LEAST_FALL
-                && contrast.abs() > LEAST_CONTRAST.ln()
+            probability(log_odds) > least_probability
+                && self.plain.misfit - fit.misfit > least_fall
+                && contrast.abs() > f64::ln(least_contrast)
         })
     }
 
     /// Value and 95 % interval of a coordinate, errors widened by a factor.
     ///
-    /// Of a skewed posterior the optimum lies at an end of the interval: D and d are its medians. E₁'s upper tail
-    /// is the prior's, and so would be its median: the optimum depends on it less.
+    /// Of a skewed posterior the optimum lies at an end of the interval: D and d are its medians.
+    /// E₁'s upper tail is the prior's, and so would be its median: the optimum depends on it less.
     fn posterior(&self, fit: &Fit, coordinate: usize, widened: f64) -> (f64, [f64; 2]) {
         let best = fit.parameters.get(COORDINATES[coordinate]);
         let is_lump = fit.covariance.nrows() > BLOCK_COORDINATES;
@@ -157,7 +164,8 @@ impl Hypothesis {
         })
     }
 
-    /// The answer; `rival` explains the frames about as well, `is_unsolved` that one could not be solved which may have.
+    /// The answer. `rival` explains the frames about as well, `is_unsolved` that one could not be
+    /// solved which may have.
     pub fn estimate(
         self,
         observed: &Observed,
@@ -236,10 +244,6 @@ fn hull(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
     [a[0].min(b[0]), a[1].max(b[1])]
 }
 
-/// Fall of the objective that a grid's inclusion must promise for inclusions to be fitted. One that is found lowers χ² by 36; its
-/// neighbour in the grid promises half of that or more.
-const LEAST_PROMISE: f64 = 18.0;
-
 /// What a grid of inclusions would change of a plain fit.
 #[derive(Debug, Clone, Copy)]
 pub struct Score {
@@ -250,7 +254,7 @@ pub struct Score {
 }
 
 impl Score {
-    /// Of a fit without inclusion; `None` where it has no derivatives.
+    /// Of a fit without inclusion. `None` where it has no derivatives.
     pub fn new(problem: &Problem, plain: &Fit, grid: &[Start]) -> Option<Self> {
         let normal = problem.normal(&plain.parameters, Some(&plain.solved))?;
         let residual = problem.whitened(problem.residual(&normal.predicted));
@@ -282,6 +286,10 @@ impl Score {
 
     /// Whether an inclusion can be ruled out.
     pub fn is_plain(&self) -> bool {
-        self.promise < LEAST_PROMISE
+        // Fall of the objective that a grid's inclusion must promise for inclusions to be fitted.
+        // One that is found lowers χ² by 36; its neighbour in the grid promises half of that or
+        // more.
+        let least_promise = 18.0;
+        self.promise < least_promise
     }
 }

@@ -1,29 +1,32 @@
 #![doc = include_str!("../README.md")]
 //!
 //! # Method
-//! The unknowns are the diameter D, the depth d of the top, the inclusion's modulus E₁ and the block's E₀.
-//! The block's height, Poisson's ratio and the zero of the approaches are known with errors. The model is
-//! [`FemScene::block_under_guide`](tactile_fem::FemScene::block_under_guide) at finite strain: size and
-//! stiffness differ in how the pressure grows with the approach, which linear elasticity hardly shows.
+//! The unknowns are the diameter D, the depth d of the top, the inclusion's modulus E₁ and the
+//! block's E₀. The block's height, Poisson's ratio and the zero of the approaches are known with
+//! errors. The model is [`FemScene::block_under_guide`](tactile_fem::FemScene::block_under_guide)
+//! at finite strain: size and stiffness differ in how the pressure grows with the approach, which
+//! linear elasticity hardly shows.
 //!
-//! With y the measured ring means and forces, m(φ) the model's, C the covariance of the sensor's and
-//! the model's errors and a Gaussian prior of mean φ₀ and covariance P,
+//! With y the measured ring means and forces, m(φ) the model's, C the covariance of the sensor's
+//! and the model's errors and a Gaussian prior of mean φ₀ and covariance P,
 //!
 //! $$ -2 \ln p(\varphi | y) = (y - m)^T C^{-1} (y - m) + (\varphi - \varphi_0)^T P^{-1} (\varphi - \varphi_0) + c $$
 //!
-//! is minimised over φ = (ln E₀, zero, ln H, ν, ln D, ln d, ln E₁). Its second derivative there gives
-//! errors and correlations, its determinant the evidence (Laplace). The ratio of the evidence with and
-//! without inclusion is the odds that there is one.
+//! is minimised over φ = (ln E₀, zero, ln H, ν, ln D, ln d, ln E₁). Its second derivative there
+//! gives errors and correlations, its determinant the evidence (Laplace). The ratio of the evidence
+//! with and without inclusion is the odds that there is one.
 //!
-//! The posterior is far from Gaussian: beyond some contrast a stiffer inclusion changes the pressure no
-//! more, and a small stiff one is hardly different from a large one that is little stiffer than the tissue.
-//! The intervals of D, d and E₁ therefore follow the posterior along ln E₁. Where bonded and frictionless
-//! faces explain the frames about equally well the intervals hold those of both.
+//! The posterior is far from Gaussian: beyond some contrast a stiffer inclusion changes the
+//! pressure no more, and a small stiff one is hardly different from a large one that is little
+//! stiffer than the tissue. The intervals of D, d and E₁ therefore follow the posterior along ln
+//! E₁. Where bonded and frictionless faces explain the frames about equally well the intervals hold
+//! those of both.
 //!
 //! # References
-//! V. Egorov & A. P. Sarvazyan, IEEE Trans. Med. Imaging 27 (2008) 1275. J.-H. Lee & C.-H. Won, IEEE Sensors
-//! J. 13 (2013). A. Tarantola, *Inverse Problem Theory* (2005). R. E. Kass & A. E. Raftery, J. Am. Stat.
-//! Assoc. 90 (1995) 773. H. Rue, S. Martino & N. Chopin, J. R. Stat. Soc. B 71 (2009) 319.
+//! V. Egorov & A. P. Sarvazyan, IEEE Trans. Med. Imaging 27 (2008) 1275. J.-H. Lee & C.-H. Won,
+//! IEEE Sensors J. 13 (2013). A. Tarantola, *Inverse Problem Theory* (2005). R. E. Kass & A. E.
+//! Raftery, J. Am. Stat. Assoc. 90 (1995) 773. H. Rue, S. Martino & N. Chopin, J. R. Stat. Soc. B
+//! 71 (2009) 319.
 #![forbid(unsafe_code)]
 
 mod covariance;
@@ -38,7 +41,9 @@ mod search;
 mod specimen;
 
 pub use design::{AssumedInclusion, ExpectedErrors};
-pub use estimate::{Estimated, Identifiable, Inclusion, InclusionEstimate, InclusionWarning};
+pub use estimate::{
+    Estimated, Identifiable, Inclusion, InclusionEstimate, InclusionWarning, Verdict,
+};
 pub use search::{InclusionSearch, SearchProgress};
 pub use specimen::{PressureProfile, SensorErrors, Specimen};
 

@@ -2,33 +2,22 @@
 //!
 //! Marginal posteriors of an inclusion's parameters, which are not Gaussian.
 //!
-//! A stiff inclusion hardly changes the pressure when it gets stiffer still, and a small stiff one is hardly told from a
-//! large one that is little stiffer than the tissue: along such a ridge the posterior's density falls neither fast nor
-//! evenly, and the curvature at its top says little of its length. With u = ln E₁, θ all other coordinates, F the fit's objective
-//! (−2 ln of the posterior), θ(u) its minimum at given u and M(u) its curvature there in θ,
+//! A stiff inclusion hardly changes the pressure when it gets stiffer still, and a small stiff one
+//! is hardly told from a large one that is little stiffer than the tissue: along such a ridge the
+//! posterior's density falls neither fast nor evenly, and the curvature at its top says little of
+//! its length. With u = ln E₁, θ all other coordinates, F the fit's objective (−2 ln of the
+//! posterior), θ(u) its minimum at given u and M(u) its curvature there in θ,
 //!
 //! $$ p(u) \propto |M(u)|^{-1/2} \exp(-F(u, \theta(u)) / 2) $$
 //!
-//! and at a given u the others are Gaussian about θ(u) with covariance M(u)⁻¹ (Laplace's approximation, nested: H. Rue, S. Martino & N.
-//! Chopin, J. R. Stat. Soc. B 71 (2009) 319), which gives evidence, covariance and quantiles.
+//! and at a given u the others are Gaussian about θ(u) with covariance M(u)⁻¹ (Laplace's
+//! approximation, nested: H. Rue, S. Martino & N. Chopin, J. R. Stat. Soc. B 71 (2009) 319), which
+//! gives evidence, covariance and quantiles.
 
-use crate::fit::{Fit, Normal, Problem, Step};
+use crate::fit::{Fit, FitStep, Normal, Problem};
 use crate::forward::{Coordinate, Parameters, Solved};
 use nalgebra::{DMatrix, DVector};
 use statrs::function::erf::erfc;
-
-/// Step along ln E₁ in its local standard error, and the largest: mesh and tangent follow the ridge that far.
-const RIDGE_STEP: f64 = 1.2;
-const LARGEST_RIDGE_STEP: f64 = 1.0;
-/// Fall of ln p at which a side ends: that of 2.4 standard errors. Beyond, its slope goes on.
-const SIDE_FALL: f64 = 2.9;
-/// Fall of ln p in one step beyond which it was too long, and is halved: a Gaussian falls by 2.2 in the second.
-const CLIFF: f64 = 3.0;
-/// Distance from the ridge in standard errors above which one step to it does not do, and steps there.
-const LONG: f64 = 1.0;
-const MAX_STEPS: usize = 4;
-/// Steps along a side, halved ones too; reached where E₁ is open and the prior alone ends it.
-const MAX_NODES: usize = 8;
 
 /// The ridge at one E₁.
 #[derive(Debug, Clone)]
@@ -65,8 +54,22 @@ struct Place {
 }
 
 impl Problem {
-    /// The posterior along ln E₁ through an optimum with an inclusion; `None` where it has no curvature there.
+    /// The posterior along ln E₁ through an optimum with an inclusion. `None` where it has no
+    /// curvature there.
     pub fn ridge(&self, fit: &Fit, mut go_on: impl FnMut() -> bool) -> Option<Ridge> {
+        // Steps along a side, halved ones too; reached where E₁ is open and the prior alone ends
+        // it.
+        let max_nodes: usize = 8;
+        // Fall of ln p in one step beyond which it was too long, and is halved: a Gaussian falls by
+        // 2.2 in the second.
+        let cliff = 3.0;
+        // Fall of ln p at which a side ends: that of 2.4 standard errors. Beyond, its slope goes
+        // on.
+        let side_fall = 2.9;
+        let largest_ridge_step = 1.0;
+        // Step along ln E₁ in its local standard error, and the largest: mesh and tangent follow
+        // the ridge that far.
+        let ridge_step = 1.2;
         let index = (self.coordinates().iter()).position(|c| *c == Coordinate::LumpModulus)?;
         let normal = self.normal(&fit.parameters, Some(&fit.solved))?;
         let (node, start) = self.node(&fit.parameters, normal, index)?;
@@ -80,16 +83,17 @@ impl Problem {
             };
             let mut part = 1.0;
             let mut before = top;
-            for _ in 0..MAX_NODES {
-                let step = part * (RIDGE_STEP * place.error).min(LARGEST_RIDGE_STEP);
+            for _ in 0..max_nodes {
+                let step = part * (ridge_step * place.error).min(largest_ridge_step);
                 let at = self.stepped(&place.parameters, &(sign * step * &place.tangent));
                 let near = &place.solved;
                 let Some((node, next)) = self.settled_node(&at, near, index, &mut go_on) else {
                     break;
                 };
                 let density = node.density;
-                if density < before - CLIFF {
-                    // The ridge bends or ends on the way: an inclusion as soft as the tissue is none.
+                if density < before - cliff {
+                    // The ridge bends or ends on the way: an inclusion as soft as the tissue is
+                    // none.
                     part *= 0.5;
                     continue;
                 }
@@ -101,7 +105,7 @@ impl Problem {
                     nodes.push(node);
                 }
                 place = next;
-                if density < top - SIDE_FALL {
+                if density < top - side_fall {
                     break;
                 }
             }
@@ -114,7 +118,8 @@ impl Problem {
         })
     }
 
-    /// The ridge at the E₁ of some parameters nearby, solved anew where the first step to it was long.
+    /// The ridge at the E₁ of some parameters nearby, solved anew where the first step to it was
+    /// long.
     fn settled_node(
         &self,
         at: &Parameters,
@@ -122,12 +127,16 @@ impl Problem {
         index: usize,
         go_on: &mut impl FnMut() -> bool,
     ) -> Option<(Node, Place)> {
+        let max_steps: usize = 4;
+        // Distance from the ridge in standard errors above which one step to it does not do, and
+        // steps there.
+        let long = 1.0;
         let mut solve =
             |at: &Parameters, near: &Solved| go_on().then(|| self.normal(at, Some(near))).flatten();
         let mut found = self.node(at, solve(at, near)?, index)?;
-        for _ in 1..MAX_STEPS {
+        for _ in 1..max_steps {
             let place = &found.1;
-            if place.away < LONG {
+            if place.away < long {
                 break;
             }
             let normal = solve(&place.parameters, &place.solved)?;
@@ -138,7 +147,7 @@ impl Problem {
 
     /// The ridge at the E₁ of some parameters nearby.
     fn node(&self, at: &Parameters, normal: Normal, index: usize) -> Option<(Node, Place)> {
-        let Step { by, size } = self.step(at, &normal, 0.0, Some(index))?;
+        let FitStep { by, size } = self.step(at, &normal, 0.0, Some(index))?;
         let fall = 2.0 * by.dot(&normal.gradient) - by.dot(&(&normal.matrix * &by));
         let objective = normal.misfit + normal.penalty - fall;
         let mut matrix = normal.matrix.clone();
@@ -174,13 +183,6 @@ impl Problem {
     }
 }
 
-/// Largest rise of ln p between nodes: parabolas through uneven ones overshoot.
-const RISE: f64 = 0.3;
-/// Points of the quadrature over u.
-const POINTS: usize = 200;
-/// Fall of ln p beyond the last node up to which its slope is followed.
-const TAIL: f64 = 4.0;
-
 /// Marginal posteriors of all coordinates: a mixture of Gaussians.
 #[derive(Debug, Clone)]
 pub struct Marginal {
@@ -190,7 +192,8 @@ pub struct Marginal {
     pub gain: f64,
 }
 
-/// A function of the nodes at `x` in the interval after node `k`: the mean of the parabolas through the nodes around it.
+/// A function of the nodes at `x` in the interval after node `k`: the mean of the parabolas through
+/// the nodes around it.
 fn between(xs: &[f64], ys: &[f64], k: usize, x: f64) -> f64 {
     let parabola = |first: usize| -> f64 {
         let [a, b, c] = [xs[first], xs[first + 1], xs[first + 2]];
@@ -213,8 +216,8 @@ struct Curve<'a> {
 }
 
 impl Curve<'_> {
-    /// Fall of ln p by ln E₁ beyond the first node, or the last: the parabola's through three there, not below the last
-    /// interval's and not negative.
+    /// Fall of ln p by ln E₁ beyond the first node, or the last: the parabola's through three
+    /// there, not below the last interval's and not negative.
     fn slope(&self, is_first: bool) -> f64 {
         let last = self.xs.len() - 1;
         let [a, b, c] = if is_first {
@@ -232,15 +235,19 @@ impl Curve<'_> {
 
     /// How far that slope is followed.
     fn tail(&self, is_first: bool) -> f64 {
+        // Fall of ln p beyond the last node up to which its slope is followed.
+        let tail = 4.0;
         let last = self.xs.len() - 1;
         let [outer, inner] = if is_first { [0, 1] } else { [last, last - 1] };
         let step = (self.xs[outer] - self.xs[inner]).abs();
         // A side that ended before p fell is followed as far as its last step.
-        (TAIL / self.slope(is_first).max(1e-9)).clamp(step, 4.0 * step)
+        (tail / self.slope(is_first).max(1e-9)).clamp(step, 4.0 * step)
     }
 
     /// The ridge at ln E₁.
     fn at(&self, x: f64) -> Node {
+        // Largest rise of ln p between nodes: parabolas through uneven ones overshoot.
+        let rise = 0.3;
         let last = self.xs.len() - 1;
         let k = self.xs.partition_point(|node| *node < x).clamp(1, last) - 1;
         let (a, b) = (&self.nodes[k], &self.nodes[k + 1]);
@@ -264,7 +271,7 @@ impl Curve<'_> {
         };
         let (low, high) = (a.density.min(b.density), a.density.max(b.density));
         Node {
-            density: value(&|node| node.density).clamp(low, high + RISE),
+            density: value(&|node| node.density).clamp(low, high + rise),
             at: DVector::from_fn(a.at.len(), |c, _| value(&|node| node.at[c])),
             covariance: &a.covariance * (1.0 - part) + &b.covariance * part,
         }
@@ -272,8 +279,10 @@ impl Curve<'_> {
 }
 
 impl Marginal {
-    /// Of a ridge; `None` where neither side could be followed.
+    /// Of a ridge. `None` where neither side could be followed.
     pub fn new(ridge: &Ridge) -> Option<Self> {
+        // Points of the quadrature over u.
+        let points_limit: usize = 200;
         let (nodes, index) = (&ridge.nodes, ridge.index);
         let xs: Vec<f64> = nodes.iter().map(|node| node.at[index]).collect();
         if xs.len() < 3 || xs.windows(2).any(|pair| pair[1] <= pair[0]) {
@@ -283,8 +292,8 @@ impl Marginal {
         let curve = Curve { nodes, xs };
         let from = curve.xs[0] - curve.tail(true);
         let to = curve.xs[last] + curve.tail(false);
-        let step = (to - from) / POINTS as f64;
-        let mut points: Vec<Node> = (0..POINTS)
+        let step = (to - from) / points_limit as f64;
+        let mut points: Vec<Node> = (0..points_limit)
             .map(|point| curve.at(from + (point as f64 + 0.5) * step))
             .collect();
         for point in &mut points {
@@ -303,13 +312,15 @@ impl Marginal {
         })
     }
 
-    /// The value that a coordinate is as probably above as below: the optimum of a skewed posterior lies at an end of its interval.
+    /// The value that a coordinate is as probably above as below: the optimum of a skewed posterior
+    /// lies at an end of its interval.
     pub fn median(&self, coordinate: usize) -> f64 {
         self.quantile(coordinate, 0.5)
     }
 
-    /// The 95 % interval of a coordinate, with equal tails: it holds 96, 98 and 97 % of 161 inclusions' D, d and E₁ by CalculiX, the likelihood
-    /// ratio's 96, 98 and 98 (`inclusion_study`).
+    /// The 95 % interval of a coordinate, with equal tails: it holds 96, 98 and 97 % of 161
+    /// inclusions' D, d and E₁ by CalculiX, the likelihood ratio's 96, 98 and 98
+    /// (`inclusion_study`).
     pub fn interval(&self, coordinate: usize) -> [f64; 2] {
         [0.025, 0.975].map(|probability| self.quantile(coordinate, probability))
     }

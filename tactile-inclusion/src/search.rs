@@ -21,26 +21,12 @@ use core::ops::ControlFlow;
 use tactile_elasticity::ElasticityError;
 use tactile_fem::{Guide, Interface, Kinematics};
 
-/// Part of the guide's radius within which pressures are used: further out the singular rim rules,
-/// where meshes disagree by percents.
-const USED_FACE: f64 = 0.75;
-/// Fewer rings do not show an inclusion's shape.
-const MIN_RINGS: usize = 8;
-/// Difference of log evidence above which one assumption about the face is clearly better: 20 to 1 and three times as much again for
-/// what the finite elements err by on a sliding face, which the covariance knows by its size alone. Two frames on soft tissue by
-/// CalculiX preferred the wrong one by up to 13, beside a poor fit (`inclusion_study` on the scenes of `evidence/inclusion_scenes.py`); the price is
-/// intervals that hold under both where the right one leads by less. Where the better one leaves more than the errors explain, differences
-/// count as much less (K. P. Burnham & D. R. Anderson, *Model Selection and Multimodel Inference* (2002), §2.5).
-const CLEAR_EVIDENCE: f64 = 12.0;
-/// Difference of log evidence beyond which another assumption about the face is not fitted to the end.
-const RIVAL_EVIDENCE: f64 = 16.0;
-
 /// Finds a spherical inclusion in a block from the pressure on a guide's face at some approaches.
 ///
-/// Maximum a posteriori over ln D, ln d, ln E₁, ln E₀, the block's height, ν and the approaches' zero by
-/// Levenberg–Marquardt on finite-strain finite elements from several starts, once a score test says that an inclusion would explain
-/// more than the plain block; intervals by following the posterior along ln E₁; an inclusion's probability from the evidence with
-/// and without one.
+/// Maximum a posteriori over ln D, ln d, ln E₁, ln E₀, the block's height, ν and the approaches'
+/// zero by Levenberg–Marquardt on finite-strain finite elements from several starts, once a score
+/// test says that an inclusion would explain more than the plain block. Intervals by following the
+/// posterior along ln E₁. An inclusion's probability from the evidence with and without one.
 ///
 /// ```no_run
 /// use tactile_fem::{Guide, GuideLayer, Material};
@@ -99,19 +85,19 @@ impl InclusionSearch {
     /// Sets the sensor's smooth errors.
     ///
     /// # Errors
-    /// Negative or NaN; a correlation length or a force error of zero.
+    /// Negative or NaN. A correlation length or a force error of zero.
     pub fn with_sensor_errors(mut self, errors: SensorErrors) -> Result<Self, ElasticityError> {
         self.sensor = errors.checked()?;
         Ok(self)
     }
 
-    /// The inclusion that explains ring means at `radii_m` (metres, ascending) best; rings beyond three
-    /// quarters of the guide's radius are not used. Some 100 finite-element solutions.
+    /// The inclusion that explains ring means at `radii_m` (metres, ascending) best. Rings beyond
+    /// three quarters of the guide's radius are not used. Some 100 finite-element solutions.
     ///
     /// # Errors
-    /// No frame; approaches that do not grow; lengths that differ; values that are not finite; fewer
-    /// than eight rings within reach; [`ElasticityError::NoSolution`] where the approaches are beyond
-    /// what the block's finite elements bear.
+    /// No frame. Approaches that do not grow. Lengths that differ. Values that are not finite.
+    /// Fewer than eight rings within reach. [`ElasticityError::NoSolution`] where the approaches
+    /// are beyond what the block's finite elements bear.
     pub fn search(
         &self,
         radii_m: &[f64],
@@ -120,16 +106,28 @@ impl InclusionSearch {
         self.search_with_progress(radii_m, frames, &mut |_| ControlFlow::Continue(()))
     }
 
-    /// As [`Self::search`]; `progress` hears of every solution and may end the search.
+    /// As [`Self::search`]. `progress` hears of every solution and may end the search.
     ///
     /// # Errors
-    /// Those of [`Self::search`]; [`ElasticityError::Cancelled`].
+    /// Those of [`Self::search`]. [`ElasticityError::Cancelled`].
     pub fn search_with_progress(
         &self,
         radii_m: &[f64],
         frames: &[PressureProfile],
         progress: &mut dyn FnMut(SearchProgress) -> ControlFlow<()>,
     ) -> Result<InclusionEstimate, ElasticityError> {
+        // Difference of log evidence beyond which another assumption about the face is not fitted
+        // to the end.
+        let rival_evidence = 16.0;
+        // Difference of log evidence above which one assumption about the face is clearly better:
+        // 20 to 1 and three times as much again for what the finite elements err by on a sliding
+        // face, which the covariance knows by its size alone. Two frames on soft tissue by CalculiX
+        // preferred the wrong one by up to 13, beside a poor fit (`inclusion_study` on the scenes
+        // of `evidence/inclusion_scenes.py`); the price is intervals that hold under both where the
+        // right one leads by less. Where the better one leaves more than the errors explain,
+        // differences count as much less (K. P. Burnham & D. R. Anderson, *Model Selection and
+        // Multimodel Inference* (2002), §2.5).
+        let clear_evidence = 12.0;
         check(radii_m, frames)?;
         let observed = self.observed(radii_m, frames)?;
         let approaches_m: Vec<f64> = frames.iter().map(|frame| frame.approach_m).collect();
@@ -144,7 +142,8 @@ impl InclusionSearch {
         let plains: Vec<Plain> = (interfaces.into_iter())
             .filter_map(|face| self.plain(&observed, &approaches_m, face, &mut counter))
             .collect();
-        // Where the plain block that fits better needs no inclusion, one would make up for a wrong assumption about the face.
+        // Where the plain block that fits better needs no inclusion, one would make up for a wrong
+        // assumption about the face.
         let best = (plains.iter()).max_by(|a, b| a.fit.evidence.total_cmp(&b.fit.evidence));
         let is_plain = best.is_some_and(Plain::is_plain);
         let mut drafts: Vec<Draft> = Vec::new();
@@ -168,13 +167,13 @@ impl InclusionSearch {
         let mut is_unsolved = false;
         for draft in drafts {
             let needed = (hypotheses.first())
-                .map_or(f64::NEG_INFINITY, |best| best.evidence() - RIVAL_EVIDENCE);
+                .map_or(f64::NEG_INFINITY, |best| best.evidence() - rival_evidence);
             let found = self.hypothesis(&observed, &approaches_m, draft, needed, &mut counter);
             is_unsolved |= found.is_none();
             hypotheses.extend(found);
         }
         let best = (hypotheses.iter()).map(Hypothesis::evidence);
-        let needed = best.fold(f64::NEG_INFINITY, f64::max) - RIVAL_EVIDENCE;
+        let needed = best.fold(f64::NEG_INFINITY, f64::max) - rival_evidence;
         for hypothesis in &mut hypotheses {
             if hypothesis.evidence() > needed {
                 hypothesis.follow(|| counter.step());
@@ -186,7 +185,7 @@ impl InclusionSearch {
         hypotheses.sort_by(|a, b| b.evidence().total_cmp(&a.evidence()));
         let mut hypotheses = hypotheses.into_iter();
         let best = hypotheses.next().ok_or(ElasticityError::NoSolution)?;
-        let clear = CLEAR_EVIDENCE * best.inflation(&observed);
+        let clear = clear_evidence * best.inflation(&observed);
         let rival = (hypotheses.next()).filter(|other| best.evidence() - other.evidence() < clear);
         Ok(best.estimate(&observed, rival.as_ref(), is_unsolved))
     }
@@ -251,7 +250,7 @@ impl InclusionSearch {
         }
     }
 
-    /// What is known of the block; `guess` of its modulus counts where nobody has said it.
+    /// What is known of the block. `guess` of its modulus counts where nobody has said it.
     pub(crate) fn block_priors(&self, guess: f64) -> Vec<Prior> {
         let [height, zero, (poisson_ratio, error)] = self.specimen.known();
         let poisson = (poisson_ratio.min(LARGEST_POISSON_RATIO), error);
@@ -265,8 +264,8 @@ impl InclusionSearch {
         ]
     }
 
-    /// Sizes, depths and contrasts that a face of this radius can see: D from 0.2 to 2 radii, d from
-    /// 0.06 to 1.5, E₁ from 0.4 to 47 times E₀, as 95 % ranges.
+    /// Sizes, depths and contrasts that a face of this radius can see: D from 0.2 to 2 radii, d
+    /// from 0.06 to 1.5, E₁ from 0.4 to 47 times E₀, as 95 % ranges.
     pub(crate) fn lump_priors(&self, block_modulus_pa: f64) -> [Prior; 3] {
         let face = self.guide.radius_m();
         [
@@ -292,14 +291,19 @@ impl InclusionSearch {
         &self,
         radii_m: &[f64],
     ) -> Result<Vec<usize>, ElasticityError> {
-        let limit = USED_FACE * self.guide.radius_m();
+        // Fewer rings do not show an inclusion's shape.
+        let min_rings: usize = 8;
+        // Part of the guide's radius within which pressures are used: further out the singular rim
+        // rules, where meshes disagree by percents.
+        let used_face = 0.75;
+        let limit = used_face * self.guide.radius_m();
         let used: Vec<usize> = (0..radii_m.len())
             .filter(|&k| radii_m[k] <= limit)
             .collect();
-        if used.len() < MIN_RINGS {
+        if used.len() < min_rings {
             return Err(ElasticityError::LengthMismatch {
                 quantity: Quantity::Samples,
-                expected: MIN_RINGS,
+                expected: min_rings,
                 found: used.len(),
             });
         }
@@ -332,7 +336,7 @@ pub struct Counter<'a> {
 }
 
 impl Counter<'_> {
-    /// Reports a solution; `false` where the search is to end.
+    /// Reports a solution. `false` where the search is to end.
     pub fn step(&mut self) -> bool {
         if self.cancelled {
             return false;
@@ -348,15 +352,10 @@ impl Counter<'_> {
     }
 }
 
-/// Elements along an eighth of the inclusion's circumference, of a plain block's first fit and of the grid.
-const HOMOGENEOUS_FINENESS: usize = 2;
-/// χ² of the first fit over its degrees of freedom up to which the block may be plain. The meshes' errors bring plain blocks by
-/// CalculiX to 1.5, under the wrong assumption about the face to 2.2; what an inclusion adds above 2 needs no test.
-const DOUBTFUL: f64 = 2.0;
-
-/// Elements along an eighth of the inclusion's circumference for the answer. Of bonded blocks the pressure is within 0.05 %
-/// of a mesh of ten; five leave waves of 0.1 % above a wide shallow inclusion, which move its size and depth by one bound, and where
-/// the face slides χ² by up to ten, enough to take it for one that sticks. On an inclusion that hardly shows the noise errs by
+/// Elements along an eighth of the inclusion's circumference for the answer. Of bonded blocks the
+/// pressure is within 0.05 % of a mesh of ten. Five leave waves of 0.1 % above a wide shallow
+/// inclusion, which move its size and depth by one bound, and where the face slides χ² by up to
+/// ten, enough to take it for one that sticks. On an inclusion that hardly shows the noise errs by
 /// more than five elements do.
 fn answer_fineness(is_certain: bool) -> usize {
     if is_certain { 7 } else { 5 }
@@ -368,7 +367,8 @@ pub struct Plain {
     pub problem: Problem,
     pub interface: Interface,
     pub fit: Fit,
-    /// The fit on the answer's mesh and what inclusions promise to add to it, where the block may be plain.
+    /// The fit on the answer's mesh and what inclusions promise to add to it, where the block may
+    /// be plain.
     pub settled: Option<(Fit, Score)>,
     pub grid: Vec<Start>,
 }
@@ -390,7 +390,7 @@ impl Plain {
 }
 
 impl InclusionSearch {
-    /// The fit of a plain block; `None` where it could not be solved.
+    /// The fit of a plain block. `None` where it could not be solved.
     pub(crate) fn plain(
         &self,
         observed: &Observed,
@@ -398,8 +398,15 @@ impl InclusionSearch {
         interface: Interface,
         counter: &mut Counter<'_>,
     ) -> Option<Plain> {
+        // χ² of the first fit over its degrees of freedom up to which the block may be plain. The
+        // meshes' errors bring plain blocks by CalculiX to 1.5, under the wrong assumption about
+        // the face to 2.2; what an inclusion adds above 2 needs no test.
+        let doubtful = 2.0;
+        // Elements along an eighth of the inclusion's circumference, of a plain block's first fit
+        // and of the grid.
+        let homogeneous_fineness: usize = 2;
         let guess = self.stiffness(observed, approaches_m);
-        let forward = self.forward(observed, approaches_m, interface, HOMOGENEOUS_FINENESS);
+        let forward = self.forward(observed, approaches_m, interface, homogeneous_fineness);
         let problem = Problem {
             forward: forward.clone(),
             measured: observed.values.clone(),
@@ -414,10 +421,11 @@ impl InclusionSearch {
             kinematics: Kinematics::Linear,
             ..forward
         };
-        // A plain block that fits an inclusion's pressures is bent out of what is known of it; starts are not.
+        // A plain block that fits an inclusion's pressures is bent out of what is known of it;
+        // starts are not.
         let known = self.plain_block(fit.parameters.block_modulus_pa);
         let grid = starts(&linear, &known, counter)?;
-        let settled = if fit.misfit < DOUBTFUL * observed.values.len() as f64 {
+        let settled = if fit.misfit < doubtful * observed.values.len() as f64 {
             self.settled(&problem, &fit, observed, &grid, counter)
         } else {
             None
@@ -473,8 +481,6 @@ impl InclusionSearch {
 const DIAMETERS: [f64; 3] = [0.35, 0.65, 1.05];
 const DEPTHS: [f64; 3] = [0.15, 0.3, 0.55];
 const CONTRASTS: [f64; 2] = [2.5, 8.0];
-/// Part of the block's height that an inclusion may reach down to.
-const DEEPEST: f64 = 0.95;
 
 /// An inclusion in a block, and its pressures.
 #[derive(Debug, Clone)]
@@ -485,12 +491,15 @@ pub struct Start {
     pub added: Vec<f64>,
 }
 
-/// The grid of inclusions in a plain block under a face of this radius; `None` where the search is to end.
+/// The grid of inclusions in a plain block under a face of this radius. `None` where the search is
+/// to end.
 pub fn starts(
     forward: &Forward,
     plain: &Parameters,
     counter: &mut Counter<'_>,
 ) -> Option<Vec<Start>> {
+    // Part of the block's height that an inclusion may reach down to.
+    let deepest = 0.95;
     let face_radius_m = forward.guide.radius_m();
     let mut starts = Vec::new();
     for diameter in DIAMETERS {
@@ -500,7 +509,7 @@ pub fn starts(
                 depth_m: depth * face_radius_m,
                 youngs_modulus_pa: contrast * plain.block_modulus_pa,
             };
-            if (diameter + depth) * face_radius_m >= DEEPEST * plain.height_m {
+            if (diameter + depth) * face_radius_m >= deepest * plain.height_m {
                 continue;
             }
             let with = |contrast: f64| Parameters {
@@ -533,22 +542,10 @@ pub fn starts(
     Some(starts)
 }
 
-/// Elements along an eighth of the inclusion's circumference in the first fits with an inclusion.
-const FIRST_FINENESS: usize = 3;
-/// Starts that are fitted. With tempered errors most end in one optimum; a third adds a quarter of the time.
-const FITTED_STARTS: usize = 2;
-/// Difference of the first fits' log evidence beyond which a block is not plain.
-const CERTAIN_EVIDENCE: f64 = 50.0;
-
-/// Difference of the first fits' log evidence beyond which an assumption about the face is given up: this
-/// and a part of the better one's misfit, most of which is the mesh's.
-const HOPELESS_EVIDENCE: f64 = 25.0;
-const HOPELESS_MISFIT: f64 = 0.05;
-
 /// The best first fits under one assumption about the face.
 ///
-/// Their covariance has the coarse mesh's error in it: without, the objective is as rough as that, and fits
-/// end far from the truth.
+/// Their covariance has the coarse mesh's error in it: without, the objective is as rough as that,
+/// and fits end far from the truth.
 pub struct Draft {
     problem: Problem,
     interface: Interface,
@@ -587,12 +584,17 @@ impl Draft {
 
     /// Log evidence of the first fits below which another assumption about the face is given up.
     fn hopeless(&self) -> f64 {
-        self.evidence() - HOPELESS_EVIDENCE - HOPELESS_MISFIT * self.better().misfit
+        let hopeless_misfit = 0.05;
+        // Difference of the first fits' log evidence beyond which an assumption about the face is
+        // given up: this and a part of the better one's misfit, most of which is the mesh's.
+        let hopeless_evidence = 25.0;
+        self.evidence() - hopeless_evidence - hopeless_misfit * self.better().misfit
     }
 }
 
 impl InclusionSearch {
-    /// The best first fits with an inclusion, from the grid's best starts and from what fits best under `another` assumption.
+    /// The best first fits with an inclusion, from the grid's best starts and from what fits best
+    /// under `another` assumption.
     fn draft(
         &self,
         observed: &Observed,
@@ -601,25 +603,31 @@ impl InclusionSearch {
         another: Option<&Draft>,
         counter: &mut Counter<'_>,
     ) -> Draft {
+        // Starts that are fitted. With tempered errors most end in one optimum; a third adds a
+        // quarter of the time.
+        let fitted_starts: usize = 2;
+        // Elements along an eighth of the inclusion's circumference in the first fits with an
+        // inclusion.
+        let first_fineness: usize = 3;
         let starts = plain.starts();
         let mut draft = Draft::plain(plain);
         let modulus = draft.plain.parameters.block_modulus_pa;
         let problem = &mut draft.problem;
         problem.priors.extend(self.lump_priors(modulus));
-        problem.forward = self.forward(observed, approaches_m, draft.interface, FIRST_FINENESS);
+        problem.forward = self.forward(observed, approaches_m, draft.interface, first_fineness);
         let best = another.and_then(|another| Some((another, another.lump.as_ref()?)));
         let ending = best.map_or(DRAFTED, |(another, lump)| {
             DRAFTED.below(problem.objective_at(another.hopeless(), lump.volume))
         });
         let best = best.map(|(_, lump)| &lump.parameters);
-        draft.lump = (best.into_iter().chain(&starts).take(FITTED_STARTS))
+        draft.lump = (best.into_iter().chain(&starts).take(fitted_starts))
             .filter_map(|start| problem.fit(*start, ending, || counter.step()))
             .max_by(|a, b| a.evidence.total_cmp(&b.evidence));
         draft
     }
 
-    /// A draft's fits on the answer's mesh, in full where their log evidence exceeds `needed`; `None` where the plain
-    /// block's could not be solved.
+    /// A draft's fits on the answer's mesh, in full where their log evidence exceeds `needed`.
+    /// `None` where the plain block's could not be solved.
     pub(crate) fn hypothesis(
         &self,
         observed: &Observed,
@@ -628,6 +636,8 @@ impl InclusionSearch {
         needed: f64,
         counter: &mut Counter<'_>,
     ) -> Option<Hypothesis> {
+        // Difference of the first fits' log evidence beyond which a block is not plain.
+        let certain_evidence = 50.0;
         let Draft {
             mut problem,
             interface,
@@ -638,7 +648,7 @@ impl InclusionSearch {
         } = draft;
         let with_lump = core::mem::take(&mut problem.priors);
         let gain = (lump.as_ref()).map_or(f64::NEG_INFINITY, |lump| lump.evidence - plain.evidence);
-        let is_certain = gain > CERTAIN_EVIDENCE;
+        let is_certain = gain > certain_evidence;
         let fineness = answer_fineness(is_certain);
         problem.forward = self.forward(observed, approaches_m, interface, fineness);
         let covariance = observed.covariance(self.sensor(), interface, Resolution::Answer);

@@ -6,8 +6,8 @@ use crate::error::{Quantity, finite, not_negative, positive};
 use tactile_elasticity::ElasticityError;
 use tactile_fem::{Interface, Material};
 
-/// A cylindrical block of tissue on a rigid stage: what is known of it before it is pressed, each with
-/// its standard error.
+/// A cylindrical block of tissue on a rigid stage: what is known of it before it is pressed, each
+/// with its standard error.
 ///
 /// ```
 /// use tactile_fem::Interface;
@@ -37,9 +37,9 @@ pub struct Specimen {
 }
 
 impl Specimen {
-    /// Height and radius in metres. The height's standard error is 2 %, Poisson's ratio
-    /// 0.495 ± 0.005, the zero of the approaches known to 20 µm, and whether the face sticks or slides
-    /// is not known, until set.
+    /// Height and radius in metres. The height's standard error is 2 %, Poisson's ratio 0.495 ±
+    /// 0.005, the zero of the approaches known to 20 µm, and whether the face sticks or slides is
+    /// not known, until set.
     ///
     /// # Errors
     /// A length that is not positive.
@@ -70,7 +70,7 @@ impl Specimen {
     /// Sets Poisson's ratio of tissue and inclusion, at most 0.4999, and its standard error.
     ///
     /// # Errors
-    /// A ratio that finite elements do not take; an error that is not positive.
+    /// A ratio that finite elements do not take. An error that is not positive.
     pub fn with_poisson_ratio(mut self, value: f64, error: f64) -> Result<Self, ElasticityError> {
         Material::new(1.0, value)?;
         self.poisson_ratio = value;
@@ -87,7 +87,7 @@ impl Specimen {
         Ok(self)
     }
 
-    /// Sets the tissue's Young's modulus and its standard error, in pascals; both are fitted from
+    /// Sets the tissue's Young's modulus and its standard error, in pascals. Both are fitted from
     /// scratch where it is not set.
     ///
     /// # Errors
@@ -162,13 +162,14 @@ pub struct SensorErrors {
     pub correlation_m: f64,
     /// Relative standard error of the force.
     pub force: f64,
-    /// Part of the finite elements' own error (how far another code's pressures are off) that counts: 1; 0 for
-    /// what the sensor alone would leave open, as in published bounds.
+    /// Part of the finite elements' own error (how far another code's pressures are off) that
+    /// counts: 1. 0 for what the sensor alone would leave open, as in published bounds.
     pub model: f64,
 }
 
 impl Default for SensorErrors {
-    /// 0.3 % in common and 0.1 % of each frame, correlated over 3 mm; 0.1 % of the force; and the model's error.
+    /// 0.3 % in common and 0.1 % of each frame, correlated over 3 mm. 0.1 % of the force. And the
+    /// model's error.
     fn default() -> Self {
         Self {
             common: 3e-3,

@@ -1,4 +1,5 @@
-//! The calibration of the sensor: integrated pixel value against the force of a gauge, loading and unloading (Fig. 9).
+//! The calibration of the sensor: integrated pixel value against the force of a gauge, loading and
+//! unloading (Fig. 9).
 
 use crate::camera::{Purpose, row_stream};
 use crate::contact::ContactModel;
@@ -27,17 +28,18 @@ pub struct CalibrationRun {
     pub indenter: ElasticSphere,
     /// The largest force in newton.
     pub largest_force_n: f64,
-    /// Equal steps from 0 to the largest force; the way back takes as many.
+    /// Equal steps from 0 to the largest force. The way back takes as many.
     pub steps: usize,
     /// Standard deviation of the gauge's reading in newton.
     pub gauge_noise_n: f64,
-    /// On the way back the light is that of a larger force F + 4·h·F_max·x(1 − x), x = F/F_max: h is the largest
-    /// difference between the branches as a share of the range. The paper saw none.
+    /// On the way back the light is that of a larger force F + 4·h·F_max·x(1 − x), x = F/F_max: h
+    /// is the largest difference between the branches as a share of the range. The paper saw none.
     pub hysteresis: f64,
 }
 
 impl Default for CalibrationRun {
-    /// A rigid sphere of 10 mm radius, 0 to 2 N in 20 steps and back, 2 mN of gauge noise, no hysteresis.
+    /// A rigid sphere of 10 mm radius, 0 to 2 N in 20 steps and back, 2 mN of gauge noise, no
+    /// hysteresis.
     fn default() -> Self {
         let indenter = ElasticSphere {
             radius_m: 10e-3,
@@ -69,8 +71,8 @@ impl Default for CalibrationRun {
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct CalibrationSeries {
-    /// Sum over the pixels of frame minus reference in 8-bit grey levels, and the gauge's reading with its noise, in the order they were taken: up
-    /// and down again.
+    /// Sum over the pixels of frame minus reference in 8-bit grey levels, and the gauge's reading
+    /// with its noise, in the order they were taken: up and down again.
     pub pairs: Vec<CalibrationPair>,
     /// The force itself of every pair, in newton.
     pub true_forces_n: Vec<f64>,
@@ -78,14 +80,9 @@ pub struct CalibrationSeries {
     pub newton_per_grey: f64,
 }
 
-/// The camera's largest grey level.
-const BRIGHTEST: f64 = 255.0;
-/// An indenter is doubled so many times at most: sixteen times the radius is a sixth of the pressure.
-const DOUBLINGS: usize = 4;
-
 impl PressScene {
-    /// Calibrates the scene's sensor (waveguide, camera, light and gain) with another indenter; every reading is the sum
-    /// over a simulated frame. The reference frame is exposed once.
+    /// Calibrates the scene's sensor (waveguide, camera, light and gain) with another indenter.
+    /// Every reading is the sum over a simulated frame. The reference frame is exposed once.
     ///
     /// ```
     /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -142,8 +139,9 @@ impl PressScene {
         })
     }
 
-    /// The calibration with an indenter of two, four, eight or sixteen times the radius where the given one saturates the camera: a gain that
-    /// suits the low pressure of a large or soft object is too high for a small rigid ball.
+    /// The calibration with an indenter of two, four, eight or sixteen times the radius where the
+    /// given one saturates the camera: a gain that suits the low pressure of a large or soft object
+    /// is too high for a small rigid ball.
     ///
     /// ```
     /// use tactile_simulate::{CalibrationRun, Camera, Elastic, PressOptions, PressScene, ElasticSphere};
@@ -163,10 +161,13 @@ impl PressScene {
         &self,
         mut options: CalibrationRun,
     ) -> Result<CalibrationRun, SimulateError> {
+        // An indenter is doubled so many times at most: sixteen times the radius is a sixth of the
+        // pressure.
+        let doublings: usize = 4;
         options.validate()?;
         // Light grows with the force on both branches.
         let force_n = options.largest_force_n;
-        for _ in 0..=DOUBLINGS {
+        for _ in 0..=doublings {
             if !is_beyond_range(&self.calibration_light(options.indenter, force_n)?) {
                 return Ok(options);
             }
@@ -192,7 +193,9 @@ impl PressScene {
 }
 
 fn is_beyond_range(light: &Array2<f64>) -> bool {
-    light.iter().any(|&grey| grey > BRIGHTEST)
+    // The camera's largest grey level.
+    let brightest = 255.0;
+    light.iter().any(|&grey| grey > brightest)
 }
 
 impl CalibrationRun {

@@ -1,4 +1,5 @@
-//! From light to an 8-bit frame: blur, vignetting, photon and read noise, quantisation and saturation.
+//! From light to an 8-bit frame: blur, vignetting, photon and read noise, quantisation and
+//! saturation.
 //!
 //! One random stream per row of each frame.
 
@@ -9,9 +10,6 @@ use ndarray::{Array2, ArrayView2, Axis};
 use rand::SeedableRng;
 use rand::rngs::ChaCha8Rng;
 use rand_distr::{Distribution, Poisson, StandardNormal};
-
-/// From this many electrons on, Poisson noise is drawn from the normal law (skewness 1/√256 = 0.06).
-const NORMAL_FROM_ELECTRONS: f64 = 256.0;
 
 /// The camera's noise in grey levels.
 #[derive(Debug, Clone, Copy)]
@@ -44,22 +42,25 @@ pub struct Camera {
     pub pixel_size_m: [f64; 2],
     /// Stray light without contact, in grey levels.
     pub background_grey: f64,
-    /// Barrel distortion about the frame's middle: the share by which the corners appear too close to it. A place at the distance
-    /// d from the middle is seen at the distance e with d = e (1 + barrel (e/e_corner)²); below 0 a pincushion.
+    /// Barrel distortion about the frame's middle: the share by which the corners appear too close
+    /// to it. A place at the distance d from the middle is seen at the distance e with d = e (1 +
+    /// barrel (e/e_corner)²). Below 0 a pincushion.
     pub barrel: f64,
-    /// Share of the light lost in the frame's corners; it grows with the squared distance from the middle.
+    /// Share of the light lost in the frame's corners. It grows with the squared distance from the
+    /// middle.
     pub vignetting: f64,
-    /// Standard deviation of the Gaussian point-spread function in pixels; 0 for none.
+    /// Standard deviation of the Gaussian point-spread function in pixels. 0 for none.
     pub blur_sigma_px: f64,
-    /// Electrons at grey level 255, which set the photon noise; infinite for none.
+    /// Electrons at grey level 255, which set the photon noise. Infinite for none.
     pub full_well_electrons: f64,
-    /// Standard deviation of the read noise in grey levels; 0 for none.
+    /// Standard deviation of the read noise in grey levels. 0 for none.
     pub read_noise_grey: f64,
 }
 
 impl Default for Camera {
-    /// The paper's 1392×1042 pixels over 30 mm, 15 grey levels of stray light, 3 % vignetting, 0.8 px blur, a full well
-    /// of 15 000 electrons (a scientific CCD of that pitch) and half a grey level of read noise.
+    /// The paper's 1392×1042 pixels over 30 mm, 15 grey levels of stray light, 3 % vignetting, 0.8
+    /// px blur, a full well of 15 000 electrons (a scientific CCD of that pitch) and half a grey
+    /// level of read noise.
     fn default() -> Self {
         Self {
             shape: [1042, 1392],
@@ -75,8 +76,8 @@ impl Default for Camera {
 }
 
 impl Camera {
-    /// The same field of view, lens and noise of a pixel on pixels that are `factor` times as wide and high; 0 is taken as 1. What
-    /// needs no fine frame is drawn `factor²` times as fast.
+    /// The same field of view, lens and noise of a pixel on pixels that are `factor` times as wide
+    /// and high. 0 is taken as 1. What needs no fine frame is drawn `factor²` times as fast.
     ///
     /// ```
     /// use tactile_simulate::Camera;
@@ -134,8 +135,8 @@ impl Camera {
         asked.unwrap_or_else(|| self.middle_px())
     }
 
-    /// Turns expected grey levels into an exposure: noise, rounding, and clipping at 0 and 255. Each (`seed`, `frame`)
-    /// has its own noise. A caller may pass any image; O(pixels).
+    /// Turns expected grey levels into an exposure: noise, rounding, and clipping at 0 and 255.
+    /// Each (`seed`, `frame`) has its own noise. A caller may pass any image. O(pixels).
     pub fn expose(&self, expected_grey: ArrayView2<'_, f64>, seed: u64, frame: u64) -> Array2<u8> {
         self.expose_for(Purpose::Frames, expected_grey, seed, frame)
     }
@@ -182,10 +183,13 @@ impl Camera {
     }
 
     fn noise_law(&self) -> NoiseLaw {
+        // From this many electrons on, Poisson noise is drawn from the normal law (skewness 1/√256
+        // = 0.06).
+        let normal_from_electrons = 256.0;
         NoiseLaw {
             variance_per_grey: self.electrons_per_grey().recip(),
             read_variance: self.read_noise_grey * self.read_noise_grey,
-            normal_from_grey: NORMAL_FROM_ELECTRONS / self.electrons_per_grey(),
+            normal_from_grey: normal_from_electrons / self.electrons_per_grey(),
         }
     }
 
@@ -194,7 +198,7 @@ impl Camera {
         (4.0 * self.blur_sigma_px).ceil() as usize
     }
 
-    /// Blurs a patch in place; light that leaves the patch is lost.
+    /// Blurs a patch in place. Light that leaves the patch is lost.
     pub(crate) fn blur(&self, patch: &mut Patch) {
         let reach = self.blur_reach();
         if reach == 0 {
@@ -227,7 +231,8 @@ impl Camera {
         }
     }
 
-    /// Expected grey levels: background plus the patches of leaked light, times illumination and lens.
+    /// Expected grey levels: background plus the patches of leaked light, times illumination and
+    /// lens.
     pub(crate) fn compose(
         &self,
         leaked_grey: &[Patch],
@@ -255,8 +260,9 @@ impl Camera {
         frame
     }
 
-    /// An exposure of a target instead of the sensing surface: bright dots of a third of the pitch (in metres) in diameter on a
-    /// square grid, 180 grey levels above the background, through the same lens, blur, vignetting and noise.
+    /// An exposure of a target instead of the sensing surface: bright dots of a third of the pitch
+    /// (in metres) in diameter on a square grid, 180 grey levels above the background, through the
+    /// same lens, blur, vignetting and noise.
     ///
     /// ```
     /// use tactile_simulate::Camera;
@@ -292,13 +298,13 @@ impl Camera {
         self.expose_for(Purpose::CalibrationFrames, light.view(), seed, 1 << 40)
     }
 
-    /// An exposure without contact; each `repeat` has its own noise.
+    /// An exposure without contact. Each `repeat` has its own noise.
     pub(crate) fn expose_reference(&self, seed: u64, repeat: u32) -> Array2<u8> {
         let dark = self.compose(&[], &Illumination::default());
         self.expose(dark.view(), seed, u64::from(repeat) << 16)
     }
 
-    /// An exposure of the light of load `load`; each `repeat` has its own noise.
+    /// An exposure of the light of load `load`. Each `repeat` has its own noise.
     pub(crate) fn expose_load(
         &self,
         light: ArrayView2<'_, f64>,
@@ -334,7 +340,7 @@ impl Camera {
     }
 }
 
-/// What a stream is used for; streams of different uses never meet.
+/// What a stream is used for. Streams of different uses never meet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Purpose {

@@ -1,4 +1,5 @@
-//! A sphere pressed on the waveguide: pressure, contact radius, indentation and surface displacement.
+//! A sphere pressed on the waveguide: pressure, contact radius, indentation and surface
+//! displacement.
 //!
 //! Where the contact at a force comes from: a closed form or states computed elsewhere.
 //!
@@ -32,7 +33,7 @@ pub struct SimulatedContact {
     pub force_n: f64,
     /// Radius of the undeformed sphere in metres.
     pub sphere_radius_m: f64,
-    /// Radius a of the contact in metres; 0 without load.
+    /// Radius a of the contact in metres. 0 without load.
     pub contact_radius_m: f64,
     /// Approach δ of the two bodies in metres.
     pub indentation_m: f64,
@@ -117,7 +118,8 @@ impl SimulatedContact {
         self.given.is_none()
     }
 
-    /// Pressure at distance `r_m` from the centre, in pascal: p₀ √(1 − r²/a²) for a closed form, else that of the given state.
+    /// Pressure at distance `r_m` from the centre, in pascal: p₀ √(1 − r²/a²) for a closed form,
+    /// else that of the given state.
     pub fn pressure_pa(&self, r_m: f64) -> f64 {
         let a = self.contact_radius_m;
         if r_m >= a {
@@ -134,9 +136,10 @@ impl SimulatedContact {
         self.contact_radius_m / self.sphere_radius_m
     }
 
-    /// Height of the *apparent* surface: the pressure read as the shading of a frontally lit Lambertian surface,
-    /// z(r) = ∫ᵣᵃ √((p₀/p)² − 1) dr with p₀ the largest pressure. Hertz's pressure gives exactly a hemisphere of radius a, z = √(a² − r²), whatever
-    /// the sphere's radius and modulus. Zero outside.
+    /// Height of the *apparent* surface: the pressure read as the shading of a frontally lit
+    /// Lambertian surface, z(r) = ∫ᵣᵃ √((p₀/p)² − 1) dr with p₀ the largest pressure. Hertz's
+    /// pressure gives exactly a hemisphere of radius a, z = √(a² − r²), whatever the sphere's
+    /// radius and modulus. Zero outside.
     pub fn apparent_height_m(&self, r_m: f64) -> f64 {
         let a = self.contact_radius_m;
         if r_m >= a {
@@ -145,7 +148,8 @@ impl SimulatedContact {
         let Some(state) = &self.given else {
             return ((a - r_m) * (a + r_m)).sqrt();
         };
-        // With r = a sin φ the integrand stays finite at the rim, where p falls as √(a − r); midpoint rule.
+        // With r = a sin φ the integrand stays finite at the rim, where p falls as √(a − r);
+        // midpoint rule.
         const STEPS: usize = 64;
         let first = (r_m / a).asin();
         let step = (FRAC_PI_2 - first) / STEPS as f64;
@@ -157,8 +161,9 @@ impl SimulatedContact {
         angles.map(slope_at).sum::<f64>() * step
     }
 
-    /// Vertical displacement in metres of the waveguide's surface at distance `r_m` from the centre, negative under the object:
-    /// of a closed form the waveguide's share of the joint displacement under Hertz's pressure, else that of the given state.
+    /// Vertical displacement in metres of the waveguide's surface at distance `r_m` from the
+    /// centre, negative under the object: of a closed form the waveguide's share of the joint
+    /// displacement under Hertz's pressure, else that of the given state.
     pub(crate) fn waveguide_height_m(&self, r_m: f64) -> f64 {
         match &self.given {
             Some(state) => state.height_at_m(r_m),
@@ -179,7 +184,8 @@ impl SimulatedContact {
         }
         let q = a / r;
         if q < 0.02 {
-            // (2q² − 1) asin q + q√(1 − q²) = (4/3) q³ (1 + q²/10 + 9q⁴/280 + …), far field of a point force.
+            // (2q² − 1) asin q + q√(1 − q²) = (4/3) q³ (1 + q²/10 + 9q⁴/280 + …), far field of a
+            // point force.
             return 2.0 * p0 * a * q / (3.0 * e) * (1.0 + q * q * (0.1 + q * q * (9.0 / 280.0)));
         }
         p0 * a / (2.0 * e) * ((2.0 - 1.0 / (q * q)) * q.asin() + ((1.0 - q) * (1.0 + q)).sqrt() / q)
@@ -207,26 +213,30 @@ impl SimulatedContact {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum ContactModel {
-    /// Hertz (1882): a³ = 3FR/(4E*), δ = a²/R. Small contact, a ≪ R; the simulator obeys it at any load.
+    /// Hertz (1882): a³ = 3FR/(4E*), δ = a²/R. Small contact, a ≪ R. The simulator obeys it at any
+    /// load.
     #[default]
     Hertz,
-    /// Tatara (1991), first extension of Hertz to a sphere squeezed between two surfaces: Hertz's radius and
-    /// pressure, but the approach is lessened by the displacement that the opposite contact's force causes,
-    /// δ = a²/R − F/(πE₁)·[(1 − ν₁²)/√(a² + 4R²) + 2(1 + ν₁)R²/(a² + 4R²)^{3/2}].
-    /// Only the sphere's own material (E₁, ν₁) enters the correction: the waveguide is loaded on one side.
-    /// His stiffening of rubber and the lateral spread of the contact are not included.
+    /// Tatara (1991), first extension of Hertz to a sphere squeezed between two surfaces: Hertz's
+    /// radius and pressure, but the approach is lessened by the displacement that the opposite
+    /// contact's force causes, δ = a²/R − F/(πE₁)·[(1 − ν₁²)/√(a² + 4R²) + 2(1 + ν₁)R²/(a² +
+    /// 4R²)^{3/2}]. Only the sphere's own material (E₁, ν₁) enters the correction: the waveguide is
+    /// loaded on one side. His stiffening of rubber and the lateral spread of the contact are not
+    /// included.
     ///
     /// Y. Tatara, J. Eng. Mater. Technol. 113 (1991) 285–291.
     Tatara,
-    /// Finite elements at finite strain: the contacts of a ball of 3 mm of [`CL2000X`](crate::Elastic::CL2000X) or
-    /// [`CL2003X`](crate::Elastic::CL2003X) on the [default waveguide](crate::LightGuide::default) up to 1.3 N, neo-Hookean and without friction, as
-    /// `examples/contact_states.rs` computes them. Another ball or waveguide is refused: give its contacts as
-    /// [`Tabulated`](Self::Tabulated). Between the states as there.
+    /// Finite elements at finite strain: the contacts of a ball of 3 mm of
+    /// [`CL2000X`](crate::Elastic::CL2000X) or [`CL2003X`](crate::Elastic::CL2003X) on the [default
+    /// waveguide](crate::LightGuide::default) up to 1.3 N, neo-Hookean and without friction, as
+    /// `examples/contact_states.rs` computes them. Another ball or waveguide is refused: give its
+    /// contacts as [`Tabulated`](Self::Tabulated). Between the states as there.
     FiniteElements,
-    /// States computed elsewhere, with growing force. A load at a state's force is that state; between two states radius, pressure
-    /// over its mean, and height over F^⅔ at equal r/a are linear in F^⅓; below the first, that one shrinks as Hertz's contact does. A
-    /// load beyond the last state is refused. [`PressScene::calibrate`](crate::PressScene::calibrate), which presses another
-    /// object, takes Hertz's law.
+    /// States computed elsewhere, with growing force. A load at a state's force is that state.
+    /// Between two states radius, pressure over its mean, and height over F^⅔ at equal r/a are
+    /// linear in F^⅓. Below the first, that one shrinks as Hertz's contact does. A load beyond the
+    /// last state is refused. [`PressScene::calibrate`](crate::PressScene::calibrate), which
+    /// presses another object, takes Hertz's law.
     Tabulated(Vec<ContactState>),
 }
 
@@ -262,7 +272,7 @@ impl ContactModel {
         Ok(states.map_or(f64::MAX, |s| s.last().map_or(0.0, largest)))
     }
 
-    /// The states of a contact computed elsewhere; none for a closed form.
+    /// The states of a contact computed elsewhere. None for a closed form.
     ///
     /// # Errors
     /// [`SimulateError::NoFiniteElements`].
@@ -292,18 +302,17 @@ fn far_side_m(sphere: &ElasticSphere, force_n: f64, a: f64) -> f64 {
         * ((1.0 - nu) * (1.0 + nu) / d + 2.0 * (1.0 + nu) * r * r / (d * d * d))
 }
 
-/// Largest relative difference allowed between a state's force and the integral of its pressure. Finite-element pressures
-/// recovered at nodes miss the force by up to some percent where the mesh is coarse; a wrong unit misses it by far more.
-const LARGEST_FORCE_MISMATCH: f64 = 0.05;
-
-/// Forces that differ by no more than this part are one: a solver meets the force that it was asked for within its tolerance.
+/// Forces that differ by no more than this part are one: a solver meets the force that it was asked
+/// for within its tolerance.
 const EQUAL_FORCES: f64 = 1e-9;
 
-/// An axisymmetric contact at one load, computed by other means: finite elements, integral equations, a measurement.
+/// An axisymmetric contact at one load, computed by other means: finite elements, integral
+/// equations, a measurement.
 ///
-/// The columns are samples over the distance r from the contact's axis in the deformed configuration. Between samples p² is linear
-/// in r², which is exact for Hertz's √(1 − r²/a²) and follows the square-root fall at any rim; heights are linear in r.
-/// The pressure is scaled to carry `force_n` exactly.
+/// The columns are samples over the distance r from the contact's axis in the deformed
+/// configuration. Between samples p² is linear in r², which is exact for Hertz's √(1 − r²/a²) and
+/// follows the square-root fall at any rim. Heights are linear in r. The pressure is scaled to
+/// carry `force_n` exactly.
 ///
 /// ```
 /// use tactile_simulate::{Camera, ContactModel, ContactState, PressLoad, PressOptions, PressScene};
@@ -337,20 +346,26 @@ const EQUAL_FORCES: f64 = 1e-9;
 pub struct ContactState {
     /// Normal force in newton.
     pub force_n: f64,
-    /// Radius of the contact in metres; the pressure is taken as 0 from here on.
+    /// Radius of the contact in metres. The pressure is taken as 0 from here on.
     pub contact_radius_m: f64,
     /// Approach of the two bodies in metres.
     pub indentation_m: f64,
-    /// Distances from the axis in metres: 0 first, then growing, beyond the contact's rim at the last or at it.
+    /// Distances from the axis in metres: 0 first, then growing, beyond the contact's rim at the
+    /// last or at it.
     pub radius_m: Vec<f64>,
     /// Contact pressure in pascal at each distance.
     pub pressure_pa: Vec<f64>,
-    /// Vertical displacement in metres of the waveguide's surface at each distance, negative under the object.
+    /// Vertical displacement in metres of the waveguide's surface at each distance, negative under
+    /// the object.
     pub height_m: Vec<f64>,
 }
 
 impl ContactState {
     pub(crate) fn validate(&self) -> Result<(), SimulateError> {
+        // Largest relative difference allowed between a state's force and the integral of its
+        // pressure. Finite-element pressures recovered at nodes miss the force by up to some
+        // percent where the mesh is coarse; a wrong unit misses it by far more.
+        let largest_force_mismatch = 0.05;
         positive("force_n", self.force_n)?;
         positive("contact_radius_m", self.contact_radius_m)?;
         finite("indentation_m", self.indentation_m)?;
@@ -388,8 +403,8 @@ impl ContactState {
         within(
             "force_n",
             self.force_n,
-            carried_n * (1.0 - LARGEST_FORCE_MISMATCH),
-            carried_n * (1.0 + LARGEST_FORCE_MISMATCH),
+            carried_n * (1.0 - largest_force_mismatch),
+            carried_n * (1.0 + largest_force_mismatch),
         )
     }
 
@@ -400,8 +415,8 @@ impl ContactState {
         self
     }
 
-    /// ∫ p dS as interpolated: with q = p² linear in s = r², π ∫ √q ds over a stretch from q₀ to q₁ is
-    /// (2π/3)·Δs·(q₀ + √(q₀q₁) + q₁)/(√q₀ + √q₁).
+    /// ∫ p dS as interpolated: with q = p² linear in s = r², π ∫ √q ds over a stretch from q₀ to q₁
+    /// is (2π/3)·Δs·(q₀ + √(q₀q₁) + q₁)/(√q₀ + √q₁).
     pub(crate) fn carried_force_n(&self) -> f64 {
         let rim = self.contact_radius_m;
         let mut force = 0.0;
@@ -422,7 +437,7 @@ impl ContactState {
         not_beyond.saturating_sub(1).min(self.radius_m.len() - 2)
     }
 
-    /// Pressure at a distance from the axis, in pascal; 0 from the rim on.
+    /// Pressure at a distance from the axis, in pascal. 0 from the rim on.
     pub(crate) fn pressure_at_pa(&self, r_m: f64) -> f64 {
         if r_m >= self.contact_radius_m {
             0.0
@@ -434,7 +449,8 @@ impl ContactState {
     fn sampled_pressure_pa(&self, r_m: f64) -> f64 {
         let k = self.stretch(r_m);
         let [q0, q1] = [self.pressure_pa[k].powi(2), self.pressure_pa[k + 1].powi(2)];
-        // The rim mostly lies between two samples: the pressure falls to zero there, not at the sample beyond.
+        // The rim mostly lies between two samples: the pressure falls to zero there, not at the
+        // sample beyond.
         let last = self.radius_m[k + 1];
         let end = if q1 == 0.0 {
             last.min(self.contact_radius_m)
@@ -450,7 +466,8 @@ impl ContactState {
         (q0 + t * (q1 - q0)).sqrt()
     }
 
-    /// Height at a distance from the axis, in metres. Beyond the last sample it falls off as 1/r, a point load's displacement.
+    /// Height at a distance from the axis, in metres. Beyond the last sample it falls off as 1/r, a
+    /// point load's displacement.
     pub(crate) fn height_at_m(&self, r_m: f64) -> f64 {
         let last = self.radius_m.len() - 1;
         if r_m > self.radius_m[last] {
@@ -469,9 +486,10 @@ impl ContactState {
             .fold(0.0, f64::max)
     }
 
-    /// The state at `force_n` > 0 among `states` of growing force: one of them where the force is its own, else between
-    /// two of them, with a, p over its mean, z/F^⅔ and δ/F^⅔ linear in F^⅓. Below
-    /// the first, that one shrunk by Hertz's scaling, a ∝ F^⅓ and z ∝ F^⅔. None above the last.
+    /// The state at `force_n` > 0 among `states` of growing force: one of them where the force is
+    /// its own, else between two of them, with a, p over its mean, z/F^⅔ and δ/F^⅔ linear in F^⅓.
+    /// Below the first, that one shrunk by Hertz's scaling, a ∝ F^⅓ and z ∝ F^⅔. None above the
+    /// last.
     pub(crate) fn at_force(states: &[Self], force_n: f64) -> Option<Self> {
         let next = states.partition_point(|s| s.force_n < force_n * (1.0 - EQUAL_FORCES));
         let upper = states.get(next)?;
@@ -537,18 +555,17 @@ impl ContactState {
     }
 }
 
-/// A row a point: the ball's modulus and radius, its guide's layers, force, contact radius and approach of its state, then distance,
-/// pressure and height. Made by `examples/contact_states.rs`.
+/// A row a point: the ball's modulus and radius, its guide's layers, force, contact radius and
+/// approach of its state, then distance, pressure and height. Made by `examples/contact_states.rs`.
 const POINTS: &str = include_str!("finite_elements.csv");
 
-/// R of the balls.
-const RADIUS_M: f64 = 3e-3;
-
-/// The states of a ball on a waveguide, of growing force; None for bodies that were not computed.
+/// The states of a ball on a waveguide, of growing force. None for bodies that were not computed.
 pub fn finite_element_states(
     sphere: &ElasticSphere,
     waveguide: &LightGuide,
 ) -> Option<Vec<ContactState>> {
+    // R of the balls.
+    let radius_m_limit = 3e-3;
     let known = [Elastic::CL2000X, Elastic::CL2003X].contains(&sphere.material);
     let elastic = |w: &LightGuide| -> Vec<(f64, Elastic)> {
         w.layers
@@ -557,7 +574,7 @@ pub fn finite_element_states(
             .collect()
     };
     let same_guide = elastic(waveguide) == elastic(&LightGuide::default());
-    if !known || !same_guide || sphere.radius_m != RADIUS_M {
+    if !known || !same_guide || sphere.radius_m != radius_m_limit {
         return None;
     }
     let mut states: Vec<ContactState> = Vec::new();

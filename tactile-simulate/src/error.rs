@@ -52,7 +52,8 @@ pub enum SimulateError {
         /// Entries given.
         found: usize,
     },
-    /// A frame of the calibration is too bright for the camera: its sum would not be in proportion to the force.
+    /// A frame of the calibration is too bright for the camera: its sum would not be in proportion
+    /// to the force.
     #[error(
         "at {force_n} N the calibration's indenter lights pixels beyond the camera's range: take a larger indenter, or a smaller force"
     )]
@@ -69,9 +70,6 @@ pub enum SimulateError {
         limit_n: f64,
     },
 }
-
-/// Smallest value called positive: far below any length, modulus or count in use.
-const TINY: f64 = f64::MIN_POSITIVE;
 
 /// A limit to six significant digits: more say nothing to a reader.
 fn six_digits(limit: f64) -> f64 {
@@ -112,7 +110,9 @@ pub fn within(
 
 /// Positive and finite.
 pub fn positive(field: &'static str, found: f64) -> Result<(), SimulateError> {
-    within(field, found, TINY, f64::MAX)
+    // Smallest value called positive: far below any length, modulus or count in use.
+    let tiny = f64::MIN_POSITIVE;
+    within(field, found, tiny, f64::MAX)
 }
 
 /// Zero or positive, and finite.

@@ -1,4 +1,5 @@
-//! A scene written as the files that the command line reads: images, calibration table and scene description.
+//! A scene written as the files that the command line reads: images, calibration table and scene
+//! description.
 
 use crate::calibration::CalibrationSeries;
 use crate::contact::ContactModel;
@@ -7,8 +8,9 @@ use std::path::{Path, PathBuf};
 use tactile_imaging::io::{ReadError, write_bytes, write_grey_image};
 use toml::{Table, Value};
 
-/// Writes a scene and a calibration of its sensor as files: `reference.png`, `frame_1.png` …, `calibration.csv` (columns `integrated_pixel_value,force_N`) and `scene.toml`
-/// to `folder`, which is made if need be. Returns the path of `scene.toml`.
+/// Writes a scene and a calibration of its sensor as files: `reference.png`, `frame_1.png` …,
+/// `calibration.csv` (columns `integrated_pixel_value,force_N`) and `scene.toml` to `folder`, which
+/// is made if need be. Returns the path of `scene.toml`.
 ///
 /// ```
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {

@@ -1,9 +1,9 @@
 #![doc = include_str!("../README.md")]
 //!
 //! # Overview
-//! A scene goes forward only: force → contact pressure → light → photons → 8-bit frame. But for finite
-//! elements it shares no code with the measuring crates, so that a measurement of a simulated frame is a
-//! test and not a tautology.
+//! A scene goes forward only: force → contact pressure → light → photons → 8-bit frame. But for
+//! finite elements it shares no code with the measuring crates, so that a measurement of a
+//! simulated frame is a test and not a tautology.
 //!
 //! | module | contents |
 //! |---|---|
@@ -19,20 +19,20 @@
 //! | `folder` | a scene written as files (feature `scene`) |
 //!
 //! # Conventions
-//! Images are `[row, column]`; x is the column, y the row, z points from the sensor to the object. The centre of the
-//! first pixel is (0, 0). SI units, except where a name ends in `_px` or `_grey`.
+//! Images are `[row, column]`. X is the column, y the row, z points from the sensor to the object.
+//! The centre of the first pixel is (0, 0). SI units, except where a name ends in `_px` or `_grey`.
 //!
 //! # Scale of the default frame
-//! The paper gives a pixel of 4.65 µm and a sensing side of 30 mm seen by 1392 pixels; both cannot hold on the
-//! sensing surface (30 mm / 4.65 µm = 6452). They do hold together when 4.65 µm is the pitch on the camera chip and
-//! the lens reduces 30 mm to the chip's 6.47 mm (magnification 0.216). The pixel on the *surface* is then
-//! 30 mm / 1392 = 21.55 µm, which is [`Camera::default`]'s.
+//! The paper gives a pixel of 4.65 µm and a sensing side of 30 mm seen by 1392 pixels. Both cannot
+//! hold on the sensing surface (30 mm / 4.65 µm = 6452). They do hold together when 4.65 µm is the
+//! pitch on the camera chip and the lens reduces 30 mm to the chip's 6.47 mm (magnification 0.216).
+//! The pixel on the *surface* is then 30 mm / 1392 = 21.55 µm, which is [`Camera::default`]'s.
 //!
 //! # Reproducibility
-//! Random numbers come from ChaCha8 (a published algorithm whose stream is fixed by its definition, unlike `StdRng`
-//! and `SmallRng`, which may change with any release of `rand`), turned into normal deviates by the ziggurat of
-//! `rand_distr`. Each row of each frame has its own stream, so frames can be made in any order, alone or in
-//! parallel, with the same bits.
+//! Random numbers come from ChaCha8 (a published algorithm whose stream is fixed by its definition,
+//! unlike `StdRng` and `SmallRng`, which may change with any release of `rand`), turned into normal
+//! deviates by the ziggurat of `rand_distr`. Each row of each frame has its own stream, so frames
+//! can be made in any order, alone or in parallel, with the same bits.
 #![forbid(unsafe_code)]
 
 mod calibration;

@@ -6,9 +6,9 @@ use crate::contact::SimulatedContact;
 use crate::error::{SimulateError, finite, not_negative, within};
 use crate::pixel_average::{Disc, Patch, Plane, Profile, Window};
 
-/// Light that leaks under pressure p, relative to the gain g in grey levels per pascal. All are monotone up to the
-/// largest peak pressure p_max of the scene. Hertz's pressure under the first two is averaged over pixels exactly, everything
-/// else by quadrature (1e-4 of the light).
+/// Light that leaks under pressure p, relative to the gain g in grey levels per pascal. All are
+/// monotone up to the largest peak pressure p_max of the scene. Hertz's pressure under the first
+/// two is averaged over pixels exactly, everything else by quadrature (1e-4 of the light).
 ///
 /// ```
 /// use tactile_simulate::{Camera, PressOptions, PressScene, Response};
@@ -39,8 +39,8 @@ pub enum Response {
         /// κ, the share of light lost at p_max.
         droop: f64,
     },
-    /// g·p_max·(p/p_max)ⁿ, n in 0.25 to 4: light that is no longer in proportion to the pressure, so that the frame's sum depends
-    /// on how the force is spread.
+    /// g·p_max·(p/p_max)ⁿ, n in 0.25 to 4: light that is no longer in proportion to the pressure,
+    /// so that the frame's sum depends on how the force is spread.
     Power {
         /// n, 1 for [`Linear`](Self::Linear).
         exponent: f64,
@@ -73,7 +73,8 @@ impl Response {
     }
 }
 
-/// Illumination of one frame, relative to the reference frame: it scales background and leaked light alike.
+/// Illumination of one frame, relative to the reference frame: it scales background and leaked
+/// light alike.
 ///
 /// ```
 /// use tactile_simulate::{Camera, Illumination, PressLoad, PressOptions, PressScene};
@@ -91,7 +92,8 @@ impl Response {
 pub struct Illumination {
     /// Brightness, 1 for unchanged.
     pub level: f64,
-    /// Relative change of brightness from the frame's first to its last column (x) and row (y); 0 for unchanged.
+    /// Relative change of brightness from the frame's first to its last column (x) and row (y). 0
+    /// for unchanged.
     pub tilt: [f64; 2],
 }
 

@@ -1,13 +1,15 @@
 //! Averages of the contact's pressure over pixels, exact also at the rim.
 //!
-//! A pixel sees the mean of the light over its square, not the value at its centre. With
-//! G(x, y) = ∫₀ˣ∫₀ʸ f(s² + t²) ds dt the integral over a pixel is the inclusion–exclusion sum of G at its corners; summed
-//! over all pixels the inner corners cancel, so the frame's sum is the force. In units of the contact radius
+//! A pixel sees the mean of the light over its square, not the value at its centre. With G(x, y) =
+//! ∫₀ˣ∫₀ʸ f(s² + t²) ds dt the integral over a pixel is the inclusion–exclusion sum of G at its
+//! corners. Summed over all pixels the inner corners cancel, so the frame's sum is the force. In
+//! units of the contact radius
 //!
 //! * f = √(1 − ρ²): 6G = 2xyz + x(3 − x²) atan(y/z) + y(3 − y²) atan(x/z) − 2 atan(xy/z), z = √(1 − x² − y²)
 //! * f = 1 − ρ²:    G = xy(1 − (x² + y²)/3)
 //!
-//! inside; outside the disc, G is the quarter disc's integral less the two caps beyond x and beyond y.
+//! inside. Outside the disc, G is the quarter disc's integral less the two caps beyond x and beyond
+//! y.
 //!
 //! Pixel averages of any function of the distance from the contact's centre, by quadrature.
 //!
@@ -76,8 +78,8 @@ pub struct Disc {
 }
 
 impl Disc {
-    /// Rows and columns (first, one past the last) that the disc touches, widened by `margin` pixels and cut to what
-    /// lies within `margin` of a frame of `shape`.
+    /// Rows and columns (first, one past the last) that the disc touches, widened by `margin`
+    /// pixels and cut to what lies within `margin` of a frame of `shape`.
     pub fn window(&self, shape: [usize; 2], margin: usize) -> Window {
         let span = |axis: usize, length: usize| {
             let radius_px = self.radius_m / self.pixel_size_m[axis];
@@ -121,8 +123,8 @@ impl Disc {
     }
 }
 
-/// First and one past the last of the pixels along one axis that lie within `half` of `centre`, widened by `margin` and cut to what lies
-/// within `margin` of a frame of `length` pixels.
+/// First and one past the last of the pixels along one axis that lie within `half` of `centre`,
+/// widened by `margin` and cut to what lies within `margin` of a frame of `length` pixels.
 pub fn touched(centre: f64, half: f64, length: usize, margin: usize) -> [isize; 2] {
     let margin = margin as isize;
     let limit = length as isize + margin;
@@ -135,8 +137,9 @@ pub fn touched(centre: f64, half: f64, length: usize, margin: usize) -> [isize; 
     [first, last]
 }
 
-/// Where the pixel is smaller than this share of 1 − ρ², quadrature of order 8 is exact to rounding: its error falls as
-/// the eighth power of that ratio. It spares the corners' cancellation, which grows as (radius/pixel)², and their cost.
+/// Where the pixel is smaller than this share of 1 − ρ², quadrature of order 8 is exact to
+/// rounding: its error falls as the eighth power of that ratio. It spares the corners'
+/// cancellation, which grows as (radius/pixel)², and their cost.
 pub const SMOOTH: f64 = 0.03;
 
 /// Nodes and weights of the four-point Gauss–Legendre rule on (−½, ½).
@@ -215,7 +218,8 @@ impl<'a> Corners<'a> {
         }
     }
 
-    /// Moves on to the row between `above` and `below`; the corners between it and the last row are kept.
+    /// Moves on to the row between `above` and `below`. The corners between it and the last row are
+    /// kept.
     fn next_row(&mut self, above: f64, below: f64) {
         self.ys = [above, below];
         std::mem::swap(&mut self.above, &mut self.below);
@@ -265,25 +269,28 @@ fn paraboloid_cap(x: f64) -> f64 {
     (1.5 * x.acos() - x * s * (2.5 - x * x)) / 6.0
 }
 
-/// Pixels this close to the rim, in pixels, are averaged over a fine grid: pressures fall to zero there as a square root.
-const RIM_ZONE: f64 = 3.0;
-/// Steps a side in a pixel at the rim. Twice as many change the light of a contact of 20 pixels by 2e-5.
-const RIM_STEPS: f64 = 16.0;
-/// Least steps in the contact's radius, for contacts below a pixel.
-const STEPS_IN_RADIUS: f64 = 24.0;
-/// Bound on the steps a side, for contacts far below a pixel, whose light nobody sees.
-const MOST_STEPS: f64 = 512.0;
-
 impl Disc {
-    /// Pixel averages over `window` of `value`, a function of the distance from the centre in metres that is zero from the rim on.
+    /// Pixel averages over `window` of `value`, a function of the distance from the centre in
+    /// metres that is zero from the rim on.
     ///
-    /// Four by four Gauss nodes inside; at the rim 16 by 16 midpoints, with an error of some 1e-5 of the light.
+    /// Four by four Gauss nodes inside. At the rim 16 by 16 midpoints, with an error of some 1e-5
+    /// of the light.
     pub fn average_radial(&self, window: Window, value: impl Fn(f64) -> f64) -> Patch {
+        // Bound on the steps a side, for contacts far below a pixel, whose light nobody sees.
+        let most_steps = 512.0;
+        // Least steps in the contact's radius, for contacts below a pixel.
+        let steps_in_radius = 24.0;
+        // Steps a side in a pixel at the rim. Twice as many change the light of a contact of 20
+        // pixels by 2e-5.
+        let rim_steps = 16.0;
+        // Pixels this close to the rim, in pixels, are averaged over a fine grid: pressures fall to
+        // zero there as a square root.
+        let rim_zone = 3.0;
         let [[row0, row1], [col0, col1]] = window;
         let [width, height] = self.pixel_size_m;
-        let smooth_below = self.radius_m - RIM_ZONE * width.max(height);
-        let least = (STEPS_IN_RADIUS * width.max(height) / self.radius_m).ceil();
-        let steps = least.clamp(RIM_STEPS, MOST_STEPS) as usize;
+        let smooth_below = self.radius_m - rim_zone * width.max(height);
+        let least = (steps_in_radius * width.max(height) / self.radius_m).ceil();
+        let steps = least.clamp(rim_steps, most_steps) as usize;
         let midpoints: Vec<(f64, f64)> = (0..steps)
             .map(|k| ((k as f64 + 0.5) / steps as f64 - 0.5, 1.0 / steps as f64))
             .collect();
@@ -325,7 +332,8 @@ impl Disc {
 pub struct Plane {
     pub middle_px: [f64; 2],
     pub pixel_size_m: [f64; 2],
-    /// d = e (1 + bend e²), e the distance at which a place is seen, in metres of the frame's middle.
+    /// d = e (1 + bend e²), e the distance at which a place is seen, in metres of the frame's
+    /// middle.
     pub bend: f64,
 }
 
@@ -344,7 +352,8 @@ impl Plane {
     /// The pixel that shows a place, in metres from the frame's middle.
     fn to_pixel(self, metres: [f64; 2]) -> [f64; 2] {
         let distance = metres[0].hypot(metres[1]);
-        // Newton's method on e (1 + bend e²) = d: the slope is positive wherever the image does not fold.
+        // Newton's method on e (1 + bend e²) = d: the slope is positive wherever the image does not
+        // fold.
         let mut seen = distance;
         for _ in 0..20 {
             let square = self.bend * seen * seen;
@@ -355,13 +364,9 @@ impl Plane {
     }
 }
 
-/// Steps a side in a pixel near the rim; twice as many change the light by some 10⁻⁴ of the rim's pixels.
-const BENT_RIM_STEPS: usize = 8;
-/// Pixels this close to the rim, in pixels, are averaged over the fine grid.
-const BENT_RIM_ZONE: f64 = 2.0;
-
 impl Disc {
-    /// Metres from the frame's middle to the contact's: `centre_px` is where it would be seen without distortion.
+    /// Metres from the frame's middle to the contact's: `centre_px` is where it would be seen
+    /// without distortion.
     fn place(&self, plane: Plane) -> [f64; 2] {
         std::array::from_fn(|k| (self.centre_px[k] - plane.middle_px[k]) * self.pixel_size_m[k])
     }
@@ -393,16 +398,21 @@ impl Disc {
 
     /// [`average_radial`](Self::average_radial) behind a lens that distorts.
     pub fn average_bent(&self, plane: Plane, window: Window, value: impl Fn(f64) -> f64) -> Patch {
+        // Pixels this close to the rim, in pixels, are averaged over the fine grid.
+        let bent_rim_zone = 2.0;
+        // Steps a side in a pixel near the rim; twice as many change the light by some 10⁻⁴ of the
+        // rim's pixels.
+        let bent_rim_steps: usize = 8;
         let [[row0, row1], [col0, col1]] = window;
         let centre = self.place(plane);
         let distance = |pixel: [f64; 2]| {
             let place = plane.to_metres(pixel);
             (place[0] - centre[0]).hypot(place[1] - centre[1])
         };
-        let reach = BENT_RIM_ZONE * self.pixel_size_m[0].max(self.pixel_size_m[1]);
-        let fine: Vec<(f64, f64)> = (0..BENT_RIM_STEPS)
+        let reach = bent_rim_zone * self.pixel_size_m[0].max(self.pixel_size_m[1]);
+        let fine: Vec<(f64, f64)> = (0..bent_rim_steps)
             .map(|k| {
-                let steps = BENT_RIM_STEPS as f64;
+                let steps = bent_rim_steps as f64;
                 ((k as f64 + 0.5) / steps - 0.5, 1.0 / steps)
             })
             .collect();

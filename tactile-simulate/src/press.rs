@@ -83,14 +83,14 @@ impl PressScene {
         self.light.grey_per_pascal
     }
 
-    /// An exposure without contact; each `repeat` has its own noise.
+    /// An exposure without contact. Each `repeat` has its own noise.
     pub fn reference(&self, repeat: u32) -> Array2<u8> {
         self.options
             .camera
             .expose_reference(self.options.seed, repeat)
     }
 
-    /// An exposure of load `load`; each `repeat` has its own noise.
+    /// An exposure of load `load`. Each `repeat` has its own noise.
     ///
     /// # Panics
     /// If there is no such load.
@@ -101,8 +101,8 @@ impl PressScene {
             .expose_load(light.view(), self.options.seed, load, repeat)
     }
 
-    /// Expected grey levels of load `load`, before noise and rounding. Pass it to [`Camera::expose`](crate::Camera::expose) to draw many
-    /// exposures of the same light.
+    /// Expected grey levels of load `load`, before noise and rounding. Pass it to
+    /// [`Camera::expose`](crate::Camera::expose) to draw many exposures of the same light.
     ///
     /// ```
     /// use tactile_simulate::{Camera, PressOptions, PressScene};
@@ -138,7 +138,8 @@ impl PressScene {
         self.with_object(object, law, vec![load])
     }
 
-    /// Another object on the same sensor, with the same light, camera and centre: a calibration's balls, for instance.
+    /// Another object on the same sensor, with the same light, camera and centre: a calibration's
+    /// balls, for instance.
     ///
     /// ```
     /// use tactile_simulate::{Camera, ContactModel, Elastic, PressLoad, PressOptions, PressScene, ElasticSphere};
@@ -197,7 +198,7 @@ impl PressScene {
         }
     }
 
-    /// Blurred light of the contact in grey levels above the background; none without force.
+    /// Blurred light of the contact in grey levels above the background. None without force.
     fn leaked_light(&self, load: usize) -> Option<Patch> {
         let (disc, camera) = (self.disc(load), &self.options.camera);
         if disc.radius_m == 0.0 {
@@ -234,7 +235,7 @@ impl PressScene {
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Elastic {
-    /// Young's modulus in pascal; infinite for a rigid body.
+    /// Young's modulus in pascal. Infinite for a rigid body.
     pub youngs_modulus_pa: f64,
     /// Poisson's ratio, in (−1, 0.5].
     pub poisson_ratio: f64,
@@ -351,9 +352,9 @@ pub struct LightGuide {
 }
 
 impl Default for LightGuide {
-    /// Epidermis, dermis and subcutanea of the paper (§2.2): PDMS of 2, 3 and 5 mm with indices 1.41, 1.40 and 1.39
-    /// and moduli 1.36×10⁵, 8.0×10⁴ and 3.4×10⁴ Pa (the paper prints 1.4×10² Pa for the first, calling it the
-    /// stiffest; its source has 1.36×10⁵).
+    /// Epidermis, dermis and subcutanea of the paper (§2.2): PDMS of 2, 3 and 5 mm with indices
+    /// 1.41, 1.40 and 1.39 and moduli 1.36×10⁵, 8.0×10⁴ and 3.4×10⁴ Pa (the paper prints 1.4×10² Pa
+    /// for the first, calling it the stiffest; its source has 1.36×10⁵).
     fn default() -> Self {
         let layer = |refractive_index, thickness_m, youngs_modulus_pa| WaveguideLayer {
             refractive_index,
@@ -374,8 +375,8 @@ impl Default for LightGuide {
 }
 
 impl LightGuide {
-    /// The stack seen as one material: the layers in series, E = Σh / Σ(h/E), and Poisson's ratio averaged by
-    /// thickness (0.5 for the paper's stack).
+    /// The stack seen as one material: the layers in series, E = Σh / Σ(h/E), and Poisson's ratio
+    /// averaged by thickness (0.5 for the paper's stack).
     pub(crate) fn series(&self) -> Elastic {
         let height = self.thickness_m();
         let compliance: f64 = self
@@ -430,15 +431,16 @@ impl LightGuide {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum Gain {
-    /// The largest load's peak pressure lies so many grey levels above the background (before vignetting).
+    /// The largest load's peak pressure lies so many grey levels above the background (before
+    /// vignetting).
     PeakGrey(f64),
     /// Fixed: grey levels per pascal. Use it to share one calibration among scenes.
     GreyPerPascal(f64),
 }
 
 impl Gain {
-    /// Grey levels per pascal in a scene whose brightest place shows the light of `largest_pa`; 0 where a peak is asked for and nothing is
-    /// lit.
+    /// Grey levels per pascal in a scene whose brightest place shows the light of `largest_pa`. 0
+    /// where a peak is asked for and nothing is lit.
     pub(crate) fn grey_per_pascal(self, largest_pa: f64) -> f64 {
         match self {
             Self::GreyPerPascal(gain) => gain,
@@ -471,7 +473,8 @@ impl Gain {
 pub struct PressLoad {
     /// Normal force in newton.
     pub force_n: f64,
-    /// Shear force (x, y) in newton; it moves the contact by force over [`PressOptions::shear_stiffness_n_per_m`].
+    /// Shear force (x, y) in newton. It moves the contact by force over
+    /// [`PressOptions::shear_stiffness_n_per_m`].
     pub shear_n: [f64; 2],
     /// Illumination, relative to the reference frame.
     pub illumination: Illumination,
@@ -488,7 +491,7 @@ impl PressLoad {
     }
 }
 
-/// Everything that describes a press; [`PressScene::new`](crate::PressScene::new) checks it.
+/// Everything that describes a press. [`PressScene::new`](crate::PressScene::new) checks it.
 ///
 /// ```
 /// use tactile_simulate::{Camera, Elastic, PressLoad, PressOptions, PressScene, ElasticSphere};
@@ -515,7 +518,7 @@ pub struct PressOptions {
     pub law: ContactModel,
     /// Loads, a frame each.
     pub loads: Vec<PressLoad>,
-    /// Centre (x, y) of the unsheared contact in pixels; the frame's middle if not given.
+    /// Centre (x, y) of the unsheared contact in pixels. The frame's middle if not given.
     pub centre_px: Option<[f64; 2]>,
     /// K_x, K_y of F_x = K_x u_x, F_y = K_y u_y in newton per metre.
     pub shear_stiffness_n_per_m: [f64; 2],
@@ -530,11 +533,12 @@ pub struct PressOptions {
 }
 
 impl Default for PressOptions {
-    /// The paper's experiment (§5): a CL2000X sphere of 3 mm radius at 0.7 N and 1.2 N. The brightest pixel expected is
-    /// 15 + 200 of 255 grey levels: 40 levels, twenty times its noise, are left before saturation.
+    /// The paper's experiment (§5): a CL2000X sphere of 3 mm radius at 0.7 N and 1.2 N. The
+    /// brightest pixel expected is 15 + 200 of 255 grey levels: 40 levels, twenty times its noise,
+    /// are left before saturation.
     ///
-    /// Hertz's a/R is 1.09 and 1.30 there, far outside small contact; for scenes inside Hertz's range, take a
-    /// larger sphere or smaller loads.
+    /// Hertz's a/R is 1.09 and 1.30 there, far outside small contact. For scenes inside Hertz's
+    /// range, take a larger sphere or smaller loads.
     fn default() -> Self {
         Self {
             object: ElasticSphere {
@@ -643,13 +647,13 @@ pub struct PressTruth {
     pub load: PressLoad,
     /// Centre (x, y) of the contact in pixels.
     pub centre_px: [f64; 2],
-    /// Centroid (x, y) of the pressure that lies in the frame, by pixel averages: the centre to some 1e-5 px, unless
-    /// the contact is cut by the frame's edge. NaN when nothing is visible.
+    /// Centroid (x, y) of the pressure that lies in the frame, by pixel averages: the centre to
+    /// some 1e-5 px, unless the contact is cut by the frame's edge. NaN when nothing is visible.
     pub centroid_px: [f64; 2],
     /// The force that acts inside the frame, in newton.
     pub visible_force_n: f64,
-    /// Sum over the frame of leaked light in grey levels, without blur, lens, noise and clipping: (grey/Pa)·F/pixel area
-    /// for a linear response.
+    /// Sum over the frame of leaked light in grey levels, without blur, lens, noise and clipping:
+    /// (grey/Pa)·F/pixel area for a linear response.
     pub integrated_pixel_value: f64,
     /// Grey levels per pascal (at small pressure).
     pub grey_per_pascal: f64,
@@ -690,7 +694,8 @@ impl PressTruth {
         truth
     }
 
-    /// Pressure in pascal, averaged over each pixel; its sum times the pixel's area is the visible force.
+    /// Pressure in pascal, averaged over each pixel. Its sum times the pixel's area is the visible
+    /// force.
     pub fn pressure_pa(&self) -> Array2<f64> {
         let mut field = Array2::zeros(self.shape);
         if self.contact.contact_radius_m > 0.0 {
@@ -700,7 +705,8 @@ impl PressTruth {
         field
     }
 
-    /// Height of the apparent surface in metres at pixel centres (see [`SimulatedContact::apparent_height_m`]).
+    /// Height of the apparent surface in metres at pixel centres (see
+    /// [`SimulatedContact::apparent_height_m`]).
     pub fn apparent_height_m(&self) -> Array2<f64> {
         Array2::from_shape_fn(self.shape, |(row, col)| {
             let [x, y] = self.offset_m(row, col);
@@ -708,7 +714,8 @@ impl PressTruth {
         })
     }
 
-    /// Vertical displacement in metres of the waveguide's surface at pixel centres, negative under the object.
+    /// Vertical displacement in metres of the waveguide's surface at pixel centres, negative under
+    /// the object.
     pub fn waveguide_height_m(&self) -> Array2<f64> {
         Array2::from_shape_fn(self.shape, |(row, col)| {
             let [x, y] = self.offset_m(row, col);
@@ -769,7 +776,7 @@ impl PressTruth {
     }
 }
 
-/// Pixels whose expected grey level exceeds 255; the frame is made only where one can.
+/// Pixels whose expected grey level exceeds 255. The frame is made only where one can.
 fn saturated_pixels(scene: &PressScene, load: usize) -> usize {
     let (options, illumination) = (scene.options(), scene.options().loads[load].illumination);
     let peak = scene.contact(load).peak_pressure_pa;
@@ -785,10 +792,12 @@ fn saturated_pixels(scene: &PressScene, load: usize) -> usize {
         .count()
 }
 
-/// The map that takes the apparent surface of one load to that of another: it scales about the contact's centre.
+/// The map that takes the apparent surface of one load to that of another: it scales about the
+/// contact's centre.
 ///
-/// The surface read from a press follows Hertz's law, or nearly: a hemisphere of the contact's radius, which grows by (F₂/F₁)^⅓ whatever the
-/// object's modulus. Its strain says nothing about the modulus. At finite strain the surface grows less along z than across.
+/// The surface read from a press follows Hertz's law, or nearly: a hemisphere of the contact's
+/// radius, which grows by (F₂/F₁)^⅓ whatever the object's modulus. Its strain says nothing about
+/// the modulus. At finite strain the surface grows less along z than across.
 ///
 /// ```
 /// use nalgebra::Point3;

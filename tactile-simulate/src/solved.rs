@@ -5,11 +5,9 @@ use crate::error::{SimulateError, at_least, positive};
 use crate::press::Elastic;
 use tactile_imaging::fem::{AppliedLoad, FemScene, Interface, Material, State};
 
-/// ν = ½ has no finite bulk modulus; at this one the volume changes by less than 1e-4 of the pressure over E.
-const LARGEST_POISSON_RATIO: f64 = 0.4999;
-
 impl ContactState {
-    /// A state that the solver of `tactile-elasticity` found of a ball, a cone or another object with a free rim; `None` without contact.
+    /// A state that the solver of `tactile-elasticity` found of a ball, a cone or another object
+    /// with a free rim. `None` without contact.
     ///
     /// The samples are the contact's nodes and its rim, at which the pressure is 0.
     ///
@@ -43,11 +41,15 @@ impl ContactState {
         Some(contact)
     }
 
-    /// The face of a cylinder squeezed between two rigid plates on which its faces slide or to which they stick, neo-Hookean and at finite strain: a state
-    /// for each force, for [`ContactModel::Tabulated`](crate::ContactModel::Tabulated). Solved anew at each call, some 0.1 s a state: keep the states.
+    /// The face of a cylinder squeezed between two rigid plates on which its faces slide or to
+    /// which they stick, neo-Hookean and at finite strain: a state for each force, for
+    /// [`ContactModel::Tabulated`](crate::ContactModel::Tabulated). Solved anew at each call, some
+    /// 0.1 s a state: keep the states.
     ///
-    /// Sliding, the state is homogeneous, as in a [`UniaxialScene`](crate::UniaxialScene) but for the material law; sticking, the face keeps its size, and
-    /// the pressure is higher in the middle of a flat cylinder and at the rim of a tall one. Blocks whose face is no disc have the homogeneous state alone.
+    /// Sliding, the state is homogeneous, as in a [`UniaxialScene`](crate::UniaxialScene) but for
+    /// the material law. Sticking, the face keeps its size, and the pressure is higher in the
+    /// middle of a flat cylinder and at the rim of a tall one. Blocks whose face is no disc have
+    /// the homogeneous state alone.
     ///
     /// ```
     /// use tactile_imaging::fem::Interface;
@@ -72,6 +74,9 @@ impl ContactState {
         faces: Interface,
         forces_n: &[f64],
     ) -> Result<Vec<Self>, SimulateError> {
+        // ν = ½ has no finite bulk modulus; at this one the volume changes by less than 1e-4 of the
+        // pressure over E.
+        let largest_poisson_ratio = 0.4999;
         positive("radius_m", radius_m)?;
         positive("height_m", height_m)?;
         material.validate()?;
@@ -82,7 +87,7 @@ impl ContactState {
             positive("force_n", force_n - last_n)?;
             last_n = force_n;
         }
-        let poisson_ratio = material.poisson_ratio.min(LARGEST_POISSON_RATIO);
+        let poisson_ratio = material.poisson_ratio.min(largest_poisson_ratio);
         let unsolved = |limit_n: f64| SimulateError::Overload {
             force_n: last_n,
             limit_n,

@@ -25,7 +25,7 @@ use tactile_imaging::pipeline::FrameSource;
 pub struct LoadCycle {
     /// Largest force F_max in newton.
     pub largest_force_n: f64,
-    /// Largest shear force (x, y) in newton; it follows the normal force.
+    /// Largest shear force (x, y) in newton. It follows the normal force.
     pub largest_shear_n: [f64; 2],
     /// Time T of one cycle in seconds.
     pub period_s: f64,
@@ -42,7 +42,8 @@ pub struct LoadCycle {
 }
 
 impl Default for LoadCycle {
-    /// One cycle of one second to 1.2 N after a tenth of a second of rest, at the paper's 80 frames per second.
+    /// One cycle of one second to 1.2 N after a tenth of a second of rest, at the paper's 80 frames
+    /// per second.
     fn default() -> Self {
         Self {
             largest_force_n: 1.2,
@@ -100,7 +101,8 @@ pub struct FrameStream {
 }
 
 impl PressScene {
-    /// The frames of `cycle` with this scene's object, sensor, light and gain (its own loads set the gain only).
+    /// The frames of `cycle` with this scene's object, sensor, light and gain (its own loads set
+    /// the gain only).
     ///
     /// ```
     /// use tactile_simulate::{Camera, LoadCycle, PressOptions, PressScene};

@@ -9,7 +9,8 @@ use tactile_imaging::force::CalibrationPair;
 use tactile_imaging::pipeline::{EstimatorChoice, PipelineError, StagesConfig};
 use tactile_imaging::{Object, Pipeline, Press};
 
-/// A simulated press with the calibration of its sensor: the frames to measure and the truth to compare with.
+/// A simulated press with the calibration of its sensor: the frames to measure and the truth to
+/// compare with.
 ///
 /// ```
 /// use tactile_simulate::{Trial, CalibrationRun, Camera, PressOptions};
@@ -32,8 +33,9 @@ pub struct Trial {
 }
 
 impl Trial {
-    /// Simulates a calibration series and the press itself. Where the calibration's ball saturates the camera, one of two, four, eight or sixteen times
-    /// its radius takes its place: a gain that suits the low pressure of a large or soft object is too high for a small rigid ball.
+    /// Simulates a calibration series and the press itself. Where the calibration's ball saturates
+    /// the camera, one of two, four, eight or sixteen times its radius takes its place: a gain that
+    /// suits the low pressure of a large or soft object is too high for a small rigid ball.
     ///
     /// # Errors
     /// [`SimulateError`] for options that have no meaning.
@@ -49,9 +51,11 @@ impl Trial {
         })
     }
 
-    /// The default pipeline for the simulated sensor: it knows the calibration, the pixel size, the ball's radius and the
-    /// waveguide, and nothing of the truth. Where the scene obeys a closed form (Hertz, Tatara), the estimator is Hertz's with the layers in series
-    /// ([`EstimatorChoice::Sphere`]), whose law the truth shares; where its contacts come from elsewhere, the default.
+    /// The default pipeline for the simulated sensor: it knows the calibration, the pixel size, the
+    /// ball's radius and the waveguide, and nothing of the truth. Where the scene obeys a closed
+    /// form (Hertz, Tatara), the estimator is Hertz's with the layers in series
+    /// ([`EstimatorChoice::Sphere`]), whose law the truth shares. Where its contacts come from
+    /// elsewhere, the default.
     ///
     /// # Errors
     /// [`PipelineError`].

@@ -1,28 +1,32 @@
-//! A plain or patterned block or cylinder squeezed between two plates without friction: the case for which the paper's ratio (31),
-//! E = S_zz / mean e_zz, is exact.
+//! A plain or patterned block or cylinder squeezed between two plates without friction: the case
+//! for which the paper's ratio (31), E = S_zz / mean e_zz, is exact.
 //!
-//! The deformation is homogeneous, x = λ_t X, y = λ_t Y, z = λ_z Z, and the material obeys S = E·e in uniaxial stress, with
-//! S the second Piola–Kirchhoff stress and e the Green–Lagrange strain (St. Venant–Kirchhoff):
+//! The deformation is homogeneous, x = λ_t X, y = λ_t Y, z = λ_z Z, and the material obeys S = E·e
+//! in uniaxial stress, with S the second Piola–Kirchhoff stress and e the Green–Lagrange strain
+//! (St. Venant–Kirchhoff):
 //!
 //! * e_zz = ½(λ_z² − 1), e_xx = e_yy = −ν e_zz, hence λ_t = √(1 − 2ν e_zz);
 //! * S_zz = E e_zz; force F = −λ_z S_zz A₀; Cauchy's stress σ = λ_z S_zz/λ_t².
 //!
-//! From state 1 to state 2, with state 1 as the reference, e₁₂ = (e₂ − e₁)/λ₁² and S₁₂ = (S₂ − S₁)/λ₁² have the ratio E again.
+//! From state 1 to state 2, with state 1 as the reference, e₁₂ = (e₂ − e₁)/λ₁² and S₁₂ = (S₂ −
+//! S₁)/λ₁² have the ratio E again.
 //!
-//! In small strain all the stresses agree; at 10 % they differ by as much. The force has a greatest value,
-//! E A₀/(3√3) at λ_z = 1/√3, where this material law ends.
+//! In small strain all the stresses agree. At 10 % they differ by as much. The force has a greatest
+//! value, E A₀/(3√3) at λ_z = 1/√3, where this material law ends.
 //!
 //! The frame shows pressure in proportion to the pattern's height, normalised to carry the force.
 //!
 //! What describes the squeezed block: material, face, forces, light and camera.
 //!
-//! Stretch, strain and stress of the squeezed block in closed form; the equations are in [`uniaxial`](super::uniaxial).
+//! Stretch, strain and stress of the squeezed block in closed form. The equations are in
+//! [`uniaxial`](super::uniaxial).
 //!
 //! A surface pattern of bumps whose pixel averages are exact.
 //!
-//! On a rectangular face the height is h(X, Y) = h₀ + h₁ Σₖ b((X − Xₖ)/w) b((Y − Yₖ)/w) with b(t) = cos²(πt/2) for |t| < 1,
-//! 0 beyond. It is continuous with its slope, each bump lies wholly on the face, and ∫b = (t + sin(πt)/π)/2 in closed
-//! form makes every pixel's average a product of two differences.
+//! On a rectangular face the height is h(X, Y) = h₀ + h₁ Σₖ b((X − Xₖ)/w) b((Y − Yₖ)/w) with b(t) =
+//! cos²(πt/2) for |t| < 1, 0 beyond. It is continuous with its slope, each bump lies wholly on the
+//! face, and ∫b = (t + sin(πt)/π)/2 in closed form makes every pixel's average a product of two
+//! differences.
 
 use crate::camera::{Camera, Purpose, row_stream};
 use crate::error::{SimulateError, at_least, finite, not_negative, positive};
@@ -104,14 +108,14 @@ impl UniaxialScene {
         &self.states
     }
 
-    /// An exposure without contact; each `repeat` has its own noise.
+    /// An exposure without contact. Each `repeat` has its own noise.
     pub fn reference(&self, repeat: u32) -> Array2<u8> {
         self.options
             .camera
             .expose_reference(self.options.seed, repeat)
     }
 
-    /// An exposure of state `load`; each `repeat` has its own noise.
+    /// An exposure of state `load`. Each `repeat` has its own noise.
     ///
     /// # Panics
     /// If there is no such state.
@@ -146,7 +150,7 @@ impl UniaxialScene {
             .compose(&[patch], &Illumination::default())
     }
 
-    /// Pressure in pascal averaged over each pixel; the sum times the pixel's area is the force.
+    /// Pressure in pascal averaged over each pixel. The sum times the pixel's area is the force.
     ///
     /// # Panics
     /// If there is no such state.
@@ -156,7 +160,8 @@ impl UniaxialScene {
         field
     }
 
-    /// Height in metres per pascal of light in state `load`: pressure times this is the deformed height.
+    /// Height in metres per pascal of light in state `load`: pressure times this is the deformed
+    /// height.
     ///
     /// # Panics
     /// If there is no such state.
@@ -192,8 +197,8 @@ impl UniaxialScene {
         })
     }
 
-    /// Material points of the undeformed surface: a grid of `columns` × `rows` cell centres over the face, in metres from the
-    /// first pixel's centre, with the surface's height as z.
+    /// Material points of the undeformed surface: a grid of `columns` × `rows` cell centres over
+    /// the face, in metres from the first pixel's centre, with the surface's height as z.
     pub fn material_points(&self, columns: usize, rows: usize) -> Vec<Point3<f64>> {
         let (size, centre) = (self.options.face_m, self.centre_m());
         let at = |k: usize, n: usize, side: f64| ((k as f64 + 0.5) / n as f64 - 0.5) * side;
@@ -306,7 +311,8 @@ fn add_product(values: &mut Array2<f64>, height: f64, column: &[f64], line: &[f6
     }
 }
 
-/// Everything that describes the squeezed block; [`UniaxialScene::new`](crate::UniaxialScene::new) checks it.
+/// Everything that describes the squeezed block. [`UniaxialScene::new`](crate::UniaxialScene::new)
+/// checks it.
 ///
 /// ```
 /// use tactile_simulate::{Camera, Elastic, UniaxialOptions, UniaxialScene};
@@ -333,9 +339,9 @@ pub struct UniaxialOptions {
     pub face_m: [f64; 2],
     /// What its surface looks like.
     pub pattern: SurfacePattern,
-    /// Forces in newton, a frame each; 0 shows no light.
+    /// Forces in newton, a frame each. 0 shows no light.
     pub forces_n: Vec<f64>,
-    /// Centre (x, y) of the face in pixels; the frame's middle if not given.
+    /// Centre (x, y) of the face in pixels. The frame's middle if not given.
     pub centre_px: Option<[f64; 2]>,
     /// Camera, lens, stray light.
     pub camera: Camera,
@@ -596,7 +602,7 @@ pub struct Relief {
 }
 
 impl Relief {
-    /// Height at a material point; 0 off the face.
+    /// Height at a material point. 0 off the face.
     pub fn height_m(&self, at: [f64; 2]) -> f64 {
         if (0..2).any(|k| at[k].abs() > 0.5 * self.size_m[k])
             || !self.outline.holds(at, 0.0, self.size_m)
@@ -626,8 +632,9 @@ impl Relief {
             + bumps * self.half_width_m * self.half_width_m
     }
 
-    /// Shares of the cells between `rows` (y) and `columns` (x), edges in material coordinates, that an elliptic face covers: differences of the area of the
-    /// unit disc to the lower left of the cells' corners.
+    /// Shares of the cells between `rows` (y) and `columns` (x), edges in material coordinates,
+    /// that an elliptic face covers: differences of the area of the unit disc to the lower left of
+    /// the cells' corners.
     fn covered_by_ellipse(&self, rows: &[f64], columns: &[f64]) -> Array2<f64> {
         let half = self.size_m.map(|side| 0.5 * side);
         let corner = |row: usize, column: usize| {
@@ -655,7 +662,8 @@ impl Relief {
     }
 }
 
-/// Area of the unit disc where X ≤ x and Y ≤ y: ∫ (min(y, h) + h) dt over t from −1 to x with h = √(1 − t²), where y ≥ −h.
+/// Area of the unit disc where X ≤ x and Y ≤ y: ∫ (min(y, h) + h) dt over t from −1 to x with h =
+/// √(1 − t²), where y ≥ −h.
 pub fn disc_below(x: f64, y: f64) -> f64 {
     let (x, y) = (x.clamp(-1.0, 1.0), y.clamp(-1.0, 1.0));
     // ∫ h from 0 to t.
@@ -665,7 +673,8 @@ pub fn disc_below(x: f64, y: f64) -> f64 {
     let inside = |to: f64| to.clamp(-c, c) + c;
     let whole = half_disc(x) - half_disc(-1.0);
     let chord = half_disc(x.clamp(-c, c)) - half_disc(-c);
-    // Where the line is inside: y + h; outside the chord: 2 h above the disc's middle, nothing below it.
+    // Where the line is inside: y + h; outside the chord: 2 h above the disc's middle, nothing
+    // below it.
     let beside = whole - chord;
     y * inside(x) + chord + if y >= 0.0 { 2.0 * beside } else { 0.0 }
 }

@@ -88,7 +88,7 @@ pub fn run(arguments: &Arguments, context: &mut Context) -> Result<Exit, Failure
     let search = InclusionSearch::new(source.specimen, source.guide.clone())
         .map_err(|error| unusable(file, &error))?;
     let estimate = match found(&search, &source, context) {
-        Ok(estimate) => estimate,
+        Ok(estimate) => estimate.with_asymmetry(source.asymmetry),
         Err(ElasticityError::Cancelled) => return Ok(Exit::Interrupted),
         Err(error @ ElasticityError::NoSolution) => return Err(Failure::no_answer(error)),
         Err(error) => return Err(unusable(file, &error)),

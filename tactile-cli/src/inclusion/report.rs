@@ -5,11 +5,10 @@ use crate::outputs::Csv;
 use crate::plot::{Colour, Page, Panel};
 use serde_json::{Value, json};
 use tactile_imaging::fem::Interface;
-use tactile_imaging::inclusion::{Estimated, Identifiable, InclusionEstimate, InclusionWarning};
+use tactile_imaging::inclusion::{
+    Estimated, Identifiable, InclusionEstimate, InclusionWarning, Verdict,
+};
 use tactile_imaging::pipeline::with_error;
-
-/// Asymmetry about the axis above which a lump is off it or more than one: the model is axisymmetric.
-const ASYMMETRIC: f64 = 0.01;
 
 fn interval(estimated: &Estimated, scale: f64, unit: &str) -> String {
     let value = with_error(estimated.value, estimated.standard_error, scale);
@@ -17,8 +16,8 @@ fn interval(estimated: &Estimated, scale: f64, unit: &str) -> String {
     format!("{value} {unit}   (95 %: {low:.3} to {high:.3})")
 }
 
-fn told(told: &Identifiable, scale: f64, unit: &str) -> String {
-    match told {
+fn parameter(parameter: &Identifiable, scale: f64, unit: &str) -> String {
+    match parameter {
         Identifiable::Yes(estimated) => interval(estimated, scale, unit),
         Identifiable::No(estimated) => {
             let [low, high] = estimated.interval.map(|limit| limit * scale);
@@ -28,26 +27,26 @@ fn told(told: &Identifiable, scale: f64, unit: &str) -> String {
 }
 
 pub fn print(estimate: &InclusionEstimate, source: &Source, context: &mut Context) {
-    let asymmetry = source.asymmetry;
     let console = &mut context.console;
-    let verdict = match (estimate.found, estimate.probability) {
-        (true, _) => "a lump".to_owned(),
-        (false, p) if p > 0.5 => format!("uncertain: a lump with probability {p:.2}"),
-        _ => "no lump that these frames show".to_owned(),
+    let verdict = match (estimate.verdict(), estimate.probability) {
+        (Verdict::Found, _) => "a lump".to_owned(),
+        (Verdict::Absent, _) => "no lump that these frames show".to_owned(),
+        (Verdict::Uncertain, p) if p > 0.5 => format!("uncertain: a lump with probability {p:.2}"),
+        (Verdict::Uncertain, _) => "uncertain: the model does not explain the frames".to_owned(),
     };
     console.line(format!("found             {verdict}"));
     if let Some(inclusion) = &estimate.inclusion {
         console.line(format!(
             "diameter          {}",
-            told(&inclusion.diameter_m, 1e3, "mm")
+            parameter(&inclusion.diameter_m, 1e3, "mm")
         ));
         console.line(format!(
             "depth of its top  {}",
-            told(&inclusion.depth_m, 1e3, "mm")
+            parameter(&inclusion.depth_m, 1e3, "mm")
         ));
         console.line(format!(
             "its modulus       {}",
-            told(&inclusion.youngs_modulus_pa, 1e-3, "kPa")
+            parameter(&inclusion.youngs_modulus_pa, 1e-3, "kPa")
         ));
         let [[_, depth, modulus], [_, _, both], _] = inclusion.correlation;
         console.line(format!(
@@ -77,12 +76,6 @@ pub fn print(estimate: &InclusionEstimate, source: &Source, context: &mut Contex
     for warning in &estimate.warnings {
         console.line(format!("warning           {}", sentence(warning)));
     }
-    if asymmetry > ASYMMETRIC {
-        console.line(format!(
-            "warning           the pressure is {:.1} % larger on one side: a lump off the axis, several, or a tilted block; the model is symmetric",
-            100.0 * asymmetry
-        ));
-    }
 }
 
 fn sentence(warning: &InclusionWarning) -> String {
@@ -100,21 +93,27 @@ fn sentence(warning: &InclusionWarning) -> String {
         InclusionWarning::AtBoundary => {
             "the lump touches the surface or the base: beyond the model".into()
         }
+        InclusionWarning::Asymmetric { asymmetry } => format!(
+            "the pressure is {:.1} % larger on one side: a lump off the axis, several, or a tilted block; the model is symmetric",
+            100.0 * asymmetry
+        ),
         other => format!("{other:?}"),
     }
 }
 
 pub fn as_json(estimate: &InclusionEstimate, source: &Source) -> Value {
-    let asymmetry = source.asymmetry;
+    let is_asymmetric = (estimate.warnings.iter())
+        .any(|warning| matches!(warning, InclusionWarning::Asymmetric { .. }));
     json!({
+        "verdict": estimate.verdict(),
         "found": estimate.found,
         "probability": estimate.probability,
         "inclusion": estimate.inclusion,
         "block_modulus_pa": estimate.block_modulus_pa,
         "interface": estimate.interface,
         "misfit": estimate.misfit,
-        "asymmetry": asymmetry,
-        "is_asymmetric": asymmetry > ASYMMETRIC,
+        "asymmetry": source.asymmetry,
+        "is_asymmetric": is_asymmetric,
         "warnings": estimate.warnings,
     })
 }

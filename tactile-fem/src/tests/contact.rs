@@ -2,8 +2,9 @@
 
 use super::*;
 
-/// A half space of four hundred contact radii of 0.1, of modulus 1 and ν = 0.45, with its E/(1 − ν²). `lines` resolve the contact.
-fn half_space(lines: &[f64], first: f64, shape: RigidShape) -> (Model, f64) {
+/// A half space of four hundred contact radii of 0.1, of modulus 1 and ν = 0.45, with its E/(1 −
+/// ν²). `lines` resolve the contact.
+fn half_space(lines: &[f64], first: f64, shape: RigidShape) -> (ElementModel, f64) {
     let model = half_space_of(0.45, lines, first, shape);
     (model, 1.0 / (1.0 - 0.45 * 0.45))
 }
@@ -14,7 +15,7 @@ pub(super) fn half_space_of(
     lines: &[f64],
     first: f64,
     shape: RigidShape,
-) -> Model {
+) -> ElementModel {
     let inner = lines[lines.len() - 1];
     let mut lines = lines.to_vec();
     lines.extend(
@@ -24,7 +25,7 @@ pub(super) fn half_space_of(
             .map(|r| inner + r),
     );
     let mesh = Mesh::layered_disc(&[40.0], &lines, first, 1.4);
-    let mut model = Model::new(Kinematics::Linear);
+    let mut model = ElementModel::new(Kinematics::Linear);
     let material = Material::new(1.0, poisson_ratio).unwrap();
     let half_space = model.add(&mesh, &[material]).unwrap();
     model.drive(half_space, Boundary::Base, Support::Bonded);
@@ -106,7 +107,7 @@ fn a_ball_on_a_bonded_layer_follows_the_linear_theory() {
         lines
     };
     let mesh = Mesh::layered_disc(&[1.0], &lines, 0.02, 1.25);
-    let mut model = Model::new(Kinematics::Linear);
+    let mut model = ElementModel::new(Kinematics::Linear);
     let layer = model
         .add(&mesh, &[Material::new(modulus, NU).unwrap()])
         .unwrap();
@@ -116,7 +117,8 @@ fn a_ball_on_a_bonded_layer_follows_the_linear_theory() {
     let solution = model.solve(&ratios.map(|x| AppliedLoad::Approach(x * x / radius)));
     assert_eq!(solution.report.outcome, Outcome::Solved);
     for (state, x) in solution.states.iter().zip(ratios) {
-        // The exact linear contact at the elements' own Poisson ratio, by its integral equation, at the contact radius of this approach.
+        // The exact linear contact at the elements' own Poisson ratio, by its integral equation, at
+        // the contact radius of this approach.
         let radius_of = |a: f64| {
             let layer = equation.solve(a).unwrap();
             (layer.indentation_ratio * a * a / radius, layer)
@@ -137,8 +139,8 @@ fn a_ball_on_a_bonded_layer_follows_the_linear_theory() {
         assert!((ratio - 1.0).abs() < 3e-3, "{x} {ratio}");
         let by_radius = state.contact_radius().unwrap().radius_m / low;
         assert!((by_radius - 1.0).abs() < 3e-3, "{x} {by_radius}");
-        // Dimitriadis et al., Biophys. J. 82 (2002) 2798, with the corrected coefficients at ν = 1/2; a series in x, short of 1.2 % at its
-        // end, and ν = 0.4999 takes its part.
+        // Dimitriadis et al., Biophys. J. 82 (2002) 2798, with the corrected coefficients at ν =
+        // 1/2; a series in x, short of 1.2 % at its end, and ν = 0.4999 takes its part.
         let series = 1.0 + 1.127 * x + 1.482 * x.powi(2) + 1.470 * x.powi(3) + 1.005 * x.powi(4);
         let half_space = 16.0 / 9.0 * modulus * radius.sqrt() * state.approach_m().powf(1.5);
         let ratio = state.force_n() / (half_space * series);

@@ -1,9 +1,9 @@
 //! Patch test, manufactured solutions.
 
 use crate::element::{GAUSS3, map, shape};
-use crate::material::{Deformation, Gradient, Kinematics, Material, inverse_cube_root};
+use crate::material::{Gradient, Kinematics, Material, PointDeformation, inverse_cube_root};
 use crate::mesh::Mesh;
-use crate::model::{Model, Motion};
+use crate::model::{DofMotion, ElementModel};
 use crate::scene::{AppliedLoad, Outcome};
 
 /// An annulus (0 ≤ r ≤ 1, 0 ≤ z ≤ 1) of n × n elements with its inner nodes displaced.
@@ -19,14 +19,14 @@ fn distorted(n: usize, amplitude: f64) -> Mesh {
 }
 
 /// All displacements of the outer boundary are those of `field` at an approach of one.
-fn clamp_to(model: &mut Model, field: impl Fn([f64; 2]) -> [f64; 2]) {
+fn clamp_to(model: &mut ElementModel, field: impl Fn([f64; 2]) -> [f64; 2]) {
     for part in model.parts.clone() {
         for edge in part.boundaries.values().flatten() {
             for &node in edge {
                 let u = field(model.nodes[node]);
                 for (k, u) in u.into_iter().enumerate() {
                     if !(k == 0 && model.nodes[node][0] == 0.0) && on_boundary(model.nodes[node]) {
-                        model.motion[2 * node + k] = Motion::Driven(u);
+                        model.motion[2 * node + k] = DofMotion::Driven(u);
                     }
                 }
             }
@@ -47,7 +47,7 @@ fn a_homogeneous_strain_is_exact_on_a_distorted_mesh() {
         (Kinematics::Finite, 0.3),
         (Kinematics::Finite, 0.4999),
     ] {
-        let mut model = Model::new(kinematics);
+        let mut model = ElementModel::new(kinematics);
         let material = Material::new(2e4, poisson).unwrap();
         // Straight-sided elements: the middles of their edges stay in the middle.
         let mut mesh = distorted(4, 0.04);
@@ -107,7 +107,7 @@ fn stress(kinematics: Kinematics, material: &Material, [r, z]: [f64; 2]) -> Grad
         smooth([r, z])[0] / r
     };
     let h = [by_r[0], by_z[0], by_r[1], by_z[1], hoop];
-    let deformation = Deformation::new(kinematics, material.shear_modulus(), &h).unwrap();
+    let deformation = PointDeformation::new(kinematics, material.shear_modulus(), &h).unwrap();
     let response = deformation.response();
     let pressure = material.bulk_modulus() * response.volume;
     core::array::from_fn(|k| response.stress[k] + pressure * response.cofactor[k])
@@ -117,7 +117,7 @@ fn stress(kinematics: Kinematics, material: &Material, [r, z]: [f64; 2]) -> Grad
 fn manufactured_error(kinematics: Kinematics, poisson: f64, n: usize) -> f64 {
     let material = Material::new(1.0, poisson).unwrap();
     let mesh = distorted(n, 0.05);
-    let mut model = Model::new(kinematics);
+    let mut model = ElementModel::new(kinematics);
     model.add(&mesh, &[material]).unwrap();
     clamp_to(&mut model, smooth);
     let step = 1e-3;

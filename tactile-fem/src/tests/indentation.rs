@@ -9,7 +9,8 @@ use tactile_elasticity::modulus::EstimatorKind;
 
 const MODULUS: f64 = 20e3;
 
-/// A curve of eight loads up to an approach, its sample `depth` deep; contacts reach about `contact`.
+/// A curve of eight loads up to an approach, its sample `depth` deep. Contacts reach about
+/// `contact`.
 fn curve(
     shape: RigidShape,
     [depth, contact, approach]: [f64; 3],
@@ -21,7 +22,7 @@ fn curve(
     let outer = contact_lines(0.1 * contact, 1, 1.4, 1e9, depth.max(10.0 * contact));
     lines.extend(outer.iter().skip(1).map(|r| inner + r));
     let mesh = Mesh::layered_disc(&[depth], &lines, 0.05 * contact, 1.4);
-    let mut model = Model::new(Kinematics::Finite);
+    let mut model = ElementModel::new(Kinematics::Finite);
     let material = Material::new(MODULUS, poisson_ratio).unwrap();
     let sample = model.add(&mesh, &[material]).unwrap();
     model.drive(sample, Boundary::Base, Support::Bonded);

@@ -1,7 +1,7 @@
 //! Convergence of the elements and of contact, against exact solutions.
 
 use crate::mesh::{Boundary, Mesh, contact_lines, graded};
-use crate::model::{Model, RigidShape, Support};
+use crate::model::{ElementModel, RigidShape, Support};
 use crate::*;
 
 mod contact;

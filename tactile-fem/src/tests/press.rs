@@ -1,4 +1,5 @@
-//! Presses of an object on a flat or a guide: against another program, over shapes, proportions and meshes.
+//! Presses of an object on a flat or a guide: against another program, over shapes, proportions and
+//! meshes.
 
 use super::*;
 use tactile_elasticity::ElasticityError;
@@ -52,7 +53,8 @@ fn balls_on_guides_solve_to_contact_radii_beyond_their_own() {
         assert!(ratios.windows(2).all(|pair| pair[1] > pair[0]));
         assert!(ratios[2] > 0.95, "{ratios:?}");
         for state in &solution.states {
-            // The pressure carries the force, p² linear in r² between the points and to zero at the contact's edge.
+            // The pressure carries the force, p² linear in r² between the points and to zero at the
+            // contact's edge.
             let edge = state.contact_radius().unwrap().radius_m;
             let mut nodes: Vec<[f64; 2]> = (state.pressure().iter())
                 .map(|point| [point.r_m, point.pressure_pa])
@@ -65,7 +67,8 @@ fn balls_on_guides_solve_to_contact_radii_beyond_their_own() {
                     2.0 / 3.0 * ring * (p * p + p * q + q * q) / (p + q)
                 })
                 .sum();
-            // The means that the points come from carry it exactly; a parabola's arc over a chord is what is left.
+            // The means that the points come from carry it exactly; a parabola's arc over a chord
+            // is what is left.
             assert!((carried / state.force_n() - 1.0).abs() < 3e-3, "{carried}");
             // It falls from the axis to the edge, point by point.
             assert!(
@@ -115,7 +118,8 @@ fn objects_of_every_shape_are_pressed_on_a_flat_and_on_a_guide() {
         assert!(0.0 < soft && soft < flat, "{object:?}: {soft} {flat}");
         for (press, expected) in [(on_flat, flat), (on_guide, soft)] {
             let finer = force(&press.with_fineness(8).unwrap());
-            // A cone's tip and a cylinder's rim are singular: some tenths of a percent more than a ball.
+            // A cone's tip and a cylinder's rim are singular: some tenths of a percent more than a
+            // ball.
             assert!(
                 (finer / expected - 1.0).abs() < 1e-2,
                 "{object:?}: {finer} {expected}"
@@ -175,7 +179,8 @@ fn a_soft_cylinder_on_a_flat_is_stiffer_than_a_free_column() {
         .states[0];
     let column = core::f64::consts::PI * radius_m * radius_m * modulus * strain;
     let ratio = state.force_n() / column;
-    // Glued at one end, ten radii long: the end that cannot spread adds some percent, the strain itself 0.1 %.
+    // Glued at one end, ten radii long: the end that cannot spread adds some percent, the strain
+    // itself 0.1 %.
     assert!((1.0..1.03).contains(&ratio), "{ratio}");
 }
 
@@ -223,8 +228,8 @@ fn a_finer_mesh_moves_the_table_little() {
             .collect()
     };
     for (default, fine) in radii(5).iter().zip(radii(8)) {
-        // F at a given radius goes with its third to fourth power: estimates carry a standard error of 0.3 % for the elements, 0.09 % of
-        // the radius; this is half as much again.
+        // F at a given radius goes with its third to fourth power: estimates carry a standard error
+        // of 0.3 % for the elements, 0.09 % of the radius; this is half as much again.
         assert!((default / fine - 1.0).abs() < 1.4e-3, "{default} {fine}");
     }
 }

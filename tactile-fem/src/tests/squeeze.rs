@@ -14,8 +14,8 @@ fn squeezed(aspect: f64, material: Material, faces: Interface, squeeze: f64) -> 
     solution.states.into_iter().next().unwrap()
 }
 
-/// Lateral stretch and pressure of the material at an axial stretch, its sides free: σ_t = 0 solved by bisection, with
-/// σ = μ J^{−5/3} dev B + κ (J − 1).
+/// Lateral stretch and pressure of the material at an axial stretch, its sides free: σ_t = 0 solved
+/// by bisection, with σ = μ J^{−5/3} dev B + κ (J − 1).
 fn homogeneous(material: Material, axial: f64) -> (f64, f64) {
     let (mu, kappa) = (material.shear_modulus(), {
         let [e, nu] = [material.youngs_modulus_pa(), material.poisson_ratio()];
@@ -61,7 +61,8 @@ fn faces_that_slide_give_the_homogeneous_state() {
 
 #[test]
 fn thin_discs_that_stick_are_as_stiff_as_gent_and_lindley_say() {
-    // E(1 + 2S²) with S = R/2H, for incompressible material and S well above one; the bulk modulus, 1,667 E, adds 1/κ to the compliance.
+    // E(1 + 2S²) with S = R/2H, for incompressible material and S well above one; the bulk modulus,
+    // 1,667 E, adds 1/κ to the compliance.
     let material = Material::new(1e5, 0.4999).unwrap();
     for shape in [2.0_f64, 4.0] {
         let aspect = 1.0 / (4.0 * shape);
@@ -70,7 +71,8 @@ fn thin_discs_that_stick_are_as_stiff_as_gent_and_lindley_say() {
         let incompressible = 1e5 * (1.0 + 2.0 * shape * shape);
         let kappa = 1e5 / (3.0 * (1.0 - 2.0 * 0.4999));
         let expected = 1.0 / (1.0 / incompressible + 1.0 / kappa);
-        // Their parabola of pressure is the leading order in the thickness; the squeeze adds some tenths of a percent.
+        // Their parabola of pressure is the leading order in the thickness; the squeeze adds some
+        // tenths of a percent.
         assert_relative_eq!(apparent, expected, max_relative = 0.05);
         let [first, last] = [
             state.pressure()[0],

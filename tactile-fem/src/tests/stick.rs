@@ -14,7 +14,8 @@ fn a_flat_punch_without_slip_follows_spence() {
     for poisson_ratio in [0.0, 0.3, 0.45] {
         let shape = RigidShape::Punch { radius_m: 0.1 };
         let mut model = half_space_of(poisson_ratio, &punch_lines(0.1, 1e-3), 2e-3, shape);
-        let force = |model: &Model| model.solve(&[AppliedLoad::Approach(1e-3)]).states[0].force_n();
+        let force =
+            |model: &ElementModel| model.solve(&[AppliedLoad::Approach(1e-3)]).states[0].force_n();
         let slides = force(&model);
         model.forbid_slip();
         let ratio = force(&model) / slides / spence(poisson_ratio);
@@ -35,14 +36,16 @@ fn a_ball_without_slip_is_as_stiff_as_a_punch_of_its_contact() {
         .states;
     let stiffness = (states[2].force_n() - states[0].force_n()) / 0.002;
     let radius = states[1].contact_radius().unwrap().radius_m;
-    // dF/dδ = 2 E* a times Spence's ratio wherever the load only grows (Borodich and Keer 2004); the difference of two forces misses
-    // the derivative of δ^1.5 by 0.04 %, the elements Hertz's by 0.3 %.
+    // dF/dδ = 2 E* a times Spence's ratio wherever the load only grows (Borodich and Keer 2004);
+    // the difference of two forces misses the derivative of δ^1.5 by 0.04 %, the elements Hertz's
+    // by 0.3 %.
     let modulus = 1.0 / (1.0 - poisson_ratio * poisson_ratio);
     let ratio = stiffness / (2.0 * modulus * radius * spence(poisson_ratio));
     assert!((ratio - 1.0).abs() < 5e-3, "{ratio}");
 }
 
-/// Force of spheres and cones without slip on meshes of so many elements to the first line, over that of the closed forms.
+/// Force of spheres and cones without slip on meshes of so many elements to the first line, over
+/// that of the closed forms.
 fn over_closed_forms(poisson_ratio: f64, elements: usize) -> [f64; 2] {
     let half_angle_rad = 1.3_f64;
     let tangent = half_angle_rad.tan();
@@ -68,7 +71,8 @@ fn over_closed_forms(poisson_ratio: f64, elements: usize) -> [f64; 2] {
 fn growing_contacts_without_slip_follow_their_closed_forms() {
     for poisson_ratio in [0.0, 0.3] {
         let ratios = over_closed_forms(poisson_ratio, 4);
-        // Elements, loading steps and the half space's end: 0.2 % at most; without friction the force is 5.3 % less at ν = 0, 1.6 % at 0.3.
+        // Elements, loading steps and the half space's end: 0.2 % at most; without friction the
+        // force is 5.3 % less at ν = 0, 1.6 % at 0.3.
         assert!(
             ratios.iter().all(|ratio| (ratio - 1.0).abs() < 3e-3),
             "{poisson_ratio}: {ratios:?}"
@@ -123,12 +127,14 @@ fn a_stiff_guide_holds_as_a_rigid_flat_does() {
     };
     let stiff = Material::new(10e6, 0.495).unwrap();
     let [rigid, stiff] = [None, Some(stiff)].map(stiffening);
-    // Friction's part of the force goes with the square of the bodies' contrast, two per cent smaller on a layer a hundred times as stiff.
+    // Friction's part of the force goes with the square of the bodies' contrast, two per cent
+    // smaller on a layer a hundred times as stiff.
     assert!(rigid > 1.01, "{rigid}");
     assert!((stiff / rigid - 1.0).abs() < 3e-3, "{stiff} {rigid}");
 }
 
-/// Where within a step a node touches is a guess, which moves forces by less than a thousandth and contact radii by less than two.
+/// Where within a step a node touches is a guess, which moves forces by less than a thousandth and
+/// contact radii by less than two.
 #[test]
 fn more_loads_on_the_way_change_little() {
     let gel = |modulus, poisson_ratio| Material::new(modulus, poisson_ratio).unwrap();

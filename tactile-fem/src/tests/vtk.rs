@@ -12,7 +12,7 @@ fn block<'a>(text: &'a str, title: &str) -> impl Iterator<Item = f64> + 'a {
 fn a_file_holds_mesh_displacements_and_stresses() {
     // A cylinder free to slide between plates, squeezed by a hundredth.
     let mesh = Mesh::rectangle(&[0.0, 1e-3, 2e-3], &[0.0, 1e-3]);
-    let mut model = Model::new(Kinematics::Linear);
+    let mut model = ElementModel::new(Kinematics::Linear);
     let body = model
         .add(&mesh, &[Material::new(1e5, 0.45).unwrap()])
         .unwrap();
@@ -27,7 +27,8 @@ fn a_file_holds_mesh_displacements_and_stresses() {
     assert_eq!(points.len(), 3 * mesh.nodes.len());
     let displacements: Vec<f64> = block(&text, "VECTORS").collect();
     for (point, u) in points.chunks(3).zip(displacements.chunks(3)) {
-        // The base rises by 10 µm, the top stays; the sides spread by ν of the strain. The residual's tolerance is left.
+        // The base rises by 10 µm, the top stays; the sides spread by ν of the strain. The
+        // residual's tolerance is left.
         assert!((u[1] - 1e-5 * (1.0 - point[1] / 1e-3)).abs() < 1e-11);
         assert!((u[0] - 0.45e-2 * point[0]).abs() < 1e-11);
     }

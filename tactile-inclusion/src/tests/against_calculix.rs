@@ -1,6 +1,7 @@
 //! The forward model against CalculiX, an independent finite-element program.
 //!
-//! `tests/data/inclusion_calculix.csv` is what `evidence/inclusion_scenes.py` finds, with elements of `size_mm`: a row a load.
+//! `tests/data/inclusion_calculix.csv` is what `evidence/inclusion_scenes.py` finds, with elements
+//! of `size_mm`: a row a load.
 #![allow(clippy::print_stdout)]
 
 use crate::forward::{Forward, LumpParameters, Parameters};
@@ -88,7 +89,8 @@ fn pressures_within_three_quarters_of_the_face_are_those_of_calculix() {
         {
             let error = found / expected - 1.0;
             println!("{} r {radius:.4} {:+.2} %", load.scene, 100.0 * error);
-            // 0.2 % by CalculiX's mesh (its pressures fall by 0.15 % from elements of 1 mm to 0.6 mm), 0.1 % by this one's.
+            // 0.2 % by CalculiX's mesh (its pressures fall by 0.15 % from elements of 1 mm to 0.6
+            // mm), 0.1 % by this one's.
             assert!(error.abs() < 5e-3, "{} at {radius}: {error}", load.scene);
         }
         // Most of it sits at the rim, which both resolve by halves.

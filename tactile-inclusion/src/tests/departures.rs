@@ -55,8 +55,8 @@ fn ring_radii() -> Vec<f64> {
     (0..RINGS).map(|k| (k as f64 + 0.5) * 0.5e-3).collect()
 }
 
-/// Frames with these values and the noise of pixels of 86 µm, 0.75 % each, which is not drawn: what is
-/// left of a fit is the departure alone.
+/// Frames with these values and the noise of pixels of 86 µm, 0.75 % each, which is not drawn: what
+/// is left of a fit is the departure alone.
 fn frames(values: &[f64]) -> Vec<PressureProfile> {
     let forces = &values[2 * RINGS..];
     let rings = values[..2 * RINGS].chunks(RINGS);
@@ -109,7 +109,8 @@ fn told_is_right(estimate: &InclusionEstimate, truth: LumpParameters) -> bool {
     })
 }
 
-/// Ring means of the pressure that a lump adds, moved sideways by `aside_m`, on that of the plain block.
+/// Ring means of the pressure that a lump adds, moved sideways by `aside_m`, on that of the plain
+/// block.
 fn moved_aside(lumps: LumpParameters, aside_m: f64, times: f64) -> Vec<f64> {
     let fine: Vec<f64> = (0..72).map(|k| (f64::from(k) + 0.5) * 0.25e-3).collect();
     let with = solved(Some(lumps), &fine);
@@ -170,8 +171,8 @@ fn a_faint_inclusion_is_found() {
     assert!(told_is_right(&estimate, truth), "{estimate:?}");
 }
 
-/// One frame on soft tissue hardly tells a face that sticks from one that slides, and an inclusion is larger and softer
-/// under the wrong assumption.
+/// One frame on soft tissue hardly tells a face that sticks from one that slides, and an inclusion
+/// is larger and softer under the wrong assumption.
 #[test]
 fn where_a_face_may_stick_or_slide_the_intervals_hold_the_truth() {
     let truth = lump(9e-3, 4.5e-3, 50e3);
@@ -224,7 +225,8 @@ fn study_two_inclusions_beside_the_axis_fit_poorly() {
 fn forces_that_contradict_the_approaches_fit_poorly() {
     let truth = lump(10e-3, 4e-3, 40e3);
     let mut values = solved(Some(truth), &ring_radii());
-    // By nine times the errors of sensor and model, one way at the first frame and the other at the second.
+    // By nine times the errors of sensor and model, one way at the first frame and the other at the
+    // second.
     values[2 * RINGS] *= 1.06;
     values[2 * RINGS + 1] *= 0.94;
     let estimate = searched(&frames(&values));

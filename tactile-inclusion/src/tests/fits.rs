@@ -64,8 +64,8 @@ fn a_fit_from_afar_ends_at_the_truth_within_its_errors() {
 #[test]
 fn a_fit_goes_on_along_the_limit_of_poissons_ratio() {
     let (problem, truth) = problem();
-    // From the limit itself and far from the truth in all else: ν's prior and the data pull it back,
-    // but first steps go beyond the limit.
+    // From the limit itself and far from the truth in all else: ν's prior and the data pull it
+    // back, but first steps go beyond the limit.
     let mut start = truth;
     start.poisson_ratio = LARGEST_POISSON_RATIO;
     start.block_modulus_pa *= 0.8;
@@ -110,7 +110,8 @@ fn points_of_a_ridge_are_on_it() {
         });
         let normal = problem.normal(&at, None).unwrap();
         let left = problem.step(&at, &normal, 0.0, Some(ridge.index)).unwrap();
-        // What the last step, shorter than one standard error, and a mesh of its own leave; up to 4 after a single step.
+        // What the last step, shorter than one standard error, and a mesh of its own leave; up to 4
+        // after a single step.
         assert!(left.size < 0.5, "{}", left.size);
     }
 }

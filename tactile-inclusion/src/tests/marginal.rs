@@ -44,7 +44,8 @@ fn a_gaussian_has_its_own_interval_and_evidence() {
 
 #[test]
 fn a_ridge_that_is_open_upwards_reaches_further_there() {
-    // Falls as a Gaussian of 0.2 below and of three times that above: a quarter and three quarters of the probability.
+    // Falls as a Gaussian of 0.2 below and of three times that above: a quarter and three quarters
+    // of the probability.
     let fall = |x: f64| {
         if x < 0.0 {
             12.5 * x * x

@@ -90,8 +90,8 @@ fn derivative_errors(model: &Forward, here: &Parameters) -> Vec<(Coordinate, f64
     let (_, solved) = model.predict_near(here, None).unwrap();
     let columns = model.derivatives(here, &COORDINATES, &solved).unwrap();
     let error = |column: &[f64], coordinate| {
-        // The truncation error of a central quotient is of the step's square, the solutions' tolerance is
-        // a hundred times below the difference.
+        // The truncation error of a central quotient is of the step's square, the solutions'
+        // tolerance is a hundred times below the difference.
         let step = 200.0 * here.small_step(coordinate).abs();
         let at = |by| {
             let moved = here.moved(coordinate, by);
@@ -110,8 +110,8 @@ fn derivative_errors(model: &Forward, here: &Parameters) -> Vec<(Coordinate, f64
 
 #[test]
 fn derivatives_are_those_of_solutions_at_changed_parameters() {
-    // Near the limit of ν the bulk modulus is 160 times Young's: what a difference quotient leaves of
-    // second order grows with it.
+    // Near the limit of ν the bulk modulus is 160 times Young's: what a difference quotient leaves
+    // of second order grows with it.
     for (poisson_ratio, tolerance) in [(0.45, 2e-4), (0.495, 1e-3), (0.498, 2e-3)] {
         let here = Parameters {
             poisson_ratio,
@@ -133,8 +133,9 @@ fn derivatives_without_friction_know_how_the_face_slides() {
         ..forward(2, 1.0)
     };
     for (coordinate, error) in derivative_errors(&model, &block(1.0)) {
-        // Faces of the solutions meet within 2e-6 of the radius, which a quotient by ν, whose step is the smallest,
-        // shows as a percent. Left out, sliding would change the derivative by ν by 8 %.
+        // Faces of the solutions meet within 2e-6 of the radius, which a quotient by ν, whose step
+        // is the smallest, shows as a percent. Left out, sliding would change the derivative by ν
+        // by 8 %.
         let tolerance = match coordinate {
             Coordinate::PoissonRatio => 0.02,
             _ => 0.004,

@@ -136,7 +136,8 @@ fn states_between_and_below_hertz_are_hertz() {
         assert!(close(found.carried_force_n(), force_n));
         let r = 0.4 * expected.contact_radius_m;
         assert!(close(found.pressure_at_pa(r), expected.pressure_pa(r)));
-        // Heights are linear between the samples: a chord of a/200 is off by some 1e-5 of the height.
+        // Heights are linear between the samples: a chord of a/200 is off by some 1e-5 of the
+        // height.
         let height = found.height_at_m(r) / expected.waveguide_height_m(r);
         assert!((height - 1.0).abs() < 1e-4, "{force_n} {height}");
     }
@@ -212,7 +213,8 @@ fn every_state_is_a_contact_that_carries_its_force() {
         }
         for state in &states {
             state.validate().unwrap();
-            // The recovered nodal pressures carry the force within the contact radius's own uncertainty.
+            // The recovered nodal pressures carry the force within the contact radius's own
+            // uncertainty.
             let carried = state.carried_force_n() / state.force_n;
             assert!(
                 (carried - 1.0).abs() < 5e-3,

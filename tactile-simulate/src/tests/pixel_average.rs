@@ -35,7 +35,8 @@ fn averages_agree_with_brute_force_for_oblong_pixels_inside_and_at_the_rim() {
         let patch = disc.average(profile, [[0, 10], [0, 13]]);
         for ((r, c), &value) in patch.values.indexed_iter() {
             let slow = sampled(&disc, profile, r as isize, c as isize, 400);
-            // 400 midpoints a side miss about h^1.5 = 1e-4 of a pixel at the rim, where the slope is infinite.
+            // 400 midpoints a side miss about h^1.5 = 1e-4 of a pixel at the rim, where the slope
+            // is infinite.
             assert!(
                 (value - slow).abs() < 1e-4,
                 "{profile:?} row {r} column {c}: {value} {slow}"
@@ -152,8 +153,8 @@ fn averages_agree_with_the_reference_numbers() {
             Profile::Hemisphere,
             [[0, size as isize], [0, size as isize]],
         );
-        // Near the rim, corners are of size 1 in units of the radius, a pixel of (h/a)²; the discs met by the rim have
-        // radii below 10 pixels.
+        // Near the rim, corners are of size 1 in units of the radius, a pixel of (h/a)²; the discs
+        // met by the rim have radii below 10 pixels.
         let cancelled = 20.0 * f64::EPSILON * (at("a") / pitch).clamp(1.0, 10.0).powi(2);
         let Some(expected) = case["expected"]["pixels"].as_array() else {
             assert!(
