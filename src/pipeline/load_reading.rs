@@ -1,9 +1,9 @@
 //! What each load says, and the errors that all loads share.
 use super::contact::ContactReading;
 use super::error::PipelineError;
-use super::guide_error;
 use super::object::Object;
 use super::settings::Settings;
+use crate::elasticity::contact::guide_compliance_error;
 use crate::elasticity::modulus::{Estimate, LoadSeries, LoadState, SharedErrors};
 
 /// What one load says, before errors are split into its own and those that all loads share.
@@ -144,5 +144,5 @@ fn guide_error_at(readings: impl Iterator<Item = LoadReading>, settings: &Settin
         count += 1.0;
     }
     // Without a radius the mean is NaN, which the compliance refuses.
-    guide_error::relative_error(guide.layers(), covariance, sum / count).unwrap_or(0.0)
+    guide_compliance_error(guide.layers(), covariance, sum / count).unwrap_or(0.0)
 }

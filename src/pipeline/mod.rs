@@ -36,7 +36,6 @@ mod error_budget;
 mod estimators;
 mod face;
 mod flag;
-pub(crate) mod guide_error;
 mod load_reading;
 mod measurement;
 mod object;
@@ -50,7 +49,6 @@ mod same_image;
 mod session;
 mod settings;
 mod source;
-mod strain_error;
 mod surface;
 mod time;
 

@@ -3,11 +3,10 @@ use super::composition::Pipeline;
 use super::contact::ContactReading;
 use super::error::PipelineError;
 use super::face;
-use super::strain_error::mean_strain_error;
 use super::surface::ControlPoints;
-use crate::elasticity::field::{StrainField, StrainSummary};
+use crate::elasticity::field::{StrainField, StrainSummary, mean_strain_error};
 use crate::elasticity::modulus::{Estimate, LoadSeries, LoadState, UniaxialLoads};
-use crate::tps::{Pairs, SeriesMemory};
+use crate::tps::{Pairs, SeriesMemory, StrainSpline};
 use nalgebra::{Matrix3, Point3};
 
 /// Fewest matches from which a strain is worked out: twice the four affine terms of a spline in space.
@@ -177,7 +176,12 @@ impl StrainWorkspace {
             .map_err(|source| PipelineError::Strain { from, to, source })?;
         strain.measure = measure.name();
         strain.summary = strain.field.summary();
-        let noise = mean_strain_error(&self.sources, &self.targets, matched.model.grid_m);
+        let noise = mean_strain_error(
+            &self.sources,
+            &self.targets,
+            matched.model.grid_m,
+            StrainSpline::RUN_LENGTH,
+        );
         let errors = &mut strain.summary.standard_error;
         errors.zip_apply(&noise, |error, noise| *error = error.hypot(noise));
         Ok(())

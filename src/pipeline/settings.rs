@@ -1,7 +1,7 @@
 //! What a pipeline knows beside its stages.
 use super::error::PipelineError;
-use super::guide_error::LAYER_PARAMETERS;
 use super::object::Object;
+use crate::elasticity::contact::PARAMETERS_PER_LAYER;
 use crate::elasticity::contact::Waveguide;
 use crate::sfs::Binning;
 use nalgebra::DMatrix;
@@ -168,7 +168,7 @@ impl Settings {
 
     fn check_covariance(&self, covariance: &DMatrix<f64>) -> Result<(), PipelineError> {
         let layers = self.waveguide.as_ref().map_or(0, |w| w.layers().len());
-        let expected = LAYER_PARAMETERS * layers;
+        let expected = PARAMETERS_PER_LAYER * layers;
         let found = covariance.shape();
         if found != (expected, expected) {
             return Err(PipelineError::LayerCovariance { expected, found });

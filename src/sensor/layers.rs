@@ -5,8 +5,9 @@
 //! error as a prior, so that what the presses do not determine stays as it was stated.
 use super::error::SensorError;
 use super::input::LayerInput;
-use crate::elasticity::contact::Layer;
-use crate::pipeline::guide_error::{LAYER_PARAMETERS, log_stiffness, moved};
+use crate::elasticity::contact::{
+    Layer, PARAMETERS_PER_LAYER, guide_log_stiffness, stepped_layers,
+};
 use nalgebra::{DMatrix, DVector};
 
 /// A contact of a rigid ball.
@@ -71,9 +72,9 @@ pub(super) fn fit(
         return Ok(None);
     };
     problem.plausible(&solution)?;
-    let count = LAYER_PARAMETERS * layers.len();
+    let count = PARAMETERS_PER_LAYER * layers.len();
     let parameters = solution.parameters.rows(0, count).into_owned();
-    let fitted = moved(&layers, &parameters);
+    let fitted = stepped_layers(&layers, &parameters);
     let Some(stiffness) = Stiffness::new(&fitted, contacts) else {
         return Ok(None);
     };
@@ -123,7 +124,7 @@ impl Stiffness {
         });
         let mut values = [0.0; NODES];
         for (value, node) in values.iter_mut().zip(nodes) {
-            *value = log_stiffness(layers, f64::exp(node))?;
+            *value = guide_log_stiffness(layers, f64::exp(node))?;
         }
         Some(Self { nodes, values })
     }
@@ -163,7 +164,7 @@ impl<'a> Problem<'a> {
         let errors = stated.iter().map(LayerInput::parameter_errors);
         let errors: Vec<[f64; 3]> = errors.collect();
         let n = stated.len();
-        let layer_parameters = LAYER_PARAMETERS * n;
+        let layer_parameters = PARAMETERS_PER_LAYER * n;
         let prior = DVector::from_fn(layer_parameters + balls.len() + 1, |k, _| {
             let error = if k < layer_parameters {
                 errors[k % n][k / n]
@@ -188,7 +189,7 @@ impl<'a> Problem<'a> {
     fn predicted(&self, layers: &[Layer], parameters: &DVector<f64>) -> Option<Vec<f64>> {
         let n = self.layer_parameters;
         let step = parameters.rows(0, n).into_owned();
-        let stiffness = Stiffness::new(&moved(layers, &step), self.contacts)?;
+        let stiffness = Stiffness::new(&stepped_layers(layers, &step), self.contacts)?;
         let common = parameters[n + self.balls.len()];
         let log_force = |(c, model): (&BallContact, &f64)| {
             let ball_radius = self.balls[c.ball].radius_m.ln() + parameters[n + c.ball];

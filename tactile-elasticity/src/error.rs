@@ -1,5 +1,7 @@
 //! What can be wrong with the input, one variant each.
 
+use tactile_core::CustomError;
+
 /// Why a strain, a stress or a modulus cannot be given.
 ///
 /// ```
@@ -8,7 +10,7 @@
 /// let error = HertzSphere::new(3e-3_f64, 0.7).unwrap_err();
 /// assert_eq!(error, ElasticityError::PoissonRatio { found: 0.7 });
 /// ```
-#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
 pub enum ElasticityError {
@@ -177,6 +179,22 @@ pub enum ElasticityError {
         /// Its index.
         element: usize,
     },
+    /// An estimator, a law or a measure of a user's own failed.
+    #[error(transparent)]
+    Custom(CustomError),
+}
+
+impl ElasticityError {
+    /// The failure of an estimator, a law or a measure of one's own.
+    ///
+    /// ```
+    /// use tactile_elasticity::ElasticityError;
+    /// let error = ElasticityError::custom("no weights");
+    /// assert_eq!(error.to_string(), "no weights");
+    /// ```
+    pub fn custom(error: impl Into<Box<dyn std::error::Error + Send + Sync>>) -> Self {
+        Self::Custom(CustomError::new(error))
+    }
 }
 
 /// The quantity that an error is about.

@@ -28,11 +28,12 @@ pub mod contact;
 pub mod curve;
 mod error;
 pub mod field;
-mod golden_section;
 pub mod modulus;
+mod numerics;
 pub mod relaxation;
-mod selection;
 pub mod strain;
 pub mod stress;
 
 pub use error::{ElasticityError, Quantity};
+pub use nalgebra;
+pub use tactile_core::{CustomError, statistics};

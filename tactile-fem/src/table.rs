@@ -276,7 +276,7 @@ impl Ball {
                 let step = (options.largest_ratio - smallest_ratio) * k as f64 / last;
                 (smallest_ratio + step) * self.radius_m
             })
-            .filter_map(|a| law.of_contact_radius(a, other * reduced))
+            .filter_map(|a| law.log_force_at_radius(a, other * reduced))
             .map(|force| AppliedLoad::Force(reduced * force.value.exp()))
             .collect()
     }

@@ -10,35 +10,23 @@
 //! | [`ContactTable`] | soft ball on a guide, tabulated by finite elements |
 //! | [`Waveguide`] | the layers of a sensor |
 
-mod body;
 mod hertz;
-mod interpolation;
-mod layer_equation;
-mod layer_kernel;
-mod layer_series;
-mod layer_table;
-mod punch;
-mod quadrature;
-mod stack;
+mod layers;
 mod table;
-mod tatara;
 mod waveguide;
 
-pub use body::{Body, reduced_modulus_pa, relative_radius_m, sample_modulus_pa};
 pub use hertz::{
-    HertzContact, hertz_surface_displacement_m, reduced_modulus_from_contact_radius,
-    reduced_modulus_from_indentation,
+    Body, ConeContact, HertzContact, PunchContact, cone, flat_punch, hertz_surface_displacement_m,
+    reduced_modulus_from_contact_radius, reduced_modulus_from_indentation, reduced_modulus_pa,
+    relative_radius_m, sample_modulus_pa, tangent_of_degrees, tatara_indentation_m,
 };
-pub use layer_equation::{LayerContact, LayerEquation};
-pub use layer_kernel::Bond;
-pub use layer_series::LayerSeries;
-pub use punch::{ConeContact, PunchContact, cone, flat_punch, tangent_of_degrees};
+pub use layers::{Bond, LayerContact, LayerEquation, LayerSeries};
 pub use table::{ContactCurve, ContactTable};
-pub use tatara::tatara_indentation_m;
-pub use waveguide::{Layer, Waveguide};
+pub use waveguide::{
+    Layer, PARAMETERS_PER_LAYER, Waveguide, guide_compliance_error, guide_log_stiffness,
+    stepped_layers,
+};
 
-pub(crate) use layer_kernel::LayerKernel;
-pub(crate) use layer_table::{LayerTable, SharedLayerTable};
-pub(crate) use quadrature::gauss_panels;
+pub(crate) use hertz::Squeeze;
+pub(crate) use layers::{LayerKernel, LayerTable, SharedLayerTable};
 pub(crate) use table::TabulatedForce;
-pub(crate) use tatara::Squeeze;

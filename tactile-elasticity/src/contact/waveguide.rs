@@ -1,7 +1,8 @@
 //! The elastic layers of a sensor.
 
-use super::Body;
+use super::{Body, Bond, LayerEquation};
 use crate::error::{ElasticityError, Quantity, not_negative, poisson, positive};
+use nalgebra::{DMatrix, DVector};
 
 /// One elastic layer of the waveguide.
 ///
@@ -132,3 +133,89 @@ impl Waveguide {
             .fold(0.0, |sum, l| sum + l.thickness_m * density(l))
     }
 }
+
+/// Parameters of a layer whose errors count: ln E, ln h and ν.
+pub const PARAMETERS_PER_LAYER: usize = 3;
+
+/// Step of the numerical derivatives: third powers of it are lost, rounding of the integral equation is far below.
+const STEP: f64 = 1e-3;
+
+/// ln of the stiffness E_g of the guide under a ball's contact of radius a, F = 4/3 E_g a³/R; None where the
+/// layer equation cannot be solved.
+///
+/// ```
+/// use tactile_elasticity::contact::{Layer, guide_log_stiffness};
+/// let gel = Layer { thickness_m: 10e-3, youngs_modulus_pa: 75e3, poisson_ratio: 0.5 };
+/// // Under a small contact the guide is a half-space, E/(1 − ν²).
+/// let stiffness_pa = guide_log_stiffness(&[gel], 1e-5).unwrap().exp();
+/// assert!((stiffness_pa / 100e3 - 1.0).abs() < 0.01);
+/// ```
+pub fn guide_log_stiffness(layers: &[Layer], radius_m: f64) -> Option<f64> {
+    let guide = Waveguide::new(layers.to_vec()).ok()?;
+    let equation = LayerEquation::of_layers(&guide, Bond::Bonded).ok()?;
+    let contact = equation.solve(radius_m / guide.thickness_m()).ok()?;
+    let top = layers.first()?;
+    let plane_strain = top.youngs_modulus_pa / (1.0 - top.poisson_ratio.powi(2));
+    Some(plane_strain.ln() + contact.force_ratio_same_radius.ln())
+}
+
+/// Layers with their parameters moved by a step: ln E of all layers, then ln h, then ν, which stays at most ½.
+///
+/// ```
+/// use nalgebra::DVector;
+/// use tactile_elasticity::contact::{Layer, stepped_layers};
+/// let gel = Layer { thickness_m: 10e-3, youngs_modulus_pa: 75e3, poisson_ratio: 0.5 };
+/// let stiffer = stepped_layers(&[gel], &DVector::from_vec(vec![2_f64.ln(), 0.0, 0.1]));
+/// assert!((stiffer[0].youngs_modulus_pa - 150e3).abs() < 1e-6 && stiffer[0].poisson_ratio == 0.5);
+/// ```
+pub fn stepped_layers(layers: &[Layer], step: &DVector<f64>) -> Vec<Layer> {
+    let n = layers.len();
+    let layer = |(i, layer): (usize, &Layer)| Layer {
+        youngs_modulus_pa: layer.youngs_modulus_pa * step[i].exp(),
+        thickness_m: layer.thickness_m * step[n + i].exp(),
+        poisson_ratio: (layer.poisson_ratio + step[2 * n + i]).min(0.5),
+    };
+    layers.iter().enumerate().map(layer).collect()
+}
+
+/// Derivatives of [`guide_log_stiffness`] by ln E, ln h and ν of the layers, in this order.
+fn log_stiffness_gradient(layers: &[Layer], radius_m: f64) -> Option<DVector<f64>> {
+    let count = PARAMETERS_PER_LAYER * layers.len();
+    let mut slopes = DVector::zeros(count);
+    for k in 0..count {
+        // ν is at most ½: it is stepped downwards alone.
+        let upper = if k < 2 * layers.len() { STEP } else { 0.0 };
+        let at = |value: f64| {
+            let mut step = DVector::zeros(count);
+            step[k] = value;
+            guide_log_stiffness(&stepped_layers(layers, &step), radius_m)
+        };
+        slopes[k] = (at(upper)? - at(-STEP)?) / (upper + STEP);
+    }
+    Some(slopes)
+}
+
+/// Relative standard error of the guide's compliance under a contact of radius a (m), from the covariance of
+/// ln E of all layers, ln h and ν. None where that has another size or the layer equation cannot be solved.
+///
+/// ```
+/// use nalgebra::DMatrix;
+/// use tactile_elasticity::contact::{Layer, guide_compliance_error};
+/// let gel = Layer { thickness_m: 10e-3, youngs_modulus_pa: 75e3, poisson_ratio: 0.5 };
+/// // Two per cent of the modulus are two per cent of the compliance.
+/// let covariance = DMatrix::from_diagonal(&vec![4e-4, 0.0, 0.0].into());
+/// assert!((guide_compliance_error(&[gel], &covariance, 1e-3).unwrap() - 0.02).abs() < 1e-6);
+/// ```
+pub fn guide_compliance_error(
+    layers: &[Layer],
+    covariance: &DMatrix<f64>,
+    radius_m: f64,
+) -> Option<f64> {
+    let slopes = log_stiffness_gradient(layers, radius_m)?;
+    (covariance.nrows() == slopes.len())
+        .then(|| slopes.dot(&(covariance * &slopes)).max(0.0).sqrt())
+}
+
+#[cfg(test)]
+#[path = "waveguide_tests.rs"]
+mod tests;

@@ -1,10 +1,9 @@
 //! Estimators and their results.
 
-use super::warning::Warning;
+use super::load::LoadSeries;
 use crate::error::ElasticityError;
-use crate::modulus::LoadSeries;
 use std::sync::Arc;
-use tactile_core::Interval;
+use tactile_core::{Estimate, Interval};
 
 /// Estimates Young's modulus from a series of loads.
 ///
@@ -170,6 +169,7 @@ impl core::fmt::Display for EstimatorKind {
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[non_exhaustive]
 pub struct ModulusEstimate {
     /// E of the sample.
     pub youngs_modulus_pa: f64,
@@ -187,6 +187,32 @@ pub struct ModulusEstimate {
     pub warnings: Vec<Warning>,
 }
 
+impl ModulusEstimate {
+    /// Of an estimator of one's own: E with its standard error, in pascals. The interval is symmetric, by
+    /// Student's t where the error has degrees of freedom. No lower end is below zero.
+    ///
+    /// ```
+    /// use tactile_elasticity::modulus::{Estimate, EstimatorKind, ModulusEstimate};
+    ///
+    /// let modulus_pa = Estimate::new(62e3, 2e3).with_degrees_of_freedom(4.0);
+    /// let estimate = ModulusEstimate::new(EstimatorKind::Other("stiffness"), modulus_pa);
+    /// assert!((estimate.interval_95.lower - (62e3 - 2.776 * 2e3)).abs() < 1.0);
+    /// assert!(estimate.loads.is_empty() && estimate.warnings.is_empty());
+    /// ```
+    pub fn new(estimator: EstimatorKind, youngs_modulus_pa: Estimate) -> Self {
+        let interval = youngs_modulus_pa.interval_95();
+        Self {
+            youngs_modulus_pa: youngs_modulus_pa.value,
+            standard_error_pa: youngs_modulus_pa.standard_error,
+            interval_95: Interval::new(interval.lower.max(0.0), interval.upper),
+            estimator,
+            loads: Vec::new(),
+            fit: FitStatistics::new(1, 1, 0.0, 0.0),
+            warnings: Vec::new(),
+        }
+    }
+}
+
 /// What one load contributed.
 ///
 /// ```
@@ -201,8 +227,9 @@ pub struct ModulusEstimate {
 /// assert!(modulus.loads[0].used && !modulus.loads[1].used);
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
 /// ```
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[non_exhaustive]
 pub struct LoadDiagnostics {
     /// True when the load carried what the estimator needs.
     pub used: bool,
@@ -212,17 +239,6 @@ pub struct LoadDiagnostics {
     pub youngs_modulus_pa: Option<f64>,
     /// Residual over its standard deviation.
     pub standardized_residual: Option<f64>,
-}
-
-impl LoadDiagnostics {
-    pub(crate) fn unused() -> Self {
-        Self {
-            used: false,
-            contact_ratio: None,
-            youngs_modulus_pa: None,
-            standardized_residual: None,
-        }
-    }
 }
 
 /// How a law fits the data. Smaller information criteria are better; they compare laws on the same data only.
@@ -246,6 +262,7 @@ impl LoadDiagnostics {
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[non_exhaustive]
 pub struct FitStatistics {
     /// Number of observations.
     pub observations: usize,
@@ -260,7 +277,15 @@ pub struct FitStatistics {
 }
 
 impl FitStatistics {
-    pub(crate) fn new(
+    /// From the numbers of observations and parameters, χ² and −2 ln of the likelihood, both criteria:
+    /// AICc = −2 ln L + 2k + 2k(k + 1)/(n − k − 1) and BIC = −2 ln L + k ln n.
+    ///
+    /// ```
+    /// use tactile_elasticity::modulus::FitStatistics;
+    /// let fit = FitStatistics::new(5, 1, 4.2, 4.2);
+    /// assert!((fit.aicc - (4.2 + 2.0 + 4.0 / 3.0)).abs() < 1e-12);
+    /// ```
+    pub fn new(
         observations: usize,
         parameters: usize,
         chi_squared: f64,
@@ -278,6 +303,133 @@ impl FitStatistics {
             chi_squared: chi_squared,
             aicc: (minus_two_log_likelihood + 2.0 * k + correction),
             bic: (minus_two_log_likelihood + k * n.ln()),
+        }
+    }
+}
+
+/// A typed caution; the estimate stands, but not unconditionally.
+///
+/// ```
+/// use tactile_elasticity::modulus::Warning;
+///
+/// let warning = Warning::LargeContact { load: 1, ratio: 0.5, limit: 0.3 };
+/// assert!(warning.to_string().contains("0.5"));
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[non_exhaustive]
+pub enum Warning {
+    /// a/R is beyond the reach of small-contact theory.
+    LargeContact {
+        /// Index of the load.
+        load: usize,
+        /// a/R.
+        ratio: f64,
+        /// The limit of the law.
+        limit: f64,
+    },
+    /// The layer is thin beside the contact for this law.
+    ThinLayer {
+        /// Index of the load.
+        load: usize,
+        /// χ = √(Rδ)/h, or a/h.
+        ratio: f64,
+        /// The limit of the law.
+        limit: f64,
+    },
+    /// The strain is too large for a linear law.
+    LargeStrain {
+        /// Index of the load.
+        load: usize,
+        /// The strain.
+        strain: f64,
+        /// The limit.
+        limit: f64,
+    },
+    /// The residuals are larger than the standard errors say; these were scaled up by the square root of this.
+    ExcessScatter {
+        /// χ² over degrees of freedom.
+        reduced_chi_squared: f64,
+    },
+    /// The data do not bound the modulus from above.
+    UnboundedAbove,
+    /// The intercept of the regression differs from zero at the 95 % level.
+    Intercept {
+        /// Stress at zero strain, Pa.
+        intercept_pa: f64,
+        /// Its probability under a zero intercept.
+        p_value: f64,
+    },
+    /// One load and no standard errors: the interval is not known.
+    NoErrorEstimate,
+    /// For a sphere the ratio of stress to strain is not the modulus: it depends on load and radius.
+    RatioOnSphere {
+        /// Index of the load.
+        load: usize,
+        /// a/R.
+        ratio: f64,
+    },
+}
+
+impl core::fmt::Display for Warning {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::LargeContact { load, ratio, limit } => {
+                write!(
+                    f,
+                    "load {}: a/R = {ratio:.3} is beyond {limit:.2}, small-contact theory does not hold",
+                    load + 1
+                )
+            }
+            Self::ThinLayer { load, ratio, limit } => {
+                write!(
+                    f,
+                    "load {}: contact over layer thickness = {ratio:.3} is beyond {limit:.2} for this law",
+                    load + 1
+                )
+            }
+            Self::LargeStrain {
+                load,
+                strain,
+                limit,
+            } => {
+                write!(
+                    f,
+                    "load {}: strain {strain:.3} is beyond {limit:.2}, the linear law does not hold",
+                    load + 1
+                )
+            }
+            Self::ExcessScatter {
+                reduced_chi_squared,
+            } => {
+                write!(
+                    f,
+                    "scatter exceeds the stated errors (reduced chi-squared {reduced_chi_squared:.2})"
+                )
+            }
+            Self::UnboundedAbove => write!(f, "the data do not bound the modulus from above"),
+            Self::Intercept {
+                intercept_pa,
+                p_value,
+            } => {
+                write!(
+                    f,
+                    "the stress at zero strain is {intercept_pa:.1} Pa (p = {p_value:.4}), not zero"
+                )
+            }
+            Self::NoErrorEstimate => {
+                write!(
+                    f,
+                    "no standard errors and no repetition: the interval is unknown"
+                )
+            }
+            Self::RatioOnSphere { load, ratio } => {
+                write!(
+                    f,
+                    "load {}: stress over strain is biased on a sphere (a/R = {ratio:.3})",
+                    load + 1
+                )
+            }
         }
     }
 }

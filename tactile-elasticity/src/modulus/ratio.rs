@@ -1,14 +1,8 @@
 //! The paper's modulus: stress over mean strain, equation (31).
 
-use super::covariance::Covariance;
-use super::estimate::{
-    EstimatorKind, FitStatistics, LoadDiagnostics, ModulusEstimate, ModulusEstimator,
-};
-use super::load::{LoadState, validated};
-use super::series::LoadSeries;
-use super::source::{LogErrors, total};
-use super::statistics::{CommonMean, common_mean, fewest};
-use super::warning::Warning;
+use super::estimate::{EstimatorKind, LoadDiagnostics, ModulusEstimate, ModulusEstimator, Warning};
+use super::load::{LoadSeries, LoadState, validated};
+use super::statistics::{CommonMean, Covariance, LogErrors, common_mean, fewest, total};
 use crate::error::{ElasticityError, Quantity, positive};
 use tactile_core::statistics::{effective_degrees_of_freedom, quantile_95};
 use tactile_core::{Estimate, Interval};
@@ -232,12 +226,7 @@ impl PaperRatio {
             })
         };
         warnings.extend(diagnostics.iter().enumerate().filter_map(on_sphere));
-        warnings.extend(mean.excess.map(|x| Warning::ExcessScatter {
-            reduced_chi_squared: x,
-        }));
-        if mean.standard_error.is_infinite() {
-            warnings.push(Warning::NoErrorEstimate);
-        }
+        warnings.extend(mean.warnings(true));
         warnings
     }
 
@@ -247,7 +236,7 @@ impl PaperRatio {
         ratios: &[Ratio],
         mean: &CommonMean,
     ) -> Vec<LoadDiagnostics> {
-        let mut diagnostics = vec![LoadDiagnostics::unused(); loads.len()];
+        let mut diagnostics = vec![LoadDiagnostics::default(); loads.len()];
         for (d, state) in diagnostics.iter_mut().zip(loads) {
             let ratio = self
                 .sphere_radius_m
@@ -324,12 +313,7 @@ impl ModulusEstimator for PaperRatio {
             estimator: EstimatorKind::PaperRatio,
             warnings: self.warnings(loads, &diagnostics, &mean),
             loads: diagnostics,
-            fit: FitStatistics::new(
-                ratios.len(),
-                1,
-                mean.chi_squared,
-                mean.minus_two_log_likelihood,
-            ),
+            fit: mean.fit_statistics(),
         })
     }
 

@@ -1,50 +1,73 @@
 //! Quantiles, and the generalised least squares mean.
 
-use super::covariance::{Covariance, Factor};
-use super::source::LogErrors;
+use super::estimate::{FitStatistics, Warning};
 use crate::error::{ElasticityError, Quantity};
-use nalgebra::{Cholesky, DMatrix, DVector};
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use statrs::distribution::{ChiSquared, ContinuousCDF, StudentsT};
 use tactile_core::statistics::effective_degrees_of_freedom;
 
 /// The smallest of the degrees of freedom that are not infinite.
-pub(crate) fn fewest(degrees: impl Iterator<Item = Option<f64>>) -> Option<f64> {
+pub fn fewest(degrees: impl Iterator<Item = Option<f64>>) -> Option<f64> {
     degrees.flatten().reduce(f64::min)
 }
 
 /// P(χ²_degrees > x).
-pub(crate) fn chi_squared_tail(x: f64, degrees: usize) -> f64 {
+pub fn chi_squared_tail(x: f64, degrees: usize) -> f64 {
     ChiSquared::new(degrees as f64).map_or(1.0, |d| d.sf(x.max(0.0)))
 }
 
 /// P(|t| > |x|), two-sided.
-pub(crate) fn t_tail(x: f64, degrees: usize) -> f64 {
+pub fn t_tail(x: f64, degrees: usize) -> f64 {
     StudentsT::new(0.0, 1.0, degrees as f64).map_or(1.0, |d| 2.0 * d.sf(x.abs()))
 }
 
 /// The best common mean of correlated numbers.
 #[derive(Debug, Clone)]
-pub(crate) struct CommonMean {
-    pub(crate) mean: f64,
+pub struct CommonMean {
+    pub mean: f64,
     /// Standard error, scaled up where the scatter exceeds the covariance.
-    pub(crate) standard_error: f64,
-    pub(crate) chi_squared: f64,
+    pub standard_error: f64,
+    chi_squared: f64,
     /// Of the measured forces and lengths with their true values fitted to the law. Given errors enter by χ² and a constant alone:
     /// the covariance of ln E* depends on the law's slope, and would favour flat ones.
-    pub(crate) minus_two_log_likelihood: f64,
+    minus_two_log_likelihood: f64,
     /// Degrees of freedom where the error was learnt from the scatter; None where it was given.
-    pub(crate) degrees: Option<f64>,
+    pub degrees: Option<f64>,
     /// χ²/ν where it was used to scale the error up.
-    pub(crate) excess: Option<f64>,
-    pub(crate) standardized_residuals: Vec<f64>,
+    excess: Option<f64>,
+    pub standardized_residuals: Vec<f64>,
     /// Of every number in the mean; their sum is one.
-    pub(crate) weights: DVector<f64>,
+    pub weights: DVector<f64>,
 }
 
 impl CommonMean {
+    /// Fit of one parameter, the mean.
+    pub fn fit_statistics(&self) -> FitStatistics {
+        let observations = self.standardized_residuals.len();
+        let minus_two_log = self.minus_two_log_likelihood;
+        FitStatistics::new(observations, 1, self.chi_squared, minus_two_log)
+    }
+
+    /// Cautions that follow from the scatter and the errors. `bounded` is whether the interval has an upper end.
+    pub fn warnings(&self, bounded: bool) -> Vec<Warning> {
+        let excess = self.excess;
+        let mut warnings: Vec<_> = excess
+            .map(|reduced_chi_squared| Warning::ExcessScatter {
+                reduced_chi_squared,
+            })
+            .into_iter()
+            .collect();
+        if self.standard_error.is_infinite() {
+            warnings.push(Warning::NoErrorEstimate);
+        } else if !bounded {
+            warnings.push(Warning::UnboundedAbove);
+        }
+        warnings
+    }
+
     /// Degrees of freedom of the standard error; those of its independent sources, each with its covariance, where the scatter
     /// did not tell it.
-    pub(crate) fn degrees_from(&self, sources: &[LogErrors]) -> Option<f64> {
+    pub fn degrees_from(&self, sources: &[LogErrors]) -> Option<f64> {
         let parts: Vec<_> = sources
             .iter()
             .map(|(covariance, degrees)| (covariance.variance_of_sum(&self.weights), *degrees))
@@ -63,10 +86,7 @@ const EXCESS_PROBABILITY: f64 = 1e-3;
 /// single loads are factorised. With these whitened and U split into its weighted mean ū and the rest Ũ,
 /// ŝ = (1 + ŨᵀŨ)⁻¹Ũᵀz, θ = z̄ − ū·ŝ and var θ = 1/Σw + ūᵀ(1 + ŨᵀŨ)⁻¹ū: the Woodbury identity, written so that nothing cancels where
 /// a shared error is much larger than the others. O(n k²) with k shared errors.
-pub(crate) fn common_mean(
-    z: &[f64],
-    covariance: &Covariance,
-) -> Result<CommonMean, ElasticityError> {
+pub fn common_mean(z: &[f64], covariance: &Covariance) -> Result<CommonMean, ElasticityError> {
     let n = z.len();
     let known = covariance.is_known();
     let factor = if known {
@@ -145,86 +165,250 @@ fn minus_two_log_likelihood(chi_squared: f64, n: usize, known: bool) -> f64 {
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use approx::assert_relative_eq;
+/// The covariance Σ = diag(v) + Σ_load s sᵀ + U Uᵀ + G of n numbers.
+///
+/// v are variances of errors that each number has for itself, s standard errors that the numbers of one load have in common, the
+/// columns of U those that all have in common, and G is a matrix that was given. Without G, products and solutions take O(n k²) time
+/// and O(n k) memory with k columns; a given matrix is factorised in O(n³).
+#[derive(Debug, Clone)]
+pub struct Covariance {
+    /// The load that each number belongs to; numbers of one load are neighbours.
+    loads: Vec<usize>,
+    own: DVector<f64>,
+    within_loads: Vec<DVector<f64>>,
+    shared: Vec<DVector<f64>>,
+    given: Option<DMatrix<f64>>,
+}
 
-    #[test]
-    fn a_shared_error_is_not_averaged_away() {
-        let shared = Covariance::none(0..4)
-            .with_own(|_| 0.2)
-            .with_shared(|_| 0.1);
-        let mean = common_mean(&[1.0, 1.2, 0.9, 0.9], &shared).unwrap();
-        assert_relative_eq!(mean.mean, 1.0, epsilon = 1e-12);
-        assert_relative_eq!(
-            mean.standard_error.powi(2),
-            0.01 + 0.04 / 4.0,
-            max_relative = 1e-12
-        );
+impl Covariance {
+    /// No errors at all, of numbers that belong to these loads.
+    pub fn none(loads: impl Iterator<Item = usize>) -> Self {
+        let loads: Vec<usize> = loads.collect();
+        Self {
+            own: DVector::zeros(loads.len()),
+            loads,
+            within_loads: Vec::new(),
+            shared: Vec::new(),
+            given: None,
+        }
     }
 
-    /// The mean, its variance, χ² and the weights against the plain formulas with the matrix of all pairs.
-    #[test]
-    fn shared_errors_give_what_the_matrix_of_all_pairs_gives() {
-        let z = [2.0, 2.3, 1.8, 2.1, 2.6, 1.9];
-        let loads = [0, 0, 1, 2, 2, 3];
-        let own = |i: usize| 0.1 + 0.03 * i as f64;
-        let in_load = |i: usize| 0.2 - 0.02 * i as f64;
-        let scale = |_: usize| 0.3;
-        let slope = |i: usize| 0.05 * (i as f64 - 1.0);
-        let covariance = Covariance::none(loads.into_iter())
-            .with_own(own)
-            .with_shared_in_load(in_load)
-            .with_shared(scale)
-            .with_shared(slope);
-        let dense = DMatrix::from_fn(6, 6, |i, j| {
-            let own = if i == j { own(i).powi(2) } else { 0.0 };
-            let in_load = if loads[i] == loads[j] {
-                in_load(i) * in_load(j)
-            } else {
-                0.0
-            };
-            own + in_load + scale(i) * scale(j) + slope(i) * slope(j)
+    /// With the standard error that each number has for itself.
+    pub fn with_own(mut self, standard_error: impl Fn(usize) -> f64) -> Self {
+        self.own
+            .iter_mut()
+            .enumerate()
+            .for_each(|(i, v)| *v += standard_error(i).powi(2));
+        self
+    }
+
+    /// With standard errors that the numbers of one load have in common.
+    pub fn with_shared_in_load(mut self, standard_error: impl Fn(usize) -> f64) -> Self {
+        self.within_loads.push(self.column(standard_error));
+        self
+    }
+
+    /// With standard errors that all numbers have in common: what one standard error of the cause does to each.
+    pub fn with_shared(mut self, standard_error: impl Fn(usize) -> f64) -> Self {
+        let column = self.column(standard_error);
+        if column.iter().any(|&u| u != 0.0) {
+            self.shared.push(column);
+        }
+        self
+    }
+
+    /// With standard errors of a law or a table that err the same way at all loads as far as the smallest goes. What they err beyond that at
+    /// the others is not known to be in proportion: counted as common, the weighted mean would extrapolate it away.
+    pub fn with_model_errors(self, standard_error: impl Fn(usize) -> f64) -> Self {
+        let least = (0..self.len())
+            .map(&standard_error)
+            .fold(f64::INFINITY, f64::min);
+        self.with_shared(|_| least)
+            .with_own(|i| (standard_error(i).powi(2) - least.powi(2)).max(0.0).sqrt())
+    }
+
+    /// With a matrix of all pairs.
+    pub fn with_given(mut self, entry: impl FnMut(usize, usize) -> f64) -> Self {
+        let matrix = DMatrix::from_fn(self.len(), self.len(), entry);
+        self.given = Some(match self.given.take() {
+            Some(given) => given + matrix,
+            None => matrix,
         });
-        let inverse = dense.clone().try_inverse().unwrap();
-        let information = inverse.sum();
-        let weights = inverse.column_sum() / information;
-        let mean = weights.dot(&DVector::from_row_slice(&z));
-        let residual = DVector::from_row_slice(&z).add_scalar(-mean);
-        let chi_squared = residual.dot(&(&inverse * &residual));
-
-        // Inverting a matrix of this condition (10²) costs three of sixteen digits.
-        let found = common_mean(&z, &covariance).unwrap();
-        assert_relative_eq!(found.mean, mean, max_relative = 1e-12);
-        assert_relative_eq!(
-            found.standard_error.powi(2),
-            1.0 / information,
-            max_relative = 1e-12
-        );
-        assert_relative_eq!(found.chi_squared, chi_squared, max_relative = 1e-11);
-        assert_relative_eq!(found.weights, weights, max_relative = 1e-11);
-        let variance = weights.dot(&(&dense * &weights));
-        assert_relative_eq!(
-            covariance.variance_of_sum(&weights),
-            variance,
-            max_relative = 1e-12
-        );
-        let given = Covariance::none(loads.into_iter()).with_given(|i, j| dense[(i, j)]);
-        let of_matrix = common_mean(&z, &given).unwrap();
-        assert_relative_eq!(of_matrix.mean, mean, max_relative = 1e-12);
-        assert_relative_eq!(of_matrix.chi_squared, chi_squared, max_relative = 1e-11);
+        self
     }
 
-    #[test]
-    fn a_shared_error_far_above_all_others_costs_no_digits() {
-        let covariance = Covariance::none(0..3)
-            .with_own(|_| 1e-9)
-            .with_shared(|_| 1.0);
-        let found = common_mean(&[1.0, 1.0 + 1e-9, 1.0 - 1e-9], &covariance).unwrap();
-        assert_relative_eq!(found.mean, 1.0, max_relative = 1e-15);
-        assert_relative_eq!(found.standard_error, 1.0, max_relative = 1e-12);
-        // Two residuals of one standard error each; z itself is rounded to 1e-16, a ten-millionth of them.
-        assert_relative_eq!(found.chi_squared, 2.0, max_relative = 1e-6);
+    /// The sum with the covariance of independent errors of the same numbers.
+    fn plus(mut self, other: &Self) -> Self {
+        self.own += &other.own;
+        self.within_loads.extend_from_slice(&other.within_loads);
+        self.shared.extend_from_slice(&other.shared);
+        match &other.given {
+            Some(given) => self.with_given(|i, j| given[(i, j)]),
+            None => self,
+        }
+    }
+
+    fn column(&self, entry: impl Fn(usize) -> f64) -> DVector<f64> {
+        DVector::from_fn(self.len(), |i, _| entry(i))
+    }
+
+    fn len(&self) -> usize {
+        self.loads.len()
+    }
+
+    /// What one standard error of each shared cause does to every number.
+    fn shared(&self) -> &[DVector<f64>] {
+        &self.shared
+    }
+
+    /// Σᵢᵢ.
+    fn variance(&self, i: usize) -> f64 {
+        let shared = self.shared.iter().map(|u| u[i].powi(2));
+        self.unshared_variance(i) + shared.sum::<f64>()
+    }
+
+    /// (Σ − U Uᵀ)ᵢᵢ.
+    fn unshared_variance(&self, i: usize) -> f64 {
+        let given = self.given.as_ref().map_or(0.0, |g| g[(i, i)]);
+        let within = self.within_loads.iter().map(|u| u[i].powi(2));
+        self.own[i] + given + within.sum::<f64>()
+    }
+
+    /// Whether any error is above zero.
+    fn is_known(&self) -> bool {
+        (0..self.len()).any(|i| self.variance(i) > 0.0)
+    }
+
+    /// wᵀΣw, the variance of a weighted sum.
+    fn variance_of_sum(&self, weights: &DVector<f64>) -> f64 {
+        let own = self.own.component_mul(weights).dot(weights);
+        let shared: f64 = self.shared.iter().map(|u| u.dot(weights).powi(2)).sum();
+        let given = self
+            .given
+            .as_ref()
+            .map_or(0.0, |g| weights.dot(&(g * weights)));
+        let within = |u: &DVector<f64>| -> f64 {
+            let sum_of_load =
+                |load: std::ops::Range<usize>| load.map(|i| u[i] * weights[i]).sum::<f64>();
+            self.ranges().map(|load| sum_of_load(load).powi(2)).sum()
+        };
+        own + shared + given + self.within_loads.iter().map(within).sum::<f64>()
+    }
+
+    /// The ranges of numbers that belong to one load.
+    fn ranges(&self) -> impl Iterator<Item = std::ops::Range<usize>> + '_ {
+        let mut next = 0;
+        self.loads.chunk_by(|a, b| a == b).map(move |chunk| {
+            let start = next;
+            next += chunk.len();
+            start..next
+        })
+    }
+
+    /// Σ − U Uᵀ over a range of numbers.
+    fn unshared(&self, range: &std::ops::Range<usize>) -> DMatrix<f64> {
+        let start = range.start;
+        let in_one_load = |i: usize, j: usize| self.loads[i] == self.loads[j];
+        DMatrix::from_fn(range.len(), range.len(), |r, c| {
+            let (i, j) = (start + r, start + c);
+            let own = if i == j { self.own[i] } else { 0.0 };
+            let given = self.given.as_ref().map_or(0.0, |g| g[(i, j)]);
+            let within = self.within_loads.iter().map(|u| u[i] * u[j]);
+            let within: f64 = if in_one_load(i, j) { within.sum() } else { 0.0 };
+            own + given + within
+        })
+    }
+
+    /// The factor L of Σ − U Uᵀ = L Lᵀ. What is perfectly correlated or without error gets a ridge of 10⁻¹² of the mean variance (of
+    /// Σ's, where all errors are shared): the answer then depends on it in the twelfth digit, and rounding (10⁻¹⁶) is still far below it.
+    fn unshared_factor(&self) -> Result<Factor, ElasticityError> {
+        let mean_of = |variance: &dyn Fn(usize) -> f64| {
+            (0..self.len()).map(variance).sum::<f64>() / self.len() as f64
+        };
+        let unshared = mean_of(&|i| self.unshared_variance(i));
+        let scale = if unshared > 0.0 {
+            unshared
+        } else {
+            mean_of(&|i| self.variance(i))
+        };
+        let ridge = 1e-12 * scale;
+        let block = |range: std::ops::Range<usize>| {
+            let lower = ridged_cholesky(self.unshared(&range), ridge)?.unpack();
+            Ok((range.start, lower))
+        };
+        let blocks = if self.given.is_some() {
+            vec![block(0..self.len())?]
+        } else {
+            self.ranges().map(block).collect::<Result<_, _>>()?
+        };
+        Ok(Factor { blocks })
     }
 }
+
+/// A lower triangular matrix L of blocks on the diagonal.
+struct Factor {
+    /// First row, and the block.
+    blocks: Vec<(usize, DMatrix<f64>)>,
+}
+
+impl Factor {
+    /// The identity for n numbers, of which nothing is known.
+    fn identity(n: usize) -> Self {
+        let one = DMatrix::identity(1, 1);
+        Self {
+            blocks: (0..n).map(|i| (i, one.clone())).collect(),
+        }
+    }
+
+    /// L⁻¹v: numbers whose errors are independent and one.
+    fn whiten(&self, mut v: DVector<f64>) -> DVector<f64> {
+        for (start, lower) in &self.blocks {
+            let mut part = v.rows_mut(*start, lower.nrows());
+            // A Cholesky factor has no zero on its diagonal.
+            lower.solve_lower_triangular_mut(&mut part);
+        }
+        v
+    }
+
+    /// L⁻ᵀv: weights of the numbers from those of the whitened ones.
+    fn weights(&self, mut v: DVector<f64>) -> DVector<f64> {
+        for (start, lower) in &self.blocks {
+            let mut part = v.rows_mut(*start, lower.nrows());
+            lower.tr_solve_lower_triangular_mut(&mut part);
+        }
+        v
+    }
+}
+
+/// Cholesky of a covariance, with the ridge where it is singular.
+fn ridged_cholesky(sigma: DMatrix<f64>, ridge: f64) -> Result<Cholesky<f64, Dyn>, ElasticityError> {
+    let n = sigma.nrows();
+    if let Some(factor) = sigma.clone().cholesky() {
+        let d = factor.l_dirty().diagonal();
+        if d.min() * d.min() > ridge * 1e-3 {
+            return Ok(factor);
+        }
+    }
+    (sigma + DMatrix::identity(n, n) * ridge)
+        .cholesky()
+        .ok_or(ElasticityError::Covariance {
+            quantity: Quantity::Force,
+        })
+}
+
+/// The covariance of logarithms of moduli from one source of error, and its degrees of freedom: those of the least known error, for
+/// repetition does not improve a standard error that all loads take from one calibration.
+pub type LogErrors = (Covariance, Option<f64>);
+
+/// The covariance of all sources together, which are independent of one another.
+pub fn total(sources: &[LogErrors]) -> Covariance {
+    let [first, rest @ ..] = sources else {
+        return Covariance::none(std::iter::empty());
+    };
+    rest.iter()
+        .fold(first.0.clone(), |sum, source| sum.plus(&source.0))
+}
+
+#[cfg(test)]
+#[path = "statistics_tests.rs"]
+mod tests;

@@ -1,14 +1,9 @@
 //! Young's modulus of a ball from a table of its contacts.
 
-use super::covariance::Covariance;
-use super::estimate::{
-    EstimatorKind, FitStatistics, LoadDiagnostics, ModulusEstimate, ModulusEstimator,
-};
-use super::load::{LoadState, validated};
-use super::series::LoadSeries;
-use super::source::{LogErrors, total};
-use super::statistics::{CommonMean, common_mean, fewest};
-use super::warning::Warning;
+use super::contact::large_contacts;
+use super::estimate::{EstimatorKind, LoadDiagnostics, ModulusEstimate, ModulusEstimator};
+use super::load::{LoadSeries, LoadState, validated};
+use super::statistics::{CommonMean, Covariance, LogErrors, common_mean, fewest, total};
 use crate::contact::{ContactTable, TabulatedForce, Waveguide};
 use crate::error::{ElasticityError, Quantity, positive};
 use std::sync::Arc;
@@ -252,7 +247,7 @@ impl TabulatedContact {
         let mut all: Vec<LoadDiagnostics> = (loads.iter())
             .map(|l| LoadDiagnostics {
                 contact_ratio: (l.contact_radius_m).map(|a| a.value / self.table.radius_m()),
-                ..LoadDiagnostics::unused()
+                ..LoadDiagnostics::default()
             })
             .collect();
         for (k, contact) in contacts.iter().enumerate() {
@@ -262,28 +257,6 @@ impl TabulatedContact {
             own.standardized_residual = Some(fit.mean.standardized_residuals[k]);
         }
         all
-    }
-
-    fn warnings(&self, loads: &[LoadDiagnostics], fit: &Fit, bounded: bool) -> Vec<Warning> {
-        let limit = self.table.contact_ratios(fit.log_modulus)[1];
-        let mut warnings: Vec<Warning> = (loads.iter().enumerate())
-            .filter_map(|(load, d)| Some((load, d.contact_ratio?)))
-            .filter(|&(_, ratio)| ratio > limit)
-            .map(|(load, ratio)| Warning::LargeContact {
-                load,
-                ratio,
-                limit: limit,
-            })
-            .collect();
-        warnings.extend(fit.mean.excess.map(|x| Warning::ExcessScatter {
-            reduced_chi_squared: x,
-        }));
-        if fit.mean.standard_error.is_infinite() {
-            warnings.push(Warning::NoErrorEstimate);
-        } else if !bounded {
-            warnings.push(Warning::UnboundedAbove);
-        }
-        warnings
     }
 }
 
@@ -341,19 +314,16 @@ impl ModulusEstimator for TabulatedContact {
         };
         let modulus = fit.log_modulus.exp();
         let loads = self.diagnose(series.loads(), &contacts, &fit);
-        let warnings = self.warnings(&loads, &fit, upper.is_some());
+        let limit = self.table.contact_ratios(fit.log_modulus)[1];
+        let mut warnings = large_contacts(&loads, limit);
+        warnings.extend(fit.mean.warnings(upper.is_some()));
         Ok(ModulusEstimate {
             youngs_modulus_pa: modulus,
             standard_error_pa: (modulus * fit.mean.standard_error),
             interval_95: Interval::new(lower.map_or(0.0, f64::exp), upper.map(|u| u.exp())),
             estimator: EstimatorKind::TabulatedContact,
             loads,
-            fit: FitStatistics::new(
-                contacts.len(),
-                1,
-                fit.mean.chi_squared,
-                fit.mean.minus_two_log_likelihood,
-            ),
+            fit: fit.mean.fit_statistics(),
             warnings,
         })
     }

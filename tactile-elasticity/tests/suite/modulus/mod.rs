@@ -6,6 +6,7 @@ mod laws;
 mod stress_over_strain;
 
 use nalgebra::DMatrix;
+use proptest::prelude::*;
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 use rand_distr::StandardNormal;
 use tactile_elasticity::contact::{

@@ -1,0 +1,523 @@
+//! Strain at many points: its mean, spread and error.
+
+use crate::error::{ElasticityError, Quantity, not_negative, positive};
+use crate::strain::{Deformation, StrainMeasure};
+use nalgebra::{Matrix3, Matrix6, Point3, SMatrix, Vector3};
+
+/// Averages of a strain field, component by component.
+///
+/// ```
+/// use nalgebra::Matrix3;
+/// use tactile_elasticity::field::StrainField;
+/// use tactile_elasticity::strain::Infinitesimal;
+///
+/// let gradients = [0.01_f64, 0.03].map(Matrix3::from_diagonal_element);
+/// let summary = StrainField::from_gradients(&gradients, None, &Infinitesimal)?.summary();
+/// assert!((summary.mean[(0, 0)] - 0.02).abs() < 1e-15);
+/// assert!((summary.standard_error[(0, 0)] - summary.spread[(0, 0)] / 2.0_f64.sqrt()).abs() < 1e-15);
+/// # Ok::<(), tactile_elasticity::ElasticityError>(())
+/// ```
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub struct StrainSummary {
+    /// Weighted mean.
+    pub mean: Matrix3<f64>,
+    /// Weighted standard deviation over the field.
+    pub spread: Matrix3<f64>,
+    /// Standard error of the mean, as if the points were independent: spread/√n_eff, n_eff = (Σw)²/Σw².
+    pub standard_error: Matrix3<f64>,
+    /// Points that count.
+    pub used: usize,
+    /// Indices of the points where det F ≤ 0, left out of the averages.
+    pub folded: Vec<usize>,
+}
+
+/// Strain at points, with the weight (area, volume) of each.
+#[derive(Debug, Clone, Default, PartialEq)]
+#[non_exhaustive]
+pub struct StrainField {
+    /// The strain at every point; zero where the deformation folds.
+    pub strains: Vec<Matrix3<f64>>,
+    /// The weight of every point; zero where the deformation folds.
+    pub weights: Vec<f64>,
+    /// The points at which the deformation folds, det F ≤ 0.
+    pub folded: Vec<usize>,
+}
+
+impl StrainField {
+    /// Strain of every displacement gradient, equal weights.
+    ///
+    /// # Errors
+    /// [`ElasticityError::NotFinite`].
+    ///
+    /// ```
+    /// use nalgebra::Matrix3;
+    /// use tactile_elasticity::field::StrainField;
+    /// use tactile_elasticity::strain::GreenLagrange;
+    /// let mut gradients = vec![Matrix3::from_diagonal_element(0.01); 4];
+    /// gradients[2][(0, 0)] = -1.5; // turned inside out
+    /// let summary = StrainField::from_gradients(&gradients, None, &GreenLagrange)?.summary();
+    /// assert_eq!(summary.folded, [2]);
+    /// assert!((summary.mean[(0, 0)] - 0.01005f64).abs() < 1e-15);
+    /// # Ok::<(), tactile_elasticity::ElasticityError>(())
+    /// ```
+    pub fn from_gradients(
+        gradients: &[Matrix3<f64>],
+        weights: Option<&[f64]>,
+        measure: &dyn StrainMeasure,
+    ) -> Result<Self, ElasticityError> {
+        let mut field = Self {
+            strains: Vec::new(),
+            weights: Vec::new(),
+            folded: Vec::new(),
+        };
+        field.set_gradients(gradients, weights, measure)?;
+        Ok(field)
+    }
+
+    /// As [`from_gradients`](Self::from_gradients), in the memory of this field: for as many points nothing is allocated.
+    ///
+    /// ```
+    /// use nalgebra::Matrix3;
+    /// use tactile_elasticity::field::StrainField;
+    /// use tactile_elasticity::strain::Infinitesimal;
+    /// let mut field = StrainField::from_gradients(&[Matrix3::identity(); 2], None, &Infinitesimal)?;
+    /// field.set_gradients(&[Matrix3::from_diagonal_element(0.01)], Some(&[2.0]), &Infinitesimal)?;
+    /// assert_eq!((field.strains.len(), field.summary().mean[(2, 2)]), (1, 0.01));
+    /// # Ok::<(), tactile_elasticity::ElasticityError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// As [`from_gradients`](Self::from_gradients); the field is then empty.
+    pub fn set_gradients(
+        &mut self,
+        gradients: &[Matrix3<f64>],
+        weights: Option<&[f64]>,
+        measure: &dyn StrainMeasure,
+    ) -> Result<(), ElasticityError> {
+        self.clear();
+        let taken = self.take(gradients, weights, measure);
+        if taken.is_err() {
+            self.clear();
+        }
+        taken
+    }
+
+    fn clear(&mut self) {
+        self.strains.clear();
+        self.weights.clear();
+        self.folded.clear();
+    }
+
+    fn take(
+        &mut self,
+        gradients: &[Matrix3<f64>],
+        weights: Option<&[f64]>,
+        measure: &dyn StrainMeasure,
+    ) -> Result<(), ElasticityError> {
+        match weights {
+            None => self.weights.resize(gradients.len(), 1.0),
+            Some(weights) => {
+                check_weights(gradients.len(), weights)?;
+                self.weights.extend_from_slice(weights);
+            }
+        }
+        for (i, h) in gradients.iter().enumerate() {
+            let deformation = Deformation::from_displacement_gradient(*h);
+            if deformation.is_finite() && deformation.jacobian() <= 0.0 {
+                self.folded.push(i);
+                self.strains.push(Matrix3::zeros());
+                self.weights[i] = 0.0;
+            } else {
+                self.strains.push(measure.of(&deformation)?);
+            }
+        }
+        Ok(())
+    }
+
+    /// Mean, spread and standard error, robust if asked for.
+    ///
+    /// The robust standard error is that of the mean over the estimator's efficiency on normal data: √(π/2) for the median,
+    /// 1/√0.95 for Huber's mean.
+    ///
+    /// ```
+    /// use nalgebra::Matrix3;
+    /// use tactile_elasticity::field::{Averaging, StrainField};
+    /// use tactile_elasticity::strain::Infinitesimal;
+    ///
+    /// let gradients = [0.01_f64, 0.02, 0.9].map(Matrix3::from_diagonal_element);
+    /// let field = StrainField::from_gradients(&gradients, None, &Infinitesimal)?;
+    /// assert_eq!(field.summary_with(Averaging::Median).mean[(0, 0)], 0.02);
+    /// # Ok::<(), tactile_elasticity::ElasticityError>(())
+    /// ```
+    pub fn summary_with(&self, averaging: Averaging) -> StrainSummary {
+        let mut summary = self.summary();
+        let loss: f64 = match averaging {
+            Averaging::Mean => return summary,
+            Averaging::Huber => 1.0 / 0.95f64.sqrt(),
+            Averaging::Median => std::f64::consts::FRAC_PI_2.sqrt(),
+        };
+        let total = self.weights.iter().fold(0.0, |s, &w| s + w);
+        let squares = self.weights.iter().fold(0.0, |s, &w| s + w * w);
+        if squares == 0.0 {
+            return summary;
+        }
+        let root = total / squares.sqrt();
+        for i in 0..3 {
+            for j in 0..3 {
+                let values: Vec<f64> = self.strains.iter().map(|e| e[(i, j)]).collect();
+                let (centre, spread) = centre_and_spread(&values, &self.weights, averaging);
+                summary.mean[(i, j)] = centre;
+                summary.spread[(i, j)] = spread;
+                summary.standard_error[(i, j)] = spread / root * loss;
+            }
+        }
+        summary
+    }
+
+    /// Weighted mean, spread and standard error.
+    pub fn summary(&self) -> StrainSummary {
+        let mut total = 0.0;
+        let (mut squares, mut mean) = (0.0, Matrix3::zeros());
+        for (e, &w) in self.strains.iter().zip(&self.weights) {
+            total += w;
+            squares += w * w;
+            if total > 0.0 {
+                mean += (e - mean) * (w / total);
+            }
+        }
+        let mut variance = Matrix3::zeros();
+        for (e, &w) in self.strains.iter().zip(&self.weights) {
+            let d = e - mean;
+            variance += d.component_mul(&d) * w;
+        }
+        let effective = if squares > 0.0 {
+            total * total / squares
+        } else {
+            0.0
+        };
+        let (spread, standard_error) = if effective > 1.0 {
+            let unbiased = effective / (effective - 1.0);
+            let variance = variance * (unbiased / total);
+            (
+                variance.map(|v| v.sqrt()),
+                variance.map(|v| (v / effective).sqrt()),
+            )
+        } else {
+            (Matrix3::zeros(), Matrix3::zeros())
+        };
+        let used = self.weights.iter().filter(|&&w| w > 0.0).count();
+        StrainSummary {
+            mean,
+            spread,
+            standard_error,
+            used,
+            folded: self.folded.clone(),
+        }
+    }
+}
+
+fn check_weights(n: usize, weights: &[f64]) -> Result<(), ElasticityError> {
+    if weights.len() != n {
+        return Err(ElasticityError::LengthMismatch {
+            quantity: Quantity::Weight,
+            expected: n,
+            found: weights.len(),
+        });
+    }
+    for &w in weights {
+        not_negative(w, Quantity::Weight)?;
+    }
+    Ok(())
+}
+
+/// How a field is averaged.
+///
+/// ```
+/// use nalgebra::Matrix3;
+/// use tactile_elasticity::field::{Averaging, StrainField};
+/// use tactile_elasticity::strain::Infinitesimal;
+///
+/// // One mismatched point among ten.
+/// let mut gradients = vec![Matrix3::from_diagonal_element(0.01_f64); 10];
+/// gradients[4] *= 100.0;
+/// let field = StrainField::from_gradients(&gradients, None, &Infinitesimal)?;
+/// let mean = |averaging| field.summary_with(averaging).mean[(0, 0)];
+/// assert!((mean(Averaging::Mean) - 0.109).abs() < 1e-12);
+/// assert!((mean(Averaging::Median) - 0.01).abs() < 1e-12);
+/// # Ok::<(), tactile_elasticity::ElasticityError>(())
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum Averaging {
+    /// Weighted mean and standard deviation.
+    #[default]
+    Mean,
+    /// Huber's mean, k = 1.345 (95 % efficient on normal data); spread from the median absolute deviation.
+    Huber,
+    /// Weighted median; spread from the median absolute deviation.
+    Median,
+}
+
+/// Median absolute deviation of normal data over its standard deviation.
+const MAD: f64 = 0.674_489_750_196_081_7;
+/// Huber's constant.
+const K: f64 = 1.345;
+
+/// The value below which half of the weight lies.
+fn weighted_median(values: &[f64], weights: &[f64]) -> f64 {
+    let mut order: Vec<usize> = (0..values.len()).filter(|&i| weights[i] > 0.0).collect();
+    order.sort_by(|&i, &j| {
+        values[i]
+            .partial_cmp(&values[j])
+            .unwrap_or(core::cmp::Ordering::Equal)
+    });
+    let total = order.iter().fold(0.0, |s, &i| s + weights[i]);
+    let half = total * 0.5;
+    let mut below = 0.0;
+    for (k, &i) in order.iter().enumerate() {
+        below += weights[i];
+        if below > half {
+            return values[i];
+        }
+        if below == half {
+            let next = order.get(k + 1).map_or(values[i], |&j| values[j]);
+            return (values[i] + next) * 0.5;
+        }
+    }
+    0.0
+}
+
+/// Centre and spread of one component.
+fn centre_and_spread(values: &[f64], weights: &[f64], how: Averaging) -> (f64, f64) {
+    let median = weighted_median(values, weights);
+    let deviations: Vec<f64> = values.iter().map(|&v| (v - median).abs()).collect();
+    let spread = weighted_median(&deviations, weights) / MAD;
+    if how == Averaging::Median || spread == 0.0 {
+        return (median, spread);
+    }
+    let limit = spread * K;
+    let mut centre = median;
+    for _ in 0..50 {
+        let (mut sum, mut total) = (0.0, 0.0);
+        for (&v, &w) in values.iter().zip(weights) {
+            let away = (v - centre).abs();
+            let w = if away > limit { w * limit / away } else { w };
+            sum += w * (v - centre);
+            total += w;
+        }
+        let step = sum / total;
+        centre += step;
+        if step.abs() <= spread * 1e-7 {
+            break;
+        }
+    }
+    (centre, spread)
+}
+
+// From the covariance of displacements to that of the mean Green–Lagrange strain.
+//
+// A smoothing spline is linear in its data: H(Xᵢ) = Σⱼ uⱼ aᵢⱼᵀ, with aᵢⱼ the gradient at Xᵢ of the j-th point's share.
+// To first order dE = sym(Fᵀ dH), so that the mean is linear in the data too, and its covariance a sum over the points.
+
+/// Order of the components in covariances of strain: xx, yy, zz, xy, xz, yz.
+const PAIRS: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)];
+
+/// Covariance of the Green–Lagrange strain (xx, yy, zz, xy, xz, yz) from that of H, whose nine entries are taken column by column.
+///
+/// ```
+/// use nalgebra::{Matrix3, SMatrix};
+/// use tactile_elasticity::field::strain_covariance;
+///
+/// // Small strains: xx follows its own entry, xy the mean of two.
+/// let covariance = strain_covariance(&Matrix3::zeros(), &(SMatrix::<f64, 9, 9>::identity() * 1e-8));
+/// assert_eq!((covariance[(0, 0)], covariance[(3, 3)]), (1e-8, 0.5e-8));
+/// ```
+pub fn strain_covariance(gradient: &Matrix3<f64>, covariance: &SMatrix<f64, 9, 9>) -> Matrix6<f64> {
+    let f = gradient + Matrix3::identity();
+    let half: f64 = 0.5;
+    // ∂E_ab/∂H_kl = ½(δ_bl F_ka + δ_al F_kb)
+    let jacobian = SMatrix::<f64, 6, 9>::from_fn(|row, column| {
+        let ((a, b), (k, l)) = (PAIRS[row], (column % 3, column / 3));
+        let first = if b == l { f[(k, a)] } else { 0.0 };
+        let second = if a == l { f[(k, b)] } else { 0.0 };
+        (first + second) * half
+    });
+    jacobian * covariance * jacobian.transpose()
+}
+
+/// Covariance of the weighted mean Green–Lagrange strain (xx, yy, zz, xy, xz, yz).
+///
+/// `gradients` and `weights` are those of the sample points i; `influence(i, j)` is aᵢⱼ, how the gradient at sample i follows
+/// data point j; `displacement_covariance[j]` is the covariance of data point j's displacement, independent of the others. O(samples · data).
+///
+/// # Errors
+/// [`ElasticityError::LengthMismatch`], [`ElasticityError::NotPositive`] where the weights add up to nothing.
+///
+/// ```
+/// use nalgebra::{Matrix3, Vector3};
+/// use tactile_elasticity::field::mean_strain_covariance;
+///
+/// // A bar of length 1 whose gradient is the difference of its two ends' displacements, each known to 10⁻⁴.
+/// let influence = |_, end| Vector3::new(if end == 0 { -1.0 } else { 1.0 }, 0.0, 0.0);
+/// let ends = [Matrix3::from_diagonal_element(1e-8); 2];
+/// let covariance = mean_strain_covariance(&[Matrix3::zeros()], &[1.0], influence, &ends)?;
+/// assert!((covariance[(0, 0)] - 2e-8_f64).abs() < 1e-22);
+/// # Ok::<(), tactile_elasticity::ElasticityError>(())
+/// ```
+pub fn mean_strain_covariance(
+    gradients: &[Matrix3<f64>],
+    weights: &[f64],
+    influence: impl Fn(usize, usize) -> Vector3<f64>,
+    displacement_covariance: &[Matrix3<f64>],
+) -> Result<Matrix6<f64>, ElasticityError> {
+    if weights.len() != gradients.len() {
+        let (expected, found) = (gradients.len(), weights.len());
+        return Err(ElasticityError::LengthMismatch {
+            quantity: Quantity::Weight,
+            expected,
+            found,
+        });
+    }
+    let total = weights.iter().fold(0.0, |s, &w| s + w);
+    positive(total, Quantity::Weight)?;
+    let half: f64 = 0.5;
+    let mut sum = Matrix6::zeros();
+    for (j, sigma) in displacement_covariance.iter().enumerate() {
+        // Row ab: what a displacement of point j adds to the mean E_ab.
+        let mut response = SMatrix::<f64, 6, 3>::zeros();
+        for (i, h) in gradients.iter().enumerate() {
+            let (f, a) = (
+                h + Matrix3::identity(),
+                influence(i, j) * (weights[i] / total),
+            );
+            for (row, &(p, q)) in PAIRS.iter().enumerate() {
+                for k in 0..3 {
+                    response[(row, k)] += (f[(k, p)] * a[q] + f[(k, q)] * a[p]) * half;
+                }
+            }
+        }
+        sum += response * sigma * response.transpose();
+    }
+    Ok(sum)
+}
+
+// Three errors go beyond the spread of the strain over the points. Those of a reconstructed surface are shared by neighbours,
+// so that n points know less than n independent ones: residuals of the affine fit are added up over runs of neighbours,
+// and the sums taken as independent (cluster-robust errors: Liang & Zeger, Biometrika 73, 1986). And the contact's edge,
+// to which the points are tied, is known to a part of a pixel: the smaller contact is off by more, relatively. Third, errors of
+// the first surface's points make any fit to them too flat (regression dilution: Fuller, Measurement Error Models, 1987, §1.1).
+
+/// How far, in pixels of the surfaces, the edge of a mask lies from the contact's.
+const EDGE_PX: f64 = 0.5;
+
+/// Standard errors of the mean Green–Lagrange strain between matched points of two reconstructed surfaces.
+///
+/// `grid_m` is the surfaces' pixel in metres. `run_length` is the number of neighbours in the order given that
+/// share the errors of a surface. O(n).
+///
+/// ```
+/// use nalgebra::Point3;
+/// use tactile_elasticity::field::mean_strain_error;
+///
+/// // A dome that grows by a fifth. The edges of both contacts are known to half a pixel.
+/// let dome: Vec<_> = (0..100)
+///     .map(|i| {
+///         let (z, angle) = (1.0 - f64::from(i) / 100.0, 2.4 * f64::from(i));
+///         let r = (1.0 - z * z).sqrt();
+///         Point3::new(r * angle.cos(), r * angle.sin(), z)
+///     })
+///     .collect();
+/// let grown: Vec<_> = dome.iter().map(|p| p * 1.2).collect();
+/// assert!(mean_strain_error(&dome, &grown, 0.0, 10).amax() < 1e-10);
+/// assert!(mean_strain_error(&dome, &grown, 0.1, 10)[(2, 2)] > 0.005);
+/// ```
+pub fn mean_strain_error(
+    sources: &[Point3<f64>],
+    targets: &[Point3<f64>],
+    grid_m: f64,
+    run_length: usize,
+) -> Matrix3<f64> {
+    let [from, to] = [sources, targets].map(Disc::of);
+    let offsets = || pairs_of(sources, targets, [&from, &to]);
+    let spread: Matrix3<f64> = offsets().map(|(d, _)| d * d.transpose()).sum();
+    // What the points do not span they know nothing of: a little of their size keeps the inverse finite.
+    let inverse = (spread + Matrix3::identity() * (1e-12 * spread.trace())).try_inverse();
+    let Some(inverse) = inverse else {
+        return Matrix3::zeros();
+    };
+    let slope = offsets()
+        .map(|(d, t)| t * d.transpose())
+        .sum::<Matrix3<f64>>()
+        * inverse;
+    let gradient = clustered(offsets(), run_length, &slope, &inverse);
+    let along = |k: usize| slope.column(k).norm();
+    let edge = EDGE_PX * grid_m * (from.radius.recip() - to.radius.recip()).abs();
+    let residual: Vector3<f64> = offsets()
+        .map(|(d, t)| t - slope * d)
+        .map(|r| r.component_mul(&r))
+        .sum();
+    // Both surfaces have the same errors, in the units of the first.
+    let dilution = |k: usize| residual[k] * inverse[(k, k)] / (1.0 + along(k).powi(2));
+    Matrix3::from_fn(|j, k| {
+        if j == k {
+            let square = along(j).powi(2);
+            (along(j) * gradient[(j, j)])
+                .hypot(square * edge)
+                .hypot(square * dilution(j))
+        } else {
+            0.5 * (along(j) * gradient[(j, k)]).hypot(along(k) * gradient[(k, j)])
+        }
+    })
+}
+
+/// The disc in the image plane that has the points' centroid and spread.
+struct Disc {
+    centroid: Vector3<f64>,
+    radius: f64,
+}
+
+impl Disc {
+    fn of(points: &[Point3<f64>]) -> Self {
+        let n = points.len() as f64;
+        let centroid = points.iter().map(|p| p.coords).sum::<Vector3<f64>>() / n;
+        let offsets = points.iter().map(|p| p.coords - centroid);
+        let square = offsets.map(|d| d.xy().norm_squared()).sum::<f64>() / n;
+        let radius = (2.0 * square).sqrt().max(f64::MIN_POSITIVE);
+        Self { centroid, radius }
+    }
+}
+
+/// The pairs' offsets from their centroids.
+fn pairs_of<'a>(
+    sources: &'a [Point3<f64>],
+    targets: &'a [Point3<f64>],
+    [from, to]: [&'a Disc; 2],
+) -> impl ExactSizeIterator<Item = (Vector3<f64>, Vector3<f64>)> + 'a {
+    let pairs = sources.iter().zip(targets);
+    pairs.map(|(s, t)| (s.coords - from.centroid, t.coords - to.centroid))
+}
+
+/// Standard errors of the affine gradient's entries, runs of neighbours being independent.
+fn clustered(
+    mut offsets: impl ExactSizeIterator<Item = (Vector3<f64>, Vector3<f64>)>,
+    run_length: usize,
+    slope: &Matrix3<f64>,
+    inverse: &Matrix3<f64>,
+) -> Matrix3<f64> {
+    let runs = offsets.len().div_ceil(run_length);
+    let mut variance = Matrix3::zeros();
+    for _ in 0..runs {
+        let run = offsets.by_ref().take(run_length);
+        let sum: Matrix3<f64> = run.map(|(d, t)| (t - slope * d) * d.transpose()).sum();
+        let share = sum * inverse;
+        variance += share.component_mul(&share);
+    }
+    // The fit itself takes four of the runs' degrees of freedom.
+    let runs = runs as f64;
+    variance.map(|v| (v * runs / (runs - 4.0).max(1.0)).sqrt())
+}
+
+#[cfg(test)]
+#[path = "field_tests.rs"]
+mod tests;

@@ -1,0 +1,81 @@
+use super::*;
+
+use approx::assert_relative_eq;
+
+#[test]
+fn a_shared_error_is_not_averaged_away() {
+    let shared = Covariance::none(0..4)
+        .with_own(|_| 0.2)
+        .with_shared(|_| 0.1);
+    let mean = common_mean(&[1.0, 1.2, 0.9, 0.9], &shared).unwrap();
+    assert_relative_eq!(mean.mean, 1.0, epsilon = 1e-12);
+    assert_relative_eq!(
+        mean.standard_error.powi(2),
+        0.01 + 0.04 / 4.0,
+        max_relative = 1e-12
+    );
+}
+
+/// The mean, its variance, χ² and the weights against the plain formulas with the matrix of all pairs.
+#[test]
+fn shared_errors_give_what_the_matrix_of_all_pairs_gives() {
+    let z = [2.0, 2.3, 1.8, 2.1, 2.6, 1.9];
+    let loads = [0, 0, 1, 2, 2, 3];
+    let own = |i: usize| 0.1 + 0.03 * i as f64;
+    let in_load = |i: usize| 0.2 - 0.02 * i as f64;
+    let scale = |_: usize| 0.3;
+    let slope = |i: usize| 0.05 * (i as f64 - 1.0);
+    let covariance = Covariance::none(loads.into_iter())
+        .with_own(own)
+        .with_shared_in_load(in_load)
+        .with_shared(scale)
+        .with_shared(slope);
+    let dense = DMatrix::from_fn(6, 6, |i, j| {
+        let own = if i == j { own(i).powi(2) } else { 0.0 };
+        let in_load = if loads[i] == loads[j] {
+            in_load(i) * in_load(j)
+        } else {
+            0.0
+        };
+        own + in_load + scale(i) * scale(j) + slope(i) * slope(j)
+    });
+    let inverse = dense.clone().try_inverse().unwrap();
+    let information = inverse.sum();
+    let weights = inverse.column_sum() / information;
+    let mean = weights.dot(&DVector::from_row_slice(&z));
+    let residual = DVector::from_row_slice(&z).add_scalar(-mean);
+    let chi_squared = residual.dot(&(&inverse * &residual));
+
+    // Inverting a matrix of this condition (10²) costs three of sixteen digits.
+    let found = common_mean(&z, &covariance).unwrap();
+    assert_relative_eq!(found.mean, mean, max_relative = 1e-12);
+    assert_relative_eq!(
+        found.standard_error.powi(2),
+        1.0 / information,
+        max_relative = 1e-12
+    );
+    assert_relative_eq!(found.chi_squared, chi_squared, max_relative = 1e-11);
+    assert_relative_eq!(found.weights, weights, max_relative = 1e-11);
+    let variance = weights.dot(&(&dense * &weights));
+    assert_relative_eq!(
+        covariance.variance_of_sum(&weights),
+        variance,
+        max_relative = 1e-12
+    );
+    let given = Covariance::none(loads.into_iter()).with_given(|i, j| dense[(i, j)]);
+    let of_matrix = common_mean(&z, &given).unwrap();
+    assert_relative_eq!(of_matrix.mean, mean, max_relative = 1e-12);
+    assert_relative_eq!(of_matrix.chi_squared, chi_squared, max_relative = 1e-11);
+}
+
+#[test]
+fn a_shared_error_far_above_all_others_costs_no_digits() {
+    let covariance = Covariance::none(0..3)
+        .with_own(|_| 1e-9)
+        .with_shared(|_| 1.0);
+    let found = common_mean(&[1.0, 1.0 + 1e-9, 1.0 - 1e-9], &covariance).unwrap();
+    assert_relative_eq!(found.mean, 1.0, max_relative = 1e-15);
+    assert_relative_eq!(found.standard_error, 1.0, max_relative = 1e-12);
+    // Two residuals of one standard error each; z itself is rounded to 1e-16, a ten-millionth of them.
+    assert_relative_eq!(found.chi_squared, 2.0, max_relative = 1e-6);
+}

@@ -1,0 +1,866 @@
+//! Strain of a deformation gradient.
+//!
+//! F = ∂x/∂X = I + H maps material to space, H = ∂u/∂X. All measures agree to first order in H and are
+//! functions of the stretch U of F = R U:
+//!
+//! | measure | tensor | of a stretch λ |
+//! |---|---|---|
+//! | [`GreenLagrange`] | ½(FᵀF − I) | ½(λ² − 1) |
+//! | [`EulerAlmansi`] | ½(I − F⁻ᵀF⁻¹) | ½(1 − λ⁻²) |
+//! | [`Hencky`] | ln U | ln λ |
+//! | [`Biot`] | U − I | λ − 1 |
+//! | [`Infinitesimal`] | ½(H + Hᵀ) | λ − 1 |
+
+use crate::error::{ElasticityError, Quantity};
+use nalgebra::{Matrix3, Vector3};
+use std::sync::Arc;
+
+/// A way to measure strain: a symmetric tensor that vanishes when the material only moves and turns
+/// (the infinitesimal one: only moves).
+///
+/// Object safe, and a boxed or shared one is one too, so that a program can choose at run time. Cost: Green–Lagrange and infinitesimal
+/// some 10 ns, the others a small eigenvalue problem.
+///
+/// ```
+/// use nalgebra::Matrix3;
+/// use tactile_elasticity::strain::{GreenLagrange, Hencky, StrainMeasure};
+/// let mut h = Matrix3::zeros();
+/// h[(0, 0)] = 0.05; // 5 % stretch along x
+/// let measures: [&dyn StrainMeasure; 2] = [&GreenLagrange, &Hencky];
+/// let exx = measures.map(|m| m.strain(&h).unwrap()[(0, 0)]);
+/// assert!((exx[0] - 0.05125).abs() < 1e-15);
+/// assert!((exx[1] - 1.05f64.ln()).abs() < 1e-15);
+/// ```
+pub trait StrainMeasure {
+    /// The strain of a deformation.
+    ///
+    /// # Errors
+    /// [`ElasticityError::NotFinite`]; and for the measures that need F⁻¹ or U to exist,
+    /// [`ElasticityError::SingularDeformation`] and [`ElasticityError::InvertedDeformation`].
+    ///
+    /// ```
+    /// use nalgebra::Matrix3;
+    /// use tactile_elasticity::strain::{Deformation, Hencky, StrainMeasure};
+    ///
+    /// // Inside out there is no logarithm.
+    /// let inverted = Deformation::from_deformation_gradient(Matrix3::from_diagonal_element(-1.0_f64));
+    /// assert!(Hencky.of(&inverted).is_err());
+    /// ```
+    fn of(&self, deformation: &Deformation) -> Result<Matrix3<f64>, ElasticityError>;
+
+    /// The measure's name, as the field writes it.
+    ///
+    /// ```
+    /// use tactile_elasticity::strain::{GreenLagrange, Hencky, StrainMeasure};
+    ///
+    /// let measures: [&dyn StrainMeasure; 2] = [&GreenLagrange, &Hencky];
+    /// assert_eq!(measures.map(|m| m.name()), ["Green-Lagrange", "Hencky"]);
+    /// ```
+    fn name(&self) -> &'static str;
+
+    /// The strain of a displacement gradient H (F = I + H). Errors as [`of`](Self::of).
+    fn strain(&self, h: &Matrix3<f64>) -> Result<Matrix3<f64>, ElasticityError> {
+        self.of(&Deformation::from_displacement_gradient(*h))
+    }
+}
+
+impl<M: StrainMeasure + ?Sized> StrainMeasure for Box<M> {
+    fn of(&self, deformation: &Deformation) -> Result<Matrix3<f64>, ElasticityError> {
+        (**self).of(deformation)
+    }
+
+    fn name(&self) -> &'static str {
+        (**self).name()
+    }
+
+    fn strain(&self, h: &Matrix3<f64>) -> Result<Matrix3<f64>, ElasticityError> {
+        (**self).strain(h)
+    }
+}
+
+impl<M: StrainMeasure + ?Sized> StrainMeasure for Arc<M> {
+    fn of(&self, deformation: &Deformation) -> Result<Matrix3<f64>, ElasticityError> {
+        (**self).of(deformation)
+    }
+
+    fn name(&self) -> &'static str {
+        (**self).name()
+    }
+
+    fn strain(&self, h: &Matrix3<f64>) -> Result<Matrix3<f64>, ElasticityError> {
+        (**self).strain(h)
+    }
+}
+
+/// E = ½(FᵀF − I) = ½(H + Hᵀ + HᵀH): Lagrangian, conjugate to the second Piola–Kirchhoff stress.
+///
+/// (26)–(30) of the paper print the exponents 3 for 2, and f for the map of positions, so that ∇u = ∇f − I.
+///
+/// ```
+/// use nalgebra::Matrix3;
+/// use tactile_elasticity::strain::{Deformation, GreenLagrange, StrainMeasure};
+///
+/// // A stretch of λ: ½(λ² − 1).
+/// let stretched = Deformation::from_displacement_gradient(Matrix3::from_diagonal_element(0.1));
+/// assert!((GreenLagrange.of(&stretched)?[(0, 0)] - 0.105_f64).abs() < 1e-16);
+/// # Ok::<(), tactile_elasticity::ElasticityError>(())
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct GreenLagrange;
+
+/// e = ½(I − F⁻ᵀF⁻¹) = F⁻ᵀ E F⁻¹: Eulerian, of the deformed state.
+///
+/// ```
+/// use nalgebra::Matrix3;
+/// use tactile_elasticity::strain::{EulerAlmansi, StrainMeasure};
+///
+/// // A stretch of λ: ½(1 − λ⁻²).
+/// let strain = EulerAlmansi.strain(&Matrix3::from_diagonal_element(1.0))?;
+/// assert!((strain[(0, 0)] - 0.375_f64).abs() < 1e-15);
+/// # Ok::<(), tactile_elasticity::ElasticityError>(())
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct EulerAlmansi;
+
+/// ln U, the logarithmic strain in material axes: its trace is ln J, and coaxial steps add up.
+///
+/// ```
+/// use nalgebra::Matrix3;
+/// use tactile_elasticity::strain::{Hencky, StrainMeasure};
+///
+/// // Steps that stretch the same axes add up: 10 % twice is 21 % once.
+/// let strain = |stretch: f64| Hencky.strain(&Matrix3::from_diagonal_element(stretch)).map(|e| e[(0, 0)]);
+/// assert!((2.0 * strain(0.10)? - strain(0.21)?).abs() < 1e-15);
+/// # Ok::<(), tactile_elasticity::ElasticityError>(())
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Hencky;
+
+/// U − I: relative elongations along the principal directions, conjugate to the Biot stress.
+///
+/// ```
+/// use nalgebra::Matrix3;
+/// use tactile_elasticity::strain::{Biot, StrainMeasure};
+///
+/// // A turn by a right angle with 5 % of stretch: the turn does not count.
+/// let turned = Matrix3::new(0.0, -1.05, 0.0, 1.05, 0.0, 0.0, 0.0, 0.0, 1.05) - Matrix3::identity();
+/// assert!((Biot.strain(&turned)?[(0, 0)] - 0.05_f64).abs() < 1e-15);
+/// # Ok::<(), tactile_elasticity::ElasticityError>(())
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Biot;
+
+/// ε = ½(H + Hᵀ): linear in the displacement, wrong by the rotation squared.
+///
+/// ```
+/// use nalgebra::{Matrix3, Rotation3, Vector3};
+/// use tactile_elasticity::strain::{Infinitesimal, StrainMeasure};
+///
+/// // A mere turn by 0.1 rad is taken for a squeeze of 1 − cos 0.1.
+/// let turn = Rotation3::new(Vector3::z() * 0.1_f64).into_inner() - Matrix3::identity();
+/// assert!((Infinitesimal.strain(&turn)?[(0, 0)] - (0.1_f64.cos() - 1.0)).abs() < 1e-15);
+/// # Ok::<(), tactile_elasticity::ElasticityError>(())
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Infinitesimal;
+
+impl StrainMeasure for GreenLagrange {
+    fn of(&self, deformation: &Deformation) -> Result<Matrix3<f64>, ElasticityError> {
+        finite(deformation).map(Deformation::green_lagrange)
+    }
+
+    fn name(&self) -> &'static str {
+        "Green-Lagrange"
+    }
+}
+
+impl StrainMeasure for EulerAlmansi {
+    fn of(&self, deformation: &Deformation) -> Result<Matrix3<f64>, ElasticityError> {
+        upright(deformation)?;
+        let inverse = deformation
+            .inverse()
+            .ok_or(ElasticityError::SingularDeformation)?;
+        let e = deformation.green_lagrange();
+        let quarter: f64 = 0.25;
+        let small = e.iter().all(|x| x.abs() < quarter);
+        let half: f64 = 0.5;
+        let strain = if small {
+            inverse.transpose() * e * inverse
+        } else {
+            (Matrix3::identity() - inverse.transpose() * inverse) * half
+        };
+        Ok((strain + strain.transpose()) * half)
+    }
+
+    fn name(&self) -> &'static str {
+        "Euler-Almansi"
+    }
+}
+
+impl StrainMeasure for Hencky {
+    fn of(&self, deformation: &Deformation) -> Result<Matrix3<f64>, ElasticityError> {
+        upright(deformation)?;
+        let principal = PrincipalStretches::from(deformation);
+        Ok(principal.compose(principal.logarithms))
+    }
+
+    fn name(&self) -> &'static str {
+        "Hencky"
+    }
+}
+
+impl StrainMeasure for Biot {
+    fn of(&self, deformation: &Deformation) -> Result<Matrix3<f64>, ElasticityError> {
+        upright(deformation)?;
+        let principal = PrincipalStretches::from(deformation);
+        Ok(principal.compose(principal.elongations))
+    }
+
+    fn name(&self) -> &'static str {
+        "Biot"
+    }
+}
+
+impl StrainMeasure for Infinitesimal {
+    fn of(&self, deformation: &Deformation) -> Result<Matrix3<f64>, ElasticityError> {
+        let h = finite(deformation)?.displacement_gradient();
+        Ok((h + h.transpose()) * 0.5)
+    }
+
+    fn name(&self) -> &'static str {
+        "infinitesimal"
+    }
+}
+
+fn finite(deformation: &Deformation) -> Result<&Deformation, ElasticityError> {
+    if deformation.is_finite() {
+        Ok(deformation)
+    } else {
+        Err(ElasticityError::NotFinite {
+            quantity: Quantity::DeformationGradient,
+        })
+    }
+}
+
+/// Refuses det F ≤ 0.
+pub fn upright(deformation: &Deformation) -> Result<(), ElasticityError> {
+    let determinant = finite(deformation)?.jacobian();
+    if determinant > 0.0 {
+        Ok(())
+    } else if determinant == 0.0 {
+        Err(ElasticityError::SingularDeformation)
+    } else {
+        Err(ElasticityError::InvertedDeformation { determinant })
+    }
+}
+
+/// F = I + H at a point, given by either, and the other rounded.
+///
+/// Strains of 10⁻¹² and below live in H and are lost when F is formed; stretches of 10⁻⁸ live in F and
+/// are lost when H is. Every measure asks for whichever keeps its digits.
+///
+/// ```
+/// use nalgebra::Matrix3;
+/// use tactile_elasticity::strain::Deformation;
+/// let stretch = Deformation::from_displacement_gradient(Matrix3::from_diagonal_element(1e-20));
+/// assert!((stretch.volume_change() / 3e-20f64 - 1.0).abs() < 1e-15);
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Deformation {
+    f: Matrix3<f64>,
+    h: Matrix3<f64>,
+    given: Given,
+}
+
+/// Which of the two is exact.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Given {
+    F,
+    H,
+}
+
+impl Deformation {
+    /// From H = ∂u/∂X, row = component of u, column = direction of the derivative.
+    pub fn from_displacement_gradient(h: Matrix3<f64>) -> Self {
+        Self {
+            f: h + Matrix3::identity(),
+            h,
+            given: Given::H,
+        }
+    }
+
+    /// From F = ∂x/∂X, the Jacobian of a map of positions.
+    ///
+    /// ```
+    /// use nalgebra::Matrix3;
+    /// use tactile_elasticity::strain::Deformation;
+    ///
+    /// let twice = Deformation::from_deformation_gradient(Matrix3::from_diagonal_element(2.0_f64));
+    /// assert_eq!(twice.jacobian(), 8.0);
+    /// assert_eq!(twice.displacement_gradient(), Matrix3::identity());
+    /// assert_eq!(twice.deformation_gradient()[(2, 2)], 2.0);
+    /// ```
+    pub fn from_deformation_gradient(f: Matrix3<f64>) -> Self {
+        Self {
+            f,
+            h: f - Matrix3::identity(),
+            given: Given::F,
+        }
+    }
+
+    /// F.
+    pub fn deformation_gradient(&self) -> Matrix3<f64> {
+        self.f
+    }
+
+    /// H = F − I.
+    pub fn displacement_gradient(&self) -> Matrix3<f64> {
+        self.h
+    }
+
+    /// True when every entry is a finite number.
+    pub(crate) fn is_finite(&self) -> bool {
+        self.h.iter().all(|x| x.is_finite())
+    }
+
+    /// J − 1 = tr H + II(H) + det H, the relative change of volume, without cancellation.
+    pub fn volume_change(&self) -> f64 {
+        match self.given {
+            Given::F => determinant(&self.f).add(-1.0).value(),
+            Given::H => self.volume_change_from_h(),
+        }
+    }
+
+    /// J = det F; negative where the material is turned inside out.
+    pub fn jacobian(&self) -> f64 {
+        match self.given {
+            Given::F => determinant(&self.f).value(),
+            Given::H => 1.0 + self.volume_change_from_h(),
+        }
+    }
+
+    fn volume_change_from_h(&self) -> f64 {
+        let h = &self.h;
+        let mut sum = determinant(h);
+        for i in 0..3 {
+            let (j, k) = ((i + 1) % 3, (i + 2) % 3);
+            sum = sum
+                .add_product(h[(j, j)], h[(k, k)])
+                .add_product(-h[(j, k)], h[(k, j)]);
+        }
+        sum.add(h[(0, 0)]).add(h[(1, 1)]).add(h[(2, 2)]).value()
+    }
+
+    /// F⁻¹ by cofactors whose differences of products are summed in double-double; None where det F = 0.
+    pub(crate) fn inverse(&self) -> Option<Matrix3<f64>> {
+        let f = &self.f;
+        let det = determinant(f).value();
+        if det == 0.0 {
+            return None;
+        }
+        Some(Matrix3::from_fn(|i, j| {
+            let (r, s) = ((j + 1) % 3, (j + 2) % 3);
+            let (p, q) = ((i + 1) % 3, (i + 2) % 3);
+            let minor = DoubleDouble::zero().add_product(f[(r, p)], f[(s, q)]);
+            minor.add_product(-f[(r, q)], f[(s, p)]).value() / det
+        }))
+    }
+
+    /// E = ½(H + Hᵀ + HᵀH), summed in double-double where the terms cancel (large rotation, little strain).
+    fn green_lagrange(&self) -> Matrix3<f64> {
+        let plain = green_lagrange_plain(&self.h);
+        if cancels(&self.h, &plain) {
+            self.green_lagrange_double_double()
+        } else {
+            plain
+        }
+    }
+
+    fn green_lagrange_double_double(&self) -> Matrix3<f64> {
+        let half: f64 = 0.5;
+        let mut e = Matrix3::zeros();
+        for i in 0..3 {
+            for j in i..3 {
+                let m = if self.given == Given::F {
+                    &self.f
+                } else {
+                    &self.h
+                };
+                let mut sum = DoubleDouble::zero();
+                for k in 0..3 {
+                    sum = sum.add_product(m[(k, i)], m[(k, j)]);
+                }
+                sum = match self.given {
+                    Given::H => sum.add(m[(i, j)]).add(m[(j, i)]),
+                    Given::F if i == j => sum.add(-1.0),
+                    Given::F => sum,
+                };
+                e[(i, j)] = half * sum.value();
+                e[(j, i)] = e[(i, j)];
+            }
+        }
+        e
+    }
+}
+
+/// ½(H + Hᵀ + HᵀH) in working precision.
+#[inline(always)]
+fn green_lagrange_plain(h: &Matrix3<f64>) -> Matrix3<f64> {
+    let half: f64 = 0.5;
+    let term = |i: usize, j: usize| {
+        let product = h[(0, i)] * h[(0, j)] + h[(1, i)] * h[(1, j)] + h[(2, i)] * h[(2, j)];
+        half * ((h[(i, j)] + h[(j, i)]) + product)
+    };
+    let (xx, yy, zz) = (term(0, 0), term(1, 1), term(2, 2));
+    let (xy, xz, yz) = (term(0, 1), term(0, 2), term(1, 2));
+    Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz)
+}
+
+/// Whether E is so much smaller than what it was summed from that more than two digits are gone.
+#[inline(always)]
+fn cancels(h: &Matrix3<f64>, e: &Matrix3<f64>) -> bool {
+    // Summed as trees: a chain of additions would take longer than the strain itself.
+    let of_h = ((h[(0, 0)].abs() + h[(1, 1)].abs()) + (h[(2, 2)].abs() + h[(0, 1)].abs()))
+        + ((h[(1, 0)].abs() + h[(0, 2)].abs())
+            + (h[(2, 0)].abs() + (h[(1, 2)].abs() + h[(2, 1)].abs())));
+    let diagonal = (e[(0, 0)].abs() + e[(1, 1)].abs()) + e[(2, 2)].abs();
+    let shear = (e[(0, 1)].abs() + e[(0, 2)].abs()) + e[(1, 2)].abs();
+    let many: f64 = 128.0;
+    (diagonal + shear) * many < of_h
+}
+
+fn determinant(m: &Matrix3<f64>) -> DoubleDouble {
+    let mut sum = DoubleDouble::zero();
+    for i in 0..3 {
+        let (j, k) = ((i + 1) % 3, (i + 2) % 3);
+        sum = sum.add_triple(m[(0, i)], m[(1, j)], m[(2, k)]);
+        sum = sum.add_triple(-m[(0, i)], m[(1, k)], m[(2, j)]);
+    }
+    sum
+}
+
+// Sums of products carried in twice the working precision.
+//
+// Knuth's two-sum and the fused two-product (Ogita, Rump & Oishi 2005, "Accurate sum and dot product").
+
+/// An unevaluated sum `hi + lo`, |lo| no more than half an ulp of `hi`.
+#[derive(Clone, Copy, Debug)]
+struct DoubleDouble {
+    hi: f64,
+    lo: f64,
+}
+
+/// a + b exactly.
+fn two_sum(a: f64, b: f64) -> DoubleDouble {
+    let hi = a + b;
+    let of_b = hi - a;
+    DoubleDouble {
+        hi,
+        lo: (a - (hi - of_b)) + (b - of_b),
+    }
+}
+
+/// a · b exactly (unless it underflows).
+fn two_product(a: f64, b: f64) -> DoubleDouble {
+    let hi = a * b;
+    DoubleDouble {
+        hi,
+        lo: a.mul_add(b, -hi),
+    }
+}
+
+impl DoubleDouble {
+    fn zero() -> Self {
+        Self { hi: 0.0, lo: 0.0 }
+    }
+
+    fn add(self, x: f64) -> Self {
+        let sum = two_sum(self.hi, x);
+        let low = self.lo + sum.lo;
+        let hi = sum.hi + low;
+        Self {
+            hi,
+            lo: low - (hi - sum.hi),
+        }
+    }
+
+    fn add_sum(self, other: Self) -> Self {
+        self.add(other.lo).add(other.hi)
+    }
+
+    /// self + a·b.
+    fn add_product(self, a: f64, b: f64) -> Self {
+        self.add_sum(two_product(a, b))
+    }
+
+    /// self + a·b·c.
+    fn add_triple(self, a: f64, b: f64, c: f64) -> Self {
+        let ab = two_product(a, b);
+        self.add(ab.lo * c).add_product(ab.hi, c)
+    }
+
+    fn value(self) -> f64 {
+        self.hi + self.lo
+    }
+}
+
+/// The right stretch U in its principal axes, largest stretch first.
+///
+/// ```
+/// use nalgebra::{Matrix3, Vector3};
+/// use tactile_elasticity::strain::{Deformation, PrincipalStretches};
+///
+/// let deformation = Deformation::from_displacement_gradient(Matrix3::from_diagonal(&Vector3::new(0.0, 1e-20, -0.05)));
+/// let principal = PrincipalStretches::from(&deformation);
+/// assert!((principal.elongations[0] / 1e-20_f64 - 1.0).abs() < 1e-12);
+/// assert!((principal.stretches[2] - 0.95).abs() < 1e-15);
+/// assert!((principal.directions.column(2)[2].abs() - 1.0).abs() < 1e-15);
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub struct PrincipalStretches {
+    /// λᵢ, the singular values of F.
+    pub stretches: [f64; 3],
+    /// λᵢ − 1, without cancellation where the strain is small.
+    pub elongations: [f64; 3],
+    /// ln λᵢ, likewise; −∞ where λᵢ = 0.
+    pub logarithms: [f64; 3],
+    /// Column i is the material direction vᵢ, of length 1.
+    pub directions: Matrix3<f64>,
+}
+
+impl From<&Deformation> for PrincipalStretches {
+    /// Of a deformation; needs finite entries.
+    ///
+    /// Near the identity they come from the eigenvalues 2E of C − I, which keeps every digit of a tiny strain;
+    /// elsewhere from the singular values of F by one-sided Jacobi, which keeps every digit of a tiny stretch.
+    fn from(deformation: &Deformation) -> Self {
+        let e = deformation.green_lagrange();
+        let quarter: f64 = 0.25;
+        let largest = e.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
+        // |eigenvalue| ≤ 3 max |e|: within this bound C is between ½I and 3⁄2 I.
+        if largest * 3.0 <= quarter {
+            Self::from_small_strain(&e)
+        } else {
+            Self::from_singular_values(deformation)
+        }
+    }
+}
+
+impl PrincipalStretches {
+    fn from_small_strain(e: &Matrix3<f64>) -> Self {
+        let (values, directions) = symmetric_eigen(e);
+        let two: f64 = 2.0;
+        let elongation = |x: f64| two * x / (1.0 + (1.0 + two * x).sqrt());
+        let elongations = values.map(elongation);
+        Self {
+            stretches: elongations.map(|x| 1.0 + x),
+            elongations,
+            logarithms: values.map(|x| (two * x).ln_1p() / two),
+            directions,
+        }
+    }
+
+    fn from_singular_values(deformation: &Deformation) -> Self {
+        let (mut s, directions) = one_sided_jacobi(&deformation.deformation_gradient());
+        let thousandth: f64 = 1e-3;
+        if s[2] < s[0] * thousandth && s[1] > 0.0 {
+            // λ₁λ₂λ₃ = |J|, and J is accurate to its last digit.
+            s[2] = deformation.jacobian().abs() / s[0] / s[1];
+        }
+        Self {
+            stretches: s,
+            elongations: s.map(|x| x - 1.0),
+            logarithms: s.map(|x| if x > 0.0 { x.ln() } else { f64::MIN }),
+            directions,
+        }
+    }
+
+    /// Σ gᵢ vᵢ vᵢᵀ.
+    fn compose(&self, g: [f64; 3]) -> Matrix3<f64> {
+        let mut sum = Matrix3::zeros();
+        for (i, &gi) in g.iter().enumerate() {
+            let v: Vector3<f64> = self.directions.column(i).into();
+            for r in 0..3 {
+                for c in r..3 {
+                    sum[(r, c)] += gi * v[r] * v[c];
+                }
+            }
+        }
+        for r in 0..3 {
+            for c in 0..r {
+                sum[(r, c)] = sum[(c, r)];
+            }
+        }
+        sum
+    }
+}
+
+/// Rotation (c, s) that makes the off-diagonal of [[app, apq], [apq, aqq]] vanish.
+fn jacobi_rotation(app: f64, aqq: f64, apq: f64) -> (f64, f64, f64) {
+    let two: f64 = 2.0;
+    let theta = (aqq - app) / (two * apq);
+    let t = 1.0 / (theta.abs() + (theta * theta + 1.0).sqrt());
+    let t = if theta < 0.0 { -t } else { t };
+    let c = 1.0 / (t * t + 1.0).sqrt();
+    (c, t * c, t)
+}
+
+/// Eigenvalues (largest first) and eigenvectors of a symmetric matrix by cyclic Jacobi rotations.
+fn symmetric_eigen(m: &Matrix3<f64>) -> ([f64; 3], Matrix3<f64>) {
+    let mut a = *m;
+    let mut v = Matrix3::identity();
+    for _ in 0..32 {
+        let mut done = true;
+        for (p, q) in [(0, 1), (0, 2), (1, 2)] {
+            let apq = a[(p, q)];
+            let scale = a[(p, p)].abs().max(a[(q, q)].abs());
+            if apq == 0.0 || (scale + apq.abs() == scale && apq.abs() < scale * f64::EPSILON) {
+                continue;
+            }
+            done = false;
+            let (c, s, t) = jacobi_rotation(a[(p, p)], a[(q, q)], apq);
+            let r = 3 - p - q;
+            a[(p, p)] -= t * apq;
+            a[(q, q)] += t * apq;
+            (a[(p, q)], a[(q, p)]) = (0.0, 0.0);
+            let (arp, arq) = (a[(r, p)], a[(r, q)]);
+            (a[(r, p)], a[(r, q)]) = (c * arp - s * arq, s * arp + c * arq);
+            (a[(p, r)], a[(q, r)]) = (a[(r, p)], a[(r, q)]);
+            rotate_columns(&mut v, p, q, c, s);
+        }
+        if done {
+            break;
+        }
+    }
+    sorted([a[(0, 0)], a[(1, 1)], a[(2, 2)]], v)
+}
+
+/// Singular values (largest first) and right singular vectors of `f` by one-sided Jacobi (Hestenes).
+fn one_sided_jacobi(f: &Matrix3<f64>) -> ([f64; 3], Matrix3<f64>) {
+    let scale = f.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
+    if scale == 0.0 {
+        return ([0.0; 3], Matrix3::identity());
+    }
+    let mut w = f / scale;
+    let mut v = Matrix3::identity();
+    for _ in 0..32 {
+        let mut done = true;
+        for (p, q) in [(0, 1), (0, 2), (1, 2)] {
+            let (app, aqq) = (w.column(p).norm_squared(), w.column(q).norm_squared());
+            let apq = w.column(p).dot(&w.column(q));
+            if apq.abs() <= f64::EPSILON * (app * aqq).sqrt() {
+                continue;
+            }
+            done = false;
+            let (c, s, _) = jacobi_rotation(app, aqq, apq);
+            rotate_columns(&mut w, p, q, c, s);
+            rotate_columns(&mut v, p, q, c, s);
+        }
+        if done {
+            break;
+        }
+    }
+    sorted([0, 1, 2].map(|i| w.column(i).norm() * scale), v)
+}
+
+fn rotate_columns(m: &mut Matrix3<f64>, p: usize, q: usize, c: f64, s: f64) {
+    for r in 0..3 {
+        let (a, b) = (m[(r, p)], m[(r, q)]);
+        (m[(r, p)], m[(r, q)]) = (c * a - s * b, s * a + c * b);
+    }
+}
+
+fn sorted(values: [f64; 3], v: Matrix3<f64>) -> ([f64; 3], Matrix3<f64>) {
+    let mut order = [0, 1, 2];
+    order.sort_by(|&i, &j| {
+        values[j]
+            .partial_cmp(&values[i])
+            .unwrap_or(core::cmp::Ordering::Equal)
+    });
+    let columns = order.map(|i| v.column(i).into_owned());
+    (order.map(|i| values[i]), Matrix3::from_columns(&columns))
+}
+
+/// Principal values, largest first, and their directions.
+///
+/// ```
+/// use nalgebra::Matrix3;
+/// use tactile_elasticity::strain::PrincipalValues;
+/// let shear = Matrix3::new(0.0, 0.5, 0.0, 0.5, 0.0, 0.0, 0.0, 0.0, 0.0);
+/// assert_eq!(PrincipalValues::from(&shear).values, [0.5, 0.0, -0.5]);
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub struct PrincipalValues {
+    /// The eigenvalues, largest first.
+    pub values: [f64; 3],
+    /// Column i is the direction of value i, of length 1.
+    pub directions: Matrix3<f64>,
+}
+
+impl From<&Matrix3<f64>> for PrincipalValues {
+    /// Of a symmetric tensor.
+    fn from(tensor: &Matrix3<f64>) -> Self {
+        let (values, directions) = symmetric_eigen(tensor);
+        Self { values, directions }
+    }
+}
+
+/// I₁ = tr A, I₂ = ½(tr² A − tr A²), I₃ = det A.
+///
+/// ```
+/// use nalgebra::{Matrix3, Vector3};
+/// use tactile_elasticity::strain::Invariants;
+/// let i = Invariants::from(&Matrix3::from_diagonal(&Vector3::new(1.0, 2.0, 3.0)));
+/// assert_eq!((i.first, i.second, i.third), (6.0, 11.0, 6.0));
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub struct Invariants {
+    /// I₁, for a small strain the relative change of volume.
+    pub first: f64,
+    /// I₂.
+    pub second: f64,
+    /// I₃.
+    pub third: f64,
+}
+
+impl From<&Matrix3<f64>> for Invariants {
+    /// Of a tensor.
+    fn from(a: &Matrix3<f64>) -> Self {
+        let minor = |i: usize, j: usize| a[(i, i)] * a[(j, j)] - a[(i, j)] * a[(j, i)];
+        Self {
+            first: a.trace(),
+            second: minor(0, 1) + minor(0, 2) + minor(1, 2),
+            third: a.determinant(),
+        }
+    }
+}
+
+/// Equivalent strain √(⅔ dev A : dev A), dev A = A − ⅓ tr A I.
+///
+/// The form conjugate to the von Mises stress of an incompressible solid; the other one in use,
+/// √(3⁄2 e:e)/(1 + ν), is the same at ν = ½ only.
+///
+/// ```
+/// use nalgebra::{Matrix3, Vector3};
+/// use tactile_elasticity::strain::von_mises_strain;
+/// let isochoric = Matrix3::from_diagonal(&Vector3::new(0.02, -0.01, -0.01));
+/// assert!((von_mises_strain(&isochoric) - 0.02f64).abs() < 1e-17);
+/// ```
+pub fn von_mises_strain(a: &Matrix3<f64>) -> f64 {
+    scaled_norm(&deviator(a), 2.0 / 3.0)
+}
+
+/// A − ⅓ tr A I.
+pub fn deviator(a: &Matrix3<f64>) -> Matrix3<f64> {
+    // Differences of the diagonal: exact where its entries are close, and zero for c·I.
+    let third: f64 = 1.0 / 3.0;
+    let (x, y, z) = (a[(0, 0)], a[(1, 1)], a[(2, 2)]);
+    let mut dev = *a;
+    dev[(0, 0)] = ((x - y) + (x - z)) * third;
+    dev[(1, 1)] = ((y - x) + (y - z)) * third;
+    dev[(2, 2)] = ((z - x) + (z - y)) * third;
+    dev
+}
+
+/// √(factor · a:a), scaled so that squares neither underflow nor overflow.
+pub fn scaled_norm(a: &Matrix3<f64>, factor: f64) -> f64 {
+    let scale = a.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
+    if scale == 0.0 {
+        return scale;
+    }
+    (a / scale).norm() * factor.sqrt() * scale
+}
+
+/// The Green–Lagrange strain of every displacement gradient, written to `strains`; allocates nothing.
+///
+/// The same bits as [`GreenLagrange`] one at a time; a gradient that is not finite gives NaN there
+/// and leaves its neighbours alone.
+///
+/// # Errors
+/// [`ElasticityError::LengthMismatch`] where the slices differ in length.
+///
+/// ```
+/// use nalgebra::Matrix3;
+/// use tactile_elasticity::strain::green_lagrange_into;
+/// let gradients = vec![Matrix3::from_diagonal_element(0.1); 100];
+/// let mut strains = vec![Matrix3::zeros(); 100];
+/// green_lagrange_into(&gradients, &mut strains)?;
+/// assert!((strains[99][(0, 0)] - 0.105f64).abs() < 1e-16);
+/// # Ok::<(), tactile_elasticity::ElasticityError>(())
+/// ```
+pub fn green_lagrange_into(
+    gradients: &[Matrix3<f64>],
+    strains: &mut [Matrix3<f64>],
+) -> Result<(), ElasticityError> {
+    same_length(gradients, strains)?;
+    fill(gradients, strains);
+    Ok(())
+}
+
+/// [`green_lagrange_into`] over rayon's threads: the same bits.
+///
+/// # Errors
+/// As [`green_lagrange_into`].
+///
+/// ```
+/// use nalgebra::Matrix3;
+/// use tactile_elasticity::strain::{green_lagrange_into, green_lagrange_par_into};
+///
+/// let gradients = vec![Matrix3::from_diagonal_element(0.1_f64); 10_000];
+/// let (mut serial, mut parallel) = (vec![Matrix3::zeros(); 10_000], vec![Matrix3::zeros(); 10_000]);
+/// green_lagrange_into(&gradients, &mut serial)?;
+/// green_lagrange_par_into(&gradients, &mut parallel)?;
+/// assert_eq!(serial, parallel);
+/// # Ok::<(), tactile_elasticity::ElasticityError>(())
+/// ```
+#[cfg(feature = "rayon")]
+pub fn green_lagrange_par_into(
+    gradients: &[Matrix3<f64>],
+    strains: &mut [Matrix3<f64>],
+) -> Result<(), ElasticityError> {
+    use rayon::prelude::*;
+    const CHUNK: usize = 4096;
+    same_length(gradients, strains)?;
+    gradients
+        .par_chunks(CHUNK)
+        .zip(strains.par_chunks_mut(CHUNK))
+        .for_each(|(h, e)| fill(h, e));
+    Ok(())
+}
+
+fn same_length<A, B>(gradients: &[A], strains: &[B]) -> Result<(), ElasticityError> {
+    let (expected, found) = (gradients.len(), strains.len());
+    if expected == found {
+        return Ok(());
+    }
+    Err(ElasticityError::LengthMismatch {
+        quantity: Quantity::Strain,
+        expected,
+        found,
+    })
+}
+
+fn fill(gradients: &[Matrix3<f64>], strains: &mut [Matrix3<f64>]) {
+    for (h, strain) in gradients.iter().zip(strains) {
+        let plain = green_lagrange_plain(h);
+        *strain = if cancels(h, &plain) {
+            careful(h)
+        } else {
+            plain
+        };
+    }
+}
+
+#[cold]
+fn careful(h: &Matrix3<f64>) -> Matrix3<f64> {
+    GreenLagrange
+        .strain(h)
+        .unwrap_or_else(|_| Matrix3::repeat(f64::NAN))
+}
+
+#[cfg(test)]
+#[path = "strain_tests.rs"]
+mod tests;
