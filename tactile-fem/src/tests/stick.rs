@@ -55,7 +55,13 @@ fn over_closed_forms(poisson_ratio: f64, elements: usize) -> [f64; 2] {
         let mut model = half_space_of(poisson_ratio, &lines, 0.04 / elements as f64, shape);
         model.forbid_slip();
         let force = model.solve(&[AppliedLoad::Approach(approach)]).states[0].force_n();
-        force / (modulus * law.log_force_at_indentation(approach, 0.0).unwrap().value.exp())
+        force
+            / (modulus
+                * law
+                    .log_force_at_indentation(approach, 0.0)
+                    .unwrap()
+                    .value
+                    .exp())
     };
     let sphere = NoSlipLaw::sphere(1.0, poisson_ratio).unwrap();
     let cone = NoSlipLaw::cone(tangent, poisson_ratio).unwrap();
