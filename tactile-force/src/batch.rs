@@ -9,8 +9,8 @@ use crate::frame::ReferenceFrame;
 use crate::measure::{ForceMeasurement, ForceMeter, ForceWorkspace};
 
 impl ForceMeter {
-    /// Measures frames on all threads of the current pool; the results are those of [`measure_with`](Self::measure_with) frame by frame,
-    /// bit for bit.
+    /// Measures frames on all threads of the current pool. The results are those of
+    /// [`measure_with`](Self::measure_with) frame by frame, bit for bit.
     ///
     /// ```
     /// use ndarray::Array2;

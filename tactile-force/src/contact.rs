@@ -1,11 +1,11 @@
 //! Where the object touches: detection against the noise, and the contact's sums.
 //!
-//! A frame is first tested by the one pass over it ([`FrameStatistics`]). Contact is suspected where
-//! one pixel, or one tile of 8 × 32 pixels, differs from the reference by more than its noise allows
-//! at the stated false-alarm rate *per frame*. Only there a mask is made: smooth if the contact is
-//! faint, threshold, keep the largest component, fill its holes. Sums run over the mask grown by a
-//! margin (the *aperture*) with signed differences, so that the edge, where the signal is below the
-//! noise, is not cut off.
+//! A frame is first tested by the one pass over it ([`FrameStatistics`]). Contact is suspected
+//! where one pixel, or one tile of 8 × 32 pixels, differs from the reference by more than its noise
+//! allows at the stated false-alarm rate *per frame*. Only there a mask is made: smooth if the
+//! contact is faint, threshold, keep the largest component, fill its holes. Sums run over the mask
+//! grown by a margin (the *aperture*) with signed differences, so that the edge, where the signal
+//! is below the noise, is not cut off.
 
 use ndarray::{ArrayView2, Axis, Slice};
 use statrs::function::erf::erfc_inv;
@@ -56,7 +56,8 @@ pub struct Contact {
     pub aperture_px: usize,
     /// Saturated pixels of the mask (255 if brighter, 0 if darker).
     pub saturated_px: usize,
-    /// Other patches of contact in the frame's region, each at least a hundredth of this one; they are not part of it.
+    /// Other patches of contact in the frame's region, each at least a hundredth of this one. They
+    /// are not part of it.
     pub other_contacts: usize,
     /// The aperture reaches the edge of the frame: part of the contact may be missing.
     pub touches_edge: bool,
@@ -124,14 +125,16 @@ pub struct ContactOptions {
 }
 
 impl Default for ContactOptions {
-    /// Brighter contact, one false alarm in a thousand frames, smoothing chosen by the signal, a margin of 4 pixels, at least 4
-    /// pixels of contact, no correction of drift, at most 1 % of the contact saturated.
+    /// Brighter contact, one false alarm in a thousand frames, smoothing chosen by the signal, a
+    /// margin of 4 pixels, at least 4 pixels of contact, no correction of drift, at most 1 % of the
+    /// contact saturated.
     fn default() -> Self {
         Self {
             polarity: Polarity::Brighter,
             false_alarm_rate: 1e-3,
             smoothing_px: None,
-            // Beyond 4 pixels the blurred edge of a sharp lens is below the noise; more adds noise to the force alone.
+            // Beyond 4 pixels the blurred edge of a sharp lens is below the noise. More adds noise
+            // to the force alone.
             margin_px: 4,
             minimum_area_px: 4,
             drift: DriftCorrection::None,
@@ -156,8 +159,9 @@ impl ContactOptions {
         Ok(self)
     }
 
-    /// Smooths with a box of this odd width in pixels. By default the narrowest is taken that puts the threshold below a tenth
-    /// of the contact's signal (1, no smoothing, for all but faint contacts).
+    /// Smooths with a box of this odd width in pixels. By default the narrowest is taken that puts
+    /// the threshold below a tenth of the contact's signal (1, no smoothing, for all but faint
+    /// contacts).
     ///
     /// # Errors
     /// A width that is even.
@@ -262,8 +266,8 @@ pub struct DetectorWorkspace {
 }
 
 impl DetectorWorkspace {
-    /// The mask of the last frame's contact (1 inside, 0 outside) over a region, and the region's place in the frame; `None`
-    /// if there was no contact.
+    /// The mask of the last frame's contact (1 inside, 0 outside) over a region, and the region's
+    /// place in the frame; `None` if there was no contact.
     pub fn mask(&self) -> Option<(BoundingBox, ArrayView2<'_, u8>)> {
         let place = self.region.place?;
         let view =
@@ -271,8 +275,9 @@ impl DetectorWorkspace {
         Some((place, view))
     }
 
-    /// Brightness and noise of the last frame outside the contact, against the reference that it was compared with; `None` if no
-    /// frame of the reference's size was. From at most 1,500 tiles of 8 × 32 pixels, evenly over the frame, or all of a smaller one: O(tiles).
+    /// Brightness and noise of the last frame outside the contact, against the reference that it
+    /// was compared with; `None` if no frame of the reference's size was. From at most 1,500 tiles
+    /// of 8 × 32 pixels, evenly over the frame, or all of a smaller one: O(tiles).
     ///
     /// ```
     /// # use ndarray::Array2;
@@ -295,8 +300,9 @@ impl DetectorWorkspace {
         FrameCondition::of(size, tiles.step_by(step), sd, &mut self.drift)
     }
 
-    /// The grey histogram of the last frame's contact over its aperture, each pixel covering `pixel_area_m2`: a row of the fit of a
-    /// [`PressureCurve`](crate::PressureCurve). `None` if there was no contact.
+    /// The grey histogram of the last frame's contact over its aperture, each pixel covering
+    /// `pixel_area_m2`: a row of the fit of a [`PressureCurve`](crate::PressureCurve). `None` if
+    /// there was no contact.
     ///
     /// ```
     /// use ndarray::Array2;
@@ -433,7 +439,8 @@ impl ContactDetector {
         drift::fit(self.options.drift, size, tiles, sd, &mut workspace.drift)
     }
 
-    /// The mask in a region around the suspect pixels, which grows while the aperture meets its border.
+    /// The mask in a region around the suspect pixels, which grows while the aperture meets its
+    /// border.
     fn segment(
         &self,
         region: &mut Region,
@@ -499,7 +506,7 @@ impl ContactDetector {
         }
     }
 
-    /// Number of saturated pixels of the mask; an error where their share exceeds the limit.
+    /// Number of saturated pixels of the mask. An error where their share exceeds the limit.
     fn saturated(
         &self,
         region: &Region,
@@ -573,7 +580,8 @@ fn peak(region: &Region) -> f32 {
         .fold(0.0, f32::max)
 }
 
-/// The box one pixel larger on every side, whether or not the frame is; a box at the first row or column cannot be.
+/// The box one pixel larger on every side, whether or not the frame is. A box at the first row or
+/// column cannot be.
 fn grown_freely(b: BoundingBox) -> BoundingBox {
     BoundingBox {
         row_start: b.row_start.wrapping_sub(1),
@@ -583,7 +591,8 @@ fn grown_freely(b: BoundingBox) -> BoundingBox {
     }
 }
 
-/// The narrowest odd box for which the threshold on its mean, limit/width, is a tenth of the signal or less.
+/// The narrowest odd box for which the threshold on its mean, limit/width, is a tenth of the signal
+/// or less.
 fn smoothing_width(limit: f64, signal: f64) -> usize {
     let width = (10.0 * limit / signal.max(1.0)).ceil().clamp(1.0, 31.0) as usize;
     width | 1
@@ -602,7 +611,8 @@ impl ContactDetector {
     ) -> Option<BoundingBox> {
         let size = (statistics.rows, statistics.columns);
         let bright = self.bright_tiles(&pass.tiles, reference, size, drift, sd);
-        // Pixels were compared with their limit before the drift was known; that holds while the drift is well below the limit.
+        // Pixels were compared with their limit before the drift was known. That holds while the
+        // drift is well below the limit.
         let pixels = statistics
             .bounding_box
             .filter(|_| drift.greatest_grey(size, reference.mean_grey()) < 0.3 * pixel_limit);
@@ -624,7 +634,8 @@ impl ContactDetector {
             let tile = reference.tile_sum(tiles, k);
             f64::from(sign) * drift.residual(&tile) > z * tile.pixels.sqrt()
         };
-        // The last tile of a band is its smallest: a band whose sums stay below that tile's noise has no bright tile.
+        // The last tile of a band is its smallest: a band whose sums stay below that tile's noise
+        // has no bright tile.
         let below_noise = |band: usize| {
             drift.is_zero() && {
                 let last = reference.tile_sum(tiles, (band + 1) * tiles.columns - 1);
@@ -641,8 +652,8 @@ impl ContactDetector {
     }
 }
 
-/// The z with P(N > z) = rate / trials for a standard normal N: among `trials` values one exceeds it with
-/// probability at most `rate`.
+/// The z with P(N > z) = rate / trials for a standard normal N: among `trials` values one exceeds
+/// it with probability at most `rate`.
 fn quantile(rate: f64, trials: usize) -> f64 {
     let tail = rate / trials.max(1) as f64;
     std::f64::consts::SQRT_2 * erfc_inv(2.0 * tail)

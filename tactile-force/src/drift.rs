@@ -7,7 +7,7 @@ use tactile_core::BoundingBox;
 
 use crate::frame::{TILE_COLUMNS, TILE_ROWS, TileSum};
 
-/// The change of illumination or stray light that is corrected; none by default.
+/// The change of illumination or stray light that is corrected. None by default.
 ///
 /// ```
 /// use ndarray::Array2;
@@ -36,9 +36,11 @@ pub enum DriftCorrection {
     Plane,
     /// Illumination brighter or darker, background and signal alike: d = f/g − r.
     Illumination,
-    /// Illumination that also changed its distribution, as when an LED moves: d = f/(g + gₓ x + g_y y) − r.
+    /// Illumination that also changed its distribution, as when an LED moves: d = f/(g + gₓ x + g_y
+    /// y) − r.
     TiltedIllumination,
-    /// [`Illumination`](Self::Illumination) where the frame shows it, nothing where it does not: [`DriftOutcome`] says which.
+    /// [`Illumination`](Self::Illumination) where the frame shows it, nothing where it does not:
+    /// [`DriftOutcome`] states which.
     Automatic,
 }
 
@@ -72,13 +74,14 @@ pub enum DriftOutcome {
     NotRequested,
     /// The drift was estimated and corrected.
     Corrected,
-    /// The background is too dark beside its noise: the illumination would be known to no better than this standard error, where
-    /// 0.5 % is required. Nothing was corrected.
+    /// The background is too dark beside its noise: the illumination would be known to no better
+    /// than this standard error, where 0.5 % is required. Nothing was corrected.
     TooDark {
         /// Standard error of the relative illumination.
         standard_error: f64,
     },
-    /// Less than half of the frame agrees on one illumination, as under a contact that covers most of it. Nothing was corrected.
+    /// Less than half of the frame agrees on one illumination, as under a contact that covers most
+    /// of it. Nothing was corrected.
     TooLittleBackground {
         /// Share of the tiles that agree.
         share: f64,
@@ -102,8 +105,8 @@ impl DriftCorrection {
     }
 }
 
-/// The drift found in one frame. `coefficients` are [value, per column, per row] about the frame's middle: grey
-/// levels for stray light, shares for illumination.
+/// The drift found in one frame. `coefficients` are [value, per column, per row] about the frame's
+/// middle: grey levels for stray light, shares for illumination.
 ///
 /// ```
 /// use ndarray::Array2;
@@ -126,7 +129,8 @@ pub struct IlluminationDrift {
     pub correction: DriftCorrection,
     /// Whether the drift is known.
     pub outcome: DriftOutcome,
-    /// Offset (grey levels) or relative illumination (1 for unchanged) in the frame's middle, and its change per column and per row.
+    /// Offset (grey levels) or relative illumination (1 for unchanged) in the frame's middle, and
+    /// its change per column and per row.
     pub coefficients: [f64; 3],
     /// Standard error of the first coefficient.
     pub standard_error: f64,
@@ -183,7 +187,8 @@ impl IlluminationDrift {
         }
     }
 
-    /// Variances due to the correction's own error at a place: of the background in squared grey levels, and of the signal's scale.
+    /// Variances due to the correction's own error at a place: of the background in squared grey
+    /// levels, and of the signal's scale.
     pub(crate) fn variances(&self, x: f64, y: f64) -> [f64; 2] {
         let at = [1.0, x - self.middle[0], y - self.middle[1]];
         let mut variance = 0.0;
@@ -199,7 +204,8 @@ impl IlluminationDrift {
         }
     }
 
-    /// Background that the correction subtracts from a frame at a place where the reference is `reference`.
+    /// Background that the correction subtracts from a frame at a place where the reference is
+    /// `reference`.
     fn level(&self, x: f64, y: f64, reference: f64) -> f64 {
         let at = self.at(x, y);
         if self.correction.is_multiplicative() {
@@ -215,8 +221,8 @@ impl IlluminationDrift {
         value + per_column * (x - self.middle[0]) + per_row * (y - self.middle[1])
     }
 
-    /// The greatest background that the correction removes anywhere in a frame of a given size, in grey levels, for a reference
-    /// of even brightness `mean`.
+    /// The greatest background that the correction removes anywhere in a frame of a given size, in
+    /// grey levels, for a reference of even brightness `mean`.
     pub(crate) fn greatest_grey(&self, (rows, columns): (usize, usize), mean: f64) -> f64 {
         if self.is_zero() {
             return 0.0;
@@ -241,7 +247,7 @@ impl IlluminationDrift {
         tile.difference - background
     }
 
-    /// The automatic correction if it is sure enough, else none and the reason.
+    /// The automatic correction if its error is small enough, else none and the reason.
     fn accepted(self, tiles: &[TileSum], sd: f64) -> Self {
         let (mut agree, mut all) = (0.0, 0.0);
         for tile in tiles {
@@ -390,19 +396,18 @@ pub(crate) fn fit(
     drift
 }
 
-/// One in so many values is looked at first; a quarter of those of a frame's 5 700 tiles that are few enough to sort cost more
-/// to collect than they leave out.
-const SAMPLED: usize = 32;
-
-/// The upper median, by [`f64::total_cmp`] (0 of no values); `scratch` is overwritten. A sample brackets it, so that most values are only counted.
-/// The answer does not depend on the sample: where the bracket missed, all values are looked through.
+/// The upper median, by [`f64::total_cmp`] (0 of no values); `scratch` is overwritten. A sample
+/// brackets it, so that most values are only counted. The answer does not depend on the sample:
+/// where the bracket missed, all values are looked through.
 pub(crate) fn median(values: &[f64], scratch: &mut Vec<f64>) -> f64 {
     if values.is_empty() {
         return 0.0;
     }
     let middle = values.len() / 2;
     scratch.clear();
-    scratch.extend(values.iter().step_by(SAMPLED));
+    // One in 32 values is looked at first. A quarter of those of a frame's 5 700 tiles that are few
+    // enough to sort cost more to collect than they leave out.
+    scratch.extend(values.iter().step_by(32));
     scratch.sort_unstable_by(f64::total_cmp);
     // Three standard deviations of a sample's rank, ½√n each.
     let reach = (1.5 * (scratch.len() as f64).sqrt()).ceil() as usize;
@@ -410,7 +415,8 @@ pub(crate) fn median(values: &[f64], scratch: &mut Vec<f64>) -> f64 {
     let low = scratch[centre.saturating_sub(reach)];
     let high = scratch[(centre + reach).min(scratch.len() - 1)];
     if low <= high {
-        // A value that is not a number, whatever its sign, is neither below nor above: it is among those looked at.
+        // A value that is not a number, whatever its sign, is neither below nor above: it is among
+        // those looked at.
         scratch.resize(values.len(), 0.0);
         let (mut below, mut between, mut whole) = (0, 0, true);
         for value in values {
@@ -435,8 +441,8 @@ pub(crate) fn median(values: &[f64], scratch: &mut Vec<f64>) -> f64 {
 /// How far the light of a frame without contact is from the reference's, in grey levels: the mean
 /// difference of the block of 8 × 8 pixels where it is greatest.
 ///
-/// `None` up to 4 grey levels, which noise may be, and for images that differ in size. A shift means
-/// other light, or that frame and reference were swapped. O(pixels).
+/// `None` up to 4 grey levels, which noise may be, and for images that differ in size. A shift
+/// means other light, or that frame and reference were swapped. O(pixels).
 ///
 /// ```
 /// use ndarray::Array2;
@@ -469,9 +475,9 @@ pub fn background_shift(frame: ArrayView2<'_, u8>, reference: ArrayView2<'_, u8>
 
 /// The median of frame minus reference outside a contact's box, in grey levels, from some 24 rows.
 ///
-/// `None` with fewer than 100 pixels, whose median is not known to a grey level, and for images that
-/// differ in size. A mean would follow the surroundings of the contact: a dent in a dark sensor is
-/// wider than the contact. O(rows looked at).
+/// `None` with fewer than 100 pixels, whose median is not known to a grey level, and for images
+/// that differ in size. A mean would follow the surroundings of the contact: a dent in a dark
+/// sensor is wider than the contact. O(rows looked at).
 ///
 /// ```
 /// use ndarray::Array2;

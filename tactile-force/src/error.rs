@@ -5,8 +5,8 @@ use thiserror::Error;
 
 /// The reason why an input was rejected.
 ///
-/// No contact is a value, a fit that does not converge is a report, and a calibration used outside its range is a
-/// flag: none of them is an error.
+/// No contact is a value, a fit that does not converge is a report, and a calibration used outside
+/// its range is a flag: none of them is an error.
 ///
 /// ```
 /// use ndarray::Array2;
@@ -82,7 +82,8 @@ pub enum ForceError {
         /// Spread of the input.
         span: f64,
     },
-    /// The fitted force falls where the pixel value rises, and a monotone calibration was asked for.
+    /// The fitted force falls where the pixel value rises, and a monotone calibration was asked
+    /// for.
     #[error("the force falls from pixel value {from} to {to}")]
     NotMonotone {
         /// Pixel value at which the force starts to fall.

@@ -19,7 +19,8 @@ pub fn vectorized<W: pulp::NullaryFnOnce>(work: W) -> W::Output {
     work.call()
 }
 
-/// What one pass tells of the signed difference d = frame − reference of a whole frame, exact in integers.
+/// Sums and extremes of the signed difference d = frame − reference of a whole frame, exact in
+/// integers.
 ///
 /// Differences keep their sign: clamping the negative ones to zero would turn noise into force.
 ///
@@ -58,8 +59,8 @@ pub struct FrameStatistics {
 
 /// Variance of one pixel of one frame: read variance + gain × grey level, in squared grey levels.
 ///
-/// The read variance includes the 1/12 of rounding to whole grey levels. The gain is the camera's: grey levels per
-/// photoelectron, so that the shot noise of a grey level g is gain × g.
+/// The read variance includes the 1/12 of rounding to whole grey levels. The gain is the camera's:
+/// grey levels per photoelectron, so that the shot noise of a grey level g is gain × g.
 ///
 /// ```
 /// use ndarray::Array2;
@@ -76,14 +77,14 @@ pub struct FrameStatistics {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct NoiseModel {
-    /// Variance at grey level zero, in squared grey levels; at least 1/12.
+    /// Variance at grey level zero, in squared grey levels. At least 1/12.
     pub read_variance: f64,
     /// Growth of the variance per grey level, in grey levels.
     pub gain: f64,
 }
 
-/// Variance of one pixel's difference frame − reference, background + gain × difference in squared grey levels, and the
-/// variances of errors that all pixels share.
+/// Variance of one pixel's difference frame − reference, background + gain × difference in squared
+/// grey levels, and the variances of errors that all pixels share.
 ///
 /// ```
 /// use tactile_force::DifferenceNoise;
@@ -128,9 +129,6 @@ impl DifferenceNoise {
 /// Variance of rounding to whole numbers.
 pub const QUANTISATION: f64 = 1.0 / 12.0;
 
-/// Absolute values that the response of a frame's second differences may have: up to 16 × 255.
-const RESPONSES: usize = 4081;
-
 impl NoiseModel {
     /// From the standard deviation of the read noise (rounding excluded) and the gain.
     ///
@@ -152,9 +150,9 @@ impl NoiseModel {
 
     /// White noise of a frame without contact, from its second differences in both directions.
     ///
-    /// The response of [1 −2 1; −2 4 −2; 1 −2 1] has 36 times the variance of a pixel and none of a quadratic background
-    /// (Immerkær 1996). Responses beyond three standard deviations are left out, again and again, and the variance of
-    /// what stays is corrected for the cut tails.
+    /// The response of [1 −2 1. −2 4 −2. 1 −2 1] has 36 times the variance of a pixel and none of a
+    /// quadratic background (Immerkær 1996). Responses beyond three standard deviations are left
+    /// out, again and again, and the variance of what stays is corrected for the cut tails.
     fn of_frame(frame: ArrayView2<'_, u8>) -> Self {
         let columns = frame.ncols();
         let mut counts = Counts::new();
@@ -223,8 +221,8 @@ fn respond<'a>(
 /// Responses below this are counted in pairs.
 const SMALL: u16 = 64;
 
-/// Counts of a frame's responses. Two neighbours that are both small, as nearly all are, are counted in one place: half the writes, which are
-/// what counting waits for.
+/// Counts of a frame's responses. Two neighbours that are both small, as nearly all are, are
+/// counted in one place: half the writes, which are what counting waits for.
 struct Counts {
     pairs: Vec<u32>,
     single: Vec<u32>,
@@ -234,7 +232,9 @@ impl Counts {
     fn new() -> Self {
         Self {
             pairs: vec![0; usize::from(SMALL).pow(2)],
-            single: vec![0; RESPONSES],
+            // Absolute values that the response of a frame's second differences may have: up to 16
+            // × 255.
+            single: vec![0; 4081],
         }
     }
 
@@ -267,7 +267,8 @@ impl Counts {
     }
 }
 
-/// Variance of a normal sample given as a histogram of absolute values, with everything beyond 3 sd left out.
+/// Variance of a normal sample given as a histogram of absolute values, with everything beyond 3 sd
+/// left out.
 pub fn trimmed_variance(histogram: &[u64]) -> f64 {
     // Variance of a standard normal cut at ±3: 1 − 6 φ(3)/(2Φ(3) − 1).
     const CUT: f64 = 0.973_336_950_7;
@@ -295,9 +296,11 @@ pub fn trimmed_variance(histogram: &[u64]) -> f64 {
     variance
 }
 
-/// Brightness relative to the frame's middle: a quadratic L(x, y) in x and y, least squares over the tiles of a reference frame.
+/// Brightness relative to the frame's middle: a quadratic L(x, y) in x and y, least squares over
+/// the tiles of a reference frame.
 ///
-/// Where stray light reaches the camera through the same lens as the signal, the reference shows the vignetting of both.
+/// Where stray light reaches the camera through the same lens as the signal, the reference shows
+/// the vignetting of both.
 ///
 /// ```
 /// use ndarray::Array2;
@@ -317,7 +320,8 @@ pub fn trimmed_variance(histogram: &[u64]) -> f64 {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct FlatField {
-    /// Coefficients of 1, u, v, u², uv, v², with u and v running from −1 to 1 over the frame; the first is 1.
+    /// Coefficients of 1, u, v, u², uv, v², with u and v running from −1 to 1 over the frame. The
+    /// first is 1.
     pub coefficients: [f64; 6],
     middle: [f64; 2],
     /// Covariance of the unscaled coefficients over the square of the first.
@@ -339,8 +343,8 @@ impl FlatLine {
 }
 
 impl FlatField {
-    /// `None` if the reference is black or has too few tiles for six coefficients.
-    /// `variance` is that of one pixel of the reference.
+    /// `None` if the reference is black or has too few tiles for six coefficients. `variance` is
+    /// that of one pixel of the reference.
     fn fit(
         (rows, columns): (usize, usize),
         tiles: impl Iterator<Item = TileSum>,
@@ -406,7 +410,8 @@ fn terms(middle: [f64; 2], x: f64, y: f64) -> [f64; 6] {
 /// Longest side for which every integer sum of the pass fits its type: 16384⁴/3 · 255 < 2⁶³.
 const LONGEST_SIDE: usize = 16_384;
 
-/// A frame of the unpressed sensor, its noise and its sums, prepared once and compared with many frames.
+/// A frame of the unpressed sensor, its noise and its sums, prepared once and compared with many
+/// frames.
 ///
 /// ```
 /// use ndarray::Array2;
@@ -424,7 +429,7 @@ const LONGEST_SIDE: usize = 16_384;
 #[derive(Clone, Debug)]
 pub struct ReferenceFrame {
     image: Array2<u8>,
-    /// The mean of several frames, finer than whole grey levels; one frame is its own.
+    /// The mean of several frames, finer than whole grey levels. One frame is its own.
     mean: Option<Array2<f32>>,
     frames: usize,
     noise: NoiseModel,
@@ -450,7 +455,7 @@ pub struct PassWorkspace {
 }
 
 impl ReferenceFrame {
-    /// From one frame; its noise is estimated from its second differences in both directions.
+    /// From one frame. Its noise is estimated from its second differences in both directions.
     ///
     /// # Errors
     /// An empty image, or a side longer than 16384 pixels.
@@ -458,15 +463,17 @@ impl ReferenceFrame {
         Self::from_frames(&[image])
     }
 
-    /// From the mean of several frames of the unpressed sensor: its own noise falls with their number, and the noise of a
-    /// frame is that of each pixel from frame to frame, whatever the texture of the image.
+    /// From the mean of several frames of the unpressed sensor: its own noise falls with their
+    /// number, and the noise of a frame is that of each pixel from frame to frame, whatever the
+    /// texture of the image.
     ///
     /// # Errors
     /// No frame, an empty one, a side longer than 16384 pixels, or frames that differ in size.
     pub fn from_frames(frames: &[ArrayView2<'_, u8>]) -> Result<Self, ForceError> {
         let size = common_size(frames)?;
         let mean = (frames.len() > 1).then(|| mean_of(frames, size));
-        // To the nearest, halves upwards: exact, and the standard library's rounding is a function call a pixel.
+        // To the nearest, halves upwards: exact, and the standard library's rounding is a function
+        // call a pixel.
         let image = match &mean {
             None => frames[0].as_standard_layout().into_owned(),
             Some(mean) => mean.mapv(|m| (f64::from(m) + 0.5) as u8),
@@ -503,8 +510,9 @@ impl ReferenceFrame {
         self
     }
 
-    /// Corrects every difference for vignetting: divides it by the brightness that the reference itself has there, relative to
-    /// the frame's middle, smoothed to a quadratic. A calibration then holds wherever the contact lies.
+    /// Corrects every difference for vignetting: divides it by the brightness that the reference
+    /// itself has there, relative to the frame's middle, smoothed to a quadratic. A calibration
+    /// then holds wherever the contact lies.
     ///
     /// Right where stray light and signal come through the same lens.
     ///
@@ -544,7 +552,7 @@ impl ReferenceFrame {
         self.flat
     }
 
-    /// The image; the mean of several frames, rounded.
+    /// The image. The mean of several frames, rounded.
     pub fn image(&self) -> ArrayView2<'_, u8> {
         self.image.view()
     }
@@ -580,7 +588,7 @@ impl ReferenceFrame {
         Ok(self.compare_with(&mut PassWorkspace::default(), frame, threshold))
     }
 
-    /// The pass proper; the frame has the reference's size.
+    /// The pass proper. The frame has the reference's size.
     pub(crate) fn compare_with(
         &self,
         workspace: &mut PassWorkspace,
@@ -814,7 +822,8 @@ pub struct TileSum {
     pub difference: f64,
 }
 
-/// The tiles of an image in standard layout and of nonzero size, and the number of its pixels at 255. `band` is scratch.
+/// The tiles of an image in standard layout and of nonzero size, and the number of its pixels at
+/// 255. `band` is scratch.
 fn scan(image: &[u8], size: (usize, usize), tiles: &mut Tiles, band: &mut Vec<u8>) -> usize {
     tiles.reset(size);
     let mut saturated = 0;
@@ -826,7 +835,8 @@ fn scan(image: &[u8], size: (usize, usize), tiles: &mut Tiles, band: &mut Vec<u8
             darkest: &mut tiles.darkest[here],
             brightest,
         };
-        // As memory has them, pixels that come from far arrive in half the time that they take where tiles fetch them from eight rows in turn.
+        // As memory has them, pixels that come from far arrive in half the time that they take
+        // where tiles fetch them from eight rows in turn.
         band.clear();
         band.extend_from_slice(rows);
         summarise_band(band, size.1, of_band);
@@ -863,7 +873,8 @@ fn summarise_band(rows: &[u8], width: usize, mut tiles: OfTiles<'_>) {
 }
 
 impl FrameStatistics {
-    /// The tiles give extremes on their own side of zero only; where every difference is on one side, computes them anew.
+    /// The tiles give extremes on their own side of zero only. Where every difference is on one
+    /// side, computes them anew.
     fn correct_extremes(&mut self, frame: ArrayView2<'_, u8>, reference: ArrayView2<'_, u8>) {
         let all_equal = self.least == 0 && self.greatest == 0;
         if all_equal || (self.least < 0 && self.greatest > 0) {
@@ -892,7 +903,7 @@ struct OfTiles<'a> {
 }
 
 impl OfTiles<'_> {
-    /// The first so many tiles.
+    /// The first tiles, of this number.
     fn first(&mut self, number: usize) -> OfTiles<'_> {
         OfTiles {
             sums: &mut self.sums[..number],
@@ -902,8 +913,8 @@ impl OfTiles<'_> {
     }
 }
 
-/// Summarises the tiles of a strip by the widest instructions that the processor has: integers, so that no result depends on
-/// which.
+/// Summarises the tiles of a strip by the widest instructions that the processor has: integers, so
+/// that no result depends on which.
 fn summarise(rows: Rows<'_>, tiles: OfTiles<'_>) {
     #[cfg(target_arch = "x86_64")]
     if let Some(simd) = pulp::x86::V3::try_new() {
@@ -912,7 +923,8 @@ fn summarise(rows: Rows<'_>, tiles: OfTiles<'_>) {
     each(&Plain, rows, tiles);
 }
 
-/// Tile after tile, so that nothing but its sums leaves the registers: row after row, as memory has the pixels, takes several times as long.
+/// Tile after tile, so that nothing but its sums leaves the registers: row after row, as memory has
+/// the pixels, takes several times as long.
 #[inline(always)]
 fn each(instructions: &impl Summarise, rows: Rows<'_>, tiles: OfTiles<'_>) {
     let number = tiles.sums.len();
@@ -947,7 +959,7 @@ impl Summarise for Plain {
                 high[j] = high[j].max(f[j]);
             }
             for j in 0..TILE_COLUMNS {
-                // Eight times 255 fits; checked, the sum would be taken pixel by pixel.
+                // Eight times 255 fits. Checked, the sum would be taken pixel by pixel.
                 columns[j] = columns[j].wrapping_add(u16::from(f[j]));
             }
         }
@@ -961,7 +973,8 @@ impl Summarise for Plain {
     }
 }
 
-/// AVX2, whose sum of absolute differences adds eight bytes at once, which no plain loop becomes: a quarter of the plain loops' time.
+/// AVX2, whose sum of absolute differences adds eight bytes at once, which no plain loop becomes: a
+/// quarter of the plain loops' time.
 #[cfg(target_arch = "x86_64")]
 mod avx2 {
     use std::arch::x86_64::{__m128i, __m256i};

@@ -8,7 +8,7 @@ fn pairs_are_counted_like_single_responses() {
         (0..799).map(|k| k * 37 % 71).collect(),
         (0..33).map(|k| k * 127).collect(),
     ];
-    let (mut counts, mut expected) = (Counts::new(), vec![0; RESPONSES]);
+    let (mut counts, mut expected) = (Counts::new(), vec![0; 4081]);
     for responses in &rows {
         counts.add(responses);
         responses.iter().for_each(|&r| expected[r as usize] += 1);
@@ -29,7 +29,8 @@ fn responses_are_those_of_the_mask() {
 }
 
 proptest! {
-    /// By plain loops and by whatever instructions this machine has: those of the pixels one by one.
+    /// By plain loops and by whatever instructions this machine has: those of the pixels one by
+    /// one.
     #[test]
     fn a_tile_is_its_pixels(
         pixels in proptest::collection::vec(any::<u8>(), TILE_ROWS * TILE_COLUMNS), low in 0_u8..255, span in 0_u8..=255

@@ -31,24 +31,27 @@ pub struct FrameCondition {
     pub brightness: Estimate,
     /// Mean grey level of the background.
     pub background_grey: f64,
-    /// Scatter of the background over what the reference's noise explains, as a ratio of standard deviations.
+    /// Scatter of the background over what the reference's noise explains, as a ratio of standard
+    /// deviations.
     pub noise_ratio: f64,
 }
 
-/// Tiles that a condition is read from. The ratio of noise, a median, is known from so many to 3 %, where charts look for 20 %, and the
-/// brightness to a hundredth of what they look for. All 5,764 tiles of a frame of 1392 × 1042 pixels take five times as long, a fifth of the
-/// time that contact and force take (`cargo bench -p tactile-benches --bench pipeline`, a frame without contact).
-const MOST_TILES: usize = 1500;
-
 impl FrameCondition {
-    /// Every how many of `tiles`, in rows of `columns`, are looked at. No divisor in common with the columns: else whole columns were never seen.
+    /// Every how many of `tiles`, in rows of `columns`, are looked at. No divisor in common with
+    /// the columns: else whole columns were never seen.
     pub(crate) fn tile_step(tiles: usize, columns: usize) -> usize {
-        let least = tiles.div_ceil(MOST_TILES).max(1);
+        // Tiles that a condition is read from. The ratio of noise, a median, is known from these to
+        // 3 %, where charts look for 20 %, and the brightness to a hundredth of what they look for.
+        // All 5,764 tiles of a frame of 1392 × 1042 pixels take five times as long, a fifth of the
+        // time that contact and force take (`cargo bench -p tactile-benches --bench pipeline`, a
+        // frame without contact).
+        let least = tiles.div_ceil(1500).max(1);
         let shares_none = |step: &usize| greatest_common_divisor(*step, columns) == 1;
         (least..).find(shares_none).unwrap_or(least)
     }
 
-    /// From the tiles of a frame of the given size; `sd` is the noise of one pixel's difference. `None` without background.
+    /// From the tiles of a frame of the given size; `sd` is the noise of one pixel's difference.
+    /// `None` without background.
     pub(crate) fn of(
         size: (usize, usize),
         tiles: impl Iterator<Item = TileSum>,
@@ -128,14 +131,15 @@ pub struct HealthOptions {
 }
 
 impl Default for HealthOptions {
-    /// A change of brightness by 2 % or of noise by 20 %, one false alarm in 40 000 frames, a baseline of 400 frames.
+    /// A change of brightness by 2 % or of noise by 20 %, one false alarm in 40 000 frames, a
+    /// baseline of 400 frames.
     fn default() -> Self {
         Self {
             brightness_change: 0.02,
             noise_change: 0.2,
             // Half as often as one in 20 000: the baseline's own scatter takes the rest.
             false_alarm_interval: 40_000.0,
-            // Five seconds at 80 frames a second; a mean known to a twentieth of a frame's scatter.
+            // Five seconds at 80 frames a second. A mean known to a twentieth of a frame's scatter.
             baseline_frames: 400,
         }
     }
@@ -201,7 +205,8 @@ pub enum ChartState {
     Healthy,
     /// The mean has changed.
     Changed,
-    /// Frames scatter so much that a change as small as asked for would take this number of frames to find, more than fifty.
+    /// Frames scatter so much that a change as small as asked for would take this number of frames
+    /// to find, more than fifty.
     Insensitive {
         /// Mean number of frames until the change would be found.
         delay_frames: f64,
@@ -234,13 +239,15 @@ impl HealthReport {
     }
 }
 
-/// Follows a sensor's condition and tells lasting changes from noise: two cumulative-sum charts, after a baseline of healthy frames.
+/// Follows a sensor's condition and separates lasting changes from noise: two cumulative-sum
+/// charts, after a baseline of healthy frames.
 ///
-/// Thresholds come from Siegmund's approximation of the run length. With frames whose brightness scatters by 0.5 %, a change
-/// of 2 % is found in 5 frames on average; where it scatters by 2.9 % (±5 % from frame to frame) in some 45. O(1) a frame.
+/// Thresholds come from Siegmund's approximation of the run length. With frames whose brightness
+/// scatters by 0.5 %, a change of 2 % is found in 5 frames on average. Where it scatters by 2.9 %
+/// (±5 % from frame to frame) in some 45. O(1) a frame.
 ///
-/// The background shows the product of illumination and camera gain, so a change of either is seen; light that leaks from
-/// contacts can also change on its own, which only a known load shows.
+/// The background shows the product of illumination and camera gain, so a change of either is seen.
+/// Light that leaks from contacts can also change on its own, which only a known load shows.
 ///
 /// ```
 /// use tactile_force::{ChartState, Estimate, FrameCondition, HealthMonitor, HealthOptions};
@@ -339,8 +346,9 @@ impl Chart {
 /// Standard scores beyond this count as this: one odd frame is no drift.
 const CLIP: f64 = 4.0;
 
-/// A two-sided cumulative-sum chart (E. S. Page, Biometrika 41 (1954) 100–115) of standard scores z:
-/// S⁺ ← max(0, S⁺ + z − k), S⁻ ← max(0, S⁻ − z − k), alarm at S > h. It is the likelihood-ratio test of a shift by 2k.
+/// A two-sided cumulative-sum chart (E. S. Page, Biometrika 41 (1954) 100–115) of standard scores
+/// z: S⁺ ← max(0, S⁺ + z − k), S⁻ ← max(0, S⁻ − z − k), alarm at S > h. It is the likelihood-ratio
+/// test of a shift by 2k.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Cusum {
     allowance: f64,
@@ -350,11 +358,11 @@ struct Cusum {
 }
 
 impl Cusum {
-    /// A chart for a shift of `shift` standard deviations with one false alarm in `interval` frames on average, where the mean
-    /// is known to `mean_error` standard deviations.
+    /// A chart for a shift of `shift` standard deviations with one false alarm in `interval` frames
+    /// on average, where the mean is known to `mean_error` standard deviations.
     fn new(shift: f64, interval: f64, mean_error: f64) -> Self {
-        // Half the shift is optimal. Beyond 2 standard deviations one or two frames show it anyway, and the approximation of the
-        // threshold holds no more.
+        // Half the shift is optimal. Beyond 2 standard deviations one or two frames show it anyway,
+        // and the approximation of the threshold holds no more.
         let allowance = 0.5 * shift.min(2.0);
         Self {
             allowance,
@@ -364,7 +372,7 @@ impl Cusum {
         }
     }
 
-    /// Takes the next score; whether the chart is in alarm. It stays so until the scores return.
+    /// Takes the next score. Whether the chart is in alarm. It stays so until the scores return.
     fn update(&mut self, score: f64) -> bool {
         let score = score.clamp(-CLIP, CLIP);
         // What a return needs is bounded, so that a long alarm ends when its cause does.
@@ -384,15 +392,17 @@ impl Cusum {
     }
 }
 
-/// Siegmund's approximation of the mean run length of a one-sided chart whose sums drift by Δ a frame (D. Siegmund, *Sequential
-/// Analysis*, 1985, section 2.6): (e^(−2Δb) + 2Δb − 1)/(2Δ²) with b = h + 1.166.
+/// Siegmund's approximation of the mean run length of a one-sided chart whose sums drift by Δ a
+/// frame (D. Siegmund, *Sequential Analysis*, 1985, section 2.6): (e^(−2Δb) + 2Δb − 1)/(2Δ²) with b
+/// = h + 1.166.
 fn run_length(drift: f64, threshold: f64) -> f64 {
     let b = threshold + 1.166;
     let twice = 2.0 * drift * b;
     ((-twice).exp() + twice - 1.0) / (2.0 * drift * drift)
 }
 
-/// The h for which both sides together give one false alarm in `interval` frames: each side in twice as many.
+/// The h for which both sides together give one false alarm in `interval` frames: each side in
+/// twice as many.
 fn threshold(allowance: f64, interval: f64) -> f64 {
     let (mut low, mut high) = (0.0, 1.0);
     while run_length(-allowance, high) < 2.0 * interval {
@@ -409,10 +419,12 @@ fn threshold(allowance: f64, interval: f64) -> f64 {
     high
 }
 
-/// Finds pixels whose grey level does not change while their neighbours' do: dead, hot or stuck ones.
+/// Finds pixels whose grey level does not change while their neighbours' do: dead, hot or stuck
+/// ones.
 ///
-/// Feed it frames some time apart, loads among them: a pixel is stuck if it has kept one grey level over all frames while at least
-/// five of its eight neighbours have changed in a quarter of them. O(pixels) a frame.
+/// Feed it frames some time apart, loads among them: a pixel is stuck if it has kept one grey level
+/// over all frames while at least five of its eight neighbours have changed in a quarter of them.
+/// O(pixels) a frame.
 ///
 /// ```
 /// use ndarray::Array2;
@@ -433,10 +445,6 @@ pub struct StuckPixels {
     changes: Array2<u16>,
     frames: u16,
 }
-
-/// Fewest frames before a pixel can be called stuck. Of a healthy pixel that rounds to one of two levels at random all
-/// differences between 16 frames vanish once in 2¹⁵.
-const FEWEST_FRAMES: u16 = 16;
 
 impl StuckPixels {
     /// A search in frames of the given size (rows, columns).
@@ -479,9 +487,11 @@ impl StuckPixels {
         Ok(())
     }
 
-    /// The stuck pixels as (row, column); none before sixteen frames.
+    /// The stuck pixels as (row, column). None before sixteen frames.
     pub fn pixels(&self) -> Vec<(usize, usize)> {
-        if self.frames < FEWEST_FRAMES {
+        // Fewest frames before a pixel can be called stuck. Of a healthy pixel that rounds to one
+        // of two levels at random all differences between 16 frames vanish once in 2¹⁵.
+        if self.frames < 16 {
             return Vec::new();
         }
         let unchanged = self.changes.indexed_iter().filter(|(_, c)| **c == 0);
@@ -491,7 +501,8 @@ impl StuckPixels {
             .collect()
     }
 
-    /// Number of neighbours that changed in a quarter of the frames; those beyond the frame's edge count as the others do.
+    /// Number of neighbours that changed in a quarter of the frames. Those beyond the frame's edge
+    /// count as the others do.
     fn lively_neighbours(&self, (row, column): (usize, usize)) -> usize {
         let (mut lively, mut all) = (0, 0);
         for y in row.saturating_sub(1)..=row + 1 {

@@ -1,20 +1,22 @@
-//! Camera geometry: from pixels to metres on the sensor's surface, with radial distortion and pixels
-//! that are not square, and its fit to a dot target.
+//! Camera geometry: from pixels to metres on the sensor's surface, with radial distortion and
+//! pixels that are not square, and its fit to a dot target.
 
 use nalgebra::{Matrix2, Matrix3, SMatrix, SVector, Vector2, Vector3};
 use tactile_core::{Estimate, Requirement, StopReason};
 
 use crate::error::ForceError;
 
-/// The map from pixels to undistorted metres: pixel sizes h_x and h_y, and Brown's radial distortion about a centre c.
+/// The map from pixels to undistorted metres: pixel sizes h_x and h_y, and Brown's radial
+/// distortion about a centre c.
 ///
 /// With (u, v) = p − c in pixels and ρ² = (u² + (v h_y/h_x)²)/R²,
 ///
 /// X = h_x (c_x + u s), Y = h_y (c_y + v s), s = 1 + k₁ρ² + k₂ρ⁴
 ///
-/// (D. C. Brown, "Decentering distortion of lenses", 1966, without its tangential terms). R is a length in pixels, half the
-/// frame's diagonal by custom, which makes k₁ and k₂ numbers: the share by which the corners are moved. Barrel distortion of the
-/// image has k₁ > 0, pincushion k₁ < 0. Without distortion a place is its pixel times the pixel's size.
+/// (D. C. Brown, "Decentering distortion of lenses", 1966, without its tangential terms). R is a
+/// length in pixels, half the frame's diagonal by custom, which makes k₁ and k₂ numbers: the share
+/// by which the corners are moved. Barrel distortion of the image has k₁ > 0, pincushion k₁ < 0.
+/// Without distortion a place is its pixel times the pixel's size.
 ///
 /// ```
 /// use tactile_force::LensGeometry;
@@ -72,7 +74,8 @@ impl TryFrom<Unchecked> for LensGeometry {
 
 /// Points of a contour that is undistorted.
 const DIRECTIONS: usize = 16;
-/// Radius of the ring, as a share of the contact's, on which a quadratic has the mean that it has over Hertz's pressure: √0.4.
+/// Radius of the ring, as a share of the contact's, on which a quadratic has the mean that it has
+/// over Hertz's pressure: √0.4.
 const HERTZ_RADIUS: f64 = 0.632_455_532_033_675_9;
 
 /// Value and derivatives of the map at a pixel.
@@ -102,8 +105,8 @@ impl LensGeometry {
     /// Adds radial distortion [k₁, k₂] about a centre [x, y], normalised by `radius_px`.
     ///
     /// # Errors
-    /// A centre or coefficient that is not finite, a radius that is not positive, or a distortion that folds the image within the
-    /// radius: 1 + 3k₁ρ² + 5k₂ρ⁴ must stay positive up to ρ = 1.
+    /// A centre or coefficient that is not finite, a radius that is not positive, or a distortion
+    /// that folds the image within the radius: 1 + 3k₁ρ² + 5k₂ρ⁴ must stay positive up to ρ = 1.
     pub fn with_distortion(
         mut self,
         centre_px: [f64; 2],
@@ -143,13 +146,14 @@ impl LensGeometry {
         self.distortion
     }
 
-    /// The undistorted place [X, Y] of a pixel [x, y], in metres from where the first pixel would be without distortion.
+    /// The undistorted place [X, Y] of a pixel [x, y], in metres from where the first pixel would
+    /// be without distortion.
     pub fn to_metres(&self, pixel: [f64; 2]) -> [f64; 2] {
         self.local(pixel).metres
     }
 
-    /// The pixel [x, y] of a place in metres, by Newton's method; `None` where no pixel within three radii of the centre is seen
-    /// there.
+    /// The pixel [x, y] of a place in metres, by Newton's method; `None` where no pixel within
+    /// three radii of the centre is seen there.
     pub fn to_pixels(&self, metres: [f64; 2]) -> Option<[f64; 2]> {
         let undistorted = |k: usize| metres[k] / self.pixel_size_m[k];
         let mut pixel = [undistorted(0), undistorted(1)];
@@ -179,7 +183,8 @@ impl LensGeometry {
         None
     }
 
-    /// Distances [x, y] in metres that one pixel step covers at a pixel: h_x and h_y without distortion.
+    /// Distances [x, y] in metres that one pixel step covers at a pixel: h_x and h_y without
+    /// distortion.
     pub(crate) fn pixel_step_m(&self, pixel: [f64; 2]) -> [f64; 2] {
         let [[xu, xv], [yu, yv]] = self.local(pixel).jacobian;
         [xu.hypot(yu), xv.hypot(yv)]
@@ -191,8 +196,9 @@ impl LensGeometry {
         (xu * yv - xv * yu).abs()
     }
 
-    /// Mean area of a pixel over a ball's contact around a centre [x, y], weighted with Hertz's pressure: right to second order
-    /// in the contact's radius. dS of (6) for a contact that is not small beside the frame.
+    /// Mean area of a pixel over a ball's contact around a centre [x, y], weighted with Hertz's
+    /// pressure: right to second order in the contact's radius. dS of (6) for a contact that is not
+    /// small beside the frame.
     ///
     /// ```
     /// use tactile_force::LensGeometry;
@@ -208,8 +214,9 @@ impl LensGeometry {
         ring.map(|p| self.pixel_area_m2(p)).sum::<f64>() / DIRECTIONS as f64
     }
 
-    /// Undistorted centre [X, Y] and radius, in metres, of a contact seen as a circle of `radius_px` pixel widths where pixels are
-    /// `aspect` times as high as wide: the radius is that of the circle of the undistorted contour's area.
+    /// Undistorted centre [X, Y] and radius, in metres, of a contact seen as a circle of
+    /// `radius_px` pixel widths where pixels are `aspect` times as high as wide: the radius is that
+    /// of the circle of the undistorted contour's area.
     pub(crate) fn contact_m(
         &self,
         centre_px: [f64; 2],
@@ -341,8 +348,8 @@ const FEWEST_DOTS: usize = 7;
 const MAX_STEPS: usize = 50;
 
 impl LensFit {
-    /// Least squares on the undistorted places of the dots: pixel sizes, k₁, k₂ about the frame's middle, and the pose of the
-    /// target, which may be mirrored. O(dots).
+    /// Least squares on the undistorted places of the dots: pixel sizes, k₁, k₂ about the frame's
+    /// middle, and the pose of the target, which may be mirrored. O(dots).
     ///
     /// # Errors
     /// Fewer than seven dots, one that is not finite, or dots on a line.
@@ -410,7 +417,8 @@ impl Equations {
         self.normal.diagonal().map(|d| (largest / d).sqrt())
     }
 
-    /// The Gauss–Newton step, with columns scaled to unit length: parameters differ by ten orders of magnitude.
+    /// The Gauss–Newton step, with columns scaled to unit length: parameters differ by ten orders
+    /// of magnitude.
     fn step(&self) -> Option<Vector> {
         let inverse = self.inverse()?;
         Some(inverse * self.gradient)

@@ -1,9 +1,10 @@
 #![doc = include_str!("../README.md")]
 //!
 //! # Conventions
-//! Images are indexed `[row, column]`; x is the column, y the row, and (0, 0) is the centre of the first pixel. Physical quantities are
-//! SI and say so in their names; names that end in `_px` are in pixels. Equation numbers are those of the paper on waveguide tactile
-//! imaging that the workspace follows.
+//! Images are indexed `[row, column]`. X is the column, y the row, and (0, 0) is the centre of the
+//! first pixel. Physical quantities are SI and carry their unit in their names. Names that end in
+//! `_px` are in pixels. Equation numbers are those of the paper on waveguide tactile imaging that
+//! the workspace follows.
 //!
 //! # Modules
 //! | module | contents |
@@ -20,7 +21,8 @@
 //! | `lens` | pixels to metres: sizes along x and y, radial distortion, fit to a dot target |
 //!
 //! # Equations
-//! $d$ is the grey-level difference frame − reference, $V = \sum d$ the integrated pixel value; numbers are the paper's.
+//! $d$ is the grey-level difference frame − reference, $V = \sum d$ the integrated pixel value.
+//! Numbers are the paper's.
 //!
 //! - Stress and force (5), (6): $P = f(I)$ and $F_z = \int P dS$, that is $F_z = F(V)$ by calibration.
 //! - Centroid (7), (8): $\bar x = \sum x d / \sum d$ and $\bar y = \sum y d / \sum d$. One pass over the frame, O(pixels), exact in integers.

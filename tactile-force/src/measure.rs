@@ -60,8 +60,8 @@ impl ForceMeter {
         })
     }
 
-    /// The same meter behind a lens that distorts: the contact's contour and centre are undistorted, areas and stresses take the
-    /// mean size of a pixel over the contact.
+    /// The same meter behind a lens that distorts: the contact's contour and centre are
+    /// undistorted, areas and stresses take the mean size of a pixel over the contact.
     ///
     /// ```
     /// use tactile_force::{ForceMeter, LensGeometry};
@@ -76,7 +76,8 @@ impl ForceMeter {
         self
     }
 
-    /// The same meter without the fit of Hertz's profile, see [`ForceOptions::without_profile`]: for contacts known to be no ball's.
+    /// The same meter without the fit of Hertz's profile, see [`ForceOptions::without_profile`]:
+    /// for contacts known to be no ball's.
     ///
     /// ```
     /// use tactile_force::ForceMeter;
@@ -90,8 +91,9 @@ impl ForceMeter {
         self
     }
 
-    /// Measures one frame. A calibration with a [local curve](StressCalibration::local) turns the contact's grey levels into
-    /// pressures: the force is their integral, and the profile is fitted to them.
+    /// Measures one frame. A calibration with a [local curve](StressCalibration::local) turns the
+    /// contact's grey levels into pressures: the force is their integral, and the profile is fitted
+    /// to them.
     ///
     /// # Errors
     /// The frame has not the reference's size, or too much of the contact is saturated.
@@ -136,9 +138,10 @@ impl ForceMeter {
                     None => fit,
                 });
         }
-        // A part of an outline, or one that noise has frayed, says nothing of its shape.
+        // A part of an outline, or one that noise has frayed, does not show its shape.
         let whole = !contact.touches_edge && contact.other_contacts == 0;
-        let clear = contact.peak > CLEAR * noise.background.sqrt();
+        // Peak over the noise of one pixel at which a contact's outline is sharp to a pixel.
+        let clear = contact.peak > 20.0 * noise.background.sqrt();
         let elongation = (whole && clear)
             .then(|| elongation(&workspace.detector.region.mask, self.jacobian(&contact)))
             .flatten();
@@ -181,7 +184,8 @@ impl ForceMeter {
         }
     }
 
-    /// Where the fit of the profile starts, in pixels of the region; `integral` is in the units of its levels.
+    /// Where the fit of the profile starts, in pixels of the region; `integral` is in the units of
+    /// its levels.
     fn start(
         &self,
         region: &Region,
@@ -247,9 +251,6 @@ impl ForceMeter {
     }
 }
 
-/// Peak over the noise of one pixel at which a contact's outline is sharp to a pixel.
-const CLEAR: f64 = 20.0;
-
 /// Steps [x, y] of a pixel in metres, and its area.
 #[derive(Clone, Copy, Debug)]
 struct PixelSize {
@@ -257,11 +258,12 @@ struct PixelSize {
     area: f64,
 }
 
-/// Measures the force of one frame against one reference frame. For many frames keep a [`ForceMeter`], a
-/// [`ReferenceFrame`] and a [`ForceWorkspace`].
+/// Measures the force of one frame against one reference frame. For many frames keep a
+/// [`ForceMeter`], a [`ReferenceFrame`] and a [`ForceWorkspace`].
 ///
 /// # Errors
-/// Images of different size or without pixels, a pixel size that is not positive, too much of the contact saturated.
+/// Images of different size or without pixels, a pixel size that is not positive, too much of the
+/// contact saturated.
 ///
 /// ```
 /// use ndarray::Array2;
@@ -363,9 +365,10 @@ impl ForceOptions {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ForceMeasurement {
-    /// Normal force in newtons, equation (6); zero without contact.
+    /// Normal force in newtons, equation (6). Zero without contact.
     pub force_n: Estimate,
-    /// The parts of the force's error, and whether the calibration was used outside its range; `None` without contact.
+    /// The parts of the force's error, and whether the calibration was used outside its range;
+    /// `None` without contact.
     pub reading: Option<ForceReading>,
     /// The contact; `None` if the frame shows none.
     pub contact: Option<Contact>,
@@ -375,14 +378,17 @@ pub struct ForceMeasurement {
     pub centroid_m: Option<[Estimate; 2]>,
     /// Area of the mask in square metres.
     pub contact_area_m2: Option<f64>,
-    /// Contact radius in metres: the profile's, else the mask's equivalent radius with half a pixel as its error.
+    /// Contact radius in metres: the profile's, else the mask's equivalent radius with half a pixel
+    /// as its error.
     pub contact_radius_m: Option<Estimate>,
     /// F/(π a²) in pascals.
     pub mean_stress_pa: Option<Estimate>,
-    /// Stress at the centre in pascals: the profile's peak, else the greatest difference, through the calibration.
+    /// Stress at the centre in pascals: the profile's peak, else the greatest difference, through
+    /// the calibration.
     pub peak_stress_pa: Option<Estimate>,
-    /// Longer over shorter half axis of the contact's outline, less one, where that stands out of what whole pixels leave and exceeds
-    /// 0.5 %: pixels that are not as stated, a lens that distorts, or an object that is not round.
+    /// Longer over shorter half axis of the contact's outline, less one, where that stands out of
+    /// what whole pixels leave and exceeds 0.5 %: pixels that are not as stated, a lens that
+    /// distorts, or an object that is not round.
     pub elongation: Option<f64>,
     /// Sums over the whole frame.
     pub statistics: FrameStatistics,
@@ -412,7 +418,8 @@ impl ForceMeasurement {
     }
 }
 
-/// The profile's radius, else the mask's with half a pixel as its error; `side` is that of a square pixel of equal area.
+/// The profile's radius, else the mask's with half a pixel as its error; `side` is that of a square
+/// pixel of equal area.
 fn contact_radius(contact: &Contact, profile: Option<HertzFit>, side: f64) -> Estimate {
     let half = 0.5 * side;
     let of_mask = Estimate::new(contact.equivalent_radius_px * side, half);
@@ -436,7 +443,8 @@ fn mean_stress(force: Estimate, radius: Estimate) -> Estimate {
     stress
 }
 
-/// Buffers that measurements reuse from frame to frame; after the first frames nothing is allocated.
+/// Buffers that measurements reuse from frame to frame. After the first frames nothing is
+/// allocated.
 ///
 /// ```
 /// use ndarray::Array2;
@@ -467,8 +475,9 @@ pub struct ForceWorkspace {
 }
 
 impl ForceWorkspace {
-    /// The pressure of the last contact in pascals over its region (zero outside the aperture), and the region's place in the
-    /// frame; `None` without contact, or if the calibration had no [local curve](crate::StressCalibration::local). O(pixels of the region).
+    /// The pressure of the last contact in pascals over its region (zero outside the aperture), and
+    /// the region's place in the frame; `None` without contact, or if the calibration had no [local
+    /// curve](crate::StressCalibration::local). O(pixels of the region).
     ///
     /// ```
     /// use ndarray::Array2;
@@ -510,8 +519,9 @@ impl ForceWorkspace {
     }
 }
 
-/// Steps of a grey level at which the curve is tabulated and pixels are counted: rounding to a sixteenth adds 2 % to the smallest
-/// variance that a grey level can have, that of rounding to whole ones.
+/// Steps of a grey level at which the curve is tabulated and pixels are counted: rounding to a
+/// sixteenth adds 2 % to the smallest variance that a grey level can have, that of rounding to
+/// whole ones.
 const STEPS: usize = 16;
 /// Entries of the table, from −256 grey levels on.
 const TABLE: usize = 512 * STEPS + 1;
@@ -566,7 +576,8 @@ impl Local {
         }
     }
 
-    /// Reads the force off the histogram of the aperture and turns the aperture's differences into pressures.
+    /// Reads the force off the histogram of the aperture and turns the aperture's differences into
+    /// pressures.
     fn convert(
         &mut self,
         curve: &dyn LocalCalibration,
@@ -623,7 +634,8 @@ impl Local {
         self.table.push(below as f32);
     }
 
-    /// Variance of a pressure, (slope over the noise)² σ², from zero to a fifth beyond the contact's peak.
+    /// Variance of a pressure, (slope over the noise)² σ², from zero to a fifth beyond the
+    /// contact's peak.
     fn variances(&self, noise: DifferenceNoise, peak: f64, per_grey_pa: f64) -> Converted {
         let pressure = |grey: f64| {
             let place = (place_of(grey as f32) as usize).min(TABLE - 1);
@@ -662,19 +674,12 @@ fn grey_at(place: usize) -> f64 {
     f64::from(LEAST) + place as f64 / STEPS as f64
 }
 
-/// Elongation below which an outline counts as a circle: pixels that are not square by half a per cent change a ball's modulus by
-/// less than one.
-const ROUND: f64 = 5e-3;
-/// Standard deviation of an outline's place in pixels: 1/√12 of a step of one pixel.
-const STEP_SD: f64 = 0.29;
-/// Standard errors by which an elongation must stand out.
-const SIGNIFICANT: f64 = 4.0;
-
-/// Ratio of the longer to the shorter half axis of the mask's ellipse of inertia, less one; `None` where it does not stand out of what
-/// whole pixels leave. The Jacobian takes a step [x, y] in pixels to metres: [∂x, ∂y] in rows.
+/// Ratio of the longer to the shorter half axis of the mask's ellipse of inertia, less one; `None`
+/// where it does not stand out of what whole pixels leave. The Jacobian takes a step [x, y] in
+/// pixels to metres: [∂x, ∂y] in rows.
 ///
-/// An outline whose N = 2πa places are off by σ each has a second harmonic of σ √(2/N), and an elongation of twice that over a.
-/// O(rows of the mask).
+/// An outline whose N = 2πa places are off by σ each has a second harmonic of σ √(2/N), and an
+/// elongation of twice that over a. O(rows of the mask).
 fn elongation(mask: &[Run], jacobian: [[f64; 2]; 2]) -> Option<f64> {
     let (mut n, mut x, mut y) = (0.0, 0.0, 0.0);
     for run in mask {
@@ -701,8 +706,12 @@ fn elongation(mask: &[Run], jacobian: [[f64; 2]; 2]) -> Option<f64> {
     let half = (0.5 * (moved_xx - moved_yy)).hypot(moved_xy);
     let elongation = ((mean + half) / (mean - half)).sqrt() - 1.0;
     let radius_px = (n / std::f64::consts::PI).sqrt();
-    let error = 2.0 * STEP_SD / (radius_px * (std::f64::consts::PI * radius_px).sqrt());
-    (elongation > ROUND.max(SIGNIFICANT * error)).then_some(elongation)
+    // Standard deviation of an outline's place in pixels: 1/√12 of a step of one pixel.
+    let error = 2.0 * 0.29 / (radius_px * (std::f64::consts::PI * radius_px).sqrt());
+    // Elongation below which an outline counts as a circle: pixels that are not square by half a
+    // per cent change a ball's modulus by less than one. Standard errors by which an elongation
+    // must stand out.
+    (elongation > 5e-3_f64.max(4.0 * error)).then_some(elongation)
 }
 
 /// Number of a run's pixels, and its middle.

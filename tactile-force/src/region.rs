@@ -45,7 +45,8 @@ impl Region {
         self.place.map_or(1, |p| p.columns())
     }
 
-    /// Takes the differences inside a box, corrected for drift and vignetting, and returns the greatest of them, zero if none is positive.
+    /// Takes the differences inside a box, corrected for drift and vignetting, and returns the
+    /// greatest of them, zero if none is positive.
     pub fn load(
         &mut self,
         frame: ArrayView2<'_, u8>,
@@ -68,7 +69,8 @@ impl Region {
         rows.take(&mut self.difference)
     }
 
-    /// Thresholds the mean over a box of `width` pixels, keeps the largest component and fills its holes.
+    /// Thresholds the mean over a box of `width` pixels, keeps the largest component and fills its
+    /// holes.
     pub fn segment(&mut self, width: usize, limit: f32, notable: usize) -> Extent {
         let columns = self.columns();
         let rows = self.difference.len() / columns;
@@ -119,7 +121,7 @@ impl Region {
         }
     }
 
-    /// Every so many rows and columns of what runs cover.
+    /// Every n-th row and column of the pixels of some runs.
     pub fn every_nth(&self, runs: &[Run], step: usize) -> [EveryNth; 2] {
         let start = runs.iter().map(|run| run.start).min().unwrap_or(0) as usize;
         let end = runs.iter().map(|run| run.end).max().unwrap_or(1) as usize;
@@ -144,7 +146,7 @@ impl Region {
     }
 }
 
-/// Sums over a box of odd width centred at every pixel; beyond the region there is nothing to add.
+/// Sums over a box of odd width centred at every pixel. Beyond the region there is nothing to add.
 fn box_sums(
     difference: &[f32],
     columns: usize,
@@ -243,7 +245,7 @@ impl Rows<'_> {
     }
 }
 
-/// One row; the greatest difference is taken while the row is in the nearest cache.
+/// One row. The greatest difference is taken while the row is in the nearest cache.
 struct Row<'a, P> {
     frame: &'a [u8],
     levels: &'a [P],
@@ -300,7 +302,7 @@ fn greatest_of(values: &[f32]) -> f32 {
     lanes.iter().chain(rest).copied().fold(0.0, larger)
 }
 
-/// A comparison, which has a wide instruction; the first where the second is not a number.
+/// A comparison, which has a wide instruction. The first where the second is not a number.
 #[inline(always)]
 fn larger(a: f32, b: f32) -> f32 {
     if b > a { b } else { a }
@@ -334,7 +336,8 @@ const BLOCK: usize = 32;
 pub fn push_runs<P>(runs: &mut Vec<Run>, row: usize, pixels: &[P], inside: impl Fn(&P) -> bool) {
     let mut start = None;
     for (block, pixels) in pixels.chunks(BLOCK).enumerate() {
-        // Most blocks lie wholly inside or outside; counting takes SIMD instructions, pixels of an edge are tested one by one.
+        // Most blocks lie wholly inside or outside. Counting takes SIMD instructions, pixels of an
+        // edge are tested one by one.
         let count = pixels.iter().map(|p| u32::from(inside(p))).sum::<u32>() as usize;
         if count == if start.is_some() { pixels.len() } else { 0 } {
             continue;
@@ -410,8 +413,8 @@ impl Components {
         self.parent[a.max(b) as usize] = a.min(b);
     }
 
-    /// Keeps the runs of the largest 8-connected component. Returns its area and the number of other components of at
-    /// least `notable` pixels and a hundredth of its area.
+    /// Keeps the runs of the largest 8-connected component. Returns its area and the number of
+    /// other components of at least `notable` pixels and a hundredth of its area.
     pub fn keep_largest(&mut self, runs: &mut Vec<Run>, notable: usize) -> (usize, usize) {
         self.join(runs, true);
         self.area.clear();
@@ -456,7 +459,8 @@ impl Components {
         }
     }
 
-    /// Adds everything the runs enclose: the background that no 4-path joins to the border. Returns the area filled.
+    /// Adds everything the runs enclose: the background that no 4-path joins to the border. Returns
+    /// the area filled.
     pub fn fill_holes(
         &mut self,
         runs: &mut Vec<Run>,
@@ -525,7 +529,8 @@ fn merge(runs: &mut Vec<Run>) {
     });
 }
 
-/// The runs, sorted by row and start, grown by a square of half width `margin` and clipped to the region.
+/// The runs, sorted by row and start, grown by a square of half width `margin` and clipped to the
+/// region.
 pub fn grow(runs: &[Run], grown: &mut Vec<Run>, margin: usize, rows: usize, columns: usize) {
     grown.clear();
     let (Some(top), Some(bottom)) = (runs.first(), runs.last()) else {
@@ -561,9 +566,11 @@ pub struct NoiseWorkspace {
 /// Absolute responses of the second-difference filter, in whole grey levels.
 const RESPONSES: usize = 4081;
 
-/// Variance per grey level: that of the pixels brighter than half the peak, by their second differences in both directions
-/// (as the reference's own noise, see [`crate::NoiseModel`]), less the background's, over their mean. The edge, where the signal itself bends, is darker.
-/// Of a large contact every so many rows and columns are enough: 8 000 pixels know a variance to 2 %, a standard error to half of that.
+/// Variance per grey level: that of the pixels brighter than half the peak, by their second
+/// differences in both directions (as the reference's own noise, see [`crate::NoiseModel`]), less
+/// the background's, over their mean. The edge, where the signal itself bends, is darker. Of a
+/// large contact every n-th row and column is enough: 8 000 pixels give a variance to 2 %, a
+/// standard error to half of that.
 pub fn gain(region: &Region, workspace: &mut NoiseWorkspace, background: f64, peak: f32) -> f64 {
     let NoiseWorkspace { histogram, bends } = workspace;
     histogram.clear();
@@ -595,7 +602,8 @@ pub fn gain(region: &Region, workspace: &mut NoiseWorkspace, background: f64, pe
                 *bend = up - 2.0 * here + down;
             }
         });
-        // Walked by the iterator itself: a loop over two chained parts asks at every step which one it is in.
+        // Walked by the iterator itself: a loop over two chained parts asks at every step which one
+        // it is in.
         every_column.within(inner).for_each(|column| {
             let at = column - span.start;
             if here[at] > 0.5 * peak {
@@ -618,8 +626,8 @@ pub fn gain(region: &Region, workspace: &mut NoiseWorkspace, background: f64, pe
     ((trimmed_variance(seen) / 36.0 - background) * count as f64 / signal).max(0.0)
 }
 
-/// Every n-th number of a range, counted from its middle to both sides: the same rows and columns of a contact whichever way the image is
-/// mirrored, turned or moved.
+/// Every n-th number of a range, counted from its middle to both sides: the same rows and columns
+/// of a contact whichever way the image is mirrored, turned or moved.
 #[derive(Clone, Copy, Debug)]
 pub struct EveryNth {
     /// The middle of the range, rounded down and up.
@@ -670,7 +678,7 @@ impl EveryNth {
     }
 }
 
-/// Sums over the aperture; coordinates are relative to the region's first pixel.
+/// Sums over the aperture. Coordinates are relative to the region's first pixel.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Sums {
     /// Number of pixels and their moments: 1, x, y, x², y².
@@ -725,7 +733,8 @@ impl Sums {
         ]
     }
 
-    /// Variance of Σ d: every pixel's, and that of errors of background and scale common to all, which go together.
+    /// Variance of Σ d: every pixel's, and that of errors of background and scale common to all,
+    /// which go together.
     pub fn variance(&self, noise: &DifferenceNoise) -> f64 {
         noise.background * self.plain[0]
             + noise.gain * self.weighted[0].max(0.0)
@@ -733,7 +742,8 @@ impl Sums {
             + noise.flat_field * self.weighted[0] * self.weighted[0]
     }
 
-    /// Variance of the centroid along x (0) or y (1): Σ var(d) (x − x̄)²/(Σ d)², and the common error's lever.
+    /// Variance of the centroid along x (0) or y (1): Σ var(d) (x − x̄)²/(Σ d)², and the common
+    /// error's lever.
     pub fn centroid_variance(&self, axis: usize, noise: &DifferenceNoise) -> f64 {
         let at = self.centroid()[axis];
         let about = |s: &[f64; 5]| s[3 + axis] - 2.0 * at * s[1 + axis] + at * at * s[0];
@@ -745,7 +755,8 @@ impl Sums {
     }
 }
 
-/// Σ d of every column of the aperture, and Σ d, Σ y d, Σ y² d: moments need no product for every pixel.
+/// Σ d of every column of the aperture, and Σ d, Σ y d, Σ y² d: moments need no product for every
+/// pixel.
 struct Moments<'a> {
     region: &'a Region,
     columns: &'a mut [f64],

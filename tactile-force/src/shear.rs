@@ -139,7 +139,8 @@ impl Spring {
 pub struct ShearMeasurement {
     /// Centroid now minus centroid when contact began, [x, y] in metres.
     pub displacement_m: [Estimate; 2],
-    /// Centroid now minus centroid of the frame before, [x, y] in metres: u of equations (9) and (10).
+    /// Centroid now minus centroid of the frame before, [x, y] in metres: u of equations (9) and
+    /// (10).
     pub step_m: [Estimate; 2],
     /// Shear force since contact began, [x, y] in newtons, equations (11) and (12).
     pub force_n: [Estimate; 2],
@@ -147,8 +148,8 @@ pub struct ShearMeasurement {
 
 /// Follows the centroid from frame to frame.
 ///
-/// The shear force belongs to the displacement since contact began. Taking each step from the frame before and adding up
-/// would add up the noise of every frame; here it is that of two.
+/// The shear force belongs to the displacement since contact began. Taking each step from the frame
+/// before and adding up would add up the noise of every frame. Here it is that of two.
 ///
 /// ```
 /// use ndarray::Array2;
@@ -188,8 +189,9 @@ impl ShearTracker {
         }
     }
 
-    /// Takes the centroid [x, y] of the next frame in metres, however it was measured; `None` without contact. The first frame
-    /// of a contact has zero shear by definition; after a frame without contact the next contact starts anew.
+    /// Takes the centroid [x, y] of the next frame in metres, however it was measured; `None`
+    /// without contact. The first frame of a contact has zero shear by definition. After a frame
+    /// without contact the next contact starts anew.
     pub fn update(&mut self, centroid_m: Option<[Estimate; 2]>) -> Option<ShearMeasurement> {
         let Some(now) = centroid_m else {
             (self.first, self.last) = (None, None);

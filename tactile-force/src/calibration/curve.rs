@@ -3,7 +3,8 @@
 //! The force is linear in the coefficients of the curve, with the grey histogram of the contact as
 //! the row of the design,
 //!
-//! F_i = Σ_g A_i(g) f(g), A_i(g) the area in m² whose difference from the reference is g grey levels in frame i.
+//! F_i = Σ_g A_i(g) f(g), A_i(g) the area in m² whose difference from the reference is g grey
+//! levels in frame i.
 //!
 //! f rises, passes through the origin and is as smooth as cross-validation finds best.
 
@@ -162,7 +163,8 @@ pub struct PressureCurveReport {
     pub hysteresis: Option<CurveHysteresis>,
 }
 
-/// The local light-to-pressure curve f of (5): pressure in pascals of a pixel's grey-level difference.
+/// The local light-to-pressure curve f of (5): pressure in pascals of a pixel's grey-level
+/// difference.
 ///
 /// Fitted from frames of contacts under known forces by penalised least squares: f rises, f(0) = 0,
 /// smoothness by cross-validation. Standard errors come from the Bayesian covariance σ²(XᵀX + λP)⁻¹
@@ -252,7 +254,8 @@ impl PressureCurve {
     /// Fits the curve to frames under known forces, loading and unloading.
     ///
     /// # Errors
-    /// Fewer than five frames, no force or no light in any of them, or light that falls with the force.
+    /// Fewer than five frames, no force or no light in any of them, or light that falls with the
+    /// force.
     pub fn fit(
         frames: &[CalibrationFrame],
         options: &PressureCurveOptions,
@@ -376,11 +379,12 @@ const KNOTS: usize = 13;
 type Knots = SVector<f64, KNOTS>;
 type Normal = SMatrix<f64, KNOTS, KNOTS>;
 
-/// f(d) = ∫₀ᵈ s with s linear between its values at the knots; slopes that are not negative make f rise.
+/// f(d) = ∫₀ᵈ s with s linear between its values at the knots. Slopes that are not negative make f
+/// rise.
 ///
 /// Knots lie at t_j = top (j/12)²: light that goes as a power of the pressure bends most near zero.
-/// Below zero f goes on with the slope at zero, so that noise about zero adds nothing. Beyond the top
-/// it goes on with the last slope.
+/// Below zero f goes on with the slope at zero, so that noise about zero adds nothing. Beyond the
+/// top it goes on with the last slope.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 struct Basis {
@@ -461,7 +465,7 @@ impl Coefficients {
     }
 }
 
-/// Rows and forces, each divided by the frame's assumed error; slopes in units of their mean.
+/// Rows and forces, each divided by the frame's assumed error. Slopes in units of their mean.
 struct Problem {
     basis: Basis,
     rows: Vec<Knots>,
@@ -553,7 +557,8 @@ impl Problem {
             right += self.rows[i] * self.forces[i];
         }
         let weight = smoothness * data.trace() / KNOTS as f64;
-        // A trace of first differences keeps the matrix definite where the frames leave a straight slope undetermined.
+        // A trace of first differences keeps the matrix definite where the frames leave a straight
+        // slope undetermined.
         let normal = data
             + differences([1.0, -2.0, 1.0]) * weight
             + differences([-1.0, 1.0]) * (1e-6 * weight);
@@ -586,8 +591,8 @@ impl Problem {
             }
             (squares / count as f64).sqrt()
         };
-        // From a curve that follows every frame to one whose slope is a parabola in the grey level's
-        // root.
+        // From a curve that follows every frame to one whose slope is a parabola in the grey
+        // level's root.
         let mut best = (0.0, f64::INFINITY);
         for smoothness in [1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1.0, 10.0, 100.0, 1000.0] {
             let here = error(smoothness);
@@ -662,7 +667,7 @@ fn nonnegative(normal: &Normal, right: &Knots) -> (Knots, [bool; KNOTS]) {
     let mut x = Knots::zeros();
     // Rounding of a gradient.
     let tolerance = 1e-12 * right.amax();
-    // Each round frees one coefficient; in practice few are bound again.
+    // Each round frees one coefficient. In practice few are bound again.
     for _ in 0..10 * KNOTS {
         let gradient = right - normal * x;
         let most = (0..KNOTS)

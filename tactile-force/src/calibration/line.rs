@@ -6,7 +6,8 @@ use tactile_core::{Estimate, StopReason};
 use super::{Branch, CalibrationOptions, CalibrationPair, Robustness, StressCalibration};
 use crate::error::ForceError;
 
-/// A straight line from integrated pixel value to force, F = b + s V, or F = s V through the origin.
+/// A straight line from integrated pixel value to force, F = b + s V, or F = s V through the
+/// origin.
 ///
 /// ```
 /// use tactile_force::{CalibrationPair, LinearCalibration, StressCalibration};
@@ -38,7 +39,8 @@ impl LinearCalibration {
     /// Fits the line to pairs of integrated pixel value and force.
     ///
     /// # Errors
-    /// Fewer pairs than parameters + 1, a pair that is not finite, or pairs at one pixel value only.
+    /// Fewer pairs than parameters + 1, a pair that is not finite, or pairs at one pixel value
+    /// only.
     pub fn fit(
         pairs: &[CalibrationPair],
         options: &CalibrationOptions,
@@ -195,12 +197,14 @@ fn check_pairs(pairs: &[CalibrationPair], parameters: usize) -> Result<(), Force
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub struct Hysteresis {
-    /// Greatest difference of the two branches at one pixel value, loading minus unloading, in newtons.
+    /// Greatest difference of the two branches at one pixel value, loading minus unloading, in
+    /// newtons.
     pub greatest_n: f64,
     /// Mean difference over the range of both branches, in newtons.
     pub mean_n: Estimate,
-    /// Half of the mean difference where it exceeds three times its own error, else zero, in newtons.
-    /// Every force whose branch is not known has this standard error, common to all of them.
+    /// Half of the mean difference where it exceeds three times its own error, else zero, in
+    /// newtons. Every force whose branch is not known has this standard error, common to all of
+    /// them.
     pub width_n: f64,
     /// |greatest| as a share of the full scale.
     pub share_of_full_scale: f64,
@@ -231,15 +235,15 @@ pub struct Hysteresis {
 pub struct CalibrationReport {
     /// Number of pairs.
     pub pairs: usize,
-    /// Parameters with their standard errors and degrees of freedom: [offset, slope] of a line, slope
-    /// alone through the origin.
+    /// Parameters with their standard errors and degrees of freedom: [offset, slope] of a line,
+    /// slope alone through the origin.
     pub parameters: Vec<Estimate>,
     /// Pairs less parameters.
     pub degrees_of_freedom: usize,
     /// Coefficient of determination, 1 − Σr²/Σ(F − F̄)².
     pub r_squared: f64,
-    /// Standard deviation of the residuals, √(Σr²/(n − p)), in newtons. A robust scale where outliers
-    /// were discounted.
+    /// Standard deviation of the residuals, √(Σr²/(n − p)), in newtons. A robust scale where
+    /// outliers were discounted.
     pub residual_sd_n: f64,
     /// Residual of every pair, measured minus fitted, in newtons.
     pub residuals_n: Vec<f64>,
@@ -315,9 +319,9 @@ fn extremes(values: &[f64]) -> [f64; 2] {
 }
 
 impl Hysteresis {
-    /// Compares the residuals of each branch with the other branch's, interpolated at the same pixel
-    /// value. Residuals are nearly flat where forces are steep, so that interpolation adds next to
-    /// nothing.
+    /// Compares the residuals of each branch with the other branch's, interpolated at the same
+    /// pixel value. Residuals are nearly flat where forces are steep, so that interpolation adds
+    /// next to nothing.
     fn of(pairs: &[CalibrationPair], residuals: &[f64], full_scale_n: f64) -> Option<Self> {
         let branch = |wanted: Branch| {
             let both = pairs.iter().zip(residuals);

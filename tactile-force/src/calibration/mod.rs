@@ -1,8 +1,8 @@
 //! From pixel values to force and stress: P = f(I), F_z = ∫P dS, equations (5) and (6).
 //!
-//! A line ([`LinearCalibration`]) is fitted to pairs of integrated pixel value V = Σ (I − I_ref) over
-//! the contact and known force F, taken while loading and unloading. It gives F(V), its standard
-//! error and, shared out over the pixels in proportion to their grey level, the stress
+//! A line ([`LinearCalibration`]) is fitted to pairs of integrated pixel value V = Σ (I − I_ref)
+//! over the contact and known force F, taken while loading and unloading. It gives F(V), its
+//! standard error and, shared out over the pixels in proportion to their grey level, the stress
 //!
 //! ```text
 //! P_ij = (I_ij − I_ref,ij) F(V) / (V A),   A = area of a pixel,   so that  Σ P_ij A = F(V)  exactly.
@@ -52,8 +52,8 @@ pub struct ForceReading {
     pub force_n: Estimate,
     /// The part of the standard error from noise in the frames, in newtons.
     pub noise_n: f64,
-    /// The part of the standard error from the calibration, in newtons: common to all frames that are
-    /// read with it.
+    /// The part of the standard error from the calibration, in newtons: common to all frames that
+    /// are read with it.
     pub calibration_n: f64,
     /// The pixel value lies outside the range of the calibration.
     pub out_of_range: bool,
@@ -121,8 +121,9 @@ pub trait StressCalibration: Send + Sync {
         (self.force_n(v + step) - self.force_n(v - step)) / (2.0 * step)
     }
 
-    /// Standard error of the force due to the calibration itself, in newtons: the uncertainty of its
-    /// parameters, and the difference of its branches ([`Hysteresis::width_n`]). Zero by default.
+    /// Standard error of the force due to the calibration itself, in newtons: the uncertainty of
+    /// its parameters, and the difference of its branches ([`Hysteresis::width_n`]). Zero by
+    /// default.
     fn standard_error_n(&self, _integrated_pixel_value: f64) -> f64 {
         0.0
     }
@@ -133,14 +134,14 @@ pub trait StressCalibration: Send + Sync {
         None
     }
 
-    /// Covariance of the calibration's errors at two integrated pixel values, in N². By default errors
-    /// at all pixel values are fully correlated.
+    /// Covariance of the calibration's errors at two integrated pixel values, in N². By default
+    /// errors at all pixel values are fully correlated.
     fn error_covariance_n2(&self, a: f64, b: f64) -> f64 {
         self.standard_error_n(a) * self.standard_error_n(b)
     }
 
-    /// Covariance matrix of forces read with this one calibration, in N²:
-    /// C_ij = cov_cal(V_i, V_j) + δ_ij (dF/dV)² σ_V².
+    /// Covariance matrix of forces read with this one calibration, in N²: C_ij = cov_cal(V_i, V_j)
+    /// + δ_ij (dF/dV)² σ_V².
     ///
     /// The noise of the frames is each force's own, the calibration's error is shared. O(n²).
     ///
@@ -342,8 +343,8 @@ impl GreyHistogram {
         self.bins().map(|(grey, _)| grey).fold(0.0, f64::max)
     }
 
-    /// Standard error of ∫ f dS by the noise of the pixels, for a curve f of this slope: white noise
-    /// of each pixel, and the errors that all pixels share.
+    /// Standard error of ∫ f dS by the noise of the pixels, for a curve f of this slope: white
+    /// noise of each pixel, and the errors that all pixels share.
     fn noise(&self, noise: &DifferenceNoise, slope: impl Fn(f64) -> f64) -> f64 {
         let (mut white, mut common, mut scale) = (0.0, 0.0, 0.0);
         for (grey, area) in self.bins() {

@@ -86,8 +86,8 @@ pub struct FaceWorkspace {
 }
 
 impl FaceWorkspace {
-    /// The face in a contact, from a frame and its reference, the contact's box and its pixels within
-    /// the box. `None` where the contact is too small or too irregular to have an inside.
+    /// The face in a contact, from a frame and its reference, the contact's box and its pixels
+    /// within the box. `None` where the contact is too small or too irregular to have an inside.
     ///
     /// O(pixels of the box).
     pub fn measure(
@@ -231,8 +231,8 @@ impl FaceWorkspace {
             }
             let spread = sums.depth_squared - sums.depth * sums.depth / sums.count;
             let slope = (sums.depth_light - sums.depth * sums.light / sums.count) / spread;
-            // Below three standard errors extrapolating the noise would make the area of plain faces
-            // ten times as noisy.
+            // Below three standard errors extrapolating the noise would make the area of plain
+            // faces ten times as noisy.
             let is_clear = spread > 0.0 && slope * slope * spread > 9.0 * variance;
             tile.slope = if is_clear { slope } else { 0.0 };
             tile.mean = (sums.light - tile.slope * sums.depth) / sums.count;
@@ -244,7 +244,8 @@ impl FaceWorkspace {
     /// Area, moments and errors.
     fn sum(&mut self, [hx, hy]: [f64; 2], variance: f64) -> Option<FaceReading> {
         let [mut area, mut light] = self.deep_moments([hx, hy]);
-        // Light 4 to 5 and 8 to 9 pixels inside with the number of pixels, and the outline's length.
+        // Light 4 to 5 and 8 to 9 pixels inside with the number of pixels, and the outline's
+        // length.
         let (mut near, mut far, mut outline) = ([0.0; 2], [0.0; 2], 0.0);
         let mut of_pixels = 0.0;
         for &at in &self.near {
@@ -295,8 +296,8 @@ impl FaceWorkspace {
         })
     }
 
-    /// Moments of the area and of the light over the pixels beyond `FARTHEST` from the outline, which
-    /// are nearly all: row by row, since a column's place is common to them.
+    /// Moments of the area and of the light over the pixels beyond `FARTHEST` from the outline,
+    /// which are nearly all: row by row, since a column's place is common to them.
     fn deep_moments(&self, [hx, hy]: [f64; 2]) -> [Moments; 2] {
         let [mut area, mut light] = [Moments::default(); 2];
         let rows = self.signal.rows().into_iter();
@@ -358,8 +359,8 @@ fn around(tiles: &Array2<Tile>, row: usize, column: usize) -> impl Iterator<Item
     rows.flat_map(move |row| columns.clone().map(move |column| &tiles[[row, column]]))
 }
 
-/// For every pixel the chessboard distance to the nearest pixel on the other side of the outline, at
-/// most `FARTHEST`: 1 beside the outline. Beyond the image its last pixels go on. O(pixels).
+/// For every pixel the chessboard distance to the nearest pixel on the other side of the outline,
+/// at most `FARTHEST`: 1 beside the outline. Beyond the image its last pixels go on. O(pixels).
 fn distance_to_outline(inside: &Array2<bool>, distance: &mut Array2<u8>) {
     let [from_outside, from_inside] = [false, true].map(|side| distance_to_side(inside, side));
     // One of the two is zero.

@@ -1,31 +1,31 @@
 //! Flat faces: the area of a contact from its own region, and how a flat face differs from a ball.
 //!
 //! # Area
-//! A pixel that the outline cuts shows the covered share, times the light beside it. With s the frame
-//! minus the reference, and P the light of the face just inside the outline, the area is
+//! A pixel that the outline cuts shows the covered share, times the light beside it. With s the
+//! frame minus the reference, and P the light of the face just inside the outline, the area is
 //!
 //! A = h_x h_y Σ s/P over the pixels around the outline + the pixels further inside.
 //!
 //! Blur moves light across the outline, but takes none away. The sum does not change as long as the
 //! outline bends on a scale much larger than the blur. P is the mean over a ring of pixels near by,
-//! so that it follows texture, vignetting and uneven pressure. Where the outer and the inner half of
-//! that ring differ by more than noise explains, P is extrapolated from both. The error of A is that
-//! of noise in both rings of pixels, and a floor for the shape of texture and sampling.
+//! so that it follows texture, vignetting and uneven pressure. Where the outer and the inner half
+//! of that ring differ by more than noise explains, P is extrapolated from both. The error of A is
+//! that of noise in both rings of pixels, and a floor for the shape of texture and sampling.
 //!
 //! # Shape
 //! Just inside its outline a flat face is as bright as further inside. Under a ball the pressure
 //! √(1 − r²/a²) falls to zero there as the square root of the distance. The ratio of the light 3 to
-//! 5 pixels inside to that 7 to 9 pixels inside is 1 for the one and some 0.7 for the other, whatever
-//! their size ([`FaceReading::edge_ratio`]).
+//! 5 pixels inside to that 7 to 9 pixels inside is 1 for the one and some 0.7 for the other,
+//! whatever their size ([`FaceReading::edge_ratio`]).
 //!
 //! Two numbers show whether the deformation between two loads is the same everywhere. The second
-//! moment of the outline over the square of its area does not change as long as the outline keeps its
-//! shape. The second moment of the light over that of the area does not change as long as the
+//! moment of the outline over the square of its area does not change as long as the outline keeps
+//! its shape. The second moment of the light over that of the area does not change as long as the
 //! pressure follows the material. Friction, slip and tilt change them.
 //!
 //! # Stretch
-//! The lateral stretch between two loads is √(A₂/A₁), from the outline. A textured face has material
-//! points, whose stretch is a second measurement ([`TextureStretch`]).
+//! The lateral stretch between two loads is √(A₂/A₁), from the outline. A textured face has
+//! material points, whose stretch is a second measurement ([`TextureStretch`]).
 
 mod area;
 mod texture;
@@ -63,8 +63,8 @@ pub use texture::{TextureStretch, texture_spots};
 pub struct FaceReading {
     /// Area within the outline in square metres.
     pub area_m2: Estimate,
-    /// Light 3 to 5 pixels inside the outline over that 7 to 9 pixels inside: 1 for an even pressure,
-    /// some 0.7 for a ball's.
+    /// Light 3 to 5 pixels inside the outline over that 7 to 9 pixels inside: 1 for an even
+    /// pressure, some 0.7 for a ball's.
     pub edge_ratio: f64,
     /// 2π (m_xx + m_yy)/A² of the outline, m the second moments about its centre: 1 for a disc, π/3
     /// for a square.
@@ -106,11 +106,12 @@ impl FaceReading {
         self.edge_ratio > 1.18
     }
 
-    /// Checks that the face is under uniaxial load, as it was at a first load: it grows by less than
-    /// a quarter, and outline and pressure keep their shapes.
+    /// Checks that the face is under uniaxial load, as it was at a first load: it grows by less
+    /// than a quarter, and outline and pressure keep their shapes.
     ///
     /// # Errors
-    /// [`ShapeProblem::Grows`], [`ShapeProblem::OutlineChanges`] or [`ShapeProblem::PressureChanges`].
+    /// [`ShapeProblem::Grows`], [`ShapeProblem::OutlineChanges`] or
+    /// [`ShapeProblem::PressureChanges`].
     ///
     /// ```
     /// use tactile_force::{Estimate, FaceReading, ShapeProblem};

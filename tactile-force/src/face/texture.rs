@@ -1,10 +1,10 @@
 //! Material points of a textured face, and their stretch between two loads.
 //!
-//! Points are the bright spots of the texture, at the maximum of the smoothed light and to a fraction
-//! of a pixel by a quadratic through its surroundings. A face without texture has none. The outline's
-//! growth predicts where they go, and the nearest spot there is the partner. The similarity
-//! q = l R p + t by least squares through the pairs has the stretch l. Where the face slips or sticks,
-//! l and the outline's √(A₂/A₁) differ.
+//! Points are the bright spots of the texture, at the maximum of the smoothed light and to a
+//! fraction of a pixel by a quadratic through its surroundings. A face without texture has none.
+//! The outline's growth predicts where they go, and the nearest spot there is the partner. The
+//! similarity q = l R p + t by least squares through the pairs has the stretch l. Where the face
+//! slips or sticks, l and the outline's √(A₂/A₁) differ.
 
 use nalgebra::{Point2, Vector2};
 use ndarray::{Array2, ArrayView2, Zip};
@@ -50,9 +50,9 @@ pub struct TextureStretch {
 }
 
 impl TextureStretch {
-    /// The stretch from the spots of a first face to those of a second. `predict` takes a spot to its
-    /// expected place in the second frame. Partners lie within `reach_m` of it, which friction makes
-    /// necessary: some pixels at the rim of a face that is stretched by 5 %.
+    /// The stretch from the spots of a first face to those of a second. `predict` takes a spot to
+    /// its expected place in the second frame. Partners lie within `reach_m` of it, which friction
+    /// makes necessary: some pixels at the rim of a face that is stretched by 5 %.
     ///
     /// `None` with fewer than eight pairs. O(spots²).
     pub fn between(
@@ -167,8 +167,8 @@ pub fn texture_spots(
     spots
 }
 
-/// The sum over a box of five pixels along both axes, twice, of grey levels: below 2²⁴ and so without
-/// rounding. Beyond the image its edge goes on.
+/// The sum over a box of five pixels along both axes, twice, of grey levels: below 2²⁴ and so
+/// without rounding. Beyond the image its edge goes on.
 fn smooth(light: &mut Array2<f32>) {
     let (rows, columns) = light.dim();
     if rows == 0 || columns == 0 {
@@ -300,7 +300,7 @@ mod tests {
         let level = |r: usize, c: usize| ((r * 37 + c * 101 + r * c) % 256) as f32;
         let mut light = Array2::from_shape_fn((23, 31), |(r, c)| level(r, c));
         smooth(&mut light);
-        // Twice a box is a tent; the edge goes on.
+        // Twice a box is a tent. The edge goes on.
         let tent = [1.0, 2.0, 3.0, 4.0, 5.0, 4.0, 3.0, 2.0, 1.0];
         for (row, column) in [(11, 15), (4, 4), (18, 26), (9, 20)] {
             let terms = ndarray::indices((9, 9)).into_iter();

@@ -37,14 +37,16 @@ impl Default for HertzFitOptions {
         Self {
             blur_px: None,
             fit_background: false,
-            // A clean contact takes 5 to 8 steps: `cargo bench -p tactile-benches --bench work_precision` shows the error after 1, 2 and 5.
+            // A clean contact takes 5 to 8 steps: `cargo bench -p tactile-benches --bench
+            // work_precision` shows the error after 1, 2 and 5.
             max_iterations: 50,
         }
     }
 }
 
 impl HertzFitOptions {
-    /// Takes the standard deviation of the optical blur, in pixels, as known. By default it is fitted.
+    /// Takes the standard deviation of the optical blur, in pixels, as known. By default it is
+    /// fitted.
     ///
     /// # Errors
     /// A blur that is negative or not finite.
@@ -117,12 +119,12 @@ mod read {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum ProfileShape {
-    /// The pressure is Hertz's, or with a [`bend`](HertzFit::bend) that of a ball at finite strain, to within the misfit that the noise and a smooth
-    /// guide explain.
+    /// The pressure is Hertz's, or with a [`bend`](HertzFit::bend) that of a ball at finite strain,
+    /// to within the misfit that the noise and a smooth guide explain.
     Hertz,
-    /// Not a ball's profile: the misfit stands out of the noise and exceeds 1 % of the peak along the radius, or 3 % around it.
-    /// The contact radius is that of the profile with its `bend`: for a ball at finite strain within 0.03 %, for other objects no more than a
-    /// size.
+    /// Not a ball's profile: the misfit stands out of the noise and exceeds 1 % of the peak along
+    /// the radius, or 3 % around it. The contact radius is that of the profile with its `bend`: for
+    /// a ball at finite strain within 0.03 %, for other objects no more than a size.
     NotHertz,
 }
 
@@ -157,12 +159,13 @@ pub struct HertzFit {
     pub radius_m: Estimate,
     /// Grey-level difference at the centre.
     pub peak: Estimate,
-    /// Grey-level difference far away; zero if it was not fitted.
+    /// Grey-level difference far away. Zero if it was not fitted.
     pub background: Estimate,
     /// Standard deviation of the blur, in pixels.
     pub blur_px: f64,
-    /// c of p₀ √(1 − r²/a²) (1 − c r²/a²). Zero where the Hertz profile fits to within the noise; balls of finite strain on soft layers
-    /// press harder at the rim (c < 0, to −0.3), balls flattened on a stiff base less (c > 0, to 0.15).
+    /// c of p₀ √(1 − r²/a²) (1 − c r²/a²). Zero where the Hertz profile fits to within the noise.
+    /// Balls of finite strain on soft layers press harder at the rim (c < 0, to −0.3), balls
+    /// flattened on a stiff base less (c > 0, to 0.15).
     pub bend: Estimate,
     /// Integral of the profile, 2π/3 A a² (1 − 2c/5) in grey levels × pixels.
     pub integrated_pixel_value: Estimate,
@@ -170,9 +173,11 @@ pub struct HertzFit {
     pub covariance: [[f64; 6]; 6],
     /// Residual variance over the noise model's: near 1 if the contact is that of a ball.
     pub reduced_chi_squared: f64,
-    /// Root mean square misfit of the mean level at each radius, the noise's share subtracted, relative to the peak.
+    /// Root mean square misfit of the mean level at each radius, the noise's share subtracted,
+    /// relative to the peak.
     pub radial_misfit: f64,
-    /// Root mean square misfit around the centre, the noise's and the radial share subtracted, relative to the peak.
+    /// Root mean square misfit around the centre, the noise's and the radial share subtracted,
+    /// relative to the peak.
     pub azimuthal_misfit: f64,
     /// Whether the misfits are those of a ball.
     pub shape: ProfileShape,
@@ -200,26 +205,19 @@ impl HertzFit {
 
 /// Variance along one axis of a position spread evenly over a pixel.
 const PIXEL: f64 = 1.0 / 12.0;
-/// Greatest bend that is fitted. Balls on soft layers reach −0.3, balls flattened on glass +0.15; beyond ±0.6 the profile is no ball's.
+/// Greatest bend that is fitted. Balls on soft layers reach −0.3, balls flattened on glass +0.15.
+/// Beyond ±0.6 the profile is no ball's.
 const LARGEST_BEND: f64 = 0.6;
-/// Share of the misfit that a bend must take away to be believed. Contacts by finite elements lose nine tenths and more; where the light is not
-/// quite proportional, saturates, or is rough, a bend takes away a tenth and makes the radius worse (`cargo test -p tactile-force --test suite
-/// sensor`).
-const EXPLAINED: f64 = 0.5;
-/// Least fall of χ² in a step, as a share, of a profile that is no ball's: there blur and radius wander along a valley without end, and what they
-/// are says nothing.
-const FALLING: f64 = 1e-2;
-/// Steps in which a ball's profile has long settled, however far from it the fit starts.
-const AMPLE: usize = 12;
 
-/// Fits Hertz profiles; holds the table of the blurred edge.
+/// Fits Hertz profiles. Holds the table of the blurred edge.
 #[derive(Clone, Debug)]
 pub struct HertzFitter {
     options: HertzFitOptions,
     edge: BlurredEdge,
 }
 
-/// Where a fit starts: the contact's centroid, equivalent radius and integral, in pixels of its region.
+/// Where a fit starts: the contact's centroid, equivalent radius and integral, in pixels of its
+/// region.
 #[derive(Clone, Copy, Debug)]
 pub struct Start {
     pub centre: [f64; 2],
@@ -318,13 +316,18 @@ impl HertzFitter {
         let equations = self.assemble(rings, &state, data.variance);
         let chi2 = equations.chi2;
         let left = Misfit::of(rings, &self.edge, &state.shape, data.variance, chi2);
-        let explained = left.radial < EXPLAINED * misfit.radial;
+        // Share of the misfit that a bend must take away to be accepted. Contacts by finite
+        // elements lose nine tenths and more. Where the light is not quite proportional, saturates,
+        // or is rough, a bend takes away a tenth and makes the radius worse (`cargo test -p
+        // tactile-force --test suite sensor`).
+        let explained = left.radial < 0.5 * misfit.radial;
         state.iterations += hertz.iterations;
         (explained && state.shape.bend.abs() < LARGEST_BEND).then_some((state, equations, left))
     }
 
-    /// Fits and gathers the rings anew until the centre stays. `None` too where it leaves the region by more than the region's size: rings about
-    /// such a centre, of which the pixels say nothing, would be without number.
+    /// Fits and gathers the rings anew until the centre stays. `None` too where it leaves the
+    /// region by more than the region's size: rings about such a centre, which the pixels do not
+    /// determine, would be without number.
     fn refine(&self, rings: &mut Rings, data: &Data<'_>, state: &mut State) -> Option<()> {
         let place = data.region.place?;
         let farthest = 2.0 * (place.rows() + place.columns()) as f64;
@@ -342,9 +345,11 @@ impl HertzFitter {
         is_near(state.centre).then_some(())
     }
 
-    /// Gauss–Newton steps on fixed rings until nothing moves; returns how far the centre went, in pixels.
+    /// Gauss–Newton steps on fixed rings until nothing moves. Returns how far the centre went, in
+    /// pixels.
     ///
-    /// Weights follow the shape, so χ² may rise by a hair near the end: only a step that makes it clearly worse is halved.
+    /// Weights follow the shape, so χ² may rise by a hair near the end: only a step that makes it
+    /// clearly worse is halved.
     fn descend(
         &self,
         rings: &Rings,
@@ -369,8 +374,11 @@ impl HertzFitter {
                 trial = self.stepped(state, &(step * 0.5_f64.powi(halving)));
                 there = self.assemble(rings, &trial, variance);
             }
-            let no_ball = state.iterations >= AMPLE && there.is_no_ball(trial.shape.peak);
-            if no_ball && there.chi2 > (1.0 - FALLING) * here.chi2 {
+            // Steps in which a ball's profile has long settled, however far from it the fit starts.
+            let no_ball = state.iterations >= 12 && there.is_no_ball(trial.shape.peak);
+            // Least fall of χ² in a step, as a share, of a profile that is no ball's: there blur
+            // and radius wander along a valley without end, and their values mean nothing.
+            if no_ball && there.chi2 > 0.99 * here.chi2 {
                 // The better of the two, about the centre as it is.
                 if there.chi2 < here.chi2 {
                     state.shape = trial.shape;
@@ -409,7 +417,8 @@ impl HertzFitter {
         }
     }
 
-    /// Normal equations over all pixels of the rings; rows of parameters that are not fitted are those of the identity.
+    /// Normal equations over all pixels of the rings. Rows of parameters that are not fitted are
+    /// those of the identity.
     fn assemble(&self, rings: &Rings, state: &State, variance: PixelVariance<'_>) -> Equations {
         let shape = &state.shape;
         let mut e = Equations::zeros();
@@ -442,7 +451,8 @@ impl HertzFitter {
         .filter_map(|(parameter, fixed)| fixed.then_some(parameter))
     }
 
-    /// The parameters' covariance, scaled by the residuals and in pixels along both axes, and the reduced χ².
+    /// The parameters' covariance, scaled by the residuals and in pixels along both axes, and the
+    /// reduced χ².
     fn covariance(
         &self,
         state: &State,
@@ -527,11 +537,6 @@ type Step = SVector<f64, 7>;
 
 /// Place of the bend among the parameters.
 const BEND: usize = 6;
-/// Root mean square residual, as a share of the peak, beyond which a profile is no ball's: contacts by finite elements have 2 %, flat faces 10 % and
-/// more.
-const NO_BALL: f64 = 0.05;
-/// Squared residuals over the noise's from which on they are the profile's, not the noise's.
-const CLEARLY: f64 = 2.0;
 
 struct Equations {
     normal: Normal,
@@ -553,10 +558,10 @@ impl Equations {
         }
     }
 
-    /// Adds one ring's pixels; only the lower triangle of the normal matrix is filled.
+    /// Adds one ring's pixels. Only the lower triangle of the normal matrix is filled.
     ///
-    /// Along a ring the model is its level, to first order in r² − mean r²; a shift of the centre changes it by
-    /// −2 (dI/dr²) times the place.
+    /// Along a ring the model is its level, to first order in r² − mean r². A shift of the centre
+    /// changes it by −2 (dI/dr²) times the place.
     fn add(&mut self, ring: &Ring, l: &Level, weight: f64, r2: f64, spread: f64) {
         let [n, u, v, sum_r2] = ring.place;
         let [uu, uv, r2u, r2v] = ring.product;
@@ -590,27 +595,23 @@ impl Equations {
         self.normal[(5, 5)] += square * (sum_r2 - uu);
         self.gradient[4] += slope * (du - along(u, r2u));
         self.gradient[5] += slope * (dv - along(v, r2v));
-        // Along a ring the model itself varies; that is no misfit.
+        // Along a ring the model itself varies. That is no misfit.
         let within = n * l.by_r2 * l.by_r2 * spread;
         self.chi2 += weight * (dd - 2.0 * l.value * d + n * l.value * l.value - within);
         self.pixels += n;
         self.weights += weight * n;
     }
 
-    /// Whether the residuals of a profile of that peak are neither noise nor what finite strain leaves.
+    /// Whether the residuals of a profile of that peak are neither noise nor what finite strain
+    /// leaves.
     fn is_no_ball(&self, peak: f64) -> bool {
-        let limit = NO_BALL * peak;
-        self.chi2 > CLEARLY * self.pixels && self.chi2 > limit * limit * self.weights
+        // Root mean square residual, as a share of the peak, beyond which a profile is no ball's:
+        // contacts by finite elements have 2 %, flat faces 10 % and more.
+        let limit = 0.05 * peak;
+        // Squared residuals over the noise's from which on they are the profile's, not the noise's.
+        self.chi2 > 2.0 * self.pixels && self.chi2 > limit * limit * self.weights
     }
 }
-
-/// Radial misfit, as a share of the peak, beyond which a profile is not Hertz's. Blur, whole grey levels and the depth of a guide
-/// ten times the contact leave 0.2 % or less; light ∝ p^1.2 taken for pressure 0.8 %, a flat punch 10 %.
-const RADIAL_LIMIT: f64 = 0.01;
-/// The same around the centre, where the noise model's own error counts: an ellipse of 1.2 to 1 has 4 %.
-const AZIMUTHAL_LIMIT: f64 = 0.03;
-/// Standard deviations by which a sum of squares must exceed that of the noise.
-const SIGNIFICANT: f64 = 5.0;
 
 /// Misfit of a fitted profile as shares of its peak.
 #[derive(Clone, Copy, Debug)]
@@ -623,8 +624,9 @@ struct Misfit {
 }
 
 impl Misfit {
-    /// Splits χ² of all pixels into that of the rings' means and the rest. With weights w = 1/σ² the noise adds one a ring and
-    /// one a pixel, so that (χ² − number)/Σw is the mean square of the misfit.
+    /// Splits χ² of all pixels into that of the rings' means and the rest. With weights w = 1/σ²
+    /// the noise adds one a ring and one a pixel, so that (χ² − number)/Σw is the mean square of
+    /// the misfit.
     fn of(
         rings: &Rings,
         edge: &BlurredEdge,
@@ -650,10 +652,16 @@ impl Misfit {
         let radial = share(radial_chi2 - count);
         let azimuthal = share(around_chi2 - (pixels - count));
         let stands_out =
-            |chi2: f64, number: f64| chi2 > number + SIGNIFICANT * (2.0 * number).sqrt();
+            // Standard deviations by which a sum of squares must exceed that of the noise.
+            |chi2: f64, number: f64| chi2 > number + 5.0 * (2.0 * number).sqrt();
         let radial_stands_out = stands_out(radial_chi2, count);
-        let not_radial = radial > RADIAL_LIMIT && radial_stands_out;
-        let not_round = azimuthal > AZIMUTHAL_LIMIT && stands_out(around_chi2, pixels - count);
+        // Radial misfit, as a share of the peak, beyond which a profile is not Hertz's. Blur, whole
+        // grey levels and the depth of a guide ten times the contact leave 0.2 % or less. Light ∝
+        // p^1.2 taken for pressure 0.8 %, a flat punch 10 %.
+        let not_radial = radial > 0.01 && radial_stands_out;
+        // The same around the centre, where the noise model's own error counts: an ellipse of 1.2
+        // to 1 has 4 %.
+        let not_round = azimuthal > 0.03 && stands_out(around_chi2, pixels - count);
         Self {
             radial,
             azimuthal,

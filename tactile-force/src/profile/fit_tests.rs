@@ -1,6 +1,7 @@
 use super::*;
 
-/// Every interval has a slope of its own, so that a neighbour's would be seen; outside the table its ends hold.
+/// Every interval has a slope of its own, so that a neighbour's would be seen. Outside the table
+/// its ends hold.
 #[test]
 fn tables_are_linear_between_their_levels() {
     let values: [f64; VARIANCE_LEVELS] = std::array::from_fn(|k| 3.0 + (k * k) as f64);

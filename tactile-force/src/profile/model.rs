@@ -1,11 +1,12 @@
 //! The blurred pressure profile and its derivatives.
 //!
 //! Its base is E √(z + N)₊ for a standard normal N: a square-root edge blurred by a Gaussian. With
-//! h(z) for that mean, h″ = ½ h − z h′ (√ is homogeneous of degree ½ and Gaussian means obey the heat
-//! equation), so every derivative follows from h and h′: h⁽ⁿ⁺²⁾ = (½ − n) h⁽ⁿ⁾ − z h⁽ⁿ⁺¹⁾. At zero
-//! h(0) = Γ(¾)/(2^¾ √π), h′(0) = Γ(¼)/(2^(9/4) √π).
+//! h(z) for that mean, h″ = ½ h − z h′ (√ is homogeneous of degree ½ and Gaussian means obey the
+//! heat equation), so every derivative follows from h and h′: h⁽ⁿ⁺²⁾ = (½ − n) h⁽ⁿ⁾ − z h⁽ⁿ⁺¹⁾. At
+//! zero h(0) = Γ(¾)/(2^¾ √π), h′(0) = Γ(¼)/(2^(9/4) √π).
 
-/// Nodes every quarter from −8 to 16; below h < 1e-15, above the asymptotic series is exact to 1e-9.
+/// Nodes every quarter from −8 to 16. Below h < 1e-15, above the asymptotic series is exact to
+/// 1e-9.
 const LOW: f64 = -8.0;
 const HIGH: f64 = 16.0;
 const STEP: f64 = 0.25;
@@ -114,7 +115,7 @@ pub struct Shape {
     pub radius: f64,
     /// Variance of the blur along one axis, the 1/12 of the pixel included.
     pub blur: f64,
-    /// c of √(1 − r²/a²) (1 − c r²/a²); zero is Hertz's profile.
+    /// c of √(1 − r²/a²) (1 − c r²/a²). Zero is Hertz's profile.
     pub bend: f64,
 }
 
@@ -130,7 +131,8 @@ pub struct Level {
     pub by_r2: f64,
 }
 
-/// Mean of a power of (1 − |r + ε|²/a²)₊ under the blur, and its derivatives by the cumulants of what is raised.
+/// Mean of a power of (1 − |r + ε|²/a²)₊ under the blur, and its derivatives by the cumulants of
+/// what is raised.
 #[derive(Clone, Copy, Debug)]
 struct Power {
     value: f64,
@@ -152,11 +154,13 @@ impl Power {
     }
 }
 
-/// B + A E √x₊ (1 − c + c x) with x = 1 − |r + ε|²/a², ε normal with the blur's variance w along each axis.
+/// B + A E √x₊ (1 − c + c x) with x = 1 − |r + ε|²/a², ε normal with the blur's variance w along
+/// each axis.
 ///
 /// |r + ε|² is w times a noncentral χ² with two degrees of freedom: mean r² + 2w, variance 4r²w + 4w², third cumulant
-/// 24 r²w² + 16 w³. The mean of the root is that of a normal variable, corrected for the skewness (Edgeworth); the error is of
-/// order (blur/a)². `spread` is the variance of r² among the pixels that share this distance.
+/// 24 r²w² + 16 w³. The mean of the root is that of a normal variable, corrected for the skewness
+/// (Edgeworth). The error is of order (blur/a)². `spread` is the variance of r² among the pixels
+/// that share this distance.
 pub fn level(edge: &BlurredEdge, shape: &Shape, r2: f64, spread: f64) -> Level {
     let (w, inverse) = (shape.blur, 1.0 / (shape.radius * shape.radius));
     let inverse2 = inverse * inverse;

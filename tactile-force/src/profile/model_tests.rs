@@ -15,7 +15,7 @@ fn agrees_with_the_integral() {
     let edge = BlurredEdge::new();
     for k in -90..400 {
         let z = 0.1 * f64::from(k) + 0.013;
-        // Table: Taylor remainder 0.125⁹; series at 16: 1e-9.
+        // Table: Taylor remainder 0.125⁹. Series at 16: 1e-9.
         assert!(
             (edge.derivatives(z)[0] - by_quadrature(z)).abs() < 3e-9,
             "z = {z}"
@@ -34,7 +34,7 @@ fn derivatives_of_the_edge_agree_with_differences() {
             edge.derivatives(z),
         );
         for k in 0..5 {
-            // Differences: e² h⁽ᵏ⁺³⁾/6; far series: its last term.
+            // Differences: e² h⁽ᵏ⁺³⁾/6. Far series: its last term.
             let slope = (above[k] - below[k]) / (2.0 * e);
             assert!(
                 (slope - here[k + 1]).abs() < 2e-6,

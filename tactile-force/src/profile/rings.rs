@@ -5,28 +5,20 @@ use std::ops::Range;
 use crate::frame::vectorized;
 use crate::region::Region;
 
-/// Rings a quarter of a pixel wide at the contact's edge, one pixel further in and four pixels where the profile hardly bends; reused from fit
-/// to fit.
+/// Rings a quarter of a pixel wide at the contact's edge, one pixel further in and four pixels
+/// where the profile hardly bends. Reused from fit to fit.
 ///
-/// Where rings are wide, pixels are added in blocks, with the sums over all pixels of a block: only the ring is that of the block's centre.
+/// Where rings are wide, pixels are added in blocks, with the sums over all pixels of a block: only
+/// the ring is that of the block's centre.
 #[derive(Clone, Debug, Default)]
 pub struct Rings {
     rings: Vec<Ring>,
-    /// The longest run of the aperture in every row, and what of it was added in blocks: columns from and to.
+    /// The longest run of the aperture in every row, and what of it was added in blocks: columns
+    /// from and to.
     spans: Vec<[usize; 2]>,
     taken: Vec<[usize; 2]>,
 }
 
-/// How far inside the edge pixels are added in blocks of four by four, and rings are four pixels wide. At the edge of that disc a² − r² is ten times
-/// its change from the middle of a ring to its border, whose spread in r² the level takes into account: what is left is of the fourth order, 1e-5
-/// of the level. `cargo bench -p tactile-benches --bench work_precision -- force` shows the error.
-const WIDE: f64 = 20.0;
-/// The same for blocks of two by two and rings one pixel wide.
-const NEAR: f64 = 8.0;
-/// Pixels well inside the edge beyond which some blocks are left out there: the profile is flat and they only repeat each other.
-const ENOUGH: f64 = 8192.0;
-/// Between 2⁵² and 2⁵³ a double has whole numbers alone.
-const WHOLE: f64 = 6_755_399_441_055_744.0;
 /// Pixels whose rings are found at once.
 const AT_ONCE: usize = 16;
 
@@ -36,8 +28,9 @@ impl Rings {
         self.rings.iter().filter(|ring| ring.place[0] > 0.0)
     }
 
-    /// Gathers the pixels of the aperture. The centre is relative to the region's first pixel; `aspect` is the pixel's
-    /// height over its width, and distances are in pixel widths. `radius` is about that of the contact.
+    /// Gathers the pixels of the aperture. The centre is relative to the region's first pixel;
+    /// `aspect` is the pixel's height over its width, and distances are in pixel widths. `radius`
+    /// is about that of the contact.
     pub fn gather(&mut self, region: &Region, centre: [f64; 2], aspect: f64, radius: f64) {
         let Self {
             rings,
@@ -56,7 +49,12 @@ impl Rings {
             }
         }
         let inside = |depth: f64| (radius - depth).max(0.0).floor();
-        let wide = inside(WIDE);
+        // How far inside the edge pixels are added in blocks of four by four, and rings are four
+        // pixels wide. At the edge of that disc a² − r² is ten times its change from the middle of
+        // a ring to its border, whose spread in r² the level takes into account: the remainder is
+        // of the fourth order, 1e-5 of the level. `cargo bench -p tactile-benches --bench
+        // work_precision -- force` shows the error.
+        let wide = inside(20.0);
         let pixels = std::f64::consts::PI * wide * wide / aspect;
         vectorized(Gather {
             rings,
@@ -68,8 +66,11 @@ impl Rings {
                 spans,
             },
             wide,
-            near: inside(NEAR),
-            step: (pixels / ENOUGH).sqrt().ceil().max(1.0) as usize,
+            // The same for blocks of two by two and rings one pixel wide.
+            near: inside(8.0),
+            // Pixels well inside the edge beyond which some blocks are left out there: the profile
+            // is flat and they only repeat each other.
+            step: (pixels / 8192.0).sqrt().ceil().max(1.0) as usize,
         });
     }
 }
@@ -82,7 +83,7 @@ struct Gather<'a> {
     /// Distances up to which rings are four pixels and one pixel wide.
     wide: f64,
     near: f64,
-    /// Of the large blocks every so many rows and columns are gathered.
+    /// Of the large blocks every n-th row and column is gathered.
     step: usize,
 }
 
@@ -95,8 +96,10 @@ impl Gather<'_> {
         let edge = 4.0 * r - 0.75 * self.wide - 3.0 * self.near;
         let inner = if bent > flat { bent } else { flat };
         let place = if edge > inner { edge } else { inner };
-        // Rounds to the nearest whole number, which then stands in the last digits; a conversion that minds its limits has no wide instruction.
-        (place - 0.5 + WHOLE).to_bits() as u32 as usize
+        // Rounds to the nearest whole number, which then stands in the last digits. A conversion
+        // that minds its limits has no wide instruction. Between 2⁵² and 2⁵³ a double has whole
+        // numbers alone.
+        (place - 0.5 + 6_755_399_441_055_744.0).to_bits() as u32 as usize
     }
 
     /// As many rings as the farthest pixel of the aperture needs, all empty.
@@ -222,8 +225,8 @@ impl pulp::NullaryFnOnce for Gather<'_> {
     }
 }
 
-/// Sums over the pixels of one ring; (u, v) is a pixel's place relative to the centre, d its difference. Four by four, so
-/// that a pixel is added with a few wide instructions.
+/// Sums over the pixels of one ring. (u, v) is a pixel's place relative to the centre, d its
+/// difference. Four by four, so that a pixel is added with a few wide instructions.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Ring {
     /// Σ 1, Σ u, Σ v, Σ r².
@@ -261,7 +264,8 @@ impl Ring {
     }
 }
 
-/// Where blocks lie: a corner of four of them is beside the centre, so that they are the same whichever way the image is mirrored, turned or moved.
+/// Where blocks lie: a corner of four of them is beside the centre, so that they are the same
+/// whichever way the image is mirrored, turned or moved.
 #[derive(Clone, Copy, Debug)]
 pub struct Grid<'a> {
     /// Column and row of the centre.
@@ -302,7 +306,8 @@ impl Grid<'_> {
         }
     }
 
-    /// The columns of whole blocks in rows from `row` on, all of whose pixels lie within a distance of the centre and in the rows' spans.
+    /// The columns of whole blocks in rows from `row` on, all of whose pixels lie within a distance
+    /// of the centre and in the rows' spans.
     #[inline(always)]
     pub fn columns<const SIDE: usize>(&self, row: isize, distance: f64) -> Range<usize> {
         let none = 0..0;
@@ -334,7 +339,8 @@ impl Grid<'_> {
     }
 }
 
-/// A block of pixels: its differences, and where its centre is relative to that of the contact, in pixel widths.
+/// A block of pixels: its differences, and where its centre is relative to that of the contact, in
+/// pixel widths.
 #[derive(Clone, Copy, Debug)]
 pub struct Block<const SIDE: usize> {
     pub pixels: [[f32; SIDE]; SIDE],
@@ -355,7 +361,8 @@ impl<const SIDE: usize> Block<SIDE> {
         sums
     };
 
-    /// What the pixels one by one add to a ring. With u + p and v + q the place of a pixel, sums of odd powers of p and q vanish.
+    /// What the pixels one by one add to a ring. With u + p and v + q the place of a pixel, sums of
+    /// odd powers of p and q vanish.
     #[inline(always)]
     pub fn sums(&self) -> Ring {
         let (u, v, side) = (self.u, self.v, SIDE as f64);

@@ -37,7 +37,8 @@ fn a_block_is_its_pixels() {
     }
 }
 
-/// Mirrored about a centre that is not in the middle of a pixel: the blocks are mirrored, too, and counted alike.
+/// Mirrored about a centre that is not in the middle of a pixel: the blocks are mirrored, too, and
+/// counted alike.
 #[test]
 fn blocks_are_mirrored_with_the_image() {
     let size = 40;

@@ -156,7 +156,8 @@ fn shear_pairs_that_say_nothing() {
     ));
 }
 
-/// Blocks, noise, edges, single pixels, full scale, whatever comes: a measurement with a finite force, or a refusal of what is saturated.
+/// Blocks, noise, edges, single pixels, full scale, whatever comes: a measurement with a finite
+/// force, or a refusal of what is saturated.
 fn end_civilly(
     (rows, columns): (usize, usize),
     seed: u64,
@@ -195,7 +196,8 @@ fn end_civilly(
     Ok(())
 }
 
-/// Two columns say nothing of where the contact's centre is; followed without a limit, it once took rings for 223 GB.
+/// Two columns do not determine the contact's centre. Followed without a limit, it once took
+/// rings for 223 GB.
 #[test]
 fn a_centre_that_the_pixels_do_not_determine_is_given_up() {
     end_civilly((19, 2), 12_243_987_543_208_780_806, [192, 252, 19, 3]).unwrap();

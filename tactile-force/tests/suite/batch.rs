@@ -1,4 +1,5 @@
-//! Batches give what single frames give, whatever the workspace saw before and however many threads work.
+//! Batches give what single frames give, whatever the workspace saw before and however many threads
+//! work.
 
 use ndarray::{Array2, ArrayView2};
 use tactile_force::{

@@ -1,4 +1,4 @@
-//! Calibrations: what they recover, how sure they say they are, what they refuse.
+//! Calibrations: what they recover, the errors that they state, what they refuse.
 
 use proptest::prelude::*;
 use rand::{SeedableRng, rngs::ChaCha8Rng};
@@ -77,11 +77,13 @@ fn hysteresis_is_measured_with_its_sign() {
         p.force_n -= 0.08 * x * (1.0 - x);
     }
     let h = fitted(&pairs).report().hysteresis.unwrap();
-    // Greatest difference 0.02 N at half range, up to three times the noise of a difference; mean 0.08/6.
+    // Greatest difference 0.02 N at half range, up to three times the noise of a difference. Mean
+    // 0.08/6.
     assert!((h.greatest_n - 0.02).abs() < 5e-4, "{h:?}");
     assert!((h.mean_n.value - 0.08 / 6.0).abs() < 5e-4, "{h:?}");
     assert!((h.share_of_full_scale - 0.01).abs() < 3e-4, "{h:?}");
-    // The curves lie between the branches: what they state of one force holds half of the difference, and of two it is common.
+    // The curves lie between the branches: what they state of one force holds half of the
+    // difference, and of two it is common.
     assert!((h.width_n / (0.04 / 6.0) - 1.0).abs() < 0.05, "{h:?}");
     let (curve, low, high) = (fitted(&pairs), 0.8e6, 2.4e6);
     assert!(curve.standard_error_n(low) >= h.width_n);
@@ -182,7 +184,7 @@ fn coverage(o: &CalibrationOptions, at: f64) -> f64 {
 fn stated_errors_are_right() {
     let plain = CalibrationOptions::default();
     let huber = options(false, Robustness::Huber);
-    // 68.3 % ± 1.5 % (binomial, 1000 seeds); Student's t with 38 degrees takes 0.5 % off.
+    // 68.3 % ± 1.5 % (binomial, 1000 seeds). Student's t with 38 degrees takes 0.5 % off.
     for at in [0.0, 1.7e6, 3.9e6] {
         let linear = coverage(&plain, at);
         assert!((0.64..0.72).contains(&linear), "line at {at}: {linear}");
@@ -199,7 +201,8 @@ fn confidence_intervals_cover_nineteen_in_twenty() {
             c.report().parameters[1].interval_95().contains(5e-7)
         })
         .count();
-    // 95 % ± 0.7 %: three standard deviations. Seven degrees of freedom: with the normal's 1.96 it would be 91 %.
+    // 95 % ± 0.7 %: three standard deviations. Seven degrees of freedom: with the normal's 1.96 it
+    // would be 91 %.
     assert!((929..=971).contains(&inside), "{inside}");
 }
 
@@ -214,7 +217,8 @@ fn errors_of_two_forces_go_together_as_stated() {
         stated += c.error_covariance_n2(at[0], at[1]);
         size += c.standard_error_n(at[0]) * c.standard_error_n(at[1]);
     }
-    // The mean of a thousand products of two errors is uncertain by √2/√1000 of their size at most; three of that.
+    // The mean of a thousand products of two errors is uncertain by √2/√1000 of their size at most.
+    // Three of that.
     assert!(
         (seen - stated).abs() < 0.13 * size,
         "{seen} {stated} {size}"

@@ -49,7 +49,7 @@ impl Stream {
 fn a_healthy_sensor_is_suspected_less_than_once_in_twenty_thousand_frames() {
     for sd in [0.002, 0.005, 0.01, 0.02] {
         let mut alarms = 0;
-        // A hundred baselines of 20 000 frames each; a run ends with its alarm.
+        // A hundred baselines of 20 000 frames each. A run ends with its alarm.
         for seed in 0..100 {
             let mut stream = Stream::new(sd, seed);
             let mut monitor = stream.learned();
@@ -57,7 +57,8 @@ fn a_healthy_sensor_is_suspected_less_than_once_in_twenty_thousand_frames() {
                 (0..20_000).any(|_| monitor.update(&stream.next(1.0, 1.0)).has_changed()),
             );
         }
-        // One in 40 000 was asked for: 40 runs in 100 would be right, with a mean that is known; the bar is one a run.
+        // One in 40 000 was asked for: 40 runs in 100 would be right, with a mean that is known.
+        // The bar is one a run.
         assert!(alarms < 60, "scatter {sd}: {alarms} runs of 100");
     }
 }
@@ -137,7 +138,7 @@ fn frames_show_gain_background_and_noise_under_a_contact_too() {
                 error < 8.0 * found.brightness.standard_error,
                 "{force}: {found:?}"
             );
-            // The ratio of two thousand pixels' worth of tiles: 200 tiles know it to 5 %.
+            // The ratio of two thousand pixels' worth of tiles: 200 tiles give it to 5 %.
             assert!((found.noise_ratio - 1.0).abs() < 0.35, "{force}: {found:?}");
         }
     }

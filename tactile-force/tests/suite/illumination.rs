@@ -61,7 +61,7 @@ fn five_percent_from_frame_to_frame_are_divided_out() {
             }
         }
     }
-    // Two standard errors; the reference's own error is common to all.
+    // Two standard errors. The reference's own error is common to all.
     assert!(inside * 10 >= count * 8, "{inside} of {count}");
 }
 

@@ -1,4 +1,5 @@
-//! The camera's geometry against an independent forward model: Brown's polynomial applied to the undistorted image.
+//! The camera's geometry against an independent forward model: Brown's polynomial applied to the
+//! undistorted image.
 
 use proptest::prelude::*;
 use rand::{SeedableRng, rngs::ChaCha8Rng};
@@ -9,8 +10,8 @@ const SHAPE: (usize, usize) = (1042, 1392);
 const CENTRE: [f64; 2] = [695.5, 520.5];
 const SIZE: [f64; 2] = [21.6e-6, 22.032e-6];
 
-/// Where a place in metres is seen by a lens that moves the corners inwards by `barrel`: distortion as a function of the
-/// undistorted radius, the other way round than the crate's model.
+/// Where a place in metres is seen by a lens that moves the corners inwards by `barrel`: distortion
+/// as a function of the undistorted radius, the other way round than the crate's model.
 fn seen(metres: [f64; 2], barrel: f64) -> [f64; 2] {
     let offset = [
         metres[0] - SIZE[0] * CENTRE[0],
@@ -25,7 +26,8 @@ fn seen(metres: [f64; 2], barrel: f64) -> [f64; 2] {
     ]
 }
 
-/// A target of 15 × 11 dots, 1.9 mm apart, turned by 10 mrad and shifted, centroids known to `noise` pixels.
+/// A target of 15 × 11 dots, 1.9 mm apart, turned by 10 mrad and shifted, centroids known to
+/// `noise` pixels.
 fn target(barrel: f64, noise: f64, seed: u64, mirror: bool) -> Vec<DotPair> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let normal = Normal::new(0.0, noise).unwrap();
@@ -68,8 +70,8 @@ fn a_barrel_of_three_percent_and_oblong_pixels_are_recovered() {
             worst = worst.max((diameter / 5.4e-3 - 1.0).abs());
         }
     }
-    // Uncorrected, diameters are off by up to 8 %. Left are the third order that two coefficients of the inverse cannot hold
-    // (3e-4 at the very corner) and the dots' noise.
+    // Uncorrected, diameters are off by up to 8 %. Left are the third order that two coefficients
+    // of the inverse cannot hold (3e-4 at the very corner) and the dots' noise.
     assert!(worst < 1e-3, "{worst}");
 }
 
@@ -101,7 +103,7 @@ fn stated_errors_are_those_of_repeated_targets() {
     }
     for (k, sum) in squares.iter().enumerate() {
         let ratio = (sum / seeds as f64).sqrt();
-        // A standard deviation from 400 seeds is known to 3.5 %; three of that.
+        // A standard deviation from 400 seeds is known to 3.5 %. Three of that.
         assert!((0.89..1.11).contains(&ratio), "parameter {k}: {ratio}");
     }
 }
@@ -177,7 +179,8 @@ proptest! {
     }
 }
 
-/// One ring of pixels against the whole contact, every part weighted with Hertz's pressure √(1 − r²/a²).
+/// One ring of pixels against the whole contact, every part weighted with Hertz's pressure √(1 −
+/// r²/a²).
 #[test]
 fn the_mean_area_of_a_contacts_pixels_is_that_under_the_pressure() {
     let lens = LensGeometry::new([20e-6; 2])
@@ -192,6 +195,7 @@ fn the_mean_area_of_a_contacts_pixels_is_that_under_the_pressure() {
         weights += weight;
     }
     let found = lens.mean_pixel_area_m2(centre, radius);
-    // Right to second order: 3 k₁² ρ⁴, which differs between the ring and the contact by 4e-6; half pixels add some 1e-5.
+    // Right to second order: 3 k₁² ρ⁴, which differs between the ring and the contact by 4e-6. Half
+    // pixels add some 1e-5.
     assert!((found * weights / sum - 1.0).abs() < 5e-5, "{found:e}");
 }

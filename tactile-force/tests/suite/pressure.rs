@@ -1,5 +1,6 @@
-//! The local curve against an independent forward model: light that goes as a power of the pressure, vignetting, noise, whole
-//! grey levels. The scenes that are measured show another ball than the ones that calibrated.
+//! The local curve against an independent forward model: light that goes as a power of the
+//! pressure, vignetting, noise, whole grey levels. The scenes that are measured show another ball
+//! than the ones that calibrated.
 #![allow(clippy::print_stdout)]
 
 use proptest::prelude::*;
@@ -27,7 +28,8 @@ fn force_and_radius_of_another_ball_are_right_whatever_the_power() {
         let curve = PressureCurve::fit(&frames, &PressureCurveOptions::default()).unwrap();
         let options = CalibrationOptions::default().with_zero_at_origin();
         let sums = LinearCalibration::fit(&pairs, &options).unwrap();
-        // The local curve, and the frame sums for comparison: worst relative errors of force and radius.
+        // The local curve, and the frame sums for comparison: worst relative errors of force and
+        // radius.
         let (mut local, mut summed) = ([0.0_f64; 2], [0.0_f64; 2]);
         for (k, force) in [0.1, 0.2, 0.3, 0.4].into_iter().enumerate() {
             let frame = sensor.frame(force, 2.5e-3, [121.3, 97.6], Branch::Loading, 77 + k as u64);
@@ -84,8 +86,8 @@ fn stated_errors_cover_the_truth() {
         }
     }
     let share = inside as f64 / count as f64;
-    // 95.4 % if the errors were exact. Those of smoothing are an average over curves like this one, and four forces of one
-    // calibration share its error: 12 draws, ± 6 % each way.
+    // 95.4 % if the errors were exact. Those of smoothing are an average over curves like this one,
+    // and four forces of one calibration share its error: 12 draws, ± 6 % each way.
     assert!(share > 0.8, "{share}");
 }
 
@@ -218,7 +220,7 @@ proptest! {
                 CalibrationFrame::new(disc, noise * f64::from(*grey), Branch::Loading).unwrap()
             })
             .collect();
-        // Forces that fall throughout leave the sums without a rising curve; that is refused.
+        // Forces that fall throughout leave the sums without a rising curve. That is refused.
         if let Ok(curve) = PressureCurve::fit(&frames, &PressureCurveOptions::default()) {
             prop_assert_eq!(curve.pressure_pa(0.0).value, 0.0);
             let pressures: Vec<f64> = (-10..=260).map(|g| curve.pressure_pa(f64::from(g)).value).collect();

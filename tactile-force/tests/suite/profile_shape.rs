@@ -1,4 +1,4 @@
-//! A contact that is not a ball's says so.
+//! A contact that is not a ball's is reported as such.
 #![allow(clippy::print_stdout)]
 
 use ndarray::Array2;
@@ -14,7 +14,8 @@ use crate::simulated::{SHAPE, Sensor, measure};
 /// Light at (x, y).
 type Level = dyn Fn(f64, f64) -> f64;
 
-/// The profile fitted to a contact whose light is `level` at (x, y) in units of a radius of 35 pixels, 120 grey levels at 1.
+/// The profile fitted to a contact whose light is `level` at (x, y) in units of a radius of 35
+/// pixels, 120 grey levels at 1.
 fn fitted(level: impl Fn(f64, f64) -> f64, seed: u64) -> HertzFit {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut frame = |pressed: bool| {
@@ -65,14 +66,16 @@ fn balls_are_balls() {
     }
 }
 
-/// Contacts at finite strain: finite elements give c from −0.3 (stiff balls sunk into soft layers) to 0.15 (balls flattened on glass).
+/// Contacts at finite strain: finite elements give c from −0.3 (stiff balls sunk into soft layers)
+/// to 0.15 (balls flattened on glass).
 #[test]
 fn radii_of_bent_profiles_are_right() {
     for (seed, bend) in [-0.3, -0.1, 0.08, 0.15].into_iter().enumerate() {
         let bent = |x: f64, y: f64| ball(x, y) * (1.0 - bend * radius2(x, y));
         let fit = fitted(bent, seed as u64);
         let [radius, found] = [fit.radius_px, fit.bend];
-        // Four standard errors and what 3 × 3 samples a pixel leave at the edge (0.01 px for a Hertz profile).
+        // Four standard errors and what 3 × 3 samples a pixel leave at the edge (0.01 px for a
+        // Hertz profile).
         let off = (radius.value - 35.0).abs();
         assert!(
             off < 4.0 * radius.standard_error + 0.01,
@@ -129,8 +132,9 @@ fn punches_pads_ellipses_and_rings_are_not() {
             fit.radial_misfit,
             fit.azimuthal_misfit
         );
-        // The best profile of what is no ball's has no minimum that Gauss and Newton's steps find: they end where χ² no longer falls. Two fits, with
-        // and without a bend, of the twelve steps that are ample for a ball, and a few.
+        // The best profile of what is no ball's has no minimum that Gauss and Newton's steps find:
+        // they end where χ² no longer falls. Two fits, with and without a bend, of the twelve steps
+        // that are ample for a ball, and a few.
         assert!(fit.iterations <= 40, "{name}: {}", fit.iterations);
     }
 }
@@ -159,7 +163,7 @@ fn the_curve_turns_a_balls_light_back_into_a_balls_pressure() {
     assert!(pressure.radial_misfit < 0.4 * light.radial_misfit);
 }
 
-/// The limit holds over all rounds of the fit, and a fit that it ends says so.
+/// The limit holds over all rounds of the fit, and a fit that it ends reports it.
 #[test]
 fn no_fit_takes_more_steps_than_allowed() {
     let reference = Array2::from_elem(SHAPE, 40_u8);

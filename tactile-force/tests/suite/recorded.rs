@@ -1,7 +1,8 @@
 //! Answers of an earlier state of this crate, so that a change of its form changes no number.
 //!
-//! `tests/recorded/answers.txt` holds a line for every name. After a change that is meant to alter answers, write it
-//! anew with `RECORD_ANSWERS=1 cargo test -p tactile-force --test suite recorded` and read the difference before committing.
+//! `tests/recorded/answers.txt` holds a line for every name. After a change that is meant to alter
+//! answers, write it anew with `RECORD_ANSWERS=1 cargo test -p tactile-force --test suite recorded`
+//! and read the difference before committing.
 
 use test_support as record;
 

@@ -1,5 +1,6 @@
-//! All building blocks together, in the order of the crate's page: a sensor whose light goes as a power of the pressure, behind
-//! a lens with vignetting and distortion, with oblong pixels and illumination that changes from frame to frame.
+//! All building blocks together, in the order of the crate's page: a sensor whose light goes as a
+//! power of the pressure, behind a lens with vignetting and distortion, with oblong pixels and
+//! illumination that changes from frame to frame.
 #![allow(clippy::print_stdout)]
 
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};

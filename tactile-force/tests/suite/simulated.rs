@@ -1,5 +1,6 @@
-//! Frames of an independent forward model: Hertz's contact, light that goes as a power of the pressure, vignetting, drifting
-//! illumination, noise and whole grey levels. None of it is the crate's own code.
+//! Frames of an independent forward model: Hertz's contact, light that goes as a power of the
+//! pressure, vignetting, drifting illumination, noise and whole grey levels. None of it is the
+//! crate's own code.
 
 use ndarray::Array2;
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
@@ -46,7 +47,7 @@ impl Default for Sensor {
     }
 }
 
-/// Hertz: contact radius in metres of a ball of radius `ball_m` under a force; E* = 200 kPa.
+/// Hertz: contact radius in metres of a ball of radius `ball_m` under a force. E* = 200 kPa.
 pub(crate) fn contact_radius(force_n: f64, ball_m: f64) -> f64 {
     (0.75 * force_n * ball_m / 200e3).cbrt()
 }
@@ -57,8 +58,9 @@ impl Sensor {
         120.0 * (pressure_pa / 60e3).powf(self.q)
     }
 
-    /// The undistorted place of a pixel, in pixel widths from where the first pixel would be: the image of a place at the
-    /// distance ρ (corners: 1) from the middle lies at ρ (1 − barrel ρ²), solved here by iteration.
+    /// The undistorted place of a pixel, in pixel widths from where the first pixel would be: the
+    /// image of a place at the distance ρ (corners: 1) from the middle lies at ρ (1 − barrel ρ²),
+    /// solved here by iteration.
     pub(crate) fn place(&self, x: f64, y: f64) -> [f64; 2] {
         let middle = [0.5 * (SHAPE.1 as f64 - 1.0), 0.5 * (SHAPE.0 as f64 - 1.0)];
         let seen = [x - middle[0], self.aspect * (y - middle[1])];
@@ -74,7 +76,8 @@ impl Sensor {
         ]
     }
 
-    /// A frame of a contact at an undistorted place (x, y) in pixel widths; without force, of the sensor at rest.
+    /// A frame of a contact at an undistorted place (x, y) in pixel widths. Without force, of the
+    /// sensor at rest.
     pub(crate) fn frame(
         &self,
         force_n: f64,
@@ -133,7 +136,8 @@ impl Sensor {
             .unwrap()
     }
 
-    /// Frames of a ball of 4 mm under 0.05 to 1 N, up and down, at places that differ, and a gauge good to 0.2 %.
+    /// Frames of a ball of 4 mm under 0.05 to 1 N, up and down, at places that differ, and a gauge
+    /// good to 0.2 %.
     pub(crate) fn calibration(
         &self,
         reference: &ReferenceFrame,

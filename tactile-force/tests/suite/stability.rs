@@ -54,13 +54,15 @@ fn x_and_y_are_treated_alike() {
 #[test]
 fn darkness_measures_as_light_does() {
     let (light, dark) = (pressed::<false>(false), pressed::<true>(false));
-    // Halves round away from zero, up in one image and down in the other: up to half a level in one of 4 pixels.
+    // Halves round away from zero, up in one image and down in the other: up to half a level in one
+    // of 4 pixels.
     assert!((light.force_n.value / dark.force_n.value - 1.0).abs() < 5e-3);
     let radius = |m: &ForceMeasurement| m.profile.unwrap().radius_px.value;
     assert!((radius(&light) / radius(&dark) - 1.0).abs() < 2e-3);
 }
 
-/// Of a wide contact only every so many rows are looked at well inside the edge: the answer stays that of the profile.
+/// Of a wide contact only every n-th row is looked at well inside the edge: the answer stays
+/// that of the profile.
 #[test]
 fn rows_left_out_of_a_wide_contact_do_not_move_the_fit() {
     let pairs: Vec<_> = (0..5)
@@ -84,7 +86,8 @@ fn rows_left_out_of_a_wide_contact_do_not_move_the_fit() {
         )
         .unwrap();
         let (fit, found) = (m.profile.unwrap(), m.contact_radius_m.unwrap().value);
-        // Rounding to grey levels and one sample a pixel at the edge leave 10⁻⁴, as for contacts whose pixels all count.
+        // Rounding to grey levels and one sample a pixel at the edge leave 10⁻⁴, as for contacts
+        // whose pixels all count.
         assert!((found / radius - 1.0).abs() < 2e-4, "{radius}: {found}");
         assert!(
             (fit.peak.value / 200.0 - 1.0).abs() < 2e-3,
