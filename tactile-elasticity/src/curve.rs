@@ -4,9 +4,9 @@
 //!
 //! F(z) = F₀ + E* f(z − z₀) beyond z₀, F₀ before,
 //!
-//! which is linear in (F₀, E*) at a given z₀: the squared residuals, minimised over these, are a function of z₀
-//! alone, scanned and then refined. Intervals are those of the profile likelihood; residuals that follow one another (the sign of a wrong law)
-//! widen them.
+//! which is linear in (F₀, E*) at a given z₀: the squared residuals, minimised over these, are a
+//! function of z₀ alone, scanned and then refined. Intervals are those of the profile likelihood.
+//! Residuals that follow one another (the sign of a wrong law) widen them.
 
 use crate::contact::{Bond, Waveguide};
 use crate::error::{ElasticityError, Quantity, finite, poisson};
@@ -25,7 +25,10 @@ use tactile_core::{Interval, statistics::quantile_95};
 /// use tactile_elasticity::curve::IndentationCurve;
 ///
 /// // In any order: a curve is sorted by position.
-/// let curve = IndentationCurve::new(&[3e-6, 1e-6, 2e-6, 0.0, 5e-6, 4e-6], &[3e-4, 1e-4, 2e-4, 0.0, 5e-4, 4e-4])?;
+/// let curve = IndentationCurve::new(
+///     &[3e-6, 1e-6, 2e-6, 0.0, 5e-6, 4e-6],
+///     &[3e-4, 1e-4, 2e-4, 0.0, 5e-4, 4e-4],
+/// )?;
 /// assert_eq!((curve.position_m()[1], curve.force_n()[1]), (1e-6, 1e-4));
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
 /// ```
@@ -39,11 +42,12 @@ pub struct IndentationCurve {
 const FEWEST_POINTS: usize = 6;
 
 impl IndentationCurve {
-    /// From positions (m, growing into the sample; in any order) and forces (N, pressing positive).
+    /// From positions (m, growing into the sample, in any order) and forces (N, pressing positive).
     ///
     /// # Errors
     /// [`ElasticityError::LengthMismatch`], [`ElasticityError::TooFewLoads`] below six points,
-    /// [`ElasticityError::NotFinite`], and [`ElasticityError::EqualLoads`] where all forces or all positions are equal.
+    /// [`ElasticityError::NotFinite`], and [`ElasticityError::EqualLoads`] where all forces or all
+    /// positions are equal.
     pub fn new(position_m: &[f64], force_n: &[f64]) -> Result<Self, ElasticityError> {
         let (expected, found) = (position_m.len(), force_n.len());
         if expected != found {
@@ -124,14 +128,28 @@ pub enum Baseline {
 /// Where contact begins.
 ///
 /// ```
-/// use tactile_elasticity::curve::{ContactPoint, CurveOptions, IndentationCurve, Indenter, fit_curve};
+/// use tactile_elasticity::curve::{
+///     ContactPoint, CurveOptions, IndentationCurve, Indenter, fit_curve,
+/// };
 /// use tactile_elasticity::modulus::EstimatorKind;
 ///
 /// let z: Vec<f64> = (0..50).map(|i| i as f64 * 2e-5).collect();
-/// let f: Vec<f64> = z.iter().map(|z| 2.0 * 20e3 / 0.75 * 1e-3 * (z - 2e-4).max(0.0)).collect();
-/// let known = CurveOptions { contact_point: ContactPoint::At(2e-4), ..CurveOptions::default() };
+/// let f: Vec<f64> = z
+///     .iter()
+///     .map(|z| 2.0 * 20e3 / 0.75 * 1e-3 * (z - 2e-4).max(0.0))
+///     .collect();
+/// let known = CurveOptions {
+///     contact_point: ContactPoint::At(2e-4),
+///     ..CurveOptions::default()
+/// };
 /// let punch = Indenter::Punch { radius_m: 1e-3 };
-/// let fit = fit_curve(&IndentationCurve::new(&z, &f)?, &punch, 0.5, EstimatorKind::FlatPunch, &known)?;
+/// let fit = fit_curve(
+///     &IndentationCurve::new(&z, &f)?,
+///     &punch,
+///     0.5,
+///     EstimatorKind::FlatPunch,
+///     &known,
+/// )?;
 /// assert_eq!(fit.contact_point_m, 2e-4);
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
 /// ```
@@ -150,7 +168,10 @@ pub enum ContactPoint {
 /// ```
 /// use tactile_elasticity::curve::{Baseline, ContactPoint, CurveOptions};
 ///
-/// let options = CurveOptions { baseline: Baseline::Offset, contact_point: ContactPoint::At(1e-4) };
+/// let options = CurveOptions {
+///     baseline: Baseline::Offset,
+///     contact_point: ContactPoint::At(1e-4),
+/// };
 /// assert_ne!(options, CurveOptions::default());
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -172,8 +193,16 @@ pub struct CurveOptions {
 /// let z: Vec<f64> = (0..60).map(|i| i as f64 * 1e-5).collect();
 /// let force = |d: f64| std::f64::consts::FRAC_2_PI * 20e3 / 0.75 * d * d;
 /// let f: Vec<f64> = z.iter().map(|d| (force(*d) * 1e5).round() / 1e5).collect();
-/// let cone = Indenter::Cone { half_angle_tangent: 1.0 };
-/// let fit = fit_curve(&IndentationCurve::new(&z, &f)?, &cone, 0.5, EstimatorKind::Cone, &CurveOptions::default())?;
+/// let cone = Indenter::Cone {
+///     half_angle_tangent: 1.0,
+/// };
+/// let fit = fit_curve(
+///     &IndentationCurve::new(&z, &f)?,
+///     &cone,
+///     0.5,
+///     EstimatorKind::Cone,
+///     &CurveOptions::default(),
+/// )?;
 /// assert!((fit.youngs_modulus_pa - 20e3).abs() < 4.0 * fit.standard_error_pa);
 /// assert!(fit.residual_sd_n < 1e-5 && fit.fitted_n.len() == 60);
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
@@ -197,7 +226,7 @@ pub struct CurveFit {
     pub offset_n: f64,
     /// Standard deviation of the residuals.
     pub residual_sd_n: f64,
-    /// Correlation of each residual with the next; near zero where the law is right.
+    /// Correlation of each residual with the next. Near zero where the law is right.
     pub residual_autocorrelation: f64,
     /// Fitted force at every position.
     pub fitted_n: Vec<f64>,
@@ -205,26 +234,37 @@ pub struct CurveFit {
     pub contact_ratio: Option<f64>,
     /// Information criteria.
     pub statistics: FitStatistics,
-    /// Where the law's assumptions fail; their load is the curve's last point.
+    /// Where the law's assumptions fail. Their load is the curve's last point.
     pub warnings: Vec<Warning>,
 }
 
 /// Fits one law of a rigid `indenter` on a sample with Poisson ratio `nu`.
 ///
 /// # Errors
-/// [`ElasticityError::OutOfRange`] where the law does not reach as far as the curve or does not belong to the indenter;
-/// [`ElasticityError::PoissonRatio`] and the indenter's own.
+/// [`ElasticityError::OutOfRange`] where the law does not reach as far as the curve or does not
+/// belong to the indenter. [`ElasticityError::PoissonRatio`] and the indenter's own.
 ///
 /// ```
 /// use tactile_elasticity::curve::{CurveOptions, IndentationCurve, Indenter, fit_curve};
 /// use tactile_elasticity::modulus::EstimatorKind;
 /// // A 1 mm punch on 20 kPa, contact at 0.2 mm.
 /// let z: Vec<f64> = (0..50).map(|i| i as f64 * 2e-5).collect();
-/// let f: Vec<f64> = z.iter().map(|z| 2.0 * 20e3 / 0.75 * 1e-3 * (z - 2e-4).max(0.0)).collect();
+/// let f: Vec<f64> = z
+///     .iter()
+///     .map(|z| 2.0 * 20e3 / 0.75 * 1e-3 * (z - 2e-4).max(0.0))
+///     .collect();
 /// let curve = IndentationCurve::new(&z, &f)?;
 /// let punch = Indenter::Punch { radius_m: 1e-3 };
-/// let fit = fit_curve(&curve, &punch, 0.5, EstimatorKind::FlatPunch, &CurveOptions::default())?;
-/// assert!((fit.youngs_modulus_pa - 20e3).abs() < 1e-3 && (fit.contact_point_m - 2e-4).abs() < 1e-9);
+/// let fit = fit_curve(
+///     &curve,
+///     &punch,
+///     0.5,
+///     EstimatorKind::FlatPunch,
+///     &CurveOptions::default(),
+/// )?;
+/// assert!(
+///     (fit.youngs_modulus_pa - 20e3).abs() < 1e-3 && (fit.contact_point_m - 2e-4).abs() < 1e-9
+/// );
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
 /// ```
 pub fn fit_curve(
@@ -338,7 +378,8 @@ fn report(
     }
 }
 
-/// Limits around a modulus with the law's own standard error of ln F, which no number of points averages away.
+/// Limits around a modulus with the law's own standard error of ln F, which no number of points
+/// averages away.
 fn widened((lower, upper): (f64, f64), modulus: f64, model_error: f64) -> (f64, f64) {
     if model_error == 0.0 {
         return (lower, upper);
@@ -451,7 +492,7 @@ const SCAN: usize = 300;
 const SECTIONS: usize = 70;
 
 impl Problem<'_> {
-    /// f(z − z₀) of every point; None where the law does not reach so far.
+    /// f(z − z₀) of every point. None where the law does not reach so far.
     fn shape(&self, contact: f64) -> Option<Vec<f64>> {
         let of = |z: &f64| {
             let d = z - contact;
@@ -508,7 +549,8 @@ impl Problem<'_> {
         })
     }
 
-    /// The contact point that leaves the least, from one span before the first point up to the fifth last point.
+    /// The contact point that leaves the least, from one span before the first point up to the
+    /// fifth last point.
     fn best(&self) -> Option<Profile> {
         let (first, last) = self.curve.span();
         let z = self.curve.position_m();
@@ -549,9 +591,19 @@ impl Problem<'_> {
 /// use tactile_elasticity::curve::Indenter;
 /// use tactile_elasticity::modulus::EstimatorKind;
 ///
-/// let on_a_layer = Indenter::Sphere { radius_m: 5e-3, thickness_m: Some(2e-3), bond: Bond::Bonded };
-/// assert_eq!(on_a_layer.candidates()[0], EstimatorKind::LayerIntegralEquation);
-/// assert_eq!(Indenter::Punch { radius_m: 1e-3 }.candidates(), [EstimatorKind::FlatPunch]);
+/// let on_a_layer = Indenter::Sphere {
+///     radius_m: 5e-3,
+///     thickness_m: Some(2e-3),
+///     bond: Bond::Bonded,
+/// };
+/// assert_eq!(
+///     on_a_layer.candidates()[0],
+///     EstimatorKind::LayerIntegralEquation
+/// );
+/// assert_eq!(
+///     Indenter::Punch { radius_m: 1e-3 }.candidates(),
+///     [EstimatorKind::FlatPunch]
+/// );
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -565,12 +617,13 @@ pub enum Indenter {
         /// How the sample sits on its base.
         bond: Bond,
     },
-    /// A flat plate on a soft ball that lies on another; the indentation is that of one contact.
+    /// A flat plate on a soft ball that lies on another. The indentation is that of one contact.
     Ball {
         /// The ball's radius.
         radius_m: f64,
     },
-    /// A rigid spherical tip on a soft ball that lies on a rigid plate; the indentation is the tip's travel.
+    /// A rigid spherical tip on a soft ball that lies on a rigid plate. The indentation is the
+    /// tip's travel.
     TipOnBall {
         /// The tip's radius.
         tip_radius_m: f64,
@@ -608,8 +661,9 @@ pub enum Model {
 }
 
 impl Indenter {
-    /// The laws that apply, the most general theory first; the published layer series and contact
-    /// without slip, which a curve cannot tell from contact without friction on a softer sample, only where they are asked for by name.
+    /// The laws that apply, the most general theory first. The published layer series and contact
+    /// without slip, which a curve cannot tell from contact without friction on a softer sample,
+    /// only where they are asked for by name.
     pub fn candidates(&self) -> Vec<EstimatorKind> {
         use EstimatorKind as K;
         match self {
@@ -633,12 +687,15 @@ impl Indenter {
         }
     }
 
-    /// Standard error of ln F that the law of this indenter makes at an indentation on a sample with Poisson ratio ν, by finite strain above all.
+    /// Standard error of ln F that the law of this indenter makes at an indentation on a sample
+    /// with Poisson ratio ν, by finite strain above all.
     ///
-    /// Against finite elements, neo-Hookean. Half balls, ν = 0.495: Hertz's law of a ball's indentation carries 5 % too much at
-    /// δ/R = 0.02, 12 % at 0.08 and 28 % at 0.21; Tatara's 5 % and 9 % at the first and last. Rigid indenters, sliding or sticking: δ/R = 0.4 takes 7 % off
-    /// a sphere's force at ν = 0.495 and adds 13 % at ν = 0, where points slide inwards; a layer adds up to 12 % at δ/h = 0.3; a cone of 70.3° carries
-    /// 2 % too much at ν = 0.495 and 12 % too little at ν = 0; a punch 1 % at δ/a = 0.1.
+    /// Against finite elements, neo-Hookean. Half balls, ν = 0.495: Hertz's law of a ball's
+    /// indentation carries 5 % too much at δ/R = 0.02, 12 % at 0.08 and 28 % at 0.21. Tatara's 5 %
+    /// and 9 % at the first and last. Rigid indenters, sliding or sticking: δ/R = 0.4 takes 7 % off
+    /// a sphere's force at ν = 0.495 and adds 13 % at ν = 0, where points slide inwards. A layer
+    /// adds up to 12 % at δ/h = 0.3. A cone of 70.3° carries 2 % too much at ν = 0.495 and 12 % too
+    /// little at ν = 0. A punch 1 % at δ/a = 0.1.
     fn model_error(&self, law: &dyn ContactLaw, indentation: f64, nu: f64) -> f64 {
         let own = law.model_error(None, Some(indentation));
         let ratio = law.contact_ratio(None, Some(indentation)).unwrap_or(0.0);
@@ -656,7 +713,7 @@ impl Indenter {
         }
     }
 
-    /// The law of a kind for this indenter; None where it does not apply.
+    /// The law of a kind for this indenter. None where it does not apply.
     fn law(
         &self,
         kind: EstimatorKind,
@@ -747,15 +804,30 @@ impl Indenter {
 ///
 /// ```
 /// use tactile_elasticity::contact::Bond;
-/// use tactile_elasticity::curve::{CurveOptions, IndentationCurve, Indenter, Model, SelectionReason, select_model};
+/// use tactile_elasticity::curve::{
+///     CurveOptions, IndentationCurve, Indenter, Model, SelectionReason, select_model,
+/// };
 /// use tactile_elasticity::modulus::EstimatorKind;
 ///
 /// // A 5 mm sphere on 30 kPa, deep: Hertz's law is asked for by name.
 /// let z: Vec<f64> = (0..40).map(|i| i as f64 * 5e-6).collect();
-/// let f: Vec<f64> = z.iter().map(|d| 4.0 / 3.0 * 40e3 * 5e-3_f64.sqrt() * d.powf(1.5)).collect();
-/// let sphere = Indenter::Sphere { radius_m: 5e-3, thickness_m: None, bond: Bond::Bonded };
+/// let f: Vec<f64> = z
+///     .iter()
+///     .map(|d| 4.0 / 3.0 * 40e3 * 5e-3_f64.sqrt() * d.powf(1.5))
+///     .collect();
+/// let sphere = Indenter::Sphere {
+///     radius_m: 5e-3,
+///     thickness_m: None,
+///     bond: Bond::Bonded,
+/// };
 /// let hertz = Model::Named(EstimatorKind::HertzSphere);
-/// let selection = select_model(&IndentationCurve::new(&z, &f)?, &sphere, 0.5, hertz, &CurveOptions::default())?;
+/// let selection = select_model(
+///     &IndentationCurve::new(&z, &f)?,
+///     &sphere,
+///     0.5,
+///     hertz,
+///     &CurveOptions::default(),
+/// )?;
 /// assert_eq!(selection.reason, SelectionReason::Asked);
 /// assert!((selection.chosen().youngs_modulus_pa / 30e3 - 1.0).abs() < 1e-6);
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
@@ -763,7 +835,7 @@ impl Indenter {
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct CurveSelection {
-    /// Fits; the first is the chosen one, the others follow by AICc.
+    /// Fits. The first is the chosen one, the others follow by AICc.
     pub fits: Vec<CurveFit>,
     /// Akaike weights of the fits, in their order.
     pub weights: Vec<f64>,
@@ -778,19 +850,27 @@ impl CurveSelection {
     }
 }
 
-/// Fits the law asked for, or all that apply, and chooses by AICc: among those within 2 of the best, the most general theory, which
-/// holds wherever the others do.
+/// Fits the law asked for, or all that apply, and chooses by AICc: among those within 2 of the
+/// best, the most general theory, which holds wherever the others do.
 ///
 /// # Errors
 /// As [`fit_curve`], where no law can be fitted.
 ///
 /// ```
-/// use tactile_elasticity::curve::{CurveOptions, IndentationCurve, Indenter, Model, select_model};
+/// use tactile_elasticity::curve::{
+///     CurveOptions, IndentationCurve, Indenter, Model, select_model,
+/// };
 ///
 /// let z: Vec<f64> = (0..40).map(|i| i as f64 * 5e-6).collect();
 /// let f: Vec<f64> = z.iter().map(|d| 2.0 * 40e3 * 1e-3 * d).collect();
 /// let punch = Indenter::Punch { radius_m: 1e-3 };
-/// let selection = select_model(&IndentationCurve::new(&z, &f)?, &punch, 0.5, Model::Auto, &CurveOptions::default())?;
+/// let selection = select_model(
+///     &IndentationCurve::new(&z, &f)?,
+///     &punch,
+///     0.5,
+///     Model::Auto,
+///     &CurveOptions::default(),
+/// )?;
 /// assert!((selection.chosen().youngs_modulus_pa / 30e3 - 1.0).abs() < 1e-6);
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
 /// ```
@@ -821,7 +901,7 @@ pub fn select_model(
     })
 }
 
-/// The fits of the laws that can be fitted; the first error where none can.
+/// The fits of the laws that can be fitted. The first error where none can.
 fn fit_each(
     curve: &IndentationCurve,
     indenter: &Indenter,

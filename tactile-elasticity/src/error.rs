@@ -64,8 +64,8 @@ pub enum ElasticityError {
         bounded_below(*.lower_bound_pa)
     )]
     StifferThanResolvable {
-        /// The 95 % lower limit of the modulus; None where the errors are unknown, and where the contact is stiffer than any sample could make
-        /// it.
+        /// The 95 % lower limit of the modulus. None where the errors are unknown, and where the
+        /// contact is stiffer than any sample could make it.
         lower_bound_pa: Option<f64>,
     },
     /// Fewer usable loads than the estimator needs.
@@ -157,7 +157,8 @@ pub enum ElasticityError {
     NotMonotone,
     /// Finite elements did not reach a contact that a table needs.
     #[error(
-        "the solver stopped at {force_n} N with E = {youngs_modulus_pa} Pa: the table lacks larger contacts"
+        "the solver stopped at {force_n} N with E = {youngs_modulus_pa} Pa: \
+         the table lacks larger contacts"
     )]
     NotReached {
         /// The ball's modulus.
@@ -170,7 +171,8 @@ pub enum ElasticityError {
     Cancelled,
     /// No load could be solved by finite elements.
     #[error(
-        "the finite elements find no solution: approaches too large for this block or sizes that do not fit"
+        "the finite elements find no solution: \
+         approaches too large for this block or sizes that do not fit"
     )]
     NoSolution,
     /// An element of a finite-element mesh is degenerate or turned inside out.
@@ -349,7 +351,8 @@ fn bounded_below(lower_bound_pa: Option<f64>) -> String {
             ": it has more than {:.3} kPa with 95 % confidence",
             bound * 1e-3
         ),
-        None => ": the contact is no larger than a rigid one would be; check forces, pixel size, radius and the moduli of the layers"
+        None => ": the contact is no larger than a rigid one would be; check forces, pixel size, \
+                 radius and the moduli of the layers"
             .into(),
     }
 }

@@ -14,7 +14,9 @@ use nalgebra::{Matrix3, Matrix6, Point3, SMatrix, Vector3};
 /// let gradients = [0.01_f64, 0.03].map(Matrix3::from_diagonal_element);
 /// let summary = StrainField::from_gradients(&gradients, None, &Infinitesimal)?.summary();
 /// assert!((summary.mean[(0, 0)] - 0.02).abs() < 1e-15);
-/// assert!((summary.standard_error[(0, 0)] - summary.spread[(0, 0)] / 2.0_f64.sqrt()).abs() < 1e-15);
+/// assert!(
+///     (summary.standard_error[(0, 0)] - summary.spread[(0, 0)] / 2.0_f64.sqrt()).abs() < 1e-15
+/// );
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
 /// ```
 #[derive(Debug, Clone, PartialEq)]
@@ -24,7 +26,8 @@ pub struct StrainSummary {
     pub mean: Matrix3<f64>,
     /// Weighted standard deviation over the field.
     pub spread: Matrix3<f64>,
-    /// Standard error of the mean, as if the points were independent: spread/√n_eff, n_eff = (Σw)²/Σw².
+    /// Standard error of the mean, as if the points were independent: spread/√n_eff, n_eff =
+    /// (Σw)²/Σw².
     pub standard_error: Matrix3<f64>,
     /// Points that count.
     pub used: usize,
@@ -36,9 +39,9 @@ pub struct StrainSummary {
 #[derive(Debug, Clone, Default, PartialEq)]
 #[non_exhaustive]
 pub struct StrainField {
-    /// The strain at every point; zero where the deformation folds.
+    /// The strain at every point. Zero where the deformation folds.
     pub strains: Vec<Matrix3<f64>>,
-    /// The weight of every point; zero where the deformation folds.
+    /// The weight of every point. Zero where the deformation folds.
     pub weights: Vec<f64>,
     /// The points at which the deformation folds, det F ≤ 0.
     pub folded: Vec<usize>,
@@ -75,20 +78,29 @@ impl StrainField {
         Ok(field)
     }
 
-    /// As [`from_gradients`](Self::from_gradients), in the memory of this field: for as many points nothing is allocated.
+    /// As [`from_gradients`](Self::from_gradients), in the memory of this field: for as many points
+    /// nothing is allocated.
     ///
     /// ```
     /// use nalgebra::Matrix3;
     /// use tactile_elasticity::field::StrainField;
     /// use tactile_elasticity::strain::Infinitesimal;
-    /// let mut field = StrainField::from_gradients(&[Matrix3::identity(); 2], None, &Infinitesimal)?;
-    /// field.set_gradients(&[Matrix3::from_diagonal_element(0.01)], Some(&[2.0]), &Infinitesimal)?;
-    /// assert_eq!((field.strains.len(), field.summary().mean[(2, 2)]), (1, 0.01));
+    /// let mut field =
+    ///     StrainField::from_gradients(&[Matrix3::identity(); 2], None, &Infinitesimal)?;
+    /// field.set_gradients(
+    ///     &[Matrix3::from_diagonal_element(0.01)],
+    ///     Some(&[2.0]),
+    ///     &Infinitesimal,
+    /// )?;
+    /// assert_eq!(
+    ///     (field.strains.len(), field.summary().mean[(2, 2)]),
+    ///     (1, 0.01)
+    /// );
     /// # Ok::<(), tactile_elasticity::ElasticityError>(())
     /// ```
     ///
     /// # Errors
-    /// As [`from_gradients`](Self::from_gradients); the field is then empty.
+    /// As [`from_gradients`](Self::from_gradients). The field is then empty.
     pub fn set_gradients(
         &mut self,
         gradients: &[Matrix3<f64>],
@@ -137,8 +149,8 @@ impl StrainField {
 
     /// Mean, spread and standard error, robust if asked for.
     ///
-    /// The robust standard error is that of the mean over the estimator's efficiency on normal data: √(π/2) for the median,
-    /// 1/√0.95 for Huber's mean.
+    /// The robust standard error is that of the mean over the estimator's efficiency on normal
+    /// data: √(π/2) for the median, 1/√0.95 for Huber's mean.
     ///
     /// ```
     /// use nalgebra::Matrix3;
@@ -253,9 +265,10 @@ pub enum Averaging {
     /// Weighted mean and standard deviation.
     #[default]
     Mean,
-    /// Huber's mean, k = 1.345 (95 % efficient on normal data); spread from the median absolute deviation.
+    /// Huber's mean, k = 1.345 (95 % efficient on normal data). Spread from the median absolute
+    /// deviation.
     Huber,
-    /// Weighted median; spread from the median absolute deviation.
+    /// Weighted median. Spread from the median absolute deviation.
     Median,
 }
 
@@ -317,20 +330,25 @@ fn centre_and_spread(values: &[f64], weights: &[f64], how: Averaging) -> (f64, f
 
 // From the covariance of displacements to that of the mean Green–Lagrange strain.
 //
-// A smoothing spline is linear in its data: H(Xᵢ) = Σⱼ uⱼ aᵢⱼᵀ, with aᵢⱼ the gradient at Xᵢ of the j-th point's share.
-// To first order dE = sym(Fᵀ dH), so that the mean is linear in the data too, and its covariance a sum over the points.
+// A smoothing spline is linear in its data: H(Xᵢ) = Σⱼ uⱼ aᵢⱼᵀ, with aᵢⱼ the gradient at Xᵢ of the
+// j-th point's share. To first order dE = sym(Fᵀ dH), so that the mean is linear in the data too,
+// and its covariance a sum over the points.
 
 /// Order of the components in covariances of strain: xx, yy, zz, xy, xz, yz.
 const PAIRS: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)];
 
-/// Covariance of the Green–Lagrange strain (xx, yy, zz, xy, xz, yz) from that of H, whose nine entries are taken column by column.
+/// Covariance of the Green–Lagrange strain (xx, yy, zz, xy, xz, yz) from that of H, whose nine
+/// entries are taken column by column.
 ///
 /// ```
 /// use nalgebra::{Matrix3, SMatrix};
 /// use tactile_elasticity::field::strain_covariance;
 ///
 /// // Small strains: xx follows its own entry, xy the mean of two.
-/// let covariance = strain_covariance(&Matrix3::zeros(), &(SMatrix::<f64, 9, 9>::identity() * 1e-8));
+/// let covariance = strain_covariance(
+///     &Matrix3::zeros(),
+///     &(SMatrix::<f64, 9, 9>::identity() * 1e-8),
+/// );
 /// assert_eq!((covariance[(0, 0)], covariance[(3, 3)]), (1e-8, 0.5e-8));
 /// ```
 pub fn strain_covariance(gradient: &Matrix3<f64>, covariance: &SMatrix<f64, 9, 9>) -> Matrix6<f64> {
@@ -348,17 +366,20 @@ pub fn strain_covariance(gradient: &Matrix3<f64>, covariance: &SMatrix<f64, 9, 9
 
 /// Covariance of the weighted mean Green–Lagrange strain (xx, yy, zz, xy, xz, yz).
 ///
-/// `gradients` and `weights` are those of the sample points i; `influence(i, j)` is aᵢⱼ, how the gradient at sample i follows
-/// data point j; `displacement_covariance[j]` is the covariance of data point j's displacement, independent of the others. O(samples · data).
+/// `gradients` and `weights` are those of the sample points i. `influence(i, j)` is aᵢⱼ, how the
+/// gradient at sample i follows data point j. `displacement_covariance[j]` is the covariance of
+/// data point j's displacement, independent of the others. O(samples · data).
 ///
 /// # Errors
-/// [`ElasticityError::LengthMismatch`], [`ElasticityError::NotPositive`] where the weights add up to nothing.
+/// [`ElasticityError::LengthMismatch`], [`ElasticityError::NotPositive`] where the weights add up
+/// to nothing.
 ///
 /// ```
 /// use nalgebra::{Matrix3, Vector3};
 /// use tactile_elasticity::field::mean_strain_covariance;
 ///
-/// // A bar of length 1 whose gradient is the difference of its two ends' displacements, each known to 10⁻⁴.
+/// // A bar of length 1 whose gradient is the difference of its two ends' displacements, each known
+/// // to 10⁻⁴.
 /// let influence = |_, end| Vector3::new(if end == 0 { -1.0 } else { 1.0 }, 0.0, 0.0);
 /// let ends = [Matrix3::from_diagonal_element(1e-8); 2];
 /// let covariance = mean_strain_covariance(&[Matrix3::zeros()], &[1.0], influence, &ends)?;
@@ -402,19 +423,22 @@ pub fn mean_strain_covariance(
     Ok(sum)
 }
 
-// Three errors go beyond the spread of the strain over the points. Those of a reconstructed surface are shared by neighbours,
-// so that n points know less than n independent ones: residuals of the affine fit are added up over runs of neighbours,
-// and the sums taken as independent (cluster-robust errors: Liang & Zeger, Biometrika 73, 1986). And the contact's edge,
-// to which the points are tied, is known to a part of a pixel: the smaller contact is off by more, relatively. Third, errors of
-// the first surface's points make any fit to them too flat (regression dilution: Fuller, Measurement Error Models, 1987, §1.1).
+// Three errors go beyond the spread of the strain over the points. Those of a reconstructed surface
+// are shared by neighbours, so that n points know less than n independent ones: residuals of the
+// affine fit are added up over runs of neighbours, and the sums taken as independent
+// (cluster-robust errors: Liang & Zeger, Biometrika 73, 1986). And the contact's edge, to which the
+// points are tied, is known to a part of a pixel: the smaller contact is off by more, relatively.
+// Third, errors of the first surface's points make any fit to them too flat (regression dilution:
+// Fuller, Measurement Error Models, 1987, §1.1).
 
 /// How far, in pixels of the surfaces, the edge of a mask lies from the contact's.
 const EDGE_PX: f64 = 0.5;
 
-/// Standard errors of the mean Green–Lagrange strain between matched points of two reconstructed surfaces.
+/// Standard errors of the mean Green–Lagrange strain between matched points of two reconstructed
+/// surfaces.
 ///
-/// `grid_m` is the surfaces' pixel in metres. `run_length` is the number of neighbours in the order given that
-/// share the errors of a surface. O(n).
+/// `grid_m` is the surfaces' pixel in metres. `run_length` is the number of neighbours in the order
+/// given that share the errors of a surface. O(n).
 ///
 /// ```
 /// use nalgebra::Point3;
@@ -441,7 +465,8 @@ pub fn mean_strain_error(
     let [from, to] = [sources, targets].map(Disc::of);
     let offsets = || pairs_of(sources, targets, [&from, &to]);
     let spread: Matrix3<f64> = offsets().map(|(d, _)| d * d.transpose()).sum();
-    // What the points do not span they know nothing of: a little of their size keeps the inverse finite.
+    // What the points do not span they know nothing of: a little of their size keeps the inverse
+    // finite.
     let inverse = (spread + Matrix3::identity() * (1e-12 * spread.trace())).try_inverse();
     let Some(inverse) = inverse else {
         return Matrix3::zeros();

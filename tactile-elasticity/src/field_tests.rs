@@ -28,7 +28,8 @@ fn exact_pairs_have_no_error_but_the_edges() {
     assert!((edge[(2, 2)] / expected - 1.0).abs() < 1e-3, "{edge}");
 }
 
-/// Monte Carlo: errors shared by runs of neighbours, the mean strain's true error beside the one told.
+/// Monte Carlo: errors shared by runs of neighbours, the mean strain's true error beside the one
+/// told.
 #[test]
 fn errors_that_neighbours_share_are_told() {
     let sources = dome();
@@ -49,7 +50,8 @@ fn errors_that_neighbours_share_are_told() {
         true_square += (0.5 * (slope * slope - 1.44)).powi(2);
     }
     let ratio = (told / true_square).sqrt();
-    // Twenty runs of which the fit takes four: the mean variance over 200 trials is known to a tenth or so.
+    // Twenty runs of which the fit takes four: the mean variance over 200 trials is known to a
+    // tenth or so.
     assert!((0.8..1.3).contains(&ratio), "{ratio}");
 }
 

@@ -1,27 +1,37 @@
 #![doc = include_str!("../README.md")]
 //!
 //! # Conventions
-//! SI units; tensors are `nalgebra::Matrix3`; x = column, y = row, z towards the object. Everything is computed in `f64`.
+//! SI units. Tensors are `nalgebra::Matrix3`. x = column, y = row, z towards the object. Everything
+//! is computed in `f64`.
 //!
 //! # References
-//! K. L. Johnson, *Contact Mechanics* (1985). I. N. Sneddon, Int. J. Eng. Sci. 3 (1965) 47. E. K. Dimitriadis et al., Biophys. J.
-//! 82 (2002) 2798. N. N. Lebedev & Ia. S. Ufliand, J. Appl. Math. Mech. 22 (1958) 442. Y. Tatara, J. Eng. Mater. Technol. 113 (1991) 285.
-//! T. Ogita, S. M. Rump & S. Oishi, SIAM J. Sci. Comput. 26 (2005) 1955. K. P. Burnham & D. R. Anderson, *Model Selection and
-//! Multimodel Inference* (2002).
+//! K. L. Johnson, *Contact Mechanics* (1985). I. N. Sneddon, Int. J. Eng. Sci. 3 (1965) 47. E. K.
+//! Dimitriadis et al., Biophys. J. 82 (2002) 2798. N. N. Lebedev & Ia. S. Ufliand, J. Appl. Math.
+//! Mech. 22 (1958) 442. Y. Tatara, J. Eng. Mater. Technol. 113 (1991) 285. T. Ogita, S. M. Rump &
+//! S. Oishi, SIAM J. Sci. Comput. 26 (2005) 1955. K. P. Burnham & D. R. Anderson, *Model Selection
+//! and Multimodel Inference* (2002).
 //!
 //! # Equations
-//! $F = I + H$ is the deformation gradient, $H = \nabla u$; $1/E^{\ast} = (1 - \nu_1^2)/E_1 + (1 - \nu_2^2)/E_2$; numbers are the paper's.
+//! $F = I + H$ is the deformation gradient, $H = \nabla u$.
+//! $1/E^{\ast} = (1 - \nu_1^2)/E_1 + (1 - \nu_2^2)/E_2$. Numbers are the paper's.
 //!
-//! - Green–Lagrange (25)–(30): $E = \frac{1}{2}(F^T F - I) = \frac{1}{2}(H + H^T + H^T H)$. Others: Euler–Almansi
-//!   $\frac{1}{2}(I - F^{-T} F^{-1})$, Hencky $\ln U$, Biot $U - I$, infinitesimal $\frac{1}{2}(H + H^T)$. O(1) a gradient.
-//! - Second Piola–Kirchhoff: $S = J F^{-1} \sigma F^{-T}$. The paper's ratio (31): $E = S_{zz}/\bar e_{zz}$, right in uniaxial loading.
-//! - Hertz: $a^3 = 3FR/(4E^{\ast})$, $\delta = a^2/R$, $F = \frac{4}{3} E^{\ast} \sqrt{R} \delta^{3/2}$, $p = p_0 \sqrt{1 - r^2/a^2}$.
-//! - Flat punch: $F = 2 E^{\ast} a \delta$. Cone: $F = \frac{2}{\pi} E^{\ast} \tan\alpha \delta^2$.
-//! - Thin layer: $\varphi(s) - \frac{2}{\pi} \int_0^a K(s, t) \varphi(t) dt = \frac{E^{\ast}}{\pi} (\delta - s^2/R)$, $F = 2\pi \int_0^a \varphi$; O(n³) with some
-//!   24 + 6 a/h nodes, tabulated by the estimators.
+//! - Green–Lagrange (25)–(30):
+//!   $E = \frac{1}{2}(F^T F - I) = \frac{1}{2}(H + H^T + H^T H)$. O(1) a gradient.
+//! - Euler–Almansi $\frac{1}{2}(I - F^{-T} F^{-1})$, Hencky $\ln U$, Biot $U - I$, infinitesimal
+//!   $\frac{1}{2}(H + H^T)$.
+//! - Second Piola–Kirchhoff: $S = J F^{-1} \sigma F^{-T}$. The paper's ratio (31):
+//!   $E = S_{zz}/\bar e_{zz}$, right in uniaxial loading.
+//! - Hertz: $a^3 = 3FR/(4E^{\ast})$, $\delta = a^2/R$,
+//!   $F = \frac{4}{3} E^{\ast} \sqrt{R} \delta^{3/2}$, $p = p_0 \sqrt{1 - r^2/a^2}$.
+//! - Flat punch: $F = 2 E^{\ast} a \delta$. Cone:
+//!   $F = \frac{2}{\pi} E^{\ast} \tan\alpha \delta^2$.
+//! - Thin layer: $\varphi(s) - \frac{2}{\pi} \int_0^a K(s, t) \varphi(t) dt =
+//!   \frac{E^{\ast}}{\pi} (\delta - s^2/R)$, $F = 2\pi \int_0^a \varphi$. O(n³) with some 24 + 6 a/h
+//!   nodes, tabulated by the estimators.
 //! - Model choice: $AICc = -2 \ln L + 2k + 2k(k + 1)/(n - k - 1)$.
 //!
-//! Errors are [`ElasticityError`]; what weakens an estimate without forbidding it is a [`modulus::Warning`].
+//! Errors are [`ElasticityError`]. What weakens an estimate without forbidding it is a
+//! [`modulus::Warning`].
 #![forbid(unsafe_code)]
 
 pub mod contact;

@@ -3,10 +3,11 @@
 /// Part of a bracket that a golden section leaves.
 const RATIO: f64 = 0.618_033_988_749_894_8;
 
-/// Argument of the least of a function that has one minimum in [low, high]: the better of the last bracket's two inner points.
+/// Argument of the least of a function that has one minimum in [low, high]: the better of the last
+/// bracket's two inner points.
 ///
-/// Every section takes one evaluation and leaves 0.62 of the bracket; `sections` of them, fewer where the bracket is down to
-/// rounding.
+/// Every section takes one evaluation and leaves 0.62 of the bracket. `sections` of them, fewer
+/// where the bracket is down to rounding.
 pub fn golden_section(
     mut low: f64,
     mut high: f64,
@@ -62,7 +63,8 @@ fn legendre(n: usize, x: f64) -> (f64, f64) {
     (p, previous)
 }
 
-/// Edges from 0 to `end`: panels of width `first` at the origin, growing by half of what lies before, none above `widest`.
+/// Edges from 0 to `end`: panels of width `first` at the origin, growing by half of what lies
+/// before, none above `widest`.
 pub fn panel_edges(end: f64, first: f64, widest: f64) -> Vec<f64> {
     let mut edges = vec![0.0];
     let mut last = 0.0;

@@ -1,23 +1,31 @@
-//! Whether a modulus changes with time, and whether it is the sample that relaxes or the sensor that drifts.
+//! Whether a modulus changes with time, and whether it is the sample that relaxes or the sensor
+//! that drifts.
 //!
-//! Loads at known times each give a modulus $E_k = F_k/x_k$, where $x_k$ is what the law makes of the contact's size: for a ball
-//! $x \propto a^3$. In a standard linear solid, a spring $E_\infty$ beside a spring $E_0 - E_\infty$ in series with a dashpot,
+//! Loads at known times each give a modulus $E_k = F_k/x_k$, where $x_k$ is what the law makes of
+//! the contact's size: for a ball $x \propto a^3$. In a standard linear solid, a spring $E_\infty$
+//! beside a spring $E_0 - E_\infty$ in series with a dashpot,
 //!
-//! $F(t) = \int_0^t E(t - s)\, \mathrm d x(s), \qquad E(t) = E_\infty + (E_0 - E_\infty)\, e^{-t/\tau}$
+//! $F(t) = \int_0^t E(t - s)\, \mathrm d x(s), \qquad E(t) = E_\infty + (E_0 - E_\infty)\,
+//! e^{-t/\tau}$
 //!
-//! holds for a contact that grows (Lee and Radok, J. Appl. Mech. 27 (1960) 438), and so, whatever the history,
+//! holds for a contact that grows (Lee and Radok, J. Appl. Mech. 27 (1960) 438), and so, whatever
+//! the history,
 //!
-//! $E_k = E_\infty + (E_0 - E_\infty)\, g_k(x, \tau), \qquad \frac 1 {E_k} = \frac 1 {E_\infty} - \Bigl(\frac 1 {E_\infty} - \frac 1 {E_0}\Bigr) g_k(F, \tau_c),
-//! \qquad g_k(u, \tau) = \frac 1 {u_k} \int_0^{t_k} e^{-(t_k - s)/\tau}\, \mathrm d u(s)$
+//! $E_k = E_\infty + (E_0 - E_\infty)\, g_k(x, \tau), \qquad \frac 1 {E_k} = \frac 1 {E_\infty} -
+//! \Bigl(\frac 1 {E_\infty} - \frac 1 {E_0}\Bigr) g_k(F, \tau_c), \qquad g_k(u, \tau) = \frac 1
+//! {u_k} \int_0^{t_k} e^{-(t_k - s)/\tau}\, \mathrm d u(s)$
 //!
-//! with $\tau_c = \tau E_0/E_\infty$. A held approach ($x$ constant) is relaxation, a held force ($F$ constant) creep. The form is used whose
-//! history varies less, since it must be known between the frames, where it is taken as linear.
+//! with $\tau_c = \tau E_0/E_\infty$. A held approach ($x$ constant) is relaxation, a held force
+//! ($F$ constant) creep. The form is used whose history varies less, since it must be known between
+//! the frames, where it is taken as linear.
 //!
-//! A gain that drifts multiplies the forces, and with them the moduli, by $1 + \gamma t$, whatever the history.
+//! A gain that drifts multiplies the forces, and with them the moduli, by $1 + \gamma t$, whatever
+//! the history.
 //!
 //! # References
-//! R. M. Christensen, *Theory of Viscoelasticity* (1982). R. E. Kass & A. E. Raftery, J. Am. Stat. Assoc. 90 (1995) 773. R. B. Davies,
-//! Biometrika 74 (1987) 33: a time constant that has no meaning where nothing relaxes makes the likelihood ratio larger than χ².
+//! R. M. Christensen, *Theory of Viscoelasticity* (1982). R. E. Kass & A. E. Raftery, J. Am. Stat.
+//! Assoc. 90 (1995) 773. R. B. Davies, Biometrika 74 (1987) 33: a time constant that has no meaning
+//! where nothing relaxes makes the likelihood ratio larger than χ².
 
 use crate::error::{ElasticityError, Quantity, not_negative, positive};
 use crate::numerics::golden_section;
@@ -30,8 +38,15 @@ use tactile_core::{Estimate, Interval, statistics::quantile_95};
 /// use tactile_elasticity::modulus::Estimate;
 /// use tactile_elasticity::relaxation::{TimeDependence, TimedModulus, time_dependence};
 ///
-/// let at = |time_s: f64| TimedModulus { time_s, force_n: 0.7, youngs_modulus_pa: Estimate::new(100e3, 500.0) };
-/// assert_eq!(time_dependence(&[0.0, 1.0, 2.0, 4.0, 8.0].map(at), 0.01, 0.0)?, TimeDependence::Steady);
+/// let at = |time_s: f64| TimedModulus {
+///     time_s,
+///     force_n: 0.7,
+///     youngs_modulus_pa: Estimate::new(100e3, 500.0),
+/// };
+/// assert_eq!(
+///     time_dependence(&[0.0, 1.0, 2.0, 4.0, 8.0].map(at), 0.01, 0.0)?,
+///     TimeDependence::Steady
+/// );
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -61,10 +76,14 @@ pub struct TimedModulus {
 /// assert!(matches!(relaxing, TimeDependence::Relaxes(_)));
 /// // No sample stiffens while it is held, but a gain may rise.
 /// let rising = time_dependence(&series(|t| 80e3 * (1.0 + 0.01 * t)), 0.0, 0.0)?;
-/// assert!(matches!(rising, TimeDependence::Drifts { per_s } if (per_s.value - 0.01).abs() < 0.001));
+/// assert!(
+///     matches!(rising, TimeDependence::Drifts { per_s } if (per_s.value - 0.01).abs() < 0.001)
+/// );
 /// // A gain that falls steadily is what a sample shows that relaxes over hours.
 /// let falling = time_dependence(&series(|t| 80e3 * (1.0 - 0.01 * t)), 0.0, 0.0)?;
-/// assert!(matches!(falling, TimeDependence::Undecided { change } if (change + 0.08).abs() < 0.01));
+/// assert!(
+///     matches!(falling, TimeDependence::Undecided { change } if (change + 0.08).abs() < 0.01)
+/// );
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -75,7 +94,8 @@ pub struct TimedModulus {
 )]
 #[non_exhaustive]
 pub enum TimeDependence {
-    /// No change that the errors would not explain (one such series in a hundred is told as one of the others).
+    /// No change that the errors would not explain (one such series in a hundred is told as one of
+    /// the others).
     Steady,
     /// The sample relaxes as a standard linear solid.
     Relaxes(StandardLinearSolid),
@@ -84,29 +104,45 @@ pub enum TimeDependence {
         /// Relative change of the gain in a second.
         per_s: Estimate,
     },
-    /// The moduli change with time and either may be the reason: too few loads, a fall in proportion to time (a falling gain, or a time constant
-    /// longer than the loads last), or a change that neither explains.
+    /// The moduli change with time and either may be the reason: too few loads, a fall in
+    /// proportion to time (a falling gain, or a time constant longer than the loads last), or a
+    /// change that neither explains.
     Undecided {
         /// Relative change from the first load to the last.
         change: f64,
     },
 }
 
-/// E(t) = E∞ + (E₀ − E∞) exp(−t/τ), each parameter with its 95 % interval by the profile of the likelihood.
+/// E(t) = E∞ + (E₀ − E∞) exp(−t/τ), each parameter with its 95 % interval by the profile of the
+/// likelihood.
 ///
 /// ```
 /// use tactile_elasticity::modulus::Estimate;
 /// use tactile_elasticity::relaxation::{TimeDependence, TimedModulus, time_dependence};
 ///
-/// // A weight of 0.7 N on 110 kPa that relax to 80 kPa with 2 s: the compliance creeps with 2 s · 110/80.
+/// // A weight of 0.7 N on 110 kPa that relax to 80 kPa with 2 s: the compliance creeps with 2 s ·
+/// // 110/80.
 /// let loads = [0.0, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0].map(|time_s: f64| {
 ///     let compliance = 1.0 / 80e3 - (1.0 / 80e3 - 1.0 / 110e3) * (-time_s / 2.75).exp();
-///     TimedModulus { time_s, force_n: 0.7, youngs_modulus_pa: Estimate::new(1.0 / compliance, 300.0) }
+///     TimedModulus {
+///         time_s,
+///         force_n: 0.7,
+///         youngs_modulus_pa: Estimate::new(1.0 / compliance, 300.0),
+///     }
 /// });
-/// let TimeDependence::Relaxes(solid) = time_dependence(&loads, 0.0, 0.0)? else { unreachable!() };
-/// assert!((solid.instantaneous_pa / 110e3 - 1.0).abs() < 1e-3 && solid.instantaneous_95_pa.contains(110e3));
-/// assert!((solid.equilibrium_pa / 80e3 - 1.0).abs() < 1e-3 && solid.equilibrium_95_pa.contains(80e3));
-/// assert!((solid.time_constant_s / 2.0 - 1.0).abs() < 1e-3 && solid.time_constant_95_s.contains(2.0));
+/// let TimeDependence::Relaxes(solid) = time_dependence(&loads, 0.0, 0.0)? else {
+///     unreachable!()
+/// };
+/// assert!(
+///     (solid.instantaneous_pa / 110e3 - 1.0).abs() < 1e-3
+///         && solid.instantaneous_95_pa.contains(110e3)
+/// );
+/// assert!(
+///     (solid.equilibrium_pa / 80e3 - 1.0).abs() < 1e-3 && solid.equilibrium_95_pa.contains(80e3)
+/// );
+/// assert!(
+///     (solid.time_constant_s / 2.0 - 1.0).abs() < 1e-3 && solid.time_constant_95_s.contains(2.0)
+/// );
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -120,51 +156,70 @@ pub struct StandardLinearSolid {
     pub equilibrium_pa: f64,
     /// Interval of E∞.
     pub equilibrium_95_pa: Interval,
-    /// τ, of the relaxation under a held approach; under a held force it creeps with τ E₀/E∞.
+    /// τ, of the relaxation under a held approach. Under a held force it creeps with τ E₀/E∞.
     pub time_constant_s: f64,
     /// Interval of τ.
     pub time_constant_95_s: Interval,
 }
 
-/// Loads at different times below which three parameters of a solid leave nothing that could speak against it.
+/// Loads at different times below which three parameters of a solid leave nothing that could speak
+/// against it.
 const FEWEST_LOADS: usize = 5;
 
-/// What the likelihood ratio of a change against none must exceed. With the time constant free it is no χ²: chosen by simulation of constant series,
-/// of which about 1 % exceed it (`cargo test -p tactile-elasticity --test suite false_alarms -- --nocapture`).
+/// What the likelihood ratio of a change against none must exceed. With the time constant free it
+/// is no χ²: chosen by simulation of constant series, of which about 1 % exceed it (`cargo test -p
+/// tactile-elasticity --test suite false_alarms -- --nocapture`).
 const CHANGE: f64 = 8.0;
 
 /// What a trend alone must exceed where a solid is not tried: χ² of one degree of freedom at 1 %.
 const TREND: f64 = 6.63;
 
-/// Difference of Bayes' information criterion that is strong evidence (Kass & Raftery 1995, Table in § 3.2).
+/// Difference of Bayes' information criterion that is strong evidence (Kass & Raftery 1995, Table
+/// in § 3.2).
 const STRONG_EVIDENCE: f64 = 6.0;
 
-/// Tells a sample that relaxes from a sensor that drifts, from the moduli of single loads in the order of time.
+/// Tells a sample that relaxes from a sensor that drifts, from the moduli of single loads in the
+/// order of time.
 ///
-/// `scale_error` is the relative standard error that all moduli share: it widens the intervals of E₀ and E∞. `law_error` is the relative error of the
-/// law that gave the moduli: between loads that differ by a factor of e they are taken to differ by as much, so that a load that
-/// grows with time is not mistaken for time.
+/// `scale_error` is the relative standard error that all moduli share: it widens the intervals of
+/// E₀ and E∞. `law_error` is the relative error of the law that gave the moduli: between loads that
+/// differ by a factor of e they are taken to differ by as much, so that a load that grows with time
+/// is not mistaken for time.
 ///
-/// Needs five loads at different times; of fewer only a significant trend is reported, as [`TimeDependence::Undecided`]. A solid is told where
-/// the likelihood ratio against a constant exceeds 8 (1 % of constant series do), Bayes' criterion prefers it to a drift by more than 6,
-/// and its time constant is no longer than the loads lasted. Where the moduli scatter about the best solid by more than their errors, these are scaled up. O(n) for each
-/// of some 400 time constants.
+/// Needs five loads at different times. Of fewer only a significant trend is reported, as
+/// [`TimeDependence::Undecided`]. A solid is told where the likelihood ratio against a constant
+/// exceeds 8 (1 % of constant series do), Bayes' criterion prefers it to a drift by more than 6,
+/// and its time constant is no longer than the loads lasted. Where the moduli scatter about the
+/// best solid by more than their errors, these are scaled up. O(n) for each of some 400 time
+/// constants.
 ///
 /// # Errors
-/// [`ElasticityError::TooFewLoads`] of none, [`ElasticityError::NotPositive`] for forces, moduli and their errors, [`ElasticityError::Negative`] for
-/// times and for the two errors, [`ElasticityError::TimeDecreases`].
+/// [`ElasticityError::TooFewLoads`] of none, [`ElasticityError::NotPositive`] for forces, moduli
+/// and their errors, [`ElasticityError::Negative`] for times and for the two errors,
+/// [`ElasticityError::TimeDecreases`].
 ///
 /// ```
 /// use tactile_elasticity::ElasticityError;
 /// use tactile_elasticity::modulus::Estimate;
 /// use tactile_elasticity::relaxation::{TimeDependence, TimedModulus, time_dependence};
 ///
-/// let at = |time_s: f64, kpa: f64| TimedModulus { time_s, force_n: 0.7, youngs_modulus_pa: Estimate::new(1e3 * kpa, 200.0) };
+/// let at = |time_s: f64, kpa: f64| TimedModulus {
+///     time_s,
+///     force_n: 0.7,
+///     youngs_modulus_pa: Estimate::new(1e3 * kpa, 200.0),
+/// };
 /// // Three loads say that something changed, not what.
 /// let few = time_dependence(&[at(0.0, 100.0), at(1.0, 97.0), at(2.0, 95.0)], 0.0, 0.0)?;
 /// assert!(matches!(few, TimeDependence::Undecided { change } if (change + 0.05).abs() < 0.01));
 /// let back = time_dependence(&[at(1.0, 100.0), at(0.0, 97.0)], 0.0, 0.0).unwrap_err();
-/// assert_eq!(back, ElasticityError::TimeDecreases { load: 1, before_s: 1.0, found_s: 0.0 });
+/// assert_eq!(
+///     back,
+///     ElasticityError::TimeDecreases {
+///         load: 1,
+///         before_s: 1.0,
+///         found_s: 0.0
+///     }
+/// );
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
 /// ```
 pub fn time_dependence(
@@ -191,7 +246,8 @@ pub fn time_dependence(
     let best = profile.best();
     let count = moduli.len() as f64;
     let least = best.map_or(f64::INFINITY, |(_, line)| line.chi_squared);
-    // Scatter beyond the errors about whichever explains more; constants, trends and solids share it.
+    // Scatter beyond the errors about whichever explains more. Constants, trends and solids share
+    // it.
     let excess = (least / (count - 3.0))
         .min(trend.chi_squared / (count - 2.0))
         .max(1.0);
@@ -218,7 +274,7 @@ pub fn time_dependence(
     Ok(undecided(&series, &trend))
 }
 
-/// The number of different times; refuses what no series can have.
+/// The number of different times. Refuses what no series can have.
 fn checked_times(moduli: &[TimedModulus]) -> Result<usize, ElasticityError> {
     let mut different = 0;
     let mut before_s = f64::NEG_INFINITY;
@@ -290,7 +346,8 @@ struct Series {
     response: Vec<f64>,
     /// Standard errors of the response.
     sigma: Vec<f64>,
-    /// What one standard error of the law adds to each response: nothing at the mean load, the whole at e times the mean.
+    /// What one standard error of the law adds to each response: nothing at the mean load, the
+    /// whole at e times the mean.
     law: Vec<f64>,
 }
 
@@ -359,7 +416,8 @@ impl Series {
         self.line(&self.times_s)
     }
 
-    /// y = a + b g(τ); None where no solid with this time constant does that: E∞ or E₀ would not be positive, or E would rise.
+    /// y = a + b g(τ). None where no solid with this time constant does that: E∞ or E₀ would not be
+    /// positive, or E would rise.
     fn solid(&self, time_constant_s: f64) -> Option<Line> {
         let line = self.line(&memory(&self.times_s, &self.held, time_constant_s));
         let (fresh, settled) = (line.a + line.b, line.a);
@@ -370,7 +428,8 @@ impl Series {
         (falls && fresh > 0.0 && settled > 0.0).then_some(line)
     }
 
-    /// Weighted least squares; the law's slope has a standard normal prior. A column that vanishes gets the coefficient zero.
+    /// Weighted least squares. The law's slope has a standard normal prior. A column that vanishes
+    /// gets the coefficient zero.
     fn line(&self, column: &[f64]) -> Line {
         let mut normal = Matrix3::zeros();
         let mut right = Vector3::zeros();
@@ -383,7 +442,8 @@ impl Series {
             right += row * y;
         }
         normal[(2, 2)] += 1.0;
-        // A column without contrast to the mean carries nothing; its coefficient must not blow up with rounding.
+        // A column without contrast to the mean carries nothing. Its coefficient must not blow up
+        // with rounding.
         let contrast = normal[(1, 1)] - normal[(0, 1)].powi(2) / normal[(0, 0)];
         let told = contrast > CONTRAST * normal[(1, 1)] && scale > 0.0;
         if !told {
@@ -413,10 +473,12 @@ impl Series {
     }
 }
 
-/// Share of a column's weight that must differ from its mean: below, the normal equations have lost half their digits.
+/// Share of a column's weight that must differ from its mean: below, the normal equations have lost
+/// half their digits.
 const CONTRAST: f64 = 1e-10;
 
-/// A deformation that scatters no more than its errors was held: its mean. Noise in the history would count as relaxation.
+/// A deformation that scatters no more than its errors was held: its mean. Noise in the history
+/// would count as relaxation.
 fn without_noise(deformations: Vec<f64>, relative_errors: &[f64]) -> Vec<f64> {
     let count = deformations.len() as f64;
     let centre = mean(deformations.iter().copied());
@@ -442,7 +504,8 @@ fn mean(values: impl ExactSizeIterator<Item = f64>) -> f64 {
     values.sum::<f64>() / count
 }
 
-/// Time constants tried, from a tenth of the shortest interval to ten times the whole, in logarithmic steps.
+/// Time constants tried, from a tenth of the shortest interval to ten times the whole, in
+/// logarithmic steps.
 const STEPS: usize = 200;
 
 /// χ² as a function of the time constant alone, the other parameters fitted.
@@ -474,7 +537,8 @@ impl<'a> Profile<'a> {
             .map_or(f64::INFINITY, |line| line.chi_squared)
     }
 
-    /// The best time constant, and the parameters there: the least of the steps, refined by golden sections.
+    /// The best time constant, and the parameters there: the least of the steps, refined by golden
+    /// sections.
     fn best(&self) -> Option<(f64, Line)> {
         let (low, high) = (self.shortest_s.ln(), self.longest_s.ln());
         let step = (high - low) / STEPS as f64;
@@ -493,7 +557,8 @@ impl<'a> Profile<'a> {
         Some((refined.exp(), self.at(refined)?))
     }
 
-    /// Where χ² has risen by `room` on one side of the best; None where it does not before the last time constant tried.
+    /// Where χ² has risen by `room` on one side of the best. None where it does not before the last
+    /// time constant tried.
     fn limit(&self, best: f64, end: f64, allowed: f64) -> Option<f64> {
         let step = (end - best) / STEPS as f64;
         let outside = (1..=STEPS)
@@ -511,10 +576,11 @@ impl<'a> Profile<'a> {
         Some(inside)
     }
 
-    /// The solid with its intervals; None where the longest time constant tried still fits.
+    /// The solid with its intervals. None where the longest time constant tried still fits.
     ///
-    /// At a fixed τ the fit is linear, so that a combination q of its parameters may lie within √(Δ − χ²(τ) + χ²_min) of its
-    /// standard errors: the interval of q is the union over all τ within theirs.
+    /// At a fixed τ the fit is linear, so that a combination q of its parameters may lie within √(Δ
+    /// − χ²(τ) + χ²_min) of its standard errors: the interval of q is the union over all τ within
+    /// theirs.
     fn solid(&self, excess: f64, count: f64, scale_error: f64) -> Option<StandardLinearSolid> {
         let (time_constant_s, best) = self.best()?;
         let learnt = (excess > 1.0).then_some(count - 3.0);
@@ -568,7 +634,8 @@ impl<'a> Profile<'a> {
         })
     }
 
-    /// The time constant of relaxation with its standard error at a fixed time constant of the fit: the same, or of creep that times E∞/E₀.
+    /// The time constant of relaxation with its standard error at a fixed time constant of the fit:
+    /// the same, or of creep that times E∞/E₀.
     fn relaxation_time(&self, time_constant_s: f64, line: &Line) -> (f64, f64) {
         match self.series.form {
             Form::Relaxation => (time_constant_s, 0.0),
@@ -619,9 +686,10 @@ impl Range {
     }
 }
 
-/// g_k(u, τ) = (1/u_k) ∫₀^{t_k} e^{−(t_k − s)/τ} du(s), and what of it a change of u_k alone adds, O(n).
+/// g_k(u, τ) = (1/u_k) ∫₀^{t_k} e^{−(t_k − s)/τ} du(s), and what of it a change of u_k alone adds,
+/// O(n).
 ///
-/// The first load is put on at time 0 and kept; between loads u is linear.
+/// The first load is put on at time 0 and kept. Between loads u is linear.
 fn memory(times_s: &[f64], held: &[f64], time_constant_s: f64) -> Vec<f64> {
     let mut remaining = 0.0;
     let mut before = (0.0, 0.0);
@@ -629,7 +697,8 @@ fn memory(times_s: &[f64], held: &[f64], time_constant_s: f64) -> Vec<f64> {
         let (last_s, last) = before;
         let elapsed = (time_s - last_s) / time_constant_s;
         let decay = (-elapsed).exp();
-        // Of the first load all is put on at the start; of a later one's change what a steady growth leaves, (1 − e^{−u})/u.
+        // Of the first load all is put on at the start. Of a later one's change what a steady
+        // growth leaves, (1 − e^{−u})/u.
         let growth = match (last > 0.0, elapsed > 0.0) {
             (false, _) => decay,
             (true, false) => 1.0,

@@ -1,7 +1,7 @@
 //! Strain of a deformation gradient.
 //!
-//! F = ∂x/∂X = I + H maps material to space, H = ∂u/∂X. All measures agree to first order in H and are
-//! functions of the stretch U of F = R U:
+//! F = ∂x/∂X = I + H maps material to space, H = ∂u/∂X. All measures agree to first order in H and
+//! are functions of the stretch U of F = R U:
 //!
 //! | measure | tensor | of a stretch λ |
 //! |---|---|---|
@@ -18,8 +18,8 @@ use std::sync::Arc;
 /// A way to measure strain: a symmetric tensor that vanishes when the material only moves and turns
 /// (the infinitesimal one: only moves).
 ///
-/// Object safe, and a boxed or shared one is one too, so that a program can choose at run time. Cost: Green–Lagrange and infinitesimal
-/// some 10 ns, the others a small eigenvalue problem.
+/// Object safe, and a boxed or shared one is one too, so that a program can choose at run time.
+/// Cost: Green–Lagrange and infinitesimal some 10 ns, the others a small eigenvalue problem.
 ///
 /// ```
 /// use nalgebra::Matrix3;
@@ -35,7 +35,7 @@ pub trait StrainMeasure {
     /// The strain of a deformation.
     ///
     /// # Errors
-    /// [`ElasticityError::NotFinite`]; and for the measures that need F⁻¹ or U to exist,
+    /// [`ElasticityError::NotFinite`]. And for the measures that need F⁻¹ or U to exist,
     /// [`ElasticityError::SingularDeformation`] and [`ElasticityError::InvertedDeformation`].
     ///
     /// ```
@@ -43,7 +43,8 @@ pub trait StrainMeasure {
     /// use tactile_elasticity::strain::{Deformation, Hencky, StrainMeasure};
     ///
     /// // Inside out there is no logarithm.
-    /// let inverted = Deformation::from_deformation_gradient(Matrix3::from_diagonal_element(-1.0_f64));
+    /// let inverted =
+    ///     Deformation::from_deformation_gradient(Matrix3::from_diagonal_element(-1.0_f64));
     /// assert!(Hencky.of(&inverted).is_err());
     /// ```
     fn of(&self, deformation: &Deformation) -> Result<Matrix3<f64>, ElasticityError>;
@@ -94,7 +95,8 @@ impl<M: StrainMeasure + ?Sized> StrainMeasure for Arc<M> {
 
 /// E = ½(FᵀF − I) = ½(H + Hᵀ + HᵀH): Lagrangian, conjugate to the second Piola–Kirchhoff stress.
 ///
-/// (26)–(30) of the paper print the exponents 3 for 2, and f for the map of positions, so that ∇u = ∇f − I.
+/// (26)–(30) of the paper print the exponents 3 for 2, and f for the map of positions, so that ∇u =
+/// ∇f − I.
 ///
 /// ```
 /// use nalgebra::Matrix3;
@@ -129,7 +131,11 @@ pub struct EulerAlmansi;
 /// use tactile_elasticity::strain::{Hencky, StrainMeasure};
 ///
 /// // Steps that stretch the same axes add up: 10 % twice is 21 % once.
-/// let strain = |stretch: f64| Hencky.strain(&Matrix3::from_diagonal_element(stretch)).map(|e| e[(0, 0)]);
+/// let strain = |stretch: f64| {
+///     Hencky
+///         .strain(&Matrix3::from_diagonal_element(stretch))
+///         .map(|e| e[(0, 0)])
+/// };
 /// assert!((2.0 * strain(0.10)? - strain(0.21)?).abs() < 1e-15);
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
 /// ```
@@ -143,7 +149,8 @@ pub struct Hencky;
 /// use tactile_elasticity::strain::{Biot, StrainMeasure};
 ///
 /// // A turn by a right angle with 5 % of stretch: the turn does not count.
-/// let turned = Matrix3::new(0.0, -1.05, 0.0, 1.05, 0.0, 0.0, 0.0, 0.0, 1.05) - Matrix3::identity();
+/// let turned =
+///     Matrix3::new(0.0, -1.05, 0.0, 1.05, 0.0, 0.0, 0.0, 0.0, 1.05) - Matrix3::identity();
 /// assert!((Biot.strain(&turned)?[(0, 0)] - 0.05_f64).abs() < 1e-15);
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
 /// ```
@@ -256,8 +263,8 @@ pub fn upright(deformation: &Deformation) -> Result<(), ElasticityError> {
 
 /// F = I + H at a point, given by either, and the other rounded.
 ///
-/// Strains of 10⁻¹² and below live in H and are lost when F is formed; stretches of 10⁻⁸ live in F and
-/// are lost when H is. Every measure asks for whichever keeps its digits.
+/// Strains of 10⁻¹² and below live in H and are lost when F is formed. Stretches of 10⁻⁸ live in F
+/// and are lost when H is. Every measure asks for whichever keeps its digits.
 ///
 /// ```
 /// use nalgebra::Matrix3;
@@ -331,7 +338,7 @@ impl Deformation {
         }
     }
 
-    /// J = det F; negative where the material is turned inside out.
+    /// J = det F. Negative where the material is turned inside out.
     pub fn jacobian(&self) -> f64 {
         match self.given {
             Given::F => determinant(&self.f).value(),
@@ -351,7 +358,8 @@ impl Deformation {
         sum.add(h[(0, 0)]).add(h[(1, 1)]).add(h[(2, 2)]).value()
     }
 
-    /// F⁻¹ by cofactors whose differences of products are summed in double-double; None where det F = 0.
+    /// F⁻¹ by cofactors whose differences of products are summed in double-double. None where det F
+    /// = 0.
     pub(crate) fn inverse(&self) -> Option<Matrix3<f64>> {
         let f = &self.f;
         let det = determinant(f).value();
@@ -366,7 +374,8 @@ impl Deformation {
         }))
     }
 
-    /// E = ½(H + Hᵀ + HᵀH), summed in double-double where the terms cancel (large rotation, little strain).
+    /// E = ½(H + Hᵀ + HᵀH), summed in double-double where the terms cancel (large rotation, little
+    /// strain).
     fn green_lagrange(&self) -> Matrix3<f64> {
         let plain = green_lagrange_plain(&self.h);
         if cancels(&self.h, &plain) {
@@ -441,7 +450,8 @@ fn determinant(m: &Matrix3<f64>) -> DoubleDouble {
 
 // Sums of products carried in twice the working precision.
 //
-// Knuth's two-sum and the fused two-product (Ogita, Rump & Oishi 2005, "Accurate sum and dot product").
+// Knuth's two-sum and the fused two-product (Ogita, Rump & Oishi 2005, "Accurate sum and dot
+// product").
 
 /// An unevaluated sum `hi + lo`, |lo| no more than half an ulp of `hi`.
 #[derive(Clone, Copy, Debug)]
@@ -510,7 +520,9 @@ impl DoubleDouble {
 /// use nalgebra::{Matrix3, Vector3};
 /// use tactile_elasticity::strain::{Deformation, PrincipalStretches};
 ///
-/// let deformation = Deformation::from_displacement_gradient(Matrix3::from_diagonal(&Vector3::new(0.0, 1e-20, -0.05)));
+/// let deformation = Deformation::from_displacement_gradient(Matrix3::from_diagonal(
+///     &Vector3::new(0.0, 1e-20, -0.05),
+/// ));
 /// let principal = PrincipalStretches::from(&deformation);
 /// assert!((principal.elongations[0] / 1e-20_f64 - 1.0).abs() < 1e-12);
 /// assert!((principal.stretches[2] - 0.95).abs() < 1e-15);
@@ -523,17 +535,18 @@ pub struct PrincipalStretches {
     pub stretches: [f64; 3],
     /// λᵢ − 1, without cancellation where the strain is small.
     pub elongations: [f64; 3],
-    /// ln λᵢ, likewise; −∞ where λᵢ = 0.
+    /// ln λᵢ, likewise. −∞ where λᵢ = 0.
     pub logarithms: [f64; 3],
     /// Column i is the material direction vᵢ, of length 1.
     pub directions: Matrix3<f64>,
 }
 
 impl From<&Deformation> for PrincipalStretches {
-    /// Of a deformation; needs finite entries.
+    /// Of a deformation. Needs finite entries.
     ///
-    /// Near the identity they come from the eigenvalues 2E of C − I, which keeps every digit of a tiny strain;
-    /// elsewhere from the singular values of F by one-sided Jacobi, which keeps every digit of a tiny stretch.
+    /// Near the identity they come from the eigenvalues 2E of C − I, which keeps every digit of a
+    /// tiny strain. Elsewhere from the singular values of F by one-sided Jacobi, which keeps every
+    /// digit of a tiny stretch.
     fn from(deformation: &Deformation) -> Self {
         let e = deformation.green_lagrange();
         let quarter: f64 = 0.25;
@@ -636,7 +649,8 @@ fn symmetric_eigen(m: &Matrix3<f64>) -> ([f64; 3], Matrix3<f64>) {
     sorted([a[(0, 0)], a[(1, 1)], a[(2, 2)]], v)
 }
 
-/// Singular values (largest first) and right singular vectors of `f` by one-sided Jacobi (Hestenes).
+/// Singular values (largest first) and right singular vectors of `f` by one-sided Jacobi
+/// (Hestenes).
 fn one_sided_jacobi(f: &Matrix3<f64>) -> ([f64; 3], Matrix3<f64>) {
     let scale = f.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
     if scale == 0.0 {
@@ -740,7 +754,7 @@ impl From<&Matrix3<f64>> for Invariants {
 
 /// Equivalent strain √(⅔ dev A : dev A), dev A = A − ⅓ tr A I.
 ///
-/// The form conjugate to the von Mises stress of an incompressible solid; the other one in use,
+/// The form conjugate to the von Mises stress of an incompressible solid. The other one in use,
 /// √(3⁄2 e:e)/(1 + ν), is the same at ν = ½ only.
 ///
 /// ```
@@ -774,9 +788,10 @@ pub fn scaled_norm(a: &Matrix3<f64>, factor: f64) -> f64 {
     (a / scale).norm() * factor.sqrt() * scale
 }
 
-/// The Green–Lagrange strain of every displacement gradient, written to `strains`; allocates nothing.
+/// The Green–Lagrange strain of every displacement gradient, written to `strains`. Allocates
+/// nothing.
 ///
-/// The same bits as [`GreenLagrange`] one at a time; a gradient that is not finite gives NaN there
+/// The same bits as [`GreenLagrange`] one at a time. A gradient that is not finite gives NaN there
 /// and leaves its neighbours alone.
 ///
 /// # Errors
@@ -810,7 +825,10 @@ pub fn green_lagrange_into(
 /// use tactile_elasticity::strain::{green_lagrange_into, green_lagrange_par_into};
 ///
 /// let gradients = vec![Matrix3::from_diagonal_element(0.1_f64); 10_000];
-/// let (mut serial, mut parallel) = (vec![Matrix3::zeros(); 10_000], vec![Matrix3::zeros(); 10_000]);
+/// let (mut serial, mut parallel) = (
+///     vec![Matrix3::zeros(); 10_000],
+///     vec![Matrix3::zeros(); 10_000],
+/// );
 /// green_lagrange_into(&gradients, &mut serial)?;
 /// green_lagrange_par_into(&gradients, &mut parallel)?;
 /// assert_eq!(serial, parallel);

@@ -1,7 +1,8 @@
 //! Stress measures, conversions between them, and the strain each belongs to.
 //!
-//! Work per volume of the undeformed material is the same in every conjugate pair: S : Ė = P : Ḟ = τ : d. Equation (31) divides
-//! components of one pair: the second Piola–Kirchhoff stress by Green–Lagrange strain.
+//! Work per volume of the undeformed material is the same in every conjugate pair: S : Ė = P : Ḟ =
+//! τ : d. Equation (31) divides components of one pair: the second Piola–Kirchhoff stress by
+//! Green–Lagrange strain.
 
 use crate::error::{ElasticityError, Quantity, poisson, positive};
 use crate::strain::{Biot, Deformation, StrainMeasure, deviator, scaled_norm, upright};
@@ -19,9 +20,14 @@ use nalgebra::Matrix3;
 ///
 /// ```
 /// use nalgebra::Matrix3;
-/// use tactile_elasticity::{strain::Deformation, stress::{StressMeasure, convert_stress}};
+/// use tactile_elasticity::{
+///     strain::Deformation,
+///     stress::{StressMeasure, convert_stress},
+/// };
 ///
-/// // Stretched to twice its length in every direction, J = 8: a unit of S is ½ of σ, 4 of τ and 2 of P and Biot's.
+/// // Stretched to twice its length in every direction, J = 8: a unit of S is ½ of σ, 4 of τ and 2
+/// // of
+/// // P and Biot's.
 /// let twice = Deformation::from_deformation_gradient(Matrix3::from_diagonal_element(2.0));
 /// let expected = [
 ///     (StressMeasure::Cauchy, 0.5_f64),
@@ -30,7 +36,12 @@ use nalgebra::Matrix3;
 ///     (StressMeasure::Biot, 2.0),
 /// ];
 /// for (to, value) in expected {
-///     let stress_pa = convert_stress(&Matrix3::identity(), StressMeasure::SecondPiolaKirchhoff, to, &twice)?;
+///     let stress_pa = convert_stress(
+///         &Matrix3::identity(),
+///         StressMeasure::SecondPiolaKirchhoff,
+///         to,
+///         &twice,
+///     )?;
 ///     assert!((stress_pa[(0, 0)] - value).abs() < 1e-14, "{to:?}");
 /// }
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
@@ -41,7 +52,7 @@ pub enum StressMeasure {
     Cauchy,
     /// τ = Jσ.
     Kirchhoff,
-    /// P = τF⁻ᵀ, the nominal stress; not symmetric.
+    /// P = τF⁻ᵀ, the nominal stress. Not symmetric.
     FirstPiolaKirchhoff,
     /// S = F⁻¹τF⁻ᵀ, the stress of equation (31).
     SecondPiolaKirchhoff,
@@ -51,17 +62,25 @@ pub enum StressMeasure {
 
 /// Converts a stress tensor in Pa from one measure to another.
 ///
-/// All go by way of Kirchhoff's stress. Biot's stress is solved for S in the principal directions of U: S_ij = 2B_ij/(λ_i + λ_j).
+/// All go by way of Kirchhoff's stress. Biot's stress is solved for S in the principal directions
+/// of U: S_ij = 2B_ij/(λ_i + λ_j).
 ///
 /// ```
 /// use nalgebra::Matrix3;
-/// use tactile_elasticity::{strain::Deformation, stress::{StressMeasure, convert_stress}};
+/// use tactile_elasticity::{
+///     strain::Deformation,
+///     stress::{StressMeasure, convert_stress},
+/// };
 ///
 /// // There and back again.
 /// let h = Matrix3::new(0.1, 0.2, 0.0, 0.0, -0.1, 0.0, 0.0, 0.0, 0.3);
 /// let deformation = Deformation::from_displacement_gradient(h);
 /// let cauchy = Matrix3::new(3.0, 1.0, 0.0, 1.0, 2.0, 0.0, 0.0, 0.0, 1.0);
-/// for measure in [StressMeasure::SecondPiolaKirchhoff, StressMeasure::FirstPiolaKirchhoff, StressMeasure::Biot] {
+/// for measure in [
+///     StressMeasure::SecondPiolaKirchhoff,
+///     StressMeasure::FirstPiolaKirchhoff,
+///     StressMeasure::Biot,
+/// ] {
 ///     let there = convert_stress(&cauchy, StressMeasure::Cauchy, measure, &deformation)?;
 ///     let back = convert_stress(&there, measure, StressMeasure::Cauchy, &deformation)?;
 ///     assert!((back - cauchy).norm() < 1e-13, "{measure:?}");
@@ -70,7 +89,8 @@ pub enum StressMeasure {
 /// ```
 ///
 /// # Errors
-/// [`ElasticityError::SingularDeformation`] or [`ElasticityError::InvertedDeformation`] unless det F > 0.
+/// [`ElasticityError::SingularDeformation`] or [`ElasticityError::InvertedDeformation`] unless det
+/// F > 0.
 pub fn convert_stress(
     stress_pa: &Matrix3<f64>,
     from: StressMeasure,
@@ -114,11 +134,12 @@ pub fn von_mises_stress(cauchy: &Matrix3<f64>) -> f64 {
     scaled_norm(&deviator(cauchy), 1.5)
 }
 
-/// S = λ tr(E) I + 2μE in Pa of an isotropic (St. Venant–Kirchhoff) solid under a Green–Lagrange strain E. Incompressible solids have no
-/// such law.
+/// S = λ tr(E) I + 2μE in Pa of an isotropic (St. Venant–Kirchhoff) solid under a Green–Lagrange
+/// strain E. Incompressible solids have no such law.
 ///
 /// # Errors
-/// [`ElasticityError::NotPositive`] modulus, [`ElasticityError::PoissonRatio`] for ν outside (−1, ½).
+/// [`ElasticityError::NotPositive`] modulus, [`ElasticityError::PoissonRatio`] for ν outside (−1,
+/// ½).
 ///
 /// ```
 /// use nalgebra::Matrix3;

@@ -5,13 +5,15 @@ use std::f64::consts::PI;
 
 /// A sphere pressed with a known force (Johnson 1985, *Contact Mechanics*, §4.2).
 ///
-/// a = (3FR/4E*)^⅓, δ = a²/R, p₀ = 3F/(2πa²), pressure p₀√(1 − r²/a²). Good for a/R up to about 0.3.
+/// a = (3FR/4E*)^⅓, δ = a²/R, p₀ = 3F/(2πa²), pressure p₀√(1 − r²/a²). Good for a/R up to about
+/// 0.3.
 ///
 /// ```
 /// use tactile_elasticity::contact::HertzContact;
 /// let contact = HertzContact::from_force(0.05, 0.003, 26_666.7)?;
 /// assert!((contact.contact_radius_m - 1.6158e-3f64).abs() < 1e-7);
-/// assert!(contact.contact_radius_m / contact.radius_m > 0.5); // far too large for Hertz: squeezed, not touched
+/// // Far too large for Hertz: squeezed, not touched.
+/// assert!(contact.contact_radius_m / contact.radius_m > 0.5);
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -87,10 +89,12 @@ impl HertzContact {
     }
 }
 
-/// Normal displacement (m) at distance r of a half-space under p₀√(1 − r²/a²) (Johnson 1985, eq. 3.42).
+/// Normal displacement (m) at distance r of a half-space under p₀√(1 − r²/a²) (Johnson 1985, eq.
+/// 3.42).
 ///
-/// Inside π p₀(2a² − r²)/(4aE*); outside p₀/(2aE*)·[(2a² − r²) asin(a/r) + a√(r² − a²)], which cancels as (r/a)²
-/// and is summed beyond r = 2a as ½ p₀ a/E* Σ 4 b_k (a/r)^(2k+1)/((2k+1)(2k+3)), b_k = (2k)!/(4ᵏ k!²): all terms positive.
+/// Inside π p₀(2a² − r²)/(4aE*). Outside p₀/(2aE*)·[(2a² − r²) asin(a/r) + a√(r² − a²)], which
+/// cancels as (r/a)² and is summed beyond r = 2a as ½ p₀ a/E* Σ 4 b_k (a/r)^(2k+1)/((2k+1)(2k+3)),
+/// b_k = (2k)!/(4ᵏ k!²): all terms positive.
 ///
 /// ```
 /// use tactile_elasticity::contact::hertz_surface_displacement_m;
@@ -99,7 +103,10 @@ impl HertzContact {
 /// assert!((far * 1e8 - 2.0f64 / 3.0).abs() < 1e-15);
 /// // Under a rigid sphere the rim has sunk half as deep as the centre.
 /// let c = tactile_elasticity::contact::HertzContact::from_force(1e-3_f64, 5e-3, 50e3)?;
-/// let depth = |r| hertz_surface_displacement_m(r, c.contact_radius_m, c.peak_pressure_pa, 50e3) / c.indentation_m;
+/// let depth = |r| {
+///     hertz_surface_displacement_m(r, c.contact_radius_m, c.peak_pressure_pa, 50e3)
+///         / c.indentation_m
+/// };
 /// assert!((depth(0.0) - 1.0).abs() < 1e-14 && (depth(c.contact_radius_m) - 0.5).abs() < 1e-14);
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
 /// ```
@@ -258,16 +265,20 @@ pub fn reduced_modulus_pa(one: Body, other: Body) -> Result<f64, ElasticityError
     Ok(1.0 / compliance)
 }
 
-/// R of two surfaces, 1/R = 1/R₁ + 1/R₂, in m; `None` is a flat surface, a negative radius a hollow one.
+/// R of two surfaces, 1/R = 1/R₁ + 1/R₂, in m. `None` is a flat surface, a negative radius a hollow
+/// one.
 ///
 /// # Errors
-/// [`ElasticityError::Conforming`] where the relative curvature is zero or negative;
+/// [`ElasticityError::Conforming`] where the relative curvature is zero or negative.
 /// [`ElasticityError::NotFinite`], or [`ElasticityError::NotPositive`] for a radius of zero.
 ///
 /// ```
 /// use tactile_elasticity::{ElasticityError, contact::relative_radius_m};
 /// assert_eq!(relative_radius_m(Some(0.005), None)?, 0.005);
-/// assert!(matches!(relative_radius_m(Some(0.01), Some(-0.01)), Err(ElasticityError::Conforming { .. })));
+/// assert!(matches!(
+///     relative_radius_m(Some(0.01), Some(-0.01)),
+///     Err(ElasticityError::Conforming { .. })
+/// ));
 /// # Ok::<(), ElasticityError>(())
 /// ```
 pub fn relative_radius_m(one: Option<f64>, other: Option<f64>) -> Result<f64, ElasticityError> {
@@ -282,7 +293,8 @@ pub fn relative_radius_m(one: Option<f64>, other: Option<f64>) -> Result<f64, El
     }
     let radius = match (one, other) {
         (Some(a), Some(b)) => {
-            // The sum of the radii is exact where they nearly cancel; that of the curvatures is not.
+            // The sum of the radii is exact where they nearly cancel. That of the curvatures is
+            // not.
             let curvature = (a + b) / a / b;
             if curvature <= 0.0 {
                 return Err(ElasticityError::Conforming {
@@ -310,15 +322,21 @@ pub fn relative_radius_m(one: Option<f64>, other: Option<f64>) -> Result<f64, El
 /// Young's modulus (Pa) of one body from E* and the other body: E = (1 − ν²)/(1/E* − (1 − ν₁²)/E₁).
 ///
 /// # Errors
-/// [`ElasticityError::StifferThanResolvable`] where the other body alone is already softer than the contact;
-/// [`ElasticityError::NotPositive`], [`ElasticityError::PoissonRatio`].
+/// [`ElasticityError::StifferThanResolvable`] where the other body alone is already softer than the
+/// contact. [`ElasticityError::NotPositive`], [`ElasticityError::PoissonRatio`].
 ///
 /// ```
-/// use tactile_elasticity::{ElasticityError, contact::{Body, sample_modulus_pa}};
+/// use tactile_elasticity::{
+///     ElasticityError,
+///     contact::{Body, sample_modulus_pa},
+/// };
 /// let waveguide = Body::elastic(100e3, 0.48)?;
 /// let soft = sample_modulus_pa(50e3, 0.48, waveguide)?;
 /// assert!(soft > 50e3);
-/// assert!(matches!(sample_modulus_pa(150e3, 0.48, waveguide), Err(ElasticityError::StifferThanResolvable { .. })));
+/// assert!(matches!(
+///     sample_modulus_pa(150e3, 0.48, waveguide),
+///     Err(ElasticityError::StifferThanResolvable { .. })
+/// ));
 /// # Ok::<(), ElasticityError>(())
 /// ```
 pub fn sample_modulus_pa(
@@ -344,7 +362,9 @@ pub fn sample_modulus_pa(
 /// use tactile_elasticity::contact::flat_punch;
 ///
 /// let contact = flat_punch(1e5_f64, 2e-3, 1e-3)?;
-/// assert!((contact.mean_pressure_pa - contact.force_n / (std::f64::consts::PI * 4e-6)).abs() < 1e-9);
+/// assert!(
+///     (contact.mean_pressure_pa - contact.force_n / (std::f64::consts::PI * 4e-6)).abs() < 1e-9
+/// );
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -352,7 +372,7 @@ pub fn sample_modulus_pa(
 pub struct PunchContact {
     /// F.
     pub force_n: f64,
-    /// F/(πa²); the pressure at the edge is infinite.
+    /// F/(πa²). The pressure at the edge is infinite.
     pub mean_pressure_pa: f64,
 }
 
@@ -403,9 +423,11 @@ pub struct ConeContact {
     pub mean_pressure_pa: f64,
 }
 
-/// Of reduced modulus E* (Pa), tangent of the half opening angle α from the axis, and indentation δ (m, zero allowed).
+/// Of reduced modulus E* (Pa), tangent of the half opening angle α from the axis, and indentation δ
+/// (m, zero allowed).
 ///
-/// The tangent, because an angle near 90° has lost what makes it differ; see [`tangent_of_degrees`].
+/// The tangent, because an angle near 90° has lost what makes it differ. See
+/// [`tangent_of_degrees`].
 ///
 /// # Errors
 /// [`ElasticityError::NotPositive`], [`ElasticityError::Negative`].
@@ -468,22 +490,26 @@ pub fn tangent_of_degrees(degrees: f64) -> Result<f64, ElasticityError> {
 
 // Tatara's large-deformation sphere.
 //
-// A sphere pressed from both sides deforms at each contact as Hertz's law says, less the displacement that the force on the far
-// side causes in the contact region: Boussinesq's displacement at (a, 2R) under a point force,
+// A sphere pressed from both sides deforms at each contact as Hertz's law says, less the
+// displacement that the force on the far side causes in the contact region: Boussinesq's
+// displacement at (a, 2R) under a point force,
 //
 // δ = a²/R − (F/πE)·[(1 − ν²)/√(a² + 4R²) + 2(1 + ν)R²/(a² + 4R²)^{3⁄2}],  a³ = 3FR/(4E*)
 //
-// per contact. Source: Y. Tatara, J. Eng. Mater. Technol. 113 (1991) 285–291, the extensive term; his lateral spreading of the
-// free surface and the stiffening of rubber are not included.
+// per contact. Source: Y. Tatara, J. Eng. Mater. Technol. 113 (1991) 285–291, the extensive term.
+// His lateral spreading of the free surface and the stiffening of rubber are not included.
 
-/// δ (m) of one contact with contact radius a (m) of a sphere of radius R (m) and Poisson ratio ν between rigid plates.
+/// δ (m) of one contact with contact radius a (m) of a sphere of radius R (m) and Poisson ratio ν
+/// between rigid plates.
 ///
 /// # Errors
-/// [`ElasticityError::NotPositive`] radius, [`ElasticityError::Negative`] contact radius, [`ElasticityError::PoissonRatio`].
+/// [`ElasticityError::NotPositive`] radius, [`ElasticityError::Negative`] contact radius,
+/// [`ElasticityError::PoissonRatio`].
 ///
 /// ```
 /// // At a/R = 0.1 the far side takes 4 % off Hertz's a²/R; at 0.5 a fifth.
-/// let ratio = |a: f64| tactile_elasticity::contact::tatara_indentation_m(a, 1.0, 0.5).unwrap() / (a * a);
+/// let ratio =
+///     |a: f64| tactile_elasticity::contact::tatara_indentation_m(a, 1.0, 0.5).unwrap() / (a * a);
 /// assert!((ratio(0.1) - 0.958).abs() < 1e-3 && (ratio(0.5) - 0.800).abs() < 1e-3);
 /// ```
 pub fn tatara_indentation_m(
@@ -538,7 +564,8 @@ impl Squeeze {
         2.0 * x - self.share * 4.0 / (3.0 * PI) * (3.0 * x * x * bracket + x.powi(3) * derivative)
     }
 
-    /// The contact radius (m) of an indentation (m), by Newton from Hertz's; None where the law has none below a = R.
+    /// The contact radius (m) of an indentation (m), by Newton from Hertz's. None where the law has
+    /// none below a = R.
     pub fn contact_radius(&self, indentation: f64) -> Option<f64> {
         let mut a = (self.radius_m * indentation).sqrt();
         for _ in 0..60 {

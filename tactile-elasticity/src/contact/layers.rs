@@ -1,13 +1,14 @@
 //! A sphere on layers with a rigid base: the integral equation solved.
 //!
-//! With P(ξ) = ∫₀ᵃ φ(t) cos ξt dt for the transform of the pressure, the mixed boundary problem becomes Fredholm's
-//! equation of the second kind (Lebedev & Ufliand 1958)
+//! With P(ξ) = ∫₀ᵃ φ(t) cos ξt dt for the transform of the pressure, the mixed boundary problem
+//! becomes Fredholm's equation of the second kind (Lebedev & Ufliand 1958)
 //!
 //! φ(s) − (2/π) ∫₀ᵃ K(s, t) φ(t) dt = (E*/π)(δ − s²/R),  K = ∫₀^∞ (1 − L(ξh)) cos ξs cos ξt dξ,
 //!
-//! with φ(a) = 0 where the pressure ends smoothly, and F = 2π ∫ φ. Both bodies may yield: with 1/E* the sum of the sphere's
-//! compliance and the touched layer's, the deficit 1 − L counts with the layer's share of it. K is analytic, so that Nyström's
-//! method on Gauss nodes converges exponentially.
+//! with φ(a) = 0 where the pressure ends smoothly, and F = 2π ∫ φ. Both bodies may yield: with 1/E*
+//! the sum of the sphere's compliance and the touched layer's, the deficit 1 − L counts with the
+//! layer's share of it. K is analytic, so that Nyström's method on Gauss nodes converges
+//! exponentially.
 
 use super::Waveguide;
 use crate::error::{ElasticityError, Quantity, poisson, positive};
@@ -22,7 +23,10 @@ use std::f64::consts::{FRAC_2_PI, PI};
 ///
 /// // A contact small beside the layer is Hertz's.
 /// let contact = LayerEquation::new(Bond::Bonded, 0.5)?.solve(1e-4)?;
-/// assert!((contact.force_ratio - 1.0_f64).abs() < 2e-4 && (contact.indentation_ratio - 1.0).abs() < 2e-4);
+/// assert!(
+///     (contact.force_ratio - 1.0_f64).abs() < 2e-4
+///         && (contact.indentation_ratio - 1.0).abs() < 2e-4
+/// );
 /// assert!((contact.chi / contact.a_over_h - 1.0).abs() < 2e-4);
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
 /// ```
@@ -41,7 +45,7 @@ pub struct LayerContact {
     pub indentation_ratio: f64,
 }
 
-/// The largest a/h solved for; beyond, a thin-layer asymptote is the better theory.
+/// The largest a/h solved for. Beyond, a thin-layer asymptote is the better theory.
 const LARGEST_A_OVER_H: f64 = 20.0;
 
 /// The contact of a sphere with layers on a rigid base.
@@ -50,10 +54,18 @@ const LARGEST_A_OVER_H: f64 = 20.0;
 /// use tactile_elasticity::contact::{Bond, Layer, LayerEquation, Waveguide};
 ///
 /// // A soft layer below makes a stiff one yield more than a rigid base does.
-/// let layer = |thickness_m, youngs_modulus_pa| Layer { thickness_m, youngs_modulus_pa, poisson_ratio: 0.5_f64 };
+/// let layer = |thickness_m, youngs_modulus_pa| Layer {
+///     thickness_m,
+///     youngs_modulus_pa,
+///     poisson_ratio: 0.5_f64,
+/// };
 /// let on_soft = Waveguide::new(vec![layer(2e-3, 1e5), layer(8e-3, 1e4)])?;
 /// let on_rigid = Waveguide::new(vec![layer(10e-3, 1e5)])?;
-/// let force = |guide| LayerEquation::of_layers(&guide, Bond::Bonded)?.solve(0.2).map(|c| c.force_ratio_same_radius);
+/// let force = |guide| {
+///     LayerEquation::of_layers(&guide, Bond::Bonded)?
+///         .solve(0.2)
+///         .map(|c| c.force_ratio_same_radius)
+/// };
 /// assert!(force(on_soft)? < 0.9 * force(on_rigid)?);
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
 /// ```
@@ -75,8 +87,8 @@ impl LayerEquation {
         })
     }
 
-    /// Of layers bonded to one another, the touched one first, under a rigid sphere; `bond` is that of the lowest layer to the rigid
-    /// base.
+    /// Of layers bonded to one another, the touched one first, under a rigid sphere. `bond` is that
+    /// of the lowest layer to the rigid base.
     ///
     /// # Errors
     /// [`ElasticityError::NotPositive`] thickness: a rigid waveguide has no layers.
@@ -117,8 +129,8 @@ impl LayerEquation {
         &self.kernel
     }
 
-    /// The contact at a/h; O(n³ + n² q) with n ≈ 24 + 6 a/h₁ nodes, h₁ the touched layer's thickness, and some hundreds of
-    /// wavenumbers q.
+    /// The contact at a/h. O(n³ + n² q) with n ≈ 24 + 6 a/h₁ nodes, h₁ the touched layer's
+    /// thickness, and some hundreds of wavenumbers q.
     ///
     /// # Errors
     /// [`ElasticityError::NotPositive`], and [`ElasticityError::OutOfRange`] beyond a/h = 20.
@@ -141,7 +153,7 @@ struct DiscreteKernel {
     a_over_h: f64,
     /// Gauss nodes on [0, 1] with their weights.
     rule: Vec<(f64, f64)>,
-    /// ∫(1 − L) cos(uρσ) cos(uρτ) du at the nodes σ, τ; the last row is that of the rim, σ = 1.
+    /// ∫(1 − L) cos(uρσ) cos(uρτ) du at the nodes σ, τ. The last row is that of the rim, σ = 1.
     values: DMatrix<f64>,
 }
 
@@ -151,8 +163,9 @@ impl DiscreteKernel {
         if a_over_h > LARGEST_A_OVER_H {
             return Err(out_of_range(a_over_h));
         }
-        // The pressure bends within h₁ of the rim: six nodes for that length leave 10⁻⁹. A skin thinner than a/40 is
-        // smoothed over rather than paid for with the third power of its nodes.
+        // The pressure bends within h₁ of the rim: six nodes for that length leave 10⁻⁹. A skin
+        // thinner than a/40 is smoothed over rather than paid for with the third power of its
+        // nodes.
         let per_top_layer = (a_over_h / kernel.top_thickness()).min(40.0);
         let rule = gauss_legendre(24 + (6.0 * per_top_layer) as usize);
         let samples = kernel.samples(a_over_h);
@@ -177,7 +190,7 @@ impl DiscreteKernel {
         let scale = FRAC_2_PI * self.a_over_h * share;
         let (flat, round) =
             flat_and_round(rule, kernel, scale).ok_or(out_of_range(self.a_over_h))?;
-        // φ at the rim by Nyström's own interpolation; the last row of the kernel belongs to s = a.
+        // φ at the rim by Nyström's own interpolation. The last row of the kernel belongs to s = a.
         let rim = |phi: &DVector<f64>, rhs: f64| {
             let integral = (0..n).map(|j| kernel[(n, j)] * rule[j].1 * phi[j]);
             rhs + scale * integral.sum::<f64>()
@@ -221,8 +234,8 @@ fn flat_and_round(
 
 // How much stiffer than a half-space layers on a rigid base are, by wavenumber.
 //
-// Under a pressure of wavenumber ξ a half-space yields by 2p/(E*ξ); layers of total thickness h by L(ξh) times that, with E* of the
-// touched one: L → 0 for long waves and 1 for short ones.
+// Under a pressure of wavenumber ξ a half-space yields by 2p/(E*ξ). Layers of total thickness h by
+// L(ξh) times that, with E* of the touched one: L → 0 for long waves and 1 for short ones.
 
 /// How the layer sits on its rigid base.
 ///
@@ -266,7 +279,8 @@ impl LayerKernel {
         })
     }
 
-    /// Of layers bonded to one another, the touched one first; `bond` is that of the lowest to the rigid base.
+    /// Of layers bonded to one another, the touched one first. `bond` is that of the lowest to the
+    /// rigid base.
     ///
     /// # Errors
     /// [`ElasticityError::NotPositive`] thickness: a rigid waveguide has no layers.
@@ -293,7 +307,8 @@ impl LayerKernel {
         })
     }
 
-    /// 1 − L(s): 1 for long waves, 0 for short ones; below zero where a soft layer lies under a stiff one.
+    /// 1 − L(s): 1 for long waves, 0 for short ones. Below zero where a soft layer lies under a
+    /// stiff one.
     fn deficit(&self, s: f64) -> f64 {
         self.stack.deficit(s)
     }
@@ -325,17 +340,19 @@ impl LayerKernel {
 
 // The surface of bonded elastic layers under a pressure wave.
 //
-// Under a normal traction p̂ J₀(kr) every layer deforms as W(z) J₀(kr), U(z) J₁(kr) with the tractions Σ and T, in units of 2kG.
-// With y = kz growing upwards the state v = (W, U, Σ, T) obeys dv/dy = Mv,
+// Under a normal traction p̂ J₀(kr) every layer deforms as W(z) J₀(kr), U(z) J₁(kr) with the
+// tractions Σ and T, in units of 2kG. With y = kz growing upwards the state v = (W, U, Σ, T) obeys
+// dv/dy = Mv,
 //
 // Ẇ = −nU + (1 − n)Σ,  U̇ = W + 2T,  Σ̇ = −T,  Ṫ = (1 + n)U + nΣ,  n = ν/(1 − ν),
 //
-// in which nothing is singular at ν = ½. As (M² − 1)² = 0, the transfer matrix exp(yM) is a cubic in M. It is not chained, which
-// would lose all digits at large y; instead the compliance F with (W, U) = F (Σ, T) is carried from the base to the surface, layer by
-// layer: the growing waves dominate numerator and denominator alike, and their ratio keeps its digits at every kh.
+// in which nothing is singular at ν = ½. As (M² − 1)² = 0, the transfer matrix exp(yM) is a cubic
+// in M. It is not chained, which would lose all digits at large y. Instead the compliance F with
+// (W, U) = F (Σ, T) is carried from the base to the surface, layer by layer: the growing waves
+// dominate numerator and denominator alike, and their ratio keeps its digits at every kh.
 //
-// Where the touched layer is deep beside the wave, 1 − L is small and would be rounding alone. There the wave that its lower face
-// sends back, e^(−2y) times a reflection, gives 1 − L itself.
+// Where the touched layer is deep beside the wave, 1 − L is small and would be rounding alone.
+// There the wave that its lower face sends back, e^(−2y) times a reflection, gives 1 − L itself.
 
 /// A layer in units of the stack's thickness and of the top layer's shear modulus.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -345,7 +362,7 @@ struct StackLayer {
     poisson_ratio: f64,
 }
 
-/// Layers on a rigid base, the touched one first; never empty.
+/// Layers on a rigid base, the touched one first. Never empty.
 #[derive(Debug, Clone, PartialEq)]
 struct Stack {
     layers: Vec<StackLayer>,
@@ -365,7 +382,8 @@ impl Stack {
         self.layers[0].thickness
     }
 
-    /// 1 − L(s): how much less the surface yields at s = kh than a half-space of the touched layer, over what that yields.
+    /// 1 − L(s): how much less the surface yields at s = kh than a half-space of the touched layer,
+    /// over what that yields.
     fn deficit(&self, s: f64) -> f64 {
         let Some((top, lower)) = self.layers.split_first().filter(|_| s > 1e-9) else {
             return 1.0; // long waves move nothing
@@ -400,7 +418,8 @@ impl StackLayer {
         }
         let identity = Matrix2::identity();
         let normal = Matrix2::new(1.0, 0.0, 0.0, 0.0);
-        // Displacements and tractions of two independent solutions at the lower face, a column each.
+        // Displacements and tractions of two independent solutions at the lower face, a column
+        // each.
         let (displacements, tractions) = match below {
             Face::Compliant(compliance) => (*compliance, identity),
             Face::Base(Bond::Bonded) => (Matrix2::zeros(), identity),
@@ -412,8 +431,9 @@ impl StackLayer {
         displacements * inverse(tractions)
     }
 
-    /// F of a half-space of this layer less F at its upper face: e^(−2y)(D − F T)ρ(T₀ + e^(−2y) Tρ)⁻¹, D and T the
-    /// displacements and tractions of the waves that decay upwards, T₀ of those that grow, ρ the reflection at the lower face.
+    /// F of a half-space of this layer less F at its upper face: e^(−2y)(D − F T)ρ(T₀ + e^(−2y)
+    /// Tρ)⁻¹, D and T the displacements and tractions of the waves that decay upwards, T₀ of those
+    /// that grow, ρ the reflection at the lower face.
     fn less_than_half_space(&self, y: f64, below: &Face) -> Matrix2<f64> {
         let unit = self.shear_modulus;
         // The two rows that vanish at the lower face.
@@ -434,7 +454,8 @@ impl StackLayer {
         (displacements - self.half_space() * tractions) * inverse(growing - tractions)
     }
 
-    /// The two waves that decay upwards, at height y above where they are counted from, less their e^(−y).
+    /// The two waves that decay upwards, at height y above where they are counted from, less their
+    /// e^(−y).
     fn decaying(&self, y: f64) -> Matrix4x2<f64> {
         let nu = self.poisson_ratio;
         let w = Vector4::new(1.0, 1.0, -1.0, -1.0);
@@ -468,7 +489,8 @@ impl StackLayer {
         Matrix2::new(own, other, other, own) / self.shear_modulus
     }
 
-    /// e^(−y) exp(yM) = c₀ + c₁M + c₂M² + c₃M³, Hermite's interpolation of the exponential at the double eigenvalues ±1.
+    /// e^(−y) exp(yM) = c₀ + c₁M + c₂M² + c₃M³, Hermite's interpolation of the exponential at the
+    /// double eigenvalues ±1.
     fn transfer(&self, y: f64) -> Matrix4<f64> {
         let n = self.poisson_ratio / (1.0 - self.poisson_ratio);
         #[rustfmt::skip]
@@ -492,7 +514,7 @@ fn y_cosh_less_sinh(y: f64, cosh: f64, sinh: f64) -> f64 {
     if y > 0.5 {
         return y * cosh - sinh;
     }
-    // Σ 2k y^(2k+1)/(2k+1)!; at y = ½ the first term left out is 10⁻¹⁷ of the sum.
+    // Σ 2k y^(2k+1)/(2k+1)!. At y = ½ the first term left out is 10⁻¹⁷ of the sum.
     let square = y * y;
     let tail = 1.0 + square / 54.0 * (1.0 + square / 88.0 * (1.0 + square / 130.0));
     let series = 1.0 + square / 10.0 * (1.0 + square / 28.0 * tail);
@@ -506,7 +528,8 @@ fn stacked(upper: Matrix2<f64>, lower: Matrix2<f64>) -> Matrix4x2<f64> {
     rows
 }
 
-/// Of tractions or conditions that belong to independent solutions: a load has one answer, so that the inverse exists.
+/// Of tractions or conditions that belong to independent solutions: a load has one answer, so that
+/// the inverse exists.
 fn inverse(matrix: Matrix2<f64>) -> Matrix2<f64> {
     matrix.try_inverse().unwrap_or_else(Matrix2::zeros)
 }
@@ -521,12 +544,12 @@ pub struct LayerSeries {
 
 impl LayerSeries {
     /// As Dimitriadis et al. print it (2002, Biophys. J. 82, 2798), by the general formula in ν:
-    /// bonded α₀ = −(1.2876 − 1.4678ν + 1.3442ν²)/(1 − ν), β₀ = (0.6387 − 1.0277ν + 1.5164ν²)/(1 − ν);
-    /// free α₀ = −0.347(3 − 2ν)/(1 − ν), β₀ = 0.056(5 − 2ν)/(1 − ν).
+    /// bonded α₀ = −(1.2876 − 1.4678ν + 1.3442ν²)/(1 − ν), β₀ = (0.6387 − 1.0277ν + 1.5164ν²)/(1 −
+    /// ν). Free α₀ = −0.347(3 − 2ν)/(1 − ν), β₀ = 0.056(5 − 2ν)/(1 − ν).
     ///
-    /// Beyond the linear term it is not the solution of the contact problem: the force is 2 % low at χ = 0.27,
-    /// 15 % at 0.75. The free α₀ is empirical: a layer sliding on its base does not depend on ν. Use it to compare with
-    /// results obtained by it.
+    /// Beyond the linear term it is not the solution of the contact problem: the force is 2 % low
+    /// at χ = 0.27, 15 % at 0.75. The free α₀ is empirical: a layer sliding on its base does not
+    /// depend on ν. Use it to compare with results obtained by it.
     ///
     /// # Errors
     /// [`ElasticityError::PoissonRatio`].
@@ -552,8 +575,8 @@ impl LayerSeries {
         })
     }
 
-    /// The expansion of the true solution: 1 + (2m₀/π)χ + (14m₀²/3π²)χ² + 8(200m₀³ − 9π²m₂)/(135π³)χ³
-    /// + 2m₀(715m₀³ − 72π²m₂)/(45π⁴)χ⁴. Within 1 % up to χ = 0.5 (ν = ½, bonded).
+    /// The expansion of the true solution: 1 + (2m₀/π)χ + (14m₀²/3π²)χ² + 8(200m₀³ −
+    /// 9π²m₂)/(135π³)χ³ + 2m₀(715m₀³ − 72π²m₂)/(45π⁴)χ⁴. Within 1 % up to χ = 0.5 (ν = ½, bonded).
     ///
     /// `share` is the layer's share of the whole compliance: 1 where the other body is rigid.
     ///
@@ -631,7 +654,7 @@ impl LayerTable {
         }
     }
 
-    /// ln(F/F_Hertz) at χ and its slope in ln χ; None beyond the table.
+    /// ln(F/F_Hertz) at χ and its slope in ln χ. None beyond the table.
     pub fn of_chi(&self, chi: f64) -> Option<(f64, f64)> {
         let (at, rows) = (chi.ln(), &self.rows);
         if at > rows.last()?.0 {
@@ -659,17 +682,18 @@ pub struct SharedContact {
     pub indentation_slope: f64,
 }
 
-/// Contacts of a sphere that yields with the layers: cubic in ln(a/h), Chebyshev in the touched layer's share of 1/E*.
+/// Contacts of a sphere that yields with the layers: cubic in ln(a/h), Chebyshev in the touched
+/// layer's share of 1/E*.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SharedLayerTable {
     first: f64,
     rows: Vec<Row>,
 }
 
-/// Twelve shares leave 10⁻⁷ at a/h = 3 (see the test); each costs one factorisation a row.
+/// Twelve shares leave 10⁻⁷ at a/h = 3 (see the test). Each costs one factorisation a row.
 const SHARES: usize = 12;
 
-/// Width of a row in ln a; the cubic's error goes as its fourth power and is 5·10⁻⁶ here.
+/// Width of a row in ln a. The cubic's error goes as its fourth power and is 5·10⁻⁶ here.
 const STEP: f64 = 0.1;
 
 #[derive(Debug, Clone, PartialEq)]
@@ -679,7 +703,8 @@ struct Row {
 }
 
 impl SharedLayerTable {
-    /// For a/h in `range`, the upper end at most [`LARGEST_A_OVER_H`]; None where a row cannot be solved.
+    /// For a/h in `range`, the upper end at most [`LARGEST_A_OVER_H`]. None where a row cannot be
+    /// solved.
     pub fn new(kernel: &LayerKernel, range: (f64, f64)) -> Option<Self> {
         let (first, last) = (range.0.ln(), range.1.min(LARGEST_A_OVER_H).ln());
         let count = ((last - first) / STEP).ceil().max(3.0) as usize + 1;
@@ -688,7 +713,7 @@ impl SharedLayerTable {
         Some(Self { first, rows: rows? })
     }
 
-    /// At a/h and a share in [0, 1]; None beyond the table.
+    /// At a/h and a share in [0, 1]. None beyond the table.
     pub fn at(&self, a_over_h: f64, share: f64) -> Option<SharedContact> {
         let (rows, at) = (&self.rows, a_over_h.ln());
         let place = (at - self.first) / STEP;

@@ -19,8 +19,8 @@ fn without_a_share_the_layer_does_not_matter() {
 
 #[test]
 fn gauss_nodes_are_enough() {
-    // The force of a layer 20 times thinner than the contact changes by less than 10⁻⁹ with one more node: compare
-    // with the solution at nearly the same a/h, whose node count differs.
+    // The force of a layer 20 times thinner than the contact changes by less than 10⁻⁹ with one
+    // more node: compare with the solution at nearly the same a/h, whose node count differs.
     let equation = LayerEquation::new(Bond::Bonded, 0.3).unwrap();
     let (a, b) = (
         equation.solve(5.0 - 1e-9).unwrap(),
@@ -45,8 +45,8 @@ fn layer(thickness: f64, shear_modulus: f64, poisson_ratio: f64) -> StackLayer {
     }
 }
 
-/// 1 − L of one layer in closed form: with q = e^(−2s) bonded, k = 3 − 4ν, (2kq² + (1 + k² + 4s² + 4s)q)/(k(1 + q²) +
-/// (1 + k² + 4s²)q), free 2q(2s + 1 − q)/(1 − q² + 4sq).
+/// 1 − L of one layer in closed form: with q = e^(−2s) bonded, k = 3 − 4ν, (2kq² + (1 + k² + 4s² +
+/// 4s)q)/(k(1 + q²) + (1 + k² + 4s²)q), free 2q(2s + 1 − q)/(1 − q² + 4sq).
 fn closed_form(s: f64, nu: f64, bond: Bond) -> f64 {
     let (k, q) = (3.0 - 4.0 * nu, (-2.0 * s).exp());
     let base = 1.0 + k * k + 4.0 * s * s;
@@ -67,7 +67,8 @@ fn one_layer_has_its_closed_form_and_may_be_cut() {
                 let exact = closed_form(s, nu, bond);
                 let whole = one.deficit(s) / exact - 1.0;
                 assert!(whole.abs() < 1e-12, "{nu} {bond:?} {s}: {whole:e}");
-                // Thin layers are stiff: y = 10⁻⁵ takes some digits. A part's digits are those of what its lower face returns.
+                // Thin layers are stiff: y = 10⁻⁵ takes some digits. A part's digits are those of
+                // what its lower face returns.
                 let parts = cut.deficit(s) - exact;
                 let tolerance = 1e-9 * exact + 1e-11 * (-2.0 * 0.301 * s).exp();
                 assert!(parts.abs() < tolerance, "{nu} {bond:?} {s}: {parts:e}");
@@ -76,7 +77,8 @@ fn one_layer_has_its_closed_form_and_may_be_cut() {
     }
 }
 
-/// A long wave squeezes an incompressible bonded layer as lubrication theory says: W = k²h³p/(3G), so L = 2s³/3.
+/// A long wave squeezes an incompressible bonded layer as lubrication theory says: W = k²h³p/(3G),
+/// so L = 2s³/3.
 #[test]
 fn long_waves_see_a_confined_layer() {
     let stack = Stack::new(vec![layer(1.0, 1.0, 0.5)], Bond::Bonded);

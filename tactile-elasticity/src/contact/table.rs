@@ -6,18 +6,27 @@ use nalgebra::{DMatrix, DVector};
 
 /// Force over contact radius and modulus for a ball of one radius on one guide, or on a rigid flat.
 ///
-/// With Hertz's force on a rigid flat taken out, $\ln[F / (\frac{4}{3} \frac{E}{1 - \nu^2} \frac{a^3}{R})]$ is a product of
-/// polynomials in a/R and ln E, fitted to all contacts by least squares; F must grow with a and E everywhere between them.
-/// [`interpolation_error`](Self::interpolation_error) is what the fit misses. With the feature `fem` `solve` computes one by finite
-/// elements.
+/// With Hertz's force on a rigid flat taken out, $\ln[F / (\frac{4}{3} \frac{E}{1 - \nu^2}
+/// \frac{a^3}{R})]$ is a product of polynomials in a/R and ln E, fitted to all contacts by least
+/// squares. F must grow with a and E everywhere between them.
+/// [`interpolation_error`](Self::interpolation_error) is what the fit misses. With the feature
+/// `fem` `solve` computes one by finite elements.
 ///
 /// ```
 /// use tactile_elasticity::contact::{ContactCurve, ContactTable, Waveguide};
 ///
-/// // Hertz's contacts of a ball of 3 mm on a rigid flat: forces are in proportion to the modulus, one curve is enough.
+/// // Hertz's contacts of a ball of 3 mm on a rigid flat: forces are in proportion to the modulus,
+/// // one curve is enough.
 /// let contact_radius_m: Vec<f64> = (1..=10).map(|k| 0.1e-3 * f64::from(k)).collect();
-/// let force_n = contact_radius_m.iter().map(|a| 4.0 / 3.0 * 80e3 * a.powi(3) / 3e-3).collect();
-/// let curve = ContactCurve { youngs_modulus_pa: 60e3, contact_radius_m, force_n };
+/// let force_n = contact_radius_m
+///     .iter()
+///     .map(|a| 4.0 / 3.0 * 80e3 * a.powi(3) / 3e-3)
+///     .collect();
+/// let curve = ContactCurve {
+///     youngs_modulus_pa: 60e3,
+///     contact_radius_m,
+///     force_n,
+/// };
 /// let table = ContactTable::new(3e-3, 0.5, &Waveguide::rigid(), vec![curve])?;
 /// let force_n = table.force_n(0.55e-3, 120e3).unwrap();
 /// assert!((force_n / (4.0 / 3.0 * 160e3 * 0.55e-3_f64.powi(3) / 3e-3) - 1.0).abs() < 1e-9);
@@ -43,9 +52,10 @@ pub struct ContactTable {
 #[derive(Debug, Clone, PartialEq)]
 struct Limits {
     smallest_ratio: f64,
-    /// ln E and the largest a/R of each curve: a stiff ball sinks in before its contact is as large as a soft one's.
+    /// ln E and the largest a/R of each curve: a stiff ball sinks in before its contact is as large
+    /// as a soft one's.
     largest_ratio: Vec<(f64, f64)>,
-    /// ln E; all reals on a rigid flat.
+    /// ln E. All reals on a rigid flat.
     log_modulus: [f64; 2],
 }
 
@@ -76,16 +86,19 @@ pub struct TabulatedForce {
 /// Limits are met by numbers that rounding moved by this.
 const ROUNDING: f64 = 1e-12;
 
-/// How much smaller than its smallest a contact may be: ln(F/F_Hertz) is some −0.1 a/R there, and is taken on along its tangent.
+/// How much smaller than its smallest a contact may be: ln(F/F_Hertz) is some −0.1 a/R there, and
+/// is taken on along its tangent.
 const SMALLER: f64 = 0.6;
 
 impl ContactTable {
-    /// From curves of growing modulus for a ball of radius R (m) and Poisson ratio ν on a guide, or on a
-    /// [rigid](Waveguide::rigid) flat.
+    /// From curves of growing modulus for a ball of radius R (m) and Poisson ratio ν on a guide, or
+    /// on a [rigid](Waveguide::rigid) flat.
     ///
     /// # Errors
-    /// R, ν, a modulus, a contact radius or a force that is not valid or does not grow; fewer than four contacts of a modulus, or than two moduli on a
-    /// guide that yields; [`ElasticityError::NotMonotone`] where the fitted force does not grow with contact radius and modulus.
+    /// R, ν, a modulus, a contact radius or a force that is not valid or does not grow. Fewer than
+    /// four contacts of a modulus, or than two moduli on a guide that yields.
+    /// [`ElasticityError::NotMonotone`] where the fitted force does not grow with contact radius
+    /// and modulus.
     pub fn new(
         radius_m: f64,
         poisson_ratio: f64,
@@ -148,7 +161,7 @@ impl ContactTable {
         self.poisson_ratio
     }
 
-    /// The guide's layers, the touched one first; none on a rigid flat.
+    /// The guide's layers, the touched one first. None on a rigid flat.
     pub fn layers(&self) -> &[Layer] {
         &self.layers
     }
@@ -158,13 +171,14 @@ impl ContactTable {
         &self.curves
     }
 
-    /// Root mean square relative error of the interpolated force: what each contact of the table misses when it is left out, but for those at the
-    /// ends of the curves and of the softest and the stiffest ball, where that would show how well the fit extrapolates.
+    /// Root mean square relative error of the interpolated force: what each contact of the table
+    /// misses when it is left out, but for those at the ends of the curves and of the softest and
+    /// the stiffest ball, where that would show how well the fit extrapolates.
     pub fn interpolation_error(&self) -> f64 {
         self.surface.error()
     }
 
-    /// The force in newtons at a contact radius (m) and a modulus (Pa); None outside the table.
+    /// The force in newtons at a contact radius (m) and a modulus (Pa). None outside the table.
     pub fn force_n(&self, contact_radius_m: f64, youngs_modulus_pa: f64) -> Option<f64> {
         let log_modulus = youngs_modulus_pa.ln();
         let [softest, stiffest] = self.limits.log_modulus;
@@ -181,7 +195,7 @@ impl ContactTable {
         ratio >= smallest * (1.0 - ROUNDING) && ratio <= largest * (1.0 + ROUNDING)
     }
 
-    /// The force; beyond the computed contact radii at this ln E continued along the tangent.
+    /// The force. Beyond the computed contact radii at this ln E continued along the tangent.
     pub(crate) fn at(&self, a: f64, log_modulus: f64) -> TabulatedForce {
         let [smallest, largest] = self.contact_ratios(log_modulus);
         let ratio = a / self.radius_m;
@@ -358,7 +372,8 @@ impl TryFrom<TableFile> for ContactTable {
     }
 }
 
-/// The contacts of one ball under growing loads, of [`ContactTable`](super::ContactTable)'s example: columns of equal length.
+/// The contacts of one ball under growing loads, of [`ContactTable`](super::ContactTable)'s
+/// example: columns of equal length.
 ///
 /// ```
 /// use tactile_elasticity::contact::ContactCurve;
@@ -418,8 +433,9 @@ impl ContactCurve {
     }
 }
 
-/// Degree in a/R and the largest in ln E: what they leave of contacts that finite elements computed is the elements' own scatter in
-/// the contact radius, some 0.1 % (`the_surface_leaves_the_scatter_of_the_contact_radius`).
+/// Degree in a/R and the largest in ln E: what they leave of contacts that finite elements computed
+/// is the elements' own scatter in the contact radius, some 0.1 %
+/// (`the_surface_leaves_the_scatter_of_the_contact_radius`).
 const DEGREE_IN_RATIO: usize = 6;
 const DEGREE_IN_MODULUS: usize = 5;
 
@@ -449,11 +465,12 @@ struct Surface {
     log_modulus: Range,
     /// Rows by degree in a/R, columns by degree in ln E.
     coefficients: DMatrix<f64>,
-    /// Root mean square of what each sample that has others on both sides misses when it is left out of the fit.
+    /// Root mean square of what each sample that has others on both sides misses when it is left
+    /// out of the fit.
     error: f64,
 }
 
-/// A range mapped to [−1, 1]; a single value is mapped to 0.
+/// A range mapped to [−1, 1]. A single value is mapped to 0.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Range {
     lower: f64,
@@ -501,7 +518,7 @@ fn chebyshev(t: f64, polynomials: &mut [f64], derivatives: &mut [f64]) {
 }
 
 impl Surface {
-    /// Through samples of `moduli` different moduli; None where they do not determine it.
+    /// Through samples of `moduli` different moduli. None where they do not determine it.
     fn fit(samples: &[Sample], moduli: usize) -> Option<Self> {
         let per_modulus = samples.len() / moduli.max(1);
         // Two samples more than coefficients in each direction leave something to judge the fit by.
@@ -548,8 +565,9 @@ impl Surface {
         self.error
     }
 
-    /// Whether there are contacts on both sides of one: at the ends of its curve and for the smallest and the largest modulus leaving one out would
-    /// show how well the fit extrapolates, which it does nowhere.
+    /// Whether there are contacts on both sides of one: at the ends of its curve and for the
+    /// smallest and the largest modulus leaving one out would show how well the fit extrapolates,
+    /// which it does nowhere.
     fn surrounds(&self, samples: &[Sample], i: usize) -> bool {
         let own = samples[i].log_modulus;
         let same = |k: usize| samples.get(k).is_some_and(|s| s.log_modulus == own);
@@ -558,7 +576,7 @@ impl Surface {
         inside && (of_one || (own > self.log_modulus.lower && own < self.log_modulus.upper))
     }
 
-    /// At a/R and ln E; the caller keeps to the range of the samples.
+    /// At a/R and ln E. The caller keeps to the range of the samples.
     fn at(&self, ratio: f64, log_modulus: f64) -> Value {
         let basis = self.basis(ratio, log_modulus);
         let (mut value, mut ratio_slope, mut modulus_slope) = (0.0, 0.0, 0.0);

@@ -66,7 +66,8 @@ fn guide() -> Waveguide {
     Waveguide::new(vec![layer(2e-3, 136e3), layer(8e-3, 50e3)]).unwrap()
 }
 
-/// A law of the right kind with nothing but arithmetic in it: Hertz of two bodies, stiffened with a/R.
+/// A law of the right kind with nothing but arithmetic in it: Hertz of two bodies, stiffened with
+/// a/R.
 fn invented_force(a: f64, e: f64) -> f64 {
     let reduced = 1.0 / ((1.0 - 0.495 * 0.495) * (1.0 / e + 1.0 / 70e3));
     4.0 / 3.0 * reduced * a.powi(3) / RADIUS * (0.1 * (a / RADIUS).powi(2)).exp()
@@ -115,18 +116,21 @@ fn forces_and_moduli_between_the_contacts() {
         }
         let loads = LoadSeries::new([load(0.6 * RADIUS, e), load(0.9 * RADIUS, e)]);
         let found = estimator.estimate(&loads).unwrap();
-        // The guide takes up to four fifths of the compliance: an error of the force counts five times.
+        // The guide takes up to four fifths of the compliance: an error of the force counts five
+        // times.
         assert!((found.youngs_modulus_pa / e - 1.0).abs() < 5e-4);
         assert!(found.interval_95.contains(e) && found.fit.observations == 2);
     }
     assert!(table.interpolation_error() < 1e-4);
 }
 
-/// The table's own error does more to ln E where the force tells less of it. Taken as one error in proportion at all loads it would be inferred
-/// from the difference between two, and the answer carried far beyond both.
+/// The table's own error does more to ln E where the force tells less of it. Taken as one error in
+/// proportion at all loads it would be inferred from the difference between two, and the answer
+/// carried far beyond both.
 #[test]
 fn the_modulus_of_two_loads_lies_between_what_each_says() {
-    // On a guide that stiffens under a large contact the force of a stiff ball tells the more of E the larger the contact.
+    // On a guide that stiffens under a large contact the force of a stiff ball tells the more of E
+    // the larger the contact.
     let stiffening = |a: f64, e: f64| {
         let guide_pa = 70e3 * (1.0 + 2.0 * (a / RADIUS).powi(2));
         4.0 / 3.0 / (1.0 / e + 1.0 / guide_pa) * a.powi(3) / RADIUS

@@ -16,7 +16,7 @@ use nalgebra::{DMatrix, DVector};
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Layer {
-    /// Thickness in m; zero is allowed and counts for nothing.
+    /// Thickness in m. Zero is allowed and counts for nothing.
     pub thickness_m: f64,
     /// Young's modulus in Pa.
     pub youngs_modulus_pa: f64,
@@ -28,9 +28,17 @@ pub struct Layer {
 ///
 /// ```
 /// use tactile_elasticity::contact::{Layer, Waveguide};
-/// let layer = |thickness_m, youngs_modulus_pa| Layer { thickness_m, youngs_modulus_pa, poisson_ratio: 0.48 };
+/// let layer = |thickness_m, youngs_modulus_pa| Layer {
+///     thickness_m,
+///     youngs_modulus_pa,
+///     poisson_ratio: 0.48,
+/// };
 /// // Epidermis, dermis and subcutanea of the paper's sensor.
-/// let waveguide = Waveguide::new(vec![layer(2e-3, 1.36e5), layer(3e-3, 8.0e4), layer(5e-3, 3.4e4)])?;
+/// let waveguide = Waveguide::new(vec![
+///     layer(2e-3, 1.36e5),
+///     layer(3e-3, 8.0e4),
+///     layer(5e-3, 3.4e4),
+/// ])?;
 /// assert!((waveguide.thickness_m() - 10e-3f64).abs() < 1e-17);
 /// assert!((waveguide.series_modulus_pa() - 50_184.5f64).abs() < 0.1);
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
@@ -45,7 +53,8 @@ impl Waveguide {
     /// From the touched layer down.
     ///
     /// # Errors
-    /// No layers or no thickness at all, a negative thickness, a modulus that is not above zero, a Poisson ratio out of range.
+    /// No layers or no thickness at all, a negative thickness, a modulus that is not above zero, a
+    /// Poisson ratio out of range.
     pub fn new(layers: Vec<Layer>) -> Result<Self, ElasticityError> {
         for layer in &layers {
             not_negative(layer.thickness_m, Quantity::Thickness)?;
@@ -74,7 +83,11 @@ impl Waveguide {
     /// ```
     /// use tactile_elasticity::contact::{Layer, Waveguide};
     ///
-    /// let layer = |thickness_m, youngs_modulus_pa| Layer { thickness_m, youngs_modulus_pa, poisson_ratio: 0.48_f64 };
+    /// let layer = |thickness_m, youngs_modulus_pa| Layer {
+    ///     thickness_m,
+    ///     youngs_modulus_pa,
+    ///     poisson_ratio: 0.48_f64,
+    /// };
     /// let waveguide = Waveguide::new(vec![layer(2e-3, 1.36e5), layer(8e-3, 5.0e4)])?;
     /// assert_eq!(waveguide.layers().len(), 2);
     /// // In series and free or held sideways: how soft and how stiff it may look.
@@ -94,13 +107,14 @@ impl Waveguide {
         self.sum(|_| 1.0)
     }
 
-    /// Σh/Σ(h/E): the layers carry the same stress one after the other and are free to spread sideways (Reuss).
+    /// Σh/Σ(h/E): the layers carry the same stress one after the other and are free to spread
+    /// sideways (Reuss).
     pub fn series_modulus_pa(&self) -> f64 {
         self.thickness_m() / self.sum(|l| 1.0 / l.youngs_modulus_pa)
     }
 
-    /// Σh/Σ(h (1+ν)(1−2ν)/(E(1−ν))): in series and held sideways, as under a wide punch; infinite where every layer
-    /// is incompressible.
+    /// Σh/Σ(h (1+ν)(1−2ν)/(E(1−ν))): in series and held sideways, as under a wide punch. Infinite
+    /// where every layer is incompressible.
     pub fn confined_modulus_pa(&self) -> f64 {
         let compliance = self.sum(|l| {
             let nu = l.poisson_ratio;
@@ -115,7 +129,8 @@ impl Waveguide {
         self.sum(|l| l.poisson_ratio) / self.thickness_m()
     }
 
-    /// The waveguide as one deep body: (1 − ν²)/E of the layers in series, Σ(h(1 − ν²)/E)/Σh in 1/Pa.
+    /// The waveguide as one deep body: (1 − ν²)/E of the layers in series, Σ(h(1 − ν²)/E)/Σh in
+    /// 1/Pa.
     ///
     /// True while the contact is small beside every layer's thickness and the layers are alike.
     pub fn as_body(&self) -> Body {
@@ -137,11 +152,12 @@ impl Waveguide {
 /// Parameters of a layer whose errors count: ln E, ln h and ν.
 pub const PARAMETERS_PER_LAYER: usize = 3;
 
-/// Step of the numerical derivatives: third powers of it are lost, rounding of the integral equation is far below.
+/// Step of the numerical derivatives: third powers of it are lost, rounding of the integral
+/// equation is far below.
 const STEP: f64 = 1e-3;
 
-/// ln of the stiffness E_g of the guide under a ball's contact of radius a, F = 4/3 E_g a³/R; None where the
-/// layer equation cannot be solved.
+/// ln of the stiffness E_g of the guide under a ball's contact of radius a, F = 4/3 E_g a³/R. None
+/// where the layer equation cannot be solved.
 ///
 /// ```
 /// use tactile_elasticity::contact::{Layer, guide_log_stiffness};
@@ -159,7 +175,8 @@ pub fn guide_log_stiffness(layers: &[Layer], radius_m: f64) -> Option<f64> {
     Some(plane_strain.ln() + contact.force_ratio_same_radius.ln())
 }
 
-/// Layers with their parameters moved by a step: ln E of all layers, then ln h, then ν, which stays at most ½.
+/// Layers with their parameters moved by a step: ln E of all layers, then ln h, then ν, which stays
+/// at most ½.
 ///
 /// ```
 /// use nalgebra::DVector;
@@ -195,8 +212,9 @@ fn log_stiffness_gradient(layers: &[Layer], radius_m: f64) -> Option<DVector<f64
     Some(slopes)
 }
 
-/// Relative standard error of the guide's compliance under a contact of radius a (m), from the covariance of
-/// ln E of all layers, ln h and ν. None where that has another size or the layer equation cannot be solved.
+/// Relative standard error of the guide's compliance under a contact of radius a (m), from the
+/// covariance of ln E of all layers, ln h and ν. None where that has another size or the layer
+/// equation cannot be solved.
 ///
 /// ```
 /// use nalgebra::DMatrix;

@@ -17,7 +17,8 @@ fn the_gradient_obeys_the_scaling_laws() {
     // Twice the moduli, twice the stiffness.
     let moduli: f64 = slopes.rows(0, 3).sum();
     assert!((moduli - 1.0).abs() < 1e-6, "{moduli}");
-    // Thicker layers under a contact as much larger: no change; so the slopes by ln h undo that by ln a.
+    // Thicker layers under a contact as much larger: no change. So the slopes by ln h undo that by
+    // ln a.
     let [low, high] = [1.5e-3 / 1.001, 1.5e-3 * 1.001].map(|a| guide_log_stiffness(&layers, a));
     let by_radius = (high.unwrap() - low.unwrap()) / (2.0 * 1.001_f64.ln());
     let by_thickness: f64 = slopes.rows(3, 3).sum();

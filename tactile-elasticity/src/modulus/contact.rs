@@ -1,10 +1,11 @@
 //! Young's modulus from forces and the contacts they make.
 //!
-//! Every observation (F, x) gives one ln E* = ln F − ln f(x); their errors are relative, so that logarithms make the
-//! problem linear. The common mean is the generalised least squares one, with the covariance of forces (which share a calibration),
-//! of lengths (which share a pixel size) and of the indenter's size carried along. E of the sample follows from
-//! 1/E* = (1 − ν²)/E + C, C the compliance of the waveguide or indenter; the interval is carried through that curve, and is
-//! open above where it reaches C.
+//! Every observation (F, x) gives one ln E* = ln F − ln f(x). Their errors are relative, so that
+//! logarithms make the problem linear. The common mean is the generalised least squares one, with
+//! the covariance of forces (which share a calibration), of lengths (which share a pixel size) and
+//! of the indenter's size carried along. E of the sample follows from 1/E* = (1 − ν²)/E + C, C the
+//! compliance of the waveguide or indenter. The interval is carried through that curve, and is open
+//! above where it reaches C.
 
 use super::estimate::{EstimatorKind, LoadDiagnostics, ModulusEstimate, ModulusEstimator, Warning};
 use super::law::{
@@ -31,7 +32,9 @@ use tactile_core::{Estimate, Interval, statistics::quantile_95};
 ///     indentation_m: Some(Estimate::new(contact.indentation_m + 2e-5, 1e-6)),
 ///     ..LoadState::new(Estimate::new(1e-3, 1e-5))
 /// };
-/// let modulus = HertzSphere::new(5e-3, 0.5)?.with_evidence(Evidence::ContactRadius).estimate(&LoadSeries::new([load]))?;
+/// let modulus = HertzSphere::new(5e-3, 0.5)?
+///     .with_evidence(Evidence::ContactRadius)
+///     .estimate(&LoadSeries::new([load]))?;
 /// assert!((modulus.youngs_modulus_pa - 30e3).abs() < 1e-6);
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
 /// ```
@@ -47,7 +50,7 @@ pub enum Evidence {
     Indentation,
 }
 
-/// Young's modulus by a law F = E* f(x); see [`HertzSphere`], [`FlatPunch`], [`Cone`].
+/// Young's modulus by a law F = E* f(x). See [`HertzSphere`], [`FlatPunch`], [`Cone`].
 ///
 /// ```
 /// use tactile_elasticity::contact::{Body, HertzContact, Layer, Waveguide};
@@ -63,14 +66,26 @@ pub enum Evidence {
 /// let plain = rigid.estimate(&loads)?;
 ///
 /// // The other body's compliance is subtracted: the sample is stiffer than without.
-/// let steel = rigid.clone().with_other_body(Body::elastic(200e9, 0.3)?).estimate(&loads)?;
-/// let gel = Waveguide::new(vec![Layer { thickness_m: 10e-3, youngs_modulus_pa: 100e3, poisson_ratio: 0.5 }])?;
+/// let steel = rigid
+///     .clone()
+///     .with_other_body(Body::elastic(200e9, 0.3)?)
+///     .estimate(&loads)?;
+/// let gel = Waveguide::new(vec![Layer {
+///     thickness_m: 10e-3,
+///     youngs_modulus_pa: 100e3,
+///     poisson_ratio: 0.5,
+/// }])?;
 /// let on_gel = rigid.clone().with_waveguide(&gel).estimate(&loads)?;
 /// assert!(steel.youngs_modulus_pa / plain.youngs_modulus_pa - 1.0 < 1e-6);
 /// assert!(on_gel.youngs_modulus_pa > 1.3 * plain.youngs_modulus_pa);
 ///
 /// // Errors that all loads share are not reduced by averaging.
-/// let shared = SharedErrors { force_scale: 0.01, length_scale: 0.005, size: 0.002, ..SharedErrors::default() };
+/// let shared = SharedErrors {
+///     force_scale: 0.01,
+///     length_scale: 0.005,
+///     size: 0.002,
+///     ..SharedErrors::default()
+/// };
 /// let careful = rigid.estimate(&loads.with_shared_errors(shared)?)?;
 /// assert!(careful.standard_error_pa > plain.standard_error_pa);
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
@@ -126,9 +141,11 @@ impl<L: ContactLaw> ContactEstimator<L> {
         self
     }
 
-    /// With a waveguide as the other body, its layers in series: one half-space of their mean compliance.
+    /// With a waveguide as the other body, its layers in series: one half-space of their mean
+    /// compliance.
     ///
-    /// Good for a contact that is small beside layers that are alike; [`SphereOnWaveguide`] solves the layers.
+    /// Good for a contact that is small beside layers that are alike. [`SphereOnWaveguide`] solves
+    /// the layers.
     pub fn with_waveguide(self, waveguide: &Waveguide) -> Self {
         self.with_other_body(waveguide.as_body())
     }
@@ -136,14 +153,21 @@ impl<L: ContactLaw> ContactEstimator<L> {
     /// Which observations to use.
     ///
     /// ```
-    /// use tactile_elasticity::modulus::{Estimate, Evidence, HertzSphere, LoadSeries, LoadState, ModulusEstimator};
+    /// use tactile_elasticity::modulus::{
+    ///     Estimate, Evidence, HertzSphere, LoadSeries, LoadState, ModulusEstimator,
+    /// };
     ///
     /// // Only the radius was measured, and only the indentation is to be used.
     /// let load = LoadState {
     ///     contact_radius_m: Some(Estimate::new(0.45e-3_f64, 1e-6)),
     ///     ..LoadState::new(Estimate::new(1e-3, 1e-5))
     /// };
-    /// assert!(HertzSphere::new(5e-3, 0.5)?.with_evidence(Evidence::Indentation).estimate(&LoadSeries::new([load])).is_err());
+    /// assert!(
+    ///     HertzSphere::new(5e-3, 0.5)?
+    ///         .with_evidence(Evidence::Indentation)
+    ///         .estimate(&LoadSeries::new([load]))
+    ///         .is_err()
+    /// );
     /// # Ok::<(), tactile_elasticity::ElasticityError>(())
     /// ```
     pub fn with_evidence(mut self, evidence: Evidence) -> Self {
@@ -203,8 +227,8 @@ impl<L: ContactLaw> ContactEstimator<L> {
         Ok(all)
     }
 
-    /// Covariances of the ln E* with their degrees of freedom: of forces, of lengths, of errors that all have
-    /// in common.
+    /// Covariances of the ln E* with their degrees of freedom: of forces, of lengths, of errors
+    /// that all have in common.
     fn sources(&self, all: &[Observation], series: &LoadSeries) -> [LogErrors; 3] {
         let shared = series.shared_errors();
         let none = Covariance::none(all.iter().map(|o| o.load));
@@ -242,11 +266,12 @@ impl<L: ContactLaw> ContactEstimator<L> {
         (left > 0.0).then(|| (1.0 - self.poisson_ratio.powi(2)) * reduced / left)
     }
 
-    /// Standard error of ln E*: that of the mean with those of the other body's compliance C and of ν.
+    /// Standard error of ln E*: that of the mean with those of the other body's compliance C and of
+    /// ν.
     ///
-    /// With p the sample's part of the compliance, 1 − C E* on a deep body, ln E moves by 1/p of ln F, by
-    /// 1 − 1/p of ln C and by 2ν/(1 − ν²) of ν. Beside ln E* an error of ln C counts 1 − p times, one of ν
-    /// p·2ν/(1 − ν²) times.
+    /// With p the sample's part of the compliance, 1 − C E* on a deep body, ln E moves by 1/p of ln
+    /// F, by 1 − 1/p of ln C and by 2ν/(1 − ν²) of ν. Beside ln E* an error of ln C counts 1 − p
+    /// times, one of ν p·2ν/(1 − ν²) times.
     fn standard_error(&self, series: &LoadSeries, mean: &CommonMean, sample_part: f64) -> f64 {
         let shared = series.shared_errors();
         let nu_slope = 2.0 * self.poisson_ratio / (1.0 - self.poisson_ratio.powi(2));
@@ -269,7 +294,8 @@ impl<L: ContactLaw> ContactEstimator<L> {
         (self.other_compliance_per_pa * log_reduced.exp()).clamp(0.0, 1.0)
     }
 
-    /// The mean with an assumed fraction of the other body, moved by `reach` times its 95 % quantile.
+    /// The mean with an assumed fraction of the other body, moved by `reach` times its 95 %
+    /// quantile.
     fn mean_at(
         &self,
         series: &LoadSeries,
@@ -297,10 +323,11 @@ impl<L: ContactLaw> ContactEstimator<L> {
 
     /// The mean whose assumed fraction of the other body is the one that follows from it.
     ///
-    /// The fraction that follows falls while the assumed one rises: the larger the part of a layer on a stiff
-    /// base, the stiffer the contact, and the softer the bodies that make it. Their difference has one zero
-    /// between 0 and 1. It is sought by secants, and by bisection where these leave the bracket or are slow.
-    /// The plain iteration swings for ever where a thin layer takes most of the compliance.
+    /// The fraction that follows falls while the assumed one rises: the larger the part of a layer
+    /// on a stiff base, the stiffer the contact, and the softer the bodies that make it. Their
+    /// difference has one zero between 0 and 1. It is sought by secants, and by bisection where
+    /// these leave the bracket or are slow. The plain iteration swings for ever where a thin layer
+    /// takes most of the compliance.
     fn consistent(&self, series: &LoadSeries, reach: f64) -> Result<Consistent, ElasticityError> {
         let mut assumed = self.law.first_compliance_fraction();
         let mut found = self.mean_at(series, assumed, reach)?;
@@ -311,7 +338,8 @@ impl<L: ContactLaw> ContactEstimator<L> {
         let mut before: Option<[f64; 2]> = None;
         for step in 1..=100 {
             let gap = self.fraction_at(found.log_reduced) - assumed;
-            // A fraction moves ln E* by no more than itself over the sample's part: eleven digits of a modulus.
+            // A fraction moves ln E* by no more than itself over the sample's part: eleven digits
+            // of a modulus.
             if gap.abs() < 1e-11 {
                 break;
             }
@@ -331,7 +359,8 @@ impl<L: ContactLaw> ContactEstimator<L> {
             } else {
                 0.5 * (low + high)
             };
-            // Where the law does not reach, the bracket ends: back towards the fraction at which it does.
+            // Where the law does not reach, the bracket ends: back towards the fraction at which it
+            // does.
             let mut moved = self.mean_at(series, next, reach);
             while moved.is_err() && (next - assumed).abs() > 1e-9 {
                 if next < assumed {
@@ -479,13 +508,19 @@ impl<L: ContactLaw> ModulusEstimator for ContactEstimator<L> {
     }
 }
 
-/// Hertz's sphere: a = (3FR/4E*)^⅓, δ = a²/R. Right for a/R up to 0.3; beyond, the estimate carries a warning.
+/// Hertz's sphere: a = (3FR/4E*)^⅓, δ = a²/R. Right for a/R up to 0.3. Beyond, the estimate carries
+/// a warning.
 ///
 /// ```
-/// use tactile_elasticity::modulus::{Estimate, HertzSphere, LoadSeries, LoadState, ModulusEstimator};
+/// use tactile_elasticity::modulus::{
+///     Estimate, HertzSphere, LoadSeries, LoadState, ModulusEstimator,
+/// };
 ///
 /// // 1 mN on a 5 mm sphere makes a contact of 0.4543 mm: 30 kPa.
-/// let load = LoadState { contact_radius_m: Some(Estimate::new(0.4543e-3, 1e-6)), ..LoadState::new(Estimate::new(1e-3, 1e-5)) };
+/// let load = LoadState {
+///     contact_radius_m: Some(Estimate::new(0.4543e-3, 1e-6)),
+///     ..LoadState::new(Estimate::new(1e-3, 1e-5))
+/// };
 /// let modulus = HertzSphere::new(5e-3, 0.5)?.estimate(&LoadSeries::new([load]))?;
 /// assert!((modulus.youngs_modulus_pa / 30e3 - 1.0_f64).abs() < 1e-3);
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
@@ -494,10 +529,15 @@ pub type HertzSphere = ContactEstimator<HertzLaw>;
 /// A flat circular punch, F = 2E*aδ.
 ///
 /// ```
-/// use tactile_elasticity::modulus::{Estimate, FlatPunch, LoadSeries, LoadState, ModulusEstimator};
+/// use tactile_elasticity::modulus::{
+///     Estimate, FlatPunch, LoadSeries, LoadState, ModulusEstimator,
+/// };
 ///
 /// // F = 2E*aδ with E* = 40 kPa, a = 1 mm, δ = 0.1 mm.
-/// let load = LoadState { indentation_m: Some(Estimate::new(0.1e-3, 1e-7)), ..LoadState::new(Estimate::new(8e-3, 1e-5)) };
+/// let load = LoadState {
+///     indentation_m: Some(Estimate::new(0.1e-3, 1e-7)),
+///     ..LoadState::new(Estimate::new(8e-3, 1e-5))
+/// };
 /// let modulus = FlatPunch::new(1e-3, 0.5)?.estimate(&LoadSeries::new([load]))?;
 /// assert!((modulus.youngs_modulus_pa - 30e3_f64).abs() < 1e-6);
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
@@ -531,18 +571,28 @@ pub type Cone = ContactEstimator<ConeLaw>;
 ///     indentation_m: Some(Estimate::new(contact.indentation_m, 1e-7)),
 ///     ..LoadState::new(Estimate::new(1e-3, 1e-5))
 /// }]);
-/// let layer = BondedLayer::new(5e-3, 1e-3, 0.5, Bond::Bonded, LayerTheory::IntegralEquation)?.estimate(&load)?;
-/// assert!(layer.youngs_modulus_pa < 0.7 * HertzSphere::new(5e-3, 0.5)?.estimate(&load)?.youngs_modulus_pa);
+/// let layer = BondedLayer::new(5e-3, 1e-3, 0.5, Bond::Bonded, LayerTheory::IntegralEquation)?
+///     .estimate(&load)?;
+/// assert!(
+///     layer.youngs_modulus_pa
+///         < 0.7
+///             * HertzSphere::new(5e-3, 0.5)?
+///                 .estimate(&load)?
+///                 .youngs_modulus_pa
+/// );
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
 /// ```
 pub type BondedLayer = ContactEstimator<LayerLaw>;
-/// Tatara's soft sphere: the extension of the far side counted; a/R up to 0.6.
+/// Tatara's soft sphere: the extension of the far side counted. A/R up to 0.6.
 ///
 /// ```
 /// use tactile_elasticity::contact::tatara_indentation_m;
-/// use tactile_elasticity::modulus::{Estimate, LoadSeries, LoadState, ModulusEstimator, TataraSphere};
+/// use tactile_elasticity::modulus::{
+///     Estimate, LoadSeries, LoadState, ModulusEstimator, TataraSphere,
+/// };
 ///
-/// // A ball of 3 mm squeezed to a/R = 0.5: Hertz's force for E* = 40 kPa at that radius, and Tatara's indentation.
+/// // A ball of 3 mm squeezed to a/R = 0.5: Hertz's force for E* = 40 kPa at that radius, and
+/// // Tatara's indentation.
 /// let (radius, a) = (3e-3_f64, 1.5e-3_f64);
 /// let force = 4.0 / 3.0 * 40e3 * a.powi(3) / radius;
 /// let load = LoadState {
@@ -558,7 +608,9 @@ pub type TataraSphere = ContactEstimator<TataraLaw>;
 ///
 /// ```
 /// use tactile_elasticity::contact::HertzContact;
-/// use tactile_elasticity::modulus::{Estimate, LoadSeries, LoadState, ModulusEstimator, SphereBetweenPlates};
+/// use tactile_elasticity::modulus::{
+///     Estimate, LoadSeries, LoadState, ModulusEstimator, SphereBetweenPlates,
+/// };
 ///
 /// // Between two rigid plates each contact takes half of the approach.
 /// let contact = HertzContact::from_force(1e-3_f64, 5e-3, 40e3)?;
@@ -571,36 +623,49 @@ pub type TataraSphere = ContactEstimator<TataraLaw>;
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
 /// ```
 pub type SphereBetweenPlates = ContactEstimator<TwoContactsLaw>;
-/// A soft sphere on the layers of a waveguide, or on a [rigid](Waveguide::rigid) flat: the linear contact with N bonded layers
-/// ([`LayerEquation`](crate::contact::LayerEquation)), exact for thick and thin layers, with a correction for finite strain.
+/// A soft sphere on the layers of a waveguide, or on a [rigid](Waveguide::rigid) flat: the linear
+/// contact with N bonded layers ([`LayerEquation`](crate::contact::LayerEquation)), exact for thick
+/// and thin layers, with a correction for finite strain.
 ///
-/// Range: a/R up to 1.2 and a/h up to 1.6, with a warning beyond. Of finite-element contacts (neo-Hookean, ν = 0.495) that the correction was not fitted
-/// to, on the paper's guide and on single layers, 30 to 250 kPa, 3 to 20 mm, the modulus from one contact radius is within 0.6 % in the median and
-/// 6.1 % at worst (where the guide takes two thirds of the compliance); of an independent program's, within 0.5 % on a rigid flat up to a/R = 0.9 and 1.7 % on the
-/// paper's guide up to 1.07. From the indentation, the approach of the ball's centre, it is within 0.4 % on the flat and 12 % on the guide. The law's own
-/// error is part of the interval.
+/// Range: a/R up to 1.2 and a/h up to 1.6, with a warning beyond. Of finite-element contacts
+/// (neo-Hookean, ν = 0.495) that the correction was not fitted to, on the paper's guide and on
+/// single layers, 30 to 250 kPa, 3 to 20 mm, the modulus from one contact radius is within 0.6 % in
+/// the median and 6.1 % at worst (where the guide takes two thirds of the compliance). Of an
+/// independent program's, within 0.5 % on a rigid flat up to a/R = 0.9 and 1.7 % on the paper's
+/// guide up to 1.07. From the indentation, the approach of the ball's centre, it is within 0.4 % on
+/// the flat and 12 % on the guide. The law's own error is part of the interval.
 ///
-/// The set-up solves some 45 contact radii for a dozen ratios of stiffness; an estimate then interpolates.
+/// The set-up solves some 45 contact radii for a dozen ratios of stiffness. An estimate then
+/// interpolates.
 ///
 /// ```
 /// use tactile_elasticity::contact::{Bond, Layer, Waveguide};
-/// use tactile_elasticity::modulus::{Estimate, HertzSphere, LoadSeries, LoadState, ModulusEstimator, SphereOnWaveguide};
+/// use tactile_elasticity::modulus::{
+///     Estimate, HertzSphere, LoadSeries, LoadState, ModulusEstimator, SphereOnWaveguide,
+/// };
 ///
 /// // On a gel of 2 mm the depth is felt: as on a deep one the ball would be called stiffer.
-/// let gel = Waveguide::new(vec![Layer { thickness_m: 2e-3, youngs_modulus_pa: 100e3, poisson_ratio: 0.5 }])?;
+/// let gel = Waveguide::new(vec![Layer {
+///     thickness_m: 2e-3,
+///     youngs_modulus_pa: 100e3,
+///     poisson_ratio: 0.5,
+/// }])?;
 /// let load = LoadSeries::new([LoadState {
 ///     contact_radius_m: Some(Estimate::new(0.8e-3_f64, 1e-6)),
 ///     ..LoadState::new(Estimate::new(5e-3, 1e-5))
 /// }]);
 /// let layered = SphereOnWaveguide::new(5e-3, 0.5, &gel, Bond::Bonded)?.estimate(&load)?;
-/// let deep = HertzSphere::new(5e-3, 0.5)?.with_waveguide(&gel).estimate(&load)?;
+/// let deep = HertzSphere::new(5e-3, 0.5)?
+///     .with_waveguide(&gel)
+///     .estimate(&load)?;
 /// assert!(layered.youngs_modulus_pa < deep.youngs_modulus_pa);
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
 /// ```
 pub type SphereOnWaveguide = ContactEstimator<WaveguideLaw>;
 
 impl ContactEstimator<HertzLaw> {
-    /// A sphere of relative radius R (m); the sample, with Poisson ratio ν, is either the sphere or what it is pressed into.
+    /// A sphere of relative radius R (m). The sample, with Poisson ratio ν, is either the sphere or
+    /// what it is pressed into.
     ///
     /// # Errors
     /// [`ElasticityError::NotPositive`], [`ElasticityError::PoissonRatio`].
@@ -623,7 +688,8 @@ impl ContactEstimator<ConeLaw> {
     /// A cone of half opening angle α (rad, from the axis) on a sample with Poisson ratio ν.
     ///
     /// # Errors
-    /// [`ElasticityError::OutOfRange`] for an angle outside (0, π/2), [`ElasticityError::PoissonRatio`].
+    /// [`ElasticityError::OutOfRange`] for an angle outside (0, π/2),
+    /// [`ElasticityError::PoissonRatio`].
     pub fn new(half_angle_rad: f64, poisson_ratio: f64) -> Result<Self, ElasticityError> {
         let (angle, limit) = (half_angle_rad, std::f64::consts::FRAC_PI_2);
         positive(angle, Quantity::HalfAngle)?;
@@ -639,7 +705,8 @@ impl ContactEstimator<ConeLaw> {
 }
 
 impl ContactEstimator<LayerLaw> {
-    /// A sphere of radius R (m) on a sample of thickness h (m) and Poisson ratio ν, bonded to or sliding on its rigid base.
+    /// A sphere of radius R (m) on a sample of thickness h (m) and Poisson ratio ν, bonded to or
+    /// sliding on its rigid base.
     ///
     /// # Errors
     /// [`ElasticityError::NotPositive`], [`ElasticityError::PoissonRatio`].
@@ -678,8 +745,8 @@ impl ContactEstimator<TwoContactsLaw> {
 }
 
 impl ContactEstimator<WaveguideLaw> {
-    /// A soft sphere of radius R (m) and Poisson ratio ν on the layers of a waveguide, or on a [rigid](Waveguide::rigid) flat; `bond`
-    /// is that of the lowest layer to its rigid base.
+    /// A soft sphere of radius R (m) and Poisson ratio ν on the layers of a waveguide, or on a
+    /// [rigid](Waveguide::rigid) flat. `bond` is that of the lowest layer to its rigid base.
     ///
     /// # Errors
     /// [`ElasticityError::NotPositive`], [`ElasticityError::PoissonRatio`].
@@ -697,11 +764,14 @@ impl ContactEstimator<WaveguideLaw> {
         Ok(Self::from_law(law, poisson_ratio)?.with_other_body(touched))
     }
 
-    /// The linear contact alone, without what finite strain adds and without the model's error in the interval.
+    /// The linear contact alone, without what finite strain adds and without the model's error in
+    /// the interval.
     ///
     /// ```
     /// use tactile_elasticity::contact::{Bond, HertzContact, Waveguide};
-    /// use tactile_elasticity::modulus::{Estimate, LoadSeries, LoadState, ModulusEstimator, SphereOnWaveguide};
+    /// use tactile_elasticity::modulus::{
+    ///     Estimate, LoadSeries, LoadState, ModulusEstimator, SphereOnWaveguide,
+    /// };
     ///
     /// // On a rigid flat the linear contact is Hertz's.
     /// let contact = HertzContact::from_force(1e-3_f64, 5e-3, 40e3)?;
@@ -709,7 +779,8 @@ impl ContactEstimator<WaveguideLaw> {
     ///     contact_radius_m: Some(Estimate::new(contact.contact_radius_m, 1e-6)),
     ///     ..LoadState::new(Estimate::new(1e-3, 1e-5))
     /// };
-    /// let estimator = SphereOnWaveguide::new(5e-3, 0.5, &Waveguide::rigid(), Bond::Bonded)?.without_finite_strain();
+    /// let estimator = SphereOnWaveguide::new(5e-3, 0.5, &Waveguide::rigid(), Bond::Bonded)?
+    ///     .without_finite_strain();
     /// let modulus = estimator.estimate(&LoadSeries::new([load]))?;
     /// assert!((modulus.youngs_modulus_pa - 30e3).abs() < 1e-6);
     /// # Ok::<(), tactile_elasticity::ElasticityError>(())

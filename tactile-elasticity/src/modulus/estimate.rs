@@ -7,16 +7,22 @@ use tactile_core::{Estimate, Interval};
 
 /// Estimates Young's modulus from a series of loads.
 ///
-/// An estimator holds what is known of the object; what was measured, with its errors, comes with the
-/// [`LoadSeries`]. One estimator therefore serves any number of series, and a boxed or shared one is an estimator as well.
+/// An estimator holds what is known of the object. What was measured, with its errors, comes with
+/// the [`LoadSeries`]. One estimator therefore serves any number of series, and a boxed or shared
+/// one is an estimator as well.
 ///
 /// ```
-/// use tactile_elasticity::modulus::{Estimate, HertzSphere, LoadSeries, LoadState, ModulusEstimator};
+/// use tactile_elasticity::modulus::{
+///     Estimate, HertzSphere, LoadSeries, LoadState, ModulusEstimator,
+/// };
 /// // A rigid ball of 5 mm on a sample of 30 kPa.
 /// let loads: Vec<_> = [0.01, 0.02, 0.04]
 ///     .map(|f| {
 ///         let a = (0.75 * f * 0.005 / (30e3 / 0.75f64)).cbrt();
-///         LoadState { contact_radius_m: Some(Estimate::new(a, 1e-6)), ..LoadState::new(Estimate::new(f, 1e-4)) }
+///         LoadState {
+///             contact_radius_m: Some(Estimate::new(a, 1e-6)),
+///             ..LoadState::new(Estimate::new(f, 1e-4))
+///         }
 ///     })
 ///     .to_vec();
 /// let estimator: Box<dyn ModulusEstimator> = Box::new(HertzSphere::new(0.005, 0.5)?);
@@ -42,12 +48,16 @@ pub trait ModulusEstimator {
     /// ```
     fn kind(&self) -> EstimatorKind;
 
-    /// Whether it uses the loads' strains. Without them a caller can leave out surfaces, matches and warps.
+    /// Whether it uses the loads' strains. Without them a caller can leave out surfaces, matches
+    /// and warps.
     ///
     /// ```
     /// use tactile_elasticity::modulus::{HertzSphere, ModulusEstimator, PaperRatio};
     ///
-    /// let estimators: [Box<dyn ModulusEstimator>; 2] = [Box::new(PaperRatio::default()), Box::new(HertzSphere::new(3e-3, 0.5)?)];
+    /// let estimators: [Box<dyn ModulusEstimator>; 2] = [
+    ///     Box::new(PaperRatio::default()),
+    ///     Box::new(HertzSphere::new(3e-3, 0.5)?),
+    /// ];
     /// assert_eq!(estimators.map(|e| e.needs_strain()), [true, false]);
     /// # Ok::<(), tactile_elasticity::ElasticityError>(())
     /// ```
@@ -108,7 +118,7 @@ pub enum EstimatorKind {
     TipOnBall,
     FlatPunch,
     Cone,
-    /// A sphere on a half-space; what touches sticks.
+    /// A sphere on a half-space. What touches sticks.
     SphereWithoutSlip,
     FlatPunchWithoutSlip,
     ConeWithoutSlip,
@@ -154,17 +164,22 @@ impl core::fmt::Display for EstimatorKind {
 ///
 /// ```
 /// use tactile_elasticity::contact::HertzContact;
-/// use tactile_elasticity::modulus::{Estimate, HertzSphere, LoadSeries, LoadState, ModulusEstimate, ModulusEstimator, Warning};
+/// use tactile_elasticity::modulus::{
+///     Estimate, HertzSphere, LoadSeries, LoadState, ModulusEstimate, ModulusEstimator, Warning,
+/// };
 ///
 /// let contact = HertzContact::from_force(0.05_f64, 3e-3, 40e3)?;
 /// let load = LoadState {
 ///     contact_radius_m: Some(Estimate::new(contact.contact_radius_m, 1e-6)),
 ///     ..LoadState::new(Estimate::new(0.05, 1e-4))
 /// };
-/// let modulus: ModulusEstimate = HertzSphere::new(3e-3, 0.5)?.estimate(&LoadSeries::new([load]))?;
+/// let modulus: ModulusEstimate =
+///     HertzSphere::new(3e-3, 0.5)?.estimate(&LoadSeries::new([load]))?;
 /// assert!(modulus.interval_95.contains(30e3));
 /// // The number stands, with the warning that a/R = 0.47 is much.
-/// assert!(matches!(modulus.warnings[0], Warning::LargeContact { load: 0, ratio, .. } if ratio > 0.4));
+/// assert!(
+///     matches!(modulus.warnings[0], Warning::LargeContact { load: 0, ratio, .. } if ratio > 0.4)
+/// );
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
 /// ```
 #[derive(Debug, Clone, PartialEq)]
@@ -188,8 +203,9 @@ pub struct ModulusEstimate {
 }
 
 impl ModulusEstimate {
-    /// Of an estimator of one's own: E with its standard error, in pascals. The interval is symmetric, by
-    /// Student's t where the error has degrees of freedom. No lower end is below zero.
+    /// Of an estimator of one's own: E with its standard error, in pascals. The interval is
+    /// symmetric, by Student's t where the error has degrees of freedom. No lower end is below
+    /// zero.
     ///
     /// ```
     /// use tactile_elasticity::modulus::{Estimate, EstimatorKind, ModulusEstimate};
@@ -217,12 +233,20 @@ impl ModulusEstimate {
 ///
 /// ```
 /// use tactile_elasticity::contact::HertzContact;
-/// use tactile_elasticity::modulus::{Estimate, HertzSphere, LoadSeries, LoadState, ModulusEstimator};
+/// use tactile_elasticity::modulus::{
+///     Estimate, HertzSphere, LoadSeries, LoadState, ModulusEstimator,
+/// };
 ///
 /// // The second load carries nothing but its force.
 /// let contact = HertzContact::from_force(1e-3_f64, 5e-3, 40e3)?;
 /// let force = LoadState::new(Estimate::new(1e-3, 1e-5));
-/// let loads = [LoadState { contact_radius_m: Some(Estimate::new(contact.contact_radius_m, 1e-6)), ..force }, force];
+/// let loads = [
+///     LoadState {
+///         contact_radius_m: Some(Estimate::new(contact.contact_radius_m, 1e-6)),
+///         ..force
+///     },
+///     force,
+/// ];
 /// let modulus = HertzSphere::new(5e-3, 0.5)?.estimate(&LoadSeries::new(loads))?;
 /// assert!(modulus.loads[0].used && !modulus.loads[1].used);
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
@@ -241,21 +265,29 @@ pub struct LoadDiagnostics {
     pub standardized_residual: Option<f64>,
 }
 
-/// How a law fits the data. Smaller information criteria are better; they compare laws on the same data only.
+/// How a law fits the data. Smaller information criteria are better. They compare laws on the same
+/// data only.
 ///
 /// ```
 /// use tactile_elasticity::contact::HertzContact;
-/// use tactile_elasticity::modulus::{Estimate, HertzSphere, LoadSeries, LoadState, ModulusEstimator};
+/// use tactile_elasticity::modulus::{
+///     Estimate, HertzSphere, LoadSeries, LoadState, ModulusEstimator,
+/// };
 ///
 /// let loads: Vec<LoadState> = [1e-3, 2e-3, 4e-3]
 ///     .into_iter()
 ///     .map(|force| {
 ///         let contact = HertzContact::from_force(force, 5e-3, 40e3)?;
 ///         let radius = Estimate::new(contact.contact_radius_m, 1e-6);
-///         Ok(LoadState { contact_radius_m: Some(radius), ..LoadState::new(Estimate::new(force, 1e-5)) })
+///         Ok(LoadState {
+///             contact_radius_m: Some(radius),
+///             ..LoadState::new(Estimate::new(force, 1e-5))
+///         })
 ///     })
 ///     .collect::<Result<_, tactile_elasticity::ElasticityError>>()?;
-/// let fit = HertzSphere::new(5e-3, 0.5)?.estimate(&LoadSeries::new(loads))?.fit;
+/// let fit = HertzSphere::new(5e-3, 0.5)?
+///     .estimate(&LoadSeries::new(loads))?
+///     .fit;
 /// assert_eq!((fit.observations, fit.parameters), (3, 1));
 /// assert!(fit.chi_squared < 1e-12);
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
@@ -270,15 +302,15 @@ pub struct FitStatistics {
     pub parameters: usize,
     /// Σ (residual/σ)², or the residuals' own sum where no σ was given.
     pub chi_squared: f64,
-    /// Akaike's criterion with the small-sample correction; infinite with too few observations.
+    /// Akaike's criterion with the small-sample correction. Infinite with too few observations.
     pub aicc: f64,
     /// Schwarz's criterion.
     pub bic: f64,
 }
 
 impl FitStatistics {
-    /// From the numbers of observations and parameters, χ² and −2 ln of the likelihood, both criteria:
-    /// AICc = −2 ln L + 2k + 2k(k + 1)/(n − k − 1) and BIC = −2 ln L + k ln n.
+    /// From the numbers of observations and parameters, χ² and −2 ln of the likelihood, both
+    /// criteria: AICc = −2 ln L + 2k + 2k(k + 1)/(n − k − 1) and BIC = −2 ln L + k ln n.
     ///
     /// ```
     /// use tactile_elasticity::modulus::FitStatistics;
@@ -307,7 +339,7 @@ impl FitStatistics {
     }
 }
 
-/// A typed caution; the estimate stands, but not unconditionally.
+/// A typed caution. The estimate stands, but not unconditionally.
 ///
 /// ```
 /// use tactile_elasticity::modulus::Warning;
@@ -346,7 +378,8 @@ pub enum Warning {
         /// The limit.
         limit: f64,
     },
-    /// The residuals are larger than the standard errors say; these were scaled up by the square root of this.
+    /// The residuals are larger than the standard errors say. These were scaled up by the square
+    /// root of this.
     ExcessScatter {
         /// χ² over degrees of freedom.
         reduced_chi_squared: f64,
@@ -362,7 +395,8 @@ pub enum Warning {
     },
     /// One load and no standard errors: the interval is not known.
     NoErrorEstimate,
-    /// For a sphere the ratio of stress to strain is not the modulus: it depends on load and radius.
+    /// For a sphere the ratio of stress to strain is not the modulus: it depends on load and
+    /// radius.
     RatioOnSphere {
         /// Index of the load.
         load: usize,
@@ -377,14 +411,16 @@ impl core::fmt::Display for Warning {
             Self::LargeContact { load, ratio, limit } => {
                 write!(
                     f,
-                    "load {}: a/R = {ratio:.3} is beyond {limit:.2}, small-contact theory does not hold",
+                    "load {}: a/R = {ratio:.3} is beyond {limit:.2}, \
+                     small-contact theory does not hold",
                     load + 1
                 )
             }
             Self::ThinLayer { load, ratio, limit } => {
                 write!(
                     f,
-                    "load {}: contact over layer thickness = {ratio:.3} is beyond {limit:.2} for this law",
+                    "load {}: contact over layer thickness = {ratio:.3} \
+                     is beyond {limit:.2} for this law",
                     load + 1
                 )
             }
@@ -395,7 +431,8 @@ impl core::fmt::Display for Warning {
             } => {
                 write!(
                     f,
-                    "load {}: strain {strain:.3} is beyond {limit:.2}, the linear law does not hold",
+                    "load {}: strain {strain:.3} is beyond {limit:.2}, \
+                     the linear law does not hold",
                     load + 1
                 )
             }
@@ -404,7 +441,8 @@ impl core::fmt::Display for Warning {
             } => {
                 write!(
                     f,
-                    "scatter exceeds the stated errors (reduced chi-squared {reduced_chi_squared:.2})"
+                    "scatter exceeds the stated errors \
+                     (reduced chi-squared {reduced_chi_squared:.2})"
                 )
             }
             Self::UnboundedAbove => write!(f, "the data do not bound the modulus from above"),

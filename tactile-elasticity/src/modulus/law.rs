@@ -18,21 +18,23 @@ pub struct LogForce {
     pub size_slope: f64,
 }
 
-/// A law F = E* f(x) of a contact, x the contact radius or the indentation. A law of one's own implements
-/// [`log_force_at_radius`](Self::log_force_at_radius) and goes into [`ContactEstimator::from_law`](super::ContactEstimator::from_law).
+/// A law F = E* f(x) of a contact, x the contact radius or the indentation. A law of one's own
+/// implements [`log_force_at_radius`](Self::log_force_at_radius) and goes into
+/// [`ContactEstimator::from_law`](super::ContactEstimator::from_law).
 ///
-/// `compliance_fraction` is the other body's part of 1/E*, in [0, 1]: 0 where it is rigid. Most laws do not
-/// depend on it.
+/// `compliance_fraction` is the other body's part of 1/E*, in [0, 1]: 0 where it is rigid. Most
+/// laws do not depend on it.
 pub trait ContactLaw {
-    /// ln f of a contact radius (m). None where the law does not depend on it or does not reach so far.
+    /// ln f of a contact radius (m). None where the law does not depend on it or does not reach so
+    /// far.
     fn log_force_at_radius(
         &self,
         contact_radius_m: f64,
         compliance_fraction: f64,
     ) -> Option<LogForce>;
 
-    /// ln f of an indentation (m). None where the law does not depend on it or does not reach so far, which
-    /// is the default.
+    /// ln f of an indentation (m). None where the law does not depend on it or does not reach so
+    /// far, which is the default.
     fn log_force_at_indentation(
         &self,
         _indentation_m: f64,
@@ -79,7 +81,8 @@ pub trait ContactLaw {
         0.0
     }
 
-    /// The sample's part of the compliance of a contact of radius a (m), the other body's depth counted.
+    /// The sample's part of the compliance of a contact of radius a (m), the other body's depth
+    /// counted.
     fn sample_part(&self, _contact_radius_m: Option<f64>, compliance_fraction: f64) -> f64 {
         1.0 - compliance_fraction
     }
@@ -232,11 +235,11 @@ impl ContactLaw for ConeLaw {
     }
 }
 
-/// A soft sphere between the other body (the waveguide) and a rigid plate, Hertz at both contacts; the indentation is the
-/// approach of the plate, so that both flatten.
+/// A soft sphere between the other body (the waveguide) and a rigid plate, Hertz at both contacts.
+/// The indentation is the approach of the plate, so that both flatten.
 ///
-/// Both carry F, and δ ∝ (F/E*)^⅔ at each: with s the other body's share of 1/E* at the near contact,
-/// δ = δ_near (1 + (1 − s)^⅔). The contact radius is the near one's.
+/// Both carry F, and δ ∝ (F/E*)^⅔ at each: with s the other body's share of 1/E* at the near
+/// contact, δ = δ_near (1 + (1 − s)^⅔). The contact radius is the near one's.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TwoContactsLaw {
     sphere: HertzLaw,
@@ -287,9 +290,9 @@ impl ContactLaw for TwoContactsLaw {
     }
 }
 
-/// Hertz at both contacts of the ball: the same force flattens it under the tip, with 1/R₁ = 1/R_tip + 1/R_ball, and on the plate,
-/// with R₂ = R_ball. Indentations go as (F/E*)^⅔ R^(−⅓) and add up, so that both act as one contact of radius R with
-/// R^(−⅓) = R₁^(−⅓) + R₂^(−⅓).
+/// Hertz at both contacts of the ball: the same force flattens it under the tip, with 1/R₁ =
+/// 1/R_tip + 1/R_ball, and on the plate, with R₂ = R_ball. Indentations go as (F/E*)^⅔ R^(−⅓) and
+/// add up, so that both act as one contact of radius R with R^(−⅓) = R₁^(−⅓) + R₂^(−⅓).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TipOnBallLaw {
     both: HertzLaw,
@@ -339,7 +342,8 @@ impl ContactLaw for TipOnBallLaw {
     }
 }
 
-/// Tatara's sphere: Hertz's radius, and an indentation lessened by the far contact; the sample is the sphere.
+/// Tatara's sphere: Hertz's radius, and an indentation lessened by the far contact. The sample is
+/// the sphere.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TataraLaw {
     sphere: HertzLaw,
@@ -408,18 +412,19 @@ impl ContactLaw for TataraLaw {
 
 // Contact without slip on a half-space.
 //
-// What touches keeps its place beneath the indenter, so a growing load adds flat punches that stick, one of each contact radius
-// (Mossakovskii 1963): with θ = ln(3 − 4ν)/2π,
+// What touches keeps its place beneath the indenter, so a growing load adds flat punches that
+// stick, one of each contact radius (Mossakovskii 1963): with θ = ln(3 − 4ν)/2π,
 //
 // dF/dδ = 2E* a c, c = (1 − ν) ln(3 − 4ν)/(1 − 2ν) (Spence 1968),
 //
-// and a surface that a punch of radius b has lifted by 1 − cos(θ ln((t + b)/(t − b))) in Abel's transform lies on a profile z = B rᵈ from
-// (Borodich and Keer 2004)
+// and a surface that a punch of radius b has lifted by 1 − cos(θ ln((t + b)/(t − b))) in Abel's
+// transform lies on a profile z = B rᵈ from (Borodich and Keer 2004)
 //
 // δ(a) I(d) = B aᵈ ∫₀¹ xᵈ⁻¹/√(1 − x²) dx, I(d) = ∫₀¹ sᵈ⁻¹ cos(θ ln((1 + s)/(1 − s))) ds.
 //
-// F = 2c d/(d + 1) E* a δ therefore differs from a contact without friction, θ = 0 and I(d) = 1/d, by factors of ν alone: at ν = ½ by none, for a
-// sphere's force at one indentation by 1.6 % at ν = 0.3 and 5.3 % at ν = 0.
+// F = 2c d/(d + 1) E* a δ therefore differs from a contact without friction, θ = 0 and I(d) = 1/d,
+// by factors of ν alone: at ν = ½ by none, for a sphere's force at one indentation by 1.6 % at ν =
+// 0.3 and 5.3 % at ν = 0.
 
 /// A law of contact without friction, with the factors by which sticking changes it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -561,16 +566,21 @@ fn parabola_integral(theta: f64) -> f64 {
 ///
 /// ```
 /// use tactile_elasticity::contact::{Bond, HertzContact};
-/// use tactile_elasticity::modulus::{BondedLayer, Estimate, LayerTheory, LoadSeries, LoadState, ModulusEstimator};
+/// use tactile_elasticity::modulus::{
+///     BondedLayer, Estimate, LayerTheory, LoadSeries, LoadState, ModulusEstimator,
+/// };
 ///
-/// // √(Rδ)/h = 0.75: the published series is 15 % low in force, so its modulus is that much too high.
+/// // √(Rδ)/h = 0.75: the published series is 15 % low in force, so its modulus is that much too
+/// // high.
 /// let delta = (0.75_f64 * 2e-3).powi(2) / 5e-3;
 /// let load = LoadSeries::new([LoadState {
 ///     indentation_m: Some(Estimate::new(delta, 1e-8)),
 ///     ..LoadState::new(Estimate::new(1e-2, 1e-5))
 /// }]);
 /// let modulus = |theory| {
-///     BondedLayer::new(5e-3, 2e-3, 0.5, Bond::Bonded, theory)?.estimate(&load).map(|m| m.youngs_modulus_pa)
+///     BondedLayer::new(5e-3, 2e-3, 0.5, Bond::Bonded, theory)?
+///         .estimate(&load)
+///         .map(|m| m.youngs_modulus_pa)
 /// };
 /// let ratio = modulus(LayerTheory::PublishedSeries)? / modulus(LayerTheory::IntegralEquation)?;
 /// assert!((ratio - 1.0 / 0.85).abs() < 0.02);

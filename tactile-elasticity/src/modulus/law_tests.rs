@@ -7,11 +7,13 @@ fn nothing_changes_without_a_change_of_volume() {
     assert!(sphere.abs() < 1e-14 && punch == 0.0 && cone == 0.0);
 }
 
-/// ∫ tanh x cos(2θx)/cosh² x dx = ½ − θ ∫ sin(2θx)/cosh² x dx, the last by e⁻²ˣ's series: 4 Σ (−1)ᵏ⁺¹ k 2θ/(4k² + 4θ²).
+/// ∫ tanh x cos(2θx)/cosh² x dx = ½ − θ ∫ sin(2θx)/cosh² x dx, the last by e⁻²ˣ's series: 4 Σ
+/// (−1)ᵏ⁺¹ k 2θ/(4k² + 4θ²).
 #[test]
 fn the_parabolas_integral_is_its_series() {
     for theta in [0.01, 0.1, 0.31] {
-        // Alternating terms: the mean of two sums that follow each other is within the last difference's change, 10⁻¹¹ here.
+        // Alternating terms: the mean of two sums that follow each other is within the last
+        // difference's change, 10⁻¹¹ here.
         let term = |k: f64| 2.0 * theta * k / (k * k + theta * theta);
         let sign = |k: u32| if k % 2 == 1 { 1.0 } else { -1.0 };
         let sum: f64 = (1..400_000).map(|k| sign(k) * term(f64::from(k))).sum();

@@ -23,8 +23,8 @@ pub fn derived(from: Estimate, value: f64, standard_error: f64) -> Estimate {
 
 /// One load: the force and what was measured of the contact.
 ///
-/// Pressing forces are positive. Strain is that between the unloaded state (or the first load, see the estimators) and this
-/// load, positive where the object is squeezed.
+/// Pressing forces are positive. Strain is that between the unloaded state (or the first load, see
+/// the estimators) and this load, positive where the object is squeezed.
 ///
 /// ```
 /// use tactile_elasticity::modulus::{Estimate, LoadSeries, LoadState};
@@ -62,7 +62,7 @@ impl LoadState {
         }
     }
 
-    /// F over the area given, or over πa²; None where neither is known or the area is zero.
+    /// F over the area given, or over πa². None where neither is known or the area is zero.
     pub fn stress_pa(&self) -> Option<f64> {
         let area = match (self.contact_area_m2, self.contact_radius_m) {
             (Some(area), _) => area.value,
@@ -86,17 +86,23 @@ impl LoadState {
     }
 }
 
-/// Standard errors that all loads of a series have in common: averaging over loads does not reduce them. Zero where negligible or unknown.
+/// Standard errors that all loads of a series have in common: averaging over loads does not reduce
+/// them. Zero where negligible or unknown.
 ///
 /// ```
-/// use tactile_elasticity::modulus::{Estimate, HertzSphere, LoadSeries, LoadState, ModulusEstimator, SharedErrors};
+/// use tactile_elasticity::modulus::{
+///     Estimate, HertzSphere, LoadSeries, LoadState, ModulusEstimator, SharedErrors,
+/// };
 ///
 /// let load = LoadState {
 ///     contact_radius_m: Some(Estimate::new(0.4543e-3_f64, 1e-6)),
 ///     ..LoadState::new(Estimate::new(1e-3, 1e-5))
 /// };
 /// let series = LoadSeries::new([load; 50]);
-/// let shared = SharedErrors { force_scale: 0.02, ..SharedErrors::default() };
+/// let shared = SharedErrors {
+///     force_scale: 0.02,
+///     ..SharedErrors::default()
+/// };
 /// let hertz = HertzSphere::new(5e-3, 0.5)?;
 /// let averaged = hertz.estimate(&series)?;
 /// let scaled = hertz.estimate(&series.with_shared_errors(shared)?)?;
@@ -107,8 +113,8 @@ impl LoadState {
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct SharedErrors {
-    /// Relative error of all forces: the slope of one calibration. Its degrees of freedom are the fewest that
-    /// the forces of the loads have.
+    /// Relative error of all forces: the slope of one calibration. Its degrees of freedom are the
+    /// fewest that the forces of the loads have.
     pub force_scale: f64,
     /// Relative error of all lengths: the size of a pixel.
     pub length_scale: f64,
@@ -116,7 +122,8 @@ pub struct SharedErrors {
     pub size: f64,
     /// Error of the sample's Poisson ratio.
     pub poisson_ratio: f64,
-    /// Relative error of the other body's compliance: the moduli of a waveguide's layers, all by one factor.
+    /// Relative error of the other body's compliance: the moduli of a waveguide's layers, all by
+    /// one factor.
     pub other_body: f64,
 }
 
@@ -142,14 +149,21 @@ impl SharedErrors {
 /// use nalgebra::DMatrix;
 /// use tactile_elasticity::modulus::{Estimate, LoadSeries, LoadState, SharedErrors};
 ///
-/// let load = |force, radius| {
-///     LoadState { contact_radius_m: Some(Estimate::new(radius, 4e-6)), ..LoadState::new(Estimate::new(force, 1e-3)) }
+/// let load = |force, radius| LoadState {
+///     contact_radius_m: Some(Estimate::new(radius, 4e-6)),
+///     ..LoadState::new(Estimate::new(force, 1e-3))
 /// };
 /// let series = LoadSeries::new([load(0.7, 1.2e-3), load(1.2, 1.4e-3)])
 ///     // The offset of one calibration is in both forces.
 ///     .with_force_covariance(&DMatrix::from_row_slice(2, 2, &[2e-6, 1e-6, 1e-6, 2e-6]))?
-///     .with_shared_errors(SharedErrors { length_scale: 0.002, ..SharedErrors::default() })?;
-/// assert_eq!((series.loads().len(), series.shared_errors().length_scale), (2, 0.002));
+///     .with_shared_errors(SharedErrors {
+///         length_scale: 0.002,
+///         ..SharedErrors::default()
+///     })?;
+/// assert_eq!(
+///     (series.loads().len(), series.shared_errors().length_scale),
+///     (2, 0.002)
+/// );
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
 /// ```
 #[derive(Debug, Clone, PartialEq)]
@@ -158,7 +172,8 @@ pub struct LoadSeries {
     shared: SharedErrors,
     force_covariance: Option<DMatrix<f64>>,
     strain_covariance: Option<DMatrix<f64>>,
-    /// Poisson's ratio, where the strains were derived from lateral stretches by it: all are in inverse proportion to it.
+    /// Poisson's ratio, where the strains were derived from lateral stretches by it: all are in
+    /// inverse proportion to it.
     strained_by: Option<f64>,
 }
 
@@ -183,7 +198,8 @@ impl LoadSeries {
         Ok(self)
     }
 
-    /// With the covariance of the forces (N²), a row and a column for each load; it replaces their standard errors.
+    /// With the covariance of the forces (N²), a row and a column for each load. It replaces their
+    /// standard errors.
     ///
     /// # Errors
     /// [`ElasticityError::NotFinite`], [`ElasticityError::LengthMismatch`].
@@ -195,8 +211,9 @@ impl LoadSeries {
         Ok(self)
     }
 
-    /// With the covariance of the mean strains, a row and a column for each load (zeros for a load without a strain); it replaces
-    /// their standard errors. Strains counted from one frame share its errors.
+    /// With the covariance of the mean strains, a row and a column for each load (zeros for a load
+    /// without a strain). It replaces their standard errors. Strains counted from one frame share
+    /// its errors.
     ///
     /// # Errors
     /// [`ElasticityError::NotFinite`], [`ElasticityError::LengthMismatch`].
@@ -205,10 +222,22 @@ impl LoadSeries {
     /// use nalgebra::DMatrix;
     /// use tactile_elasticity::modulus::{Estimate, LoadSeries, LoadState};
     ///
-    /// let load = LoadState { mean_strain: Some(Estimate::exact(0.02)), ..LoadState::new(Estimate::new(0.12_f64, 1e-3)) };
+    /// let load = LoadState {
+    ///     mean_strain: Some(Estimate::exact(0.02)),
+    ///     ..LoadState::new(Estimate::new(0.12_f64, 1e-3))
+    /// };
     /// let series = LoadSeries::new([load; 2]);
-    /// assert!(series.clone().with_strain_covariance(&DMatrix::from_element(3, 3, 1e-8)).is_err());
-    /// assert!(series.with_strain_covariance(&DMatrix::from_element(2, 2, 1e-8)).is_ok());
+    /// assert!(
+    ///     series
+    ///         .clone()
+    ///         .with_strain_covariance(&DMatrix::from_element(3, 3, 1e-8))
+    ///         .is_err()
+    /// );
+    /// assert!(
+    ///     series
+    ///         .with_strain_covariance(&DMatrix::from_element(2, 2, 1e-8))
+    ///         .is_ok()
+    /// );
     /// # Ok::<(), tactile_elasticity::ElasticityError>(())
     /// ```
     pub fn with_strain_covariance(
@@ -279,8 +308,9 @@ impl LoadSeries {
 }
 
 impl LoadSeries {
-    /// Relative error that all ratios of stress to strain share beside that of the forces. Areas go as the
-    /// square of lengths, strains derived from lateral stretches as one over Poisson's ratio.
+    /// Relative error that all ratios of stress to strain share beside that of the forces. Areas go
+    /// as the square of lengths, strains derived from lateral stretches as one over Poisson's
+    /// ratio.
     pub(crate) fn size_scale_error(&self) -> f64 {
         let of_strains = (self.strained_by).map_or(0.0, |ratio| self.shared.poisson_ratio / ratio);
         (2.0 * self.shared.length_scale).hypot(of_strains)

@@ -13,18 +13,20 @@ pub(crate) const LINEAR_STRAIN: f64 = 0.1;
 /// What the strain of a load is counted from.
 ///
 /// ```
-/// use tactile_elasticity::modulus::{Estimate, LoadSeries, LoadState, ModulusEstimator, PaperRatio, StrainReference};
+/// use tactile_elasticity::modulus::{
+///     Estimate, LoadSeries, LoadState, ModulusEstimator, PaperRatio, StrainReference,
+/// };
 ///
 /// // Two pressed frames: the strain between them belongs to the difference of their stresses.
-/// let load = |force, strain| {
-///     LoadState {
-///         contact_area_m2: Some(Estimate::exact(1e-4)),
-///         mean_strain: Some(Estimate::exact(strain)),
-///         ..LoadState::new(Estimate::new(force, 1e-4))
-///     }
+/// let load = |force, strain| LoadState {
+///     contact_area_m2: Some(Estimate::exact(1e-4)),
+///     mean_strain: Some(Estimate::exact(strain)),
+///     ..LoadState::new(Estimate::new(force, 1e-4))
 /// };
 /// let loads = LoadSeries::new([load(0.7, 0.0), load(1.2, 0.05)]);
-/// let modulus = PaperRatio::default().with_reference(StrainReference::FirstLoad).estimate(&loads)?;
+/// let modulus = PaperRatio::default()
+///     .with_reference(StrainReference::FirstLoad)
+///     .estimate(&loads)?;
 /// assert!((modulus.youngs_modulus_pa - (1.2 - 0.7) / 1e-4 / 0.05_f64).abs() < 1e-6);
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
 /// ```
@@ -34,23 +36,25 @@ pub enum StrainReference {
     /// The unloaded object: stress is counted from zero.
     #[default]
     Unloaded,
-    /// The first load, as when two pressed frames are matched: stress is counted from there, and its own strain, where it has one, is taken
-    /// from all others.
+    /// The first load, as when two pressed frames are matched: stress is counted from there, and
+    /// its own strain, where it has one, is taken from all others.
     FirstLoad,
 }
 
 /// E = S_zz / ⟨e_zz⟩, equation (31): right where the loading is uniaxial.
 ///
-/// On a sphere it is biased by construction. Hertz's pressure p₀√(1 − r²/a²), read as the shading of a surface,
-/// is a hemisphere of radius a ∝ (FR/E*)^⅓, whose apparent strain between two loads, ½((F₂/F₁)^⅔ − 1), does not depend on E at
-/// all; the modulus enters through the mean pressure F/(πa²) ∝ (E*/R)^⅔ F^⅓ alone. Give the sphere's radius to be told so,
-/// and use [`HertzSphere`](super::HertzSphere) for a number.
+/// On a sphere it is biased by construction. Hertz's pressure p₀√(1 − r²/a²), read as the shading
+/// of a surface, is a hemisphere of radius a ∝ (FR/E*)^⅓, whose apparent strain between two loads,
+/// ½((F₂/F₁)^⅔ − 1), does not depend on E at all. The modulus enters through the mean pressure
+/// F/(πa²) ∝ (E*/R)^⅔ F^⅓ alone. Give the sphere's radius to be told so, and use
+/// [`HertzSphere`](super::HertzSphere) for a number.
 ///
 /// Several loads are averaged with the weights of their relative errors.
 ///
 /// ```
 /// use tactile_elasticity::modulus::{
-///     Estimate, LoadSeries, LoadState, ModulusEstimator, PaperRatio, SharedErrors, StrainReference, Warning,
+///     Estimate, LoadSeries, LoadState, ModulusEstimator, PaperRatio, SharedErrors,
+///     StrainReference, Warning,
 /// };
 ///
 /// let load = LoadState {
@@ -60,14 +64,26 @@ pub enum StrainReference {
 ///     ..LoadState::new(Estimate::new(0.12, 0.001))
 /// };
 /// let series = LoadSeries::new([load]);
-/// let plain = PaperRatio::default().with_reference(StrainReference::Unloaded).estimate(&series)?;
+/// let plain = PaperRatio::default()
+///     .with_reference(StrainReference::Unloaded)
+///     .estimate(&series)?;
 /// assert!((plain.youngs_modulus_pa - 60e3_f64).abs() < 1e-6);
 ///
 /// // Errors that loads share come with the series; on a sphere the ratio is biased, and says so.
-/// let series = series.with_shared_errors(SharedErrors { force_scale: 0.01, ..SharedErrors::default() })?;
-/// let careful = PaperRatio::default().with_sphere_radius(3e-3)?.estimate(&series)?;
+/// let series = series.with_shared_errors(SharedErrors {
+///     force_scale: 0.01,
+///     ..SharedErrors::default()
+/// })?;
+/// let careful = PaperRatio::default()
+///     .with_sphere_radius(3e-3)?
+///     .estimate(&series)?;
 /// assert!(careful.standard_error_pa > plain.standard_error_pa);
-/// assert!(careful.warnings.iter().any(|w| matches!(w, Warning::RatioOnSphere { .. })));
+/// assert!(
+///     careful
+///         .warnings
+///         .iter()
+///         .any(|w| matches!(w, Warning::RatioOnSphere { .. }))
+/// );
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -77,7 +93,7 @@ pub struct PaperRatio {
 }
 
 impl PaperRatio {
-    /// With strain counted from `reference`; by default from the unloaded state.
+    /// With strain counted from `reference`. By default from the unloaded state.
     pub fn with_reference(mut self, reference: StrainReference) -> Self {
         self.reference = reference;
         self
@@ -92,7 +108,8 @@ impl PaperRatio {
         Ok(self)
     }
 
-    /// The first load's own strain, where strains are counted from an earlier state but the ratio from the first load.
+    /// The first load's own strain, where strains are counted from an earlier state but the ratio
+    /// from the first load.
     fn first_strain(&self, loads: &[LoadState]) -> Estimate {
         let first = loads.first().and_then(|load| load.mean_strain);
         first
@@ -140,9 +157,11 @@ impl PaperRatio {
         Ok(ratios)
     }
 
-    /// Covariances of the ln E, from forces, areas, strains and the scale of all stresses, each with its degrees of freedom.
+    /// Covariances of the ln E, from forces, areas, strains and the scale of all stresses, each
+    /// with its degrees of freedom.
     ///
-    /// d ln E = (dS_i − dS_0)/(S_i − S_0) − de_i/e_i with dS = dF/A − S dA/A. What the first load's stress errs by, all ratios share.
+    /// d ln E = (dS_i − dS_0)/(S_i − S_0) − de_i/e_i with dS = dF/A − S dA/A. What the first load's
+    /// stress errs by, all ratios share.
     fn sources(&self, series: &LoadSeries, ratios: &[Ratio]) -> [LogErrors; 4] {
         let loads = series.loads();
         let areas: Vec<_> = loads.iter().map(LoadState::area).collect();
@@ -265,7 +284,7 @@ impl Ratio {
     }
 }
 
-/// Mean stress of a load with its error; the area must be above zero.
+/// Mean stress of a load with its error. The area must be above zero.
 pub(crate) fn stress(load: usize, state: &LoadState) -> Result<Estimate, ElasticityError> {
     let force = validated(state.force_n, Quantity::Force)?;
     let quantity = if state.contact_area_m2.is_some() {

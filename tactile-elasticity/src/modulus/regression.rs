@@ -14,12 +14,14 @@ use tactile_core::{Estimate, Interval};
 
 /// S_i = S₀ + E e_i over many loads, with errors in both.
 ///
-/// Each load weighs 1/(σ_S² + E²σ_e²) (York's effective variance without correlation); without any
-/// standard errors all weigh the same and the error is estimated from the scatter. At least two loads, three where neither errors nor a
-/// zero intercept are given.
+/// Each load weighs 1/(σ_S² + E²σ_e²) (York's effective variance without correlation). Without any
+/// standard errors all weigh the same and the error is estimated from the scatter. At least two
+/// loads, three where neither errors nor a zero intercept are given.
 ///
 /// ```
-/// use tactile_elasticity::modulus::{Estimate, LoadSeries, LoadState, ModulusEstimator, StressStrainRegression};
+/// use tactile_elasticity::modulus::{
+///     Estimate, LoadSeries, LoadState, ModulusEstimator, StressStrainRegression,
+/// };
 /// let load = |stress: f64, strain: f64| {
 ///     LoadState {
 ///         contact_area_m2: Some(Estimate::exact(1e-6)), // one square millimetre
@@ -38,10 +40,13 @@ pub struct StressStrainRegression {
 }
 
 impl StressStrainRegression {
-    /// The line goes through the origin. By default it has an intercept, which is tested: a significant one is warned of.
+    /// The line goes through the origin. By default it has an intercept, which is tested: a
+    /// significant one is warned of.
     ///
     /// ```
-    /// use tactile_elasticity::modulus::{Estimate, LoadSeries, LoadState, ModulusEstimator, StressStrainRegression, Warning};
+    /// use tactile_elasticity::modulus::{
+    ///     Estimate, LoadSeries, LoadState, ModulusEstimator, StressStrainRegression, Warning,
+    /// };
     ///
     /// // Stress that starts at 300 Pa: a gauge that was not tared.
     /// let loads = [0.01, 0.02, 0.03, 0.04].map(|strain: f64| LoadState {
@@ -51,7 +56,12 @@ impl StressStrainRegression {
     /// });
     /// let (loads, line) = (LoadSeries::new(loads), StressStrainRegression::default());
     /// let tested = line.estimate(&loads)?;
-    /// assert!(tested.warnings.iter().any(|w| matches!(w, Warning::Intercept { .. })));
+    /// assert!(
+    ///     tested
+    ///         .warnings
+    ///         .iter()
+    ///         .any(|w| matches!(w, Warning::Intercept { .. }))
+    /// );
     /// let forced = line.with_zero_at_origin().estimate(&loads)?;
     /// assert!(forced.youngs_modulus_pa > tested.youngs_modulus_pa);
     /// # Ok::<(), tactile_elasticity::ElasticityError>(())
@@ -131,8 +141,9 @@ impl StressStrainRegression {
         Ok(())
     }
 
-    /// Degrees of freedom of the slope's error: those of the scatter, or of the sources, the stresses counted as one.
-    /// `scales` are the variances that all stresses share, with their degrees of freedom.
+    /// Degrees of freedom of the slope's error: those of the scatter, or of the sources, the
+    /// stresses counted as one. `scales` are the variances that all stresses share, with their
+    /// degrees of freedom.
     fn degrees(points: &[Point], line: &Line, scales: [(f64, Option<f64>); 2]) -> Option<f64> {
         if line.learnt {
             return Some(line.degrees as f64);
@@ -187,7 +198,7 @@ impl StressStrainRegression {
     }
 }
 
-/// Residuals over their standard errors; over the scatter where no errors are known.
+/// Residuals over their standard errors. Over the scatter where no errors are known.
 fn diagnostics(points: &[Point], line: &Line, known: bool, loads: usize) -> Vec<LoadDiagnostics> {
     let mut diagnostics = vec![LoadDiagnostics::default(); loads];
     for p in points {
@@ -271,8 +282,8 @@ struct Point {
 }
 
 impl Line {
-    /// The line through the points, or through them and the origin; weighted by their errors where these are known. The
-    /// weights depend on the slope, so that the fit is iterated.
+    /// The line through the points, or through them and the origin. Weighted by their errors where
+    /// these are known. The weights depend on the slope, so that the fit is iterated.
     fn fit(points: &[Point], free: bool, known: bool) -> Self {
         let mut line = Self::weighted(points, |_| 1.0, free, false);
         if !known {
@@ -332,25 +343,30 @@ impl Line {
     }
 }
 
-// Specimens with a flat face, pressed without friction: strain and conjugate stress from the face's area.
+// Specimens with a flat face, pressed without friction: strain and conjugate stress from the face's
+// area.
 //
-// Under uniaxial load a block or a cylinder of any outline deforms homogeneously: the face stretches by λ_t in its plane and by λ_z
-// across it, and its area is A = A₀ λ_t². With a measure of strain f (Green–Lagrange: f(λ) = ½(λ² − 1)) and Poisson's ratio defined
-// by the same measure, f(λ_t) = −ν f(λ_z), which for Hencky's measure and ν = ½ is incompressibility, λ_z λ_t² = 1.
-// The stress conjugate to the measure does the work of the force: S df = (F/A₀) dλ_z, hence
+// Under uniaxial load a block or a cylinder of any outline deforms homogeneously: the face
+// stretches by λ_t in its plane and by λ_z across it, and its area is A = A₀ λ_t². With a measure
+// of strain f (Green–Lagrange: f(λ) = ½(λ² − 1)) and Poisson's ratio defined by the same measure,
+// f(λ_t) = −ν f(λ_z), which for Hencky's measure and ν = ½ is incompressibility, λ_z λ_t² = 1. The
+// stress conjugate to the measure does the work of the force: S df = (F/A₀) dλ_z, hence
 //
 // S = F / (A₀ f′(λ_z)),
 //
-// the second Piola–Kirchhoff stress for Green–Lagrange, F/A₀ (engineering stress) for Biot's measure and J times the true stress F/A for
-// Hencky's. Material law: S = E f(λ_z), equation (31).
+// the second Piola–Kirchhoff stress for Green–Lagrange, F/A₀ (engineering stress) for Biot's
+// measure and J times the true stress F/A for Hencky's. Material law: S = E f(λ_z), equation (31).
 //
-// Frames show pressed faces only, so that A₀ is not measured. It is the area for which the line S over e passes through the origin:
-// n loads determine the two unknowns E and A₀ from n ≥ 2. To first order E = 2ν ΔF/ΔA, which does not hold A₀ at all; the error of A₀ is of
-// the order of that of E times the strain and is neglected.
+// Frames show pressed faces only, so that A₀ is not measured. It is the area for which the line S
+// over e passes through the origin: n loads determine the two unknowns E and A₀ from n ≥ 2. To
+// first order E = 2ν ΔF/ΔA, which does not hold A₀ at all. The error of A₀ is of the order of that
+// of E times the strain and is neglected.
 //
-// Range: no friction. A face that sticks to the plate stretches less than the material above it, and E comes out too large.
+// Range: no friction. A face that sticks to the plate stretches less than the material above it,
+// and E comes out too large.
 
-/// Steps to the unloaded area: the error falls by about the strain each time, to rounding for strains up to a third.
+/// Steps to the unloaded area: the error falls by about the strain each time, to rounding for
+/// strains up to a third.
 const AREA_STEPS: usize = 60;
 /// Axial stretches that are considered: beyond them no law with one modulus holds.
 const STRETCHES: [f64; 2] = [0.05, 4.0];
@@ -363,14 +379,20 @@ const STRETCHES: [f64; 2] = [0.05, 4.0];
 /// };
 /// use tactile_elasticity::strain::GreenLagrange;
 ///
-/// // A face of 1 cm² of 100 kPa and ν = ½, squeezed by e = 2 % and 5 %: λ_z = √(1 − 2e), A = A₀(1 + e), F = E e λ_z A₀.
-/// let load = |e: f64| {
-///     LoadState {
-///         contact_area_m2: Some(Estimate::new(1e-4 * (1.0 + e), 1e-9)),
-///         ..LoadState::new(Estimate::new(100e3 * e * (1.0 - 2.0 * e).sqrt() * 1e-4, 1e-4))
-///     }
+/// // A face of 1 cm² of 100 kPa and ν = ½, squeezed by e = 2 % and 5 %: λ_z = √(1 − 2e), A = A₀(1
+/// // + e), F = E e λ_z A₀.
+/// let load = |e: f64| LoadState {
+///     contact_area_m2: Some(Estimate::new(1e-4 * (1.0 + e), 1e-9)),
+///     ..LoadState::new(Estimate::new(
+///         100e3 * e * (1.0 - 2.0 * e).sqrt() * 1e-4,
+///         1e-4,
+///     ))
 /// };
-/// let uniaxial = UniaxialLoads::new(&LoadSeries::new([load(0.02), load(0.05)]), 0.5, &GreenLagrange)?;
+/// let uniaxial = UniaxialLoads::new(
+///     &LoadSeries::new([load(0.02), load(0.05)]),
+///     0.5,
+///     &GreenLagrange,
+/// )?;
 /// assert!((uniaxial.unloaded_area_m2 / 1e-4 - 1.0).abs() < 1e-9);
 /// let [_lateral, axial] = uniaxial.stretches[1];
 /// assert!((axial - 0.9f64.sqrt()).abs() < 1e-9);
@@ -390,12 +412,14 @@ pub struct UniaxialLoads {
 }
 
 impl UniaxialLoads {
-    /// Finds A₀ and the state of every load that has a contact area; the others have a force alone. O(loads).
+    /// Finds A₀ and the state of every load that has a contact area. The others have a force alone.
+    /// O(loads).
     ///
     /// # Errors
-    /// [`ElasticityError::NotPositive`] for a Poisson ratio, from which there is no way back to the axial strain, or an area;
-    /// [`ElasticityError::TooFewLoads`] for fewer than two areas, [`ElasticityError::EqualLoads`] and [`ElasticityError::ZeroStrain`] where they
-    /// are all one, [`ElasticityError::OppositeSigns`] where the face does not grow with the force.
+    /// [`ElasticityError::NotPositive`] for a Poisson ratio, from which there is no way back to the
+    /// axial strain, or an area. [`ElasticityError::TooFewLoads`] for fewer than two areas,
+    /// [`ElasticityError::EqualLoads`] and [`ElasticityError::ZeroStrain`] where they are all one,
+    /// [`ElasticityError::OppositeSigns`] where the face does not grow with the force.
     pub fn new(
         series: &LoadSeries,
         poisson_ratio: f64,
@@ -455,13 +479,15 @@ impl LateralLaw<'_> {
         Ok(self.measure.strain(&gradient)?[(2, 2)])
     }
 
-    /// f′ of a stretch, by a central difference: exact to 1e-11, its third derivative times the step squared.
+    /// f′ of a stretch, by a central difference: exact to 1e-11, its third derivative times the
+    /// step squared.
     fn slope(&self, stretch: f64) -> Result<f64, ElasticityError> {
         const STEP: f64 = 1e-5;
         Ok((self.strain(stretch + STEP)? - self.strain(stretch - STEP)?) / (2.0 * STEP))
     }
 
-    /// λ_z of a face that has stretched by λ_t, by bisection: f rises with the stretch, whatever the measure.
+    /// λ_z of a face that has stretched by λ_t, by bisection: f rises with the stretch, whatever
+    /// the measure.
     fn axial(&self, lateral: f64) -> Result<f64, ElasticityError> {
         let wanted = -self.strain(lateral)? / self.poisson_ratio;
         let [mut low, mut high] = STRETCHES;

@@ -31,13 +31,15 @@ use std::sync::Arc;
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct ModulusSelection {
-    /// Estimates; the first is the chosen one, the others follow by their criterion. Each carries its warnings.
+    /// Estimates. The first is the chosen one, the others follow by their criterion. Each carries
+    /// its warnings.
     pub estimates: Vec<ModulusEstimate>,
     /// Akaike weights of the estimates, in their order.
     pub weights: Vec<f64>,
     /// Why the first was chosen.
     pub reason: SelectionReason,
-    /// Estimators without an answer, or with one from other observations than the most general candidate's: these cannot be compared.
+    /// Estimators without an answer, or with one from other observations than the most general
+    /// candidate's: these cannot be compared.
     pub left_out: Vec<EstimatorKind>,
 }
 
@@ -48,26 +50,34 @@ impl ModulusSelection {
     }
 }
 
-/// Estimates with every candidate and chooses by Akaike's criterion: among those within 2 of the best, the first given, so give the
-/// most general theory first. An estimator itself: [`estimate`](ModulusEstimator::estimate) gives the chosen estimate.
+/// Estimates with every candidate and chooses by Akaike's criterion: among those within 2 of the
+/// best, the first given, so give the most general theory first. An estimator itself:
+/// [`estimate`](ModulusEstimator::estimate) gives the chosen estimate.
 ///
-/// The criterion is that of [`FitStatistics`](super::FitStatistics): AICc, or AIC where the loads are too few for the correction.
-/// Loads of one size cannot tell laws apart: the first candidate is then the answer, with the reason
-/// [`SelectionReason::MostGeneral`].
+/// The criterion is that of [`FitStatistics`](super::FitStatistics): AICc, or AIC where the loads
+/// are too few for the correction. Loads of one size cannot tell laws apart: the first candidate is
+/// then the answer, with the reason [`SelectionReason::MostGeneral`].
 ///
 /// ```
-/// use tactile_elasticity::modulus::{BestOf, Estimate, EstimatorKind, LoadSeries, LoadState, ModulusEstimator};
+/// use tactile_elasticity::modulus::{
+///     BestOf, Estimate, EstimatorKind, LoadSeries, LoadState, ModulusEstimator,
+/// };
 /// // A ball of 5 mm on a deep sample of 30 kPa: δ³ᐟ² = 3F/(4E*√R).
 /// let loads = [0.002, 0.01, 0.05].map(|f: f64| {
 ///     let d = (0.75 * f / (40e3 * 0.005f64.sqrt())).powf(2.0 / 3.0);
-///     LoadState { indentation_m: Some(Estimate::new(d, 0.003 * d)), ..LoadState::new(Estimate::exact(f)) }
+///     LoadState {
+///         indentation_m: Some(Estimate::new(d, 0.003 * d)),
+///         ..LoadState::new(Estimate::exact(f))
+///     }
 /// });
 /// let series = LoadSeries::new(loads);
 /// // Against a layer of 1 mm, bonded or sliding:
 /// let estimator = BestOf::sphere_on_sample(0.005, 0.5, Some(1e-3))?;
 /// let selection = estimator.select(&series)?;
 /// assert_eq!(selection.chosen().estimator, EstimatorKind::HertzSphere);
-/// assert!((selection.chosen().youngs_modulus_pa - 30e3).abs() < 1.0 && selection.weights[0] > 0.99);
+/// assert!(
+///     (selection.chosen().youngs_modulus_pa - 30e3).abs() < 1.0 && selection.weights[0] > 0.99
+/// );
 /// assert_eq!(estimator.estimate(&series)?, *selection.chosen());
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
 /// ```
@@ -99,8 +109,8 @@ impl BestOf {
         self
     }
 
-    /// A rigid sphere of radius R (m) on a sample with Poisson ratio ν: Hertz, and with a thickness h (m) the layer's integral
-    /// equation, bonded to its rigid base or sliding on it.
+    /// A rigid sphere of radius R (m) on a sample with Poisson ratio ν: Hertz, and with a thickness
+    /// h (m) the layer's integral equation, bonded to its rigid base or sliding on it.
     ///
     /// # Errors
     /// [`ElasticityError::NotPositive`], [`ElasticityError::PoissonRatio`].
@@ -122,23 +132,31 @@ impl BestOf {
             .or(half_space))
     }
 
-    /// A soft sphere of radius R (m) and Poisson ratio ν, the sample, pressed by a rigid plate onto a waveguide: the waveguide as
-    /// a layer of finite depth, Tatara's large deformation, and Hertz with one and with two contacts.
+    /// A soft sphere of radius R (m) and Poisson ratio ν, the sample, pressed by a rigid plate onto
+    /// a waveguide: the waveguide as a layer of finite depth, Tatara's large deformation, and Hertz
+    /// with one and with two contacts.
     ///
     /// # Errors
     /// [`ElasticityError::NotPositive`], [`ElasticityError::PoissonRatio`].
     ///
     /// ```
     /// use tactile_elasticity::contact::{HertzContact, Layer, Waveguide};
-    /// use tactile_elasticity::modulus::{BestOf, Estimate, EstimatorKind, LoadSeries, LoadState, ModulusEstimator};
+    /// use tactile_elasticity::modulus::{
+    ///     BestOf, Estimate, EstimatorKind, LoadSeries, LoadState, ModulusEstimator,
+    /// };
     ///
-    /// let gel = Waveguide::new(vec![Layer { thickness_m: 10e-3, youngs_modulus_pa: 50e3_f64, poisson_ratio: 0.5 }])?;
+    /// let gel = Waveguide::new(vec![Layer {
+    ///     thickness_m: 10e-3,
+    ///     youngs_modulus_pa: 50e3_f64,
+    ///     poisson_ratio: 0.5,
+    /// }])?;
     /// let contact = HertzContact::from_force(1e-3, 3e-3, 30e3)?;
     /// let load = LoadState {
     ///     contact_radius_m: Some(Estimate::new(contact.contact_radius_m, 1e-6)),
     ///     ..LoadState::new(Estimate::new(1e-3, 1e-5))
     /// };
-    /// let modulus = BestOf::sphere_as_sample(3e-3, 0.5, &gel)?.estimate(&LoadSeries::new([load]))?;
+    /// let modulus =
+    ///     BestOf::sphere_as_sample(3e-3, 0.5, &gel)?.estimate(&LoadSeries::new([load]))?;
     /// assert_eq!(modulus.estimator, EstimatorKind::SphereOnWaveguide);
     /// # Ok::<(), tactile_elasticity::ElasticityError>(())
     /// ```
@@ -209,7 +227,8 @@ impl ModulusEstimator for BestOf {
     }
 }
 
-/// AICc; where the loads are too few for it, AIC from χ², which differs by a constant between laws of the same loads.
+/// AICc. Where the loads are too few for it, AIC from χ², which differs by a constant between laws
+/// of the same loads.
 fn criterion(estimate: &ModulusEstimate) -> f64 {
     let fit = &estimate.fit;
     let corrected = fit.aicc;
@@ -243,10 +262,11 @@ pub enum SelectionReason {
     OnlyCandidate,
     /// Its AICc is lower than the next by this much.
     BetterFit {
-        /// The margin; 10 is decisive.
+        /// The margin. 10 is decisive.
         margin: f64,
     },
-    /// Others fit as well (within 2 of the best AICc, by this much); this is the most general theory among them.
+    /// Others fit as well (within 2 of the best AICc, by this much). This is the most general
+    /// theory among them.
     MostGeneral {
         /// How far its AICc is above the best.
         behind: f64,
@@ -256,8 +276,8 @@ pub enum SelectionReason {
 /// AICc differences up to this one are no evidence (Burnham & Anderson 2002).
 const NO_EVIDENCE: f64 = 2.0;
 
-/// Candidates (the most general first) in the order of preference: the first that is within 2 of the lowest criterion, then the
-/// others, ascending. The list must not be empty.
+/// Candidates (the most general first) in the order of preference: the first that is within 2 of
+/// the lowest criterion, then the others, ascending. The list must not be empty.
 pub fn rank(criteria: &[f64]) -> (Vec<usize>, SelectionReason) {
     let lowest = criteria.iter().copied().fold(f64::INFINITY, f64::min);
     let chosen = criteria

@@ -28,15 +28,16 @@ pub struct CommonMean {
     /// Standard error, scaled up where the scatter exceeds the covariance.
     pub standard_error: f64,
     chi_squared: f64,
-    /// Of the measured forces and lengths with their true values fitted to the law. Given errors enter by χ² and a constant alone:
-    /// the covariance of ln E* depends on the law's slope, and would favour flat ones.
+    /// Of the measured forces and lengths with their true values fitted to the law. Given errors
+    /// enter by χ² and a constant alone: the covariance of ln E* depends on the law's slope, and
+    /// would favour flat ones.
     minus_two_log_likelihood: f64,
-    /// Degrees of freedom where the error was learnt from the scatter; None where it was given.
+    /// Degrees of freedom where the error was learnt from the scatter. None where it was given.
     pub degrees: Option<f64>,
     /// χ²/ν where it was used to scale the error up.
     excess: Option<f64>,
     pub standardized_residuals: Vec<f64>,
-    /// Of every number in the mean; their sum is one.
+    /// Of every number in the mean. Their sum is one.
     pub weights: DVector<f64>,
 }
 
@@ -48,7 +49,8 @@ impl CommonMean {
         FitStatistics::new(observations, 1, self.chi_squared, minus_two_log)
     }
 
-    /// Cautions that follow from the scatter and the errors. `bounded` is whether the interval has an upper end.
+    /// Cautions that follow from the scatter and the errors. `bounded` is whether the interval has
+    /// an upper end.
     pub fn warnings(&self, bounded: bool) -> Vec<Warning> {
         let excess = self.excess;
         let mut warnings: Vec<_> = excess
@@ -65,8 +67,8 @@ impl CommonMean {
         warnings
     }
 
-    /// Degrees of freedom of the standard error; those of its independent sources, each with its covariance, where the scatter
-    /// did not tell it.
+    /// Degrees of freedom of the standard error. Those of its independent sources, each with its
+    /// covariance, where the scatter did not tell it.
     pub fn degrees_from(&self, sources: &[LogErrors]) -> Option<f64> {
         let parts: Vec<_> = sources
             .iter()
@@ -82,10 +84,11 @@ const EXCESS_PROBABILITY: f64 = 1e-3;
 
 /// θ = (1ᵀΣ⁻¹z)/(1ᵀΣ⁻¹1). Σ = 0 means unknown: equal weights and the error from the scatter.
 ///
-/// Errors that all numbers share enter as unknowns s of a standard normal prior, z = θ + U s + ε, so that only the errors of
-/// single loads are factorised. With these whitened and U split into its weighted mean ū and the rest Ũ,
-/// ŝ = (1 + ŨᵀŨ)⁻¹Ũᵀz, θ = z̄ − ū·ŝ and var θ = 1/Σw + ūᵀ(1 + ŨᵀŨ)⁻¹ū: the Woodbury identity, written so that nothing cancels where
-/// a shared error is much larger than the others. O(n k²) with k shared errors.
+/// Errors that all numbers share enter as unknowns s of a standard normal prior, z = θ + U s + ε,
+/// so that only the errors of single loads are factorised. With these whitened and U split into its
+/// weighted mean ū and the rest Ũ, ŝ = (1 + ŨᵀŨ)⁻¹Ũᵀz, θ = z̄ − ū·ŝ and var θ = 1/Σw + ūᵀ(1 +
+/// ŨᵀŨ)⁻¹ū: the Woodbury identity, written so that nothing cancels where a shared error is much
+/// larger than the others. O(n k²) with k shared errors.
 pub fn common_mean(z: &[f64], covariance: &Covariance) -> Result<CommonMean, ElasticityError> {
     let n = z.len();
     let known = covariance.is_known();
@@ -141,7 +144,8 @@ pub fn common_mean(z: &[f64], covariance: &Covariance) -> Result<CommonMean, Ela
     })
 }
 
-/// Residuals over their standard deviations, the variances times `unit`; without a covariance all have one variance.
+/// Residuals over their standard deviations, the variances times `unit`. Without a covariance all
+/// have one variance.
 fn standardized(z: &[f64], mean: f64, covariance: Option<&Covariance>, unit: f64) -> Vec<f64> {
     let over_spread = |(i, z): (usize, &f64)| {
         let spread = (covariance.map_or(1.0, |c| c.variance(i)) * unit).sqrt();
@@ -154,7 +158,7 @@ fn standardized(z: &[f64], mean: f64, covariance: Option<&Covariance>, unit: f64
     z.iter().enumerate().map(over_spread).collect()
 }
 
-/// Of a normal sample; where the variance is unknown, at its most likely value.
+/// Of a normal sample. Where the variance is unknown, at its most likely value.
 fn minus_two_log_likelihood(chi_squared: f64, n: usize, known: bool) -> f64 {
     let n = n as f64;
     let full = (2.0 * std::f64::consts::PI).ln() * n;
@@ -167,12 +171,13 @@ fn minus_two_log_likelihood(chi_squared: f64, n: usize, known: bool) -> f64 {
 
 /// The covariance Σ = diag(v) + Σ_load s sᵀ + U Uᵀ + G of n numbers.
 ///
-/// v are variances of errors that each number has for itself, s standard errors that the numbers of one load have in common, the
-/// columns of U those that all have in common, and G is a matrix that was given. Without G, products and solutions take O(n k²) time
-/// and O(n k) memory with k columns; a given matrix is factorised in O(n³).
+/// v are variances of errors that each number has for itself, s standard errors that the numbers of
+/// one load have in common, the columns of U those that all have in common, and G is a matrix that
+/// was given. Without G, products and solutions take O(n k²) time and O(n k) memory with k columns.
+/// A given matrix is factorised in O(n³).
 #[derive(Debug, Clone)]
 pub struct Covariance {
-    /// The load that each number belongs to; numbers of one load are neighbours.
+    /// The load that each number belongs to. Numbers of one load are neighbours.
     loads: Vec<usize>,
     own: DVector<f64>,
     within_loads: Vec<DVector<f64>>,
@@ -208,7 +213,8 @@ impl Covariance {
         self
     }
 
-    /// With standard errors that all numbers have in common: what one standard error of the cause does to each.
+    /// With standard errors that all numbers have in common: what one standard error of the cause
+    /// does to each.
     pub fn with_shared(mut self, standard_error: impl Fn(usize) -> f64) -> Self {
         let column = self.column(standard_error);
         if column.iter().any(|&u| u != 0.0) {
@@ -217,8 +223,9 @@ impl Covariance {
         self
     }
 
-    /// With standard errors of a law or a table that err the same way at all loads as far as the smallest goes. What they err beyond that at
-    /// the others is not known to be in proportion: counted as common, the weighted mean would extrapolate it away.
+    /// With standard errors of a law or a table that err the same way at all loads as far as the
+    /// smallest goes. What they err beyond that at the others is not known to be in proportion:
+    /// counted as common, the weighted mean would extrapolate it away.
     pub fn with_model_errors(self, standard_error: impl Fn(usize) -> f64) -> Self {
         let least = (0..self.len())
             .map(&standard_error)
@@ -319,8 +326,9 @@ impl Covariance {
         })
     }
 
-    /// The factor L of Σ − U Uᵀ = L Lᵀ. What is perfectly correlated or without error gets a ridge of 10⁻¹² of the mean variance (of
-    /// Σ's, where all errors are shared): the answer then depends on it in the twelfth digit, and rounding (10⁻¹⁶) is still far below it.
+    /// The factor L of Σ − U Uᵀ = L Lᵀ. What is perfectly correlated or without error gets a ridge
+    /// of 10⁻¹² of the mean variance (of Σ's, where all errors are shared): the answer then depends
+    /// on it in the twelfth digit, and rounding (10⁻¹⁶) is still far below it.
     fn unshared_factor(&self) -> Result<Factor, ElasticityError> {
         let mean_of = |variance: &dyn Fn(usize) -> f64| {
             (0..self.len()).map(variance).sum::<f64>() / self.len() as f64
@@ -396,8 +404,9 @@ fn ridged_cholesky(sigma: DMatrix<f64>, ridge: f64) -> Result<Cholesky<f64, Dyn>
         })
 }
 
-/// The covariance of logarithms of moduli from one source of error, and its degrees of freedom: those of the least known error, for
-/// repetition does not improve a standard error that all loads take from one calibration.
+/// The covariance of logarithms of moduli from one source of error, and its degrees of freedom:
+/// those of the least known error, for repetition does not improve a standard error that all loads
+/// take from one calibration.
 pub type LogErrors = (Covariance, Option<f64>);
 
 /// The covariance of all sources together, which are independent of one another.

@@ -16,7 +16,8 @@ fn a_shared_error_is_not_averaged_away() {
     );
 }
 
-/// The mean, its variance, χ² and the weights against the plain formulas with the matrix of all pairs.
+/// The mean, its variance, χ² and the weights against the plain formulas with the matrix of all
+/// pairs.
 #[test]
 fn shared_errors_give_what_the_matrix_of_all_pairs_gives() {
     let z = [2.0, 2.3, 1.8, 2.1, 2.6, 1.9];
@@ -76,6 +77,7 @@ fn a_shared_error_far_above_all_others_costs_no_digits() {
     let found = common_mean(&[1.0, 1.0 + 1e-9, 1.0 - 1e-9], &covariance).unwrap();
     assert_relative_eq!(found.mean, 1.0, max_relative = 1e-15);
     assert_relative_eq!(found.standard_error, 1.0, max_relative = 1e-12);
-    // Two residuals of one standard error each; z itself is rounded to 1e-16, a ten-millionth of them.
+    // Two residuals of one standard error each. z itself is rounded to 1e-16, a ten-millionth of
+    // them.
     assert_relative_eq!(found.chi_squared, 2.0, max_relative = 1e-6);
 }

@@ -9,28 +9,44 @@ use crate::error::{ElasticityError, Quantity, positive};
 use std::sync::Arc;
 use tactile_core::{Estimate, Interval, statistics::quantile_95};
 
-/// A soft ball on the guide, or the rigid flat, of a [`ContactTable`]: the E at which the tabulated forces at the measured contact radii fit the
-/// measured forces best, all loads at once.
+/// A soft ball on the guide, or the rigid flat, of a [`ContactTable`]: the E at which the tabulated
+/// forces at the measured contact radii fit the measured forces best, all loads at once.
 ///
-/// ln F(aᵢ, E) = ln Fᵢ is solved for ln E by generalised least squares (Gauss–Newton), with the covariance of forces and radii, the
-/// errors that all loads share, and the table's own error; the interval is carried through the table, and is open above where it leaves it. Loads
-/// outside the table are not used, with a warning; O(n) in the loads (O(n³) with a given covariance), some microseconds for two.
+/// ln F(aᵢ, E) = ln Fᵢ is solved for ln E by generalised least squares (Gauss–Newton), with the
+/// covariance of forces and radii, the errors that all loads share, and the table's own error. The
+/// interval is carried through the table, and is open above where it leaves it. Loads outside the
+/// table are not used, with a warning. O(n) in the loads (O(n³) with a given covariance), some
+/// microseconds for two.
 ///
 /// ```
 /// use tactile_elasticity::contact::{ContactCurve, ContactTable, Waveguide};
-/// use tactile_elasticity::modulus::{Estimate, LoadSeries, LoadState, ModulusEstimator, TabulatedContact};
+/// use tactile_elasticity::modulus::{
+///     Estimate, LoadSeries, LoadState, ModulusEstimator, TabulatedContact,
+/// };
 ///
 /// let contact_radius_m: Vec<f64> = (1..=10).map(|k| 0.1e-3 * f64::from(k)).collect();
-/// let force_n = contact_radius_m.iter().map(|a| 4.0 / 3.0 * 80e3 * a.powi(3) / 3e-3).collect();
-/// let curve = ContactCurve { youngs_modulus_pa: 60e3, contact_radius_m, force_n };
+/// let force_n = contact_radius_m
+///     .iter()
+///     .map(|a| 4.0 / 3.0 * 80e3 * a.powi(3) / 3e-3)
+///     .collect();
+/// let curve = ContactCurve {
+///     youngs_modulus_pa: 60e3,
+///     contact_radius_m,
+///     force_n,
+/// };
 /// let flat = Waveguide::rigid();
 /// let table = ContactTable::new(3e-3, 0.5, &flat, vec![curve])?;
 ///
-/// let load = LoadState { contact_radius_m: Some(Estimate::new(0.5e-3, 1e-6)), ..LoadState::new(Estimate::new(5e-3, 1e-5)) };
-/// let estimate = TabulatedContact::new(table.clone(), 3e-3, 0.5, &flat)?.estimate(&LoadSeries::new([load]))?;
+/// let load = LoadState {
+///     contact_radius_m: Some(Estimate::new(0.5e-3, 1e-6)),
+///     ..LoadState::new(Estimate::new(5e-3, 1e-5))
+/// };
+/// let estimate = TabulatedContact::new(table.clone(), 3e-3, 0.5, &flat)?
+///     .estimate(&LoadSeries::new([load]))?;
 /// let relative_error: f64 = estimate.youngs_modulus_pa / 67.5e3 - 1.0;
 /// assert!(relative_error.abs() < 1e-9);
-/// assert!(TabulatedContact::new(table, 4e-3, 0.5, &flat).is_err()); // another ball than the table's
+/// // Another ball than the table's.
+/// assert!(TabulatedContact::new(table, 4e-3, 0.5, &flat).is_err());
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
 /// ```
 #[derive(Debug, Clone, PartialEq)]
@@ -38,15 +54,16 @@ pub struct TabulatedContact {
     table: Arc<ContactTable>,
 }
 
-/// Standard error of ln F that finite elements leave beside the interpolation's: meshes of twice the elements move F by this
-/// (`a_finer_mesh_moves_the_table_little`).
+/// Standard error of ln F that finite elements leave beside the interpolation's: meshes of twice
+/// the elements move F by this (`a_finer_mesh_moves_the_table_little`).
 const ELEMENT_ERROR: f64 = 3e-3;
 
 /// Part of ln F below which a change of ln E changes nothing: the ball is rigid beside the guide.
 const LEAST_SENSITIVITY: f64 = 0.01;
 
 impl TabulatedContact {
-    /// For a ball of radius R (m) and Poisson ratio ν on a guide: those that the table was made for.
+    /// For a ball of radius R (m) and Poisson ratio ν on a guide: those that the table was made
+    /// for.
     ///
     /// # Errors
     /// [`ElasticityError::TableMismatch`] for any other ball or guide.
@@ -122,7 +139,8 @@ impl TabulatedContact {
         } else {
             0.0
         };
-        // Newton's method in one unknown on a function that is nearly a straight line: three or four steps, ten where it bends.
+        // Newton's method in one unknown on a function that is nearly a straight line: three or
+        // four steps, ten where it bends.
         const STEPS: usize = 30;
         const SETTLED: f64 = 1e-11;
         for step in 0..STEPS {
@@ -157,7 +175,8 @@ impl TabulatedContact {
         unreachable!("the last step returns")
     }
 
-    /// Covariances of each load's ln E, with their degrees of freedom: of forces, of radii, of what all have in common.
+    /// Covariances of each load's ln E, with their degrees of freedom: of forces, of radii, of what
+    /// all have in common.
     fn sources(
         &self,
         contacts: &[Contact],
@@ -191,7 +210,8 @@ impl TabulatedContact {
         let of_poisson_ratio = 2.0 * nu / (1.0 - nu * nu) * shared.poisson_ratio;
         let of_all = none
             .with_shared(|i| over(i, forces[i].radius_slope * shared.length_scale))
-            // F has the dimension E R²: what does not follow a follows R, what does not follow E follows the guide's moduli.
+            // F has the dimension E R²: what does not follow a follows R, what does not follow E
+            // follows the guide's moduli.
             .with_shared(|i| over(i, (2.0 - forces[i].radius_slope) * shared.size))
             .with_shared(|i| over(i, (1.0 - forces[i].modulus_slope) * shared.other_body))
             .with_shared(|i| over(i, forces[i].modulus_slope * of_poisson_ratio))
@@ -209,7 +229,8 @@ impl TabulatedContact {
         ]
     }
 
-    /// ln E where the tabulated forces, weighted as in the mean, have changed by `step` in ln F; None beyond the table's moduli.
+    /// ln E where the tabulated forces, weighted as in the mean, have changed by `step` in ln F.
+    /// None beyond the table's moduli.
     fn limit(&self, contacts: &[Contact], fit: &Fit, step: f64) -> Option<f64> {
         let force = |log_modulus: f64| {
             let (mut value, mut slope) = (0.0, 0.0);
@@ -229,7 +250,8 @@ impl TabulatedContact {
             if (next - log_modulus).abs() < 1e-9 {
                 return Some(next);
             }
-            // The force grows with E: where the limit asks for more, there is none within the table.
+            // The force grows with E: where the limit asks for more, there is none within the
+            // table.
             if next > highest && log_modulus == highest || next < lowest && log_modulus == lowest {
                 return None;
             }

@@ -5,8 +5,9 @@ use super::law::{ContactLaw, HertzLaw, LogForce};
 use crate::contact::{Bond, LayerKernel, SharedLayerTable, Waveguide};
 use crate::error::{ElasticityError, Quantity, poisson, positive};
 
-/// F = E* f(a): the linear contact of a ball with bonded layers on a rigid base, solved by its integral equation and tabulated, with
-/// what finite strain adds. E* is that of the ball and the touched layer.
+/// F = E* f(a): the linear contact of a ball with bonded layers on a rigid base, solved by its
+/// integral equation and tabulated, with what finite strain adds. E* is that of the ball and the
+/// touched layer.
 #[derive(Debug, Clone, PartialEq)]
 pub struct WaveguideLaw {
     sphere: HertzLaw,
@@ -16,7 +17,7 @@ pub struct WaveguideLaw {
     finite_strain: Option<FiniteStrain>,
 }
 
-/// Contact radii tabulated, over the ball's radius; above the second no contact of a ball is meant.
+/// Contact radii tabulated, over the ball's radius. Above the second no contact of a ball is meant.
 const TABULATED: (f64, f64) = (0.02, 1.6);
 
 /// Indentation over the ball's radius beyond which finite elements and this law part.
@@ -58,7 +59,7 @@ impl WaveguideLaw {
         self
     }
 
-    /// The contact of radius a; None beyond the table.
+    /// The contact of radius a. None beyond the table.
     fn contact(&self, a: f64, share: f64) -> Option<Contact> {
         let x = a / self.sphere.radius_m();
         if x > TABULATED.1 {
@@ -83,7 +84,8 @@ impl WaveguideLaw {
             contact.log_force.slope += layers.force_slope;
             contact.log_indentation += layers.indentation;
             contact.indentation_slope += layers.indentation_slope;
-            // The ball's compliance (1 − s)/E* times the stiffness that the contact has, F/F_Hertz times E*.
+            // The ball's compliance (1 − s)/E* times the stiffness that the contact has, F/F_Hertz
+            // times E*.
             linear.ball = ((1.0 - share) * layers.force.exp()).clamp(0.0, 1.0);
             contact.ball_part = linear.ball;
             linear.layer_ratio = a / self.thickness_m;
@@ -147,7 +149,7 @@ impl ContactLaw for WaveguideLaw {
         }
         let (_, contact) = self.radius_of(d, share)?;
         let slope = contact.log_force.slope / contact.indentation_slope;
-        // f has the dimension of an area; layers apart, its slopes in δ and R add up to 2.
+        // f has the dimension of an area. Layers apart, its slopes in δ and R add up to 2.
         Some(LogForce {
             value: contact.log_force.value,
             slope,
@@ -207,15 +209,18 @@ impl ContactLaw for WaveguideLaw {
 
 // What finite strain adds to the linear contact of a ball with a flat or with layers.
 //
-// At the same contact radius a ball on a rigid flat carries less than linear theory says, at first by a tenth of a/R, and more beyond a/R = 1; a
-// guide that yields wraps round the ball. With x = a/R, β the ball's part of the compliance, γ = 1 − β the guide's, y = a/h, and
-// f = ln(F/F_Hertz) and d = ln(δ/δ_Hertz) of the linear contact with the layers,
+// At the same contact radius a ball on a rigid flat carries less than linear theory says, at first
+// by a tenth of a/R, and more beyond a/R = 1. A guide that yields wraps round the ball. With x =
+// a/R, β the ball's part of the compliance, γ = 1 − β the guide's, y = a/h, and f = ln(F/F_Hertz)
+// and d = ln(δ/δ_Hertz) of the linear contact with the layers,
 //
 // ln(F/F_linear) = β P₁(x) + γ [P₂(x) + β P₃(x) + d P₄(x) + f P₅(x) + y P₆(x)],
 //
-// and the same form for ln(δ/δ_linear). The polynomials are fitted to axisymmetric finite elements without friction, neo-Hookean with ν = 0.495: a rigid
-// flat, the paper's three layers under balls of 3 to 20 mm and 30 to 250 kPa, single layers of 0.8 to 4 ball radii, 0.5 to 4 times as stiff as
-// the ball; a/R 0.2 to 1.15, a/h up to 1.6. Small contacts and deep layers need no correction: every power of x is at least one.
+// and the same form for ln(δ/δ_linear). The polynomials are fitted to axisymmetric finite elements
+// without friction, neo-Hookean with ν = 0.495: a rigid flat, the paper's three layers under balls
+// of 3 to 20 mm and 30 to 250 kPa, single layers of 0.8 to 4 ball radii, 0.5 to 4 times as stiff as
+// the ball. A/R 0.2 to 1.15, a/h up to 1.6. Small contacts and deep layers need no correction:
+// every power of x is at least one.
 
 /// What the linear contact says, at one contact radius.
 #[derive(Debug, Clone, Copy)]
@@ -224,7 +229,7 @@ struct LinearContact {
     ratio: f64,
     /// The ball's part of the compliance, layers and their depth counted.
     ball: f64,
-    /// a/h; zero on a rigid flat.
+    /// a/h. Zero on a rigid flat.
     layer_ratio: f64,
     /// ln(F/F_Hertz) and its slope in ln a.
     log_force: [f64; 2],
@@ -272,8 +277,8 @@ impl FiniteStrain {
     /// ln(F/F_linear).
     fn force(&self, contact: &LinearContact) -> Correction {
         let mut correction = FORCE.at(contact);
-        // A confined body's bulk yields to the mean pressure, which a half-space's does not: x (½ − ν)(γ + 2.3 β) leaves 0.3 % on a flat for ν
-        // from 0.45 to ½, 1 % on layers from 0.47.
+        // A confined body's bulk yields to the mean pressure, which a half-space's does not: x (½ −
+        // ν)(γ + 2.3 β) leaves 0.3 % on a flat for ν from 0.45 to ½, 1 % on layers from 0.47.
         let per_ball = (FITTED_POISSON_RATIO - self.poisson_ratio) * contact.ratio;
         let bulk = per_ball * (1.0 + 1.3 * contact.ball);
         correction.value += bulk;
@@ -282,12 +287,14 @@ impl FiniteStrain {
         correction
     }
 
-    /// ln(δ/δ_linear); δ is the approach of the ball's centre, which the ball's own bulk lets lag behind.
+    /// ln(δ/δ_linear). δ is the approach of the ball's centre, which the ball's own bulk lets lag
+    /// behind.
     fn indentation(&self, contact: &LinearContact) -> Correction {
         INDENTATION.at(contact)
     }
 
-    /// Standard error of ln F from the model: what the fit leaves of contacts that it was not fitted to.
+    /// Standard error of ln F from the model: what the fit leaves of contacts that it was not
+    /// fitted to.
     fn model_error(&self, x: f64, layer_ratio: Option<f64>, by_indentation: bool) -> f64 {
         let fit = match layer_ratio {
             None => 0.004,
@@ -333,7 +340,8 @@ struct Polynomials {
 
 impl Polynomials {
     fn at(&self, contact: &LinearContact) -> Correction {
-        // Beyond the fitted contacts the polynomials would run away: they go on along the tangent in ln x.
+        // Beyond the fitted contacts the polynomials would run away: they go on along the tangent
+        // in ln x.
         let inside = contact.ratio.min(FiniteStrain::LARGEST_CONTACT_RATIO);
         let x = |coefficients: &[f64], powers: &[i32]| {
             let terms = coefficients.iter().zip(powers);
@@ -375,8 +383,8 @@ impl Polynomials {
     }
 }
 
-/// Leaves 0.3 % of the force on a flat, where the elements scatter by as much, and 0.6 % on guides (root mean square); of 13 scenes that it was
-/// not fitted to, 0.6 %.
+/// Leaves 0.3 % of the force on a flat, where the elements scatter by as much, and 0.6 % on guides
+/// (root mean square). Of 13 scenes that it was not fitted to, 0.6 %.
 const FORCE: Polynomials = Polynomials {
     ball: [-0.0802, -0.0489, 0.1702, -0.0379],
     guide: [-0.1409, 0.4893, -0.4257, 0.3998],
@@ -386,7 +394,8 @@ const FORCE: Polynomials = Polynomials {
     depth: [-0.2104, 0.1450],
 };
 
-/// Leaves 0.3 % of the approach on a flat, 0.8 % on guides; of 13 scenes that it was not fitted to, 0.6 %.
+/// Leaves 0.3 % of the approach on a flat, 0.8 % on guides. Of 13 scenes that it was not fitted to,
+/// 0.6 %.
 const INDENTATION: Polynomials = Polynomials {
     ball: [-0.2297, -0.2563, -0.2349, 0.1099],
     guide: [-0.0271, 0.4013, -0.2207, 0.3105],
