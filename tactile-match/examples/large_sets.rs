@@ -1,11 +1,12 @@
-//! Time, memory and right pairs of large sets in space under a smooth deformation of a tenth of their size, shuffled.
+//! Time, memory and right pairs of large sets in space under a smooth deformation of a tenth of
+//! their size, shuffled.
 //!
 //! ```text
 //! cargo run --release -p tactile-match --example large_sets -- POINTS [surface|volume] [NOISE OUTLIERS [SEED]]
 //! ```
 //!
-//! Noise is a standard deviation along an axis in shares of the size (the largest extent), outliers a share of the points. Memory is the
-//! peak of the whole process (Linux).
+//! Noise is a standard deviation along an axis in shares of the size (the largest extent), outliers
+//! a share of the points. Memory is the peak of the whole process (Linux).
 #![allow(clippy::print_stdout)]
 use nalgebra::{Point3, Vector3};
 use std::ops::ControlFlow;

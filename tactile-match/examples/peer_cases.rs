@@ -1,12 +1,14 @@
-//! Matches the cases of a file with the default matcher, writes the answers in the same kind of file, and prints one line a level.
+//! Matches the cases of a file with the default matcher, writes the answers in the same kind of
+//! file, and prints one line a level.
 //!
 //! ```text
 //! cargo run --release -p tactile-match --example peer_cases -- CASES.txt [RESULTS.txt]
 //! ```
 //!
-//! A case is `case NAME D n_model n_target`, then rows `m` (model), `t` (target), `g` (true position of each model row) and `p` (row of
-//! its true partner, −1 for none). A result is `case NAME milliseconds`, then for each model row `w` (warped) and `a` (target row or −1).
-//! The time is the least of five calls through a warm workspace.
+//! A case is `case NAME D n_model n_target`, then rows `m` (model), `t` (target), `g` (true
+//! position of each model row) and `p` (row of its true partner, −1 for none). A result is
+//! `case NAME milliseconds`, then for each model row `w` (warped) and `a` (target row or −1). The
+//! time is the least of five calls through a warm workspace.
 #![allow(clippy::print_stdout)]
 use nalgebra::Point;
 use std::collections::BTreeMap;

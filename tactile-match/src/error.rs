@@ -1,9 +1,11 @@
 //! The crate's one error type.
 
+use nalgebra::Point;
 use std::error::Error;
 use tactile_core::CustomError;
 
-/// Why a match could not be attempted. Not converging is no error: see [`StopReason`](crate::StopReason).
+/// Why a match could not be attempted. Not converging is no error: see
+/// [`StopReason`](crate::StopReason).
 ///
 /// ```
 /// use nalgebra::Point2;
@@ -25,7 +27,8 @@ pub enum MatchError {
         /// The empty set, "model" or "target".
         set: &'static str,
     },
-    /// A coordinate is NaN, infinite or so large that its square is (beyond 10¹⁵³ in double, 10¹⁸ in single precision).
+    /// A coordinate is NaN, infinite or so large that its square is (beyond 10¹⁵³ in double, 10¹⁸
+    /// in single precision).
     #[error(
         "point {row} of the {set} has a coordinate that is not finite or too large to be squared"
     )]
@@ -110,4 +113,69 @@ impl MatchError {
     pub fn custom(error: impl Into<Box<dyn Error + Send + Sync>>) -> Self {
         Self::Custom(CustomError::new(error))
     }
+}
+
+/// Rejects empty sets and coordinates that are NaN, infinite or too large to be squared.
+/// `O(I + J)`.
+///
+/// # Errors
+/// [`MatchError::Empty`] and [`MatchError::NotFinite`].
+pub(crate) fn point_sets<const D: usize>(
+    model: &[Point<f64, D>],
+    target: &[Point<f64, D>],
+) -> Result<(), MatchError> {
+    point_set("model", model)?;
+    point_set("target", target)
+}
+
+/// The same for one set.
+pub(crate) fn point_set<const D: usize>(
+    set: &'static str,
+    points: &[Point<f64, D>],
+) -> Result<(), MatchError> {
+    if points.is_empty() {
+        return Err(MatchError::Empty { set });
+    }
+    // Sixteen: room for differences, and for the sum of their squares.
+    let usable = |c: f64| (c * c * 16.0).is_finite();
+    match points.iter().position(|p| p.iter().any(|&c| !usable(c))) {
+        Some(row) => Err(MatchError::NotFinite { set, row }),
+        None => Ok(()),
+    }
+}
+
+/// The largest distance of a pair, which must be positive and finite.
+pub(crate) fn valid_distance(max_distance: f64) -> Result<f64, MatchError> {
+    option_within(
+        "max_distance",
+        max_distance,
+        f64::MIN_POSITIVE,
+        f64::MAX,
+        "(0, ∞)",
+    )?;
+    Ok(max_distance)
+}
+
+/// Rejects an option outside `[low, high]`, NaN included.
+pub(crate) fn option_within(
+    option: &'static str,
+    value: f64,
+    low: f64,
+    high: f64,
+    expected: &'static str,
+) -> Result<(), MatchError> {
+    if value.is_finite() && (low..=high).contains(&value) {
+        Ok(())
+    } else {
+        Err(MatchError::InvalidOption {
+            option,
+            value,
+            expected,
+        })
+    }
+}
+
+/// Rejects a count of zero.
+pub(crate) fn at_least_one(option: &'static str, value: usize) -> Result<(), MatchError> {
+    option_within(option, value as f64, 1.0, f64::MAX, "[1, ∞)")
 }

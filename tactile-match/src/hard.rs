@@ -1,24 +1,26 @@
-//! From pairs alone to a [`Matching`]: what nearest neighbours and linear assignment have in common.
+//! From pairs alone to a [`Matching`]: what nearest neighbours and linear assignment have in
+//! common.
 
-use crate::frame::Frame;
-use crate::{MatchReport, Matching, SoftMatches, StopReason, unmatched_rows};
+use crate::Frame;
+use crate::error::{point_sets, valid_distance};
+use crate::{
+    MatchError, MatchReport, Matching, PointMatcher, SoftMatches, StopReason, linear_assignment,
+    unmatched_rows,
+};
 use nalgebra::{DMatrix, Point, SMatrix, SVector};
 use tactile_tps::{Affine, Factorization, FitOptions, NegR, R2LogR, Smoothing, TpsError, Warp};
 
-/// Soft matches below this weight are left out.
-const NEGLIGIBLE: f64 = 1e-4;
-
 /// Both sets in one frame, with all squared distances between them.
-pub(crate) struct Distances<const D: usize> {
+struct Distances<const D: usize> {
     /// The frame, for lengths.
-    pub(crate) frame: Frame<D>,
+    frame: Frame<D>,
     target: Vec<SVector<f64, D>>,
     /// `|x_i − y_j|²`, `I × J`, in the units of the frame.
-    pub(crate) squared: DMatrix<f64>,
+    squared: DMatrix<f64>,
 }
 
 impl<const D: usize> Distances<D> {
-    pub(crate) fn new(model: &[Point<f64, D>], target: &[Point<f64, D>]) -> Self {
+    fn new(model: &[Point<f64, D>], target: &[Point<f64, D>]) -> Self {
         let frame = Frame::of_both(model, target);
         let inside =
             |points: &[Point<f64, D>]| points.iter().map(|p| frame.inside(p)).collect::<Vec<_>>();
@@ -33,13 +35,13 @@ impl<const D: usize> Distances<D> {
         }
     }
 
-    /// The square of a length of the caller, in the units of the frame; infinite for none.
-    pub(crate) fn limit(&self, length: Option<f64>) -> f64 {
+    /// The square of a length of the caller, in the units of the frame. Infinite for none.
+    fn limit(&self, length: Option<f64>) -> f64 {
         length.map_or(f64::INFINITY, |l| (l / self.frame.scale).powi(2))
     }
 
-    /// Probabilities of the targets for model point `i`, its displacement being drawn from a normal distribution of variance
-    /// `variance` along each axis.
+    /// Probabilities of the targets for model point `i`, its displacement being drawn from a normal
+    /// distribution of variance `variance` along each axis.
     fn posterior(&self, i: usize, variance: f64) -> Vec<f64> {
         let row = self.squared.row(i);
         let least = row.iter().copied().fold(f64::INFINITY, f64::min);
@@ -71,9 +73,9 @@ impl<const D: usize> Distances<D> {
     }
 }
 
-/// The result for these pairs: the warp interpolates them, confidences and covariances come from how the displacements are
-/// distributed.
-pub(crate) fn matching<const D: usize>(
+/// The result for these pairs: the warp interpolates them, confidences and covariances come from
+/// how the displacements are distributed.
+fn matching<const D: usize>(
     model: &[Point<f64, D>],
     target: &[Point<f64, D>],
     distances: &Distances<D>,
@@ -92,10 +94,11 @@ pub(crate) fn matching<const D: usize>(
         let p = distances.posterior(i, variance);
         confidence.push(partner.map_or(0.0, |j| p[j]));
         covariance.push(distances.spread(&p));
+        // Soft matches below this weight are left out.
         let kept = p
             .iter()
             .enumerate()
-            .filter(|(_, p)| partner.is_some() && **p > NEGLIGIBLE);
+            .filter(|(_, p)| partner.is_some() && **p > 1e-4);
         soft.push_row(kept.map(|(j, &p)| (j, p)));
     }
     let sources: Vec<_> = pairs.iter().map(|&(i, _)| model[i]).collect();
@@ -129,7 +132,8 @@ pub(crate) fn matching<const D: usize>(
     }
 }
 
-/// The spline through these pairs and where it takes the model; where that is beyond all numbers, the affine map, or none.
+/// The spline through these pairs and where it takes the model. Where that is beyond all numbers,
+/// the affine map, or none.
 fn through<const D: usize>(
     model: &[Point<f64, D>],
     sources: &[Point<f64, D>],
@@ -202,7 +206,8 @@ impl<const D: usize> Interpolation<D> {
         }
     }
 
-    /// The spline through these pairs; an affine map where they determine none, the identity where there are none.
+    /// The spline through these pairs. An affine map where they determine none, the identity where
+    /// there are none.
     pub(crate) fn through(
         &self,
         sources: &[Point<f64, D>],
@@ -227,8 +232,8 @@ impl<const D: usize> Interpolation<D> {
     }
 }
 
-/// The warp of weighted pairs: a spline smoothed by cross-validation, an affine map for few of them, a rigid motion
-/// for fewer, the identity for none.
+/// The warp of weighted pairs: a spline smoothed by cross-validation, an affine map for few of
+/// them, a rigid motion for fewer, the identity for none.
 pub(crate) fn fitted<const D: usize>(
     sources: &[Point<f64, D>],
     images: &[Point<f64, D>],
@@ -245,7 +250,7 @@ pub(crate) fn fitted<const D: usize>(
     Box::new(fit(sources, images, Some(&weights)).unwrap_or_default())
 }
 
-/// The thin-plate spline through these pairs; see [`Interpolation`].
+/// The thin-plate spline through these pairs. See [`Interpolation`].
 pub(crate) fn spline<const D: usize>(
     sources: &[Point<f64, D>],
     images: &[Point<f64, D>],
@@ -255,7 +260,8 @@ pub(crate) fn spline<const D: usize>(
     Interpolation::new(sources, weights, smoothing).through(sources, images)
 }
 
-/// Whether the spline is any good: where sources nearly coincide and their images do not, no digit is left in it.
+/// Whether the spline is any good: where sources nearly coincide and their images do not, no digit
+/// is left in it.
 fn follows<const D: usize>(
     spline: &(dyn Warp<f64, D> + Send + Sync),
     sources: &[Point<f64, D>],
@@ -270,4 +276,144 @@ fn follows<const D: usize>(
             let miss = (found - image).amax();
             miss.is_finite() && (!exact || miss <= size * (1e-3))
         })
+}
+
+/// Gives every model point the target point nearest to it. Of several model points that want one
+/// target, the nearest has it.
+///
+/// Right while displacements are smaller than half the distance between points. The warp
+/// interpolates the pairs. `O(I J)`.
+///
+/// ```
+/// use nalgebra::Point2;
+/// use tactile_match::{NearestNeighbour, PointMatcher};
+/// let model = [[0.0, 0.0], [4.0, 0.0], [0.0, 4.0], [9.0, 9.0]].map(Point2::from);
+/// let target = [[0.1, 4.2], [0.2, 0.1], [4.1, -0.1]].map(Point2::from);
+/// let matching = NearestNeighbour::within(1.0)?.match_points(&model, &target)?;
+/// assert_eq!(matching.assignment, [Some(1), Some(2), Some(0), None]);
+/// # Ok::<(), tactile_match::MatchError>(())
+/// ```
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct NearestNeighbour {
+    max_distance: Option<f64>,
+}
+
+impl NearestNeighbour {
+    /// No pair further apart than `max_distance`, in the units of the points.
+    ///
+    /// # Errors
+    /// [`MatchError::InvalidOption`] unless the distance is positive and finite.
+    pub fn within(max_distance: f64) -> Result<Self, MatchError> {
+        let max_distance = Some(valid_distance(max_distance)?);
+        Ok(Self { max_distance })
+    }
+}
+
+impl<const D: usize> PointMatcher<D> for NearestNeighbour {
+    fn match_points(
+        &self,
+        model: &[Point<f64, D>],
+        target: &[Point<f64, D>],
+    ) -> Result<Matching<D>, MatchError> {
+        point_sets(model, target)?;
+        let distances = Distances::new(model, target);
+        let limit = distances.limit(self.max_distance);
+        let mut holder: Vec<Option<(usize, f64)>> = vec![None; target.len()];
+        for i in 0..model.len() {
+            let (nearest, squared) = nearest(distances.squared.row(i).iter().copied());
+            if squared <= limit && holder[nearest].is_none_or(|(_, other)| squared < other) {
+                holder[nearest] = Some((i, squared));
+            }
+        }
+        let mut assignment = vec![None; model.len()];
+        for (j, held) in holder.iter().enumerate() {
+            if let Some((i, _)) = held {
+                assignment[*i] = Some(j);
+            }
+        }
+        Ok(matching(model, target, &distances, assignment))
+    }
+}
+
+/// The least of some distances, the first of equals.
+fn nearest(distances: impl Iterator<Item = f64>) -> (usize, f64) {
+    distances.enumerate().fold(
+        (0, f64::INFINITY),
+        |best, d| if d.1 < best.1 { d } else { best },
+    )
+}
+
+/// Pairs the sets so that the sum of squared distances is least, by [`linear_assignment`].
+///
+/// Unlike nearest neighbours it never leaves a point without a partner for another's sake, and a
+/// common translation of two sets of one size makes no difference. The warp interpolates the pairs.
+///
+/// ```
+/// use nalgebra::{Point2, Vector2};
+/// use tactile_match::{LinearAssignment, PointMatcher};
+/// let model = [[0.0, 0.0], [1.0, 0.0], [2.0, 0.5], [3.0, 0.0]].map(Point2::from);
+/// let target = model.map(|p| p + Vector2::new(1.4, 0.0)); // more than the distance between points
+/// let matching = LinearAssignment::default().match_points(&model, &target)?;
+/// assert_eq!(matching.assignment, [Some(0), Some(1), Some(2), Some(3)]);
+/// # Ok::<(), tactile_match::MatchError>(())
+/// ```
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct LinearAssignment {
+    max_distance: Option<f64>,
+}
+
+impl LinearAssignment {
+    /// No pair further apart than `max_distance`, in the units of the points. Leaving two points
+    /// without partner costs as much as a pair at that distance.
+    ///
+    /// ```
+    /// use nalgebra::Point2;
+    /// use tactile_match::{LinearAssignment, PointMatcher};
+    /// let model = [[0.0, 0.0], [1.0, 0.0]].map(Point2::from);
+    /// let target = [[0.1, 0.0], [9.0, 0.0]].map(Point2::from);
+    /// assert_eq!(
+    ///     LinearAssignment::default()
+    ///         .match_points(&model, &target)?
+    ///         .assignment,
+    ///     [Some(0), Some(1)]
+    /// );
+    /// assert_eq!(
+    ///     LinearAssignment::within(2.0)?
+    ///         .match_points(&model, &target)?
+    ///         .assignment,
+    ///     [Some(0), None]
+    /// );
+    /// # Ok::<(), tactile_match::MatchError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`MatchError::InvalidOption`] unless the distance is positive and finite.
+    pub fn within(max_distance: f64) -> Result<Self, MatchError> {
+        let max_distance = Some(valid_distance(max_distance)?);
+        Ok(Self { max_distance })
+    }
+}
+
+impl<const D: usize> PointMatcher<D> for LinearAssignment {
+    fn match_points(
+        &self,
+        model: &[Point<f64, D>],
+        target: &[Point<f64, D>],
+    ) -> Result<Matching<D>, MatchError> {
+        point_sets(model, target)?;
+        let distances = Distances::new(model, target);
+        let limit = distances.limit(self.max_distance);
+        // nalgebra is column-major: the transpose in memory is row-major.
+        let costs: Vec<f64> = distances
+            .squared
+            .transpose()
+            .iter()
+            .map(|s| s.min(limit))
+            .collect();
+        let mut assignment = linear_assignment(&costs, model.len(), target.len())?;
+        for (i, partner) in assignment.iter_mut().enumerate() {
+            *partner = partner.filter(|&j| distances.squared[(i, j)] <= limit);
+        }
+        Ok(matching(model, target, &distances, assignment))
+    }
 }

@@ -1,7 +1,8 @@
 //! The matchers for `f64` in the plane and in space, compiled with this crate.
 //!
-//! Builds at low optimisation share the instances of generic code that a dependency holds. Without these, every test,
-//! example and dependent crate compiles the matchers anew: half of the time a test build takes.
+//! Builds at low optimisation share the instances of generic code that a dependency holds. Without
+//! these, every test, example and dependent crate compiles the matchers anew: half of the time a
+//! test build takes.
 
 use crate::{
     AnnealedSoftassign, CoherentPointDrift, MatchError, MatchedPairs, Matching, PointMatcher,

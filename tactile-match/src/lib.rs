@@ -1,65 +1,200 @@
-//! Matching of point sets in the plane and in space: which point is which, and the smooth warp between them.
+//! Matching of point sets in the plane and in space: which point is which, and the smooth warp
+//! between them.
 //!
 //! # Methods
-//! The default, [`AnnealedSoftassign`], alternates a soft assignment and a smooth warp while a temperature falls. The warp has a
-//! Gaussian-process prior, and distances are taken from its leave-one-out predictions. Relaxation labelling is one of the starts it tries
-//! where the first does not settle the matter. The paper's own method, relaxation labelling (13)–(20) with a thin-plate spline
-//! (21)–(24), is [`RelaxationLabelling`]: `RelaxationLabelling::default().match_points(&model, &target)`.
+//! The default, [`AnnealedSoftassign`], alternates a soft assignment and a smooth warp while a
+//! temperature falls. The warp has a Gaussian-process prior, and distances are taken from its
+//! leave-one-out predictions. Relaxation labelling is one of the starts it tries where the first
+//! does not settle the matter. The paper's own method, relaxation labelling (13)–(20) with a
+//! thin-plate spline (21)–(24), is [`RelaxationLabelling`]:
+//! `RelaxationLabelling::default().match_points(&model, &target)`.
 //!
 //! # Equations
-//! Match matrix $M$ of I model points $y_i$ and J target points $t_j$, with slack; numbers are the paper's.
+//! Match matrix $M$ of I model points $y_i$ and J target points $t_j$, with slack. Numbers are the
+//! paper's.
 //!
 //! - Rows and columns sum to one with their slack: $\sum_j M_{ij} = 1$ and $\sum_i M_{ij} = 1$.
-//! - Soft assignment at the temperature $\sigma$: $M_{ij} \propto \exp(-|y_i - t_j|^2/2\sigma^2)$, made doubly stochastic. At most O(IJ) a sweep.
-//! - Warp: the posterior mean of an affine field plus a smooth one, $\tau^2 \exp(-|x - x^{\prime}|^2/2\ell^2)$; $O(I r^2)$ with r near 30. The last one
-//!   is the thin-plate spline through the estimated positions.
-//! - Relaxation labelling (19), (20): $M_{ij} \leftarrow M_{ij} S_{ij}/\sum_k M_{ik} S_{ik}$ with the support
-//!   $S_{ij} = \sum_a \sum_b M_{ab} \alpha \beta \gamma$ of neighbours a of i and b of j. Densely O(IJAB), over few candidates one product a link.
+//! - Soft assignment at the temperature $\sigma$: $M_{ij} \propto \exp(-|y_i - t_j|^2/2\sigma^2)$,
+//!   made doubly stochastic. At most O(IJ) a sweep.
+//! - Warp: the posterior mean of an affine field plus a smooth one,
+//!   $\tau^2 \exp(-|x - x^{\prime}|^2/2\ell^2)$. $O(I r^2)$ with r near 30. The last one is the
+//!   thin-plate spline through the estimated positions.
+//! - Relaxation labelling (19), (20): $M_{ij} \leftarrow M_{ij} S_{ij}/\sum_k M_{ik} S_{ik}$ with
+//!   the support $S_{ij} = \sum_a \sum_b M_{ab} \alpha \beta \gamma$ of neighbours a of i and b of
+//!   j. Densely O(IJAB), over few candidates one product a link.
 //!
-//! Lengths are in any unit; errors are [`MatchError`], not converging is a [`MatchReport`].
+//! Lengths are in any unit. Errors are [`MatchError`], not converging is a [`MatchReport`].
 #![forbid(unsafe_code)]
 // Several arrays share one index; zipping them all hides it.
 #![allow(clippy::needless_range_loop)]
 
 mod assignment;
-mod assignment_matcher;
 #[cfg(test)]
 #[allow(dead_code)] // shared with the tests of the public interface
 #[path = "../tests/suite/common/mod.rs"]
 mod common;
 mod cpd;
 mod error;
-mod frame;
 mod hard;
 #[cfg(all(debug_assertions, not(test)))]
 mod instances;
 pub mod labelling;
 mod matching;
-mod nearest;
 mod shape_context;
-mod simd;
-mod soft;
 mod softassign;
-mod validate;
-mod warm_start;
 
 // The shared tests name the crate from outside.
 #[cfg(test)]
 extern crate self as tactile_match;
 
 pub use assignment::{AssignmentWorkspace, linear_assignment};
-pub use assignment_matcher::LinearAssignment;
 pub use cpd::{CoherentPointDrift, DriftWorkspace, Motion, Normalization};
 pub use error::MatchError;
+pub use hard::{LinearAssignment, NearestNeighbour};
 pub use labelling::RelaxationLabelling;
-pub use matching::{Doubt, MatchReport, MatchedPairs, Matching, PointMatcher, unmatched_rows};
+pub use matching::{
+    Doubt, MatchReport, MatchedPairs, Matching, PointMatcher, SoftMatches, WarmStart,
+    unmatched_rows,
+};
 pub use nalgebra;
-pub use nearest::NearestNeighbour;
 pub use shape_context::ShapeContexts;
-pub use soft::SoftMatches;
 pub use softassign::{
-    AnnealedSoftassign, Landmark, Outliers, Rotation, Search, SoftassignMatch, SoftassignWorkspace,
-    Transformation,
+    AnnealedSoftassign, Landmark, Mechanism, Outliers, Rotation, Search, SoftassignMatch,
+    SoftassignWorkspace, Transformation,
 };
 pub use tactile_core::{CustomError, StopReason};
-pub use warm_start::WarmStart;
+
+use ::nalgebra::{Point, SVector};
+
+// A frame to work in: centre and size taken out, so that no parameter depends on the units of the
+// points and no square under- or overflows.
+
+/// `x ↦ (x − centre) / scale`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Frame<const D: usize> {
+    centre: SVector<f64, D>,
+    scale: f64,
+}
+
+impl<const D: usize> Default for Frame<D> {
+    fn default() -> Self {
+        Self {
+            centre: SVector::zeros(),
+            scale: 1.0,
+        }
+    }
+}
+
+/// The point in double precision.
+fn widened<const D: usize>(point: &Point<f64, D>) -> SVector<f64, D> {
+    point.coords.map(|c| c)
+}
+
+impl<const D: usize> Frame<D> {
+    /// Centre and root mean square radius of a set. Scale one where all points coincide.
+    fn of(points: &[Point<f64, D>]) -> Self {
+        let (centre, radius) = centre_and_radius(points);
+        Self {
+            centre,
+            scale: if radius > 0.0 { radius } else { 1.0 },
+        }
+    }
+
+    /// The model's centre and the largest distance from it along an axis in either set: for sets
+    /// compared as they lie.
+    fn of_both(model: &[Point<f64, D>], target: &[Point<f64, D>]) -> Self {
+        let centre = Self::of(model).centre;
+        let largest = model
+            .iter()
+            .chain(target)
+            .map(|p| (widened(p) - centre).amax())
+            .fold(0.0, f64::max);
+        Self {
+            centre,
+            scale: if largest > 0.0 { largest } else { 1.0 },
+        }
+    }
+
+    /// A point in this frame.
+    fn inside(&self, point: &Point<f64, D>) -> SVector<f64, D> {
+        (widened(point) - self.centre) / self.scale
+    }
+
+    /// All points in this frame.
+    fn enter(&self, points: &[Point<f64, D>], columns: &mut [Vec<f64>; D]) {
+        columns.iter_mut().for_each(Vec::clear);
+        for point in points {
+            columns
+                .iter_mut()
+                .zip(self.inside(point).iter())
+                .for_each(|(column, &c)| column.push(c));
+        }
+    }
+
+    /// A point of this frame in the units of the caller.
+    fn leave(&self, inside: SVector<f64, D>) -> Point<f64, D> {
+        Point::from(inside * self.scale + self.centre)
+    }
+}
+
+/// Centroid of a set and its root mean square radius, zero where all points coincide.
+fn centre_and_radius<const D: usize>(points: &[Point<f64, D>]) -> (SVector<f64, D>, f64) {
+    let n = points.len() as f64;
+    let origin = widened(&points[0]); // sums of differences keep the digits of sets far from the origin
+    let centre = origin
+        + points
+            .iter()
+            .map(|p| widened(p) - origin)
+            .sum::<SVector<f64, D>>()
+            / n;
+    // The largest radius taken out first: no square under- or overflows.
+    let largest = points
+        .iter()
+        .map(|p| (widened(p) - centre).amax())
+        .fold(0.0, f64::max);
+    if !(largest > 0.0 && largest.is_finite()) {
+        return (centre, 0.0);
+    }
+    let squares: f64 = points
+        .iter()
+        .map(|p| ((widened(p) - centre) / largest).norm_squared())
+        .sum();
+    (centre, largest * (squares / n).sqrt())
+}
+
+// Runs a loop compiled for the best instruction set the processor turns out to have.
+//
+// The loops are plain Rust without fused operations: wider registers change their speed, not one
+// bit of their result.
+
+/// A loop: a closure, or a type of its own. Mark closure or `run`, and what it calls,
+/// `#[inline(always)]`: a function that is not inlined is compiled for the least processor.
+trait Loop {
+    type Output;
+    fn run(self) -> Self::Output;
+}
+
+impl<R, F: FnMut() -> R> Loop for F {
+    type Output = R;
+    #[inline(always)]
+    fn run(mut self) -> R {
+        // As `FnMut`: called as `FnOnce`, a closure goes through a function of the standard library
+        // that is not inlined.
+        self()
+    }
+}
+
+struct Vectorised<L>(L);
+
+impl<L: Loop> pulp::WithSimd for Vectorised<L> {
+    type Output = L::Output;
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, _: S) -> L::Output {
+        self.0.run()
+    }
+}
+
+/// Runs the loop.
+fn vectorised<L: Loop>(work: L) -> L::Output {
+    pulp::Arch::new().dispatch(Vectorised(work))
+}

@@ -1,20 +1,31 @@
 //! What every matcher takes and returns: [`PointMatcher`], [`Matching`] and its [`MatchReport`].
 
-use crate::validate::{option_within, point_sets};
-use crate::{MatchError, SoftMatches, WarmStart, hard};
+use crate::error::{option_within, point_sets};
+use crate::{MatchError, hard};
 use nalgebra::{Point, SMatrix};
 use tactile_core::StopReason;
-use tactile_tps::Warp;
+use tactile_tps::{SeriesMemory, Warp};
 
-/// Finds which model point is which target point, and the warp that takes the model onto the target.
+/// Finds which model point is which target point, and the warp that takes the model onto the
+/// target.
 ///
 /// Object safe, so that a user picks the method at run time:
 /// `let matcher: Box<dyn PointMatcher<2>> = …`.
 ///
 /// ```
 /// use nalgebra::Point2;
-/// use tactile_match::{CoherentPointDrift, NearestNeighbour, PointMatcher, AnnealedSoftassign};
-/// let model = [[0.0, 0.0], [1.0, 0.1], [0.2, 1.0], [1.1, 1.2], [0.5, 0.4], [1.8, 0.3]].map(Point2::from);
+/// use tactile_match::{
+///     AnnealedSoftassign, CoherentPointDrift, NearestNeighbour, PointMatcher,
+/// };
+/// let model = [
+///     [0.0, 0.0],
+///     [1.0, 0.1],
+///     [0.2, 1.0],
+///     [1.1, 1.2],
+///     [0.5, 0.4],
+///     [1.8, 0.3],
+/// ]
+/// .map(Point2::from);
 /// let target = model.map(|p| Point2::new(p.x + 0.05 * p.y, p.y));
 /// let matchers: [Box<dyn PointMatcher<2>>; 3] = [
 ///     Box::new(NearestNeighbour::default()),
@@ -28,7 +39,7 @@ use tactile_tps::Warp;
 /// # Ok::<(), tactile_match::MatchError>(())
 /// ```
 pub trait PointMatcher<const D: usize> {
-    /// Matches `model` (I points) to `target` (J points); I and J may differ and either may be 1.
+    /// Matches `model` (I points) to `target` (J points). I and J may differ and either may be 1.
     ///
     /// # Errors
     /// [`MatchError`] for empty sets, coordinates that are not finite and options out of range.
@@ -38,8 +49,9 @@ pub trait PointMatcher<const D: usize> {
         target: &[Point<f64, D>],
     ) -> Result<Matching<D>, MatchError>;
 
-    /// As [`match_points`](Self::match_points), for the next target of a series: a matcher may begin where its last match of the same
-    /// model ended, with what it keeps in `warm` ([`WarmStart`]). By default the match is made anew.
+    /// As [`match_points`](Self::match_points), for the next target of a series: a matcher may
+    /// begin where its last match of the same model ended, with what it keeps in `warm`
+    /// ([`WarmStart`]). By default the match is made anew.
     ///
     /// ```
     /// use nalgebra::Point2;
@@ -65,14 +77,27 @@ pub trait PointMatcher<const D: usize> {
         self.match_points(model, target)
     }
 
-    /// As [`match_next`](Self::match_next), for who asks for the pairs alone: a matcher may leave out what else a [`Matching`] holds, and
-    /// then allocates nothing once `warm` and `pairs` have grown. By default it is the match's.
+    /// As [`match_next`](Self::match_next), for who asks for the pairs alone: a matcher may leave
+    /// out what else a [`Matching`] holds, and then allocates nothing once `warm` and `pairs` have
+    /// grown. By default it is the match's.
     ///
     /// ```
     /// use nalgebra::Point2;
     /// use tactile_match::{AnnealedSoftassign, MatchedPairs, PointMatcher, WarmStart};
-    /// let model = [[0.0, 0.0], [1.0, 0.1], [0.2, 1.0], [1.1, 1.2], [0.5, 0.4], [1.8, 0.3]].map(Point2::from);
-    /// let (matcher, mut warm, mut pairs) = (AnnealedSoftassign::default(), WarmStart::default(), MatchedPairs::default());
+    /// let model = [
+    ///     [0.0, 0.0],
+    ///     [1.0, 0.1],
+    ///     [0.2, 1.0],
+    ///     [1.1, 1.2],
+    ///     [0.5, 0.4],
+    ///     [1.8, 0.3],
+    /// ]
+    /// .map(Point2::from);
+    /// let (matcher, mut warm, mut pairs) = (
+    ///     AnnealedSoftassign::default(),
+    ///     WarmStart::default(),
+    ///     MatchedPairs::default(),
+    /// );
     /// for step in [0.1, 0.2] {
     ///     let target = model.map(|p| Point2::new(p.x + step, p.y));
     ///     matcher.match_next_pairs(&mut warm, &model, &target, &mut pairs)?;
@@ -82,7 +107,7 @@ pub trait PointMatcher<const D: usize> {
     /// ```
     ///
     /// # Errors
-    /// As [`match_points`](Self::match_points); `pairs` is then as it was.
+    /// As [`match_points`](Self::match_points). `pairs` is then as it was.
     fn match_next_pairs(
         &self,
         warm: &mut WarmStart,
@@ -97,7 +122,8 @@ pub trait PointMatcher<const D: usize> {
     }
 }
 
-/// The pairs of a match without its warp, soft matches and covariances: see [`PointMatcher::match_next_pairs`].
+/// The pairs of a match without its warp, soft matches and covariances: see
+/// [`PointMatcher::match_next_pairs`].
 ///
 /// ```
 /// use nalgebra::Point2;
@@ -156,14 +182,19 @@ impl<const D: usize, M: PointMatcher<D> + ?Sized> PointMatcher<D> for Box<M> {
 /// use tactile_match::{AnnealedSoftassign, Doubt, PointMatcher};
 /// let scattered = |seed: f64| -> Vec<Point2<f64>> {
 ///     let place = |i: i32, k: f64| (f64::from(i * i) * k + seed * f64::from(i)).fract();
-///     (0..60).map(|i| Point2::new(place(i, 0.618), place(i, 0.755))).collect()
+///     (0..60)
+///         .map(|i| Point2::new(place(i, 0.618), place(i, 0.755)))
+///         .collect()
 /// };
 /// let matcher = AnnealedSoftassign::default();
 /// let same = matcher.match_points(&scattered(0.1), &scattered(0.1))?;
 /// assert_eq!(same.report.doubt, None);
 /// // Two sets that have nothing to do with each other: some points coincide by chance.
 /// let other = matcher.match_points(&scattered(0.1), &scattered(0.37))?;
-/// assert!(matches!(other.report.doubt, Some(Doubt::FewPairs | Doubt::LargeResiduals | Doubt::Undecided)));
+/// assert!(matches!(
+///     other.report.doubt,
+///     Some(Doubt::FewPairs | Doubt::LargeResiduals | Doubt::Undecided)
+/// ));
 /// # Ok::<(), tactile_match::MatchError>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -176,8 +207,9 @@ impl<const D: usize, M: PointMatcher<D> + ?Sized> PointMatcher<D> for Box<M> {
 pub enum Doubt {
     /// So few points of the smaller set have a partner that the pairs may have met by chance.
     FewPairs,
-    /// The residuals are so large that points strewn at random would explain the targets nearly as well; or those of a part of the set are
-    /// far larger than the others', which may lie a point aside.
+    /// The residuals are so large that points strewn at random would explain the targets nearly as
+    /// well. Or those of a part of the set are far larger than the others', which may lie a point
+    /// aside.
     LargeResiduals,
     /// One pair in twenty or more is wrong, by the pairs' confidences.
     Undecided,
@@ -206,9 +238,11 @@ pub struct MatchReport {
     pub iterations: usize,
     /// Starts that were tried.
     pub starts: usize,
-    /// Root mean square distance between warped model points and their partners, in the units of the points.
+    /// Root mean square distance between warped model points and their partners, in the units of
+    /// the points.
     pub residual: f64,
-    /// Estimated standard deviation of the position noise along one axis, in the units of the points.
+    /// Estimated standard deviation of the position noise along one axis, in the units of the
+    /// points.
     pub sigma: f64,
     /// Why the pairs are not to be relied on, where the matcher can tell.
     #[cfg_attr(feature = "serde", serde(default))]
@@ -231,15 +265,18 @@ pub struct MatchReport {
 /// ```
 #[non_exhaustive]
 pub struct Matching<const D: usize> {
-    /// The warp; it takes the model points to [`warped`](Self::warped), of a model of four thousand points and more a sample of them.
+    /// The warp. It takes the model points to [`warped`](Self::warped), of a model of four thousand
+    /// points and more a sample of them.
     pub warp: Box<dyn Warp<f64, D> + Send + Sync>,
     /// The warped model points.
     pub warped: Vec<Point<f64, D>>,
-    /// Target row of every model point; `None` for a point without a partner. No target row occurs twice.
+    /// Target row of every model point. `None` for a point without a partner. No target row occurs
+    /// twice.
     pub assignment: Vec<Option<usize>>,
-    /// Probability that the assignment (or the lack of one) of each model point is right, in [0, 1]. Of the default matcher and noisy points:
-    /// of all pairs given a confidence c, a share c is right, within some five points above 0.6 and thirteen below, over bent, cropped, turned
-    /// and stretched scenes that were not tuned on (`--example confidence`).
+    /// Probability that the assignment (or the lack of one) of each model point is right, in [0,
+    /// 1]. Of the default matcher and noisy points: of all pairs given a confidence c, a share c is
+    /// right, within some five points above 0.6 and thirteen below, over bent, cropped, turned and
+    /// stretched scenes that were not tuned on (`--example confidence`).
     pub confidence: Vec<f64>,
     /// The soft matches M the assignment was read from.
     pub soft: SoftMatches,
@@ -247,8 +284,9 @@ pub struct Matching<const D: usize> {
     pub unmatched_model: Vec<usize>,
     /// Target rows without a partner, ascending.
     pub unmatched_target: Vec<usize>,
-    /// Covariance of each model point's position under the warp, in squared units of the points. Of the default matcher it is the posterior
-    /// covariance given that the pairs are right: about 68 % of the true positions lie within one standard deviation along an axis.
+    /// Covariance of each model point's position under the warp, in squared units of the points. Of
+    /// the default matcher it is the posterior covariance given that the pairs are right: about 68
+    /// % of the true positions lie within one standard deviation along an axis.
     pub displacement_covariance: Vec<SMatrix<f64, D, D>>,
     /// The matcher's energy after every outer iteration.
     pub energy: Vec<f64>,
@@ -257,19 +295,22 @@ pub struct Matching<const D: usize> {
 }
 
 impl<const D: usize> Matching<D> {
-    /// The match of these pairs, each (model row, target row, confidence in [0, 1]), as a matcher of your own may return it.
+    /// The match of these pairs, each (model row, target row, confidence in [0, 1]), as a matcher
+    /// of your own may return it.
     ///
-    /// The warp is a thin-plate spline smoothed by cross-validation where there are three times as many pairs as
-    /// coefficients of an affine map along an axis, an affine map for fewer, and a rigid motion for D or fewer. Pairs
-    /// weigh as their confidences. The covariance of every warped point is that of the weighted residuals of the pairs.
-    /// Model points without a pair have confidence zero. O(n³) for up to 3000 pairs.
+    /// The warp is a thin-plate spline smoothed by cross-validation where there are three times as
+    /// many pairs as coefficients of an affine map along an axis, an affine map for fewer, and a
+    /// rigid motion for D or fewer. Pairs weigh as their confidences. The covariance of every
+    /// warped point is that of the weighted residuals of the pairs. Model points without a pair
+    /// have confidence zero. O(n³) for up to 3000 pairs.
     ///
     /// ```
     /// use nalgebra::Point2;
     /// use tactile_match::Matching;
     /// let model = [[0.0, 0.0], [2.0, 0.0], [0.0, 2.0], [2.0, 2.0]].map(Point2::from);
     /// let target = [[2.1, 0.0], [0.1, 2.0], [0.1, 0.0]].map(Point2::from);
-    /// let found = Matching::from_pairs(&model, &target, &[(0, 2, 1.0), (1, 0, 1.0), (2, 1, 0.9)])?;
+    /// let found =
+    ///     Matching::from_pairs(&model, &target, &[(0, 2, 1.0), (1, 0, 1.0), (2, 1, 0.9)])?;
     /// assert_eq!(found.pairs().nth(1), Some((1, 0, 1.0)));
     /// assert_eq!(found.unmatched_model, [3]);
     /// assert!((found.warped[3] - Point2::new(2.1, 2.0)).norm() < 1e-12);
@@ -277,8 +318,8 @@ impl<const D: usize> Matching<D> {
     /// ```
     ///
     /// # Errors
-    /// [`MatchError`] for empty sets, coordinates that are not finite, rows that do not exist or occur twice, and
-    /// confidences outside [0, 1].
+    /// [`MatchError`] for empty sets, coordinates that are not finite, rows that do not exist or
+    /// occur twice, and confidences outside [0, 1].
     pub fn from_pairs(
         model: &[Point<f64, D>],
         target: &[Point<f64, D>],
@@ -351,7 +392,8 @@ impl<const D: usize> Matching<D> {
     }
 }
 
-/// Rows without a partner on both sides, `(model, target)`, ascending, for `target_len` target points.
+/// Rows without a partner on both sides, `(model, target)`, ascending, for `target_len` target
+/// points.
 ///
 /// ```
 /// use tactile_match::unmatched_rows;
@@ -370,22 +412,153 @@ pub fn unmatched_rows(assignment: &[Option<usize>], target_len: usize) -> (Vec<u
     (model, (0..target_len).filter(|&j| !taken[j]).collect())
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
+/// The match matrix `M` without its slack row and column, in compressed rows: for every model point
+/// the target points that keep some probability, and how much. What a row lacks to one is its
+/// probability of having no partner.
+///
+/// ```
+/// use tactile_match::SoftMatches;
+/// // Model point 0: target 3 or 1, or with probability 0.25 none; model point 1: none.
+/// let soft: SoftMatches = [vec![(3, 0.5), (1, 0.25)], vec![]].into_iter().collect();
+/// assert_eq!(soft.rows(), 2);
+/// assert_eq!(1.0 - soft.row(0).map(|(_, p)| p).sum::<f64>(), 0.25);
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub struct SoftMatches {
+    starts: Vec<usize>,
+    columns: Vec<usize>,
+    weights: Vec<f64>,
+}
 
-    #[test]
-    fn unmatched_rows_are_the_complement_of_the_assignment() {
-        assert_eq!(
-            unmatched_rows(&[Some(2), None, Some(0)], 4),
-            (vec![1], vec![1, 3])
-        );
-        assert_eq!(unmatched_rows(&[], 1), (vec![], vec![0]));
+impl Default for SoftMatches {
+    fn default() -> Self {
+        Self {
+            starts: vec![0],
+            columns: Vec::new(),
+            weights: Vec::new(),
+        }
+    }
+}
+
+impl<R: IntoIterator<Item = (usize, f64)>> FromIterator<R> for SoftMatches {
+    /// The matrix of these rows, each the target points of one model point with their weights.
+    fn from_iter<I: IntoIterator<Item = R>>(rows: I) -> Self {
+        let mut soft = Self::default();
+        rows.into_iter().for_each(|row| soft.push_row(row));
+        soft
+    }
+}
+
+impl SoftMatches {
+    /// Appends the row of the next model point.
+    pub(crate) fn push_row(&mut self, row: impl IntoIterator<Item = (usize, f64)>) {
+        for (column, weight) in row {
+            self.columns.push(column);
+            self.weights.push(weight);
+        }
+        self.starts.push(self.columns.len());
     }
 
-    /// Compiles only while the trait can be made into an object.
-    #[test]
-    fn matchers_are_objects() {
-        fn _takes(_: &dyn PointMatcher<3>) {}
+    /// Number of rows (model points).
+    #[must_use]
+    pub fn rows(&self) -> usize {
+        self.starts.len() - 1
+    }
+
+    /// The target rows and weights of model point `row`. Nothing for a row that does not exist.
+    pub fn row(&self, row: usize) -> impl Iterator<Item = (usize, f64)> + '_ {
+        let range = match (self.starts.get(row), self.starts.get(row + 1)) {
+            (Some(&start), Some(&end)) => start..end,
+            _ => 0..0,
+        };
+        self.columns[range.clone()]
+            .iter()
+            .copied()
+            .zip(self.weights[range].iter().copied())
+    }
+}
+
+/// Memory of one matcher along a series of targets of one model, for
+/// [`PointMatcher::match_next`](crate::PointMatcher::match_next).
+///
+/// What is in it belongs to the matcher: a matcher of your own asks for its own type with
+/// [`state`](Self::state). A matcher that finds the state of another one starts cold.
+///
+/// ```
+/// use nalgebra::Point3;
+/// use tactile_match::{PointMatcher, AnnealedSoftassign, Search, WarmStart};
+/// # fn main() -> Result<(), tactile_match::MatchError> {
+/// let model: Vec<Point3<f64>> = (0..60)
+///     .map(|i| (0.13 * f64::from(i).sqrt(), 2.4 * f64::from(i)))
+///     .map(|(r, angle)| Point3::new(r * angle.cos(), r * angle.sin(), 1.0 - 0.5 * r * r))
+///     .collect();
+/// let matcher = AnnealedSoftassign::default().with_search(Search::Near);
+/// let mut warm = WarmStart::default();
+/// // The load rises: the surface grows by a hundredth from frame to frame.
+/// let mut iterations = Vec::new();
+/// for frame in 1..=4 {
+///     let target: Vec<_> = model.iter().map(|p| p * (1.1 + 0.01 * f64::from(frame))).collect();
+///     let found = matcher.match_next(&mut warm, &model, &target)?;
+///     assert!(found.assignment.iter().enumerate().all(|(i, &j)| j == Some(i)));
+///     iterations.push(found.report.iterations);
+/// }
+/// assert!(iterations[3] < iterations[0]);
+/// # Ok(())
+/// # }
+/// ```
+#[derive(Debug, Default)]
+pub struct WarmStart(SeriesMemory);
+
+impl WarmStart {
+    /// The state of type `S` that the last match left here. A default one where there is none, or
+    /// one of another type.
+    ///
+    /// ```
+    /// use nalgebra::Point2;
+    /// use tactile_match::{MatchError, Matching, NearestNeighbour, PointMatcher, WarmStart};
+    /// /// Nearest neighbours of where the model came to lie last.
+    /// struct Follower;
+    /// impl PointMatcher<2> for Follower {
+    ///     fn match_points(
+    ///         &self,
+    ///         model: &[Point2<f64>],
+    ///         target: &[Point2<f64>],
+    ///     ) -> Result<Matching<2>, MatchError> {
+    ///         NearestNeighbour::default().match_points(model, target)
+    ///     }
+    ///     fn match_next(
+    ///         &self,
+    ///         warm: &mut WarmStart,
+    ///         model: &[Point2<f64>],
+    ///         target: &[Point2<f64>],
+    ///     ) -> Result<Matching<2>, MatchError> {
+    ///         let last: &mut Vec<Point2<f64>> = warm.state();
+    ///         let found = self.match_points(
+    ///             if last.len() == model.len() {
+    ///                 last
+    ///             } else {
+    ///                 model
+    ///             },
+    ///             target,
+    ///         )?;
+    ///         last.clone_from(&found.warped);
+    ///         Ok(found)
+    ///     }
+    /// }
+    /// let model = [[0.0, 0.0], [1.0, 0.0], [2.0, 0.0]].map(Point2::from);
+    /// let mut warm = WarmStart::default();
+    /// for frame in 1..5 {
+    ///     // the sets end 1.6 apart, more than their spacing
+    ///     let target = model.map(|p| Point2::new(p.x + 0.4 * f64::from(frame), p.y));
+    ///     assert_eq!(
+    ///         Follower.match_next(&mut warm, &model, &target)?.assignment,
+    ///         [Some(0), Some(1), Some(2)]
+    ///     );
+    /// }
+    /// # Ok::<(), MatchError>(())
+    /// ```
+    pub fn state<S: Default + Send + Sync + 'static>(&mut self) -> &mut S {
+        self.0.state()
     }
 }

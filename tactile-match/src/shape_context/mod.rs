@@ -1,13 +1,15 @@
 //! Shape contexts: where the other points of a set lie, seen from each point.
 //!
-//! The context of a point is a histogram of the vectors to all other points, in bins of log-distance and direction
+//! The context of a point is a histogram of the vectors to all other points, in bins of
+//! log-distance and direction
 //! [Belongie, Malik & Puzicha, *Shape matching and object recognition using shape contexts*, PAMI 24 (2002)]; two
-//! contexts are compared by the χ² distance `½ Σ (g − h)²/(g + h)` of the histograms over their mean count. In the plane
-//! directions are twelve sectors, in space the 26 neighbours of a cube's centre. Points between two sectors of the plane
-//! count for both in proportion, so that a small turn changes the histogram a little.
+//! contexts are compared by the χ² distance `½ Σ (g − h)²/(g + h)` of the histograms over their
+//! mean count. In the plane directions are twelve sectors, in space the 26 neighbours of a cube's
+//! centre. Points between two sectors of the plane count for both in proportion, so that a small
+//! turn changes the histogram a little.
 
-use crate::simd::vectorised;
-use crate::{MatchError, validate};
+use crate::vectorised;
+use crate::{MatchError, error};
 use nalgebra::Point;
 
 /// Radial bins: the outermost ends at the largest radius, each further one at half the radius.
@@ -42,12 +44,12 @@ impl ShapeContexts {
     /// The contexts of all `points`, of neighbours up to `radius` away: `O(n²)`.
     ///
     /// # Errors
-    /// [`MatchError::NotFinite`] for a coordinate that is not finite, [`MatchError::InvalidOption`] for a radius that is
-    /// not positive and finite.
+    /// [`MatchError::NotFinite`] for a coordinate that is not finite, [`MatchError::InvalidOption`]
+    /// for a radius that is not positive and finite.
     pub fn new<const D: usize>(points: &[Point<f64, D>], radius: f64) -> Result<Self, MatchError> {
-        validate::option_within("radius", radius, f64::MIN_POSITIVE, f64::MAX, "(0, ∞)")?;
+        error::option_within("radius", radius, f64::MIN_POSITIVE, f64::MAX, "(0, ∞)")?;
         if !points.is_empty() {
-            validate::point_set("model", points)?;
+            error::point_set("model", points)?;
         }
         let plain: Vec<[f64; D]> = points
             .iter()
@@ -71,12 +73,14 @@ impl ShapeContexts {
         chi_squared(g, h) / (self.totals[i] + other.totals[j]).max(1.0)
     }
 
-    /// The costs of point `i` here and all points of `other`, into `costs`: the χ² distances of their contexts, in [0, 1].
+    /// The costs of point `i` here and all points of `other`, into `costs`: the χ² distances of
+    /// their contexts, in [0, 1].
     ///
     /// ```
     /// use nalgebra::Point2;
     /// use tactile_match::ShapeContexts;
-    /// let points = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0], [0.3, 0.45]].map(Point2::from);
+    /// let points =
+    ///     [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0], [0.3, 0.45]].map(Point2::from);
     /// let contexts = ShapeContexts::new(&points, 2.0)?;
     /// let mut costs = Vec::new();
     /// contexts.costs_into(4, &contexts, &mut costs);
@@ -128,7 +132,8 @@ fn sectors<const D: usize>() -> usize {
     }
 }
 
-/// Adds one neighbour to a histogram; coinciding points and those beyond the radius have no place in it.
+/// Adds one neighbour to a histogram. Coinciding points and those beyond the radius have no place
+/// in it.
 fn count<const D: usize>(histogram: &mut [f32], offset: &[f64; D], radius: f64) {
     let square = offset.iter().map(|v| v * v).sum::<f64>() / (radius * radius);
     if square <= 0.0 || square > 1.0 {
@@ -147,14 +152,16 @@ fn count<const D: usize>(histogram: &mut [f32], offset: &[f64; D], radius: f64) 
     }
 }
 
-/// The direction of least angle: the 26 neighbours of a cube's centre, or the axes in other dimensions.
+/// The direction of least angle: the 26 neighbours of a cube's centre, or the axes in other
+/// dimensions.
 fn sector<const D: usize>(offset: &[f64; D]) -> usize {
     let best = |a: (f64, usize), b: (f64, usize)| if b.0 > a.0 { b } else { a };
     if D != 3 {
         let axis = (0..D).map(|k| (offset[k].abs(), 2 * k + usize::from(offset[k] < 0.0)));
         return axis.fold((-1.0, 0), best).1;
     }
-    // With the sizes sorted, the nearest of (1,0,0), (1,1,0)/√2 and (1,1,1)/√3 has the largest scalar product.
+    // With the sizes sorted, the nearest of (1,0,0), (1,1,0)/√2 and (1,1,1)/√3 has the largest
+    // scalar product.
     let mut order = [0, 1, 2];
     order.sort_by(|&a, &b| offset[b].abs().total_cmp(&offset[a].abs()));
     let (mut sum, mut choice) = (0.0, (-1.0, 0));

@@ -1,71 +1,30 @@
-//! The alternation: soft assignment at a falling temperature, then the warp that it asks for.
+//! One annealing run: soft assignment at a falling temperature, then the warp that it asks for.
 
-use super::axes::Axes;
-use super::extrapolate::Extrapolation;
-use super::known::Known;
-use super::prior::Prior;
-use super::regression::Regression;
-use super::rigid::RigidFit;
-use super::schedule::{Schedule, Slack, State};
-use super::soft_assign::{Gaussian, SoftAssignment};
+use super::{Annealer, Gaussian, Known, Request, Schedule, Slack, State};
 use std::f64::consts::TAU;
 use std::ops::ControlFlow;
 
-/// A point whose own match decides its position is not left out altogether.
-const MAX_LEVERAGE: f64 = 0.95;
-/// Soft partners spread less than this, relative to the temperature, are as good as decided: no need to go slowly.
-const DECIDED: f64 = 0.01;
-/// Fall of σ an iteration once the matches are decided.
-const DECIDED_RATE: f64 = 0.3;
-/// Nearly decided: where such residuals stay above the temperature, noise holds them. Of 324 noisy scenes none then ended in a worse answer; at 0.1
-/// three did (`--example peer_cases`).
-const NEARLY_DECIDED: f64 = 0.05;
-/// A cold run that matches this share of the points that can have a partner, but for what the slack takes, has found them all, single points that
-/// noise has moved far left out. At 0.97 without regard to the slack, two of 324 noisy scenes kept a part one point aside (`--example peer_cases`).
-const FULL: f64 = 0.99;
-/// Share of residuals in the [tail](Annealer::tail) that noise explains: twice what it has.
-const NOISE_TAIL: f64 = 2e-3;
-/// Residuals and temperature, as variances, differ by less than this share: the noise is known well enough for the averages that follow.
-const NOISE_KNOWN: f64 = 1e-2;
+// Landmarks as the annealing sees them.
+
+impl<const D: usize> Known<D> {
+    /// Energy of a model point that was put there: minus the logarithm of its density, but for a
+    /// constant.
+    fn energy(&self, warped: &[f64; D]) -> f64 {
+        let square: f64 = (0..D).map(|k| (warped[k] - self.position[k]).powi(2)).sum();
+        0.5 * square / self.variance
+    }
+}
+
+// The alternation: soft assignment at a falling temperature, then the warp that it asks for.
+
 /// Affinities so much fainter than the slack's are left out.
 const FAINTER: f64 = 1e-3;
 /// Least share of outliers an estimate may come to.
 const LEAST_SHARE: f64 = 0.02;
-/// Temperatures (variances) below this are cold: a tenth of the model's radius.
-const COLD: f64 = 0.01;
-/// Fixed-point rounds for the share of outliers.
-const SHARE_ROUNDS: usize = 8;
-
-/// Displacements that the model points should have, and how much each counts; both padded with zeros.
-#[derive(Clone, Copy)]
-pub(crate) struct Request<'a, const D: usize> {
-    pub(crate) weights: &'a [f64],
-    pub(crate) displacements: &'a Axes<D>,
-}
-
-/// Shared machinery of the runs: targets, prior, scratch.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct Annealer<const D: usize> {
-    pub(crate) soft: SoftAssignment<D>,
-    pub(crate) prior: Prior,
-    pub(crate) regression: Regression<D>,
-    /// Takes the regression's place where the warp may not bend.
-    pub(crate) rigid: RigidFit<D>,
-    /// What the caller knows of some model points.
-    pub(super) known: Vec<Known<D>>,
-    /// Volume of the targets' bounding box.
-    pub(crate) volume: f64,
-    pub(super) weights: Vec<f64>,
-    pub(super) residuals: Axes<D>,
-    predicted: Vec<[f64; D]>,
-    pub(super) sums: Vec<f64>,
-    /// Spread of the soft partners within a row, relative to the temperature: 1 undecided, 0 decided.
-    ambiguity: f64,
-}
 
 impl<const D: usize> Annealer<D> {
     /// What the soft matches of the last fit ask of the warp.
-    pub(crate) fn request(&self) -> Request<'_, D> {
+    pub(super) fn request(&self) -> Request<'_, D> {
         Request {
             weights: &self.weights,
             displacements: &self.residuals,
@@ -74,9 +33,9 @@ impl<const D: usize> Annealer<D> {
 
     /// Soft matches of `warped` at this temperature, with their moments.
     ///
-    /// The slack weighs `(2πσ²)^{D/2}` times the density of outliers, beside Gaussian affinities. All weights are raised to the power
-    /// `sharpness`.
-    pub(crate) fn assign(
+    /// The slack weighs `(2πσ²)^{D/2}` times the density of outliers, beside Gaussian affinities.
+    /// All weights are raised to the power `sharpness`.
+    pub(super) fn assign(
         &mut self,
         warped: &[[f64; D]],
         variance: f64,
@@ -103,23 +62,26 @@ impl<const D: usize> Annealer<D> {
         (TAU * variance).powf(0.5 * D as f64) * density
     }
 
-    /// Share of a point's weight that its slack takes where the residual is noise as warm as the temperature: a pair with the residual r
-    /// keeps about `1 − w exp(r²/4σ²)` beside slack of weight w on both sides, and the mean of the exponential is `2^{D/2}`.
+    /// Share of a point's weight that its slack takes where the residual is noise as warm as the
+    /// temperature.
+    ///
+    /// A pair with the residual r keeps about `1 − w exp(r²/4σ²)` beside slack of weight w on both
+    /// sides, and the mean of the exponential is `2^{D/2}`.
     fn lost_to_slack(&self, points: usize, variance: f64, slack: Slack) -> f64 {
         let weight = self.slack_weight(points, 2.0 * variance, slack.share);
         slack.model.max(slack.target) * weight
     }
 
-    /// Alternates until the temperature stands still; `observe` is told every iteration and may stop the run.
-    pub(crate) fn run(
+    /// Alternates until the temperature stands still. `observe` is told every iteration and may
+    /// stop the run.
+    pub(super) fn run(
         &mut self,
         state: &mut State<D>,
         schedule: &Schedule,
         observe: &mut dyn FnMut(usize, f64) -> ControlFlow<()>,
     ) -> ControlFlow<()> {
-        let mut variance = schedule.sigma * schedule.sigma;
-        let (mut standing, mut extrapolation) = (0, Extrapolation::default());
-        let mut noise_found = false;
+        let mut variance = schedule.cooling.sigma * schedule.cooling.sigma;
+        let (mut standing, mut noise_found) = (0, false);
         state.settled = false;
         self.predicted.clone_from(&state.warped);
         for iteration in 0..schedule.limit {
@@ -128,39 +90,40 @@ impl<const D: usize> Annealer<D> {
             state.trace.push(self.free_energy(state, variance));
             observe(state.iterations, *state.trace.last().unwrap_or(&0.0))?;
             let floor = self.floor(schedule).powi(2);
-            if variance < COLD && state.matched < schedule.collapse {
+            // Temperatures (variances) below this are cold: a tenth of the model's radius.
+            if variance < 0.01 && state.matched < schedule.collapse {
                 break; // the temperature fell below the noise: points lose their partners, and none comes back
             }
-            let decided = self.ambiguity < DECIDED;
+            // Soft partners spread less than this, relative to the temperature, are as good as
+            // decided: no need to go slowly.
+            let decided = self.ambiguity < 0.01;
             let fall = |rate: f64| variance * rate * rate;
-            let lowest = fall(if decided { DECIDED_RATE } else { schedule.rate }).max(floor);
-            let aim = if schedule.extrapolates && !decided {
-                extrapolation.next(variance, residual)
-            } else {
-                residual
-            };
+            let rate = if decided { 0.3 } else { schedule.cooling.rate };
+            let lowest = fall(rate).max(floor);
+            // With nearly all points matched and decided, and no part aside, residuals above the
+            // temperature are noise. Below it points would lose their partners.
             let lost = self.lost_to_slack(state.warped.len(), variance, schedule.slack);
-            noise_found |= schedule.least < 1.0
+            noise_found |= schedule.cooling.least < 1.0
                 && residual > variance
-                && state.matched >= schedule.partners * (FULL - lost)
-                && self.ambiguity < NEARLY_DECIDED
-                && self.tail(0.0) <= NOISE_TAIL;
-            // Below the noise points would lose their partners: the temperature stays with the residuals.
+                && state.matched >= schedule.partners * (0.99 - lost)
+                && self.ambiguity < 0.05
+                && self.tail(0.0) <= 2e-3;
             let next = if noise_found {
                 residual.max(lowest)
             } else {
-                aim.min(fall(schedule.least)).max(lowest).min(variance)
+                let forced = residual.min(fall(schedule.cooling.least));
+                forced.max(lowest).min(variance)
             };
             let still = match () {
-                () if noise_found => NOISE_KNOWN,
+                () if noise_found => 1e-2,
                 () if decided => 1e-3,
-                () => schedule.still,
+                () => schedule.cooling.still,
             };
             standing = if next < variance { 0 } else { standing + 1 };
             let patience = if state.iterations > standing {
-                schedule.patience
+                schedule.cooling.patience
             } else {
-                schedule.stuck // never colder than at the start
+                schedule.cooling.stuck // never colder than at the start
             };
             state.settled = variance <= floor
                 || standing > patience
@@ -174,9 +137,9 @@ impl<const D: usize> Annealer<D> {
         ControlFlow::Continue(())
     }
 
-    /// One step from `state` in `scratch`: sets soft matches and regression to those of `state`; how undecided they are,
-    /// see [`ambiguity`](Self::ambiguity).
-    pub(crate) fn restore(
+    /// One step from `state` in `scratch`: sets soft matches and regression to those of `state`.
+    /// How undecided they are, see [`ambiguity`](Self::ambiguity).
+    pub(super) fn restore(
         &mut self,
         state: &State<D>,
         scratch: &mut State<D>,
@@ -188,8 +151,9 @@ impl<const D: usize> Annealer<D> {
         self.ambiguity
     }
 
-    /// Expectation and maximisation in turn with the noise level free: `rounds` of them, from where `state` stands.
-    pub(crate) fn settle(&mut self, state: &mut State<D>, schedule: &Schedule, rounds: usize) {
+    /// Expectation and maximisation in turn with the noise level free: `rounds` of them, from where
+    /// `state` stands.
+    pub(super) fn settle(&mut self, state: &mut State<D>, schedule: &Schedule, rounds: usize) {
         self.predicted.clone_from(&state.warped);
         for _ in 0..rounds {
             let residual = self.step(state, schedule, state.sigma * state.sigma);
@@ -207,17 +171,25 @@ impl<const D: usize> Annealer<D> {
         }
     }
 
-    /// The lowest temperature: the schedule's, or the least error of the targets where that is known.
+    /// The lowest temperature: the schedule's, or the least error of the targets where that is
+    /// known.
     fn floor(&self, schedule: &Schedule) -> f64 {
         schedule.floor.max(self.soft.errors.floor())
     }
 
-    /// One soft assignment and one fit; the residual variance that is left.
+    /// One soft assignment and one fit. The residual variance that is left.
     ///
-    /// Distances are taken from where the *other* points' matches put a point: a wrong match does not confirm itself.
+    /// Distances are taken from where the *other* points' matches put a point: a wrong match does
+    /// not confirm itself.
     fn step(&mut self, state: &mut State<D>, schedule: &Schedule, variance: f64) -> f64 {
         let predicted = std::mem::take(&mut self.predicted);
-        self.assign(&predicted, variance, schedule.slack, schedule.sweeps, 1.0);
+        self.assign(
+            &predicted,
+            variance,
+            schedule.slack,
+            schedule.cooling.sweeps,
+            1.0,
+        );
         self.predicted = predicted;
         self.fit(state, variance);
         let moments = &self.soft.moments;
@@ -227,7 +199,8 @@ impl<const D: usize> Annealer<D> {
             let w = fitted.weight[i];
             let shifts = noise.shift[i].iter().map(|s| s * s);
             within += noise.spread[i] - noise.weight[i] * shifts.sum::<f64>();
-            let leverage = (w * self.regression.variance[i] / variance).min(MAX_LEVERAGE);
+            // A point whose own match decides its position is not left out altogether.
+            let leverage = (w * self.regression.variance[i] / variance).min(0.95);
             let mut square = noise.spread[i];
             for k in 0..D {
                 let (u, z) = (self.regression.displacement.0[k][i], self.residuals.0[k][i]);
@@ -281,18 +254,21 @@ impl<const D: usize> Annealer<D> {
         self.regression.variances(&self.prior);
     }
 
-    /// The annealed energy: distances under M, over the temperature, plus the warp's penalty, a model point.
+    /// The annealed energy: distances under M, over the temperature, plus the warp's penalty, a
+    /// model point.
     fn free_energy(&self, state: &State<D>, variance: f64) -> f64 {
         let spread = &self.soft.moments.by_precision().spread;
         let data = spread.iter().sum::<f64>() / (2.0 * variance);
         (data + 0.5 * self.regression.penalty()) / state.warped.len() as f64
     }
 
-    /// What runs are compared by: `−ln p(targets | warp) − ln p(warp)`, with the warp's posterior volume (Laplace).
+    /// What runs are compared by: `−ln p(targets | warp) − ln p(warp)`, with the warp's posterior
+    /// volume (Laplace).
     ///
-    /// The targets are a mixture of Gaussians about the warped points and of uniform outliers, whose share is
-    /// estimated; residuals under `resolution` count as that, so that an exact fit does not win by an infinite margin.
-    pub(crate) fn evaluate(&mut self, state: &mut State<D>, share: f64, resolution: f64) {
+    /// The targets are a mixture of Gaussians about the warped points and of uniform outliers,
+    /// whose share is estimated. Residuals under `resolution` count as that, so that an exact fit
+    /// does not win by an infinite margin.
+    pub(super) fn evaluate(&mut self, state: &mut State<D>, share: f64, resolution: f64) {
         let variance = state.sigma.max(resolution).powi(2);
         let (n, m) = (state.warped.len(), self.soft.targets());
         let gaussian = n as f64 * (TAU * variance).powf(0.5 * D as f64);
@@ -306,7 +282,8 @@ impl<const D: usize> Annealer<D> {
         let sums = &self.sums[..m];
         let density = 1.0 / gaussian;
         let mut share = share;
-        for _ in 0..SHARE_ROUNDS {
+        // Fixed-point rounds for the share of outliers.
+        for _ in 0..8 {
             let outlier = share / self.volume;
             let outliers = sums
                 .iter()
@@ -320,7 +297,8 @@ impl<const D: usize> Annealer<D> {
             .map(|known| known.energy(&state.warped[known.row]))
             .sum::<f64>();
         if self.rigid.is_active() {
-            // All motions are equally likely, and as precisely known from one start as from another.
+            // All motions are equally likely, and as precisely known from one start as from
+            // another.
             state.energy = data;
             return;
         }
@@ -340,4 +318,40 @@ impl<const D: usize> Annealer<D> {
         state.energy =
             data + 0.5 * (self.regression.penalty() + D as f64 * self.regression.log_det);
     }
+}
+
+// Signs that a part of a set lies one point aside: residuals that the noise of the others does not
+// explain, and soft partners that spread farther than noise makes them.
+
+impl<const D: usize> Annealer<D> {
+    /// Share of the matched points of the last step whose distance from the leave-one-out
+    /// prediction is larger than `least` and than Gaussian noise explains, whose variance the
+    /// median of all squared distances gives. Where a part of a set lies one point aside, its
+    /// points have such residuals, though the root mean square of all is small.
+    pub(super) fn tail(&mut self, least: f64) -> f64 {
+        self.sums.clear();
+        let moments = &self.soft.moments;
+        let spread = &moments.by_precision().spread;
+        let rows = moments.plain().weight.iter().zip(spread);
+        let matched = rows.filter(|&(&weight, _)| weight > 0.5);
+        self.sums
+            .extend(matched.map(|(weight, spread)| spread / weight));
+        if self.sums.is_empty() {
+            return 0.0;
+        }
+        let middle = self.sums.len() / 2;
+        let median = *self.sums.select_nth_unstable_by(middle, f64::total_cmp).1;
+        // Squared residuals beyond so many variances are not the noise's: one in a thousand
+        // Gaussian ones is, in the plane and in space.
+        let limit = (16.0 * median / median_of_chi_squared(D)).max(least * least);
+        let beyond = self.sums.iter().filter(|&&square| square > limit);
+        beyond.count() as f64 / self.sums.len() as f64
+    }
+}
+
+/// Median of the sum of `dimension` squared standard normal deviates, by the approximation of
+/// Wilson and Hilferty (to 1 % from 2 on).
+fn median_of_chi_squared(dimension: usize) -> f64 {
+    let n = dimension as f64;
+    n * (1.0 - 2.0 / (9.0 * n)).powi(3)
 }

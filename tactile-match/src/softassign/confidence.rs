@@ -1,48 +1,201 @@
-//! How sure a pair is: the odds of the assignments that take it apart.
-//!
-//! Among noisy points a pair can be wrong in a few ways: two pairs have each other's targets, a point belongs to a target that is left over,
-//! a point that is left over belongs to the pair's target, or the pair has met by chance. With `rᵢ = tⱼ − ŷᵢ` about where the *other* points
-//! put point i, with the variance `σ²(1 + oᵢ)`, the evidence changes in closed form. Where i goes to a target that is δ away from its own,
-//!
-//! `ΔEᵢ(δ) = [δ·rᵢ + ½ |δ|²]/σ²(1 + oᵢ)`;
-//!
-//! where i and k exchange targets that are δ apart, `ΔE = ΔEᵢ(δ) + ΔE_k(−δ) + |δ|² c_ik/σ⁴` with the posterior covariance `c_ik` of their positions.
-//! Targets of their own errors have `1/ρⱼ + oᵢ` in place of `1 + oᵢ` ([`target_errors`](super::target_errors)). The changes exclude each other, and
-//! what they share with changes elsewhere cancels to first order: the pair is right with the probability `1/(1 + Σ exp(−ΔE))`. Unlike the
-//! entries of the doubly stochastic matrix, which tell two points that may be exchanged apart by half their odds, these are shares of right
-//! pairs (`--example confidence`).
+//! From the last soft assignment to the answer: hard matches, confidences, positions and
+//! covariances.
 
-use super::anneal::Annealer;
+use super::Annealer;
+use super::SoftAssignment;
+use super::{Answer, Mechanism, Slack, State};
+use crate::Doubt;
 use std::f64::consts::TAU;
 
+// From the last soft assignment to the answer: hard matches, confidences, positions, covariances.
+
+/// Residuals below this (radii of the model) are what the prior's factor leaves out: the data are
+/// clean.
+pub(super) const CLEAN_SIGMA: f64 = 3e-3;
+/// The lowest temperature of a run.
+pub(super) const MIN_SIGMA: f64 = 1e-3;
+/// Least logarithm, a point, of how much more likely an answer makes the targets than chance does:
+/// wrong basins come to less than nothing.
+pub(super) const MIN_TELLING_GAIN: f64 = 0.2;
+
+/// Whether parts of one set are out of sight or strewn about.
+pub(super) fn are_unequal(model: usize, target: usize) -> bool {
+    // Where the smaller set has less than this share of the larger one's points, parts are out of
+    // sight or strewn about: its edges draw what lies behind them a point aside, and an answer
+    // leaves no doubt only where it makes the targets so much likelier than chance. Less misses
+    // more of such shifts, more costs noisy scenes further starts (`--example confidence`).
+    (model.min(target) as f64) < 0.95 * model.max(target) as f64
+}
+
+impl<const D: usize> Answer<D> {
+    /// Why the pairs are not to be relied on: `smaller` points could have a partner, `share` of
+    /// them are expected to have none.
+    pub(super) fn doubt(&self, smaller: usize, share: f64) -> Option<Doubt> {
+        let pairs = self.assignment.iter().flatten().count() as f64;
+        // An answer with fewer pairs, relative to the smaller set, may be one of chance: wrong
+        // basins of sets that were stretched or turned matched up to two fifths. The same where the
+        // caller expects most points to have no partner.
+        let enough = 0.55_f64.min(1.0 - 1.5 * share).max(0.1);
+        match () {
+            () if pairs < enough * smaller as f64 => Some(Doubt::FewPairs),
+            // Least mean confidence of pairs: of a hundred pairs the share that is right varies by
+            // two points about its mean, and scenes with less than nine in ten are to be doubted.
+            () if self.sureness() < 0.95 => Some(Doubt::Undecided),
+            () => None,
+        }
+    }
+
+    /// Mean confidence of the pairs. 1 where there are none.
+    pub(super) fn sureness(&self) -> f64 {
+        let paired = self.assignment.iter().zip(&self.confidence);
+        let (mut pairs, mut sure) = (0.0, 0.0);
+        for (_, confidence) in paired.filter(|(partner, _)| partner.is_some()) {
+            pairs += 1.0;
+            sure += confidence;
+        }
+        if pairs > 0.0 { sure / pairs } else { 1.0 }
+    }
+
+    /// Reads the answer from the run's final state. `spread` is the variance of the positions
+    /// between the scales of the prior, empty where there is one scale. `gain` is that of the
+    /// answer over chance, see [`SoftassignWorkspace::gain`](super::SoftassignWorkspace).
+    pub(super) fn read(
+        &mut self,
+        annealer: &mut Annealer<D>,
+        state: &State<D>,
+        targets: &[[f64; D]],
+        slack: Slack,
+        spread: &[f64],
+        without: Option<Mechanism>,
+    ) {
+        let n = state.warped.len();
+        let noisy = state.sigma > CLEAN_SIGMA || annealer.soft.errors.differ();
+        // What the prior's factor leaves out must not cost a clean pair its match. The answer is
+        // read at no lower temperature.
+        let variance = state.sigma.max(1.4e-3).powi(2);
+        // Soft matches are read with weights raised to this power. Scaling rows and columns tells
+        // two points that may be swapped apart by half the logarithm of the odds that the whole
+        // permutations have. The power makes up for it. The confidences of pairs are told by
+        // [`PairOdds`].
+        let (sweeps, sharpness) = if noisy { (8, 1.55) } else { (3, 1.0) };
+        annealer.assign(&state.warped, variance, slack, sweeps, sharpness);
+        annealer.soft.cap_rows();
+        self.assign(&annealer.soft, n, targets.len());
+        // A rigid motion leaves residuals, however small.
+        let snaps = !noisy && !annealer.rigid.is_active();
+        let fit = self.place(state, targets, snaps);
+        if !annealer.rigid.is_active() {
+            annealer.regression.variances(&annealer.prior);
+        }
+        if noisy && without != Some(Mechanism::PairOdds) {
+            let fitted = Fitted {
+                annealer,
+                warped: &state.warped,
+                targets,
+                variance,
+            };
+            self.odds
+                .weigh(fitted, &mut self.assignment, &mut self.confidence);
+        }
+        self.variance.clear();
+        for i in 0..n {
+            let of_warp = annealer.regression.variance[i] + spread.get(i).copied().unwrap_or(0.0);
+            // A point that was put onto its target shares the target's error.
+            let on_target = snaps && self.assignment[i].is_some();
+            self.variance.push(if on_target { fit } else { of_warp });
+        }
+    }
+
+    /// Pairs that prefer each other to every rival and to having no partner.
+    fn assign(&mut self, soft: &SoftAssignment<D>, n: usize, m: usize) {
+        self.column_best.clear();
+        self.column_best.resize(m, (0.0, usize::MAX));
+        self.assignment.clear();
+        self.confidence.clear();
+        for i in 0..n {
+            let mut best = (0.0, usize::MAX);
+            for (j, p) in soft.entries(i) {
+                best = if p > best.0 { (p, j) } else { best };
+                if p > self.column_best[j].0 {
+                    self.column_best[j] = (p, i);
+                }
+            }
+            let free = (1.0 - soft.moments.plain().weight[i]).max(0.0);
+            let matched = best.1 != usize::MAX && soft.moments.plain().weight[i] > 0.5;
+            self.assignment.push(matched.then_some(best.1));
+            self.confidence
+                .push(if matched { best.0.min(1.0) } else { free });
+        }
+        for i in 0..n {
+            if self.assignment[i].is_some_and(|j| self.column_best[j].1 != i) {
+                self.assignment[i] = None;
+            }
+        }
+    }
+
+    /// The positions, on their targets where it `snaps`. The variance, along one axis, of what the
+    /// warp alone leaves to the targets.
+    fn place(&mut self, state: &State<D>, targets: &[[f64; D]], snaps: bool) -> f64 {
+        let square =
+            |a: &[f64; D], b: &[f64; D]| (0..D).map(|k| (a[k] - b[k]).powi(2)).sum::<f64>();
+        self.warped.clone_from(&state.warped);
+        let (mut left, mut squares, mut pairs) = (0.0, 0.0, 0);
+        for (i, partner) in self.assignment.iter().enumerate() {
+            let &Some(j) = partner else { continue };
+            left += square(&self.warped[i], &targets[j]);
+            if snaps {
+                self.warped[i] = targets[j];
+            }
+            squares += square(&self.warped[i], &targets[j]);
+            pairs += 1;
+        }
+        let count = f64::from(pairs.max(1));
+        self.residual = (squares / count).sqrt();
+        left / (D as f64 * count)
+    }
+}
+
+/// Soft matches of row i worth reporting.
+pub(super) fn soft_row<const D: usize>(
+    soft: &SoftAssignment<D>,
+    i: usize,
+) -> impl Iterator<Item = (usize, f64)> + '_ {
+    // Soft matches below this are not reported.
+    soft.entries(i).filter(|&(_, p)| p > 1e-3)
+}
+
+// How sure a pair is: the odds of the assignments that take it apart.
+//
+// Among noisy points a pair can be wrong in a few ways: two pairs have each other's targets, a
+// point belongs to a target that is left over, a point that is left over belongs to the pair's
+// target, or the pair has met by chance. With `rᵢ = tⱼ − ŷᵢ` about where the *other* points put
+// point i, with the variance `σ²(1 + oᵢ)`, the evidence changes in closed form. Where i goes to a
+// target that is δ away from its own,
+//
+// `ΔEᵢ(δ) = [δ·rᵢ + ½ |δ|²]/σ²(1 + oᵢ)`;
+//
+// where i and k exchange targets that are δ apart, `ΔE = ΔEᵢ(δ) + ΔE_k(−δ) + |δ|² c_ik/σ⁴` with the
+// posterior covariance `c_ik` of their positions. Targets of their own errors have `1/ρⱼ + oᵢ` in
+// place of `1 + oᵢ` ([`target_errors`](super::target_errors)). The changes exclude each other, and
+// what they share with changes elsewhere cancels to first order: the pair is right with the
+// probability `1/(1 + Σ exp(−ΔE))`. Unlike the entries of the doubly stochastic matrix, which tell
+// two points that may be exchanged apart by half their odds, these are shares of right pairs
+// (`--example confidence`).
+
 /// A point whose own target decides its position is not free of it altogether.
-const MAX_LEVERAGE: f64 = 0.95;
+const MAX_OWN_LEVERAGE: f64 = 0.95;
 /// The variance of what the other points say of it is at most so many times the noise's.
-const MOST_OTHERS: f64 = MAX_LEVERAGE / (1.0 - MAX_LEVERAGE);
-/// Squared residuals beyond so many variances are no partner's: one in a thousand Gaussian ones is, in the plane and in space.
-const FARTHEST: f64 = 16.0;
-/// Targets with fainter soft matches, some five standard deviations of the noise away, are not looked at.
-const IMPOSSIBLE: f64 = 1e-9;
-/// A point whose likeliest target has less than one chance in fifty has no partner that could be told: its confidence would be far below
-/// [`KEPT`]. Of large sets whose noise exceeds their spacing these are nearly all points, with hundreds of candidates each.
-const HOPELESS: f64 = 0.02;
-/// Odds fainter than this do not count.
-const FAINT: f64 = 1e-4;
-/// Rounds of exchanges until none makes the pairs likelier: one or two are needed.
-const ROUNDS: usize = 4;
-/// A change counts as one for the better from this on: rounding is less.
-const BETTER: f64 = -1e-9;
-/// Points that the soft matches leave without a partner get the likeliest one where it is surer than this, and others keep theirs where it
-/// is surer than that.
-const SURE: f64 = 0.5;
-const KEPT: f64 = 0.3;
+const MOST_OTHERS: f64 = MAX_OWN_LEVERAGE / (1.0 - MAX_OWN_LEVERAGE);
+/// Squared residuals beyond so many variances are no partner's: one in a thousand Gaussian ones is,
+/// in the plane and in space.
+const MAX_SQUARED_RESIDUAL: f64 = 16.0;
 
 /// Memory of the odds.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct PairOdds {
+pub(super) struct PairOdds {
     /// Target of each model row.
     partners: Vec<Option<usize>>,
-    /// Rows whose partner cannot be told, see [`HOPELESS`].
+    /// Rows whose partner cannot be told, see 0.02.
     hopeless: Vec<bool>,
     /// Model row of each target.
     owners: Vec<Option<usize>>,
@@ -64,18 +217,18 @@ struct Leverage {
 
 /// What pairs are judged by.
 #[derive(Clone, Copy)]
-pub(crate) struct Fitted<'a, const D: usize> {
-    pub(crate) annealer: &'a Annealer<D>,
-    pub(crate) warped: &'a [[f64; D]],
-    pub(crate) targets: &'a [[f64; D]],
+struct Fitted<'a, const D: usize> {
+    annealer: &'a Annealer<D>,
+    warped: &'a [[f64; D]],
+    targets: &'a [[f64; D]],
     /// Variance of the noise along an axis.
-    pub(crate) variance: f64,
+    variance: f64,
 }
 
 impl PairOdds {
-    /// Replaces `assignment` by the likeliest one in its neighbourhood, and sets the `confidence` of every pair; that of points without a
-    /// partner stays.
-    pub(crate) fn weigh<const D: usize>(
+    /// Replaces `assignment` by the likeliest one in its neighbourhood, and sets the `confidence`
+    /// of every pair. That of points without a partner stays.
+    fn weigh<const D: usize>(
         &mut self,
         fitted: Fitted<'_, D>,
         assignment: &mut [Option<usize>],
@@ -83,7 +236,8 @@ impl PairOdds {
     ) {
         self.take(fitted, assignment);
         self.complete(fitted);
-        for _ in 0..ROUNDS {
+        // Rounds of exchanges until none makes the pairs likelier: one or two are needed.
+        for _ in 0..4 {
             if !self.exchange(fitted) {
                 break;
             }
@@ -91,7 +245,13 @@ impl PairOdds {
         self.add_odds(fitted);
         for (i, partner) in assignment.iter_mut().enumerate() {
             let sure = 1.0 / (1.0 + self.against[i]);
-            let wanted = if partner.is_some() { KEPT } else { SURE };
+            let wanted = if partner.is_some() {
+                0.3
+            } else {
+                // Points that the soft matches leave without a partner get the likeliest one where
+                // it is surer than this, and others keep theirs where it is surer than that.
+                0.5
+            };
             if self.partners[i].is_some() && sure > wanted {
                 *partner = self.partners[i];
                 confidence[i] = sure;
@@ -123,7 +283,7 @@ impl PairOdds {
         self.leverages
             .extend(soft.iter().zip(variances).map(|(weight, variance)| {
                 let variance = variance / fitted.variance;
-                let own = (weight * variance).min(MAX_LEVERAGE);
+                let own = (weight * variance).min(MAX_OWN_LEVERAGE);
                 Leverage {
                     stretch: 1.0 / (1.0 - own),
                     others: variance / (1.0 - own),
@@ -131,7 +291,8 @@ impl PairOdds {
             }));
     }
 
-    /// Pairs what is left over on both sides, nearest first: what the soft matches leave undecided mostly has a partner.
+    /// Pairs what is left over on both sides, nearest first: what the soft matches leave undecided
+    /// mostly has a partner.
     fn complete<const D: usize>(&mut self, fitted: Fitted<'_, D>) {
         self.open.clear();
         for (i, partner) in self.partners.iter().enumerate() {
@@ -140,7 +301,7 @@ impl PairOdds {
             }
             let others = self.leverages[i].others;
             for j in fitted.candidates(i) {
-                let limit = FARTHEST * fitted.variance * (fitted.width(j) + others);
+                let limit = MAX_SQUARED_RESIDUAL * fitted.variance * (fitted.width(j) + others);
                 let square = squared(&fitted.offset(i, j));
                 if self.owners[j].is_none() && square < limit {
                     self.open.push((square, i, j));
@@ -158,11 +319,12 @@ impl PairOdds {
         }
     }
 
-    /// Makes for every point the change that makes the pairs likeliest; whether there was any.
+    /// Makes for every point the change that makes the pairs likeliest. Whether there was any.
     fn exchange<const D: usize>(&mut self, fitted: Fitted<'_, D>) -> bool {
         let mut changed = false;
         for i in (0..self.partners.len()).filter(|&i| !self.hopeless[i]) {
-            let mut best = (BETTER, None);
+            // A change counts as one for the better from this on: rounding is less.
+            let mut best = (-1e-9, None);
             for j in fitted.candidates(i) {
                 let change = match (self.partners[i], self.owners[j]) {
                     (Some(own), _) if own == j => continue,
@@ -240,11 +402,12 @@ impl PairOdds {
         fitted.width(j) + self.leverages[i].others.min(MOST_OTHERS)
     }
 
-    /// Minus the logarithm of a target's density about where the others put its point, beside that of a point without noise.
+    /// Minus the logarithm of a target's density about where the others put its point, beside that
+    /// of a point without noise.
     fn misfit<const D: usize>(&self, fitted: Fitted<'_, D>, pair: (usize, usize)) -> f64 {
         let variance = self.variance(fitted, pair);
         let square = squared(&self.residual(fitted, pair)) / (fitted.variance * variance);
-        0.5 * (square.min(FARTHEST) + D as f64 * variance.ln())
+        0.5 * (square.min(MAX_SQUARED_RESIDUAL) + D as f64 * variance.ln())
     }
 
     /// Change of the energy where point i of a pair goes to the target j.
@@ -273,7 +436,8 @@ impl PairOdds {
         (k, theirs): (usize, usize),
     ) -> f64 {
         let least = self.of_move(fitted, (i, own), theirs) + self.of_move(fitted, (k, theirs), own);
-        if least > -FAINT.ln() {
+        // Odds fainter than this do not count.
+        if least > -1e-4_f64.ln() {
             return least; // neighbours move together, so that there is more to come
         }
         let widths = fitted.width(own) * fitted.width(theirs);
@@ -308,13 +472,18 @@ impl<const D: usize> Fitted<'_, D> {
     /// Whether point i has a partner that nothing tells from others.
     fn is_hopeless(&self, i: usize) -> bool {
         let soft = &self.annealer.soft;
-        soft.moments.plain().weight[i] > 0.5 && soft.entries(i).all(|(_, p)| p < HOPELESS)
+        // A point whose likeliest target has less than one chance in fifty has no partner that
+        // could be told: its confidence would be far below 0.3. Of large sets whose noise exceeds
+        // their spacing these are nearly all points, with hundreds of candidates each.
+        soft.moments.plain().weight[i] > 0.5 && soft.entries(i).all(|(_, p)| p < 0.02)
     }
 
     /// Targets that point i could belong to.
     fn candidates(&self, i: usize) -> impl Iterator<Item = usize> + '_ {
         let entries = self.annealer.soft.entries(i);
-        entries.filter(|&(_, p)| p > IMPOSSIBLE).map(|(j, _)| j)
+        // Targets with fainter soft matches, some five standard deviations of the noise away, are
+        // not looked at.
+        entries.filter(|&(_, p)| p > 1e-9).map(|(j, _)| j)
     }
 
     /// From one target to another.

@@ -1,25 +1,16 @@
 //! Pairs from the points' surroundings: shape contexts propose, relaxation labelling decides.
 
-use super::candidate_labels::CandidateLabels;
 use crate::shape_context::ShapeContexts;
 use std::f64::consts::PI;
 
-/// Candidates a model point.
-const CANDIDATES: usize = 10;
-/// Neighbours a model point.
-const NEIGHBOURS: usize = 8;
 /// Radius of the shape contexts, in radii of the model.
 const RADIUS: f64 = 2.0;
-/// χ² distance that costs a candidate a factor e.
-const COST_SCALE: f64 = 0.05;
 /// Initial share and constant gain of the slack.
 const SLACK: f64 = 0.1;
-const SLACK_GAIN: f64 = 0.05;
-const SWEEPS: usize = 12;
 
 /// Memory of the search for pairs.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Correspondence {
+pub(super) struct Correspondence {
     model_contexts: ShapeContexts,
     target_contexts: ShapeContexts,
     costs: Vec<f32>,
@@ -28,12 +19,12 @@ pub(crate) struct Correspondence {
     neighbours: Vec<usize>,
     reach: Vec<f64>,
     /// The likeliest target of every model point, with its probability.
-    pub(crate) pairs: Vec<(usize, f64)>,
+    pub(super) pairs: Vec<(usize, f64)>,
 }
 
 impl Correspondence {
     /// Finds `pairs` for model points as they lie.
-    pub(crate) fn find<const D: usize>(&mut self, model: &[[f64; D]], target: &[[f64; D]]) {
+    pub(super) fn find<const D: usize>(&mut self, model: &[[f64; D]], target: &[[f64; D]]) {
         self.propose(model, target);
         self.relax(model, target);
         let likeliest = |i| {
@@ -57,7 +48,8 @@ impl Correspondence {
             let costs = &self.costs;
             self.order.clear();
             self.order.extend(0..target.len());
-            let kept = CANDIDATES.min(target.len());
+            // Candidates a model point.
+            let kept = 10.min(target.len());
             if kept < self.order.len() {
                 let by_cost = |a: &usize, b: &usize| costs[*a].total_cmp(&costs[*b]).then(a.cmp(b));
                 self.order.select_nth_unstable_by(kept - 1, by_cost);
@@ -68,7 +60,8 @@ impl Correspondence {
                 .iter()
                 .map(|&j| costs[j])
                 .fold(f32::MAX, f32::min);
-            let raw = |j: usize| (-f64::from(costs[j] - least) / COST_SCALE).exp();
+            // χ² distance that costs a candidate a factor e.
+            let raw = |j: usize| (-f64::from(costs[j] - least) / 0.05).exp();
             let sum: f64 = self.order.iter().map(|&j| raw(j)).sum();
             self.labels.push_row(
                 self.order
@@ -96,8 +89,8 @@ impl Correspondence {
             compatibility(&u, &v) * gamma / kept as f64
         };
         self.labels.link(weight, near);
-        for _ in 0..SWEEPS {
-            self.labels.sweep(SLACK_GAIN, 2);
+        for _ in 0..12 {
+            self.labels.sweep(0.05, 2);
             if self.labels.is_settled(0.999) {
                 break;
             }
@@ -106,7 +99,8 @@ impl Correspondence {
 
     /// Lists the nearest neighbours of every model point and the distance to the farthest of them.
     fn find_neighbours<const D: usize>(&mut self, model: &[[f64; D]]) -> usize {
-        let kept = NEIGHBOURS.min(model.len() - 1);
+        // Neighbours a model point.
+        let kept = 8.min(model.len() - 1);
         self.neighbours.clear();
         self.reach.clear();
         for (i, x) in model.iter().enumerate() {
@@ -149,4 +143,160 @@ fn compatibility<const D: usize>(u: &[f64; D], v: &[f64; D]) -> f64 {
     let cosine = (0..D).map(|k| u[k] * v[k]).sum::<f64>() / (p * q);
     let beta = 1.0 - cosine.clamp(-1.0, 1.0).acos() / PI;
     p.min(q) / p.max(q) * beta.powi(4)
+}
+
+// Relaxation labelling over candidates: the paper's update (19)–(20) as a sparse matrix–vector product.
+//
+// Only some pairs `(i, j)` are candidates; the match matrix is kept for those and for the slack. What pair `(a, b)`
+// says for pair `(i, j)` does not depend on M: these links are computed once, and a sweep costs one multiplication a link
+// instead of `O(I J A B)`. With all pairs as candidates the numbers are those of [`labelling`](crate::labelling).
+
+/// The match matrix over candidate pairs, with the links between them.
+#[derive(Clone, Debug, Default)]
+struct CandidateLabels {
+    starts: Vec<usize>,
+    columns: Vec<usize>,
+    entries: Vec<f64>,
+    row_slack: Vec<f64>,
+    column_slack: Vec<f64>,
+    link_starts: Vec<usize>,
+    link_from: Vec<u32>,
+    link_weight: Vec<f64>,
+    support: Vec<f64>,
+    sums: Vec<f64>,
+}
+
+impl CandidateLabels {
+    /// Forgets everything but the memory.
+    fn reset(&mut self, targets: usize, slack: f64) {
+        self.starts.clear();
+        self.starts.push(0);
+        self.columns.clear();
+        self.entries.clear();
+        self.row_slack.clear();
+        self.column_slack.clear();
+        self.column_slack.resize(targets, slack);
+    }
+
+    /// Appends a model point with its candidates.
+    fn push_row(&mut self, row: impl Iterator<Item = (usize, f64)>, slack: f64) {
+        for (column, probability) in row {
+            assert!(
+                column < self.column_slack.len(),
+                "candidate beyond the targets"
+            );
+            self.columns.push(column);
+            self.entries.push(probability);
+        }
+        self.starts.push(self.columns.len());
+        self.row_slack.push(slack);
+    }
+
+    /// Computes the links: `weight((i, j), (a, b))` for the points `a` of `neighbours(i)` and their candidates; zeros
+    /// are left out.
+    fn link<N: AsRef<[usize]>>(
+        &mut self,
+        mut weight: impl FnMut((usize, usize), (usize, usize)) -> f64,
+        mut neighbours: impl FnMut(usize) -> N,
+    ) {
+        self.link_starts.clear();
+        self.link_from.clear();
+        self.link_weight.clear();
+        self.link_starts.push(0);
+        for i in 0..self.rows() {
+            let near = neighbours(i);
+            for e in self.starts[i]..self.starts[i + 1] {
+                for &a in near.as_ref() {
+                    for f in self.starts[a]..self.starts[a + 1] {
+                        let w = weight((i, self.columns[e]), (a, self.columns[f]));
+                        if w > 0.0 {
+                            self.link_from.push(f as u32);
+                            self.link_weight.push(w);
+                        }
+                    }
+                }
+                self.link_starts.push(self.link_from.len());
+            }
+        }
+    }
+
+    /// Number of model points.
+    fn rows(&self) -> usize {
+        self.starts.len() - 1
+    }
+
+    /// Candidates of model point `i` with their probabilities.
+    fn row(&self, i: usize) -> impl Iterator<Item = (usize, f64)> + '_ {
+        let range = self.starts[i]..self.starts[i + 1];
+        self.columns[range.clone()]
+            .iter()
+            .copied()
+            .zip(self.entries[range].iter().copied())
+    }
+
+    /// One sweep: support (19), update (20) with the constant `slack_gain` for the slack, and `normalisations` of rows and
+    /// columns in turn.
+    fn sweep(&mut self, slack_gain: f64, normalisations: usize) {
+        self.support.clear();
+        for links in self.link_starts.windows(2) {
+            let range = links[0]..links[1];
+            let pairs = self.link_from[range.clone()]
+                .iter()
+                .zip(&self.link_weight[range]);
+            self.support
+                .push(pairs.map(|(&f, w)| w * self.entries[f as usize]).sum());
+        }
+        for i in 0..self.rows() {
+            let range = self.starts[i]..self.starts[i + 1];
+            let gains = self.entries[range.clone()]
+                .iter()
+                .zip(&self.support[range.clone()]);
+            let total = gains.map(|(p, s)| p * s).sum::<f64>() + self.row_slack[i] * slack_gain;
+            if total > 0.0 {
+                for e in range {
+                    self.entries[e] *= self.support[e] / total;
+                }
+                self.row_slack[i] *= slack_gain / total;
+            }
+        }
+        (0..normalisations).for_each(|_| self.normalise());
+    }
+
+    /// Whether every model point is decided: one candidate, or the slack, has at least `certainty`.
+    fn is_settled(&self, certainty: f64) -> bool {
+        (0..self.rows()).all(|i| {
+            self.row(i)
+                .map(|(_, p)| p)
+                .fold(self.row_slack[i], f64::max)
+                >= certainty
+        })
+    }
+
+    fn normalise(&mut self) {
+        self.sums.clear();
+        self.sums.extend_from_slice(&self.column_slack);
+        for i in 0..self.rows() {
+            let range = self.starts[i]..self.starts[i + 1];
+            let sum = self.entries[range.clone()].iter().sum::<f64>() + self.row_slack[i];
+            for e in range {
+                self.entries[e] /= if sum > 0.0 { sum } else { 1.0 };
+                self.sums[self.columns[e]] += self.entries[e];
+            }
+            self.row_slack[i] /= if sum > 0.0 { sum } else { 1.0 };
+        }
+        self.entries
+            .iter_mut()
+            .zip(&self.columns)
+            .for_each(|(p, &j)| {
+                *p /= if self.sums[j] > 0.0 {
+                    self.sums[j]
+                } else {
+                    1.0
+                };
+            });
+        self.column_slack
+            .iter_mut()
+            .zip(&self.sums)
+            .for_each(|(s, &sum)| *s /= if sum > 0.0 { sum } else { 1.0 });
+    }
 }

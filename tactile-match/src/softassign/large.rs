@@ -1,53 +1,33 @@
 //! Large sets, coarse to fine.
-//!
-//! One annealing run from a warm start costs `O(I J)`, which is too much for tens of thousands of points. A well-spread sample of either set
-//! (every 8ᵏ-th point in the order of a k-d tree) is registered first: its points are not each other's partners, but the field that takes
-//! one density onto the other is the whole set's [Hirose, *Acceleration of non-rigid point set registration with downsampling and Gaussian
-//! process regression*, IEEE TPAMI 43 (2021)]. The field is extended to a sample eight times as large, which starts no warmer than the
-//! coarser sample was dense, and so on to all points. There only targets within a few spacings are looked at: time `O(I r²)` an
-//! iteration with r ≤ 64 modes of the prior, memory `O(I r)`.
 
-use super::levels::{Levels, STEP};
-use super::schedule::Schedule;
-use super::search::{FAST, NOTICED, RESOLUTION, SCALES, bounding_volume};
-use super::{AnnealedSoftassign, Rotation, SoftassignWorkspace, finish, starts};
+use super::Annealer;
+use super::Axes;
+use super::assign::Blocks;
+use super::confidence::CLEAN_SIGMA;
+use super::model::Prior;
+use super::search::{ENERGY_RESOLUTION, FAST, MAX_PATTERN_REACH, SCALES};
+use super::{
+    AnnealedSoftassign, Cooling, Mechanism, Rotation, Schedule, SoftassignWorkspace, State, starts,
+};
 use std::ops::ControlFlow;
+
+// Large sets, coarse to fine.
+//
+// One annealing run from a warm start costs `O(I J)`, which is too much for tens of thousands of
+// points. A well-spread sample of either set (every 8ᵏ-th point in the order of a k-d tree) is
+// registered first: its points are not each other's partners, but the field that takes one density
+// onto the other is the whole set's [Hirose, *Acceleration of non-rigid point set registration with
+// downsampling and Gaussian process regression*, IEEE TPAMI 43 (2021)]. The field is extended to a
+// sample eight times as large, which starts no warmer than the coarser sample was dense, and so on
+// to all points. There only targets within a few spacings are looked at: time `O(I r²)` an
+// iteration with r ≤ 64 modes of the prior, memory `O(I r)`.
 
 /// Sets of which both have so many points are matched coarse to fine.
 pub(super) const LARGE: usize = 4000;
-/// The coarsest sample has at least so many points: fewer show too little of a set's shape.
-const COARSEST: usize = 500;
-/// A sample is annealed down to so many of its spacings: its points are no partners, and nearer than that there is nothing to see. Half as
-/// much takes twice the time and leaves noisy sets below their noise (`--example large_sets`).
-const SAMPLED: f64 = 1.0;
-/// First temperature of a level in spacings of the coarser one.
-const FIRST: f64 = 1.0;
-/// Gaussians fainter than this are left out in large sets: the positions move by a thousandth of the temperature.
-const FAINTEST: f64 = 1e-4;
-/// Rounds in which warp and noise level follow each other at the end of noisy sets.
-const SETTLING: usize = 4;
-
-/// Points whose local patterns are compared first, and how far away their candidates may be: in spacings, so many times farther where those
-/// do not agree on a field, and at most in radii of the model.
-const SEEDS: usize = 120;
-const SEED_SPACINGS: f64 = 8.0;
-const SEED_GROWTH: f64 = 2.5;
-const SEED_REACH: f64 = 0.25;
-/// Points and reach, in spacings, of the patterns that make the seeds' field exact.
-const GROWN: usize = 1000;
-const GROWN_SPACINGS: f64 = 4.0;
-/// Patterns are believed where so large a share of them lies within a spacing of one field: of wrong candidates a sixteenth does.
-const AGREED: f64 = 0.3;
-/// First temperature after the patterns, in spacings.
-const NEAR_BY: f64 = 0.4;
-/// Where noise hides the patterns, all points are annealed as the residuals decide, until residuals and temperature, as variances, differ by less
-/// than this share. A tenth of it takes a tenth more time for the same errors; ten iterations alone leave volumes three noise widths from
-/// the truth (`--example large_sets -- 20000 volume 0.01 0.2`).
-const NOISY_STILL: f64 = 1e-3;
 
 impl AnnealedSoftassign {
     /// Whether sets of these sizes are matched coarse to fine.
-    pub(super) fn is_large<const D: usize>(ws: &SoftassignWorkspace<D>) -> bool {
+    pub(super) fn is_large<const D: usize>(&self, ws: &SoftassignWorkspace<D>) -> bool {
         ws.model.len().min(ws.target.len()) >= LARGE
     }
 
@@ -59,69 +39,85 @@ impl AnnealedSoftassign {
     ) -> ControlFlow<()> {
         let smaller = ws.model.len().min(ws.target.len());
         let mut stride = 1;
-        while smaller / (stride * STEP) >= COARSEST {
+        // The coarsest sample has at least so many points: fewer show too little of a set's shape.
+        while smaller / (stride * STEP) >= 500 {
             stride *= STEP;
         }
-        ws.annealer.volume = bounding_volume(&ws.target);
         let mut levels = std::mem::take(&mut ws.levels);
         levels.model_order.build(&ws.model);
         levels.target_order.build(&ws.target);
         let mut flow = self.coarsest(ws, &mut levels, stride, observe);
         while stride > 1 {
-            let sigma = FIRST * ws.spacing;
+            // First temperature of a level in spacings of the coarser one.
+            let sigma = 1.0 * ws.spacing;
             stride /= STEP;
             levels.coarse.copy_from(&ws.state);
             self.enter(ws, &mut levels, stride);
             levels.extend(&mut ws.annealer, stride, STEP, &mut ws.state);
             let run = if stride > 1 {
                 self.sampled(ws, sigma)
-            } else if self.follow_sampled_patterns(ws, &mut levels) {
-                Schedule {
-                    sigma: NEAR_BY * ws.spacing,
-                    ..self.schedule(FAST)
-                }
+            } else if self.has(Mechanism::LargePatterns)
+                && self.follow_sampled_patterns(ws, &mut levels)
+            {
+                self.schedule(Cooling {
+                    // First temperature after the patterns, in spacings.
+                    sigma: 0.4 * ws.spacing,
+                    ..FAST
+                })
             } else {
-                Schedule {
+                self.schedule(Cooling {
                     sigma,
                     least: 1.0,
-                    still: NOISY_STILL,
-                    ..self.schedule(FAST)
-                }
+                    // Where noise hides the patterns, all points are annealed as the residuals
+                    // decide, until residuals and temperature, as variances, differ by less than
+                    // this share. A tenth of it takes a tenth more time for the same errors. Ten
+                    // iterations alone leave volumes three noise widths from the truth
+                    // (`--example large_sets -- 20000 volume 0.01 0.2`).
+                    still: 1e-3,
+                    ..FAST
+                })
             };
             flow = refine(ws, run, flow, observe);
         }
         let schedule = self.schedule(FAST);
-        let noisy = ws.state.sigma > finish::CLEAN || ws.annealer.soft.errors.differ();
+        let noisy = ws.state.sigma > CLEAN_SIGMA || ws.annealer.soft.errors.differ();
         if flow.is_continue() && noisy {
-            ws.annealer.settle(&mut ws.state, &schedule, SETTLING);
+            // Rounds in which warp and noise level follow each other at the end of noisy sets.
+            ws.annealer.settle(&mut ws.state, &schedule, 4);
         }
         ws.levels = levels;
         ws.starts = 1;
         ws.state.energy = f64::INFINITY;
-        ws.state.tail = ws.annealer.tail(NOTICED * ws.spacing);
+        ws.state.tail = ws.annealer.tail(0.1 * ws.spacing);
         ws.best.copy_from(&ws.state);
         if !self.is_exact(ws) {
-            ws.annealer.evaluate(&mut ws.state, self.share, RESOLUTION);
+            ws.annealer
+                .evaluate(&mut ws.state, self.share, ENERGY_RESOLUTION);
             ws.best.copy_from(&ws.state);
         }
         flow
     }
 
-    /// Puts `ws.state` where local patterns agree it belongs: first those of a few points with candidates far away, then those of many
-    /// with candidates near the field found. False, and no change, where they do not agree.
+    /// Puts `ws.state` where local patterns agree it belongs: first those of a few points with
+    /// candidates far away, then those of many with candidates near the field found. False, and no
+    /// change, where they do not agree.
     fn follow_sampled_patterns<const D: usize>(
         &self,
         ws: &mut SoftassignWorkspace<D>,
         levels: &mut Levels<D>,
     ) -> bool {
-        let mut reach = SEED_SPACINGS * ws.spacing;
-        while !follow_patterns_of(ws, levels, SEEDS, reach.min(SEED_REACH)) {
-            if reach >= SEED_REACH {
+        let mut reach = 8.0 * ws.spacing;
+        // Points whose local patterns are compared first, and how far away their candidates may be:
+        // in spacings, so many times farther where those do not agree on a field, and at most in
+        // radii of the model.
+        while !follow_patterns_of(ws, levels, 120, reach.min(MAX_PATTERN_REACH)) {
+            if reach >= MAX_PATTERN_REACH {
                 return false;
             }
-            reach *= SEED_GROWTH;
+            reach *= 2.5;
         }
-        follow_patterns_of(ws, levels, GROWN, GROWN_SPACINGS * ws.spacing)
+        // Points and reach, in spacings, of the patterns that make the seeds' field exact.
+        follow_patterns_of(ws, levels, 1000, 4.0 * ws.spacing)
     }
 
     /// Sets up targets, prior and spacing of a level.
@@ -150,7 +146,8 @@ impl AnnealedSoftassign {
         ws.spacing = ws.patterns.typical_spacing(&levels.target);
     }
 
-    /// The coarsest level, from the centroids; where any rotation is allowed the best of several starts.
+    /// The coarsest level, from the centroids. Where any rotation is allowed the best of several
+    /// starts.
     fn coarsest<const D: usize>(
         &self,
         ws: &mut SoftassignWorkspace<D>,
@@ -166,10 +163,11 @@ impl AnnealedSoftassign {
         if self.rotation == Rotation::Limited {
             return ControlFlow::Continue(());
         }
-        ws.annealer.evaluate(&mut ws.state, self.share, RESOLUTION);
+        ws.annealer
+            .evaluate(&mut ws.state, self.share, ENERGY_RESOLUTION);
         ws.best.copy_from(&ws.state);
         let mut base = levels.base.clone();
-        for rotation in starts::rotations::<D>(starts::ANY) {
+        for rotation in starts::rotations::<D>(self.rotation) {
             starts::moments(&ws.model, &ws.target, &rotation, &mut levels.base);
             levels.sample(
                 &ws.model,
@@ -180,7 +178,8 @@ impl AnnealedSoftassign {
             ws.state.warped.clone_from(&ws.state.base);
             let run = self.sampled(ws, FAST.sigma);
             refine(ws, run, ControlFlow::Continue(()), observe)?;
-            ws.annealer.evaluate(&mut ws.state, self.share, RESOLUTION);
+            ws.annealer
+                .evaluate(&mut ws.state, self.share, ENERGY_RESOLUTION);
             if ws.state.energy < ws.best.energy {
                 ws.best.copy_from(&ws.state);
                 base.clone_from(&levels.base);
@@ -194,14 +193,16 @@ impl AnnealedSoftassign {
     /// How a sample is annealed.
     fn sampled<const D: usize>(&self, ws: &SoftassignWorkspace<D>, sigma: f64) -> Schedule {
         Schedule {
-            sigma,
-            floor: SAMPLED * ws.spacing,
-            ..self.schedule(FAST)
+            // A sample is annealed down to so many of its spacings: its points are no partners, and
+            // nearer than that there is nothing to see. Half as much takes twice the time and
+            // leaves noisy sets below their noise (`--example large_sets`).
+            floor: 1.0 * ws.spacing,
+            ..self.schedule(Cooling { sigma, ..FAST })
         }
     }
 }
 
-/// One annealing run of a level; a single silent iteration where the caller has had enough.
+/// One annealing run of a level. A single silent iteration where the caller has had enough.
 fn refine<const D: usize>(
     ws: &mut SoftassignWorkspace<D>,
     schedule: Schedule,
@@ -210,7 +211,9 @@ fn refine<const D: usize>(
 ) -> ControlFlow<()> {
     ws.state.trace.clear();
     ws.state.iterations = 0;
-    ws.annealer.soft.faintest = FAINTEST;
+    // Gaussians fainter than this are left out in large sets: the positions move by a thousandth of
+    // the temperature.
+    ws.annealer.soft.faintest = 1e-4;
     if flow.is_continue() {
         return ws.annealer.run(&mut ws.state, &schedule, observe);
     }
@@ -224,7 +227,8 @@ fn refine<const D: usize>(
     flow
 }
 
-/// Puts `ws.state` onto the field that the local patterns of about `points` model points agree on; candidates lie up to `reach` away.
+/// Puts `ws.state` onto the field that the local patterns of about `points` model points agree on.
+/// Candidates lie up to `reach` away.
 fn follow_patterns_of<const D: usize>(
     ws: &mut SoftassignWorkspace<D>,
     levels: &mut Levels<D>,
@@ -235,7 +239,7 @@ fn follow_patterns_of<const D: usize>(
     let order = &levels.model_order.order;
     let rows = order.iter().step_by(step).copied();
     let (warped, target) = (&ws.state.warped, &*ws.target);
-    if !ws.patterns.propose_for(rows.clone(), warped, target, reach) {
+    if !ws.patterns.propose(rows.clone(), warped, target, reach) {
         return false;
     }
     levels.model.clear();
@@ -251,7 +255,9 @@ fn follow_patterns_of<const D: usize>(
     ws.consensus
         .fit(&mut ws.annealer, SCALES, sets, pairs, coarse);
     std::mem::swap(&mut ws.annealer.prior, &mut levels.sampled);
-    let agreed = agreement(target, pairs, &coarse.warped, ws.spacing) >= AGREED;
+    // Patterns are believed where so large a share of them lies within a spacing of one field: of
+    // wrong candidates a sixteenth does.
+    let agreed = agreement(target, pairs, &coarse.warped, ws.spacing) >= 0.3;
     if agreed {
         levels.extend(&mut ws.annealer, 1, step, &mut ws.state);
     }
@@ -271,4 +277,97 @@ fn agreement<const D: usize>(
     };
     let agreeing = pairs.iter().zip(warped).filter(near).count();
     agreeing as f64 / pairs.len().max(1) as f64
+}
+
+// Samples of large sets, and fields that are extended from one to the next.
+
+/// Points of a level for one of the next coarser level.
+const STEP: usize = 8;
+
+/// Samples of both sets, and where the coarser level put its points.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Levels<const D: usize> {
+    model_order: Blocks<D>,
+    target_order: Blocks<D>,
+    model: Vec<[f64; D]>,
+    target: Vec<[f64; D]>,
+    /// Standard deviations of the targets. Empty where the caller did not tell them.
+    deviations: Vec<f64>,
+    /// Where the start puts all model points.
+    base: Vec<[f64; D]>,
+    coarse: State<D>,
+    weights: Vec<f64>,
+    wanted: Axes<D>,
+    /// The prior at the points whose patterns are compared.
+    sampled: Prior,
+}
+
+impl<const D: usize> Levels<D> {
+    /// The sample of every `stride`-th point. All points in their own order for 1. Also sets the
+    /// sample's base in `state`.
+    fn sample(
+        &mut self,
+        model: &[[f64; D]],
+        (target, deviations): (&[[f64; D]], &[f64]),
+        stride: usize,
+        state: &mut State<D>,
+    ) {
+        state.base.clear();
+        self.model.clear();
+        self.target.clear();
+        self.deviations.clear();
+        if stride == 1 {
+            state.base.extend_from_slice(&self.base);
+            self.model.extend_from_slice(model);
+            self.target.extend_from_slice(target);
+            self.deviations.extend_from_slice(deviations);
+            return;
+        }
+        let rows = self.model_order.order.iter().step_by(stride);
+        state.base.extend(rows.clone().map(|&i| self.base[i]));
+        self.model.extend(rows.map(|&i| model[i]));
+        let rows = self.target_order.order.iter().step_by(stride);
+        self.target.extend(rows.clone().map(|&j| target[j]));
+        if !deviations.is_empty() {
+            self.deviations.extend(rows.map(|&j| deviations[j]));
+        }
+    }
+
+    /// The field of `coarse`, every `step`-th point of the level of this stride, at all points of
+    /// that level, in `state.warped`.
+    fn extend(
+        &mut self,
+        annealer: &mut Annealer<D>,
+        stride: usize,
+        step: usize,
+        state: &mut State<D>,
+    ) {
+        let padded = annealer.prior.stride;
+        let order = &self.model_order.order;
+        let row_of = |coarse: usize| match stride {
+            1 => order[coarse * step],
+            _ => coarse * step,
+        };
+        self.weights.clear();
+        self.weights.resize(padded, 0.0);
+        self.wanted
+            .fill(padded, state.base.iter().map(|_| [0.0; D]));
+        for (k, (warped, base)) in self.coarse.warped.iter().zip(&self.coarse.base).enumerate() {
+            let row = row_of(k);
+            self.weights[row] = 1.0;
+            for d in 0..D {
+                self.wanted.0[d][row] = warped[d] - base[d];
+            }
+        }
+        // Variance of a coarse field's values when it is extended: what its factor left out.
+        annealer
+            .regression
+            .fit(&annealer.prior, &self.weights, &self.wanted, 1e-6);
+        let field = &annealer.regression.displacement;
+        state.warped.clear();
+        let rows = state.base.iter().enumerate();
+        state
+            .warped
+            .extend(rows.map(|(i, b)| std::array::from_fn(|d| b[d] + field.0[d][i])));
+    }
 }

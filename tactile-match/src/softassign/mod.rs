@@ -1,84 +1,62 @@
-//! The default matcher: annealed softassign with a Gaussian-process prior on the warp and leave-one-out prediction.
+//! The default matcher: annealed softassign with a Gaussian-process prior on the warp and
+//! leave-one-out prediction.
 //!
-//! Given where the warp puts the model points, the soft assignment `m_ij ∝ exp(−|yᵢ − tⱼ|²/2σ²)`, made doubly stochastic with slack, says
-//! how likely every pair is; given the pairs, the warp is the posterior mean of a smooth random field through the soft partners. The two
-//! steps alternate while the temperature σ falls [Gold, Rangarajan et al., *New algorithms for 2-D and 3-D point matching*, Pattern
-//! Recognition 31 (1998); Chui & Rangarajan, *A new point matching algorithm for non-rigid registration*, CVIU 89 (2003)].
+//! Given where the warp puts the model points, the soft assignment `m_ij ∝ exp(−|yᵢ − tⱼ|²/2σ²)`,
+//! made doubly stochastic with slack, says how likely every pair is. Given the pairs, the warp is
+//! the posterior mean of a smooth random field through the soft partners. The two steps alternate
+//! while the temperature σ falls [Gold, Rangarajan et al., *New algorithms for 2-D and 3-D point
+//! matching*, Pattern Recognition 31 (1998); Chui & Rangarajan, *A new point matching algorithm for
+//! non-rigid registration*, CVIU 89 (2003)].
 //!
-//! - Distances are taken from the *leave-one-out* prediction of the warp, so that a wrong match does not confirm itself.
-//! - The field's covariance has few modes: a fit costs `O(I r²)` with r near 30, and its leverages come with it.
-//! - Most scenes are easy and end with the first run (`search`). Others get further starts: local patterns of dense sets (`patterns`),
-//!   relaxation labelling (19), (20) over the candidates that shape contexts propose (`correspond`), the moments, and the affine map that
-//!   local tuples of points agree on (`tuples`).
-//!   The start of least energy wins: minus the logarithm of the targets' likelihood and of the warp's prior.
+//! - Distances are taken from the *leave-one-out* prediction of the warp, so that a wrong match
+//!   does not confirm itself.
+//! - The field's covariance has few modes: a fit costs `O(I r²)` with r near 30, and its leverages
+//!   come with it.
+//! - Most scenes are easy and end with the first run (`search`). Others get further starts: local
+//!   patterns of dense sets (`patterns`), relaxation labelling (19), (20) over the candidates that
+//!   shape contexts propose (`correspond`), the moments, and the affine map that local tuples of
+//!   points agree on (`tuples`). The start of least energy wins: minus the logarithm of the
+//!   targets' likelihood and of the warp's prior.
 //!
-//! Where the residuals are rounding the data are clean, and matched points go exactly onto their partners. Where they are
-//! noise the warp is averaged over the scales of the prior by their evidence (`scales`), unless the matches themselves are undecided. The
-//! final warp is the thin-plate spline through the estimated positions.
+//! Where the residuals are rounding the data are clean, and matched points go exactly onto their
+//! partners. Where they are noise the warp is averaged over the scales of the prior by their
+//! evidence (`scales`), unless the matches themselves are undecided. The final warp is the
+//! thin-plate spline through the estimated positions.
 //!
-//! An iteration costs the pairs within reach of the temperature, at most `O(I J)`, in time and in memory. Sets of four thousand points and
-//! more are matched coarse to fine (`large`), where those pairs are a few hundred a point. Everything else is computed in double precision, whatever the type of the points.
+//! An iteration costs the pairs within reach of the temperature, at most `O(I J)`, in time and in
+//! memory. Sets of four thousand points and more are matched coarse to fine (`large`), where those
+//! pairs are a few hundred a point. Everything else is computed in double precision, whatever the
+//! type of the points.
 
 mod anneal;
-mod axes;
-#[cfg(feature = "rayon")]
-mod batch;
-mod blocks;
-mod candidate_labels;
-mod cells;
-mod columns;
+mod assign;
 mod confidence;
-mod consensus;
 mod correspond;
-mod extrapolate;
-mod finish;
-mod found;
-mod frame;
-mod gated;
-mod known;
-mod landmarks;
-mod lanes;
 mod large;
-mod levels;
-mod locality;
-mod moments;
-mod next;
+mod model;
 mod options;
 mod patterns;
-mod prior;
-mod regression;
-mod rigid;
-mod row_sums;
-mod scales;
-mod schedule;
+mod result;
 mod search;
-mod series;
-mod soft_assign;
-mod spline;
-mod spread;
 mod starts;
-mod target_errors;
-mod tuples;
 
-pub use found::SoftassignMatch;
-pub use landmarks::Landmark;
-pub use options::{AnnealedSoftassign, Outliers, Rotation, Search, Transformation};
+pub use options::{
+    AnnealedSoftassign, Landmark, Mechanism, Outliers, Rotation, Search, Transformation,
+};
+pub use result::SoftassignMatch;
 
-use crate::{Doubt, MatchError, MatchedPairs, Matching, PointMatcher, WarmStart, validate};
-use anneal::Annealer;
-use consensus::Consensus;
+use crate::{Doubt, MatchError, MatchedPairs, Matching, PointMatcher, WarmStart, error};
+use crate::{centre_and_radius, widened};
+use assign::{Blocks, TargetErrors};
+use confidence::PairOdds;
 use correspond::Correspondence;
-use finish::Answer;
-use frame::Frame;
-use known::Known;
-use levels::Levels;
-use nalgebra::Point;
-use patterns::LocalPatterns;
-use scales::ScaleAverage;
-use schedule::State;
-use series::Series;
+use large::Levels;
+use model::{Prior, RigidFit, ScaleAverage};
+use nalgebra::{Point, SVector};
+use patterns::{Candidate, Cells, Consensus, GatedNearest};
+use result::Series;
+use starts::Tuples;
 use std::ops::ControlFlow;
-use tuples::Tuples;
 
 /// Memory that matches use again and again.
 ///
@@ -86,12 +64,23 @@ use tuples::Tuples;
 /// use nalgebra::Point2;
 /// use std::ops::ControlFlow;
 /// use tactile_match::{AnnealedSoftassign, SoftassignWorkspace};
-/// let model = [[0.0, 0.0], [1.0, 0.1], [0.2, 1.0], [1.1, 1.2], [0.5, 0.4], [1.8, 0.3]].map(Point2::from);
+/// let model = [
+///     [0.0, 0.0],
+///     [1.0, 0.1],
+///     [0.2, 1.0],
+///     [1.1, 1.2],
+///     [0.5, 0.4],
+///     [1.8, 0.3],
+/// ]
+/// .map(Point2::from);
 /// let mut workspace = SoftassignWorkspace::default();
-/// for load in [0.02, 0.05, 0.1] { // a sequence of frames: memory is taken once
+/// for load in [0.02, 0.05, 0.1] {
+///     // a sequence of frames: memory is taken once
 ///     let target = model.map(|p| Point2::new(p.x + load * p.y, p.y));
 ///     let matcher = AnnealedSoftassign::default();
-///     let found = matcher.match_points_with(&mut workspace, &model, &target, |_, _| ControlFlow::Continue(()))?;
+///     let found = matcher.match_points_with(&mut workspace, &model, &target, |_, _| {
+///         ControlFlow::Continue(())
+///     })?;
 ///     assert!((0..6).all(|i| found.assignment[i] == Some(i)));
 /// }
 /// # Ok::<(), tactile_match::MatchError>(())
@@ -112,49 +101,33 @@ pub struct SoftassignWorkspace<const D: usize> {
     scales: ScaleAverage<D>,
     levels: Levels<D>,
     known: Vec<Known<D>>,
-    /// Standard deviations of the targets; empty where the caller did not tell them.
+    /// Standard deviations of the targets. Empty where the caller did not tell them.
     deviations: Vec<f64>,
     /// Typical distance of a target from the next, once the search asks for it.
     spacing: f64,
     /// Share of points without a partner that the caller expects.
     expected_share: f64,
     starts: usize,
-    /// Whether a slow run from the centroids has ended in the best answer before it, whose soft partners spread no farther than noise makes
-    /// them.
-    confirmed: bool,
     stopped: bool,
 }
-
-/// A larger share of residuals that the noise of the others does not explain is that of a part of the set that lies aside.
-const PART_ASIDE: f64 = 0.08;
-
-/// Where one set is partly out of sight, answers with more gain than this show no part aside, nor do those with pairs as sure as this and
-/// surroundings as even as this. Chosen to flag all of ten cropped and stretched scenes that were wrong without a doubt, at the cost of a doubt
-/// about one scene in ten that is right (`--example confidence`).
-const PLAIN: f64 = 1.4;
-const SURE: f64 = 0.965;
-const UNEVEN: f64 = 1.75;
 
 impl<const D: usize> SoftassignWorkspace<D> {
     /// Why the answer is not to be relied on.
     fn doubt(&self) -> Option<Doubt> {
         let smaller = self.model.len().min(self.target.len());
         let doubt = self.answer.doubt(smaller, self.expected_share);
-        let by_chance = self.gain().is_some_and(|gain| gain < finish::TELLING);
-        let misfit = by_chance || self.best.tail > PART_ASIDE || self.may_lie_aside();
+        let by_chance = self
+            .gain()
+            .is_some_and(|gain| gain < confidence::MIN_TELLING_GAIN);
+        // A larger share of residuals that the noise of the others does not explain is that of a
+        // part of the set that lies aside.
+        let misfit = by_chance || self.best.tail > 0.08;
         doubt.or(misfit.then_some(Doubt::LargeResiduals))
     }
 
-    /// Whether a part of one set that is partly out of sight may lie a point aside: the answer is not much likelier than chance, and its
-    /// pairs are not all sure, or a surrounding fits far worse than the others.
-    fn may_lie_aside(&self) -> bool {
-        let unequal = finish::are_unequal(self.model.len(), self.target.len());
-        let plain = self.gain().is_none_or(|gain| gain >= PLAIN);
-        unequal && !plain && (self.answer.sureness() < SURE || self.answer.contrast() > UNEVEN)
-    }
-
-    /// How much more likely the best answer makes the targets than points strewn over their bounding box, warp and all, as a logarithm
-    /// a point of the smaller set; `None` where an exact first run had nothing to be compared with.
+    /// How much more likely the best answer makes the targets than points strewn over their
+    /// bounding box, warp and all, as a logarithm a point of the smaller set. `None` where an exact
+    /// first run had nothing to be compared with.
     fn gain(&self) -> Option<f64> {
         let smaller = self.model.len().min(self.target.len()) as f64;
         let strewn = self.target.len() as f64 * self.annealer.volume.ln();
@@ -168,7 +141,7 @@ impl<const D: usize> SoftassignWorkspace<D> {
         model: &[Point<f64, D>],
         target: &[Point<f64, D>],
     ) -> Result<(), MatchError> {
-        validate::point_sets(model, target)?;
+        error::point_sets(model, target)?;
         let frame = Frame::new(model, target);
         self.frame = frame;
         self.model.clear();
@@ -182,22 +155,37 @@ impl<const D: usize> SoftassignWorkspace<D> {
 }
 
 impl AnnealedSoftassign {
-    /// As [`PointMatcher::match_points`] in the caller's workspace; nothing is allocated once that has grown.
+    /// As [`PointMatcher::match_points`] in the caller's workspace. Nothing is allocated once that
+    /// has grown.
     ///
-    /// `observe` hears the iteration and the energy after every outer iteration and may stop the search: the best answer
-    /// so far is then returned.
+    /// `observe` hears the iteration and the energy after every outer iteration and may stop the
+    /// search: the best answer so far is then returned.
     ///
     /// ```
     /// use nalgebra::Point2;
     /// use std::ops::ControlFlow;
     /// use tactile_match::{AnnealedSoftassign, SoftassignWorkspace};
     /// # fn main() -> Result<(), tactile_match::MatchError> {
-    /// let model: Vec<Point2<f64>> =
-    ///     (0..30).map(|i| Point2::new(f64::from(i % 6) + 0.1 * f64::from(i * i % 7), f64::from(i / 6))).collect();
-    /// let target: Vec<Point2<f64>> = model.iter().rev().map(|p| Point2::new(1.1 * p.x + 0.1 * p.y, p.y)).collect();
+    /// let model: Vec<Point2<f64>> = (0..30)
+    ///     .map(|i| {
+    ///         Point2::new(
+    ///             f64::from(i % 6) + 0.1 * f64::from(i * i % 7),
+    ///             f64::from(i / 6),
+    ///         )
+    ///     })
+    ///     .collect();
+    /// let target: Vec<Point2<f64>> = model
+    ///     .iter()
+    ///     .rev()
+    ///     .map(|p| Point2::new(1.1 * p.x + 0.1 * p.y, p.y))
+    ///     .collect();
     /// let mut workspace = SoftassignWorkspace::default();
-    /// let found = AnnealedSoftassign::default()
-    ///     .match_points_with(&mut workspace, &model, &target, |_, _| ControlFlow::Continue(()))?;
+    /// let found = AnnealedSoftassign::default().match_points_with(
+    ///     &mut workspace,
+    ///     &model,
+    ///     &target,
+    ///     |_, _| ControlFlow::Continue(()),
+    /// )?;
     /// assert_eq!(found.assignment[3], Some(26));
     /// # Ok(())
     /// # }
@@ -254,4 +242,311 @@ impl<const D: usize> PointMatcher<D> for AnnealedSoftassign {
         series.pairs(pairs);
         Ok(())
     }
+}
+
+/// Points without a partner: their expected share, and how far each side may have them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Slack {
+    share: f64,
+    model: f64,
+    target: f64,
+}
+
+/// How the temperature of a run falls.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Cooling {
+    /// First temperature, as a standard deviation in radii of the model.
+    sigma: f64,
+    /// Largest fall of σ an iteration, as a factor.
+    rate: f64,
+    /// Smallest fall of σ an iteration, as a factor. With 1 the residuals decide.
+    least: f64,
+    /// Iterations after which a temperature that no longer falls is the last.
+    patience: usize,
+    /// The same for the first temperature: a start colder than the noise.
+    stuck: usize,
+    /// Sinkhorn sweeps an iteration.
+    sweeps: usize,
+    /// Undecided matches stand still when residuals and temperature, as variances, differ by less
+    /// than this share.
+    still: f64,
+}
+
+/// One annealing run.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Schedule {
+    cooling: Cooling,
+    /// Lowest temperature.
+    floor: f64,
+    /// Most iterations.
+    limit: usize,
+    /// A cold run that matches fewer points has collapsed and ends.
+    collapse: f64,
+    /// So many points can have a partner: with nearly all of them matched, residuals that no longer
+    /// fall are noise.
+    partners: f64,
+    /// What is expected of points without a partner.
+    slack: Slack,
+}
+
+/// Where a run stands.
+#[derive(Clone, Debug, Default)]
+struct State<const D: usize> {
+    /// Where the run's prior puts the model points.
+    base: Vec<[f64; D]>,
+    /// Where the warp puts them.
+    warped: Vec<[f64; D]>,
+    /// Standard deviation of the residuals along one axis.
+    sigma: f64,
+    /// Model points matched, in all.
+    matched: f64,
+    /// Iterations made.
+    iterations: usize,
+    /// Energy per model point after every iteration.
+    trace: Vec<f64>,
+    /// What the run is judged by. Less is better.
+    energy: f64,
+    /// Whether the temperature stopped falling before the limit.
+    settled: bool,
+    /// Share of the matched points whose residual the noise of the others does not explain, see
+    /// [`Annealer::tail`].
+    tail: f64,
+    /// Spread of the soft partners within a row, relative to the temperature: 1 undecided, 0
+    /// decided.
+    ambiguity: f64,
+}
+
+impl<const D: usize> State<D> {
+    fn copy_from(&mut self, other: &Self) {
+        self.base.clone_from(&other.base);
+        self.warped.clone_from(&other.warped);
+        self.trace.clone_from(&other.trace);
+        (self.sigma, self.iterations) = (other.sigma, other.iterations);
+        (self.energy, self.settled, self.matched) = (other.energy, other.settled, other.matched);
+        (self.tail, self.ambiguity) = (other.tail, other.ambiguity);
+    }
+}
+
+/// Beyond this many radii a coordinate is as good as at infinity, and its square is still finite in
+/// single precision.
+const FARTHEST: f64 = 1e12;
+
+/// The centroids, and the length that is one inside the matcher.
+#[derive(Clone, Copy, Debug)]
+struct Frame<const D: usize> {
+    model: SVector<f64, D>,
+    target: SVector<f64, D>,
+    scale: f64,
+}
+
+impl<const D: usize> Default for Frame<D> {
+    fn default() -> Self {
+        Self {
+            model: SVector::zeros(),
+            target: SVector::zeros(),
+            scale: 1.0,
+        }
+    }
+}
+
+impl<const D: usize> Frame<D> {
+    /// The frame of two sets. The radius of `target` stands in for a model without extent, 1 if
+    /// that has none either.
+    fn new(model: &[Point<f64, D>], target: &[Point<f64, D>]) -> Self {
+        let sets = [model, target].map(centre_and_radius);
+        // Below the rounding of the coordinates the radius is noise: such a set is one point.
+        let extended = |(centre, radius): &(SVector<f64, D>, f64)| {
+            *radius > 8.0 * f64::EPSILON * centre.amax()
+        };
+        let scale = sets
+            .iter()
+            .find(|set| extended(set))
+            .map_or(1.0, |set| set.1);
+        Self {
+            model: sets[0].0,
+            target: sets[1].0,
+            scale,
+        }
+    }
+
+    /// A model point in the frame.
+    fn model(&self, point: &Point<f64, D>) -> [f64; D] {
+        self.inward(widened(point) - self.model)
+    }
+
+    /// A target point in the frame.
+    fn target(&self, point: &Point<f64, D>) -> [f64; D] {
+        self.inward(widened(point) - self.target)
+    }
+
+    fn inward(&self, offset: SVector<f64, D>) -> [f64; D] {
+        std::array::from_fn(|k| (offset[k] / self.scale).clamp(-FARTHEST, FARTHEST))
+    }
+
+    /// A warped point, which lies among the targets, in the units of the caller.
+    fn outward(&self, point: &[f64; D]) -> Point<f64, D> {
+        Point::from(std::array::from_fn(|k| {
+            point[k] * self.scale + self.target[k]
+        }))
+    }
+}
+
+/// Mean of points already in the frame.
+fn mean<const D: usize>(points: &[[f64; D]]) -> [f64; D] {
+    let mut centre = [0.0; D];
+    for point in points {
+        (0..D).for_each(|k| centre[k] += point[k]);
+    }
+    centre.map(|c| c / points.len() as f64)
+}
+
+/// Scales of the prior, in radii of the model.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct PriorScales {
+    /// Length ℓ over which the warp bends.
+    length: f64,
+    /// Standard deviation τ of the bending displacement.
+    bending: f64,
+    /// Standard deviation τₐ of the affine part's entries.
+    affine: f64,
+}
+
+/// Displacements that the model points should have, and how much each counts. Both padded with
+/// zeros.
+#[derive(Clone, Copy)]
+struct Request<'a, const D: usize> {
+    weights: &'a [f64],
+    displacements: &'a Axes<D>,
+}
+
+/// What the affinities are: `exp(−s |yᵢ − tⱼ|²/2σ²)`, wider and lower for targets that are less
+/// precise than others.
+#[derive(Clone, Copy, Debug)]
+struct Gaussian {
+    /// The variance σ² of the most precise targets.
+    variance: f64,
+    /// The power s that they are raised to.
+    sharpness: f64,
+}
+
+/// A landmark in the units of the frame.
+#[derive(Clone, Copy, Debug)]
+struct Known<const D: usize> {
+    row: usize,
+    position: [f64; D],
+    /// Variance along an axis.
+    variance: f64,
+}
+
+/// Shared machinery of the runs: targets, prior, scratch.
+#[derive(Clone, Debug, Default)]
+struct Annealer<const D: usize> {
+    soft: SoftAssignment<D>,
+    prior: Prior,
+    regression: Regression<D>,
+    /// Takes the regression's place where the warp may not bend.
+    rigid: RigidFit<D>,
+    /// What the caller knows of some model points.
+    known: Vec<Known<D>>,
+    /// Volume of the targets' bounding box.
+    volume: f64,
+    weights: Vec<f64>,
+    residuals: Axes<D>,
+    predicted: Vec<[f64; D]>,
+    sums: Vec<f64>,
+    /// Spread of the soft partners within a row, relative to the temperature: 1 undecided, 0
+    /// decided.
+    ambiguity: f64,
+}
+
+/// The answer in the frame's units.
+#[derive(Clone, Debug, Default)]
+struct Answer<const D: usize> {
+    warped: Vec<[f64; D]>,
+    assignment: Vec<Option<usize>>,
+    confidence: Vec<f64>,
+    /// Posterior variance of the positions, along one axis.
+    variance: Vec<f64>,
+    residual: f64,
+    column_best: Vec<(f64, usize)>,
+    odds: PairOdds,
+}
+
+/// Sums over the rows of M, each entry times a power of its target's precision.
+#[derive(Clone, Debug, Default)]
+struct RowMoments<const D: usize> {
+    /// Row sums without the slack.
+    weight: Vec<f64>,
+    /// Mean of `tⱼ − yᵢ` under row i.
+    shift: Vec<[f64; D]>,
+    /// Sum of `m_ij |tⱼ − yᵢ|²` over row i.
+    spread: Vec<f64>,
+}
+
+/// Moments with the entries times the precisions of their targets to the power of 0, 1 and 2.
+#[derive(Clone, Debug, Default)]
+struct AllMoments<const D: usize> {
+    powers: [RowMoments<D>; 3],
+    /// Column scales times precisions.
+    factors: Vec<f32>,
+    /// Whether the powers differ. Otherwise there is the first alone.
+    differ: bool,
+}
+
+/// The match matrix in factored form, with the moments of its rows. Columns stand in the order of
+/// the blocks.
+#[derive(Clone, Debug)]
+struct SoftAssignment<const D: usize> {
+    blocks: Blocks<D>,
+    /// How precise the targets are.
+    errors: TargetErrors,
+    /// Affinities so much fainter than the largest there can be are left out.
+    faintest: f64,
+    /// Where the blocks of every row begin in `active`, and one past the last.
+    starts: Vec<usize>,
+    active: Vec<u32>,
+    reach: Vec<f32>,
+    kernel: Vec<f32>,
+    row_scale: Vec<f32>,
+    column_scale: Vec<f32>,
+    column_sum: Vec<f32>,
+    /// Moments of the rows.
+    moments: AllMoments<D>,
+}
+
+/// One array an axis, each padded with zeros to whole vectors.
+#[derive(Clone, Debug)]
+struct Axes<const D: usize>([Vec<f64>; D]);
+
+/// Memory and answer of a regression.
+#[derive(Clone, Debug, Default)]
+struct Regression<const D: usize> {
+    gram: Vec<f64>,
+    solution: Vec<[f64; D]>,
+    weighted: Vec<f64>,
+    whitened: Vec<f64>,
+    /// `ln det(1 + LᵀWL/σ²)`.
+    log_det: f64,
+    /// Displacements, one array an axis, padded like the prior's columns.
+    displacement: Axes<D>,
+    /// Their variances along one axis, once [`variances`](Self::variances) has been called.
+    variance: Vec<f64>,
+    noise: f64,
+    rank: usize,
+}
+
+/// Memory of the start.
+#[derive(Clone, Debug, Default)]
+struct LocalPatterns<const D: usize> {
+    /// Where candidates and where neighbours' targets are looked up.
+    targets: Cells<D>,
+    gated: GatedNearest<D>,
+    model: Cells<D>,
+    offsets: Vec<[f64; D]>,
+    distances: Vec<(f64, usize)>,
+    candidates: Vec<usize>,
+    best: Vec<Candidate>,
+    /// The likeliest target of every model point, with the probability that it is right.
+    pairs: Vec<(usize, f64)>,
+    spacing: f64,
 }

@@ -1,20 +1,60 @@
-//! What a caller may say about a scene.
+//! What a caller knows of a scene: options, landmarks, errors of the targets.
 
-use super::schedule::Slack;
-use crate::{
-    MatchError,
-    validate::{at_least_one, option_within},
-};
+use super::Annealer;
+use super::Known;
+use super::{Slack, SoftassignMatch, SoftassignWorkspace, confidence};
+use crate::error::{at_least_one, option_within};
+use crate::{MatchError, Matching};
+use nalgebra::Point;
+#[cfg(feature = "rayon")]
+use rayon::prelude::*;
+use std::ops::ControlFlow;
 
 /// Weight of the slack on a side where no outliers are expected.
 const RARE: f64 = 0.01;
+
+/// What the ablation study switches off.
+#[doc(hidden)]
+#[allow(missing_docs)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Mechanism {
+    Patterns,
+    Reheat,
+    Slow,
+    Tuples,
+    Labelling,
+    Moments,
+    LastReheat,
+    Scales,
+    PairOdds,
+    LargePatterns,
+}
+
+#[allow(missing_docs)]
+impl Mechanism {
+    pub const ALL: [Self; 10] = [
+        Self::Patterns,
+        Self::Reheat,
+        Self::Slow,
+        Self::Tuples,
+        Self::Labelling,
+        Self::Moments,
+        Self::LastReheat,
+        Self::Scales,
+        Self::PairOdds,
+        Self::LargePatterns,
+    ];
+}
 
 /// How far the target may be turned against the model.
 ///
 /// ```
 /// use nalgebra::{Point2, Rotation2};
-/// use tactile_match::{PointMatcher, AnnealedSoftassign, Rotation};
-/// let model: Vec<_> = (0..12).map(f64::from).map(|k| Point2::new(k % 4.0 + 0.3 * k.sin(), (k / 4.0).floor())).collect();
+/// use tactile_match::{AnnealedSoftassign, PointMatcher, Rotation};
+/// let model: Vec<_> = (0..12)
+///     .map(f64::from)
+///     .map(|k| Point2::new(k % 4.0 + 0.3 * k.sin(), (k / 4.0).floor()))
+///     .collect();
 /// let target: Vec<_> = model.iter().map(|p| Rotation2::new(2.5) * p).collect(); // turned by 143°
 /// let matcher = AnnealedSoftassign::default().with_rotation(Rotation::Any);
 /// let matching = matcher.match_points(&model, &target)?;
@@ -39,8 +79,16 @@ pub enum Rotation {
 ///
 /// ```
 /// use nalgebra::Point2;
-/// use tactile_match::{Outliers, PointMatcher, AnnealedSoftassign};
-/// let model = [[0.0, 0.0], [1.0, 0.1], [0.2, 1.0], [1.1, 1.2], [0.5, 0.4], [1.8, 0.3]].map(Point2::from);
+/// use tactile_match::{AnnealedSoftassign, Outliers, PointMatcher};
+/// let model = [
+///     [0.0, 0.0],
+///     [1.0, 0.1],
+///     [0.2, 1.0],
+///     [1.1, 1.2],
+///     [0.5, 0.4],
+///     [1.8, 0.3],
+/// ]
+/// .map(Point2::from);
 /// let mut target = model.map(|p| Point2::new(1.05 * p.x, p.y)).to_vec();
 /// target.push(Point2::new(6.0, 5.0)); // clutter
 /// let matcher = AnnealedSoftassign::default().with_outliers(Outliers::Target);
@@ -71,9 +119,12 @@ pub enum Outliers {
 ///
 /// ```
 /// use nalgebra::Point2;
-/// use tactile_match::{PointMatcher, AnnealedSoftassign, Search};
+/// use tactile_match::{AnnealedSoftassign, PointMatcher, Search};
 /// let loaded = |p: &Point2<f64>| Point2::new(1.02 * p.x, p.y + 0.01 * p.x * p.x); // the same contact at a higher load
-/// let model: Vec<_> = (0..12).map(f64::from).map(|k| Point2::new(k % 4.0 + 0.3 * k.sin(), (k / 4.0).floor())).collect();
+/// let model: Vec<_> = (0..12)
+///     .map(f64::from)
+///     .map(|k| Point2::new(k % 4.0 + 0.3 * k.sin(), (k / 4.0).floor()))
+///     .collect();
 /// let target: Vec<_> = model.iter().map(loaded).collect();
 /// let matcher = AnnealedSoftassign::default().with_search(Search::Near);
 /// let matching = matcher.match_points(&model, &target)?;
@@ -88,12 +139,13 @@ pub enum Outliers {
     serde(rename_all = "snake_case")
 )]
 pub enum Search {
-    /// Start after start, until an answer is exact or noise explains its residuals; noisy answers are averaged over the scales of the
-    /// prior: any scene. Sets of four thousand points and more are matched coarse to fine, from one start, whichever search is asked for.
+    /// Start after start, until an answer is exact or noise explains its residuals. Noisy answers
+    /// are averaged over the scales of the prior: any scene. Sets of four thousand points and more
+    /// are matched coarse to fine, from one start, whichever search is asked for.
     #[default]
     Thorough,
-    /// One annealing run from the sets as they lie, centred: for sets known to be near each other, such as those of one
-    /// contact at two loads. A fixed, small number of iterations.
+    /// One annealing run from the sets as they lie, centred: for sets known to be near each other,
+    /// such as those of one contact at two loads. A fixed, small number of iterations.
     Near,
 }
 
@@ -102,12 +154,21 @@ pub enum Search {
 /// ```
 /// use nalgebra::{Point2, Rotation2};
 /// use tactile_match::{AnnealedSoftassign, PointMatcher, Transformation};
-/// let model: Vec<_> = (0..12).map(f64::from).map(|k| Point2::new(k % 4.0 + 0.3 * k.sin(), (k / 4.0).floor())).collect();
+/// let model: Vec<_> = (0..12)
+///     .map(f64::from)
+///     .map(|k| Point2::new(k % 4.0 + 0.3 * k.sin(), (k / 4.0).floor()))
+///     .collect();
 /// let mut target: Vec<_> = model.iter().map(|p| Rotation2::new(0.3) * p).collect();
 /// target[5].x += 0.1; // a point that has moved against the others
 /// let options = AnnealedSoftassign::default().with_transformation(Transformation::Rigid);
 /// let matching = options.match_points(&model, &target)?;
-/// assert!((0..12).filter(|&i| i != 5).all(|i| matching.assignment[i] == Some(i)), "{:?}", matching.assignment);
+/// assert!(
+///     (0..12)
+///         .filter(|&i| i != 5)
+///         .all(|i| matching.assignment[i] == Some(i)),
+///     "{:?}",
+///     matching.assignment
+/// );
 /// let distance = |points: &[Point2<f64>]| (points[0] - points[11]).norm();
 /// assert!((distance(&matching.warped) - distance(&model)).abs() < 1e-9);
 /// # Ok::<(), tactile_match::MatchError>(())
@@ -128,16 +189,26 @@ pub enum Transformation {
     Rigid,
 }
 
-/// The default matcher: annealed softassign, with a Gaussian-process prior on the warp and leave-one-out prediction.
+/// The default matcher: annealed softassign, with a Gaussian-process prior on the warp and
+/// leave-one-out prediction.
 ///
-/// One default setting serves deformation, noise, outliers and missing points; say [`Rotation::Any`] where the target may be
-/// turned by more than half a right angle. Two and three dimensions.
+/// One default setting serves deformation, noise, outliers and missing points. Say
+/// [`Rotation::Any`] where the target may be turned by more than half a right angle. Two and three
+/// dimensions.
 ///
 /// ```
 /// use nalgebra::Point2;
-/// use tactile_match::{PointMatcher, AnnealedSoftassign};
+/// use tactile_match::{AnnealedSoftassign, PointMatcher};
 /// # fn main() -> Result<(), tactile_match::MatchError> {
-/// let model = [[0.0, 0.0], [1.0, 0.1], [0.2, 1.0], [1.1, 1.2], [0.5, 0.4], [1.8, 0.3]].map(Point2::from);
+/// let model = [
+///     [0.0, 0.0],
+///     [1.0, 0.1],
+///     [0.2, 1.0],
+///     [1.1, 1.2],
+///     [0.5, 0.4],
+///     [1.8, 0.3],
+/// ]
+/// .map(Point2::from);
 /// let mut target = model.map(|p| Point2::new(1.1 * p.x + 0.1 * p.y, p.y + 0.05 * p.x));
 /// target.reverse();
 /// let found = AnnealedSoftassign::default().match_points(&model, &target)?;
@@ -151,7 +222,9 @@ pub enum Transformation {
 /// All of them have defaults that suit every scene tried.
 ///
 /// ```
-/// use tactile_match::{MatchError, Outliers, AnnealedSoftassign, Rotation, Search, Transformation};
+/// use tactile_match::{
+///     AnnealedSoftassign, MatchError, Outliers, Rotation, Search, Transformation,
+/// };
 /// let options = AnnealedSoftassign::default()
 ///     .with_transformation(Transformation::Similarity) // the set only moves, turns and grows
 ///     .with_rotation(Rotation::Any)
@@ -160,22 +233,30 @@ pub enum Transformation {
 ///     .with_outlier_ratio(0.3)? // three in ten points are out of sight
 ///     .with_max_iterations(100)?;
 /// assert_ne!(options, AnnealedSoftassign::default());
-/// assert!(matches!(options.with_outlier_ratio(0.95), Err(MatchError::InvalidOption { option: "outlier_ratio", .. })));
+/// assert!(matches!(
+///     options.with_outlier_ratio(0.95),
+///     Err(MatchError::InvalidOption {
+///         option: "outlier_ratio",
+///         ..
+///     })
+/// ));
 /// # Ok::<(), tactile_match::MatchError>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AnnealedSoftassign {
-    pub(crate) rotation: Rotation,
-    pub(crate) outliers: Outliers,
-    pub(crate) search: Search,
-    pub(crate) transformation: Transformation,
-    pub(crate) share: f64,
-    pub(crate) max_iterations: usize,
+    pub(super) without: Option<Mechanism>,
+    pub(super) rotation: Rotation,
+    pub(super) outliers: Outliers,
+    pub(super) search: Search,
+    pub(super) transformation: Transformation,
+    pub(super) share: f64,
+    pub(super) max_iterations: usize,
 }
 
 impl Default for AnnealedSoftassign {
     fn default() -> Self {
         Self {
+            without: None,
             rotation: Rotation::Limited,
             outliers: Outliers::Both,
             search: Search::Thorough,
@@ -208,8 +289,9 @@ impl AnnealedSoftassign {
         self
     }
 
-    /// Says what the model may do: bend (the default), or only move rigidly or as a similarity. Those leave residuals where the pairs do
-    /// not fit to rounding, and no warped point is put onto its partner.
+    /// Says what the model may do: bend (the default), or only move rigidly or as a similarity.
+    /// Those leave residuals where the pairs do not fit to rounding, and no warped point is put
+    /// onto its partner.
     #[must_use]
     pub fn with_transformation(mut self, transformation: Transformation) -> Self {
         self.transformation = transformation;
@@ -236,7 +318,19 @@ impl AnnealedSoftassign {
         Ok(self)
     }
 
-    pub(crate) fn slack(&self) -> Slack {
+    /// Switches one mechanism off, for the ablation study.
+    #[doc(hidden)]
+    #[must_use]
+    pub fn without(mut self, mechanism: Mechanism) -> Self {
+        self.without = Some(mechanism);
+        self
+    }
+
+    pub(super) fn has(&self, mechanism: Mechanism) -> bool {
+        self.without != Some(mechanism)
+    }
+
+    pub(super) fn slack(&self) -> Slack {
         let (model, target) = match self.outliers {
             Outliers::Both => (1.0, 1.0),
             Outliers::Model => (1.0, RARE),
@@ -248,5 +342,271 @@ impl AnnealedSoftassign {
             model,
             target,
         }
+    }
+}
+
+/// Where a model point is known to go, as a normal distribution: the fit counts it beside the soft
+/// matches, with the weight σ²/s² of its standard deviation s at the temperature σ.
+///
+/// ```
+/// use nalgebra::Point2;
+/// use tactile_match::{AnnealedSoftassign, Landmark, Transformation};
+/// // Twelve points of a regular ring: only landmarks can tell that it was turned.
+/// let ring = |turn: f64| -> Vec<Point2<f64>> {
+///     (0..12)
+///         .map(|k| f64::from(k).mul_add(30.0, turn).to_radians())
+///         .map(|a| Point2::new(a.cos(), a.sin()))
+///         .collect()
+/// };
+/// let (model, target) = (ring(0.0), ring(30.0));
+/// let landmarks = [0, 4].map(|row| Landmark {
+///     row,
+///     position: target[row],
+///     deviation: 0.0,
+/// }); // two known pairs
+/// let options = AnnealedSoftassign::default().with_transformation(Transformation::Rigid);
+/// let found = options.match_with_landmarks(&model, &target, &landmarks)?;
+/// assert!((0..12).all(|i| found.assignment[i] == Some(i)));
+/// # Ok::<(), tactile_match::MatchError>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Landmark<const D: usize> {
+    /// Row of the model point.
+    pub row: usize,
+    /// Where it goes.
+    pub position: Point<f64, D>,
+    /// Standard deviation along an axis, in the units of the points. 0 for a hard landmark, which
+    /// is kept to a thousandth of the model's radius, and where its position is a target exactly.
+    pub deviation: f64,
+}
+
+impl<const D: usize> Landmark<D> {
+    fn check(&self, points: usize) -> Result<(), MatchError> {
+        let row = self.row;
+        if row >= points {
+            return Err(MatchError::LandmarkRow { row, points });
+        }
+        let deviation = self.deviation;
+        option_within("deviation", deviation, 0.0, f64::MAX, "[0, ∞)")?;
+        if !self.position.iter().all(|c| c.is_finite()) {
+            return Err(MatchError::LandmarkPosition { row });
+        }
+        Ok(())
+    }
+}
+
+impl AnnealedSoftassign {
+    /// As [`match_points`](crate::PointMatcher::match_points), with what is known of some model
+    /// points. Several landmarks of one point count together.
+    ///
+    /// ```
+    /// use nalgebra::Point2;
+    /// use tactile_match::{AnnealedSoftassign, Landmark};
+    /// let model = [
+    ///     [0.0, 0.0],
+    ///     [1.0, 0.1],
+    ///     [0.2, 1.0],
+    ///     [1.1, 1.2],
+    ///     [0.5, 0.4],
+    ///     [1.8, 0.3],
+    /// ]
+    /// .map(Point2::from);
+    /// let target = model.map(|p| Point2::new(1.1 * p.x + 0.1 * p.y, p.y));
+    /// let known = Landmark {
+    ///     row: 2,
+    ///     position: target[2],
+    ///     deviation: 0.01,
+    /// };
+    /// let found =
+    ///     AnnealedSoftassign::default().match_with_landmarks(&model, &target, &[known])?;
+    /// assert_eq!(found.assignment[2], Some(2));
+    /// # Ok::<(), tactile_match::MatchError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// As [`match_points`](crate::PointMatcher::match_points), [`MatchError::LandmarkRow`] for a
+    /// landmark of a point that the model does not have, [`MatchError::LandmarkPosition`] for a
+    /// position that is not finite, and [`MatchError::InvalidOption`] for a deviation that is
+    /// negative or not finite.
+    pub fn match_with_landmarks<const D: usize>(
+        &self,
+        model: &[Point<f64, D>],
+        target: &[Point<f64, D>],
+        landmarks: &[Landmark<D>],
+    ) -> Result<Matching<D>, MatchError> {
+        for landmark in landmarks {
+            landmark.check(model.len())?;
+        }
+        let mut workspace = SoftassignWorkspace::default();
+        workspace.take(model, target)?;
+        let frame = workspace.frame;
+        workspace.known.extend(landmarks.iter().map(|known| {
+            Known {
+                row: known.row,
+                position: frame.target(&known.position),
+                variance: (known.deviation / frame.scale)
+                    .max(confidence::MIN_SIGMA)
+                    .powi(2),
+            }
+        }));
+        self.solve(&mut workspace, &mut |_, _| ControlFlow::Continue(()));
+        Ok(SoftassignMatch::of(&workspace).to_matching(model))
+    }
+}
+
+impl<const D: usize> Annealer<D> {
+    /// Adds what the landmarks say to the request of the soft matches: precisions add up,
+    /// displacements are averaged by them.
+    pub(super) fn add_landmarks(&mut self, base: &[[f64; D]], variance: f64) {
+        for known in &self.known {
+            let (row, precision) = (known.row, variance / known.variance);
+            let total = self.weights[row] + precision;
+            for (k, axis) in self.residuals.0.iter_mut().enumerate() {
+                let displacement = known.position[k] - base[row][k];
+                axis[row] = (self.weights[row] * axis[row] + precision * displacement) / total;
+            }
+            self.weights[row] = total;
+        }
+    }
+}
+
+impl AnnealedSoftassign {
+    /// As [`match_points`](crate::PointMatcher::match_points), where the targets were measured with
+    /// different precision: `deviations[j]` is the standard deviation of target j along an axis, in
+    /// the units of the points.
+    ///
+    /// A precise target counts for more than an uncertain one in the soft matches, in the warp and
+    /// in its covariances: the pair of target j has the noise variance `σ² + sⱼ² − min s²`. The σ²
+    /// of the most precise targets is estimated from the residuals, since it also holds what the
+    /// warp does not explain, and is at least `min s²`
+    /// ([`MatchReport::sigma`](crate::MatchReport)). Equal deviations say nothing that the
+    /// residuals do not: they give the answer of
+    /// [`match_points`](crate::PointMatcher::match_points) to the bit. Where they differ, no point
+    /// is put onto its partner exactly.
+    ///
+    /// ```
+    /// use nalgebra::{Point2, Vector2};
+    /// use tactile_match::{AnnealedSoftassign, MatchError};
+    /// let model: Vec<_> = (0..60)
+    ///     .map(|i| {
+    ///         Point2::new(
+    ///             f64::from(i % 10) + 0.03 * f64::from(i * i % 7),
+    ///             f64::from(i / 10),
+    ///         )
+    ///     })
+    ///     .collect();
+    /// // Every other point was seen in shadow, with an error of about 0.2 instead of 0.002.
+    /// let deviations: Vec<f64> = (0..60)
+    ///     .map(|i| if i % 2 == 0 { 0.002 } else { 0.2 })
+    ///     .collect();
+    /// let truth = |p: &Point2<f64>| Point2::new(1.05 * p.x, p.y + 0.01 * p.x * p.x);
+    /// let target: Vec<_> = model
+    ///     .iter()
+    ///     .zip(&deviations)
+    ///     .enumerate()
+    ///     .map(|(i, (p, s))| {
+    ///         truth(p) + Vector2::new((2.1 * i as f64).sin(), (3.7 * i as f64).cos()) * 1.4 * *s
+    ///     })
+    ///     .collect();
+    /// let matcher = AnnealedSoftassign::default();
+    /// let found = matcher.match_with_target_errors(&model, &target, &deviations)?;
+    /// let rms = |warped: &[Point2<f64>]| {
+    ///     let squares = warped
+    ///         .iter()
+    ///         .zip(&model)
+    ///         .map(|(w, p)| (w - truth(p)).norm_squared());
+    ///     (squares.sum::<f64>() / 60.0).sqrt()
+    /// };
+    /// assert!(rms(&found.warped) < 0.02);
+    /// let wrong = matcher.match_with_target_errors(&model, &target, &deviations[1..]);
+    /// assert!(matches!(
+    ///     wrong,
+    ///     Err(MatchError::Shape {
+    ///         what: "deviations of the targets",
+    ///         expected: 60,
+    ///         found: 59
+    ///     })
+    /// ));
+    /// # Ok::<(), MatchError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// As [`match_points`](crate::PointMatcher::match_points), [`MatchError::Shape`] where there is
+    /// not one deviation a target, and [`MatchError::TargetDeviation`] for one that is not positive
+    /// and finite.
+    pub fn match_with_target_errors<const D: usize>(
+        &self,
+        model: &[Point<f64, D>],
+        target: &[Point<f64, D>],
+        deviations: &[f64],
+    ) -> Result<Matching<D>, MatchError> {
+        let mut workspace = SoftassignWorkspace::default();
+        workspace.take(model, target)?;
+        workspace.take_deviations(deviations)?;
+        self.solve(&mut workspace, &mut |_, _| ControlFlow::Continue(()));
+        Ok(SoftassignMatch::of(&workspace).to_matching(model))
+    }
+}
+
+impl<const D: usize> SoftassignWorkspace<D> {
+    fn take_deviations(&mut self, deviations: &[f64]) -> Result<(), MatchError> {
+        if deviations.len() != self.target.len() {
+            return Err(MatchError::Shape {
+                what: "deviations of the targets",
+                expected: self.target.len(),
+                found: deviations.len(),
+            });
+        }
+        let positive = |s: &f64| *s > 0.0 && s.is_finite();
+        let widened = deviations.iter().map(|&s| s);
+        if let Some(row) = widened.clone().position(|s| !positive(&s)) {
+            let value = deviations[row];
+            return Err(MatchError::TargetDeviation { row, value });
+        }
+        let scale = self.frame.scale;
+        self.deviations.extend(widened.map(|s| s / scale));
+        Ok(())
+    }
+}
+
+/// A model and a target.
+#[cfg(feature = "rayon")]
+type Pair<'a, const D: usize> = (&'a [Point<f64, D>], &'a [Point<f64, D>]);
+
+#[cfg(feature = "rayon")]
+impl AnnealedSoftassign {
+    /// Matches every `(model, target)` on all threads of the current pool, with the bits of
+    /// [`PointMatcher::match_points`]. A pair that cannot be matched does not hinder the others.
+    ///
+    /// ```
+    /// use nalgebra::Point2;
+    /// use tactile_match::{AnnealedSoftassign, PointMatcher};
+    /// let model = [[0.0, 0.0], [1.0, 0.1], [0.2, 1.0], [1.1, 1.2]].map(Point2::from);
+    /// let target = model.map(|p| Point2::new(1.1 * p.x, p.y));
+    /// let (matcher, pairs) = (
+    ///     AnnealedSoftassign::default(),
+    ///     [(&model[..], &target[..]); 3],
+    /// );
+    /// let (serial, parallel) = (
+    ///     matcher.match_points(&model, &target)?,
+    ///     matcher.match_all_in_parallel(&pairs),
+    /// );
+    /// assert_eq!(serial.warped, parallel[2].as_ref().unwrap().warped);
+    /// # Ok::<(), tactile_match::MatchError>(())
+    /// ```
+    pub fn match_all_in_parallel<const D: usize>(
+        &self,
+        pairs: &[Pair<'_, D>],
+    ) -> Vec<Result<Matching<D>, MatchError>> {
+        let go = |_, _| ControlFlow::Continue(());
+        let one = |workspace: &mut _, &(model, target): &_| {
+            Ok(self
+                .match_points_with(workspace, model, target, go)?
+                .to_matching(model))
+        };
+        pairs
+            .par_iter()
+            .map_init(SoftassignWorkspace::default, one)
+            .collect()
     }
 }

@@ -1,68 +1,41 @@
-//! A start for dense sets: which target a point is, is told by where its neighbours come to lie.
-//!
-//! Once the temperature is below the points' spacing, a part of a dense set that lies one point aside stays there: points
-//! are matched one by one, and each has a neighbour's target at hand. The pattern of the neighbours, though, fits at the
-//! right target only, the better the less regular the set is. For every model point i and every target j in reach the
-//! neighbours are put about `tⱼ` as the warp has them about `yᵢ`, a small affine correction is fitted, and what remains to the
-//! targets found there is the candidate's misfit.
+//! Local patterns: which target a point is follows from where its neighbours come to lie. With the
+//! robust fit of doubtful pairs.
 
-use super::cells::Cells;
-use super::gated::GatedNearest;
+use super::Annealer;
+use super::Axes;
+use super::model::Prior;
+use super::{LocalPatterns, PriorScales, State};
 use nalgebra::{SMatrix, SVector};
+use std::f64::consts::TAU;
+
+// A start for dense sets: which target a point is, is told by where its neighbours come to lie.
+//
+// Once the temperature is below the points' spacing, a part of a dense set that lies one point
+// aside stays there: points are matched one by one, and each has a neighbour's target at hand. The
+// pattern of the neighbours, though, fits at the right target only, the better the less regular the
+// set is. For every model point i and every target j in reach the neighbours are put about `tⱼ` as
+// the warp has them about `yᵢ`, a small affine correction is fitted, and what remains to the
+// targets found there is the candidate's misfit.
 
 /// Neighbours a point, for every dimension.
 const NEIGHBOURS: usize = 4;
-/// Farthest candidate, in radii of the model.
-const REACH: f64 = 0.25;
 /// A neighbour's target lies within this many spacings of where it is expected.
 const GATE: f64 = 0.45;
-/// Side of the cells in which candidates are looked up, in spacings.
-const CANDIDATE_CELLS: f64 = 2.0;
-/// Rounds of looking up the neighbours' targets and fitting the affine correction.
-const ROUNDS: usize = 2;
-/// Misfits above this share of the largest there can be are not worth a correction.
-const HOPELESS: f64 = 0.75;
-/// Weight of no correction at all, in squared spacings.
-const RIDGE: f64 = 0.3;
-/// Misfits are told apart no finer than this, in spacings.
-const RESOLUTION: f64 = 2e-3;
-/// Points by which the spacing is told.
-const SAMPLE: usize = 101;
 
 /// The target that the pattern of a model point fits best.
 #[derive(Clone, Copy, Debug)]
-struct Candidate {
+pub(super) struct Candidate {
     target: usize,
     misfit: f64,
     /// Misfit at the next best target.
     second: f64,
 }
 
-/// Memory of the start.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct LocalPatterns<const D: usize> {
-    /// Where candidates and where neighbours' targets are looked up.
-    targets: Cells<D>,
-    gated: GatedNearest<D>,
-    model: Cells<D>,
-    offsets: Vec<[f64; D]>,
-    distances: Vec<(f64, usize)>,
-    candidates: Vec<usize>,
-    best: Vec<Candidate>,
-    /// The likeliest target of every model point, with the probability that it is right.
-    pub(crate) pairs: Vec<(usize, f64)>,
-    pub(crate) spacing: f64,
-}
-
 impl<const D: usize> LocalPatterns<D> {
-    /// Finds `pairs` for model points that a first warp has put at `warped`; false where the sets have no spacing to speak of.
-    pub(crate) fn propose(&mut self, warped: &[[f64; D]], target: &[[f64; D]]) -> bool {
-        let all = 0..warped.len();
-        self.propose_for(all, warped, target, REACH)
-    }
-
-    /// As [`propose`](Self::propose) for some model rows, with candidates up to `reach` away; `pairs` are in the order of the rows.
-    pub(crate) fn propose_for(
+    /// Finds `pairs` for some model rows, in their order, of model points that a first warp has put
+    /// at `warped`, with candidates up to `reach` away. False where the sets have no spacing to
+    /// speak of.
+    pub(super) fn propose(
         &mut self,
         rows: impl Iterator<Item = usize>,
         warped: &[[f64; D]],
@@ -73,7 +46,8 @@ impl<const D: usize> LocalPatterns<D> {
         if !(self.spacing > 0.0 && self.spacing < reach) {
             return false;
         }
-        self.targets.build(target, CANDIDATE_CELLS * self.spacing);
+        // Side of the cells in which candidates are looked up, in spacings.
+        self.targets.build(target, 2.0 * self.spacing);
         self.gated.build(target, GATE * self.spacing);
         self.model.build(warped, 2.0 * self.spacing);
         self.best.clear();
@@ -87,8 +61,9 @@ impl<const D: usize> LocalPatterns<D> {
     }
 
     /// Median distance from a target to the next, over a sample.
-    pub(crate) fn typical_spacing(&mut self, target: &[[f64; D]]) -> f64 {
-        let step = target.len().div_ceil(SAMPLE);
+    pub(super) fn typical_spacing(&mut self, target: &[[f64; D]]) -> f64 {
+        // Points by which the spacing is told.
+        let step = target.len().div_ceil(101);
         self.distances.clear();
         for i in (0..target.len()).step_by(step) {
             let others = target.iter().enumerate().filter(|&(j, _)| j != i);
@@ -165,11 +140,14 @@ impl<const D: usize> LocalPatterns<D> {
         best
     }
 
-    /// Sum of squared distances between where the neighbours are expected about target `j`, a little bent, and the targets there.
+    /// Sum of squared distances between where the neighbours are expected about target `j`, a
+    /// little bent, and the targets there.
     fn misfit(&self, target: &[[f64; D]], j: usize) -> f64 {
-        let hopeless = HOPELESS * (GATE * self.spacing).powi(2) * self.offsets.len() as f64;
+        // Misfits above this share of the largest there can be are not worth a correction.
+        let hopeless = 0.75 * (GATE * self.spacing).powi(2) * self.offsets.len() as f64;
         let (mut misfit, mut bend) = self.bent(&target[j], target, &SMatrix::zeros());
-        for _ in 0..ROUNDS {
+        // Rounds of looking up the neighbours' targets and fitting the affine correction.
+        for _ in 0..2 {
             if misfit > hopeless {
                 break;
             }
@@ -178,7 +156,8 @@ impl<const D: usize> LocalPatterns<D> {
         misfit
     }
 
-    /// The misfit about `centre` when the neighbours' offsets are bent by `bend`, and the bend that the targets found ask for.
+    /// The misfit about `centre` when the neighbours' offsets are bent by `bend`, and the bend that
+    /// the targets found ask for.
     fn bent(
         &self,
         centre: &[f64; D],
@@ -188,7 +167,8 @@ impl<const D: usize> LocalPatterns<D> {
         let gate = GATE * self.spacing;
         let mut misfit = 0.0;
         let mut outer = SMatrix::<f64, D, D>::zeros();
-        let mut gram = SMatrix::<f64, D, D>::identity() * (RIDGE * self.spacing * self.spacing);
+        // Weight of no correction at all, in squared spacings.
+        let mut gram = SMatrix::<f64, D, D>::identity() * (0.3 * self.spacing * self.spacing);
         for offset in &self.offsets {
             let offset = SVector::from(*offset);
             let place = SVector::from(*centre) + offset + bend * offset;
@@ -207,7 +187,8 @@ impl<const D: usize> LocalPatterns<D> {
         )
     }
 
-    /// Probabilities from misfits, with the noise at which the typical best candidate fits as it does.
+    /// Probabilities from misfits, with the noise at which the typical best candidate fits as it
+    /// does.
     fn weigh(&mut self) {
         let values = (NEIGHBOURS * D * D) as f64;
         self.distances.clear();
@@ -219,7 +200,8 @@ impl<const D: usize> LocalPatterns<D> {
             .select_nth_unstable_by(place, |a, b| a.0.total_cmp(&b.0))
             .1
             .0;
-        let variance = (typical / values).max((RESOLUTION * self.spacing).powi(2));
+        // Misfits are told apart no finer than this, in spacings.
+        let variance = (typical / values).max((2e-3 * self.spacing).powi(2));
         self.pairs.clear();
         let pair = |best: &Candidate| {
             let trust = if best.misfit.is_finite() {
@@ -242,3 +224,276 @@ fn difference<const D: usize>(a: &[f64; D], b: &[f64; D]) -> [f64; D] {
 fn squared<const D: usize>(v: &[f64; D]) -> f64 {
     v.iter().map(|x| x * x).sum()
 }
+
+// The point nearest to a place within a fixed gate, for many places: one look-up instead of one for
+// every cell that the gate touches.
+
+/// Chains of points by the hash of every cell, two gates wide, that a point's gate touches: at most
+/// two cells an axis, so that any place finds all points within the gate in the chain of its own
+/// cell. Cells that share a hash share a chain: distances tell them apart.
+#[derive(Clone, Debug, Default)]
+pub(super) struct GatedNearest<const D: usize> {
+    points: Vec<[f64; D]>,
+    grid: Grid,
+    gate: f64,
+    heads: Vec<u32>,
+    /// Row, and the entry that follows it in the chain.
+    entries: Vec<(u32, u32)>,
+}
+
+impl<const D: usize> GatedNearest<D> {
+    /// Takes points and a gate, which is positive and finite. `O(2ᴰ I)` time and memory.
+    fn build(&mut self, points: &[[f64; D]], gate: f64) {
+        self.points.clear();
+        self.points.extend_from_slice(points);
+        self.gate = gate;
+        self.grid = Grid::new(2.0 * gate);
+        self.heads.clear();
+        self.heads
+            .resize((points.len() << D).next_power_of_two(), NONE);
+        self.entries.clear();
+        let (heads, entries) = (&mut self.heads, &mut self.entries);
+        for (i, point) in points.iter().enumerate() {
+            self.grid.for_each_cell(point, gate, |cell| {
+                let chain = Grid::chain(cell, heads.len());
+                entries.push((i as u32, heads[chain]));
+                heads[chain] = (entries.len() - 1) as u32;
+            });
+        }
+    }
+
+    /// The point nearest to `place`, if one is within the gate.
+    fn find(&self, place: &[f64; D]) -> Option<usize> {
+        let cell = place.map(|c| self.grid.cell(c));
+        let mut entry = self.heads[Grid::chain(&cell, self.heads.len())];
+        let mut best = (self.gate * self.gate, None);
+        while entry != NONE {
+            let (row, next) = self.entries[entry as usize];
+            let square = squared_distance(&self.points[row as usize], place);
+            if square <= best.0 {
+                best = (square, Some(row as usize));
+            }
+            entry = next;
+        }
+        best.1
+    }
+}
+
+// Points in hashed square cells: what lies near a place is found without looking at the rest.
+
+/// Beyond this many cells from the origin all cells are one: coordinates there are as good as
+/// infinite.
+const MAX_CELLS: f64 = 1e9;
+/// No point.
+const NONE: u32 = u32::MAX;
+
+/// Square cells that fill space.
+#[derive(Clone, Copy, Debug, Default)]
+struct Grid {
+    /// Reciprocal side of a cell.
+    per_side: f64,
+}
+
+impl Grid {
+    /// Cells of this side, which is positive and finite.
+    fn new(side: f64) -> Self {
+        Self {
+            per_side: side.recip(),
+        }
+    }
+
+    /// Index of the cell of a coordinate, along its axis.
+    #[inline]
+    fn cell(self, coordinate: f64) -> i64 {
+        let place = (coordinate * self.per_side).clamp(-MAX_CELLS, MAX_CELLS);
+        // Rounding down by hand: `floor` is a call where the processor's newer instructions are not
+        // compiled for.
+        let towards_zero = place as i64;
+        towards_zero - i64::from(towards_zero as f64 > place)
+    }
+
+    /// Calls `visit` with every cell that a box of half width `radius` about `place` touches.
+    #[inline]
+    fn for_each_cell<const D: usize>(
+        self,
+        place: &[f64; D],
+        radius: f64,
+        mut visit: impl FnMut(&[i64; D]),
+    ) {
+        let low = place.map(|c| self.cell(c - radius));
+        let high = place.map(|c| self.cell(c + radius));
+        let mut cell = low;
+        loop {
+            visit(&cell);
+            let Some(axis) = (0..D).find(|&k| cell[k] < high[k]) else {
+                return;
+            };
+            cell[axis] += 1;
+            cell[..axis].copy_from_slice(&low[..axis]);
+        }
+    }
+
+    /// The chain of a cell, of so many, which are a power of two.
+    #[inline]
+    fn chain<const D: usize>(cell: &[i64; D], chains: usize) -> usize {
+        let mixed = cell.iter().fold(0_u64, |hash, &c| {
+            (hash ^ c as u64)
+                .wrapping_mul(0x9e37_79b9_7f4a_7c15)
+                .rotate_left(29)
+        });
+        (mixed ^ (mixed >> 32)) as usize & (chains - 1)
+    }
+}
+
+/// Chains of points by the hash of their cell. Cells that share a hash share a chain: distances
+/// tell them apart.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Cells<const D: usize> {
+    points: Vec<[f64; D]>,
+    grid: Grid,
+    heads: Vec<u32>,
+    next: Vec<u32>,
+}
+
+impl<const D: usize> Cells<D> {
+    /// Takes points into cells of this side, which is positive and finite. `O(I)`.
+    pub(super) fn build(&mut self, points: &[[f64; D]], side: f64) {
+        self.points.clear();
+        self.points.extend_from_slice(points);
+        self.grid = Grid::new(side);
+        self.heads.clear();
+        self.heads
+            .resize((2 * points.len()).next_power_of_two(), NONE);
+        self.next.clear();
+        for (i, p) in points.iter().enumerate() {
+            let cell = p.map(|c| self.grid.cell(c));
+            let head = Grid::chain(&cell, self.heads.len());
+            self.next.push(self.heads[head]);
+            self.heads[head] = i as u32;
+        }
+    }
+
+    /// Calls `visit` with row and squared distance of every point within `radius` of `place`, in no
+    /// useful order. Twice with the same where two of the cells share a chain.
+    pub(super) fn within(&self, place: &[f64; D], radius: f64, mut visit: impl FnMut(usize, f64)) {
+        self.grid.for_each_cell(place, radius, |cell| {
+            let mut row = self.heads[Grid::chain(cell, self.heads.len())];
+            while row != NONE {
+                let square = squared_distance(&self.points[row as usize], place);
+                if square <= radius * radius {
+                    visit(row as usize, square);
+                }
+                row = self.next[row as usize];
+            }
+        });
+    }
+
+    /// The point nearest to `place`, if one is within `radius`.
+    pub(super) fn nearest(&self, place: &[f64; D], radius: f64) -> Option<usize> {
+        let mut best = (f64::INFINITY, None);
+        self.within(place, radius, |row, square| {
+            if square < best.0 {
+                best = (square, Some(row));
+            }
+        });
+        best.1
+    }
+}
+
+fn squared_distance<const D: usize>(a: &[f64; D], b: &[f64; D]) -> f64 {
+    (0..D).map(|k| (a[k] - b[k]).powi(2)).sum()
+}
+
+// A warp from doubtful pairs: a robust fit keeps those that agree.
+
+/// Rounds of the fit. The first half with a nearly affine warp.
+const FIT_ROUNDS: usize = 12;
+
+/// Memory of the fit.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Consensus<const D: usize> {
+    prior: Prior,
+    weights: Vec<f64>,
+    trust: Vec<f64>,
+    wanted: Axes<D>,
+}
+
+impl<const D: usize> Consensus<D> {
+    /// Robust regression of the likeliest pairs, target and probability for every model point, into
+    /// `state.warped`: those far from the common warp lose their say, round by round.
+    pub(super) fn fit(
+        &mut self,
+        annealer: &mut Annealer<D>,
+        scales: PriorScales,
+        (model, target): (&[[f64; D]], &[[f64; D]]),
+        pairs: &[(usize, f64)],
+        state: &mut State<D>,
+    ) {
+        self.prior.build(
+            model,
+            PriorScales {
+                bending: 0.05,
+                ..scales
+            },
+        );
+        self.take(target, pairs, &state.base);
+        let mut variance = 1.0;
+        for round in 0..FIT_ROUNDS {
+            let prior = if round < FIT_ROUNDS / 2 {
+                &self.prior
+            } else {
+                &annealer.prior
+            };
+            annealer
+                .regression
+                .fit(prior, &self.weights, &self.wanted, f64::max(variance, 1e-4));
+            variance = self.reweigh(&annealer.regression.displacement, variance, annealer.volume);
+        }
+        for (i, warped) in state.warped.iter_mut().enumerate() {
+            *warped = std::array::from_fn(|k| {
+                state.base[i][k] + annealer.regression.displacement.0[k][i]
+            });
+        }
+    }
+
+    /// The displacements that the pairs ask for, and how far each is trusted.
+    fn take(&mut self, target: &[[f64; D]], pairs: &[(usize, f64)], base: &[[f64; D]]) {
+        let stride = self.prior.stride;
+        let rows = pairs.iter().zip(base);
+        self.wanted.fill(
+            stride,
+            rows.map(|((j, _), b)| std::array::from_fn(|k| target[*j][k] - b[k])),
+        );
+        self.trust.clear();
+        self.trust
+            .extend(pairs.iter().map(|(_, trust)| trust.clamp(0.05, 0.95)));
+        self.weights.clone_from(&self.trust);
+        self.weights.resize(stride, 0.0);
+    }
+
+    /// New weights from the residuals. The residual variance of those that agree, at most halved a
+    /// round.
+    fn reweigh(&mut self, displacement: &Axes<D>, last: f64, volume: f64) -> f64 {
+        let square = |i: usize| {
+            (0..D)
+                .map(|k| (displacement.0[k][i] - self.wanted.0[k][i]).powi(2))
+                .sum::<f64>()
+        };
+        let weight: f64 = self.weights.iter().sum();
+        let sum: f64 = (0..self.trust.len())
+            .map(|i| self.weights[i] * square(i))
+            .sum();
+        let variance = (sum / (D as f64 * weight.max(1e-9)))
+            .max(0.5 * last)
+            .clamp(1e-6, last);
+        let outlier = (TAU * variance).powf(0.5 * D as f64) / volume;
+        for (i, &trust) in self.trust.iter().enumerate() {
+            let agree = (-0.5 * square(i) / variance).exp() * trust;
+            self.weights[i] = agree / (agree + (1.0 - trust) * outlier).max(f64::MIN_POSITIVE);
+        }
+        variance
+    }
+}
+
+#[cfg(test)]
+mod tests;

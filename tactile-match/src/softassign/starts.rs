@@ -1,10 +1,13 @@
 //! Where a run may start: first guesses of the affine part of the warp.
 
-use super::frame::mean;
+use super::patterns::Cells;
+use super::{Rotation, mean};
 use nalgebra::{Matrix3, SMatrix, SVector, SymmetricEigen};
 
+// Where a run may start: first guesses of the affine part of the warp.
+
 /// The model moved so that the centroids meet.
-pub(crate) fn centred<const D: usize>(
+pub(super) fn centred<const D: usize>(
     model: &[[f64; D]],
     target: &[[f64; D]],
     base: &mut Vec<[f64; D]>,
@@ -18,11 +21,12 @@ pub(crate) fn centred<const D: usize>(
     );
 }
 
-/// The model stretched so that centroid and covariance are the target's, and turned by `rotation` before the stretch.
+/// The model stretched so that centroid and covariance are the target's, and turned by `rotation`
+/// before the stretch.
 ///
-/// `A = S C^½ R C^−½` with S the symmetric map that takes the model's covariance C to the target's: for R = 1 the
-/// affine map without rotation.
-pub(crate) fn moments<const D: usize>(
+/// `A = S C^½ R C^−½` with S the symmetric map that takes the model's covariance C to the target's:
+/// for R = 1 the affine map without rotation.
+pub(super) fn moments<const D: usize>(
     model: &[[f64; D]],
     target: &[[f64; D]],
     rotation: &SMatrix<f64, D, D>,
@@ -50,8 +54,8 @@ fn covariance<const D: usize>(points: &[[f64; D]], centre: &[f64; D]) -> SMatrix
     sum / points.len() as f64
 }
 
-/// Square root and inverse square root of a covariance, in which directions without extent get a thousandth of the largest,
-/// and the projection onto the other directions.
+/// Square root and inverse square root of a covariance, in which directions without extent get a
+/// thousandth of the largest, and the projection onto the other directions.
 fn roots<const D: usize>(matrix: &SMatrix<f64, D, D>) -> [SMatrix<f64, D, D>; 3] {
     // Up to three dimensions, the missing ones filled up with zeros: no allocation.
     let entry = |r: usize, c: usize| if r < D && c < D { matrix[(r, c)] } else { 0.0 };
@@ -72,36 +76,26 @@ fn roots<const D: usize>(matrix: &SMatrix<f64, D, D>) -> [SMatrix<f64, D, D>; 3]
     ]
 }
 
-/// Rotations to try: in the plane, or in space.
-pub(crate) struct Choice {
-    plane: &'static [f64],
-    space: usize,
-}
-
-/// All angles: every 30° in the plane, the 24 rotations of the cube in space.
-pub(crate) const ANY: Choice = Choice {
-    plane: &[
-        0., 30., -30., 60., -60., 90., -90., 120., -120., 150., -150., 180.,
-    ],
-    space: 24,
-};
-/// Little: none, and 30° each way in the plane.
-pub(crate) const LIMITED: Choice = Choice {
-    plane: &[0., -30., 30.],
-    space: 1,
-};
-
-/// The rotations of a choice.
-pub(crate) fn rotations<const D: usize>(
-    choice: Choice,
+/// Rotations to try. Limited ones: none, and 30° each way in the plane. Any: every 30° in the
+/// plane, the 24 rotations of the cube in space.
+pub(super) fn rotations<const D: usize>(
+    range: Rotation,
 ) -> impl Iterator<Item = SMatrix<f64, D, D>> {
+    let any = range == Rotation::Any;
+    let plane = if any { 12 } else { 3 };
+    let space = if any { 24 } else { 1 };
     let count = match D {
-        2 => choice.plane.len(),
-        3 => choice.space,
+        2 => plane,
+        3 => space,
         _ => 1,
     };
-    (0..count).map(move |k| match D {
-        2 => turn(0, 1, choice.plane[k].to_radians()),
+    (0..count).map(move |k: usize| match D {
+        // 0°, 30°, −30°, 60°, and so on: the small ones first.
+        2 => {
+            let angle = 30.0 * k.div_ceil(2) as f64;
+            let forth = (k % 2 == 1) == any;
+            turn(0, 1, if forth { angle } else { -angle }.to_radians())
+        }
         3 => cube(k),
         _ => SMatrix::identity(),
     })
@@ -125,3 +119,395 @@ fn cube<const D: usize>(k: usize) -> SMatrix<f64, D, D> {
     };
     up * turn::<D>(0, 1, (k % 4) as f64 * quarter)
 }
+
+// A start for sets that an affine map takes far: local tuples of points agree on it.
+//
+// A model point with D of its neighbours, and a target point with D of its own, determine an affine
+// map. The right pair of tuples puts the model point's other neighbours onto targets, a wrong one
+// does so by chance alone. From the tuples with most hits the map is refitted over larger and
+// larger neighbourhoods, as long as most of them hit. Neither second moments nor centroids enter,
+// so that cropping and outliers do no harm [after Fischler & Bolles, *Random sample consensus*,
+// CACM 24 (1981), with all local tuples in place of a sample].
+
+/// Model points tried, nearest the centre first and spread over the inner half.
+const SEEDS: usize = 12;
+/// Neighbours of a model point that a map is tested on, and of a target that tuples are made of,
+/// for every dimension.
+const TESTED: usize = 10;
+const OFFERED: usize = 5;
+/// A hit is a target within this many spacings.
+const GATE: f64 = 0.3;
+/// Memory of the start, and the map found.
+#[derive(Clone, Debug)]
+pub(super) struct Tuples<const D: usize> {
+    targets: Cells<D>,
+    order: Vec<(f64, usize)>,
+    seeds: Vec<usize>,
+    near: Vec<(f64, usize)>,
+    offsets: Vec<SVector<f64, D>>,
+    offered: Vec<SVector<f64, D>>,
+    linear: SMatrix<f64, D, D>,
+    from: SVector<f64, D>,
+    to: SVector<f64, D>,
+}
+
+impl<const D: usize> Default for Tuples<D> {
+    fn default() -> Self {
+        Self {
+            targets: Cells::default(),
+            order: Vec::new(),
+            seeds: Vec::new(),
+            near: Vec::new(),
+            offsets: Vec::new(),
+            offered: Vec::new(),
+            linear: SMatrix::identity(),
+            from: SVector::zeros(),
+            to: SVector::zeros(),
+        }
+    }
+}
+
+impl<const D: usize> Tuples<D> {
+    /// The map, applied to the model.
+    pub(super) fn apply(&self, model: &[[f64; D]], base: &mut Vec<[f64; D]>) {
+        let map = Local {
+            linear: self.linear,
+            from: self.from,
+            to: self.to,
+        };
+        base.clear();
+        base.extend(model.iter().map(|p| map.apply(p)));
+    }
+
+    /// Looks for the map. False where no tuples agree. `limited` leaves out rotations beyond some
+    /// 60°.
+    pub(super) fn find(
+        &mut self,
+        model: &[[f64; D]],
+        target: &[[f64; D]],
+        spacing: f64,
+        limited: bool,
+    ) -> bool {
+        let is_degenerate = spacing.is_nan() || spacing <= 0.0;
+        if is_degenerate || model.len().min(target.len()) < 2 * TESTED * D {
+            return false;
+        }
+        self.targets.build(target, 2.0 * spacing);
+        self.choose_seeds(model);
+        let mut best: Option<(f64, Local<D>)> = None;
+        for s in 0..self.seeds.len() {
+            let seed = self.seeds[s];
+            let Some(map) = self.best_tuple(model, target, seed, spacing, limited) else {
+                continue;
+            };
+            let Some((grown, map)) = self.grow(model, target, seed, map, spacing) else {
+                continue;
+            };
+            if best.as_ref().is_none_or(|(b, _)| grown > *b) {
+                best = Some((grown, map));
+            }
+            // Half the model in one affine piece leaves no doubt.
+            if grown >= 0.5 * model.len() as f64 {
+                break;
+            }
+        }
+        let Some((_, map)) = best else { return false };
+        (self.linear, self.from, self.to) = (map.linear, map.from, map.to);
+        true
+    }
+
+    fn choose_seeds(&mut self, model: &[[f64; D]]) {
+        let centre = mean(model);
+        self.order.clear();
+        let by_distance = model
+            .iter()
+            .enumerate()
+            .map(|(i, p)| (squared(p, &centre), i));
+        self.order.extend(by_distance);
+        self.order
+            .sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        let step = (model.len() / 2 / SEEDS).max(1);
+        self.seeds.clear();
+        let inner = self.order.iter().step_by(step).take(SEEDS);
+        self.seeds.extend(inner.map(|&(_, i)| i));
+    }
+
+    /// The `count` points nearest to `place`, nearest first.
+    fn nearest(&mut self, points: &[[f64; D]], place: &[f64; D], count: usize) {
+        self.near.clear();
+        let distances = points
+            .iter()
+            .enumerate()
+            .map(|(i, p)| (squared(p, place), i));
+        self.near.extend(distances);
+        let count = count.min(points.len());
+        let by_distance =
+            |a: &(f64, usize), b: &(f64, usize)| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1));
+        if count < self.near.len() {
+            self.near.select_nth_unstable_by(count, by_distance);
+            self.near.truncate(count);
+        }
+        self.near.sort_unstable_by(by_distance);
+    }
+
+    /// The local map with most hits among the neighbours of a seed, over all targets and tuples of
+    /// their neighbours.
+    fn best_tuple(
+        &mut self,
+        model: &[[f64; D]],
+        target: &[[f64; D]],
+        seed: usize,
+        spacing: f64,
+        limited: bool,
+    ) -> Option<Local<D>> {
+        let from = SVector::from(model[seed]);
+        self.nearest(model, &model[seed], TESTED * D + 1);
+        self.offsets.clear();
+        let others = self.near.iter().filter(|&&(_, i)| i != seed);
+        self.offsets
+            .extend(others.map(|&(_, i)| SVector::from(model[i]) - from));
+        let (basis, inverse) = best_basis(&self.offsets)?;
+        // Shares of hits: of the neighbours tested, and of a larger neighbourhood after a refit.
+        let wanted = (0.7 * self.offsets.len() as f64) as usize;
+        let mut best = (wanted, f64::INFINITY, None);
+        for j in 0..target.len() {
+            let to = SVector::from(target[j]);
+            self.near.clear();
+            let mut radius = 2.0 * spacing;
+            for _ in 0..3 {
+                self.near.clear();
+                let near = &mut self.near;
+                self.targets
+                    .within(&target[j], radius, |i, square| near.push((square, i)));
+                if self.near.len() > OFFERED * D {
+                    break;
+                }
+                radius *= 1.5;
+            }
+            self.near
+                .sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+            self.near.dedup();
+            self.near.retain(|&(_, i)| i != j);
+            self.near.truncate(OFFERED * D);
+            self.offered.clear();
+            self.offered.extend(
+                self.near
+                    .iter()
+                    .map(|&(_, i)| SVector::from(target[i]) - to),
+            );
+            let count = self.offered.len();
+            if count < D {
+                continue;
+            }
+            for code in 0..count.pow(D as u32) {
+                let mut rest = code;
+                let mut images = SMatrix::<f64, D, D>::zeros();
+                let mut used = [usize::MAX; D];
+                let mut distinct = true;
+                for axis in 0..D {
+                    let choice = rest % count;
+                    rest /= count;
+                    distinct &= !used[..axis].contains(&choice);
+                    used[axis] = choice;
+                    images.set_column(axis, &self.offered[choice]);
+                }
+                if !distinct {
+                    continue;
+                }
+                let linear = images * inverse;
+                if !plausible(&linear, limited) {
+                    continue;
+                }
+                let (hits, misfit) = self.hits(&linear, &to, &basis, best.0, spacing);
+                if hits > best.0 || (hits == best.0 && misfit < best.1) {
+                    best = (hits, misfit, Some(Local { linear, from, to }));
+                }
+            }
+        }
+        best.2
+    }
+
+    /// Neighbours that a map puts onto a target, with the sum of their squared distances. Given up
+    /// when `wanted` is out of reach.
+    fn hits(
+        &self,
+        linear: &SMatrix<f64, D, D>,
+        to: &SVector<f64, D>,
+        basis: &[usize; D],
+        wanted: usize,
+        spacing: f64,
+    ) -> (usize, f64) {
+        let (mut hits, mut misfit) = (D, 0.0);
+        let total = self.offsets.len();
+        for (at, offset) in self.offsets.iter().enumerate() {
+            if basis.contains(&at) {
+                continue;
+            }
+            let place: [f64; D] = (to + linear * offset).into();
+            let mut least = f64::INFINITY;
+            self.targets.within(&place, GATE * spacing, |_, square| {
+                least = least.min(square)
+            });
+            if least.is_finite() {
+                hits += 1;
+                misfit += least;
+            } else if hits + (total - at) <= wanted {
+                return (0, f64::INFINITY);
+            }
+        }
+        (hits, misfit)
+    }
+
+    /// Refits the map over larger and larger neighbourhoods of the seed. The number of points it
+    /// hits at the end.
+    fn grow(
+        &mut self,
+        model: &[[f64; D]],
+        target: &[[f64; D]],
+        seed: usize,
+        mut map: Local<D>,
+        spacing: f64,
+    ) -> Option<(f64, Local<D>)> {
+        let mut grown = None;
+        let mut count = TESTED * D;
+        loop {
+            count = count.min(model.len());
+            self.nearest(model, &model[seed], count);
+            let (mut hits, mut inside) = (0.0, 0.0);
+            let mut means = [SVector::<f64, D>::zeros(); 2];
+            let mut gram = SMatrix::<f64, D, D>::identity() * 1e-9;
+            let mut cross = SMatrix::<f64, D, D>::zeros();
+            for pass in 0..2 {
+                for &(_, i) in &self.near {
+                    let image = map.apply(&model[i]);
+                    let Some(j) = self.targets.nearest(&image, GATE * spacing) else {
+                        // A place without any target about is out of sight, not a miss.
+                        if pass == 0 && self.targets.nearest(&image, 1.5 * spacing).is_some() {
+                            inside += 1.0;
+                        }
+                        continue;
+                    };
+                    let (p, q) = (SVector::from(model[i]), SVector::from(target[j]));
+                    if pass == 0 {
+                        (hits, inside) = (hits + 1.0, inside + 1.0);
+                        means[0] += p;
+                        means[1] += q;
+                    } else {
+                        let (p, q) = (p - means[0], q - means[1]);
+                        gram += p * p.transpose();
+                        cross += q * p.transpose();
+                    }
+                }
+                if pass == 0 {
+                    if hits < 0.6 * inside || hits < 2.0 * D as f64 {
+                        return grown;
+                    }
+                    means = means.map(|m| m / hits);
+                }
+            }
+            map = Local {
+                linear: cross * gram.try_inverse()?,
+                from: means[0],
+                to: means[1],
+            };
+            grown = Some((hits, map));
+            if count == model.len() {
+                return grown;
+            }
+            count *= 2;
+        }
+    }
+}
+
+fn squared<const D: usize>(a: &[f64; D], b: &[f64; D]) -> f64 {
+    (0..D).map(|k| (a[k] - b[k]).powi(2)).sum()
+}
+
+// Affine maps about a pair of points: what determines one, and which are plausible.
+
+/// Stretches of a local map outside this range are not considered.
+const STRETCH: [f64; 2] = [0.4, 2.5];
+
+/// An affine map about a pair of points.
+#[derive(Clone, Copy)]
+struct Local<const D: usize> {
+    linear: SMatrix<f64, D, D>,
+    from: SVector<f64, D>,
+    to: SVector<f64, D>,
+}
+
+impl<const D: usize> Local<D> {
+    /// The image of a point.
+    fn apply(&self, p: &[f64; D]) -> [f64; D] {
+        (self.linear * (SVector::from(*p) - self.from) + self.to).into()
+    }
+}
+
+/// The D offsets of a point's nearest neighbours that span the most, for their size, and the
+/// inverse of their matrix.
+fn best_basis<const D: usize>(
+    offsets: &[SVector<f64, D>],
+) -> Option<([usize; D], SMatrix<f64, D, D>)> {
+    let count = offsets.len().min(2 * D + 2);
+    let mut best = (0.0, None);
+    for code in 0..count.pow(D as u32) {
+        let mut rest = code;
+        let mut chosen = [0; D];
+        for slot in &mut chosen {
+            *slot = rest % count;
+            rest /= count;
+        }
+        // One order of every choice.
+        if chosen.windows(2).any(|pair| pair[0] >= pair[1]) {
+            continue;
+        }
+        let mut columns = SMatrix::<f64, D, D>::zeros();
+        let mut size = 1.0;
+        for (axis, &at) in chosen.iter().enumerate() {
+            columns.set_column(axis, &offsets[at]);
+            size *= offsets[at].norm();
+        }
+        let Some(inverse) = columns.try_inverse() else {
+            continue;
+        };
+        // Near neighbours are more surely in sight together: the spanned volume counts relative to
+        // the lengths.
+        let volume = volume(&columns).abs() / size;
+        if volume > best.0 {
+            best = (volume, Some((chosen, inverse)));
+        }
+    }
+    best.1
+}
+
+fn volume<const D: usize>(m: &SMatrix<f64, D, D>) -> f64 {
+    match D {
+        2 => m[(0, 0)] * m[(1, 1)] - m[(0, 1)] * m[(1, 0)],
+        3 => {
+            m[(0, 0)] * (m[(1, 1)] * m[(2, 2)] - m[(1, 2)] * m[(2, 1)])
+                - m[(0, 1)] * (m[(1, 0)] * m[(2, 2)] - m[(1, 2)] * m[(2, 0)])
+                + m[(0, 2)] * (m[(1, 0)] * m[(2, 1)] - m[(1, 1)] * m[(2, 0)])
+        }
+        _ => 1.0,
+    }
+}
+
+/// Whether a local map is one that a body could follow: no reflection, no stretch out of range, no
+/// great turn where turns are limited.
+fn plausible<const D: usize>(linear: &SMatrix<f64, D, D>, limited: bool) -> bool {
+    let [low, high] = STRETCH;
+    for k in 0..D {
+        if limited && linear[(k, k)] < 0.5 * linear.column(k).norm() {
+            return false;
+        }
+        for v in [linear.column(k).norm(), linear.row(k).norm()] {
+            if !(low..=high).contains(&v) {
+                return false;
+            }
+        }
+    }
+    volume(linear) > low.powi(D as i32 - 1)
+}
+
+#[cfg(test)]
+mod tests;

@@ -41,7 +41,8 @@ fn a_batch_of_small_matches_allocates_nothing_after_the_first() {
 
 #[test]
 fn a_dense_set_allocates_nothing_the_second_time() {
-    // Turned so far that the first run leaves parts aside: the patterns of the points are looked at as well.
+    // Turned so far that the first run leaves parts aside: the patterns of the points are looked at
+    // as well.
     let place = |i: u32, angle: f64| {
         let (r, turn) = (
             ((f64::from(i) + 0.5) / 700.0).sqrt(),

@@ -1,4 +1,5 @@
-//! Linear assignment against brute force, against a slow Hungarian method and against its own proof of optimality.
+//! Linear assignment against brute force, against a slow Hungarian method and against its own proof
+//! of optimality.
 
 use proptest::prelude::*;
 use tactile_match::{AssignmentWorkspace, MatchError, linear_assignment};
@@ -11,7 +12,8 @@ fn total(costs: &[f64], columns: usize, assignment: &[Option<usize>]) -> f64 {
         .sum()
 }
 
-/// Every row to every column left, recursively: (pairs, cost) with the most pairs and then the least cost.
+/// Every row to every column left, recursively: (pairs, cost) with the most pairs and then the
+/// least cost.
 fn brute_force(
     costs: &[f64],
     rows: usize,
@@ -38,8 +40,8 @@ fn brute_force(
     best
 }
 
-/// Kuhn's Hungarian method on prices, `O(n² m)`, for `rows <= columns`: short and well known, nothing shared with the code under
-/// test. Returns the least cost.
+/// Kuhn's Hungarian method on prices, `O(n² m)`, for `rows <= columns`: short and well known,
+/// nothing shared with the code under test. Returns the least cost.
 fn slow_hungarian(costs: &[f64], rows: usize, columns: usize) -> f64 {
     let (mut u, mut v) = (vec![0.0; rows + 1], vec![0.0; columns + 1]);
     let mut row_of = vec![0; columns + 1]; // counted from one; zero is none
@@ -91,8 +93,9 @@ fn assert_distinct(assignment: &[Option<usize>], columns: usize) {
     }
 }
 
-/// `u_i + v_j <= c_ij`, equal on the pairs chosen, no positive price on the longer side and none on what is left over: sufficient for
-/// optimality. Rounding: a price is a sum of up to `rows + columns` costs.
+/// `u_i + v_j <= c_ij`, equal on the pairs chosen, no positive price on the longer side and none on
+/// what is left over: sufficient for optimality. Rounding: a price is a sum of up to
+/// `rows + columns` costs.
 fn assert_optimal(
     costs: &[f64],
     rows: usize,
@@ -177,7 +180,8 @@ proptest! {
     fn forbidden_pairs_leave_the_least_cost((n, costs, forbidden) in (1..=6_usize).prop_flat_map(|n| (
         Just(n), prop::collection::vec(0.0..1.0_f64, n * n), prop::collection::vec(prop::bool::weighted(0.4), n * n)))
     ) {
-        // The diagonal stays allowed, so that every row can be served and the least cost is well defined.
+        // The diagonal stays allowed, so that every row can be served and the least cost is well
+        // defined.
         let costs: Vec<f64> = (0..n * n).map(|k| if forbidden[k] && k % (n + 1) != 0 { f64::INFINITY } else { costs[k] }).collect();
         let found = linear_assignment(&costs, n, n).unwrap();
         let (pairs, cost) = brute_force(&costs, n, n, 0, &mut vec![false; n]);

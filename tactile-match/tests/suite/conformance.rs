@@ -101,7 +101,8 @@ fn sets_of_different_size_are_matched() {
             let right = (0..45)
                 .filter(|&i| matching.assignment[i] == Some(i))
                 .count();
-            // What the leftover points lie on has no answer of its own; nine tenths of the rest must be right.
+            // What the leftover points lie on has no answer of its own; nine tenths of the rest
+            // must be right.
             assert!(right >= 41, "{name}: {right} of 45");
         }
     }

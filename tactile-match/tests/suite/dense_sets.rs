@@ -1,4 +1,5 @@
-//! Sets whose displacements are many times their spacing, evenly spread: annealing alone leaves parts one point aside.
+//! Sets whose displacements are many times their spacing, evenly spread: annealing alone leaves
+//! parts one point aside.
 use nalgebra::{Point, Point2, Point3};
 use std::ops::ControlFlow;
 use tactile_match::{AnnealedSoftassign, PointMatcher, SoftassignWorkspace};
@@ -77,7 +78,8 @@ fn outliers_and_a_little_noise_do_not_mislead_the_patterns() {
     let mut target: Vec<_> = model.iter().enumerate().map(noisy).collect();
     target.extend((0..50).map(|i| Point2::new(1.1 * scatter(i + 3, 1), 1.1 * scatter(i + 3, 0))));
     let (right, wrong) = score(&model, &target, 50);
-    // An outlier that lies closer than the noise to a place takes it rightly, as far as any matcher can tell.
+    // An outlier that lies closer than the noise to a place takes it rightly, as far as any matcher
+    // can tell.
     assert!(right >= 998 && wrong <= 2, "{right} right, {wrong} wrong");
 }
 
@@ -115,7 +117,8 @@ fn what_a_workspace_did_before_changes_no_answer() {
             .unwrap();
         (found.report, found.assignment.to_vec())
     };
-    // In the first scene patterns are looked at, with a wider spacing than the second's, whose first run is nearly right.
+    // In the first scene patterns are looked at, with a wider spacing than the second's, whose
+    // first run is nearly right.
     let (coarse, dense) = (scene(500, 0.01), scene(700, 0.006));
     let mut used = SoftassignWorkspace::default();
     run(&mut used, &coarse);

@@ -1,4 +1,5 @@
-//! Coherent point drift against its equations written out slowly, and against what it must not depend on.
+//! Coherent point drift against its equations written out slowly, and against what it must not
+//! depend on.
 
 use crate::common::{Stream, bend, reordered, rotation, scattered};
 use nalgebra::{DMatrix, Point, Point2, Point3, SVector, Vector3};
@@ -16,8 +17,9 @@ fn drift<const D: usize>(
     options.match_points(model, target).expect("valid points")
 }
 
-/// Eq. 22–23 and figure 4 of Myronenko & Song with whole matrices and an LU factorisation in every iteration. Ends early where σ²
-/// has shrunk to a ten-thousandth: collapsing onto the targets is a matter of rounding. Returns the iterations too.
+/// Eq. 22–23 and figure 4 of Myronenko & Song with whole matrices and an LU factorisation in every
+/// iteration. Ends early where σ² has shrunk to a ten-thousandth: collapsing onto the targets is a
+/// matter of rounding. Returns the iterations too.
 fn slow_non_rigid<const D: usize>(
     model: &[Point<f64, D>],
     target: &[Point<f64, D>],
@@ -77,7 +79,8 @@ fn largest_step<const D: usize>(a: &[Point<f64, D>], b: &[Point<f64, D>]) -> f64
         .fold(0.0, f64::max)
 }
 
-/// The tolerance is that of the kernel's factorisation, 1e-12, over the ridge λσ² ≥ 1e-4 of the first iterations.
+/// The tolerance is that of the kernel's factorisation, 1e-12, over the ridge λσ² ≥ 1e-4 of the
+/// first iterations.
 fn check_against_slow<const D: usize>(
     seed: u64,
     rows: usize,

@@ -1,5 +1,5 @@
-//! Points a caller may come with by mistake, to every matcher: an answer that is consistent or a typed error, never a panic and never
-//! NaN.
+//! Points a caller may come with by mistake, to every matcher: an answer that is consistent or a
+//! typed error, never a panic and never NaN.
 
 use crate::common::{assert_consistent, hostile_points, matchers};
 use nalgebra::Point;

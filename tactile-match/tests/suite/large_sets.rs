@@ -8,7 +8,8 @@ use tactile_match::{AnnealedSoftassign, PointMatcher, SoftassignWorkspace, StopR
 /// Enough for two levels, and few enough for a debug build.
 const POINTS: usize = 4500;
 
-/// A bent set, shuffled, with outliers: model, true positions, targets, and the model row of every target but the outliers.
+/// A bent set, shuffled, with outliers: model, true positions, targets, and the model row of every
+/// target but the outliers.
 struct Scene<const D: usize> {
     model: Vec<Point<f64, D>>,
     truth: Vec<Point<f64, D>>,
@@ -54,7 +55,8 @@ fn check_clean<const D: usize>() {
         // An outlier may take the place of a point that it nearly coincides with.
         assert!(right > 0.99, "{D}-D, {outliers} outliers: {right} right");
         assert_eq!(found.report.doubt, None, "{D}-D, {outliers} outliers");
-        // The spline goes through one point in three; between them the field is smooth on the scale of their spacing.
+        // The spline goes through one point in three; between them the field is smooth on the scale
+        // of their spacing.
         let between = scene.model.iter().zip(&scene.truth);
         let close = between.filter(|(p, t)| (found.warp.apply(p) - *t).norm() < 2e-3);
         assert!(close.count() as f64 > 0.99 * POINTS as f64, "{D}-D");
@@ -71,8 +73,8 @@ fn clean_sets_are_matched_in_space() {
     check_clean::<3>();
 }
 
-/// Noise of a spacing hides the pairs, and their density alone tells the field: what moves points along without crowding them does not
-/// show, so that not all points lie within three noise widths.
+/// Noise of a spacing hides the pairs, and their density alone tells the field: what moves points
+/// along without crowding them does not show, so that not all points lie within three noise widths.
 #[test]
 fn noise_of_a_spacing_leaves_the_field() {
     let noise = 0.015;

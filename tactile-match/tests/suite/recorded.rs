@@ -1,7 +1,9 @@
-//! Recorded answers: what every matcher returned on small scenes when the numbers were last meant to change.
+//! Recorded answers: what every matcher returned on small scenes when the numbers were last meant
+//! to change.
 //!
-//! A change that is to leave the numbers alone passes; one that is to change them writes the record anew with
-//! `RECORD_ANSWERS=1 cargo test -p tactile-match --test suite recorded` and shows the difference in review.
+//! A change that is to leave the numbers alone passes. One that is to change them writes the record
+//! anew with `RECORD_ANSWERS=1 cargo test -p tactile-match --test suite recorded` and shows the
+//! difference in review.
 
 use crate::common::{Stream, bend, reordered, rotation, scattered};
 use nalgebra::{Point, Point2, SVector};
@@ -76,8 +78,8 @@ fn dense_scene() -> Scene<2> {
     }
 }
 
-/// Numbers that change when anything in an answer does: the counts and the report as they are, of the arrays their sums with weights
-/// that tell the rows apart.
+/// Numbers that change when anything in an answer does: the counts and the report as they are, of
+/// the arrays their sums with weights that tell the rows apart.
 fn digest<const D: usize>(name: &str, found: &Matching<D>) -> String {
     let weight = |i: usize| (1.0 + i as f64).sin();
     let sum = |values: &mut dyn Iterator<Item = f64>| -> f64 {
@@ -172,7 +174,8 @@ fn of_dimension<const D: usize>(lines: &mut Vec<String>) {
     }
 }
 
-/// Points have coordinates of size one: sums of a few hundred of them in another order differ by less.
+/// Points have coordinates of size one: sums of a few hundred of them in another order differ by
+/// less.
 const TOLERANCE: f64 = 1e-12;
 
 #[test]

@@ -8,7 +8,8 @@ const POINTS: usize = 80;
 const TURN: f64 = 0.4;
 const SCALE: f64 = 1.3;
 
-/// A model, its turned and shifted (and for a similarity enlarged) image, and that image shuffled, with noise and outliers.
+/// A model, its turned and shifted (and for a similarity enlarged) image, and that image shuffled,
+/// with noise and outliers.
 struct Scene<const D: usize> {
     model: Vec<Point<f64, D>>,
     truth: Vec<Point<f64, D>>,
@@ -68,7 +69,8 @@ fn check_motion<const D: usize>(
         let right = (0..POINTS).filter(|&i| found.assignment[i].is_some_and(|j| own(i, j)));
         let case = format!("{D}-D, {transformation:?}, noise {noise}, {outliers} outliers");
         assert!(right.count() as f64 > 0.95 * POINTS as f64, "{case}");
-        // The thin-plate spline through points that moved so is that motion, to the rounding of its system.
+        // The thin-plate spline through points that moved so is that motion, to the rounding of its
+        // system.
         let jacobian = found.warp.jacobian(&scene.model[0]);
         let size = (jacobian.transpose() * jacobian)[(0, 0)].sqrt();
         let shape = jacobian.transpose() * jacobian / (size * size);
@@ -83,7 +85,8 @@ fn check_motion<const D: usize>(
             "{case}: {size}"
         );
         for (w, t) in found.warped.iter().zip(&scene.truth) {
-            // Three parameters or more from eighty points: a fifth of the noise, and rarely four times that.
+            // Three parameters or more from eighty points: a fifth of the noise, and rarely four
+            // times that.
             assert!((w - t).norm() < 0.8 * noise + 1e-6, "{case}: {w} {t}");
         }
     }
@@ -115,7 +118,8 @@ fn check_variances<const D: usize>(transformation: Transformation) {
         }
     }
     let ratio = squares / variances;
-    // Forty scenes of three to seven parameters: their mean square varies by an eighth; the noise that is estimated adds to it.
+    // Forty scenes of three to seven parameters: their mean square varies by an eighth; the noise
+    // that is estimated adds to it.
     assert!(
         (0.65..1.5).contains(&ratio),
         "{D}-D, {transformation:?}: {ratio}"
@@ -130,7 +134,7 @@ fn covariances_are_those_of_the_motion() {
     check_variances::<3>(Transformation::Similarity);
 }
 
-/// What no rigid motion explains stays in the residuals; the shape does not change.
+/// What no rigid motion explains stays in the residuals. The shape does not change.
 #[test]
 fn shapes_are_kept() {
     let model = scattered::<2>(POINTS, 43);

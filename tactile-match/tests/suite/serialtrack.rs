@@ -1,5 +1,6 @@
-//! The fast matcher on tracked particles of a stretched volume and plane (data of FranckLab/SerialTrack, MIT, Jin Yang 2022), of
-//! which some leave the field of view and others enter: at least 99 % of the true pairs found, under half a percent wrong.
+//! The fast matcher on tracked particles of a stretched volume and plane (data of
+//! FranckLab/SerialTrack, MIT, Jin Yang 2022), of which some leave the field of view and others
+//! enter: at least 99 % of the true pairs found, under half a percent wrong.
 #![allow(clippy::print_stdout)] // what was found, beside the bars
 
 use crate::common::{Stream, reordered};
@@ -7,7 +8,7 @@ use nalgebra::Point;
 use std::path::PathBuf;
 use tactile_match::{AnnealedSoftassign, PointMatcher};
 
-/// Rows of `C` numbers; none where the file is not there. The line of names is no row.
+/// Rows of `C` numbers. None where the file is not there. The line of names is no row.
 fn read<const C: usize>(file: &str) -> Option<Vec<[f64; C]>> {
     let folder = std::env::var_os("TACTILE_DATA").map_or_else(
         || PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/data")),
@@ -25,7 +26,8 @@ fn read<const C: usize>(file: &str) -> Option<Vec<[f64; C]>> {
     Some(text.lines().filter_map(row).collect())
 }
 
-/// Matches frame 0 to frame `k`; checks the shares of the true pairs found and of the pairs found that are wrong.
+/// Matches frame 0 to frame `k`. Checks the shares of the true pairs found and of the pairs found
+/// that are wrong.
 fn check<const D: usize>(kind: &str, k: usize) {
     let files = (
         read::<D>(&format!("{kind}_frame00.csv")),

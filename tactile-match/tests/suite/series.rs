@@ -53,7 +53,8 @@ fn a_series_agrees_with_matches_made_anew() {
             let target = frame(&model, k, noise);
             let next = near().match_next(&mut warm, &model, &target).unwrap();
             let anew = near().match_points(&model, &target).unwrap();
-            // Both stop when the temperature moves by a ten-thousandth; what is left is a small part of the noise.
+            // Both stop when the temperature moves by a ten-thousandth; what is left is a small
+            // part of the noise.
             agree(&next, &anew, 1e-12 + 0.03 * noise);
 
             saved += anew
@@ -66,7 +67,8 @@ fn a_series_agrees_with_matches_made_anew() {
     }
 }
 
-/// `Near` leaves out the other starts and the average over scales: on the sets it is meant for it finds every partner, and the thorough search's warp.
+/// `Near` leaves out the other starts and the average over scales: on the sets it is meant for it
+/// finds every partner, and the thorough search's warp.
 #[test]
 fn a_near_search_finds_what_a_thorough_one_finds() {
     let model = dome(150);
@@ -78,7 +80,8 @@ fn a_near_search_finds_what_a_thorough_one_finds() {
                 .match_points(&model, &target)
                 .unwrap();
             assert_eq!(found.assignment, (0..150).map(Some).collect::<Vec<_>>());
-            // The thorough search is the more careful: of a hundred noisy points it may leave one without a partner.
+            // The thorough search is the more careful: of a hundred noisy points it may leave one
+            // without a partner.
             let pairs = found.assignment.iter().zip(&thorough.assignment);
             assert!(pairs.filter(|(a, b)| a != b).count() <= 2);
             for (a, b) in found.warped.iter().zip(&thorough.warped) {

@@ -1,4 +1,5 @@
-//! Every matcher far from size one and from the origin, on points that nearly coincide or lie in a plane, and in single precision.
+//! Every matcher far from size one and from the origin, on points that nearly coincide or lie in a
+//! plane, and in single precision.
 
 use crate::common::{
     Stream, assert_consistent, bend, largest_step, matchers, reordered, scattered,
@@ -39,8 +40,8 @@ fn right(assignment: &[Option<usize>], order: &[usize]) -> usize {
         .count()
 }
 
-/// The answer must scale with the points. Powers of ten round every coordinate: the input differs by the scalar's epsilon, which
-/// iterations and ill-conditioned splines enlarge by up to `growth`.
+/// The answer must scale with the points. Powers of ten round every coordinate: the input differs
+/// by the scalar's epsilon, which iterations and ill-conditioned splines enlarge by up to `growth`.
 fn check_scale<const D: usize>(growth: f64) {
     let (model, target, _) = scene::<D>(1, 0.03);
     for (name, matcher) in matchers::<D>() {
@@ -122,7 +123,8 @@ fn a_nearly_flat_set_is_matched() {
         for (name, matcher) in matchers::<3>() {
             let name = format!("{name}, thickness {thickness}");
             let matching = run(&name, &*matcher, &model, &target);
-            // Projecting a jittered cube brings points close to one another; most are still told apart by their plane positions.
+            // Projecting a jittered cube brings points close to one another; most are still told
+            // apart by their plane positions.
             assert!(
                 right(&matching.assignment, &order) >= POINTS / 2,
                 "{name}: {}",

@@ -9,7 +9,8 @@ fn deviate(stream: &mut Stream) -> f64 {
     (0..12).map(|_| stream.next()).sum::<f64>() - 6.0
 }
 
-/// A model, its true positions, targets with noise of known deviations and which model point each of them is.
+/// A model, its true positions, targets with noise of known deviations and which model point each
+/// of them is.
 struct Scene<const D: usize> {
     model: Vec<Point<f64, D>>,
     truth: Vec<Point<f64, D>>,
@@ -19,7 +20,7 @@ struct Scene<const D: usize> {
 }
 
 impl<const D: usize> Scene<D> {
-    /// `n` points bent; the deviations of the targets, in spacings, are drawn from `choices`.
+    /// `n` points bent. The deviations of the targets, in spacings, are drawn from `choices`.
     fn new(n: usize, choices: &[f64], seed: u64) -> Self {
         let mut stream = Stream::new(seed + 500);
         let model = scattered::<D>(n, seed);
@@ -95,8 +96,8 @@ fn equal_errors_give_the_answer_of_the_common_noise_to_the_bit() {
     }
 }
 
-/// Half of the targets have some seven times the error of the others, too little for equal weights to take them for outliers: known errors
-/// leave at most half the error of the field.
+/// Half of the targets have some seven times the error of the others, too little for equal weights
+/// to take them for outliers: known errors leave at most half the error of the field.
 fn check_halved<const D: usize>() {
     let (mut weighted, mut plain) = (0.0, 0.0);
     let (mut right, mut right_plain) = (0, 0);
@@ -146,7 +147,8 @@ fn coverage<const D: usize>(choices: &[f64]) -> f64 {
     f64::from(within) / f64::from(all)
 }
 
-/// Forty fields of some fifteen modes an axis: the share varies by 0.01 to 0.015 about the 0.68 of a normal distribution.
+/// Forty fields of some fifteen modes an axis: the share varies by 0.01 to 0.015 about the 0.68 of
+/// a normal distribution.
 #[test]
 fn standard_deviations_hold_where_errors_differ() {
     for choices in [[0.03, 0.3].as_slice(), &[0.05, 0.1, 0.2]] {
@@ -186,7 +188,8 @@ fn a_rigid_fit_counts_precise_targets_more() {
         weighted += scene.error(&found(true).expect("good points"));
         plain += scene.error(&found(false).expect("good points"));
     }
-    // Three parameters from thirty points of 0.03 spacings instead of sixty of 0.11 in the root mean square: two fifths.
+    // Three parameters from thirty points of 0.03 spacings instead of sixty of 0.11 in the root
+    // mean square: two fifths.
     assert!(
         weighted < 0.6 * plain,
         "{weighted} with errors, {plain} without"

@@ -4,7 +4,8 @@ use crate::common::{Stream, bend, reordered, rotation, scattered};
 use nalgebra::{Point, SVector};
 use tactile_match::{AnnealedSoftassign, Doubt, Matching, PointMatcher, StopReason};
 
-/// A model, its true positions, and targets with noise: `order[j]` is the model point of target `j`, rows beyond are outliers.
+/// A model, its true positions, and targets with noise: `order[j]` is the model point of target
+/// `j`, rows beyond are outliers.
 struct Scene<const D: usize> {
     model: Vec<Point<f64, D>>,
     truth: Vec<Point<f64, D>>,
@@ -13,7 +14,8 @@ struct Scene<const D: usize> {
 }
 
 impl<const D: usize> Scene<D> {
-    /// Adds Gaussian noise and uniform outliers to the true positions of the points that are `seen`, and shuffles them.
+    /// Adds Gaussian noise and uniform outliers to the true positions of the points that are
+    /// `seen`, and shuffles them.
     fn new(
         model: Vec<Point<f64, D>>,
         truth: Vec<Point<f64, D>>,
@@ -69,8 +71,8 @@ fn noisy<const D: usize>(seed: u64, outliers: f64) -> Scene<D> {
     Scene::new(model, truth, |_| true, (noise, outliers), seed + 1000)
 }
 
-/// Share of the coordinates within one standard deviation of the truth, and the calibration of the confidences: for every tenth, how
-/// many pairs, the sum of their confidences, how many are right.
+/// Share of the coordinates within one standard deviation of the truth, and the calibration of the
+/// confidences: for every tenth, how many pairs, the sum of their confidences, how many are right.
 fn trust<const D: usize>(outliers: f64) -> (f64, [[f64; 3]; 10]) {
     let (mut within, mut all) = (0, 0);
     let mut tenths = [[0.0; 3]; 10];
@@ -97,13 +99,15 @@ fn trust<const D: usize>(outliers: f64) -> (f64, [[f64; 3]; 10]) {
 
 fn check_trust<const D: usize>(outliers: f64) {
     let (within, tenths) = trust::<D>(outliers);
-    // Sixteen smooth fields of some twenty modes each: their share varies by 3 % about the 68 % of a normal distribution.
+    // Sixteen smooth fields of some twenty modes each: their share varies by 3 % about the 68 % of
+    // a normal distribution.
     assert!(
         (0.60..0.76).contains(&within),
         "{D}-D: {within} within one standard deviation"
     );
     let total = |column: usize| tenths.iter().map(|tenth| tenth[column]).sum::<f64>();
-    // Confidences also allow for parts that lie aside, which these scenes have none of: 2 to 4 % too low.
+    // Confidences also allow for parts that lie aside, which these scenes have none of: 2 to 4 %
+    // too low.
     assert!(
         (total(1) - total(2)).abs() < 0.04 * total(0),
         "{D}-D: confidence {} in all, {} of {} pairs are right",
@@ -112,7 +116,8 @@ fn check_trust<const D: usize>(outliers: f64) {
         total(0)
     );
     for [count, confidence, right] in tenths {
-        // Over all kinds of scenes they are closer (`--example confidence`); ten points for one kind, and what the share of so few pairs varies by.
+        // Over all kinds of scenes they are closer (`--example confidence`); ten points for one
+        // kind, and what the share of so few pairs varies by.
         if count > 100.0 {
             let chance = 0.5 / f64::sqrt(count);
             assert!(
@@ -153,7 +158,8 @@ fn stretched<const D: usize>(n: usize, stretch: f64, outliers: f64, seed: u64) -
     Scene::new(model, truth, in_window, (noise, outliers), seed + 7)
 }
 
-/// Of 24 scenes at most one has less than 98 % of its pairs: in a plane stretched by a quarter a part may stay one point aside.
+/// Of 24 scenes at most one has less than 98 % of its pairs: in a plane stretched by a quarter a
+/// part may stay one point aside.
 #[test]
 fn stretched_and_cropped_sets_are_matched() {
     let mut short = Vec::new();
@@ -174,7 +180,8 @@ fn stretched_and_cropped_sets_are_matched() {
     );
 }
 
-/// An answer that is wrong says so: sets turned by a right angle, which the default excludes, and sets that are not related.
+/// An answer that is wrong says so: sets turned by a right angle, which the default excludes, and
+/// sets that are not related.
 #[test]
 fn wrong_answers_are_doubted() {
     for seed in [5, 6] {

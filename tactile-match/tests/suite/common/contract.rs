@@ -10,13 +10,14 @@ use tactile_tps::Scalar;
 
 pub(crate) type Matchers<const D: usize> = Vec<(&'static str, Box<dyn PointMatcher<D>>)>;
 
-/// The matchers that every test file runs; a new one is added here and nowhere else.
+/// The matchers that every test file runs. A new one is added here and nowhere else.
 pub(crate) fn matchers<const D: usize>() -> Matchers<D> {
     let drift = |motion| {
         let options = CoherentPointDrift::default().with_motion(motion);
         options.expect("a valid motion")
     };
-    // Eight neighbours instead of half of all points: what is checked here does not need the time of the latter.
+    // Eight neighbours instead of half of all points: what is checked here does not need the time
+    // of the latter.
     let options = RelaxationLabelling::default().with_neighbourhood(Neighbourhood::Nearest(8));
     let dense = options.expect("neighbours");
     vec![
@@ -95,7 +96,8 @@ pub(crate) fn assert_consistent<const D: usize>(
         matching.warped
     );
     for (i, (point, warped)) in model.iter().zip(&matching.warped).enumerate() {
-        // Rounding of a spline's sum, whose terms may exceed the set's size by some orders of magnitude.
+        // Rounding of a spline's sum, whose terms may exceed the set's size by some orders of
+        // magnitude.
         let size = target
             .iter()
             .chain(&matching.warped)
@@ -130,7 +132,7 @@ pub(crate) fn assert_consistent<const D: usize>(
     );
 }
 
-/// No target twice; matched and unmatched rows together are all rows.
+/// No target twice. Matched and unmatched rows together are all rows.
 fn assert_partition<const D: usize>(name: &str, columns: usize, matching: &Matching<D>) {
     let mut seen = vec![false; columns];
     for &j in matching

@@ -42,7 +42,8 @@ impl Stream {
     }
 }
 
-/// `n` points, no two closer than about half the spacing of a regular arrangement: a jittered lattice of the unit cube.
+/// `n` points, no two closer than about half the spacing of a regular arrangement: a jittered
+/// lattice of the unit cube.
 pub(crate) fn scattered<const D: usize>(n: usize, seed: u64) -> Vec<Point<f64, D>> {
     let side = (n as f64).powf(1.0 / D as f64).ceil() as usize;
     let mut stream = Stream::new(seed);
@@ -69,7 +70,7 @@ pub(crate) fn grid<const D: usize>(side: usize) -> Vec<Point<f64, D>> {
         .collect()
 }
 
-/// A smooth, fold-free deformation of the unit cube; `size` is the largest displacement.
+/// A smooth, fold-free deformation of the unit cube. `size` is the largest displacement.
 pub(crate) fn bend<const D: usize>(points: &[Point<f64, D>], size: f64) -> Vec<Point<f64, D>> {
     let size: f64 = size;
     let wave = |x: f64, phase: f64| (x * 2.1 + phase).sin();

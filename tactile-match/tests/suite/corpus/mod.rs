@@ -1,4 +1,5 @@
-//! The inputs kept for the fuzz target `matcher`, once more: regular, scattered and extreme points in the plane and in space.
+//! The inputs kept for the fuzz target `matcher`, once more: regular, scattered and extreme points
+//! in the plane and in space.
 //!
 //! `fuzz/README.md` says how to look for more.
 #![allow(clippy::print_stdout)] // the input that is checked, shown where a check fails

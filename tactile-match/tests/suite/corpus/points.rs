@@ -6,7 +6,8 @@ use super::contract::{assert_consistent, matchers};
 use nalgebra::{Point, SVector};
 use tactile_match::MatchError;
 
-/// Largest number of points of a set: enough for every stage of the matchers, few enough for a thousand inputs a minute.
+/// Largest number of points of a set: enough for every stage of the matchers, few enough for a
+/// thousand inputs a minute.
 const MOST: usize = 24;
 
 /// Values that arithmetic meets its limits with.
@@ -27,9 +28,10 @@ const EXTREMES: [f64; 12] = [
 
 /// Reads two sets of points and gives them to every matcher.
 ///
-/// The first byte says whether the points lie in the plane or in space and whether the target is the model moved; the second and third
-/// how many there are. Then come coordinates: a byte below 200 is a multiple of a tenth, above it an extreme value, and 255 stands before the eight
-/// bytes of any number. What is not there is zero.
+/// The first byte says whether the points lie in the plane or in space and whether the target is
+/// the model moved. The second and third how many there are. Then come coordinates: a byte below
+/// 200 is a multiple of a tenth, above it an extreme value, and 255 stands before the eight bytes
+/// of any number. What is not there is zero.
 pub(crate) fn matcher(bytes: &[u8]) {
     let mut bytes = bytes.iter().copied();
     let mut next = || bytes.next().unwrap_or(0);
@@ -63,7 +65,8 @@ fn either_dimension<const D: usize>(
     every_matcher(&model, &target);
 }
 
-/// Every matcher gives a consistent answer, or says that a coordinate cannot be used where one cannot.
+/// Every matcher gives a consistent answer, or says that a coordinate cannot be used where one
+/// cannot.
 fn every_matcher<const D: usize>(model: &[Point<f64, D>], target: &[Point<f64, D>]) {
     // A coordinate is usable where the square of a difference of two such is finite.
     let sixteen = 16.0;

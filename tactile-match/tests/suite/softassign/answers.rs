@@ -4,7 +4,7 @@ use crate::common;
 use nalgebra::{Point2, Point3, Rotation2};
 use tactile_match::{AnnealedSoftassign, Outliers, PointMatcher, Rotation, StopReason};
 
-/// Every model point of `partner` has its own; targets beyond them may have none.
+/// Every model point of `partner` has its own. Targets beyond them may have none.
 fn assert_pairs(assignment: &[Option<usize>], partner: &[usize], scene: &str) {
     let mut pairs = assignment.iter().zip(partner);
     assert!(
@@ -40,8 +40,8 @@ fn clean_warps_of_plane_and_space_are_found_exactly() {
     all_right::<3>(61);
 }
 
-/// Where noise is well below the spacing, the first run ends at the noise: it does not fall below it, where points lose their partners and a second start
-/// has to find them again.
+/// Where noise is well below the spacing, the first run ends at the noise: it does not fall below
+/// it, where points lose their partners and a second start has to find them again.
 #[test]
 fn noise_below_the_spacing_rarely_takes_a_second_start() {
     /// A tenth of the spacing, (1/105)^⅓ of the cube's side, to either side.
@@ -65,12 +65,14 @@ fn noise_below_the_spacing_rarely_takes_a_second_start() {
             .filter(|&(j, &i)| found.assignment[i] == Some(j))
             .count();
         assert!(right >= 104, "{seed}: {right}");
-        // The field is smooth: its points are nearer to the truth than the noise, of standard deviation NOISE/√3 along an axis, puts one.
+        // The field is smooth: its points are nearer to the truth than the noise, of standard
+        // deviation NOISE/√3 along an axis, puts one.
         let squares = (found.warped.iter().zip(&truth)).map(|(w, t)| (w - t).norm_squared());
         let error = (squares.sum::<f64>() / 105.0).sqrt();
         assert!(error < 0.8 * NOISE, "{seed}: {error}");
     }
-    // Where a point of the eight sets has strayed too far to be called matched, a second start looks for it; without a sign of noise all take two.
+    // Where a point of the eight sets has strayed too far to be called matched, a second start
+    // looks for it; without a sign of noise all take two.
     assert!(of_one_start >= 4, "{of_one_start}");
 }
 
@@ -79,7 +81,8 @@ fn the_warp_goes_through_every_point_of_a_large_set() {
     all_right::<2>(502);
 }
 
-/// A jittered sunflower: nearly regular, so that a whole part may settle one point aside and support itself there.
+/// A jittered sunflower: nearly regular, so that a whole part may settle one point aside and
+/// support itself there.
 #[test]
 fn a_dense_nearly_regular_set_does_not_slip() {
     let n = 842;
@@ -152,7 +155,8 @@ fn outliers_stay_without_partner() {
     assert_eq!(found.unmatched_target, [61, 62, 63]);
 }
 
-/// Where no outliers are expected every point gets a partner; where they are, a far point is left without.
+/// Where no outliers are expected every point gets a partner. Where they are, a far point is left
+/// without.
 #[test]
 fn the_outliers_option_says_which_side_may_stay_alone() {
     let model = cloud::<2>(31);

@@ -6,7 +6,8 @@ use tactile_match::{
     AnnealedSoftassign, MatchError, PointMatcher, Rotation, SoftassignWorkspace, StopReason,
 };
 
-/// An answer for every odd input: as many rows as model points, all of them finite, no target twice.
+/// An answer for every odd input: as many rows as model points, all of them finite, no target
+/// twice.
 fn is_sound<const D: usize>(model: &[Point<f64, D>], target: &[Point<f64, D>]) {
     let matcher = AnnealedSoftassign::default().with_rotation(Rotation::Any);
     let found = matcher.match_points(model, target).unwrap();
@@ -141,7 +142,8 @@ fn a_used_workspace_gives_the_same_bits() {
     assert_eq!(again.assignment, fresh.assignment);
 }
 
-/// Clean, noisy and unusable pairs of different sizes: a workspace that has seen one must not colour the next.
+/// Clean, noisy and unusable pairs of different sizes: a workspace that has seen one must not
+/// colour the next.
 #[test]
 fn a_batch_gives_the_bits_of_single_matches() {
     let models = [cloud::<2>(31), cloud::<2>(24), Vec::new(), cloud::<2>(37)];

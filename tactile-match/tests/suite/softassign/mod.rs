@@ -4,7 +4,8 @@ mod calls;
 
 use nalgebra::Point;
 
-/// Fractional part of a multiple of the golden ratio: points without pattern, the same on every machine.
+/// Fractional part of a multiple of the golden ratio: points without pattern, the same on every
+/// machine.
 fn scatter(i: usize, k: usize) -> f64 {
     ((i * 7 + k * 131 + i * i * 3 + 1) as f64
         * [0.618_033_988_75, 0.754_877_666_25, 0.569_840_291][k])
@@ -25,7 +26,7 @@ fn bend<const D: usize>(p: &Point<f64, D>) -> Point<f64, D> {
     }))
 }
 
-/// Row `i` of the model is row `(5 i + 3) mod n` of the target; 5 and n have no common factor.
+/// Row `i` of the model is row `(5 i + 3) mod n` of the target. 5 and n have no common factor.
 fn shuffled<const D: usize>(points: &[Point<f64, D>]) -> (Vec<Point<f64, D>>, Vec<usize>) {
     let n = points.len();
     let partner: Vec<usize> = (0..n).map(|i| (5 * i + 3) % n).collect();

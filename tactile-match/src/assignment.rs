@@ -1,0 +1,335 @@
+//! Linear assignment: which column for which row, at the least total cost.
+//!
+//! Given costs `c_ij` of `n` rows and `m` columns, choose distinct columns `j(i)` with `Σ c_i,j(i)`
+//! least. Of a matrix that is not square, `min(n, m)` rows get a column. The method is Jonker and
+//! Volgenant's (Computing 38, 325–340, 1987) in its rectangular form: augmenting row reduction
+//! assigns most rows, shortest augmenting paths (Dijkstra's, on the reduced costs
+//! `c_ij − u_i − v_j ≥ 0`) the rest. `O(min(n, m)² max(n, m))` at worst, on point sets close to
+//! `O(n m)`.
+//!
+//! The prices `u`, `v` prove the answer: `u_i + v_j ≤ c_ij`, equal on the chosen pairs. They are
+//! zero for rows and columns left over. To maximise, negate the costs. To forbid a pair, let it
+//! cost `+∞`.
+
+use crate::MatchError;
+
+/// Columns for the rows of a cost matrix (`rows × columns`, row-major) at the least total cost.
+///
+/// `None` for the rows left over where there are more rows than columns, or that only forbidden
+/// pairs (`+∞`) could serve. The number of pairs is the largest possible. The same input gives the
+/// same answer, also among ties.
+///
+/// # Errors
+/// [`MatchError::Shape`] if `costs` has not `rows · columns` entries, [`MatchError::Cost`] for NaN
+/// and `−∞`.
+///
+/// ```
+/// use tactile_match::linear_assignment;
+/// let costs = [
+///     4.0, 1.0, 3.0, //
+///     2.0, 0.0, 5.0,
+/// ];
+/// assert_eq!(linear_assignment(&costs, 2, 3)?, [Some(1), Some(0)]); // 1 + 2; the greedy 0 + 3 costs as much
+/// # Ok::<(), tactile_match::MatchError>(())
+/// ```
+pub fn linear_assignment(
+    costs: &[f64],
+    rows: usize,
+    columns: usize,
+) -> Result<Vec<Option<usize>>, MatchError> {
+    let mut workspace = AssignmentWorkspace::default();
+    workspace.solve(costs, rows, columns)?;
+    Ok(workspace.assignment)
+}
+
+/// [`linear_assignment`] with its memory kept: no allocation once it has seen the largest matrix.
+///
+/// ```
+/// use tactile_match::AssignmentWorkspace;
+/// let mut workspace = AssignmentWorkspace::default();
+/// assert_eq!(workspace.solve(&[2.0, 1.0, 1.0, 5.0], 2, 2)?, [Some(1), Some(0)]);
+/// assert_eq!(workspace.row_prices.iter().chain(&workspace.column_prices).sum::<f64>(), 2.0);
+/// # Ok::<(), tactile_match::MatchError>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct AssignmentWorkspace {
+    assignment: Vec<Option<usize>>,
+    /// `u` of the last solution.
+    pub row_prices: Vec<f64>,
+    /// `v` of the last solution.
+    pub column_prices: Vec<f64>,
+    /// The matrix turned so that it is not taller than wide.
+    turned: Vec<f64>,
+    search: Search,
+}
+
+impl Default for AssignmentWorkspace {
+    /// Without memory yet.
+    fn default() -> Self {
+        Self {
+            assignment: Vec::new(),
+            row_prices: Vec::new(),
+            column_prices: Vec::new(),
+            turned: Vec::new(),
+            search: Search::new(),
+        }
+    }
+}
+
+impl AssignmentWorkspace {
+    /// As [`linear_assignment`].
+    ///
+    /// # Errors
+    /// As [`linear_assignment`].
+    pub fn solve(
+        &mut self,
+        costs: &[f64],
+        rows: usize,
+        columns: usize,
+    ) -> Result<&[Option<usize>], MatchError> {
+        check(costs, rows, columns)?;
+        self.assignment.clear();
+        self.row_prices.clear();
+        self.column_prices.clear();
+        if rows <= columns {
+            self.search.run(costs, rows, columns);
+            self.assignment.extend(
+                self.search
+                    .column_of
+                    .iter()
+                    .map(|&j| (j != NONE).then_some(j)),
+            );
+            self.row_prices
+                .extend((0..rows).map(|i| self.search.row_price(costs, i)));
+            self.column_prices.extend_from_slice(&self.search.prices);
+        } else {
+            self.turned.clear();
+            self.turned
+                .extend((0..columns).flat_map(|j| (0..rows).map(move |i| costs[i * columns + j])));
+            self.search.run(&self.turned, columns, rows);
+            self.assignment
+                .extend(self.search.row_of.iter().map(|&j| (j != NONE).then_some(j)));
+            self.row_prices.extend_from_slice(&self.search.prices);
+            self.column_prices
+                .extend((0..columns).map(|j| self.search.row_price(&self.turned, j)));
+        }
+        Ok(&self.assignment)
+    }
+}
+
+fn check(costs: &[f64], rows: usize, columns: usize) -> Result<(), MatchError> {
+    let expected = rows.saturating_mul(columns);
+    if costs.len() != expected {
+        return Err(MatchError::Shape {
+            what: "costs",
+            expected,
+            found: costs.len(),
+        });
+    }
+    match costs.iter().position(|&c| !(c.is_finite() || c > 0.0)) {
+        Some(at) => Err(MatchError::Cost {
+            row: at / columns,
+            column: at % columns,
+        }),
+        None => Ok(()),
+    }
+}
+
+// The search: augmenting row reduction, then shortest augmenting paths on the reduced costs.
+
+/// No row, no column.
+const NONE: usize = usize::MAX;
+
+/// Memory of the algorithm proper, for a matrix that is not taller than wide.
+#[derive(Clone, Debug, Default)]
+struct Search {
+    column_of: Vec<usize>,
+    row_of: Vec<usize>,
+    /// v. u follows from it.
+    prices: Vec<f64>,
+    free: Vec<usize>,
+    waiting: Vec<usize>,
+    /// Length of the shortest path to every column, and the row before it.
+    distance: Vec<f64>,
+    before: Vec<usize>,
+    /// Columns the search has not settled yet, in any order, then those it has.
+    order: Vec<usize>,
+}
+
+impl Search {
+    fn new() -> Self {
+        Self {
+            column_of: Vec::new(),
+            row_of: Vec::new(),
+            prices: Vec::new(),
+            free: Vec::new(),
+            waiting: Vec::new(),
+            distance: Vec::new(),
+            before: Vec::new(),
+            order: Vec::new(),
+        }
+    }
+
+    fn run(&mut self, costs: &[f64], rows: usize, columns: usize) {
+        reset(&mut self.column_of, rows, NONE);
+        reset(&mut self.row_of, columns, NONE);
+        reset(&mut self.prices, columns, 0.0);
+        reset(&mut self.distance, columns, 0.0);
+        reset(&mut self.before, columns, NONE);
+        self.free.clear();
+        self.free.extend(0..rows);
+        // Twice, as published: the rows a first pass displaces often settle in the second.
+        self.reduce_rows(costs, columns);
+        self.reduce_rows(costs, columns);
+        self.order.clear();
+        self.order.extend(0..columns);
+        let free = std::mem::take(&mut self.free);
+        for &row in &free {
+            self.augment(costs, columns, row);
+        }
+        self.free = free;
+    }
+
+    /// Augmenting row reduction: every free row takes its cheapest column, and bids until the next
+    /// best would do as well.
+    ///
+    /// Only columns that become assigned, and stay so, change their price: those left over keep
+    /// `v = 0`, which the rectangular problem needs.
+    fn reduce_rows(&mut self, costs: &[f64], columns: usize) {
+        self.waiting.clear();
+        self.free.reverse();
+        let mut bids = 8 * self.free.len(); // a price war of many steps is cheaper by augmentation
+        while let Some(row) = self.free.pop() {
+            let (mut best, second) = two_cheapest(&costs[row * columns..][..columns], &self.prices);
+            let lowered = self.prices[best.0] - (second.1 - best.1);
+            let lowers = lowered.is_finite() && lowered < self.prices[best.0];
+            if !best.1.is_finite() || bids == 0 {
+                self.waiting.push(row);
+                continue;
+            }
+            bids -= 1;
+            if lowers {
+                self.prices[best.0] = lowered;
+            } else if self.row_of[best.0] != NONE {
+                if !second.1.is_finite() || second.1 > best.1 {
+                    self.waiting.push(row); // no other column, or none as cheap to rounding
+                    continue;
+                }
+                best = second;
+            }
+            let displaced = std::mem::replace(&mut self.row_of[best.0], row);
+            self.column_of[row] = best.0;
+            if displaced != NONE {
+                self.column_of[displaced] = NONE;
+                if lowers {
+                    self.free.push(displaced)
+                } else {
+                    self.waiting.push(displaced)
+                }
+            }
+        }
+        std::mem::swap(&mut self.free, &mut self.waiting);
+    }
+
+    /// The shortest augmenting path from a free row. None if only forbidden pairs lead on.
+    fn augment(&mut self, costs: &[f64], columns: usize, free_row: usize) {
+        for (j, &c) in costs[free_row * columns..][..columns].iter().enumerate() {
+            self.distance[j] = c - self.prices[j];
+            self.before[j] = free_row;
+        }
+        let mut open = columns;
+        let (sink, reach) = loop {
+            if open == 0 {
+                return;
+            }
+            let at = self.nearest(open);
+            let column = self.order[at];
+            let reach = self.distance[column];
+            if !reach.is_finite() {
+                return;
+            }
+            open -= 1;
+            self.order.swap(at, open);
+            if self.row_of[column] == NONE {
+                break (column, reach);
+            }
+            self.relax(costs, columns, (column, reach), open);
+        };
+        for &column in &self.order[open..] {
+            self.prices[column] += self.distance[column] - reach;
+        }
+        self.flip(sink, free_row);
+    }
+
+    /// Where in the order the open column with the shortest path stands. A column without a row
+    /// wins a tie.
+    fn nearest(&self, open: usize) -> usize {
+        let mut best = 0;
+        for at in 1..open {
+            let (column, holder) = (self.order[at], self.order[best]);
+            let (found, least) = (self.distance[column], self.distance[holder]);
+            if found < least
+                || (found == least && self.row_of[column] == NONE && self.row_of[holder] != NONE)
+            {
+                best = at;
+            }
+        }
+        best
+    }
+
+    /// Paths through a column that has just been settled, at `reach`, and the row it belongs to.
+    fn relax(&mut self, costs: &[f64], columns: usize, (column, reach): (usize, f64), open: usize) {
+        let row = self.row_of[column];
+        let costs = &costs[row * columns..][..columns];
+        let through = reach - (costs[column] - self.prices[column]);
+        for &j in &self.order[..open] {
+            let path = through + (costs[j] - self.prices[j]);
+            if path < self.distance[j] {
+                self.distance[j] = path;
+                self.before[j] = row;
+            }
+        }
+    }
+
+    /// Exchanges assigned and free pairs along the path that ends in `column`.
+    fn flip(&mut self, mut column: usize, free_row: usize) {
+        loop {
+            let row = self.before[column];
+            self.row_of[column] = row;
+            column = std::mem::replace(&mut self.column_of[row], column);
+            if row == free_row {
+                return;
+            }
+        }
+    }
+
+    /// `u_i` from complementary slackness. Zero for a row left over.
+    fn row_price(&self, costs: &[f64], row: usize) -> f64 {
+        match self.column_of[row] {
+            NONE => 0.0,
+            column => costs[row * self.prices.len() + column] - self.prices[column],
+        }
+    }
+}
+
+/// The columns with the least and the second least reduced cost `c − v`, with these costs. `+∞`
+/// where there is no second.
+fn two_cheapest(costs: &[f64], prices: &[f64]) -> ((usize, f64), (usize, f64)) {
+    let infinite = 1.0 / 0.0;
+    let (mut best, mut second) = ((0, infinite), (0, infinite));
+    for (j, (&c, &v)) in costs.iter().zip(prices).enumerate() {
+        let reduced = c - v;
+        if reduced < second.1 {
+            second = (j, reduced);
+            if reduced < best.1 {
+                std::mem::swap(&mut best, &mut second);
+            }
+        }
+    }
+    (best, second)
+}
+
+fn reset<V: Clone>(vector: &mut Vec<V>, len: usize, value: V) {
+    vector.clear();
+    vector.resize(len, value);
+}

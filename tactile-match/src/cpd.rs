@@ -1,0 +1,1342 @@
+//! Coherent point drift: rigid, similarity, affine and non-rigid registration by maximum
+//! likelihood.
+//!
+//! The model points `y_m` (`M` of them) are the centres of a Gaussian mixture of one variance `σ²`,
+//! with a uniform component of weight `w` for outliers. The target points `x_n` (`N`) are its
+//! sample. Expectation maximisation alternates (Myronenko & Song, Point set registration: coherent
+//! point drift, IEEE PAMI 32, 2262–2275, 2010):
+//!
+//! ```text
+//! P_mn = exp(−|x_n − T(y_m)|²/2σ²) / (Σ_k exp(−|x_n − T(y_k)|²/2σ²) + (2πσ²)^{D/2} w M / ((1−w) N))
+//! T    = the rigid, similarity, affine or non-rigid motion that minimises Σ P_mn |x_n − T(y_m)|² / 2σ² (+ ½ λ |T|²)
+//! σ²   = Σ P_mn |x_n − T(y_m)|² / (D Σ P_mn)
+//! ```
+//!
+//! Non-rigid motion is `T(y) = y + Σ_k w_k exp(−|y − y_k|²/2β²)`, neighbours moving coherently. All
+//! parameters refer to sets of root mean square radius one ([`Normalization`]): the same settings
+//! mean the same in every unit. Two things differ from the usual programs, neither in the answer:
+//! `P` is never stored while iterating, and the Gaussian kernel is factorised once, to the rank it
+//! numerically has, instead of solving an `M × M` system in every iteration.
+
+use crate::Frame;
+use crate::error::{at_least_one, option_within, point_sets};
+use crate::{
+    AssignmentWorkspace, MatchError, MatchReport, Matching, PointMatcher, SoftMatches, StopReason,
+    unmatched_rows,
+};
+use crate::{Loop, vectorised};
+use nalgebra::{Cholesky, DMatrix, Dyn, Point, SMatrix, SVector, VecStorage};
+use tactile_tps::{Affine, Warp};
+
+/// How the model may move.
+///
+/// ```
+/// use nalgebra::{Point2, Vector2};
+/// use tactile_match::{CoherentPointDrift, Motion, PointMatcher};
+/// let model: Vec<_> = (0..20)
+///     .map(f64::from)
+///     .map(|k| Point2::new(k.cos() * k, (1.3 * k).sin() * k))
+///     .collect();
+/// let target: Vec<_> = model
+///     .iter()
+///     .map(|p| p * 1.2 + Vector2::new(0.0, 3.0))
+///     .collect(); // swollen by a fifth
+/// let residual = |motion| {
+///     let matcher = CoherentPointDrift::default().with_motion(motion)?;
+///     Ok::<_, tactile_match::MatchError>(
+///         matcher.match_points(&model, &target)?.report.residual,
+///     )
+/// };
+/// assert!(residual(Motion::Similarity)? < 1e-6);
+/// assert!(residual(Motion::Rigid)? > 0.1); // has no scale to offer
+/// # Ok::<(), tactile_match::MatchError>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Motion {
+    /// Rotation and translation.
+    Rigid,
+    /// Rotation, translation and one scale.
+    Similarity,
+    /// Any affine map.
+    Affine,
+    /// Smooth displacement.
+    NonRigid {
+        /// Width β of the Gaussian kernel, in root mean square radii: how far neighbours move
+        /// together.
+        beta: f64,
+        /// Weight λ of smoothness against likelihood.
+        lambda: f64,
+        /// Greatest rank of the kernel. `None` for the rank it numerically has. Thirty is customary
+        /// for speed.
+        rank: Option<usize>,
+    },
+}
+
+impl Motion {
+    /// Non-rigid with the customary β = 2, λ = 3, and no bound on the rank.
+    pub const NON_RIGID: Self = Self::NonRigid {
+        beta: 2.0,
+        lambda: 3.0,
+        rank: None,
+    };
+}
+
+/// How the two sets are brought to size one.
+///
+/// ```
+/// use nalgebra::Point2;
+/// use tactile_match::{CoherentPointDrift, Motion, Normalization, PointMatcher};
+/// let model: Vec<_> = (0..24)
+///     .map(f64::from)
+///     .map(|k| Point2::new(k % 6.0 + 0.2 * k.sin(), (k / 6.0).floor()))
+///     .collect();
+/// let target: Vec<_> = model[..18]
+///     .iter()
+///     .map(|p| Point2::new(p.x + 0.1, p.y))
+///     .collect(); // the last row is out of sight
+/// let (motion, normalization) = (Motion::Rigid, Normalization::Model);
+/// let options = CoherentPointDrift::default()
+///     .with_motion(motion)?
+///     .with_normalization(normalization);
+/// let matching = options.match_points(&model, &target)?;
+/// assert!((0..18).all(|i| matching.assignment[i] == Some(i)));
+/// assert_eq!(matching.unmatched_model, [18, 19, 20, 21, 22, 23]);
+/// # Ok::<(), tactile_match::MatchError>(())
+/// ```
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Normalization {
+    /// Each set by its own centre and root mean square radius: customary in coherent point drift,
+    /// and right whatever lies between the sets.
+    ///
+    /// [`Rigid`](Motion::Rigid) motion, which has no scale to give back, takes the model's radius
+    /// for both.
+    #[default]
+    Each,
+    /// Both by the centre and the root mean square radius of the model: for sets that nearly lie on
+    /// one another, where points without a partner would shift the centre of one of them.
+    Model,
+    /// None: the parameters are in the units of the points.
+    Off,
+}
+
+impl CoherentPointDrift {
+    /// [`PointMatcher::match_points`] with the memory of the iterations kept between calls.
+    ///
+    /// ```
+    /// use nalgebra::{Point2, Vector2};
+    /// use tactile_match::{CoherentPointDrift, DriftWorkspace};
+    /// let model: Vec<_> = (0..12)
+    ///     .map(f64::from)
+    ///     .map(|k| Point2::new(k % 4.0 + 0.2 * k.sin(), (k / 4.0).floor()))
+    ///     .collect();
+    /// let (matcher, mut workspace) = (CoherentPointDrift::default(), DriftWorkspace::default());
+    /// for shift in [0.5, 5.0] {
+    ///     let target: Vec<_> = model.iter().map(|p| p + Vector2::new(shift, 0.0)).collect();
+    ///     let matching = matcher.match_with(&mut workspace, &model, &target)?;
+    ///     assert!((0..12).all(|i| matching.assignment[i] == Some(i)));
+    /// }
+    /// # Ok::<(), tactile_match::MatchError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// As [`PointMatcher::match_points`].
+    pub fn match_with<const D: usize>(
+        &self,
+        workspace: &mut DriftWorkspace<D>,
+        model: &[Point<f64, D>],
+        target: &[Point<f64, D>],
+    ) -> Result<Matching<D>, MatchError> {
+        point_sets(model, target)?;
+        workspace.register(self, model, target);
+        Ok(matching(self, workspace, model.len(), target.len()))
+    }
+}
+
+impl<const D: usize> PointMatcher<D> for CoherentPointDrift {
+    fn match_points(
+        &self,
+        model: &[Point<f64, D>],
+        target: &[Point<f64, D>],
+    ) -> Result<Matching<D>, MatchError> {
+        self.match_with(&mut DriftWorkspace::default(), model, target)
+    }
+}
+
+/// Coherent point drift as a [`PointMatcher`](crate::PointMatcher).
+///
+/// Where the sets are far apart in rotation it finds a local optimum, as every method of its kind
+/// does. The time is `O((M N + M r²) · iterations)`, with `r` the rank of the kernel.
+///
+/// ```
+/// use nalgebra::{Point2, Rotation2, Vector2};
+/// use tactile_match::{CoherentPointDrift, Motion, PointMatcher};
+///
+/// let model: Vec<_> = (0..40)
+///     .map(|k| f64::from(k))
+///     .map(|k| Point2::new(k.cos() * k, (1.3 * k).sin() * k))
+///     .collect();
+/// let motion = Rotation2::new(0.2);
+/// let target: Vec<_> = model
+///     .iter()
+///     .rev()
+///     .map(|p| motion * p + Vector2::new(7.0, -2.0))
+///     .collect();
+///
+/// let matcher = CoherentPointDrift::default().with_motion(Motion::Rigid)?;
+/// let matching = matcher.match_points(&model, &target)?;
+/// assert!((0..40).all(|m| matching.assignment[m] == Some(39 - m)));
+/// assert!(
+///     matching
+///         .warped
+///         .iter()
+///         .zip(target.iter().rev())
+///         .all(|(w, t)| (w - t).norm() < 1e-6)
+/// );
+/// # Ok::<(), tactile_match::MatchError>(())
+/// ```
+///
+/// # Options
+/// All are independent of the units of the points.
+///
+/// ```
+/// use nalgebra::Point2;
+/// use tactile_match::{CoherentPointDrift, MatchError, Motion, Normalization, PointMatcher};
+/// // About a fifth of the target points are outliers, and the object may bend, but gently.
+/// let motion = Motion::NonRigid {
+///     beta: 2.0,
+///     lambda: 10.0,
+///     rank: Some(30),
+/// };
+/// let options = CoherentPointDrift::default()
+///     .with_motion(motion)?
+///     .with_normalization(Normalization::Model)
+///     .with_outlier_weight(0.2)?
+///     .with_tolerance(1e-6)?
+///     .with_max_iterations(50)?;
+/// let points = [[0.0, 0.0], [1.0, 0.1], [2.5, 0.0], [0.3, 2.0], [1.6, 1.4]].map(Point2::from);
+/// let found = options.match_points(&points, &points)?;
+/// assert!((0..5).all(|i| found.assignment[i] == Some(i)) && found.report.iterations <= 50);
+/// let all_outliers = options.with_outlier_weight(1.0);
+/// assert!(matches!(
+///     all_outliers,
+///     Err(MatchError::InvalidOption {
+///         option: "outlier_weight",
+///         ..
+///     })
+/// ));
+/// # Ok::<(), MatchError>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CoherentPointDrift {
+    motion: Motion,
+    outlier_weight: f64,
+    tolerance: f64,
+    max_iterations: usize,
+    normalization: Normalization,
+}
+
+impl Default for CoherentPointDrift {
+    fn default() -> Self {
+        Self {
+            motion: Motion::NON_RIGID,
+            outlier_weight: 0.1,
+            tolerance: 1e-5,
+            max_iterations: 150,
+            normalization: Normalization::Each,
+        }
+    }
+}
+
+impl CoherentPointDrift {
+    /// Sets how the model may move (default [`Motion::NON_RIGID`]).
+    ///
+    /// # Errors
+    /// [`MatchError::InvalidOption`] unless β and λ are positive and finite and the rank is at
+    /// least one.
+    pub fn with_motion(mut self, motion: Motion) -> Result<Self, MatchError> {
+        if let Motion::NonRigid { beta, lambda, rank } = motion {
+            option_within("beta", beta, f64::MIN_POSITIVE, f64::MAX, "(0, ∞)")?;
+            option_within("lambda", lambda, f64::MIN_POSITIVE, f64::MAX, "(0, ∞)")?;
+            at_least_one("rank", rank.unwrap_or(1))?;
+        }
+        self.motion = motion;
+        Ok(self)
+    }
+
+    /// Sets the weight `w` of the uniform component (default 0.1): about the share of target points
+    /// that are outliers.
+    ///
+    /// # Errors
+    /// [`MatchError::InvalidOption`] outside `[0, 1)`.
+    pub fn with_outlier_weight(mut self, weight: f64) -> Result<Self, MatchError> {
+        option_within("outlier_weight", weight, 0.0, 1.0 - f64::EPSILON, "[0, 1)")?;
+        self.outlier_weight = weight;
+        Ok(self)
+    }
+
+    /// Sets the change of `σ²` at which the iterations end (default 10⁻⁵).
+    ///
+    /// # Errors
+    /// [`MatchError::InvalidOption`] unless it is finite and not negative.
+    pub fn with_tolerance(mut self, tolerance: f64) -> Result<Self, MatchError> {
+        option_within("tolerance", tolerance, 0.0, f64::MAX, "[0, ∞)")?;
+        self.tolerance = tolerance;
+        Ok(self)
+    }
+
+    /// Sets the most iterations (default 150).
+    ///
+    /// # Errors
+    /// [`MatchError::InvalidOption`] for 0.
+    pub fn with_max_iterations(mut self, limit: usize) -> Result<Self, MatchError> {
+        at_least_one("max_iterations", limit)?;
+        self.max_iterations = limit;
+        Ok(self)
+    }
+
+    /// Sets the frame of the registration (default [`Normalization::Each`]).
+    #[must_use]
+    pub fn with_normalization(mut self, normalization: Normalization) -> Self {
+        self.normalization = normalization;
+        self
+    }
+}
+
+// Expectation maximisation: the loop, and the memory it needs.
+
+/// Memory of [`CoherentPointDrift`](super::CoherentPointDrift), to be reused: the iterations do not
+/// allocate once it has seen the largest sets.
+///
+/// ```
+/// use nalgebra::Point2;
+/// use tactile_match::{CoherentPointDrift, DriftWorkspace};
+/// let model: Vec<_> = (0..12)
+///     .map(f64::from)
+///     .map(|k| Point2::new(k % 4.0 + 0.2 * k.sin(), (k / 4.0).floor()))
+///     .collect();
+/// let target: Vec<_> = model
+///     .iter()
+///     .map(|p| Point2::new(p.x + 0.1 * p.y, p.y + 2.0))
+///     .collect();
+/// let mut workspace = DriftWorkspace::default();
+/// let found = CoherentPointDrift::default().match_with(&mut workspace, &model, &target)?;
+/// assert!(found.report.iterations > 1 && found.report.sigma < 0.2); // in the units of the points
+/// assert!((found.warp.apply(&model[5]) - found.warped[5]).norm() < 1e-6);
+/// # Ok::<(), tactile_match::MatchError>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct DriftWorkspace<const D: usize> {
+    model_frame: Frame<D>,
+    target_frame: Frame<D>,
+    model: Columns<D>,
+    target: Columns<D>,
+    moved: Columns<D>,
+    posterior: Posterior<D>,
+    sigma2: f64,
+    energy: Vec<f64>,
+    stop: StopReason,
+    motion: Motion,
+    kernel: KernelFactor,
+    non_rigid: NonRigidStep,
+    global: GlobalStep<D>,
+}
+
+impl<const D: usize> Default for DriftWorkspace<D> {
+    fn default() -> Self {
+        // Without memory yet.
+        let columns = || std::array::from_fn(|_| Vec::new());
+        Self {
+            model_frame: Frame::default(),
+            target_frame: Frame::default(),
+            model: columns(),
+            target: columns(),
+            moved: columns(),
+            posterior: Posterior::default(),
+            sigma2: 0.0,
+            energy: Vec::new(),
+            stop: StopReason::default(),
+            motion: Motion::NON_RIGID,
+            kernel: KernelFactor::default(),
+            non_rigid: NonRigidStep::default(),
+            global: GlobalStep::default(),
+        }
+    }
+}
+
+impl<const D: usize> DriftWorkspace<D> {
+    /// Iterations of the last registration.
+    fn iterations(&self) -> usize {
+        self.energy.len()
+    }
+
+    /// Registers `model` to `target`. Both have points and finite coordinates.
+    fn register(
+        &mut self,
+        options: &CoherentPointDrift,
+        model: &[Point<f64, D>],
+        target: &[Point<f64, D>],
+    ) {
+        self.enter_frames(options, model, target);
+        self.global.reset();
+        self.motion = options.motion;
+        if let Motion::NonRigid { beta, rank, .. } = options.motion {
+            self.kernel.build(
+                &self.model,
+                beta,
+                rank.unwrap_or(model.len()),
+                // What is left of the kernel's diagonal when its factorisation ends: far below what
+                // the ridge `λσ²` lets through.
+                1e-12,
+            );
+        }
+        self.energy.clear();
+        self.sigma2 = self.initial_variance();
+        self.stop = StopReason::Exact;
+        if self.sigma2 <= 0.0 {
+            return; // all points of both sets coincide
+        }
+        self.stop = StopReason::IterationLimit;
+        for _ in 0..options.max_iterations {
+            let before = self.sigma2;
+            self.iterate(options);
+            if (self.sigma2 - before).abs() <= options.tolerance {
+                self.stop = StopReason::Converged;
+                break;
+            }
+        }
+    }
+
+    fn enter_frames(
+        &mut self,
+        options: &CoherentPointDrift,
+        model: &[Point<f64, D>],
+        target: &[Point<f64, D>],
+    ) {
+        self.model_frame = Frame::of(model);
+        self.target_frame = match options.normalization {
+            Normalization::Each => Frame::of(target),
+            Normalization::Model => self.model_frame,
+            Normalization::Off => Frame::default(),
+        };
+        if options.normalization == Normalization::Off {
+            self.model_frame = Frame::default();
+        } else if options.motion == Motion::Rigid {
+            // Rigid motion knows one unit: that of the larger set, or squares of the other could
+            // overflow.
+            let scale = self.model_frame.scale.max(self.target_frame.scale);
+            (self.model_frame.scale, self.target_frame.scale) = (scale, scale);
+        }
+        self.model_frame.enter(model, &mut self.model);
+        self.target_frame.enter(target, &mut self.target);
+        self.moved.clone_from(&self.model);
+    }
+
+    /// Mean squared distance of all pairs, per axis.
+    fn initial_variance(&self) -> f64 {
+        let mut sum = 0.0;
+        for (y, x) in self.model.iter().zip(&self.target) {
+            let moments = |v: &[f64]| {
+                let n = v.len() as f64;
+                (
+                    v.iter().sum::<f64>() / n,
+                    v.iter().map(|c| c * c).sum::<f64>() / n,
+                )
+            };
+            let ((mean_y, square_y), (mean_x, square_x)) = (moments(y), moments(x));
+            sum += square_y + square_x - 2.0 * mean_y * mean_x;
+        }
+        sum / D as f64
+    }
+
+    /// One E-step and one M-step.
+    fn iterate(&mut self, options: &CoherentPointDrift) {
+        let uniform = self.uniform(options);
+        self.posterior
+            .update(&self.moved, &self.target, self.sigma2, uniform);
+        self.energy.push(self.posterior.energy);
+        match options.motion {
+            Motion::NonRigid { lambda, .. } => {
+                let ridge = lambda * self.sigma2;
+                self.non_rigid.solve(
+                    &self.kernel,
+                    &self.posterior,
+                    &self.model,
+                    ridge,
+                    &mut self.moved,
+                );
+            }
+            motion => self
+                .global
+                .solve(motion, &self.posterior, &self.model, &mut self.moved),
+        }
+        self.update_variance(options.tolerance);
+    }
+
+    /// Weight of the uniform component at the present variance.
+    fn uniform(&self, options: &CoherentPointDrift) -> f64 {
+        uniform_weight::<D>(
+            self.sigma2,
+            options.outlier_weight,
+            self.model[0].len(),
+            self.target[0].len(),
+        )
+    }
+
+    /// `σ² = Σ P_mn |x_n − T(y_m)|² / (D Σ P_mn)`. A tenth of the tolerance where rounding makes it
+    /// zero or less.
+    fn update_variance(&mut self, tolerance: f64) {
+        let mass: f64 = self.posterior.model_mass.iter().sum();
+        if mass <= f64::MIN_POSITIVE {
+            return; // all are outliers: nothing to learn from
+        }
+        let weighted = |w: &[f64], a: &[f64], b: &[f64]| -> f64 {
+            w.iter().zip(a).zip(b).map(|((w, a), b)| w * a * b).sum()
+        };
+        let mut sum = 0.0;
+        for d in 0..D {
+            let (x, t) = (&self.target[d], &self.moved[d]);
+            let cross: f64 = self.posterior.weighted[d]
+                .iter()
+                .zip(t)
+                .map(|(p, t)| p * t)
+                .sum();
+            sum += weighted(&self.posterior.target_mass, x, x) - 2.0 * cross
+                + weighted(&self.posterior.model_mass, t, t);
+        }
+        // Coordinates of size one are not known better than ε, and 1/σ² must stay finite.
+        let least = f64::EPSILON * f64::EPSILON;
+        let variance = sum / (mass * D as f64);
+        self.sigma2 = if variance > 0.0 {
+            variance
+        } else {
+            0.1 * tolerance
+        }
+        .max(least);
+    }
+
+    /// The model points where the last registration left them.
+    fn warped(&self) -> Vec<Point<f64, D>> {
+        let at = |m: usize| SVector::from_fn(|d, _| self.moved[d][m]);
+        (0..self.moved[0].len())
+            .map(|m| self.target_frame.leave(at(m)))
+            .collect()
+    }
+
+    /// The map the last registration found, for any point.
+    fn warp(&self) -> DriftWarp<D> {
+        let mut warp = DriftWarp {
+            model: self.model_frame,
+            target: self.target_frame,
+            linear: self.global.linear,
+            offset: self.global.offset,
+            centres: Vec::new(),
+            weights: Vec::new(),
+            beta: 1.0,
+        };
+        if let (Motion::NonRigid { beta, .. }, false) = (self.motion, self.energy.is_empty()) {
+            (warp.linear, warp.offset, warp.beta) = (SMatrix::identity(), SVector::zeros(), beta);
+            let coefficients: Vec<_> = (0..self.kernel.rank())
+                .map(|k| self.non_rigid.coefficient(k))
+                .collect();
+            warp.weights = self
+                .kernel
+                .pivot_weights(&coefficients)
+                .into_iter()
+                .map(SVector::from)
+                .collect();
+            let at = |&m: &usize| SVector::from_fn(|d, _| self.model[d][m]);
+            warp.centres = self.kernel.pivots.iter().map(at).collect();
+        }
+        warp
+    }
+}
+
+// The E-step: which target point belongs to which model point, as sums over the posterior `P`
+// without storing it.
+
+/// `D` coordinates, each contiguous over the points.
+type Columns<const D: usize> = [Vec<f64>; D];
+
+/// The sums over the posterior that the M-steps need, for `M` model and `N` target points.
+#[derive(Clone, Debug)]
+struct Posterior<const D: usize> {
+    /// `P 1`: how much of the target every model point has.
+    model_mass: Vec<f64>,
+    /// `Pᵀ 1`: how much of every target point is no outlier.
+    target_mass: Vec<f64>,
+    /// `P X`.
+    weighted: Columns<D>,
+    /// Negative log-likelihood, up to a constant that depends on the sizes alone.
+    energy: f64,
+    /// One column of `P`.
+    column: Vec<f64>,
+}
+
+impl<const D: usize> Default for Posterior<D> {
+    fn default() -> Self {
+        Self {
+            model_mass: Vec::new(),
+            target_mass: Vec::new(),
+            weighted: std::array::from_fn(|_| Vec::new()),
+            energy: 0.0,
+            column: Vec::new(),
+        }
+    }
+}
+
+/// Weight of the uniform component relative to one Gaussian's peak,
+/// `(2πσ²)^{D/2} w M / ((1 − w) N)`.
+fn uniform_weight<const D: usize>(
+    sigma2: f64,
+    outlier_weight: f64,
+    model: usize,
+    target: usize,
+) -> f64 {
+    let volume = (std::f64::consts::TAU * sigma2).powf(0.5 * D as f64);
+    volume * outlier_weight / (1.0 - outlier_weight) * model as f64 / target as f64
+}
+
+impl<const D: usize> Posterior<D> {
+    /// All sums for model points that have moved to `moved`. `O(M N)`.
+    fn update(&mut self, moved: &Columns<D>, target: &Columns<D>, sigma2: f64, uniform: f64) {
+        let (model_len, target_len) = (moved[0].len(), target[0].len());
+        for sums in self
+            .weighted
+            .iter_mut()
+            .chain([&mut self.model_mass, &mut self.column])
+        {
+            sums.clear();
+            sums.resize(model_len, 0.0);
+        }
+        self.target_mass.clear();
+        self.target_mass.resize(target_len, 0.0);
+        vectorised(Accumulate {
+            posterior: self,
+            moved,
+            target,
+            sigma2,
+            uniform,
+        });
+        self.energy += 0.5 * (D * target_len) as f64 * sigma2.ln();
+    }
+}
+
+/// The pass over all pairs.
+struct Accumulate<'a, const D: usize> {
+    posterior: &'a mut Posterior<D>,
+    moved: &'a Columns<D>,
+    target: &'a Columns<D>,
+    sigma2: f64,
+    uniform: f64,
+}
+
+impl<const D: usize> Loop for Accumulate<'_, D> {
+    type Output = ();
+    #[inline(always)]
+    fn run(self) {
+        let sums = self.posterior;
+        sums.energy = 0.0;
+        for n in 0..sums.target_mass.len() {
+            let x: [f64; D] = std::array::from_fn(|d| self.target[d][n]);
+            let sum = gaussians(&mut sums.column, self.moved, x, self.sigma2);
+            let total = sum + self.uniform;
+            if total <= 0.0 {
+                continue; // out of reach of every model point, and no outlier component to take it
+            }
+            sums.energy -= total.ln();
+            sums.target_mass[n] = sum / total;
+            scale_and_add(&mut sums.column, &mut sums.model_mass, 1.0 / total);
+            for (weighted, x) in sums.weighted.iter_mut().zip(x) {
+                for (sum, &p) in weighted.iter_mut().zip(&sums.column) {
+                    *sum += p * x;
+                }
+            }
+        }
+    }
+}
+
+/// `exp(−|x − y_m|² / 2σ²)` for every model point. Returns their sum.
+#[inline(always)]
+fn gaussians<const D: usize>(
+    column: &mut [f64],
+    moved: &Columns<D>,
+    x: [f64; D],
+    sigma2: f64,
+) -> f64 {
+    let scale = -0.5 / sigma2;
+    let moved: [&[f64]; D] = std::array::from_fn(|d| &moved[d][..column.len()]);
+    for m in 0..column.len() {
+        let mut squared = 0.0;
+        for d in 0..D {
+            let step = x[d] - moved[d][m];
+            squared += step * step;
+        }
+        column[m] = exp_of_negative(squared * scale);
+    }
+    lane_sum(column)
+}
+
+#[inline(always)]
+fn scale_and_add(column: &mut [f64], sums: &mut [f64], factor: f64) {
+    for (p, sum) in column.iter_mut().zip(sums) {
+        *p *= factor;
+        *sum += *p;
+    }
+}
+
+/// The sum in eight lanes, which vectorise without reordering: the same bits on every machine.
+#[inline(always)]
+fn lane_sum(values: &[f64]) -> f64 {
+    let mut lanes = [0.0; 8];
+    let (chunks, rest) = values.as_chunks::<8>();
+    for chunk in chunks {
+        for l in 0..8 {
+            lanes[l] += chunk[l];
+        }
+    }
+    lanes.iter().sum::<f64>() + rest.iter().sum::<f64>()
+}
+
+// eˣ in loops that vectorise.
+
+/// `e^x` for `x <= 0`, to about one unit in the last place. Exactly zero below −708, where a
+/// product with anything of size one would be lost anyway. No branch and no table, so that a loop
+/// over it vectorises. Plain products and sums, so that every machine gives the same bits.
+#[inline(always)]
+fn exp_of_negative(x: f64) -> f64 {
+    const LOWEST: f64 = -708.0;
+    // Adding 1.5·2⁵² rounds to an integer and leaves it, offset by the exponent's bias, in the
+    // lowest bits.
+    const SHIFT: f64 = 6_755_399_441_055_744.0;
+    const LN2_HIGH: f64 = 6.931_471_803_691_238e-1;
+    const LN2_LOW: f64 = 1.908_214_929_270_587_7e-10;
+    let clamped = if x > LOWEST { x } else { LOWEST };
+    let shifted = clamped * std::f64::consts::LOG2_E + SHIFT;
+    let k = shifted - SHIFT;
+    let r = clamped - k * LN2_HIGH - k * LN2_LOW;
+    let power = f64::from_bits(shifted.to_bits().wrapping_add(1023) << 52);
+    let value = taylor(r) * power;
+    if x > LOWEST { value } else { 0.0 }
+}
+
+/// Σ rⁿ/n! to n = 13: below 2⁻⁵³ of eʳ for |r| ≤ ½ ln 2.
+#[inline(always)]
+fn taylor(r: f64) -> f64 {
+    const INVERSE_FACTORIAL: [f64; 12] = [
+        1.0 / 6_227_020_800.0,
+        1.0 / 479_001_600.0,
+        1.0 / 39_916_800.0,
+        1.0 / 3_628_800.0,
+        1.0 / 362_880.0,
+        1.0 / 40_320.0,
+        1.0 / 5_040.0,
+        1.0 / 720.0,
+        1.0 / 120.0,
+        1.0 / 24.0,
+        1.0 / 6.0,
+        0.5,
+    ];
+    let mut sum = INVERSE_FACTORIAL[0];
+    for &c in &INVERSE_FACTORIAL[1..] {
+        sum = sum * r + c;
+    }
+    1.0 + (r + r * r * sum)
+}
+
+// The Gaussian kernel `G` of the non-rigid motion, as a product `L Lᵀ` of low rank.
+//
+// `G_mk = exp(−|y_m − y_k|² / 2β²)` of smooth motion (β about the size of the set) has few
+// eigenvalues above rounding, so that a pivoted Cholesky factor `L` of `r ≪ M` columns holds all of
+// it that double precision can use. With it one M-step costs `O(M r²)` instead of `O(M³)`, and
+// needs no difference of large terms.
+
+/// `G ≈ L Lᵀ`, and what evaluates the motion at other points.
+#[derive(Clone, Debug, Default)]
+struct KernelFactor {
+    /// `L`, column after column of `M` entries.
+    columns: Vec<f64>,
+    /// `L`, row after row of `r` entries.
+    rows: Vec<f64>,
+    /// The model points the columns stem from.
+    pivots: Vec<usize>,
+    /// What is left of the diagonal of `G − L Lᵀ`.
+    residual: Vec<f64>,
+    len: usize,
+}
+
+impl KernelFactor {
+    /// Rank of the factor.
+    #[inline(always)]
+    fn rank(&self) -> usize {
+        self.pivots.len()
+    }
+
+    /// Column `k` of `L`.
+    #[inline(always)]
+    fn column(&self, k: usize) -> &[f64] {
+        &self.columns[k * self.len..][..self.len]
+    }
+
+    /// Row `m` of `L`.
+    #[inline(always)]
+    fn row(&self, m: usize) -> &[f64] {
+        &self.rows[m * self.rank()..][..self.rank()]
+    }
+
+    /// Factorises the kernel of `model`: columns are added, largest remainder first, until none
+    /// exceeds `tolerance` or there are `rank` of them. `O(M r²)`.
+    fn build<const D: usize>(
+        &mut self,
+        model: &Columns<D>,
+        beta: f64,
+        rank: usize,
+        tolerance: f64,
+    ) {
+        self.len = model[0].len();
+        self.columns.clear();
+        self.pivots.clear();
+        self.residual.clear();
+        self.residual.resize(self.len, 1.0);
+        while self.rank() < rank.min(self.len) {
+            let (pivot, &largest) = match self
+                .residual
+                .iter()
+                .enumerate()
+                .max_by(|a, b| a.1.total_cmp(b.1).then(b.0.cmp(&a.0)))
+            {
+                Some(found) if *found.1 > tolerance => found,
+                _ => break,
+            };
+            self.append(model, beta, pivot, largest.sqrt());
+        }
+        self.rows.clear();
+        let (columns, len, rank) = (&self.columns, self.len, self.pivots.len());
+        self.rows
+            .extend((0..len).flat_map(|m| (0..rank).map(move |k| columns[k * len + m])));
+    }
+
+    fn append<const D: usize>(&mut self, model: &Columns<D>, beta: f64, pivot: usize, root: f64) {
+        let done = self.columns.len();
+        self.columns.resize(done + self.len, 0.0);
+        let (before, column) = self.columns.split_at_mut(done);
+        vectorised(NextColumn {
+            before,
+            column,
+            model,
+            beta,
+            pivot,
+            root,
+        });
+        for (rest, c) in self.residual.iter_mut().zip(column.iter()) {
+            *rest -= c * c;
+        }
+        for &earlier in &self.pivots {
+            column[earlier] = 0.0; // exactly, so that the pivots' rows are triangular
+        }
+        column[pivot] = root;
+        self.residual[pivot] = 0.0;
+        self.pivots.push(pivot);
+    }
+
+    /// Weights `w` at the pivots with `Σ_k G(x, y_k) w_k = (L z)(x)`: solves `Cᵀ w = z`, `C` the
+    /// pivots' rows of `L`.
+    fn pivot_weights<const D: usize>(&self, coefficients: &[[f64; D]]) -> Vec<[f64; D]> {
+        let mut weights = coefficients.to_vec();
+        for k in (0..self.rank()).rev() {
+            let column = self.column(k);
+            let mut w = weights[k];
+            for (later, weight) in weights.iter().enumerate().skip(k + 1) {
+                let factor = column[self.pivots[later]];
+                (0..D).for_each(|d| w[d] -= factor * weight[d]);
+            }
+            weights[k] = w.map(|w| w / column[self.pivots[k]]);
+        }
+        weights
+    }
+}
+
+/// A new column of the factor: that of the kernel, less what the columns before it hold.
+struct NextColumn<'a, const D: usize> {
+    before: &'a [f64],
+    column: &'a mut [f64],
+    model: &'a Columns<D>,
+    beta: f64,
+    pivot: usize,
+    root: f64,
+}
+
+impl<const D: usize> Loop for NextColumn<'_, D> {
+    type Output = ();
+    #[inline(always)]
+    fn run(self) {
+        let len = self.column.len();
+        let scale = -0.5 / (self.beta * self.beta);
+        let model: [&[f64]; D] = std::array::from_fn(|d| &self.model[d][..len]);
+        for m in 0..len {
+            let mut squared = 0.0;
+            for axis in model {
+                let step = axis[self.pivot] - axis[m];
+                squared += step * step;
+            }
+            self.column[m] = exp_of_negative(squared * scale);
+        }
+        for earlier in self.before.chunks_exact(len) {
+            let factor = earlier[self.pivot];
+            self.column
+                .iter_mut()
+                .zip(earlier)
+                .for_each(|(c, e)| *c -= factor * e);
+        }
+        self.column.iter_mut().for_each(|c| *c /= self.root);
+    }
+}
+
+// The M-step of non-rigid motion: `y ↦ y + (G W)(y)` with a smooth Gaussian kernel.
+//
+// Myronenko & Song (2010), eq. 22–23: `(diag(P1) G + λσ² I) W = P X − diag(P1) Y`. With `G = L Lᵀ`
+// the motion is `G W = L z`, `(Lᵀ diag(P1) L + λσ² I) z = Lᵀ (P X − diag(P1) Y)`: symmetric,
+// positive definite, `r × r`.
+
+/// The coefficients `z`, a row per column of `L`, and the memory of the step.
+#[derive(Clone, Debug, Default)]
+struct NonRigidStep {
+    /// `z`, column by column of `r` entries.
+    coefficients: Vec<f64>,
+    normal: Vec<f64>,
+}
+
+impl NonRigidStep {
+    /// Row `k` of `z`.
+    fn coefficient<const D: usize>(&self, k: usize) -> [f64; D] {
+        let rank = self.coefficients.len() / D;
+        std::array::from_fn(|d| self.coefficients[d * rank + k])
+    }
+
+    /// Solves for `z` and moves `model` into `moved`. `O(M r²)`.
+    fn solve<const D: usize>(
+        &mut self,
+        kernel: &KernelFactor,
+        posterior: &Posterior<D>,
+        model: &Columns<D>,
+        ridge: f64,
+        moved: &mut Columns<D>,
+    ) {
+        let rank = kernel.rank();
+        self.normal.clear();
+        self.normal.resize(rank * rank, 0.0);
+        self.coefficients.clear();
+        self.coefficients.resize(rank * D, 0.0);
+        vectorised(Assemble {
+            step: self,
+            kernel,
+            posterior,
+            model,
+            ridge,
+        });
+        let storage = VecStorage::new(Dyn(rank), Dyn(rank), std::mem::take(&mut self.normal));
+        // Positive definite by construction; were it not, z = 0 leaves the model where it was.
+        if let Some(factor) = Cholesky::new(DMatrix::from_data(storage)) {
+            let storage =
+                VecStorage::new(Dyn(rank), Dyn(D), std::mem::take(&mut self.coefficients));
+            let mut coefficients = DMatrix::from_data(storage);
+            factor.solve_mut(&mut coefficients);
+            self.coefficients = coefficients.data.into();
+            self.normal = factor.unpack_dirty().data.into();
+        } else {
+            self.coefficients.fill(0.0);
+        }
+        vectorised(Apply {
+            coefficients: &self.coefficients,
+            kernel,
+            model,
+            moved,
+        });
+    }
+}
+
+/// `Lᵀ diag(P1) L + ridge I` (lower half) and `Lᵀ (P X − diag(P1) Y)`.
+struct Assemble<'a, const D: usize> {
+    step: &'a mut NonRigidStep,
+    kernel: &'a KernelFactor,
+    posterior: &'a Posterior<D>,
+    model: &'a Columns<D>,
+    ridge: f64,
+}
+
+impl<const D: usize> Loop for Assemble<'_, D> {
+    type Output = ();
+    #[inline(always)]
+    fn run(self) {
+        let rank = self.kernel.rank();
+        let NonRigidStep {
+            coefficients,
+            normal,
+            ..
+        } = self.step;
+        let mass = &self.posterior.model_mass;
+        for (m, &p) in mass.iter().enumerate() {
+            let row = self.kernel.row(m);
+            for d in 0..D {
+                let residual = self.posterior.weighted[d][m] - p * self.model[d][m];
+                add_scaled(&mut coefficients[d * rank..][..rank], row, residual);
+            }
+        }
+        let (blocks, rest) = mass.as_chunks::<4>();
+        for (block, p) in blocks.iter().enumerate() {
+            let rows: [&[f64]; 4] = std::array::from_fn(|v| self.kernel.row(4 * block + v));
+            for k in 0..rank {
+                add_four(
+                    &mut normal[k * rank..][k..rank],
+                    rows.map(|row| &row[k..]),
+                    p,
+                );
+            }
+        }
+        for (at, p) in rest.iter().enumerate() {
+            let row = self.kernel.row(4 * blocks.len() + at);
+            for k in 0..rank {
+                add_scaled(&mut normal[k * rank..][k..rank], &row[k..], p * row[k]);
+            }
+        }
+        for k in 0..rank {
+            normal[k * rank + k] += self.ridge;
+        }
+    }
+}
+
+/// `sum += factor · row`.
+#[inline(always)]
+fn add_scaled(sum: &mut [f64], row: &[f64], factor: f64) {
+    sum.iter_mut().zip(row).for_each(|(s, r)| *s += factor * r);
+}
+
+/// `sum += Σ_v p_v row_v[0] · row_v`: four model points at a time, to load and store the sum less
+/// often.
+#[inline(always)]
+fn add_four(sum: &mut [f64], rows: [&[f64]; 4], p: &[f64; 4]) {
+    let [a, b, c, d] = rows.map(|row| &row[..sum.len()]);
+    let [pa, pb, pc, pd] = [p[0] * a[0], p[1] * b[0], p[2] * c[0], p[3] * d[0]];
+    for k in 0..sum.len() {
+        sum[k] += (pa * a[k] + pb * b[k]) + (pc * c[k] + pd * d[k]);
+    }
+}
+
+/// `moved = Y + L z`.
+struct Apply<'a, const D: usize> {
+    coefficients: &'a [f64],
+    kernel: &'a KernelFactor,
+    model: &'a Columns<D>,
+    moved: &'a mut Columns<D>,
+}
+
+impl<const D: usize> Loop for Apply<'_, D> {
+    type Output = ();
+    #[inline(always)]
+    fn run(self) {
+        let rank = self.kernel.rank();
+        for d in 0..D {
+            self.moved[d].copy_from_slice(&self.model[d]);
+            for (k, z) in self.coefficients[d * rank..][..rank].iter().enumerate() {
+                self.moved[d]
+                    .iter_mut()
+                    .zip(self.kernel.column(k))
+                    .for_each(|(t, l)| *t += l * z);
+            }
+        }
+    }
+}
+
+// The M-step of rigid, similarity and affine motion.
+//
+// The posterior pulls model point `y_m` with weight `(P1)_m` to the mean `(P X)_m / (P1)_m`, so
+// that the step is the weighted fit to these means: Myronenko & Song (2010), figures 2 and 3.
+
+/// `y ↦ A y + b`, and the memory to find it.
+#[derive(Clone, Debug)]
+struct GlobalStep<const D: usize> {
+    linear: SMatrix<f64, D, D>,
+    offset: SVector<f64, D>,
+    sources: Vec<Point<f64, D>>,
+    means: Vec<Point<f64, D>>,
+    weights: Vec<f64>,
+}
+
+impl<const D: usize> Default for GlobalStep<D> {
+    fn default() -> Self {
+        let (sources, means, weights) = Default::default();
+        Self {
+            linear: SMatrix::identity(),
+            offset: SVector::zeros(),
+            sources,
+            means,
+            weights,
+        }
+    }
+}
+
+impl<const D: usize> GlobalStep<D> {
+    /// Back to the identity.
+    fn reset(&mut self) {
+        (self.linear, self.offset) = (SMatrix::identity(), SVector::zeros());
+    }
+
+    /// Fits `motion` and moves `model` into `moved`. `O(M)`. A posterior without mass leaves the
+    /// last motion.
+    fn solve(
+        &mut self,
+        motion: Motion,
+        posterior: &Posterior<D>,
+        model: &Columns<D>,
+        moved: &mut Columns<D>,
+    ) {
+        self.collect(posterior, model);
+        match motion {
+            Motion::Rigid => self.fit_rigid(false),
+            Motion::Similarity => self.fit_rigid(true),
+            _ => {
+                if let Ok(fit) = Affine::fit(&self.sources, &self.means, Some(&self.weights)) {
+                    (self.linear, self.offset) = (fit.linear, fit.offset);
+                }
+            }
+        }
+        for m in 0..model[0].len() {
+            let image = self.linear * SVector::from_fn(|d, _| model[d][m]) + self.offset;
+            (0..D).for_each(|d| moved[d][m] = image[d]);
+        }
+    }
+
+    fn collect(&mut self, posterior: &Posterior<D>, model: &Columns<D>) {
+        self.sources.clear();
+        self.means.clear();
+        self.weights.clear();
+        for (m, &mass) in posterior
+            .model_mass
+            .iter()
+            .enumerate()
+            .filter(|(_, mass)| **mass > f64::MIN_POSITIVE)
+        {
+            self.sources
+                .push(Point::from(SVector::from_fn(|d, _| model[d][m])));
+            self.means.push(Point::from(SVector::from_fn(|d, _| {
+                posterior.weighted[d][m] / mass
+            })));
+            self.weights.push(mass);
+        }
+    }
+
+    fn fit_rigid(&mut self, scaled: bool) {
+        let Ok(fit) = Affine::fit_rigid(&self.sources, &self.means, Some(&self.weights)) else {
+            return;
+        };
+        let scale = if scaled { self.scale(&fit.linear) } else { 1.0 };
+        let (source, mean) = (
+            self.weighted_mean(&self.sources),
+            self.weighted_mean(&self.means),
+        );
+        self.linear = fit.linear * scale;
+        self.offset = mean - self.linear * source;
+    }
+
+    /// `tr(Aᵀ R) / tr(Yᵀ diag(P1) Y)` about the weighted means. One where the model has no extent.
+    fn scale(&self, rotation: &SMatrix<f64, D, D>) -> f64 {
+        let (source, mean) = (
+            self.weighted_mean(&self.sources),
+            self.weighted_mean(&self.means),
+        );
+        let (mut along, mut extent) = (0.0, 0.0);
+        for ((y, x), w) in self.sources.iter().zip(&self.means).zip(&self.weights) {
+            let y = y.coords - source;
+            along += w * (x.coords - mean).dot(&(rotation * y));
+            extent += w * y.norm_squared();
+        }
+        if extent > 0.0 { along / extent } else { 1.0 }
+    }
+
+    fn weighted_mean(&self, points: &[Point<f64, D>]) -> SVector<f64, D> {
+        let total: f64 = self.weights.iter().sum();
+        points
+            .iter()
+            .zip(&self.weights)
+            .map(|(p, w)| p.coords * (w / total))
+            .sum()
+    }
+}
+
+// The map a registration found, for any point of space.
+
+/// The map found by [`CoherentPointDrift`](super::CoherentPointDrift): in the frame of the
+/// registration `y ↦ A y + b + Σ_k w_k exp(−|y − p_k|² / 2β²)`, with no Gaussians for rigid,
+/// similarity and affine motion, and `A = I`, `b = 0` for non-rigid. It takes the model points to
+/// where the registration left them, and any other point along.
+#[derive(Clone, Debug, PartialEq)]
+struct DriftWarp<const D: usize> {
+    model: Frame<D>,
+    target: Frame<D>,
+    linear: SMatrix<f64, D, D>,
+    offset: SVector<f64, D>,
+    centres: Vec<SVector<f64, D>>,
+    weights: Vec<SVector<f64, D>>,
+    beta: f64,
+}
+
+impl<const D: usize> DriftWarp<D> {
+    fn gaussian(&self, from_centre: &SVector<f64, D>) -> f64 {
+        (-0.5 * from_centre.norm_squared() / (self.beta * self.beta)).exp()
+    }
+}
+
+impl<const D: usize> Warp<f64, D> for DriftWarp<D> {
+    fn apply(&self, point: &Point<f64, D>) -> Point<f64, D> {
+        let y = self.model.inside(point);
+        let mut image = self.linear * y + self.offset;
+        for (centre, weight) in self.centres.iter().zip(&self.weights) {
+            image += weight * self.gaussian(&(y - centre));
+        }
+        self.target.leave(image)
+    }
+
+    fn jacobian(&self, point: &Point<f64, D>) -> SMatrix<f64, D, D> {
+        let y = self.model.inside(point);
+        let mut jacobian = self.linear;
+        for (centre, weight) in self.centres.iter().zip(&self.weights) {
+            let step = y - centre;
+            jacobian -=
+                weight * step.transpose() * (self.gaussian(&step) / (self.beta * self.beta));
+        }
+        jacobian * (self.target.scale / self.model.scale)
+    }
+}
+
+// From the mixture at its end to a [`Matching`]: posterior, pairs, confidences, covariances.
+
+/// The posterior `P` at the end, a row of `M` entries per target point.
+fn posterior<const D: usize>(
+    options: &CoherentPointDrift,
+    workspace: &DriftWorkspace<D>,
+) -> Vec<f64> {
+    let (model_len, target_len) = (workspace.moved[0].len(), workspace.target[0].len());
+    let sigma2 = workspace.sigma2.max(f64::MIN_POSITIVE);
+    let uniform = workspace.uniform(options);
+    let mut rows = vec![0.0; model_len * target_len];
+    for (n, row) in rows.chunks_exact_mut(model_len).enumerate() {
+        let x = std::array::from_fn(|d| workspace.target[d][n]);
+        let total = gaussians(row, &workspace.moved, x, sigma2) + uniform;
+        if total > 0.0 {
+            row.iter_mut().for_each(|p| *p /= total);
+        }
+    }
+    rows
+}
+
+/// Distinct targets for the model points with the most posterior in sum. A pair stays only if its
+/// target is at least as likely the model point's as an outlier.
+fn pairs(posterior: &[f64], model_len: usize, target_len: usize) -> Vec<Option<usize>> {
+    let costs: Vec<f64> = posterior.iter().map(|p| -p).collect();
+    let mut workspace = AssignmentWorkspace::default();
+    let mut assignment = vec![None; model_len];
+    // The costs are probabilities: finite, and of the right number.
+    let columns = workspace
+        .solve(&costs, target_len, model_len)
+        .unwrap_or_default();
+    for (n, m) in columns
+        .iter()
+        .enumerate()
+        .filter_map(|(n, m)| m.map(|m| (n, m)))
+    {
+        let row = &posterior[n * model_len..][..model_len];
+        let outlier = 1.0 - row.iter().sum::<f64>();
+        if row[m] > 0.0 && row[m] >= outlier {
+            assignment[m] = Some(n);
+        }
+    }
+    assignment
+}
+
+/// Assembles the result. Lengths are those of the model and the target.
+fn matching<const D: usize>(
+    options: &CoherentPointDrift,
+    workspace: &DriftWorkspace<D>,
+    model_len: usize,
+    target_len: usize,
+) -> Matching<D> {
+    let posterior = posterior(options, workspace);
+    let assignment = pairs(&posterior, model_len, target_len);
+    let scale = workspace.target_frame.scale;
+    let (mut soft, mut confidence, mut covariance) =
+        (SoftMatches::default(), Vec::new(), Vec::new());
+    for (m, partner) in assignment.iter().enumerate() {
+        // Soft matches below this weight are left out.
+        let row: Vec<(usize, f64)> = (0..target_len)
+            .map(|n| (n, posterior[n * model_len + m]))
+            .filter(|p| p.1 > 1e-4)
+            .collect();
+        let mass = row.iter().map(|p| p.1).sum::<f64>();
+        let share = |p: f64| p / mass.max(1.0); // many targets may have one model point; a row of M has sum one
+        soft.push_row(row.iter().map(|&(n, p)| (n, share(p))));
+        let sure = partner.map_or(1.0 - mass.min(1.0), |n| share(posterior[n * model_len + m]));
+        confidence.push(sure.clamp(0.0, 1.0));
+        covariance.push(spread(workspace, &row, mass) * (scale * scale));
+    }
+    let (unmatched_model, unmatched_target) = unmatched_rows(&assignment, target_len);
+    Matching {
+        warp: Box::new(workspace.warp()),
+        warped: workspace.warped(),
+        confidence,
+        soft,
+        unmatched_model,
+        unmatched_target,
+        displacement_covariance: covariance,
+        energy: workspace.energy.iter().map(|&e| e).collect(),
+        report: report(workspace, &assignment),
+        assignment,
+    }
+}
+
+/// Covariance of a displacement: the spread of the soft matches about their mean, and the noise
+/// `σ²` of the mixture.
+fn spread<const D: usize>(
+    workspace: &DriftWorkspace<D>,
+    row: &[(usize, f64)],
+    mass: f64,
+) -> SMatrix<f64, D, D> {
+    let at = |n: usize| SVector::<f64, D>::from_fn(|d, _| workspace.target[d][n]);
+    let noise = SMatrix::identity() * workspace.sigma2;
+    if mass <= 0.0 {
+        return noise;
+    }
+    let mean: SVector<f64, D> = row.iter().map(|&(n, p)| at(n) * (p / mass)).sum();
+    row.iter().fold(noise, |sum, &(n, p)| {
+        let step = at(n) - mean;
+        sum + step * step.transpose() * (p / mass)
+    })
+}
+
+fn report<const D: usize>(
+    workspace: &DriftWorkspace<D>,
+    assignment: &[Option<usize>],
+) -> MatchReport {
+    let squares = assignment
+        .iter()
+        .enumerate()
+        .filter_map(|(m, n)| n.map(|n| (m, n)))
+        .map(|(m, n)| {
+            (0..D)
+                .map(|d| (workspace.moved[d][m] - workspace.target[d][n]).powi(2))
+                .sum::<f64>()
+        });
+    let (count, sum) = squares.fold((0.0_f64, 0.0), |(count, sum), s| (count + 1.0, sum + s));
+    let scale = workspace.target_frame.scale;
+    MatchReport {
+        stop: workspace.stop,
+        iterations: workspace.iterations(),
+        starts: 1,
+        residual: (scale * (sum / count.max(1.0)).sqrt()),
+        sigma: (scale * workspace.sigma2.sqrt()),
+        doubt: None,
+    }
+}
+
+#[cfg(test)]
+mod tests;

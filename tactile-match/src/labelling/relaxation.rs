@@ -1,0 +1,637 @@
+//! Relaxation (13)–(20): graphs, compatibilities, support, update and normalisation.
+
+use super::{Compatibility, LengthMaximum, Neighbourhood, RelaxationLabelling};
+use crate::ShapeContexts;
+use nalgebra::{Point, SVector};
+use tactile_tps::Scalar;
+
+/// Links that are kept between sweeps. Those of more are computed anew in every sweep.
+const MAX_STORED_LINKS: usize = 1 << 25;
+
+/// The edge from a point to one of its neighbours.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Edge<const D: usize> {
+    /// Row of the point.
+    pub from: usize,
+    /// Row of its neighbour.
+    pub to: usize,
+    /// Position of the neighbour relative to the point.
+    pub vector: SVector<f64, D>,
+    /// Its length `d`.
+    pub length: f64,
+    /// [`gamma`] of this edge among the edges of its point.
+    pub gamma: f64,
+}
+
+/// A point set as a graph: every point with the edges to its neighbours.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct NeighbourGraph<const D: usize> {
+    edges: Vec<Edge<D>>,
+    starts: Vec<usize>,
+}
+
+impl<const D: usize> NeighbourGraph<D> {
+    /// Joins every point to its neighbours. `O(n² log n)`.
+    pub(super) fn new(points: &[Point<f64, D>], neighbourhood: Neighbourhood) -> Self {
+        let radius = median_pairwise_distance(points);
+        let mut graph = Self {
+            edges: Vec::new(),
+            starts: vec![0],
+        };
+        for i in 0..points.len() {
+            let mut neighbours: Vec<usize> = (0..points.len()).filter(|&a| a != i).collect();
+            match neighbourhood {
+                Neighbourhood::MedianRadius => {
+                    let reach = radius.map_or(0.0, |r| r + rounding(points, r));
+                    neighbours.retain(|&a| (points[a] - points[i]).norm() <= reach);
+                }
+                Neighbourhood::Nearest(k) => {
+                    let distance = |&a: &usize| (points[a] - points[i]).norm();
+                    neighbours.sort_by(|a, b| {
+                        distance(a)
+                            .partial_cmp(&distance(b))
+                            .unwrap_or(std::cmp::Ordering::Equal)
+                    });
+                    neighbours.truncate(k);
+                    neighbours.sort_unstable();
+                }
+            }
+            graph.push_point(points, i, &neighbours);
+        }
+        graph
+    }
+
+    fn push_point(&mut self, points: &[Point<f64, D>], i: usize, neighbours: &[usize]) {
+        let first = self.edges.len();
+        for &a in neighbours {
+            let vector = points[a] - points[i];
+            self.edges.push(Edge {
+                from: i,
+                to: a,
+                vector,
+                length: vector.norm(),
+                gamma: 0.0,
+            });
+        }
+        let longest = self.edges[first..]
+            .iter()
+            .fold(0.0_f64, |m, e| m.max(e.length));
+        for edge in &mut self.edges[first..] {
+            edge.gamma = gamma(edge.length, longest);
+        }
+        self.starts.push(self.edges.len());
+    }
+
+    /// The edges of point `i`.
+    ///
+    /// # Panics
+    /// If there is no such point.
+    fn of(&self, i: usize) -> &[Edge<D>] {
+        &self.edges[self.range(i)]
+    }
+
+    /// Where the edges of point `i` stand in [`edges`](Self::edges).
+    fn range(&self, i: usize) -> std::ops::Range<usize> {
+        self.starts[i]..self.starts[i + 1]
+    }
+
+    /// Number of points.
+    fn points(&self) -> usize {
+        self.starts.len() - 1
+    }
+
+    /// Length of the longest edge. Zero without edges.
+    fn longest(&self) -> f64 {
+        self.edges.iter().fold(0.0_f64, |m, e| m.max(e.length))
+    }
+}
+
+/// What rounding may add to a distance of about `radius`: the coordinates themselves carry half a
+/// unit in the last place.
+fn rounding<const D: usize>(points: &[Point<f64, D>], radius: f64) -> f64 {
+    let largest = points
+        .iter()
+        .flat_map(|p| p.iter())
+        .fold(radius, |m, c| m.max(c.abs()));
+    f64::EPSILON * (largest + largest)
+}
+
+/// The median of all pairwise distances (the mean of the two middle ones where their number is
+/// even). `None` for fewer than two points. `O(n² log n)`.
+fn median_pairwise_distance<const D: usize>(points: &[Point<f64, D>]) -> Option<f64> {
+    let mut distances = Vec::with_capacity(points.len() * points.len().saturating_sub(1) / 2);
+    for (i, p) in points.iter().enumerate() {
+        distances.extend(points[i + 1..].iter().map(|q| (q - p).norm()));
+    }
+    distances.sort_by(|a, b| a.partial_cmp(b).unwrap_or(std::cmp::Ordering::Equal));
+    let n = distances.len();
+    match n {
+        0 => None,
+        n if n % 2 == 1 => Some(distances[n / 2]),
+        n => Some((distances[n / 2 - 1] + distances[n / 2]) * 0.5),
+    }
+}
+
+/// α (15), the maximum per pair: `1 − |d − e| / max(d, e) = min(d, e) / max(d, e)`. Two lengths of
+/// zero are alike.
+///
+/// The quotient keeps its digits where the lengths differ by many decades. The printed difference
+/// loses them.
+fn alpha(d: f64, e: f64) -> f64 {
+    let longer = d.max(e);
+    if longer > 0.0 { d.min(e) / longer } else { 1.0 }
+}
+
+/// α (15), the maximum over all edges: `1 − |d − e| / longest`. One where `longest` is zero.
+fn alpha_global(d: f64, e: f64, longest: f64) -> f64 {
+    if longest > 0.0 {
+        1.0 - (d - e).abs() / longest
+    } else {
+        1.0
+    }
+}
+
+/// β (16): `1 − ∠(u, v) / π`, one for parallel and zero for opposite edges, in any dimension. Zero
+/// if an edge has no length.
+///
+/// The angle is `atan2(|u ∧ v|, u · v)`, exact at 0 and π where `acos` loses half the digits or
+/// returns NaN.
+fn beta<const D: usize>(u: &SVector<f64, D>, v: &SVector<f64, D>) -> f64 {
+    // Largest components scaled to one: no square under- or overflows, and parallel vectors stay
+    // exactly parallel.
+    let (largest_u, largest_v) = (u.amax(), v.amax());
+    if largest_u <= 0.0 || largest_v <= 0.0 {
+        return 0.0;
+    }
+    let (u, v) = (u / largest_u, v / largest_v);
+    let mut wedge = 0.0;
+    for p in 0..D {
+        for q in p + 1..D {
+            let minor = u[p] * v[q] - u[q] * v[p];
+            wedge += minor * minor;
+        }
+    }
+    // π − ∠(u, v) = ∠(u, −v): near opposite edges keep the digits of a small β.
+    wedge.sqrt().atan2(-u.dot(&v)) / std::f64::consts::PI
+}
+
+/// γ (17): `1 − d / longest`, `longest` among the edges of the same point. One where `longest` is
+/// zero.
+fn gamma(d: f64, longest: f64) -> f64 {
+    if longest > 0.0 {
+        (longest - d) / longest
+    } else {
+        1.0
+    }
+}
+
+/// A [`Compatibility`] ready to be evaluated: the factors and the maximum in α.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct CompatibilityRule {
+    /// The factors.
+    pub factors: Compatibility,
+    /// Longest edge of both graphs for [`alpha_global`]. `None` for [`alpha`].
+    pub longest: Option<f64>,
+}
+
+impl CompatibilityRule {
+    /// r (18) of model edge `x` and target edge `y`.
+    fn of<const D: usize>(&self, x: &Edge<D>, y: &Edge<D>) -> f64 {
+        let length = || match self.longest {
+            None => alpha(x.length, y.length),
+            Some(longest) => alpha_global(x.length, y.length, longest),
+        };
+        match self.factors {
+            Compatibility::Count => 1.0,
+            Compatibility::Length => length(),
+            Compatibility::LengthDirection => length() * beta(&x.vector, &y.vector),
+            Compatibility::Printed => length() * beta(&x.vector, &y.vector) * x.gamma,
+            Compatibility::Full => length() * beta(&x.vector, &y.vector) * x.gamma * y.gamma,
+        }
+    }
+}
+
+/// The match matrix `M` of the paper, `(I + 1) × (J + 1)`, row-major: entry `(i, j)` is the
+/// probability that model point `i` is target point `j`. Row `I` and column `J` are the slack for
+/// points without a partner, and the corner `(I, J)` is not used.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct MatchMatrix {
+    rows: usize,
+    columns: usize,
+    entries: Vec<f64>,
+}
+
+impl MatchMatrix {
+    /// All entries zero.
+    pub(super) fn zeros(rows: usize, columns: usize) -> Self {
+        Self {
+            rows,
+            columns,
+            entries: vec![0.0; (rows + 1) * (columns + 1)],
+        }
+    }
+
+    /// Entry by entry, `i` in `0..=rows` and `j` in `0..=columns`. The corner is set to zero.
+    fn from_fn(rows: usize, columns: usize, mut entry: impl FnMut(usize, usize) -> f64) -> Self {
+        let mut m = Self::zeros(rows, columns);
+        for i in 0..=rows {
+            for j in 0..=columns {
+                if (i, j) != (rows, columns) {
+                    m[(i, j)] = entry(i, j);
+                }
+            }
+        }
+        m
+    }
+
+    /// Row `i` with its slack entry last. `i = I` is the slack row.
+    ///
+    /// # Panics
+    /// If `i` exceeds the number of rows.
+    pub(super) fn row(&self, i: usize) -> &[f64] {
+        &self.entries[i * (self.columns + 1)..][..=self.columns]
+    }
+
+    fn row_mut(&mut self, i: usize) -> &mut [f64] {
+        &mut self.entries[i * (self.columns + 1)..][..=self.columns]
+    }
+
+    /// Probability that model point `i` has no partner.
+    ///
+    /// # Panics
+    /// If `i` exceeds the number of rows.
+    pub(super) fn slack_of_row(&self, i: usize) -> f64 {
+        self[(i, self.columns)]
+    }
+
+    /// The largest change of an entry, `max |M − M'|`. The matrices must have the same size.
+    fn largest_change(&self, other: &Self) -> f64 {
+        self.entries
+            .iter()
+            .zip(&other.entries)
+            .fold(0.0, |worst, (&a, &b)| worst.max((a - b).abs()))
+    }
+}
+
+impl std::ops::Index<(usize, usize)> for MatchMatrix {
+    type Output = f64;
+    fn index(&self, (i, j): (usize, usize)) -> &f64 {
+        debug_assert!(j <= self.columns);
+        &self.entries[i * (self.columns + 1) + j]
+    }
+}
+
+impl std::ops::IndexMut<(usize, usize)> for MatchMatrix {
+    fn index_mut(&mut self, (i, j): (usize, usize)) -> &mut f64 {
+        debug_assert!(j <= self.columns);
+        &mut self.entries[i * (self.columns + 1) + j]
+    }
+}
+
+/// The energy (14), `Σ_i Σ_{a∈N(i)} Σ_j Σ_{b∈N(j)} M_ij M_ab`: how many edges the match keeps, each
+/// counted from both ends, the slack left out. `O(A B)` for each of the at most `I J` entries that
+/// are not zero.
+///
+/// # Panics
+/// If `m` has not the size of the graphs.
+pub(super) fn energy<const D: usize>(
+    m: &MatchMatrix,
+    model: &NeighbourGraph<D>,
+    target: &NeighbourGraph<D>,
+) -> f64 {
+    assert_eq!(
+        (m.rows, m.columns),
+        (model.points(), target.points()),
+        "size of M"
+    );
+    let mut energy = 0.0;
+    for i in 0..m.rows {
+        for j in (0..m.columns).filter(|&j| m[(i, j)] > 0.0) {
+            let mut kept = 0.0;
+            for a in model.of(i) {
+                let row = m.row(a.to);
+                kept = target.of(j).iter().fold(kept, |sum, b| sum + row[b.to]);
+            }
+            energy += m[(i, j)] * kept;
+        }
+    }
+    energy
+}
+
+/// How far [`sinkhorn`] came.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct SinkhornReport {
+    /// Sweeps done.
+    pub sweeps: usize,
+    /// `max_i |1 − Σ_j M_ij|`: how far the rows are from one, the columns being one.
+    pub row_defect: f64,
+}
+
+/// (20): every model row becomes `[M_ij S_ij, M_i,slack · slack_gain]` over its sum. Returns the
+/// rows whose sum was zero, which stay as they were. `support` is row-major `I × J`. The slack row
+/// is not touched.
+///
+/// Each product is taken relative to the largest of its row, so that none under- or overflows on
+/// the way.
+///
+/// # Panics
+/// If `support` has not `I · J` entries.
+fn update(m: &mut MatchMatrix, support: &[f64], slack_gain: f64) -> Vec<usize> {
+    let columns = m.columns;
+    assert_eq!(support.len(), m.rows * columns, "size of the support");
+    let mut zero_rows = Vec::new();
+    for i in 0..m.rows {
+        let gains = support[i * columns..][..columns]
+            .iter()
+            .copied()
+            .chain([slack_gain]);
+        let largest = m
+            .row(i)
+            .iter()
+            .copied()
+            .zip(gains.clone())
+            .fold(None, |best, (p, s)| match best {
+                _ if p <= 0.0 || s <= 0.0 => best,
+                Some((_, _, log)) if p.ln() + s.ln() <= log => best,
+                _ => Some((p, s, p.ln() + s.ln())),
+            });
+        let Some((largest_p, largest_s, largest_log)) = largest else {
+            zero_rows.push(i);
+            continue;
+        };
+        let row = m.row_mut(i);
+        for (p, s) in row.iter_mut().zip(gains) {
+            let product = (*p / largest_p) * (s / largest_s);
+            *p = if *p <= 0.0 || s <= 0.0 {
+                0.0
+            } else if product.is_finite() {
+                product
+            } else {
+                (p.ln() + s.ln() - largest_log).exp() // one quotient overflowed
+            };
+        }
+        divide_by_sum(row);
+    }
+    zero_rows
+}
+
+/// Alternate normalisation with slack. Each sweep divides the rows `0..I` by their sums over
+/// `J + 1` entries, then the columns `0..J` by their sums over `I + 1` entries. The slack row and
+/// column are not normalised, sums of zero are skipped. Stops after `sweeps`, or when no row is
+/// further than `tolerance` from one.
+fn sinkhorn(m: &mut MatchMatrix, sweeps: usize, tolerance: f64) -> SinkhornReport {
+    let mut report = SinkhornReport {
+        sweeps: 0,
+        row_defect: row_defect(m),
+    };
+    while report.sweeps < sweeps {
+        for i in 0..m.rows {
+            divide_by_sum(m.row_mut(i));
+        }
+        for j in 0..m.columns {
+            let sum = (0..=m.rows).fold(0.0, |sum, i| sum + m[(i, j)]);
+            if sum > 0.0 {
+                (0..=m.rows).for_each(|i| m[(i, j)] /= sum);
+            }
+        }
+        report = SinkhornReport {
+            sweeps: report.sweeps + 1,
+            row_defect: row_defect(m),
+        };
+        if report.row_defect <= tolerance {
+            break;
+        }
+    }
+    report
+}
+
+fn divide_by_sum(row: &mut [f64]) {
+    let sum = row.iter().fold(0.0, |sum, &p| sum + p);
+    if sum > 0.0 {
+        row.iter_mut().for_each(|p| *p /= sum);
+    }
+}
+
+fn row_defect(m: &MatchMatrix) -> f64 {
+    (0..m.rows).fold(0.0, |worst, i| {
+        let sum = m.row(i).iter().fold(0.0, |sum, &p| sum + p);
+        worst.max((1.0 - sum).abs())
+    })
+}
+
+/// The contexts reach twice the mean distance of two points. None where all coincide.
+fn contexts<const D: usize>(points: &[Point<f64, D>]) -> Option<ShapeContexts> {
+    let distances = points
+        .iter()
+        .flat_map(|p| points.iter().map(move |q| (q - p).norm()));
+    let sum = distances.fold(0.0, |sum, d| sum + d);
+    let pairs = points.len() * points.len().saturating_sub(1);
+    ShapeContexts::new(points, 2.0 * sum / (pairs.max(1) as f64)).ok()
+}
+
+/// The first match matrix: `exp(−C_ij / temperature)` of the shape-context distances `C`, `slack`
+/// relative to the likeliest partner in the slack entries, after one sweep of
+/// [`sinkhorn`](sinkhorn). `O(I J)` times the number of bins.
+fn first_matches<const D: usize>(
+    model: &[Point<f64, D>],
+    target: &[Point<f64, D>],
+    temperature: f64,
+    slack: f64,
+) -> MatchMatrix {
+    let contexts = contexts(model).zip(contexts(target));
+    let cost = |i, j| {
+        contexts
+            .as_ref()
+            .map_or(0.0, |(g, h)| f64::from(g.cost(i, h, j)))
+    };
+    let costs: Vec<Vec<f64>> = (0..model.len())
+        .map(|i| (0..target.len()).map(|j| cost(i, j)).collect())
+        .collect();
+    let least = |row: &[f64]| row.iter().copied().fold(f64::INFINITY, f64::min);
+    let columns = target.len();
+    let mut m = MatchMatrix::from_fn(model.len(), columns, |i, j| {
+        let weight = match costs.get(i) {
+            Some(row) if j < columns => (-(row[j] - least(row)) / temperature).exp(),
+            _ => slack,
+        };
+        weight
+    });
+    sinkhorn(&mut m, 1, 0.0);
+    m
+}
+
+/// One outer iteration's match matrix: first probabilities of `model` (as warped so far) and
+/// `target`, then (19), (20) and normalisation in turn until M no longer changes.
+///
+/// Where the options limit the candidates, all but the likeliest are zero, which (20) does not
+/// change.
+pub(super) fn relax<const D: usize>(
+    options: &RelaxationLabelling,
+    model: &[Point<f64, D>],
+    target: &[Point<f64, D>],
+) -> MatchMatrix {
+    let graphs = [model, target].map(|points| NeighbourGraph::new(points, options.neighbourhood));
+    let longest = match options.length_maximum {
+        LengthMaximum::PerPair => None,
+        LengthMaximum::Global => Some(graphs[0].longest().max(graphs[1].longest())),
+    };
+    let rule = CompatibilityRule {
+        factors: options.compatibility,
+        longest,
+    };
+    let mut m = first_matches(model, target, options.temperature, options.slack);
+    if let Some(count) = options.candidates {
+        keep_likeliest(&mut m, count);
+    }
+    let links = Links::new(&m, &graphs, rule);
+    for _ in 0..options.sweeps {
+        let before = m.clone();
+        let support = links.support(&m);
+        let gain = slack_gain(&support, m.columns, options.slack);
+        update(&mut m, &support, gain);
+        sinkhorn(&mut m, options.sinkhorn_sweeps, 0.0);
+        if m.largest_change(&before) <= options.tolerance {
+            break;
+        }
+    }
+    m
+}
+
+/// Gain of the slack: a share of what the best partners get, so that it means the same for every
+/// neighbourhood.
+fn slack_gain(support: &[f64], columns: usize, share: f64) -> f64 {
+    let rows = support.len() / columns;
+    let best = support
+        .chunks_exact(columns)
+        .map(|row| row.iter().fold(0.0_f64, |m, &s| m.max(s)));
+    best.fold(0.0, |sum, s| sum + s) * (share / rows as f64)
+}
+
+/// The target that has all of a row, so that no other can still come up: what they have is below a
+/// hundred roundings.
+fn settled_on(row: &[f64]) -> Option<usize> {
+    let sum = row.iter().fold(0.0, |sum, &p| sum + p);
+    let enough = sum * (1.0 - 100.0 * f64::UNIT_ROUNDOFF);
+    row[..row.len() - 1]
+        .iter()
+        .position(|&p| p > 0.0 && p >= enough)
+}
+
+/// Sets all but the `count` likeliest partners of every model point to zero. Of equal ones the
+/// lower rows stay.
+fn keep_likeliest(m: &mut MatchMatrix, count: usize) {
+    let columns = m.columns;
+    let mut order: Vec<usize> = Vec::with_capacity(columns);
+    for i in 0..m.rows {
+        order.clear();
+        order.extend(0..columns);
+        let row = m.row_mut(i);
+        let unlikely = |a: &usize, b: &usize| {
+            row[*b]
+                .partial_cmp(&row[*a])
+                .unwrap_or(std::cmp::Ordering::Equal)
+                .then(a.cmp(b))
+        };
+        order.sort_unstable_by(unlikely);
+        order.iter().skip(count).for_each(|&j| row[j] = 0.0);
+    }
+}
+
+/// The terms of the support (19): for every candidate pair `(i, j)` the entries `M_ab` of its
+/// neighbours' candidate pairs, with their compatibilities. They do not depend on M.
+struct Links<'a, const D: usize> {
+    graphs: &'a [NeighbourGraph<D>; 2],
+    rule: CompatibilityRule,
+    /// Candidates of every model point.
+    candidates: Vec<Vec<usize>>,
+    /// Where the links of every candidate pair start, and where those of the last pair end. Empty
+    /// where there are too many links to be stored.
+    starts: Vec<usize>,
+    /// Places in M and compatibilities.
+    stored: Vec<(u32, f64)>,
+}
+
+impl<'a, const D: usize> Links<'a, D> {
+    fn new(m: &MatchMatrix, graphs: &'a [NeighbourGraph<D>; 2], rule: CompatibilityRule) -> Self {
+        assert_eq!(
+            (m.rows, m.columns),
+            (graphs[0].points(), graphs[1].points()),
+            "size of M"
+        );
+        let candidates = |i: usize| (0..m.columns).filter(|&j| m[(i, j)] > 0.0).collect();
+        let mut links = Self {
+            graphs,
+            rule,
+            candidates: (0..m.rows).map(candidates).collect(),
+            starts: Vec::new(),
+            stored: Vec::new(),
+        };
+        let edges = |i: usize| graphs[0].of(i).iter();
+        let products = (0..m.rows).map(|i| {
+            let offered: usize = edges(i).map(|x| links.candidates[x.to].len()).sum();
+            links.candidates[i].len() * offered
+        });
+        if products.sum::<usize>() <= 2 * MAX_STORED_LINKS {
+            links.store();
+        }
+        links
+    }
+
+    fn store(&mut self) {
+        let (mut starts, mut stored) = (vec![0], Vec::new());
+        let width = self.graphs[1].points() + 1;
+        for i in 0..self.candidates.len() {
+            for &j in &self.candidates[i] {
+                self.visit(i, j, |a, b, r| stored.push(((a * width + b) as u32, r)));
+                starts.push(stored.len());
+            }
+        }
+        (self.starts, self.stored) = (starts, stored);
+    }
+
+    /// Calls `take` with the pairs `(a, b)` that support pair `(i, j)`, and their compatibilities.
+    fn visit(&self, i: usize, j: usize, mut take: impl FnMut(usize, usize, f64)) {
+        let mut edge_to = vec![None; self.graphs[1].points()];
+        for edge in self.graphs[1].of(j) {
+            edge_to[edge.to] = Some(edge);
+        }
+        for x in self.graphs[0].of(i) {
+            for &b in &self.candidates[x.to] {
+                if let Some(y) = edge_to[b] {
+                    take(x.to, b, self.rule.of(x, y));
+                }
+            }
+        }
+    }
+
+    /// The support (19) of the candidate pairs, row-major `I × J`, zero for all others:
+    /// `S_ij = Σ_{a∈N(i)} Σ_{b∈N(j)} M_ab r(ia, jb)`.
+    ///
+    /// A point whose match is settled to rounding keeps the support of that pair alone.
+    fn support(&self, m: &MatchMatrix) -> Vec<f64> {
+        let mut support = vec![0.0; m.rows * m.columns];
+        let mut pair = 0;
+        for (i, candidates) in self.candidates.iter().enumerate() {
+            let settled = settled_on(m.row(i));
+            for &j in candidates {
+                let sum = &mut support[i * m.columns + j];
+                let links = self.starts.get(pair..pair + 2);
+                pair += 1;
+                if settled.is_some_and(|on| on != j) {
+                    continue;
+                }
+                match links {
+                    Some(ends) => {
+                        let links = self.stored[ends[0]..ends[1]].iter();
+                        *sum = links.map(|&(at, r)| m.entries[at as usize] * r).sum();
+                    }
+                    None => self.visit(i, j, |a, b, r| *sum += m[(a, b)] * r),
+                }
+            }
+        }
+        support
+    }
+}
+
+#[cfg(test)]
+mod tests;

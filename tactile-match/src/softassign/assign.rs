@@ -1,0 +1,697 @@
+//! Soft assignment: affinities, Sinkhorn normalisation and the moments of the rows, over blocks of
+//! near targets.
+
+use super::{AllMoments, Gaussian, RowMoments, SoftAssignment};
+use crate::vectorised;
+
+// Soft assignment: the match matrix M from distances, made doubly stochastic with slack (Sinkhorn).
+//
+// `m_ij = aᵢ bⱼ exp(−|yᵢ − tⱼ|²/2σ²)` with `aᵢ`, `bⱼ` such that every row and every column sums to
+// one together with its slack, whose weight is the density of outliers seen through the same
+// Gaussian. Worked in single precision: the weights need no more, and the positions they lead to
+// are refined in double precision.
+//
+// The targets are put into blocks of neighbours ([`blocks`](super::blocks)); of a row only the
+// blocks within reach of its Gaussian are kept. At a low temperature that is a small part of `I J`.
+
+impl<const D: usize> Default for SoftAssignment<D> {
+    fn default() -> Self {
+        Self {
+            blocks: Blocks::default(),
+            errors: TargetErrors::default(),
+            faintest: 1e-6,
+            starts: Vec::new(),
+            active: Vec::new(),
+            reach: Vec::new(),
+            kernel: Vec::new(),
+            row_scale: Vec::new(),
+            column_scale: Vec::new(),
+            column_sum: Vec::new(),
+            moments: AllMoments::default(),
+        }
+    }
+}
+
+impl<const D: usize> SoftAssignment<D> {
+    /// Takes the target points and their standard deviations, where those are known.
+    pub(super) fn set_targets(&mut self, targets: &[[f64; D]], deviations: &[f64]) {
+        self.blocks.build(targets);
+        self.errors.set(deviations);
+    }
+
+    /// Number of target points.
+    pub(super) fn targets(&self) -> usize {
+        self.blocks.order.len()
+    }
+
+    /// The Gaussian affinities of `warped`. Blocks in which all are below `least`, or below
+    /// [`faintest`](Self::faintest), are left out.
+    pub(super) fn affinities(&mut self, warped: &[[f64; D]], gaussian: Gaussian, least: f64) {
+        let Gaussian {
+            variance,
+            sharpness,
+        } = gaussian;
+        let Self { blocks, errors, .. } = self;
+        errors.prepare(&blocks.order, variance, 0.5 * D as f64 * sharpness);
+        let widest = errors.widest(variance) / sharpness;
+        let (scale, cut) = (
+            (-0.5 / (variance / sharpness)) as f32,
+            (-2.0 * widest * least.min(self.faintest).ln()) as f32,
+        );
+        let (precision, height) = (
+            errors.precision.as_chunks::<LANES>().0,
+            errors.height.as_chunks::<LANES>().0,
+        );
+        self.starts.clear();
+        self.starts.push(0);
+        self.active.clear();
+        let kernel = &mut self.kernel;
+        vectorised(
+            #[inline(always)]
+            || {
+                for y in warped {
+                    let y = single(y);
+                    blocks.within(&y, cut, &mut self.reach, &mut self.active);
+                    self.starts.push(self.active.len());
+                }
+                let dense = warped.len() * blocks.width();
+                let sparse = self.active.len() * LANES;
+                // Of small sets all the memory there can be is taken at once: no later match of
+                // sets of this size needs more. Match matrices of so many entries (16 MB) are kept
+                // as if they were dense.
+                kernel.resize(if dense <= (1 << 22) { dense } else { sparse }, 0.0);
+                let rows = kernel.as_chunks_mut::<LANES>().0;
+                for (y, range) in warped.iter().zip(self.starts.windows(2)) {
+                    let y = single(y);
+                    let range = range[0]..range[1];
+                    for (row, &block) in rows[range.clone()].iter_mut().zip(&self.active[range]) {
+                        let targets = blocks.at(block);
+                        let Some(precision) = precision.get(block as usize) else {
+                            gaussians(row, targets, &y, scale);
+                            continue;
+                        };
+                        let height = &height[block as usize];
+                        gaussians_of(row, targets, &y, scale, (precision, height));
+                    }
+                }
+            },
+        );
+    }
+
+    /// Number of model points.
+    fn rows(&self) -> usize {
+        self.starts.len() - 1
+    }
+
+    /// The blocks of row `i`, and its affinities there.
+    #[inline(always)]
+    fn row(&self, i: usize) -> impl Iterator<Item = (usize, &[f32; LANES])> {
+        row_of(&self.starts, &self.active, &self.kernel, i)
+    }
+
+    /// Alternates row and column normalisation `sweeps` times.
+    pub(super) fn normalise(&mut self, sweeps: usize, row_slack: f32, column_slack: f32) {
+        let rows = self.rows();
+        refill(&mut self.row_scale, rows, 1.0);
+        refill(&mut self.column_scale, self.blocks.width(), 1.0);
+        let Self {
+            starts,
+            active,
+            kernel,
+            row_scale,
+            column_scale,
+            column_sum,
+            ..
+        } = self;
+        vectorised(
+            #[inline(always)]
+            || {
+                for _ in 0..sweeps {
+                    refill(column_sum, column_scale.len(), column_slack);
+                    let (b, sums) = (
+                        column_scale.as_chunks::<LANES>().0,
+                        column_sum.as_chunks_mut::<LANES>().0,
+                    );
+                    for (i, a) in row_scale.iter_mut().enumerate() {
+                        let mut dots = [0.0_f32; LANES];
+                        for (block, k) in row_of(starts, active, kernel, i) {
+                            add_product(&mut dots, k, &b[block]);
+                        }
+                        let scale = 1.0 / (sum(dots) + row_slack);
+                        *a = scale;
+                        for (block, k) in row_of(starts, active, kernel, i) {
+                            add_scaled(&mut sums[block], scale, k);
+                        }
+                    }
+                    for (b, s) in column_scale.iter_mut().zip(&*column_sum) {
+                        *b = 1.0 / s;
+                    }
+                }
+            },
+        );
+    }
+
+    /// Row `i` of M where it is not zero: target rows, in the order of the blocks, and entries.
+    pub(super) fn entries(&self, i: usize) -> impl Iterator<Item = (usize, f64)> + '_ {
+        let (scale, columns) = (self.row_scale[i], self.column_scale.as_chunks::<LANES>().0);
+        self.row(i).flat_map(move |(block, k)| {
+            let real = self.blocks.order[block * LANES..].iter().take(LANES);
+            real.enumerate()
+                .map(move |(l, &j)| (j, f64::from(scale * k[l] * columns[block][l])))
+        })
+    }
+
+    /// Sums of the affinities over the rows, for every column. The first [`targets`](Self::targets)
+    /// are targets.
+    pub(super) fn column_totals(&self, totals: &mut Vec<f64>) {
+        refill(totals, self.blocks.width(), 0.0);
+        let totals = totals.as_chunks_mut::<LANES>().0;
+        vectorised(
+            #[inline(always)]
+            || {
+                for i in 0..self.rows() {
+                    for (b, k) in self.row(i) {
+                        for l in 0..LANES {
+                            totals[b][l] += f64::from(k[l]);
+                        }
+                    }
+                }
+            },
+        );
+    }
+
+    /// Sums of the affinities over the columns, each times its factor, for every row.
+    pub(super) fn row_totals(&self, factors: &[f64], totals: &mut Vec<f64>) {
+        let factors = factors.as_chunks::<LANES>().0;
+        totals.clear();
+        vectorised(
+            #[inline(always)]
+            || {
+                for i in 0..self.rows() {
+                    let mut sums = [0.0; LANES];
+                    for (b, k) in self.row(i) {
+                        for l in 0..LANES {
+                            sums[l] += f64::from(k[l]) * factors[b][l];
+                        }
+                    }
+                    totals.push(sums.iter().sum());
+                }
+            },
+        );
+    }
+}
+
+#[inline(always)]
+fn row_of<'a>(
+    starts: &[usize],
+    active: &'a [u32],
+    kernel: &'a [f32],
+    i: usize,
+) -> impl Iterator<Item = (usize, &'a [f32; LANES])> + use<'a> {
+    let range = starts[i]..starts[i + 1];
+    let rows = kernel.as_chunks::<LANES>().0;
+    active[range.clone()]
+        .iter()
+        .map(|&b| b as usize)
+        .zip(&rows[range])
+}
+
+/// In single precision.
+#[inline(always)]
+fn single<const D: usize>(y: &[f64; D]) -> [f32; D] {
+    let mut single = [0.0; D];
+    for d in 0..D {
+        single[d] = y[d] as f32;
+    }
+    single
+}
+
+fn refill<V: Clone>(values: &mut Vec<V>, len: usize, value: V) {
+    values.clear();
+    values.resize(len, value);
+}
+
+// Moments of the rows of the match matrix: how much of a point is matched, and where its soft
+// partners lie.
+
+impl<const D: usize> AllMoments<D> {
+    /// As they are: how much of each point is matched.
+    pub(super) fn plain(&self) -> &RowMoments<D> {
+        &self.powers[0]
+    }
+
+    /// By precision: what the warp is fitted to.
+    pub(super) fn by_precision(&self) -> &RowMoments<D> {
+        &self.powers[usize::from(self.differ)]
+    }
+
+    /// By squared precision: what the noise is estimated from.
+    pub(super) fn by_squared_precision(&self) -> &RowMoments<D> {
+        &self.powers[2 * usize::from(self.differ)]
+    }
+}
+
+// The moments of the rows of a match matrix in factored form.
+
+impl<const D: usize> SoftAssignment<D> {
+    /// Sets the moments of M about `warped`.
+    pub(super) fn sum_moments(&mut self, warped: &[[f64; D]]) {
+        let mut moments = std::mem::take(&mut self.moments);
+        moments.differ = self.errors.differ();
+        self.sum(warped, &self.column_scale, &mut moments.powers[0]);
+        if moments.differ {
+            moments.factors.clone_from(&self.column_scale);
+            for power in 1..=2 {
+                let factors = moments.factors.iter_mut().zip(&self.errors.precision);
+                factors.for_each(|(factor, precision)| *factor *= precision);
+                self.sum(warped, &moments.factors, &mut moments.powers[power]);
+            }
+        }
+        self.moments = moments;
+    }
+
+    /// The moments with these factors of the columns.
+    fn sum(&self, warped: &[[f64; D]], factors: &[f32], moments: &mut RowMoments<D>) {
+        let RowMoments {
+            weight,
+            shift,
+            spread,
+        } = moments;
+        weight.clear();
+        shift.clear();
+        spread.clear();
+        let columns = factors.as_chunks::<LANES>().0;
+        vectorised(
+            #[inline(always)]
+            || {
+                for ((i, y), &a) in warped.iter().enumerate().zip(&self.row_scale) {
+                    let y = single(y);
+                    let mut sums = Moments::new();
+                    for (block, k) in row_of(&self.starts, &self.active, &self.kernel, i) {
+                        sums.add(k, &columns[block], self.blocks.at(block as u32), &y);
+                    }
+                    let total = f64::from(sum(sums.weight));
+                    let mut mean = [0.0; D];
+                    for d in 0..D {
+                        if total > 0.0 {
+                            mean[d] = f64::from(sum(sums.shift[d])) / total;
+                        }
+                    }
+                    weight.push(total * f64::from(a));
+                    shift.push(mean);
+                    spread.push(f64::from(sum(sums.spread)) * f64::from(a));
+                }
+            },
+        );
+    }
+
+    /// Makes rows that the last column normalisation left above one sum to one: where points
+    /// coincide, a few sweeps do not converge.
+    pub(super) fn cap_rows(&mut self) {
+        let [plain, weighed @ ..] = &mut self.moments.powers;
+        for (i, scale) in self.row_scale.iter_mut().enumerate() {
+            let excess = plain.weight[i].max(1.0);
+            *scale /= excess as f32;
+            plain.weight[i] /= excess;
+            for power in weighed.iter_mut().filter(|_| self.moments.differ) {
+                power.weight[i] /= excess;
+            }
+        }
+    }
+}
+
+// Errors of the targets: how precisely each of them was measured.
+//
+// A target j with the standard deviation `sⱼ` lies about the warped point of its partner with the
+// variance `σ² + eⱼ`, `eⱼ = sⱼ² − min s²`: the annealed variance σ² is common to all targets, and
+// what it comes to is what the most precise ones leave. With the relative precision
+// `ρⱼ = σ²/(σ² + eⱼ)` the affinities are `ρⱼ^{d/2} exp(−ρⱼ |yᵢ − tⱼ|²/2σ²)`, the regression's
+// weights are `wᵢ = Σⱼ mᵢⱼ ρⱼ` and its targets the means under `mᵢⱼ ρⱼ`, and the likelihood of the
+// noise is largest at `σ² = Σ mᵢⱼ ρⱼ² |yᵢ − tⱼ|² / d Σ mᵢⱼ ρⱼ`, which is iterated along with the
+// matches.
+
+/// The excess variances of the targets, and what they are at one temperature.
+#[derive(Clone, Debug, Default)]
+pub(super) struct TargetErrors {
+    /// `eⱼ` of every target row. Empty where all are equal.
+    excess: Vec<f64>,
+    largest: f64,
+    /// Standard deviation of the most precise targets. Zero where all are equal.
+    least: f64,
+    /// `ρⱼ` in the order of the blocks, padded with ones.
+    precision: Vec<f32>,
+    /// `ρⱼ^{d/2}`, sharpened, in the same order.
+    height: Vec<f32>,
+}
+
+impl TargetErrors {
+    /// Takes the standard deviations of the targets, which say nothing where all are equal or there
+    /// are none.
+    fn set(&mut self, deviations: &[f64]) {
+        let least = deviations.iter().copied().fold(f64::MAX, f64::min);
+        let largest = deviations.iter().copied().fold(0.0, f64::max);
+        self.excess.clear();
+        self.least = 0.0;
+        self.largest = 0.0;
+        if largest > least {
+            self.least = least;
+            self.largest = (largest - least) * (largest + least);
+            let excess = deviations.iter().map(|s| (s - least) * (s + least));
+            self.excess.extend(excess);
+        }
+    }
+
+    /// The lowest temperature: the deviation of the most precise targets. Residuals alone say
+    /// little about it where few targets are precise, since the warp passes through those.
+    pub(super) fn floor(&self) -> f64 {
+        self.least
+    }
+
+    /// Whether targets differ in their errors.
+    pub(super) fn differ(&self) -> bool {
+        !self.excess.is_empty()
+    }
+
+    /// Largest variance of a target at the temperature `variance`.
+    fn widest(&self, variance: f64) -> f64 {
+        variance + self.largest
+    }
+
+    /// Variance of a target over that of the most precise ones, `1/ρⱼ`.
+    pub(super) fn width(&self, row: usize, variance: f64) -> f64 {
+        self.excess.get(row).map_or(1.0, |e| 1.0 + e / variance)
+    }
+
+    /// Precisions and heights at a temperature, for targets in this order.
+    fn prepare(&mut self, order: &[usize], variance: f64, power: f64) {
+        self.precision.clear();
+        self.height.clear();
+        if !self.differ() {
+            return;
+        }
+        for &j in order {
+            let precision = self.width(j, variance).recip();
+            self.precision.push(precision as f32);
+            self.height.push(precision.powf(power) as f32);
+        }
+        let padded = order.len().next_multiple_of(LANES);
+        self.precision.resize(padded, 1.0);
+        self.height.resize(padded, 1.0);
+    }
+
+    /// Multiplies values in the order of the blocks by the precisions.
+    pub(super) fn weigh(&self, values: &mut [f64]) {
+        let weighed = values.iter_mut().zip(&self.precision);
+        weighed.for_each(|(value, &precision)| *value *= f64::from(precision));
+    }
+}
+
+// Target points in blocks of neighbours: what is far from a block's box is far from all its points.
+
+/// Points a block: one or two vectors of single precision.
+const LANES: usize = 16;
+
+/// Blocks a group: in large sets whole groups are passed over at once.
+const GROUP: usize = 32;
+
+/// Points in the order of their blocks, one array an axis, with the blocks' boxes.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Blocks<const D: usize> {
+    /// Which point stands at every place.
+    pub(super) order: Vec<usize>,
+    axes: Vec<f32>,
+    low: Vec<f32>,
+    high: Vec<f32>,
+    groups: Groups,
+}
+
+/// Boxes of [`GROUP`] consecutive blocks, one array an axis.
+#[derive(Clone, Debug, Default)]
+struct Groups {
+    low: Vec<f32>,
+    high: Vec<f32>,
+}
+
+impl<const D: usize> Blocks<D> {
+    /// Sorts `points` into blocks: halves across the longest side, until one block is left.
+    /// `O(J log² J)`.
+    pub(super) fn build(&mut self, points: &[[f64; D]]) {
+        self.order.clear();
+        self.order.extend(0..points.len());
+        split(points, &mut self.order);
+        let width = points.len().next_multiple_of(LANES);
+        let (order, axes) = (&self.order, &mut self.axes);
+        axes.clear();
+        self.low.clear();
+        self.high.clear();
+        for k in 0..D {
+            axes.extend(order.iter().map(|&j| points[j][k] as f32));
+            let real = axes[k * width..].chunks(LANES);
+            self.low.extend(
+                real.clone()
+                    .map(|block| block.iter().copied().fold(f32::MAX, f32::min)),
+            );
+            self.high
+                .extend(real.map(|block| block.iter().copied().fold(f32::MIN, f32::max)));
+            // Where the padding lies: no Gaussian reaches it, and its square is finite.
+            axes.resize((k + 1) * width, 1e15);
+        }
+        let count = self.low.len() / D;
+        self.groups.low.clear();
+        self.groups.high.clear();
+        for k in 0..D {
+            let sides = k * count..(k + 1) * count;
+            let low = self.low[sides.clone()].chunks(GROUP);
+            let high = self.high[sides].chunks(GROUP);
+            let least = |group: &[f32]| group.iter().copied().fold(f32::MAX, f32::min);
+            let largest = |group: &[f32]| group.iter().copied().fold(f32::MIN, f32::max);
+            self.groups.low.extend(low.map(least));
+            self.groups.high.extend(high.map(largest));
+        }
+    }
+
+    /// Number of places, padding included.
+    fn width(&self) -> usize {
+        self.order.len().next_multiple_of(LANES)
+    }
+
+    /// The coordinates of block `block`.
+    #[inline(always)]
+    fn at(&self, block: u32) -> [&[f32; LANES]; D] {
+        let axes = self.axes.as_chunks::<LANES>().0;
+        let count = axes.len() / D;
+        let mut at = [&[0.0; LANES]; D];
+        for k in 0..D {
+            at[k] = &axes[k * count + block as usize];
+        }
+        at
+    }
+
+    /// Appends the blocks whose boxes lie within the squared distance `cut` of `y`, in ascending
+    /// order. `squared` is scratch.
+    ///
+    /// `O(J/16)` for small sets. In large ones `O(J/512)` and the blocks of the groups in reach.
+    #[inline(always)]
+    fn within(&self, y: &[f32; D], cut: f32, squared: &mut Vec<f32>, found: &mut Vec<u32>) {
+        let count = self.low.len() / D;
+        let groups = self.groups.low.len() / D;
+        // Fewer groups are not worth their own test.
+        if groups <= 4 {
+            box_distances(y, (&self.low, &self.high), count, squared);
+            for (block, &square) in squared.iter().enumerate() {
+                if square <= cut {
+                    found.push(block as u32);
+                }
+            }
+            return;
+        }
+        let boxes = (&*self.groups.low, &*self.groups.high);
+        box_distances(y, boxes, groups, squared);
+        for group in 0..groups {
+            if squared[group] > cut {
+                continue;
+            }
+            for block in group * GROUP..((group + 1) * GROUP).min(count) {
+                let outside = |k: usize| {
+                    let side = k * count + block;
+                    (self.low[side] - y[k]).max(y[k] - self.high[side]).max(0.0)
+                };
+                let square: f32 = (0..D).map(|k| outside(k) * outside(k)).sum();
+                if square <= cut {
+                    found.push(block as u32);
+                }
+            }
+        }
+    }
+}
+
+/// Squared distances of `y` from boxes given by their sides, one array an axis.
+#[inline(always)]
+fn box_distances<const D: usize>(
+    y: &[f32; D],
+    (low, high): (&[f32], &[f32]),
+    count: usize,
+    squared: &mut Vec<f32>,
+) {
+    squared.clear();
+    squared.resize(count, 0.0);
+    for (k, &c) in y.iter().enumerate() {
+        let sides = low[k * count..].iter().zip(&high[k * count..]);
+        for (s, (low, high)) in squared.iter_mut().zip(sides) {
+            let outside = (low - c).max(c - high).max(0.0);
+            *s += outside * outside;
+        }
+    }
+}
+
+/// Orders `rows` so that blocks of [`LANES`] consecutive ones lie close together.
+fn split<const D: usize>(points: &[[f64; D]], rows: &mut [usize]) {
+    if rows.len() <= LANES {
+        return;
+    }
+    let side = |k: usize| {
+        let (low, high) = rows
+            .iter()
+            .map(|&j| points[j][k])
+            .fold((f64::MAX, f64::MIN), |(l, h), c| (l.min(c), h.max(c)));
+        high - low
+    };
+    let axis = (1..D).fold(0, |best, k| if side(k) > side(best) { k } else { best });
+    let half = (rows.len() / 2).next_multiple_of(LANES).min(rows.len() - 1);
+    rows.select_nth_unstable_by(half, |&a, &b| {
+        points[a][axis].total_cmp(&points[b][axis]).then(a.cmp(&b))
+    });
+    let (left, right) = rows.split_at_mut(half);
+    split(points, left);
+    split(points, right);
+}
+
+// What the soft assignment does with one block of targets: Gaussians and moments, lane by lane in
+// single precision.
+//
+// Plain loops over arrays of one length: closures and iterators in their place are functions of
+// their own, which the compiler does not give the wider registers of their [caller](crate::vectorised).
+
+/// One value a target of a block.
+type Lanes = [f32; LANES];
+
+/// `exp(scale · |t − y|²)` for a block of targets `t`.
+#[inline(always)]
+fn gaussians<const D: usize>(row: &mut Lanes, targets: [&Lanes; D], y: &[f32; D], scale: f32) {
+    *row = squared_distances(targets, y);
+    for value in row {
+        *value = exp(*value * scale);
+    }
+}
+
+/// The same for targets of different precision, times their heights.
+#[inline(always)]
+fn gaussians_of<const D: usize>(
+    row: &mut Lanes,
+    targets: [&Lanes; D],
+    y: &[f32; D],
+    scale: f32,
+    (precision, height): (&Lanes, &Lanes),
+) {
+    *row = squared_distances(targets, y);
+    for l in 0..LANES {
+        row[l] = height[l] * exp(row[l] * scale * precision[l]);
+    }
+}
+
+#[inline(always)]
+fn squared_distances<const D: usize>(targets: [&Lanes; D], y: &[f32; D]) -> Lanes {
+    let mut squares = [0.0; LANES];
+    for d in 0..D {
+        for l in 0..LANES {
+            let apart = targets[d][l] - y[d];
+            squares[l] += apart * apart;
+        }
+    }
+    squares
+}
+
+/// `sums += a · b`.
+#[inline(always)]
+fn add_product(sums: &mut Lanes, a: &Lanes, b: &Lanes) {
+    for l in 0..LANES {
+        sums[l] += a[l] * b[l];
+    }
+}
+
+/// `sums += factor · values`.
+#[inline(always)]
+fn add_scaled(sums: &mut Lanes, factor: f32, values: &Lanes) {
+    let mut sum = *sums; // a copy cannot overlap with the values
+    for l in 0..LANES {
+        sum[l] += factor * values[l];
+    }
+    *sums = sum;
+}
+
+/// Sum of all lanes, half and half. Not inlined: the compiler would else arrange the running sums
+/// for these few additions rather than for the loop before.
+#[inline(never)]
+fn sum(mut values: Lanes) -> f32 {
+    let mut half = LANES / 2;
+    while half > 0 {
+        for l in 0..half {
+            values[l] += values[l + half];
+        }
+        half /= 2;
+    }
+    values[0]
+}
+
+/// Running sums of a row, lane by lane.
+struct Moments<const D: usize> {
+    weight: Lanes,
+    shift: [Lanes; D],
+    spread: Lanes,
+}
+
+impl<const D: usize> Moments<D> {
+    #[inline(always)]
+    fn new() -> Self {
+        Self {
+            weight: [0.0; LANES],
+            shift: [[0.0; LANES]; D],
+            spread: [0.0; LANES],
+        }
+    }
+
+    #[inline(always)]
+    fn add(&mut self, k: &Lanes, b: &Lanes, targets: [&Lanes; D], y: &[f32; D]) {
+        let mut m = [0.0_f32; LANES];
+        for l in 0..LANES {
+            m[l] = k[l] * b[l];
+            self.weight[l] += m[l];
+        }
+        for d in 0..D {
+            for l in 0..LANES {
+                let e = targets[d][l] - y[d];
+                self.shift[d][l] += m[l] * e;
+                self.spread[l] += m[l] * e * e;
+            }
+        }
+    }
+}
+
+/// eˣ for x ≤ 0 to two units of single precision. 0 below −87.
+#[inline(always)]
+fn exp(x: f32) -> f32 {
+    const MAGIC: f32 = 12_582_912.0; // 1.5 · 2²³: adding it rounds to the nearest integer
+    let x = x.max(-88.0);
+    let n = (x * std::f32::consts::LOG2_E + MAGIC) - MAGIC;
+    let f = (x - n * 0.693_359_4) - n * -2.121_944_4e-4;
+    let p = 1.0
+        + f * (1.0
+            + f * (0.5
+                + f * (0.166_666_57 + f * (0.041_665_795 + f * (8.334_52e-3 + f * 1.388_89e-3)))));
+    let power =
+        f32::from_bits((((n + MAGIC).to_bits() << 23) as i32).wrapping_add(0x3f80_0000) as u32);
+    if x > -87.0 { p * power } else { 0.0 }
+}
+
+#[cfg(test)]
+mod tests;

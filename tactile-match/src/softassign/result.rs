@@ -1,0 +1,505 @@
+//! The result of a match: its warp, and what is kept along a series of targets.
+
+use super::assign::Blocks;
+use super::confidence::{self, CLEAN_SIGMA};
+use super::large::LARGE;
+use super::{AnnealedSoftassign, Frame, SoftassignWorkspace, mean};
+use crate::hard::{self, Interpolation};
+use crate::{
+    MatchError, MatchReport, MatchedPairs, Matching, SoftMatches, StopReason, error, unmatched_rows,
+};
+use crate::{centre_and_radius, widened};
+use nalgebra::{Point, SMatrix};
+use std::ops::ControlFlow;
+use std::sync::{Arc, OnceLock};
+use tactile_tps::{Scalar, Smoothing, TpsError, Warp};
+
+// What a run of the matcher has found, read from its workspace.
+
+/// The answer in a workspace.
+///
+/// ```
+/// use nalgebra::Point2;
+/// use std::ops::ControlFlow;
+/// use tactile_match::{AnnealedSoftassign, SoftassignWorkspace};
+/// let model = [
+///     [0.0, 0.0],
+///     [1.0, 0.1],
+///     [0.2, 1.0],
+///     [1.1, 1.2],
+///     [0.5, 0.4],
+///     [1.8, 0.3],
+/// ]
+/// .map(Point2::from);
+/// let target = model.map(|p| Point2::new(1.1 * p.x + 0.1 * p.y, p.y));
+/// let mut workspace = SoftassignWorkspace::default();
+/// let found = AnnealedSoftassign::default().match_points_with(
+///     &mut workspace,
+///     &model,
+///     &target,
+///     |_, _| ControlFlow::Continue(()),
+/// )?;
+/// assert_eq!(
+///     (found.assignment[2], found.confidence[2] > 0.9),
+///     (Some(2), true)
+/// );
+/// assert!(
+///     found
+///         .warped()
+///         .zip(&target)
+///         .all(|(w, t)| (w - t).norm() < 1e-9)
+/// );
+/// assert!(found.report.residual < 1e-9); // units of the points
+/// let matching = found.to_matching(&model);
+/// assert!((matching.warp.jacobian(&model[4]).determinant() - 1.1).abs() < 1e-6); // areas grow by a tenth
+/// # Ok::<(), tactile_match::MatchError>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct SoftassignMatch<'w, const D: usize> {
+    workspace: &'w SoftassignWorkspace<D>,
+    /// Target row of every model point.
+    pub assignment: &'w [Option<usize>],
+    /// Probability that each assignment is right.
+    pub confidence: &'w [f64],
+    /// How it went.
+    pub report: MatchReport,
+}
+
+impl<'w, const D: usize> SoftassignMatch<'w, D> {
+    /// What the workspace holds.
+    pub(super) fn of(workspace: &'w SoftassignWorkspace<D>) -> Self {
+        let scale = workspace.frame.scale;
+        Self {
+            workspace,
+            assignment: &workspace.answer.assignment,
+            confidence: &workspace.answer.confidence,
+            report: MatchReport {
+                stop: stop_reason(workspace),
+                iterations: workspace.best.iterations,
+                starts: workspace.starts,
+                residual: workspace.answer.residual * scale,
+                sigma: workspace.best.sigma * scale,
+                doubt: workspace.doubt(),
+            },
+        }
+    }
+
+    /// The warped model points.
+    pub fn warped(&self) -> impl ExactSizeIterator<Item = Point<f64, D>> + use<'w, D> {
+        let workspace = self.workspace;
+        workspace
+            .answer
+            .warped
+            .iter()
+            .map(|w| workspace.frame.outward(w))
+    }
+
+    /// The answer with its warp, soft matches and covariances. `model` are the points that were
+    /// matched.
+    #[must_use]
+    pub fn to_matching(&self, model: &[Point<f64, D>]) -> Matching<D> {
+        self.interpolated(model, &ModelSpline::new(model))
+    }
+
+    /// The report in the type of the points.
+    fn narrow_report(&self) -> MatchReport {
+        let report = &self.report;
+        MatchReport {
+            stop: report.stop,
+            iterations: report.iterations,
+            starts: report.starts,
+            residual: report.residual,
+            sigma: report.sigma,
+            doubt: report.doubt,
+        }
+    }
+
+    /// As [`to_matching`](Self::to_matching), with the factorised system of the model's spline.
+    fn interpolated(&self, model: &[Point<f64, D>], spline: &ModelSpline<D>) -> Matching<D> {
+        let workspace = self.workspace;
+        let (answer, frame) = (&workspace.answer, &workspace.frame);
+        let mut warped: Vec<Point<f64, D>> = self.warped().collect();
+        let warp = spline.through(&mut warped);
+        let (mut soft, mut row) = (SoftMatches::default(), Vec::new());
+        for i in 0..model.len() {
+            row.clear();
+            row.extend(confidence::soft_row(&workspace.annealer.soft, i).map(|(j, p)| (j, p)));
+            row.sort_unstable_by_key(|entry| entry.0);
+            soft.push_row(row.iter().copied());
+        }
+        let square = frame.scale * frame.scale;
+        let covariance = |v: &f64| SMatrix::from_diagonal_element(v * square);
+        let (unmatched_model, unmatched_target) =
+            unmatched_rows(&answer.assignment, workspace.target.len());
+        Matching {
+            warp,
+            warped,
+            assignment: answer.assignment.clone(),
+            confidence: answer.confidence.iter().map(|&c| c).collect(),
+            soft,
+            unmatched_model,
+            unmatched_target,
+            displacement_covariance: answer.variance.iter().map(covariance).collect(),
+            energy: workspace.best.trace.iter().map(|&e| e).collect(),
+            report: self.narrow_report(),
+        }
+    }
+}
+
+fn stop_reason<const D: usize>(workspace: &SoftassignWorkspace<D>) -> StopReason {
+    match () {
+        () if workspace.stopped => StopReason::Cancelled,
+        // The floor is reached to rounding.
+        () if workspace.best.sigma <= 1.000_001 * confidence::MIN_SIGMA
+            && !workspace.annealer.soft.errors.differ()
+            && workspace.doubt().is_none() =>
+        {
+            StopReason::Exact
+        }
+        () if workspace.best.settled => StopReason::Converged,
+        () => StopReason::IterationLimit,
+    }
+}
+
+// The warp of an answer: the thin-plate spline through the estimated positions.
+
+/// Least distance of two points, in radii of the model, from which on a spline surely goes through
+/// all positions: the condition of its system grows with the square of the distance's inverse at
+/// most (Narcowich & Ward, J. Approx. Theory 69, 1992), to 10⁷ for some hundred points.
+const APART: f64 = 0.01;
+
+/// Radii in which nothing over- or underflows, whatever the type of the points.
+const ORDINARY: std::ops::Range<f64> = 1e-12..1e12;
+
+/// A model's interpolating spline: through all points, or through a well-spread sample of a large
+/// set. Its system is factorised when a warp first needs it, and once for all targets.
+#[derive(Clone, Debug)]
+struct ModelSpline<const D: usize> {
+    sources: Arc<Sources<D>>,
+}
+
+#[derive(Debug)]
+struct Sources<const D: usize> {
+    points: Vec<Point<f64, D>>,
+    /// Their rows in the model. Empty for all.
+    rows: Vec<usize>,
+    /// Whether a spline goes through any positions.
+    apart: bool,
+    system: OnceLock<Interpolation<D>>,
+}
+
+impl<const D: usize> Sources<D> {
+    fn system(&self) -> &Interpolation<D> {
+        self.system
+            .get_or_init(|| Interpolation::new(&self.points, None, Smoothing::None))
+    }
+}
+
+impl<const D: usize> ModelSpline<D> {
+    fn new(model: &[Point<f64, D>]) -> Self {
+        let mut rows = Vec::new();
+        if model.len() >= LARGE {
+            let frame = Frame::new(model, model);
+            let inside: Vec<[f64; D]> = model.iter().map(|p| frame.model(p)).collect();
+            let mut blocks = Blocks::default();
+            blocks.build(&inside);
+            // Points that the spline of a large set goes through: a system of so many is solved in
+            // a tenth of a second, and between them a field as smooth as the prior's differs from
+            // it by less than its residuals.
+            let step = model.len() / 1500;
+            rows.extend(blocks.order.iter().step_by(step));
+        }
+        let points = if rows.is_empty() {
+            model.to_vec()
+        } else {
+            rows.iter().map(|&i| model[i]).collect()
+        };
+        Self {
+            sources: Arc::new(Sources {
+                apart: are_apart(&points),
+                points,
+                rows,
+                system: OnceLock::new(),
+            }),
+        }
+    }
+
+    /// The spline that takes the model, or its sample, to `warped`. Where none goes through these
+    /// positions a smoothed one, and `warped`, unless that is of a sample, becomes what it gives.
+    fn through(&self, warped: &mut [Point<f64, D>]) -> Box<dyn Warp<f64, D> + Send + Sync> {
+        let Sources { rows, apart, .. } = &*self.sources;
+        let mut images = if rows.is_empty() {
+            warped.to_vec()
+        } else {
+            rows.iter().map(|&i| warped[i]).collect()
+        };
+        if *apart && ORDINARY.contains(&centre_and_radius(&images).1) {
+            return Box::new(Lazy {
+                sources: Arc::clone(&self.sources),
+                images,
+                spline: OnceLock::new(),
+            });
+        }
+        let warp = warp_through(&self.sources, &mut images);
+        if rows.is_empty() {
+            warped.copy_from_slice(&images);
+        }
+        warp
+    }
+}
+
+/// A spline that is fitted when it is first asked for: who wants the pairs alone does not wait for
+/// it.
+#[derive(Debug)]
+struct Lazy<const D: usize> {
+    sources: Arc<Sources<D>>,
+    images: Vec<Point<f64, D>>,
+    spline: OnceLock<Fitted<D>>,
+}
+
+struct Fitted<const D: usize>(Box<dyn Warp<f64, D> + Send + Sync>);
+
+impl<const D: usize> std::fmt::Debug for Fitted<D> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Fitted").finish_non_exhaustive()
+    }
+}
+
+impl<const D: usize> Lazy<D> {
+    fn spline(&self) -> &dyn Warp<f64, D> {
+        let fit = || Fitted(warp_through(&self.sources, &mut self.images.clone()));
+        &*self.spline.get_or_init(fit).0
+    }
+}
+
+impl<const D: usize> Warp<f64, D> for Lazy<D> {
+    fn apply(&self, point: &Point<f64, D>) -> Point<f64, D> {
+        self.spline().apply(point)
+    }
+
+    fn jacobian(&self, point: &Point<f64, D>) -> SMatrix<f64, D, D> {
+        self.spline().jacobian(point)
+    }
+
+    fn apply_into(
+        &self,
+        points: &[Point<f64, D>],
+        images: &mut [Point<f64, D>],
+    ) -> Result<(), TpsError> {
+        self.spline().apply_into(points, images)
+    }
+
+    fn jacobian_into(
+        &self,
+        points: &[Point<f64, D>],
+        jacobians: &mut [SMatrix<f64, D, D>],
+    ) -> Result<(), TpsError> {
+        self.spline().jacobian_into(points, jacobians)
+    }
+}
+
+/// Whether all points are so far from each other, and their set of such a size, that a spline goes
+/// through any positions.
+fn are_apart<const D: usize>(points: &[Point<f64, D>]) -> bool {
+    let (centre, radius) = centre_and_radius(points);
+    if !ORDINARY.contains(&radius) {
+        return false;
+    }
+    let inside = |p: &Point<f64, D>| (widened(p) - centre) / radius;
+    let mut sorted: Vec<_> = points.iter().map(inside).collect();
+    // Only neighbours along the first axis can be near.
+    sorted.sort_unstable_by(|a, b| a[0].total_cmp(&b[0]));
+    sorted.iter().enumerate().all(|(i, p)| {
+        let near = sorted[i + 1..].iter();
+        near.take_while(|q| q[0] - p[0] < APART)
+            .all(|q| (q - p).norm() >= APART)
+    })
+}
+
+/// The interpolating spline through the estimated positions. Where there is none (model points that
+/// coincide and go different ways) a smoothed one, and `warped` becomes what that gives.
+fn warp_through<const D: usize>(
+    sources: &Sources<D>,
+    warped: &mut [Point<f64, D>],
+) -> Box<dyn Warp<f64, D> + Send + Sync> {
+    let model = &sources.points;
+    let exact = sources.system().through(model, warped);
+    if agrees(&*exact, model, warped) {
+        return exact;
+    }
+    // Smoothing of the spline where none goes through all positions.
+    let warp = hard::spline(model, warped, None, Smoothing::Lambda(1e-6));
+    // As many points in as out.
+    let _ = warp.apply_into(model, warped);
+    warp
+}
+
+/// Whether a warp takes the model to these positions, to half the digits.
+fn agrees<const D: usize>(
+    warp: &(dyn Warp<f64, D> + Send + Sync),
+    model: &[Point<f64, D>],
+    warped: &[Point<f64, D>],
+) -> bool {
+    let size = warped
+        .iter()
+        .fold(0.0_f64, |size, p| size.max(p.coords.amax()));
+    let tolerance = size * (f64::UNIT_ROUNDOFF.sqrt());
+    // All at once: a spline samples points several at a time.
+    let mut images = model.to_vec();
+    warp.apply_into(model, &mut images).is_ok()
+        && images
+            .iter()
+            .zip(warped)
+            .all(|(image, w)| (image - w).amax() <= tolerance)
+}
+
+// What the matcher keeps of one model along a series of targets.
+
+/// Where the last match put the model, the factorisation of the spline between its points, the
+/// matcher's memory. Given another model it forgets the old one.
+#[derive(Clone, Debug)]
+pub(super) struct Series<const D: usize> {
+    model: Vec<Point<f64, D>>,
+    /// Empty where nothing was matched yet.
+    last: Vec<Point<f64, D>>,
+    /// `last` in the frame of the match that begins there.
+    start: Vec<[f64; D]>,
+    /// How many points had a partner.
+    matched: usize,
+    /// The noise that was found, in the units of the points.
+    sigma: f64,
+    /// Holds the answer of the last match.
+    workspace: SoftassignWorkspace<D>,
+    spline: Option<ModelSpline<D>>,
+}
+
+impl<const D: usize> Default for Series<D> {
+    fn default() -> Self {
+        Self {
+            model: Vec::new(),
+            last: Vec::new(),
+            start: Vec::new(),
+            matched: 0,
+            sigma: 0.0,
+            workspace: SoftassignWorkspace::default(),
+            spline: None,
+        }
+    }
+}
+
+impl<const D: usize> Series<D> {
+    /// Forgets the past of another model.
+    fn switch_to(&mut self, model: &[Point<f64, D>]) {
+        if self.model != model {
+            self.model.clear();
+            self.model.extend_from_slice(model);
+            self.last.clear();
+            self.spline = None;
+        }
+    }
+
+    /// Keeps the answer in the workspace for the next match.
+    fn keep(&mut self) {
+        let found = SoftassignMatch::of(&self.workspace);
+        self.last.clear();
+        self.last.extend(found.warped());
+        self.matched = found.assignment.iter().flatten().count();
+        self.sigma = found.report.sigma;
+    }
+
+    /// The last answer, its warp through the factorised system of the model's spline.
+    pub(super) fn matching(&mut self) -> Matching<D> {
+        let Self {
+            spline,
+            workspace,
+            model,
+            ..
+        } = self;
+        let spline = spline.get_or_insert_with(|| ModelSpline::new(model));
+        SoftassignMatch::of(workspace).interpolated(model, spline)
+    }
+
+    /// The pairs of the last answer.
+    pub(super) fn pairs(&self, pairs: &mut MatchedPairs) {
+        let found = SoftassignMatch::of(&self.workspace);
+        pairs.assignment.clear();
+        pairs.assignment.extend_from_slice(found.assignment);
+        pairs.confidence.clear();
+        let confidence = found.confidence.iter();
+        pairs.confidence.extend(confidence.map(|&c| c));
+        pairs.report = found.narrow_report();
+    }
+}
+
+// The next match of a series: from where the last one put the model.
+
+impl AnnealedSoftassign {
+    /// A short run from where the last match put the model, as warm as the target is far from
+    /// there. The usual search where there is no last match, or the run loses partners. The answer
+    /// is left in the series.
+    pub(super) fn follow<const D: usize>(
+        &self,
+        series: &mut Series<D>,
+        model: &[Point<f64, D>],
+        target: &[Point<f64, D>],
+    ) -> Result<(), MatchError> {
+        // Before the series takes notice of the model.
+        error::point_sets(model, target)?;
+        series.switch_to(model);
+        if !self.go_on(series, model, target)? {
+            let go = |_, _| ControlFlow::Continue(());
+            self.match_points_with(&mut series.workspace, model, target, go)?;
+        }
+        series.keep();
+        Ok(())
+    }
+
+    /// Whether a run from the last answer is one: it keeps the partners, and fits as well.
+    fn go_on<const D: usize>(
+        &self,
+        series: &mut Series<D>,
+        model: &[Point<f64, D>],
+        target: &[Point<f64, D>],
+    ) -> Result<bool, MatchError> {
+        let Series {
+            last,
+            start,
+            matched,
+            sigma,
+            workspace,
+            ..
+        } = series;
+        if last.is_empty() {
+            return Ok(false);
+        }
+        workspace.take(model, target)?;
+        let frame = workspace.frame;
+        start.clear();
+        start.extend(last.iter().map(|p| frame.target(p)));
+        // The first temperature is so many times what the sets differ by in place and size.
+        let warmth = 2.0 * apart(start, &workspace.target);
+        self.solve_from(workspace, start, warmth);
+        let noise = (2.0 * *sigma / frame.scale).max(CLEAN_SIGMA);
+        let found = workspace.answer.assignment.iter().flatten().count();
+        // A match that finds partners for less than this share of what the last one found, or
+        // leaves so many times its residuals, is made anew.
+        Ok(found as f64 >= 0.95 * *matched as f64 && workspace.best.sigma <= noise)
+    }
+}
+
+/// How far two sets are apart in place and size: distance of the centroids and difference of the
+/// radii.
+fn apart<const D: usize>(a: &[[f64; D]], b: &[[f64; D]]) -> f64 {
+    let [(p, r), (q, s)] = [a, b].map(|points| {
+        let centre = mean(points);
+        let square = |p: &[f64; D]| (0..D).map(|k| (p[k] - centre[k]).powi(2)).sum::<f64>();
+        (
+            centre,
+            (points.iter().map(square).sum::<f64>() / points.len() as f64).sqrt(),
+        )
+    });
+    (0..D).map(|k| (p[k] - q[k]).powi(2)).sum::<f64>().sqrt() + (r - s).abs()
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,409 @@
+//! The search: a list of starts, each annealed on its own schedule and compared by its evidence,
+//! until an answer leaves no doubt.
+//!
+//! Most scenes are easy and end with the first, fast run. Where its answer neither fits exactly nor
+//! leaves residuals that noise explains, the further starts follow, from the cheapest to the most
+//! expensive. The answer of least energy wins. Noisy scenes then average over the scales of the
+//! prior.
+
+use super::confidence::{self, CLEAN_SIGMA, MIN_TELLING_GAIN};
+use super::{
+    AnnealedSoftassign, Cooling, Mechanism, PriorScales, Rotation, Schedule, Search,
+    SoftassignWorkspace, Transformation, starts,
+};
+use nalgebra::SMatrix;
+use std::ops::ControlFlow;
+
+/// Scales of the prior in the search.
+pub(super) const SCALES: PriorScales = PriorScales {
+    length: 1.2,
+    bending: 0.35,
+    affine: 0.5,
+};
+/// Residuals are compared no finer than this.
+pub(super) const ENERGY_RESOLUTION: f64 = 0.01;
+/// A set of so many points is dense: an exact answer need not be complete, and local tuples are
+/// tried first.
+const MIN_DENSE_POINTS: usize = 500;
+
+/// Farthest target that the pattern of a point is compared at, in radii of the model.
+pub(super) const MAX_PATTERN_REACH: f64 = 0.25;
+
+/// The first run. Its temperature falls whatever the residuals are.
+pub(super) const FAST: Cooling = Cooling {
+    sigma: 0.3,
+    rate: 0.75,
+    least: 0.9,
+    patience: usize::MAX,
+    stuck: usize::MAX,
+    sweeps: 3,
+    still: 1e-4,
+};
+/// Further runs follow the residuals. They end when the temperature has stood still for `patience`
+/// iterations: matches that have not settled by then wander for hundreds.
+const SLOW: Cooling = Cooling {
+    rate: 0.93,
+    least: 1.0,
+    patience: 20,
+    stuck: 8,
+    sweeps: 5,
+    ..FAST
+};
+/// From the best answer so far.
+const REHEAT: Cooling = Cooling {
+    sigma: 0.1,
+    rate: 0.9,
+    ..SLOW
+};
+/// After relaxation labelling, whose pairs are trusted more than a first guess.
+const LABELLED: Cooling = Cooling {
+    sigma: 0.15,
+    ..SLOW
+};
+/// The only run between sets that lie near each other.
+const NEAR: Cooling = Cooling {
+    sigma: 0.2,
+    rate: 0.8,
+    least: 1.0,
+    patience: 12,
+    stuck: 12,
+    ..FAST
+};
+
+/// Where a run starts.
+#[derive(Clone, Copy, Debug)]
+enum Start<const D: usize> {
+    /// The centroids on each other.
+    Centred,
+    /// The best answer so far.
+    Best,
+    /// The best answer so far, corrected by the local patterns of a dense set.
+    Patterns,
+    /// The pairs of relaxation labelling.
+    Labelling,
+    /// The second moments on each other, after a rotation.
+    Moments(SMatrix<f64, D, D>),
+    /// The affine map that local tuples of points agree on.
+    Tuples,
+}
+
+type Observer<'a> = &'a mut dyn FnMut(usize, f64) -> ControlFlow<()>;
+
+impl AnnealedSoftassign {
+    pub(super) fn solve<const D: usize>(
+        &self,
+        ws: &mut SoftassignWorkspace<D>,
+        observe: Observer<'_>,
+    ) {
+        self.begin(ws);
+        let flow = if self.is_large(ws) {
+            self.solve_coarse_to_fine(ws, observe)
+        } else {
+            self.prepare(ws);
+            match self.search {
+                Search::Near => self.run(ws, Start::Centred, NEAR, observe),
+                Search::Thorough => self.search(ws, observe),
+            }
+        };
+        ws.stopped = flow.is_break();
+        self.conclude(ws);
+    }
+
+    /// One short run from `start`, at first as warm as `sigma`, between the coldest that lets
+    /// points change their partners and that of sets near each other.
+    pub(super) fn solve_from<const D: usize>(
+        &self,
+        ws: &mut SoftassignWorkspace<D>,
+        start: &[[f64; D]],
+        sigma: f64,
+    ) {
+        self.begin(ws);
+        self.prepare(ws);
+        starts::centred(&ws.model, &ws.target, &mut ws.state.base);
+        ws.state.warped.clear();
+        ws.state.warped.extend_from_slice(start);
+        let cooling = Cooling {
+            sigma: sigma.clamp(0.03, NEAR.sigma),
+            ..NEAR
+        };
+        // There is no observer that could stop it.
+        let _ = self.anneal(ws, cooling, &mut |_, _| ControlFlow::Continue(()));
+        self.conclude(ws);
+    }
+
+    /// Nothing is found yet.
+    fn begin<const D: usize>(&self, ws: &mut SoftassignWorkspace<D>) {
+        ws.annealer.soft.faintest = 1e-6;
+        ws.annealer.volume = bounding_volume(&ws.target);
+        ws.spacing = 0.0;
+        ws.scales.spread.clear();
+        (ws.starts, ws.stopped) = (0, false);
+        ws.best.energy = f64::INFINITY;
+    }
+
+    /// Sets up prior, targets and landmarks for all points.
+    fn prepare<const D: usize>(&self, ws: &mut SoftassignWorkspace<D>) {
+        ws.annealer.prior.build(&ws.model, SCALES);
+        ws.annealer.soft.set_targets(&ws.target, &ws.deviations);
+        ws.annealer.rigid.set(self.transformation, &ws.model);
+        ws.annealer.known.clone_from(&ws.known);
+    }
+
+    /// Reads the answer from the best run.
+    fn conclude<const D: usize>(&self, ws: &mut SoftassignWorkspace<D>) {
+        ws.expected_share = self.share;
+        if ws.starts > 1 || !self.is_exact(ws) {
+            // Soft matches and regression are those of the last run, which need not be the best
+            // one.
+            let schedule = self.schedule(Cooling {
+                sigma: ws.best.sigma,
+                ..SLOW
+            });
+            ws.annealer.restore(&ws.best, &mut ws.state, &schedule);
+        }
+        let slack = self.slack();
+        let spread = &ws.scales.spread;
+        ws.answer.read(
+            &mut ws.annealer,
+            &ws.best,
+            &ws.target,
+            slack,
+            spread,
+            self.without,
+        );
+    }
+
+    /// All starts in turn until the best answer leaves no doubt, then the scales of the prior.
+    fn search<const D: usize>(
+        &self,
+        ws: &mut SoftassignWorkspace<D>,
+        observe: Observer<'_>,
+    ) -> ControlFlow<()> {
+        self.run(ws, Start::Centred, FAST, observe)?;
+        let dense = ws.model.len().min(ws.target.len()) >= MIN_DENSE_POINTS;
+        let limited = self.rotation == Rotation::Limited;
+        // Warmer, the edges of a cropped set would draw it together again.
+        let seeded = Cooling {
+            sigma: 0.3 * ws.spacing,
+            ..REHEAT
+        };
+        let patterns =
+            (dense && self.has(Mechanism::Patterns)).then_some((Start::Patterns, seeded));
+        let first = [
+            patterns,
+            // The second time they start from a better field.
+            patterns,
+            (dense && self.has(Mechanism::Tuples)).then_some((Start::Tuples, seeded)),
+            self.has(Mechanism::Reheat).then_some((Start::Best, REHEAT)),
+            self.has(Mechanism::Slow).then_some((Start::Centred, SLOW)),
+            (!dense && self.has(Mechanism::Tuples)).then_some((Start::Tuples, seeded)),
+            (limited && self.has(Mechanism::Labelling)).then_some((Start::Labelling, LABELLED)),
+        ];
+        let rotations = starts::rotations::<D>(self.rotation)
+            .filter(|_| self.has(Mechanism::Moments))
+            .map(|rotation| (Start::Moments(rotation), SLOW));
+        let last = self
+            .has(Mechanism::LastReheat)
+            .then_some((Start::Best, REHEAT));
+        for (start, cooling) in first.into_iter().flatten().chain(rotations).chain(last) {
+            if self.is_done(ws) {
+                break;
+            }
+            self.run(ws, start, cooling, observe)?;
+        }
+        let noisy = ws.best.sigma > CLEAN_SIGMA || ws.annealer.soft.errors.differ();
+        if noisy && self.has(Mechanism::Scales) && !ws.annealer.rigid.is_active() {
+            self.average_scales(ws);
+        }
+        ControlFlow::Continue(())
+    }
+
+    /// A run from a start. None where the sets do not have such a start.
+    fn run<const D: usize>(
+        &self,
+        ws: &mut SoftassignWorkspace<D>,
+        start: Start<D>,
+        cooling: Cooling,
+        observe: Observer<'_>,
+    ) -> ControlFlow<()> {
+        if self.place(ws, start) {
+            self.anneal(ws, cooling, observe)
+        } else {
+            ControlFlow::Continue(())
+        }
+    }
+
+    /// Puts `ws.state` to a start: base and warped positions. False where the sets do not have such
+    /// a start.
+    fn place<const D: usize>(&self, ws: &mut SoftassignWorkspace<D>, start: Start<D>) -> bool {
+        let (model, target) = (&*ws.model, &*ws.target);
+        let state = &mut ws.state;
+        match start {
+            Start::Best => {
+                state.copy_from(&ws.best);
+                return true;
+            }
+            Start::Patterns => {
+                state.copy_from(&ws.best);
+                let rows = 0..model.len();
+                if !ws
+                    .patterns
+                    .propose(rows, &state.warped, target, MAX_PATTERN_REACH)
+                {
+                    return false;
+                }
+                let pairs = &ws.patterns.pairs;
+                ws.consensus
+                    .fit(&mut ws.annealer, SCALES, (model, target), pairs, state);
+                return true;
+            }
+            Start::Centred => starts::centred(model, target, &mut state.base),
+            Start::Moments(rotation) => {
+                starts::moments(model, target, &rotation, &mut state.base);
+            }
+            Start::Tuples => {
+                let limited = self.rotation == Rotation::Limited;
+                if !ws.tuples.find(model, target, ws.spacing, limited) {
+                    return false;
+                }
+                ws.tuples.apply(model, &mut state.base);
+            }
+            Start::Labelling => {
+                // Where noise hides which point is which, the points' surroundings hold nothing.
+                let hidden = ws.best.ambiguity >= 0.8 && ws.best.sigma >= 0.999 * REHEAT.sigma;
+                if hidden && !ws.annealer.rigid.is_active() {
+                    return false;
+                }
+                starts::centred(model, target, &mut state.base);
+                ws.correspondence.find(&state.base, target);
+                let pairs = &ws.correspondence.pairs;
+                ws.consensus
+                    .fit(&mut ws.annealer, SCALES, (model, target), pairs, state);
+                return true;
+            }
+        }
+        state.warped.clone_from(&state.base);
+        true
+    }
+
+    /// Anneals `ws.state` from its place. Kept if it is the best so far.
+    fn anneal<const D: usize>(
+        &self,
+        ws: &mut SoftassignWorkspace<D>,
+        cooling: Cooling,
+        observe: Observer<'_>,
+    ) -> ControlFlow<()> {
+        let smaller = ws.model.len().min(ws.target.len()) as f64;
+        let schedule = Schedule {
+            collapse: 0.5 * smaller,
+            partners: smaller,
+            ..self.schedule(cooling)
+        };
+        ws.starts += 1;
+        ws.state.trace.clear();
+        ws.state.iterations = 0;
+        (ws.state.energy, ws.state.tail) = (f64::INFINITY, 0.0);
+        let flow = ws.annealer.run(&mut ws.state, &schedule, observe);
+        if ws.starts == 1 {
+            ws.best.copy_from(&ws.state);
+            if self.is_exact(ws) {
+                return flow; // there will be nothing to compare it with
+            }
+            ws.spacing = ws.patterns.typical_spacing(&ws.target);
+        }
+        ws.state.tail = ws.annealer.tail(0.1 * ws.spacing);
+        ws.annealer
+            .evaluate(&mut ws.state, self.share, ENERGY_RESOLUTION);
+        if ws.state.energy < ws.best.energy || ws.starts == 1 {
+            ws.best.copy_from(&ws.state);
+        }
+        flow
+    }
+
+    /// The mean over the prior's scales, by their evidence, twice: the first changes matches and
+    /// noise level, from which the second starts.
+    fn average_scales<const D: usize>(&self, ws: &mut SoftassignWorkspace<D>) {
+        let schedule = self.schedule(Cooling {
+            sigma: ws.best.sigma,
+            ..SLOW
+        });
+        let ambiguity = ws.annealer.restore(&ws.best, &mut ws.state, &schedule);
+        // Soft partners that spread more than this hide the evidence of a warp behind that of its
+        // matches.
+        if ambiguity > 0.3 {
+            return;
+        }
+        let average = |ws: &mut SoftassignWorkspace<D>, likely: bool| {
+            let variance = ws.best.sigma * ws.best.sigma;
+            let request = ws.annealer.request();
+            let (model, best) = (&ws.model, &mut ws.best);
+            ws.scales
+                .average(request, model, best, variance, SCALES.affine, likely)
+        };
+        let likeliest = average(ws, false);
+        ws.annealer.prior.build(&ws.model, likeliest);
+        ws.state.copy_from(&ws.best);
+        // A third round moves the warp by a hundredth of the noise.
+        ws.annealer.settle(&mut ws.state, &schedule, 2);
+        ws.best.sigma = ws.state.sigma;
+        average(ws, true);
+    }
+
+    pub(super) fn schedule(&self, mut cooling: Cooling) -> Schedule {
+        if self.transformation != Transformation::NonRigid {
+            // A motion without bending stands still while it turns into place.
+            cooling.stuck = cooling.patience;
+        }
+        Schedule {
+            cooling,
+            floor: confidence::MIN_SIGMA,
+            limit: self.max_iterations,
+            collapse: 0.0,
+            partners: f64::INFINITY,
+            slack: self.slack(),
+        }
+    }
+
+    /// Whether no further start can do better: an exact answer, or residuals of a dense set so far
+    /// below its spacing that no part can lie aside, or residuals and soft partners that noise
+    /// explains.
+    fn is_done<const D: usize>(&self, ws: &SoftassignWorkspace<D>) -> bool {
+        let points = ws.model.len().min(ws.target.len());
+        let (best, matched) = (&ws.best, ws.best.matched / points as f64);
+        if self.is_exact(ws) {
+            return true;
+        }
+        if points >= MIN_DENSE_POINTS {
+            return best.sigma <= 0.15 * ws.spacing && matched >= 0.8 && best.tail <= 0.01;
+        }
+        let unequal = confidence::are_unequal(ws.model.len(), ws.target.len());
+        let gain = if unequal { 1.2 } else { MIN_TELLING_GAIN };
+        // Soft partners that spread no more than this, relative to the temperature, are decided. Of
+        // points well apart they spread by 0.05, where a part lies aside by 0.12 to 0.6.
+        ws.gain().is_some_and(|found| found >= gain)
+            && matched >= 0.9
+            && best.tail <= 0.03
+            && best.ambiguity <= 0.1
+    }
+
+    /// Whether the best run so far explains nearly every point of the smaller set to rounding.
+    pub(super) fn is_exact<const D: usize>(&self, ws: &SoftassignWorkspace<D>) -> bool {
+        let points = ws.model.len().min(ws.target.len());
+        let dense = points >= MIN_DENSE_POINTS;
+        let wanted = if ws.starts == 1 || !dense { 0.98 } else { 0.8 };
+        ws.best.sigma <= CLEAN_SIGMA
+            && ws.best.matched >= wanted * points as f64
+            && (ws.best.tail <= 0.01 || !dense)
+    }
+}
+
+/// Volume of the bounding box. Thin sides count as a tenth of the model's radius.
+pub(super) fn bounding_volume<const D: usize>(points: &[[f64; D]]) -> f64 {
+    let side = |k: usize| {
+        let (low, high) = points
+            .iter()
+            .fold((f64::MAX, f64::MIN), |(l, h), p| (l.min(p[k]), h.max(p[k])));
+        (high - low).max(0.1)
+    };
+    (0..D).map(side).product()
+}
