@@ -38,7 +38,7 @@ pub struct IndentationCurve {
     force_n: Vec<f64>,
 }
 
-/// Points below which contact point, baseline, modulus and their scatter cannot be told apart.
+// Points below which contact point, baseline, modulus and their scatter cannot be told apart.
 const FEWEST_POINTS: usize = 6;
 
 impl IndentationCurve {
@@ -487,9 +487,8 @@ struct Problem<'a> {
     offset: bool,
 }
 
-const SCAN: usize = 300;
-/// Golden sections down to rounding.
-const SECTIONS: usize = 70;
+// Golden sections.
+const DOWN_TO_ROUNDING: usize = 70;
 
 impl Problem<'_> {
     /// f(z − z₀) of every point. None where the law does not reach so far.
@@ -555,15 +554,16 @@ impl Problem<'_> {
         let (first, last) = self.curve.span();
         let z = self.curve.position_m();
         let (from, to) = (first - (last - first), z[z.len() - 5]);
-        let step = (to - from) / SCAN as f64;
-        let scanned = (0..=SCAN).filter_map(|k| self.at(from + step * k as f64));
+        let scan = 300;
+        let step = (to - from) / f64::from(scan);
+        let scanned = (0..=scan).filter_map(|k| self.at(from + step * f64::from(k)));
         let start = scanned.min_by(|a, b| a.squares.total_cmp(&b.squares))?;
         let (low, high) = (
             (start.contact_m - step).max(from),
             (start.contact_m + step).min(to),
         );
         let squares = |x| self.at(x).map_or(f64::INFINITY, |profile| profile.squares);
-        let refined = self.at(golden_section(low, high, SECTIONS, squares))?;
+        let refined = self.at(golden_section(low, high, DOWN_TO_ROUNDING, squares))?;
         Some(if refined.squares <= start.squares {
             refined
         } else {
@@ -578,7 +578,7 @@ impl Problem<'_> {
         at(golden_section(
             near - reach,
             near + reach,
-            SECTIONS,
+            DOWN_TO_ROUNDING,
             squares,
         ))
     }
@@ -720,83 +720,51 @@ impl Indenter {
         nu: f64,
     ) -> Result<Option<Box<dyn ContactLaw>>, ElasticityError> {
         use EstimatorKind as K;
-        let layer = |radius,
-                     thickness,
-                     bond,
-                     theory|
-         -> Result<Option<Box<dyn ContactLaw>>, ElasticityError> {
-            Ok(Some(Box::new(
-                LayerLaw::new(radius, thickness, nu, bond, theory)?.tabulated(),
-            )))
-        };
-        match (*self, kind) {
-            (Self::Sphere { radius_m, .. } | Self::Ball { radius_m }, K::HertzSphere) => {
-                Ok(Some(Box::new(HertzLaw::new(radius_m)?)))
-            }
-            (Self::Ball { radius_m }, K::SphereOnFlat) => {
-                let flat = Waveguide::rigid();
-                let law = WaveguideLaw::new(radius_m, nu, &flat, Bond::Bonded)?;
-                Ok(Some(Box::new(law)))
-            }
-            (
-                Self::TipOnBall {
-                    tip_radius_m,
-                    ball_radius_m,
-                },
-                K::TipOnBall,
-            ) => Ok(Some(Box::new(TipOnBallLaw::new(
+        let law: Box<dyn ContactLaw> = match *self {
+            Self::Sphere {
+                radius_m,
+                thickness_m,
+                bond,
+            } => match (kind, thickness_m) {
+                (K::HertzSphere, _) => Box::new(HertzLaw::new(radius_m)?),
+                (K::SphereWithoutSlip, None) => Box::new(NoSlipLaw::sphere(radius_m, nu)?),
+                (kind, Some(thickness_m)) => {
+                    let theory = match kind {
+                        K::LayerIntegralEquation => LayerTheory::IntegralEquation,
+                        K::LayerCorrectedSeries => LayerTheory::CorrectedSeries,
+                        K::LayerPublishedSeries => LayerTheory::PublishedSeries,
+                        _ => return Ok(None),
+                    };
+                    Box::new(LayerLaw::new(radius_m, thickness_m, nu, bond, theory)?.tabulated())
+                }
+                _ => return Ok(None),
+            },
+            Self::Ball { radius_m } => match kind {
+                K::HertzSphere => Box::new(HertzLaw::new(radius_m)?),
+                K::TataraSphere => Box::new(TataraLaw::new(radius_m, nu)?),
+                K::SphereOnFlat => {
+                    let flat = Waveguide::rigid();
+                    Box::new(WaveguideLaw::new(radius_m, nu, &flat, Bond::Bonded)?)
+                }
+                _ => return Ok(None),
+            },
+            Self::TipOnBall {
                 tip_radius_m,
                 ball_radius_m,
-            )?))),
-            (Self::Ball { radius_m }, K::TataraSphere) => {
-                Ok(Some(Box::new(TataraLaw::new(radius_m, nu)?)))
-            }
-            (Self::Punch { radius_m }, K::FlatPunch) => {
-                Ok(Some(Box::new(PunchLaw::new(radius_m)?)))
-            }
-            (Self::Cone { half_angle_tangent }, K::Cone) => {
-                Ok(Some(Box::new(ConeLaw::new(half_angle_tangent)?)))
-            }
-            (
-                Self::Sphere {
-                    radius_m,
-                    thickness_m: None,
-                    ..
-                },
-                K::SphereWithoutSlip,
-            ) => Ok(Some(Box::new(NoSlipLaw::sphere(radius_m, nu)?))),
-            (Self::Punch { radius_m }, K::FlatPunchWithoutSlip) => {
-                Ok(Some(Box::new(NoSlipLaw::punch(radius_m, nu)?)))
-            }
-            (Self::Cone { half_angle_tangent }, K::ConeWithoutSlip) => {
-                Ok(Some(Box::new(NoSlipLaw::cone(half_angle_tangent, nu)?)))
-            }
-            (
-                Self::Sphere {
-                    radius_m,
-                    thickness_m: Some(h),
-                    bond,
-                },
-                K::LayerIntegralEquation,
-            ) => layer(radius_m, h, bond, LayerTheory::IntegralEquation),
-            (
-                Self::Sphere {
-                    radius_m,
-                    thickness_m: Some(h),
-                    bond,
-                },
-                K::LayerCorrectedSeries,
-            ) => layer(radius_m, h, bond, LayerTheory::CorrectedSeries),
-            (
-                Self::Sphere {
-                    radius_m,
-                    thickness_m: Some(h),
-                    bond,
-                },
-                K::LayerPublishedSeries,
-            ) => layer(radius_m, h, bond, LayerTheory::PublishedSeries),
-            _ => Ok(None),
-        }
+            } if kind == K::TipOnBall => Box::new(TipOnBallLaw::new(tip_radius_m, ball_radius_m)?),
+            Self::Punch { radius_m } => match kind {
+                K::FlatPunch => Box::new(PunchLaw::new(radius_m)?),
+                K::FlatPunchWithoutSlip => Box::new(NoSlipLaw::punch(radius_m, nu)?),
+                _ => return Ok(None),
+            },
+            Self::Cone { half_angle_tangent } => match kind {
+                K::Cone => Box::new(ConeLaw::new(half_angle_tangent)?),
+                K::ConeWithoutSlip => Box::new(NoSlipLaw::cone(half_angle_tangent, nu)?),
+                _ => return Ok(None),
+            },
+            Self::TipOnBall { .. } => return Ok(None),
+        };
+        Ok(Some(law))
     }
 }
 

@@ -272,11 +272,6 @@ pub enum Averaging {
     Median,
 }
 
-/// Median absolute deviation of normal data over its standard deviation.
-const MAD: f64 = 0.674_489_750_196_081_7;
-/// Huber's constant.
-const K: f64 = 1.345;
-
 /// The value below which half of the weight lies.
 fn weighted_median(values: &[f64], weights: &[f64]) -> f64 {
     let mut order: Vec<usize> = (0..values.len()).filter(|&i| weights[i] > 0.0).collect();
@@ -305,11 +300,13 @@ fn weighted_median(values: &[f64], weights: &[f64]) -> f64 {
 fn centre_and_spread(values: &[f64], weights: &[f64], how: Averaging) -> (f64, f64) {
     let median = weighted_median(values, weights);
     let deviations: Vec<f64> = values.iter().map(|&v| (v - median).abs()).collect();
-    let spread = weighted_median(&deviations, weights) / MAD;
+    // The median absolute deviation of normal data is 0.674 of its standard deviation.
+    let spread = weighted_median(&deviations, weights) / 0.674_489_750_196_081_7;
     if how == Averaging::Median || spread == 0.0 {
         return (median, spread);
     }
-    let limit = spread * K;
+    // Huber's constant, 95 % efficient on normal data.
+    let limit = spread * 1.345;
     let mut centre = median;
     for _ in 0..50 {
         let (mut sum, mut total) = (0.0, 0.0);
@@ -334,7 +331,7 @@ fn centre_and_spread(values: &[f64], weights: &[f64], how: Averaging) -> (f64, f
 // j-th point's share. To first order dE = sym(Fᵀ dH), so that the mean is linear in the data too,
 // and its covariance a sum over the points.
 
-/// Order of the components in covariances of strain: xx, yy, zz, xy, xz, yz.
+// Order of the components in covariances of strain: xx, yy, zz, xy, xz, yz.
 const PAIRS: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)];
 
 /// Covariance of the Green–Lagrange strain (xx, yy, zz, xy, xz, yz) from that of H, whose nine
@@ -431,7 +428,7 @@ pub fn mean_strain_covariance(
 // Third, errors of the first surface's points make any fit to them too flat (regression dilution:
 // Fuller, Measurement Error Models, 1987, §1.1).
 
-/// How far, in pixels of the surfaces, the edge of a mask lies from the contact's.
+// How far, in pixels of the surfaces, the edge of a mask lies from the contact's.
 const EDGE_PX: f64 = 0.5;
 
 /// Standard errors of the mean Green–Lagrange strain between matched points of two reconstructed

@@ -1,8 +1,5 @@
 //! Minimum of a function of one variable.
 
-/// Part of a bracket that a golden section leaves.
-const RATIO: f64 = 0.618_033_988_749_894_8;
-
 /// Argument of the least of a function that has one minimum in [low, high]: the better of the last
 /// bracket's two inner points.
 ///
@@ -14,16 +11,18 @@ pub fn golden_section(
     sections: usize,
     at: impl Fn(f64) -> f64,
 ) -> f64 {
+    // The part of a bracket that a golden section leaves.
+    let ratio = 0.618_033_988_749_894_8;
     let evaluated = |x: f64| (x, at(x));
-    let left = |low: f64, high: f64| evaluated(high - RATIO * (high - low));
-    let right = |low: f64, high: f64| evaluated(low + RATIO * (high - low));
+    let left = |low: f64, high: f64| evaluated(high - ratio * (high - low));
+    let right = |low: f64, high: f64| evaluated(low + ratio * (high - low));
     let (mut a, mut b) = (left(low, high), right(low, high));
     for _ in 0..sections {
         if a.1 <= b.1 {
-            high = low + RATIO * (high - low);
+            high = low + ratio * (high - low);
             (a, b) = (left(low, high), a);
         } else {
-            low = high - RATIO * (high - low);
+            low = high - ratio * (high - low);
             (a, b) = (b, right(low, high));
         }
         if high - low <= 1e-12 * (high.abs() + low.abs()) {

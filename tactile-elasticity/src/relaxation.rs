@@ -162,20 +162,20 @@ pub struct StandardLinearSolid {
     pub time_constant_95_s: Interval,
 }
 
-/// Loads at different times below which three parameters of a solid leave nothing that could speak
-/// against it.
+// Loads at different times below which three parameters of a solid leave nothing that could speak
+// against it.
 const FEWEST_LOADS: usize = 5;
 
-/// What the likelihood ratio of a change against none must exceed. With the time constant free it
-/// is no χ²: chosen by simulation of constant series, of which about 1 % exceed it (`cargo test -p
-/// tactile-elasticity --test suite false_alarms -- --nocapture`).
+// What the likelihood ratio of a change against none must exceed. With the time constant free it
+// is no χ²: chosen by simulation of constant series, of which about 1 % exceed it (`cargo test -p
+// tactile-elasticity --test suite false_alarms -- --nocapture`).
 const CHANGE: f64 = 8.0;
 
-/// What a trend alone must exceed where a solid is not tried: χ² of one degree of freedom at 1 %.
+// What a trend alone must exceed where a solid is not tried: χ² of one degree of freedom at 1 %.
 const TREND: f64 = 6.63;
 
-/// Difference of Bayes' information criterion that is strong evidence (Kass & Raftery 1995, Table
-/// in § 3.2).
+// Difference of Bayes' information criterion that is strong evidence (Kass & Raftery 1995, Table
+// in § 3.2).
 const STRONG_EVIDENCE: f64 = 6.0;
 
 /// Tells a sample that relaxes from a sensor that drifts, from the moduli of single loads in the
@@ -473,8 +473,8 @@ impl Series {
     }
 }
 
-/// Share of a column's weight that must differ from its mean: below, the normal equations have lost
-/// half their digits.
+// Share of a column's weight that must differ from its mean: below, the normal equations have lost
+// half their digits.
 const CONTRAST: f64 = 1e-10;
 
 /// A deformation that scatters no more than its errors was held: its mean. Noise in the history
@@ -504,8 +504,8 @@ fn mean(values: impl ExactSizeIterator<Item = f64>) -> f64 {
     values.sum::<f64>() / count
 }
 
-/// Time constants tried, from a tenth of the shortest interval to ten times the whole, in
-/// logarithmic steps.
+// Time constants tried, from a tenth of the shortest interval to ten times the whole, in
+// logarithmic steps.
 const STEPS: usize = 200;
 
 /// χ² as a function of the time constant alone, the other parameters fitted.

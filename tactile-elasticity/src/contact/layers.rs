@@ -45,7 +45,7 @@ pub struct LayerContact {
     pub indentation_ratio: f64,
 }
 
-/// The largest a/h solved for. Beyond, a thin-layer asymptote is the better theory.
+// The largest a/h solved for. Beyond, a thin-layer asymptote is the better theory.
 const LARGEST_A_OVER_H: f64 = 20.0;
 
 /// The contact of a sphere with layers on a rigid base.
@@ -369,7 +369,7 @@ struct Stack {
     bond: Bond,
 }
 
-/// Beyond this kh a layer is a half-space to the last digit: what lies below counts with y²e^(−2y).
+// Beyond this kh a layer is a half-space to the last digit: what lies below counts with y²e^(−2y).
 const DEEP: f64 = 30.0;
 
 impl Stack {
@@ -640,7 +640,7 @@ pub struct LayerTable {
     rows: Vec<(f64, f64)>,
 }
 
-/// Nodes 0.18 apart in ln a: cubic interpolation leaves 2·10⁻⁵ (see the test).
+// Nodes 0.18 apart in ln a: cubic interpolation leaves 2·10⁻⁵ (see the test).
 const NODES: usize = 81;
 const SMALLEST_A_OVER_H: f64 = 1e-5;
 
@@ -690,10 +690,10 @@ pub struct SharedLayerTable {
     rows: Vec<Row>,
 }
 
-/// Twelve shares leave 10⁻⁷ at a/h = 3 (see the test). Each costs one factorisation a row.
+// Twelve shares leave 10⁻⁷ at a/h = 3 (see the test). Each costs one factorisation a row.
 const SHARES: usize = 12;
 
-/// Width of a row in ln a. The cubic's error goes as its fourth power and is 5·10⁻⁶ here.
+// Width of a row in ln a. The cubic's error goes as its fourth power and is 5·10⁻⁶ here.
 const STEP: f64 = 0.1;
 
 #[derive(Debug, Clone, PartialEq)]

@@ -83,11 +83,11 @@ pub struct TabulatedForce {
     pub modulus_slope: f64,
 }
 
-/// Limits are met by numbers that rounding moved by this.
+// Limits are met by numbers that rounding moved by this.
 const ROUNDING: f64 = 1e-12;
 
-/// How much smaller than its smallest a contact may be: ln(F/F_Hertz) is some −0.1 a/R there, and
-/// is taken on along its tangent.
+// How much smaller than its smallest a contact may be: ln(F/F_Hertz) is some −0.1 a/R there, and
+// is taken on along its tangent.
 const SMALLER: f64 = 0.6;
 
 impl ContactTable {
@@ -433,9 +433,9 @@ impl ContactCurve {
     }
 }
 
-/// Degree in a/R and the largest in ln E: what they leave of contacts that finite elements computed
-/// is the elements' own scatter in the contact radius, some 0.1 %
-/// (`the_surface_leaves_the_scatter_of_the_contact_radius`).
+// Degree in a/R and the largest in ln E: what they leave of contacts that finite elements computed
+// is the elements' own scatter in the contact radius, some 0.1 %
+// (`the_surface_leaves_the_scatter_of_the_contact_radius`).
 const DEGREE_IN_RATIO: usize = 6;
 const DEGREE_IN_MODULUS: usize = 5;
 

@@ -152,8 +152,8 @@ impl Waveguide {
 /// Parameters of a layer whose errors count: ln E, ln h and ν.
 pub const PARAMETERS_PER_LAYER: usize = 3;
 
-/// Step of the numerical derivatives: third powers of it are lost, rounding of the integral
-/// equation is far below.
+// Step of the numerical derivatives: third powers of it are lost, rounding of the integral
+// equation is far below.
 const STEP: f64 = 1e-3;
 
 /// ln of the stiffness E_g of the guide under a ball's contact of radius a, F = 4/3 E_g a³/R. None

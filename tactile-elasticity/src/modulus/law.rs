@@ -18,6 +18,17 @@ pub struct LogForce {
     pub size_slope: f64,
 }
 
+impl LogForce {
+    /// ln f, d ln f / d ln x and d ln f / d ln R.
+    pub const fn new(value: f64, slope: f64, size_slope: f64) -> Self {
+        Self {
+            value,
+            slope,
+            size_slope,
+        }
+    }
+}
+
 /// A law F = E* f(x) of a contact, x the contact radius or the indentation. A law of one's own
 /// implements [`log_force_at_radius`](Self::log_force_at_radius) and goes into
 /// [`ContactEstimator::from_law`](super::ContactEstimator::from_law).
@@ -122,20 +133,12 @@ impl ContactLaw for HertzLaw {
 
     fn log_force_at_radius(&self, a: f64, _: f64) -> Option<LogForce> {
         let value = (4.0 / 3.0f64).ln() - self.radius_m.ln() + 3.0 * a.ln();
-        Some(LogForce {
-            value,
-            slope: 3.0,
-            size_slope: -1.0,
-        })
+        Some(LogForce::new(value, 3.0, -1.0))
     }
 
     fn log_force_at_indentation(&self, d: f64, _: f64) -> Option<LogForce> {
         let value = (4.0 / 3.0f64).ln() + 0.5 * self.radius_m.ln() + 1.5 * d.ln();
-        Some(LogForce {
-            value,
-            slope: 1.5,
-            size_slope: 0.5,
-        })
+        Some(LogForce::new(value, 1.5, 0.5))
     }
 
     fn contact_ratio(&self, contact_radius: Option<f64>, indentation: Option<f64>) -> Option<f64> {
@@ -177,11 +180,7 @@ impl ContactLaw for PunchLaw {
     }
 
     fn log_force_at_indentation(&self, d: f64, _: f64) -> Option<LogForce> {
-        Some(LogForce {
-            value: (2.0 * self.radius_m).ln() + d.ln(),
-            slope: 1.0,
-            size_slope: 1.0,
-        })
+        Some(LogForce::new((2.0 * self.radius_m).ln() + d.ln(), 1.0, 1.0))
     }
 
     fn contact_ratio(&self, _: Option<f64>, _: Option<f64>) -> Option<f64> {
@@ -214,20 +213,12 @@ impl ContactLaw for ConeLaw {
 
     fn log_force_at_radius(&self, a: f64, _: f64) -> Option<LogForce> {
         let value = (std::f64::consts::FRAC_PI_2 / self.tangent).ln() + 2.0 * a.ln();
-        Some(LogForce {
-            value,
-            slope: 2.0,
-            size_slope: -1.0,
-        })
+        Some(LogForce::new(value, 2.0, -1.0))
     }
 
     fn log_force_at_indentation(&self, d: f64, _: f64) -> Option<LogForce> {
         let value = (std::f64::consts::FRAC_2_PI * self.tangent).ln() + 2.0 * d.ln();
-        Some(LogForce {
-            value,
-            slope: 2.0,
-            size_slope: 1.0,
-        })
+        Some(LogForce::new(value, 2.0, 1.0))
     }
 
     fn contact_ratio(&self, _: Option<f64>, _: Option<f64>) -> Option<f64> {
@@ -388,11 +379,7 @@ impl ContactLaw for TataraLaw {
         let hertz = self.sphere.log_force_at_radius(a, share)?;
         let slope = hertz.slope * d / (a * squeeze.slope(a));
         // f has the dimension of an area: its slopes in δ and R add up to 2.
-        Some(LogForce {
-            value: hertz.value,
-            slope,
-            size_slope: 2.0 - slope,
-        })
+        Some(LogForce::new(hertz.value, slope, 2.0 - slope))
     }
 
     fn contact_ratio(&self, contact_radius: Option<f64>, indentation: Option<f64>) -> Option<f64> {
@@ -733,11 +720,11 @@ impl ContactLaw for LayerLaw {
 
 /// Hertz's ln f with a correction and what it adds to the slopes.
 fn corrected(hertz: LogForce, value: f64, slope: f64, size_slope: f64) -> LogForce {
-    LogForce {
-        value: hertz.value + value,
-        slope: hertz.slope + slope,
-        size_slope: hertz.size_slope + size_slope,
-    }
+    LogForce::new(
+        hertz.value + value,
+        hertz.slope + slope,
+        hertz.size_slope + size_slope,
+    )
 }
 
 fn of_radius(
@@ -746,7 +733,6 @@ fn of_radius(
     a: f64,
     thickness: f64,
 ) -> Option<LogForce> {
-    const STEP: f64 = 1e-4;
     let at = |x: f64| {
         equation
             .solve(x)
@@ -754,7 +740,7 @@ fn of_radius(
             .map(|c| c.force_ratio_same_radius.ln())
     };
     let ratio = a / thickness;
-    let slope = (at(ratio * STEP.exp())? - at(ratio * (-STEP).exp())?) / (2.0 * STEP);
+    let slope = (at(ratio * 1e-4_f64.exp())? - at(ratio * (-1e-4_f64).exp())?) / 2e-4;
     Some(corrected(
         sphere.log_force_at_radius(a, 0.0)?,
         at(ratio)?,
@@ -765,7 +751,6 @@ fn of_radius(
 
 /// ln(F/F_Hertz) at χ and its slope in ln χ, by the secant method on ln(a/h).
 fn at_chi(equation: &LayerEquation, chi: f64) -> Option<(f64, f64)> {
-    const STEP: f64 = 1e-4;
     let at = |log_a: f64| -> Option<LayerContact> { equation.solve(log_a.exp()).ok() };
     let target = chi.ln();
     let mut x = target;
@@ -783,7 +768,7 @@ fn at_chi(equation: &LayerEquation, chi: f64) -> Option<(f64, f64)> {
         }
         (x, contact) = (next, after);
     }
-    let (high, low) = (at(x + STEP)?, at(x - STEP)?);
+    let (high, low) = (at(x + 1e-4)?, at(x - 1e-4)?);
     let derivative = (high.force_ratio / low.force_ratio).ln() / (high.chi / low.chi).ln();
     Some((contact.force_ratio.ln(), derivative))
 }

@@ -365,10 +365,10 @@ impl Line {
 // Range: no friction. A face that sticks to the plate stretches less than the material above it,
 // and E comes out too large.
 
-/// Steps to the unloaded area: the error falls by about the strain each time, to rounding for
-/// strains up to a third.
+// Steps to the unloaded area: the error falls by about the strain each time, to rounding for
+// strains up to a third.
 const AREA_STEPS: usize = 60;
-/// Axial stretches that are considered: beyond them no law with one modulus holds.
+// Axial stretches that are considered: beyond them no law with one modulus holds.
 const STRETCHES: [f64; 2] = [0.05, 4.0];
 
 /// The loads of a specimen with a flat face, its areas turned into strains and conjugate stresses.

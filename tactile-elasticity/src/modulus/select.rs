@@ -273,7 +273,7 @@ pub enum SelectionReason {
     },
 }
 
-/// AICc differences up to this one are no evidence (Burnham & Anderson 2002).
+// AICc differences up to this one are no evidence (Burnham & Anderson 2002).
 const NO_EVIDENCE: f64 = 2.0;
 
 /// Candidates (the most general first) in the order of preference: the first that is within 2 of

@@ -79,7 +79,7 @@ impl CommonMean {
     }
 }
 
-/// The errors are scaled up to the scatter when χ² is this improbable.
+// The errors are scaled up to the scatter when χ² is this improbable.
 const EXCESS_PROBABILITY: f64 = 1e-3;
 
 /// θ = (1ᵀΣ⁻¹z)/(1ᵀΣ⁻¹1). Σ = 0 means unknown: equal weights and the error from the scatter.

@@ -54,11 +54,11 @@ pub struct TabulatedContact {
     table: Arc<ContactTable>,
 }
 
-/// Standard error of ln F that finite elements leave beside the interpolation's: meshes of twice
-/// the elements move F by this (`a_finer_mesh_moves_the_table_little`).
+// Standard error of ln F that finite elements leave beside the interpolation's: meshes of twice
+// the elements move F by this (`a_finer_mesh_moves_the_table_little`).
 const ELEMENT_ERROR: f64 = 3e-3;
 
-/// Part of ln F below which a change of ln E changes nothing: the ball is rigid beside the guide.
+// Part of ln F below which a change of ln E changes nothing: the ball is rigid beside the guide.
 const LEAST_SENSITIVITY: f64 = 0.01;
 
 impl TabulatedContact {

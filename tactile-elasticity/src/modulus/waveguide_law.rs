@@ -17,10 +17,10 @@ pub struct WaveguideLaw {
     finite_strain: Option<FiniteStrain>,
 }
 
-/// Contact radii tabulated, over the ball's radius. Above the second no contact of a ball is meant.
+// Contact radii tabulated, over the ball's radius. Above the second no contact of a ball is meant.
 const TABULATED: (f64, f64) = (0.02, 1.6);
 
-/// Indentation over the ball's radius beyond which finite elements and this law part.
+// Indentation over the ball's radius beyond which finite elements and this law part.
 const LARGEST_INDENTATION: f64 = 0.8;
 
 impl WaveguideLaw {
@@ -318,7 +318,7 @@ impl FiniteStrain {
     }
 }
 
-/// ν of the contacts that the correction was fitted to.
+// ν of the contacts that the correction was fitted to.
 const FITTED_POISSON_RATIO: f64 = 0.495;
 
 /// Coefficients of x, x², … as their powers say.
@@ -383,8 +383,8 @@ impl Polynomials {
     }
 }
 
-/// Leaves 0.3 % of the force on a flat, where the elements scatter by as much, and 0.6 % on guides
-/// (root mean square). Of 13 scenes that it was not fitted to, 0.6 %.
+// Leaves 0.3 % of the force on a flat, where the elements scatter by as much, and 0.6 % on guides
+// (root mean square). Of 13 scenes that it was not fitted to, 0.6 %.
 const FORCE: Polynomials = Polynomials {
     ball: [-0.0802, -0.0489, 0.1702, -0.0379],
     guide: [-0.1409, 0.4893, -0.4257, 0.3998],
@@ -394,8 +394,8 @@ const FORCE: Polynomials = Polynomials {
     depth: [-0.2104, 0.1450],
 };
 
-/// Leaves 0.3 % of the approach on a flat, 0.8 % on guides. Of 13 scenes that it was not fitted to,
-/// 0.6 %.
+// Leaves 0.3 % of the approach on a flat, 0.8 % on guides. Of 13 scenes that it was not fitted to,
+// 0.6 %.
 const INDENTATION: Polynomials = Polynomials {
     ball: [-0.2297, -0.2563, -0.2349, 0.1099],
     guide: [-0.0271, 0.4013, -0.2207, 0.3105],
