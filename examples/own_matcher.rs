@@ -32,7 +32,7 @@ fn nearest(point: &Point3<f64>, set: &[Point3<f64>]) -> Option<usize> {
 fn main() -> Result<(), Box<dyn Error>> {
     let trial = Trial::new(PressOptions::default(), &CalibrationRun::default())?;
     let pipeline = trial.pipeline()?.with_matcher(MutualNearest);
-    let mut press = trial.press(&pipeline)?;
+    let press = trial.press(&pipeline)?;
     let matched = press.matching(1)?.pairs().count();
     let mean = press.strain(1)?.summary.mean;
     println!("{matched} pairs, strain e_zz {:.3}", mean[(2, 2)]);

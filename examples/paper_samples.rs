@@ -100,7 +100,7 @@ fn moduli(
         let mut scene = scene.clone();
         scene.stages.estimator = estimator;
         let pipeline = scene.pipeline(&data)?;
-        let mut press = scene.press(&pipeline, &data)?;
+        let press = scene.press(&pipeline, &data)?;
         let modulus = press.modulus().map(|found| {
             let [lower, upper] = [Some(found.interval_95.lower), found.interval_95.upper]
                 .map(|end| end.map_or("∞".into(), |pa| format!("{:.1}", pa * 1e-3)));

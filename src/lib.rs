@@ -1,7 +1,7 @@
 #![doc = include_str!("../README.md")]
 //!
 //! # Equations
-//! What the stages compute; each crate's page has its own.
+//! What the stages compute. Each crate's page has its own.
 //!
 //! - Light stays inside below $\theta_i = \arcsin\sqrt{n_i^2 - 1}$ (1)–(4) until a press lets it out: [`optics`].
 //! - Force $F_z = \int P dS$, centroid $\sum x I/\sum I$, shear $F_x = K_x u_x$ (5)–(12): [`force`].
@@ -30,5 +30,23 @@ pub mod pipeline;
 pub mod scene;
 #[cfg(feature = "scene")]
 pub mod sensor;
+mod strain_between;
 
 pub use pipeline::{Measurement, Object, Pipeline, Press};
+pub use strain_between::{StrainBetween, StrainBetweenError, StrainBetweenOptions, strain_between};
+
+/// The types and traits of a program that measures with stages of its own: `use tactile_imaging::prelude::*`.
+pub mod prelude {
+    pub use crate::elasticity::ElasticityError;
+    pub use crate::elasticity::modulus::{LoadSeries, ModulusEstimate, ModulusEstimator};
+    pub use crate::elasticity::strain::{Deformation, StrainMeasure};
+    pub use crate::force::{Estimate, ForceError, ReferenceFrame, StressCalibration};
+    pub use crate::matching::{MatchError, Matching, PointMatcher};
+    pub use crate::pipeline::{
+        ContactReading, ContactStage, FrameContact, Measurement, Object, Pipeline, PipelineError,
+        Press, Session,
+    };
+    pub use crate::sfs::{ControlPointSampler, SfsError, SlopeIntegrator, SurfaceReconstruction};
+    pub use crate::tps::{TpsError, Warp, WarpModel};
+    pub use crate::{StrainBetween, StrainBetweenOptions, strain_between};
+}

@@ -1,7 +1,7 @@
 //! The pipeline on frames of 1392 × 1042 pixels with 200 control points: the paper's press, both results asserted, and a
 //! table of times and errors over 500 simulated scenes (two with `--test` or `--quick`) whose contacts cover 1 to 15 % of
 //! the frame: ten sensors, each calibrated once, and on each presses at random places with random forces and noise. Beside
-//! them what is skipped: a frame without contact, the second of two equal frames, and what a stream keeps from frame to frame;
+//! them what is skipped: a frame without contact, and what a stream keeps from frame to frame;
 //! and what a sensor calibrated for its curve, flat field and lens costs a frame beside a line from sums to force.
 #![allow(clippy::print_stdout)]
 mod calibrated;
@@ -17,7 +17,7 @@ use std::time::Instant;
 use stream::stream;
 use tactile_imaging::Pipeline;
 use tactile_imaging::force::ReferenceFrame;
-use tactile_imaging::pipeline::{Measurement, Press, Stage};
+use tactile_imaging::pipeline::{Measurement, Stage};
 use tactile_simulate::Trial;
 use tactile_simulate::{
     CalibrationRun, Camera, Elastic, ElasticSphere, Gain, PressLoad, PressOptions, PressScene,
@@ -31,7 +31,7 @@ fn press(c: &mut Criterion) {
     let truth = trial.simulation.youngs_modulus_pa;
     let measured = trial
         .press(&pipeline)
-        .map(|mut p| p.measure())
+        .map(|p| p.measure())
         .expect("a press");
     let modulus = measured.youngs_modulus_pa.expect("a modulus").value;
     let error = 100.0 * (modulus / truth - 1.0);
@@ -44,7 +44,7 @@ fn press(c: &mut Criterion) {
         b.iter(|| {
             trial
                 .press(&pipeline)
-                .and_then(|mut p| p.modulus())
+                .and_then(|p| p.modulus())
                 .expect("a modulus")
         });
     });
@@ -52,7 +52,7 @@ fn press(c: &mut Criterion) {
         b.iter(|| {
             trial
                 .press(&pipeline)
-                .map(|mut p| p.measure())
+                .map(|p| p.measure())
                 .expect("a press")
         });
     });
@@ -144,9 +144,8 @@ struct Table {
     force_error: Vec<f64>,
     height_error: Vec<f64>,
     strain_error: Vec<f64>,
-    /// Of a frame without contact, and of the second of two equal frames, per cent of a frame's everything.
+    /// Of a frame without contact, per cent of a frame's everything.
     empty_share: Vec<f64>,
-    equal_share: Vec<f64>,
 }
 
 impl Table {
@@ -171,39 +170,21 @@ impl Table {
         let all = press().measure();
         let everything = start.elapsed().as_secs_f64();
         self.everything_ms.push(everything * 1e3);
-        self.add_skipped(
-            press(),
-            reference,
-            pipeline,
-            [&made.frames[1], empty],
-            everything,
-        );
+        self.add_empty(reference, pipeline, empty, everything);
         for (list, stage) in self.stages_ms.iter_mut().zip(Stage::ALL) {
             list.push(all.report.work(stage).time.as_secs_f64() * 1e3);
         }
         self.add_errors(modulus, &all, made);
     }
 
-    /// The second of two equal frames, and a frame without contact, beside everything of a pair.
-    fn add_skipped<'a>(
+    /// A frame without contact, beside everything of a pair.
+    fn add_empty(
         &mut self,
-        mut twins: Press<'a>,
         reference: &Arc<ReferenceFrame>,
         pipeline: &Pipeline,
-        [equal, empty]: [&'a Array2<u8>; 2],
+        empty: &Array2<u8>,
         everything: f64,
     ) {
-        twins.measure();
-        let start = Instant::now();
-        let frame = twins.add_frame(equal.view());
-        assert!(twins.strain(frame).is_ok());
-        self.equal_share
-            .push(100.0 * start.elapsed().as_secs_f64() / (0.5 * everything));
-        assert_eq!(
-            twins.report().work(Stage::Surface).runs,
-            2,
-            "an equal frame takes no surface"
-        );
         let mut quiet = pipeline.press_on(reference.clone());
         let start = Instant::now();
         quiet.add_frame(empty.view());
@@ -247,7 +228,6 @@ impl Table {
         row("surface height error", "%", &mut self.height_error);
         row("largest strain error", "%", &mut self.strain_error);
         row("frame without contact", "%", &mut self.empty_share);
-        row("second of equal frames", "%", &mut self.equal_share);
     }
 }
 
@@ -295,12 +275,12 @@ fn scenes(_: &mut Criterion) {
     let worst = table.modulus_error.last().copied().unwrap_or(f64::NAN);
     assert!(worst < 3.0, "modulus error {worst} %");
     // A frame without contact takes 0.2 ms, in which an image comes from memory: a tenth of a frame's everything, 0.27 ms, is less than the twentieth that
-    // was allowed when everything took 5.6 ms. Telling an equal frame takes a fifth of that.
+    // was allowed when everything took 5.6 ms.
     if !quick {
-        let shares = [&table.empty_share, &table.equal_share].map(|list| list[list.len() / 2]);
+        let share = table.empty_share[table.empty_share.len() / 2];
         assert!(
-            shares[0] < 10.0 && shares[1] < 5.0,
-            "skipped frames take {shares:?} % of a frame"
+            share < 10.0,
+            "a frame without contact takes {share} % of a frame"
         );
     }
 }

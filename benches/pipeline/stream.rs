@@ -21,10 +21,6 @@ pub(crate) fn stream(group: &mut BenchmarkGroup<'_, WallTime>, trial: &Trial) {
                 .expect("a contact")
         });
     });
-    let mut same = session();
-    group.bench_function("force_of_an_equal_frame", |b| {
-        b.iter(|| same.push(black_box(one).view()).expect("a contact"));
-    });
     let mut strained = session();
     for frame in [one, two] {
         strained

@@ -39,7 +39,7 @@ fn run(
 ) {
     let pipelines: Vec<_> = trials.iter().map(pipeline).collect();
     let strain = |(trial, pipeline): (&Trial, &Pipeline)| {
-        let measured = trial.press(pipeline).map(|mut press| press.measure());
+        let measured = trial.press(pipeline).map(|press| press.measure());
         measured.expect("a press").strain.expect("a strain").mean
     };
     let job = || {

@@ -68,7 +68,7 @@ const THRESHOLD: f64 = 0.25;
 /// Mean pressure in rings around the centre of the pressed region.
 ///
 /// Light is taken as proportional to the pressure, p = s I with the frame's brightening I and
-/// `pascals_per_grey` s. `image` is the brightening, [row, column]; `pixel_size_m` is (x, y);
+/// `pascals_per_grey` s. `image` is the brightening, [row, column]. `pixel_size_m` is (x, y);
 /// `face_radius_m` the guide's. O(pixels).
 ///
 /// ```

@@ -90,7 +90,7 @@ impl InclusionScene {
         Self::parse(&String::from_utf8_lossy(&bytes), path)
     }
 
-    /// Checks the text of a scene file; relative paths are relative to the folder of `file`.
+    /// Checks the text of a scene file. Relative paths are relative to the folder of `file`.
     fn parse(text: &str, file: impl AsRef<Path>) -> Result<Self, SceneError> {
         let file = file.as_ref();
         let table = parse_table(text, file)?;
@@ -132,7 +132,7 @@ impl InclusionScene {
     ///
     /// # Errors
     /// [`SceneError::File`] and [`SceneError::SizeMismatch`] for images that cannot be read or differ in
-    /// size; [`SceneError::Unusable`] where a frame shows no face.
+    /// size. [`SceneError::Unusable`] where a frame shows no face.
     pub fn load(&self) -> Result<LoadedInclusion, SceneError> {
         let reference = self.image("reference".into(), &self.reference)?;
         let newtons_per_grey = self.newtons_per_grey()?;

@@ -87,7 +87,7 @@ pub fn read_cases(path: impl AsRef<Path>) -> Result<Vec<MatchCase>, ReadError> {
     parse_cases(&read_bytes(path)?, path)
 }
 
-/// Parses cases from the bytes of a file; `name` stands for the file in errors.
+/// Parses cases from the bytes of a file. `name` stands for the file in errors.
 ///
 /// # Errors
 /// As [`read_cases`].
@@ -185,7 +185,7 @@ impl At<'_> {
     }
 }
 
-/// A case whose rows are being read; third coordinates are zero in the plane.
+/// A case whose rows are being read. Third coordinates are zero in the plane.
 struct OpenCase<'a> {
     at: At<'a>,
     name: String,

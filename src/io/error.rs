@@ -146,7 +146,7 @@ pub enum ReadError {
         column: String,
         /// The units that are known.
         known: String,
-        /// The unit in the heading; empty where it names none.
+        /// The unit in the heading. Empty where it names none.
         found: String,
     },
     /// A value that no number can hold after its conversion to SI.

@@ -5,7 +5,7 @@ use super::table::parse_table;
 use ndarray::Array2;
 use std::path::Path;
 
-/// Reads a matrix `[row, column]`; empty cells and `nan` are NaN.
+/// Reads a matrix `[row, column]`. Empty cells and `nan` are NaN.
 ///
 /// ```
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {

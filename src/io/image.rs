@@ -46,12 +46,12 @@ impl GreyImage {
     }
 }
 
-/// Reads a grey image; the kind of file is told from its content, not its name.
+/// Reads a grey image. The kind of file is told from its content, not its name.
 ///
-/// Colour is turned to grey by the weights of `grey`, on the stored (gamma-coded) values; alpha is ignored. Levels are on the scale of 8 bits,
+/// Colour is turned to grey by the weights of `grey`, on the stored (gamma-coded) values. Alpha is ignored. Levels are on the scale of 8 bits,
 /// and samples of more bits keep their precision as fractions: a sample v becomes 255 v/m, where m is the largest value that the camera
 /// gives. A PGM or PPM says m (its `maxval`). A PNG of 16 bits does not: m is 65535, or 2ᵇ − 1 where the caller gives the `bits` b, 1 to 16. A
-/// camera of 12 bits often writes its samples into 16 as they are; an image without any sample above 4095 is therefore refused until the
+/// camera of 12 bits often writes its samples into 16 as they are. An image without any sample above 4095 is therefore refused until the
 /// bits are given, unless all are multiples of 257, as 8 bits stretched to 16 are. Images of 8 bits are not scaled.
 ///
 /// ```

@@ -8,7 +8,7 @@
 //! | [`read_cases`] | point-matching case files (`m` and `t` rows) |
 //! | [`read_grey_image`] | PNG, PGM, JPEG; grey or colour; 8 or 16 bits; [`write_grey_image`] writes 8-bit PNG and PGM |
 //!
-//! In CSV, fields are separated by commas, semicolons or tabs; a first line without any number is a header; empty lines and lines that start
+//! In CSV, fields are separated by commas, semicolons or tabs. A first line without any number is a header. Empty lines and lines that start
 //! with `#` are passed over.
 //!
 //! Whatever is wrong with a file is a [`ReadError`] that names the file, the line and column, what was expected

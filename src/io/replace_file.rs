@@ -4,7 +4,7 @@ use std::io::{Error, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
 /// Writes a whole file, creating its folder where needed: the bytes go to a temporary file in the same folder, which then takes the name. A
-/// link is followed; what is no file (`/dev/stdout`) is written to as it is.
+/// link is followed. What is no file (`/dev/stdout`) is written to as it is.
 pub fn replace_file(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
     match fs::metadata(path) {
         Ok(metadata) if metadata.is_dir() => {
@@ -24,7 +24,7 @@ pub fn replace_file(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
     }
 }
 
-/// Writes beside `path` and renames; nothing is left behind where that fails.
+/// Writes beside `path` and renames. Nothing is left behind where that fails.
 fn replace(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
     if path.file_name().is_none() {
         return Err(Error::new(ErrorKind::InvalidInput, "it has no file name"));

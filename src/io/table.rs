@@ -1,6 +1,6 @@
 //! Tables of numbers in CSV: the reader below points, grids, calibration pairs and depth tables.
 //!
-//! Fields are separated by commas, semicolons or tabs (the first of these that the first line has); a field may stand in
+//! Fields are separated by commas, semicolons or tabs (the first of these that the first line has). A field may stand in
 //! double quotes. The first line is a header if none of its fields is a number. Empty lines and lines that start with
 //! `#` are passed over.
 use super::error::{Expected, ReadError, shorten};
@@ -23,19 +23,19 @@ pub struct Column<'a> {
 /// A rectangular table of numbers with the names of its columns, if it has a header.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Table {
-    /// Names of the columns; empty where the file has no header line.
+    /// Names of the columns. Empty where the file has no header line.
     pub header: Vec<String>,
     /// The numbers, `[row, column]`.
     pub values: Array2<f64>,
 }
 
 impl Table {
-    /// The wanted columns in SI units: by name where the file has a header, whatever other columns it has; by position
+    /// The wanted columns in SI units: by name where the file has a header, whatever other columns it has. By position
     /// in a file without one, which must then have exactly these.
     ///
     /// # Errors
     /// [`ReadError::MissingColumn`], [`ReadError::Unit`], [`ReadError::Overflow`] and, where the number of columns is wrong,
-    /// [`ReadError::Line`]; `path` is the name they give to the file.
+    /// [`ReadError::Line`]. `path` is the name they give to the file.
     pub fn columns<const N: usize>(
         &self,
         wanted: [Column<'_>; N],
@@ -108,7 +108,7 @@ impl Table {
 /// Reads columns of a CSV file in SI units, each by the names it may have (the usual one first, without the unit) and the unit it is in where the
 /// file names none.
 ///
-/// A file with a header may have other columns, and units in its headings (`depth_um`, `force (mN)`); a unit of another quantity than the given
+/// A file with a header may have other columns, and units in its headings (`depth_um`, `force (mN)`). A unit of another quantity than the given
 /// one is an error. Without a header it has exactly these columns, in this order.
 ///
 /// ```
@@ -149,7 +149,7 @@ pub fn read_table(path: impl AsRef<Path>) -> Result<Table, ReadError> {
     parse_table(&read_bytes(path)?, path, Expected::FiniteNumber)
 }
 
-/// Parses the bytes of a table; `path` is the name that errors give.
+/// Parses the bytes of a table. `path` is the name that errors give.
 ///
 /// A field becomes a number at once, so that a file of any shape needs little more memory than its numbers.
 pub fn parse_table(bytes: &[u8], path: &Path, cell: Expected) -> Result<Table, ReadError> {

@@ -18,7 +18,7 @@ pub enum Quantity {
     Pressure,
     /// us (µs), ms, s.
     Time,
-    /// A number without a unit; `px` and `grey_levels` may stand in the heading.
+    /// A number without a unit. `px` and `grey_levels` may stand in the heading.
     Number,
 }
 
@@ -56,7 +56,7 @@ const UNITS: [(Quantity, &[(&str, f64)]); 5] = [
 ];
 
 impl Quantity {
-    /// The value of one `unit` in SI; `None` where the quantity has no such unit. Both signs for micro are `u`.
+    /// The value of one `unit` in SI. `None` where the quantity has no such unit. Both signs for micro are `u`.
     pub fn in_si(self, unit: &str) -> Option<f64> {
         let plain = unit.replace(['µ', 'μ'], "u");
         let units = UNITS.iter().find(|(quantity, _)| *quantity == self)?.1;
@@ -64,7 +64,7 @@ impl Quantity {
         Some(found.1)
     }
 
-    /// The quantity that `unit` measures; a number where none has it.
+    /// The quantity that `unit` measures. A number where none has it.
     pub fn of_unit(unit: &str) -> Self {
         let has = |quantity: &Self| quantity.in_si(unit).is_some();
         let mut quantities = UNITS.iter().map(|(quantity, _)| *quantity);

@@ -1,4 +1,4 @@
-//! Many frames at once: serial, or over threads with the feature `rayon`; the bits are the same.
+//! Many frames at once: serial, or over threads with the feature `rayon`. The bits are the same.
 use super::composition::Pipeline;
 use super::contact::{ContactReading, FrameContact};
 use super::error::PipelineError;
@@ -31,7 +31,7 @@ type Reading = Result<Option<ContactReading>, PipelineError>;
 /// ```
 ///
 /// # Errors
-/// [`PipelineError::Sensor`] for a reference without pixels; a frame's own trouble stands in its place.
+/// [`PipelineError::Sensor`] for a reference without pixels. A frame's own trouble stands in its place.
 pub fn contacts(
     pipeline: &Pipeline,
     reference: ArrayView2<'_, u8>,
@@ -42,7 +42,7 @@ pub fn contacts(
                (frame, image): (usize, &ArrayView2<'_, u8>)| {
         pipeline
             .contact()
-            .measure(workspace, *image, &reference, None, contact)
+            .measure_into(workspace, *image, &reference, contact)
             .map_err(|source| PipelineError::Contact { frame, source })?;
         Ok(contact.reading)
     };

@@ -1,5 +1,5 @@
 //! Why a measurement could not be made.
-use super::choice::EstimatorChoice;
+use super::named::EstimatorChoice;
 use crate::elasticity::ElasticityError;
 use crate::force::{ForceError, ShapeProblem};
 use crate::matching::MatchError;
@@ -90,7 +90,7 @@ pub enum PipelineError {
         /// How many there are.
         frames: usize,
     },
-    /// A frame that is read on demand could not be read again.
+    /// A frame that is read on demand could not be read.
     #[error("frame {}: {reason}", frame + 1)]
     Unreadable {
         /// The frame.

@@ -1,7 +1,7 @@
 //! The modulus estimators: the default one, and those behind the names of a configuration.
-use super::choice::EstimatorChoice;
 use super::error::PipelineError;
-use super::object::Object;
+use super::named::EstimatorChoice;
+use super::specimen::Object;
 use crate::elasticity::ElasticityError;
 use crate::elasticity::contact::{Body, Bond, Waveguide};
 use crate::elasticity::modulus::{
@@ -11,12 +11,12 @@ use crate::elasticity::modulus::{
 use std::sync::{Arc, OnceLock};
 
 /// An estimator that pipelines and their clones share.
-pub(super) type SharedEstimator = Arc<dyn ModulusEstimator + Send + Sync>;
+pub type SharedEstimator = Arc<dyn ModulusEstimator + Send + Sync>;
 
 /// The estimator where none is chosen. This is the place to change the default.
 ///
 /// A ball: the linear contact with the waveguide's layers, or with a rigid flat, corrected for finite strain. A sample on a rigid base, a cone: their own laws. Else
-/// stress over strain, equation (31); of a flat face regressed over all loads.
+/// stress over strain, equation (31). Of a flat face regressed over all loads.
 fn default_of(
     object: Object,
     waveguide: Option<&Waveguide>,
@@ -42,8 +42,8 @@ fn default_of(
     }
 }
 
-/// Estimators to lay beside the chosen one, the paper's ratio first; for a ball Hertz with the layers in series.
-pub(super) fn that_fit(
+/// Estimators to lay beside the chosen one, the paper's ratio first. For a ball Hertz with the layers in series.
+pub fn that_fit(
     object: Object,
     waveguide: Option<&Waveguide>,
 ) -> Result<Vec<SharedEstimator>, PipelineError> {
@@ -195,7 +195,7 @@ fn layer(
     )
 }
 
-/// A ball on the layers of a waveguide; on a rigid flat where they are not known.
+/// A ball on the layers of a waveguide. On a rigid flat where they are not known.
 fn on_waveguide(
     radius_m: f64,
     poisson_ratio: f64,
@@ -228,7 +228,7 @@ fn shared(
 
 /// A pipeline's estimator: given as a value, or by a name and then built from object and waveguide when it is first needed.
 #[derive(Clone)]
-pub(super) enum EstimatorStage {
+pub enum EstimatorStage {
     Given(SharedEstimator),
     Named {
         choice: EstimatorChoice,
@@ -238,7 +238,7 @@ pub(super) enum EstimatorStage {
 }
 
 impl EstimatorStage {
-    pub(super) fn named(choice: EstimatorChoice) -> Self {
+    pub fn named(choice: EstimatorChoice) -> Self {
         Self::Named {
             choice,
             built: Arc::default(),
@@ -246,13 +246,13 @@ impl EstimatorStage {
     }
 
     /// The object or the waveguide has changed: a named estimator is built anew.
-    pub(super) fn renew(&mut self) {
+    pub fn renew(&mut self) {
         if let Self::Named { choice, .. } = *self {
             *self = Self::named(choice);
         }
     }
 
-    pub(super) fn get(
+    pub fn get(
         &self,
         object: Object,
         waveguide: Option<&Waveguide>,

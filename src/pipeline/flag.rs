@@ -50,7 +50,7 @@ pub enum Flag {
         /// The frame.
         frame: usize,
     },
-    /// The frame shows more than one contact; the largest is measured, and theory knows of one.
+    /// The frame shows more than one contact. The largest is measured, and theory knows of one.
     SeveralContacts {
         /// The frame.
         frame: usize,
@@ -152,7 +152,7 @@ pub enum Flag {
         /// Radius of the smaller contact in pixels.
         radius_px: f64,
     },
-    /// The warp folds over at some control points; they are left out of the strain.
+    /// The warp folds over at some control points. They are left out of the strain.
     Folded {
         /// How many.
         points: usize,
@@ -160,7 +160,10 @@ pub enum Flag {
     /// An assumption of the estimator is broken.
     Assumption {
         /// Which.
-        #[cfg_attr(feature = "serde", serde(serialize_with = "super::outcome::text"))]
+        #[cfg_attr(
+            feature = "serde",
+            serde(serialize_with = "super::result::outcome::text")
+        )]
         warning: Warning,
     },
 }

@@ -1,4 +1,4 @@
-//! The pipeline: frames in; force, contact, surface, match, strain and modulus out, each when asked for.
+//! The pipeline: frames in. Force, contact, surface, match, strain and modulus out, each when asked for.
 //!
 //! ```text
 //! frame ─ contact ─┬─ force, radius, centroid ──────────────────────────┐
@@ -6,7 +6,7 @@
 //! ```
 //!
 //! A [`Pipeline`] holds the stages, each any implementation of its trait, given as a value or by its name in a configuration
-//! ([`StagesConfig`]); it is `Send + Sync` and cheap to clone. A [`Press`]
+//! ([`StagesConfig`]). It is `Send + Sync` and cheap to clone. A [`Press`]
 //! holds frames and computes what it is asked for, with what that needs and nothing else: [`Press::contact`] touches no
 //! surface, [`Press::modulus`] of a ball none either, [`Press::measure`] everything. The [`Report`] says what ran,
 //! for how long, and what was skipped for which reason.
@@ -16,66 +16,56 @@
 //!
 //! # Which modulus
 //! For a ball, Hertz's pressure p₀√(1 − r²/a²) read as frontal Lambertian shading is a hemisphere of radius a, and a grows
-//! as (F R/E*)^⅓; between two loads that surface scales by (F₂/F₁)^⅓ whatever the modulus is. The ratio of stress to
+//! as (F R/E*)^⅓. Between two loads that surface scales by (F₂/F₁)^⅓ whatever the modulus is. The ratio of stress to
 //! strain, equation (31), is therefore reported (first among [`Measurement::estimators`]) but not believed: the modulus comes
 //! from a³ = 3FR/(4E*), both bodies yielding, the waveguide's layers in series. a/R is in every report, and beyond 0.3 the
 //! result carries a flag. Specimens with a flat face are what (31) is exact for: stress over strain, regressed over all loads, the strain from the growth of the
 //! face's area. An object of unknown shape is read so if its contacts are those of a flat face, and refused with what to tell the program if not
 //! ([`PipelineError::NotUniaxial`]).
 mod batch;
-mod choice;
 mod composition;
-mod config;
 mod contact;
-mod depth;
-mod digits;
-mod display;
-mod display_stream;
+mod dark;
 mod error;
-mod error_budget;
 mod estimators;
-mod face;
 mod flag;
-mod load_reading;
-mod measurement;
-mod object;
-#[cfg(feature = "serde")]
-mod outcome;
-mod pair;
+mod light;
+mod loads;
+mod measure;
+mod named;
 mod press;
 mod report;
-mod runner;
-mod same_image;
+mod result;
 mod session;
 mod settings;
 mod source;
+mod specimen;
+mod stages;
 mod surface;
 mod time;
 
 pub use crate::force::{FaceReading, ShapeProblem};
 pub use crate::sfs::{BallFit, Binning};
 pub use batch::contacts;
-pub use choice::{
-    EstimatorChoice, IntegratorChoice, MatcherChoice, ReconstructionChoice, SamplerChoice,
-    StrainChoice, UnknownStage, WarpChoice,
-};
 pub use composition::Pipeline;
-pub use config::StagesConfig;
-pub use contact::{ContactReading, ContactStage, FrameContact, LightContact};
-pub use depth::DarkContact;
-pub use digits::with_error;
+pub use contact::{ContactReading, ContactStage, FrameContact};
+pub use dark::DarkContact;
 pub use error::PipelineError;
-pub use error_budget::{ErrorShare, ErrorSource};
 pub use flag::Flag;
-pub use measurement::{FrameResult, MatchResult, Measurement, ModulusResult, StrainResult};
-pub use object::Object;
-pub use pair::PairStrain;
+pub use light::LightContact;
+pub use named::{
+    EstimatorChoice, IntegratorChoice, MatcherChoice, ReconstructionChoice, SamplerChoice,
+    StagesConfig, StrainChoice, UnknownStage, WarpChoice,
+};
 pub use press::Press;
 pub use report::{Report, Skip, SkipReason, Stage, Work};
+pub use result::{FrameResult, MatchResult, Measurement, ModulusResult, StrainResult, with_error};
 pub use session::{DriftWatch, Session, SessionStrain, Update};
-pub use settings::{Settings, Skips, SurfaceInput};
+pub use settings::{Settings, SurfaceInput};
 pub use source::FrameSource;
 #[cfg(feature = "scene")]
 pub use source::ImageFolder;
+pub use specimen::Object;
+pub use stages::PairStrain;
 pub use surface::ContactSurface;
-pub use time::TimeResult;
+pub use time::{ErrorShare, ErrorSource, TimeResult};

@@ -11,7 +11,7 @@ use std::time::Duration;
 /// use tactile_imaging::pipeline::Stage;
 /// // What a ball's modulus takes: both contacts, and no surface.
 /// let pipeline = trial.pipeline()?;
-/// let mut press = trial.press(&pipeline)?;
+/// let press = trial.press(&pipeline)?;
 /// press.modulus()?;
 /// let ran: Vec<_> = Stage::ALL.into_iter().filter(|stage| press.report().work(*stage).runs > 0).collect();
 /// assert_eq!(ran, [Stage::Contact, Stage::Modulus]);
@@ -66,28 +66,6 @@ impl fmt::Display for Stage {
 }
 
 /// Why work was left out.
-///
-/// ```
-/// use tactile_imaging::pipeline::{Object, Pipeline, SkipReason};
-/// # use tactile_imaging::force::CalibrationPair;
-/// # let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
-/// # let hertz = |peak: f64| ndarray::Array2::from_shape_fn((64, 64), |(r, c)| {
-/// #     let d = ((r as f64 - 32.0).hypot(c as f64 - 32.0) / 20.0).min(1.0);
-/// #     10 + (peak * (1.0 - d * d).sqrt()).round() as u8
-/// # });
-/// let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?;
-/// let (empty, frame) = (hertz(0.0), hertz(120.0));
-/// let mut press = pipeline.press(empty.view())?;
-/// for image in [&empty, &frame, &frame] {
-///     press.add_frame(image.view());
-/// }
-/// press.contact(0)?;
-/// press.contact(1)?;
-/// let reasons: Vec<_> = press.report().skips.iter().map(|s| s.reason).collect();
-/// assert_eq!(reasons, [SkipReason::EqualFrame, SkipReason::NoContact, SkipReason::OutsideContact]);
-/// assert_eq!(SkipReason::EqualFrame.to_string(), "the frame equals an earlier one");
-/// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
-/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(
     feature = "serde",
@@ -100,10 +78,6 @@ pub enum SkipReason {
     NotAsked,
     /// The frame shows no contact.
     NoContact,
-    /// The frame equals an earlier one, bit for bit: its results were taken over.
-    EqualFrame,
-    /// Only the contact's box was worked on, not the whole frame.
-    OutsideContact,
     /// The surface, points and spline of the load that strain is counted from are kept.
     KeptFromBefore,
     /// The match began where the last one ended.
@@ -115,33 +89,50 @@ impl fmt::Display for SkipReason {
         f.write_str(match self {
             Self::NotAsked => "not asked for",
             Self::NoContact => "no contact",
-            Self::EqualFrame => "the frame equals an earlier one",
-            Self::OutsideContact => "outside the contact",
             Self::KeptFromBefore => "kept from an earlier load",
             Self::NearLastAnswer => "begun from the last answer",
         })
     }
 }
 
-/// One piece of work that was left out.
+/// Work of one kind that was left out.
 ///
 /// ```
-/// use tactile_imaging::pipeline::{Skip, SkipReason, Stage};
-/// let skip = Skip { stage: Stage::Contact, frame: Some(1), reason: SkipReason::EqualFrame, saved: 64 * 64 };
-/// let text = skip.to_string();
-/// assert_eq!(text, "contact and force of frame 2: the frame equals an earlier one (4096 pixels saved)");
+/// use tactile_imaging::pipeline::{Object, Pipeline, SkipReason, Stage};
+/// # use tactile_imaging::force::CalibrationPair;
+/// # let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
+/// let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?;
+/// let empty = ndarray::Array2::from_elem((64, 64), 10_u8);
+/// let mut press = pipeline.press(empty.view())?;
+/// press.add_frame(empty.view());
+/// assert!(press.contact(0)?.is_none());
+/// let skip = press.report().skips[0];
+/// assert_eq!((skip.stage, skip.reason, skip.frames), (Stage::Surface, SkipReason::NoContact, 1));
+/// assert_eq!(skip.to_string(), "surface in 1 frame: no contact");
+/// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[non_exhaustive]
 pub struct Skip {
     /// The stage.
     pub stage: Stage,
-    /// The frame, counted from 0; `None` for a stream, whose skips of one kind are added up.
-    pub frame: Option<usize>,
     /// Why.
     pub reason: SkipReason,
-    /// How many pixels need not be looked at; iterations, for a match.
-    pub saved: usize,
+    /// Number of frames in which it was left out.
+    pub frames: usize,
+}
+
+impl fmt::Display for Skip {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self {
+            stage,
+            reason,
+            frames,
+        } = self;
+        let s = if *frames == 1 { "" } else { "s" };
+        write!(f, "{stage} in {frames} frame{s}: {reason}")
+    }
 }
 
 /// How often a stage ran, and for how long.
@@ -160,6 +151,18 @@ pub struct Work {
     pub time: Duration,
 }
 
+impl fmt::Display for Work {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let s = if self.runs == 1 { "" } else { "s" };
+        write!(
+            f,
+            "{:.3} ms in {} run{s}",
+            self.time.as_secs_f64() * 1e3,
+            self.runs
+        )
+    }
+}
+
 /// What was computed, what was skipped and why.
 ///
 /// ```
@@ -168,9 +171,9 @@ pub struct Work {
 /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationRun::default())?;
 /// use tactile_imaging::pipeline::{Report, Stage};
 /// let pipeline = trial.pipeline()?;
-/// let mut press = trial.press(&pipeline)?;
+/// let press = trial.press(&pipeline)?;
 /// press.surface(1)?;
-/// let report: &Report = press.report();
+/// let report: Report = press.report();
 /// // The second surface has the grid of the first, which needs both contacts.
 /// assert_eq!((report.work(Stage::Contact).runs, report.work(Stage::Surface).runs), (2, 1));
 /// assert!(report.to_string().contains("in 2 runs"));
@@ -189,36 +192,22 @@ impl Report {
         self.work[stage as usize]
     }
 
-    pub(crate) fn ran(&mut self, stage: Stage, time: Duration) {
+    pub(super) fn ran(&mut self, stage: Stage, time: Duration) {
         let work = &mut self.work[stage as usize];
         work.runs += 1;
         work.time += time;
     }
 
-    /// Counts a skip of a stream: those of one kind are one entry, of no frame, with the sum of what was saved.
-    pub(crate) fn count_skip(&mut self, stage: Stage, reason: SkipReason, saved: usize) {
-        match self
-            .skips
-            .iter_mut()
-            .find(|s| s.stage == stage && s.reason == reason)
-        {
-            Some(skip) => skip.saved += saved,
+    pub(super) fn skipped(&mut self, stage: Stage, reason: SkipReason) {
+        let same = |skip: &&mut Skip| (skip.stage, skip.reason) == (stage, reason);
+        match self.skips.iter_mut().find(same) {
+            Some(skip) => skip.frames += 1,
             None => self.skips.push(Skip {
                 stage,
-                frame: None,
                 reason,
-                saved,
+                frames: 1,
             }),
         }
-    }
-
-    pub(crate) fn skipped(&mut self, stage: Stage, frame: usize, reason: SkipReason, saved: usize) {
-        self.skips.push(Skip {
-            stage,
-            frame: Some(frame),
-            reason,
-            saved,
-        });
     }
 }
 
@@ -235,29 +224,8 @@ impl fmt::Display for Report {
                 )?;
             }
         }
-        let mut kinds: Vec<(Skip, usize)> = Vec::new();
-        for skip in &self.skips {
-            let same = |(kind, _): &&mut (Skip, usize)| {
-                (kind.stage, kind.reason) == (skip.stage, skip.reason)
-            };
-            match kinds.iter_mut().find(same) {
-                Some((kind, frames)) => {
-                    kind.saved += skip.saved;
-                    *frames += 1;
-                }
-                None => kinds.push((*skip, 1)),
-            }
-        }
-        kinds.iter().try_for_each(|(kind, frames)| match frames {
-            1 => writeln!(f, "  skipped: {kind}"),
-            _ => {
-                let all = Skip {
-                    frame: None,
-                    ..*kind
-                };
-                writeln!(f, "  skipped in {frames} frames: {all}")
-            }
-        })
+        let mut skips = self.skips.iter();
+        skips.try_for_each(|skip| writeln!(f, "  skipped: {skip}"))
     }
 }
 

@@ -1,52 +1,12 @@
-//! What a pipeline knows beside its stages.
+//! Settings of a pipeline beside its stages.
 use super::error::PipelineError;
-use super::object::Object;
-use crate::elasticity::contact::PARAMETERS_PER_LAYER;
-use crate::elasticity::contact::Waveguide;
+use super::specimen::Object;
+use crate::elasticity::contact::{PARAMETERS_PER_LAYER, Waveguide};
 use crate::sfs::Binning;
 use nalgebra::DMatrix;
 
 /// Control points on each surface where nothing else is asked for: the paper's number.
 pub(crate) const DEFAULT_CONTROL_POINTS: usize = 200;
-
-/// What the pipeline may leave out; each skip can be turned off. Equal frames and pixels outside the contact leave every result the same to the bit,
-/// matches that begin where the last one ended leave strains the same within half their standard error.
-///
-/// ```
-/// # use tactile_simulate::{Trial, CalibrationRun, Camera, PressOptions};
-/// # let camera = Camera::default().coarser(8);
-/// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationRun::default())?;
-/// use tactile_imaging::pipeline::Skips;
-/// let none = Skips { equal_frames: false, outside_contact: false, last_answer: false };
-/// let everything = trial.pipeline()?.with_settings(|settings| settings.skips = none)?;
-/// let mut press = trial.press(&everything)?;
-/// let region = press.surface(0)?.region;
-/// assert_eq!((region.rows(), region.columns()), (130, 174), "the whole frame");
-/// assert!(press.report().skips.is_empty());
-/// // The contact is the same.
-/// let pipeline = trial.pipeline()?;
-/// assert_eq!(trial.press(&pipeline)?.contact(0)?, press.contact(0)?);
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Skips {
-    /// Frames that equal an earlier frame bit for bit take over its results.
-    pub equal_frames: bool,
-    /// Surfaces are reconstructed inside the contact's box alone.
-    pub outside_contact: bool,
-    /// Matches of a stream begin where the last one ended. Where several pairings fit alike they may end in another one than a match made anew.
-    pub last_answer: bool,
-}
-
-impl Default for Skips {
-    fn default() -> Self {
-        Self {
-            equal_frames: true,
-            outside_contact: true,
-            last_answer: true,
-        }
-    }
-}
 
 /// What of the frame the surface stage looks at.
 ///
@@ -71,7 +31,7 @@ pub enum SurfaceInput {
     Signal,
 }
 
-/// What a pipeline knows beside its stages; [`Pipeline::with_settings`](super::Pipeline::with_settings) changes it.
+/// Settings of a pipeline beside its stages. [`Pipeline::with_settings`](super::Pipeline::with_settings) changes it.
 ///
 /// ```
 /// use tactile_imaging::pipeline::{Binning, Object, Pipeline, Settings};
@@ -91,9 +51,9 @@ pub enum SurfaceInput {
 pub struct Settings {
     /// What is pressed.
     pub object: Object,
-    /// The sensor's layers; `None`: rigid beside the object.
+    /// The sensor's layers. `None`: rigid beside the object.
     pub waveguide: Option<Waveguide>,
-    /// Number of control points on each surface; the paper's 200 by default.
+    /// Number of control points on each surface. The paper's 200 by default.
     pub control_points: usize,
     /// What of the frame the surface stage looks at.
     pub surface_input: SurfaceInput,
@@ -114,10 +74,8 @@ pub struct Settings {
     pub object_radius_error_m: f64,
     /// Standard error of the object's Poisson ratio.
     pub poisson_ratio_error: f64,
-    /// Covariance of ln E of all layers of the waveguide, then of ln h, then of ν; `None`: the layers are exact.
+    /// Covariance of ln E of all layers of the waveguide, then of ln h, then of ν. `None`: the layers are exact.
     pub layer_covariance: Option<DMatrix<f64>>,
-    /// What may be left out.
-    pub skips: Skips,
 }
 
 impl Settings {
@@ -136,7 +94,6 @@ impl Settings {
             object_radius_error_m: 0.0,
             poisson_ratio_error: 0.0,
             layer_covariance: None,
-            skips: Skips::default(),
         }
     }
 

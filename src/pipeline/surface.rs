@@ -41,23 +41,20 @@ pub struct ContactSurface {
     pub origin_m: [f64; 2],
 }
 
-impl ContactSurface {
+impl Default for ContactSurface {
     /// No surface yet, to be filled.
-    pub(super) fn empty() -> Self {
+    fn default() -> Self {
         Self {
             surface: Surface::default(),
-            region: BoundingBox {
-                row_start: 0,
-                row_end: 0,
-                column_start: 0,
-                column_end: 0,
-            },
+            region: BoundingBox::whole((0, 0)),
             binning: 1,
             pixel_size_m: [1.0; 2],
             origin_m: [0.0; 2],
         }
     }
+}
 
+impl ContactSurface {
     /// Fits a ball of radius `radius_m`, its centre in metres from the frame's first pixel.
     ///
     /// `None` where the surface has fewer than 16 pixels, is wider than the ball, or no cap fits.
@@ -111,15 +108,15 @@ fn origin_m(region: &BoundingBox, binning: usize, pixel_size_m: [f64; 2]) -> [f6
     ]
 }
 
-/// What the surface stage reuses from frame to frame.
+/// Memory of the surface stage.
 #[derive(Debug, Default)]
-pub(super) struct SurfaceWorkspace {
+pub struct SurfaceWorkspace {
     sfs: sfs::SurfaceWorkspace<f64>,
     grid: BinnedContact,
 }
 
 impl SurfaceWorkspace {
-    /// The signal and the mask on the grid; returns the grid's box. With a curve the signal is the pressure over its peak.
+    /// The signal and the mask on the grid. Returns the grid's box. With a curve the signal is the pressure over its peak.
     fn load(
         &mut self,
         settings: &Settings,
@@ -196,7 +193,7 @@ fn mask_over(contact: &FrameContact, part: BoundingBox) -> ArrayView2<'_, bool> 
 }
 
 /// Reconstructs the surface of a contact on a grid as fine as a contact of `pixels` pixels asks for.
-pub(super) fn reconstruct(
+pub fn reconstruct(
     pipeline: &Pipeline,
     workspace: &mut SurfaceWorkspace,
     images: [ArrayView2<'_, u8>; 2],
@@ -223,10 +220,8 @@ pub(super) fn reconstruct(
         scale
     };
     let side = settings.binning.side(pixels, settings.control_points);
-    let region = match contact.bounds().filter(|_| settings.skips.outside_contact) {
-        Some(bounds) => trimmed(region, bounds, side, settings.smoothing_px / side),
-        None => region,
-    };
+    let bounds = contact.bounds().unwrap_or(region);
+    let region = trimmed(region, bounds, side, settings.smoothing_px / side);
     let region = workspace.load(settings, images, contact, (region, scale, side), peak);
     let pixel_size_m = pipeline
         .contact()
@@ -247,15 +242,15 @@ pub(super) fn reconstruct(
 
 /// Control points on a surface.
 #[derive(Debug, Default)]
-pub(super) struct ControlPoints {
+pub struct ControlPoints {
     /// In metres from the frame's first pixel.
-    pub(super) points: Vec<Point3<f64>>,
+    pub points: Vec<Point3<f64>>,
     /// The longer side of the surface's pixel in metres.
-    pub(super) grid_m: f64,
+    pub grid_m: f64,
 }
 
 /// Samples the control points of a surface.
-pub(super) fn sample(
+pub fn sample(
     pipeline: &Pipeline,
     workspace: &mut SurfaceWorkspace,
     surface: &ContactSurface,

@@ -36,7 +36,7 @@ use std::path::Path;
 /// ```
 ///
 /// # Errors
-/// [`SceneError::Open`], [`SceneError::Syntax`]; [`SceneError::ContactTable`] for contacts that make no table, or a table of another version.
+/// [`SceneError::Open`], [`SceneError::Syntax`]. [`SceneError::ContactTable`] for contacts that make no table, or a table of another version.
 pub fn read_contact_table(path: impl AsRef<Path>) -> Result<ContactTable, SceneError> {
     let path = path.as_ref();
     let table = read_toml(path)?;
@@ -71,7 +71,7 @@ pub fn write_contact_table(path: impl AsRef<Path>, table: &ContactTable) -> Resu
 /// `waveguide` alone. `progress` is called before each modulus and after the last.
 ///
 /// # Errors
-/// Those of a scene's `object` and `waveguide`; [`SceneError::Measure`] where the object is no ball, or the table cannot be computed.
+/// Those of a scene's `object` and `waveguide`. [`SceneError::Measure`] where the object is no ball, or the table cannot be computed.
 #[cfg(feature = "fem")]
 pub fn solve_contact_table(
     path: impl AsRef<Path>,
@@ -109,7 +109,7 @@ pub fn solve_contact_table(
 }
 
 /// The layers of a scene as a waveguide, rigid without any.
-pub(super) fn guide(layers: &[SceneLayer]) -> Result<Waveguide, ElasticityError> {
+pub fn guide(layers: &[SceneLayer]) -> Result<Waveguide, ElasticityError> {
     if layers.is_empty() {
         return Ok(Waveguide::rigid());
     }

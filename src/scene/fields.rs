@@ -5,14 +5,14 @@ use std::path::Path;
 use toml::{Table, Value};
 
 /// A table inside the scene file.
-pub(crate) struct Fields<'a> {
+pub struct Fields<'a> {
     file: &'a Path,
     prefix: String,
     table: &'a Table,
 }
 
 impl<'a> Fields<'a> {
-    pub(crate) fn new(file: &'a Path, table: &'a Table) -> Self {
+    pub fn new(file: &'a Path, table: &'a Table) -> Self {
         Self {
             file,
             prefix: String::new(),
@@ -21,7 +21,7 @@ impl<'a> Fields<'a> {
     }
 
     /// The field's name with its path: `waveguide.layers[2].thickness_m`.
-    pub(crate) fn path(&self, name: &str) -> String {
+    pub fn path(&self, name: &str) -> String {
         if self.prefix.is_empty() {
             name.into()
         } else {
@@ -30,7 +30,7 @@ impl<'a> Fields<'a> {
     }
 
     /// Refuses fields that are not in `known`.
-    pub(crate) fn only(&self, known: &[&'static str]) -> Result<(), SceneError> {
+    pub fn only(&self, known: &[&'static str]) -> Result<(), SceneError> {
         match self.table.keys().find(|key| !known.contains(&key.as_str())) {
             None => Ok(()),
             Some(key) => Err(SceneError::Unknown {
@@ -42,11 +42,11 @@ impl<'a> Fields<'a> {
         }
     }
 
-    pub(crate) fn has(&self, name: &str) -> bool {
+    pub fn has(&self, name: &str) -> bool {
         self.table.contains_key(name)
     }
 
-    pub(crate) fn missing(&self, name: &str, expected: &'static str) -> SceneError {
+    pub fn missing(&self, name: &str, expected: &'static str) -> SceneError {
         SceneError::Missing {
             file: self.file.into(),
             field: self.path(name),
@@ -54,7 +54,7 @@ impl<'a> Fields<'a> {
         }
     }
 
-    pub(crate) fn wrong(&self, name: &str, expected: &'static str, found: &Value) -> SceneError {
+    pub fn wrong(&self, name: &str, expected: &'static str, found: &Value) -> SceneError {
         let found = match found {
             Value::String(_) | Value::Integer(_) | Value::Float(_) | Value::Boolean(_) => {
                 // One line of a text of any length.
@@ -72,7 +72,7 @@ impl<'a> Fields<'a> {
         }
     }
 
-    pub(crate) fn unusable(&self, name: &str, reason: &dyn std::fmt::Display) -> SceneError {
+    pub fn unusable(&self, name: &str, reason: &dyn std::fmt::Display) -> SceneError {
         SceneError::Unusable {
             file: self.file.into(),
             field: self.path(name),
@@ -86,7 +86,7 @@ impl<'a> Fields<'a> {
             .ok_or_else(|| self.missing(name, expected))
     }
 
-    pub(crate) fn string(&self, name: &str, expected: &'static str) -> Result<&'a str, SceneError> {
+    pub fn string(&self, name: &str, expected: &'static str) -> Result<&'a str, SceneError> {
         let value = self.value(name, expected)?;
         value
             .as_str()
@@ -95,7 +95,7 @@ impl<'a> Fields<'a> {
     }
 
     /// A number for which `accept` holds.
-    pub(crate) fn number(
+    pub fn number(
         &self,
         name: &str,
         expected: &'static str,
@@ -107,7 +107,7 @@ impl<'a> Fields<'a> {
             .ok_or_else(|| self.wrong(name, expected, value))
     }
 
-    pub(crate) fn optional_number(
+    pub fn optional_number(
         &self,
         name: &str,
         expected: &'static str,
@@ -120,7 +120,7 @@ impl<'a> Fields<'a> {
         }
     }
 
-    pub(crate) fn optional_flag(&self, name: &str) -> Result<Option<bool>, SceneError> {
+    pub fn optional_flag(&self, name: &str) -> Result<Option<bool>, SceneError> {
         const EXPECTED: &str = "true or false";
         if !self.has(name) {
             return Ok(None);
@@ -133,11 +133,7 @@ impl<'a> Fields<'a> {
     }
 
     /// At least one text.
-    pub(crate) fn strings(
-        &self,
-        name: &str,
-        expected: &'static str,
-    ) -> Result<Vec<&'a str>, SceneError> {
+    pub fn strings(&self, name: &str, expected: &'static str) -> Result<Vec<&'a str>, SceneError> {
         let value = self.value(name, expected)?;
         let texts = value.as_array().filter(|a| !a.is_empty());
         texts
@@ -146,7 +142,7 @@ impl<'a> Fields<'a> {
     }
 
     /// Two positive numbers.
-    pub(crate) fn positive_pair(
+    pub fn positive_pair(
         &self,
         name: &str,
         expected: &'static str,
@@ -161,7 +157,7 @@ impl<'a> Fields<'a> {
         }
     }
 
-    pub(crate) fn table(&self, name: &str, expected: &'static str) -> Result<Self, SceneError> {
+    pub fn table(&self, name: &str, expected: &'static str) -> Result<Self, SceneError> {
         let value = self.value(name, expected)?;
         let table = value
             .as_table()
@@ -174,11 +170,7 @@ impl<'a> Fields<'a> {
     }
 
     /// At least one table in an array.
-    pub(crate) fn tables(
-        &self,
-        name: &str,
-        expected: &'static str,
-    ) -> Result<Vec<Self>, SceneError> {
+    pub fn tables(&self, name: &str, expected: &'static str) -> Result<Vec<Self>, SceneError> {
         let value = self.value(name, expected)?;
         let wrong = || self.wrong(name, expected, value);
         let values = value
@@ -200,12 +192,12 @@ impl<'a> Fields<'a> {
 }
 
 /// Greater than zero and finite.
-pub(crate) fn positive(v: f64) -> bool {
+pub fn positive(v: f64) -> bool {
     v > 0.0 && v.is_finite()
 }
 
 /// A Poisson ratio at which an isotropic solid is stable.
-pub(crate) fn poisson(v: f64) -> bool {
+pub fn poisson(v: f64) -> bool {
     v > -1.0 && v <= 0.5
 }
 

@@ -55,7 +55,7 @@ pub enum LoadedCalibration {
 pub struct SceneData {
     /// The frame without contact.
     pub reference: Array2<u8>,
-    /// The frames, in the order of the scene; those that are missing are read from their files whenever a stage needs them.
+    /// The frames, in the order of the scene. Those that are missing are read from their files whenever a stage needs them.
     pub frames: Vec<Array2<u8>>,
     /// The calibration.
     pub calibration: LoadedCalibration,
@@ -149,7 +149,7 @@ impl Scene {
 }
 
 /// An image in eight bits a pixel, of a camera of `bits` where that is said.
-pub(super) fn read_image(path: &Path, bits: Option<u8>) -> Result<Array2<u8>, ReadError> {
+pub fn read_image(path: &Path, bits: Option<u8>) -> Result<Array2<u8>, ReadError> {
     read_grey_levels(path, bits)
 }
 

@@ -10,8 +10,11 @@ use crate::pipeline::{
     Press, SurfaceInput,
 };
 
+/// Images of a scene that a press keeps. Those beyond are read again for every stage that needs them.
+const MOST_KEPT_BYTES: usize = 64 << 20;
+
 impl Scene {
-    /// Reads a scene file with its images and measures everything; what a stage cannot do stands in its place in the
+    /// Reads a scene file with its images and measures everything. What a stage cannot do stands in its place in the
     /// [`Measurement`] ([`measure_error`](Self::measure_error) adds the field of the scene file).
     ///
     /// ```
@@ -37,7 +40,7 @@ impl Scene {
     pub fn measure_file(path: impl AsRef<std::path::Path>) -> Result<Measurement, SceneError> {
         let scene = Self::read(path)?;
         let data = scene.load_without_frames()?;
-        let mut press = scene.press(&scene.pipeline(&data)?, &data)?;
+        let press = scene.press(&scene.pipeline(&data)?, &data)?;
         Ok(press.measure())
     }
 
@@ -73,10 +76,10 @@ impl Scene {
         self.build(data).map_err(|e| self.measure_error(e))
     }
 
-    /// The scene's frames on a pipeline, ready to be asked; those that `data` lacks are read from their files.
+    /// The scene's frames on a pipeline, ready to be asked. Those that `data` lacks are read from their files.
     ///
     /// # Errors
-    /// [`SceneError::Measure`]; [`SceneError::File`] and [`SceneError::SizeMismatch`] of frames that are read.
+    /// [`SceneError::Measure`]. [`SceneError::File`] and [`SceneError::SizeMismatch`] of frames that are read.
     pub fn press<'a>(
         &self,
         pipeline: &Pipeline,
@@ -85,6 +88,7 @@ impl Scene {
         let mut press = pipeline
             .press(data.reference.view())
             .map_err(|e| self.measure_error(e))?;
+        let mut kept_bytes = 0;
         for (index, frame) in self.frames.iter().enumerate() {
             let gauge = frame
                 .force_n
@@ -93,9 +97,14 @@ impl Scene {
                 Some(image) => press.add_gauged_frame(image.view(), gauge),
                 None => {
                     let image = self.read_frame(index, data.reference.view())?;
-                    let (path, bits) = (frame.image.clone(), self.bits);
-                    let read = move || read_image(&path, bits).map_err(|e| e.to_string());
-                    press.add_frame_on_demand(image.view(), gauge, read)
+                    kept_bytes += image.len();
+                    if kept_bytes <= MOST_KEPT_BYTES {
+                        press.add_gauged_frame(image, gauge)
+                    } else {
+                        let (path, bits) = (frame.image.clone(), self.bits);
+                        let read = move || read_image(&path, bits).map_err(|e| e.to_string());
+                        press.add_frame_on_demand(gauge, read)
+                    }
                 }
             };
             if let Some(time_s) = frame.time_s {

@@ -59,7 +59,7 @@
 //!                                        # "sphere-between-plates", "tatara-sphere"; "bonded-layer", "cone", "flat-punch"; "least-akaike" of a ball's or a layer's laws
 //! ```
 //!
-//! Images are PNG, PGM or JPEG; colour becomes grey by the luma of Rec. 601 (see [`read_grey_image`](crate::io::read_grey_image)).
+//! Images are PNG, PGM or JPEG. Colour becomes grey by the luma of Rec. 601 (see [`read_grey_image`](crate::io::read_grey_image)).
 //! Relative paths are relative to the scene file. Fields counted in errors (`frames[2]`) start at 1.
 mod contact_table;
 mod error;
@@ -180,7 +180,7 @@ pub struct SceneLayer {
     pub poisson_ratio: f64,
 }
 
-/// A scene file, checked; paths are resolved, the files they name not yet read.
+/// A scene file, checked. Paths are resolved, the files they name not yet read.
 ///
 /// ```
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -208,11 +208,11 @@ pub struct Scene {
     pub file: PathBuf,
     /// The image without contact.
     pub reference: PathBuf,
-    /// Size of a pixel on the sensing surface in metres, x and y; zero where a sensor file has it.
+    /// Size of a pixel on the sensing surface in metres, x and y. Zero where a sensor file has it.
     pub pixel_size_m: [f64; 2],
     /// Whether vignetting is corrected by the reference's own brightness.
     pub flat_field: bool,
-    /// Bits of the camera, for images of 16 bits; told from the file where not given.
+    /// Bits of the camera, for images of 16 bits. Told from the file where not given.
     pub bits: Option<u8>,
     /// Whether changes of the lamps since the reference are divided out where they can be told.
     pub corrects_drift: bool,
@@ -245,7 +245,7 @@ impl Scene {
         Self::parse(&String::from_utf8_lossy(&bytes), path)
     }
 
-    /// Checks the text of a scene file; `file` is its name, to whose folder relative paths are relative.
+    /// Checks the text of a scene file. `file` is its name, to whose folder relative paths are relative.
     ///
     /// ```
     /// use tactile_imaging::{pipeline::Object, scene::Scene};

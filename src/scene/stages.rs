@@ -7,7 +7,7 @@ use crate::pipeline::{
 };
 use std::str::FromStr;
 
-pub(super) fn read(scene: &Fields<'_>) -> Result<StagesConfig, SceneError> {
+pub fn read(scene: &Fields<'_>) -> Result<StagesConfig, SceneError> {
     if !scene.has("stages") {
         return Ok(StagesConfig::default());
     }

@@ -20,8 +20,8 @@ pub(super) const FIELDS: [&str; 12] = [
     "stages",
 ];
 
-/// The name of the sensor file; what it stands for must not be there beside it.
-pub(super) fn sensor<'a>(fields: &Fields<'a>) -> Result<Option<&'a str>, SceneError> {
+/// The name of the sensor file. What it stands for must not be there beside it.
+pub fn sensor<'a>(fields: &Fields<'a>) -> Result<Option<&'a str>, SceneError> {
     if !fields.has("sensor") {
         return Ok(None);
     }
@@ -36,7 +36,7 @@ pub(super) fn sensor<'a>(fields: &Fields<'a>) -> Result<Option<&'a str>, SceneEr
 }
 
 /// Whether changes of the lamps are divided out, where the scene says so.
-pub(super) fn corrects_drift(fields: &Fields<'_>) -> Result<Option<bool>, SceneError> {
+pub fn corrects_drift(fields: &Fields<'_>) -> Result<Option<bool>, SceneError> {
     const FIELD: &str = "illumination_drift";
     const EXPECTED: &str = "\"automatic\" or \"none\"";
     if !fields.has(FIELD) {
@@ -50,7 +50,7 @@ pub(super) fn corrects_drift(fields: &Fields<'_>) -> Result<Option<bool>, SceneE
 }
 
 /// Standard errors of the object's radius and Poisson ratio.
-pub(super) fn object_errors(fields: &Fields<'_>) -> Result<[f64; 2], SceneError> {
+pub fn object_errors(fields: &Fields<'_>) -> Result<[f64; 2], SceneError> {
     let fields = fields.table("object", "a table with `shape`")?;
     let not_negative = |v: f64| v >= 0.0 && v.is_finite();
     let error = |name: &str, expected| {
@@ -63,7 +63,7 @@ pub(super) fn object_errors(fields: &Fields<'_>) -> Result<[f64; 2], SceneError>
     ])
 }
 
-pub(super) fn flat_field(fields: &Fields<'_>) -> Result<bool, SceneError> {
+pub fn flat_field(fields: &Fields<'_>) -> Result<bool, SceneError> {
     const EXPECTED: &str = "\"reference\", or absent for no correction";
     if !fields.has("flat_field") {
         return Ok(false);
@@ -74,14 +74,14 @@ pub(super) fn flat_field(fields: &Fields<'_>) -> Result<bool, SceneError> {
     }
 }
 
-pub(super) fn bits(fields: &Fields<'_>) -> Result<Option<u8>, SceneError> {
+pub fn bits(fields: &Fields<'_>) -> Result<Option<u8>, SceneError> {
     const EXPECTED: &str = "a whole number from 8 to 16, the bits of the camera";
     let accept = |bits: f64| (8.0..=16.0).contains(&bits) && bits.fract() == 0.0;
     let bits = fields.optional_number("bits", EXPECTED, accept)?;
     Ok(bits.map(|bits| bits as u8))
 }
 
-pub(super) fn calibration(
+pub fn calibration(
     fields: &Fields<'_>,
     folder: &Path,
     gauged: bool,
@@ -117,7 +117,7 @@ pub(super) fn calibration(
     }
 }
 
-pub(super) fn frames(fields: &Fields<'_>, folder: &Path) -> Result<Vec<SceneFrame>, SceneError> {
+pub fn frames(fields: &Fields<'_>, folder: &Path) -> Result<Vec<SceneFrame>, SceneError> {
     let tables = fields.tables("frames", "one or more [[frames]] tables with `image`")?;
     let mut last_s = 0.0;
     let mut frame = |f: &Fields<'_>| {
@@ -152,10 +152,7 @@ pub(super) fn frames(fields: &Fields<'_>, folder: &Path) -> Result<Vec<SceneFram
     tables.iter().map(&mut frame).collect()
 }
 
-pub(super) fn contact_table(
-    fields: &Fields<'_>,
-    folder: &Path,
-) -> Result<Option<PathBuf>, SceneError> {
+pub fn contact_table(fields: &Fields<'_>, folder: &Path) -> Result<Option<PathBuf>, SceneError> {
     if !fields.has("contact_table") {
         return Ok(None);
     }
@@ -163,7 +160,7 @@ pub(super) fn contact_table(
     Ok(Some(folder.join(path)))
 }
 
-pub(super) fn object(fields: &Fields<'_>) -> Result<Object, SceneError> {
+pub fn object(fields: &Fields<'_>) -> Result<Object, SceneError> {
     const SHAPE: &str =
         "\"sphere\", \"block\", \"cylinder\", \"flat_punch\", \"layer\", \"cone\" or \"unknown\"";
     let fields = fields.table("object", "a table with `shape`")?;
@@ -213,7 +210,7 @@ pub(super) fn object(fields: &Fields<'_>) -> Result<Object, SceneError> {
     }
 }
 
-pub(super) fn layers(fields: &Fields<'_>) -> Result<Vec<SceneLayer>, SceneError> {
+pub fn layers(fields: &Fields<'_>) -> Result<Vec<SceneLayer>, SceneError> {
     const EXPECTED: &str = "a table with `layers`, or \"rigid\" (as where it is absent)";
     if !fields.has("waveguide")
         || fields

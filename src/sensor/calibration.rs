@@ -42,8 +42,8 @@ pub struct SensorPress {
 
 /// What a sensor is calibrated from.
 ///
-/// The curve f of P = f(I) comes from the grey histograms of the presses' contacts, F = Σ f(I) dS; the lens from a target; vignetting
-/// from the reference itself; the layers' moduli from the contact radii of rigid balls. What the presses do not determine keeps the
+/// The curve f of P = f(I) comes from the grey histograms of the presses' contacts, F = Σ f(I) dS. The lens from a target; vignetting
+/// from the reference itself. The layers' moduli from the contact radii of rigid balls. What the presses do not determine keeps the
 /// value and the error that were stated.
 ///
 /// ```no_run
@@ -85,7 +85,7 @@ pub struct SensorCalibration {
 
 /// Fewest presses with a contact.
 const FEWEST_PRESSES: usize = 5;
-/// Largest scatter of the forces about the curve over what the gauge explains. Noise of the frames adds a little; a press whose force
+/// Largest scatter of the forces about the curve over what the gauge explains. Noise of the frames adds a little. A press whose force
 /// is wrong by a tenth makes it 20.
 const LARGEST_SCATTER: f64 = 5.0;
 /// What a force may be off by beside the gauge's noise: frames' noise and what the curve smooths over.
@@ -103,7 +103,7 @@ impl SensorCalibration {
     /// Finds the sensor.
     ///
     /// # Errors
-    /// [`SensorError`]: one sentence; a press is named by its number.
+    /// [`SensorError`]: one sentence. A press is named by its number.
     pub fn run(&self) -> Result<CalibratedSensor, SensorError> {
         let reference = self.reference()?;
         let (geometry, lens) = self.geometry()?;

@@ -91,7 +91,7 @@ pub struct Sensor {
     pub flat_field: bool,
     /// Relative standard error of the gauge, common to all forces.
     pub gauge_error: f64,
-    /// Covariance of ln E of all layers, then of ln h, then of ν; empty where the layers are taken as exact.
+    /// Covariance of ln E of all layers, then of ln h, then of ν. Empty where the layers are taken as exact.
     #[serde(default)]
     pub layer_covariance: Vec<Vec<f64>>,
     /// Lens and outline.
@@ -119,7 +119,7 @@ impl Sensor {
         Self::parse(&String::from_utf8_lossy(&bytes), path)
     }
 
-    /// Checks the text of a sensor file; `file` is its name, for errors.
+    /// Checks the text of a sensor file. `file` is its name, for errors.
     ///
     /// # Errors
     /// As [`read`](Self::read).
@@ -145,7 +145,7 @@ impl Sensor {
         replace_file(path, text.as_bytes()).map_err(failed)
     }
 
-    /// The guide; rigid without layers.
+    /// The guide. Rigid without layers.
     pub fn waveguide(&self) -> Result<Waveguide, PipelineError> {
         if self.layers.is_empty() {
             return Ok(Waveguide::rigid());

@@ -26,11 +26,11 @@ pub struct PressFinding {
     pub branch: Branch,
     /// The gauge's force in newtons.
     pub force_n: f64,
-    /// The force read from the frame with the fitted curve; `None` where no contact is seen, and the press was not used.
+    /// The force read from the frame with the fitted curve. `None` where no contact is seen, and the press was not used.
     pub read_force_n: Option<f64>,
     /// The fitted contact radius.
     pub contact_radius_m: Option<Estimate>,
-    /// The force that the fitted layers have at that radius; `None` for presses that the layers were not fitted to.
+    /// The force that the fitted layers have at that radius. `None` for presses that the layers were not fitted to.
     pub layers_force_n: Option<f64>,
 }
 
@@ -61,7 +61,7 @@ pub struct LayerFinding {
     pub identified: bool,
 }
 
-/// A calibrated sensor and how it was found; made by [`SensorCalibration::run`](super::SensorCalibration::run).
+/// A calibrated sensor and how it was found. Made by [`SensorCalibration::run`](super::SensorCalibration::run).
 ///
 /// ```no_run
 /// use tactile_imaging::sensor::{CalibratedSensor, SensorCalibration};
@@ -74,7 +74,7 @@ pub struct LayerFinding {
 pub struct CalibratedSensor {
     /// The sensor.
     pub sensor: Sensor,
-    /// The lens as the target showed it; `None` without a target.
+    /// The lens as the target showed it. `None` without a target.
     pub lens: Option<LensFit>,
     /// Every press.
     pub presses: Vec<PressFinding>,

@@ -1,7 +1,7 @@
 //! The fit of the guide's layers to contact radii of rigid balls.
 //!
 //! ln F = ln(4/3 a³/R) + ln E_g(a; layers), E_g from the layer equation. The parameters are ln E, ln h and ν of all layers, ln R of
-//! every ball, and one factor on all forces for what the parabola of the theory is not a ball; all start from what is stated, with its
+//! every ball, and one factor on all forces for what the parabola of the theory is not a ball. All start from what is stated, with its
 //! error as a prior, so that what the presses do not determine stays as it was stated.
 use super::error::SensorError;
 use super::input::LayerInput;
@@ -12,32 +12,32 @@ use nalgebra::{DMatrix, DVector};
 
 /// A contact of a rigid ball.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct BallContact {
+pub struct BallContact {
     /// Which ball.
-    pub(super) ball: usize,
-    pub(super) force_n: f64,
+    pub ball: usize,
+    pub force_n: f64,
     /// Relative standard error of the force.
-    pub(super) force_error: f64,
-    pub(super) radius_m: f64,
+    pub force_error: f64,
+    pub radius_m: f64,
     /// Relative standard error of the contact radius.
-    pub(super) radius_error: f64,
+    pub radius_error: f64,
 }
 
 /// A ball as stated.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Ball {
-    pub(super) radius_m: f64,
+pub struct Ball {
+    pub radius_m: f64,
     /// Relative.
-    pub(super) radius_error: f64,
+    pub radius_error: f64,
 }
 
 #[derive(Clone, Debug)]
-pub(super) struct LayerFit {
-    pub(super) layers: Vec<Layer>,
+pub struct LayerFit {
+    pub layers: Vec<Layer>,
     /// Of ln E, ln h and ν of all layers.
-    pub(super) covariance: DMatrix<f64>,
+    pub covariance: DMatrix<f64>,
     /// Force of the fitted law at every contact's radius.
-    pub(super) forces_n: Vec<f64>,
+    pub forces_n: Vec<f64>,
 }
 
 /// Nodes in ln a between which ln E_g is a polynomial: it bends so little that five leave 10⁻⁵ over a decade.
@@ -46,14 +46,14 @@ const NODES: usize = 5;
 const STEPS: usize = 4;
 /// Largest a/R that the layers are fitted to: beyond, a ball is no parabola.
 pub(super) const LARGEST_CONTACT_RATIO: f64 = 0.5;
-/// Relative error of F at a/R = 1 from taking the ball for a parabola and strains as small; it goes as (a/R)².
+/// Relative error of F at a/R = 1 from taking the ball for a parabola and strains as small. It goes as (a/R)².
 const MODEL_ERROR: f64 = 0.1;
 /// Standard errors by which a stated value, or the whole fit, may be off before it counts as a mistake.
 const LARGEST_DEVIATION: f64 = 4.0;
 /// Standard error that a parameter stated as exact is given: far below what can be told.
 const EXACT: f64 = 1e-6;
 
-pub(super) fn fit(
+pub fn fit(
     stated: &[LayerInput],
     balls: &[Ball],
     contacts: &[BallContact],
@@ -95,7 +95,7 @@ pub(super) fn fit(
     }))
 }
 
-pub(super) fn elastic(input: &LayerInput) -> Layer {
+pub fn elastic(input: &LayerInput) -> Layer {
     Layer {
         thickness_m: input.layer.thickness_m,
         youngs_modulus_pa: input.layer.youngs_modulus_pa,

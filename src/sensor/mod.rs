@@ -27,7 +27,7 @@
 //! # [shear]                              # springs K_x and K_y, where they are known
 //! ```
 //!
-//! [`SensorCalibration`] makes the file from presses of balls and punches of known radius; a scene names it with
+//! [`SensorCalibration`] makes the file from presses of balls and punches of known radius. A scene names it with
 //! `sensor = "sensor.toml"`.
 mod calibration;
 mod error;

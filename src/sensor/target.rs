@@ -12,16 +12,13 @@ const CAPTURE: f64 = 0.25;
 
 /// Finds the dots of a target, dark on bright or bright on dark, and pairs them with their places on a square grid.
 ///
-/// The frame is cut at the mean of its two levels (Otsu's threshold); dots are its connected regions of the rarer level, those that
+/// The frame is cut at the mean of its two levels (Otsu's threshold). Dots are its connected regions of the rarer level, those that
 /// touch the edge left out, and their centres weighted with the level. The grid is followed from dot to dot out of the middle, each
 /// next place from its neighbours', so that distortion does no harm. O(pixels).
 ///
 /// # Errors
 /// [`SensorError::Target`] for fewer than twenty dots on the grid.
-pub(super) fn find_dots(
-    frame: ArrayView2<'_, u8>,
-    pitch_m: f64,
-) -> Result<Vec<DotPair>, SensorError> {
+pub fn find_dots(frame: ArrayView2<'_, u8>, pitch_m: f64) -> Result<Vec<DotPair>, SensorError> {
     let dots = centres(frame);
     let placed = on_grid(&dots, frame.dim());
     if placed.len() < FEWEST_DOTS {

@@ -3,7 +3,7 @@ use crate::scene::SceneError;
 use std::path::Path;
 
 /// What was wrong with a file that was read by its fields' types.
-pub(super) fn sentence(file: &Path, text: &str, error: &toml::de::Error) -> SceneError {
+pub fn sentence(file: &Path, text: &str, error: &toml::de::Error) -> SceneError {
     let message = error.message().lines().next().unwrap_or("not TOML");
     let start = error.span().map_or(0, |span| span.start.min(text.len()));
     match field_at(text, start) {

@@ -163,7 +163,7 @@ impl Ball {
                 .with_settings(|settings| settings.waveguide = Some(guide.clone()))
                 .unwrap(),
         };
-        let mut press = trial.press(&pipeline).unwrap();
+        let press = trial.press(&pipeline).unwrap();
         let layered = match press.modulus() {
             Ok(layered) => layered,
             Err(error) => panic!(

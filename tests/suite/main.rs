@@ -4,14 +4,12 @@
 mod architecture;
 mod assumptions;
 mod corpus;
+mod few_pairs;
 mod finite_element_presses;
 mod force_on_simulated_frames;
 #[path = "../support/hostile.rs"]
 mod hostile;
 mod io_properties;
-#[path = "../../tactile-cli/src/strain/measure.rs"]
-#[allow(unreachable_pub, dead_code)]
-mod measure;
 mod modulus_on_simulated_scenes;
 mod pipeline;
 mod press_9dtact;

@@ -2,12 +2,10 @@
 //! the exact stretch.
 #![allow(clippy::print_stdout)]
 
-use crate::measure;
 use nalgebra::{Matrix3, Point3};
 use std::path::PathBuf;
-use tactile_imaging::elasticity::strain::GreenLagrange;
 use tactile_imaging::io::read_points;
-use tactile_imaging::matching::AnnealedSoftassign;
+use tactile_imaging::{StrainBetweenOptions, strain_between};
 
 fn frame(k: usize) -> Option<Vec<Point3<f64>>> {
     let folder = std::env::var_os("TACTILE_DATA").map_or_else(
@@ -26,13 +24,7 @@ fn stretch(k: usize) {
     let (Some(before), Some(after)) = (frame(0), frame(k)) else {
         return;
     };
-    let found = measure::strain_between(
-        &before,
-        &after,
-        &AnnealedSoftassign::default(),
-        &GreenLagrange,
-    )
-    .unwrap();
+    let found = strain_between(&before, &after, &StrainBetweenOptions::default()).unwrap();
     let mut exact = Matrix3::zeros();
     exact[(0, 0)] = 0.5 * ((1.0 + 0.05 * k as f64).powi(2) - 1.0);
     let gap = found.summary.mean - exact;

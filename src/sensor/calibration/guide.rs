@@ -124,7 +124,7 @@ impl SensorCalibration {
     }
 }
 
-pub(super) fn rows(fit: &LayerFit) -> Vec<Vec<f64>> {
+pub fn rows(fit: &LayerFit) -> Vec<Vec<f64>> {
     let row = |i: usize| fit.covariance.row(i).iter().copied().collect();
     (0..fit.covariance.nrows()).map(row).collect()
 }

@@ -26,7 +26,7 @@ pub fn repeated(first: &Press<'_>, n: u32, context: &Context) -> Vec<Timing> {
             break;
         }
         let start = Instant::now();
-        let mut press = first.renewed();
+        let press = first.renewed();
         // A stage without an answer takes its time as well.
         let _ = press.measure();
         let whole = start.elapsed();

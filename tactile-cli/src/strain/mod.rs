@@ -1,5 +1,4 @@
 //! `tactile strain`: from two sets of points, before and after a deformation.
-mod measure;
 mod report;
 
 use crate::context::Context;
@@ -8,10 +7,10 @@ use crate::match_points::{self, Expectations};
 use crate::outputs::Outputs;
 use crate::progress::waiting_or_interrupted;
 use clap::{Args, ValueEnum};
-use measure::{assigned, strain_of};
 use nalgebra::Point;
 use report::Report;
 use std::path::PathBuf;
+use tactile_imaging::StrainBetween;
 use tactile_imaging::elasticity::strain::{
     Biot, EulerAlmansi, GreenLagrange, Hencky, Infinitesimal, StrainMeasure,
 };
@@ -125,7 +124,13 @@ fn measured<const D: usize>(
             arguments.after.display()
         ))
     })?;
-    let rows = assigned(&matching.assignment);
+    let partner = |(i, j): (usize, &Option<usize>)| j.map(|j| (i, j));
+    let rows: Vec<_> = matching
+        .assignment
+        .iter()
+        .enumerate()
+        .filter_map(partner)
+        .collect();
     let job = format!("fitting {} pairs", rows.len());
     let (from, to, pairs, measure) = (
         before.to_vec(),
@@ -134,7 +139,8 @@ fn measured<const D: usize>(
         arguments.measure,
     );
     let found = waiting_or_interrupted(job, &context.interrupt, move || {
-        strain_of(&from, &to, &pairs, measure.strain()).map_err(|error| error.to_string())
+        StrainBetween::of_pairs(&from, &to, &pairs, measure.strain())
+            .map_err(|error| error.to_string())
     });
     let report = Report {
         before,

@@ -1,11 +1,11 @@
 //! The strain between two sets of points as text, JSON, tables and a page of plots.
-use super::measure::Strain;
 use crate::console::Console;
 use crate::numbers::four_digits;
 use crate::outputs::Csv;
 use crate::plot::{Colour, Page, Panel};
 use nalgebra::{Matrix3, Point};
 use serde_json::{Map, Value, json};
+use tactile_imaging::StrainBetween;
 use tactile_imaging::pipeline::with_error;
 
 /// Pairs of a smaller weight are left out of the spline.
@@ -20,7 +20,7 @@ pub struct Report<'a, const D: usize> {
     pub after: &'a [Point<f64, D>],
     /// Pairs of the matcher.
     pub matched: &'a [(usize, usize)],
-    pub strain: Result<Strain<D>, String>,
+    pub strain: Result<StrainBetween<D>, String>,
     pub measure: &'static str,
     pub unit: &'static str,
 }
@@ -38,7 +38,7 @@ fn components<const D: usize>() -> &'static [(&'static str, usize, usize)] {
     &ALL[..if D == 2 { 3 } else { 6 }]
 }
 
-fn left_out<const D: usize>(found: &Strain<D>) -> usize {
+fn left_out<const D: usize>(found: &StrainBetween<D>) -> usize {
     found.weights.iter().filter(|w| **w < LEAST_WEIGHT).count()
 }
 
@@ -106,7 +106,7 @@ impl<const D: usize> Report<'_, D> {
 }
 
 fn print_strain<const D: usize>(
-    found: &Strain<D>,
+    found: &StrainBetween<D>,
     measure: &str,
     unit: &str,
     console: &mut Console,
@@ -146,7 +146,7 @@ fn print_strain<const D: usize>(
     ));
 }
 
-fn strain_json<const D: usize>(found: &Strain<D>, measure: &str) -> Value {
+fn strain_json<const D: usize>(found: &StrainBetween<D>, measure: &str) -> Value {
     let mut tensors = Map::new();
     for &(name, i, j) in components::<D>() {
         let value = json!({
@@ -173,7 +173,7 @@ fn suffix(unit: &str) -> &'static str {
 }
 
 /// The strain at every point, and its standard error.
-pub fn strains<const D: usize>(found: &Strain<D>, unit: &str) -> Vec<u8> {
+pub fn strains<const D: usize>(found: &StrainBetween<D>, unit: &str) -> Vec<u8> {
     let suffix = suffix(unit);
     let mut header = vec!["row_before".to_owned()];
     header.extend(["x", "y", "z"][..D].iter().map(|a| format!("{a}{suffix}")));
@@ -191,7 +191,7 @@ pub fn strains<const D: usize>(found: &Strain<D>, unit: &str) -> Vec<u8> {
     csv.into_bytes()
 }
 
-pub fn page<const D: usize>(found: &Strain<D>, unit: &str) -> Page {
+pub fn page<const D: usize>(found: &StrainBetween<D>, unit: &str) -> Page {
     let flat = |p: &Point<f64, D>| [p[0], p[1]];
     let pairs = |kept: bool| {
         let chosen = (found.pairs.iter().zip(&found.weights))

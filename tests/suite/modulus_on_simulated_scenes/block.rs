@@ -2,16 +2,14 @@
 
 use super::bumps::{bumps, mean_frame};
 use super::{NU, calibrate, force, force_covariance, log_uniform, reference, verbose};
-use crate::measure::{self, Strain};
 use nalgebra::DMatrix;
 use ndarray::Array2;
 use rand::{SeedableRng, rngs::ChaCha8Rng};
 use tactile_imaging::elasticity::modulus::{
     Estimate, LoadSeries, LoadState, ModulusEstimate, ModulusEstimator, PaperRatio, StrainReference,
 };
-use tactile_imaging::elasticity::strain::GreenLagrange;
 use tactile_imaging::force::{ForceMeter, ForceOptions, ForceWorkspace};
-use tactile_imaging::matching::AnnealedSoftassign;
+use tactile_imaging::{StrainBetween, StrainBetweenOptions, strain_between};
 use tactile_simulate::{Camera, Elastic, UniaxialOptions, UniaxialScene};
 
 /// Side of the undeformed face.
@@ -70,7 +68,7 @@ fn forces(
 
 /// e_xx = e_yy = −ν e_zz, each counted from the first load and hence over its λ_t² = 1 − 2ν e_zz. Two errors of much the same size
 /// have twice the degrees of freedom of one.
-fn lateral(found: &Strain<2>) -> Estimate {
+fn lateral(found: &StrainBetween<2>) -> Estimate {
     let (mean, error) = (found.summary.mean, found.standard_error);
     Estimate::new(
         0.5 * (mean[(0, 0)] + mean[(1, 1)]),
@@ -122,7 +120,7 @@ fn ratio(forces: &[Estimate; 2], covariance: &DMatrix<f64>, lateral: Estimate) -
 fn report(
     scene: &UniaxialScene,
     bumps: usize,
-    found: &Strain<2>,
+    found: &StrainBetween<2>,
     last_force: Estimate,
     answer: &ModulusEstimate,
 ) {
@@ -161,13 +159,7 @@ pub(super) fn trial(seed: u64) -> (f64, ModulusEstimate) {
     let [before, after] = pressed
         .each_ref()
         .map(|frames| bumps(&(mean_frame(frames) - &unlit), pixel_m));
-    let found = measure::strain_between(
-        &before,
-        &after,
-        &AnnealedSoftassign::default(),
-        &GreenLagrange,
-    )
-    .expect("strain");
+    let found = strain_between(&before, &after, &StrainBetweenOptions::default()).expect("strain");
     let answer = ratio(&forces, &covariance, lateral(&found));
     if verbose() {
         report(&scene, before.len(), &found, forces[1], &answer);

@@ -33,7 +33,7 @@ fn answer(trial: &Trial, binning: Binning) -> Answer {
     let pipeline = pipeline
         .with_settings(|settings| settings.binning = binning)
         .unwrap();
-    let mut press = trial.press(&pipeline).unwrap();
+    let press = trial.press(&pipeline).unwrap();
     let surface = press.surface(0).unwrap().clone();
     let found = press.strain(1).unwrap();
     Answer {

@@ -1,6 +1,6 @@
 //! Frames that are read when a stage needs them say what frames in memory say.
-use super::{runs, trial};
-use tactile_imaging::pipeline::{PipelineError, Stage};
+use super::trial;
+use tactile_imaging::pipeline::PipelineError;
 
 #[test]
 fn a_frame_on_demand_says_what_one_in_memory_says() {
@@ -12,20 +12,13 @@ fn a_frame_on_demand_says_what_one_in_memory_says() {
     let mut on_demand = pipeline.press(trial.simulation.reference.view()).unwrap();
     for index in [0, 1, 1] {
         let image = trial.simulation.frames[index].clone();
-        let read = {
-            let image = image.clone();
-            move || Ok(image.clone())
-        };
-        on_demand.add_frame_on_demand(image.view(), None, read);
+        on_demand.add_frame_on_demand(None, move || Ok(image.clone()));
     }
     assert_eq!(on_demand.modulus().unwrap(), lent.modulus().unwrap());
-    assert_eq!(runs(&on_demand)[0], 2);
     assert_eq!(
         on_demand.strain(1).unwrap().field.clone(),
         lent.strain(1).unwrap().field
     );
-    let skips = on_demand.report().skips.iter();
-    assert_eq!(skips.filter(|skip| skip.stage == Stage::Contact).count(), 1);
 }
 
 #[test]
@@ -34,7 +27,7 @@ fn a_frame_that_can_no_longer_be_read_is_named() {
     let pipeline = trial.pipeline().unwrap();
     let mut press = pipeline.press(trial.simulation.reference.view()).unwrap();
     let gone = || Err("the file is gone".to_owned());
-    press.add_frame_on_demand(trial.simulation.frames[0].view(), None, gone);
+    press.add_frame_on_demand(None, gone);
     let error = press.contact(0).unwrap_err();
     let reason = "the file is gone".to_owned();
     assert_eq!(error, PipelineError::Unreadable { frame: 0, reason });

@@ -1,8 +1,6 @@
 //! A contact stage of a user's own may err.
 use ndarray::{Array2, ArrayView2};
-use tactile_imaging::force::{
-    BoundingBox, Estimate, ForceError, ForceWorkspace, Polarity, ReferenceFrame,
-};
+use tactile_imaging::force::{BoundingBox, ForceError, ReferenceFrame};
 use tactile_imaging::pipeline::{ContactStage, FrameContact, LightContact, PipelineError};
 use tactile_imaging::{Object, Pipeline};
 
@@ -15,20 +13,12 @@ struct Spoiled {
 impl ContactStage for Spoiled {
     fn measure(
         &self,
-        workspace: &mut ForceWorkspace,
         frame: ArrayView2<'_, u8>,
         reference: &ReferenceFrame,
-        gauge: Option<Estimate>,
-        contact: &mut FrameContact,
-    ) -> Result<(), ForceError> {
-        self.light
-            .measure(workspace, frame, reference, gauge, contact)?;
-        (self.spoil)(contact);
-        Ok(())
-    }
-
-    fn polarity(&self) -> Polarity {
-        self.light.polarity()
+    ) -> Result<FrameContact, ForceError> {
+        let mut contact = self.light.measure(frame, reference)?;
+        (self.spoil)(&mut contact);
+        Ok(contact)
     }
 
     fn pixel_size_m(&self) -> [f64; 2] {

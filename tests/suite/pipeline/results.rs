@@ -47,7 +47,7 @@ fn every_result_can_be_read_by_people_and_programs() {
         "{line}"
     );
     assert!(told(&update.contact.unwrap()).contains(" mm   centroid ("));
-    let mut press = trial.press(&pipeline).unwrap();
+    let press = trial.press(&pipeline).unwrap();
     let measured = press.measure();
     assert!(told(&measured).contains("cautions:"));
     assert!(told(measured.youngs_modulus_pa.as_ref().unwrap()).contains(" kPa"));
@@ -55,13 +55,13 @@ fn every_result_can_be_read_by_people_and_programs() {
     assert!(told(measured.matching.as_ref().unwrap()).contains("control points matched"));
     assert!(told(measured.strain.as_ref().unwrap()).contains("e_zz"));
     assert!(measured.flags.iter().all(|flag| !told(flag).is_empty()));
-    assert!(told(press.report()).contains("surface"));
+    assert!(told(&press.report()).contains("surface"));
     assert!(
         press
             .report()
             .skips
             .iter()
-            .all(|skip| told(skip).ends_with("saved)"))
+            .all(|skip| told(skip).contains(" frame"))
     );
     let cap = |(r, c): (usize, usize)| {
         let square = (r as f64 - 20.0).powi(2) + (c as f64 - 10.0).powi(2);

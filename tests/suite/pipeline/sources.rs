@@ -10,7 +10,7 @@ fn a_batch_reads_as_frames_one_by_one() {
     let pipeline = trial.pipeline().unwrap();
     let views: Vec<_> = trial.simulation.frames.iter().map(|f| f.view()).collect();
     let batch = contacts(&pipeline, trial.simulation.reference.view(), &views).unwrap();
-    let mut press = trial.press(&pipeline).unwrap();
+    let press = trial.press(&pipeline).unwrap();
     for (i, reading) in batch.iter().enumerate() {
         assert_eq!(
             reading.as_ref().unwrap().as_ref(),

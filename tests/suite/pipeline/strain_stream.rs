@@ -7,7 +7,7 @@ use tactile_imaging::elasticity::modulus::{
     EstimatorKind, HertzSphere, LoadSeries, ModulusEstimate, ModulusEstimator,
 };
 use tactile_imaging::pipeline::{
-    EstimatorChoice, Pipeline, PipelineError, Session, SkipReason, Skips, Stage, StagesConfig,
+    EstimatorChoice, Pipeline, PipelineError, Session, SkipReason, Stage, StagesConfig,
 };
 use tactile_simulate::Trial;
 
@@ -18,27 +18,22 @@ fn session(trial: &Trial, pipeline: &Pipeline) -> Session {
 /// The strains of all frames against the first, and what the matches took.
 struct Followed {
     means: Vec<Matrix3<f64>>,
-    standard_errors: Vec<Matrix3<f64>>,
     iterations: usize,
     session: Session,
 }
 
-fn follow(trial: &Trial, skips: Skips) -> Followed {
-    let pipeline = trial.pipeline().unwrap();
-    let pipeline = pipeline.with_settings(|settings| settings.skips = skips);
-    let mut session = session(trial, &pipeline.unwrap());
-    let (mut means, mut standard_errors, mut iterations) = (Vec::new(), Vec::new(), 0);
+fn follow(trial: &Trial) -> Followed {
+    let mut session = session(trial, &trial.pipeline().unwrap());
+    let (mut means, mut iterations) = (Vec::new(), 0);
     for frame in &trial.simulation.frames {
         session.push(frame.view()).unwrap();
         if let Some(found) = session.strain().unwrap() {
             means.push(found.strain.summary.mean);
-            standard_errors.push(found.strain.summary.standard_error);
             iterations += found.report.iterations;
         }
     }
     Followed {
         means,
-        standard_errors,
         iterations,
         session,
     }
@@ -47,9 +42,9 @@ fn follow(trial: &Trial, skips: Skips) -> Followed {
 #[test]
 fn two_frames_of_a_stream_strain_as_two_of_a_press() {
     let trial = trial(&[0.7, 1.2], 4);
-    let Followed { means, session, .. } = follow(&trial, Skips::default());
+    let Followed { means, session, .. } = follow(&trial);
     let pipeline = trial.pipeline().unwrap();
-    let mut press = trial.press(&pipeline).unwrap();
+    let press = trial.press(&pipeline).unwrap();
     assert_eq!(means, [press.strain(1).unwrap().summary.mean]);
     let runs = Stage::ALL.map(|stage| session.report().work(stage).runs);
     assert_eq!(runs, [2, 2, 2, 1, 1, 0]);
@@ -59,7 +54,7 @@ fn two_frames_of_a_stream_strain_as_two_of_a_press() {
 #[test]
 fn a_streams_strain_is_that_of_the_scene() {
     let forces = [0.7, 0.8, 0.9, 1.0, 1.1, 1.2];
-    let Followed { means, .. } = follow(&trial(&forces, 5), Skips::default());
+    let Followed { means, .. } = follow(&trial(&forces, 5));
     assert_eq!(means.len(), forces.len() - 1);
     for (mean, force) in means.iter().zip(&forces[1..]) {
         let truth = 0.5 * ((force / forces[0]).powf(2.0 / 3.0) - 1.0);
@@ -77,41 +72,39 @@ fn a_streams_strain_is_that_of_the_scene() {
 #[test]
 fn matches_that_go_on_from_the_last_one_strain_as_those_made_anew() {
     let trial = trial(&[0.7, 0.8, 0.9, 1.0, 1.1, 1.2], 5);
-    let on = follow(&trial, Skips::default());
-    let anew = follow(
-        &trial,
-        Skips {
-            last_answer: false,
-            ..Skips::default()
-        },
-    );
-    assert_eq!(on.means.len(), anew.means.len());
-    for (k, (a, b)) in on.means.iter().zip(&anew.means).enumerate() {
-        // What `Skips` promises: a match may end in another of the pairings that fit alike.
-        let allowed = 0.5 * anew.standard_errors[k];
-        for i in 0..9 {
-            assert!((a[i] - b[i]).abs() <= allowed[i], "{a} {b} {allowed}");
-        }
+    let on = follow(&trial);
+    let pipeline = trial.pipeline().unwrap();
+    let press = trial.press(&pipeline).unwrap();
+    let mut anew = 0;
+    for (k, mean) in on.means.iter().enumerate() {
+        let expected = &press.strain(k + 1).unwrap().summary;
+        anew += press.matching(k + 1).unwrap().report.iterations;
+        // A match may end in another of the pairings that fit alike.
+        let allowed = 0.5 * expected.standard_error;
+        let gap = (mean - expected.mean).abs();
+        assert!(
+            gap.iter()
+                .zip(&allowed)
+                .all(|(gap, allowed)| gap <= allowed),
+            "{gap} {allowed}"
+        );
     }
     assert!(
-        on.iterations < anew.iterations,
-        "{} iterations, {} without",
-        on.iterations,
-        anew.iterations
+        on.iterations < anew,
+        "{} iterations, {anew} without",
+        on.iterations
     );
-    let (session, other) = (on.session, anew.session);
-    let saved = |s: &Session, reason| {
-        s.report()
-            .skips
-            .iter()
-            .find(|k| k.reason == reason)
-            .map_or(0, |k| k.saved)
+    let skipped = |reason| {
+        let skips = on.session.report().skips.iter();
+        skips
+            .filter(|skip| skip.reason == reason)
+            .map(|skip| skip.frames)
+            .sum::<usize>()
     };
-    assert!(saved(&session, SkipReason::NearLastAnswer) > 0);
-    assert_eq!(saved(&other, SkipReason::NearLastAnswer), 0);
-    // Five surfaces of the first load need not be made again.
-    assert!(saved(&session, SkipReason::KeptFromBefore) > 0);
-    assert_eq!(session.report().work(Stage::Surface).runs, 6);
+    assert_eq!(skipped(SkipReason::NearLastAnswer), 4);
+    // The surface of the first load need not be made again for the five that follow.
+    assert_eq!(skipped(SkipReason::KeptFromBefore), 5);
+    assert_eq!(on.session.report().work(Stage::Surface).runs, 6);
 }
 
 #[test]
@@ -122,7 +115,7 @@ fn an_estimator_that_needs_strain_gets_its_modulus_from_the_stream() {
         ..StagesConfig::default()
     };
     let pipeline = trial.pipeline().unwrap().with_stages(&config).unwrap();
-    let mut press = trial.press(&pipeline).unwrap();
+    let press = trial.press(&pipeline).unwrap();
     let expected = press.modulus().unwrap();
     let mut session = session(&trial, &pipeline);
     assert!(
@@ -159,14 +152,11 @@ fn strain_is_measured_once_a_frame_and_starts_anew_when_told() {
     session.push(high).unwrap();
     let to = |session: &mut Session| session.strain().unwrap().map(|s| (s.from, s.to));
     assert_eq!([to(&mut session), to(&mut session)], [Some((1, 2)); 2]);
-    // The same frame again: neither contact nor strain is measured anew.
-    session.push(high).unwrap();
-    assert_eq!(to(&mut session), Some((1, 2)));
     assert_eq!(session.report().work(Stage::Strain).runs, 1);
     session.restart_strain();
     assert_eq!(to(&mut session), None);
     session.push(low).unwrap();
-    assert_eq!(to(&mut session), Some((2, 4)));
+    assert_eq!(to(&mut session), Some((2, 3)));
     let eased = session.strain().unwrap().unwrap().strain.summary.mean[(0, 0)];
     assert!(
         eased < 0.0,
@@ -183,7 +173,7 @@ fn an_estimator_can_be_chosen_and_a_wrong_one_says_what_it_needs() {
             ..StagesConfig::default()
         };
         let pipeline = trial.pipeline().unwrap().with_stages(&config).unwrap();
-        let mut press = trial.press(&pipeline).unwrap();
+        let press = trial.press(&pipeline).unwrap();
         let found = press.modulus().map(|m| m.estimator);
         (found, press.report().work(Stage::Surface).runs)
     };
@@ -265,7 +255,7 @@ fn an_estimator_of_a_users_own_is_a_stage_boxed_too() {
         trial.pipeline().unwrap().with_estimator(Stiffness),
         trial.pipeline().unwrap().with_estimator(boxed),
     ] {
-        let mut press = trial.press(&pipeline).unwrap();
+        let press = trial.press(&pipeline).unwrap();
         let modulus = press.modulus().unwrap();
         assert_eq!(modulus.estimator, EstimatorKind::Other("stiffness"));
         assert!((modulus.youngs_modulus_pa / 0.7e6 - 1.0).abs() < 0.02);
@@ -274,30 +264,28 @@ fn an_estimator_of_a_users_own_is_a_stage_boxed_too() {
     }
 }
 
-/// What a frame leaves in the memory that the next one works in changes no digit of its strain.
+/// A frame leaves nothing in the memory that the next one works in, but the answer that its match begins from.
 #[test]
 fn frames_in_between_leave_no_trace() {
     let trial = trial(&[0.7, 1.2, 0.4, 1.0], 5);
-    // A match that begins where the last one ended differs by rounding.
-    let skips = Skips {
-        last_answer: false,
-        ..Skips::default()
-    };
     let pipeline = trial.pipeline().unwrap();
-    let pipeline = pipeline.with_settings(|settings| settings.skips = skips);
     let last = |frames: &[usize]| {
-        let mut session = session(&trial, pipeline.as_ref().unwrap());
+        let mut session = session(&trial, &pipeline);
         let mut found = None;
         for &frame in frames {
             session.push(trial.simulation.frames[frame].view()).unwrap();
             found = session.strain().unwrap().cloned();
         }
-        found.expect("a strain").strain
+        found.expect("a strain").strain.summary
     };
     let (alone, after_others) = (last(&[0, 3]), last(&[0, 1, 2, 1, 3]));
-    assert_eq!(alone.field, after_others.field);
-    assert_eq!(
-        alone.summary.standard_error,
-        after_others.summary.standard_error
+    // Another of the pairings that fit alike.
+    let allowed = 0.5 * alone.standard_error;
+    let gap = (alone.mean - after_others.mean).abs();
+    assert!(
+        gap.iter()
+            .zip(&allowed)
+            .all(|(gap, allowed)| gap <= allowed),
+        "{gap} {allowed}"
     );
 }

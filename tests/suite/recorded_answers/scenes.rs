@@ -216,7 +216,7 @@ fn stages_by_name() -> Vec<Answer> {
             .and_then(|pipeline| pipeline.with_stages(&config))
             .expect("a pipeline")
             .with_control_points(40);
-        let mut measured = trial.press(&pipeline).expect("a press");
+        let measured = trial.press(&pipeline).expect("a press");
         let heights = &measured.surface(1).expect("a surface").surface.heights;
         let heights: Vec<f64> = heights.iter().copied().filter(|h| h.is_finite()).collect();
         answers.add(

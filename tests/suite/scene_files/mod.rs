@@ -196,7 +196,7 @@ fn a_missing_scene_file_is_named() {
 /// Everything measured of a scene, as text, but for the times.
 fn measured(scene: &Scene, pipeline: &Pipeline) -> String {
     let data = scene.load().unwrap();
-    let mut press = scene.press(pipeline, &data).unwrap();
+    let press = scene.press(pipeline, &data).unwrap();
     let points: Vec<_> = press.control_points(1).unwrap().to_vec();
     let strain = press.strain(1).unwrap().summary.clone();
     format!("{points:?} {strain:?} {:?}", press.modulus().unwrap())
@@ -264,7 +264,7 @@ fn stages_by_name_are_those_given_as_values() {
         )
         .unwrap();
         let pipeline = scene.pipeline(&data).unwrap();
-        let mut press = scene.press(&pipeline, &data).unwrap();
+        let press = scene.press(&pipeline, &data).unwrap();
         press.surface(1).unwrap().surface.heights.clone()
     };
     assert!(

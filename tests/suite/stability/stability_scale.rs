@@ -61,7 +61,7 @@ fn truth(table: &mut Table) {
 /// √(h/2a) of its height.
 fn surface(table: &mut Table, case: &str, trial: &Trial) {
     let pipeline = pipeline(trial, SI);
-    let mut press = trial.press(&pipeline).unwrap();
+    let press = trial.press(&pipeline).unwrap();
     for (k, truth) in trial.simulation.truth.iter().enumerate() {
         let found = press.surface(k).unwrap();
         let inside = found

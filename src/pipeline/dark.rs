@@ -1,9 +1,9 @@
 //! Sensors that grow darker with depth: contact by a threshold, depth by a table.
 //!
 //! Such a sensor measures shape, not force: a force must come from a gauge.
-use super::contact::{ContactReading, ContactStage, FrameContact, resize};
+use super::contact::{ContactReading, ContactStage, FrameContact};
 use super::error::PipelineError;
-use crate::force::{BoundingBox, Estimate, ForceError, ForceWorkspace, Polarity, ReferenceFrame};
+use crate::force::{Estimate, ForceError, Polarity, ReferenceFrame};
 use crate::sfs::DepthTable;
 use ndarray::{Array2, ArrayView2};
 
@@ -94,12 +94,9 @@ impl DarkContact {
 impl ContactStage for DarkContact {
     fn measure(
         &self,
-        _workspace: &mut ForceWorkspace,
         frame: ArrayView2<'_, u8>,
         reference: &ReferenceFrame,
-        gauge: Option<Estimate>,
-        contact: &mut FrameContact,
-    ) -> Result<(), ForceError> {
+    ) -> Result<FrameContact, ForceError> {
         let image = reference.image();
         if frame.dim() != image.dim() {
             return Err(ForceError::SizeMismatch {
@@ -109,25 +106,21 @@ impl ContactStage for DarkContact {
         }
         let darkness = |at: [usize; 2]| f64::from(image[at]) - f64::from(frame[at]);
         let patch = largest_patch(frame.dim(), |at| darkness(at) > self.threshold_grey);
-        contact.region = None;
-        contact.reading = None;
-        contact.background_step_grey = None;
-        let Some(patch) = patch else { return Ok(()) };
-        let region = patch.region.grown(1, frame.dim());
-        resize(&mut contact.mask, (region.rows(), region.columns()));
-        contact.mask.fill(false);
-        for &[row, column] in &patch.pixels {
-            contact.mask[[row - region.row_start, column - region.column_start]] = true;
+        if patch.is_empty() {
+            return Ok(FrameContact::default());
         }
-        contact.region = Some(region);
-        let peak = patch
-            .pixels
-            .iter()
-            .map(|&at| darkness(at))
-            .fold(0.0, f64::max);
-        let saturated = patch.pixels.iter().filter(|&&at| frame[at] == 0).count();
-        contact.reading = Some(self.reading(&patch, frame.dim(), gauge, peak, saturated));
-        Ok(())
+        let mut mask = Array2::from_elem(frame.dim(), false);
+        for &at in &patch {
+            mask[at] = true;
+        }
+        let peak = patch.iter().map(|&at| darkness(at)).fold(0.0, f64::max);
+        let saturated = patch.iter().filter(|&&at| frame[at] == 0).count();
+        let saturated_share = saturated as f64 / patch.len() as f64;
+        let reading = ContactReading {
+            saturated_share,
+            ..self.reading(&patch, frame.dim(), peak)
+        };
+        Ok(FrameContact::new(reading, mask.view()))
     }
 
     fn polarity(&self) -> Polarity {
@@ -142,59 +135,41 @@ impl ContactStage for DarkContact {
 impl DarkContact {
     fn reading(
         &self,
-        patch: &Patch,
+        patch: &[[usize; 2]],
         (rows, columns): (usize, usize),
-        gauge: Option<Estimate>,
         peak: f64,
-        saturated: usize,
     ) -> ContactReading {
-        let n = patch.pixels.len() as f64;
-        let mean = |axis: usize| patch.pixels.iter().map(|p| p[axis] as f64).sum::<f64>() / n;
+        let n = patch.len() as f64;
+        let mean = |axis: usize| patch.iter().map(|p| p[axis] as f64).sum::<f64>() / n;
         // An outline uncertain by half a pixel, pixel by pixel, moves the centroid of a disc by 1/√(2 a) of that.
         let radius_px = (n / std::f64::consts::PI).sqrt();
         let centroid_error = 0.5 / (2.0 * radius_px).sqrt();
         let [hx, hy] = self.pixel_size_m;
         let pixel = (hx * hy).sqrt();
-        let (depth, _) = self.table.depth(peak);
+        let (depth, in_table) = self.table.depth(peak);
         let (step, _) = self.table.depth(peak - 1.0);
-        let b = patch.region;
+        let at_edge = |&[row, column]: &[usize; 2]| {
+            row == 0 || column == 0 || row + 1 == rows || column + 1 == columns
+        };
+        // Specks of noise are patches too: other contacts are not counted.
         ContactReading {
-            force_n: gauge,
-            force_noise_n: gauge.map_or(0.0, |gauge| gauge.standard_error),
-            force_calibration_n: 0.0,
-            contact_radius_m: Estimate::new(radius_px * pixel, 0.5 * pixel),
             indentation_m: Some(Estimate::new(depth, (depth - step).abs())),
             centroid_px: [mean(1), mean(0)].map(|value| Estimate::new(value, centroid_error)),
             area_m2: n * hx * hy,
             peak_grey: peak,
-            saturated_share: saturated as f64 / n,
-            out_of_calibration: !self.table.depth(peak).1,
-            touches_edge: b.row_start == 0
-                || b.column_start == 0
-                || b.row_end == rows
-                || b.column_end == columns,
-            // Specks of noise are patches too: they are not counted.
-            other_contacts: 0,
-            converged: true,
-            profile_misfit: None,
-            face: None,
-            elongation: None,
-            calibration_bend: None,
+            out_of_calibration: !in_table,
+            touches_edge: patch.iter().any(at_edge),
+            ..ContactReading::new(None, Estimate::new(radius_px * pixel, 0.5 * pixel))
         }
     }
 }
 
-/// A connected set of pixels, `[row, column]`, and the box around it.
-struct Patch {
-    pixels: Vec<[usize; 2]>,
-    region: BoundingBox,
-}
-
-/// The largest set of pixels inside, connected by their sides; `None` where no pixel is inside. O(pixels).
+/// The largest set of pixels `[row, column]` inside, connected by their sides. Empty where no pixel is inside.
+/// O(pixels).
 fn largest_patch(
     (rows, columns): (usize, usize),
     inside: impl Fn([usize; 2]) -> bool,
-) -> Option<Patch> {
+) -> Vec<[usize; 2]> {
     let mut open = Array2::from_shape_fn((rows, columns), |(r, c)| inside([r, c]));
     let mut largest: Vec<[usize; 2]> = Vec::new();
     for start in 0..rows * columns {
@@ -223,22 +198,7 @@ fn largest_patch(
             largest = patch;
         }
     }
-    let range = |axis: usize| {
-        let values = largest.iter().map(move |p| p[axis]);
-        values.clone().min().zip(values.max())
-    };
-    let (row_start, row_last) = range(0)?;
-    let (column_start, column_last) = range(1)?;
-    let region = BoundingBox {
-        row_start,
-        row_end: row_last + 1,
-        column_start,
-        column_end: column_last + 1,
-    };
-    Some(Patch {
-        pixels: largest,
-        region,
-    })
+    largest
 }
 
 #[cfg(test)]
@@ -248,9 +208,9 @@ mod tests {
     #[test]
     fn the_largest_patch_wins_and_diagonals_do_not_connect() {
         let image = ndarray::array![[1, 0, 0, 1], [0, 1, 1, 1], [0, 0, 0, 0], [1, 1, 0, 0]];
-        let patch = largest_patch(image.dim(), |at| image[at] == 1).unwrap();
-        assert_eq!(patch.pixels.len(), 4);
-        assert_eq!((patch.region.row_start, patch.region.column_start), (0, 1));
-        assert!(largest_patch((3, 3), |_| false).is_none());
+        let patch = largest_patch(image.dim(), |at| image[at] == 1);
+        assert_eq!(patch.len(), 4);
+        assert!(patch.contains(&[0, 3]) && patch.contains(&[1, 1]));
+        assert!(largest_patch((3, 3), |_| false).is_empty());
     }
 }

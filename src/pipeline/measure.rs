@@ -1,30 +1,15 @@
-//! Everything that the frames of a press say, in one go.
-use super::Press;
-use crate::force::{Estimate, median_shift_outside};
+//! All answers of a press in one go, with cautions.
+use super::error::PipelineError;
+use super::flag::Flag;
+use super::press::Press;
+use super::report::{SkipReason, Stage};
+use super::result::{FrameResult, MatchResult, Measurement, ModulusResult, StrainResult};
+use super::specimen::{Object, Specimen, material_law};
+use super::time::{self, ErrorShare, TimeResult};
+use crate::elasticity::modulus::{Estimate, LoadSeries, PaperRatio};
+use crate::elasticity::relaxation::TimeDependence;
 use crate::matching::StopReason;
-use crate::pipeline::error::PipelineError;
-use crate::pipeline::face;
-use crate::pipeline::flag::Flag;
-use crate::pipeline::measurement::{
-    FrameResult, MatchResult, Measurement, ModulusResult, StrainResult,
-};
-use crate::pipeline::object::Object;
-use crate::pipeline::report::{SkipReason, Stage};
 use nalgebra::Matrix3;
-
-/// Frames of a press up to which all surfaces are reconstructed and kept, which plots want to show: some milliseconds and some hundred
-/// kilobytes each. With more, only those of the first and the last frame are kept, and of the others only those reconstructed whose strain is
-/// worked out.
-const KEPT_SURFACES: usize = 64;
-
-/// Radius in pixels of a contact below which the strain's stated error has been seen to be too small: over 40 presses the largest deviation is
-/// 3.05 of e_zz's standard errors at 38 pixels and 2.1 at 51 (`STRAIN_SEEDS=40 cargo test --test suite strain_of_sizes -- --nocapture`).
-const COARSE_RADIUS_PX: f64 = 40.0;
-
-/// Standard errors by which the stretches of a face's outline and of its texture may differ: with one comparison a press, one in some 10⁴ is flagged in vain.
-const SLIP_ERRORS: f64 = 4.0;
-/// Share of the strain below which their difference does no harm.
-const SLIP_SHARE: f64 = 0.02;
 
 impl Press<'_> {
     /// Runs all stages on all frames. A stage that fails withholds nothing of the others: its error stands in its place.
@@ -42,7 +27,7 @@ impl Press<'_> {
     /// assert!(measurement.flags.iter().any(|flag| flag.to_string().contains("small-contact theory does not hold")));
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
-    pub fn measure(&mut self) -> Measurement {
+    pub fn measure(&self) -> Measurement {
         let mut flags = Vec::new();
         let youngs_modulus_pa = self.modulus().map(|m| ModulusResult::from(&m));
         let matching = self.match_result(&mut flags);
@@ -72,30 +57,31 @@ impl Press<'_> {
             strain,
             matching,
             flags,
-            report: self.report().clone(),
+            report: self.report(),
         }
     }
 
-    /// A caution where the light of a frame, away from its contact, differs from the reference's; of the frame where it does most.
+    /// A caution where the light of a frame, away from its contact, differs from the reference's. Of the frame where it
+    /// does most.
     fn light_drift(&self) -> Option<Flag> {
-        let reference = self.runner.reference().image();
-        let steps = self.frames.iter().enumerate().filter_map(|(index, frame)| {
-            let known = frame.contact.as_ref()?;
-            if frame.image.is_on_demand() {
-                return known.light_step_grey;
-            }
-            let image = frame.image.get(index).ok()?;
-            median_shift_outside(image.view(), reference, known.contact.bounds()?)
-        });
-        let greatest = steps.max_by_key(|step| step.abs())?;
-        (greatest != 0).then_some(Flag::LightDrifted {
-            grey: f64::from(greatest),
+        let grey = self.light_step_grey().filter(|&grey| grey != 0)?;
+        Some(Flag::LightDrifted {
+            grey: f64::from(grey),
         })
     }
 
+    /// The relative error of [`modulus`](Self::modulus) by its inputs, the largest first.
+    fn error_budget(&self) -> Result<Vec<ErrorShare>, PipelineError> {
+        let estimator = self.pipeline().estimator()?;
+        let loads = self.loads(estimator.needs_strain())?;
+        Ok(time::error_budget(&estimator, &loads))
+    }
+
     /// A caution where a flat face is squeezed so far that the law of its material matters.
-    fn material_law(&mut self) -> Option<Flag> {
-        self.pipeline().settings().object.flat_face()?;
+    fn material_law(&self) -> Option<Flag> {
+        let Specimen::Flat(_) = self.specimen() else {
+            return None;
+        };
         let series = self.loads(true).ok()?;
         let strains = series.loads().iter().filter_map(|load| load.mean_strain);
         let largest = strains
@@ -103,11 +89,11 @@ impl Press<'_> {
             .max_by(|a, b| a.abs().total_cmp(&b.abs()))?;
         let measure = self.pipeline().strain().name();
         // Loads count a squeeze as positive.
-        face::material_law_caution(measure, -largest.abs())
+        material_law(measure, -largest.abs())
     }
 
     fn frame_result(
-        &mut self,
+        &self,
         frame: usize,
         flags: &mut Vec<Flag>,
     ) -> Result<FrameResult, PipelineError> {
@@ -155,23 +141,19 @@ impl Press<'_> {
         })
     }
 
-    /// The height of a frame's surface, unless there are many frames and this one's surface served nothing.
-    fn surface_height(&mut self, frame: usize) -> Result<f64, PipelineError> {
+    /// The height of a frame's surface. Of a press with many frames only the first, the last and those whose strain is
+    /// worked out have one: each takes some milliseconds and some hundred kilobytes.
+    fn surface_height(&self, frame: usize) -> Result<f64, PipelineError> {
         let frames = self.frames();
-        let kept = frames <= KEPT_SURFACES || frame == 0 || frame == frames - 1;
-        if !kept && !self.has_surface(frame) {
-            let pixels = self.contact_pixels(frame)?;
-            let reason = SkipReason::NotAsked;
-            self.runner.skip(Stage::Surface, frame, reason, pixels);
+        // Plots show the surfaces of a press of some dozens of frames.
+        let wanted = frames <= 64 || frame == 0 || frame == frames - 1;
+        if !wanted && !self.has_surface(frame) {
+            self.skipped(Stage::Surface, SkipReason::NotAsked);
             return Err(PipelineError::NotReconstructed { frame, frames });
         }
         let surface = &self.surface(frame)?.surface;
         let heights = surface.heights.iter().copied().filter(|h| h.is_finite());
-        let highest = heights.fold(0.0, f64::max);
-        if !kept {
-            self.forget_surface(frame)?;
-        }
-        Ok(highest)
+        Ok(heights.fold(0.0, f64::max))
     }
 
     /// The last frame, if there are two.
@@ -182,12 +164,12 @@ impl Press<'_> {
         }
     }
 
-    fn match_result(&mut self, flags: &mut Vec<Flag>) -> Result<MatchResult, PipelineError> {
+    fn match_result(&self, flags: &mut Vec<Flag>) -> Result<MatchResult, PipelineError> {
         let last = self.last()?;
-        if self.pipeline().settings().object.flat_face().is_some() {
+        if let Specimen::Flat(_) = self.specimen() {
             return self.texture_result(last, flags);
         }
-        let model = self.control_points(0)?.to_vec();
+        let model = self.control_points(0)?;
         let matching = self.matching(last)?;
         let count = model.len() as f64;
         let displacements = model.iter().zip(&matching.warped);
@@ -214,7 +196,7 @@ impl Press<'_> {
 
     /// The match of a face's texture, and a caution where its points stretch otherwise than the outline.
     fn texture_result(
-        &mut self,
+        &self,
         last: usize,
         flags: &mut Vec<Flag>,
     ) -> Result<MatchResult, PipelineError> {
@@ -225,8 +207,10 @@ impl Press<'_> {
             let relative = |area: Estimate| area.standard_error / area.value;
             let error = 0.5 * outline * relative(first).hypot(relative(second));
             let apart = (outline - texture.stretch.value).abs();
-            let allowed = SLIP_ERRORS * error.hypot(texture.stretch.standard_error);
-            if apart > allowed && apart > SLIP_SHARE * (outline - 1.0).abs() {
+            // With one comparison a press, four standard errors flag one in some 10⁴ in vain. A fiftieth of the strain does
+            // no harm.
+            let allowed = 4.0 * error.hypot(texture.stretch.standard_error);
+            if apart > allowed && apart > 0.02 * (outline - 1.0).abs() {
                 flags.push(Flag::Slip {
                     frame: last,
                     outline_strain: outline - 1.0,
@@ -246,23 +230,25 @@ impl Press<'_> {
     }
 
     /// The contact's radius in pixels.
-    fn radius_px(&mut self, frame: usize) -> Option<f64> {
+    fn radius_px(&self, frame: usize) -> Option<f64> {
         let size = self.pipeline().contact().pixel_size_m();
         let radius = self.reading(frame).ok()?.contact_radius_m.value;
         Some(radius / (size[0] * size[1]).sqrt())
     }
 
-    fn strain_result(&mut self, flags: &mut Vec<Flag>) -> Result<StrainResult, PipelineError> {
+    fn strain_result(&self, flags: &mut Vec<Flag>) -> Result<StrainResult, PipelineError> {
         let last = self.last()?;
-        self.strain(last)?;
-        let fewest_px = [0, last]
-            .map(|frame| self.radius_px(frame))
-            .into_iter()
-            .flatten();
-        let radius_px = fewest_px.fold(f64::INFINITY, f64::min);
         let strain = self.strain(last)?;
         let summary = &strain.summary;
-        if radius_px < COARSE_RADIUS_PX {
+        let fewest_px = [0, last].map(|frame| self.radius_px(frame));
+        let radius_px = fewest_px
+            .into_iter()
+            .flatten()
+            .fold(f64::INFINITY, f64::min);
+        // Of smaller contacts the strain's stated error has been seen to be too small: over 40 presses the largest deviation
+        // is 3.05 of e_zz's standard errors at 38 pixels and 2.1 at 51 (`STRAIN_SEEDS=40 cargo test --test suite
+        // strain_of_sizes -- --nocapture`).
+        if radius_px < 40.0 {
             flags.push(Flag::CoarseStrain { radius_px });
         }
         if !summary.folded.is_empty() {
@@ -278,6 +264,89 @@ impl Press<'_> {
             used: summary.used,
             folded: summary.folded.len(),
         })
+    }
+
+    /// Whether the modulus changes over the frames that have a [time](Self::set_time_s): relaxing sample or drifting sensor, see
+    /// [`relaxation`](crate::elasticity::relaxation). Where all of them have a gauge's force, that is taken in place of the light's: no gain is in it.
+    /// `None` where fewer than two frames have a time and a modulus of their own.
+    ///
+    /// # Errors
+    /// Those of [`modulus`](Self::modulus) but for its estimator's: what gives no modulus is left out.
+    fn time_dependence(&self) -> Result<Option<TimeResult>, PipelineError> {
+        let times_s: Vec<_> = (0..self.frames()).map(|k| self.time_s(k)).collect();
+        if times_s.iter().flatten().count() < 2 {
+            return Ok(None);
+        }
+        let estimator = self.pipeline().estimator()?;
+        let flat = matches!(self.specimen(), Specimen::Flat(_));
+        // A strain since the first frame gives no modulus of one load; that of a face is since the unloaded state.
+        if estimator.needs_strain() && !flat {
+            return Ok(None);
+        }
+        let series = self.loads(estimator.needs_strain())?;
+        let series = match self.gauged_loads(&series) {
+            Some(gauged) => gauged,
+            None => series,
+        };
+        Ok(match estimator.needs_strain() {
+            true => time::of_moduli(&PaperRatio::default(), &series, &times_s),
+            false => time::of_moduli(estimator.as_ref(), &series, &times_s),
+        })
+    }
+
+    /// The loads with the gauge's forces, where all frames with a time have one.
+    fn gauged_loads(&self, series: &LoadSeries) -> Option<LoadSeries> {
+        let mut loads = series.loads().to_vec();
+        for (frame, load) in loads.iter_mut().enumerate() {
+            if self.time_s(frame).is_some() {
+                let gauge = self.gauge(frame)?;
+                load.force_n = gauge;
+            }
+        }
+        let shared = *series.shared_errors();
+        LoadSeries::new(loads).with_shared_errors(shared).ok()
+    }
+
+    /// How the light's force changed against the gauge's, where all frames with a time have both.
+    fn gain_change(&self) -> Option<f64> {
+        let mut forces = Vec::new();
+        for frame in 0..self.frames() {
+            let Some(time_s) = self.time_s(frame) else {
+                continue;
+            };
+            let gauge = self.gauge(frame)?;
+            let reading = self.reading(frame).ok()?;
+            let light = Estimate::new(reading.force_n?.value, reading.force_noise_n);
+            // Without a calibration the reading is the gauge's.
+            let is_gauge = light.value == gauge.value;
+            if !is_gauge {
+                forces.push((time_s, light, gauge));
+            }
+        }
+        let result = time::of_gains(&forces)?;
+        (result.change != TimeDependence::Steady).then(|| result.relative_change())
+    }
+
+    /// Cautions about time: a modulus that is of a moment, a gain that is no longer the calibration's.
+    fn time_flags(&self, time: Option<&TimeResult>) -> Vec<Flag> {
+        let gain = self
+            .gain_change()
+            .map(|change| Flag::SensorDrifts { change });
+        let of_moduli = time.and_then(|time| match time.change {
+            TimeDependence::Relaxes(solid) => Some(Flag::SampleRelaxes {
+                instantaneous_pa: solid.instantaneous_pa,
+                equilibrium_pa: solid.equilibrium_pa,
+                time_constant_s: solid.time_constant_s,
+            }),
+            TimeDependence::Drifts { .. } if gain.is_none() => Some(Flag::SensorDrifts {
+                change: time.relative_change(),
+            }),
+            TimeDependence::Steady => None,
+            _ => Some(Flag::ChangesWithTime {
+                change: time.relative_change(),
+            }),
+        });
+        gain.into_iter().chain(of_moduli).collect()
     }
 }
 

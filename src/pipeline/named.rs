@@ -1,5 +1,20 @@
-//! The names of stages in configurations.
+//! The names of stages in configurations, and the stage behind every name.
+use super::error::PipelineError;
+use crate::elasticity::strain::{
+    Biot, EulerAlmansi, GreenLagrange, Hencky, Infinitesimal, StrainMeasure,
+};
+use crate::matching::{
+    AnnealedSoftassign, CoherentPointDrift, LinearAssignment, NearestNeighbour, PointMatcher,
+    RelaxationLabelling, Search,
+};
+use crate::sfs::{
+    BoundaryCondition, BrooksHorn, ContactSampler, ControlPointSampler, CosinePoisson,
+    CurvatureAdaptive, Eikonal, EquallySpaced, FrankotChellappa, Lighting, MaskedLeastSquares,
+    Random, SlopeIntegrator, SurfaceReconstruction, TsaiShah,
+};
+use crate::tps::{AffineModel, FitOptions, R3, Smoothing, StrainSpline, WarpModel};
 use std::fmt;
+use std::sync::Arc;
 
 /// A name that no stage of this kind has.
 ///
@@ -20,7 +35,7 @@ pub struct UnknownStage {
     pub found: String,
 }
 
-/// An enum whose variants have names in configurations; the first is the default.
+/// An enum whose variants have names in configurations. The first is the default.
 macro_rules! choice {
     ($(#[$meta:meta])* $name:ident, $stage:literal:
         $(#[$one:meta])* $first:ident = $text:literal, $($(#[$more:meta])* $variant:ident = $other:literal),+ $(,)?) => {
@@ -42,7 +57,7 @@ macro_rules! choice {
             /// The names, as a sentence says them.
             pub const EXPECTED: &str = concat!("one of \"", $text, "\"", $(", \"", $other, "\""),+);
 
-            /// The name in configurations; [`Display`](fmt::Display) writes it.
+            /// The name in configurations. [`Display`](fmt::Display) writes it.
             pub(crate) fn name(self) -> &'static str {
                 match self { Self::$first => $text, $(Self::$variant => $other),+ }
             }
@@ -200,22 +215,144 @@ choice! {
     PaperRatio = "paper-ratio",
     /// [`StressStrainRegression`](crate::elasticity::modulus::StressStrainRegression) over three loads or more.
     Regression = "regression",
-    /// [`HertzSphere`](crate::elasticity::modulus::HertzSphere), the waveguide's layers in series: small contacts on deep layers; a ball alone.
+    /// [`HertzSphere`](crate::elasticity::modulus::HertzSphere), the waveguide's layers in series: small contacts on deep layers. A ball alone.
     Sphere = "sphere",
-    /// [`SphereOnWaveguide`](crate::elasticity::modulus::SphereOnWaveguide); a ball alone, on the waveguide's layers or a rigid flat.
+    /// [`SphereOnWaveguide`](crate::elasticity::modulus::SphereOnWaveguide). A ball alone, on the waveguide's layers or a rigid flat.
     SphereOnWaveguide = "sphere-on-waveguide",
-    /// [`TabulatedContact`](crate::elasticity::modulus::TabulatedContact); a ball alone, and with a table of its contacts.
+    /// [`TabulatedContact`](crate::elasticity::modulus::TabulatedContact). A ball alone, and with a table of its contacts.
     TabulatedContact = "tabulated-contact",
-    /// [`SphereBetweenPlates`](crate::elasticity::modulus::SphereBetweenPlates); a ball alone.
+    /// [`SphereBetweenPlates`](crate::elasticity::modulus::SphereBetweenPlates). A ball alone.
     SphereBetweenPlates = "sphere-between-plates",
-    /// [`TataraSphere`](crate::elasticity::modulus::TataraSphere); a ball alone.
+    /// [`TataraSphere`](crate::elasticity::modulus::TataraSphere). A ball alone.
     TataraSphere = "tatara-sphere",
-    /// [`BondedLayer`](crate::elasticity::modulus::BondedLayer) by its integral equation; a layer alone.
+    /// [`BondedLayer`](crate::elasticity::modulus::BondedLayer) by its integral equation. A layer alone.
     BondedLayer = "bonded-layer",
-    /// [`Cone`](crate::elasticity::modulus::Cone); a cone alone, and from depths.
+    /// [`Cone`](crate::elasticity::modulus::Cone). A cone alone, and from depths.
     Cone = "cone",
     /// [`BestOf`](crate::elasticity::modulus::BestOf): of all contact laws of a ball or a layer the one with the least Akaike criterion.
     LeastAkaike = "least-akaike",
-    /// [`FlatPunch`](crate::elasticity::modulus::FlatPunch); a flat-ended cylinder alone, and from depths (a depth table's).
+    /// [`FlatPunch`](crate::elasticity::modulus::FlatPunch). A flat-ended cylinder alone, and from depths (a depth table's).
     FlatPunch = "flat-punch",
+}
+
+/// The default reconstruction: frontal light, height zero on the sub-pixel contour of the profile fitted to the contact.
+pub(super) fn eikonal() -> Result<Eikonal<f64>, PipelineError> {
+    Eikonal::new(Lighting::default())
+        .with_boundary(BoundaryCondition::Height(0.0))
+        .map(|eikonal| eikonal.with_fitted_profile(true))
+        .map_err(PipelineError::SurfaceOptions)
+}
+
+impl ReconstructionChoice {
+    pub(super) fn build(
+        self,
+    ) -> Result<Arc<dyn SurfaceReconstruction<f64> + Send + Sync>, PipelineError> {
+        let light = Lighting::default();
+        Ok(match self {
+            Self::Eikonal => Arc::new(eikonal()?),
+            Self::TsaiShah => Arc::new(TsaiShah::new(light)),
+            Self::BrooksHorn => Arc::new(BrooksHorn::new(light).with_occluding_boundary(true)),
+        })
+    }
+}
+
+impl IntegratorChoice {
+    /// The integrator of a name. `None` for the reconstruction's own.
+    pub(super) fn build(self) -> Option<Arc<dyn SlopeIntegrator<f64> + Send + Sync>> {
+        match self {
+            Self::OfReconstruction => None,
+            Self::FrankotChellappa => Some(Arc::new(FrankotChellappa)),
+            Self::CosinePoisson => Some(Arc::new(CosinePoisson)),
+            Self::MaskedLeastSquares => Some(Arc::new(MaskedLeastSquares::default())),
+        }
+    }
+}
+
+impl SamplerChoice {
+    pub(super) fn build(
+        self,
+    ) -> Result<Arc<dyn ControlPointSampler<f64> + Send + Sync>, PipelineError> {
+        Ok(match self {
+            Self::Contact => Arc::new(ContactSampler),
+            Self::EquallySpaced => Arc::new(EquallySpaced),
+            Self::Curvature => {
+                Arc::new(CurvatureAdaptive::new(4.0).map_err(PipelineError::SurfaceOptions)?)
+            }
+            Self::Random => Arc::new(Random { seed: 0 }),
+        })
+    }
+}
+
+/// The default matcher. Two loads of one contact lie near each other: one run from where they are.
+pub(super) fn near_by() -> AnnealedSoftassign {
+    AnnealedSoftassign::default().with_search(Search::Near)
+}
+
+impl MatcherChoice {
+    pub(super) fn build(self) -> Arc<dyn PointMatcher<3> + Send + Sync> {
+        match self {
+            Self::AnnealedSoftassign => Arc::new(near_by()),
+            Self::RelaxationLabelling => Arc::new(RelaxationLabelling::default()),
+            Self::CoherentPointDrift => Arc::new(CoherentPointDrift::default()),
+            Self::LinearAssignment => Arc::new(LinearAssignment::default()),
+            Self::NearestNeighbour => Arc::new(NearestNeighbour::default()),
+        }
+    }
+}
+
+impl WarpChoice {
+    pub(super) fn build(self) -> Result<Arc<dyn WarpModel<f64, 3> + Send + Sync>, PipelineError> {
+        Ok(match self {
+            Self::ThinPlateSpline => Arc::new(StrainSpline),
+            Self::CubicSpline => {
+                let options = FitOptions::new(R3).with_smoothing(Smoothing::Gcv);
+                Arc::new(options.map_err(PipelineError::WarpOptions)?)
+            }
+            Self::Affine => Arc::new(AffineModel::General),
+            Self::Rigid => Arc::new(AffineModel::Rigid),
+        })
+    }
+}
+
+impl StrainChoice {
+    pub(super) fn build(self) -> Arc<dyn StrainMeasure + Send + Sync> {
+        match self {
+            Self::GreenLagrange => Arc::new(GreenLagrange),
+            Self::EulerAlmansi => Arc::new(EulerAlmansi),
+            Self::Hencky => Arc::new(Hencky),
+            Self::Biot => Arc::new(Biot),
+            Self::Infinitesimal => Arc::new(Infinitesimal),
+        }
+    }
+}
+
+/// Which stage to take for each step, by name. What is not said is the default. With the feature `serde` a table such as
+/// `reconstruction = "tsai-shah"` is one.
+///
+/// ```
+/// use tactile_imaging::pipeline::{MatcherChoice, StagesConfig, StrainChoice};
+/// let config = StagesConfig { strain: StrainChoice::Hencky, ..StagesConfig::default() };
+/// assert_eq!(config.matcher, MatcherChoice::AnnealedSoftassign);
+/// ```
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(default, deny_unknown_fields)
+)]
+pub struct StagesConfig {
+    /// Image to surface.
+    pub reconstruction: ReconstructionChoice,
+    /// Slopes to heights. Only a reconstruction that goes through slopes takes another than its own.
+    pub integrator: IntegratorChoice,
+    /// Surface to control points.
+    pub sampler: SamplerChoice,
+    /// Points to matches.
+    pub matcher: MatcherChoice,
+    /// Matches to a warp.
+    pub warp: WarpChoice,
+    /// Displacement gradient to strain.
+    pub strain: StrainChoice,
+    /// Loads to the modulus.
+    pub estimator: EstimatorChoice,
 }

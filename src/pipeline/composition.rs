@@ -1,0 +1,472 @@
+//! The pipeline: the stages, shared, and the settings.
+use super::contact::ContactStage;
+use super::error::PipelineError;
+use super::estimators::EstimatorStage;
+use super::light::LightContact;
+use super::named::{self, EstimatorChoice, StagesConfig};
+use super::settings::{Settings, SurfaceInput};
+use super::specimen::Object;
+use crate::elasticity::modulus::ModulusEstimator;
+use crate::elasticity::strain::{GreenLagrange, StrainMeasure};
+use crate::force::{CalibrationPair, ReferenceFrame};
+use crate::matching::PointMatcher;
+use crate::sfs::{
+    Binning, ContactSampler, ControlPointSampler, EquallySpaced, SlopeIntegrator,
+    SurfaceReconstruction,
+};
+use crate::tps::{StrainSpline, WarpModel};
+use ndarray::ArrayView2;
+use std::sync::Arc;
+
+/// The stages from a frame to Young's modulus, each of which can be replaced in one line, and the settings they share.
+///
+/// | stage | setter | default |
+/// |---|---|---|
+/// | frame to contact and force | [`with_contact`](Self::with_contact) | [`LightContact`] with a linear calibration |
+/// | image to surface | [`with_surface`](Self::with_surface) | [`Eikonal`](crate::sfs::Eikonal), frontal light, zero height at the rim |
+/// | slopes to heights, inside a reconstruction that has slopes | [`with_slope_integrator`](Self::with_slope_integrator) | the reconstruction's own |
+/// | surface to control points | [`with_sampler`](Self::with_sampler) | [`ContactSampler`]; [`EquallySpaced`] where the surface is read from a signal |
+/// | points to matches | [`with_matcher`](Self::with_matcher) | [`AnnealedSoftassign`](crate::matching::AnnealedSoftassign), searching near by |
+/// | weighted matches to the warp whose gradient is strained | [`with_warp`](Self::with_warp) | a [spline](crate::tps::ThinPlateSpline), thin-plate, kernel −r, smoothed by blocked cross-validation |
+/// | displacement gradient to strain | [`with_strain`](Self::with_strain) | [`GreenLagrange`] |
+/// | loads to the modulus | [`with_estimator`](Self::with_estimator) | the layered law for a ball, else stress over strain; see [`EstimatorChoice::Best`] |
+///
+/// A setter takes any value that implements the stage's trait, a `Box` or an `Arc` of one too, so that a program can choose at run time;
+/// [`with_stages`](Self::with_stages) takes stages by the names of a configuration. The stages are shared: a clone copies
+/// pointers and the settings.
+///
+/// ```
+/// use ndarray::Array2;
+/// use tactile_imaging::{Object, Pipeline, force::CalibrationPair};
+/// // 10⁵ grey levels in all are 1 N; a pixel is 50 µm wide; the ball has a radius of 3 mm.
+/// let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
+/// let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?;
+/// // Hertz's pressure p₀√(1 − r²/a²), a = 20 pixels = 1 mm: (2π/3) a² p₀ grey levels, 1.005 N for p₀ = 120.
+/// let hertz = |peak: f64| Array2::from_shape_fn((64, 64), |(r, c)| {
+///     let d = ((r as f64 - 32.0).hypot(c as f64 - 32.0) / 20.0).min(1.0);
+///     10 + (peak * (1.0 - d * d).sqrt()).round() as u8
+/// });
+/// let (reference, frame) = (hertz(0.0), hertz(120.0));
+/// let mut press = pipeline.press(reference.view())?;
+/// press.add_frame(frame.view());
+/// // Hertz has E = (1 − ν²) 3FR/(4a³) of a ball on a rigid flat; finite strain changes it by some percents at a/R = 1/3.
+/// let hertz = 0.75 * 3.0 * 1.005 * 3e-3 / (4.0 * 1e-9);
+/// assert!((press.modulus()?.youngs_modulus_pa / hertz - 1.0).abs() < 0.1);
+/// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
+/// ```
+#[derive(Clone)]
+pub struct Pipeline {
+    contact: Arc<dyn ContactStage>,
+    surface: Arc<dyn SurfaceReconstruction<f64> + Send + Sync>,
+    /// None: the default for what the surface is read from.
+    sampler: Option<Arc<dyn ControlPointSampler<f64> + Send + Sync>>,
+    matcher: Arc<dyn PointMatcher<3> + Send + Sync>,
+    warp: Arc<dyn WarpModel<f64, 3> + Send + Sync>,
+    strain: Arc<dyn StrainMeasure + Send + Sync>,
+    estimator: EstimatorStage,
+    settings: Settings,
+}
+
+impl Pipeline {
+    /// The default stages behind any contact stage. No waveguide, 200 control points.
+    ///
+    /// ```
+    /// use tactile_imaging::elasticity::modulus::ModulusEstimator;
+    /// use tactile_imaging::pipeline::{DarkContact, Object, Pipeline};
+    /// let contact = DarkContact::new(&[(0.0, 0.0), (100.0, 0.5e-3)], [0.1e-3; 2])?;
+    /// let pipeline = Pipeline::new(contact, Object::Unknown { poisson_ratio: 0.48 })?;
+    /// assert!(pipeline.estimator()?.needs_strain(), "stress over strain");
+    /// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`PipelineError::Material`] for an object that is not physical, [`PipelineError::SurfaceOptions`] where a default stage refuses its options.
+    pub fn new(
+        contact: impl ContactStage + 'static,
+        object: Object,
+    ) -> Result<Self, PipelineError> {
+        Ok(Self {
+            contact: Arc::new(contact),
+            surface: Arc::new(named::eikonal()?),
+            sampler: None,
+            matcher: Arc::new(named::near_by()),
+            warp: Arc::new(StrainSpline),
+            strain: Arc::new(GreenLagrange),
+            estimator: EstimatorStage::named(EstimatorChoice::default()),
+            settings: Settings::new(object.checked()?),
+        })
+    }
+
+    /// The default pipeline for a sensor calibrated with pairs of integrated pixel value and force.
+    ///
+    /// # Errors
+    /// [`PipelineError::Calibration`] and [`PipelineError::Sensor`]. Those of [`new`](Self::new).
+    pub fn from_pairs(
+        pairs: &[CalibrationPair],
+        pixel_size_m: [f64; 2],
+        object: Object,
+    ) -> Result<Self, PipelineError> {
+        Self::new(LightContact::from_pairs(pairs, pixel_size_m)?, object)
+    }
+
+    /// Sets the number of control points.
+    ///
+    /// ```
+    /// # use tactile_simulate::{Trial, CalibrationRun, Camera, PressOptions};
+    /// # let camera = Camera::default().coarser(8);
+    /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationRun::default())?;
+    /// let pipeline = trial.pipeline()?.with_control_points(40);
+    /// assert_eq!(trial.press(&pipeline)?.control_points(0)?.len(), 40);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub fn with_control_points(mut self, count: usize) -> Self {
+        self.settings.control_points = count;
+        self
+    }
+
+    /// Changes any of the settings. All are checked together.
+    ///
+    /// ```
+    /// # use tactile_simulate::{Trial, CalibrationRun, Camera, PressOptions};
+    /// # let camera = Camera::default().coarser(8);
+    /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationRun::default())?;
+    /// use tactile_imaging::pipeline::Binning;
+    /// let exact = trial.pipeline()?;
+    /// let pipeline = exact.clone().with_settings(|settings| {
+    ///     settings.binning = Binning::Blocks(2);
+    ///     settings.object_radius_error_m = 0.09e-3; // 3 % of the ball's radius
+    /// })?;
+    /// let press = trial.press(&pipeline)?;
+    /// assert!((press.surface(0)?.pixel_size_m[0] / camera.pixel_size_m[0] - 2.0).abs() < 1e-12);
+    /// // E is proportional to the radius, but for the guide's share of the compliance and the correction for finite strain.
+    /// let relative = |m: &tactile_imaging::elasticity::modulus::ModulusEstimate| m.standard_error_pa / m.youngs_modulus_pa;
+    /// let of_the_radius = relative(&press.modulus()?).powi(2) - relative(&trial.press(&exact)?.modulus()?).powi(2);
+    /// assert!(of_the_radius.sqrt() > 0.03);
+    /// // On a rigid flat instead of the layered guide the ball would be softer for the same contact.
+    /// let rigid = exact.clone().with_settings(|settings| settings.waveguide = None)?;
+    /// assert!(trial.press(&rigid)?.modulus()?.youngs_modulus_pa < trial.press(&exact)?.modulus()?.youngs_modulus_pa);
+    /// assert!(exact.clone().with_settings(|settings| settings.smoothing_px = 8).is_err(), "no middle");
+    /// assert!(exact.with_settings(|settings| settings.force_scale_error = f64::NAN).is_err());
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`PipelineError::Material`] for an object that is not physical, [`PipelineError::EvenSmoothing`], [`PipelineError::EmptyBlocks`],
+    /// [`PipelineError::ScaleError`] and [`PipelineError::InputError`] for an error that is negative or not finite, and
+    /// [`PipelineError::LayerCovariance`] for one that has not three rows and columns for each layer of the waveguide.
+    pub fn with_settings(
+        mut self,
+        change: impl FnOnce(&mut Settings),
+    ) -> Result<Self, PipelineError> {
+        let known = (self.settings.object, self.settings.waveguide.clone());
+        change(&mut self.settings);
+        self.settings.check()?;
+        if known != (self.settings.object, self.settings.waveguide.clone()) {
+            self.estimator.renew();
+        }
+        Ok(self)
+    }
+
+    /// Takes the stages that a configuration names. A surface stage looks at shading.
+    ///
+    /// ```
+    /// # use tactile_simulate::{Trial, CalibrationRun, Camera, PressOptions};
+    /// # let camera = Camera::default().coarser(8);
+    /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationRun::default())?;
+    /// use tactile_imaging::pipeline::{StagesConfig, StrainChoice};
+    /// let config = StagesConfig { strain: StrainChoice::Hencky, ..StagesConfig::default() };
+    /// let pipeline = trial.pipeline()?.with_stages(&config)?.with_control_points(60);
+    /// assert_eq!(trial.press(&pipeline)?.strain(1)?.measure, "Hencky");
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`PipelineError::SurfaceOptions`], [`PipelineError::WarpOptions`] where a stage refuses its options;
+    /// [`PipelineError::NoSlopes`] for an integrator beside a reconstruction without slopes.
+    pub fn with_stages(mut self, config: &StagesConfig) -> Result<Self, PipelineError> {
+        self.surface = config.reconstruction.build()?;
+        self.settings.surface_input = SurfaceInput::Shading;
+        if let Some(integrator) = config.integrator.build() {
+            self = self.with_slope_integrator(integrator)?;
+        }
+        self.sampler = Some(config.sampler.build()?);
+        self.matcher = config.matcher.build();
+        self.warp = config.warp.build()?;
+        self.strain = config.strain.build();
+        self.estimator = EstimatorStage::named(config.estimator);
+        Ok(self)
+    }
+
+    /// Takes another way from frame to contact and force.
+    ///
+    /// ```
+    /// use tactile_imaging::pipeline::{DarkContact, Object, Pipeline};
+    /// # use tactile_imaging::force::CalibrationPair;
+    /// # let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
+    /// let light = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?.with_control_points(80);
+    /// let dark = light.with_contact(DarkContact::new(&[(0.0, 0.0), (100.0, 0.5e-3)], [0.1e-3; 2])?);
+    /// assert_eq!(dark.settings().control_points, 80, "the rest stays");
+    /// let [reference, darker] = [200, 150].map(|grey| ndarray::Array2::from_shape_fn((40, 40), |(r, c)| {
+    ///     if (10..30).contains(&r) && (10..30).contains(&c) { grey } else { 200_u8 }
+    /// }));
+    /// let mut press = dark.press(reference.view())?;
+    /// press.add_frame(darker.view());
+    /// let depth = press.contact(0)?.and_then(|contact| contact.indentation_m).expect("a depth");
+    /// assert!((depth.value - 0.25e-3).abs() < 1e-9, "half of the darkness that is 0.5 mm deep");
+    /// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
+    /// ```
+    #[must_use]
+    pub fn with_contact(mut self, contact: impl ContactStage + 'static) -> Self {
+        self.contact = Arc::new(contact);
+        self
+    }
+
+    /// Takes another way from image to surface, looking at `input`.
+    ///
+    /// ```
+    /// # use tactile_simulate::{Trial, CalibrationRun, Camera, PressOptions};
+    /// # let camera = Camera::default().coarser(8);
+    /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationRun::default())?;
+    /// use tactile_imaging::pipeline::SurfaceInput;
+    /// use tactile_imaging::sfs::{BrooksHorn, Lighting};
+    /// let variational = BrooksHorn::new(Lighting::default()).with_occluding_boundary(true);
+    /// let pipeline = trial.pipeline()?.with_surface(variational, SurfaceInput::Shading);
+    /// let press = trial.press(&pipeline)?;
+    /// let heights = press.surface(0)?.surface.heights.iter().copied().filter(|h| h.is_finite());
+    /// // Its heights have mean zero: from the rim to the top they are those of the truth.
+    /// let (low, high) = heights.fold((0.0, 0.0), |(low, high): (f64, f64), h| (low.min(h), high.max(h)));
+    /// assert!(((high - low) / trial.simulation.truth[0].contact.apparent_height_m(0.0) - 1.0).abs() < 0.1);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub fn with_surface(
+        mut self,
+        surface: impl SurfaceReconstruction<f64> + Send + Sync + 'static,
+        input: SurfaceInput,
+    ) -> Self {
+        self.surface = Arc::new(surface);
+        self.settings.surface_input = input;
+        if input == SurfaceInput::Signal {
+            self.settings.smoothing_px = 1;
+            self.settings.binning = Binning::Blocks(1);
+        }
+        self
+    }
+
+    /// Takes another way from slopes to heights, inside the reconstruction that the pipeline has by now.
+    ///
+    /// ```
+    /// # use tactile_simulate::{Trial, CalibrationRun, Camera, PressOptions};
+    /// # let camera = Camera::default().coarser(8);
+    /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationRun::default())?;
+    /// use tactile_imaging::pipeline::{PipelineError, SurfaceInput};
+    /// use tactile_imaging::sfs::{BrooksHorn, Lighting, MaskedLeastSquares};
+    /// // The default reconstruction solves for heights: it has no slopes.
+    /// let eikonal = trial.pipeline()?;
+    /// let refused = eikonal.clone().with_slope_integrator(MaskedLeastSquares::default());
+    /// assert_eq!(refused.unwrap_err(), PipelineError::NoSlopes);
+    /// // Brooks and Horn's has; least squares over the contact alone need not take the frame as periodic.
+    /// let variational = BrooksHorn::new(Lighting::default()).with_occluding_boundary(true);
+    /// let fourier = eikonal.with_surface(variational, SurfaceInput::Shading);
+    /// let masked = fourier.clone().with_slope_integrator(MaskedLeastSquares::default())?;
+    /// let truth = trial.simulation.truth[0].contact.apparent_height_m(0.0);
+    /// for pipeline in [fourier, masked] {
+    ///     let press = trial.press(&pipeline)?;
+    ///     let heights = press.surface(0)?.surface.heights.iter().copied().filter(|h| h.is_finite());
+    ///     let (low, high) = heights.fold((0.0, 0.0), |(low, high): (f64, f64), h| (low.min(h), high.max(h)));
+    ///     assert!(((high - low) / truth - 1.0).abs() < 0.1);
+    /// }
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`PipelineError::NoSlopes`] where the reconstruction goes from the image to heights without slopes.
+    pub fn with_slope_integrator(
+        mut self,
+        integrator: impl SlopeIntegrator<f64> + Send + Sync + 'static,
+    ) -> Result<Self, PipelineError> {
+        self.surface = self
+            .surface
+            .with_slope_integrator(Arc::new(integrator))
+            .ok_or(PipelineError::NoSlopes)?;
+        Ok(self)
+    }
+
+    /// Takes another estimator of the modulus. Strains of the loads are counted from the first.
+    ///
+    /// ```
+    /// # use tactile_simulate::Trial;
+    /// # use tactile_simulate::{CalibrationRun, Camera, PressOptions};
+    /// # let camera = Camera::default().coarser(8);
+    /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationRun::default())?;
+    /// use tactile_imaging::elasticity::modulus::{EstimatorKind, TataraSphere};
+    /// let tatara = trial.pipeline()?.with_estimator(TataraSphere::new(3e-3, 0.5)?);
+    /// let modulus = trial.press(&tatara)?.modulus()?;
+    /// assert_eq!(modulus.estimator, EstimatorKind::TataraSphere);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub fn with_estimator(
+        mut self,
+        estimator: impl ModulusEstimator + Send + Sync + 'static,
+    ) -> Self {
+        self.estimator = EstimatorStage::Given(Arc::new(estimator));
+        self
+    }
+
+    /// Takes another choice of control points.
+    ///
+    /// ```
+    /// # use tactile_simulate::{Trial, CalibrationRun, Camera, PressOptions};
+    /// # let camera = Camera::default().coarser(8);
+    /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationRun::default())?;
+    /// use tactile_imaging::sfs::Random;
+    /// let pipeline = trial.pipeline()?.with_sampler(Random { seed: 7 }).with_control_points(40);
+    /// let press = trial.press(&pipeline)?;
+    /// let points = press.control_points(0)?.to_vec();
+    /// assert_eq!(points.len(), 40);
+    /// assert_eq!(trial.press(&pipeline)?.control_points(0)?, points, "the seed decides");
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub fn with_sampler(
+        mut self,
+        sampler: impl ControlPointSampler<f64> + Send + Sync + 'static,
+    ) -> Self {
+        self.sampler = Some(Arc::new(sampler));
+        self
+    }
+
+    /// Takes another matcher, one of your own too, or one chosen at run time.
+    ///
+    /// ```
+    /// # use tactile_simulate::{Trial, CalibrationRun, Camera, PressOptions};
+    /// # let camera = Camera::default().coarser(8);
+    /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationRun::default())?;
+    /// use tactile_imaging::matching::{LinearAssignment, PointMatcher};
+    /// let pipeline = trial.pipeline()?.with_matcher(LinearAssignment::default()).with_control_points(60);
+    /// let press = trial.press(&pipeline)?;
+    /// let matching = press.matching(1)?;
+    /// assert!(matching.assignment.iter().all(Option::is_some), "without a limit to the distance every point has a partner");
+    /// let chosen: Box<dyn PointMatcher<3> + Send + Sync> = Box::new(LinearAssignment::default());
+    /// let pipeline = pipeline.with_matcher(chosen);
+    /// assert_eq!(trial.press(&pipeline)?.matching(1)?.assignment, matching.assignment);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub fn with_matcher(mut self, matcher: impl PointMatcher<3> + Send + Sync + 'static) -> Self {
+        self.matcher = Arc::new(matcher);
+        self
+    }
+
+    /// Takes another measure of strain.
+    ///
+    /// ```
+    /// # use tactile_simulate::{Trial, CalibrationRun, Camera, PressOptions};
+    /// # let camera = Camera::default().coarser(8);
+    /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationRun::default())?;
+    /// use tactile_imaging::elasticity::strain::Hencky;
+    /// let green = trial.pipeline()?.with_control_points(60);
+    /// let hencky = green.clone().with_strain(Hencky);
+    /// let e = trial.press(&green)?.strain(1)?.summary.mean[(2, 2)];
+    /// let logarithmic = trial.press(&hencky)?.strain(1)?.summary.mean[(2, 2)];
+    /// // A stretch λ is (λ² − 1)/2 to Green and Lagrange, ln λ to Hencky.
+    /// assert!(logarithmic < e && (logarithmic - 0.5 * (1.0 + 2.0 * e).ln()).abs() < 0.02);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub fn with_strain(mut self, strain: impl StrainMeasure + Send + Sync + 'static) -> Self {
+        self.strain = Arc::new(strain);
+        self
+    }
+
+    /// Takes another family of warps for the strain.
+    ///
+    /// ```
+    /// # use tactile_simulate::{Trial, CalibrationRun, Camera, PressOptions};
+    /// # let camera = Camera::default().coarser(8);
+    /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationRun::default())?;
+    /// use tactile_imaging::tps::AffineModel;
+    /// let pipeline = trial.pipeline()?.with_warp(AffineModel::General).with_control_points(60);
+    /// let press = trial.press(&pipeline)?;
+    /// let strain = press.strain(1)?;
+    /// assert!(strain.summary.spread.amax() < 1e-9, "one gradient for all points");
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub fn with_warp(mut self, warp: impl WarpModel<f64, 3> + Send + Sync + 'static) -> Self {
+        self.warp = Arc::new(warp);
+        self
+    }
+
+    /// The settings.
+    pub fn settings(&self) -> &Settings {
+        &self.settings
+    }
+
+    /// The contact stage.
+    pub fn contact(&self) -> &dyn ContactStage {
+        self.contact.as_ref()
+    }
+
+    /// The estimator of the modulus. One that goes by its name is built when it is first needed, for all clones.
+    ///
+    /// # Errors
+    /// [`PipelineError::WrongEstimator`] where the chosen one does not fit the object.
+    pub fn estimator(&self) -> Result<Arc<dyn ModulusEstimator + Send + Sync>, PipelineError> {
+        let settings = &self.settings;
+        self.estimator
+            .get(settings.object, settings.waveguide.as_ref())
+    }
+
+    /// The contact stage, to be held.
+    pub(super) fn shared_contact(&self) -> Arc<dyn ContactStage> {
+        Arc::clone(&self.contact)
+    }
+
+    pub(super) fn surface(&self) -> &dyn SurfaceReconstruction<f64> {
+        self.surface.as_ref()
+    }
+
+    pub(super) fn sampler(&self) -> &dyn ControlPointSampler<f64> {
+        match (&self.sampler, self.settings.surface_input) {
+            (Some(sampler), _) => sampler.as_ref(),
+            (None, SurfaceInput::Shading) => &ContactSampler,
+            // Depths read from a signal end in a step at the contact's boundary, not at the plane.
+            (None, SurfaceInput::Signal) => &EquallySpaced,
+        }
+    }
+
+    pub(super) fn matcher(&self) -> &dyn PointMatcher<3> {
+        self.matcher.as_ref()
+    }
+
+    pub(super) fn warp(&self) -> &dyn WarpModel<f64, 3> {
+        self.warp.as_ref()
+    }
+
+    pub(super) fn strain(&self) -> &dyn StrainMeasure {
+        self.strain.as_ref()
+    }
+
+    /// The reference that the settings ask for, of one or more frames without contact.
+    pub(super) fn reference_frame(
+        &self,
+        frames: &[ArrayView2<'_, u8>],
+    ) -> Result<ReferenceFrame, PipelineError> {
+        let reference = ReferenceFrame::from_frames(frames).map_err(PipelineError::Sensor)?;
+        if !self.settings.flat_field {
+            return Ok(reference);
+        }
+        reference.with_flat_field().map_err(PipelineError::Sensor)
+    }
+}
+
+impl std::fmt::Debug for Pipeline {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Pipeline")
+            .field("settings", &self.settings)
+            .finish_non_exhaustive()
+    }
+}

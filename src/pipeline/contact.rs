@@ -1,0 +1,375 @@
+//! The first stage: one frame to contact, force, centroid and radius.
+use super::error::PipelineError;
+use crate::force::{
+    BoundingBox, Estimate, FaceReading, ForceError, ForceMeasurement, ForceWorkspace, LensGeometry,
+    LocalCalibration, Polarity, ProfileShape, ReferenceFrame, StopReason,
+};
+use ndarray::{Array2, ArrayView2};
+use std::f64::consts::PI;
+use std::sync::Arc;
+
+/// One frame to contact and force.
+///
+/// ```
+/// use ndarray::ArrayView2;
+/// use tactile_imaging::force::{Estimate, ForceError, ReferenceFrame};
+/// use tactile_imaging::pipeline::{ContactStage, FrameContact, LightContact, Object, Pipeline};
+/// # use tactile_imaging::force::CalibrationPair;
+/// # let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
+/// # let hertz = |peak: f64| ndarray::Array2::from_shape_fn((64, 64), |(r, c)| {
+/// #     let d = ((r as f64 - 32.0).hypot(c as f64 - 32.0) / 20.0).min(1.0);
+/// #     10 + (peak * (1.0 - d * d).sqrt()).round() as u8
+/// # });
+/// /// The contact by its light, the force of a spring scale that stands at 0.98 N.
+/// struct OnScale(LightContact);
+/// impl ContactStage for OnScale {
+///     fn measure(
+///         &self, frame: ArrayView2<'_, u8>, reference: &ReferenceFrame,
+///     ) -> Result<FrameContact, ForceError> {
+///         let mut contact = self.0.measure(frame, reference)?;
+///         if let Some(reading) = &mut contact.reading {
+///             reading.force_n = Some(Estimate::new(0.98, 1e-3));
+///         }
+///         Ok(contact)
+///     }
+///     fn pixel_size_m(&self) -> [f64; 2] { self.0.pixel_size_m() }
+/// }
+/// let (reference, frame) = (hertz(0.0), hertz(120.0));
+/// let stage = OnScale(LightContact::from_pairs(&pairs, [50e-6; 2])?);
+/// // Neither a lens nor a local curve: coordinates stand as they are, shading is taken from the light.
+/// assert!(stage.lens().is_none() && stage.pressure_curve().is_none());
+/// let pipeline = Pipeline::new(stage, Object::sphere(3e-3))?;
+/// let mut press = pipeline.press(reference.view())?;
+/// press.add_frame(frame.view());
+/// assert_eq!(press.contact(0)?.and_then(|c| c.force_n).map(|f| f.value), Some(0.98));
+/// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
+/// ```
+pub trait ContactStage: Send + Sync {
+    /// The contact of `frame`, which differs from `reference` by it. A reading without a force takes that
+    /// of a gauge, where there is one.
+    ///
+    /// # Errors
+    /// [`ForceError`], such as a frame of another size or a saturated contact.
+    fn measure(
+        &self,
+        frame: ArrayView2<'_, u8>,
+        reference: &ReferenceFrame,
+    ) -> Result<FrameContact, ForceError>;
+
+    /// The size of a pixel in metres, x and y. That at the centre of distortion where there is a
+    /// [`lens`](Self::lens).
+    fn pixel_size_m(&self) -> [f64; 2];
+
+    /// As [`measure`](Self::measure), in memory that a stream keeps from frame to frame.
+    ///
+    /// # Errors
+    /// Those of [`measure`](Self::measure).
+    fn measure_into(
+        &self,
+        workspace: &mut ForceWorkspace,
+        frame: ArrayView2<'_, u8>,
+        reference: &ReferenceFrame,
+        contact: &mut FrameContact,
+    ) -> Result<(), ForceError> {
+        let _ = workspace;
+        *contact = self.measure(frame, reference)?;
+        Ok(())
+    }
+
+    /// Whether contact makes the frame brighter or darker.
+    fn polarity(&self) -> Polarity {
+        Polarity::Brighter
+    }
+
+    /// The lens that distorts, if there is one: control points are undistorted by it.
+    fn lens(&self) -> Option<&LensGeometry> {
+        None
+    }
+
+    /// The local curve from grey level to pressure, if there is one: shading is taken from pressures instead
+    /// of light.
+    fn pressure_curve(&self) -> Option<&dyn LocalCalibration> {
+        None
+    }
+
+    /// The stage to take for objects that are known to have a flat face, if it saves work that only a ball's
+    /// contact needs, such as the fit of its profile. The contact radius is then taken from the face's area.
+    ///
+    /// ```
+    /// use tactile_imaging::pipeline::{ContactStage, LightContact};
+    /// let light = LightContact::gauged([50e-6; 2], &Default::default())?;
+    /// assert!(light.for_flat_faces().is_some(), "without the fit of Hertz's profile");
+    /// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
+    /// ```
+    fn for_flat_faces(&self) -> Option<Arc<dyn ContactStage>> {
+        None
+    }
+}
+
+/// The contact of one frame.
+///
+/// ```
+/// use tactile_imaging::pipeline::{ContactReading, Object, Pipeline};
+/// # use tactile_imaging::force::CalibrationPair;
+/// # let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
+/// # let hertz = |peak: f64| ndarray::Array2::from_shape_fn((64, 64), |(r, c)| {
+/// #     let d = ((r as f64 - 32.0).hypot(c as f64 - 32.0) / 20.0).min(1.0);
+/// #     10 + (peak * (1.0 - d * d).sqrt()).round() as u8
+/// # });
+/// // 1.005 N over a disc of 1 mm radius.
+/// let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?;
+/// let (reference, frame) = (hertz(0.0), hertz(120.0));
+/// let mut press = pipeline.press(reference.view())?;
+/// press.add_frame(frame.view());
+/// let contact: ContactReading = *press.contact(0)?.expect("a contact");
+/// assert!((contact.contact_radius_m.value / 1e-3 - 1.0).abs() < 0.01);
+/// let force = contact.force_n.expect("a calibrated sensor");
+/// assert!((force.value / 1.005 - 1.0).abs() < 0.01);
+/// assert_eq!(contact.flags(0).count(), 0, "nothing to caution of");
+/// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[non_exhaustive]
+pub struct ContactReading {
+    /// Normal force in newtons. `None` where neither calibration nor gauge gives it.
+    pub force_n: Option<Estimate>,
+    /// The part of the force's error that comes from noise in the frames, in newtons.
+    pub force_noise_n: f64,
+    /// The part that comes from the calibration and is common to all frames, in newtons.
+    pub force_calibration_n: f64,
+    /// Contact radius in metres. Of a flat face √(A/π), that of a disc of its area.
+    pub contact_radius_m: Estimate,
+    /// Indentation in metres, where the sensor measures depth.
+    pub indentation_m: Option<Estimate>,
+    /// Centroid (x, y) in pixels.
+    pub centroid_px: [Estimate; 2],
+    /// Area of the contact in square metres.
+    pub area_m2: f64,
+    /// Greatest signal: grey levels above (or below) the reference.
+    pub peak_grey: f64,
+    /// Share of the contact's pixels that are saturated.
+    pub saturated_share: f64,
+    /// The signal lies outside the range of the calibration.
+    pub out_of_calibration: bool,
+    /// The contact reaches the frame's edge: part of it may be missing.
+    pub touches_edge: bool,
+    /// Other contacts in the frame: this one is the largest.
+    pub other_contacts: usize,
+    /// Whether the fit of the contact's profile converged (no fit counts as converged).
+    pub converged: bool,
+    /// Misfit of the pressure's profile as a share of its peak, where it is not that of a ball's contact.
+    pub profile_misfit: Option<f64>,
+    /// The contact as a flat face, where the object may have one and the contact is large enough to tell.
+    pub face: Option<FaceReading>,
+    /// Longer over shorter half axis of the outline, less one, where it is not round.
+    pub elongation: Option<f64>,
+    /// Departure of the calibration's pairs from a line at half scale, as a share of the full scale, where the
+    /// pairs show one.
+    pub calibration_bend: Option<f64>,
+}
+
+impl ContactReading {
+    /// A round contact of this radius under this force, about which there is nothing to caution. The error of
+    /// the force counts as noise of the frame, the peak as one grey level.
+    ///
+    /// ```
+    /// use tactile_imaging::{force::Estimate, pipeline::ContactReading};
+    /// let mut contact = ContactReading::new(Some(Estimate::new(0.7, 2e-3)), Estimate::new(1e-3, 2e-6));
+    /// contact.centroid_px = [Estimate::exact(120.0), Estimate::exact(80.0)];
+    /// assert_eq!((contact.force_noise_n, contact.touches_edge), (2e-3, false));
+    /// ```
+    #[must_use]
+    pub fn new(force_n: Option<Estimate>, contact_radius_m: Estimate) -> Self {
+        Self {
+            force_n,
+            force_noise_n: force_n.map_or(0.0, |force| force.standard_error),
+            force_calibration_n: 0.0,
+            contact_radius_m,
+            indentation_m: None,
+            centroid_px: [Estimate::exact(0.0); 2],
+            area_m2: PI * contact_radius_m.value.powi(2),
+            peak_grey: 1.0,
+            saturated_share: 0.0,
+            out_of_calibration: false,
+            touches_edge: false,
+            other_contacts: 0,
+            converged: true,
+            profile_misfit: None,
+            face: None,
+            elongation: None,
+            calibration_bend: None,
+        }
+    }
+
+    /// F/(π a²) in pascals.
+    pub(crate) fn mean_stress_pa(&self) -> Option<Estimate> {
+        let (force, radius) = (self.force_n?, self.contact_radius_m);
+        let value = force.value / (PI * radius.value * radius.value);
+        let relative =
+            (force.standard_error / force.value).hypot(2.0 * radius.standard_error / radius.value);
+        Some(Estimate::new(value, value.abs() * relative))
+    }
+
+    /// The force is the gauge's.
+    pub(super) fn take_gauge(&mut self, gauge: Option<Estimate>) {
+        self.force_n = gauge;
+        self.force_noise_n = gauge.map_or(0.0, |gauge| gauge.standard_error);
+        self.force_calibration_n = 0.0;
+    }
+
+    /// The contact is a flat face of that area: the radius is that of a disc as large.
+    pub(super) fn take_area(&mut self, area_m2: Estimate) {
+        let radius_m = (area_m2.value / PI).sqrt();
+        self.area_m2 = area_m2.value;
+        let error_m = 0.5 * radius_m * area_m2.standard_error / area_m2.value;
+        self.contact_radius_m = Estimate::new(radius_m, error_m);
+    }
+
+    /// The reading of a measured force. `None` without contact.
+    pub(super) fn of_light(force: &ForceMeasurement) -> Option<Self> {
+        let (contact, reading, radius) = (force.contact?, force.reading?, force.contact_radius_m?);
+        let profile = force.profile;
+        let misfit = profile.filter(|p| p.shape == ProfileShape::NotHertz);
+        Some(Self {
+            force_noise_n: reading.noise_n,
+            force_calibration_n: reading.calibration_n,
+            centroid_px: contact.centroid_px,
+            area_m2: force.contact_area_m2?,
+            peak_grey: profile.map_or(contact.peak, |p| p.peak.value),
+            saturated_share: contact.saturated_px as f64 / contact.area_px as f64,
+            out_of_calibration: reading.out_of_range,
+            touches_edge: contact.touches_edge,
+            other_contacts: contact.other_contacts,
+            converged: profile.is_none_or(|p| p.stop == StopReason::Converged),
+            profile_misfit: misfit.map(|p| p.radial_misfit.hypot(p.azimuthal_misfit)),
+            elongation: force.elongation,
+            ..Self::new(Some(force.force_n), radius)
+        })
+    }
+}
+
+/// Answer of the first stage: the reading, and where in the frame the contact is.
+///
+/// ```
+/// use tactile_imaging::force::ReferenceFrame;
+/// use tactile_imaging::pipeline::{ContactStage, LightContact};
+/// # use tactile_imaging::force::CalibrationPair;
+/// # let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
+/// # let hertz = |peak: f64| ndarray::Array2::from_shape_fn((64, 64), |(r, c)| {
+/// #     let d = ((r as f64 - 32.0).hypot(c as f64 - 32.0) / 20.0).min(1.0);
+/// #     10 + (peak * (1.0 - d * d).sqrt()).round() as u8
+/// # });
+/// let stage = LightContact::from_pairs(&pairs, [50e-6; 2])?;
+/// let reference = ReferenceFrame::new(hertz(0.0).view())?;
+/// let contact = stage.measure(hertz(120.0).view(), &reference)?;
+/// let region = contact.region.expect("a contact");
+/// assert_eq!(contact.mask.dim(), (region.rows(), region.columns()));
+/// assert!(region.row_start <= 12 && region.row_end >= 52, "20 pixels around row 32");
+/// // Without contact: how far the light is from the reference's.
+/// let contact = stage.measure(hertz(0.0).view(), &reference)?;
+/// assert_eq!((contact.reading, contact.background_step_grey), (None, Some(0.0)));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Debug, Default)]
+#[non_exhaustive]
+pub struct FrameContact {
+    /// The reading. `None` without contact.
+    pub reading: Option<ContactReading>,
+    /// The box worked on: the contact's, with a margin of at least one pixel (but at the frame's edge).
+    pub region: Option<BoundingBox>,
+    /// The contact's pixels within the box.
+    pub mask: Array2<bool>,
+    /// Mean of frame minus reference in grey levels, of a frame without contact. `None` with one, or where it
+    /// is not known.
+    pub background_step_grey: Option<f64>,
+}
+
+impl FrameContact {
+    /// A contact whose pixels are the true ones of `mask`, an image as large as the frame. No pixel is no
+    /// contact.
+    ///
+    /// ```
+    /// use tactile_imaging::{force::Estimate, pipeline::{ContactReading, FrameContact}};
+    /// let mask = ndarray::Array2::from_shape_fn((64, 64), |(r, c)| (20..40).contains(&r) && c > 50);
+    /// let reading = ContactReading::new(None, Estimate::exact(1e-3));
+    /// let contact = FrameContact::new(reading, mask.view());
+    /// // A margin of one pixel.
+    /// assert_eq!(contact.mask.dim(), (22, 14));
+    /// assert!(FrameContact::new(reading, mask.mapv(|_| false).view()).reading.is_none());
+    /// ```
+    #[must_use]
+    pub fn new(reading: ContactReading, mask: ArrayView2<'_, bool>) -> Self {
+        let Some(bounds) = BoundingBox::of_mask(mask) else {
+            return Self::default();
+        };
+        let region = bounds.grown(1, mask.dim());
+        Self {
+            reading: Some(reading),
+            region: Some(region),
+            mask: region.of(mask).to_owned(),
+            background_step_grey: None,
+        }
+    }
+
+    /// Number of the contact's pixels.
+    pub(super) fn pixels(&self) -> usize {
+        let count = |pixels: &[bool]| {
+            // Short runs fit a byte, whose sums are wide instructions.
+            let sum = |run: &[bool]| run.iter().map(|inside| u8::from(*inside)).sum::<u8>();
+            pixels.chunks(128).map(|run| usize::from(sum(run))).sum()
+        };
+        match self.mask.as_slice() {
+            Some(pixels) => count(pixels),
+            None => self.mask.iter().filter(|inside| **inside).count(),
+        }
+    }
+
+    /// The smallest box of the frame that holds the contact's pixels: `region` may be wider.
+    pub(super) fn bounds(&self) -> Option<BoundingBox> {
+        let region = self.region?;
+        let bounds = BoundingBox::of_mask(self.mask.view())?;
+        Some(BoundingBox {
+            row_start: region.row_start + bounds.row_start,
+            row_end: region.row_start + bounds.row_end,
+            column_start: region.column_start + bounds.column_start,
+            column_end: region.column_start + bounds.column_end,
+        })
+    }
+
+    /// Refuses a mask that does not fill its region, and a region that does not lie in the frame: a stage may
+    /// be a user's own.
+    pub(super) fn check(&self, frame: usize, image: (usize, usize)) -> Result<(), PipelineError> {
+        let Some(at) = self.region else {
+            return Ok(());
+        };
+        let ordered = at.row_start <= at.row_end && at.column_start <= at.column_end;
+        let inside = ordered && at.row_end <= image.0 && at.column_end <= image.1;
+        let mask = self.mask.dim();
+        if inside && mask == (at.rows(), at.columns()) {
+            return Ok(());
+        }
+        let region = (
+            at.row_end.saturating_sub(at.row_start),
+            at.column_end.saturating_sub(at.column_start),
+        );
+        Err(PipelineError::ContactMask {
+            frame,
+            mask,
+            region,
+            image,
+        })
+    }
+}
+
+/// Gives an array a shape, keeping its memory where it is large enough.
+pub fn resize<T: Clone + Default>(array: &mut Array2<T>, shape: (usize, usize)) {
+    if array.dim() != shape {
+        let (mut memory, _) = std::mem::take(array).into_raw_vec_and_offset();
+        memory.clear();
+        memory.resize(shape.0 * shape.1, T::default());
+        if let Ok(resized) = Array2::from_shape_vec(shape, memory) {
+            *array = resized;
+        }
+    }
+}

@@ -1,0 +1,500 @@
+//! The answers of a press as plain data, for people ([`Display`]) and programs (feature `serde`).
+use super::contact::ContactReading;
+use super::error::PipelineError;
+use super::flag::Flag;
+use super::report::Report;
+use super::session::{DriftWatch, Update};
+use super::time::{ErrorShare, TimeResult};
+use crate::elasticity::modulus::{EstimatorKind, ModulusEstimate, Warning};
+use crate::force::Estimate;
+use crate::matching::StopReason;
+use std::fmt::{self, Display, Formatter};
+
+/// A modulus with its error.
+///
+/// ```
+/// use tactile_imaging::elasticity::modulus::{Estimate, HertzSphere, LoadSeries, LoadState, ModulusEstimator};
+/// use tactile_imaging::pipeline::ModulusResult;
+/// // A ball of 3 mm radius under 10 mN, in contact up to 0.5 mm: E = (1 − ν²) 3FR/(4a³) = 135 kPa.
+/// let load = LoadState { contact_radius_m: Some(Estimate::new(0.5e-3, 1e-6)), ..LoadState::new(Estimate::new(10e-3, 0.1e-3)) };
+/// let modulus = ModulusResult::from(&HertzSphere::new(3e-3, 0.5)?.estimate(&LoadSeries::new([load]))?);
+/// assert!((modulus.value - 135e3).abs() < 1.0);
+/// assert!(modulus.interval_95.0 < modulus.value && modulus.warnings.is_empty());
+/// assert!(modulus.to_string().starts_with("135.0 ± 1.6 kPa"));
+/// # Ok::<(), tactile_imaging::elasticity::ElasticityError>(())
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub struct ModulusResult {
+    /// Young's modulus in pascals.
+    pub value: f64,
+    /// Its standard error in pascals.
+    pub standard_error: f64,
+    /// Its 95 % interval in pascals. No upper end where the loads do not bound it.
+    pub interval_95: (f64, Option<f64>),
+    /// Which estimator.
+    #[cfg_attr(feature = "serde", serde(serialize_with = "outcome::text"))]
+    pub estimator: EstimatorKind,
+    /// Where the estimator's assumptions fail.
+    #[cfg_attr(feature = "serde", serde(serialize_with = "outcome::texts"))]
+    pub warnings: Vec<Warning>,
+}
+
+impl From<&ModulusEstimate> for ModulusResult {
+    fn from(estimate: &ModulusEstimate) -> Self {
+        Self {
+            value: estimate.youngs_modulus_pa,
+            standard_error: estimate.standard_error_pa,
+            interval_95: (estimate.interval_95.lower, estimate.interval_95.upper),
+            estimator: estimate.estimator,
+            warnings: estimate.warnings.clone(),
+        }
+    }
+}
+
+/// What one frame says.
+///
+/// ```
+/// # use tactile_simulate::{Trial, CalibrationRun, Camera, PressOptions};
+/// # let camera = Camera::default().coarser(8);
+/// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationRun::default())?;
+/// use tactile_imaging::pipeline::FrameResult;
+/// let pipeline = trial.pipeline()?;
+/// let measurement = trial.press(&pipeline)?.measure();
+/// let frames: Vec<&FrameResult> = measurement.frames.iter().flatten().collect();
+/// // A ball of 3 mm radius under 0.7 N and 1.2 N.
+/// for (frame, force_n) in frames.iter().zip([0.7, 1.2]) {
+///     let force = frame.force_n.as_ref().expect("a calibrated sensor").value;
+///     assert!((force / force_n - 1.0).abs() < 0.02);
+///     let radius = frame.contact_radius_m.value;
+///     assert!((frame.contact_ratio.expect("a ball") - radius / 3e-3).abs() < 1e-12);
+///     let stress = frame.mean_stress_pa.expect("a force").value;
+///     assert!((stress * std::f64::consts::PI * radius * radius - force).abs() < 1e-12);
+/// }
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub struct FrameResult {
+    /// Normal force in newtons.
+    #[cfg_attr(feature = "serde", serde(serialize_with = "outcome::one"))]
+    pub force_n: Result<Estimate, PipelineError>,
+    /// What a gauge read, in newtons.
+    pub gauge_force_n: Option<f64>,
+    /// Contact radius in metres. Of a flat face that of a disc of its area.
+    pub contact_radius_m: Estimate,
+    /// Contact radius over the ball's radius: small-contact theory holds up to 0.3.
+    pub contact_ratio: Option<f64>,
+    /// Centroid (x, y) in pixels.
+    pub centroid_px: [f64; 2],
+    /// One standard deviation of the centroid, in pixels.
+    pub centroid_sd_px: [f64; 2],
+    /// Area of the contact in square metres.
+    pub contact_area_m2: f64,
+    /// F/(π a²) in pascals.
+    pub mean_stress_pa: Option<Estimate>,
+    /// Greatest height of the reconstructed surface in metres.
+    #[cfg_attr(feature = "serde", serde(serialize_with = "outcome::one"))]
+    pub surface_height_m: Result<f64, PipelineError>,
+}
+
+/// How the control points of the first and the last frame were matched.
+///
+/// ```
+/// # use tactile_simulate::{Trial, CalibrationRun, Camera, PressOptions};
+/// # let camera = Camera::default().coarser(8);
+/// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationRun::default())?;
+/// use tactile_imaging::pipeline::MatchResult;
+/// let pipeline = trial.pipeline()?.with_control_points(60);
+/// let matching: MatchResult = trial.press(&pipeline)?.measure().matching?;
+/// assert_eq!(matching.points, 60);
+/// assert!(matching.matched > 50 && matching.mean_confidence > 0.5);
+/// assert!(matching.residual_m < matching.mean_displacement_m, "the warp takes points to their partners");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub struct MatchResult {
+    /// Control points on the first surface.
+    pub points: usize,
+    /// Those with a partner on the last.
+    pub matched: usize,
+    /// Mean confidence of the matches.
+    pub mean_confidence: f64,
+    /// Root mean square distance between warped points and their partners in metres.
+    pub residual_m: f64,
+    /// Mean length of the displacement in metres.
+    pub mean_displacement_m: f64,
+    /// Iterations.
+    pub iterations: usize,
+    /// Why the matcher stopped.
+    pub stop: StopReason,
+}
+
+/// The strain between the first and the last frame.
+///
+/// ```
+/// # use tactile_simulate::{Trial, CalibrationRun, Camera, PressOptions};
+/// # let camera = Camera::default().coarser(8);
+/// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationRun::default())?;
+/// use tactile_imaging::pipeline::StrainResult;
+/// let pipeline = trial.pipeline()?.with_control_points(60);
+/// let strain: StrainResult = trial.press(&pipeline)?.measure().strain?;
+/// // From 0.7 N to 1.2 N the apparent surface grows by s = (1.2/0.7)^⅓: e_xx = (s² − 1)/2 = 0.216.
+/// assert!((strain.mean[0][0] - 0.216).abs() < 0.03);
+/// assert_eq!(strain.mean[0][2], strain.mean[2][0], "symmetric");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub struct StrainResult {
+    /// The name of the measure of strain.
+    pub measure: &'static str,
+    /// Mean over the control points, rows of the tensor (x, y, z).
+    pub mean: [[f64; 3]; 3],
+    /// Standard error of the mean.
+    pub standard_error: [[f64; 3]; 3],
+    /// Standard deviation over the control points.
+    pub spread: [[f64; 3]; 3],
+    /// Control points that count.
+    pub used: usize,
+    /// Control points where the warp folds over.
+    pub folded: usize,
+}
+
+/// All results of a press: what a stage computed, or why it could not, whatever became of the others.
+///
+/// ```
+/// # use tactile_simulate::{Trial, CalibrationRun, Camera, PressOptions};
+/// # let camera = Camera::default().coarser(8);
+/// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationRun::default())?;
+/// use tactile_imaging::Measurement;
+/// let pipeline = trial.pipeline()?.with_control_points(60);
+/// let measurement: Measurement = trial.press(&pipeline)?.measure();
+/// let modulus = measurement.youngs_modulus_pa.as_ref().expect("two loads");
+/// assert!((modulus.value / 103e3 - 1.0).abs() < 0.0538, "the ball's 103 kPa");
+/// assert_eq!(measurement.frames.len(), 2);
+/// assert!(measurement.estimators.contains(modulus), "beside the paper's ratio");
+/// assert!(measurement.to_string().starts_with(&format!("Young's modulus  {modulus}")));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub struct Measurement {
+    /// Young's modulus by the pipeline's estimator.
+    #[cfg_attr(feature = "serde", serde(serialize_with = "outcome::one"))]
+    pub youngs_modulus_pa: Result<ModulusResult, PipelineError>,
+    /// The time that the modulus is of, where frames say when they were taken, and whether it changed meanwhile.
+    pub time: Option<TimeResult>,
+    /// Which inputs the modulus' error comes from, the largest first. Empty without a modulus.
+    pub error_budget: Vec<ErrorShare>,
+    /// By every estimator that the frames allow, the paper's ratio first.
+    pub estimators: Vec<ModulusResult>,
+    /// What every frame says.
+    #[cfg_attr(feature = "serde", serde(serialize_with = "outcome::each"))]
+    pub frames: Vec<Result<FrameResult, PipelineError>>,
+    /// The strain between the first frame and the last.
+    #[cfg_attr(feature = "serde", serde(serialize_with = "outcome::one"))]
+    pub strain: Result<StrainResult, PipelineError>,
+    /// The match between the first frame and the last.
+    #[cfg_attr(
+        feature = "serde",
+        serde(rename = "match", serialize_with = "outcome::one")
+    )]
+    pub matching: Result<MatchResult, PipelineError>,
+    /// Cautions.
+    pub flags: Vec<Flag>,
+    /// What was computed and what was skipped.
+    pub report: Report,
+}
+
+impl Display for ModulusResult {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        let k = |v: f64| v * 1e-3;
+        write!(
+            f,
+            "{} kPa",
+            with_error(self.value, self.standard_error, 1e-3)
+        )?;
+        match self.interval_95 {
+            (low, Some(high)) => write!(f, "   95 %: {:.2} to {:.2} kPa", k(low), k(high))?,
+            (low, None) if low > 0.0 => write!(f, "   95 %: above {:.2} kPa", k(low))?,
+            (_, None) => f.write_str("   no interval: the errors are not known")?,
+        }
+        write!(f, "   ({})", self.estimator)
+    }
+}
+
+impl Display for FrameResult {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        match self.force_n {
+            Ok(force) => write!(f, "force {} N", with_its_error(force, 1.0))?,
+            Err(_) => f.write_str("force unknown")?,
+        }
+        let radius = self.contact_radius_m;
+        if let Some(gauge) = self.gauge_force_n {
+            write!(f, " (gauge {gauge:.4} N)")?;
+        }
+        write!(f, "   contact radius {} mm", with_its_error(radius, 1e3))?;
+        if let Some(ratio) = self.contact_ratio {
+            write!(f, "   a/R {ratio:.3}")?;
+        }
+        let [x, y] = self.centroid_px;
+        write!(f, "   centroid ({x:.2}, {y:.2}) px")?;
+        match self.mean_stress_pa {
+            Some(stress) => write!(f, "   mean stress {} kPa", with_its_error(stress, 1e-3)),
+            None => Ok(()),
+        }
+    }
+}
+
+impl Display for MatchResult {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "{} of {} control points matched, residual {:.1} µm, mean displacement {:.1} µm, {} after {} iterations",
+            self.matched,
+            self.points,
+            self.residual_m * 1e6,
+            self.mean_displacement_m * 1e6,
+            stop_text(self.stop),
+            self.iterations
+        )
+    }
+}
+
+impl Display for StrainResult {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        // The strain between equal frames is zero to rounding: digits beyond the sixth are never known.
+        let error = |i: usize, j: usize| self.standard_error[i][j].max(1e-6);
+        let e = |i: usize, j: usize| with_error(self.mean[i][j], error(i, j), 1.0);
+        write!(
+            f,
+            "{}: e_xx {}  e_yy {}  e_zz {}",
+            self.measure,
+            e(0, 0),
+            e(1, 1),
+            e(2, 2)
+        )
+    }
+}
+
+/// The first three cautions of every kind, and how many more there are: of a press with thousands of frames each may
+/// carry the same one.
+fn cautions(f: &mut Formatter<'_>, flags: &[Flag]) -> fmt::Result {
+    let kind = |flag: &Flag| {
+        let warning = match flag {
+            Flag::Assumption { warning } => Some(std::mem::discriminant(warning)),
+            _ => None,
+        };
+        (std::mem::discriminant(flag), warning)
+    };
+    let mut printed = Vec::new();
+    for flag in flags {
+        if printed.contains(&kind(flag)) {
+            continue;
+        }
+        printed.push(kind(flag));
+        let alike = || flags.iter().filter(|other| kind(other) == kind(flag));
+        for flag in alike().take(3) {
+            writeln!(f, "  {flag}")?;
+        }
+        let more = alike().count().saturating_sub(3);
+        if more > 0 {
+            writeln!(f, "  … and {more} more like it")?;
+        }
+    }
+    Ok(())
+}
+
+/// A result under its heading, or why there is none.
+fn line<T: Display>(
+    f: &mut Formatter<'_>,
+    heading: &str,
+    result: &Result<T, PipelineError>,
+) -> fmt::Result {
+    match result {
+        Ok(value) => writeln!(f, "{heading:<16} {value}"),
+        Err(error) => writeln!(f, "{heading:<16} none: {error}"),
+    }
+}
+
+fn stop_text(stop: StopReason) -> &'static str {
+    match stop {
+        StopReason::Converged => "converged",
+        StopReason::Exact => "exact",
+        StopReason::IterationLimit => "not converged",
+        StopReason::Cancelled => "stopped by the caller",
+        StopReason::Degenerate => "degenerate",
+        _ => "stopped",
+    }
+}
+
+impl Display for Measurement {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        line(f, "Young's modulus", &self.youngs_modulus_pa)?;
+        if let Some(time) = &self.time {
+            writeln!(f, "{:<16} {time}", "over time")?;
+        }
+        for (i, frame) in self.frames.iter().enumerate() {
+            line(f, &format!("frame {}", i + 1), frame)?;
+        }
+        line(f, "match", &self.matching)?;
+        line(f, "strain", &self.strain)?;
+        if !self.estimators.is_empty() {
+            writeln!(f, "all estimators:")?;
+        }
+        for estimate in &self.estimators {
+            writeln!(f, "  {estimate}")?;
+        }
+        if !self.flags.is_empty() {
+            writeln!(f, "cautions:")?;
+            cautions(f, &self.flags)?;
+        }
+        Ok(())
+    }
+}
+
+impl Display for ContactReading {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        match self.force_n {
+            Some(force) => write!(f, "force {} N", with_its_error(force, 1.0))?,
+            None => f.write_str("force unknown")?,
+        }
+        write!(
+            f,
+            "   contact radius {} mm",
+            with_its_error(self.contact_radius_m, 1e3)
+        )?;
+        if let Some(depth) = self.indentation_m {
+            write!(f, "   indentation {} mm", with_its_error(depth, 1e3))?;
+        }
+        let [x, y] = self.centroid_px.map(|c| with_its_error(c, 1.0));
+        write!(f, "   centroid ({x}, {y}) px")?;
+        self.flags(0)
+            .try_for_each(|flag| match flag.to_string().strip_prefix("frame 1: ") {
+                Some(caution) => write!(f, "   [{caution}]"),
+                None => write!(f, "   [{flag}]"),
+            })
+    }
+}
+
+impl Display for Update {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        write!(f, "frame {}: ", self.frame + 1)?;
+        match &self.contact {
+            Some(contact) => write!(f, "{contact}")?,
+            None => f.write_str("no contact")?,
+        }
+        if let Some(shear) = &self.shear {
+            let [x, y] = shear.force_n.map(|e| with_its_error(e, 1.0));
+            write!(f, "   shear ({x}, {y}) N")?;
+        }
+        Ok(())
+    }
+}
+
+impl Display for DriftWatch {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        let Self {
+            frames,
+            last_grey,
+            greatest_grey,
+            ..
+        } = self;
+        let s = if *frames == 1 { "" } else { "s" };
+        write!(
+            f,
+            "light {last_grey:+.2} grey levels from the reference, {greatest_grey:+.2} at most, in "
+        )?;
+        write!(f, "{frames} frame{s} without contact")
+    }
+}
+
+/// A value with its standard error, scaled to a unit: two significant digits of the error decide the decimals.
+pub fn with_error(value: f64, error: f64, scale: f64) -> String {
+    let (value, error) = (value * scale, error * scale);
+    if !(error > 0.0 && error.is_finite()) {
+        return format!("{value:.4}");
+    }
+    let decimals = (1 - error.log10().floor() as i32).max(0) as usize;
+    // Beyond the twelfth decimal it is rounding.
+    if decimals > 12 {
+        return format!("{value:.4}");
+    }
+    format!("{value:.decimals$} ± {error:.decimals$}")
+}
+
+/// An estimate with its standard error, scaled to a unit.
+fn with_its_error(e: Estimate, scale: f64) -> String {
+    with_error(e.value, e.standard_error, scale)
+}
+
+/// How results that may be missing are written: `{"value": …}` or `{"error": "…"}`.
+#[cfg(feature = "serde")]
+pub(super) mod outcome {
+    use super::PipelineError;
+    use serde::{Serialize, Serializer};
+
+    #[derive(Serialize)]
+    #[serde(rename_all = "snake_case")]
+    enum Outcome<'a, T> {
+        Value(&'a T),
+        Error(String),
+    }
+
+    impl<'a, T> From<&'a Result<T, PipelineError>> for Outcome<'a, T> {
+        fn from(result: &'a Result<T, PipelineError>) -> Self {
+            match result {
+                Ok(value) => Self::Value(value),
+                Err(error) => Self::Error(error.to_string()),
+            }
+        }
+    }
+
+    pub fn one<T: Serialize, S: Serializer>(
+        result: &Result<T, PipelineError>,
+        serializer: S,
+    ) -> Result<S::Ok, S::Error> {
+        Outcome::from(result).serialize(serializer)
+    }
+
+    pub fn each<T: Serialize, S: Serializer>(
+        results: &[Result<T, PipelineError>],
+        serializer: S,
+    ) -> Result<S::Ok, S::Error> {
+        serializer.collect_seq(results.iter().map(Outcome::from))
+    }
+
+    /// What has a name or a sentence, as that.
+    pub fn text<S: Serializer>(
+        value: &impl std::fmt::Display,
+        serializer: S,
+    ) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(value)
+    }
+
+    pub fn texts<S: Serializer>(
+        values: &[impl std::fmt::Display],
+        serializer: S,
+    ) -> Result<S::Ok, S::Error> {
+        serializer.collect_seq(values.iter().map(ToString::to_string))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::with_error;
+
+    #[test]
+    fn a_value_has_the_digits_that_its_error_allows() {
+        assert_eq!(with_error(3.27124e-3, 4.1e-8, 1e3), "3.271240 ± 0.000041");
+        assert_eq!(with_error(103_384.0, 140.0, 1e-3), "103.38 ± 0.14");
+        assert_eq!(with_error(0.7, 0.0, 1.0), "0.7000");
+        assert_eq!(
+            with_error(0.7, 3e-17, 1.0),
+            "0.7000",
+            "rounding is no error"
+        );
+    }
+}

@@ -1,0 +1,748 @@
+//! A session: one sensor, one object, a stream of frames.
+//!
+//! The first frames without contact make the reference. Then every frame gives its contact and force, and every contact
+//! refines the modulus. Shear is followed where its stiffnesses are known, drift of the light watched in frames without
+//! contact. Strain is followed on request ([`Session::strain`]), from the load where that began: its surface, points and
+//! spline are kept, and each match begins where the last one ended. Memory is constant: similar loads are merged.
+//! [`Session::push`] and, with the default stages, [`Session::strain`] allocate nothing once their buffers have their size.
+use super::composition::Pipeline;
+use super::contact::{ContactReading, FrameContact, resize};
+use super::error::PipelineError;
+use super::flag::Flag;
+use super::loads::{self, Load, MOST_LOADS, SeenLoads};
+use super::report::{Report, SkipReason, Stage};
+use super::specimen::{FlatSpecimen, Specimen};
+use super::stages::{Bench, MatchedPoints, PairStrain, Stages};
+use super::surface::{ContactSurface, ControlPoints};
+use crate::elasticity::modulus::ModulusEstimate;
+use crate::force::{
+    FrameCondition, HealthMonitor, HealthOptions, HealthReport, ShearCalibration, ShearMeasurement,
+    ShearTracker, StuckPixels,
+};
+use crate::matching::{MatchReport, MatchedPairs, WarmStart};
+use ndarray::{Array2, ArrayView2};
+use std::sync::Arc;
+
+/// The answer of a stream to one frame.
+///
+/// ```
+/// use std::sync::Arc;
+/// use tactile_imaging::pipeline::{Object, Pipeline, Session, Update};
+/// # use tactile_imaging::force::CalibrationPair;
+/// # let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
+/// # let hertz = |peak: f64| ndarray::Array2::from_shape_fn((64, 64), |(r, c)| {
+/// #     let d = ((r as f64 - 32.0).hypot(c as f64 - 32.0) / 20.0).min(1.0);
+/// #     10 + (peak * (1.0 - d * d).sqrt()).round() as u8
+/// # });
+/// let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?;
+/// let mut session = Session::new(&pipeline, &[hertz(0.0).view()])?;
+/// let first: Update = session.push(hertz(120.0).view())?;
+/// assert_eq!((first.frame, first.shear), (0, None), "the stiffnesses are not known");
+/// assert!(first.to_string().starts_with("frame 1: force 1.00"));
+/// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub struct Update {
+    /// Number of the frame, counted from 0.
+    pub frame: u64,
+    /// The contact. `None` where nothing touches.
+    pub contact: Option<ContactReading>,
+    /// Shear since contact began, where the session knows the stiffnesses.
+    pub shear: Option<ShearMeasurement>,
+}
+
+/// Drift of the light since the reference was taken, seen in frames without contact, in grey levels: the mean of frame
+/// minus reference.
+///
+/// ```
+/// use std::sync::Arc;
+/// use tactile_imaging::pipeline::{DriftWatch, Flag, Object, Pipeline, Session};
+/// # use tactile_imaging::force::CalibrationPair;
+/// # let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
+/// # let hertz = |peak: f64| ndarray::Array2::from_shape_fn((64, 64), |(r, c)| {
+/// #     let d = ((r as f64 - 32.0).hypot(c as f64 - 32.0) / 20.0).min(1.0);
+/// #     10 + (peak * (1.0 - d * d).sqrt()).round() as u8
+/// # });
+/// let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?;
+/// let mut session = Session::new(&pipeline, &[hertz(0.0).view()])?;
+/// // The light fades by two grey levels and recovers by one.
+/// for loss in [0, 2, 1] {
+///     session.push(hertz(0.0).mapv(|v| v - loss).view())?;
+/// }
+/// assert_eq!(session.drift(), &DriftWatch { frames: 3, last_grey: -1.0, greatest_grey: -2.0, caution: Some(Flag::LightDrifted { grey: -1.0 }) });
+/// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
+/// ```
+#[derive(Clone, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub struct DriftWatch {
+    /// Frames without contact so far.
+    pub frames: u64,
+    /// In the last of them.
+    pub last_grey: f64,
+    /// The greatest so far, with its sign.
+    pub greatest_grey: f64,
+    /// The light had drifted by more than half a grey level when the sensor was last free: the reference should be taken anew, or the contact
+    /// stage told to correct drift.
+    pub caution: Option<Flag>,
+}
+
+impl DriftWatch {
+    /// Drift beyond which the reference should be taken anew.
+    const LIMIT_GREY: f64 = 0.5;
+
+    fn watch(&mut self, grey: f64) {
+        self.frames += 1;
+        self.last_grey = grey;
+        self.caution = (grey.abs() > Self::LIMIT_GREY).then_some(Flag::LightDrifted { grey });
+        if grey.abs() > self.greatest_grey.abs() {
+            self.greatest_grey = grey;
+        }
+    }
+}
+
+/// Charts of gain and noise, and the pixels that do not follow.
+struct SensorHealth {
+    monitor: HealthMonitor,
+    report: Option<HealthReport>,
+    stuck: Option<StuckPixels>,
+}
+
+impl SensorHealth {
+    fn new(options: HealthOptions) -> Self {
+        Self {
+            monitor: HealthMonitor::new(options),
+            report: None,
+            stuck: None,
+        }
+    }
+
+    fn watch(&mut self, number: u64, frame: ArrayView2<'_, u8>, condition: Option<FrameCondition>) {
+        let Some(condition) = condition else { return };
+        self.report = Some(self.monitor.update(&condition));
+        // A look reads the whole frame, so that it must be rare. Sixteen looks, the fewest that tell, are 13 seconds at 80
+        // frames a second.
+        if !number.is_multiple_of(64) {
+            return;
+        }
+        if self.stuck.is_none() {
+            self.stuck = StuckPixels::new(frame.dim()).ok();
+        }
+        if let Some(stuck) = &mut self.stuck {
+            // All frames of a session have the reference's size, or they were refused before.
+            let _ = stuck.update(frame);
+        }
+    }
+
+    fn report(&self) -> Option<HealthReport> {
+        self.report
+    }
+
+    fn stuck_pixels(&self) -> Vec<(usize, usize)> {
+        self.stuck
+            .as_ref()
+            .map_or_else(Vec::new, StuckPixels::pixels)
+    }
+}
+
+/// Follows a stream of frames from one sensor pressed on one object. `Send`: one session a thread.
+///
+/// ```
+/// use std::sync::Arc;
+/// use tactile_imaging::pipeline::Session;
+/// use tactile_simulate::Trial;
+/// use tactile_simulate::{CalibrationRun, Camera, PressOptions};
+/// let camera = Camera::default().coarser(8);
+/// let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationRun::default())?;
+/// let mut session = Session::new(&trial.pipeline()?, &[trial.simulation.reference.view()])?;
+/// for frame in &trial.simulation.frames {
+///     assert!(session.push(frame.view())?.contact.is_some());
+/// }
+/// let modulus = session.modulus()?;
+/// assert!((modulus.youngs_modulus_pa / 103e3 - 1.0).abs() < 0.0538);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub struct Session {
+    stages: Stages,
+    bench: Bench,
+    contact: FrameContact,
+    last: Array2<u8>,
+    /// Whether `contact` is that of `last`, and which frame that was.
+    measured: bool,
+    measured_frame: u64,
+    frames: u64,
+    loads: SeenLoads,
+    shear: Option<ShearTracker>,
+    strain: FollowedStrain,
+    /// The first contact that a flat face's loads are compared with.
+    first_contact: Option<ContactReading>,
+    drift: DriftWatch,
+    health: SensorHealth,
+}
+
+impl Session {
+    /// Loads that a session keeps apart. More are merged.
+    pub const MOST_LOADS: usize = MOST_LOADS;
+
+    /// A session whose reference is the mean of one or more frames without contact. Of more, the noise is measured too.
+    ///
+    /// ```
+    /// use std::sync::Arc;
+    /// use tactile_imaging::pipeline::{Object, Pipeline, Session};
+    /// # use tactile_imaging::force::CalibrationPair;
+    /// # let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
+    /// # let hertz = |peak: f64| ndarray::Array2::from_shape_fn((64, 64), |(r, c)| {
+    /// #     let d = ((r as f64 - 32.0).hypot(c as f64 - 32.0) / 20.0).min(1.0);
+    /// #     10 + (peak * (1.0 - d * d).sqrt()).round() as u8
+    /// # });
+    /// let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?;
+    /// let empty = hertz(0.0);
+    /// let mut session = Session::new(&pipeline, &[empty.view(), empty.view(), empty.view()])?;
+    /// let force = session.push(hertz(60.0).view())?.contact.and_then(|c| c.force_n).expect("a force");
+    /// assert!((force.value / 0.503 - 1.0).abs() < 0.01);
+    /// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`PipelineError::Sensor`] for no frames, or frames that differ in size.
+    pub fn new(
+        pipeline: &Pipeline,
+        references: &[ArrayView2<'_, u8>],
+    ) -> Result<Self, PipelineError> {
+        let reference = Arc::new(pipeline.reference_frame(references)?);
+        Ok(Self {
+            stages: Stages::new(pipeline.clone(), reference),
+            bench: Bench::default(),
+            contact: FrameContact::default(),
+            last: Array2::default((0, 0)),
+            measured: false,
+            measured_frame: 0,
+            frames: 0,
+            loads: SeenLoads::new(),
+            shear: None,
+            strain: FollowedStrain::default(),
+            first_contact: None,
+            drift: DriftWatch::default(),
+            health: SensorHealth::new(HealthOptions::default()),
+        })
+    }
+
+    /// Follows shear too: F_x = K_x u_x, F_y = K_y u_y, u the way of the centroid since contact began.
+    ///
+    /// ```
+    /// use ndarray::Array2;
+    /// use std::sync::Arc;
+    /// use tactile_imaging::force::{Estimate, ShearCalibration};
+    /// use tactile_imaging::pipeline::{Object, Pipeline, Session};
+    /// # use tactile_imaging::force::CalibrationPair;
+    /// # let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
+    /// // A contact that slides along x by two pixels of 50 µm, held by 400 N/m.
+    /// let press = |x: f64| Array2::from_shape_fn((64, 64), |(r, c)| {
+    ///     let d = ((r as f64 - 32.0).hypot(c as f64 - x) / 20.0).min(1.0);
+    ///     10 + (120.0 * (1.0 - d * d).sqrt()).round() as u8
+    /// });
+    /// let stiffness_n_per_m = [Estimate::new(400.0, 4.0); 2];
+    /// let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?;
+    /// let mut session = Session::new(&pipeline, &[Array2::from_elem((64, 64), 10).view()])?
+    ///     .with_shear(ShearCalibration { stiffness_n_per_m, residual_sd_n: [0.0; 2] });
+    /// session.push(press(32.0).view())?;
+    /// let shear = session.push(press(34.0).view())?.shear.expect("stiffnesses are known");
+    /// assert!((shear.force_n[0].value - 0.04).abs() < 1e-3 && shear.force_n[1].value.abs() < 1e-3);
+    /// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
+    /// ```
+    #[must_use]
+    pub fn with_shear(mut self, calibration: ShearCalibration) -> Self {
+        self.shear = Some(ShearTracker::new(calibration));
+        self
+    }
+
+    /// Sets what counts as a change of the sensor. [`health`](Self::health) starts anew. The default is a change of the brightness by 2 %
+    /// or of the noise by 20 %.
+    ///
+    /// ```
+    /// use tactile_imaging::force::{ChartState, HealthOptions};
+    /// use tactile_imaging::pipeline::{Object, Pipeline, Session};
+    /// # use tactile_imaging::force::CalibrationPair;
+    /// # let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
+    /// let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?;
+    /// let frame = |k: usize, grey: usize| ndarray::Array2::from_shape_fn((96, 96), |(r, c)| {
+    ///     (grey + (7 * r + 13 * c + 5 * k) % 4) as u8
+    /// });
+    /// let options = HealthOptions::default().with_baseline_frames(50)?;
+    /// let mut session = Session::new(&pipeline, &[frame(0, 40).view()])?.with_health(options);
+    /// for k in 0..60 {
+    ///     session.push(frame(k, 40).view())?;
+    /// }
+    /// assert_eq!(session.health().map(|h| h.brightness), Some(ChartState::Healthy));
+    /// // The light rises by a fortieth.
+    /// for k in 60..110 {
+    ///     session.push(frame(k, 41).view())?;
+    /// }
+    /// assert_eq!(session.health().map(|h| h.brightness), Some(ChartState::Changed));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub fn with_health(mut self, options: HealthOptions) -> Self {
+        self.health = SensorHealth::new(options);
+        self
+    }
+
+    /// Measures the next frame. A contact that is alone, whole, unsaturated and inside the calibration refines the modulus;
+    /// a frame without contact is watched for drift of the light.
+    ///
+    /// # Errors
+    /// [`PipelineError::Contact`]. The session can go on with the next frame.
+    pub fn push(&mut self, frame: ArrayView2<'_, u8>) -> Result<Update, PipelineError> {
+        let number = self.frames;
+        self.frames += 1;
+        self.measure(number, frame)?;
+        let contact = self.contact.reading;
+        let size = self.stages.pipeline.contact().pixel_size_m();
+        let centroid = contact.map(|c| std::array::from_fn(|k| c.centroid_px[k] * size[k]));
+        let shear = self
+            .shear
+            .as_mut()
+            .and_then(|tracker| tracker.update(centroid));
+        Ok(Update {
+            frame: number,
+            contact,
+            shear,
+        })
+    }
+
+    fn measure(&mut self, number: u64, frame: ArrayView2<'_, u8>) -> Result<(), PipelineError> {
+        self.measured = false;
+        resize(&mut self.last, frame.dim());
+        match (self.last.as_slice_mut(), frame.as_slice()) {
+            (Some(to), Some(from)) => to.copy_from_slice(from),
+            _ => self.last.assign(&frame),
+        }
+        let before = self.contact.reading;
+        let (bench, contact) = (&mut self.bench, &mut self.contact);
+        self.stages
+            .contact(bench, number as usize, frame, None, contact)?;
+        self.measured = true;
+        self.measured_frame = number;
+        // Equal readings are those of one image, which noise moves: counted twice it would not be better known.
+        if let Some(reading) = self
+            .contact
+            .reading
+            .filter(|_| self.contact.reading != before)
+        {
+            let usable = match self.stages.specimen {
+                Specimen::Curved => true,
+                Specimen::Flat(flat) => self.check_face(flat, &reading).is_ok(),
+            };
+            if usable {
+                self.first_contact.get_or_insert(reading);
+                self.loads.learn(&reading, None);
+            }
+        }
+        if let Some(grey) = self.contact.background_step_grey {
+            self.drift.watch(grey);
+        }
+        let condition = self.bench.force.detector.condition(&self.stages.reference);
+        self.health.watch(number, frame, condition);
+        Ok(())
+    }
+
+    /// Refuses a contact that is not that of one flat face, the same as in the first frame.
+    fn check_face(
+        &self,
+        flat: FlatSpecimen,
+        contact: &ContactReading,
+    ) -> Result<(), PipelineError> {
+        let both = self.first_contact.iter().chain([contact]);
+        flat.check(both.map(|contact| (self.measured_frame as usize, contact)))
+    }
+
+    /// Frames seen so far.
+    pub fn frames(&self) -> u64 {
+        self.frames
+    }
+
+    /// Loads kept apart so far, at most [`MOST_LOADS`](Self::MOST_LOADS).
+    ///
+    /// ```
+    /// # use std::sync::Arc;
+    /// # use tactile_imaging::pipeline::{Object, Pipeline, Session};
+    /// # use tactile_imaging::force::CalibrationPair;
+    /// # let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
+    /// # let hertz = |peak: f64| ndarray::Array2::from_shape_fn((64, 64), |(r, c)| {
+    /// #     let d = ((r as f64 - 32.0).hypot(c as f64 - 32.0) / 20.0).min(1.0);
+    /// #     10 + (peak * (1.0 - d * d).sqrt()).round() as u8
+    /// # });
+    /// # let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?;
+    /// let mut session = Session::new(&pipeline, &[hertz(0.0).view()])?;
+    /// for peak in [120.0, 60.0, 120.0] {
+    ///     session.push(hertz(peak).view())?;
+    ///     session.push(hertz(0.0).view())?;
+    /// }
+    /// assert_eq!((session.frames(), session.loads()), (6, 3), "frames without contact are no load");
+    /// for k in 0..40 {
+    ///     session.push(hertz(100.0 + f64::from(k)).view())?;
+    /// }
+    /// assert_eq!(session.loads(), Session::MOST_LOADS, "forty forces, the closest merged");
+    /// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
+    /// ```
+    pub fn loads(&self) -> usize {
+        self.loads.len()
+    }
+
+    /// Drift of the light, seen in frames without contact.
+    ///
+    /// ```
+    /// use tactile_imaging::pipeline::Flag;
+    /// # use std::sync::Arc;
+    /// # use tactile_imaging::pipeline::{Object, Pipeline, Session};
+    /// # use tactile_imaging::force::CalibrationPair;
+    /// # let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
+    /// # let hertz = |peak: f64| ndarray::Array2::from_shape_fn((64, 64), |(r, c)| {
+    /// #     let d = ((r as f64 - 32.0).hypot(c as f64 - 32.0) / 20.0).min(1.0);
+    /// #     10 + (peak * (1.0 - d * d).sqrt()).round() as u8
+    /// # });
+    /// # let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?;
+    /// let mut session = Session::new(&pipeline, &[hertz(0.0).view()])?;
+    /// session.push(hertz(0.0).mapv(|v| v - 2).view())?;
+    /// session.push(hertz(120.0).view())?;
+    /// let drift = session.drift();
+    /// assert_eq!((drift.frames, drift.last_grey), (1, -2.0), "contacts say nothing of the light");
+    /// assert_eq!(drift.caution, Some(Flag::LightDrifted { grey: -2.0 }));
+    /// session.push(hertz(0.0).view())?;
+    /// assert_eq!(session.drift().caution, None, "the light is back");
+    /// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
+    /// ```
+    pub fn drift(&self) -> &DriftWatch {
+        &self.drift
+    }
+
+    /// Gain and noise of the sensor as its background shows them, contacts or not, against the session's first frames
+    /// ([`HealthOptions::with_baseline_frames`]). `None` before a frame, and where the contact stage does not look at the background.
+    pub fn health(&self) -> Option<HealthReport> {
+        self.health.report()
+    }
+
+    /// Pixels (row, column) that have kept one grey level while their neighbours changed. Every 64th frame is looked at, and none is
+    /// named before sixteen looks. O(pixels).
+    ///
+    /// ```
+    /// use tactile_imaging::pipeline::{Object, Pipeline, Session};
+    /// # use tactile_imaging::force::CalibrationPair;
+    /// # let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
+    /// let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?;
+    /// let frame = |k: usize| ndarray::Array2::from_shape_fn((64, 64), |(r, c)| {
+    ///     if (r, c) == (12, 30) { 44 } else { (40 + (7 * r + 13 * c + k / 64) % 4) as u8 }
+    /// });
+    /// let mut session = Session::new(&pipeline, &[frame(0).view()])?;
+    /// for k in 0..1024 {
+    ///     session.push(frame(k).view())?;
+    /// }
+    /// assert_eq!(session.stuck_pixels(), [(12, 30)]);
+    /// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
+    /// ```
+    pub fn stuck_pixels(&self) -> Vec<(usize, usize)> {
+        self.health.stuck_pixels()
+    }
+
+    /// The stages that ran so far, and those that were skipped.
+    ///
+    /// ```
+    /// use std::sync::Arc;
+    /// use tactile_imaging::pipeline::{Object, Pipeline, Session, SkipReason, Stage};
+    /// # use tactile_imaging::force::CalibrationPair;
+    /// # let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
+    /// # let hertz = |peak: f64| ndarray::Array2::from_shape_fn((64, 64), |(r, c)| {
+    /// #     let d = ((r as f64 - 32.0).hypot(c as f64 - 32.0) / 20.0).min(1.0);
+    /// #     10 + (peak * (1.0 - d * d).sqrt()).round() as u8
+    /// # });
+    /// let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?;
+    /// let mut session = Session::new(&pipeline, &[hertz(0.0).view()])?;
+    /// for peak in [0.0, 120.0, 120.0, 120.0] {
+    ///     session.push(hertz(peak).view())?;
+    /// }
+    /// let report = session.report();
+    /// assert_eq!(report.work(Stage::Contact).runs, 4);
+    /// assert_eq!((report.skips[0].reason, report.skips[0].frames), (SkipReason::NoContact, 1));
+    /// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
+    /// ```
+    pub fn report(&self) -> &Report {
+        &self.bench.report
+    }
+
+    /// Strain of the last frame against the load where strain began to be asked for. That load's own answer is `None`.
+    ///
+    /// The first call makes its frame's load the one that strains are counted from, until [`restart_strain`](Self::restart_strain).
+    /// Costs the surface, control points, match and strain of one frame. A call without a new frame costs nothing.
+    ///
+    /// ```
+    /// use std::sync::Arc;
+    /// use tactile_imaging::pipeline::Session;
+    /// use tactile_simulate::Trial;
+    /// use tactile_simulate::{Camera, CalibrationRun, PressLoad, PressOptions};
+    /// let camera = Camera::default().coarser(4);
+    /// let loads = [0.7, 1.0, 1.2].map(PressLoad::normal).to_vec();
+    /// let trial = Trial::new(PressOptions { camera, loads, ..PressOptions::default() }, &CalibrationRun::default())?;
+    /// let mut session = Session::new(&trial.pipeline()?, &[trial.simulation.reference.view()])?;
+    /// let mut across = Vec::new();
+    /// for frame in &trial.simulation.frames {
+    ///     session.push(frame.view())?;
+    ///     across.extend(session.strain()?.map(|found| found.strain.summary.mean[(0, 0)]));
+    /// }
+    /// // From 0.7 N the surface of a ball grows with the cube root of the load.
+    /// let truth = |force: f64| 0.5 * ((force / 0.7_f64).powf(2.0 / 3.0) - 1.0);
+    /// assert_eq!(across.len(), 2);
+    /// assert!((across[0] - truth(1.0)).abs() < 0.02 && (across[1] - truth(1.2)).abs() < 0.02);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`PipelineError::NoContact`] where nothing touches. Those of a [`Press`](crate::pipeline::Press)'s strain.
+    pub fn strain(&mut self) -> Result<Option<&SessionStrain>, PipelineError> {
+        let Some(reading) = self.contact.reading.filter(|_| self.measured) else {
+            return Err(PipelineError::NoContact {
+                frame: self.frames.saturating_sub(1) as usize,
+            });
+        };
+        let frame = Frame {
+            number: self.measured_frame,
+            image: self.last.view(),
+            contact: &self.contact,
+            reading,
+        };
+        self.strain.follow(&self.stages, &mut self.bench, &frame)
+    }
+
+    /// Counts strain anew, from the next load that [`strain`](Self::strain) is asked for.
+    ///
+    /// ```
+    /// # use std::sync::Arc;
+    /// # use tactile_imaging::pipeline::Session;
+    /// # use tactile_simulate::Trial;
+    /// # use tactile_simulate::{Camera, CalibrationRun, PressOptions};
+    /// # let camera = Camera::default().coarser(8);
+    /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationRun::default())?;
+    /// # let mut session = Session::new(&trial.pipeline()?, &[trial.simulation.reference.view()])?;
+    /// session.push(trial.simulation.frames[0].view())?;
+    /// assert!(session.strain()?.is_none());
+    /// session.push(trial.simulation.frames[1].view())?;
+    /// session.restart_strain();
+    /// assert!(session.strain()?.is_none(), "strain is now counted from this frame");
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn restart_strain(&mut self) {
+        self.strain = FollowedStrain::default();
+    }
+
+    /// Young's modulus from all loads so far, by the estimator of the pipeline. Where that needs strain the loads are those whose [`strain`](Self::strain) was asked for;
+    /// of a flat face all.
+    ///
+    /// # Errors
+    /// [`PipelineError::Modulus`]. [`PipelineError::NotUniaxial`] where the last contact is not that of a flat face.
+    pub fn modulus(&mut self) -> Result<ModulusEstimate, PipelineError> {
+        let pipeline = &self.stages.pipeline;
+        let estimator = pipeline.estimator()?;
+        let (settings, size) = (pipeline.settings(), pipeline.contact().pixel_size_m());
+        let loads = match self.stages.specimen {
+            Specimen::Curved if estimator.needs_strain() => {
+                loads::series(self.strain.loads(), settings, size)?
+            }
+            Specimen::Flat(flat) if estimator.needs_strain() => {
+                if let Some(contact) = &self.contact.reading {
+                    self.check_face(flat, contact)?;
+                }
+                let series = loads::series(self.loads.loads(), settings, size)?;
+                flat.strained(&series, pipeline.strain())?
+            }
+            _ => loads::series(self.loads.loads(), settings, size)?,
+        };
+        self.stages
+            .modulus(&mut self.bench, estimator.as_ref(), &loads)
+    }
+}
+
+/// Strain of one frame of a stream.
+///
+/// ```
+/// # use std::sync::Arc;
+/// # use tactile_imaging::pipeline::Session;
+/// # use tactile_simulate::Trial;
+/// # use tactile_simulate::{Camera, CalibrationRun, PressOptions};
+/// # let camera = Camera::default().coarser(8);
+/// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationRun::default())?;
+/// let mut session = Session::new(&trial.pipeline()?, &[trial.simulation.reference.view()])?;
+/// for frame in &trial.simulation.frames {
+///     session.push(frame.view())?;
+///     if let Some(found) = session.strain()? {
+///         assert_eq!((found.from, found.to), (0, 1));
+///         assert!(found.strain.summary.mean[(0, 0)] > 0.0, "the load rose: the surface grew");
+///     }
+/// }
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Debug, Default)]
+pub struct SessionStrain {
+    /// The frame from whose load strain is counted, from 0.
+    pub from: u64,
+    /// The strained frame.
+    pub to: u64,
+    /// Control points with a partner on the strained surface; 0 of a flat face, whose strain is that of its area.
+    pub matched: usize,
+    /// How the match went.
+    pub report: MatchReport,
+    /// The strain at the control points of the load it is counted from.
+    pub strain: PairStrain,
+}
+
+/// The frame whose strain is asked for.
+struct Frame<'a> {
+    number: u64,
+    image: ArrayView2<'a, u8>,
+    contact: &'a FrameContact,
+    reading: ContactReading,
+}
+
+/// The load that strain is counted from.
+struct Anchor {
+    frame: u64,
+    reading: ContactReading,
+    /// Pixels of its contact: all surfaces have its grid.
+    pixels: usize,
+    /// None of a flat face, whose strain is that of its area.
+    points: Option<ControlPoints>,
+}
+
+/// Memory of the stages before the strain.
+#[derive(Default)]
+struct Buffers {
+    surface: ContactSurface,
+    points: ControlPoints,
+    pairs: MatchedPairs,
+}
+
+impl Buffers {
+    /// The control points of a frame's surface, into `points`.
+    fn sample(
+        &mut self,
+        stages: &Stages,
+        bench: &mut Bench,
+        frame: &Frame<'_>,
+        grid_pixels: usize,
+    ) -> Result<(), PipelineError> {
+        let (number, surface) = (frame.number as usize, &mut self.surface);
+        stages.surface(
+            bench,
+            number,
+            frame.image,
+            frame.contact,
+            grid_pixels,
+            surface,
+        )?;
+        stages.control_points(bench, number, surface, &mut self.points)
+    }
+}
+
+/// Strain from frame to frame.
+#[derive(Default)]
+struct FollowedStrain {
+    anchor: Option<Anchor>,
+    warm: WarmStart,
+    buffers: Buffers,
+    last: Option<SessionStrain>,
+    loads: Option<SeenLoads>,
+}
+
+impl FollowedStrain {
+    /// The strain of `frame`. `None` where it is the one that strain is counted from.
+    fn follow(
+        &mut self,
+        stages: &Stages,
+        bench: &mut Bench,
+        frame: &Frame<'_>,
+    ) -> Result<Option<&SessionStrain>, PipelineError> {
+        let Some(anchor) = &self.anchor else {
+            let pixels = frame.contact.pixels();
+            let points = match stages.specimen {
+                Specimen::Curved => {
+                    self.buffers.sample(stages, bench, frame, pixels)?;
+                    Some(std::mem::take(&mut self.buffers.points))
+                }
+                Specimen::Flat(_) => None,
+            };
+            self.anchor = Some(Anchor {
+                frame: frame.number,
+                reading: frame.reading,
+                pixels,
+                points,
+            });
+            return Ok(None);
+        };
+        if anchor.frame == frame.number {
+            return Ok(None);
+        }
+        let known = |last: &SessionStrain| last.to == frame.number;
+        if !self.last.as_ref().is_some_and(known) {
+            // A strain that fails leaves none behind.
+            let mut found = self.last.take().unwrap_or_default();
+            (found.from, found.to) = (anchor.frame, frame.number);
+            let (buffers, warm) = (&mut self.buffers, &mut self.warm);
+            strain_since(anchor, buffers, warm, stages, bench, frame, &mut found)?;
+            let force_n = |reading: &ContactReading| reading.force_n.map_or(0.0, |f| f.value);
+            let step = force_n(&frame.reading) - force_n(&anchor.reading);
+            self.loads
+                .get_or_insert_with(SeenLoads::new)
+                .learn(&frame.reading, Some(found.strain.of_load(step)));
+            self.last = Some(found);
+        }
+        Ok(self.last.as_ref())
+    }
+
+    /// The load that strain is counted from, then all others with their strains.
+    fn loads(&self) -> impl Iterator<Item = Load> + Clone + '_ {
+        let anchor = self.anchor.as_ref();
+        let first = anchor.and_then(|anchor| Load::of(&anchor.reading));
+        let later = self.loads.iter().flat_map(SeenLoads::loads);
+        first.into_iter().chain(later)
+    }
+}
+
+fn strain_since(
+    anchor: &Anchor,
+    buffers: &mut Buffers,
+    warm: &mut WarmStart,
+    stages: &Stages,
+    bench: &mut Bench,
+    frame: &Frame<'_>,
+    found: &mut SessionStrain,
+) -> Result<(), PipelineError> {
+    let frames = [anchor.frame as usize, frame.number as usize];
+    if let Specimen::Flat(flat) = stages.specimen {
+        let contacts = [&anchor.reading, &frame.reading];
+        let measure = stages.pipeline.strain();
+        found.strain = bench.timed(Stage::Strain, |_| flat.strain(frames, contacts, measure))?;
+        return Ok(());
+    }
+    let Some(model) = &anchor.points else {
+        return Err(PipelineError::NoContact { frame: frames[0] });
+    };
+    buffers.sample(stages, bench, frame, anchor.pixels)?;
+    bench
+        .report
+        .skipped(Stage::Surface, SkipReason::KeptFromBefore);
+    if found.report.iterations > 0 {
+        bench
+            .report
+            .skipped(Stage::Match, SkipReason::NearLastAnswer);
+    }
+    let (pairs, target) = (&mut buffers.pairs, &buffers.points.points);
+    stages.next_pairs(bench, frames, warm, [&model.points, target], pairs)?;
+    let matched = MatchedPoints {
+        model,
+        target,
+        assignment: &pairs.assignment,
+        confidence: &pairs.confidence,
+    };
+    stages.strain(bench, frames, &matched, &mut found.strain)?;
+    found.matched = pairs.assignment.iter().flatten().count();
+    found.report.clone_from(&pairs.report);
+    Ok(())
+}

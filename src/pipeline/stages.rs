@@ -1,0 +1,398 @@
+//! The stages as functions: values in, values out. A press keeps the answers, a session the memory they are written to.
+use super::composition::Pipeline;
+use super::contact::{ContactStage, FrameContact};
+use super::error::PipelineError;
+use super::report::{Report, SkipReason, Stage};
+use super::specimen::Specimen;
+use super::surface::{self, ContactSurface, ControlPoints, SurfaceWorkspace};
+use crate::elasticity::field::{StrainField, StrainSummary, mean_strain_error};
+use crate::elasticity::modulus::{Estimate, LoadSeries, ModulusEstimate, ModulusEstimator};
+use crate::force::{
+    FaceReading, FaceWorkspace, ForceWorkspace, ReferenceFrame, TextureStretch, texture_spots,
+};
+use crate::matching::{MatchedPairs, Matching, WarmStart};
+use crate::tps::{Pairs, SeriesMemory, StrainSpline};
+use nalgebra::{Matrix3, Point2, Point3};
+use ndarray::ArrayView2;
+use std::sync::Arc;
+use std::time::Instant;
+
+/// The strain between two frames.
+///
+/// ```
+/// # use tactile_simulate::{Trial, CalibrationRun, Camera, PressOptions};
+/// # let camera = Camera::default().coarser(8);
+/// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationRun::default())?;
+/// use tactile_imaging::pipeline::PairStrain;
+/// let pipeline = trial.pipeline()?.with_control_points(60);
+/// let press = trial.press(&pipeline)?;
+/// let strain: &PairStrain = press.strain(1)?;
+/// assert_eq!(strain.field.strains.len(), 60, "one at every control point of the first frame");
+/// let found = strain.summary.mean[(0, 0)];
+/// let [first, last] = [&trial.simulation.truth[0], &trial.simulation.truth[1]];
+/// assert!((found - first.scaling_to(last).green_lagrange_strain()[(0, 0)]).abs() < 0.03);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct PairStrain {
+    /// Name of the measure.
+    pub measure: &'static str,
+    /// Strain at every control point of the first frame.
+    pub field: StrainField,
+    /// Mean, spread and standard error.
+    pub summary: StrainSummary,
+}
+
+impl Default for PairStrain {
+    /// No strain yet, to be filled.
+    fn default() -> Self {
+        let field = StrainField::default();
+        Self {
+            measure: "",
+            summary: field.summary(),
+            field,
+        }
+    }
+}
+
+impl PairStrain {
+    /// The apparent strain of a ball's load for equation (31). The surface that its pressure is read as swells where
+    /// the load rises, in all directions, so that (31) takes the size of the mean e_zz, with the sign of
+    /// `force_step_n`, the step of the load from the first frame to the second.
+    /// (Specimens with a flat face have signed strains.)
+    pub(super) fn of_load(&self, force_step_n: f64) -> Estimate {
+        let size = self.summary.mean[(2, 2)].abs();
+        let error = self.summary.standard_error[(2, 2)];
+        Estimate::new(size.copysign(force_step_n), error)
+    }
+}
+
+/// What a press or a session asks its stages of: nothing in it changes.
+#[derive(Clone)]
+pub struct Stages {
+    pub pipeline: Pipeline,
+    pub reference: Arc<ReferenceFrame>,
+    pub specimen: Specimen,
+    /// The contact stage, or the variant that it has for flat faces.
+    contact: Arc<dyn ContactStage>,
+}
+
+/// Memory that stages reuse from frame to frame, and the record of their work.
+#[derive(Default)]
+pub struct Bench {
+    pub force: ForceWorkspace,
+    face: FaceWorkspace,
+    surface: SurfaceWorkspace,
+    strain: StrainWorkspace,
+    pub report: Report,
+}
+
+impl Bench {
+    /// The answer of a stage, its time recorded.
+    pub fn timed<T>(&mut self, stage: Stage, run: impl FnOnce(&mut Self) -> T) -> T {
+        let start = Instant::now();
+        let answer = run(self);
+        self.report.ran(stage, start.elapsed());
+        answer
+    }
+}
+
+impl Stages {
+    pub fn new(pipeline: Pipeline, reference: Arc<ReferenceFrame>) -> Self {
+        let specimen = pipeline.settings().object.specimen();
+        let contact = match specimen {
+            Specimen::Flat(flat) if flat.stated => pipeline.contact().for_flat_faces(),
+            _ => None,
+        };
+        Self {
+            contact: contact.unwrap_or_else(|| pipeline.shared_contact()),
+            reference,
+            specimen,
+            pipeline,
+        }
+    }
+
+    /// The size of a pixel as the side of a square in metres.
+    pub fn pixel_m(&self) -> f64 {
+        let [hx, hy] = self.contact.pixel_size_m();
+        (hx * hy).sqrt()
+    }
+
+    /// Contact and force of a frame, into `contact`. A force that the stage does not know is the gauge's.
+    pub fn contact(
+        &self,
+        bench: &mut Bench,
+        frame: usize,
+        image: ArrayView2<'_, u8>,
+        gauge: Option<Estimate>,
+        contact: &mut FrameContact,
+    ) -> Result<(), PipelineError> {
+        bench.timed(Stage::Contact, |bench| {
+            self.contact
+                .measure_into(&mut bench.force, image, &self.reference, contact)
+                .map_err(|source| PipelineError::Contact { frame, source })?;
+            contact.check(frame, image.dim())?;
+            if let Some(reading) = &mut contact.reading
+                && reading.force_n.is_none()
+            {
+                reading.take_gauge(gauge);
+            }
+            if let Specimen::Flat(_) = self.specimen {
+                let face = self.face(&mut bench.face, image, contact);
+                if let Some(reading) = &mut contact.reading {
+                    reading.face = face;
+                    if let Some(face) = face.filter(FaceReading::has_edge) {
+                        reading.take_area(face.area_m2);
+                    }
+                }
+            }
+            Ok(())
+        })?;
+        if contact.reading.is_none() {
+            bench.report.skipped(Stage::Surface, SkipReason::NoContact);
+        }
+        Ok(())
+    }
+
+    /// A contact as a flat face.
+    fn face(
+        &self,
+        workspace: &mut FaceWorkspace,
+        image: ArrayView2<'_, u8>,
+        contact: &FrameContact,
+    ) -> Option<FaceReading> {
+        let (reading, region) = (contact.reading.as_ref()?, contact.region?);
+        let images = [image, self.reference.image()];
+        let (polarity, size) = (self.contact.polarity(), self.contact.pixel_size_m());
+        let mut face = workspace.measure(images, region, contact.mask.view(), polarity, size)?;
+        if let Some(lens) = self.contact.lens() {
+            // Pixels of a lens that distorts differ in size.
+            let pixel_m2 = size[0] * size[1];
+            let place = reading.centroid_px.map(|c| c.value);
+            let radius_px = (face.area_m2.value / (std::f64::consts::PI * pixel_m2)).sqrt();
+            let growth = lens.mean_pixel_area_m2(place, radius_px) / pixel_m2;
+            face.area_m2 = face.area_m2 * growth;
+        }
+        Some(face)
+    }
+
+    /// The surface of a contact, into `surface`. All surfaces that are compared have one grid, so that the grid leaves
+    /// no strain: that of a contact of `grid_pixels` pixels.
+    pub fn surface(
+        &self,
+        bench: &mut Bench,
+        frame: usize,
+        image: ArrayView2<'_, u8>,
+        contact: &FrameContact,
+        grid_pixels: usize,
+        surface: &mut ContactSurface,
+    ) -> Result<(), PipelineError> {
+        let images = [image, self.reference.image()];
+        bench.timed(Stage::Surface, |bench| {
+            let workspace = &mut bench.surface;
+            surface::reconstruct(
+                &self.pipeline,
+                workspace,
+                images,
+                contact,
+                grid_pixels,
+                surface,
+            )
+            .map_err(|source| PipelineError::Surface { frame, source })
+        })
+    }
+
+    /// The control points of a surface, into `points`.
+    pub fn control_points(
+        &self,
+        bench: &mut Bench,
+        frame: usize,
+        surface: &ContactSurface,
+        points: &mut ControlPoints,
+    ) -> Result<(), PipelineError> {
+        bench.timed(Stage::ControlPoints, |bench| {
+            surface::sample(&self.pipeline, &mut bench.surface, surface, points)
+                .map_err(|source| PipelineError::Surface { frame, source })
+        })
+    }
+
+    /// The matches between the control points of two frames.
+    pub fn matching(
+        &self,
+        bench: &mut Bench,
+        [from, to]: [usize; 2],
+        model: &[Point3<f64>],
+        target: &[Point3<f64>],
+    ) -> Result<Matching<3>, PipelineError> {
+        let matcher = self.pipeline.matcher();
+        bench
+            .timed(Stage::Match, |_| matcher.match_points(model, target))
+            .map_err(|source| PipelineError::Match { from, to, source })
+    }
+
+    /// The pairs of a match that begins where the last one ended, into `pairs`.
+    pub fn next_pairs(
+        &self,
+        bench: &mut Bench,
+        [from, to]: [usize; 2],
+        warm: &mut WarmStart,
+        points: [&[Point3<f64>]; 2],
+        pairs: &mut MatchedPairs,
+    ) -> Result<(), PipelineError> {
+        let matcher = self.pipeline.matcher();
+        let [model, target] = points;
+        bench
+            .timed(Stage::Match, |_| {
+                matcher.match_next_pairs(warm, model, target, pairs)
+            })
+            .map_err(|source| PipelineError::Match { from, to, source })
+    }
+
+    /// The strain between two frames from the matches of their control points, into `strain`.
+    pub fn strain(
+        &self,
+        bench: &mut Bench,
+        frames: [usize; 2],
+        matched: &MatchedPoints<'_>,
+        strain: &mut PairStrain,
+    ) -> Result<(), PipelineError> {
+        bench.timed(Stage::Strain, |bench| {
+            bench.strain.strain(&self.pipeline, frames, matched, strain)
+        })
+    }
+
+    /// The stretch of a face between two frames from the material points of its texture.
+    pub fn texture(
+        &self,
+        bench: &mut Bench,
+        [from, to]: [usize; 2],
+        images: [ArrayView2<'_, u8>; 2],
+        contacts: [&FrameContact; 2],
+    ) -> Result<TextureStretch, PipelineError> {
+        bench
+            .timed(Stage::Match, |_| {
+                let (polarity, size) = (self.contact.polarity(), self.contact.pixel_size_m());
+                let one = |image, contact: &FrameContact| {
+                    let (reading, region) = (contact.reading?, contact.region?);
+                    let pair = [image, self.reference.image()];
+                    let spots = texture_spots(pair, region, contact.mask.view(), polarity, size);
+                    let [x, y] = reading.centroid_px.map(|c| c.value);
+                    let centre = Point2::new(x * size[0], y * size[1]);
+                    Some((spots, reading.face?.area_m2.value, centre))
+                };
+                let (model, before_m2, first) = one(images[0], contacts[0])?;
+                let (target, after_m2, last) = one(images[1], contacts[1])?;
+                let growth = (after_m2 / before_m2).sqrt();
+                let predict = |p: &Point2<f64>| last + growth * (p - first);
+                // Friction changes a stretch of 5 % by half: some pixels at the rim.
+                let reach_m = 4.0 * self.pixel_m();
+                TextureStretch::between([&model, &target], predict, reach_m)
+            })
+            .ok_or(PipelineError::NoTexture { from, to })
+    }
+
+    /// Young's modulus. An estimate that fails is timed too: it has looked at the data.
+    pub fn modulus(
+        &self,
+        bench: &mut Bench,
+        estimator: &dyn ModulusEstimator,
+        loads: &LoadSeries,
+    ) -> Result<ModulusEstimate, PipelineError> {
+        bench
+            .timed(Stage::Modulus, |_| estimator.estimate(loads))
+            .map_err(PipelineError::Modulus)
+    }
+}
+
+/// The pairs of a match between the control points of two frames.
+#[derive(Clone, Copy)]
+pub struct MatchedPoints<'a> {
+    pub model: &'a ControlPoints,
+    pub target: &'a [Point3<f64>],
+    /// For every point of the model.
+    pub assignment: &'a [Option<usize>],
+    pub confidence: &'a [f64],
+}
+
+/// Memory of the strain stage.
+#[derive(Default)]
+struct StrainWorkspace {
+    warp: SeriesMemory,
+    sources: Vec<Point3<f64>>,
+    targets: Vec<Point3<f64>>,
+    weights: Vec<f64>,
+    gradients: Vec<Matrix3<f64>>,
+}
+
+impl StrainWorkspace {
+    /// Takes the pairs of a match.
+    fn take(&mut self, matched: &MatchedPoints<'_>) {
+        self.sources.clear();
+        self.targets.clear();
+        self.weights.clear();
+        let points = matched.model.points.iter().zip(matched.assignment);
+        for ((source, partner), &weight) in points.zip(matched.confidence) {
+            let partner = partner.and_then(|partner| matched.target.get(partner));
+            if let Some(target) = partner.filter(|_| weight > 0.0) {
+                self.sources.push(*source);
+                self.targets.push(*target);
+                self.weights.push(weight);
+            }
+        }
+    }
+
+    /// Strain, at the first frame's control points, of the warp through the matches, weighted by their confidence.
+    ///
+    /// The matcher's own warp follows every point. Its gradient across a surface, where no two points lie behind each
+    /// other, would be noise. The warp fitted here is smooth.
+    fn strain(
+        &mut self,
+        pipeline: &Pipeline,
+        [from, to]: [usize; 2],
+        matched: &MatchedPoints<'_>,
+        strain: &mut PairStrain,
+    ) -> Result<(), PipelineError> {
+        self.take(matched);
+        // Twice the four affine terms of a spline in space.
+        let expected = 8;
+        let found = self.sources.len();
+        if found < expected {
+            return Err(PipelineError::TooFewMatches {
+                from,
+                to,
+                expected,
+                found,
+            });
+        }
+        let model = &matched.model.points;
+        self.gradients.clear();
+        self.gradients.resize(model.len(), Matrix3::zeros());
+        let pairs = Pairs {
+            sources: &self.sources,
+            targets: &self.targets,
+            weights: Some(&self.weights),
+        };
+        pipeline
+            .warp()
+            .jacobians_through(&mut self.warp, pairs, model, &mut self.gradients)
+            .map_err(|source| PipelineError::Warp { from, to, source })?;
+        let gradients = self.gradients.iter_mut();
+        gradients.for_each(|g| *g -= Matrix3::identity());
+        let measure = pipeline.strain();
+        strain
+            .field
+            .set_gradients(&self.gradients, None, measure)
+            .map_err(|source| PipelineError::Strain { from, to, source })?;
+        strain.measure = measure.name();
+        strain.summary = strain.field.summary();
+        let noise = mean_strain_error(
+            &self.sources,
+            &self.targets,
+            matched.model.grid_m,
+            StrainSpline::RUN_LENGTH,
+        );
+        let errors = &mut strain.summary.standard_error;
+        errors.zip_apply(&noise, |error, noise| *error = error.hypot(noise));
+        Ok(())
+    }
+}

@@ -1,0 +1,86 @@
+//! A calibration of few pairs with a noisy gauge: the intervals of force and modulus hold as often as they promise.
+#![allow(clippy::print_stdout)]
+
+use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
+use rand_distr::StandardNormal;
+use tactile_imaging::force::CalibrationPair;
+use tactile_imaging::pipeline::PipelineError;
+use tactile_simulate::{CalibrationRun, Camera, PressLoad, PressOptions, Trial};
+
+/// Noise of the gauge in newtons: 2 % of the 1.5 N that it reaches.
+const GAUGE_N: f64 = 0.03;
+
+/// Draws for each number of pairs: a coverage of 95 % is then known to 1.1 % (one standard deviation).
+const DRAWS: usize = 400;
+
+/// Forces of both loads, and the modulus with the interval's lower end and its upper end.
+fn measure(trial: &Trial) -> Result<Vec<(f64, f64, f64)>, PipelineError> {
+    let pipeline = trial.pipeline()?;
+    let press = trial.press(&pipeline)?;
+    let mut found = Vec::new();
+    for frame in 0..trial.simulation.frames.len() {
+        let force = press.contact(frame)?.and_then(|contact| contact.force_n);
+        let force = force.expect("a calibrated contact");
+        let interval = force.interval_95();
+        found.push((force.value, interval.lower, interval.upper.unwrap()));
+    }
+    let modulus = press.modulus()?;
+    let interval = modulus.interval_95;
+    let upper = interval.upper.unwrap_or(f64::INFINITY);
+    found.push((modulus.youngs_modulus_pa, interval.lower, upper));
+    Ok(found)
+}
+
+/// Only the pairs are drawn anew: the truth is what the same frames give with pairs free of noise.
+#[test]
+fn intervals_from_few_pairs_hold() {
+    let options = PressOptions {
+        camera: Camera::default().coarser(8),
+        loads: vec![PressLoad::normal(0.7), PressLoad::normal(1.2)],
+        ..PressOptions::default()
+    };
+    let mut trial = Trial::new(options, &CalibrationRun::default()).unwrap();
+    // Light per newton, from the calibration that came with the scene.
+    let top = trial
+        .pairs
+        .iter()
+        .map(|pair| pair.force_n)
+        .fold(0.0, f64::max);
+    let light = trial
+        .pairs
+        .iter()
+        .map(|pair| pair.integrated_pixel_value)
+        .fold(0.0, f64::max);
+    let per_newton = light / top;
+    let mut rng = ChaCha8Rng::seed_from_u64(5);
+    for count in [3, 4, 6] {
+        let mut pairs = |gauge: f64| -> Vec<_> {
+            (1..=count)
+                .map(|k| 1.5 * f64::from(k) / f64::from(count))
+                .map(|force| {
+                    let noise = gauge * rng.sample::<f64, _>(StandardNormal);
+                    CalibrationPair::loading(per_newton * force, force + noise)
+                })
+                .collect()
+        };
+        trial.pairs = pairs(0.0);
+        let truth = measure(&trial).unwrap();
+        let mut held = vec![0; truth.len()];
+        for _ in 0..DRAWS {
+            trial.pairs = pairs(GAUGE_N);
+            for ((truth, found), held) in truth.iter().zip(measure(&trial).unwrap()).zip(&mut held)
+            {
+                let (_, lower, upper) = found;
+                *held += usize::from((lower..=upper).contains(&truth.0));
+            }
+        }
+        let held = held.iter().map(|&held| held as f64 / DRAWS as f64);
+        for (share, of) in held.zip(["0.7 N", "1.2 N", "the modulus"]) {
+            println!("{count} pairs, {of}: {share}");
+            assert!(
+                (0.92..=0.98).contains(&share),
+                "{count} pairs, {of}: {share}"
+            );
+        }
+    }
+}
