@@ -61,12 +61,10 @@ mod table;
 mod vtk;
 
 pub use material::{Kinematics, Material};
-pub use nearby::{Found, SolvedNeighbourhood};
+pub use nearby::{FrameResponse, SolvedFrames};
 pub use press::{Guide, GuideLayer, ObjectPress, ObjectShape};
 pub use scene::{AppliedLoad, Block, FemScene, Interface, Lump, Outcome, Solution, SolverReport};
-pub use slide::Relaxation;
-pub use state::{ContactRadius, PressurePoint, State, Stress, pressure_at};
-pub use system::Layout;
+pub use state::{ContactRadius, PressurePoint, State, Stress};
 pub use table::{TableOptions, TableProgress, solve_contact_table};
 
 #[cfg(test)]

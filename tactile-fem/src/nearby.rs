@@ -3,9 +3,10 @@
 use crate::element::{ElementGeometry, Elimination};
 use crate::material::Material;
 use crate::model::{ElementModel, Fields};
-use crate::scene::FemScene;
+use crate::scene::{AppliedLoad, FemScene, Outcome};
+use crate::slide::Relaxation;
 use crate::sparse::Factors;
-use crate::state::{PressurePoint, State};
+use crate::state::{PressurePoint, State, pressure_at};
 use crate::system::{Layout, Slot, Tangent};
 use std::sync::Arc;
 use tactile_elasticity::ElasticityError;
@@ -32,7 +33,7 @@ impl FemScene {
 
     /// The equations of this scene and of those [changed](Self::changed) from it, analysed. `None`
     /// where there is no memory for them.
-    pub fn layout(&self) -> Option<Layout> {
+    fn layout(&self) -> Option<Layout> {
         let mut layout = Layout::new(self.model());
         layout
             .pattern(&self.model().elements, core::iter::empty())
@@ -41,7 +42,7 @@ impl FemScene {
     }
 
     /// What solutions of nearby scenes start from. `None` where the tangent is singular.
-    pub fn neighbourhood<'a>(
+    fn neighbourhood<'a>(
         &'a self,
         layout: &mut Layout,
         state: &'a State,
@@ -60,19 +61,166 @@ impl FemScene {
     }
 }
 
-/// What one iteration finds of a nearby scene.
+/// Pressure on the interface and force of one frame of a nearby scene.
 #[derive(Debug, Clone)]
-pub struct Found {
-    /// The interface pressure over the radius.
-    pub pressure: Vec<PressurePoint>,
-    /// The force, in newtons.
-    pub force_n: f64,
+pub struct FrameResponse {
+    pressure: Vec<PressurePoint>,
+    force: f64,
     /// r and z of every node but the elements' centres.
-    pub displacement: Vec<f64>,
+    displacement: Vec<f64>,
+}
+
+impl FrameResponse {
+    /// The force, in newtons.
+    pub fn force_n(&self) -> f64 {
+        self.force
+    }
+
+    /// Pressure at a radius of the interface, as [`State::pressure_at`].
+    pub fn pressure_at(&self, radius_m: f64) -> f64 {
+        pressure_at(&self.pressure, radius_m)
+    }
+}
+
+/// Rounds in which the faces of slightly changed scenes are made to meet again: each leaves a tenth of
+/// the distance before.
+const SLIDING_ROUNDS: usize = 2;
+
+/// A scene with an interface, solved at some approaches. Scenes near it on the same mesh are solved
+/// from it in fewer iterations, and it has derivatives by whatever changes a scene.
+///
+/// ```
+/// use tactile_fem::{Block, FemScene, Guide, GuideLayer, Interface, Material, SolvedFrames};
+///
+/// let gel = |modulus| Material::new(modulus, 0.49);
+/// let guide = Guide::new(vec![GuideLayer { thickness_m: 5e-3, material: gel(5e4)? }], 10e-3)?;
+/// let block = Block { height_m: 20e-3, radius_m: 30e-3, material: gel(1e4)?, lump: None };
+/// let scene = FemScene::block_under_guide(&block, &guide, Interface::Bonded)?;
+/// let solved = SolvedFrames::new(&scene, &[0.5e-3], None, None).unwrap();
+/// // The tissue, the region after the guide's one layer, stiffer by a thousandth.
+/// let stiffer = gel(1.001e4)?;
+/// let changed = |scene: &FemScene| Some(vec![scene.changed(&[(1, stiffer)], None).ok()?]);
+/// let answers = solved.responses(changed, |_| vec![0.5e-3; 2]).unwrap();
+/// let [there, here] = [&answers[0][0], &answers[1][0]].map(|frame| frame.force_n());
+/// assert!(there > here && (there / here - 1.0) < 1e-3);
+/// # Ok::<(), tactile_elasticity::ElasticityError>(())
+/// ```
+#[derive(Debug, Clone)]
+pub struct SolvedFrames {
+    /// Of the mesh, however it is moved.
+    layout: Layout,
+    /// One for all frames. Where surfaces slide, one a frame.
+    scenes: Vec<FemScene>,
+    states: Vec<State>,
+    sliding_depth: Option<f64>,
+}
+
+impl SolvedFrames {
+    /// Solves a scene at approaches in metres, from a solution nearby where there is one. Where the mesh
+    /// is to follow surfaces that slide, `sliding_depth_m` is how far below the surface it may move.
+    /// `None` where an approach is not reached.
+    pub fn new(
+        scene: &FemScene,
+        approaches_m: &[f64],
+        sliding_depth_m: Option<f64>,
+        near: Option<&Self>,
+    ) -> Option<Self> {
+        let on_mesh = near.filter(|near| near.scenes[0].model.elements == scene.model.elements);
+        let mut solved = Self {
+            layout: match on_mesh {
+                Some(near) => near.layout.clone(),
+                None => scene.layout()?,
+            },
+            scenes: Vec::with_capacity(approaches_m.len()),
+            states: Vec::with_capacity(approaches_m.len()),
+            sliding_depth: sliding_depth_m,
+        };
+        let mut layout = solved.layout.clone();
+        let Some(depth) = sliding_depth_m else {
+            let loads: Vec<AppliedLoad> = (approaches_m.iter().copied())
+                .map(AppliedLoad::Approach)
+                .collect();
+            let guesses = on_mesh.map_or(&[][..], |near| &near.states);
+            let solution = scene.model.solve_near(&mut layout, &loads, guesses);
+            solved.scenes.push(scene.clone());
+            solved.states = solution.states;
+            return (solution.report.outcome == Outcome::Solved).then_some(solved);
+        };
+        // Frame by frame, each from the same frame of the solution nearby or from the frame before.
+        for (frame, &approach) in approaches_m.iter().enumerate() {
+            let before = || solved.scenes.last().zip(solved.states.last());
+            let near = near.map(|near| (near.scene(frame), &near.states[frame]));
+            let (scene, state) = scene.slid(&mut layout, approach, depth, near.or_else(before))?;
+            solved.scenes.push(scene);
+            solved.states.push(state);
+        }
+        Some(solved)
+    }
+
+    /// The state of each frame.
+    pub fn states(&self) -> &[State] {
+        &self.states
+    }
+
+    fn scene(&self, frame: usize) -> &FemScene {
+        &self.scenes[frame.min(self.scenes.len() - 1)]
+    }
+
+    /// Responses of changed scenes and, last, of the scene itself, each frame by frame, by one iteration
+    /// from the solution with its tangent: the error is of second order in the change.
+    ///
+    /// `changed` makes the changed scenes of a frame's scene. `approaches_m` gives the approach of each
+    /// in a frame, and last that of the scene itself. One factorisation a frame, one residual for each
+    /// scene and frame. The iteration on the scene itself is for differences: it takes out what the
+    /// solution leaves unbalanced. `None` where an element is turned inside out.
+    pub fn responses(
+        &self,
+        changed: impl Fn(&FemScene) -> Option<Vec<FemScene>>,
+        approaches_m: impl Fn(usize) -> Vec<f64>,
+    ) -> Option<Vec<Vec<FrameResponse>>> {
+        let mut layout = self.layout.clone();
+        let mut nearby = changed(self.scene(0))?;
+        let mut answers = vec![Vec::with_capacity(self.states.len()); nearby.len() + 1];
+        for (frame, state) in self.states.iter().enumerate() {
+            let scene = self.scene(frame);
+            if frame > 0 && frame < self.scenes.len() {
+                nearby = changed(scene)?;
+            }
+            let neighbourhood = scene.neighbourhood(&mut layout, state)?;
+            let approaches = approaches_m(frame);
+            let solve = |nearby: &[FemScene]| {
+                let scenes = nearby.iter().chain([scene]);
+                let at: Vec<(&FemScene, f64)> = scenes.zip(approaches.iter().copied()).collect();
+                neighbourhood.solve(&at)
+            };
+            let mut found = solve(&nearby)?;
+            if let Some(depth) = self.sliding_depth {
+                let mut relaxations = vec![Relaxation::default(); nearby.len()];
+                for _ in 0..SLIDING_ROUNDS {
+                    let met = scene.distances(&found[nearby.len()].displacement);
+                    for ((nearby, found), relaxation) in
+                        nearby.iter_mut().zip(&found).zip(&mut relaxations)
+                    {
+                        let apart = nearby.distances(&found.displacement);
+                        let mut apart: Vec<f64> =
+                            apart.iter().zip(&met).map(|(a, b)| a - b).collect();
+                        let parts = relaxation.next(apart.iter().copied());
+                        apart.iter_mut().zip(parts).for_each(|(a, part)| *a *= part);
+                        *nearby = nearby.moved_back(&apart, depth)?;
+                    }
+                    found = solve(&nearby)?;
+                }
+            }
+            for (answers, found) in answers.iter_mut().zip(found) {
+                answers.push(found);
+            }
+        }
+        Some(answers)
+    }
 }
 
 /// A state with its tangent.
-pub struct SolvedNeighbourhood<'a> {
+struct SolvedNeighbourhood<'a> {
     model: &'a ElementModel,
     fields: &'a Fields,
     tangent: Tangent,
@@ -88,7 +236,7 @@ impl SolvedNeighbourhood<'_> {
     /// Elements are evaluated anew only where they differ, and without their stiffness.
     ///
     /// `None` where an element is turned inside out.
-    pub fn solve(&self, nearby: &[(&FemScene, f64)]) -> Option<Vec<Found>> {
+    fn solve(&self, nearby: &[(&FemScene, f64)]) -> Option<Vec<FrameResponse>> {
         let size = self.tangent.right.len();
         // The last column is the answer to a unit approach.
         let mut columns = Vec::with_capacity((nearby.len() + 1) * size);
@@ -150,7 +298,7 @@ impl SolvedNeighbourhood<'_> {
         changes: &[Option<Elimination>],
         approach: f64,
         step: impl Fn(usize) -> f64,
-    ) -> Option<Found> {
+    ) -> Option<FrameResponse> {
         let interface = nearby.interface.as_ref()?;
         let steps: Vec<f64> = (self.slots.iter())
             .map(|slot| match *slot {
@@ -173,9 +321,9 @@ impl SolvedNeighbourhood<'_> {
             fields.displacement[2 * nodes[8] + 1] += centre[1];
             fields.pressures[index] = pressures;
         }
-        Some(Found {
+        Some(FrameResponse {
             pressure: nearby.interface_pressure(interface, &fields),
-            force_n: nearby.interface_forces(interface, &fields).sum(),
+            force: nearby.interface_forces(interface, &fields).sum(),
             displacement: fields.displacement,
         })
     }

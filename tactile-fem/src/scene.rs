@@ -10,7 +10,6 @@ use crate::mesh::{BlockMesh, Boundary, InclusionSize};
 use crate::model::{BondedInterface, ElementModel, Support};
 use crate::press::{Guide, ObjectPress, ObjectShape};
 use crate::state::{State, Stress};
-use crate::system::Layout;
 use tactile_elasticity::ElasticityError;
 
 /// Whether two surfaces that are pressed together slide.
@@ -197,19 +196,6 @@ impl FemScene {
     /// Solves for the loads in order.
     pub fn solve(&self, loads: &[AppliedLoad]) -> Solution {
         self.model.solve(loads)
-    }
-
-    /// [`Self::solve`] from the states of another scene at about these approaches, where its mesh has the
-    /// same elements.
-    pub fn solve_near(
-        &self,
-        layout: &mut Layout,
-        loads: &[AppliedLoad],
-        near: Option<(&Self, &[State])>,
-    ) -> Solution {
-        let near = near.filter(|(scene, _)| scene.model.elements == self.model.elements);
-        let guesses = near.map_or(&[][..], |(_, states)| states);
-        self.model.solve_near(layout, loads, guesses)
     }
 
     pub(crate) fn from_model(model: ElementModel) -> Self {

@@ -32,7 +32,7 @@ impl FemScene {
     ///
     /// `depth_m` is how far below the surface the mesh may move. `near` a solution nearby, on a
     /// mesh with the same elements, `layout` one of such a mesh. `None` where there is no solution.
-    pub fn slid(
+    pub(crate) fn slid(
         &self,
         layout: &mut Layout,
         approach_m: f64,
@@ -109,7 +109,7 @@ impl FemScene {
     }
 
     /// How far the nodes of each pair are apart along r, at the nodes' displacements (r, z).
-    pub fn distances(&self, displacement: &[f64]) -> Vec<f64> {
+    pub(crate) fn distances(&self, displacement: &[f64]) -> Vec<f64> {
         let radius = |node: usize| self.model.nodes[node][0] + displacement[2 * node];
         let pairs = self.model.pairs().into_iter();
         pairs
@@ -118,7 +118,7 @@ impl FemScene {
     }
 
     /// This scene with the upper node of each pair moved back by its distance.
-    pub fn moved_back(&self, distances: &[f64], depth_m: f64) -> Option<Self> {
+    pub(crate) fn moved_back(&self, distances: &[f64], depth_m: f64) -> Option<Self> {
         let pairs = self.model.pairs().into_iter().zip(distances);
         let shifts: Vec<[f64; 2]> = pairs
             .map(|(pair, distance)| [self.model.nodes[pair.upper][0], -distance])

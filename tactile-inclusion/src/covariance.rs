@@ -22,7 +22,7 @@ struct ModelErrors {
     /// Of the forces beyond the pressures': most of it sits at the guide's rim.
     force: f64,
     /// What the rim sends inwards beyond `rim` as the face sinks in, at the outermost radius and
-    /// the last frame: it grows with the sixth power of the radius and with the load. Half of its
+    /// the last frame. It grows with the sixth power of the radius and with the load. Half of its
     /// variance is correlated over `element`: waves of the elements' length.
     sinking: f64,
     /// The same of the forces.
@@ -36,8 +36,8 @@ struct ModelErrors {
 const SHAPE_LENGTH: f64 = 0.4;
 
 /// Against CalculiX, over bonded blocks with and without inclusion: all pressures 0.05 to 0.2 %
-/// low, the shape within 0.1 %, lower by 0.05 to 0.3 % towards the rim, waves of 0.05 to 0.1 %
-/// there, forces 0.1 to 1 % low. What grows as the face sinks in: between meshes of 5 and 10
+/// low, the shape within 0.1 %, lower by 0.05 to 0.3 % towards the rim. There are waves of 0.05 to
+/// 0.1 % there, forces 0.1 to 1 % low. What grows as the face sinks in: between meshes of 5 and 10
 /// elements an eighth, 0.1 % at the outermost radius and 0.3 % of the force.
 const BONDED: ModelErrors = ModelErrors {
     scale: 2e-3,
@@ -53,12 +53,12 @@ const BONDED: ModelErrors = ModelErrors {
 
 /// The same, without friction: all pressures 0.05 to 0.25 % low, the shape within 0.1 %, lower by
 /// up to 0.2 % towards the rim in soft tissue and by 0.85 % in tissue a third as stiff as the
-/// guide, 0.5 % root mean square over eight blocks of `evidence/inclusion_scenes.py`: four fifths
-/// of it go where CalculiX's elements at the rim are made a quarter as long, but data are as they
-/// are. Up to 0.4 % on the axis above a shallow inclusion, forces 0.2 to 1.3 % low. What grows:
-/// between rim elements of 0.02, 0.05 and 0.08 radii, 0.1 to 0.25 % at the outermost radius. The
-/// radial share, put in as forces on the nodes at a tenth of the block's height, bends the profile
-/// by 0.15 % across an inclusion, by more above a shallow one.
+/// guide. Over eight blocks of `evidence/inclusion_scenes.py` that is 0.5 % root mean square. Four
+/// fifths of it go where CalculiX's elements at the rim are made a quarter as long, but data are as
+/// they are. Up to 0.4 % on the axis above a shallow inclusion, forces 0.2 to 1.3 % low. What
+/// grows: between rim elements of 0.02, 0.05 and 0.08 radii, 0.1 to 0.25 % at the outermost radius.
+/// The radial share, put in as forces on the nodes at a tenth of the block's height, bends the
+/// profile by 0.15 % across an inclusion. It does so by more above a shallow one.
 const FRICTIONLESS: ModelErrors = ModelErrors {
     scale: 2e-3,
     shape: 1.2e-3,

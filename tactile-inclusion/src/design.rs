@@ -99,7 +99,7 @@ impl InclusionSearch {
             frames: approaches_m.len(),
         };
         let interface = self.specimen().interfaces()[0];
-        let mut parameters = self.plain_block(assumed.block_modulus_pa);
+        let mut parameters = self.known_block(assumed.block_modulus_pa);
         parameters.lump = Some(LumpParameters {
             diameter_m: assumed.diameter_m,
             depth_m: assumed.depth_m,

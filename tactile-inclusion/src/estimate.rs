@@ -43,7 +43,7 @@ impl Estimated {
 /// Standard deviations that 95 % of a Gaussian lie within.
 pub const TWO_SIDED_95: f64 = 1.959_963_984_540_054;
 
-/// A parameter of an inclusion: told, or not.
+/// A parameter of an inclusion: identified, or left open.
 ///
 /// ```
 /// use tactile_inclusion::{Estimated, Identifiable};
@@ -64,11 +64,11 @@ pub enum Identifiable {
 
 impl Identifiable {
     pub(crate) fn new(estimated: Estimated, is_reliable: bool) -> Self {
-        // Relative standard error above which a parameter cannot be told, on the side where its
-        // interval reaches further: a modulus that may be far higher is not told by being bounded
-        // from below. On 162 scenes of `evidence/inclusion_scenes.py`, none of 60 parameters that a
-        // sensor cannot know within 30 % was told (`inclusion_study`); the price is that some it
-        // could know within 20 to 30 % are left open.
+        // Relative standard error above which a parameter is not identified, on the side where its
+        // interval reaches further: a modulus that may be far higher is not identified by being
+        // bounded from below. On 162 scenes of `evidence/inclusion_scenes.py`, none of 60
+        // parameters that a sensor cannot know within 30 % was told (`inclusion_study`); the price
+        // is that some it could know within 20 to 30 % are left open.
         let open = 0.25;
         let [low, high] = estimated.interval;
         let reach = (estimated.value / low).max(high / estimated.value).ln();
@@ -79,7 +79,7 @@ impl Identifiable {
         }
     }
 
-    /// The value, where it can be told.
+    /// The value, where it is identified.
     pub fn value(&self) -> Option<f64> {
         match self {
             Self::Yes(estimated) => Some(estimated.value),
@@ -87,7 +87,7 @@ impl Identifiable {
         }
     }
 
-    /// The estimate, told or not.
+    /// The estimate, identified or not.
     pub fn estimate(&self) -> &Estimated {
         match self {
             Self::Yes(estimated) | Self::No(estimated) => estimated,
@@ -132,7 +132,7 @@ pub struct Inclusion {
 pub enum InclusionWarning {
     /// The best fit leaves more than the errors explain (below 1 chance in 1000): several
     /// inclusions, one off the axis, or errors larger than stated. Errors are widened by the root
-    /// of the excess, and no parameter counts as told.
+    /// of the excess, and no parameter counts as identified.
     PoorFit {
         /// χ² over its degrees of freedom.
         excess: f64,
@@ -143,7 +143,7 @@ pub enum InclusionWarning {
     NotConverged,
     /// Bonded and frictionless faces explain the frames about equally well: the better one's values
     /// are given, with intervals that hold those of both. Or one of them could not be solved, and
-    /// no parameter counts as told.
+    /// no parameter counts as identified.
     UncertainInterface,
     /// The inclusion lies nearer to the surface or to the stage than half an element: the model
     /// does not reach that far.
@@ -203,8 +203,8 @@ pub struct InclusionEstimate {
     pub radii_m: Vec<f64>,
     /// Fitted pressure of each frame at those radii, in pascals.
     pub fitted_pa: Vec<Vec<f64>>,
-    /// Pressure of the plain block that fits best, in pascals.
-    pub plain_pa: Vec<Vec<f64>>,
+    /// Pressure of the homogeneous block that fits best, in pascals.
+    pub homogeneous_pa: Vec<Vec<f64>>,
 }
 
 impl InclusionEstimate {

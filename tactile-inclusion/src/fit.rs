@@ -56,7 +56,7 @@ pub struct Ending {
     step: f64,
     /// Evaluations of the model with its derivatives.
     evaluations: usize,
-    /// Objective that a fit must reach to be of use: one that does not promise to ends.
+    /// Objective that a fit must reach to be of use: one that is not predicted to ends.
     needed: f64,
 }
 
@@ -71,7 +71,7 @@ impl Ending {
 }
 
 /// Of an answer: what is left is far below what the data tell.
-pub const SETTLED: Ending = Ending {
+pub const ANSWER_ENDING: Ending = Ending {
     step: 0.2,
     evaluations: 20,
     needed: f64::INFINITY,
@@ -79,7 +79,7 @@ pub const SETTLED: Ending = Ending {
 
 /// Of the first fits, which a finer mesh moves by more. From a start of the grid, four to eight
 /// evaluations are taken, under the wrong assumption about the face any number.
-pub const DRAFTED: Ending = Ending {
+pub const FIRST_FIT_ENDING: Ending = Ending {
     step: 0.5,
     evaluations: 12,
     needed: f64::INFINITY,
@@ -237,9 +237,9 @@ impl Problem {
     ) -> Option<Fit> {
         // Distance of the optimum in standard errors that the solutions' tolerance may hide.
         let unresolved = 1.0;
-        // Gain of the objective that a fit may still promise over that of its quadratic model:
+        // Gain of the objective that a fit may still bring over that of its quadratic model:
         // along a flat valley steps gain more than the model at their start says.
-        let promise = 4.0;
+        let predicted_gain = 4.0;
         let largest_damping = 10.0;
         let least_damping = 1e-6;
         // Levenberg's damping: at first, and its bounds. Beyond the largest no step lowers the
@@ -253,8 +253,8 @@ impl Problem {
             // How far the quadratic model's optimum is; steps cut short by damping say nothing of
             // it.
             let left = self.step(&parameters, &normal, 0.0, None)?.size;
-            let promised = normal.misfit + normal.penalty - promise * left.powi(2);
-            if left < ending.step || promised > ending.needed {
+            let reachable = normal.misfit + normal.penalty - predicted_gain * left.powi(2);
+            if left < ending.step || reachable > ending.needed {
                 break true;
             }
             if damping > largest_damping {

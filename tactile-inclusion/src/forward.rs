@@ -5,10 +5,7 @@
 //! Interface pressure of a block with an inclusion under a guide, and its derivatives.
 
 use std::sync::Arc;
-use tactile_fem::{
-    AppliedLoad, Block, FemScene, Found, Guide, Interface, Kinematics, Layout, Lump, Material,
-    Outcome, PressurePoint, Relaxation, State, pressure_at,
-};
+use tactile_fem::{Block, FemScene, Guide, Interface, Kinematics, Lump, Material, SolvedFrames};
 
 /// A block's unknowns.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -234,15 +231,7 @@ pub struct Prediction {
 #[derive(Debug, Clone)]
 pub struct Solved {
     meshed: Arc<Meshed>,
-    /// One for all frames. Where surfaces slide, one a frame.
-    scenes: Vec<FemScene>,
-    states: Vec<State>,
-}
-
-impl Solved {
-    fn scene(&self, frame: usize) -> &FemScene {
-        &self.scenes[frame.min(self.scenes.len() - 1)]
-    }
+    frames: SolvedFrames,
 }
 
 /// A scene as it was meshed, before its mesh is moved to other parameters or along the interface.
@@ -253,8 +242,6 @@ impl Solved {
 struct Meshed {
     scene: FemScene,
     parameters: Parameters,
-    /// Of this mesh's equations, however it is moved.
-    layout: Layout,
 }
 
 impl Meshed {
@@ -335,7 +322,6 @@ impl Forward {
             _ => {
                 let scene = self.scene(parameters)?;
                 Arc::new(Meshed {
-                    layout: scene.layout()?,
                     scene,
                     parameters: *parameters,
                 })
@@ -345,51 +331,14 @@ impl Forward {
         let approaches: Vec<f64> = (self.approaches_m.iter())
             .map(|approach| approach + parameters.zero_m)
             .collect();
-        let solved = if self.slides() {
-            self.solve_sliding(meshed, &scene, parameters, &approaches, near)?
-        } else {
-            let loads: Vec<AppliedLoad> =
-                approaches.into_iter().map(AppliedLoad::Approach).collect();
-            let near = near.map(|near| (near.scene(0), near.states.as_slice()));
-            let solution = scene.solve_near(&mut meshed.layout.clone(), &loads, near);
-            if solution.report.outcome != Outcome::Solved {
-                return None;
-            }
-            Solved {
-                meshed,
-                scenes: vec![scene],
-                states: solution.states,
-            }
-        };
-        let frames = (solved.states.iter()).map(|state| (state.pressure(), state.force_n()));
-        Some((self.collect(frames), solved))
-    }
-
-    /// Frame by frame, each from the same frame of a solution nearby or from the frame before.
-    fn solve_sliding(
-        &self,
-        meshed: Arc<Meshed>,
-        scene: &FemScene,
-        parameters: &Parameters,
-        approaches_m: &[f64],
-        near: Option<&Solved>,
-    ) -> Option<Solved> {
-        let depth_m = sliding_depth(parameters);
-        let mut layout = meshed.layout.clone();
-        let mut solved = Solved {
-            meshed,
-            scenes: Vec::with_capacity(approaches_m.len()),
-            states: Vec::with_capacity(approaches_m.len()),
-        };
-        for (frame, &approach) in approaches_m.iter().enumerate() {
-            let before = || solved.scenes.last().zip(solved.states.last());
-            let near = near.map(|near| (near.scene(frame), &near.states[frame]));
-            let near = near.or_else(before);
-            let (scene, state) = scene.slid(&mut layout, approach, depth_m, near)?;
-            solved.scenes.push(scene);
-            solved.states.push(state);
-        }
-        Some(solved)
+        let sliding_depth = self.slides().then(|| sliding_depth(parameters));
+        let near = near.map(|near| &near.frames);
+        let frames = SolvedFrames::new(&scene, &approaches, sliding_depth, near)?;
+        let answers = frames.states().iter();
+        let prediction = self.collect(
+            answers.map(|state| (|radius: f64| state.pressure_at(radius), state.force_n())),
+        );
+        Some((prediction, Solved { meshed, frames }))
     }
 
     /// The scene of parameters near those of `scene`, on its mesh.
@@ -408,11 +357,12 @@ impl Forward {
         scene.changed(&materials, moved).ok()
     }
 
-    fn collect<'a>(&self, frames: impl Iterator<Item = (&'a [PressurePoint], f64)>) -> Prediction {
+    /// Values of frames, each given by its pressure over the radius and its force.
+    fn collect<P: Fn(f64) -> f64>(&self, frames: impl Iterator<Item = (P, f64)>) -> Prediction {
         let mut values = Vec::with_capacity(self.observations());
         let mut forces = Vec::with_capacity(self.approaches_m.len());
-        for (points, force) in frames {
-            values.extend(self.radii_m.iter().map(|&r| pressure_at(points, r)));
+        for (pressure_at, force) in frames {
+            values.extend(self.radii_m.iter().map(|&r| pressure_at(r)));
             forces.push(force);
         }
         values.extend(forces);
@@ -422,18 +372,15 @@ impl Forward {
     /// The derivatives of a solved scene's prediction, one column a coordinate.
     ///
     /// A derivative is the difference of one iteration on the slightly changed block and one on the
-    /// block itself, both from the solution with its tangent: one factorisation a frame, one
-    /// residual for each coordinate and frame. The iteration on the block itself takes out what the
-    /// solution leaves unbalanced.
+    /// block itself, both from the solution with its tangent. It takes one factorisation a frame
+    /// and one residual for each coordinate and frame. The iteration on the block itself takes out
+    /// what the solution leaves unbalanced.
     pub fn derivatives(
         &self,
         parameters: &Parameters,
         coordinates: &[Coordinate],
         solved: &Solved,
     ) -> Option<Vec<Vec<f64>>> {
-        // Rounds in which the faces of slightly changed blocks are made to meet again: each leaves
-        // a tenth of the distance before.
-        let sliding_rounds: usize = 2;
         let moved: Vec<Parameters> = (coordinates.iter())
             .map(|&coordinate| parameters.moved(coordinate, parameters.small_step(coordinate)))
             .collect();
@@ -442,57 +389,21 @@ impl Forward {
                 .map(|moved| self.changed(scene, parameters, moved))
                 .collect()
         };
-        let mut layout = solved.meshed.layout.clone();
-        let mut nearby = Vec::new();
-        // Of each coordinate, the interface's answer frame by frame.
-        let mut answers = vec![Vec::with_capacity(solved.states.len()); coordinates.len()];
-        let mut here = Vec::with_capacity(solved.states.len());
-        for (frame, state) in solved.states.iter().enumerate() {
-            if frame < solved.scenes.len() {
-                nearby = changed(solved.scene(frame))?;
-            }
-            let scene = solved.scene(frame);
-            let neighbourhood = scene.neighbourhood(&mut layout, state)?;
-            let approach = |parameters: &Parameters| self.approaches_m[frame] + parameters.zero_m;
-            let solve = |nearby: &[FemScene]| {
-                let mut at: Vec<(&FemScene, f64)> = (nearby.iter().zip(&moved))
-                    .map(|(scene, moved)| (scene, approach(moved)))
-                    .collect();
-                at.push((scene, approach(parameters)));
-                neighbourhood.solve(&at)
-            };
-            let mut found = solve(&nearby)?;
-            if self.slides() {
-                let depth_m = sliding_depth(parameters);
-                let mut relaxations = vec![Relaxation::default(); nearby.len()];
-                for _ in 0..sliding_rounds {
-                    let met = scene.distances(&found[nearby.len()].displacement);
-                    for ((nearby, found), relaxation) in
-                        nearby.iter_mut().zip(&found).zip(&mut relaxations)
-                    {
-                        let apart = nearby.distances(&found.displacement);
-                        let mut apart: Vec<f64> =
-                            apart.iter().zip(&met).map(|(a, b)| a - b).collect();
-                        let parts = relaxation.next(apart.iter().copied());
-                        apart.iter_mut().zip(parts).for_each(|(a, part)| *a *= part);
-                        *nearby = nearby.moved_back(&apart, depth_m)?;
-                    }
-                    found = solve(&nearby)?;
-                }
-            }
-            here.extend(found.pop());
-            for (answers, found) in answers.iter_mut().zip(found) {
-                answers.push(found);
-            }
-        }
-        let frames = |answers: &[Found]| {
-            let frames = answers.iter();
-            self.collect(frames.map(|found| (found.pressure.as_slice(), found.force_n)))
+        let approaches = |frame: usize| {
+            let at = moved.iter().chain([parameters]);
+            at.map(|at| self.approaches_m[frame] + at.zero_m).collect()
         };
-        let here = frames(&here);
+        let answers = solved.frames.responses(changed, approaches)?;
+        let mut predictions: Vec<Prediction> = (answers.iter())
+            .map(|frames| {
+                let frames = frames.iter();
+                let frames = frames.map(|frame| (|r: f64| frame.pressure_at(r), frame.force_n()));
+                self.collect(frames)
+            })
+            .collect();
+        let here = predictions.pop()?;
         let mut columns = Vec::with_capacity(coordinates.len());
-        for (answers, coordinate) in answers.iter().zip(coordinates) {
-            let there = frames(answers);
+        for (there, coordinate) in predictions.iter().zip(coordinates) {
             let step = parameters.small_step(*coordinate);
             let column = (there.values.iter().zip(&here.values))
                 .map(|(there, here)| (there - here) / step)

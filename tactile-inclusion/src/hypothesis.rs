@@ -2,10 +2,9 @@
 //!
 //! Whether a block can be plain, before an inclusion is fitted.
 //!
-//! Rao's score test: with r what the plain block leaves of the measured values, J its derivatives,
-//! C and P the covariances of errors and prior, and s what a given inclusion would add to the
-//! pressures, the fall of the objective by a multiple of s, the plain block's parameters fitted
-//! along, is
+//! Rao's score test: let r be the residual of the homogeneous block, J its derivatives, C and P the
+//! covariances of errors and prior, and s what a given inclusion would add to the pressures, the
+//! fall of the objective by a multiple of s, the homogeneous block's parameters fitted along, is
 //!
 //! $$ \frac{(s^T Q r)^2}{s^T Q s}, \qquad Q = C^{-1} - C^{-1} J (J^T C^{-1} J + P^{-1})^{-1} J^T C^{-1} $$
 //!
@@ -21,11 +20,11 @@ use crate::estimate::{
 use crate::fit::{Fit, Problem};
 use crate::forward::Coordinate;
 use crate::ridge::Marginal;
-use crate::search::Start;
+use crate::search::GridStart;
 use nalgebra::{DMatrix, DVector};
 use tactile_fem::Interface;
 
-/// Fall of the objective without which an inclusion is not that probable, 2 ln(p / (1 − p)): the
+/// Fall of the objective without which an inclusion is not that probable, 2 ln(p / (1 − p)). The
 /// parameters it adds are known better afterwards than before, which lowers the evidence further.
 pub const LEAST_GAIN: f64 = 9.2;
 
@@ -54,8 +53,8 @@ pub const BLOCK_COORDINATES: usize = 4;
 pub struct Hypothesis {
     pub problem: Problem,
     pub interface: Interface,
-    pub plain: Fit,
-    /// What inclusions promise, where none was fitted.
+    pub homogeneous: Fit,
+    /// What inclusions are predicted to bring, where none was fitted.
     pub score: Option<Score>,
     pub lump: Option<Fit>,
     /// Posteriors of the fit with an inclusion, once its ridge is followed.
@@ -68,7 +67,7 @@ impl Hypothesis {
         if let Some(fit) = self
             .lump
             .as_ref()
-            .filter(|fit| fit.evidence > self.plain.evidence)
+            .filter(|fit| fit.evidence > self.homogeneous.evidence)
         {
             let ridge = self.problem.ridge(fit, go_on);
             self.marginal = ridge.as_ref().and_then(Marginal::new);
@@ -76,15 +75,15 @@ impl Hypothesis {
     }
 
     pub fn evidence(&self) -> f64 {
-        self.plain.evidence.max(self.evidence_with())
+        self.homogeneous.evidence.max(self.evidence_with())
     }
 
     /// χ² over its degrees of freedom, where that is more than one: what differences of log
     /// evidence are too large by.
     pub fn inflation(&self, observed: &Observed) -> f64 {
         let best = match &self.lump {
-            Some(lump) if lump.evidence > self.plain.evidence => lump,
-            _ => &self.plain,
+            Some(lump) if lump.evidence > self.homogeneous.evidence => lump,
+            _ => &self.homogeneous,
         };
         (best.misfit / observed.values.len() as f64).max(1.0)
     }
@@ -93,7 +92,7 @@ impl Hypothesis {
     fn evidence_with(&self) -> f64 {
         match (&self.lump, &self.score) {
             (Some(fit), _) => fit.evidence + self.marginal.as_ref().map_or(0.0, |m| m.gain),
-            (None, Some(score)) => self.plain.evidence + score.log_odds,
+            (None, Some(score)) => self.homogeneous.evidence + score.log_odds,
             (None, None) => f64::NEG_INFINITY,
         }
     }
@@ -102,28 +101,28 @@ impl Hypothesis {
     fn log_odds(&self, rival: Option<&Self>) -> f64 {
         let both = || [self].into_iter().chain(rival);
         let with = both().map(Self::evidence_with);
-        let without = both().map(|one| one.plain.evidence);
+        let without = both().map(|one| one.homogeneous.evidence);
         with.fold(f64::NEG_INFINITY, f64::max) - without.fold(f64::NEG_INFINITY, f64::max)
     }
 
     /// The fit with an inclusion, where it counts as found at these odds.
     fn found(&self, log_odds: f64) -> Option<&Fit> {
         // Least contrast either way, E₁/E₀ or E₀/E₁: an inclusion nearer to the tissue explains no
-        // more than what its mesh differs by from a plain block's (a contrast of 1.02 to 1.04 in
-        // plain blocks by CalculiX).
+        // more than what its mesh differs by from a homogeneous block's (a contrast of 1.02 to 1.04
+        // in homogeneous blocks by CalculiX).
         let least_contrast = 1.2;
         // Least probability for that.
         let least_probability = 0.99;
         // Least fall of χ² for an inclusion to count as found, that of six standard errors: what
-        // finite elements err by brings it to 25 in one of 38 plain blocks by CalculiX, 161 of 162
-        // inclusions there to 60 or more and the last, hardly to be found, to 33
+        // finite elements err by brings it to 25 in one of 38 homogeneous blocks by CalculiX, 161
+        // of 162 inclusions there to 60 or more and the last, hardly to be found, to 33
         // (`inclusion_study`).
         let least_fall = 36.0;
         self.lump.as_ref().filter(|fit| {
             let modulus = |coordinate| fit.parameters.get(coordinate);
             let contrast = modulus(Coordinate::LumpModulus) - modulus(Coordinate::BlockModulus);
             probability(log_odds) > least_probability
-                && self.plain.misfit - fit.misfit > least_fall
+                && self.homogeneous.misfit - fit.misfit > least_fall
                 && contrast.abs() > f64::ln(least_contrast)
         })
     }
@@ -174,7 +173,7 @@ impl Hypothesis {
     ) -> InclusionEstimate {
         let log_odds = self.log_odds(rival);
         let found = self.found(log_odds);
-        let chosen = found.unwrap_or(&self.plain);
+        let chosen = found.unwrap_or(&self.homogeneous);
         let misfit = chosen.misfit / observed.values.len() as f64;
         let is_poor = is_poor(chosen.misfit, observed);
         let widened = if is_poor { misfit.sqrt() } else { 1.0 };
@@ -201,17 +200,18 @@ impl Hypothesis {
             let other = rival.map(|rival| {
                 let lump = rival.lump.as_ref().filter(|_| found.is_some());
                 rival
-                    .posterior(lump.unwrap_or(&rival.plain), coordinate, widened)
+                    .posterior(lump.unwrap_or(&rival.homogeneous), coordinate, widened)
                     .1
             });
             Estimated::within(at, other.map_or(interval, |other| hull(interval, other)))
         };
         let inclusion = found.map(|fit| {
-            let told = |k: usize| Identifiable::new(estimated(BLOCK_COORDINATES + k), is_reliable);
+            let parameter =
+                |k: usize| Identifiable::new(estimated(BLOCK_COORDINATES + k), is_reliable);
             Inclusion {
-                diameter_m: told(0),
-                depth_m: told(1),
-                youngs_modulus_pa: told(2),
+                diameter_m: parameter(0),
+                depth_m: parameter(1),
+                youngs_modulus_pa: parameter(2),
                 correlation: self.correlation(fit),
             }
         });
@@ -230,7 +230,7 @@ impl Hypothesis {
             warnings,
             radii_m: observed.radii_m.clone(),
             fitted_pa: split(&chosen.predicted),
-            plain_pa: split(&self.plain.predicted),
+            homogeneous_pa: split(&self.homogeneous.predicted),
         }
     }
 }
@@ -244,26 +244,26 @@ fn hull(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
     [a[0].min(b[0]), a[1].max(b[1])]
 }
 
-/// What a grid of inclusions would change of a plain fit.
+/// What a grid of inclusions would change of a homogeneous fit.
 #[derive(Debug, Clone, Copy)]
 pub struct Score {
     /// Largest fall of the objective.
-    pub promise: f64,
+    pub predicted_gain: f64,
     /// Logarithm of the odds of an inclusion, those of the grid being equally likely.
     log_odds: f64,
 }
 
 impl Score {
     /// Of a fit without inclusion. `None` where it has no derivatives.
-    pub fn new(problem: &Problem, plain: &Fit, grid: &[Start]) -> Option<Self> {
-        let normal = problem.normal(&plain.parameters, Some(&plain.solved))?;
+    pub fn new(problem: &Problem, homogeneous: &Fit, grid: &[GridStart]) -> Option<Self> {
+        let normal = problem.normal(&homogeneous.parameters, Some(&homogeneous.solved))?;
         let residual = problem.whitened(problem.residual(&normal.predicted));
         let columns = DMatrix::from_columns(&normal.columns);
         let precision = normal.matrix.cholesky()?;
-        // What the plain block's own parameters cannot take up.
+        // What the homogeneous block's own parameters cannot take up.
         let left = &residual - &columns * precision.solve(&normal.gradient);
         let mut odds = Vec::new();
-        let mut promise = 0.0f64;
+        let mut predicted_gain = 0.0f64;
         for start in grid {
             let added = (start.added.iter().zip(&normal.predicted)).map(|(part, p)| part * p);
             let added = problem.whitened(DVector::from_iterator(normal.predicted.len(), added));
@@ -273,23 +273,23 @@ impl Score {
                 continue;
             }
             let along = added.dot(&left);
-            promise = promise.max(along.powi(2) / square);
+            predicted_gain = predicted_gain.max(along.powi(2) / square);
             odds.push(along - 0.5 * square);
         }
         let largest = odds.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         let sum: f64 = odds.iter().map(|odds| (odds - largest).exp()).sum();
         Some(Self {
-            promise,
+            predicted_gain,
             log_odds: largest + (sum / odds.len().max(1) as f64).ln(),
         })
     }
 
     /// Whether an inclusion can be ruled out.
-    pub fn is_plain(&self) -> bool {
-        // Fall of the objective that a grid's inclusion must promise for inclusions to be fitted.
-        // One that is found lowers χ² by 36; its neighbour in the grid promises half of that or
-        // more.
+    pub fn is_homogeneous(&self) -> bool {
+        // Fall of the objective that a grid's inclusion must be predicted to bring for inclusions
+        // to be fitted. One that is found lowers χ² by 36; its neighbour in the grid brings half of
+        // that or more.
         let least_promise = 18.0;
-        self.promise < least_promise
+        self.predicted_gain < least_promise
     }
 }

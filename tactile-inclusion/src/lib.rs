@@ -17,10 +17,10 @@
 //! with and without inclusion is the odds that there is one.
 //!
 //! The posterior is far from Gaussian: beyond some contrast a stiffer inclusion changes the
-//! pressure no more, and a small stiff one is hardly different from a large one that is little
-//! stiffer than the tissue. The intervals of D, d and E₁ therefore follow the posterior along ln
-//! E₁. Where bonded and frictionless faces explain the frames about equally well the intervals hold
-//! those of both.
+//! pressure no more. A small stiff one is hardly different from a large one that is little stiffer
+//! than the tissue. The intervals of D, d and E₁ therefore follow the posterior along ln E₁. Where
+//! bonded and frictionless faces explain the frames about equally well the intervals hold those of
+//! both.
 //!
 //! # References
 //! V. Egorov & A. P. Sarvazyan, IEEE Trans. Med. Imaging 27 (2008) 1275. J.-H. Lee & C.-H. Won,

@@ -3,9 +3,9 @@
 //! Marginal posteriors of an inclusion's parameters, which are not Gaussian.
 //!
 //! A stiff inclusion hardly changes the pressure when it gets stiffer still, and a small stiff one
-//! is hardly told from a large one that is little stiffer than the tissue: along such a ridge the
-//! posterior's density falls neither fast nor evenly, and the curvature at its top says little of
-//! its length. With u = ln E₁, θ all other coordinates, F the fit's objective (−2 ln of the
+//! is hardly different from a large one that is little stiffer than the tissue. Along such a ridge
+//! the posterior's density falls neither fast nor evenly, and the curvature at its top says little
+//! of its length. With u = ln E₁, θ all other coordinates, F the fit's objective (−2 ln of the
 //! posterior), θ(u) its minimum at given u and M(u) its curvature there in θ,
 //!
 //! $$ p(u) \propto |M(u)|^{-1/2} \exp(-F(u, \theta(u)) / 2) $$
@@ -318,7 +318,7 @@ impl Marginal {
         self.quantile(coordinate, 0.5)
     }
 
-    /// The 95 % interval of a coordinate, with equal tails: it holds 96, 98 and 97 % of 161
+    /// The 95 % interval of a coordinate, with equal tails. It holds 96, 98 and 97 % of 161
     /// inclusions' D, d and E₁ by CalculiX, the likelihood ratio's 96, 98 and 98
     /// (`inclusion_study`).
     pub fn interval(&self, coordinate: usize) -> [f64; 2] {

@@ -11,7 +11,7 @@
 use crate::covariance::{Observed, Resolution};
 use crate::error::Quantity;
 use crate::estimate::InclusionEstimate;
-use crate::fit::{DRAFTED, Fit, Prior, Problem, SETTLED};
+use crate::fit::{ANSWER_ENDING, FIRST_FIT_ENDING, Fit, Prior, Problem};
 use crate::forward::{
     Coordinate, Forward, LARGEST_POISSON_RATIO, LumpParameters, Parameters, Prediction,
 };
@@ -24,9 +24,10 @@ use tactile_fem::{Guide, Interface, Kinematics};
 /// Finds a spherical inclusion in a block from the pressure on a guide's face at some approaches.
 ///
 /// Maximum a posteriori over ln D, ln d, ln E₁, ln E₀, the block's height, ν and the approaches'
-/// zero by Levenberg–Marquardt on finite-strain finite elements from several starts, once a score
-/// test says that an inclusion would explain more than the plain block. Intervals by following the
-/// posterior along ln E₁. An inclusion's probability from the evidence with and without one.
+/// zero by Levenberg–Marquardt on finite-strain finite elements from several starts. A score test
+/// first shows whether an inclusion would explain more than the homogeneous block. Intervals by
+/// following the posterior along ln E₁. An inclusion's probability from the evidence with and
+/// without one.
 ///
 /// ```no_run
 /// use tactile_fem::{Guide, GuideLayer, Material};
@@ -134,41 +135,43 @@ impl InclusionSearch {
         let interfaces = self.specimen.interfaces();
         let mut counter = Counter {
             done: 0,
-            // Per interface: a plain fit, the grid, two first fits, the answer's.
+            // Per interface: a homogeneous fit, the grid, two first fits, the answer's.
             expected: interfaces.len() * 55,
             progress,
             cancelled: false,
         };
-        let plains: Vec<Plain> = (interfaces.into_iter())
-            .filter_map(|face| self.plain(&observed, &approaches_m, face, &mut counter))
+        let blocks: Vec<HomogeneousFit> = (interfaces.into_iter())
+            .filter_map(|face| self.homogeneous(&observed, &approaches_m, face, &mut counter))
             .collect();
-        // Where the plain block that fits better needs no inclusion, one would make up for a wrong
-        // assumption about the face.
-        let best = (plains.iter()).max_by(|a, b| a.fit.evidence.total_cmp(&b.fit.evidence));
-        let is_plain = best.is_some_and(Plain::is_plain);
-        let mut drafts: Vec<Draft> = Vec::new();
-        for plain in plains {
-            drafts.push(if is_plain || plain.is_plain() {
-                Draft::plain(plain)
+        // Where the homogeneous block that fits better needs no inclusion, one would make up for a
+        // wrong assumption about the face.
+        let best = (blocks.iter()).max_by(|a, b| a.fit.evidence.total_cmp(&b.fit.evidence));
+        let is_homogeneous = best.is_some_and(HomogeneousFit::is_homogeneous);
+        let mut candidates: Vec<FirstFits> = Vec::new();
+        for homogeneous in blocks {
+            candidates.push(if is_homogeneous || homogeneous.is_homogeneous() {
+                FirstFits::homogeneous(homogeneous)
             } else {
-                self.draft(
+                self.first_fits(
                     &observed,
                     &approaches_m,
-                    plain,
-                    drafts.first(),
+                    homogeneous,
+                    candidates.first(),
                     &mut counter,
                 )
             });
         }
-        drafts.sort_by(|a, b| b.evidence().total_cmp(&a.evidence()));
-        let hopeless = drafts.first().map_or(f64::NEG_INFINITY, Draft::hopeless);
-        drafts.retain(|draft| draft.evidence() > hopeless);
+        candidates.sort_by(|a, b| b.evidence().total_cmp(&a.evidence()));
+        let hopeless = candidates
+            .first()
+            .map_or(f64::NEG_INFINITY, FirstFits::hopeless);
+        candidates.retain(|first_fits| first_fits.evidence() > hopeless);
         let mut hypotheses: Vec<Hypothesis> = Vec::new();
         let mut is_unsolved = false;
-        for draft in drafts {
+        for first_fits in candidates {
             let needed = (hypotheses.first())
                 .map_or(f64::NEG_INFINITY, |best| best.evidence() - rival_evidence);
-            let found = self.hypothesis(&observed, &approaches_m, draft, needed, &mut counter);
+            let found = self.hypothesis(&observed, &approaches_m, first_fits, needed, &mut counter);
             is_unsolved |= found.is_none();
             hypotheses.extend(found);
         }
@@ -240,7 +243,7 @@ impl InclusionSearch {
         }
     }
 
-    pub(crate) fn plain_block(&self, block_modulus_pa: f64) -> Parameters {
+    pub(crate) fn known_block(&self, block_modulus_pa: f64) -> Parameters {
         Parameters {
             block_modulus_pa,
             lump: None,
@@ -264,8 +267,8 @@ impl InclusionSearch {
         ]
     }
 
-    /// Sizes, depths and contrasts that a face of this radius can see: D from 0.2 to 2 radii, d
-    /// from 0.06 to 1.5, E₁ from 0.4 to 47 times E₀, as 95 % ranges.
+    /// Sizes, depths and contrasts that a face of this radius can see. These are D from 0.2 to 2
+    /// radii, d from 0.06 to 1.5, E₁ from 0.4 to 47 times E₀, as 95 % ranges.
     pub(crate) fn lump_priors(&self, block_modulus_pa: f64) -> [Prior; 3] {
         let face = self.guide.radius_m();
         [
@@ -354,29 +357,29 @@ impl Counter<'_> {
 
 /// Elements along an eighth of the inclusion's circumference for the answer. Of bonded blocks the
 /// pressure is within 0.05 % of a mesh of ten. Five leave waves of 0.1 % above a wide shallow
-/// inclusion, which move its size and depth by one bound, and where the face slides χ² by up to
-/// ten, enough to take it for one that sticks. On an inclusion that hardly shows the noise errs by
-/// more than five elements do.
+/// inclusion, which move its size and depth by one bound. Where the face slides they move χ² by up
+/// to ten, enough to take it for one that sticks. On an inclusion that hardly shows the noise errs
+/// by more than five elements do.
 fn answer_fineness(is_certain: bool) -> usize {
     if is_certain { 7 } else { 5 }
 }
 
-/// A plain block under one assumption about the face.
-pub struct Plain {
+/// A homogeneous block under one assumption about the face.
+pub struct HomogeneousFit {
     /// Of the first fits.
     pub problem: Problem,
     pub interface: Interface,
     pub fit: Fit,
-    /// The fit on the answer's mesh and what inclusions promise to add to it, where the block may
-    /// be plain.
+    /// The fit on the answer's mesh and what inclusions are predicted to add to it, where the block
+    /// may be plain.
     pub settled: Option<(Fit, Score)>,
-    pub grid: Vec<Start>,
+    pub grid: Vec<GridStart>,
 }
 
-impl Plain {
+impl HomogeneousFit {
     /// Whether inclusions can be ruled out, were the face as assumed.
-    pub fn is_plain(&self) -> bool {
-        (self.settled.as_ref()).is_some_and(|(_, score)| score.is_plain())
+    pub fn is_homogeneous(&self) -> bool {
+        (self.settled.as_ref()).is_some_and(|(_, score)| score.is_homogeneous())
     }
 
     /// Starts with their pressures scaled to those observed, the best first.
@@ -390,20 +393,20 @@ impl Plain {
 }
 
 impl InclusionSearch {
-    /// The fit of a plain block. `None` where it could not be solved.
-    pub(crate) fn plain(
+    /// The fit of a homogeneous block. `None` where it could not be solved.
+    pub(crate) fn homogeneous(
         &self,
         observed: &Observed,
         approaches_m: &[f64],
         interface: Interface,
         counter: &mut Counter<'_>,
-    ) -> Option<Plain> {
+    ) -> Option<HomogeneousFit> {
         // χ² of the first fit over its degrees of freedom up to which the block may be plain. The
-        // meshes' errors bring plain blocks by CalculiX to 1.5, under the wrong assumption about
-        // the face to 2.2; what an inclusion adds above 2 needs no test.
+        // meshes' errors bring homogeneous blocks by CalculiX to 1.5, under the wrong assumption
+        // about the face to 2.2; what an inclusion adds above 2 needs no test.
         let doubtful = 2.0;
-        // Elements along an eighth of the inclusion's circumference, of a plain block's first fit
-        // and of the grid.
+        // Elements along an eighth of the inclusion's circumference, of a homogeneous block's first
+        // fit and of the grid.
         let homogeneous_fineness: usize = 2;
         let guess = self.stiffness(observed, approaches_m);
         let forward = self.forward(observed, approaches_m, interface, homogeneous_fineness);
@@ -414,23 +417,23 @@ impl InclusionSearch {
                 .cholesky()?,
             priors: self.block_priors(guess),
         };
-        let block = self.plain_block(guess);
+        let block = self.known_block(guess);
         let (_, start) = problem.scaled_start(&block, &forward.predict(&block)?)?;
-        let fit = problem.fit(start, DRAFTED, || counter.step())?;
+        let fit = problem.fit(start, FIRST_FIT_ENDING, || counter.step())?;
         let linear = Forward {
             kinematics: Kinematics::Linear,
             ..forward
         };
-        // A plain block that fits an inclusion's pressures is bent out of what is known of it;
-        // starts are not.
-        let known = self.plain_block(fit.parameters.block_modulus_pa);
+        // A homogeneous block that fits an inclusion's pressures is bent out of what is known of
+        // it; starts are not.
+        let known = self.known_block(fit.parameters.block_modulus_pa);
         let grid = starts(&linear, &known, counter)?;
         let settled = if fit.misfit < doubtful * observed.values.len() as f64 {
             self.settled(&problem, &fit, observed, &grid, counter)
         } else {
             None
         };
-        Some(Plain {
+        Some(HomogeneousFit {
             problem,
             interface,
             fit,
@@ -439,13 +442,14 @@ impl InclusionSearch {
         })
     }
 
-    /// The plain block's fit on the answer's mesh, and what inclusions promise to add to it.
+    /// The homogeneous block's fit on the answer's mesh, and what inclusions are predicted to add
+    /// to it.
     fn settled(
         &self,
         problem: &Problem,
-        plain: &Fit,
+        homogeneous: &Fit,
         observed: &Observed,
-        grid: &[Start],
+        grid: &[GridStart],
         counter: &mut Counter<'_>,
     ) -> Option<(Fit, Score)> {
         let interface = problem.forward.interface;
@@ -459,13 +463,13 @@ impl InclusionSearch {
             factor: covariance.cholesky()?,
             priors: problem.priors.clone(),
         };
-        let fit = problem.fit(plain.parameters, SETTLED, || counter.step())?;
+        let fit = problem.fit(homogeneous.parameters, ANSWER_ENDING, || counter.step())?;
         let score = Score::new(&problem, &fit, grid)?;
         Some((fit, score))
     }
 
-    /// Modulus of a plain block by the mean pressure over the mean strain: right within a factor of
-    /// three, from which the fit of ln E₀ converges.
+    /// Modulus of a homogeneous block by the mean pressure over the mean strain: right within a
+    /// factor of three, from which the fit of ln E₀ converges.
     fn stiffness(&self, observed: &Observed, approaches_m: &[f64]) -> f64 {
         let rings = observed.radii_m.len();
         let last = observed.frames - 1;
@@ -484,20 +488,20 @@ const CONTRASTS: [f64; 2] = [2.5, 8.0];
 
 /// An inclusion in a block, and its pressures.
 #[derive(Debug, Clone)]
-pub struct Start {
+pub struct GridStart {
     pub parameters: Parameters,
     pub predicted: Prediction,
-    /// Part by which each value exceeds that of a plain block on the same mesh.
+    /// Part by which each value exceeds that of a homogeneous block on the same mesh.
     pub added: Vec<f64>,
 }
 
-/// The grid of inclusions in a plain block under a face of this radius. `None` where the search is
-/// to end.
+/// The grid of inclusions in a homogeneous block under a face of this radius. `None` where the
+/// search is to end.
 pub fn starts(
     forward: &Forward,
-    plain: &Parameters,
+    homogeneous: &Parameters,
     counter: &mut Counter<'_>,
-) -> Option<Vec<Start>> {
+) -> Option<Vec<GridStart>> {
     // Part of the block's height that an inclusion may reach down to.
     let deepest = 0.95;
     let face_radius_m = forward.guide.radius_m();
@@ -507,14 +511,14 @@ pub fn starts(
             let lump = |contrast: f64| LumpParameters {
                 diameter_m: diameter * face_radius_m,
                 depth_m: depth * face_radius_m,
-                youngs_modulus_pa: contrast * plain.block_modulus_pa,
+                youngs_modulus_pa: contrast * homogeneous.block_modulus_pa,
             };
-            if (diameter + depth) * face_radius_m >= deepest * plain.height_m {
+            if (diameter + depth) * face_radius_m >= deepest * homogeneous.height_m {
                 continue;
             }
             let with = |contrast: f64| Parameters {
                 lump: Some(lump(contrast)),
-                ..*plain
+                ..*homogeneous
             };
             if !counter.step() {
                 return None;
@@ -531,7 +535,7 @@ pub fn starts(
                     continue;
                 };
                 let added = predicted.values.iter().zip(&none.values);
-                starts.push(Start {
+                starts.push(GridStart {
                     parameters,
                     added: added.map(|(with, none)| with / none - 1.0).collect(),
                     predicted,
@@ -546,24 +550,24 @@ pub fn starts(
 ///
 /// Their covariance has the coarse mesh's error in it: without, the objective is as rough as that,
 /// and fits end far from the truth.
-pub struct Draft {
+pub struct FirstFits {
     problem: Problem,
     interface: Interface,
-    plain: Fit,
-    /// The plain block's fit on the answer's mesh, where it may be one.
+    homogeneous: Fit,
+    /// The homogeneous block's fit on the answer's mesh, where it may be one.
     settled: Option<Fit>,
     score: Option<Score>,
     lump: Option<Fit>,
 }
 
-impl Draft {
+impl FirstFits {
     /// Without an inclusion.
-    pub fn plain(plain: Plain) -> Self {
-        let (settled, score) = plain.settled.unzip();
+    pub fn homogeneous(homogeneous: HomogeneousFit) -> Self {
+        let (settled, score) = homogeneous.settled.unzip();
         Self {
-            problem: plain.problem,
-            interface: plain.interface,
-            plain: plain.fit,
+            problem: homogeneous.problem,
+            interface: homogeneous.interface,
+            homogeneous: homogeneous.fit,
             settled,
             score,
             lump: None,
@@ -572,8 +576,8 @@ impl Draft {
 
     fn better(&self) -> &Fit {
         match &self.lump {
-            Some(lump) if lump.evidence > self.plain.evidence => lump,
-            _ => &self.plain,
+            Some(lump) if lump.evidence > self.homogeneous.evidence => lump,
+            _ => &self.homogeneous,
         }
     }
 
@@ -595,77 +599,80 @@ impl Draft {
 impl InclusionSearch {
     /// The best first fits with an inclusion, from the grid's best starts and from what fits best
     /// under `another` assumption.
-    fn draft(
+    fn first_fits(
         &self,
         observed: &Observed,
         approaches_m: &[f64],
-        plain: Plain,
-        another: Option<&Draft>,
+        homogeneous: HomogeneousFit,
+        another: Option<&FirstFits>,
         counter: &mut Counter<'_>,
-    ) -> Draft {
+    ) -> FirstFits {
         // Starts that are fitted. With tempered errors most end in one optimum; a third adds a
         // quarter of the time.
         let fitted_starts: usize = 2;
         // Elements along an eighth of the inclusion's circumference in the first fits with an
         // inclusion.
         let first_fineness: usize = 3;
-        let starts = plain.starts();
-        let mut draft = Draft::plain(plain);
-        let modulus = draft.plain.parameters.block_modulus_pa;
-        let problem = &mut draft.problem;
+        let starts = homogeneous.starts();
+        let mut first_fits = FirstFits::homogeneous(homogeneous);
+        let modulus = first_fits.homogeneous.parameters.block_modulus_pa;
+        let problem = &mut first_fits.problem;
         problem.priors.extend(self.lump_priors(modulus));
-        problem.forward = self.forward(observed, approaches_m, draft.interface, first_fineness);
+        problem.forward =
+            self.forward(observed, approaches_m, first_fits.interface, first_fineness);
         let best = another.and_then(|another| Some((another, another.lump.as_ref()?)));
-        let ending = best.map_or(DRAFTED, |(another, lump)| {
-            DRAFTED.below(problem.objective_at(another.hopeless(), lump.volume))
+        let ending = best.map_or(FIRST_FIT_ENDING, |(another, lump)| {
+            FIRST_FIT_ENDING.below(problem.objective_at(another.hopeless(), lump.volume))
         });
         let best = best.map(|(_, lump)| &lump.parameters);
-        draft.lump = (best.into_iter().chain(&starts).take(fitted_starts))
+        first_fits.lump = (best.into_iter().chain(&starts).take(fitted_starts))
             .filter_map(|start| problem.fit(*start, ending, || counter.step()))
             .max_by(|a, b| a.evidence.total_cmp(&b.evidence));
-        draft
+        first_fits
     }
 
-    /// A draft's fits on the answer's mesh, in full where their log evidence exceeds `needed`.
-    /// `None` where the plain block's could not be solved.
+    /// First fits on the answer's mesh, in full where their log evidence exceeds `needed`.
+    /// `None` where the homogeneous block's could not be solved.
     pub(crate) fn hypothesis(
         &self,
         observed: &Observed,
         approaches_m: &[f64],
-        draft: Draft,
+        first_fits: FirstFits,
         needed: f64,
         counter: &mut Counter<'_>,
     ) -> Option<Hypothesis> {
         // Difference of the first fits' log evidence beyond which a block is not plain.
         let certain_evidence = 50.0;
-        let Draft {
+        let FirstFits {
             mut problem,
             interface,
-            plain,
+            homogeneous,
             settled,
             score,
             lump,
-        } = draft;
+        } = first_fits;
         let with_lump = core::mem::take(&mut problem.priors);
-        let gain = (lump.as_ref()).map_or(f64::NEG_INFINITY, |lump| lump.evidence - plain.evidence);
+        let gain = (lump.as_ref()).map_or(f64::NEG_INFINITY, |lump| {
+            lump.evidence - homogeneous.evidence
+        });
         let is_certain = gain > certain_evidence;
         let fineness = answer_fineness(is_certain);
         problem.forward = self.forward(observed, approaches_m, interface, fineness);
         let covariance = observed.covariance(self.sensor(), interface, Resolution::Answer);
         problem.factor = covariance.cholesky()?;
-        let plain = match settled {
+        let homogeneous = match settled {
             Some(settled) => settled,
-            None if is_certain => plain,
+            None if is_certain => homogeneous,
             None => {
                 problem.priors = with_lump[..BLOCK_COORDINATES].to_vec();
-                problem.fit(plain.parameters, SETTLED, || counter.step())?
+                problem.fit(homogeneous.parameters, ANSWER_ENDING, || counter.step())?
             }
         };
         problem.priors = with_lump;
         let ending = if is_certain {
-            SETTLED
+            ANSWER_ENDING
         } else {
-            SETTLED.below(plain.objective() - LEAST_GAIN)
+            ANSWER_ENDING.below(homogeneous.objective() - LEAST_GAIN)
         };
         let lump = lump.and_then(|fit| {
             let ending = ending.below(problem.objective_at(needed, fit.volume));
@@ -674,7 +681,7 @@ impl InclusionSearch {
         Some(Hypothesis {
             problem,
             interface,
-            plain,
+            homogeneous,
             score,
             lump,
             marginal: None,

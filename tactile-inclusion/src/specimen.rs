@@ -38,8 +38,8 @@ pub struct Specimen {
 
 impl Specimen {
     /// Height and radius in metres. The height's standard error is 2 %, Poisson's ratio 0.495 ±
-    /// 0.005, the zero of the approaches known to 20 µm, and whether the face sticks or slides is
-    /// not known, until set.
+    /// 0.005, and the zero of the approaches is known to 20 µm, until set. Whether the face sticks
+    /// or slides is not known.
     ///
     /// # Errors
     /// A length that is not positive.

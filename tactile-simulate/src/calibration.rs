@@ -32,8 +32,9 @@ pub struct CalibrationRun {
     pub steps: usize,
     /// Standard deviation of the gauge's reading in newton.
     pub gauge_noise_n: f64,
-    /// On the way back the light is that of a larger force F + 4·h·F_max·x(1 − x), x = F/F_max: h
-    /// is the largest difference between the branches as a share of the range. The paper saw none.
+    /// On the way back the light is that of a larger force F + 4·h·F_max·x(1 − x), x = F/F_max. The
+    /// share h is the largest difference between the branches as a share of the range. The paper
+    /// saw none.
     pub hysteresis: f64,
 }
 
@@ -140,7 +141,7 @@ impl PressScene {
     }
 
     /// The calibration with an indenter of two, four, eight or sixteen times the radius where the
-    /// given one saturates the camera: a gain that suits the low pressure of a large or soft object
+    /// given one saturates the camera. A gain that suits the low pressure of a large or soft object
     /// is too high for a small rigid ball.
     ///
     /// ```

@@ -58,9 +58,9 @@ pub struct Camera {
 }
 
 impl Default for Camera {
-    /// The paper's 1392×1042 pixels over 30 mm, 15 grey levels of stray light, 3 % vignetting, 0.8
-    /// px blur, a full well of 15 000 electrons (a scientific CCD of that pitch) and half a grey
-    /// level of read noise.
+    /// The paper's 1392×1042 pixels over 30 mm, 15 grey levels of stray light, 3 % vignetting and
+    /// 0.8 px blur. The full well is 15 000 electrons (a scientific CCD of that pitch), the read
+    /// noise half a grey level.
     fn default() -> Self {
         Self {
             shape: [1042, 1392],
@@ -261,8 +261,8 @@ impl Camera {
     }
 
     /// An exposure of a target instead of the sensing surface: bright dots of a third of the pitch
-    /// (in metres) in diameter on a square grid, 180 grey levels above the background, through the
-    /// same lens, blur, vignetting and noise.
+    /// (in metres) in diameter on a square grid. They lie 180 grey levels above the background,
+    /// behind the same lens, blur, vignetting and noise.
     ///
     /// ```
     /// use tactile_simulate::Camera;

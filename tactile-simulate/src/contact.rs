@@ -162,7 +162,7 @@ impl SimulatedContact {
     }
 
     /// Vertical displacement in metres of the waveguide's surface at distance `r_m` from the
-    /// centre, negative under the object: of a closed form the waveguide's share of the joint
+    /// centre, negative under the object. Of a closed form it is the waveguide's share of the joint
     /// displacement under Hertz's pressure, else that of the given state.
     pub(crate) fn waveguide_height_m(&self, r_m: f64) -> f64 {
         match &self.given {
@@ -276,7 +276,7 @@ impl ContactModel {
     ///
     /// # Errors
     /// [`SimulateError::NoFiniteElements`].
-    pub(crate) fn states(
+    fn states(
         &self,
         sphere: &ElasticSphere,
         waveguide: &LightGuide,
@@ -480,14 +480,14 @@ impl ContactState {
     }
 
     /// The largest pressure of the table, in pascal.
-    pub(crate) fn peak_pressure_pa(&self) -> f64 {
+    fn peak_pressure_pa(&self) -> f64 {
         (self.radius_m.iter().copied())
             .map(|r| self.pressure_at_pa(r))
             .fold(0.0, f64::max)
     }
 
     /// The state at `force_n` > 0 among `states` of growing force: one of them where the force is
-    /// its own, else between two of them, with a, p over its mean, z/F^⅔ and δ/F^⅔ linear in F^⅓.
+    /// its own, else between two of them. Linear in F^⅓ are a, p over its mean, z/F^⅔ and δ/F^⅔.
     /// Below the first, that one shrunk by Hertz's scaling, a ∝ F^⅓ and z ∝ F^⅔. None above the
     /// last.
     pub(crate) fn at_force(states: &[Self], force_n: f64) -> Option<Self> {

@@ -29,10 +29,10 @@
 //! The pixel on the *surface* is then 30 mm / 1392 = 21.55 µm, which is [`Camera::default`]'s.
 //!
 //! # Reproducibility
-//! Random numbers come from ChaCha8 (a published algorithm whose stream is fixed by its definition,
-//! unlike `StdRng` and `SmallRng`, which may change with any release of `rand`), turned into normal
-//! deviates by the ziggurat of `rand_distr`. Each row of each frame has its own stream, so frames
-//! can be made in any order, alone or in parallel, with the same bits.
+//! Random numbers come from ChaCha8, a published algorithm whose stream is fixed by its definition.
+//! Those of `StdRng` and `SmallRng` may change with any release of `rand`. The ziggurat of
+//! `rand_distr` turns them into normal deviates. Each row of each frame has its own stream, so
+//! frames can be made in any order, alone or in parallel, with the same bits.
 #![forbid(unsafe_code)]
 
 mod calibration;

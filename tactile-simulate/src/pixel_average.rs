@@ -124,7 +124,7 @@ impl Disc {
 }
 
 /// First and one past the last of the pixels along one axis that lie within `half` of `centre`,
-/// widened by `margin` and cut to what lies within `margin` of a frame of `length` pixels.
+/// widened by `margin`. They are cut to those within `margin` of a frame of `length` pixels.
 pub fn touched(centre: f64, half: f64, length: usize, margin: usize) -> [isize; 2] {
     let margin = margin as isize;
     let limit = length as isize + margin;

@@ -173,17 +173,17 @@ impl PressScene {
     }
 
     /// From pressure to light.
-    pub(crate) fn light(&self) -> &LightLaw {
+    fn light(&self) -> &LightLaw {
         &self.light
     }
 
     /// Contact of load `load`.
-    pub(crate) fn contact(&self, load: usize) -> &SimulatedContact {
+    fn contact(&self, load: usize) -> &SimulatedContact {
         &self.contacts[load]
     }
 
     /// The contact's disc on the image plane.
-    pub(crate) fn disc(&self, load: usize) -> Disc {
+    fn disc(&self, load: usize) -> Disc {
         let options = &self.options;
         let middle = options.camera.centre_px(options.centre_px);
         let pixel_size_m = options.camera.pixel_size_m;
@@ -400,7 +400,7 @@ impl LightGuide {
         self.layers.iter().map(|l| l.thickness_m).sum()
     }
 
-    pub(crate) fn validate(&self) -> Result<(), SimulateError> {
+    fn validate(&self) -> Result<(), SimulateError> {
         at_least("layers", self.layers.len(), 1)?;
         for layer in &self.layers {
             positive("thickness_m", layer.thickness_m)?;
@@ -559,7 +559,7 @@ impl Default for PressOptions {
 }
 
 impl PressOptions {
-    pub(crate) fn validate(&self) -> Result<(), SimulateError> {
+    fn validate(&self) -> Result<(), SimulateError> {
         self.object.validate()?;
         self.waveguide.validate()?;
         self.camera.validate()?;
@@ -734,7 +734,7 @@ impl PressTruth {
     }
 
     /// The contact's centre (x, y) in metres from the first pixel's centre.
-    pub(crate) fn centre_m(&self) -> [f64; 2] {
+    fn centre_m(&self) -> [f64; 2] {
         std::array::from_fn(|k| self.centre_px[k] * self.pixel_size_m[k])
     }
 

@@ -42,7 +42,7 @@ impl ContactState {
     }
 
     /// The face of a cylinder squeezed between two rigid plates on which its faces slide or to
-    /// which they stick, neo-Hookean and at finite strain: a state for each force, for
+    /// which they stick, neo-Hookean and at finite strain. A state for each force, for
     /// [`ContactModel::Tabulated`](crate::ContactModel::Tabulated). Solved anew at each call, some
     /// 0.1 s a state: keep the states.
     ///

@@ -34,7 +34,7 @@ pub struct Trial {
 
 impl Trial {
     /// Simulates a calibration series and the press itself. Where the calibration's ball saturates
-    /// the camera, one of two, four, eight or sixteen times its radius takes its place: a gain that
+    /// the camera, one of two, four, eight or sixteen times its radius takes its place. A gain that
     /// suits the low pressure of a large or soft object is too high for a small rigid ball.
     ///
     /// # Errors

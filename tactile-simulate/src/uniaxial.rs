@@ -24,9 +24,9 @@
 //! A surface pattern of bumps whose pixel averages are exact.
 //!
 //! On a rectangular face the height is h(X, Y) = h₀ + h₁ Σₖ b((X − Xₖ)/w) b((Y − Yₖ)/w) with b(t) =
-//! cos²(πt/2) for |t| < 1, 0 beyond. It is continuous with its slope, each bump lies wholly on the
-//! face, and ∫b = (t + sin(πt)/π)/2 in closed form makes every pixel's average a product of two
-//! differences.
+//! cos²(πt/2) for |t| < 1, 0 beyond. It is continuous with its slope, and each bump lies wholly on
+//! the face. The integral ∫b = (t + sin(πt)/π)/2 in closed form makes every pixel's average a
+//! product of two differences.
 
 use crate::camera::{Camera, Purpose, row_stream};
 use crate::error::{SimulateError, at_least, finite, not_negative, positive};
@@ -369,7 +369,7 @@ impl Default for UniaxialOptions {
 }
 
 impl UniaxialOptions {
-    pub(crate) fn validate(&self) -> Result<(), SimulateError> {
+    fn validate(&self) -> Result<(), SimulateError> {
         self.material.validate()?;
         positive("youngs_modulus_pa", self.material.youngs_modulus_pa)?;
         self.pattern.validate()?;
@@ -418,11 +418,7 @@ pub struct UniaxialState {
 }
 
 impl UniaxialState {
-    pub(crate) fn new(
-        material: &Elastic,
-        area0_m2: f64,
-        force_n: f64,
-    ) -> Result<Self, SimulateError> {
+    fn new(material: &Elastic, area0_m2: f64, force_n: f64) -> Result<Self, SimulateError> {
         let e = material.youngs_modulus_pa;
         // Nominal stress over modulus: λ(1 − λ²)/2, greatest at 1/√3.
         let load = force_n / (e * area0_m2);
@@ -531,7 +527,7 @@ impl Default for SurfacePattern {
 }
 
 impl SurfacePattern {
-    pub(crate) fn validate(&self) -> Result<(), SimulateError> {
+    fn validate(&self) -> Result<(), SimulateError> {
         positive("base_height_m", self.base_height_m)?;
         not_negative("bump_height_m", self.bump_height_m[0])?;
         crate::error::within(
@@ -551,7 +547,7 @@ impl SurfacePattern {
     }
 
     /// Places the bumps on a face of `size_m` centred on the origin.
-    pub(crate) fn place(&self, outline: FaceOutline, size_m: [f64; 2], seed: u64) -> Relief {
+    fn place(&self, outline: FaceOutline, size_m: [f64; 2], seed: u64) -> Relief {
         let mut rng = row_stream(seed, Purpose::Pattern, 0, 0);
         let cell: [f64; 2] = std::array::from_fn(|k| size_m[k] / self.bumps[k] as f64);
         let half_width_m = self.bump_share * cell[0].min(cell[1]);
@@ -633,8 +629,8 @@ impl Relief {
     }
 
     /// Shares of the cells between `rows` (y) and `columns` (x), edges in material coordinates,
-    /// that an elliptic face covers: differences of the area of the unit disc to the lower left of
-    /// the cells' corners.
+    /// that an elliptic face covers. They are differences of the area of the unit disc to the lower
+    /// left of the cells' corners.
     fn covered_by_ellipse(&self, rows: &[f64], columns: &[f64]) -> Array2<f64> {
         let half = self.size_m.map(|side| 0.5 * side);
         let corner = |row: usize, column: usize| {

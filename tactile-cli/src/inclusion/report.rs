@@ -135,7 +135,7 @@ pub fn table(estimate: &InclusionEstimate, source: &Source) -> Vec<u8> {
                 profile.pressure_pa[k],
                 profile.standard_error_pa[k],
                 estimate.fitted_pa[frame][k],
-                estimate.plain_pa[frame][k],
+                estimate.homogeneous_pa[frame][k],
             ]);
         }
     }
@@ -180,7 +180,7 @@ pub fn page(estimate: &InclusionEstimate, source: &Source) -> Page {
                 &name("fit"),
             )
             .dashed(
-                points(&estimate.plain_pa[frame]),
+                points(&estimate.homogeneous_pa[frame]),
                 Colour::GREY,
                 &name("plain block"),
             );

@@ -91,7 +91,7 @@ fn is_poor(estimate: &InclusionEstimate) -> bool {
     estimate.warnings.iter().any(poor)
 }
 
-/// Each parameter that is told holds its truth.
+/// Each parameter that is identified holds its truth.
 fn told_is_right(estimate: &InclusionEstimate, truth: LumpParameters) -> bool {
     let Some(inclusion) = &estimate.inclusion else {
         return true;
@@ -115,12 +115,12 @@ fn moved_aside(lumps: LumpParameters, aside_m: f64, times: f64) -> Vec<f64> {
     let fine: Vec<f64> = (0..72).map(|k| (f64::from(k) + 0.5) * 0.25e-3).collect();
     let with = solved(Some(lumps), &fine);
     let without = solved(None, &fine);
-    let plain = solved(None, &ring_radii());
+    let homogeneous = solved(None, &ring_radii());
     let added = |frame: usize, radius: f64| {
         let at = ((radius / 0.25e-3) as usize).min(fine.len() - 1) + frame * fine.len();
         with[at] - without[at]
     };
-    let mut values = plain.clone();
+    let mut values = homogeneous.clone();
     for frame in 0..2 {
         for (k, radius) in ring_radii().into_iter().enumerate() {
             let around = (0..64).map(|step| {
@@ -144,7 +144,8 @@ fn as_assumed_the_told_is_right() {
     assert!(told_is_right(&estimate, truth), "{estimate:?}");
 }
 
-/// A search of a plain block fits no inclusion: the grid's 27 solutions and a plain block's few.
+/// A search of a homogeneous block fits no inclusion: the grid's 27 solutions and a homogeneous
+/// block's few.
 #[test]
 fn a_plain_block_is_plain_after_a_few_solutions() {
     let frames = frames(&solved(None, &ring_radii()));
@@ -162,7 +163,8 @@ fn a_plain_block_is_plain_after_a_few_solutions() {
     assert!(solutions < 40, "{solutions}");
 }
 
-/// The test that ends a plain block's search lets a small one of twice the tissue's modulus pass.
+/// The test that ends a homogeneous block's search lets a small one of twice the tissue's modulus
+/// pass.
 #[test]
 fn a_faint_inclusion_is_found() {
     let truth = lump(5e-3, 8e-3, 10e3);

@@ -3,7 +3,7 @@
 use super::{block, forward};
 use crate::SensorErrors;
 use crate::covariance::{Observed, Resolution};
-use crate::fit::{Prior, Problem, SETTLED};
+use crate::fit::{ANSWER_ENDING, Prior, Problem};
 use crate::forward::{Coordinate, LARGEST_POISSON_RATIO, LumpParameters, Parameters};
 use tactile_fem::Interface;
 
@@ -49,7 +49,7 @@ fn a_fit_from_afar_ends_at_the_truth_within_its_errors() {
         depth_m: 6e-3,
         youngs_modulus_pa: 15e3,
     });
-    let fit = problem.fit(start, SETTLED, || true).unwrap();
+    let fit = problem.fit(start, ANSWER_ENDING, || true).unwrap();
     assert!(fit.converged);
     for (k, coordinate) in problem.coordinates().into_iter().enumerate() {
         let error = fit.covariance[(k, k)].sqrt();
@@ -74,7 +74,7 @@ fn a_fit_goes_on_along_the_limit_of_poissons_ratio() {
         depth_m: 3e-3,
         youngs_modulus_pa: 60e3,
     });
-    let fit = problem.fit(start, SETTLED, || true).unwrap();
+    let fit = problem.fit(start, ANSWER_ENDING, || true).unwrap();
     assert!(fit.converged);
     // As of the fit from afar.
     assert!(fit.misfit < fit.predicted.len() as f64, "{}", fit.misfit);
@@ -84,7 +84,7 @@ fn a_fit_goes_on_along_the_limit_of_poissons_ratio() {
 fn a_step_that_may_not_go_on_ends_the_fit() {
     let (problem, mut start) = problem();
     start.block_modulus_pa *= 1.5;
-    let fit = problem.fit(start, SETTLED, || false).unwrap();
+    let fit = problem.fit(start, ANSWER_ENDING, || false).unwrap();
     assert!(!fit.converged);
 }
 
@@ -100,7 +100,7 @@ fn points_of_a_ridge_are_on_it() {
         ..block(1.0)
     };
     let problem = problem_of(&truth, Resolution::Answer);
-    let fit = problem.fit(truth, SETTLED, || true).unwrap();
+    let fit = problem.fit(truth, ANSWER_ENDING, || true).unwrap();
     let ridge = problem.ridge(&fit, || true).unwrap();
     assert!(ridge.nodes.len() > 4, "{}", ridge.nodes.len());
     for node in &ridge.nodes {

@@ -67,9 +67,9 @@ fn an_inclusion_as_soft_as_the_tissue_is_none() {
     if let Some(lump) = &mut same.lump {
         lump.youngs_modulus_pa = same.block_modulus_pa;
     }
-    let plain = Parameters { lump: None, ..same };
+    let homogeneous = Parameters { lump: None, ..same };
     let with = forward(3, 1.0).predict(&same).unwrap().values;
-    let without = forward(3, 1.0).predict(&plain).unwrap().values;
+    let without = forward(3, 1.0).predict(&homogeneous).unwrap().values;
     // Two meshes of the same body: what the coarser one leaves.
     let rings = 32;
     assert!(distance(&with[..rings], &without[..rings]) < 2e-3);
@@ -198,7 +198,7 @@ fn a_block_said_to_be_incompressible_is_fitted_at_the_limit() {
     let specimen = Specimen::new(30e-3, 40e-3).unwrap();
     let specimen = specimen.with_poisson_ratio(0.4999, 1e-4).unwrap();
     let search = InclusionSearch::new(specimen, guide(1.0)).unwrap();
-    let start = search.plain_block(5e3);
+    let start = search.known_block(5e3);
     assert_eq!(start.poisson_ratio, LARGEST_POISSON_RATIO);
     for prior in search.block_priors(5e3) {
         if prior.coordinate == Coordinate::PoissonRatio {
