@@ -1,7 +1,10 @@
 //! The forward model and its derivatives, and what a search refuses.
 
 use crate::forward::{Coordinate, Forward, LARGEST_POISSON_RATIO, LumpParameters, Parameters};
-use crate::{AssumedInclusion, Identifiable, InclusionSearch, PressureProfile, Specimen};
+use crate::{
+    AssumedInclusion, Identifiable, InclusionEstimate, InclusionSearch, InclusionWarning,
+    PressureProfile, Specimen, Verdict,
+};
 use core::ops::ControlFlow;
 use tactile_elasticity::ElasticityError;
 use tactile_fem::{Guide, GuideLayer, Interface, Kinematics, Material};
@@ -305,4 +308,31 @@ fn what_is_not_known_within_a_quarter_both_ways_is_not_told() {
         (interval[0] * interval[1] - 4.0).abs() < 1e-12,
         "symmetric in the logarithm"
     );
+}
+
+#[test]
+fn that_there_is_none_is_certain_only_where_the_model_explains_the_frames() {
+    let known = crate::Estimated::within(5e3f64.ln(), [5e3f64.ln() - 0.1, 5e3f64.ln() + 0.1]);
+    let estimate = |probability: f64, warnings: &[InclusionWarning]| InclusionEstimate {
+        probability,
+        found: false,
+        block_modulus_pa: known,
+        inclusion: None,
+        interface: Interface::Bonded,
+        misfit: 1.0,
+        warnings: warnings.to_vec(),
+        radii_m: vec![],
+        fitted_pa: vec![],
+        homogeneous_pa: vec![],
+    };
+    assert_eq!(estimate(1e-3, &[]).verdict(), Verdict::Absent);
+    assert_eq!(estimate(0.7, &[]).verdict(), Verdict::Uncertain);
+    let poor = InclusionWarning::PoorFit { excess: 9.0 };
+    assert_eq!(estimate(1e-3, &[poor]).verdict(), Verdict::Uncertain);
+    // One per cent of asymmetry is harmless, six are not.
+    let of_picture = |asymmetry| estimate(1e-3, &[]).with_asymmetry(asymmetry);
+    assert_eq!(of_picture(0.01).verdict(), Verdict::Absent);
+    assert!(of_picture(0.01).warnings.is_empty());
+    assert_eq!(of_picture(0.06).verdict(), Verdict::Uncertain);
+    assert_eq!(of_picture(0.06).warnings.len(), 1);
 }
