@@ -37,15 +37,15 @@ pub fn sensor<'a>(fields: &Fields<'a>) -> Result<Option<&'a str>, SceneError> {
 
 /// Whether changes of the lamps are divided out, where the scene says so.
 pub fn corrects_drift(fields: &Fields<'_>) -> Result<Option<bool>, SceneError> {
-    const FIELD: &str = "illumination_drift";
-    const EXPECTED: &str = "\"automatic\" or \"none\"";
-    if !fields.has(FIELD) {
+    let field = "illumination_drift";
+    let expected = "\"automatic\" or \"none\"";
+    if !fields.has(field) {
         return Ok(None);
     }
-    match fields.string(FIELD, EXPECTED)? {
+    match fields.string(field, expected)? {
         "automatic" => Ok(Some(true)),
         "none" => Ok(Some(false)),
-        other => Err(fields.wrong(FIELD, EXPECTED, &toml::Value::String(other.into()))),
+        other => Err(fields.wrong(field, expected, &toml::Value::String(other.into()))),
     }
 }
 
@@ -64,20 +64,20 @@ pub fn object_errors(fields: &Fields<'_>) -> Result<[f64; 2], SceneError> {
 }
 
 pub fn flat_field(fields: &Fields<'_>) -> Result<bool, SceneError> {
-    const EXPECTED: &str = "\"reference\", or absent for no correction";
+    let expected = "\"reference\", or absent for no correction";
     if !fields.has("flat_field") {
         return Ok(false);
     }
-    match fields.string("flat_field", EXPECTED)? {
+    match fields.string("flat_field", expected)? {
         "reference" => Ok(true),
-        other => Err(fields.wrong("flat_field", EXPECTED, &toml::Value::String(other.into()))),
+        other => Err(fields.wrong("flat_field", expected, &toml::Value::String(other.into()))),
     }
 }
 
 pub fn bits(fields: &Fields<'_>) -> Result<Option<u8>, SceneError> {
-    const EXPECTED: &str = "a whole number from 8 to 16, the bits of the camera";
+    let expected = "a whole number from 8 to 16, the bits of the camera";
     let accept = |bits: f64| (8.0..=16.0).contains(&bits) && bits.fract() == 0.0;
-    let bits = fields.optional_number("bits", EXPECTED, accept)?;
+    let bits = fields.optional_number("bits", expected, accept)?;
     Ok(bits.map(|bits| bits as u8))
 }
 
@@ -86,11 +86,11 @@ pub fn calibration(
     folder: &Path,
     gauged: bool,
 ) -> Result<CalibrationSource, SceneError> {
-    const EXPECTED: &str = "a table with `pairs` or `depth_table`, or `force_N` in every frame";
+    let expected = "a table with `pairs` or `depth_table`, or `force_N` in every frame";
     if gauged && !fields.has("calibration") {
         return Ok(CalibrationSource::Gauge);
     }
-    let fields = fields.table("calibration", EXPECTED)?;
+    let fields = fields.table("calibration", expected)?;
     fields.only(&["pairs", "depth_table"])?;
     match (fields.has("pairs"), fields.has("depth_table")) {
         (true, false) => {
@@ -211,15 +211,15 @@ pub fn object(fields: &Fields<'_>) -> Result<Object, SceneError> {
 }
 
 pub fn layers(fields: &Fields<'_>) -> Result<Vec<SceneLayer>, SceneError> {
-    const EXPECTED: &str = "a table with `layers`, or \"rigid\" (as where it is absent)";
+    let expected = "a table with `layers`, or \"rigid\" (as where it is absent)";
     if !fields.has("waveguide")
         || fields
-            .string("waveguide", EXPECTED)
+            .string("waveguide", expected)
             .is_ok_and(|s| s == "rigid")
     {
         return Ok(Vec::new());
     }
-    let fields = fields.table("waveguide", EXPECTED)?;
+    let fields = fields.table("waveguide", expected)?;
     fields.only(&["layers"])?;
     let tables = fields.tables(
         "layers",
