@@ -73,11 +73,13 @@ impl Material {
     }
 
     /// μ = E / 2(1 + ν), in pascals.
+    #[inline]
     pub(crate) fn shear_modulus(&self) -> f64 {
         self.youngs_modulus_pa / (2.0 * (1.0 + self.poisson_ratio))
     }
 
     /// κ = E / 3(1 − 2ν), in pascals.
+    #[inline]
     pub(crate) fn bulk_modulus(&self) -> f64 {
         self.youngs_modulus_pa / (3.0 * (1.0 - 2.0 * self.poisson_ratio))
     }
@@ -107,6 +109,7 @@ pub struct StressResponse {
 }
 
 /// (1 + v)^(−1/3) to rounding.
+#[inline]
 pub fn inverse_cube_root(v: f64) -> f64 {
     // The series' error is below 0.15 v⁴, and twice its square after a step of Newton's method.
     const SERIES: f64 = 0.1;
@@ -142,6 +145,7 @@ pub enum PointDeformation {
 
 impl PointDeformation {
     /// At displacement gradient `h`. `None` where J ≤ 0.
+    #[inline]
     pub fn new(kinematics: Kinematics, shear: f64, h: &Gradient) -> Option<Self> {
         if kinematics == Kinematics::Linear {
             return Some(Self::Linear { shear, h: *h });
@@ -169,6 +173,7 @@ impl PointDeformation {
         })
     }
 
+    #[inline]
     pub fn response(&self) -> StressResponse {
         match *self {
             Self::Linear { shear, h } => {
@@ -206,6 +211,7 @@ impl PointDeformation {
     }
 
     /// Derivative of the first Piola–Kirchhoff stress by F at a given pressure (tension positive).
+    #[inline]
     pub fn tangent(&self, pressure: f64) -> [Gradient; 5] {
         match *self {
             Self::Linear { shear, .. } => {
