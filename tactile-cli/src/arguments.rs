@@ -1,120 +1,201 @@
-//! The command line.
-use crate::context::Context;
-use crate::failure::{Exit, Failure};
-use crate::{
-    calibrate, depth, force, inclusion, indent, integrate, light, match_points, measure, numbers,
-    reconstruct, strain, stream, table, warp,
-};
-use clap::error::ErrorKind;
-use clap::{Parser, Subcommand};
-use std::io::Write;
+//! What several subcommands ask for: numbers, repetitions, frames of a sensor, masks and known heights.
+use crate::console::{Failure, Interrupt, median_ms};
+use clap::{Args, ValueEnum};
+use ndarray::Array2;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+use tactile_imaging::io::{Grey, read_grey_image, read_grid};
 
-/// Force, shape, strain and Young's modulus from the frames of an optical tactile sensor.
-///
-/// Every subcommand prints its results as text, or as one JSON object with --json, and writes files (tables as CSV, plots
-/// as SVG) to the folder given by --out and nowhere else. The examples in the help run as they stand in a copy of the
-/// repository.
-#[derive(Parser)]
-#[command(name = "tactile", version, after_help = AFTER_HELP, arg_required_else_help = true)]
-pub struct Program {
-    #[command(subcommand)]
-    pub command: Command,
-    /// Print one JSON object on standard output instead of text; each stage is a value or its error.
-    #[arg(long, global = true)]
-    pub json: bool,
-    /// Refuse a job that needs more memory than this, in GB.
-    #[arg(long, global = true, value_name = "GB", default_value = "4", value_parser = numbers::positive)]
-    pub memory_gb: f64,
+fn number(text: &str, fits: impl Fn(f64) -> bool, expected: &str) -> Result<f64, String> {
+    let value = text.parse().ok();
+    let value = value.filter(|v: &f64| v.is_finite() && fits(*v));
+    value.ok_or_else(|| format!("expected {expected}"))
 }
 
-const AFTER_HELP: &str = "\
-Examples, one for each subcommand:
-  tactile measure examples/data/press/scene.toml
-  tactile force --reference examples/data/press/reference.png --pairs examples/data/press/calibration.csv --pixel-um 40 examples/data/press/frame_1.png
-  tactile calibrate examples/data/sensor/calibration.toml
-  tactile match examples/data/cases.txt
-  tactile warp examples/data/sources.csv examples/data/targets.csv examples/data/queries.csv
-  tactile strain examples/data/before.csv examples/data/after.csv
-  tactile reconstruct examples/data/ball.pgm --light 0,0,1 --mask examples/data/ball.pgm
-  tactile integrate examples/data/slope_x.csv examples/data/slope_y.csv
-  tactile depth --reference examples/data/dark_reference.pgm --table examples/data/depth_table.csv --pixel-um 100 examples/data/dark_frame.pgm
-  tactile inclusion --design examples/data/inclusion/scene.toml
-  tactile indent examples/data/curve.csv --shape sphere --radius 5e-3
-  tactile stream --rate 20 --period 1 --allowed-late 100
-  tactile light --rays 2000
-  tactile table examples/data/press/scene.toml --moduli 2 --largest-ratio 0.5
-
-Exit codes:
-  0    all that was asked for is there
-  1    results were printed, but a stage has no answer; it is printed with its reason
-  2    an argument or a file cannot be used; nothing was computed
-  3    a result could not be written
-  130  stopped by Ctrl-C; what was there was printed";
-
-#[derive(Subcommand)]
-pub enum Command {
-    Measure(measure::Arguments),
-    Force(force::Arguments),
-    Calibrate(calibrate::Arguments),
-    Match(match_points::Arguments),
-    Warp(warp::Arguments),
-    Strain(strain::Arguments),
-    Reconstruct(reconstruct::Arguments),
-    Integrate(integrate::Arguments),
-    Depth(depth::Arguments),
-    Inclusion(inclusion::Arguments),
-    Indent(indent::Arguments),
-    Stream(stream::Arguments),
-    Light(light::Arguments),
-    Table(table::Arguments),
+/// An argument that is a positive, finite number.
+pub fn positive(text: &str) -> Result<f64, String> {
+    number(text, |v| v > 0.0, "a number above zero")
 }
 
-impl Command {
-    pub fn run(&self, context: &mut Context) -> Result<Exit, Failure> {
-        match self {
-            Self::Measure(arguments) => measure::run(arguments, context),
-            Self::Force(arguments) => force::run(arguments, context),
-            Self::Calibrate(arguments) => calibrate::run(arguments, context),
-            Self::Match(arguments) => match_points::run(arguments, context),
-            Self::Warp(arguments) => warp::run(arguments, context),
-            Self::Strain(arguments) => strain::run(arguments, context),
-            Self::Reconstruct(arguments) => reconstruct::run(arguments, context),
-            Self::Integrate(arguments) => integrate::run(arguments, context),
-            Self::Depth(arguments) => depth::run(arguments, context),
-            Self::Inclusion(arguments) => inclusion::run(arguments, context),
-            Self::Indent(arguments) => indent::run(arguments, context),
-            Self::Stream(arguments) => stream::run(arguments, context),
-            Self::Light(arguments) => light::run(arguments, context),
-            Self::Table(arguments) => table::run(arguments, context),
-        }
+/// An argument that is a finite number.
+pub fn finite(text: &str) -> Result<f64, String> {
+    number(text, |_| true, "a finite number")
+}
+
+/// An argument that is a finite number of at least zero.
+pub fn not_negative(text: &str) -> Result<f64, String> {
+    number(text, |v| v >= 0.0, "a number of at least zero")
+}
+
+/// An argument that is a Poisson's ratio.
+pub fn poisson(text: &str) -> Result<f64, String> {
+    let fits = |v| v > -1.0 && v <= 0.5;
+    number(text, fits, "a number above -1 and at most 0.5")
+}
+
+/// An argument of three finite numbers between commas.
+pub fn direction(text: &str) -> Result<[f64; 3], String> {
+    let numbers: Result<Vec<f64>, _> = text.split(',').map(|part| finite(part.trim())).collect();
+    let three = numbers.ok().and_then(|numbers| numbers.try_into().ok());
+    three.ok_or_else(|| "expected 3 finite numbers between commas".to_owned())
+}
+
+/// An argument that is one positive number, or two between commas: the size of a pixel along x and y.
+pub fn one_or_two(text: &str) -> Result<[f64; 2], String> {
+    let numbers: Result<Vec<f64>, _> = text.split(',').map(|part| positive(part.trim())).collect();
+    match numbers.as_deref() {
+        Ok(&[both]) => Ok([both; 2]),
+        Ok(&[x, y]) => Ok([x, y]),
+        _ => Err("expected one number above zero, or two between a comma".to_owned()),
     }
 }
 
-/// Prints the help where it was asked for, else what is wrong with the arguments as one sentence.
-pub fn explain(error: &clap::Error) -> Exit {
-    let text = error.render().to_string();
-    match error.kind() {
-        ErrorKind::DisplayHelp | ErrorKind::DisplayVersion => {
-            match std::io::stdout().write_all(text.as_bytes()) {
-                Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => Exit::Output,
-                _ => Exit::Complete,
+/// The name of a value as it is written on the command line.
+pub fn name(value: impl ValueEnum) -> String {
+    let value = value.to_possible_value();
+    value.map_or(String::new(), |v| v.get_name().to_owned())
+}
+
+/// How often the work is done.
+#[derive(Args, Clone, Copy)]
+pub struct Repetition {
+    /// Do the work N times. The median of the times is given.
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
+    pub repeat: u32,
+}
+
+impl Repetition {
+    /// The result of the last repetition, and the median of the times in milliseconds. Ctrl-C ends the repetitions.
+    pub fn timed<T, E>(
+        self,
+        interrupt: &Interrupt,
+        mut work: impl FnMut() -> Result<T, E>,
+    ) -> Result<(T, f64), E> {
+        let mut times = Vec::new();
+        loop {
+            let start = Instant::now();
+            let result = work()?;
+            times.push(start.elapsed());
+            if times.len() >= self.repeat as usize || interrupt.requested() {
+                return Ok((result, median_ms(times)));
             }
         }
-        ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand => {
-            let _ = std::io::stderr().write_all(text.as_bytes());
-            Exit::Input
-        }
-        _ => {
-            // The first paragraph says what is wrong; usage and tips follow.
-            let first = text.split("\n\n").next().unwrap_or_default();
-            let words: Vec<&str> = first.split_whitespace().collect();
-            let sentence = words.join(" ");
-            let sentence = sentence.strip_prefix("error: ").unwrap_or(&sentence);
-            let _ = writeln!(
-                std::io::stderr(),
-                "tactile: {sentence}; --help lists the arguments"
-            );
-            Exit::Input
-        }
     }
 }
+
+/// Pressed frames and the frame without contact.
+#[derive(Args)]
+pub struct SensorFrames {
+    /// Pressed frames (PNG, PGM or JPEG).
+    #[arg(required = true)]
+    pub frames: Vec<PathBuf>,
+    /// Frame of the sensor without contact.
+    #[arg(long, value_name = "IMAGE")]
+    pub reference: PathBuf,
+    /// Size of a pixel on the sensor's surface in micrometres, or its width and height.
+    #[arg(long, value_name = "X[,Y]", value_parser = one_or_two, allow_negative_numbers = true)]
+    pixel_um: [f64; 2],
+    /// Bits of the camera, for images of 16 bits whose file does not say.
+    #[arg(long, value_parser = clap::value_parser!(u8).range(8..=16))]
+    bits: Option<u8>,
+}
+
+impl SensorFrames {
+    /// Reference, a table and the frames: the files that are read.
+    pub fn files<'a>(&'a self, table: &'a Path) -> Vec<&'a Path> {
+        let frames = self.frames.iter().map(PathBuf::as_path);
+        frames.chain([self.reference.as_path(), table]).collect()
+    }
+
+    pub fn pixel_m(&self) -> [f64; 2] {
+        self.pixel_um.map(|um| um * 1e-6)
+    }
+
+    /// The frame without contact, in eight bits.
+    pub fn read_reference(&self, grey: Grey) -> Result<Array2<u8>, Failure> {
+        eight_bits(&self.reference, grey, self.bits)
+    }
+
+    /// A pressed frame of the reference's size.
+    pub fn read(
+        &self,
+        path: &Path,
+        grey: Grey,
+        reference: &Array2<u8>,
+    ) -> Result<Array2<u8>, Failure> {
+        let frame = eight_bits(path, grey, self.bits)?;
+        same_shape((path, frame.dim()), (&self.reference, reference.dim()))?;
+        Ok(frame)
+    }
+}
+
+/// An image in eight bits, of a camera with these bits where they are given.
+pub fn eight_bits(path: &Path, grey: Grey, bits: Option<u8>) -> Result<Array2<u8>, Failure> {
+    Ok(read_grey_image(path, grey, bits)?.to_u8())
+}
+
+/// Rows and columns of a file.
+pub type Shaped<'a> = (&'a Path, (usize, usize));
+
+/// Refuses a file of another shape than the first.
+pub fn same_shape(
+    (path, (rows, columns)): Shaped<'_>,
+    (first, (first_rows, first_columns)): Shaped<'_>,
+) -> Result<(), Failure> {
+    if (rows, columns) == (first_rows, first_columns) {
+        return Ok(());
+    }
+    Err(Failure::input(format!(
+        "{} has {rows} rows and {columns} columns, but {} has {first_rows} and {first_columns}: give files of one size",
+        path.display(),
+        first.display()
+    )))
+}
+
+/// The part of a surface that is wanted, and its known heights.
+#[derive(Args)]
+pub struct HeightRegion {
+    /// Image of the object: bright (above 127) pixels are solved for.
+    #[arg(long, value_name = "IMAGE")]
+    pub mask: Option<PathBuf>,
+    /// Known heights, NaN where unknown.
+    #[arg(long, value_name = "KNOWN.csv")]
+    pub heights: Option<PathBuf>,
+}
+
+impl HeightRegion {
+    /// The files beside the first, which gives the shape.
+    pub fn files<'a>(&'a self, first: &'a [&'a Path]) -> Vec<&'a Path> {
+        let own = self.mask.iter().chain(&self.heights).map(PathBuf::as_path);
+        first.iter().copied().chain(own).collect()
+    }
+
+    pub fn known_heights(&self, first: Shaped<'_>) -> Result<Option<Array2<f64>>, Failure> {
+        let Some(path) = &self.heights else {
+            return Ok(None);
+        };
+        let grid = read_grid(path)?;
+        same_shape((path, grid.dim()), first)?;
+        Ok(Some(grid))
+    }
+
+    pub fn bright_pixels(&self, first: Shaped<'_>) -> Result<Option<Array2<bool>>, Failure> {
+        let Some(path) = &self.mask else {
+            return Ok(None);
+        };
+        let levels = read_grey_image(path, Grey::default(), None)?.levels;
+        same_shape((path, levels.dim()), first)?;
+        let mask = levels.mapv(|level| level > 127.0);
+        if !mask.iter().any(|&inside| inside) {
+            return Err(Failure::input(format!(
+                "the mask {} has no pixel brighter than 127: paint the object white",
+                path.display()
+            )));
+        }
+        Ok(Some(mask))
+    }
+}
+
+#[cfg(test)]
+#[path = "arguments_tests.rs"]
+mod tests;

@@ -1,38 +1,164 @@
-//! Standard output and standard error: results on the one, notes on the other.
-use crate::failure::Exit;
+//! What every subcommand has at hand: the standard streams, exit codes, Ctrl-C, the limit of memory, bars, and numbers as text.
+use crate::outputs::Outputs;
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde::Serialize;
-use std::fmt::Display;
+use std::fmt::{self, Display};
 use std::io::{BufWriter, ErrorKind, Write, stderr, stdout};
+use std::ops::ControlFlow;
+use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, mpsc};
+use std::time::{Duration, Instant};
+use tactile_imaging::force::Estimate;
+use tactile_imaging::io::ReadError;
+use tactile_imaging::pipeline::with_error;
 
-/// Where results are printed. A reader that goes away (`| head -1`) ends the printing, not the program.
-pub struct Console {
+/// The exit codes, as the help of the program lists them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Exit {
+    /// All that was asked for is there.
+    Complete,
+    /// Something is there, but a stage has no answer. It is printed with its reason.
+    Partial,
+    /// Arguments or input that cannot be used: nothing was computed.
+    Input,
+    /// The answer could not be written.
+    Output,
+    /// Stopped by Ctrl-C, after the results at that time were printed.
+    Interrupted,
+}
+
+impl Exit {
+    pub fn code(self) -> u8 {
+        match self {
+            Self::Complete => 0,
+            Self::Partial => 1,
+            Self::Input => 2,
+            Self::Output => 3,
+            Self::Interrupted => 130,
+        }
+    }
+
+    /// Complete or, where something is missing, partial.
+    pub fn complete_if(complete: bool) -> Self {
+        if complete {
+            Self::Complete
+        } else {
+            Self::Partial
+        }
+    }
+}
+
+/// Why a call came to nothing, in one sentence.
+#[derive(Debug)]
+pub struct Failure {
+    pub exit: Exit,
+    sentence: String,
+}
+
+impl Failure {
+    fn new(exit: Exit, sentence: impl Display) -> Self {
+        let sentence = sentence.to_string();
+        Self { exit, sentence }
+    }
+
+    /// The input cannot be used.
+    pub fn input(sentence: impl Display) -> Self {
+        Self::new(Exit::Input, sentence)
+    }
+
+    /// This file cannot be used.
+    pub fn in_file(path: &Path, error: impl Display) -> Self {
+        Self::input(format!("{}: {error}", path.display()))
+    }
+
+    /// The input is fine, but there is no answer.
+    pub fn no_answer(sentence: impl Display) -> Self {
+        Self::new(Exit::Partial, sentence)
+    }
+
+    /// The answer could not be written.
+    pub fn output(sentence: impl Display) -> Self {
+        Self::new(Exit::Output, sentence)
+    }
+}
+
+impl Display for Failure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        // Decoders of images say what is wrong in several lines, and go on with their own data.
+        let own = self.sentence.split(" while decoding ChunkType").next();
+        let words: Vec<&str> = own.unwrap_or_default().split_whitespace().collect();
+        f.write_str(&printable(&words.join(" ")))
+    }
+}
+
+impl From<ReadError> for Failure {
+    fn from(error: ReadError) -> Self {
+        match error {
+            ReadError::Write { .. } => Self::output(error),
+            _ => Self::input(error),
+        }
+    }
+}
+
+/// Text of others for terminals and pictures: control characters and marks that turn the direction of writing are replaced.
+///
+/// Without this a file's name could clear the screen, forge a line of the answer, or make an SVG file unreadable.
+pub fn printable(text: &str) -> String {
+    let hidden = |c: char| {
+        c.is_control()
+            || matches!(c, '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
+    };
+    let seen = |c| if hidden(c) { '\u{fffd}' } else { c };
+    text.chars().map(seen).collect()
+}
+
+/// The standard streams, Ctrl-C, the limit of memory and the files to write.
+pub struct Context {
     /// One JSON object instead of text.
     pub json: bool,
+    pub interrupt: Interrupt,
+    pub outputs: Outputs,
+    limit_bytes: f64,
     reader_left: bool,
     error: Option<std::io::Error>,
 }
 
-impl Console {
-    pub fn new(json: bool) -> Self {
+impl Context {
+    pub fn new(json: bool, limit_gb: f64, outputs: Outputs) -> Self {
         Self {
             json,
+            interrupt: Interrupt::install(),
+            outputs,
+            limit_bytes: limit_gb * 1e9,
             reader_left: false,
             error: None,
         }
     }
 
-    /// Prints a line of the result, unless JSON is wanted.
+    /// Prints a line of the result, unless JSON is wanted. A reader that goes away (`| head -1`) ends the printing, not the program.
     pub fn line(&mut self, text: impl Display) {
-        if !self.json {
-            self.print(&text.to_string());
+        if self.json || self.reader_left || self.error.is_some() {
+            return;
+        }
+        let text = text.to_string();
+        let lines: Vec<String> = text.split('\n').map(printable).collect();
+        if let Err(error) = writeln!(stdout(), "{}", lines.join("\n")) {
+            self.keep(error);
         }
     }
 
-    /// Prints the result as JSON, where it is wanted, number by number: that of many frames is as large as what they say.
+    /// Prints a line of a name and its value.
+    pub fn row(&mut self, name: &str, value: impl Display) {
+        self.line(format_args!("{name:<18}{value}"));
+    }
+
+    /// Prints the result as JSON, where it is wanted.
     pub fn value(&mut self, value: &impl Serialize) {
         if !self.json || self.reader_left || self.error.is_some() {
             return;
         }
+        // Number by number: as one text the result of many frames would take as much memory again.
         let mut output = BufWriter::new(stdout().lock());
         let written = serde_json::to_writer_pretty(&mut output, value)
             .map_err(std::io::Error::from)
@@ -47,29 +173,79 @@ impl Console {
     /// A sentence for the person at the terminal, on standard error.
     pub fn note(&self, text: impl Display) {
         // Nothing can be done about a standard error that is closed.
-        let _ = writeln!(stderr(), "tactile: {text}");
+        let _ = writeln!(stderr(), "tactile: {}", printable(&text.to_string()));
     }
 
-    /// The exit code: `exit`, unless the result could not be printed.
-    pub fn close(mut self, exit: Exit) -> Exit {
+    /// Refuses a job that needs more memory than is allowed. `job` names it and its size, `remedy` the way out.
+    pub fn allow(&self, bytes: f64, job: &str, remedy: &str) -> Result<(), Failure> {
+        let size = |bytes: f64| match bytes {
+            b if b >= 1e12 => format!("{:.1} TB", b * 1e-12),
+            b if b >= 1e9 => format!("{:.1} GB", b * 1e-9),
+            b => format!("{:.1} MB", b * 1e-6),
+        };
+        if bytes <= self.limit_bytes {
+            return Ok(());
+        }
+        Err(Failure::input(format!(
+            "{job} needs about {}, more than the {} allowed: {remedy}, or allow more with --memory-gb",
+            size(bytes),
+            size(self.limit_bytes)
+        )))
+    }
+
+    /// Runs a job that can neither stop nor report its progress, with its time so far on the terminal. It is none after
+    /// Ctrl-C, which leaves the job to end with the program.
+    pub fn wait<R: Send + 'static>(
+        &self,
+        job: impl Into<String>,
+        work: impl FnOnce() -> R + Send + 'static,
+    ) -> Option<R> {
+        let _clock = Bar::clock(job);
+        let (answer, answered) = mpsc::channel();
+        self.interrupt.polled(true);
+        let worker = std::thread::spawn(move || {
+            // Nobody waits for the answer any more after Ctrl-C.
+            let _ = answer.send(work());
+        });
+        let result = loop {
+            match answered.recv_timeout(Duration::from_millis(100)) {
+                Ok(result) => break Some(result),
+                Err(mpsc::RecvTimeoutError::Timeout) if self.interrupt.requested() => break None,
+                Err(mpsc::RecvTimeoutError::Timeout) => {}
+                Err(mpsc::RecvTimeoutError::Disconnected) => match worker.join() {
+                    Err(panic) => std::panic::resume_unwind(panic),
+                    Ok(()) => break None,
+                },
+            }
+        };
+        self.interrupt.polled(false);
+        result
+    }
+
+    /// Writes the files of a call that has its answer, and returns the exit code.
+    pub fn close(mut self, ended: Result<Exit, Failure>) -> Exit {
+        // The answer is printed by now: a folder that cannot be written withholds nothing.
+        let ended = ended.and_then(|exit| {
+            let written = self.outputs.write()?;
+            if !written.is_empty() {
+                self.line(format_args!("wrote {}", written.join(", ")));
+            }
+            Ok(exit)
+        });
+        let exit = ended.unwrap_or_else(|failure| {
+            self.note(&failure);
+            failure.exit
+        });
         if let Err(error) = stdout().flush() {
             self.keep(error);
         }
         match &self.error {
-            None => exit,
             Some(error) => {
-                self.note(format!("cannot write to standard output: {error}"));
+                self.note(format_args!("cannot write to standard output: {error}"));
                 Exit::Output
             }
-        }
-    }
-
-    fn print(&mut self, text: &str) {
-        if self.reader_left || self.error.is_some() {
-            return;
-        }
-        if let Err(error) = writeln!(stdout(), "{text}") {
-            self.keep(error);
+            None if self.interrupt.requested() => Exit::Interrupted,
+            None => exit,
         }
     }
 
@@ -81,3 +257,151 @@ impl Console {
         }
     }
 }
+
+/// Ctrl-C: work that polls it stops with its results so far, other work ends at once. A second one always ends.
+#[derive(Clone, Default)]
+pub struct Interrupt {
+    requested: Arc<AtomicBool>,
+    polled: Arc<AtomicBool>,
+}
+
+impl Interrupt {
+    /// Listens for Ctrl-C. Where the system allows no handler it ends the program, as without one.
+    fn install() -> Self {
+        let interrupt = Self::default();
+        let copy = interrupt.clone();
+        let _ = ctrlc::set_handler(move || {
+            let again = copy.requested.swap(true, Ordering::SeqCst);
+            // Files are written whole or not at all, so that ending here leaves nothing half done.
+            if again || !copy.polled.load(Ordering::SeqCst) {
+                std::process::exit(Exit::Interrupted.code().into());
+            }
+        });
+        interrupt
+    }
+
+    pub fn requested(&self) -> bool {
+        self.requested.load(Ordering::SeqCst)
+    }
+
+    /// The answer to a job that asks whether to go on.
+    pub fn flow(&self) -> ControlFlow<()> {
+        if self.requested() {
+            ControlFlow::Break(())
+        } else {
+            ControlFlow::Continue(())
+        }
+    }
+
+    /// Announces that the work from here on polls [`requested`](Self::requested), or no longer does.
+    pub fn polled(&self, polled: bool) {
+        self.polled.store(polled, Ordering::SeqCst);
+    }
+}
+
+/// A bar on the terminal for a job that takes longer than a second. It is hidden where standard error is no terminal.
+pub struct Bar {
+    bar: ProgressBar,
+    started: Instant,
+    shown: bool,
+    /// Dropped at the end, which the thread of a clock waits for.
+    end: Option<mpsc::Sender<()>>,
+}
+
+impl Bar {
+    /// Of a job of `total` steps.
+    pub fn of(total: usize, job: impl Into<String>) -> Self {
+        let bar = ProgressBar::with_draw_target(Some(total as u64), ProgressDrawTarget::hidden());
+        Self::styled(bar, "{msg} [{bar:32}] {percent} %, {eta} left", job)
+    }
+
+    /// Of a job that does not report its progress: a clock that runs by itself.
+    pub fn clock(job: impl Into<String>) -> Self {
+        let mut progress = Self::styled(ProgressBar::hidden(), "{spinner} {msg}, {elapsed}", job);
+        let bar = progress.bar.clone();
+        let (end, ended) = mpsc::channel::<()>();
+        progress.end = Some(end);
+        std::thread::spawn(move || {
+            let still_runs = Err(mpsc::RecvTimeoutError::Timeout);
+            if ended.recv_timeout(Duration::from_secs(1)) == still_runs {
+                bar.set_draw_target(ProgressDrawTarget::stderr());
+                bar.enable_steady_tick(Duration::from_millis(200));
+            }
+        });
+        progress
+    }
+
+    fn styled(bar: ProgressBar, template: &str, job: impl Into<String>) -> Self {
+        if let Ok(style) = ProgressStyle::with_template(template) {
+            bar.set_style(style);
+        }
+        bar.set_message(printable(&job.into()));
+        Self {
+            bar,
+            started: Instant::now(),
+            shown: false,
+            end: None,
+        }
+    }
+
+    /// Shows that this many steps are done.
+    pub fn done(&mut self, steps: usize) {
+        self.bar.set_position(steps as u64);
+        if !self.shown && self.started.elapsed() > Duration::from_secs(1) {
+            self.shown = true;
+            self.bar.set_draw_target(ProgressDrawTarget::stderr());
+        }
+    }
+}
+
+impl Drop for Bar {
+    fn drop(&mut self) {
+        self.end = None;
+        self.bar.finish_and_clear();
+    }
+}
+
+/// Four significant digits, for numbers whose error is not known.
+pub fn four_digits(value: f64) -> String {
+    digits(value, 4)
+}
+
+/// A number of significant digits, plain where the value is neither tiny nor huge.
+pub fn digits(value: f64, significant: usize) -> String {
+    if value == 0.0 || !value.is_finite() {
+        return format!("{value}");
+    }
+    let power = value.abs().log10().floor() as i32;
+    let last = significant as i32 - 1;
+    if (-4..=last.max(5)).contains(&power) {
+        format!("{value:.*}", (last - power).max(0) as usize)
+    } else {
+        format!("{value:.*e}", last.max(0) as usize)
+    }
+}
+
+/// A value with its standard error in a unit of which one is `1 / scale`.
+pub fn in_unit(estimate: Estimate, scale: f64) -> String {
+    with_error(estimate.value, estimate.standard_error, scale)
+}
+
+/// Value and standard error, as JSON has them.
+pub fn pair(estimate: Estimate) -> [f64; 2] {
+    [estimate.value, estimate.standard_error]
+}
+
+/// `1 point`, `2 points`.
+pub fn count(n: usize, noun: &str) -> String {
+    format!("{n} {noun}{}", if n == 1 { "" } else { "s" })
+}
+
+/// The median of repeated times in milliseconds.
+pub fn median_ms(mut times: Vec<Duration>) -> f64 {
+    times.sort_unstable();
+    let middle = times.get(times.len() / 2);
+    middle.map_or(0.0, |t| t.as_secs_f64() * 1e3)
+}
+
+#[cfg(test)]
+#[path = "console_tests.rs"]
+mod tests;

@@ -8,35 +8,114 @@
 mod arguments;
 mod calibrate;
 mod console;
-mod context;
 mod depth;
-mod failure;
 mod force;
-mod images;
 mod inclusion;
 mod indent;
-mod integrate;
-mod interrupt;
 mod light;
 mod match_points;
 mod measure;
-mod memory;
-mod numbers;
 mod outputs;
-pub mod plot;
-mod progress;
-mod reconstruct;
-mod simulated;
+mod plot;
 mod strain;
 mod stream;
+mod surfaces;
 mod table;
 mod warp;
 
-use self::arguments::Program;
-use self::context::Context;
-use self::failure::Exit;
-use clap::Parser;
+pub use plot::{PlotError, save_press_pages};
+
+use clap::error::ErrorKind;
+use clap::{Parser, Subcommand};
+use console::{Context, Exit, Failure, printable};
+use outputs::Outputs;
+use std::io::Write;
+use std::path::PathBuf;
 use std::process::ExitCode;
+
+/// Force, shape, strain and Young's modulus from the frames of an optical tactile sensor.
+///
+/// Every subcommand prints its results as text, or as one JSON object with --json, and writes files (tables as CSV, plots
+/// as SVG) to the folder given by --out and nowhere else. The examples in the help run as they stand in a copy of the
+/// repository.
+#[derive(Parser)]
+#[command(name = "tactile", version, after_help = AFTER_HELP, arg_required_else_help = true)]
+struct Program {
+    #[command(subcommand)]
+    command: Command,
+    /// Print one JSON object on standard output instead of text. Each stage is a value or its error.
+    #[arg(long, global = true)]
+    json: bool,
+    /// Write tables and plots to this folder. `calibrate` writes a sensor to this file.
+    #[arg(long, global = true, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Refuse a job that needs more memory than this, in GB.
+    #[arg(long, global = true, value_name = "GB", default_value = "4", value_parser = arguments::positive)]
+    memory_gb: f64,
+}
+
+const AFTER_HELP: &str = "\
+Examples, one for each subcommand:
+  tactile measure examples/data/press/scene.toml
+  tactile force --reference examples/data/press/reference.png --pairs examples/data/press/calibration.csv --pixel-um 40 examples/data/press/frame_1.png
+  tactile calibrate examples/data/sensor/calibration.toml
+  tactile match examples/data/cases.txt
+  tactile warp examples/data/sources.csv examples/data/targets.csv examples/data/queries.csv
+  tactile strain examples/data/before.csv examples/data/after.csv
+  tactile reconstruct examples/data/ball.pgm --light 0,0,1 --mask examples/data/ball.pgm
+  tactile integrate examples/data/slope_x.csv examples/data/slope_y.csv
+  tactile depth --reference examples/data/dark_reference.pgm --table examples/data/depth_table.csv --pixel-um 100 examples/data/dark_frame.pgm
+  tactile inclusion --design examples/data/inclusion/scene.toml
+  tactile indent examples/data/curve.csv --shape sphere --radius 5e-3
+  tactile stream --rate 20 --period 1 --allowed-late 100
+  tactile light --rays 2000
+  tactile table examples/data/press/scene.toml --moduli 2 --largest-ratio 0.5
+
+Exit codes:
+  0    all that was asked for is there
+  1    results were printed, but a stage has no answer; it is printed with its reason
+  2    an argument or a file cannot be used; nothing was computed
+  3    a result could not be written
+  130  stopped by Ctrl-C; what was there was printed";
+
+#[derive(Subcommand)]
+enum Command {
+    Measure(measure::MeasureArguments),
+    Force(force::ForceArguments),
+    Calibrate(calibrate::CalibrateArguments),
+    Match(match_points::MatchArguments),
+    Warp(warp::WarpArguments),
+    Strain(strain::StrainArguments),
+    Reconstruct(surfaces::ReconstructArguments),
+    Integrate(surfaces::IntegrateArguments),
+    Depth(depth::DepthArguments),
+    Inclusion(inclusion::InclusionArguments),
+    Indent(indent::IndentArguments),
+    Stream(stream::StreamArguments),
+    Light(light::LightArguments),
+    Table(table::TableArguments),
+}
+
+impl Command {
+    fn run(&self, context: &mut Context) -> Result<Exit, Failure> {
+        match self {
+            Self::Measure(arguments) => measure::run(arguments, context),
+            Self::Force(arguments) => force::run(arguments, context),
+            Self::Calibrate(arguments) => calibrate::run(arguments, context),
+            Self::Match(arguments) => match_points::run(arguments, context),
+            Self::Warp(arguments) => warp::run(arguments, context),
+            Self::Strain(arguments) => strain::run(arguments, context),
+            Self::Reconstruct(arguments) => surfaces::reconstruct(arguments, context),
+            Self::Integrate(arguments) => surfaces::integrate(arguments, context),
+            Self::Depth(arguments) => depth::run(arguments, context),
+            Self::Inclusion(arguments) => inclusion::run(arguments, context),
+            Self::Indent(arguments) => indent::run(arguments, context),
+            Self::Stream(arguments) => stream::run(arguments, context),
+            Self::Light(arguments) => light::run(arguments, context),
+            Self::Table(arguments) => table::run(arguments, context),
+        }
+    }
+}
 
 /// Runs the program on the arguments of this process and returns its exit code, as `tactile --help` lists them.
 ///
@@ -50,20 +129,39 @@ use std::process::ExitCode;
 pub fn run() -> ExitCode {
     let program = match Program::try_parse() {
         Ok(program) => program,
-        Err(error) => return ExitCode::from(arguments::explain(&error).code()),
+        Err(error) => return ExitCode::from(explain(&error).code()),
     };
-    let mut context = Context::new(program.json, program.memory_gb);
-    let exit = match program.command.run(&mut context) {
-        Ok(exit) => exit,
-        Err(failure) => {
-            context.console.note(&failure);
-            failure.exit
+    let outputs = Outputs::new(program.out);
+    let mut context = Context::new(program.json, program.memory_gb, outputs);
+    let ended = program.command.run(&mut context);
+    ExitCode::from(context.close(ended).code())
+}
+
+/// Prints the help where it was asked for, else the error in the arguments as one sentence.
+fn explain(error: &clap::Error) -> Exit {
+    let text = error.render().to_string();
+    match error.kind() {
+        ErrorKind::DisplayHelp | ErrorKind::DisplayVersion => {
+            match std::io::stdout().write_all(text.as_bytes()) {
+                Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => Exit::Output,
+                _ => Exit::Complete,
+            }
         }
-    };
-    let exit = if context.interrupt.requested() {
-        Exit::Interrupted
-    } else {
-        exit
-    };
-    ExitCode::from(context.console.close(exit).code())
+        ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand => {
+            let _ = std::io::stderr().write_all(text.as_bytes());
+            Exit::Input
+        }
+        _ => {
+            // The first paragraph says what is wrong; usage and tips follow.
+            let first = text.split("\n\n").next().unwrap_or_default();
+            let words: Vec<&str> = first.split_whitespace().collect();
+            let sentence = printable(&words.join(" "));
+            let sentence = sentence.strip_prefix("error: ").unwrap_or(&sentence);
+            let _ = writeln!(
+                std::io::stderr(),
+                "tactile: {sentence}; --help lists the arguments"
+            );
+            Exit::Input
+        }
+    }
 }

@@ -1,4 +1,4 @@
-//! The program `tactile`; it is in the library so that what both compute is compiled once.
+//! The program `tactile`.
 
 fn main() -> std::process::ExitCode {
     tactile_cli::run()

@@ -1,20 +1,16 @@
 //! `tactile match`: the point sets of case files.
-use crate::context::Context;
-use crate::failure::{Exit, Failure};
-use crate::numbers::{count, four_digits, median_ms};
-use crate::outputs::Outputs;
-use crate::progress::waiting_or_interrupted;
+use crate::arguments::Repetition;
+use crate::console::{Context, Exit, Failure, count, four_digits, printable};
 use clap::{Args, ValueEnum};
 use nalgebra::Point;
 use serde_json::{Value, json};
 use std::ffi::OsString;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
-use std::time::{Duration, Instant};
-use tactile_imaging::io::{CasePoints, MatchCase, read_cases, write_case_result};
+use tactile_imaging::io::{CasePoints, read_cases, write_case_result};
 use tactile_imaging::matching::{
-    AnnealedSoftassign, CoherentPointDrift, LinearAssignment, MatchError, Matching,
-    NearestNeighbour, Outliers, PointMatcher, RelaxationLabelling, Rotation, StopReason,
+    AnnealedSoftassign, CoherentPointDrift, LinearAssignment, NearestNeighbour, Outliers,
+    PointMatcher, RelaxationLabelling, Rotation, StopReason,
 };
 
 /// Match the points of two sets, in the plane or in space
@@ -24,24 +20,20 @@ use tactile_imaging::matching::{
 /// time_ms`, then for every model row its warped position (`w`) and the target row assigned to it (`a`, -1 for none).
 #[derive(Args)]
 #[command(after_help = "Example:\n  tactile match examples/data/cases.txt --out target/match")]
-pub struct Arguments {
+pub struct MatchArguments {
     /// Case files.
     #[arg(required = true)]
     cases: Vec<PathBuf>,
-    /// Folder for the answers, a file for each case file.
-    #[arg(long, value_name = "DIR")]
-    out: Option<PathBuf>,
     #[command(flatten)]
     expectations: Expectations,
     /// The matcher.
     #[arg(long, value_enum, default_value_t = Method::Softassign)]
     method: Method,
-    /// Calls for each case; the median of their times is given.
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
-    repeat: u32,
+    #[command(flatten)]
+    repetition: Repetition,
 }
 
-/// What is known of the sets beforehand.
+/// The prior knowledge of the sets.
 #[derive(Args, Clone, Copy)]
 pub struct Expectations {
     /// How far the target may be turned against the model.
@@ -99,19 +91,6 @@ impl Expectations {
             .with_rotation(rotation)
             .with_outliers(outliers)
     }
-
-    fn are_default(self) -> bool {
-        self.rotation == Turn::Limited && self.outliers == Unmatched::Both
-    }
-}
-
-/// What is done with one case.
-#[derive(Clone, Copy)]
-struct Job<'a> {
-    name: &'a str,
-    method: Method,
-    expectations: Expectations,
-    repeat: u32,
 }
 
 impl Method {
@@ -130,156 +109,122 @@ impl Method {
     }
 }
 
-/// Bytes that matching takes for every pair of a model and a target point: the scores of all candidates.
-const BYTES_OF_A_PAIR: f64 = 4.5;
-
 /// Refuses sets whose table of candidates does not fit into memory.
 pub fn allow(context: &Context, model: usize, target: usize, remedy: &str) -> Result<(), Failure> {
-    context.memory.allow(
-        BYTES_OF_A_PAIR * model as f64 * target as f64,
-        &format!("matching {model} points to {target}"),
-        remedy,
-    )
+    // The scores of all candidates take 4.5 bytes for every pair of a model and a target point.
+    let bytes = 4.5 * model as f64 * target as f64;
+    let job = format!("matching {model} points to {target}");
+    context.allow(bytes, &job, remedy)
 }
 
-pub fn run(arguments: &Arguments, context: &mut Context) -> Result<Exit, Failure> {
-    if arguments.method != Method::Softassign && !arguments.expectations.are_default() {
+pub fn run(arguments: &MatchArguments, context: &mut Context) -> Result<Exit, Failure> {
+    let Expectations { rotation, outliers } = arguments.expectations;
+    let expected = rotation != Turn::Limited || outliers != Unmatched::Both;
+    if arguments.method != Method::Softassign && expected {
         return Err(Failure::input(
             "--rotation and --outliers apply to the method softassign alone: leave out --method or them",
         ));
     }
-    let names: Vec<OsString> = (arguments.cases.iter())
-        .map(|path| path.file_name().unwrap_or_default().to_owned())
-        .collect();
     let inputs: Vec<&Path> = arguments.cases.iter().map(PathBuf::as_path).collect();
-    let mut outputs = Outputs::plan(arguments.out.as_deref(), &names, &inputs)?;
+    let name = |path: &&Path| path.file_name().unwrap_or_default().to_owned();
+    let names: Vec<OsString> = inputs.iter().map(name).collect();
+    context.outputs.plan(&names, &inputs)?;
     // All files are read before the first case is matched, so that a mistake in the last costs no time.
     let mut files = Vec::new();
     for path in &arguments.cases {
         let cases = read_cases(path)?;
         for case in &cases {
-            let (model, target) = sizes(case);
+            let (model, target) = match &case.points {
+                CasePoints::Plane { model, target } => (model.len(), target.len()),
+                CasePoints::Space { model, target } => (model.len(), target.len()),
+            };
             allow(context, model, target, "give fewer points")?;
         }
         files.push(cases);
     }
-    let mut exit = Exit::Complete;
-    let mut answers = Vec::new();
-    'files: for (name, cases) in names.iter().zip(files) {
+    let (mut answers, mut interrupted) = (Vec::new(), false);
+    for (name, cases) in names.iter().zip(files) {
         let mut text = Vec::new();
         for case in cases {
-            let job = Job {
-                name: &case.name,
-                method: arguments.method,
-                expectations: arguments.expectations,
-                repeat: arguments.repeat,
-            };
             let solved = match case.points {
-                CasePoints::Plane { model, target } => job.solve(context, model, target, &mut text),
-                CasePoints::Space { model, target } => job.solve(context, model, target, &mut text),
+                CasePoints::Plane { model, target } => {
+                    solve(arguments, context, &case.name, model, target, &mut text)
+                }
+                CasePoints::Space { model, target } => {
+                    solve(arguments, context, &case.name, model, target, &mut text)
+                }
             };
-            let Some((answer, complete)) = solved else {
-                exit = Exit::Interrupted;
-                outputs.write(name, &text)?;
-                break 'files;
-            };
-            answers.push(answer);
-            if !complete {
-                exit = Exit::Partial;
+            interrupted = solved.is_none();
+            answers.extend(solved);
+            if interrupted {
+                break;
             }
         }
-        outputs.write(name, &text)?;
+        context.outputs.add(name, text);
+        if interrupted {
+            break;
+        }
     }
-    context.console.value(&json!({ "cases": answers }));
-    if let Some(summary) = outputs.summary() {
-        context.console.line(summary);
-    }
-    Ok(exit)
+    let complete = answers.iter().all(|answer| answer.get("error").is_none());
+    context.value(&json!({ "cases": answers }));
+    Ok(if interrupted {
+        Exit::Interrupted
+    } else {
+        Exit::complete_if(complete)
+    })
 }
 
-fn sizes(case: &MatchCase) -> (usize, usize) {
-    match &case.points {
-        CasePoints::Plane { model, target } => (model.len(), target.len()),
-        CasePoints::Space { model, target } => (model.len(), target.len()),
-    }
-}
-
-impl Job<'_> {
-    /// Matches one case, prints a line about it, appends its answer to `text`; whether there is one. None after Ctrl-C.
-    fn solve<const D: usize>(
-        self,
-        context: &mut Context,
-        model: Vec<Point<f64, D>>,
-        target: Vec<Point<f64, D>>,
-        text: &mut Vec<u8>,
-    ) -> Option<(Value, bool)> {
-        let name = self.name;
-        let (points, targets) = (model.len(), target.len());
-        let job = format!("matching {name}: {points} points to {targets}");
-        let Self {
-            method,
-            expectations,
-            repeat,
-            ..
-        } = self;
-        let answer = waiting_or_interrupted(job, &context.interrupt, move || {
-            repeated(&*method.matcher(expectations), repeat, &model, &target)
-        })?;
-        Some(match answer {
-            Ok((matching, ms)) => {
-                let report = &matching.report;
-                let matched = matching.assignment.iter().flatten().count();
-                let stop = stop_reason(report.stop);
-                context.console.line(format!(
-                    "{name}: {matched} of {points} points matched, residual {}, {stop} after {} and {}, {ms:.1} ms",
-                    four_digits(report.residual),
-                    count(report.iterations, "iteration"),
-                    count(report.starts, "start")
-                ));
-                // Writing into memory does not fail.
-                let _ = writeln!(
-                    text,
-                    "# {name}: {stop} after {} iterations, starts: {}, residual {:.3e}",
-                    report.iterations, report.starts, report.residual
-                );
-                let _ = write_case_result(text, name, ms, &matching.warped, &matching.assignment);
-                let value = json!({
-                    "model_points": points, "target_points": targets, "matched": matched,
-                    "assignment": matching.assignment, "confidence": matching.confidence,
-                    "residual": report.residual, "noise": report.sigma, "stop": stop,
-                    "iterations": report.iterations, "starts": report.starts, "time_ms": ms,
-                });
-                (json!({ "case": name, "value": value }), true)
-            }
-            Err(error) => {
-                context.console.line(format!("{name}: no answer: {error}"));
-                let _ = writeln!(text, "# {name}: no answer: {error}");
-                (json!({ "case": name, "error": error.to_string() }), false)
-            }
-        })
-    }
-}
-
-/// The answer, and the median time of the calls in milliseconds.
-fn repeated<const D: usize>(
-    matcher: &dyn PointMatcher<D>,
-    repeat: u32,
-    model: &[Point<f64, D>],
-    target: &[Point<f64, D>],
-) -> Result<(Matching<D>, f64), MatchError> {
-    let timed = || -> Result<(Matching<D>, Duration), MatchError> {
-        let start = Instant::now();
-        let matching = matcher.match_points(model, target)?;
-        Ok((matching, start.elapsed()))
+/// Matches one case, prints a line about it, appends its answer to `text` and returns it as JSON. It is none after Ctrl-C.
+fn solve<const D: usize>(
+    arguments: &MatchArguments,
+    context: &mut Context,
+    case: &str,
+    model: Vec<Point<f64, D>>,
+    target: Vec<Point<f64, D>>,
+    text: &mut Vec<u8>,
+) -> Option<Value> {
+    let name = printable(case);
+    let (points, targets) = (model.len(), target.len());
+    let job = format!("matching {name}: {points} points to {targets}");
+    let repetition = arguments.repetition;
+    let (method, expectations) = (arguments.method, arguments.expectations);
+    let interrupt = context.interrupt.clone();
+    let answer = context.wait(job, move || {
+        let matcher = method.matcher(expectations);
+        repetition.timed(&interrupt, || matcher.match_points(&model, &target))
+    })?;
+    let (matching, ms) = match answer {
+        Ok(answer) => answer,
+        Err(error) => {
+            context.line(format_args!("{name}: no answer: {error}"));
+            // Writing into memory does not fail, here and below.
+            let _ = writeln!(text, "# {name}: no answer: {error}");
+            return Some(json!({ "case": case, "error": error.to_string() }));
+        }
     };
-    let (mut matching, first) = timed()?;
-    let mut times = vec![first];
-    for _ in 1..repeat {
-        let (again, time) = timed()?;
-        matching = again;
-        times.push(time);
-    }
-    Ok((matching, median_ms(&mut times)))
+    let report = &matching.report;
+    let (iterations, starts) = (report.iterations, report.starts);
+    let matched = matching.assignment.iter().flatten().count();
+    let stop = stop_reason(report.stop);
+    context.line(format_args!(
+        "{name}: {matched} of {points} points matched, residual {}, {stop} after {} and {}, {ms:.1} ms",
+        four_digits(report.residual),
+        count(iterations, "iteration"),
+        count(starts, "start")
+    ));
+    let _ = writeln!(
+        text,
+        "# {name}: {stop} after {iterations} iterations, starts: {starts}, residual {:.3e}",
+        report.residual
+    );
+    let _ = write_case_result(text, case, ms, &matching.warped, &matching.assignment);
+    let value = json!({
+        "model_points": points, "target_points": targets, "matched": matched,
+        "assignment": matching.assignment, "confidence": matching.confidence,
+        "residual": report.residual, "noise": report.sigma, "stop": stop,
+        "iterations": iterations, "starts": starts, "time_ms": ms,
+    });
+    Some(json!({ "case": case, "value": value }))
 }
 
 fn stop_reason(stop: StopReason) -> &'static str {

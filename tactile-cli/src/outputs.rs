@@ -1,33 +1,40 @@
-//! The files of a call: named before the work starts, written after it.
-use crate::failure::Failure;
+//! The files of a call: named and checked before the work starts, written after the answer is printed.
+use crate::console::Failure;
 use crate::plot::Page;
+use ndarray::Array2;
 use std::collections::HashSet;
-use std::ffi::OsStr;
-use std::fmt::{Debug, Write as _};
+use std::ffi::{OsStr, OsString};
+use std::fmt::Debug;
+use std::fs::Metadata;
 use std::path::{Path, PathBuf};
-use tactile_imaging::io::{ReadError, write_bytes};
+use tactile_imaging::io::write_bytes;
 
-/// A folder for results, or none.
+/// The folder of the results, if one is wanted, and the files for it.
+#[derive(Default)]
 pub struct Outputs {
     folder: Option<PathBuf>,
     planned: Vec<PathBuf>,
-    written: Vec<PathBuf>,
+    ready: Vec<(PathBuf, Vec<u8>)>,
 }
 
 impl Outputs {
-    /// Checks that none of the files to be written is one of the inputs, and that no two have one name.
-    pub fn plan<N: AsRef<OsStr>>(
-        folder: Option<&Path>,
-        names: &[N],
-        inputs: &[&Path],
-    ) -> Result<Self, Failure> {
-        let outputs = Self {
-            folder: folder.map(Path::to_path_buf),
-            planned: Vec::new(),
-            written: Vec::new(),
-        };
-        let Some(folder) = folder else {
-            return Ok(outputs);
+    pub fn new(folder: Option<PathBuf>) -> Self {
+        Self {
+            folder,
+            ..Self::default()
+        }
+    }
+
+    /// The argument of `--out`.
+    pub fn folder(&self) -> Option<&Path> {
+        self.folder.as_deref()
+    }
+
+    /// Announces the names of the files to be written and the inputs. No result may replace an input, also none that a
+    /// scene or calibration file names, no two may have one name, and the folder must allow writing.
+    pub fn plan<N: AsRef<OsStr>>(&mut self, names: &[N], inputs: &[&Path]) -> Result<(), Failure> {
+        let Some(folder) = self.folder.clone() else {
+            return Ok(());
         };
         if folder.exists() && !folder.is_dir() {
             return Err(Failure::input(format!(
@@ -35,8 +42,28 @@ impl Outputs {
                 folder.display()
             )));
         }
+        self.plan_in(&folder, names, inputs)
+    }
+
+    /// As [`plan`](Self::plan), where `--out` names a file in this folder.
+    pub fn plan_in<N: AsRef<OsStr>>(
+        &mut self,
+        folder: &Path,
+        names: &[N],
+        inputs: &[&Path],
+    ) -> Result<(), Failure> {
+        // The folder is made with the first file, inside the nearest one that exists.
+        let nearest = folder.ancestors().find(|f| f.exists());
+        let ancestor = nearest.unwrap_or(Path::new("."));
+        let closed = |m: Metadata| !m.is_dir() || m.permissions().readonly();
+        if ancestor.metadata().is_ok_and(closed) {
+            return Err(Failure::input(format!(
+                "--out {} cannot be written in {}: name another folder for the results",
+                folder.display(),
+                ancestor.display()
+            )));
+        }
         let mut taken = HashSet::new();
-        let mut planned = Vec::new();
         for name in names {
             let path = folder.join(name.as_ref());
             if !taken.insert(name.as_ref()) {
@@ -45,17 +72,20 @@ impl Outputs {
                     path.display()
                 )));
             }
-            planned.push(path);
+            self.planned.push(path);
         }
-        let outputs = Self { planned, ..outputs };
-        outputs.check(inputs)?;
-        Ok(outputs)
+        self.folder = Some(folder.into());
+        let named = inputs.iter().flat_map(|input| named_in(input, 0));
+        self.protect(inputs)?;
+        let named: Vec<PathBuf> = named.collect();
+        self.protect(&named)
     }
 
     /// Refuses more inputs that one of the results would replace.
-    pub fn check(&self, inputs: &[&Path]) -> Result<(), Failure> {
+    pub fn protect(&self, inputs: &[impl AsRef<Path>]) -> Result<(), Failure> {
         for path in &self.planned {
-            if let Some(input) = inputs.iter().find(|input| same_file(input, path)) {
+            let mut inputs = inputs.iter().map(AsRef::as_ref);
+            if let Some(input) = inputs.find(|input| same_file(input, path)) {
                 return Err(Failure::input(format!(
                     "the result {} would replace the input {}: choose another folder for --out",
                     path.display(),
@@ -66,72 +96,104 @@ impl Outputs {
         Ok(())
     }
 
-    /// Whether files are wanted at all.
-    pub fn wanted(&self) -> bool {
-        self.folder.is_some()
-    }
-
-    /// Writes a file, if files are wanted.
-    pub fn write(&mut self, name: impl AsRef<Path>, bytes: &[u8]) -> Result<(), Failure> {
+    /// Adds a file, if files are wanted.
+    pub fn add(&mut self, name: impl AsRef<Path>, bytes: Vec<u8>) {
         if let Some(folder) = &self.folder {
-            let path = folder.join(name);
-            write_bytes(&path, bytes).map_err(|error| match error {
-                // A path that the system refuses (a name too long, say) was given by the user as well.
-                ReadError::Write { .. } => Failure::output(error),
-                error => error.into(),
-            })?;
-            self.written.push(path);
+            self.ready.push((folder.join(name), bytes));
         }
-        Ok(())
     }
 
-    /// Writes a page of plots, if files are wanted.
-    pub fn page(&mut self, name: &str, page: impl FnOnce() -> Page) -> Result<(), Failure> {
-        if self.wanted() {
+    /// Adds a page of plots, if files are wanted.
+    pub fn page(
+        &mut self,
+        name: impl AsRef<Path>,
+        page: impl FnOnce() -> Page,
+    ) -> Result<(), Failure> {
+        if self.folder.is_some() {
             let svg = page().to_svg().map_err(Failure::output)?;
-            self.write(name, svg.as_bytes())?;
+            self.add(name, svg.into_bytes());
         }
         Ok(())
     }
 
-    /// A sentence that says what was written where.
-    pub fn summary(&self) -> Option<String> {
-        let names: Vec<_> = self
-            .written
-            .iter()
-            .map(|p| p.display().to_string())
-            .collect();
-        (!names.is_empty()).then(|| format!("wrote {}", names.join(", ")))
+    /// Writes the files, each whole or not at all, and returns their paths.
+    pub fn write(&mut self) -> Result<Vec<String>, Failure> {
+        let mut written = Vec::new();
+        for (path, bytes) in self.ready.drain(..) {
+            write_bytes(&path, &bytes)?;
+            written.push(path.display().to_string());
+        }
+        Ok(written)
+    }
+}
+
+/// The files that a TOML file names, and those that the TOML files among them name.
+fn named_in(path: &Path, depth: usize) -> Vec<PathBuf> {
+    let toml = path.extension().is_some_and(|e| e == "toml");
+    // A scene names a sensor, and no scene or sensor is as long as a megabyte.
+    if !toml
+        || depth > 4
+        || !path
+            .metadata()
+            .is_ok_and(|m| m.is_file() && m.len() < 1 << 20)
+    {
+        return Vec::new();
+    }
+    let text = std::fs::read_to_string(path).unwrap_or_default();
+    let mut names = Vec::new();
+    // A file that is no TOML is refused by its reader.
+    if let Ok(table) = text.parse::<toml::Table>() {
+        strings(&toml::Value::Table(table), &mut names);
+    }
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let files = names.into_iter().map(|name| folder.join(name));
+    let mut files: Vec<PathBuf> = files.filter(|file| file.is_file()).collect();
+    for k in 0..files.len() {
+        files.extend(named_in(&files[k], depth + 1));
+    }
+    files
+}
+
+/// All strings of a TOML value.
+fn strings(value: &toml::Value, found: &mut Vec<String>) {
+    match value {
+        toml::Value::String(text) => found.push(text.clone()),
+        toml::Value::Array(values) => values.iter().for_each(|v| strings(v, found)),
+        toml::Value::Table(table) => table.values().for_each(|v| strings(v, found)),
+        _ => {}
     }
 }
 
 /// Whether both paths lead to one file that exists.
 fn same_file(a: &Path, b: &Path) -> bool {
-    match (std::fs::metadata(a), std::fs::metadata(b)) {
-        (Ok(x), Ok(y)) => {
-            identity(&x).is_some_and(|id| Some(id) == identity(&y)) || same_path(a, b)
-        }
-        _ => false,
-    }
-}
-
-fn same_path(a: &Path, b: &Path) -> bool {
-    matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b)
+    let (Ok(x), Ok(y)) = (a.metadata(), b.metadata()) else {
+        return false;
+    };
+    identity(&x).is_some_and(|id| Some(id) == identity(&y))
+        || matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b)
 }
 
 /// Device and number of a file: equal for two names of one file, hard links too.
 #[cfg(unix)]
-fn identity(metadata: &std::fs::Metadata) -> Option<(u64, u64)> {
+fn identity(metadata: &Metadata) -> Option<(u64, u64)> {
     use std::os::unix::fs::MetadataExt;
     Some((metadata.dev(), metadata.ino()))
 }
 
 #[cfg(not(unix))]
-fn identity(_: &std::fs::Metadata) -> Option<(u64, u64)> {
+fn identity(_: &Metadata) -> Option<(u64, u64)> {
     None
 }
 
+/// `STEM_suffix`, the name of a result for an input.
+pub fn beside(input: &Path, suffix: &str) -> OsString {
+    let mut name = input.file_stem().unwrap_or_default().to_owned();
+    name.push(suffix);
+    name
+}
+
 /// CSV text: a header, and rows of numbers with the digits that give them back.
+#[derive(Default)]
 pub struct Csv {
     text: String,
 }
@@ -139,35 +201,30 @@ pub struct Csv {
 impl Csv {
     pub fn new<H: AsRef<str>>(header: &[H]) -> Self {
         let names: Vec<&str> = header.iter().map(AsRef::as_ref).collect();
-        Self {
-            text: names.join(",") + "\n",
-        }
+        let text = names.join(",") + "\n";
+        Self { text }
     }
 
-    pub fn without_header() -> Self {
-        Self {
-            text: String::new(),
-        }
+    /// A matrix without a header, a row a line.
+    pub fn of_grid(values: &Array2<f64>) -> Vec<u8> {
+        let mut csv = Self::default();
+        values.rows().into_iter().for_each(|row| csv.row(row));
+        csv.into_bytes()
     }
 
     pub fn row(&mut self, values: impl IntoIterator<Item = impl Debug>) {
-        for (i, value) in values.into_iter().enumerate() {
-            if i > 0 {
-                self.text.push(',');
-            }
-            let _ = write!(self.text, "{value:?}");
-            // A whole number is written as one.
-            if self.text.ends_with(".0") {
-                self.text.truncate(self.text.len() - 2);
-            }
-        }
-        self.text.push('\n');
+        self.cells(values.into_iter().map(Some));
     }
 
-    /// A row of numbers of which some are not known: their cells are empty.
-    pub fn cells<const N: usize>(&mut self, values: [Option<f64>; N]) {
-        let cell = |value: Option<f64>| value.map_or(String::new(), |value| format!("{value:?}"));
-        self.text += &values.map(cell).join(",");
+    /// A row in which unknown values are empty cells.
+    pub fn cells(&mut self, values: impl IntoIterator<Item = Option<impl Debug>>) {
+        let cell = |value: Option<_>| {
+            let text = value.map_or(String::new(), |value| format!("{value:?}"));
+            // A whole number is written as one.
+            text.strip_suffix(".0").map_or(text.clone(), str::to_owned)
+        };
+        let cells: Vec<String> = values.into_iter().map(cell).collect();
+        self.text += &cells.join(",");
         self.text.push('\n');
     }
 

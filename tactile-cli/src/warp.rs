@@ -1,13 +1,10 @@
 //! `tactile warp`: a thin-plate spline through pairs of points.
-use crate::context::Context;
-use crate::failure::{Exit, Failure};
-use crate::numbers::{count, four_digits, median_ms};
-use crate::outputs::{Csv, Outputs};
-use crate::progress::{Progress as Bar, waiting};
+use crate::arguments::Repetition;
+use crate::console::{Bar, Context, Exit, Failure, count, four_digits, median_ms};
+use crate::outputs::Csv;
 use clap::{Args, ValueEnum};
 use nalgebra::{Point, SMatrix};
 use serde_json::json;
-use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::time::Instant;
 use tactile_imaging::io::{PointTable, read_point_table};
@@ -25,7 +22,7 @@ use tactile_imaging::tps::{
 Examples:
   tactile warp examples/data/sources.csv examples/data/targets.csv examples/data/queries.csv --lambda gcv
   tactile warp examples/data/sources.csv examples/data/targets.csv examples/data/queries.csv --kernel r --out target/warp")]
-pub struct Arguments {
+pub struct WarpArguments {
     /// Where points are.
     sources: PathBuf,
     /// Where they go.
@@ -38,12 +35,8 @@ pub struct Arguments {
     /// Smoothing parameter, a number of at least zero, or gcv for the one of least generalised cross-validation.
     #[arg(long, value_name = "X|gcv", default_value = "0", value_parser = smoothing, allow_negative_numbers = true)]
     lambda: Smoothing<f64>,
-    /// Folder for warped.csv.
-    #[arg(long, value_name = "DIR")]
-    out: Option<PathBuf>,
-    /// Fit and evaluate N times; the median of the times is given.
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
-    repeat: u32,
+    #[command(flatten)]
+    repetition: Repetition,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -68,44 +61,35 @@ fn smoothing(text: &str) -> Result<Smoothing<f64>, String> {
     }
 }
 
-const FILE: &str = "warped.csv";
-
-/// Residual of an iterative fit, relative to the largest target.
+/// Residual of an iterative fit, relative to the largest target: below it the digits of a CSV file hardly change.
 const TOLERANCE: f64 = 1e-10;
 
-pub fn run(arguments: &Arguments, context: &mut Context) -> Result<Exit, Failure> {
+pub fn run(arguments: &WarpArguments, context: &mut Context) -> Result<Exit, Failure> {
     let inputs = [&arguments.sources, &arguments.targets, &arguments.queries];
-    let outputs = Outputs::plan(
-        arguments.out.as_deref(),
-        &[FILE],
-        &inputs.map(PathBuf::as_path),
-    )?;
+    context
+        .outputs
+        .plan(&["warped.csv"], &inputs.map(PathBuf::as_path))?;
+    let names = inputs.map(|path| path.display());
     let [sources, targets, queries] = inputs.map(read_point_table);
     let ((sources, metres), targets, queries) = (sources?, targets?, queries?);
-    for (path, unit) in [
-        (&arguments.targets, targets.1),
-        (&arguments.queries, queries.1),
-    ] {
+    for (name, unit) in [(&names[1], targets.1), (&names[2], queries.1)] {
         if unit != metres {
             return Err(Failure::input(format!(
-                "only one of {} and {} names the unit of its coordinates: name it in both headers or in none",
-                arguments.sources.display(),
-                path.display()
+                "only one of {} and {name} names the unit of its coordinates: name it in both headers or in none",
+                names[0],
             )));
         }
     }
     match (sources, targets.0, queries.0) {
         (PointTable::Plane(a), PointTable::Plane(b), PointTable::Plane(q)) => {
-            with_kernel(arguments, context, outputs, &[a, b, q])
+            with_kernel(arguments, context, &[a, b, q])
         }
         (PointTable::Space(a), PointTable::Space(b), PointTable::Space(q)) => {
-            with_kernel(arguments, context, outputs, &[a, b, q])
+            with_kernel(arguments, context, &[a, b, q])
         }
         _ => Err(Failure::input(format!(
             "{}, {} and {} must all have two coordinates a point, or all three",
-            arguments.sources.display(),
-            arguments.targets.display(),
-            arguments.queries.display()
+            names[0], names[1], names[2],
         ))),
     }
 }
@@ -114,22 +98,20 @@ pub fn run(arguments: &Arguments, context: &mut Context) -> Result<Exit, Failure
 type Sets<const D: usize> = [Vec<Point<f64, D>>; 3];
 
 fn with_kernel<const D: usize>(
-    arguments: &Arguments,
+    arguments: &WarpArguments,
     context: &mut Context,
-    outputs: Outputs,
     sets: &Sets<D>,
 ) -> Result<Exit, Failure> {
     match arguments.kernel {
-        KernelName::R2logr => warp(arguments, context, outputs, R2LogR, sets),
-        KernelName::R => warp(arguments, context, outputs, NegR, sets),
-        KernelName::R3 => warp(arguments, context, outputs, R3, sets),
+        KernelName::R2logr => warp(arguments, context, R2LogR, sets),
+        KernelName::R => warp(arguments, context, NegR, sets),
+        KernelName::R3 => warp(arguments, context, R3, sets),
     }
 }
 
 fn warp<const D: usize, K: Kernel>(
-    arguments: &Arguments,
+    arguments: &WarpArguments,
     context: &mut Context,
-    mut outputs: Outputs,
     kernel: K,
     sets: &Sets<D>,
 ) -> Result<Exit, Failure> {
@@ -138,115 +120,99 @@ fn warp<const D: usize, K: Kernel>(
     if matches!(arguments.lambda, Smoothing::Gcv) {
         let n = sources.len() as f64;
         let job = format!("cross-validation with {} points", sources.len());
-        context
-            .memory
-            .allow(24.0 * n * n, &job, "give --lambda a number")?;
+        context.allow(24.0 * n * n, &job, "give --lambda a number")?;
     }
     let options = FitOptions::new(kernel)
         .with_smoothing(arguments.lambda)
         .and_then(|options| options.with_tolerance(TOLERANCE))
         .map_err(Failure::input)?;
-    let (mut fit_times, mut evaluate_times) = (Vec::new(), Vec::new());
+    let mut evaluate_times = Vec::new();
     let mut values = vec![Point::origin(); queries.len()];
     let mut jacobians = vec![SMatrix::zeros(); queries.len()];
-    let (mut spline, mut warped) = (None, 0);
-    for _ in 0..arguments.repeat {
-        // A direct solution does not tell how far it is.
-        let clock = Bar::with_clock(fitting(sources.len()));
+    let mut warped = 0;
+    let (spline, both_ms) = arguments.repetition.timed(&context.interrupt, || {
+        let spline = fit(context, sources, targets, &options)
+            .map_err(|error| Failure::input(in_files(arguments, error)))?;
         let start = Instant::now();
-        let fitted = fit(context, clock, sources, targets, &options);
-        let fitted = fitted.map_err(|error| Failure::input(in_files(arguments, error)))?;
-        fit_times.push(start.elapsed());
-        let start = Instant::now();
-        warped = evaluate(context, &fitted, queries, &mut values, &mut jacobians)?;
+        warped = evaluate(context, &spline, queries, &mut values, &mut jacobians)?;
         evaluate_times.push(start.elapsed());
-        spline = Some(fitted);
-        if warped < queries.len() {
-            break;
-        }
-    }
-    let Some(spline) = spline else {
-        return Ok(Exit::Complete);
-    };
-    let (fit_ms, evaluate_ms) = (median_ms(&mut fit_times), median_ms(&mut evaluate_times));
-    outputs.write(FILE, &table(&values[..warped], &jacobians[..warped]))?;
+        Ok::<_, Failure>(spline)
+    })?;
+    let evaluate_ms = median_ms(evaluate_times);
+    let fit_ms = both_ms - evaluate_ms;
     let report = &spline.report;
     // As much work as a step of the iteration, which after Ctrl-C nobody waits for.
-    let bending_energy = (!context.interrupt.requested())
-        .then(|| waiting("computing the bending energy", || spline.bending_energy()));
-    let console = &mut context.console;
-    console.value(&json!({
+    let bending_energy = (!context.interrupt.requested()).then(|| {
+        let _clock = Bar::clock("computing the bending energy");
+        spline.bending_energy()
+    });
+    context.value(&json!({
         "points": report.points, "queries": warped, "lambda": report.lambda,
         "bending_energy": bending_energy, "condition": report.condition, "rank": report.rank,
         "merged": report.merged, "extents": report.extents, "residual": report.residual, "digits": report.digits,
         "iterations": report.iterations, "converged": report.converged(), "fit_ms": fit_ms,
         "evaluate_ms": evaluate_ms,
     }));
-    console.line(format!(
-        "points           {} ({} merged)",
-        report.points, report.merged
-    ));
-    console.line(format!("smoothing λ      {}", four_digits(report.lambda)));
+    context.row(
+        "points",
+        format_args!("{} ({} merged)", report.points, report.merged),
+    );
+    context.row("smoothing λ", four_digits(report.lambda));
     if let Some(energy) = bending_energy {
-        console.line(format!("bending energy   {}", four_digits(energy)));
+        context.row("bending energy", four_digits(energy));
     }
     if let Some(residual) = report.residual {
-        console.line(format!(
-            "residual         {residual:.1e} of the largest target"
-        ));
+        context.row(
+            "residual",
+            format_args!("{residual:.1e} of the largest target"),
+        );
     }
-    console.line(format!(
-        "condition        {:.1e}, about {:.0} digits left",
-        report.condition, report.digits
-    ));
-    console.line(format!(
-        "time             fit {fit_ms:.2} ms, {} {evaluate_ms:.2} ms",
-        count(warped, "evaluation")
-    ));
+    let (condition, digits) = (report.condition, report.digits);
+    context.row(
+        "condition",
+        format_args!("{condition:.1e}, about {digits:.0} digits left"),
+    );
+    let evaluations = count(warped, "evaluation");
+    let text = format!("fit {fit_ms:.2} ms, {evaluations} {evaluate_ms:.2} ms");
+    context.row("time", text);
     if report.rank <= D {
-        console.note(format!(
-            "the sources span {} of {D} directions; the spline bends along these alone",
-            report.rank - 1
+        let spanned = report.rank - 1;
+        context.note(format_args!(
+            "the sources span {spanned} of {D} directions; the spline bends along these alone"
         ));
     }
-    if let Some(summary) = outputs.summary() {
-        console.line(summary);
-    }
+    context
+        .outputs
+        .add("warped.csv", table(&values[..warped], &jacobians[..warped]));
     if !report.converged() {
-        console.note("the iteration was stopped before it reached its tolerance; the residual says how far it came");
+        context.note("the iteration was stopped before it reached its tolerance; the residual says how far it came");
     }
     if warped < queries.len() {
-        console.note(format!(
-            "stopped after {warped} of {} points to warp",
-            queries.len()
+        let all = queries.len();
+        context.note(format_args!(
+            "stopped after {warped} of {all} points to warp"
         ));
     }
-    if context.interrupt.requested() {
-        return Ok(Exit::Interrupted);
-    }
-    if !report.converged() {
-        return Ok(Exit::Partial);
-    }
-    Ok(Exit::Complete)
+    Ok(Exit::complete_if(report.converged()))
 }
 
-/// The spline; thousands of points are solved for by iteration, which Ctrl-C ends with what there is.
+/// The spline. Thousands of points are solved for by iteration, which Ctrl-C ends with the spline so far.
 fn fit<const D: usize, K: Kernel>(
     context: &Context,
-    clock: Bar,
     sources: &[Point<f64, D>],
     targets: &[Point<f64, D>],
     options: &FitOptions<f64, K>,
 ) -> Result<ThinPlateSpline<f64, D, K>, TpsError> {
     let interrupt = &context.interrupt;
-    let job = fitting(sources.len());
-    let mut clock = Some(clock);
+    let job = format!("fitting {}", count(sources.len(), "point"));
+    // A direct solution does not report its progress.
+    let mut clock = Some(Bar::clock(job.clone()));
     let mut preparing: Option<Bar> = None;
     let mut iterating: Option<Bar> = None;
     let mut first = None;
     let spline = ThinPlateSpline::fit_watched(sources, targets, options, |progress| {
         // From here on Ctrl-C is looked at; before, it ends the program.
-        interrupt.hear(true);
+        interrupt.polled(true);
         clock = None;
         match progress.residual {
             None => preparing
@@ -255,39 +221,20 @@ fn fit<const D: usize, K: Kernel>(
             Some(residual) => {
                 let first = *first.get_or_insert(residual);
                 preparing = None;
+                // Conjugate gradients gain about as many digits in every step, so digits are what is counted.
+                let part = (first / residual).ln() / (first / TOLERANCE).ln();
                 iterating
-                    .get_or_insert_with(|| Bar::of(DIGITS, format!("{job}: iterating")))
-                    .done(digits(first, residual));
+                    .get_or_insert_with(|| Bar::of(1000, format!("{job}: iterating")))
+                    .done((1000.0 * part.clamp(0.0, 1.0)) as usize);
             }
         }
-        if interrupt.requested() {
-            ControlFlow::Break(())
-        } else {
-            ControlFlow::Continue(())
-        }
+        interrupt.flow()
     });
-    interrupt.hear(false);
+    interrupt.polled(false);
     spline
 }
 
-fn fitting(points: usize) -> String {
-    format!("fitting {}", count(points, "point"))
-}
-
-/// Steps of the bar of an iteration.
-const DIGITS: usize = 1000;
-
-/// How much of the way from the `first` residual to the tolerance is done, in digits: conjugate gradients gain about as many in every step.
-fn digits(first: f64, residual: f64) -> usize {
-    let (first, now, end) = (first.ln(), residual.ln(), TOLERANCE.ln());
-    let part = (first - now) / (first - end);
-    (DIGITS as f64 * part.clamp(0.0, 1.0)) as usize
-}
-
-/// Kernels between two looks at the clock and at Ctrl-C.
-const KERNELS: usize = 1 << 26;
-
-/// Values and Jacobians at the queries; how many there are after Ctrl-C.
+/// Values and Jacobians at the queries. After Ctrl-C it is the number of those done.
 fn evaluate<const D: usize, K: Kernel>(
     context: &Context,
     spline: &ThinPlateSpline<f64, D, K>,
@@ -296,26 +243,28 @@ fn evaluate<const D: usize, K: Kernel>(
     jacobians: &mut [SMatrix<f64, D, D>],
 ) -> Result<usize, Failure> {
     let interrupt = &context.interrupt;
-    interrupt.hear(true);
+    interrupt.polled(true);
     let job = format!("warping {}", count(queries.len(), "point"));
     let mut bar = Bar::of(queries.len(), job);
-    let run = (KERNELS / spline.report.points.max(1)).max(1);
+    // 2^26 kernels take about a second: as long as Ctrl-C may wait.
+    let run = ((1 << 26) / spline.report.points.max(1)).max(1);
     let mut done = 0;
     let parts = queries.chunks(run).zip(values.chunks_mut(run));
     for ((queries, values), jacobians) in parts.zip(jacobians.chunks_mut(run)) {
-        (spline.apply_and_jacobian_into(queries, values, jacobians)).map_err(Failure::no_answer)?;
+        let applied = spline.apply_and_jacobian_into(queries, values, jacobians);
+        applied.map_err(Failure::no_answer)?;
         done += queries.len();
         bar.done(done);
         if interrupt.requested() {
             break;
         }
     }
-    interrupt.hear(false);
+    interrupt.polled(false);
     Ok(done)
 }
 
 /// The error with the file it is about.
-fn in_files(arguments: &Arguments, error: TpsError) -> String {
+fn in_files(arguments: &WarpArguments, error: TpsError) -> String {
     let sources = arguments.sources.display();
     let targets = arguments.targets.display();
     match error {

@@ -1,24 +1,21 @@
 //! The pages of a press: frames, surfaces, matches, displacement, strain, summary.
-use super::colour::Colour;
-use super::heat::HeatMap;
-use super::layer::Marker;
-use super::page::{Page, PlotError};
-use super::panel::Panel;
+use super::{Colour, HeatMap, Page, Panel, Place, PlotError};
+use crate::console::in_unit;
 use ndarray::Array2;
 use std::path::{Path, PathBuf};
+use tactile_imaging::io::replace_file;
 use tactile_imaging::pipeline::{Measurement, PipelineError, Press, with_error};
 
-const MM: f64 = 1e3;
-const UM: f64 = 1e6;
-
-/// Writes every page that the press has results for to `folder`, as SVG: frames, surfaces, matches, displacement and strain between the
-/// first and the last frame, and a summary of [`Press::measure`]. Returns their paths.
+/// Writes every page that the press has results for to `folder`, as SVG, and returns their paths.
+///
+/// The pages are frames, surfaces, and a summary of [`Press::measure`]. Of two frames or more there are also matches,
+/// displacement and strain between the first and the last.
 ///
 /// ```
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// # use tactile_simulate::{CalibrationRun, Camera, PressLoad, PressOptions, PressScene};
 /// use tactile_imaging::{Object, Pipeline};
-/// use tactile_cli::plot::save_press_pages;
+/// use tactile_cli::save_press_pages;
 /// # let camera = Camera::default().coarser(16);
 /// # let scene = PressScene::new(PressOptions { camera, loads: vec![PressLoad::normal(0.7)], ..Default::default() })?;
 /// # let calibration = scene.calibrate(&CalibrationRun { steps: 8, ..Default::default() })?;
@@ -31,7 +28,7 @@ const UM: f64 = 1e6;
 /// let names: Vec<_> = paths.iter().filter_map(|p| p.file_name()).collect();
 /// assert_eq!(names, ["frames.svg", "surfaces.svg", "summary.svg"], "strain takes two frames");
 /// let summary = std::fs::read_to_string(folder.path().join("summary.svg"))?;
-/// assert!(summary.contains("Young's modulus") && summary.contains("force 1"));
+/// assert!(summary.contains("Young") && summary.contains("force 1"));
 /// # Ok(()) }
 /// ```
 ///
@@ -42,15 +39,23 @@ pub fn save_press_pages(
     folder: impl AsRef<Path>,
 ) -> Result<Vec<PathBuf>, PlotError> {
     let summary = summary_lines(&press.measure());
-    save_pages(press, summary, folder.as_ref())
+    let mut paths = Vec::new();
+    for (name, page) in press_pages(press, summary)? {
+        let path = folder.as_ref().join(format!("{name}.svg"));
+        replace_file(&path, page.to_svg()?.as_bytes()).map_err(|source| PlotError::Write {
+            path: path.clone(),
+            source,
+        })?;
+        paths.push(path);
+    }
+    Ok(paths)
 }
 
-/// As [`save_press_pages`], with these lines in the summary: a tab stands between name and value.
-pub(crate) fn save_pages(
+/// Names and pages. In the lines of the summary a tab stands between name and value.
+pub fn press_pages(
     press: &mut Press<'_>,
     summary: Vec<String>,
-    folder: &Path,
-) -> Result<Vec<PathBuf>, PlotError> {
+) -> Result<Vec<(&'static str, Page)>, PlotError> {
     let mut pages = vec![
         ("frames", frames_page(press)?),
         ("surfaces", surfaces_page(press)?),
@@ -62,17 +67,11 @@ pub(crate) fn save_pages(
         pages.push(("strain", strain_page(press, last)?));
     }
     pages.push(("summary", summary_page(press, summary)?));
-    let mut paths = Vec::with_capacity(pages.len());
-    for (name, page) in pages {
-        let path = folder.join(format!("{name}.svg"));
-        page.save(&path)?;
-        paths.push(path);
-    }
-    Ok(paths)
+    Ok(pages)
 }
 
-/// What every measurement says, as lines for the summary page.
-pub(crate) fn summary_lines(measurement: &Measurement) -> Vec<String> {
+/// The results of a measurement, as lines for the summary page.
+pub fn summary_lines(measurement: &Measurement) -> Vec<String> {
     let mut lines = Vec::new();
     match &measurement.youngs_modulus_pa {
         Ok(modulus) => {
@@ -83,25 +82,25 @@ pub(crate) fn summary_lines(measurement: &Measurement) -> Vec<String> {
         Err(error) => lines.push(format!("Young's modulus\tnone: {error}")),
     }
     for (i, frame) in measurement.frames.iter().enumerate() {
+        let i = i + 1;
         let frame = match frame {
             Ok(frame) => frame,
             Err(error) => {
-                lines.push(format!("frame {}\tnone: {error}", i + 1));
+                lines.push(format!("frame {i}\tnone: {error}"));
                 continue;
             }
         };
         if let Ok(f) = &frame.force_n {
-            let value = with_error(f.value, f.standard_error, 1.0);
-            lines.push(format!("force {}\t{value} N", i + 1));
+            lines.push(format!(
+                "force {i}\t{} N",
+                with_error(f.value, f.standard_error, 1.0)
+            ));
         }
         let a = frame.contact_radius_m;
-        lines.push(format!(
-            "contact radius {}\t{} mm",
-            i + 1,
-            with_error(a.value, a.standard_error, MM)
-        ));
+        let radius = with_error(a.value, a.standard_error, 1e3);
+        lines.push(format!("contact radius {i}\t{radius} mm"));
         if let Some(ratio) = frame.contact_ratio {
-            lines.push(format!("a/R {}\t{ratio:.3}", i + 1));
+            lines.push(format!("a/R {i}\t{ratio:.3}"));
         }
     }
     if let Ok(m) = &measurement.matching {
@@ -111,210 +110,179 @@ pub(crate) fn summary_lines(measurement: &Measurement) -> Vec<String> {
         ));
     }
     if let Ok(s) = &measurement.strain {
-        lines.push(format!(
-            "mean strain e_zz\t{}",
-            with_error(s.mean[2][2], s.standard_error[2][2], 1.0)
-        ));
+        let mean = with_error(s.mean[2][2], s.standard_error[2][2], 1.0);
+        lines.push(format!("mean strain e_zz\t{mean}"));
     }
     lines
 }
 
 fn force_title(press: &mut Press<'_>, frame: usize) -> Result<String, PipelineError> {
     let force = press.contact(frame)?.and_then(|c| c.force_n);
-    Ok(match force {
-        Some(f) => format!("frame {}: {:.3} N", frame + 1, f.value),
-        None => format!("frame {}", frame + 1),
-    })
+    let force = force.map_or(String::new(), |f| format!(": {} N", in_unit(f, 1.0)));
+    Ok(format!("frame {}{force}", frame + 1))
 }
 
 fn axes(title: impl Into<String>) -> Panel {
-    Panel::new(title).x_label("x (mm)").y_label("y (mm)")
+    Panel::new(title, "x (mm)", "y (mm)")
+}
+
+/// From above, in millimetres.
+fn above(p: &nalgebra::Point3<f64>) -> Place {
+    [1e3 * p.x, 1e3 * p.y]
 }
 
 /// The frames with the contact circles.
 fn frames_page(press: &mut Press<'_>) -> Result<Page, PlotError> {
-    let size = press.pipeline().contact().pixel_size_m().map(|s| s * MM);
-    let mut page = Page::new("Frames and contacts").columns(press.frames().min(2));
+    let size = press.pipeline().contact().pixel_size_m().map(|s| 1e3 * s);
+    let mut panels = Vec::new();
     for frame in 0..press.frames() {
         let title = force_title(press, frame)?;
-        let circle = press.contact(frame)?.map(|c| {
-            let [x, y] = [
-                c.centroid_px[0].value * size[0],
-                c.centroid_px[1].value * size[1],
-            ];
-            circle([x, y], c.contact_radius_m.value * MM)
+        let rim = press.contact(frame)?.map(|c| {
+            let centre = [0, 1].map(|k| c.centroid_px[k].value * size[k]);
+            circle(centre, 1e3 * c.contact_radius_m.value)
         });
         let image = press.image(frame)?;
         let panel = axes(title).heat_map(HeatMap::of_frame(image.view(), size));
-        page = page.panel(panel.line(circle.unwrap_or_default(), Colour::ORANGE, "contact radius"));
+        panels.push(panel.line(rim.unwrap_or_default(), Colour::Orange, "contact radius"));
     }
-    Ok(page)
+    Ok(Page::new(
+        "Frames and contacts",
+        press.frames().min(2),
+        panels,
+    ))
 }
 
-fn circle([x, y]: [f64; 2], radius: f64) -> Vec<[f64; 2]> {
-    let at = |i: u32| f64::from(i) * std::f64::consts::TAU / 120.0;
-    (0..=120)
-        .map(|i| [x + radius * at(i).cos(), y + radius * at(i).sin()])
-        .collect()
+/// The vertices of a circle.
+pub fn circle([x, y]: Place, radius: f64) -> Vec<Place> {
+    let angles = (0..=120).map(|i| f64::from(i) * std::f64::consts::TAU / 120.0);
+    let at = |angle: f64| [x + radius * angle.cos(), y + radius * angle.sin()];
+    angles.map(at).collect()
 }
 
-/// Heights as maps, and a cut through the middle of each.
+/// Heights as maps, and a cut through the highest point of each.
 fn surfaces_page(press: &mut Press<'_>) -> Result<Page, PlotError> {
-    let mut page = Page::new("Reconstructed surfaces").columns((press.frames() + 1).min(3));
-    let mut cuts = axes("Cuts along x through the highest point").y_label("height (mm)");
+    let mut panels = Vec::new();
+    let mut cuts = Panel::new(
+        "Cuts along x through the highest point",
+        "x (mm)",
+        "height (mm)",
+    );
     for frame in 0..press.frames() {
         let title = force_title(press, frame)?;
-        let points = press.control_points(frame)?.to_vec();
+        let dots: Vec<Place> = press.control_points(frame)?.iter().map(above).collect();
         let surface = press.surface(frame)?;
-        let (origin, size) = (surface.origin_m, surface.pixel_size_m.map(|s| s * MM));
-        let masked = |(at, h): ((usize, usize), &f64)| {
-            if surface.surface.mask[at] {
-                *h * MM
+        let size = surface.pixel_size_m.map(|s| 1e3 * s);
+        let origin = surface.origin_m.map(|o| 1e3 * o);
+        let (mask, heights) = (&surface.surface.mask, &surface.surface.heights);
+        let heights = Array2::from_shape_fn(heights.dim(), |at| {
+            if mask[at] {
+                1e3 * heights[at]
             } else {
                 f64::NAN
             }
-        };
-        let cells: Vec<f64> = surface.surface.heights.indexed_iter().map(masked).collect();
-        let heights =
-            Array2::from_shape_vec(surface.surface.heights.dim(), cells).unwrap_or_default();
-        let map =
-            HeatMap::of_pixels(heights.view(), size, "height (mm)").origin(origin.map(|o| o * MM));
-        let dots = points.iter().map(|p| [p.x * MM, p.y * MM]);
-        page = page.panel(axes(title.clone()).heat_map(map).marked(
-            dots,
-            Marker::Ring,
-            Colour::RED,
-            "",
-        ));
-        let top = heights
-            .indexed_iter()
-            .filter(|(_, h)| h.is_finite())
-            .max_by(|a, b| a.1.total_cmp(b.1));
-        if let Some(((row, _), _)) = top {
+        });
+        let map = HeatMap::of_pixels(heights.view(), size, "height (mm)").origin(origin);
+        let panel = axes(title.clone()).heat_map(map);
+        panels.push(panel.rings(dots, Colour::Red, ""));
+        let finite = heights.indexed_iter().filter(|(_, h)| h.is_finite());
+        if let Some(((row, _), _)) = finite.max_by(|a, b| a.1.total_cmp(b.1)) {
             let cut = heights.row(row);
-            let line = cut
-                .iter()
-                .enumerate()
-                .map(|(c, h)| [origin[0] * MM + c as f64 * size[0], *h]);
-            cuts = cuts.line(
-                line,
-                Colour::CATEGORIES[frame % Colour::CATEGORIES.len()],
-                &title,
-            );
+            let at = |(c, h): (usize, &f64)| [origin[0] + c as f64 * size[0], *h];
+            let line: Vec<Place> = cut.iter().enumerate().map(at).collect();
+            // The colours repeat after six frames, and a legend of more would fill the panel.
+            let label = if frame < 6 { title.as_str() } else { "" };
+            cuts = cuts.line(line, Colour::category(frame), label);
         }
     }
-    Ok(page.panel(cuts))
+    panels.push(cuts);
+    Ok(Page::new(
+        "Reconstructed surfaces",
+        panels.len().min(3),
+        panels,
+    ))
 }
 
 /// Control points of both frames and their matches, from above and from the side.
 fn matches_page(press: &mut Press<'_>, last: usize) -> Result<Page, PlotError> {
-    let (model, target) = (
-        press.control_points(0)?.to_vec(),
-        press.control_points(last)?.to_vec(),
-    );
-    let matching = press.matching(last)?;
-    let pairs = || {
-        matching
-            .assignment
-            .iter()
-            .enumerate()
-            .filter_map(|(i, a)| a.map(|j| (i, j)))
-    };
-    let view = |title: &str, axis: [usize; 2]| {
-        let at = |p: &nalgebra::Point3<f64>| axis.map(|k| p[k] * MM);
-        let segments = pairs().map(|(i, j)| [at(&model[i]), at(&target[j])]);
-        Panel::new(title)
-            .x_label("x (mm)")
+    let model = press.control_points(0)?.to_vec();
+    let target = press.control_points(last)?.to_vec();
+    let assignment = press.matching(last)?.assignment.iter().enumerate();
+    let pairs: Vec<_> = assignment.filter_map(|(i, a)| a.map(|j| (i, j))).collect();
+    let view = |title: &str, y: &str, axis: [usize; 2]| {
+        let at = |p: &nalgebra::Point3<f64>| axis.map(|k| 1e3 * p[k]);
+        let segments = pairs.iter().map(|&(i, j)| [at(&model[i]), at(&target[j])]);
+        Panel::new(title, "x (mm)", y)
             .equal_aspect()
-            .segments(segments, Colour::GREY, "match")
-            .points(model.iter().map(at), Colour::BLUE, "first frame")
-            .marked(
-                target.iter().map(at),
-                Marker::Ring,
-                Colour::RED,
-                "last frame",
-            )
+            .segments(segments, Colour::Grey, "match")
+            .points(model.iter().map(at), Colour::Blue, "first frame")
+            .rings(target.iter().map(at), Colour::Red, "last frame")
     };
-    Ok(Page::new("Control points and matches")
-        .columns(2)
-        .panel_size(620, 520)
-        .panel(view("From above", [0, 1]).y_label("y (mm)"))
-        .panel(view("From the side", [0, 2]).y_label("z (mm)")))
+    let panels = vec![
+        view("From above", "y (mm)", [0, 1]),
+        view("From the side", "z (mm)", [0, 2]),
+    ];
+    Ok(Page::new("Control points and matches", 2, panels))
 }
 
 /// Displacement as arrows and as lengths.
 fn displacement_page(press: &mut Press<'_>, last: usize) -> Result<Page, PlotError> {
     let model = press.control_points(0)?.to_vec();
     let warped = &press.matching(last)?.warped;
-    let at = |p: &nalgebra::Point3<f64>| [p.x * MM, p.y * MM];
-    let arrows = model.iter().zip(warped).map(|(a, b)| [at(a), at(b)]);
-    let lengths = model.iter().zip(warped).map(|(a, b)| (b - a).norm() * UM);
-    let rise = model.iter().zip(warped).map(|(a, b)| (b.z - a.z) * UM);
-    let points = || model.iter().map(at);
-    Ok(
-        Page::new("Displacement between the first and the last frame")
-            .columns(3)
-            .panel(
-                axes("Direction")
-                    .equal_aspect()
-                    .arrows(arrows, Colour::BLUE, "displacement"),
-            )
-            .panel(axes("Length").equal_aspect().coloured_points(
-                points(),
-                lengths,
-                "displacement (µm)",
-            ))
-            .panel(axes("Along z").equal_aspect().coloured_points(
-                points(),
-                rise,
-                "displacement (µm)",
-            )),
-    )
+    let pairs = || model.iter().zip(warped);
+    let arrows = pairs().map(|(a, b)| [above(a), above(b)]);
+    let lengths = pairs().map(|(a, b)| 1e6 * (b - a).norm());
+    let rise = pairs().map(|(a, b)| 1e6 * (b.z - a.z));
+    let places = || model.iter().map(above);
+    let panel = |title: &str| axes(title).equal_aspect();
+    let panels = vec![
+        panel("Direction").arrows(arrows, Colour::Blue, "displacement"),
+        panel("Length").valued_points(places(), lengths, "displacement (µm)"),
+        panel("Along z").valued_points(places(), rise, "displacement (µm)"),
+    ];
+    let title = "Displacement between the first and the last frame";
+    Ok(Page::new(title, 3, panels))
 }
 
 /// The diagonal of the strain over the control points.
 fn strain_page(press: &mut Press<'_>, last: usize) -> Result<Page, PlotError> {
-    let model = press.control_points(0)?.to_vec();
+    let places: Vec<Place> = press.control_points(0)?.iter().map(above).collect();
     let strain = press.strain(last)?;
-    let mut page = Page::new(format!("{} strain", strain.measure)).columns(3);
-    for (k, name) in ["e_xx", "e_yy", "e_zz"].into_iter().enumerate() {
+    let panel = |(k, name): (usize, &str)| {
         let values = strain.field.strains.iter().map(|e| e[(k, k)]);
         let title = format!("{name}: mean {:+.4}", strain.summary.mean[(k, k)]);
-        let points = model.iter().map(|p| [p.x * MM, p.y * MM]);
-        page = page.panel(
-            axes(title)
-                .equal_aspect()
-                .coloured_points(points, values, name),
-        );
-    }
-    Ok(page)
+        let panel = axes(title).equal_aspect();
+        panel.valued_points(places.iter().copied(), values, name)
+    };
+    let panels = ["e_xx", "e_yy", "e_zz"].into_iter().enumerate().map(panel);
+    let title = format!("{} strain", strain.measure);
+    Ok(Page::new(title, 3, panels.collect()))
 }
 
 fn summary_page(press: &mut Press<'_>, lines: Vec<String>) -> Result<Page, PlotError> {
-    let mut points = Vec::new();
+    let mut readings = Vec::new();
     for frame in 0..press.frames() {
         if let Some(c) = press.contact(frame)?
             && let Some(force) = c.force_n
         {
-            points.push((force, c.contact_radius_m));
+            let radius = c.contact_radius_m;
+            readings.push([force.value, 1e3 * radius.value, 1e3 * radius.standard_error]);
         }
     }
-    let at = points.iter().map(|(f, a)| [f.value, a.value * MM]);
-    let errors = points.iter().map(|(_, a)| a.standard_error * MM);
-    let largest = points.iter().map(|(f, _)| f.value).fold(0.0, f64::max);
-    let cubes = points.iter().map(|(f, a)| a.value / f.value.cbrt());
-    let scale = cubes.sum::<f64>() / points.len().max(1) as f64 * MM;
-    let law = (0..=100)
-        .map(|i| 1.05 * largest * f64::from(i) / 100.0)
-        .map(|f| [f, scale * f.cbrt()]);
-    let growth = Panel::new("Contact radius against force")
-        .x_label("force (N)")
-        .y_label("contact radius (mm)")
-        .dashed(law, Colour::GREY, "a ∝ F^(1/3)")
-        .error_bars(at.clone(), errors, Colour::BLUE)
-        .points(at, Colour::BLUE, "measured");
-    Ok(Page::new("Summary")
-        .columns(2)
-        .panel(Panel::new("Results").text(lines))
-        .panel(growth))
+    let at = readings.iter().map(|[f, a, _]| [*f, *a]);
+    let errors = readings
+        .iter()
+        .map(|[f, a, error]| [[*f, a - error], [*f, a + error]]);
+    let largest = readings.iter().map(|r| r[0]).fold(0.0, f64::max);
+    let cubes = readings.iter().map(|[f, a, _]| a / f.cbrt());
+    let scale = cubes.sum::<f64>() / readings.len().max(1) as f64;
+    // The curve bends at its start, where the steps in the force are the smallest.
+    let forces = (0..=100).map(|i| 1.05 * largest * (f64::from(i) / 100.0).powi(3));
+    let law = forces.map(|f| [f, scale * f.cbrt()]);
+    let title = "Contact radius against force";
+    let growth = Panel::new(title, "force (N)", "contact radius (mm)")
+        .dashed(law, Colour::Grey, "a ∝ F^(1/3)")
+        .segments(errors, Colour::Blue, "")
+        .points(at, Colour::Blue, "measured");
+    let panels = vec![Panel::of_text("Results", lines), growth];
+    Ok(Page::new("Summary", 2, panels))
 }

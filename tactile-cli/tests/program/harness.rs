@@ -32,7 +32,7 @@ pub(crate) fn words(line: &str) -> Vec<&str> {
 /// A folder in which the paths of the help lead to the examples' data.
 pub(crate) fn folder_with_examples() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
-    let examples = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples");
+    let examples = Path::new(env!("CARGO_MANIFEST_DIR")).join("../examples");
     std::os::unix::fs::symlink(examples, folder.path().join("examples")).unwrap();
     folder
 }

@@ -8,7 +8,7 @@ use tempfile::TempDir;
 
 /// The example's calibration under its own name, with one text replaced by another throughout.
 fn calibration(from: &str, to: &str) -> TempDir {
-    let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/data/sensor");
+    let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("../examples/data/sensor");
     let folder = tempfile::tempdir().unwrap();
     for entry in fs::read_dir(data).unwrap() {
         let path = entry.unwrap().path();

@@ -4,7 +4,7 @@ use std::path::Path;
 
 /// Good inputs under short names.
 pub(super) fn good_files(folder: &Path) {
-    let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/data");
+    let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("../examples/data");
     for entry in fs::read_dir(&data)
         .unwrap()
         .chain(fs::read_dir(data.join("press")).unwrap())
@@ -86,6 +86,16 @@ pub(super) fn more_files(folder: &Path) {
         "lump_dark.toml",
         &lump.replace("frame_1.png", "reference.png"),
     );
+    // Tables under the names of results.
+    put(
+        "named.toml",
+        &scene.replace("calibration.csv", "stream.csv"),
+    );
+    let pairs = fs::read(folder.join("calibration.csv")).unwrap();
+    fs::write(folder.join("stream.csv"), &pairs).unwrap();
+    fs::write(folder.join("profiles.csv"), &pairs).unwrap();
+    let named = "[calibration]\npairs = \"profiles.csv\"\n[object]";
+    put("lump_named.toml", &lump.replace("[object]", named));
     let no_frames = scene.split("[[frames]]").next().unwrap();
     put("no_frames.toml", no_frames);
     put(

@@ -344,6 +344,23 @@ pub(super) const CALLS: &[(&str, &str)] = &[
     ("stream --force nan", "force"),
     ("stream --period 1e9", "GB"),
     ("stream --cycles 0", "cycles"),
+    ("stream named.toml --out .", "would replace the input"),
+    (
+        "stream named.toml frame_1.png --out .",
+        "would replace the input",
+    ),
+    (
+        "inclusion lump_named.toml --out .",
+        "would replace the input",
+    ),
+    (
+        "measure scene.toml --out cases.txt/results",
+        "cannot be written",
+    ),
+    (
+        "light --rays 100 --out cases.txt/results",
+        "cannot be written",
+    ),
     ("light --rays 0", "rays"),
     ("light --rays many", "rays"),
 ];

@@ -1,0 +1,452 @@
+//! `tactile inclusion`: size, depth and stiffness of a lump under the surface of a block.
+use crate::arguments::positive;
+use crate::console::{Bar, Context, Exit, Failure};
+use crate::outputs::Csv;
+use crate::plot::{Colour, Page, Panel, circle};
+use clap::Args;
+use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
+use rand_distr::StandardNormal;
+use serde_json::json;
+use std::path::{Path, PathBuf};
+use tactile_imaging::elasticity::ElasticityError;
+use tactile_imaging::fem::{
+    AppliedLoad, Block, FemScene, Guide, GuideLayer, Interface, Lump, Material,
+};
+use tactile_imaging::inclusion::{
+    AssumedInclusion, Estimated, Identifiable, InclusionEstimate, InclusionScene, InclusionSearch,
+    InclusionWarning, PressureProfile, Specimen, Verdict,
+};
+use tactile_imaging::pipeline::with_error;
+
+/// Find a lump under the surface of a block: its size, depth and stiffness
+///
+/// SCENE.toml names frames of the guide pressed onto a flat block at known approaches, the block's size and the guide's
+/// layers (examples/data/inclusion/scene.toml is one). Without it a block with a lump is simulated. The pressure over the radius is
+/// compared with finite elements at finite strain. The answer is whether there is a lump, its diameter, depth and modulus with 95 %
+/// intervals, or which of them the frames leave open. --out gets profiles.csv and inclusion.svg. A search takes some five seconds for
+/// each kind of interface.
+#[derive(Args)]
+#[command(after_help = "\
+Examples:
+  tactile inclusion --design examples/data/inclusion/scene.toml
+The scene file:
+  reference = \"reference.png\"
+  pixel_size_m = [3.44e-4, 3.44e-4]
+  frames = [{ image = \"frame_1.png\", approach_m = 1e-3, force_N = 0.35 }]     growing approaches; three tell most
+  [calibration]
+  pairs = \"calibration.csv\"; without it the force_N of every frame, spread over its light, gives the pressure
+  [object]
+  shape = \"block\"; height_m, radius_m; interface = \"bonded\" or \"frictionless\" (both are tried where it is absent);
+  height_error_m (2 % if absent), poisson_ratio and poisson_ratio_error (0.495, 0.005), approach_error_m (2e-5),
+  youngs_modulus_pa and youngs_modulus_error_pa where the tissue's modulus is known
+  [waveguide]
+  radius_m; layers = [{ thickness_m, youngs_modulus_pa, poisson_ratio }], from the block's side to the glass")]
+pub struct InclusionArguments {
+    /// Scene file.
+    #[arg(value_name = "SCENE.toml")]
+    scene: Option<PathBuf>,
+    /// Instead of searching, compare what scans with other approaches would tell of a lump in this block.
+    #[arg(long)]
+    design: bool,
+    /// Design: diameter of the lump, in millimetres.
+    #[arg(long, value_name = "MM", default_value = "10", value_parser = positive, requires = "design")]
+    diameter_mm: f64,
+    /// Design: depth of its top, in millimetres.
+    #[arg(long, value_name = "MM", default_value = "4", value_parser = positive, requires = "design")]
+    depth_mm: f64,
+    /// Design: its modulus, in kPa.
+    #[arg(long, value_name = "KPA", default_value = "40", value_parser = positive, requires = "design")]
+    lump_kpa: f64,
+    /// Design: the tissue's modulus, in kPa.
+    #[arg(long, value_name = "KPA", default_value = "5", value_parser = positive, requires = "design")]
+    tissue_kpa: f64,
+    /// Simulation: seed of the camera's noise.
+    #[arg(long, default_value_t = 1, conflicts_with = "scene")]
+    seed: u64,
+}
+
+/// The input of a search, and the truth where it is known.
+struct Scan {
+    specimen: Specimen,
+    guide: Guide,
+    radii_m: Vec<f64>,
+    profiles: Vec<PressureProfile>,
+    /// First harmonic of the pressure around the axis over its mean.
+    asymmetry: f64,
+    /// Diameter, depth and modulus.
+    truth: Option<[f64; 3]>,
+}
+
+impl Scan {
+    fn of_scene(scene: &InclusionScene) -> Result<Self, Failure> {
+        let loaded = scene.load().map_err(Failure::input)?;
+        let asymmetry = loaded.rings.iter().map(|rings| rings.asymmetry);
+        Ok(Self {
+            specimen: scene.specimen,
+            guide: scene.guide.clone(),
+            radii_m: loaded.rings[0].radii_m.clone(),
+            asymmetry: asymmetry.fold(0.0, f64::max),
+            profiles: loaded.profiles,
+            truth: None,
+        })
+    }
+
+    /// Frames of a block with a lump, and white noise of the camera.
+    fn simulated(seed: u64) -> Result<Self, ElasticityError> {
+        let (specimen, guide) = simulated_block()?;
+        let truth = [12e-3, 4e-3, 40e3];
+        let tissue = |modulus| Material::new(modulus, 0.495);
+        let block = Block {
+            height_m: specimen.height_m(),
+            radius_m: specimen.radius_m(),
+            material: tissue(5e3)?,
+            lump: Some(Lump {
+                diameter_m: truth[0],
+                depth_m: truth[1],
+                material: tissue(truth[2])?,
+            }),
+        };
+        let approaches = [1e-3, 2e-3, 3e-3];
+        let scene = FemScene::block_under_guide(&block, &guide, Interface::Bonded)?;
+        let solution = scene.solve(&approaches.map(AppliedLoad::Approach));
+        let (radii_m, width) = rings(guide.radius_m());
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let profiles = solution
+            .states
+            .iter()
+            .zip(approaches)
+            .map(|(state, approach_m)| {
+                let clean: Vec<f64> = radii_m.iter().map(|r| state.pressure_at(*r)).collect();
+                let largest = clean.iter().copied().fold(0.0, f64::max);
+                // 0.75 % of the largest pressure a pixel of 86 µm, of which a ring has many.
+                let error = |radius: &f64| {
+                    let pixels = std::f64::consts::TAU * radius * width / 86e-6f64.powi(2);
+                    7.5e-3 * largest / pixels.sqrt()
+                };
+                let errors: Vec<f64> = radii_m.iter().map(error).collect();
+                let noisy = clean.iter().zip(&errors);
+                let noisy = noisy.map(|(p, e)| p + e * rng.sample::<f64, _>(StandardNormal));
+                PressureProfile {
+                    approach_m,
+                    force_n: Some(state.force_n()),
+                    pressure_pa: noisy.collect(),
+                    standard_error_pa: errors,
+                }
+            });
+        let profiles = profiles.collect();
+        Ok(Self {
+            specimen,
+            guide,
+            radii_m,
+            profiles,
+            asymmetry: 0.0,
+            truth: Some(truth),
+        })
+    }
+}
+
+/// A block of tissue as high as two faces, and a guide of three layers, the stiffest towards the tissue.
+fn simulated_block() -> Result<(Specimen, Guide), ElasticityError> {
+    let layer = |(thickness_m, modulus)| {
+        Ok(GuideLayer {
+            thickness_m,
+            material: Material::new(modulus, 0.495)?,
+        })
+    };
+    let layers = [(2e-3, 136e3), (3e-3, 80e3), (5e-3, 34e3)].map(layer);
+    let layers: Result<Vec<GuideLayer>, ElasticityError> = layers.into_iter().collect();
+    let specimen = Specimen::new(30e-3, 40e-3)?.with_interface(Interface::Bonded);
+    Ok((specimen, Guide::new(layers?, 16e-3)?))
+}
+
+pub fn run(arguments: &InclusionArguments, context: &mut Context) -> Result<Exit, Failure> {
+    if arguments.design && context.outputs.folder().is_some() {
+        return Err(Failure::input(
+            "--out has no use with --design, which writes no files",
+        ));
+    }
+    let file = arguments.scene.as_deref();
+    let names = ["profiles.csv", "inclusion.svg"];
+    context.outputs.plan(&names, file.as_slice())?;
+    let scene = file.map(InclusionScene::read).transpose();
+    let scene = scene.map_err(Failure::input)?;
+    if arguments.design {
+        return design(arguments, scene.as_ref(), context);
+    }
+    let scan = match &scene {
+        Some(scene) => Scan::of_scene(scene)?,
+        None => Scan::simulated(arguments.seed).map_err(|error| unusable(file, &error))?,
+    };
+    let search = InclusionSearch::new(scan.specimen, scan.guide.clone())
+        .map_err(|error| unusable(file, &error))?;
+    let estimate = match found(&search, &scan, context) {
+        Ok(estimate) => estimate.with_asymmetry(scan.asymmetry),
+        Err(ElasticityError::Cancelled) => return Ok(Exit::Interrupted),
+        Err(error @ ElasticityError::NoSolution) => return Err(Failure::no_answer(error)),
+        Err(error) => return Err(unusable(file, &error)),
+    };
+    let off_axis = |w: &InclusionWarning| matches!(w, InclusionWarning::Asymmetric { .. });
+    let is_asymmetric = estimate.warnings.iter().any(off_axis);
+    context.value(&json!({
+        "verdict": estimate.verdict(), "found": estimate.found, "probability": estimate.probability, "inclusion": estimate.inclusion,
+        "block_modulus_pa": estimate.block_modulus_pa, "interface": estimate.interface,
+        "misfit": estimate.misfit, "asymmetry": scan.asymmetry, "is_asymmetric": is_asymmetric,
+        "warnings": estimate.warnings,
+    }));
+    print(&estimate, &scan, context);
+    context.outputs.add(names[0], table(&estimate, &scan));
+    context.outputs.page(names[1], || page(&estimate, &scan))?;
+    Ok(Exit::Complete)
+}
+
+fn unusable(file: Option<&Path>, error: &ElasticityError) -> Failure {
+    match file {
+        Some(file) => Failure::in_file(file, error),
+        None => Failure::input(error),
+    }
+}
+
+/// The search with its progress, which Ctrl-C ends.
+fn found(
+    search: &InclusionSearch,
+    scan: &Scan,
+    context: &Context,
+) -> Result<InclusionEstimate, ElasticityError> {
+    let mut progress: Option<Bar> = None;
+    let interrupt = &context.interrupt;
+    interrupt.polled(true);
+    let found = search.search_with_progress(&scan.radii_m, &scan.profiles, &mut |now| {
+        let bar = progress.get_or_insert_with(|| Bar::of(now.expected, "searching"));
+        bar.done(now.done);
+        interrupt.flow()
+    });
+    interrupt.polled(false);
+    found
+}
+
+/// Prints the errors that scans of this block would leave, were the assumed lump in it.
+fn design(
+    arguments: &InclusionArguments,
+    scene: Option<&InclusionScene>,
+    context: &mut Context,
+) -> Result<Exit, Failure> {
+    let file = arguments.scene.as_deref();
+    let (specimen, guide) = match scene {
+        Some(scene) => (scene.specimen, scene.guide.clone()),
+        None => simulated_block().map_err(|error| unusable(file, &error))?,
+    };
+    let radii = rings(guide.radius_m()).0;
+    let search = InclusionSearch::new(specimen, guide).map_err(|error| unusable(file, &error))?;
+    let assumed = AssumedInclusion {
+        diameter_m: 1e-3 * arguments.diameter_mm,
+        depth_m: 1e-3 * arguments.depth_mm,
+        youngs_modulus_pa: 1e3 * arguments.lump_kpa,
+        block_modulus_pa: 1e3 * arguments.tissue_kpa,
+    };
+    // Largest approaches over the block's height, and numbers of frames at even approaches.
+    let scans = [0.03, 0.06, 0.1].map(|largest| [1, 2, 3].map(|frames| (largest, frames)));
+    let scans = scans.concat();
+    let mut bar = Bar::of(scans.len(), "comparing scans");
+    let mut rows = Vec::new();
+    for (largest, frames) in scans {
+        let step = largest * specimen.height_m() / f64::from(frames);
+        let approaches: Vec<f64> = (1..=frames).map(|k| step * f64::from(k)).collect();
+        // White error of a ring's mean over the mean pressure: some thousand pixels with 1 % noise.
+        let white = vec![3e-4 * assumed.block_modulus_pa * largest; radii.len()];
+        let errors = search.expected_errors(&assumed, &approaches, &radii, &white);
+        rows.push((approaches, errors.map_err(|error| unusable(file, &error))?));
+        bar.done(rows.len());
+    }
+    drop(bar);
+    context.line(format_args!(
+        "expected standard errors for a lump of {:.1} mm, {:.1} mm deep, {:.0} kPa in tissue of {:.1} kPa",
+        arguments.diameter_mm, arguments.depth_mm, arguments.lump_kpa, arguments.tissue_kpa,
+    ));
+    context.line("approaches (mm)           diameter    depth  modulus");
+    for (approaches, errors) in &rows {
+        let list: Vec<String> = approaches
+            .iter()
+            .map(|a| format!("{:.2}", 1e3 * a))
+            .collect();
+        let list = list.join(", ");
+        let errors = [errors.diameter, errors.depth, errors.youngs_modulus].map(|e| 100.0 * e);
+        let [diameter, depth, modulus] = errors;
+        context.line(format_args!(
+            "{list:<24} {diameter:>8.1} % {depth:>6.1} % {modulus:>6.1} %"
+        ));
+    }
+    context.line(
+        "above 25 % a parameter cannot be told; a contact that slips or tissue that tears is not in the model",
+    );
+    let row =
+        |(approaches, errors)| json!({ "approaches_m": approaches, "expected_errors": errors });
+    let rows: Vec<_> = rows.into_iter().map(row).collect();
+    context.value(&json!({ "design": rows }));
+    Ok(Exit::Complete)
+}
+
+/// Radii of rings over three quarters of a face, and their width.
+fn rings(face_radius_m: f64) -> (Vec<f64>, f64) {
+    let width = face_radius_m / 60.0;
+    let radii = (0..45).map(|k| (f64::from(k) + 0.5) * width).collect();
+    (radii, width)
+}
+
+fn interval(estimated: &Estimated, scale: f64, unit: &str) -> String {
+    let value = with_error(estimated.value, estimated.standard_error, scale);
+    let [low, high] = estimated.interval.map(|limit| limit * scale);
+    format!("{value} {unit}   (95 %: {low:.3} to {high:.3})")
+}
+
+fn parameter(parameter: &Identifiable, scale: f64, unit: &str) -> String {
+    match parameter {
+        Identifiable::Yes(estimated) => interval(estimated, scale, unit),
+        Identifiable::No(estimated) => {
+            let [low, high] = estimated.interval.map(|limit| limit * scale);
+            format!("cannot be told from these frames (95 %: {low:.2} to {high:.2} {unit})")
+        }
+    }
+}
+
+fn print(estimate: &InclusionEstimate, scan: &Scan, context: &mut Context) {
+    let verdict = match (estimate.verdict(), estimate.probability) {
+        (Verdict::Found, _) => "a lump".to_owned(),
+        (Verdict::Absent, _) => "no lump that these frames show".to_owned(),
+        (Verdict::Uncertain, p) if p > 0.5 => format!("uncertain: a lump with probability {p:.2}"),
+        (Verdict::Uncertain, _) => "uncertain: the model does not explain the frames".to_owned(),
+    };
+    context.row("found", verdict);
+    if let Some(inclusion) = &estimate.inclusion {
+        context.row("diameter", parameter(&inclusion.diameter_m, 1e3, "mm"));
+        context.row("depth of its top", parameter(&inclusion.depth_m, 1e3, "mm"));
+        context.row(
+            "its modulus",
+            parameter(&inclusion.youngs_modulus_pa, 1e-3, "kPa"),
+        );
+        let [[_, depth, modulus], [_, _, both], _] = inclusion.correlation;
+        context.row("correlations", format_args!(
+            "diameter–depth {depth:+.2}, diameter–modulus {modulus:+.2}, depth–modulus {both:+.2}"
+        ));
+    }
+    context.row(
+        "block's modulus",
+        interval(&estimate.block_modulus_pa, 1e-3, "kPa"),
+    );
+    let interface = match estimate.interface {
+        Interface::Bonded => "bonded",
+        Interface::Frictionless => "frictionless",
+    };
+    let misfit = estimate.misfit;
+    context.row(
+        "interface",
+        format_args!("{interface}, misfit χ² {misfit:.2} per value"),
+    );
+    if let Some([diameter, depth, modulus]) = scan.truth {
+        let [diameter, depth, modulus] = [1e3 * diameter, 1e3 * depth, 1e-3 * modulus];
+        context.row("truth", format_args!(
+            "diameter {diameter:.1} mm, depth {depth:.1} mm, modulus {modulus:.0} kPa (simulated by the same finite elements)"
+        ));
+    }
+    for warning in &estimate.warnings {
+        context.row("warning", sentence(warning));
+    }
+}
+
+fn sentence(warning: &InclusionWarning) -> String {
+    match warning {
+        InclusionWarning::PoorFit { excess } => format!(
+            "the best fit leaves {excess:.1} times what the errors explain: several lumps, one off the axis, or wrong sizes or forces; errors are widened"
+        ),
+        InclusionWarning::OneFrame => {
+            "one frame tells size and stiffness hardly apart: add approaches".into()
+        }
+        InclusionWarning::NotConverged => "the fit had not settled; nothing of it is told".into(),
+        InclusionWarning::UncertainInterface => {
+            "bonded and frictionless faces explain the frames about equally well".into()
+        }
+        InclusionWarning::AtBoundary => {
+            "the lump touches the surface or the base: beyond the model".into()
+        }
+        InclusionWarning::Asymmetric { asymmetry } => format!(
+            "the pressure is {:.1} % larger on one side: a lump off the axis, several, or a tilted block; the model is symmetric",
+            100.0 * asymmetry
+        ),
+        other => format!("{other:?}"),
+    }
+}
+
+fn table(estimate: &InclusionEstimate, scan: &Scan) -> Vec<u8> {
+    let mut csv = Csv::new(&[
+        "frame",
+        "radius_m",
+        "pressure_pa",
+        "standard_error_pa",
+        "fitted_pa",
+        "plain_block_pa",
+    ]);
+    for (frame, profile) in scan.profiles.iter().enumerate() {
+        for (k, radius) in estimate.radii_m.iter().enumerate() {
+            csv.row([
+                frame as f64 + 1.0,
+                *radius,
+                profile.pressure_pa[k],
+                profile.standard_error_pa[k],
+                estimate.fitted_pa[frame][k],
+                estimate.homogeneous_pa[frame][k],
+            ]);
+        }
+    }
+    csv.into_bytes()
+}
+
+fn page(estimate: &InclusionEstimate, scan: &Scan) -> Page {
+    let axes = |title, y| Panel::new(title, "distance from the axis (mm)", y);
+    let mut pressures = axes("Pressure on the guide's face", "pressure (Pa)");
+    let mut residuals = axes("Residuals of all frames", "measured − fitted (Pa)");
+    for (frame, profile) in scan.profiles.iter().enumerate() {
+        // The legend names each kind of mark once.
+        let name = |text: &'static str| if frame == 0 { text } else { "" };
+        let curve = |values: &[f64]| -> Vec<[f64; 2]> {
+            let pairs = estimate.radii_m.iter().zip(values);
+            pairs
+                .map(|(radius, value)| [1e3 * radius, *value])
+                .collect()
+        };
+        let fitted = &estimate.fitted_pa[frame];
+        let pairs = profile.pressure_pa.iter().zip(fitted);
+        let rest: Vec<f64> = pairs.map(|(measured, fitted)| measured - fitted).collect();
+        pressures = pressures
+            .points(curve(&profile.pressure_pa), Colour::Blue, name("measured"))
+            .line(curve(fitted), Colour::Orange, name("fit"))
+            .dashed(
+                curve(&estimate.homogeneous_pa[frame]),
+                Colour::Grey,
+                name("plain block"),
+            );
+        residuals = residuals.points(curve(&rest), Colour::Blue, "");
+    }
+    let panels = vec![pressures, residuals, section(scan, estimate)];
+    Page::new("Inclusion under the surface", 2, panels)
+}
+
+/// The block in section, to scale, with the lump.
+fn section(scan: &Scan, estimate: &InclusionEstimate) -> Panel {
+    let specimen = scan.specimen;
+    let (height, radius) = (1e3 * specimen.height_m(), 1e3 * specimen.radius_m());
+    let top = [[-radius, 0.0], [radius, 0.0]];
+    let outline = top
+        .into_iter()
+        .chain([[radius, -height], [-radius, -height], top[0]]);
+    let face = 1e3 * scan.guide.radius_m();
+    let panel = Panel::new("Section, to scale", "distance (mm)", "height (mm)")
+        .equal_aspect()
+        .line(outline, Colour::Grey, "block")
+        .line([[-face, 0.5], [face, 0.5]], Colour::Blue, "guide's face");
+    let Some(inclusion) = &estimate.inclusion else {
+        return panel;
+    };
+    let lump_radius = 0.5e3 * inclusion.diameter_m.estimate().value;
+    let depth = 1e3 * inclusion.depth_m.estimate().value;
+    let rim = circle([0.0, -depth - lump_radius], lump_radius);
+    panel.line(rim, Colour::Orange, "lump")
+}

@@ -1,0 +1,499 @@
+//! `tactile measure`: everything, of a simulated press or of a user's own frames.
+use crate::arguments::{Repetition, positive};
+use crate::console::{Bar, Context, Exit, Failure, four_digits, in_unit};
+use crate::plot::{PlotError, press_pages, summary_lines};
+use clap::{Args, ValueEnum};
+use serde::Serialize;
+use serde_json::{Value, json};
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+use tactile_imaging::Pipeline;
+use tactile_imaging::io::{Grey, read_grey_image};
+use tactile_imaging::pipeline::{ContactReading, Measurement, PipelineError, Press, Stage};
+use tactile_imaging::scene::{Scene, SceneData};
+use tactile_simulate::{
+    CalibrationRun, Camera, ContactModel, Elastic, ElasticSphere, PressLoad, PressOptions,
+    PressSimulation, PressTruth, SimulateError, Trial,
+};
+
+/// Measure the Young's modulus of an object from frames at two or more loads
+///
+/// Without SCENE.toml it simulates the paper's experiment (a ball of 3 mm radius pressed with 0.7 N and 1.2 N on the layered
+/// waveguide), measures the simulated frames blindly, and prints every result beside the truth. With SCENE.toml it
+/// measures your own frames. --repeat N gives the median and the 99th centile of the times of every stage and of the whole.
+/// --out gets the plots: frames.svg, surfaces.svg, matches.svg, displacement.svg, strain.svg, summary.svg.
+#[derive(Args)]
+#[command(after_help = "\
+Examples:
+  tactile measure
+  tactile measure examples/data/press/scene.toml --out target/measure
+  tactile measure --polymer cl2003x --seed 7 --json
+  tactile measure --physics hertz --radius-mm 20
+
+SCENE.toml (paths are relative to it; PNG, PGM or JPEG; colour becomes grey by the luma of Rec. 601):
+
+  reference = \"reference.png\"            # the sensor without contact
+  pixel_size_m = [21.55e-6, 21.55e-6]    # x, y, on the sensing surface
+  [calibration]
+  pairs = \"calibration.csv\"              # columns integrated_pixel_value,force_N
+  # or: depth_table = \"depth.csv\"        # columns darkness_grey_levels,depth_mm
+  [[frames]]
+  image = \"frame_1.png\"
+  force_N = 0.70                         # optional gauge reading
+  [[frames]]
+  image = \"frame_2.png\"
+  [object]
+  shape = \"sphere\"                       # or \"block\", \"cylinder\" (flat faces, no size), \"flat_punch\", \"unknown\"
+  radius_m = 3e-3
+  poisson_ratio = 0.5
+  [waveguide]                            # from the object's side to the glass
+  layers = [{ refractive_index = 1.38, thickness_m = 2e-3, youngs_modulus_pa = 1.36e5, poisson_ratio = 0.5 }]")]
+pub struct MeasureArguments {
+    /// Scene file with your own frames. See below. Without it a press is simulated.
+    #[arg(value_name = "SCENE.toml")]
+    scene: Option<PathBuf>,
+    #[command(flatten)]
+    repetition: Repetition,
+    /// Number of control points on each surface.
+    #[arg(long, value_name = "COUNT", default_value_t = 200, value_parser = clap::value_parser!(u32).range(8..=5000))]
+    points: u32,
+    #[command(flatten)]
+    simulation: Simulation,
+}
+
+/// The press that is simulated where no scene is given.
+#[derive(Args)]
+struct Simulation {
+    /// Simulation: the ball's material.
+    #[arg(long, value_enum, default_value_t = Polymer::Cl2000x, conflicts_with = "scene")]
+    polymer: Polymer,
+    /// Simulation: the ball's Young's modulus in kPa, instead of a polymer's.
+    #[arg(long, value_name = "KPA", value_parser = positive, conflicts_with_all = ["scene", "polymer"])]
+    modulus_kpa: Option<f64>,
+    /// Simulation: the ball's radius in mm.
+    #[arg(long, value_name = "MM", default_value_t = 3.0, value_parser = positive, conflicts_with = "scene")]
+    radius_mm: f64,
+    /// Simulation: the loads in newtons.
+    #[arg(long, value_name = "N,N,...", value_delimiter = ',', default_values_t = [0.7, 1.2], value_parser = positive, conflicts_with = "scene")]
+    forces: Vec<f64>,
+    /// Simulation: where the contacts come from. Finite elements are there for the two polymers, 3 mm, up to 1.3 N.
+    #[arg(long, value_enum, default_value_t = Physics::FiniteElements, conflicts_with = "scene")]
+    physics: Physics,
+    /// Simulation: seed of the camera's noise.
+    #[arg(long, default_value_t = 1, conflicts_with = "scene")]
+    seed: u64,
+    /// Simulation: no noise, blur, vignetting or background.
+    #[arg(long, conflicts_with = "scene")]
+    ideal_camera: bool,
+}
+
+/// The law of the simulated contacts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Physics {
+    /// Finite elements at finite strain, on the layers. Read by the default estimator.
+    FiniteElements,
+    /// Hertz with the layers in series. Read by the same law.
+    Hertz,
+}
+
+/// The paper's two polymers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Polymer {
+    /// Versaflex CL2000X, 103 kPa.
+    Cl2000x,
+    /// Versaflex CL2003X, 62 kPa.
+    Cl2003x,
+}
+
+impl Simulation {
+    fn options(&self) -> PressOptions {
+        let polymer = match self.polymer {
+            Polymer::Cl2000x => Elastic::CL2000X,
+            Polymer::Cl2003x => Elastic::CL2003X,
+        };
+        let own_pa = self.modulus_kpa.map(|kpa| kpa * 1e3);
+        let material = Elastic {
+            youngs_modulus_pa: own_pa.unwrap_or(polymer.youngs_modulus_pa),
+            ..polymer
+        };
+        let camera = Camera::default();
+        let mut options = PressOptions {
+            object: ElasticSphere {
+                radius_m: self.radius_mm * 1e-3,
+                material,
+            },
+            loads: self.forces.iter().map(|&f| PressLoad::normal(f)).collect(),
+            camera: if self.ideal_camera {
+                camera.ideal()
+            } else {
+                camera
+            },
+            seed: self.seed,
+            ..PressOptions::default()
+        };
+        if self.physics == Physics::FiniteElements {
+            options.law = ContactModel::FiniteElements;
+        }
+        options
+    }
+
+    fn run(&self) -> Result<Trial, Failure> {
+        let clock = Bar::clock(format!("simulating {} frames", self.forces.len()));
+        let trial = Trial::new(self.options(), &CalibrationRun::default());
+        drop(clock);
+        let trial = trial.map_err(|error| {
+            let hint = match self.physics {
+                Physics::FiniteElements => ", or try --physics hertz",
+                Physics::Hertz => "",
+            };
+            let error = match error {
+                SimulateError::CalibrationSaturates { .. } => {
+                    "the gain that suits so small --forces saturates the camera in the calibration up to 2 N: give larger ones".to_owned()
+                }
+                // The library names its field, a user has written --forces.
+                error => error.to_string().replace("force_n", "the force in N"),
+            };
+            Failure::input(format!("the press cannot be simulated: {error}{hint}"))
+        })?;
+        // A contact that reaches beyond the corners leaves the camera nothing of the sensor to see.
+        let camera = trial.scene.options().camera;
+        let [rows, columns] = camera.shape.map(|pixels| pixels as f64);
+        let [width, height] = camera.pixel_size_m;
+        let corner_m = 0.5 * (columns * width).hypot(rows * height);
+        let contacts = trial.simulation.truth.iter().map(|truth| &truth.contact);
+        match contacts.max_by(|a, b| a.contact_radius_m.total_cmp(&b.contact_radius_m)) {
+            Some(largest) if largest.contact_radius_m > corner_m => Err(Failure::input(format!(
+                "at {} N the contact has a radius of {} mm and covers the whole frame: give smaller --forces",
+                four_digits(largest.force_n),
+                four_digits(1e3 * largest.contact_radius_m),
+            ))),
+            _ => Ok(trial),
+        }
+    }
+}
+
+/// Frames with everything that their measurement needs.
+enum Frames {
+    /// Simulated, with the truth.
+    Simulated(Box<Trial>),
+    /// A user's own.
+    Scene(Box<(Scene, SceneData)>),
+}
+
+impl Frames {
+    fn open(arguments: &MeasureArguments, context: &Context) -> Result<Self, Failure> {
+        let Some(path) = &arguments.scene else {
+            return Ok(Self::Simulated(Box::new(arguments.simulation.run()?)));
+        };
+        let scene = Scene::read(path).map_err(Failure::input)?;
+        let frames = scene.frames.len();
+        // Loading names the error of a reference that cannot be read.
+        if let Ok(reference) = read_grey_image(&scene.reference, Grey::default(), None) {
+            // Frames are kept up to 64 MB and read again beyond. Their results take 4 kB each.
+            let pixels = reference.levels.len() as f64;
+            let bytes = pixels + (frames as f64 * pixels).min(64e6) + 4e3 * frames as f64;
+            let job = format!("a scene of {frames} frames");
+            context.allow(bytes, &job, "give fewer or smaller frames")?;
+        }
+        let data = scene.load_without_frames().map_err(Failure::input)?;
+        Ok(Self::Scene(Box::new((scene, data))))
+    }
+
+    fn pipeline(&self, points: usize) -> Result<Pipeline, Failure> {
+        let pipeline = match self {
+            Self::Simulated(trial) => trial.pipeline().map_err(Failure::input)?,
+            Self::Scene(own) => own.0.pipeline(&own.1).map_err(Failure::input)?,
+        };
+        Ok(pipeline.with_control_points(points))
+    }
+
+    fn press(&self, pipeline: &Pipeline) -> Result<Press<'_>, Failure> {
+        match self {
+            Self::Simulated(trial) => trial.press(pipeline).map_err(Failure::input),
+            Self::Scene(own) => {
+                let _clock = Bar::clock(format!("reading {} frames", own.0.frames.len()));
+                own.0.press(pipeline, &own.1).map_err(Failure::input)
+            }
+        }
+    }
+
+    /// The pipeline's error, with file and field where there is a scene file.
+    fn explain(&self, error: PipelineError) -> String {
+        match self {
+            Self::Simulated(_) => error.to_string(),
+            Self::Scene(own) => own.0.measure_error(error).to_string(),
+        }
+    }
+
+    fn truth(&self) -> Option<&PressSimulation> {
+        match self {
+            Self::Simulated(trial) => Some(&trial.simulation),
+            Self::Scene(_) => None,
+        }
+    }
+}
+
+/// Strain of the apparent surfaces of a simulated press between the first and the last frame.
+fn true_strain(truth: &[PressTruth]) -> Option<[[f64; 3]; 3]> {
+    let (first, last) = (truth.first()?, truth[1..].last()?);
+    let e = first.scaling_to(last).green_lagrange_strain();
+    Some(std::array::from_fn(|r| std::array::from_fn(|c| e[(r, c)])))
+}
+
+/// The truth of a simulated press as JSON. The surface is the one that the pressure is read as.
+fn truth_value(simulation: &PressSimulation) -> Value {
+    let frame = |t: &PressTruth| {
+        json!({
+            "force_n": t.contact.force_n, "contact_radius_m": t.contact.contact_radius_m,
+            "contact_ratio": t.contact.contact_ratio(), "centroid_px": t.centroid_px,
+            "indentation_m": t.contact.indentation_m,
+            "surface_height_m": t.contact.apparent_height_m(0.0),
+        })
+    };
+    json!({
+        "youngs_modulus_pa": simulation.youngs_modulus_pa,
+        "frames": simulation.truth.iter().map(frame).collect::<Vec<_>>(),
+        "strain": true_strain(&simulation.truth),
+    })
+}
+
+/// Median and 99th centile of a stage in milliseconds.
+#[derive(Serialize)]
+struct Timing {
+    stage: String,
+    median_ms: f64,
+    centile_99_ms: f64,
+}
+
+/// The object that `--json` prints.
+#[derive(Serialize)]
+struct Answer<'a> {
+    #[serde(flatten)]
+    measurement: &'a Measurement,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    truth: Option<Value>,
+    #[serde(skip_serializing_if = "<[_]>::is_empty")]
+    timing: &'a [Timing],
+}
+
+/// The reading of a frame by the first stage, none without contact.
+type Contact = Result<Option<ContactReading>, PipelineError>;
+
+pub fn run(arguments: &MeasureArguments, context: &mut Context) -> Result<Exit, Failure> {
+    let stages = [
+        "frames",
+        "surfaces",
+        "matches",
+        "displacement",
+        "strain",
+        "summary",
+    ];
+    let inputs: Vec<_> = arguments.scene.iter().map(PathBuf::as_path).collect();
+    context
+        .outputs
+        .plan(&stages.map(|name| format!("{name}.svg")), &inputs)?;
+    // It lives as long as the program, so that Ctrl-C can leave work on it undone.
+    let frames: &'static Frames = Box::leak(Box::new(Frames::open(arguments, context)?));
+    let pipeline = frames.pipeline(arguments.points as usize)?;
+    let mut press = frames.press(&pipeline)?;
+    // The contact of a frame needs nothing of the others: these are there if Ctrl-C ends the rest.
+    let Some(contacts) = contacts(&mut press, context) else {
+        return Ok(Exit::Interrupted);
+    };
+    let job = format!("measuring {} frames", press.frames());
+    let measured = context.wait(job, move || {
+        let measurement = press.measure();
+        (press, measurement)
+    });
+    let Some((mut press, measurement)) = measured else {
+        print_contacts(&contacts, context);
+        return Ok(Exit::Interrupted);
+    };
+    let timing = timing(&press, arguments.repetition.repeat, context);
+    let truth = frames.truth();
+    print(&measurement, truth, &timing, context);
+    if let Err(error) = &measurement.youngs_modulus_pa {
+        context.note(frames.explain(error.clone()));
+    }
+    context.value(&Answer {
+        measurement: &measurement,
+        truth: truth.map(truth_value),
+        timing: &timing,
+    });
+    let mut results = measurement.frames.iter();
+    let complete = measurement.youngs_modulus_pa.is_ok()
+        && measurement.strain.is_ok()
+        && results.all(|f| f.as_ref().is_ok_and(|f| f.force_n.is_ok()));
+    if context.outputs.folder().is_none() {
+        return Ok(Exit::complete_if(complete));
+    }
+    let mut lines = summary_lines(&measurement);
+    if let (Some(truth), Ok(modulus)) = (truth, &measurement.youngs_modulus_pa) {
+        let error = percent(modulus.value, truth.youngs_modulus_pa);
+        let kpa = truth.youngs_modulus_pa * 1e-3;
+        lines.push(format!("true modulus\t{kpa:.2} kPa (error {error:+.2} %)"));
+    }
+    match press_pages(&mut press, lines) {
+        Ok(pages) => {
+            for (name, page) in pages {
+                context.outputs.page(format!("{name}.svg"), || page)?;
+            }
+            Ok(Exit::complete_if(complete))
+        }
+        Err(PlotError::Measure(error)) => {
+            context.note(format_args!("no plots: {error}"));
+            Ok(Exit::Partial)
+        }
+        Err(error) => Err(Failure::output(error)),
+    }
+}
+
+/// The contact of every frame. After Ctrl-C those so far are printed, and there is nothing more to do.
+fn contacts(press: &mut Press<'_>, context: &mut Context) -> Option<Vec<Contact>> {
+    let mut bar = Bar::of(press.frames(), "measuring contacts");
+    context.interrupt.polled(true);
+    let mut contacts = Vec::with_capacity(press.frames());
+    for frame in 0..press.frames() {
+        if context.interrupt.requested() {
+            drop(bar);
+            print_contacts(&contacts, context);
+            return None;
+        }
+        contacts.push(press.contact(frame).map(|contact| contact.copied()));
+        bar.done(frame + 1);
+    }
+    Some(contacts)
+}
+
+/// The contacts alone, of a measurement that Ctrl-C stopped.
+fn print_contacts(contacts: &[Contact], context: &mut Context) {
+    let mut values = Vec::new();
+    for (k, contact) in contacts.iter().enumerate() {
+        let name = format!("frame {}", k + 1);
+        match contact {
+            Ok(Some(contact)) => {
+                let force = contact.force_n.map(|f| in_unit(f, 1.0) + " N");
+                let force = force.unwrap_or("unknown".to_owned());
+                let radius = in_unit(contact.contact_radius_m, 1e3);
+                context.row(
+                    &name,
+                    format_args!("force {force}   contact radius {radius} mm"),
+                );
+                values.push(json!({ "value": contact }));
+            }
+            Ok(None) => {
+                context.row(&name, "no contact");
+                values.push(json!({ "value": null }));
+            }
+            Err(error) => {
+                context.row(&name, format_args!("none: {error}"));
+                values.push(json!({ "error": error.to_string() }));
+            }
+        }
+    }
+    context.line("stopped by Ctrl-C before surfaces, strain and modulus");
+    context.value(&json!({ "interrupted": true, "contacts": values }));
+}
+
+/// Measures `n` times from the frames, the reference being known. It is empty where `n` is one.
+fn timing(first: &Press<'_>, n: u32, context: &Context) -> Vec<Timing> {
+    if n < 2 {
+        return Vec::new();
+    }
+    let mut times: Vec<Vec<Duration>> = vec![Vec::new(); Stage::ALL.len() + 1];
+    let mut bar = Bar::of(n as usize, "measuring");
+    context.interrupt.polled(true);
+    for k in 0..n {
+        if context.interrupt.requested() {
+            break;
+        }
+        let start = Instant::now();
+        let press = first.renewed();
+        // A stage without an answer takes its time as well.
+        let _ = press.measure();
+        let whole = start.elapsed();
+        for (list, stage) in times.iter_mut().zip(Stage::ALL) {
+            list.push(press.report().work(stage).time);
+        }
+        times[Stage::ALL.len()].push(whole);
+        bar.done(k as usize + 1);
+    }
+    let stages = Stage::ALL.map(|stage| stage.to_string());
+    let names = stages.into_iter().chain(["whole".to_owned()]);
+    let timed = names.zip(times).map(|(stage, mut list)| {
+        list.sort_unstable();
+        let at = |share: f64| {
+            let last = list.len().saturating_sub(1) as f64;
+            let time = list.get((last * share).ceil() as usize);
+            time.map_or(0.0, |time| time.as_secs_f64() * 1e3)
+        };
+        Timing {
+            stage,
+            median_ms: at(0.5),
+            centile_99_ms: at(0.99),
+        }
+    });
+    timed.collect()
+}
+
+fn percent(found: f64, truth: f64) -> f64 {
+    100.0 * (found / truth - 1.0)
+}
+
+fn print(
+    measurement: &Measurement,
+    truth: Option<&PressSimulation>,
+    timing: &[Timing],
+    context: &mut Context,
+) {
+    context.line(measurement);
+    context.line(format_args!("time\n{}", measurement.report));
+    for row in timing {
+        context.line(format_args!(
+            "  {:<18} median {:9.3} ms   99th centile {:9.3} ms",
+            row.stage, row.median_ms, row.centile_99_ms
+        ));
+    }
+    let Some(truth) = truth else {
+        return;
+    };
+    let [measured, exact, error] = ["measured", "true", "error"];
+    context.line(format_args!(
+        "beside the truth        {measured:>12} {exact:>12} {error:>10}"
+    ));
+    let mut line = |name: String, unit: &str, found: f64, truth: f64| {
+        let error = percent(found, truth);
+        context.line(format_args!(
+            "  {name:<16} {unit:<4} {found:>12.4} {truth:>12.4} {error:>+8.2} %"
+        ));
+    };
+    for (i, (m, t)) in measurement.frames.iter().zip(&truth.truth).enumerate() {
+        let Ok(m) = m else {
+            continue;
+        };
+        let i = i + 1;
+        if let Ok(force) = &m.force_n {
+            line(format!("force {i}"), "N", force.value, t.contact.force_n);
+        }
+        let [found, exact] =
+            [m.contact_radius_m.value, t.contact.contact_radius_m].map(|r| 1e3 * r);
+        line(format!("contact radius {i}"), "mm", found, exact);
+        if let Ok(height) = m.surface_height_m {
+            let exact = 1e3 * t.contact.apparent_height_m(0.0);
+            line(format!("surface height {i}"), "mm", 1e3 * height, exact);
+        }
+        for (k, axis) in ["x", "y"].into_iter().enumerate() {
+            let (found, exact) = (m.centroid_px[k], t.centroid_px[k]);
+            line(format!("centroid {axis} {i}"), "px", found, exact);
+        }
+    }
+    if let (Ok(m), Some(t)) = (&measurement.strain, true_strain(&truth.truth)) {
+        for (k, name) in ["e_xx", "e_yy", "e_zz"].into_iter().enumerate() {
+            line(format!("strain {name}"), "", m.mean[k][k], t[k][k]);
+        }
+    }
+    if let Ok(modulus) = &measurement.youngs_modulus_pa {
+        let [found, exact] = [modulus.value, truth.youngs_modulus_pa].map(|pa| 1e-3 * pa);
+        line("modulus".into(), "kPa", found, exact);
+    }
+}

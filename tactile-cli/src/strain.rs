@@ -1,0 +1,323 @@
+//! `tactile strain`: from two sets of points, before and after a deformation.
+use crate::console::{Context, Exit, Failure, four_digits};
+use crate::match_points::{self, Expectations};
+use crate::outputs::Csv;
+use crate::plot::{Colour, Page, Panel};
+use clap::{Args, ValueEnum};
+use nalgebra::{Matrix3, Point};
+use serde_json::{Map, Value, json};
+use std::path::PathBuf;
+use tactile_imaging::StrainBetween;
+use tactile_imaging::elasticity::strain::{
+    Biot, EulerAlmansi, GreenLagrange, Hencky, Infinitesimal, StrainMeasure,
+};
+use tactile_imaging::io::{PointTable, read_point_table};
+use tactile_imaging::matching::PointMatcher;
+use tactile_imaging::pipeline::with_error;
+
+/// Match the points before and after a deformation and measure the strain between them
+///
+/// The files are CSV, a point a row: columns x, y and, in space, z, found by name where there is a header. Points may come
+/// and go. A smoothing spline whose smoothing is chosen by cross-validation gives the strain. Misplaced points are found
+/// and left out. --out gets pairs.csv (rows, positions and displacements of the pairs), strain.csv (the strain at every
+/// point with its standard error) and strain.svg.
+#[derive(Args)]
+#[command(after_help = "\
+Examples:
+  tactile strain examples/data/before.csv examples/data/after.csv
+  tactile strain examples/data/before.csv examples/data/after.csv --measure hencky --rotation any --out target/strain")]
+pub struct StrainArguments {
+    /// Points before.
+    before: PathBuf,
+    /// Points after.
+    after: PathBuf,
+    /// Measure of strain.
+    #[arg(long, value_enum, default_value_t = Measure::GreenLagrange)]
+    measure: Measure,
+    #[command(flatten)]
+    expectations: Expectations,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum Measure {
+    GreenLagrange,
+    EulerAlmansi,
+    Hencky,
+    Biot,
+    Infinitesimal,
+}
+
+impl Measure {
+    fn strain(self) -> &'static dyn StrainMeasure {
+        match self {
+            Self::GreenLagrange => &GreenLagrange,
+            Self::EulerAlmansi => &EulerAlmansi,
+            Self::Hencky => &Hencky,
+            Self::Biot => &Biot,
+            Self::Infinitesimal => &Infinitesimal,
+        }
+    }
+}
+
+/// The unit of points whose headings name one.
+const METRES: &str = "m";
+
+const FILES: [&str; 3] = ["pairs.csv", "strain.csv", "strain.svg"];
+
+pub fn run(arguments: &StrainArguments, context: &mut Context) -> Result<Exit, Failure> {
+    let (before, after) = (&arguments.before, &arguments.after);
+    context.outputs.plan(&FILES, &[before, after])?;
+    let (a, metres) = read_point_table(before)?;
+    let (b, also_metres) = read_point_table(after)?;
+    let files = format!("{} and {}", before.display(), after.display());
+    if metres != also_metres {
+        return Err(Failure::input(format!(
+            "only one of {files} names the unit of its coordinates: name it in both headers or in none"
+        )));
+    }
+    let unit = if metres { METRES } else { "the points' unit" };
+    match (a, b) {
+        (PointTable::Plane(a), PointTable::Plane(b)) => measured(a, b, unit, arguments, context),
+        (PointTable::Space(a), PointTable::Space(b)) => measured(a, b, unit, arguments, context),
+        _ => Err(Failure::input(format!(
+            "{files} must both have two coordinates a point, or both three"
+        ))),
+    }
+}
+
+fn measured<const D: usize>(
+    before: Vec<Point<f64, D>>,
+    after: Vec<Point<f64, D>>,
+    unit: &'static str,
+    arguments: &StrainArguments,
+    context: &mut Context,
+) -> Result<Exit, Failure> {
+    let remedy = "take every tenth point, or cut the sets into parts";
+    match_points::allow(context, before.len(), after.len(), remedy)?;
+    let matcher = arguments.expectations.matcher();
+    let job = format!("matching {} to {} points", before.len(), after.len());
+    let sets = (before.clone(), after.clone());
+    let Some(matching) = context.wait(job, move || matcher.match_points(&sets.0, &sets.1)) else {
+        return Ok(Exit::Interrupted);
+    };
+    let files = [&arguments.before, &arguments.after].map(|path| path.display());
+    let matching = matching.map_err(|error| {
+        Failure::input(format!(
+            "{} and {} cannot be matched: {error}",
+            files[0], files[1]
+        ))
+    })?;
+    let partner = |(i, j): (usize, &Option<usize>)| j.map(|j| (i, j));
+    let assignment = matching.assignment.iter().enumerate();
+    let matched: Vec<_> = assignment.filter_map(partner).collect();
+    let job = format!("fitting {} pairs", matched.len());
+    let (from, to, pairs) = (before.clone(), after.clone(), matched.clone());
+    let measure = arguments.measure;
+    let found = context.wait(job, move || {
+        StrainBetween::of_pairs(&from, &to, &pairs, measure.strain())
+            .map_err(|error| error.to_string())
+    });
+    let report = StrainReport {
+        before,
+        after,
+        matched,
+        strain: found.unwrap_or_else(|| Err("stopped by Ctrl-C".to_owned())),
+        measure: measure.strain().name(),
+        unit,
+    };
+    report.print(context);
+    context.value(&report.json());
+    context.outputs.add(FILES[0], report.pairs());
+    if let Ok(strain) = &report.strain {
+        context.outputs.add(FILES[1], report.table(strain));
+        context.outputs.page(FILES[2], || report.page(strain))?;
+    }
+    Ok(Exit::complete_if(report.strain.is_ok()))
+}
+
+/// The results, as far as they came.
+struct StrainReport<const D: usize> {
+    before: Vec<Point<f64, D>>,
+    after: Vec<Point<f64, D>>,
+    /// Pairs of the matcher.
+    matched: Vec<(usize, usize)>,
+    strain: Result<StrainBetween<D>, String>,
+    measure: &'static str,
+    unit: &'static str,
+}
+
+/// Name and indices of a component of the strain.
+type Component = (&'static str, usize, usize);
+
+/// The components in `D` dimensions.
+fn components<const D: usize>() -> Vec<Component> {
+    let plane = [("e_xx", 0, 0), ("e_yy", 1, 1), ("e_xy", 0, 1)];
+    let space = [("e_zz", 2, 2), ("e_xz", 0, 2), ("e_yz", 1, 2)];
+    let more = if D == 2 { &[][..] } else { &space };
+    plane.iter().chain(more).copied().collect()
+}
+
+/// Whether a pair of this weight counts in the spline.
+fn counts(weight: f64) -> bool {
+    weight >= 1e-3
+}
+
+impl<const D: usize> StrainReport<D> {
+    /// The pairs that the strain comes from, those of the matcher where there is no strain.
+    fn rows(&self) -> &[(usize, usize)] {
+        self.strain.as_ref().map_or(&self.matched, |s| &s.rows)
+    }
+
+    /// The ending of headings, empty where the unit of the points is not known.
+    fn suffix(&self) -> &'static str {
+        if self.unit == METRES { "_m" } else { "" }
+    }
+
+    fn print(&self, context: &mut Context) {
+        let pairs = self.rows().len();
+        let of = |set: &[Point<f64, D>], name: &str| {
+            let share = 100.0 * pairs as f64 / set.len() as f64;
+            format!("of {} {name} ({share:.1} %)", set.len())
+        };
+        let [before, after] = [of(&self.before, "points before"), of(&self.after, "after")];
+        context.row("matched", format_args!("{pairs} {before}, {after}"));
+        let found = match &self.strain {
+            Ok(found) => found,
+            Err(reason) => return context.row("strain", format_args!("none: {reason}")),
+        };
+        let left_out = found.weights.iter().filter(|w| !counts(**w)).count();
+        context.row("left out", format_args!("{left_out} as misplaced"));
+        let noise = four_digits(found.sigma);
+        context.row(
+            "noise",
+            format_args!("{noise} for each coordinate (in {})", self.unit),
+        );
+        let smoothing = if found.relative_lambda >= 1e8 {
+            "homogeneous (nothing finer is supported by the data)".into()
+        } else {
+            format!("λ = {:.0e} squared radii", found.relative_lambda)
+        };
+        context.row("smoothing", smoothing);
+        let folded = found.summary.folded.len();
+        if folded > 0 {
+            let text = format!("at {folded} points (det F ≤ 0), left out of the mean");
+            context.row("FOLDED", text);
+        }
+        let measure = self.measure;
+        context.line(format_args!(
+            "\n{:<8} {:>26}   spread   ({measure} strain)",
+            "", "mean"
+        ));
+        for (name, i, j) in components::<D>() {
+            let at = |m: &Matrix3<f64>| m[(i, j)];
+            let mean = with_error(at(&found.summary.mean), at(&found.standard_error), 1.0);
+            let spread = four_digits(at(&found.summary.spread));
+            context.line(format_args!("{name:<8} {mean:>26}   {spread}"));
+        }
+        let degrees = found.degrees_of_freedom;
+        context.line(format_args!(
+            "(standard errors with {degrees} degrees of freedom)"
+        ));
+    }
+
+    fn json(&self) -> Value {
+        let strain = match &self.strain {
+            Ok(found) => json!({ "value": self.strain_json(found) }),
+            Err(reason) => json!({ "error": reason }),
+        };
+        json!({
+            "points_before": self.before.len(), "points_after": self.after.len(),
+            "unit": self.unit,
+            "match": { "value": { "pairs": self.rows().len() } },
+            "strain": strain,
+        })
+    }
+
+    fn strain_json(&self, found: &StrainBetween<D>) -> Value {
+        let component = |(name, i, j): Component| {
+            let value = json!({
+                "mean": found.summary.mean[(i, j)], "spread": found.summary.spread[(i, j)],
+                "standard_error": found.standard_error[(i, j)],
+            });
+            (name.to_owned(), value)
+        };
+        let tensors: Map<String, Value> = components::<D>().into_iter().map(component).collect();
+        json!({
+            "measure": self.measure,
+            "left_out_as_misplaced": found.weights.iter().filter(|w| !counts(**w)).count(),
+            "noise_per_coordinate": found.sigma,
+            "smoothing_over_squared_radius": found.relative_lambda,
+            "degrees_of_freedom": found.degrees_of_freedom,
+            "folded_points": found.summary.folded,
+            "components": tensors,
+        })
+    }
+
+    /// Rows (counted from 0), positions and displacements of the pairs, and their weights in the spline.
+    fn pairs(&self) -> Vec<u8> {
+        let (axes, suffix) = (&["x", "y", "z"][..D], self.suffix());
+        let mut header = vec!["row_before".to_owned(), "row_after".to_owned()];
+        header.extend(axes.iter().map(|a| format!("{a}{suffix}")));
+        header.extend(axes.iter().map(|a| format!("{a}_after{suffix}")));
+        header.extend(axes.iter().map(|a| format!("u_{a}{suffix}")));
+        header.push("weight".to_owned());
+        let mut csv = Csv::new(&header);
+        for (k, &(i, j)) in self.rows().iter().enumerate() {
+            let (a, b) = (self.before[i], self.after[j]);
+            let mut row = vec![i as f64, j as f64];
+            row.extend(a.iter().chain(b.iter()).chain((b - a).iter()));
+            row.push(self.strain.as_ref().map_or(1.0, |s| s.weights[k]));
+            csv.row(row);
+        }
+        csv.into_bytes()
+    }
+
+    /// The strain at every point, and its standard error.
+    fn table(&self, found: &StrainBetween<D>) -> Vec<u8> {
+        let (suffix, components) = (self.suffix(), components::<D>());
+        let mut header = vec!["row_before".to_owned()];
+        header.extend(["x", "y", "z"][..D].iter().map(|a| format!("{a}{suffix}")));
+        header.extend(components.iter().map(|c| c.0.to_owned()));
+        header.extend(components.iter().map(|c| format!("se_{}", c.0)));
+        let mut csv = Csv::new(&header);
+        for (k, pair) in found.pairs.iter().enumerate() {
+            let mut row = vec![found.rows[k].0 as f64];
+            row.extend(pair[0].iter());
+            for tensor in [&found.strains[k], &found.standard_errors[k]] {
+                row.extend(components.iter().map(|c| tensor[(c.1, c.2)]));
+            }
+            csv.row(row);
+        }
+        csv.into_bytes()
+    }
+
+    fn page(&self, found: &StrainBetween<D>) -> Page {
+        let unit = self.unit;
+        let flat = |p: &Point<f64, D>| [p[0], p[1]];
+        let pairs = |kept: bool| {
+            let weighted = found.pairs.iter().zip(&found.weights);
+            let chosen = weighted.filter(move |(_, w)| counts(**w) == kept);
+            chosen.map(move |(pair, _)| [flat(&pair[0]), flat(&pair[1])])
+        };
+        let panel = |title: String| {
+            Panel::new(title, format!("x ({unit})"), format!("y ({unit})")).equal_aspect()
+        };
+        let mut matches =
+            panel("Displacements".into()).arrows(pairs(true), Colour::Blue, "matched");
+        if pairs(false).next().is_some() {
+            matches = matches.arrows(pairs(false), Colour::Red, "left out");
+        }
+        let positions: Vec<_> = found.pairs.iter().map(|p| flat(&p[0])).collect();
+        let map = |(name, i, j): Component| {
+            let (mean, error) = (found.summary.mean[(i, j)], found.standard_error[(i, j)]);
+            let values = found.strains.iter().map(|e| e[(i, j)]);
+            let title = format!("{name}: mean {}", with_error(mean, error, 1.0));
+            panel(title).valued_points(positions.clone(), values, name)
+        };
+        let shown = components::<D>()
+            .into_iter()
+            .filter(|c| c.1 == c.2 || D == 2);
+        let panels = std::iter::once(matches).chain(shown.map(map)).collect();
+        Page::new("Strain between two point sets", 2, panels)
+    }
+}

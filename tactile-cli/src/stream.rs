@@ -1,0 +1,486 @@
+//! `tactile stream`: force and modulus live, from a simulated series at camera rate or from recorded frames.
+use crate::arguments::{eight_bits, not_negative, positive};
+use crate::console::{Bar, Context, Exit, Failure, pair};
+use crate::outputs::Csv;
+use clap::Args;
+use ndarray::{Array2, ArrayView2};
+use serde_json::{Value, json};
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+use tactile_imaging::io::Grey;
+use tactile_imaging::pipeline::{FrameSource, PipelineError, Session, with_error};
+use tactile_imaging::scene::Scene;
+use tactile_simulate::{CalibrationRun, Camera, Gain, LoadCycle, PressLoad, PressOptions, Trial};
+
+/// Measure frame after frame: force, contact and modulus live
+///
+/// Without SCENE.toml a loading–unloading series is simulated and played at camera rate: frames are made beforehand, so that only
+/// the measuring is timed. A frame is late if its answer comes after the next frame is due. The exit code is then 1 if more
+/// frames came late than allowed or the modulus ends outside the tolerance. With SCENE.toml (see `tactile measure`), which
+/// describes sensor and object, recorded frames are measured one after the other, as fast as they can be. One is late if
+/// that takes longer than a frame at --rate lasts. --out gets stream.csv, a row a frame.
+#[derive(Args)]
+#[command(after_help = "\
+Examples:
+  tactile stream --rate 20 --period 1 --allowed-late 100
+  tactile stream --rate 20 --period 1 --allowed-late 100 --strain --json
+  tactile stream examples/data/press/scene.toml --allowed-late 100 --out target/stream
+  tactile stream examples/data/press/scene.toml examples/data/press/frame_1.png examples/data/press/frame_2.png --allowed-late 100")]
+pub struct StreamArguments {
+    /// Scene file of the sensor and the object, whose recorded frames are measured.
+    #[arg(value_name = "SCENE.toml")]
+    scene: Option<PathBuf>,
+    /// Recorded frames: images, or folders whose images are taken in the order of their names. Those of the scene if
+    /// there is none here.
+    #[arg(value_name = "FRAMES", requires = "scene")]
+    frames: Vec<PathBuf>,
+    /// Frames per second.
+    #[arg(long, value_name = "HZ", default_value_t = 80.0, value_parser = positive)]
+    rate: f64,
+    /// Largest force in newtons (1.5 in a simulation).
+    #[arg(long, value_name = "N", value_parser = positive)]
+    force: Option<f64>,
+    /// Measure strain too, in frames of at least a third of the largest force, counted from the first of them.
+    #[arg(long)]
+    strain: bool,
+    /// Share of frames in per cent that may come late.
+    #[arg(long, value_name = "PERCENT", default_value_t = 0.0, value_parser = not_negative)]
+    allowed_late: f64,
+    #[command(flatten)]
+    simulation: Simulation,
+}
+
+/// The series that is simulated where no scene is given.
+#[derive(Args)]
+struct Simulation {
+    /// Simulation: seconds of one load and unload.
+    #[arg(long, value_name = "S", default_value_t = 2.0, value_parser = positive, conflicts_with = "scene")]
+    period: f64,
+    /// Simulation: cycles.
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..), conflicts_with = "scene")]
+    cycles: u32,
+    /// Simulation: frames of 1392 × 1042 pixels instead of 348 × 260.
+    #[arg(long, conflicts_with = "scene")]
+    full_size: bool,
+    /// Simulation: error of the modulus in per cent beyond which the run fails.
+    #[arg(long, value_name = "PERCENT", default_value_t = 3.0, value_parser = positive, conflicts_with = "scene")]
+    tolerance: f64,
+}
+
+pub fn run(arguments: &StreamArguments, context: &mut Context) -> Result<Exit, Failure> {
+    let inputs: Vec<_> = arguments.scene.iter().map(PathBuf::as_path).collect();
+    context.outputs.plan(&["stream.csv"], &inputs)?;
+    match &arguments.scene {
+        Some(scene) => recorded(scene, arguments, context),
+        None => simulated(arguments, context),
+    }
+}
+
+/// The results of one frame, each number with its standard error.
+struct Row {
+    time_s: f64,
+    force_n: Option<[f64; 2]>,
+    radius_m: Option<[f64; 2]>,
+    /// The modulus from all frames so far.
+    modulus_pa: Option<[f64; 2]>,
+    strain_xx_zz: Option<[f64; 2]>,
+}
+
+/// A session with the results of every frame so far.
+struct Live {
+    session: Session,
+    rows: Vec<Row>,
+    late: usize,
+    /// Where the frames are simulated.
+    truth_pa: Option<f64>,
+    /// Strain is measured in frames of at least this force.
+    strained_above_n: Option<f64>,
+}
+
+impl Live {
+    fn new(session: Session, arguments: &StreamArguments, truth_pa: Option<f64>) -> Self {
+        let largest_n = arguments.force.unwrap_or(SIMULATED_FORCE_N);
+        Self {
+            session,
+            rows: Vec::new(),
+            late: 0,
+            truth_pa,
+            strained_above_n: arguments.strain.then_some(largest_n / 3.0),
+        }
+    }
+
+    /// Measures a frame.
+    fn push(&mut self, time_s: f64, frame: ArrayView2<'_, u8>) -> Result<(), PipelineError> {
+        let contact = self.session.push(frame)?.contact;
+        let force = contact.and_then(|c| c.force_n);
+        let least = self.strained_above_n;
+        let strained = least.is_some_and(|least| force.is_some_and(|f| f.value > least));
+        let modulus = self.session.modulus().ok();
+        let strain_xx_zz = if strained { self.strain()? } else { None };
+        self.rows.push(Row {
+            time_s,
+            force_n: force.map(pair),
+            radius_m: contact.map(|c| pair(c.contact_radius_m)),
+            modulus_pa: modulus.map(|m| [m.youngs_modulus_pa, m.standard_error_pa]),
+            strain_xx_zz,
+        });
+        Ok(())
+    }
+
+    /// Mean strain along x and z. It is none in the frame that strain is counted from, and where the match has too few points.
+    fn strain(&mut self) -> Result<Option<[f64; 2]>, PipelineError> {
+        match self.session.strain() {
+            Ok(found) => Ok(found.map(|s| [(0, 0), (2, 2)].map(|at| s.strain.summary.mean[at]))),
+            Err(PipelineError::TooFewMatches { .. } | PipelineError::Surface { .. }) => Ok(None),
+            Err(error) => Err(error),
+        }
+    }
+
+    fn late_percent(&self) -> f64 {
+        100.0 * self.late as f64 / self.rows.len().max(1) as f64
+    }
+
+    fn print_heading(&self, context: &mut Context) {
+        let strain = if self.strained_above_n.is_some() {
+            "   strain xx, zz"
+        } else {
+            ""
+        };
+        context.line(format_args!(
+            "time (s)   force (N)   radius (mm)   late (%)   modulus (kPa)     {strain}"
+        ));
+    }
+
+    /// Prints a line for every frame or, of a long series, for one out of sixteen.
+    fn print_last(&self, every_one: bool, context: &mut Context) {
+        let Some(row) = self.rows.last() else {
+            return;
+        };
+        if !every_one && !(self.rows.len() - 1).is_multiple_of(16) {
+            return;
+        }
+        let unknown = || "-".to_owned();
+        let number = |pair: Option<[f64; 2]>, scale: f64| {
+            pair.map_or_else(unknown, |[value, _]| format!("{:.4}", value * scale))
+        };
+        let [force, radius] = [number(row.force_n, 1.0), number(row.radius_m, 1e3)];
+        let kpa = |[value, error]: [f64; 2]| with_error(value, error, 1e-3);
+        let modulus = row.modulus_pa.map_or_else(unknown, kpa);
+        let strain = row.strain_xx_zz.map(|[x, z]| format!("{x:+.3}, {z:+.3}"));
+        let (time, late) = (row.time_s, self.late_percent());
+        let strain = strain.unwrap_or_default();
+        let line =
+            format!("{time:8.3} {force:>11} {radius:>13} {late:10.1}   {modulus:<18}{strain}");
+        context.line(line.trim_end());
+    }
+
+    /// Prints the results of the whole series, and adds its table to the files.
+    fn finish(
+        mut self,
+        arguments: &StreamArguments,
+        context: &mut Context,
+    ) -> Result<Exit, Failure> {
+        let (frames, late, rate) = (self.rows.len(), self.late, arguments.rate);
+        let percent = self.late_percent();
+        context.line(format_args!(
+            "{frames} frames at {rate} Hz, {late} late ({percent:.1} %)"
+        ));
+        let modulus = self.session.modulus();
+        let error = |pa: f64| self.truth_pa.map(|truth| 100.0 * (pa / truth - 1.0));
+        let answer = match &modulus {
+            Ok(m) => {
+                let kpa = with_error(m.youngs_modulus_pa, m.standard_error_pa, 1e-3);
+                let beside = error(m.youngs_modulus_pa).zip(self.truth_pa);
+                let beside = beside.map_or(String::new(), |(error, truth)| {
+                    format!(", true {:.2} kPa ({error:+.2} %)", truth * 1e-3)
+                });
+                context.line(format_args!("modulus {kpa} kPa{beside}"));
+                json!({ "value": { "value": m.youngs_modulus_pa, "standard_error": m.standard_error_pa } })
+            }
+            Err(reason) => {
+                context.line(format_args!("modulus none: {reason}"));
+                json!({ "error": reason.to_string() })
+            }
+        };
+        context.line(self.session.report());
+        let caution = self.session.drift().caution.as_ref();
+        let caution = caution.map(ToString::to_string);
+        if let Some(caution) = &caution {
+            context.line(format_args!("caution: {caution}"));
+        }
+        let first = |pair: Option<[f64; 2]>| pair.map(|[value, _]| value);
+        let update = |row: &Row| {
+            json!({
+                "time_s": row.time_s, "force_n": first(row.force_n), "contact_radius_m": first(row.radius_m),
+                "youngs_modulus_pa": first(row.modulus_pa), "strain_xx_zz": row.strain_xx_zz,
+            })
+        };
+        let mut value = json!({
+            "frames": frames, "rate_hz": rate, "late": late,
+            "updates": self.rows.iter().map(update).collect::<Vec<Value>>(),
+            "youngs_modulus_pa": answer, "caution": caution,
+        });
+        if let Some(truth_pa) = self.truth_pa {
+            value["true_youngs_modulus_pa"] = json!(truth_pa);
+        }
+        context.value(&value);
+        context.outputs.add("stream.csv", table(&self.rows));
+        let mut exit = Exit::Complete;
+        let mut fail = |note: String| {
+            exit = Exit::Partial;
+            context.note(note);
+        };
+        let allowed = arguments.allowed_late;
+        if percent > allowed {
+            fail(format!(
+                "{percent:.1} % of the frames came late, more than {allowed} %"
+            ));
+        }
+        match &modulus {
+            Err(reason) => fail(format!("there is no modulus: {reason}")),
+            Ok(m) => {
+                let tolerance = arguments.simulation.tolerance;
+                let beyond = error(m.youngs_modulus_pa).filter(|e| e.abs() > tolerance);
+                if let Some(error) = beyond {
+                    fail(format!(
+                        "the modulus is off by {error:+.2} %, more than {tolerance} %"
+                    ));
+                }
+            }
+        }
+        Ok(exit)
+    }
+}
+
+/// A row a frame, with empty cells for unknown values.
+fn table(rows: &[Row]) -> Vec<u8> {
+    let mut csv = Csv::new(&[
+        "time_s",
+        "force_N",
+        "force_error_N",
+        "contact_radius_m",
+        "contact_radius_error_m",
+        "youngs_modulus_Pa",
+        "youngs_modulus_error_Pa",
+        "strain_xx",
+        "strain_zz",
+    ]);
+    for row in rows {
+        let pairs = [row.force_n, row.radius_m, row.modulus_pa, row.strain_xx_zz];
+        let cells = pairs.map(|pair| pair.map_or([None; 2], |pair| pair.map(Some)));
+        csv.cells(std::iter::once(Some(row.time_s)).chain(cells.concat()));
+    }
+    csv.into_bytes()
+}
+
+/// Measures recorded frames: those of a scene, or images and folders of images.
+fn recorded(
+    path: &Path,
+    arguments: &StreamArguments,
+    context: &mut Context,
+) -> Result<Exit, Failure> {
+    if arguments.strain && arguments.force.is_none() {
+        return Err(Failure::input(
+            "--strain of recorded frames needs --force, the largest force in newtons: strain is counted from the first frame of a third of it",
+        ));
+    }
+    let scene = Scene::read(path).map_err(Failure::input)?;
+    let frames = if arguments.frames.is_empty() {
+        scene
+            .frames
+            .iter()
+            .map(|frame| frame.image.clone())
+            .collect()
+    } else {
+        listed(&arguments.frames)?
+    };
+    context.outputs.protect(&frames)?;
+    let clock = Bar::clock("reading the scene");
+    let data = scene.load().map_err(Failure::input)?;
+    drop(clock);
+    let pipeline = scene.pipeline(&data).map_err(Failure::input)?;
+    let session = Session::new(&pipeline, &[data.reference.view()])
+        .map_err(|error| Failure::input(scene.measure_error(error)))?;
+    let mut live = Live::new(session, arguments, None);
+    live.print_heading(context);
+    let mut bar = Bar::of(frames.len(), "measuring");
+    let mut unusable = 0;
+    context.interrupt.polled(true);
+    for (k, path) in frames.iter().enumerate() {
+        if context.interrupt.requested() {
+            break;
+        }
+        let time_s = k as f64 / arguments.rate;
+        let measured = eight_bits(path, Grey::default(), scene.bits).and_then(|frame| {
+            let start = Instant::now();
+            let pushed = live.push(time_s, frame.view());
+            pushed.map_err(|error| Failure::in_file(path, error))?;
+            Ok(start.elapsed())
+        });
+        match measured {
+            Ok(took) => {
+                live.late += usize::from(took.as_secs_f64() > 1.0 / arguments.rate);
+                live.print_last(frames.len() <= 32, context);
+            }
+            Err(failure) => {
+                unusable += 1;
+                context.note(failure);
+            }
+        }
+        bar.done(k + 1);
+    }
+    drop(bar);
+    if live.rows.is_empty() && unusable > 0 {
+        return Err(Failure::input(format!(
+            "none of the {unusable} frames can be measured"
+        )));
+    }
+    let exit = live.finish(arguments, context)?;
+    Ok(if unusable > 0 { Exit::Partial } else { exit })
+}
+
+/// The images that are named, and those of the folders that are named in the order of their names.
+fn listed(paths: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
+    let mut frames = Vec::new();
+    for path in paths {
+        if !path.is_dir() {
+            frames.push(path.clone());
+            continue;
+        }
+        let name = path.display();
+        let entries = std::fs::read_dir(path).and_then(|entries| {
+            let paths = entries.map(|entry| entry.map(|e| e.path()));
+            paths.collect::<std::io::Result<Vec<PathBuf>>>()
+        });
+        let unreadable = |error| Failure::input(format!("cannot list the folder {name}: {error}"));
+        let mut images = entries.map_err(unreadable)?;
+        images.retain(|file| is_image(file));
+        if images.is_empty() {
+            return Err(Failure::input(format!(
+                "the folder {name} has no PNG, PGM or JPEG images"
+            )));
+        }
+        images.sort_by_cached_key(|image| natural(image));
+        frames.append(&mut images);
+    }
+    Ok(frames)
+}
+
+fn is_image(path: &Path) -> bool {
+    let extension = path.extension().and_then(|e| e.to_str());
+    let extension = extension.unwrap_or_default().to_ascii_lowercase();
+    ["png", "pgm", "jpg", "jpeg"].contains(&extension.as_str())
+}
+
+/// The parts of a file's name, numbers by their value: frame_2 comes before frame_10.
+fn natural(path: &Path) -> Vec<(u64, String)> {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let mut parts: Vec<(u64, String)> = vec![(0, String::new())];
+    let mut in_number = false;
+    for character in name.chars() {
+        let digit = character.to_digit(10);
+        if digit.is_some() && !in_number {
+            parts.push((0, String::new()));
+        }
+        in_number = digit.is_some();
+        let Some((number, text)) = parts.last_mut() else {
+            continue;
+        };
+        match digit {
+            Some(digit) => *number = number.saturating_mul(10).saturating_add(digit.into()),
+            None => text.push(character),
+        }
+    }
+    parts
+}
+
+/// Largest force of a simulation where none is given.
+const SIMULATED_FORCE_N: f64 = 1.5;
+
+/// Plays a simulated loading–unloading series at camera rate.
+fn simulated(arguments: &StreamArguments, context: &mut Context) -> Result<Exit, Failure> {
+    let simulation = &arguments.simulation;
+    let force_n = arguments.force.unwrap_or(SIMULATED_FORCE_N);
+    let factor = if simulation.full_size { 1 } else { 4 };
+    let options = PressOptions {
+        camera: Camera::default().coarser(factor),
+        loads: vec![PressLoad::normal(force_n)],
+        gain: Gain::PeakGrey(200.0),
+        ..PressOptions::default()
+    };
+    let pixels = options.camera.shape.iter().product::<usize>() as f64;
+    let frames = arguments.rate * simulation.period * f64::from(simulation.cycles);
+    let job = format!("a stream of {frames:.0} frames");
+    context.allow(
+        frames * pixels,
+        &job,
+        "ask for fewer cycles or a lower rate",
+    )?;
+    let trial = Trial::new(options, &CalibrationRun::default())
+        .map_err(|error| Failure::input(format!("the press cannot be simulated: {error}")))?;
+    let cycle = LoadCycle {
+        largest_force_n: force_n,
+        period_s: simulation.period,
+        cycles: simulation.cycles as usize,
+        frame_rate_hz: arguments.rate,
+        ..LoadCycle::default()
+    };
+    let frames = record(&trial, cycle, context)?;
+    let references: Vec<_> = (1..5).map(|k| trial.scene.reference(k)).collect();
+    let views: Vec<_> = references.iter().map(|r| r.view()).collect();
+    let pipeline = trial.pipeline().map_err(Failure::no_answer)?;
+    let session = Session::new(&pipeline, &views).map_err(Failure::no_answer)?;
+    let truth_pa = trial.simulation.youngs_modulus_pa;
+    let mut live = Live::new(session, arguments, Some(truth_pa));
+    play(&mut live, &frames, arguments.rate, context).map_err(Failure::no_answer)?;
+    live.finish(arguments, context)
+}
+
+/// Times in seconds and frames.
+type Recording = Vec<(f64, Array2<u8>)>;
+
+/// Makes all frames of the loading and unloading. Ctrl-C leaves those that are made.
+fn record(trial: &Trial, cycle: LoadCycle, context: &Context) -> Result<Recording, Failure> {
+    let source = trial.scene.stream(cycle);
+    let mut source = source
+        .map_err(|error| Failure::input(format!("the series cannot be simulated: {error}")))?;
+    let mut bar = Bar::of(source.len(), format!("making {} frames", source.len()));
+    let mut frames = Recording::new();
+    let mut frame = Array2::zeros((0, 0));
+    context.interrupt.polled(true);
+    while !context.interrupt.requested()
+        && let Some(time_s) = source.next_frame(&mut frame).map_err(Failure::no_answer)?
+    {
+        frames.push((time_s, frame.clone()));
+        bar.done(frames.len());
+    }
+    Ok(frames)
+}
+
+/// Gives every frame to the session when it is due.
+fn play(
+    live: &mut Live,
+    frames: &[(f64, Array2<u8>)],
+    rate_hz: f64,
+    context: &mut Context,
+) -> Result<(), PipelineError> {
+    let Some((_, first)) = frames.first() else {
+        return Ok(());
+    };
+    let period = Duration::from_secs_f64(1.0 / rate_hz);
+    // Buffers get their size before the clock starts.
+    live.session.push(first.view())?;
+    let start = Instant::now();
+    live.print_heading(context);
+    for (time_s, frame) in frames {
+        if context.interrupt.requested() {
+            break;
+        }
+        let due = Duration::from_secs_f64(*time_s);
+        std::thread::sleep(due.saturating_sub(start.elapsed()));
+        live.push(*time_s, frame.view())?;
+        live.late += usize::from(start.elapsed() > due + period);
+        live.print_last(false, context);
+    }
+    Ok(())
+}
