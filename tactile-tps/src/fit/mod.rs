@@ -334,7 +334,7 @@ struct AffineBasis {
     n: usize,
     /// Number of affine functions.
     q: usize,
-    /// Q, column by column.
+    /// Q, column by column, and columns of zeros: four in all, so that loops over them have a fixed length.
     columns: Vec<f64>,
     r: [[f64; MAX]; MAX],
 }
@@ -346,7 +346,7 @@ impl AffineBasis {
     fn factor(&mut self, n: usize, q: usize, fill: impl Fn(usize, &mut [f64])) {
         (self.n, self.q) = (n, q);
         self.columns.clear();
-        self.columns.resize(n * q, 0.0);
+        self.columns.resize(n * MAX, 0.0);
         self.r = [[0.0; MAX]; MAX];
         for k in 0..q {
             let (done, rest) = self.columns.split_at_mut(k * n);
@@ -424,7 +424,7 @@ struct System<const D: usize> {
     scales: Vec<f64>,
     span: Span<D>,
     affine: AffineBasis,
-    /// SQ without λ, column by column.
+    /// SQ without λ, column by column, and columns of zeros.
     coupling: Vec<f64>,
     /// σ.
     shift: f64,
@@ -488,10 +488,10 @@ impl<const D: usize> System<D> {
     ) -> f64 {
         self.choose(setting.centres.len(), weights, scaled);
         self.outline(setting);
-        let (n, q) = (self.active.len(), self.affine.q);
+        let n = self.active.len();
         self.matrix.resize(n);
         self.coupling.clear();
-        self.coupling.resize(n * q, 0.0);
+        self.coupling.resize(n * MAX, 0.0);
         self.places(setting.centres);
         self.scratch.resize((D + 1) * n, 1.0);
         self.scratch[D * n..][..self.scales.len()].copy_from_slice(&self.scales);
@@ -703,7 +703,13 @@ impl Triangle {
         if self.stride.is_multiple_of(64) {
             self.stride += 8;
         }
-        self.data.resize(n * self.stride, 0.0);
+        let length = n * self.stride;
+        if self.data.capacity() < length {
+            // A new allocation comes zeroed from the system, page by page as it is touched.
+            self.data = vec![0.0; length];
+        } else {
+            self.data.resize(length, 0.0);
+        }
     }
 
     /// Takes over another matrix, without its memory.
@@ -907,36 +913,42 @@ impl<K: Kernel, const D: usize> Job<f64> for Assemble<'_, K, D> {
                 let scale = L::new(scales[i]) * own_scale;
                 *value = (self.kernel.derivatives(s).value * scale).get();
             }
-            let basis = self.basis.chunks_exact(n);
-            for (basis, product) in basis.zip(self.product.chunks_exact_mut(n)) {
-                add_column::<L>(column, &basis[j..], &mut product[j..]);
-            }
+            add_column::<L>(column, j, self.basis, self.product);
         }
     }
 }
 
-/// What one column of a symmetric matrix, from the diagonal on, adds to the product y with v, on both sides of the diagonal.
+/// What column `j` of a symmetric matrix, given from the diagonal on, adds to Y = SQ on both sides of the diagonal.
 #[inline(always)]
-fn add_column<L: Lane<f64>>(column: &[f64], v: &[f64], y: &mut [f64]) {
-    let own = L::new(v[0]);
-    let (mut sums, mut diagonal) = ([0.0; 8], column[0] * v[0]);
-    let columns = column.chunks_exact(8);
-    let rest = columns.remainder().len();
-    let whole = column.len() - rest;
-    for ((a, v), y) in columns.zip(v.chunks_exact(8)).zip(y.chunks_exact_mut(8)) {
-        for l in 0..8 {
-            let a = L::new(a[l]);
-            sums[l] = a.mul_add(L::new(v[l]), L::new(sums[l])).get();
-            y[l] = own.mul_add(a, L::new(y[l])).get();
+fn add_column<L: Lane<f64>>(column: &[f64], j: usize, basis: &[f64], product: &mut [f64]) {
+    let n = basis.len() / MAX;
+    let mut sums = [[0.0; 8]; MAX];
+    let whole = column.len() / 8 * 8;
+    for at in (0..whole).step_by(8) {
+        let mut a = [0.0; 8];
+        a.copy_from_slice(&column[at..at + 8]);
+        for c in 0..MAX {
+            let own = L::new(basis[c * n + j]);
+            let first = c * n + j + at;
+            let (v, y) = (&basis[first..first + 8], &mut product[first..first + 8]);
+            for l in 0..8 {
+                let sum = L::new(sums[c][l]);
+                sums[c][l] = L::new(a[l]).mul_add(L::new(v[l]), sum).get();
+                y[l] = own.mul_add(L::new(a[l]), L::new(y[l])).get();
+            }
         }
     }
-    for i in whole..column.len() {
-        let a = L::new(column[i]);
-        diagonal -= column[i] * v[i];
-        y[i] = own.mul_add(a, L::new(y[i])).get();
+    for c in 0..MAX {
+        let (v, y) = (&basis[c * n + j..], &mut product[c * n + j..]);
+        let own = L::new(v[0]);
+        let mut tail = 0.0;
+        for i in whole..column.len() {
+            tail += column[i] * v[i];
+            y[i] = own.mul_add(L::new(column[i]), L::new(y[i])).get();
+        }
+        // Both sums have counted the diagonal.
+        y[0] += sums[c].iter().sum::<f64>() + tail - column[0] * v[0];
     }
-    // Both sums have counted the diagonal.
-    y[0] += sums.iter().sum::<f64>() - diagonal;
 }
 
 /// A ← A − QXᵀ − XQᵀ in the lower triangle. Gives the squared Frobenius norm of the whole.
@@ -955,13 +967,28 @@ impl Job<f64> for Update<'_> {
         let mut squares = 0.0;
         for j in 0..n {
             let column = self.matrix.column(j);
-            let pairs = self.basis.chunks_exact(n).zip(self.x.chunks_exact(n));
-            for (basis, x) in pairs {
-                let (basis, x) = (&basis[j..], &x[j..]);
-                let (by_basis, by_x) = (L::new(-basis[0]), L::new(-x[0]));
-                for ((a, q), x) in column.iter_mut().zip(basis).zip(x) {
-                    let sum = by_x.mul_add(L::new(*q), L::new(*a));
-                    *a = by_basis.mul_add(L::new(*x), sum).get();
+            let whole = column.len() / 8 * 8;
+            for at in (0..whole).step_by(8) {
+                // A copy of eight stays in registers.
+                let mut a = [0.0; 8];
+                a.copy_from_slice(&column[at..at + 8]);
+                for c in 0..MAX {
+                    let (first, own) = (c * n + j + at, c * n + j);
+                    let (by_q, by_x) = (L::new(-self.basis[own]), L::new(-self.x[own]));
+                    let (q, x) = (&self.basis[first..first + 8], &self.x[first..first + 8]);
+                    for l in 0..8 {
+                        let sum = by_x.mul_add(L::new(q[l]), L::new(a[l]));
+                        a[l] = by_q.mul_add(L::new(x[l]), sum).get();
+                    }
+                }
+                column[at..at + 8].copy_from_slice(&a);
+            }
+            for i in whole..column.len() {
+                for c in 0..MAX {
+                    let own = c * n + j;
+                    let (by_q, by_x) = (L::new(-self.basis[own]), L::new(-self.x[own]));
+                    let sum = by_x.mul_add(L::new(self.basis[own + i]), L::new(column[i]));
+                    column[i] = by_q.mul_add(L::new(self.x[own + i]), sum).get();
                 }
             }
             squares += 2.0 * dot(column, column) - column[0] * column[0];
