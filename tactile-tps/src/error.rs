@@ -15,7 +15,8 @@ use crate::{Scalar, Smoothing};
 /// let targets = [[0.0, 0.0], [1.0, 0.0], [0.0, 0.5]].map(Point2::from);
 /// let error = ThinPlateSpline::fit(&sources, &targets, &FitOptions::default()).unwrap_err();
 /// assert_eq!(error, TpsError::Conflict { first: 0, second: 2 });
-/// assert_eq!(error.to_string(), "source points 0 and 2 coincide but their targets differ: smooth, or drop one");
+/// assert_eq!(error.to_string(),
+///     "source points 0 and 2 coincide but their targets differ: smooth, or drop one");
 /// ```
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]

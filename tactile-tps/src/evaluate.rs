@@ -1,7 +1,9 @@
-//! The fitted spline: values, Jacobians and Hessians at one point or many, its parts and its energy.
+//! The fitted spline: values, Jacobians and Hessians at one point or many, its parts and its
+//! energy.
 //!
 //! Queries are the lanes of vectorised loops and centres the outer loop.
-//! Every query's sum runs over the centres in the same order, whether it comes alone or among thousands.
+//! Every query's sum runs over the centres in the same order, whether it comes alone or among
+//! thousands.
 //! So the bits are the same.
 
 use core::ops::{ControlFlow, Range};
@@ -17,13 +19,15 @@ use crate::{
     lanes::{Job, Lane, dispatch},
 };
 
-/// Queries in a full block: long enough for the compiler to vectorise, short enough for the first-level cache.
+/// Queries in a full block: long enough for the compiler to vectorise, short enough for the
+/// first-level cache.
 pub(crate) const BLOCK: usize = 64;
 
 /// Queries in the smaller blocks that take the remainder.
 const TAIL: usize = 8;
 
-/// The shift and the scale that bring points to unit size: x̂ = (x − centre) / scale, scale a power of two.
+/// The shift and the scale that bring points to unit size: x̂ = (x − centre) / scale, scale a power
+/// of two.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Frame<const D: usize> {
     centre: [f64; D],
@@ -40,7 +44,8 @@ impl<const D: usize> Default for Frame<D> {
 }
 
 impl<const D: usize> Frame<D> {
-    /// Centre of the bounding box, and the power of two next to half its longest side (one without `rescale`).
+    /// Centre of the bounding box, and the power of two next to half its longest side (one without
+    /// `rescale`).
     pub(crate) fn around<T: Scalar>(points: &[Point<T, D>], rescale: bool) -> Self {
         let mut low = [f64::INFINITY; D];
         let mut high = [f64::NEG_INFINITY; D];
@@ -77,7 +82,8 @@ struct AffinePart<T, const D: usize, const M: usize> {
 /// A thin-plate spline from `D`-space to `M`-space: f(x) = a₀ + A x + Σᵢ wᵢ U(|x − xᵢ|).
 ///
 /// [`Default`] is the spline that is zero everywhere.
-/// The weights satisfy Σ wᵢ = 0 and Σ wᵢ xᵢᵀ = 0 and minimise Σ weightᵢ |f(xᵢ) − yᵢ|² + λ wᵀKw (Wahba 1990).
+/// The weights satisfy Σ wᵢ = 0 and Σ wᵢ xᵢᵀ = 0 and minimise Σ weightᵢ |f(xᵢ) − yᵢ|² + λ wᵀKw
+/// (Wahba 1990).
 #[derive(Clone, Debug)]
 pub struct Spline<T: Scalar, const D: usize, const M: usize, K = R2LogR> {
     kernel: K,
@@ -110,10 +116,13 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel + Default> Default
 /// # use nalgebra::Point3;
 /// # use tactile_tps::{FitOptions, NegR, ThinPlateSpline};
 /// # fn main() -> Result<(), tactile_tps::TpsError> {
-/// let sources = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.3, 0.4, 0.2]].map(Point3::from);
+/// let sources = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.3, 0.4,
+///     0.2]].map(Point3::from);
 /// let targets = sources.map(|p| p * 2.0);
-/// let warp: ThinPlateSpline<f64, 3, NegR> = ThinPlateSpline::fit(&sources, &targets, &FitOptions::new(NegR))?;
-/// assert!((warp.jacobian(&Point3::new(0.5, 0.5, 0.5)) - nalgebra::Matrix3::identity() * 2.0).norm() < 1e-13);
+/// let warp: ThinPlateSpline<f64, 3, NegR> = ThinPlateSpline::fit(&sources, &targets,
+///     &FitOptions::new(NegR))?;
+/// assert!((warp.jacobian(&Point3::new(0.5, 0.5,
+///     0.5)) - nalgebra::Matrix3::identity() * 2.0).norm() < 1e-13);
 /// # Ok(())
 /// # }
 /// ```
@@ -139,7 +148,8 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
     /// use nalgebra::Point2;
     /// use tactile_tps::{FitOptions, ThinPlateSpline};
     /// # fn main() -> Result<(), tactile_tps::TpsError> {
-    /// let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
+    /// let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4,
+    ///     0.6]].map(Point2::from);
     /// let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
     /// let warp = ThinPlateSpline::fit(&sources, &targets, &FitOptions::default())?;
     /// assert!((warp.apply(&sources[4]) - targets[4]).norm() < 1e-14);
@@ -148,7 +158,8 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
     /// ```
     ///
     /// # Errors
-    /// [`TpsError`] for invalid input, coinciding points with different targets, or a kernel that is not definite.
+    /// [`TpsError`] for invalid input, coinciding points with different targets, or a kernel that
+    /// is not definite.
     pub fn fit(
         sources: &[Point<T, D>],
         targets: &[Point<T, M>],
@@ -157,9 +168,11 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
         Factorization::new(sources, options)?.fit(targets)
     }
 
-    /// As [`fit`](Self::fit), reporting the progress of an iterative solver to `watch`, which may stop it.
+    /// As [`fit`](Self::fit), reporting the progress of an iterative solver to `watch`, which may
+    /// stop it.
     ///
-    /// A direct solver does not report. Stopped while it iterates, the fit returns the best spline so far.
+    /// A direct solver does not report. Stopped while it iterates, the fit returns the best spline
+    /// so far.
     /// Its report has the residual.
     ///
     /// ```
@@ -168,23 +181,27 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
     /// use tactile_tps::{FitOptions, Solver, ThinPlateSpline, TpsError};
     /// # fn main() -> Result<(), tactile_tps::TpsError> {
     /// let sources: Vec<Point2<f64>> =
-    ///     (0..900).map(|i| Point2::new(f64::from(i % 30), f64::from(i / 30) + 0.3 * f64::from(i % 7))).collect();
+    ///     (0..900).map(|i| Point2::new(f64::from(i % 30), f64::from(i / 30)
+    ///         + 0.3 * f64::from(i % 7))).collect();
     /// let targets: Vec<_> = sources.iter().map(|p| Point2::new(p.x.sin(), p.y.cos())).collect();
     /// let options = FitOptions::default().with_solver(Solver::Iterative);
-    /// let spline = ThinPlateSpline::fit_watched(&sources, &targets, &options, |progress| match progress.residual {
+    /// let spline = ThinPlateSpline::fit_watched(&sources, &targets, &options,
+    ///     |progress| match progress.residual {
     ///     // Good enough for a first look.
     ///     Some(residual) if residual < 1e-3 => ControlFlow::Break(()),
     ///     _ => ControlFlow::Continue(()),
     /// })?;
     /// assert!(!spline.report.converged() && spline.report.residual < Some(1e-2));
-    /// let stopped = ThinPlateSpline::fit_watched(&sources, &targets, &options, |_| ControlFlow::Break(()));
+    /// let stopped = ThinPlateSpline::fit_watched(&sources, &targets, &options,
+    ///     |_| ControlFlow::Break(()));
     /// assert_eq!(stopped.err(), Some(TpsError::Stopped));
     /// # Ok(())
     /// # }
     /// ```
     ///
     /// # Errors
-    /// Those of [`fit`](Self::fit), and [`TpsError::Stopped`] if `watch` returns `Break` before there is a spline.
+    /// Those of [`fit`](Self::fit), and [`TpsError::Stopped`] if `watch` returns `Break` before
+    /// there is a spline.
     pub fn fit_watched(
         sources: &[Point<T, D>],
         targets: &[Point<T, M>],
@@ -241,7 +258,8 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
 
     /// Rounding error to expect of the sum at squared distance `s` from the frame's centre.
     fn rounding(&self, s: f64) -> f64 {
-        // The farthest centre lies a unit or so beyond. Nearer than two units the terms do not shrink.
+        // The farthest centre lies a unit or so beyond. Nearer than two units the terms do not
+        // shrink.
         let distance = f64::max(s.sqrt() + 1.0, 2.0);
         let term = self.kernel.derivatives(distance * distance).value;
         T::UNIT_ROUNDOFF * self.weight * term.abs()
@@ -249,7 +267,8 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
 
     /// Decimal digits that the sum of the spline's terms keeps at a point.
     ///
-    /// That is −log₁₀ of the rounding error to expect, relative to the value or the targets, whichever is larger.
+    /// That is −log₁₀ of the rounding error to expect, relative to the value or the targets,
+    /// whichever is larger.
     /// Far from the points the number falls: the terms grow faster than the sum.
     /// Values with few digits are better replaced by those of the [affine part](Self::affine).
     ///
@@ -257,7 +276,8 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
     /// # use nalgebra::Point2;
     /// # use tactile_tps::{FitOptions, ThinPlateSpline};
     /// # fn main() -> Result<(), tactile_tps::TpsError> {
-    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
+    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4,
+    /// #     0.6]].map(Point2::from);
     /// # let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
     /// let warp = ThinPlateSpline::fit(&sources, &targets, &FitOptions::default())?;
     /// let near = warp.digits(&Point2::new(0.5, 0.5));
@@ -277,13 +297,15 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
 
     /// wᵀKw, summed over the outputs, in the kernel's own units; O(n²).
     ///
-    /// In the plane with r² ln r, and in space with −r, the integral ∫ |∂²f|² of all second derivatives is 8π times this.
+    /// In the plane with r² ln r, and in space with −r, the integral ∫ |∂²f|² of all second
+    /// derivatives is 8π times this.
     ///
     /// ```
     /// # use nalgebra::Point2;
     /// # use tactile_tps::{FitOptions, ThinPlateSpline};
     /// # fn main() -> Result<(), tactile_tps::TpsError> {
-    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
+    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4,
+    /// #     0.6]].map(Point2::from);
     /// # let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
     /// let warp = ThinPlateSpline::fit(&sources, &targets, &FitOptions::default())?;
     /// let straight = ThinPlateSpline::fit(&sources, &sources, &FitOptions::default())?;
@@ -312,19 +334,22 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
         self.centres.len() / D
     }
 
-    /// The terms of the kernel sum, each with its centre xᵢ and its weight wᵢ in the kernel's units: the distinct source points, in
-    /// their order.
+    /// The terms of the kernel sum, each with its centre xᵢ and its weight wᵢ in the kernel's
+    /// units: the distinct source points, in their order.
     ///
     /// ```
     /// # use nalgebra::Point2;
     /// # use tactile_tps::{FitOptions, ThinPlateSpline};
     /// # fn main() -> Result<(), tactile_tps::TpsError> {
-    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
+    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4,
+    /// #     0.6]].map(Point2::from);
     /// # let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
     /// let warp = ThinPlateSpline::fit(&sources, &targets, &FitOptions::default())?;
-    /// assert!(warp.terms().zip(&sources).all(|((centre, _), source)| (centre - source).norm() < 1e-15));
+    /// assert!(warp.terms().zip(&sources).all(|((centre, _),
+    ///     source)| (centre - source).norm() < 1e-15));
     /// let sum: nalgebra::Vector2<f64> = warp.terms().map(|(_, w)| w).sum();
-    /// let moment: nalgebra::Matrix2<f64> = warp.terms().map(|(x, w)| w * x.coords.transpose()).sum();
+    /// let moment: nalgebra::Matrix2<f64> = warp.terms().map(|(x,
+    ///     w)| w * x.coords.transpose()).sum();
     /// assert!(warp.terms().len() == 5 && sum.norm() < 1e-15 && moment.norm() < 1e-15);
     /// # Ok(())
     /// # }
@@ -343,20 +368,24 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
 
     /// The affine part x ↦ A x + a₀ beside the kernel sum, in the points' units.
     ///
-    /// Kernels are scaled to unit size inside. A kernel like r² ln r changes by a multiple of r² by that.
+    /// Kernels are scaled to unit size inside. A kernel like r² ln r changes by a multiple of r² by
+    /// that.
     /// Its sum is affine by the side conditions and is accounted for here.
     ///
     /// ```
     /// # use nalgebra::Point2;
     /// # use tactile_tps::{FitOptions, Kernel, R2LogR, ThinPlateSpline};
     /// # fn main() -> Result<(), tactile_tps::TpsError> {
-    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
+    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4,
+    /// #     0.6]].map(Point2::from);
     /// # let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
     /// let warp = ThinPlateSpline::fit(&sources, &targets, &FitOptions::default())?;
     /// let (linear, offset) = warp.affine();
     /// let x = Point2::new(0.7, 0.2);
-    /// let term = |(c, w): (Point2<f64>, nalgebra::Vector2<f64>)| w * R2LogR.derivatives((x - c).norm_squared()).value;
-    /// let by_hand = linear * x.coords + offset + warp.terms().map(term).sum::<nalgebra::Vector2<f64>>();
+    /// let term = |(c, w): (Point2<f64>,
+    ///     nalgebra::Vector2<f64>)| w * R2LogR.derivatives((x - c).norm_squared()).value;
+    /// let by_hand = linear * x.coords + offset
+    ///     + warp.terms().map(term).sum::<nalgebra::Vector2<f64>>();
     /// assert!((warp.apply(&x).coords - by_hand).norm() < 1e-14);
     /// # Ok(())
     /// # }
@@ -404,7 +433,8 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
     /// # use nalgebra::Point2;
     /// # use tactile_tps::{FitOptions, ThinPlateSpline};
     /// # fn main() -> Result<(), tactile_tps::TpsError> {
-    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
+    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4,
+    /// #     0.6]].map(Point2::from);
     /// # let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
     /// let warp = ThinPlateSpline::fit(&sources, &targets, &FitOptions::default())?;
     /// assert!((warp.apply(&sources[4]) - targets[4]).norm() < 1e-14);
@@ -419,13 +449,15 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
         value[0]
     }
 
-    /// The Jacobian ∂fᵢ/∂xⱼ (row i, column j). At a centre of −r, which has a cusp there, its own term is left out.
+    /// The Jacobian ∂fᵢ/∂xⱼ (row i, column j). At a centre of −r, which has a cusp there, its own
+    /// term is left out.
     ///
     /// ```
     /// # use nalgebra::Point2;
     /// # use tactile_tps::{FitOptions, ThinPlateSpline};
     /// # fn main() -> Result<(), tactile_tps::TpsError> {
-    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
+    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4,
+    /// #     0.6]].map(Point2::from);
     /// # let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
     /// let warp = ThinPlateSpline::fit(&sources, &targets, &FitOptions::default())?;
     /// let (x, h) = (Point2::new(0.5, 0.5), nalgebra::Vector2::new(1e-5, 0.0));
@@ -448,7 +480,8 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
     /// # use nalgebra::Point2;
     /// # use tactile_tps::{FitOptions, ThinPlateSpline};
     /// # fn main() -> Result<(), tactile_tps::TpsError> {
-    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
+    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4,
+    /// #     0.6]].map(Point2::from);
     /// # let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
     /// let warp = ThinPlateSpline::fit(&sources, &targets, &FitOptions::default())?;
     /// let (x, h) = (Point2::<f64>::new(0.5, 0.5), nalgebra::Vector2::new(0.0, 1e-5));
@@ -472,7 +505,8 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
     /// # use nalgebra::Point2;
     /// # use tactile_tps::{FitOptions, ThinPlateSpline};
     /// # fn main() -> Result<(), tactile_tps::TpsError> {
-    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
+    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4,
+    /// #     0.6]].map(Point2::from);
     /// # let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
     /// let warp = ThinPlateSpline::fit(&sources, &targets, &FitOptions::default())?;
     /// let queries = [Point2::new(0.5, 0.5), Point2::new(0.1, 0.9)];
@@ -501,7 +535,8 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
     /// # use nalgebra::Point2;
     /// # use tactile_tps::{FitOptions, ThinPlateSpline};
     /// # fn main() -> Result<(), tactile_tps::TpsError> {
-    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
+    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4,
+    /// #     0.6]].map(Point2::from);
     /// # let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
     /// let warp = ThinPlateSpline::fit(&sources, &targets, &FitOptions::default())?;
     /// let mut jacobians = [nalgebra::Matrix2::zeros(); 5];
@@ -529,14 +564,16 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
     /// # use nalgebra::Point2;
     /// # use tactile_tps::{FitOptions, ThinPlateSpline};
     /// # fn main() -> Result<(), tactile_tps::TpsError> {
-    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
+    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4,
+    /// #     0.6]].map(Point2::from);
     /// # let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
     /// let warp = ThinPlateSpline::fit(&sources, &targets, &FitOptions::default())?;
     /// let queries = [Point2::new(0.5, 0.5), Point2::new(0.1, 0.9)];
     /// let (mut values, mut jacobians) = ([Point2::origin(); 2], [nalgebra::Matrix2::zeros(); 2]);
     /// warp.apply_and_jacobian_into(&queries, &mut values, &mut jacobians)?;
     /// // Where the warp keeps orientation and does not fold, the determinant is positive.
-    /// assert!(jacobians.iter().all(|j| j.determinant() > 0.5) && (values[0] - queries[0]).norm() < 0.1);
+    /// assert!(jacobians.iter().all(|j| j.determinant() > 0.5)
+    ///     && (values[0] - queries[0]).norm() < 0.1);
     /// # Ok(())
     /// # }
     /// ```
@@ -591,7 +628,8 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
     /// # use nalgebra::Point2;
     /// # use tactile_tps::{FitOptions, ThinPlateSpline};
     /// # fn main() -> Result<(), tactile_tps::TpsError> {
-    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
+    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4,
+    /// #     0.6]].map(Point2::from);
     /// # let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
     /// let warp = ThinPlateSpline::fit(&sources, &targets, &FitOptions::default())?;
     /// let queries: Vec<_> = (0..1000).map(|i| Point2::new(f64::from(i) / 1000.0, 0.5)).collect();
@@ -616,13 +654,15 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
         chunks.try_for_each(|(points, values)| self.apply_into(points, values))
     }
 
-    /// As [`apply_and_jacobian_into`](Self::apply_and_jacobian_into), over the threads of the current rayon pool.
+    /// As [`apply_and_jacobian_into`](Self::apply_and_jacobian_into), over the threads of the
+    /// current rayon pool.
     ///
     /// ```
     /// # use nalgebra::Point2;
     /// # use tactile_tps::{FitOptions, ThinPlateSpline};
     /// # fn main() -> Result<(), tactile_tps::TpsError> {
-    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
+    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4,
+    /// #     0.6]].map(Point2::from);
     /// # let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
     /// let warp = ThinPlateSpline::fit(&sources, &targets, &FitOptions::default())?;
     /// let queries: Vec<_> = (0..1000).map(|i| Point2::new(f64::from(i) / 1000.0, 0.5)).collect();
@@ -801,7 +841,8 @@ impl<T: Scalar, const D: usize, const M: usize, const W: usize> Lanes<T, D, M, W
         }
     }
 
-    /// Adds a term's value, gradient 2U'd and, at second order, Hessian 2U' I + 4U'' d dᵀ (derivatives by s = |d|²).
+    /// Adds a term's value, gradient 2U'd and, at second order, Hessian 2U' I + 4U'' d dᵀ
+    /// (derivatives by s = |d|²).
     #[inline(always)]
     fn add_derivatives<L: Lane<T>, const ORDER: usize>(
         &mut self,
@@ -881,7 +922,8 @@ impl<T: Scalar, K: Kernel, const D: usize, const M: usize> KernelSum<'_, T, K, D
 }
 
 impl<K: Kernel, const D: usize, const M: usize> KernelSum<'_, f64, K, D, M> {
-    /// Subtracts the sum at the places of a range, which begins at a multiple of [`BLOCK`], from `residuals`.
+    /// Subtracts the sum at the places of a range, which begins at a multiple of [`BLOCK`], from
+    /// `residuals`.
     ///
     /// `residuals` holds those of all places, output by output.
     pub(crate) fn subtract(self, places: [&[f64]; D], range: Range<usize>, residuals: &mut [f64]) {

@@ -7,7 +7,8 @@ use core::ops::{Add, Div, Mul, Neg, Sub};
 /// Kernels are written once against this trait and run in every arithmetic the crate needs:
 /// `f32`, `f64` and their forms with fused multiplication and addition.
 ///
-/// Comparison is allowed. Keep both branches free of side effects and the compiler turns them into a select.
+/// Comparison is allowed. Keep both branches free of side effects and the compiler turns them into
+/// a select.
 ///
 /// ```
 /// # use tactile_tps::KernelScalar;
@@ -15,7 +16,8 @@ use core::ops::{Add, Div, Mul, Neg, Sub};
 /// fn softplus<R: KernelScalar>(x: R) -> R {
 ///     (R::from_f64(1.0) + x.exp()).ln()
 /// }
-/// assert!((softplus(0.0f64) - 2f64.ln()).abs() < 1e-15 && (softplus(0.0f32) - 2f32.ln()).abs() < 1e-6);
+/// assert!((softplus(0.0f64) - 2f64.ln()).abs() < 1e-15
+///     && (softplus(0.0f32) - 2f32.ln()).abs() < 1e-6);
 /// ```
 pub trait KernelScalar:
     Copy
@@ -50,7 +52,8 @@ pub trait KernelScalar:
 
 /// A kernel's value and derivatives with respect to the **squared** distance s = r².
 ///
-/// With d = x − xᵢ the term U(|d|) has the gradient `2 first d` and the Hessian `2 first I + 4 second d dᵀ`.
+/// With d = x − xᵢ the term U(|d|) has the gradient `2 first d` and the Hessian `2 first I + 4
+/// second d dᵀ`.
 ///
 /// ```
 /// # use tactile_tps::{KernelDerivatives, Kernel, R3};
@@ -69,8 +72,9 @@ pub struct KernelDerivatives<R> {
 
 /// A radial function U(r) that is conditionally positive definite of order at most two.
 ///
-/// That is: Σᵢⱼ wᵢ wⱼ U(|xᵢ − xⱼ|) > 0 for distinct points and any w ≠ 0 with Σ wᵢ = 0 and Σ wᵢ xᵢ = 0. The three
-/// kernels of the crate satisfy this. An implementor writes [`derivatives`](Self::derivatives) alone.
+/// That is: Σᵢⱼ wᵢ wⱼ U(|xᵢ − xⱼ|) > 0 for distinct points and any w ≠ 0 with Σ wᵢ = 0 and Σ wᵢ xᵢ
+/// = 0. The three kernels of the crate satisfy this. An implementor writes
+/// [`derivatives`](Self::derivatives) alone.
 ///
 /// ```
 /// use tactile_tps::{KernelDerivatives, Kernel, KernelScalar};
@@ -83,26 +87,31 @@ pub struct KernelDerivatives<R> {
 ///     fn derivatives<R: KernelScalar>(&self, s: R) -> KernelDerivatives<R> {
 ///         let root = (s + R::from_f64(self.0 * self.0)).sqrt();
 ///         let first = R::from_f64(-0.5) / root;
-///         KernelDerivatives { value: -root, first, second: -first * R::from_f64(0.5) / (root * root) }
+///         KernelDerivatives { value: -root, first,
+///             second: -first * R::from_f64(0.5) / (root * root) }
 ///     }
 /// }
 /// ```
 pub trait Kernel: Clone + Send + Sync {
     /// U and its derivatives with respect to s = r² ≥ 0.
     ///
-    /// At s = 0 give the limit of U. A derivative without a limit is given as 0, which leaves the point's own term out.
+    /// At s = 0 give the limit of U. A derivative without a limit is given as 0, which leaves the
+    /// point's own term out.
     fn derivatives<R: KernelScalar>(&self, s: R) -> KernelDerivatives<R>;
 
-    /// The degree k if U(c r) = cᵏ U(r), up to a multiple of r², for every c > 0. `None` if there is none.
+    /// The degree k if U(c r) = cᵏ U(r), up to a multiple of r², for every c > 0. `None` if there
+    /// is none.
     ///
-    /// Points are scaled to unit size inside when there is one. A kernel with a length scale has none.
+    /// Points are scaled to unit size inside when there is one. A kernel with a length scale has
+    /// none.
     ///
     /// ```
     /// use tactile_tps::{Kernel, NegR, R2LogR};
     /// assert_eq!((NegR.degree(), R2LogR.degree()), (Some(1), Some(2)));
     /// // r² ln r at 3 r is 9 r² ln r, up to 9 ln 3 r².
     /// let (s, excess) = (2.0_f64, 9.0 * 3_f64.ln() * 2.0);
-    /// assert!((R2LogR.derivatives(9.0 * s).value - 9.0 * R2LogR.derivatives(s).value - excess).abs() < 1e-12);
+    /// let value = |s: f64| R2LogR.derivatives(s).value;
+    /// assert!((value(9.0 * s) - 9.0 * value(s) - excess).abs() < 1e-12);
     /// ```
     fn degree(&self) -> Option<i32> {
         None
@@ -111,7 +120,8 @@ pub trait Kernel: Clone + Send + Sync {
 
 /// U(r) = r² ln r with U(0) = 0: the thin plate of the plane (m = 2, D = 2).
 ///
-/// Bookstein's r² ln r² is twice this: with it the weights halve, and λ must be doubled for the same spline.
+/// Bookstein's r² ln r² is twice this: with it the weights halve, and λ must be doubled for the
+/// same spline.
 ///
 /// ```
 /// # use tactile_tps::{Kernel, R2LogR};
@@ -123,7 +133,8 @@ pub trait Kernel: Clone + Send + Sync {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct R2LogR;
 
-/// U(r) = −r: the same energy in space (m = 2, D = 3). Its gradient has a cusp at each source point.
+/// U(r) = −r: the same energy in space (m = 2, D = 3). Its gradient has a cusp at each source
+/// point.
 ///
 /// ```
 /// # use tactile_tps::{Kernel, NegR};

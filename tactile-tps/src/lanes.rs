@@ -1,7 +1,8 @@
 //! Arithmetic of vectorised loops, and their dispatch to the instruction set of the processor.
 //!
-//! The loops are plain Rust over slices of one scalar. Inlined into a function with wider vectors enabled,
-//! the compiler vectorises them. Sums are written out (fused or not), so that the result depends on that choice alone.
+//! The loops are plain Rust over slices of one scalar. Inlined into a function with wider vectors
+//! enabled, the compiler vectorises them. Sums are written out (fused or not), so that the result
+//! depends on that choice alone.
 
 use core::ops::{Add, Div, Mul, Neg, Sub};
 
@@ -19,7 +20,8 @@ pub trait Lane<T>: KernelScalar {
 
 /// The scalar type of points: `f32` or `f64`.
 ///
-/// Fits are always computed in `f64`. The type decides in which precision the spline is kept and evaluated.
+/// Fits are always computed in `f64`. The type decides in which precision the spline is kept and
+/// evaluated.
 ///
 /// ```
 /// # use tactile_tps::Scalar;
@@ -199,9 +201,11 @@ pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     sums.iter().sum::<f64>() + tail
 }
 
-/// ln x for positive normal `x`, without branches or tables, so that loops vectorise. Elsewhere finite nonsense.
+/// ln x for positive normal `x`, without branches or tables, so that loops vectorise. Elsewhere
+/// finite nonsense.
 ///
-/// x = 2ᵏ m with m in [√½, √2), f = m − 1, t = f/(2 + f) and ln m = 2 artanh t = f − f²/2 + t (f²/2 + R(t²)).
+/// x = 2ᵏ m with m in [√½, √2), f = m − 1, t = f/(2 + f) and ln m = 2 artanh t = f − f²/2 + t (f²/2
+/// + R(t²)).
 /// R is a minimax polynomial (coefficients of fdlibm, Sun Microsystems 1993).
 /// Its error is below 2⁻⁵⁸, in f32 below 2⁻³⁴.
 #[inline(always)]
@@ -273,8 +277,8 @@ mod tests {
         (found - expected).abs() / (expected.abs().max(f64::MIN_POSITIVE) * epsilon)
     }
 
-    /// fdlibm states less than one unit in the last place; the library's own logarithm may be half a unit off, and
-    /// an ulp is up to twice epsilon relative.
+    /// fdlibm states less than one unit in the last place; the library's own logarithm may be half
+    /// a unit off, and an ulp is up to twice epsilon relative.
     #[test]
     fn logarithms_agree_with_the_library_to_an_ulp() {
         for x in arguments().filter(|&x| x != 1.0) {

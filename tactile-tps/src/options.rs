@@ -12,9 +12,11 @@ use crate::{
 /// # use tactile_tps::{FitOptions, Solver, ThinPlateSpline};
 /// # fn main() -> Result<(), tactile_tps::TpsError> {
 /// let sources: Vec<Point2<f64>> =
-///     (0..900).map(|i| Point2::new(f64::from(i % 30), f64::from(i / 30) + 0.3 * f64::from(i % 7))).collect();
+///     (0..900).map(|i| Point2::new(f64::from(i % 30), f64::from(i / 30)
+///         + 0.3 * f64::from(i % 7))).collect();
 /// let targets: Vec<_> = sources.iter().map(|p| Point2::new(p.x.sin(), p.y.cos())).collect();
-/// let fit = |solver| ThinPlateSpline::fit(&sources, &targets, &FitOptions::default().with_solver(solver));
+/// let fit = |solver| ThinPlateSpline::fit(&sources, &targets,
+///     &FitOptions::default().with_solver(solver));
 /// let (direct, iterative) = (fit(Solver::Direct)?, fit(Solver::Iterative)?);
 /// let query = Point2::new(7.3, 11.9);
 /// assert!((direct.apply(&query) - iterative.apply(&query)).norm() < 1e-8);
@@ -31,7 +33,8 @@ pub enum Solver {
     Automatic,
     /// A dense factor: n³/3 operations and 8n² bytes, to rounding.
     Direct,
-    /// Preconditioned conjugate gradients: n² kernels a step, O(n) memory, to the [tolerance](FitOptions::with_tolerance).
+    /// Preconditioned conjugate gradients: n² kernels a step, O(n) memory, to the
+    /// [tolerance](FitOptions::with_tolerance).
     Iterative,
 }
 
@@ -39,7 +42,9 @@ pub enum Solver {
 ///
 /// ```
 /// use tactile_tps::{FitOptions, NegR, Smoothing};
-/// let options = FitOptions::new(NegR).with_smoothing(Smoothing::Lambda(1e-3))?.with_weights(vec![1.0, 1.0, 0.2, 1.0])?;
+/// let options = FitOptions::new(NegR)
+///     .with_smoothing(Smoothing::Lambda(1e-3))?
+///     .with_weights(vec![1.0, 1.0, 0.2, 1.0])?;
 /// assert!(options.with_smoothing(Smoothing::Lambda(f64::NAN)).is_err());
 /// # Ok::<(), tactile_tps::TpsError>(())
 /// ```
@@ -121,7 +126,8 @@ impl<T: Scalar, K> FitOptions<T, K> {
     /// # use nalgebra::Point2;
     /// # use tactile_tps::{FitOptions, Smoothing, ThinPlateSpline};
     /// # fn main() -> Result<(), tactile_tps::TpsError> {
-    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
+    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4,
+    /// #     0.6]].map(Point2::from);
     /// # let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
     /// let options = FitOptions::default().with_smoothing(Smoothing::Lambda(0.5))?;
     /// let warp = ThinPlateSpline::fit(&sources, &targets, &options)?;
@@ -140,23 +146,26 @@ impl<T: Scalar, K> FitOptions<T, K> {
 
     /// Gives every point a weight of at least zero. Zero leaves the point out.
     ///
-    /// Weights act against λ: an interpolating spline passes through every point of positive weight.
+    /// Weights act against λ: an interpolating spline passes through every point of positive
+    /// weight.
     ///
     /// ```
     /// # use nalgebra::Point2;
     /// # use tactile_tps::{FitOptions, ThinPlateSpline};
     /// # fn main() -> Result<(), tactile_tps::TpsError> {
-    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
+    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4,
+    /// #     0.6]].map(Point2::from);
     /// # let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
-    /// let warp = ThinPlateSpline::fit(&sources, &targets, &FitOptions::default().with_weights(vec![1.0, 1.0, 1.0, 1.0, 0.0])?)?;
+    /// let warp = ThinPlateSpline::fit(&sources, &targets,
+    ///     &FitOptions::default().with_weights(vec![1.0, 1.0, 1.0, 1.0, 0.0])?)?;
     /// assert_eq!(warp.report.ignored, 1);
     /// # Ok(())
     /// # }
     /// ```
     ///
     /// # Errors
-    /// [`TpsError::Weight`] for a weight that is negative, NaN or infinite, [`TpsError::Empty`] if none is positive. Whether
-    /// there are as many weights as points is checked by the fit.
+    /// [`TpsError::Weight`] for a weight that is negative, NaN or infinite, [`TpsError::Empty`] if
+    /// none is positive. Whether there are as many weights as points is checked by the fit.
     pub fn with_weights(mut self, weights: Vec<T>) -> Result<Self, TpsError> {
         validate_weights(&weights, weights.len())?;
         self.weights = Some(weights);
@@ -186,14 +195,15 @@ impl<T: Scalar, K> FitOptions<T, K> {
 
     /// Drops directions in which the points extend less than this fraction of their largest extent.
     ///
-    /// The default 0 drops those that rounding of the coordinates alone could have made. A nearly flat surface needs
-    /// more: across it the spline's gradient is noise divided by thickness.
+    /// The default 0 drops those that rounding of the coordinates alone could have made. A nearly
+    /// flat surface needs more: across it the spline's gradient is noise divided by thickness.
     ///
     /// ```
     /// # use nalgebra::Point3;
     /// # use tactile_tps::{FitOptions, NegR, ThinPlateSpline};
     /// # fn main() -> Result<(), tactile_tps::TpsError> {
-    /// let sources = [[0.0, 0.0, 0.0], [1.0, 0.0, 1e-5], [0.0, 1.0, 0.0], [1.0, 1.0, 0.0], [0.4, 0.6, 1e-5]].map(Point3::from);
+    /// let sources = [[0.0, 0.0, 0.0], [1.0, 0.0, 1e-5], [0.0, 1.0, 0.0], [1.0, 1.0, 0.0], [0.4,
+    ///     0.6, 1e-5]].map(Point3::from);
     /// let rank = |tolerance| {
     ///     let options = FitOptions::new(NegR).with_rank_tolerance(tolerance)?;
     ///     ThinPlateSpline::fit(&sources, &sources, &options).map(|spline| spline.report.rank)
@@ -227,16 +237,19 @@ impl<T: Scalar, K> FitOptions<T, K> {
         self
     }
 
-    /// Sets the residual at which an iterative solver stops: the largest at a point, relative to the largest target.
+    /// Sets the residual at which an iterative solver stops: the largest at a point, relative to
+    /// the largest target.
     ///
-    /// The default is 10⁻¹⁰. The spline's values are off by about as much. Its report has the residual that was reached.
+    /// The default is 10⁻¹⁰. The spline's values are off by about as much. Its report has the
+    /// residual that was reached.
     ///
     /// ```
     /// # use nalgebra::Point2;
     /// # use tactile_tps::{FitOptions, Solver, ThinPlateSpline};
     /// # fn main() -> Result<(), tactile_tps::TpsError> {
     /// let sources: Vec<Point2<f64>> =
-    ///     (0..900).map(|i| Point2::new(f64::from(i % 30), f64::from(i / 30) + 0.3 * f64::from(i % 7))).collect();
+    ///     (0..900).map(|i| Point2::new(f64::from(i % 30), f64::from(i / 30)
+    ///         + 0.3 * f64::from(i % 7))).collect();
     /// let targets: Vec<_> = sources.iter().map(|p| Point2::new(p.x.sin(), p.y.cos())).collect();
     /// let options = FitOptions::default().with_solver(Solver::Iterative).with_tolerance(1e-4)?;
     /// let warp = ThinPlateSpline::fit(&sources, &targets, &options)?;
@@ -293,22 +306,29 @@ pub struct FitReport {
     pub merged: usize,
     /// Points left out because their weight is zero.
     pub ignored: usize,
-    /// Rank of [1 X]: one more than the number of directions the points span; D + 1 when they span space.
+    /// Rank of [1 X]: one more than the number of directions the points span; D + 1 when they span
+    /// space.
     pub rank: usize,
-    /// Root mean square extent of the points along their principal directions relative to the largest, falling.
+    /// Root mean square extent of the points along their principal directions relative to the
+    /// largest, falling.
     ///
     /// With a tiny last entry the gradient along that direction is noise over thickness.
     pub extents: Vec<f64>,
-    /// The smoothing parameter λ used, in the units of the points and the kernel. 0 for interpolation.
+    /// The smoothing parameter λ used, in the units of the points and the kernel. 0 for
+    /// interpolation.
     pub lambda: f64,
-    /// Estimated 2-norm condition number of the matrix solved with, in the inner units. 1 for the iterative solver.
+    /// Estimated 2-norm condition number of the matrix solved with, in the inner units. 1 for the
+    /// iterative solver.
     ///
-    /// Beyond 10¹⁰ some points nearly coincide. Values keep their digits there, single weights do not.
-    /// Infinite where rounding left the matrix indefinite and λ was raised to the size of that rounding.
+    /// Beyond 10¹⁰ some points nearly coincide. Values keep their digits there, single weights do
+    /// not.
+    /// Infinite where rounding left the matrix indefinite and λ was raised to the size of that
+    /// rounding.
     pub condition: f64,
     /// Largest residual of the spline's equations relative to the largest target.
     ///
-    /// It is measured at up to 64 points spread evenly. Where the solution was refined, at all before the last step.
+    /// It is measured at up to 64 points spread evenly. Where the solution was refined, at all
+    /// before the last step.
     /// `None` after a quick refit, which does not spend the time.
     pub residual: Option<f64>,
     /// Steps of iterative refinement taken.

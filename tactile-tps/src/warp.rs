@@ -14,14 +14,16 @@ use crate::{
 /// ```
 /// use nalgebra::{Point2, Matrix2, Vector2};
 /// use tactile_tps::{Affine, Warp};
-/// let warp: Box<dyn Warp<f64, 2>> = Box::new(Affine { linear: Matrix2::identity() * 2.0, offset: Vector2::new(1.0, 0.0) });
+/// let warp: Box<dyn Warp<f64, 2>> = Box::new(Affine { linear: Matrix2::identity() * 2.0,
+///     offset: Vector2::new(1.0, 0.0) });
 /// assert_eq!(warp.apply(&Point2::new(1.0, 3.0)), Point2::new(3.0, 6.0));
 /// ```
 pub trait Warp<T: Scalar, const D: usize> {
     /// The image of a point.
     fn apply(&self, point: &Point<T, D>) -> Point<T, D>;
 
-    /// The Jacobian ∂fᵢ/∂xⱼ at a point (row i, column j); for a deformation this is the deformation gradient.
+    /// The Jacobian ∂fᵢ/∂xⱼ at a point (row i, column j); for a deformation this is the deformation
+    /// gradient.
     fn jacobian(&self, point: &Point<T, D>) -> SMatrix<T, D, D>;
 
     /// The images of many points, into the caller's memory.
@@ -52,7 +54,8 @@ pub trait Warp<T: Scalar, const D: usize> {
     /// shear.apply_into(&points, &mut images)?;
     /// shear.jacobian_into(&points, &mut jacobians)?;
     /// assert_eq!(images[1], Point2::new(1.4, 2.0));
-    /// assert_eq!((jacobians[1], shear.jacobian(&points[1]).determinant()), (jacobians[0], 1.0)); // shear keeps areas
+    /// assert_eq!((jacobians[1], shear.jacobian(&points[1]).determinant()), (jacobians[0], 1.0));
+    /// // shear keeps areas
     /// assert!(shear.apply_into(&points, &mut images[..2]).is_err());
     /// # Ok::<(), tactile_tps::TpsError>(())
     /// ```
@@ -86,7 +89,8 @@ pub trait Warp<T: Scalar, const D: usize> {
 /// # fn main() -> Result<(), tactile_tps::TpsError> {
 /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
 /// # let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
-/// let models: [Arc<dyn WarpModel<f64, 2> + Send + Sync>; 2] = [Arc::new(FitOptions::default()), Arc::new(AffineModel::General)];
+/// let models: [Arc<dyn WarpModel<f64, 2> + Send + Sync>; 2] = [Arc::new(FitOptions::default()),
+///     Arc::new(AffineModel::General)];
 /// let mut misfits = Vec::new();
 /// for model in models {
 ///     let warp = model.fit(&sources, &targets, None)?;
@@ -97,7 +101,8 @@ pub trait Warp<T: Scalar, const D: usize> {
 /// # }
 /// ```
 pub trait WarpModel<T: Scalar, const D: usize> {
-    /// The warp that takes each source to its target as nearly as the model allows. Without weights all count alike.
+    /// The warp that takes each source to its target as nearly as the model allows. Without weights
+    /// all count alike.
     ///
     /// # Errors
     /// See [`TpsError`].
@@ -108,9 +113,11 @@ pub trait WarpModel<T: Scalar, const D: usize> {
         weights: Option<&[T]>,
     ) -> Result<Box<dyn Warp<T, D> + Send + Sync>, TpsError>;
 
-    /// The Jacobians at `points` of the warp that [`fit`](Self::fit) finds, for one set of pairs of a series.
+    /// The Jacobians at `points` of the warp that [`fit`](Self::fit) finds, for one set of pairs of
+    /// a series.
     ///
-    /// A model may work in what it keeps in `memory`, and then allocates nothing from the second set on.
+    /// A model may work in what it keeps in `memory`, and then allocates nothing from the second
+    /// set on.
     /// By default the warp is fitted as if alone.
     ///
     /// ```
@@ -121,14 +128,16 @@ pub trait WarpModel<T: Scalar, const D: usize> {
     /// for stretch in [1.1_f64, 1.2] {
     ///     let targets = sources.map(|p| Point2::new(stretch * p.x, p.y));
     ///     let pairs = Pairs { sources: &sources, targets: &targets, weights: None };
-    ///     AffineModel::General.jacobians_through(&mut memory, pairs, &sources[..1], &mut jacobians)?;
+    ///     AffineModel::General.jacobians_through(&mut memory, pairs, &sources[..1],
+    ///         &mut jacobians)?;
     ///     assert!((jacobians[0][(0, 0)] - stretch).abs() < 1e-14);
     /// }
     /// # Ok::<(), tactile_tps::TpsError>(())
     /// ```
     ///
     /// # Errors
-    /// Those of [`fit`](Self::fit), and [`TpsError::Length`] where `points` and `jacobians` differ in number.
+    /// Those of [`fit`](Self::fit), and [`TpsError::Length`] where `points` and `jacobians` differ
+    /// in number.
     fn jacobians_through(
         &self,
         memory: &mut SeriesMemory,
@@ -148,7 +157,8 @@ pub trait WarpModel<T: Scalar, const D: usize> {
 /// use nalgebra::Point2;
 /// use tactile_tps::Pairs;
 /// let (sources, targets) = ([Point2::new(0.0, 0.0)], [Point2::new(1.0, 0.0)]);
-/// assert_eq!(Pairs { sources: &sources, targets: &targets, weights: Some(&[0.5]) }.weights, Some(&[0.5][..]));
+/// assert_eq!(Pairs { sources: &sources, targets: &targets, weights: Some(&[0.5]) }.weights,
+///     Some(&[0.5][..]));
 /// ```
 #[derive(Clone, Copy, Debug)]
 pub struct Pairs<'a, T: Scalar, const D: usize> {
@@ -221,7 +231,8 @@ pub struct SeriesMemory {
 }
 
 impl SeriesMemory {
-    /// The state of type `S` that was left here. A default one where there is none, or one of another type.
+    /// The state of type `S` that was left here. A default one where there is none, or one of
+    /// another type.
     pub fn state<S: Default + Send + Sync + 'static>(&mut self) -> &mut S {
         let kept = self.state.take().and_then(|state| state.downcast().ok());
         let state: Box<S> = kept.unwrap_or_default();
@@ -240,7 +251,8 @@ impl core::fmt::Debug for SeriesMemory {
     }
 }
 
-/// The affine map f(x) = A x + b. A rigid motion where A is a rotation. [`Default`] is the identity.
+/// The affine map f(x) = A x + b. A rigid motion where A is a rotation. [`Default`] is the
+/// identity.
 ///
 /// ```
 /// # use nalgebra::{Matrix2, Point2, Vector2};
@@ -273,15 +285,18 @@ impl<T: Scalar, const D: usize> Default for Affine<T, D> {
 }
 
 impl<T: Scalar, const D: usize> Affine<T, D> {
-    /// The map of least Σ wᵢ |A xᵢ + b − yᵢ|²: A = C S⁺ with S = Σ w x xᵀ and C = Σ w y xᵀ about the weighted means.
+    /// The map of least Σ wᵢ |A xᵢ + b − yᵢ|²: A = C S⁺ with S = Σ w x xᵀ and C = Σ w y xᵀ about
+    /// the weighted means.
     ///
-    /// Along directions that the points do not span the map moves points with their mean (the pseudo-inverse S⁺). O(n).
+    /// Along directions that the points do not span the map moves points with their mean (the
+    /// pseudo-inverse S⁺). O(n).
     ///
     /// ```
     /// # use nalgebra::Point2;
     /// # use tactile_tps::{Affine, Warp};
     /// # fn main() -> Result<(), tactile_tps::TpsError> {
-    /// let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
+    /// let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4,
+    ///     0.6]].map(Point2::from);
     /// let targets = sources.map(|p| Point2::new(2.0 * p.x - p.y, p.y + 3.0));
     /// let map = Affine::fit(&sources, &targets, None)?;
     /// assert!((map.apply(&Point2::new(5.0, 1.0)) - Point2::new(9.0, 4.0)).norm() < 1e-14);
@@ -313,14 +328,15 @@ impl<T: Scalar, const D: usize> Affine<T, D> {
         })
     }
 
-    /// The rigid motion of least Σ wᵢ |R xᵢ + b − yᵢ|², R a rotation (no reflection): the one nearest to C = Σ w y xᵀ
-    /// (Kabsch 1976; Umeyama 1991). O(n).
+    /// The rigid motion of least Σ wᵢ |R xᵢ + b − yᵢ|², R a rotation (no reflection): the one
+    /// nearest to C = Σ w y xᵀ (Kabsch 1976; Umeyama 1991). O(n).
     ///
     /// ```
     /// # use nalgebra::{Point2, Rotation2};
     /// # use tactile_tps::Affine;
     /// # fn main() -> Result<(), tactile_tps::TpsError> {
-    /// let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
+    /// let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4,
+    ///     0.6]].map(Point2::from);
     /// let turn = Rotation2::new(0.3);
     /// let motion = Affine::fit_rigid(&sources, &sources.map(|p| turn * p), None)?;
     /// assert!((motion.linear - turn.matrix()).norm() < 1e-15);
@@ -407,7 +423,8 @@ fn symmetric_eigen<const D: usize>(matrix: &SMatrix<f64, D, D>) -> (Vec<f64>, DM
     )
 }
 
-/// The rotation R that maximises tr(Rᵀ C): U diag(1, …, det(U Vᵀ)) Vᵀ of the singular value decomposition.
+/// The rotation R that maximises tr(Rᵀ C): U diag(1, …, det(U Vᵀ)) Vᵀ of the singular value
+/// decomposition.
 fn nearest_rotation<const D: usize>(cross: &SMatrix<f64, D, D>) -> SMatrix<f64, D, D> {
     let svd = DMatrix::from_fn(D, D, |i, j| cross[(i, j)]).svd(true, true);
     let (Some(mut u), Some(vt)) = (svd.u, svd.v_t) else {
@@ -429,7 +446,8 @@ fn nearest_rotation<const D: usize>(cross: &SMatrix<f64, D, D>) -> SMatrix<f64, 
 /// # fn main() -> Result<(), tactile_tps::TpsError> {
 /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
 /// let doubled = sources.map(|p| p * 2.0 + Vector2::new(1.0, 2.0));
-/// let warp: Box<dyn Warp<f64, 2> + Send + Sync> = AffineModel::General.fit(&sources, &doubled, None)?;
+/// let warp: Box<dyn Warp<f64, 2> + Send + Sync> = AffineModel::General.fit(&sources, &doubled,
+///     None)?;
 /// assert!((warp.apply(&Point2::new(5.0, 1.0)) - Point2::new(11.0, 4.0)).norm() < 1e-14);
 /// let motion = AffineModel::Rigid.fit(&sources, &doubled, None)?;
 /// assert!((motion.jacobian(&Point2::origin()).determinant() - 1.0_f64).abs() < 1e-14);

@@ -5,76 +5,15 @@ use core::ops::ControlFlow;
 use nalgebra::{Point, SVector};
 
 use super::{
-    Buffers, Centres, Coefficients, MAX, Setting, System,
-    iterative::{Iterative, Run},
-    largest, relative,
+    Buffers, Centres, Coefficients, Factorization, Iterative, MAX, Outcome, Run, SplineWorkspace,
+    System, Watch, largest, relative,
 };
 use crate::{
-    FitOptions, FitReport, Kernel, Progress, R2LogR, Scalar, Smoothing, Spline, StopReason,
-    TpsError,
-    error::{finite, same_count, same_length, validate_smoothing, validate_weights},
+    FitOptions, FitReport, Kernel, Progress, Scalar, Smoothing, Spline, TpsError,
+    error::{same_length, validate_smoothing, validate_weights},
     evaluate::{BLOCK, KernelSum, Solution},
     lanes::{Job, Lane, dispatch},
 };
-
-/// A callback that receives a fit's progress and may stop it.
-pub(super) type Watch<'a> = dyn FnMut(&Progress) -> ControlFlow<()> + 'a;
-
-/// Source points with their kernel matrix factored: splines to any targets follow in O(n²).
-///
-/// ```
-/// use nalgebra::Point2;
-/// use tactile_tps::{Factorization, FitOptions, ThinPlateSpline};
-/// # fn main() -> Result<(), tactile_tps::TpsError> {
-/// let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
-/// let factorization = Factorization::new(&sources, &FitOptions::default())?;
-/// let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
-/// let spline: ThinPlateSpline<f64, 2> = factorization.fit(&targets)?;
-/// assert!((spline.apply(&sources[4]) - targets[4]).norm() < 1e-14);
-/// # Ok(())
-/// # }
-/// ```
-#[derive(Clone, Debug)]
-pub struct Factorization<T: Scalar, const D: usize, K = R2LogR> {
-    pub(super) kernel: K,
-    pub(super) centres: Centres<D>,
-    system: System<D>,
-    pub(super) weights: Option<Vec<T>>,
-    /// Weight of every centre, empty if all weights are one.
-    pub(super) centre_weights: Vec<f64>,
-    smoothing: Smoothing<T>,
-    rank_tolerance: f64,
-    /// The preconditioner, if the solver iterates. The system is then without a factor.
-    iterative: Option<Iterative<D>>,
-    /// Residual at which iteration stops.
-    tolerance: f64,
-}
-
-/// Buffers that refits reuse.
-///
-/// ```
-/// # use nalgebra::Point2;
-/// # use tactile_tps::{Factorization, FitOptions, Spline, SplineWorkspace};
-/// # fn main() -> Result<(), tactile_tps::TpsError> {
-/// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
-/// let factorization = Factorization::new(&sources, &FitOptions::default())?;
-/// let (mut workspace, mut spline) = (SplineWorkspace::default(), Spline::default());
-/// for step in 1..=3 {
-///     // No allocation from the second round on.
-///     let targets = sources.map(|p| Point2::new(p.x, p.y * f64::from(step)));
-///     factorization.refit_with(&mut workspace, &targets, None, None, &mut spline)?;
-///     assert!((spline.apply(&sources[4]) - targets[4]).norm() < 1e-14);
-/// }
-/// # Ok(())
-/// # }
-/// ```
-#[derive(Clone, Debug, Default)]
-pub struct SplineWorkspace<const D: usize> {
-    buffers: Buffers,
-    system: System<D>,
-    iterative: Iterative<D>,
-    centre_weights: Vec<f64>,
-}
 
 /// A system with what is to be solved with it.
 struct Task<'a, T, const D: usize> {
@@ -85,32 +24,6 @@ struct Task<'a, T, const D: usize> {
     careful: bool,
     /// Where there is no factor.
     iterative: Option<&'a Iterative<D>>,
-}
-
-/// The affine parts of a solution and how it was found. The weights stand in the buffers.
-pub(super) struct Outcome<const M: usize> {
-    pub(super) affine: [Coefficients; M],
-    /// Largest residual relative to the largest target, where it was measured.
-    pub(super) residual: Option<f64>,
-    pub(super) refinements: usize,
-    /// Steps of conjugate gradients.
-    pub(super) iterations: usize,
-    pub(super) condition: f64,
-    pub(super) stop: StopReason,
-}
-
-impl<const M: usize> Outcome<M> {
-    /// Of a direct solve.
-    pub(super) fn new(affine: [Coefficients; M], condition: f64) -> Self {
-        Self {
-            affine,
-            residual: None,
-            refinements: 0,
-            iterations: 0,
-            condition,
-            stop: StopReason::Direct,
-        }
-    }
 }
 
 impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
@@ -124,7 +37,8 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
     /// # use nalgebra::Point2;
     /// # use tactile_tps::{Factorization, FitOptions, NegR, TpsError};
     /// # fn main() -> Result<(), tactile_tps::TpsError> {
-    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
+    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4,
+    /// #     0.6]].map(Point2::from);
     /// let factorization = Factorization::new(&sources, &FitOptions::new(NegR))?;
     /// assert!(factorization.fit(&sources)?.report.points == 5);
     /// let five_weights = FitOptions::new(NegR).with_weights(vec![1.0; 5])?;
@@ -140,7 +54,8 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
         Self::new_watched(sources, options, |_| ControlFlow::Continue(()))
     }
 
-    /// As [`new`](Self::new), reporting the progress of an iterative solver's preparation to `watch`, which may stop it.
+    /// As [`new`](Self::new), reporting the progress of an iterative solver's preparation to
+    /// `watch`, which may stop it.
     pub(crate) fn new_watched(
         sources: &[Point<T, D>],
         options: &FitOptions<T, K>,
@@ -158,7 +73,8 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
     /// # use nalgebra::Point2;
     /// # use tactile_tps::{Factorization, FitOptions, Spline, TpsError, SplineWorkspace};
     /// # fn main() -> Result<(), TpsError> {
-    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
+    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4,
+    /// #     0.6]].map(Point2::from);
     /// let options = FitOptions::default();
     /// let mut factorization = Factorization::new(&sources, &options)?;
     /// let (mut workspace, mut spline) = (SplineWorkspace::default(), Spline::default());
@@ -209,66 +125,6 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
         Ok(this)
     }
 
-    /// No points yet: memory for [`with_points`](Self::with_points).
-    pub(super) fn without_points(kernel: K) -> Self {
-        const { assert!(D >= 1 && D < MAX, "splines have one to three dimensions") };
-        Self {
-            kernel,
-            centres: Centres::default(),
-            system: System::default(),
-            weights: None,
-            centre_weights: Vec::new(),
-            smoothing: Smoothing::None,
-            rank_tolerance: 0.0,
-            iterative: None,
-            tolerance: 0.0,
-        }
-    }
-
-    /// The distinct centres and the options, without a factor for them.
-    pub(super) fn with_points(
-        mut self,
-        sources: &[Point<T, D>],
-        options: &FitOptions<T, K>,
-    ) -> Result<Self, TpsError> {
-        if let Some(weights) = &options.weights {
-            same_count("weights", sources.len(), weights.len())?;
-            self.weights.get_or_insert_default().clone_from(weights);
-        } else {
-            self.weights = None;
-        }
-        self.kernel.clone_from(&options.kernel);
-        self.centres.take(sources, self.kernel.degree().is_some())?;
-        self.centres
-            .weigh(self.weights.as_deref(), &mut self.centre_weights);
-        self.smoothing = options.smoothing;
-        self.rank_tolerance = options.rank_tolerance.widen();
-        self.tolerance = options.tolerance.widen();
-        Ok(self)
-    }
-
-    pub(super) fn setting(&self) -> Setting<'_, K, D> {
-        Setting {
-            kernel: &self.kernel,
-            centres: &self.centres,
-            rank_tolerance: self.rank_tolerance,
-        }
-    }
-
-    /// λ in the frame's units: the kernel scales as length to its degree.
-    pub(super) fn inner_lambda(&self, smoothing: Smoothing<T>) -> f64 {
-        match smoothing {
-            Smoothing::Lambda(lambda) => lambda.widen() / self.unit(),
-            _ => 0.0,
-        }
-    }
-
-    /// How much larger the kernel is outside than in the frame.
-    fn unit(&self) -> f64 {
-        let degree = self.kernel.degree().unwrap_or(0);
-        self.centres.frame.scale.powi(degree)
-    }
-
     /// Number of source points.
     fn len(&self) -> usize {
         self.centres.inputs
@@ -282,7 +138,8 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
     /// # use nalgebra::Point2;
     /// # use tactile_tps::{Factorization, FitOptions};
     /// # fn main() -> Result<(), tactile_tps::TpsError> {
-    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
+    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4,
+    /// #     0.6]].map(Point2::from);
     /// let factorization = Factorization::new(&sources, &FitOptions::default())?;
     /// // Any number of outputs: here a height.
     /// let heights = sources.map(|p| nalgebra::Point1::new(p.x * p.y));
@@ -334,23 +191,28 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
         }
     }
 
-    /// New targets, weights and smoothing (`None`: those of the factorisation) for the same sources.
+    /// New targets, weights and smoothing (`None`: those of the factorisation) for the same
+    /// sources.
     ///
     /// The answer goes into a spline that is already there.
     /// Nothing is allocated once workspace and spline have grown, but by a new cross-validation.
     ///
-    /// Unlike [`fit`](Self::fit) it measures no residual, and refines only where the condition number exceeds 10⁸.
+    /// Unlike [`fit`](Self::fit) it measures no residual, and refines only where the condition
+    /// number exceeds 10⁸.
     /// The same weights and λ cost two triangular solves.
     /// Positive weights leave an interpolating spline as it is, and cost the same.
-    /// Other weights or another λ cost a factorisation, for an iterative solver a new preconditioner.
+    /// Other weights or another λ cost a factorisation, for an iterative solver a new
+    /// preconditioner.
     ///
     /// ```
     /// # use nalgebra::Point2;
     /// # use tactile_tps::{Factorization, FitOptions, Smoothing, Spline, SplineWorkspace};
     /// # fn main() -> Result<(), tactile_tps::TpsError> {
-    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
+    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4,
+    /// #     0.6]].map(Point2::from);
     /// let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
-    /// let factorization = Factorization::new(&sources, &FitOptions::default().with_smoothing(Smoothing::Lambda(0.01))?)?;
+    /// let factorization = Factorization::new(&sources,
+    ///     &FitOptions::default().with_smoothing(Smoothing::Lambda(0.01))?)?;
     /// let (mut workspace, mut spline) = (SplineWorkspace::default(), Spline::default());
     /// let mut miss = |weight: f64| {
     ///     let weights = [1.0, 1.0, 1.0, 1.0, weight];
@@ -508,12 +370,6 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
         Ok(())
     }
 
-    /// One finite target for each source.
-    pub(super) fn check<const M: usize>(&self, targets: &[Point<T, M>]) -> Result<(), TpsError> {
-        same_count("target points", self.len(), targets.len())?;
-        finite(targets, "target points")
-    }
-
     /// Writes a solution's numbers into the report.
     fn record<const M: usize>(
         &self,
@@ -542,14 +398,16 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
     /// Goes row by row into the caller's memory, `n` entries (one per source point) a point.
     /// Allocates nothing once the workspace has grown.
     ///
-    /// The same for every output and all targets, with the weights and λ of the factorisation. Σ aⱼ = 1, and Σ aⱼ xⱼ = x
-    /// where the points span space. Targets with covariances Cⱼ give f(x) the covariance Σ aⱼ² Cⱼ. O(n²) a point.
+    /// The same for every output and all targets, with the weights and λ of the factorisation. Σ aⱼ
+    /// = 1, and Σ aⱼ xⱼ = x where the points span space. Targets with covariances Cⱼ give f(x) the
+    /// covariance Σ aⱼ² Cⱼ. O(n²) a point.
     ///
     /// ```
     /// use nalgebra::Point2;
     /// use tactile_tps::{Factorization, FitOptions, SplineWorkspace};
     /// # fn main() -> Result<(), tactile_tps::TpsError> {
-    /// let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
+    /// let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4,
+    ///     0.6]].map(Point2::from);
     /// let factorization = Factorization::<f64, 2>::new(&sources, &FitOptions::default())?;
     /// let queries = [Point2::new(0.5, 0.5), sources[1]];
     /// let mut influence = [0.0; 2 * 5];
@@ -563,8 +421,8 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
     /// ```
     ///
     /// # Errors
-    /// [`TpsError::DependsOnTargets`] if λ is left to cross-validation, [`TpsError::NoFactor`] if the solver is iterative,
-    /// [`TpsError::Length`] if `influence` is not of that length.
+    /// [`TpsError::DependsOnTargets`] if λ is left to cross-validation, [`TpsError::NoFactor`] if
+    /// the solver is iterative, [`TpsError::Length`] if `influence` is not of that length.
     pub fn influence_into(
         &self,
         workspace: &mut SplineWorkspace<D>,
@@ -594,12 +452,16 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
     /// use nalgebra::{Matrix2, Point2, Vector2};
     /// use tactile_tps::{Factorization, FitOptions, SplineWorkspace};
     /// # fn main() -> Result<(), tactile_tps::TpsError> {
-    /// let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
+    /// let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4,
+    ///     0.6]].map(Point2::from);
     /// let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
-    /// let (factorization, x) = (Factorization::<f64, 2>::new(&sources, &FitOptions::default())?, Point2::new(0.5, 0.5));
+    /// let (factorization, x) = (Factorization::<f64, 2>::new(&sources, &FitOptions::default())?,
+    ///     Point2::new(0.5, 0.5));
     /// let mut influence = [Vector2::zeros(); 5];
-    /// factorization.jacobian_influence_into(&mut SplineWorkspace::default(), &[x], &mut influence)?;
-    /// let sum = targets.iter().zip(&influence).fold(Matrix2::zeros(), |j, (y, b)| j + y.coords * b.transpose());
+    /// factorization.jacobian_influence_into(&mut SplineWorkspace::default(), &[x],
+    ///     &mut influence)?;
+    /// let sum = targets.iter().zip(&influence).fold(Matrix2::zeros(), |j, (y, b)| j
+    ///     + y.coords * b.transpose());
     /// assert!((factorization.fit(&targets)?.jacobian(&x) - sum).norm() < 1e-14);
     /// # Ok(())
     /// # }
@@ -631,10 +493,12 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
         }
     }
 
-    /// Solves for the influence of every source point on each right-hand side, and hands each to `sink`.
+    /// Solves for the influence of every source point on each right-hand side, and hands each to
+    /// `sink`.
     ///
     /// The value is f(x) = k(x)ᵀw + p(x)ᵀa with (w, a) from the symmetric system A(w, a) = (y, 0).
-    /// So f(x) = α(x)ᵀy for the first part of A(α, β) = (k(x), p(x)): one solve, whatever the targets.
+    /// So f(x) = α(x)ᵀy for the first part of A(α, β) = (k(x), p(x)): one solve, whatever the
+    /// targets.
     /// Derivatives of k and p give those of f.
     fn follow<const R: usize>(
         &self,
@@ -675,7 +539,8 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
     }
 }
 
-/// One right-hand side: the kernels and affine functions at a point, or their derivative along an axis.
+/// One right-hand side: the kernels and affine functions at a point, or their derivative along an
+/// axis.
 struct Side<const D: usize> {
     point: [f64; D],
     axis: Option<usize>,
@@ -814,7 +679,8 @@ impl<K: Kernel, const D: usize> Equations<'_, K, D> {
         }
     }
 
-    /// y − K w − λ W⁻¹ w − P a at the centres. Gives its largest entry relative to the largest target.
+    /// y − K w − λ W⁻¹ w − P a at the centres. Gives its largest entry relative to the largest
+    /// target.
     fn residual<const M: usize>(&self, affine: &[Coefficients; M], buffers: &mut Buffers) -> f64 {
         let n = self.centres.len();
         let Buffers {

@@ -3,15 +3,15 @@
 //! The dense factor takes n³/3 operations and 8n² bytes.
 //! Here a step takes one sum over all pairs, n² kernels and no memory.
 //! The preconditioner keeps the number of steps nearly independent of n.
-//! On the complement of the affine functions the matrix is definite, so conjugate gradients stay there:
+//! On the complement of the affine functions the matrix is definite, so conjugate gradients stay
+//! there:
 //! every direction satisfies the side conditions.
 
 use core::ops::ControlFlow;
 
 use super::{
-    AffineBasis, Buffers, Centres, Coefficients, MAX, Setting, System,
-    factorization::{Outcome, Watch},
-    largest, relative,
+    AffineBasis, Buffers, Centres, Coefficients, Iterative, MAX, Outcome, Run, Setting, System,
+    Vectors, Watch, largest, relative,
 };
 use crate::{
     Kernel, Progress, StopReason,
@@ -19,8 +19,8 @@ use crate::{
     lanes::{Job, Lane, dispatch, dot},
 };
 
-/// Earlier points that a point is predicted from. With more the set-up costs more, with fewer there are more steps
-/// (`cargo bench -p tactile-benches --bench tps`).
+/// Earlier points that a point is predicted from. With more the set-up costs more, with fewer there
+/// are more steps (`cargo bench -p tactile-benches --bench tps`).
 const NEIGHBOURS: usize = 64;
 
 /// Points of the coarsest level, which are solved for exactly.
@@ -29,31 +29,9 @@ const COARSE_POINTS: usize = 512;
 /// Steps at most.
 const STEPS: usize = 200;
 
-/// Memory of an iterative solve.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Vectors {
-    residual: Vec<f64>,
-    preconditioned: Vec<f64>,
-    direction: Vec<f64>,
-    product: Vec<f64>,
-    solution: Vec<f64>,
-    target: Vec<f64>,
-    /// Values at the coarse points, and memory of their solve.
-    coarse: [Vec<f64>; 2],
-}
-
-/// Points from coarse to fine with their preconditioner.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Iterative<const D: usize> {
-    /// Coordinates of the active centres in order, axis by axis.
-    axes: Vec<Vec<f64>>,
-    /// λ/weight of each, empty without λ.
-    diagonal: Vec<f64>,
-    preconditioner: Preconditioner<D>,
-}
-
 impl<const D: usize> Iterative<D> {
-    /// Orders the points of positive weight in `system` and builds the preconditioner: O(n²) time, O(n) memory.
+    /// Orders the points of positive weight in `system` and builds the preconditioner: O(n²) time,
+    /// O(n) memory.
     pub(super) fn build<K: Kernel>(
         &mut self,
         setting: &Setting<'_, K, D>,
@@ -88,7 +66,8 @@ impl<const D: usize> Iterative<D> {
         (self.preconditioner).build(&ordered, &mut |weighted| tell(n + weighted))
     }
 
-    /// Orders the active points from coarse to fine. Gives the squared distance of each to the nearest before it.
+    /// Orders the active points from coarse to fine. Gives the squared distance of each to the
+    /// nearest before it.
     fn arrange(
         &mut self,
         centres: &Centres<D>,
@@ -115,17 +94,9 @@ impl<const D: usize> Iterative<D> {
     }
 }
 
-/// One run: its system and its stopping rule.
-pub(super) struct Run<'a, K, const D: usize> {
-    pub(super) kernel: &'a K,
-    pub(super) system: &'a System<D>,
-    pub(super) iterative: &'a Iterative<D>,
-    /// Largest residual at a point, relative to the largest target, to stop at.
-    pub(super) tolerance: f64,
-}
-
 impl<K: Kernel, const D: usize> Run<'_, K, D> {
-    /// Solves for the targets in `buffers`; weights come there. Stops early if `watch` returns `Break`.
+    /// Solves for the targets in `buffers`; weights come there. Stops early if `watch` returns
+    /// `Break`.
     pub(super) fn solve<const M: usize>(
         &self,
         buffers: &mut Buffers,
@@ -158,7 +129,8 @@ impl<K: Kernel, const D: usize> Run<'_, K, D> {
                 false if answer.iterations >= STEPS => StopReason::IterationLimit,
                 false => StopReason::Stagnated,
             };
-            // Restarts from a residual formed anew, from which rounding has made the iterated one drift.
+            // Restarts from a residual formed anew, from which rounding has made the iterated one
+            // drift.
             if answer.stop != StopReason::Stagnated || start == 3 {
                 break;
             }
@@ -230,7 +202,8 @@ impl<K: Kernel, const D: usize> Run<'_, K, D> {
         *size = new;
     }
 
-    /// The step along the direction that makes the energy least. No step if `still_wanted` returns `Break` before it is known.
+    /// The step along the direction that makes the energy least. No step if `still_wanted` returns
+    /// `Break` before it is known.
     fn advance<const M: usize>(
         &self,
         vectors: &mut Vectors,
@@ -295,8 +268,8 @@ impl<K: Kernel, const D: usize> Run<'_, K, D> {
         ControlFlow::Continue(())
     }
 
-    /// Forms the residual anew: y − (K + λW⁻¹)w − P a with the a that makes it least, and its largest entry relative to the
-    /// largest target.
+    /// Forms the residual anew: y − (K + λW⁻¹)w − P a with the a that makes it least, and its
+    /// largest entry relative to the largest target.
     fn residual<const M: usize>(&self, vectors: &mut Vectors) -> ([Coefficients; M], f64) {
         let Vectors {
             residual,
@@ -338,7 +311,8 @@ fn ratio(a: f64, b: f64) -> f64 {
 
 /// Orders points by farthest-point sampling from the one nearest to the origin. O(n²) time.
 ///
-/// Gives the order, and the squared distance of each point to the nearest before it (infinite for the first).
+/// Gives the order, and the squared distance of each point to the nearest before it (infinite for
+/// the first).
 /// Stops if `watch`, which receives the number of ordered points, returns `Break`.
 fn coarse_to_fine<const D: usize>(
     axes: [&[f64]; D],
@@ -494,16 +468,19 @@ impl Nearest {
     }
 }
 
-/// A sparse inverse Cholesky factor of the kernel matrix on the complement: Σ wᵢ wᵢᵀ over the points.
+/// A sparse inverse Cholesky factor of the kernel matrix on the complement: Σ wᵢ wᵢᵀ over the
+/// points.
 ///
-/// Points are ordered from coarse to fine. Point i adds its error of prediction from those before it,
-/// cᵢ(y) = yᵢ − f(xᵢ) with f the spline through the earlier points.
-/// Such errors are uncorrelated in the kernel's product: wᵢᵀA wⱼ = δᵢⱼ after scaling, so that A⁻¹ = Σ wᵢ wᵢᵀ.
-/// Here f goes through the nearest earlier points only (Vecchia 1988; Schäfer, Katzfuss & Owhadi 2021).
+/// Points are ordered from coarse to fine. Point i adds its error of prediction from those before
+/// it, cᵢ(y) = yᵢ − f(xᵢ) with f the spline through the earlier points.
+/// Such errors are uncorrelated in the kernel's product: wᵢᵀA wⱼ = δᵢⱼ after scaling, so that A⁻¹ =
+/// Σ wᵢ wᵢᵀ.
+/// Here f goes through the nearest earlier points only (Vecchia 1988; Schäfer, Katzfuss & Owhadi
+/// 2021).
 /// The weights of the spline with value one at xᵢ and zero at its neighbours are wᵢ √wᵢᵢ.
 /// All of them satisfy the side conditions, which conditionally definite kernels need.
 #[derive(Clone, Debug, Default)]
-struct Preconditioner<const D: usize> {
+pub(super) struct Preconditioner<const D: usize> {
     /// The first points, factored.
     coarse: System<D>,
     coarse_points: usize,
@@ -575,7 +552,8 @@ impl<'a, K: Kernel, const D: usize> Cardinal<'a, K, D> {
         }
     }
 
-    /// The weights of the spline of the points at these places. The unit vector itself where there is none.
+    /// The weights of the spline of the points at these places. The unit vector itself where there
+    /// is none.
     fn weights(&mut self, places: &[usize]) -> &[f64] {
         let Self {
             points,

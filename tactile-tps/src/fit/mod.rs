@@ -1,10 +1,12 @@
-//! The equations of a spline: distinct points, the directions they span, and the matrix to solve with.
+//! The equations of a spline: distinct points, the directions they span, and the matrix to solve
+//! with.
 //!
 //! With weights W the equations K w + λW⁻¹w + P a = y, Pᵀw = 0 become, for v = W^-½ w,
 //! S v + W^½P a = W^½ y and (W^½P)ᵀv = 0 with S = W^½KW^½ + λI.
 //! Scaling by rows keeps weights apart that differ by many decades.
 //!
-//! Let W^½P = QR with orthonormal Q, and Π = I − QQᵀ. The solution satisfies v = Πv and ΠSΠ v = Π W^½y.
+//! Let W^½P = QR with orthonormal Q, and Π = I − QQᵀ. The solution satisfies v = Πv and ΠSΠ v = Π
+//! W^½y.
 //! On the range of Π the matrix ΠSΠ is positive definite.
 //! Adding σQQᵀ makes it definite everywhere without touching the solution.
 //! With σ the mean eigenvalue on the range of Π the condition number stays what it is.
@@ -13,7 +15,7 @@ mod factorization;
 mod iterative;
 mod path;
 
-use core::mem::MaybeUninit;
+use core::{mem::MaybeUninit, ops::ControlFlow};
 
 use faer::{
     Accum, Mat, MatMut, MatRef, Par, Spec,
@@ -23,12 +25,11 @@ use faer::{
 };
 use nalgebra::Point;
 
-pub use factorization::{Factorization, SplineWorkspace};
 pub use path::LambdaPath;
 
 use crate::{
-    Kernel, Scalar, TpsError,
-    error::finite,
+    FitOptions, Kernel, Progress, R2LogR, Scalar, Smoothing, StopReason, TpsError,
+    error::{finite, same_count},
     evaluate::Frame,
     lanes::{Job, Lane, dispatch, dot},
     smoothing::least_gcv,
@@ -39,6 +40,191 @@ const MAX: usize = 4;
 
 /// Coefficients of an affine function.
 type Coefficients = [f64; MAX];
+
+/// A callback that receives a fit's progress and may stop it.
+type Watch<'a> = dyn FnMut(&Progress) -> ControlFlow<()> + 'a;
+
+/// Source points with their kernel matrix factored: splines to any targets follow in O(n²).
+///
+/// ```
+/// use nalgebra::Point2;
+/// use tactile_tps::{Factorization, FitOptions, ThinPlateSpline};
+/// # fn main() -> Result<(), tactile_tps::TpsError> {
+/// let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
+/// let factorization = Factorization::new(&sources, &FitOptions::default())?;
+/// let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
+/// let spline: ThinPlateSpline<f64, 2> = factorization.fit(&targets)?;
+/// assert!((spline.apply(&sources[4]) - targets[4]).norm() < 1e-14);
+/// # Ok(())
+/// # }
+/// ```
+#[derive(Clone, Debug)]
+pub struct Factorization<T: Scalar, const D: usize, K = R2LogR> {
+    kernel: K,
+    centres: Centres<D>,
+    system: System<D>,
+    weights: Option<Vec<T>>,
+    /// Weight of every centre, empty if all weights are one.
+    centre_weights: Vec<f64>,
+    smoothing: Smoothing<T>,
+    rank_tolerance: f64,
+    /// The preconditioner, if the solver iterates. The system is then without a factor.
+    iterative: Option<Iterative<D>>,
+    /// Residual at which iteration stops.
+    tolerance: f64,
+}
+
+/// Buffers that refits reuse.
+///
+/// ```
+/// # use nalgebra::Point2;
+/// # use tactile_tps::{Factorization, FitOptions, Spline, SplineWorkspace};
+/// # fn main() -> Result<(), tactile_tps::TpsError> {
+/// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
+/// let factorization = Factorization::new(&sources, &FitOptions::default())?;
+/// let (mut workspace, mut spline) = (SplineWorkspace::default(), Spline::default());
+/// for step in 1..=3 {
+///     // No allocation from the second round on.
+///     let targets = sources.map(|p| Point2::new(p.x, p.y * f64::from(step)));
+///     factorization.refit_with(&mut workspace, &targets, None, None, &mut spline)?;
+///     assert!((spline.apply(&sources[4]) - targets[4]).norm() < 1e-14);
+/// }
+/// # Ok(())
+/// # }
+/// ```
+#[derive(Clone, Debug, Default)]
+pub struct SplineWorkspace<const D: usize> {
+    buffers: Buffers,
+    system: System<D>,
+    iterative: Iterative<D>,
+    centre_weights: Vec<f64>,
+}
+
+impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
+    /// No points yet: memory for [`with_points`](Self::with_points).
+    fn without_points(kernel: K) -> Self {
+        const { assert!(D >= 1 && D < MAX, "splines have one to three dimensions") };
+        Self {
+            kernel,
+            centres: Centres::default(),
+            system: System::default(),
+            weights: None,
+            centre_weights: Vec::new(),
+            smoothing: Smoothing::None,
+            rank_tolerance: 0.0,
+            iterative: None,
+            tolerance: 0.0,
+        }
+    }
+
+    /// The distinct centres and the options, without a factor for them.
+    fn with_points(
+        mut self,
+        sources: &[Point<T, D>],
+        options: &FitOptions<T, K>,
+    ) -> Result<Self, TpsError> {
+        if let Some(weights) = &options.weights {
+            same_count("weights", sources.len(), weights.len())?;
+            self.weights.get_or_insert_default().clone_from(weights);
+        } else {
+            self.weights = None;
+        }
+        self.kernel.clone_from(&options.kernel);
+        self.centres.take(sources, self.kernel.degree().is_some())?;
+        self.centres
+            .weigh(self.weights.as_deref(), &mut self.centre_weights);
+        self.smoothing = options.smoothing;
+        self.rank_tolerance = options.rank_tolerance.widen();
+        self.tolerance = options.tolerance.widen();
+        Ok(self)
+    }
+
+    fn setting(&self) -> Setting<'_, K, D> {
+        Setting {
+            kernel: &self.kernel,
+            centres: &self.centres,
+            rank_tolerance: self.rank_tolerance,
+        }
+    }
+
+    /// λ in the frame's units: the kernel scales as length to its degree.
+    fn inner_lambda(&self, smoothing: Smoothing<T>) -> f64 {
+        match smoothing {
+            Smoothing::Lambda(lambda) => lambda.widen() / self.unit(),
+            _ => 0.0,
+        }
+    }
+
+    /// How much larger the kernel is outside than in the frame.
+    fn unit(&self) -> f64 {
+        let degree = self.kernel.degree().unwrap_or(0);
+        self.centres.frame.scale.powi(degree)
+    }
+
+    /// One finite target for each source.
+    fn check<const M: usize>(&self, targets: &[Point<T, M>]) -> Result<(), TpsError> {
+        same_count("target points", self.centres.inputs, targets.len())?;
+        finite(targets, "target points")
+    }
+}
+
+/// The affine parts of a solution and how it was found. The weights stand in the buffers.
+struct Outcome<const M: usize> {
+    affine: [Coefficients; M],
+    /// Largest residual relative to the largest target, where it was measured.
+    residual: Option<f64>,
+    refinements: usize,
+    /// Steps of conjugate gradients.
+    iterations: usize,
+    condition: f64,
+    stop: StopReason,
+}
+
+impl<const M: usize> Outcome<M> {
+    /// Of a direct solve.
+    fn new(affine: [Coefficients; M], condition: f64) -> Self {
+        Self {
+            affine,
+            residual: None,
+            refinements: 0,
+            iterations: 0,
+            condition,
+            stop: StopReason::Direct,
+        }
+    }
+}
+
+/// Memory of an iterative solve.
+#[derive(Clone, Debug, Default)]
+struct Vectors {
+    residual: Vec<f64>,
+    preconditioned: Vec<f64>,
+    direction: Vec<f64>,
+    product: Vec<f64>,
+    solution: Vec<f64>,
+    target: Vec<f64>,
+    /// Values at the coarse points, and memory of their solve.
+    coarse: [Vec<f64>; 2],
+}
+
+/// Points from coarse to fine with their preconditioner.
+#[derive(Clone, Debug, Default)]
+struct Iterative<const D: usize> {
+    /// Coordinates of the active centres in order, axis by axis.
+    axes: Vec<Vec<f64>>,
+    /// λ/weight of each, empty without λ.
+    diagonal: Vec<f64>,
+    preconditioner: iterative::Preconditioner<D>,
+}
+
+/// One run: its system and its stopping rule.
+struct Run<'a, K, const D: usize> {
+    kernel: &'a K,
+    system: &'a System<D>,
+    iterative: &'a Iterative<D>,
+    /// Largest residual at a point, relative to the largest target, to stop at.
+    tolerance: f64,
+}
 
 /// Distinct points in their frame, and which input point went where.
 #[derive(Clone, Debug)]
@@ -163,7 +349,8 @@ impl<const D: usize> Centres<D> {
         Ok(())
     }
 
-    /// Targets at the centres less `origin`, output by output: the weighted mean where points coincide.
+    /// Targets at the centres less `origin`, output by output: the weighted mean where points
+    /// coincide.
     fn gather<T: Scalar, const M: usize>(
         &self,
         targets: &[Point<T, M>],
@@ -226,10 +413,13 @@ impl<const D: usize> Default for Span<D> {
 }
 
 impl<const D: usize> Span<D> {
-    /// The span of n points, whose coordinates stand in `columns`, axis by axis, and are overwritten.
+    /// The span of n points, whose coordinates stand in `columns`, axis by axis, and are
+    /// overwritten.
     ///
-    /// One-sided rotations (Hestenes 1958) keep small singular values to their own relative precision.
-    /// A direction counts if its extent exceeds the rounding `grain` and the share `tolerance` of the largest.
+    /// One-sided rotations (Hestenes 1958) keep small singular values to their own relative
+    /// precision.
+    /// A direction counts if its extent exceeds the rounding `grain` and the share `tolerance` of
+    /// the largest.
     fn new(columns: &mut [f64], grain: f64, tolerance: f64) -> Self {
         let n = columns.len() / D;
         for column in columns.chunks_exact_mut(n) {
@@ -297,7 +487,8 @@ impl<const D: usize> Span<D> {
     }
 }
 
-/// Rotates columns `p` and `q` of length `n` until they are orthogonal, and `vectors` with them. `false` if they are.
+/// Rotates columns `p` and `q` of length `n` until they are orthogonal, and `vectors` with them.
+/// `false` if they are.
 fn orthogonalise<const D: usize>(
     columns: &mut [f64],
     n: usize,
@@ -334,7 +525,8 @@ struct AffineBasis {
     n: usize,
     /// Number of affine functions.
     q: usize,
-    /// Q, column by column, and columns of zeros: four in all, so that loops over them have a fixed length.
+    /// Q, column by column, and columns of zeros: four in all, so that loops over them have a fixed
+    /// length.
     columns: Vec<f64>,
     r: [[f64; MAX]; MAX],
 }
@@ -342,7 +534,8 @@ struct AffineBasis {
 impl AffineBasis {
     /// Factors the q columns of length n that `fill` writes, by Gram and Schmidt's rule.
     ///
-    /// Twice is enough for orthogonality to rounding. Rows keep their own relative precision, which wild weights need.
+    /// Twice is enough for orthogonality to rounding. Rows keep their own relative precision, which
+    /// wild weights need.
     fn factor(&mut self, n: usize, q: usize, fill: impl Fn(usize, &mut [f64])) {
         (self.n, self.q) = (n, q);
         self.columns.clear();
@@ -447,8 +640,9 @@ impl<const D: usize> System<D> {
         let size = self.assemble(setting, weights, lambda > 0.0);
         self.matrix.add_to_diagonal(lambda);
         if self.matrix.factor().is_err() {
-            // Points nearly coincide, and rounding has left the matrix indefinite. A λ of the size of that rounding
-            // moves values by no more than it. A kernel that is not definite fails again.
+            // Points nearly coincide, and rounding has left the matrix indefinite. A λ of the size
+            // of that rounding moves values by no more than it. A kernel that is not definite fails
+            // again.
             self.assemble(setting, weights, lambda > 0.0);
             let rounding = f64::EPSILON * self.active.len() as f64 * (size + lambda);
             self.matrix.add_to_diagonal(lambda + rounding);
@@ -569,7 +763,8 @@ impl<const D: usize> System<D> {
             });
     }
 
-    /// The λ of least generalised cross-validation for values at all centres. The system must be decomposed.
+    /// The λ of least generalised cross-validation for values at all centres. The system must be
+    /// decomposed.
     fn cross_validate<const M: usize>(
         &self,
         y: &[f64],
@@ -590,7 +785,8 @@ impl<const D: usize> System<D> {
         least_gcv(&spectrum.values, &spare[..n], self.affine.q, self.shift)
     }
 
-    /// Solves for `M` outputs: `y` holds the values at all centres and receives the weights w. Returns the affine parts.
+    /// Solves for `M` outputs: `y` holds the values at all centres and receives the weights w.
+    /// Returns the affine parts.
     ///
     /// `lambda` is added to a decomposed system. A factored one has its own.
     fn solve<const M: usize>(
@@ -627,9 +823,11 @@ impl<const D: usize> System<D> {
         heads
     }
 
-    /// Solves for the weights alone: (K + λW⁻¹)w + P a = y, Pᵀw = p for each column of `y`. The system must be factored.
+    /// Solves for the weights alone: (K + λW⁻¹)w + P a = y, Pᵀw = p for each column of `y`. The
+    /// system must be factored.
     ///
-    /// With W^-½w = Qh + z the conditions give h, which moves to the right-hand side of the equations for z.
+    /// With W^-½w = Qh + z the conditions give h, which moves to the right-hand side of the
+    /// equations for z.
     fn solve_adjoint<const R: usize>(
         &self,
         y: &mut [f64],
@@ -684,7 +882,8 @@ impl<const D: usize> System<D> {
     }
 }
 
-/// The lower triangle of a symmetric matrix, column by column, and its Cholesky factor in the same place.
+/// The lower triangle of a symmetric matrix, column by column, and its Cholesky factor in the same
+/// place.
 #[derive(Clone, Debug, Default)]
 struct Triangle {
     n: usize,
@@ -772,7 +971,8 @@ impl Triangle {
         llt::solve::solve_in_place(self.view(), b, Par::Seq, MemStack::new(&mut []));
     }
 
-    /// An estimate of the 2-norm of A⁻¹: two steps of inverse iteration from the column of the least pivot.
+    /// An estimate of the 2-norm of A⁻¹: two steps of inverse iteration from the column of the
+    /// least pivot.
     fn inverse_norm(&self, x: &mut Vec<f64>) -> f64 {
         let pivot = |j: usize| self.data[j * self.stride + j];
         let start = (1..self.n).fold(
@@ -837,7 +1037,8 @@ impl Spectrum {
             memory(&mut stack, scratch),
             parameters,
         );
-        // Without convergence, which finite symmetric matrices do not fail, the spectrum counts as singular.
+        // Without convergence, which finite symmetric matrices do not fail, the spectrum counts as
+        // singular.
         if done.is_err() {
             self.values.fill(0.0);
         }
@@ -870,7 +1071,8 @@ impl Spectrum {
         self.product(self.vectors.as_ref(), spare, b);
     }
 
-    /// 2-norm condition number of A + λI. Infinite where rounding leaves eigenvalues that are not positive.
+    /// 2-norm condition number of A + λI. Infinite where rounding leaves eigenvalues that are not
+    /// positive.
     fn condition(&self, lambda: f64) -> f64 {
         let ends = self.values.first().zip(self.values.last());
         match ends {
@@ -918,7 +1120,8 @@ impl<K: Kernel, const D: usize> Job<f64> for Assemble<'_, K, D> {
     }
 }
 
-/// What column `j` of a symmetric matrix, given from the diagonal on, adds to Y = SQ on both sides of the diagonal.
+/// What column `j` of a symmetric matrix, given from the diagonal on, adds to Y = SQ on both sides
+/// of the diagonal.
 #[inline(always)]
 fn add_column<L: Lane<f64>>(column: &[f64], j: usize, basis: &[f64], product: &mut [f64]) {
     let n = basis.len() / MAX;
@@ -1007,7 +1210,7 @@ struct Buffers {
     residuals: Vec<f64>,
     work: Vec<f64>,
     spare: Vec<f64>,
-    vectors: iterative::Vectors,
+    vectors: Vectors,
 }
 
 /// Largest magnitude.
@@ -1025,7 +1228,8 @@ fn relative(size: f64, targets: &[f64]) -> f64 {
 mod tests {
     use super::*;
 
-    /// Columns of known lengths turned by a known rotation: sizes to rounding, a small one to its own precision.
+    /// Columns of known lengths turned by a known rotation: sizes to rounding, a small one to its
+    /// own precision.
     #[test]
     fn extents_come_to_their_own_precision() {
         let (c, s) = (0.8, 0.6);

@@ -9,9 +9,11 @@ use crate::{
     lanes::{Job, Lane, dispatch},
 };
 
-/// The splines through the same pairs for several λ: what cross-validation over left-out points asks for.
+/// The splines through the same pairs for several λ: what cross-validation over left-out points
+/// asks for.
 ///
-/// The matrix is assembled once for all λ and factored for each. The values at a point share its kernels.
+/// The matrix is assembled once for all λ and factored for each. The values at a point share its
+/// kernels.
 /// A fit takes O(n³/3) a λ, a point O(n) a λ.
 ///
 /// ```
@@ -51,10 +53,12 @@ pub struct LambdaPath<T: Scalar, const D: usize, const M: usize, K = R2LogR> {
 const TOGETHER: usize = 8;
 
 impl<T: Scalar, const D: usize, const M: usize, K: Kernel> LambdaPath<T, D, M, K> {
-    /// The splines of [`Spline::fit`](crate::Spline::fit) with [`Smoothing::Lambda`] of each of the `lambdas`, to rounding.
+    /// The splines of [`Spline::fit`](crate::Spline::fit) with [`Smoothing::Lambda`] of each of the
+    /// `lambdas`, to rounding.
     ///
     /// # Errors
-    /// Those of [`Spline::fit`](crate::Spline::fit), and [`TpsError::Lambda`] for a λ that is not positive and finite.
+    /// Those of [`Spline::fit`](crate::Spline::fit), and [`TpsError::Lambda`] for a λ that is not
+    /// positive and finite.
     pub fn fit(
         sources: &[Point<T, D>],
         targets: &[Point<T, M>],
@@ -76,19 +80,22 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> LambdaPath<T, D, M, K
         empty.refit(sources, targets, options, lambdas)
     }
 
-    /// As [`fit`](Self::fit), in the memory of these splines: for as many points nothing is allocated.
+    /// As [`fit`](Self::fit), in the memory of these splines: for as many points nothing is
+    /// allocated.
     ///
     /// ```
     /// # use nalgebra::Point2;
     /// # use tactile_tps::{FitOptions, LambdaPath};
     /// # fn main() -> Result<(), tactile_tps::TpsError> {
-    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
+    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4,
+    /// #     0.6]].map(Point2::from);
     /// let options = FitOptions::default();
     /// let mut path = LambdaPath::fit(&sources, &sources, &options, &[1e-9, 1.0])?;
     /// let lifted = sources.map(|p| Point2::new(p.x, p.y + p.x * p.y));
     /// path = path.refit(&sources, &lifted, &options, &[1e-9, 1.0])?;
     /// // Nearly interpolated, and smoothed.
-    /// let misses = path.values(&sources[4]).iter().map(|v| (v - lifted[4]).norm()).collect::<Vec<_>>();
+    /// let miss = |v: &Point2<f64>| (v - lifted[4]).norm();
+    /// let misses: Vec<f64> = path.values(&sources[4]).iter().map(miss).collect();
     /// assert!(misses[0] < 1e-6 && misses[1] > 1e-3, "{misses:?}");
     /// # Ok(())
     /// # }

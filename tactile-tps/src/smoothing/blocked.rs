@@ -17,7 +17,8 @@ type Spline = ThinPlateSpline<f64, 3, NegR>;
 ///
 /// Errors of matches on a reconstructed surface are shared by neighbours.
 /// Plain (generalised) cross-validation takes such errors for deformation.
-/// Across the surface, where no two points lie behind each other, the gradient of its spline is noise.
+/// Across the surface, where no two points lie behind each other, the gradient of its spline is
+/// noise.
 ///
 /// Here whole runs of neighbours are predicted from the others
 /// ("blocked" cross-validation: Roberts et al., Ecography 40, 2017).
@@ -146,8 +147,8 @@ impl Fitter {
         )
     }
 
-    /// The greatest λ that predicts left-out runs as well as the best, to one standard error; `None` where too few pairs, or
-    /// too badly placed ones, are there to be split.
+    /// The greatest λ that predicts left-out runs as well as the best, to one standard error;
+    /// `None` where too few pairs, or too badly placed ones, are there to be split.
     fn one_standard_error_lambda(&mut self, pairs: Pairs<'_, f64, 3>) -> Option<f64> {
         let n = pairs.sources.len();
         let as_many = pairs.targets.len() == n && pairs.weights.is_none_or(|w| w.len() == n);
@@ -188,8 +189,8 @@ impl Fitter {
         }
     }
 
-    /// Adds, for every λ, the squared distances from where the spline through one half puts the sources of the other to their targets, times
-    /// the weights.
+    /// Adds, for every λ, the squared distances from where the spline through one half puts the
+    /// sources of the other to their targets, times the weights.
     fn predict(&mut self, half: usize) -> Option<()> {
         let (own, other) = (&self.halves[half], &self.halves[1 - half]);
         self.options.set_weights(&own.weights).ok()?;
@@ -320,8 +321,8 @@ mod tests {
             (sources.iter().map(square).sum::<f64>() / sources.len() as f64).sqrt()
         };
         let [stiff, loose] = [stiff, loose.expect("a spline")].map(|warp| error(&*warp));
-        // An affine fit knows it to the error of 0.03 × 1.2/√3 of 50 groups over the spread 1/√12 of z: 0.010; to two and a half standard
-        // deviations.
+        // An affine fit knows it to the error of 0.03 × 1.2/√3 of 50 groups over the spread 1/√12
+        // of z: 0.010; to two and a half standard deviations.
         assert!(stiff < 0.025, "{stiff}, interpolated {loose}");
         assert!(stiff < 0.5 * loose, "{stiff}, interpolated {loose}");
     }
@@ -341,7 +342,8 @@ mod tests {
         let chosen = error(&*chosen.expect("a spline"));
         let [affine, interpolated] = [Smoothing::Lambda(1e9), Smoothing::None]
             .map(|smoothing| error(&fit_spline(smoothing, &sources, &targets)));
-        // What the gradient of a spline through points of a surface can tell of the bending is told, to a third of the whole.
+        // What the gradient of a spline through points of a surface can tell of the bending is
+        // told, to a third of the whole.
         assert!(
             chosen < interpolated + affine / 3.0,
             "{chosen}: {interpolated} to {affine}"
@@ -378,7 +380,8 @@ mod tests {
         let flat: Vec<_> = sources.iter().map(|p| Point3::new(p.x, p.y, 0.0)).collect();
         let chosen = StrainSpline.fit(&flat, &flat, None).expect("a spline");
         let own = fit_spline(Smoothing::Gcv, &flat, &flat);
-        // Nothing to smooth: both leave the points where they are, to the rounding of a system of 200.
+        // Nothing to smooth: both leave the points where they are, to the rounding of a system of
+        // 200.
         assert!((chosen.apply(&flat[7]) - own.apply(&flat[7])).norm() < 1e-8);
     }
 }

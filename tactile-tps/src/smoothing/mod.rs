@@ -12,12 +12,15 @@ pub use robust::{RobustFit, RobustSpline};
 /// # use nalgebra::Point2;
 /// # use tactile_tps::{FitOptions, Smoothing, ThinPlateSpline};
 /// # fn main() -> Result<(), tactile_tps::TpsError> {
-/// let sources: Vec<Point2<f64>> = (0..25).map(|i| Point2::new(f64::from(i % 5), f64::from(i / 5))).collect();
+/// let sources: Vec<Point2<f64>> = (0..25).map(|i| Point2::new(f64::from(i % 5),
+///     f64::from(i / 5))).collect();
 /// let noise = |i: usize| 0.01 * ((i * 7919 % 101) as f64 / 50.0 - 1.0);
-/// let targets: Vec<_> = sources.iter().enumerate().map(|(i, p)| Point2::new(p.x + noise(i), p.y)).collect();
+/// let targets: Vec<_> = sources.iter().enumerate().map(|(i, p)| Point2::new(p.x + noise(i),
+///     p.y)).collect();
 /// let options = FitOptions::default().with_smoothing(Smoothing::Gcv)?;
 /// let smooth = ThinPlateSpline::fit(&sources, &targets, &options)?;
-/// let through = ThinPlateSpline::fit(&sources, &targets, &options.with_smoothing(Smoothing::None)?)?;
+/// let through = ThinPlateSpline::fit(&sources, &targets,
+///     &options.with_smoothing(Smoothing::None)?)?;
 /// assert!(smooth.report.lambda > 0.0 && smooth.bending_energy() < through.bending_energy());
 /// # Ok(())
 /// # }
@@ -29,17 +32,21 @@ pub enum Smoothing<T> {
     /// Interpolate: λ = 0.
     #[default]
     None,
-    /// Minimise Σ weightᵢ |f(xᵢ) − yᵢ|² + λ wᵀKw for this λ ≥ 0, in the units of the points and the kernel.
+    /// Minimise Σ weightᵢ |f(xᵢ) − yᵢ|² + λ wᵀKw for this λ ≥ 0, in the units of the points and the
+    /// kernel.
     Lambda(T),
-    /// The λ of least generalised cross-validation (Craven & Wahba 1979; Golub, Heath & Wahba 1979).
+    /// The λ of least generalised cross-validation (Craven & Wahba 1979; Golub, Heath & Wahba
+    /// 1979).
     Gcv,
 }
 
-/// The λ of least generalised cross-validation, from the spectrum of the matrix with σ on `affine` directions.
+/// The λ of least generalised cross-validation, from the spectrum of the matrix with σ on `affine`
+/// directions.
 ///
-/// V(λ) = n |W^½(y − f)|² / tr(I − H)², both sums over the eigenvalues μ: |W^½(y − f)|² = Σ (λ/(μ + λ))² e
-/// and tr(I − H) = Σ λ/(μ + λ) less the terms of the affine directions.
-/// `energies` are the squared coefficients e = (vᵀb)² of the values in the eigenvectors, summed over the outputs.
+/// V(λ) = n |W^½(y − f)|² / tr(I − H)², both sums over the eigenvalues μ: |W^½(y − f)|² = Σ (λ/(μ +
+/// λ))² e and tr(I − H) = Σ λ/(μ + λ) less the terms of the affine directions.
+/// `energies` are the squared coefficients e = (vᵀb)² of the values in the eigenvectors, summed
+/// over the outputs.
 pub(crate) fn least_gcv(values: &[f64], energies: &[f64], affine: usize, shift: f64) -> f64 {
     let most = values.iter().fold(f64::MIN_POSITIVE, |m, &mu| m.max(mu));
     let score = |log: f64| {
@@ -50,11 +57,13 @@ pub(crate) fn least_gcv(values: &[f64], energies: &[f64], affine: usize, shift: 
         let trace = all - affine as f64 * filter(shift);
         values.len() as f64 * rss / (trace * trace)
     };
-    // From far below what rounding of the matrix allows to where the spline is affine to single precision.
+    // From far below what rounding of the matrix allows to where the spline is affine to single
+    // precision.
     minimise(most.log2() - 50.0, most.log2() + 24.0, score).exp2()
 }
 
-/// The least of a function on a grid, then by golden section around it. The larger argument where values are equal.
+/// The least of a function on a grid, then by golden section around it. The larger argument where
+/// values are equal.
 fn minimise(low: f64, high: f64, f: impl Fn(f64) -> f64) -> f64 {
     let steps = 148;
     let at = |i: usize| low + (high - low) * i as f64 / steps as f64;

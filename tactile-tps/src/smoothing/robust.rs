@@ -9,7 +9,8 @@ use crate::{
 /// λ that are tried, in units of the squared radius of the points. The last one is affine.
 const LAMBDAS: [f64; 9] = [1e-3, 1e-2, 1e-1, 1.0, 1e1, 1e2, 1e3, 1e4, 1e8];
 
-/// The model of a smoothing spline (kernel r² ln r) that wrong pairs do not bend: [`RobustFit`] as a [`WarpModel`].
+/// The model of a smoothing spline (kernel r² ln r) that wrong pairs do not bend: [`RobustFit`] as
+/// a [`WarpModel`].
 ///
 /// ```
 /// use nalgebra::Point2;
@@ -41,9 +42,10 @@ impl<const D: usize> WarpModel<f64, D> for RobustSpline {
 /// A smoothing spline through matched points, its weights, and what its error is estimated from.
 ///
 /// Every residual is that of a point that was held out of the fit.
-/// The reason: a point on the border of the set pulls a spline towards itself and has a small own residual
-/// whatever its error.
-/// λ is the largest whose held-out loss (Tukey's, bounded) is within one standard error of the least.
+/// The reason: a point on the border of the set pulls a spline towards itself and has a small own
+/// residual whatever its error.
+/// λ is the largest whose held-out loss (Tukey's, bounded) is within one standard error of the
+/// least.
 /// The same predictions give every pair its weight (Tukey's biweight).
 ///
 /// ```
@@ -82,11 +84,13 @@ pub struct RobustFit<const D: usize> {
 impl<const D: usize> RobustFit<D> {
     /// Fits `sources` to `targets`. Prior weights, where given, multiply those that are found.
     ///
-    /// With n points below 300 every spline is fitted to 31/32 of them, 32 times for each of nine λ.
+    /// With n points below 300 every spline is fitted to 31/32 of them, 32 times for each of nine
+    /// λ.
     /// From 300 on there are 12 parts, and λ is chosen on at most 700 points. O(n³) time.
     ///
     /// # Errors
-    /// [`TpsError`] for no points, lengths that differ, numbers that are not finite, weights that are negative.
+    /// [`TpsError`] for no points, lengths that differ, numbers that are not finite, weights that
+    /// are negative.
     pub fn new(
         sources: &[Point<f64, D>],
         targets: &[Point<f64, D>],
@@ -97,7 +101,8 @@ impl<const D: usize> RobustFit<D> {
         let square = squared_radius(sources);
         let relative_lambda = one_standard_error_lambda(sources, targets, &prior, square)?;
         let lambda = relative_lambda * square;
-        // Noise below this is rounding: pairs that miss their prediction by so little are not misplaced.
+        // Noise below this is rounding: pairs that miss their prediction by so little are not
+        // misplaced.
         let rounding = 1e-12 * square.sqrt();
         let mut weights = vec![1.0; sources.len()];
         let (mut folds, mut sigma, mut response) = (Vec::new(), 0.0, 1.0);
@@ -246,12 +251,14 @@ fn squared_radius<const D: usize>(points: &[Point<f64, D>]) -> f64 {
     squares.sum::<f64>() / n
 }
 
-/// Held-out distances beyond this many standard deviations have no weight: the 0.9999 quantile of χ with `D` degrees.
+/// Held-out distances beyond this many standard deviations have no weight: the 0.9999 quantile of χ
+/// with `D` degrees.
 fn cutoff<const D: usize>() -> f64 {
     [3.9, 4.3, 4.6][D.clamp(1, 3) - 1]
 }
 
-/// Standard deviation of one coordinate, from the median distance and the median of χ with `D` degrees.
+/// Standard deviation of one coordinate, from the median distance and the median of χ with `D`
+/// degrees.
 fn noise<const D: usize>(distances: &[f64]) -> f64 {
     let mut sorted = distances.to_vec();
     sorted.sort_by(f64::total_cmp);
@@ -263,7 +270,8 @@ fn biweight(u: f64) -> f64 {
     if u < 1.0 { (1.0 - u * u).powi(2) } else { 0.0 }
 }
 
-/// Derivative of the pull w(u)u of a point by its own residual, averaged over directions: w + u w'/D.
+/// Derivative of the pull w(u)u of a point by its own residual, averaged over directions: w + u
+/// w'/D.
 ///
 /// An M-estimator's error is that of its pulls over the mean of this, not over the mean weight
 /// (Huber 1981, 7.6). On clean data in the plane the ratio of the two is 1.26.

@@ -100,7 +100,8 @@ fn agrees<const D: usize, K: Kernel>(kernel: K) {
         let (value, jacobian) = (spline.apply(&query), spline.jacobian(&query));
         for k in 0..D {
             for (m, dual) in along(&spline, &kernel, &query, k).iter().enumerate() {
-                // Rounding, 1e-16, of terms of at most a weight times U and U' at a distance of 10, below 1e3.
+                // Rounding, 1e-16, of terms of at most a weight times U and U' at a distance of 10,
+                // below 1e3.
                 let rounding = 1e-13 * (weight + 1.0) * 10.0;
                 assert!(
                     (dual.0 - value[m]).abs() < rounding,

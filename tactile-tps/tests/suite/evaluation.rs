@@ -1,4 +1,5 @@
-//! Values and derivatives: right, the same bits alone, in batches and in threads, in both precisions, near and far.
+//! Values and derivatives: right, the same bits alone, in batches and in threads, in both
+//! precisions, near and far.
 
 use crate::common::{Uniform, bend, fit, for_all};
 use nalgebra::{Point, Point2, SMatrix, SVector};
@@ -24,7 +25,8 @@ fn has_the_derivatives_it_says<const D: usize, K: Kernel>(kernel: K, seed: u64) 
         let bend =
             (spline.jacobian(&(query + step)) - spline.jacobian(&(query - step))) / (2.0 * STEP);
         for m in 0..D {
-            // Central differences: h² times third derivatives, at most w/0.05² with weights below 10.
+            // Central differences: h² times third derivatives, at most w/0.05² with weights below
+            // 10.
             assert!((slope[m] - jacobian[(m, k)]).abs() < 1e-4);
             for l in 0..D {
                 assert!((bend[(m, l)] - hessian[m][(l, k)]).abs() < 1e-2);
@@ -97,14 +99,16 @@ proptest! {
 
     #[test]
     fn single_precision_follows_double(seed in 1u64..u64::MAX) {
-        // Every kernel and every dimension once: each further pair takes seconds to compile and shares all its code with these.
+        // Every kernel and every dimension once: each further pair takes seconds to compile and
+        // shares all its code with these.
         works_in_single_precision::<2, _>(R2LogR, seed);
         works_in_single_precision::<2, _>(R3, seed);
         works_in_single_precision::<3, _>(NegR, seed);
     }
 }
 
-/// Far from the points the terms cancel: the digits that are reported bound the distance from the law of the far field.
+/// Far from the points the terms cancel: the digits that are reported bound the distance from the
+/// law of the far field.
 #[test]
 fn far_values_report_their_digits() {
     let sources = Uniform(21).points::<2>(40);
@@ -112,7 +116,8 @@ fn far_values_report_their_digits() {
     let spline = fit(&sources, &targets, &FitOptions::new(R3));
     let place = |distance: f64| Point2::new(distance, 0.5 * distance);
     assert!(spline.digits(&place(1e7)) < 2.0 && spline.digits(&sources[0]) > 8.0);
-    // Moments of degree 0 and 1 vanish: of fixed direction the value grows as the distance, with a correction of 1/r.
+    // Moments of degree 0 and 1 vanish: of fixed direction the value grows as the distance, with a
+    // correction of 1/r.
     let slope = |distance: f64| spline.apply(&place(distance)).coords / distance;
     let far = slope(1e3);
     for distance in [3e3, 1e4] {

@@ -1,4 +1,5 @@
-//! The influence of targets on a spline against refits, against what splines reproduce, and against merged points.
+//! The influence of targets on a spline against refits, against what splines reproduce, and against
+//! merged points.
 
 use crate::common::{Uniform, bend, largest, options};
 use nalgebra::{Matrix3, Point, Point1, SMatrix, SVector};
@@ -84,7 +85,8 @@ fn influences_are_fits_to_unit_targets() {
     }
 }
 
-/// In metres and in micrometres, for many outputs, with points merged: the sums are the spline to rounding.
+/// In metres and in micrometres, for many outputs, with points merged: the sums are the spline to
+/// rounding.
 #[test]
 fn influences_sum_to_the_spline() {
     let mut random = Uniform(9);
@@ -110,7 +112,8 @@ fn influences_sum_to_the_spline() {
     }
 }
 
-/// Splines reproduce affine maps, so influences have the moments of a point: also off a plane that holds all sources.
+/// Splines reproduce affine maps, so influences have the moments of a point: also off a plane that
+/// holds all sources.
 #[test]
 fn influences_have_the_moments_of_the_point() {
     let mut random = Uniform(3);
@@ -136,7 +139,8 @@ fn influences_have_the_moments_of_the_point() {
     }
 }
 
-/// In single precision the numbers are those of double precision, rounded once from sources that were rounded before.
+/// In single precision the numbers are those of double precision, rounded once from sources that
+/// were rounded before.
 #[test]
 fn single_precision_keeps_its_digits() {
     let sources = Uniform(4).points::<2>(30);

@@ -4,7 +4,8 @@ use crate::common::{Uniform, bend, fit, options};
 use nalgebra::{Point2, Point3, SVector};
 use tactile_tps::{FitOptions, NegR, R2LogR, Smoothing, ThinPlateSpline, TpsError};
 
-/// Twice the same place with one value is one point; with two values it is their weighted mean, smoothed.
+/// Twice the same place with one value is one point; with two values it is their weighted mean,
+/// smoothed.
 #[test]
 fn coinciding_points_are_merged() {
     let mut random = Uniform(11);

@@ -40,7 +40,8 @@ fn compare<const D: usize, K: Kernel>(
     )
 }
 
-/// The residual is at most 1e-10 of targets of size one; between the points a spline is off by little more than at them.
+/// The residual is at most 1e-10 of targets of size one; between the points a spline is off by
+/// little more than at them.
 /// Steps grow slowly with the number of points; a preconditioner without effect takes hundreds.
 #[test]
 fn iteration_finds_the_direct_solution() {
@@ -97,7 +98,8 @@ fn awkward_points_are_no_obstacle() {
     }
 }
 
-/// New targets, weights and λ are those of a fit with them, and cost no memory after the first round.
+/// New targets, weights and λ are those of a fit with them, and cost no memory after the first
+/// round.
 #[test]
 fn refits_are_fits() {
     let sources = Uniform(11).points::<3>(POINTS);
@@ -162,7 +164,8 @@ fn a_watch_stops_the_fit() {
     });
     let early = early.expect("the best so far");
     assert!(early.report.iterations == 3 && !early.report.converged());
-    // What was told is what is reported: the residual carried along and the one formed anew differ by rounding.
+    // What was told is what is reported: the residual carried along and the one formed anew differ
+    // by rounding.
     let (told, reported) = (residuals[3], early.report.residual.expect("measured"));
     assert!(
         (told / reported - 1.0).abs() < 1e-6 && reported < 0.01 * residuals[0],

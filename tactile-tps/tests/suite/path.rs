@@ -115,7 +115,8 @@ fn what_cannot_be_fitted_is_refused() {
     assert!(values.coords.iter().all(|x| x.is_nan()), "as a spline's");
 }
 
-/// In the memory of other splines, of more or fewer points, with or without weights, the values are those of a new fit.
+/// In the memory of other splines, of more or fewer points, with or without weights, the values are
+/// those of a new fit.
 #[test]
 fn what_was_fitted_before_leaves_no_trace() {
     let query = Point3::new(0.2, 0.1, 0.7);
@@ -165,7 +166,8 @@ fn what_was_fitted_before_leaves_no_trace() {
     }
 }
 
-/// A factor of the last points is not taken for one of these: what has none, by its smoothing or its number of points, is solved anew.
+/// A factor of the last points is not taken for one of these: what has none, by its smoothing or
+/// its number of points, is solved anew.
 #[test]
 fn a_factor_of_other_points_is_not_used() {
     let (old, sources) = (dome(40, 0.7), dome(40, 1.0));

@@ -1,4 +1,5 @@
-//! What every spline must be: interpolating, affine where its targets are, the same in any frame, unit and order.
+//! What every spline must be: interpolating, affine where its targets are, the same in any frame,
+//! unit and order.
 
 use crate::common::{Uniform, bend, fit, for_all, largest, options};
 use nalgebra::{Point, Point2, Point3, Rotation2, Rotation3, SMatrix, SVector};
@@ -13,7 +14,8 @@ fn interpolates<const D: usize, K: Kernel>(kernel: K, seed: u64) {
     let targets: Vec<_> = sources.iter().map(bend).collect();
     let spline = fit(&sources, &targets, &FitOptions::new(kernel));
     for (x, y) in sources.iter().zip(&targets) {
-        // Rounding of sums of 40 terms whose weights reach some 1e3 for r³ on close points: far below 1e-10.
+        // Rounding of sums of 40 terms whose weights reach some 1e3 for r³ on close points: far
+        // below 1e-10.
         assert!((spline.apply(x) - y).norm() < 1e-10);
     }
     let residual = spline.report.residual.expect("measured");
@@ -39,8 +41,8 @@ fn reproduces_affine_maps<const D: usize, K: Kernel>(kernel: K, seed: u64) {
             &targets,
             &options(kernel.clone(), smoothing, None),
         );
-        // The targets' own rounding, up to 1e-15 of their size 10 over 30 points, times the condition number: close
-        // points under r³ bring it to 1e8.
+        // The targets' own rounding, up to 1e-15 of their size 10 over 30 points, times the
+        // condition number: close points under r³ bring it to 1e8.
         let rounding = 5e-15 * spline.report.condition;
         assert!(
             largest(
@@ -110,7 +112,8 @@ fn smooths_towards_the_affine_fit<const D: usize, K: Kernel>(kernel: K, seed: u6
     assert!((spline.apply(&query) - limit.apply(&query)).norm() < 1e-9);
 }
 
-/// The same spline by every way in: at once, refitted in place, by the spectrum, with weights and without.
+/// The same spline by every way in: at once, refitted in place, by the spectrum, with weights and
+/// without.
 fn refits_to_the_same<const D: usize, K: Kernel + Default>(kernel: K, seed: u64) {
     let mut random = Uniform(seed);
     let sources = random.points::<D>(35);
@@ -157,7 +160,11 @@ proptest! {
     }
 
     #[test]
-    fn frames_and_units_do_not_matter(seed in 1u64..u64::MAX, angle in -3.0..3.0f64, power in -6.0..6.0f64) {
+    fn frames_and_units_do_not_matter(
+        seed in 1u64..u64::MAX,
+        angle in -3.0..3.0f64,
+        power in -6.0..6.0f64,
+    ) {
         let turn2 = |x: &Point2<f64>| Rotation2::new(angle) * x;
         let turn3 = |x: &Point3<f64>| Rotation3::from_euler_angles(angle, 0.3, -0.7 * angle) * x;
         let scale = 10f64.powf(power);
@@ -184,7 +191,8 @@ proptest! {
     }
 }
 
-/// Noise of a known size on a smooth map: cross-validation must come closer to the map than interpolation does.
+/// Noise of a known size on a smooth map: cross-validation must come closer to the map than
+/// interpolation does.
 #[test]
 fn cross_validation_finds_the_noise() {
     let mut random = Uniform(7);

@@ -1,6 +1,8 @@
-//! Answers of every public path, compared with recorded ones: a change that is not meant to move a number must not.
+//! Answers of every public path, compared with recorded ones: a change that is not meant to move a
+//! number must not.
 //!
-//! `RECORD_ANSWERS=1 cargo test -p tactile-tps --test suite recorded` writes the record anew; the commit says why numbers moved.
+//! `RECORD_ANSWERS=1 cargo test -p tactile-tps --test suite recorded` writes the record anew; the
+//! commit says why numbers moved.
 
 use test_support as record;
 
@@ -13,8 +15,8 @@ use tactile_tps::{
 use self::record::Answers;
 use super::common::{Uniform, bend, options};
 
-/// Relative to the largest number of a line: sums of 40 terms in another order differ by 1e-15, times condition numbers
-/// of at most 1e4: processors with wider instructions sum in another order.
+/// Relative to the largest number of a line: sums of 40 terms in another order differ by 1e-15,
+/// times condition numbers of at most 1e4: processors with wider instructions sum in another order.
 const TOLERANCE: f64 = 1e-11;
 
 /// Where λ minimises a score: its least is flat, so that λ is known to the root of rounding, 1e-8.
@@ -127,7 +129,8 @@ fn all() -> Answers {
     answers
 }
 
-/// Iteration stops at a residual: its answers are those of the direct solver to that, and are not recorded.
+/// Iteration stops at a residual: its answers are those of the direct solver to that, and are not
+/// recorded.
 #[test]
 fn answers_are_the_recorded_ones() {
     let found = all();

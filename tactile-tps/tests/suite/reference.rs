@@ -1,6 +1,8 @@
-//! Agreement with splines computed in 110-digit arithmetic, case by case, to the tolerance their authors state.
+//! Agreement with splines computed in 110-digit arithmetic, case by case, to the tolerance their
+//! authors state.
 //!
-//! The numbers lie outside the repository, in the folder named by `TACTILE_DATA` or in `../shared/data`.
+//! The numbers lie outside the repository, in the folder named by `TACTILE_DATA` or in
+//! `../shared/data`.
 #![allow(clippy::print_stdout)]
 
 use std::collections::BTreeMap;
@@ -70,7 +72,8 @@ fn options<K: Kernel>(case: &Value, kernel: K) -> FitOptions<f64, K> {
     crate::common::options(kernel, smoothing, weights.as_deref())
 }
 
-/// The tolerance the reference states: never below 1e-13, growing with conditioning and cancellation.
+/// The tolerance the reference states: never below 1e-13, growing with conditioning and
+/// cancellation.
 fn tolerance(n: usize, sensitivity: f64, summation: f64) -> f64 {
     f64::max(
         1e-13,
@@ -100,7 +103,8 @@ fn check<const D: usize, K: Kernel>(table: &mut Table, case: &Value, kernel: K) 
     coefficients(table, case, &spline, &targets);
 }
 
-/// Two points in one place: an error where their values differ, the spline of the others where they agree.
+/// Two points in one place: an error where their values differ, the spline of the others where they
+/// agree.
 fn singular<const D: usize, K: Kernel>(
     case: &Value,
     sources: &[Point<f64, D>],
@@ -213,7 +217,8 @@ fn coefficients<const D: usize, K: Kernel>(
         .zip(&rows)
         .flat_map(|((_, w), row)| (0..row.len()).map(move |k| w[k] - row[k]));
     let (error, size) = (largest(errors), largest(rows.iter().flatten().copied()));
-    // Of points that nearly coincide the weights share a sum. Each alone keeps rounding times the condition number.
+    // Of points that nearly coincide the weights share a sum. Each alone keeps rounding times the
+    // condition number.
     let condition = spline.report.condition;
     let coincidence = if condition > 1e10 {
         0.5f64.powi(53) * condition

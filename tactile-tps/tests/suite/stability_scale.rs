@@ -1,5 +1,6 @@
-//! Scales from 1e-9 to 1e9, offsets of 1e6 diameters, nearly flat and nearly equal points, λ up to 1e12, single precision and
-//! singular systems: every error in units of what rounding the inputs alone does to the exact spline.
+//! Scales from 1e-9 to 1e9, offsets of 1e6 diameters, nearly flat and nearly equal points, λ up to
+//! 1e12, single precision and singular systems: every error in units of what rounding the inputs
+//! alone does to the exact spline.
 #![allow(clippy::print_stdout)]
 
 use test_support as worst;
@@ -19,8 +20,8 @@ fn points<const D: usize>(value: &Value) -> Vec<Point<f64, D>> {
         .collect()
 }
 
-/// `condition` counts every rounding of an input once. A fit does some n = 8 operations per entry of a system of 12 rows, and an
-/// algorithm that is backward stable is within that many units: 100.
+/// `condition` counts every rounding of an input once. A fit does some n = 8 operations per entry
+/// of a system of 12 rows, and an algorithm that is backward stable is within that many units: 100.
 const ALLOWED: f64 = 100.0;
 
 fn check<const D: usize, K: Kernel>(table: &mut Worst, case: &Value, kernel: K) {
@@ -67,7 +68,8 @@ fn splines_of_hard_points_are_as_good_as_their_inputs() {
     table.finish();
 }
 
-/// f32 against f64 on the same numbers, in units of f32's rounding times the condition number that the fit itself reports.
+/// f32 against f64 on the same numbers, in units of f32's rounding times the condition number that
+/// the fit itself reports.
 fn single_precision(table: &mut Worst) {
     let sources: Vec<Point<f32, 3>> = Uniform(9)
         .points::<3>(40)
