@@ -33,7 +33,9 @@ pub mod sensor;
 mod strain_between;
 
 pub use pipeline::{Measurement, Object, Pipeline, Press};
-pub use strain_between::{StrainBetween, StrainBetweenError, StrainBetweenOptions, strain_between};
+pub use strain_between::{
+    PairsDoubt, StrainBetween, StrainBetweenError, StrainBetweenOptions, strain_between,
+};
 
 /// The types and traits of a program that measures with stages of its own: `use tactile_imaging::prelude::*`.
 pub mod prelude {

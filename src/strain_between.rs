@@ -2,7 +2,7 @@
 use crate::elasticity::ElasticityError;
 use crate::elasticity::field::{StrainField, StrainSummary};
 use crate::elasticity::strain::{GreenLagrange, StrainMeasure};
-use crate::matching::{AnnealedSoftassign, MatchError, PointMatcher};
+use crate::matching::{AnnealedSoftassign, Doubt, MatchError, PointMatcher};
 use crate::tps::{RobustFit, ThinPlateSpline, TpsError};
 use nalgebra::{Matrix3, Point, SVector};
 use std::sync::Arc;
@@ -20,6 +20,7 @@ use std::sync::Arc;
 pub struct StrainBetweenOptions<const D: usize> {
     matcher: Arc<dyn PointMatcher<D> + Send + Sync>,
     measure: Arc<dyn StrainMeasure + Send + Sync>,
+    doubtful_pairs: bool,
 }
 
 impl<const D: usize> Default for StrainBetweenOptions<D>
@@ -31,6 +32,7 @@ where
         Self {
             matcher: Arc::new(AnnealedSoftassign::default()),
             measure: Arc::new(GreenLagrange),
+            doubtful_pairs: false,
         }
     }
 }
@@ -48,6 +50,62 @@ impl<const D: usize> StrainBetweenOptions<D> {
     pub fn with_measure(mut self, measure: impl StrainMeasure + Send + Sync + 'static) -> Self {
         self.measure = Arc::new(measure);
         self
+    }
+
+    /// Answers with a strain of doubtful pairs too, its [`doubt`](StrainBetween::doubt) beside it. By default
+    /// [`StrainBetweenError::Doubtful`] takes its place.
+    #[must_use]
+    pub fn with_doubtful_pairs(mut self) -> Self {
+        self.doubtful_pairs = true;
+        self
+    }
+}
+
+/// Why the pairs behind a strain may be wrong.
+///
+/// ```
+/// use tactile_imaging::PairsDoubt;
+/// let doubt = PairsDoubt::FewPartners { share: 0.31 };
+/// assert_eq!(doubt.to_string(), "31 % of the smaller set have a partner on one smooth deformation");
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum PairsDoubt {
+    /// The matcher's own doubt.
+    Matcher(Doubt),
+    /// Less than half of the smaller set lies on one smooth deformation.
+    FewPartners {
+        /// Share of the smaller set that does.
+        share: f64,
+    },
+    /// The residuals are so large that a point cannot be told from its neighbour.
+    LargeResiduals {
+        /// Noise of one coordinate over the usual distance between neighbours.
+        ratio: f64,
+    },
+}
+
+impl std::fmt::Display for PairsDoubt {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Matcher(Doubt::FewPairs) => {
+                f.write_str("the matched points are so few that they may have met by chance")
+            }
+            Self::Matcher(Doubt::LargeResiduals) => {
+                f.write_str("the residuals of the match are as large as those of scattered points")
+            }
+            Self::Matcher(_) => f.write_str("one matched pair in twenty or more is wrong"),
+            Self::FewPartners { share } => write!(
+                f,
+                "{:.0} % of the smaller set have a partner on one smooth deformation",
+                100.0 * share
+            ),
+            Self::LargeResiduals { ratio } => write!(
+                f,
+                "the residuals are {:.0} % of the distance between neighbours",
+                100.0 * ratio
+            ),
+        }
     }
 }
 
@@ -73,6 +131,9 @@ pub enum StrainBetweenError {
         /// Number of pairs.
         found: usize,
     },
+    /// The pairs may be wrong, and a strain of doubtful pairs was not asked for.
+    #[error("no strain of doubtful pairs: {0}")]
+    Doubtful(PairsDoubt),
     /// No smooth deformation takes the points to their partners.
     #[error("the matched points do not lie on any smooth deformation")]
     NotSmooth,
@@ -113,6 +174,8 @@ pub struct StrainBetween<const D: usize> {
     pub sigma: f64,
     /// Smoothing λ over the squared radius of the points.
     pub relative_lambda: f64,
+    /// Why the pairs may be wrong, where there is a reason.
+    pub doubt: Option<PairsDoubt>,
 }
 
 /// Strain of the first set on its way to the second.
@@ -151,7 +214,16 @@ pub fn strain_between<const D: usize>(
         .enumerate()
         .filter_map(partner)
         .collect();
-    StrainBetween::of_pairs(before, after, &pairs, options.measure.as_ref())
+    let mut found = StrainBetween::of_pairs(before, after, &pairs, options.measure.as_ref())?;
+    found.doubt = matching
+        .report
+        .doubt
+        .map(PairsDoubt::Matcher)
+        .or(found.doubt);
+    match found.doubt {
+        Some(doubt) if !options.doubtful_pairs => Err(StrainBetweenError::Doubtful(doubt)),
+        _ => Ok(found),
+    }
 }
 
 impl<const D: usize> StrainBetween<D> {
@@ -172,8 +244,9 @@ impl<const D: usize> StrainBetween<D> {
             return Err(StrainBetweenError::TooFewPairs { expected, found });
         }
         let rough = fit(before, after, matched)?;
+        let spacing = median_spacing(after);
         // A point that lies where the spline predicts is a partner, whatever the matcher's answer.
-        let rows = partners(before, after, &rough);
+        let rows = partners(before, after, &rough, spacing);
         if rows.len() < expected {
             return Err(StrainBetweenError::NotSmooth);
         }
@@ -193,7 +266,9 @@ impl<const D: usize> StrainBetween<D> {
             jackknife(&without) * robust.response
         };
         let displacement = |p: &Point<f64, D>| robust.spline.apply(p) - p;
+        let share = rows.len() as f64 / before.len().min(after.len()) as f64;
         Ok(Self {
+            doubt: doubt(share, robust.sigma / spacing),
             pairs: rows.iter().map(|&(i, j)| [before[i], after[j]]).collect(),
             displacements: sources.iter().map(displacement).collect(),
             standard_errors: (0..rows.len()).map(errors_at).collect(),
@@ -234,24 +309,46 @@ fn gradients<const D: usize>(
         .collect()
 }
 
+/// Why a share of matched points or their residuals over the distance between neighbours cast doubt on the pairs.
+///
+/// Where the deformation is wrong, a prediction meets some point within a third of the spacing by chance, a tenth of them in
+/// space and a third in the plane. Residuals of a quarter of the spacing exchange one neighbour in twenty.
+fn doubt(share: f64, ratio: f64) -> Option<PairsDoubt> {
+    if share < 0.5 {
+        Some(PairsDoubt::FewPartners { share })
+    } else if ratio > 0.25 {
+        Some(PairsDoubt::LargeResiduals { ratio })
+    } else {
+        None
+    }
+}
+
+/// The point of a set nearest to `p`, without the one of row `not`.
+fn nearest<const D: usize>(p: &Point<f64, D>, set: &[Point<f64, D>], not: usize) -> Option<usize> {
+    let distance = |k: usize| (set[k] - p).norm_squared();
+    (0..set.len())
+        .filter(|&k| k != not)
+        .min_by(|&a, &b| distance(a).total_cmp(&distance(b)))
+}
+
+/// Median distance to the nearest neighbour.
+fn median_spacing<const D: usize>(points: &[Point<f64, D>]) -> f64 {
+    let mut spacing: Vec<f64> = (0..points.len())
+        .filter_map(|j| nearest(&points[j], points, j).map(|k| (points[k] - points[j]).norm()))
+        .collect();
+    spacing.sort_by(f64::total_cmp);
+    spacing.get(spacing.len() / 2).copied().unwrap_or(0.0)
+}
+
 /// Mutual nearest neighbours of prediction and target, within a third of the targets' usual spacing.
 fn partners<const D: usize>(
     before: &[Point<f64, D>],
     after: &[Point<f64, D>],
     rough: &RobustFit<D>,
+    spacing: f64,
 ) -> Vec<(usize, usize)> {
     let predicted: Vec<_> = before.iter().map(|p| rough.spline.apply(p)).collect();
-    let nearest = |p: &Point<f64, D>, set: &[Point<f64, D>], not: usize| {
-        let distance = |k: usize| (set[k] - p).norm_squared();
-        (0..set.len())
-            .filter(|&k| k != not)
-            .min_by(|&a, &b| distance(a).total_cmp(&distance(b)))
-    };
-    let mut spacing: Vec<f64> = (0..after.len())
-        .filter_map(|j| nearest(&after[j], after, j).map(|k| (after[k] - after[j]).norm()))
-        .collect();
-    spacing.sort_by(f64::total_cmp);
-    let reach = spacing.get(spacing.len() / 2).map_or(0.0, |s| s / 3.0);
+    let reach = spacing / 3.0;
     (0..before.len())
         .filter_map(|i| nearest(&predicted[i], after, usize::MAX).map(|j| (i, j)))
         .filter(|&(i, j)| (after[j] - predicted[i]).norm() <= reach)
