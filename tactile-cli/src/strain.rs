@@ -198,6 +198,9 @@ impl<const D: usize> StrainReport<D> {
             format!("λ = {:.0e} squared radii", found.relative_lambda)
         };
         context.row("smoothing", smoothing);
+        if let Some(doubt) = found.doubt {
+            context.row("DOUBT", doubt);
+        }
         let folded = found.summary.folded.len();
         if folded > 0 {
             let text = format!("at {folded} points (det F ≤ 0), left out of the mean");
@@ -249,6 +252,7 @@ impl<const D: usize> StrainReport<D> {
             "smoothing_over_squared_radius": found.relative_lambda,
             "degrees_of_freedom": found.degrees_of_freedom,
             "folded_points": found.summary.folded,
+            "doubt": found.doubt.map(|doubt| doubt.to_string()),
             "components": tensors,
         })
     }
