@@ -23,7 +23,7 @@
 
 use crate::element::{GAUSS3, quadratic};
 use crate::material::Kinematics;
-use crate::model::{ElementModel, Fields, RigidShape};
+use crate::model::{ElementModel, ModelFields, RigidShape};
 use crate::stick::Slip;
 
 /// What a surface may touch.
@@ -654,7 +654,7 @@ pub struct Candidate {
 
 impl ElementModel {
     /// Where contact is judged at a state.
-    pub fn placement<'a>(&'a self, fields: &'a Fields) -> Placement<'a> {
+    pub fn placement<'a>(&'a self, fields: &'a ModelFields) -> Placement<'a> {
         Placement {
             kinematics: self.kinematics,
             nodes: &self.nodes,
@@ -664,7 +664,7 @@ impl ElementModel {
     }
 
     /// Contact nodes that touch or are nearer than two spacings and `margin`.
-    pub fn candidates(&self, fields: &Fields, margin: f64) -> Vec<Candidate> {
+    pub fn candidates(&self, fields: &ModelFields, margin: f64) -> Vec<Candidate> {
         // Part of a node's area that has something opposite to it, below which the node is open.
         let least_share = 0.25;
         let placement = self.placement(fields);
@@ -704,7 +704,7 @@ impl ElementModel {
     }
 
     /// The points at which gaps are measured at a state.
-    pub fn contact_points(&self, fields: &Fields) -> Vec<GapPoint> {
+    pub fn contact_points(&self, fields: &ModelFields) -> Vec<GapPoint> {
         let placement = self.placement(fields);
         let mut points = Vec::with_capacity(3 * self.segments.len());
         for segment in &self.segments {

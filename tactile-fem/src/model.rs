@@ -305,7 +305,7 @@ impl ElementModel {
 
 /// The unknowns: displacements, element pressures and the approach.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Fields {
+pub struct ModelFields {
     /// Component 2 node + (0 for r, 1 for z).
     pub displacement: Vec<f64>,
     pub pressures: Vec<[f64; 3]>,
@@ -318,7 +318,7 @@ pub struct Fields {
     pub anchors: Vec<Option<Anchor>>,
 }
 
-impl Fields {
+impl ModelFields {
     pub fn zero(model: &ElementModel) -> Self {
         Self {
             displacement: vec![0.0; 2 * model.nodes.len()],
@@ -341,7 +341,7 @@ impl Fields {
 
 /// An equilibrium.
 pub struct Equilibrium {
-    pub fields: Fields,
+    pub fields: ModelFields,
     pub force: f64,
 }
 

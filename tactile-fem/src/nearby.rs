@@ -2,7 +2,7 @@
 
 use crate::element::{ElementGeometry, Elimination};
 use crate::material::Material;
-use crate::model::{ElementModel, Fields};
+use crate::model::{ElementModel, ModelFields};
 use crate::scene::{AppliedLoad, FemScene, Outcome};
 use crate::slide::Relaxation;
 use crate::sparse::Factors;
@@ -222,7 +222,7 @@ impl SolvedFrames {
 /// A state with its tangent.
 struct SolvedNeighbourhood<'a> {
     model: &'a ElementModel,
-    fields: &'a Fields,
+    fields: &'a ModelFields,
     tangent: Tangent,
     factors: Factors,
     slots: Arc<[Slot]>,

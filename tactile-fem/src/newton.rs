@@ -12,7 +12,7 @@
 use crate::contact::Opposite;
 use crate::element::{Elimination, OUTER};
 use crate::material::Kinematics;
-use crate::model::{ElementModel, Equilibrium, Fields};
+use crate::model::{ElementModel, Equilibrium, ModelFields};
 use crate::scene::{AppliedLoad, Outcome, Solution, SolverReport};
 use crate::sparse::Factors;
 use crate::state::State;
@@ -51,7 +51,7 @@ impl ElementModel {
         loads: &[AppliedLoad],
         guesses: &[State],
     ) -> Solution {
-        let mut unloaded = Fields::zero(self);
+        let mut unloaded = ModelFields::zero(self);
         if self.sticks {
             unloaded.anchors = self.first_anchors(&unloaded);
         }
@@ -251,7 +251,7 @@ impl Solver<'_> {
         self.newton(self.last.fields.clone(), goal)
     }
 
-    fn extrapolated(&self, goal: Goal) -> Option<Fields> {
+    fn extrapolated(&self, goal: Goal) -> Option<ModelFields> {
         if self.slides() {
             // Nodes that came into contact since do not go on as they did.
             return None;
@@ -269,7 +269,7 @@ impl Solver<'_> {
         let (a, b) = (&before.fields, &self.last.fields);
         let displacement = a.displacement.iter().zip(&b.displacement);
         let pressures = a.pressures.iter().zip(&b.pressures);
-        Some(Fields {
+        Some(ModelFields {
             displacement: displacement.map(|(a, b)| b + ratio * (b - a)).collect(),
             pressures: pressures
                 .map(|(a, b)| core::array::from_fn(|k| b[k] + ratio * (b[k] - a[k])))
@@ -283,7 +283,7 @@ impl Solver<'_> {
 
     /// Equilibrium at the goal. Without contacts by simplified Newton iterations where they
     /// converge.
-    fn newton(&mut self, start: Fields, goal: Goal) -> Option<Equilibrium> {
+    fn newton(&mut self, start: ModelFields, goal: Goal) -> Option<Equilibrium> {
         if let (Goal::Approach(to), true) = (goal, self.model.contact_nodes.is_empty()) {
             let iterations = &mut self.report.iterations;
             let found = simplified(self.model, self.layout, &start, to, iterations);
@@ -292,7 +292,7 @@ impl Solver<'_> {
         self.full(start, goal)
     }
 
-    fn full(&mut self, start: Fields, goal: Goal) -> Option<Equilibrium> {
+    fn full(&mut self, start: ModelFields, goal: Goal) -> Option<Equilibrium> {
         // Imbalance at a guessed approach below which the force takes over.
         let switch_to_force = 1e-2;
         // Part of a Newton step below which it is given up, where elements are turned inside out
@@ -309,7 +309,7 @@ impl Solver<'_> {
             Goal::Force(force) => Goal::Approach(self.approach_for(force)),
             Goal::Approach(_) => goal,
         };
-        let margin = |goal: Goal, fields: &Fields| match goal {
+        let margin = |goal: Goal, fields: &ModelFields| match goal {
             Goal::Approach(target) => target - fields.approach,
             Goal::Force(_) => 0.0,
         };
@@ -412,7 +412,7 @@ impl Solver<'_> {
 fn simplified(
     model: &ElementModel,
     layout: &mut Layout,
-    start: &Fields,
+    start: &ModelFields,
     approach: f64,
     iterations: &mut usize,
 ) -> Option<Equilibrium> {
@@ -465,7 +465,7 @@ pub struct Chord {
 enum Ending {
     Balanced(Equilibrium),
     /// They converge no longer, or not fast: the iterate from which a new tangent is to be taken.
-    Slow(Fields),
+    Slow(ModelFields),
 }
 
 /// Forces out of balance at some displacements.
@@ -504,7 +504,7 @@ impl Chord {
     fn iterate(
         &self,
         model: &ElementModel,
-        start: Fields,
+        start: ModelFields,
         approach: f64,
         is_new: bool,
         iterations: &mut usize,
@@ -516,7 +516,7 @@ impl Chord {
         // A full step of Newton's method may raise the imbalance on its way to the solution.
         let mut may_rise = is_new;
         // The iterate before and its imbalance.
-        let mut before: Option<(Fields, f64)> = None;
+        let mut before: Option<(ModelFields, f64)> = None;
         loop {
             let unbalanced = self.unbalanced(model, &fields);
             let imbalance = (unbalanced.as_ref()).map_or(f64::INFINITY, |found| found.imbalance);
@@ -555,7 +555,7 @@ impl Chord {
     }
 
     /// `None` where an element is turned inside out.
-    fn unbalanced(&self, model: &ElementModel, fields: &Fields) -> Option<Unbalanced> {
+    fn unbalanced(&self, model: &ElementModel, fields: &ModelFields) -> Option<Unbalanced> {
         let mut found = Unbalanced {
             right: vec![0.0; self.by_approach.len()],
             centres: Vec::with_capacity(model.elements.len()),
@@ -608,10 +608,10 @@ impl Chord {
     fn step(
         &self,
         model: &ElementModel,
-        fields: &Fields,
+        fields: &ModelFields,
         unbalanced: &Unbalanced,
         approach: f64,
-    ) -> Option<Fields> {
+    ) -> Option<ModelFields> {
         let mut solution = unbalanced.right.clone();
         self.factors.solve(&mut solution).ok()?;
         let step = approach - fields.approach;

@@ -10,7 +10,7 @@
 //! elements' forces.
 
 use crate::element::{GAUSS3, quadratic};
-use crate::model::{BondedInterface, ElementModel, Fields};
+use crate::model::{BondedInterface, ElementModel, ModelFields};
 use crate::state::{ContactRadius, PressurePoint};
 use core::f64::consts::{PI, TAU};
 use nalgebra::DVector;
@@ -267,7 +267,7 @@ fn smooth(points: &[PressurePoint], means: &[Mean], fit: Option<&Fit>) -> Vec<Pr
 impl ElementModel {
     /// Force per deformed area at the contact's nodes from the axis outwards, and their axial
     /// forces.
-    pub fn contact_pressure(&self, fields: &Fields) -> (Vec<PressurePoint>, Vec<f64>) {
+    pub fn contact_pressure(&self, fields: &ModelFields) -> (Vec<PressurePoint>, Vec<f64>) {
         let placement = self.placement(fields);
         let candidates = self.candidates(fields, 0.0);
         let mut deformed = vec![0.0; self.contact_nodes.len()];
@@ -299,7 +299,11 @@ impl ElementModel {
 
 impl ElementModel {
     /// Axial forces that press the bodies together at the interface's nodes.
-    pub fn interface_forces(&self, interface: &BondedInterface, fields: &Fields) -> DVector<f64> {
+    pub fn interface_forces(
+        &self,
+        interface: &BondedInterface,
+        fields: &ModelFields,
+    ) -> DVector<f64> {
         let mut forces = DVector::zeros(interface.nodes.len());
         for &index in &interface.elements {
             let nodes = &self.elements[index];
@@ -332,7 +336,7 @@ impl ElementModel {
     pub fn interface_pressure(
         &self,
         interface: &BondedInterface,
-        fields: &Fields,
+        fields: &ModelFields,
     ) -> Vec<PressurePoint> {
         let means = self.interface_means(interface, fields);
         let mut points = Vec::with_capacity(means.len());
@@ -350,7 +354,7 @@ impl ElementModel {
         points
     }
 
-    fn interface_means(&self, interface: &BondedInterface, fields: &Fields) -> Vec<HatMean> {
+    fn interface_means(&self, interface: &BondedInterface, fields: &ModelFields) -> Vec<HatMean> {
         let forces = self.interface_forces(interface, fields);
         let force = |node: usize| {
             let place = interface.nodes.iter().position(|n| *n == node);

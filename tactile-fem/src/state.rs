@@ -6,7 +6,7 @@
 
 use crate::element::{ALL, map, pressure_functions, shape};
 use crate::material::{Gradient, Kinematics, PointDeformation};
-use crate::model::{ElementModel, Equilibrium, Fields};
+use crate::model::{ElementModel, Equilibrium, ModelFields};
 use crate::recovery::ContactProfile;
 
 /// The deformed bodies at one load.
@@ -21,7 +21,7 @@ use crate::recovery::ContactProfile;
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct State {
-    pub(crate) fields: Fields,
+    pub(crate) fields: ModelFields,
     force: f64,
     pressure: Vec<PressurePoint>,
     radius: Option<ContactRadius>,

@@ -15,7 +15,7 @@
 
 use crate::contact::{ContactNode, DRIVER, Opposite, Placement};
 use crate::material::Kinematics;
-use crate::model::{ElementModel, Fields};
+use crate::model::{ElementModel, ModelFields};
 
 /// Where a contact node is held.
 #[derive(Debug, Clone, PartialEq)]
@@ -80,7 +80,7 @@ impl Anchor {
 
 impl ElementModel {
     /// Anchors of the nodes that touch without load.
-    pub fn first_anchors(&self, unloaded: &Fields) -> Vec<Option<Anchor>> {
+    pub fn first_anchors(&self, unloaded: &ModelFields) -> Vec<Option<Anchor>> {
         // Part of the nodes' spacing within which two unloaded surfaces count as touching: rounding
         // of coordinates leaves 1e-16 of it.
         let touching = 1e-9;
@@ -96,7 +96,7 @@ impl ElementModel {
 
     /// Anchors after a load step: those of nodes that still press, turned with the surface, and new
     /// ones where nodes have come into contact.
-    pub fn next_anchors(&self, before: &Fields, after: &Fields) -> Vec<Option<Anchor>> {
+    pub fn next_anchors(&self, before: &ModelFields, after: &ModelFields) -> Vec<Option<Anchor>> {
         let anchors = after.contact.iter().zip(&after.anchors);
         let contacts = self.contact_nodes.iter().zip(anchors);
         contacts
@@ -113,7 +113,7 @@ impl ElementModel {
             .collect()
     }
 
-    fn anchor(&self, contact: &ContactNode, fields: &Fields) -> Option<Anchor> {
+    fn anchor(&self, contact: &ContactNode, fields: &ModelFields) -> Option<Anchor> {
         let opposite = &self.opposites[contact.pair];
         self.placement(fields).anchor(contact.node, opposite)
     }

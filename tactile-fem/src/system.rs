@@ -8,7 +8,7 @@
 
 use crate::contact::{Candidate, DRIVER};
 use crate::element::{Elimination, OUTER};
-use crate::model::{DofMotion, ElementModel, Fields};
+use crate::model::{DofMotion, ElementModel, ModelFields};
 use crate::newton::Chord;
 use crate::sparse::{Factors, Pattern, Singular, Symmetric};
 use crate::stick::Slip;
@@ -317,7 +317,7 @@ impl ElementModel {
     pub fn assemble(
         &self,
         layout: &mut Layout,
-        fields: &Fields,
+        fields: &ModelFields,
         margin: f64,
     ) -> Option<System<'_>> {
         let candidates = self.candidates(fields, 2.0 * margin.abs());
@@ -415,7 +415,7 @@ impl System<'_> {
     }
 
     /// The Newton step from `fields` towards the goal.
-    pub fn step(&self, fields: &Fields, goal: Goal) -> Result<NewtonStep, Singular> {
+    pub fn step(&self, fields: &ModelFields, goal: Goal) -> Result<NewtonStep, Singular> {
         // Changes of the active set within a Newton iteration; more are rounding's toss between two
         // sets.
         let max_changes: usize = 15;
@@ -508,12 +508,12 @@ impl System<'_> {
 
 impl NewtonStep {
     /// The fields after the fraction `length` of the step.
-    pub fn apply(&self, fields: &Fields, length: f64) -> Fields {
+    pub fn apply(&self, fields: &ModelFields, length: f64) -> ModelFields {
         let along =
             |a: &[f64; 3], b: &[f64; 3]| core::array::from_fn(|k| a[k] + length * (b[k] - a[k]));
         let displacement = fields.displacement.iter().zip(&self.displacement);
         let pressures = fields.pressures.iter().zip(&self.pressures);
-        Fields {
+        ModelFields {
             displacement: displacement.map(|(u, du)| u + length * du).collect(),
             pressures: pressures.map(|(old, new)| along(old, new)).collect(),
             approach: fields.approach + length * self.approach,

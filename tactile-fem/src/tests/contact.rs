@@ -168,7 +168,7 @@ fn gaps_and_their_derivatives_agree_with_differences() {
     )
     .unwrap();
     let model = scene.model();
-    let mut fields = crate::model::Fields::zero(model);
+    let mut fields = crate::model::ModelFields::zero(model);
     for (k, u) in fields.displacement.iter_mut().enumerate() {
         let [r, z] = model.nodes[k / 2];
         // Smooth, curved and zero on the axis.
