@@ -1,4 +1,5 @@
-//! What several subcommands ask for: numbers, repetitions, frames of a sensor, masks and known heights.
+//! What several subcommands ask for: numbers, repetitions, frames of a sensor, masks and known
+//! heights.
 use crate::console::{Failure, Interrupt, median_ms};
 use clap::{Args, ValueEnum};
 use ndarray::Array2;
@@ -40,7 +41,8 @@ pub fn direction(text: &str) -> Result<[f64; 3], String> {
     three.ok_or_else(|| "expected 3 finite numbers between commas".to_owned())
 }
 
-/// An argument that is one positive number, or two between commas: the size of a pixel along x and y.
+/// An argument that is one positive number, or two between commas: the size of a pixel along x and
+/// y.
 pub fn one_or_two(text: &str) -> Result<[f64; 2], String> {
     let numbers: Result<Vec<f64>, _> = text.split(',').map(|part| positive(part.trim())).collect();
     match numbers.as_deref() {
@@ -65,7 +67,8 @@ pub struct Repetition {
 }
 
 impl Repetition {
-    /// The result of the last repetition, and the median of the times in milliseconds. Ctrl-C ends the repetitions.
+    /// The result of the last repetition, and the median of the times in milliseconds. Ctrl-C ends
+    /// the repetitions.
     pub fn timed<T, E>(
         self,
         interrupt: &Interrupt,

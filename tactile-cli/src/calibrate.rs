@@ -1,4 +1,5 @@
-//! `tactile calibrate`: a sensor from presses under known forces, or the line from integrated pixel value to force.
+//! `tactile calibrate`: a sensor from presses under known forces, or the line from integrated pixel
+//! value to force.
 use crate::console::{Context, Exit, Failure, digits, four_digits, in_unit, pair};
 use crate::plot::{Colour, Page, Panel};
 use clap::Args;
@@ -15,14 +16,16 @@ use tactile_imaging::sensor::{
 
 /// Calibrate a sensor from frames of presses, or fit the line from pixel value to force
 ///
-/// CALIBRATION.toml names frames of rigid balls or flat punches of known radius under forces of a gauge, a frame without contact, a
-/// frame of a dot target where there is one, and the guide's layers as they are stated. The local light-to-pressure curve, the lens,
-/// the layers and the errors of all of them are found. --out sensor.toml gets the sensor file that scenes name, and sensor.svg
-/// beside it, the report of all that was identified by the presses and all that was not. Where the frames cannot be used nothing is
-/// written.
+/// CALIBRATION.toml names frames of rigid balls or flat punches of known radius under forces of a
+/// gauge, a frame without contact, a frame of a dot target where there is one, and the guide's
+/// layers as they are stated. The local light-to-pressure curve, the lens, the layers and the
+/// errors of all of them are found. --out sensor.toml gets the sensor file that scenes name, and
+/// sensor.svg beside it, the report of all that was identified by the presses and all that was not.
+/// Where the frames cannot be used nothing is written.
 ///
-/// PAIRS.csv has the columns integrated_pixel_value (grey levels above the reference, summed over the contact) and force
-/// (N, mN, … by its heading), at least three rows. --out is a folder and gets calibration.svg.
+/// PAIRS.csv has the columns integrated_pixel_value (grey levels above the reference, summed over
+/// the contact) and force (N, mN, … by its heading), at least three rows. --out is a folder and
+/// gets calibration.svg.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -34,7 +37,8 @@ pub struct CalibrateArguments {
     /// Calibration file of a sensor (.toml), or table of integrated pixel values and forces.
     #[arg(value_name = "CALIBRATION.toml | PAIRS.csv")]
     input: PathBuf,
-    /// Of a table: the rows after the one of largest force were taken while unloading, hysteresis is reported.
+    /// Of a table: the rows after the one of largest force were taken while unloading, hysteresis
+    /// is reported.
     #[arg(long)]
     there_and_back: bool,
 }
@@ -83,6 +87,7 @@ impl PairLine {
         let pair = |(k, (value, force)): (usize, (&f64, &f64))| CalibrationPair {
             integrated_pixel_value: *value,
             force_n: *force,
+            // Forces grow up to the largest and fall after it.
             branch: if there_and_back && largest.is_some_and(|largest| k > largest) {
                 Branch::Unloading
             } else {
@@ -125,6 +130,7 @@ impl PairLine {
             let text = format!("{mean} mN on average, {share} % of full scale at most");
             context.row("hysteresis", text);
         }
+        // Outside this range the line is an extrapolation.
         let [low, high] = self.line.range().map(|grey| four_digits(1e-6 * grey));
         let full = four_digits(report.full_scale_n);
         let range = format!("{low} to {high} million grey levels, up to {full} N");

@@ -1,4 +1,5 @@
-//! What every subcommand has at hand: the standard streams, exit codes, Ctrl-C, the limit of memory, bars, and numbers as text.
+//! What every subcommand has at hand: the standard streams, exit codes, Ctrl-C, the limit of
+//! memory, bars, and numbers as text.
 use crate::outputs::Outputs;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde::Serialize;
@@ -101,9 +102,11 @@ impl From<ReadError> for Failure {
     }
 }
 
-/// Text of others for terminals and pictures: control characters and marks that turn the direction of writing are replaced.
+/// Text of others for terminals and pictures: control characters and marks that turn the direction
+/// of writing are replaced.
 ///
-/// Without this a file's name could clear the screen, forge a line of the answer, or make an SVG file unreadable.
+/// Without this a file's name could clear the screen, forge a line of the answer, or make an SVG
+/// file unreadable.
 pub fn printable(text: &str) -> String {
     let hidden = |c: char| {
         c.is_control()
@@ -136,7 +139,8 @@ impl Context {
         }
     }
 
-    /// Prints a line of the result, unless JSON is wanted. A reader that goes away (`| head -1`) ends the printing, not the program.
+    /// Prints a line of the result, unless JSON is wanted. A reader that goes away (`| head -1`)
+    /// ends the printing, not the program.
     pub fn line(&mut self, text: impl Display) {
         if self.json || self.reader_left || self.error.is_some() {
             return;
@@ -176,7 +180,8 @@ impl Context {
         let _ = writeln!(stderr(), "tactile: {}", printable(&text.to_string()));
     }
 
-    /// Refuses a job that needs more memory than is allowed. `job` names it and its size, `remedy` the way out.
+    /// Refuses a job that needs more memory than is allowed. `job` names it and its size, `remedy`
+    /// the way out.
     pub fn allow(&self, bytes: f64, job: &str, remedy: &str) -> Result<(), Failure> {
         let size = |bytes: f64| match bytes {
             b if b >= 1e12 => format!("{:.1} TB", b * 1e-12),
@@ -193,8 +198,8 @@ impl Context {
         )))
     }
 
-    /// Runs a job that can neither stop nor report its progress, with its time so far on the terminal. It is none after
-    /// Ctrl-C, which leaves the job to end with the program.
+    /// Runs a job that can neither stop nor report its progress, with its time so far on the
+    /// terminal. It is none after Ctrl-C, which leaves the job to end with the program.
     pub fn wait<R: Send + 'static>(
         &self,
         job: impl Into<String>,
@@ -203,6 +208,8 @@ impl Context {
         let _clock = Bar::clock(job);
         let (answer, answered) = mpsc::channel();
         self.interrupt.polled(true);
+        // The library has no way to stop this work: it runs beside the thread that listens for
+        // Ctrl-C.
         let worker = std::thread::spawn(move || {
             // Nobody waits for the answer any more after Ctrl-C.
             let _ = answer.send(work());
@@ -218,6 +225,7 @@ impl Context {
                 },
             }
         };
+        // What follows is short or listens by itself.
         self.interrupt.polled(false);
         result
     }
@@ -244,12 +252,14 @@ impl Context {
                 self.note(format_args!("cannot write to standard output: {error}"));
                 Exit::Output
             }
+            // Partial results of an interrupted run do not pass for complete ones.
             None if self.interrupt.requested() => Exit::Interrupted,
             None => exit,
         }
     }
 
     fn keep(&mut self, error: std::io::Error) {
+        // A reader that has seen enough is no failure, a full disk is.
         if error.kind() == ErrorKind::BrokenPipe {
             self.reader_left = true;
         } else if self.error.is_none() {
@@ -258,7 +268,8 @@ impl Context {
     }
 }
 
-/// Ctrl-C: work that polls it stops with its results so far, other work ends at once. A second one always ends.
+/// Ctrl-C: work that polls it stops with its results so far, other work ends at once. A second one
+/// always ends.
 #[derive(Clone, Default)]
 pub struct Interrupt {
     requested: Arc<AtomicBool>,
@@ -293,13 +304,15 @@ impl Interrupt {
         }
     }
 
-    /// Announces that the work from here on polls [`requested`](Self::requested), or no longer does.
+    /// Announces that the work from here on polls [`requested`](Self::requested), or no longer
+    /// does.
     pub fn polled(&self, polled: bool) {
         self.polled.store(polled, Ordering::SeqCst);
     }
 }
 
-/// A bar on the terminal for a job that takes longer than a second. It is hidden where standard error is no terminal.
+/// A bar on the terminal for a job that takes longer than a second. It is hidden where standard
+/// error is no terminal.
 pub struct Bar {
     bar: ProgressBar,
     started: Instant,

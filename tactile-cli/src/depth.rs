@@ -16,9 +16,10 @@ use tactile_imaging::sfs::DepthTable;
 
 /// Find the contact and its depth in frames of a sensor that grows darker with depth
 ///
-/// TABLE.csv says how deep a darkness is: columns darkness (grey levels below the reference, of the same --grey) and depth (m, mm, µm,
-/// by its heading, mm without one). With --ball-radius-mm a ball of this radius is fitted to the depth, with --ball one of any.
-/// --out gets NAME_depth.csv (m, NaN outside the contact) and NAME_depth.svg for every frame NAME.
+/// TABLE.csv says how deep a darkness is: columns darkness (grey levels below the reference, of the
+/// same --grey) and depth (m, mm, µm, by its heading, mm without one). With --ball-radius-mm a ball
+/// of this radius is fitted to the depth, with --ball one of any. --out gets NAME_depth.csv (m, NaN
+/// outside the contact) and NAME_depth.svg for every frame NAME.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -36,7 +37,8 @@ pub struct DepthArguments {
     /// Fit a ball of any radius.
     #[arg(long, conflicts_with = "ball_radius_mm")]
     ball: bool,
-    /// Shift the table so that no darkness is no depth: for tables counted from a contact circle found at some darkness.
+    /// Shift the table so that no darkness is no depth: for tables counted from a contact circle
+    /// found at some darkness.
     #[arg(long)]
     zero_table: bool,
     /// How the colours of a frame make its grey: as those of the table were made.
@@ -63,6 +65,7 @@ impl DepthArguments {
         let entries: Vec<_> = darkness.into_iter().zip(depth).collect();
         let stages = self.stages(&entries);
         let (contact, table) = stages.map_err(|error| Failure::in_file(&self.table, error))?;
+        // Depth is read from the table whatever the object is: it only says what may be fitted.
         let unknown = Object::Unknown {
             poisson_ratio: Object::DEFAULT_POISSON_RATIO,
         };
@@ -218,9 +221,11 @@ fn print(found: &Found, context: &mut Context) -> Value {
     })
 }
 
-/// Mean measured depth and the ball's by distance from the ball's centre, in mm: distance, measured, ball.
+/// Mean measured depth and the ball's by distance from the ball's centre, in mm: distance,
+/// measured, ball.
 fn profile(surface: &ContactSurface, ball: &BallFit) -> Vec<[f64; 3]> {
     let ([x0, y0], [dx, dy]) = (surface.origin_m, surface.pixel_size_m);
+    // Twenty rings, a fifth of the radius beyond the contact.
     let width = ball.contact_radius_m * 1.2 / 20.0;
     let mut rings = [[0.0; 4]; 20];
     for ((row, column), h) in surface.surface.heights.indexed_iter() {

@@ -12,10 +12,11 @@ use tactile_imaging::force::{
 use tactile_imaging::io::Grey;
 use tactile_imaging::pipeline::PipelineError;
 
-/// Measure force, contact radius, centroid and stress in frames of a sensor that grows brighter where it is pressed
+/// Measure force, contact radius, centroid and stress in frames of a sensor that grows brighter
+/// where it is pressed
 ///
-/// Fits the calibration to the pairs first and reports it, see `tactile calibrate`. --out gets force.csv (a row a frame) and
-/// calibration.svg.
+/// Fits the calibration to the pairs first and reports it, see `tactile calibrate`. --out gets
+/// force.csv (a row a frame) and calibration.svg.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -41,7 +42,8 @@ pub fn run(arguments: &ForceArguments, context: &mut Context) -> Result<Exit, Fa
         .map_err(|error| Failure::in_file(&frames.reference, error))?;
     let options = ForceOptions::default();
     let meter = ForceMeter::new(frames.pixel_m(), &options).map_err(Failure::input)?;
-    // One frame is held at a time, but a file that cannot be read is found before the first is measured.
+    // One frame is held at a time, but a file that cannot be read is found before the first is
+    // measured.
     for path in &frames.frames {
         frames.read(path, Grey::default(), &image)?;
     }
@@ -95,7 +97,8 @@ pub fn run(arguments: &ForceArguments, context: &mut Context) -> Result<Exit, Fa
     Ok(exit)
 }
 
-/// The doubts about a measurement. `step_grey` is the largest difference from the reference, if that is no noise.
+/// The doubts about a measurement. `step_grey` is the largest difference from the reference, if
+/// that is no noise.
 fn warnings(m: &ForceMeasurement, step_grey: Option<f64>) -> Vec<String> {
     let mut warnings = Vec::new();
     if m.contact.is_some_and(|contact| contact.touches_edge) {

@@ -20,11 +20,12 @@ use tactile_imaging::pipeline::with_error;
 
 /// Find a lump under the surface of a block: its size, depth and stiffness
 ///
-/// SCENE.toml names frames of the guide pressed onto a flat block at known approaches, the block's size and the guide's
-/// layers (examples/data/inclusion/scene.toml is one). Without it a block with a lump is simulated. The pressure over the radius is
-/// compared with finite elements at finite strain. The answer is whether there is a lump, its diameter, depth and modulus with 95 %
-/// intervals, or which of them the frames leave open. --out gets profiles.csv and inclusion.svg. A search takes some five seconds for
-/// each kind of interface.
+/// SCENE.toml names frames of the guide pressed onto a flat block at known approaches, the block's
+/// size and the guide's layers (examples/data/inclusion/scene.toml is one). Without it a block with
+/// a lump is simulated. The pressure over the radius is compared with finite elements at finite
+/// strain. The answer is whether there is a lump, its diameter, depth and modulus with 95 %
+/// intervals, or which of them the frames leave open. --out gets profiles.csv and inclusion.svg. A
+/// search takes some five seconds for each kind of interface.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -45,7 +46,8 @@ pub struct InclusionArguments {
     /// Scene file.
     #[arg(value_name = "SCENE.toml")]
     scene: Option<PathBuf>,
-    /// Instead of searching, compare what scans with other approaches would tell of a lump in this block.
+    /// Instead of searching, compare what scans with other approaches would tell of a lump in this
+    /// block.
     #[arg(long)]
     design: bool,
     /// Design: diameter of the lump, in millimetres.
@@ -94,6 +96,7 @@ impl Scan {
     /// Frames of a block with a lump, and white noise of the camera.
     fn simulated(seed: u64) -> Result<Self, ElasticityError> {
         let (specimen, guide) = simulated_block()?;
+        // A hard lump of clinical size, shallow enough to be found.
         let truth = [12e-3, 4e-3, 40e3];
         let tissue = |modulus| Material::new(modulus, 0.495);
         let block = Block {
@@ -145,7 +148,8 @@ impl Scan {
     }
 }
 
-/// A block of tissue as high as two faces, and a guide of three layers, the stiffest towards the tissue.
+/// A block of tissue as high as two faces, and a guide of three layers, the stiffest towards the
+/// tissue.
 fn simulated_block() -> Result<(Specimen, Guide), ElasticityError> {
     let layer = |(thickness_m, modulus)| {
         Ok(GuideLayer {

@@ -19,10 +19,11 @@ use tactile_imaging::pipeline::with_error;
 
 /// Measure Young's modulus from a force–indentation curve
 ///
-/// Finds the contact point, the modulus with its 95 % interval, and the law that fits. CURVE.csv has a column of
-/// indentation (or depth, position, displacement: growing into the sample, its zero anywhere) and one of force (or load:
-/// pressing positive), found by name and converted from the unit in the heading (indentation_um, force (mN)). Without a
-/// header it has exactly these two, in m and N. --out gets fit.csv and indentation.svg.
+/// Finds the contact point, the modulus with its 95 % interval, and the law that fits. CURVE.csv
+/// has a column of indentation (or depth, position, displacement: growing into the sample, its zero
+/// anywhere) and one of force (or load: pressing positive), found by name and converted from the
+/// unit in the heading (indentation_um, force (mN)). Without a header it has exactly these two, in
+/// m and N. --out gets fit.csv and indentation.svg.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -51,7 +52,8 @@ pub struct IndentArguments {
     /// The ball is squeezed between two plates and the indentation is that of both contacts.
     #[arg(long)]
     plates: bool,
-    /// The ball lies on a plate and a rigid sphere presses it from above: the indentation is that of both contacts.
+    /// The ball lies on a plate and a rigid sphere presses it from above: the indentation is that
+    /// of both contacts.
     #[arg(long)]
     on_plate: bool,
     /// Half opening angle of the cone in degrees from its axis (70.3 if not given).
@@ -258,6 +260,7 @@ pub fn run(arguments: &IndentArguments, context: &mut Context) -> Result<Exit, F
     arguments.check()?;
     let names = ["fit.csv", "indentation.svg"];
     context.outputs.plan(&names, &[&arguments.curve])?;
+    // The fit runs in a thread of its own, the curve is drawn in this one.
     let curve = Arc::new(arguments.read()?);
     let indenter = arguments.indenter().map_err(Failure::input)?;
     let options = CurveOptions {
@@ -324,6 +327,7 @@ fn reason(found: &CurveSelection) -> String {
 
 fn print(found: &CurveSelection, points: usize, context: &mut Context) {
     let fit = found.chosen();
+    // All limits in the unit of the value, so that they compare at a glance.
     let (scale, unit) = unit(fit.youngs_modulus_pa);
     let lower = digits(fit.interval_95.lower * scale, 5);
     let interval = match fit.interval_95.upper {

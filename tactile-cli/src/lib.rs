@@ -1,4 +1,5 @@
-//! The program `tactile`: every stage of an optical tactile sensor's measurement, and the whole, from the command line.
+//! The program `tactile`: every stage of an optical tactile sensor's measurement, and the whole,
+//! from the command line.
 //!
 //! ```text
 //! cargo run --release -p tactile-cli -- measure
@@ -35,15 +36,16 @@ use std::process::ExitCode;
 
 /// Force, shape, strain and Young's modulus from the frames of an optical tactile sensor.
 ///
-/// Every subcommand prints its results as text, or as one JSON object with --json, and writes files (tables as CSV, plots
-/// as SVG) to the folder given by --out and nowhere else. The examples in the help run as they stand in a copy of the
-/// repository.
+/// Every subcommand prints its results as text, or as one JSON object with --json, and writes files
+/// (tables as CSV, plots as SVG) to the folder given by --out and nowhere else. The examples in the
+/// help run as they stand in a copy of the repository.
 #[derive(Parser)]
 #[command(name = "tactile", version, after_help = AFTER_HELP, arg_required_else_help = true)]
 struct Program {
     #[command(subcommand)]
     command: Command,
-    /// Print one JSON object on standard output instead of text. Each stage is a value or its error.
+    /// Print one JSON object on standard output instead of text. Each stage is a value or its
+    /// error.
     #[arg(long, global = true)]
     json: bool,
     /// Write tables and plots to this folder. `calibrate` writes a sensor to this file.
@@ -117,9 +119,11 @@ impl Command {
     }
 }
 
-/// Runs the program on the arguments of this process and returns its exit code, as `tactile --help` lists them.
+/// Runs the program on the arguments of this process and returns its exit code, as `tactile --help`
+/// lists them.
 ///
-/// Reads and writes files, the standard streams and, where it can, the interrupt's handler of the process: for a `main`.
+/// Reads and writes files, the standard streams and, where it can, the interrupt's handler of the
+/// process: for a `main`.
 ///
 /// ```no_run
 /// fn main() -> std::process::ExitCode {

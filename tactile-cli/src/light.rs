@@ -10,9 +10,9 @@ use tactile_imaging::optics::{Dispersion, Geometry, Led, OpticsError, acceptance
 
 /// Trace the light of an LED through the layered waveguide, at rest and under a press
 ///
-/// Prints the acceptance angles of the paper's layers and where the light goes. --out gets light.svg: ray paths, the light
-/// towards the camera against slope and against the touching object's index, and how fast the answer settles with the
-/// number of rays.
+/// Prints the acceptance angles of the paper's layers and where the light goes. --out gets
+/// light.svg: ray paths, the light towards the camera against slope and against the touching
+/// object's index, and how fast the answer settles with the number of rays.
 #[derive(Args)]
 #[command(after_help = "Example:\n  tactile light --rays 2000 --out target/light")]
 pub struct LightArguments {
@@ -256,6 +256,7 @@ impl Tracer<'_> {
             ),
         ];
         for (name, surface, colour) in scenes {
+            // A bin a millimetre of the slab, and rays for all of them.
             let mut profile = [0.0; 30];
             self.trace(surface, Geometry::Volume, (4 * self.rays, 1), &mut profile)?;
             let bins = profile.iter().enumerate();
@@ -271,11 +272,13 @@ impl Tracer<'_> {
             let budget = self.trace(&surface, Geometry::Section, (rays, seed), &mut [])?;
             Ok(budget.camera)
         };
+        // Thirty-two times as many rays as the longest of the series stand in for the exact answer.
         let best = camera(1 << 19, 99)?;
         let mut curve: Vec<[f64; 2]> = Vec::new();
         for power in 5..=14 {
             let rays = 1_u32 << power;
             let mut square = 0.0;
+            // Sixteen starts of the sequence tell the error of one.
             for seed in 0..16 {
                 square += (camera(rays, seed)? / best - 1.0).powi(2);
             }

@@ -15,9 +15,10 @@ use tactile_imaging::matching::{
 
 /// Match the points of two sets, in the plane or in space
 ///
-/// A case file holds one or more cases: a line `case NAME D n_model n_target`, then rows `m` (a model point) and `t` (a
-/// target point) with D coordinates. The answers go to --out, a file for each case file under the same name: `case NAME
-/// time_ms`, then for every model row its warped position (`w`) and the target row assigned to it (`a`, -1 for none).
+/// A case file holds one or more cases: a line `case NAME D n_model n_target`, then rows `m` (a
+/// model point) and `t` (a target point) with D coordinates. The answers go to --out, a file for
+/// each case file under the same name: `case NAME time_ms`, then for every model row its warped
+/// position (`w`) and the target row assigned to it (`a`, -1 for none).
 #[derive(Args)]
 #[command(after_help = "Example:\n  tactile match examples/data/cases.txt --out target/match")]
 pub struct MatchArguments {
@@ -129,7 +130,8 @@ pub fn run(arguments: &MatchArguments, context: &mut Context) -> Result<Exit, Fa
     let name = |path: &&Path| path.file_name().unwrap_or_default().to_owned();
     let names: Vec<OsString> = inputs.iter().map(name).collect();
     context.outputs.plan(&names, &inputs)?;
-    // All files are read before the first case is matched, so that a mistake in the last costs no time.
+    // All files are read before the first case is matched, so that a mistake in the last costs no
+    // time.
     let mut files = Vec::new();
     for path in &arguments.cases {
         let cases = read_cases(path)?;
@@ -160,6 +162,7 @@ pub fn run(arguments: &MatchArguments, context: &mut Context) -> Result<Exit, Fa
                 break;
             }
         }
+        // The cases that are done are written, the file says which.
         context.outputs.add(name, text);
         if interrupted {
             break;
@@ -174,7 +177,8 @@ pub fn run(arguments: &MatchArguments, context: &mut Context) -> Result<Exit, Fa
     })
 }
 
-/// Matches one case, prints a line about it, appends its answer to `text` and returns it as JSON. It is none after Ctrl-C.
+/// Matches one case, prints a line about it, appends its answer to `text` and returns it as JSON.
+/// It is none after Ctrl-C.
 fn solve<const D: usize>(
     arguments: &MatchArguments,
     context: &mut Context,

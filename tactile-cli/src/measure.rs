@@ -18,10 +18,11 @@ use tactile_simulate::{
 
 /// Measure the Young's modulus of an object from frames at two or more loads
 ///
-/// Without SCENE.toml it simulates the paper's experiment (a ball of 3 mm radius pressed with 0.7 N and 1.2 N on the layered
-/// waveguide), measures the simulated frames blindly, and prints every result beside the truth. With SCENE.toml it
-/// measures your own frames. --repeat N gives the median and the 99th centile of the times of every stage and of the whole.
-/// --out gets the plots: frames.svg, surfaces.svg, matches.svg, displacement.svg, strain.svg, summary.svg.
+/// Without SCENE.toml it simulates the paper's experiment (a ball of 3 mm radius pressed with 0.7 N
+/// and 1.2 N on the layered waveguide), measures the simulated frames blindly, and prints every
+/// result beside the truth. With SCENE.toml it measures your own frames. --repeat N gives the
+/// median and the 99th centile of the times of every stage and of the whole. --out gets the plots:
+/// frames.svg, surfaces.svg, matches.svg, displacement.svg, strain.svg, summary.svg.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -76,7 +77,8 @@ struct Simulation {
     /// Simulation: the loads in newtons.
     #[arg(long, value_name = "N,N,...", value_delimiter = ',', default_values_t = [0.7, 1.2], value_parser = positive, conflicts_with = "scene")]
     forces: Vec<f64>,
-    /// Simulation: where the contacts come from. Finite elements are there for the two polymers, 3 mm, up to 1.3 N.
+    /// Simulation: where the contacts come from. Finite elements are there for the two polymers, 3
+    /// mm, up to 1.3 N.
     #[arg(long, value_enum, default_value_t = Physics::FiniteElements, conflicts_with = "scene")]
     physics: Physics,
     /// Simulation: seed of the camera's noise.
@@ -327,6 +329,7 @@ pub fn run(arguments: &MeasureArguments, context: &mut Context) -> Result<Exit, 
     if context.outputs.folder().is_none() {
         return Ok(Exit::complete_if(complete));
     }
+    // A press that was simulated is drawn beside its truth.
     let mut lines = summary_lines(&measurement);
     if let (Some(truth), Ok(modulus)) = (truth, &measurement.youngs_modulus_pa) {
         let error = percent(modulus.value, truth.youngs_modulus_pa);
@@ -348,7 +351,8 @@ pub fn run(arguments: &MeasureArguments, context: &mut Context) -> Result<Exit, 
     }
 }
 
-/// The contact of every frame. After Ctrl-C those so far are printed, and there is nothing more to do.
+/// The contact of every frame. After Ctrl-C those so far are printed, and there is nothing more to
+/// do.
 fn contacts(press: &mut Press<'_>, context: &mut Context) -> Option<Vec<Contact>> {
     let mut bar = Bar::of(press.frames(), "measuring contacts");
     context.interrupt.polled(true);
@@ -422,6 +426,7 @@ fn timing(first: &Press<'_>, n: u32, context: &Context) -> Vec<Timing> {
     let names = stages.into_iter().chain(["whole".to_owned()]);
     let timed = names.zip(times).map(|(stage, mut list)| {
         list.sort_unstable();
+        // Rounded up, so that the 99th centile of few runs is the slowest.
         let at = |share: f64| {
             let last = list.len().saturating_sub(1) as f64;
             let time = list.get((last * share).ceil() as usize);

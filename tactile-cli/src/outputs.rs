@@ -1,4 +1,5 @@
-//! The files of a call: named and checked before the work starts, written after the answer is printed.
+//! The files of a call: named and checked before the work starts, written after the answer is
+//! printed.
 use crate::console::Failure;
 use crate::plot::Page;
 use ndarray::Array2;
@@ -30,8 +31,9 @@ impl Outputs {
         self.folder.as_deref()
     }
 
-    /// Announces the names of the files to be written and the inputs. No result may replace an input, also none that a
-    /// scene or calibration file names, no two may have one name, and the folder must allow writing.
+    /// Announces the names of the files to be written and the inputs. No result may replace an
+    /// input, also none that a scene or calibration file names, no two may have one name, and the
+    /// folder must allow writing.
     pub fn plan<N: AsRef<OsStr>>(&mut self, names: &[N], inputs: &[&Path]) -> Result<(), Failure> {
         let Some(folder) = self.folder.clone() else {
             return Ok(());
@@ -66,6 +68,7 @@ impl Outputs {
         let mut taken = HashSet::new();
         for name in names {
             let path = folder.join(name.as_ref());
+            // Frames of one name from two folders.
             if !taken.insert(name.as_ref()) {
                 return Err(Failure::input(format!(
                     "two inputs would be answered in the same file {}: rename one",
@@ -169,6 +172,7 @@ fn same_file(a: &Path, b: &Path) -> bool {
     let (Ok(x), Ok(y)) = (a.metadata(), b.metadata()) else {
         return false;
     };
+    // The path alone does not show a hard link.
     identity(&x).is_some_and(|id| Some(id) == identity(&y))
         || matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b)
 }

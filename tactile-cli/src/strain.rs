@@ -17,10 +17,11 @@ use tactile_imaging::pipeline::with_error;
 
 /// Match the points before and after a deformation and measure the strain between them
 ///
-/// The files are CSV, a point a row: columns x, y and, in space, z, found by name where there is a header. Points may come
-/// and go. A smoothing spline whose smoothing is chosen by cross-validation gives the strain. Misplaced points are found
-/// and left out. --out gets pairs.csv (rows, positions and displacements of the pairs), strain.csv (the strain at every
-/// point with its standard error) and strain.svg.
+/// The files are CSV, a point a row: columns x, y and, in space, z, found by name where there is a
+/// header. Points may come and go. A smoothing spline whose smoothing is chosen by cross-validation
+/// gives the strain. Misplaced points are found and left out. --out gets pairs.csv (rows, positions
+/// and displacements of the pairs), strain.csv (the strain at every point with its standard error)
+/// and strain.svg.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -113,6 +114,7 @@ fn measured<const D: usize>(
     let job = format!("fitting {} pairs", matched.len());
     let (from, to, pairs) = (before.clone(), after.clone(), matched.clone());
     let measure = arguments.measure;
+    // Ctrl-C during the fit leaves the pairs, which took the longest.
     let found = context.wait(job, move || {
         StrainBetween::of_pairs(&from, &to, &pairs, measure.strain())
             .map_err(|error| error.to_string())
@@ -257,7 +259,8 @@ impl<const D: usize> StrainReport<D> {
         })
     }
 
-    /// Rows (counted from 0), positions and displacements of the pairs, and their weights in the spline.
+    /// Rows (counted from 0), positions and displacements of the pairs, and their weights in the
+    /// spline.
     fn pairs(&self) -> Vec<u8> {
         let (axes, suffix) = (&["x", "y", "z"][..D], self.suffix());
         let mut header = vec!["row_before".to_owned(), "row_after".to_owned()];
@@ -318,6 +321,7 @@ impl<const D: usize> StrainReport<D> {
             let title = format!("{name}: mean {}", with_error(mean, error, 1.0));
             panel(title).valued_points(positions.clone(), values, name)
         };
+        // In space the diagonal alone: shear seen from above would mislead.
         let shown = components::<D>()
             .into_iter()
             .filter(|c| c.1 == c.2 || D == 2);

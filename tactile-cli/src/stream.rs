@@ -1,4 +1,5 @@
-//! `tactile stream`: force and modulus live, from a simulated series at camera rate or from recorded frames.
+//! `tactile stream`: force and modulus live, from a simulated series at camera rate or from
+//! recorded frames.
 use crate::arguments::{eight_bits, not_negative, positive};
 use crate::console::{Bar, Context, Exit, Failure, pair};
 use crate::outputs::Csv;
@@ -14,11 +15,12 @@ use tactile_simulate::{CalibrationRun, Camera, Gain, LoadCycle, PressLoad, Press
 
 /// Measure frame after frame: force, contact and modulus live
 ///
-/// Without SCENE.toml a loading–unloading series is simulated and played at camera rate: frames are made beforehand, so that only
-/// the measuring is timed. A frame is late if its answer comes after the next frame is due. The exit code is then 1 if more
-/// frames came late than allowed or the modulus ends outside the tolerance. With SCENE.toml (see `tactile measure`), which
-/// describes sensor and object, recorded frames are measured one after the other, as fast as they can be. One is late if
-/// that takes longer than a frame at --rate lasts. --out gets stream.csv, a row a frame.
+/// Without SCENE.toml a loading–unloading series is simulated and played at camera rate: frames are
+/// made beforehand, so that only the measuring is timed. A frame is late if its answer comes after
+/// the next frame is due. The exit code is then 1 if more frames came late than allowed or the
+/// modulus ends outside the tolerance. With SCENE.toml (see `tactile measure`), which describes
+/// sensor and object, recorded frames are measured one after the other, as fast as they can be. One
+/// is late if that takes longer than a frame at --rate lasts. --out gets stream.csv, a row a frame.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -30,8 +32,8 @@ pub struct StreamArguments {
     /// Scene file of the sensor and the object, whose recorded frames are measured.
     #[arg(value_name = "SCENE.toml")]
     scene: Option<PathBuf>,
-    /// Recorded frames: images, or folders whose images are taken in the order of their names. Those of the scene if
-    /// there is none here.
+    /// Recorded frames: images, or folders whose images are taken in the order of their names.
+    /// Those of the scene if there is none here.
     #[arg(value_name = "FRAMES", requires = "scene")]
     frames: Vec<PathBuf>,
     /// Frames per second.
@@ -40,7 +42,8 @@ pub struct StreamArguments {
     /// Largest force in newtons (1.5 in a simulation).
     #[arg(long, value_name = "N", value_parser = positive)]
     force: Option<f64>,
-    /// Measure strain too, in frames of at least a third of the largest force, counted from the first of them.
+    /// Measure strain too, in frames of at least a third of the largest force, counted from the
+    /// first of them.
     #[arg(long)]
     strain: bool,
     /// Share of frames in per cent that may come late.
@@ -127,7 +130,8 @@ impl Live {
         Ok(())
     }
 
-    /// Mean strain along x and z. It is none in the frame that strain is counted from, and where the match has too few points.
+    /// Mean strain along x and z. It is none in the frame that strain is counted from, and where
+    /// the match has too few points.
     fn strain(&mut self) -> Result<Option<[f64; 2]>, PipelineError> {
         match self.session.strain() {
             Ok(found) => Ok(found.map(|s| [(0, 0), (2, 2)].map(|at| s.strain.summary.mean[at]))),
@@ -312,6 +316,7 @@ fn recorded(
         }
         let time_s = k as f64 / arguments.rate;
         let measured = eight_bits(path, Grey::default(), scene.bits).and_then(|frame| {
+            // Reading the file is not part of the measurement.
             let start = Instant::now();
             let pushed = live.push(time_s, frame.view());
             pushed.map_err(|error| Failure::in_file(path, error))?;
@@ -323,6 +328,7 @@ fn recorded(
                 live.print_last(frames.len() <= 32, context);
             }
             Err(failure) => {
+                // A torn frame does not end a recording.
                 unusable += 1;
                 context.note(failure);
             }
@@ -426,6 +432,7 @@ fn simulated(arguments: &StreamArguments, context: &mut Context) -> Result<Exit,
         ..LoadCycle::default()
     };
     let frames = record(&trial, cycle, context)?;
+    // The mean of four frames has half the noise of one.
     let references: Vec<_> = (1..5).map(|k| trial.scene.reference(k)).collect();
     let views: Vec<_> = references.iter().map(|r| r.view()).collect();
     let pipeline = trial.pipeline().map_err(Failure::no_answer)?;
@@ -477,6 +484,7 @@ fn play(
             break;
         }
         let due = Duration::from_secs_f64(*time_s);
+        // A camera would deliver the frame now.
         std::thread::sleep(due.saturating_sub(start.elapsed()));
         live.push(*time_s, frame.view())?;
         live.late += usize::from(start.elapsed() > due + period);

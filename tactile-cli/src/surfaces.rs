@@ -19,10 +19,11 @@ use tactile_imaging::sfs::{
 
 /// Reconstruct a surface from one shaded image
 ///
-/// The light comes from X,Y,Z: x to the right, y down the image, z to the viewer. Heights are in pixels, NaN where there
-/// is none. Known heights that are connected to the frame's border are taken as outside the object unless a mask says otherwise.
-/// Grey levels are modelled as ambient + intensity · max(0, n·s). Nothing is normalised. --out gets heights.csv
-/// and surface.svg (image, heights, and the heights shaded again).
+/// The light comes from X,Y,Z: x to the right, y down the image, z to the viewer. Heights are in
+/// pixels, NaN where there is none. Known heights that are connected to the frame's border are
+/// taken as outside the object unless a mask says otherwise. Grey levels are modelled as ambient +
+/// intensity · max(0, n·s). Nothing is normalised. --out gets heights.csv and surface.svg (image,
+/// heights, and the heights shaded again).
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -96,6 +97,7 @@ pub fn reconstruct(
     if let (None, Some(known)) = (&mask, &known) {
         mask = Some(not_outside(known));
     }
+    // Under frontal light the eikonal equation needs nothing but the rim of the object.
     let frontal = lighting.direction() == [0.0, 0.0, 1.0];
     let rimmed = known.is_some() || mask.is_some() && frontal || arguments.boundary.is_some();
     let method = arguments.method.unwrap_or(if rimmed {
@@ -251,8 +253,9 @@ fn reconstruction_page(
 
 /// Integrate slopes to heights
 ///
-/// P holds the slopes ∂z/∂x (along a row) and Q ∂z/∂y (down the rows), as CSV matrices of the image's shape without a
-/// header. The mean height is 0 unless heights are known. --out gets heights.csv and heights.svg.
+/// P holds the slopes ∂z/∂x (along a row) and Q ∂z/∂y (down the rows), as CSV matrices of the
+/// image's shape without a header. The mean height is 0 unless heights are known. --out gets
+/// heights.csv and heights.svg.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -300,6 +303,7 @@ pub fn integrate(arguments: &IntegrateArguments, context: &mut Context) -> Resul
     same_shape((q_path, q.dim()), first)?;
     let known = region.known_heights(first)?;
     let mask = region.bright_pixels(first)?;
+    // The cosine transform takes whole rectangles of numbers alone.
     let finite = p.iter().chain(&q).all(|slope| slope.is_finite());
     let whole = mask.is_none() && known.is_none() && finite;
     let method = arguments.method.unwrap_or(if whole {

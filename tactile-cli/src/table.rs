@@ -10,9 +10,10 @@ use tactile_imaging::scene::solve_contact_table;
 
 /// Compute the contact table of a ball and a waveguide
 ///
-/// SCENE.toml is a scene file, or one with its tables `object` (a sphere) and `waveguide` alone. The table holds force over contact
-/// radius and modulus, by finite elements at finite strain. `contact_table = "table.toml"` in a scene file makes the modulus follow from
-/// it. --out gets table.toml. Ctrl-C stops without a table.
+/// SCENE.toml is a scene file, or one with its tables `object` (a sphere) and `waveguide` alone.
+/// The table holds force over contact radius and modulus, by finite elements at finite strain.
+/// `contact_table = "table.toml"` in a scene file makes the modulus follow from it. --out gets
+/// table.toml. Ctrl-C stops without a table.
 #[derive(Args)]
 #[command(
     after_help = "Example:\n  tactile table examples/data/press/scene.toml --moduli 2 --largest-ratio 0.5 --out target/table"

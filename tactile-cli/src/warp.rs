@@ -14,9 +14,10 @@ use tactile_imaging::tps::{
 
 /// Fit a thin-plate spline to pairs of points and warp other points by it
 ///
-/// The files are CSV, a point a row: columns x, y and, in space, z, found by name where there is a header. Row i of
-/// TARGETS is where row i of SOURCES goes. λ weighs the bending energy wᵀKw against the squared distances to the targets;
-/// 0 passes through every target. --out gets warped.csv: fx, fy (and fz) and the Jacobian dfx_dx,dfx_dy,… at every query.
+/// The files are CSV, a point a row: columns x, y and, in space, z, found by name where there is a
+/// header. Row i of TARGETS is where row i of SOURCES goes. λ weighs the bending energy wᵀKw
+/// against the squared distances to the targets; 0 passes through every target. --out gets
+/// warped.csv: fx, fy (and fz) and the Jacobian dfx_dx,dfx_dy,… at every query.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -32,7 +33,8 @@ pub struct WarpArguments {
     /// U(r): r² ln r (the thin plate of the plane), −r (of space) or r³.
     #[arg(long, value_enum, default_value = "r2logr")]
     kernel: KernelName,
-    /// Smoothing parameter, a number of at least zero, or gcv for the one of least generalised cross-validation.
+    /// Smoothing parameter, a number of at least zero, or gcv for the one of least generalised
+    /// cross-validation.
     #[arg(long, value_name = "X|gcv", default_value = "0", value_parser = smoothing, allow_negative_numbers = true)]
     lambda: Smoothing<f64>,
     #[command(flatten)]
@@ -41,7 +43,8 @@ pub struct WarpArguments {
 
 #[derive(Clone, Copy, ValueEnum)]
 enum KernelName {
-    /// r² ln r, half of r² log r²: the same splines, and with λ half of the other's the same smoothing.
+    /// r² ln r, half of r² log r²: the same splines, and with λ half of the other's the same
+    /// smoothing.
     #[value(name = "r2logr", alias = "r2logr2")]
     R2logr,
     /// −r.
@@ -61,7 +64,8 @@ fn smoothing(text: &str) -> Result<Smoothing<f64>, String> {
     }
 }
 
-/// Residual of an iterative fit, relative to the largest target: below it the digits of a CSV file hardly change.
+/// Residual of an iterative fit, relative to the largest target: below it the digits of a CSV file
+/// hardly change.
 const TOLERANCE: f64 = 1e-10;
 
 pub fn run(arguments: &WarpArguments, context: &mut Context) -> Result<Exit, Failure> {
@@ -116,7 +120,8 @@ fn warp<const D: usize, K: Kernel>(
     sets: &Sets<D>,
 ) -> Result<Exit, Failure> {
     let [sources, targets, queries] = sets;
-    // Cross-validation is direct whatever the number of points: it takes the eigenvalues of a dense matrix.
+    // Cross-validation is direct whatever the number of points: it takes the eigenvalues of a dense
+    // matrix.
     if matches!(arguments.lambda, Smoothing::Gcv) {
         let n = sources.len() as f64;
         let job = format!("cross-validation with {} points", sources.len());
@@ -126,20 +131,21 @@ fn warp<const D: usize, K: Kernel>(
         .with_smoothing(arguments.lambda)
         .and_then(|options| options.with_tolerance(TOLERANCE))
         .map_err(Failure::input)?;
-    let mut evaluate_times = Vec::new();
+    let (mut fit_times, mut evaluate_times) = (Vec::new(), Vec::new());
     let mut values = vec![Point::origin(); queries.len()];
     let mut jacobians = vec![SMatrix::zeros(); queries.len()];
     let mut warped = 0;
-    let (spline, both_ms) = arguments.repetition.timed(&context.interrupt, || {
+    let (spline, _) = arguments.repetition.timed(&context.interrupt, || {
+        let start = Instant::now();
         let spline = fit(context, sources, targets, &options)
             .map_err(|error| Failure::input(in_files(arguments, error)))?;
+        fit_times.push(start.elapsed());
         let start = Instant::now();
         warped = evaluate(context, &spline, queries, &mut values, &mut jacobians)?;
         evaluate_times.push(start.elapsed());
         Ok::<_, Failure>(spline)
     })?;
-    let evaluate_ms = median_ms(evaluate_times);
-    let fit_ms = both_ms - evaluate_ms;
+    let [fit_ms, evaluate_ms] = [fit_times, evaluate_times].map(median_ms);
     let report = &spline.report;
     // As much work as a step of the iteration, which after Ctrl-C nobody waits for.
     let bending_energy = (!context.interrupt.requested()).then(|| {
@@ -196,7 +202,8 @@ fn warp<const D: usize, K: Kernel>(
     Ok(Exit::complete_if(report.converged()))
 }
 
-/// The spline. Thousands of points are solved for by iteration, which Ctrl-C ends with the spline so far.
+/// The spline. Thousands of points are solved for by iteration, which Ctrl-C ends with the spline
+/// so far.
 fn fit<const D: usize, K: Kernel>(
     context: &Context,
     sources: &[Point<f64, D>],
@@ -221,7 +228,8 @@ fn fit<const D: usize, K: Kernel>(
             Some(residual) => {
                 let first = *first.get_or_insert(residual);
                 preparing = None;
-                // Conjugate gradients gain about as many digits in every step, so digits are what is counted.
+                // Conjugate gradients gain about as many digits in every step, so digits are what
+                // is counted.
                 let part = (first / residual).ln() / (first / TOLERANCE).ln();
                 iterating
                     .get_or_insert_with(|| Bar::of(1000, format!("{job}: iterating")))

@@ -1,7 +1,9 @@
-//! Plots of a press as SVG: [`save_press_pages`] draws its frames, surfaces, matches, displacement, strain and summary.
+//! Plots of a press as SVG: [`save_press_pages`] draws its frames, surfaces, matches, displacement,
+//! strain and summary.
 //!
-//! A page is one self-contained SVG file of panels in rows and columns. A panel is a set of axes with layers in them.
-//! Heat maps take perceptually uniform colours and have a colour bar, lines and points the colours of Okabe and Ito.
+//! A page is one self-contained SVG file of panels in rows and columns. A panel is a set of axes
+//! with layers in them. Heat maps take perceptually uniform colours and have a colour bar, lines
+//! and points the colours of Okabe and Ito.
 
 mod press;
 #[cfg(test)]
@@ -77,7 +79,8 @@ impl<T: IntoIterator<Item = Place>> Places for T {}
 pub trait Ends: IntoIterator<Item = [Place; 2]> {}
 impl<T: IntoIterator<Item = [Place; 2]>> Ends for T {}
 
-/// Colours that people with any colour vision tell apart (Okabe and Ito 2008), and two neutral ones.
+/// Colours that people with any colour vision tell apart (Okabe and Ito 2008), and two neutral
+/// ones.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Colour {
     Blue,
@@ -124,7 +127,8 @@ pub struct HeatMap {
 }
 
 impl HeatMap {
-    /// Cells of `pixel_size` (x, y). The centre of the first one is the origin, the label names the values with their unit.
+    /// Cells of `pixel_size` (x, y). The centre of the first one is the origin, the label names the
+    /// values with their unit.
     pub fn of_pixels(values: ArrayView2<'_, f64>, pixel_size: [f64; 2], label: &str) -> Self {
         let (rows, columns) = values.dim();
         let span = |n: usize, size: f64| [-0.5 * size, (n as f64 - 0.5) * size];
@@ -293,7 +297,8 @@ impl Panel {
         self.layer(Marks::Arrows(ends.into_iter().collect()), colour, label)
     }
 
-    /// Adds points coloured by a value. The label of the colour bar names the values with their unit.
+    /// Adds points coloured by a value. The label of the colour bar names the values with their
+    /// unit.
     pub fn valued_points(
         self,
         at: impl Places,
@@ -304,7 +309,8 @@ impl Panel {
         self.layer(Marks::Valued(at, values), Colour::Black, label)
     }
 
-    /// Adds a heat map and draws the panel like an image: y downwards, both axes with the same scale.
+    /// Adds a heat map and draws the panel like an image: y downwards, both axes with the same
+    /// scale.
     pub fn heat_map(mut self, map: HeatMap) -> Self {
         self.y_down = true;
         let label = map.label.clone();
@@ -322,7 +328,8 @@ impl Panel {
         self
     }
 
-    /// The axes, a little wider than the data but around heat maps, of which no cell may be cut off.
+    /// The axes, a little wider than the data but around heat maps, of which no cell may be cut
+    /// off.
     fn axes(&self) -> [Axis; 2] {
         let heat = |layer: &Layer| matches!(layer.marks, Marks::Heat(_));
         let margin = if self.layers.iter().any(heat) {
@@ -397,6 +404,7 @@ impl Page {
 "#,
             size[0], size[1]
         );
+        // Every part is an element of its own, so that a panel draws without knowing the page.
         svg += &drawing([0, 0], [size[0], head], |area| {
             text(area, &self.title, [size[0] / 2, head / 2], 20, HPos::Center)
         })?;
@@ -411,7 +419,8 @@ impl Page {
 type Drawn<T> = Result<T, Box<dyn Error + Send + Sync>>;
 type Area<'a> = DrawingArea<SVGBackend<'a>, plotters::coord::Shift>;
 
-/// The drawing library counts in whole pixels, which shows as steps in curves: it draws on a canvas this many times as fine.
+/// The drawing library counts in whole pixels, which shows as steps in curves: it draws on a canvas
+/// this many times as fine.
 const FINE: i32 = 4;
 
 /// What is drawn by `inside` on an area of this size, as an element of a page.
@@ -427,6 +436,7 @@ fn drawing(
         inside(&area)?;
         area.present()?;
     }
+    // The outer size turns the fine canvas back into pixels of the page.
     let fine = format!(r#"<svg width="{fine_width}" height="{fine_height}""#);
     let placed = format!(r#"<svg x="{x}" y="{y}" width="{width}" height="{height}""#);
     Ok(svg.replacen(&fine, &placed, 1))
@@ -476,9 +486,12 @@ impl Layout {
     const LABELS: [i32; 2] = [70, 42];
 
     fn new(panel: &Panel, axes: &[Axis; 2], size: [i32; 2], legend_rows: i32) -> Self {
-        // Title and legend stand above the axes, so that they never cover data.
-        let [left, top] = [Self::LABELS[0] + 10, 34 + 20 * legend_rows];
-        let right = if panel.bar().is_some() { 96 } else { 18 };
+        // Title, legend and the name of the colour bar stand above the axes, so that they never
+        // cover data.
+        let has_bar = panel.bar().is_some();
+        let rows = legend_rows.max(i32::from(has_bar));
+        let [left, top] = [Self::LABELS[0] + 10, 34 + 20 * rows];
+        let right = if has_bar { 104 } else { 18 };
         let bottom = Self::LABELS[1] + 6;
         let available = [size[0] - left - right, size[1] - top - bottom];
         let mut inner = available;
@@ -583,6 +596,7 @@ impl Panel {
             .x_label_area_size(FINE * labels[1])
             .y_label_area_size(FINE * labels[0])
             .build_cartesian_2d(x, y)?;
+        // Grid lines over a heat map would be read as its values.
         let grid = match self.bar() {
             Some(_) => TRANSPARENT.into(),
             None => stroke(RGBColor(228, 228, 228), 1),
@@ -611,13 +625,15 @@ impl Panel {
             .try_for_each(|layer| layer.draw(area, &place))
     }
 
-    /// Ticks and label of the colour bar.
+    /// Ticks and name of the colour bar.
     fn draw_bar(&self, area: &Area<'_>, layout: &Layout) -> Drawn<()> {
         let Some((layer, range, _)) = self.bar() else {
             return Ok(());
         };
         let at = layout.bar();
-        let room = (layout.size[0] - at[0] - 4).min(78);
+        let room = layout.size[0] - at[0] - 4;
+        let name_at = [layout.size[0] - 8, at[1] - 12];
+        text(area, &layer.label, name_at, 13, HPos::Right)?;
         let across: RangedCoordf64 = (0.0..1.0).into();
         layout
             .chart(area, at, [room, layout.inner[1]])
@@ -627,8 +643,6 @@ impl Panel {
             .disable_mesh()
             .disable_x_axis()
             .y_labels((layout.inner[1] / 50).clamp(2, 6) as usize)
-            .y_desc(printable(&layer.label))
-            .axis_desc_style(font(13))
             .label_style(font(12))
             .set_all_tick_mark_size(FINE * 4)
             .axis_style(axis_style())
@@ -640,8 +654,8 @@ impl Panel {
         text(area, &self.title, [size[0] / 2, 17], 16, HPos::Center)?;
         for (line, words) in self.text.iter().enumerate() {
             let y = 48 + 21 * line as i32;
-            for (part, x) in words.splitn(2, '\t').zip([24, 24 + 2 * size[0] / 5]) {
-                text(area, part, [x, y], 14, HPos::Left)?;
+            for (part, x) in words.splitn(2, '\t').zip([20, 20 + size[0] / 3]) {
+                text(area, part, [x, y], 13, HPos::Left)?;
             }
         }
         Ok(())
@@ -699,7 +713,8 @@ fn dashes(area: &Area<'_>, at: &[Pixel], colour: RGBColor) -> Drawn<()> {
 }
 
 impl Layer {
-    /// Draws everything but a heat map. `place` brings a position to the page, where it has a finite place on the axes.
+    /// Draws everything but a heat map. `place` brings a position to the page, where it has a
+    /// finite place on the axes.
     fn draw(&self, area: &Area<'_>, place: &dyn Fn(Place) -> Option<Pixel>) -> Drawn<()> {
         let colour = self.colour.rgb();
         let circles = |at: &[Place], radius: i32, style: ShapeStyle| -> Drawn<()> {
@@ -774,16 +789,20 @@ fn spread(values: impl Iterator<Item = f64>) -> [f64; 2] {
     if low > high { [0.0, 1.0] } else { [low, high] }
 }
 
-/// The range of colours: not narrower than a thousandth of the values, for else rounding errors would be shown.
+/// The range of colours: not narrower than a thousandth of the values, for else rounding errors
+/// would be shown.
 fn value_range(values: impl Iterator<Item = f64>) -> [f64; 2] {
     let [low, high] = spread(values);
+    // A homogeneous strain differs in its last bits alone, which the full range of colours would
+    // exaggerate.
     let least = 1e-3 * low.abs().max(high.abs());
     let more = (0.5 * (least - (high - low))).max(0.0);
     [low - more, high + more]
 }
 
 impl Axis {
-    /// From the smallest to the largest value, wider by the share `margin` at both ends, and never empty.
+    /// From the smallest to the largest value, wider by the share `margin` at both ends, and never
+    /// empty.
     fn around(values: impl Iterator<Item = f64>, logarithmic: bool, margin: f64) -> Self {
         let scaled = values.map(|v| if logarithmic { v.log10() } else { v });
         let [low, high] = spread(scaled);
@@ -890,7 +909,8 @@ impl ValueFormatter<f64> for Axis {
     }
 }
 
-/// A number of at least four digits and these decimals, as short as it can be read: 0.25, 1200, 3×10⁶.
+/// A number of at least four digits and these decimals, as short as it can be read: 0.25, 1200,
+/// 3×10⁶.
 fn label(value: f64, decimals: f64) -> String {
     // Steps such as 0.1 leave rounding errors on values that are zero.
     let size = value.abs();

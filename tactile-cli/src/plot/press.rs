@@ -8,8 +8,8 @@ use tactile_imaging::pipeline::{Measurement, PipelineError, Press, with_error};
 
 /// Writes every page that the press has results for to `folder`, as SVG, and returns their paths.
 ///
-/// The pages are frames, surfaces, and a summary of [`Press::measure`]. Of two frames or more there are also matches,
-/// displacement and strain between the first and the last.
+/// The pages are frames, surfaces, and a summary of [`Press::measure`]. Of two frames or more there
+/// are also matches, displacement and strain between the first and the last.
 ///
 /// ```
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {

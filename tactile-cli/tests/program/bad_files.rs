@@ -4,7 +4,8 @@ use std::os::unix::fs::symlink;
 use std::path::Path;
 use std::process::Command;
 
-/// Writes files of every kind of wrong into the folder; the names of those that are no image, and of those that are no table.
+/// Writes files of every kind of wrong into the folder; the names of those that are no image, and
+/// of those that are no table.
 pub(crate) fn write(folder: &Path) -> (Vec<&'static str>, Vec<&'static str>) {
     let put = |name: &str, bytes: &[u8]| fs::write(folder.join(name), bytes).unwrap();
     let image = fs::read(folder.join("reference.png")).unwrap();

@@ -3,7 +3,8 @@ use super::harness::{run, text, words};
 use serde_json::Value;
 use std::fs;
 
-/// A frame of 40 × 40 pixels of grey 200, a stamp of 20 × 20 in the middle darker by this much in blue.
+/// A frame of 40 × 40 pixels of grey 200, a stamp of 20 × 20 in the middle darker by this much in
+/// blue.
 fn frame(blue: u8) -> Vec<u8> {
     let mut bytes = b"P6\n40 40\n255\n".to_vec();
     for at in 0..1600 {
@@ -34,8 +35,8 @@ fn the_grey_and_the_zero_are_those_of_the_table() {
             .as_f64()
             .unwrap()
     };
-    // 90 levels of blue are 30 of the mean, 0.114 · 90 = 10.3 of Rec. 601 and 0.0722 · 90 = 6.5 of Rec. 709, of which
-    // frames of eight bits have 10 and 6.
+    // 90 levels of blue are 30 of the mean, 0.114 · 90 = 10.3 of Rec. 601 and 0.0722 · 90 = 6.5 of
+    // Rec. 709, of which frames of eight bits have 10 and 6.
     for (options, expected) in [
         ("", 0.21),
         ("--grey rec601", 0.21),

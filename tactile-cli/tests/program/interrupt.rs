@@ -9,7 +9,8 @@ use std::time::{Duration, Instant};
 /// Longest time from Ctrl-C to the end, on a busy machine: the work itself would go on for minutes.
 const SOON: Duration = Duration::from_secs(30);
 
-/// Starts the program, sends it Ctrl-C a moment after it has printed its first line, and returns what it printed and its exit code.
+/// Starts the program, sends it Ctrl-C a moment after it has printed its first line, and returns
+/// what it printed and its exit code.
 fn interrupted(folder: &Path, arguments: &str, lines_before: usize) -> (String, Option<i32>) {
     let mut child = tactile(folder, &words(arguments))
         .stdout(Stdio::piped())
@@ -24,7 +25,8 @@ fn interrupted(folder: &Path, arguments: &str, lines_before: usize) -> (String, 
             "tactile {arguments}: {printed}"
         );
     }
-    // The handler is there before anything is printed; without a line to wait for it takes a moment.
+    // The handler is there before anything is printed; without a line to wait for it takes a
+    // moment.
     std::thread::sleep(Duration::from_millis(700));
     let sent = Instant::now();
     let id = child.id().to_string();
@@ -50,8 +52,8 @@ fn interrupted(folder: &Path, arguments: &str, lines_before: usize) -> (String, 
     (printed, output.status.code())
 }
 
-/// Points whose match takes some seconds on a fast machine, in the tests' build: longer than the moment before Ctrl-C. More than 30,000 are refused for
-/// want of memory.
+/// Points whose match takes some seconds on a fast machine, in the tests' build: longer than the
+/// moment before Ctrl-C. More than 30,000 are refused for want of memory.
 const LARGE: usize = 24_000;
 
 /// A spiral of points.

@@ -1,4 +1,5 @@
-//! The program `tactile` as a user meets it: what the help shows runs, and what is wrong is said in one sentence.
+//! The program `tactile` as a user meets it: what the help shows runs, and what is wrong is said in
+//! one sentence.
 #![cfg(unix)]
 
 mod bad_calls;

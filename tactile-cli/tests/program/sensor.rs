@@ -35,7 +35,8 @@ fn a_calibration_writes_a_sensor_and_a_report_and_says_what_was_learned() {
     assert_eq!(modulus["parameter"], "youngs_modulus_pa");
     assert_eq!(modulus["identified"], true);
     let [fitted, error] = [0, 1].map(|k| modulus["fitted"][k].as_f64().unwrap());
-    // Contact radii of 8 to 22 pixels, known to some hundredth of a pixel, and forces to 0.5 % or better; three standard errors.
+    // Contact radii of 8 to 22 pixels, known to some hundredth of a pixel, and forces to 0.5 % or
+    // better; three standard errors.
     assert!(
         (fitted - 100e3).abs() < 3.0 * error && error < 2e3,
         "{fitted} ± {error}"
@@ -92,7 +93,8 @@ const MISTAKES: [(&str, &str, &str, &str); 12] = [
     ("", "", "--there-and-back", "branch"),
 ];
 
-/// What is wrong with how the calibration in this folder is refused; `None` where all is as it should be.
+/// What is wrong with how the calibration in this folder is refused; `None` where all is as it
+/// should be.
 fn complaint(folder: &Path, end: &str, says: &str) -> Option<String> {
     let before = fs::read_dir(folder).unwrap().count();
     let end = if end.is_empty() {

@@ -1,4 +1,5 @@
-//! A table of calls that cannot work: each ends with the right code and one sentence, and leaves everything as it was.
+//! A table of calls that cannot work: each ends with the right code and one sentence, and leaves
+//! everything as it was.
 mod files;
 mod table;
 
