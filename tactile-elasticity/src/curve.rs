@@ -64,7 +64,7 @@ impl IndentationCurve {
             });
         }
         let [position_m, force_n] =
-            [position_m, force_n].map(|v| v.iter().map(|&x| x).collect::<Vec<_>>());
+            [position_m, force_n].map(|v| v.to_vec());
         for (values, quantity) in [
             (&position_m, Quantity::Indentation),
             (&force_n, Quantity::Force),

@@ -146,7 +146,7 @@ impl ForceMeter {
             .then(|| elongation(&workspace.detector.region.mask, self.jacobian(&contact)))
             .flatten();
         Ok(ForceMeasurement {
-            elongation: elongation,
+            elongation,
             ..self.combine(found, contact, profile, stress, pixel)
         })
     }
@@ -180,7 +180,7 @@ impl ForceMeter {
         let area = lens.mean_pixel_area_m2(place, contact.equivalent_radius_px);
         PixelSize {
             step: lens.pixel_step_m(place),
-            area: area,
+            area,
         }
     }
 

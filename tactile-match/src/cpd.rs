@@ -1288,7 +1288,7 @@ fn matching<const D: usize>(
         unmatched_model,
         unmatched_target,
         displacement_covariance: covariance,
-        energy: workspace.energy.iter().map(|&e| e).collect(),
+        energy: workspace.energy.to_vec(),
         report: report(workspace, &assignment),
         assignment,
     }

@@ -120,7 +120,7 @@ impl Dispersion {
             } => {
                 let mut n_squared = 1.0 + *constant;
                 for &[strength, resonance] in terms {
-                    n_squared = n_squared + strength * square / (square - resonance);
+                    n_squared += strength * square / (square - resonance);
                 }
                 n_squared.sqrt()
             }

@@ -159,9 +159,9 @@ fn integral(a: f64, b: f64, f: impl Fn(f64) -> f64) -> f64 {
         let middle = a + half * ((2 * panel + 1) as f64);
         for (k, (node, weight)) in NODES.iter().enumerate() {
             let (offset, weight) = (half * *node, *weight);
-            sum = sum + weight * f(middle + offset);
+            sum += weight * f(middle + offset);
             if k > 0 {
-                sum = sum + weight * f(middle - offset);
+                sum += weight * f(middle - offset);
             }
         }
     }

@@ -87,8 +87,8 @@ pub fn normal_incidence(indices: &[f64], ambient: f64) -> Result<NormalIncidence
     let mut before = ambient;
     for after in indices.iter().copied().chain(core::iter::once(ambient)) {
         let (sum, step) = (before + after, before - after);
-        single_pass = single_pass * (four * (before / sum) * (after / sum));
-        reflected = reflected + step / before * (step / after) / four;
+        single_pass *= four * (before / sum) * (after / sum);
+        reflected += step / before * (step / after) / four;
         before = after;
     }
     Ok(NormalIncidence {

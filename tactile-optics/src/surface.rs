@@ -311,7 +311,7 @@ pub(crate) fn march<S: TopSurface + ?Sized>(
         if opening <= 0.0 {
             return Meeting::At(t);
         }
-        t = t + (tolerance + tolerance) / opening;
+        t += (tolerance + tolerance) / opening;
         g = gap(t);
     }
     approach(gap, [t, g], to, closing, tolerance)
@@ -334,7 +334,7 @@ fn approach(
         if g <= tolerance {
             return Meeting::At(t);
         }
-        t = t + g / closing;
+        t += g / closing;
         g = gap(t);
     }
     Meeting::Undecided

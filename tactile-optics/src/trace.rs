@@ -155,7 +155,7 @@ pub fn trace<S: TopSurface + ?Sized>(
     tracer
         .camera_profile
         .iter_mut()
-        .for_each(|v| *v = *v / total);
+        .for_each(|v| *v /= total);
     Ok(tracer.tally.budget(total))
 }
 
@@ -191,7 +191,7 @@ fn launch(slab: &Slab<'_>, z: f64, y: f64, outside: [f64; 3]) -> (Ray, f64) {
     let mut depth = z * slab.thickness_m();
     let mut layer = 0;
     while layer + 1 < slab.layers.len() && depth > slab.layers[layer].thickness_m {
-        depth = depth - slab.layers[layer].thickness_m;
+        depth -= slab.layers[layer].thickness_m;
         layer += 1;
     }
     let n = slab.layers[layer].index;
@@ -385,7 +385,7 @@ impl Tally {
             (power - new) + old
         };
         self.sums[k] = new;
-        self.errors[k] = self.errors[k] + lost;
+        self.errors[k] += lost;
     }
 
     /// Shares of `total`.
@@ -695,7 +695,7 @@ impl<S: TopSurface + ?Sized> Tracer<'_, '_, S> {
             let bins = self.camera_profile.len();
             let share = ray.position[0] / self.slab.length * (bins as f64);
             let bin = (share as usize).min(bins - 1);
-            self.camera_profile[bin] = self.camera_profile[bin] + transmitted;
+            self.camera_profile[bin] += transmitted;
         }
         ray.mirrored(&normal, ray.power - transmitted)
     }

@@ -332,7 +332,7 @@ impl FitStatistics {
         Self {
             observations,
             parameters,
-            chi_squared: chi_squared,
+            chi_squared,
             aicc: (minus_two_log_likelihood + 2.0 * k + correction),
             bic: (minus_two_log_likelihood + k * n.ln()),
         }

@@ -316,7 +316,7 @@ impl ModulusEstimator for PaperRatio {
     fn estimate(&self, series: &LoadSeries) -> Result<ModulusEstimate, ElasticityError> {
         let loads = series.loads();
         let ratios = self.ratios(loads)?;
-        let sources = self.sources(&series, &ratios);
+        let sources = self.sources(series, &ratios);
         let logs: Vec<f64> = ratios.iter().map(Ratio::log).collect();
         let mean = common_mean(&logs, &total(&sources))?;
         let reach = quantile_95(mean.degrees_from(&sources)) * mean.standard_error;
@@ -348,7 +348,7 @@ pub(crate) fn strain_warnings(loads: &[LoadState]) -> Vec<Warning> {
         .filter(|(_, strain)| strain.abs() > LINEAR_STRAIN)
         .map(|(load, strain)| Warning::LargeStrain {
             load,
-            strain: strain,
+            strain,
             limit: LINEAR_STRAIN,
         })
         .collect()

@@ -190,7 +190,7 @@ impl StressStrainRegression {
             if p_value < 0.05 {
                 warnings.push(Warning::Intercept {
                     intercept_pa: line.intercept,
-                    p_value: p_value,
+                    p_value,
                 });
             }
         }

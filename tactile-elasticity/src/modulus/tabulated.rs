@@ -309,7 +309,7 @@ struct Fit {
 impl ModulusEstimator for TabulatedContact {
     fn estimate(&self, series: &LoadSeries) -> Result<ModulusEstimate, ElasticityError> {
         let contacts = self.contacts(series.loads())?;
-        let (contacts, fit) = self.fit_covered(contacts, &series)?;
+        let (contacts, fit) = self.fit_covered(contacts, series)?;
         let known = fit.mean.standard_error.is_finite();
         let reach = quantile_95(fit.mean.degrees) * fit.mean.standard_error * fit.sensitivity;
         let lower = if known {

@@ -194,10 +194,10 @@ impl HertzFit {
         self.background = self.background * factor;
         self.integrated_pixel_value = self.integrated_pixel_value * factor;
         for k in 0..2 {
-            self.covariance[k].iter_mut().for_each(|c| *c = *c * factor);
+            self.covariance[k].iter_mut().for_each(|c| *c *= factor);
             self.covariance
                 .iter_mut()
-                .for_each(|row| row[k] = row[k] * factor);
+                .for_each(|row| row[k] *= factor);
         }
         self
     }

@@ -450,11 +450,11 @@ fn first_matches<const D: usize>(
     let least = |row: &[f64]| row.iter().copied().fold(f64::INFINITY, f64::min);
     let columns = target.len();
     let mut m = MatchMatrix::from_fn(model.len(), columns, |i, j| {
-        let weight = match costs.get(i) {
+        
+        match costs.get(i) {
             Some(row) if j < columns => (-(row[j] - least(row)) / temperature).exp(),
             _ => slack,
-        };
-        weight
+        }
     });
     sinkhorn(&mut m, 1, 0.0);
     m

@@ -558,7 +558,7 @@ impl<const D: usize> SoftassignWorkspace<D> {
             });
         }
         let positive = |s: &f64| *s > 0.0 && s.is_finite();
-        let widened = deviations.iter().map(|&s| s);
+        let widened = deviations.iter().copied();
         if let Some(row) = widened.clone().position(|s| !positive(&s)) {
             let value = deviations[row];
             return Err(MatchError::TargetDeviation { row, value });

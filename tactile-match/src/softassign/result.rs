@@ -123,7 +123,7 @@ impl<'w, const D: usize> SoftassignMatch<'w, D> {
         let (mut soft, mut row) = (SoftMatches::default(), Vec::new());
         for i in 0..model.len() {
             row.clear();
-            row.extend(confidence::soft_row(&workspace.annealer.soft, i).map(|(j, p)| (j, p)));
+            row.extend(confidence::soft_row(&workspace.annealer.soft, i));
             row.sort_unstable_by_key(|entry| entry.0);
             soft.push_row(row.iter().copied());
         }
@@ -135,12 +135,12 @@ impl<'w, const D: usize> SoftassignMatch<'w, D> {
             warp,
             warped,
             assignment: answer.assignment.clone(),
-            confidence: answer.confidence.iter().map(|&c| c).collect(),
+            confidence: answer.confidence.to_vec(),
             soft,
             unmatched_model,
             unmatched_target,
             displacement_covariance: answer.variance.iter().map(covariance).collect(),
-            energy: workspace.best.trace.iter().map(|&e| e).collect(),
+            energy: workspace.best.trace.to_vec(),
             report: self.narrow_report(),
         }
     }
@@ -426,7 +426,7 @@ impl<const D: usize> Series<D> {
         pairs.assignment.extend_from_slice(found.assignment);
         pairs.confidence.clear();
         let confidence = found.confidence.iter();
-        pairs.confidence.extend(confidence.map(|&c| c));
+        pairs.confidence.extend(confidence.copied());
         pairs.report = found.narrow_report();
     }
 }

@@ -55,13 +55,13 @@ fn closed_forms(answers: &mut Answers) {
         (1.0001, 1.0),
     ] {
         let acceptance = acceptance_angle(n, n0).unwrap();
-        answers.add(&format!("acceptance.f64"), acceptance.radians);
+        answers.add(&"acceptance.f64".to_string(), acceptance.radians);
         if acceptance.radians > 0.0 && acceptance.complement > 0.0 {
-            answers.add(&format!("acceptance.complement.f64"), acceptance.complement);
+            answers.add(&"acceptance.complement.f64".to_string(), acceptance.complement);
         }
         if let Some(angle) = critical_angle(n, n0).unwrap() {
-            answers.add(&format!("critical.f64"), angle.radians);
-            answers.add(&format!("critical.complement.f64"), angle.complement);
+            answers.add(&"critical.f64".to_string(), angle.radians);
+            answers.add(&"critical.complement.f64".to_string(), angle.complement);
         }
         for incidence in [0.0, 0.3, 0.7, 1.2, 1.57] {
             let f = fresnel(n, n0, incidence).unwrap();
@@ -71,18 +71,18 @@ fn closed_forms(answers: &mut Answers) {
                 f.transmittance_s,
                 f.transmittance_p,
             ] {
-                answers.add(&format!("fresnel.f64"), value);
+                answers.add(&"fresnel.f64".to_string(), value);
             }
         }
         if let Some(angle) = propagation(n, 0.9).unwrap() {
-            answers.add(&format!("propagation.f64"), angle.radians);
+            answers.add(&"propagation.f64".to_string(), angle.radians);
             let cosine = angle.complement.sin();
-            answers.add(&format!("propagation.cosine.f64"), cosine);
+            answers.add(&"propagation.cosine.f64".to_string(), cosine);
         }
         for geometry in [Geometry::Section, Geometry::Volume] {
             let led = Led::from_half_intensity_angle(0.8).unwrap();
             answers.add(
-                &format!("trapped.f64"),
+                &"trapped.f64".to_string(),
                 led.trapped_share(acceptance, geometry),
             );
         }
@@ -90,14 +90,14 @@ fn closed_forms(answers: &mut Answers) {
     let indices = [1.38, 1.39, 1.40, 1.41];
     let normal = normal_incidence(&indices, 1.0).unwrap();
     for value in [normal.single_pass, normal.transmittance, normal.reflectance] {
-        answers.add(&format!("stack.f64"), value);
+        answers.add(&"stack.f64".to_string(), value);
     }
     for n in indices {
         let angle = acceptance_angle(n, 1.0).unwrap();
-        answers.add(&format!("stack.acceptance.f64"), angle.radians);
+        answers.add(&"stack.acceptance.f64".to_string(), angle.radians);
     }
     let cone = led_cone(&indices, 1.0, 2.4).unwrap();
-    answers.add(&format!("cone.f64"), cone.margin);
+    answers.add(&"cone.f64".to_string(), cone.margin);
     for (name, material) in [
         ("5:1", Dispersion::PDMS_5_1),
         ("10:1", Dispersion::PDMS_10_1),
@@ -118,7 +118,7 @@ fn traces(answers: &mut Answers) {
     let layers =
         [(1.41, 2e-3), (1.40, 3e-3), (1.39, 5e-3), (1.4715, 2e-3)].map(|(index, thickness)| {
             SlabLayer {
-                index: index,
+                index,
                 thickness_m: thickness,
             }
         });

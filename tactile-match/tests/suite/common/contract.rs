@@ -73,7 +73,7 @@ pub(crate) fn assert_consistent<const D: usize>(
         "{name}: one covariance per model point"
     );
     assert_partition(name, columns, matching);
-    let probability = |p: f64| p >= 0.0 && p <= 1.0 + (1e-5);
+    let probability = |p: f64| (0.0..=1.0 + (1e-5)).contains(&p);
     assert!(
         matching.confidence.iter().all(|&p| probability(p)),
         "{name}: confidence {:?}",
