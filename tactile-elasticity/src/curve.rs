@@ -63,8 +63,7 @@ impl IndentationCurve {
                 found,
             });
         }
-        let [position_m, force_n] =
-            [position_m, force_n].map(|v| v.to_vec());
+        let [position_m, force_n] = [position_m, force_n].map(|v| v.to_vec());
         for (values, quantity) in [
             (&position_m, Quantity::Indentation),
             (&force_n, Quantity::Force),

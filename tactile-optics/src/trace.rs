@@ -152,10 +152,7 @@ pub fn trace<S: TopSurface + ?Sized>(
         });
     }
     let total = total.budget(1.0).entry;
-    tracer
-        .camera_profile
-        .iter_mut()
-        .for_each(|v| *v /= total);
+    tracer.camera_profile.iter_mut().for_each(|v| *v /= total);
     Ok(tracer.tally.budget(total))
 }
 

@@ -204,8 +204,8 @@ pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
 /// ln x for positive normal `x`, without branches or tables, so that loops vectorise. Elsewhere
 /// finite nonsense.
 ///
-/// x = 2ᵏ m with m in [√½, √2), f = m − 1, t = f/(2 + f) and ln m = 2 artanh t = f − f²/2 + t (f²/2
-/// + R(t²)).
+/// x = 2ᵏ m with m in [√½, √2), f = m − 1, t = f/(2 + f) and
+/// ln m = 2 artanh t = f − f²/2 + t (f²/2 + R(t²)).
 /// R is a minimax polynomial (coefficients of fdlibm, Sun Microsystems 1993).
 /// Its error is below 2⁻⁵⁸, in f32 below 2⁻³⁴.
 #[inline(always)]

@@ -1,6 +1,6 @@
 //! What the tests of several crates share: recorded answers, and tables of worst errors.
 #![forbid(unsafe_code)]
-#![allow(missing_docs)]
+#![allow(missing_docs, clippy::print_stdout)]
 
 mod recorded;
 mod worst;

@@ -195,9 +195,7 @@ impl HertzFit {
         self.integrated_pixel_value = self.integrated_pixel_value * factor;
         for k in 0..2 {
             self.covariance[k].iter_mut().for_each(|c| *c *= factor);
-            self.covariance
-                .iter_mut()
-                .for_each(|row| row[k] *= factor);
+            self.covariance.iter_mut().for_each(|row| row[k] *= factor);
         }
         self
     }

@@ -449,12 +449,9 @@ fn first_matches<const D: usize>(
         .collect();
     let least = |row: &[f64]| row.iter().copied().fold(f64::INFINITY, f64::min);
     let columns = target.len();
-    let mut m = MatchMatrix::from_fn(model.len(), columns, |i, j| {
-        
-        match costs.get(i) {
-            Some(row) if j < columns => (-(row[j] - least(row)) / temperature).exp(),
-            _ => slack,
-        }
+    let mut m = MatchMatrix::from_fn(model.len(), columns, |i, j| match costs.get(i) {
+        Some(row) if j < columns => (-(row[j] - least(row)) / temperature).exp(),
+        _ => slack,
     });
     sinkhorn(&mut m, 1, 0.0);
     m

@@ -55,13 +55,13 @@ fn closed_forms(answers: &mut Answers) {
         (1.0001, 1.0),
     ] {
         let acceptance = acceptance_angle(n, n0).unwrap();
-        answers.add(&"acceptance.f64".to_string(), acceptance.radians);
+        answers.add("acceptance.f64", acceptance.radians);
         if acceptance.radians > 0.0 && acceptance.complement > 0.0 {
-            answers.add(&"acceptance.complement.f64".to_string(), acceptance.complement);
+            answers.add("acceptance.complement.f64", acceptance.complement);
         }
         if let Some(angle) = critical_angle(n, n0).unwrap() {
-            answers.add(&"critical.f64".to_string(), angle.radians);
-            answers.add(&"critical.complement.f64".to_string(), angle.complement);
+            answers.add("critical.f64", angle.radians);
+            answers.add("critical.complement.f64", angle.complement);
         }
         for incidence in [0.0, 0.3, 0.7, 1.2, 1.57] {
             let f = fresnel(n, n0, incidence).unwrap();
@@ -71,33 +71,30 @@ fn closed_forms(answers: &mut Answers) {
                 f.transmittance_s,
                 f.transmittance_p,
             ] {
-                answers.add(&"fresnel.f64".to_string(), value);
+                answers.add("fresnel.f64", value);
             }
         }
         if let Some(angle) = propagation(n, 0.9).unwrap() {
-            answers.add(&"propagation.f64".to_string(), angle.radians);
+            answers.add("propagation.f64", angle.radians);
             let cosine = angle.complement.sin();
-            answers.add(&"propagation.cosine.f64".to_string(), cosine);
+            answers.add("propagation.cosine.f64", cosine);
         }
         for geometry in [Geometry::Section, Geometry::Volume] {
             let led = Led::from_half_intensity_angle(0.8).unwrap();
-            answers.add(
-                &"trapped.f64".to_string(),
-                led.trapped_share(acceptance, geometry),
-            );
+            answers.add("trapped.f64", led.trapped_share(acceptance, geometry));
         }
     }
     let indices = [1.38, 1.39, 1.40, 1.41];
     let normal = normal_incidence(&indices, 1.0).unwrap();
     for value in [normal.single_pass, normal.transmittance, normal.reflectance] {
-        answers.add(&"stack.f64".to_string(), value);
+        answers.add("stack.f64", value);
     }
     for n in indices {
         let angle = acceptance_angle(n, 1.0).unwrap();
-        answers.add(&"stack.acceptance.f64".to_string(), angle.radians);
+        answers.add("stack.acceptance.f64", angle.radians);
     }
     let cone = led_cone(&indices, 1.0, 2.4).unwrap();
-    answers.add(&"cone.f64".to_string(), cone.margin);
+    answers.add("cone.f64", cone.margin);
     for (name, material) in [
         ("5:1", Dispersion::PDMS_5_1),
         ("10:1", Dispersion::PDMS_10_1),

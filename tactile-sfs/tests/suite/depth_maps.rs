@@ -117,8 +117,8 @@ fn an_exact_cap_comes_back() {
             2e-8,
         ),
     ] {
-        for k in 0..2 {
-            assert!((fit.centre_m[k] - centre[k]).abs() < tolerance);
+        for (found, expected) in fit.centre_m.iter().zip(&centre) {
+            assert!((found - expected).abs() < tolerance);
         }
         assert!((fit.radius_m - radius).abs() < tolerance);
         assert!((fit.contact_radius_m - contact_radius).abs() < tolerance);
