@@ -147,10 +147,10 @@ pub(crate) struct SampleBuffers {
 ///
 /// ```
 /// use ndarray::Array2;
-/// use tactile_sfs::{ControlPointSampler, EquallySpaced};
+/// use tactile_sfs::{ControlPointSampler, Domain, EquallySpaced};
 /// // Level on the left, a roof of slope √3 on the right: twice the area, hence twice the points.
 /// let z = Array2::from_shape_fn((60, 120), |(_, c)| 3.0_f64.sqrt() * (c as f64 - 60.0).max(0.0));
-/// let points = EquallySpaced.sample(z.view(), None, [1.0, 1.0], 90)?;
+/// let points = EquallySpaced.sample(z.view(), &Domain::new([1.0, 1.0])?, 90)?;
 /// let level = points.iter().filter(|point| point.x < 60.0).count();
 /// assert!((27..=33).contains(&level));
 /// # Ok::<(), tactile_sfs::SfsError>(())
