@@ -248,39 +248,12 @@ def matching_cases():
         }
 
 
-# Image moments ---------------------------------------------------------------------------------------------------------------
-
-
-def image_cases():
-    for number, (name, pedestal, height, zero) in enumerate([
-        ("ordinary", 10.0, 100.0, 10.0), ("pedestal 1e9", 1e9, 100.0, 1e9), ("pedestal 1e12, blob 1e-3", 1e12, 1e-3, 1e12),
-        ("scale 1e-9", 1e-9, 1e-8, 1e-9), ("scale 1e9", 1e9, 1e10, 1e9), ("saturated", 0.0, 1e4, 0.0), ("constant", 0.1, 0.0, 0.0),
-    ]):
-        stream = Stream(700 + number)
-        rows, columns = 7, 9
-        blob = lambda r, c: max(0.0, 1 - ((r - 3.2) ** 2 + (c - 4.7) ** 2) / 9) * (0.5 + stream.next())
-        pixels = [[pedestal + height * blob(r, c) for c in range(columns)] for r in range(rows)]
-        if name == "saturated":
-            pixels = [[min(p, 255.0) for p in row] for row in pixels]
-        flat = [(r, c, D(pixels[r][c])) for r in range(rows) for c in range(columns)]
-        light = [(r, c, p - D(zero)) for r, c, p in flat]
-        total = sum(p for _, _, p in light)
-        centre = [sum(c * p for _, c, p in light) / total, sum(r * p for r, _, p in light) / total]
-        second = sum(((c - centre[0]) ** 2 + (r - centre[1]) ** 2) * p for r, c, p in light) / total
-        mean = sum(p for _, _, p in flat) / len(flat)
-        yield {
-            "name": name, "pixels": pixels, "background": zero, "sum": total, "centroid": centre, "radius_of_gyration": second.sqrt(),
-            "mean": mean, "variance": sum((p - mean) ** 2 for _, _, p in flat) / len(flat),
-        }
-
-
 FILES = {
     "tactile-tps/tests/reference/splines.json": tps_cases,
     "tactile-optics/tests/reference/angles.json": optics_cases,
     "tactile-elasticity/tests/reference/strain.json": strain_cases,
     "tactile-elasticity/tests/reference/hertz.json": hertz_cases,
     "tactile-match/tests/reference/relaxation.json": matching_cases,
-    "tactile-force/tests/reference/moments.json": image_cases,
 }
 
 

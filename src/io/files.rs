@@ -8,7 +8,7 @@ use std::path::Path;
 /// Largest file that is read, in bytes: more is not a measurement.
 pub const LARGEST_FILE: u64 = 512 << 20;
 
-/// Reads a whole file of at most [`LARGEST_FILE`] bytes. The error names it.
+/// Reads a whole file of at most half a gibibyte. The error names it.
 pub fn read_bytes(path: &Path) -> Result<Vec<u8>, ReadError> {
     let open = |source| ReadError::Open {
         path: path.into(),

@@ -576,7 +576,8 @@ type Pair<'a, const D: usize> = (&'a [Point<f64, D>], &'a [Point<f64, D>]);
 #[cfg(feature = "rayon")]
 impl AnnealedSoftassign {
     /// Matches every `(model, target)` on all threads of the current pool, with the bits of
-    /// [`PointMatcher::match_points`]. A pair that cannot be matched does not hinder the others.
+    /// [`PointMatcher::match_points`](crate::PointMatcher::match_points). A pair that cannot be
+    /// matched does not hinder the others.
     ///
     /// ```
     /// use nalgebra::Point2;
