@@ -1,11 +1,14 @@
 //! Scene files of a block pressed by the sensor's guide.
-
 use super::rings::{RingMeans, ring_means};
+use crate::elasticity::ElasticityError;
 use crate::force::{CalibrationOptions, LinearCalibration, StressCalibration};
-use crate::io::{Grey, read_bytes, read_grey_image};
-use crate::scene::fields::{Fields, poisson, positive};
-use crate::scene::{SceneError, parse_table, read_pairs};
+use crate::io::{
+    FileError, beside, number, one_or_more, positive, positive_pair, read_frame, read_toml,
+};
+use crate::scene::force_pairs;
 use ndarray::Array2;
+use serde::{Deserialize, Deserializer};
+use std::error::Error;
 use std::path::{Path, PathBuf};
 use tactile_fem::{Guide, GuideLayer, Interface, Material};
 use tactile_inclusion::{PressureProfile, Specimen};
@@ -21,7 +24,8 @@ use tactile_inclusion::{PressureProfile, Specimen};
 /// let text = r#"
 ///     reference = "reference.png"            # the sensor without contact
 ///     pixel_size_m = [86e-6, 86e-6]          # x, y, on the face
-///     calibration = { pairs = "pairs.csv" }  # integrated_pixel_value,force_N; without it every frame needs force_N
+///     ## Columns integrated_pixel_value,force_N. Without it every frame needs force_N.
+///     calibration = { pairs = "pairs.csv" }
 ///     frames = [
 ///         { image = "one.png", approach_m = 1e-3, force_N = 0.35 },
 ///         { image = "two.png", approach_m = 2e-3, force_N = 0.71 },
@@ -30,7 +34,7 @@ use tactile_inclusion::{PressureProfile, Specimen};
 ///     shape = "block"
 ///     height_m = 30e-3
 ///     radius_m = 40e-3
-///     interface = "bonded"                   # or "frictionless"; both are tried where it is absent
+///     interface = "bonded"                   # or "frictionless", or absent to try both
 ///     [waveguide]                            # from the block's side to the glass
 ///     radius_m = 16e-3
 ///     layers = [{ thickness_m = 10e-3, youngs_modulus_pa = 60e3, poisson_ratio = 0.495 }]
@@ -43,7 +47,7 @@ use tactile_inclusion::{PressureProfile, Specimen};
 /// ```
 #[derive(Clone, Debug)]
 pub struct InclusionScene {
-    /// What is known of the block.
+    /// The block, with the errors of its sizes.
     pub specimen: Specimen,
     /// The guide.
     pub guide: Guide,
@@ -54,20 +58,23 @@ pub struct InclusionScene {
     frames: Vec<Frame>,
 }
 
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
 struct Frame {
     image: PathBuf,
+    #[serde(deserialize_with = "positive")]
     approach_m: f64,
+    #[serde(default, rename = "force_N", deserialize_with = "positive")]
     force_n: Option<f64>,
 }
 
-/// What a scene's images say.
+/// The pressures of a scene's images.
 ///
 /// ```no_run
 /// use tactile_imaging::inclusion::{InclusionScene, LoadedInclusion};
 /// let LoadedInclusion { rings, profiles } = InclusionScene::read("press/scene.toml")?.load()?;
 /// println!("{} frames, the first one's centre at {:?}", profiles.len(), rings[0].centre_px);
-/// # Ok::<(), tactile_imaging::scene::SceneError>(())
+/// # Ok::<(), tactile_imaging::io::FileError>(())
 /// ```
 #[derive(Clone, Debug)]
 pub struct LoadedInclusion {
@@ -77,45 +84,36 @@ pub struct LoadedInclusion {
     pub profiles: Vec<PressureProfile>,
 }
 
-const LENGTH: &str = "a positive number (metres)";
-
 impl InclusionScene {
-    /// Reads and checks a scene file.
+    /// Reads and checks a scene file. Relative paths are relative to its folder.
     ///
     /// # Errors
-    /// [`SceneError`]: one sentence that names the file and the field.
-    pub fn read(path: impl AsRef<Path>) -> Result<Self, SceneError> {
+    /// [`FileError`]: one sentence that names the file and the field.
+    pub fn read(path: impl AsRef<Path>) -> Result<Self, FileError> {
         let path = path.as_ref();
-        let bytes = read_bytes(path).map_err(|error| SceneError::Open(Box::new(error)))?;
-        Self::parse(&String::from_utf8_lossy(&bytes), path)
-    }
-
-    /// Checks the text of a scene file. Relative paths are relative to the folder of `file`.
-    fn parse(text: &str, file: impl AsRef<Path>) -> Result<Self, SceneError> {
-        let file = file.as_ref();
-        let table = parse_table(text, file)?;
-        let fields = Fields::new(file, &table);
-        fields.only(&[
-            "reference",
-            "pixel_size_m",
-            "calibration",
-            "frames",
-            "object",
-            "waveguide",
-        ])?;
-        let folder = file.parent().unwrap_or(Path::new(""));
-        let reference = fields.string("reference", "the path of the image without contact")?;
+        let file: InclusionFile = read_toml(path)?;
+        let mut frames = file.frames;
+        let mut last_m = 0.0;
+        for (index, frame) in frames.iter_mut().enumerate() {
+            // Contact grows with the approach, and the search starts each frame from the one before.
+            if frame.approach_m <= last_m {
+                let field = format!("frames[{}].approach_m", index + 1);
+                let reason = "expected an approach greater than that of the frame before";
+                return Err(FileError::field(path, field, reason));
+            }
+            last_m = frame.approach_m;
+            frame.image = beside(path, &frame.image);
+        }
+        let specimen = file.object.specimen();
+        let guide = file.waveguide.guide();
         Ok(Self {
-            file: file.into(),
-            reference: folder.join(reference),
-            pixel_size_m: fields.positive_pair(
-                "pixel_size_m",
-                "two positive numbers [x, y] (metres per pixel)",
-            )?,
-            calibration: calibration(&fields, folder)?,
-            frames: frames(&fields, folder)?,
-            specimen: specimen(&fields)?,
-            guide: guide(&fields)?,
+            specimen: specimen.map_err(|error| FileError::field(path, "object", error))?,
+            guide: guide.map_err(|error| FileError::field(path, "waveguide.layers", error))?,
+            file: path.into(),
+            reference: beside(path, &file.reference),
+            pixel_size_m: file.pixel_size_m,
+            calibration: file.calibration.map(|table| beside(path, &table.pairs)),
+            frames,
         })
     }
 
@@ -126,84 +124,60 @@ impl InclusionScene {
 
     /// Reads the images and takes their ring means.
     ///
-    /// The scale from light to pressure is the calibration's slope: p = s I / A with s in newtons per
-    /// grey level and the area A of a pixel. Without a calibration the force spread over the picture gives
-    /// it, and is then not counted once more as a measurement.
+    /// The scale from light to pressure is the calibration's slope: p = s I / A with s in newtons
+    /// per grey level and the area A of a pixel. Without a calibration the force spread over the
+    /// picture gives it, and is then not counted once more as a measurement.
     ///
     /// # Errors
-    /// [`SceneError::File`] and [`SceneError::SizeMismatch`] for images that cannot be read or differ in
-    /// size. [`SceneError::Unusable`] where a frame shows no face.
-    pub fn load(&self) -> Result<LoadedInclusion, SceneError> {
-        let reference = self.image("reference".into(), &self.reference)?;
+    /// [`FileError`] for images that cannot be read, differ in size or show no face.
+    pub fn load(&self) -> Result<LoadedInclusion, FileError> {
+        let reference = self.image("reference", &self.reference, None)?;
         let newtons_per_grey = self.newtons_per_grey()?;
         let area = self.pixel_size_m[0] * self.pixel_size_m[1];
         let mut rings = Vec::with_capacity(self.frames.len());
         for (index, frame) in self.frames.iter().enumerate() {
             let field = format!("frames[{}].image", index + 1);
-            let image = self.image(field.clone(), &frame.image)?;
-            if image.dim() != reference.dim() {
-                let size = |image: &Array2<f64>| [image.nrows() as u32, image.ncols() as u32];
-                return Err(SceneError::SizeMismatch {
-                    file: self.file.clone(),
-                    field,
-                    image: frame.image.clone(),
-                    reference: self.reference.clone(),
-                    expected: size(&reference),
-                    found: size(&image),
-                });
-            }
+            let image = self.image(&field, &frame.image, Some(reference.dim()))?;
             let brightening = image - &reference;
             let newtons = newtons_per_grey
                 .or_else(|| frame.force_n.map(|force| force / brightening.sum()))
-                .ok_or_else(|| SceneError::Unusable {
-                    file: self.file.clone(),
-                    field: format!("frames[{}].force_N", index + 1),
-                    reason: "without a [calibration] every frame needs its force".into(),
+                .ok_or_else(|| {
+                    let field = format!("frames[{}].force_N", index + 1);
+                    let reason = "without a [calibration] every frame needs its force";
+                    FileError::field(&self.file, field, reason)
                 })?;
-            let means = ring_means(
-                &brightening.view(),
-                self.pixel_size_m,
-                newtons / area,
-                self.guide.radius_m(),
-            );
-            rings.push(means.map_err(|error| SceneError::Unusable {
-                file: self.file.clone(),
-                field,
-                reason: error.to_string(),
-            })?);
+            let (size, face) = (self.pixel_size_m, self.guide.radius_m());
+            let means = ring_means(&brightening.view(), size, newtons / area, face);
+            rings.push(means.map_err(|error| FileError::field(&self.file, field, error))?);
         }
-        let radii = rings
-            .first()
-            .map(|first| first.radii_m.clone())
-            .unwrap_or_default();
-        let profiles = (self.frames.iter().zip(&rings))
+        // The search compares frames ring by ring, so all are taken at the radii of the first.
+        let first = rings.first().map(|first| first.radii_m.clone());
+        let radii = first.unwrap_or_default();
+        let profiles = self
+            .frames
+            .iter()
+            .zip(&rings)
             .map(|(frame, means)| PressureProfile {
                 approach_m: frame.approach_m,
+                // A force that gave the scale is no measurement of its own.
                 force_n: frame.force_n.filter(|_| newtons_per_grey.is_some()),
                 pressure_pa: resampled(means, &means.pressure_pa, &radii),
                 standard_error_pa: resampled(means, &means.standard_error_pa, &radii),
-            })
-            .collect();
-        Ok(LoadedInclusion { rings, profiles })
+            });
+        Ok(LoadedInclusion {
+            profiles: profiles.collect(),
+            rings,
+        })
     }
 
-    fn newtons_per_grey(&self) -> Result<Option<f64>, SceneError> {
+    fn newtons_per_grey(&self) -> Result<Option<f64>, FileError> {
         let Some(path) = &self.calibration else {
             return Ok(None);
         };
-        let field = "calibration.pairs";
-        let pairs = read_pairs(path).map_err(|source| SceneError::File {
-            file: self.file.clone(),
-            field: field.into(),
-            source: Box::new(source),
-        })?;
-        let unusable = |reason: String| SceneError::Unusable {
-            file: self.file.clone(),
-            field: field.into(),
-            reason,
-        };
+        let unusable = |reason| FileError::field(&self.file, "calibration.pairs", reason);
+        let pairs = force_pairs(path).map_err(|error| unusable(error.into()))?;
         let line = LinearCalibration::fit(&pairs, &CalibrationOptions::default())
-            .map_err(|error| unusable(error.to_string()))?;
+            .map_err(|error| unusable(Box::<dyn Error + Send + Sync>::from(error)))?;
         let slope = line.force_n(1.0) - line.force_n(0.0);
         if slope > 0.0 {
             Ok(Some(slope))
@@ -212,162 +186,156 @@ impl InclusionScene {
         }
     }
 
-    fn image(&self, field: String, path: &Path) -> Result<Array2<f64>, SceneError> {
-        let image =
-            read_grey_image(path, Grey::default(), None).map_err(|source| SceneError::File {
-                file: self.file.clone(),
-                field,
-                source: Box::new(source),
-            })?;
-        Ok(image.to_u8().mapv(f64::from))
+    fn image(
+        &self,
+        field: &str,
+        path: &Path,
+        size: Option<(usize, usize)>,
+    ) -> Result<Array2<f64>, FileError> {
+        Ok(read_frame(&self.file, field, path, None, size)?.mapv(f64::from))
     }
 }
 
 /// Values at the radii of another frame, whose centre lies a fraction of a pixel elsewhere.
 fn resampled(means: &RingMeans, values: &[f64], radii: &[f64]) -> Vec<f64> {
+    let known = &means.radii_m;
     let at = |radius: f64| {
-        let last = means.radii_m.len() - 1;
-        let after = means
-            .radii_m
+        let after = known
             .partition_point(|r| *r < radius)
-            .clamp(1, last);
-        let (a, b) = (means.radii_m[after - 1], means.radii_m[after]);
+            .clamp(1, known.len() - 1);
+        let (a, b) = (known[after - 1], known[after]);
         let part = ((radius - a) / (b - a)).clamp(0.0, 1.0);
         values[after - 1] + part * (values[after] - values[after - 1])
     };
     radii.iter().map(|&radius| at(radius)).collect()
 }
 
-fn calibration(fields: &Fields<'_>, folder: &Path) -> Result<Option<PathBuf>, SceneError> {
-    if !fields.has("calibration") {
-        return Ok(None);
-    }
-    let fields = fields.table("calibration", "a table with `pairs`")?;
-    fields.only(&["pairs"])?;
-    let path = fields.string(
-        "pairs",
-        "the path of a CSV file (integrated_pixel_value,force_N)",
-    )?;
-    Ok(Some(folder.join(path)))
+/// An inclusion scene as it stands in its file.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct InclusionFile {
+    reference: PathBuf,
+    #[serde(deserialize_with = "positive_pair")]
+    pixel_size_m: [f64; 2],
+    calibration: Option<PairsTable>,
+    #[serde(deserialize_with = "one_or_more")]
+    frames: Vec<Frame>,
+    object: BlockTable,
+    waveguide: GuideTable,
 }
 
-fn frames(fields: &Fields<'_>, folder: &Path) -> Result<Vec<Frame>, SceneError> {
-    let tables = fields.tables(
-        "frames",
-        "one or more [[frames]] tables with `image` and `approach_m`",
-    )?;
-    let mut last = 0.0;
-    let mut frames = Vec::with_capacity(tables.len());
-    for table in &tables {
-        table.only(&["image", "approach_m", "force_N"])?;
-        let image = folder.join(table.string("image", "the path of an image")?);
-        let grows = |approach: f64| positive(approach) && approach > last;
-        let approach_m = table.number(
-            "approach_m",
-            "a positive number (metres), greater than that of the frame before",
-            grows,
-        )?;
-        last = approach_m;
-        let force_n = table.optional_number("force_N", "a positive number (newtons)", positive)?;
-        frames.push(Frame {
-            image,
-            approach_m,
-            force_n,
-        });
-    }
-    Ok(frames)
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct PairsTable {
+    pairs: PathBuf,
 }
 
-fn specimen(fields: &Fields<'_>) -> Result<Specimen, SceneError> {
-    const SHAPE: &str = "\"block\"";
-    const RATIO: &str = "a number above -1, at most 0.4999";
-    const INTERFACE: &str = "\"bonded\" or \"frictionless\", or absent: both are tried";
-    let fields = fields.table("object", "a table with `shape = \"block\"`")?;
-    fields.only(&[
-        "shape",
-        "height_m",
-        "height_error_m",
-        "radius_m",
-        "poisson_ratio",
-        "poisson_ratio_error",
-        "youngs_modulus_pa",
-        "youngs_modulus_error_pa",
-        "approach_error_m",
-        "interface",
-    ])?;
-    let shape = fields.string("shape", SHAPE)?;
-    if shape != "block" {
-        return Err(fields.wrong("shape", SHAPE, &toml::Value::String(shape.into())));
-    }
-    let height = fields.number("height_m", LENGTH, positive)?;
-    let radius = fields.number("radius_m", LENGTH, positive)?;
-    let refused = |error: crate::elasticity::ElasticityError| fields.unusable("object", &error);
-    let mut specimen = Specimen::new(height, radius).map_err(refused)?;
-    if let Some(error) = fields.optional_number("height_error_m", LENGTH, positive)? {
-        specimen = specimen.with_height_error_m(error).map_err(refused)?;
-    }
-    if let Some(error) = fields.optional_number("approach_error_m", LENGTH, positive)? {
-        specimen = specimen.with_approach_error_m(error).map_err(refused)?;
-    }
-    let accept = |ratio: f64| poisson(ratio) && ratio <= 0.4999;
-    let ratio = fields.optional_number("poisson_ratio", RATIO, accept)?;
-    let error = fields.optional_number("poisson_ratio_error", "a positive number", positive)?;
-    if ratio.is_some() || error.is_some() {
-        specimen = specimen
-            .with_poisson_ratio(ratio.unwrap_or(0.495), error.unwrap_or(0.005))
-            .map_err(refused)?;
-    }
-    const MODULUS: &str = "a positive number (pascals)";
-    let modulus = fields.optional_number("youngs_modulus_pa", MODULUS, positive)?;
-    let error = fields.optional_number("youngs_modulus_error_pa", MODULUS, positive)?;
-    if let Some(value) = modulus {
-        // A modulus from a textbook or another laboratory: a tenth.
-        let error = error.unwrap_or(0.1 * value);
-        specimen = specimen
-            .with_youngs_modulus(value, error)
-            .map_err(refused)?;
-    }
-    if fields.has("interface") {
-        specimen = specimen.with_interface(match fields.string("interface", INTERFACE)? {
-            "bonded" => Interface::Bonded,
-            "frictionless" => Interface::Frictionless,
-            other => {
-                let found = toml::Value::String(other.into());
-                return Err(fields.wrong("interface", INTERFACE, &found));
-            }
-        });
-    }
-    Ok(specimen)
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct BlockTable {
+    #[serde(rename = "shape")]
+    _shape: BlockShape,
+    #[serde(deserialize_with = "positive")]
+    height_m: f64,
+    #[serde(default, deserialize_with = "positive")]
+    height_error_m: Option<f64>,
+    #[serde(deserialize_with = "positive")]
+    radius_m: f64,
+    #[serde(default, deserialize_with = "compressible")]
+    poisson_ratio: Option<f64>,
+    #[serde(default, deserialize_with = "positive")]
+    poisson_ratio_error: Option<f64>,
+    #[serde(default, deserialize_with = "positive")]
+    youngs_modulus_pa: Option<f64>,
+    #[serde(default, deserialize_with = "positive")]
+    youngs_modulus_error_pa: Option<f64>,
+    #[serde(default, deserialize_with = "positive")]
+    approach_error_m: Option<f64>,
+    interface: Option<InterfaceName>,
 }
 
-fn guide(fields: &Fields<'_>) -> Result<Guide, SceneError> {
-    let fields = fields.table("waveguide", "a table with `radius_m` and `layers`")?;
-    fields.only(&["radius_m", "layers"])?;
-    let radius = fields.number("radius_m", LENGTH, positive)?;
-    let tables = fields.tables(
-        "layers",
-        "an array of one or more tables, from the block's side to the glass",
-    )?;
-    let mut layers = Vec::with_capacity(tables.len());
-    for table in &tables {
-        // The refractive index of a layer plays no part, but stands in files of the same sensor.
-        table.only(&[
-            "refractive_index",
-            "thickness_m",
-            "youngs_modulus_pa",
-            "poisson_ratio",
-        ])?;
-        let modulus = table.number("youngs_modulus_pa", "a positive number (pascals)", positive)?;
-        let accept = |ratio: f64| poisson(ratio) && ratio <= 0.4999;
-        let ratio = table
-            .optional_number("poisson_ratio", "a number above -1, at most 0.4999", accept)?
-            .unwrap_or(0.495);
-        let material = Material::new(modulus, ratio)
-            .map_err(|error| table.unusable("poisson_ratio", &error))?;
-        layers.push(GuideLayer {
-            thickness_m: table.number("thickness_m", LENGTH, positive)?,
-            material,
-        });
+#[derive(Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum BlockShape {
+    Block,
+}
+
+#[derive(Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum InterfaceName {
+    Bonded,
+    Frictionless,
+}
+
+/// A Poisson ratio that finite elements take.
+fn compressible<'de, D: Deserializer<'de>, T: From<f64>>(d: D) -> Result<T, D::Error> {
+    let expected = "a number above -1, at most 0.4999";
+    number(d, expected, |v| v > -1.0 && v <= 0.4999)
+}
+
+impl BlockTable {
+    fn specimen(&self) -> Result<Specimen, ElasticityError> {
+        let mut specimen = Specimen::new(self.height_m, self.radius_m)?;
+        if let Some(error) = self.height_error_m {
+            specimen = specimen.with_height_error_m(error)?;
+        }
+        if let Some(error) = self.approach_error_m {
+            specimen = specimen.with_approach_error_m(error)?;
+        }
+        if self.poisson_ratio.is_some() || self.poisson_ratio_error.is_some() {
+            let ratio = self.poisson_ratio.unwrap_or(0.495);
+            specimen =
+                specimen.with_poisson_ratio(ratio, self.poisson_ratio_error.unwrap_or(0.005))?;
+        }
+        if let Some(modulus) = self.youngs_modulus_pa {
+            // A modulus from a textbook or another laboratory is good to a tenth.
+            let error = self.youngs_modulus_error_pa.unwrap_or(0.1 * modulus);
+            specimen = specimen.with_youngs_modulus(modulus, error)?;
+        }
+        Ok(match self.interface {
+            None => specimen,
+            Some(InterfaceName::Bonded) => specimen.with_interface(Interface::Bonded),
+            Some(InterfaceName::Frictionless) => specimen.with_interface(Interface::Frictionless),
+        })
     }
-    Guide::new(layers, radius).map_err(|error| fields.unusable("layers", &error))
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct GuideTable {
+    #[serde(deserialize_with = "positive")]
+    radius_m: f64,
+    #[serde(deserialize_with = "one_or_more")]
+    layers: Vec<LayerTable>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct LayerTable {
+    /// It plays no part, but stands in files of the same sensor.
+    #[serde(rename = "refractive_index")]
+    _refractive_index: Option<f64>,
+    #[serde(deserialize_with = "positive")]
+    thickness_m: f64,
+    #[serde(deserialize_with = "positive")]
+    youngs_modulus_pa: f64,
+    #[serde(default, deserialize_with = "compressible")]
+    poisson_ratio: Option<f64>,
+}
+
+impl GuideTable {
+    fn guide(&self) -> Result<Guide, ElasticityError> {
+        let layer = |layer: &LayerTable| {
+            let ratio = layer.poisson_ratio.unwrap_or(0.495);
+            Ok(GuideLayer {
+                thickness_m: layer.thickness_m,
+                material: Material::new(layer.youngs_modulus_pa, ratio)?,
+            })
+        };
+        let layers = self.layers.iter().map(layer);
+        Guide::new(
+            layers.collect::<Result<_, ElasticityError>>()?,
+            self.radius_m,
+        )
+    }
 }

@@ -1,115 +1,232 @@
-//! Whole files in and out: what is no file is refused before it is opened, and a file is replaced only by a complete one.
-use super::error::ReadError;
-use crate::io::replace_file;
-use std::fs::{self, FileType};
-use std::io::Read;
-use std::path::Path;
+//! Whole files in and out, and TOML files as structs with checked numbers.
+use super::error::{FileError, Place, quoted};
+use serde::de::{self, Deserialize, DeserializeOwned, Deserializer, Unexpected, Visitor};
+use serde_path_to_error::Segment;
+use std::fmt;
+use std::fs::{self, OpenOptions};
+use std::io::{Error, ErrorKind, Read, Write};
+use std::path::{Path, PathBuf};
 
-/// Largest file that is read, in bytes: more is not a measurement.
-pub const LARGEST_FILE: u64 = 512 << 20;
+/// Largest file that is read, in bytes. No table, scene or frame needs more, and a device never
+/// ends.
+const LARGEST_FILE: u64 = 512 << 20;
 
-/// Reads a whole file of at most half a gibibyte. The error names it.
-pub fn read_bytes(path: &Path) -> Result<Vec<u8>, ReadError> {
-    let open = |source| ReadError::Open {
-        path: path.into(),
-        source,
-    };
-    let metadata = fs::metadata(path).map_err(open)?;
-    // Opening a pipe that nobody writes to would wait for ever, and a device may never end.
-    if !metadata.is_file() {
-        return Err(ReadError::NotAFile {
-            path: path.into(),
-            found: kind(metadata.file_type()),
-        });
-    }
-    let too_large = |bytes| ReadError::TooLarge {
-        path: path.into(),
-        bytes,
-        limit: LARGEST_FILE,
-    };
-    if metadata.len() > LARGEST_FILE {
-        return Err(too_large(metadata.len()));
-    }
-    let mut bytes = Vec::with_capacity(metadata.len() as usize);
-    // One byte more than allowed tells a file that grew, or whose size the system does not know (as in /proc).
-    let file = fs::File::open(path).map_err(open)?;
-    file.take(LARGEST_FILE + 1)
-        .read_to_end(&mut bytes)
-        .map_err(open)?;
-    if bytes.len() as u64 > LARGEST_FILE {
-        return Err(too_large(bytes.len() as u64));
-    }
-    Ok(bytes)
-}
-
-/// Writes a whole file, creating its folder where needed.
-///
-/// The bytes go to a temporary file in the same folder, which then takes the name: whoever reads finds the old file or
-/// the new one, and a full disk leaves the old one. What is no file (`/dev/stdout`) is written to as it is.
+/// Reads a whole file of at most 512 MiB.
 ///
 /// # Errors
-/// [`ReadError::Write`], which names the file.
-pub fn write_bytes(path: &Path, bytes: &[u8]) -> Result<(), ReadError> {
-    replace_file(path, bytes).map_err(|source| ReadError::Write {
+/// [`FileError::Read`], also for a folder, a pipe or a device.
+pub fn read_bytes(path: &Path) -> Result<Vec<u8>, FileError> {
+    let read = || {
+        let metadata = fs::metadata(path)?;
+        // Opening a pipe without a writer would wait for ever, and a device may never end.
+        if metadata.is_dir() {
+            return Err(Error::other("it is a folder, not a file"));
+        }
+        if !metadata.is_file() {
+            return Err(Error::other("it is a pipe or a device, not a file"));
+        }
+        let mut bytes = Vec::new();
+        if metadata.len() <= LARGEST_FILE {
+            // The size may grow while the file is read, or be unknown to the system (in /proc).
+            let file = fs::File::open(path)?;
+            file.take(LARGEST_FILE + 1).read_to_end(&mut bytes)?;
+        }
+        // One byte beyond the limit is enough to refuse a file.
+        let size = metadata.len().max(bytes.len() as u64);
+        if size > LARGEST_FILE {
+            let reason = format!("it has {size} bytes, more than the {LARGEST_FILE} that are read");
+            return Err(Error::other(reason));
+        }
+        Ok(bytes)
+    };
+    read().map_err(|source| FileError::Read {
         path: path.into(),
         source,
     })
 }
 
-fn kind(file_type: FileType) -> &'static str {
-    if file_type.is_dir() {
-        "a folder"
-    } else {
-        special(file_type)
+/// Writes a whole file as [`replace_file`] does.
+///
+/// # Errors
+/// [`FileError::Write`], which names the file.
+pub fn write_bytes(path: &Path, bytes: &[u8]) -> Result<(), FileError> {
+    replace_file(path, bytes).map_err(|source| FileError::Write {
+        path: path.into(),
+        source,
+    })
+}
+
+/// Writes a whole file, creating its folder where needed.
+///
+/// The bytes go to a temporary file in the same folder, which then takes the name. A reader finds
+/// the old file or the new one, and a full disk leaves the old one. A link is followed. What is no
+/// file (`/dev/stdout`) is written to as it is.
+///
+/// # Errors
+/// Those of the operating system.
+pub fn replace_file(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
+    let target = match fs::metadata(path) {
+        Ok(metadata) if metadata.is_dir() => {
+            return Err(Error::new(ErrorKind::IsADirectory, "it is a folder"));
+        }
+        Ok(metadata) if !metadata.is_file() => {
+            return OpenOptions::new().write(true).open(path)?.write_all(bytes);
+        }
+        Ok(_) => fs::canonicalize(path)?,
+        Err(_) => {
+            fs::create_dir_all(path.parent().unwrap_or(Path::new("")))?;
+            path.to_owned()
+        }
+    };
+    if target.file_name().is_none() {
+        return Err(Error::new(ErrorKind::InvalidInput, "it has no file name"));
+    }
+    // A new name only: a file that is there belongs to somebody else.
+    let process = std::process::id();
+    let (temporary, mut file) = (0..u32::MAX)
+        .map(|k| target.with_file_name(format!(".{process}-{k}.part")))
+        .find_map(|name| {
+            let file = OpenOptions::new().write(true).create_new(true).open(&name);
+            match file {
+                Err(error) if error.kind() == ErrorKind::AlreadyExists => None,
+                file => Some(file.map(|file| (name, file))),
+            }
+        })
+        .ok_or_else(|| Error::other("no name is free for a temporary file"))??;
+    // The file is closed before it is renamed, as some systems ask.
+    let written = file.write_all(bytes);
+    drop(file);
+    let done = written.and_then(|()| fs::rename(&temporary, &target));
+    if done.is_err() {
+        let _ = fs::remove_file(&temporary);
+    }
+    done
+}
+
+/// Reads a TOML file into a struct.
+pub fn read_toml<T: DeserializeOwned>(path: &Path) -> Result<T, FileError> {
+    parse_toml(&String::from_utf8_lossy(&read_bytes(path)?), path)
+}
+
+/// Reads a TOML text into a struct. The error names the field with its path, counted from 1.
+pub fn parse_toml<T: DeserializeOwned>(text: &str, path: &Path) -> Result<T, FileError> {
+    let rejected = |place: Place, error: &toml::de::Error| FileError::Rejected {
+        path: path.into(),
+        place,
+        // A sentence is one line, whatever the file holds. The longest list of names fits. The parser
+        // has words of its own for a name that is no text.
+        source: quoted(error.message(), 400)
+            .replace("wanted string or table", "invalid type, expected a string")
+            .into(),
+    };
+    let parsed = toml::Deserializer::parse(text).map_err(|error| {
+        let start = error.span().map_or(0, |span| span.start.min(text.len()));
+        let line = 1 + text.as_bytes()[..start]
+            .iter()
+            .filter(|b| **b == b'\n')
+            .count();
+        rejected(Place::Line(line as u64), &error)
+    })?;
+    serde_path_to_error::deserialize(parsed).map_err(|error| {
+        let mut field = String::new();
+        for segment in error.path() {
+            let dot = if field.is_empty() { "" } else { "." };
+            match segment {
+                Segment::Seq { index } => field += &format!("[{}]", index + 1),
+                Segment::Map { key } => field += &format!("{dot}{key}"),
+                Segment::Enum { variant } => field += &format!("{dot}{variant}"),
+                Segment::Unknown => {}
+            }
+        }
+        let place = match field.as_str() {
+            "" => Place::File,
+            field => Place::Field(quoted(field, 80)),
+        };
+        rejected(place, error.inner())
+    })
+}
+
+/// The path that a file names, relative to the folder of that file.
+pub fn beside(file: &Path, name: &Path) -> PathBuf {
+    file.parent().unwrap_or(Path::new("")).join(name)
+}
+
+/// What a field accepts: the words of a sentence, and the test.
+struct Number {
+    expected: &'static str,
+    accepts: fn(f64) -> bool,
+}
+
+impl Visitor<'_> for Number {
+    type Value = f64;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.expected)
+    }
+
+    fn visit_f64<E: de::Error>(self, value: f64) -> Result<f64, E> {
+        if (self.accepts)(value) {
+            Ok(value)
+        } else {
+            Err(E::invalid_value(Unexpected::Float(value), &self))
+        }
+    }
+
+    fn visit_i64<E: de::Error>(self, value: i64) -> Result<f64, E> {
+        self.visit_f64(value as f64)
+    }
+
+    fn visit_u64<E: de::Error>(self, value: u64) -> Result<f64, E> {
+        self.visit_f64(value as f64)
     }
 }
 
-#[cfg(unix)]
-fn special(file_type: FileType) -> &'static str {
-    use std::os::unix::fs::FileTypeExt;
-    if file_type.is_fifo() {
-        "a pipe"
-    } else if file_type.is_socket() {
-        "a socket"
-    } else {
-        "a device"
-    }
+/// A number, or an optional number, that passes a test. For `#[serde(deserialize_with = …)]`.
+pub fn number<'de, D: Deserializer<'de>, T: From<f64>>(
+    deserializer: D,
+    expected: &'static str,
+    accepts: fn(f64) -> bool,
+) -> Result<T, D::Error> {
+    let number = deserializer.deserialize_f64(Number { expected, accepts })?;
+    Ok(number.into())
 }
 
-#[cfg(not(unix))]
-fn special(_: FileType) -> &'static str {
-    "a device"
+pub fn finite<'de, D: Deserializer<'de>, T: From<f64>>(d: D) -> Result<T, D::Error> {
+    number(d, "a finite number", f64::is_finite)
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
+pub fn positive<'de, D: Deserializer<'de>, T: From<f64>>(d: D) -> Result<T, D::Error> {
+    number(d, "a positive number", |v| v > 0.0 && v.is_finite())
+}
 
-    #[test]
-    fn a_file_is_replaced_whole_and_nothing_is_left_beside_it() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("a.csv");
-        write_bytes(&path, b"first").unwrap();
-        write_bytes(&path, b"second").unwrap();
-        assert_eq!(fs::read(&path).unwrap(), b"second");
-        let blocked = folder.path().join("a.csv/b.csv");
-        assert!(write_bytes(&blocked, b"").is_err());
-        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
-    }
+pub fn not_negative<'de, D: Deserializer<'de>, T: From<f64>>(d: D) -> Result<T, D::Error> {
+    let expected = "zero or a positive number";
+    number(d, expected, |v| v >= 0.0 && v.is_finite())
+}
 
-    #[test]
-    fn a_folder_and_a_file_too_large_are_refused_by_name() {
-        let folder = tempfile::tempdir().unwrap();
-        let message = |path: &Path| read_bytes(path).unwrap_err().to_string();
-        assert!(message(folder.path()).ends_with("it is a folder, not a file"));
-        let path = folder.path().join("huge.csv");
-        // A file of holes takes no room on the disk.
-        fs::File::create(&path)
-            .unwrap()
-            .set_len(LARGEST_FILE + 1)
-            .unwrap();
-        assert!(
-            message(&path).ends_with("has 536870913 bytes, more than the 536870912 that are read")
-        );
+/// A Poisson ratio at which an isotropic solid is stable.
+pub fn poisson_ratio<'de, D: Deserializer<'de>, T: From<f64>>(d: D) -> Result<T, D::Error> {
+    let expected = "a number above -1, at most 0.5";
+    number(d, expected, |v| v > -1.0 && v <= 0.5)
+}
+
+/// Two positive numbers.
+pub fn positive_pair<'de, D: Deserializer<'de>, T: From<[f64; 2]>>(
+    deserializer: D,
+) -> Result<T, D::Error> {
+    #[derive(serde::Deserialize)]
+    struct Positive(#[serde(deserialize_with = "positive")] f64);
+    let pair = <[Positive; 2]>::deserialize(deserializer)?;
+    Ok(pair.map(|number| number.0).into())
+}
+
+/// An array of one or more.
+pub fn one_or_more<'de, D: Deserializer<'de>, T: Deserialize<'de>>(
+    deserializer: D,
+) -> Result<Vec<T>, D::Error> {
+    let array = Vec::deserialize(deserializer)?;
+    if array.is_empty() {
+        return Err(de::Error::invalid_length(0, &"one or more"));
     }
+    Ok(array)
 }

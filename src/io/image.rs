@@ -1,18 +1,48 @@
 //! Grey images from PNG, PGM and JPEG files.
-use super::depth::{Samples, full_scale};
-use super::error::ReadError;
+use super::error::FileError;
 use super::files::{read_bytes, write_bytes};
-use super::grey::Grey;
-use ::image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, Limits};
+use ::image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, Limits};
 use ndarray::{Array2, ArrayView2};
 use std::io::Cursor;
 use std::path::Path;
 
-/// Longest side of an image in pixels.
-pub const LARGEST_SIDE: u32 = 30_000;
+/// How red, green and blue make a grey level, on the stored (gamma-coded) values.
+///
+/// A calibration holds for the grey that it was made with. Reading colour frames by another one
+/// moves every level.
+///
+/// ```
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// use tactile_imaging::io::{Grey, read_grey_image};
+/// # let folder = tempfile::tempdir()?;
+/// # let path = folder.path().join("blue.ppm");
+/// std::fs::write(&path, b"P6\n1 1\n255\n\x00\x00\x5a")?; // 90 levels of blue
+/// let levels = |grey| read_grey_image(&path, grey, None).map(|image| image.to_u8()[[0, 0]]);
+/// assert_eq!((levels(Grey::Mean)?, levels(Grey::default())?), (30, 10));
+/// # Ok(()) }
+/// ```
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Grey {
+    /// The luma of Rec. 601, 0.299 R + 0.587 G + 0.114 B, as in OpenCV and most camera software.
+    #[default]
+    Rec601,
+    /// The luma of Rec. 709, 0.2126 R + 0.7152 G + 0.0722 B.
+    Rec709,
+    /// The mean of the channels, as in the depth tables of 9DTact.
+    Mean,
+}
 
-/// Most pixels of an image: 64 million.
-pub const LARGEST_IMAGE: u64 = 64_000_000;
+impl Grey {
+    /// Weights of red, green and blue, of sum 1.
+    pub fn weights(self) -> [f64; 3] {
+        match self {
+            Grey::Rec601 => [0.299, 0.587, 0.114],
+            Grey::Rec709 => [0.2126, 0.7152, 0.0722],
+            Grey::Mean => [1.0 / 3.0; 3],
+        }
+    }
+}
 
 /// A grey image, `[row, column]`.
 ///
@@ -46,17 +76,22 @@ impl GreyImage {
     }
 }
 
-/// Reads a grey image. The kind of file is told from its content, not its name.
+/// Reads a grey image, of the format that its content shows, whatever its name.
 ///
-/// Colour is turned to grey by the weights of `grey`, on the stored (gamma-coded) values. Alpha is ignored. Levels are on the scale of 8 bits,
-/// and samples of more bits keep their precision as fractions: a sample v becomes 255 v/m, where m is the largest value that the camera
-/// gives. A PGM or PPM says m (its `maxval`). A PNG of 16 bits does not: m is 65535, or 2ᵇ − 1 where the caller gives the `bits` b, 1 to 16. A
-/// camera of 12 bits often writes its samples into 16 as they are. An image without any sample above 4095 is therefore refused until the
-/// bits are given, unless all are multiples of 257, as 8 bits stretched to 16 are. Images of 8 bits are not scaled.
+/// Colour is turned to grey by the weights of `grey`, on the stored (gamma-coded) values. Alpha is
+/// ignored. Levels are on the scale of 8 bits, and samples of more bits keep their precision as
+/// fractions: a sample v becomes 255 v/m, where m is the largest value that the camera gives.
+///
+/// - Images of 8 bits are not scaled.
+/// - A PGM or PPM states m, its `maxval`.
+/// - A PNG of 16 bits does not. There m is 65535, or 2ᵇ − 1 where the caller gives the `bits` b, 1
+///   to 16. A camera of 12 bits often writes its samples into 16 as they are. An image without any
+///   sample above 4095 is therefore refused until the bits are given. It is taken where all samples
+///   are multiples of 257, as 8 bits stretched to 16 are.
 ///
 /// ```
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
-/// use tactile_imaging::io::{Grey, ReadError, read_grey_image};
+/// use tactile_imaging::io::{Grey, read_grey_image};
 /// let folder = tempfile::tempdir()?;
 /// let path = folder.path().join("frame.ppm");
 /// std::fs::write(&path, b"P6\n1 1\n255\n\x1e\x3c\x00")?;
@@ -67,70 +102,206 @@ impl GreyImage {
 /// let samples = image::ImageBuffer::<image::Luma<u16>, _>::from_raw(2, 1, vec![4095, 819]);
 /// samples.ok_or("two samples")?.save(&path)?;
 /// let read = |bits| read_grey_image(&path, Grey::default(), bits);
-/// assert!(matches!(read(None), Err(ReadError::UnclearBits { likely: 12, .. })));
+/// assert!(read(None).unwrap_err().to_string().contains("give the bits of its camera"));
 /// assert_eq!(read(Some(12))?.levels, ndarray::array![[255.0, 51.0]]);
-/// assert!(matches!(read(Some(10)), Err(ReadError::TooFewBits { .. })));
+/// assert!(read(Some(10)).is_err(), "4095 takes 12 bits");
 /// # Ok(()) }
 /// ```
 ///
 /// # Errors
-/// [`ReadError`] where the file cannot be read or decoded, is too large, its depth is not clear, or a sample needs more bits than given.
+/// [`FileError`] where the file cannot be read or decoded, is too large, its depth is not clear, or
+/// a sample needs more bits than given.
 pub fn read_grey_image(
     path: impl AsRef<Path>,
     grey: Grey,
     bits: Option<u8>,
-) -> Result<GreyImage, ReadError> {
+) -> Result<GreyImage, FileError> {
     let path = path.as_ref();
-    parse(&read_bytes(path)?, path, grey, bits)
+    let bytes = read_bytes(path)?;
+    let image = decode(&bytes, path)?;
+    to_grey(image, &bytes, path, grey, bits)
 }
 
-fn parse(bytes: &[u8], path: &Path, grey: Grey, bits: Option<u8>) -> Result<GreyImage, ReadError> {
-    let (image, largest) = decode(bytes, path, bits)?;
-    Ok(to_grey(&image, largest, grey))
-}
-
-/// The image, and the sample that stands for the level 255.
-fn decode(bytes: &[u8], path: &Path, bits: Option<u8>) -> Result<(DynamicImage, f64), ReadError> {
-    let broken = |source| ReadError::Image {
-        path: path.into(),
-        source,
-    };
-    let mut reader = ImageReader::new(Cursor::new(bytes))
-        .with_guessed_format()
-        .map_err(|e| broken(e.into()))?;
-    let mut limits = Limits::default();
-    limits.max_image_width = Some(LARGEST_SIDE);
-    limits.max_image_height = Some(LARGEST_SIDE);
-    // Four samples of 16 bits a pixel, the widest that is decoded.
-    limits.max_alloc = Some(8 * LARGEST_IMAGE);
-    reader.limits(limits.clone());
-    let mut decoder = reader.into_decoder().map_err(broken)?;
-    decoder.set_limits(limits).map_err(broken)?;
-    let (width, height) = decoder.dimensions();
-    // Before anything is decoded: a header of some bytes can announce any size.
-    if u64::from(width) * u64::from(height) > LARGEST_IMAGE {
-        return Err(ReadError::TooManyPixels {
-            path: path.into(),
-            width,
-            height,
-            limit: LARGEST_IMAGE,
-        });
-    }
-    let decoded = DynamicImage::from_decoder(decoder).map_err(broken)?;
-    let largest = full_scale(&decoded, bytes, path, bits)?;
-    Ok((decoded, largest))
-}
-
-/// Reads a grey image in eight bits a pixel: as [`GreyImage::to_u8`], but samples that are grey levels already are taken as they stand.
-pub fn read_grey_levels(path: &Path, bits: Option<u8>) -> Result<Array2<u8>, ReadError> {
-    match decode(&read_bytes(path)?, path, bits)? {
-        (DynamicImage::ImageLuma8(image), 255.0) => {
+/// Reads a grey image in eight bits a pixel, as [`GreyImage::to_u8`] gives it.
+///
+/// # Errors
+/// As [`read_grey_image`].
+pub fn read_grey_levels(path: &Path, bits: Option<u8>) -> Result<Array2<u8>, FileError> {
+    let bytes = read_bytes(path)?;
+    match decode(&bytes, path)? {
+        // Samples that are grey levels already are taken as they stand.
+        DynamicImage::ImageLuma8(image) => {
             let shape = (image.height() as usize, image.width() as usize);
             let levels = Array2::from_shape_vec(shape, image.into_raw());
             Ok(levels.unwrap_or_else(|_| Array2::zeros(shape)))
         }
-        (image, largest) => Ok(to_grey(&image, largest, Grey::default()).to_u8()),
+        image => Ok(to_grey(image, &bytes, path, Grey::default(), bits)?.to_u8()),
     }
+}
+
+/// Reads the image that a field of `file` names. It has to have the size of the reference, where
+/// that is known.
+pub fn read_frame(
+    file: &Path,
+    field: &str,
+    path: &Path,
+    bits: Option<u8>,
+    reference: Option<(usize, usize)>,
+) -> Result<Array2<u8>, FileError> {
+    let image = read_grey_levels(path, bits);
+    let image = image.map_err(|error| FileError::field(file, field, error))?;
+    let (rows, columns) = reference.unwrap_or(image.dim());
+    if image.dim() == (rows, columns) {
+        return Ok(image);
+    }
+    let reason = format!(
+        "the image {} is {} × {} pixels, but the reference is {columns} × {rows}",
+        path.display(),
+        image.ncols(),
+        image.nrows()
+    );
+    Err(FileError::field(file, field, reason))
+}
+
+fn decode(bytes: &[u8], path: &Path) -> Result<DynamicImage, FileError> {
+    // Longest side and most pixels that are read. A header of some bytes can announce any size.
+    let (side, pixels) = (30_000, 64_000_000);
+    let mut limits = Limits::default();
+    limits.max_image_width = Some(side);
+    limits.max_image_height = Some(side);
+    // Four samples of 16 bits a pixel, the widest that is decoded.
+    limits.max_alloc = Some(8 * pixels);
+    // An error of the decoder and a sentence of this reader end in one place.
+    let decoded = || {
+        let mut reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format()?;
+        reader.limits(limits.clone());
+        let mut decoder = reader.into_decoder()?;
+        decoder.set_limits(limits)?;
+        let (width, height) = decoder.dimensions();
+        if u64::from(width) * u64::from(height) > pixels {
+            return Ok(Err(format!(
+                "{width} × {height} pixels are more than the {} million that are read",
+                pixels / 1_000_000
+            )));
+        }
+        DynamicImage::from_decoder(decoder).map(Ok)
+    };
+    let decoded = decoded().unwrap_or_else(|error: ImageError| Err(in_words(&error)));
+    decoded.map_err(|reason| refused(path, reason))
+}
+
+/// A decoder's error on one line. That of portable anymaps prints `Some(3)` and `None`.
+fn in_words(error: &ImageError) -> String {
+    let mut text = error.to_string();
+    while let Some(start) = text.find("Some(") {
+        let inner = start + "Some(".len();
+        let Some(length) = text[inner..].find(')') else {
+            break;
+        };
+        text.replace_range(inner + length..=inner + length, "");
+        text.replace_range(start..inner, "");
+    }
+    let text = text.replace("None", "missing");
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+fn refused(path: &Path, reason: impl Into<String>) -> FileError {
+    FileError::Image {
+        path: path.into(),
+        reason: reason.into(),
+    }
+}
+
+fn to_grey(
+    image: DynamicImage,
+    bytes: &[u8],
+    path: &Path,
+    grey: Grey,
+    bits: Option<u8>,
+) -> Result<GreyImage, FileError> {
+    let (colour, shape) = (
+        image.color(),
+        (image.height() as usize, image.width() as usize),
+    );
+    // 8 bits become 16 by a factor of 257, which the division below takes back exactly.
+    let samples = match colour.has_color() {
+        true => image.into_rgb16().into_raw(),
+        false => image.into_luma16().into_raw(),
+    };
+    let is_wide = colour.bytes_per_pixel() / colour.channel_count() > 1;
+    let white = if is_wide {
+        white_of(&samples, bytes, bits)
+    } else {
+        Ok(65_535.0)
+    };
+    let scale = white.map_err(|reason| refused(path, reason))? / 255.0;
+    // Where the caller gives the bits, the decoder's rounding can pass the largest level.
+    let level = |sample: u16| f64::from(sample) / scale;
+    let levels = if colour.has_color() {
+        let weights = grey.weights();
+        let pixels = samples.chunks_exact(3);
+        let weighted = pixels.map(|rgb| (0..3).map(|i| weights[i] * level(rgb[i])));
+        weighted
+            .map(|terms| terms.sum::<f64>().min(255.0))
+            .collect()
+    } else {
+        samples
+            .iter()
+            .map(|sample| level(*sample).min(255.0))
+            .collect()
+    };
+    Ok(GreyImage {
+        levels: Array2::from_shape_vec(shape, levels).unwrap_or_else(|_| Array2::zeros(shape)),
+        bits: if is_wide { 16 } else { 8 },
+        colour: colour.has_color(),
+    })
+}
+
+/// The sample of 16 bits that stands for the level 255. The decoder stretches the samples of a PGM,
+/// PPM or PAM from the largest value that the header announces to the full range.
+fn white_of(samples: &[u16], bytes: &[u8], bits: Option<u8>) -> Result<f64, String> {
+    let full_range = 65_535.0;
+    let brightest = samples.iter().copied().max().unwrap_or(u16::MAX);
+    let announced = announced_maximum(bytes);
+    if let Some(bits) = bits {
+        let stretch = announced.map_or(1.0, |maximum| full_range / f64::from(maximum));
+        let white = stretch * f64::from((1_u32 << bits.clamp(1, 16)) - 1);
+        // Half a sample for the decoder's rounding.
+        if f64::from(brightest) <= white + 0.5 {
+            return Ok(white);
+        }
+        let brightest = (f64::from(brightest) / stretch).round();
+        return Err(format!(
+            "it has a sample of {brightest}, more than {bits} bits hold"
+        ));
+    }
+    // A program that stores 8 bits in 16 makes every sample a multiple of 257. Samples of a camera
+    // with 12 bits or fewer do not pass 4095.
+    let is_stretched = samples.iter().all(|sample| sample.is_multiple_of(257));
+    if announced.is_some() || brightest > 4095 || is_stretched {
+        return Ok(full_range);
+    }
+    // Cameras of 10 bits do not pass 1023.
+    let likely = if brightest > 1023 { 12 } else { 10 };
+    let bits = format!("give the bits of its camera (bits = {likely}, or 16)");
+    Err(format!("no sample of 16 bits is above {brightest}: {bits}"))
+}
+
+/// The largest value of a sample that the header of a PGM, PPM or PAM announces.
+fn announced_maximum(bytes: &[u8]) -> Option<u16> {
+    let kind = bytes.strip_prefix(b"P")?.first()?;
+    // No header is longer. Words beyond it are samples.
+    let header = String::from_utf8_lossy(&bytes[..bytes.len().min(4096)]);
+    let lines = header
+        .lines()
+        .map(|line| line.split('#').next().unwrap_or(""));
+    let mut words = lines.flat_map(str::split_ascii_whitespace);
+    let word = match kind {
+        b'2' | b'3' | b'5' | b'6' => words.nth(3),
+        b'7' => words.skip_while(|word| *word != "MAXVAL").nth(1),
+        _ => None,
+    };
+    word?.parse().ok().filter(|&maximum| maximum > 0)
 }
 
 /// Writes an 8-bit grey image: PGM where the name ends in `.pgm`, else PNG.
@@ -146,161 +317,24 @@ pub fn read_grey_levels(path: &Path, bits: Option<u8>) -> Result<Array2<u8>, Rea
 /// ```
 ///
 /// # Errors
-/// [`ReadError::Write`] and [`ReadError::Image`].
+/// [`FileError::Write`] and [`FileError::Image`].
 pub fn write_grey_image(
     path: impl AsRef<Path>,
     pixels: ArrayView2<'_, u8>,
-) -> Result<(), ReadError> {
+) -> Result<(), FileError> {
     let path = path.as_ref();
     let (rows, columns) = pixels.dim();
     let samples: Vec<u8> = pixels.iter().copied().collect();
-    let is_pgm = path
-        .extension()
-        .is_some_and(|e| e.eq_ignore_ascii_case("pgm"));
-    let mut bytes = Vec::new();
-    if is_pgm {
-        bytes = format!("P5\n{columns} {rows}\n255\n").into_bytes();
-        bytes.extend_from_slice(&samples);
-    } else {
-        let cursor = &mut Cursor::new(&mut bytes);
-        let (width, height) = (columns as u32, rows as u32);
-        let colour = ::image::ExtendedColorType::L8;
-        ::image::write_buffer_with_format(
-            cursor,
-            &samples,
-            width,
-            height,
-            colour,
-            ImageFormat::Png,
-        )
-        .map_err(|source| ReadError::Image {
-            path: path.into(),
-            source,
-        })?;
+    let extension = path.extension();
+    if extension.is_some_and(|name| name.eq_ignore_ascii_case("pgm")) {
+        let header = format!("P5\n{columns} {rows}\n255\n").into_bytes();
+        return write_bytes(path, &[header, samples].concat());
     }
-    write_bytes(path, &bytes)
-}
-
-/// Levels from samples of which `largest` stands for 255.
-fn to_grey(image: &DynamicImage, largest: f64, grey: Grey) -> GreyImage {
-    let channels = usize::from(image.color().channel_count());
-    let scale = largest / 255.0;
-    let samples = Samples::of(image);
-    let levels = match samples {
-        Samples::Eight(samples) => levels(samples, channels, scale, grey),
-        Samples::Sixteen(samples) => levels(samples, channels, scale, grey),
-    };
-    let shape = (image.height() as usize, image.width() as usize);
-    GreyImage {
-        levels: Array2::from_shape_vec(shape, levels).unwrap_or_else(|_| Array2::zeros(shape)),
-        bits: samples.bits(),
-        colour: image.color().has_color(),
-    }
-}
-
-/// The level of the largest sample. Where the caller says how many bits there are, the decoder's rounding can pass it.
-const WHITE: f64 = 255.0;
-
-/// Levels of pixels of one (grey), two (grey, alpha), three (colours) or four channels (colours, alpha).
-fn levels<S: Copy + Into<f64>>(samples: &[S], channels: usize, scale: f64, grey: Grey) -> Vec<f64> {
-    let weights = grey.weights();
-    let pixels = samples.chunks_exact(channels);
-    if channels < 3 {
-        return pixels
-            .map(|pixel| (pixel[0].into() / scale).min(WHITE))
-            .collect();
-    }
-    pixels
-        .map(|pixel| (0..3).map(|i| weights[i] * (pixel[i].into() / scale)))
-        .map(|colours| colours.sum::<f64>().min(WHITE))
-        .collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn pnm(header: &str, samples: &[u8]) -> GreyImage {
-        let bytes = [header.as_bytes(), samples].concat();
-        parse(&bytes, Path::new("i"), Grey::default(), None).unwrap()
-    }
-
-    #[test]
-    fn colour_is_rec_601() {
-        let image = pnm("P6\n3 1\n255\n", &[255, 0, 0, 0, 255, 0, 0, 0, 255]);
-        assert!(image.colour);
-        // 255 times the weights; the sums differ from the products by rounding alone.
-        for (level, weight) in image.levels.iter().zip(Grey::Rec601.weights()) {
-            assert!((level - 255.0 * weight).abs() < 1e-12);
-        }
-        assert_eq!(image.to_u8().into_raw_vec_and_offset().0, [76, 150, 29]);
-    }
-
-    #[test]
-    fn sixteen_bits_keep_their_fraction() {
-        let image = pnm("P5\n2 1\n65535\n", &[0x01, 0x00, 0xff, 0xff]);
-        assert_eq!((image.bits, image.colour), (16, false));
-        assert_eq!(image.levels.as_slice().unwrap(), [256.0 / 257.0, 255.0]);
-    }
-
-    /// A dark frame of 8 bits that another program saved in 16.
-    #[test]
-    fn eight_bits_stretched_to_sixteen_are_known() {
-        let png = |samples: Vec<u16>| {
-            let image = ::image::ImageBuffer::<::image::Luma<u16>, _>::from_raw(3, 1, samples);
-            let mut bytes = Cursor::new(Vec::new());
-            image
-                .unwrap()
-                .write_to(&mut bytes, ImageFormat::Png)
-                .unwrap();
-            let path = Path::new("dark.png");
-            parse(bytes.get_ref(), path, Grey::default(), None)
-        };
-        let levels = png(vec![0, 3 * 257, 11 * 257]).unwrap().levels;
-        assert_eq!(levels.as_slice().unwrap(), [0.0, 3.0, 11.0]);
-        assert!(png(vec![0, 3 * 257, 11 * 257 + 1]).is_err());
-    }
-
-    #[test]
-    fn a_text_file_is_an_error_that_names_it() {
-        let error = parse(b"hello", Path::new("frame.png"), Grey::default(), None)
-            .unwrap_err()
-            .to_string();
-        assert!(
-            error.starts_with("cannot decode the image frame.png: "),
-            "{error}"
-        );
-    }
-
-    #[test]
-    fn a_pgm_is_scaled_by_the_largest_value_it_announces() {
-        let image = pnm(
-            "P5\n# a camera of 12 bits\n2 1\n4095\n",
-            &[0x0f, 0xff, 0x03, 0x33],
-        );
-        // 65535 / 4095 and its products are right to rounding; the decoder rounds 819 of 4095 to 13107 of 65535, which is exact.
-        assert!((image.levels[[0, 0]] - 255.0).abs() < 1e-12);
-        assert!((image.levels[[0, 1]] - 51.0).abs() < 1e-12);
-        let coarse = pnm("P2\n2 1\n15\n15 3\n", b"");
-        assert_eq!(coarse.levels.as_slice().unwrap(), [255.0, 51.0]);
-    }
-
-    #[test]
-    fn bits_given_beside_an_announced_largest_value_count_in_its_samples() {
-        let bytes = [b"P5\n2 1\n4095\n".as_slice(), &[0x03, 0xff, 0x01, 0x55]].concat();
-        let path = Path::new("frame.pgm");
-        let read = |bits| parse(&bytes, path, Grey::default(), Some(bits));
-        let image = read(10).unwrap();
-        // 1023 of ten bits is 255, 341 a third of it; the decoder rounds to one part in 65535.
-        assert!((image.levels[[0, 0]] - 255.0).abs() < 255.0 / 16_000.0);
-        assert!((image.levels[[0, 1]] - 85.0).abs() < 255.0 / 16_000.0);
-        assert!(matches!(
-            read(9),
-            Err(ReadError::TooFewBits {
-                brightest: 1023,
-                bits: 9,
-                ..
-            })
-        ));
-    }
+    let mut png = Cursor::new(Vec::new());
+    let (width, height) = (columns as u32, rows as u32);
+    let colour = ::image::ExtendedColorType::L8;
+    let format = ImageFormat::Png;
+    ::image::write_buffer_with_format(&mut png, &samples, width, height, colour, format)
+        .map_err(|error| refused(path, in_words(&error)))?;
+    write_bytes(path, png.get_ref())
 }

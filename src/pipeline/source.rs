@@ -61,18 +61,18 @@ impl ImageFolder {
     /// The PNG, PGM and JPEG files of `folder`.
     ///
     /// # Errors
-    /// [`ReadError::Open`](crate::io::ReadError::Open) where the folder cannot be listed.
+    /// [`FileError::Read`](crate::io::FileError::Read) where the folder cannot be listed.
     pub fn open(
         folder: impl AsRef<std::path::Path>,
         frame_rate_hz: f64,
-    ) -> Result<Self, crate::io::ReadError> {
+    ) -> Result<Self, crate::io::FileError> {
         let folder = folder.as_ref();
         let list = || -> std::io::Result<Vec<_>> {
             std::fs::read_dir(folder)?
                 .map(|entry| entry.map(|e| e.path()))
                 .collect()
         };
-        let mut files = list().map_err(|source| crate::io::ReadError::Open {
+        let mut files = list().map_err(|source| crate::io::FileError::Read {
             path: folder.into(),
             source,
         })?;
@@ -95,7 +95,7 @@ impl ImageFolder {
 
 #[cfg(feature = "scene")]
 impl FrameSource for ImageFolder {
-    type Error = crate::io::ReadError;
+    type Error = crate::io::FileError;
 
     fn next_frame(&mut self, frame: &mut Array2<u8>) -> Result<Option<f64>, Self::Error> {
         let Some(path) = self.files.next() else {

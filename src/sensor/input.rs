@@ -1,5 +1,13 @@
-//! What is told of a sensor before its calibration.
-use crate::scene::SceneLayer;
+//! The input of a calibration: presses under known forces, a target, stated layers, and their file.
+use crate::force::{Branch, ShearCalibration};
+use crate::io::{
+    FileError, beside, finite, not_negative, one_or_more, poisson_ratio, positive, positive_pair,
+    read_frame, read_toml,
+};
+use crate::scene::{SceneLayer, refractive_index};
+use ndarray::Array2;
+use serde::Deserialize;
+use std::path::{Path, PathBuf};
 
 /// What a calibration presses on the sensor.
 ///
@@ -10,14 +18,14 @@ use crate::scene::SceneLayer;
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Indenter {
-    /// A rigid ball: it teaches the curve and, by its contact radii, the layers.
+    /// A rigid ball. The curve is fitted to its forces, and the layers to its contact radii.
     Ball {
         /// Radius in metres.
         radius_m: f64,
         /// Standard error of the radius in metres.
         radius_error_m: f64,
     },
-    /// A rigid flat punch: it teaches the curve alone, as its contact radius is its own.
+    /// A rigid flat punch. The curve alone is fitted to it, as its contact radius is its own.
     Punch {
         /// Radius in metres.
         radius_m: f64,
@@ -28,8 +36,18 @@ pub enum Indenter {
 ///
 /// ```
 /// use tactile_imaging::{scene::SceneLayer, sensor::LayerInput};
-/// let layer = SceneLayer { refractive_index: 1.41, thickness_m: 2e-3, youngs_modulus_pa: 136e3, poisson_ratio: 0.495 };
-/// let known = LayerInput { layer, thickness_error_m: 20e-6, youngs_modulus_error_pa: 14e3, poisson_ratio_error: 0.003 };
+/// let layer = SceneLayer {
+///     refractive_index: 1.41,
+///     thickness_m: 2e-3,
+///     youngs_modulus_pa: 136e3,
+///     poisson_ratio: 0.495,
+/// };
+/// let known = LayerInput {
+///     layer,
+///     thickness_error_m: 20e-6,
+///     youngs_modulus_error_pa: 14e3,
+///     poisson_ratio_error: 0.003,
+/// };
 /// assert!(known.youngs_modulus_error_pa / known.layer.youngs_modulus_pa > 0.1, "to a tenth");
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -44,13 +62,297 @@ pub struct LayerInput {
     pub poisson_ratio_error: f64,
 }
 
-impl LayerInput {
-    /// Standard errors of ln E, ln h and ν.
-    pub(super) fn parameter_errors(&self) -> [f64; 3] {
-        [
-            self.youngs_modulus_error_pa / self.layer.youngs_modulus_pa,
-            self.thickness_error_m / self.layer.thickness_m,
-            self.poisson_ratio_error,
-        ]
+/// A frame under a gauge's force.
+///
+/// ```
+/// use tactile_imaging::force::Branch;
+/// use tactile_imaging::sensor::{Indenter, SensorPress};
+/// let press = SensorPress {
+///     frame: ndarray::Array2::zeros((1042, 1392)),
+///     force_n: 0.5,
+///     branch: Branch::Loading,
+///     indenter: Indenter::Ball { radius_m: 4e-3, radius_error_m: 5e-6 },
+/// };
+/// assert_eq!(press.frame.dim(), (1042, 1392));
+/// ```
+#[derive(Clone, Debug)]
+pub struct SensorPress {
+    /// The frame.
+    pub frame: Array2<u8>,
+    /// The gauge's force in newtons.
+    pub force_n: f64,
+    /// Whether the force was rising or falling.
+    pub branch: Branch,
+    /// What was pressed.
+    pub indenter: Indenter,
+}
+
+/// What a sensor is calibrated from.
+///
+/// The curve f of P = f(I) comes from the grey histograms of the presses' contacts, F = Σ f(I) dS.
+/// The lens comes from a target, vignetting from the reference itself, and the layers' moduli from
+/// the contact radii of rigid balls. Parameters that the presses do not determine keep the stated
+/// value and error.
+///
+/// ```no_run
+/// use tactile_imaging::sensor::SensorCalibration;
+/// let calibrated = SensorCalibration::read("calibration.toml")?.run()?;
+/// for layer in calibrated.layers.iter().filter(|layer| !layer.identified) {
+///     println!("layer {}: its {} is not determined", layer.layer + 1, layer.parameter);
+/// }
+/// calibrated.sensor.write("sensor.toml")?;
+/// # Ok::<(), tactile_imaging::sensor::SensorError>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct SensorCalibration {
+    /// When, as the user writes it.
+    pub date: String,
+    /// Temperature in degrees Celsius.
+    pub temperature_c: Option<f64>,
+    /// Frames without contact.
+    pub references: Vec<Array2<u8>>,
+    /// The presses.
+    pub presses: Vec<SensorPress>,
+    /// A frame of a target, the pitch of its dots in metres and the relative standard error of the
+    /// pitch.
+    pub target: Option<(Array2<u8>, f64, f64)>,
+    /// Size of a pixel in metres and its relative standard error, used without a target.
+    pub pixel_size_m: ([f64; 2], f64),
+    /// The layers as stated, from the object's side, rigid if empty.
+    pub layers: Vec<LayerInput>,
+    /// Whether frames are divided by the reference's own brightness.
+    pub flat_field: bool,
+    /// Relative standard error of the gauge, common to all presses.
+    pub gauge_error: f64,
+    /// Standard deviation of the gauge's noise in newtons.
+    pub gauge_noise_n: f64,
+    /// Springs of shear, passed on as they are.
+    pub shear: Option<ShearCalibration>,
+    /// Least and greatest force in newtons that scenes will have. Presses that do not cover them
+    /// are refused.
+    pub covers_n: Option<[f64; 2]>,
+}
+
+impl SensorCalibration {
+    /// Reads a calibration file and the images that it names.
+    ///
+    /// ```toml
+    /// date = "2026-11-22"
+    /// temperature_c = 22.5                # may be left out
+    /// references = ["reference.png"]
+    /// pixel_size_m = [21.55e-6, 21.55e-6] # without a target
+    /// pixel_size_error = 1e-3             # relative
+    /// flat_field = true                   # the default
+    /// gauge_error = 1e-3                  # relative, common to all forces
+    /// gauge_noise_N = 2e-3
+    /// covers_N = [0.1, 1.2]               # forces of later scenes, may be left out
+    /// target = { image = "target.png", pitch_m = 1e-3, error = 5e-4 }
+    ///
+    /// [[presses]]
+    /// image = "press_01.png"
+    /// force_N = 0.1
+    /// branch = "loading"                  # or "unloading"
+    /// # or indenter = { shape = "punch", radius_m = 2e-3 }
+    /// indenter = { shape = "ball", radius_m = 4e-3, radius_error_m = 5e-6 }
+    ///
+    /// [[layers]]                          # from the object's side to the glass
+    /// refractive_index = 1.41
+    /// thickness_m = 2e-3
+    /// thickness_error_m = 20e-6
+    /// youngs_modulus_pa = 1.36e5
+    /// youngs_modulus_error_pa = 1.4e4
+    /// poisson_ratio = 0.5
+    /// poisson_ratio_error = 0.0
+    /// ```
+    ///
+    /// # Errors
+    /// [`FileError`]: one sentence with file and field.
+    pub fn read(path: impl AsRef<Path>) -> Result<Self, FileError> {
+        let path = path.as_ref();
+        read_toml::<CalibrationFile>(path)?.validate(path)
+    }
+}
+
+/// A calibration file as it stands.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct CalibrationFile {
+    date: String,
+    #[serde(default, deserialize_with = "finite")]
+    temperature_c: Option<f64>,
+    #[serde(deserialize_with = "one_or_more")]
+    references: Vec<PathBuf>,
+    #[serde(default, deserialize_with = "positive_pair")]
+    pixel_size_m: Option<[f64; 2]>,
+    #[serde(default = "per_mille", deserialize_with = "not_negative")]
+    pixel_size_error: f64,
+    flat_field: Option<bool>,
+    #[serde(default = "per_mille", deserialize_with = "not_negative")]
+    gauge_error: f64,
+    #[serde(default, rename = "gauge_noise_N", deserialize_with = "positive")]
+    gauge_noise_n: Option<f64>,
+    #[serde(default, rename = "covers_N", deserialize_with = "positive_pair")]
+    covers_n: Option<[f64; 2]>,
+    target: Option<TargetTable>,
+    #[serde(deserialize_with = "one_or_more")]
+    presses: Vec<PressTable>,
+    #[serde(default)]
+    layers: Vec<LayerTable>,
+}
+
+/// The relative error of a size or a gauge where none is stated.
+fn per_mille() -> f64 {
+    1e-3
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct TargetTable {
+    image: PathBuf,
+    #[serde(deserialize_with = "positive")]
+    pitch_m: f64,
+    #[serde(default = "per_mille", deserialize_with = "not_negative")]
+    error: f64,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct PressTable {
+    image: PathBuf,
+    #[serde(rename = "force_N", deserialize_with = "not_negative")]
+    force_n: f64,
+    branch: BranchName,
+    indenter: IndenterTable,
+}
+
+#[derive(Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum BranchName {
+    Loading,
+    Unloading,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct IndenterTable {
+    shape: IndenterShape,
+    #[serde(deserialize_with = "positive")]
+    radius_m: f64,
+    #[serde(default, deserialize_with = "not_negative")]
+    radius_error_m: f64,
+}
+
+#[derive(Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum IndenterShape {
+    Ball,
+    Punch,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct LayerTable {
+    #[serde(deserialize_with = "refractive_index")]
+    refractive_index: f64,
+    #[serde(deserialize_with = "positive")]
+    thickness_m: f64,
+    #[serde(deserialize_with = "not_negative")]
+    thickness_error_m: f64,
+    #[serde(deserialize_with = "positive")]
+    youngs_modulus_pa: f64,
+    #[serde(deserialize_with = "not_negative")]
+    youngs_modulus_error_pa: f64,
+    #[serde(deserialize_with = "poisson_ratio")]
+    poisson_ratio: f64,
+    #[serde(deserialize_with = "not_negative")]
+    poisson_ratio_error: f64,
+}
+
+impl CalibrationFile {
+    /// Reads the images and checks their sizes.
+    fn validate(self, file: &Path) -> Result<SensorCalibration, FileError> {
+        let image = |field: &str, name: &Path, size| {
+            read_frame(file, field, &beside(file, name), None, size)
+        };
+        let references = self.references.iter();
+        let references = references.map(|name| image("references", name, None));
+        let references = references.collect::<Result<Vec<_>, _>>()?;
+        // All images are of one camera.
+        let size = references.first().map(Array2::dim);
+        let mut presses = Vec::with_capacity(self.presses.len());
+        for (k, table) in self.presses.iter().enumerate() {
+            let field = format!("presses[{}].image", k + 1);
+            let frame = image(&field, &table.image, size)?;
+            presses.push(SensorPress {
+                frame,
+                force_n: table.force_n,
+                branch: match table.branch {
+                    BranchName::Loading => Branch::Loading,
+                    BranchName::Unloading => Branch::Unloading,
+                },
+                indenter: table.indenter.indenter(),
+            });
+        }
+        let target = match &self.target {
+            None => None,
+            Some(table) => Some((
+                image("target.image", &table.image, None)?,
+                table.pitch_m,
+                table.error,
+            )),
+        };
+        let pixel_size_m = match (self.pixel_size_m, &target) {
+            (Some(size), _) => size,
+            // The target gives the size.
+            (None, Some(_)) => [1.0; 2],
+            (None, None) => {
+                let reason = "it is missing, expected two positive numbers, or a [target]";
+                return Err(FileError::field(file, "pixel_size_m", reason));
+            }
+        };
+        Ok(SensorCalibration {
+            date: self.date,
+            temperature_c: self.temperature_c,
+            references,
+            presses,
+            target,
+            pixel_size_m: (pixel_size_m, self.pixel_size_error),
+            // Springs of shear come from another experiment, and the program adds them.
+            shear: None,
+            layers: self.layers.iter().map(LayerTable::layer).collect(),
+            flat_field: self.flat_field.unwrap_or(true),
+            gauge_error: self.gauge_error,
+            gauge_noise_n: self.gauge_noise_n.unwrap_or(2e-3),
+            covers_n: self.covers_n,
+        })
+    }
+}
+
+impl IndenterTable {
+    fn indenter(&self) -> Indenter {
+        let radius_m = self.radius_m;
+        match self.shape {
+            IndenterShape::Ball => Indenter::Ball {
+                radius_m,
+                radius_error_m: self.radius_error_m,
+            },
+            IndenterShape::Punch => Indenter::Punch { radius_m },
+        }
+    }
+}
+
+impl LayerTable {
+    fn layer(&self) -> LayerInput {
+        LayerInput {
+            layer: SceneLayer {
+                refractive_index: self.refractive_index,
+                thickness_m: self.thickness_m,
+                youngs_modulus_pa: self.youngs_modulus_pa,
+                poisson_ratio: self.poisson_ratio,
+            },
+            thickness_error_m: self.thickness_error_m,
+            youngs_modulus_error_pa: self.youngs_modulus_error_pa,
+            poisson_ratio_error: self.poisson_ratio_error,
+        }
     }
 }

@@ -1,106 +1,193 @@
 //! The fit of the guide's layers to contact radii of rigid balls.
 //!
-//! ln F = ln(4/3 a³/R) + ln E_g(a; layers), E_g from the layer equation. The parameters are ln E, ln h and ν of all layers, ln R of
-//! every ball, and one factor on all forces for what the parabola of the theory is not a ball. All start from what is stated, with its
-//! error as a prior, so that what the presses do not determine stays as it was stated.
-use super::error::SensorError;
-use super::input::LayerInput;
+//! ln F = ln(4/3 a³/R) + ln E_g(a, layers), with E_g from the layer equation. The parameters are ln
+//! E, ln h and ν of all layers, ln R of every ball, and one factor on all forces, because the
+//! parabola of the theory is not a ball. All start from their stated values, with the stated errors
+//! as a prior. Parameters that the presses do not determine stay as they were stated.
+use super::calibration::{LayerFinding, PressFinding, SensorError};
+use super::input::{Indenter, LayerInput};
 use crate::elasticity::contact::{
     Layer, PARAMETERS_PER_LAYER, guide_log_stiffness, stepped_layers,
 };
+use crate::force::Estimate;
+use crate::scene::{SceneLayer, elastic_layers};
 use nalgebra::{DMatrix, DVector};
 
 /// A contact of a rigid ball.
 #[derive(Clone, Copy, Debug)]
-pub struct BallContact {
-    /// Which ball.
-    pub ball: usize,
-    pub force_n: f64,
+struct BallContact {
+    /// Index of the ball.
+    ball: usize,
+    force_n: f64,
     /// Relative standard error of the force.
-    pub force_error: f64,
-    pub radius_m: f64,
+    force_error: f64,
+    radius_m: f64,
     /// Relative standard error of the contact radius.
-    pub radius_error: f64,
+    radius_error: f64,
 }
 
 /// A ball as stated.
 #[derive(Clone, Copy, Debug)]
-pub struct Ball {
-    pub radius_m: f64,
+struct Ball {
+    radius_m: f64,
     /// Relative.
-    pub radius_error: f64,
+    radius_error: f64,
 }
 
+/// The layers with their errors.
 #[derive(Clone, Debug)]
 pub struct LayerFit {
-    pub layers: Vec<Layer>,
+    /// Fitted, or as stated where no press could be used.
+    pub layers: Vec<SceneLayer>,
     /// Of ln E, ln h and ν of all layers.
-    pub covariance: DMatrix<f64>,
-    /// Force of the fitted law at every contact's radius.
-    pub forces_n: Vec<f64>,
+    covariance: DMatrix<f64>,
 }
 
-/// Nodes in ln a between which ln E_g is a polynomial: it bends so little that five leave 10⁻⁵ over a decade.
+impl LayerFit {
+    /// The covariance as a sensor file has it.
+    pub fn covariance_rows(&self) -> Vec<Vec<f64>> {
+        let rows = self.covariance.row_iter();
+        rows.map(|row| row.iter().copied().collect()).collect()
+    }
+}
+
+/// Nodes in ln a between which ln E_g is a polynomial. Five leave an error of 10⁻⁵ over a decade,
+/// and each costs a solution of the layer equation.
 const NODES: usize = 5;
-/// Newton's steps: the law is nearly linear in the logarithms, a step of a tenth leaves some 10⁻³ of itself.
-const STEPS: usize = 4;
-/// Largest a/R that the layers are fitted to: beyond, a ball is no parabola.
-pub(super) const LARGEST_CONTACT_RATIO: f64 = 0.5;
-/// Relative error of F at a/R = 1 from taking the ball for a parabola and strains as small. It goes as (a/R)².
+/// Relative error of F at a/R = 1 from taking the ball for a parabola and strains as small. It goes
+/// as (a/R)².
 const MODEL_ERROR: f64 = 0.1;
-/// Standard errors by which a stated value, or the whole fit, may be off before it counts as a mistake.
+/// Standard errors by which a stated value, or the whole fit, may be off before it is refused.
 const LARGEST_DEVIATION: f64 = 4.0;
-/// Standard error that a parameter stated as exact is given: far below what can be told.
+/// Standard error of a parameter that is stated as exact, far below any that presses determine.
 const EXACT: f64 = 1e-6;
 
+/// Fits the layers to the contacts of balls, and notes the force that they have there.
+///
+/// # Errors
+/// [`SensorError::Radius`] where the contacts contradict the statements.
 pub fn fit(
     stated: &[LayerInput],
-    balls: &[Ball],
-    contacts: &[BallContact],
-) -> Result<Option<LayerFit>, SensorError> {
-    let layers: Vec<Layer> = stated.iter().map(elastic).collect();
-    let near: Vec<BallContact> = contacts
-        .iter()
-        .filter(|c| c.radius_m <= LARGEST_CONTACT_RATIO * balls[c.ball].radius_m)
-        .copied()
-        .collect();
-    if layers.is_empty() || near.is_empty() {
-        return Ok(None);
+    gauge_noise_n: f64,
+    presses: &mut [PressFinding],
+) -> Result<LayerFit, SensorError> {
+    let n = stated.len();
+    let errors: Vec<[f64; 3]> = stated.iter().map(parameter_errors).collect();
+    let variances = DVector::from_fn(3 * n, |k, _| errors[k % n][k / n].powi(2));
+    let as_stated = LayerFit {
+        layers: stated.iter().map(|input| input.layer).collect(),
+        covariance: DMatrix::from_diagonal(&variances),
+    };
+    let (mut balls, mut contacts, mut places) = (Vec::<Ball>::new(), Vec::new(), Vec::new());
+    for (place, press) in presses.iter().enumerate() {
+        let (
+            Indenter::Ball {
+                radius_m,
+                radius_error_m,
+            },
+            Some(radius),
+        ) = (press.indenter, press.contact_radius_m)
+        else {
+            continue;
+        };
+        // Beyond half the ball's radius, a ball is no parabola.
+        if radius.value > 0.5 * radius_m || press.force_n <= 0.0 {
+            continue;
+        }
+        // Presses of equal radius are of one ball, whose error they share.
+        let known = balls.iter().position(|b| b.radius_m == radius_m);
+        let ball = known.unwrap_or_else(|| {
+            balls.push(Ball {
+                radius_m,
+                radius_error: radius_error_m / radius_m,
+            });
+            balls.len() - 1
+        });
+        // The profile of a guide that ends is not quite Hertz's.
+        let profile_error = 5e-4;
+        contacts.push(BallContact {
+            ball,
+            force_n: press.force_n,
+            force_error: (gauge_noise_n / press.force_n).max(1e-4),
+            radius_m: radius.value,
+            radius_error: (radius.standard_error / radius.value).hypot(profile_error),
+        });
+        places.push(place);
     }
-    let problem = Problem::new(stated, balls, &near);
+    // A rigid guide, or a calibration by punches alone, has nothing to fit.
+    if n == 0 || contacts.is_empty() {
+        return Ok(as_stated);
+    }
+    let layers = elastic_layers(&as_stated.layers);
+    let problem = Problem::new(&errors, &balls, &contacts);
     let Some(solution) = problem.solve(&layers) else {
-        return Ok(None);
+        return Ok(as_stated);
     };
     problem.plausible(&solution)?;
-    let count = PARAMETERS_PER_LAYER * layers.len();
+    let count = PARAMETERS_PER_LAYER * n;
     let parameters = solution.parameters.rows(0, count).into_owned();
     let fitted = stepped_layers(&layers, &parameters);
-    let Some(stiffness) = Stiffness::new(&fitted, contacts) else {
-        return Ok(None);
+    let Some(stiffness) = Stiffness::new(&fitted, &contacts) else {
+        return Ok(as_stated);
     };
-    let ball_radius = |ball: usize| balls[ball].radius_m * solution.parameters[count + ball].exp();
-    let forces_n = contacts
-        .iter()
-        .map(|c| {
-            4.0 / 3.0 * c.radius_m.powi(3) / ball_radius(c.ball) * stiffness.at(c.radius_m).exp()
-        })
-        .collect();
-    Ok(Some(LayerFit {
-        layers: fitted,
-        covariance: solution
-            .covariance
-            .view((0, 0), (count, count))
-            .into_owned(),
-        forces_n,
-    }))
+    for (place, c) in places.into_iter().zip(&contacts) {
+        let ball_radius = balls[c.ball].radius_m * solution.parameters[count + c.ball].exp();
+        let force_n = 4.0 / 3.0 * c.radius_m.powi(3) / ball_radius * stiffness.at(c.radius_m).exp();
+        presses[place].layers_force_n = Some(force_n);
+    }
+    let covariance = solution.covariance.view((0, 0), (count, count));
+    let layer = |(layer, input): (&Layer, &LayerInput)| SceneLayer {
+        thickness_m: layer.thickness_m,
+        youngs_modulus_pa: layer.youngs_modulus_pa,
+        poisson_ratio: layer.poisson_ratio,
+        ..input.layer
+    };
+    Ok(LayerFit {
+        layers: fitted.iter().zip(stated).map(layer).collect(),
+        covariance: covariance.into_owned(),
+    })
 }
 
-pub fn elastic(input: &LayerInput) -> Layer {
-    Layer {
-        thickness_m: input.layer.thickness_m,
-        youngs_modulus_pa: input.layer.youngs_modulus_pa,
-        poisson_ratio: input.layer.poisson_ratio,
+/// Every parameter of the layers before and after the fit.
+pub fn findings(stated: &[LayerInput], fit: &LayerFit) -> Vec<LayerFinding> {
+    let n = stated.len();
+    let mut findings = Vec::with_capacity(3 * n);
+    let values = |layer: &SceneLayer| {
+        [
+            layer.youngs_modulus_pa,
+            layer.thickness_m,
+            layer.poisson_ratio,
+        ]
+    };
+    for (layer, input) in stated.iter().enumerate() {
+        let (before, after) = (values(&input.layer), values(&fit.layers[layer]));
+        let names = ["youngs_modulus_pa", "thickness_m", "poisson_ratio"];
+        for (k, parameter) in names.into_iter().enumerate() {
+            // The errors of moduli and thicknesses are relative.
+            let unit = |value: f64| if k < 2 { value } else { 1.0 };
+            let place = k * n + layer;
+            let error = fit.covariance[(place, place)].sqrt();
+            let stated = Estimate::new(before[k], parameter_errors(input)[k] * unit(before[k]));
+            let fitted = Estimate::new(after[k], error * unit(after[k]));
+            findings.push(LayerFinding {
+                layer,
+                parameter,
+                stated,
+                fitted,
+                identified: fitted.standard_error < 0.7 * stated.standard_error,
+            });
+        }
     }
+    findings
+}
+
+/// Standard errors of ln E, ln h and ν.
+fn parameter_errors(input: &LayerInput) -> [f64; 3] {
+    [
+        input.youngs_modulus_error_pa / input.layer.youngs_modulus_pa,
+        input.thickness_error_m / input.layer.thickness_m,
+        input.poisson_ratio_error,
+    ]
 }
 
 /// ln E_g over ln a: the polynomial through Chebyshev's nodes.
@@ -118,6 +205,7 @@ impl Stiffness {
         );
         // A single radius has a span of its own, so that no nodes coincide.
         let half = (0.5 * (high - low)).max(0.05);
+        // Chebyshev's nodes keep the interpolation from swinging at the ends.
         let nodes = std::array::from_fn(|k| {
             let angle = std::f64::consts::PI * (k as f64 + 0.5) / NODES as f64;
             0.5 * (low + high) - half * angle.cos()
@@ -145,7 +233,8 @@ impl Stiffness {
 struct Problem<'a> {
     balls: &'a [Ball],
     contacts: &'a [BallContact],
-    /// Prior standard errors: of the layers' parameters, of ln R of every ball, of the common factor.
+    /// Prior standard errors: of the layers' parameters, of ln R of every ball, of the common
+    /// factor.
     prior: DVector<f64>,
     layer_parameters: usize,
     /// How much of the common factor every contact has.
@@ -160,10 +249,8 @@ struct Solution {
 }
 
 impl<'a> Problem<'a> {
-    fn new(stated: &[LayerInput], balls: &'a [Ball], contacts: &'a [BallContact]) -> Self {
-        let errors = stated.iter().map(LayerInput::parameter_errors);
-        let errors: Vec<[f64; 3]> = errors.collect();
-        let n = stated.len();
+    fn new(errors: &[[f64; 3]], balls: &'a [Ball], contacts: &'a [BallContact]) -> Self {
+        let n = errors.len();
         let layer_parameters = PARAMETERS_PER_LAYER * n;
         let prior = DVector::from_fn(layer_parameters + balls.len() + 1, |k, _| {
             let error = if k < layer_parameters {
@@ -216,9 +303,11 @@ impl<'a> Problem<'a> {
         let count = self.prior.len();
         let mut parameters = DVector::zeros(count);
         let mut covariance = DMatrix::zeros(count, count);
-        for _ in 0..STEPS {
+        // The law is nearly linear in the logarithms. A step of a tenth leaves some 10⁻³ of itself.
+        for _ in 0..4 {
             let here = self.predicted(layers, &parameters)?;
             let slopes = self.slopes(layers, &parameters, &here)?;
+            // The priors keep the normal equations regular where the presses determine nothing.
             let mut normal = DMatrix::from_diagonal(&self.prior.map(|sd| (sd * sd).recip()));
             let mut right = -(&normal * &parameters);
             for (i, contact) in self.contacts.iter().enumerate() {
@@ -248,18 +337,18 @@ impl<'a> Problem<'a> {
         here: &[f64],
     ) -> Option<DMatrix<f64>> {
         // Downwards, because ν is at most ½.
-        const STEP: f64 = -1e-3;
+        let step = -1e-3;
         let mut slopes = DMatrix::zeros(here.len(), self.prior.len());
         for k in 0..self.prior.len() {
-            // What is stated as exact does not move.
+            // Parameters that are stated as exact do not move.
             if self.prior[k] <= EXACT {
                 continue;
             }
             let mut beside = parameters.clone();
-            beside[k] += STEP;
+            beside[k] += step;
             let there = self.predicted(layers, &beside)?;
             for (i, (there, here)) in there.iter().zip(here).enumerate() {
-                slopes[(i, k)] = (there - here) / STEP;
+                slopes[(i, k)] = (there - here) / step;
             }
         }
         Some(slopes)
@@ -272,12 +361,14 @@ impl<'a> Problem<'a> {
         let excess = (solution.chi_squared - freedom) / (2.0 * freedom).sqrt();
         let prior_excess = moved.norm_squared().sqrt();
         let deviation = prior_excess.max(moved.amax());
-        // The stated errors of the presses are those of noise alone: ten times their χ² is a wrong law, not a wrong error.
+        // The stated errors of the presses are those of noise alone. Ten times their χ² is a wrong
+        // law, not a wrong error.
         let misfit = solution.chi_squared > 10.0 * freedom && excess > LARGEST_DEVIATION;
         if deviation <= LARGEST_DEVIATION && !misfit {
             return Ok(());
         }
         let n = self.layer_parameters;
+        // The sentence names the ball that moved the most.
         let worst = (0..self.balls.len())
             .max_by(|i, j| moved[n + i].abs().total_cmp(&moved[n + j].abs()))
             .unwrap_or(0);

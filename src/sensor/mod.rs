@@ -1,10 +1,10 @@
-//! A sensor: its lens, light, layers and what is known of their errors, calibrated once and kept in one TOML file.
+//! A sensor: its lens, light and layers with their errors, calibrated once and kept in a TOML file.
 //!
 //! ```toml
 //! date = "2026-11-22"
 //! temperature_c = 22.5                   # may be left out
 //! flat_field = true                      # frames are divided by the reference's own brightness
-//! gauge_error = 1e-3                     # relative standard error of the gauge that all forces were read from
+//! gauge_error = 1e-3                     # relative standard error of the gauge of all forces
 //!
 //! [geometry]
 //! frame_px = [1392, 1042]                # columns and rows
@@ -23,23 +23,18 @@
 //! poisson_ratio = 0.5
 //!
 //! # layer_covariance = [[…], …]          # of ln E of all layers, then of ln h, then of ν
-//! # [curve]                              # the local light-to-pressure curve: written by the calibration
+//! # [curve]                              # the light-to-pressure curve, from the calibration
 //! # [shear]                              # springs K_x and K_y, where they are known
 //! ```
 //!
-//! [`SensorCalibration`] makes the file from presses of balls and punches of known radius. A scene names it with
-//! `sensor = "sensor.toml"`.
+//! [`SensorCalibration`] makes the file from presses of balls and punches of known radius. A scene
+//! names it with `sensor = "sensor.toml"`.
 mod calibration;
-mod error;
 mod file;
-mod findings;
 mod input;
 mod layers;
 mod target;
-mod toml_error;
 
-pub use calibration::{SensorCalibration, SensorPress};
-pub use error::SensorError;
+pub use calibration::{CalibratedSensor, LayerFinding, PressFinding, SensorError};
 pub use file::{Sensor, SensorGeometry};
-pub use findings::{CalibratedSensor, LayerFinding, PressFinding};
-pub use input::{Indenter, LayerInput};
+pub use input::{Indenter, LayerInput, SensorCalibration, SensorPress};

@@ -1,30 +1,27 @@
 //! The dots of a target: found in its frame, and given their places on the grid.
-use super::error::SensorError;
+use super::calibration::SensorError;
 use crate::force::DotPair;
 use ndarray::ArrayView2;
 
-/// Fewest dots on the grid.
-const FEWEST_DOTS: usize = 20;
-/// Least area of a dot in pixels: smaller blobs are noise.
-const LEAST_AREA: f64 = 9.0;
-/// How far from where the grid continues a dot may lie, as a share of the pitch: distortion bends the grid by less from dot to dot.
-const CAPTURE: f64 = 0.25;
-
-/// Finds the dots of a target, dark on bright or bright on dark, and pairs them with their places on a square grid.
+/// Finds the dots of a target, dark on bright or bright on dark, and pairs them with their places
+/// on a square grid.
 ///
-/// The frame is cut at the mean of its two levels (Otsu's threshold). Dots are its connected regions of the rarer level, those that
-/// touch the edge left out, and their centres weighted with the level. The grid is followed from dot to dot out of the middle, each
-/// next place from its neighbours', so that distortion does no harm. O(pixels).
+/// The frame is cut at the mean of its two levels (Otsu's threshold). Dots are its connected
+/// regions of the rarer level, those that touch the edge left out, and their centres weighted with
+/// the level. The grid is followed from dot to dot out of the middle, each next place from its
+/// neighbours', so that distortion does no harm. O(pixels).
 ///
 /// # Errors
 /// [`SensorError::Target`] for fewer than twenty dots on the grid.
 pub fn find_dots(frame: ArrayView2<'_, u8>, pitch_m: f64) -> Result<Vec<DotPair>, SensorError> {
     let dots = centres(frame);
     let placed = on_grid(&dots, frame.dim());
-    if placed.len() < FEWEST_DOTS {
+    // Enough for six parameters of the lens with a residual.
+    let expected = 20;
+    if placed.len() < expected {
         return Err(SensorError::Target {
             found: placed.len(),
-            expected: FEWEST_DOTS,
+            expected,
         });
     }
     let pair = |(dot, place): &(usize, [i32; 2])| DotPair {
@@ -64,9 +61,11 @@ fn threshold(frame: ArrayView2<'_, u8>) -> f64 {
 fn centres(frame: ArrayView2<'_, u8>) -> Vec<[f64; 2]> {
     let cut = threshold(frame);
     let above = frame.iter().filter(|v| f64::from(**v) > cut).count();
+    // Dots cover less than half of the frame, whether dark or bright.
     let sign = if 2 * above < frame.len() { 1.0 } else { -1.0 };
     let (rows, columns) = frame.dim();
     let weight = |r: usize, c: usize| sign * (f64::from(frame[[r, c]]) - cut);
+    // A stack of its own instead of recursion: a region may be as large as the frame.
     let mut seen = vec![false; rows * columns];
     let (mut stack, mut found) = (Vec::new(), Vec::new());
     for start in 0..rows * columns {
@@ -97,7 +96,8 @@ fn centres(frame: ArrayView2<'_, u8>) -> Vec<[f64; 2]> {
                 }
             }
         }
-        if inside && area >= LEAST_AREA {
+        // Smaller blobs are noise.
+        if inside && area >= 9.0 {
             found.push([sums[1] / sums[0], sums[2] / sums[0]]);
         }
     }
@@ -124,7 +124,8 @@ fn on_grid(dots: &[[f64; 2]], (rows, columns): (usize, usize)) -> Vec<(usize, [i
         for (axis, sign) in [(0, 1), (0, -1), (1, 1), (1, -1)] {
             let step = steps[axis].map(|s| s * f64::from(sign));
             let expected = [dots[from][0] + step[0], dots[from][1] + step[1]];
-            let reach = CAPTURE * step[0].hypot(step[1]);
+            // Distortion bends the grid by less than a quarter of the pitch from dot to dot.
+            let reach = 0.25 * step[0].hypot(step[1]);
             let Some(dot) = nearest(dots, expected, reach).filter(|dot| !taken[*dot]) else {
                 continue;
             };

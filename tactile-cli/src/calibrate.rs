@@ -206,7 +206,7 @@ fn calibrate_sensor(path: &Path, context: &mut Context) -> Result<Exit, Failure>
         SensorError::File(error) => Failure::input(error),
         error => Failure::in_file(path, error),
     };
-    let calibration = SensorCalibration::read(path).map_err(failed)?;
+    let calibration = SensorCalibration::read(path)?;
     let found = calibration.run().map_err(failed)?;
     print_sensor(&found, context);
     context.value(&sensor_value(&found)?);

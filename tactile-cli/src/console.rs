@@ -11,7 +11,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, mpsc};
 use std::time::{Duration, Instant};
 use tactile_imaging::force::Estimate;
-use tactile_imaging::io::ReadError;
+use tactile_imaging::io::FileError;
 use tactile_imaging::pipeline::with_error;
 
 /// The exit codes, as the help of the program lists them.
@@ -93,10 +93,10 @@ impl Display for Failure {
     }
 }
 
-impl From<ReadError> for Failure {
-    fn from(error: ReadError) -> Self {
+impl From<FileError> for Failure {
+    fn from(error: FileError) -> Self {
         match error {
-            ReadError::Write { .. } => Self::output(error),
+            FileError::Write { .. } => Self::output(error),
             _ => Self::input(error),
         }
     }

@@ -14,7 +14,7 @@ use tactile_imaging::elasticity::curve::{
     Model, SelectionReason, select_model,
 };
 use tactile_imaging::elasticity::modulus::EstimatorKind;
-use tactile_imaging::io::{Column, Quantity, read_table};
+use tactile_imaging::io::read_table;
 use tactile_imaging::pipeline::with_error;
 
 /// Measure Young's modulus from a force–indentation curve
@@ -226,16 +226,9 @@ impl IndentArguments {
 
     fn read(&self) -> Result<IndentationCurve, Failure> {
         let table = read_table(&self.curve)?;
-        let indentation = Column {
-            names: &["indentation", "depth", "position", "displacement"],
-            quantity: Quantity::Length,
-            unit: "m",
-        };
-        let force = Column {
-            names: &["force", "load"],
-            quantity: Quantity::Force,
-            unit: "N",
-        };
+        let indentation: (&[&str], _) =
+            (&["indentation", "depth", "position", "displacement"], "m");
+        let force: (&[&str], _) = (&["force", "load"], "N");
         if self.force_first && !table.header.is_empty() {
             return Err(Failure::input(format!(
                 "--force-first is for tables without a header, and {} has one: leave it out",
@@ -243,10 +236,10 @@ impl IndentArguments {
             )));
         }
         let [mut z, f] = if self.force_first {
-            let [f, z] = table.columns([force, indentation], &self.curve)?;
+            let [f, z] = table.columns([force, indentation])?;
             [z, f]
         } else {
-            table.columns([indentation, force], &self.curve)?
+            table.columns([indentation, force])?
         };
         if self.plates {
             // Each of the two contacts has half of the approach.

@@ -5,7 +5,7 @@ use crate::calibration::CalibrationSeries;
 use crate::contact::ContactModel;
 use crate::press::PressScene;
 use std::path::{Path, PathBuf};
-use tactile_imaging::io::{ReadError, write_bytes, write_grey_image};
+use tactile_imaging::io::{FileError, write_bytes, write_grey_image};
 use toml::{Table, Value};
 
 /// Writes a scene and a calibration of its sensor as files: `reference.png`, `frame_1.png` …,
@@ -28,12 +28,12 @@ use toml::{Table, Value};
 /// ```
 ///
 /// # Errors
-/// [`ReadError::Write`] and [`ReadError::Image`], naming the file that could not be written.
+/// [`FileError::Write`] and [`FileError::Image`], naming the file that could not be written.
 pub fn write_folder(
     scene: &PressScene,
     calibration: &CalibrationSeries,
     folder: &Path,
-) -> Result<PathBuf, ReadError> {
+) -> Result<PathBuf, FileError> {
     let made = scene.simulate();
     write_grey_image(folder.join("reference.png"), made.reference.view())?;
     for (k, frame) in made.frames.iter().enumerate() {

@@ -327,7 +327,7 @@ fn a_gauge_alone_gives_force_contact_and_modulus() {
     assert!(measured.youngs_modulus_pa.is_ok());
     // One frame without its force: a calibration is missing.
     let half = gauged.replace("force_N = 1.1\nforce_error_N = 0.02", "");
-    assert!(sentence(folder.path(), &half).contains("`calibration` is missing"));
+    assert!(sentence(folder.path(), &half).contains("`calibration`: it is missing"));
 }
 
 #[test]
@@ -340,7 +340,7 @@ fn a_waveguide_can_be_rigid() {
     let wrong =
         Scene::parse(&format!("waveguide = \"soft\"\n{without}"), "scene.toml").unwrap_err();
     assert!(
-        wrong.to_string().contains("`waveguide` must be a table"),
+        wrong.to_string().contains("expected a table with `layers`"),
         "{wrong}"
     );
 }

@@ -69,7 +69,7 @@ pub(super) const CALLS: &[(&str, &str)] = &[
     ("strain plain.csv space.csv", "coordinates"),
     ("strain before.csv after.csv --measure seth", "seth"),
     ("strain million.csv million.csv", "GB"),
-    ("strain twice.csv twice.csv", "more than once"),
+    ("strain twice.csv twice.csv", "found more than one"),
     ("strain named.csv named.csv", "column named `x`"),
     ("reconstruct ball.pgm", "--light"),
     ("reconstruct ball.pgm --light 0,0", "light"),
@@ -285,11 +285,11 @@ pub(super) const CALLS: &[(&str, &str)] = &[
     ),
     (
         "strain half_units.csv half_units.csv",
-        "the column `y` names no unit",
+        "a unit of the column `y`",
     ),
     (
         "strain units_later.csv units_later.csv",
-        "the column `x` names no unit",
+        "a unit of the column `x`",
     ),
     ("measure wrong_size.toml", "80 × 64"),
     ("measure no_frames.toml", "frames"),

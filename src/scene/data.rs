@@ -1,0 +1,343 @@
+//! The files of a scene, read and checked against each other, and a pipeline with its frames.
+use super::file::guide;
+use super::{CalibrationSource, Scene, read_contact_table};
+use crate::elasticity::ElasticityError;
+use crate::elasticity::contact::ContactTable;
+use crate::elasticity::modulus::TabulatedContact;
+use crate::force::{CalibrationPair, ContactOptions, DriftCorrection, Estimate, ForceOptions};
+use crate::io::{FileError, read_columns, read_frame, read_grey_levels};
+use crate::pipeline::{
+    DarkContact, EstimatorChoice, LightContact, Measurement, Object, Pipeline, PipelineError,
+    Press, SurfaceInput,
+};
+use crate::sensor::Sensor;
+use ndarray::{Array2, ArrayView2};
+use std::path::Path;
+
+/// A scene's calibration, read.
+///
+/// ```
+/// use tactile_imaging::force::CalibrationPair;
+/// use tactile_imaging::scene::LoadedCalibration;
+/// let name = |calibration: &LoadedCalibration| match calibration {
+///     LoadedCalibration::Pairs(pairs) => format!("pairs to {} N", pairs[1].force_n),
+///     LoadedCalibration::Gauge => "a gauge's forces".into(),
+///     LoadedCalibration::Sensor(sensor) => format!("of {}", sensor.date),
+///     LoadedCalibration::DepthTable(rows) => format!("down to {} m", rows[1].1),
+/// };
+/// let pairs = [0.0, 1.0].map(|f| CalibrationPair::loading(1e5 * f, f)).to_vec();
+/// assert_eq!(name(&LoadedCalibration::Pairs(pairs)), "pairs to 1 N");
+/// let depths = LoadedCalibration::DepthTable(vec![(0.0, 0.0), (60.0, 1.9e-3)]);
+/// assert_eq!(name(&depths), "down to 0.0019 m");
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub enum LoadedCalibration {
+    /// Integrated pixel value and force.
+    Pairs(Vec<CalibrationPair>),
+    /// Darkness in grey levels and depth in metres.
+    DepthTable(Vec<(f64, f64)>),
+    /// None: the forces are a gauge's.
+    Gauge,
+    /// A sensor with its curve, lens and layers.
+    Sensor(Box<Sensor>),
+}
+
+/// A scene's images and calibration.
+///
+/// ```
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// # use tactile_simulate::{CalibrationRun, Camera, PressOptions, PressScene, write_folder};
+/// use tactile_imaging::scene::{LoadedCalibration, Scene};
+/// # let camera = Camera::default().coarser(16);
+/// # let made = PressScene::new(PressOptions { camera, ..PressOptions::default() })?;
+/// # let folder = tempfile::tempdir()?;
+/// # let calibration = CalibrationRun { steps: 8, ..CalibrationRun::default() };
+/// # let path = write_folder(&made, &made.calibrate(&calibration)?, folder.path())?;
+/// let data = Scene::read(&path)?.load()?; // a calibration up to 2 N in 8 steps and back
+/// assert!(data.frames.iter().all(|frame| frame.dim() == data.reference.dim()));
+/// let LoadedCalibration::Pairs(pairs) = &data.calibration else { unreachable!() };
+/// assert!(pairs.len() == 17 && (pairs[8].force_n - 2.0).abs() < 0.01);
+/// # Ok(()) }
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub struct SceneData {
+    /// The frame without contact.
+    pub reference: Array2<u8>,
+    /// The frames, in the order of the scene. Those that are missing are read from their files
+    /// whenever a stage needs them.
+    pub frames: Vec<Array2<u8>>,
+    /// The calibration.
+    pub calibration: LoadedCalibration,
+    /// The table of contacts, where the scene names one.
+    pub contact_table: Option<ContactTable>,
+}
+
+impl Scene {
+    /// Reads the images and the calibration, and checks that the images have one size. Where the
+    /// frames are too many for the memory, [`measure_file`](Self::measure_file) keeps a few of
+    /// them.
+    ///
+    /// # Errors
+    /// [`FileError`], naming the field and the file.
+    pub fn load(&self) -> Result<SceneData, FileError> {
+        let mut data = self.load_without_frames()?;
+        let reference = data.reference.view();
+        let frames = (0..self.frames.len()).map(|index| self.read_frame(index, reference));
+        data.frames = frames.collect::<Result<_, _>>()?;
+        Ok(data)
+    }
+
+    /// As [`load`](Self::load) without the frames. A [`press`](Self::press) then reads each when it
+    /// is added and again when a stage needs it, so that any number of them fits into memory.
+    ///
+    /// # Errors
+    /// [`FileError`], naming the field and the file.
+    pub fn load_without_frames(&self) -> Result<SceneData, FileError> {
+        let in_field = |field: &str, error| FileError::field(&self.file, field, error);
+        let reference = read_frame(&self.file, "reference", &self.reference, self.bits, None)?;
+        let calibration = match &self.calibration {
+            CalibrationSource::Gauge => LoadedCalibration::Gauge,
+            CalibrationSource::Sensor(path) => {
+                LoadedCalibration::Sensor(Box::new(Sensor::read(path)?))
+            }
+            CalibrationSource::Pairs(path) => LoadedCalibration::Pairs(
+                force_pairs(path).map_err(|error| in_field("calibration.pairs", error))?,
+            ),
+            CalibrationSource::DepthTable(path) => {
+                let darkness = (&["darkness"][..], "grey_levels");
+                let [darkness, depth] = read_columns(path, [darkness, (&["depth"], "mm")])
+                    .map_err(|error| in_field("calibration.depth_table", error))?;
+                LoadedCalibration::DepthTable(darkness.into_iter().zip(depth).collect())
+            }
+        };
+        // Errors of a table or a sensor name fields of their own file.
+        let contact_table = self.contact_table.as_ref().map(read_contact_table);
+        Ok(SceneData {
+            reference,
+            frames: Vec::new(),
+            calibration,
+            contact_table: contact_table.transpose()?,
+        })
+    }
+
+    /// The image of a frame, of the reference's size.
+    fn read_frame(
+        &self,
+        index: usize,
+        reference: ArrayView2<'_, u8>,
+    ) -> Result<Array2<u8>, FileError> {
+        let field = format!("frames[{}].image", index + 1);
+        let (path, size) = (&self.frames[index].image, Some(reference.dim()));
+        read_frame(&self.file, &field, path, self.bits, size)
+    }
+
+    /// Reads a scene file with its images and measures everything.
+    ///
+    /// The error of a stage stands in its place in the [`Measurement`], and
+    /// [`measure_error`](Self::measure_error) adds the field of the scene file to it.
+    ///
+    /// ```
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// # use tactile_simulate::{CalibrationRun, Camera, PressLoad, PressOptions, PressScene};
+    /// # use tactile_simulate::write_folder;
+    /// use tactile_imaging::scene::Scene;
+    /// # let camera = Camera::default().coarser(16);
+    /// # let loads = vec![PressLoad::normal(0.7)];
+    /// # let made = PressScene::new(PressOptions { camera, loads, ..Default::default() })?;
+    /// # let folder = tempfile::tempdir()?;
+    /// # let calibration = CalibrationRun { steps: 8, ..CalibrationRun::default() };
+    /// # let path = write_folder(&made, &made.calibrate(&calibration)?, folder.path())?;
+    /// let measured = Scene::measure_file(&path)?; // one frame, of a ball pressed with 0.7 N
+    /// let frame = measured.frames[0].as_ref().expect("a contact");
+    /// let force = frame.force_n.as_ref().expect("a calibration").value;
+    /// assert!((force / 0.7 - 1.0).abs() < 0.03);
+    /// let modulus = measured.youngs_modulus_pa?;
+    /// assert_eq!(modulus.estimator.to_string(), "Hertz sphere");
+    /// assert!(measured.strain.is_err(), "strain takes two frames");
+    /// # Ok(()) }
+    /// ```
+    ///
+    /// # Errors
+    /// [`FileError`]: one sentence that names the file and the field.
+    pub fn measure_file(path: impl AsRef<Path>) -> Result<Measurement, FileError> {
+        let scene = Self::read(path)?;
+        let data = scene.load_without_frames()?;
+        let press = scene.press(&scene.pipeline(&data)?, &data)?;
+        Ok(press.measure())
+    }
+
+    /// The pipeline for this scene's sensor and object, of the stages it names.
+    ///
+    /// ```
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// # use tactile_imaging::force::CalibrationPair;
+    /// # use tactile_imaging::scene::{LoadedCalibration, Scene, SceneData};
+    /// # let scene = Scene::parse(r#"
+    /// #     reference = "reference.png"
+    /// #     pixel_size_m = [2e-5, 2e-5]
+    /// #     calibration = { pairs = "pairs.csv" }
+    /// #     frames = [{ image = "one.png" }]
+    /// #     object = { shape = "unknown" }
+    /// #     stages = { strain = "hencky" }
+    /// #     [waveguide]
+    /// #     layers = [{ refractive_index = 1.41, thickness_m = 2e-3, youngs_modulus_pa = 1.36e5 }]
+    /// # "#, "scene.toml")?;
+    /// # let pairs = [0.0, 1.0, 2.0].map(|f| CalibrationPair::loading(1e5 * f, f)).to_vec();
+    /// # let frame = ndarray::Array2::from_elem((20, 30), 10);
+    /// # let calibration = LoadedCalibration::Pairs(pairs);
+    /// # let frames = vec![frame.clone()];
+    /// # let data = SceneData { reference: frame, frames, calibration, contact_table: None };
+    /// // The file has strain = "hencky", and the program its own number of points.
+    /// let pipeline = scene.pipeline(&data)?.with_control_points(60);
+    /// let mut press = scene.press(&pipeline, &data)?;
+    /// assert!(press.contact(0)?.is_none(), "as grey as the reference");
+    /// # Ok(()) }
+    /// ```
+    ///
+    /// # Errors
+    /// [`FileError::Rejected`] where the calibration or the waveguide is not usable.
+    pub fn pipeline(&self, data: &SceneData) -> Result<Pipeline, FileError> {
+        self.build(data).map_err(|e| self.measure_error(e))
+    }
+
+    /// The scene's frames on a pipeline, ready to be measured. Those that `data` lacks are read
+    /// from their files.
+    ///
+    /// # Errors
+    /// [`FileError::Rejected`], also of frames that are read.
+    pub fn press<'a>(
+        &self,
+        pipeline: &Pipeline,
+        data: &'a SceneData,
+    ) -> Result<Press<'a>, FileError> {
+        let mut press = pipeline
+            .press(data.reference.view())
+            .map_err(|e| self.measure_error(e))?;
+        let mut kept_bytes = 0;
+        for (index, frame) in self.frames.iter().enumerate() {
+            let gauge = frame
+                .force_n
+                .map(|value| Estimate::new(value, frame.force_error_n.unwrap_or(0.0)));
+            let added = match data.frames.get(index) {
+                Some(image) => press.add_gauged_frame(image.view(), gauge),
+                None => {
+                    let image = self.read_frame(index, data.reference.view())?;
+                    kept_bytes += image.len();
+                    // Images beyond 64 MiB are read again for every stage that needs them.
+                    if kept_bytes <= 64 << 20 {
+                        press.add_gauged_frame(image, gauge)
+                    } else {
+                        let (path, bits) = (frame.image.clone(), self.bits);
+                        let read = move || read_grey_levels(&path, bits).map_err(|e| e.to_string());
+                        press.add_frame_on_demand(gauge, read)
+                    }
+                }
+            };
+            if let Some(time_s) = frame.time_s {
+                press
+                    .set_time_s(added, time_s)
+                    .map_err(|e| self.measure_error(e))?;
+            }
+        }
+        Ok(press)
+    }
+
+    fn force_options(&self) -> ForceOptions {
+        let drift = match self.corrects_drift {
+            true => DriftCorrection::Automatic,
+            false => DriftCorrection::None,
+        };
+        ForceOptions::default().with_contact(ContactOptions::default().with_drift(drift))
+    }
+
+    fn build(&self, data: &SceneData) -> Result<Pipeline, PipelineError> {
+        let pipeline = match &data.calibration {
+            LoadedCalibration::Pairs(pairs) => {
+                let contact =
+                    LightContact::from_pairs_with(pairs, self.pixel_size_m, &self.force_options())?;
+                Pipeline::new(contact, self.object)?.with_stages(&self.stages)?
+            }
+            // Forces come from the gauge, but contacts and radii still come from the light.
+            LoadedCalibration::Gauge => {
+                let contact = LightContact::gauged(self.pixel_size_m, &self.force_options())?;
+                Pipeline::new(contact, self.object)?.with_stages(&self.stages)?
+            }
+            LoadedCalibration::Sensor(sensor) => {
+                let contact = sensor.contact(&self.force_options())?;
+                let pipeline = Pipeline::new(contact, self.object)?.with_stages(&self.stages)?;
+                return sensor.configured(pipeline)?.with_settings(|settings| {
+                    settings.object_radius_error_m = self.radius_error_m;
+                    settings.poisson_ratio_error = self.poisson_ratio_error;
+                });
+            }
+            LoadedCalibration::DepthTable(table) => {
+                let contact = DarkContact::new(table, self.pixel_size_m)?;
+                Pipeline::new(contact, self.object)?
+                    .with_stages(&self.stages)?
+                    .with_surface(DarkContact::depth_table(table)?, SurfaceInput::Signal)
+            }
+        };
+        let pipeline = pipeline.with_settings(|settings| {
+            settings.flat_field = self.flat_field;
+            settings.object_radius_error_m = self.radius_error_m;
+            settings.poisson_ratio_error = self.poisson_ratio_error;
+        })?;
+        let guide = guide(&self.layers).map_err(PipelineError::Material)?;
+        // An estimator named in the file goes before the one that the contact table suggests.
+        let pipeline = match (&data.contact_table, self.stages.estimator) {
+            (Some(table), EstimatorChoice::Best | EstimatorChoice::TabulatedContact) => {
+                let Object::Sphere {
+                    radius_m,
+                    poisson_ratio,
+                } = self.object
+                else {
+                    return Err(PipelineError::WrongEstimator {
+                        estimator: EstimatorChoice::TabulatedContact,
+                        needs: "a ball as the object",
+                    });
+                };
+                let tabulated =
+                    TabulatedContact::new(table.clone(), radius_m, poisson_ratio, &guide);
+                pipeline.with_estimator(tabulated.map_err(PipelineError::Material)?)
+            }
+            _ => pipeline,
+        };
+        if self.layers.is_empty() {
+            return Ok(pipeline);
+        }
+        pipeline.with_settings(|settings| settings.waveguide = Some(guide))
+    }
+
+    /// The pipeline's error with the field that it comes from.
+    pub fn measure_error(&self, error: PipelineError) -> FileError {
+        // The field that a user has to change, as far as the kind of error determines it.
+        let field = match (&error, error.frame()) {
+            (PipelineError::NoForce { .. }, Some(i)) => format!("frames[{}].force_N", i + 1),
+            (PipelineError::Time { .. } | PipelineError::TimeDecreases { .. }, Some(i)) => {
+                format!("frames[{}].time_s", i + 1)
+            }
+            (_, Some(i)) => match self.frames.get(i) {
+                Some(frame) => format!("frames[{}].image = {}", i + 1, frame.image.display()),
+                None => format!("frames[{}]", i + 1),
+            },
+            (PipelineError::Calibration(_), _) => "calibration.pairs".into(),
+            (PipelineError::DepthTable(_), _) => "calibration.depth_table".into(),
+            (PipelineError::Material(ElasticityError::TableMismatch { .. }), _) => {
+                "contact_table".into()
+            }
+            (PipelineError::Material(_), _) => "waveguide.layers".into(),
+            (PipelineError::WrongEstimator { .. }, _) => "stages.estimator".into(),
+            (PipelineError::Sensor(_), _) => "reference".into(),
+            _ => "frames".into(),
+        };
+        FileError::field(&self.file, field, error)
+    }
+}
+
+/// Pairs of integrated pixel value and force from a CSV file.
+pub fn force_pairs(path: &Path) -> Result<Vec<CalibrationPair>, FileError> {
+    let value = (&["integrated_pixel_value"][..], "grey_levels");
+    let [values, forces] = read_columns(path, [value, (&["force"], "N")])?;
+    let pairs = values.into_iter().zip(forces);
+    Ok(pairs.map(|(v, f)| CalibrationPair::loading(v, f)).collect())
+}

@@ -1,0 +1,646 @@
+//! What a scene file may hold, and contact tables as files.
+use crate::elasticity::ElasticityError;
+use crate::elasticity::contact::{ContactTable, Layer, Waveguide};
+#[cfg(feature = "fem")]
+use crate::fem::{TableOptions, TableProgress};
+use crate::io::{
+    FileError, beside, not_negative, number, one_or_more, parse_toml, poisson_ratio, positive,
+    positive_pair, read_bytes, read_toml, write_bytes,
+};
+use crate::pipeline::{
+    EstimatorChoice, IntegratorChoice, MatcherChoice, Object, ReconstructionChoice, SamplerChoice,
+    StagesConfig, StrainChoice, WarpChoice,
+};
+use serde::de::value::MapAccessDeserializer;
+use serde::de::{self, Deserializer, MapAccess, Unexpected, Visitor};
+use serde::{Deserialize, Serialize};
+use std::fmt;
+#[cfg(feature = "fem")]
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+
+/// The calibration of a scene.
+///
+/// ```
+/// use tactile_imaging::scene::{CalibrationSource, Scene};
+/// # let rest = r#"
+/// #     [[frames]]
+/// #     image = "frame.png"
+/// #     [object]
+/// #     shape = "unknown"
+/// #     [waveguide]
+/// #     layers = [{ refractive_index = 1.41, thickness_m = 2e-3, youngs_modulus_pa = 1e5 }]
+/// # "#;
+/// let head = "reference = \"reference.png\"\npixel_size_m = [2e-5, 2e-5]\n[calibration]\n";
+/// let source = |line: &str| {
+///     Scene::parse(&format!("{head}{line}{rest}"), "scene.toml").map(|s| s.calibration)
+/// };
+/// let pairs = CalibrationSource::Pairs("pairs.csv".into());
+/// assert_eq!(source("pairs = \"pairs.csv\"")?, pairs);
+/// let depths = CalibrationSource::DepthTable("depth.csv".into());
+/// assert_eq!(source("depth_table = \"depth.csv\"")?, depths);
+/// let both = "pairs = \"pairs.csv\"\ndepth_table = \"depth.csv\"";
+/// assert!(source(both).is_err(), "one of the two");
+/// # Ok::<(), tactile_imaging::io::FileError>(())
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub enum CalibrationSource {
+    /// Pairs of integrated pixel value and force.
+    Pairs(PathBuf),
+    /// A table of darkness and depth.
+    DepthTable(PathBuf),
+    /// None: every frame has a gauge's reading of its force.
+    Gauge,
+    /// The path of a sensor file: curve, lens and layers.
+    Sensor(PathBuf),
+}
+
+/// A frame with contact.
+///
+/// ```
+/// use tactile_imaging::scene::{Scene, SceneFrame};
+/// # let rest = r#"
+/// #     [calibration]
+/// #     pairs = "pairs.csv"
+/// #     [object]
+/// #     shape = "unknown"
+/// #     [waveguide]
+/// #     layers = [{ refractive_index = 1.41, thickness_m = 2e-3, youngs_modulus_pa = 1e5 }]
+/// # "#;
+/// let head = "reference = \"reference.png\"\npixel_size_m = [2e-5, 2e-5]";
+/// let frames = "[[frames]]\nimage = \"one.png\"\nforce_N = 0.7\n[[frames]]\nimage = \"two.png\"";
+/// let scene = Scene::parse(&format!("{head}\n{frames}\n{rest}"), "press/scene.toml")?;
+/// let image = "press/one.png".into();
+/// let first = SceneFrame { image, force_n: Some(0.7), force_error_n: None, time_s: None };
+/// assert_eq!(scene.frames[0], first);
+/// assert_eq!(scene.frames[1].force_n, None, "no gauge: the calibration gives the force");
+/// # Ok::<(), tactile_imaging::io::FileError>(())
+/// ```
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SceneFrame {
+    /// The image.
+    pub image: PathBuf,
+    /// The reading of a gauge in newtons, if there was one.
+    #[serde(default, rename = "force_N", deserialize_with = "positive")]
+    pub force_n: Option<f64>,
+    /// The standard error of that reading in newtons, if one is stated.
+    #[serde(default, rename = "force_error_N", deserialize_with = "not_negative")]
+    pub force_error_n: Option<f64>,
+    /// When it was taken, in seconds since the object touched, if that is known.
+    #[serde(default, deserialize_with = "not_negative")]
+    pub time_s: Option<f64>,
+}
+
+/// A layer of the waveguide.
+///
+/// ```
+/// use tactile_imaging::scene::Scene;
+/// # let head = r#"
+/// #     reference = "reference.png"
+/// #     pixel_size_m = [2e-5, 2e-5]
+/// #     [calibration]
+/// #     pairs = "pairs.csv"
+/// #     [[frames]]
+/// #     image = "frame.png"
+/// #     [object]
+/// #     shape = "unknown"
+/// # "#;
+/// let waveguide = "
+///     [[waveguide.layers]]
+///     refractive_index = 1.41
+///     thickness_m = 2e-3
+///     youngs_modulus_pa = 1.36e5
+///     poisson_ratio = 0.48
+///     [[waveguide.layers]]
+///     refractive_index = 1.40
+///     thickness_m = 3e-3
+///     youngs_modulus_pa = 8.0e4
+/// ";
+/// let layers = Scene::parse(&format!("{head}\n{waveguide}"), "scene.toml")?.layers;
+/// assert_eq!(layers[0].youngs_modulus_pa, 136e3, "the layer that the object touches");
+/// assert_eq!(layers[1].poisson_ratio, 0.5, "incompressible where it is absent");
+/// # Ok::<(), tactile_imaging::io::FileError>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SceneLayer {
+    /// Refractive index.
+    #[serde(deserialize_with = "refractive_index")]
+    pub refractive_index: f64,
+    /// Thickness in metres.
+    #[serde(deserialize_with = "positive")]
+    pub thickness_m: f64,
+    /// Young's modulus in pascals.
+    #[serde(deserialize_with = "positive")]
+    pub youngs_modulus_pa: f64,
+    /// Poisson's ratio, ½ where a file states none.
+    #[serde(default = "incompressible", deserialize_with = "poisson_ratio")]
+    pub poisson_ratio: f64,
+}
+
+fn incompressible() -> f64 {
+    0.5
+}
+
+/// A refractive index, for `#[serde(deserialize_with = …)]`.
+pub fn refractive_index<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
+    let accepts = |v: f64| v >= 1.0 && v.is_finite();
+    number(deserializer, "a number of at least 1", accepts)
+}
+
+/// Layers as contact laws take them.
+pub fn elastic_layers(layers: &[SceneLayer]) -> Vec<Layer> {
+    let elastic = |layer: &SceneLayer| Layer {
+        thickness_m: layer.thickness_m,
+        youngs_modulus_pa: layer.youngs_modulus_pa,
+        poisson_ratio: layer.poisson_ratio,
+    };
+    layers.iter().map(elastic).collect()
+}
+
+/// A scene file, checked. Paths are resolved, the files they name not yet read.
+///
+/// ```
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// # use tactile_simulate::{CalibrationRun, Camera, PressOptions, PressScene, write_folder};
+/// # use tactile_simulate::{Elastic, ElasticSphere};
+/// use tactile_imaging::scene::Scene;
+/// # let camera = Camera::default().coarser(16);
+/// # let object = ElasticSphere { radius_m: 20e-3, material: Elastic::CL2000X };
+/// # let made = PressScene::new(PressOptions { camera, object, ..PressOptions::default() })?;
+/// # let folder = tempfile::tempdir()?;
+/// # let indenter = ElasticSphere { radius_m: 60e-3, material: Elastic::RIGID };
+/// # let calibration = CalibrationRun { steps: 8, indenter, ..CalibrationRun::default() };
+/// # let path = write_folder(&made, &made.calibrate(&calibration)?, folder.path())?;
+/// let scene = Scene::read(&path)?; // a CL2000X ball, E = 103 kPa, at 0.7 N and 1.2 N
+/// let data = scene.load()?;
+/// let mut press = scene.press(&scene.pipeline(&data)?, &data)?;
+/// // The errors of a scene name file and field.
+/// let modulus = press.modulus().map_err(|e| scene.measure_error(e))?;
+/// let (low, high) = (modulus.interval_95.lower, modulus.interval_95.upper);
+/// assert!(low < 103e3 && high.is_none_or(|high| high > 103e3));
+/// # Ok(()) }
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub struct Scene {
+    /// The file itself.
+    pub file: PathBuf,
+    /// The image without contact.
+    pub reference: PathBuf,
+    /// Size of a pixel on the sensing surface in metres, x and y. Zero where a sensor file has it.
+    pub pixel_size_m: [f64; 2],
+    /// Whether vignetting is corrected by the reference's own brightness.
+    pub flat_field: bool,
+    /// Bits of the camera, for images of 16 bits whose files do not state them.
+    pub bits: Option<u8>,
+    /// Whether changes of the lamps since the reference are divided out where they are detected.
+    pub corrects_drift: bool,
+    /// Standard error of the object's radius in metres.
+    pub radius_error_m: f64,
+    /// Standard error of the object's Poisson ratio.
+    pub poisson_ratio_error: f64,
+    /// How grey levels become force or depth.
+    pub calibration: CalibrationSource,
+    /// The frames, in the order of the file.
+    pub frames: Vec<SceneFrame>,
+    /// The pressed object.
+    pub object: Object,
+    /// The waveguide's layers from the object's side, rigid if empty.
+    pub layers: Vec<SceneLayer>,
+    /// A table of the ball's contacts with the waveguide. The modulus follows from it unless
+    /// `stages` names another estimator.
+    pub contact_table: Option<PathBuf>,
+    /// The stages, by name.
+    pub stages: StagesConfig,
+}
+
+impl Scene {
+    /// Reads and checks a scene file.
+    ///
+    /// # Errors
+    /// [`FileError`]: one sentence that names the file and the field.
+    pub fn read(path: impl AsRef<Path>) -> Result<Self, FileError> {
+        let path = path.as_ref();
+        Self::parse(&String::from_utf8_lossy(&read_bytes(path)?), path)
+    }
+
+    /// Checks the text of a scene file. Relative paths are relative to the folder of `file`.
+    ///
+    /// ```
+    /// use tactile_imaging::{pipeline::Object, scene::Scene};
+    /// let text = r#"
+    ///     reference = "reference.png"
+    ///     pixel_size_m = [21.55e-6, 21.55e-6]
+    ///     calibration = { pairs = "pairs.csv" }
+    ///     frames = [{ image = "one.png" }, { image = "two.png", force_N = 1.2 }]
+    ///     object = { shape = "sphere", radius_m = 3e-3, poisson_ratio = 0.5 }
+    ///     [waveguide]
+    ///     layers = [{ refractive_index = 1.41, thickness_m = 2e-3, youngs_modulus_pa = 1.36e5 }]
+    /// "#;
+    /// let scene = Scene::parse(text, "press/scene.toml")?;
+    /// assert_eq!(scene.object, Object::Sphere { radius_m: 3e-3, poisson_ratio: 0.5 });
+    /// assert_eq!(scene.reference, std::path::Path::new("press/reference.png"));
+    /// # Ok::<(), tactile_imaging::io::FileError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// As [`read`](Self::read).
+    pub fn parse(text: &str, file: impl AsRef<Path>) -> Result<Self, FileError> {
+        let path = file.as_ref();
+        parse_toml::<SceneFile>(text, path)?.validate(path)
+    }
+}
+
+/// A scene file as it stands.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct SceneFile {
+    reference: PathBuf,
+    sensor: Option<PathBuf>,
+    #[serde(default, deserialize_with = "positive_pair")]
+    pixel_size_m: Option<[f64; 2]>,
+    flat_field: Option<FlatField>,
+    illumination_drift: Option<Drift>,
+    #[serde(default, deserialize_with = "bits")]
+    bits: Option<u8>,
+    calibration: Option<CalibrationTable>,
+    #[serde(deserialize_with = "one_or_more")]
+    frames: Vec<SceneFrame>,
+    object: ObjectTable,
+    waveguide: Option<WaveguideTable>,
+    contact_table: Option<PathBuf>,
+    #[serde(default)]
+    stages: StagesTable,
+}
+
+#[derive(Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum FlatField {
+    Reference,
+}
+
+#[derive(Deserialize, PartialEq)]
+#[serde(rename_all = "lowercase")]
+enum Drift {
+    Automatic,
+    None,
+}
+
+fn bits<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<u8>, D::Error> {
+    let expected = "a whole number from 8 to 16, the bits of the camera";
+    let accepts = |bits: f64| (8.0..=16.0).contains(&bits) && bits.fract() == 0.0;
+    let bits: f64 = number(deserializer, expected, accepts)?;
+    Ok(Some(bits as u8))
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct CalibrationTable {
+    pairs: Option<PathBuf>,
+    depth_table: Option<PathBuf>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ObjectTable {
+    shape: Shape,
+    #[serde(default, deserialize_with = "positive")]
+    radius_m: Option<f64>,
+    #[serde(default, deserialize_with = "positive")]
+    thickness_m: Option<f64>,
+    #[serde(default, deserialize_with = "half_angle")]
+    half_angle_rad: Option<f64>,
+    #[serde(default, deserialize_with = "poisson_ratio")]
+    poisson_ratio: Option<f64>,
+    #[serde(default, deserialize_with = "not_negative")]
+    radius_error_m: f64,
+    #[serde(default, deserialize_with = "not_negative")]
+    poisson_ratio_error: f64,
+}
+
+#[derive(Deserialize)]
+#[serde(rename_all = "snake_case")]
+enum Shape {
+    Sphere,
+    Block,
+    Cylinder,
+    FlatPunch,
+    Layer,
+    Cone,
+    Unknown,
+}
+
+fn half_angle<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<f64>, D::Error> {
+    let accepts = |v: f64| v > 0.0 && v < std::f64::consts::FRAC_PI_2;
+    number(deserializer, "a number between 0 and π/2", accepts)
+}
+
+/// `"rigid"`, or a table with `layers`.
+struct WaveguideTable(Vec<SceneLayer>);
+
+impl<'de> Deserialize<'de> for WaveguideTable {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        #[derive(Deserialize)]
+        #[serde(deny_unknown_fields)]
+        struct Layers {
+            #[serde(deserialize_with = "one_or_more")]
+            layers: Vec<SceneLayer>,
+        }
+        // An untagged enum would lose the path to a wrong field of a layer.
+        struct RigidOrLayers;
+        impl<'de> Visitor<'de> for RigidOrLayers {
+            type Value = WaveguideTable;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("a table with `layers`, or \"rigid\"")
+            }
+
+            fn visit_str<E: de::Error>(self, text: &str) -> Result<WaveguideTable, E> {
+                match text {
+                    "rigid" => Ok(WaveguideTable(Vec::new())),
+                    text => Err(E::invalid_value(Unexpected::Str(text), &self)),
+                }
+            }
+
+            fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<WaveguideTable, A::Error> {
+                let table = Layers::deserialize(MapAccessDeserializer::new(map))?;
+                Ok(WaveguideTable(table.layers))
+            }
+        }
+        deserializer.deserialize_any(RigidOrLayers)
+    }
+}
+
+/// Stages by name, absent where the default is meant.
+#[derive(Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct StagesTable {
+    reconstruction: Option<ReconstructionChoice>,
+    integrator: Option<IntegratorChoice>,
+    sampler: Option<SamplerChoice>,
+    matcher: Option<MatcherChoice>,
+    warp: Option<WarpChoice>,
+    strain: Option<StrainChoice>,
+    estimator: Option<EstimatorChoice>,
+}
+
+impl SceneFile {
+    /// Checks the fields against one another.
+    fn validate(self, file: &Path) -> Result<Scene, FileError> {
+        let error = |field: &str, reason: &str| FileError::field(file, field, reason);
+        let missing = |field: &str| error(field, "it is missing");
+        let calibration = self.calibration(file)?;
+        // Relaxation is fitted over times in order.
+        let mut last_s = 0.0;
+        for (index, frame) in self.frames.iter().enumerate() {
+            let Some(time_s) = frame.time_s else { continue };
+            if time_s < last_s {
+                let field = format!("frames[{}].time_s", index + 1);
+                let reason = format!("{time_s} s is before the frame that it follows ({last_s} s)");
+                return Err(FileError::field(file, field, reason));
+            }
+            last_s = time_s;
+        }
+        let stages = self.stages.choices();
+        // A stage that is named but would not run is a misunderstanding of the file.
+        let unused = match calibration {
+            CalibrationSource::DepthTable(_) if self.stages.reconstruction.is_some() => {
+                Some(("stages.reconstruction", "the depth table makes the surface"))
+            }
+            CalibrationSource::DepthTable(_) if self.stages.integrator.is_some() => {
+                Some(("stages.integrator", "the depth table makes the surface"))
+            }
+            _ if stages.integrator != IntegratorChoice::default()
+                && stages.reconstruction != ReconstructionChoice::BrooksHorn =>
+            {
+                let reason = "only the reconstruction \"brooks-horn\" integrates slopes";
+                Some(("stages.integrator", reason))
+            }
+            _ => None,
+        };
+        if let Some((field, reason)) = unused {
+            return Err(error(field, &format!("expected none: {reason}")));
+        }
+        // The sensor file has the pixel size, and its curve allows for the drift of the lamps.
+        let has_sensor = self.sensor.is_some();
+        let pixel_size_m = match self.pixel_size_m {
+            Some(size) => size,
+            None if has_sensor => [0.0; 2],
+            None => return Err(missing("pixel_size_m")),
+        };
+        let mut frames = self.frames;
+        for frame in &mut frames {
+            frame.image = beside(file, &frame.image);
+        }
+        Ok(Scene {
+            file: file.into(),
+            reference: beside(file, &self.reference),
+            pixel_size_m,
+            flat_field: self.flat_field.is_some(),
+            bits: self.bits,
+            corrects_drift: self
+                .illumination_drift
+                .map_or(has_sensor, |d| d == Drift::Automatic),
+            radius_error_m: self.object.radius_error_m,
+            poisson_ratio_error: self.object.poisson_ratio_error,
+            calibration,
+            frames,
+            object: self.object.object(file)?,
+            layers: self
+                .waveguide
+                .map_or_else(Vec::new, |waveguide| waveguide.0),
+            contact_table: self.contact_table.map(|path| beside(file, &path)),
+            stages,
+        })
+    }
+
+    /// The one source of the calibration.
+    fn calibration(&self, file: &Path) -> Result<CalibrationSource, FileError> {
+        let error = |field: &str, reason: &str| FileError::field(file, field, reason);
+        if let Some(sensor) = &self.sensor {
+            // Two sources of one quantity would leave open which of them counts.
+            let beside_sensor = [
+                ("pixel_size_m", self.pixel_size_m.is_some()),
+                ("flat_field", self.flat_field.is_some()),
+                ("calibration", self.calibration.is_some()),
+                ("waveguide", self.waveguide.is_some()),
+            ];
+            return match beside_sensor.iter().find(|(_, is_given)| *is_given) {
+                Some((field, _)) => Err(error(field, "expected none: the sensor file has it")),
+                None => Ok(CalibrationSource::Sensor(beside(file, sensor))),
+            };
+        }
+        match &self.calibration {
+            None if self.frames.iter().all(|frame| frame.force_n.is_some()) => {
+                Ok(CalibrationSource::Gauge)
+            }
+            None => Err(error(
+                "calibration",
+                "it is missing, expected `pairs` or `depth_table`, or `force_N` in every frame",
+            )),
+            Some(table) => match (&table.pairs, &table.depth_table) {
+                (Some(pairs), None) => Ok(CalibrationSource::Pairs(beside(file, pairs))),
+                (None, Some(depths)) => Ok(CalibrationSource::DepthTable(beside(file, depths))),
+                (None, None) => Err(error("calibration", "expected `pairs` or `depth_table`")),
+                (Some(_), Some(_)) => Err(error(
+                    "calibration",
+                    "expected `pairs` or `depth_table`, found both",
+                )),
+            },
+        }
+    }
+}
+
+impl ObjectTable {
+    fn object(&self, file: &Path) -> Result<Object, FileError> {
+        let poisson_ratio = self.poisson_ratio.unwrap_or(Object::DEFAULT_POISSON_RATIO);
+        let given = |field: &str, value: Option<f64>| {
+            let missing = || {
+                let reason = "it is missing, and this shape needs it";
+                FileError::field(file, format!("object.{field}"), reason)
+            };
+            value.ok_or_else(missing)
+        };
+        let radius_m = || given("radius_m", self.radius_m);
+        Ok(match self.shape {
+            Shape::Sphere => Object::Sphere {
+                radius_m: radius_m()?,
+                poisson_ratio,
+            },
+            Shape::FlatPunch => Object::FlatPunch {
+                radius_m: radius_m()?,
+                poisson_ratio,
+            },
+            Shape::Layer => Object::Layer {
+                indenter_radius_m: radius_m()?,
+                thickness_m: given("thickness_m", self.thickness_m)?,
+                poisson_ratio,
+            },
+            Shape::Cone => Object::Cone {
+                half_angle_rad: given("half_angle_rad", self.half_angle_rad)?,
+                poisson_ratio,
+            },
+            Shape::Block => Object::Block { poisson_ratio },
+            Shape::Cylinder => Object::Cylinder { poisson_ratio },
+            Shape::Unknown => Object::Unknown { poisson_ratio },
+        })
+    }
+}
+
+impl StagesTable {
+    fn choices(&self) -> StagesConfig {
+        StagesConfig {
+            reconstruction: self.reconstruction.unwrap_or_default(),
+            integrator: self.integrator.unwrap_or_default(),
+            sampler: self.sampler.unwrap_or_default(),
+            matcher: self.matcher.unwrap_or_default(),
+            warp: self.warp.unwrap_or_default(),
+            strain: self.strain.unwrap_or_default(),
+            estimator: self.estimator.unwrap_or_default(),
+        }
+    }
+}
+
+/// Reads a contact table from a TOML file and checks it.
+///
+/// ```
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// use tactile_imaging::elasticity::contact::{ContactCurve, ContactTable, Waveguide};
+/// use tactile_imaging::scene::{read_contact_table, write_contact_table};
+///
+/// let contact_radius_m: Vec<f64> = (1..=10).map(|k| 0.1e-3 * f64::from(k)).collect();
+/// let force_n = contact_radius_m.iter().map(|a| 4.0 / 3.0 * 80e3 * a.powi(3) / 3e-3).collect();
+/// let curve = ContactCurve { youngs_modulus_pa: 60e3, contact_radius_m, force_n };
+/// let table = ContactTable::new(3e-3, 0.5, &Waveguide::rigid(), vec![curve])?;
+/// let path = tempfile::tempdir()?.path().join("table.toml");
+/// # std::fs::create_dir_all(path.parent().unwrap())?;
+/// write_contact_table(&path, &table)?;
+/// assert_eq!(read_contact_table(&path)?, table);
+/// std::fs::write(&path, "version = 7")?;
+/// assert!(read_contact_table(&path).is_err());
+/// # Ok(()) }
+/// ```
+///
+/// # Errors
+/// [`FileError`], also for contacts that make no table, or a table of another version.
+pub fn read_contact_table(path: impl AsRef<Path>) -> Result<ContactTable, FileError> {
+    read_toml(path.as_ref())
+}
+
+/// Writes a contact table as TOML. Numbers keep all their digits.
+///
+/// ```no_run
+/// # use tactile_imaging::elasticity::contact::ContactTable;
+/// # fn keep(table: &ContactTable) -> Result<(), tactile_imaging::io::FileError> {
+/// use tactile_imaging::scene::write_contact_table;
+/// write_contact_table("table.toml", table)
+/// # }
+/// ```
+///
+/// # Errors
+/// [`FileError::Write`].
+pub fn write_contact_table(path: impl AsRef<Path>, table: &ContactTable) -> Result<(), FileError> {
+    let path = path.as_ref();
+    let text = toml::to_string(table).map_err(|error| FileError::Write {
+        path: path.into(),
+        source: std::io::Error::other(error),
+    })?;
+    write_bytes(path, text.as_bytes())
+}
+
+/// Computes the contact table of the ball and the waveguide that a file describes.
+///
+/// The file is a scene file, or one with its tables `object` and `waveguide` alone. `progress` is
+/// called before each modulus and after the last.
+///
+/// # Errors
+/// [`FileError`], also where the object is no ball, or the table cannot be computed.
+#[cfg(feature = "fem")]
+pub fn solve_contact_table(
+    path: impl AsRef<Path>,
+    options: &TableOptions,
+    progress: impl FnMut(TableProgress) -> ControlFlow<()>,
+) -> Result<ContactTable, FileError> {
+    #[derive(Deserialize)]
+    #[serde(deny_unknown_fields)]
+    struct BallFile {
+        object: ObjectTable,
+        waveguide: Option<WaveguideTable>,
+    }
+    let path = path.as_ref();
+    let text = String::from_utf8_lossy(&read_bytes(path)?).into_owned();
+    // A scene has a reference. The other kind of file has the two tables alone, so that a misspelt
+    // `waveguide` is an error and not a rigid guide.
+    let is_scene = parse_toml::<toml::Table>(&text, path)?.contains_key("reference");
+    let BallFile { object, waveguide } = if is_scene {
+        let SceneFile {
+            object, waveguide, ..
+        } = parse_toml(&text, path)?;
+        BallFile { object, waveguide }
+    } else {
+        parse_toml(&text, path)?
+    };
+    let Object::Sphere {
+        radius_m,
+        poisson_ratio,
+    } = object.object(path)?
+    else {
+        let reason = "expected a ball: contact tables are of balls";
+        return Err(FileError::field(path, "object.shape", reason));
+    };
+    let layers = waveguide.map_or_else(Vec::new, |waveguide| waveguide.0);
+    guide(&layers)
+        .and_then(|guide| {
+            crate::fem::solve_contact_table(radius_m, poisson_ratio, &guide, options, progress)
+        })
+        .map_err(|error| FileError::field(path, "waveguide", error))
+}
+
+/// The layers of a scene as a waveguide, rigid without any.
+pub fn guide(layers: &[SceneLayer]) -> Result<Waveguide, ElasticityError> {
+    if layers.is_empty() {
+        return Ok(Waveguide::rigid());
+    }
+    Waveguide::new(elastic_layers(layers))
+}
