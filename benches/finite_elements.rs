@@ -1,9 +1,11 @@
-//! Finite elements: time of a ball on the paper's guide, of its contact table and of an inversion; agreement with another program.
+//! Finite elements: time of a ball on the paper's guide, of its contact table and of an inversion;
+//! agreement with another program.
 //!
 //! ```console
 //! cargo bench -p tactile-benches --features fem --bench finite_elements              # some two minutes; the table alone, once: -- table
 //! ```
-//! Times are seconds of processor where the system tells them (a busy machine counts for nothing), else of the clock.
+//! Times are seconds of processor where the system tells them (a busy machine counts for nothing),
+//! else of the clock.
 #![allow(clippy::print_stdout, missing_docs)]
 
 use std::ops::ControlFlow;
@@ -37,7 +39,8 @@ fn processor_seconds(clock: Instant) -> f64 {
     let ticks = std::fs::read_to_string("/proc/self/stat")
         .ok()
         .and_then(|text| {
-            // After the command's closing bracket: utime and stime are the 12th and 13th fields, in hundredths of a second.
+            // After the command's closing bracket: utime and stime are the 12th and 13th fields, in
+            // hundredths of a second.
             let fields: Vec<&str> = text.rsplit(')').next()?.split_whitespace().collect();
             Some(fields.get(11)?.parse::<f64>().ok()? + fields.get(12)?.parse::<f64>().ok()?)
         });

@@ -1,6 +1,7 @@
 //! Force: what a frame costs, with the error beside the time.
 //!
-//! Everything runs on the paper's frame, 1392 × 1042 pixels of 8 bits; the yardstick is adding up its bytes.
+//! Everything runs on the paper's frame, 1392 × 1042 pixels of 8 bits; the yardstick is adding up
+//! its bytes.
 #![allow(missing_docs, clippy::print_stderr)]
 
 use std::hint::black_box;
@@ -42,7 +43,8 @@ fn scene_of(wider: f64) -> Scene {
     }
 }
 
-/// The sum as one writes it, and with a 32-bit sum for every 64 KiB, which the compiler turns into wide instructions.
+/// The sum as one writes it, and with a 32-bit sum for every 64 KiB, which the compiler turns into
+/// wide instructions.
 fn add_up(bytes: &[u8]) -> u64 {
     bytes.iter().map(|&b| u64::from(b)).sum()
 }

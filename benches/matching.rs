@@ -1,7 +1,8 @@
 //! Point matching: time beside error, on generated scenes with known partners.
 //!
-//! `match/105x105` and `match/200x200` are jittered discs bent into a bell under a smooth warp (clean, with outliers, with
-//! noise), `match/scaling` the plane's disc from 105 points up. Every answer is checked before it is timed.
+//! `match/105x105` and `match/200x200` are jittered discs bent into a bell under a smooth warp
+//! (clean, with outliers, with noise), `match/scaling` the plane's disc from 105 points up. Every
+//! answer is checked before it is timed.
 #![allow(clippy::print_stdout, missing_docs)]
 
 use std::hint::black_box;
@@ -22,7 +23,8 @@ struct Scene<const D: usize> {
 }
 
 impl<const D: usize> Scene<D> {
-    /// `n` points of a jittered sunflower disc of radius 1 (a bell in space), warped by six broad Gaussians.
+    /// `n` points of a jittered sunflower disc of radius 1 (a bell in space), warped by six broad
+    /// Gaussians.
     fn new(n: usize, outliers: usize, noise: f64) -> Self {
         let mut random = SmallRng::seed_from_u64((n + 7 * outliers) as u64);
         let mut uniform = |size: f64| random.random_range(-size..size);
@@ -75,7 +77,8 @@ impl<const D: usize> Scene<D> {
     }
 }
 
-/// Checks and times the default matcher on one scene; a match through a warm workspace, without the spline of the result.
+/// Checks and times the default matcher on one scene; a match through a warm workspace, without the
+/// spline of the result.
 fn fast<const D: usize>(
     criterion: &mut Criterion,
     group: &str,
@@ -118,7 +121,8 @@ fn fast<const D: usize>(
 fn sizes(criterion: &mut Criterion) {
     for n in [105, 200] {
         let group = format!("match/{n}x{n}");
-        // Clean scenes are solved to rounding; noise of ±0.05 (sd 0.029 an axis) leaves less than half of it.
+        // Clean scenes are solved to rounding; noise of ±0.05 (sd 0.029 an axis) leaves less than
+        // half of it.
         fast(
             criterion,
             &group,
@@ -161,7 +165,8 @@ fn labelling(criterion: &mut Criterion) {
             )
         });
         println!("match/105x105/labelling: mean error {error:.2e}");
-        // It measured 1.6e-3 of the disc's radius on this scene; three times that would be another answer.
+        // It measured 1.6e-3 of the disc's radius on this scene; three times that would be another
+        // answer.
         assert!(error < 5e-3, "labelling: error {error}");
     });
     group.finish();

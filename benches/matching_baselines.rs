@@ -1,7 +1,8 @@
 //! The matchers beside the fast one on its standard case, 105 points to 105.
 //!
-//! `match/105x105/{dense, dense_8_neighbours, cpd, cpd_rank_30, assignment, nearest}`. Each match is checked against
-//! its truth, and its mean error in percent of the diameter is printed beside the time.
+//! `match/105x105/{dense, dense_8_neighbours, cpd, cpd_rank_30, assignment, nearest}`. Each match
+//! is checked against its truth, and its mean error in percent of the diameter is printed beside
+//! the time.
 #![allow(clippy::print_stdout)] // the error beside the time
 
 use criterion::{Criterion, SamplingMode, criterion_group, criterion_main};
@@ -15,7 +16,8 @@ use tactile_imaging::matching::{
 
 type Point3 = nalgebra::Point3<f64>;
 
-/// A sunflower head of `n` points on a shallow bell, the same after a smooth deformation of `size` diameters, and where each went.
+/// A sunflower head of `n` points on a shallow bell, the same after a smooth deformation of `size`
+/// diameters, and where each went.
 struct Scene {
     model: Vec<Point3>,
     target: Vec<Point3>,
@@ -63,7 +65,8 @@ fn gcd(a: usize, b: usize) -> usize {
     if b == 0 { a } else { gcd(b, a % b) }
 }
 
-/// Matches once: at least `share` of the pairs must be right, the mean error (percent of the diameter) below `bound`; prints both.
+/// Matches once: at least `share` of the pairs must be right, the mean error (percent of the
+/// diameter) below `bound`; prints both.
 fn check(name: &str, matcher: &dyn PointMatcher<3>, scene: &Scene, share: f64, bound: f64) {
     let matching = matcher
         .match_points(&scene.model, &scene.target)

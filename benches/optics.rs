@@ -1,4 +1,5 @@
-//! Optics: closed forms per call, rays per second through the paper's waveguide, and error against the number of rays.
+//! Optics: closed forms per call, rays per second through the paper's waveguide, and error against
+//! the number of rays.
 //!
 //! Every measured answer is asserted first; the error stands in the name of the tracer's benches.
 use std::f64::consts::FRAC_PI_2;

@@ -1,4 +1,5 @@
-//! Surfaces: shape from shading, slope integration and control points, with the error printed beside the time.
+//! Surfaces: shape from shading, slope integration and control points, with the error printed
+//! beside the time.
 #![allow(clippy::print_stderr)]
 
 use std::{hint::black_box, path::PathBuf};
@@ -80,8 +81,8 @@ fn mozart() -> Option<Case> {
     })
 }
 
-/// Height 0 outside the object, and the height where the surface faces the light: where z + (s_x x + s_y y)/s_z has a
-/// maximum, a minimum or a saddle.
+/// Height 0 outside the object, and the height where the surface faces the light: where z + (s_x x +
+/// s_y y)/s_z has a maximum, a minimum or a saddle.
 fn knowledge(case: &Case, [x, y, z]: [f64; 3]) -> Array2<f64> {
     let (rows, columns) = case.z.dim();
     let tilted = Array2::from_shape_fn((rows, columns), |(r, c)| {

@@ -1,7 +1,8 @@
 //! Thin-plate splines: fit, refit, evaluate, differentiate; the error stands beside the time.
 //!
-//! The problem is that of common RBF packages' own comparisons: `n` uniform points in the cube [−1, 1]³ moved by five
-//! Gaussian bumps, 10,000 queries. Every answer is checked against the map before it is timed.
+//! The problem is that of common RBF packages' own comparisons: `n` uniform points in the cube [−1,
+//! 1]³ moved by five Gaussian bumps, 10,000 queries. Every answer is checked against the map before
+//! it is timed.
 #![allow(clippy::print_stdout, missing_docs)]
 
 use std::hint::black_box;

@@ -1,12 +1,14 @@
-//! Contacts by finite elements, as CSV: those that the simulator's finite-element scene draws from, or those of a test.
+//! Contacts by finite elements, as CSV: those that the simulator's finite-element scene draws from,
+//! or those of a test.
 //!
 //! ```console
 //! cargo run --release --features fem,simulate --example contact_states > src/simulate/finite_elements.csv
 //! cargo run --release --features fem,simulate --example contact_states -- presses > tests/data/finite_element_presses.csv
 //! ```
 //!
-//! Neo-Hookean balls on neo-Hookean layers or on a rigid flat, without friction. ν = ½ is computed as 0.4999. A row a point: its contact
-//! (modulus, radius, layers as thickness:modulus, force, contact radius, approach), then distance from the axis, pressure and height.
+//! Neo-Hookean balls on neo-Hookean layers or on a rigid flat, without friction. ν = ½ is computed
+//! as 0.4999. A row a point: its contact (modulus, radius, layers as thickness:modulus, force,
+//! contact radius, approach), then distance from the axis, pressure and height.
 use std::io::{Result, Write, stdout};
 use tactile_imaging::elasticity::ElasticityError;
 use tactile_imaging::fem::{
@@ -61,7 +63,8 @@ impl Ball {
                 continue;
             };
             let a = contact.radius_m;
-            // Heights count from the guide's undeformed surface, which the glass has carried up by the approach.
+            // Heights count from the guide's undeformed surface, which the glass has carried up by
+            // the approach.
             let mut rows: Vec<[f64; 3]> = (state.pressure().iter())
                 .map(|p| [p.r_m, p.pressure_pa, p.z_m - state.approach_m()])
                 .collect();

@@ -1,4 +1,5 @@
-//! The crate tactile-elasticity alone: the modulus of a ball from force and contact radius at three loads.
+//! The crate tactile-elasticity alone: the modulus of a ball from force and contact radius at three
+//! loads.
 #![allow(clippy::print_stdout)]
 use tactile_elasticity::ElasticityError;
 use tactile_elasticity::contact::{Layer, Waveguide};

@@ -1,4 +1,5 @@
-//! The crate tactile-optics alone: which light stays in the paper's layers, and where the rest goes under a press.
+//! The crate tactile-optics alone: which light stays in the paper's layers, and where the rest goes
+//! under a press.
 #![allow(clippy::print_stdout)]
 use tactile_optics::surface::Dimple;
 use tactile_optics::trace::{Slab, SlabLayer, TraceOptions, trace};

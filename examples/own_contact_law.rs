@@ -1,12 +1,12 @@
-//! A contact law of one's own inside an estimator inside the pipeline: the pipeline measures force and contact, the
-//! law turns them into a modulus with an error.
+//! A contact law of one's own inside an estimator inside the pipeline: the pipeline measures force
+//! and contact, the law turns them into a modulus with an error.
 #![allow(clippy::print_stdout)]
 use std::error::Error;
 use tactile_imaging::elasticity::modulus::{ContactEstimator, ContactLaw, EstimatorKind, LogForce};
 use tactile_simulate::{CalibrationRun, PressOptions, Trial};
 
-/// Hertz with F = 4/3 E* a³/R and a factor 1 + 0.3 (a/R)² for contacts that are not small beside the ball, as if the
-/// ball grew stiffer while it is squeezed.
+/// Hertz with F = 4/3 E* a³/R and a factor 1 + 0.3 (a/R)² for contacts that are not small beside
+/// the ball, as if the ball grew stiffer while it is squeezed.
 struct Stiffening {
     radius_m: f64,
 }

@@ -1,5 +1,5 @@
-//! An estimator of one's own as a stage of the pipeline: the mean of Hertz's modulus over all loads, with the errors
-//! of forces and radii, of the calibration and of the pixel carried along.
+//! An estimator of one's own as a stage of the pipeline: the mean of Hertz's modulus over all
+//! loads, with the errors of forces and radii, of the calibration and of the pixel carried along.
 #![allow(clippy::print_stdout)]
 use std::error::Error;
 use tactile_imaging::elasticity::ElasticityError;

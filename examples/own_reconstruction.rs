@@ -1,4 +1,5 @@
-//! A reconstruction of one's own behind the trait: darkening is depth, by Beer's law, without any method of the library.
+//! A reconstruction of one's own behind the trait: darkening is depth, by Beer's law, without any
+//! method of the library.
 #![allow(clippy::print_stdout)]
 use ndarray::{Array2, array};
 use tactile_imaging::sfs::{Domain, Frame, SfsError, Surface, SurfaceReconstruction};

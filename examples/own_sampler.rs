@@ -1,4 +1,5 @@
-//! A sampler of control points of one's own behind the trait, and the pipeline that takes it: the highest pixels.
+//! A sampler of control points of one's own behind the trait, and the pipeline that takes it: the
+//! highest pixels.
 #![allow(clippy::print_stdout)]
 use ndarray::{Array2, ArrayView2};
 use tactile_imaging::sfs::nalgebra::Point3;

@@ -1,11 +1,13 @@
-//! The paper's two samples, balls of 3 mm radius of 103 and 62 kPa at 0.7 and 1.2 N, by every estimator: a table beside the truth.
+//! The paper's two samples, balls of 3 mm radius of 103 and 62 kPa at 0.7 and 1.2 N, by every
+//! estimator: a table beside the truth.
 //!
 //! ```console
 //! cargo run --release --features cli -- table examples/data/contact_table/scene.toml --out target/table   # some minutes, for the last row
 //! cargo run --release --features cli --example paper_samples -- target/paper_samples target/table/table.toml
 //! ```
-//! It simulates the presses by finite elements, writes each as a scene file with its frames, and measures those files. Without a table that row
-//! is left out; without a folder it writes to `target/paper_samples`.
+//! It simulates the presses by finite elements, writes each as a scene file with its frames, and
+//! measures those files. Without a table that row is left out; without a folder it writes to
+//! `target/paper_samples`.
 #![allow(clippy::print_stdout)]
 use std::error::Error;
 use std::fmt::Write;

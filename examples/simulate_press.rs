@@ -1,4 +1,5 @@
-//! Writes a simulated press as a folder that `tactile measure` reads: frames, calibration, scene.toml.
+//! Writes a simulated press as a folder that `tactile measure` reads: frames, calibration,
+//! scene.toml.
 //!
 //! ```text
 //! cargo run --release --example simulate_press -- target/press

@@ -1,4 +1,5 @@
-//! The crate tactile-tps alone: a thin-plate spline through pairs of points, its values and its gradient.
+//! The crate tactile-tps alone: a thin-plate spline through pairs of points, its values and its
+//! gradient.
 #![allow(clippy::print_stdout)]
 use nalgebra::Point2;
 use tactile_tps::{FitOptions, Smoothing, ThinPlateSpline, TpsError};

@@ -52,7 +52,8 @@ impl<const D: usize> StrainBetweenOptions<D> {
         self
     }
 
-    /// Answers with a strain of doubtful pairs too, its [`doubt`](StrainBetween::doubt) beside it. By default
+    /// Answers with a strain of doubtful pairs too, its [`doubt`](StrainBetween::doubt) beside it.
+    /// By default
     /// [`StrainBetweenError::Doubtful`] takes its place.
     #[must_use]
     pub fn with_doubtful_pairs(mut self) -> Self {
@@ -166,7 +167,8 @@ pub struct StrainBetween<const D: usize> {
     pub standard_errors: Vec<Matrix3<f64>>,
     /// Mean and spread of the strains.
     pub summary: StrainSummary,
-    /// Standard error of the mean: the jackknife over the spline's parts, and the response of the spline's weights.
+    /// Standard error of the mean: the jackknife over the spline's parts, and the response of the
+    /// spline's weights.
     pub standard_error: Matrix3<f64>,
     /// Degrees of freedom of the standard error: parts less one.
     pub degrees_of_freedom: usize,
@@ -180,8 +182,9 @@ pub struct StrainBetween<const D: usize> {
 
 /// Strain of the first set on its way to the second.
 ///
-/// The points are matched, a smoothing spline is fitted robustly through the pairs, and its gradient is strained at every
-/// matched point. Wrong pairs get no weight, and pairs that the matcher missed are found by the spline. O(n³) time.
+/// The points are matched, a smoothing spline is fitted robustly through the pairs, and its
+/// gradient is strained at every matched point. Wrong pairs get no weight, and pairs that the
+/// matcher missed are found by the spline. O(n³) time.
 ///
 /// ```
 /// use nalgebra::Point2;
@@ -309,10 +312,12 @@ fn gradients<const D: usize>(
         .collect()
 }
 
-/// Why a share of matched points or their residuals over the distance between neighbours cast doubt on the pairs.
+/// Why a share of matched points or their residuals over the distance between neighbours cast doubt
+/// on the pairs.
 ///
-/// Where the deformation is wrong, a prediction meets some point within a third of the spacing by chance, a tenth of them in
-/// space and a third in the plane. Residuals of a quarter of the spacing exchange one neighbour in twenty.
+/// Where the deformation is wrong, a prediction meets some point within a third of the spacing by
+/// chance, a tenth of them in space and a third in the plane. Residuals of a quarter of the spacing
+/// exchange one neighbour in twenty.
 fn doubt(share: f64, ratio: f64) -> Option<PairsDoubt> {
     if share < 0.5 {
         Some(PairsDoubt::FewPartners { share })
@@ -340,7 +345,8 @@ fn median_spacing<const D: usize>(points: &[Point<f64, D>]) -> f64 {
     spacing.get(spacing.len() / 2).copied().unwrap_or(0.0)
 }
 
-/// Mutual nearest neighbours of prediction and target, within a third of the targets' usual spacing.
+/// Mutual nearest neighbours of prediction and target, within a third of the targets' usual
+/// spacing.
 fn partners<const D: usize>(
     before: &[Point<f64, D>],
     after: &[Point<f64, D>],

@@ -1,5 +1,5 @@
-//! What a calibrated sensor costs a frame: local curve, flat field and lens, and the drift correction, beside a line from sums to
-//! force.
+//! What a calibrated sensor costs a frame: local curve, flat field and lens, and the drift
+//! correction, beside a line from sums to force.
 use criterion::BenchmarkGroup;
 use criterion::measurement::WallTime;
 use ndarray::Array2;
@@ -16,11 +16,13 @@ use tactile_simulate::{
     CalibrationRun, Camera, Gain, PressLoad, PressOptions, PressScene, PressSimulation,
 };
 
-/// Frames of each pipeline that the ratio of times is taken from, in turns: what slows the machine slows both.
+/// Frames of each pipeline that the ratio of times is taken from, in turns: what slows the machine
+/// slows both.
 const TURNS: usize = 400;
 const BARREL: f64 = 0.03;
 
-/// The default press seen by a camera with barrel distortion, vignetting and pixels higher than wide.
+/// The default press seen by a camera with barrel distortion, vignetting and pixels higher than
+/// wide.
 fn options(loads: Vec<PressLoad>) -> PressOptions {
     let camera = Camera::default();
     let [width_m, height_m] = camera.pixel_size_m;
@@ -53,8 +55,8 @@ fn histogram(made: &PressSimulation, load: usize) -> CalibrationFrame {
     CalibrationFrame::new(histogram, truth.contact.force_n, Branch::Loading).expect("a contact")
 }
 
-/// The stages of a sensor that was calibrated for all that the camera does, without and with the correction of lamps that
-/// changed, which a sensor's file asks for.
+/// The stages of a sensor that was calibrated for all that the camera does, without and with the
+/// correction of lamps that changed, which a sensor's file asks for.
 fn sensor(trial: &Trial) -> [Pipeline; 2] {
     let forces = [0.1, 0.3, 0.5, 0.7, 0.9, 1.1, 1.3];
     let made = PressScene::new(PressOptions {
@@ -98,7 +100,8 @@ fn medians(sessions: &mut [Session; 3], frames: &[Array2<u8>]) -> [Duration; 3] 
     })
 }
 
-/// A frame's force with a calibrated sensor and with the short form of calibration, from the same frames in one run.
+/// A frame's force with a calibrated sensor and with the short form of calibration, from the same
+/// frames in one run.
 pub(crate) fn calibrated(group: &mut BenchmarkGroup<'_, WallTime>) {
     let loads = vec![PressLoad::normal(0.7), PressLoad::normal(1.2)];
     let trial = Trial::new(options(loads), &CalibrationRun::default()).expect("a trial");

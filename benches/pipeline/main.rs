@@ -1,8 +1,9 @@
-//! The pipeline on frames of 1392 × 1042 pixels with 200 control points: the paper's press, both results asserted, and a
-//! table of times and errors over 500 simulated scenes (two with `--test` or `--quick`) whose contacts cover 1 to 15 % of
-//! the frame: ten sensors, each calibrated once, and on each presses at random places with random forces and noise. Beside
-//! them what is skipped: a frame without contact, and what a stream keeps from frame to frame;
-//! and what a sensor calibrated for its curve, flat field and lens costs a frame beside a line from sums to force.
+//! The pipeline on frames of 1392 × 1042 pixels with 200 control points: the paper's press, both
+//! results asserted, and a table of times and errors over 500 simulated scenes (two with `--test`
+//! or `--quick`) whose contacts cover 1 to 15 % of the frame: ten sensors, each calibrated once,
+//! and on each presses at random places with random forces and noise. Beside them what is skipped:
+//! a frame without contact, and what a stream keeps from frame to frame; and what a sensor
+//! calibrated for its curve, flat field and lens costs a frame beside a line from sums to force.
 #![allow(clippy::print_stdout)]
 mod calibrated;
 mod face;
@@ -61,8 +62,8 @@ fn press(c: &mut Criterion) {
     group.finish();
 }
 
-/// Share of the frame under the larger load of sensor `k` of ten: 1.2 to 13 %, in equal ratios. Forces vary by a fifth
-/// around it, areas by a seventh.
+/// Share of the frame under the larger load of sensor `k` of ten: 1.2 to 13 %, in equal ratios.
+/// Forces vary by a fifth around it, areas by a seventh.
 fn coverage(k: usize) -> f64 {
     0.012 * (0.13_f64 / 0.012).powf(k as f64 / 9.0)
 }
@@ -274,8 +275,9 @@ fn scenes(_: &mut Criterion) {
     table.print();
     let worst = table.modulus_error.last().copied().unwrap_or(f64::NAN);
     assert!(worst < 3.0, "modulus error {worst} %");
-    // A frame without contact takes 0.2 ms, in which an image comes from memory: a tenth of a frame's everything, 0.27 ms, is less than the twentieth that
-    // was allowed when everything took 5.6 ms.
+    // A frame without contact takes 0.2 ms, in which an image comes from memory: a tenth of a
+    // frame's everything, 0.27 ms, is less than the twentieth that was allowed when everything took
+    // 5.6 ms.
     if !quick {
         let share = table.empty_share[table.empty_share.len() / 2];
         assert!(

@@ -8,8 +8,8 @@ use tactile_imaging::elasticity::modulus::{
 };
 use tactile_simulate::{self, ContactModel, Elastic, ElasticSphere, PressOptions, PressScene};
 
-/// The paper's two samples at 0.7 and 1.2 N as finite elements give them, force and contact radius without noise, by every law of a ball.
-/// The bench `finite_elements` times contact tables.
+/// The paper's two samples at 0.7 and 1.2 N as finite elements give them, force and contact radius
+/// without noise, by every law of a ball. The bench `finite_elements` times contact tables.
 pub(crate) fn laws(study: &mut Study) {
     study.error_label = "rms error of the modulus, relative";
     const RADIUS_M: f64 = 3e-3;

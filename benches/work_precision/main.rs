@@ -1,4 +1,5 @@
-//! Time against error: every knob that trades one for the other, stage by stage and for the whole pipeline.
+//! Time against error: every knob that trades one for the other, stage by stage and for the whole
+//! pipeline.
 //!
 //! ```console
 //! cargo bench -p tactile-benches --bench work_precision              # some minutes
@@ -6,10 +7,11 @@
 //! cargo bench -p tactile-benches --bench work_precision -- matching  # one study
 //! cargo bench -p tactile-benches --bench work_precision -- --quick --within=1.5   # judged less strictly: a machine that is not ours alone
 //! ```
-//! Writes `target/work_precision/STUDY.csv` and `.svg` (time on one axis, error on the other, the front drawn, defaults marked) and fails if
-//! a default lies more than 20 % behind the front of its study in time or in error, whichever is worse: if some setting is more than 1.2
-//! times faster and no less accurate, or more than 1.2 times more accurate and no slower.
-//! With `--test` everything runs once and nothing is judged: one timing is none.
+//! Writes `target/work_precision/STUDY.csv` and `.svg` (time on one axis, error on the other, the
+//! front drawn, defaults marked) and fails if a default lies more than 20 % behind the front of its
+//! study in time or in error, whichever is worse: if some setting is more than 1.2 times faster and
+//! no less accurate, or more than 1.2 times more accurate and no slower. With `--test` everything
+//! runs once and nothing is judged: one timing is none.
 #![allow(missing_docs, clippy::print_stdout)]
 
 mod elasticity;

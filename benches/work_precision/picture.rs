@@ -4,7 +4,8 @@ use crate::study::Study;
 use std::fmt::Write;
 use std::path::Path;
 
-/// Colours of the knobs, told apart by people with any colour vision (Okabe & Ito 2008), and two more.
+/// Colours of the knobs, told apart by people with any colour vision (Okabe & Ito 2008), and two
+/// more.
 const COLOURS: [&str; 7] = [
     "#0072b2", "#009e73", "#e69f00", "#cc79a7", "#56b4e9", "#785e3c", "#5a5ac8",
 ];

@@ -1,4 +1,5 @@
-//! The whole pipeline: strain between two loads against control points, smoothing, camera and matcher.
+//! The whole pipeline: strain between two loads against control points, smoothing, camera and
+//! matcher.
 
 use crate::study::Study;
 use tactile_imaging::Pipeline;
@@ -7,7 +8,8 @@ use tactile_imaging::pipeline::Binning;
 use tactile_simulate::Trial;
 use tactile_simulate::{CalibrationRun, Camera, PressLoad, PressOptions};
 
-/// Presses on one sensor that differ in force and noise: one alone would say what its noise happened to do.
+/// Presses on one sensor that differ in force and noise: one alone would say what its noise
+/// happened to do.
 fn trials(shape: [usize; 2], count: u64) -> Vec<Trial> {
     let camera = Camera {
         shape,
@@ -28,7 +30,8 @@ fn trials(shape: [usize; 2], count: u64) -> Vec<Trial> {
     (0..count).map(trial).collect()
 }
 
-/// Root mean square over the presses of the largest error of a normal strain; the time is that of all of them.
+/// Root mean square over the presses of the largest error of a normal strain; the time is that of
+/// all of them.
 fn run(
     study: &mut Study,
     trials: &[Trial],

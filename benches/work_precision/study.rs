@@ -15,7 +15,8 @@ pub(crate) enum Effort {
 /// Differences below this are rounding, not error.
 const ROUNDING: f64 = 1e-14;
 
-/// Settings whose times or errors differ by less than this factor count as equal in it: times of one job scatter by as much.
+/// Settings whose times or errors differ by less than this factor count as equal in it: times of
+/// one job scatter by as much.
 const AS_GOOD: f64 = 0.98;
 
 pub(crate) struct Entry {
@@ -55,7 +56,8 @@ impl Study {
         }
     }
 
-    /// Times a job (least of many runs) and takes the error of its answer. A knob's default must be said to be one.
+    /// Times a job (least of many runs) and takes the error of its answer. A knob's default must be
+    /// said to be one.
     pub(crate) fn run<R>(
         &mut self,
         knob: &'static str,
@@ -112,8 +114,9 @@ impl Study {
         order
     }
 
-    /// How far behind the front a setting lies, in time or in error, whichever is worse: times faster that one is which is no less
-    /// accurate, or times more accurate one that is no slower. One on the front.
+    /// How far behind the front a setting lies, in time or in error, whichever is worse: times
+    /// faster that one is which is no less accurate, or times more accurate one that is no slower.
+    /// One on the front.
     pub(crate) fn behind(&self, entry: &Entry) -> f64 {
         let factor = |other: &Entry| {
             let (faster, better) = (entry.seconds / other.seconds, entry.error / other.error);

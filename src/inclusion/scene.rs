@@ -95,7 +95,8 @@ impl InclusionScene {
         let mut frames = file.frames;
         let mut last_m = 0.0;
         for (index, frame) in frames.iter_mut().enumerate() {
-            // Contact grows with the approach, and the search starts each frame from the one before.
+            // Contact grows with the approach, and the search starts each frame from the one
+            // before.
             if frame.approach_m <= last_m {
                 let field = format!("frames[{}].approach_m", index + 1);
                 let reason = "expected an approach greater than that of the frame before";

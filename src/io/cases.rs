@@ -4,7 +4,7 @@
 //! point). Rows `g` and `p`, which hold the truth for a scorer, are passed over unread. A result is
 //! a line `case NAME time_ms`, then for every model row a line `w` (its warped position) and a line
 //! `a` (the target row assigned to it, −1 for none).
-use super::error::{FileError, Place, quoted};
+use super::error::{FileError, FilePlace, quoted};
 use super::files::read_bytes;
 use nalgebra::{Point, Point2, Point3};
 use std::io::Write;
@@ -131,7 +131,7 @@ pub fn read_cases(path: impl AsRef<Path>) -> Result<Vec<MatchCase>, FileError> {
     cases.extend(open.map(OpenCase::close).transpose()?);
     // A file without a case is more likely the wrong file than an empty list.
     if cases.is_empty() {
-        return Err(FileError::content(path, Place::File, header, "none"));
+        return Err(FileError::content(path, FilePlace::File, header, "none"));
     }
     Ok(cases)
 }
@@ -178,11 +178,11 @@ impl Row<'_> {
     fn word(self, column: usize, expected: &str, found: &str) -> FileError {
         let line = self.line;
         let found = format!("`{}`", quoted(found, 40));
-        FileError::content(self.path, Place::Cell { line, column }, expected, found)
+        FileError::content(self.path, FilePlace::Cell { line, column }, expected, found)
     }
 
     fn error(self, expected: impl Into<String>, found: impl Into<String>) -> FileError {
-        FileError::content(self.path, Place::Line(self.line), expected, found)
+        FileError::content(self.path, FilePlace::Line(self.line), expected, found)
     }
 
     /// The coordinates after a tag. The third is zero in the plane.

@@ -7,12 +7,12 @@ use std::path::{Path, PathBuf};
 ///
 /// ```
 /// use tactile_imaging::io::Place;
-/// assert_eq!(Place::Cell { line: 3, column: 2 }.to_string(), ", line 3, column 2");
-/// assert_eq!(Place::Field("object.radius_m".into()).to_string(), ": field `object.radius_m`");
+/// assert_eq!(FilePlace::Cell { line: 3, column: 2 }.to_string(), ", line 3, column 2");
+/// assert_eq!(FilePlace::Field("object.radius_m".into()).to_string(), ": field `object.radius_m`");
 /// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
-pub enum Place {
+pub enum FilePlace {
     /// The file as a whole.
     File,
     /// A line of text.
@@ -28,7 +28,7 @@ pub enum Place {
     Field(String),
 }
 
-impl fmt::Display for Place {
+impl fmt::Display for FilePlace {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::File => Ok(()),
@@ -43,14 +43,14 @@ impl fmt::Display for Place {
 ///
 /// ```
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
-/// use tactile_imaging::io::{FileError, Place, read_grid};
+/// use tactile_imaging::io::{FileError, FilePlace, read_grid};
 /// use tactile_imaging::scene::Scene;
 /// # let folder = tempfile::tempdir()?;
 /// # let path = folder.path().join("depth.csv");
 /// std::fs::write(&path, "0.1,0.2\n0.3\n")?;
 /// let ragged = read_grid(&path).unwrap_err();
 /// assert!(ragged.to_string().ends_with("depth.csv, line 2: expected 2 columns, found 1"));
-/// assert!(matches!(ragged, FileError::Content { place: Place::Line(2), .. }));
+/// assert!(matches!(ragged, FileError::Content { place: FilePlace::Line(2), .. }));
 /// let absent = read_grid("nowhere/depth.csv").unwrap_err();
 /// assert!(absent.to_string().starts_with("cannot read nowhere/depth.csv: "));
 /// let wrong = Scene::parse("reference = 3\n", "a.toml").unwrap_err().to_string();
@@ -82,7 +82,7 @@ pub enum FileError {
         /// The file.
         path: PathBuf,
         /// The place.
-        place: Place,
+        place: FilePlace,
         /// What belongs there.
         expected: String,
         /// What is there, shortened if long.
@@ -94,7 +94,7 @@ pub enum FileError {
         /// The file.
         path: PathBuf,
         /// The place.
-        place: Place,
+        place: FilePlace,
         /// The reason, with what is expected there.
         source: Box<dyn Error + Send + Sync>,
     },
@@ -112,7 +112,7 @@ impl FileError {
     /// A place that holds something else than belongs there.
     pub(crate) fn content(
         path: &Path,
-        place: Place,
+        place: FilePlace,
         expected: impl Into<String>,
         found: impl Into<String>,
     ) -> Self {
@@ -132,7 +132,7 @@ impl FileError {
     ) -> Self {
         Self::Rejected {
             path: path.into(),
-            place: Place::Field(field.into()),
+            place: FilePlace::Field(field.into()),
             source: reason.into(),
         }
     }

@@ -1,5 +1,5 @@
 //! Whole files in and out, and TOML files as structs with checked numbers.
-use super::error::{FileError, Place, quoted};
+use super::error::{FileError, FilePlace, quoted};
 use serde::de::{self, Deserialize, DeserializeOwned, Deserializer, Unexpected, Visitor};
 use serde_path_to_error::Segment;
 use std::fmt;
@@ -110,11 +110,11 @@ pub fn read_toml<T: DeserializeOwned>(path: &Path) -> Result<T, FileError> {
 
 /// Reads a TOML text into a struct. The error names the field with its path, counted from 1.
 pub fn parse_toml<T: DeserializeOwned>(text: &str, path: &Path) -> Result<T, FileError> {
-    let rejected = |place: Place, error: &toml::de::Error| FileError::Rejected {
+    let rejected = |place: FilePlace, error: &toml::de::Error| FileError::Rejected {
         path: path.into(),
         place,
-        // A sentence is one line, whatever the file holds. The longest list of names fits. The parser
-        // has words of its own for a name that is no text.
+        // A sentence is one line, whatever the file holds. The longest list of names fits. The
+        // parser has words of its own for a name that is no text.
         source: quoted(error.message(), 400)
             .replace("wanted string or table", "invalid type, expected a string")
             .into(),
@@ -125,7 +125,7 @@ pub fn parse_toml<T: DeserializeOwned>(text: &str, path: &Path) -> Result<T, Fil
             .iter()
             .filter(|b| **b == b'\n')
             .count();
-        rejected(Place::Line(line as u64), &error)
+        rejected(FilePlace::Line(line as u64), &error)
     })?;
     serde_path_to_error::deserialize(parsed).map_err(|error| {
         let mut field = String::new();
@@ -139,8 +139,8 @@ pub fn parse_toml<T: DeserializeOwned>(text: &str, path: &Path) -> Result<T, Fil
             }
         }
         let place = match field.as_str() {
-            "" => Place::File,
-            field => Place::Field(quoted(field, 80)),
+            "" => FilePlace::File,
+            field => FilePlace::Field(quoted(field, 80)),
         };
         rejected(place, error.inner())
     })

@@ -25,7 +25,7 @@ mod table;
 mod tests;
 
 pub use cases::{CasePoints, MatchCase, read_cases, write_case_result};
-pub use error::{FileError, Place};
+pub use error::{FileError, FilePlace};
 pub use files::{read_bytes, replace_file, write_bytes};
 pub use image::{Grey, GreyImage, read_grey_image, read_grey_levels, write_grey_image};
 pub use table::{

@@ -1,5 +1,5 @@
 //! Tables of numbers in CSV: columns by name in SI units, points, grids.
-use super::error::{FileError, Place, quoted};
+use super::error::{FileError, FilePlace, quoted};
 use super::files::read_bytes;
 use nalgebra::{Point, Point2, Point3};
 use ndarray::Array2;
@@ -46,7 +46,7 @@ impl Table {
         let headings = self.headings();
         if headings.is_empty() && self.values.ncols() != N {
             let found = self.values.ncols().to_string();
-            return Err(self.error(Place::Line(1), columns_in_words(N), found));
+            return Err(self.error(FilePlace::Line(1), columns_in_words(N), found));
         }
         let mut found = [const { Vec::new() }; N];
         for (position, (names, unit)) in wanted.into_iter().enumerate() {
@@ -57,14 +57,15 @@ impl Table {
                 at = self.find(names, &headings)?;
                 given = headings[at].unit.as_deref();
             }
-            // The wanted unit stands for its quantity: any multiple of its base may stand in the file.
+            // The wanted unit stands for its quantity: any multiple of its base may stand in the
+            // file.
             let (base, _) = in_si(unit).unwrap_or(("1", 1.0));
             let factor = match in_si(given.unwrap_or(unit)) {
                 Some((found, factor)) if found == base => factor,
                 _ => {
                     let expected = format!("the column `{name}` in {base} or a multiple of it");
                     let found = format!("`{}`", quoted(given.unwrap_or(unit), 40));
-                    return Err(self.error(Place::File, expected, found));
+                    return Err(self.error(FilePlace::File, expected, found));
                 }
             };
             let column = self.values.column(at);
@@ -72,7 +73,7 @@ impl Table {
             let overflows = |(si, value): &(&f64, &f64)| value.is_finite() && !si.is_finite();
             if let Some((_, value)) = found[position].iter().zip(column).find(overflows) {
                 let expected = format!("values of the column `{name}` that SI units can hold");
-                return Err(self.error(Place::File, expected, format!("{value:e}")));
+                return Err(self.error(FilePlace::File, expected, format!("{value:e}")));
             }
         }
         Ok(found)
@@ -87,20 +88,20 @@ impl Table {
                 (Some(i), None) => return Ok(i),
                 (Some(_), Some(_)) => {
                     let expected = format!("one column named `{name}`");
-                    return Err(self.error(Place::File, expected, "more than one".into()));
+                    return Err(self.error(FilePlace::File, expected, "more than one".into()));
                 }
             }
         }
         let expected = format!("a column named `{}`", names.first().unwrap_or(&""));
         let found = format!("`{}`", self.header.join("`, `"));
-        Err(self.error(Place::File, expected, found))
+        Err(self.error(FilePlace::File, expected, found))
     }
 
     fn headings(&self) -> Vec<Heading> {
         self.header.iter().map(|text| heading(text)).collect()
     }
 
-    fn error(&self, place: Place, expected: String, found: String) -> FileError {
+    fn error(&self, place: FilePlace, expected: String, found: String) -> FileError {
         FileError::content(&self.path, place, expected, found)
     }
 }
@@ -172,7 +173,7 @@ pub fn read_grid(path: impl AsRef<Path>) -> Result<Array2<f64>, FileError> {
     match table.header.first() {
         None => Ok(table.values),
         Some(word) => {
-            let place = Place::Cell { line: 1, column: 1 };
+            let place = FilePlace::Cell { line: 1, column: 1 };
             Err(table.error(place, expected.into(), format!("`{word}`")))
         }
     }
@@ -202,7 +203,7 @@ pub fn read_point_table(path: impl AsRef<Path>) -> Result<(PointTable, bool), Fi
             3 => true,
             found => {
                 let expected = "2 or 3 columns".into();
-                return Err(table.error(Place::Line(1), expected, found.to_string()));
+                return Err(table.error(FilePlace::Line(1), expected, found.to_string()));
             }
         };
     }
@@ -249,7 +250,7 @@ fn to_points<const D: usize>(table: &Table) -> Result<Vec<Point<f64, D>>, FileEr
     let headings = table.headings();
     let find = |axis: &str| headings.iter().find(|h| h.name == axis);
     if D == 2 && find("z").is_some() {
-        return Err(table.error(Place::Line(1), columns_in_words(2), "3".into()));
+        return Err(table.error(FilePlace::Line(1), columns_in_words(2), "3".into()));
     }
     // Positions of tracked points are often in pixels, which have no length here.
     let in_pixels = find("x").is_some_and(|h| h.unit.as_deref() == Some("px"));
@@ -263,7 +264,7 @@ fn to_points<const D: usize>(table: &Table) -> Result<Vec<Point<f64, D>>, FileEr
         && let Some(axis) = axes[..D].iter().find(|axis| !with_unit(axis))
     {
         let expected = format!("a unit of the column `{}`, as others have one", axis[0]);
-        return Err(table.error(Place::Line(1), expected, "none".into()));
+        return Err(table.error(FilePlace::Line(1), expected, "none".into()));
     }
     let rows = 0..table.values.nrows();
     Ok(rows
@@ -308,7 +309,8 @@ fn heading(text: &str) -> Heading {
         let mut parts = cuts.map(|(at, _)| (&text[..at], &text[at + 1..]));
         parts.find(|(name, unit)| !name.is_empty() && in_si(unit).is_some())
     };
-    // Whatever stands in brackets is meant as a unit, a word after a blank or a line only if it is one.
+    // Whatever stands in brackets is meant as a unit, a word after a blank or a line only if it is
+    // one.
     let (name, unit) = match bracketed().or_else(suffixed) {
         Some((name, unit)) => (name, Some(unit.trim().to_owned())),
         None => (text, None),
@@ -330,7 +332,7 @@ fn parse_table(
     let error =
         |place, expected: &str, found: &str| FileError::content(path, place, expected, found);
     if bytes.starts_with(b"\xff\xfe") || bytes.starts_with(b"\xfe\xff") {
-        return Err(error(Place::File, "UTF-8 text", "UTF-16 text"));
+        return Err(error(FilePlace::File, "UTF-8 text", "UTF-16 text"));
     }
     let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&bytes);
     let is_passed_over = |line: &[u8]| line.is_empty() || line.starts_with(b"#");
@@ -364,7 +366,7 @@ fn parse_table(
             Err(error) => {
                 return Err(FileError::Rejected {
                     path: path.into(),
-                    place: Place::Line(line()),
+                    place: FilePlace::Line(line()),
                     source: error.into(),
                 });
             }
@@ -394,13 +396,13 @@ fn parse_table(
             values.push(number(&text).ok_or_else(|| {
                 let (line, column) = (line(), column + 1);
                 let found = format!("`{}`", quoted(&text, 40));
-                error(Place::Cell { line, column }, expected, &found)
+                error(FilePlace::Cell { line, column }, expected, &found)
             })?);
         }
         if let Some(columns) = columns.filter(|columns| *columns != record.len()) {
             let found = record.len().to_string();
             return Err(error(
-                Place::Line(line()),
+                FilePlace::Line(line()),
                 &columns_in_words(columns),
                 &found,
             ));
@@ -413,6 +415,10 @@ fn parse_table(
             values,
             path: path.into(),
         }),
-        _ => Err(error(Place::File, "at least one row of numbers", "none")),
+        _ => Err(error(
+            FilePlace::File,
+            "at least one row of numbers",
+            "none",
+        )),
     }
 }

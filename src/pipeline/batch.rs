@@ -7,8 +7,8 @@ use ndarray::ArrayView2;
 
 type Reading = Result<Option<ContactReading>, PipelineError>;
 
-/// Contact and force of every frame, in order. Workspaces are reused from frame to frame (one a thread with the feature
-/// `rayon`, whose pool decides how many).
+/// Contact and force of every frame, in order. Workspaces are reused from frame to frame (one a
+/// thread with the feature `rayon`, whose pool decides how many).
 ///
 /// ```
 /// use ndarray::Array2;

@@ -18,7 +18,8 @@ use crate::tps::{StrainSpline, WarpModel};
 use ndarray::ArrayView2;
 use std::sync::Arc;
 
-/// The stages from a frame to Young's modulus, each of which can be replaced in one line, and the settings they share.
+/// The stages from a frame to Young's modulus, each of which can be replaced in one line, and the
+/// settings they share.
 ///
 /// | stage | setter | default |
 /// |---|---|---|
@@ -31,7 +32,8 @@ use std::sync::Arc;
 /// | displacement gradient to strain | [`with_strain`](Self::with_strain) | [`GreenLagrange`] |
 /// | loads to the modulus | [`with_estimator`](Self::with_estimator) | the layered law for a ball, else stress over strain; see [`EstimatorChoice::Best`] |
 ///
-/// A setter takes any value that implements the stage's trait, a `Box` or an `Arc` of one too, so that a program can choose at run time;
+/// A setter takes any value that implements the stage's trait, a `Box` or an `Arc` of one too, so
+/// that a program can choose at run time;
 /// [`with_stages`](Self::with_stages) takes stages by the names of a configuration. The stages are shared: a clone copies
 /// pointers and the settings.
 ///
@@ -254,7 +256,8 @@ impl Pipeline {
         self
     }
 
-    /// Takes another way from slopes to heights, inside the reconstruction that the pipeline has by now.
+    /// Takes another way from slopes to heights, inside the reconstruction that the pipeline has by
+    /// now.
     ///
     /// ```
     /// # use tactile_simulate::{Trial, CalibrationRun, Camera, PressOptions};
@@ -410,7 +413,8 @@ impl Pipeline {
         self.contact.as_ref()
     }
 
-    /// The estimator of the modulus. One that goes by its name is built when it is first needed, for all clones.
+    /// The estimator of the modulus. One that goes by its name is built when it is first needed,
+    /// for all clones.
     ///
     /// # Errors
     /// [`PipelineError::WrongEstimator`] where the chosen one does not fit the object.

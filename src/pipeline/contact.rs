@@ -45,8 +45,8 @@ use std::sync::Arc;
 /// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
 /// ```
 pub trait ContactStage: Send + Sync {
-    /// The contact of `frame`, which differs from `reference` by it. A reading without a force takes that
-    /// of a gauge, where there is one.
+    /// The contact of `frame`, which differs from `reference` by it. A reading without a force
+    /// takes that of a gauge, where there is one.
     ///
     /// # Errors
     /// [`ForceError`], such as a frame of another size or a saturated contact.
@@ -86,14 +86,15 @@ pub trait ContactStage: Send + Sync {
         None
     }
 
-    /// The local curve from grey level to pressure, if there is one: shading is taken from pressures instead
-    /// of light.
+    /// The local curve from grey level to pressure, if there is one: shading is taken from
+    /// pressures instead of light.
     fn pressure_curve(&self) -> Option<&dyn LocalCalibration> {
         None
     }
 
-    /// The stage to take for objects that are known to have a flat face, if it saves work that only a ball's
-    /// contact needs, such as the fit of its profile. The contact radius is then taken from the face's area.
+    /// The stage to take for objects that are known to have a flat face, if it saves work that only
+    /// a ball's contact needs, such as the fit of its profile. The contact radius is then taken
+    /// from the face's area.
     ///
     /// ```
     /// use tactile_imaging::pipeline::{ContactStage, LightContact};
@@ -158,20 +159,22 @@ pub struct ContactReading {
     pub other_contacts: usize,
     /// Whether the fit of the contact's profile converged (no fit counts as converged).
     pub converged: bool,
-    /// Misfit of the pressure's profile as a share of its peak, where it is not that of a ball's contact.
+    /// Misfit of the pressure's profile as a share of its peak, where it is not that of a ball's
+    /// contact.
     pub profile_misfit: Option<f64>,
-    /// The contact as a flat face, where the object may have one and the contact is large enough to tell.
+    /// The contact as a flat face, where the object may have one and the contact is large enough to
+    /// tell.
     pub face: Option<FaceReading>,
     /// Longer over shorter half axis of the outline, less one, where it is not round.
     pub elongation: Option<f64>,
-    /// Departure of the calibration's pairs from a line at half scale, as a share of the full scale, where the
-    /// pairs show one.
+    /// Departure of the calibration's pairs from a line at half scale, as a share of the full
+    /// scale, where the pairs show one.
     pub calibration_bend: Option<f64>,
 }
 
 impl ContactReading {
-    /// A round contact of this radius under this force, about which there is nothing to caution. The error of
-    /// the force counts as noise of the frame, the peak as one grey level.
+    /// A round contact of this radius under this force, about which there is nothing to caution.
+    /// The error of the force counts as noise of the frame, the peak as one grey level.
     ///
     /// ```
     /// use tactile_imaging::{force::Estimate, pipeline::ContactReading};
@@ -276,18 +279,19 @@ impl ContactReading {
 pub struct FrameContact {
     /// The reading. `None` without contact.
     pub reading: Option<ContactReading>,
-    /// The box worked on: the contact's, with a margin of at least one pixel (but at the frame's edge).
+    /// The box worked on: the contact's, with a margin of at least one pixel (but at the frame's
+    /// edge).
     pub region: Option<BoundingBox>,
     /// The contact's pixels within the box.
     pub mask: Array2<bool>,
-    /// Mean of frame minus reference in grey levels, of a frame without contact. `None` with one, or where it
-    /// is not known.
+    /// Mean of frame minus reference in grey levels, of a frame without contact. `None` with one,
+    /// or where it is not known.
     pub background_step_grey: Option<f64>,
 }
 
 impl FrameContact {
-    /// A contact whose pixels are the true ones of `mask`, an image as large as the frame. No pixel is no
-    /// contact.
+    /// A contact whose pixels are the true ones of `mask`, an image as large as the frame. No pixel
+    /// is no contact.
     ///
     /// ```
     /// use tactile_imaging::{force::Estimate, pipeline::{ContactReading, FrameContact}};
@@ -337,8 +341,8 @@ impl FrameContact {
         })
     }
 
-    /// Refuses a mask that does not fill its region, and a region that does not lie in the frame: a stage may
-    /// be a user's own.
+    /// Refuses a mask that does not fill its region, and a region that does not lie in the frame: a
+    /// stage may be a user's own.
     pub(super) fn check(&self, frame: usize, image: (usize, usize)) -> Result<(), PipelineError> {
         let Some(at) = self.region else {
             return Ok(());

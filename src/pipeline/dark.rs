@@ -7,7 +7,8 @@ use crate::force::{Estimate, ForceError, Polarity, ReferenceFrame};
 use crate::sfs::DepthTable;
 use ndarray::{Array2, ArrayView2};
 
-/// Contact is the largest connected patch that is darker than the reference by more than a threshold.
+/// Contact is the largest connected patch that is darker than the reference by more than a
+/// threshold.
 ///
 /// ```
 /// use ndarray::Array2;
@@ -40,8 +41,8 @@ impl DarkContact {
     /// Darkening that counts as contact: above the noise of an 8-bit camera.
     pub const DEFAULT_THRESHOLD_GREY: f64 = 3.0;
 
-    /// With a table of (darkness in grey levels, depth in metres). Entries at or below the threshold of contact are
-    /// left out: what lies there is not contact.
+    /// With a table of (darkness in grey levels, depth in metres). Entries at or below the
+    /// threshold of contact are left out: what lies there is not contact.
     ///
     /// # Errors
     /// [`PipelineError::DepthTable`].
@@ -54,8 +55,9 @@ impl DarkContact {
         })
     }
 
-    /// The indentation counted from no darkness instead of the table's own zero, often a contact circle found at a
-    /// threshold ([`DepthTable::zeroed`]). Depths want the same: `DarkContact::depth_table(&entries)?.zeroed()`.
+    /// The indentation counted from no darkness instead of the table's own zero, often a contact
+    /// circle found at a threshold ([`DepthTable::zeroed`]). Depths want the same:
+    /// `DarkContact::depth_table(&entries)?.zeroed()`.
     ///
     /// ```
     /// use tactile_imaging::pipeline::DarkContact;
@@ -141,7 +143,8 @@ impl DarkContact {
     ) -> ContactReading {
         let n = patch.len() as f64;
         let mean = |axis: usize| patch.iter().map(|p| p[axis] as f64).sum::<f64>() / n;
-        // An outline uncertain by half a pixel, pixel by pixel, moves the centroid of a disc by 1/√(2 a) of that.
+        // An outline uncertain by half a pixel, pixel by pixel, moves the centroid of a disc by
+        // 1/√(2 a) of that.
         let radius_px = (n / std::f64::consts::PI).sqrt();
         let centroid_error = 0.5 / (2.0 * radius_px).sqrt();
         let [hx, hy] = self.pixel_size_m;
@@ -164,8 +167,8 @@ impl DarkContact {
     }
 }
 
-/// The largest set of pixels `[row, column]` inside, connected by their sides. Empty where no pixel is inside.
-/// O(pixels).
+/// The largest set of pixels `[row, column]` inside, connected by their sides. Empty where no pixel
+/// is inside. O(pixels).
 fn largest_patch(
     (rows, columns): (usize, usize),
     inside: impl Fn([usize; 2]) -> bool,

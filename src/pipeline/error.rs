@@ -6,7 +6,8 @@ use crate::matching::MatchError;
 use crate::sfs::SfsError;
 use crate::tps::TpsError;
 
-/// Why a measurement could not be made. Frames are counted from 0 in the fields and from 1 in the sentences.
+/// Why a measurement could not be made. Frames are counted from 0 in the fields and from 1 in the
+/// sentences.
 ///
 /// ```
 /// use tactile_imaging::pipeline::{Object, Pipeline, PipelineError};
@@ -231,7 +232,8 @@ pub enum PipelineError {
         /// Why.
         source: ElasticityError,
     },
-    /// A contact is not that of one flat face under uniaxial load, from which a modulus could be read.
+    /// A contact is not that of one flat face under uniaxial load, from which a modulus could be
+    /// read.
     #[error("frame {}: {problem}", frame + 1)]
     NotUniaxial {
         /// The frame.

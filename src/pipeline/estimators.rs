@@ -15,8 +15,9 @@ pub type SharedEstimator = Arc<dyn ModulusEstimator + Send + Sync>;
 
 /// The estimator where none is chosen. This is the place to change the default.
 ///
-/// A ball: the linear contact with the waveguide's layers, or with a rigid flat, corrected for finite strain. A sample on a rigid base, a cone: their own laws. Else
-/// stress over strain, equation (31). Of a flat face regressed over all loads.
+/// A ball: the linear contact with the waveguide's layers, or with a rigid flat, corrected for
+/// finite strain. A sample on a rigid base, a cone: their own laws. Else stress over strain,
+/// equation (31). Of a flat face regressed over all loads.
 fn default_of(
     object: Object,
     waveguide: Option<&Waveguide>,
@@ -42,7 +43,8 @@ fn default_of(
     }
 }
 
-/// Estimators to lay beside the chosen one, the paper's ratio first. For a ball Hertz with the layers in series.
+/// Estimators to lay beside the chosen one, the paper's ratio first. For a ball Hertz with the
+/// layers in series.
 pub fn that_fit(
     object: Object,
     waveguide: Option<&Waveguide>,
@@ -226,7 +228,8 @@ fn shared(
     Ok(Arc::new(estimator))
 }
 
-/// A pipeline's estimator: given as a value, or by a name and then built from object and waveguide when it is first needed.
+/// A pipeline's estimator: given as a value, or by a name and then built from object and waveguide
+/// when it is first needed.
 #[derive(Clone)]
 pub enum EstimatorStage {
     Given(SharedEstimator),

@@ -67,22 +67,25 @@ pub enum Flag {
         /// The frame.
         frame: usize,
     },
-    /// The profile of the contact's pressure is not that of a ball: the contact radius is that of the best ball.
+    /// The profile of the contact's pressure is not that of a ball: the contact radius is that of
+    /// the best ball.
     NotABall {
         /// The frame.
         frame: usize,
         /// Misfit as a share of the peak.
         misfit: f64,
     },
-    /// The contact's outline is not round: the pixels are not as stated, the lens distorts, or the object is no ball.
+    /// The contact's outline is not round: the pixels are not as stated, the lens distorts, or the
+    /// object is no ball.
     NotRound {
         /// The frame.
         frame: usize,
         /// Longer over shorter half axis, less one.
         elongation: f64,
     },
-    /// The pairs of the calibration do not lie on a line: light is not proportional to pressure, so that the light's profile and its
-    /// radius are not those of the pressure. A sensor calibrated from frames has the local curve.
+    /// The pairs of the calibration do not lie on a line: light is not proportional to pressure, so
+    /// that the light's profile and its radius are not those of the pressure. A sensor calibrated
+    /// from frames has the local curve.
     LightNotProportional {
         /// The frame.
         frame: usize,
@@ -98,7 +101,8 @@ pub enum Flag {
         /// What the gauge said, in newtons.
         gauge_n: f64,
     },
-    /// The material points of a face and its outline stretch differently: the face slips, sticks or bulges, and the modulus is off by as much as the strain.
+    /// The material points of a face and its outline stretch differently: the face slips, sticks or
+    /// bulges, and the modulus is off by as much as the strain.
     Slip {
         /// The frame.
         frame: usize,
@@ -107,7 +111,8 @@ pub enum Flag {
         /// Lateral strain of the points.
         texture_strain: f64,
     },
-    /// The pressure rises to the outline of a flat face, as where it sticks: it does not spread freely, and its strain is not that of its material.
+    /// The pressure rises to the outline of a flat face, as where it sticks: it does not spread
+    /// freely, and its strain is not that of its material.
     FaceSticks {
         /// The frame.
         frame: usize,
@@ -147,7 +152,8 @@ pub enum Flag {
         /// How many.
         points: usize,
     },
-    /// The first contact is so small, in pixels, that its surface and the strain counted from it may be off by more than their errors say.
+    /// The first contact is so small, in pixels, that its surface and the strain counted from it
+    /// may be off by more than their errors say.
     CoarseStrain {
         /// Radius of the smaller contact in pixels.
         radius_px: f64,

@@ -9,7 +9,8 @@ use nalgebra::{Matrix3, Vector3};
 use ndarray::ArrayView2;
 use std::sync::Arc;
 
-/// Light that leaks where an object presses: brightness is force, through a calibration, or the force is a gauge's.
+/// Light that leaks where an object presses: brightness is force, through a calibration, or the
+/// force is a gauge's.
 ///
 /// ```
 /// use tactile_imaging::force::{CalibrationOptions, CalibrationPair, Estimate, ForceOptions, LinearCalibration};
@@ -102,7 +103,8 @@ impl LightContact {
         })
     }
 
-    /// Behind a lens that distorts: contours and coordinates are undistorted, areas are those that the pixels cover.
+    /// Behind a lens that distorts: contours and coordinates are undistorted, areas are those that
+    /// the pixels cover.
     ///
     /// ```
     /// use tactile_imaging::force::LensGeometry;
@@ -224,9 +226,9 @@ impl ContactStage for LightContact {
     }
 }
 
-/// Departure of a parabola through the pairs from its chord at half scale, as a share of the full scale. `None` where it is small or
-/// does not stand out of the pairs' scatter. With light ∝ pᵉ under a ball of growing load the sum goes as F^((2+e)/3), a line for e = 1
-/// alone. O(pairs).
+/// Departure of a parabola through the pairs from its chord at half scale, as a share of the full
+/// scale. `None` where it is small or does not stand out of the pairs' scatter. With light ∝ pᵉ
+/// under a ball of growing load the sum goes as F^((2+e)/3), a line for e = 1 alone. O(pairs).
 fn bend_of(pairs: &[CalibrationPair]) -> Option<f64> {
     let scale = |value: fn(&CalibrationPair) -> f64| {
         pairs.iter().map(value).map(f64::abs).fold(0.0, f64::max)
@@ -254,8 +256,8 @@ fn bend_of(pairs: &[CalibrationPair]) -> Option<f64> {
     let error = (squares / (pairs.len() - 3) as f64 * inverse[(2, 2)]).sqrt();
     // c v² less its chord c v is −c/4 at one half.
     let departure = 0.25 * parabola[2].abs();
-    // Light ∝ p^0.95 or p^1.05 under a ball departs by 0.6 %, and changes the modulus by some 5 %. Five
-    // standard errors stand out of the scatter.
+    // Light ∝ p^0.95 or p^1.05 under a ball departs by 0.6 %, and changes the modulus by some 5 %.
+    // Five standard errors stand out of the scatter.
     (departure > 6e-3 && departure > 5.0 * 0.25 * error).then_some(departure)
 }
 
@@ -263,7 +265,8 @@ fn bend_of(pairs: &[CalibrationPair]) -> Option<f64> {
 mod tests {
     use super::*;
 
-    /// Pairs of light ∝ pᵉ under a ball, forces off by a share of the full scale to either side in turn.
+    /// Pairs of light ∝ pᵉ under a ball, forces off by a share of the full scale to either side in
+    /// turn.
     fn pairs(exponent: f64, error: f64) -> Vec<CalibrationPair> {
         let pair = |k: i32| {
             let force = f64::from(k) / 12.0;

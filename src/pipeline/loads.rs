@@ -14,8 +14,8 @@ pub struct Load {
     pub force_n: Estimate,
     /// Strain since the first load.
     pub mean_strain: Option<Estimate>,
-    /// Whether estimators use the contact. Not of one that repeats an earlier one (what is counted twice is not
-    /// better known), nor of one that is not whole.
+    /// Whether estimators use the contact. Not of one that repeats an earlier one (what is counted
+    /// twice is not better known), nor of one that is not whole.
     pub counts: bool,
 }
 
@@ -35,17 +35,17 @@ impl Load {
         (self.contact.force_calibration_n / self.force_n.value).abs()
     }
 
-    /// The contact radius with a floor that no profile goes below: a hundredth of a pixel, by which a rim of
-    /// pixels, blur and the contact's true shape differ from the fitted profile.
+    /// The contact radius with a floor that no profile goes below: a hundredth of a pixel, by which
+    /// a rim of pixels, blur and the contact's true shape differ from the fitted profile.
     fn radius_m(&self, pixel_m: f64) -> Estimate {
         let radius = self.contact.contact_radius_m;
         Estimate::new(radius.value, radius.standard_error.hypot(0.01 * pixel_m))
     }
 
-    /// The area of a face with a floor of its error that no outline goes below: a hundredth of a pixel all around
-    /// it, by which speckles at the rim, blur and rounding shift the outline from one load to the next. Without it
-    /// 88 % of the 95 % intervals hold, with it 97 % (`SCENES=400 cargo test --release --test suite
-    /// moduli_of_blocks -- --nocapture`).
+    /// The area of a face with a floor of its error that no outline goes below: a hundredth of a
+    /// pixel all around it, by which speckles at the rim, blur and rounding shift the outline from
+    /// one load to the next. Without it 88 % of the 95 % intervals hold, with it 97 % (`SCENES=400
+    /// cargo test --release --test suite moduli_of_blocks -- --nocapture`).
     fn face_m2(&self, pixel_m: f64) -> Option<Estimate> {
         let area = self.contact.face?.area_m2;
         let outline_m = 2.0 * (std::f64::consts::PI * area.value).sqrt();
@@ -69,8 +69,8 @@ impl Load {
     }
 }
 
-/// Loads and the relative errors they share. Of the calibration's errors the smallest relative one is common to all
-/// loads (the slope's). A load's error beyond that (the offset's) is its own.
+/// Loads and the relative errors they share. Of the calibration's errors the smallest relative one
+/// is common to all loads (the slope's). A load's error beyond that (the offset's) is its own.
 pub fn series(
     loads: impl Iterator<Item = Load> + Clone,
     settings: &Settings,
@@ -128,8 +128,8 @@ fn guide_error_at(loads: impl Iterator<Item = Load>, settings: &Settings) -> f64
 /// Loads that a session keeps apart. More are merged.
 pub const MOST_LOADS: usize = 32;
 
-/// The loads of a stream in rising order of force, at most [`MOST_LOADS`]: similar ones are merged. Beside each load
-/// the number of its frames.
+/// The loads of a stream in rising order of force, at most [`MOST_LOADS`]: similar ones are merged.
+/// Beside each load the number of its frames.
 #[derive(Clone, Debug)]
 pub struct SeenLoads(Vec<(Load, f64)>);
 
@@ -146,7 +146,8 @@ impl SeenLoads {
         self.0.iter().map(|(load, _)| *load)
     }
 
-    /// Takes a contact that can be trusted: alone, whole, unsaturated, inside the calibration, its profile fitted.
+    /// Takes a contact that can be trusted: alone, whole, unsaturated, inside the calibration, its
+    /// profile fitted.
     pub fn learn(&mut self, contact: &ContactReading, mean_strain: Option<Estimate>) {
         let whole = !contact.touches_edge && contact.other_contacts == 0;
         // A flat face is not read by the fit of a profile.
@@ -184,8 +185,8 @@ impl SeenLoads {
     }
 }
 
-/// The mean of two loads, weighted with their frames. Radii are averaged as cubes, which grow in proportion to the
-/// force. Relative errors of the calibration are common to both.
+/// The mean of two loads, weighted with their frames. Radii are averaged as cubes, which grow in
+/// proportion to the force. Relative errors of the calibration are common to both.
 fn merged((one, frames): (Load, f64), (other, more): (Load, f64)) -> (Load, f64) {
     let all = frames + more;
     let (a, b) = (frames / all, more / all);

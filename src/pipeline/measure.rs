@@ -12,7 +12,8 @@ use crate::matching::StopReason;
 use nalgebra::Matrix3;
 
 impl Press<'_> {
-    /// Runs all stages on all frames. A stage that fails withholds nothing of the others: its error stands in its place.
+    /// Runs all stages on all frames. A stage that fails withholds nothing of the others: its error
+    /// stands in its place.
     ///
     /// ```
     /// # use tactile_simulate::{Trial, CalibrationRun, Camera, PressOptions};
@@ -61,8 +62,8 @@ impl Press<'_> {
         }
     }
 
-    /// A caution where the light of a frame, away from its contact, differs from the reference's. Of the frame where it
-    /// does most.
+    /// A caution where the light of a frame, away from its contact, differs from the reference's.
+    /// Of the frame where it does most.
     fn light_drift(&self) -> Option<Flag> {
         let grey = self.light_step_grey().filter(|&grey| grey != 0)?;
         Some(Flag::LightDrifted {
@@ -141,8 +142,9 @@ impl Press<'_> {
         })
     }
 
-    /// The height of a frame's surface. Of a press with many frames only the first, the last and those whose strain is
-    /// worked out have one: each takes some milliseconds and some hundred kilobytes.
+    /// The height of a frame's surface. Of a press with many frames only the first, the last and
+    /// those whose strain is worked out have one: each takes some milliseconds and some hundred
+    /// kilobytes.
     fn surface_height(&self, frame: usize) -> Result<f64, PipelineError> {
         let frames = self.frames();
         // Plots show the surfaces of a press of some dozens of frames.
@@ -194,7 +196,8 @@ impl Press<'_> {
         Ok(result)
     }
 
-    /// The match of a face's texture, and a caution where its points stretch otherwise than the outline.
+    /// The match of a face's texture, and a caution where its points stretch otherwise than the
+    /// outline.
     fn texture_result(
         &self,
         last: usize,
@@ -207,8 +210,8 @@ impl Press<'_> {
             let relative = |area: Estimate| area.standard_error / area.value;
             let error = 0.5 * outline * relative(first).hypot(relative(second));
             let apart = (outline - texture.stretch.value).abs();
-            // With one comparison a press, four standard errors flag one in some 10⁴ in vain. A fiftieth of the strain does
-            // no harm.
+            // With one comparison a press, four standard errors flag one in some 10⁴ in vain. A
+            // fiftieth of the strain does no harm.
             let allowed = 4.0 * error.hypot(texture.stretch.standard_error);
             if apart > allowed && apart > 0.02 * (outline - 1.0).abs() {
                 flags.push(Flag::Slip {
@@ -245,9 +248,9 @@ impl Press<'_> {
             .into_iter()
             .flatten()
             .fold(f64::INFINITY, f64::min);
-        // Of smaller contacts the strain's stated error has been seen to be too small: over 40 presses the largest deviation
-        // is 3.05 of e_zz's standard errors at 38 pixels and 2.1 at 51 (`STRAIN_SEEDS=40 cargo test --test suite
-        // strain_of_sizes -- --nocapture`).
+        // Of smaller contacts the strain's stated error has been seen to be too small: over 40
+        // presses the largest deviation is 3.05 of e_zz's standard errors at 38 pixels and 2.1 at
+        // 51 (`STRAIN_SEEDS=40 cargo test --test suite strain_of_sizes -- --nocapture`).
         if radius_px < 40.0 {
             flags.push(Flag::CoarseStrain { radius_px });
         }
@@ -266,12 +269,14 @@ impl Press<'_> {
         })
     }
 
-    /// Whether the modulus changes over the frames that have a [time](Self::set_time_s): relaxing sample or drifting sensor, see
+    /// Whether the modulus changes over the frames that have a [time](Self::set_time_s): relaxing
+    /// sample or drifting sensor, see
     /// [`relaxation`](crate::elasticity::relaxation). Where all of them have a gauge's force, that is taken in place of the light's: no gain is in it.
     /// `None` where fewer than two frames have a time and a modulus of their own.
     ///
     /// # Errors
-    /// Those of [`modulus`](Self::modulus) but for its estimator's: what gives no modulus is left out.
+    /// Those of [`modulus`](Self::modulus) but for its estimator's: what gives no modulus is left
+    /// out.
     fn time_dependence(&self) -> Result<Option<TimeResult>, PipelineError> {
         let times_s: Vec<_> = (0..self.frames()).map(|k| self.time_s(k)).collect();
         if times_s.iter().flatten().count() < 2 {
@@ -279,7 +284,8 @@ impl Press<'_> {
         }
         let estimator = self.pipeline().estimator()?;
         let flat = matches!(self.specimen(), Specimen::Flat(_));
-        // A strain since the first frame gives no modulus of one load; that of a face is since the unloaded state.
+        // A strain since the first frame gives no modulus of one load; that of a face is since the
+        // unloaded state.
         if estimator.needs_strain() && !flat {
             return Ok(None);
         }
@@ -327,7 +333,8 @@ impl Press<'_> {
         (result.change != TimeDependence::Steady).then(|| result.relative_change())
     }
 
-    /// Cautions about time: a modulus that is of a moment, a gain that is no longer the calibration's.
+    /// Cautions about time: a modulus that is of a moment, a gain that is no longer the
+    /// calibration's.
     fn time_flags(&self, time: Option<&TimeResult>) -> Vec<Flag> {
         let gain = self
             .gain_change()

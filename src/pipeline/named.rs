@@ -169,7 +169,8 @@ choice! {
     /// assert_eq!(WarpChoice::Affine.to_string(), "affine");
     /// ```
     WarpChoice, "warp":
-    /// A [spline](crate::tps::ThinPlateSpline), thin-plate, kernel −r, smoothed by blocked cross-validation.
+    /// A [spline](crate::tps::ThinPlateSpline), thin-plate, kernel −r, smoothed by blocked
+    /// cross-validation.
     ThinPlateSpline = "thin-plate-spline",
     /// The spline of kernel r³, smoothed by cross-validation.
     CubicSpline = "cubic-spline",
@@ -208,8 +209,10 @@ choice! {
     /// assert_eq!(EstimatorChoice::default().to_string(), "best");
     /// ```
     EstimatorChoice, "estimator":
-    /// The default for the object: [`SphereOnWaveguide`](crate::elasticity::modulus::SphereOnWaveguide) for a ball, on a rigid flat where no layers are
-    /// known, the law of its shape for a layer and a cone, else [`PaperRatio`](crate::elasticity::modulus::PaperRatio).
+    /// The default for the object:
+    /// [`SphereOnWaveguide`](crate::elasticity::modulus::SphereOnWaveguide) for a ball, on a rigid
+    /// flat where no layers are known, the law of its shape for a layer and a cone, else
+    /// [`PaperRatio`](crate::elasticity::modulus::PaperRatio).
     Best = "best",
     /// [`PaperRatio`](crate::elasticity::modulus::PaperRatio): stress over strain, equation (31).
     PaperRatio = "paper-ratio",
@@ -235,7 +238,8 @@ choice! {
     FlatPunch = "flat-punch",
 }
 
-/// The default reconstruction: frontal light, height zero on the sub-pixel contour of the profile fitted to the contact.
+/// The default reconstruction: frontal light, height zero on the sub-pixel contour of the profile
+/// fitted to the contact.
 pub(super) fn eikonal() -> Result<Eikonal<f64>, PipelineError> {
     Eikonal::new(Lighting::default())
         .with_boundary(BoundaryCondition::Height(0.0))
@@ -326,8 +330,8 @@ impl StrainChoice {
     }
 }
 
-/// Which stage to take for each step, by name. What is not said is the default. With the feature `serde` a table such as
-/// `reconstruction = "tsai-shah"` is one.
+/// Which stage to take for each step, by name. What is not said is the default. With the feature
+/// `serde` a table such as `reconstruction = "tsai-shah"` is one.
 ///
 /// ```
 /// use tactile_imaging::pipeline::{MatcherChoice, StagesConfig, StrainChoice};
@@ -343,7 +347,8 @@ impl StrainChoice {
 pub struct StagesConfig {
     /// Image to surface.
     pub reconstruction: ReconstructionChoice,
-    /// Slopes to heights. Only a reconstruction that goes through slopes takes another than its own.
+    /// Slopes to heights. Only a reconstruction that goes through slopes takes another than its
+    /// own.
     pub integrator: IntegratorChoice,
     /// Surface to control points.
     pub sampler: SamplerChoice,

@@ -75,7 +75,8 @@ impl<'a> Loaded<'a> {
 
 /// The contact of a frame.
 struct KnownContact {
-    /// Without its mask where the image is read: nothing as large as an image is kept of such a frame.
+    /// Without its mask where the image is read: nothing as large as an image is kept of such a
+    /// frame.
     contact: FrameContact,
     /// Number of the contact's pixels.
     pixels: usize,
@@ -83,8 +84,9 @@ struct KnownContact {
     light_step_grey: Option<i32>,
 }
 
-/// Frames at one or more loads. Every result is computed when it is first asked for, with what it needs and nothing
-/// else, and kept. Matches, displacements and strains are from the first frame to a later one.
+/// Frames at one or more loads. Every result is computed when it is first asked for, with what it
+/// needs and nothing else, and kept. Matches, displacements and strains are from the first frame to
+/// a later one.
 ///
 /// Made by [`Pipeline::press`].
 ///
@@ -112,7 +114,8 @@ pub struct Press<'a> {
 }
 
 impl Pipeline {
-    /// Starts a press: add frames, then ask for what you want. The press holds a clone of the pipeline.
+    /// Starts a press: add frames, then ask for what you want. The press holds a clone of the
+    /// pipeline.
     ///
     /// # Errors
     /// [`PipelineError::Sensor`] for a reference without pixels, or too dark for the flat field that was asked for.
@@ -202,8 +205,9 @@ impl<'a> Press<'a> {
         self.frames.len() - 1
     }
 
-    /// Adds a frame that is read whenever a stage needs it and never kept, for more frames than memory takes; returns
-    /// its number. An error of `read` is a sentence and becomes [`PipelineError::Unreadable`].
+    /// Adds a frame that is read whenever a stage needs it and never kept, for more frames than
+    /// memory takes; returns its number. An error of `read` is a sentence and becomes
+    /// [`PipelineError::Unreadable`].
     ///
     /// ```
     /// use tactile_imaging::{Object, Pipeline};
@@ -312,7 +316,8 @@ impl<'a> Press<'a> {
         Ok(contact)
     }
 
-    /// A frame's image and its contact with the mask, which is found again where the frame keeps none.
+    /// A frame's image and its contact with the mask, which is found again where the frame keeps
+    /// none.
     fn masked(
         &self,
         frame: usize,
@@ -444,7 +449,8 @@ impl<'a> Press<'a> {
             .texture(&mut self.bench(), [0, frame], images, [&first, &contact])
     }
 
-    /// The strain between the first frame and a later one. Of an object with a flat face by the growth of its area, the same at all points.
+    /// The strain between the first frame and a later one. Of an object with a flat face by the
+    /// growth of its area, the same at all points.
     ///
     /// # Errors
     /// [`PipelineError::TooFewMatches`], [`PipelineError::Warp`], [`PipelineError::Strain`] and those of
@@ -491,12 +497,14 @@ impl<'a> Press<'a> {
             .modulus(&mut self.bench(), estimator.as_ref(), &loads)
     }
 
-    /// The load of every frame, with the strain since the first (of at most 32 frames, evenly chosen. Of a flat face,
-    /// of all frames and since the unloaded state) and the errors that all share. This is the input of
+    /// The load of every frame, with the strain since the first (of at most 32 frames, evenly
+    /// chosen. Of a flat face, of all frames and since the unloaded state) and the errors that all
+    /// share. This is the input of
     /// [estimators](crate::elasticity::modulus::ModulusEstimator).
     ///
-    /// A frame whose contact repeats an earlier one carries no information, and a contact that the frame's edge cuts
-    /// is wrong: their loads have a force alone (where all are cut, there is nothing better).
+    /// A frame whose contact repeats an earlier one carries no information, and a contact that the
+    /// frame's edge cuts is wrong: their loads have a force alone (where all are cut, there is
+    /// nothing better).
     ///
     /// ```
     /// # use tactile_simulate::Trial;
@@ -582,8 +590,8 @@ impl<'a> Press<'a> {
         }
     }
 
-    /// Leaves out of the modulus the frames whose contact repeats an earlier one, bit for bit, and those whose contact
-    /// is cut by the frame's edge, unless all are.
+    /// Leaves out of the modulus the frames whose contact repeats an earlier one, bit for bit, and
+    /// those whose contact is cut by the frame's edge, unless all are.
     fn leave_out(&self, loads: &mut [Load]) {
         let all_cut = loads.iter().all(|load| load.contact.touches_edge);
         let mut seen = HashSet::new();
@@ -597,9 +605,10 @@ impl<'a> Press<'a> {
         }
     }
 
-    /// The frames whose strain enters the modulus: at most 32 of those that repeat no earlier one, chosen evenly. A
-    /// match takes milliseconds, so that thousands would take minutes. The error of the mean strain is that of the
-    /// first surface, which all share, and does not fall with more.
+    /// The frames whose strain enters the modulus: at most 32 of those that repeat no earlier one,
+    /// chosen evenly. A match takes milliseconds, so that thousands would take minutes. The error
+    /// of the mean strain is that of the first surface, which all share, and does not fall with
+    /// more.
     fn strained_frames(&self, loads: &[Load]) -> Vec<usize> {
         let new: Vec<usize> = (1..loads.len()).filter(|&k| loads[k].counts).collect();
         let kept = new.len().min(32);
@@ -607,8 +616,8 @@ impl<'a> Press<'a> {
         (1..=kept).map(|k| new[k * new.len() / kept - 1]).collect()
     }
 
-    /// The largest step of the light since the reference was taken, in grey levels, away from the contacts of the
-    /// frames that were measured.
+    /// The largest step of the light since the reference was taken, in grey levels, away from the
+    /// contacts of the frames that were measured.
     pub(super) fn light_step_grey(&self) -> Option<i32> {
         let known = self
             .frames
@@ -618,7 +627,8 @@ impl<'a> Press<'a> {
         steps.max_by_key(|step| step.abs())
     }
 
-    /// Sets when a frame was taken, in seconds since the object touched. Frames without a time do not count where time does.
+    /// Sets when a frame was taken, in seconds since the object touched. Frames without a time do
+    /// not count where time does.
     ///
     /// ```
     /// # use tactile_simulate::{Trial, CalibrationRun, Camera, PressOptions};

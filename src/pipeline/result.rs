@@ -162,7 +162,8 @@ pub struct StrainResult {
     pub folded: usize,
 }
 
-/// All results of a press: what a stage computed, or why it could not, whatever became of the others.
+/// All results of a press: what a stage computed, or why it could not, whatever became of the
+/// others.
 ///
 /// ```
 /// # use tactile_simulate::{Trial, CalibrationRun, Camera, PressOptions};
@@ -184,7 +185,8 @@ pub struct Measurement {
     /// Young's modulus by the pipeline's estimator.
     #[cfg_attr(feature = "serde", serde(serialize_with = "outcome::one"))]
     pub youngs_modulus_pa: Result<ModulusResult, PipelineError>,
-    /// The time that the modulus is of, where frames say when they were taken, and whether it changed meanwhile.
+    /// The time that the modulus is of, where frames say when they were taken, and whether it
+    /// changed meanwhile.
     pub time: Option<TimeResult>,
     /// Which inputs the modulus' error comes from, the largest first. Empty without a modulus.
     pub error_budget: Vec<ErrorShare>,
@@ -265,7 +267,8 @@ impl Display for MatchResult {
 
 impl Display for StrainResult {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        // The strain between equal frames is zero to rounding: digits beyond the sixth are never known.
+        // The strain between equal frames is zero to rounding: digits beyond the sixth are never
+        // known.
         let error = |i: usize, j: usize| self.standard_error[i][j].max(1e-6);
         let e = |i: usize, j: usize| with_error(self.mean[i][j], error(i, j), 1.0);
         write!(
@@ -279,8 +282,8 @@ impl Display for StrainResult {
     }
 }
 
-/// The first three cautions of every kind, and how many more there are: of a press with thousands of frames each may
-/// carry the same one.
+/// The first three cautions of every kind, and how many more there are: of a press with thousands
+/// of frames each may carry the same one.
 fn cautions(f: &mut Formatter<'_>, flags: &[Flag]) -> fmt::Result {
     let kind = |flag: &Flag| {
         let warning = match flag {
@@ -411,7 +414,8 @@ impl Display for DriftWatch {
     }
 }
 
-/// A value with its standard error, scaled to a unit: two significant digits of the error decide the decimals.
+/// A value with its standard error, scaled to a unit: two significant digits of the error decide
+/// the decimals.
 pub fn with_error(value: f64, error: f64, scale: f64) -> String {
     let (value, error) = (value * scale, error * scale);
     if !(error > 0.0 && error.is_finite()) {

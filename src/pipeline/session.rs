@@ -1,9 +1,10 @@
 //! A session: one sensor, one object, a stream of frames.
 //!
-//! The first frames without contact make the reference. Then every frame gives its contact and force, and every contact
-//! refines the modulus. Shear is followed where its stiffnesses are known, drift of the light watched in frames without
-//! contact. Strain is followed on request ([`Session::strain`]), from the load where that began: its surface, points and
-//! spline are kept, and each match begins where the last one ended. Memory is constant: similar loads are merged.
+//! The first frames without contact make the reference. Then every frame gives its contact and
+//! force, and every contact refines the modulus. Shear is followed where its stiffnesses are known,
+//! drift of the light watched in frames without contact. Strain is followed on request
+//! ([`Session::strain`]), from the load where that began: its surface, points and spline are kept,
+//! and each match begins where the last one ended. Memory is constant: similar loads are merged.
 //! [`Session::push`] and, with the default stages, [`Session::strain`] allocate nothing once their buffers have their size.
 use super::composition::Pipeline;
 use super::contact::{ContactReading, FrameContact, resize};
@@ -52,8 +53,8 @@ pub struct Update {
     pub shear: Option<ShearMeasurement>,
 }
 
-/// Drift of the light since the reference was taken, seen in frames without contact, in grey levels: the mean of frame
-/// minus reference.
+/// Drift of the light since the reference was taken, seen in frames without contact, in grey
+/// levels: the mean of frame minus reference.
 ///
 /// ```
 /// use std::sync::Arc;
@@ -82,8 +83,8 @@ pub struct DriftWatch {
     pub last_grey: f64,
     /// The greatest so far, with its sign.
     pub greatest_grey: f64,
-    /// The light had drifted by more than half a grey level when the sensor was last free: the reference should be taken anew, or the contact
-    /// stage told to correct drift.
+    /// The light had drifted by more than half a grey level when the sensor was last free: the
+    /// reference should be taken anew, or the contact stage told to correct drift.
     pub caution: Option<Flag>,
 }
 
@@ -120,8 +121,8 @@ impl SensorHealth {
     fn watch(&mut self, number: u64, frame: ArrayView2<'_, u8>, condition: Option<FrameCondition>) {
         let Some(condition) = condition else { return };
         self.report = Some(self.monitor.update(&condition));
-        // A look reads the whole frame, so that it must be rare. Sixteen looks, the fewest that tell, are 13 seconds at 80
-        // frames a second.
+        // A look reads the whole frame, so that it must be rare. Sixteen looks, the fewest that
+        // tell, are 13 seconds at 80 frames a second.
         if !number.is_multiple_of(64) {
             return;
         }
@@ -184,7 +185,8 @@ impl Session {
     /// Loads that a session keeps apart. More are merged.
     pub const MOST_LOADS: usize = MOST_LOADS;
 
-    /// A session whose reference is the mean of one or more frames without contact. Of more, the noise is measured too.
+    /// A session whose reference is the mean of one or more frames without contact. Of more, the
+    /// noise is measured too.
     ///
     /// ```
     /// use std::sync::Arc;
@@ -227,7 +229,8 @@ impl Session {
         })
     }
 
-    /// Follows shear too: F_x = K_x u_x, F_y = K_y u_y, u the way of the centroid since contact began.
+    /// Follows shear too: F_x = K_x u_x, F_y = K_y u_y, u the way of the centroid since contact
+    /// began.
     ///
     /// ```
     /// use ndarray::Array2;
@@ -256,8 +259,8 @@ impl Session {
         self
     }
 
-    /// Sets what counts as a change of the sensor. [`health`](Self::health) starts anew. The default is a change of the brightness by 2 %
-    /// or of the noise by 20 %.
+    /// Sets what counts as a change of the sensor. [`health`](Self::health) starts anew. The
+    /// default is a change of the brightness by 2 % or of the noise by 20 %.
     ///
     /// ```
     /// use tactile_imaging::force::{ChartState, HealthOptions};
@@ -287,8 +290,8 @@ impl Session {
         self
     }
 
-    /// Measures the next frame. A contact that is alone, whole, unsaturated and inside the calibration refines the modulus;
-    /// a frame without contact is watched for drift of the light.
+    /// Measures the next frame. A contact that is alone, whole, unsaturated and inside the
+    /// calibration refines the modulus; a frame without contact is watched for drift of the light.
     ///
     /// # Errors
     /// [`PipelineError::Contact`]. The session can go on with the next frame.
@@ -323,7 +326,8 @@ impl Session {
             .contact(bench, number as usize, frame, None, contact)?;
         self.measured = true;
         self.measured_frame = number;
-        // Equal readings are those of one image, which noise moves: counted twice it would not be better known.
+        // Equal readings are those of one image, which noise moves: counted twice it would not be
+        // better known.
         if let Some(reading) = self
             .contact
             .reading
@@ -416,14 +420,15 @@ impl Session {
         &self.drift
     }
 
-    /// Gain and noise of the sensor as its background shows them, contacts or not, against the session's first frames
-    /// ([`HealthOptions::with_baseline_frames`]). `None` before a frame, and where the contact stage does not look at the background.
+    /// Gain and noise of the sensor as its background shows them, contacts or not, against the
+    /// session's first frames ([`HealthOptions::with_baseline_frames`]). `None` before a frame, and
+    /// where the contact stage does not look at the background.
     pub fn health(&self) -> Option<HealthReport> {
         self.health.report()
     }
 
-    /// Pixels (row, column) that have kept one grey level while their neighbours changed. Every 64th frame is looked at, and none is
-    /// named before sixteen looks. O(pixels).
+    /// Pixels (row, column) that have kept one grey level while their neighbours changed. Every
+    /// 64th frame is looked at, and none is named before sixteen looks. O(pixels).
     ///
     /// ```
     /// use tactile_imaging::pipeline::{Object, Pipeline, Session};
@@ -469,10 +474,12 @@ impl Session {
         &self.bench.report
     }
 
-    /// Strain of the last frame against the load where strain began to be asked for. That load's own answer is `None`.
+    /// Strain of the last frame against the load where strain began to be asked for. That load's
+    /// own answer is `None`.
     ///
-    /// The first call makes its frame's load the one that strains are counted from, until [`restart_strain`](Self::restart_strain).
-    /// Costs the surface, control points, match and strain of one frame. A call without a new frame costs nothing.
+    /// The first call makes its frame's load the one that strains are counted from, until
+    /// [`restart_strain`](Self::restart_strain). Costs the surface, control points, match and
+    /// strain of one frame. A call without a new frame costs nothing.
     ///
     /// ```
     /// use std::sync::Arc;
@@ -533,8 +540,8 @@ impl Session {
         self.strain = FollowedStrain::default();
     }
 
-    /// Young's modulus from all loads so far, by the estimator of the pipeline. Where that needs strain the loads are those whose [`strain`](Self::strain) was asked for;
-    /// of a flat face all.
+    /// Young's modulus from all loads so far, by the estimator of the pipeline. Where that needs
+    /// strain the loads are those whose [`strain`](Self::strain) was asked for; of a flat face all.
     ///
     /// # Errors
     /// [`PipelineError::Modulus`]. [`PipelineError::NotUniaxial`] where the last contact is not that of a flat face.
@@ -585,7 +592,8 @@ pub struct SessionStrain {
     pub from: u64,
     /// The strained frame.
     pub to: u64,
-    /// Control points with a partner on the strained surface; 0 of a flat face, whose strain is that of its area.
+    /// Control points with a partner on the strained surface; 0 of a flat face, whose strain is
+    /// that of its area.
     pub matched: usize,
     /// How the match went.
     pub report: MatchReport,

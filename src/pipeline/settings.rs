@@ -31,7 +31,8 @@ pub enum SurfaceInput {
     Signal,
 }
 
-/// Settings of a pipeline beside its stages. [`Pipeline::with_settings`](super::Pipeline::with_settings) changes it.
+/// Settings of a pipeline beside its stages.
+/// [`Pipeline::with_settings`](super::Pipeline::with_settings) changes it.
 ///
 /// ```
 /// use tactile_imaging::pipeline::{Binning, Object, Pipeline, Settings};
@@ -57,16 +58,18 @@ pub struct Settings {
     pub control_points: usize,
     /// What of the frame the surface stage looks at.
     pub surface_input: SurfaceInput,
-    /// Width in pixels (odd) of the box that smooths the signal, twice along each axis, before the surface stage; 1 for
-    /// none. Where the surface is nearly level its slope √(1/I² − 1) turns noise of the shading I into height.
+    /// Width in pixels (odd) of the box that smooths the signal, twice along each axis, before the
+    /// surface stage; 1 for none. Where the surface is nearly level its slope √(1/I² − 1) turns
+    /// noise of the shading I into height.
     pub smoothing_px: usize,
     /// Grid of the surface stage.
     pub binning: Binning,
-    /// Whether differences are divided by the brightness that the reference has there: vignetting then costs no force. Right
-    /// where stray light and signal come through the same lens, and the calibration was taken in the frame's middle.
+    /// Whether differences are divided by the brightness that the reference has there: vignetting
+    /// then costs no force. Right where stray light and signal come through the same lens, and the
+    /// calibration was taken in the frame's middle.
     pub flat_field: bool,
-    /// Relative error common to all forces beside the calibration's scatter. Light that is uneven over the frame reads
-    /// contacts of another size than the calibration's with another gain.
+    /// Relative error common to all forces beside the calibration's scatter. Light that is uneven
+    /// over the frame reads contacts of another size than the calibration's with another gain.
     pub force_scale_error: f64,
     /// Relative error common to all lengths: that of the pixel size.
     pub length_scale_error: f64,
@@ -74,7 +77,8 @@ pub struct Settings {
     pub object_radius_error_m: f64,
     /// Standard error of the object's Poisson ratio.
     pub poisson_ratio_error: f64,
-    /// Covariance of ln E of all layers of the waveguide, then of ln h, then of ν. `None`: the layers are exact.
+    /// Covariance of ln E of all layers of the waveguide, then of ln h, then of ν. `None`: the
+    /// layers are exact.
     pub layer_covariance: Option<DMatrix<f64>>,
 }
 

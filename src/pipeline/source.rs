@@ -24,7 +24,8 @@ pub trait FrameSource {
     /// What can go wrong.
     type Error: std::error::Error;
 
-    /// Writes the next frame into `frame` (of another size: replaces it) and returns its time in seconds. `None` at the end.
+    /// Writes the next frame into `frame` (of another size: replaces it) and returns its time in
+    /// seconds. `None` at the end.
     ///
     /// # Errors
     /// What the source meets.

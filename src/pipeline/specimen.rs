@@ -1,4 +1,5 @@
-//! The pressed object, and the decision that follows from it: a curved specimen or one with a flat face.
+//! The pressed object, and the decision that follows from it: a curved specimen or one with a flat
+//! face.
 use super::contact::ContactReading;
 use super::error::PipelineError;
 use super::flag::Flag;
@@ -40,17 +41,20 @@ pub enum Object {
         /// Its Poisson ratio.
         poisson_ratio: f64,
     },
-    /// A block with a flat face of any outline, squeezed between the sensor and a plate: loaded uniaxially.
+    /// A block with a flat face of any outline, squeezed between the sensor and a plate: loaded
+    /// uniaxially.
     Block {
         /// Its Poisson ratio.
         poisson_ratio: f64,
     },
-    /// A cylinder standing on its flat face, squeezed between the sensor and a plate: loaded uniaxially.
+    /// A cylinder standing on its flat face, squeezed between the sensor and a plate: loaded
+    /// uniaxially.
     Cylinder {
         /// Its Poisson ratio.
         poisson_ratio: f64,
     },
-    /// A thin flat sample, bonded to a rigid base and pressed by a rigid ball: the sensor's own gel, for instance.
+    /// A thin flat sample, bonded to a rigid base and pressed by a rigid ball: the sensor's own
+    /// gel, for instance.
     Layer {
         /// The ball's radius in metres.
         indenter_radius_m: f64,
@@ -66,7 +70,8 @@ pub enum Object {
         /// The sample's Poisson ratio.
         poisson_ratio: f64,
     },
-    /// Nothing is known of its shape: it is read as a block where its contacts are those of a flat face, and refused where not.
+    /// Nothing is known of its shape: it is read as a block where its contacts are those of a flat
+    /// face, and refused where not.
     Unknown {
         /// Its Poisson ratio.
         poisson_ratio: f64,
@@ -155,8 +160,8 @@ pub enum Specimen {
 #[derive(Clone, Copy, Debug)]
 pub struct FlatSpecimen {
     pub poisson_ratio: f64,
-    /// Whether the user has stated that its face is flat. The statement is believed as far as the frame does not
-    /// contradict it.
+    /// Whether the user has stated that its face is flat. The statement is believed as far as the
+    /// frame does not contradict it.
     pub stated: bool,
 }
 
@@ -181,7 +186,8 @@ impl FlatSpecimen {
         Ok(face)
     }
 
-    /// Refuses contacts that are not those of one flat face under uniaxial load. `frame` numbers go with the contacts.
+    /// Refuses contacts that are not those of one flat face under uniaxial load. `frame` numbers go
+    /// with the contacts.
     ///
     /// # Errors
     /// [`PipelineError::NotUniaxial`] of the first contact that is not.
@@ -243,10 +249,12 @@ impl FlatSpecimen {
     }
 }
 
-/// A caution where a rubber-like sample, squeezed to this strain of the measure of this name, would give a ratio that is off by more than 2.5 %, or a slope by 5 %.
+/// A caution where a rubber-like sample, squeezed to this strain of the measure of this name, would
+/// give a ratio that is off by more than 2.5 %, or a slope by 5 %.
 ///
-/// An incompressible neo-Hookean solid has the nominal stress P = E (λ − λ⁻²)/3, its conjugate stress to a measure e(λ) is S = P dλ/de, and
-/// S/e is E at small strain alone: at e = −9 % it is 1.25 E for Green–Lagrange's measure, 0.96 E for Hencky's.
+/// An incompressible neo-Hookean solid has the nominal stress P = E (λ − λ⁻²)/3, its conjugate
+/// stress to a measure e(λ) is S = P dλ/de, and S/e is E at small strain alone: at e = −9 % it is
+/// 1.25 E for Green–Lagrange's measure, 0.96 E for Hencky's.
 pub fn material_law(measure: &str, strain: f64) -> Option<Flag> {
     // Stretch, and de/dλ.
     let (stretch, slope) = match measure {
@@ -263,8 +271,8 @@ pub fn material_law(measure: &str, strain: f64) -> Option<Flag> {
     };
     let nominal = (stretch - stretch.powi(-2)) / 3.0;
     let excess = nominal / (slope * strain) - 1.0;
-    // With S = E (e + c e²) the ratio S/e is off by c e and the slope of a line with an intercept of its own by up
-    // to twice that: 5 %, the error that the paper reports.
+    // With S = E (e + c e²) the ratio S/e is off by c e and the slope of a line with an intercept
+    // of its own by up to twice that: 5 %, the error that the paper reports.
     (excess.abs() > 0.025).then_some(Flag::MaterialLaw { strain, excess })
 }
 
@@ -285,7 +293,8 @@ mod tests {
 
     #[test]
     fn the_excess_is_that_of_the_expansion() {
-        // S/e = E (1 − 5e/2 + …) for Green–Lagrange, E (1 + e/2 + …) for Hencky: the next terms are of some e².
+        // S/e = E (1 − 5e/2 + …) for Green–Lagrange, E (1 + e/2 + …) for Hencky: the next terms are
+        // of some e².
         let excess = |measure, strain| match material_law(measure, strain) {
             Some(Flag::MaterialLaw { excess, .. }) => excess,
             other => panic!("{other:?}"),

@@ -1,10 +1,11 @@
-//! The stages as functions: values in, values out. A press keeps the answers, a session the memory they are written to.
+//! The stages as functions: values in, values out. A press keeps the answers, a session the memory
+//! they are written to.
 use super::composition::Pipeline;
 use super::contact::{ContactStage, FrameContact};
 use super::error::PipelineError;
 use super::report::{Report, SkipReason, Stage};
 use super::specimen::Specimen;
-use super::surface::{self, ContactSurface, ControlPoints, SurfaceWorkspace};
+use super::surface::{self, ContactSurface, ContactSurfaceWorkspace, ControlPoints};
 use crate::elasticity::field::{StrainField, StrainSummary, mean_strain_error};
 use crate::elasticity::modulus::{Estimate, LoadSeries, ModulusEstimate, ModulusEstimator};
 use crate::force::{
@@ -56,10 +57,10 @@ impl Default for PairStrain {
 }
 
 impl PairStrain {
-    /// The apparent strain of a ball's load for equation (31). The surface that its pressure is read as swells where
-    /// the load rises, in all directions, so that (31) takes the size of the mean e_zz, with the sign of
-    /// `force_step_n`, the step of the load from the first frame to the second.
-    /// (Specimens with a flat face have signed strains.)
+    /// The apparent strain of a ball's load for equation (31). The surface that its pressure is
+    /// read as swells where the load rises, in all directions, so that (31) takes the size of the
+    /// mean e_zz, with the sign of `force_step_n`, the step of the load from the first frame to the
+    /// second. (Specimens with a flat face have signed strains.)
     pub(super) fn of_load(&self, force_step_n: f64) -> Estimate {
         let size = self.summary.mean[(2, 2)].abs();
         let error = self.summary.standard_error[(2, 2)];
@@ -82,7 +83,7 @@ pub struct Stages {
 pub struct Bench {
     pub force: ForceWorkspace,
     face: FaceWorkspace,
-    surface: SurfaceWorkspace,
+    surface: ContactSurfaceWorkspace,
     strain: StrainWorkspace,
     pub report: Report,
 }
@@ -118,7 +119,8 @@ impl Stages {
         (hx * hy).sqrt()
     }
 
-    /// Contact and force of a frame, into `contact`. A force that the stage does not know is the gauge's.
+    /// Contact and force of a frame, into `contact`. A force that the stage does not know is the
+    /// gauge's.
     pub fn contact(
         &self,
         bench: &mut Bench,
@@ -176,8 +178,8 @@ impl Stages {
         Some(face)
     }
 
-    /// The surface of a contact, into `surface`. All surfaces that are compared have one grid, so that the grid leaves
-    /// no strain: that of a contact of `grid_pixels` pixels.
+    /// The surface of a contact, into `surface`. All surfaces that are compared have one grid, so
+    /// that the grid leaves no strain: that of a contact of `grid_pixels` pixels.
     pub fn surface(
         &self,
         bench: &mut Bench,
@@ -341,10 +343,11 @@ impl StrainWorkspace {
         }
     }
 
-    /// Strain, at the first frame's control points, of the warp through the matches, weighted by their confidence.
+    /// Strain, at the first frame's control points, of the warp through the matches, weighted by
+    /// their confidence.
     ///
-    /// The matcher's own warp follows every point. Its gradient across a surface, where no two points lie behind each
-    /// other, would be noise. The warp fitted here is smooth.
+    /// The matcher's own warp follows every point. Its gradient across a surface, where no two
+    /// points lie behind each other, would be noise. The warp fitted here is smooth.
     fn strain(
         &mut self,
         pipeline: &Pipeline,

@@ -37,7 +37,8 @@ pub struct ContactSurface {
     pub binning: usize,
     /// The size of one of the grid's pixels in metres, x and y.
     pub pixel_size_m: [f64; 2],
-    /// Position (x, y) in metres of the grid's first pixel: from the middle of the frame's first pixel to that of the block.
+    /// Position (x, y) in metres of the grid's first pixel: from the middle of the frame's first
+    /// pixel to that of the block.
     pub origin_m: [f64; 2],
 }
 
@@ -62,7 +63,8 @@ impl ContactSurface {
         self.fit(|heights, domain| BallFit::of_radius(heights, domain, radius_m))
     }
 
-    /// Fits a ball of the radius with the least mean absolute error. `None` as for [`fit_ball`](Self::fit_ball).
+    /// Fits a ball of the radius with the least mean absolute error. `None` as for
+    /// [`fit_ball`](Self::fit_ball).
     pub fn fit_any_ball(&self) -> Option<BallFit> {
         self.fit(BallFit::of_any_radius)
     }
@@ -81,7 +83,8 @@ impl ContactSurface {
     }
 }
 
-/// The box that whole blocks make of a contact's box: grown to the right and downwards, cut at the frame's end.
+/// The box that whole blocks make of a contact's box: grown to the right and downwards, cut at the
+/// frame's end.
 fn whole_blocks(region: BoundingBox, side: usize, (rows, columns): (usize, usize)) -> BoundingBox {
     let end = |start: usize, end: usize, limit: usize| {
         let blocks = (end - start).div_ceil(side).min((limit - start) / side);
@@ -110,13 +113,14 @@ fn origin_m(region: &BoundingBox, binning: usize, pixel_size_m: [f64; 2]) -> [f6
 
 /// Memory of the surface stage.
 #[derive(Debug, Default)]
-pub struct SurfaceWorkspace {
+pub struct ContactSurfaceWorkspace {
     sfs: sfs::SurfaceWorkspace<f64>,
     grid: BinnedContact,
 }
 
-impl SurfaceWorkspace {
-    /// The signal and the mask on the grid. Returns the grid's box. With a curve the signal is the pressure over its peak.
+impl ContactSurfaceWorkspace {
+    /// The signal and the mask on the grid. Returns the grid's box. With a curve the signal is the
+    /// pressure over its peak.
     fn load(
         &mut self,
         settings: &Settings,
@@ -154,12 +158,12 @@ fn ceiling(input: SurfaceInput) -> f64 {
     }
 }
 
-/// Blocks around a contact that its surface depends on, beside those that smoothing brings in: a ring of up to three on which the profile is
-/// continued, and one of known height.
+/// Blocks around a contact that its surface depends on, beside those that smoothing brings in: a
+/// ring of up to three on which the profile is continued, and one of known height.
 const AROUND: usize = 4;
 
-/// The part of a contact's region that its surface depends on, with the same blocks: detection looks far around a contact. Two passes of the
-/// smoothing reach as far as its width.
+/// The part of a contact's region that its surface depends on, with the same blocks: detection
+/// looks far around a contact. Two passes of the smoothing reach as far as its width.
 fn trimmed(
     region: BoundingBox,
     contact: BoundingBox,
@@ -192,10 +196,11 @@ fn mask_over(contact: &FrameContact, part: BoundingBox) -> ArrayView2<'_, bool> 
     mask
 }
 
-/// Reconstructs the surface of a contact on a grid as fine as a contact of `pixels` pixels asks for.
+/// Reconstructs the surface of a contact on a grid as fine as a contact of `pixels` pixels asks
+/// for.
 pub fn reconstruct(
     pipeline: &Pipeline,
-    workspace: &mut SurfaceWorkspace,
+    workspace: &mut ContactSurfaceWorkspace,
     images: [ArrayView2<'_, u8>; 2],
     contact: &FrameContact,
     pixels: usize,
@@ -252,7 +257,7 @@ pub struct ControlPoints {
 /// Samples the control points of a surface.
 pub fn sample(
     pipeline: &Pipeline,
-    workspace: &mut SurfaceWorkspace,
+    workspace: &mut ContactSurfaceWorkspace,
     surface: &ContactSurface,
     sampled: &mut ControlPoints,
 ) -> Result<(), SfsError> {
@@ -277,8 +282,8 @@ pub fn sample(
     Ok(())
 }
 
-/// A point of a surface that was made as if all pixels were of the size at the centre of distortion. Its height grows as the pixels
-/// around it do.
+/// A point of a surface that was made as if all pixels were of the size at the centre of
+/// distortion. Its height grows as the pixels around it do.
 fn undistorted(lens: &LensGeometry, p: Point3<f64>) -> Point3<f64> {
     let [hx, hy] = lens.pixel_size_m();
     let pixel = [p.x / hx, p.y / hy];
@@ -287,8 +292,8 @@ fn undistorted(lens: &LensGeometry, p: Point3<f64>) -> Point3<f64> {
     Point3::new(x, y, p.z * growth)
 }
 
-/// How far a pixel is to be smoothed: not at all on slopes above 60°, where smoothing would round off the rim and noise does
-/// little harm, wholly on slopes below 37°.
+/// How far a pixel is to be smoothed: not at all on slopes above 60°, where smoothing would round
+/// off the rim and noise does little harm, wholly on slopes below 37°.
 fn levelness(shading: f64) -> f64 {
     ((shading - 0.5) / 0.3).clamp(0.0, 1.0)
 }

@@ -100,8 +100,8 @@ fn within(value: f64, interval: Interval, scale: f64, unit: &str) -> String {
 /// An error that is taken out, relative: an estimator without any error gives no interval.
 const NEGLIGIBLE: f64 = 1e-9;
 
-/// What the moduli of single loads say of time. `times_s` has a place for each load. What has no time or alone gives no modulus is left out, and None is
-/// returned where fewer than two are left.
+/// What the moduli of single loads say of time. `times_s` has a place for each load. What has no
+/// time or alone gives no modulus is left out, and None is returned where fewer than two are left.
 pub fn of_moduli(
     estimator: &dyn ModulusEstimator,
     series: &LoadSeries,
@@ -255,7 +255,8 @@ impl Display for ErrorSource {
     }
 }
 
-/// The part of a modulus' relative standard error that one input is responsible for. The parts' squares add up to the whole.
+/// The part of a modulus' relative standard error that one input is responsible for. The parts'
+/// squares add up to the whole.
 ///
 /// ```
 /// # use tactile_simulate::{Trial, CalibrationRun, Camera, PressOptions};

@@ -203,8 +203,8 @@ impl SensorCalibration {
     /// # Errors
     /// [`SensorError`]: one sentence. A press is named by its number.
     pub fn run(&self) -> Result<CalibratedSensor, SensorError> {
-        // Each stage needs the one before: contacts need the lens, the curve needs their histograms,
-        // and radii and forces of the presses need the curve.
+        // Each stage needs the one before: contacts need the lens, the curve needs their
+        // histograms, and radii and forces of the presses need the curve.
         let reference = self.reference()?;
         let (geometry, lens) = self.geometry()?;
         let seen = self.contacts(&reference, &geometry.lens)?;

@@ -54,7 +54,8 @@ impl BoundingBox {
     pub fn of_mask(mask: ArrayView2<'_, bool>) -> Option<Self> {
         let mut bounds: Option<Self> = None;
         for (row, line) in mask.outer_iter().enumerate() {
-            // Most rows of a large frame are empty. A fold without an early end is computed in wide instructions.
+            // Most rows of a large frame are empty. A fold without an early end is computed in wide
+            // instructions.
             if let Some(line) = line.to_slice()
                 && !line.iter().fold(false, |any, &inside| any | inside)
             {

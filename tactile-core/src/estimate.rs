@@ -91,8 +91,8 @@ impl Estimate {
         self.standard_error / self.value.abs()
     }
 
-    /// The symmetric 95 % interval, value ± t·standard error, with t of Student's distribution where
-    /// the degrees of freedom are known and of the normal distribution otherwise.
+    /// The symmetric 95 % interval, value ± t·standard error, with t of Student's distribution
+    /// where the degrees of freedom are known and of the normal distribution otherwise.
     ///
     /// ```
     /// use tactile_core::Estimate;

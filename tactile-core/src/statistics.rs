@@ -15,9 +15,10 @@ pub fn quantile_95(degrees: Option<f64>) -> f64 {
     const UPPER_TAIL: f64 = 0.975;
     let z = Normal::standard().inverse_cdf(UPPER_TAIL);
     match degrees.and_then(|n| Some((n, StudentsT::new(0.0, 1.0, n).ok()?))) {
-        // The iteration behind the inverse loses digits with the degrees of freedom, and does not end for
-        // millions of them, as where a calibration is free of scatter. The expansion about the normal
-        // quantile is good to 1e-11 from a thousand on (Fisher & Cornish, Technometrics 2, 1960).
+        // The iteration behind the inverse loses digits with the degrees of freedom, and does not
+        // end for millions of them, as where a calibration is free of scatter. The expansion about
+        // the normal quantile is good to 1e-11 from a thousand on (Fisher & Cornish, Technometrics
+        // 2, 1960).
         Some((n, _)) if n > 1e3 => {
             let first = (z.powi(3) + z) / 4.0;
             let second = (5.0 * z.powi(5) + 16.0 * z.powi(3) + 3.0 * z) / 96.0;

@@ -25,9 +25,9 @@
 //!   $F = \frac{4}{3} E^{\ast} \sqrt{R} \delta^{3/2}$, $p = p_0 \sqrt{1 - r^2/a^2}$.
 //! - Flat punch: $F = 2 E^{\ast} a \delta$. Cone:
 //!   $F = \frac{2}{\pi} E^{\ast} \tan\alpha \delta^2$.
-//! - Thin layer: $\varphi(s) - \frac{2}{\pi} \int_0^a K(s, t) \varphi(t) dt =
-//!   \frac{E^{\ast}}{\pi} (\delta - s^2/R)$, $F = 2\pi \int_0^a \varphi$. O(n³) with some 24 + 6 a/h
-//!   nodes, tabulated by the estimators.
+//! - Thin layer: $\varphi(s) - \frac{2}{\pi} \int_0^a K(s, t) \varphi(t) dt = \frac{E^{\ast}}{\pi}
+//!   (\delta - s^2/R)$, $F = 2\pi \int_0^a \varphi$. O(n³) with some 24 + 6 a/h nodes, tabulated by
+//!   the estimators.
 //! - Model choice: $AICc = -2 \ln L + 2k + 2k(k + 1)/(n - k - 1)$.
 //!
 //! Errors are [`ElasticityError`]. What weakens an estimate without forbidding it is a

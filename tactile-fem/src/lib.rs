@@ -11,24 +11,24 @@
 //! as it converges fast. The sparse LDLᵀ factorisation is analysed once a pattern. Load steps are
 //! halved and doubled by what converges.
 //!
-//! - Contact without friction: pressures are piecewise linear on the nodes of one surface. Gaps to the
-//! closest points of the other's edges are integrated from one end of these edges to the next
-//! (segment-to-segment). The augmented Lagrangian finds its contact zone by a primal–dual active
-//! set.
-//! - Contact without slip: nodes are held along the surface, by a penalty, where they first touched, in
-//!   load steps of a tenth.
+//! - Contact without friction: pressures are piecewise linear on the nodes of one surface. Gaps to
+//!   the closest points of the other's edges are integrated from one end of these edges to the next
+//!   (segment-to-segment). The augmented Lagrangian finds its contact zone by a primal–dual active
+//!   set.
+//! - Contact without slip: nodes are held along the surface, by a penalty, where they first
+//!   touched, in load steps of a tenth.
 //! - Surfaces that touch from the start and only slide share their axial displacements instead.
 //!
 //! # Accuracy
 //! Against independent finite-element programs at ν = 0.495:
 //!
-//! - A ball on a rigid flat, up to a/R = 0.9: within 0.2 % in contact radius and 0.1 % in approach at
-//!   given force.
-//! - A ball on a guide of three layers, up to a/R = 1.07: within 0.2 % in contact radius and 0.3 % in
-//!   approach at given force, 0.6 % in force at given contact radius.
-//! - A bonded block with an inclusion of up to 11 mm: within 0.9 % in force and 0.3 % root mean square in
-//! pressure over the inner three quarters of the face. Most of it is CalculiX's mesh: where that is
-//! refined, 0.3 % in both. Without friction 1.6 % and 0.7 %.
+//! - A ball on a rigid flat, up to a/R = 0.9: within 0.2 % in contact radius and 0.1 % in approach
+//!   at given force.
+//! - A ball on a guide of three layers, up to a/R = 1.07: within 0.2 % in contact radius and 0.3 %
+//!   in approach at given force, 0.6 % in force at given contact radius.
+//! - A bonded block with an inclusion of up to 11 mm: within 0.9 % in force and 0.3 % root mean
+//!   square in pressure over the inner three quarters of the face. Most of it is CalculiX's mesh:
+//!   where that is refined, 0.3 % in both. Without friction 1.6 % and 0.7 %.
 //!
 //! The bench `finite_elements` and the tests `against_calculix` of `tactile-inclusion` print these.
 //! Without slip a flat punch follows Spence within 0.05 % at ν = 0, 0.3 and 0.45. A ball's

@@ -82,8 +82,8 @@ impl FrameResponse {
     }
 }
 
-/// Rounds in which the faces of slightly changed scenes are made to meet again: each leaves a tenth of
-/// the distance before.
+/// Rounds in which the faces of slightly changed scenes are made to meet again: each leaves a tenth
+/// of the distance before.
 const SLIDING_ROUNDS: usize = 2;
 
 /// A scene with an interface, solved at some approaches. Scenes near it on the same mesh are solved
@@ -116,9 +116,9 @@ pub struct SolvedFrames {
 }
 
 impl SolvedFrames {
-    /// Solves a scene at approaches in metres, from a solution nearby where there is one. Where the mesh
-    /// is to follow surfaces that slide, `sliding_depth_m` is how far below the surface it may move.
-    /// `None` where an approach is not reached.
+    /// Solves a scene at approaches in metres, from a solution nearby where there is one. Where the
+    /// mesh is to follow surfaces that slide, `sliding_depth_m` is how far below the surface it may
+    /// move. `None` where an approach is not reached.
     pub fn new(
         scene: &FemScene,
         approaches_m: &[f64],
@@ -166,13 +166,13 @@ impl SolvedFrames {
         &self.scenes[frame.min(self.scenes.len() - 1)]
     }
 
-    /// Responses of changed scenes and, last, of the scene itself, each frame by frame, by one iteration
-    /// from the solution with its tangent: the error is of second order in the change.
+    /// Responses of changed scenes and, last, of the scene itself, each frame by frame, by one
+    /// iteration from the solution with its tangent: the error is of second order in the change.
     ///
-    /// `changed` makes the changed scenes of a frame's scene. `approaches_m` gives the approach of each
-    /// in a frame, and last that of the scene itself. One factorisation a frame, one residual for each
-    /// scene and frame. The iteration on the scene itself is for differences: it takes out what the
-    /// solution leaves unbalanced. `None` where an element is turned inside out.
+    /// `changed` makes the changed scenes of a frame's scene. `approaches_m` gives the approach of
+    /// each in a frame, and last that of the scene itself. One factorisation a frame, one residual
+    /// for each scene and frame. The iteration on the scene itself is for differences: it takes out
+    /// what the solution leaves unbalanced. `None` where an element is turned inside out.
     pub fn responses(
         &self,
         changed: impl Fn(&FemScene) -> Option<Vec<FemScene>>,

@@ -130,9 +130,9 @@ struct Fit {
 }
 
 impl Fit {
-    /// The constants fit the means inside the contact's outermost elements. The radius a is where the fit
-    /// carries the same force outside as the elements do, which equilibrium makes accurate although
-    /// their pressures are not. `None` with too few nodes in contact.
+    /// The constants fit the means inside the contact's outermost elements. The radius a is where
+    /// the fit carries the same force outside as the elements do, which equilibrium makes accurate
+    /// although their pressures are not. `None` with too few nodes in contact.
     fn new(points: &[PressurePoint], force: f64, means: &[Mean], left_out: usize) -> Option<Self> {
         // Fewest means that two constants are fitted to.
         let fewest_means: usize = 4;

@@ -24,11 +24,15 @@
 //! $d$ is the grey-level difference frame − reference, $V = \sum d$ the integrated pixel value.
 //! Numbers are the paper's.
 //!
-//! - Stress and force (5), (6): $P = f(I)$ and $F_z = \int P dS$, that is $F_z = F(V)$ by calibration.
-//! - Centroid (7), (8): $\bar x = \sum x d / \sum d$ and $\bar y = \sum y d / \sum d$. One pass over the frame, O(pixels), exact in integers.
+//! - Stress and force (5), (6): $P = f(I)$ and $F_z = \int P dS$, that is $F_z = F(V)$ by
+//!   calibration.
+//! - Centroid (7), (8): $\bar x = \sum x d / \sum d$ and $\bar y = \sum y d / \sum d$. One pass
+//!   over the frame, O(pixels), exact in integers.
 //! - Shear (9)–(12): $F_x = K_x u_x$ and $F_y = K_y u_y$, $u$ the step of the centroid.
-//! - Hertz's profile: $I(r) = I_0 \sqrt{1 - r^2/a^2}$, averaged over pixels and blurred; $V = \frac{2}{3} \pi a^2 I_0$.
-//! - Noise of a difference: $\sigma^2 = \sigma_0^2 + g d$; of the force: $\sigma_F^2 = (dF/dV)^2 \sigma_V^2 + \sigma_{cal}^2$.
+//! - Hertz's profile: $I(r) = I_0 \sqrt{1 - r^2/a^2}$, averaged over pixels and blurred; $V =
+//!   \frac{2}{3} \pi a^2 I_0$.
+//! - Noise of a difference: $\sigma^2 = \sigma_0^2 + g d$; of the force: $\sigma_F^2 = (dF/dV)^2
+//!   \sigma_V^2 + \sigma_{cal}^2$.
 #![forbid(unsafe_code)]
 
 #[cfg(feature = "rayon")]

@@ -11,10 +11,10 @@ use tactile_core::Requirement;
 /// # Convention
 ///
 /// x is the column, y the row (so y points *down* the image), z points from the surface to the
-/// viewer. A surface z(x, y) with slopes p = ∂z/∂x and q = ∂z/∂y has the normal
-/// n = (−p, −q, 1)/√(1 + p² + q²). `direction` points *from the surface to the light*: (1, 0, 1) is a light to the
-/// right of the image, 45° above the surface. It brightens slopes that fall to the right. Texts
-/// whose y points up need the sign of y changed.
+/// viewer. A surface z(x, y) with slopes p = ∂z/∂x and q = ∂z/∂y has the normal n = (−p, −q, 1)/√(1 +
+/// p² + q²). `direction` points *from the surface to the light*: (1, 0, 1) is a light to the right
+/// of the image, 45° above the surface. It brightens slopes that fall to the right. Texts whose y
+/// points up need the sign of y changed.
 ///
 /// ```
 /// use tactile_sfs::Lighting;

@@ -5,7 +5,8 @@
 //! corners. Summed over all pixels the inner corners cancel, so the frame's sum is the force. In
 //! units of the contact radius
 //!
-//! * f = √(1 − ρ²): 6G = 2xyz + x(3 − x²) atan(y/z) + y(3 − y²) atan(x/z) − 2 atan(xy/z), z = √(1 − x² − y²)
+//! * f = √(1 − ρ²): 6G = 2xyz + x(3 − x²) atan(y/z) + y(3 − y²) atan(x/z) − 2 atan(xy/z), z = √(1 −
+//!   x² − y²)
 //! * f = 1 − ρ²:    G = xy(1 − (x² + y²)/3)
 //!
 //! inside. Outside the disc, G is the quarter disc's integral less the two caps beyond x and beyond

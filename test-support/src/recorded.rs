@@ -1,8 +1,10 @@
-//! Answers of the tests' scenes, compared with those of an earlier state: one format for all crates.
+//! Answers of the tests' scenes, compared with those of an earlier state: one format for all
+//! crates.
 //!
-//! A record is a text file of lines `name: number number …`. A change that is meant to leave every answer as it is shows that here. One
-//! that is meant to move answers writes the records anew with `RECORD_ANSWERS=1 cargo test -p CRATE --test suite recorded`: the
-//! difference of the file says what moved, the commit says why.
+//! A record is a text file of lines `name: number number …`. A change that is meant to leave every
+//! answer as it is shows that here. One that is meant to move answers writes the records anew with
+//! `RECORD_ANSWERS=1 cargo test -p CRATE --test suite recorded`: the difference of the file says
+//! what moved, the commit says why.
 use std::fmt::Write as _;
 
 /// What a crate's scenes answer, in the order in which it was found.
@@ -31,7 +33,8 @@ impl Answers {
         text
     }
 
-    /// What differs from the text of a record by more than `tolerance(name, number, largest number of the line)` allows.
+    /// What differs from the text of a record by more than `tolerance(name, number, largest number
+    /// of the line)` allows.
     pub fn differences(
         &self,
         record: &str,

@@ -1,4 +1,5 @@
-//! A calibration of few pairs with a noisy gauge: the intervals of force and modulus hold as often as they promise.
+//! A calibration of few pairs with a noisy gauge: the intervals of force and modulus hold as often
+//! as they promise.
 #![allow(clippy::print_stdout)]
 
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
@@ -10,7 +11,8 @@ use tactile_simulate::{CalibrationRun, Camera, PressLoad, PressOptions, Trial};
 /// Noise of the gauge in newtons: 2 % of the 1.5 N that it reaches.
 const GAUGE_N: f64 = 0.03;
 
-/// Draws for each number of pairs: a coverage of 95 % is then known to 1.1 % (one standard deviation).
+/// Draws for each number of pairs: a coverage of 95 % is then known to 1.1 % (one standard
+/// deviation).
 const DRAWS: usize = 400;
 
 /// Forces of both loads, and the modulus with the interval's lower end and its upper end.

@@ -1,7 +1,8 @@
 //! Frames rendered from finite-element contacts, measured blindly: the modulus and its interval.
 //!
-//! `tests/data/finite_element_presses.csv` holds contacts computed by the crate's own finite elements (neo-Hookean, ν = 0.4999, no friction), of moduli,
-//! radii, guides and loads that the layered law was not fitted to and that no table holds; `examples/contact_states.rs` makes it.
+//! `tests/data/finite_element_presses.csv` holds contacts computed by the crate's own finite
+//! elements (neo-Hookean, ν = 0.4999, no friction), of moduli, radii, guides and loads that the
+//! layered law was not fitted to and that no table holds; `examples/contact_states.rs` makes it.
 mod solved;
 
 use std::path::{Path, PathBuf};
@@ -106,7 +107,8 @@ impl Ball {
             material: Elastic::RIGID,
         }];
         let layers = self.layers();
-        // The camera stands so far away that contacts, the calibration's too, take half of the frame at most.
+        // The camera stands so far away that contacts, the calibration's too, take half of the
+        // frame at most.
         let largest_m = self
             .states
             .last()
@@ -139,13 +141,15 @@ impl Ball {
                 material: Elastic::RIGID,
             },
             largest_force_n: 1.2 * pair[1].force_n,
-            // A gauge that suits the range, which loads between a hundredth of a newton and a hundred have.
+            // A gauge that suits the range, which loads between a hundredth of a newton and a
+            // hundred have.
             gauge_noise_n: 1e-3 * pair[1].force_n,
             ..CalibrationRun::default()
         };
         let trial = Trial::new(options, &calibration).unwrap();
         let size = trial.simulation.pixel_size_m;
-        // The rigid ball that calibrates leaves no contact on a rigid flat: there the light of a pascal is given.
+        // The rigid ball that calibrates leaves no contact on a rigid flat: there the light of a
+        // pascal is given.
         let grey_per_newton = trial.scene.truth(0).grey_per_pascal / (size[0] * size[1]);
         let known = |k: u8| {
             let force_n = 0.15 * f64::from(k) * pair[1].force_n;
@@ -307,7 +311,8 @@ fn balls_are_measured_within_their_intervals() {
             readings.push(ball.read(first, 1 + 10 * k as u64 + first as u64, &[]));
         }
     }
-    // The best Hertz profile is up to 0.9 % too wide; rounding to grey levels and the lens's blur leave some hundredths of a per cent.
+    // The best Hertz profile is up to 0.9 % too wide; rounding to grey levels and the lens's blur
+    // leave some hundredths of a per cent.
     let radius = (readings.iter().flat_map(|r| r.radius_errors))
         .fold(0.0, |worst: f64, e| worst.max(e.abs()));
     assert!(radius < 2e-3, "{radius}");
@@ -315,7 +320,8 @@ fn balls_are_measured_within_their_intervals() {
     summaries(&readings)[0].check(0.01, 0.04);
 }
 
-/// Random balls solved anew, on other meshes than the tables', against tables solved here: minutes, for `.ci/run studies`.
+/// Random balls solved anew, on other meshes than the tables', against tables solved here: minutes,
+/// for `.ci/run studies`.
 #[test]
 fn study_of_solved_presses() {
     let Some(count) = std::env::var("PRESSES").ok().and_then(|n| n.parse().ok()) else {
@@ -334,7 +340,8 @@ fn study_of_solved_presses() {
     }
     let [layered, tabulated] = summaries(&readings);
     layered.check_coverage();
-    // Where the contact is in the law's range and the camera's noise lets a modulus be known to a few per cent.
+    // Where the contact is in the law's range and the camera's noise lets a modulus be known to a
+    // few per cent.
     let clear = |r: &&Reading| {
         r.largest_ratio < 1.2 && r.layered.standard_error_pa < 0.03 * r.layered.youngs_modulus_pa
     };

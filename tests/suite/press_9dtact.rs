@@ -1,4 +1,5 @@
-//! A real press: the ball of the 9DTact sensor, its contact and its depth against the ball's geometry.
+//! A real press: the ball of the 9DTact sensor, its contact and its depth against the ball's
+//! geometry.
 #![allow(clippy::print_stdout)]
 use ndarray::Array2;
 use std::path::{Path, PathBuf};
@@ -8,7 +9,8 @@ use tactile_imaging::pipeline::{ContactSurface, DarkContact, Object, Pipeline, S
 const PIXEL_M: f64 = 0.0510151e-3;
 const BALL_M: f64 = 4.0e-3;
 
-/// The sensor with its makers' table, as it stands or zeroed, and its images without and with the ball.
+/// The sensor with its makers' table, as it stands or zeroed, and its images without and with the
+/// ball.
 fn sensor(folder: &Path, grey: Grey, zeroed: bool) -> (Pipeline, [Array2<u8>; 2]) {
     let images = ["rectify_crop_ref.png", "rectify_crop_sample.png"].map(|name| {
         let image = read_grey_image(folder.join(name), grey, None);
@@ -54,8 +56,9 @@ fn the_ball_is_found_and_its_depth_is_right() {
     let surface = press.surface(0).unwrap();
     let ball = surface.fit_ball(BALL_M).expect("a ball");
 
-    // The stated circle, centre (243.9, 188.5) px and a = 67.6 px, is the smallest around the pixels whose mean of the channels
-    // is darker by more than 3: the circle of their area has 66.6 px.
+    // The stated circle, centre (243.9, 188.5) px and a = 67.6 px, is the smallest around the
+    // pixels whose mean of the channels is darker by more than 3: the circle of their area has 66.6
+    // px.
     let [x, y] = reading.centroid_px.map(|c| c.value);
     assert!((x - 243.9).hypot(y - 188.5) < 1.0, "centroid {x}, {y}");
     let [x, y] = ball.centre_m.map(|m| m / PIXEL_M);
@@ -66,7 +69,8 @@ fn the_ball_is_found_and_its_depth_is_right() {
         "contact radius {radius} px"
     );
 
-    // Against the stated cap, over the frame's own contact and all that lies around it. The makers publish 0.0462 mm.
+    // Against the stated cap, over the frame's own contact and all that lies around it. The makers
+    // publish 0.0462 mm.
     let error_m = stated_cap_error_m(surface);
     println!(
         "mean absolute depth error {:.4} mm against the stated cap, {:.4} mm against the fitted ball",
@@ -87,10 +91,11 @@ fn the_ball_is_found_and_its_depth_is_right() {
     check_empty(&pipeline, &reference);
 }
 
-/// What the grey and the zero of the makers' table are worth. The table was made from this very image, by the mean of the channels
-/// and a circle that lost its fractions: with centre (243, 188) and 67 px each of its depths is a mean of that cap to 0.4 nm.
-/// The cap of 67.6 px is 0.051 mm deeper, which no reading of the table gives back. Its zero does, without any circle: no
-/// darkness is no depth.
+/// What the grey and the zero of the makers' table are worth. The table was made from this very
+/// image, by the mean of the channels and a circle that lost its fractions: with centre (243, 188)
+/// and 67 px each of its depths is a mean of that cap to 0.4 nm. The cap of 67.6 px is 0.051 mm
+/// deeper, which no reading of the table gives back. Its zero does, without any circle: no darkness
+/// is no depth.
 #[test]
 fn the_table_is_read_by_its_own_grey_and_from_no_darkness() {
     let Some(folder) = data() else {
@@ -121,7 +126,8 @@ fn stated_cap_m(r: f64) -> f64 {
     (BALL_M * BALL_M - r * r).sqrt() - (BALL_M * BALL_M - a * a).sqrt()
 }
 
-/// Mean absolute error of the heights over the stated contact circle; where no contact was found the height is zero.
+/// Mean absolute error of the heights over the stated contact circle; where no contact was found
+/// the height is zero.
 fn stated_cap_error_m(surface: &ContactSurface) -> f64 {
     let [left, top] = surface.origin_m.map(|m| m / PIXEL_M);
     let (mut sum, mut count) = (0.0, 0.0);
@@ -164,7 +170,8 @@ fn check_empty(pipeline: &Pipeline, reference: &Array2<u8>) {
     assert!(press.contact(0).unwrap().is_none());
 }
 
-/// The cap's profile, ring by ring of 10 px, against the stated geometry: within 0.1 mm of 1.98 mm everywhere.
+/// The cap's profile, ring by ring of 10 px, against the stated geometry: within 0.1 mm of 1.98 mm
+/// everywhere.
 fn check_profile(surface: &ContactSurface) {
     let origin = surface.origin_m;
     let mut rings = [[0.0; 3]; 6];

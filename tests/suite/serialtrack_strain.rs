@@ -1,5 +1,5 @@
-//! The tracked particles of a uniaxially stretched volume, matched, splined and strained: mean and local strain against
-//! the exact stretch.
+//! The tracked particles of a uniaxially stretched volume, matched, splined and strained: mean and
+//! local strain against the exact stretch.
 #![allow(clippy::print_stdout)]
 
 use nalgebra::{Matrix3, Point3};
@@ -67,8 +67,8 @@ fn scattered(seed: f64, count: u32) -> Vec<Point3<f64>> {
     (0..count).map(point).collect()
 }
 
-/// Where the sample is stretched by 2.6 to 3 and two thirds of its points have left the field of view, the strain is exact or
-/// refused.
+/// Where the sample is stretched by 2.6 to 3 and two thirds of its points have left the field of
+/// view, the strain is exact or refused.
 #[test]
 fn a_large_stretch_is_exact_or_refused() {
     let before = scattered(0.1, 700);

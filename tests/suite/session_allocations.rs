@@ -33,7 +33,8 @@ fn pushing_frames_allocates_nothing_after_warm_up() {
     assert_eq!(count.count_total, 0, "{count:?}");
 }
 
-/// Surface, control points, match, spline and strain of a frame work in the memory of the frames before.
+/// Surface, control points, match, spline and strain of a frame work in the memory of the frames
+/// before.
 #[test]
 fn following_strain_allocates_nothing_after_warm_up() {
     let camera = Camera::default().coarser(4);

@@ -1,7 +1,9 @@
-//! The simulator's frames to the bit: a change of its code that is meant to change no frame is held to the frames recorded here.
+//! The simulator's frames to the bit: a change of its code that is meant to change no frame is held
+//! to the frames recorded here.
 //!
-//! The frames are integers, so a last digit of a system's `exp` or `sin` almost never shows. A change that is meant to
-//! change frames records the new checksums (each failing line prints them) and says so in its commit.
+//! The frames are integers, so a last digit of a system's `exp` or `sin` almost never shows. A
+//! change that is meant to change frames records the new checksums (each failing line prints them)
+//! and says so in its commit.
 use crate::hostile::Hostile;
 use ndarray::Array2;
 use tactile_simulate::{

@@ -51,8 +51,8 @@ impl Hostile {
         Self::PressedReference,
     ];
 
-    /// Reference, one frame and truth of the scene on `base` (camera, object, waveguide, seed), whose loads, gain and
-    /// centre are replaced.
+    /// Reference, one frame and truth of the scene on `base` (camera, object, waveguide, seed),
+    /// whose loads, gain and centre are replaced.
     ///
     pub(crate) fn simulate(self, base: &PressOptions) -> Result<PressSimulation, SimulateError> {
         let (options, force_n) = self.options(base)?;
@@ -71,7 +71,8 @@ impl Hostile {
         Ok(made)
     }
 
-    /// The scene's options, and the force of its common contact: a fifth of the frame's shorter side in radius.
+    /// The scene's options, and the force of its common contact: a fifth of the frame's shorter
+    /// side in radius.
     fn options(self, base: &PressOptions) -> Result<(PressOptions, f64), SimulateError> {
         let camera = base.camera;
         let middle = [camera.shape[1], camera.shape[0]].map(|n| (n as f64 - 1.0) / 2.0);
@@ -137,7 +138,8 @@ fn several(base: &PressOptions, force_n: f64) -> Result<PressSimulation, Simulat
     })
 }
 
-/// Expected grey levels of the first loads of several scenes seen in one frame: their light above that of the sensor alone, added up.
+/// Expected grey levels of the first loads of several scenes seen in one frame: their light above
+/// that of the sensor alone, added up.
 fn superposed(sensor: &PressScene, scenes: &[PressScene]) -> Result<Array2<f64>, SimulateError> {
     let free = PressScene::new(PressOptions {
         loads: vec![PressLoad {

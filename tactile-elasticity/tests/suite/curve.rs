@@ -19,7 +19,8 @@ fn sphere(thickness_m: Option<f64>) -> Indenter {
     }
 }
 
-/// Force of the law `f` beyond contact at 0.3 mm, 200 positions up to 0.3 mm deep, offset and noise added.
+/// Force of the law `f` beyond contact at 0.3 mm, 200 positions up to 0.3 mm deep, offset and noise
+/// added.
 fn curve(f: impl Fn(f64) -> f64, offset: f64, noise: f64, seed: u64) -> IndentationCurve {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let z: Vec<f64> = (0..200).map(|i| f64::from(i) * 3e-6).collect();
@@ -207,7 +208,8 @@ fn a_tip_on_a_ball_on_a_plate() {
     assert!((found.chosen().youngs_modulus_pa / E - 1.0).abs() < 1e-6);
 }
 
-/// A curve does not tell friction from a stiffer sample: the law is named, and what is on a layer has none.
+/// A curve does not tell friction from a stiffer sample: the law is named, and what is on a layer
+/// has none.
 #[test]
 fn contact_without_slip_is_asked_for() {
     let nu = 0.3;
@@ -224,7 +226,8 @@ fn contact_without_slip_is_asked_for() {
     assert!(!sphere(None).candidates().contains(&sticks));
 }
 
-/// Strain under a cone goes with the cotangent of its half angle, and so does the error stated of its law; under a ball it grows with depth.
+/// Strain under a cone goes with the cotangent of its half angle, and so does the error stated of
+/// its law; under a ball it grows with depth.
 #[test]
 fn the_error_stated_of_a_law_grows_with_the_strain() {
     let error = |indenter: &Indenter, kind, force: &dyn Fn(f64) -> f64| {
@@ -250,7 +253,8 @@ fn the_error_stated_of_a_law_grows_with_the_strain() {
         error(&indenter, EstimatorKind::HertzSphere, &force)
     };
     assert!(ball(2e-3) > 1.5 * ball(4e-3));
-    // Half balls carry so much less than Hertz's law at these depths over the radius, by finite elements: about a standard error.
+    // Half balls carry so much less than Hertz's law at these depths over the radius, by finite
+    // elements: about a standard error.
     for (depth, off) in [(0.02, 0.05), (0.08, 0.12), (0.21, 0.28)] {
         let radius_m: f64 = 2.97e-4 / depth;
         let force = |d: f64| 4.0 / 3.0 * E / (1.0 - NU * NU) * radius_m.sqrt() * d.powf(1.5);

@@ -240,7 +240,8 @@ fn layers() {
     }
 }
 
-/// The reference of the integral equation is itself good to about 10⁻⁹, its samples are printed with ten digits.
+/// The reference of the integral equation is itself good to about 10⁻⁹, its samples are printed
+/// with ten digits.
 #[test]
 fn layers_solved() {
     for case in of_kind("layer") {

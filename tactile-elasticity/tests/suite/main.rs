@@ -1,4 +1,5 @@
-//! The tests of `tactile-elasticity`, in one program: the generic code is compiled once for all of them.
+//! The tests of `tactile-elasticity`, in one program: the generic code is compiled once for all of
+//! them.
 
 mod common;
 mod curve;

@@ -1,6 +1,8 @@
-//! Recorded answers: what the crate computed when `tests/recorded.txt` was written, so that a change of its insides changes no number.
+//! Recorded answers: what the crate computed when `tests/recorded.txt` was written, so that a
+//! change of its insides changes no number.
 //!
-//! `RECORD_ANSWERS=1 cargo test -p tactile-elasticity --test suite recorded` writes the file anew; the reason belongs in the commit.
+//! `RECORD_ANSWERS=1 cargo test -p tactile-elasticity --test suite recorded` writes the file anew;
+//! the reason belongs in the commit.
 
 use test_support as record;
 
@@ -16,7 +18,8 @@ use tactile_elasticity::stress::{
 
 const FILE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/recorded.txt");
 
-/// A reordered sum, or another way to the same zero of a function, may move the last digits. Nothing else may.
+/// A reordered sum, or another way to the same zero of a function, may move the last digits.
+/// Nothing else may.
 const TOLERANCE: f64 = 1e-9;
 
 /// Names with their numbers.

@@ -41,13 +41,16 @@ enum Protocol {
     HeldApproach,
     /// A weight: the contact grows.
     HeldForce,
-    /// An approach that is kept against a guide that yields: the contact grows by a sixth while the force falls.
+    /// An approach that is kept against a guide that yields: the contact grows by a sixth while the
+    /// force falls.
     YieldingApproach,
-    /// A weight put on at once and another at the same rate until the last load: Boltzmann's superposition of a step and a ramp.
+    /// A weight put on at once and another at the same rate until the last load: Boltzmann's
+    /// superposition of a step and a ramp.
     GrowingForce,
 }
 
-/// ∫₀ᵗ kernel(t − s) rate(s) ds by Simpson's rule on a thousand steps: exact to 1e-10 for so smooth a function.
+/// ∫₀ᵗ kernel(t − s) rate(s) ds by Simpson's rule on a thousand steps: exact to 1e-10 for so smooth
+/// a function.
 fn superposition(time_s: f64, kernel: impl Fn(f64) -> f64, rate: impl Fn(f64) -> f64) -> f64 {
     let steps = 1000;
     let width = time_s / f64::from(steps);
@@ -96,7 +99,8 @@ fn equal_times(count: usize, last_s: f64) -> Vec<f64> {
         .collect()
 }
 
-/// Moduli with relative errors of their own: of the forces, and of what the deformations are told from.
+/// Moduli with relative errors of their own: of the forces, and of what the deformations are told
+/// from.
 fn measured(
     times_s: &[f64],
     truth: &[(f64, f64)],
@@ -266,7 +270,8 @@ fn scatter_beyond_the_errors_is_no_change() {
         let told = time_dependence(&series, 0.0, 0.0).unwrap();
         alarms += usize::from(told != TimeDependence::Steady);
     }
-    // The scatter is learnt from the same 20 loads, so that more than 1 % are expected; without the scaling it is nine of ten.
+    // The scatter is learnt from the same 20 loads, so that more than 1 % are expected; without the
+    // scaling it is nine of ten.
     println!("{alarms} alarms of 400");
     assert!(alarms <= 20, "{alarms}");
 }
@@ -347,7 +352,8 @@ fn what_is_no_series_is_refused() {
     );
 }
 
-/// Four loads under one force tell no time constant, but how much the sample has softened: a compliance that grows by 15 %.
+/// Four loads under one force tell no time constant, but how much the sample has softened: a
+/// compliance that grows by 15 %.
 #[test]
 fn few_loads_under_a_held_force_tell_the_change() {
     let series: Vec<TimedModulus> = (0..4)

@@ -1,4 +1,5 @@
-//! Little strain under much rotation, all scales, both precisions, folding, robustness and no allocation.
+//! Little strain under much rotation, all scales, both precisions, folding, robustness and no
+//! allocation.
 
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use proptest::prelude::*;
@@ -33,7 +34,8 @@ fn gradient(size: f64) -> impl Strategy<Value = Matrix3<f64>> {
 }
 
 proptest! {
-    /// Turning the whole does not strain it; F = Q(I + H) is rounded to 10⁻¹⁶, and so is the strain, absolutely.
+    /// Turning the whole does not strain it; F = Q(I + H) is rounded to 10⁻¹⁶, and so is the
+    /// strain, absolutely.
     #[test]
     fn rotations_do_not_strain(q in rotation(), h in gradient(0.2)) {
         let f = Matrix3::identity() + h;
@@ -208,7 +210,8 @@ fn weights_are_areas() {
     assert!((field.summary().mean[(1, 1)] - 0.01f64).abs() < 1e-17);
 }
 
-/// A small turn in each plane, of numbers whose strain is exact: E is 2⁻⁴³ where the terms it is summed from are 2⁻²¹ and need 81 bits.
+/// A small turn in each plane, of numbers whose strain is exact: E is 2⁻⁴³ where the terms it is
+/// summed from are 2⁻²¹ and need 81 bits.
 #[test]
 fn what_a_turn_leaves_keeps_all_its_digits_in_every_plane() {
     let power = |k: i32| 2.0_f64.powi(k);
@@ -219,7 +222,8 @@ fn what_a_turn_leaves_keeps_all_its_digits_in_every_plane() {
         (h[(i, j)], h[(j, i)]) = (-turn, turn);
         (h[(i, i)], h[(j, j)]) = (along, along);
         let strain = GreenLagrange.strain(&h).unwrap();
-        // along + ½ (along² + turn²), in full 2⁻⁴³ + 2⁻⁷¹ + 2⁻⁸¹ + 2⁻¹⁰¹; the last is half a rounding.
+        // along + ½ (along² + turn²), in full 2⁻⁴³ + 2⁻⁷¹ + 2⁻⁸¹ + 2⁻¹⁰¹; the last is half a
+        // rounding.
         let expected = power(-43) + power(-71) + power(-81);
         for k in [i, j] {
             let error = (strain[(k, k)] / expected - 1.0).abs();

@@ -1,4 +1,5 @@
-//! Tiny strain under large rotation, nearly singular deformations, contacts of every size, against 80-digit numbers.
+//! Tiny strain under large rotation, nearly singular deformations, contacts of every size, against
+//! 80-digit numbers.
 #![allow(clippy::print_stdout)]
 
 use test_support as worst;
@@ -16,7 +17,8 @@ fn matrix(value: &Value) -> Matrix3<f64> {
     Matrix3::from_fn(|i, j| rows[i][j])
 }
 
-/// Relative to the largest entry of the strain, however small: a dozen roundings in twofold arithmetic or of single products.
+/// Relative to the largest entry of the strain, however small: a dozen roundings in twofold
+/// arithmetic or of single products.
 const ALLOWED: f64 = 50.0;
 
 #[test]

@@ -1,4 +1,5 @@
-//! Every case of the strain reference (90-digit arithmetic), 10⁻¹² where cond F ≤ 10², else 100 ε cond F.
+//! Every case of the strain reference (90-digit arithmetic), 10⁻¹² where cond F ≤ 10², else 100 ε
+//! cond F.
 
 #![allow(clippy::print_stdout)]
 
@@ -81,7 +82,8 @@ fn every_scalar_of_every_case() {
     };
     for case in &cases {
         let (d, expected, tol) = (deformation(case), &case["expected"], tolerance(case));
-        // The deviator of a near-dilation is a difference of the tensor's entries: relative to these.
+        // The deviator of a near-dilation is a difference of the tensor's entries: relative to
+        // these.
         let deviatoric = |key: &str, e: Matrix3<f64>| {
             let Some(expected) = expected[key].as_f64() else {
                 return;
@@ -96,7 +98,8 @@ fn every_scalar_of_every_case() {
         let check = |key: &str, found: f64, index: Option<usize>| {
             let v = index.map_or(&expected[key], |i| &expected[key][i]);
             let Some(e) = v.as_f64() else { return };
-            // A zero of the reference is a zero of the mathematics; rounding may leave an ulp of one.
+            // A zero of the reference is a zero of the mathematics; rounding may leave an ulp of
+            // one.
             let gap = (found - e).abs() / if e == 0.0 { 1.0 } else { e.abs() };
             assert!(
                 gap <= tol,

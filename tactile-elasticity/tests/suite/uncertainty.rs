@@ -1,4 +1,5 @@
-//! Covariance of displacements and forces carried to the modulus, against redrawing the whole experiment.
+//! Covariance of displacements and forces carried to the modulus, against redrawing the whole
+//! experiment.
 
 use nalgebra::{DMatrix, Matrix3, Point3, Vector3};
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
@@ -10,7 +11,8 @@ use tactile_elasticity::modulus::{
 };
 use tactile_elasticity::strain::GreenLagrange;
 
-/// Spread and quantiles of 4000 repetitions of an experiment, which draws its normal errors from what it is given.
+/// Spread and quantiles of 4000 repetitions of an experiment, which draws its normal errors from
+/// what it is given.
 struct Redrawn {
     standard_error: f64,
     interval_95: [f64; 2],
@@ -45,8 +47,9 @@ fn cloud() -> (Vec<Point3<f64>>, Vec<Vector3<f64>>) {
     (points, influence)
 }
 
-/// Force and mean strain to the modulus, by propagation and by 4000 redrawn experiments: the standard deviation of these is
-/// itself known to 1.1 %, so that 5 % is four and a half of its standard deviations.
+/// Force and mean strain to the modulus, by propagation and by 4000 redrawn experiments: the
+/// standard deviation of these is itself known to 1.1 %, so that 5 % is four and a half of its
+/// standard deviations.
 #[test]
 fn displacements_through_strain_to_the_modulus() {
     let (points, influence) = cloud();

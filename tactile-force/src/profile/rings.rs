@@ -162,7 +162,7 @@ impl Gather<'_> {
             {
                 continue;
             }
-            let block = Block {
+            let block = RingBlock {
                 pixels: lines.map(|line| line[k]),
                 u: self.grid.u(column as f64 + middle),
                 v,
@@ -342,14 +342,14 @@ impl Grid<'_> {
 /// A block of pixels: its differences, and where its centre is relative to that of the contact, in
 /// pixel widths.
 #[derive(Clone, Copy, Debug)]
-pub struct Block<const SIDE: usize> {
+pub struct RingBlock<const SIDE: usize> {
     pub pixels: [[f32; SIDE]; SIDE],
     pub u: f64,
     pub v: f64,
     pub aspect: f64,
 }
 
-impl<const SIDE: usize> Block<SIDE> {
+impl<const SIDE: usize> RingBlock<SIDE> {
     /// Σ o² and Σ o⁴ over the distances o of a block's columns from its centre.
     const SQUARES: [f64; 2] = {
         let (mut sums, mut k) = ([0.0; 2], 0);

@@ -3,7 +3,7 @@ use super::*;
 /// Pixels of whole quarters: sums of a block are those of its pixels to rounding.
 fn compare<const SIDE: usize>(aspect: f64) {
     let value = |k: usize, j: usize| (k * 7 + j * 13 % 5) as f32 - 9.25;
-    let block = Block::<SIDE> {
+    let block = RingBlock::<SIDE> {
         pixels: std::array::from_fn(|k| std::array::from_fn(|j| value(k, j))),
         u: -31.25,
         v: 12.5,

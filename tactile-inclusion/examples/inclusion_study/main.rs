@@ -4,13 +4,14 @@
 //! cargo run --release -p tactile-elasticity --features fem --example inclusion_study -- FOLDER [SEEDS] [NAMES]
 //! ```
 //!
-//! FOLDER holds `scenes.csv` (scene, D_m, depth_m, E1_pa, E0_pa, block_height_m, block_radius_m, disc_radius_m,
-//! nu, contact, approach_1_m …, force_1_n …; D_m = 0 for a plain block, cells of loads that a scene has not are empty) and
-//! for every scene a file `NAME.csv` (load_index, r_m, pressure_pa), solved by another program: `evidence/inclusion_scenes.py`
-//! makes such folders with CalculiX. Every scene is searched with
-//! SEEDS (default 1) draws of the sensor's errors: white noise of pixels, smooth errors of the calibration,
-//! force, and of what is known of the block: its height and the approaches' zero; Poisson's ratio is said to be
-//! 0.495 ± 0.005 whatever it is. NAMES keeps the scenes whose names begin with one of them, separated by commas.
+//! FOLDER holds `scenes.csv` (scene, D_m, depth_m, E1_pa, E0_pa, block_height_m, block_radius_m,
+//! disc_radius_m, nu, contact, approach_1_m …, force_1_n …; D_m = 0 for a plain block, cells of
+//! loads that a scene has not are empty) and for every scene a file `NAME.csv` (load_index, r_m,
+//! pressure_pa), solved by another program: `evidence/inclusion_scenes.py` makes such folders with
+//! CalculiX. Every scene is searched with SEEDS (default 1) draws of the sensor's errors: white
+//! noise of pixels, smooth errors of the calibration, force, and of what is known of the block: its
+//! height and the approaches' zero; Poisson's ratio is said to be 0.495 ± 0.005 whatever it is.
+//! NAMES keeps the scenes whose names begin with one of them, separated by commas.
 #![allow(clippy::print_stdout)]
 
 mod scenes;
@@ -49,9 +50,9 @@ fn normal(rng: &mut ChaCha8Rng) -> f64 {
     rng.sample(StandardNormal)
 }
 
-/// Ring means of a smooth random field in the plane of unit variance with Matérn's kernel of order 3/2:
-/// a sum of waves whose wave vectors follow the kernel's spectrum, Student's t with three degrees
-/// of freedom.
+/// Ring means of a smooth random field in the plane of unit variance with Matérn's kernel of order
+/// 3/2: a sum of waves whose wave vectors follow the kernel's spectrum, Student's t with three
+/// degrees of freedom.
 fn smooth_field(radii_m: &[f64], length_m: f64, rng: &mut ChaCha8Rng) -> Vec<f64> {
     const WAVES: usize = 400;
     const ANGLES: usize = 32;

@@ -28,7 +28,8 @@ pub(crate) struct Tally {
     findable_found: usize,
     plain: usize,
     false_alarms: usize,
-    /// Processor's time of searches, and of one solution of the model with its derivatives, from nothing.
+    /// Processor's time of searches, and of one solution of the model with its derivatives, from
+    /// nothing.
     pub(crate) search_seconds: Vec<f64>,
     pub(crate) model_seconds: Vec<f64>,
 }

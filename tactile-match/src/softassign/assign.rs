@@ -570,7 +570,8 @@ fn split<const D: usize>(points: &[[f64; D]], rows: &mut [usize]) {
 // single precision.
 //
 // Plain loops over arrays of one length: closures and iterators in their place are functions of
-// their own, which the compiler does not give the wider registers of their [caller](crate::vectorised).
+// their own, which the compiler does not give the wider registers of their
+// [caller](crate::vectorised).
 
 /// One value a target of a block.
 type Lanes = [f32; LANES];

@@ -133,8 +133,8 @@ fn norm<const D: usize>(v: &[f64; D]) -> f64 {
     v.iter().map(|x| x * x).sum::<f64>().sqrt()
 }
 
-/// αβ⁴ of two edges: (15) with the maximum of the pair, (16) sharpened, because a neighbourhood's edges differ in
-/// direction more than in length.
+/// αβ⁴ of two edges: (15) with the maximum of the pair, (16) sharpened, because a neighbourhood's
+/// edges differ in direction more than in length.
 fn compatibility<const D: usize>(u: &[f64; D], v: &[f64; D]) -> f64 {
     let (p, q) = (norm(u), norm(v));
     if p == 0.0 || q == 0.0 {
@@ -145,11 +145,13 @@ fn compatibility<const D: usize>(u: &[f64; D], v: &[f64; D]) -> f64 {
     p.min(q) / p.max(q) * beta.powi(4)
 }
 
-// Relaxation labelling over candidates: the paper's update (19)–(20) as a sparse matrix–vector product.
+// Relaxation labelling over candidates: the paper's update (19)–(20) as a sparse matrix–vector
+// product.
 //
-// Only some pairs `(i, j)` are candidates; the match matrix is kept for those and for the slack. What pair `(a, b)`
-// says for pair `(i, j)` does not depend on M: these links are computed once, and a sweep costs one multiplication a link
-// instead of `O(I J A B)`. With all pairs as candidates the numbers are those of [`labelling`](crate::labelling).
+// Only some pairs `(i, j)` are candidates; the match matrix is kept for those and for the slack.
+// What pair `(a, b)` says for pair `(i, j)` does not depend on M: these links are computed once,
+// and a sweep costs one multiplication a link instead of `O(I J A B)`. With all pairs as candidates
+// the numbers are those of [`labelling`](crate::labelling).
 
 /// The match matrix over candidate pairs, with the links between them.
 #[derive(Clone, Debug, Default)]
@@ -192,8 +194,8 @@ impl CandidateLabels {
         self.row_slack.push(slack);
     }
 
-    /// Computes the links: `weight((i, j), (a, b))` for the points `a` of `neighbours(i)` and their candidates; zeros
-    /// are left out.
+    /// Computes the links: `weight((i, j), (a, b))` for the points `a` of `neighbours(i)` and their
+    /// candidates; zeros are left out.
     fn link<N: AsRef<[usize]>>(
         &mut self,
         mut weight: impl FnMut((usize, usize), (usize, usize)) -> f64,
@@ -234,8 +236,8 @@ impl CandidateLabels {
             .zip(self.entries[range].iter().copied())
     }
 
-    /// One sweep: support (19), update (20) with the constant `slack_gain` for the slack, and `normalisations` of rows and
-    /// columns in turn.
+    /// One sweep: support (19), update (20) with the constant `slack_gain` for the slack, and
+    /// `normalisations` of rows and columns in turn.
     fn sweep(&mut self, slack_gain: f64, normalisations: usize) {
         self.support.clear();
         for links in self.link_starts.windows(2) {

@@ -1,9 +1,9 @@
 //! Control points on a surface: the trait and its implementations.
 //!
-//! Most of them spread points over the area of the surface on a lattice of its pixels. The surface is
-//! cut into strips of rows, the strips into cells of equal weight, and a point stands in the centroid
-//! of each. Cuts run through nodes: where the surface is the same but larger, or lies elsewhere
-//! between the pixels, the points are the same points of the surface.
+//! Most of them spread points over the area of the surface on a lattice of its pixels. The surface
+//! is cut into strips of rows, the strips into cells of equal weight, and a point stands in the
+//! centroid of each. Cuts run through nodes: where the surface is the same but larger, or lies
+//! elsewhere between the pixels, the points are the same points of the surface.
 
 mod contact;
 

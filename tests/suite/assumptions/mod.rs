@@ -1,7 +1,9 @@
-//! What happens when the world is not as assumed: the error of the modulus, what was stated of it, and whether that was true.
+//! What happens when the world is not as assumed: the error of the modulus, what was stated of it,
+//! and whether that was true.
 //!
-//! Contacts are by finite elements at finite strain. A row departs from what the default pipeline assumes in one respect or in all; its
-//! answer's interval holds the truth, or a flag about the modulus says what is wrong, or the row is one that [`UNSEEN`] names.
+//! Contacts are by finite elements at finite strain. A row departs from what the default pipeline
+//! assumes in one respect or in all; its answer's interval holds the truth, or a flag about the
+//! modulus says what is wrong, or the row is one that [`UNSEEN`] names.
 #![allow(clippy::print_stdout)]
 mod worlds;
 
@@ -12,7 +14,8 @@ use tactile_imaging::pipeline::{EstimatorChoice, Flag};
 use tactile_simulate::Camera;
 use worlds::{MODULUS_PA, RADIUS_M, Sample, Stated, World};
 
-/// Departures that leave no trace in two frames of one ball: nothing but a standard error that the user states can hold the truth.
+/// Departures that leave no trace in two frames of one ball: nothing but a standard error that the
+/// user states can hold the truth.
 const UNSEEN: [&str; 3] = [
     "layers stated 10 % too stiff",
     "pixels stated 1 % too large",
@@ -170,7 +173,8 @@ fn all_of_it(world: &mut World) {
     world.camera.read_noise_grey *= 2.0;
 }
 
-/// Flags of the surface, the match and the strain excuse nothing: the modulus of a ball does not use them, and one always stands on frames so coarse.
+/// Flags of the surface, the match and the strain excuse nothing: the modulus of a ball does not
+/// use them, and one always stands on frames so coarse.
 fn concerns_modulus(flag: &Flag) -> bool {
     !matches!(
         flag,

@@ -1,4 +1,5 @@
-//! The inputs kept for the fuzz targets of the readers, once more: valid files of every kind, broken ones, and what once failed.
+//! The inputs kept for the fuzz targets of the readers, once more: valid files of every kind,
+//! broken ones, and what once failed.
 //!
 //! `fuzz/README.md` says how to look for more.
 #![allow(clippy::print_stdout)] // the input that is checked, shown where a check fails

@@ -1,4 +1,5 @@
-//! What must hold of every reader for any bytes: an answer within its documented range, or an error of one sentence that names the file.
+//! What must hold of every reader for any bytes: an answer within its documented range, or an error
+//! of one sentence that names the file.
 //!
 //! Shared by the replay of the kept corpus and by the fuzz targets of `fuzz/`.
 
@@ -81,7 +82,8 @@ pub(crate) fn toml(bytes: &[u8]) {
     answer(bytes, read_contact_table(&file.path));
 }
 
-/// The answer, if there is one; an error names the file and holds no value printed for debugging, unless it quotes one from the file.
+/// The answer, if there is one; an error names the file and holds no value printed for debugging,
+/// unless it quotes one from the file.
 fn answer<T, E: Display>(bytes: &[u8], result: Result<T, E>) -> Option<T> {
     let sentence = match result {
         Ok(answer) => return Some(answer),

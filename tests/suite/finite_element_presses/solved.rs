@@ -13,7 +13,8 @@ type Sensor = (f64, &'static [(f64, f64)]);
 
 const PAPER: &[(f64, f64)] = &[(2e-3, 136e3), (3e-3, 80e3), (5e-3, 34e3)];
 
-/// The paper's guide under balls of 3 and 8 mm, single layers that contacts of 1.2 ball radii take to a/h of 1 and 1.5, rigid flats.
+/// The paper's guide under balls of 3 and 8 mm, single layers that contacts of 1.2 ball radii take
+/// to a/h of 1 and 1.5, rigid flats.
 pub(super) const SENSORS: [Sensor; 6] = [
     (3e-3, PAPER),
     (8e-3, PAPER),
@@ -23,8 +24,8 @@ pub(super) const SENSORS: [Sensor; 6] = [
     (20e-3, &[]),
 ];
 
-/// The largest a/R that the laws and the tables are asked for. On a guide softer than the ball, approaches that a rigid flat would take to 1.15 may
-/// exceed it.
+/// The largest a/R that the laws and the tables are asked for. On a guide softer than the ball,
+/// approaches that a rigid flat would take to 1.15 may exceed it.
 const LARGEST_RATIO: f64 = 1.2;
 
 /// The elements' Poisson ratio where ½ is meant.
@@ -47,13 +48,15 @@ pub(super) fn table((radius_m, layers): &Sensor) -> Arc<ContactTable> {
     Arc::new(table.unwrap())
 }
 
-/// A ball of 30 to 250 kPa on one of the sensors at four loads, a/R 0.1 to 1.2, on a coarser or a finer mesh than the tables'.
+/// A ball of 30 to 250 kPa on one of the sensors at four loads, a/R 0.1 to 1.2, on a coarser or a
+/// finer mesh than the tables'.
 pub(super) fn ball(seed: u64) -> Ball {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let (radius_m, layers) = SENSORS[seed as usize % SENSORS.len()];
     let modulus = 30e3 * (250.0_f64 / 30.0).powf(rng.random::<f64>());
     let fineness = if rng.random::<bool>() { 4 } else { 7 };
-    // Approaches at which a/R is about x: Hertz's a²/R, less what large strain and the ball's far side take off.
+    // Approaches at which a/R is about x: Hertz's a²/R, less what large strain and the ball's far
+    // side take off.
     let part = if layers.is_empty() { 0.75 } else { 0.9 };
     let ratios = [0.12, 0.45].map(|from: f64| {
         let smaller = from * (0.85_f64 / 0.45).powf(1.6 * rng.random::<f64>());

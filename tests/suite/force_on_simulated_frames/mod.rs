@@ -1,6 +1,7 @@
 //! Force, centroid and contact radius on simulated frames, against the scene's truth.
 //!
-//! The default camera's noise is 1 % of the brightest signal (2 of 200 grey levels, most of it photons).
+//! The default camera's noise is 1 % of the brightest signal (2 of 200 grey levels, most of it
+//! photons).
 #![allow(clippy::print_stdout)]
 
 mod study;
@@ -34,7 +35,8 @@ fn press(camera: Camera) -> PressOptions {
     }
 }
 
-/// The sensor's true calibration, with its error left out: what is tested is the frames' share of the error.
+/// The sensor's true calibration, with its error left out: what is tested is the frames' share of
+/// the error.
 fn calibration(scene: &PressScene) -> LinearCalibration {
     let camera = scene.options().camera;
     let newton_per_grey =
@@ -93,7 +95,8 @@ fn the_full_frame_with_its_vignetting() {
 
 #[test]
 fn vignetting_is_corrected_on_request() {
-    // In a corner, where the lens takes 2 % of the light; the scene's calibration belongs to the middle.
+    // In a corner, where the lens takes 2 % of the light; the scene's calibration belongs to the
+    // middle.
     let vignetted = Camera {
         vignetting: 0.03,
         ..camera()

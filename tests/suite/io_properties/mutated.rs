@@ -1,5 +1,5 @@
-//! Valid files with bytes, fields or lines changed, dropped, doubled or cut: every reader gives an answer or an error that names
-//! the file, none panics; nor does what the values are given to.
+//! Valid files with bytes, fields or lines changed, dropped, doubled or cut: every reader gives an
+//! answer or an error that names the file, none panics; nor does what the values are given to.
 //!
 //! Random bytes alone end at a parser's door; a valid file with a few edits comes further in.
 

@@ -66,8 +66,8 @@ fn forces(
     )
 }
 
-/// e_xx = e_yy = −ν e_zz, each counted from the first load and hence over its λ_t² = 1 − 2ν e_zz. Two errors of much the same size
-/// have twice the degrees of freedom of one.
+/// e_xx = e_yy = −ν e_zz, each counted from the first load and hence over its λ_t² = 1 − 2ν e_zz.
+/// Two errors of much the same size have twice the degrees of freedom of one.
 fn lateral(found: &StrainBetween<2>) -> Estimate {
     let (mean, error) = (found.summary.mean, found.standard_error);
     Estimate::new(

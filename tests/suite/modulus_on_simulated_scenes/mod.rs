@@ -1,8 +1,10 @@
-//! Young's modulus of simulated spheres and blocks, from frames with camera noise through a calibration made with a noisy gauge.
+//! Young's modulus of simulated spheres and blocks, from frames with camera noise through a
+//! calibration made with a noisy gauge.
 //!
-//! The experimenter of these tests sets the loads so that a/R stays between 0.1 and 0.3, inside Hertz's range, and the lens so
-//! that the largest contact spans half of the frame's height; calibrates with a rigid ball that makes contacts of the same size and
-//! brightness; and knows the ball's radius, the waveguide and Poisson's ratio.
+//! The experimenter of these tests sets the loads so that a/R stays between 0.1 and 0.3, inside
+//! Hertz's range, and the lens so that the largest contact spans half of the frame's height;
+//! calibrates with a rigid ball that makes contacts of the same size and brightness; and knows the
+//! ball's radius, the waveguide and Poisson's ratio.
 #![allow(clippy::print_stdout)]
 
 mod block;
@@ -24,7 +26,8 @@ const NU: f64 = 0.5;
 /// Error of the force gauge, as a share of its range.
 const GAUGE: f64 = 1e-3;
 
-/// Scenes per study: thirty for the errors; coverage, which takes more, is tight in `.ci/run studies`. `SCENES` overrides.
+/// Scenes per study: thirty for the errors; coverage, which takes more, is tight in `.ci/run
+/// studies`. `SCENES` overrides.
 fn scenes(default: u64) -> u64 {
     std::env::var("SCENES")
         .ok()
@@ -158,8 +161,9 @@ fn spheres_of_10_to_500_kilopascal() {
     Study::run(scenes(30), "spheres", sphere::trial).check();
 }
 
-/// Stage by stage, without a [`Pipeline`](tactile_imaging::Pipeline): its surfaces are read from shading, which says nothing of a
-/// patterned block, so that the strain here is that of the bumps' centres.
+/// Stage by stage, without a [`Pipeline`](tactile_imaging::Pipeline): its surfaces are read from
+/// shading, which says nothing of a patterned block, so that the strain here is that of the bumps'
+/// centres.
 #[test]
 fn blocks_by_the_ratio_of_stress_and_the_strain_of_their_bumps() {
     Study::run(scenes(12), "blocks", block::trial).check();

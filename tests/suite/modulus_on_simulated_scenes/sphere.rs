@@ -31,8 +31,9 @@ fn waveguide() -> Waveguide {
     Waveguide::new(layers).unwrap()
 }
 
-/// A sphere, and the rigid ball that calibrates: chosen, from the sphere's largest contact as measured and the gauge's force there,
-/// to make contacts of the same size and brightness at the same forces. The sphere's modulus has no part in the choice.
+/// A sphere, and the rigid ball that calibrates: chosen, from the sphere's largest contact as
+/// measured and the gauge's force there, to make contacts of the same size and brightness at the
+/// same forces. The sphere's modulus has no part in the choice.
 struct Presses {
     modulus: f64,
     radius: f64,

@@ -1,5 +1,5 @@
-//! Errors of the calibration, of the light and of every matched displacement carried through the spline and the strain to
-//! the modulus, against redrawing the whole experiment.
+//! Errors of the calibration, of the light and of every matched displacement carried through the
+//! spline and the strain to the modulus, against redrawing the whole experiment.
 
 use nalgebra::{DMatrix, Matrix3, Point3, SVector, Vector3};
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
@@ -184,7 +184,8 @@ fn loads(forces: [f64; 2], squeeze: Estimate) -> LoadSeries {
     LoadSeries::new([load(forces[0]), last])
 }
 
-/// The standard deviation of 4000 redrawn moduli is itself known to 1.1 %; 5 % is four and a half of its standard deviations.
+/// The standard deviation of 4000 redrawn moduli is itself known to 1.1 %; 5 % is four and a half
+/// of its standard deviations.
 #[test]
 fn propagation_and_redrawing_agree() {
     let experiment = Experiment::new();
@@ -202,7 +203,8 @@ fn propagation_and_redrawing_agree() {
         propagated.interval_95.upper.unwrap(),
     ];
     for (one, other) in ends.iter().zip(redrawn.interval_95) {
-        // Quantiles of 4000 draws near 2.5 % wander by 4 % of a standard deviation, and the modulus bends a little.
+        // Quantiles of 4000 draws near 2.5 % wander by 4 % of a standard deviation, and the modulus
+        // bends a little.
         assert!(
             (one - other).abs() < 0.25 * redrawn.standard_error,
             "{one} {other}"
@@ -210,7 +212,8 @@ fn propagation_and_redrawing_agree() {
     }
 }
 
-/// Each source alone, so that a wrong one cannot hide behind the others; their variances add up to the whole.
+/// Each source alone, so that a wrong one cannot hide behind the others; their variances add up to
+/// the whole.
 #[test]
 fn every_source_is_carried_rightly() {
     let experiment = Experiment::new();

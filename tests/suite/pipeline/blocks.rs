@@ -1,11 +1,13 @@
-//! Surfaces over blocks of pixels, as large as the control points allow, are those over single pixels.
+//! Surfaces over blocks of pixels, as large as the control points allow, are those over single
+//! pixels.
 #![allow(clippy::print_stdout)]
 use nalgebra::Matrix3;
 use tactile_imaging::pipeline::{Binning, ContactSurface};
 use tactile_simulate::Trial;
 use tactile_simulate::{CalibrationRun, Camera, PressOptions};
 
-/// Half the paper's resolution: contacts of some 80 pixels' radius, whose blocks for 60 points are 4 × 4.
+/// Half the paper's resolution: contacts of some 80 pixels' radius, whose blocks for 60 points are
+/// 4 × 4.
 fn trial() -> Trial {
     let camera = Camera {
         shape: [521, 696],
@@ -43,7 +45,8 @@ fn answer(trial: &Trial, binning: Binning) -> Answer {
     }
 }
 
-/// Heights above the rim: those of the blocks against the means of their pixels', as shares of the greatest.
+/// Heights above the rim: those of the blocks against the means of their pixels', as shares of the
+/// greatest.
 fn largest_difference(blocks: &ContactSurface, pixels: &ContactSurface) -> f64 {
     let side = blocks.binning;
     let top = pixels.surface.heights.iter().copied().fold(0.0, f64::max);

@@ -1,6 +1,7 @@
 //! Hostile presses: a typed error or a flagged answer, never a panic, never a silent NaN.
 //!
-//! 500 presses are some three of every pair of troubles; `HOSTILE=10000` takes more, as `.ci/run studies` does in an optimised build.
+//! 500 presses are some three of every pair of troubles; `HOSTILE=10000` takes more, as `.ci/run
+//! studies` does in an optimised build.
 use crate::hostile::Hostile;
 use ndarray::{Array2, s};
 use proptest::prelude::*;
@@ -13,7 +14,8 @@ use tactile_simulate::{Camera, PressOptions};
 const SHAPE: [usize; 2] = [36, 44];
 const SEEDS: usize = 24;
 
-/// Reference and frame of every kind of trouble and every seed, made once; the kind after the last is a sound press.
+/// Reference and frame of every kind of trouble and every seed, made once; the kind after the last
+/// is a sound press.
 fn frames(kind: usize, seed: usize) -> &'static [Array2<u8>; 2] {
     static FRAMES: OnceLock<Vec<[Array2<u8>; 2]>> = OnceLock::new();
     let all = || {
@@ -78,8 +80,9 @@ fn pipeline(object: u8) -> Pipeline {
         .with_control_points(16)
 }
 
-/// Whether a contact's numbers that are no numbers are owned up to: by a flag that says what is wrong with that contact. A flag about the law
-/// (a/R beyond Hertz's range stands on most of these scenes) or about another frame excuses nothing.
+/// Whether a contact's numbers that are no numbers are owned up to: by a flag that says what is
+/// wrong with that contact. A flag about the law (a/R beyond Hertz's range stands on most of these
+/// scenes) or about another frame excuses nothing.
 fn excuses_contact(flag: &Flag, in_frame: usize) -> bool {
     matches!(flag,
         Flag::Saturated { frame, .. }

@@ -1,4 +1,5 @@
-//! The pipeline pulls: what is not asked for is not computed, what is skipped changes no answer, stages can be swapped.
+//! The pipeline pulls: what is not asked for is not computed, what is skipped changes no answer,
+//! stages can be swapped.
 mod blocks;
 mod hostile;
 mod on_demand;

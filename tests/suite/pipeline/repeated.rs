@@ -71,7 +71,8 @@ fn darker_frames_are_flagged() {
     assert_eq!(found, Some(-3.0), "{text}");
 }
 
-/// One contact of two is cut by the border: its force and radius are wrong, and the modulus is the other's.
+/// One contact of two is cut by the border: its force and radius are wrong, and the modulus is the
+/// other's.
 #[test]
 fn a_contact_that_the_border_cuts_is_left_out() {
     let trial = trial(&[0.7, 1.2], 6);

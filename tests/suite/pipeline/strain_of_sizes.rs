@@ -14,7 +14,8 @@ fn seeds() -> u64 {
     given.and_then(|n| n.parse().ok()).unwrap_or(2)
 }
 
-/// The paper's press in a camera of this size; every seed has its own noise and its own place between the pixels.
+/// The paper's press in a camera of this size; every seed has its own noise and its own place
+/// between the pixels.
 fn trial([width, height]: [usize; 2], seed: u64) -> Trial {
     let fraction = |step: f64| (step * seed as f64).fract() - 0.5;
     let camera = Camera {
@@ -44,8 +45,9 @@ fn cautions(flags: &[Flag]) -> bool {
     })
 }
 
-/// Every mean strain lies within three stated standard errors of the truth, or a caution says that it may not: 3 is what one normal
-/// number in 370 exceeds, and the errors are stated for the worst size.
+/// Every mean strain lies within three stated standard errors of the truth, or a caution says that
+/// it may not: 3 is what one normal number in 370 exceeds, and the errors are stated for the worst
+/// size.
 #[test]
 fn strains_are_within_their_errors_at_every_size_or_flagged() {
     let mut failures = Vec::new();

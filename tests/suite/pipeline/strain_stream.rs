@@ -264,7 +264,8 @@ fn an_estimator_of_a_users_own_is_a_stage_boxed_too() {
     }
 }
 
-/// A frame leaves nothing in the memory that the next one works in, but the answer that its match begins from.
+/// A frame leaves nothing in the memory that the next one works in, but the answer that its match
+/// begins from.
 #[test]
 fn frames_in_between_leave_no_trace() {
     let trial = trial(&[0.7, 1.2, 0.4, 1.0], 5);

@@ -80,7 +80,8 @@ fn shear_is_the_way_of_the_centroid_since_contact_began() {
     );
     let shear = session.push(second).unwrap().shear.unwrap();
     for (found, truth) in shear.force_n.iter().zip(shear_n) {
-        // Six standard errors, and a hundredth of a pixel for what rounding and vignetting do to the centroid.
+        // Six standard errors, and a hundredth of a pixel for what rounding and vignetting do to
+        // the centroid.
         let tolerance = 6.0 * found.standard_error + 0.01 * 86.2e-6 * stiffness[0];
         assert!(
             (found.value - truth).abs() < tolerance,
@@ -125,7 +126,8 @@ fn drift_of_the_light_is_seen_in_frames_without_contact() {
     assert!(session.drift().caution.is_some());
 }
 
-/// The answer after 4 000 frames is that after the first cycles, and the truth: the loads kept apart are full after a few hundred.
+/// The answer after 4 000 frames is that after the first cycles, and the truth: the loads kept
+/// apart are full after a few hundred.
 #[test]
 fn four_thousand_frames_leave_memory_and_answer_alone() {
     let camera = Camera::default().coarser(16);
@@ -166,7 +168,8 @@ fn four_thousand_frames_leave_memory_and_answer_alone() {
     let drift = late.youngs_modulus_pa / early.youngs_modulus_pa - 1.0;
     let error = late.youngs_modulus_pa / trial.simulation.youngs_modulus_pa - 1.0;
     println!("drift {drift:+.5}, error {error:+.5}");
-    // Two and a half of the early estimate's standard errors, most of which (the calibration's) both have in common.
+    // Two and a half of the early estimate's standard errors, most of which (the calibration's)
+    // both have in common.
     assert!(drift.abs() < 0.01, "drift {drift}");
     assert!(error.abs() < 0.03, "error {error}");
     assert!(session.drift().caution.is_none(), "{:?}", session.drift());

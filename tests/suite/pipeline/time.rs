@@ -17,7 +17,8 @@ fn relaxing(time_s: f64) -> f64 {
     80e3 + 40e3 * (-time_s / 2.0).exp()
 }
 
-/// A frame of a ball of this modulus at this force, by a sensor whose gain has changed by this factor since its calibration.
+/// A frame of a ball of this modulus at this force, by a sensor whose gain has changed by this
+/// factor since its calibration.
 fn frame(trial: &Trial, modulus_pa: f64, force_n: f64, gain: f64, repeat: u32) -> Array2<u8> {
     let options = trial.scene.options();
     let material = Elastic {

@@ -1,18 +1,22 @@
-//! The numbers of small simulated scenes, compared with those recorded in `tests/suite/recorded_answers/answers.txt`.
+//! The numbers of small simulated scenes, compared with those recorded in
+//! `tests/suite/recorded_answers/answers.txt`.
 //!
-//! A change that is meant to leave every answer as it is shows that here. A change that is meant to move answers records them
-//! anew: `RECORD_ANSWERS=1 cargo test --test suite recorded_answers`, and the difference of the text file says what moved.
+//! A change that is meant to leave every answer as it is shows that here. A change that is meant to
+//! move answers records them anew: `RECORD_ANSWERS=1 cargo test --test suite recorded_answers`, and
+//! the difference of the text file says what moved.
 
 mod readings;
 use test_support as record;
 mod scenes;
 
-/// Largest difference from a recorded number, relative to the largest number of its line: sums taken in another order differ by some
-/// thousand roundings of 1e-16; anything else moves a number by far more.
+/// Largest difference from a recorded number, relative to the largest number of its line: sums
+/// taken in another order differ by some thousand roundings of 1e-16; anything else moves a number
+/// by far more.
 const TOLERANCE: f64 = 1e-12;
 
-/// The same for strains and what comes of them. Processors with wider instructions sum in another order, and λ, the least of a flat
-/// score, is known to the root of rounding: with AVX-512 and with AVX2 strains differ by up to 4e-10.
+/// The same for strains and what comes of them. Processors with wider instructions sum in another
+/// order, and λ, the least of a flat score, is known to the root of rounding: with AVX-512 and with
+/// AVX2 strains differ by up to 4e-10.
 const STRAIN_TOLERANCE: f64 = 1e-8;
 
 /// One line: what the numbers are, then the numbers.

@@ -62,7 +62,8 @@ fn ball() -> Vec<Answer> {
     answers.all
 }
 
-/// A patterned block between plates: nothing is known of its shape, the modulus is stress over strain.
+/// A patterned block between plates: nothing is known of its shape, the modulus is stress over
+/// strain.
 fn block() -> Vec<Answer> {
     let mut answers = Answers::of("block");
     let scene = UniaxialScene::new(UniaxialOptions {

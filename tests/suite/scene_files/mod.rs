@@ -1,4 +1,5 @@
-//! Scene files from end to end: a simulated scene written to a folder is measured; every bad input gets its sentence.
+//! Scene files from end to end: a simulated scene written to a folder is measured; every bad input
+//! gets its sentence.
 
 mod mistakes;
 

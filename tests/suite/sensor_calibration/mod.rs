@@ -13,7 +13,8 @@ use tactile_imaging::pipeline::{Object, Pipeline};
 use tactile_imaging::sensor::{Indenter, Sensor, SensorCalibration, SensorError};
 use tactile_simulate::Camera;
 
-/// Changes of the illumination are divided out where they can be told, as a sensor's own pipeline does.
+/// Changes of the illumination are divided out where they can be told, as a sensor's own pipeline
+/// does.
 fn drift_corrected() -> ForceOptions {
     let contact = ContactOptions::default().with_drift(DriftCorrection::Automatic);
     ForceOptions::default().with_contact(contact)
@@ -114,8 +115,9 @@ impl Study {
     }
 }
 
-/// The paper's camera with pixels twice as wide over the same 30 mm: small enough for a test, and blurred by so little that the local
-/// curve, which is not linear, reads the same pressure from the mean light of a pixel as from its parts.
+/// The paper's camera with pixels twice as wide over the same 30 mm: small enough for a test, and
+/// blurred by so little that the local curve, which is not linear, reads the same pressure from the
+/// mean light of a pixel as from its parts.
 fn half() -> Camera {
     Camera::default().coarser(2)
 }
@@ -165,7 +167,8 @@ fn mistakes_of_a_calibration_are_named() {
         matches!(wrong_balls, SensorError::Radius { .. }),
         "{wrong_balls}"
     );
-    // The largest force of the largest ball, whose pressures the other balls have too: the curve cannot bend to it.
+    // The largest force of the largest ball, whose pressures the other balls have too: the curve
+    // cannot bend to it.
     let wrong_force = sentence(&|c| c.presses[37].force_n *= 1.3);
     assert!(
         matches!(wrong_force, SensorError::Scatter { worst: 37, .. }),
@@ -182,7 +185,8 @@ fn mistakes_of_a_calibration_are_named() {
     }
 }
 
-/// A sensor's file says the same when it is read again, and names what is wrong in one that cannot be used.
+/// A sensor's file says the same when it is read again, and names what is wrong in one that cannot
+/// be used.
 #[test]
 fn a_sensor_file_is_read_as_it_was_written() {
     let calibrated = Simulated::new(Effects::ALL, Camera::default().coarser(4), 78)

@@ -1,7 +1,7 @@
 //! Simulated sensors with every effect that a calibration must learn, and presses on them.
 //!
-//! Contacts are those of the linear theory of bonded layers, radius by radius, with Hertz's pressure: the simulator's closed form takes
-//! the layers in series.
+//! Contacts are those of the linear theory of bonded layers, radius by radius, with Hertz's
+//! pressure: the simulator's closed form takes the layers in series.
 use ndarray::Array2;
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 use rand_distr::{Distribution, StandardNormal};
@@ -337,7 +337,8 @@ fn rigid(radius_m: f64) -> ElasticSphere {
     }
 }
 
-/// The same scene with its contact centred elsewhere, in pixels: its light does not depend on the place.
+/// The same scene with its contact centred elsewhere, in pixels: its light does not depend on the
+/// place.
 fn centred(scene: &PressScene, place: [f64; 2]) -> PressScene {
     PressScene::new(PressOptions {
         centre_px: Some(place),

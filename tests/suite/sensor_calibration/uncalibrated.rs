@@ -1,4 +1,5 @@
-//! Each effect alone on a sensor that was not calibrated for it: the answer moves by less than its interval, or it is flagged.
+//! Each effect alone on a sensor that was not calibrated for it: the answer moves by less than its
+//! interval, or it is flagged.
 #![allow(clippy::print_stdout)]
 use super::sensors::{
     BALL_ERROR, Effects, POISSON_ERROR, SAMPLE_POISSON, SAMPLE_RADIUS_M, Simulated, estimator,
@@ -186,7 +187,8 @@ fn answer(effects: Effects, left_out: Option<LeftOut>, camera: Camera, seed: u64
     Ok((modulus, flags))
 }
 
-/// Prints a row an effect, and returns the effects that were neither within the interval nor flagged.
+/// Prints a row an effect, and returns the effects that were neither within the interval nor
+/// flagged.
 fn table(seeds: u64) -> Vec<(&'static str, u32)> {
     // The same draws without an effect.
     let ideal = |seed: u64| {

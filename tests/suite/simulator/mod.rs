@@ -35,7 +35,8 @@ fn the_light_of_an_ideal_frame_sums_to_the_force() {
         let truth = scene.truth(k);
         let light: f64 = scene.expected_frame(k).iter().map(|v| v - background).sum();
         let area = scene.options().camera.pixel_size_m.iter().product::<f64>();
-        // 10⁵ pixels of up to 215 grey levels, each rounded to 1 ulp (3e-14), against a sum of 10⁶: below 1e-13.
+        // 10⁵ pixels of up to 215 grey levels, each rounded to 1 ulp (3e-14), against a sum of 10⁶:
+        // below 1e-13.
         assert!(relative(light * area / scene.truth(0).grey_per_pascal, force) < 1e-12);
         assert!(relative(light, truth.integrated_pixel_value) < 1e-12);
         assert!(relative(truth.visible_force_n, force) < 1e-12);
@@ -176,7 +177,8 @@ fn a_brighter_gain_saturates_and_the_truth_counts_it() {
     assert!(bright >= truth.saturated_pixels && bright < truth.saturated_pixels + 100);
 }
 
-/// A gain that suits a large soft ball's low pressure is too high for a small rigid one: its sums are no longer in proportion to the force.
+/// A gain that suits a large soft ball's low pressure is too high for a small rigid one: its sums
+/// are no longer in proportion to the force.
 #[test]
 fn a_calibration_that_saturates_is_refused_and_says_what_helps() {
     let large = ElasticSphere {

@@ -19,8 +19,9 @@ fn noise_has_the_stated_mean_and_variance() {
             .map(|&v| (f64::from(v) - mean).powi(2))
             .sum::<f64>()
             / (n - 1.0);
-        // Rounding adds 1/12 where the noise spans a level or more; below that, and where noise is clipped at black,
-        // the moments are those of the rounded law, so only the brighter fields are checked.
+        // Rounding adds 1/12 where the noise spans a level or more; below that, and where noise is
+        // clipped at black, the moments are those of the rounded law, so only the brighter fields
+        // are checked.
         if grey < 4.0 {
             continue;
         }
@@ -49,7 +50,8 @@ fn faint_light_is_poisson() {
     };
     let image = camera.expose(Array2::from_elem((400, 500), 2.0).view(), 1, 1);
     let zero = image.iter().filter(|&&v| v == 0).count() as f64 / image.len() as f64;
-    // Grey 0 is fewer than 10 electrons: P(X ≤ 9 | 40) = 9.2e-9; grey ≤ 1 is fewer than 30: 0.0374… by summation.
+    // Grey 0 is fewer than 10 electrons: P(X ≤ 9 | 40) = 9.2e-9; grey ≤ 1 is fewer than 30: 0.0374…
+    // by summation.
     let at_most = |k: u32| {
         let mut term = (-40.0_f64).exp();
         let mut sum = term;

@@ -52,7 +52,8 @@ fn a_table_of_hertz_is_seen_as_hertz() {
         );
         let (seen, wanted) = (table.frame(load, 0), exact.frame(load, 0));
         let other = seen.iter().zip(&wanted).filter(|(a, b)| a != b).count();
-        // The same noise falls on the same light: a difference of 1e-4 grey levels moves the rounding of one pixel in 10⁴.
+        // The same noise falls on the same light: a difference of 1e-4 grey levels moves the
+        // rounding of one pixel in 10⁴.
         assert!(other < 20, "{other} of {} pixels", seen.len());
         let apparent = found
             .contact

@@ -217,8 +217,8 @@ fn hostile_scenes_are_what_they_say() {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 48, ..ProptestConfig::default() })]
 
-    /// Any scene, however odd its frame, makes frames of the right size whose visible force lies between zero and the
-    /// force and, where nothing is clipped, whose light is that force.
+    /// Any scene, however odd its frame, makes frames of the right size whose visible force lies
+    /// between zero and the force and, where nothing is clipped, whose light is that force.
     #[test]
     fn any_scene_keeps_its_books(
         shape in (1_usize..60, 1_usize..60),

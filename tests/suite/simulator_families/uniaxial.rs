@@ -57,19 +57,22 @@ fn uniaxial_frames_carry_the_force_and_the_points_deform_as_the_states_say() {
         let light: f64 = scene.expected_frame(k).iter().map(|v| v - background).sum();
         assert!(relative(light * area / scene.grey_per_pascal(), force) < 1e-12);
         assert!(relative(scene.pressure_pa(k).sum() * area, force) < 1e-12);
-        // Where the surface is flat over a pixel, the pressure is the height through the stated factor.
+        // Where the surface is flat over a pixel, the pressure is the height through the stated
+        // factor.
         let heights = scene.height_m(k);
         let from_light = scene.pressure_pa(k) * scene.height_per_pascal_m(k);
         let inner = largest_inner_difference(&heights, &from_light);
-        // Bumps of 0.6 mm height and 0.6 mm half width curve by π²h/2w² = 8 per mm: over a pixel of 0.086 mm
-        // the mean and the centre differ by curvature·pixel²/12 = 5 µm. Border pixels are partly covered.
+        // Bumps of 0.6 mm height and 0.6 mm half width curve by π²h/2w² = 8 per mm: over a pixel of
+        // 0.086 mm the mean and the centre differ by curvature·pixel²/12 = 5 µm. Border pixels are
+        // partly covered.
         assert!(inner < 6e-6, "{inner}");
         for p in &points {
             let moved = scene.deform(k, p);
             assert!((moved.z - scene.states()[k].stretch_z * p.z).abs() < 1e-18);
         }
     }
-    // Strain of the moved points is that of the increment: the map between two states is affine about the centre.
+    // Strain of the moved points is that of the increment: the map between two states is affine
+    // about the centre.
     let (a, b) = (scene.deform(0, &points[3]), scene.deform(1, &points[3]));
     let (c, d) = (scene.deform(0, &points[200]), scene.deform(1, &points[200]));
     let [first, second] = [&scene.states()[0], &scene.states()[1]];

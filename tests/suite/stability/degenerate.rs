@@ -1,4 +1,5 @@
-//! Frames that are hardly frames: a typed error, or an answer that is finite or flagged; never a panic.
+//! Frames that are hardly frames: a typed error, or an answer that is finite or flagged; never a
+//! panic.
 use ndarray::Array2;
 use tactile_imaging::Pipeline;
 use tactile_imaging::force::CalibrationPair;
@@ -7,7 +8,8 @@ use tactile_imaging::pipeline::{
     SessionStrain, StagesConfig,
 };
 
-/// Hertz's hemisphere of this radius in pixels and peak in grey levels, in the middle of a frame over a background of 15.
+/// Hertz's hemisphere of this radius in pixels and peak in grey levels, in the middle of a frame
+/// over a background of 15.
 fn dome((rows, columns): (usize, usize), radius: f64, peak: f64) -> Array2<u8> {
     let middle = [(rows as f64 - 1.0) / 2.0, (columns as f64 - 1.0) / 2.0];
     Array2::from_shape_fn((rows, columns), |(r, c)| {
@@ -262,7 +264,8 @@ fn measured_is_sound(case: &str, measured: &Measurement) {
     );
 }
 
-/// A stream of the same frames, twice, in which no error may stick: a sound frame pushed after an error is measured as ever.
+/// A stream of the same frames, twice, in which no error may stick: a sound frame pushed after an
+/// error is measured as ever.
 fn stream(case: &str, pipeline: &Pipeline, [reference, first, second]: &[Array2<u8>; 3]) {
     let Ok(mut session) = Session::new(pipeline, &[reference.view()]) else {
         return;

@@ -12,8 +12,8 @@ fn steps(loads: usize) -> Vec<f64> {
     (0..loads).map(|k| 0.2 + 0.035 * k as f64).collect()
 }
 
-/// Six of its standard errors around the truth; those errors between a thousandth (that of the force scale) and the two hundredths
-/// that the worst load alone has.
+/// Six of its standard errors around the truth; those errors between a thousandth (that of the
+/// force scale) and the two hundredths that the worst load alone has.
 pub(crate) fn many(table: &mut Table) {
     let falling = steps(8).into_iter().rev().collect();
     for (what, forces) in [
@@ -36,7 +36,8 @@ pub(crate) fn many(table: &mut Table) {
             &[press.youngs_modulus_pa],
             1.0,
         );
-        // A session has its loads in rising order; those that it merges are 3 % apart and follow one law, of which they are means.
+        // A session has its loads in rising order; those that it merges are 3 % apart and follow
+        // one law, of which they are means.
         let allowed = if forces.len() > Session::MOST_LOADS {
             0.1 * press.standard_error_pa / truth
         } else {
@@ -107,7 +108,8 @@ fn one_load_has_no_strain() {
     }
 }
 
-/// Stress over strain where both are noise: the loads determine no modulus, or zero within six standard errors.
+/// Stress over strain where both are noise: the loads determine no modulus, or zero within six
+/// standard errors.
 #[test]
 fn equal_loads_have_no_ratio() {
     for choice in [EstimatorChoice::PaperRatio, EstimatorChoice::Regression] {

@@ -1,4 +1,5 @@
-//! The whole pipeline in every unit, position and brightness, and at the ends of what frames and loads can be.
+//! The whole pipeline in every unit, position and brightness, and at the ends of what frames and
+//! loads can be.
 mod degenerate;
 mod loads;
 mod press;

@@ -9,7 +9,8 @@ use tactile_imaging::pipeline::{EstimatorChoice, Object, StagesConfig};
 use tactile_simulate::Trial;
 use tactile_simulate::{CalibrationRun, Camera, Gain, PressLoad, PressOptions};
 
-/// 348 × 260 pixels on 15 mm: the contact is as large in pixels as a camera of 696 × 520 sees it, for 200 control points enough.
+/// 348 × 260 pixels on 15 mm: the contact is as large in pixels as a camera of 696 × 520 sees it,
+/// for 200 control points enough.
 pub(crate) fn camera() -> Camera {
     Camera {
         shape: [260, 348],
@@ -42,7 +43,8 @@ pub(crate) fn trial(camera: Camera, peak_grey: f64, forces: &[f64]) -> Trial {
     Trial::new(options, &calibration).expect("a scene")
 }
 
-/// Units of length and force in which the sensor is described, and the grey levels of its calibration.
+/// Units of length and force in which the sensor is described, and the grey levels of its
+/// calibration.
 #[derive(Clone, Copy)]
 pub(crate) struct Units {
     pub(crate) length: f64,
@@ -56,7 +58,8 @@ pub(crate) const SI: Units = Units {
     grey: 1.0,
 };
 
-/// The trial's pipeline with its sensor described in other units: the layers' moduli too, in force over length².
+/// The trial's pipeline with its sensor described in other units: the layers' moduli too, in force
+/// over length².
 pub(crate) fn pipeline(trial: &Trial, units: Units) -> Pipeline {
     let options = trial.scene.options();
     let layers = options.waveguide.layers.iter().map(|l| Layer {
@@ -90,7 +93,8 @@ pub(crate) fn pipeline(trial: &Trial, units: Units) -> Pipeline {
         .expect("stages")
 }
 
-/// Exposures without contact, from which the noise of all pixels is measured, and the frames of a press.
+/// Exposures without contact, from which the noise of all pixels is measured, and the frames of a
+/// press.
 #[derive(Clone)]
 pub(crate) struct Images {
     pub(crate) references: [Array2<u8>; 2],

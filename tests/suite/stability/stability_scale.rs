@@ -1,4 +1,5 @@
-//! Units, brightness and position: what the numbers are against the truth, and what must not change them.
+//! Units, brightness and position: what the numbers are against the truth, and what must not change
+//! them.
 use super::press::{
     Answer, Images, SI, Units, answer, camera, coarse_camera, pipeline, relative, trial,
 };
@@ -22,8 +23,8 @@ fn the_pipeline_keeps_its_numbers() {
     table.finish();
 }
 
-/// Frames of a camera without noise, blur and vignetting: what is left is the pixels' size, the rounding to whole grey levels
-/// and the gauge's noise in the calibration (2 mN, of 20 readings).
+/// Frames of a camera without noise, blur and vignetting: what is left is the pixels' size, the
+/// rounding to whole grey levels and the gauge's noise in the calibration (2 mN, of 20 readings).
 fn truth(table: &mut Table) {
     for grey in [60.0, 120.0, 200.0, 235.0] {
         let (fine, coarse) = (camera().ideal(), coarse_camera().ideal());
@@ -36,8 +37,9 @@ fn truth(table: &mut Table) {
             let modulus_pa = trial.simulation.youngs_modulus_pa;
             let modulus = relative(&[found.modulus_pa], &[modulus_pa], 1.0);
             let case = |quantity: &str| format!("truth, {what}: {quantity}");
-            // The gauge's mean is good for 0.1 % of these forces, and of 60 grey levels half of one is lost at the rim of few
-            // pixels: 0.2 %. E goes as F/a³, and as the layers yield too its error is 1.7 times theirs.
+            // The gauge's mean is good for 0.1 % of these forces, and of 60 grey levels half of one
+            // is lost at the rim of few pixels: 0.2 %. E goes as F/a³, and as the layers yield too
+            // its error is 1.7 times theirs.
             table.enter(&case("force"), relative(&found.force_n, &force, 1.0), 0.004);
             table.enter(
                 &case("radius"),
@@ -57,8 +59,8 @@ fn truth(table: &mut Table) {
     }
 }
 
-/// At the rim, where a hemisphere is steepest, a quarter of a pixel may be taken or left: with pixels of width h that is
-/// √(h/2a) of its height.
+/// At the rim, where a hemisphere is steepest, a quarter of a pixel may be taken or left: with
+/// pixels of width h that is √(h/2a) of its height.
 fn surface(table: &mut Table, case: &str, trial: &Trial) {
     let pipeline = pipeline(trial, SI);
     let press = trial.press(&pipeline).unwrap();
@@ -157,10 +159,11 @@ fn pedestal(table: &mut Table, trial: &Trial, expected: &Answer) {
     }
 }
 
-/// Twice the light, twice the calibration's sums. How noise grows with light is read in whole grey levels, which do not double where
-/// the mean of two exposures has halves: the profile's fit weighs bright pixels otherwise, by a hundredth at most. What it
-/// finds moves by such shares of its own errors, 10⁻⁴ of the radius and 4 · 10⁻³ of the modulus; a tenth and a fortieth are
-/// allowed. The force is a sum and has no weights.
+/// Twice the light, twice the calibration's sums. How noise grows with light is read in whole grey
+/// levels, which do not double where the mean of two exposures has halves: the profile's fit weighs
+/// bright pixels otherwise, by a hundredth at most. What it finds moves by such shares of its own
+/// errors, 10⁻⁴ of the radius and 4 · 10⁻³ of the modulus; a tenth and a fortieth are allowed. The
+/// force is a sum and has no weights.
 fn light(table: &mut Table) {
     let trial = trial(camera(), 100.0, &[0.7, 1.2]);
     let expected = answer(&pipeline(&trial, SI), &Images::of(&trial));

@@ -3,8 +3,9 @@ use super::press::{Images, SI, answer, camera, pipeline, trial};
 use super::table::{STRAIN, Table};
 use ndarray::Array2;
 
-/// Without noise a share p of the pixels has another grey value; as many points stand otherwise, and independent errors of a share p
-/// add as √p. Frames without any such pixel are the same frame and have no strain at all, which is what the step left: δ/3.
+/// Without noise a share p of the pixels has another grey value; as many points stand otherwise,
+/// and independent errors of a share p add as √p. Frames without any such pixel are the same frame
+/// and have no strain at all, which is what the step left: δ/3.
 pub(crate) fn small(table: &mut Table) {
     let steps = [0.0, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2];
     for (what, camera) in [("without noise", camera().ideal()), ("noise", camera())] {

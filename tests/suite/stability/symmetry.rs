@@ -5,12 +5,14 @@ use nalgebra::Matrix3;
 use ndarray::{Array2, Axis};
 use tactile_simulate::Trial;
 
-/// The contact's threshold allows for false alarms among the pixels of the tiles around it, and those are others: a few faint pixels of
-/// the rim come and go, some 10⁻⁶ of the light. In this order for force, radius (of a fit that hardly looks at the rim) and
-/// centroid in pixels (10⁻⁵ of the light, a hundred pixels away at most).
+/// The contact's threshold allows for false alarms among the pixels of the tiles around it, and
+/// those are others: a few faint pixels of the rim come and go, some 10⁻⁶ of the light. In this
+/// order for force, radius (of a fit that hardly looks at the rim) and centroid in pixels (10⁻⁵ of
+/// the light, a hundred pixels away at most).
 const RIM: [f64; 3] = [1e-5, 1e-6, 1e-3];
 
-/// The image moved by whole pixels; what leaves on one side comes in on the other, so that the grey values stay the same.
+/// The image moved by whole pixels; what leaves on one side comes in on the other, so that the grey
+/// values stay the same.
 fn shifted(image: &Array2<u8>, [x, y]: [isize; 2]) -> Array2<u8> {
     let (rows, columns) = image.dim();
     let from = |i: usize, by: isize, n: usize| (i as isize - by).rem_euclid(n as isize) as usize;
@@ -20,7 +22,8 @@ fn shifted(image: &Array2<u8>, [x, y]: [isize; 2]) -> Array2<u8> {
 }
 
 pub(crate) fn shifts(table: &mut Table, trial: &Trial, expected: &Answer) {
-    // The larger contact, 91 pixels in radius, stays clear of the edge: a contact that the edge cuts is left out of the modulus.
+    // The larger contact, 91 pixels in radius, stays clear of the edge: a contact that the edge
+    // cuts is left out of the modulus.
     for by in [[1, 0], [0, 1], [-17, 9], [40, -25], [-50, -20]] {
         let moved = Images::of(trial).map(|image| shifted(image, by));
         let found = answer(&pipeline(trial, SI), &moved);
@@ -36,7 +39,8 @@ pub(crate) fn shifts(table: &mut Table, trial: &Trial, expected: &Answer) {
     }
 }
 
-/// One of the seven ways to mirror and turn a frame: rows for columns first, then columns and rows in reverse.
+/// One of the seven ways to mirror and turn a frame: rows for columns first, then columns and rows
+/// in reverse.
 #[derive(Clone, Copy)]
 struct Turn {
     transposed: bool,
@@ -108,8 +112,8 @@ pub(crate) fn turns(table: &mut Table, trial: &Trial, expected: &Answer) {
     }
 }
 
-/// The strain follows to the matcher's tolerance: points are placed from the first row on, and where the contact lies otherwise in
-/// the frame they are others.
+/// The strain follows to the matcher's tolerance: points are placed from the first row on, and
+/// where the contact lies otherwise in the frame they are others.
 fn compare(
     table: &mut Table,
     case: &str,

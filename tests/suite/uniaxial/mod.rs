@@ -1,4 +1,5 @@
-//! Specimens with a flat face, from simulated frames to the modulus: the case for which the paper's ratio (31) is exact.
+//! Specimens with a flat face, from simulated frames to the modulus: the case for which the paper's
+//! ratio (31) is exact.
 #![allow(clippy::print_stdout)]
 
 mod refusals;

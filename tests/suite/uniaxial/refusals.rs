@@ -1,4 +1,5 @@
-//! Contacts of shapes that fit nothing: a refusal that says what to tell the program, or an interval that holds the truth.
+//! Contacts of shapes that fit nothing: a refusal that says what to tell the program, or an
+//! interval that holds the truth.
 use ndarray::Array2;
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 use std::f64::consts::TAU;
@@ -28,13 +29,15 @@ enum Outline {
 /// How the pressure lies under the outline and how the contact grows.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Contact {
-    /// As under round bodies: it falls to zero at the outline, and lengths grow with the cube root of the force.
+    /// As under round bodies: it falls to zero at the outline, and lengths grow with the cube root
+    /// of the force.
     Round,
     /// A specimen of that outline in uniaxial load: even, and the area grows with the strain.
     Specimen,
 }
 
-/// Distance to the outline, positive inside, in units of the contact's size; `at` likewise, from its middle.
+/// Distance to the outline, positive inside, in units of the contact's size; `at` likewise, from
+/// its middle.
 fn depth(outline: Outline, [x, y]: [f64; 2], turn: f64) -> f64 {
     let r = x.hypot(y);
     match outline {

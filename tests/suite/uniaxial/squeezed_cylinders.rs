@@ -1,4 +1,5 @@
-//! Cylinders solved by finite elements, their faces sliding or sticking: what the pipeline says of them.
+//! Cylinders solved by finite elements, their faces sliding or sticking: what the pipeline says of
+//! them.
 use super::scenes::exact_pairs;
 use tactile_imaging::elasticity::strain::Hencky;
 use tactile_imaging::fem::Interface;
@@ -10,7 +11,8 @@ use tactile_simulate::{
 
 const RADIUS_M: f64 = 6e-3;
 
-/// Everything that frames of a cylinder say, squeezed with the nominal stresses over E that are given.
+/// Everything that frames of a cylinder say, squeezed with the nominal stresses over E that are
+/// given.
 fn measured(
     faces: Interface,
     aspect: f64,

@@ -8,7 +8,8 @@ use tactile_imaging::pipeline::LightContact;
 use tactile_imaging::{Object, Pipeline};
 use tactile_simulate::{Camera, FaceOutline};
 
-/// Relative error that all readings of a gauge share: what a pipeline assumes unless told otherwise (`Settings::force_scale_error`).
+/// Relative error that all readings of a gauge share: what a pipeline assumes unless told otherwise
+/// (`Settings::force_scale_error`).
 const GAUGE_SCALE: f64 = 1e-3;
 /// Error of each reading, of its range.
 const GAUGE_NOISE: f64 = 2e-3;
@@ -20,7 +21,8 @@ struct Outcome {
     signs_right: bool,
 }
 
-/// One specimen: cylinder or block, plain or speckled, 30 to 250 kPa, four to eight loads up to 4 to 10 %, read with a gauge.
+/// One specimen: cylinder or block, plain or speckled, 30 to 250 kPa, four to eight loads up to 4
+/// to 10 %, read with a gauge.
 fn trial(seed: u64) -> Outcome {
     let mut rng = ChaCha8Rng::seed_from_u64(1000 + seed);
     let mut uniform = |low: f64, high: f64| low + (high - low) * rng.random::<f64>();

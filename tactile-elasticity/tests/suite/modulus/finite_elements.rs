@@ -106,7 +106,8 @@ fn balls_are_read_through_layers_and_on_a_flat() {
     }
 }
 
-/// The indentations of all balls on a rigid flat as one curve: in units of E and R they are one ball.
+/// The indentations of all balls on a rigid flat as one curve: in units of E and R they are one
+/// ball.
 #[test]
 fn a_curve_of_a_soft_ball_is_read_at_finite_strain() {
     let scenes = scenes();

@@ -128,7 +128,8 @@ fn errors_learnt_from_few_repetitions_widen_the_interval() {
     assert!(refused.is_err());
 }
 
-/// A regression of many loads takes time and memory in proportion to them: a matrix of all pairs of these would be 3 GB.
+/// A regression of many loads takes time and memory in proportion to them: a matrix of all pairs of
+/// these would be 3 GB.
 #[test]
 fn twenty_thousand_loads_are_one_linear_regression() {
     let forces: Vec<f64> = (0..20_000).map(|i| 1e-3 + 1e-7 * f64::from(i)).collect();
@@ -156,8 +157,8 @@ fn twenty_thousand_loads_are_one_linear_regression() {
         .unwrap()
         .estimate(&series)
         .unwrap();
-    // The errors of single loads average to 0.005 % (force 0.5 %, three times the radius's 0.4 % and 1.5 times the depth's 1 %, by
-    // √20000): the shared 0.01 % stays.
+    // The errors of single loads average to 0.005 % (force 0.5 %, three times the radius's 0.4 %
+    // and 1.5 times the depth's 1 %, by √20000): the shared 0.01 % stays.
     let relative = hertz.standard_error_pa / hertz.youngs_modulus_pa;
     assert!((1e-4..1.4e-4).contains(&relative), "{relative}");
     assert!((hertz.youngs_modulus_pa / SAMPLE - 1.0).abs() < 4.0 * relative);
@@ -170,8 +171,9 @@ fn twenty_thousand_loads_are_one_linear_regression() {
     assert_eq!(ratio.fit.observations, 20_000);
 }
 
-/// A ball on a layer thin beside its contact and stiff beneath: there the plain iteration for the guide's part of the
-/// compliance swings between two values, and gave an interval that was reversed and missed its own estimate.
+/// A ball on a layer thin beside its contact and stiff beneath: there the plain iteration for the
+/// guide's part of the compliance swings between two values, and gave an interval that was reversed
+/// and missed its own estimate.
 #[test]
 fn a_thin_layer_on_a_stiff_base_has_an_interval_around_its_estimate() {
     let gel = Layer {
@@ -202,8 +204,8 @@ fn holds_its_estimate(found: &ModulusEstimate) {
         interval.upper.is_none_or(|upper| estimate < upper),
         "{found:?}"
     );
-    // To first order the interval is as wide as its standard error: an end that did not converge is not. Scatter that
-    // exceeds the errors widens it by Student's t.
+    // To first order the interval is as wide as its standard error: an end that did not converge is
+    // not. Scatter that exceeds the errors widens it by Student's t.
     let excess = |w: &Warning| matches!(w, Warning::ExcessScatter { .. });
     let first_order = estimate - 1.96 * found.standard_error_pa;
     let off = (interval.lower - first_order) / found.standard_error_pa;

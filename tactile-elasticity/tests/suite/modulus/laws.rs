@@ -67,7 +67,8 @@ fn layers_invert_themselves_thick_or_thin() {
     let loads = [load(0.05), load(0.4), load(1.3)];
     let theory = |t| BondedLayer::new(r, h, NU, Bond::Bonded, t).unwrap();
     finds(&theory(LayerTheory::IntegralEquation), &loads);
-    // The published series errs as its authors' readers found; the corrected one only where χ is large.
+    // The published series errs as its authors' readers found; the corrected one only where χ is
+    // large.
     let off = |t, i: usize| {
         ModulusEstimator::estimate(&theory(t), &LoadSeries::new(&loads[i..=i]))
             .unwrap()
@@ -122,7 +123,8 @@ fn a_sphere_on_layers_inverts_itself() {
     // The table's interpolation, 5·10⁻⁶ in ln F.
     let gap = found.youngs_modulus_pa / SAMPLE - 1.0;
     assert!(gap.abs() < 3e-5, "{gap:e}");
-    // In series the soft layers below count as if they were touched: half as much again, or twice the modulus.
+    // In series the soft layers below count as if they were touched: half as much again, or twice
+    // the modulus.
     let deep = |evidence| {
         let estimator = HertzSphere::new(4e-3, NU)
             .unwrap()
@@ -206,7 +208,8 @@ fn loads_choose_their_law() {
         EstimatorKind::SphereBetweenPlates
     );
     assert!((choice.chosen().youngs_modulus_pa / SAMPLE - 1.0).abs() < 1e-9);
-    // Hertz with one contact takes the plate's approach for twice what it is: many standard errors off.
+    // Hertz with one contact takes the plate's approach for twice what it is: many standard errors
+    // off.
     assert!(matches!(choice.reason, SelectionReason::BetterFit { margin } if margin > 10.0));
     assert!((choice.weights.iter().sum::<f64>() - 1.0).abs() < 1e-12 && choice.weights[0] > 0.99);
     assert_eq!(choice.estimates.len() + choice.left_out.len(), 4);
@@ -244,8 +247,8 @@ fn one_load_is_answered_by_the_most_general_law() {
     );
 }
 
-/// Balls from softer to stiffer than the guide, larger and smaller than it is deep: the share of compliance that belongs to the
-/// answer is found everywhere.
+/// Balls from softer to stiffer than the guide, larger and smaller than it is deep: the share of
+/// compliance that belongs to the answer is found everywhere.
 #[test]
 fn balls_of_every_stiffness_and_size_invert_on_layers() {
     let guides = [
@@ -285,7 +288,8 @@ fn balls_of_every_stiffness_and_size_invert_on_layers() {
                     };
                     let found = estimator.estimate(&LoadSeries::new([load])).unwrap();
                     let gap = found.youngs_modulus_pa / modulus - 1.0;
-                    // The table's 5·10⁻⁶ in ln F, times what the guide's own compliance makes of it.
+                    // The table's 5·10⁻⁶ in ln F, times what the guide's own compliance makes of
+                    // it.
                     assert!(gap.abs() < 2e-4, "{radius} {modulus} {ratio}: {gap:e}");
                 }
             }

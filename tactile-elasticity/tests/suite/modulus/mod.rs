@@ -57,7 +57,8 @@ fn hertz_loads(other: Body, forces: &[f64]) -> Vec<LoadState> {
         .collect()
 }
 
-/// The same, with the indentation that of both contacts: the waveguide's and a rigid plate's. Relative error as stated.
+/// The same, with the indentation that of both contacts: the waveguide's and a rigid plate's.
+/// Relative error as stated.
 fn between_plates(forces: &[f64], relative: f64) -> Vec<LoadState> {
     let far = hertz_loads(Body::rigid(), forces);
     (hertz_loads(waveguide().as_body(), forces)

@@ -229,7 +229,8 @@ fn growing_faces_give_their_stretches_and_the_area_without_load() {
     let squeezes = [0.02, 0.05, 0.1];
     let series = LoadSeries::new(squeezes.map(load));
     let found = UniaxialLoads::new(&series, 0.5, &GreenLagrange).unwrap();
-    // Steps to the area end where it moves by 1e-14; the bisection for a stretch is exact to rounding.
+    // Steps to the area end where it moves by 1e-14; the bisection for a stretch is exact to
+    // rounding.
     assert!((found.unloaded_area_m2 / 1e-4 - 1.0).abs() < 1e-9);
     for ([lateral, axial], e) in found.stretches.iter().zip(squeezes) {
         assert!((lateral - (1.0 + e).sqrt()).abs() < 1e-9, "{lateral}");

@@ -3,7 +3,8 @@
 
 use ndarray::Array2;
 
-/// Heights and slopes of a closed form at a point of the square [−1, 1]²; `None` outside its support.
+/// Heights and slopes of a closed form at a point of the square [−1, 1]²; `None` outside its
+/// support.
 pub type Shape = fn(f64, f64) -> Option<[f64; 3]>;
 
 /// A surface sampled on n × n pixels of size 2/n, with what is seen of it.
