@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 /// A place in a file. Lines and columns are counted from 1.
 ///
 /// ```
-/// use tactile_imaging::io::Place;
+/// use tactile_imaging::io::FilePlace;
 /// assert_eq!(FilePlace::Cell { line: 3, column: 2 }.to_string(), ", line 3, column 2");
 /// assert_eq!(FilePlace::Field("object.radius_m".into()).to_string(), ": field `object.radius_m`");
 /// ```
