@@ -1,0 +1,224 @@
+//! Frozen results: fields, a sentence, a table for notebooks, a dictionary.
+use crate::arrays::{Matrix, Tensors, Vector};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use tactile_imaging::core::{Estimate as CoreEstimate, Interval};
+
+/// The fields of a result by name. Results inside become dictionaries too.
+pub fn to_dict<'py>(result: &Bound<'py, PyAny>, names: &[&str]) -> PyResult<Bound<'py, PyDict>> {
+    let dict = PyDict::new(result.py());
+    for &name in names {
+        let value = result.getattr(name)?;
+        let value = match value.hasattr("to_dict")? {
+            true => value.call_method0("to_dict")?,
+            false => value,
+        };
+        dict.set_item(name, value)?;
+    }
+    Ok(dict)
+}
+
+/// A table of two columns. Values are escaped: they may hold text of the caller.
+pub fn to_html(result: &Bound<'_, PyAny>, names: &[&str]) -> PyResult<String> {
+    let escaped = |text: String| text.replace('&', "&amp;").replace('<', "&lt;");
+    let mut html = String::from("<table>");
+    for name in names {
+        let value = escaped(result.getattr(*name)?.str()?.to_string());
+        html += &format!("<tr><th>{name}</th><td>{value}</td></tr>");
+    }
+    Ok(html + "</table>")
+}
+
+/// A frozen class of fields with what every result has.
+macro_rules! result {
+    ($(#[$meta:meta])* $name:ident { $($(#[$doc:meta])* $field:ident: $kind:ty,)+ }) => {
+        $(#[$meta])*
+        #[pyclass(frozen, module = "tactile_imaging")]
+        pub struct $name {
+            pub text: String,
+            $($(#[$doc])* #[pyo3(get)] pub $field: $kind,)+
+        }
+
+        #[pymethods]
+        impl $name {
+            fn __repr__(&self) -> String {
+                format!("{}({})", stringify!($name), self.text)
+            }
+
+            fn _repr_html_(slf: &Bound<'_, Self>) -> PyResult<String> {
+                to_html(slf.as_any(), &[$(stringify!($field)),+])
+            }
+
+            /// The fields by name.
+            fn to_dict<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyDict>> {
+                to_dict(slf.as_any(), &[$(stringify!($field)),+])
+            }
+        }
+    };
+}
+
+result! {
+    /// A number with its standard error.
+    Estimate {
+        /// The number.
+        value: f64,
+        /// Its standard error.
+        standard_error: f64,
+        /// Its 95 % interval. No upper end where the data do not bound it.
+        interval_95: (f64, Option<f64>),
+    }
+}
+
+result! {
+    /// Young's modulus in pascals.
+    Modulus {
+        /// Young's modulus.
+        value: f64,
+        /// Its standard error.
+        standard_error: f64,
+        /// Its 95 % interval. No upper end where the loads do not bound it.
+        interval_95: (f64, Option<f64>),
+        /// The name of the estimator.
+        estimator: String,
+        /// Where the estimator's assumptions fail, a sentence each.
+        flags: Vec<String>,
+    }
+}
+
+result! {
+    /// The contact of one frame.
+    Contact {
+        /// Normal force in newtons, where the sensor is calibrated.
+        force: Option<Py<Estimate>>,
+        /// Contact radius in metres.
+        radius: Py<Estimate>,
+        /// Indentation in metres, of a sensor that reads depth.
+        indentation: Option<Py<Estimate>>,
+        /// Centroid x in pixels.
+        x: Py<Estimate>,
+        /// Centroid y in pixels.
+        y: Py<Estimate>,
+        /// Area in square metres.
+        area: f64,
+        /// Whether the frame's edge cuts the contact.
+        touches_edge: bool,
+    }
+}
+
+result! {
+    /// A reconstructed surface.
+    Surface {
+        /// Heights in metres, NaN outside the contact.
+        heights: Matrix<f64>,
+        /// Size of a pixel of the heights in metres, x and y.
+        pixel_size: (f64, f64),
+        /// Place of the first height in metres, x and y.
+        origin: (f64, f64),
+    }
+}
+
+result! {
+    /// Mean strain between two frames.
+    Strain {
+        /// Mean tensor over the control points, 3 × 3.
+        value: Matrix<f64>,
+        /// Standard error of the mean, 3 × 3.
+        standard_error: Matrix<f64>,
+        /// Lower and upper end of the 95 % interval of every component, 3 × 3 each.
+        interval_95: (Matrix<f64>, Matrix<f64>),
+        /// Standard deviation over the control points, 3 × 3.
+        spread: Matrix<f64>,
+        /// The name of the measure of strain.
+        measure: String,
+        /// Control points that count.
+        used: usize,
+    }
+}
+
+result! {
+    /// Strain between two point sets.
+    StrainBetween {
+        /// Mean tensor over the matched points, 3 × 3.
+        value: Matrix<f64>,
+        /// Standard error of the mean, 3 × 3.
+        standard_error: Matrix<f64>,
+        /// Lower and upper end of the 95 % interval of every component, 3 × 3 each.
+        interval_95: (Matrix<f64>, Matrix<f64>),
+        /// Rows of the matched points, before and after, (n, 2).
+        pairs: Matrix<i64>,
+        /// Displacement of every matched point by the smoothed deformation, (n, d).
+        displacements: Matrix<f64>,
+        /// Strain at every matched point, (n, 3, 3).
+        strains: Tensors,
+        /// Standard error of the strain at every matched point, (n, 3, 3).
+        standard_errors: Tensors,
+        /// Noise of one coordinate in the unit of the points.
+        sigma: f64,
+    }
+}
+
+result! {
+    /// Which model point is which target point.
+    Match {
+        /// Target row of every model point, −1 for none, (n,).
+        assignment: Vector<i64>,
+        /// Probability that each of these is right, (n,).
+        confidence: Vector<f64>,
+        /// The warped model points, (n, d).
+        warped: Matrix<f64>,
+        /// Rows of model and target of every pair, (k, 2).
+        pairs: Matrix<i64>,
+        /// Noise of one coordinate in the unit of the points.
+        sigma: f64,
+        /// Why the pairs are not to be relied on, where the matcher can tell.
+        doubt: Option<String>,
+        /// Iterations.
+        iterations: usize,
+    }
+}
+
+result! {
+    /// A simulated press with its truth.
+    SimulatedPress {
+        /// The frame without contact, uint8.
+        reference: Matrix<u8>,
+        /// One frame for each load, uint8.
+        frames: Vec<Matrix<u8>>,
+        /// Calibration of the sensor: integrated pixel value and newtons, (n, 2).
+        pairs: Matrix<f64>,
+        /// Size of a pixel in metres, x and y.
+        pixel_size: (f64, f64),
+        /// Layers of the waveguide: thickness in metres, Young's modulus in pascals, Poisson's
+        /// ratio, (n, 3).
+        waveguide: Matrix<f64>,
+        /// Radius of the ball in metres.
+        radius: f64,
+        /// The true Young's modulus, forces, contact radii and centres.
+        truth: Py<PyDict>,
+    }
+}
+
+impl Estimate {
+    pub fn of(py: Python<'_>, estimate: CoreEstimate) -> PyResult<Py<Self>> {
+        let CoreEstimate {
+            value,
+            standard_error,
+            ..
+        } = estimate;
+        let text = format!("{value:.6e} ± {standard_error:.1e}");
+        let interval_95 = ends(estimate.interval_95());
+        Py::new(
+            py,
+            Self {
+                text,
+                value,
+                standard_error,
+                interval_95,
+            },
+        )
+    }
+}
+
+pub fn ends(interval: Interval) -> (f64, Option<f64>) {
+    (interval.lower, interval.upper)
+}

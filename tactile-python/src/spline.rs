@@ -1,0 +1,249 @@
+//! Splines through scattered values, and heights from slopes.
+use crate::arrays;
+use crate::errors::{self, invalid};
+use nalgebra::{Point, Point3, SMatrix};
+use ndarray::{Array2, Array3, ArrayView2};
+use numpy::{PyArray1, PyArray2, PyArray3};
+use pyo3::prelude::*;
+use tactile_imaging::sfs::{
+    CosinePoisson, Domain, FrankotChellappa, MaskedLeastSquares, SlopeIntegrator,
+};
+use tactile_imaging::tps::{FitOptions, Kernel, NegR, R2LogR, R3, Smoothing, Spline};
+
+/// A spline of any kernel in the plane or in space. It has three outputs, of which the caller's are
+/// the first and the others zero.
+trait Fitted: Send + Sync {
+    fn values(&self, points: ArrayView2<'_, f64>) -> Vec<Point3<f64>>;
+    /// ∂f_m/∂x_k of each point, (points, outputs, axes).
+    fn jacobians(&self, points: ArrayView2<'_, f64>, outputs: usize) -> Array3<f64>;
+    fn lambda(&self) -> f64;
+}
+
+impl<const D: usize, K: Kernel + Send + Sync> Fitted for Spline<f64, D, 3, K> {
+    fn values(&self, points: ArrayView2<'_, f64>) -> Vec<Point3<f64>> {
+        let points: Vec<Point<f64, D>> = arrays::points(points);
+        let mut values = vec![Point3::origin(); points.len()];
+        self.apply_into(&points, &mut values)
+            .expect("as many values as points");
+        values
+    }
+
+    fn jacobians(&self, points: ArrayView2<'_, f64>, outputs: usize) -> Array3<f64> {
+        let points: Vec<Point<f64, D>> = arrays::points(points);
+        let mut jacobians = vec![SMatrix::<f64, 3, D>::zeros(); points.len()];
+        self.jacobian_into(&points, &mut jacobians)
+            .expect("as many Jacobians as points");
+        Array3::from_shape_fn((points.len(), outputs, D), |(n, m, k)| jacobians[n][(m, k)])
+    }
+
+    fn lambda(&self) -> f64 {
+        self.report.lambda
+    }
+}
+
+/// A spline with an affine part: f(x) = a + A x + Σ w_i U(|x − x_i|).
+///
+/// Parameters
+/// ----------
+/// sources : (n, 2) or (n, 3) array
+/// targets : (n,) or (n, m) array of up to three columns
+/// smoothing : λ ≥ 0 of Σ|f(x_i) − y_i|² + λ wᵀKw, or "gcv" for that of generalised cross-validation
+/// kernel : "thin_plate_spline" (r² ln r), "linear" (−r) or "cubic" (r³)
+#[pyclass(frozen, module = "tactile_imaging")]
+pub struct ThinPlateSpline {
+    fitted: Box<dyn Fitted>,
+    axes: usize,
+    outputs: usize,
+    /// Whether targets were a vector.
+    flat: bool,
+    /// Number of sources.
+    points: usize,
+}
+
+#[pymethods]
+impl ThinPlateSpline {
+    #[new]
+    #[pyo3(signature = (sources, targets, *, smoothing=None, kernel="thin_plate_spline"))]
+    fn new(
+        py: Python<'_>,
+        sources: &Bound<'_, PyAny>,
+        targets: &Bound<'_, PyAny>,
+        smoothing: Option<&Bound<'_, PyAny>>,
+        kernel: &str,
+    ) -> PyResult<Self> {
+        let sources = arrays::matrix("sources", sources)?;
+        let flat = arrays::vector("targets", targets).ok();
+        let is_flat = flat.is_some();
+        let targets = match flat {
+            Some(values) => {
+                let shape = (values.len(), 1);
+                Array2::from_shape_vec(shape, values).map_err(invalid)?
+            }
+            None => arrays::matrix("targets", targets)?,
+        };
+        let (axes, outputs) = (sources.ncols(), targets.ncols());
+        if !(2..=3).contains(&axes) || !(1..=3).contains(&outputs) {
+            return Err(invalid(format!(
+                "sources must have two or three columns and targets up to three, found {axes} and {outputs}"
+            )));
+        }
+        let smoothing = match smoothing {
+            None => Smoothing::None,
+            Some(given) if given.extract::<String>().is_ok_and(|name| name == "gcv") => {
+                Smoothing::Gcv
+            }
+            Some(given) => match given.extract::<f64>() {
+                Ok(0.0) => Smoothing::None,
+                Ok(lambda) => Smoothing::Lambda(lambda),
+                Err(_) => return Err(invalid("smoothing must be a number or \"gcv\"")),
+            },
+        };
+        let output = |i: usize, k: usize| if k < outputs { targets[[i, k]] } else { 0.0 };
+        let targets: Vec<_> = (0..targets.nrows())
+            .map(|i| Point3::from(std::array::from_fn(|k| output(i, k))))
+            .collect();
+        let view = sources.view();
+        let fitted = py.detach(|| match (kernel, axes) {
+            ("thin_plate_spline", 2) => fit::<2, _>(view, &targets, R2LogR, smoothing),
+            ("thin_plate_spline", _) => fit::<3, _>(view, &targets, R2LogR, smoothing),
+            ("linear", 2) => fit::<2, _>(view, &targets, NegR, smoothing),
+            ("linear", _) => fit::<3, _>(view, &targets, NegR, smoothing),
+            ("cubic", 2) => fit::<2, _>(view, &targets, R3, smoothing),
+            ("cubic", _) => fit::<3, _>(view, &targets, R3, smoothing),
+            _ => Err(invalid(format!(
+                "kernel must be \"thin_plate_spline\", \"linear\" or \"cubic\", found {kernel:?}"
+            ))),
+        })?;
+        Ok(Self {
+            fitted,
+            axes,
+            outputs,
+            flat: is_flat,
+            points: sources.nrows(),
+        })
+    }
+
+    /// Values at points: (k, d) to (k, m), or (k,) where the targets were a vector.
+    fn __call__<'py>(
+        &self,
+        py: Python<'py>,
+        points: &Bound<'py, PyAny>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let points = self.queries(points)?;
+        let values = py.detach(|| self.fitted.values(points.view()));
+        if self.flat {
+            let values = values.iter().map(|value| value.x);
+            return Ok(PyArray1::from_iter(py, values).into_any());
+        }
+        let shape = (values.len(), self.outputs);
+        let values = Array2::from_shape_fn(shape, |(n, m)| values[n][m]);
+        Ok(PyArray2::from_owned_array(py, values).into_any())
+    }
+
+    /// Jacobians at points, (k, m, d): [n, i, j] is ∂f_i/∂x_j.
+    fn jacobian<'py>(
+        &self,
+        py: Python<'py>,
+        points: &Bound<'py, PyAny>,
+    ) -> PyResult<Bound<'py, PyArray3<f64>>> {
+        let points = self.queries(points)?;
+        let jacobians = py.detach(|| self.fitted.jacobians(points.view(), self.outputs));
+        Ok(PyArray3::from_owned_array(py, jacobians))
+    }
+
+    /// The smoothing λ that was used.
+    #[getter]
+    fn smoothing(&self) -> f64 {
+        self.fitted.lambda()
+    }
+
+    fn __repr__(&self) -> String {
+        let Self {
+            points,
+            axes,
+            outputs,
+            ..
+        } = self;
+        let lambda = self.fitted.lambda();
+        format!(
+            "ThinPlateSpline({points} points, {axes} axes to {outputs}, smoothing {lambda:.3e})"
+        )
+    }
+}
+
+impl ThinPlateSpline {
+    fn queries(&self, points: &Bound<'_, PyAny>) -> PyResult<Array2<f64>> {
+        let points = arrays::matrix("points", points)?;
+        if points.ncols() != self.axes {
+            let (expected, found) = (self.axes, points.ncols());
+            return Err(invalid(format!(
+                "points must have {expected} columns, found {found}"
+            )));
+        }
+        Ok(points)
+    }
+}
+
+fn fit<const D: usize, K: Kernel + Send + Sync + 'static>(
+    sources: ArrayView2<'_, f64>,
+    targets: &[Point3<f64>],
+    kernel: K,
+    smoothing: Smoothing<f64>,
+) -> PyResult<Box<dyn Fitted>> {
+    let options = FitOptions::new(kernel).with_smoothing(smoothing);
+    let options = options.map_err(errors::spline)?;
+    let sources: Vec<Point<f64, D>> = arrays::points(sources);
+    let spline = Spline::<f64, D, 3, K>::fit(&sources, targets, &options);
+    Ok(Box::new(spline.map_err(errors::spline)?))
+}
+
+/// Heights whose slopes are nearest to those given, with mean zero.
+///
+/// Parameters
+/// ----------
+/// slope_x, slope_y : (rows, columns) arrays, ∂z/∂x along a row and ∂z/∂y down the rows
+/// pixel_size : one number or (x, y); heights have its unit
+/// method : "poisson", "frankot-chellappa" or "least-squares"
+/// mask : (rows, columns) array, true where there are heights; it takes "least-squares"
+#[pyfunction]
+#[pyo3(signature = (slope_x, slope_y, pixel_size, *, method=None, mask=None))]
+pub fn integrate<'py>(
+    py: Python<'py>,
+    slope_x: &Bound<'py, PyAny>,
+    slope_y: &Bound<'py, PyAny>,
+    pixel_size: &Bound<'py, PyAny>,
+    method: Option<&str>,
+    mask: Option<&Bound<'py, PyAny>>,
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let slopes = [
+        arrays::matrix("slope_x", slope_x)?,
+        arrays::matrix("slope_y", slope_y)?,
+    ];
+    let size = arrays::pixel_size(pixel_size)?;
+    let mask = mask.map(|mask| arrays::matrix("mask", mask)).transpose()?;
+    let mask = mask.map(|mask| mask.mapv(|inside| inside != 0.0));
+    let unused = if mask.is_some() {
+        "least-squares"
+    } else {
+        "poisson"
+    };
+    let integrator: Box<dyn SlopeIntegrator<f64> + Send + Sync> = match method.unwrap_or(unused) {
+        "poisson" => Box::new(CosinePoisson),
+        "frankot-chellappa" => Box::new(FrankotChellappa),
+        "least-squares" => Box::new(MaskedLeastSquares::default()),
+        other => {
+            return Err(invalid(format!(
+                "method must be \"poisson\", \"frankot-chellappa\" or \"least-squares\", found {other:?}"
+            )));
+        }
+    };
+    let surface = py.detach(|| {
+        let mut domain = Domain::new(size)?;
+        if let Some(mask) = &mask {
+            domain = domain.with_mask(mask.view());
+        }
+        integrator.integrate(slopes[0].view(), slopes[1].view(), &domain)
+    });
+    let heights = surface.map_err(invalid)?.heights;
+    Ok(PyArray2::from_owned_array(py, heights))
+}
