@@ -30,6 +30,7 @@ use clap::error::ErrorKind;
 use clap::{Parser, Subcommand};
 use console::{Context, Exit, Failure, printable};
 use outputs::Outputs;
+use std::ffi::OsString;
 use std::io::Write;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -119,8 +120,7 @@ impl Command {
     }
 }
 
-/// Runs the program on the arguments of this process and returns its exit code, as `tactile --help`
-/// lists them.
+/// Runs the program on the arguments of this process.
 ///
 /// Reads and writes files, the standard streams and, where it can, the interrupt's handler of the
 /// process: for a `main`.
@@ -131,14 +131,28 @@ impl Command {
 /// }
 /// ```
 pub fn run() -> ExitCode {
-    let program = match Program::try_parse() {
+    ExitCode::from(run_with(std::env::args_os()))
+}
+
+/// Runs the program on arguments, of which the first is its own name, and returns its exit code as
+/// `tactile --help` lists them.
+///
+/// As [`run`], it takes the interrupt's handler of the process: for a program in another language
+/// that is this one.
+///
+/// ```
+/// let code = tactile_cli::run_with(["tactile", "--version"]);
+/// assert_eq!(code, 0);
+/// ```
+pub fn run_with(arguments: impl IntoIterator<Item: Into<OsString> + Clone>) -> u8 {
+    let program = match Program::try_parse_from(arguments) {
         Ok(program) => program,
-        Err(error) => return ExitCode::from(explain(&error).code()),
+        Err(error) => return explain(&error).code(),
     };
     let outputs = Outputs::new(program.out);
     let mut context = Context::new(program.json, program.memory_gb, outputs);
     let ended = program.command.run(&mut context);
-    ExitCode::from(context.close(ended).code())
+    context.close(ended).code()
 }
 
 /// Prints the help where it was asked for, else the error in the arguments as one sentence.

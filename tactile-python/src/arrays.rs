@@ -28,14 +28,29 @@ fn read<'py, T: Element>(
     Ok(aligned.extract::<PyReadonlyArrayDyn<'py, T>>()?)
 }
 
+/// A copy of a view of two axes.
+fn two_axes<T: Element + Copy + Default>(
+    name: &str,
+    array: &PyReadonlyArrayDyn<'_, T>,
+) -> PyResult<Array2<T>> {
+    let view = array.as_array();
+    let &[rows, columns] = view.shape() else {
+        let shape = view.shape();
+        return Err(invalid(format!(
+            "{name} must have two axes, found shape {shape:?}"
+        )));
+    };
+    // NumPy's strides of an array without elements may be any.
+    if view.is_empty() {
+        return Ok(Array2::default((rows, columns)));
+    }
+    let view = view.into_dimensionality::<ndarray::Ix2>();
+    Ok(view.map_err(invalid)?.to_owned())
+}
+
 /// A matrix of floating-point numbers.
 pub fn matrix(name: &str, given: &Bound<'_, PyAny>) -> PyResult<Array2<f64>> {
-    let array = read::<f64>(name, given, "iufb", "float64")?;
-    let view = array.as_array();
-    let shape = view.shape().to_vec();
-    view.into_dimensionality()
-        .map(|view| view.to_owned())
-        .map_err(|_| invalid(format!("{name} must have two axes, found shape {shape:?}")))
+    two_axes(name, &read::<f64>(name, given, "iufb", "float64")?)
 }
 
 /// A frame: a matrix of bytes, [row, column]. Other numbers are refused, because a cast would wrap.
@@ -47,12 +62,7 @@ pub fn frame(name: &str, given: &Bound<'_, PyAny>) -> PyResult<Array2<u8>> {
             "{name} must be a frame of uint8, found {found}"
         )));
     }
-    let array = read::<u8>(name, given, "u", "uint8")?;
-    let view = array.as_array();
-    let shape = view.shape().to_vec();
-    view.into_dimensionality()
-        .map(|view| view.to_owned())
-        .map_err(|_| invalid(format!("{name} must have two axes, found shape {shape:?}")))
+    two_axes(name, &read::<u8>(name, given, "u", "uint8")?)
 }
 
 /// A vector of integers, as indices that may be −1.

@@ -8,6 +8,13 @@ mod spline;
 
 use pyo3::prelude::*;
 
+/// Runs the program `tactile` on arguments, of which the first is its own name, and returns its
+/// exit code.
+#[pyfunction]
+fn run_program(py: Python<'_>, arguments: Vec<String>) -> u8 {
+    py.detach(|| tactile_cli::run_with(arguments))
+}
+
 #[pymodule]
 fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
@@ -32,5 +39,6 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(matching::strain_between, module)?)?;
     module.add_function(wrap_pyfunction!(spline::integrate, module)?)?;
     module.add_function(wrap_pyfunction!(press::simulate, module)?)?;
+    module.add_function(wrap_pyfunction!(run_program, module)?)?;
     Ok(())
 }
