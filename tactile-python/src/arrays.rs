@@ -25,7 +25,7 @@ fn read<'py, T: Element>(
     }
     // Aligned and in the machine's order of bytes, copied only where it is not.
     let aligned = numpy.call_method1("require", (array, dtype, "A"))?;
-    Ok(aligned.extract::<PyReadonlyArrayDyn<'py, T>>()?)
+    aligned.extract()
 }
 
 /// A copy of a view of two axes.

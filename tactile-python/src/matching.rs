@@ -27,10 +27,7 @@ pub enum Matcher {
     Own(Py<PyAny>),
 }
 
-fn option<'a, T>(name: &str, text: &str, choices: &[(&'a str, T)]) -> PyResult<T>
-where
-    T: Copy,
-{
+fn option<T: Copy>(name: &str, text: &str, choices: &[(&str, T)]) -> PyResult<T> {
     let names: Vec<_> = choices.iter().map(|(name, _)| *name).collect();
     let chosen = choices.iter().find(|(name, _)| *name == text);
     let unknown = || invalid(format!("{name} must be one of {names:?}, found {text:?}"));
