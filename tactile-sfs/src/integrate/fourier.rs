@@ -8,8 +8,8 @@
 use std::sync::Arc;
 
 use ndarray::ArrayView2;
-use rustdct::rustfft::num_complex::Complex;
-use rustdct::rustfft::{Fft, FftPlanner};
+use rustfft::num_complex::Complex;
+use rustfft::{Fft, FftPlanner};
 
 use super::{SlopeIntegrator, load_row, write_levelled};
 use crate::{Domain, PixelScalar, SfsError, Surface, SurfaceWorkspace};
