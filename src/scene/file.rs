@@ -376,6 +376,8 @@ impl<'de> Deserialize<'de> for WaveguideTable {
 #[derive(Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct StagesTable {
+    #[serde(default)]
+    as_printed: bool,
     reconstruction: Option<ReconstructionChoice>,
     integrator: Option<IntegratorChoice>,
     sampler: Option<SamplerChoice>,
@@ -529,15 +531,21 @@ impl ObjectTable {
 }
 
 impl StagesTable {
+    /// The stages named, the others as printed in the paper or the defaults.
     fn choices(&self) -> StagesConfig {
+        let others = if self.as_printed {
+            StagesConfig::as_printed()
+        } else {
+            StagesConfig::default()
+        };
         StagesConfig {
-            reconstruction: self.reconstruction.unwrap_or_default(),
-            integrator: self.integrator.unwrap_or_default(),
-            sampler: self.sampler.unwrap_or_default(),
-            matcher: self.matcher.unwrap_or_default(),
-            warp: self.warp.unwrap_or_default(),
-            strain: self.strain.unwrap_or_default(),
-            estimator: self.estimator.unwrap_or_default(),
+            reconstruction: self.reconstruction.unwrap_or(others.reconstruction),
+            integrator: self.integrator.unwrap_or(others.integrator),
+            sampler: self.sampler.unwrap_or(others.sampler),
+            matcher: self.matcher.unwrap_or(others.matcher),
+            warp: self.warp.unwrap_or(others.warp),
+            strain: self.strain.unwrap_or(others.strain),
+            estimator: self.estimator.unwrap_or(others.estimator),
         }
     }
 }

@@ -17,6 +17,7 @@ mod light;
 mod match_points;
 mod measure;
 mod outputs;
+mod paper;
 mod plot;
 mod strain;
 mod stream;
@@ -73,6 +74,7 @@ Examples, one for each subcommand:
   tactile stream --rate 20 --period 1 --allowed-late 100
   tactile light --rays 2000
   tactile table examples/data/press/scene.toml --moduli 2 --largest-ratio 0.5
+  tactile paper --out target/paper
 
 Exit codes:
   0    all that was asked for is there
@@ -97,6 +99,7 @@ enum Command {
     Stream(stream::StreamArguments),
     Light(light::LightArguments),
     Table(table::TableArguments),
+    Paper(paper::PaperArguments),
 }
 
 impl Command {
@@ -116,6 +119,7 @@ impl Command {
             Self::Stream(arguments) => stream::run(arguments, context),
             Self::Light(arguments) => light::run(arguments, context),
             Self::Table(arguments) => table::run(arguments, context),
+            Self::Paper(arguments) => paper::run(arguments, context),
         }
     }
 }

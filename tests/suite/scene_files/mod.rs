@@ -11,7 +11,7 @@ use tactile_imaging::Pipeline;
 use tactile_imaging::elasticity::modulus::{EstimatorKind, ModulusEstimator};
 use tactile_imaging::elasticity::strain::Hencky;
 use tactile_imaging::io::write_grey_image;
-use tactile_imaging::pipeline::{Measurement, PipelineError};
+use tactile_imaging::pipeline::{MatcherChoice, Measurement, PipelineError, StagesConfig};
 use tactile_imaging::scene::{LoadedCalibration, Scene};
 use tactile_imaging::sfs::CurvatureAdaptive;
 use tactile_imaging::tps::AffineModel;
@@ -243,6 +243,13 @@ fn stages_by_name_are_those_given_as_values() {
             &swapped.with_warp(AffineModel::General).with_strain(Hencky)
         )
     );
+    let printed = "as_printed = true\nmatcher = \"coherent-point-drift\"";
+    let printed = Scene::parse(&format!("{text}\n[stages]\n{printed}"), &path).unwrap();
+    let expected = StagesConfig {
+        matcher: MatcherChoice::CoherentPointDrift,
+        ..StagesConfig::as_printed()
+    };
+    assert_eq!(printed.stages, expected);
     let ratio = Scene::parse(
         &format!("{text}\n[stages]\nestimator = \"paper-ratio\""),
         &path,

@@ -1,0 +1,614 @@
+//! `tactile paper`: the experiments of the paper's section 5 on the simulated sensor.
+use crate::console::{Bar, Context, Exit, Failure, digits, in_unit, median_ms};
+use crate::plot::{Colour, Page, Panel};
+use clap::Args;
+use nalgebra::Point3;
+use serde_json::{Map, Value, json};
+use std::time::Instant;
+use tactile_imaging::force::{CalibrationOptions, CalibrationPair, LinearCalibration};
+use tactile_imaging::matching::labelling::Compatibility;
+use tactile_imaging::matching::{AnnealedSoftassign, PointMatcher, RelaxationLabelling};
+use tactile_imaging::optics::{SensorParameters, SensorSpecification, acceptance_angle, led_cone};
+use tactile_imaging::pipeline::{EstimatorChoice, StagesConfig};
+use tactile_imaging::{Pipeline, Press};
+use tactile_simulate::{
+    CalibrationRun, ContactModel, ContactState, Elastic, ElasticSphere, PressLoad, PressOptions,
+    PressScene, PressTruth, Trial,
+};
+
+/// Repeat the experiments of the paper's section 5 on the simulated sensor
+///
+/// Prints what the paper reports beside what the simulated sensor gives: the calibration with a
+/// flat tip (Fig. 9), the line through a contact's centroid (Fig. 8), the moduli of both polymers
+/// by the printed method and by the default one (Figs 10 to 12), a match of 105 to 105 points, the
+/// sensor's specification (Table 1), and the angles of total internal reflection (§3.4). The truth
+/// of the balls is by finite elements. --out gets paper.svg.
+#[derive(Args)]
+#[command(after_help = "\
+Example:
+  tactile paper --out target/paper
+
+Every part has a command of its own:
+  calibration with your own sensor   tactile calibrate examples/data/sensor/calibration.toml
+  force and contact of a frame       tactile force --help
+  modulus by the printed stages      tactile measure SCENE.toml   with `stages.as_printed = true`
+  modulus by the default stages      tactile measure
+  a match of 105 to 105 points       tactile match examples/data/cases.txt
+  light and angles                   tactile light")]
+pub struct PaperArguments {
+    /// Run the labelling over all candidates too. Without it, over the 12 likeliest of each point.
+    #[arg(long)]
+    dense: bool,
+    /// Seed of the camera's noise.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+}
+
+/// One experiment: its rows of text, its panel, and its numbers.
+struct Experiment {
+    title: &'static str,
+    key: &'static str,
+    /// What, the paper's figure, and the figure here.
+    rows: Vec<[String; 3]>,
+    panels: Vec<Panel>,
+    value: Value,
+}
+
+pub fn run(arguments: &PaperArguments, context: &mut Context) -> Result<Exit, Failure> {
+    context.outputs.plan(&["paper.svg"], &[])?;
+    let mut bar = Bar::of(6, "repeating the paper's experiments");
+    let polymers = [("CL2000X", Elastic::CL2000X), ("CL2003X", Elastic::CL2003X)];
+    let mut trials = Vec::new();
+    for (name, material) in polymers {
+        trials.push((name, trial(material, arguments.seed)?));
+    }
+    let first = &trials[0].1;
+    let parts: [&dyn Fn() -> Result<Experiment, Failure>; 6] = [
+        &|| flat_tip(arguments.seed),
+        &|| centroid_line(first),
+        &|| moduli(&trials, arguments.dense),
+        &|| labelling(first, arguments.dense),
+        &|| specification(first),
+        &light,
+    ];
+    let (mut values, mut panels) = (Map::new(), Vec::new());
+    for (done, part) in parts.iter().enumerate() {
+        let experiment = part()?;
+        bar.done(done + 1);
+        context.line(format_args!("\n{}", experiment.title));
+        context.line(format_args!("  {:54} {:>22}   {}", "", "paper", "here"));
+        for [what, paper, here] in experiment.rows {
+            context.line(format_args!("  {what:54} {paper:>22}   {here}"));
+        }
+        values.insert(experiment.key.to_owned(), experiment.value);
+        panels.extend(experiment.panels);
+    }
+    context.value(&values);
+    if context.outputs.folder().is_some() {
+        let page = Page::new("The paper's experiments on the simulated sensor", 2, panels);
+        context.outputs.page("paper.svg", || page)?;
+    }
+    Ok(Exit::Complete)
+}
+
+/// A ball of 3 mm at 0.7 N and 1.2 N (§5), its contacts by finite elements.
+fn trial(material: Elastic, seed: u64) -> Result<Trial, Failure> {
+    let object = ElasticSphere {
+        radius_m: 3e-3,
+        material,
+    };
+    let options = PressOptions {
+        object,
+        loads: [0.7, 1.2].map(PressLoad::normal).to_vec(),
+        law: ContactModel::FiniteElements,
+        seed,
+        ..PressOptions::default()
+    };
+    Trial::new(options, &CalibrationRun::default()).map_err(Failure::no_answer)
+}
+
+/// §5.1 and Fig. 9: a flat tip of 2 mm radius from 0 to 2 N and back in steps of 0.1 N.
+fn flat_tip(seed: u64) -> Result<Experiment, Failure> {
+    let (radius_m, steps) = (2e-3, 20_u32);
+    let forces: Vec<f64> = (1..=steps).map(|k| 0.1 * f64::from(k)).collect();
+    let options = PressOptions {
+        law: ContactModel::Tabulated(forces.iter().map(|&f| punch(f, radius_m)).collect()),
+        loads: forces.iter().map(|&f| PressLoad::normal(f)).collect(),
+        seed,
+        ..PressOptions::default()
+    };
+    let scene = PressScene::new(options).map_err(Failure::no_answer)?;
+    let reference = scene.reference(0);
+    let sum = |frame: ndarray::Array2<u8>| -> f64 {
+        let pixels = frame.iter().zip(&reference);
+        pixels.map(|(&f, &r)| f64::from(f) - f64::from(r)).sum()
+    };
+    // Every reading is a frame with noise of its own. The gauge is taken as exact.
+    let up = (0..forces.len()).map(|k| CalibrationPair::loading(sum(scene.frame(k, 0)), forces[k]));
+    let down = (0..forces.len())
+        .rev()
+        .map(|k| CalibrationPair::unloading(sum(scene.frame(k, 1)), forces[k]));
+    let mut pairs = vec![CalibrationPair::loading(sum(scene.reference(1)), 0.0)];
+    pairs.extend(up.chain(down));
+    pairs.push(CalibrationPair::unloading(sum(scene.reference(2)), 0.0));
+    let line = LinearCalibration::fit(&pairs, &CalibrationOptions::default())
+        .map_err(Failure::no_answer)?;
+    let report = line.report();
+    let hysteresis = report.hysteresis.as_ref();
+    let loop_percent = 100.0 * hysteresis.map_or(f64::NAN, |h| h.share_of_full_scale);
+    let departure_percent = 100.0 * report.linearity_error;
+    let rows = vec![
+        row(
+            "response",
+            "nearly linear",
+            format!("R² {:.6}", report.r_squared),
+        ),
+        row(
+            "largest departure from the line",
+            "not stated",
+            format!("{departure_percent:.2} % of 2 N"),
+        ),
+        row(
+            "loop between loading and unloading",
+            "none seen",
+            format!("{loop_percent:.2} % of 2 N"),
+        ),
+    ];
+    let place = |p: &CalibrationPair| [p.force_n, 1e-6 * p.integrated_pixel_value];
+    let (loading, unloading) = pairs.split_at(pairs.len() / 2);
+    let ends = [0.0, 2.0].map(|f| [f, 1e-6 * line.integrated_pixel_value(f).unwrap_or(f64::NAN)]);
+    let panel = Panel::new(
+        "Fig. 9: a flat tip of 2 mm radius, 0 to 2 N and back",
+        "force (N)",
+        "integrated pixel value (10⁶ grey levels)",
+    )
+    .line(ends, Colour::Grey, "line")
+    .points(loading.iter().map(place), Colour::Blue, "loading")
+    .rings(unloading.iter().map(place), Colour::Orange, "unloading");
+    Ok(Experiment {
+        title: "Calibration with a flat tip of 2 mm radius (§5.1, Fig. 9)",
+        key: "flat_tip",
+        rows,
+        panels: vec![panel],
+        value: json!({
+            "r_squared": report.r_squared,
+            "linearity_error_percent": departure_percent,
+            "hysteresis_percent": loop_percent,
+        }),
+    })
+}
+
+/// A rigid flat punch on an elastic half-space (Boussinesq): p = F/(2πa √(a² − r²)).
+///
+/// The pressure at the rim has no bound. It is level beyond s = 0.98 of the radius, where a share
+/// 1 − ½√(1 − s²) of the force is left, and scaled to carry all of it.
+fn punch(force_n: f64, radius_m: f64) -> ContactState {
+    let radii: Vec<f64> = (0..=100).map(|k| 1e-2 * f64::from(k) * radius_m).collect();
+    let rim = |share: f64| (1.0 - share * share).sqrt();
+    let level_from = 0.98;
+    let mean_pa = force_n / (std::f64::consts::PI * radius_m * radius_m);
+    let scale_pa = 0.5 * mean_pa / (1.0 - 0.5 * rim(level_from));
+    let pressure = |r: &f64| scale_pa / rim((r / radius_m).min(level_from));
+    // The outermost layer of the guide, incompressible.
+    let indentation_m = force_n * 0.75 / (2.0 * radius_m * 136e3);
+    ContactState {
+        force_n,
+        contact_radius_m: radius_m,
+        indentation_m,
+        pressure_pa: radii.iter().map(pressure).collect(),
+        height_m: vec![-indentation_m; radii.len()],
+        radius_m: radii,
+    }
+}
+
+/// Fig. 8: the grey levels along the row through the centroid, and three curves through them.
+fn centroid_line(trial: &Trial) -> Result<Experiment, Failure> {
+    let simulation = &trial.simulation;
+    let pipeline = trial.pipeline().map_err(Failure::no_answer)?;
+    let press = trial.press(&pipeline).map_err(Failure::no_answer)?;
+    let contact = press.contact(0).map_err(Failure::no_answer)?;
+    let contact = contact.ok_or_else(|| Failure::no_answer("the frame shows no contact"))?;
+    let [x, y] = contact.centroid_px.map(|c| c.value);
+    let (row_px, pixel_mm) = (y.round() as usize, 1e3 * simulation.pixel_size_m[0]);
+    let line: Vec<[f64; 2]> = simulation.frames[0]
+        .row(row_px)
+        .iter()
+        .zip(simulation.reference.row(row_px))
+        .enumerate()
+        .map(|(k, (&f, &r))| [(k as f64 - x) * pixel_mm, f64::from(f) - f64::from(r)])
+        .collect();
+    let inside = |u: f64| (1.0 - u * u).max(0.0);
+    let curves: [(&str, &str, Colour, Basis<'_>); 3] = [
+        ("Gaussian", "gaussian", Colour::Orange, &|u| {
+            vec![(-0.5 * u * u).exp()]
+        }),
+        ("Hertz, √(1 − r²/a²)", "hertz", Colour::Green, &|u| {
+            vec![inside(u).sqrt()]
+        }),
+        (
+            "bent, √(1 − r²/a²)(1 − c r²/a²)",
+            "bent",
+            Colour::Red,
+            &|u| vec![inside(u).sqrt(), inside(u).sqrt() * u * u],
+        ),
+    ];
+    let mut panel = Panel::new(
+        "Fig. 8: the row through the centroid, 0.7 N",
+        "distance from the centroid (mm)",
+        "grey levels above the reference",
+    )
+    .points(
+        line.iter().copied().step_by(8),
+        Colour::Grey,
+        "pixels, every eighth",
+    );
+    let title = "Fig. 8: what the curves leave of the row";
+    let axes = (
+        "distance from the centroid (mm)",
+        "pixel less curve (grey levels)",
+    );
+    let mut residuals = Panel::new(title, axes.0, axes.1);
+    let (mut rows, mut values) = (Vec::new(), Map::new());
+    for (name, key, colour, basis) in curves {
+        let (scale_mm, fitted, rms) = fit_line(&line, basis);
+        let paper = if key == "gaussian" { "drawn" } else { "" };
+        rows.push(row(
+            &format!("{name}: rms residual"),
+            paper,
+            format!("{rms:.2} grey levels"),
+        ));
+        values.insert(key.into(), json!({ "rms_grey": rms, "scale_mm": scale_mm }));
+        let left = line.iter().zip(&fitted).map(|(p, f)| [p[0], p[1] - f[1]]);
+        residuals = residuals.line(left, colour, name);
+        panel = panel.line(fitted, colour, name);
+    }
+    Ok(Experiment {
+        title: "The line through the centroid at 0.7 N (Fig. 8)",
+        key: "centroid_line",
+        rows,
+        panels: vec![panel, residuals],
+        value: Value::Object(values),
+    })
+}
+
+/// The functions of r/s whose sum is a profile.
+type Basis<'a> = &'a dyn Fn(f64) -> Vec<f64>;
+
+/// Least squares of a profile Σ c_k b_k(x/s) with its scale s, over a centred line of pixels.
+/// Returns the scale, the fitted line, and the root mean square of the residuals.
+fn fit_line(line: &[[f64; 2]], basis: Basis<'_>) -> (f64, Vec<[f64; 2]>, f64) {
+    let fit = |scale: f64| {
+        let rows: Vec<Vec<f64>> = line.iter().map(|[x, _]| basis(x / scale)).collect();
+        let columns = rows[0].len();
+        let a = nalgebra::DMatrix::from_fn(line.len(), columns, |i, k| rows[i][k]);
+        let b = nalgebra::DVector::from_iterator(line.len(), line.iter().map(|p| p[1]));
+        // A profile that covers no pixel leaves all of the line.
+        let c = a.clone().svd(true, true).solve(&b, 1e-12);
+        let fitted = c.map_or_else(|_| b.map(|_| 0.0), |c| a * c);
+        let rms = ((&fitted - &b).norm_squared() / line.len() as f64).sqrt();
+        (fitted, rms)
+    };
+    // The residual has one minimum in the scale: golden-section search between 0.5 and 8 mm.
+    let golden = 0.5 * (5_f64.sqrt() - 1.0);
+    let (mut low, mut high) = (0.5, 8.0);
+    while high - low > 1e-3 {
+        let step = golden * (high - low);
+        if fit(high - step).1 < fit(low + step).1 {
+            high = low + step;
+        } else {
+            low = high - step;
+        }
+    }
+    let scale = 0.5 * (low + high);
+    let (fitted, rms) = fit(scale);
+    let places = line.iter().zip(&fitted).map(|(p, &f)| [p[0], f]);
+    (scale, places.collect(), rms)
+}
+
+/// Figs 10 to 12: both polymers at 1392 × 1042 pixels with 200 control points, by the printed
+/// stages and by the default ones.
+fn moduli(trials: &[(&str, Trial)], dense: bool) -> Result<Experiment, Failure> {
+    let (mut rows, mut values) = (Vec::new(), Map::new());
+    let kpa = |pa: f64| 1e-3 * pa;
+    let title = "Figs 10 to 12: Young's modulus of both polymers";
+    let mut panel = Panel::new(title, "true modulus (kPa)", "measured modulus (kPa)").dashed(
+        [[50.0, 50.0], [115.0, 115.0]],
+        Colour::Grey,
+        "truth",
+    );
+    let (mut printed_places, mut ratio_places) = (Vec::new(), Vec::new());
+    let (mut default_places, mut intervals) = (Vec::new(), Vec::new());
+    for ((name, trial), paper) in trials.iter().zip(["4.23 % off", "5.38 % off"]) {
+        let truth = trial.simulation.youngs_modulus_pa;
+        let pipeline = trial.pipeline().map_err(Failure::no_answer)?;
+        let measured = trial
+            .press(&pipeline)
+            .and_then(|press| press.modulus())
+            .map_err(Failure::no_answer)?;
+        let stated = printed(&pipeline, dense)?;
+        let (printed, printed_strain) = stress_over_strain(trial, &stated)?;
+        let ratio = StagesConfig {
+            estimator: EstimatorChoice::PaperRatio,
+            ..StagesConfig::default()
+        };
+        let pipeline = pipeline.with_stages(&ratio).map_err(Failure::no_answer)?;
+        let (ratio, strain) = stress_over_strain(trial, &pipeline)?;
+        let percent = |e: f64| 100.0 * (e / truth - 1.0);
+        rows.push(row(
+            &format!("{name}, {:.0} kPa: printed stages, (31)", kpa(truth)),
+            paper,
+            format!(
+                "{:.1} kPa ({:+.0} %), mean e_zz {printed_strain:.3}",
+                kpa(printed),
+                percent(printed)
+            ),
+        ));
+        rows.push(row(
+            &format!("{name}: (31) on the default surface and match"),
+            "",
+            format!(
+                "{:.1} kPa ({:+.0} %), mean e_zz {strain:.3}",
+                kpa(ratio),
+                percent(ratio)
+            ),
+        ));
+        let estimate = measured.youngs_modulus_pa;
+        let interval = measured.interval_95;
+        let upper = interval
+            .upper
+            .map_or("open".to_owned(), |u| digits(kpa(u), 4));
+        rows.push(row(
+            &format!("{name}, {:.0} kPa: default stages", kpa(truth)),
+            "",
+            format!(
+                "{} kPa ({:+.2} %), 95 %: {} to {upper}",
+                digits(kpa(estimate), 4),
+                percent(estimate),
+                digits(kpa(interval.lower), 4)
+            ),
+        ));
+        printed_places.push([kpa(truth), kpa(printed)]);
+        ratio_places.push([kpa(truth), kpa(ratio)]);
+        default_places.push([kpa(truth), kpa(estimate)]);
+        let ends = [interval.lower, interval.upper.unwrap_or(interval.lower)];
+        intervals.push(ends.map(|end| [kpa(truth), kpa(end)]));
+        values.insert(
+            (*name).to_owned(),
+            json!({
+                "true_pa": truth,
+                "printed_pa": printed, "printed_mean_strain_zz": printed_strain,
+                "stress_over_strain_pa": ratio, "mean_strain_zz": strain,
+                "default_pa": estimate, "default_interval_95_pa": interval,
+            }),
+        );
+    }
+    // Between two loads the apparent surface of any ball scales by (F₂/F₁)^⅓.
+    rows.push(row(
+        "e_zz of Hertz's contact, ½((F₂/F₁)^⅔ − 1), for any ball",
+        "",
+        format!("{:.3}", 0.5 * ((1.2_f64 / 0.7).powf(2.0 / 3.0) - 1.0)),
+    ));
+    panel = panel
+        .segments(intervals, Colour::Blue, "")
+        .points(default_places, Colour::Blue, "default stages, 95 %")
+        .rings(ratio_places, Colour::Orange, "(31) on the default surface")
+        .rings(printed_places, Colour::Red, "printed stages, (31)");
+    Ok(Experiment {
+        title: "Young's modulus of both polymers, 200 control points (Figs 10 to 12)",
+        key: "moduli",
+        rows,
+        panels: vec![panel],
+        value: Value::Object(values),
+    })
+}
+
+/// The modulus of (31) and the mean strain along z that it divides by.
+fn stress_over_strain(trial: &Trial, pipeline: &Pipeline) -> Result<(f64, f64), Failure> {
+    let press = trial.press(pipeline).map_err(Failure::no_answer)?;
+    let modulus = press.modulus().map_err(Failure::no_answer)?;
+    let strain = press.strain(1).map_err(Failure::no_answer)?;
+    Ok((modulus.youngs_modulus_pa, strain.summary.mean[(2, 2)]))
+}
+
+/// The printed stages, with the labelling over few candidates unless `dense`.
+fn printed(pipeline: &Pipeline, dense: bool) -> Result<Pipeline, Failure> {
+    let pipeline = pipeline
+        .clone()
+        .with_stages(&StagesConfig::as_printed())
+        .map_err(Failure::no_answer)?;
+    Ok(if dense {
+        pipeline
+    } else {
+        pipeline.with_matcher(sparse_labelling()?)
+    })
+}
+
+fn printed_labelling() -> RelaxationLabelling {
+    RelaxationLabelling::default().with_compatibility(Compatibility::Printed)
+}
+
+fn sparse_labelling() -> Result<RelaxationLabelling, Failure> {
+    let sparse = printed_labelling().with_candidates(12);
+    sparse.map_err(Failure::no_answer)
+}
+
+/// 105 control points at 0.7 N matched to where the truth moves them at 1.2 N, in another order.
+fn labelling(trial: &Trial, dense: bool) -> Result<Experiment, Failure> {
+    let pipeline = trial.pipeline().map_err(Failure::no_answer)?;
+    let press = trial
+        .press(&pipeline.with_control_points(105))
+        .map_err(Failure::no_answer)?;
+    let model = press.control_points(0).map_err(Failure::no_answer)?;
+    let [first, second]: &[PressTruth; 2] = trial.simulation.truth[..]
+        .try_into()
+        .map_err(Failure::no_answer)?;
+    let scaling = first.scaling_to(second);
+    let moved: Vec<Point3<f64>> = model.iter().map(|p| scaling.apply(p)).collect();
+    let target: Vec<Point3<f64>> = moved.iter().rev().copied().collect();
+    let sparse = sparse_labelling()?;
+    let full = printed_labelling();
+    let default = AnnealedSoftassign::default();
+    let mut matchers: Vec<(&str, &str, &dyn PointMatcher<3>)> = vec![
+        (
+            "printed labelling, 12 candidates",
+            "sparse_labelling",
+            &sparse,
+        ),
+        ("default matcher", "default", &default),
+    ];
+    if dense {
+        matchers.insert(
+            0,
+            (
+                "printed labelling, all candidates",
+                "dense_labelling",
+                &full,
+            ),
+        );
+    }
+    let (mut rows, mut values) = (Vec::new(), Map::new());
+    for (name, key, matcher) in matchers {
+        let start = Instant::now();
+        let found = matcher
+            .match_points(model, &target)
+            .map_err(Failure::no_answer)?;
+        let seconds = start.elapsed().as_secs_f64();
+        let count = model.len();
+        let right = (0..count).filter(|&i| found.assignment[i] == Some(count - 1 - i));
+        let right = right.count();
+        let errors = found.warped.iter().zip(&moved).map(|(w, m)| (w - m).norm());
+        let error_um = 1e6 * errors.sum::<f64>() / count as f64;
+        rows.push(row(
+            &format!("{name}: time"),
+            "1.69 s",
+            format!(
+                "{} s, {right} of {count} right, {error_um:.2} µm off",
+                digits(seconds, 3)
+            ),
+        ));
+        values.insert(
+            key.into(),
+            json!({ "time_s": seconds, "right": right, "points": count, "mean_error_um": error_um }),
+        );
+    }
+    Ok(Experiment {
+        title: "A match of 105 to 105 control points (§5)",
+        key: "match_105",
+        rows,
+        panels: Vec::new(),
+        value: Value::Object(values),
+    })
+}
+
+/// Table 1, measured on the simulated sensor.
+fn specification(trial: &Trial) -> Result<Experiment, Failure> {
+    let simulation = &trial.simulation;
+    let pipeline = trial.pipeline().map_err(Failure::no_answer)?;
+    let line = LinearCalibration::fit(&trial.pairs, &CalibrationOptions::default())
+        .map_err(Failure::no_answer)?;
+    let second = trial.scene.reference(1);
+    let squares = second.iter().zip(&simulation.reference).map(|(&a, &b)| {
+        let difference = f64::from(a) - f64::from(b);
+        difference * difference
+    });
+    let noise_grey = (0.5 * squares.sum::<f64>() / second.len() as f64).sqrt();
+    let start = |press: &Press<'_>| {
+        let now = Instant::now();
+        let contact = press.contact(0).map(|contact| contact.copied());
+        (now.elapsed(), contact)
+    };
+    let press = trial.press(&pipeline).map_err(Failure::no_answer)?;
+    let (mut times, mut contact) = (Vec::new(), None);
+    for _ in 0..20 {
+        let (time, found) = start(&press.renewed());
+        times.push(time);
+        contact = found.map_err(Failure::no_answer)?;
+    }
+    let contact = contact.ok_or_else(|| Failure::no_answer("the frame shows no contact"))?;
+    let area_m2 = std::f64::consts::PI * contact.contact_radius_m.value.powi(2);
+    let specification = SensorSpecification::new(
+        &SensorParameters {
+            side_m: 30e-3,
+            pixel_m: simulation.pixel_size_m[0],
+            frame_rate_hz: 1e3 / median_ms(times),
+            largest_force_n: 2.0,
+            newton_per_grey: line.report().parameters[1].value,
+            pixel_noise_grey: noise_grey,
+            summed_pixels: area_m2 / simulation.pixel_size_m.iter().product::<f64>(),
+        },
+        3.0,
+    )
+    .map_err(Failure::no_answer)?;
+    let rate_hz = 1.0 / specification.temporal_resolution_s;
+    let hysteresis = line.report().hysteresis.as_ref();
+    let loop_percent = 100.0 * hysteresis.map_or(f64::NAN, |h| h.share_of_full_scale);
+    let rows = vec![
+        row(
+            "smallest force, three standard deviations",
+            "2.5 mN",
+            format!("{} mN", digits(1e3 * specification.force_resolution_n, 2)),
+        ),
+        row("hysteresis", "none", format!("{loop_percent:.2} % of 2 N")),
+        row(
+            "frames a second (forces of whole frames here)",
+            "80",
+            digits(rate_hz, 3),
+        ),
+        row(
+            "pixel on the sensing surface",
+            "4.65 µm (on the chip)",
+            format!("{:.2} µm", 1e6 * simulation.pixel_size_m[0]),
+        ),
+        row(
+            "contact radius at 0.7 N",
+            "",
+            format!("{} mm", in_unit(contact.contact_radius_m, 1e3)),
+        ),
+    ];
+    Ok(Experiment {
+        title: "Specification of the sensor (Table 1)",
+        key: "specification",
+        rows,
+        panels: Vec::new(),
+        value: json!({
+            "force_resolution_n": specification.force_resolution_n,
+            "hysteresis_percent": loop_percent,
+            "forces_per_second": rate_hz,
+            "pixel_m": simulation.pixel_size_m[0],
+        }),
+    })
+}
+
+/// (1) to (4): within which angle each layer traps light, and whether the cone of the LED fits.
+fn light() -> Result<Experiment, Failure> {
+    let indices = [1.38, 1.39, 1.40, 1.41];
+    let printed = ["71.98°", "74.89°", "78.46°", "83.73°"];
+    let (mut rows, mut angles) = (Vec::new(), Vec::new());
+    for (index, paper) in indices.iter().zip(printed) {
+        let angle = acceptance_angle(*index, 1.0).map_err(Failure::no_answer)?;
+        let degrees = angle.radians.to_degrees();
+        rows.push(row(
+            &format!("acceptance angle of a layer of index {index:.2}"),
+            paper,
+            format!("{degrees:.2}°"),
+        ));
+        angles.push(degrees);
+    }
+    let cone = led_cone(&indices, 1.0, 140_f64.to_radians()).map_err(Failure::no_answer)?;
+    rows.push(row(
+        "an LED cone of 140° is trapped by every layer",
+        "yes, below 143.96°",
+        if cone.trapped { "yes" } else { "no" }.into(),
+    ));
+    Ok(Experiment {
+        title: "Total internal reflection in the guide (§3.4, (1) to (4))",
+        key: "light",
+        rows,
+        panels: Vec::new(),
+        value: json!({ "acceptance_degrees": angles, "cone_of_140_degrees_is_trapped": cone.trapped }),
+    })
+}
+
+fn row(what: &str, paper: &str, here: String) -> [String; 3] {
+    [what.to_owned(), paper.to_owned(), here]
+}
