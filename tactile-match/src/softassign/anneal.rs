@@ -351,7 +351,7 @@ impl<const D: usize> Annealer<D> {
 
 /// Median of the sum of `dimension` squared standard normal deviates, by the approximation of
 /// Wilson and Hilferty (to 1 % from 2 on).
-fn median_of_chi_squared(dimension: usize) -> f64 {
+pub(super) fn median_of_chi_squared(dimension: usize) -> f64 {
     let n = dimension as f64;
     n * (1.0 - 2.0 / (9.0 * n)).powi(3)
 }

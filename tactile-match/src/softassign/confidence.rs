@@ -69,10 +69,11 @@ impl<const D: usize> Answer<D> {
         without: Option<Mechanism>,
     ) {
         let n = state.warped.len();
-        let noisy = state.sigma > CLEAN_SIGMA || annealer.soft.errors.differ();
+        let noisy = state.noisy || state.sigma > CLEAN_SIGMA || annealer.soft.errors.differ();
         // What the prior's factor leaves out must not cost a clean pair its match. The answer is
         // read at no lower temperature.
-        let variance = state.sigma.max(1.4e-3).powi(2);
+        let least = if state.noisy { 0.0 } else { 1.4e-3 };
+        let variance = state.sigma.max(least).powi(2);
         // Soft matches are read with weights raised to this power. Scaling rows and columns tells
         // two points that may be swapped apart by half the logarithm of the odds that the whole
         // permutations have. The power makes up for it. The confidences of pairs are told by

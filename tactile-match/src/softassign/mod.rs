@@ -32,6 +32,7 @@ mod anneal;
 mod assign;
 mod confidence;
 mod correspond;
+mod fine;
 mod large;
 mod model;
 mod options;
@@ -50,6 +51,7 @@ use crate::{centre_and_radius, widened};
 use assign::{Blocks, TargetErrors};
 use confidence::PairOdds;
 use correspond::Correspondence;
+use fine::FineFit;
 use large::Levels;
 use model::{Prior, RigidFit, ScaleAverage};
 use nalgebra::{Point, SVector};
@@ -99,6 +101,7 @@ pub struct SoftassignWorkspace<const D: usize> {
     consensus: Consensus<D>,
     tuples: Tuples<D>,
     scales: ScaleAverage<D>,
+    fine: FineFit<D>,
     levels: Levels<D>,
     known: Vec<Known<D>>,
     /// Standard deviations of the targets. Empty where the caller did not tell them.
@@ -308,6 +311,8 @@ struct State<const D: usize> {
     energy: f64,
     /// Whether the temperature stopped falling before the limit.
     settled: bool,
+    /// Whether the residuals are noise, however small.
+    noisy: bool,
     /// Share of the matched points whose residual the noise of the others does not explain, see
     /// [`Annealer::tail`].
     tail: f64,
@@ -324,6 +329,7 @@ impl<const D: usize> State<D> {
         (self.sigma, self.iterations) = (other.sigma, other.iterations);
         (self.energy, self.settled, self.matched) = (other.energy, other.settled, other.matched);
         (self.tail, self.ambiguity) = (other.tail, other.ambiguity);
+        self.noisy = other.noisy;
     }
 }
 

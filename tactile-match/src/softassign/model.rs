@@ -423,7 +423,7 @@ fn whiten_blocks<const B: usize>(
 /// Cholesky factor in place of the lower triangle. The diagonal carries σ², so that pivots stay
 /// positive. Rounding is caught by a floor.
 #[inline(always)]
-fn cholesky(a: &mut [f64], n: usize) {
+pub(super) fn cholesky(a: &mut [f64], n: usize) {
     let mut first = 0;
     while first + TOGETHER <= n {
         eliminate::<TOGETHER>(a, n, first);

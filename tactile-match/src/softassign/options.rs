@@ -308,7 +308,8 @@ impl AnnealedSoftassign {
         Ok(self)
     }
 
-    /// Sets the most outer iterations of one start, at least 1 (default 200).
+    /// Sets the most outer iterations of one start, at least 1 (default 200). Where the limit ends
+    /// the first start there is no other.
     ///
     /// # Errors
     /// [`MatchError::InvalidOption`] for 0.

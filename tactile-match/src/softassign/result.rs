@@ -78,7 +78,7 @@ impl<'w, const D: usize> SoftassignMatch<'w, D> {
                 iterations: workspace.best.iterations,
                 starts: workspace.starts,
                 residual: workspace.answer.residual * scale,
-                sigma: workspace.best.sigma * scale,
+                sigma: workspace.fine.sigma.unwrap_or(workspace.best.sigma) * scale,
                 doubt: workspace.doubt(),
             },
         }
@@ -152,6 +152,7 @@ fn stop_reason<const D: usize>(workspace: &SoftassignWorkspace<D>) -> StopReason
         // The floor is reached to rounding.
         () if workspace.best.sigma <= 1.000_001 * confidence::MIN_SIGMA
             && !workspace.annealer.soft.errors.differ()
+            && !workspace.best.noisy
             && workspace.doubt().is_none() =>
         {
             StopReason::Exact

@@ -137,6 +137,7 @@ impl AnnealedSoftassign {
         ws.annealer.volume = bounding_volume(&ws.target);
         ws.spacing = 0.0;
         ws.scales.spread.clear();
+        ws.best.noisy = false;
         (ws.starts, ws.stopped) = (0, false);
         ws.best.energy = f64::INFINITY;
     }
@@ -152,7 +153,8 @@ impl AnnealedSoftassign {
     /// Reads the answer from the best run.
     fn conclude<const D: usize>(&self, ws: &mut SoftassignWorkspace<D>) {
         ws.expected_share = self.share;
-        if ws.starts > 1 || !self.is_exact(ws) {
+        let noisy = ws.best.noisy || self.resolve(ws);
+        if ws.starts > 1 || noisy || !self.is_exact(ws) {
             // Soft matches and regression are those of the last run, which need not be the best
             // one.
             let schedule = self.schedule(Cooling {
@@ -171,6 +173,9 @@ impl AnnealedSoftassign {
             spread,
             self.without,
         );
+        if ws.best.noisy {
+            ws.answer.variance.clone_from(&ws.fine.variance);
+        }
     }
 
     /// All starts in turn until the best answer leaves no doubt, then the scales of the prior.
@@ -180,6 +185,9 @@ impl AnnealedSoftassign {
         observe: Observer<'_>,
     ) -> ControlFlow<()> {
         self.run(ws, Start::Centred, FAST, observe)?;
+        if !ws.best.settled && ws.best.iterations >= self.max_iterations {
+            return ControlFlow::Continue(()); // the limit would cut every further start as well
+        }
         let dense = ws.model.len().min(ws.target.len()) >= MIN_DENSE_POINTS;
         let limited = self.rotation == Rotation::Limited;
         // Warmer, the edges of a cropped set would draw it together again.
@@ -206,13 +214,14 @@ impl AnnealedSoftassign {
             .has(Mechanism::LastReheat)
             .then_some((Start::Best, REHEAT));
         for (start, cooling) in first.into_iter().flatten().chain(rotations).chain(last) {
-            if self.is_done(ws) {
+            if self.is_done(ws) || self.resolve(ws) {
                 break;
             }
             self.run(ws, start, cooling, observe)?;
         }
         let noisy = ws.best.sigma > CLEAN_SIGMA || ws.annealer.soft.errors.differ();
-        if noisy && self.has(Mechanism::Scales) && !ws.annealer.rigid.is_active() {
+        if noisy && !ws.best.noisy && self.has(Mechanism::Scales) && !ws.annealer.rigid.is_active()
+        {
             self.average_scales(ws);
         }
         ControlFlow::Continue(())
@@ -303,6 +312,7 @@ impl AnnealedSoftassign {
         ws.state.trace.clear();
         ws.state.iterations = 0;
         (ws.state.energy, ws.state.tail) = (f64::INFINITY, 0.0);
+        ws.state.noisy = false;
         let flow = ws.annealer.run(&mut ws.state, &schedule, observe);
         if ws.starts == 1 {
             ws.best.copy_from(&ws.state);

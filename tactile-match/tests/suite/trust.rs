@@ -142,6 +142,48 @@ fn standard_deviations_and_confidences_are_honest_in_space() {
     check_trust::<3>(0.2);
 }
 
+/// Noise between the rounding of clean data and what the annealing resolves: no true pair is
+/// rejected, the noise is found, and the warp is nearer to the truth than the noisy points are.
+fn check_small_noise<const D: usize>(n: usize, size: f64) {
+    for noise in [1e-5, 3e-4, 1e-3, 2e-3] {
+        let (mut found_noise, mut squares) = (0.0, 0.0);
+        for seed in 0..4 {
+            let model = scattered::<D>(n, seed);
+            let truth = bend(&model, size);
+            let scene = Scene::new(model, truth, |_| true, (noise, 0.0), seed + 60);
+            let found = scene.matched();
+            assert_eq!(
+                scene.right(&found),
+                1.0,
+                "{D}-D, {n} points, noise {noise}, seed {seed}"
+            );
+            assert_eq!(found.report.doubt, None);
+            found_noise += found.report.sigma / 4.0;
+            let rows = found.warped.iter().zip(&scene.truth);
+            squares += rows.map(|(w, t)| (w - t).norm_squared()).sum::<f64>();
+        }
+        // Four sets of n points, of whose coordinates the warp takes up to two thirds: 2 to 5 %.
+        assert!(
+            (found_noise / noise - 1.0).abs() < 0.15,
+            "{D}-D, {n} points: noise {found_noise} for {noise}"
+        );
+        let error = (squares / (4 * n * D) as f64).sqrt();
+        assert!(
+            error < 0.9 * noise,
+            "{D}-D, {n} points, noise {noise}: error {error}"
+        );
+    }
+}
+
+#[test]
+fn small_noise_costs_no_pair_and_is_found() {
+    for bending in [0.0, 0.03] {
+        check_small_noise::<2>(105, bending);
+        check_small_noise::<3>(105, bending);
+        check_small_noise::<2>(50, bending);
+    }
+}
+
 /// A set stretched along x and seen through its old window.
 fn stretched<const D: usize>(n: usize, stretch: f64, outliers: f64, seed: u64) -> Scene<D> {
     let model = scattered::<D>(n, seed);

@@ -1,0 +1,478 @@
+//! Residuals below what the annealing resolves: are they noise, and where do the points go then?
+
+use super::anneal::median_of_chi_squared;
+use super::confidence::CLEAN_SIGMA;
+use super::model::cholesky;
+use super::{AnnealedSoftassign, SoftassignWorkspace, State, Transformation};
+use crate::vectorised;
+use nalgebra::{Matrix4, Matrix4x3, RowVector4, SVector, Vector3};
+
+// An annealing run ends at a thousandth of the radius, since the factor of its prior leaves out as
+// much. Pairs are decided there, and what is left is either the rounding of clean data or noise.
+// With hard pairs `zᵢ` the model is a full Gaussian process with free affine part,
+// `cov z = τ²(K + λ 1)`. Its restricted likelihood (Patterson & Thompson, Biometrika 58, 1971), with
+// τ profiled out, is that of λ and of the shape of K alone:
+//
+// `−ln p = ½ [M ln S + D (ln det C + ln det PᵀC⁻¹P)]`, `C = K + λ 1`, `S = zᵀ B z`,
+// `B = C⁻¹ − C⁻¹P (PᵀC⁻¹P)⁻¹ PᵀC⁻¹`, `M = D (n − D − 1)`.
+//
+// Clean data of a field that bends take the least λ, under a rough covariance if under no other.
+
+/// Shapes of the covariance by likelihood: Gaussian of a length in radii, and one of Matérn's whose
+/// fields have one derivative, for clean fields that no Gaussian resolves.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Shape {
+    Gaussian(f64),
+    Matern(f64),
+}
+
+const SHAPES: [Shape; 6] = [
+    Shape::Gaussian(1.2),
+    Shape::Gaussian(1.7),
+    Shape::Gaussian(2.4),
+    Shape::Gaussian(3.4),
+    Shape::Gaussian(0.6),
+    Shape::Matern(2.0),
+];
+
+/// Pairs whose likelihood decides about the noise: the 60 next to the centre. Their noise is known
+/// to 7 %, and twice as many take eight times as long.
+const PATCH: usize = 60;
+
+/// Sets up to this size are fitted as a whole: a dense system of theirs takes a tenth of a second.
+const MAX_WHOLE: usize = 600;
+
+/// λ = 4ᵏ: from the rounding of the covariances to where a field is affine beside its noise.
+const POWERS: std::ops::RangeInclusive<i32> = -20..=6;
+
+impl Shape {
+    fn covariance(self, square: f64) -> f64 {
+        match self {
+            Self::Gaussian(length) => (-0.5 * square / (length * length)).exp(),
+            Self::Matern(length) => {
+                let a = (3.0 * square).sqrt() / length;
+                (1.0 + a) * (-a).exp()
+            }
+        }
+    }
+}
+
+/// Memory of the fit, and its answer.
+#[derive(Clone, Debug, Default)]
+pub(super) struct FineFit<const D: usize> {
+    /// Standard deviation of the noise along an axis, once it was looked for.
+    pub(super) sigma: Option<f64>,
+    /// Variance of the positions along an axis. Empty where the positions are not the fit's.
+    pub(super) variance: Vec<f64>,
+    pairs: Vec<(usize, usize)>,
+    sample: Vec<(usize, usize)>,
+    distances: Vec<f64>,
+    system: System<D>,
+}
+
+impl AnnealedSoftassign {
+    /// Whether the residuals of decided pairs are noise. Where they are, `ws.best` gets the noise
+    /// and the positions.
+    pub(super) fn resolve<const D: usize>(&self, ws: &mut SoftassignWorkspace<D>) -> bool {
+        ws.fine.forget();
+        let bends = self.transformation == Transformation::NonRigid;
+        let plain = ws.known.is_empty() && !ws.annealer.soft.errors.differ();
+        let smaller = ws.model.len().min(ws.target.len()) as f64;
+        // A run colder than the noise has lost some of its pairs.
+        let cold = ws.best.sigma < 0.1 * ws.spacing && ws.best.matched < 0.95 * smaller;
+        if !bends || !plain || !(ws.best.sigma <= CLEAN_SIGMA || cold) {
+            return false;
+        }
+        // Those lie this far from their targets at most.
+        let reach = if self.is_exact(ws) {
+            0.0
+        } else {
+            0.3 * ws.spacing
+        };
+        let whole = ws.model.len() <= MAX_WHOLE;
+        let fine = &mut ws.fine;
+        fine.pair(&ws.model, &ws.best.warped, &ws.target, reach);
+        let sets = (&*ws.model, &*ws.best.base, &*ws.target);
+        let enough = 0.9 * smaller.min(if whole { f64::INFINITY } else { PATCH as f64 });
+        let are_enough = |fine: &FineFit<D>| fine.pairs.len() as f64 >= enough;
+        let noisy = are_enough(fine) && fine.are_noisy(sets) && are_enough(fine);
+        // Partners met by chance within that reach look like noise of twice as much at least.
+        let small = reach == 0.0 || fine.sigma.is_some_and(|sigma| sigma < 0.25 * reach);
+        if !(noisy && small && whole) {
+            return false;
+        }
+        fine.place(&ws.model, &mut ws.best);
+        if ws.best.sigma > CLEAN_SIGMA {
+            // The annealing resolves it, and its average over scales errs less.
+            ws.best.noisy = false;
+            fine.forget();
+        }
+        true
+    }
+}
+
+/// Model, where a start puts it, and targets.
+type Sets<'a, const D: usize> = (&'a [[f64; D]], &'a [[f64; D]], &'a [[f64; D]]);
+
+impl<const D: usize> FineFit<D> {
+    fn forget(&mut self) {
+        self.sigma = None;
+        self.variance.clear();
+    }
+
+    /// Mutual nearest neighbours of warped points and targets, of all points or of those next to
+    /// the centre: pairs nearer than `reach` or six times the median.
+    fn pair(&mut self, model: &[[f64; D]], warped: &[[f64; D]], target: &[[f64; D]], reach: f64) {
+        self.pairs.clear();
+        self.pairs.extend((0..model.len()).map(|i| (i, 0)));
+        if model.len() > MAX_WHOLE {
+            centre_first(model, &mut self.pairs, PATCH);
+        }
+        self.pairs.retain_mut(|pair| {
+            pair.1 = nearest(&warped[pair.0], target);
+            nearest(&target[pair.1], warped) == pair.0
+        });
+        let apart = |&(i, j): &(usize, usize)| squared_distance(&warped[i], &target[j]);
+        self.distances.clear();
+        self.distances.extend(self.pairs.iter().map(apart));
+        let limit = (36.0 * median(&mut self.distances)).max(reach * reach);
+        self.pairs.retain(|pair| apart(pair) <= limit);
+    }
+
+    /// Whether the residuals of the pairs are noise. Pairs that the others contradict leave. Leaves
+    /// the fit of all pairs in `system`.
+    fn are_noisy(&mut self, sets: Sets<'_, D>) -> bool {
+        for _ in 0..3 {
+            // Fewer do not tell noise from bending.
+            if self.pairs.len() < 8 * (D + 1) {
+                return false;
+            }
+            self.sample.clone_from(&self.pairs);
+            centre_first(sets.0, &mut self.sample, PATCH);
+            let Some(of_patch) = self.likeliest(sets) else {
+                return false;
+            };
+            if sets.0.len() > MAX_WHOLE {
+                return true;
+            }
+            let step = self.pairs.len().div_ceil(2 * PATCH);
+            self.sample.clear();
+            self.sample.extend(self.pairs.iter().step_by(step));
+            let (shape, mut lambda) = self.likeliest(sets).unwrap_or(of_patch);
+            self.system.take(sets, &self.pairs, shape);
+            let energies = [0.5, 1.0, 2.0].map(|f| self.system.energy(f * lambda));
+            if energies[0] < energies[1] {
+                lambda *= 0.5;
+            } else if energies[2] < energies[1] {
+                lambda *= 2.0;
+            }
+            self.system.solve(lambda);
+            self.sigma = Some(self.system.noise());
+            if !self.drop_contradicted() {
+                return true;
+            }
+        }
+        true
+    }
+
+    /// Drops pairs whose residual the noise of the others does not explain. Whether there were any.
+    fn drop_contradicted(&mut self) -> bool {
+        let Self {
+            system,
+            pairs,
+            distances,
+            ..
+        } = self;
+        // λα has the variance σ²λB where the noise is σ².
+        let misfit = |row: usize| squared(&system.weights[row]) / system.precision[row];
+        distances.clear();
+        distances.extend((0..pairs.len()).map(misfit));
+        // One true residual in a million is beyond five standard deviations, by the median.
+        let limit = 25.0 / median_of_chi_squared(D) * D as f64 / 2.0 * median(distances);
+        let (before, mut row) = (pairs.len(), 0);
+        pairs.retain(|_| {
+            row += 1;
+            misfit(row - 1) <= limit
+        });
+        pairs.len() < before
+    }
+
+    /// Shape and λ of the largest likelihood over the sample. None where the data are clean.
+    fn likeliest(&mut self, sets: Sets<'_, D>) -> Option<(Shape, f64)> {
+        let (least, most) = (*POWERS.start(), *POWERS.end());
+        let lambda = |k: i32| 4_f64.powi(k);
+        let (mut best, mut clean) = ((f64::INFINITY, SHAPES[0], least), f64::INFINITY);
+        for shape in SHAPES {
+            self.system.take(sets, &self.sample, shape);
+            // What is clean under the first shape is clean, by a few λ.
+            if shape == SHAPES[0] {
+                let rough = [least, -17, -11, -2].map(|k| self.system.energy(lambda(k)));
+                if rough.is_sorted() {
+                    self.sigma = Some(self.system.scale(lambda(least)));
+                    return None;
+                }
+            }
+            let mut of_shape = (self.system.energy(lambda(least)), least);
+            clean = clean.min(of_shape.0);
+            let mut consider = |k: i32| {
+                let energy = self.system.energy(lambda(k.clamp(least, most)));
+                if energy < of_shape.0 {
+                    of_shape = (energy, k.clamp(least, most));
+                }
+                of_shape.1
+            };
+            let coarse = (least..=most).step_by(3).map(&mut consider).last();
+            let centre = coarse.unwrap_or(least);
+            consider(centre - 1);
+            consider(centre + 1);
+            if of_shape.0 < best.0 {
+                best = (of_shape.0, shape, of_shape.1);
+            }
+        }
+        let (energy, shape, k) = best;
+        self.system.take(sets, &self.sample, shape);
+        self.system.solve(lambda(k));
+        let sigma = self.system.noise();
+        self.sigma = Some(sigma);
+        // Texts of six digits round to more than that. A likelihood that is not e⁵ times that of
+        // clean data decides nothing.
+        let noisy = k > least + 1 && sigma > 1e-6 && energy < clean - 5.0;
+        noisy.then_some((shape, lambda(k)))
+    }
+
+    /// Puts the points where the fit has them.
+    fn place(&mut self, model: &[[f64; D]], state: &mut State<D>) {
+        let sigma = self.system.noise();
+        self.sigma = Some(sigma);
+        (state.sigma, state.noisy) = (sigma, true);
+        self.variance.clear();
+        for (i, point) in model.iter().enumerate() {
+            let (displacement, variance) = self.system.predict(point);
+            state.warped[i] = std::array::from_fn(|d| state.base[i][d] + displacement[d]);
+            self.variance.push(sigma * sigma * variance);
+        }
+    }
+}
+
+/// Keeps the `count` pairs whose model points are next to the centre.
+fn centre_first<const D: usize>(model: &[[f64; D]], pairs: &mut Vec<(usize, usize)>, count: usize) {
+    if pairs.len() > count {
+        pairs.select_nth_unstable_by(count, |&(a, _), &(b, _)| {
+            squared(&model[a]).total_cmp(&squared(&model[b]))
+        });
+        pairs.truncate(count);
+    }
+}
+
+/// The median, 0 of nothing.
+fn median(values: &mut [f64]) -> f64 {
+    let middle = values.len() / 2;
+    if values.is_empty() {
+        return 0.0;
+    }
+    *values.select_nth_unstable_by(middle, f64::total_cmp).1
+}
+
+/// The dense system of some pairs.
+#[derive(Clone, Debug, Default)]
+struct System<const D: usize> {
+    shape: Option<Shape>,
+    lambda: f64,
+    points: Vec<[f64; D]>,
+    displacements: Vec<[f64; D]>,
+    /// K, and the factor of C, by rows.
+    kernel: Vec<f64>,
+    factor: Vec<f64>,
+    /// L⁻¹[P z].
+    whitened: Vec<(RowVector4<f64>, SVector<f64, D>)>,
+    inverse: Vec<f64>,
+    normal: Matrix4<f64>,
+    affine: Matrix4x3<f64>,
+    /// α = B z, and the diagonal of B.
+    weights: Vec<[f64; D]>,
+    precision: Vec<f64>,
+}
+
+impl<const D: usize> System<D> {
+    fn take(&mut self, (model, base, target): Sets<'_, D>, pairs: &[(usize, usize)], shape: Shape) {
+        self.shape = Some(shape);
+        self.points.clear();
+        self.points.extend(pairs.iter().map(|&(i, _)| model[i]));
+        self.displacements.clear();
+        let displacement = |&(i, j): &(usize, usize)| -> [f64; D] {
+            std::array::from_fn(|d| target[j][d] - base[i][d])
+        };
+        self.displacements.extend(pairs.iter().map(displacement));
+        let n = pairs.len();
+        self.kernel.clear();
+        self.kernel.resize(n * n, 0.0);
+        for i in 0..n {
+            for j in 0..=i {
+                let square = squared_distance(&self.points[i], &self.points[j]);
+                self.kernel[i * n + j] = shape.covariance(square);
+            }
+        }
+    }
+
+    /// The basis of the affine fields at a point, unit vectors for the dimensions it lacks.
+    fn basis(point: &[f64; D]) -> RowVector4<f64> {
+        RowVector4::from_fn(|_, c| match c {
+            0 => 1.0,
+            _ => point.get(c - 1).copied().unwrap_or(0.0),
+        })
+    }
+
+    /// Factors C and whitens. The quadratic form S and the logarithm of both determinants.
+    fn whiten(&mut self, lambda: f64) -> (f64, f64) {
+        let n = self.points.len();
+        self.lambda = lambda;
+        self.factor.clone_from(&self.kernel);
+        (0..n).for_each(|i| self.factor[i * n + i] += lambda);
+        let factor = &mut self.factor;
+        vectorised(
+            #[inline(always)]
+            || cholesky(factor, n),
+        );
+        self.whitened.clear();
+        let mut normal = Matrix4::zeros();
+        let (mut moments, mut squares, mut log_det) = (Matrix4x3::zeros(), 0.0, 0.0);
+        for i in 0..n {
+            let row = &self.factor[i * n..=i * n + i];
+            let mut p = Self::basis(&self.points[i]);
+            let mut z = SVector::from(self.displacements[i]);
+            for (l, (pw, zw)) in row.iter().zip(&self.whitened) {
+                p -= pw * *l;
+                z -= zw * *l;
+            }
+            (p, z) = (p / row[i], z / row[i]);
+            log_det += 2.0 * row[i].ln();
+            normal += p.transpose() * p;
+            squares += z.norm_squared();
+            moments += p.transpose() * in_three(&z).transpose();
+            self.whitened.push((p, z));
+        }
+        (D + 1..4).for_each(|c| normal[(c, c)] = 1.0);
+        let Some(inverse) = normal.try_inverse() else {
+            return (f64::INFINITY, 0.0); // all on a line or plane: no affine part
+        };
+        (self.normal, self.affine) = (inverse, inverse * moments);
+        // Below that is rounding.
+        let left = (squares - moments.dot(&self.affine)).max(1e-26);
+        (left, log_det + normal.determinant().ln())
+    }
+
+    /// Standard deviation of the noise by the likelihood: τ√λ.
+    fn scale(&mut self, lambda: f64) -> f64 {
+        let degrees = ((self.points.len() - D - 1) * D) as f64;
+        (self.whiten(lambda).0 * lambda / degrees).sqrt()
+    }
+
+    /// Minus the logarithm of the restricted likelihood.
+    fn energy(&mut self, lambda: f64) -> f64 {
+        let degrees = (self.points.len() - D - 1) as f64;
+        let (left, log_det) = self.whiten(lambda);
+        0.5 * D as f64 * (degrees * left.ln() + log_det)
+    }
+
+    /// Sets α and the diagonal of B: `O(n³)`.
+    fn solve(&mut self, lambda: f64) {
+        let n = self.points.len();
+        self.whiten(lambda);
+        // Rows of L⁻ᵀ, one after the other: C⁻¹ = L⁻ᵀ L⁻¹.
+        self.precision.clear();
+        self.weights.clear();
+        let Self {
+            factor,
+            inverse,
+            whitened,
+            ..
+        } = self;
+        for k in 0..n {
+            inverse.clear();
+            inverse.resize(n, 0.0);
+            let mut p = RowVector4::zeros();
+            let mut z = SVector::<f64, D>::zeros();
+            let mut square = 0.0;
+            for i in k..n {
+                let row = &factor[i * n..=i * n + i];
+                let sum: f64 = row[k..i]
+                    .iter()
+                    .zip(&inverse[k..i])
+                    .map(|(l, x)| l * x)
+                    .sum();
+                let value = (f64::from(u8::from(i == k)) - sum) / row[i];
+                inverse[i] = value;
+                square += value * value;
+                p += whitened[i].0 * value;
+                z += whitened[i].1 * value;
+            }
+            let affine = p * self.affine;
+            self.weights.push(std::array::from_fn(|d| z[d] - affine[d]));
+            let explained = (p * self.normal * p.transpose())[0];
+            self.precision
+                .push((square - explained).max(f64::MIN_POSITIVE));
+        }
+    }
+
+    /// Standard deviation of the noise: residuals over what the fit leaves free.
+    fn noise(&self) -> f64 {
+        let squares: f64 = self.weights.iter().map(squared).sum();
+        let free: f64 = self.precision.iter().sum();
+        (self.lambda * squares / (D as f64 * free)).sqrt()
+    }
+
+    /// Displacement at a point, and its variance over that of the noise: `O(n²)`.
+    fn predict(&mut self, point: &[f64; D]) -> ([f64; D], f64) {
+        let n = self.points.len();
+        let shape = self.shape.unwrap_or(SHAPES[0]);
+        let Self {
+            factor,
+            inverse,
+            whitened,
+            points,
+            ..
+        } = self;
+        inverse.clear();
+        let mut basis = Self::basis(point);
+        let own = basis * self.affine;
+        let mut displacement: [f64; D] = std::array::from_fn(|d| own[d]);
+        let mut variance = 1.0;
+        for i in 0..n {
+            let covariance = shape.covariance(squared_distance(point, &points[i]));
+            for d in 0..D {
+                displacement[d] += covariance * self.weights[i][d];
+            }
+            let row = &factor[i * n..=i * n + i];
+            let sum: f64 = row[..i].iter().zip(&*inverse).map(|(l, x)| l * x).sum();
+            let value = (covariance - sum) / row[i];
+            inverse.push(value);
+            variance -= value * value;
+            basis -= whitened[i].0 * value;
+        }
+        let affine = (basis * self.normal * basis.transpose())[0];
+        (displacement, (variance.max(0.0) + affine) / self.lambda)
+    }
+}
+
+fn in_three<const D: usize>(v: &SVector<f64, D>) -> Vector3<f64> {
+    Vector3::from_fn(|k, _| if k < D { v[k] } else { 0.0 })
+}
+
+fn nearest<const D: usize>(place: &[f64; D], points: &[[f64; D]]) -> usize {
+    let mut best = (f64::INFINITY, 0);
+    for (j, point) in points.iter().enumerate() {
+        let square = squared_distance(place, point);
+        if square < best.0 {
+            best = (square, j);
+        }
+    }
+    best.1
+}
+
+fn squared_distance<const D: usize>(a: &[f64; D], b: &[f64; D]) -> f64 {
+    (0..D).map(|k| (a[k] - b[k]).powi(2)).sum()
+}
+
+fn squared<const D: usize>(a: &[f64; D]) -> f64 {
+    a.iter().map(|c| c * c).sum()
+}
