@@ -1,8 +1,11 @@
-//! Arrays of NumPy to those of Rust and back.
+//! NumPy arrays in and out. They are read in place where their type and layout allow.
 use crate::errors::invalid;
 use nalgebra::{Matrix3, Point};
 use ndarray::{Array1, Array2, Array3, ArrayView2, Dimension};
-use numpy::{Element, PyArray, PyArray1, PyArray2, PyArray3, PyReadonlyArrayDyn};
+use numpy::{
+    Element, PyArray, PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray2,
+    PyReadonlyArrayDyn, PyUntypedArrayMethods,
+};
 use pyo3::prelude::*;
 
 /// What NumPy makes of an argument, whose kind of numbers is one of `kinds`, as `dtype`.
@@ -28,67 +31,86 @@ fn read<'py, T: Element>(
     aligned.extract()
 }
 
-/// A copy of a view of two axes.
-fn two_axes<T: Element + Copy + Default>(
+fn axes(name: &str, expected: &str, shape: &[usize]) -> PyErr {
+    invalid(format!(
+        "{name} must have {expected}, found shape {shape:?}"
+    ))
+}
+
+/// An array of two axes. NumPy's own are read in place where they are aligned and lie in a row.
+fn two_axes<'py, T: Element>(
     name: &str,
-    array: &PyReadonlyArrayDyn<'_, T>,
-) -> PyResult<Array2<T>> {
-    let view = array.as_array();
-    let &[rows, columns] = view.shape() else {
-        let shape = view.shape();
-        return Err(invalid(format!(
-            "{name} must have two axes, found shape {shape:?}"
-        )));
-    };
-    // NumPy's strides of an array without elements may be any.
-    if view.is_empty() {
-        return Ok(Array2::default((rows, columns)));
+    given: &Bound<'py, PyAny>,
+    kinds: &str,
+    dtype: &str,
+) -> PyResult<PyReadonlyArray2<'py, T>> {
+    if let Ok(array) = given.cast::<PyArray2<T>>() {
+        let aligned = (array.data() as usize).is_multiple_of(align_of::<T>());
+        if aligned && array.is_c_contiguous() {
+            return Ok(array.try_readonly()?);
+        }
     }
-    let view = view.into_dimensionality::<ndarray::Ix2>();
-    Ok(view.map_err(invalid)?.to_owned())
+    let array = read::<T>(name, given, kinds, dtype)?;
+    let shape = array.shape().to_vec();
+    let two = array.cast::<PyArray2<T>>();
+    Ok(two
+        .map_err(|_| axes(name, "two axes", &shape))?
+        .try_readonly()?)
 }
 
 /// A matrix of floating-point numbers.
-pub fn matrix(name: &str, given: &Bound<'_, PyAny>) -> PyResult<Array2<f64>> {
-    two_axes(name, &read::<f64>(name, given, "iufb", "float64")?)
+pub fn matrix<'py>(name: &str, given: &Bound<'py, PyAny>) -> PyResult<PyReadonlyArray2<'py, f64>> {
+    two_axes(name, given, "iufb", "float64")
+}
+
+/// A mask: a matrix of booleans.
+pub fn mask(name: &str, given: &Bound<'_, PyAny>) -> PyResult<Array2<bool>> {
+    let array = two_axes::<bool>(name, given, "b", "bool")?;
+    Ok(owned(array.as_array()))
 }
 
 /// A frame: a matrix of bytes, [row, column]. Other numbers are refused, because a cast would wrap.
-pub fn frame(name: &str, given: &Bound<'_, PyAny>) -> PyResult<Array2<u8>> {
-    let found = || -> PyResult<String> { Ok(given.getattr("dtype")?.str()?.to_string()) };
-    if found().is_ok_and(|dtype| dtype != "uint8") {
-        let found = found()?;
+pub fn frame<'py>(name: &str, given: &Bound<'py, PyAny>) -> PyResult<PyReadonlyArray2<'py, u8>> {
+    if given.cast::<PyArray2<u8>>().is_err()
+        && let Ok(found) = given.getattr("dtype")
+        && found.str()? != "uint8"
+    {
         return Err(invalid(format!(
             "{name} must be a frame of uint8, found {found}"
         )));
     }
-    two_axes(name, &read::<u8>(name, given, "u", "uint8")?)
+    two_axes(name, given, "u", "uint8")
+}
+
+/// A copy. ndarray refuses NumPy's strides of an array without elements.
+pub fn owned<T: Clone + Default>(view: ArrayView2<'_, T>) -> Array2<T> {
+    match view.is_empty() {
+        true => Array2::default(view.dim()),
+        false => view.to_owned(),
+    }
 }
 
 /// A vector of integers, as indices that may be −1.
 pub fn indices(name: &str, given: &Bound<'_, PyAny>) -> PyResult<Vec<i64>> {
-    let array = read::<i64>(name, given, "iu", "int64")?;
-    let view = array.as_array();
-    if view.ndim() != 1 {
-        let shape = view.shape();
-        return Err(invalid(format!(
-            "{name} must have one axis, found shape {shape:?}"
-        )));
-    }
-    Ok(view.iter().copied().collect())
+    one_axis(name, given, "iu", "int64")
 }
 
 /// A vector of floating-point numbers.
 pub fn vector(name: &str, given: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
-    let array = read::<f64>(name, given, "iufb", "float64")?;
-    let view = array.as_array();
-    if view.ndim() != 1 {
-        let shape = view.shape();
-        return Err(invalid(format!(
-            "{name} must have one axis, found shape {shape:?}"
-        )));
+    one_axis(name, given, "iufb", "float64")
+}
+
+fn one_axis<T: Element + Copy>(
+    name: &str,
+    given: &Bound<'_, PyAny>,
+    kinds: &str,
+    dtype: &str,
+) -> PyResult<Vec<T>> {
+    let array = read::<T>(name, given, kinds, dtype)?;
+    match array.ndim() {
+        1 => Ok(array.as_array().iter().copied().collect()),
+        _ => Err(axes(name, "one axis", array.shape())),
     }
-    Ok(view.iter().copied().collect())
 }
 
 /// Pixel size along x and y: one number for both, or two.
@@ -98,6 +120,17 @@ pub fn pixel_size(given: &Bound<'_, PyAny>) -> PyResult<[f64; 2]> {
     }
     let sizes = vector("pixel_size", given)?;
     <[f64; 2]>::try_from(sizes).map_err(|_| invalid("pixel_size must be one number or two"))
+}
+
+/// The rows of an array of N columns.
+pub fn columns<const N: usize>(name: &str, given: &Bound<'_, PyAny>) -> PyResult<Vec<[f64; N]>> {
+    let array = matrix(name, given)?;
+    let view = array.as_array();
+    if view.ncols() != N {
+        return Err(axes(name, &format!("{N} columns"), view.shape()));
+    }
+    let row = |row: ndarray::ArrayView1<'_, f64>| std::array::from_fn(|k| row[k]);
+    Ok(view.rows().into_iter().map(row).collect())
 }
 
 /// Two sets of points in the plane or in space.
@@ -119,6 +152,10 @@ pub fn points<const D: usize>(rows: ArrayView2<'_, f64>) -> Vec<Point<f64, D>> {
 
 pub fn rows<const D: usize>(points: &[Point<f64, D>]) -> Array2<f64> {
     Array2::from_shape_fn((points.len(), D), |(i, k)| points[i][k])
+}
+
+pub fn tensor(rows: ArrayView2<'_, f64>) -> Matrix3<f64> {
+    Matrix3::from_fn(|i, j| rows[[i, j]])
 }
 
 /// An array that nobody can change, as a part of a frozen result.

@@ -1,11 +1,14 @@
 //! Exceptions: by kind, with the sentence of the error, and with the Python error that caused it.
-use pyo3::exceptions::{PyIndexError, PyRuntimeError, PyValueError};
+use pyo3::exceptions::{PyException, PyIndexError, PyOSError, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use std::error::Error;
-use tactile_imaging::elasticity::ElasticityError;
+use std::ops::ControlFlow;
+use std::time::{Duration, Instant};
+use tactile_imaging::StrainBetweenError;
+use tactile_imaging::io::FileError;
 use tactile_imaging::matching::MatchError;
 use tactile_imaging::pipeline::PipelineError;
-use tactile_imaging::{StrainBetweenError, tps::TpsError};
+use tactile_imaging::sensor::SensorError;
 
 pyo3::create_exception!(
     tactile_imaging,
@@ -14,23 +17,40 @@ pyo3::create_exception!(
     "A measurement that cannot be made from valid input: no contact, too few matches, a failed stage."
 );
 
-/// An error that a caller mends by other arguments.
-pub fn invalid(error: impl ToString) -> PyErr {
-    PyValueError::new_err(error.to_string())
+/// An argument that a caller has to change.
+pub fn invalid(sentence: impl ToString) -> PyErr {
+    PyValueError::new_err(sentence.to_string())
 }
 
-/// A failure of a measurement, caused by the exception of a stage in Python where one was raised.
-pub fn failed(error: &(dyn Error + 'static)) -> PyErr {
-    let raised = TactileError::new_err(error.to_string());
-    let mut link = Some(error);
-    while let Some(error) = link {
-        if let Some(cause) = error.downcast_ref::<PyErr>() {
-            Python::attach(|py| raised.set_cause(py, Some(cause.clone_ref(py))));
-            break;
+/// The exception of a stage in Python that an error carries, as the cause of one with the error's
+/// sentence. What is no `Exception`, as `KeyboardInterrupt`, is raised itself.
+fn caused(error: &(dyn Error + 'static)) -> Option<PyErr> {
+    let mut link = error;
+    let cause = loop {
+        match link.downcast_ref::<PyErr>() {
+            Some(cause) => break cause,
+            None => link = link.source()?,
         }
-        link = error.source();
-    }
-    raised
+    };
+    Some(Python::attach(|py| {
+        let cause = cause.clone_ref(py);
+        if !cause.is_instance_of::<PyException>(py) {
+            return cause;
+        }
+        let raised = TactileError::new_err(error.to_string());
+        raised.set_cause(py, Some(cause));
+        raised
+    }))
+}
+
+/// A failure of a measurement.
+pub fn failed(error: impl Error + 'static) -> PyErr {
+    caused(&error).unwrap_or_else(|| TactileError::new_err(error.to_string()))
+}
+
+/// An error that a caller mends by other arguments, unless a stage in Python failed.
+pub fn refused(error: impl Error + 'static) -> PyErr {
+    caused(&error).unwrap_or_else(|| invalid(error))
 }
 
 pub fn pipeline(error: PipelineError) -> PyErr {
@@ -46,33 +66,68 @@ pub fn pipeline(error: PipelineError) -> PyErr {
         | E::Material(_)
         | E::ScaleError { .. }
         | E::InputError { .. }
+        | E::LayerCovariance { .. }
         | E::EvenSmoothing { .. }
         | E::EmptyBlocks
         | E::Contact { .. }
-        | E::WrongEstimator { .. } => invalid(error),
-        _ => failed(&error),
+        | E::Time { .. }
+        | E::TimeDecreases { .. }
+        | E::WrongEstimator { .. } => refused(error),
+        _ => failed(error),
     }
-}
-
-pub fn matching(error: MatchError) -> PyErr {
-    match error {
-        MatchError::Custom(_) => failed(&error),
-        _ => invalid(error),
-    }
-}
-
-pub fn spline(error: TpsError) -> PyErr {
-    invalid(error)
-}
-
-pub fn elasticity(error: ElasticityError) -> PyErr {
-    invalid(error)
 }
 
 pub fn strain_between(error: StrainBetweenError) -> PyErr {
     match error {
-        StrainBetweenError::Match(error) => matching(error),
-        StrainBetweenError::TooFewPairs { .. } => invalid(error),
-        _ => failed(&error),
+        StrainBetweenError::Match(MatchError::Custom(_))
+        | StrainBetweenError::NotSmooth
+        | StrainBetweenError::Doubtful(_) => failed(error),
+        _ => refused(error),
+    }
+}
+
+pub fn file(error: FileError) -> PyErr {
+    match error {
+        FileError::Write { .. } | FileError::Read { .. } => PyOSError::new_err(error.to_string()),
+        _ => invalid(error),
+    }
+}
+
+pub fn sensor(error: SensorError) -> PyErr {
+    match error {
+        SensorError::File(error) => file(error),
+        _ => refused(error),
+    }
+}
+
+/// Lets `KeyboardInterrupt` end long work: asked at every step of it, which it looks for at times.
+pub struct Signals {
+    looked: Instant,
+    raised: Option<PyErr>,
+}
+
+impl Signals {
+    pub fn new() -> Self {
+        Self {
+            looked: Instant::now(),
+            raised: None,
+        }
+    }
+
+    /// Whether the work goes on.
+    pub fn check(&mut self) -> ControlFlow<()> {
+        // Rare enough to cost nothing, often enough for a person.
+        if self.looked.elapsed() > Duration::from_millis(50) {
+            self.looked = Instant::now();
+            self.raised = Python::attach(|py| py.check_signals().err());
+        }
+        match self.raised {
+            Some(_) => ControlFlow::Break(()),
+            None => ControlFlow::Continue(()),
+        }
+    }
+
+    pub fn finish(&mut self) -> PyResult<()> {
+        self.raised.take().map_or(Ok(()), Err)
     }
 }

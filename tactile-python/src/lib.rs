@@ -1,10 +1,20 @@
 //! The module `tactile_imaging._native` of the Python package `tactile_imaging`.
+// Keywords of Python are arguments here.
+#![allow(clippy::too_many_arguments)]
+
 mod arrays;
 mod errors;
+mod inclusion;
+mod laws;
 mod matching;
+mod own;
+mod pipeline;
 mod press;
 mod results;
+mod sensor;
+mod simulate;
 mod spline;
+mod surfaces;
 
 use pyo3::prelude::*;
 
@@ -16,29 +26,36 @@ fn run_program(py: Python<'_>, arguments: Vec<String>) -> u8 {
 }
 
 #[pymodule]
-fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add("__version__", env!("CARGO_PKG_VERSION"))?;
-    module.add(
-        "TactileError",
-        module.py().get_type::<errors::TactileError>(),
-    )?;
-    module.add_class::<press::Object>()?;
-    module.add_class::<press::Pipeline>()?;
-    module.add_class::<press::Press>()?;
-    module.add_class::<press::Session>()?;
-    module.add_class::<spline::ThinPlateSpline>()?;
-    module.add_class::<results::Contact>()?;
-    module.add_class::<results::Estimate>()?;
-    module.add_class::<results::Match>()?;
-    module.add_class::<results::Modulus>()?;
-    module.add_class::<results::SimulatedPress>()?;
-    module.add_class::<results::Strain>()?;
-    module.add_class::<results::StrainBetween>()?;
-    module.add_class::<results::Surface>()?;
-    module.add_function(wrap_pyfunction!(matching::match_points, module)?)?;
-    module.add_function(wrap_pyfunction!(matching::strain_between, module)?)?;
-    module.add_function(wrap_pyfunction!(spline::integrate, module)?)?;
-    module.add_function(wrap_pyfunction!(press::simulate, module)?)?;
-    module.add_function(wrap_pyfunction!(run_program, module)?)?;
-    Ok(())
+mod _native {
+    #[pymodule_export]
+    use super::errors::TactileError;
+    #[pymodule_export]
+    use super::inclusion::{inclusion, inclusion_of_scene};
+    #[pymodule_export]
+    use super::laws::{estimate_modulus, hertz};
+    #[pymodule_export]
+    use super::matching::{match_points, strain_between};
+    #[pymodule_export]
+    use super::pipeline::{Object, Pipeline};
+    #[pymodule_export]
+    use super::press::{Press, Session};
+    #[pymodule_export]
+    use super::results::{
+        Contact, Estimate, HertzContact, Inclusion, Load, Match, Modulus, SimulatedPress, Strain,
+        StrainBetween, Surface,
+    };
+    #[pymodule_export]
+    use super::run_program;
+    #[pymodule_export]
+    use super::sensor::Sensor;
+    #[pymodule_export]
+    use super::simulate::simulate;
+    #[pymodule_export]
+    use super::spline::ThinPlateSpline;
+    #[pymodule_export]
+    use super::surfaces::{depth, integrate, reconstruct};
+
+    #[pymodule_export]
+    #[allow(non_upper_case_globals)] // its name in Python
+    const __version__: &str = env!("CARGO_PKG_VERSION");
 }

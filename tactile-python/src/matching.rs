@@ -1,21 +1,23 @@
 //! Matching of points, with a matcher of this library or one written in Python.
 use crate::arrays;
-use crate::errors::{self, invalid};
+use crate::errors::{self, Signals, invalid};
+use crate::own::OwnStage;
 use crate::results::{Match, StrainBetween};
 use nalgebra::{Matrix3, Point};
-use ndarray::Array2;
-use numpy::PyArray2;
+use ndarray::{Array2, ArrayView2};
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyTuple};
+use pyo3::types::PyDict;
+use std::str::FromStr;
 use tactile_imaging::core::statistics::quantile_95;
+use tactile_imaging::matching::labelling::{Compatibility, LengthMaximum, Neighbourhood};
 use tactile_imaging::matching::{
     AnnealedSoftassign, CoherentPointDrift, Doubt, LinearAssignment, MatchError, Matching, Motion,
-    NearestNeighbour, Outliers, PointMatcher, RelaxationLabelling, Rotation, Search,
+    NearestNeighbour, Normalization, Outliers, PointMatcher, RelaxationLabelling, Rotation,
+    SoftassignWorkspace, Transformation,
 };
+use tactile_imaging::pipeline::MatcherChoice;
 use tactile_imaging::{StrainBetweenOptions, strain_between as strain_of_sets};
-
-pub type Boxed<const D: usize> = Box<dyn PointMatcher<D> + Send + Sync>;
 
 /// A matcher as the caller gave it: read once, made for the plane or for space.
 pub enum Matcher {
@@ -24,266 +26,331 @@ pub enum Matcher {
     Labelling(RelaxationLabelling),
     Assignment(LinearAssignment),
     Nearest(NearestNeighbour),
-    Own(Py<PyAny>),
+    Own(OwnStage),
 }
 
-fn option<T: Copy>(name: &str, text: &str, choices: &[(&str, T)]) -> PyResult<T> {
-    let names: Vec<_> = choices.iter().map(|(name, _)| *name).collect();
-    let chosen = choices.iter().find(|(name, _)| *name == text);
-    let unknown = || invalid(format!("{name} must be one of {names:?}, found {text:?}"));
-    chosen.map(|(_, choice)| *choice).ok_or_else(unknown)
+/// Options of a matcher by name, taken one after the other.
+struct Options<'py>(Vec<(String, Bound<'py, PyAny>)>);
+
+impl<'py> Options<'py> {
+    fn new(given: Option<&Bound<'py, PyDict>>) -> PyResult<Self> {
+        let pair = |(name, value): (Bound<'py, PyAny>, _)| Ok((name.extract()?, value));
+        let pairs: PyResult<_> = given.into_iter().flatten().map(pair).collect();
+        Ok(Self(pairs?))
+    }
+
+    fn take(&mut self, name: &str) -> Option<Bound<'py, PyAny>> {
+        let place = self.0.iter().position(|(option, _)| option == name)?;
+        Some(self.0.remove(place).1)
+    }
+
+    fn number(&mut self, name: &str) -> PyResult<Option<f64>> {
+        let number = self.take(name).map(|value| value.extract());
+        let wrong = |_| PyTypeError::new_err(format!("{name} must be a number"));
+        number.transpose().map_err(wrong)
+    }
+
+    fn count(&mut self, name: &str) -> PyResult<Option<usize>> {
+        let number = self.take(name).map(|value| value.extract());
+        let wrong =
+            |_| PyTypeError::new_err(format!("{name} must be a whole number, not negative"));
+        number.transpose().map_err(wrong)
+    }
+
+    fn choice<T: Copy>(&mut self, name: &str, choices: &[(&str, T)]) -> PyResult<Option<T>> {
+        let Some(given) = self.take(name) else {
+            return Ok(None);
+        };
+        let text: String = given.extract().unwrap_or_default();
+        let chosen = choices.iter().find(|(choice, _)| *choice == text);
+        let names: Vec<_> = choices.iter().map(|(name, _)| *name).collect();
+        let unknown = || invalid(format!("{name} must be one of {names:?}, found {given}"));
+        chosen.map(|(_, choice)| Some(*choice)).ok_or_else(unknown)
+    }
+
+    /// Refuses what is left.
+    fn finish(self, matcher: &str) -> PyResult<()> {
+        match self.0.first() {
+            Some((option, _)) => Err(PyTypeError::new_err(format!(
+                "the matcher {matcher} has no option {option}"
+            ))),
+            None => Ok(()),
+        }
+    }
 }
 
 impl Matcher {
     /// From a name with options, or from an object with a method `match_points`.
+    ///
+    /// `annealed` is what the default matcher starts from.
     pub fn new(
-        given: &Bound<'_, PyAny>,
+        given: Option<&Bound<'_, PyAny>>,
         options: Option<&Bound<'_, PyDict>>,
-        search: Search,
+        annealed: AnnealedSoftassign,
     ) -> PyResult<Self> {
-        let mut left: Vec<(String, Bound<'_, PyAny>)> = match options {
-            Some(options) => options.extract::<Vec<_>>().or_else(|_| pairs(options))?,
-            None => Vec::new(),
+        let mut options = Options::new(options)?;
+        let choice = match given {
+            None => MatcherChoice::default(),
+            Some(given) => match given.extract::<String>() {
+                Ok(name) => MatcherChoice::from_str(&name).map_err(invalid)?,
+                Err(_) => {
+                    options.finish("of your own")?;
+                    let stage = OwnStage::new("matcher", "match_points", given)?;
+                    return Ok(Self::Own(stage));
+                }
+            },
         };
-        let Ok(name) = given.extract::<String>() else {
-            if !given.hasattr("match_points")? {
-                let message = "matcher must be a name or have a method match_points(model, target)";
-                return Err(PyTypeError::new_err(message));
+        let matcher = match choice {
+            MatcherChoice::CoherentPointDrift => drift(&mut options).map(Self::Drift),
+            MatcherChoice::RelaxationLabelling => labelling(&mut options).map(Self::Labelling),
+            MatcherChoice::LinearAssignment => {
+                let within = options
+                    .number("max_distance")?
+                    .map(LinearAssignment::within);
+                let matcher = within.transpose().map_err(invalid)?;
+                Ok(Self::Assignment(matcher.unwrap_or_default()))
             }
-            left.is_empty()
-                .then_some(())
-                .ok_or_else(|| invalid("options belong to a matcher that is given by its name"))?;
-            return Ok(Self::Own(given.clone().unbind()));
-        };
-        let mut take = |name: &str| {
-            let place = left.iter().position(|(option, _)| option == name)?;
-            Some(left.remove(place).1)
-        };
-        let matcher = match name.as_str() {
-            "annealed" | "annealed-softassign" => {
-                let mut matcher = AnnealedSoftassign::default().with_search(search);
-                if let Some(value) = take("rotation") {
-                    let choices = [("limited", Rotation::Limited), ("any", Rotation::Any)];
-                    matcher = matcher.with_rotation(option(
-                        "rotation",
-                        &value.extract::<String>()?,
-                        &choices,
-                    )?);
-                }
-                if let Some(value) = take("outliers") {
-                    let choices = [
-                        ("both", Outliers::Both),
-                        ("model", Outliers::Model),
-                        ("target", Outliers::Target),
-                        ("none", Outliers::None),
-                    ];
-                    matcher = matcher.with_outliers(option(
-                        "outliers",
-                        &value.extract::<String>()?,
-                        &choices,
-                    )?);
-                }
-                if let Some(value) = take("outlier_ratio") {
-                    let with = matcher.with_outlier_ratio(value.extract()?);
-                    matcher = with.map_err(errors::matching)?;
-                }
-                if let Some(value) = take("max_iterations") {
-                    let with = matcher.with_max_iterations(value.extract()?);
-                    matcher = with.map_err(errors::matching)?;
-                }
-                Self::Annealed(matcher)
+            MatcherChoice::NearestNeighbour => {
+                let within = options
+                    .number("max_distance")?
+                    .map(NearestNeighbour::within);
+                let matcher = within.transpose().map_err(invalid)?;
+                Ok(Self::Nearest(matcher.unwrap_or_default()))
             }
-            "cpd" | "coherent-point-drift" => {
-                let mut matcher = CoherentPointDrift::default();
-                if let Some(value) = take("motion") {
-                    let choices = [
-                        ("rigid", Some(Motion::Rigid)),
-                        ("similarity", Some(Motion::Similarity)),
-                        ("affine", Some(Motion::Affine)),
-                        ("non-rigid", None),
-                    ];
-                    if let Some(motion) = option("motion", &value.extract::<String>()?, &choices)? {
-                        matcher = matcher.with_motion(motion).map_err(errors::matching)?;
-                    }
-                }
-                if let Some(value) = take("outlier_weight") {
-                    let with = matcher.with_outlier_weight(value.extract()?);
-                    matcher = with.map_err(errors::matching)?;
-                }
-                if let Some(value) = take("max_iterations") {
-                    let with = matcher.with_max_iterations(value.extract()?);
-                    matcher = with.map_err(errors::matching)?;
-                }
-                Self::Drift(matcher)
-            }
-            "labelling" | "relaxation-labelling" => {
-                let mut matcher = RelaxationLabelling::default();
-                if let Some(value) = take("candidates") {
-                    let with = matcher.with_candidates(value.extract()?);
-                    matcher = with.map_err(errors::matching)?;
-                }
-                if let Some(value) = take("max_iterations") {
-                    let with = matcher.with_max_iterations(value.extract()?);
-                    matcher = with.map_err(errors::matching)?;
-                }
-                Self::Labelling(matcher)
-            }
-            "assignment" | "linear-assignment" => Self::Assignment(match take("max_distance") {
-                Some(value) => {
-                    LinearAssignment::within(value.extract()?).map_err(errors::matching)?
-                }
-                None => LinearAssignment::default(),
-            }),
-            "nearest" | "nearest-neighbour" => Self::Nearest(match take("max_distance") {
-                Some(value) => {
-                    NearestNeighbour::within(value.extract()?).map_err(errors::matching)?
-                }
-                None => NearestNeighbour::default(),
-            }),
-            _ => {
-                return Err(invalid(format!(
-                    "matcher must be one of \"annealed\", \"cpd\", \"labelling\", \"assignment\", \"nearest\", found {name:?}"
-                )));
-            }
-        };
-        match left.first() {
-            Some((option, _)) => Err(PyTypeError::new_err(format!(
-                "the matcher {name:?} has no option {option:?}"
-            ))),
-            None => Ok(matcher),
-        }
+            _ => softassign(annealed, &mut options).map(Self::Annealed),
+        }?;
+        options.finish(&choice.to_string())?;
+        Ok(matcher)
     }
 
-    pub fn boxed<const D: usize>(self) -> Boxed<D> {
+    /// For a stage of a pipeline.
+    pub fn boxed<const D: usize>(self) -> Box<dyn PointMatcher<D> + Send + Sync> {
         match self {
             Self::Annealed(matcher) => Box::new(matcher),
             Self::Drift(matcher) => Box::new(matcher),
             Self::Labelling(matcher) => Box::new(matcher),
             Self::Assignment(matcher) => Box::new(matcher),
             Self::Nearest(matcher) => Box::new(matcher),
-            Self::Own(object) => Box::new(OwnMatcher(object)),
+            Self::Own(matcher) => Box::new(matcher),
+        }
+    }
+
+    /// For a call that a person waits for.
+    fn interruptible<const D: usize>(self) -> Box<dyn PointMatcher<D> + Send + Sync> {
+        match self {
+            Self::Annealed(matcher) => Box::new(Interruptible(matcher)),
+            other => other.boxed(),
         }
     }
 }
 
-fn pairs<'py>(options: &Bound<'py, PyDict>) -> PyResult<Vec<(String, Bound<'py, PyAny>)>> {
-    let pair = |(key, value): (Bound<'py, PyAny>, _)| Ok((key.extract::<String>()?, value));
-    options.iter().map(pair).collect()
-}
-
-/// An object of Python with a method `match_points(model, target)`.
-///
-/// It returns the target row of every model point, −1 for none, or that and a confidence for each, as
-/// a tuple or as the attributes `assignment` and `confidence`.
-struct OwnMatcher(Py<PyAny>);
-
-impl OwnMatcher {
-    fn pairs<const D: usize>(
-        &self,
-        py: Python<'_>,
-        model: &[Point<f64, D>],
-        target: &[Point<f64, D>],
-    ) -> PyResult<Vec<(usize, usize, f64)>> {
-        let array = |points| PyArray2::from_owned_array(py, arrays::rows(points));
-        let arguments = (array(model), array(target));
-        let answer = self.0.bind(py).call_method1("match_points", arguments)?;
-        let (assignment, confidence) = if let Ok(both) = answer.cast::<PyTuple>() {
-            (both.get_item(0)?, Some(both.get_item(1)?))
-        } else if answer.hasattr("assignment")? {
-            let confidence = match answer.hasattr("confidence")? {
-                true => Some(answer.getattr("confidence")?),
-                false => None,
-            };
-            (answer.getattr("assignment")?, confidence)
-        } else {
-            (answer, None)
-        };
-        let rows = arrays::indices("the assignment of match_points", &assignment)?;
-        let confidence = match confidence {
-            Some(given) => arrays::vector("the confidence of match_points", &given)?,
-            None => vec![1.0; rows.len()],
-        };
-        let (expected, found) = (model.len(), [rows.len(), confidence.len()]);
-        if found != [expected; 2] {
-            return Err(invalid(format!(
-                "match_points must return an assignment and a confidence for each of {expected} \
-                 model points, found {} and {}",
-                found[0], found[1]
-            )));
-        }
-        let mut pairs = Vec::with_capacity(expected);
-        for (i, (&row, &confidence)) in rows.iter().zip(&confidence).enumerate() {
-            match usize::try_from(row) {
-                Ok(j) => pairs.push((i, j, confidence)),
-                Err(_) if row == -1 => {}
-                Err(_) => {
-                    return Err(invalid(format!(
-                        "match_points must return rows of the target or -1, found {row}"
-                    )));
-                }
-            }
-        }
-        Ok(pairs)
+fn softassign(
+    mut matcher: AnnealedSoftassign,
+    options: &mut Options<'_>,
+) -> PyResult<AnnealedSoftassign> {
+    let rotations = [("limited", Rotation::Limited), ("any", Rotation::Any)];
+    if let Some(rotation) = options.choice("rotation", &rotations)? {
+        matcher = matcher.with_rotation(rotation);
     }
+    let outliers = [
+        ("both", Outliers::Both),
+        ("model", Outliers::Model),
+        ("target", Outliers::Target),
+        ("none", Outliers::None),
+    ];
+    if let Some(outliers) = options.choice("outliers", &outliers)? {
+        matcher = matcher.with_outliers(outliers);
+    }
+    let transformations = [
+        ("non-rigid", Transformation::NonRigid),
+        ("similarity", Transformation::Similarity),
+        ("rigid", Transformation::Rigid),
+    ];
+    if let Some(transformation) = options.choice("transformation", &transformations)? {
+        matcher = matcher.with_transformation(transformation);
+    }
+    if let Some(ratio) = options.number("outlier_ratio")? {
+        matcher = matcher.with_outlier_ratio(ratio).map_err(invalid)?;
+    }
+    if let Some(limit) = options.count("max_iterations")? {
+        matcher = matcher.with_max_iterations(limit).map_err(invalid)?;
+    }
+    Ok(matcher)
 }
 
-impl<const D: usize> PointMatcher<D> for OwnMatcher {
+fn drift(options: &mut Options<'_>) -> PyResult<CoherentPointDrift> {
+    let mut matcher = CoherentPointDrift::default();
+    let motions = [
+        ("rigid", Motion::Rigid),
+        ("similarity", Motion::Similarity),
+        ("affine", Motion::Affine),
+        ("non-rigid", Motion::NON_RIGID),
+    ];
+    let mut motion = options
+        .choice("motion", &motions)?
+        .unwrap_or(Motion::NON_RIGID);
+    if let Motion::NonRigid { beta, lambda, rank } = &mut motion {
+        *beta = options.number("beta")?.unwrap_or(*beta);
+        *lambda = options.number("lambda_")?.unwrap_or(*lambda);
+        *rank = options.count("rank")?.or(*rank);
+    }
+    matcher = matcher.with_motion(motion).map_err(invalid)?;
+    if let Some(weight) = options.number("outlier_weight")? {
+        matcher = matcher.with_outlier_weight(weight).map_err(invalid)?;
+    }
+    if let Some(tolerance) = options.number("tolerance")? {
+        matcher = matcher.with_tolerance(tolerance).map_err(invalid)?;
+    }
+    if let Some(limit) = options.count("max_iterations")? {
+        matcher = matcher.with_max_iterations(limit).map_err(invalid)?;
+    }
+    let normalizations = [
+        ("each", Normalization::Each),
+        ("model", Normalization::Model),
+        ("off", Normalization::Off),
+    ];
+    if let Some(normalization) = options.choice("normalization", &normalizations)? {
+        matcher = matcher.with_normalization(normalization);
+    }
+    Ok(matcher)
+}
+
+fn labelling(options: &mut Options<'_>) -> PyResult<RelaxationLabelling> {
+    let mut matcher = RelaxationLabelling::default();
+    if let Some(count) = options.count("neighbours")? {
+        let neighbourhood = Neighbourhood::Nearest(count);
+        matcher = matcher.with_neighbourhood(neighbourhood).map_err(invalid)?;
+    }
+    let compatibilities = [
+        ("count", Compatibility::Count),
+        ("length", Compatibility::Length),
+        ("length-direction", Compatibility::LengthDirection),
+        ("printed", Compatibility::Printed),
+        ("full", Compatibility::Full),
+    ];
+    if let Some(compatibility) = options.choice("compatibility", &compatibilities)? {
+        matcher = matcher.with_compatibility(compatibility);
+    }
+    let maxima = [
+        ("per-pair", LengthMaximum::PerPair),
+        ("global", LengthMaximum::Global),
+    ];
+    if let Some(maximum) = options.choice("length_maximum", &maxima)? {
+        matcher = matcher.with_length_maximum(maximum);
+    }
+    if let Some(temperature) = options.number("temperature")? {
+        matcher = matcher.with_temperature(temperature).map_err(invalid)?;
+    }
+    if let Some(slack) = options.number("slack")? {
+        matcher = matcher.with_slack(slack).map_err(invalid)?;
+    }
+    if let Some(lambda) = options.number("smoothing")? {
+        matcher = matcher.with_smoothing(lambda).map_err(invalid)?;
+    }
+    if let Some(candidates) = options.count("candidates")? {
+        matcher = matcher.with_candidates(candidates).map_err(invalid)?;
+    }
+    if let Some(limit) = options.count("max_iterations")? {
+        matcher = matcher.with_max_iterations(limit).map_err(invalid)?;
+    }
+    Ok(matcher)
+}
+
+/// The default matcher, which `KeyboardInterrupt` ends.
+struct Interruptible(AnnealedSoftassign);
+
+impl<const D: usize> PointMatcher<D> for Interruptible {
     fn match_points(
         &self,
         model: &[Point<f64, D>],
         target: &[Point<f64, D>],
     ) -> Result<Matching<D>, MatchError> {
-        let pairs = Python::attach(|py| self.pairs(py, model, target));
-        let pairs = pairs.map_err(MatchError::custom)?;
-        // A row twice or a confidence that is NaN is the fault of the stage as well.
-        Matching::from_pairs(model, target, &pairs)
-            .map_err(|error| MatchError::custom(invalid(format!("match_points: {error}"))))
+        let (mut workspace, mut signals) = (SoftassignWorkspace::default(), Signals::new());
+        let watch = |_, _| signals.check();
+        let found = (self.0).match_points_with(&mut workspace, model, target, watch)?;
+        let found = found.to_matching(model);
+        signals.finish().map_err(MatchError::custom)?;
+        Ok(found)
     }
 }
 
-fn doubt(doubt: Doubt) -> String {
+fn doubt(doubt: Doubt) -> &'static str {
     match doubt {
-        Doubt::FewPairs => "few pairs",
-        Doubt::LargeResiduals => "large residuals",
-        _ => "undecided",
+        Doubt::FewPairs => "the matched points are so few that they may have met by chance",
+        Doubt::LargeResiduals => "the residuals are as large as those of scattered points",
+        _ => "one matched pair in twenty or more is wrong",
     }
-    .into()
 }
 
 pub fn answer<const D: usize>(py: Python<'_>, found: &Matching<D>) -> Match {
     let row = |row: &Option<usize>| row.map_or(-1, |row| row as i64);
-    let pairs: Vec<_> = found.pairs().collect();
+    let pairs: Vec<_> = found.pairs().map(|(i, j, _)| (i, j)).collect();
     let report = &found.report;
-    let text = format!(
-        "{} of {} points matched, sigma {:.3e}{}",
-        pairs.len(),
-        found.assignment.len(),
-        report.sigma,
-        report
-            .doubt
-            .map_or(String::new(), |d| format!(", doubt: {}", doubt(d)))
-    );
-    let both = |(i, k): (usize, usize)| [pairs[i].0, pairs[i].1][k] as i64;
+    let (matched, points) = (pairs.len(), found.assignment.len());
+    let flags: Vec<String> = report
+        .doubt
+        .map(doubt)
+        .into_iter()
+        .map(Into::into)
+        .collect();
+    let caution = flags
+        .first()
+        .map_or(String::new(), |flag| format!(", {flag}"));
     Match {
-        text,
+        text: format!(
+            "{matched} of {points} points matched, sigma {:.3e}{caution}",
+            report.sigma
+        ),
         assignment: arrays::kept_vector(py, found.assignment.iter().map(row).collect()),
         confidence: arrays::kept_vector(py, found.confidence.clone()),
         warped: arrays::kept(py, arrays::rows(&found.warped)),
-        pairs: arrays::kept(py, Array2::from_shape_fn((pairs.len(), 2), both)),
+        pairs: arrays::kept(py, rows_of_pairs(&pairs)),
         sigma: report.sigma,
-        doubt: report.doubt.map(doubt),
+        residual: report.residual,
         iterations: report.iterations,
+        flags,
     }
+}
+
+fn rows_of_pairs(pairs: &[(usize, usize)]) -> Array2<i64> {
+    let side = |(n, k): (usize, usize)| [pairs[n].0, pairs[n].1][k] as i64;
+    Array2::from_shape_fn((pairs.len(), 2), side)
 }
 
 /// Finds which point of the model is which point of the target.
 ///
 /// Parameters
 /// ----------
-/// model, target : (n, 2) or (n, 3) and (m, 2) or (m, 3) arrays, in any unit
-/// matcher : "annealed", "cpd", "labelling", "assignment", "nearest", or an object with a method
-///     `match_points(model, target)`
-/// **options : options of the matcher
+/// model : (n, 2) or (n, 3) array
+///     Points in any unit.
+/// target : (m, 2) or (m, 3) array
+///     Points in the same unit. n and m may differ.
+/// matcher : str or object
+///     "annealed-softassign" (the default), "coherent-point-drift", "relaxation-labelling" (the
+///     paper's), "linear-assignment", "nearest-neighbour", or an object with a method
+///     `match_points(model, target)` that returns the target row of every model point, -1 for none,
+///     or a tuple of these rows and a confidence for each.
+/// **options
+///     Of "annealed-softassign": `rotation` ("limited", "any"), `outliers` ("both", "model",
+///     "target", "none"), `transformation` ("non-rigid", "similarity", "rigid"), `outlier_ratio`
+///     (0.1), `max_iterations` (200). Of "coherent-point-drift": `motion` ("rigid", "similarity",
+///     "affine", "non-rigid"), `beta` (2), `lambda_` (3), `rank`, `outlier_weight` (0.1),
+///     `tolerance`, `max_iterations`, `normalization` ("each", "model", "off"). Of
+///     "relaxation-labelling": `neighbours`, `compatibility`, `length_maximum`, `temperature`,
+///     `slack`, `smoothing`, `candidates`, `max_iterations`. Of the other two: `max_distance`.
+///
+/// Returns
+/// -------
+/// Match
+///
+/// Raises
+/// ------
+/// ValueError
+///     Empty sets, coordinates that are not finite, options out of range.
+/// TypeError
+///     Options that the matcher does not have.
+/// TactileError
+///     A matcher of your own failed. Its exception is the cause.
 #[pyfunction]
 #[pyo3(signature = (model, target, matcher=None, **options))]
 pub fn match_points(
@@ -297,98 +364,128 @@ pub fn match_points(
         arrays::matrix("model", model)?,
         arrays::matrix("target", target)?,
     ];
-    let matcher = chosen(py, matcher, options)?;
-    match arrays::dimension(["model", "target"], sets.each_ref().map(|set| set.view()))? {
+    let sets = sets.each_ref().map(|set| set.as_array());
+    let matcher = Matcher::new(matcher, options, AnnealedSoftassign::default())?;
+    match arrays::dimension(["model", "target"], sets)? {
         2 => matched::<2>(py, sets, matcher),
         _ => matched::<3>(py, sets, matcher),
     }
 }
 
-fn chosen(
-    py: Python<'_>,
-    matcher: Option<&Bound<'_, PyAny>>,
-    options: Option<&Bound<'_, PyDict>>,
-) -> PyResult<Matcher> {
-    let default = pyo3::types::PyString::new(py, "annealed").into_any();
-    Matcher::new(matcher.unwrap_or(&default), options, Search::Thorough)
-}
-
 fn matched<const D: usize>(
     py: Python<'_>,
-    sets: [Array2<f64>; 2],
+    sets: [ArrayView2<'_, f64>; 2],
     matcher: Matcher,
 ) -> PyResult<Match> {
-    let matcher = matcher.boxed::<D>();
+    let matcher = matcher.interruptible::<D>();
     let found = py.detach(|| {
-        let [model, target] = sets.each_ref().map(|set| arrays::points(set.view()));
+        let [model, target] = sets.map(arrays::points);
         matcher.match_points(&model, &target)
     });
-    Ok(answer(py, &found.map_err(errors::matching)?))
+    Ok(answer(py, &found.map_err(errors::refused)?))
 }
 
 /// Strain of a point set on its way to another: match, robust spline, Green-Lagrange strain.
 ///
 /// Parameters
 /// ----------
-/// before, after : (n, 2) or (n, 3) and (m, 2) or (m, 3) arrays, in any unit
-/// matcher : as that of `match_points`
+/// before : (n, 2) or (n, 3) array
+///     Points in any unit.
+/// after : (m, 2) or (m, 3) array
+///     Points in the same unit.
+/// matcher, **options
+///     As those of `match_points`.
+/// measure : str or object
+///     "green-lagrange", "euler-almansi", "hencky", "biot", "infinitesimal", or an object with a
+///     method `strain(deformation_gradient)` that returns a 3 × 3 tensor.
+/// with_doubtful_pairs : bool
+///     Whether pairs that are not to be relied on give a strain with a flag instead of an error.
+///
+/// Returns
+/// -------
+/// StrainBetween
+///     In the plane the third axis is undeformed.
+///
+/// Raises
+/// ------
+/// ValueError
+///     As `match_points`, and fewer than 16 matched points.
+/// TactileError
+///     Doubtful pairs, or no smooth deformation.
 #[pyfunction]
-#[pyo3(signature = (before, after, matcher=None, **options))]
+#[pyo3(signature = (
+    before, after, matcher=None, *, measure=None, with_doubtful_pairs=false, **options
+))]
 pub fn strain_between(
     py: Python<'_>,
     before: &Bound<'_, PyAny>,
     after: &Bound<'_, PyAny>,
     matcher: Option<&Bound<'_, PyAny>>,
+    measure: Option<&Bound<'_, PyAny>>,
+    with_doubtful_pairs: bool,
     options: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<StrainBetween> {
     let sets = [
         arrays::matrix("before", before)?,
         arrays::matrix("after", after)?,
     ];
-    let matcher = chosen(py, matcher, options)?;
-    match arrays::dimension(["before", "after"], sets.each_ref().map(|set| set.view()))? {
-        2 => strained::<2>(py, sets, matcher),
-        _ => strained::<3>(py, sets, matcher),
+    let sets = sets.each_ref().map(|set| set.as_array());
+    let matcher = Matcher::new(matcher, options, AnnealedSoftassign::default())?;
+    let task = StrainTask {
+        sets,
+        matcher,
+        measure,
+        with_doubtful_pairs,
+    };
+    match arrays::dimension(["before", "after"], sets)? {
+        2 => task.run::<2>(py),
+        _ => task.run::<3>(py),
     }
 }
 
-fn strained<const D: usize>(
-    py: Python<'_>,
-    sets: [Array2<f64>; 2],
+struct StrainTask<'a, 'py> {
+    sets: [ArrayView2<'a, f64>; 2],
     matcher: Matcher,
-) -> PyResult<StrainBetween> {
-    let options = StrainBetweenOptions::<D>::default().with_matcher(matcher.boxed::<D>());
-    let found = py.detach(|| {
-        let [before, after] = sets.each_ref().map(|set| arrays::points(set.view()));
-        strain_of_sets(&before, &after, &options)
-    });
-    let found = found.map_err(errors::strain_between)?;
-    let (mean, error) = (found.summary.mean, found.standard_error);
-    let half = error * quantile_95(Some(found.degrees_of_freedom as f64));
-    let pair = |(i, k): (usize, usize)| [found.rows[i].0, found.rows[i].1][k] as i64;
-    let displaced = |(i, k): (usize, usize)| found.displacements[i][k];
-    let count = found.rows.len();
-    Ok(StrainBetween {
-        text: format!("{count} points, {}", tensor_text(&mean, &error)),
-        value: arrays::kept_tensor(py, &mean),
-        standard_error: arrays::kept_tensor(py, &error),
-        interval_95: interval(py, &mean, &half),
-        pairs: arrays::kept(py, Array2::from_shape_fn((count, 2), pair)),
-        displacements: arrays::kept(py, Array2::from_shape_fn((count, D), displaced)),
-        strains: arrays::kept_tensors(py, &found.strains),
-        standard_errors: arrays::kept_tensors(py, &found.standard_errors),
-        sigma: found.sigma,
-    })
+    measure: Option<&'a Bound<'py, PyAny>>,
+    with_doubtful_pairs: bool,
 }
 
-/// The two ends of an interval, centre less half and centre plus half.
-pub fn interval(
-    py: Python<'_>,
-    centre: &Matrix3<f64>,
-    half: &Matrix3<f64>,
-) -> (arrays::Matrix<f64>, arrays::Matrix<f64>) {
-    let end = |tensor: Matrix3<f64>| arrays::kept_tensor(py, &tensor);
-    (end(centre - half), end(centre + half))
+impl StrainTask<'_, '_> {
+    fn run<const D: usize>(self, py: Python<'_>) -> PyResult<StrainBetween> {
+        let matcher = self.matcher.interruptible::<D>();
+        let mut options = StrainBetweenOptions::<D>::default().with_matcher(matcher);
+        if let Some(given) = self.measure {
+            options = options.with_measure(crate::pipeline::strain_measure("measure", given)?);
+        }
+        if self.with_doubtful_pairs {
+            options = options.with_doubtful_pairs();
+        }
+        let sets = self.sets;
+        let found = py.detach(|| {
+            let [before, after] = sets.map(arrays::points);
+            strain_of_sets(&before, &after, &options)
+        });
+        let found = found.map_err(errors::strain_between)?;
+        let (mean, error) = (found.summary.mean, found.standard_error);
+        let half = error * quantile_95(Some(found.degrees_of_freedom as f64));
+        let displaced = |(i, k): (usize, usize)| found.displacements[i][k];
+        let count = found.rows.len();
+        Ok(StrainBetween {
+            text: format!("{count} points, {}", tensor_text(&mean, &error)),
+            value: arrays::kept_tensor(py, &mean),
+            standard_error: arrays::kept_tensor(py, &error),
+            interval_95: (
+                arrays::kept_tensor(py, &(mean - half)),
+                arrays::kept_tensor(py, &(mean + half)),
+            ),
+            pairs: arrays::kept(py, rows_of_pairs(&found.rows)),
+            displacements: arrays::kept(py, Array2::from_shape_fn((count, D), displaced)),
+            strains: arrays::kept_tensors(py, &found.strains),
+            standard_errors: arrays::kept_tensors(py, &found.standard_errors),
+            sigma: found.sigma,
+            flags: found.doubt.iter().map(ToString::to_string).collect(),
+        })
+    }
 }
 
 pub fn tensor_text(mean: &Matrix3<f64>, error: &Matrix3<f64>) -> String {

@@ -1,248 +1,161 @@
-//! The pipeline, presses and sessions on it, and simulated presses to try them on.
+//! Presses and sessions on a pipeline.
 use crate::arrays;
-use crate::errors::{self, invalid};
-use crate::matching::{self, Matcher};
-use crate::results::{Contact, Estimate, Match, Modulus, SimulatedPress, Strain, Surface, ends};
-use ndarray::Array2;
+use crate::errors;
+use crate::matching::{answer, tensor_text};
+use crate::pipeline::Pipeline;
+use crate::results::{Contact, Estimate, Match, Modulus, Strain, Surface, ends};
 use numpy::PyArray2;
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyType};
-use std::str::FromStr;
+use pyo3::types::PyType;
+use std::path::PathBuf;
+use std::sync::Mutex;
+use std::thread::ThreadId;
 use tactile_imaging as rust;
 use tactile_imaging::core::Estimate as CoreEstimate;
-use tactile_imaging::core::statistics::quantile_95;
-use tactile_imaging::elasticity::contact::{Layer, Waveguide};
 use tactile_imaging::elasticity::modulus::ModulusEstimate;
-use tactile_imaging::force::CalibrationPair;
-use tactile_imaging::matching::Search;
-use tactile_imaging::pipeline::{ContactReading, PairStrain, StagesConfig};
-use tactile_simulate::{CalibrationRun, Camera, PressLoad, PressOptions, Trial};
+use tactile_imaging::io::FileError;
+use tactile_imaging::pipeline::{ContactReading, ContactSurface, Flag, PairStrain, PipelineError};
+use tactile_imaging::scene::Scene;
 
-/// What is pressed on the sensor. Lengths in metres.
-#[pyclass(frozen, module = "tactile_imaging")]
-pub struct Object(rust::Object);
-
-#[pymethods]
-impl Object {
-    /// A ball.
-    #[classmethod]
-    #[pyo3(signature = (radius, *, poisson_ratio=0.5))]
-    fn sphere(_class: &Bound<'_, PyType>, radius: f64, poisson_ratio: f64) -> Self {
-        let radius_m = radius;
-        Self(rust::Object::Sphere {
-            radius_m,
-            poisson_ratio,
-        })
-    }
-
-    /// A block with a flat face.
-    #[classmethod]
-    #[pyo3(signature = (*, poisson_ratio=0.5))]
-    fn block(_class: &Bound<'_, PyType>, poisson_ratio: f64) -> Self {
-        Self(rust::Object::Block { poisson_ratio })
-    }
-
-    /// A cylinder standing on its flat face.
-    #[classmethod]
-    #[pyo3(signature = (*, poisson_ratio=0.5))]
-    fn cylinder(_class: &Bound<'_, PyType>, poisson_ratio: f64) -> Self {
-        Self(rust::Object::Cylinder { poisson_ratio })
-    }
-
-    /// A flat punch of small radius.
-    #[classmethod]
-    #[pyo3(signature = (radius, *, poisson_ratio=0.5))]
-    fn flat_punch(_class: &Bound<'_, PyType>, radius: f64, poisson_ratio: f64) -> Self {
-        let radius_m = radius;
-        Self(rust::Object::FlatPunch {
-            radius_m,
-            poisson_ratio,
-        })
-    }
-
-    /// A cone of the half angle in radians.
-    #[classmethod]
-    #[pyo3(signature = (half_angle, *, poisson_ratio=0.5))]
-    fn cone(_class: &Bound<'_, PyType>, half_angle: f64, poisson_ratio: f64) -> Self {
-        let half_angle_rad = half_angle;
-        Self(rust::Object::Cone {
-            half_angle_rad,
-            poisson_ratio,
-        })
-    }
-
-    /// An object of unknown shape: read as one with a flat face where its contacts are those of one.
-    #[classmethod]
-    #[pyo3(signature = (*, poisson_ratio=0.5))]
-    fn unknown(_class: &Bound<'_, PyType>, poisson_ratio: f64) -> Self {
-        Self(rust::Object::Unknown { poisson_ratio })
-    }
-
-    fn __repr__(&self) -> String {
-        format!("Object.{:?}", self.0)
-    }
-}
-
-/// The stages from a frame to Young's modulus.
+/// Frames at one or more loads. Nothing is computed before it is asked for, and all of it once.
+///
+/// Frames are counted from zero. Threads may share a press, and the interpreter's lock is free while
+/// it computes.
 ///
 /// Parameters
 /// ----------
-/// pairs : (n, 2) array, integrated pixel value and force in newtons
-/// pixel_size : metres, one number or (x, y)
-/// object : `Object`
-/// waveguide : (k, 3) array of thickness in metres, Young's modulus in pascals and Poisson's ratio,
-///     or None for a rigid flat
-/// control_points : number of points that are matched
-/// matcher : a name, or an object with a method `match_points(model, target)`
-/// matcher_options : options of a matcher that is given by its name
-/// surface, warp, strain, estimator : names of stages
-#[pyclass(frozen, module = "tactile_imaging")]
-pub struct Pipeline(rust::Pipeline);
-
-#[pymethods]
-impl Pipeline {
-    #[new]
-    #[pyo3(signature = (
-        *, pairs, pixel_size, object, waveguide=None, control_points=200, matcher=None,
-        matcher_options=None, surface="eikonal", warp="thin-plate-spline", strain="green-lagrange",
-        estimator="best"
-    ))]
-    #[allow(clippy::too_many_arguments)] // keywords of Python
-    fn new(
-        pairs: &Bound<'_, PyAny>,
-        pixel_size: &Bound<'_, PyAny>,
-        object: &Object,
-        waveguide: Option<&Bound<'_, PyAny>>,
-        control_points: usize,
-        matcher: Option<&Bound<'_, PyAny>>,
-        matcher_options: Option<&Bound<'_, PyDict>>,
-        surface: &str,
-        warp: &str,
-        strain: &str,
-        estimator: &str,
-    ) -> PyResult<Self> {
-        let pairs = columns::<2>("pairs", pairs)?;
-        let pairs: Vec<_> = (pairs.iter())
-            .map(|&[light, force]| CalibrationPair::loading(light, force))
-            .collect();
-        let config = StagesConfig {
-            reconstruction: named(surface)?,
-            warp: named(warp)?,
-            strain: named(strain)?,
-            estimator: named(estimator)?,
-            ..StagesConfig::default()
-        };
-        let layers = waveguide
-            .map(|layers| columns::<3>("waveguide", layers))
-            .transpose()?;
-        let waveguide = layers
-            .map(|layers| Waveguide::new(layers.into_iter().map(layer).collect()))
-            .transpose()
-            .map_err(errors::elasticity)?;
-        let size = arrays::pixel_size(pixel_size)?;
-        let mut pipeline = rust::Pipeline::from_pairs(&pairs, size, object.0)
-            .and_then(|pipeline| pipeline.with_settings(|settings| settings.waveguide = waveguide))
-            .and_then(|pipeline| pipeline.with_stages(&config))
-            .map_err(errors::pipeline)?
-            .with_control_points(control_points);
-        if let Some(matcher) = matcher {
-            let matcher = Matcher::new(matcher, matcher_options, Search::Near)?;
-            pipeline = pipeline.with_matcher(matcher.boxed::<3>());
-        } else if matcher_options.is_some() {
-            return Err(invalid(
-                "matcher_options belong to a matcher that is given by its name",
-            ));
-        }
-        Ok(Self(pipeline))
-    }
-
-    /// A press on this pipeline, with the frame without contact.
-    fn press(&self, py: Python<'_>, reference: &Bound<'_, PyAny>) -> PyResult<Press> {
-        let reference = arrays::frame("reference", reference)?;
-        let press = py.detach(|| self.0.press(reference.view()));
-        Ok(Press(press.map_err(errors::pipeline)?))
-    }
-
-    fn __repr__(&self) -> String {
-        let settings = self.0.settings();
-        let points = settings.control_points;
-        format!("Pipeline({:?}, {points} control points)", settings.object)
-    }
-}
-
-fn named<T: FromStr<Err: ToString>>(name: &str) -> PyResult<T> {
-    name.parse().map_err(|error: T::Err| invalid(error))
-}
-
-fn layer([thickness_m, youngs_modulus_pa, poisson_ratio]: [f64; 3]) -> Layer {
-    Layer {
-        thickness_m,
-        youngs_modulus_pa,
-        poisson_ratio,
-    }
-}
-
-/// The rows of an array of N columns.
-fn columns<const N: usize>(name: &str, given: &Bound<'_, PyAny>) -> PyResult<Vec<[f64; N]>> {
-    let array = arrays::matrix(name, given)?;
-    if array.ncols() != N {
-        let found = array.ncols();
-        return Err(invalid(format!(
-            "{name} must have {N} columns, found {found}"
-        )));
-    }
-    let row = |row: ndarray::ArrayView1<'_, f64>| std::array::from_fn(|k| row[k]);
-    Ok(array.rows().into_iter().map(row).collect())
-}
-
-/// Frames at one or more loads. Nothing is computed before it is asked for, and all of it once.
+/// pipeline : Pipeline
+/// reference : (rows, columns) array of uint8
+///     The frame without contact.
 #[pyclass(module = "tactile_imaging")]
-pub struct Press(rust::Press<'static>);
+pub struct Press {
+    press: rust::Press<'static>,
+    /// Threads that compute. A stage in Python that asks its own press would wait for itself.
+    busy: Mutex<Vec<ThreadId>>,
+}
+
+/// Takes a thread off the list, whatever ended its work.
+struct Busy<'a>(&'a Mutex<Vec<ThreadId>>);
+
+impl Drop for Busy<'_> {
+    fn drop(&mut self) {
+        let mut busy = self.0.lock().unwrap_or_else(|broken| broken.into_inner());
+        let here = std::thread::current().id();
+        busy.retain(|thread| *thread != here);
+    }
+}
+
+impl Press {
+    pub fn on(py: Python<'_>, pipeline: &Pipeline, reference: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let reference = arrays::frame("reference", reference)?;
+        let view = reference.as_array();
+        let press = py.detach(|| pipeline.0.press(view));
+        Ok(Self::new_on(press.map_err(errors::pipeline)?))
+    }
+
+    fn new_on(press: rust::Press<'static>) -> Self {
+        Self {
+            press,
+            busy: Mutex::default(),
+        }
+    }
+
+    /// Computes without the interpreter's lock.
+    fn ask<T: Send>(
+        &self,
+        py: Python<'_>,
+        compute: impl Send + FnOnce(&rust::Press<'static>) -> Result<T, PipelineError>,
+    ) -> PyResult<T> {
+        let here = std::thread::current().id();
+        {
+            let mut busy = self
+                .busy
+                .lock()
+                .unwrap_or_else(|broken| broken.into_inner());
+            if busy.contains(&here) {
+                return Err(errors::TactileError::new_err(
+                    "a stage asks the press that runs it, which waits for the stage",
+                ));
+            }
+            busy.push(here);
+        }
+        let busy = Busy(&self.busy);
+        let found = py.detach(|| compute(&self.press));
+        drop(busy);
+        found.map_err(errors::pipeline)
+    }
+}
 
 #[pymethods]
 impl Press {
     #[new]
     fn new(py: Python<'_>, pipeline: &Pipeline, reference: &Bound<'_, PyAny>) -> PyResult<Self> {
-        pipeline.press(py, reference)
+        Self::on(py, pipeline, reference)
     }
 
-    /// Adds a frame (uint8, [row, column]) and returns its number, from zero.
+    /// The press of a scene file, as the program `tactile measure` reads it.
     ///
-    /// `gauge` is the force in newtons that a gauge read, `gauge_error` its standard error.
-    #[pyo3(signature = (frame, *, gauge=None, gauge_error=0.0))]
+    /// Raises
+    /// ------
+    /// OSError
+    ///     A file that cannot be read.
+    /// ValueError
+    ///     A file that cannot be used, with the field and what is expected.
+    #[classmethod]
+    fn from_scene(_class: &Bound<'_, PyType>, py: Python<'_>, path: PathBuf) -> PyResult<Self> {
+        let press = py.detach(|| press_of_scene(path));
+        Ok(Self::new_on(press.map_err(errors::file)?))
+    }
+
+    /// Adds a frame and returns its number.
+    ///
+    /// Parameters
+    /// ----------
+    /// frame : (rows, columns) array of uint8
+    /// gauge, gauge_error : float
+    ///     Force in newtons that a gauge read, and its standard error.
+    /// time : float
+    ///     Seconds since the first frame.
+    #[pyo3(signature = (frame, *, gauge=None, gauge_error=0.0, time=None))]
     fn add_frame(
         &mut self,
         frame: &Bound<'_, PyAny>,
         gauge: Option<f64>,
         gauge_error: f64,
+        time: Option<f64>,
     ) -> PyResult<usize> {
-        let frame = arrays::frame("frame", frame)?;
+        let frame = arrays::owned(arrays::frame("frame", frame)?.as_array());
         let gauge = gauge.map(|force_n| CoreEstimate::new(force_n, gauge_error));
-        Ok(self.0.add_gauged_frame(frame, gauge))
+        let number = self.press.add_gauged_frame(frame, gauge);
+        if let Some(time_s) = time {
+            let set = self.press.set_time_s(number, time_s);
+            set.map_err(errors::pipeline)?;
+        }
+        Ok(number)
     }
 
     fn __len__(&self) -> usize {
-        self.0.frames()
+        self.press.frames()
+    }
+
+    /// A frame as it was given, (rows, columns) of uint8.
+    fn image<'py>(&self, py: Python<'py>, frame: usize) -> PyResult<Bound<'py, PyArray2<u8>>> {
+        let image = self.ask(py, |press| Ok(press.image(frame)?.into_owned()))?;
+        Ok(PyArray2::from_owned_array(py, image))
     }
 
     /// Force, radius and centroid of a frame, or None where nothing touches.
     fn contact(&self, py: Python<'_>, frame: usize) -> PyResult<Option<Contact>> {
-        let reading = py.detach(|| self.0.contact(frame));
-        let reading = reading.map_err(errors::pipeline)?;
-        reading.map(|reading| contact(py, reading)).transpose()
+        let reading = self.ask(py, |press| Ok(press.contact(frame)?.copied()))?;
+        reading
+            .map(|reading| contact(py, frame, &reading))
+            .transpose()
     }
 
     /// The reconstructed surface of a frame.
     fn surface(&self, py: Python<'_>, frame: usize) -> PyResult<Surface> {
-        let surface = py.detach(|| self.0.surface(frame));
-        let surface = surface.map_err(errors::pipeline)?;
-        let heights = surface.surface.heights.clone();
-        Ok(Surface {
-            text: format!("{} × {} heights", heights.nrows(), heights.ncols()),
-            heights: arrays::kept(py, heights),
-            pixel_size: surface.pixel_size_m.into(),
-            origin: surface.origin_m.into(),
-        })
+        let surface = self.ask(py, |press| press.surface(frame).cloned())?;
+        Ok(surface_result(py, surface))
     }
 
     /// Control points of a frame in metres, (n, 3).
@@ -251,52 +164,101 @@ impl Press {
         py: Python<'py>,
         frame: usize,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let points = py.detach(|| self.0.control_points(frame).map(arrays::rows));
-        Ok(PyArray2::from_owned_array(
-            py,
-            points.map_err(errors::pipeline)?,
-        ))
+        let points = self.ask(py, |press| press.control_points(frame).map(arrays::rows))?;
+        Ok(PyArray2::from_owned_array(py, points))
     }
 
     /// The match of the first frame's control points with those of a frame.
     fn matching(&self, py: Python<'_>, frame: usize) -> PyResult<Match> {
-        let found = py.detach(|| self.0.matching(frame));
-        Ok(matching::answer(py, found.map_err(errors::pipeline)?))
+        self.ask(py, |press| {
+            press
+                .matching(frame)
+                .map(|found| Python::attach(|py| answer(py, found)))
+        })
     }
 
     /// Mean strain between the first frame and a frame.
     fn strain(&self, py: Python<'_>, frame: usize) -> PyResult<Strain> {
-        let strain = py.detach(|| self.0.strain(frame));
-        Ok(strain_result(py, strain.map_err(errors::pipeline)?))
+        let strain = self.ask(py, |press| press.strain(frame).cloned())?;
+        Ok(strain_result(py, &strain))
     }
 
     /// Young's modulus from all frames.
+    ///
+    /// Raises
+    /// ------
+    /// TactileError
+    ///     No frame with a contact and a force, or loads that do not determine it.
     fn modulus(&self, py: Python<'_>) -> PyResult<Modulus> {
-        let estimate = py.detach(|| self.0.modulus());
-        Ok(modulus(&estimate.map_err(errors::pipeline)?))
+        Ok(modulus(&self.ask(py, |press| press.modulus())?))
     }
 
     /// The modulus by every estimator that the frames allow.
     fn estimates(&self, py: Python<'_>) -> PyResult<Vec<Modulus>> {
-        let estimates = py.detach(|| self.0.estimates());
-        Ok(estimates
-            .map_err(errors::pipeline)?
-            .iter()
-            .map(modulus)
-            .collect())
+        let estimates = self.ask(py, |press| press.estimates())?;
+        Ok(estimates.iter().map(modulus).collect())
+    }
+
+    /// All results as a dictionary of plain values, that of `tactile measure --json`. A result that
+    /// is not there has its reason.
+    fn measure<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let text = self.ask(py, |press| Ok(serde_json::to_string(&press.measure())))?;
+        let text = text.map_err(errors::invalid)?;
+        py.import("json")?.call_method1("loads", (text,))
     }
 
     /// All results as text, with what could not be computed and why.
-    fn summary(&self, py: Python<'_>) -> String {
-        py.detach(|| self.0.measure().to_string())
+    fn summary(&self, py: Python<'_>) -> PyResult<String> {
+        self.ask(py, |press| Ok(press.measure().to_string()))
+    }
+
+    /// Draws a frame with its contact, and the reconstructed surface.
+    ///
+    /// Parameters
+    /// ----------
+    /// frame : int
+    ///     Its number, from the end where it is negative.
+    ///
+    /// Returns
+    /// -------
+    /// matplotlib.figure.Figure
+    ///
+    /// Raises
+    /// ------
+    /// ImportError
+    ///     matplotlib is not installed.
+    #[pyo3(signature = (frame=-1), text_signature = "($self, frame=-1)")]
+    fn plot<'py>(slf: &Bound<'py, Self>, frame: i64) -> PyResult<Bound<'py, PyAny>> {
+        let plots = slf.py().import("tactile_imaging._plot")?;
+        plots.call_method1("plot_press", (slf, frame))
     }
 
     fn __repr__(&self) -> String {
-        format!("Press({} frames)", self.0.frames())
+        format!("Press({} frames)", self.press.frames())
     }
 }
 
-fn contact(py: Python<'_>, reading: &ContactReading) -> PyResult<Contact> {
+/// A press that owns its frames.
+fn press_of_scene(path: PathBuf) -> Result<rust::Press<'static>, FileError> {
+    let scene = Scene::read(path)?;
+    let data = scene.load()?;
+    let press = scene.pipeline(&data)?.press(data.reference.view());
+    let mut press = press.map_err(|error| scene.measure_error(error))?;
+    for (frame, image) in scene.frames.iter().zip(data.frames) {
+        let error_n = frame.force_error_n.unwrap_or(0.0);
+        let gauge = frame
+            .force_n
+            .map(|force_n| CoreEstimate::new(force_n, error_n));
+        let number = press.add_gauged_frame(image, gauge);
+        if let Some(time_s) = frame.time_s {
+            let set = press.set_time_s(number, time_s);
+            set.map_err(|error| scene.measure_error(error))?;
+        }
+    }
+    Ok(press)
+}
+
+fn contact(py: Python<'_>, frame: usize, reading: &ContactReading) -> PyResult<Contact> {
     let estimate = |estimate| Estimate::of(py, estimate);
     let [x, y] = reading.centroid_px;
     Ok(Contact {
@@ -308,28 +270,37 @@ fn contact(py: Python<'_>, reading: &ContactReading) -> PyResult<Contact> {
         y: estimate(y)?,
         area: reading.area_m2,
         touches_edge: reading.touches_edge,
+        flags: reading.flags(frame).map(|flag| flag.to_string()).collect(),
     })
+}
+
+pub fn surface_result(py: Python<'_>, surface: ContactSurface) -> Surface {
+    let heights = surface.surface.heights;
+    Surface {
+        text: format!("{} × {} heights", heights.nrows(), heights.ncols()),
+        heights: arrays::kept(py, heights),
+        pixel_size: surface.pixel_size_m.into(),
+        origin: surface.origin_m.into(),
+    }
 }
 
 fn strain_result(py: Python<'_>, strain: &PairStrain) -> Strain {
     let summary = &strain.summary;
     let (mean, error) = (summary.mean, summary.standard_error);
+    let points = summary.folded.len();
+    let folded = (points > 0).then(|| Flag::Folded { points }.to_string());
     Strain {
-        text: format!(
-            "{}: {}",
-            strain.measure,
-            matching::tensor_text(&mean, &error)
-        ),
+        text: format!("{}: {}", strain.measure, tensor_text(&mean, &error)),
         value: arrays::kept_tensor(py, &mean),
         standard_error: arrays::kept_tensor(py, &error),
-        interval_95: matching::interval(py, &mean, &(error * quantile_95(None))),
         spread: arrays::kept_tensor(py, &summary.spread),
         measure: strain.measure.into(),
         used: summary.used,
+        flags: folded.into_iter().collect(),
     }
 }
 
-fn modulus(estimate: &ModulusEstimate) -> Modulus {
+pub fn modulus(estimate: &ModulusEstimate) -> Modulus {
     Modulus {
         text: rust::pipeline::ModulusResult::from(estimate).to_string(),
         value: estimate.youngs_modulus_pa,
@@ -342,34 +313,48 @@ fn modulus(estimate: &ModulusEstimate) -> Modulus {
 
 /// A stream of frames from one sensor and one object, with constant memory.
 ///
+/// A session belongs to one thread at a time. Different sessions run side by side.
+///
 /// Parameters
 /// ----------
-/// pipeline : `Pipeline`
-/// references : one frame or more without contact
+/// pipeline : Pipeline
+/// references : sequence of (rows, columns) arrays of uint8
+///     One frame or more without contact.
 #[pyclass(module = "tactile_imaging")]
 pub struct Session(rust::pipeline::Session);
 
 #[pymethods]
 impl Session {
     #[new]
-    fn new(pipeline: &Pipeline, references: Vec<Bound<'_, PyAny>>) -> PyResult<Self> {
+    fn new(
+        py: Python<'_>,
+        pipeline: &Pipeline,
+        references: Vec<Bound<'_, PyAny>>,
+    ) -> PyResult<Self> {
         let read = |frame| arrays::frame("references", frame);
-        let frames: Vec<Array2<u8>> = references.iter().map(read).collect::<PyResult<_>>()?;
-        let views: Vec<_> = frames.iter().map(|frame| frame.view()).collect();
-        let session = rust::pipeline::Session::new(&pipeline.0, &views);
+        let frames: Vec<_> = references.iter().map(read).collect::<PyResult<_>>()?;
+        let views: Vec<_> = frames.iter().map(|frame| frame.as_array()).collect();
+        let session = py.detach(|| rust::pipeline::Session::new(&pipeline.0, &views));
         Ok(Self(session.map_err(errors::pipeline)?))
     }
 
     /// Measures the next frame: its contact, or None where nothing touches.
     fn push(&mut self, py: Python<'_>, frame: &Bound<'_, PyAny>) -> PyResult<Option<Contact>> {
         let frame = arrays::frame("frame", frame)?;
-        let session = &mut self.0;
-        let update = py.detach(|| session.push(frame.view()));
-        let reading = update.map_err(errors::pipeline)?.contact;
-        reading.map(|reading| contact(py, &reading)).transpose()
+        let (session, view) = (&mut self.0, frame.as_array());
+        let update = py.detach(|| session.push(view)).map_err(errors::pipeline)?;
+        let number = update.frame as usize;
+        let reading = update.contact;
+        reading
+            .map(|reading| contact(py, number, &reading))
+            .transpose()
     }
 
-    /// Mean strain since the first load that it was asked at, None there.
+    fn __len__(&self) -> usize {
+        self.0.frames() as usize
+    }
+
+    /// Mean strain since the load at which it was asked for first, None there.
     fn strain(&mut self, py: Python<'_>) -> PyResult<Option<Strain>> {
         let session = &mut self.0;
         let strain = py.detach(|| Ok(session.strain()?.map(|followed| followed.strain.clone())));
@@ -387,77 +372,4 @@ impl Session {
     fn __repr__(&self) -> String {
         format!("Session({} frames)", self.0.frames())
     }
-}
-
-/// Simulates a ball pressed on the sensor: frames, calibration and truth.
-///
-/// Parameters
-/// ----------
-/// forces : newtons, a frame each
-/// radius : metres
-/// youngs_modulus : pascals
-/// coarser : factor by which pixels are larger than those of 1392 × 1040 on 30 mm
-/// seed : of the noise
-#[pyfunction]
-#[pyo3(signature = (
-    *, forces=vec![0.7, 1.2], radius=3e-3, youngs_modulus=103e3, poisson_ratio=0.5, coarser=1, seed=0
-))]
-pub fn simulate(
-    py: Python<'_>,
-    forces: Vec<f64>,
-    radius: f64,
-    youngs_modulus: f64,
-    poisson_ratio: f64,
-    coarser: usize,
-    seed: u64,
-) -> PyResult<SimulatedPress> {
-    let mut options = PressOptions {
-        camera: Camera::default().coarser(coarser),
-        loads: forces.iter().copied().map(PressLoad::normal).collect(),
-        seed,
-        ..PressOptions::default()
-    };
-    options.object.radius_m = radius;
-    options.object.material.youngs_modulus_pa = youngs_modulus;
-    options.object.material.poisson_ratio = poisson_ratio;
-    let trial = py.detach(|| Trial::new(options, &CalibrationRun::default()));
-    let Trial {
-        scene,
-        simulation,
-        pairs,
-    } = trial.map_err(invalid)?;
-    let truth = PyDict::new(py);
-    truth.set_item("youngs_modulus", simulation.youngs_modulus_pa)?;
-    let contacts = simulation.truth.iter();
-    let radii: Vec<f64> = contacts
-        .clone()
-        .map(|truth| truth.contact.contact_radius_m)
-        .collect();
-    truth.set_item("forces", forces)?;
-    truth.set_item("contact_radii", radii)?;
-    truth.set_item(
-        "centres",
-        contacts.map(|truth| truth.centre_px).collect::<Vec<_>>(),
-    )?;
-    let layers = &scene.options().waveguide.layers;
-    let property = |(i, k): (usize, usize)| {
-        let (layer, material) = (layers[i].thickness_m, layers[i].material);
-        [layer, material.youngs_modulus_pa, material.poisson_ratio][k]
-    };
-    let pair = |(i, k): (usize, usize)| [pairs[i].integrated_pixel_value, pairs[i].force_n][k];
-    let [x, y] = simulation.pixel_size_m;
-    let frames = simulation.frames;
-    Ok(SimulatedPress {
-        text: format!("{} frames, ball of {:.3} mm", frames.len(), radius * 1e3),
-        reference: arrays::kept(py, simulation.reference),
-        frames: frames
-            .into_iter()
-            .map(|frame| arrays::kept(py, frame))
-            .collect(),
-        pairs: arrays::kept(py, Array2::from_shape_fn((pairs.len(), 2), pair)),
-        pixel_size: (x, y),
-        waveguide: arrays::kept(py, Array2::from_shape_fn((layers.len(), 3), property)),
-        radius,
-        truth: truth.unbind(),
-    })
 }

@@ -18,12 +18,20 @@ pub fn to_dict<'py>(result: &Bound<'py, PyAny>, names: &[&str]) -> PyResult<Boun
     Ok(dict)
 }
 
-/// A table of two columns. Values are escaped: they may hold text of the caller.
+/// A table of two columns. Values are escaped: they may hold text of the caller. Of arrays larger
+/// than a tensor the shape is shown.
 pub fn to_html(result: &Bound<'_, PyAny>, names: &[&str]) -> PyResult<String> {
     let escaped = |text: String| text.replace('&', "&amp;").replace('<', "&lt;");
     let mut html = String::from("<table>");
     for name in names {
-        let value = escaped(result.getattr(*name)?.str()?.to_string());
+        let value = result.getattr(*name)?;
+        let size = value.getattr_opt("size")?;
+        let is_large = size.is_some_and(|size| size.gt(9).unwrap_or(false));
+        let value = match is_large {
+            true => format!("array of shape {}", value.getattr("shape")?),
+            false => value.str()?.to_string(),
+        };
+        let value = escaped(value);
         html += &format!("<tr><th>{name}</th><td>{value}</td></tr>");
     }
     Ok(html + "</table>")
@@ -86,6 +94,22 @@ result! {
 }
 
 result! {
+    /// One load of a series, as an estimator gets it.
+    Load {
+        /// Normal force in newtons.
+        force: Py<Estimate>,
+        /// Contact radius in metres.
+        radius: Option<Py<Estimate>>,
+        /// Contact area in square metres.
+        area: Option<Py<Estimate>>,
+        /// Indentation in metres.
+        indentation: Option<Py<Estimate>>,
+        /// Mean strain along the load, of specimens whose strain is worked out.
+        strain: Option<Py<Estimate>>,
+    }
+}
+
+result! {
     /// The contact of one frame.
     Contact {
         /// Normal force in newtons, where the sensor is calibrated.
@@ -102,6 +126,26 @@ result! {
         area: f64,
         /// Whether the frame's edge cuts the contact.
         touches_edge: bool,
+        /// What is doubtful about it, a sentence each.
+        flags: Vec<String>,
+    }
+}
+
+result! {
+    /// Hertz's contact of a ball.
+    HertzContact {
+        /// Metres.
+        contact_radius: f64,
+        /// Metres.
+        indentation: f64,
+        /// Pascals, in the middle.
+        peak_pressure: f64,
+        /// Pascals.
+        mean_pressure: f64,
+        /// Newtons a metre.
+        stiffness: f64,
+        /// E* of both bodies in pascals.
+        reduced_modulus: f64,
     }
 }
 
@@ -119,19 +163,22 @@ result! {
 
 result! {
     /// Mean strain between two frames.
+    ///
+    /// There is no interval: what a point is off is off at its neighbours too, and by how much is
+    /// not known.
     Strain {
         /// Mean tensor over the control points, 3 × 3.
         value: Matrix<f64>,
-        /// Standard error of the mean, 3 × 3.
+        /// Standard error of the mean as if the points were independent, 3 × 3.
         standard_error: Matrix<f64>,
-        /// Lower and upper end of the 95 % interval of every component, 3 × 3 each.
-        interval_95: (Matrix<f64>, Matrix<f64>),
         /// Standard deviation over the control points, 3 × 3.
         spread: Matrix<f64>,
         /// The name of the measure of strain.
         measure: String,
         /// Control points that count.
         used: usize,
+        /// What is doubtful about it, a sentence each.
+        flags: Vec<String>,
     }
 }
 
@@ -154,6 +201,8 @@ result! {
         standard_errors: Tensors,
         /// Noise of one coordinate in the unit of the points.
         sigma: f64,
+        /// Why the pairs are not to be relied on, a sentence each.
+        flags: Vec<String>,
     }
 }
 
@@ -170,10 +219,37 @@ result! {
         pairs: Matrix<i64>,
         /// Noise of one coordinate in the unit of the points.
         sigma: f64,
-        /// Why the pairs are not to be relied on, where the matcher can tell.
-        doubt: Option<String>,
+        /// Root mean square distance of the warped points from their targets.
+        residual: f64,
         /// Iterations.
         iterations: usize,
+        /// Why the pairs are not to be relied on, where the matcher can tell, a sentence each.
+        flags: Vec<String>,
+    }
+}
+
+result! {
+    /// What a search for a lump in a block found.
+    Inclusion {
+        /// "found", "absent" or "uncertain".
+        verdict: String,
+        /// Probability that there is a lump.
+        probability: f64,
+        /// Young's modulus of the block in pascals.
+        block_modulus: Py<Estimate>,
+        /// Diameter of the lump in metres.
+        diameter: Option<Py<Estimate>>,
+        /// Depth of its top in metres.
+        depth: Option<Py<Estimate>>,
+        /// Its Young's modulus in pascals.
+        youngs_modulus: Option<Py<Estimate>>,
+        /// Names of those of the last three that the frames determine. Of the others the interval
+        /// alone is of use.
+        identified: Vec<&'static str>,
+        /// "bonded" or "frictionless", how the block lies on its ground.
+        interface: &'static str,
+        /// What is doubtful about it, a sentence each.
+        flags: Vec<String>,
     }
 }
 
@@ -193,6 +269,10 @@ result! {
         waveguide: Matrix<f64>,
         /// Radius of the ball in metres.
         radius: f64,
+        /// Poisson's ratio of the ball.
+        poisson_ratio: f64,
+        /// The estimator that knows the simulated contacts.
+        estimator: &'static str,
         /// The true Young's modulus, forces, contact radii and centres.
         truth: Py<PyDict>,
     }
@@ -205,8 +285,16 @@ impl Estimate {
             standard_error,
             ..
         } = estimate;
+        Self::within(py, value, standard_error, ends(estimate.interval_95()))
+    }
+
+    pub fn within(
+        py: Python<'_>,
+        value: f64,
+        standard_error: f64,
+        interval_95: (f64, Option<f64>),
+    ) -> PyResult<Py<Self>> {
         let text = format!("{value:.6e} ± {standard_error:.1e}");
-        let interval_95 = ends(estimate.interval_95());
         Py::new(
             py,
             Self {

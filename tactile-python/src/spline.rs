@@ -1,13 +1,10 @@
-//! Splines through scattered values, and heights from slopes.
+//! Splines through scattered values.
 use crate::arrays;
-use crate::errors::{self, invalid};
+use crate::errors::invalid;
 use nalgebra::{Point, Point3, SMatrix};
 use ndarray::{Array2, Array3, ArrayView2};
-use numpy::{PyArray1, PyArray2, PyArray3};
+use numpy::{PyArray1, PyArray2, PyArray3, PyReadonlyArray2};
 use pyo3::prelude::*;
-use tactile_imaging::sfs::{
-    CosinePoisson, Domain, FrankotChellappa, MaskedLeastSquares, SlopeIntegrator,
-};
 use tactile_imaging::tps::{FitOptions, Kernel, NegR, R2LogR, R3, Smoothing, Spline};
 
 /// A spline of any kernel in the plane or in space. It has three outputs, of which the caller's are
@@ -72,6 +69,7 @@ impl ThinPlateSpline {
         kernel: &str,
     ) -> PyResult<Self> {
         let sources = arrays::matrix("sources", sources)?;
+        let view = sources.as_array();
         let flat = arrays::vector("targets", targets).ok();
         let is_flat = flat.is_some();
         let targets = match flat {
@@ -79,9 +77,9 @@ impl ThinPlateSpline {
                 let shape = (values.len(), 1);
                 Array2::from_shape_vec(shape, values).map_err(invalid)?
             }
-            None => arrays::matrix("targets", targets)?,
+            None => arrays::owned(arrays::matrix("targets", targets)?.as_array()),
         };
-        let (axes, outputs) = (sources.ncols(), targets.ncols());
+        let (axes, outputs) = (view.ncols(), targets.ncols());
         if !(2..=3).contains(&axes) || !(1..=3).contains(&outputs) {
             return Err(invalid(format!(
                 "sources must have two or three columns and targets up to three, found {axes} and {outputs}"
@@ -102,7 +100,6 @@ impl ThinPlateSpline {
         let targets: Vec<_> = (0..targets.nrows())
             .map(|i| Point3::from(std::array::from_fn(|k| output(i, k))))
             .collect();
-        let view = sources.view();
         let fitted = py.detach(|| match (kernel, axes) {
             ("thin_plate_spline", 2) => fit::<2, _>(view, &targets, R2LogR, smoothing),
             ("thin_plate_spline", _) => fit::<3, _>(view, &targets, R2LogR, smoothing),
@@ -119,7 +116,7 @@ impl ThinPlateSpline {
             axes,
             outputs,
             flat: is_flat,
-            points: sources.nrows(),
+            points: view.nrows(),
         })
     }
 
@@ -130,7 +127,8 @@ impl ThinPlateSpline {
         points: &Bound<'py, PyAny>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let points = self.queries(points)?;
-        let values = py.detach(|| self.fitted.values(points.view()));
+        let view = points.as_array();
+        let values = py.detach(|| self.fitted.values(view));
         if self.flat {
             let values = values.iter().map(|value| value.x);
             return Ok(PyArray1::from_iter(py, values).into_any());
@@ -147,7 +145,8 @@ impl ThinPlateSpline {
         points: &Bound<'py, PyAny>,
     ) -> PyResult<Bound<'py, PyArray3<f64>>> {
         let points = self.queries(points)?;
-        let jacobians = py.detach(|| self.fitted.jacobians(points.view(), self.outputs));
+        let view = points.as_array();
+        let jacobians = py.detach(|| self.fitted.jacobians(view, self.outputs));
         Ok(PyArray3::from_owned_array(py, jacobians))
     }
 
@@ -172,10 +171,10 @@ impl ThinPlateSpline {
 }
 
 impl ThinPlateSpline {
-    fn queries(&self, points: &Bound<'_, PyAny>) -> PyResult<Array2<f64>> {
+    fn queries<'py>(&self, points: &Bound<'py, PyAny>) -> PyResult<PyReadonlyArray2<'py, f64>> {
         let points = arrays::matrix("points", points)?;
-        if points.ncols() != self.axes {
-            let (expected, found) = (self.axes, points.ncols());
+        let (expected, found) = (self.axes, points.as_array().ncols());
+        if found != expected {
             return Err(invalid(format!(
                 "points must have {expected} columns, found {found}"
             )));
@@ -191,59 +190,8 @@ fn fit<const D: usize, K: Kernel + Send + Sync + 'static>(
     smoothing: Smoothing<f64>,
 ) -> PyResult<Box<dyn Fitted>> {
     let options = FitOptions::new(kernel).with_smoothing(smoothing);
-    let options = options.map_err(errors::spline)?;
+    let options = options.map_err(invalid)?;
     let sources: Vec<Point<f64, D>> = arrays::points(sources);
     let spline = Spline::<f64, D, 3, K>::fit(&sources, targets, &options);
-    Ok(Box::new(spline.map_err(errors::spline)?))
-}
-
-/// Heights whose slopes are nearest to those given, with mean zero.
-///
-/// Parameters
-/// ----------
-/// slope_x, slope_y : (rows, columns) arrays, ∂z/∂x along a row and ∂z/∂y down the rows
-/// pixel_size : one number or (x, y); heights have its unit
-/// method : "poisson", "frankot-chellappa" or "least-squares"
-/// mask : (rows, columns) array, true where there are heights; it takes "least-squares"
-#[pyfunction]
-#[pyo3(signature = (slope_x, slope_y, pixel_size, *, method=None, mask=None))]
-pub fn integrate<'py>(
-    py: Python<'py>,
-    slope_x: &Bound<'py, PyAny>,
-    slope_y: &Bound<'py, PyAny>,
-    pixel_size: &Bound<'py, PyAny>,
-    method: Option<&str>,
-    mask: Option<&Bound<'py, PyAny>>,
-) -> PyResult<Bound<'py, PyArray2<f64>>> {
-    let slopes = [
-        arrays::matrix("slope_x", slope_x)?,
-        arrays::matrix("slope_y", slope_y)?,
-    ];
-    let size = arrays::pixel_size(pixel_size)?;
-    let mask = mask.map(|mask| arrays::matrix("mask", mask)).transpose()?;
-    let mask = mask.map(|mask| mask.mapv(|inside| inside != 0.0));
-    let unused = if mask.is_some() {
-        "least-squares"
-    } else {
-        "poisson"
-    };
-    let integrator: Box<dyn SlopeIntegrator<f64> + Send + Sync> = match method.unwrap_or(unused) {
-        "poisson" => Box::new(CosinePoisson),
-        "frankot-chellappa" => Box::new(FrankotChellappa),
-        "least-squares" => Box::new(MaskedLeastSquares::default()),
-        other => {
-            return Err(invalid(format!(
-                "method must be \"poisson\", \"frankot-chellappa\" or \"least-squares\", found {other:?}"
-            )));
-        }
-    };
-    let surface = py.detach(|| {
-        let mut domain = Domain::new(size)?;
-        if let Some(mask) = &mask {
-            domain = domain.with_mask(mask.view());
-        }
-        integrator.integrate(slopes[0].view(), slopes[1].view(), &domain)
-    });
-    let heights = surface.map_err(invalid)?.heights;
-    Ok(PyArray2::from_owned_array(py, heights))
+    Ok(Box::new(spline.map_err(invalid)?))
 }

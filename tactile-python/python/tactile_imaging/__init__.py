@@ -2,19 +2,26 @@
 
 Three lines to a modulus::
 
-    import tactile_imaging
-    scene = tactile_imaging.simulate()
-    print(tactile_imaging.press_of(scene).modulus())
+    import tactile_imaging as ti
+    scene = ti.simulate()
+    print(ti.press_of(scene).modulus())
+
+Units are SI. Images are arrays [row, column], frames of uint8. x is the column, y the row, z points
+to the object. (0, 0) is the centre of the first pixel.
 """
 
 from ._native import (
     Contact,
     Estimate,
+    HertzContact,
+    Inclusion,
+    Load,
     Match,
     Modulus,
     Object,
     Pipeline,
     Press,
+    Sensor,
     Session,
     SimulatedPress,
     Strain,
@@ -23,42 +30,31 @@ from ._native import (
     TactileError,
     ThinPlateSpline,
     __version__,
+    depth,
+    estimate_modulus,
+    hertz,
+    inclusion,
+    inclusion_of_scene,
     integrate,
     match_points,
+    reconstruct,
     simulate,
     strain_between,
 )
-
-
-def press_of(scene, **stages):
-    """The press of a simulated scene, on the default pipeline of its sensor.
-
-    Parameters
-    ----------
-    scene : SimulatedPress
-    **stages : keyword arguments of `Pipeline` that replace defaults, as `matcher=`
-    """
-    arguments = {
-        "pairs": scene.pairs,
-        "pixel_size": scene.pixel_size,
-        "object": Object.sphere(scene.radius),
-        "waveguide": scene.waveguide,
-        "estimator": "sphere",
-    }
-    press = Pipeline(**(arguments | stages)).press(scene.reference)
-    for frame in scene.frames:
-        press.add_frame(frame)
-    return press
-
+from ._simulated import pipeline_of, press_of
 
 __all__ = [
     "Contact",
     "Estimate",
+    "HertzContact",
+    "Inclusion",
+    "Load",
     "Match",
     "Modulus",
     "Object",
     "Pipeline",
     "Press",
+    "Sensor",
     "Session",
     "SimulatedPress",
     "Strain",
@@ -67,9 +63,16 @@ __all__ = [
     "TactileError",
     "ThinPlateSpline",
     "__version__",
+    "depth",
+    "estimate_modulus",
+    "hertz",
+    "inclusion",
+    "inclusion_of_scene",
     "integrate",
     "match_points",
+    "pipeline_of",
     "press_of",
+    "reconstruct",
     "simulate",
     "strain_between",
 ]

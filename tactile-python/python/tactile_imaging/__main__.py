@@ -5,7 +5,7 @@ import sys
 from ._native import run_program
 
 
-def main():
+def main() -> None:
     """Runs the program on the arguments of this process."""
     sys.exit(run_program(["tactile", *sys.argv[1:]]))
 

@@ -1,0 +1,376 @@
+//! The stages, by name or as objects of Python.
+use crate::arrays;
+use crate::errors::{self, invalid};
+use crate::matching::Matcher;
+use crate::own::{OwnContact, OwnStage};
+use crate::press::Press;
+use crate::sensor::Sensor;
+use pyo3::exceptions::PyTypeError;
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyType};
+use std::str::FromStr;
+use tactile_imaging as rust;
+use tactile_imaging::elasticity::contact::{Layer, Waveguide};
+use tactile_imaging::elasticity::strain::{
+    Biot, EulerAlmansi, GreenLagrange, Hencky, Infinitesimal, StrainMeasure,
+};
+use tactile_imaging::force::{CalibrationPair, ForceOptions};
+use tactile_imaging::matching::{AnnealedSoftassign, Search};
+use tactile_imaging::pipeline::{
+    DarkContact, EstimatorChoice, LightContact, StagesConfig, StrainChoice, SurfaceInput,
+};
+
+/// What is pressed on the sensor. Lengths in metres.
+#[pyclass(frozen, module = "tactile_imaging")]
+pub struct Object(pub rust::Object);
+
+#[pymethods]
+impl Object {
+    /// A ball.
+    #[classmethod]
+    #[pyo3(signature = (radius, *, poisson_ratio=0.5))]
+    fn sphere(_class: &Bound<'_, PyType>, radius: f64, poisson_ratio: f64) -> Self {
+        let radius_m = radius;
+        Self(rust::Object::Sphere {
+            radius_m,
+            poisson_ratio,
+        })
+    }
+
+    /// A block with a flat face.
+    #[classmethod]
+    #[pyo3(signature = (*, poisson_ratio=0.5))]
+    fn block(_class: &Bound<'_, PyType>, poisson_ratio: f64) -> Self {
+        Self(rust::Object::Block { poisson_ratio })
+    }
+
+    /// A cylinder standing on its flat face.
+    #[classmethod]
+    #[pyo3(signature = (*, poisson_ratio=0.5))]
+    fn cylinder(_class: &Bound<'_, PyType>, poisson_ratio: f64) -> Self {
+        Self(rust::Object::Cylinder { poisson_ratio })
+    }
+
+    /// A flat punch of small radius.
+    #[classmethod]
+    #[pyo3(signature = (radius, *, poisson_ratio=0.5))]
+    fn flat_punch(_class: &Bound<'_, PyType>, radius: f64, poisson_ratio: f64) -> Self {
+        let radius_m = radius;
+        Self(rust::Object::FlatPunch {
+            radius_m,
+            poisson_ratio,
+        })
+    }
+
+    /// A cone of the half angle in radians.
+    #[classmethod]
+    #[pyo3(signature = (half_angle, *, poisson_ratio=0.5))]
+    fn cone(_class: &Bound<'_, PyType>, half_angle: f64, poisson_ratio: f64) -> Self {
+        let half_angle_rad = half_angle;
+        Self(rust::Object::Cone {
+            half_angle_rad,
+            poisson_ratio,
+        })
+    }
+
+    /// A layer that is pressed by a ball.
+    #[classmethod]
+    #[pyo3(signature = (indenter_radius, thickness, *, poisson_ratio=0.5))]
+    fn layer(
+        _class: &Bound<'_, PyType>,
+        indenter_radius: f64,
+        thickness: f64,
+        poisson_ratio: f64,
+    ) -> Self {
+        Self(rust::Object::Layer {
+            indenter_radius_m: indenter_radius,
+            thickness_m: thickness,
+            poisson_ratio,
+        })
+    }
+
+    /// An object of unknown shape: read as one with a flat face where its contacts are those of one.
+    #[classmethod]
+    #[pyo3(signature = (*, poisson_ratio=0.5))]
+    fn unknown(_class: &Bound<'_, PyType>, poisson_ratio: f64) -> Self {
+        Self(rust::Object::Unknown { poisson_ratio })
+    }
+
+    fn __repr__(&self) -> String {
+        format!("Object.{:?}", self.0)
+    }
+}
+
+/// The stages from a frame to Young's modulus.
+///
+/// A stage is a name or an object with the stage's method. What an object raises, or returns in a
+/// wrong shape, is the cause of one `TactileError`.
+///
+/// Parameters
+/// ----------
+/// object : Object
+///     What is pressed on the sensor.
+/// pairs : (n, 2) array
+///     Integrated pixel value and force in newtons of a calibration. Without it forces come from a
+///     gauge, `Press.add_frame(..., gauge=)`.
+/// sensor : Sensor
+///     A calibrated sensor, instead of `pairs`, `pixel_size` and `waveguide`.
+/// depth_table : (n, 2) array
+///     Grey levels below the reference and depth in metres, of a sensor that grows darker.
+/// contact : object
+///     Instead of these, an object with a method `measure(frame, reference)` that returns None or a
+///     dict with `radius` (m) and `force` (N) as (value, standard error), `mask` and `centre`.
+/// pixel_size : float or (x, y)
+///     Metres.
+/// waveguide : (k, 3) array
+///     Thickness in metres, Young's modulus in pascals and Poisson's ratio of its layers, from the
+///     object's side. None is a rigid flat.
+/// control_points : int
+///     Points that are matched.
+/// surface : str or object
+///     "eikonal", "tsai-shah", "brooks-horn", or `reconstruct(image, mask, pixel_size)`.
+/// integrator : str or object
+///     "of-reconstruction", "frankot-chellappa", "cosine-poisson", "masked-least-squares", or
+///     `integrate(slope_x, slope_y, mask, pixel_size)`.
+/// sampler : str or object
+///     "contact", "equally-spaced", "curvature", "random", or
+///     `sample(heights, mask, pixel_size, count)`.
+/// matcher, matcher_options : str or object, dict
+///     As `match_points` takes them. The default search is that of near loads.
+/// warp : str or object
+///     "thin-plate-spline", "cubic-spline", "affine", "rigid", or `fit(sources, targets, weights)`
+///     that returns a callable with a method `jacobian`.
+/// strain : str or object
+///     "green-lagrange", "euler-almansi", "hencky", "biot", "infinitesimal", or
+///     `strain(deformation_gradient)`.
+/// estimator : str or object
+///     "best", "paper-ratio", "regression", "sphere", "sphere-on-waveguide", "flat-punch", "cone"
+///     and others, or `estimate(loads)` that returns pascals and their standard error. Its attribute
+///     `needs_strain` says whether loads have strains.
+/// flat_field : bool
+///     Whether frames are divided by the reference's own brightness.
+/// force_scale_error, length_scale_error, radius_error, poisson_ratio_error : float
+///     Standard errors that all loads share: relative, relative, in metres, absolute.
+///
+/// Raises
+/// ------
+/// ValueError
+///     A name that is none, or a value that is not physical.
+#[pyclass(frozen, module = "tactile_imaging")]
+pub struct Pipeline(pub rust::Pipeline);
+
+#[pymethods]
+impl Pipeline {
+    #[new]
+    #[pyo3(signature = (
+        object, *, pairs=None, sensor=None, depth_table=None, contact=None, pixel_size=None,
+        waveguide=None, control_points=200, surface=None, integrator=None, sampler=None,
+        matcher=None, matcher_options=None, warp=None, strain=None, estimator=None,
+        flat_field=None, force_scale_error=None, length_scale_error=None, radius_error=None,
+        poisson_ratio_error=None
+    ))]
+    fn new(
+        object: &Object,
+        pairs: Option<&Bound<'_, PyAny>>,
+        sensor: Option<&Sensor>,
+        depth_table: Option<&Bound<'_, PyAny>>,
+        contact: Option<&Bound<'_, PyAny>>,
+        pixel_size: Option<&Bound<'_, PyAny>>,
+        waveguide: Option<&Bound<'_, PyAny>>,
+        control_points: usize,
+        surface: Option<&Bound<'_, PyAny>>,
+        integrator: Option<&Bound<'_, PyAny>>,
+        sampler: Option<&Bound<'_, PyAny>>,
+        matcher: Option<&Bound<'_, PyAny>>,
+        matcher_options: Option<&Bound<'_, PyDict>>,
+        warp: Option<&Bound<'_, PyAny>>,
+        strain: Option<&Bound<'_, PyAny>>,
+        estimator: Option<&Bound<'_, PyAny>>,
+        flat_field: Option<bool>,
+        force_scale_error: Option<f64>,
+        length_scale_error: Option<f64>,
+        radius_error: Option<f64>,
+        poisson_ratio_error: Option<f64>,
+    ) -> PyResult<Self> {
+        let input = Input {
+            pairs,
+            sensor,
+            depth_table,
+            contact,
+            pixel_size,
+        };
+        let (surface_name, own_surface) = stage("surface", "reconstruct", surface)?;
+        let (integrator_name, own_integrator) = stage("integrator", "integrate", integrator)?;
+        let (sampler_name, own_sampler) = stage("sampler", "sample", sampler)?;
+        let (warp_name, own_warp) = stage("warp", "fit", warp)?;
+        let (estimator_name, own_estimator) = stage("estimator", "estimate", estimator)?;
+        let config = StagesConfig {
+            reconstruction: named(surface_name)?,
+            integrator: named(integrator_name)?,
+            sampler: named(sampler_name)?,
+            warp: named(warp_name)?,
+            estimator: named::<EstimatorChoice>(estimator_name)?,
+            ..StagesConfig::default()
+        };
+        let near = AnnealedSoftassign::default().with_search(Search::Near);
+        let matcher = Matcher::new(matcher, matcher_options, near)?;
+        let guide = waveguide.map(guide).transpose()?;
+        let pipeline = input.pipeline(object.0, &config)?;
+        let mut pipeline = (pipeline.with_settings(|settings| {
+            if guide.is_some() {
+                settings.waveguide = guide;
+            }
+            let set = |field: &mut f64, given: Option<f64>| *field = given.unwrap_or(*field);
+            settings.flat_field = flat_field.unwrap_or(settings.flat_field);
+            set(&mut settings.force_scale_error, force_scale_error);
+            set(&mut settings.length_scale_error, length_scale_error);
+            set(&mut settings.object_radius_error_m, radius_error);
+            set(&mut settings.poisson_ratio_error, poisson_ratio_error);
+        }))
+        .map_err(errors::pipeline)?
+        .with_control_points(control_points)
+        .with_matcher(matcher.boxed::<3>());
+        if let Some(own) = own_surface {
+            pipeline = pipeline.with_surface(own, SurfaceInput::Shading);
+        }
+        if let Some(own) = own_integrator {
+            pipeline = pipeline
+                .with_slope_integrator(own)
+                .map_err(errors::pipeline)?;
+        }
+        if let Some(own) = own_sampler {
+            pipeline = pipeline.with_sampler(own);
+        }
+        if let Some(own) = own_warp {
+            pipeline = pipeline.with_warp(own);
+        }
+        if let Some(given) = strain {
+            pipeline = pipeline.with_strain(strain_measure("strain", given)?);
+        }
+        if let Some(own) = own_estimator {
+            pipeline = pipeline.with_estimator(own);
+        }
+        Ok(Self(pipeline))
+    }
+
+    /// A press on this pipeline, with the frame without contact.
+    fn press(&self, py: Python<'_>, reference: &Bound<'_, PyAny>) -> PyResult<Press> {
+        Press::on(py, self, reference)
+    }
+
+    fn __repr__(&self) -> String {
+        let settings = self.0.settings();
+        let points = settings.control_points;
+        format!("Pipeline({:?}, {points} control points)", settings.object)
+    }
+}
+
+/// Where force and contact come from: one of the first four.
+struct Input<'a, 'py> {
+    pairs: Option<&'a Bound<'py, PyAny>>,
+    sensor: Option<&'a Sensor>,
+    depth_table: Option<&'a Bound<'py, PyAny>>,
+    contact: Option<&'a Bound<'py, PyAny>>,
+    pixel_size: Option<&'a Bound<'py, PyAny>>,
+}
+
+impl Input<'_, '_> {
+    fn pipeline(&self, object: rust::Object, config: &StagesConfig) -> PyResult<rust::Pipeline> {
+        let given = [
+            self.pairs.is_some(),
+            self.sensor.is_some(),
+            self.depth_table.is_some(),
+            self.contact.is_some(),
+        ];
+        if given.into_iter().filter(|given| *given).count() > 1 {
+            return Err(PyTypeError::new_err(
+                "only one of pairs, sensor, depth_table and contact may be given",
+            ));
+        }
+        if let Some(Sensor(sensor)) = self.sensor {
+            let pipeline = sensor.pipeline(object);
+            let staged = pipeline.and_then(|pipeline| pipeline.with_stages(config));
+            return staged.map_err(errors::pipeline);
+        }
+        let missing = || PyTypeError::new_err("pixel_size is missing");
+        let size = arrays::pixel_size(self.pixel_size.ok_or_else(missing)?)?;
+        let pipeline = if let Some(contact) = self.contact {
+            let stage = OwnStage::new("contact", "measure", contact)?;
+            let pixel_size_m = size;
+            rust::Pipeline::new(
+                OwnContact {
+                    stage,
+                    pixel_size_m,
+                },
+                object,
+            )
+        } else if let Some(table) = self.depth_table {
+            let table = arrays::columns::<2>("depth_table", table)?;
+            let table: Vec<(f64, f64)> = table.into_iter().map(Into::into).collect();
+            let contact = DarkContact::new(&table, size).map_err(errors::pipeline)?;
+            let depths = DarkContact::depth_table(&table).map_err(errors::pipeline)?;
+            return rust::Pipeline::new(contact, object)
+                .and_then(|pipeline| pipeline.with_stages(config))
+                .map(|pipeline| pipeline.with_surface(depths, SurfaceInput::Signal))
+                .map_err(errors::pipeline);
+        } else if let Some(pairs) = self.pairs {
+            let pair = |[light, force]: [f64; 2]| CalibrationPair::loading(light, force);
+            let pairs = arrays::columns::<2>("pairs", pairs)?;
+            let pairs: Vec<_> = pairs.into_iter().map(pair).collect();
+            rust::Pipeline::from_pairs(&pairs, size, object)
+        } else {
+            LightContact::gauged(size, &ForceOptions::default())
+                .and_then(|contact| rust::Pipeline::new(contact, object))
+        };
+        let staged = pipeline.and_then(|pipeline| pipeline.with_stages(config));
+        staged.map_err(errors::pipeline)
+    }
+}
+
+/// A stage as its name, or none and the object.
+fn stage(
+    name: &str,
+    method: &'static str,
+    given: Option<&Bound<'_, PyAny>>,
+) -> PyResult<(Option<String>, Option<OwnStage>)> {
+    let Some(given) = given else {
+        return Ok((None, None));
+    };
+    match given.extract::<String>() {
+        Ok(text) => Ok((Some(text), None)),
+        Err(_) => Ok((None, Some(OwnStage::new(name, method, given)?))),
+    }
+}
+
+/// A choice by its name, the default without one.
+pub fn named<T: FromStr<Err: ToString> + Default>(name: Option<String>) -> PyResult<T> {
+    name.map_or_else(|| Ok(T::default()), |name| name.parse().map_err(invalid))
+}
+
+type SharedMeasure = Box<dyn StrainMeasure + Send + Sync>;
+
+/// A measure of strain by its name, or an object with a method `strain`.
+pub fn strain_measure(name: &str, given: &Bound<'_, PyAny>) -> PyResult<SharedMeasure> {
+    let (text, own) = stage(name, "strain", Some(given))?;
+    if let Some(own) = own {
+        return Ok(Box::new(own));
+    }
+    Ok(match named::<StrainChoice>(text)? {
+        StrainChoice::EulerAlmansi => Box::new(EulerAlmansi),
+        StrainChoice::Hencky => Box::new(Hencky),
+        StrainChoice::Biot => Box::new(Biot),
+        StrainChoice::Infinitesimal => Box::new(Infinitesimal),
+        _ => Box::new(GreenLagrange),
+    })
+}
+
+/// A waveguide of layers: thickness in metres, Young's modulus in pascals, Poisson's ratio.
+pub fn guide(layers: &Bound<'_, PyAny>) -> PyResult<Waveguide> {
+    let layer = |[thickness_m, youngs_modulus_pa, poisson_ratio]: [f64; 3]| Layer {
+        thickness_m,
+        youngs_modulus_pa,
+        poisson_ratio,
+    };
+    let layers = arrays::columns::<3>("waveguide", layers)?;
+    Waveguide::new(layers.into_iter().map(layer).collect()).map_err(invalid)
+}

@@ -1,0 +1,158 @@
+"""Presses and sessions: truth, the program's answers, threads, memory."""
+
+import json
+import signal
+import subprocess
+import sys
+import threading
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+import tactile_imaging as ti
+from conftest import DATA, points
+
+SCENE = DATA / "press" / "scene.toml"
+
+
+def test_three_lines_to_the_modulus_of_the_default_press(scene):
+    modulus = ti.press_of(scene).modulus()
+    low, high = modulus.interval_95
+    assert low < scene.truth["youngs_modulus"] < high
+    assert low < modulus.value < high
+    assert modulus.to_dict()["estimator"] == modulus.estimator
+    assert "kPa" in repr(modulus) and "<table>" in modulus._repr_html_()
+    with pytest.raises(AttributeError):
+        modulus.value = 1.0
+
+
+def program(*arguments):
+    """The program's JSON answer, in a process of its own."""
+    command = [sys.executable, "-m", "tactile_imaging", *map(str, arguments), "--json"]
+    return json.loads(subprocess.run(command, capture_output=True, check=True).stdout)
+
+
+def without_times(answer):
+    return {key: value for key, value in answer.items() if key not in ("report", "truth")}
+
+
+def test_a_scene_file_has_the_bits_of_the_program():
+    ours = ti.Press.from_scene(SCENE).measure()
+    theirs = program("measure", SCENE)
+    for key, value in without_times(ours).items():
+        assert theirs[key] == value
+
+
+def test_a_press_has_contact_surface_points_and_strain(scene):
+    press = ti.press_of(scene, control_points=60)
+    assert len(press) == 2 and np.array_equal(press.image(1), scene.frames[1])
+    contact = press.contact(1)
+    assert abs(contact.force.value / 1.2 - 1) < 0.02
+    radius = scene.truth["contact_radii"][1]
+    # A tenth of a pixel.
+    assert abs(contact.radius.value - radius) < 0.1 * scene.pixel_size[0]
+    assert np.nanmax(press.surface(1).heights) > 0
+    assert press.control_points(0).shape == (60, 3)
+    found = press.matching(1)
+    assert len(found.pairs) > 50
+    assert np.isfinite(press.strain(1).value).all()
+    assert "kPa" in press.summary() and len(press.estimates()) > 1
+
+
+def test_a_gauge_takes_the_place_of_a_calibration(scene):
+    pipeline = ti.Pipeline(
+        ti.Object.sphere(scene.radius), pixel_size=scene.pixel_size, waveguide=scene.waveguide
+    )
+    press = ti.Press(pipeline, scene.reference)
+    for frame, force in zip(scene.frames, scene.truth["forces"]):
+        press.add_frame(frame, gauge=force, gauge_error=1e-3)
+    low, high = press.modulus().interval_95
+    assert low < scene.truth["youngs_modulus"] < high
+
+
+def test_a_sensor_is_calibrated_saved_and_loaded(tmp_path):
+    sensor = ti.Sensor.calibrate(DATA / "sensor" / "calibration.toml")
+    sensor.save(tmp_path / "sensor.toml")
+    again = ti.Sensor.load(tmp_path / "sensor.toml")
+    grey = np.linspace(0, 100, 11)
+    assert np.array_equal(sensor.pressure(grey), again.pressure(grey))
+    assert np.all(np.diff(sensor.pressure(grey)) > 0)
+    assert ti.Pipeline(ti.Object.sphere(3e-3), sensor=again) is not None
+
+
+def test_depth_is_read_from_a_table():
+    y, x = np.mgrid[:64, :64] - 32.0
+    # A ball of 4 mm, pressed 0.8 mm deep, 100 µm a pixel, 50 grey levels a millimetre.
+    ball = np.sqrt(np.maximum(16 - 0.01 * (x**2 + y**2), 0)) - 3.2
+    depth = np.maximum(ball, 0)
+    reference = np.full((64, 64), 200, np.uint8)
+    frame = np.round(200 - 50 * depth).astype(np.uint8)
+    table = [(0, 0), (50, 1e-3)]
+    surface = ti.depth(frame, reference, table, 1e-4)
+    # Half a grey level.
+    assert np.nanmax(surface.heights) == pytest.approx(0.8e-3, abs=0.5e-3 / 50)
+    assert ti.depth(reference, reference, table, 1e-4) is None
+
+
+def test_a_lump_is_found():
+    found = ti.inclusion_of_scene(DATA / "inclusion" / "scene.toml")
+    assert found.verdict == "found" and "diameter" in found.identified
+    # The block of the example is one of 5 kPa with a lump of 12 mm and 40 kPa, 4 mm deep.
+    truth = {"block_modulus": 5e3, "diameter": 12e-3, "depth": 4e-3, "youngs_modulus": 40e3}
+    for name, value in truth.items():
+        low, high = getattr(found, name).interval_95
+        assert low < value < high
+
+
+def session_answer(pipeline, scene):
+    session = ti.Session(pipeline, [scene.reference])
+    assert session.push(scene.reference) is None
+    forces = [session.push(frame).force.value for frame in scene.frames]
+    return forces, session.modulus().value
+
+
+def test_eight_sessions_at_once_have_the_bits_of_one(scene):
+    pipeline = ti.pipeline_of(scene)
+    alone = session_answer(pipeline, scene)
+    assert alone[1] == pytest.approx(ti.press_of(scene).modulus().value, rel=0.01)
+    with ThreadPoolExecutor(8) as pool:
+        answers = list(pool.map(lambda _: session_answer(pipeline, scene), range(8)))
+    assert answers == [alone] * 8
+
+
+def test_threads_share_a_press(scene):
+    press = ti.press_of(scene, control_points=60)
+    with ThreadPoolExecutor(8) as pool:
+        strains = list(pool.map(lambda _: press.strain(1).value[0, 0], range(8)))
+    assert len(set(strains)) == 1
+
+
+def test_a_session_does_not_grow():
+    resource = pytest.importorskip("resource")
+    scene = ti.simulate(coarser=16)
+    session = ti.Session(ti.pipeline_of(scene), [scene.reference])
+
+    def push(count):
+        for k in range(count):
+            session.push(scene.frames[k % 2])
+        return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+
+    before = push(1000)
+    # A frame has 5.7 kB: 9,000 that stayed would take 50 MB.
+    assert push(9000) - before < 4 << 10
+
+
+def test_the_keyboard_stops_a_long_match():
+    # Points strewn at random, which every start of the search is tried on.
+    timer = threading.Timer(0.1, signal.raise_signal, [signal.SIGINT])
+    timer.start()
+    with pytest.raises(KeyboardInterrupt):
+        ti.match_points(points(600), points(600, seed=1), rotation="any")
+    timer.join()
+
+
+def test_a_press_is_drawn(scene, tmp_path):
+    pytest.importorskip("matplotlib")
+    figure = ti.press_of(scene).plot()
+    figure.savefig(tmp_path / "press.png")
+    assert (tmp_path / "press.png").stat().st_size > 1000
