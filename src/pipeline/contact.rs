@@ -149,6 +149,8 @@ pub struct ContactReading {
     pub area_m2: f64,
     /// Greatest signal: grey levels above (or below) the reference.
     pub peak_grey: f64,
+    /// Stress at the contact's centre in pascals, where the sensor is calibrated.
+    pub peak_stress_pa: Option<Estimate>,
     /// Share of the contact's pixels that are saturated.
     pub saturated_share: f64,
     /// The signal lies outside the range of the calibration.
@@ -193,6 +195,7 @@ impl ContactReading {
             centroid_px: [Estimate::exact(0.0); 2],
             area_m2: PI * contact_radius_m.value.powi(2),
             peak_grey: 1.0,
+            peak_stress_pa: None,
             saturated_share: 0.0,
             out_of_calibration: false,
             touches_edge: false,
@@ -205,8 +208,16 @@ impl ContactReading {
         }
     }
 
-    /// F/(π a²) in pascals.
-    pub(crate) fn mean_stress_pa(&self) -> Option<Estimate> {
+    /// F/(π a²) in pascals. `None` where the force is not known.
+    ///
+    /// ```
+    /// use tactile_imaging::{force::Estimate, pipeline::ContactReading};
+    /// let contact = ContactReading::new(Some(Estimate::exact(0.5)), Estimate::exact(1e-3));
+    /// let stress = contact.mean_stress_pa().expect("a force");
+    /// assert!((stress.value / 159_155.0 - 1.0).abs() < 1e-6);
+    /// ```
+    #[must_use]
+    pub fn mean_stress_pa(&self) -> Option<Estimate> {
         let (force, radius) = (self.force_n?, self.contact_radius_m);
         let value = force.value / (PI * radius.value * radius.value);
         let relative =
@@ -219,6 +230,7 @@ impl ContactReading {
         self.force_n = gauge;
         self.force_noise_n = gauge.map_or(0.0, |gauge| gauge.standard_error);
         self.force_calibration_n = 0.0;
+        self.peak_stress_pa = None;
     }
 
     /// The contact is a flat face of that area: the radius is that of a disc as large.
@@ -240,6 +252,7 @@ impl ContactReading {
             centroid_px: contact.centroid_px,
             area_m2: force.contact_area_m2?,
             peak_grey: profile.map_or(contact.peak, |p| p.peak.value),
+            peak_stress_pa: force.peak_stress_pa,
             saturated_share: contact.saturated_px as f64 / contact.area_px as f64,
             out_of_calibration: reading.out_of_range,
             touches_edge: contact.touches_edge,
@@ -284,8 +297,8 @@ pub struct FrameContact {
     pub region: Option<BoundingBox>,
     /// The contact's pixels within the box.
     pub mask: Array2<bool>,
-    /// Mean of frame minus reference in grey levels, of a frame without contact. `None` with one,
-    /// or where it is not known.
+    /// Frame minus reference in grey levels where nothing touches: the mean of a frame without
+    /// contact, the median outside of one. `None` where it is not known.
     pub background_step_grey: Option<f64>,
 }
 

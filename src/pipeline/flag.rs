@@ -1,6 +1,8 @@
 //! Typed cautions: the result stands, but not unconditionally.
 use super::contact::ContactReading;
+use super::error::PipelineError;
 use crate::elasticity::modulus::Warning;
+use crate::force::Estimate;
 use std::fmt;
 
 /// A caution about a result. Frames are counted from 0 in the fields and from 1 in the sentences.
@@ -49,6 +51,32 @@ pub enum Flag {
     TouchesEdge {
         /// The frame.
         frame: usize,
+    },
+    /// The contact is wider than the frame: most of it is not seen, or the light has changed
+    /// everywhere.
+    WiderThanFrame {
+        /// The frame.
+        frame: usize,
+        /// Contact radius in metres.
+        radius_m: f64,
+    },
+    /// A number whose error is larger than the number.
+    CannotBeTold {
+        /// The frame.
+        frame: usize,
+        /// Which number.
+        quantity: &'static str,
+        /// In SI units.
+        value: f64,
+        /// Its standard error.
+        standard_error: f64,
+    },
+    /// No contact, though the frame differs from the reference the other way than a contact does.
+    OppositeSignal {
+        /// The frame.
+        frame: usize,
+        /// Frame minus reference where they differ most, in grey levels.
+        grey: f64,
     },
     /// The frame shows more than one contact. The largest is measured, and theory knows of one.
     SeveralContacts {
@@ -195,11 +223,28 @@ impl ContactReading {
         let light = self
             .calibration_bend
             .map(|departure| Flag::LightNotProportional { frame, departure });
-        [
+        let numbers = [
+            ("force", self.force_n),
+            ("contact radius", Some(self.contact_radius_m)),
+            ("indentation", self.indentation_m),
+        ];
+        let unknown = numbers.into_iter().filter_map(move |(quantity, number)| {
+            let Estimate {
+                value,
+                standard_error,
+                ..
+            } = number?;
+            (standard_error > value.abs()).then_some(Flag::CannotBeTold {
+                frame,
+                quantity,
+                value,
+                standard_error,
+            })
+        });
+        let others = [
             saturated, outside, edge, several, fit, shape, outline, light,
-        ]
-        .into_iter()
-        .flatten()
+        ];
+        others.into_iter().flatten().chain(unknown)
     }
 }
 
@@ -227,6 +272,30 @@ impl fmt::Display for Flag {
                     "frame {}: the contact reaches the frame's edge",
                     frame + 1
                 )
+            }
+            Self::WiderThanFrame { frame, radius_m } => {
+                write!(
+                    f,
+                    "frame {}: the contact, {:.3} mm in radius, is wider than the frame: its size cannot be told",
+                    frame + 1,
+                    1e3 * radius_m
+                )
+            }
+            Self::CannotBeTold {
+                frame,
+                quantity,
+                value,
+                standard_error,
+            } => {
+                write!(
+                    f,
+                    "frame {}: the {quantity} cannot be told, its error ({standard_error:.1e}) is larger than its value ({value:.1e})",
+                    frame + 1
+                )
+            }
+            Self::OppositeSignal { frame, grey } => {
+                let (frame, grey) = (*frame, *grey);
+                PipelineError::OppositeSignal { frame, grey }.fmt(f)
             }
             Self::SeveralContacts { frame, others: 1 } => {
                 write!(

@@ -4,7 +4,7 @@ use super::flag::Flag;
 use super::press::Press;
 use super::report::{SkipReason, Stage};
 use super::result::{FrameResult, MatchResult, Measurement, ModulusResult, StrainResult};
-use super::specimen::{Object, Specimen, material_law};
+use super::specimen::{Specimen, material_law};
 use super::time::{self, ErrorShare, TimeResult};
 use crate::elasticity::modulus::{Estimate, LoadSeries, PaperRatio};
 use crate::elasticity::relaxation::TimeDependence;
@@ -37,7 +37,8 @@ impl Press<'_> {
         let frames = (0..self.frames())
             .map(|frame| self.frame_result(frame, &mut flags))
             .collect();
-        flags.extend(self.light_drift());
+        let step = self.light_step_grey().filter(|&grey| grey != 0.0);
+        flags.extend(step.map(|grey| Flag::LightDrifted { grey }));
         if let Ok(modulus) = &youngs_modulus_pa {
             let warnings = modulus.warnings.iter().copied();
             flags.extend(warnings.map(|warning| Flag::Assumption { warning }));
@@ -60,15 +61,6 @@ impl Press<'_> {
             flags,
             report: self.report(),
         }
-    }
-
-    /// A caution where the light of a frame, away from its contact, differs from the reference's.
-    /// Of the frame where it does most.
-    fn light_drift(&self) -> Option<Flag> {
-        let grey = self.light_step_grey().filter(|&grey| grey != 0)?;
-        Some(Flag::LightDrifted {
-            grey: f64::from(grey),
-        })
     }
 
     /// The relative error of [`modulus`](Self::modulus) by its inputs, the largest first.
@@ -100,33 +92,10 @@ impl Press<'_> {
     ) -> Result<FrameResult, PipelineError> {
         let reading = self.reading(frame)?;
         let gauge_force_n = self.gauge(frame).map(|gauge| gauge.value);
-        // What is said to be no ball need not look like one.
-        let ball = matches!(
-            self.pipeline().settings().object,
-            Object::Sphere { .. } | Object::Layer { .. }
-        );
-        let cautions = reading.flags(frame);
-        flags.extend(
-            cautions.filter(|flag| {
-                ball || !matches!(flag, Flag::NotABall { .. } | Flag::NotRound { .. })
-            }),
-        );
-        if let Some(face) = &reading.face
-            && face.sticks()
-        {
-            let edge_ratio = face.edge_ratio;
-            flags.push(Flag::FaceSticks { frame, edge_ratio });
-        }
-        if let (Some(gauge_n), Some(force_n)) = (gauge_force_n, reading.force_n) {
-            let apart = (gauge_n - force_n.value).abs();
-            if apart > 3.0 * force_n.standard_error && apart > 0.02 * gauge_n {
-                flags.push(Flag::GaugeDisagrees {
-                    frame,
-                    measured_n: force_n.value,
-                    gauge_n,
-                });
-            }
-        }
+        let cautions = self.cautions(frame)?;
+        // The light is one for all frames: the caution about it stands once.
+        let of_frame = |flag: &Flag| !matches!(flag, Flag::LightDrifted { .. });
+        flags.extend(cautions.into_iter().filter(of_frame));
         let radius = self.pipeline().settings().object.sphere_radius_m();
         let surface_height_m = self.surface_height(frame);
         Ok(FrameResult {
@@ -134,8 +103,7 @@ impl Press<'_> {
             gauge_force_n,
             contact_radius_m: reading.contact_radius_m,
             contact_ratio: radius.map(|r| reading.contact_radius_m.value / r),
-            centroid_px: reading.centroid_px.map(|c| c.value),
-            centroid_sd_px: reading.centroid_px.map(|c| c.standard_error),
+            centroid_px: reading.centroid_px,
             contact_area_m2: reading.area_m2,
             mean_stress_pa: reading.mean_stress_pa(),
             surface_height_m,

@@ -3,15 +3,14 @@ use super::composition::Pipeline;
 use super::contact::{ContactReading, FrameContact};
 use super::error::PipelineError;
 use super::estimators::that_fit;
+use super::flag::Flag;
 use super::loads::{self, Load};
 use super::report::{Report, SkipReason, Stage};
 use super::specimen::Specimen;
 use super::stages::{Bench, MatchedPoints, PairStrain, Stages};
 use super::surface::{ContactSurface, ControlPoints};
 use crate::elasticity::modulus::{LoadSeries, ModulusEstimate};
-use crate::force::{
-    Estimate, ReferenceFrame, TextureStretch, background_shift, median_shift_outside,
-};
+use crate::force::{Estimate, ReferenceFrame, TextureStretch, background_shift};
 use crate::matching::Matching;
 use nalgebra::Point3;
 use ndarray::{Array2, ArrayView2, CowArray, Ix2};
@@ -80,8 +79,6 @@ struct KnownContact {
     contact: FrameContact,
     /// Number of the contact's pixels.
     pixels: usize,
-    /// The median of frame minus reference outside the contact.
-    light_step_grey: Option<i32>,
 }
 
 /// Frames at one or more loads. Every result is computed when it is first asked for, with what it
@@ -282,24 +279,39 @@ impl<'a> Press<'a> {
         Ok(self.known(frame)?.contact.reading.as_ref())
     }
 
+    /// The cautions about a frame's contact, or about a frame without one, which
+    /// [`measure`](Self::measure) gives for all frames.
+    ///
+    /// ```
+    /// use tactile_imaging::pipeline::{Flag, Object, Pipeline};
+    /// # use tactile_imaging::force::CalibrationPair;
+    /// # let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
+    /// let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?;
+    /// let reference = ndarray::Array2::from_elem((64, 64), 60_u8);
+    /// let mut press = pipeline.press(reference.view())?;
+    /// press.add_frame(reference.mapv(|level| level - 20).view());
+    /// assert_eq!(press.cautions(0)?, [Flag::OppositeSignal { frame: 0, grey: -20.0 }]);
+    /// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// Those of [`contact`](Self::contact).
+    pub fn cautions(&self, frame: usize) -> Result<Vec<Flag>, PipelineError> {
+        let contact = &self.known(frame)?.contact;
+        let (image, gauge) = (self.image(frame)?, self.gauge(frame));
+        Ok(self.stages.cautions(frame, image.view(), contact, gauge))
+    }
+
     fn known(&self, frame: usize) -> Result<&KnownContact, PipelineError> {
         let loaded = self.loaded(frame)?;
         let known = loaded.contact.get_or_init(|| {
             let image = loaded.image.get(frame)?;
             let mut contact = self.measured(frame, image.view())?;
             let pixels = contact.pixels();
-            let reference = self.stages.reference.image();
-            let light_step_grey = contact
-                .bounds()
-                .and_then(|contact| median_shift_outside(image.view(), reference, contact));
             if let FrameImage::Read(_) = loaded.image {
                 contact.mask = Array2::default((0, 0));
             }
-            Ok(Box::new(KnownContact {
-                contact,
-                pixels,
-                light_step_grey,
-            }))
+            Ok(Box::new(KnownContact { contact, pixels }))
         });
         known.as_deref().map_err(Clone::clone)
     }
@@ -618,13 +630,12 @@ impl<'a> Press<'a> {
 
     /// The largest step of the light since the reference was taken, in grey levels, away from the
     /// contacts of the frames that were measured.
-    pub(super) fn light_step_grey(&self) -> Option<i32> {
-        let known = self
-            .frames
-            .iter()
-            .filter_map(|frame| frame.contact.get()?.as_ref().ok());
-        let steps = known.filter_map(|known| known.light_step_grey);
-        steps.max_by_key(|step| step.abs())
+    pub(super) fn light_step_grey(&self) -> Option<f64> {
+        let known = self.frames.iter().filter_map(|frame| frame.contact.get());
+        let contacts = known.filter_map(|known| known.as_ref().ok());
+        let pressed = contacts.filter(|known| known.contact.reading.is_some());
+        let steps = pressed.filter_map(|known| known.contact.background_step_grey);
+        steps.max_by(|a, b| a.abs().total_cmp(&b.abs()))
     }
 
     /// Sets when a frame was taken, in seconds since the object touched. Frames without a time do

@@ -86,9 +86,7 @@ pub struct FrameResult {
     /// Contact radius over the ball's radius: small-contact theory holds up to 0.3.
     pub contact_ratio: Option<f64>,
     /// Centroid (x, y) in pixels.
-    pub centroid_px: [f64; 2],
-    /// One standard deviation of the centroid, in pixels.
-    pub centroid_sd_px: [f64; 2],
+    pub centroid_px: [Estimate; 2],
     /// Area of the contact in square metres.
     pub contact_area_m2: f64,
     /// F/(π a²) in pascals.
@@ -205,6 +203,7 @@ pub struct Measurement {
     )]
     pub matching: Result<MatchResult, PipelineError>,
     /// Cautions.
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Vec::is_empty"))]
     pub flags: Vec<Flag>,
     /// What was computed and what was skipped.
     pub report: Report,
@@ -241,7 +240,7 @@ impl Display for FrameResult {
         if let Some(ratio) = self.contact_ratio {
             write!(f, "   a/R {ratio:.3}")?;
         }
-        let [x, y] = self.centroid_px;
+        let [x, y] = self.centroid_px.map(|c| c.value);
         write!(f, "   centroid ({x:.2}, {y:.2}) px")?;
         match self.mean_stress_pa {
             Some(stress) => write!(f, "   mean stress {} kPa", with_its_error(stress, 1e-3)),
@@ -434,24 +433,26 @@ fn with_its_error(e: Estimate, scale: f64) -> String {
     with_error(e.value, e.standard_error, scale)
 }
 
-/// How results that may be missing are written: `{"value": …}` or `{"error": "…"}`.
+/// How results that may be missing are written: as they are, or `{"error": "…"}`.
 #[cfg(feature = "serde")]
 pub(super) mod outcome {
     use super::PipelineError;
     use serde::{Serialize, Serializer};
 
     #[derive(Serialize)]
-    #[serde(rename_all = "snake_case")]
+    #[serde(untagged)]
     enum Outcome<'a, T> {
         Value(&'a T),
-        Error(String),
+        Error { error: String },
     }
 
     impl<'a, T> From<&'a Result<T, PipelineError>> for Outcome<'a, T> {
         fn from(result: &'a Result<T, PipelineError>) -> Self {
             match result {
                 Ok(value) => Self::Value(value),
-                Err(error) => Self::Error(error.to_string()),
+                Err(error) => Self::Error {
+                    error: error.to_string(),
+                },
             }
         }
     }

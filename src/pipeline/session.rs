@@ -342,12 +342,40 @@ impl Session {
                 self.loads.learn(&reading, None);
             }
         }
-        if let Some(grey) = self.contact.background_step_grey {
+        if self.contact.reading.is_none()
+            && let Some(grey) = self.contact.background_step_grey
+        {
             self.drift.watch(grey);
         }
         let condition = self.bench.force.detector.condition(&self.stages.reference);
         self.health.watch(number, frame, condition);
         Ok(())
+    }
+
+    /// The cautions about the last frame. Empty before the first and after one that could not be
+    /// measured.
+    ///
+    /// ```
+    /// use tactile_imaging::pipeline::{Flag, Object, Pipeline, Session};
+    /// # use tactile_imaging::force::CalibrationPair;
+    /// # let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
+    /// # let hertz = |peak: f64| ndarray::Array2::from_shape_fn((64, 64), |(r, c)| {
+    /// #     let d = ((r as f64 - 32.0).hypot(c as f64 - 4.0) / 20.0).min(1.0);
+    /// #     10 + (peak * (1.0 - d * d).sqrt()).round() as u8
+    /// # });
+    /// let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?;
+    /// let mut session = Session::new(&pipeline, &[hertz(0.0).view()])?;
+    /// session.push(hertz(120.0).view())?;
+    /// assert!(session.cautions().contains(&Flag::TouchesEdge { frame: 0 }));
+    /// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
+    /// ```
+    pub fn cautions(&self) -> Vec<Flag> {
+        if !self.measured {
+            return Vec::new();
+        }
+        let frame = self.measured_frame as usize;
+        self.stages
+            .cautions(frame, self.last.view(), &self.contact, None)
     }
 
     /// Refuses a contact that is not that of one flat face, the same as in the first frame.

@@ -3,13 +3,15 @@
 use super::composition::Pipeline;
 use super::contact::{ContactStage, FrameContact};
 use super::error::PipelineError;
+use super::flag::Flag;
 use super::report::{Report, SkipReason, Stage};
-use super::specimen::Specimen;
+use super::specimen::{Object, Specimen};
 use super::surface::{self, ContactSurface, ContactSurfaceWorkspace, ControlPoints};
 use crate::elasticity::field::{StrainField, StrainSummary, mean_strain_error};
 use crate::elasticity::modulus::{Estimate, LoadSeries, ModulusEstimate, ModulusEstimator};
 use crate::force::{
-    FaceReading, FaceWorkspace, ForceWorkspace, ReferenceFrame, TextureStretch, texture_spots,
+    FaceReading, FaceWorkspace, ForceWorkspace, Polarity, ReferenceFrame, TextureStretch,
+    background_shift, median_shift_outside, texture_spots,
 };
 use crate::matching::{MatchedPairs, Matching, WarmStart};
 use crate::tps::{Pairs, SeriesMemory, StrainSpline};
@@ -139,6 +141,12 @@ impl Stages {
             {
                 reading.take_gauge(gauge);
             }
+            if contact.background_step_grey.is_none()
+                && let Some(bounds) = contact.bounds()
+            {
+                let step = median_shift_outside(image, self.reference.image(), bounds);
+                contact.background_step_grey = step.map(f64::from);
+            }
             if let Specimen::Flat(_) = self.specimen {
                 let face = self.face(&mut bench.face, image, contact);
                 if let Some(reading) = &mut contact.reading {
@@ -154,6 +162,67 @@ impl Stages {
             bench.report.skipped(Stage::Surface, SkipReason::NoContact);
         }
         Ok(())
+    }
+
+    /// The cautions about a frame: about its contact, the light around it, the gauge's reading of
+    /// its force, or why it may have no contact.
+    pub fn cautions(
+        &self,
+        frame: usize,
+        image: ArrayView2<'_, u8>,
+        contact: &FrameContact,
+        gauge: Option<Estimate>,
+    ) -> Vec<Flag> {
+        let reference = self.reference.image();
+        let Some(reading) = &contact.reading else {
+            let against = match self.contact.polarity() {
+                Polarity::Darker => 1.0,
+                _ => -1.0,
+            };
+            let shift = background_shift(image, reference);
+            let caution = shift.map(|grey| match grey * against > 0.0 {
+                true => Flag::OppositeSignal { frame, grey },
+                // The light that was corrected, or a contact too faint or small to be one.
+                false => Flag::LightDrifted { grey },
+            });
+            return caution.into_iter().collect();
+        };
+        // What is said to be no ball need not look like one.
+        let ball = matches!(
+            self.pipeline.settings().object,
+            Object::Sphere { .. } | Object::Layer { .. }
+        );
+        let own = reading
+            .flags(frame)
+            .filter(|flag| ball || !matches!(flag, Flag::NotABall { .. } | Flag::NotRound { .. }));
+        let mut flags: Vec<Flag> = own.collect();
+        let [width, height] = self.contact.pixel_size_m();
+        let (rows, columns) = reference.dim();
+        let narrowest_m = (rows as f64 * height).min(columns as f64 * width);
+        let radius_m = reading.contact_radius_m.value;
+        if 2.0 * radius_m > narrowest_m {
+            flags.push(Flag::WiderThanFrame { frame, radius_m });
+        }
+        if let Some(face) = &reading.face
+            && face.sticks()
+        {
+            let edge_ratio = face.edge_ratio;
+            flags.push(Flag::FaceSticks { frame, edge_ratio });
+        }
+        if let (Some(gauge), Some(force_n)) = (gauge, reading.force_n) {
+            let (gauge_n, measured_n) = (gauge.value, force_n.value);
+            let apart = (gauge_n - measured_n).abs();
+            if apart > 3.0 * force_n.standard_error && apart > 0.02 * gauge_n {
+                flags.push(Flag::GaugeDisagrees {
+                    frame,
+                    measured_n,
+                    gauge_n,
+                });
+            }
+        }
+        let step = contact.background_step_grey.filter(|&grey| grey != 0.0);
+        flags.extend(step.map(|grey| Flag::LightDrifted { grey }));
+        flags
     }
 
     /// A contact as a flat face.

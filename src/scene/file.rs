@@ -443,7 +443,7 @@ impl SceneFile {
             bits: self.bits,
             corrects_drift: self
                 .illumination_drift
-                .map_or(has_sensor, |d| d == Drift::Automatic),
+                .is_none_or(|d| d == Drift::Automatic),
             radius_error_m: self.object.radius_error_m,
             poisson_ratio_error: self.object.poisson_ratio_error,
             calibration,

@@ -52,8 +52,8 @@
 //! ```toml
 //! contact_table = "table.toml"           # of this ball and waveguide, made by `tactile table`
 //! bits = 12                              # of the camera, where 16-bit files do not state them
-//! illumination_drift = "none"            # with a sensor "automatic": changes of the lamps since
-//!                                        # the reference are divided out where they are detected
+//! illumination_drift = "automatic"       # changes of the lamps since the reference are divided
+//!                                        # out where the light outside the contact shows them
 //! flat_field = "reference"               # divides by the reference's own brightness (vignetting)
 //!
 //! [stages]                               # each by name, here the defaults

@@ -1,12 +1,12 @@
 //! `tactile calibrate`: a sensor from presses under known forces, or the line from integrated pixel
 //! value to force.
-use crate::console::{Context, Exit, Failure, digits, four_digits, in_unit, pair};
+use crate::console::{Context, Exit, Failure, digits, four_digits, in_unit};
 use crate::plot::{Colour, Page, Panel};
 use clap::Args;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use tactile_imaging::force::{
-    Branch, CalibrationOptions, CalibrationPair, Estimate, LinearCalibration, LocalCalibration,
+    Branch, CalibrationOptions, CalibrationPair, LinearCalibration, LocalCalibration,
     StressCalibration,
 };
 use tactile_imaging::io::read_columns;
@@ -69,7 +69,7 @@ const BRANCHES: [(Branch, Colour, &str); 2] = [
 
 /// Pairs of integrated pixel value and force, and the line through them.
 pub struct PairLine {
-    pairs: Vec<CalibrationPair>,
+    pub pairs: Vec<CalibrationPair>,
     pub line: LinearCalibration,
 }
 
@@ -139,20 +139,15 @@ impl PairLine {
 
     pub fn value(&self) -> Value {
         let report = self.line.report();
-        let interval = |e: &Estimate| {
-            let interval = e.interval_95();
-            json!([interval.lower, interval.upper])
-        };
-        let intervals: Vec<Value> = report.parameters.iter().map(interval).collect();
-        let parameters: Vec<[f64; 2]> = report.parameters.iter().map(|e| pair(*e)).collect();
+        let [offset, slope] = [0, 1].map(|k| report.parameters.get(k));
         json!({
-            "pairs": report.pairs, "parameters": parameters, "intervals_95": intervals,
+            "pairs": report.pairs, "offset_n": offset, "slope_n_per_grey_level": slope,
             "r_squared": report.r_squared, "residual_sd_n": report.residual_sd_n,
             "linearity_error": report.linearity_error, "sensitivity_n_per_grey_level": report.sensitivity_n,
             "smallest_force_n": report.smallest_force_n, "full_scale_n": report.full_scale_n,
             "range_grey_levels": self.line.range(), "residuals_n": report.residuals_n,
             "hysteresis": report.hysteresis.map(|h| json!({
-                "mean_n": pair(h.mean_n), "greatest_n": h.greatest_n,
+                "mean_n": h.mean_n, "greatest_n": h.greatest_n,
                 "share_of_full_scale": h.share_of_full_scale,
             })),
         })
@@ -275,14 +270,14 @@ fn sensor_value(found: &CalibratedSensor) -> Result<Value, Failure> {
         let branch = BRANCHES.iter().find(|b| b.0 == p.branch).map(|b| b.2);
         json!({
             "indenter": shape, "radius_m": radius_m, "branch": branch, "force_n": p.force_n,
-            "read_force_n": p.read_force_n, "contact_radius_m": p.contact_radius_m.map(pair),
+            "read_force_n": p.read_force_n, "contact_radius_m": p.contact_radius_m,
             "layers_force_n": p.layers_force_n,
         })
     };
     let layer = |l: &LayerFinding| {
         json!({
-            "layer": l.layer + 1, "parameter": l.parameter, "stated": pair(l.stated),
-            "fitted": pair(l.fitted), "identified": l.identified,
+            "layer": l.layer + 1, "parameter": l.parameter, "stated": l.stated,
+            "fitted": l.fitted, "identified": l.identified,
         })
     };
     let sensor = serde_json::to_value(&found.sensor).map_err(Failure::output)?;

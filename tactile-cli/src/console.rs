@@ -3,6 +3,7 @@
 use crate::outputs::Outputs;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde::Serialize;
+use serde_json::{Value, json};
 use std::fmt::{self, Display};
 use std::io::{BufWriter, ErrorKind, Write, stderr, stdout};
 use std::ops::ControlFlow;
@@ -12,7 +13,7 @@ use std::sync::{Arc, mpsc};
 use std::time::{Duration, Instant};
 use tactile_imaging::force::Estimate;
 use tactile_imaging::io::FileError;
-use tactile_imaging::pipeline::with_error;
+use tactile_imaging::pipeline::{Flag, with_error};
 
 /// The exit codes, as the help of the program lists them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -123,13 +124,32 @@ pub struct Context {
     pub interrupt: Interrupt,
     pub outputs: Outputs,
     limit_bytes: f64,
+    /// The subcommand, for the JSON object.
+    command: &'static str,
+    /// All cautions of the answer, as its JSON object has them.
+    cautions: Vec<Value>,
     reader_left: bool,
     error: Option<std::io::Error>,
 }
 
+/// The version of the JSON objects that `docs/json.md` describes.
+const SCHEMA: &str = "tactile-1";
+
+/// What `--json` prints: the answer of a subcommand, and what all have in common.
+#[derive(Serialize)]
+struct Envelope<'a, T> {
+    schema: &'a str,
+    command: &'a str,
+    #[serde(flatten)]
+    answer: &'a T,
+    cautions: &'a [Value],
+}
+
 impl Context {
-    pub fn new(json: bool, limit_gb: f64, outputs: Outputs) -> Self {
+    pub fn new(command: &'static str, json: bool, limit_gb: f64, outputs: Outputs) -> Self {
         Self {
+            command,
+            cautions: Vec::new(),
             json,
             interrupt: Interrupt::install(),
             outputs,
@@ -157,14 +177,55 @@ impl Context {
         self.line(format_args!("{name:<18}{value}"));
     }
 
-    /// Prints the result as JSON, where it is wanted.
-    pub fn value(&mut self, value: &impl Serialize) {
+    /// Prints a caution about the answer, and keeps it for the JSON object: a kind, its numbers (an
+    /// object, or null) and its sentence.
+    pub fn warn(&mut self, kind: &str, numbers: Value, sentence: impl Display) {
+        let sentence = sentence.to_string();
+        self.row("caution", &sentence);
+        let mut caution = json!({ "kind": kind, "text": sentence });
+        if let (Value::Object(caution), Value::Object(mut numbers)) = (&mut caution, numbers) {
+            caution.append(&mut numbers);
+        }
+        self.cautions.push(caution);
+    }
+
+    /// The cautions about a frame, in a line each. The frame's name stands above them.
+    pub fn warn_of_frame(&mut self, flags: &[Flag]) {
+        for flag in flags {
+            let sentence = flag.to_string();
+            let words = sentence.strip_prefix("frame ");
+            let words = words.and_then(|s| Some(s.split_once(": ")?.1));
+            self.row("caution", words.unwrap_or(&sentence));
+        }
+        self.keep_cautions(flags);
+    }
+
+    /// Keeps cautions that were printed for the JSON object. The first frame is frame 1.
+    pub fn keep_cautions(&mut self, flags: &[Flag]) {
+        for flag in flags {
+            let mut caution = serde_json::to_value(flag).unwrap_or_default();
+            if let Some(frame) = caution.get("frame").and_then(Value::as_u64) {
+                caution["frame"] = json!(frame + 1);
+            }
+            caution["text"] = json!(flag.to_string());
+            self.cautions.push(caution);
+        }
+    }
+
+    /// Prints the result as JSON, where it is wanted, with the cautions so far.
+    pub fn value(&mut self, answer: &impl Serialize) {
         if !self.json || self.reader_left || self.error.is_some() {
             return;
         }
         // Number by number: as one text the result of many frames would take as much memory again.
         let mut output = BufWriter::new(stdout().lock());
-        let written = serde_json::to_writer_pretty(&mut output, value)
+        let value = Envelope {
+            schema: SCHEMA,
+            command: self.command,
+            answer,
+            cautions: &self.cautions,
+        };
+        let written = serde_json::to_writer_pretty(&mut output, &value)
             .map_err(std::io::Error::from)
             .and_then(|()| writeln!(output))
             .and_then(|()| output.flush());
@@ -396,11 +457,6 @@ pub fn digits(value: f64, significant: usize) -> String {
 /// A value with its standard error in a unit of which one is `1 / scale`.
 pub fn in_unit(estimate: Estimate, scale: f64) -> String {
     with_error(estimate.value, estimate.standard_error, scale)
-}
-
-/// Value and standard error, as JSON has them.
-pub fn pair(estimate: Estimate) -> [f64; 2] {
-    [estimate.value, estimate.standard_error]
 }
 
 /// `1 point`, `2 points`.

@@ -1,6 +1,6 @@
 //! `tactile depth`: contact and depth of a sensor that grows darker where it is pressed.
 use crate::arguments::SensorFrames;
-use crate::console::{Context, Exit, Failure, four_digits, in_unit, pair};
+use crate::console::{Context, Exit, Failure, four_digits, in_unit};
 use crate::outputs::{Csv, beside};
 use crate::plot::{Colour, HeatMap, Page, Panel, circle};
 use crate::surfaces::span;
@@ -149,9 +149,12 @@ pub fn run(arguments: &DepthArguments, context: &mut Context) -> Result<Exit, Fa
         });
         context.line(format_args!("{}:", path.display()));
         let value = found.as_ref().map(|found| print(found, context));
+        if found.is_none() {
+            context.line("no contact");
+        }
+        context.warn_of_frame(&press.cautions(k).unwrap_or_default());
         values.push(json!({ "frame": path.display().to_string(), "contact": value }));
         let Some(found) = found else {
-            context.line("no contact");
             continue;
         };
         let Ok(surface) = &found.surface else {
@@ -178,6 +181,7 @@ fn print(found: &Found, context: &mut Context) -> Value {
     let ContactReading {
         centroid_px,
         contact_radius_m,
+        indentation_m,
         ..
     } = found.reading;
     let [x, y] = centroid_px.map(|c| in_unit(c, 1.0));
@@ -189,7 +193,7 @@ fn print(found: &Found, context: &mut Context) -> Value {
             let heights = &surface.surface.heights;
             context.row("depth", span(heights, 1e3, "mm"));
             let finite = heights.iter().copied().filter(|h| h.is_finite());
-            json!({ "value": { "largest_depth_m": finite.fold(f64::NAN, f64::max) } })
+            json!({ "largest_depth_m": finite.fold(f64::NAN, f64::max) })
         }
         Err(reason) => {
             context.row("depth", format_args!("none: {reason}"));
@@ -205,10 +209,10 @@ fn print(found: &Found, context: &mut Context) -> Value {
             context.row("ball", text);
             let text = format!("mean absolute error {error} mm over {} pixels", ball.pixels);
             context.row("", text);
-            json!({ "value": {
+            json!({
                 "radius_m": ball.radius_m, "centre_m": ball.centre_m, "contact_radius_m": ball.contact_radius_m,
                 "depth_m": depth_m, "mean_absolute_error_m": ball.mean_absolute_error_m, "pixels": ball.pixels,
-            } })
+            })
         }
         Err(reason) => {
             context.row("ball", format_args!("none: {reason}"));
@@ -216,8 +220,8 @@ fn print(found: &Found, context: &mut Context) -> Value {
         }
     });
     json!({
-        "centroid_px": centroid_px.map(pair), "contact_radius_m": pair(contact_radius_m),
-        "depth": depth, "ball": ball,
+        "centroid_px": centroid_px, "contact_radius_m": contact_radius_m,
+        "indentation_m": indentation_m, "surface": depth, "ball": ball,
     })
 }
 

@@ -1,16 +1,16 @@
 //! `tactile force`: normal force, contact and stress from frames.
 use crate::arguments::SensorFrames;
 use crate::calibrate::PairLine;
-use crate::console::{Bar, Context, Exit, Failure, in_unit, pair};
+use crate::console::{Bar, Context, Exit, Failure, in_unit};
 use crate::outputs::Csv;
 use clap::Args;
-use serde_json::{Value, json};
+use serde::Serialize;
+use serde_json::json;
 use std::path::PathBuf;
-use tactile_imaging::force::{
-    ForceMeasurement, ForceMeter, ForceOptions, ForceWorkspace, ReferenceFrame, background_shift,
-};
+use tactile_imaging::Pipeline;
+use tactile_imaging::force::Estimate;
 use tactile_imaging::io::Grey;
-use tactile_imaging::pipeline::PipelineError;
+use tactile_imaging::pipeline::{ContactReading, Object, Session, Update};
 
 /// Measure force, contact radius, centroid and stress in frames of a sensor that grows brighter
 /// where it is pressed
@@ -38,10 +38,14 @@ pub fn run(arguments: &ForceArguments, context: &mut Context) -> Result<Exit, Fa
         .plan(&[table, PairLine::PAGE], &frames.files(pairs))?;
     let line = PairLine::read(pairs, false)?;
     let image = frames.read_reference(Grey::default())?;
-    let reference = ReferenceFrame::new(image.view())
+    // Forces are read from the light whatever the object is.
+    let object = Object::Unknown {
+        poisson_ratio: Object::DEFAULT_POISSON_RATIO,
+    };
+    let pipeline = Pipeline::from_pairs(&line.pairs, frames.pixel_m(), object);
+    let mut session = pipeline
+        .and_then(|pipeline| Session::new(&pipeline, &[image.view()]))
         .map_err(|error| Failure::in_file(&frames.reference, error))?;
-    let options = ForceOptions::default();
-    let meter = ForceMeter::new(frames.pixel_m(), &options).map_err(Failure::input)?;
     // One frame is held at a time, but a file that cannot be read is found before the first is
     // measured.
     for path in &frames.frames {
@@ -49,7 +53,6 @@ pub fn run(arguments: &ForceArguments, context: &mut Context) -> Result<Exit, Fa
     }
     line.print(context);
     let mut exit = Exit::Complete;
-    let mut workspace = ForceWorkspace::default();
     let mut values = Vec::new();
     let mut csv = Csv::new(&[
         "frame",
@@ -72,16 +75,16 @@ pub fn run(arguments: &ForceArguments, context: &mut Context) -> Result<Exit, Fa
         }
         let frame = frames.read(path, Grey::default(), &image)?;
         let name = path.display().to_string();
-        let found = meter.measure_with(&mut workspace, frame.view(), &reference, &line.line);
+        let found = session.push(frame.view());
         bar.done(k + 1);
         context.line(format_args!("{name}:"));
         match found {
-            Ok(measurement) => {
-                let step = background_shift(frame.view(), image.view());
-                let warnings = warnings(&measurement, step);
-                print(&measurement, &warnings, context);
-                values.push(json!({ "frame": name, "value": value(&measurement, &warnings) }));
-                csv.row(row(k, &measurement));
+            Ok(Update { contact, .. }) => {
+                let answer = contact.map(|contact| Answer::new(&contact, frames.pixel_m()));
+                print(answer.as_ref(), context);
+                context.warn_of_frame(&session.cautions());
+                values.push(json!({ "frame": name, "contact": answer }));
+                csv.row(row(k, answer.as_ref()));
             }
             Err(error) => {
                 exit = Exit::Partial;
@@ -91,64 +94,66 @@ pub fn run(arguments: &ForceArguments, context: &mut Context) -> Result<Exit, Fa
         }
     }
     drop(bar);
-    context.value(&json!({ "calibration": { "value": line.value() }, "frames": values }));
+    context.value(&json!({ "calibration": line.value(), "frames": values }));
     context.outputs.add(table, csv.into_bytes());
     context.outputs.page(PairLine::PAGE, || line.page())?;
     Ok(exit)
 }
 
-/// The doubts about a measurement. `step_grey` is the largest difference from the reference, if
-/// that is no noise.
-fn warnings(m: &ForceMeasurement, step_grey: Option<f64>) -> Vec<String> {
-    let mut warnings = Vec::new();
-    if m.contact.is_some_and(|contact| contact.touches_edge) {
-        warnings.push("the contact reaches the edge of the frame: a part of it is not seen".into());
-    }
-    if m.reading.is_some_and(|reading| reading.out_of_range) {
-        warnings.push("the force is outside the calibrated range".into());
-    }
-    if let Some(grey) = step_grey.filter(|_| m.contact.is_none()) {
-        let error = PipelineError::OppositeSignal { frame: 0, grey };
-        warnings.push(error.to_string().replacen("frame 1 shows ", "", 1));
-    }
-    warnings
+/// The numbers of a contact.
+#[derive(Serialize)]
+struct Answer {
+    force_n: Option<Estimate>,
+    contact_radius_m: Estimate,
+    centroid_m: [Estimate; 2],
+    mean_stress_pa: Option<Estimate>,
+    peak_stress_pa: Option<Estimate>,
 }
 
-fn print(m: &ForceMeasurement, warnings: &[String], context: &mut Context) {
-    if let Some([x, y]) = m.centroid_m.map(|c| c.map(|e| in_unit(e, 1e3))) {
-        context.row("force", in_unit(m.force_n, 1.0) + " N");
-        if let Some(radius) = m.contact_radius_m {
-            context.row("radius", in_unit(radius, 1e3) + " mm");
+impl Answer {
+    fn new(contact: &ContactReading, pixel_m: [f64; 2]) -> Self {
+        let [x, y] = contact.centroid_px;
+        Self {
+            force_n: contact.force_n,
+            contact_radius_m: contact.contact_radius_m,
+            centroid_m: [x * pixel_m[0], y * pixel_m[1]],
+            mean_stress_pa: contact.mean_stress_pa(),
+            peak_stress_pa: contact.peak_stress_pa,
         }
-        context.row("centroid", format_args!("({x}, {y}) mm"));
-        if let (Some(mean), Some(peak)) = (m.mean_stress_pa, m.peak_stress_pa) {
-            let [mean, peak] = [mean, peak].map(|e| in_unit(e, 1e-3));
-            context.row("stress", format_args!("{mean} kPa mean, {peak} kPa peak"));
-        }
-    } else {
+    }
+}
+
+fn print(answer: Option<&Answer>, context: &mut Context) {
+    let Some(answer) = answer else {
         context.line("no contact");
+        return;
+    };
+    if let Some(force) = answer.force_n {
+        context.row("force", in_unit(force, 1.0) + " N");
     }
-    for warning in warnings {
-        context.row("warning", warning);
+    context.row("radius", in_unit(answer.contact_radius_m, 1e3) + " mm");
+    let [x, y] = answer.centroid_m.map(|e| in_unit(e, 1e3));
+    context.row("centroid", format_args!("({x}, {y}) mm"));
+    if let (Some(mean), Some(peak)) = (answer.mean_stress_pa, answer.peak_stress_pa) {
+        let [mean, peak] = [mean, peak].map(|e| in_unit(e, 1e-3));
+        context.row("stress", format_args!("{mean} kPa mean, {peak} kPa peak"));
     }
-}
-
-fn value(m: &ForceMeasurement, warnings: &[String]) -> Value {
-    json!({
-        "contact": m.contact.is_some(),
-        "force_n": pair(m.force_n),
-        "contact_radius_m": m.contact_radius_m.map(pair),
-        "centroid_m": m.centroid_m.map(|c| c.map(pair)),
-        "mean_stress_pa": m.mean_stress_pa.map(pair),
-        "peak_stress_pa": m.peak_stress_pa.map(pair),
-        "warnings": warnings,
-    })
 }
 
 /// A frame's row, with NaN where there is no contact.
-fn row(k: usize, m: &ForceMeasurement) -> Vec<f64> {
-    let [x, y] = m.centroid_m.map_or([None; 2], |c| c.map(Some));
-    let estimates = [Some(m.force_n), m.contact_radius_m, x, y, m.mean_stress_pa];
-    let cells = estimates.map(|e| e.map_or([f64::NAN; 2], pair)).concat();
-    std::iter::once(k as f64 + 1.0).chain(cells).collect()
+fn row(k: usize, answer: Option<&Answer>) -> Vec<f64> {
+    let numbers = match answer {
+        Some(answer) => {
+            let [x, y] = answer.centroid_m.map(Some);
+            let radius = Some(answer.contact_radius_m);
+            [answer.force_n, radius, x, y, answer.mean_stress_pa]
+        }
+        None => [Some(Estimate::default()), None, None, None, None],
+    };
+    let cells = numbers.map(|number| {
+        let number = number.unwrap_or(Estimate::new(f64::NAN, f64::NAN));
+        [number.value, number.standard_error]
+    });
+    let row = std::iter::once(k as f64 + 1.0).chain(cells.concat());
+    row.collect()
 }

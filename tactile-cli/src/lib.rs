@@ -103,6 +103,26 @@ enum Command {
 }
 
 impl Command {
+    /// The name on the command line.
+    fn name(&self) -> &'static str {
+        match self {
+            Self::Measure(_) => "measure",
+            Self::Force(_) => "force",
+            Self::Calibrate(_) => "calibrate",
+            Self::Match(_) => "match",
+            Self::Warp(_) => "warp",
+            Self::Strain(_) => "strain",
+            Self::Reconstruct(_) => "reconstruct",
+            Self::Integrate(_) => "integrate",
+            Self::Depth(_) => "depth",
+            Self::Inclusion(_) => "inclusion",
+            Self::Indent(_) => "indent",
+            Self::Stream(_) => "stream",
+            Self::Light(_) => "light",
+            Self::Table(_) => "table",
+        }
+    }
+
     fn run(&self, context: &mut Context) -> Result<Exit, Failure> {
         match self {
             Self::Measure(arguments) => measure::run(arguments, context),
@@ -154,7 +174,8 @@ pub fn run_with(arguments: impl IntoIterator<Item: Into<OsString> + Clone>) -> u
         Err(error) => return explain(&error).code(),
     };
     let outputs = Outputs::new(program.out);
-    let mut context = Context::new(program.json, program.memory_gb, outputs);
+    let name = program.command.name();
+    let mut context = Context::new(name, program.json, program.memory_gb, outputs);
     let ended = program.command.run(&mut context);
     context.close(ended).code()
 }

@@ -307,7 +307,7 @@ pub fn run(arguments: &MeasureArguments, context: &mut Context) -> Result<Exit, 
         let measurement = press.measure();
         (press, measurement)
     });
-    let Some((mut press, measurement)) = measured else {
+    let Some((mut press, mut measurement)) = measured else {
         print_contacts(&contacts, context);
         return Ok(Exit::Interrupted);
     };
@@ -317,11 +317,15 @@ pub fn run(arguments: &MeasureArguments, context: &mut Context) -> Result<Exit, 
     if let Err(error) = &measurement.youngs_modulus_pa {
         context.note(frames.explain(error.clone()));
     }
+    context.keep_cautions(&measurement.flags);
+    // The cautions stand beside the measurement, as in every answer.
+    let flags = std::mem::take(&mut measurement.flags);
     context.value(&Answer {
         measurement: &measurement,
         truth: truth.map(truth_value),
         timing: &timing,
     });
+    measurement.flags = flags;
     let mut results = measurement.frames.iter();
     let complete = measurement.youngs_modulus_pa.is_ok()
         && measurement.strain.is_ok()
@@ -383,11 +387,11 @@ fn print_contacts(contacts: &[Contact], context: &mut Context) {
                     &name,
                     format_args!("force {force}   contact radius {radius} mm"),
                 );
-                values.push(json!({ "value": contact }));
+                values.push(json!(contact));
             }
             Ok(None) => {
                 context.row(&name, "no contact");
-                values.push(json!({ "value": null }));
+                values.push(Value::Null);
             }
             Err(error) => {
                 context.row(&name, format_args!("none: {error}"));
@@ -488,7 +492,7 @@ fn print(
             line(format!("surface height {i}"), "mm", 1e3 * height, exact);
         }
         for (k, axis) in ["x", "y"].into_iter().enumerate() {
-            let (found, exact) = (m.centroid_px[k], t.centroid_px[k]);
+            let (found, exact) = (m.centroid_px[k].value, t.centroid_px[k]);
             line(format!("centroid {axis} {i}"), "px", found, exact);
         }
     }

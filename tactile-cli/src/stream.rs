@@ -1,15 +1,19 @@
 //! `tactile stream`: force and modulus live, from a simulated series at camera rate or from
 //! recorded frames.
 use crate::arguments::{eight_bits, not_negative, positive};
-use crate::console::{Bar, Context, Exit, Failure, pair};
+use crate::console::{Bar, Context, Exit, Failure};
 use crate::outputs::Csv;
 use clap::Args;
 use ndarray::{Array2, ArrayView2};
+use serde::Serialize;
 use serde_json::{Value, json};
+use std::mem::discriminant;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
+use tactile_imaging::elasticity::modulus::ModulusEstimate;
+use tactile_imaging::force::Estimate;
 use tactile_imaging::io::Grey;
-use tactile_imaging::pipeline::{FrameSource, PipelineError, Session, with_error};
+use tactile_imaging::pipeline::{Flag, FrameSource, PipelineError, Session, with_error};
 use tactile_imaging::scene::Scene;
 use tactile_simulate::{CalibrationRun, Camera, Gain, LoadCycle, PressLoad, PressOptions, Trial};
 
@@ -82,17 +86,38 @@ pub fn run(arguments: &StreamArguments, context: &mut Context) -> Result<Exit, F
 /// The results of one frame, each number with its standard error.
 struct Row {
     time_s: f64,
-    force_n: Option<[f64; 2]>,
-    radius_m: Option<[f64; 2]>,
+    force_n: Option<Estimate>,
+    radius_m: Option<Estimate>,
     /// The modulus from all frames so far.
-    modulus_pa: Option<[f64; 2]>,
+    modulus: Option<Modulus>,
     strain_xx_zz: Option<[f64; 2]>,
+}
+
+/// A modulus as JSON has it.
+#[derive(Clone, Copy, Serialize)]
+struct Modulus {
+    value: f64,
+    standard_error: f64,
+    interval_95: [Option<f64>; 2],
+}
+
+impl From<&ModulusEstimate> for Modulus {
+    fn from(found: &ModulusEstimate) -> Self {
+        let (lower, upper) = (found.interval_95.lower, found.interval_95.upper);
+        Self {
+            value: found.youngs_modulus_pa,
+            standard_error: found.standard_error_pa,
+            interval_95: [Some(lower), upper],
+        }
+    }
 }
 
 /// A session with the results of every frame so far.
 struct Live {
     session: Session,
     rows: Vec<Row>,
+    /// One of every kind, of the frame where it came first.
+    cautions: Vec<Flag>,
     late: usize,
     /// Where the frames are simulated.
     truth_pa: Option<f64>,
@@ -106,6 +131,7 @@ impl Live {
         Self {
             session,
             rows: Vec::new(),
+            cautions: Vec::new(),
             late: 0,
             truth_pa,
             strained_above_n: arguments.strain.then_some(largest_n / 3.0),
@@ -118,13 +144,23 @@ impl Live {
         let force = contact.and_then(|c| c.force_n);
         let least = self.strained_above_n;
         let strained = least.is_some_and(|least| force.is_some_and(|f| f.value > least));
+        for flag in self.session.cautions() {
+            let kind = discriminant(&flag);
+            if self
+                .cautions
+                .iter()
+                .all(|known| discriminant(known) != kind)
+            {
+                self.cautions.push(flag);
+            }
+        }
         let modulus = self.session.modulus().ok();
         let strain_xx_zz = if strained { self.strain()? } else { None };
         self.rows.push(Row {
             time_s,
-            force_n: force.map(pair),
-            radius_m: contact.map(|c| pair(c.contact_radius_m)),
-            modulus_pa: modulus.map(|m| [m.youngs_modulus_pa, m.standard_error_pa]),
+            force_n: force,
+            radius_m: contact.map(|c| c.contact_radius_m),
+            modulus: modulus.as_ref().map(Modulus::from),
             strain_xx_zz,
         });
         Ok(())
@@ -164,12 +200,12 @@ impl Live {
             return;
         }
         let unknown = || "-".to_owned();
-        let number = |pair: Option<[f64; 2]>, scale: f64| {
-            pair.map_or_else(unknown, |[value, _]| format!("{:.4}", value * scale))
+        let number = |number: Option<Estimate>, scale: f64| {
+            number.map_or_else(unknown, |e| format!("{:.4}", e.value * scale))
         };
         let [force, radius] = [number(row.force_n, 1.0), number(row.radius_m, 1e3)];
-        let kpa = |[value, error]: [f64; 2]| with_error(value, error, 1e-3);
-        let modulus = row.modulus_pa.map_or_else(unknown, kpa);
+        let kpa = |m: Modulus| with_error(m.value, m.standard_error, 1e-3);
+        let modulus = row.modulus.map_or_else(unknown, kpa);
         let strain = row.strain_xx_zz.map(|[x, z]| format!("{x:+.3}, {z:+.3}"));
         let (time, late) = (row.time_s, self.late_percent());
         let strain = strain.unwrap_or_default();
@@ -199,7 +235,7 @@ impl Live {
                     format!(", true {:.2} kPa ({error:+.2} %)", truth * 1e-3)
                 });
                 context.line(format_args!("modulus {kpa} kPa{beside}"));
-                json!({ "value": { "value": m.youngs_modulus_pa, "standard_error": m.standard_error_pa } })
+                json!(Modulus::from(m))
             }
             Err(reason) => {
                 context.line(format_args!("modulus none: {reason}"));
@@ -207,22 +243,29 @@ impl Live {
             }
         };
         context.line(self.session.report());
-        let caution = self.session.drift().caution.as_ref();
-        let caution = caution.map(ToString::to_string);
-        if let Some(caution) = &caution {
-            context.line(format_args!("caution: {caution}"));
+        let drifted = |flag: &Flag| matches!(flag, Flag::LightDrifted { .. });
+        if !self.cautions.iter().any(drifted) {
+            self.cautions.extend(self.session.drift().caution.clone());
         }
-        let first = |pair: Option<[f64; 2]>| pair.map(|[value, _]| value);
+        if let Ok(found) = &modulus {
+            let warnings = found.warnings.iter();
+            let flags = warnings.map(|&warning| Flag::Assumption { warning });
+            self.cautions.extend(flags);
+        }
+        for caution in &self.cautions {
+            context.row("caution", caution);
+        }
+        context.keep_cautions(&self.cautions);
         let update = |row: &Row| {
             json!({
-                "time_s": row.time_s, "force_n": first(row.force_n), "contact_radius_m": first(row.radius_m),
-                "youngs_modulus_pa": first(row.modulus_pa), "strain_xx_zz": row.strain_xx_zz,
+                "time_s": row.time_s, "force_n": row.force_n, "contact_radius_m": row.radius_m,
+                "youngs_modulus_pa": row.modulus, "strain_xx_zz": row.strain_xx_zz,
             })
         };
         let mut value = json!({
             "frames": frames, "rate_hz": rate, "late": late,
             "updates": self.rows.iter().map(update).collect::<Vec<Value>>(),
-            "youngs_modulus_pa": answer, "caution": caution,
+            "youngs_modulus_pa": answer,
         });
         if let Some(truth_pa) = self.truth_pa {
             value["true_youngs_modulus_pa"] = json!(truth_pa);
@@ -270,7 +313,13 @@ fn table(rows: &[Row]) -> Vec<u8> {
         "strain_zz",
     ]);
     for row in rows {
-        let pairs = [row.force_n, row.radius_m, row.modulus_pa, row.strain_xx_zz];
+        let of = |e: Estimate| [e.value, e.standard_error];
+        let pairs = [
+            row.force_n.map(of),
+            row.radius_m.map(of),
+            row.modulus.map(|m| [m.value, m.standard_error]),
+            row.strain_xx_zz,
+        ];
         let cells = pairs.map(|pair| pair.map_or([None; 2], |pair| pair.map(Some)));
         csv.cells(std::iter::once(Some(row.time_s)).chain(cells.concat()));
     }

@@ -16,7 +16,7 @@ use std::ops::Mul;
 /// assert_eq!((force_n * 1e3).standard_error, 3.0);
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", derive(serde::Deserialize))]
 #[non_exhaustive]
 pub struct Estimate {
     /// The value.
@@ -25,10 +25,7 @@ pub struct Estimate {
     pub standard_error: f64,
     /// Degrees of freedom of a standard error that was itself estimated: pairs less parameters of a
     /// calibration, parts of a jackknife less one. `None` where the error is known.
-    #[cfg_attr(
-        feature = "serde",
-        serde(default, skip_serializing_if = "Option::is_none")
-    )]
+    #[cfg_attr(feature = "serde", serde(default))]
     pub degrees_of_freedom: Option<f64>,
 }
 
@@ -103,6 +100,26 @@ impl Estimate {
     pub fn interval_95(self) -> Interval {
         let half = quantile_95(self.degrees_of_freedom) * self.standard_error;
         Interval::new(self.value - half, Some(self.value + half))
+    }
+}
+
+/// Value, standard error, both ends of the 95 % interval and, where they are known, the degrees of
+/// freedom.
+#[cfg(feature = "serde")]
+impl serde::Serialize for Estimate {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        use serde::ser::SerializeStruct;
+        let Interval { lower, upper } = self.interval_95();
+        let degrees = self.degrees_of_freedom;
+        let fields = 3 + usize::from(degrees.is_some());
+        let mut out = serializer.serialize_struct("Estimate", fields)?;
+        out.serialize_field("value", &self.value)?;
+        out.serialize_field("standard_error", &self.standard_error)?;
+        out.serialize_field("interval_95", &[lower, upper.unwrap_or(f64::INFINITY)])?;
+        if degrees.is_some() {
+            out.serialize_field("degrees_of_freedom", &degrees)?;
+        }
+        out.end()
     }
 }
 

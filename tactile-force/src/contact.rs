@@ -126,8 +126,8 @@ pub struct ContactOptions {
 
 impl Default for ContactOptions {
     /// Brighter contact, one false alarm in a thousand frames, smoothing chosen by the signal, a
-    /// margin of 4 pixels, at least 4 pixels of contact, no correction of drift, at most 1 % of the
-    /// contact saturated.
+    /// margin of 4 pixels, at least 4 pixels of contact, drift corrected where the frame shows it,
+    /// at most 1 % of the contact saturated.
     fn default() -> Self {
         Self {
             polarity: Polarity::Brighter,
@@ -137,7 +137,7 @@ impl Default for ContactOptions {
             // to the force alone.
             margin_px: 4,
             minimum_area_px: 4,
-            drift: DriftCorrection::None,
+            drift: DriftCorrection::Automatic,
             saturation_limit: 0.01,
         }
     }

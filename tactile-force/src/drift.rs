@@ -7,7 +7,8 @@ use tactile_core::BoundingBox;
 
 use crate::frame::{TILE_COLUMNS, TILE_ROWS, TileSum};
 
-/// The change of illumination or stray light that is corrected. None by default.
+/// The change of illumination or stray light that is corrected. Detection takes
+/// [`Automatic`](Self::Automatic) by default.
 ///
 /// ```
 /// use ndarray::Array2;

@@ -215,8 +215,8 @@ fn frames(answers: &mut Answers) {
     let brighter = frame([60.1, 80.2], 21.0, 90.0, 1.06, 9);
     let darker = frame([98.3, 71.6], 30.0, -40.0, 1.0, 10);
     let line = LinearCalibration::fit(&pairs(), &CalibrationOptions::default()).unwrap();
-    let options = ForceOptions::default;
-    let contact = ContactOptions::default();
+    let contact = ContactOptions::default().with_drift(DriftCorrection::None);
+    let options = || ForceOptions::default().with_contact(contact);
     let drift = |correction| options().with_contact(contact.with_drift(correction));
     let hertz = HertzFitOptions::default();
     let smoothed = contact
