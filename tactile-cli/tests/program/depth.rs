@@ -31,7 +31,7 @@ fn the_grey_and_the_zero_are_those_of_the_table() {
         let output = run(folder.path(), &words(&call));
         let value: Value = serde_json::from_slice(&output.stdout)
             .unwrap_or_else(|e| panic!("{e}: {}", text(&output.stderr)));
-        1e3 * value["frames"][0]["contact"]["depth"]["value"]["largest_depth_m"]
+        1e3 * value["frames"][0]["contact"]["surface"]["largest_depth_m"]
             .as_f64()
             .unwrap()
     };

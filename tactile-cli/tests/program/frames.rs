@@ -55,7 +55,7 @@ fn a_swapped_reference_is_named_as_one() {
 fn a_frame_given_often_makes_no_modulus_surer() {
     let folder = folder_with_examples();
     let error_of = |value: &Value| {
-        value["youngs_modulus_pa"]["value"]["standard_error"]
+        value["youngs_modulus_pa"]["standard_error"]
             .as_f64()
             .unwrap()
     };

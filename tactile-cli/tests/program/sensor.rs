@@ -34,7 +34,8 @@ fn a_calibration_writes_a_sensor_and_a_report_and_says_what_was_learned() {
     let modulus = &value["layers"][0];
     assert_eq!(modulus["parameter"], "youngs_modulus_pa");
     assert_eq!(modulus["identified"], true);
-    let [fitted, error] = [0, 1].map(|k| modulus["fitted"][k].as_f64().unwrap());
+    let [fitted, error] =
+        ["value", "standard_error"].map(|key| modulus["fitted"][key].as_f64().unwrap());
     // Contact radii of 8 to 22 pixels, known to some hundredth of a pixel, and forces to 0.5 % or
     // better; three standard errors.
     assert!(

@@ -99,7 +99,8 @@ fn assert_sound(m: &Measurement) {
         if let Ok(force) = &f.force_n {
             numbers.extend([force.value, force.standard_error]);
         }
-        numbers.extend(f.centroid_px.into_iter().chain(f.centroid_sd_px));
+        let centroid = f.centroid_px.map(|c| [c.value, c.standard_error]);
+        numbers.extend(centroid.concat());
         numbers.extend(f.surface_height_m.iter());
         let sound = numbers.iter().all(|v| v.is_finite());
         let excused = m.flags.iter().any(|flag| excuses_contact(flag, k));

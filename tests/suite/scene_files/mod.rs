@@ -379,8 +379,8 @@ fn what_a_stage_cannot_do_withholds_nothing_of_the_others() {
     );
     let json = serde_json::to_value(&measured).unwrap();
     assert!(json["youngs_modulus_pa"]["error"].is_string());
-    assert!(json["strain"]["value"]["mean"].is_array());
-    assert!(json["frames"][0]["value"]["force_n"]["value"]["value"].is_number());
+    assert!(json["strain"]["mean"].is_array());
+    assert!(json["frames"][0]["force_n"]["value"].is_number());
     // An empty frame in the middle costs its own results alone.
     let text = VALID.replace("image = \"two.pgm\"", "image = \"reference.png\"");
     fs::write(&path, text).unwrap();

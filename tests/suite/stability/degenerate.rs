@@ -233,11 +233,11 @@ fn measured_is_sound(case: &str, measured: &Measurement) {
     for frame in measured.frames.iter().flatten() {
         numbers.extend(frame.force_n.iter().map(|force| force.value));
         numbers.extend([frame.contact_radius_m.value, frame.contact_area_m2]);
+        let centroid = frame.centroid_px.map(|c| [c.value, c.standard_error]);
         numbers.extend(
-            frame
-                .centroid_px
+            centroid
+                .as_flattened()
                 .iter()
-                .chain(&frame.centroid_sd_px)
                 .chain(&frame.surface_height_m),
         );
     }
