@@ -120,6 +120,7 @@ impl Command {
             Self::Stream(_) => "stream",
             Self::Light(_) => "light",
             Self::Table(_) => "table",
+            Self::Paper(_) => "paper",
         }
     }
 
