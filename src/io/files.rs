@@ -3,9 +3,15 @@ use super::error::{FileError, FilePlace, quoted};
 use serde::de::{self, Deserialize, DeserializeOwned, Deserializer, Unexpected, Visitor};
 use serde_path_to_error::Segment;
 use std::fmt;
-use std::fs::{self, OpenOptions};
+use std::fs::{self, File, Metadata, OpenOptions, Permissions};
 use std::io::{Error, ErrorKind, Read, Write};
 use std::path::{Path, PathBuf};
+use tempfile::TempPath;
+#[cfg(target_os = "linux")]
+use {
+    rustix::fs::{AtFlags, CWD, Mode, OFlags},
+    std::os::fd::AsRawFd,
+};
 
 /// Largest file that is read, in bytes. No table, scene or frame needs more, and a device never
 /// ends.
@@ -58,49 +64,83 @@ pub fn write_bytes(path: &Path, bytes: &[u8]) -> Result<(), FileError> {
 
 /// Writes a whole file, creating its folder where needed.
 ///
-/// The bytes go to a temporary file in the same folder, which then takes the name. A reader finds
-/// the old file or the new one, and a full disk leaves the old one. A link is followed. What is no
-/// file (`/dev/stdout`) is written to as it is.
+/// A reader finds the old file or the new one. A full disk, a limit of the file's size and the end
+/// of the process, whatever ends it, leave the old one and nothing beside it. Permissions of a file
+/// that is replaced are kept, and a link is followed. A device (`/dev/stdout`) is written to as it
+/// is.
 ///
 /// # Errors
-/// Those of the operating system.
+/// Those of the operating system, and a pipe, which may have no reader.
 pub fn replace_file(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
-    let target = match fs::metadata(path) {
+    let refused = |kind, reason: &str| Err(Error::new(kind, reason));
+    let (target, permissions) = match fs::metadata(path) {
         Ok(metadata) if metadata.is_dir() => {
-            return Err(Error::new(ErrorKind::IsADirectory, "it is a folder"));
+            return refused(ErrorKind::IsADirectory, "it is a folder");
+        }
+        Ok(metadata) if is_pipe(&metadata) => {
+            return refused(ErrorKind::InvalidInput, "it is a pipe or a socket");
         }
         Ok(metadata) if !metadata.is_file() => {
             return OpenOptions::new().write(true).open(path)?.write_all(bytes);
         }
-        Ok(_) => fs::canonicalize(path)?,
+        Ok(metadata) => (fs::canonicalize(path)?, Some(metadata.permissions())),
         Err(_) => {
             fs::create_dir_all(path.parent().unwrap_or(Path::new("")))?;
-            path.to_owned()
+            (path.to_owned(), None)
         }
     };
     if target.file_name().is_none() {
-        return Err(Error::new(ErrorKind::InvalidInput, "it has no file name"));
+        return refused(ErrorKind::InvalidInput, "it has no file name");
     }
-    // A new name only: a file that is there belongs to somebody else.
-    let process = std::process::id();
-    let (temporary, mut file) = (0..u32::MAX)
-        .map(|k| target.with_file_name(format!(".{process}-{k}.part")))
-        .find_map(|name| {
-            let file = OpenOptions::new().write(true).create_new(true).open(&name);
-            match file {
-                Err(error) if error.kind() == ErrorKind::AlreadyExists => None,
-                file => Some(file.map(|file| (name, file))),
-            }
-        })
-        .ok_or_else(|| Error::other("no name is free for a temporary file"))??;
-    // The file is closed before it is renamed, as some systems ask.
-    let written = file.write_all(bytes);
-    drop(file);
-    let done = written.and_then(|()| fs::rename(&temporary, &target));
-    if done.is_err() {
-        let _ = fs::remove_file(&temporary);
+    let folder = target.parent().filter(|f| !f.as_os_str().is_empty());
+    let folder = folder.unwrap_or(Path::new("."));
+    let temporary = temporary(folder, bytes, permissions)?;
+    temporary.persist(&target).map_err(|error| error.error)
+}
+
+/// A file with this content under a name of its own, which goes away with the value.
+fn temporary(
+    folder: &Path,
+    bytes: &[u8],
+    permissions: Option<Permissions>,
+) -> std::io::Result<TempPath> {
+    let fill = |mut file: &File| {
+        file.write_all(bytes)?;
+        permissions.map_or(Ok(()), |kept| file.set_permissions(kept))
+    };
+    let mut name = tempfile::Builder::new();
+    name.prefix(".").suffix(".part");
+    // A file without a name until it is whole: what ends the process meanwhile leaves nothing.
+    #[cfg(target_os = "linux")]
+    if let Ok(file) = rustix::fs::open(
+        folder,
+        OFlags::TMPFILE | OFlags::WRONLY | OFlags::CLOEXEC,
+        Mode::from_raw_mode(0o666),
+    ) {
+        let file = File::from(file);
+        fill(&file)?;
+        let own = format!("/proc/self/fd/{}", file.as_raw_fd());
+        let linked = name.make_in(folder, |path| {
+            let follow = AtFlags::SYMLINK_FOLLOW;
+            Ok(rustix::fs::linkat(CWD, &own, CWD, path, follow)?)
+        });
+        return Ok(linked?.into_temp_path());
     }
-    done
+    let create = |path: &Path| OpenOptions::new().write(true).create_new(true).open(path);
+    let file = name.make_in(folder, create)?;
+    fill(file.as_file())?;
+    Ok(file.into_temp_path())
+}
+
+#[cfg(unix)]
+fn is_pipe(metadata: &Metadata) -> bool {
+    use std::os::unix::fs::FileTypeExt;
+    metadata.file_type().is_fifo() || metadata.file_type().is_socket()
+}
+
+#[cfg(not(unix))]
+fn is_pipe(_: &Metadata) -> bool {
+    false
 }
 
 /// Reads a TOML file into a struct.

@@ -295,9 +295,13 @@ impl Context {
     pub fn close(mut self, ended: Result<Exit, Failure>) -> Exit {
         // The answer is printed by now: a folder that cannot be written withholds nothing.
         let ended = ended.and_then(|exit| {
-            let written = self.outputs.write()?;
+            let [written, kept] = self.outputs.write(self.interrupt.requested())?;
             if !written.is_empty() {
                 self.line(format_args!("wrote {}", written.join(", ")));
+            }
+            if !kept.is_empty() {
+                let kept = kept.join(", ");
+                self.note(format_args!("stopped: kept the earlier {kept}"));
             }
             Ok(exit)
         });

@@ -57,10 +57,10 @@ impl Outputs {
         // The folder is made with the first file, inside the nearest one that exists.
         let nearest = folder.ancestors().find(|f| f.exists());
         let ancestor = nearest.unwrap_or(Path::new("."));
-        let closed = |m: Metadata| !m.is_dir() || m.permissions().readonly();
-        if ancestor.metadata().is_ok_and(closed) {
+        // Where a file can be made results can be written. It has no name and is gone at once.
+        if let Err(error) = tempfile::tempfile_in(ancestor) {
             return Err(Failure::input(format!(
-                "--out {} cannot be written in {}: name another folder for the results",
+                "--out {} cannot be written in {} ({error}): name another folder for the results",
                 folder.display(),
                 ancestor.display()
             )));
@@ -75,6 +75,7 @@ impl Outputs {
                     path.display()
                 )));
             }
+            refuse_target(&path, folder)?;
             self.planned.push(path);
         }
         self.folder = Some(folder.into());
@@ -119,14 +120,44 @@ impl Outputs {
         Ok(())
     }
 
-    /// Writes the files, each whole or not at all, and returns their paths.
-    pub fn write(&mut self) -> Result<Vec<String>, Failure> {
-        let mut written = Vec::new();
+    /// Writes the files, each whole or not at all. Results of a run that was stopped are in part:
+    /// they replace no earlier ones. Returns the paths of what was written, and of what was kept.
+    pub fn write(&mut self, stopped: bool) -> Result<[Vec<String>; 2], Failure> {
+        let [mut written, mut kept] = [Vec::new(), Vec::new()];
         for (path, bytes) in self.ready.drain(..) {
-            write_bytes(&path, &bytes)?;
-            written.push(path.display().to_string());
+            let name = path.display().to_string();
+            if stopped && path.exists() {
+                kept.push(name);
+            } else {
+                write_bytes(&path, &bytes)?;
+                written.push(name);
+            }
         }
-        Ok(written)
+        Ok([written, kept])
+    }
+}
+
+/// Refuses a result whose name leads out of its folder, or to what is no file.
+fn refuse_target(path: &Path, folder: &Path) -> Result<(), Failure> {
+    let refused = |what: &str| {
+        Err(Failure::input(format!(
+            "the result {} {what}: remove it, or choose another folder for --out",
+            path.display()
+        )))
+    };
+    let Ok(entry) = path.symlink_metadata() else {
+        return Ok(());
+    };
+    if entry.is_symlink() {
+        let inside = path.canonicalize().ok().zip(folder.canonicalize().ok());
+        if !inside.is_some_and(|(target, folder)| target.starts_with(folder)) {
+            return refused("is a link that leads out of the folder");
+        }
+    }
+    match path.metadata() {
+        Ok(found) if found.is_dir() => refused("is a folder"),
+        Ok(found) if !found.is_file() => refused("is a pipe or a device"),
+        _ => Ok(()),
     }
 }
 

@@ -49,13 +49,6 @@ fn a_full_disk_is_a_sentence() {
         );
         assert_eq!(errors.lines().count(), 1, "{errors}");
     }
-    // A result that is a link to the full device is written to as it is.
-    fs::create_dir(folder.path().join("results")).unwrap();
-    std::os::unix::fs::symlink("/dev/full", folder.path().join("results/pairs.csv")).unwrap();
-    let output = run(folder.path(), &words(&format!("{STRAIN} --out results")));
-    let errors = text(&output.stderr);
-    assert_eq!(output.status.code(), Some(3), "{errors}");
-    assert!(errors.contains("results/pairs.csv"), "{errors}");
 }
 
 #[test]
