@@ -3,7 +3,8 @@ use super::rings::{RingMeans, ring_means};
 use crate::elasticity::ElasticityError;
 use crate::force::{CalibrationOptions, LinearCalibration, StressCalibration};
 use crate::io::{
-    FileError, beside, number, one_or_more, positive, positive_pair, read_frame, read_toml,
+    FileError, beside, force, length, modulus, number, one_or_more, pixel_size, positive,
+    read_frame, read_toml,
 };
 use crate::scene::force_pairs;
 use ndarray::Array2;
@@ -62,9 +63,9 @@ pub struct InclusionScene {
 #[serde(deny_unknown_fields)]
 struct Frame {
     image: PathBuf,
-    #[serde(deserialize_with = "positive")]
+    #[serde(deserialize_with = "length")]
     approach_m: f64,
-    #[serde(default, rename = "force_N", deserialize_with = "positive")]
+    #[serde(default, rename = "force_N", deserialize_with = "force")]
     force_n: Option<f64>,
 }
 
@@ -216,7 +217,7 @@ fn resampled(means: &RingMeans, values: &[f64], radii: &[f64]) -> Vec<f64> {
 #[serde(deny_unknown_fields)]
 struct InclusionFile {
     reference: PathBuf,
-    #[serde(deserialize_with = "positive_pair")]
+    #[serde(deserialize_with = "pixel_size")]
     pixel_size_m: [f64; 2],
     calibration: Option<PairsTable>,
     #[serde(deserialize_with = "one_or_more")]
@@ -236,17 +237,17 @@ struct PairsTable {
 struct BlockTable {
     #[serde(rename = "shape")]
     _shape: BlockShape,
-    #[serde(deserialize_with = "positive")]
+    #[serde(deserialize_with = "length")]
     height_m: f64,
     #[serde(default, deserialize_with = "positive")]
     height_error_m: Option<f64>,
-    #[serde(deserialize_with = "positive")]
+    #[serde(deserialize_with = "length")]
     radius_m: f64,
     #[serde(default, deserialize_with = "compressible")]
     poisson_ratio: Option<f64>,
     #[serde(default, deserialize_with = "positive")]
     poisson_ratio_error: Option<f64>,
-    #[serde(default, deserialize_with = "positive")]
+    #[serde(default, deserialize_with = "modulus")]
     youngs_modulus_pa: Option<f64>,
     #[serde(default, deserialize_with = "positive")]
     youngs_modulus_error_pa: Option<f64>,
@@ -304,7 +305,7 @@ impl BlockTable {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct GuideTable {
-    #[serde(deserialize_with = "positive")]
+    #[serde(deserialize_with = "length")]
     radius_m: f64,
     #[serde(deserialize_with = "one_or_more")]
     layers: Vec<LayerTable>,

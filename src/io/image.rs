@@ -122,6 +122,29 @@ pub fn read_grey_image(
     to_grey(image, &bytes, path, grey, bits)
 }
 
+/// Rows and columns of an image, from its header alone. `None` for what is no image that can be
+/// read.
+///
+/// ```
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// use tactile_imaging::io::image_size;
+/// let folder = tempfile::tempdir()?;
+/// let path = folder.path().join("frame.pgm");
+/// std::fs::write(&path, b"P5\n3 2\n255\n......")?;
+/// assert_eq!(image_size(&path), Some((2, 3)));
+/// assert_eq!(image_size(folder.path()), None);
+/// # Ok(()) }
+/// ```
+#[must_use]
+pub fn image_size(path: impl AsRef<Path>) -> Option<(usize, usize)> {
+    let path = path.as_ref();
+    // Opening a pipe without a writer would wait for ever.
+    path.metadata().ok().filter(std::fs::Metadata::is_file)?;
+    let reader = ImageReader::open(path).ok()?.with_guessed_format().ok()?;
+    let (width, height) = reader.into_dimensions().ok()?;
+    Some((height as usize, width as usize))
+}
+
 /// Reads a grey image in eight bits a pixel, as [`GreyImage::to_u8`] gives it.
 ///
 /// # Errors
@@ -184,7 +207,11 @@ fn decode(bytes: &[u8], path: &Path) -> Result<DynamicImage, FileError> {
                 pixels / 1_000_000
             )));
         }
-        DynamicImage::from_decoder(decoder).map(Ok)
+        let orientation = decoder.orientation()?;
+        let mut image = DynamicImage::from_decoder(decoder)?;
+        // A camera that was turned notes it beside the pixels.
+        image.apply_orientation(orientation);
+        Ok(above_maximum(bytes, (width, height)).map_or(Ok(image), Err))
     };
     let decoded = decoded().unwrap_or_else(|error: ImageError| Err(in_words(&error)));
     decoded.map_err(|reason| refused(path, reason))
@@ -302,6 +329,37 @@ fn announced_maximum(bytes: &[u8]) -> Option<u16> {
         _ => None,
     };
     word?.parse().ok().filter(|&maximum| maximum > 0)
+}
+
+/// Why the samples of a binary PGM, PPM or PAM do not fit the largest value that its header
+/// announces, if one is above it. The decoder takes it for the largest.
+fn above_maximum(bytes: &[u8], (width, height): (u32, u32)) -> Option<String> {
+    let announced = announced_maximum(bytes)?;
+    let channels = match bytes.get(1)? {
+        b'5' => 1,
+        b'6' => 3,
+        // The depth of a PAM stands in its header, and samples in text are checked by the decoder.
+        _ => return None,
+    };
+    let width_bytes = if announced > 255 { 2 } else { 1 };
+    let samples = width as usize * height as usize * channels;
+    let start = bytes.len().checked_sub(samples * width_bytes)?;
+    // Where more follows the samples, their place is not known from the end.
+    let header = String::from_utf8_lossy(&bytes[..start.min(4096)]);
+    if !header.trim_end().ends_with(&announced.to_string()) {
+        return None;
+    }
+    let raster = bytes[start..].chunks_exact(width_bytes);
+    let largest = raster
+        .map(|sample| {
+            sample
+                .iter()
+                .fold(0, |sum, &byte| 256 * sum + u16::from(byte))
+        })
+        .max()?;
+    (largest > announced).then(|| {
+        format!("it has a sample of {largest}, above the {announced} that its header announces")
+    })
 }
 
 /// Writes an 8-bit grey image: PGM where the name ends in `.pgm`, else PNG.

@@ -20,6 +20,7 @@ mod cases;
 mod error;
 mod files;
 mod image;
+mod range;
 mod table;
 #[cfg(test)]
 mod tests;
@@ -27,7 +28,8 @@ mod tests;
 pub use cases::{CasePoints, MatchCase, read_cases, write_case_result};
 pub use error::{FileError, FilePlace};
 pub use files::{read_bytes, replace_file, write_bytes};
-pub use image::{Grey, GreyImage, read_grey_image, read_grey_levels, write_grey_image};
+pub use image::{Grey, GreyImage, image_size, read_grey_image, read_grey_levels, write_grey_image};
+pub use range::Quantity;
 pub use table::{
     PointTable, Table, read_columns, read_grid, read_point_table, read_points, read_table,
 };
@@ -37,3 +39,4 @@ pub(crate) use files::{
     positive_pair, read_toml,
 };
 pub(crate) use image::read_frame;
+pub(crate) use range::{force, length, modulus, pixel_size};

@@ -5,13 +5,14 @@ use crate::elasticity::ElasticityError;
 use crate::elasticity::contact::ContactTable;
 use crate::elasticity::modulus::TabulatedContact;
 use crate::force::{CalibrationPair, ContactOptions, DriftCorrection, Estimate, ForceOptions};
-use crate::io::{FileError, read_columns, read_frame, read_grey_levels};
+use crate::io::{FileError, FilePlace, Quantity, read_columns, read_frame, read_grey_levels};
 use crate::pipeline::{
     DarkContact, EstimatorChoice, LightContact, Measurement, Object, Pipeline, PipelineError,
     Press, SurfaceInput,
 };
 use crate::sensor::Sensor;
 use ndarray::{Array2, ArrayView2};
+use std::error::Error;
 use std::path::Path;
 
 /// A scene's calibration, read.
@@ -93,7 +94,9 @@ impl Scene {
     /// # Errors
     /// [`FileError`], naming the field and the file.
     pub fn load_without_frames(&self) -> Result<SceneData, FileError> {
-        let in_field = |field: &str, error| FileError::field(&self.file, field, error);
+        let in_field = |field: &str, error: Box<dyn Error + Send + Sync>| {
+            FileError::field(&self.file, field, error)
+        };
         let reference = read_frame(&self.file, "reference", &self.reference, self.bits, None)?;
         let calibration = match &self.calibration {
             CalibrationSource::Gauge => LoadedCalibration::Gauge,
@@ -101,13 +104,17 @@ impl Scene {
                 LoadedCalibration::Sensor(Box::new(Sensor::read(path)?))
             }
             CalibrationSource::Pairs(path) => LoadedCalibration::Pairs(
-                force_pairs(path).map_err(|error| in_field("calibration.pairs", error))?,
+                force_pairs(path).map_err(|error| in_field("calibration.pairs", error.into()))?,
             ),
             CalibrationSource::DepthTable(path) => {
                 let darkness = (&["darkness"][..], "grey_levels");
                 let [darkness, depth] = read_columns(path, [darkness, (&["depth"], "mm")])
-                    .map_err(|error| in_field("calibration.depth_table", error))?;
-                LoadedCalibration::DepthTable(darkness.into_iter().zip(depth).collect())
+                    .map_err(|error| in_field("calibration.depth_table", error.into()))?;
+                let rows: Vec<_> = darkness.into_iter().zip(depth).collect();
+                if let Some(reason) = doubt_of_depths(&rows) {
+                    return Err(in_field("calibration.depth_table", reason.into()));
+                }
+                LoadedCalibration::DepthTable(rows)
             }
         };
         // Errors of a table or a sensor name fields of their own file.
@@ -339,5 +346,72 @@ pub fn force_pairs(path: &Path) -> Result<Vec<CalibrationPair>, FileError> {
     let value = (&["integrated_pixel_value"][..], "grey_levels");
     let [values, forces] = read_columns(path, [value, (&["force"], "N")])?;
     let pairs = values.into_iter().zip(forces);
-    Ok(pairs.map(|(v, f)| CalibrationPair::loading(v, f)).collect())
+    let pairs: Vec<_> = pairs.map(|(v, f)| CalibrationPair::loading(v, f)).collect();
+    match doubt_of_pairs(&pairs) {
+        Some(reason) => Err(FileError::Rejected {
+            path: path.into(),
+            place: FilePlace::File,
+            source: reason.into(),
+        }),
+        None => Ok(pairs),
+    }
+}
+
+/// Why rows of (darkness in grey levels, depth in metres) are no depth table: a darkness that eight
+/// bits do not hold, or depths of no gel. `None` where they may be one.
+///
+/// ```
+/// use tactile_imaging::scene::doubt_of_depths;
+/// assert_eq!(doubt_of_depths(&[(0.0, 0.0), (60.0, 1.9e-3)]), None);
+/// assert!(doubt_of_depths(&[(0.0, 0.0), (1.9, 60e-3)]).is_some(), "swapped columns");
+/// ```
+#[must_use]
+pub fn doubt_of_depths(rows: &[(f64, f64)]) -> Option<String> {
+    if let Some((darkness, _)) = rows.iter().find(|(darkness, _)| *darkness > 255.0) {
+        return Some(format!(
+            "a darkness of {darkness} is more than the 255 grey levels of a frame: are the columns swapped?"
+        ));
+    }
+    // Dark sensors are films of some millimetres.
+    let (_, depth) = rows.iter().find(|(_, depth)| *depth > 20e-3)?;
+    Some(format!(
+        "a depth of {} mm is more than any film is thick: are the columns swapped, or is the unit in the heading wrong?",
+        1e3 * depth
+    ))
+}
+
+/// Why pairs are no calibration of light against force: forces that no sensor bears, that do not
+/// change, or that fall where the light grows. `None` where they may be one.
+///
+/// ```
+/// use tactile_imaging::force::CalibrationPair;
+/// use tactile_imaging::scene::doubt_of_pairs;
+/// let pairs = |slope: f64| [1e5, 2e5, 3e5].map(|v| CalibrationPair::loading(v, slope * v));
+/// assert_eq!(doubt_of_pairs(&pairs(1e-6)), None);
+/// assert!(doubt_of_pairs(&pairs(-1e-6)).is_some_and(|reason| reason.contains("falls")));
+/// ```
+#[must_use]
+pub fn doubt_of_pairs(pairs: &[CalibrationPair]) -> Option<String> {
+    let forces = || pairs.iter().map(|pair| pair.force_n);
+    let [_, most] = Quantity::Force.limits();
+    if let Some(force) = forces().find(|force| force.abs() > most) {
+        return Some(format!(
+            "a force of {force:e} N is more than any sensor bears: are the columns swapped, or is the unit in the heading wrong?"
+        ));
+    }
+    let mean = |values: &dyn Fn(&CalibrationPair) -> f64| {
+        pairs.iter().map(values).sum::<f64>() / pairs.len() as f64
+    };
+    let light = mean(&|pair| pair.integrated_pixel_value);
+    let force = mean(&|pair| pair.force_n);
+    let together = mean(&|pair| (pair.integrated_pixel_value - light) * (pair.force_n - force));
+    let [least, greatest] = [f64::min, f64::max].map(|end| forces().fold(force, end));
+    if pairs.len() > 1 && least == greatest {
+        return Some(format!(
+            "all forces are {force} N: a calibration needs at least two"
+        ));
+    }
+    (together < 0.0).then(|| {
+        "the force falls where the light grows: is a column that of another quantity, or are rows out of order?".to_owned()
+    })
 }

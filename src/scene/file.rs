@@ -4,8 +4,8 @@ use crate::elasticity::contact::{ContactTable, Layer, Waveguide};
 #[cfg(feature = "fem")]
 use crate::fem::{TableOptions, TableProgress};
 use crate::io::{
-    FileError, beside, not_negative, number, one_or_more, parse_toml, poisson_ratio, positive,
-    positive_pair, read_bytes, read_toml, write_bytes,
+    FileError, beside, force, length, modulus, not_negative, number, one_or_more, parse_toml,
+    pixel_size, poisson_ratio, read_bytes, read_toml, write_bytes,
 };
 use crate::pipeline::{
     EstimatorChoice, IntegratorChoice, MatcherChoice, Object, ReconstructionChoice, SamplerChoice,
@@ -82,7 +82,7 @@ pub struct SceneFrame {
     /// The image.
     pub image: PathBuf,
     /// The reading of a gauge in newtons, if there was one.
-    #[serde(default, rename = "force_N", deserialize_with = "positive")]
+    #[serde(default, rename = "force_N", deserialize_with = "force")]
     pub force_n: Option<f64>,
     /// The standard error of that reading in newtons, if one is stated.
     #[serde(default, rename = "force_error_N", deserialize_with = "not_negative")]
@@ -129,10 +129,10 @@ pub struct SceneLayer {
     #[serde(deserialize_with = "refractive_index")]
     pub refractive_index: f64,
     /// Thickness in metres.
-    #[serde(deserialize_with = "positive")]
+    #[serde(deserialize_with = "length")]
     pub thickness_m: f64,
     /// Young's modulus in pascals.
-    #[serde(deserialize_with = "positive")]
+    #[serde(deserialize_with = "modulus")]
     pub youngs_modulus_pa: f64,
     /// Poisson's ratio, ½ where a file states none.
     #[serde(default = "incompressible", deserialize_with = "poisson_ratio")]
@@ -258,7 +258,7 @@ impl Scene {
 struct SceneFile {
     reference: PathBuf,
     sensor: Option<PathBuf>,
-    #[serde(default, deserialize_with = "positive_pair")]
+    #[serde(default, deserialize_with = "pixel_size")]
     pixel_size_m: Option<[f64; 2]>,
     flat_field: Option<FlatField>,
     illumination_drift: Option<Drift>,
@@ -305,9 +305,9 @@ struct CalibrationTable {
 #[serde(deny_unknown_fields)]
 struct ObjectTable {
     shape: Shape,
-    #[serde(default, deserialize_with = "positive")]
+    #[serde(default, deserialize_with = "length")]
     radius_m: Option<f64>,
-    #[serde(default, deserialize_with = "positive")]
+    #[serde(default, deserialize_with = "length")]
     thickness_m: Option<f64>,
     #[serde(default, deserialize_with = "half_angle")]
     half_angle_rad: Option<f64>,

@@ -73,7 +73,7 @@
 mod data;
 mod file;
 
-pub use data::{LoadedCalibration, SceneData};
+pub use data::{LoadedCalibration, SceneData, doubt_of_depths, doubt_of_pairs};
 #[cfg(feature = "fem")]
 pub use file::solve_contact_table;
 pub use file::{

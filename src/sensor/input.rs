@@ -1,8 +1,8 @@
 //! The input of a calibration: presses under known forces, a target, stated layers, and their file.
 use crate::force::{Branch, ShearCalibration};
 use crate::io::{
-    FileError, beside, finite, not_negative, one_or_more, poisson_ratio, positive, positive_pair,
-    read_frame, read_toml,
+    FileError, beside, finite, length, modulus, not_negative, one_or_more, pixel_size,
+    poisson_ratio, positive, positive_pair, read_frame, read_toml,
 };
 use crate::scene::{SceneLayer, refractive_index};
 use ndarray::Array2;
@@ -182,7 +182,7 @@ struct CalibrationFile {
     temperature_c: Option<f64>,
     #[serde(deserialize_with = "one_or_more")]
     references: Vec<PathBuf>,
-    #[serde(default, deserialize_with = "positive_pair")]
+    #[serde(default, deserialize_with = "pixel_size")]
     pixel_size_m: Option<[f64; 2]>,
     #[serde(default = "per_mille", deserialize_with = "not_negative")]
     pixel_size_error: f64,
@@ -209,7 +209,7 @@ fn per_mille() -> f64 {
 #[serde(deny_unknown_fields)]
 struct TargetTable {
     image: PathBuf,
-    #[serde(deserialize_with = "positive")]
+    #[serde(deserialize_with = "length")]
     pitch_m: f64,
     #[serde(default = "per_mille", deserialize_with = "not_negative")]
     error: f64,
@@ -236,7 +236,7 @@ enum BranchName {
 #[serde(deny_unknown_fields)]
 struct IndenterTable {
     shape: IndenterShape,
-    #[serde(deserialize_with = "positive")]
+    #[serde(deserialize_with = "length")]
     radius_m: f64,
     #[serde(default, deserialize_with = "not_negative")]
     radius_error_m: f64,
@@ -254,11 +254,11 @@ enum IndenterShape {
 struct LayerTable {
     #[serde(deserialize_with = "refractive_index")]
     refractive_index: f64,
-    #[serde(deserialize_with = "positive")]
+    #[serde(deserialize_with = "length")]
     thickness_m: f64,
     #[serde(deserialize_with = "not_negative")]
     thickness_error_m: f64,
-    #[serde(deserialize_with = "positive")]
+    #[serde(deserialize_with = "modulus")]
     youngs_modulus_pa: f64,
     #[serde(deserialize_with = "not_negative")]
     youngs_modulus_error_pa: f64,

@@ -1,11 +1,11 @@
 //! What several subcommands ask for: numbers, repetitions, frames of a sensor, masks and known
 //! heights.
-use crate::console::{Failure, Interrupt, median_ms};
+use crate::console::{Failure, Interrupt, four_digits, median_ms};
 use clap::{Args, ValueEnum};
 use ndarray::Array2;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
-use tactile_imaging::io::{Grey, read_grey_image, read_grid};
+use tactile_imaging::io::{Grey, Quantity, read_grey_image, read_grid};
 
 fn number(text: &str, fits: impl Fn(f64) -> bool, expected: &str) -> Result<f64, String> {
     let value = text.parse().ok();
@@ -16,6 +16,50 @@ fn number(text: &str, fits: impl Fn(f64) -> bool, expected: &str) -> Result<f64,
 /// An argument that is a positive, finite number.
 pub fn positive(text: &str) -> Result<f64, String> {
     number(text, |v| v > 0.0, "a number above zero")
+}
+
+fn physical(text: &str, quantity: Quantity, scale: f64, unit: &str) -> Result<f64, String> {
+    let [least, greatest] = quantity.limits().map(|v| four_digits(v / scale));
+    let expected = format!("a number from {least} to {greatest} {unit}");
+    number(text, |v| quantity.allows(v * scale), &expected)
+}
+
+/// An argument that is a length in metres.
+pub fn length_m(text: &str) -> Result<f64, String> {
+    physical(text, Quantity::Length, 1.0, "m (3 mm are 3e-3)")
+}
+
+/// An argument that is a length in millimetres.
+pub fn length_mm(text: &str) -> Result<f64, String> {
+    physical(text, Quantity::Length, 1e-3, "mm")
+}
+
+/// An argument that is a size of a lump in millimetres. The mesh of a smaller one has no end.
+pub fn lump_mm(text: &str) -> Result<f64, String> {
+    let expected = "a number from 0.5 to 200 mm";
+    number(text, |mm| (0.5..=200.0).contains(&mm), expected)
+}
+
+/// An argument that is a modulus in kilopascals.
+pub fn modulus_kpa(text: &str) -> Result<f64, String> {
+    physical(text, Quantity::Modulus, 1e3, "kPa")
+}
+
+/// An argument that is a force in newtons.
+pub fn force_n(text: &str) -> Result<f64, String> {
+    physical(text, Quantity::Force, 1.0, "N")
+}
+
+/// An argument that is the size of a pixel on the sensor in micrometres, one or width and height.
+pub fn pixel_um(text: &str) -> Result<[f64; 2], String> {
+    let [x, y] = one_or_two(text)?;
+    for side in [x, y] {
+        physical(&side.to_string(), Quantity::PixelSide, 1e-6, "µm")?;
+    }
+    if (x / y).max(y / x) > Quantity::MOST_UNEQUAL_SIDES {
+        return Err("expected sides of one unit, of which neither is ten times the other".into());
+    }
+    Ok([x, y])
 }
 
 /// An argument that is a finite number.
@@ -96,7 +140,7 @@ pub struct SensorFrames {
     #[arg(long, value_name = "IMAGE")]
     pub reference: PathBuf,
     /// Size of a pixel on the sensor's surface in micrometres, or its width and height.
-    #[arg(long, value_name = "X[,Y]", value_parser = one_or_two, allow_negative_numbers = true)]
+    #[arg(long, value_name = "X[,Y]", value_parser = pixel_um, allow_negative_numbers = true)]
     pixel_um: [f64; 2],
     /// Bits of the camera, for images of 16 bits whose file does not say.
     #[arg(long, value_parser = clap::value_parser!(u8).range(8..=16))]

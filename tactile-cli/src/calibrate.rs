@@ -10,6 +10,7 @@ use tactile_imaging::force::{
     StressCalibration,
 };
 use tactile_imaging::io::read_columns;
+use tactile_imaging::scene::doubt_of_pairs;
 use tactile_imaging::sensor::{
     CalibratedSensor, Indenter, LayerFinding, PressFinding, SensorCalibration, SensorError,
 };
@@ -95,6 +96,9 @@ impl PairLine {
             },
         };
         let pairs: Vec<_> = values.iter().zip(&forces).enumerate().map(pair).collect();
+        if let Some(reason) = doubt_of_pairs(&pairs) {
+            return Err(Failure::in_file(path, reason));
+        }
         let line = LinearCalibration::fit(&pairs, &CalibrationOptions::default())
             .map_err(|error| Failure::in_file(path, error))?;
         Ok(Self { pairs, line })

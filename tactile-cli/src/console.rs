@@ -9,7 +9,7 @@ use std::io::{BufWriter, ErrorKind, Write, stderr, stdout};
 use std::ops::ControlFlow;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, mpsc};
+use std::sync::{Arc, Mutex, mpsc};
 use std::time::{Duration, Instant};
 use tactile_imaging::force::Estimate;
 use tactile_imaging::io::FileError;
@@ -123,7 +123,6 @@ pub struct Context {
     pub json: bool,
     pub interrupt: Interrupt,
     pub outputs: Outputs,
-    limit_bytes: f64,
     /// The subcommand, for the JSON object.
     command: &'static str,
     /// All cautions of the answer, as its JSON object has them.
@@ -146,14 +145,13 @@ struct Envelope<'a, T> {
 }
 
 impl Context {
-    pub fn new(command: &'static str, json: bool, limit_gb: f64, outputs: Outputs) -> Self {
+    pub fn new(command: &'static str, json: bool, outputs: Outputs) -> Self {
         Self {
             command,
             cautions: Vec::new(),
             json,
             interrupt: Interrupt::install(),
             outputs,
-            limit_bytes: limit_gb * 1e9,
             reader_left: false,
             error: None,
         }
@@ -244,19 +242,7 @@ impl Context {
     /// Refuses a job that needs more memory than is allowed. `job` names it and its size, `remedy`
     /// the way out.
     pub fn allow(&self, bytes: f64, job: &str, remedy: &str) -> Result<(), Failure> {
-        let size = |bytes: f64| match bytes {
-            b if b >= 1e12 => format!("{:.1} TB", b * 1e-12),
-            b if b >= 1e9 => format!("{:.1} GB", b * 1e-9),
-            b => format!("{:.1} MB", b * 1e-6),
-        };
-        if bytes <= self.limit_bytes {
-            return Ok(());
-        }
-        Err(Failure::input(format!(
-            "{job} needs about {}, more than the {} allowed: {remedy}, or allow more with --memory-gb",
-            size(bytes),
-            size(self.limit_bytes)
-        )))
+        self.outputs.allow(bytes, job, remedy)
     }
 
     /// Runs a job that can neither stop nor report its progress, with its time so far on the
@@ -271,10 +257,20 @@ impl Context {
         self.interrupt.polled(true);
         // The library has no way to stop this work: it runs beside the thread that listens for
         // Ctrl-C.
-        let worker = std::thread::spawn(move || {
-            // Nobody waits for the answer any more after Ctrl-C.
-            let _ = answer.send(work());
+        let work = Arc::new(Mutex::new(Some(work)));
+        let job = Arc::clone(&work);
+        let take = |job: &Mutex<Option<_>>| job.lock().ok().and_then(|mut job| job.take());
+        let worker = std::thread::Builder::new().spawn(move || {
+            if let Some(work) = take(&job) {
+                // Nobody waits for the answer any more after Ctrl-C.
+                let _ = answer.send(work());
+            }
         });
+        let Ok(worker) = worker else {
+            // The system allows no more threads: the work runs here, and Ctrl-C ends the program.
+            self.interrupt.polled(false);
+            return take(&work).map(|work| work());
+        };
         let result = loop {
             match answered.recv_timeout(Duration::from_millis(100)) {
                 Ok(result) => break Some(result),
@@ -399,7 +395,8 @@ impl Bar {
         let bar = progress.bar.clone();
         let (end, ended) = mpsc::channel::<()>();
         progress.end = Some(end);
-        std::thread::spawn(move || {
+        // Without a thread the job has no clock.
+        let _ = std::thread::Builder::new().spawn(move || {
             let still_runs = Err(mpsc::RecvTimeoutError::Timeout);
             if ended.recv_timeout(Duration::from_secs(1)) == still_runs {
                 bar.set_draw_target(ProgressDrawTarget::stderr());

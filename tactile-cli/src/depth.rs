@@ -12,6 +12,7 @@ use tactile_imaging::pipeline::{
     BallFit, ContactReading, ContactSurface, DarkContact, Object, Pipeline, PipelineError,
     SurfaceInput,
 };
+use tactile_imaging::scene::doubt_of_depths;
 use tactile_imaging::sfs::DepthTable;
 
 /// Find the contact and its depth in frames of a sensor that grows darker with depth
@@ -32,7 +33,7 @@ pub struct DepthArguments {
     #[arg(long, value_name = "TABLE.csv")]
     table: PathBuf,
     /// Fit a ball of this radius in mm.
-    #[arg(long, value_name = "MM", value_parser = crate::arguments::positive)]
+    #[arg(long, value_name = "MM", value_parser = crate::arguments::length_mm)]
     ball_radius_mm: Option<f64>,
     /// Fit a ball of any radius.
     #[arg(long, conflicts_with = "ball_radius_mm")]
@@ -63,6 +64,9 @@ impl DepthArguments {
         let columns = [(&["darkness"][..], "grey_levels"), (&["depth"][..], "mm")];
         let [darkness, depth] = read_columns(&self.table, columns)?;
         let entries: Vec<_> = darkness.into_iter().zip(depth).collect();
+        if let Some(reason) = doubt_of_depths(&entries) {
+            return Err(Failure::in_file(&self.table, reason));
+        }
         let stages = self.stages(&entries);
         let (contact, table) = stages.map_err(|error| Failure::in_file(&self.table, error))?;
         // Depth is read from the table whatever the object is: it only says what may be fitted.
@@ -122,6 +126,10 @@ pub fn run(arguments: &DepthArguments, context: &mut Context) -> Result<Exit, Fa
         GreyOf::Mean => Grey::Mean,
     };
     let reference = frames.read_reference(grey)?;
+    // Frames are held, and each has a surface with its plot.
+    let pixels = (reference.len() * frames.frames.len()) as f64;
+    let job = format!("the depth of {} frames", frames.frames.len());
+    context.allow(40.0 * pixels, &job, "give fewer or smaller frames")?;
     let images = frames
         .frames
         .iter()

@@ -1,5 +1,5 @@
 //! `tactile inclusion`: size, depth and stiffness of a lump under the surface of a block.
-use crate::arguments::positive;
+use crate::arguments::{lump_mm, modulus_kpa};
 use crate::console::{Bar, Context, Exit, Failure};
 use crate::outputs::Csv;
 use crate::plot::{Colour, Page, Panel, circle};
@@ -51,19 +51,24 @@ pub struct InclusionArguments {
     #[arg(long)]
     design: bool,
     /// Design: diameter of the lump, in millimetres.
-    #[arg(long, value_name = "MM", default_value = "10", value_parser = positive, requires = "design")]
+    #[arg(long, value_name = "MM", default_value = "10", value_parser = lump_mm, requires = "design")]
     diameter_mm: f64,
     /// Design: depth of its top, in millimetres.
-    #[arg(long, value_name = "MM", default_value = "4", value_parser = positive, requires = "design")]
+    #[arg(long, value_name = "MM", default_value = "4", value_parser = lump_mm, requires = "design")]
     depth_mm: f64,
     /// Design: its modulus, in kPa.
-    #[arg(long, value_name = "KPA", default_value = "40", value_parser = positive, requires = "design")]
+    #[arg(long, value_name = "KPA", default_value = "40", value_parser = modulus_kpa, requires = "design")]
     lump_kpa: f64,
     /// Design: the tissue's modulus, in kPa.
-    #[arg(long, value_name = "KPA", default_value = "5", value_parser = positive, requires = "design")]
+    #[arg(long, value_name = "KPA", default_value = "5", value_parser = modulus_kpa, requires = "design")]
     tissue_kpa: f64,
     /// Simulation: seed of the camera's noise.
-    #[arg(long, default_value_t = 1, conflicts_with = "scene")]
+    #[arg(
+        long,
+        default_value_t = 1,
+        allow_negative_numbers = true,
+        conflicts_with = "scene"
+    )]
     seed: u64,
 }
 

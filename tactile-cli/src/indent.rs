@@ -1,5 +1,5 @@
 //! `tactile indent`: Young's modulus from a force–indentation curve.
-use crate::arguments::{finite, name, poisson, positive};
+use crate::arguments::{finite, length_m, name, poisson, positive};
 use crate::console::{Context, Exit, Failure, digits};
 use crate::outputs::Csv;
 use crate::plot::{Colour, Page, Panel};
@@ -44,10 +44,10 @@ pub struct IndentArguments {
     #[arg(long, value_enum)]
     shape: Shape,
     /// Radius of the sphere or punch in m.
-    #[arg(long, value_name = "R", value_parser = positive)]
+    #[arg(long, value_name = "R", value_parser = length_m)]
     radius: Option<f64>,
     /// Radius of the sample in m where it is a ball. Without --radius a flat plate presses it.
-    #[arg(long, value_name = "R2", value_parser = positive)]
+    #[arg(long, value_name = "R2", value_parser = length_m)]
     ball_radius: Option<f64>,
     /// The ball is squeezed between two plates and the indentation is that of both contacts.
     #[arg(long)]
@@ -60,7 +60,7 @@ pub struct IndentArguments {
     #[arg(long, value_name = "DEGREES", value_parser = positive)]
     half_angle: Option<f64>,
     /// Thickness of the sample in m, where it is a layer on a rigid base.
-    #[arg(long, value_name = "H", value_parser = positive)]
+    #[arg(long, value_name = "H", value_parser = length_m)]
     thickness: Option<f64>,
     /// The layer slides on its base instead of sticking to it.
     #[arg(long)]
@@ -241,12 +241,33 @@ impl IndentArguments {
         } else {
             table.columns([indentation, force])?
         };
+        refuse_return(&z).map_err(|reason| Failure::in_file(&self.curve, reason))?;
         if self.plates {
             // Each of the two contacts has half of the approach.
             z.iter_mut().for_each(|z| *z *= 0.5);
         }
         IndentationCurve::new(&z, &f).map_err(|error| Failure::in_file(&self.curve, error))
     }
+}
+
+/// Refuses a table that goes into the sample and out again: the way back is another curve.
+fn refuse_return(position_m: &[f64]) -> Result<(), String> {
+    let depth = |k: &usize| position_m[*k];
+    let rows = || 0..position_m.len();
+    let deepest = rows().max_by(|a, b| depth(a).total_cmp(&depth(b)));
+    let (Some(deepest), Some(last)) = (deepest, rows().last()) else {
+        return Ok(());
+    };
+    let way = |from: usize, to: usize| position_m[to] - position_m[from];
+    // A tenth of the way is more than a gauge's noise.
+    let (there, back) = (way(0, deepest), way(last, deepest));
+    if there > 0.0 && back > 0.1 * there {
+        return Err(format!(
+            "the indentation grows up to row {} and falls after it: keep the loading or the unloading alone",
+            deepest + 1
+        ));
+    }
+    Ok(())
 }
 
 pub fn run(arguments: &IndentArguments, context: &mut Context) -> Result<Exit, Failure> {
@@ -277,8 +298,9 @@ pub fn run(arguments: &IndentArguments, context: &mut Context) -> Result<Exit, F
     };
     let found = found.map_err(|error| Failure::in_file(&arguments.curve, error))?;
     let chosen = found.chosen();
-    context.value(&value(&found));
     print(&found, points, context);
+    doubts(&curve, chosen, arguments.contact.is_some(), context);
+    context.value(&value(&found));
     let mut csv = Csv::new(&["position_m", "force_N", "fitted_N"]);
     for (i, fitted) in chosen.fitted_n.iter().enumerate() {
         csv.row([curve.position_m()[i], curve.force_n()[i], *fitted]);
@@ -286,6 +308,48 @@ pub fn run(arguments: &IndentArguments, context: &mut Context) -> Result<Exit, F
     context.outputs.add(names[0], csv.into_bytes());
     context.outputs.page(names[1], || page(&curve, chosen))?;
     Ok(Exit::Complete)
+}
+
+/// Cautions about a curve and its fit.
+fn doubts(curve: &IndentationCurve, fit: &CurveFit, known_contact: bool, context: &mut Context) {
+    for warning in &fit.warnings {
+        context.warn("assumption", Value::Null, warning);
+    }
+    let force = curve.force_n();
+    let (first, last) = (curve.position_m()[0], curve.position_m()[force.len() - 1]);
+    let most = force.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    // A gauge in range repeats its largest reading by chance alone.
+    let at_most = force.iter().filter(|f| **f == most).count();
+    if at_most > 3 && 50 * at_most > force.len() {
+        context.warn(
+            "force_saturated",
+            json!({ "points": at_most, "force_n": most }),
+            format_args!(
+                "{at_most} points have the largest force, {} mN: the gauge may be at its limit",
+                digits(1e3 * most, 4)
+            ),
+        );
+    }
+    // Neighbours that go together leave fewer independent points than the interval counts.
+    let correlation = fit.residual_autocorrelation;
+    if correlation > 0.5 {
+        context.warn(
+            "residuals_correlated",
+            json!({ "correlation": correlation }),
+            format_args!(
+                "the residuals of neighbours go together ({correlation:.2}): the curve is not that of this law, and the interval is too narrow"
+            ),
+        );
+    }
+    let reach = 0.02 * (last - first);
+    let at = fit.contact_point_m;
+    if !known_contact && (at < first + reach || at > last - reach) {
+        context.warn(
+            "contact_point_at_bound",
+            json!({ "contact_point_m": at }),
+            "the contact point lies at an end of the curve: it may begin before it, give --contact where it is known",
+        );
+    }
 }
 
 /// The unit that a modulus of this size is read in, and its inverse in pascals.
@@ -351,9 +415,6 @@ fn print(found: &CurveSelection, points: usize, context: &mut Context) {
     if let Some(ratio) = fit.contact_ratio {
         context.row("largest a/R", format_args!("{ratio:.3}"));
     }
-    for warning in &fit.warnings {
-        context.row("warning", warning);
-    }
     if found.fits.len() > 1 {
         let [law, modulus, aicc, weight] = ["law", "modulus", "AICc", "weight"];
         context.line(format_args!(
@@ -378,9 +439,11 @@ fn value(found: &CurveSelection) -> Value {
     let fit = |(fit, weight): (&CurveFit, &f64)| {
         json!({
             "model": fit.model.to_string(),
-            "youngs_modulus_pa": fit.youngs_modulus_pa,
-            "standard_error_pa": fit.standard_error_pa,
-            "interval_95_pa": [Some(fit.interval_95.lower), fit.interval_95.upper],
+            "youngs_modulus_pa": {
+                "value": fit.youngs_modulus_pa,
+                "standard_error": fit.standard_error_pa,
+                "interval_95": [Some(fit.interval_95.lower), fit.interval_95.upper],
+            },
             "model_error": fit.model_error,
             "contact_point_m": fit.contact_point_m,
             "offset_n": fit.offset_n,

@@ -174,9 +174,9 @@ pub fn run_with(arguments: impl IntoIterator<Item: Into<OsString> + Clone>) -> u
         Ok(program) => program,
         Err(error) => return explain(&error).code(),
     };
-    let outputs = Outputs::new(program.out);
+    let outputs = Outputs::new(program.out, program.memory_gb);
     let name = program.command.name();
-    let mut context = Context::new(name, program.json, program.memory_gb, outputs);
+    let mut context = Context::new(name, program.json, outputs);
     let ended = program.command.run(&mut context);
     context.close(ended).code()
 }

@@ -1,5 +1,5 @@
 //! `tactile measure`: everything, of a simulated press or of a user's own frames.
-use crate::arguments::{Repetition, positive};
+use crate::arguments::{Repetition, force_n, length_mm, modulus_kpa};
 use crate::console::{Bar, Context, Exit, Failure, four_digits, in_unit};
 use crate::plot::{PlotError, press_pages, summary_lines};
 use clap::{Args, ValueEnum};
@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 use tactile_imaging::Pipeline;
-use tactile_imaging::io::{Grey, read_grey_image};
+use tactile_imaging::io::image_size;
 use tactile_imaging::pipeline::{ContactReading, Measurement, PipelineError, Press, Stage};
 use tactile_imaging::scene::{Scene, SceneData};
 use tactile_simulate::{
@@ -69,20 +69,25 @@ struct Simulation {
     #[arg(long, value_enum, default_value_t = Polymer::Cl2000x, conflicts_with = "scene")]
     polymer: Polymer,
     /// Simulation: the ball's Young's modulus in kPa, instead of a polymer's.
-    #[arg(long, value_name = "KPA", value_parser = positive, conflicts_with_all = ["scene", "polymer"])]
+    #[arg(long, value_name = "KPA", value_parser = modulus_kpa, conflicts_with_all = ["scene", "polymer"])]
     modulus_kpa: Option<f64>,
     /// Simulation: the ball's radius in mm.
-    #[arg(long, value_name = "MM", default_value_t = 3.0, value_parser = positive, conflicts_with = "scene")]
+    #[arg(long, value_name = "MM", default_value_t = 3.0, value_parser = length_mm, conflicts_with = "scene")]
     radius_mm: f64,
     /// Simulation: the loads in newtons.
-    #[arg(long, value_name = "N,N,...", value_delimiter = ',', default_values_t = [0.7, 1.2], value_parser = positive, conflicts_with = "scene")]
+    #[arg(long, value_name = "N,N,...", value_delimiter = ',', default_values_t = [0.7, 1.2], value_parser = force_n, conflicts_with = "scene")]
     forces: Vec<f64>,
     /// Simulation: where the contacts come from. Finite elements are there for the two polymers, 3
     /// mm, up to 1.3 N.
     #[arg(long, value_enum, default_value_t = Physics::FiniteElements, conflicts_with = "scene")]
     physics: Physics,
     /// Simulation: seed of the camera's noise.
-    #[arg(long, default_value_t = 1, conflicts_with = "scene")]
+    #[arg(
+        long,
+        default_value_t = 1,
+        allow_negative_numbers = true,
+        conflicts_with = "scene"
+    )]
     seed: u64,
     /// Simulation: no noise, blur, vignetting or background.
     #[arg(long, conflicts_with = "scene")]
@@ -190,9 +195,9 @@ impl Frames {
         let scene = Scene::read(path).map_err(Failure::input)?;
         let frames = scene.frames.len();
         // Loading names the error of a reference that cannot be read.
-        if let Ok(reference) = read_grey_image(&scene.reference, Grey::default(), None) {
+        if let Some((rows, columns)) = image_size(&scene.reference) {
             // Frames are kept up to 64 MB and read again beyond. Their results take 4 kB each.
-            let pixels = reference.levels.len() as f64;
+            let pixels = (rows * columns) as f64;
             let bytes = pixels + (frames as f64 * pixels).min(64e6) + 4e3 * frames as f64;
             let job = format!("a scene of {frames} frames");
             context.allow(bytes, &job, "give fewer or smaller frames")?;

@@ -8,21 +8,23 @@ use std::ffi::{OsStr, OsString};
 use std::fmt::Debug;
 use std::fs::Metadata;
 use std::path::{Path, PathBuf};
-use tactile_imaging::io::write_bytes;
+use tactile_imaging::io::{image_size, write_bytes};
 
 /// The folder of the results, if one is wanted, and the files for it.
-#[derive(Default)]
 pub struct Outputs {
     folder: Option<PathBuf>,
+    limit_bytes: f64,
     planned: Vec<PathBuf>,
     ready: Vec<(PathBuf, Vec<u8>)>,
 }
 
 impl Outputs {
-    pub fn new(folder: Option<PathBuf>) -> Self {
+    pub fn new(folder: Option<PathBuf>, limit_gb: f64) -> Self {
         Self {
             folder,
-            ..Self::default()
+            limit_bytes: 1e9 * limit_gb,
+            planned: Vec::new(),
+            ready: Vec::new(),
         }
     }
 
@@ -32,11 +34,11 @@ impl Outputs {
     }
 
     /// Announces the names of the files to be written and the inputs. No result may replace an
-    /// input, also none that a scene or calibration file names, no two may have one name, and the
-    /// folder must allow writing.
+    /// input, also none that a scene or calibration file names, no two may have one name, the
+    /// folder must allow writing, and every input must fit into the memory that is allowed.
     pub fn plan<N: AsRef<OsStr>>(&mut self, names: &[N], inputs: &[&Path]) -> Result<(), Failure> {
         let Some(folder) = self.folder.clone() else {
-            return Ok(());
+            return self.allow_inputs(inputs).map(|_| ());
         };
         if folder.exists() && !folder.is_dir() {
             return Err(Failure::input(format!(
@@ -47,6 +49,47 @@ impl Outputs {
         self.plan_in(&folder, names, inputs)
     }
 
+    /// Refuses a job that needs more memory than is allowed. `job` names it and its size, `remedy`
+    /// the way out.
+    pub fn allow(&self, bytes: f64, job: &str, remedy: &str) -> Result<(), Failure> {
+        let size = |bytes: f64| match bytes {
+            b if b >= 1e12 => format!("{:.1} TB", b * 1e-12),
+            b if b >= 1e9 => format!("{:.1} GB", b * 1e-9),
+            b => format!("{:.1} MB", b * 1e-6),
+        };
+        if bytes <= self.limit_bytes {
+            return Ok(());
+        }
+        Err(Failure::input(format!(
+            "{job} needs about {}, more than the {} allowed: {remedy}, or allow more with --memory-gb",
+            size(bytes),
+            size(self.limit_bytes)
+        )))
+    }
+
+    /// Refuses inputs that take more memory than is allowed, before they are decoded. Returns the
+    /// files that scenes and calibrations among them name.
+    fn allow_inputs(&self, inputs: &[&Path]) -> Result<Vec<PathBuf>, Failure> {
+        let named: Vec<PathBuf> = inputs.iter().flat_map(|path| named_in(path, 0)).collect();
+        let all = inputs.iter().copied();
+        for path in all.chain(named.iter().map(PathBuf::as_path)) {
+            let name = path.display();
+            if let Some((rows, columns)) = image_size(path) {
+                // Samples as they are decoded, grey levels as numbers, and the passes over both.
+                let bytes = 32.0 * rows as f64 * columns as f64;
+                let job = format!("the image {name} of {columns} × {rows} pixels");
+                self.allow(bytes, &job, "give smaller images")?;
+            } else if let Ok(file) = path.metadata()
+                && file.is_file()
+            {
+                // Text, and its numbers of eight bytes for one or two characters and a comma.
+                let bytes = 6.0 * file.len() as f64;
+                self.allow(bytes, &format!("the file {name}"), "give a smaller file")?;
+            }
+        }
+        Ok(named)
+    }
+
     /// As [`plan`](Self::plan), where `--out` names a file in this folder.
     pub fn plan_in<N: AsRef<OsStr>>(
         &mut self,
@@ -54,6 +97,7 @@ impl Outputs {
         names: &[N],
         inputs: &[&Path],
     ) -> Result<(), Failure> {
+        let named = self.allow_inputs(inputs)?;
         // The folder is made with the first file, inside the nearest one that exists.
         let nearest = folder.ancestors().find(|f| f.exists());
         let ancestor = nearest.unwrap_or(Path::new("."));
@@ -79,9 +123,7 @@ impl Outputs {
             self.planned.push(path);
         }
         self.folder = Some(folder.into());
-        let named = inputs.iter().flat_map(|input| named_in(input, 0));
         self.protect(inputs)?;
-        let named: Vec<PathBuf> = named.collect();
         self.protect(&named)
     }
 

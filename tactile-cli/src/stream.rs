@@ -1,6 +1,6 @@
 //! `tactile stream`: force and modulus live, from a simulated series at camera rate or from
 //! recorded frames.
-use crate::arguments::{eight_bits, not_negative, positive};
+use crate::arguments::{eight_bits, force_n, not_negative, positive};
 use crate::console::{Bar, Context, Exit, Failure};
 use crate::outputs::Csv;
 use clap::Args;
@@ -44,7 +44,7 @@ pub struct StreamArguments {
     #[arg(long, value_name = "HZ", default_value_t = 80.0, value_parser = positive)]
     rate: f64,
     /// Largest force in newtons (1.5 in a simulation).
-    #[arg(long, value_name = "N", value_parser = positive)]
+    #[arg(long, value_name = "N", value_parser = force_n)]
     force: Option<f64>,
     /// Measure strain too, in frames of at least a third of the largest force, counted from the
     /// first of them.
@@ -349,13 +349,17 @@ fn recorded(
     };
     context.outputs.protect(&frames)?;
     let clock = Bar::clock("reading the scene");
-    let data = scene.load().map_err(Failure::input)?;
+    let data = scene.load_without_frames().map_err(Failure::input)?;
     drop(clock);
     let pipeline = scene.pipeline(&data).map_err(Failure::input)?;
     let session = Session::new(&pipeline, &[data.reference.view()])
         .map_err(|error| Failure::input(scene.measure_error(error)))?;
     let mut live = Live::new(session, arguments, None);
     live.print_heading(context);
+    // The clock of a recording is the number in its frames' names, where they have one.
+    let numbers = numbers(&frames);
+    let last = numbers.as_deref().and_then(<[_]>::last);
+    let missing = last.map_or(0, |&last| last + 1 - frames.len() as u64);
     let mut bar = Bar::of(frames.len(), "measuring");
     let mut unusable = 0;
     context.interrupt.polled(true);
@@ -363,7 +367,8 @@ fn recorded(
         if context.interrupt.requested() {
             break;
         }
-        let time_s = k as f64 / arguments.rate;
+        let number = numbers.as_ref().map_or(k as u64, |numbers| numbers[k]);
+        let time_s = number as f64 / arguments.rate;
         let measured = eight_bits(path, Grey::default(), scene.bits).and_then(|frame| {
             // Reading the file is not part of the measurement.
             let start = Instant::now();
@@ -390,8 +395,34 @@ fn recorded(
             "none of the {unusable} frames can be measured"
         )));
     }
+    if missing > 0 {
+        context.warn(
+            "frames_missing",
+            json!({ "frames": missing }),
+            format_args!(
+                "{missing} missing in the numbers of the frames' names: times are counted by the numbers"
+            ),
+        );
+    }
     let exit = live.finish(arguments, context)?;
     Ok(if unusable > 0 { Exit::Partial } else { exit })
+}
+
+/// The numbers at the end of the frames' names, less the first one. `None` where a name has none or
+/// they do not rise.
+fn numbers(frames: &[PathBuf]) -> Option<Vec<u64>> {
+    let number = |path: &PathBuf| -> Option<u64> {
+        let stem = path.file_stem()?.to_str()?;
+        let digits = stem.trim_end_matches(|c: char| c.is_ascii_digit()).len();
+        stem[digits..].parse().ok()
+    };
+    let numbers = frames.iter().map(number).collect::<Option<Vec<u64>>>()?;
+    let first = *numbers.first()?;
+    // More than a tenth missing is a way of naming (times, dates), not a gap.
+    let last = numbers.last()?.checked_sub(first)?;
+    let few_gaps = last + 1 <= frames.len() as u64 + (frames.len() as u64 / 10).max(2);
+    let rising = numbers.windows(2).all(|pair| pair[0] < pair[1]);
+    (rising && few_gaps).then(|| numbers.iter().map(|n| n - first).collect())
 }
 
 /// The images that are named, and those of the folders that are named in the order of their names.

@@ -146,11 +146,34 @@ pub fn reconstruct(
     let report = &surface.report;
     let stop = stop_reason(report.stop);
     let method_name = name(method);
+    if report.stop == StopReason::IterationLimit && method == Reconstruction::Eikonal {
+        let last = report.residual;
+        context.warn(
+            "not_converged",
+            json!({ "last_change_px": last }),
+            format_args!("the sweeps did not settle, the last change was {last:.1e} px"),
+        );
+    }
+    // A tenth of the brightest level is more than noise: the shading is not that of the heights.
+    let badly = fit
+        .as_ref()
+        .ok()
+        .filter(|fit| fit.1.rms > 0.1 * arguments.intensity);
+    if let Some(fit) = badly {
+        context.warn(
+            "reprojection",
+            json!({ "rms_grey_levels": fit.1.rms }),
+            format_args!(
+                "the heights shaded again are {} grey levels from the image: check --light, --intensity, --ambient and the mask",
+                four_digits(fit.1.rms)
+            ),
+        );
+    }
     context.value(&json!({
         "method": method_name, "time_ms": ms, "stop": stop, "iterations": report.iterations,
         "solved": report.solved, "flagged": report.flagged,
         "reprojection": match &fit {
-            Ok(fit) => json!({ "value": { "rms_grey_levels": fit.1.rms } }),
+            Ok(fit) => json!({ "rms_grey_levels": fit.1.rms }),
             Err(error) => json!({ "error": error.to_string() }),
         },
     }));
@@ -168,12 +191,6 @@ pub fn reconstruct(
             Err(error) => format!("none: {error}"),
         },
     );
-    if report.stop == StopReason::IterationLimit && method == Reconstruction::Eikonal {
-        let last = report.residual;
-        context.note(format_args!(
-            "the sweeps did not settle; the last change was {last:.1e} px"
-        ));
-    }
     context
         .outputs
         .add(names[0], Csv::of_grid(&surface.heights));
@@ -334,8 +351,23 @@ pub fn integrate(arguments: &IntegrateArguments, context: &mut Context) -> Resul
         .map_err(|error| Failure::in_file(path, error))?;
     let rms = slope_rms(&surface, &p, &q, *pixel_size);
     let report = &surface.report;
+    if !surface.heights.iter().any(|height| height.is_finite()) {
+        return Err(Failure::no_answer(format!(
+            "{}: no pixel has slopes on both axes, so there are no heights",
+            path.display()
+        )));
+    }
     let stop = stop_reason(report.stop);
     let components = report.components.len();
+    if components > 1 {
+        context.warn(
+            "components",
+            json!({ "components": components }),
+            format_args!(
+                "{components} parts do not touch: their heights are not known against each other"
+            ),
+        );
+    }
     context.value(&json!({
         "method": name(method), "time_ms": ms, "slope_rms": rms, "stop": stop,
         "iterations": report.iterations, "residual": report.residual, "solved": report.solved,
@@ -349,10 +381,6 @@ pub fn integrate(arguments: &IntegrateArguments, context: &mut Context) -> Resul
     context.row("heights", heights);
     let text = four_digits(rms) + " rms between the given ones and those of the heights";
     context.row("slopes", text);
-    if components > 1 {
-        let text = format!("{components}: their heights are not known against each other");
-        context.row("components", text);
-    }
     context
         .outputs
         .add(names[0], Csv::of_grid(&surface.heights));

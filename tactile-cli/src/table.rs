@@ -1,5 +1,5 @@
 //! `tactile table`: the contacts of a ball with a sensor's guide, computed once by finite elements.
-use crate::arguments::positive;
+use crate::arguments::{modulus_kpa, positive};
 use crate::console::{Bar, Context, Exit, Failure};
 use clap::Args;
 use serde_json::json;
@@ -22,10 +22,10 @@ pub struct TableArguments {
     /// Scene file, or a file with its tables `object` and `waveguide`.
     scene: PathBuf,
     /// Smallest modulus of the ball, in kPa.
-    #[arg(long, value_name = "KPA", default_value = "25", value_parser = positive)]
+    #[arg(long, value_name = "KPA", default_value = "25", value_parser = modulus_kpa)]
     from_kpa: f64,
     /// Largest modulus of the ball, in kPa.
-    #[arg(long, value_name = "KPA", default_value = "400", value_parser = positive)]
+    #[arg(long, value_name = "KPA", default_value = "400", value_parser = modulus_kpa)]
     to_kpa: f64,
     /// Number of moduli.
     #[arg(long, default_value_t = 7, value_parser = clap::value_parser!(u16).range(2..=100))]
