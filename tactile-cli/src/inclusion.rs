@@ -196,13 +196,17 @@ pub fn run(arguments: &InclusionArguments, context: &mut Context) -> Result<Exit
     };
     let off_axis = |w: &InclusionWarning| matches!(w, InclusionWarning::Asymmetric { .. });
     let is_asymmetric = estimate.warnings.iter().any(off_axis);
+    print(&estimate, &scan, context);
+    for warning in &estimate.warnings {
+        let numbers = json!(warning);
+        let kind = numbers["kind"].as_str().unwrap_or_default().to_owned();
+        context.warn(&kind, numbers, sentence(warning));
+    }
     context.value(&json!({
         "verdict": estimate.verdict(), "found": estimate.found, "probability": estimate.probability, "inclusion": estimate.inclusion,
         "block_modulus_pa": estimate.block_modulus_pa, "interface": estimate.interface,
         "misfit": estimate.misfit, "asymmetry": scan.asymmetry, "is_asymmetric": is_asymmetric,
-        "warnings": estimate.warnings,
     }));
-    print(&estimate, &scan, context);
     context.outputs.add(names[0], table(&estimate, &scan));
     context.outputs.page(names[1], || page(&estimate, &scan))?;
     Ok(Exit::Complete)
@@ -355,9 +359,6 @@ fn print(estimate: &InclusionEstimate, scan: &Scan, context: &mut Context) {
         context.row("truth", format_args!(
             "diameter {diameter:.1} mm, depth {depth:.1} mm, modulus {modulus:.0} kPa (simulated by the same finite elements)"
         ));
-    }
-    for warning in &estimate.warnings {
-        context.row("warning", sentence(warning));
     }
 }
 

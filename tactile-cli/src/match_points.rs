@@ -228,7 +228,7 @@ fn solve<const D: usize>(
         "residual": report.residual, "noise": report.sigma, "stop": stop,
         "iterations": iterations, "starts": starts, "time_ms": ms,
     });
-    Some(json!({ "case": case, "value": value }))
+    Some(json!({ "case": case, "match": value }))
 }
 
 fn stop_reason(stop: StopReason) -> &'static str {

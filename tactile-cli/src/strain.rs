@@ -11,6 +11,7 @@ use tactile_imaging::StrainBetween;
 use tactile_imaging::elasticity::strain::{
     Biot, EulerAlmansi, GreenLagrange, Hencky, Infinitesimal, StrainMeasure,
 };
+use tactile_imaging::force::Estimate;
 use tactile_imaging::io::{PointTable, read_point_table};
 use tactile_imaging::matching::PointMatcher;
 use tactile_imaging::pipeline::with_error;
@@ -227,23 +228,22 @@ impl<const D: usize> StrainReport<D> {
 
     fn json(&self) -> Value {
         let strain = match &self.strain {
-            Ok(found) => json!({ "value": self.strain_json(found) }),
+            Ok(found) => self.strain_json(found),
             Err(reason) => json!({ "error": reason }),
         };
         json!({
             "points_before": self.before.len(), "points_after": self.after.len(),
             "unit": self.unit,
-            "match": { "value": { "pairs": self.rows().len() } },
+            "match": { "pairs": self.rows().len() },
             "strain": strain,
         })
     }
 
     fn strain_json(&self, found: &StrainBetween<D>) -> Value {
         let component = |(name, i, j): Component| {
-            let value = json!({
-                "mean": found.summary.mean[(i, j)], "spread": found.summary.spread[(i, j)],
-                "standard_error": found.standard_error[(i, j)],
-            });
+            let (mean, error) = (found.summary.mean[(i, j)], found.standard_error[(i, j)]);
+            let mut value = json!(Estimate::new(mean, error));
+            value["spread"] = json!(found.summary.spread[(i, j)]);
             (name.to_owned(), value)
         };
         let tensors: Map<String, Value> = components::<D>().into_iter().map(component).collect();

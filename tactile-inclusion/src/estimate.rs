@@ -19,6 +19,7 @@ pub struct Estimated {
     /// Its standard error.
     pub standard_error: f64,
     /// The 95 % interval.
+    #[cfg_attr(feature = "serde", serde(rename = "interval_95"))]
     pub interval: [f64; 2],
 }
 
@@ -127,7 +128,11 @@ pub struct Inclusion {
 /// assert_ne!(InclusionWarning::OneFrame, InclusionWarning::NotConverged);
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize),
+    serde(tag = "kind", rename_all = "snake_case")
+)]
 #[non_exhaustive]
 pub enum InclusionWarning {
     /// The best fit leaves more than the errors explain (below 1 chance in 1000): several

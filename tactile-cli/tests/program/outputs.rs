@@ -62,7 +62,7 @@ fn a_stage_without_an_answer_does_not_hide_the_others() {
     );
     assert_eq!(output.status.code(), Some(1), "{}", text(&output.stderr));
     let value: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
-    assert_eq!(value["match"]["value"]["pairs"], 9);
+    assert_eq!(value["match"]["pairs"], 9);
     assert!(
         value["strain"]["error"]
             .as_str()

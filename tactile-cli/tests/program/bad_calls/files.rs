@@ -1,6 +1,8 @@
 //! The files that the calls name.
 use std::fs;
+use std::os::unix::fs::symlink;
 use std::path::Path;
+use std::process::Command;
 
 /// Good inputs under short names.
 pub(super) fn good_files(folder: &Path) {
@@ -17,7 +19,7 @@ pub(super) fn good_files(folder: &Path) {
 }
 
 /// A scene of a block under the guide.
-fn lump_scene() -> String {
+pub(super) fn lump_scene() -> String {
     r#"reference = "reference.png"
 pixel_size_m = [3e-4, 3e-4]
 frames = [
@@ -86,6 +88,44 @@ pub(super) fn more_files(folder: &Path) {
         "lump_dark.toml",
         &lump.replace("frame_1.png", "reference.png"),
     );
+    put(
+        "swapped_pairs.csv",
+        "integrated_pixel_value,force_N\n0,0\n0.5,1e5\n1,2e5\n",
+    );
+    put(
+        "falling_pairs.csv",
+        "integrated_pixel_value,force_N\n0,2\n1e5,1\n2e5,0\n",
+    );
+    put(
+        "constant_pairs.csv",
+        "integrated_pixel_value,force_N\n0,1\n1e5,1\n2e5,1\n",
+    );
+    put(
+        "swapped_depths.csv",
+        "darkness,depth_mm\n0,0\n0.5,20\n1.9,60\n",
+    );
+    let there = (0..40).map(|k| format!("{},{}\n", k, k * k));
+    let back = (0..40).rev().map(|k| format!("{},{}\n", k, k * k));
+    let both: String = there.chain(back).collect();
+    put(
+        "there_and_back.csv",
+        &format!("indentation_um,force_mN\n{both}"),
+    );
+    let mut samples = b"P5\n48 48\n100\n".to_vec();
+    samples.resize(samples.len() + 48 * 48, 200);
+    fs::write(folder.join("above.pgm"), samples).unwrap();
+    // Results that are pipes, and links that lead out of their folder.
+    for name in ["pipes", "links", "links_in"] {
+        fs::create_dir(folder.join(name)).unwrap();
+    }
+    for name in ["pairs.csv", "fit.csv"] {
+        let pipe = folder.join("pipes").join(name);
+        assert!(Command::new("mkfifo").arg(pipe).status().unwrap().success());
+    }
+    for name in ["pairs.csv", "light.svg"] {
+        symlink("../plain.csv", folder.join("links").join(name)).unwrap();
+    }
+    symlink("/dev/full", folder.join("links_in/pairs.csv")).unwrap();
     // Tables under the names of results.
     put(
         "named.toml",

@@ -260,7 +260,7 @@ pub(super) const CALLS: &[(&str, &str)] = &[
     ("measure /dev/zero", "a device"),
     ("measure pipe", "a pipe"),
     ("measure folder", "a folder"),
-    ("measure huge", "bytes"),
+    ("measure huge", "huge"),
     ("measure empty", "missing"),
     ("measure garbage", "garbage"),
     ("measure scene.toml --seed 3", "--seed"),
