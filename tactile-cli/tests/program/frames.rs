@@ -1,5 +1,6 @@
 //! Frames that do not fit their reference, that repeat one another, and many of them.
 use super::harness::{folder_with_examples, run, text, words};
+use super::json::assert_keeps_to_schema;
 use serde_json::Value;
 use std::fs;
 use std::path::Path;
@@ -30,6 +31,7 @@ fn measured(folder: &Path, scene: &str) -> (Value, Option<i32>) {
     let output = run(folder, &words(&format!("measure {scene} --json")));
     let value = serde_json::from_slice(&output.stdout)
         .unwrap_or_else(|e| panic!("{e}: {}", text(&output.stderr)));
+    assert_keeps_to_schema(&value, scene);
     (value, output.status.code())
 }
 

@@ -1,5 +1,6 @@
 //! Every example in the help runs as it stands.
 use super::harness::{folder_with_examples, run, text, words};
+use super::json::assert_keeps_to_schema;
 use std::collections::BTreeSet;
 
 /// The commands of a help's examples, without what explains them.
@@ -74,9 +75,12 @@ fn the_first_help_shows_one_example_for_each_subcommand() {
 }
 
 #[test]
-fn json_is_one_object() {
+fn json_of_every_example_keeps_to_the_schema() {
     let folder = folder_with_examples();
-    for example in examples(&help(&["--help"])) {
+    let names = subcommands();
+    let helps = names.iter().map(|name| help(&[name, "--help"]));
+    let all = helps.flat_map(|text| examples(&text));
+    for example in all.filter(|example| !example.contains("--json")) {
         let mut arguments = words(&example);
         arguments.push("--json");
         let output = run(folder.path(), &arguments);
@@ -84,6 +88,6 @@ fn json_is_one_object() {
         assert_eq!(output.status.code(), Some(0), "tactile {example}: {errors}");
         let value: serde_json::Value = serde_json::from_slice(&output.stdout)
             .unwrap_or_else(|e| panic!("tactile {example}: {e}"));
-        assert!(value.is_object(), "tactile {example}");
+        assert_keeps_to_schema(&value, &example);
     }
 }

@@ -9,5 +9,6 @@ mod frames;
 mod harness;
 mod help;
 mod interrupt;
+mod json;
 mod outputs;
 mod sensor;

@@ -1,5 +1,6 @@
 //! A sensor calibrated from frames by the program.
 use super::harness::{run, text, words};
+use super::json::assert_keeps_to_schema;
 use std::fs;
 use std::path::Path;
 use tactile_imaging::force::LocalCalibration;
@@ -30,6 +31,7 @@ fn a_calibration_writes_a_sensor_and_a_report_and_says_what_was_learned() {
     );
     assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
     let value: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_keeps_to_schema(&value, "calibrate");
     // The frames are those of a layer of 100 kPa whose maker states 95 ± 10 kPa.
     let modulus = &value["layers"][0];
     assert_eq!(modulus["parameter"], "youngs_modulus_pa");
