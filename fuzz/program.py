@@ -1,0 +1,163 @@
+"""Mutates the files and the arguments of every subcommand of the program and runs it on them.
+
+    python3 fuzz/program.py --program target/debug/tactile --seconds 3600 --seed 1
+
+What must hold of every call: it ends within ten seconds with one of the program's exit codes and without a
+panic, takes no more memory than its limit, prints what is wrong in one sentence, and with --json either
+nothing or one object of which no measured number lacks its value. A call that breaks a rule is kept with
+its files in --found.
+"""
+
+import argparse
+import json
+import pathlib
+import random
+import resource
+import shutil
+import subprocess
+import tempfile
+import time
+
+EXAMPLES = pathlib.Path(__file__).parent.parent / "examples" / "data"
+CODES = {0, 1, 2, 3}
+LONGEST_S = 10
+ADDRESS_SPACE = 6 << 30
+
+CALLS = [
+    "measure press/scene.toml --points 40",
+    "force --reference press/reference.png --pairs press/calibration.csv --pixel-um 40 press/frame_1.png",
+    "calibrate sensor/calibration.toml",
+    "calibrate press/calibration.csv --there-and-back",
+    "match cases.txt",
+    "warp sources.csv targets.csv queries.csv",
+    "strain before.csv after.csv",
+    "reconstruct ball.pgm --light 0,0,1 --mask ball.pgm",
+    "integrate slope_x.csv slope_y.csv --pixel-size 5e-5",
+    "depth --reference dark_reference.pgm --table depth_table.csv --pixel-um 100 dark_frame.pgm --ball-radius-mm 4",
+    "indent curve.csv --shape sphere --radius 5e-3",
+    "stream press/scene.toml --allowed-late 100 --rate 20",
+    "light --rays 100",
+]
+FIELDS = ["", "0", "-1", "nan", "inf", "1e308", "-1e-320", "1e999", "9" * 20, "x", '"', "[[1]]", "1e-6", "1000", "0.5"]
+
+
+def piece(data: bytes, at: int, separators: bytes) -> slice:
+    """The line or field around a place, without what ends it."""
+    start, end = at, at
+    while start > 0 and data[start - 1] not in separators:
+        start -= 1
+    while end < len(data) and data[end] not in separators:
+        end += 1
+    return slice(start, end)
+
+
+def mutated(data: bytes, draw: random.Random) -> bytes:
+    """A few edits, so that most of the file stays valid."""
+    out = bytearray(data)
+    for _ in range(draw.randint(1, 4)):
+        if not out:
+            break
+        at = draw.randrange(len(out))
+        kind = draw.randrange(9)
+        if kind == 0:
+            out[at] = draw.randrange(256)
+        elif kind == 1:
+            out[at] ^= 1 << draw.randrange(8)
+        elif kind == 2:
+            del out[at:]
+        elif kind == 3:
+            del out[piece(out, at, b"\n")]
+        elif kind == 4:
+            line = bytes(out[piece(out, at, b"\n")])
+            out[at:at] = line + b"\n"
+        else:
+            out[piece(out, at, b",;= []\n")] = draw.choice(FIELDS).encode()
+    return bytes(out)
+
+
+def mutated_call(call: str, draw: random.Random) -> list[str]:
+    words = call.split()
+    for _ in range(draw.randint(0, 2)):
+        at = draw.randrange(1, len(words))
+        kind = draw.randrange(4)
+        if kind == 0:
+            words[at] = draw.choice(FIELDS)
+        elif kind == 1:
+            words.insert(at, words[at])
+        elif kind == 2 and len(words) > 2:
+            del words[at]
+        else:
+            other = draw.choice(CALLS).split()
+            words[at] = draw.choice(other[1:])
+    return words
+
+
+def complaint(folder: pathlib.Path, program: pathlib.Path, words: list[str]) -> str | None:
+    """What is wrong with how a call ended; nothing where all is as it should be."""
+    limit = lambda: resource.setrlimit(resource.RLIMIT_AS, (ADDRESS_SPACE, ADDRESS_SPACE))
+    command = [program, *words, "--json", "--out", "results"]
+    try:
+        ended = subprocess.run(command, cwd=folder, capture_output=True, timeout=LONGEST_S, preexec_fn=limit, stdin=subprocess.DEVNULL)
+    except subprocess.TimeoutExpired:
+        return f"takes longer than {LONGEST_S} s"
+    errors = ended.stderr.decode(errors="replace")
+    if "panicked" in errors or ended.returncode not in CODES:
+        return f"ended with {ended.returncode}: {errors[:300]}"
+    if ended.returncode == 2 and len(errors.splitlines()) != 1 and "Usage" not in errors:
+        return f"does not say what is wrong in one sentence: {errors[:300]}"
+    if not ended.stdout:
+        return None
+    try:
+        answer = json.loads(ended.stdout)
+    except ValueError as error:
+        return f"prints no JSON: {error}"
+    return silent(answer, "") if ended.returncode == 0 else None
+
+
+def silent(value: object, at: str) -> str | None:
+    """A measured number that is none, without an error in its place."""
+    if isinstance(value, dict):
+        if "interval_95" in value and value.get("value") is None:
+            return f"{at} has no value"
+        inner = value.items()
+    elif isinstance(value, list):
+        inner = enumerate(value)
+    else:
+        return None
+    found = (silent(child, f"{at}/{key}") for key, child in inner)
+    return next((reason for reason in found if reason), None)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--program", type=pathlib.Path, default="target/debug/tactile")
+    parser.add_argument("--seconds", type=float, default=60)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--found", type=pathlib.Path, default="fuzz/found/program")
+    options = parser.parse_args()
+    draw, end = random.Random(options.seed), time.monotonic() + options.seconds
+    calls = complaints = 0
+    while time.monotonic() < end:
+        with tempfile.TemporaryDirectory() as name:
+            folder = pathlib.Path(name) / "data"
+            shutil.copytree(EXAMPLES, folder)
+            words = mutated_call(draw.choice(CALLS), draw)
+            named = [folder / word for word in words if (folder / word).is_file()]
+            # What a scene names is as likely to be wrong as the scene.
+            beside = [path for file in named if file.suffix == ".toml" for path in file.parent.iterdir() if path.is_file()]
+            for path in draw.sample(named + beside, k=min(len(named + beside), draw.randint(0, 2))):
+                path.write_bytes(mutated(path.read_bytes(), draw))
+            calls += 1
+            reason = complaint(folder, options.program.absolute(), words)
+            if reason:
+                complaints += 1
+                kept = options.found / f"{options.seed}_{calls}"
+                shutil.rmtree(folder / "results", ignore_errors=True)
+                shutil.copytree(folder, kept, dirs_exist_ok=True)
+                print(f"tactile {' '.join(words)}\n    {reason}\n    kept in {kept}", flush=True)
+    print(f"{calls} calls, {complaints} complaints")
+    raise SystemExit(complaints > 0)
+
+
+if __name__ == "__main__":
+    main()
