@@ -3,7 +3,9 @@
 //! Such a sensor measures shape, not force: a force must come from a gauge.
 use super::contact::{ContactReading, ContactStage, FrameContact};
 use super::error::PipelineError;
-use crate::force::{Estimate, ForceError, Polarity, ReferenceFrame};
+use crate::force::{
+    BoundingBox, Estimate, ForceError, Polarity, ReferenceFrame, median_shift_outside,
+};
 use crate::sfs::DepthTable;
 use ndarray::{Array2, ArrayView2};
 
@@ -106,10 +108,15 @@ impl ContactStage for DarkContact {
                 found: frame.dim(),
             });
         }
-        let darkness = |at: [usize; 2]| f64::from(image[at]) - f64::from(frame[at]);
+        let step_grey = light_step_grey(frame, image);
+        let darkness =
+            |at: [usize; 2]| f64::from(image[at]) - f64::from(frame[at]) + step_grey.unwrap_or(0.0);
         let patch = largest_patch(frame.dim(), |at| darkness(at) > self.threshold_grey);
         if patch.is_empty() {
-            return Ok(FrameContact::default());
+            return Ok(FrameContact {
+                background_step_grey: step_grey,
+                ..FrameContact::default()
+            });
         }
         let mut mask = Array2::from_elem(frame.dim(), false);
         for &at in &patch {
@@ -122,7 +129,10 @@ impl ContactStage for DarkContact {
             saturated_share,
             ..self.reading(&patch, frame.dim(), peak)
         };
-        Ok(FrameContact::new(reading, mask.view()))
+        Ok(FrameContact {
+            background_step_grey: step_grey,
+            ..FrameContact::new(reading, mask.view())
+        })
     }
 
     fn polarity(&self) -> Polarity {
@@ -167,6 +177,26 @@ impl DarkContact {
     }
 }
 
+/// By how many grey levels all of the frame differs from the reference: the median of the
+/// difference along the frame's border, where it is more than one level. `None` where it is less,
+/// or where it is that of a contact which reaches most of the border.
+///
+/// Half of the border is background unless the contact is larger than the frame, and the dent
+/// around a contact in the frame's middle does not reach it.
+fn light_step_grey(frame: ArrayView2<'_, u8>, reference: ArrayView2<'_, u8>) -> Option<f64> {
+    let (rows, columns) = frame.dim();
+    // A sixteenth of the frame on each side.
+    let (high, wide) = (rows.div_ceil(16), columns.div_ceil(16));
+    let middle = BoundingBox {
+        row_start: high,
+        row_end: rows.saturating_sub(high),
+        column_start: wide,
+        column_end: columns.saturating_sub(wide),
+    };
+    let step = median_shift_outside(frame, reference, middle)?;
+    (step.abs() > 1).then_some(f64::from(step))
+}
+
 /// The largest set of pixels `[row, column]` inside, connected by their sides. Empty where no pixel
 /// is inside. O(pixels).
 fn largest_patch(
@@ -207,6 +237,24 @@ fn largest_patch(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn light_that_changes_everywhere_is_no_contact() {
+        let reference = ReferenceFrame::new(Array2::from_elem((64, 80), 120_u8).view()).unwrap();
+        let stage = DarkContact::new(&[(0.0, 0.0), (100.0, 1e-3)], [1e-4; 2]).unwrap();
+        for step in [-20_i16, -4, 0, 4, 20] {
+            let level = |darker: i16| (120 + step - darker) as u8;
+            let mut frame = Array2::from_elem((64, 80), level(0));
+            let contact = |frame: &Array2<u8>| stage.measure(frame.view(), &reference).unwrap();
+            assert!(contact(&frame).reading.is_none(), "{step}");
+            frame.slice_mut(ndarray::s![20..40, 30..60]).fill(level(50));
+            let depth = contact(&frame)
+                .reading
+                .and_then(|r| r.indentation_m)
+                .unwrap();
+            assert!((depth.value - 0.5e-3).abs() < 1e-12, "{step}: {depth}");
+        }
+    }
 
     #[test]
     fn the_largest_patch_wins_and_diagonals_do_not_connect() {

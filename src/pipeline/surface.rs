@@ -133,6 +133,11 @@ impl ContactSurfaceWorkspace {
         let whole = whole_blocks(region, side, frame.dim());
         let images = [whole.of(frame), whole.of(reference)];
         self.grid.load(images, side, scale);
+        // A step of one level may be rounding.
+        let step = contact.background_step_grey.unwrap_or(0.0);
+        if settings.surface_input == SurfaceInput::Signal && step.abs() > 1.0 {
+            self.grid.signal.mapv_inplace(|v| v - scale * step);
+        }
         if let Some((curve, peak_pa)) = pressure {
             let pressure = |grey| curve.value_pa(grey) / peak_pa;
             self.grid.signal.mapv_inplace(pressure);
