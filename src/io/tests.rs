@@ -46,6 +46,22 @@ fn a_file_is_replaced_whole_and_nothing_is_left_beside_it() {
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
 }
 
+#[cfg(unix)]
+#[test]
+fn permissions_of_a_replaced_file_stay_and_a_socket_is_refused() {
+    use std::os::unix::fs::PermissionsExt;
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.csv");
+    write_bytes(&path, b"first").unwrap();
+    let mode = |path: &PathBuf| std::fs::metadata(path).unwrap().permissions().mode() & 0o777;
+    std::fs::set_permissions(&path, std::fs::Permissions::from_mode(0o640)).unwrap();
+    write_bytes(&path, b"second").unwrap();
+    assert_eq!(mode(&path), 0o640);
+    let socket = folder.path().join("socket");
+    let _listener = std::os::unix::net::UnixListener::bind(&socket).unwrap();
+    assert!(write_bytes(&socket, b"").is_err());
+}
+
 #[test]
 fn a_folder_and_a_file_too_large_are_refused() {
     let folder = tempfile::tempdir().unwrap();

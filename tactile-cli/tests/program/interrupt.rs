@@ -83,6 +83,12 @@ fn matching_leaves_the_cases_that_are_done() {
     assert!(printed.starts_with("small: 40 of 40"), "{printed}");
     let answers = fs::read_to_string(folder.path().join("results/both.txt")).unwrap();
     assert!(answers.contains("case small") && !answers.contains("case large"));
+    // An earlier result is not replaced by one in part.
+    fs::write(folder.path().join("results/both.txt"), "complete").unwrap();
+    let (_, code) = interrupted(folder.path(), "match both.txt --out results", 1);
+    assert_eq!(code, Some(130));
+    let kept = fs::read_to_string(folder.path().join("results/both.txt")).unwrap();
+    assert_eq!(kept, "complete");
 }
 
 #[test]

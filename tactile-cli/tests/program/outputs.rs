@@ -1,7 +1,11 @@
 //! Results that cannot be written, and readers that go away.
 use super::harness::{folder_with_examples, run, tactile, text, words};
+use std::collections::BTreeMap;
+use std::ffi::OsString;
 use std::fs::{self, File};
-use std::process::Stdio;
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::time::Duration;
 
 const STRAIN: &str = "strain examples/data/before.csv examples/data/after.csv";
 
@@ -48,6 +52,50 @@ fn a_full_disk_is_a_sentence() {
             "{errors}"
         );
         assert_eq!(errors.lines().count(), 1, "{errors}");
+    }
+}
+
+/// The bytes of every file in a folder.
+fn files(folder: &Path) -> BTreeMap<OsString, Vec<u8>> {
+    let entries = fs::read_dir(folder).unwrap().map(Result::unwrap);
+    entries
+        .map(|entry| (entry.file_name(), fs::read(entry.path()).unwrap()))
+        .collect()
+}
+
+#[test]
+fn what_ends_the_program_leaves_earlier_results_whole() {
+    let folder = folder_with_examples();
+    let call = format!("{STRAIN} --out results");
+    assert_eq!(run(folder.path(), &words(&call)).status.code(), Some(0));
+    let results = folder.path().join("results");
+    let before = files(&results);
+    // A limit of a file's size in blocks of 512 or 1024 bytes, by which the system ends a program:
+    // no result is as short.
+    let program = env!("CARGO_BIN_EXE_tactile");
+    let limited = format!("ulimit -f 1; exec {program} {call}");
+    let ended = Command::new("sh")
+        .args(["-c", &limited])
+        .current_dir(folder.path())
+        .output();
+    assert!(!ended.unwrap().status.success());
+    assert!(
+        files(&results) == before,
+        "after a limit of the file's size"
+    );
+    // Killed at some instants of a run of a fraction of a second.
+    for milliseconds in (0..120).step_by(8) {
+        let quiet = || Stdio::null();
+        let child = tactile(folder.path(), &words(&call))
+            .stdout(quiet())
+            .stderr(quiet())
+            .spawn();
+        let mut child = child.unwrap();
+        std::thread::sleep(Duration::from_millis(milliseconds));
+        child.kill().unwrap();
+        child.wait().unwrap();
+        // The same call gives the same files: each is there, and none beside them.
+        assert!(files(&results) == before, "after {milliseconds} ms");
     }
 }
 
