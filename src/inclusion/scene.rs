@@ -317,9 +317,9 @@ struct LayerTable {
     /// It plays no part, but stands in files of the same sensor.
     #[serde(rename = "refractive_index")]
     _refractive_index: Option<f64>,
-    #[serde(deserialize_with = "positive")]
+    #[serde(deserialize_with = "length")]
     thickness_m: f64,
-    #[serde(deserialize_with = "positive")]
+    #[serde(deserialize_with = "modulus")]
     youngs_modulus_pa: f64,
     #[serde(default, deserialize_with = "compressible")]
     poisson_ratio: Option<f64>,

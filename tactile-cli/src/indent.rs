@@ -57,7 +57,7 @@ pub struct IndentArguments {
     #[arg(long)]
     on_plate: bool,
     /// Half opening angle of the cone in degrees from its axis (70.3 if not given).
-    #[arg(long, value_name = "DEGREES", value_parser = positive)]
+    #[arg(long, value_name = "DEGREES", value_parser = positive, allow_negative_numbers = true)]
     half_angle: Option<f64>,
     /// Thickness of the sample in m, where it is a layer on a rigid base.
     #[arg(long, value_name = "H", value_parser = length_m)]

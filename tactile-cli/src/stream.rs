@@ -41,7 +41,7 @@ pub struct StreamArguments {
     #[arg(value_name = "FRAMES", requires = "scene")]
     frames: Vec<PathBuf>,
     /// Frames per second.
-    #[arg(long, value_name = "HZ", default_value_t = 80.0, value_parser = positive)]
+    #[arg(long, value_name = "HZ", default_value_t = 80.0, value_parser = positive, allow_negative_numbers = true)]
     rate: f64,
     /// Largest force in newtons (1.5 in a simulation).
     #[arg(long, value_name = "N", value_parser = force_n)]

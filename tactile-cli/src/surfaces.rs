@@ -48,7 +48,7 @@ pub struct ReconstructArguments {
     #[arg(long, value_enum)]
     branch: Option<BranchName>,
     /// Grey level of a surface that faces the light, above the ambient.
-    #[arg(long, default_value_t = 255.0, value_parser = positive)]
+    #[arg(long, default_value_t = 255.0, value_parser = positive, allow_negative_numbers = true)]
     intensity: f64,
     /// Grey level without light.
     #[arg(long, default_value_t = 0.0, value_parser = not_negative, allow_negative_numbers = true)]
@@ -290,7 +290,7 @@ pub struct IntegrateArguments {
     #[command(flatten)]
     region: HeightRegion,
     /// Size of a pixel, or its width and height. Heights have its unit.
-    #[arg(long, value_name = "X[,Y]", default_value = "1", value_parser = one_or_two)]
+    #[arg(long, value_name = "X[,Y]", default_value = "1", value_parser = one_or_two, allow_negative_numbers = true)]
     pixel_size: [f64; 2],
     #[command(flatten)]
     repetition: Repetition,

@@ -68,11 +68,6 @@ pub(super) const SCENE: &[(&str, &str, &str)] = &[
         "image = \"frame_1.png\"\ntime_s = -1",
         "time_s",
     ),
-    (
-        "image = \"frame_1.png\"",
-        "image = \"scene.toml\"",
-        "scene.toml",
-    ),
     ("calibration.csv", "swapped_pairs.csv", "swapped"),
     ("calibration.csv", "falling_pairs.csv", "falls"),
     ("calibration.csv", "constant_pairs.csv", "all forces are"),
