@@ -77,7 +77,7 @@ fn numbers(value: &Value, call: &str) {
         Value::Object(object) => {
             if let Some(number) = object.get("value") {
                 let ends = object.get("interval_95").and_then(Value::as_array);
-                let [low, high] = ends.unwrap_or_else(|| panic!("{call}: {value}"))[..] else {
+                let Some([low, high]) = ends.map(Vec::as_slice) else {
                     panic!("{call}: {value}")
                 };
                 let (number, slack) = (number.as_f64().unwrap(), 1e-9);
