@@ -81,10 +81,10 @@ pub enum DriftOutcome {
         /// Standard error of the relative illumination.
         standard_error: f64,
     },
-    /// Less than half of the frame agrees on one illumination, as under a contact that covers most
-    /// of it. Nothing was corrected.
+    /// Less than half of the frame or of its border agrees on one illumination, as under a contact
+    /// that covers most of it. Nothing was corrected.
     TooLittleBackground {
-        /// Share of the tiles that agree.
+        /// Share of the tiles that agree, in the frame or along its border.
         share: f64,
     },
 }
@@ -250,14 +250,24 @@ impl IlluminationDrift {
 
     /// The automatic correction if its error is small enough, else none and the reason.
     fn accepted(self, tiles: &[TileSum], sd: f64) -> Self {
-        let (mut agree, mut all) = (0.0, 0.0);
+        // A face that covers most of the frame is even too, but it does not reach the border.
+        let [right, bottom] = self.middle.map(|half| 2.0 * half);
+        let (wide, high) = (TILE_COLUMNS as f64, TILE_ROWS as f64);
+        let at_border = |tile: &TileSum| {
+            tile.x < wide || tile.y < high || tile.x > right - wide || tile.y > bottom - high
+        };
+        let (mut agree, mut all) = ([0.0; 2], [0.0; 2]);
         for tile in tiles {
             // A tile agrees if its drift is uneven by no more than a hundredth of the background.
             let limit = 3.0 * sd * tile.pixels.sqrt() + 0.01 * tile.reference;
-            agree += f64::from(self.residual(tile).abs() <= limit);
-            all += 1.0;
+            let agrees = f64::from(self.residual(tile).abs() <= limit);
+            for k in 0..1 + usize::from(at_border(tile)) {
+                agree[k] += agrees;
+                all[k] += 1.0;
+            }
         }
-        let share = agree / f64::max(all, 1.0);
+        let [whole, border] = [0, 1].map(|k| agree[k] / f64::max(all[k], 1.0));
+        let share = f64::min(whole, border);
         let standard_error = self.standard_error;
         // At 0.5 % the force is off by at most as much as a good gauge.
         let known = standard_error > 0.0 && standard_error <= 0.005 && self.reference > 0.0;

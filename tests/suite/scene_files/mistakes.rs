@@ -46,12 +46,18 @@ pub(super) const MISTAKES: &[(&str, &str, &[&str])] = &[
     (
         "pixel_size_m = [1e-4, 1e-4]",
         "pixel_size_m = [1e-4, 0.0]",
-        &["`pixel_size_m[2]`", "expected a positive number"],
+        &[
+            "`pixel_size_m[2]`",
+            "expected the side of a pixel in metres",
+        ],
     ),
     (
         "pixel_size_m = [1e-4, 1e-4]",
         "pixel_size_m = [nan, 1e-4]",
-        &["`pixel_size_m[1]`", "expected a positive number"],
+        &[
+            "`pixel_size_m[1]`",
+            "expected the side of a pixel in metres",
+        ],
     ),
     (
         "pixel_size_m = [1e-4, 1e-4]",
@@ -130,7 +136,7 @@ pub(super) const MISTAKES: &[(&str, &str, &[&str])] = &[
     (
         "force_N = 0.8",
         "force_N = -1.0",
-        &["`frames[1].force_N`", "expected a positive number"],
+        &["`frames[1].force_N`", "expected a force in newtons"],
     ),
     (
         "force_N = 0.8",
@@ -151,12 +157,12 @@ pub(super) const MISTAKES: &[(&str, &str, &[&str])] = &[
     (
         "radius_m = 0.02",
         "radius_m = inf",
-        &["`object.radius_m`", "expected a positive number"],
+        &["`object.radius_m`", "expected a length in metres"],
     ),
     (
         "radius_m = 0.02",
         "radius_m = \"big\"",
-        &["`object.radius_m`", "big", "expected a positive number"],
+        &["`object.radius_m`", "big", "expected a length in metres"],
     ),
     (
         "poisson_ratio = 0.5",
@@ -173,7 +179,7 @@ pub(super) const MISTAKES: &[(&str, &str, &[&str])] = &[
         "thickness_m = 0",
         &[
             "`waveguide.layers[1].thickness_m`",
-            "expected a positive number",
+            "expected a length in metres",
         ],
     ),
     (
@@ -191,7 +197,7 @@ pub(super) const MISTAKES: &[(&str, &str, &[&str])] = &[
         "youngs_modulus_pa = -1",
         &[
             "`waveguide.layers[1].youngs_modulus_pa`",
-            "expected a positive number",
+            "expected a modulus in pascals",
         ],
     ),
     (

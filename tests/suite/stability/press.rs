@@ -4,8 +4,11 @@ use ndarray::Array2;
 use std::sync::Arc;
 use tactile_imaging::Pipeline;
 use tactile_imaging::elasticity::contact::{Layer, Waveguide};
-use tactile_imaging::force::{CalibrationPair, ReferenceFrame};
-use tactile_imaging::pipeline::{EstimatorChoice, Object, StagesConfig};
+use tactile_imaging::force::{
+    CalibrationPair, ContactOptions, DriftCorrection, ForceOptions, LinearCalibration,
+    ReferenceFrame,
+};
+use tactile_imaging::pipeline::{EstimatorChoice, LightContact, Object, StagesConfig};
 use tactile_simulate::Trial;
 use tactile_simulate::{CalibrationRun, Camera, Gain, PressLoad, PressOptions};
 
@@ -81,8 +84,14 @@ pub(crate) fn pipeline(trial: &Trial, units: Units) -> Pipeline {
         poisson_ratio: ball.material.poisson_ratio,
     };
     let waveguide = Waveguide::new(layers.collect()).expect("layers");
-    Pipeline::from_pairs(&pairs, size, object)
-        .expect("a calibration")
+    // The drift of the light is read from tiles of the frame, of which a frame that is moved or
+    // turned has others: what is compared is all that comes after.
+    let contact = ContactOptions::default().with_drift(DriftCorrection::None);
+    let options = ForceOptions::default().with_contact(contact);
+    let line = LinearCalibration::fit(&pairs, &Default::default()).expect("a calibration");
+    let contact = LightContact::new(line, size, &options).expect("options");
+    Pipeline::new(contact, object)
+        .expect("a pipeline")
         .with_settings(|settings| settings.waveguide = Some(waveguide))
         .unwrap()
         .with_stages(&StagesConfig {
