@@ -87,6 +87,12 @@ pub enum DriftOutcome {
         /// Share of the tiles that agree, in the frame or along its border.
         share: f64,
     },
+    /// The light is less than half or more than twice the reference's: another exposure or a
+    /// saturated frame, and no drift. Nothing was corrected.
+    OtherLight {
+        /// Light of the frame over that of the reference.
+        ratio: f64,
+    },
 }
 
 impl DriftCorrection {
@@ -281,6 +287,10 @@ impl IlluminationDrift {
         // The median that the fit starts from is background only if most tiles are.
         if share < 0.5 {
             return refused(DriftOutcome::TooLittleBackground { share });
+        }
+        let ratio = self.coefficients[0];
+        if !(0.5..=2.0).contains(&ratio) {
+            return refused(DriftOutcome::OtherLight { ratio });
         }
         Self {
             correction: DriftCorrection::Illumination,
