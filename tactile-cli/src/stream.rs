@@ -420,7 +420,7 @@ fn numbers(frames: &[PathBuf]) -> Option<Vec<u64>> {
     let first = *numbers.first()?;
     // More than a tenth missing is a way of naming (times, dates), not a gap.
     let last = numbers.last()?.checked_sub(first)?;
-    let few_gaps = last + 1 <= frames.len() as u64 + (frames.len() as u64 / 10).max(2);
+    let few_gaps = last < frames.len() as u64 + (frames.len() as u64 / 10).max(2);
     let rising = numbers.windows(2).all(|pair| pair[0] < pair[1]);
     (rising && few_gaps).then(|| numbers.iter().map(|n| n - first).collect())
 }
