@@ -29,6 +29,7 @@ pub use tactile_fem as fem;
 pub mod inclusion;
 #[cfg(feature = "scene")]
 pub mod io;
+pub mod markers;
 pub mod pipeline;
 #[cfg(feature = "scene")]
 pub mod scene;

@@ -2,7 +2,7 @@
 use super::error::FileError;
 use super::files::{read_bytes, write_bytes};
 use ::image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, Limits};
-use ndarray::{Array2, ArrayView2};
+use ndarray::{Array2, Array3, ArrayView2};
 use std::io::Cursor;
 use std::path::Path;
 
@@ -160,6 +160,35 @@ pub fn read_grey_levels(path: &Path, bits: Option<u8>) -> Result<Array2<u8>, Fil
         }
         image => Ok(to_grey(image, &bytes, path, Grey::default(), bits)?.to_u8()),
     }
+}
+
+/// Reads a colour image in eight bits a channel, `[row, column, channel]`.
+///
+/// ```
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// use tactile_imaging::io::read_colour_levels;
+/// # let folder = tempfile::tempdir()?;
+/// let path = folder.path().join("red.ppm");
+/// std::fs::write(&path, b"P6\n1 1\n255\n\xf0\x10\x00")?;
+/// assert_eq!(read_colour_levels(&path)?, ndarray::array![[[240, 16, 0]]]);
+/// let path = folder.path().join("grey.pgm");
+/// std::fs::write(&path, b"P5\n1 1\n255\n\x80")?;
+/// assert!(read_colour_levels(&path).unwrap_err().to_string().contains("grey"));
+/// # Ok(()) }
+/// ```
+///
+/// # Errors
+/// [`FileError`] where the file cannot be read or decoded, is too large or grey.
+pub fn read_colour_levels(path: impl AsRef<Path>) -> Result<Array3<u8>, FileError> {
+    let path = path.as_ref();
+    let image = decode(&read_bytes(path)?, path)?;
+    if !image.color().has_color() {
+        return Err(refused(path, "it is grey, a colour image is needed"));
+    }
+    let image = image.into_rgb8();
+    let shape = (image.height() as usize, image.width() as usize, 3);
+    let levels = Array3::from_shape_vec(shape, image.into_raw());
+    Ok(levels.unwrap_or_else(|_| Array3::zeros(shape)))
 }
 
 /// Reads the image that a field of `file` names. It has to have the size of the reference, where

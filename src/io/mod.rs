@@ -7,6 +7,7 @@
 //! | [`read_grid`] | CSV matrices, empty cells and `nan` as NaN |
 //! | [`read_cases`] | point-matching case files (`m` and `t` rows) |
 //! | [`read_grey_image`] | PNG, PGM, JPEG, grey or colour, 8 or 16 bits |
+//! | [`read_colour_levels`] | PNG, PPM, JPEG in colour, in 8 bits |
 //!
 //! In CSV, fields are separated by commas, semicolons or tabs, and may stand in double quotes. A
 //! first line without any number is a header. Empty lines and lines that start with `#` are passed
@@ -28,7 +29,10 @@ mod tests;
 pub use cases::{CasePoints, MatchCase, read_cases, write_case_result};
 pub use error::{FileError, FilePlace};
 pub use files::{read_bytes, replace_file, write_bytes};
-pub use image::{Grey, GreyImage, image_size, read_grey_image, read_grey_levels, write_grey_image};
+pub use image::{
+    Grey, GreyImage, image_size, read_colour_levels, read_grey_image, read_grey_levels,
+    write_grey_image,
+};
 pub use range::Quantity;
 pub use table::{
     PointTable, Table, read_columns, read_grid, read_point_table, read_points, read_table,

@@ -33,8 +33,10 @@ mod calibration;
 mod file;
 mod input;
 mod layers;
+mod photometric;
 mod target;
 
 pub use calibration::{CalibratedSensor, LayerFinding, PressFinding, SensorError};
 pub use file::{Sensor, SensorGeometry};
 pub use input::{Indenter, LayerInput, SensorCalibration, SensorPress};
+pub use photometric::{PhotometricPresses, PhotometricSensor};

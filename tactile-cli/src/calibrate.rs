@@ -1,6 +1,7 @@
 //! `tactile calibrate`: a sensor from presses under known forces, or the line from integrated pixel
 //! value to force.
 use crate::console::{Context, Exit, Failure, digits, four_digits, in_unit};
+use crate::photometric;
 use crate::plot::{Colour, Page, Panel};
 use clap::Args;
 use serde_json::{Value, json};
@@ -12,7 +13,8 @@ use tactile_imaging::force::{
 use tactile_imaging::io::read_columns;
 use tactile_imaging::scene::doubt_of_pairs;
 use tactile_imaging::sensor::{
-    CalibratedSensor, Indenter, LayerFinding, PressFinding, SensorCalibration, SensorError,
+    CalibratedSensor, Indenter, LayerFinding, PhotometricPresses, PressFinding, SensorCalibration,
+    SensorError,
 };
 
 /// Calibrate a sensor from frames of presses, or fit the line from pixel value to force
@@ -24,6 +26,11 @@ use tactile_imaging::sensor::{
 /// sensor.svg beside it, the report of all that was identified by the presses and all that was not.
 /// Where the frames cannot be used nothing is written.
 ///
+/// With kind = "photometric" the file names presses of a ball on a gel that is lit in colours: a
+/// frame without contact, the pixel's size, and the ball's radius of every press, with its contact
+/// circle where it was drawn. Wrong circles are named. --out sensor.toml gets the sensor file for
+/// `tactile depth --sensor`, and the frame without contact beside it.
+///
 /// PAIRS.csv has the columns integrated_pixel_value (grey levels above the reference, summed over
 /// the contact) and force (N, mN, … by its heading), at least three rows. --out is a folder and
 /// gets calibration.svg.
@@ -32,6 +39,7 @@ use tactile_imaging::sensor::{
 Examples:
   tactile calibrate examples/data/sensor/calibration.toml
   tactile calibrate examples/data/sensor/calibration.toml --out target/sensor/sensor.toml
+  tactile calibrate examples/data/colour/calibration.toml --out target/colour/sensor.toml
   tactile calibrate examples/data/press/calibration.csv
   tactile calibrate examples/data/press/calibration.csv --there-and-back --out target/calibrate")]
 pub struct CalibrateArguments {
@@ -199,6 +207,9 @@ fn calibrate_sensor(path: &Path, context: &mut Context) -> Result<Exit, Failure>
         let names = [file.clone(), file.with_extension("svg")];
         let folder = folder.unwrap_or(Path::new("."));
         context.outputs.plan_in(folder, &names, &[path])?;
+    }
+    if PhotometricPresses::names_kind(path) {
+        return photometric::calibrate(path, &file, context);
     }
     let failed = |error: SensorError| match error {
         // It names its file itself.

@@ -2,6 +2,7 @@
 use crate::arguments::SensorFrames;
 use crate::console::{Context, Exit, Failure, four_digits, in_unit};
 use crate::outputs::{Csv, beside};
+use crate::photometric::{self, unless_sensor};
 use crate::plot::{Colour, HeatMap, Page, Panel, circle};
 use crate::surfaces::span;
 use clap::{Args, ValueEnum};
@@ -20,15 +21,30 @@ use tactile_imaging::sfs::DepthTable;
 /// TABLE.csv says how deep a darkness is: columns darkness (grey levels below the reference, of the
 /// same --grey) and depth (m, mm, µm, by its heading, mm without one). With --ball-radius-mm a ball
 /// of this radius is fitted to the depth, with --ball one of any. --out gets NAME_depth.csv (m, NaN
-/// outside the contact) and NAME_depth.svg for every frame NAME.
+/// outside the contact) and NAME_depth.svg for every frame NAME. The table is that of the contact's
+/// window, whose place in the frame is printed.
+///
+/// --sensor names a gel that is lit in colours, as `tactile calibrate` wrote it. It takes the place
+/// of reference, table and pixel size. --out gets NAME_depth.csv (m, of the whole frame, zero where
+/// nothing touches), NAME_gradient_x.csv and NAME_gradient_y.csv (of the depth, along columns and
+/// rows, also of the free gel around a contact) and NAME_depth.svg.
 #[derive(Args)]
+#[command(
+    mut_arg("reference", |arg| unless_sensor(arg, ".")),
+    mut_arg("pixel_um", |arg| unless_sensor(arg, "1")),
+    mut_arg("table", |arg| unless_sensor(arg, "."))
+)]
 #[command(after_help = "\
 Examples:
   tactile depth --reference examples/data/dark_reference.pgm --table examples/data/depth_table.csv --pixel-um 100 examples/data/dark_frame.pgm --ball-radius-mm 4
-  tactile depth --reference examples/data/dark_reference.pgm --table examples/data/depth_table.csv --pixel-um 100 examples/data/dark_frame.pgm --ball --out target/depth")]
+  tactile depth --reference examples/data/dark_reference.pgm --table examples/data/depth_table.csv --pixel-um 100 examples/data/dark_frame.pgm --ball --out target/depth
+  tactile depth --sensor examples/data/colour/sensor.toml examples/data/colour/press_6.png --out target/depth")]
 pub struct DepthArguments {
     #[command(flatten)]
     frames: SensorFrames,
+    /// Sensor file of a gel that is lit in colours.
+    #[arg(long, value_name = "SENSOR.toml", conflicts_with_all = ["reference", "pixel_um", "table", "ball", "ball_radius_mm", "zero_table"])]
+    sensor: Option<PathBuf>,
     /// Table of darkness and depth.
     #[arg(long, value_name = "TABLE.csv")]
     table: PathBuf,
@@ -39,7 +55,7 @@ pub struct DepthArguments {
     #[arg(long, conflicts_with = "ball_radius_mm")]
     ball: bool,
     /// Shift the table so that no darkness is no depth: for tables counted from a contact circle
-    /// found at some darkness.
+    /// found at some darkness, as those of 9DTact are.
     #[arg(long)]
     zero_table: bool,
     /// How the colours of a frame make its grey: as those of the table were made.
@@ -113,6 +129,9 @@ struct Found {
 
 pub fn run(arguments: &DepthArguments, context: &mut Context) -> Result<Exit, Failure> {
     let DepthArguments { frames, table, .. } = arguments;
+    if let Some(sensor) = &arguments.sensor {
+        return photometric::depth(sensor, &frames.frames, context);
+    }
     let names = frames
         .frames
         .iter()
@@ -200,8 +219,16 @@ fn print(found: &Found, context: &mut Context) -> Value {
         Ok(surface) => {
             let heights = &surface.surface.heights;
             context.row("depth", span(heights, 1e3, "mm"));
+            let [x, y] = surface.origin_m.map(|m| four_digits(1e3 * m));
+            context.row(
+                "",
+                format_args!("its first pixel at ({x}, {y}) mm from the frame's"),
+            );
             let finite = heights.iter().copied().filter(|h| h.is_finite());
-            json!({ "largest_depth_m": finite.fold(f64::NAN, f64::max) })
+            json!({
+                "largest_depth_m": finite.fold(f64::NAN, f64::max),
+                "origin_m": surface.origin_m, "pixel_size_m": surface.pixel_size_m,
+            })
         }
         Err(reason) => {
             context.row("depth", format_args!("none: {reason}"));

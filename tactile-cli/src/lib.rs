@@ -14,10 +14,12 @@ mod force;
 mod inclusion;
 mod indent;
 mod light;
+mod markers;
 mod match_points;
 mod measure;
 mod outputs;
 mod paper;
+mod photometric;
 mod plot;
 mod strain;
 mod stream;
@@ -73,6 +75,7 @@ Examples, one for each subcommand:
   tactile indent examples/data/curve.csv --shape sphere --radius 5e-3
   tactile stream --rate 20 --period 1 --allowed-late 100
   tactile light --rays 2000
+  tactile markers --reference examples/data/markers_reference.png examples/data/markers_frame.png
   tactile table examples/data/press/scene.toml --moduli 2 --largest-ratio 0.5
   tactile paper --out target/paper
 
@@ -98,6 +101,7 @@ enum Command {
     Indent(indent::IndentArguments),
     Stream(stream::StreamArguments),
     Light(light::LightArguments),
+    Markers(markers::MarkersArguments),
     Table(table::TableArguments),
     Paper(paper::PaperArguments),
 }
@@ -139,6 +143,7 @@ impl Command {
             Self::Indent(arguments) => indent::run(arguments, context),
             Self::Stream(arguments) => stream::run(arguments, context),
             Self::Light(arguments) => light::run(arguments, context),
+            Self::Markers(arguments) => markers::run(arguments, context),
             Self::Table(arguments) => table::run(arguments, context),
             Self::Paper(arguments) => paper::run(arguments, context),
         }

@@ -1,6 +1,6 @@
 //! Image input: floats, or the bytes of an 8-bit camera read in place.
 
-use ndarray::ArrayView2;
+use ndarray::{ArrayView2, ArrayView3};
 
 use crate::PixelScalar;
 
@@ -22,6 +22,9 @@ pub enum Frame<'a, T> {
     Real(ArrayView2<'a, T>),
     /// Grey levels of an 8-bit camera.
     Bytes(ArrayView2<'a, u8>),
+    /// Levels of an 8-bit colour camera, `[row, column, channel]`. Methods of one channel read the
+    /// mean of the channels.
+    Colour(ArrayView3<'a, u8>),
 }
 
 impl<'a, T: PixelScalar> From<ArrayView2<'a, T>> for Frame<'a, T> {
@@ -33,6 +36,12 @@ impl<'a, T: PixelScalar> From<ArrayView2<'a, T>> for Frame<'a, T> {
 impl<'a, T: PixelScalar> From<ArrayView2<'a, u8>> for Frame<'a, T> {
     fn from(view: ArrayView2<'a, u8>) -> Self {
         Frame::Bytes(view)
+    }
+}
+
+impl<'a, T: PixelScalar> From<ArrayView3<'a, u8>> for Frame<'a, T> {
+    fn from(view: ArrayView3<'a, u8>) -> Self {
+        Frame::Colour(view)
     }
 }
 
@@ -50,6 +59,7 @@ impl<T: PixelScalar> Frame<'_, T> {
         match self {
             Frame::Real(view) => view.dim(),
             Frame::Bytes(view) => view.dim(),
+            Frame::Colour(view) => (view.dim().0, view.dim().1),
         }
     }
 
@@ -62,6 +72,13 @@ impl<T: PixelScalar> Frame<'_, T> {
         match self {
             Frame::Real(view) => view[[row, column]],
             Frame::Bytes(view) => T::of(f64::from(view[[row, column]])),
+            Frame::Colour(view) => {
+                let channels = view.dim().2;
+                let sum: f64 = (0..channels)
+                    .map(|k| f64::from(view[[row, column, k]]))
+                    .sum();
+                T::of(sum / channels as f64)
+            }
         }
     }
 }

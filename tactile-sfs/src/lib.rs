@@ -34,6 +34,7 @@ mod error;
 mod frame;
 mod integrate;
 mod lighting;
+mod photometric;
 mod quality;
 mod reconstruct;
 mod sample;
@@ -48,6 +49,10 @@ pub use error::SfsError;
 pub use frame::Frame;
 pub use integrate::{CosinePoisson, FrankotChellappa, MaskedLeastSquares, SlopeIntegrator};
 pub use lighting::Lighting;
+pub use photometric::{
+    BallPress, CircleFinding, PhotometricCalibration, PhotometricModel, PhotometricReading,
+    PhotometricStereo,
+};
 pub use quality::{
     Alignment, ErrorSummary, HeightError, height_error, render, reprojection, slopes,
 };

@@ -37,6 +37,7 @@
 
 mod calibration;
 mod camera;
+mod colour;
 mod contact;
 mod error;
 #[cfg(feature = "scene")]
@@ -52,6 +53,7 @@ mod uniaxial;
 
 pub use calibration::{CalibrationRun, CalibrationSeries};
 pub use camera::Camera;
+pub use colour::{ColourGel, GelObject};
 pub use contact::{ContactModel, ContactState, SimulatedContact};
 pub use error::SimulateError;
 #[cfg(feature = "scene")]

@@ -3,6 +3,7 @@
 
 mod architecture;
 mod assumptions;
+mod coloured_gels;
 mod corpus;
 mod few_pairs;
 mod finite_element_presses;
@@ -10,6 +11,7 @@ mod force_on_simulated_frames;
 #[path = "../support/hostile.rs"]
 mod hostile;
 mod io_properties;
+mod markers;
 mod modulus_on_simulated_scenes;
 mod pipeline;
 mod press_9dtact;

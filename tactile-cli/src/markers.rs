@@ -1,0 +1,164 @@
+//! `tactile markers`: printed markers followed from a reference.
+use crate::arguments::positive;
+use crate::console::{Context, Exit, Failure, four_digits};
+use crate::outputs::{Csv, beside};
+use clap::Args;
+use ndarray::Array2;
+use serde_json::{Value, json};
+use std::path::{Path, PathBuf};
+use tactile_imaging::io::{Grey, read_grey_image};
+use tactile_imaging::markers::{Marker, MarkerField, find_markers, track_markers};
+
+/// Follow the markers of a gel from a reference to frames
+///
+/// Dark dots of one size are found in colour or grey images, also under uneven light. The matcher
+/// pairs them, whatever their order, and bears missing ones. --out gets NAME_markers.csv for every
+/// frame NAME, a row a marker: its place in the reference and its displacement in pixels, and the
+/// standard error of a coordinate of both. With the gel's shear modulus and thickness the force
+/// along x and y and the torque about the markers' mean are printed.
+#[derive(Args)]
+#[command(after_help = "\
+Examples:
+  tactile markers --reference examples/data/markers_reference.png examples/data/markers_frame.png
+  tactile markers --reference examples/data/markers_reference.png examples/data/markers_frame.png --pixel-um 100 --shear-modulus-kpa 40 --thickness-mm 4 --out target/markers")]
+pub struct MarkersArguments {
+    /// Frames (PNG, PGM, PPM or JPEG).
+    #[arg(required = true)]
+    frames: Vec<PathBuf>,
+    /// Frame before the markers moved.
+    #[arg(long, value_name = "IMAGE")]
+    reference: PathBuf,
+    /// Size of a pixel on the gel in micrometres.
+    #[arg(long, value_name = "UM", value_parser = positive, requires = "shear_modulus_kpa")]
+    pixel_um: Option<f64>,
+    /// Shear modulus of the gel in kPa, a third of its Young's modulus.
+    #[arg(long, value_name = "KPA", value_parser = positive, requires = "thickness_mm")]
+    shear_modulus_kpa: Option<f64>,
+    /// Thickness of the gel in mm.
+    #[arg(long, value_name = "MM", value_parser = positive, requires = "pixel_um")]
+    thickness_mm: Option<f64>,
+}
+
+pub fn run(arguments: &MarkersArguments, context: &mut Context) -> Result<Exit, Failure> {
+    let MarkersArguments {
+        frames, reference, ..
+    } = arguments;
+    let names: Vec<_> = frames
+        .iter()
+        .map(|frame| beside(frame, "_markers.csv"))
+        .collect();
+    let inputs = frames.iter().chain([reference]).map(PathBuf::as_path);
+    context.outputs.plan(&names, &inputs.collect::<Vec<_>>())?;
+    let before = find_markers(grey(reference)?.view());
+    let mut values = Vec::new();
+    let mut exit = Exit::Complete;
+    for (path, name) in frames.iter().zip(&names) {
+        let after = find_markers(grey(path)?.view());
+        context.line(format_args!("{}:", path.display()));
+        let counts = format!(
+            "{} in the reference, {} in the frame",
+            before.len(),
+            after.len()
+        );
+        context.row("markers", counts);
+        let frame = path.display().to_string();
+        match track_markers(&before, &after) {
+            Ok(field) => {
+                let value = arguments.print(&field, context);
+                values.push(json!({ "frame": frame, "markers": { "value": value } }));
+                context.outputs.add(name, table(&field));
+            }
+            Err(error) => {
+                context.row("followed", format_args!("none: {error}"));
+                values.push(json!({ "frame": frame, "markers": { "error": error.to_string() } }));
+                exit = Exit::Partial;
+            }
+        }
+    }
+    context.value(&json!({ "reference_markers": before.iter().map(place).collect::<Vec<_>>(), "frames": values }));
+    Ok(exit)
+}
+
+fn place(marker: &Marker) -> [f64; 3] {
+    let centre = marker.position_px;
+    [centre.x, centre.y, marker.standard_error_px]
+}
+
+fn grey(path: &Path) -> Result<Array2<f64>, Failure> {
+    Ok(read_grey_image(path, Grey::Mean, None)?.levels)
+}
+
+fn table(field: &MarkerField) -> Vec<u8> {
+    let mut csv = Csv::new(&[
+        "x_px",
+        "y_px",
+        "dx_px",
+        "dy_px",
+        "x_error_px",
+        "y_error_px",
+        "dx_error_px",
+        "dy_error_px",
+    ]);
+    for track in &field.tracks {
+        let (p, u, [own, moved]) = (
+            track.position_px,
+            track.displacement_px,
+            track.standard_errors_px,
+        );
+        csv.row([p.x, p.y, u.x, u.y, own, own, moved, moved]);
+    }
+    csv.into_bytes()
+}
+
+impl MarkersArguments {
+    fn print(&self, field: &MarkerField, context: &mut Context) -> Value {
+        let lengths = field
+            .tracks
+            .iter()
+            .map(|track| track.displacement_px.norm());
+        let largest = lengths.fold(0.0, f64::max);
+        let followed = field.tracks.len();
+        context.row(
+            "followed",
+            format_args!("{followed}, by {} px at most", four_digits(largest)),
+        );
+        if let Some(doubt) = &field.doubt {
+            context.row("doubt", format_args!("{doubt:?}"));
+        }
+        let strain = field.strain.as_ref().map(|strain| {
+            let parts = [(0, 0), (1, 1), (0, 1)];
+            let mean = parts.map(|at| strain.summary.mean[at]);
+            let error = parts.map(|at| strain.standard_error[at]);
+            for (k, name) in ["strain xx", "strain yy", "strain xy"].iter().enumerate() {
+                let [mean, error] = [mean[k], error[k]].map(|v| four_digits(100.0 * v));
+                context.row(name, format_args!("{mean} ± {error} %"));
+            }
+            json!({ "xx_yy_xy": mean, "standard_error": error })
+        });
+        let shear = self
+            .shear_modulus_kpa
+            .zip(self.thickness_mm)
+            .zip(self.pixel_um);
+        let shear = shear.and_then(|((kpa, mm), um)| field.shear(1e6 * kpa / mm, 1e-6 * um));
+        let shear = shear.map(|shear| {
+            let error = four_digits(1e3 * shear.force_error_n);
+            for (name, force) in ["F_x", "F_y"].iter().zip(shear.force_n) {
+                context.row(
+                    name,
+                    format_args!("{} ± {error} mN", four_digits(1e3 * force)),
+                );
+            }
+            let [torque, error] =
+                [shear.torque_nm, shear.torque_error_nm].map(|v| four_digits(1e6 * v));
+            context.row("M_z", format_args!("{torque} ± {error} mN mm"));
+            json!({
+                "force_n": shear.force_n, "force_error_n": shear.force_error_n,
+                "torque_nm": shear.torque_nm, "torque_error_nm": shear.torque_error_nm,
+            })
+        });
+        json!({
+            "followed": followed, "largest_displacement_px": largest, "doubt": field.doubt.map(|doubt| format!("{doubt:?}")),
+            "strain": strain, "shear": shear,
+        })
+    }
+}

@@ -1,0 +1,241 @@
+//! Photometric stereo: the colours of a gel that is lit from several sides, to slopes and depth.
+//!
+//! The colour of a pixel, less that of the untouched gel, depends on the surface's normal and on
+//! the place in the image. A polynomial of third degree in the three colour differences, whose
+//! coefficients change linearly over the image, gives the normal's components n_x and n_y. Presses
+//! of one ball determine it: inside the contact circle n = (x − x₀, y − y₀)/R. Over presses left
+//! out in turn it was as good as lookup tables and polynomials of higher degree, with fewer
+//! numbers to determine.
+
+mod calibration;
+mod colour;
+mod contact;
+
+use ndarray::{Array2, ArrayView3, Zip};
+use tactile_core::Requirement;
+
+pub use calibration::{BallPress, CircleFinding, PhotometricCalibration};
+use colour::{Blurred, TERMS, normals};
+use contact::contact;
+
+use crate::domain::same_shape;
+use crate::{
+    BoundingBox, CosinePoisson, Domain, Frame, PixelScalar, SfsError, SlopeIntegrator, Surface,
+    SurfaceReconstruction,
+};
+
+/// The numbers that a calibration of [`PhotometricStereo`] finds, as a file keeps them.
+///
+/// ```
+/// use tactile_sfs::{PhotometricModel, PhotometricStereo};
+/// let model = PhotometricModel::new(5e-5, [vec![0.0; 60], vec![0.0; 60]]);
+/// let flat = ndarray::Array3::from_elem((40, 60, 3), 90);
+/// let sensor = PhotometricStereo::new(model, flat.view())?;
+/// assert!(sensor.read(flat.view())?.depth_m.iter().all(|z| *z == 0.0));
+/// # Ok::<(), tactile_sfs::SfsError>(())
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
+pub struct PhotometricModel {
+    /// Size of a pixel on the gel in metres.
+    pub pixel_size_m: f64,
+    /// Coefficients of n_x and n_y, 60 each. They belong to the 20 monomials of the differences in
+    /// 50 grey levels, then to those times x, then times y, with x and y from −1 to 1.
+    pub coefficients: [Vec<f64>; 2],
+    /// Standard error of n_x and n_y, from presses left out in turn.
+    pub normal_standard_error: f64,
+    /// Standard error of a depth in metres, from presses left out in turn.
+    pub depth_standard_error_m: f64,
+}
+
+impl PhotometricModel {
+    /// A model without errors.
+    pub fn new(pixel_size_m: f64, coefficients: [Vec<f64>; 2]) -> Self {
+        Self {
+            pixel_size_m,
+            coefficients,
+            normal_standard_error: 0.0,
+            depth_standard_error_m: 0.0,
+        }
+    }
+}
+
+/// Surfaces from the colours of a gel that is lit from several sides.
+///
+/// Reads 8-bit frames of three channels. A shift of all levels of a channel between frames is
+/// taken off by the median over the frame's border. [`calibrate`](Self::calibrate) makes one from
+/// presses of a ball. O(pixels) a frame, and O(n log n) for the n pixels of the contact's box.
+///
+/// As a [`SurfaceReconstruction`] it takes [`Frame::Colour`] and gives depths in the unit of the
+/// domain's pixel size, 0 where nothing touches.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PhotometricStereo {
+    model: PhotometricModel,
+    reference: Blurred,
+}
+
+/// What one frame shows.
+///
+/// Gradients are those of the gel's surface, inside the contact and around it: ∂z/∂x and ∂z/∂y
+/// with z the depth in metres, x the column, y the row.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct PhotometricReading {
+    /// Gradients along x and y.
+    pub gradient: [Array2<f32>; 2],
+    /// Standard errors of the gradients.
+    pub gradient_error: [Array2<f32>; 2],
+    /// Pixels where something touches.
+    pub contact: Array2<bool>,
+    /// Depth in metres, 0 where nothing touches.
+    pub depth_m: Array2<f64>,
+    /// Standard error of a depth inside the contact, in metres.
+    pub depth_standard_error_m: f64,
+}
+
+/// Largest sine of a slope. A steeper one is read as 76°: beyond it light hardly changes, and the
+/// slope itself has no end.
+const STEEPEST: f32 = 0.97;
+
+impl PhotometricStereo {
+    /// A sensor from its model and its frame without contact, `[row, column, channel]`.
+    ///
+    /// # Errors
+    /// [`SfsError::EmptyImage`], [`SfsError::ShapeMismatch`] unless there are three channels and 60
+    /// coefficients, [`SfsError::InvalidOption`] for a pixel size that is not positive, a
+    /// coefficient that is not finite or a negative error.
+    pub fn new(model: PhotometricModel, reference: ArrayView3<'_, u8>) -> Result<Self, SfsError> {
+        Requirement::Positive.check("pixel size", model.pixel_size_m)?;
+        Requirement::NonNegative.check("normal error", model.normal_standard_error)?;
+        Requirement::NonNegative.check("depth error", model.depth_standard_error_m)?;
+        for component in &model.coefficients {
+            same_shape("coefficients", (1, TERMS), (1, component.len()))?;
+            for value in component {
+                Requirement::Finite.check("coefficient", *value)?;
+            }
+        }
+        let reference = Blurred::of(colour_image(reference)?);
+        Ok(Self { model, reference })
+    }
+
+    /// The numbers of the calibration.
+    pub fn model(&self) -> &PhotometricModel {
+        &self.model
+    }
+
+    /// Gradients, contact and depth of a frame of the reference's size.
+    ///
+    /// # Errors
+    /// [`SfsError::ShapeMismatch`].
+    pub fn read(&self, frame: ArrayView3<'_, u8>) -> Result<PhotometricReading, SfsError> {
+        let frame = colour_image(frame)?;
+        let (rows, columns, _) = frame.dim();
+        same_shape("frame", self.reference.dim(), (rows, columns))?;
+        self.read_blurred(&Blurred::of(frame))
+    }
+
+    fn read_blurred(&self, frame: &Blurred) -> Result<PhotometricReading, SfsError> {
+        let normals = normals(frame, &self.reference, &self.model.coefficients);
+        let touched = contact(&normals);
+        let [mut p, mut q] = normals;
+        let mut errors = [Array2::zeros(p.dim()), Array2::zeros(p.dim())];
+        let [error_p, error_q] = &mut errors;
+        let sd = self.model.normal_standard_error as f32;
+        Zip::from(&mut p)
+            .and(&mut q)
+            .and(error_p)
+            .and(error_q)
+            .for_each(|nx, ny, error_p, error_q| {
+                let sine = (*nx * *nx + *ny * *ny).sqrt();
+                let cut = STEEPEST / sine.max(STEEPEST);
+                let (x, y) = (*nx * cut, *ny * cut);
+                let up2 = 1.0 - x * x - y * y;
+                let (up, [xx, xy, yy]) = (up2.sqrt(), [x * x, x * y, y * y].map(|v| v / up2));
+                // The derivative of n/n_z by n is (1 + n nᵀ/n_z²)/n_z.
+                *error_p = sd / up * ((1.0 + xx).powi(2) + xy * xy).sqrt();
+                *error_q = sd / up * ((1.0 + yy).powi(2) + xy * xy).sqrt();
+                // Outward normals of the gel rise where depth falls.
+                (*nx, *ny) = (-x / up, -y / up);
+            });
+        let depth_m = self.depth([&p, &q], &touched)?;
+        Ok(PhotometricReading {
+            gradient: [p, q],
+            gradient_error: errors,
+            contact: touched,
+            depth_m,
+            depth_standard_error_m: self.model.depth_standard_error_m,
+        })
+    }
+
+    /// Integrates the slopes of the contact with none around it, and counts from around it.
+    fn depth(
+        &self,
+        slopes: [&Array2<f32>; 2],
+        touched: &Array2<bool>,
+    ) -> Result<Array2<f64>, SfsError> {
+        let mut depth = Array2::zeros(touched.dim());
+        let Some(area) = BoundingBox::of_mask(touched.view()) else {
+            return Ok(depth);
+        };
+        // Room around the contact for slopes that do not add up to none around a loop.
+        let area = area.grown(16, touched.dim());
+        let inside = area.of(touched.view());
+        let [p, q] = slopes.map(|slope| {
+            let mut slope = area.of(slope.view()).mapv(f64::from);
+            slope.zip_mut_with(&inside, |slope, inside| {
+                *slope *= f64::from(u8::from(*inside))
+            });
+            slope
+        });
+        let domain = Domain::new([self.model.pixel_size_m; 2])?;
+        let heights = CosinePoisson
+            .integrate(p.view(), q.view(), &domain)?
+            .heights;
+        let around = heights.iter().zip(&inside).filter(|(_, inside)| !**inside);
+        let (sum, count) = around.fold((0.0, 0_usize), |(sum, n), (z, _)| (sum + z, n + 1));
+        let zero = sum / count.max(1) as f64;
+        let mut to = area.of_mut(depth.view_mut());
+        Zip::from(&mut to)
+            .and(&heights)
+            .and(&inside)
+            .for_each(|to, z, inside| {
+                if *inside {
+                    *to = (z - zero).max(0.0);
+                }
+            });
+        Ok(depth)
+    }
+}
+
+impl<T: PixelScalar> SurfaceReconstruction<T> for PhotometricStereo {
+    fn reconstruct(
+        &self,
+        frame: Frame<'_, T>,
+        domain: &Domain<'_, T>,
+    ) -> Result<Surface<T>, SfsError> {
+        let Frame::Colour(frame) = frame else {
+            return Err(SfsError::NoColour);
+        };
+        let reading = self.read(frame)?;
+        domain.bounding_box(reading.depth_m.dim())?;
+        let scale = domain.pixel_size_m[0].as_f64() / self.model.pixel_size_m;
+        let heights = Array2::from_shape_fn(reading.depth_m.dim(), |(row, column)| {
+            match domain.contains(row, column) {
+                true => T::of(scale * reading.depth_m[[row, column]]),
+                false => T::nan(),
+            }
+        });
+        Ok(Surface::from_heights(heights))
+    }
+}
+
+/// Refuses images without pixels or with other than three channels.
+fn colour_image(image: ArrayView3<'_, u8>) -> Result<ArrayView3<'_, u8>, SfsError> {
+    let (rows, columns, channels) = image.dim();
+    if rows == 0 || columns == 0 {
+        return Err(SfsError::EmptyImage { rows, columns });
+    }
+    same_shape("channels", (1, 3), (1, channels))?;
+    Ok(image)
+}
