@@ -123,6 +123,7 @@ impl Command {
             Self::Indent(_) => "indent",
             Self::Stream(_) => "stream",
             Self::Light(_) => "light",
+            Self::Markers(_) => "markers",
             Self::Table(_) => "table",
             Self::Paper(_) => "paper",
         }
