@@ -14,7 +14,7 @@ pyo3::create_exception!(
     tactile_imaging,
     TactileError,
     PyRuntimeError,
-    "A measurement that cannot be made from valid input: no contact, too few matches, a failed stage."
+    "Valid input without an answer: no contact, too few matches, a stage in Python that failed."
 );
 
 /// An argument that a caller has to change.

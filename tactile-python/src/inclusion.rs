@@ -89,7 +89,8 @@ pub fn inclusion(
     if rows != [approaches.len(); 3] {
         let expected = approaches.len();
         return Err(invalid(format!(
-            "pressures, standard_errors and forces must have {expected} rows, as approaches, found {rows:?}"
+            "pressures, standard_errors and forces must have {expected} rows, as approaches, \
+             found {rows:?}"
         )));
     }
     let profile = |k: usize| PressureProfile {

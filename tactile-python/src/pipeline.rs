@@ -89,7 +89,7 @@ impl Object {
         })
     }
 
-    /// An object of unknown shape: read as one with a flat face where its contacts are those of one.
+    /// An object of unknown shape, read as one with a flat face where its contacts are such.
     #[classmethod]
     #[pyo3(signature = (*, poisson_ratio=0.5))]
     fn unknown(_class: &Bound<'_, PyType>, poisson_ratio: f64) -> Self {
@@ -145,8 +145,8 @@ impl Object {
 ///     `strain(deformation_gradient)`.
 /// estimator : str or object
 ///     "best", "paper-ratio", "regression", "sphere", "sphere-on-waveguide", "flat-punch", "cone"
-///     and others, or `estimate(loads)` that returns pascals and their standard error. Its attribute
-///     `needs_strain` says whether loads have strains.
+///     and others, or `estimate(loads)` that returns pascals and their standard error. Its
+///     attribute `needs_strain` says whether loads have strains.
 /// flat_field : bool
 ///     Whether frames are divided by the reference's own brightness.
 /// force_scale_error, length_scale_error, radius_error, poisson_ratio_error : float

@@ -19,8 +19,8 @@ use tactile_imaging::scene::Scene;
 
 /// Frames at one or more loads. Nothing is computed before it is asked for, and all of it once.
 ///
-/// Frames are counted from zero. Threads may share a press, and the interpreter's lock is free while
-/// it computes.
+/// Frames are counted from zero. Threads may share a press, and the interpreter's lock is free
+/// while it computes.
 ///
 /// Parameters
 /// ----------

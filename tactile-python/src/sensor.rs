@@ -93,7 +93,8 @@ impl Sensor {
         if lengths != [frames.len(); 3] {
             let expected = frames.len();
             return Err(invalid(format!(
-                "forces, radii and unloading must have the length {expected} of frames, found {lengths:?}"
+                "forces, radii and unloading must have the length {expected} of frames, \
+                 found {lengths:?}"
             )));
         }
         let press = |(k, frame)| SensorPress {

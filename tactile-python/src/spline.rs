@@ -43,9 +43,23 @@ impl<const D: usize, K: Kernel + Send + Sync> Fitted for Spline<f64, D, 3, K> {
 /// Parameters
 /// ----------
 /// sources : (n, 2) or (n, 3) array
-/// targets : (n,) or (n, m) array of up to three columns
-/// smoothing : λ ≥ 0 of Σ|f(x_i) − y_i|² + λ wᵀKw, or "gcv" for that of generalised cross-validation
-/// kernel : "thin_plate_spline" (r² ln r), "linear" (−r) or "cubic" (r³)
+///     Distinct points, not all on one line.
+/// targets : (n,) or (n, m) array
+///     Up to three columns.
+/// smoothing : float or "gcv"
+///     λ ≥ 0 of Σ|f(x_i) − y_i|² + λ wᵀKw, or that of generalised cross-validation. None is 0.
+/// kernel : str
+///     "thin_plate_spline" (r² ln r), "linear" (−r) or "cubic" (r³), as SciPy's `RBFInterpolator`
+///     with `degree=1`.
+///
+/// Raises
+/// ------
+/// ValueError
+///     Lengths that differ, coordinates that are not finite, points that determine no spline.
+///
+/// Notes
+/// -----
+/// A fit of n points takes O(n³) time and O(n²) memory.
 #[pyclass(frozen, module = "tactile_imaging")]
 pub struct ThinPlateSpline {
     fitted: Box<dyn Fitted>,
@@ -82,7 +96,8 @@ impl ThinPlateSpline {
         let (axes, outputs) = (view.ncols(), targets.ncols());
         if !(2..=3).contains(&axes) || !(1..=3).contains(&outputs) {
             return Err(invalid(format!(
-                "sources must have two or three columns and targets up to three, found {axes} and {outputs}"
+                "sources must have two or three columns and targets up to three, \
+                 found {axes} and {outputs}"
             )));
         }
         let smoothing = match smoothing {

@@ -165,7 +165,8 @@ pub fn integrate<'py>(
         "least-squares" => Box::new(MaskedLeastSquares::default()),
         other => {
             return Err(invalid(format!(
-                "method must be \"poisson\", \"frankot-chellappa\" or \"least-squares\", found {other:?}"
+                "method must be \"poisson\", \"frankot-chellappa\" or \"least-squares\", \
+                 found {other:?}"
             )));
         }
     };

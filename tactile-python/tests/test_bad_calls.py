@@ -119,7 +119,8 @@ def test_any_layout_of_an_array_is_read(layout):
     given = layouts(SQUARE)[layout]
     found = ti.match_points(given, SQUARE[::-1], "nearest-neighbour")
     assert found.assignment.tolist() == [3, 2, 1, 0]
-    assert np.array_equal(ti.ThinPlateSpline(given, SQUARE)(given), ti.ThinPlateSpline(SQUARE, SQUARE)(SQUARE))
+    expected = ti.ThinPlateSpline(SQUARE, SQUARE)(SQUARE)
+    assert np.array_equal(ti.ThinPlateSpline(given, SQUARE)(given), expected)
 
 
 def test_frames_of_any_layout_are_read(scene):
