@@ -2,6 +2,7 @@
 //! torque that their displacements carry.
 
 use crate::StrainBetween;
+use crate::core::Estimate;
 use crate::elasticity::strain::GreenLagrange;
 use crate::matching::{AnnealedSoftassign, Doubt, MatchError, PointMatcher};
 use nalgebra::{Point2, Vector2};
@@ -246,18 +247,14 @@ pub struct MarkerField {
     pub doubt: Option<Doubt>,
 }
 
-/// Shear force and torque, with standard errors.
+/// Shear force and torque, with the standard errors that the markers' give them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct MarkerShear {
     /// F_x and F_y in newtons.
-    pub force_n: [f64; 2],
-    /// Standard error of F_x and F_y from the markers' errors, in newtons.
-    pub force_error_n: f64,
+    pub force_n: [Estimate; 2],
     /// M_z about the markers' mean in newton metres.
-    pub torque_nm: f64,
-    /// Standard error of M_z from the markers' errors, in newton metres.
-    pub torque_error_nm: f64,
+    pub torque_nm: Estimate,
 }
 
 /// Follows markers from the reference to a frame by [`AnnealedSoftassign`]: no order and no grid is
@@ -332,7 +329,7 @@ impl MarkerField {
     /// let field = track_markers(&all(0.0), &all(1.0))?;
     /// // 36 cells of 1 mm² move by 0.1 mm on a layer of 1e8 Pa/m.
     /// let shear = field.shear(1e8, 1e-4).expect("tracks");
-    /// assert!((shear.force_n[0] - 0.36).abs() < 1e-6 && shear.torque_nm.abs() < 1e-9);
+    /// assert!((shear.force_n[0].value - 0.36).abs() < 1e-6 && shear.torque_nm.value.abs() < 1e-9);
     /// # Ok::<(), tactile_imaging::matching::MatchError>(())
     /// ```
     pub fn shear(&self, stiffness_pa_per_m: f64, pixel_size_m: f64) -> Option<MarkerShear> {
@@ -354,11 +351,11 @@ impl MarkerField {
             variances[0] += variance;
             variances[1] += variance * r.norm_squared();
         }
+        let turn = scale * pixel_size_m;
         Some(MarkerShear {
-            force_n: (scale * force).into(),
-            force_error_n: scale * variances[0].sqrt(),
-            torque_nm: scale * pixel_size_m * torque,
-            torque_error_nm: scale * pixel_size_m * variances[1].sqrt(),
+            force_n: [force.x, force.y]
+                .map(|sum| Estimate::from_variance(scale * sum, scale * scale * variances[0])),
+            torque_nm: Estimate::from_variance(turn * torque, turn * turn * variances[1]),
         })
     }
 }

@@ -1,13 +1,15 @@
 //! `tactile markers`: printed markers followed from a reference.
 use crate::arguments::positive;
-use crate::console::{Context, Exit, Failure, four_digits};
+use crate::console::{Context, Exit, Failure, four_digits, in_unit};
 use crate::outputs::{Csv, beside};
 use clap::Args;
 use ndarray::Array2;
 use serde_json::{Value, json};
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use tactile_imaging::core::Estimate;
 use tactile_imaging::io::{Grey, read_grey_image};
-use tactile_imaging::markers::{Marker, MarkerField, find_markers, track_markers};
+use tactile_imaging::markers::{MarkerField, find_markers, track_markers};
 
 /// Follow the markers of a gel from a reference to frames
 ///
@@ -64,24 +66,18 @@ pub fn run(arguments: &MarkersArguments, context: &mut Context) -> Result<Exit, 
         let frame = path.display().to_string();
         match track_markers(&before, &after) {
             Ok(field) => {
-                let value = arguments.print(&field, context);
-                values.push(json!({ "frame": frame, "markers": { "value": value } }));
+                values.push(arguments.print(&frame, &field, context));
                 context.outputs.add(name, table(&field));
             }
             Err(error) => {
                 context.row("followed", format_args!("none: {error}"));
-                values.push(json!({ "frame": frame, "markers": { "error": error.to_string() } }));
+                values.push(json!({ "frame": frame, "error": error.to_string() }));
                 exit = Exit::Partial;
             }
         }
     }
-    context.value(&json!({ "reference_markers": before.iter().map(place).collect::<Vec<_>>(), "frames": values }));
+    context.value(&json!({ "reference_markers": before.len(), "frames": values }));
     Ok(exit)
-}
-
-fn place(marker: &Marker) -> [f64; 3] {
-    let centre = marker.position_px;
-    [centre.x, centre.y, marker.standard_error_px]
 }
 
 fn grey(path: &Path) -> Result<Array2<f64>, Failure> {
@@ -111,7 +107,7 @@ fn table(field: &MarkerField) -> Vec<u8> {
 }
 
 impl MarkersArguments {
-    fn print(&self, field: &MarkerField, context: &mut Context) -> Value {
+    fn print(&self, frame: &str, field: &MarkerField, context: &mut Context) -> Value {
         let lengths = field
             .tracks
             .iter()
@@ -126,38 +122,28 @@ impl MarkersArguments {
             context.row("doubt", format_args!("{doubt:?}"));
         }
         let strain = field.strain.as_ref().map(|strain| {
-            let parts = [(0, 0), (1, 1), (0, 1)];
-            let mean = parts.map(|at| strain.summary.mean[at]);
-            let error = parts.map(|at| strain.standard_error[at]);
-            for (k, name) in ["strain xx", "strain yy", "strain xy"].iter().enumerate() {
-                let [mean, error] = [mean[k], error[k]].map(|v| four_digits(100.0 * v));
-                context.row(name, format_args!("{mean} ± {error} %"));
-            }
-            json!({ "xx_yy_xy": mean, "standard_error": error })
+            [("xx", (0, 0)), ("yy", (1, 1)), ("xy", (0, 1))].map(|(name, at)| {
+                let part = Estimate::new(strain.summary.mean[at], strain.standard_error[at]);
+                context.row(&format!("strain {name}"), in_unit(part, 100.0) + " %");
+                (name, part)
+            })
         });
+        let strain: Option<BTreeMap<_, _>> = strain.map(BTreeMap::from);
         let shear = self
             .shear_modulus_kpa
             .zip(self.thickness_mm)
             .zip(self.pixel_um);
         let shear = shear.and_then(|((kpa, mm), um)| field.shear(1e6 * kpa / mm, 1e-6 * um));
         let shear = shear.map(|shear| {
-            let error = four_digits(1e3 * shear.force_error_n);
             for (name, force) in ["F_x", "F_y"].iter().zip(shear.force_n) {
-                context.row(
-                    name,
-                    format_args!("{} ± {error} mN", four_digits(1e3 * force)),
-                );
+                context.row(name, in_unit(force, 1e3) + " mN");
             }
-            let [torque, error] =
-                [shear.torque_nm, shear.torque_error_nm].map(|v| four_digits(1e6 * v));
-            context.row("M_z", format_args!("{torque} ± {error} mN mm"));
-            json!({
-                "force_n": shear.force_n, "force_error_n": shear.force_error_n,
-                "torque_nm": shear.torque_nm, "torque_error_nm": shear.torque_error_nm,
-            })
+            context.row("M_z", in_unit(shear.torque_nm, 1e6) + " mN mm");
+            json!({ "force_n": shear.force_n, "torque_nm": shear.torque_nm })
         });
         json!({
-            "followed": followed, "largest_displacement_px": largest, "doubt": field.doubt.map(|doubt| format!("{doubt:?}")),
+            "frame": frame, "followed": followed, "largest_displacement_px": largest,
+            "doubt": field.doubt.map(|doubt| format!("{doubt:?}")),
             "strain": strain, "shear": shear,
         })
     }

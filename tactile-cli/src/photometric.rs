@@ -1,11 +1,12 @@
 //! Sensors with a gel that is lit in colours: `tactile calibrate` and `tactile depth` for them.
-use crate::console::{Context, Exit, Failure, four_digits};
+use crate::console::{Context, Exit, Failure, four_digits, in_unit};
 use crate::outputs::{Csv, beside};
 use crate::plot::{HeatMap, Page, Panel};
 use clap::Arg;
 use clap::builder::ArgPredicate;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
+use tactile_imaging::core::Estimate;
 use tactile_imaging::io::{read_bytes, read_colour_levels};
 use tactile_imaging::sensor::{PhotometricPresses, PhotometricSensor};
 use tactile_imaging::sfs::{PhotometricCalibration, PhotometricReading};
@@ -168,21 +169,13 @@ fn reading_value(reading: &PhotometricReading, size: f64, context: &mut Context)
     }
     let centroid = [x / pixels, y / pixels];
     let deepest = reading.depth_m.iter().copied().fold(0.0, f64::max);
-    let (area, error) = (pixels * size * size, reading.depth_standard_error_m);
-    context.row(
-        "centroid",
-        format_args!("({:.1}, {:.1}) px", centroid[0], centroid[1]),
-    );
+    let area = pixels * size * size;
+    let depth = Estimate::new(deepest, reading.depth_standard_error_m);
+    let [x, y] = centroid.map(four_digits);
+    context.row("centroid", format_args!("({x}, {y}) px"));
     context.row("area", format_args!("{} mm²", four_digits(1e6 * area)));
-    let [deep, known] = [deepest, error].map(|m| four_digits(1e3 * m));
-    context.row(
-        "depth",
-        format_args!("{deep} ± {known} mm at the deepest pixel"),
-    );
-    json!({
-        "centroid_px": centroid, "area_m2": area,
-        "largest_depth_m": deepest, "depth_standard_error_m": error,
-    })
+    context.row("depth", in_unit(depth, 1e3) + " mm at the deepest pixel");
+    json!({ "centroid": centroid, "area_m2": area, "largest_depth_m": depth })
 }
 
 fn page(reading: &PhotometricReading, size: f64) -> Page {

@@ -4,6 +4,7 @@
 
 mod bad_calls;
 mod bad_files;
+mod colour;
 mod depth;
 mod frames;
 mod harness;
