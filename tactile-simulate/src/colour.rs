@@ -63,13 +63,13 @@ pub enum GelObject {
         /// Radius of the contact circle.
         contact_px: f64,
     },
-    /// A flat punch whose edge is rounded.
+    /// A flat punch whose edge is rounded, as a parabola.
     Flat {
         /// Radius of the flat and its edge.
         contact_px: f64,
         /// Depth.
         depth_px: f64,
-        /// Width of the edge, over which the depth falls to zero as a cosine.
+        /// Width of the edge, over which the depth falls to zero.
         edge_px: f64,
     },
     /// A wedge along y: depth falls linearly to both sides of an edge.
@@ -111,8 +111,7 @@ impl GelObject {
                 edge_px,
             } => {
                 let fall = ((distance - contact_px + edge_px) / edge_px).max(0.0);
-                let shape = 0.5 + 0.5 * (core::f64::consts::PI * fall).cos();
-                (distance < contact_px).then_some(depth_px * shape)
+                (distance < contact_px).then_some(depth_px * (1.0 - fall * fall))
             }
             Self::Edge {
                 contact_px,
@@ -147,7 +146,11 @@ impl GelObject {
                 let up = (radius_px * radius_px - contact_px * contact_px).sqrt();
                 (contact_px / up, x.hypot(y) - contact_px)
             }
-            Self::Flat { contact_px, .. } => (0.0, x.hypot(y) - contact_px),
+            Self::Flat {
+                contact_px,
+                depth_px,
+                edge_px,
+            } => (2.0 * depth_px / edge_px, x.hypot(y) - contact_px),
             Self::Edge {
                 contact_px,
                 depth_px,

@@ -112,7 +112,7 @@ fn contacts_of_other_shapes() {
     };
     let depth = gel.depth_px(&punch, [80.0, 60.0]);
     let reading = sensor.read(gel.frame(&depth, 8).view()).unwrap();
-    // The rim of a cosine is soft: half of its edge may count as free gel.
+    // The blur rounds the rim of the punch by some pixels.
     let touched = reading.contact.iter().filter(|touched| **touched).count() as f64;
     let area = core::f64::consts::PI * 24.0_f64.powi(2);
     assert!(
