@@ -24,6 +24,8 @@ pub enum FilePlace {
         /// The column of the table, or the word of the line.
         column: usize,
     },
+    /// A frame of a stream, counted from 1.
+    Frame(u64),
     /// A field of a TOML file, with its path: `waveguide.layers[2].thickness_m`.
     Field(String),
 }
@@ -34,6 +36,7 @@ impl fmt::Display for FilePlace {
             Self::File => Ok(()),
             Self::Line(line) => write!(f, ", line {line}"),
             Self::Cell { line, column } => write!(f, ", line {line}, column {column}"),
+            Self::Frame(frame) => write!(f, ", frame {frame}"),
             Self::Field(field) => write!(f, ": field `{field}`"),
         }
     }

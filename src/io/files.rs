@@ -15,7 +15,7 @@ use {
 
 /// Largest file that is read, in bytes. No table, scene or frame needs more, and a device never
 /// ends.
-const LARGEST_FILE: u64 = 512 << 20;
+pub const LARGEST_FILE: u64 = 512 << 20;
 
 /// Reads a whole file of at most 512 MiB.
 ///
@@ -23,22 +23,15 @@ const LARGEST_FILE: u64 = 512 << 20;
 /// [`FileError::Read`], also for a folder, a pipe or a device.
 pub fn read_bytes(path: &Path) -> Result<Vec<u8>, FileError> {
     let read = || {
-        let metadata = fs::metadata(path)?;
-        // Opening a pipe without a writer would wait for ever, and a device may never end.
-        if metadata.is_dir() {
-            return Err(Error::other("it is a folder, not a file"));
-        }
-        if !metadata.is_file() {
-            return Err(Error::other("it is a pipe or a device, not a file"));
-        }
+        let file = open_file(path)?;
+        let length = file.metadata()?.len();
         let mut bytes = Vec::new();
-        if metadata.len() <= LARGEST_FILE {
+        if length <= LARGEST_FILE {
             // The size may grow while the file is read, or be unknown to the system (in /proc).
-            let file = fs::File::open(path)?;
             file.take(LARGEST_FILE + 1).read_to_end(&mut bytes)?;
         }
         // One byte beyond the limit is enough to refuse a file.
-        let size = metadata.len().max(bytes.len() as u64);
+        let size = length.max(bytes.len() as u64);
         if size > LARGEST_FILE {
             let reason = format!("it has {size} bytes, more than the {LARGEST_FILE} that are read");
             return Err(Error::other(reason));
@@ -49,6 +42,19 @@ pub fn read_bytes(path: &Path) -> Result<Vec<u8>, FileError> {
         path: path.into(),
         source,
     })
+}
+
+/// Opens a file, but no folder, pipe or device.
+pub fn open_file(path: &Path) -> std::io::Result<fs::File> {
+    let metadata = fs::metadata(path)?;
+    // Opening a pipe without a writer would wait for ever, and a device may never end.
+    if metadata.is_dir() {
+        return Err(Error::other("it is a folder, not a file"));
+    }
+    if !metadata.is_file() {
+        return Err(Error::other("it is a pipe or a device, not a file"));
+    }
+    fs::File::open(path)
 }
 
 /// Writes a whole file as [`replace_file`] does.

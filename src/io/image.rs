@@ -1,4 +1,4 @@
-//! Grey images from PNG, PGM and JPEG files.
+//! Grey images from PNG, PGM, JPEG and TIFF files.
 use super::error::FileError;
 use super::files::{read_bytes, write_bytes};
 use ::image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, Limits};
@@ -84,10 +84,10 @@ impl GreyImage {
 ///
 /// - Images of 8 bits are not scaled.
 /// - A PGM or PPM states m, its `maxval`.
-/// - A PNG of 16 bits does not. There m is 65535, or 2ᵇ − 1 where the caller gives the `bits` b, 1
-///   to 16. A camera of 12 bits often writes its samples into 16 as they are. An image without any
-///   sample above 4095 is therefore refused until the bits are given. It is taken where all samples
-///   are multiples of 257, as 8 bits stretched to 16 are.
+/// - A PNG or TIFF of 16 bits does not. There m is 65535, or 2ᵇ − 1 where the caller gives the
+///   `bits` b, 1 to 16. A camera of 12 bits often writes its samples into 16 as they are. An image
+///   without any sample above 4095 is therefore refused until the bits are given. It is taken where
+///   all samples are multiples of 257, as 8 bits stretched to 16 are.
 ///
 /// ```
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -150,15 +150,24 @@ pub fn image_size(path: impl AsRef<Path>) -> Option<(usize, usize)> {
 /// # Errors
 /// As [`read_grey_image`].
 pub fn read_grey_levels(path: &Path, bits: Option<u8>) -> Result<Array2<u8>, FileError> {
-    let bytes = read_bytes(path)?;
-    match decode(&bytes, path)? {
+    levels_of(&read_bytes(path)?, path, Grey::default(), bits)
+}
+
+/// The levels of an encoded image in eight bits a pixel. Errors call it `path`.
+pub fn levels_of(
+    bytes: &[u8],
+    path: &Path,
+    grey: Grey,
+    bits: Option<u8>,
+) -> Result<Array2<u8>, FileError> {
+    match decode(bytes, path)? {
         // Samples that are grey levels already are taken as they stand.
         DynamicImage::ImageLuma8(image) => {
             let shape = (image.height() as usize, image.width() as usize);
             let levels = Array2::from_shape_vec(shape, image.into_raw());
             Ok(levels.unwrap_or_else(|_| Array2::zeros(shape)))
         }
-        image => Ok(to_grey(image, &bytes, path, Grey::default(), bits)?.to_u8()),
+        image => Ok(to_grey(image, bytes, path, grey, bits)?.to_u8()),
     }
 }
 
@@ -215,9 +224,13 @@ pub fn read_frame(
     Err(FileError::field(file, field, reason))
 }
 
+/// Longest side and most pixels that are read. A header of some bytes can announce any size.
+pub fn largest_image() -> (u32, u64) {
+    (30_000, 64_000_000)
+}
+
 fn decode(bytes: &[u8], path: &Path) -> Result<DynamicImage, FileError> {
-    // Longest side and most pixels that are read. A header of some bytes can announce any size.
-    let (side, pixels) = (30_000, 64_000_000);
+    let (side, pixels) = largest_image();
     let mut limits = Limits::default();
     limits.max_image_width = Some(side);
     limits.max_image_height = Some(side);

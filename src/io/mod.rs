@@ -6,8 +6,9 @@
 //! | [`read_columns`] | CSV columns by name, in SI units |
 //! | [`read_grid`] | CSV matrices, empty cells and `nan` as NaN |
 //! | [`read_cases`] | point-matching case files (`m` and `t` rows) |
-//! | [`read_grey_image`] | PNG, PGM, JPEG, grey or colour, 8 or 16 bits |
-//! | [`read_colour_levels`] | PNG, PPM, JPEG in colour, in 8 bits |
+//! | [`read_grey_image`] | PNG, PGM, JPEG, TIFF, grey or colour, 8 or 16 bits |
+//! | [`read_colour_levels`] | PNG, PPM, JPEG, TIFF in colour, in 8 bits |
+//! | [`FrameReader`] | frames of videos, pipes and stacks of images, one after the other |
 //!
 //! In CSV, fields are separated by commas, semicolons or tabs, and may stand in double quotes. A
 //! first line without any number is a header. Empty lines and lines that start with `#` are passed
@@ -20,6 +21,7 @@
 mod cases;
 mod error;
 mod files;
+mod frames;
 mod image;
 mod range;
 mod table;
@@ -29,6 +31,7 @@ mod tests;
 pub use cases::{CasePoints, MatchCase, read_cases, write_case_result};
 pub use error::{FileError, FilePlace};
 pub use files::{read_bytes, replace_file, write_bytes};
+pub use frames::FrameReader;
 pub use image::{
     Grey, GreyImage, image_size, read_colour_levels, read_grey_image, read_grey_levels,
     write_grey_image,

@@ -1,5 +1,6 @@
 //! What the documentation and the properties of `tests/suite/io_properties` do not show.
 use super::*;
+use crate::pipeline::FrameSource;
 use ::image::{ImageBuffer, ImageFormat, Luma};
 use std::io::Cursor;
 use std::path::PathBuf;
@@ -262,4 +263,227 @@ fn bits_given_beside_an_announced_largest_value_count_in_its_samples() {
     assert!((image.levels[[0, 1]] - 85.0).abs() < 255.0 / 16_000.0);
     let end = ": it has a sample of 1023, more than 9 bits hold";
     assert_eq!(sentence(grey(&bytes, Some(9))), end);
+}
+
+/// The frames of a stream and, where it breaks off, the sentence about it.
+fn frames_of(bytes: &[u8]) -> (Vec<ndarray::Array2<u8>>, Option<String>) {
+    let mut frames = Vec::new();
+    let mut frame = ndarray::Array2::default((0, 0));
+    let mut reader = match FrameReader::new(Cursor::new(bytes.to_vec()), "pipe", 80.0) {
+        Ok(reader) => reader,
+        Err(error) => return (frames, Some(error.to_string())),
+    };
+    loop {
+        match reader.next_frame(&mut frame) {
+            Ok(Some(time_s)) => {
+                let rate_hz = reader.frame_rate_hz().unwrap_or(80.0);
+                assert_eq!(time_s, frames.len() as f64 / rate_hz);
+                frames.push(frame.clone());
+            }
+            Ok(None) => return (frames, None),
+            Err(error) => {
+                assert_eq!(reader.next_frame(&mut frame).unwrap(), None, "it has ended");
+                return (frames, Some(error.to_string()));
+            }
+        }
+    }
+}
+
+/// Three frames of 5 × 3 pixels.
+fn three_frames() -> Vec<ndarray::Array2<u8>> {
+    let frame =
+        |k: usize| ndarray::Array2::from_shape_fn((3, 5), |(r, c)| (40 * k + 7 * r + c) as u8);
+    (1..4).map(frame).collect()
+}
+
+/// Frames as a video. A chroma plane has 3 × 2 samples.
+fn video(space: &str, bytes_per_sample: usize, chroma_planes: usize) -> Vec<u8> {
+    let mut bytes = format!("YUV4MPEG2 W5 H3 F25:1 Ip A1:1 C{space} XYSCSS=A\n").into_bytes();
+    for frame in three_frames() {
+        bytes.extend(b"FRAME Ip\n");
+        for level in frame {
+            // Of 12 bits 4095 is as white as 255 of 8.
+            let sample = ((u32::from(level) * 4095 / 255) as u16).to_le_bytes();
+            let eight = [level];
+            bytes.extend(if bytes_per_sample == 2 {
+                &sample[..]
+            } else {
+                &eight
+            });
+        }
+        bytes.extend(vec![128; 6 * bytes_per_sample * chroma_planes]);
+    }
+    bytes
+}
+
+fn anymaps() -> Vec<u8> {
+    let frame = |frame: ndarray::Array2<u8>| {
+        [
+            b"P5 # a comment\n5 3\n255\n",
+            frame.into_raw_vec_and_offset().0.as_slice(),
+        ]
+        .concat()
+    };
+    three_frames().into_iter().flat_map(frame).collect()
+}
+
+/// A TIFF of three pages, each its samples and its directory.
+fn pages(little_endian: bool) -> Vec<u8> {
+    let two = |v: u16| {
+        if little_endian {
+            v.to_le_bytes()
+        } else {
+            v.to_be_bytes()
+        }
+    };
+    let four = |v: u32| {
+        if little_endian {
+            v.to_le_bytes()
+        } else {
+            v.to_be_bytes()
+        }
+    };
+    let magic: &[u8] = if little_endian { b"II*\0" } else { b"MM\0*" };
+    let mut bytes = [magic, &four(8 + 15)].concat();
+    for (k, frame) in three_frames().into_iter().enumerate() {
+        let samples = bytes.len() as u32;
+        bytes.extend(frame);
+        // Width, height, bits, compression, black is zero, strips, samples, rows, bytes.
+        let entries = [
+            (256, 5),
+            (257, 3),
+            (258, 8),
+            (259, 1),
+            (262, 1),
+            (273, samples),
+            (277, 1),
+            (278, 3),
+            (279, 15),
+        ];
+        bytes.extend(two(entries.len() as u16));
+        for (tag, value) in entries {
+            bytes.extend([two(tag), two(4)].concat());
+            bytes.extend([four(1), four(value)].concat());
+        }
+        let next = if k < 2 {
+            bytes.len() as u32 + 4 + 15
+        } else {
+            0
+        };
+        bytes.extend(four(next));
+    }
+    bytes
+}
+
+#[test]
+fn every_stream_gives_the_frames_that_went_in() {
+    for bytes in [
+        video("mono", 1, 0),
+        video("420jpeg", 1, 2),
+        video("mono12", 2, 0),
+        video("420p12", 2, 2),
+        anymaps(),
+        pages(true),
+        pages(false),
+    ] {
+        let start = String::from_utf8_lossy(&bytes[..40]).into_owned();
+        assert_eq!(frames_of(&bytes), (three_frames(), None), "{start}");
+    }
+}
+
+/// What came before the break is kept, and the break is one sentence.
+#[test]
+fn a_stream_may_break_anywhere() {
+    for bytes in [
+        video("420jpeg", 1, 2),
+        video("mono12", 2, 0),
+        anymaps(),
+        pages(true),
+    ] {
+        for end in 0..bytes.len() {
+            let (frames, broken) = frames_of(&bytes[..end]);
+            assert_eq!(frames, three_frames()[..frames.len()]);
+            let whole = bytes[..end].ends_with(b"\n") || frames.len() == 3;
+            let sentence = broken.unwrap_or_default();
+            assert!(
+                !sentence.contains('\n') && sentence.len() < 300,
+                "{sentence}"
+            );
+            assert!(whole || end < 10 || !sentence.is_empty() || is_between(&bytes, end));
+        }
+    }
+}
+
+/// Whether a frame of the stream ends here.
+fn is_between(bytes: &[u8], end: usize) -> bool {
+    let rest = &bytes[end..];
+    rest.starts_with(b"FRAME") || rest.starts_with(b"P5") || bytes.starts_with(b"II")
+}
+
+#[test]
+fn what_is_no_stream_is_refused_in_a_sentence() {
+    let with = |header: &str| format!("YUV4MPEG2 {header}\nFRAME\nabc").into_bytes();
+    let mut another_size = anymaps();
+    another_size.extend(b"P5\n3 5\n255\n123456789012345");
+    let mut lost = video("mono", 1, 0);
+    lost.extend(b"garbage");
+    let mut endless = pages(true);
+    let last = endless.len() - 4;
+    endless[last..].copy_from_slice(&23_u32.to_le_bytes());
+    for (bytes, kept, says) in [
+        (
+            b"".to_vec(),
+            0,
+            "pipe: expected a video or an image, found no bytes",
+        ),
+        (with("W0 H0"), 0, "found 0 × 0 pixels"),
+        (with("W65535 H65535"), 0, "found 65535 × 65535 pixels"),
+        (with("W30000 H30000"), 0, "found 30000 × 30000 pixels"),
+        (with("W-3 H1"), 0, "found `YUV4MPEG2 W-3 H1`"),
+        (with("W3"), 0, "found `"),
+        (with("W99999999999999999999 H1"), 0, "found `"),
+        (with("W3 H1 Cpalette"), 0, "the colour space `palette`"),
+        (with("W3 H1 Cmono99"), 0, "the colour space `mono99`"),
+        (with(&"X".repeat(5000)), 0, "a first line of more than"),
+        (
+            with("W3 H1 Cmono16"),
+            0,
+            "frame 1: expected 6 bytes of samples, found the end after 3",
+        ),
+        (
+            b"P5\n0 0\n255\n".to_vec(),
+            0,
+            "pipe, frame 1: expected the header of a PGM",
+        ),
+        (
+            b"P6\n65535 65535\n255\n".to_vec(),
+            0,
+            "at most 64 million pixels, found P6",
+        ),
+        (b"P5\n3 1\n70000\nabc".to_vec(), 0, "expected the header"),
+        (b"P5\n3 1\n0\nabc".to_vec(), 0, "expected the header"),
+        (
+            b"P5\n30000 2000\n255\nabc".to_vec(),
+            0,
+            "found the end after 3",
+        ),
+        (
+            another_size,
+            3,
+            "frame 4: expected 5 × 3 pixels as in the first, found 3 × 5",
+        ),
+        (lost, 3, "frame 4: expected the word FRAME, found `garbage`"),
+        (b"no stream at all".to_vec(), 0, "cannot use the image pipe"),
+        (
+            b"II*\0\xff\xff\xff\x7f".to_vec(),
+            0,
+            "cannot use the image pipe",
+        ),
+        (endless, 3, ""),
+    ] {
+        let (frames, broken) = frames_of(&bytes);
+        assert_eq!(frames.len(), kept, "{says}");
+        let sentence = broken.unwrap_or_default();
+        assert!(sentence.contains(says), "`{sentence}` lacks `{says}`");
+    }
 }

@@ -59,7 +59,7 @@ pub struct ImageFolder {
 
 #[cfg(feature = "scene")]
 impl ImageFolder {
-    /// The PNG, PGM and JPEG files of `folder`.
+    /// The PNG, PGM, JPEG and TIFF files of `folder`.
     ///
     /// # Errors
     /// [`FileError::Read`](crate::io::FileError::Read) where the folder cannot be listed.
@@ -82,7 +82,8 @@ impl ImageFolder {
                 .extension()
                 .and_then(|e| e.to_str())
                 .unwrap_or_default();
-            ["png", "pgm", "jpg", "jpeg"].contains(&extension.to_ascii_lowercase().as_str())
+            ["png", "pgm", "jpg", "jpeg", "tif", "tiff"]
+                .contains(&extension.to_ascii_lowercase().as_str())
         };
         files.retain(is_image);
         files.sort();

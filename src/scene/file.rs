@@ -92,6 +92,18 @@ pub struct SceneFrame {
     pub time_s: Option<f64>,
 }
 
+impl SceneFrame {
+    /// An image of which nothing else is known.
+    pub fn new(image: impl Into<PathBuf>) -> Self {
+        Self {
+            image: image.into(),
+            force_n: None,
+            force_error_n: None,
+            time_s: None,
+        }
+    }
+}
+
 /// A layer of the waveguide.
 ///
 /// ```

@@ -67,7 +67,7 @@
 //! ```
 //!
 //! The names of a stage are those of its choice in [`StagesConfig`](crate::pipeline::StagesConfig).
-//! Images are PNG, PGM or JPEG. Colour becomes grey by the luma of Rec. 601, see
+//! Images are PNG, PGM, JPEG or TIFF. Colour becomes grey by the luma of Rec. 601, see
 //! [`read_grey_image`](crate::io::read_grey_image). Relative paths are relative to the scene file.
 //! Fields counted in errors (`frames[2]`) start at 1.
 mod data;

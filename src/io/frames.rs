@@ -1,0 +1,502 @@
+//! Frames one after the other, from a video, concatenated images, a stack of pages or one image.
+use super::error::{FileError, FilePlace, quoted};
+use super::files::{LARGEST_FILE, open_file};
+use super::image::{Grey, largest_image, levels_of};
+use crate::pipeline::FrameSource;
+use ndarray::Array2;
+use std::collections::HashSet;
+use std::io::{BufRead, BufReader, Cursor, Read, Result as IoResult, copy, sink, stdin};
+use std::mem::take;
+use std::path::{Path, PathBuf};
+
+/// Longest line of a video's header and longest header of an image, in bytes. Longer ones are no
+/// video, and a line without an end would fill the memory.
+const LONGEST_HEADER: u64 = 4096;
+
+/// The frames of a stream of bytes: a pipe from a camera, a video, a file.
+///
+/// The first bytes show the format.
+///
+/// - **YUV4MPEG2**, as `ffmpeg -f yuv4mpegpipe` writes it. The luma plane is the grey, as it is
+///   stored. Samples have 8 to 16 bits.
+/// - **PGM and PPM**, of binary samples, any number one after the other.
+/// - **TIFF**, a frame a page.
+/// - Any other image of [`read_grey_image`](super::read_grey_image): one frame.
+///
+/// Memory is that of one frame of videos and PGM, and that of the whole file of the others.
+///
+/// ```
+/// use ndarray::{Array2, array};
+/// use tactile_imaging::{io::FrameReader, pipeline::FrameSource};
+/// let video = b"YUV4MPEG2 W2 H1 F25:1 Cmono\nFRAME\n\x0a\x14FRAME\n\x0b\x15FRAME\n\x0c";
+/// let mut camera = FrameReader::new(&video[..], "pipe", 80.0)?;
+/// assert_eq!(camera.frame_rate_hz(), Some(25.0));
+/// let mut frame = Array2::zeros((0, 0));
+/// assert_eq!(camera.next_frame(&mut frame)?, Some(0.0));
+/// assert_eq!(camera.next_frame(&mut frame)?, Some(1.0 / 25.0));
+/// assert_eq!(frame, array![[11, 21]]);
+/// // The third frame is cut short.
+/// let error = camera.next_frame(&mut frame).unwrap_err().to_string();
+/// assert_eq!(error, "pipe, frame 3: expected 2 bytes of samples, found the end after 1");
+/// assert_eq!(camera.next_frame(&mut frame)?, None);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub struct FrameReader {
+    input: Box<dyn BufRead + Send>,
+    format: Format,
+    name: PathBuf,
+    grey: Grey,
+    bits: Option<u8>,
+    /// The number of frames that were read.
+    frames: u64,
+    /// Rows and columns of the first frame, which the others have too.
+    size: Option<(usize, usize)>,
+    default_rate_hz: f64,
+}
+
+impl std::fmt::Debug for FrameReader {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("FrameReader")
+            .field("name", &self.name)
+            .field("format", &self.format)
+            .finish_non_exhaustive()
+    }
+}
+
+enum Format {
+    Video(Video),
+    Anymaps,
+    Pages(Pages),
+    Image(Vec<u8>),
+    Ended,
+}
+
+impl std::fmt::Debug for Format {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Video(_) => "YUV4MPEG2",
+            Self::Anymaps => "PGM or PPM",
+            Self::Pages(_) => "TIFF",
+            Self::Image(_) => "image",
+            Self::Ended => "ended",
+        })
+    }
+}
+
+impl FrameReader {
+    /// Opens a file, or standard input where the path is `-`. A stream that does not state its
+    /// frame rate has `frame_rate_hz`.
+    ///
+    /// # Errors
+    /// [`FileError`] where the file cannot be read or its header is no stream's.
+    pub fn open(path: impl AsRef<Path>, frame_rate_hz: f64) -> Result<Self, FileError> {
+        let path = path.as_ref();
+        if path == Path::new("-") {
+            return Self::new(stdin(), "standard input", frame_rate_hz);
+        }
+        let file = open_file(path).map_err(|source| FileError::Read {
+            path: path.into(),
+            source,
+        })?;
+        Self::new(file, path, frame_rate_hz)
+    }
+
+    /// Reads frames from any reader. Errors call it by `name`.
+    ///
+    /// # Errors
+    /// [`FileError`] where the reader fails or its first bytes are no stream's.
+    pub fn new(
+        input: impl Read + Send + 'static,
+        name: impl Into<PathBuf>,
+        frame_rate_hz: f64,
+    ) -> Result<Self, FileError> {
+        let name = name.into();
+        let failed = |source| FileError::Read {
+            path: name.clone(),
+            source,
+        };
+        let mut input = BufReader::with_capacity(1 << 16, input);
+        // A pipe may deliver a signature byte by byte.
+        let mut start = Vec::new();
+        input
+            .by_ref()
+            .take(10)
+            .read_to_end(&mut start)
+            .map_err(failed)?;
+        let mut input = Cursor::new(start.clone()).chain(input);
+        let format = match start.as_slice() {
+            b"YUV4MPEG2 " => {
+                let header = line(&mut input).map_err(failed)?;
+                let video = Video::parse(&header);
+                Format::Video(video.map_err(|found| {
+                    let expected = "the header of a YUV4MPEG2 video";
+                    FileError::content(&name, FilePlace::File, expected, found)
+                })?)
+            }
+            [b'P', b'5' | b'6', ..] => Format::Anymaps,
+            [] => {
+                let expected = "a video or an image";
+                return Err(FileError::content(
+                    &name,
+                    FilePlace::File,
+                    expected,
+                    "no bytes",
+                ));
+            }
+            _ => {
+                let mut bytes = Vec::new();
+                let whole = input.by_ref().take(LARGEST_FILE).read_to_end(&mut bytes);
+                whole.map_err(failed)?;
+                Pages::of(&bytes).map_or_else(|| Format::Image(take(&mut bytes)), Format::Pages)
+            }
+        };
+        Ok(Self {
+            input: Box::new(input),
+            format,
+            name,
+            grey: Grey::default(),
+            bits: None,
+            frames: 0,
+            size: None,
+            default_rate_hz: frame_rate_hz,
+        })
+    }
+
+    /// How colours become grey, in formats that store colours as red, green and blue.
+    #[must_use]
+    pub fn with_grey(mut self, grey: Grey) -> Self {
+        self.grey = grey;
+        self
+    }
+
+    /// The bits of the camera, as [`read_grey_image`](super::read_grey_image) takes them.
+    #[must_use]
+    pub fn with_bits(mut self, bits: Option<u8>) -> Self {
+        self.bits = bits;
+        self
+    }
+
+    /// The frame rate that the stream itself states.
+    pub fn frame_rate_hz(&self) -> Option<f64> {
+        match &self.format {
+            Format::Video(video) => video.rate_hz,
+            _ => None,
+        }
+    }
+
+    /// The next frame, in the memory of an older one where the format allows that.
+    fn read(&mut self, memory: Vec<u8>) -> Result<Option<Array2<u8>>, FileError> {
+        let place = || FilePlace::Frame(self.frames + 1);
+        let wrong = |expected: String, found: String| {
+            FileError::content(&self.name, place(), expected, found)
+        };
+        let failed = |source| FileError::Read {
+            path: self.name.clone(),
+            source,
+        };
+        let levels = |bytes: &[u8]| levels_of(bytes, &self.name, self.grey, self.bits);
+        let cut = |expected: usize, found: usize| {
+            let expected = format!("{expected} bytes of samples");
+            Err(wrong(expected, format!("the end after {found}")))
+        };
+        match &mut self.format {
+            Format::Ended => Ok(None),
+            Format::Image(bytes) => {
+                let bytes = take(bytes);
+                self.format = Format::Ended;
+                levels(&bytes).map(Some)
+            }
+            Format::Pages(pages) => pages.turn().map(&levels).transpose(),
+            Format::Anymaps => {
+                let header = anymap_header(&mut self.input).map_err(failed)?;
+                let Some(mut bytes) = header else {
+                    return Ok(None);
+                };
+                let found = quoted(&String::from_utf8_lossy(&bytes), 40);
+                let Some((_, samples)) = anymap_samples(&bytes) else {
+                    let expected = "the header of a PGM or PPM image of at most 64 million pixels";
+                    return Err(wrong(expected.into(), found));
+                };
+                let header = bytes.len();
+                append(&mut self.input, samples, &mut bytes).map_err(failed)?;
+                if bytes.len() < header + samples {
+                    return cut(samples, bytes.len() - header);
+                }
+                levels(&bytes).map(Some)
+            }
+            Format::Video(video) => {
+                let start = line(&mut self.input).map_err(failed)?;
+                if start.is_empty() {
+                    return Ok(None);
+                }
+                if !(start.starts_with(b"FRAME") && start.ends_with(b"\n")) {
+                    let found = quoted(&String::from_utf8_lossy(&start), 40);
+                    return Err(wrong("the word FRAME".into(), format!("`{found}`")));
+                }
+                let luma = video.rows * video.columns * video.bytes_per_sample();
+                let mut samples = memory;
+                samples.clear();
+                append(&mut self.input, luma, &mut samples).map_err(failed)?;
+                let rest = (&mut self.input).take(video.chroma_bytes as u64);
+                let skipped = copy(&mut { rest }, &mut sink()).map_err(failed)? as usize;
+                if samples.len() + skipped < luma + video.chroma_bytes {
+                    return cut(luma + video.chroma_bytes, samples.len() + skipped);
+                }
+                if video.depth > 8 {
+                    return levels(&video.anymap(&samples)).map(Some);
+                }
+                let frame = Array2::from_shape_vec((video.rows, video.columns), samples);
+                Ok(frame.ok())
+            }
+        }
+    }
+}
+
+impl FrameSource for FrameReader {
+    type Error = FileError;
+
+    /// Writes the next frame into `frame` and returns its time in seconds, counted from the first.
+    ///
+    /// # Errors
+    /// [`FileError::Content`] where a frame is cut short, is none, or has another size than the
+    /// first, and [`FileError::Image`] where it cannot be decoded. The stream has then ended.
+    fn next_frame(&mut self, frame: &mut Array2<u8>) -> Result<Option<f64>, Self::Error> {
+        let rate_hz = self.frame_rate_hz().unwrap_or(self.default_rate_hz);
+        let memory = take(frame).into_raw_vec_and_offset().0;
+        let read = self.read(memory).and_then(|next| {
+            let Some(next) = next else {
+                return Ok(None);
+            };
+            let (rows, columns) = *self.size.get_or_insert(next.dim());
+            if next.dim() == (rows, columns) {
+                return Ok(Some(next));
+            }
+            let expected = format!("{columns} × {rows} pixels as in the first");
+            let found = format!("{} × {}", next.ncols(), next.nrows());
+            let place = FilePlace::Frame(self.frames + 1);
+            Err(FileError::content(&self.name, place, expected, found))
+        });
+        match read {
+            Ok(Some(next)) => {
+                *frame = next;
+                self.frames += 1;
+                Ok(Some((self.frames - 1) as f64 / rate_hz))
+            }
+            ended => {
+                self.format = Format::Ended;
+                ended.map(|_| None)
+            }
+        }
+    }
+}
+
+/// A line with its end, without one where the stream ends or the line is too long.
+fn line(input: &mut dyn BufRead) -> IoResult<Vec<u8>> {
+    let mut line = Vec::new();
+    input.take(LONGEST_HEADER).read_until(b'\n', &mut line)?;
+    Ok(line)
+}
+
+/// Appends the next bytes, fewer at the end of the stream. Memory grows with what arrives, not with
+/// what a header announces.
+fn append(input: &mut dyn BufRead, length: usize, bytes: &mut Vec<u8>) -> IoResult<usize> {
+    input.take(length as u64).read_to_end(bytes)
+}
+
+/// What the header of a YUV4MPEG2 video states.
+struct Video {
+    columns: usize,
+    rows: usize,
+    depth: u32,
+    /// Bytes of the planes after the luma.
+    chroma_bytes: usize,
+    rate_hz: Option<f64>,
+}
+
+impl Video {
+    /// The header, or the part of it that cannot be used.
+    fn parse(header: &[u8]) -> Result<Self, String> {
+        let text = String::from_utf8_lossy(header);
+        let Some(text) = text.strip_suffix('\n') else {
+            return Err(format!("a first line of more than {} bytes", header.len()));
+        };
+        let field = |name| {
+            text.split(' ')
+                .skip(1)
+                .find_map(|word| word.strip_prefix(name))
+        };
+        let side = |name: char| {
+            let digits = field(name).unwrap_or_default();
+            digits
+                .parse::<usize>()
+                .map_err(|_| format!("`{}`", quoted(text, 80)))
+        };
+        let (columns, rows) = (side('W')?, side('H')?);
+        if !is_read(columns, rows) {
+            return Err(format!("{columns} × {rows} pixels"));
+        }
+        let space = field('C').unwrap_or("420");
+        let halves = [columns, rows].map(|side| side.div_ceil(2));
+        let unknown = || format!("the colour space `{}`", quoted(space, 20));
+        let known = [
+            ("mono", 0),
+            ("420", 2 * halves[0] * halves[1]),
+            ("422", 2 * halves[0] * rows),
+            ("444alpha", 3 * columns * rows),
+            ("444", 2 * columns * rows),
+            ("411", 2 * columns.div_ceil(4) * rows),
+        ];
+        let found = known.iter().find(|(name, _)| space.starts_with(name));
+        let (name, chroma) = found.ok_or_else(unknown)?;
+        let depth = match space[name.len()..].trim_start_matches('p') {
+            // How the colours of 8 bits are placed.
+            "" | "jpeg" | "mpeg2" | "aldv" => 8,
+            digits => digits.parse().map_err(|_| unknown())?,
+        };
+        if !(8..=16).contains(&depth) {
+            return Err(unknown());
+        }
+        let rate = field('F').and_then(|rate| rate.split_once(':'));
+        let rate = rate.and_then(|(n, d)| Some(n.parse::<f64>().ok()? / d.parse::<f64>().ok()?));
+        let mut video = Self {
+            columns,
+            rows,
+            depth,
+            chroma_bytes: 0,
+            rate_hz: rate.filter(|rate| *rate > 0.0 && rate.is_finite()),
+        };
+        video.chroma_bytes = chroma * video.bytes_per_sample();
+        Ok(video)
+    }
+
+    fn bytes_per_sample(&self) -> usize {
+        if self.depth > 8 { 2 } else { 1 }
+    }
+
+    /// The luma as a PGM, whose header states the bits: one rule for deep samples of all formats.
+    fn anymap(&self, luma: &[u8]) -> Vec<u8> {
+        let largest = (1_u32 << self.depth) - 1;
+        let header = format!("P5\n{} {}\n{largest}\n", self.columns, self.rows);
+        let swapped = luma
+            .chunks_exact(2)
+            .flat_map(|sample| [sample[1], sample[0]]);
+        header.into_bytes().into_iter().chain(swapped).collect()
+    }
+}
+
+fn is_read(columns: usize, rows: usize) -> bool {
+    let (side, pixels) = largest_image();
+    let sides = [columns, rows];
+    sides.iter().all(|&s| s > 0 && s <= side as usize) && columns * rows <= pixels as usize
+}
+
+/// The header of the next PGM or PPM up to the byte before its samples. None at the end.
+fn anymap_header(input: &mut dyn BufRead) -> IoResult<Option<Vec<u8>>> {
+    let mut header = Vec::new();
+    let (mut words, mut in_word, mut in_comment) = (0, false, false);
+    for byte in input.take(LONGEST_HEADER).bytes() {
+        let byte = byte?;
+        // Some writers end an image with a line's end.
+        if header.is_empty() && byte.is_ascii_whitespace() {
+            continue;
+        }
+        header.push(byte);
+        in_comment = byte != b'\n' && (in_comment || (byte == b'#' && !in_word));
+        let part_of_word = !in_comment && !byte.is_ascii_whitespace();
+        words += usize::from(in_word && !part_of_word);
+        in_word = part_of_word;
+        // Magic number, width, height, largest value, and one white space.
+        if words == 4 {
+            break;
+        }
+    }
+    Ok(Some(header).filter(|header| !header.is_empty()))
+}
+
+/// Size, and the bytes of the samples, of an image with this header.
+fn anymap_samples(header: &[u8]) -> Option<([usize; 2], usize)> {
+    let text = std::str::from_utf8(header).ok()?;
+    let lines = text
+        .lines()
+        .map(|line| line.split('#').next().unwrap_or(""));
+    let words: Vec<&str> = lines.flat_map(str::split_ascii_whitespace).collect();
+    let &[magic, width, height, largest] = words.as_slice() else {
+        return None;
+    };
+    let channels = match magic {
+        "P5" => 1,
+        "P6" => 3,
+        _ => return None,
+    };
+    let (width, height) = (width.parse().ok()?, height.parse().ok()?);
+    let bytes = match largest.parse().ok()? {
+        1..=255 => 1,
+        256..=65_535_u32 => 2,
+        _ => return None,
+    };
+    is_read(width, height).then(|| ([width, height], width * height * channels * bytes))
+}
+
+/// The pages of a TIFF file.
+struct Pages {
+    bytes: Vec<u8>,
+    little_endian: bool,
+    /// Where the directory of the next page stands.
+    next: usize,
+    /// Directories that were read: a chain that returns to one of them would never end.
+    seen: HashSet<usize>,
+}
+
+impl Pages {
+    /// None where the bytes are no TIFF of 32-bit offsets.
+    fn of(bytes: &[u8]) -> Option<Self> {
+        let little_endian = match bytes.get(..4)? {
+            b"II*\0" => true,
+            b"MM\0*" => false,
+            _ => return None,
+        };
+        let mut pages = Self {
+            bytes: bytes.to_vec(),
+            little_endian,
+            next: 0,
+            seen: HashSet::new(),
+        };
+        pages.next = pages.offset(4)?;
+        Some(pages)
+    }
+
+    fn offset(&self, at: usize) -> Option<usize> {
+        let bytes: [u8; 4] = self.bytes.get(at..at.checked_add(4)?)?.try_into().ok()?;
+        let offset = match self.little_endian {
+            true => u32::from_le_bytes(bytes),
+            false => u32::from_be_bytes(bytes),
+        };
+        Some(offset as usize)
+    }
+
+    /// The file with the next page as its first, which is the one that decoders of images read.
+    fn turn(&mut self) -> Option<&[u8]> {
+        let page = self.next;
+        // The first directory is the decoder's to judge, wherever it stands.
+        if !self.seen.is_empty() && page == 0 || !self.seen.insert(page) {
+            return None;
+        }
+        let count: Option<[u8; 2]> = self
+            .bytes
+            .get(page..)
+            .and_then(|d| d.get(..2)?.try_into().ok());
+        let entries = count.map_or(0, |count| match self.little_endian {
+            true => u16::from_le_bytes(count),
+            false => u16::from_be_bytes(count),
+        });
+        self.next = self
+            .offset(page + 2 + 12 * usize::from(entries))
+            .unwrap_or(0);
+        let first = match self.little_endian {
+            true => (page as u32).to_le_bytes(),
+            false => (page as u32).to_be_bytes(),
+        };
+        self.bytes[4..8].copy_from_slice(&first);
+        Some(&self.bytes)
+    }
+}
