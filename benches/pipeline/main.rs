@@ -202,7 +202,7 @@ impl Table {
             let force = frame.force_n.as_ref().expect("a force").value;
             self.force_error
                 .push(100.0 * (force / truth.contact.force_n - 1.0).abs());
-            let height = frame.surface_height_m.as_ref().expect("a surface");
+            let height = frame.surface_height_m.as_ref().expect("a surface").value;
             self.height_error
                 .push(100.0 * (height / truth.contact.apparent_height_m(0.0) - 1.0).abs());
         }

@@ -137,7 +137,7 @@ impl Pipeline {
     /// let exact = trial.pipeline()?;
     /// let pipeline = exact.clone().with_settings(|settings| {
     ///     settings.binning = Binning::Blocks(2);
-    ///     settings.object_radius_error_m = 0.09e-3; // 3 % of the ball's radius
+    ///     settings.object_radius_error_m = Some(0.09e-3); // 3 % of the ball's radius
     /// })?;
     /// let press = trial.press(&pipeline)?;
     /// assert!((press.surface(0)?.pixel_size_m[0] / camera.pixel_size_m[0] - 2.0).abs() < 1e-12);
@@ -149,7 +149,7 @@ impl Pipeline {
     /// let rigid = exact.clone().with_settings(|settings| settings.waveguide = None)?;
     /// assert!(trial.press(&rigid)?.modulus()?.youngs_modulus_pa < trial.press(&exact)?.modulus()?.youngs_modulus_pa);
     /// assert!(exact.clone().with_settings(|settings| settings.smoothing_px = 8).is_err(), "no middle");
-    /// assert!(exact.with_settings(|settings| settings.force_scale_error = f64::NAN).is_err());
+    /// assert!(exact.with_settings(|settings| settings.force_scale_error = Some(f64::NAN)).is_err());
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     ///

@@ -7,6 +7,7 @@ use crate::force::{
 use ndarray::{Array2, ArrayView2};
 use std::f64::consts::PI;
 use std::sync::Arc;
+use tactile_core::statistics::effective_degrees_of_freedom;
 
 /// One frame to contact and force.
 ///
@@ -141,6 +142,9 @@ pub struct ContactReading {
     pub force_calibration_n: f64,
     /// Contact radius in metres. Of a flat face √(A/π), that of a disc of its area.
     pub contact_radius_m: Estimate,
+    /// The part of the radius's error that is common to frames of one load, in metres: the law of
+    /// the pressure's profile and the size of a pixel.
+    pub radius_common_m: f64,
     /// Indentation in metres, where the sensor measures depth.
     pub indentation_m: Option<Estimate>,
     /// Centroid (x, y) in pixels.
@@ -191,6 +195,7 @@ impl ContactReading {
             force_noise_n: force_n.map_or(0.0, |force| force.standard_error),
             force_calibration_n: 0.0,
             contact_radius_m,
+            radius_common_m: 0.0,
             indentation_m: None,
             centroid_px: [Estimate::exact(0.0); 2],
             area_m2: PI * contact_radius_m.value.powi(2),
@@ -233,12 +238,37 @@ impl ContactReading {
         self.peak_stress_pa = None;
     }
 
+    /// The light is by a factor brighter than that of the calibration.
+    pub(super) fn divide_by_gain(&mut self, gain: f64) {
+        self.force_n = self.force_n.map(|force| force * gain.recip());
+        self.force_noise_n /= gain;
+        self.force_calibration_n /= gain;
+    }
+
+    /// Adds relative errors that all forces and all lengths have in common.
+    pub(super) fn take_scales(&mut self, force_scale: f64, length_scale: f64) {
+        if let Some(force) = &mut self.force_n {
+            let scale = force_scale * force.value.abs();
+            let before = (force.standard_error.powi(2), force.degrees_of_freedom);
+            // Of a scale the error is stated, of a calibration it may be estimated from few pairs.
+            force.degrees_of_freedom =
+                effective_degrees_of_freedom(&[before, (scale * scale, None)]);
+            force.standard_error = force.standard_error.hypot(scale);
+            self.force_calibration_n = self.force_calibration_n.hypot(scale);
+        }
+        let scale = length_scale * self.contact_radius_m.value;
+        let radius = &mut self.contact_radius_m.standard_error;
+        *radius = radius.hypot(scale);
+        self.radius_common_m = self.radius_common_m.hypot(scale);
+    }
+
     /// The contact is a flat face of that area: the radius is that of a disc as large.
     pub(super) fn take_area(&mut self, area_m2: Estimate) {
         let radius_m = (area_m2.value / PI).sqrt();
         self.area_m2 = area_m2.value;
         let error_m = 0.5 * radius_m * area_m2.standard_error / area_m2.value;
         self.contact_radius_m = Estimate::new(radius_m, error_m);
+        self.radius_common_m = 0.0;
     }
 
     /// The reading of a measured force. `None` without contact.
@@ -246,7 +276,9 @@ impl ContactReading {
         let (contact, reading, radius) = (force.contact?, force.reading?, force.contact_radius_m?);
         let profile = force.profile;
         let misfit = profile.filter(|p| p.shape == ProfileShape::NotHertz);
+        let law = profile.map_or(0.0, |p| p.radius_law_px / p.radius_px.value);
         Some(Self {
+            radius_common_m: law * radius.value,
             force_noise_n: reading.noise_n,
             force_calibration_n: reading.calibration_n,
             centroid_px: contact.centroid_px,

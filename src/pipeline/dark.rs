@@ -194,7 +194,7 @@ fn light_step_grey(frame: ArrayView2<'_, u8>, reference: ArrayView2<'_, u8>) -> 
         column_end: columns.saturating_sub(wide),
     };
     let step = median_shift_outside(frame, reference, middle)?;
-    (step.abs() > 1).then_some(f64::from(step))
+    (step.value.abs() > 1.5).then_some(step.value)
 }
 
 /// The largest set of pixels `[row, column]` inside, connected by their sides. Empty where no pixel

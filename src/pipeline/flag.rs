@@ -90,6 +90,14 @@ pub enum Flag {
         /// Mean of frame minus reference without contact, in grey levels.
         grey: f64,
     },
+    /// The reference is brighter or darker than that of the calibration: forces are divided by the
+    /// factor, with its error.
+    LightChanged {
+        /// The common factor less one.
+        change: f64,
+        /// What is no common factor, relative.
+        uneven: f64,
+    },
     /// The fit of the contact's profile did not converge.
     ProfileNotConverged {
         /// The frame.
@@ -315,6 +323,14 @@ impl fmt::Display for Flag {
                 write!(
                     f,
                     "the light has drifted by {grey:+.2} grey levels since the reference was taken"
+                )
+            }
+            Self::LightChanged { change, uneven } => {
+                write!(
+                    f,
+                    "the reference is {:+.1} % brighter than the calibration's, unevenly by {:.1} %: forces are divided by that factor",
+                    100.0 * change,
+                    100.0 * uneven
                 )
             }
             Self::ProfileNotConverged { frame } => {

@@ -2,7 +2,6 @@
 use super::contact::ContactReading;
 use super::error::PipelineError;
 use super::settings::Settings;
-use super::specimen::Object;
 use crate::elasticity::contact::guide_compliance_error;
 use crate::elasticity::modulus::{Estimate, LoadSeries, LoadState, SharedErrors};
 
@@ -35,11 +34,18 @@ impl Load {
         (self.contact.force_calibration_n / self.force_n.value).abs()
     }
 
-    /// The contact radius with a floor that no profile goes below: a hundredth of a pixel, by which
-    /// a rim of pixels, blur and the contact's true shape differ from the fitted profile.
-    fn radius_m(&self, pixel_m: f64) -> Estimate {
+    /// Error of the radius that frames of one load have in common, relative.
+    fn common_length(&self) -> f64 {
+        self.contact.radius_common_m / self.contact.contact_radius_m.value
+    }
+
+    /// The contact radius with the error that is its own, beside `common`.
+    fn radius_m(&self, common: f64) -> Estimate {
         let radius = self.contact.contact_radius_m;
-        Estimate::new(radius.value, radius.standard_error.hypot(0.01 * pixel_m))
+        Estimate::new(
+            radius.value,
+            beyond(radius.standard_error, common * radius.value),
+        )
     }
 
     /// The area of a face with a floor of its error that no outline goes below: a hundredth of a
@@ -53,14 +59,16 @@ impl Load {
         Some(Estimate::new(area.value, area.standard_error.hypot(floor)))
     }
 
-    fn state(&self, common: f64, pixel_m: f64) -> LoadState {
-        let own = self.contact.force_calibration_n.powi(2) - (common * self.force_n.value).powi(2);
-        let own = own.max(0.0).sqrt();
+    fn state(&self, common: f64, common_length: f64, pixel_m: f64) -> LoadState {
+        let own = beyond(
+            self.contact.force_calibration_n,
+            common * self.force_n.value,
+        );
         let mut force = Estimate::new(self.force_n.value, self.contact.force_noise_n.hypot(own));
         force.degrees_of_freedom = self.force_n.degrees_of_freedom;
         let mut load = LoadState::new(force);
         if self.counts {
-            load.contact_radius_m = Some(self.radius_m(pixel_m));
+            load.contact_radius_m = Some(self.radius_m(common_length));
             load.indentation_m = self.contact.indentation_m;
             load.contact_area_m2 = self.face_m2(pixel_m);
             load.mean_strain = self.mean_strain;
@@ -69,52 +77,54 @@ impl Load {
     }
 }
 
-/// Loads and the relative errors they share. Of the calibration's errors the smallest relative one
-/// is common to all loads (the slope's). A load's error beyond that (the offset's) is its own.
+/// The part of an error beside another one.
+fn beyond(whole: f64, part: f64) -> f64 {
+    (whole * whole - part * part).max(0.0).sqrt()
+}
+
+/// Loads and the relative errors they share. Of the errors of forces and radii the smallest
+/// relative one is common to all loads (a calibration's slope, the size of a pixel). A load's error
+/// beyond that (a calibration's offset) is its own.
 pub fn series(
     loads: impl Iterator<Item = Load> + Clone,
     settings: &Settings,
     pixel_size_m: [f64; 2],
 ) -> Result<LoadSeries, PipelineError> {
-    let relative = loads.clone().map(|load| load.calibration());
-    let common = relative.fold(f64::INFINITY, f64::min);
-    let common = if common.is_finite() { common } else { 0.0 };
+    let smallest = |error: fn(&Load) -> f64, otherwise: f64| {
+        let errors = loads.clone().map(|load| error(&load));
+        let least = errors.fold(f64::INFINITY, f64::min);
+        if least.is_finite() { least } else { otherwise }
+    };
+    let common = smallest(Load::calibration, settings.force_scale());
+    let common_length = smallest(Load::common_length, settings.length_scale());
     let pixel_m = (pixel_size_m[0] * pixel_size_m[1]).sqrt();
     let shared = SharedErrors {
-        force_scale: common.hypot(settings.force_scale_error),
-        length_scale: settings.length_scale_error,
-        size: relative_size_error(settings),
-        poisson_ratio: settings.poisson_ratio_error,
+        force_scale: common,
+        length_scale: common_length,
+        size: settings.size_error(),
+        poisson_ratio: settings.poisson_error(),
         other_body: guide_error_at(loads.clone(), settings),
     };
     LoadSeries::new(
         loads
-            .map(|load| load.state(common, pixel_m))
+            .map(|load| load.state(common, common_length, pixel_m))
             .collect::<Vec<_>>(),
     )
     .with_shared_errors(shared)
     .map_err(PipelineError::Modulus)
 }
 
-/// Relative error of the object's size.
-fn relative_size_error(settings: &Settings) -> f64 {
-    let radius = match settings.object {
-        Object::Sphere { radius_m, .. } | Object::FlatPunch { radius_m, .. } => radius_m,
-        Object::Layer {
-            indenter_radius_m, ..
-        } => indenter_radius_m,
-        Object::Cone { .. }
-        | Object::Block { .. }
-        | Object::Cylinder { .. }
-        | Object::Unknown { .. } => return 0.0,
-    };
-    settings.object_radius_error_m / radius
-}
-
 /// Relative error of the guide's compliance under contacts of the mean radius.
 fn guide_error_at(loads: impl Iterator<Item = Load>, settings: &Settings) -> f64 {
-    let (Some(guide), Some(covariance)) = (&settings.waveguide, &settings.layer_covariance) else {
+    let Some(guide) = settings
+        .waveguide
+        .as_ref()
+        .filter(|g| !g.layers().is_empty())
+    else {
         return 0.0;
+    };
+    let Some(covariance) = &settings.layer_covariance else {
+        return Settings::ASSUMED_LAYER_ERROR;
     };
     let (mut sum, mut count) = (0.0, 0.0);
     for load in loads.filter(|load| load.counts) {
@@ -200,7 +210,10 @@ fn merged((one, frames): (Load, f64), (other, more): (Load, f64)) -> (Load, f64)
     force_n.value = a * one.force_n.value + b * other.force_n.value;
     let radii = [s, o].map(|contact| contact.contact_radius_m);
     let radius_m = (a * radii[0].value.powi(3) + b * radii[1].value.powi(3)).cbrt();
-    let radius_error_m = error(radii[0].standard_error, radii[1].standard_error);
+    // Noise is averaged away, errors that both have in common are not.
+    let common_m = (a * one.common_length() + b * other.common_length()) * radius_m;
+    let noise = |c: &ContactReading| beyond(c.contact_radius_m.standard_error, c.radius_common_m);
+    let radius_error_m = error(noise(s), noise(o)).hypot(common_m);
     let face = s.face.zip(o.face).map(|(mut face, other)| {
         face.area_m2 = mean(face.area_m2, other.area_m2);
         face
@@ -210,6 +223,7 @@ fn merged((one, frames): (Load, f64), (other, more): (Load, f64)) -> (Load, f64)
         force_noise_n: error(s.force_noise_n, o.force_noise_n),
         force_calibration_n: (a * one.calibration() + b * other.calibration()) * force_n.value,
         contact_radius_m: Estimate::new(radius_m, radius_error_m),
+        radius_common_m: common_m,
         indentation_m: s
             .indentation_m
             .zip(o.indentation_m)

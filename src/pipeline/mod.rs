@@ -28,6 +28,7 @@
 //! object of unknown shape is read so if its contacts are those of a flat face, and refused with
 //! what to tell the program if not ([`PipelineError::NotUniaxial`]).
 mod batch;
+mod budget;
 mod composition;
 mod contact;
 mod dark;
@@ -39,6 +40,7 @@ mod loads;
 mod measure;
 mod named;
 mod press;
+mod reference_light;
 mod report;
 mod result;
 mod session;
@@ -52,6 +54,7 @@ mod time;
 pub use crate::force::{FaceReading, ShapeProblem};
 pub use crate::sfs::{BallFit, Binning};
 pub use batch::contacts;
+pub use budget::{ErrorShare, ErrorSource};
 pub use composition::Pipeline;
 pub use contact::{ContactReading, ContactStage, FrameContact};
 pub use dark::DarkContact;
@@ -63,6 +66,7 @@ pub use named::{
     StagesConfig, StrainChoice, UnknownStage, WarpChoice,
 };
 pub use press::Press;
+pub use reference_light::ReferenceLight;
 pub use report::{Report, Skip, SkipReason, Stage, Work};
 pub use result::{FrameResult, MatchResult, Measurement, ModulusResult, StrainResult, with_error};
 pub use session::{DriftWatch, Session, SessionStrain, Update};
@@ -73,4 +77,4 @@ pub use source::ImageFolder;
 pub use specimen::Object;
 pub use stages::PairStrain;
 pub use surface::ContactSurface;
-pub use time::{ErrorShare, ErrorSource, TimeResult};
+pub use time::TimeResult;

@@ -5,6 +5,7 @@ use super::error::PipelineError;
 use super::estimators::that_fit;
 use super::flag::Flag;
 use super::loads::{self, Load};
+use super::reference_light::LightChange;
 use super::report::{Report, SkipReason, Stage};
 use super::specimen::Specimen;
 use super::stages::{Bench, MatchedPoints, PairStrain, Stages};
@@ -706,6 +707,10 @@ impl<'a> Press<'a> {
     }
 
     /// How the object is read.
+    pub(super) fn light_change(&self) -> Option<LightChange> {
+        self.stages.light
+    }
+
     pub(super) fn specimen(&self) -> Specimen {
         self.stages.specimen
     }

@@ -1,10 +1,11 @@
 //! The answers of a press as plain data, for people ([`Display`]) and programs (feature `serde`).
+use super::budget::{self, ErrorShare};
 use super::contact::ContactReading;
 use super::error::PipelineError;
 use super::flag::Flag;
 use super::report::Report;
 use super::session::{DriftWatch, Update};
-use super::time::{ErrorShare, TimeResult};
+use super::time::TimeResult;
 use crate::elasticity::modulus::{EstimatorKind, ModulusEstimate, Warning};
 use crate::force::Estimate;
 use crate::matching::StopReason;
@@ -91,9 +92,10 @@ pub struct FrameResult {
     pub contact_area_m2: f64,
     /// F/(π a²) in pascals.
     pub mean_stress_pa: Option<Estimate>,
-    /// Greatest height of the reconstructed surface in metres.
+    /// Greatest height of the reconstructed surface in metres. The surface is apparent: it is the
+    /// pressure, read as shading.
     #[cfg_attr(feature = "serde", serde(serialize_with = "outcome::one"))]
-    pub surface_height_m: Result<f64, PipelineError>,
+    pub surface_height_m: Result<Estimate, PipelineError>,
 }
 
 /// How the control points of the first and the last frame were matched.
@@ -335,6 +337,9 @@ fn stop_text(stop: StopReason) -> &'static str {
 impl Display for Measurement {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         line(f, "Young's modulus", &self.youngs_modulus_pa)?;
+        if let Some(sentence) = budget::sentence(&self.error_budget) {
+            writeln!(f, "{:<16} {sentence}", "error budget")?;
+        }
         if let Some(time) = &self.time {
             writeln!(f, "{:<16} {time}", "over time")?;
         }

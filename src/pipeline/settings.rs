@@ -1,5 +1,6 @@
 //! Settings of a pipeline beside its stages.
 use super::error::PipelineError;
+use super::reference_light::ReferenceLight;
 use super::specimen::Object;
 use crate::elasticity::contact::{PARAMETERS_PER_LAYER, Waveguide};
 use crate::sfs::Binning;
@@ -68,18 +69,30 @@ pub struct Settings {
     /// then costs no force. Right where stray light and signal come through the same lens, and the
     /// calibration was taken in the frame's middle.
     pub flat_field: bool,
-    /// Relative error common to all forces beside the calibration's scatter. Light that is uneven
-    /// over the frame reads contacts of another size than the calibration's with another gain.
-    pub force_scale_error: f64,
-    /// Relative error common to all lengths: that of the pixel size.
-    pub length_scale_error: f64,
-    /// Standard error of the object's radius in metres.
-    pub object_radius_error_m: f64,
-    /// Standard error of the object's Poisson ratio.
-    pub poisson_ratio_error: f64,
+    /// Relative standard error common to all forces beside the calibration's scatter: the gauge's
+    /// scale, and light that is uneven over the frame, by which contacts of another size than the
+    /// calibration's are read with another gain. `None`: a gauge to 0.2 % and 0.1 % of the light
+    /// are assumed.
+    pub force_scale_error: Option<f64>,
+    /// Relative standard error common to all forces read from light: a bare guide scatters by what
+    /// touches it, and the object may reflect otherwise than what it was calibrated with. Zero
+    /// under a fixed diffusing skin, or for the calibrator itself. `None`: 6 % are assumed, the
+    /// force of an object that reflects a tenth less lies in the interval.
+    pub coupling_error: Option<f64>,
+    /// Relative standard error common to all lengths: that of the pixel size. `None`: 0.3 % are
+    /// assumed.
+    pub length_scale_error: Option<f64>,
+    /// Standard error of the object's radius in metres. `None`: 0.5 % of it are assumed.
+    pub object_radius_error_m: Option<f64>,
+    /// Standard error of the object's Poisson ratio. `None`: 0.01 is assumed.
+    pub poisson_ratio_error: Option<f64>,
     /// Covariance of ln E of all layers of the waveguide, then of ln h, then of ν. `None`: the
-    /// layers are exact.
+    /// moduli of all layers are assumed to be wrong by one factor, of 5 %.
     pub layer_covariance: Option<DMatrix<f64>>,
+    /// The light of the reference that forces were calibrated on. Forces read from light are
+    /// divided by the factor by which a press's reference is brighter. `None`: the light is taken
+    /// to be the same.
+    pub calibrated_light: Option<ReferenceLight>,
 }
 
 impl Settings {
@@ -93,12 +106,81 @@ impl Settings {
             smoothing_px: 5,
             binning: Binning::default(),
             flat_field: false,
-            force_scale_error: 1e-3,
-            length_scale_error: 0.0,
-            object_radius_error_m: 0.0,
-            poisson_ratio_error: 0.0,
+            force_scale_error: None,
+            coupling_error: None,
+            length_scale_error: None,
+            object_radius_error_m: None,
+            poisson_ratio_error: None,
             layer_covariance: None,
+            calibrated_light: None,
         }
+    }
+
+    /// Relative error of the layers' moduli where none is stated.
+    pub(super) const ASSUMED_LAYER_ERROR: f64 = 0.05;
+
+    /// States that every input which is not stated yet is exact, but for light that is uneven over
+    /// the frame: for frames whose truth is known.
+    ///
+    /// ```
+    /// use tactile_imaging::{Object, Pipeline, force::CalibrationPair};
+    /// let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
+    /// let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?
+    ///     .with_settings(|settings| {
+    ///         settings.poisson_ratio_error = Some(0.005);
+    ///         settings.state_exact();
+    ///     })?;
+    /// let stated = pipeline.settings();
+    /// assert_eq!(stated.coupling_error, Some(0.0));
+    /// assert_eq!(stated.poisson_ratio_error, Some(0.005));
+    /// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
+    /// ```
+    pub fn state_exact(&mut self) {
+        self.force_scale_error.get_or_insert(1e-3);
+        for error in [
+            &mut self.coupling_error,
+            &mut self.length_scale_error,
+            &mut self.object_radius_error_m,
+            &mut self.poisson_ratio_error,
+        ] {
+            error.get_or_insert(0.0);
+        }
+        let layers = self.waveguide.as_ref().map_or(0, |w| w.layers().len());
+        let parameters = PARAMETERS_PER_LAYER * layers;
+        self.layer_covariance
+            .get_or_insert_with(|| DMatrix::zeros(parameters, parameters));
+    }
+
+    pub(super) fn force_scale(&self) -> f64 {
+        self.force_scale_error.unwrap_or(0.2e-2_f64.hypot(0.1e-2))
+    }
+
+    pub(super) fn coupling(&self) -> f64 {
+        self.coupling_error.unwrap_or(0.06)
+    }
+
+    pub(super) fn length_scale(&self) -> f64 {
+        self.length_scale_error.unwrap_or(0.3e-2)
+    }
+
+    pub(super) fn poisson_error(&self) -> f64 {
+        self.poisson_ratio_error.unwrap_or(0.01)
+    }
+
+    /// Relative error of the object's size.
+    pub(super) fn size_error(&self) -> f64 {
+        let radius_m = match self.object {
+            Object::Sphere { radius_m, .. } | Object::FlatPunch { radius_m, .. } => radius_m,
+            Object::Layer {
+                indenter_radius_m, ..
+            } => indenter_radius_m,
+            Object::Cone { .. }
+            | Object::Block { .. }
+            | Object::Cylinder { .. }
+            | Object::Unknown { .. } => return 0.0,
+        };
+        self.object_radius_error_m
+            .map_or(0.5e-2, |error_m| error_m / radius_m)
     }
 
     /// Refuses what has no meaning.
@@ -113,12 +195,16 @@ impl Settings {
             return Err(PipelineError::EmptyBlocks);
         }
         let is_error = |found: &f64| *found >= 0.0 && found.is_finite();
-        let scales = [self.force_scale_error, self.length_scale_error];
-        if let Some(&found) = scales.iter().find(|e| !is_error(e)) {
+        let scales = [
+            self.force_scale_error,
+            self.coupling_error,
+            self.length_scale_error,
+        ];
+        if let Some(&found) = scales.iter().flatten().find(|e| !is_error(e)) {
             return Err(PipelineError::ScaleError { found });
         }
         let inputs = [self.object_radius_error_m, self.poisson_ratio_error];
-        if let Some(&found) = inputs.iter().find(|e| !is_error(e)) {
+        if let Some(&found) = inputs.iter().flatten().find(|e| !is_error(e)) {
             return Err(PipelineError::InputError { found });
         }
         match &self.layer_covariance {

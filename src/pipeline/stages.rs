@@ -4,6 +4,7 @@ use super::composition::Pipeline;
 use super::contact::{ContactStage, FrameContact};
 use super::error::PipelineError;
 use super::flag::Flag;
+use super::reference_light::LightChange;
 use super::report::{Report, SkipReason, Stage};
 use super::specimen::{Object, Specimen};
 use super::surface::{self, ContactSurface, ContactSurfaceWorkspace, ControlPoints};
@@ -76,6 +77,8 @@ pub struct Stages {
     pub pipeline: Pipeline,
     pub reference: Arc<ReferenceFrame>,
     pub specimen: Specimen,
+    /// Since the calibration, where its light is known.
+    pub light: Option<LightChange>,
     /// The contact stage, or the variant that it has for flat faces.
     contact: Arc<dyn ContactStage>,
 }
@@ -109,6 +112,11 @@ impl Stages {
         };
         Self {
             contact: contact.unwrap_or_else(|| pipeline.shared_contact()),
+            light: pipeline
+                .settings()
+                .calibrated_light
+                .as_ref()
+                .and_then(|light| light.changed(&reference)),
             reference,
             specimen,
             pipeline,
@@ -136,16 +144,31 @@ impl Stages {
                 .measure_into(&mut bench.force, image, &self.reference, contact)
                 .map_err(|source| PipelineError::Contact { frame, source })?;
             contact.check(frame, image.dim())?;
-            if let Some(reading) = &mut contact.reading
-                && reading.force_n.is_none()
-            {
-                reading.take_gauge(gauge);
+            let settings = self.pipeline.settings();
+            let mut force_scale = settings.force_scale();
+            if let Some(reading) = &mut contact.reading {
+                if reading.force_n.is_none() {
+                    reading.take_gauge(gauge);
+                } else {
+                    force_scale = force_scale.hypot(settings.coupling());
+                    if let Some(light) = self.light {
+                        reading.divide_by_gain(light.gain.value);
+                        force_scale = force_scale.hypot(light.gain.relative_error());
+                    }
+                }
             }
             if contact.background_step_grey.is_none()
                 && let Some(bounds) = contact.bounds()
             {
                 let step = median_shift_outside(image, self.reference.image(), bounds);
-                contact.background_step_grey = step.map(f64::from);
+                // A twentieth of a grey level is half a per cent of a dim background, and five
+                // standard errors are noise once in a million frames.
+                let limit = |step: Estimate| 0.05_f64.max(5.0 * step.standard_error);
+                let beyond = |step: Estimate| match step.value.abs() > limit(step) {
+                    true => step.value,
+                    false => 0.0,
+                };
+                contact.background_step_grey = step.map(beyond);
             }
             if let Specimen::Flat(_) = self.specimen {
                 let face = self.face(&mut bench.face, image, contact);
@@ -155,6 +178,9 @@ impl Stages {
                         reading.take_area(face.area_m2);
                     }
                 }
+            }
+            if let Some(reading) = &mut contact.reading {
+                reading.take_scales(force_scale, settings.length_scale());
             }
             Ok(())
         })?;
@@ -212,7 +238,10 @@ impl Stages {
         if let (Some(gauge), Some(force_n)) = (gauge, reading.force_n) {
             let (gauge_n, measured_n) = (gauge.value, force_n.value);
             let apart = (gauge_n - measured_n).abs();
-            if apart > 3.0 * force_n.standard_error && apart > 0.02 * gauge_n {
+            // What the object couples is what a gauge shows: its error excuses no difference.
+            let coupling = self.pipeline.settings().coupling() * measured_n;
+            let variance = force_n.standard_error.powi(2) - coupling.powi(2);
+            if apart > 3.0 * variance.max(0.0).sqrt() && apart > 0.02 * gauge_n {
                 flags.push(Flag::GaugeDisagrees {
                     frame,
                     measured_n,
@@ -465,6 +494,15 @@ impl StrainWorkspace {
         );
         let errors = &mut strain.summary.standard_error;
         errors.zip_apply(&noise, |error, noise| *error = error.hypot(noise));
+        // Across the surface the strain is that of its height, ½ (h₂²/h₁² − 1), whose error both
+        // loads have in common but for half a cell of the grid.
+        let height = |points: &[Point3<f64>]| points.iter().fold(0.0, |h: f64, p| h.max(p.z));
+        let [first, last] = [model.as_slice(), matched.target].map(height);
+        let half_cell = 0.5 * matched.model.grid_m;
+        let of_height = (last / first).powi(2) * (half_cell / first).hypot(half_cell / last);
+        if of_height.is_finite() {
+            errors[(2, 2)] = errors[(2, 2)].hypot(of_height);
+        }
         Ok(())
     }
 }

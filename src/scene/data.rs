@@ -272,10 +272,9 @@ impl Scene {
             LoadedCalibration::Sensor(sensor) => {
                 let contact = sensor.contact(&self.force_options())?;
                 let pipeline = Pipeline::new(contact, self.object)?.with_stages(&self.stages)?;
-                return sensor.configured(pipeline)?.with_settings(|settings| {
-                    settings.object_radius_error_m = self.radius_error_m;
-                    settings.poisson_ratio_error = self.poisson_ratio_error;
-                });
+                return sensor
+                    .configured(pipeline)?
+                    .with_settings(|settings| self.errors.state(settings));
             }
             LoadedCalibration::DepthTable(table) => {
                 let contact = DarkContact::new(table, self.pixel_size_m)?;
@@ -286,8 +285,6 @@ impl Scene {
         };
         let pipeline = pipeline.with_settings(|settings| {
             settings.flat_field = self.flat_field;
-            settings.object_radius_error_m = self.radius_error_m;
-            settings.poisson_ratio_error = self.poisson_ratio_error;
         })?;
         let guide = guide(&self.layers).map_err(PipelineError::Material)?;
         // An estimator named in the file goes before the one that the contact table suggests.
@@ -309,10 +306,13 @@ impl Scene {
             }
             _ => pipeline,
         };
-        if self.layers.is_empty() {
-            return Ok(pipeline);
-        }
-        pipeline.with_settings(|settings| settings.waveguide = Some(guide))
+        pipeline.with_settings(|settings| {
+            // On a rigid guide the settings keep their default.
+            if !self.layers.is_empty() {
+                settings.waveguide = Some(guide);
+            }
+            self.errors.state(settings);
+        })
     }
 
     /// The pipeline's error with the field that it comes from.

@@ -1,6 +1,6 @@
 //! What a scene file may hold, and contact tables as files.
 use crate::elasticity::ElasticityError;
-use crate::elasticity::contact::{ContactTable, Layer, Waveguide};
+use crate::elasticity::contact::{ContactTable, Layer, PARAMETERS_PER_LAYER, Waveguide};
 #[cfg(feature = "fem")]
 use crate::fem::{TableOptions, TableProgress};
 use crate::io::{
@@ -9,8 +9,9 @@ use crate::io::{
 };
 use crate::pipeline::{
     EstimatorChoice, IntegratorChoice, MatcherChoice, Object, ReconstructionChoice, SamplerChoice,
-    StagesConfig, StrainChoice, WarpChoice,
+    Settings, StagesConfig, StrainChoice, WarpChoice,
 };
+use nalgebra::DMatrix;
 use serde::de::value::MapAccessDeserializer;
 use serde::de::{self, Deserializer, MapAccess, Unexpected, Visitor};
 use serde::{Deserialize, Serialize};
@@ -171,6 +172,82 @@ pub fn elastic_layers(layers: &[SceneLayer]) -> Vec<Layer> {
     layers.iter().map(elastic).collect()
 }
 
+/// The standard errors that a scene file states. What is `None` is assumed, see
+/// [`Settings`], and what is exact stands there as `"exact"`.
+///
+/// ```
+/// use tactile_imaging::scene::{Scene, StatedErrors};
+/// let text = r#"
+///     reference = "reference.png"
+///     pixel_size_m = [2e-5, 2e-5]
+///     pixel_size_error = 1e-3
+///     coupling_error = "exact"
+///     calibration = { pairs = "pairs.csv" }
+///     frames = [{ image = "frame.png" }]
+///     object = { shape = "sphere", radius_m = 3e-3, radius_error_m = 5e-6 }
+/// "#;
+/// let errors: StatedErrors = Scene::parse(text, "scene.toml")?.errors;
+/// assert_eq!((errors.pixel_size, errors.radius_m), (Some(1e-3), Some(5e-6)));
+/// assert_eq!((errors.coupling, errors.gauge), (Some(0.0), None));
+/// # Ok::<(), tactile_imaging::io::FileError>(())
+/// ```
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct StatedErrors {
+    /// Of the gauge of all forces, relative.
+    pub gauge: Option<f64>,
+    /// Of the light that the object couples beside the calibrator's, relative.
+    pub coupling: Option<f64>,
+    /// Of the size of a pixel, relative.
+    pub pixel_size: Option<f64>,
+    /// Of the moduli of all layers by one factor, relative.
+    pub layers: Option<f64>,
+    /// Of the object's radius in metres.
+    pub radius_m: Option<f64>,
+    /// Of the object's Poisson ratio.
+    pub poisson_ratio: Option<f64>,
+}
+
+impl StatedErrors {
+    /// Puts what is stated into a pipeline's settings, whose waveguide is known.
+    pub(super) fn state(&self, settings: &mut Settings) {
+        let set = |setting: &mut Option<f64>, stated: Option<f64>| *setting = stated.or(*setting);
+        set(&mut settings.force_scale_error, self.gauge);
+        set(&mut settings.coupling_error, self.coupling);
+        set(&mut settings.length_scale_error, self.pixel_size);
+        set(&mut settings.object_radius_error_m, self.radius_m);
+        set(&mut settings.poisson_ratio_error, self.poisson_ratio);
+        if let (Some(error), Some(guide)) = (self.layers, &settings.waveguide) {
+            let layers = guide.layers().len();
+            let parameters = PARAMETERS_PER_LAYER * layers;
+            // The logarithms of the moduli come first.
+            let entry = |i: usize, j: usize| {
+                if i.max(j) < layers {
+                    error * error
+                } else {
+                    0.0
+                }
+            };
+            settings.layer_covariance = Some(DMatrix::from_fn(parameters, parameters, entry));
+        }
+    }
+}
+
+/// A standard error, or `"exact"`, for `#[serde(deserialize_with = …)]`.
+fn stated<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<f64>, D::Error> {
+    #[derive(Deserialize)]
+    #[serde(untagged)]
+    enum Stated {
+        Error(f64),
+        Text(String),
+    }
+    let expected = "expected zero, a positive number or \"exact\"";
+    match Stated::deserialize(deserializer) {
+        Ok(Stated::Error(error)) if error >= 0.0 && error.is_finite() => Ok(Some(error)),
+        Ok(Stated::Text(text)) if text == "exact" => Ok(Some(0.0)),
+        _ => Err(de::Error::custom(expected)),
+    }
+}
+
 /// A scene file, checked. Paths are resolved, the files they name not yet read.
 ///
 /// ```
@@ -208,10 +285,8 @@ pub struct Scene {
     pub bits: Option<u8>,
     /// Whether changes of the lamps since the reference are divided out where they are detected.
     pub corrects_drift: bool,
-    /// Standard error of the object's radius in metres.
-    pub radius_error_m: f64,
-    /// Standard error of the object's Poisson ratio.
-    pub poisson_ratio_error: f64,
+    /// Standard errors of what the frames are measured with.
+    pub errors: StatedErrors,
     /// How grey levels become force or depth.
     pub calibration: CalibrationSource,
     /// The frames, in the order of the file.
@@ -274,6 +349,14 @@ struct SceneFile {
     pixel_size_m: Option<[f64; 2]>,
     flat_field: Option<FlatField>,
     illumination_drift: Option<Drift>,
+    #[serde(default, deserialize_with = "stated")]
+    pixel_size_error: Option<f64>,
+    #[serde(default, deserialize_with = "stated")]
+    gauge_error: Option<f64>,
+    #[serde(default, deserialize_with = "stated")]
+    coupling_error: Option<f64>,
+    #[serde(default, deserialize_with = "stated")]
+    layer_error: Option<f64>,
     #[serde(default, deserialize_with = "bits")]
     bits: Option<u8>,
     calibration: Option<CalibrationTable>,
@@ -325,10 +408,10 @@ struct ObjectTable {
     half_angle_rad: Option<f64>,
     #[serde(default, deserialize_with = "poisson_ratio")]
     poisson_ratio: Option<f64>,
-    #[serde(default, deserialize_with = "not_negative")]
-    radius_error_m: f64,
-    #[serde(default, deserialize_with = "not_negative")]
-    poisson_ratio_error: f64,
+    #[serde(default, deserialize_with = "stated")]
+    radius_error_m: Option<f64>,
+    #[serde(default, deserialize_with = "stated")]
+    poisson_ratio_error: Option<f64>,
 }
 
 #[derive(Deserialize)]
@@ -456,8 +539,14 @@ impl SceneFile {
             corrects_drift: self
                 .illumination_drift
                 .is_none_or(|d| d == Drift::Automatic),
-            radius_error_m: self.object.radius_error_m,
-            poisson_ratio_error: self.object.poisson_ratio_error,
+            errors: StatedErrors {
+                gauge: self.gauge_error,
+                coupling: self.coupling_error,
+                pixel_size: self.pixel_size_error,
+                layers: self.layer_error,
+                radius_m: self.object.radius_error_m,
+                poisson_ratio: self.object.poisson_ratio_error,
+            },
             calibration,
             frames,
             object: self.object.object(file)?,

@@ -11,7 +11,7 @@
 //! [[frames]]
 //! image = "frame_1.png"
 //! force_N = 0.70                         # a gauge reading, if there is one
-//! force_error_N = 0.002                  # its standard error, else the 0.1 % of the scale
+//! force_error_N = 0.002                  # its standard error beside that of the scale
 //! time_s = 0.5                           # since the object touched, not decreasing: five times
 //!                                        # separate a relaxing sample from a drifting sensor
 //!
@@ -66,6 +66,19 @@
 //! estimator = "best"                     # EstimatorChoice
 //! ```
 //!
+//! Inputs have standard errors. What is not stated is assumed, and the result names it:
+//!
+//! ```toml
+//! pixel_size_error = 1e-3                # relative, 0.3 % if absent
+//! gauge_error = 1e-3                     # relative, of all forces, 0.2 % if absent
+//! coupling_error = "exact"               # of the light that another object than the calibrator
+//!                                        # couples: exact under a diffusing skin, 6 % if absent
+//! layer_error = 0.02                     # of the moduli of all layers, 5 % if absent
+//! [object]
+//! radius_error_m = 5e-6                  # 0.5 % of the radius if absent
+//! poisson_ratio_error = 0.002            # 0.01 if absent
+//! ```
+//!
 //! The names of a stage are those of its choice in [`StagesConfig`](crate::pipeline::StagesConfig).
 //! Images are PNG, PGM, JPEG or TIFF. Colour becomes grey by the luma of Rec. 601, see
 //! [`read_grey_image`](crate::io::read_grey_image). Relative paths are relative to the scene file.
@@ -77,7 +90,8 @@ pub use data::{LoadedCalibration, SceneData, doubt_of_depths, doubt_of_pairs};
 #[cfg(feature = "fem")]
 pub use file::solve_contact_table;
 pub use file::{
-    CalibrationSource, Scene, SceneFrame, SceneLayer, read_contact_table, write_contact_table,
+    CalibrationSource, Scene, SceneFrame, SceneLayer, StatedErrors, read_contact_table,
+    write_contact_table,
 };
 
 #[cfg(feature = "inclusion")]

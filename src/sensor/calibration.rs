@@ -9,7 +9,7 @@ use crate::force::{
     PressureCurve, PressureCurveOptions, ReferenceFrame,
 };
 use crate::io::FileError;
-use crate::pipeline::PipelineError;
+use crate::pipeline::{PipelineError, ReferenceLight};
 use ndarray::{Array2, ArrayView2};
 
 /// Why a sensor could not be calibrated, in one sentence. Presses are counted from 1 in the
@@ -216,9 +216,11 @@ impl SensorCalibration {
             temperature_c: self.temperature_c,
             flat_field: self.flat_field,
             gauge_error: self.gauge_error,
+            coupling_error: self.coupling_error,
             layer_covariance: fitted.covariance_rows(),
             geometry,
             noise: reference.noise(),
+            light: Some(ReferenceLight::of(&reference)),
             shear: self.shear,
             layers: fitted.layers.clone(),
             curve,

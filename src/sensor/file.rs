@@ -5,7 +5,7 @@ use crate::force::{
     ShearCalibration,
 };
 use crate::io::{FileError, finite, not_negative, read_toml, write_bytes};
-use crate::pipeline::{LightContact, Object, Pipeline, PipelineError};
+use crate::pipeline::{LightContact, Object, Pipeline, PipelineError, ReferenceLight};
 use crate::scene::{SceneLayer, elastic_layers};
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
@@ -57,7 +57,7 @@ impl SensorGeometry {
 /// use tactile_imaging::{pipeline::{Object, Pipeline}, sensor::Sensor};
 /// let sensor = Sensor::read("sensor.toml")?;
 /// let ball = Object::sphere(3e-3);
-/// let pipeline = sensor.pipeline(ball)?.with_settings(|s| s.object_radius_error_m = 5e-6)?;
+/// let pipeline = sensor.pipeline(ball)?.with_settings(|s| s.object_radius_error_m = Some(5e-6))?;
 /// // Its parts, for a pipeline that is put together by hand.
 /// let (contact, guide) = (sensor.contact(&ForceOptions::default())?, sensor.waveguide()?);
 /// let by_hand = Pipeline::new(contact, ball)?.with_settings(|s| s.waveguide = Some(guide))?;
@@ -96,14 +96,26 @@ pub struct Sensor {
     /// Relative standard error of the gauge, common to all forces.
     #[serde(deserialize_with = "not_negative")]
     pub gauge_error: f64,
-    /// Covariance of ln E of all layers, then of ln h, then of ν. Empty where the layers are taken
-    /// as exact.
+    /// Relative standard error of the light that an object couples beside what the calibrator
+    /// coupled. Zero under a fixed diffusing skin. `None`: that of
+    /// [`Settings`](crate::pipeline::Settings::coupling_error) is assumed.
+    #[serde(
+        default,
+        deserialize_with = "not_negative",
+        skip_serializing_if = "Option::is_none"
+    )]
+    pub coupling_error: Option<f64>,
+    /// Covariance of ln E of all layers, then of ln h, then of ν. Empty where nothing is known of
+    /// the layers' errors, and they are assumed.
     #[serde(default)]
     pub layer_covariance: Vec<Vec<f64>>,
     /// Lens and outline.
     pub geometry: SensorGeometry,
     /// Noise of one pixel of a frame.
     pub noise: NoiseModel,
+    /// Light of the reference that the curve was fitted on. A later reference is compared with it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub light: Option<ReferenceLight>,
     /// Springs of shear, where they are known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shear: Option<ShearCalibration>,
@@ -187,8 +199,10 @@ impl Sensor {
         let covariance = DMatrix::from_fn(n, n, |i, j| entry(i, j).unwrap_or(f64::NAN));
         pipeline.with_settings(|settings| {
             settings.flat_field = self.flat_field;
-            settings.force_scale_error = self.gauge_error;
-            settings.length_scale_error = self.geometry.length_scale_error();
+            settings.force_scale_error = Some(self.gauge_error);
+            settings.coupling_error = self.coupling_error;
+            settings.calibrated_light.clone_from(&self.light);
+            settings.length_scale_error = Some(self.geometry.length_scale_error());
             // On a rigid guide the settings keep their default.
             if !self.layers.is_empty() {
                 settings.waveguide = Some(guide);

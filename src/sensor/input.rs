@@ -124,6 +124,8 @@ pub struct SensorCalibration {
     pub flat_field: bool,
     /// Relative standard error of the gauge, common to all presses.
     pub gauge_error: f64,
+    /// Relative standard error of the light of other objects, see [`Sensor`](super::Sensor).
+    pub coupling_error: Option<f64>,
     /// Standard deviation of the gauge's noise in newtons.
     pub gauge_noise_n: f64,
     /// Springs of shear, passed on as they are.
@@ -145,6 +147,7 @@ impl SensorCalibration {
     /// flat_field = true                   # the default
     /// gauge_error = 1e-3                  # relative, common to all forces
     /// gauge_noise_N = 2e-3
+    /// coupling_error = 0.0                # under a fixed diffusing skin, 0.06 if absent
     /// covers_N = [0.1, 1.2]               # forces of later scenes, may be left out
     /// target = { image = "target.png", pitch_m = 1e-3, error = 5e-4 }
     ///
@@ -189,6 +192,8 @@ struct CalibrationFile {
     flat_field: Option<bool>,
     #[serde(default = "per_mille", deserialize_with = "not_negative")]
     gauge_error: f64,
+    #[serde(default, deserialize_with = "not_negative")]
+    coupling_error: Option<f64>,
     #[serde(default, rename = "gauge_noise_N", deserialize_with = "positive")]
     gauge_noise_n: Option<f64>,
     #[serde(default, rename = "covers_N", deserialize_with = "positive_pair")]
@@ -322,6 +327,7 @@ impl CalibrationFile {
             layers: self.layers.iter().map(LayerTable::layer).collect(),
             flat_field: self.flat_field.unwrap_or(true),
             gauge_error: self.gauge_error,
+            coupling_error: self.coupling_error,
             gauge_noise_n: self.gauge_noise_n.unwrap_or(2e-3),
             covers_n: self.covers_n,
         })

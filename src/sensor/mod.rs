@@ -5,6 +5,8 @@
 //! temperature_c = 22.5                   # may be left out
 //! flat_field = true                      # frames are divided by the reference's own brightness
 //! gauge_error = 1e-3                     # relative standard error of the gauge of all forces
+//! coupling_error = 0.0                   # of the light of other objects than the calibrator, zero
+//!                                        # under a fixed diffusing skin, 6 % if absent
 //!
 //! [geometry]
 //! frame_px = [1392, 1042]                # columns and rows
@@ -15,6 +17,10 @@
 //! [noise]                                # of one pixel, in grey levels
 //! read_variance = 0.34
 //! gain = 0.017
+//!
+//! [light]                                # of the calibration's reference: 8 × 8 means and their
+//! grey = […]                             # standard error. Forces are divided by the factor by
+//! error_grey = 0.005                     # which a later reference is brighter
 //!
 //! [[layers]]                             # from the object's side to the glass
 //! refractive_index = 1.41

@@ -492,9 +492,14 @@ fn print(
         let [found, exact] =
             [m.contact_radius_m.value, t.contact.contact_radius_m].map(|r| 1e3 * r);
         line(format!("contact radius {i}"), "mm", found, exact);
-        if let Ok(height) = m.surface_height_m {
+        if let Ok(height) = &m.surface_height_m {
             let exact = 1e3 * t.contact.apparent_height_m(0.0);
-            line(format!("surface height {i}"), "mm", 1e3 * height, exact);
+            line(
+                format!("surface height {i}"),
+                "mm",
+                1e3 * height.value,
+                exact,
+            );
         }
         for (k, axis) in ["x", "y"].into_iter().enumerate() {
             let (found, exact) = (m.centroid_px[k].value, t.centroid_px[k]);

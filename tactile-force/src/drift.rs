@@ -3,7 +3,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 use ndarray::{ArrayView2, Axis, Slice};
-use tactile_core::BoundingBox;
+use tactile_core::{BoundingBox, Estimate};
 
 use crate::frame::{TILE_COLUMNS, TILE_ROWS, TileSum};
 
@@ -494,21 +494,25 @@ pub fn background_shift(frame: ArrayView2<'_, u8>, reference: ArrayView2<'_, u8>
     (shift.abs() > 4.0).then_some(shift)
 }
 
-/// The median of frame minus reference outside a contact's box, in grey levels, from some 24 rows.
+/// The median of frame minus reference outside a contact's box, in grey levels, from some 24 rows,
+/// with its standard error.
 ///
-/// `None` with fewer than 100 pixels, whose median is not known to a grey level, and for images
-/// that differ in size. A mean would follow the surroundings of the contact: a dent in a dark
-/// sensor is wider than the contact. O(rows looked at).
+/// Whole grey levels are taken as spread evenly over their width, so that a step of a fraction of a
+/// level is seen. `None` with fewer than 100 pixels and for images that differ in size. A mean
+/// would follow the surroundings of the contact: a dent in a dark sensor is wider than the contact.
+/// O(rows looked at).
 ///
 /// ```
 /// use ndarray::Array2;
 /// use tactile_force::{BoundingBox, median_shift_outside};
 ///
 /// let reference = Array2::from_elem((40, 50), 90_u8);
-/// let mut frame = Array2::from_elem((40, 50), 88_u8);
+/// // A fifth of the pixels is two levels darker, the others one.
+/// let mut frame = Array2::from_shape_fn((40, 50), |(r, c)| if (r + c) % 5 == 0 { 88 } else { 89 });
 /// frame.slice_mut(ndarray::s![8..24, 16..32]).fill(20);
 /// let contact = BoundingBox { row_start: 8, row_end: 24, column_start: 16, column_end: 32 };
-/// assert_eq!(median_shift_outside(frame.view(), reference.view(), contact), Some(-2));
+/// let shift = median_shift_outside(frame.view(), reference.view(), contact).expect("a frame");
+/// assert!((shift.value + 1.12).abs() < 0.02 && shift.standard_error < 0.02);
 /// let whole = BoundingBox::whole(frame.dim());
 /// assert_eq!(median_shift_outside(frame.view(), reference.view(), whole), None);
 /// ```
@@ -517,7 +521,7 @@ pub fn median_shift_outside(
     frame: ArrayView2<'_, u8>,
     reference: ArrayView2<'_, u8>,
     contact: BoundingBox,
-) -> Option<i32> {
+) -> Option<Estimate> {
     if frame.dim() != reference.dim() {
         return None;
     }
@@ -545,12 +549,23 @@ pub fn median_shift_outside(
     if total < 100 {
         return None;
     }
-    let mut below = 0;
-    let median = counts.iter().position(|count| {
-        below += count;
-        2 * below > total
-    });
-    median.map(|index| index as i32 - 255)
+    let quantile = |share: f64| {
+        let wanted = share * total as f64;
+        let mut below = 0.0;
+        for (index, count) in counts.iter().enumerate() {
+            let count = *count as f64;
+            if count > 0.0 && below + count >= wanted {
+                return index as f64 - 255.5 + (wanted - below) / count;
+            }
+            below += count;
+        }
+        255.0
+    };
+    // The quartiles of a normal variable lie 1.349 standard deviations apart, and the median of
+    // many scatters by 1.253 of their mean's error.
+    let sd = (quantile(0.75) - quantile(0.25)) / 1.349;
+    let error = 1.253 * sd / (total as f64).sqrt();
+    Some(Estimate::new(quantile(0.5), error))
 }
 
 #[cfg(test)]

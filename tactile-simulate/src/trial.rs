@@ -52,7 +52,7 @@ impl Trial {
     }
 
     /// The default pipeline for the simulated sensor: it knows the calibration, the pixel size, the
-    /// ball's radius and the waveguide, and nothing of the truth. Where the scene obeys a closed
+    /// ball's radius and the waveguide, all exactly, and nothing of the truth. Where the scene obeys a closed
     /// form (Hertz, Tatara), the estimator is Hertz's with the layers in series
     /// ([`EstimatorChoice::Sphere`]), whose law the truth shares. Where its contacts come from
     /// elsewhere, the default.
@@ -82,7 +82,10 @@ impl Trial {
             ..StagesConfig::default()
         };
         pipeline
-            .with_settings(|settings| settings.waveguide = Some(waveguide))?
+            .with_settings(|settings| {
+                settings.waveguide = Some(waveguide);
+                settings.state_exact();
+            })?
             .with_stages(&config)
     }
 

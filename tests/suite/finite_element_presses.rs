@@ -167,6 +167,10 @@ impl Ball {
                 .with_settings(|settings| settings.waveguide = Some(guide.clone()))
                 .unwrap(),
         };
+        // All is as it is stated.
+        let pipeline = pipeline
+            .with_settings(tactile_imaging::pipeline::Settings::state_exact)
+            .unwrap();
         let press = trial.press(&pipeline).unwrap();
         let layered = match press.modulus() {
             Ok(layered) => layered,

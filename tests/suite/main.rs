@@ -24,4 +24,5 @@ mod simulator;
 mod simulator_families;
 mod simulator_recorded;
 mod stability;
+mod stated_errors;
 mod uniaxial;

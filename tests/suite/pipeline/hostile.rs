@@ -101,7 +101,7 @@ fn assert_sound(m: &Measurement) {
         }
         let centroid = f.centroid_px.map(|c| [c.value, c.standard_error]);
         numbers.extend(centroid.concat());
-        numbers.extend(f.surface_height_m.iter());
+        numbers.extend(f.surface_height_m.iter().map(|height| height.value));
         let sound = numbers.iter().all(|v| v.is_finite());
         let excused = m.flags.iter().any(|flag| excuses_contact(flag, k));
         assert!(sound || excused, "frame {k} has a silent NaN: {m:?}");

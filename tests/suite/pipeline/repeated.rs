@@ -68,7 +68,8 @@ fn darker_frames_are_flagged() {
     let (none, text) = drift(0);
     assert_eq!(none, None, "{text}");
     let (found, text) = drift(3);
-    assert_eq!(found, Some(-3.0), "{text}");
+    // To the noise of the median.
+    assert!(found.is_some_and(|grey| (grey + 3.0).abs() < 0.1), "{text}");
 }
 
 /// One contact of two is cut by the border: its force and radius are wrong, and the modulus is the

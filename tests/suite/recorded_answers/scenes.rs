@@ -83,6 +83,8 @@ fn block() -> Vec<Answer> {
     let pixel_size_m = scene.options().camera.pixel_size_m;
     let pipeline = Pipeline::from_pairs(&pairs, pixel_size_m, object)
         .expect("a pipeline")
+        .with_settings(|settings| settings.state_exact())
+        .expect("settings")
         .with_control_points(60);
     let reference = scene.reference(0);
     let frames = [0, 1, 2].map(|load| scene.frame(load, 0));
@@ -134,8 +136,8 @@ fn dark() -> Vec<Answer> {
             .expect("a pipeline")
             .with_surface(depths.clone(), SurfaceInput::Signal)
             .with_settings(|settings| {
-                settings.force_scale_error = 0.01;
-                settings.length_scale_error = 0.002;
+                settings.force_scale_error = Some(0.01);
+                settings.length_scale_error = Some(0.002);
             })
             .expect("errors")
             .with_control_points(80);

@@ -31,8 +31,8 @@ fn pipeline(sensor: &Sensor) -> Pipeline {
         .pipeline(object)
         .unwrap()
         .with_settings(|settings| {
-            settings.object_radius_error_m = BALL_ERROR * SAMPLE_RADIUS_M;
-            settings.poisson_ratio_error = POISSON_ERROR;
+            settings.object_radius_error_m = Some(BALL_ERROR * SAMPLE_RADIUS_M);
+            settings.poisson_ratio_error = Some(POISSON_ERROR);
         })
         .unwrap()
         .with_estimator(estimator(SAMPLE_RADIUS_M, SAMPLE_POISSON, &guide))

@@ -305,6 +305,8 @@ impl Simulated {
             layers: self.stated.clone(),
             flat_field: true,
             gauge_error: GAUGE_ERROR,
+            // Sample and calibrator scatter alike.
+            coupling_error: Some(0.0),
             gauge_noise_n: GAUGE_NOISE_N,
             shear: None,
             covers_n: None,

@@ -126,11 +126,12 @@ fn pipeline(calibration: &SensorCalibration, sensor: &Sensor, left_out: LeftOut)
         .with_settings(|settings| {
             settings.waveguide = Some(sensor.waveguide().unwrap());
             settings.flat_field = sensor.flat_field;
-            settings.force_scale_error = sensor.gauge_error;
+            settings.force_scale_error = Some(sensor.gauge_error);
+            settings.coupling_error = sensor.coupling_error;
             settings.length_scale_error = whole.settings().length_scale_error;
             settings.layer_covariance = Some(covariance);
-            settings.object_radius_error_m = BALL_ERROR * SAMPLE_RADIUS_M;
-            settings.poisson_ratio_error = POISSON_ERROR;
+            settings.object_radius_error_m = Some(BALL_ERROR * SAMPLE_RADIUS_M);
+            settings.poisson_ratio_error = Some(POISSON_ERROR);
         })
         .unwrap()
         .with_estimator(estimator(

@@ -234,12 +234,8 @@ fn measured_is_sound(case: &str, measured: &Measurement) {
         numbers.extend(frame.force_n.iter().map(|force| force.value));
         numbers.extend([frame.contact_radius_m.value, frame.contact_area_m2]);
         let centroid = frame.centroid_px.map(|c| [c.value, c.standard_error]);
-        numbers.extend(
-            centroid
-                .as_flattened()
-                .iter()
-                .chain(&frame.surface_height_m),
-        );
+        numbers.extend(centroid.as_flattened());
+        numbers.extend(frame.surface_height_m.iter().map(|height| height.value));
     }
     if let Ok(strain) = &measured.strain {
         numbers.extend(

@@ -92,7 +92,10 @@ pub(crate) fn pipeline(trial: &Trial, units: Units) -> Pipeline {
     let contact = LightContact::new(line, size, &options).expect("options");
     Pipeline::new(contact, object)
         .expect("a pipeline")
-        .with_settings(|settings| settings.waveguide = Some(waveguide))
+        .with_settings(|settings| {
+            settings.waveguide = Some(waveguide);
+            settings.state_exact();
+        })
         .unwrap()
         .with_stages(&StagesConfig {
             // The law that the simulated contacts obey.

@@ -1,7 +1,7 @@
 //! Simulated faces and the sensor that reads them.
 use ndarray::Array2;
 use tactile_imaging::force::CalibrationPair;
-use tactile_imaging::pipeline::Measurement;
+use tactile_imaging::pipeline::{Measurement, Settings};
 use tactile_imaging::{Object, Pipeline};
 use tactile_simulate::{
     Camera, Elastic, FaceOutline, SurfacePattern, UniaxialOptions, UniaxialScene,
@@ -85,7 +85,8 @@ impl Face {
     pub(super) fn pipeline(&self, scene: &UniaxialScene, object: Object) -> Pipeline {
         let per_grey = self.camera.pixel_size_m.iter().product::<f64>() / scene.grey_per_pascal();
         let pairs = exact_pairs(per_grey);
-        Pipeline::from_pairs(&pairs, self.camera.pixel_size_m, object).unwrap()
+        let pipeline = Pipeline::from_pairs(&pairs, self.camera.pixel_size_m, object).unwrap();
+        pipeline.with_settings(Settings::state_exact).unwrap()
     }
 }
 

@@ -3,7 +3,7 @@
 use super::scenes::exact_pairs;
 use tactile_imaging::elasticity::strain::Hencky;
 use tactile_imaging::fem::Interface;
-use tactile_imaging::pipeline::{Flag, Measurement};
+use tactile_imaging::pipeline::{Flag, Measurement, Settings};
 use tactile_imaging::{Object, Pipeline};
 use tactile_simulate::{
     Camera, ContactModel, ContactState, Elastic, Gain, PressLoad, PressOptions, PressScene,
@@ -51,6 +51,7 @@ fn measured(
     let per_grey = camera.pixel_size_m.iter().product::<f64>() / scene.truth(0).grey_per_pascal;
     let pipeline =
         Pipeline::from_pairs(&exact_pairs(per_grey), camera.pixel_size_m, object).unwrap();
+    let pipeline = pipeline.with_settings(Settings::state_exact).unwrap();
     let pipeline = match hencky {
         true => pipeline.with_strain(Hencky),
         false => pipeline,
