@@ -2,8 +2,9 @@
 use super::composition::Pipeline;
 use super::contact::{ContactReading, FrameContact};
 use super::error::PipelineError;
-use crate::force::ForceWorkspace;
+use super::stages::{Bench, Stages};
 use ndarray::ArrayView2;
+use std::sync::Arc;
 
 type Reading = Result<Option<ContactReading>, PipelineError>;
 
@@ -37,24 +38,22 @@ pub fn contacts(
     reference: ArrayView2<'_, u8>,
     frames: &[ArrayView2<'_, u8>],
 ) -> Result<Vec<Reading>, PipelineError> {
-    let reference = pipeline.reference_frame(&[reference])?;
-    let one = |(workspace, contact): &mut (ForceWorkspace, FrameContact),
+    let reference = Arc::new(pipeline.reference_frame(&[reference])?);
+    let stages = Stages::new(pipeline.clone(), reference);
+    let one = |(bench, contact): &mut (Bench, FrameContact),
                (frame, image): (usize, &ArrayView2<'_, u8>)| {
-        pipeline
-            .contact()
-            .measure_into(workspace, *image, &reference, contact)
-            .map_err(|source| PipelineError::Contact { frame, source })?;
+        stages.contact(bench, frame, *image, None, contact)?;
         Ok(contact.reading)
     };
     #[cfg(feature = "rayon")]
     {
         use rayon::prelude::*;
-        let start = || (ForceWorkspace::default(), FrameContact::default());
+        let start = || (Bench::default(), FrameContact::default());
         Ok(frames.par_iter().enumerate().map_init(start, one).collect())
     }
     #[cfg(not(feature = "rayon"))]
     {
-        let mut state = (ForceWorkspace::default(), FrameContact::default());
+        let mut state = (Bench::default(), FrameContact::default());
         Ok(frames
             .iter()
             .enumerate()

@@ -67,7 +67,7 @@ impl LinearCalibration {
                 1.0
             }
         });
-        let rows = noise_weights(&design, &forces, options.robustness)?;
+        let rows = noise_weights(&design, &forces, options)?;
         let fit = Fit::solve(&design, &forces, &rows, options.robustness)?;
         let degrees = (pairs.len() - columns) as f64;
         let estimate = |value: f64, variance: f64| {
@@ -450,29 +450,31 @@ impl Fit {
 /// Weights 1/(1 + k F²/F_max²) of pairs whose noise has a constant part and one that grows with the
 /// force, as that of a gauge of so many per cent of the reading.
 ///
-/// Of k = 0, 4 and 30 the one of the greatest restricted likelihood is taken. Few pairs cannot tell:
-/// there the middle one, which is preferred by 0.8 in the likelihood's logarithm, holds 92 to 98 %
-/// of its 95 % intervals whichever noise there is. Robust fits weigh by their residuals.
+/// Of k = 0, 4 (the degrees of freedom, where there are fewer) and 30 the one of the greatest
+/// restricted likelihood is taken. Few pairs cannot tell: there the middle one, which is preferred
+/// by 0.8 in the likelihood's logarithm, holds 92 to 98 % of its 95 % intervals in the middle of
+/// the range whichever noise there is. Robust fits weigh by their residuals.
 fn noise_weights(
     design: &DMatrix<f64>,
     forces: &[f64],
-    robustness: Robustness,
+    options: &CalibrationOptions,
 ) -> Result<Vec<f64>, ForceError> {
     let even = vec![1.0; forces.len()];
     let largest = forces.iter().fold(0.0, |m: f64, f| m.max(f.abs()));
-    if robustness != Robustness::None || largest == 0.0 {
+    let weighs = options.robustness == Robustness::None && !options.constant_noise;
+    if !weighs || largest == 0.0 {
         return Ok(even);
     }
     let mut best = (f64::NEG_INFINITY, even.clone());
-    for (growth, prior) in [(0.0, 0.0), (4.0, 0.8), (30.0, 0.0)] {
+    let freedom = (forces.len() - design.ncols()) as f64;
+    for (growth, prior) in [(0.0, 0.0), (freedom.min(4.0), 0.8), (30.0, 0.0)] {
         let weight = |f: &f64| 1.0 / (1.0 + growth * (f / largest).powi(2));
         let rows: Vec<f64> = forces.iter().map(weight).collect();
-        let fit = Fit::solve(design, forces, &rows, robustness)?;
+        let fit = Fit::solve(design, forces, &rows, Robustness::None)?;
         // Pairs without noise leave rounding, which has no likelihood.
         if fit.residual_sd <= 1e-12 * largest {
             return Ok(even);
         }
-        let freedom = (forces.len() - design.ncols()) as f64;
         let of_rows = 0.5 * rows.iter().map(|w| w.ln()).sum::<f64>();
         let gram = &fit.covariance / fit.residual_sd.powi(2);
         let of_fit = 0.5 * gram.determinant().ln() - freedom * fit.residual_sd.ln();

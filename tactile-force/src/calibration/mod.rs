@@ -458,6 +458,7 @@ pub enum Robustness {
 /// let pairs = [1.0, 2.0, 3.0].map(|v| CalibrationPair::loading(v, 2.0 * v + 0.1));
 /// let options = CalibrationOptions::default()
 ///     .with_zero_at_origin()
+///     .with_constant_noise()
 ///     .with_robustness(Robustness::None);
 /// let line = LinearCalibration::fit(&pairs, &options)?;
 /// assert_eq!(line.force_n(0.0), 0.0);
@@ -469,6 +470,8 @@ pub enum Robustness {
 pub struct CalibrationOptions {
     through_origin: bool,
     robustness: Robustness,
+    #[cfg_attr(feature = "serde", serde(default))]
+    constant_noise: bool,
 }
 
 impl CalibrationOptions {
@@ -476,6 +479,15 @@ impl CalibrationOptions {
     #[must_use]
     pub fn with_zero_at_origin(mut self) -> Self {
         self.through_origin = true;
+        self
+    }
+
+    /// States that the gauge's noise is the same at all forces: all pairs count alike. By default
+    /// noise may grow with the force as the pairs show it, as that of a gauge of so many per cent
+    /// of its reading.
+    #[must_use]
+    pub fn with_constant_noise(mut self) -> Self {
+        self.constant_noise = true;
         self
     }
 

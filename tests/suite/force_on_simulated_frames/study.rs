@@ -97,8 +97,11 @@ pub(super) fn study_with(
             s.centroid[k].add(contact.centroid_px[k], truth.centroid_px[k], 1.0);
         }
         s.centre.add(fit.centre_px[0], truth.centre_px[0], 1.0);
+        // These contacts are Hertz's: the radius's error is that of noise alone.
+        let law = fit.radius_law_px / fit.radius_px.value * fit.radius_m.value;
+        let noise = (fit.radius_m.standard_error.powi(2) - law * law).sqrt();
         s.radius.add(
-            fit.radius_m,
+            Estimate::new(fit.radius_m.value, noise),
             truth.contact.contact_radius_m,
             truth.contact.contact_radius_m,
         );

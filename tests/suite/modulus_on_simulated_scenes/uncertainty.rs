@@ -10,7 +10,9 @@ use tactile_imaging::elasticity::modulus::{
     Estimate, LoadSeries, LoadState, ModulusEstimate, ModulusEstimator, PaperRatio, StrainReference,
 };
 use tactile_imaging::elasticity::strain::GreenLagrange;
-use tactile_imaging::force::{self, CalibrationPair, LinearCalibration, StressCalibration};
+use tactile_imaging::force::{
+    self, CalibrationOptions, CalibrationPair, LinearCalibration, StressCalibration,
+};
 use tactile_imaging::tps::{Factorization, FitOptions, Smoothing, SplineWorkspace};
 
 const AREA_M2: f64 = 4e-5;
@@ -85,7 +87,9 @@ impl Experiment {
     }
 
     fn calibrate(&self, pairs: &[CalibrationPair]) -> LinearCalibration {
-        LinearCalibration::fit(pairs, &Default::default()).unwrap()
+        // The draws have the same noise at all forces.
+        let options = CalibrationOptions::default().with_constant_noise();
+        LinearCalibration::fit(pairs, &options).unwrap()
     }
 
     /// Everything by propagation.

@@ -306,7 +306,10 @@ fn a_gauge_alone_gives_force_contact_and_modulus() {
     let folder = tempfile::tempdir().unwrap();
     small_scene(folder.path());
     let gauged = VALID
-        .replace("[calibration]\npairs = \"pairs.csv\"\n", "")
+        .replace(
+            "[calibration]\npairs = \"pairs.csv\"\n",
+            "gauge_error = \"exact\"\n",
+        )
         .replace(
             "image = \"two.pgm\"",
             "image = \"two.pgm\"\nforce_N = 1.1\nforce_error_N = 0.02",
