@@ -121,6 +121,7 @@ impl Sensor {
             layers: layers.into_iter().map(layer).collect(),
             flat_field,
             gauge_error,
+            coupling_error: None,
             gauge_noise_n: gauge_noise,
             shear: None,
             covers_n: None,

@@ -332,6 +332,7 @@ class Pipeline:
         estimator: str | _Estimator | None = None,
         flat_field: bool | None = None,
         force_scale_error: float | None = None,
+        coupling_error: float | None = None,
         length_scale_error: float | None = None,
         radius_error: float | None = None,
         poisson_ratio_error: float | None = None,
