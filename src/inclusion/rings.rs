@@ -31,6 +31,9 @@ pub struct RingMeans {
     /// First harmonic of the pressure around the inner three quarters of the face, over its mean.
     /// It is zero for pressures that are symmetric about the axis.
     pub asymmetry: f64,
+    /// Second to fourth harmonics of the rings there, over the pressure: the root of their mean
+    /// square, noise taken out. It is zero for pressures that are symmetric about the axis.
+    pub harmonics: f64,
 }
 
 /// Why an image has no ring means.
@@ -137,18 +140,68 @@ pub fn ring_means(
         dx.hypot(dy) < used_radius_m
     });
     let filled: Vec<Ring> = rings.into_iter().filter(|ring| ring.count > 0.0).collect();
+    let radii_m: Vec<f64> = (filled.iter())
+        .map(|ring| ring.radius / ring.count)
+        .collect();
+    let means: Vec<f64> = filled.iter().map(|ring| ring.sum / ring.count).collect();
+    let pixels = image.indexed_iter().filter_map(|((y, x), &value)| {
+        let dx = (x as f64 - centre_px[0]) * sx;
+        let dy = (y as f64 - centre_px[1]) * sy;
+        let radius = dx.hypot(dy);
+        let off = value - interpolated(&radii_m, &means, radius);
+        (radius < used_radius_m).then(|| (radius / used_radius_m, dy.atan2(dx), value, off))
+    });
+    let harmonics = harmonics(pixels, noise);
     Ok(RingMeans {
         centre_px,
-        radii_m: filled.iter().map(|ring| ring.radius / ring.count).collect(),
-        pressure_pa: filled
-            .iter()
-            .map(|ring| pascals_per_grey * ring.sum / ring.count)
-            .collect(),
+        radii_m,
+        harmonics,
+        pressure_pa: means.iter().map(|mean| pascals_per_grey * mean).collect(),
         standard_error_pa: (filled.iter())
             .map(|ring| pascals_per_grey * noise / ring.count.sqrt())
             .collect(),
         asymmetry: 2.0 * harmonic[0].hypot(harmonic[1]) / mean,
     })
+}
+
+/// Root mean square of the second to fourth harmonics around rings over the mean value. Of each
+/// pixel are given its radius over the outermost, its angle, its value and how far that is from its
+/// ring's mean.
+fn harmonics(pixels: impl Iterator<Item = (f64, f64, f64, f64)>, noise: f64) -> f64 {
+    // Rings wide enough that pixels lie evenly around all but the innermost.
+    const RINGS: usize = 12;
+    const ORDERS: [f64; 3] = [2.0, 3.0, 4.0];
+    let mut sums = [[[0.0; 2]; ORDERS.len()]; RINGS];
+    let mut counts = [0.0; RINGS];
+    let mut total = 0.0;
+    for (radius, angle, value, off) in pixels {
+        let ring = ((radius * RINGS as f64) as usize).min(RINGS - 1);
+        counts[ring] += 1.0;
+        total += value;
+        for (sum, order) in sums[ring].iter_mut().zip(ORDERS) {
+            sum[0] += off * (order * angle).cos();
+            sum[1] += off * (order * angle).sin();
+        }
+    }
+    let count: f64 = counts.iter().sum();
+    // White noise of variance σ² adds 4 σ² / n to an amplitude's square.
+    let squares = (sums.iter().zip(counts)).filter(|(_, n)| *n > 0.0);
+    let squares = squares.flat_map(|(ring, n)| {
+        let square = move |[a, b]: &[f64; 2]| 4.0 * ((a * a + b * b) / n - noise * noise);
+        ring.iter().map(square)
+    });
+    (squares.sum::<f64>().max(0.0) / count).sqrt() / (total / count)
+}
+
+/// A value between those at ascending radii, the outermost beyond them.
+pub fn interpolated(radii: &[f64], values: &[f64], radius: f64) -> f64 {
+    if radii.len() < 2 {
+        return values.first().copied().unwrap_or(0.0);
+    }
+    let after = (radii.partition_point(|r| *r < radius)).clamp(1, radii.len() - 1);
+    let (a, b) = (radii[after - 1], radii[after]);
+    let part = ((radius - a) / (b - a)).clamp(0.0, 1.0);
+    values[after - 1] + part * (values[after] - values[after - 1])
 }
 
 #[derive(Clone, Copy, Default)]

@@ -1,5 +1,5 @@
 //! Scene files of a block pressed by the sensor's guide.
-use super::rings::{RingMeans, ring_means};
+use super::rings::{RingMeans, interpolated, ring_means};
 use crate::elasticity::ElasticityError;
 use crate::force::{CalibrationOptions, LinearCalibration, StressCalibration};
 use crate::io::{
@@ -155,17 +155,19 @@ impl InclusionScene {
         // The search compares frames ring by ring, so all are taken at the radii of the first.
         let first = rings.first().map(|first| first.radii_m.clone());
         let radii = first.unwrap_or_default();
-        let profiles = self
-            .frames
-            .iter()
-            .zip(&rings)
-            .map(|(frame, means)| PressureProfile {
+        let profiles = self.frames.iter().zip(&rings).map(|(frame, means)| {
+            let resampled = |values: &[f64]| -> Vec<f64> {
+                let at = |&radius| interpolated(&means.radii_m, values, radius);
+                radii.iter().map(at).collect()
+            };
+            PressureProfile {
                 approach_m: frame.approach_m,
                 // A force that gave the scale is no measurement of its own.
                 force_n: frame.force_n.filter(|_| newtons_per_grey.is_some()),
-                pressure_pa: resampled(means, &means.pressure_pa, &radii),
-                standard_error_pa: resampled(means, &means.standard_error_pa, &radii),
-            });
+                pressure_pa: resampled(&means.pressure_pa),
+                standard_error_pa: resampled(&means.standard_error_pa),
+            }
+        });
         Ok(LoadedInclusion {
             profiles: profiles.collect(),
             rings,
@@ -196,20 +198,6 @@ impl InclusionScene {
     ) -> Result<Array2<f64>, FileError> {
         Ok(read_frame(&self.file, field, path, None, size)?.mapv(f64::from))
     }
-}
-
-/// Values at the radii of another frame, whose centre lies a fraction of a pixel elsewhere.
-fn resampled(means: &RingMeans, values: &[f64], radii: &[f64]) -> Vec<f64> {
-    let known = &means.radii_m;
-    let at = |radius: f64| {
-        let after = known
-            .partition_point(|r| *r < radius)
-            .clamp(1, known.len() - 1);
-        let (a, b) = (known[after - 1], known[after]);
-        let part = ((radius - a) / (b - a)).clamp(0.0, 1.0);
-        values[after - 1] + part * (values[after] - values[after - 1])
-    };
-    radii.iter().map(|&radius| at(radius)).collect()
 }
 
 /// An inclusion scene as it stands in its file.

@@ -64,6 +64,24 @@ fn a_steep_rim_is_no_noise() {
 }
 
 #[test]
+fn harmonics_are_those_of_the_pressure_and_not_of_its_noise() {
+    // Of amplitude 2 % around every ring, on a profile that falls by a third: 2 % but for pixels
+    // that a ring's edge cuts. Noise of 1 % a pixel adds nothing beyond its own scatter, 0.05 %.
+    for (amplitude, tolerance) in [(0.02, 1e-3), (0.0, 2e-3)] {
+        let mut image = disc([74.0, 70.0], |r| 100.0 - 2e3 * r);
+        let mut rng = rand::rngs::ChaCha8Rng::seed_from_u64(3);
+        for ((y, x), value) in image.indexed_iter_mut() {
+            let angle = (y as f64 - 70.0).atan2(x as f64 - 74.0);
+            let noise = rng.sample::<f64, _>(StandardNormal);
+            *value = *value * (1.0 + amplitude * (2.0 * angle).cos()) + noise;
+        }
+        let rings = ring_means(&image.view(), [0.25e-3; 2], 1.0, 15e-3).unwrap();
+        let found = rings.harmonics;
+        assert!((found - amplitude).abs() < tolerance, "{found}");
+    }
+}
+
+#[test]
 fn dark_frames_and_cut_faces_are_refused() {
     let dark = Array2::zeros((50, 50));
     let found = ring_means(&dark.view(), [0.25e-3; 2], 1.0, 15e-3);

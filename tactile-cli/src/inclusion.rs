@@ -78,8 +78,9 @@ struct Scan {
     guide: Guide,
     radii_m: Vec<f64>,
     profiles: Vec<PressureProfile>,
-    /// First harmonic of the pressure around the axis over its mean.
+    /// First harmonic of the pressure around the axis over its mean, and the higher ones.
     asymmetry: f64,
+    harmonics: f64,
     /// Diameter, depth and modulus.
     truth: Option<[f64; 3]>,
 }
@@ -88,11 +89,13 @@ impl Scan {
     fn of_scene(scene: &InclusionScene) -> Result<Self, Failure> {
         let loaded = scene.load().map_err(Failure::input)?;
         let asymmetry = loaded.rings.iter().map(|rings| rings.asymmetry);
+        let harmonics = loaded.rings.iter().map(|rings| rings.harmonics);
         Ok(Self {
             specimen: scene.specimen,
             guide: scene.guide.clone(),
             radii_m: loaded.rings[0].radii_m.clone(),
             asymmetry: asymmetry.fold(0.0, f64::max),
+            harmonics: harmonics.fold(0.0, f64::max),
             profiles: loaded.profiles,
             truth: None,
         })
@@ -148,6 +151,7 @@ impl Scan {
             radii_m,
             profiles,
             asymmetry: 0.0,
+            harmonics: 0.0,
             truth: Some(truth),
         })
     }
@@ -189,13 +193,12 @@ pub fn run(arguments: &InclusionArguments, context: &mut Context) -> Result<Exit
     let search = InclusionSearch::new(scan.specimen, scan.guide.clone())
         .map_err(|error| unusable(file, &error))?;
     let estimate = match found(&search, &scan, context) {
-        Ok(estimate) => estimate.with_asymmetry(scan.asymmetry),
+        Ok(estimate) => estimate.with_asymmetry(scan.asymmetry, scan.harmonics),
         Err(ElasticityError::Cancelled) => return Ok(Exit::Interrupted),
         Err(error @ ElasticityError::NoSolution) => return Err(Failure::no_answer(error)),
         Err(error) => return Err(unusable(file, &error)),
     };
-    let off_axis = |w: &InclusionWarning| matches!(w, InclusionWarning::Asymmetric { .. });
-    let is_asymmetric = estimate.warnings.iter().any(off_axis);
+    let is_asymmetric = estimate.is_asymmetric();
     print(&estimate, &scan, context);
     for warning in &estimate.warnings {
         let numbers = json!(warning);
@@ -205,7 +208,7 @@ pub fn run(arguments: &InclusionArguments, context: &mut Context) -> Result<Exit
     context.value(&json!({
         "verdict": estimate.verdict(), "found": estimate.found, "probability": estimate.probability, "inclusion": estimate.inclusion,
         "block_modulus_pa": estimate.block_modulus_pa, "interface": estimate.interface,
-        "misfit": estimate.misfit, "asymmetry": scan.asymmetry, "is_asymmetric": is_asymmetric,
+        "misfit": estimate.misfit, "asymmetry": scan.asymmetry, "harmonics": scan.harmonics, "is_asymmetric": is_asymmetric,
     }));
     context.outputs.add(names[0], table(&estimate, &scan));
     context.outputs.page(names[1], || page(&estimate, &scan))?;
@@ -378,8 +381,12 @@ fn sentence(warning: &InclusionWarning) -> String {
             "the lump touches the surface or the base: beyond the model".into()
         }
         InclusionWarning::Asymmetric { asymmetry } => format!(
-            "the pressure is {:.1} % larger on one side: a lump off the axis, several, or a tilted block; the model is symmetric",
+            "the pressure is {:.1} % larger on one side: a lump off the axis, several, or a tilted block; the model is symmetric, and no size is given",
             100.0 * asymmetry
+        ),
+        InclusionWarning::NotRound { harmonics } => format!(
+            "around the axis the pressure varies by {:.1} %: a lump that is not round, several, or one off the axis; the model is symmetric, and no size is given",
+            100.0 * harmonics
         ),
         other => format!("{other:?}"),
     }

@@ -107,7 +107,7 @@ impl FemScene {
     ///
     /// # Errors
     /// Lengths that are not positive. A block no wider than the guide. An inclusion that is not
-    /// inside the block or not narrower than the guide.
+    /// inside the block, not narrower than the guide or below a fiftieth of its radius.
     pub fn block_under_guide(
         block: &Block,
         guide: &Guide,
@@ -145,6 +145,18 @@ impl FemScene {
         if let Some(lump) = block.lump {
             positive(lump.diameter_m, Quantity::Radius)?;
             positive(lump.depth_m, Quantity::Thickness)?;
+            // The number of elements grows as the face over the lump: below these parts of its
+            // radius there would be thousands of them, for a lump that does not show.
+            let (least_diameter, least_depth) = (0.02, 0.001);
+            for (quantity, found, part) in [
+                (Quantity::Radius, lump.diameter_m, least_diameter),
+                (Quantity::Thickness, lump.depth_m, least_depth),
+            ] {
+                let limit = part * guide.radius_m();
+                if found < limit {
+                    return Err(out_of_range(quantity, found, limit));
+                }
+            }
             let bottom = lump.depth_m + lump.diameter_m;
             if bottom >= block.height_m {
                 return Err(out_of_range(Quantity::Thickness, bottom, block.height_m));

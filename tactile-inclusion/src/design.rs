@@ -106,6 +106,7 @@ impl InclusionSearch {
             youngs_modulus_pa: assumed.youngs_modulus_pa,
         });
         let forward = self.forward(&observed, approaches_m, interface, fineness);
+        forward.scene(&parameters)?;
         let predicted = (forward.predict(&parameters)).ok_or(ElasticityError::NoSolution)?;
         observed.white = (0..observed.frames)
             .flat_map(|_| used.iter().map(|&ring| white_pa[ring]))

@@ -5,6 +5,7 @@
 //! Interface pressure of a block with an inclusion under a guide, and its derivatives.
 
 use std::sync::Arc;
+use tactile_elasticity::ElasticityError;
 use tactile_fem::{Block, FemScene, Guide, Interface, Kinematics, Lump, Material, SolvedFrames};
 
 /// A block's unknowns.
@@ -280,8 +281,12 @@ impl Forward {
         self.interface == Interface::Frictionless && self.kinematics == Kinematics::Finite
     }
 
-    fn scene(&self, parameters: &Parameters) -> Option<FemScene> {
-        let material = |modulus| Material::new(modulus, parameters.poisson_ratio).ok();
+    /// The block under the guide at some parameters.
+    ///
+    /// # Errors
+    /// A lump that the block does not hold, or one too small to be meshed.
+    pub fn scene(&self, parameters: &Parameters) -> Result<FemScene, ElasticityError> {
+        let material = |modulus| Material::new(modulus, parameters.poisson_ratio);
         let lump = match parameters.lump {
             None => None,
             Some(lump) => Some(Lump {
@@ -303,7 +308,6 @@ impl Forward {
             self.fineness,
             self.kinematics,
         )
-        .ok()
     }
 
     /// The frames' pressures and forces. `None` where the block cannot be meshed or solved.
@@ -320,7 +324,7 @@ impl Forward {
         let meshed = match near {
             Some(near) if near.meshed.reaches(parameters) => Arc::clone(&near.meshed),
             _ => {
-                let scene = self.scene(parameters)?;
+                let scene = self.scene(parameters).ok()?;
                 Arc::new(Meshed {
                     scene,
                     parameters: *parameters,

@@ -118,12 +118,20 @@ impl Hypothesis {
         // of 162 inclusions there to 60 or more and the last, hardly to be found, to 33
         // (`inclusion_study`).
         let least_fall = 36.0;
+        // χ² over its degrees of freedom above which the model is not that of the block pressed:
+        // a lump in it explains nothing.
+        let largest_misfit = 10.0;
+        let values = self.problem.measured.len() as f64;
         self.lump.as_ref().filter(|fit| {
+            let parameters = &fit.parameters;
+            let lowest = (parameters.lump).map_or(0.0, |lump| lump.depth_m + lump.diameter_m);
             let modulus = |coordinate| fit.parameters.get(coordinate);
             let contrast = modulus(Coordinate::LumpModulus) - modulus(Coordinate::BlockModulus);
             probability(log_odds) > least_probability
                 && self.homogeneous.misfit - fit.misfit > least_fall
                 && contrast.abs() > f64::ln(least_contrast)
+                && fit.misfit < largest_misfit * values
+                && lowest < parameters.height_m
         })
     }
 

@@ -330,9 +330,11 @@ fn that_there_is_none_is_certain_only_where_the_model_explains_the_frames() {
     let poor = InclusionWarning::PoorFit { excess: 9.0 };
     assert_eq!(estimate(1e-3, &[poor]).verdict(), Verdict::Uncertain);
     // One per cent of asymmetry is harmless, six are not.
-    let of_picture = |asymmetry| estimate(1e-3, &[]).with_asymmetry(asymmetry);
-    assert_eq!(of_picture(0.01).verdict(), Verdict::Absent);
-    assert!(of_picture(0.01).warnings.is_empty());
-    assert_eq!(of_picture(0.06).verdict(), Verdict::Uncertain);
-    assert_eq!(of_picture(0.06).warnings.len(), 1);
+    let of_picture = |first, higher| estimate(1e-3, &[]).with_asymmetry(first, higher);
+    assert_eq!(of_picture(0.01, 0.004).verdict(), Verdict::Absent);
+    assert!(of_picture(0.01, 0.004).warnings.is_empty());
+    for asymmetric in [of_picture(0.06, 0.0), of_picture(0.0, 0.019)] {
+        assert_eq!(asymmetric.verdict(), Verdict::Uncertain);
+        assert_eq!(asymmetric.warnings.len(), 1);
+    }
 }
