@@ -28,6 +28,8 @@ pub struct RingMeans {
     pub pressure_pa: Vec<f64>,
     /// Standard error of each mean from the noise of single pixels, in pascals.
     pub standard_error_pa: Vec<f64>,
+    /// Standard deviation of a pixel's noise, in pascals.
+    pub pixel_noise_pa: f64,
     /// First harmonic of the pressure around the inner three quarters of the face, over its mean.
     /// It is zero for pressures that are symmetric about the axis.
     pub asymmetry: f64,
@@ -155,6 +157,7 @@ pub fn ring_means(
     Ok(RingMeans {
         centre_px,
         radii_m,
+        pixel_noise_pa: pascals_per_grey * noise,
         harmonics,
         pressure_pa: means.iter().map(|mean| pascals_per_grey * mean).collect(),
         standard_error_pa: (filled.iter())
@@ -209,6 +212,71 @@ struct Ring {
     count: f64,
     sum: f64,
     radius: f64,
+}
+
+/// Square cells of a face and their pixels.
+pub struct FaceCells {
+    /// Middle (x, y) of each from the axis.
+    pub positions_m: Vec<[f64; 2]>,
+    /// Number of pixels in each.
+    counts: Vec<f64>,
+    /// Cell of each pixel [row, column].
+    cells: Array2<Option<usize>>,
+}
+
+impl FaceCells {
+    /// Those within three quarters of a face's radius around a centre in pixels.
+    pub fn new(
+        size: (usize, usize),
+        centre_px: [f64; 2],
+        pixel_size_m: [f64; 2],
+        face_radius_m: f64,
+    ) -> Self {
+        // Cells in a radius: they are half as wide as the narrowest lump that shows.
+        let fineness = 15.0;
+        let width = face_radius_m / fineness;
+        let mut indices = std::collections::HashMap::new();
+        let mut sums: Vec<[f64; 3]> = Vec::new();
+        let mut cells = Array2::from_elem(size, None);
+        for ((y, x), cell) in cells.indexed_iter_mut() {
+            let dx = (x as f64 - centre_px[0]) * pixel_size_m[0];
+            let dy = (y as f64 - centre_px[1]) * pixel_size_m[1];
+            if dx.hypot(dy) < 0.75 * face_radius_m {
+                let key = [dx, dy].map(|off| (off / width).floor() as i64);
+                let index = *indices.entry(key).or_insert(sums.len());
+                if index == sums.len() {
+                    sums.push([0.0; 3]);
+                }
+                for (sum, part) in sums[index].iter_mut().zip([1.0, dx, dy]) {
+                    *sum += part;
+                }
+                *cell = Some(index);
+            }
+        }
+        Self {
+            positions_m: sums.iter().map(|[n, x, y]| [x / n, y / n]).collect(),
+            counts: sums.iter().map(|[n, ..]| *n).collect(),
+            cells,
+        }
+    }
+
+    /// Mean of an image over each cell.
+    pub fn means(&self, image: &ArrayView2<'_, f64>) -> Vec<f64> {
+        let mut sums = vec![0.0; self.counts.len()];
+        for (cell, value) in self.cells.iter().zip(image.iter()) {
+            if let Some(cell) = cell {
+                sums[*cell] += value;
+            }
+        }
+        let pairs = sums.iter().zip(&self.counts);
+        pairs.map(|(sum, count)| sum / count).collect()
+    }
+
+    /// Error of each mean by a pixel's noise.
+    pub fn errors(&self, pixel_noise: f64) -> Vec<f64> {
+        let error = |count: &f64| pixel_noise / count.sqrt();
+        self.counts.iter().map(error).collect()
+    }
 }
 
 /// The value that one pixel in a hundred exceeds.

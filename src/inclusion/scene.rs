@@ -1,5 +1,5 @@
 //! Scene files of a block pressed by the sensor's guide.
-use super::rings::{RingMeans, interpolated, ring_means};
+use super::rings::{FaceCells, RingMeans, interpolated, ring_means};
 use crate::elasticity::ElasticityError;
 use crate::force::{CalibrationOptions, LinearCalibration, StressCalibration};
 use crate::io::{
@@ -7,12 +7,16 @@ use crate::io::{
     read_frame, read_toml,
 };
 use crate::scene::force_pairs;
+use core::ops::ControlFlow;
 use ndarray::Array2;
 use serde::{Deserialize, Deserializer};
 use std::error::Error;
 use std::path::{Path, PathBuf};
 use tactile_fem::{Guide, GuideLayer, Interface, Material};
-use tactile_inclusion::{PressureProfile, Specimen};
+use tactile_inclusion::{
+    InclusionEstimate, InclusionSearch, PressureProfile, SearchProgress, Specimen,
+    asymmetry_warnings,
+};
 
 /// A block of tissue, the guide pressed onto it, and the frames.
 ///
@@ -73,7 +77,7 @@ struct Frame {
 ///
 /// ```no_run
 /// use tactile_imaging::inclusion::{InclusionScene, LoadedInclusion};
-/// let LoadedInclusion { rings, profiles } = InclusionScene::read("press/scene.toml")?.load()?;
+/// let LoadedInclusion { rings, profiles, .. } = InclusionScene::read("press/scene.toml")?.load()?;
 /// println!("{} frames, the first one's centre at {:?}", profiles.len(), rings[0].centre_px);
 /// # Ok::<(), tactile_imaging::io::FileError>(())
 /// ```
@@ -83,6 +87,55 @@ pub struct LoadedInclusion {
     pub rings: Vec<RingMeans>,
     /// The same as the search takes them, at the radii of the first frame.
     pub profiles: Vec<PressureProfile>,
+    /// The whole face, which shows a lump off the axis.
+    pub face: FacePicture,
+}
+
+/// Pressures on square cells within three quarters of a face's radius.
+///
+/// ```no_run
+/// use tactile_imaging::inclusion::InclusionScene;
+/// let face = InclusionScene::read("press/scene.toml")?.load()?.face;
+/// println!("{} cells, the first one at {:?}", face.positions_m.len(), face.positions_m[0]);
+/// # Ok::<(), tactile_imaging::io::FileError>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct FacePicture {
+    /// Middles (x, y) of the cells, in metres from the face's centre.
+    pub positions_m: Vec<[f64; 2]>,
+    /// Each frame's pressures.
+    pub profiles: Vec<PressureProfile>,
+}
+
+impl LoadedInclusion {
+    /// First harmonic of the pressure around the axis over its mean, of the least symmetric frame.
+    pub fn asymmetry(&self) -> f64 {
+        self.rings.iter().map(|r| r.asymmetry).fold(0.0, f64::max)
+    }
+
+    /// Root mean square of the second to fourth harmonics of that frame which has most of them.
+    pub fn harmonics(&self) -> f64 {
+        self.rings.iter().map(|r| r.harmonics).fold(0.0, f64::max)
+    }
+
+    /// The lump that explains the frames best: one under the axis from the ring means where the
+    /// pressure is symmetric, else one anywhere from the whole face.
+    ///
+    /// # Errors
+    /// Those of [`InclusionSearch::search_with_progress`].
+    pub fn search(
+        &self,
+        search: &InclusionSearch,
+        progress: &mut dyn FnMut(SearchProgress) -> ControlFlow<()>,
+    ) -> Result<InclusionEstimate, ElasticityError> {
+        if asymmetry_warnings(self.asymmetry(), self.harmonics()).is_empty() {
+            let radii_m = &self.rings[0].radii_m;
+            search.search_with_progress(radii_m, &self.profiles, progress)
+        } else {
+            let face = &self.face;
+            search.search_picture(&face.positions_m, &face.profiles, progress)
+        }
+    }
 }
 
 impl InclusionScene {
@@ -137,6 +190,7 @@ impl InclusionScene {
         let newtons_per_grey = self.newtons_per_grey()?;
         let area = self.pixel_size_m[0] * self.pixel_size_m[1];
         let mut rings = Vec::with_capacity(self.frames.len());
+        let mut images = Vec::with_capacity(self.frames.len());
         for (index, frame) in self.frames.iter().enumerate() {
             let field = format!("frames[{}].image", index + 1);
             let image = self.image(&field, &frame.image, Some(reference.dim()))?;
@@ -151,6 +205,7 @@ impl InclusionScene {
             let (size, face) = (self.pixel_size_m, self.guide.radius_m());
             let means = ring_means(&brightening.view(), size, newtons / area, face);
             rings.push(means.map_err(|error| FileError::field(&self.file, field, error))?);
+            images.push(brightening * (newtons / area));
         }
         // The search compares frames ring by ring, so all are taken at the radii of the first.
         let first = rings.first().map(|first| first.radii_m.clone());
@@ -168,10 +223,35 @@ impl InclusionScene {
                 standard_error_pa: resampled(&means.standard_error_pa),
             }
         });
+        let profiles = profiles.collect();
         Ok(LoadedInclusion {
-            profiles: profiles.collect(),
+            face: self.face(&rings, &images),
+            profiles,
             rings,
         })
+    }
+
+    /// The pressures of all frames on cells of the face.
+    fn face(&self, rings: &[RingMeans], images: &[Array2<f64>]) -> FacePicture {
+        // The face does not move in the picture: the mean of its centres is nearest to it.
+        let mean = |axis: usize| {
+            let centres = rings.iter().map(|rings| rings.centre_px[axis]);
+            centres.sum::<f64>() / rings.len() as f64
+        };
+        let size = images.first().map_or((0, 0), Array2::dim);
+        let centre = [mean(0), mean(1)];
+        let cells = FaceCells::new(size, centre, self.pixel_size_m, self.guide.radius_m());
+        let frames = self.frames.iter().zip(rings).zip(images);
+        let profiles = frames.map(|((frame, rings), image)| PressureProfile {
+            approach_m: frame.approach_m,
+            force_n: None,
+            pressure_pa: cells.means(&image.view()),
+            standard_error_pa: cells.errors(rings.pixel_noise_pa),
+        });
+        FacePicture {
+            profiles: profiles.collect(),
+            positions_m: cells.positions_m.clone(),
+        }
     }
 
     fn newtons_per_grey(&self) -> Result<Option<f64>, FileError> {

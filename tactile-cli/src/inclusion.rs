@@ -14,7 +14,8 @@ use tactile_imaging::fem::{
 };
 use tactile_imaging::inclusion::{
     AssumedInclusion, Estimated, Identifiable, InclusionEstimate, InclusionScene, InclusionSearch,
-    InclusionWarning, PressureProfile, Specimen, Verdict,
+    InclusionWarning, LoadedInclusion, PressureProfile, SearchProgress, Specimen, Verdict,
+    asymmetry_warnings,
 };
 use tactile_imaging::pipeline::with_error;
 
@@ -23,9 +24,10 @@ use tactile_imaging::pipeline::with_error;
 /// SCENE.toml names frames of the guide pressed onto a flat block at known approaches, the block's
 /// size and the guide's layers (examples/data/inclusion/scene.toml is one). Without it a block with
 /// a lump is simulated. The pressure over the radius is compared with finite elements at finite
-/// strain. The answer is whether there is a lump, its diameter, depth and modulus with 95 %
-/// intervals, or which of them the frames leave open. --out gets profiles.csv and inclusion.svg. A
-/// search takes some five seconds for each kind of interface.
+/// strain, that over the whole face where it is not symmetric: the lump may lie off the axis. The
+/// answer is whether there is a lump, its place, diameter, depth and modulus with 95 % intervals, or
+/// which of them the frames leave open. --out gets profiles.csv and inclusion.svg. A search takes
+/// some five seconds for each kind of interface.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -83,21 +85,28 @@ struct Scan {
     harmonics: f64,
     /// Diameter, depth and modulus.
     truth: Option<[f64; 3]>,
+    /// What was read from a scene.
+    loaded: Option<LoadedInclusion>,
 }
 
 impl Scan {
     fn of_scene(scene: &InclusionScene) -> Result<Self, Failure> {
         let loaded = scene.load().map_err(Failure::input)?;
-        let asymmetry = loaded.rings.iter().map(|rings| rings.asymmetry);
-        let harmonics = loaded.rings.iter().map(|rings| rings.harmonics);
+        let (asymmetry, harmonics) = (loaded.asymmetry(), loaded.harmonics());
+        let is_symmetric = asymmetry_warnings(asymmetry, harmonics).is_empty();
         Ok(Self {
             specimen: scene.specimen,
             guide: scene.guide.clone(),
             radii_m: loaded.rings[0].radii_m.clone(),
-            asymmetry: asymmetry.fold(0.0, f64::max),
-            harmonics: harmonics.fold(0.0, f64::max),
-            profiles: loaded.profiles,
+            asymmetry,
+            harmonics,
+            profiles: if is_symmetric {
+                loaded.profiles.clone()
+            } else {
+                loaded.face.profiles.clone()
+            },
             truth: None,
+            loaded: Some(loaded),
         })
     }
 
@@ -153,6 +162,7 @@ impl Scan {
             asymmetry: 0.0,
             harmonics: 0.0,
             truth: Some(truth),
+            loaded: None,
         })
     }
 }
@@ -193,12 +203,12 @@ pub fn run(arguments: &InclusionArguments, context: &mut Context) -> Result<Exit
     let search = InclusionSearch::new(scan.specimen, scan.guide.clone())
         .map_err(|error| unusable(file, &error))?;
     let estimate = match found(&search, &scan, context) {
-        Ok(estimate) => estimate.with_asymmetry(scan.asymmetry, scan.harmonics),
+        Ok(estimate) => estimate,
         Err(ElasticityError::Cancelled) => return Ok(Exit::Interrupted),
         Err(error @ ElasticityError::NoSolution) => return Err(Failure::no_answer(error)),
         Err(error) => return Err(unusable(file, &error)),
     };
-    let is_asymmetric = estimate.is_asymmetric();
+    let is_asymmetric = !asymmetry_warnings(scan.asymmetry, scan.harmonics).is_empty();
     print(&estimate, &scan, context);
     for warning in &estimate.warnings {
         let numbers = json!(warning);
@@ -207,6 +217,7 @@ pub fn run(arguments: &InclusionArguments, context: &mut Context) -> Result<Exit
     }
     context.value(&json!({
         "verdict": estimate.verdict(), "found": estimate.found, "probability": estimate.probability, "inclusion": estimate.inclusion,
+        "inclusions": estimate.inclusion.as_slice(),
         "block_modulus_pa": estimate.block_modulus_pa, "interface": estimate.interface,
         "misfit": estimate.misfit, "asymmetry": scan.asymmetry, "harmonics": scan.harmonics, "is_asymmetric": is_asymmetric,
     }));
@@ -231,11 +242,15 @@ fn found(
     let mut progress: Option<Bar> = None;
     let interrupt = &context.interrupt;
     interrupt.polled(true);
-    let found = search.search_with_progress(&scan.radii_m, &scan.profiles, &mut |now| {
+    let mut report = |now: SearchProgress| {
         let bar = progress.get_or_insert_with(|| Bar::of(now.expected, "searching"));
         bar.done(now.done);
         interrupt.flow()
-    });
+    };
+    let found = match &scan.loaded {
+        Some(loaded) => loaded.search(search, &mut report),
+        None => search.search_with_progress(&scan.radii_m, &scan.profiles, &mut report),
+    };
     interrupt.polled(false);
     found
 }
@@ -333,6 +348,10 @@ fn print(estimate: &InclusionEstimate, scan: &Scan, context: &mut Context) {
     };
     context.row("found", verdict);
     if let Some(inclusion) = &estimate.inclusion {
+        if let Some([x, y]) = &inclusion.position_m {
+            context.row("its middle, x", interval(x, 1e3, "mm"));
+            context.row("its middle, y", interval(y, 1e3, "mm"));
+        }
         context.row("diameter", parameter(&inclusion.diameter_m, 1e3, "mm"));
         context.row("depth of its top", parameter(&inclusion.depth_m, 1e3, "mm"));
         context.row(
@@ -384,6 +403,9 @@ fn sentence(warning: &InclusionWarning) -> String {
             "the pressure is {:.1} % larger on one side: a lump off the axis, several, or a tilted block; the model is symmetric, and no size is given",
             100.0 * asymmetry
         ),
+        InclusionWarning::NotABall { axes } => format!(
+            "seen from above the lump's axes are {axes:.2} : 1; the model is a ball, and no size is given"
+        ),
         InclusionWarning::NotRound { harmonics } => format!(
             "around the axis the pressure varies by {:.1} %: a lump that is not round, several, or one off the axis; the model is symmetric, and no size is given",
             100.0 * harmonics
@@ -432,17 +454,24 @@ fn page(estimate: &InclusionEstimate, scan: &Scan) -> Page {
         let fitted = &estimate.fitted_pa[frame];
         let pairs = profile.pressure_pa.iter().zip(fitted);
         let rest: Vec<f64> = pairs.map(|(measured, fitted)| measured - fitted).collect();
-        pressures = pressures
-            .points(curve(&profile.pressure_pa), Colour::Blue, name("measured"))
-            .line(curve(fitted), Colour::Orange, name("fit"))
-            .dashed(
-                curve(&estimate.homogeneous_pa[frame]),
-                Colour::Grey,
-                name("plain block"),
-            );
+        let plain = curve(&estimate.homogeneous_pa[frame]);
+        pressures = pressures.points(curve(&profile.pressure_pa), Colour::Blue, name("measured"));
+        // Cells of a face come in no order of their distance.
+        pressures = if estimate.radii_m.is_sorted() {
+            pressures
+                .line(curve(fitted), Colour::Orange, name("fit"))
+                .dashed(plain, Colour::Grey, name("plain block"))
+        } else {
+            pressures.points(curve(fitted), Colour::Orange, name("fit"))
+        };
         residuals = residuals.points(curve(&rest), Colour::Blue, "");
     }
-    let panels = vec![pressures, residuals, section(scan, estimate)];
+    let panels = vec![
+        pressures,
+        residuals,
+        section(scan, estimate),
+        above(scan, estimate),
+    ];
     Page::new("Inclusion under the surface", 2, panels)
 }
 
@@ -464,6 +493,29 @@ fn section(scan: &Scan, estimate: &InclusionEstimate) -> Panel {
     };
     let lump_radius = 0.5e3 * inclusion.diameter_m.estimate().value;
     let depth = 1e3 * inclusion.depth_m.estimate().value;
-    let rim = circle([0.0, -depth - lump_radius], lump_radius);
+    let x = inclusion.position_m.map_or(0.0, |[x, _]| 1e3 * x.value);
+    let rim = circle([x, -depth - lump_radius], lump_radius);
     panel.line(rim, Colour::Orange, "lump")
+}
+
+/// The face and the lump from above, to scale, with the ends of its diameter's interval.
+fn above(scan: &Scan, estimate: &InclusionEstimate) -> Panel {
+    let face = 1e3 * scan.guide.radius_m();
+    let panel = Panel::new("From above, to scale", "x (mm)", "y (mm)")
+        .equal_aspect()
+        .line(circle([0.0; 2], face), Colour::Blue, "guide's face");
+    let Some(inclusion) = &estimate.inclusion else {
+        return panel;
+    };
+    let centre = (inclusion.position_m).map_or([0.0; 2], |at| at.map(|x| 1e3 * x.value));
+    let diameter = inclusion.diameter_m.estimate();
+    let [low, high] = diameter.interval;
+    panel
+        .line(
+            circle(centre, 0.5e3 * diameter.value),
+            Colour::Orange,
+            "lump",
+        )
+        .dashed(circle(centre, 0.5e3 * low), Colour::Grey, "95 %")
+        .dashed(circle(centre, 0.5e3 * high), Colour::Grey, "")
 }

@@ -2,6 +2,7 @@
 
 use crate::specimen::SensorErrors;
 use nalgebra::DMatrix;
+use std::sync::Arc;
 use tactile_fem::Interface;
 
 /// How far the finite elements are from another code's pressure within three quarters of the face,
@@ -119,8 +120,7 @@ fn ring_kernel(a: f64, b: f64, length: f64) -> f64 {
     for k in 0..count {
         let angle = core::f64::consts::PI * (f64::from(k) + 0.5) / f64::from(count);
         let squared = (a * a + b * b - 2.0 * a * b * angle.cos()).max(0.0);
-        let distance = 3f64.sqrt() * squared.sqrt() / length;
-        sum += (1.0 + distance) * (-distance).exp();
+        sum += kernel(squared.sqrt(), length);
     }
     sum / f64::from(count)
 }
@@ -133,6 +133,60 @@ pub struct Observed {
     /// White errors. Infinite for a force that is not known.
     pub white: Vec<f64>,
     pub frames: usize,
+    /// Of a whole face.
+    pub cells: Option<ObservedCells>,
+}
+
+/// Cells of a face on which pressures were measured.
+#[derive(Debug, Clone)]
+pub struct ObservedCells {
+    /// (x, y) from the face's axis.
+    pub positions_m: Arc<[[f64; 2]]>,
+    /// The reciprocal of each frame's approach.
+    pub per_approach: Vec<f64>,
+    /// Mean of each value and that of the cell on the other side of the axis, over the value: a
+    /// tilted face's pressure without its tilt.
+    pub even: Vec<f64>,
+    /// Relative error of the pressure of an inclusion off the axis.
+    pub aside: f64,
+}
+
+/// Error of the pressure of an inclusion off the axis, over its distance from the axis in radii of
+/// the face and the part by which it lifts the pressure. Against solutions in three dimensions it is
+/// 0.4 % of the pressure at 0.12 radii, 0.9 % at 0.25, 1.2 % at 0.37 and 2 % at 0.56.
+const ASIDE: f64 = 0.034;
+
+/// Standard error of the angle between face and block, in radians: two degrees.
+const TILT: f64 = 0.035;
+
+/// Matérn's kernel of order 3/2.
+fn kernel(distance: f64, length: f64) -> f64 {
+    let scaled = 3f64.sqrt() * distance / length;
+    (1.0 + scaled) * (-scaled).exp()
+}
+
+impl ObservedCells {
+    /// Cells with their values, one frame after the other.
+    pub fn new(positions_m: Arc<[[f64; 2]]>, values: &[f64], approaches_m: &[f64]) -> Self {
+        let count = positions_m.len();
+        let opposite = |[x, y]: &[f64; 2]| {
+            let away = |k: &usize| (positions_m[*k][0] + x).hypot(positions_m[*k][1] + y);
+            let nearest = (0..count).min_by(|a, b| away(a).total_cmp(&away(b)));
+            nearest.unwrap_or(0)
+        };
+        let opposites: Vec<usize> = positions_m.iter().map(opposite).collect();
+        let frames = values.chunks(count).take(approaches_m.len());
+        let even = frames.flat_map(|frame| {
+            let pairs = frame.iter().zip(&opposites);
+            pairs.map(|(value, other)| 0.5 * (1.0 + frame[*other] / value))
+        });
+        Self {
+            even: even.collect(),
+            per_approach: approaches_m.iter().map(|a| a.recip()).collect(),
+            aside: 0.0,
+            positions_m,
+        }
+    }
 }
 
 impl Observed {
@@ -145,6 +199,34 @@ impl Observed {
         sums.into_iter().map(|sum| sum / last).collect()
     }
 
+    /// These values with the error of the pressure of an inclusion so far from the axis that lifts
+    /// the pressure by this part.
+    pub fn with_lump_aside(&self, aside_m: f64, face_radius_m: f64, lift: f64) -> Self {
+        let mut observed = self.clone();
+        if let Some(cells) = &mut observed.cells {
+            cells.aside = ASIDE * aside_m / face_radius_m * lift.min(1.0);
+        }
+        observed
+    }
+
+    fn aside(&self) -> f64 {
+        self.cells.as_ref().map_or(0.0, |cells| cells.aside)
+    }
+
+    /// Covariance of the relative pressures of two cells in two frames by the angle between face
+    /// and block, θ: a rigid punch's pressure grows by 2 θ x / δ at the approach δ. Ring means have
+    /// none.
+    fn tilt(&self, i: usize, j: usize, k: usize, l: usize) -> f64 {
+        let Some(cells) = &self.cells else {
+            return 0.0;
+        };
+        let [a, b] = [cells.positions_m[i], cells.positions_m[j]];
+        let cell_count = cells.positions_m.len();
+        let even = cells.even[k * cell_count + i] * cells.even[l * cell_count + j];
+        let both = even * cells.per_approach[k] * cells.per_approach[l];
+        (2.0 * TILT).powi(2) * (a[0] * b[0] + a[1] * b[1]) * both
+    }
+
     /// Covariance of the values. Relative errors are of the values observed.
     pub fn covariance(
         &self,
@@ -154,7 +236,14 @@ impl Observed {
     ) -> DMatrix<f64> {
         let model = ModelErrors::new(interface, resolution, sensor.model);
         let (frames, rings) = (self.frames, self.radii_m.len());
-        let outermost = self.radii_m.last().copied().unwrap_or(1.0);
+        let outermost = self.radii_m.iter().copied().fold(0.0, f64::max);
+        let correlation = |i: usize, k: usize, length: f64| match &self.cells {
+            Some(cells) => {
+                let [a, b] = [cells.positions_m[i], cells.positions_m[k]];
+                kernel((a[0] - b[0]).hypot(a[1] - b[1]), length)
+            }
+            None => ring_kernel(self.radii_m[i], self.radii_m[k], length),
+        };
         let values = &self.values;
         let loads = self.loads();
         let mut covariance = DMatrix::from_fn(values.len(), values.len(), |i, k| {
@@ -162,19 +251,20 @@ impl Observed {
         });
         for (i, &a) in self.radii_m.iter().enumerate() {
             for (j, &b) in self.radii_m.iter().enumerate() {
-                let smooth = ring_kernel(a, b, sensor.correlation_m);
-                let wide = ring_kernel(a, b, SHAPE_LENGTH * outermost);
-                let shape = model.shape.powi(2) * wide;
-                let rough = model.rough.powi(2) * ring_kernel(a, b, model.element * outermost);
+                let smooth = correlation(i, j, sensor.correlation_m);
+                let wide = correlation(i, j, SHAPE_LENGTH * outermost);
+                let short = correlation(i, j, model.element * outermost);
+                let shape = (model.shape.powi(2) + self.aside().powi(2)) * wide;
+                let rough = model.rough.powi(2) * short;
                 let rim = (model.rim * a * b / outermost.powi(2)).powi(2);
                 let common = sensor.common.powi(2) * smooth + shape + rim + rough;
-                let waves = 0.5 + 0.5 * ring_kernel(a, b, model.element * outermost);
+                let waves = 0.5 + 0.5 * short;
                 let rise = (a * b / outermost.powi(2)).powi(6);
                 let grown = waves * model.sinking.powi(2) * rise + model.bent.powi(2) * wide;
                 for k in 0..frames {
                     for l in 0..frames {
                         let own = sensor.each_frame.powi(2) * smooth;
-                        let both = common + grown * loads[k] * loads[l];
+                        let both = common + grown * loads[k] * loads[l] + self.tilt(i, j, k, l);
                         let relative = if k == l { both + own } else { both };
                         let (row, column) = (k * rings + i, l * rings + j);
                         covariance[(row, column)] += relative * values[row] * values[column];

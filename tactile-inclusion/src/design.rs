@@ -97,6 +97,7 @@ impl InclusionSearch {
             values: Vec::new(),
             white: Vec::new(),
             frames: approaches_m.len(),
+            cells: None,
         };
         let interface = self.specimen().interfaces()[0];
         let mut parameters = self.known_block(assumed.block_modulus_pa);

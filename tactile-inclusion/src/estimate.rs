@@ -35,6 +35,15 @@ impl Estimated {
         }
     }
 
+    /// From the ends of its 95 % interval.
+    pub(crate) fn new(value: f64, [low, high]: [f64; 2]) -> Self {
+        Self {
+            value,
+            standard_error: 0.5 * (high - low) / TWO_SIDED_95,
+            interval: [low, high],
+        }
+    }
+
     /// Standard error over value.
     pub fn relative_error(&self) -> f64 {
         self.standard_error / self.value
@@ -109,6 +118,8 @@ impl Identifiable {
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Inclusion {
+    /// Its middle (x, y) from the face's axis, in metres. `None` from ring means: under the axis.
+    pub position_m: Option<[Estimated; 2]>,
     /// Diameter D, in metres: the posterior's median.
     pub diameter_m: Identifiable,
     /// Depth of its top d, in metres: the posterior's median.
@@ -159,12 +170,44 @@ pub enum InclusionWarning {
         /// First harmonic of the pressure around the axis over its mean.
         asymmetry: f64,
     },
+    /// The inclusion is no ball: seen from above its axes differ. The model is a ball, and neither
+    /// size nor depth nor modulus can be told.
+    NotABall {
+        /// Ratio of the axes.
+        axes: f64,
+    },
     /// The pressure around the axis has second to fourth harmonics above 0.6 %: a lump that is not
     /// round, several, or one off the axis. The model is symmetric.
     NotRound {
         /// Root mean square of these harmonics over the pressure.
         harmonics: f64,
     },
+}
+
+/// What a symmetric model does not explain of a picture: its first harmonic around the axis above
+/// 3 % and the root mean square of the second to fourth above 0.6 %, both over the pressure.
+///
+/// ```
+/// use tactile_inclusion::asymmetry_warnings;
+///
+/// assert!(asymmetry_warnings(0.01, 0.002).is_empty());
+/// assert_eq!(asymmetry_warnings(0.06, 0.02).len(), 2);
+/// ```
+pub fn asymmetry_warnings(asymmetry: f64, harmonics: f64) -> Vec<InclusionWarning> {
+    // 1 % of asymmetry is harmless, 6 % is not.
+    let largest_asymmetry = 0.03;
+    // Smooth errors of a sensor (0.3 % over 3 mm) reach 0.4 % in one picture of 100. An ellipsoid
+    // of 14 × 10 × 8 mm has 1.9 %.
+    let largest_harmonics = 0.006;
+    let first = InclusionWarning::Asymmetric { asymmetry };
+    let higher = InclusionWarning::NotRound { harmonics };
+    let both = [
+        (asymmetry > largest_asymmetry, first),
+        (harmonics > largest_harmonics, higher),
+    ];
+    both.into_iter()
+        .filter_map(|(is, warning)| is.then_some(warning))
+        .collect()
 }
 
 /// Whether there is an inclusion.
@@ -199,12 +242,12 @@ pub struct InclusionEstimate {
     pub probability: f64,
     /// Whether one was found: the probability is above 0.99, χ² falls by more than 36, and its
     /// modulus is a fifth or more from the tissue's. The block holds it, and χ² over its degrees of
-    /// freedom is below 10.
+    /// freedom is below 50.
     pub found: bool,
     /// Young's modulus of the tissue, in pascals.
     pub block_modulus_pa: Estimated,
-    /// The inclusion that explains the frames best. `None` where none was found, or where the
-    /// picture is less symmetric than the model.
+    /// The inclusion that explains the frames best. `None` where none was found, and where the
+    /// picture is not that of a ball: there is a warning.
     pub inclusion: Option<Inclusion>,
     /// How the face touches the block.
     pub interface: Interface,
@@ -227,19 +270,8 @@ impl InclusionEstimate {
     /// parameters are given.
     #[must_use]
     pub fn with_asymmetry(mut self, asymmetry: f64, harmonics: f64) -> Self {
-        // Asymmetry of a picture above which its symmetric model is in doubt: 1 % is harmless, 6 %
-        // is not.
-        let largest_asymmetry = 0.03;
-        // The same of the higher harmonics. Smooth errors of a sensor (0.3 % over 3 mm) reach 0.4 %
-        // in one picture of 100. An ellipsoid of 14 × 10 × 8 mm has 1.9 %.
-        let largest_harmonics = 0.006;
-        if asymmetry > largest_asymmetry {
-            let warning = InclusionWarning::Asymmetric { asymmetry };
-            self.warnings.push(warning);
-        }
-        if harmonics > largest_harmonics {
-            self.warnings.push(InclusionWarning::NotRound { harmonics });
-        }
+        self.warnings
+            .extend(asymmetry_warnings(asymmetry, harmonics));
         if self.is_asymmetric() {
             self.inclusion = None;
         }

@@ -4,15 +4,20 @@
 //!
 //! Interface pressure of a block with an inclusion under a guide, and its derivatives.
 
+use crate::picture::{Cells, Place};
 use std::sync::Arc;
 use tactile_elasticity::ElasticityError;
-use tactile_fem::{Block, FemScene, Guide, Interface, Kinematics, Lump, Material, SolvedFrames};
+use tactile_fem::{
+    Block, FemScene, FrameResponse, Guide, Interface, Kinematics, Lump, Material, SolvedFrames,
+};
 
 /// A block's unknowns.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Parameters {
     pub block_modulus_pa: f64,
     pub lump: Option<LumpParameters>,
+    /// Where the inclusion is, which pressures of cells depend on.
+    pub place: Place,
     /// What the approaches read too little.
     pub zero_m: f64,
     pub height_m: f64,
@@ -46,6 +51,12 @@ pub enum Coordinate {
     Height,
     /// ν.
     PoissonRatio,
+    /// x and y of the inclusion's middle, in metres.
+    Centre(usize),
+    /// Its elongation along x and between the axes.
+    Elongation(usize),
+    /// How far the inclusion is carried from the axis.
+    Carried,
 }
 
 impl Coordinate {
@@ -53,9 +64,15 @@ impl Coordinate {
     pub fn unit(self) -> f64 {
         match self {
             Self::Zero => 1e-3,
+            Self::Centre(_) => 1e-2,
             Self::PoissonRatio => -1e-1,
             _ => 1.0,
         }
+    }
+
+    /// Whether a block solved with its inclusion under the axis does not depend on it.
+    fn is_place(self) -> bool {
+        matches!(self, Self::Centre(_) | Self::Elongation(_) | Self::Carried)
     }
 }
 
@@ -76,6 +93,9 @@ impl Parameters {
             Coordinate::Zero => self.zero_m,
             Coordinate::Height => self.height_m.ln(),
             Coordinate::PoissonRatio => self.poisson_ratio,
+            Coordinate::Centre(axis) => self.place.centre_m[axis],
+            Coordinate::Elongation(part) => self.place.elongation[part],
+            Coordinate::Carried => self.place.carried,
         }
     }
 
@@ -94,6 +114,9 @@ impl Parameters {
             (Coordinate::PoissonRatio, _) => {
                 moved.poisson_ratio = (moved.poisson_ratio + step).min(LARGEST_POISSON_RATIO);
             }
+            (Coordinate::Centre(axis), _) => moved.place.centre_m[axis] += step,
+            (Coordinate::Elongation(part), _) => moved.place.elongation[part] += step,
+            (Coordinate::Carried, _) => moved.place.carried += step,
         }
         moved
     }
@@ -216,6 +239,8 @@ pub struct Forward {
     pub approaches_m: Vec<f64>,
     /// Where each frame's pressure is wanted, in metres from the axis.
     pub radii_m: Vec<f64>,
+    /// The same of a whole face, where these radii are its cells'.
+    pub cells: Option<Cells>,
     /// Elements along an eighth of the inclusion's circumference.
     pub fineness: usize,
     /// Small strain is solved in one iteration: good enough to sort starts.
@@ -340,9 +365,32 @@ impl Forward {
         let frames = SolvedFrames::new(&scene, &approaches, sliding_depth, near)?;
         let answers = frames.states().iter();
         let prediction = self.collect(
+            parameters,
             answers.map(|state| (|radius: f64| state.pressure_at(radius), state.force_n())),
         );
         Some((prediction, Solved { meshed, frames }))
+    }
+
+    /// This forward model with the plain block that carries the pressure of one with an inclusion
+    /// to the cells of a face. `None` where that cannot be solved.
+    pub fn with_plain(mut self, parameters: &Parameters) -> Option<Self> {
+        let plain = Parameters {
+            lump: None,
+            ..*parameters
+        };
+        if self.cells.is_some() {
+            let (_, solved) = self.predict_near(&plain, None)?;
+            let frames = Arc::new(solved.frames);
+            self.cells
+                .iter_mut()
+                .for_each(|cells| cells.plain = Some(Arc::clone(&frames)));
+        }
+        Some(self)
+    }
+
+    /// How much an inclusion lifts the pressure above it, relative.
+    pub fn lift(&self, solved: &Solved) -> f64 {
+        (self.cells.as_ref()).map_or(0.0, |cells| cells.lift(&solved.frames))
     }
 
     /// The scene of parameters near those of `scene`, on its mesh.
@@ -362,11 +410,19 @@ impl Forward {
     }
 
     /// Values of frames, each given by its pressure over the radius and its force.
-    fn collect<P: Fn(f64) -> f64>(&self, frames: impl Iterator<Item = (P, f64)>) -> Prediction {
+    fn collect<P: Fn(f64) -> f64>(
+        &self,
+        parameters: &Parameters,
+        frames: impl Iterator<Item = (P, f64)>,
+    ) -> Prediction {
+        let place = parameters.lump.map(|_| parameters.place);
         let mut values = Vec::with_capacity(self.observations());
         let mut forces = Vec::with_capacity(self.approaches_m.len());
-        for (pressure_at, force) in frames {
-            values.extend(self.radii_m.iter().map(|&r| pressure_at(r)));
+        for (frame, (pressure_at, force)) in frames.enumerate() {
+            match &self.cells {
+                Some(cells) => values.extend(cells.pressures(frame, place.as_ref(), &pressure_at)),
+                None => values.extend(self.radii_m.iter().map(|&r| pressure_at(r))),
+            }
             forces.push(force);
         }
         values.extend(forces);
@@ -385,9 +441,12 @@ impl Forward {
         coordinates: &[Coordinate],
         solved: &Solved,
     ) -> Option<Vec<Vec<f64>>> {
-        let moved: Vec<Parameters> = (coordinates.iter())
-            .map(|&coordinate| parameters.moved(coordinate, parameters.small_step(coordinate)))
-            .collect();
+        let moved_along =
+            |coordinate| parameters.moved(coordinate, parameters.small_step(coordinate));
+        let solved_for = coordinates
+            .iter()
+            .filter(|coordinate| !coordinate.is_place());
+        let moved: Vec<Parameters> = solved_for.map(|&c| moved_along(c)).collect();
         let changed = |scene: &FemScene| -> Option<Vec<FemScene>> {
             (moved.iter())
                 .map(|moved| self.changed(scene, parameters, moved))
@@ -398,17 +457,23 @@ impl Forward {
             at.map(|at| self.approaches_m[frame] + at.zero_m).collect()
         };
         let answers = solved.frames.responses(changed, approaches)?;
-        let mut predictions: Vec<Prediction> = (answers.iter())
-            .map(|frames| {
-                let frames = frames.iter();
-                let frames = frames.map(|frame| (|r: f64| frame.pressure_at(r), frame.force_n()));
-                self.collect(frames)
-            })
-            .collect();
-        let here = predictions.pop()?;
+        let collect = |at: &Parameters, frames: &[FrameResponse]| {
+            let frames = frames.iter();
+            let frames = frames.map(|frame| (|r: f64| frame.pressure_at(r), frame.force_n()));
+            self.collect(at, frames)
+        };
+        let (unchanged, changed) = answers.split_last()?;
+        let here = collect(parameters, unchanged);
+        let mut changed = changed.iter();
         let mut columns = Vec::with_capacity(coordinates.len());
-        for (there, coordinate) in predictions.iter().zip(coordinates) {
-            let step = parameters.small_step(*coordinate);
+        for &coordinate in coordinates {
+            let frames = if coordinate.is_place() {
+                unchanged
+            } else {
+                changed.next()?
+            };
+            let there = collect(&moved_along(coordinate), frames);
+            let step = parameters.small_step(coordinate);
             let column = (there.values.iter().zip(&here.values))
                 .map(|(there, here)| (there - here) / step)
                 .collect();

@@ -21,7 +21,7 @@ use crate::fit::{Fit, Problem};
 use crate::forward::Coordinate;
 use crate::ridge::Marginal;
 use crate::search::GridStart;
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, Vector2};
 use tactile_fem::Interface;
 
 /// Fall of the objective without which an inclusion is not that probable, 2 ln(p / (1 − p)). The
@@ -38,7 +38,7 @@ pub fn is_poor(misfit: f64, observed: &Observed) -> bool {
 }
 
 /// The coordinates as they are fitted: those of the block first.
-const COORDINATES: [Coordinate; 7] = [
+const COORDINATES: [Coordinate; 12] = [
     Coordinate::BlockModulus,
     Coordinate::Zero,
     Coordinate::Height,
@@ -46,7 +46,14 @@ const COORDINATES: [Coordinate; 7] = [
     Coordinate::Diameter,
     Coordinate::Depth,
     Coordinate::LumpModulus,
+    Coordinate::Centre(0),
+    Coordinate::Centre(1),
+    Coordinate::Elongation(0),
+    Coordinate::Elongation(1),
+    Coordinate::Carried,
 ];
+/// Index of those that only a picture of the whole face shows.
+const PLACE: usize = 7;
 pub const BLOCK_COORDINATES: usize = 4;
 
 /// The best fits under one assumption about the face.
@@ -118,9 +125,9 @@ impl Hypothesis {
         // of 162 inclusions there to 60 or more and the last, hardly to be found, to 33
         // (`inclusion_study`).
         let least_fall = 36.0;
-        // χ² over its degrees of freedom above which the model is not that of the block pressed:
-        // a lump in it explains nothing.
-        let largest_misfit = 10.0;
+        // χ² over its degrees of freedom above which the model is not that of the block pressed, and
+        // a lump in it explains nothing. One that touches the surface brings it to some ten.
+        let largest_misfit = 50.0;
         let values = self.problem.measured.len() as f64;
         self.lump.as_ref().filter(|fit| {
             let parameters = &fit.parameters;
@@ -181,6 +188,7 @@ impl Hypothesis {
     ) -> InclusionEstimate {
         let log_odds = self.log_odds(rival);
         let found = self.found(log_odds);
+        let is_found = found.is_some();
         let chosen = found.unwrap_or(&self.homogeneous);
         let misfit = chosen.misfit / observed.values.len() as f64;
         let is_poor = is_poor(chosen.misfit, observed);
@@ -202,6 +210,14 @@ impl Hypothesis {
         if is_at_boundary {
             warnings.push(InclusionWarning::AtBoundary);
         }
+        let found = found.filter(|_| observed.cells.is_none() || !is_poor);
+        let elongated = found.filter(|fit| is_elongated(fit));
+        if let Some(fit) = elongated {
+            let [a, b] = fit.parameters.place.elongation;
+            let axes = (2.0 * a.hypot(b)).exp();
+            warnings.push(InclusionWarning::NotABall { axes });
+        }
+        let found = found.filter(|_| elongated.is_none());
         let is_reliable = chosen.converged && !is_poor && !is_unsolved && !is_at_boundary;
         let estimated = |coordinate: usize| {
             let (at, interval) = self.posterior(chosen, coordinate, widened);
@@ -213,10 +229,19 @@ impl Hypothesis {
             });
             Estimated::within(at, other.map_or(interval, |other| hull(interval, other)))
         };
+        let position = |coordinate: usize| {
+            let (at, interval) = self.posterior(chosen, coordinate, widened);
+            let other = rival.and_then(|rival| {
+                let lump = rival.lump.as_ref()?;
+                Some(rival.posterior(lump, coordinate, widened).1)
+            });
+            Estimated::new(at, other.map_or(interval, |other| hull(interval, other)))
+        };
         let inclusion = found.map(|fit| {
             let parameter =
                 |k: usize| Identifiable::new(estimated(BLOCK_COORDINATES + k), is_reliable);
             Inclusion {
+                position_m: (observed.cells.as_ref()).map(|_| [PLACE, PLACE + 1].map(position)),
                 diameter_m: parameter(0),
                 depth_m: parameter(1),
                 youngs_modulus_pa: parameter(2),
@@ -230,7 +255,7 @@ impl Hypothesis {
         };
         InclusionEstimate {
             probability: probability(log_odds),
-            found: found.is_some(),
+            found: is_found,
             block_modulus_pa: estimated(0),
             inclusion,
             interface: self.interface,
@@ -241,6 +266,19 @@ impl Hypothesis {
             homogeneous_pa: split(&self.homogeneous.predicted),
         }
     }
+}
+
+/// Whether an inclusion's outline is not round, but for 1 chance in 1000.
+fn is_elongated(fit: &Fit) -> bool {
+    // That of χ² with two degrees of freedom.
+    let largest = 13.8;
+    if fit.covariance.nrows() < PLACE + 4 {
+        return false;
+    }
+    let covariance = fit.covariance.fixed_view::<2, 2>(PLACE + 2, PLACE + 2);
+    let elongation = Vector2::from(fit.parameters.place.elongation);
+    let inverse = covariance.into_owned().try_inverse();
+    inverse.is_some_and(|inverse| elongation.dot(&(inverse * elongation)) > largest)
 }
 
 fn probability(log_odds: f64) -> f64 {

@@ -36,6 +36,7 @@ mod estimate;
 mod fit;
 mod forward;
 mod hypothesis;
+mod picture;
 mod ridge;
 mod search;
 mod specimen;
@@ -43,6 +44,7 @@ mod specimen;
 pub use design::{AssumedInclusion, ExpectedErrors};
 pub use estimate::{
     Estimated, Identifiable, Inclusion, InclusionEstimate, InclusionWarning, Verdict,
+    asymmetry_warnings,
 };
 pub use search::{InclusionSearch, SearchProgress};
 pub use specimen::{PressureProfile, SensorErrors, Specimen};

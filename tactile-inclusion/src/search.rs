@@ -8,18 +8,29 @@
 //!
 //! First fits under one assumption about the face, and the answer's from them.
 
-use crate::covariance::{Observed, Resolution};
-use crate::error::Quantity;
+use crate::covariance::{Observed, ObservedCells, Resolution};
+use crate::error::{Quantity, finite};
 use crate::estimate::InclusionEstimate;
 use crate::fit::{ANSWER_ENDING, FIRST_FIT_ENDING, Fit, Prior, Problem};
 use crate::forward::{
     Coordinate, Forward, LARGEST_POISSON_RATIO, LumpParameters, Parameters, Prediction,
 };
 use crate::hypothesis::{BLOCK_COORDINATES, Hypothesis, LEAST_GAIN, Score};
+use crate::picture::{Cells, Place};
 use crate::specimen::{PressureProfile, SensorErrors, Specimen, check};
 use core::ops::ControlFlow;
+use std::sync::Arc;
 use tactile_elasticity::ElasticityError;
 use tactile_fem::{Guide, Interface, Kinematics};
+
+/// Part of the guide's radius within which pressures are used: further out the singular rim rules,
+/// where meshes disagree by percents.
+const USED_FACE: f64 = 0.75;
+
+/// Radial displacement of tissue under a face over the radius and the mean strain of the block. Of
+/// incompressible tissue it is half the strain at its depth, which is larger than the mean by a half
+/// as the strain fades with the depth.
+const CARRIED: f64 = 0.75;
 
 /// Finds a spherical inclusion in a block from the pressure on a guide's face at some approaches.
 ///
@@ -117,6 +128,55 @@ impl InclusionSearch {
         frames: &[PressureProfile],
         progress: &mut dyn FnMut(SearchProgress) -> ControlFlow<()>,
     ) -> Result<InclusionEstimate, ElasticityError> {
+        check(radii_m, frames)?;
+        let observed = self.observed(radii_m, frames)?;
+        let approaches_m: Vec<f64> = frames.iter().map(|frame| frame.approach_m).collect();
+        self.search_observed(&observed, &approaches_m, progress)
+    }
+
+    /// As [`Self::search_with_progress`], from the whole face: the inclusion may lie off the axis.
+    /// `positions_m` are the middles (x, y) of cells, from the axis, and `frames` have a pressure
+    /// for each. Cells of a fifteenth of the face's radius resolve what shows, and the time grows as
+    /// the third power of their number. The force is not used.
+    ///
+    /// # Errors
+    /// Those of [`Self::search_with_progress`].
+    pub fn search_picture(
+        &self,
+        positions_m: &[[f64; 2]],
+        frames: &[PressureProfile],
+        progress: &mut dyn FnMut(SearchProgress) -> ControlFlow<()>,
+    ) -> Result<InclusionEstimate, ElasticityError> {
+        for coordinate in positions_m.iter().flatten() {
+            finite(*coordinate, Quantity::Distance)?;
+        }
+        // A cell on the axis is one.
+        let radius = |[x, y]: &[f64; 2]| x.hypot(*y).max(f64::MIN_POSITIVE);
+        let radii_m: Vec<f64> = positions_m.iter().map(radius).collect();
+        let frames: Vec<PressureProfile> = (frames.iter().cloned())
+            .map(|frame| PressureProfile {
+                force_n: None,
+                ..frame
+            })
+            .collect();
+        check(&radii_m, &frames)?;
+        let approaches_m: Vec<f64> = frames.iter().map(|frame| frame.approach_m).collect();
+        let mut observed = self.observed(&radii_m, &frames)?;
+        let used = self.rings_within_reach(&radii_m)?;
+        observed.cells = Some(ObservedCells::new(
+            used.iter().map(|&k| positions_m[k]).collect(),
+            &observed.values,
+            &approaches_m,
+        ));
+        self.search_observed(&observed, &approaches_m, progress)
+    }
+
+    fn search_observed(
+        &self,
+        observed: &Observed,
+        approaches_m: &[f64],
+        progress: &mut dyn FnMut(SearchProgress) -> ControlFlow<()>,
+    ) -> Result<InclusionEstimate, ElasticityError> {
         // Difference of log evidence beyond which another assumption about the face is not fitted
         // to the end.
         let rival_evidence = 16.0;
@@ -129,9 +189,6 @@ impl InclusionSearch {
         // differences count as much less (K. P. Burnham & D. R. Anderson, *Model Selection and
         // Multimodel Inference* (2002), §2.5).
         let clear_evidence = 12.0;
-        check(radii_m, frames)?;
-        let observed = self.observed(radii_m, frames)?;
-        let approaches_m: Vec<f64> = frames.iter().map(|frame| frame.approach_m).collect();
         let interfaces = self.specimen.interfaces();
         let mut counter = Counter {
             done: 0,
@@ -141,7 +198,7 @@ impl InclusionSearch {
             cancelled: false,
         };
         let blocks: Vec<HomogeneousFit> = (interfaces.into_iter())
-            .filter_map(|face| self.homogeneous(&observed, &approaches_m, face, &mut counter))
+            .filter_map(|face| self.homogeneous(observed, approaches_m, face, &mut counter))
             .collect();
         // Where the homogeneous block that fits better needs no inclusion, one would make up for a
         // wrong assumption about the face.
@@ -153,8 +210,8 @@ impl InclusionSearch {
                 FirstFits::homogeneous(homogeneous)
             } else {
                 self.first_fits(
-                    &observed,
-                    &approaches_m,
+                    observed,
+                    approaches_m,
                     homogeneous,
                     candidates.first(),
                     &mut counter,
@@ -171,7 +228,7 @@ impl InclusionSearch {
         for first_fits in candidates {
             let needed = (hypotheses.first())
                 .map_or(f64::NEG_INFINITY, |best| best.evidence() - rival_evidence);
-            let found = self.hypothesis(&observed, &approaches_m, first_fits, needed, &mut counter);
+            let found = self.hypothesis(observed, approaches_m, first_fits, needed, &mut counter);
             is_unsolved |= found.is_none();
             hypotheses.extend(found);
         }
@@ -188,9 +245,9 @@ impl InclusionSearch {
         hypotheses.sort_by(|a, b| b.evidence().total_cmp(&a.evidence()));
         let mut hypotheses = hypotheses.into_iter();
         let best = hypotheses.next().ok_or(ElasticityError::NoSolution)?;
-        let clear = clear_evidence * best.inflation(&observed);
+        let clear = clear_evidence * best.inflation(observed);
         let rival = (hypotheses.next()).filter(|other| best.evidence() - other.evidence() < clear);
-        Ok(best.estimate(&observed, rival.as_ref(), is_unsolved))
+        Ok(best.estimate(observed, rival.as_ref(), is_unsolved))
     }
 
     fn observed(
@@ -222,6 +279,7 @@ impl InclusionSearch {
             values,
             white,
             frames: frames.len(),
+            cells: None,
         })
     }
 
@@ -238,6 +296,14 @@ impl InclusionSearch {
             interface,
             approaches_m: approaches_m.to_vec(),
             radii_m: observed.radii_m.clone(),
+            cells: observed.cells.as_ref().map(|cells| Cells {
+                positions_m: Arc::clone(&cells.positions_m),
+                plain: None,
+                squeezed: (approaches_m.iter())
+                    .map(|approach| approach / self.specimen.height_m())
+                    .collect(),
+                reach_m: USED_FACE * self.guide.radius_m(),
+            }),
             fineness,
             kinematics: Kinematics::Finite,
         }
@@ -247,6 +313,10 @@ impl InclusionSearch {
         Parameters {
             block_modulus_pa,
             lump: None,
+            place: Place {
+                carried: CARRIED,
+                ..Place::default()
+            },
             zero_m: 0.0,
             height_m: self.specimen.height_m(),
             poisson_ratio: self.specimen.poisson_ratio().min(LARGEST_POISSON_RATIO),
@@ -281,6 +351,21 @@ impl InclusionSearch {
         ]
     }
 
+    /// Where an inclusion may lie, where that shows: under the face, with axes up to 1.75 : 1 in
+    /// two of three.
+    fn place_priors(&self, observed: &Observed) -> Vec<Prior> {
+        let centre = 0.4 * self.guide.radius_m();
+        let elongation = 0.2;
+        let known = [
+            Prior::new(Coordinate::Centre(0), (0.0, centre)),
+            Prior::new(Coordinate::Centre(1), (0.0, centre)),
+            Prior::new(Coordinate::Elongation(0), (0.0, elongation)),
+            Prior::new(Coordinate::Elongation(1), (0.0, elongation)),
+            Prior::new(Coordinate::Carried, (CARRIED, 0.3 * CARRIED)),
+        ];
+        (observed.cells.iter()).flat_map(|_| known).collect()
+    }
+
     pub(crate) fn sensor(&self) -> &SensorErrors {
         &self.sensor
     }
@@ -296,10 +381,7 @@ impl InclusionSearch {
     ) -> Result<Vec<usize>, ElasticityError> {
         // Fewer rings do not show an inclusion's shape.
         let min_rings: usize = 8;
-        // Part of the guide's radius within which pressures are used: further out the singular rim
-        // rules, where meshes disagree by percents.
-        let used_face = 0.75;
-        let limit = used_face * self.guide.radius_m();
+        let limit = USED_FACE * self.guide.radius_m();
         let used: Vec<usize> = (0..radii_m.len())
             .filter(|&k| radii_m[k] <= limit)
             .collect();
@@ -410,7 +492,7 @@ impl InclusionSearch {
         let homogeneous_fineness: usize = 2;
         let guess = self.stiffness(observed, approaches_m);
         let forward = self.forward(observed, approaches_m, interface, homogeneous_fineness);
-        let problem = Problem {
+        let mut problem = Problem {
             forward: forward.clone(),
             measured: observed.values.clone(),
             factor: (observed.covariance(self.sensor(), interface, Resolution::FirstFits))
@@ -420,13 +502,18 @@ impl InclusionSearch {
         let block = self.known_block(guess);
         let (_, start) = problem.scaled_start(&block, &forward.predict(&block)?)?;
         let fit = problem.fit(start, FIRST_FIT_ENDING, || counter.step())?;
-        let linear = Forward {
-            kinematics: Kinematics::Linear,
-            ..forward
-        };
         // A homogeneous block that fits an inclusion's pressures is bent out of what is known of
         // it; starts are not.
-        let known = self.known_block(fit.parameters.block_modulus_pa);
+        let mut known = self.known_block(fit.parameters.block_modulus_pa);
+        problem.forward = problem.forward.with_plain(&known)?;
+        if let Some(cells) = &problem.forward.cells {
+            known.place.centre_m = cells.most_symmetric(&observed.values, self.guide.radius_m());
+        }
+        let linear = Forward {
+            kinematics: Kinematics::Linear,
+            ..problem.forward.clone()
+        };
+        let linear = linear.with_plain(&known)?;
         let grid = starts(&linear, &known, counter)?;
         let settled = if fit.misfit < doubtful * observed.values.len() as f64 {
             self.settled(&problem, &fit, observed, &grid, counter)
@@ -618,8 +705,12 @@ impl InclusionSearch {
         let modulus = first_fits.homogeneous.parameters.block_modulus_pa;
         let problem = &mut first_fits.problem;
         problem.priors.extend(self.lump_priors(modulus));
-        problem.forward =
-            self.forward(observed, approaches_m, first_fits.interface, first_fineness);
+        problem.priors.extend(self.place_priors(observed));
+        let forward = self.forward(observed, approaches_m, first_fits.interface, first_fineness);
+        problem.forward = Forward {
+            cells: problem.forward.cells.clone(),
+            ..forward
+        };
         let best = another.and_then(|another| Some((another, another.lump.as_ref()?)));
         let ending = best.map_or(FIRST_FIT_ENDING, |(another, lump)| {
             FIRST_FIT_ENDING.below(problem.objective_at(another.hopeless(), lump.volume))
@@ -657,7 +748,17 @@ impl InclusionSearch {
         });
         let is_certain = gain > certain_evidence;
         let fineness = answer_fineness(is_certain);
-        problem.forward = self.forward(observed, approaches_m, interface, fineness);
+        let forward = self.forward(observed, approaches_m, interface, fineness);
+        problem.forward = forward
+            .with_plain((lump.as_ref()).map_or(&homogeneous.parameters, |lump| &lump.parameters))?;
+        let observed = &match &lump {
+            Some(fit) => observed.with_lump_aside(
+                fit.parameters.place.aside_m(),
+                self.guide.radius_m(),
+                problem.forward.lift(&fit.solved),
+            ),
+            None => observed.clone(),
+        };
         let covariance = observed.covariance(self.sensor(), interface, Resolution::Answer);
         problem.factor = covariance.cholesky()?;
         let homogeneous = match settled {

@@ -5,6 +5,7 @@
 #![allow(clippy::print_stdout)]
 
 use crate::forward::{Forward, LumpParameters, Parameters};
+use crate::picture::Place;
 use std::collections::BTreeMap;
 use tactile_fem::{Guide, GuideLayer, Interface, Kinematics, Material};
 
@@ -46,6 +47,7 @@ fn load(header: &[&str], row: &str) -> Load {
         parameters: Parameters {
             block_modulus_pa: number("E0_pa"),
             lump: (lump.diameter_m > 0.0).then_some(lump),
+            place: Place::default(),
             zero_m: 0.0,
             height_m: number("block_height_m"),
             poisson_ratio: number("nu"),
@@ -79,6 +81,7 @@ fn pressures_within_three_quarters_of_the_face_are_those_of_calculix() {
             interface: load.interface,
             approaches_m: vec![load.approach_m],
             radii_m: load.radii_m.clone(),
+            cells: None,
             fineness: 5,
             kinematics: Kinematics::Finite,
         };

@@ -1,8 +1,10 @@
 //! Blocks that are not as the model assumes: an answer with its flag, never a confident wrong one.
 
 use crate::forward::{Forward, LumpParameters, Parameters};
+use crate::picture::Place;
 use crate::{
     Identifiable, InclusionEstimate, InclusionSearch, InclusionWarning, PressureProfile, Specimen,
+    Verdict,
 };
 use core::ops::ControlFlow;
 use tactile_fem::{Guide, GuideLayer, Interface, Kinematics, Material};
@@ -38,12 +40,14 @@ fn solved_with(interface: Interface, lump: Option<LumpParameters>, radii_m: &[f6
         interface,
         approaches_m: APPROACHES_M.to_vec(),
         radii_m: radii_m.to_vec(),
+        cells: None,
         fineness: 5,
         kinematics: Kinematics::Finite,
     };
     let block = Parameters {
         block_modulus_pa: 5e3,
         lump,
+        place: Place::default(),
         zero_m: 0.0,
         height_m: 30e-3,
         poisson_ratio: 0.495,
@@ -259,14 +263,16 @@ fn an_inclusion_at_the_surface_is_flagged_or_right() {
 fn of_an_inclusion_that_touches_the_surface_nothing_is_told() {
     let truth = lump(10e-3, 0.1e-3, 40e3);
     let estimate = searched(&frames(&solved(Some(truth), &ring_radii())));
-    assert!(estimate.found);
+    // Its best fit leaves so much that even a lump is uncertain.
     assert!(
-        (estimate.warnings).contains(&InclusionWarning::AtBoundary),
+        estimate.verdict() != Verdict::Absent && is_poor(&estimate),
         "{estimate:?}"
     );
-    let found = estimate.inclusion.unwrap();
-    let told = [found.diameter_m, found.depth_m, found.youngs_modulus_pa];
-    assert!(told.iter().all(|told| told.value().is_none()), "{told:?}");
+    let told = estimate.inclusion.is_some_and(|found| {
+        let told = [found.diameter_m, found.depth_m, found.youngs_modulus_pa];
+        told.iter().any(|told| told.value().is_some())
+    });
+    assert!(!told, "{estimate:?}");
 }
 
 #[test]

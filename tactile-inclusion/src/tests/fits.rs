@@ -15,6 +15,7 @@ fn problem_of(truth: &Parameters, resolution: Resolution) -> Problem {
         white: values.iter().map(|p| 1e-3 * p).collect(),
         values,
         frames: 2,
+        cells: None,
     };
     let covariance = observed.covariance(&SensorErrors::default(), Interface::Bonded, resolution);
     let prior = |coordinate, mean, error| Prior::new(coordinate, (mean, error));

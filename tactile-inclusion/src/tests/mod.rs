@@ -1,6 +1,7 @@
 //! The forward model and its derivatives, and what a search refuses.
 
 use crate::forward::{Coordinate, Forward, LARGEST_POISSON_RATIO, LumpParameters, Parameters};
+use crate::picture::Place;
 use crate::{
     AssumedInclusion, Identifiable, InclusionEstimate, InclusionSearch, InclusionWarning,
     PressureProfile, Specimen, Verdict,
@@ -13,6 +14,7 @@ mod against_calculix;
 mod departures;
 mod fits;
 mod marginal;
+mod pictures;
 
 fn guide(scale: f64) -> Guide {
     let layer = |thickness_m, modulus: f64| GuideLayer {
@@ -29,6 +31,7 @@ fn forward(fineness: usize, scale: f64) -> Forward {
         interface: Interface::Bonded,
         approaches_m: vec![1.2e-3, 2.4e-3],
         radii_m: (0..16).map(|k| (f64::from(k) + 0.5) * 0.75e-3).collect(),
+        cells: None,
         fineness,
         kinematics: Kinematics::Finite,
     }
@@ -42,6 +45,7 @@ fn block(scale: f64) -> Parameters {
             depth_m: 4e-3,
             youngs_modulus_pa: scale * 30e3,
         }),
+        place: Place::default(),
         zero_m: 0.0,
         height_m: 30e-3,
         poisson_ratio: 0.49,
