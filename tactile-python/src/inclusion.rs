@@ -22,12 +22,11 @@ use tactile_imaging::inclusion::{
 pub fn inclusion_of_scene(py: Python<'_>, path: PathBuf) -> PyResult<Inclusion> {
     let scene = InclusionScene::read(path).map_err(errors::file)?;
     let loaded = py.detach(|| scene.load()).map_err(errors::file)?;
-    let asymmetry = loaded.rings.iter().map(|rings| rings.asymmetry);
-    let asymmetry = asymmetry.fold(0.0, f64::max);
-    let radii = loaded.rings.first().map(|rings| rings.radii_m.clone());
     let search = InclusionSearch::new(scene.specimen, scene.guide).map_err(invalid)?;
-    let estimate = searched(py, &search, &radii.unwrap_or_default(), &loaded.profiles)?;
-    result(py, &estimate.with_asymmetry(asymmetry))
+    let mut signals = Signals::new();
+    let found = py.detach(|| loaded.search(&search, &mut |_| signals.check()));
+    signals.finish()?;
+    result(py, &found.map_err(errors::refused)?)
 }
 
 /// Searches for a lump in a block that a round guide was pressed onto.
