@@ -39,7 +39,7 @@ mod strain_between;
 
 pub use pipeline::{Measurement, Object, Pipeline, Press};
 pub use strain_between::{
-    PairsDoubt, StrainBetween, StrainBetweenError, StrainBetweenOptions, strain_between,
+    PairsDoubt, StrainAt, StrainBetween, StrainBetweenError, StrainBetweenOptions, strain_between,
 };
 
 /// The types and traits of a program that measures with stages of its own: `use

@@ -1,10 +1,10 @@
 //! Two point sets in, strain with its error out: match, spline, strain.
 use crate::elasticity::ElasticityError;
 use crate::elasticity::field::{StrainField, StrainSummary};
-use crate::elasticity::strain::{GreenLagrange, StrainMeasure};
+use crate::elasticity::strain::{Deformation, GreenLagrange, StrainMeasure};
 use crate::matching::{AnnealedSoftassign, Doubt, MatchError, PointMatcher};
-use crate::tps::{RobustFit, ThinPlateSpline, TpsError};
-use nalgebra::{Matrix3, Point, SVector};
+use crate::tps::{LocalField, LocalValue, RobustFit, ThinPlateSpline, TpsError};
+use nalgebra::{Matrix3, Point, SMatrix, SVector};
 use std::sync::Arc;
 
 /// The matcher and the measure of strain that [`strain_between`] takes.
@@ -84,6 +84,10 @@ pub enum PairsDoubt {
         /// Noise of one coordinate over the usual distance between neighbours.
         ratio: f64,
     },
+    /// The points lie in a plane of space, and nothing shows how what is across it deforms.
+    Flat,
+    /// One set is a mirror image of the other, which no deformation makes.
+    Mirrored,
 }
 
 impl std::fmt::Display for PairsDoubt {
@@ -106,6 +110,10 @@ impl std::fmt::Display for PairsDoubt {
                 "the residuals are {:.0} % of the distance between neighbours",
                 100.0 * ratio
             ),
+            Self::Flat => {
+                f.write_str("the points lie in a plane, and strain across it does not show")
+            }
+            Self::Mirrored => f.write_str("one set is a mirror image of the other"),
         }
     }
 }
@@ -174,17 +182,40 @@ pub struct StrainBetween<const D: usize> {
     pub degrees_of_freedom: usize,
     /// Noise of one coordinate, in the points' unit.
     pub sigma: f64,
-    /// Smoothing λ over the squared radius of the points.
-    pub relative_lambda: f64,
+    /// Smoothing λ over the squared radius of the points. `None` for large sets, whose patches have
+    /// their own.
+    pub relative_lambda: Option<f64>,
     /// Why the pairs may be wrong, where there is a reason.
     pub doubt: Option<PairsDoubt>,
+    fit: Fit<D>,
+}
+
+/// What the strain comes from.
+#[derive(Clone, Debug)]
+enum Fit<const D: usize> {
+    Spline(RobustFit<D>),
+    Local(LocalField<D>),
+}
+
+/// Displacement and strain at a point of the first set's space.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct StrainAt<const D: usize> {
+    /// Displacement.
+    pub displacement: SVector<f64, D>,
+    /// Strain. Not a number where the deformation folds.
+    pub strain: Matrix3<f64>,
+    /// Standard error of the strain, which grows away from the matched points.
+    pub standard_error: Matrix3<f64>,
 }
 
 /// Strain of the first set on its way to the second.
 ///
 /// The points are matched, a smoothing spline is fitted robustly through the pairs, and its
 /// gradient is strained at every matched point. Wrong pairs get no weight, and pairs that the
-/// matcher missed are found by the spline. O(n³) time.
+/// matcher missed are found by the spline. O(n³) time below [`StrainBetween::LARGE`] pairs. From
+/// there on [`LocalField`] takes the spline's place, in time and memory that grow as the number of
+/// pairs.
 ///
 /// ```
 /// use nalgebra::Point2;
@@ -230,6 +261,9 @@ pub fn strain_between<const D: usize>(
 }
 
 impl<const D: usize> StrainBetween<D> {
+    /// So many pairs are fitted patch by patch: one spline takes some seconds for them.
+    pub const LARGE: usize = 1000;
+
     /// Strain from the pairs of a match, rows of both sets: the second half of [`strain_between`].
     ///
     /// # Errors
@@ -246,6 +280,9 @@ impl<const D: usize> StrainBetween<D> {
         if found < expected {
             return Err(StrainBetweenError::TooFewPairs { expected, found });
         }
+        if found >= Self::LARGE {
+            return Self::of_many(before, after, matched, measure);
+        }
         let rough = fit(before, after, matched)?;
         let spacing = median_spacing(after);
         // A point that lies where the spline predicts is a partner, whatever the matcher's answer.
@@ -253,7 +290,8 @@ impl<const D: usize> StrainBetween<D> {
         if rows.len() < expected {
             return Err(StrainBetweenError::NotSmooth);
         }
-        let robust = fit(before, after, &rows)?;
+        let fit = fit(before, after, &rows)?;
+        let robust = fit.clone();
         let sources: Vec<_> = rows.iter().map(|&(i, _)| before[i]).collect();
         let strained = |spline| {
             let gradients = gradients(spline, &sources);
@@ -271,7 +309,7 @@ impl<const D: usize> StrainBetween<D> {
         let displacement = |p: &Point<f64, D>| robust.spline.apply(p) - p;
         let share = rows.len() as f64 / before.len().min(after.len()) as f64;
         Ok(Self {
-            doubt: doubt(share, robust.sigma / spacing),
+            doubt: doubt(share, robust.sigma / spacing).or(shape_doubt(&sources, &field)),
             pairs: rows.iter().map(|&(i, j)| [before[i], after[j]]).collect(),
             displacements: sources.iter().map(displacement).collect(),
             standard_errors: (0..rows.len()).map(errors_at).collect(),
@@ -282,9 +320,228 @@ impl<const D: usize> StrainBetween<D> {
             degrees_of_freedom: means.len() - 1,
             weights: robust.weights,
             sigma: robust.sigma,
-            relative_lambda: robust.relative_lambda,
+            relative_lambda: Some(robust.relative_lambda),
+            fit: Fit::Spline(fit),
         })
     }
+}
+
+impl<const D: usize> StrainBetween<D> {
+    /// Strain by local fits.
+    fn of_many(
+        before: &[Point<f64, D>],
+        after: &[Point<f64, D>],
+        matched: &[(usize, usize)],
+        measure: &dyn StrainMeasure,
+    ) -> Result<Self, StrainBetweenError> {
+        let mut rows = matched.to_vec();
+        let mut sources: Vec<_> = rows.iter().map(|&(i, _)| before[i]).collect();
+        let targets: Vec<_> = rows.iter().map(|&(_, j)| after[j]).collect();
+        let field = LocalField::fit(&sources, &targets, |_| {})?;
+        let mut values = field.values.clone();
+        let mut weights: Vec<f64> = (field.kept.iter())
+            .map(|&kept| f64::from(u8::from(kept)))
+            .collect();
+        let spacing = median(values.iter().map(|value| value.spacing));
+        let (missed, found) = missed_partners(before, after, matched, &field, spacing / 3.0);
+        sources.extend(missed.iter().map(|&(i, _)| before[i]));
+        rows.extend(missed);
+        values.extend(found);
+        weights.resize(rows.len(), 1.0);
+        let gradients: Vec<_> = values
+            .iter()
+            .map(|v| v.gradient.fixed_resize(0.0))
+            .collect();
+        let strained = StrainField::from_gradients(&gradients, None, measure)?;
+        let errors = |value: &LocalValue<D>| strain_error(value, measure);
+        let standard_errors: Vec<_> = values.iter().map(errors).collect();
+        let finite = standard_errors
+            .iter()
+            .filter(|e| e.iter().all(|c| c.is_finite()));
+        let mean_square =
+            finite.map(|e| e.component_mul(e)).sum::<Matrix3<f64>>() / rows.len() as f64;
+        // Points of one patch share their errors. Those of neighbouring patches cancel in part, so
+        // that this is at least the error of the mean.
+        let patches = (rows.len() / LocalField::<D>::PATCH).max(2);
+        let sigma = median(values.iter().map(|value| value.sigma));
+        let kept = weights.iter().sum::<f64>();
+        let share = kept / before.len().min(after.len()) as f64;
+        Ok(Self {
+            doubt: doubt(share, sigma / spacing).or(shape_doubt(&sources, &strained)),
+            pairs: rows.iter().map(|&(i, j)| [before[i], after[j]]).collect(),
+            displacements: values.iter().map(|value| value.displacement).collect(),
+            rows,
+            weights,
+            strains: strained.strains.to_vec(),
+            summary: strained.summary(),
+            fit: Fit::Local(field),
+            standard_errors,
+            standard_error: mean_square.map(|square| (square / patches as f64).sqrt()),
+            degrees_of_freedom: patches - 1,
+            sigma,
+            relative_lambda: None,
+        })
+    }
+}
+
+impl<const D: usize> StrainBetween<D> {
+    /// Displacement and strain at any points of the first set's space.
+    ///
+    /// ```
+    /// use nalgebra::Point2;
+    /// use tactile_imaging::{StrainBetween, elasticity::strain::GreenLagrange};
+    /// let before: Vec<_> = (0..64).map(|k| Point2::new(f64::from(k % 8), f64::from(k / 8))).collect();
+    /// let after: Vec<_> = before.iter().map(|p| Point2::new(1.02 * p.x, p.y)).collect();
+    /// let rows: Vec<_> = (0..64).map(|k| (k, k)).collect();
+    /// let found = StrainBetween::of_pairs(&before, &after, &rows, &GreenLagrange)?;
+    /// let at = found.at(&[Point2::new(2.5, 3.5)], &GreenLagrange)?[0];
+    /// assert!((at.strain[(0, 0)] - 0.0202).abs() < 1e-6);
+    /// # Ok::<(), tactile_imaging::StrainBetweenError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`StrainBetweenError::Strain`].
+    pub fn at(
+        &self,
+        points: &[Point<f64, D>],
+        measure: &dyn StrainMeasure,
+    ) -> Result<Vec<StrainAt<D>>, StrainBetweenError> {
+        let strained = |gradients: &[Matrix3<f64>]| {
+            let mut field = StrainField::from_gradients(gradients, None, measure)?;
+            for &folded in &field.folded {
+                field.strains[folded].fill(f64::NAN);
+            }
+            Ok::<_, ElasticityError>(field.strains)
+        };
+        match &self.fit {
+            Fit::Local(field) => {
+                let values = field.at(points, |_| {});
+                let gradients: Vec<_> = values
+                    .iter()
+                    .map(|v| v.gradient.fixed_resize(0.0))
+                    .collect();
+                let at = |(value, strain): (&LocalValue<D>, Matrix3<f64>)| StrainAt {
+                    displacement: value.displacement,
+                    strain,
+                    standard_error: strain_error(value, measure),
+                };
+                Ok(values.iter().zip(strained(&gradients)?).map(at).collect())
+            }
+            Fit::Spline(robust) => {
+                let strains = strained(&gradients(&robust.spline, points))?;
+                let folds = (robust.folds.iter())
+                    .map(|fold| strained(&gradients(fold, points)))
+                    .collect::<Result<Vec<_>, _>>()?;
+                let at = |(k, p): (usize, &Point<f64, D>)| {
+                    let without: Vec<_> = folds.iter().map(|fold| fold[k]).collect();
+                    StrainAt {
+                        displacement: robust.spline.apply(p) - p,
+                        strain: strains[k],
+                        standard_error: jackknife(&without) * robust.response,
+                    }
+                };
+                Ok(points.iter().enumerate().map(at).collect())
+            }
+        }
+    }
+}
+
+/// Standard error of the strain, to first order in the gradient's.
+fn strain_error<const D: usize>(
+    value: &LocalValue<D>,
+    measure: &dyn StrainMeasure,
+) -> Matrix3<f64> {
+    let undefined = Matrix3::from_element(f64::NAN);
+    let strain = |gradient: &SMatrix<f64, D, D>| {
+        let h: Matrix3<f64> = gradient.fixed_resize(0.0);
+        measure.of(&Deformation::from_displacement_gradient(h)).ok()
+    };
+    let Some(centre) = strain(&value.gradient) else {
+        return undefined;
+    };
+    let Some(root) = value.gradient_covariance.cholesky() else {
+        return Matrix3::zeros(); // exact to rounding
+    };
+    let mut squares = Matrix3::zeros();
+    for row in 0..D {
+        for direction in root.l().column_iter() {
+            let mut moved = value.gradient;
+            (0..D).for_each(|a| moved[(row, a)] += direction[a]);
+            let Some(strain) = strain(&moved) else {
+                return undefined;
+            };
+            let change = strain - centre;
+            squares += change.component_mul(&change);
+        }
+    }
+    squares.map(f64::sqrt)
+}
+
+/// Pairs of points without a partner whose prediction meets a point without one, and the field
+/// there.
+fn missed_partners<const D: usize>(
+    before: &[Point<f64, D>],
+    after: &[Point<f64, D>],
+    matched: &[(usize, usize)],
+    field: &LocalField<D>,
+    reach: f64,
+) -> (Vec<(usize, usize)>, Vec<LocalValue<D>>) {
+    let (mut open, mut free) = (vec![true; before.len()], vec![true; after.len()]);
+    for &(i, j) in matched {
+        (open[i], free[j]) = (false, false);
+    }
+    let open: Vec<usize> = (0..before.len()).filter(|&i| open[i]).collect();
+    let mut free: Vec<usize> = (0..after.len()).filter(|&j| free[j]).collect();
+    // Only points near along the first axis can be near.
+    free.sort_unstable_by(|&a, &b| after[a][0].total_cmp(&after[b][0]));
+    let places: Vec<_> = open.iter().map(|&i| before[i]).collect();
+    let values = field.at(&places, |_| {});
+    let mut meetings = Vec::new();
+    for (k, value) in values.iter().enumerate() {
+        let predicted = places[k] + value.displacement;
+        let first = free.partition_point(|&j| after[j][0] < predicted[0] - reach);
+        let near = free[first..]
+            .iter()
+            .take_while(|&&j| after[j][0] <= predicted[0] + reach);
+        let distances = near.map(|&j| ((after[j] - predicted).norm(), k, j));
+        meetings.extend(distances.filter(|meeting| meeting.0 <= reach));
+    }
+    meetings.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then((a.1, a.2).cmp(&(b.1, b.2))));
+    let (mut pairs, mut found) = (Vec::new(), Vec::new());
+    let (mut taken, mut settled) = (vec![false; after.len()], vec![false; open.len()]);
+    for (_, k, j) in meetings {
+        if !taken[j] && !settled[k] {
+            (taken[j], settled[k]) = (true, true);
+            pairs.push((open[k], j));
+            found.push(values[k]);
+        }
+    }
+    (pairs, found)
+}
+
+fn median(values: impl Iterator<Item = f64>) -> f64 {
+    let mut values: Vec<f64> = values.collect();
+    values.sort_unstable_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or(0.0)
+}
+
+/// Doubt about sets whose strain has no meaning.
+fn shape_doubt<const D: usize>(
+    sources: &[Point<f64, D>],
+    field: &StrainField,
+) -> Option<PairsDoubt> {
+    let centre = sources.iter().map(|p| p.coords).sum::<SVector<f64, D>>() / sources.len() as f64;
+    let mut scatter = Matrix3::zeros();
+    for p in sources {
+        let r: nalgebra::Vector3<f64> = (p.coords - centre).fixed_resize(0.0);
+        scatter += r * r.transpose();
+    }
+    let extents = scatter.symmetric_eigenvalues();
+    let (least, most) = (extents.min(), extents.max());
+    if D == 3 && least < 1e-8 * most {
+        return Some(PairsDoubt::Flat); // a ten-thousandth of the extent: rounding of coordinates
+    }
+    (2 * field.folded.len() > sources.len()).then_some(PairsDoubt::Mirrored)
 }
 
 fn fit<const D: usize>(

@@ -7,6 +7,7 @@ use serde_json::{Value, json};
 use std::ffi::OsString;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
+use tactile_imaging::PairsDoubt;
 use tactile_imaging::io::{CasePoints, read_cases, write_case_result};
 use tactile_imaging::matching::{
     AnnealedSoftassign, CoherentPointDrift, LinearAssignment, NearestNeighbour, Outliers,
@@ -112,8 +113,15 @@ impl Method {
 
 /// Refuses sets whose table of candidates does not fit into memory.
 pub fn allow(context: &Context, model: usize, target: usize, remedy: &str) -> Result<(), Failure> {
+    let (model_points, targets) = (model as f64, target as f64);
     // The scores of all candidates take 4.5 bytes for every pair of a model and a target point.
-    let bytes = 4.5 * model as f64 * target as f64;
+    // Sets of four thousand points and more are matched coarse to fine, where 3 to 8 kilobytes a
+    // point were measured.
+    let bytes = if model.min(target) < 4000 {
+        4.5 * model_points * targets
+    } else {
+        2250.0 * (model_points + targets)
+    };
     let job = format!("matching {model} points to {target}");
     context.allow(bytes, &job, remedy)
 }
@@ -216,6 +224,12 @@ fn solve<const D: usize>(
         count(iterations, "iteration"),
         count(starts, "start")
     ));
+    let doubt = report
+        .doubt
+        .map(|doubt| PairsDoubt::Matcher(doubt).to_string());
+    if let Some(doubt) = &doubt {
+        context.line(format_args!("{name}: DOUBT: {doubt}"));
+    }
     let _ = writeln!(
         text,
         "# {name}: {stop} after {iterations} iterations, starts: {starts}, residual {:.3e}",
@@ -225,7 +239,8 @@ fn solve<const D: usize>(
     let value = json!({
         "model_points": points, "target_points": targets, "matched": matched,
         "assignment": matching.assignment, "confidence": matching.confidence,
-        "residual": report.residual, "noise": report.sigma, "stop": stop,
+        "unmatched_share": 1.0 - matched as f64 / points as f64,
+        "residual": report.residual, "noise": report.sigma, "stop": stop, "doubt": doubt,
         "iterations": iterations, "starts": starts, "time_ms": ms,
     });
     Some(json!({ "case": case, "match": value }))

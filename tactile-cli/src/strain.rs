@@ -7,7 +7,6 @@ use clap::{Args, ValueEnum};
 use nalgebra::{Matrix3, Point};
 use serde_json::{Map, Value, json};
 use std::path::PathBuf;
-use tactile_imaging::StrainBetween;
 use tactile_imaging::elasticity::strain::{
     Biot, EulerAlmansi, GreenLagrange, Hencky, Infinitesimal, StrainMeasure,
 };
@@ -15,6 +14,7 @@ use tactile_imaging::force::Estimate;
 use tactile_imaging::io::{PointTable, read_point_table};
 use tactile_imaging::matching::PointMatcher;
 use tactile_imaging::pipeline::with_error;
+use tactile_imaging::{StrainAt, StrainBetween};
 
 /// Match the points before and after a deformation and measure the strain between them
 ///
@@ -22,7 +22,9 @@ use tactile_imaging::pipeline::with_error;
 /// header. Points may come and go. A smoothing spline whose smoothing is chosen by cross-validation
 /// gives the strain. Misplaced points are found and left out. --out gets pairs.csv (rows, positions
 /// and displacements of the pairs), strain.csv (the strain at every point with its standard error)
-/// and strain.svg.
+/// and strain.svg, and with --grid also grid.csv and grid.vtk (for ParaView): displacement, strain
+/// and standard error on a grid over the box of the points before. Far from the pairs the errors
+/// grow.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -36,6 +38,9 @@ pub struct StrainArguments {
     /// Measure of strain.
     #[arg(long, value_enum, default_value_t = Measure::GreenLagrange)]
     measure: Measure,
+    /// Spacing of a grid to write displacement and strain on, in the points' unit.
+    #[arg(long, value_name = "SPACING")]
+    grid: Option<f64>,
     #[command(flatten)]
     expectations: Expectations,
 }
@@ -64,11 +69,23 @@ impl Measure {
 /// The unit of points whose headings name one.
 const METRES: &str = "m";
 
-const FILES: [&str; 3] = ["pairs.csv", "strain.csv", "strain.svg"];
+const FILES: [&str; 5] = [
+    "pairs.csv",
+    "strain.csv",
+    "strain.svg",
+    "grid.csv",
+    "grid.vtk",
+];
 
 pub fn run(arguments: &StrainArguments, context: &mut Context) -> Result<Exit, Failure> {
     let (before, after) = (&arguments.before, &arguments.after);
-    context.outputs.plan(&FILES, &[before, after])?;
+    if let Some(spacing) = arguments.grid.filter(|s| !(*s > 0.0 && s.is_finite())) {
+        return Err(Failure::input(format!(
+            "--grid {spacing}: give a spacing above zero"
+        )));
+    }
+    let files = if arguments.grid.is_some() { 5 } else { 3 };
+    context.outputs.plan(&FILES[..files], &[before, after])?;
     let (a, metres) = read_point_table(before)?;
     let (b, also_metres) = read_point_table(after)?;
     let files = format!("{} and {}", before.display(), after.display());
@@ -134,6 +151,15 @@ fn measured<const D: usize>(
     if let Ok(strain) = &report.strain {
         context.outputs.add(FILES[1], report.table(strain));
         context.outputs.page(FILES[2], || report.page(strain))?;
+        if let Some(spacing) = arguments.grid {
+            let grid = Grid::over(&report.before, spacing)?;
+            let found = strain.at(&grid.points(), measure.strain());
+            let found = found.map_err(|error| Failure::input(error.to_string()))?;
+            context
+                .outputs
+                .add(FILES[3], report.grid_table(&grid, &found));
+            context.outputs.add(FILES[4], grid.vtk(&found));
+        }
     }
     Ok(Exit::complete_if(report.strain.is_ok()))
 }
@@ -147,6 +173,84 @@ struct StrainReport<const D: usize> {
     strain: Result<StrainBetween<D>, String>,
     measure: &'static str,
     unit: &'static str,
+}
+
+/// Points on equal distances over a box, x fastest.
+struct Grid<const D: usize> {
+    origin: Point<f64, D>,
+    spacing: f64,
+    counts: [usize; D],
+}
+
+impl<const D: usize> Grid<D> {
+    fn over(points: &[Point<f64, D>], spacing: f64) -> Result<Self, Failure> {
+        let start = points.first().copied().unwrap_or_else(Point::origin);
+        let (mut low, mut high) = (start, start);
+        for p in points {
+            (low, high) = (low.inf(p), high.sup(p));
+        }
+        let count = |a: usize| ((high[a] - low[a]) / spacing).floor() + 1.0;
+        // The files have some 300 bytes for a point.
+        if (0..D).map(count).product::<f64>() > 4e6 {
+            return Err(Failure::input(format!(
+                "--grid {spacing} gives more than four million points: give a larger spacing"
+            )));
+        }
+        Ok(Self {
+            origin: low,
+            spacing,
+            counts: std::array::from_fn(|a| count(a) as usize),
+        })
+    }
+
+    fn points(&self) -> Vec<Point<f64, D>> {
+        let place = |k: usize| {
+            let mut rest = k;
+            let mut place = self.origin;
+            for a in 0..D {
+                place[a] += self.spacing * (rest % self.counts[a]) as f64;
+                rest /= self.counts[a];
+            }
+            place
+        };
+        (0..self.counts.iter().product()).map(place).collect()
+    }
+
+    /// The legacy format of VTK, as text.
+    fn vtk(&self, found: &[StrainAt<D>]) -> Vec<u8> {
+        let three = |v: &[f64]| {
+            let at = |a: usize| v.get(a).copied().unwrap_or(0.0);
+            format!("{:e} {:e} {:e}", at(0), at(1), at(2))
+        };
+        let counts: Vec<f64> = self.counts.iter().map(|&c| c as f64).collect();
+        let depth = if D == 2 { 1.0 } else { counts[D - 1] };
+        let mut text = format!(
+            "# vtk DataFile Version 3.0\ndisplacement and strain\nASCII\nDATASET STRUCTURED_POINTS\n\
+             DIMENSIONS {} {} {depth}\nORIGIN {}\nSPACING {}\nPOINT_DATA {}\n",
+            counts[0],
+            counts[1],
+            three(self.origin.coords.as_slice()),
+            three(&[self.spacing; 3]),
+            found.len()
+        );
+        text.push_str("VECTORS displacement double\n");
+        for at in found {
+            text.push_str(&three(at.displacement.as_slice()));
+            text.push('\n');
+        }
+        let strains = found.iter().map(|at| at.strain).collect();
+        let errors = found.iter().map(|at| at.standard_error).collect();
+        for (name, tensors) in [("strain", strains), ("standard_error", errors)] {
+            let tensors: Vec<Matrix3<f64>> = tensors;
+            text.push_str(&format!("TENSORS {name} double\n"));
+            // Symmetric: columns are rows.
+            for column in tensors.iter().flat_map(|tensor| tensor.column_iter()) {
+                text.push_str(&three(&[column[0], column[1], column[2]]));
+                text.push('\n');
+            }
+        }
+        text.into_bytes()
+    }
 }
 
 /// Name and indices of a component of the strain.
@@ -195,10 +299,12 @@ impl<const D: usize> StrainReport<D> {
             "noise",
             format_args!("{noise} for each coordinate (in {})", self.unit),
         );
-        let smoothing = if found.relative_lambda >= 1e8 {
-            "homogeneous (nothing finer is supported by the data)".into()
-        } else {
-            format!("λ = {:.0e} squared radii", found.relative_lambda)
+        let smoothing = match found.relative_lambda {
+            None => "by likelihood in the neighbourhood of each point".into(),
+            Some(lambda) if lambda >= 1e8 => {
+                "homogeneous (nothing finer is supported by the data)".into()
+            }
+            Some(lambda) => format!("λ = {lambda:.0e} squared radii"),
         };
         context.row("smoothing", smoothing);
         if let Some(doubt) = found.doubt {
@@ -291,6 +397,25 @@ impl<const D: usize> StrainReport<D> {
             let mut row = vec![found.rows[k].0 as f64];
             row.extend(pair[0].iter());
             for tensor in [&found.strains[k], &found.standard_errors[k]] {
+                row.extend(components.iter().map(|c| tensor[(c.1, c.2)]));
+            }
+            csv.row(row);
+        }
+        csv.into_bytes()
+    }
+
+    /// Displacement, strain and its standard error on the grid.
+    fn grid_table(&self, grid: &Grid<D>, found: &[StrainAt<D>]) -> Vec<u8> {
+        let (axes, suffix, components) = (&["x", "y", "z"][..D], self.suffix(), components::<D>());
+        let mut header: Vec<_> = axes.iter().map(|a| format!("{a}{suffix}")).collect();
+        header.extend(axes.iter().map(|a| format!("u_{a}{suffix}")));
+        header.extend(components.iter().map(|c| c.0.to_owned()));
+        header.extend(components.iter().map(|c| format!("se_{}", c.0)));
+        let mut csv = Csv::new(&header);
+        for (point, at) in grid.points().iter().zip(found) {
+            let mut row: Vec<f64> = point.iter().copied().collect();
+            row.extend(at.displacement.iter());
+            for tensor in [&at.strain, &at.standard_error] {
                 row.extend(components.iter().map(|c| tensor[(c.1, c.2)]));
             }
             csv.row(row);

@@ -4,8 +4,9 @@
 
 use nalgebra::{Matrix3, Point3};
 use std::path::PathBuf;
+use tactile_imaging::elasticity::strain::GreenLagrange;
 use tactile_imaging::io::read_points;
-use tactile_imaging::{StrainBetweenOptions, strain_between};
+use tactile_imaging::{PairsDoubt, StrainBetween, StrainBetweenOptions, strain_between};
 
 fn frame(k: usize) -> Option<Vec<Point3<f64>>> {
     let folder = std::env::var_os("TACTILE_DATA").map_or_else(
@@ -99,4 +100,52 @@ fn unrelated_sets_are_refused() {
         &StrainBetweenOptions::default(),
     );
     assert!(found.is_err(), "{:?}", found.map(|f| f.summary.mean));
+}
+
+/// Thousands of pairs are fitted patch by patch: mean and local strain are within their errors,
+/// pairs of the wrong point have no weight, and points that the matcher missed are found.
+#[test]
+fn thousands_of_pairs_are_fitted_patch_by_patch() {
+    let before = scattered(0.3, 2400);
+    let bend =
+        |p: &Point3<f64>| Point3::new(p.x + 0.04 * p.x * p.x, p.y + 0.01 * (3.0 * p.z).sin(), p.z);
+    let after: Vec<_> = before.iter().map(bend).collect();
+    // Every fiftieth pair has its neighbour's partner, every fortieth is missing.
+    let partner = |i: usize| {
+        if i.is_multiple_of(50) {
+            (i, i + 1)
+        } else {
+            (i, i)
+        }
+    };
+    let pairs: Vec<_> = (0..2399).filter(|i| i % 40 != 7).map(partner).collect();
+    let found = StrainBetween::of_pairs(&before, &after, &pairs, &GreenLagrange).unwrap();
+    let exact = |p: &Point3<f64>| {
+        let mut h = Matrix3::zeros();
+        h[(0, 0)] = 0.08 * p.x;
+        h[(1, 2)] = 0.03 * (3.0 * p.z).cos();
+        0.5 * (h + h.transpose() + h.transpose() * h)
+    };
+    for (k, &(i, j)) in found.rows.iter().enumerate() {
+        assert_eq!(found.weights[k] > 0.0, i == j, "pair {i} {j}");
+        // The field has no noise: what the pairs do not resolve is a millionth.
+        assert!((found.strains[k] - exact(&before[i])).amax() < 1e-4, "{k}");
+    }
+    assert!(found.rows.len() >= 2390, "{}", found.rows.len());
+    assert_eq!(found.doubt, None);
+    let centre = Point3::new(0.5, 0.5, 0.5);
+    let at = found.at(&[centre], &GreenLagrange).unwrap()[0];
+    assert!((at.strain - exact(&centre)).amax() < 1e-5);
+    // A set in a plane of space has no strain across it, and a mirror image none at all.
+    let flat: Vec<_> = before.iter().map(|p| Point3::new(p.x, p.y, 0.0)).collect();
+    let all: Vec<_> = (0..2400).map(|i| (i, i)).collect();
+    let doubt = StrainBetween::of_pairs(&flat, &flat, &all, &GreenLagrange)
+        .unwrap()
+        .doubt;
+    assert_eq!(doubt, Some(PairsDoubt::Flat));
+    let mirrored: Vec<_> = before.iter().map(|p| Point3::new(-p.x, p.y, p.z)).collect();
+    let doubt = StrainBetween::of_pairs(&before, &mirrored, &all, &GreenLagrange)
+        .unwrap()
+        .doubt;
+    assert_eq!(doubt, Some(PairsDoubt::Mirrored));
 }

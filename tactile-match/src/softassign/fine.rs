@@ -60,6 +60,8 @@ impl Shape {
 /// Memory of the fit, and its answer.
 #[derive(Clone, Debug, Default)]
 pub(super) struct FineFit<const D: usize> {
+    /// Whether there is noise, also in sets that are too large to be fitted as a whole.
+    pub(super) found: bool,
     /// Standard deviation of the noise along an axis, once it was looked for.
     pub(super) sigma: Option<f64>,
     /// Variance of the positions along an axis. Empty where the positions are not the fit's.
@@ -116,7 +118,7 @@ type Sets<'a, const D: usize> = (&'a [[f64; D]], &'a [[f64; D]], &'a [[f64; D]])
 
 impl<const D: usize> FineFit<D> {
     fn forget(&mut self) {
-        self.sigma = None;
+        (self.found, self.sigma) = (false, None);
         self.variance.clear();
     }
 
@@ -143,6 +145,7 @@ impl<const D: usize> FineFit<D> {
     /// the fit of all pairs in `system`.
     fn are_noisy(&mut self, sets: Sets<'_, D>) -> bool {
         for _ in 0..3 {
+            self.found = false;
             // Fewer do not tell noise from bending.
             if self.pairs.len() < 8 * (D + 1) {
                 return false;
@@ -152,6 +155,7 @@ impl<const D: usize> FineFit<D> {
             let Some(of_patch) = self.likeliest(sets) else {
                 return false;
             };
+            self.found = true;
             if sets.0.len() > MAX_WHOLE {
                 return true;
             }

@@ -152,7 +152,7 @@ fn stop_reason<const D: usize>(workspace: &SoftassignWorkspace<D>) -> StopReason
         // The floor is reached to rounding.
         () if workspace.best.sigma <= 1.000_001 * confidence::MIN_SIGMA
             && !workspace.annealer.soft.errors.differ()
-            && !workspace.best.noisy
+            && !workspace.fine.found
             && workspace.doubt().is_none() =>
         {
             StopReason::Exact

@@ -7,6 +7,7 @@ mod evaluation;
 mod influence;
 mod input;
 mod iterative;
+mod local;
 mod models;
 mod path;
 mod properties;

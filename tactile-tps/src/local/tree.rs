@@ -1,0 +1,133 @@
+//! A k-d tree: blocks of neighbours, and the nearest of some points.
+
+use nalgebra::Point;
+
+/// Points of a leaf at most.
+const LEAF: usize = 24;
+
+/// Rows of points in the order of the tree, and where its inner nodes cut.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Tree<const D: usize> {
+    order: Vec<usize>,
+    /// Axis and coordinate of the cut, as a heap. The halves of a range have its middle between
+    /// them.
+    cuts: Vec<(usize, f64)>,
+}
+
+impl<const D: usize> Tree<D> {
+    /// The tree of some rows of `points`.
+    pub(super) fn new(points: &[Point<f64, D>], rows: Vec<usize>) -> Self {
+        let mut tree = Self {
+            order: rows,
+            cuts: Vec::new(),
+        };
+        let mut order = std::mem::take(&mut tree.order);
+        tree.split(points, &mut order, 0);
+        tree.order = order;
+        tree
+    }
+
+    fn split(&mut self, points: &[Point<f64, D>], rows: &mut [usize], node: usize) {
+        if rows.len() <= LEAF {
+            return;
+        }
+        let extent = |axis: usize| {
+            let range = |(low, high): (f64, f64), &i: &usize| {
+                let x: f64 = points[i][axis];
+                (low.min(x), high.max(x))
+            };
+            let (low, high) = rows.iter().fold((f64::MAX, f64::MIN), range);
+            high - low
+        };
+        let axis = (1..D).fold(0, |best, a| if extent(a) > extent(best) { a } else { best });
+        let middle = rows.len() / 2;
+        let by_place =
+            |&a: &usize, &b: &usize| points[a][axis].total_cmp(&points[b][axis]).then(a.cmp(&b));
+        let (_, &mut cut, _) = rows.select_nth_unstable_by(middle, by_place);
+        if self.cuts.len() <= node {
+            self.cuts.resize(node + 1, (0, 0.0));
+        }
+        self.cuts[node] = (axis, points[cut][axis]);
+        let (low, high) = rows.split_at_mut(middle);
+        self.split(points, low, 2 * node + 1);
+        self.split(points, high, 2 * node + 2);
+    }
+
+    /// The leaves, neighbours after each other.
+    pub(super) fn leaves(&self) -> Vec<&[usize]> {
+        let mut leaves = Vec::new();
+        let mut open = vec![&self.order[..]];
+        while let Some(rows) = open.pop() {
+            if rows.len() <= LEAF {
+                leaves.push(rows);
+            } else {
+                let (low, high) = rows.split_at(rows.len() / 2);
+                open.extend([high, low]);
+            }
+        }
+        leaves
+    }
+
+    /// Squared distances and rows of the `count` points nearest to a place, nearest first.
+    pub(super) fn nearest(
+        &self,
+        points: &[Point<f64, D>],
+        place: &Point<f64, D>,
+        count: usize,
+    ) -> Vec<(f64, usize)> {
+        let mut found = Vec::with_capacity(3 * count + LEAF);
+        let mut limit = f64::INFINITY;
+        self.collect(
+            points,
+            place,
+            count,
+            (0, 0..self.order.len()),
+            &mut found,
+            &mut limit,
+        );
+        found.sort_unstable_by(by_distance);
+        found.truncate(count);
+        found
+    }
+
+    fn collect(
+        &self,
+        points: &[Point<f64, D>],
+        place: &Point<f64, D>,
+        count: usize,
+        (node, range): (usize, std::ops::Range<usize>),
+        found: &mut Vec<(f64, usize)>,
+        limit: &mut f64,
+    ) {
+        if range.len() <= LEAF {
+            let rows = self.order[range].iter();
+            let distances = rows.map(|&i| ((points[i] - place).norm_squared(), i));
+            found.extend(distances.filter(|near| near.0 <= *limit));
+            // Pruned now and then: in all O(1) for each point looked at.
+            if found.len() > 2 * count {
+                found.select_nth_unstable_by(count, by_distance);
+                found.truncate(count);
+                *limit = found.iter().map(|near| near.0).fold(0.0, f64::max);
+            }
+            return;
+        }
+        let (axis, cut) = self.cuts[node];
+        let middle = range.start + range.len() / 2;
+        let low = (2 * node + 1, range.start..middle);
+        let high = (2 * node + 2, middle..range.end);
+        let beyond = place[axis] - cut;
+        let (first, second) = if beyond < 0.0 {
+            (low, high)
+        } else {
+            (high, low)
+        };
+        self.collect(points, place, count, first, found, limit);
+        if beyond * beyond <= *limit {
+            self.collect(points, place, count, second, found, limit);
+        }
+    }
+}
+
+fn by_distance(a: &(f64, usize), b: &(f64, usize)) -> std::cmp::Ordering {
+    a.0.total_cmp(&b.0).then(a.1.cmp(&b.1))
+}
