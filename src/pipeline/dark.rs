@@ -108,13 +108,14 @@ impl ContactStage for DarkContact {
                 found: frame.dim(),
             });
         }
-        let step_grey = light_step_grey(frame, image);
-        let darkness =
-            |at: [usize; 2]| f64::from(image[at]) - f64::from(frame[at]) + step_grey.unwrap_or(0.0);
+        let step_grey =
+            light_step_grey(frame, image).filter(|step| step.abs() > self.threshold_grey);
+        let step_grey = step_grey.unwrap_or(0.0);
+        let darkness = |at: [usize; 2]| f64::from(image[at]) - f64::from(frame[at]) + step_grey;
         let patch = largest_patch(frame.dim(), |at| darkness(at) > self.threshold_grey);
         if patch.is_empty() {
             return Ok(FrameContact {
-                background_step_grey: step_grey,
+                background_step_grey: Some(step_grey),
                 ..FrameContact::default()
             });
         }
@@ -130,7 +131,7 @@ impl ContactStage for DarkContact {
             ..self.reading(&patch, frame.dim(), peak)
         };
         Ok(FrameContact {
-            background_step_grey: step_grey,
+            background_step_grey: Some(step_grey),
             ..FrameContact::new(reading, mask.view())
         })
     }
@@ -178,11 +179,12 @@ impl DarkContact {
 }
 
 /// By how many grey levels all of the frame differs from the reference: the median of the
-/// difference along the frame's border, where it is more than one level. `None` where it is less,
-/// or where it is that of a contact which reaches most of the border.
+/// difference along the frame's border. `None` where that is a contact's which reaches most of the
+/// border.
 ///
-/// Half of the border is background unless the contact is larger than the frame, and the dent
-/// around a contact in the frame's middle does not reach it.
+/// Half of the border is background unless the contact is larger than the frame. A step below the
+/// threshold of a contact is no light: a gel darkens as much beside a contact, and its table of
+/// depths was taken with that.
 fn light_step_grey(frame: ArrayView2<'_, u8>, reference: ArrayView2<'_, u8>) -> Option<f64> {
     let (rows, columns) = frame.dim();
     // A sixteenth of the frame on each side.
@@ -194,7 +196,7 @@ fn light_step_grey(frame: ArrayView2<'_, u8>, reference: ArrayView2<'_, u8>) -> 
         column_end: columns.saturating_sub(wide),
     };
     let step = median_shift_outside(frame, reference, middle)?;
-    (step.value.abs() > 1.5).then_some(step.value)
+    Some(step.value)
 }
 
 /// The largest set of pixels `[row, column]` inside, connected by their sides. Empty where no pixel
