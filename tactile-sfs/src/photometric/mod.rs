@@ -4,8 +4,7 @@
 //! the place in the image. A polynomial of third degree in the three colour differences, whose
 //! coefficients change linearly over the image, gives the normal's components n_x and n_y. Presses
 //! of one ball determine it: inside the contact circle n = (x − x₀, y − y₀)/R. Over presses left
-//! out in turn it was as good as lookup tables and polynomials of higher degree, with fewer
-//! numbers to determine.
+//! out in turn it was as good as polynomials of higher degree, with fewer numbers to determine.
 
 mod calibration;
 mod colour;
