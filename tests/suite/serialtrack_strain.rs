@@ -128,8 +128,10 @@ fn thousands_of_pairs_are_fitted_patch_by_patch() {
     };
     for (k, &(i, j)) in found.rows.iter().enumerate() {
         assert_eq!(found.weights[k] > 0.0, i == j, "pair {i} {j}");
-        // The field has no noise: what the pairs do not resolve is a millionth.
-        assert!((found.strains[k] - exact(&before[i])).amax() < 1e-4, "{k}");
+        // The field has no noise. What the pairs do not resolve is in the errors, mostly at corners.
+        let limit = 1e-4 + 6.0 * found.standard_errors[k].amax();
+        let off = (found.strains[k] - exact(&before[i])).amax();
+        assert!(off < limit && limit < 0.05, "{k}: {off}, {limit}");
     }
     assert!(found.rows.len() >= 2390, "{}", found.rows.len());
     assert_eq!(found.doubt, None);
