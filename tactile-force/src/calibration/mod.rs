@@ -48,7 +48,7 @@ use crate::frame::DifferenceNoise;
 pub struct ForceReading {
     /// Force in newtons, its standard error from all sources and the degrees of freedom of that
     /// error. The calibration's share was estimated from a few pairs, that of the frame is known
-    /// (Welch–Satterthwaite).
+    /// (Cochran and Cox).
     pub force_n: Estimate,
     /// The part of the standard error from noise in the frames, in newtons.
     pub noise_n: f64,

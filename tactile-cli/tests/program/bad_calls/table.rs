@@ -303,7 +303,10 @@ pub(super) const CALLS: &[(&str, &str)] = &[
     ("inclusion lump.toml --design --out results", "--out"),
     ("inclusion lump.toml --diameter-mm 4", "--design"),
     ("inclusion --design --depth-mm nan", "depth-mm"),
-    ("inclusion --design --diameter-mm 1e-9", "reach"),
+    (
+        "inclusion --design --diameter-mm 1e-9",
+        "from 0.5 to 200 mm",
+    ),
     ("inclusion lump.toml --seed 2", "--seed"),
     (
         "force --reference reference.png --pairs calibration.csv --pixel-um 40",
