@@ -1,6 +1,7 @@
 //! What several subcommands ask for: numbers, repetitions, frames of a sensor, masks and known
 //! heights.
 use crate::console::{Failure, Interrupt, four_digits, median_ms};
+use crate::frames::Reading;
 use clap::{Args, ValueEnum};
 use ndarray::Array2;
 use std::path::{Path, PathBuf};
@@ -133,7 +134,7 @@ impl Repetition {
 /// Pressed frames and the frame without contact.
 #[derive(Args)]
 pub struct SensorFrames {
-    /// Pressed frames (PNG, PGM or JPEG).
+    /// Pressed frames: images (PNG, PGM, JPEG, TIFF), videos (YUV4MPEG2), `-` for a pipe of frames.
     #[arg(required = true)]
     pub frames: Vec<PathBuf>,
     /// Frame of the sensor without contact.
@@ -163,16 +164,14 @@ impl SensorFrames {
         eight_bits(&self.reference, grey, self.bits)
     }
 
-    /// A pressed frame of the reference's size.
-    pub fn read(
-        &self,
-        path: &Path,
-        grey: Grey,
-        reference: &Array2<u8>,
-    ) -> Result<Array2<u8>, Failure> {
-        let frame = eight_bits(path, grey, self.bits)?;
-        same_shape((path, frame.dim()), (&self.reference, reference.dim()))?;
-        Ok(frame)
+    /// How the pressed frames are read.
+    pub fn reading(&self, grey: Grey, reference: &Array2<u8>) -> Reading<'_> {
+        Reading {
+            grey,
+            bits: self.bits,
+            reference: &self.reference,
+            size: reference.dim(),
+        }
     }
 }
 

@@ -146,7 +146,7 @@ impl PairLine {
         let [low, high] = self.line.range().map(|grey| four_digits(1e-6 * grey));
         let full = four_digits(report.full_scale_n);
         let range = format!("{low} to {high} million grey levels, up to {full} N");
-        context.row("range", range);
+        context.answer("range", range);
     }
 
     pub fn value(&self) -> Value {
@@ -207,6 +207,8 @@ fn calibrate_sensor(path: &Path, context: &mut Context) -> Result<Exit, Failure>
         let names = [file.clone(), file.with_extension("svg")];
         let folder = folder.unwrap_or(Path::new("."));
         context.outputs.plan_in(folder, &names, &[path])?;
+    } else {
+        context.outputs.plan(&[""; 0], &[path])?;
     }
     if PhotometricPresses::names_kind(path) {
         return photometric::calibrate(path, &file, context);
@@ -259,7 +261,7 @@ fn print_sensor(found: &CalibratedSensor, context: &mut Context) {
     let [low, high] = report.identified_grey;
     let largest = in_unit(sensor.curve.pressure_pa(high), 1e-3);
     let light = format!("identified from {low:.0} to {high:.0} grey levels, {largest} kPa there");
-    context.row("light", light);
+    context.answer("light", light);
     let [residual, parameters] =
         [report.residual_sd, report.effective_parameters].map(|v| digits(v, 2));
     let text = format!("{residual} times the gauge's error, {parameters} effective parameters");

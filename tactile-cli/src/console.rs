@@ -160,6 +160,15 @@ impl Context {
     /// Prints a line of the result, unless JSON is wanted. A reader that goes away (`| head -1`)
     /// ends the printing, not the program.
     pub fn line(&mut self, text: impl Display) {
+        let text = text.to_string();
+        if let Some(report) = &mut self.outputs.report {
+            report.line(&text);
+        }
+        self.aside(text);
+    }
+
+    /// Prints what says how fast the work was, and does not belong on a report.
+    pub fn aside(&mut self, text: impl Display) {
         if self.json || self.reader_left || self.error.is_some() {
             return;
         }
@@ -172,7 +181,29 @@ impl Context {
 
     /// Prints a line of a name and its value.
     pub fn row(&mut self, name: &str, value: impl Display) {
-        self.line(format_args!("{name:<18}{value}"));
+        let value = value.to_string();
+        if let Some(report) = &mut self.outputs.report {
+            report.row(name, &value);
+        }
+        self.aside(format_args!("{name:<18}{value}"));
+    }
+
+    /// Prints a line of a name and its value, the answer of the call.
+    pub fn answer(&mut self, name: &str, value: impl Display) {
+        let value = value.to_string();
+        if let Some(report) = &mut self.outputs.report {
+            report.answer(format!("{name}: {value}"));
+        }
+        self.row(name, value);
+    }
+
+    /// A sentence about the input for the person at the terminal, and for the report.
+    pub fn caution(&mut self, text: impl Display) {
+        let text = text.to_string();
+        if let Some(report) = &mut self.outputs.report {
+            report.caution(&text, "");
+        }
+        self.note(text);
     }
 
     /// Prints a caution about the answer, and keeps it for the JSON object: a kind, its numbers (an
@@ -193,7 +224,11 @@ impl Context {
             let sentence = flag.to_string();
             let words = sentence.strip_prefix("frame ");
             let words = words.and_then(|s| Some(s.split_once(": ")?.1));
-            self.row("caution", words.unwrap_or(&sentence));
+            self.aside(format_args!(
+                "{:<18}{}",
+                "caution",
+                words.unwrap_or(&sentence)
+            ));
         }
         self.keep_cautions(flags);
     }
@@ -201,6 +236,9 @@ impl Context {
     /// Keeps cautions that were printed for the JSON object. The first frame is frame 1.
     pub fn keep_cautions(&mut self, flags: &[Flag]) {
         for flag in flags {
+            if let Some(report) = &mut self.outputs.report {
+                report.flag(flag);
+            }
             let mut caution = serde_json::to_value(flag).unwrap_or_default();
             if let Some(frame) = caution.get("frame").and_then(Value::as_u64) {
                 caution["frame"] = json!(frame + 1);
@@ -291,6 +329,7 @@ impl Context {
     pub fn close(mut self, ended: Result<Exit, Failure>) -> Exit {
         // The answer is printed by now: a folder that cannot be written withholds nothing.
         let ended = ended.and_then(|exit| {
+            self.outputs.finish_report();
             let [written, kept] = self.outputs.write(self.interrupt.requested())?;
             if !written.is_empty() {
                 self.line(format_args!("wrote {}", written.join(", ")));

@@ -1,13 +1,14 @@
 //! `tactile depth`: contact and depth of a sensor that grows darker where it is pressed.
 use crate::arguments::SensorFrames;
 use crate::console::{Context, Exit, Failure, four_digits, in_unit};
-use crate::outputs::{Csv, beside};
+use crate::frames::Frame;
+use crate::outputs::Csv;
 use crate::photometric::{self, unless_sensor};
 use crate::plot::{Colour, HeatMap, Page, Panel, circle};
 use crate::surfaces::span;
 use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use tactile_imaging::io::{Grey, read_columns};
 use tactile_imaging::pipeline::{
     BallFit, ContactReading, ContactSurface, DarkContact, Object, Pipeline, PipelineError,
@@ -132,12 +133,6 @@ pub fn run(arguments: &DepthArguments, context: &mut Context) -> Result<Exit, Fa
     if let Some(sensor) = &arguments.sensor {
         return photometric::depth(sensor, &frames.frames, context);
     }
-    let names = frames
-        .frames
-        .iter()
-        .flat_map(|frame| ["_depth.csv", "_depth.svg"].map(|suffix| beside(frame, suffix)));
-    let names: Vec<_> = names.collect();
-    context.outputs.plan(&names, &frames.files(table))?;
     let pipeline = arguments.pipeline()?;
     let grey = match arguments.grey {
         GreyOf::Rec601 => Grey::Rec601,
@@ -145,26 +140,27 @@ pub fn run(arguments: &DepthArguments, context: &mut Context) -> Result<Exit, Fa
         GreyOf::Mean => Grey::Mean,
     };
     let reference = frames.read_reference(grey)?;
+    let reading = frames.reading(grey, &reference);
+    let (images, mut exit) = reading.all(&frames.frames, context)?;
     // Frames are held, and each has a surface with its plot.
-    let pixels = (reference.len() * frames.frames.len()) as f64;
-    let job = format!("the depth of {} frames", frames.frames.len());
+    let pixels = (reference.len() * images.len()) as f64;
+    let job = format!("the depth of {} frames", images.len());
     context.allow(40.0 * pixels, &job, "give fewer or smaller frames")?;
-    let images = frames
-        .frames
+    let names = images
         .iter()
-        .map(|path| frames.read(path, grey, &reference));
-    let images = images.collect::<Result<Vec<_>, _>>()?;
+        .flat_map(|image| ["_depth.csv", "_depth.svg"].map(|suffix| image.file(suffix)));
+    let names: Vec<_> = names.collect();
+    context.outputs.plan(&names, &frames.files(table))?;
     let mut press = pipeline
         .press(reference.view())
         .map_err(|error| Failure::in_file(&frames.reference, error))?;
     for image in &images {
-        press.add_frame(image.view());
+        press.add_frame(image.pixels.view());
     }
-    let mut exit = Exit::Complete;
     let mut values = Vec::new();
-    for (k, path) in frames.frames.iter().enumerate() {
+    for (k, Frame { name, pixels, .. }) in images.iter().enumerate() {
         let reading = press.contact(k).map(|reading| reading.copied());
-        let reading = reading.map_err(|error| Failure::in_file(path, error))?;
+        let reading = reading.map_err(|error| Failure::in_file(Path::new(name), error))?;
         let found = reading.map(|reading| {
             let surface = press.surface(k).cloned().map_err(|e| e.to_string());
             let ball = surface.as_ref().ok().and_then(|s| arguments.fitted(s));
@@ -174,13 +170,13 @@ pub fn run(arguments: &DepthArguments, context: &mut Context) -> Result<Exit, Fa
                 ball,
             }
         });
-        context.line(format_args!("{}:", path.display()));
+        context.line(format_args!("{name}:"));
         let value = found.as_ref().map(|found| print(found, context));
         if found.is_none() {
             context.line("no contact");
         }
         context.warn_of_frame(&press.cautions(k).unwrap_or_default());
-        values.push(json!({ "frame": path.display().to_string(), "contact": value }));
+        values.push(json!({ "frame": name, "contact": value }));
         let Some(found) = found else {
             continue;
         };
@@ -194,7 +190,7 @@ pub fn run(arguments: &DepthArguments, context: &mut Context) -> Result<Exit, Fa
         let heights = Csv::of_grid(&surface.surface.heights);
         context.outputs.add(&names[2 * k], heights);
         let size = surface.pixel_size_m.map(|m| 1e3 * m);
-        let frame = HeatMap::of_frame(images[k].view(), size);
+        let frame = HeatMap::of_frame(pixels.view(), size);
         let ball = found.ball.and_then(Result::ok);
         let page = || page(surface, ball.as_ref(), frame);
         context.outputs.page(&names[2 * k + 1], page)?;

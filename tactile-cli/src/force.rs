@@ -2,6 +2,7 @@
 use crate::arguments::SensorFrames;
 use crate::calibrate::PairLine;
 use crate::console::{Bar, Context, Exit, Failure, in_unit};
+use crate::frames::Frame;
 use crate::outputs::Csv;
 use clap::Args;
 use serde::Serialize;
@@ -48,9 +49,8 @@ pub fn run(arguments: &ForceArguments, context: &mut Context) -> Result<Exit, Fa
         .map_err(|error| Failure::in_file(&frames.reference, error))?;
     // One frame is held at a time, but a file that cannot be read is found before the first is
     // measured.
-    for path in &frames.frames {
-        frames.read(path, Grey::default(), &image)?;
-    }
+    let reading = frames.reading(Grey::default(), &image);
+    reading.check(&frames.frames)?;
     line.print(context);
     let mut exit = Exit::Complete;
     let mut values = Vec::new();
@@ -69,13 +69,20 @@ pub fn run(arguments: &ForceArguments, context: &mut Context) -> Result<Exit, Fa
     ]);
     let mut bar = Bar::of(frames.frames.len(), "measuring");
     context.interrupt.polled(true);
-    for (k, path) in frames.frames.iter().enumerate() {
+    for (k, frame) in reading.frames(&frames.frames).enumerate() {
         if context.interrupt.requested() {
             break;
         }
-        let frame = frames.read(path, Grey::default(), &image)?;
-        let name = path.display().to_string();
-        let found = session.push(frame.view());
+        let Frame { name, pixels, .. } = match frame {
+            Ok(frame) => frame,
+            Err(failure) if failure.exit == Exit::Partial => {
+                exit = Exit::Partial;
+                context.caution(failure);
+                continue;
+            }
+            Err(failure) => return Err(failure),
+        };
+        let found = session.push(pixels.view());
         bar.done(k + 1);
         context.line(format_args!("{name}:"));
         match found {

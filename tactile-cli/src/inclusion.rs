@@ -346,14 +346,14 @@ fn print(estimate: &InclusionEstimate, scan: &Scan, context: &mut Context) {
         (Verdict::Uncertain, p) if p > 0.5 => format!("uncertain: a lump with probability {p:.2}"),
         (Verdict::Uncertain, _) => "uncertain: the model does not explain the frames".to_owned(),
     };
-    context.row("found", verdict);
+    context.answer("found", verdict);
     if let Some(inclusion) = &estimate.inclusion {
         if let Some([x, y]) = &inclusion.position_m {
-            context.row("its middle, x", interval(x, 1e3, "mm"));
-            context.row("its middle, y", interval(y, 1e3, "mm"));
+            context.answer("its middle, x", interval(x, 1e3, "mm"));
+            context.answer("its middle, y", interval(y, 1e3, "mm"));
         }
-        context.row("diameter", parameter(&inclusion.diameter_m, 1e3, "mm"));
-        context.row("depth of its top", parameter(&inclusion.depth_m, 1e3, "mm"));
+        context.answer("diameter", parameter(&inclusion.diameter_m, 1e3, "mm"));
+        context.answer("depth of its top", parameter(&inclusion.depth_m, 1e3, "mm"));
         context.row(
             "its modulus",
             parameter(&inclusion.youngs_modulus_pa, 1e-3, "kPa"),

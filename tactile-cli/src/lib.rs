@@ -11,6 +11,7 @@ mod calibrate;
 mod console;
 mod depth;
 mod force;
+mod frames;
 mod inclusion;
 mod indent;
 mod light;
@@ -21,6 +22,9 @@ mod outputs;
 mod paper;
 mod photometric;
 mod plot;
+mod record;
+mod report;
+mod serve;
 mod strain;
 mod stream;
 mod surfaces;
@@ -30,9 +34,10 @@ mod warp;
 pub use plot::{PlotError, save_press_pages};
 
 use clap::error::ErrorKind;
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
 use console::{Context, Exit, Failure, printable};
 use outputs::Outputs;
+use report::Report;
 use std::ffi::OsString;
 use std::io::Write;
 use std::path::PathBuf;
@@ -55,6 +60,10 @@ struct Program {
     /// Write tables and plots to this folder. `calibrate` writes a sensor to this file.
     #[arg(long, global = true, value_name = "DIR")]
     out: Option<PathBuf>,
+    /// Write the answer to this file as a page for people: pictures, cautions, what was taken as
+    /// known, inputs with their hashes, and the call. It needs no network.
+    #[arg(long, global = true, value_name = "FILE.html")]
+    report: Option<PathBuf>,
     /// Refuse a job that needs more memory than this, in GB.
     #[arg(long, global = true, value_name = "GB", default_value = "4", value_parser = arguments::positive, allow_negative_numbers = true)]
     memory_gb: f64,
@@ -176,15 +185,28 @@ pub fn run() -> ExitCode {
 /// assert_eq!(code, 0);
 /// ```
 pub fn run_with(arguments: impl IntoIterator<Item: Into<OsString> + Clone>) -> u8 {
-    let program = match Program::try_parse_from(arguments) {
+    let arguments: Vec<OsString> = arguments.into_iter().map(Into::into).collect();
+    let program = match Program::try_parse_from(&arguments) {
         Ok(program) => program,
         Err(error) => return explain(&error).code(),
     };
-    let outputs = Outputs::new(program.out, program.memory_gb);
+    let mut outputs = Outputs::new(program.out, program.memory_gb);
+    outputs.report = program
+        .report
+        .map(|path| Report::new(path, &arguments, question(&arguments)));
     let name = program.command.name();
     let mut context = Context::new(name, program.json, outputs);
     let ended = program.command.run(&mut context);
     context.close(ended).code()
+}
+
+/// What the subcommand of a call is for, the first sentence of its help.
+fn question(arguments: &[OsString]) -> String {
+    let program = Program::command();
+    let mut words = arguments.iter().skip(1);
+    let command = words.find_map(|word| program.find_subcommand(word));
+    let about = command.and_then(clap::Command::get_about);
+    about.map_or(String::new(), ToString::to_string)
 }
 
 /// Prints the help where it was asked for, else the error in the arguments as one sentence.

@@ -51,7 +51,7 @@ fn traced(arguments: &LightArguments, context: &mut Context) -> Result<Option<Pa
     context.value(&json!({
         "rays": arguments.rays, "acceptance": angles, "shares_of_the_light": budgets,
     }));
-    if context.outputs.folder().is_none() {
+    if !context.outputs.draws() {
         return Ok(None);
     }
     let mut bar = Bar::of(6, "tracing");

@@ -218,12 +218,16 @@ fn solve<const D: usize>(
     let (iterations, starts) = (report.iterations, report.starts);
     let matched = matching.assignment.iter().flatten().count();
     let stop = stop_reason(report.stop);
-    context.line(format_args!(
-        "{name}: {matched} of {points} points matched, residual {}, {stop} after {} and {}, {ms:.1} ms",
+    let found = format!(
+        "{matched} of {points} points matched, residual {}, {stop} after {} and {}",
         four_digits(report.residual),
         count(iterations, "iteration"),
         count(starts, "start")
-    ));
+    );
+    context.aside(format_args!("{name}: {found}, {ms:.1} ms"));
+    if let Some(report) = &mut context.outputs.report {
+        report.row(&name, &found);
+    }
     let doubt = report
         .doubt
         .map(|doubt| PairsDoubt::Matcher(doubt).to_string());

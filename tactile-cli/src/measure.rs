@@ -1,6 +1,7 @@
 //! `tactile measure`: everything, of a simulated press or of a user's own frames.
 use crate::arguments::{Repetition, force_n, length_mm, modulus_kpa};
 use crate::console::{Bar, Context, Exit, Failure, four_digits, in_unit};
+use crate::frames::{Frame, Reading};
 use crate::plot::{PlotError, press_pages, summary_lines};
 use clap::{Args, ValueEnum};
 use serde::Serialize;
@@ -8,9 +9,9 @@ use serde_json::{Value, json};
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 use tactile_imaging::Pipeline;
-use tactile_imaging::io::image_size;
+use tactile_imaging::io::{Grey, image_size};
 use tactile_imaging::pipeline::{ContactReading, Measurement, PipelineError, Press, Stage};
-use tactile_imaging::scene::{Scene, SceneData};
+use tactile_imaging::scene::{Scene, SceneData, SceneFrame};
 use tactile_simulate::{
     CalibrationRun, Camera, ContactModel, Elastic, ElasticSphere, PressLoad, PressOptions,
     PressSimulation, PressTruth, SimulateError, Trial,
@@ -30,8 +31,9 @@ Examples:
   tactile measure examples/data/press/scene.toml --out target/measure
   tactile measure --polymer cl2003x --seed 7 --json
   tactile measure --physics hertz --radius-mm 20
+  ffmpeg -i press.mp4 -vf fps=2 -f yuv4mpegpipe -pix_fmt gray - | tactile measure scene.toml -
 
-SCENE.toml (paths are relative to it; PNG, PGM or JPEG; colour becomes grey by the luma of Rec. 601):
+SCENE.toml (paths are relative to it; PNG, PGM, JPEG or TIFF; colour becomes grey by the luma of Rec. 601):
 
   reference = \"reference.png\"            # the sensor without contact
   pixel_size_m = [21.55e-6, 21.55e-6]    # x, y, on the sensing surface
@@ -53,6 +55,10 @@ pub struct MeasureArguments {
     /// Scene file with your own frames. See below. Without it a press is simulated.
     #[arg(value_name = "SCENE.toml")]
     scene: Option<PathBuf>,
+    /// Frames to measure instead of those of the scene: images, a video (YUV4MPEG2), `-` for a
+    /// pipe of frames.
+    #[arg(value_name = "FRAMES", requires = "scene")]
+    frames: Vec<PathBuf>,
     #[command(flatten)]
     repetition: Repetition,
     /// Number of control points on each surface.
@@ -184,15 +190,30 @@ enum Frames {
     /// Simulated, with the truth.
     Simulated(Box<Trial>),
     /// A user's own.
-    Scene(Box<(Scene, SceneData)>),
+    Scene(Box<(Scene, SceneData, Exit)>),
 }
 
 impl Frames {
-    fn open(arguments: &MeasureArguments, context: &Context) -> Result<Self, Failure> {
+    fn open(arguments: &MeasureArguments, context: &mut Context) -> Result<Self, Failure> {
         let Some(path) = &arguments.scene else {
             return Ok(Self::Simulated(Box::new(arguments.simulation.run()?)));
         };
-        let scene = Scene::read(path).map_err(Failure::input)?;
+        let mut scene = Scene::read(path).map_err(Failure::input)?;
+        if !arguments.frames.is_empty() {
+            let mut data = scene.load_without_frames().map_err(Failure::input)?;
+            let reading = Reading {
+                grey: Grey::default(),
+                bits: scene.bits,
+                reference: &scene.reference,
+                size: data.reference.dim(),
+            };
+            let (frames, exit) = reading.all(&arguments.frames, context)?;
+            let named = |frame: &Frame| SceneFrame::new(&frame.name);
+            let named = frames.iter().map(named).collect();
+            data.frames = frames.into_iter().map(|frame| frame.pixels).collect();
+            scene.frames = named;
+            return Ok(Self::Scene(Box::new((scene, data, exit))));
+        }
         let frames = scene.frames.len();
         // Loading names the error of a reference that cannot be read.
         if let Some((rows, columns)) = image_size(&scene.reference) {
@@ -203,7 +224,7 @@ impl Frames {
             context.allow(bytes, &job, "give fewer or smaller frames")?;
         }
         let data = scene.load_without_frames().map_err(Failure::input)?;
-        Ok(Self::Scene(Box::new((scene, data))))
+        Ok(Self::Scene(Box::new((scene, data, Exit::Complete))))
     }
 
     fn pipeline(&self, points: usize) -> Result<Pipeline, Failure> {
@@ -229,6 +250,14 @@ impl Frames {
         match self {
             Self::Simulated(_) => error.to_string(),
             Self::Scene(own) => own.0.measure_error(error).to_string(),
+        }
+    }
+
+    /// Whether no stream of frames broke off.
+    fn all_read(&self) -> bool {
+        match self {
+            Self::Simulated(_) => true,
+            Self::Scene(own) => own.2 == Exit::Complete,
         }
     }
 
@@ -332,10 +361,18 @@ pub fn run(arguments: &MeasureArguments, context: &mut Context) -> Result<Exit, 
     });
     measurement.flags = flags;
     let mut results = measurement.frames.iter();
-    let complete = measurement.youngs_modulus_pa.is_ok()
+    let complete = frames.all_read()
+        && measurement.youngs_modulus_pa.is_ok()
         && measurement.strain.is_ok()
         && results.all(|f| f.as_ref().is_ok_and(|f| f.force_n.is_ok()));
-    if context.outputs.folder().is_none() {
+    if let Some(report) = &mut context.outputs.report {
+        report.measurement(&measurement);
+        report.inputs(arguments.frames.iter().cloned());
+        if let Frames::Scene(own) = frames {
+            report.assumptions(&own.0);
+        }
+    }
+    if !context.outputs.draws() {
         return Ok(Exit::complete_if(complete));
     }
     // A press that was simulated is drawn beside its truth.
@@ -461,9 +498,9 @@ fn print(
     context: &mut Context,
 ) {
     context.line(measurement);
-    context.line(format_args!("time\n{}", measurement.report));
+    context.aside(format_args!("time\n{}", measurement.report));
     for row in timing {
-        context.line(format_args!(
+        context.aside(format_args!(
             "  {:<18} median {:9.3} ms   99th centile {:9.3} ms",
             row.stage, row.median_ms, row.centile_99_ms
         ));

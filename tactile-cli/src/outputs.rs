@@ -2,6 +2,7 @@
 //! printed.
 use crate::console::Failure;
 use crate::plot::Page;
+use crate::report::Report;
 use ndarray::Array2;
 use std::collections::HashSet;
 use std::ffi::{OsStr, OsString};
@@ -16,6 +17,8 @@ pub struct Outputs {
     limit_bytes: f64,
     planned: Vec<PathBuf>,
     ready: Vec<(PathBuf, Vec<u8>)>,
+    /// The page for people, if one is wanted.
+    pub report: Option<Report>,
 }
 
 impl Outputs {
@@ -25,6 +28,7 @@ impl Outputs {
             limit_bytes: 1e9 * limit_gb,
             planned: Vec::new(),
             ready: Vec::new(),
+            report: None,
         }
     }
 
@@ -38,7 +42,8 @@ impl Outputs {
     /// folder must allow writing, and every input must fit into the memory that is allowed.
     pub fn plan<N: AsRef<OsStr>>(&mut self, names: &[N], inputs: &[&Path]) -> Result<(), Failure> {
         let Some(folder) = self.folder.clone() else {
-            return self.allow_inputs(inputs).map(|_| ());
+            let named = self.allow_inputs(inputs)?;
+            return self.plan_report(inputs, &named);
         };
         if folder.exists() && !folder.is_dir() {
             return Err(Failure::input(format!(
@@ -81,6 +86,8 @@ impl Outputs {
                 self.allow(bytes, &job, "give smaller images")?;
             } else if let Ok(file) = path.metadata()
                 && file.is_file()
+                // A video is read frame by frame.
+                && path.extension().is_none_or(|name| name != "y4m")
             {
                 // Text, and its numbers of eight bytes for one or two characters and a comma.
                 let bytes = 6.0 * file.len() as f64;
@@ -88,6 +95,31 @@ impl Outputs {
             }
         }
         Ok(named)
+    }
+
+    /// Whether pictures are wanted.
+    pub fn draws(&self) -> bool {
+        self.folder.is_some() || self.report.is_some()
+    }
+
+    /// Announces the page to be written. It replaces no input.
+    fn plan_report(&mut self, inputs: &[&Path], named: &[PathBuf]) -> Result<(), Failure> {
+        let Some(report) = &mut self.report else {
+            return Ok(());
+        };
+        let inputs = inputs.iter().map(|input| input.to_path_buf());
+        let inputs: Vec<PathBuf> = inputs.chain(named.iter().cloned()).collect();
+        report.inputs(inputs.clone());
+        self.planned.push(report.path.clone());
+        self.protect(&inputs)
+    }
+
+    /// Completes the page for people.
+    pub fn finish_report(&mut self) {
+        if let Some(report) = self.report.take() {
+            self.ready
+                .push((report.path.clone(), report.html().into_bytes()));
+        }
     }
 
     /// As [`plan`](Self::plan), where `--out` names a file in this folder.
@@ -98,6 +130,7 @@ impl Outputs {
         inputs: &[&Path],
     ) -> Result<(), Failure> {
         let named = self.allow_inputs(inputs)?;
+        self.plan_report(inputs, &named)?;
         // The folder is made with the first file, inside the nearest one that exists.
         let nearest = folder.ancestors().find(|f| f.exists());
         let ancestor = nearest.unwrap_or(Path::new("."));
@@ -155,8 +188,11 @@ impl Outputs {
         name: impl AsRef<Path>,
         page: impl FnOnce() -> Page,
     ) -> Result<(), Failure> {
-        if self.folder.is_some() {
+        if self.draws() {
             let svg = page().to_svg().map_err(Failure::output)?;
+            if let Some(report) = &mut self.report {
+                report.picture(svg.clone());
+            }
             self.add(name, svg.into_bytes());
         }
         Ok(())

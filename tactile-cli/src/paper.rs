@@ -84,7 +84,7 @@ pub fn run(arguments: &PaperArguments, context: &mut Context) -> Result<Exit, Fa
         panels.extend(experiment.panels);
     }
     context.value(&values);
-    if context.outputs.folder().is_some() {
+    if context.outputs.draws() {
         let page = Page::new("The paper's experiments on the simulated sensor", 2, panels);
         context.outputs.page("paper.svg", || page)?;
     }

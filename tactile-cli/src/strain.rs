@@ -287,7 +287,7 @@ impl<const D: usize> StrainReport<D> {
             format!("of {} {name} ({share:.1} %)", set.len())
         };
         let [before, after] = [of(&self.before, "points before"), of(&self.after, "after")];
-        context.row("matched", format_args!("{pairs} {before}, {after}"));
+        context.answer("matched", format_args!("{pairs} {before}, {after}"));
         let found = match &self.strain {
             Ok(found) => found,
             Err(reason) => return context.row("strain", format_args!("none: {reason}")),

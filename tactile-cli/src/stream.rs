@@ -1,13 +1,17 @@
 //! `tactile stream`: force and modulus live, from a simulated series at camera rate or from
 //! recorded frames.
-use crate::arguments::{eight_bits, force_n, not_negative, positive};
+use crate::arguments::{force_n, not_negative, positive};
 use crate::console::{Bar, Context, Exit, Failure};
+use crate::frames::{DEFAULT_RATE_HZ, Reading};
 use crate::outputs::Csv;
+use crate::record::FrameRecorder;
+use crate::serve::Page;
 use clap::Args;
 use ndarray::{Array2, ArrayView2};
 use serde::Serialize;
 use serde_json::{Value, json};
 use std::mem::discriminant;
+use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 use tactile_imaging::elasticity::modulus::ModulusEstimate;
@@ -31,18 +35,25 @@ Examples:
   tactile stream --rate 20 --period 1 --allowed-late 100
   tactile stream --rate 20 --period 1 --allowed-late 100 --strain --json
   tactile stream examples/data/press/scene.toml --allowed-late 100 --out target/stream
-  tactile stream examples/data/press/scene.toml examples/data/press/frame_1.png examples/data/press/frame_2.png --allowed-late 100")]
+  tactile stream examples/data/press/scene.toml examples/data/press/frame_1.png examples/data/press/frame_2.png --allowed-late 100
+
+A camera or a video, by a pipe (ffmpeg has names for the cameras of every system):
+  ffmpeg -f v4l2 -i /dev/video0 -f yuv4mpegpipe -pix_fmt gray - | tactile stream scene.toml -
+  ffmpeg -i press.mp4 -f yuv4mpegpipe -pix_fmt gray - | tactile stream scene.toml - --out results
+  … | tactile stream scene.toml - --record today.y4m --serve --report today.html
+
+Frames on the pipe are YUV4MPEG2 of 8 to 16 bits, or binary PGM and PPM one after the other.")]
 pub struct StreamArguments {
     /// Scene file of the sensor and the object, whose recorded frames are measured.
     #[arg(value_name = "SCENE.toml")]
     scene: Option<PathBuf>,
-    /// Recorded frames: images, or folders whose images are taken in the order of their names.
-    /// Those of the scene if there is none here.
+    /// Recorded frames: images, folders whose images are taken in the order of their names, videos
+    /// (YUV4MPEG2), `-` for a pipe of frames. Those of the scene if there is none here.
     #[arg(value_name = "FRAMES", requires = "scene")]
     frames: Vec<PathBuf>,
-    /// Frames per second.
-    #[arg(long, value_name = "HZ", default_value_t = 80.0, value_parser = positive, allow_negative_numbers = true)]
-    rate: f64,
+    /// Frames per second: those that a video states, or 80.
+    #[arg(long, value_name = "HZ", value_parser = positive, allow_negative_numbers = true)]
+    rate: Option<f64>,
     /// Largest force in newtons (1.5 in a simulation).
     #[arg(long, value_name = "N", value_parser = force_n)]
     force: Option<f64>,
@@ -53,6 +64,14 @@ pub struct StreamArguments {
     /// Share of frames in per cent that may come late.
     #[arg(long, value_name = "PERCENT", default_value_t = 0.0, value_parser = not_negative)]
     allowed_late: f64,
+    /// Record the frames as they come to this video, and their answers beside it as FILE.csv. The
+    /// video gives the same answers again.
+    #[arg(long, value_name = "FILE.y4m")]
+    record: Option<PathBuf>,
+    /// Show frame, force and modulus in browsers as they come. An address that other computers
+    /// reach gets a token.
+    #[arg(long, value_name = "ADDRESS:PORT", num_args = 0..=1, default_missing_value = "127.0.0.1:8642")]
+    serve: Option<SocketAddr>,
     #[command(flatten)]
     simulation: Simulation,
 }
@@ -91,6 +110,23 @@ struct Row {
     /// The modulus from all frames so far.
     modulus: Option<Modulus>,
     strain_xx_zz: Option<[f64; 2]>,
+    /// Centroid of the contact, for the page.
+    centre_px: Option<[f64; 2]>,
+}
+
+impl Row {
+    /// Adds the row, with empty cells for unknown values.
+    fn add_to(&self, csv: &mut Csv) {
+        let of = |e: Estimate| [e.value, e.standard_error];
+        let pairs = [
+            self.force_n.map(of),
+            self.radius_m.map(of),
+            self.modulus.map(|m| [m.value, m.standard_error]),
+            self.strain_xx_zz,
+        ];
+        let cells = pairs.map(|pair| pair.map_or([None; 2], |pair| pair.map(Some)));
+        csv.cells(std::iter::once(Some(self.time_s)).chain(cells.concat()));
+    }
 }
 
 /// A modulus as JSON has it.
@@ -119,6 +155,13 @@ struct Live {
     /// One of every kind, of the frame where it came first.
     cautions: Vec<Flag>,
     late: usize,
+    rate_hz: f64,
+    /// The number of frames that came, measured or not.
+    seen: usize,
+    /// Those, and the files, that could not be measured.
+    unusable: usize,
+    page: Option<Page>,
+    recording: Option<FrameRecorder>,
     /// Where the frames are simulated.
     truth_pa: Option<f64>,
     /// Strain is measured in frames of at least this force.
@@ -126,16 +169,68 @@ struct Live {
 }
 
 impl Live {
-    fn new(session: Session, arguments: &StreamArguments, truth_pa: Option<f64>) -> Self {
+    fn new(
+        session: Session,
+        arguments: &StreamArguments,
+        truth_pa: Option<f64>,
+        context: &Context,
+    ) -> Result<Self, Failure> {
         let largest_n = arguments.force.unwrap_or(SIMULATED_FORCE_N);
-        Self {
+        let page = arguments.serve.map(Page::serve).transpose()?;
+        if let Some(page) = &page {
+            context.note(format_args!("the measurement is shown at {}", page.url));
+        }
+        let recording = arguments.record.as_deref().map(FrameRecorder::create);
+        Ok(Self {
+            seen: 0,
+            unusable: 0,
+            page,
+            recording: recording.transpose()?,
             session,
             rows: Vec::new(),
             cautions: Vec::new(),
             late: 0,
+            rate_hz: arguments.rate.unwrap_or(DEFAULT_RATE_HZ),
             truth_pa,
             strained_above_n: arguments.strain.then_some(largest_n / 3.0),
+        })
+    }
+
+    /// Records a frame, measures it and shows its answer. Returns how long measuring and showing
+    /// took.
+    fn take(&mut self, time_s: f64, frame: ArrayView2<'_, u8>) -> Result<Duration, Failure> {
+        if let Some(recording) = &mut self.recording {
+            recording.frame(frame, self.rate_hz)?;
         }
+        let start = Instant::now();
+        let pushed = self.push(time_s, frame);
+        pushed.map_err(|error| Failure::no_answer(format!("frame {}: {error}", self.seen)))?;
+        self.show(frame);
+        let took = start.elapsed();
+        if let (Some(recording), Some(row)) = (&mut self.recording, self.rows.last()) {
+            let mut csv = match self.rows.len() {
+                1 => Csv::new(&COLUMNS),
+                _ => Csv::default(),
+            };
+            row.add_to(&mut csv);
+            recording.answers(&csv.into_bytes())?;
+        }
+        Ok(took)
+    }
+
+    fn show(&mut self, frame: ArrayView2<'_, u8>) {
+        let (Some(page), Some(row)) = (&mut self.page, self.rows.last()) else {
+            return;
+        };
+        let cautions: Vec<String> = self.cautions.iter().map(ToString::to_string).collect();
+        let centre = row.centre_px.map(|c| c.map(|c| c / frame.ncols() as f64));
+        let of = |e: Estimate| [e.value, e.standard_error];
+        let numbers = json!({
+            "frame": self.seen, "time_s": row.time_s, "late": self.late, "cautions": cautions,
+            "force_n": row.force_n.map(of), "centre": centre,
+            "modulus_pa": row.modulus.map(|m| [m.value, m.standard_error]),
+        });
+        page.show(numbers, frame);
     }
 
     /// Measures a frame.
@@ -162,7 +257,42 @@ impl Live {
             radius_m: contact.map(|c| c.contact_radius_m),
             modulus: modulus.as_ref().map(Modulus::from),
             strain_xx_zz,
+            centre_px: contact.map(|c| c.centroid_px.map(|c| c.value)),
         });
+        Ok(())
+    }
+
+    /// Measures the frames of a file or a pipe as they come, in the memory of `frame`.
+    fn watch(
+        &mut self,
+        path: &Path,
+        reading: Reading<'_>,
+        arguments: &StreamArguments,
+        frame: &mut Array2<u8>,
+        context: &mut Context,
+    ) -> Result<(), Failure> {
+        let mut source = reading.open(path)?;
+        let own_hz = arguments.rate.or(source.frame_rate_hz());
+        self.rate_hz = own_hz.unwrap_or(self.rate_hz);
+        while !context.interrupt.requested() && source.next_frame(frame)?.is_some() {
+            reading.fits(path, frame)?;
+            let time_s = self.seen as f64 / self.rate_hz;
+            self.seen += 1;
+            // Reading the file is not part of the measurement.
+            match self.take(time_s, frame.view()) {
+                Ok(took) => self.late += usize::from(took.as_secs_f64() > 1.0 / self.rate_hz),
+                // A frame without an answer does not end a stream, and thousands of them are one
+                // trouble.
+                Err(failure) if failure.exit == Exit::Partial => {
+                    self.unusable += 1;
+                    if self.unusable <= 3 {
+                        context.caution(Failure::in_file(path, failure));
+                    }
+                }
+                Err(failure) => return Err(failure),
+            }
+            self.print_last(self.rows.len() <= 32, context);
+        }
         Ok(())
     }
 
@@ -220,7 +350,7 @@ impl Live {
         arguments: &StreamArguments,
         context: &mut Context,
     ) -> Result<Exit, Failure> {
-        let (frames, late, rate) = (self.rows.len(), self.late, arguments.rate);
+        let (frames, late, rate) = (self.rows.len(), self.late, self.rate_hz);
         let percent = self.late_percent();
         context.line(format_args!(
             "{frames} frames at {rate} Hz, {late} late ({percent:.1} %)"
@@ -234,15 +364,15 @@ impl Live {
                 let beside = beside.map_or(String::new(), |(error, truth)| {
                     format!(", true {:.2} kPa ({error:+.2} %)", truth * 1e-3)
                 });
-                context.line(format_args!("modulus {kpa} kPa{beside}"));
+                context.answer("modulus", format_args!("{kpa} kPa{beside}"));
                 json!(Modulus::from(m))
             }
             Err(reason) => {
-                context.line(format_args!("modulus none: {reason}"));
+                context.answer("modulus", format_args!("none: {reason}"));
                 json!({ "error": reason.to_string() })
             }
         };
-        context.line(self.session.report());
+        context.aside(self.session.report());
         let drifted = |flag: &Flag| matches!(flag, Flag::LightDrifted { .. });
         if !self.cautions.iter().any(drifted) {
             self.cautions.extend(self.session.drift().caution.clone());
@@ -253,7 +383,7 @@ impl Live {
             self.cautions.extend(flags);
         }
         for caution in &self.cautions {
-            context.row("caution", caution);
+            context.aside(format_args!("{:<18}{caution}", "caution"));
         }
         context.keep_cautions(&self.cautions);
         let update = |row: &Row| {
@@ -299,32 +429,24 @@ impl Live {
     }
 }
 
-/// A row a frame, with empty cells for unknown values.
+/// A row a frame.
 fn table(rows: &[Row]) -> Vec<u8> {
-    let mut csv = Csv::new(&[
-        "time_s",
-        "force_N",
-        "force_error_N",
-        "contact_radius_m",
-        "contact_radius_error_m",
-        "youngs_modulus_Pa",
-        "youngs_modulus_error_Pa",
-        "strain_xx",
-        "strain_zz",
-    ]);
-    for row in rows {
-        let of = |e: Estimate| [e.value, e.standard_error];
-        let pairs = [
-            row.force_n.map(of),
-            row.radius_m.map(of),
-            row.modulus.map(|m| [m.value, m.standard_error]),
-            row.strain_xx_zz,
-        ];
-        let cells = pairs.map(|pair| pair.map_or([None; 2], |pair| pair.map(Some)));
-        csv.cells(std::iter::once(Some(row.time_s)).chain(cells.concat()));
-    }
+    let mut csv = Csv::new(&COLUMNS);
+    rows.iter().for_each(|row| row.add_to(&mut csv));
     csv.into_bytes()
 }
+
+const COLUMNS: [&str; 9] = [
+    "time_s",
+    "force_N",
+    "force_error_N",
+    "contact_radius_m",
+    "contact_radius_error_m",
+    "youngs_modulus_Pa",
+    "youngs_modulus_error_Pa",
+    "strain_xx",
+    "strain_zz",
+];
 
 /// Measures recorded frames: those of a scene, or images and folders of images.
 fn recorded(
@@ -348,51 +470,58 @@ fn recorded(
         listed(&arguments.frames)?
     };
     context.outputs.protect(&frames)?;
+    if let Some(report) = &mut context.outputs.report {
+        report.inputs(frames.iter().cloned());
+        report.assumptions(&scene);
+    }
+    if frames.is_empty() {
+        let sentence = "it names no frames: give images, a video or - for a pipe after it";
+        return Err(Failure::in_file(path, sentence));
+    }
     let clock = Bar::clock("reading the scene");
     let data = scene.load_without_frames().map_err(Failure::input)?;
     drop(clock);
     let pipeline = scene.pipeline(&data).map_err(Failure::input)?;
     let session = Session::new(&pipeline, &[data.reference.view()])
         .map_err(|error| Failure::input(scene.measure_error(error)))?;
-    let mut live = Live::new(session, arguments, None);
+    let mut live = Live::new(session, arguments, None, context)?;
     live.print_heading(context);
     // The clock of a recording is the number in its frames' names, where they have one.
     let numbers = numbers(&frames);
     let last = numbers.as_deref().and_then(<[_]>::last);
     let missing = last.map_or(0, |&last| last + 1 - frames.len() as u64);
+    let reading = Reading {
+        grey: Grey::default(),
+        bits: scene.bits,
+        reference: &scene.reference,
+        size: data.reference.dim(),
+    };
     let mut bar = Bar::of(frames.len(), "measuring");
-    let mut unusable = 0;
+    let mut frame = Array2::zeros((0, 0));
     context.interrupt.polled(true);
     for (k, path) in frames.iter().enumerate() {
         if context.interrupt.requested() {
             break;
         }
-        let number = numbers.as_ref().map_or(k as u64, |numbers| numbers[k]);
-        let time_s = number as f64 / arguments.rate;
-        let measured = eight_bits(path, Grey::default(), scene.bits).and_then(|frame| {
-            // Reading the file is not part of the measurement.
-            let start = Instant::now();
-            let pushed = live.push(time_s, frame.view());
-            pushed.map_err(|error| Failure::in_file(path, error))?;
-            Ok(start.elapsed())
-        });
-        match measured {
-            Ok(took) => {
-                live.late += usize::from(took.as_secs_f64() > 1.0 / arguments.rate);
-                live.print_last(frames.len() <= 32, context);
+        if let Some(numbers) = &numbers {
+            live.seen = numbers[k] as usize;
+        }
+        // A torn frame does not end a recording. Of a stream it ends what comes from there.
+        if let Err(failure) = live.watch(path, reading, arguments, &mut frame, context) {
+            if failure.exit == Exit::Output {
+                return Err(failure);
             }
-            Err(failure) => {
-                // A torn frame does not end a recording.
-                unusable += 1;
-                context.note(failure);
-            }
+            live.unusable += 1;
+            live.seen = live.seen.max(k + 1);
+            context.caution(failure);
         }
         bar.done(k + 1);
     }
     drop(bar);
+    let unusable = live.unusable;
     if live.rows.is_empty() && unusable > 0 {
         return Err(Failure::input(format!(
-            "none of the {unusable} frames can be measured"
+            "none of the {unusable} inputs can be measured"
         )));
     }
     if missing > 0 {
@@ -443,7 +572,7 @@ fn listed(paths: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
         images.retain(|file| is_image(file));
         if images.is_empty() {
             return Err(Failure::input(format!(
-                "the folder {name} has no PNG, PGM or JPEG images"
+                "the folder {name} has no PNG, PGM, JPEG or TIFF images"
             )));
         }
         images.sort_by_cached_key(|image| natural(image));
@@ -455,7 +584,7 @@ fn listed(paths: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
 fn is_image(path: &Path) -> bool {
     let extension = path.extension().and_then(|e| e.to_str());
     let extension = extension.unwrap_or_default().to_ascii_lowercase();
-    ["png", "pgm", "jpg", "jpeg"].contains(&extension.as_str())
+    ["png", "pgm", "ppm", "jpg", "jpeg", "tif", "tiff"].contains(&extension.as_str())
 }
 
 /// The parts of a file's name, numbers by their value: frame_2 comes before frame_10.
@@ -495,7 +624,8 @@ fn simulated(arguments: &StreamArguments, context: &mut Context) -> Result<Exit,
         ..PressOptions::default()
     };
     let pixels = options.camera.shape.iter().product::<usize>() as f64;
-    let frames = arguments.rate * simulation.period * f64::from(simulation.cycles);
+    let rate_hz = arguments.rate.unwrap_or(DEFAULT_RATE_HZ);
+    let frames = rate_hz * simulation.period * f64::from(simulation.cycles);
     let job = format!("a stream of {frames:.0} frames");
     context.allow(
         frames * pixels,
@@ -508,7 +638,7 @@ fn simulated(arguments: &StreamArguments, context: &mut Context) -> Result<Exit,
         largest_force_n: force_n,
         period_s: simulation.period,
         cycles: simulation.cycles as usize,
-        frame_rate_hz: arguments.rate,
+        frame_rate_hz: rate_hz,
         ..LoadCycle::default()
     };
     let frames = record(&trial, cycle, context)?;
@@ -518,8 +648,8 @@ fn simulated(arguments: &StreamArguments, context: &mut Context) -> Result<Exit,
     let pipeline = trial.pipeline().map_err(Failure::no_answer)?;
     let session = Session::new(&pipeline, &views).map_err(Failure::no_answer)?;
     let truth_pa = trial.simulation.youngs_modulus_pa;
-    let mut live = Live::new(session, arguments, Some(truth_pa));
-    play(&mut live, &frames, arguments.rate, context).map_err(Failure::no_answer)?;
+    let mut live = Live::new(session, arguments, Some(truth_pa), context)?;
+    play(&mut live, &frames, rate_hz, context)?;
     live.finish(arguments, context)
 }
 
@@ -550,13 +680,15 @@ fn play(
     frames: &[(f64, Array2<u8>)],
     rate_hz: f64,
     context: &mut Context,
-) -> Result<(), PipelineError> {
+) -> Result<(), Failure> {
     let Some((_, first)) = frames.first() else {
         return Ok(());
     };
     let period = Duration::from_secs_f64(1.0 / rate_hz);
     // Buffers get their size before the clock starts.
-    live.session.push(first.view())?;
+    live.session
+        .push(first.view())
+        .map_err(Failure::no_answer)?;
     let start = Instant::now();
     live.print_heading(context);
     for (time_s, frame) in frames {
@@ -566,7 +698,8 @@ fn play(
         let due = Duration::from_secs_f64(*time_s);
         // A camera would deliver the frame now.
         std::thread::sleep(due.saturating_sub(start.elapsed()));
-        live.push(*time_s, frame.view())?;
+        live.seen += 1;
+        live.take(*time_s, frame.view())?;
         live.late += usize::from(start.elapsed() > due + period);
         live.print_last(false, context);
     }

@@ -13,3 +13,4 @@ mod interrupt;
 mod json;
 mod outputs;
 mod sensor;
+mod streams;

@@ -1,0 +1,160 @@
+//! The frames of images, stacks, videos and pipes, as several subcommands measure them.
+use crate::arguments::same_shape;
+use crate::console::{Context, Exit, Failure};
+use ndarray::Array2;
+use std::ffi::OsString;
+use std::path::{Path, PathBuf};
+use tactile_imaging::io::{FrameReader, Grey};
+use tactile_imaging::pipeline::FrameSource;
+
+/// Frames per second where neither stream nor argument states them: those of the paper's camera.
+pub const DEFAULT_RATE_HZ: f64 = 80.0;
+
+/// How frames are read: the colours' grey, the camera's bits and the reference they have to fit.
+#[derive(Clone, Copy)]
+pub struct Reading<'a> {
+    pub grey: Grey,
+    pub bits: Option<u8>,
+    pub reference: &'a Path,
+    /// Rows and columns of the reference.
+    pub size: (usize, usize),
+}
+
+impl Reading<'_> {
+    pub fn open(&self, path: &Path) -> Result<FrameReader, Failure> {
+        let reader = FrameReader::open(path, DEFAULT_RATE_HZ)?;
+        Ok(reader.with_grey(self.grey).with_bits(self.bits))
+    }
+
+    /// Refuses a frame of another size than the reference.
+    pub fn fits(&self, path: &Path, frame: &Array2<u8>) -> Result<(), Failure> {
+        same_shape((path, frame.dim()), (self.reference, self.size))
+    }
+
+    /// Finds a file that cannot be read before the first one is measured. A pipe is read once.
+    pub fn check(&self, paths: &[PathBuf]) -> Result<(), Failure> {
+        let files = paths.iter().filter(|path| *path != Path::new("-"));
+        let mut frame = Array2::default((0, 0));
+        for path in files {
+            self.open(path)?.next_frame(&mut frame)?;
+            self.fits(path, &frame)?;
+        }
+        Ok(())
+    }
+
+    /// The frames of these files, each with its name.
+    pub fn frames<'a>(&'a self, paths: &'a [PathBuf]) -> Frames<'a> {
+        Frames {
+            reading: self,
+            paths: paths.iter(),
+            open: None,
+        }
+    }
+
+    /// All frames of these files. A stream that breaks off leaves those before, and makes the
+    /// answer a partial one.
+    pub fn all(
+        &self,
+        paths: &[PathBuf],
+        context: &mut Context,
+    ) -> Result<(Vec<Frame>, Exit), Failure> {
+        let (mut frames, mut exit) = (Vec::new(), Exit::Complete);
+        for frame in self.frames(paths) {
+            match frame {
+                Ok(frame) => frames.push(frame),
+                Err(failure) if failure.exit == Exit::Partial => {
+                    context.caution(failure);
+                    exit = Exit::Partial;
+                }
+                Err(failure) => return Err(failure),
+            }
+            let job = format!("a stream of {} frames or more", frames.len());
+            let bytes = frames.len() as f64 * (self.size.0 * self.size.1) as f64;
+            context.allow(bytes, &job, "give fewer or smaller frames")?;
+            if context.interrupt.requested() {
+                break;
+            }
+        }
+        Ok((frames, exit))
+    }
+}
+
+/// A frame with its name.
+pub struct Frame {
+    pub name: String,
+    /// What the files of its results begin with.
+    pub stem: OsString,
+    pub pixels: Array2<u8>,
+}
+
+impl Frame {
+    fn new(path: &Path, number: usize, pixels: Array2<u8>) -> Self {
+        let (mut name, mut stem) = match path.to_str() {
+            Some("-") => ("standard input".to_owned(), "stdin".into()),
+            _ => (
+                path.display().to_string(),
+                path.file_stem().unwrap_or_default().to_owned(),
+            ),
+        };
+        if number > 1 {
+            name += &format!(" frame {number}");
+            stem.push(format!("_{number}"));
+        }
+        Self { name, stem, pixels }
+    }
+
+    /// The name of a result.
+    pub fn file(&self, suffix: &str) -> OsString {
+        let mut name = self.stem.clone();
+        name.push(suffix);
+        name
+    }
+}
+
+/// Frames one after the other. The failure of a stream that breaks off after its first frame is a
+/// partial answer, that of any other file an input that cannot be used.
+pub struct Frames<'a> {
+    reading: &'a Reading<'a>,
+    paths: std::slice::Iter<'a, PathBuf>,
+    /// The file that is read, and the number of its frames so far.
+    open: Option<(&'a Path, FrameReader, usize)>,
+}
+
+impl Iterator for Frames<'_> {
+    type Item = Result<Frame, Failure>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        loop {
+            let Some((path, reader, frames)) = &mut self.open else {
+                let path = self.paths.next()?;
+                match self.reading.open(path) {
+                    Ok(reader) => self.open = Some((path, reader, 0)),
+                    Err(failure) => return Some(Err(failure)),
+                }
+                continue;
+            };
+            let mut frame = Array2::default((0, 0));
+            let next = reader.next_frame(&mut frame).map_err(Failure::from);
+            let next = next.and_then(|time_s| {
+                let fits = time_s.map(|_| self.reading.fits(path, &frame));
+                fits.transpose()
+            });
+            let failed = |failure: Failure| match *frames {
+                0 => failure,
+                _ => Failure::no_answer(failure),
+            };
+            match next {
+                Ok(Some(())) => {
+                    *frames += 1;
+                    return Some(Ok(Frame::new(path, *frames, frame)));
+                }
+                Ok(None) => self.open = None,
+                Err(failure) => {
+                    let failure = failed(failure);
+                    self.open = None;
+                    return Some(Err(failure));
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,376 @@
+//! `--report FILE.html`: the answer of a call as one page that needs nothing else.
+use crate::console::{four_digits, printable};
+use hmac_sha256::Hash;
+use std::ffi::OsString;
+use std::fmt::Write;
+use std::io::Read;
+use std::path::{Path, PathBuf};
+use tactile_imaging::pipeline::{Flag, Measurement, Object, with_error};
+use tactile_imaging::scene::Scene;
+
+/// A line of what was printed.
+enum Printed {
+    Line(String),
+    Row(String, String),
+}
+
+/// What a call is about, collected while it runs, and its page.
+///
+/// The page has no script, and its policy allows no request. Nothing on it depends on when, where
+/// or how fast the call ran, so that two pages differ only where calls or data do.
+pub struct Report {
+    pub path: PathBuf,
+    /// The call, ready for a shell.
+    call: String,
+    question: String,
+    answers: Vec<String>,
+    printed: Vec<Printed>,
+    cautions: Vec<[String; 2]>,
+    tables: Vec<(&'static str, Vec<[String; 2]>)>,
+    pictures: Vec<String>,
+    inputs: Vec<PathBuf>,
+}
+
+impl Report {
+    pub fn new(path: PathBuf, call: &[OsString], question: String) -> Self {
+        let words: Vec<String> = call
+            .iter()
+            .map(|word| quoted(&word.to_string_lossy()))
+            .collect();
+        Self {
+            path,
+            call: words.join(" "),
+            question,
+            answers: Vec::new(),
+            printed: Vec::new(),
+            cautions: Vec::new(),
+            tables: Vec::new(),
+            pictures: Vec::new(),
+            inputs: Vec::new(),
+        }
+    }
+
+    /// Adds what is printed too.
+    pub fn line(&mut self, text: &str) {
+        self.printed.push(Printed::Line(text.to_owned()));
+    }
+
+    /// Adds a name and its value, which are printed too.
+    pub fn row(&mut self, name: &str, value: &str) {
+        if ["warning", "caution", "DOUBT", "FOLDED"].contains(&name) {
+            self.caution(value, "");
+        } else {
+            let row = Printed::Row(name.to_owned(), value.to_owned());
+            self.printed.push(row);
+        }
+    }
+
+    /// Adds a sentence to the answer at the top.
+    pub fn answer(&mut self, text: impl Into<String>) {
+        self.answers.push(text.into());
+    }
+
+    /// Adds a caution and what to do about it, which may be empty.
+    pub fn caution(&mut self, text: impl Into<String>, remedy: &str) {
+        self.cautions.push([text.into(), remedy.into()]);
+    }
+
+    /// Adds a caution of the library.
+    pub fn flag(&mut self, flag: &Flag) {
+        self.caution(flag.to_string(), remedy(flag));
+    }
+
+    /// Adds a table of names and values.
+    pub fn table(&mut self, title: &'static str, rows: Vec<[String; 2]>) {
+        self.tables.push((title, rows));
+    }
+
+    /// Adds a picture, SVG of this program.
+    pub fn picture(&mut self, svg: String) {
+        self.pictures.push(svg);
+    }
+
+    /// Adds files that the answer depends on.
+    pub fn inputs(&mut self, files: impl IntoIterator<Item = PathBuf>) {
+        for file in files {
+            if !self.inputs.contains(&file) {
+                self.inputs.push(file);
+            }
+        }
+    }
+
+    /// Adds the answer of a measurement, its cautions and its error budget.
+    pub fn measurement(&mut self, measurement: &Measurement) {
+        match &measurement.youngs_modulus_pa {
+            Ok(found) => {
+                let value = with_error(found.value, found.standard_error, 1e-3);
+                self.answer(format!("Young's modulus {value} kPa"));
+                let [low, high] = [Some(found.interval_95.0), found.interval_95.1]
+                    .map(|end| end.map(|pa| format!("{:.2}", 1e-3 * pa)));
+                let low = low.unwrap_or_default();
+                self.answer(match high {
+                    Some(high) => format!("with 95 % confidence {low} to {high} kPa"),
+                    None => format!("with 95 % confidence above {low} kPa, without an upper bound"),
+                });
+                self.answer(format!("by the estimator {}", found.estimator));
+                for warning in &found.warnings {
+                    let remedy = "The estimator assumes otherwise: compare the other estimators.";
+                    self.caution(warning.to_string(), remedy);
+                }
+            }
+            Err(error) => self.answer(format!("No modulus: {error}")),
+        }
+        let shares = measurement.error_budget.iter().map(|share| {
+            let percent = format!("{:.2} % of the modulus", 100.0 * share.relative_error);
+            [share.source.to_string(), percent]
+        });
+        self.table("Where the error comes from", shares.collect());
+    }
+
+    /// Adds what a scene states with and without an error.
+    pub fn assumptions(&mut self, scene: &Scene) {
+        let stated = |value: f64, error: f64, scale: f64, unit: &str| match error > 0.0 {
+            true => format!("{}{unit}", with_error(value, error, scale)),
+            false => format!("{}{unit}, taken as exact", four_digits(scale * value)),
+        };
+        let mut rows = Vec::new();
+        let mut add = |name: &str, value: String| rows.push([name.to_owned(), value]);
+        if let Object::Sphere {
+            radius_m,
+            poisson_ratio,
+        } = scene.object
+        {
+            add(
+                "radius of the ball",
+                stated(radius_m, scene.radius_error_m, 1e3, " mm"),
+            );
+            let error = scene.poisson_ratio_error;
+            add("Poisson's ratio", stated(poisson_ratio, error, 1.0, ""));
+        } else {
+            // Fields and numbers, as the scene has them.
+            add("object", format!("{:?}, taken as exact", scene.object));
+        }
+        match scene.pixel_size_m {
+            [0.0, _] => add(
+                "size of a pixel",
+                "from the sensor's file, with its error".into(),
+            ),
+            [x, y] => add(
+                "size of a pixel",
+                format!(
+                    "{} × {} µm, taken as exact",
+                    four_digits(1e6 * x),
+                    four_digits(1e6 * y)
+                ),
+            ),
+        }
+        for (k, layer) in scene.layers.iter().enumerate() {
+            let value = format!(
+                "{} mm of {} kPa, Poisson's ratio {}, taken as exact",
+                four_digits(1e3 * layer.thickness_m),
+                four_digits(1e-3 * layer.youngs_modulus_pa),
+                layer.poisson_ratio
+            );
+            add(&format!("layer {}", k + 1), value);
+        }
+        self.table("What was taken as known", rows);
+    }
+
+    /// The page.
+    pub fn html(&self) -> String {
+        let mut page = String::new();
+        // Writing to a string cannot fail.
+        let _ = self.write(&mut page);
+        page
+    }
+
+    fn write(&self, page: &mut String) -> std::fmt::Result {
+        let question = escaped(&self.question);
+        writeln!(
+            page,
+            "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
+             <meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; style-src 'unsafe-inline'; img-src data:\">\n\
+             <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
+             <title>{question}</title>\n<style>{STYLE}</style>\n</head>\n<body>\n<h1>{question}</h1>"
+        )?;
+        if let Some((first, rest)) = self.answers.split_first() {
+            writeln!(page, "<p class=\"answer\">{}</p>", escaped(first))?;
+            for text in rest {
+                writeln!(page, "<p class=\"beside\">{}</p>", escaped(text))?;
+            }
+        }
+        if !self.cautions.is_empty() {
+            // A caution of every kind stands before the numbers that it is about.
+            writeln!(page, "<h2>Cautions</h2>\n<ul class=\"cautions\">")?;
+            for [text, remedy] in &self.cautions {
+                let (text, remedy) = (escaped(text), escaped(remedy));
+                writeln!(page, "<li>{text}<br><em>{remedy}</em></li>")?;
+            }
+            writeln!(page, "</ul>")?;
+        }
+        if !self.pictures.is_empty() {
+            writeln!(page, "<h2>Pictures</h2>")?;
+        }
+        for svg in &self.pictures {
+            writeln!(page, "<figure>{svg}</figure>")?;
+        }
+        for (title, rows) in self.tables.iter().filter(|(_, rows)| !rows.is_empty()) {
+            writeln!(page, "<h2>{title}</h2>\n<table>")?;
+            for [name, value] in rows {
+                row(page, name, value)?;
+            }
+            writeln!(page, "</table>")?;
+        }
+        self.write_printed(page)?;
+        writeln!(page, "<h2>Inputs</h2>\n<table class=\"files\">")?;
+        for file in &self.inputs {
+            row(page, &file.display().to_string(), &hash(file))?;
+        }
+        writeln!(
+            page,
+            "</table>\n<h2>To repeat it</h2>\n<pre>{}</pre>\n<p>tactile {}. Hashes are SHA-256.</p>\n</body>\n</html>",
+            escaped(&self.call),
+            env!("CARGO_PKG_VERSION")
+        )
+    }
+
+    /// All that was printed: rows as tables, lines as they stand.
+    fn write_printed(&self, page: &mut String) -> std::fmt::Result {
+        writeln!(page, "<h2>All numbers</h2>")?;
+        let mut open = "";
+        for printed in &self.printed {
+            let kind = match printed {
+                Printed::Line(_) => "pre",
+                Printed::Row(..) => "table",
+            };
+            if open != kind {
+                if !open.is_empty() {
+                    writeln!(page, "</{open}>")?;
+                }
+                write!(page, "<{kind}>")?;
+                open = kind;
+            }
+            match printed {
+                Printed::Line(text) => writeln!(page, "{}", escaped(text))?,
+                Printed::Row(name, value) => row(page, name, value)?,
+            }
+        }
+        if !open.is_empty() {
+            writeln!(page, "</{open}>")?;
+        }
+        Ok(())
+    }
+}
+
+fn row(page: &mut String, name: &str, value: &str) -> std::fmt::Result {
+    let (name, value) = (escaped(name), escaped(value));
+    writeln!(page, "<tr><th>{name}</th><td>{value}</td></tr>")
+}
+
+/// What to do about a caution.
+fn remedy(flag: &Flag) -> &'static str {
+    match flag {
+        Flag::Saturated { .. } => "Lower the exposure or the gain, and calibrate again.",
+        Flag::OutOfCalibration { .. } => "Calibrate up to larger forces, or press less.",
+        Flag::TouchesEdge { .. } => "Move the object to the middle of the frame.",
+        Flag::SeveralContacts { .. } => "Press with one object, and clean the sensor.",
+        Flag::LightDrifted { .. } => "Take a new reference shortly before the frames.",
+        Flag::NotABall { .. } => "State the object's true shape in the scene.",
+        Flag::NotRound { .. } => "Press straight down, or state the object's true shape.",
+        Flag::LightNotProportional { .. } => "Calibrate with more pairs, as a curve.",
+        Flag::GaugeDisagrees { .. } => "Check the gauge's zero and the calibration.",
+        Flag::Slip { .. } | Flag::FaceSticks { .. } => "Lubricate the face, or bond it.",
+        Flag::SampleRelaxes { .. } => "State the times of the frames, and hold the load.",
+        Flag::SensorDrifts { .. } => "Take references between the frames.",
+        _ => "Read the number with care: an assumption behind it does not hold.",
+    }
+}
+
+/// The SHA-256 of a file, or why there is none.
+fn hash(path: &Path) -> String {
+    let hashed = || -> std::io::Result<String> {
+        if !path.is_file() {
+            return Ok("no file: what it delivered is not kept".to_owned());
+        }
+        let mut file = std::fs::File::open(path)?;
+        let (mut hash, mut bytes) = (Hash::new(), vec![0; 1 << 16]);
+        loop {
+            match file.read(&mut bytes)? {
+                0 => break,
+                read => hash.update(&bytes[..read]),
+            }
+        }
+        let digits = hash.finalize().map(|byte| format!("{byte:02x}"));
+        Ok(digits.concat())
+    };
+    hashed().unwrap_or_else(|error| format!("cannot be read: {error}"))
+}
+
+/// Text of others as HTML.
+fn escaped(text: &str) -> String {
+    let lines: Vec<String> = text.split('\n').map(printable).collect();
+    lines
+        .join("\n")
+        .replace('&', "&amp;")
+        .replace('<', "&lt;")
+        .replace('>', "&gt;")
+        .replace('"', "&quot;")
+        .replace('\'', "&#39;")
+}
+
+/// A word of a command for a shell.
+fn quoted(word: &str) -> String {
+    let plain = |c: char| c.is_ascii_alphanumeric() || "-_./=,:+@%".contains(c);
+    if !word.is_empty() && word.chars().all(plain) {
+        return word.to_owned();
+    }
+    format!("'{}'", word.replace('\'', r"'\''"))
+}
+
+const STYLE: &str = "
+:root { color-scheme: light dark; }
+body { font: 16px/1.5 system-ui, sans-serif; max-width: 72rem; margin: 0 auto; padding: 1rem; }
+h1 { font-size: 1.1rem; font-weight: 500; opacity: .75; margin: .5rem 0; }
+h2 { font-size: 1.1rem; margin: 2rem 0 .5rem; border-bottom: 1px solid #8886; break-after: avoid; }
+.answer { font-size: 1.9rem; font-weight: 600; line-height: 1.2; margin: .3rem 0; }
+.beside { margin: .2rem 0; }
+.cautions li { margin: .4rem 0; }
+figure { margin: 1rem 0; padding: .5rem; background: #fff; border-radius: .5rem; break-inside: avoid; overflow-x: auto; }
+figure svg { display: block; width: 100%; min-width: 40rem; height: auto; }
+@media print { figure svg { min-width: 0; } }
+table { border-collapse: collapse; }
+th, td { text-align: left; vertical-align: top; padding: .2rem 1.2rem .2rem 0; font-weight: 400; overflow-wrap: anywhere; }
+th { opacity: .75; }
+.files td { font: .75rem/1.6 ui-monospace, monospace; }
+pre { font: .8rem/1.5 ui-monospace, monospace; overflow-x: auto; margin: .5rem 0; }
+@media print { body { max-width: none; padding: 0; } pre { white-space: pre-wrap; } }
+";
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn text_of_others_stays_text() {
+        let name = "<script>alert('a')</script>&\u{202e}\"".to_owned();
+        let call = ["tactile".into(), name.clone().into()];
+        let mut report = Report::new("r.html".into(), &call, name.clone());
+        report.answer(&name);
+        report.caution(&name, &name);
+        report.row(&name, &name);
+        report.line(&name);
+        report.table("Known", vec![[name.clone(), name.clone()]]);
+        report.inputs([PathBuf::from(&name)]);
+        let page = report.html();
+        assert!(!page.contains("<script") && !page.contains('\u{202e}'));
+        assert_eq!(page.matches("&lt;script&gt;").count(), 12);
+        assert!(page.contains("content=\"default-src 'none';"));
+    }
+
+    #[test]
+    fn a_word_of_a_call_is_one_word_of_a_shell() {
+        assert_eq!(quoted("a/b-1.png"), "a/b-1.png");
+        assert_eq!(quoted("it's $1"), r"'it'\''s $1'");
+        assert_eq!(quoted(""), "''");
+    }
+}

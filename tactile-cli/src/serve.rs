@@ -1,0 +1,266 @@
+//! `tactile stream --serve`: the measurement as it runs, on a page for browsers.
+use crate::console::Failure;
+use base64::Engine;
+use base64::prelude::BASE64_STANDARD;
+use ndarray::ArrayView2;
+use serde_json::{Value, json};
+use std::io::Write;
+use std::net::{IpAddr, SocketAddr};
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, Condvar, Mutex, PoisonError};
+use std::time::{Duration, Instant};
+use tiny_http::{Header, Method, Request, Response, Server};
+
+/// Most browsers that look at once. Each has a thread.
+const MOST_VIEWERS: usize = 32;
+
+/// Time between two pictures: an eye sees no more, and a picture is most of an event's bytes.
+const BETWEEN_PICTURES: Duration = Duration::from_millis(50);
+
+/// Columns of a picture, at most. A phone has no more room for it.
+const PICTURE_COLUMNS: usize = 480;
+
+/// The last frame's answer, which a later one replaces whether it was seen or not.
+#[derive(Default)]
+struct Latest {
+    number: u64,
+    numbers: Value,
+    /// The picture's own number: it changes less often.
+    picture_number: u64,
+    picture: Value,
+    ended: bool,
+}
+
+#[derive(Default)]
+struct Shared {
+    latest: Mutex<Latest>,
+    changed: Condvar,
+    viewers: AtomicUsize,
+}
+
+impl Shared {
+    fn update(&self, change: impl FnOnce(&mut Latest)) {
+        change(&mut self.latest.lock().unwrap_or_else(PoisonError::into_inner));
+        self.changed.notify_all();
+    }
+
+    /// The next event after those numbers, as soon as there is one. None at the end.
+    fn next(&self, seen: &mut [u64; 2]) -> Option<Value> {
+        let latest = self.latest.lock().unwrap_or_else(PoisonError::into_inner);
+        let waits = |latest: &mut Latest| latest.number == seen[0] && !latest.ended;
+        let latest = self.changed.wait_while(latest, waits);
+        let latest = latest.unwrap_or_else(PoisonError::into_inner);
+        if latest.number == seen[0] {
+            return None;
+        }
+        let mut event = latest.numbers.clone();
+        if latest.picture_number != seen[1] {
+            event["picture"] = latest.picture.clone();
+        }
+        *seen = [latest.number, latest.picture_number];
+        Some(event)
+    }
+}
+
+/// A server of the page. It never holds up the measurement: viewers get the latest answer, and
+/// those between are dropped.
+pub struct Page {
+    shared: Arc<Shared>,
+    pictured: Option<Instant>,
+    /// Where a browser finds the page.
+    pub url: String,
+}
+
+impl Page {
+    /// Listens on an address. One that other computers reach needs the token in the page's
+    /// address.
+    pub fn serve(address: SocketAddr) -> Result<Self, Failure> {
+        let refused = |error| Failure::input(format!("cannot serve on {address}: {error}"));
+        let server = Server::http(address).map_err(refused)?;
+        let bound = server.server_addr().to_ip().unwrap_or(address);
+        let token = match address.ip().is_loopback() {
+            true => String::new(),
+            false => {
+                let mut bytes = [0; 16];
+                getrandom::fill(&mut bytes).map_err(Failure::output)?;
+                format!("{:032x}", u128::from_ne_bytes(bytes))
+            }
+        };
+        let query = match token.as_str() {
+            "" => String::new(),
+            token => format!("?token={token}"),
+        };
+        let shared = Arc::<Shared>::default();
+        let page = Self {
+            shared: Arc::clone(&shared),
+            pictured: None,
+            url: format!("http://{bound}/{query}"),
+        };
+        std::thread::spawn(move || {
+            for request in server.incoming_requests() {
+                answer(request, &query, &shared);
+            }
+        });
+        Ok(page)
+    }
+
+    /// Shows the numbers of a frame, and the frame where the last picture is old enough.
+    pub fn show(&mut self, numbers: Value, frame: ArrayView2<'_, u8>) {
+        let due = self
+            .pictured
+            .is_none_or(|at| at.elapsed() >= BETWEEN_PICTURES);
+        let watched = self.shared.viewers.load(Ordering::Relaxed) > 0;
+        let picture = (due && watched).then(|| {
+            self.pictured = Some(Instant::now());
+            let step = frame.ncols().div_ceil(PICTURE_COLUMNS).max(1);
+            let rows = frame.rows().into_iter().step_by(step);
+            let bytes: Vec<u8> = rows
+                .flat_map(|row| row.into_iter().step_by(step).copied())
+                .collect();
+            let width = frame.ncols().div_ceil(step);
+            json!({ "width": width, "grey": BASE64_STANDARD.encode(bytes) })
+        });
+        self.shared.update(|latest| {
+            latest.number += 1;
+            latest.numbers = numbers;
+            if let Some(picture) = picture {
+                latest.picture_number += 1;
+                latest.picture = picture;
+            }
+        });
+    }
+}
+
+impl Drop for Page {
+    fn drop(&mut self) {
+        self.shared.update(|latest| latest.ended = true);
+        // Viewers get the last answer before the program ends and closes their connections.
+        let start = Instant::now();
+        while self.shared.viewers.load(Ordering::Relaxed) > 0 && start.elapsed().as_millis() < 200 {
+            std::thread::sleep(Duration::from_millis(5));
+        }
+    }
+}
+
+/// Answers with the page or with events. No path leads to a file.
+fn answer(request: Request, query: &str, shared: &Arc<Shared>) {
+    let header = |name: &'static str| {
+        let mut headers = request.headers().iter();
+        let found = headers.find(|header| header.field.equiv(name));
+        found.map_or("", |header| header.value.as_str())
+    };
+    let page = format!("/{query}");
+    let events = format!("/events{query}");
+    // A page of another site may lead its own name to this address, but no number.
+    let status = if !is_address(header("Host")) {
+        403
+    } else if *request.method() != Method::Get {
+        405
+    } else if request.url() == page {
+        200
+    } else if request.url() != events {
+        // A wrong token is not told from a wrong path.
+        404
+    } else if shared.viewers.fetch_add(1, Ordering::Relaxed) < MOST_VIEWERS {
+        let shared = Arc::clone(shared);
+        std::thread::spawn(move || {
+            // A viewer that leaves ends the writing.
+            let _ = send_events(request, &shared);
+            shared.viewers.fetch_sub(1, Ordering::Relaxed);
+        });
+        return;
+    } else {
+        shared.viewers.fetch_sub(1, Ordering::Relaxed);
+        503
+    };
+    let body = if status == 200 { PAGE } else { "" };
+    let mut response = Response::from_string(body).with_status_code(status);
+    for (name, value) in HEADERS {
+        if let Ok(header) = Header::from_bytes(name, value) {
+            response.add_header(header);
+        }
+    }
+    // Nothing can be done for a viewer that has left.
+    let _ = request.respond(response);
+}
+
+/// Whether a `Host` is a number or this computer, with or without a port.
+fn is_address(host: &str) -> bool {
+    let name = host
+        .rsplit_once(':')
+        .map_or(host, |(name, port)| match port.parse::<u16>() {
+            Ok(_) => name,
+            Err(_) => host,
+        });
+    let bare = name.trim_start_matches('[').trim_end_matches(']');
+    name == "localhost" || bare.parse::<IpAddr>().is_ok()
+}
+
+const HEADERS: [(&str, &str); 5] = [
+    ("Content-Type", "text/html; charset=utf-8"),
+    ("Cache-Control", "no-store"),
+    ("Referrer-Policy", "no-referrer"),
+    ("X-Content-Type-Options", "nosniff"),
+    (
+        "Content-Security-Policy",
+        "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; connect-src 'self'; img-src data:; frame-ancestors 'none'",
+    ),
+];
+
+fn send_events(request: Request, shared: &Shared) -> std::io::Result<()> {
+    let mut output = request.into_writer();
+    let head = "HTTP/1.1 200 OK\r\nContent-Type: text/event-stream\r\nCache-Control: no-store\r\nConnection: close\r\n\r\n";
+    output.write_all(head.as_bytes())?;
+    let mut seen = [0; 2];
+    while let Some(event) = shared.next(&mut seen) {
+        write!(output, "data: {event}\n\n")?;
+        output.flush()?;
+    }
+    output.write_all(b"event: end\ndata: {}\n\n")?;
+    output.flush()
+}
+
+const PAGE: &str = include_str!("serve.html");
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_numbers_and_this_computer_are_hosts() {
+        for host in [
+            "127.0.0.1:80",
+            "127.0.0.1",
+            "localhost:8642",
+            "[::1]:80",
+            "[::1]",
+            "10.0.0.7:1",
+        ] {
+            assert!(is_address(host), "{host}");
+        }
+        for host in [
+            "",
+            "evil.example",
+            "evil.example:80",
+            "127.0.0.1.evil.example",
+            "localhost.evil:80",
+        ] {
+            assert!(!is_address(host), "{host}");
+        }
+    }
+
+    #[test]
+    fn a_slow_viewer_gets_the_latest() {
+        let shared = Shared::default();
+        for k in 1..=5 {
+            shared.update(|latest| {
+                latest.number = k;
+                latest.numbers = json!({ "frame": k });
+            });
+        }
+        let mut seen = [0; 2];
+        assert_eq!(shared.next(&mut seen), Some(json!({ "frame": 5 })));
+        shared.update(|latest| latest.ended = true);
+        assert_eq!(shared.next(&mut seen), None);
+    }
+}

@@ -1,0 +1,206 @@
+//! Frames that come by a pipe.
+use super::harness::{folder_with_examples, tactile, text, words};
+use serde_json::Value;
+use std::io::{BufRead, BufReader, Read, Write};
+use std::net::TcpStream;
+use std::path::Path;
+use std::process::{Output, Stdio};
+use tactile_imaging::io::{Grey, read_grey_image};
+
+const SCENE: &str = "examples/data/press/scene.toml";
+const CALIBRATED: &str = "--reference examples/data/press/reference.png --pairs examples/data/press/calibration.csv --pixel-um 40 --json";
+
+/// Runs the program with these bytes on its standard input.
+fn piped(folder: &Path, call: &str, bytes: &[u8]) -> Output {
+    let mut command = tactile(folder, &words(call));
+    let mut child = command
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut input = child.stdin.take().unwrap();
+    let bytes = bytes.to_vec();
+    // The program may end before it has read all.
+    let writer = std::thread::spawn(move || drop(input.write_all(&bytes)));
+    let output = child.wait_with_output().unwrap();
+    writer.join().unwrap();
+    output
+}
+
+fn value(output: &Output) -> Value {
+    serde_json::from_slice(&output.stdout)
+        .unwrap_or_else(|e| panic!("{e}: {}", text(&output.stderr)))
+}
+
+/// The two frames of the examples as a video of 80 Hz.
+fn video(folder: &Path) -> Vec<u8> {
+    let mut bytes = b"YUV4MPEG2 W174 H130 F80:1 Cmono\n".to_vec();
+    for k in 1..3 {
+        let path = folder.join(format!("examples/data/press/frame_{k}.png"));
+        bytes.extend(b"FRAME\n");
+        bytes.extend(
+            read_grey_image(path, Grey::default(), None)
+                .unwrap()
+                .to_u8(),
+        );
+    }
+    bytes
+}
+
+#[test]
+fn a_pipe_gives_the_answers_of_the_files() {
+    let folder = folder_with_examples();
+    let video = video(folder.path());
+    let both = "examples/data/press/frame_1.png examples/data/press/frame_2.png";
+    for (call, from_files, answer) in [
+        (
+            format!("stream {SCENE} --json --allowed-late 100"),
+            "",
+            "/updates",
+        ),
+        (format!("measure {SCENE} --json"), "", "/youngs_modulus_pa"),
+        (format!("force {CALIBRATED}"), both, "/frames/1/contact"),
+    ] {
+        let piped = value(&piped(folder.path(), &format!("{call} -"), &video));
+        let files = tactile(folder.path(), &words(&format!("{call} {from_files}")));
+        let files = value(&{ files }.output().unwrap());
+        assert!(files.pointer(answer).is_some(), "{call}");
+        assert_eq!(piped.pointer(answer), files.pointer(answer), "{call}");
+    }
+}
+
+#[test]
+fn a_broken_pipe_keeps_what_was_measured() {
+    let folder = folder_with_examples();
+    let whole = video(folder.path());
+    let cut = &whole[..whole.len() - 9];
+    for (call, frames) in [
+        (
+            format!("stream {SCENE} - --json --allowed-late 100"),
+            "/updates",
+        ),
+        (format!("measure {SCENE} - --json"), "/frames"),
+        (format!("force {CALIBRATED} -"), "/frames"),
+    ] {
+        let output = piped(folder.path(), &call, cut);
+        let errors = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(1), "{call}: {errors}");
+        let first = errors.lines().next().unwrap_or_default();
+        let says = "tactile: standard input, frame 2: expected 22620 bytes of samples, found the end after 22611";
+        assert_eq!(first, says, "{call}");
+        let value = value(&output);
+        let kept = value.pointer(frames).and_then(Value::as_array).unwrap();
+        assert_eq!(kept.len(), 1, "{call}");
+        // Nothing at all, and no frame of the reference's size, are inputs that cannot be used.
+        for bytes in [&b""[..], b"P5\n2 1\n255\nab"] {
+            let output = piped(folder.path(), &call, bytes);
+            assert_eq!(output.status.code(), Some(2), "{call}");
+            assert!(output.stdout.is_empty(), "{call}");
+        }
+    }
+}
+
+#[test]
+fn a_recording_is_measured_to_the_same_bits() {
+    let folder = folder_with_examples();
+    let live = format!("stream {SCENE} - --record kept.y4m --json --allowed-late 100");
+    let first = piped(folder.path(), &live, &video(folder.path()));
+    let again = |name: &str| {
+        let call = format!("stream {SCENE} {name} --json --allowed-late 100");
+        tactile(folder.path(), &words(&call)).output().unwrap()
+    };
+    let replayed = again("kept.y4m");
+    assert_eq!(value(&replayed)["updates"], value(&first)["updates"]);
+    let answers = std::fs::read_to_string(folder.path().join("kept.csv")).unwrap();
+    assert_eq!(answers.lines().count(), 3, "{answers}");
+    // What a run leaves that was killed in its second frame.
+    let bytes = std::fs::read(folder.path().join("kept.y4m")).unwrap();
+    std::fs::write(
+        folder.path().join("killed.y4m"),
+        &bytes[..bytes.len() - 999],
+    )
+    .unwrap();
+    let killed = value(&again("killed.y4m"));
+    assert_eq!(killed["updates"][0], value(&first)["updates"][0]);
+    // A recording replaces none.
+    let refused = piped(folder.path(), &live, &video(folder.path()));
+    assert_eq!(refused.status.code(), Some(2), "{}", text(&refused.stderr));
+}
+
+#[test]
+fn a_report_is_one_page_that_changes_with_the_data_only() {
+    let folder = folder_with_examples();
+    let call = format!("measure {SCENE} --report page.html");
+    let page = || {
+        let output = tactile(folder.path(), &words(&call)).output().unwrap();
+        assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+        std::fs::read_to_string(folder.path().join("page.html")).unwrap()
+    };
+    let first = page();
+    assert_eq!(first, page());
+    for part in [
+        "Young&#39;s modulus",
+        "<svg",
+        "Cautions",
+        "taken as exact",
+        "frame_2.png",
+        &call,
+    ] {
+        assert!(first.contains(part), "the page lacks {part}");
+    }
+    // Nothing is fetched and nothing runs.
+    for part in [
+        "<script",
+        "src=\"http",
+        "url(",
+        "@import",
+        "<link",
+        "<iframe",
+    ] {
+        assert!(!first.contains(part), "the page has {part}");
+    }
+    assert!(first.len() < 3_000_000, "{} bytes", first.len());
+    let input = "examples/data/press/reference.png";
+    let call = format!("measure {SCENE} --report {input}");
+    let refused = tactile(folder.path(), &words(&call)).output().unwrap();
+    assert_eq!(refused.status.code(), Some(2));
+    assert!(text(&refused.stderr).contains("would replace the input"));
+}
+
+#[test]
+fn browsers_of_this_computer_see_the_stream() {
+    let folder = folder_with_examples();
+    let call = "stream --rate 20 --period 1 --cycles 2 --allowed-late 100 --serve 127.0.0.1:0";
+    let mut command = tactile(folder.path(), &words(call));
+    let piped = command.stdout(Stdio::null()).stderr(Stdio::piped());
+    let mut child = piped.spawn().unwrap();
+    let mut line = String::new();
+    let mut errors = BufReader::new(child.stderr.take().unwrap());
+    errors.read_line(&mut line).unwrap();
+    let url = line
+        .trim()
+        .split("http://")
+        .nth(1)
+        .unwrap_or_else(|| panic!("{line}"));
+    let address = url.trim_end_matches('/').to_owned();
+    let get = |path: &str, host: &str| {
+        let mut stream = TcpStream::connect(&address).unwrap();
+        let request = format!("GET {path} HTTP/1.1\r\nHost: {host}\r\nConnection: close\r\n\r\n");
+        stream.write_all(request.as_bytes()).unwrap();
+        let mut answer = String::new();
+        stream.read_to_string(&mut answer).unwrap();
+        answer
+    };
+    let page = get("/", &address);
+    assert!(page.starts_with("HTTP/1.1 200") && page.contains("default-src 'none'"));
+    assert!(get("/", "evil.example").starts_with("HTTP/1.1 403"));
+    assert!(get("/../../etc/passwd", &address).starts_with("HTTP/1.1 404"));
+    let events = get("/events", &address);
+    assert!(
+        events.contains("data: {") && events.contains("\"grey\":"),
+        "{events:.300}"
+    );
+    assert!(events.contains("event: end"));
+    assert!(child.wait().unwrap().success());
+}
