@@ -129,9 +129,10 @@ impl Report {
 
     /// Adds what a scene states with and without an error.
     pub fn assumptions(&mut self, scene: &Scene) {
-        let stated = |value: f64, error: f64, scale: f64, unit: &str| match error > 0.0 {
-            true => format!("{}{unit}", with_error(value, error, scale)),
-            false => format!("{}{unit}, taken as exact", four_digits(scale * value)),
+        let stated = |value: f64, error: Option<f64>, scale: f64, unit: &str| match error {
+            Some(error) if error > 0.0 => format!("{}{unit}", with_error(value, error, scale)),
+            Some(_) => format!("{}{unit}, taken as exact", four_digits(scale * value)),
+            None => format!("{}{unit}, its error assumed", four_digits(scale * value)),
         };
         let mut rows = Vec::new();
         let mut add = |name: &str, value: String| rows.push([name.to_owned(), value]);
@@ -142,9 +143,9 @@ impl Report {
         {
             add(
                 "radius of the ball",
-                stated(radius_m, scene.radius_error_m, 1e3, " mm"),
+                stated(radius_m, scene.errors.radius_m, 1e3, " mm"),
             );
-            let error = scene.poisson_ratio_error;
+            let error = scene.errors.poisson_ratio;
             add("Poisson's ratio", stated(poisson_ratio, error, 1.0, ""));
         } else {
             // Fields and numbers, as the scene has them.
