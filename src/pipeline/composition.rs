@@ -146,7 +146,9 @@ impl Pipeline {
     /// let of_the_radius = relative(&press.modulus()?).powi(2) - relative(&trial.press(&exact)?.modulus()?).powi(2);
     /// assert!(of_the_radius.sqrt() > 0.03);
     /// // On a rigid flat instead of the layered guide the ball would be softer for the same contact.
-    /// let rigid = exact.clone().with_settings(|settings| settings.waveguide = None)?;
+    /// let rigid = exact.clone().with_settings(|settings| {
+    ///     (settings.waveguide, settings.layer_covariance) = (None, None);
+    /// })?;
     /// assert!(trial.press(&rigid)?.modulus()?.youngs_modulus_pa < trial.press(&exact)?.modulus()?.youngs_modulus_pa);
     /// assert!(exact.clone().with_settings(|settings| settings.smoothing_px = 8).is_err(), "no middle");
     /// assert!(exact.with_settings(|settings| settings.force_scale_error = Some(f64::NAN)).is_err());

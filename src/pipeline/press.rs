@@ -290,7 +290,7 @@ impl<'a> Press<'a> {
     /// let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?;
     /// let reference = ndarray::Array2::from_elem((64, 64), 60_u8);
     /// let mut press = pipeline.press(reference.view())?;
-    /// press.add_frame(reference.mapv(|level| level - 20).view());
+    /// press.add_frame(reference.mapv(|level| level - 20));
     /// assert_eq!(press.cautions(0)?, [Flag::OppositeSignal { frame: 0, grey: -20.0 }]);
     /// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
     /// ```
