@@ -199,8 +199,8 @@ impl Press {
         Ok(estimates.iter().map(modulus).collect())
     }
 
-    /// All results as a dictionary of plain values, that of `tactile measure --json`. A result that
-    /// is not there has its reason.
+    /// All results as a dictionary of plain values, those of `tactile measure --json` (whose
+    /// `cautions` are `flags` here). A result that is not there has its reason.
     fn measure<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let text = self.ask(py, |press| Ok(serde_json::to_string(&press.measure())))?;
         let text = text.map_err(errors::invalid)?;

@@ -76,11 +76,11 @@ def test_every_matcher_matches_a_slight_bend(matcher):
 
 
 def test_options_reach_their_matcher():
-    model = lattice(6)
+    model = points(36)
     turned = model @ np.array([[-1.0, 0.0], [0.0, -1.0]])
     found = ti.match_points(model, turned, rotation="any", transformation="rigid")
     assert np.array_equal(found.assignment, np.arange(36))
-    near = ti.match_points(model, model + 0.3, "nearest-neighbour", max_distance=0.1)
+    near = ti.match_points(model, model + 5.0, "nearest-neighbour", max_distance=0.1)
     assert near.pairs.shape[0] == 0
     with pytest.raises(TypeError, match="has no option motion"):
         ti.match_points(model, model, "nearest-neighbour", motion="rigid")
