@@ -3,7 +3,7 @@
 use super::anneal::median_of_chi_squared;
 use super::confidence::CLEAN_SIGMA;
 use super::model::cholesky;
-use super::{AnnealedSoftassign, SoftassignWorkspace, State, Transformation};
+use super::{AnnealedSoftassign, Search, SoftassignWorkspace, State, Transformation};
 use crate::vectorised;
 use nalgebra::{Matrix4, Matrix4x3, RowVector4, SVector, Vector3};
 
@@ -77,7 +77,9 @@ impl AnnealedSoftassign {
     /// and the positions.
     pub(super) fn resolve<const D: usize>(&self, ws: &mut SoftassignWorkspace<D>) -> bool {
         ws.fine.forget();
-        let bends = self.transformation == Transformation::NonRigid;
+        // A dense fit takes many times as long as the one run of a search near by.
+        let thorough = matches!(self.search, Search::Thorough);
+        let bends = thorough && self.transformation == Transformation::NonRigid;
         let plain = ws.known.is_empty() && !ws.annealer.soft.errors.differ();
         let smaller = ws.model.len().min(ws.target.len()) as f64;
         // A run colder than the noise has lost some of its pairs.
