@@ -5,12 +5,12 @@ use clap::Args;
 use nalgebra::Point3;
 use serde_json::{Map, Value, json};
 use std::time::Instant;
+use tactile_imaging::Pipeline;
 use tactile_imaging::force::{CalibrationOptions, CalibrationPair, LinearCalibration};
 use tactile_imaging::matching::labelling::Compatibility;
 use tactile_imaging::matching::{AnnealedSoftassign, PointMatcher, RelaxationLabelling};
 use tactile_imaging::optics::{SensorParameters, SensorSpecification, acceptance_angle, led_cone};
 use tactile_imaging::pipeline::{EstimatorChoice, StagesConfig};
-use tactile_imaging::{Pipeline, Press};
 use tactile_simulate::{
     CalibrationRun, ContactModel, ContactState, Elastic, ElasticSphere, PressLoad, PressOptions,
     PressScene, PressTruth, Trial,
@@ -512,17 +512,13 @@ fn specification(trial: &Trial) -> Result<Experiment, Failure> {
         difference * difference
     });
     let noise_grey = (0.5 * squares.sum::<f64>() / second.len() as f64).sqrt();
-    let start = |press: &Press<'_>| {
-        let now = Instant::now();
-        let contact = press.contact(0).map(|contact| contact.copied());
-        (now.elapsed(), contact)
-    };
     let press = trial.press(&pipeline).map_err(Failure::no_answer)?;
     let (mut times, mut contact) = (Vec::new(), None);
     for _ in 0..20 {
-        let (time, found) = start(&press.renewed());
-        times.push(time);
-        contact = found.map_err(Failure::no_answer)?;
+        let again = press.renewed();
+        let start = Instant::now();
+        contact = again.contact(0).map_err(Failure::no_answer)?.copied();
+        times.push(start.elapsed());
     }
     let contact = contact.ok_or_else(|| Failure::no_answer("the frame shows no contact"))?;
     let area_m2 = std::f64::consts::PI * contact.contact_radius_m.value.powi(2);

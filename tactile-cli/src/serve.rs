@@ -64,14 +64,14 @@ impl Shared {
 
 /// A server of the page. It never holds up the measurement: viewers get the latest answer, and
 /// those between are dropped.
-pub struct Page {
+pub struct LivePage {
     shared: Arc<Shared>,
     pictured: Option<Instant>,
     /// Where a browser finds the page.
     pub url: String,
 }
 
-impl Page {
+impl LivePage {
     /// Listens on an address. One that other computers reach needs the token in the page's
     /// address.
     pub fn serve(address: SocketAddr) -> Result<Self, Failure> {
@@ -131,7 +131,7 @@ impl Page {
     }
 }
 
-impl Drop for Page {
+impl Drop for LivePage {
     fn drop(&mut self) {
         self.shared.update(|latest| latest.ended = true);
         // Viewers get the last answer before the program ends and closes their connections.

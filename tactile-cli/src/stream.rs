@@ -5,7 +5,7 @@ use crate::console::{Bar, Context, Exit, Failure};
 use crate::frames::{DEFAULT_RATE_HZ, Reading};
 use crate::outputs::Csv;
 use crate::record::FrameRecorder;
-use crate::serve::Page;
+use crate::serve::LivePage;
 use clap::Args;
 use ndarray::{Array2, ArrayView2};
 use serde::Serialize;
@@ -160,7 +160,7 @@ struct Live {
     seen: usize,
     /// Those, and the files, that could not be measured.
     unusable: usize,
-    page: Option<Page>,
+    page: Option<LivePage>,
     recording: Option<FrameRecorder>,
     /// Where the frames are simulated.
     truth_pa: Option<f64>,
@@ -176,7 +176,7 @@ impl Live {
         context: &Context,
     ) -> Result<Self, Failure> {
         let largest_n = arguments.force.unwrap_or(SIMULATED_FORCE_N);
-        let page = arguments.serve.map(Page::serve).transpose()?;
+        let page = arguments.serve.map(LivePage::serve).transpose()?;
         if let Some(page) = &page {
             context.note(format_args!("the measurement is shown at {}", page.url));
         }
