@@ -82,8 +82,9 @@ fn ball_on_guide(is_test: bool) {
         let off = radii.iter().zip(&fine).map(|(a, b)| (a / b - 1.0).abs());
         let worst = off.fold(0.0, f64::max);
         println!(
-            "ball on the paper's guide to 1.2 N, fineness {fineness}: {elements} elements, {} steps, {} iterations, {seconds:.2} s; \
-             contact radii within {:.3} % of fineness {finest}",
+            "ball on the paper's guide to 1.2 N, fineness {fineness}: {elements} elements, {} \
+             steps, {} iterations, {seconds:.2} s; contact radii within {:.3} % of fineness \
+             {finest}",
             report.steps,
             report.iterations,
             100.0 * worst
@@ -195,7 +196,8 @@ fn table(is_test: bool) {
     let table = table.expect("a table");
     let contacts: usize = table.curves().iter().map(|c| c.force_n.len()).sum();
     println!(
-        "contact table: {} moduli, {contacts} contacts, {seconds:.1} s; interpolation error {:.3} % of the force",
+        "contact table: {} moduli, {contacts} contacts, {seconds:.1} s; interpolation error {:.3} \
+         % of the force",
         table.curves().len(),
         100.0 * table.interpolation_error()
     );

@@ -106,7 +106,8 @@ fn contact(c: &mut Criterion) {
             .fold(0.0, f64::max);
         assert!(error < 0.02, "centroid off by {error} px");
         eprintln!(
-            "force/contact: radius {:.0} px, {:.1} % of the frame, centroid off by {error:.4} px, stated {:.4} px",
+            "force/contact: radius {:.0} px, {:.1} % of the frame, centroid off by {error:.4} px, \
+             stated {:.4} px",
             contact.equivalent_radius_px,
             100.0 * contact.area_px as f64 / s.pressed.len() as f64,
             contact.centroid_px[0].standard_error

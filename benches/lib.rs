@@ -1,2 +1,2 @@
-//! Benches of the workspace: see the files beside this one and `cargo bench -p tactile-benches --bench
-//! NAME`.
+//! Benches of the workspace: see the files beside this one and `cargo bench -p tactile-benches
+//! --bench NAME`.

@@ -81,8 +81,8 @@ fn mozart() -> Option<Case> {
     })
 }
 
-/// Height 0 outside the object, and the height where the surface faces the light: where z + (s_x x +
-/// s_y y)/s_z has a maximum, a minimum or a saddle.
+/// Height 0 outside the object, and the height where the surface faces the light: the maxima,
+/// minima and saddles of z + (s_x x + s_y y)/s_z.
 fn knowledge(case: &Case, [x, y, z]: [f64; 3]) -> Array2<f64> {
     let (rows, columns) = case.z.dim();
     let tilted = Array2::from_shape_fn((rows, columns), |(r, c)| {

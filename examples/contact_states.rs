@@ -90,7 +90,8 @@ fn main() -> Result<()> {
     let mut out = stdout().lock();
     writeln!(
         out,
-        "youngs_modulus_pa,ball_radius_m,layers,force_n,contact_radius_m,indentation_m,radius_m,pressure_pa,height_m"
+        "youngs_modulus_pa,ball_radius_m,layers,force_n,contact_radius_m,indentation_m,radius_m,\
+         pressure_pa,height_m"
     )?;
     let balls = match std::env::args().nth(1).as_deref() {
         Some("presses") => presses(),

@@ -27,7 +27,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     for approaches_m in [vec![1e-3], vec![3e-3], vec![1.5e-3, 3e-3]] {
         let errors = search.expected_errors(&lump, &approaches_m, &radii_m, &noise_pa)?;
         println!(
-            "pressed by {approaches_m:?} m: diameter within {:.1} %, depth {:.1} %, modulus {:.0} %",
+            "pressed by {approaches_m:?} m: diameter within {:.1} %, depth {:.1} %, modulus {:.0} \
+             %",
             100.0 * errors.diameter,
             100.0 * errors.depth,
             100.0 * errors.youngs_modulus

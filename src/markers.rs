@@ -263,7 +263,12 @@ pub struct MarkerShear {
 /// ```
 /// use nalgebra::Point2;
 /// use tactile_imaging::markers::{Marker, track_markers};
-/// let place = |k: usize| Point2::new(10.0 * (k % 7) as f64, 11.0 * (k / 7) as f64 + (k % 3) as f64);
+/// let place = |k: usize| {
+///     Point2::new(
+///         10.0 * (k % 7) as f64,
+///         11.0 * (k / 7) as f64 + (k % 3) as f64,
+///     )
+/// };
 /// let reference: Vec<_> = (0..42).map(|k| Marker::new(place(k), 0.05, 60.0)).collect();
 /// // Sheared by 10 %, the last markers hidden.
 /// let sheared = |p: Point2<f64>| Point2::new(p.x + 0.1 * p.y, p.y);
@@ -324,7 +329,9 @@ impl MarkerField {
     /// use tactile_imaging::markers::{Marker, track_markers};
     /// let place = |k: usize| Point2::new(10.0 * (k % 6) as f64, 10.0 * (k / 6) as f64);
     /// let all = |dx: f64| -> Vec<_> {
-    ///     (0..36).map(|k| Marker::new(place(k) + nalgebra::Vector2::new(dx, 0.0), 0.05, 60.0)).collect()
+    ///     (0..36)
+    ///         .map(|k| Marker::new(place(k) + nalgebra::Vector2::new(dx, 0.0), 0.05, 60.0))
+    ///         .collect()
     /// };
     /// let field = track_markers(&all(0.0), &all(1.0))?;
     /// // 36 cells of 1 mm² move by 0.1 mm on a layer of 1e8 Pa/m.

@@ -10,7 +10,9 @@ use std::sync::Arc;
 /// The matcher and the measure of strain that [`strain_between`] takes.
 ///
 /// ```
-/// use tactile_imaging::{StrainBetweenOptions, elasticity::strain::Hencky, matching::NearestNeighbour};
+/// use tactile_imaging::{
+///     StrainBetweenOptions, elasticity::strain::Hencky, matching::NearestNeighbour,
+/// };
 /// let options = StrainBetweenOptions::<2>::default()
 ///     .with_matcher(NearestNeighbour::default())
 ///     .with_measure(Hencky);
@@ -67,7 +69,10 @@ impl<const D: usize> StrainBetweenOptions<D> {
 /// ```
 /// use tactile_imaging::PairsDoubt;
 /// let doubt = PairsDoubt::FewPartners { share: 0.31 };
-/// assert_eq!(doubt.to_string(), "31 % of the smaller set have a partner on one smooth deformation");
+/// assert_eq!(
+///     doubt.to_string(),
+///     "31 % of the smaller set have a partner on one smooth deformation"
+/// );
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
@@ -124,15 +129,23 @@ impl std::fmt::Display for PairsDoubt {
 /// use nalgebra::Point2;
 /// use tactile_imaging::{StrainBetween, StrainBetweenError, elasticity::strain::GreenLagrange};
 /// let points = [Point2::new(0.0, 0.0), Point2::new(1.0, 0.0)];
-/// let error = StrainBetween::of_pairs(&points, &points, &[(0, 0), (1, 1)], &GreenLagrange).unwrap_err();
-/// assert_eq!(error, StrainBetweenError::TooFewPairs { expected: 16, found: 2 });
+/// let error =
+///     StrainBetween::of_pairs(&points, &points, &[(0, 0), (1, 1)], &GreenLagrange).unwrap_err();
+/// assert_eq!(
+///     error,
+///     StrainBetweenError::TooFewPairs {
+///         expected: 16,
+///         found: 2
+///     }
+/// );
 /// ```
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum StrainBetweenError {
     /// Too few points have a partner.
     #[error(
-        "{found} matched points are too few for a smoothing spline and its error, which need {expected}"
+        "{found} matched points are too few for a smoothing spline and its error, which need \
+         {expected}"
     )]
     TooFewPairs {
         /// The least number.
@@ -390,8 +403,13 @@ impl<const D: usize> StrainBetween<D> {
     /// ```
     /// use nalgebra::Point2;
     /// use tactile_imaging::{StrainBetween, elasticity::strain::GreenLagrange};
-    /// let before: Vec<_> = (0..64).map(|k| Point2::new(f64::from(k % 8), f64::from(k / 8))).collect();
-    /// let after: Vec<_> = before.iter().map(|p| Point2::new(1.02 * p.x, p.y)).collect();
+    /// let before: Vec<_> = (0..64)
+    ///     .map(|k| Point2::new(f64::from(k % 8), f64::from(k / 8)))
+    ///     .collect();
+    /// let after: Vec<_> = before
+    ///     .iter()
+    ///     .map(|p| Point2::new(1.02 * p.x, p.y))
+    ///     .collect();
     /// let rows: Vec<_> = (0..64).map(|k| (k, k)).collect();
     /// let found = StrainBetween::of_pairs(&before, &after, &rows, &GreenLagrange)?;
     /// let at = found.at(&[Point2::new(2.5, 3.5)], &GreenLagrange)?[0];

@@ -32,7 +32,9 @@ fn draw(study: &Study) -> Result<String, std::fmt::Error> {
     let all: Vec<_> = own.chain(peers).map(decades).collect();
     let axes = Axes::around(&all);
     let mut svg = String::from(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"760\" height=\"520\" font-family=\"sans-serif\" font-size=\"13\">\n<rect width=\"760\" height=\"520\" fill=\"white\"/>\n",
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"760\" height=\"520\" \
+         font-family=\"sans-serif\" font-size=\"13\">\n<rect width=\"760\" height=\"520\" \
+         fill=\"white\"/>\n",
     );
     axes.draw(&mut svg, study)?;
     let front: Vec<String> = (study.front().iter())
@@ -65,7 +67,8 @@ fn draw(study: &Study) -> Result<String, std::fmt::Error> {
             let (left, right, top, bottom) = (x - 4.0, x + 4.0, y - 4.0, y + 4.0);
             writeln!(
                 svg,
-                "<path d=\"M{left:.1} {top:.1}L{right:.1} {bottom:.1}M{left:.1} {bottom:.1}L{right:.1} {top:.1}\" stroke=\"black\"/>"
+                "<path d=\"M{left:.1} {top:.1}L{right:.1} {bottom:.1}M{left:.1} \
+                 {bottom:.1}L{right:.1} {top:.1}\" stroke=\"black\"/>"
             )?;
         }
     }
@@ -134,7 +137,8 @@ impl Axes {
         )?;
         writeln!(
             svg,
-            "<rect x=\"{LEFT}\" y=\"{TOP}\" width=\"{WIDTH}\" height=\"{HEIGHT}\" fill=\"none\" stroke=\"black\"/>"
+            "<rect x=\"{LEFT}\" y=\"{TOP}\" width=\"{WIDTH}\" height=\"{HEIGHT}\" fill=\"none\" \
+             stroke=\"black\"/>"
         )?;
         let powers = |k: usize| {
             let [low, high] = self.ranges[k];
@@ -146,7 +150,8 @@ impl Axes {
                     * WIDTH;
             writeln!(
                 svg,
-                "<path d=\"M{x:.1} {TOP}V{bottom}\" stroke=\"#ddd\"/><text x=\"{x:.1}\" y=\"{}\" text-anchor=\"middle\">1e{power}</text>",
+                "<path d=\"M{x:.1} {TOP}V{bottom}\" stroke=\"#ddd\"/><text x=\"{x:.1}\" y=\"{}\" \
+                 text-anchor=\"middle\">1e{power}</text>",
                 bottom + 18.0
             )?;
         }
@@ -156,7 +161,8 @@ impl Axes {
                     * HEIGHT;
             writeln!(
                 svg,
-                "<path d=\"M{LEFT} {y:.1}H{right}\" stroke=\"#ddd\"/><text x=\"{}\" y=\"{:.1}\" text-anchor=\"end\">1e{power}</text>",
+                "<path d=\"M{LEFT} {y:.1}H{right}\" stroke=\"#ddd\"/><text x=\"{}\" y=\"{:.1}\" \
+                 text-anchor=\"end\">1e{power}</text>",
                 LEFT - 6.0,
                 y + 4.0
             )?;
@@ -169,7 +175,8 @@ impl Axes {
         )?;
         writeln!(
             svg,
-            "<text x=\"20\" y=\"{0}\" text-anchor=\"middle\" transform=\"rotate(-90 20 {0})\">{1}</text>",
+            "<text x=\"20\" y=\"{0}\" text-anchor=\"middle\" transform=\"rotate(-90 20 \
+             {0})\">{1}</text>",
             TOP + 0.5 * HEIGHT,
             study.error_label
         )

@@ -84,7 +84,8 @@ pub fn pixel_size<'de, D: Deserializer<'de>, T: From<[f64; 2]>>(d: D) -> Result<
     let [width, height] = <[Side; 2]>::deserialize(d)?.map(|side| side.0);
     if (width / height).max(height / width) > Quantity::MOST_UNEQUAL_SIDES {
         return Err(de::Error::custom(format_args!(
-            "sides of {width:e} and {height:e} m are those of no pixel: is one of them in another unit?"
+            "sides of {width:e} and {height:e} m are those of no pixel: is one of them in another \
+             unit?"
         )));
     }
     Ok([width, height].into())

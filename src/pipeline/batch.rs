@@ -32,7 +32,8 @@ type Reading = Result<Option<ContactReading>, PipelineError>;
 /// ```
 ///
 /// # Errors
-/// [`PipelineError::Sensor`] for a reference without pixels. A frame's own trouble stands in its place.
+/// [`PipelineError::Sensor`] for a reference without pixels. A frame's own trouble stands in its
+/// place.
 pub fn contacts(
     pipeline: &Pipeline,
     reference: ArrayView2<'_, u8>,

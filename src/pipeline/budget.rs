@@ -55,9 +55,8 @@ impl Display for ErrorSource {
 /// squares add up to the whole.
 ///
 /// ```
-/// # use tactile_simulate::{Trial, CalibrationRun, Camera, PressOptions};
-/// # let camera = Camera::default().coarser(8);
-/// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationRun::default())?;
+/// use tactile_simulate::Trial;
+/// let trial = Trial::coarser(8)?;
 /// use tactile_imaging::pipeline::{ErrorShare, ErrorSource};
 /// // A ball of 3 mm whose radius is known to 0.3 mm.
 /// let pipeline = trial.pipeline()?.with_settings(|settings| settings.object_radius_error_m = Some(0.3e-3))?;

@@ -34,8 +34,8 @@ use std::sync::Arc;
 ///
 /// A setter takes any value that implements the stage's trait, a `Box` or an `Arc` of one too, so
 /// that a program can choose at run time;
-/// [`with_stages`](Self::with_stages) takes stages by the names of a configuration. The stages are shared: a clone copies
-/// pointers and the settings.
+/// [`with_stages`](Self::with_stages) takes stages by the names of a configuration. The stages are
+/// shared: a clone copies pointers and the settings.
 ///
 /// ```
 /// use ndarray::Array2;
@@ -82,7 +82,8 @@ impl Pipeline {
     /// ```
     ///
     /// # Errors
-    /// [`PipelineError::Material`] for an object that is not physical, [`PipelineError::SurfaceOptions`] where a default stage refuses its options.
+    /// [`PipelineError::Material`] for an object that is not physical,
+    /// [`PipelineError::SurfaceOptions`] where a default stage refuses its options.
     pub fn new(
         contact: impl ContactStage + 'static,
         object: Object,
@@ -114,9 +115,8 @@ impl Pipeline {
     /// Sets the number of control points.
     ///
     /// ```
-    /// # use tactile_simulate::{Trial, CalibrationRun, Camera, PressOptions};
-    /// # let camera = Camera::default().coarser(8);
-    /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationRun::default())?;
+    /// use tactile_simulate::Trial;
+    /// let trial = Trial::coarser(8)?;
     /// let pipeline = trial.pipeline()?.with_control_points(40);
     /// assert_eq!(trial.press(&pipeline)?.control_points(0)?.len(), 40);
     /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -130,9 +130,8 @@ impl Pipeline {
     /// Changes any of the settings. All are checked together.
     ///
     /// ```
-    /// # use tactile_simulate::{Trial, CalibrationRun, Camera, PressOptions};
-    /// # let camera = Camera::default().coarser(8);
-    /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationRun::default())?;
+    /// use tactile_simulate::Trial;
+    /// let trial = Trial::coarser(8)?;
     /// use tactile_imaging::pipeline::Binning;
     /// let exact = trial.pipeline()?;
     /// let pipeline = exact.clone().with_settings(|settings| {
@@ -140,6 +139,7 @@ impl Pipeline {
     ///     settings.object_radius_error_m = Some(0.09e-3); // 3 % of the ball's radius
     /// })?;
     /// let press = trial.press(&pipeline)?;
+    /// let camera = trial.scene.options().camera;
     /// assert!((press.surface(0)?.pixel_size_m[0] / camera.pixel_size_m[0] - 2.0).abs() < 1e-12);
     /// // E is proportional to the radius, but for the guide's share of the compliance and the correction for finite strain.
     /// let relative = |m: &tactile_imaging::elasticity::modulus::ModulusEstimate| m.standard_error_pa / m.youngs_modulus_pa;
@@ -156,9 +156,11 @@ impl Pipeline {
     /// ```
     ///
     /// # Errors
-    /// [`PipelineError::Material`] for an object that is not physical, [`PipelineError::EvenSmoothing`], [`PipelineError::EmptyBlocks`],
-    /// [`PipelineError::ScaleError`] and [`PipelineError::InputError`] for an error that is negative or not finite, and
-    /// [`PipelineError::LayerCovariance`] for one that has not three rows and columns for each layer of the waveguide.
+    /// [`PipelineError::Material`] for an object that is not physical,
+    /// [`PipelineError::EvenSmoothing`], [`PipelineError::EmptyBlocks`],
+    /// [`PipelineError::ScaleError`] and [`PipelineError::InputError`] for an error that is
+    /// negative or not finite, and [`PipelineError::LayerCovariance`] for one that has not
+    /// three rows and columns for each layer of the waveguide.
     pub fn with_settings(
         mut self,
         change: impl FnOnce(&mut Settings),
@@ -175,9 +177,8 @@ impl Pipeline {
     /// Takes the stages that a configuration names. A surface stage looks at shading.
     ///
     /// ```
-    /// # use tactile_simulate::{Trial, CalibrationRun, Camera, PressOptions};
-    /// # let camera = Camera::default().coarser(8);
-    /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationRun::default())?;
+    /// use tactile_simulate::Trial;
+    /// let trial = Trial::coarser(8)?;
     /// use tactile_imaging::pipeline::{StagesConfig, StrainChoice};
     /// let config = StagesConfig { strain: StrainChoice::Hencky, ..StagesConfig::default() };
     /// let pipeline = trial.pipeline()?.with_stages(&config)?.with_control_points(60);
@@ -186,8 +187,9 @@ impl Pipeline {
     /// ```
     ///
     /// # Errors
-    /// [`PipelineError::SurfaceOptions`], [`PipelineError::WarpOptions`] where a stage refuses its options;
-    /// [`PipelineError::NoSlopes`] for an integrator beside a reconstruction without slopes.
+    /// [`PipelineError::SurfaceOptions`], [`PipelineError::WarpOptions`] where a stage refuses its
+    /// options; [`PipelineError::NoSlopes`] for an integrator beside a reconstruction without
+    /// slopes.
     pub fn with_stages(mut self, config: &StagesConfig) -> Result<Self, PipelineError> {
         self.surface = config.reconstruction.build()?;
         self.settings.surface_input = SurfaceInput::Shading;
@@ -208,12 +210,22 @@ impl Pipeline {
     /// use tactile_imaging::pipeline::{DarkContact, Object, Pipeline};
     /// # use tactile_imaging::force::CalibrationPair;
     /// # let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
-    /// let light = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?.with_control_points(80);
-    /// let dark = light.with_contact(DarkContact::new(&[(0.0, 0.0), (100.0, 0.5e-3)], [0.1e-3; 2])?);
+    /// let light =
+    ///     Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?.with_control_points(80);
+    /// let dark = light.with_contact(DarkContact::new(
+    ///     &[(0.0, 0.0), (100.0, 0.5e-3)],
+    ///     [0.1e-3; 2],
+    /// )?);
     /// assert_eq!(dark.settings().control_points, 80, "the rest stays");
-    /// let [reference, darker] = [200, 150].map(|grey| ndarray::Array2::from_shape_fn((40, 40), |(r, c)| {
-    ///     if (10..30).contains(&r) && (10..30).contains(&c) { grey } else { 200_u8 }
-    /// }));
+    /// let [reference, darker] = [200, 150].map(|grey| {
+    ///     ndarray::Array2::from_shape_fn((40, 40), |(r, c)| {
+    ///         if (10..30).contains(&r) && (10..30).contains(&c) {
+    ///             grey
+    ///         } else {
+    ///             200_u8
+    ///         }
+    ///     })
+    /// });
     /// let mut press = dark.press(reference.view())?;
     /// press.add_frame(darker.view());
     /// let depth = press.contact(0)?.and_then(|contact| contact.indentation_m).expect("a depth");
@@ -229,9 +241,8 @@ impl Pipeline {
     /// Takes another way from image to surface, looking at `input`.
     ///
     /// ```
-    /// # use tactile_simulate::{Trial, CalibrationRun, Camera, PressOptions};
-    /// # let camera = Camera::default().coarser(8);
-    /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationRun::default())?;
+    /// use tactile_simulate::Trial;
+    /// let trial = Trial::coarser(8)?;
     /// use tactile_imaging::pipeline::SurfaceInput;
     /// use tactile_imaging::sfs::{BrooksHorn, Lighting};
     /// let variational = BrooksHorn::new(Lighting::default()).with_occluding_boundary(true);
@@ -262,9 +273,8 @@ impl Pipeline {
     /// now.
     ///
     /// ```
-    /// # use tactile_simulate::{Trial, CalibrationRun, Camera, PressOptions};
-    /// # let camera = Camera::default().coarser(8);
-    /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationRun::default())?;
+    /// use tactile_simulate::Trial;
+    /// let trial = Trial::coarser(8)?;
     /// use tactile_imaging::pipeline::{PipelineError, SurfaceInput};
     /// use tactile_imaging::sfs::{BrooksHorn, Lighting, MaskedLeastSquares};
     /// // The default reconstruction solves for heights: it has no slopes.
@@ -286,7 +296,8 @@ impl Pipeline {
     /// ```
     ///
     /// # Errors
-    /// [`PipelineError::NoSlopes`] where the reconstruction goes from the image to heights without slopes.
+    /// [`PipelineError::NoSlopes`] where the reconstruction goes from the image to heights without
+    /// slopes.
     pub fn with_slope_integrator(
         mut self,
         integrator: impl SlopeIntegrator<f64> + Send + Sync + 'static,
@@ -301,10 +312,8 @@ impl Pipeline {
     /// Takes another estimator of the modulus. Strains of the loads are counted from the first.
     ///
     /// ```
-    /// # use tactile_simulate::Trial;
-    /// # use tactile_simulate::{CalibrationRun, Camera, PressOptions};
-    /// # let camera = Camera::default().coarser(8);
-    /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationRun::default())?;
+    /// use tactile_simulate::Trial;
+    /// let trial = Trial::coarser(8)?;
     /// use tactile_imaging::elasticity::modulus::{EstimatorKind, TataraSphere};
     /// let tatara = trial.pipeline()?.with_estimator(TataraSphere::new(3e-3, 0.5)?);
     /// let modulus = trial.press(&tatara)?.modulus()?;
@@ -323,9 +332,8 @@ impl Pipeline {
     /// Takes another choice of control points.
     ///
     /// ```
-    /// # use tactile_simulate::{Trial, CalibrationRun, Camera, PressOptions};
-    /// # let camera = Camera::default().coarser(8);
-    /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationRun::default())?;
+    /// use tactile_simulate::Trial;
+    /// let trial = Trial::coarser(8)?;
     /// use tactile_imaging::sfs::Random;
     /// let pipeline = trial.pipeline()?.with_sampler(Random { seed: 7 }).with_control_points(40);
     /// let press = trial.press(&pipeline)?;
@@ -346,9 +354,8 @@ impl Pipeline {
     /// Takes another matcher, one of your own too, or one chosen at run time.
     ///
     /// ```
-    /// # use tactile_simulate::{Trial, CalibrationRun, Camera, PressOptions};
-    /// # let camera = Camera::default().coarser(8);
-    /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationRun::default())?;
+    /// use tactile_simulate::Trial;
+    /// let trial = Trial::coarser(8)?;
     /// use tactile_imaging::matching::{LinearAssignment, PointMatcher};
     /// let pipeline = trial.pipeline()?.with_matcher(LinearAssignment::default()).with_control_points(60);
     /// let press = trial.press(&pipeline)?;
@@ -368,9 +375,8 @@ impl Pipeline {
     /// Takes another measure of strain.
     ///
     /// ```
-    /// # use tactile_simulate::{Trial, CalibrationRun, Camera, PressOptions};
-    /// # let camera = Camera::default().coarser(8);
-    /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationRun::default())?;
+    /// use tactile_simulate::Trial;
+    /// let trial = Trial::coarser(8)?;
     /// use tactile_imaging::elasticity::strain::Hencky;
     /// let green = trial.pipeline()?.with_control_points(60);
     /// let hencky = green.clone().with_strain(Hencky);
@@ -389,9 +395,8 @@ impl Pipeline {
     /// Takes another family of warps for the strain.
     ///
     /// ```
-    /// # use tactile_simulate::{Trial, CalibrationRun, Camera, PressOptions};
-    /// # let camera = Camera::default().coarser(8);
-    /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationRun::default())?;
+    /// use tactile_simulate::Trial;
+    /// let trial = Trial::coarser(8)?;
     /// use tactile_imaging::tps::AffineModel;
     /// let pipeline = trial.pipeline()?.with_warp(AffineModel::General).with_control_points(60);
     /// let press = trial.press(&pipeline)?;

@@ -184,7 +184,8 @@ impl ContactReading {
     ///
     /// ```
     /// use tactile_imaging::{force::Estimate, pipeline::ContactReading};
-    /// let mut contact = ContactReading::new(Some(Estimate::new(0.7, 2e-3)), Estimate::new(1e-3, 2e-6));
+    /// let mut contact =
+    ///     ContactReading::new(Some(Estimate::new(0.7, 2e-3)), Estimate::new(1e-3, 2e-6));
     /// contact.centroid_px = [Estimate::exact(120.0), Estimate::exact(80.0)];
     /// assert_eq!((contact.force_noise_n, contact.touches_edge), (2e-3, false));
     /// ```

@@ -45,7 +45,8 @@ pub enum PipelineError {
     WarpOptions(#[source] TpsError),
     /// An integrator was chosen, but the reconstruction has no slopes to integrate.
     #[error(
-        "the reconstruction goes from the image to heights without slopes: it takes no integrator (Brooks and Horn's does)"
+        "the reconstruction goes from the image to heights without slopes: it takes no integrator \
+         (Brooks and Horn's does)"
     )]
     NoSlopes,
     /// The depth table is not usable.

@@ -284,7 +284,8 @@ impl fmt::Display for Flag {
             Self::WiderThanFrame { frame, radius_m } => {
                 write!(
                     f,
-                    "frame {}: the contact, {:.3} mm in radius, is wider than the frame: its size cannot be told",
+                    "frame {}: the contact, {:.3} mm in radius, is wider than the frame: its size \
+                     cannot be told",
                     frame + 1,
                     1e3 * radius_m
                 )
@@ -297,7 +298,8 @@ impl fmt::Display for Flag {
             } => {
                 write!(
                     f,
-                    "frame {}: the {quantity} cannot be told, its error ({standard_error:.1e}) is larger than its value ({value:.1e})",
+                    "frame {}: the {quantity} cannot be told, its error ({standard_error:.1e}) is \
+                     larger than its value ({value:.1e})",
                     frame + 1
                 )
             }
@@ -328,7 +330,8 @@ impl fmt::Display for Flag {
             Self::LightChanged { change, uneven } => {
                 write!(
                     f,
-                    "the reference is {:+.1} % brighter than the calibration's, unevenly by {:.1} %: forces are divided by that factor",
+                    "the reference is {:+.1} % brighter than the calibration's, unevenly by {:.1} \
+                     %: forces are divided by that factor",
                     100.0 * change,
                     100.0 * uneven
                 )
@@ -355,7 +358,8 @@ impl fmt::Display for Flag {
             Self::LightNotProportional { frame, departure } => {
                 write!(
                     f,
-                    "frame {}: the calibration's pairs depart from a line by {:.1} % of the full scale: light is not proportional to pressure",
+                    "frame {}: the calibration's pairs depart from a line by {:.1} % of the full \
+                     scale: light is not proportional to pressure",
                     frame + 1,
                     100.0 * departure
                 )
@@ -378,7 +382,8 @@ impl fmt::Display for Flag {
             } => {
                 write!(
                     f,
-                    "frame {}: the outline has stretched by {:.3} % since the first frame, the texture by {:.3} %: the face slips or sticks",
+                    "frame {}: the outline has stretched by {:.3} % since the first frame, the \
+                     texture by {:.3} %: the face slips or sticks",
                     frame + 1,
                     100.0 * outline_strain,
                     100.0 * texture_strain
@@ -386,12 +391,14 @@ impl fmt::Display for Flag {
             }
             Self::FaceSticks { frame, edge_ratio } => write!(
                 f,
-                "frame {}: the pressure rises towards the outline ({edge_ratio:.2} of that further inside): the face sticks, its strain is not that of its material",
+                "frame {}: the pressure rises towards the outline ({edge_ratio:.2} of that \
+                 further inside): the face sticks, its strain is not that of its material",
                 frame + 1
             ),
             Self::MaterialLaw { strain, excess } => write!(
                 f,
-                "at a strain of {:.1} % the modulus depends on the law of the material: of a rubber-like sample it is {:.0} % off (strain = \"hencky\" is closest)",
+                "at a strain of {:.1} % the modulus depends on the law of the material: of a \
+                 rubber-like sample it is {:.0} % off (strain = \"hencky\" is closest)",
                 100.0 * strain,
                 100.0 * excess
             ),
@@ -401,7 +408,8 @@ impl fmt::Display for Flag {
                 time_constant_s,
             } => write!(
                 f,
-                "the sample relaxes from {:.1} to {:.1} kPa with {time_constant_s:.2} s: the modulus is a mean over the time of the frames",
+                "the sample relaxes from {:.1} to {:.1} kPa with {time_constant_s:.2} s: the \
+                 modulus is a mean over the time of the frames",
                 instantaneous_pa * 1e-3,
                 equilibrium_pa * 1e-3
             ),
@@ -412,7 +420,8 @@ impl fmt::Display for Flag {
             ),
             Self::ChangesWithTime { change } => write!(
                 f,
-                "the modulus changes by {:+.1} % over the frames: a relaxing sample or a drifting sensor, which the frames do not tell apart",
+                "the modulus changes by {:+.1} % over the frames: a relaxing sample or a drifting \
+                 sensor, which the frames do not tell apart",
                 100.0 * change
             ),
             Self::MatchNotConverged => write!(f, "the match did not converge"),
@@ -420,7 +429,8 @@ impl fmt::Display for Flag {
             Self::Unmatched { points } => write!(f, "{points} control points have no partner"),
             Self::CoarseStrain { radius_px } => write!(
                 f,
-                "the contact has a radius of {radius_px:.1} pixels: too few for the strain's error to be sure"
+                "the contact has a radius of {radius_px:.1} pixels: too few for the strain's \
+                 error to be sure"
             ),
             Self::Folded { points: 1 } => write!(f, "the warp folds over at 1 control point"),
             Self::Folded { points } => write!(f, "the warp folds over at {points} control points"),

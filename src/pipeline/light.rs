@@ -109,7 +109,8 @@ impl LightContact {
     /// ```
     /// use tactile_imaging::force::LensGeometry;
     /// use tactile_imaging::pipeline::{ContactStage, LightContact};
-    /// let lens = LensGeometry::new([21.6e-6, 22e-6])?.with_distortion([695.5, 520.5], 869.0, [0.03, 0.0])?;
+    /// let lens =
+    ///     LensGeometry::new([21.6e-6, 22e-6])?.with_distortion([695.5, 520.5], 869.0, [0.03, 0.0])?;
     /// let contact = LightContact::gauged([21e-6; 2], &Default::default())?.with_lens(lens);
     /// assert_eq!(contact.pixel_size_m(), [21.6e-6, 22e-6]);
     /// assert_eq!(contact.lens(), Some(&lens));

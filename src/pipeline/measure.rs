@@ -17,9 +17,8 @@ impl Press<'_> {
     /// stands in its place.
     ///
     /// ```
-    /// # use tactile_simulate::{Trial, CalibrationRun, Camera, PressOptions};
-    /// # let camera = Camera::default().coarser(8);
-    /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationRun::default())?;
+    /// use tactile_simulate::Trial;
+    /// let trial = Trial::coarser(8)?;
     /// let pipeline = trial.pipeline()?.with_control_points(60);
     /// let measurement = trial.press(&pipeline)?.measure();
     /// let first = measurement.frames[0].as_ref().expect("a contact");
@@ -259,8 +258,9 @@ impl Press<'_> {
 
     /// Whether the modulus changes over the frames that have a [time](Self::set_time_s): relaxing
     /// sample or drifting sensor, see
-    /// [`relaxation`](crate::elasticity::relaxation). Where all of them have a gauge's force, that is taken in place of the light's: no gain is in it.
-    /// `None` where fewer than two frames have a time and a modulus of their own.
+    /// [`relaxation`](crate::elasticity::relaxation). Where all of them have a gauge's force, that
+    /// is taken in place of the light's: no gain is in it. `None` where fewer than two frames
+    /// have a time and a modulus of their own.
     ///
     /// # Errors
     /// Those of [`modulus`](Self::modulus) but for its estimator's: what gives no modulus is left

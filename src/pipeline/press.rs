@@ -89,9 +89,8 @@ struct KnownContact {
 /// Made by [`Pipeline::press`].
 ///
 /// ```
-/// # use tactile_simulate::{Trial, CalibrationRun, Camera, PressOptions};
-/// # let camera = Camera::default().coarser(8);
-/// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationRun::default())?;
+/// use tactile_simulate::Trial;
+/// let trial = Trial::coarser(8)?;
 /// use tactile_imaging::pipeline::Stage;
 /// let pipeline = trial.pipeline()?.with_control_points(60);
 /// let press = trial.press(&pipeline)?;
@@ -116,7 +115,8 @@ impl Pipeline {
     /// pipeline.
     ///
     /// # Errors
-    /// [`PipelineError::Sensor`] for a reference without pixels, or too dark for the flat field that was asked for.
+    /// [`PipelineError::Sensor`] for a reference without pixels, or too dark for the flat field
+    /// that was asked for.
     pub fn press<'a>(&self, reference: ArrayView2<'_, u8>) -> Result<Press<'a>, PipelineError> {
         Ok(self.press_on(Arc::new(self.reference_frame(&[reference])?)))
     }
@@ -360,9 +360,8 @@ impl<'a> Press<'a> {
     /// The surface of a frame's contact.
     ///
     /// ```
-    /// # use tactile_simulate::{Trial, CalibrationRun, Camera, PressOptions};
-    /// # let camera = Camera::default().coarser(8);
-    /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationRun::default())?;
+    /// use tactile_simulate::Trial;
+    /// let trial = Trial::coarser(8)?;
     /// let pipeline = trial.pipeline()?;
     /// let press = trial.press(&pipeline)?;
     /// let surface = press.surface(0)?;
@@ -374,7 +373,8 @@ impl<'a> Press<'a> {
     /// ```
     ///
     /// # Errors
-    /// [`PipelineError::NoContact`], [`PipelineError::Surface`], and those of [`contact`](Self::contact).
+    /// [`PipelineError::NoContact`], [`PipelineError::Surface`], and those of
+    /// [`contact`](Self::contact).
     pub fn surface(&self, frame: usize) -> Result<&ContactSurface, PipelineError> {
         self.reading(frame)?;
         let surface = self.frames[frame].surface.get_or_init(|| {
@@ -393,9 +393,8 @@ impl<'a> Press<'a> {
     /// Control points on a frame's surface, in metres from the frame's first pixel.
     ///
     /// ```
-    /// # use tactile_simulate::{Trial, CalibrationRun, Camera, PressOptions};
-    /// # let camera = Camera::default().coarser(8);
-    /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationRun::default())?;
+    /// use tactile_simulate::Trial;
+    /// let trial = Trial::coarser(8)?;
     /// let pipeline = trial.pipeline()?.with_control_points(60);
     /// let press = trial.press(&pipeline)?;
     /// let points = press.control_points(0)?;
@@ -426,9 +425,8 @@ impl<'a> Press<'a> {
     /// The matches of the first frame's control points to those of a later frame.
     ///
     /// ```
-    /// # use tactile_simulate::{Trial, CalibrationRun, Camera, PressOptions};
-    /// # let camera = Camera::default().coarser(8);
-    /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationRun::default())?;
+    /// use tactile_simulate::Trial;
+    /// let trial = Trial::coarser(8)?;
     /// let pipeline = trial.pipeline()?.with_control_points(60);
     /// let press = trial.press(&pipeline)?;
     /// let matching = press.matching(1)?;
@@ -466,8 +464,8 @@ impl<'a> Press<'a> {
     /// growth of its area, the same at all points.
     ///
     /// # Errors
-    /// [`PipelineError::TooFewMatches`], [`PipelineError::Warp`], [`PipelineError::Strain`] and those of
-    /// [`matching`](Self::matching).
+    /// [`PipelineError::TooFewMatches`], [`PipelineError::Warp`], [`PipelineError::Strain`] and
+    /// those of [`matching`](Self::matching).
     pub fn strain(&self, frame: usize) -> Result<&PairStrain, PipelineError> {
         let loaded = self.loaded(frame)?;
         let strain = loaded.strain.get_or_init(|| {
@@ -520,10 +518,8 @@ impl<'a> Press<'a> {
     /// nothing better).
     ///
     /// ```
-    /// # use tactile_simulate::Trial;
-    /// # use tactile_simulate::{CalibrationRun, Camera, PressOptions};
-    /// # let camera = Camera::default().coarser(8);
-    /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationRun::default())?;
+    /// use tactile_simulate::Trial;
+    /// let trial = Trial::coarser(8)?;
     /// # let pipeline = trial.pipeline()?;
     /// let series = trial.press(&pipeline)?.load_series()?;
     /// let loads = series.loads();
@@ -541,9 +537,8 @@ impl<'a> Press<'a> {
     /// Young's modulus by every estimator that the frames allow, the paper's ratio first.
     ///
     /// ```
-    /// # use tactile_simulate::{Trial, CalibrationRun, Camera, PressOptions};
-    /// # let camera = Camera::default().coarser(8);
-    /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationRun::default())?;
+    /// use tactile_simulate::Trial;
+    /// let trial = Trial::coarser(8)?;
     /// use tactile_imaging::elasticity::modulus::EstimatorKind;
     /// let pipeline = trial.pipeline()?.with_control_points(60);
     /// let press = trial.press(&pipeline)?;
@@ -643,9 +638,8 @@ impl<'a> Press<'a> {
     /// not count where time does.
     ///
     /// ```
-    /// # use tactile_simulate::{Trial, CalibrationRun, Camera, PressOptions};
-    /// # let camera = Camera::default().coarser(8);
-    /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationRun::default())?;
+    /// use tactile_simulate::Trial;
+    /// let trial = Trial::coarser(8)?;
     /// use tactile_imaging::pipeline::PipelineError;
     /// let pipeline = trial.pipeline()?;
     /// let mut press = trial.press(&pipeline)?;
@@ -659,7 +653,8 @@ impl<'a> Press<'a> {
     /// ```
     ///
     /// # Errors
-    /// [`PipelineError::NoSuchFrame`], [`PipelineError::Time`] for what is negative or not finite, [`PipelineError::TimeDecreases`].
+    /// [`PipelineError::NoSuchFrame`], [`PipelineError::Time`] for what is negative or not finite,
+    /// [`PipelineError::TimeDecreases`].
     pub fn set_time_s(&mut self, frame: usize, time_s: f64) -> Result<(), PipelineError> {
         self.loaded(frame)?;
         if !(time_s >= 0.0 && time_s.is_finite()) {

@@ -19,8 +19,9 @@ const BLOCKS: usize = 8;
 /// #     (level * (20.0 + peak * (1.0 - d * d).sqrt())).round() as u8
 /// # });
 /// let calibrated = ReferenceFrame::new(hertz(1.0, 0.0).view())?;
-/// let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?
-///     .with_settings(|settings| settings.calibrated_light = Some(ReferenceLight::of(&calibrated)))?;
+/// let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?.with_settings(
+///     |settings| settings.calibrated_light = Some(ReferenceLight::of(&calibrated)),
+/// )?;
 /// // Lamps that are a tenth darker, and a reference that was taken anew.
 /// let mut press = pipeline.press(hertz(0.9, 0.0).view())?;
 /// press.add_frame(hertz(0.9, 120.0));

@@ -5,9 +5,8 @@ use std::time::Duration;
 /// A stage of the pipeline.
 ///
 /// ```
-/// # use tactile_simulate::{Trial, CalibrationRun, Camera, PressOptions};
-/// # let camera = Camera::default().coarser(8);
-/// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationRun::default())?;
+/// use tactile_simulate::Trial;
+/// let trial = Trial::coarser(8)?;
 /// use tactile_imaging::pipeline::Stage;
 /// // What a ball's modulus takes: both contacts, and no surface.
 /// let pipeline = trial.pipeline()?;
@@ -166,9 +165,8 @@ impl fmt::Display for Work {
 /// What was computed, what was skipped and why.
 ///
 /// ```
-/// # use tactile_simulate::{Trial, CalibrationRun, Camera, PressOptions};
-/// # let camera = Camera::default().coarser(8);
-/// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationRun::default())?;
+/// use tactile_simulate::Trial;
+/// let trial = Trial::coarser(8)?;
 /// use tactile_imaging::pipeline::{Report, Stage};
 /// let pipeline = trial.pipeline()?;
 /// let press = trial.press(&pipeline)?;

@@ -56,9 +56,8 @@ impl From<&ModulusEstimate> for ModulusResult {
 /// What one frame says.
 ///
 /// ```
-/// # use tactile_simulate::{Trial, CalibrationRun, Camera, PressOptions};
-/// # let camera = Camera::default().coarser(8);
-/// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationRun::default())?;
+/// use tactile_simulate::Trial;
+/// let trial = Trial::coarser(8)?;
 /// use tactile_imaging::pipeline::FrameResult;
 /// let pipeline = trial.pipeline()?;
 /// let measurement = trial.press(&pipeline)?.measure();
@@ -101,9 +100,8 @@ pub struct FrameResult {
 /// How the control points of the first and the last frame were matched.
 ///
 /// ```
-/// # use tactile_simulate::{Trial, CalibrationRun, Camera, PressOptions};
-/// # let camera = Camera::default().coarser(8);
-/// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationRun::default())?;
+/// use tactile_simulate::Trial;
+/// let trial = Trial::coarser(8)?;
 /// use tactile_imaging::pipeline::MatchResult;
 /// let pipeline = trial.pipeline()?.with_control_points(60);
 /// let matching: MatchResult = trial.press(&pipeline)?.measure().matching?;
@@ -134,9 +132,8 @@ pub struct MatchResult {
 /// The strain between the first and the last frame.
 ///
 /// ```
-/// # use tactile_simulate::{Trial, CalibrationRun, Camera, PressOptions};
-/// # let camera = Camera::default().coarser(8);
-/// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationRun::default())?;
+/// use tactile_simulate::Trial;
+/// let trial = Trial::coarser(8)?;
 /// use tactile_imaging::pipeline::StrainResult;
 /// let pipeline = trial.pipeline()?.with_control_points(60);
 /// let strain: StrainResult = trial.press(&pipeline)?.measure().strain?;
@@ -166,9 +163,8 @@ pub struct StrainResult {
 /// others.
 ///
 /// ```
-/// # use tactile_simulate::{Trial, CalibrationRun, Camera, PressOptions};
-/// # let camera = Camera::default().coarser(8);
-/// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationRun::default())?;
+/// use tactile_simulate::Trial;
+/// let trial = Trial::coarser(8)?;
 /// use tactile_imaging::Measurement;
 /// let pipeline = trial.pipeline()?.with_control_points(60);
 /// let measurement: Measurement = trial.press(&pipeline)?.measure();
@@ -255,7 +251,8 @@ impl Display for MatchResult {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         write!(
             f,
-            "{} of {} control points matched, residual {:.1} µm, mean displacement {:.1} µm, {} after {} iterations",
+            "{} of {} control points matched, residual {:.1} µm, mean displacement {:.1} µm, {} \
+             after {} iterations",
             self.matched,
             self.points,
             self.residual_m * 1e6,

@@ -5,7 +5,8 @@
 //! drift of the light watched in frames without contact. Strain is followed on request
 //! ([`Session::strain`]), from the load where that began: its surface, points and spline are kept,
 //! and each match begins where the last one ended. Memory is constant: similar loads are merged.
-//! [`Session::push`] and, with the default stages, [`Session::strain`] allocate nothing once their buffers have their size.
+//! [`Session::push`] and, with the default stages, [`Session::strain`] allocate nothing once their
+//! buffers have their size.
 use super::composition::Pipeline;
 use super::contact::{ContactReading, FrameContact, resize};
 use super::error::PipelineError;
@@ -71,7 +72,15 @@ pub struct Update {
 /// for loss in [0, 2, 1] {
 ///     session.push(hertz(0.0).mapv(|v| v - loss).view())?;
 /// }
-/// assert_eq!(session.drift(), &DriftWatch { frames: 3, last_grey: -1.0, greatest_grey: -2.0, caution: Some(Flag::LightDrifted { grey: -1.0 }) });
+/// assert_eq!(
+///     session.drift(),
+///     &DriftWatch {
+///         frames: 3,
+///         last_grey: -1.0,
+///         greatest_grey: -2.0,
+///         caution: Some(Flag::LightDrifted { grey: -1.0 })
+///     }
+/// );
 /// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
 /// ```
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -154,7 +163,13 @@ impl SensorHealth {
 /// use tactile_simulate::Trial;
 /// use tactile_simulate::{CalibrationRun, Camera, PressOptions};
 /// let camera = Camera::default().coarser(8);
-/// let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationRun::default())?;
+/// let trial = Trial::new(
+///     PressOptions {
+///         camera,
+///         ..PressOptions::default()
+///     },
+///     &CalibrationRun::default(),
+/// )?;
 /// let mut session = Session::new(&trial.pipeline()?, &[trial.simulation.reference.view()])?;
 /// for frame in &trial.simulation.frames {
 ///     assert!(session.push(frame.view())?.contact.is_some());
@@ -200,7 +215,11 @@ impl Session {
     /// let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?;
     /// let empty = hertz(0.0);
     /// let mut session = Session::new(&pipeline, &[empty.view(), empty.view(), empty.view()])?;
-    /// let force = session.push(hertz(60.0).view())?.contact.and_then(|c| c.force_n).expect("a force");
+    /// let force = session
+    ///     .push(hertz(60.0).view())?
+    ///     .contact
+    ///     .and_then(|c| c.force_n)
+    ///     .expect("a force");
     /// assert!((force.value / 0.503 - 1.0).abs() < 0.01);
     /// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
     /// ```
@@ -410,7 +429,11 @@ impl Session {
     ///     session.push(hertz(peak).view())?;
     ///     session.push(hertz(0.0).view())?;
     /// }
-    /// assert_eq!((session.frames(), session.loads()), (6, 3), "frames without contact are no load");
+    /// assert_eq!(
+    ///     (session.frames(), session.loads()),
+    ///     (6, 3),
+    ///     "frames without contact are no load"
+    /// );
     /// for k in 0..40 {
     ///     session.push(hertz(100.0 + f64::from(k)).view())?;
     /// }
@@ -516,7 +539,14 @@ impl Session {
     /// use tactile_simulate::{Camera, CalibrationRun, PressLoad, PressOptions};
     /// let camera = Camera::default().coarser(4);
     /// let loads = [0.7, 1.0, 1.2].map(PressLoad::normal).to_vec();
-    /// let trial = Trial::new(PressOptions { camera, loads, ..PressOptions::default() }, &CalibrationRun::default())?;
+    /// let trial = Trial::new(
+    ///     PressOptions {
+    ///         camera,
+    ///         loads,
+    ///         ..PressOptions::default()
+    ///     },
+    ///     &CalibrationRun::default(),
+    /// )?;
     /// let mut session = Session::new(&trial.pipeline()?, &[trial.simulation.reference.view()])?;
     /// let mut across = Vec::new();
     /// for frame in &trial.simulation.frames {
@@ -531,7 +561,8 @@ impl Session {
     /// ```
     ///
     /// # Errors
-    /// [`PipelineError::NoContact`] where nothing touches. Those of a [`Press`](crate::pipeline::Press)'s strain.
+    /// [`PipelineError::NoContact`] where nothing touches. Those of a
+    /// [`Press`](crate::pipeline::Press)'s strain.
     pub fn strain(&mut self) -> Result<Option<&SessionStrain>, PipelineError> {
         let Some(reading) = self.contact.reading.filter(|_| self.measured) else {
             return Err(PipelineError::NoContact {
@@ -552,10 +583,8 @@ impl Session {
     /// ```
     /// # use std::sync::Arc;
     /// # use tactile_imaging::pipeline::Session;
-    /// # use tactile_simulate::Trial;
-    /// # use tactile_simulate::{Camera, CalibrationRun, PressOptions};
-    /// # let camera = Camera::default().coarser(8);
-    /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationRun::default())?;
+    /// use tactile_simulate::Trial;
+    /// let trial = Trial::coarser(8)?;
     /// # let mut session = Session::new(&trial.pipeline()?, &[trial.simulation.reference.view()])?;
     /// session.push(trial.simulation.frames[0].view())?;
     /// assert!(session.strain()?.is_none());
@@ -572,7 +601,8 @@ impl Session {
     /// strain the loads are those whose [`strain`](Self::strain) was asked for; of a flat face all.
     ///
     /// # Errors
-    /// [`PipelineError::Modulus`]. [`PipelineError::NotUniaxial`] where the last contact is not that of a flat face.
+    /// [`PipelineError::Modulus`]. [`PipelineError::NotUniaxial`] where the last contact is not
+    /// that of a flat face.
     pub fn modulus(&mut self) -> Result<ModulusEstimate, PipelineError> {
         let pipeline = &self.stages.pipeline;
         let estimator = pipeline.estimator()?;
@@ -600,10 +630,8 @@ impl Session {
 /// ```
 /// # use std::sync::Arc;
 /// # use tactile_imaging::pipeline::Session;
-/// # use tactile_simulate::Trial;
-/// # use tactile_simulate::{Camera, CalibrationRun, PressOptions};
-/// # let camera = Camera::default().coarser(8);
-/// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationRun::default())?;
+/// use tactile_simulate::Trial;
+/// let trial = Trial::coarser(8)?;
 /// let mut session = Session::new(&trial.pipeline()?, &[trial.simulation.reference.view()])?;
 /// for frame in &trial.simulation.frames {
 ///     session.push(frame.view())?;

@@ -39,10 +39,12 @@ pub enum SurfaceInput {
 /// use tactile_imaging::pipeline::{Binning, Object, Pipeline, Settings};
 /// # use tactile_imaging::force::CalibrationPair;
 /// # let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
-/// let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?.with_settings(|settings| {
-///     settings.control_points = 80;
-///     settings.smoothing_px = 3;
-/// })?;
+/// let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?.with_settings(
+///     |settings| {
+///         settings.control_points = 80;
+///         settings.smoothing_px = 3;
+///     },
+/// )?;
 /// let settings: &Settings = pipeline.settings();
 /// assert_eq!((settings.control_points, settings.smoothing_px), (80, 3));
 /// assert_eq!(settings.binning, Binning::Auto);

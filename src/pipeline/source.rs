@@ -39,7 +39,10 @@ pub trait FrameSource {
 /// use tactile_imaging::{io::write_grey_image, pipeline::{FrameSource, ImageFolder}};
 /// let folder = tempfile::tempdir()?;
 /// for grey in [30, 40_u8] {
-///     write_grey_image(folder.path().join(format!("{grey}.png")), Array2::from_elem((4, 6), grey).view())?;
+///     write_grey_image(
+///         folder.path().join(format!("{grey}.png")),
+///         Array2::from_elem((4, 6), grey).view(),
+///     )?;
 /// }
 /// let mut camera = ImageFolder::open(folder.path(), 80.0)?;
 /// let mut frame = Array2::zeros((0, 0));

@@ -17,7 +17,13 @@ use nalgebra::Matrix3;
 /// ```
 /// use tactile_imaging::Object;
 /// let ball = Object::sphere(3e-3);
-/// assert_eq!(ball, Object::Sphere { radius_m: 3e-3, poisson_ratio: Object::DEFAULT_POISSON_RATIO });
+/// assert_eq!(
+///     ball,
+///     Object::Sphere {
+///         radius_m: 3e-3,
+///         poisson_ratio: Object::DEFAULT_POISSON_RATIO
+///     }
+/// );
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(

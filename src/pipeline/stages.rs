@@ -24,9 +24,8 @@ use std::time::Instant;
 /// The strain between two frames.
 ///
 /// ```
-/// # use tactile_simulate::{Trial, CalibrationRun, Camera, PressOptions};
-/// # let camera = Camera::default().coarser(8);
-/// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationRun::default())?;
+/// use tactile_simulate::Trial;
+/// let trial = Trial::coarser(8)?;
 /// use tactile_imaging::pipeline::PairStrain;
 /// let pipeline = trial.pipeline()?.with_control_points(60);
 /// let press = trial.press(&pipeline)?;

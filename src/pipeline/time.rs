@@ -12,8 +12,17 @@ use std::fmt::{self, Display, Formatter};
 /// use tactile_imaging::elasticity::relaxation::TimeDependence;
 /// use tactile_imaging::pipeline::TimeResult;
 /// let change = TimeDependence::Undecided { change: -0.08 };
-/// let result = TimeResult { from_s: 0.5, to_s: 8.0, loads: 3, change };
-/// assert_eq!(result.to_string(), "0.5 to 8 s: the moduli of 3 loads change by -8.0 %, as a relaxing sample or a drifting sensor would");
+/// let result = TimeResult {
+///     from_s: 0.5,
+///     to_s: 8.0,
+///     loads: 3,
+///     change,
+/// };
+/// assert_eq!(
+///     result.to_string(),
+///     "0.5 to 8 s: the moduli of 3 loads change by -8.0 %, as a relaxing sample or a drifting \
+///      sensor would"
+/// );
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
@@ -67,7 +76,8 @@ impl Display for TimeResult {
             ),
             TimeDependence::Undecided { change } => write!(
                 f,
-                "the moduli of {} loads change by {:+.1} %, as a relaxing sample or a drifting sensor would",
+                "the moduli of {} loads change by {:+.1} %, as a relaxing sample or a drifting \
+                 sensor would",
                 self.loads,
                 100.0 * change
             ),

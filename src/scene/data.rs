@@ -369,13 +369,15 @@ pub fn force_pairs(path: &Path) -> Result<Vec<CalibrationPair>, FileError> {
 pub fn doubt_of_depths(rows: &[(f64, f64)]) -> Option<String> {
     if let Some((darkness, _)) = rows.iter().find(|(darkness, _)| *darkness > 255.0) {
         return Some(format!(
-            "a darkness of {darkness} is more than the 255 grey levels of a frame: are the columns swapped?"
+            "a darkness of {darkness} is more than the 255 grey levels of a frame: are the \
+             columns swapped?"
         ));
     }
     // Dark sensors are films of some millimetres.
     let (_, depth) = rows.iter().find(|(_, depth)| *depth > 20e-3)?;
     Some(format!(
-        "a depth of {} mm is more than any film is thick: are the columns swapped, or is the unit in the heading wrong?",
+        "a depth of {} mm is more than any film is thick: are the columns swapped, or is the unit \
+         in the heading wrong?",
         1e3 * depth
     ))
 }
@@ -396,7 +398,8 @@ pub fn doubt_of_pairs(pairs: &[CalibrationPair]) -> Option<String> {
     let [_, most] = Quantity::Force.limits();
     if let Some(force) = forces().find(|force| force.abs() > most) {
         return Some(format!(
-            "a force of {force:e} N is more than any sensor bears: are the columns swapped, or is the unit in the heading wrong?"
+            "a force of {force:e} N is more than any sensor bears: are the columns swapped, or is \
+             the unit in the heading wrong?"
         ));
     }
     let mean = |values: &dyn Fn(&CalibrationPair) -> f64| {
@@ -412,6 +415,8 @@ pub fn doubt_of_pairs(pairs: &[CalibrationPair]) -> Option<String> {
         ));
     }
     (together < 0.0).then(|| {
-        "the force falls where the light grows: is a column that of another quantity, or are rows out of order?".to_owned()
+        "the force falls where the light grows: is a column that of another quantity, or are rows \
+         out of order?"
+            .to_owned()
     })
 }

@@ -192,7 +192,8 @@ pub fn same_shape(
         return Ok(());
     }
     Err(Failure::input(format!(
-        "{} has {rows} rows and {columns} columns, but {} has {first_rows} and {first_columns}: give files of one size",
+        "{} has {rows} rows and {columns} columns, but {} has {first_rows} and {first_columns}: \
+         give files of one size",
         path.display(),
         first.display()
     )))

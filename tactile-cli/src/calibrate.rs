@@ -58,7 +58,8 @@ pub fn run(arguments: &CalibrateArguments, context: &mut Context) -> Result<Exit
     if extension.is_some_and(|e| e.eq_ignore_ascii_case("toml")) {
         if arguments.there_and_back {
             return Err(Failure::input(
-                "--there-and-back is for tables of pairs: a calibration file names the branch of each press",
+                "--there-and-back is for tables of pairs: a calibration file names the branch of \
+                 each press",
             ));
         }
         return calibrate_sensor(input, context);

@@ -37,9 +37,12 @@ use tactile_imaging::sfs::DepthTable;
 )]
 #[command(after_help = "\
 Examples:
-  tactile depth --reference examples/data/dark_reference.pgm --table examples/data/depth_table.csv --pixel-um 100 examples/data/dark_frame.pgm --ball-radius-mm 4
-  tactile depth --reference examples/data/dark_reference.pgm --table examples/data/depth_table.csv --pixel-um 100 examples/data/dark_frame.pgm --ball --out target/depth
-  tactile depth --sensor examples/data/colour/sensor.toml examples/data/colour/press_6.png --out target/depth")]
+  tactile depth --reference examples/data/dark_reference.pgm --table examples/data/depth_table.csv \
+                        --pixel-um 100 examples/data/dark_frame.pgm --ball-radius-mm 4
+  tactile depth --reference examples/data/dark_reference.pgm --table examples/data/depth_table.csv \
+                        --pixel-um 100 examples/data/dark_frame.pgm --ball --out target/depth
+  tactile depth --sensor examples/data/colour/sensor.toml examples/data/colour/press_6.png --out \
+                        target/depth")]
 pub struct DepthArguments {
     #[command(flatten)]
     frames: SensorFrames,

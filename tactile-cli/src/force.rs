@@ -21,8 +21,12 @@ use tactile_imaging::pipeline::{ContactReading, Object, Session, Update};
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
-  tactile force --reference examples/data/press/reference.png --pairs examples/data/press/calibration.csv --pixel-um 40 examples/data/press/frame_1.png examples/data/press/frame_2.png
-  tactile force --reference examples/data/press/reference.png --pairs examples/data/press/calibration.csv --pixel-um 40 examples/data/press/frame_1.png --out target/force")]
+  tactile force --reference examples/data/press/reference.png --pairs \
+                        examples/data/press/calibration.csv --pixel-um 40 \
+                        examples/data/press/frame_1.png examples/data/press/frame_2.png
+  tactile force --reference examples/data/press/reference.png --pairs \
+                        examples/data/press/calibration.csv --pixel-um 40 \
+                        examples/data/press/frame_1.png --out target/force")]
 pub struct ForceArguments {
     #[command(flatten)]
     frames: SensorFrames,

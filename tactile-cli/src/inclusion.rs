@@ -25,9 +25,9 @@ use tactile_imaging::pipeline::with_error;
 /// size and the guide's layers (examples/data/inclusion/scene.toml is one). Without it a block with
 /// a lump is simulated. The pressure over the radius is compared with finite elements at finite
 /// strain, that over the whole face where it is not symmetric: the lump may lie off the axis. The
-/// answer is whether there is a lump, its place, diameter, depth and modulus with 95 % intervals, or
-/// which of them the frames leave open. --out gets profiles.csv and inclusion.svg. A search takes
-/// some five seconds for each kind of interface.
+/// answer is whether there is a lump, its place, diameter, depth and modulus with 95 % intervals,
+/// or which of them the frames leave open. --out gets profiles.csv and inclusion.svg. A search
+/// takes some five seconds for each kind of interface.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -35,15 +35,20 @@ Examples:
 The scene file:
   reference = \"reference.png\"
   pixel_size_m = [3.44e-4, 3.44e-4]
-  frames = [{ image = \"frame_1.png\", approach_m = 1e-3, force_N = 0.35 }]     growing approaches; three tell most
+  frames = [{ image = \"frame_1.png\", approach_m = 1e-3, force_N = 0.35 }]     growing \
+                        approaches; three tell most
   [calibration]
-  pairs = \"calibration.csv\"; without it the force_N of every frame, spread over its light, gives the pressure
+  pairs = \"calibration.csv\"; without it the force_N of every frame, spread over its light, gives \
+                        the pressure
   [object]
-  shape = \"block\"; height_m, radius_m; interface = \"bonded\" or \"frictionless\" (both are tried where it is absent);
-  height_error_m (2 % if absent), poisson_ratio and poisson_ratio_error (0.495, 0.005), approach_error_m (2e-5),
+  shape = \"block\"; height_m, radius_m; interface = \"bonded\" or \"frictionless\" (both are \
+                        tried where it is absent);
+  height_error_m (2 % if absent), poisson_ratio and poisson_ratio_error (0.495, 0.005), \
+                        approach_error_m (2e-5),
   youngs_modulus_pa and youngs_modulus_error_pa where the tissue's modulus is known
   [waveguide]
-  radius_m; layers = [{ thickness_m, youngs_modulus_pa, poisson_ratio }], from the block's side to the glass")]
+  radius_m; layers = [{ thickness_m, youngs_modulus_pa, poisson_ratio }], from the block's side to \
+                        the glass")]
 pub struct InclusionArguments {
     /// Scene file.
     #[arg(value_name = "SCENE.toml")]
@@ -290,7 +295,8 @@ fn design(
     }
     drop(bar);
     context.line(format_args!(
-        "expected standard errors for a lump of {:.1} mm, {:.1} mm deep, {:.0} kPa in tissue of {:.1} kPa",
+        "expected standard errors for a lump of {:.1} mm, {:.1} mm deep, {:.0} kPa in tissue of \
+         {:.1} kPa",
         arguments.diameter_mm, arguments.depth_mm, arguments.lump_kpa, arguments.tissue_kpa,
     ));
     context.line("approaches (mm)           diameter    depth  modulus");
@@ -307,7 +313,8 @@ fn design(
         ));
     }
     context.line(
-        "above 25 % a parameter cannot be told; a contact that slips or tissue that tears is not in the model",
+        "above 25 % a parameter cannot be told; a contact that slips or tissue that tears is not \
+         in the model",
     );
     let row =
         |(approaches, errors)| json!({ "approaches_m": approaches, "expected_errors": errors });
@@ -378,16 +385,21 @@ fn print(estimate: &InclusionEstimate, scan: &Scan, context: &mut Context) {
     );
     if let Some([diameter, depth, modulus]) = scan.truth {
         let [diameter, depth, modulus] = [1e3 * diameter, 1e3 * depth, 1e-3 * modulus];
-        context.row("truth", format_args!(
-            "diameter {diameter:.1} mm, depth {depth:.1} mm, modulus {modulus:.0} kPa (simulated by the same finite elements)"
-        ));
+        context.row(
+            "truth",
+            format_args!(
+                "diameter {diameter:.1} mm, depth {depth:.1} mm, modulus {modulus:.0} kPa \
+                 (simulated by the same finite elements)"
+            ),
+        );
     }
 }
 
 fn sentence(warning: &InclusionWarning) -> String {
     match warning {
         InclusionWarning::PoorFit { excess } => format!(
-            "the best fit leaves {excess:.1} times what the errors explain: several lumps, one off the axis, or wrong sizes or forces; errors are widened"
+            "the best fit leaves {excess:.1} times what the errors explain: several lumps, one \
+             off the axis, or wrong sizes or forces; errors are widened"
         ),
         InclusionWarning::OneFrame => {
             "one frame tells size and stiffness hardly apart: add approaches".into()
@@ -400,14 +412,17 @@ fn sentence(warning: &InclusionWarning) -> String {
             "the lump touches the surface or the base: beyond the model".into()
         }
         InclusionWarning::Asymmetric { asymmetry } => format!(
-            "the pressure is {:.1} % larger on one side: a lump off the axis, several, or a tilted block; the model is symmetric, and no size is given",
+            "the pressure is {:.1} % larger on one side: a lump off the axis, several, or a \
+             tilted block; the model is symmetric, and no size is given",
             100.0 * asymmetry
         ),
         InclusionWarning::NotABall { axes } => format!(
-            "seen from above the lump's axes are {axes:.2} : 1; the model is a ball, and no size is given"
+            "seen from above the lump's axes are {axes:.2} : 1; the model is a ball, and no size \
+             is given"
         ),
         InclusionWarning::NotRound { harmonics } => format!(
-            "around the axis the pressure varies by {:.1} %: a lump that is not round, several, or one off the axis; the model is symmetric, and no size is given",
+            "around the axis the pressure varies by {:.1} %: a lump that is not round, several, \
+             or one off the axis; the model is symmetric, and no size is given",
             100.0 * harmonics
         ),
         other => format!("{other:?}"),

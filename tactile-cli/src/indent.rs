@@ -28,14 +28,21 @@ use tactile_imaging::pipeline::with_error;
 #[command(after_help = "\
 Examples:
   tactile indent examples/data/curve.csv --shape sphere --radius 5e-3
-  tactile indent examples/data/curve.csv --shape sphere --radius 5e-3 --thickness 2e-3 --poisson 0.48
-  tactile indent examples/data/curve.csv --shape sphere --ball-radius 3e-3      a plate on a soft ball
-  tactile indent examples/data/curve.csv --shape sphere --radius 5e-3 --ball-radius 3e-3 --on-plate    a tip on it
+  tactile indent examples/data/curve.csv --shape sphere --radius 5e-3 --thickness 2e-3 --poisson \
+                        0.48
+  tactile indent examples/data/curve.csv --shape sphere --ball-radius 3e-3      a plate on a soft \
+                        ball
+  tactile indent examples/data/curve.csv --shape sphere --radius 5e-3 --ball-radius 3e-3 \
+                        --on-plate    a tip on it
   tactile indent examples/data/curve.csv --shape cone --half-angle 70.3 --json
-Models: hertz, layer (integral equation), layer-series (corrected), layer-published (Dimitriadis 2002, as printed),
-  ball (a ball on a rigid flat at finite strain), tatara (squeezed ball), punch, cone; auto fits all that apply and takes the
-  one with the lowest AICc. The interval holds the law's own error as well as the fit's. A curve does not tell whether the
-  surfaces slide: --no-slip (deep samples) says that they stick, which lowers the modulus by 1.6 % at a Poisson's ratio of 0.3
+Models: hertz, layer (integral equation), layer-series (corrected), layer-published (Dimitriadis \
+                        2002, as printed),
+  ball (a ball on a rigid flat at finite strain), tatara (squeezed ball), punch, cone; auto fits \
+                        all that apply and takes the
+  one with the lowest AICc. The interval holds the law's own error as well as the fit's. A curve \
+                        does not tell whether the
+  surfaces slide: --no-slip (deep samples) says that they stick, which lowers the modulus by 1.6 % \
+                        at a Poisson's ratio of 0.3
   and a sphere, 2.8 % under a punch, and not at all at 0.5.")]
 pub struct IndentArguments {
     /// Table of indentation and force.
@@ -263,7 +270,8 @@ fn refuse_return(position_m: &[f64]) -> Result<(), String> {
     let (there, back) = (way(0, deepest), way(last, deepest));
     if there > 0.0 && back > 0.1 * there {
         return Err(format!(
-            "the indentation grows up to row {} and falls after it: keep the loading or the unloading alone",
+            "the indentation grows up to row {} and falls after it: keep the loading or the \
+             unloading alone",
             deepest + 1
         ));
     }
@@ -337,7 +345,8 @@ fn doubts(curve: &IndentationCurve, fit: &CurveFit, known_contact: bool, context
             "residuals_correlated",
             json!({ "correlation": correlation }),
             format_args!(
-                "the residuals of neighbours go together ({correlation:.2}): the curve is not that of this law, and the interval is too narrow"
+                "the residuals of neighbours go together ({correlation:.2}): the curve is not \
+                 that of this law, and the interval is too narrow"
             ),
         );
     }
@@ -347,7 +356,8 @@ fn doubts(curve: &IndentationCurve, fit: &CurveFit, known_contact: bool, context
         context.warn(
             "contact_point_at_bound",
             json!({ "contact_point_m": at }),
-            "the contact point lies at an end of the curve: it may begin before it, give --contact where it is known",
+            "the contact point lies at an end of the curve: it may begin before it, give \
+             --contact where it is known",
         );
     }
 }
@@ -376,7 +386,8 @@ fn reason(found: &CurveSelection) -> String {
             format!("its AICc is {margin:.1} below the next law's")
         }
         SelectionReason::MostGeneral { behind } => format!(
-            "fits as well as any (AICc {behind:.1} above the lowest) and holds wherever the others do"
+            "fits as well as any (AICc {behind:.1} above the lowest) and holds wherever the \
+             others do"
         ),
         _ => "lowest AICc".into(),
     }

@@ -72,14 +72,17 @@ struct Program {
 const AFTER_HELP: &str = "\
 Examples, one for each subcommand:
   tactile measure examples/data/press/scene.toml
-  tactile force --reference examples/data/press/reference.png --pairs examples/data/press/calibration.csv --pixel-um 40 examples/data/press/frame_1.png
+  tactile force --reference examples/data/press/reference.png --pairs \
+                          examples/data/press/calibration.csv --pixel-um 40 \
+                          examples/data/press/frame_1.png
   tactile calibrate examples/data/sensor/calibration.toml
   tactile match examples/data/cases.txt
   tactile warp examples/data/sources.csv examples/data/targets.csv examples/data/queries.csv
   tactile strain examples/data/before.csv examples/data/after.csv
   tactile reconstruct examples/data/ball.pgm --light 0,0,1 --mask examples/data/ball.pgm
   tactile integrate examples/data/slope_x.csv examples/data/slope_y.csv
-  tactile depth --reference examples/data/dark_reference.pgm --table examples/data/depth_table.csv --pixel-um 100 examples/data/dark_frame.pgm
+  tactile depth --reference examples/data/dark_reference.pgm --table examples/data/depth_table.csv \
+                          --pixel-um 100 examples/data/dark_frame.pgm
   tactile inclusion --design examples/data/inclusion/scene.toml
   tactile indent examples/data/curve.csv --shape sphere --radius 5e-3
   tactile stream --rate 20 --period 1 --allowed-late 100

@@ -22,7 +22,9 @@ use tactile_imaging::markers::{MarkerField, find_markers, track_markers};
 #[command(after_help = "\
 Examples:
   tactile markers --reference examples/data/markers_reference.png examples/data/markers_frame.png
-  tactile markers --reference examples/data/markers_reference.png examples/data/markers_frame.png --pixel-um 100 --shear-modulus-kpa 40 --thickness-mm 4 --out target/markers")]
+  tactile markers --reference examples/data/markers_reference.png examples/data/markers_frame.png \
+                        --pixel-um 100 --shear-modulus-kpa 40 --thickness-mm 4 --out \
+                        target/markers")]
 pub struct MarkersArguments {
     /// Frames (PNG, PGM, PPM or JPEG).
     #[arg(required = true)]

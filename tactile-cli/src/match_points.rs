@@ -131,7 +131,8 @@ pub fn run(arguments: &MatchArguments, context: &mut Context) -> Result<Exit, Fa
     let expected = rotation != Turn::Limited || outliers != Unmatched::Both;
     if arguments.method != Method::Softassign && expected {
         return Err(Failure::input(
-            "--rotation and --outliers apply to the method softassign alone: leave out --method or them",
+            "--rotation and --outliers apply to the method softassign alone: leave out --method \
+             or them",
         ));
     }
     let inputs: Vec<&Path> = arguments.cases.iter().map(PathBuf::as_path).collect();

@@ -33,7 +33,8 @@ Examples:
   tactile measure --physics hertz --radius-mm 20
   ffmpeg -i press.mp4 -vf fps=2 -f yuv4mpegpipe -pix_fmt gray - | tactile measure scene.toml -
 
-SCENE.toml (paths are relative to it; PNG, PGM, JPEG or TIFF; colour becomes grey by the luma of Rec. 601):
+SCENE.toml (paths are relative to it; PNG, PGM, JPEG or TIFF; colour becomes grey by the luma of \
+                        Rec. 601):
 
   reference = \"reference.png\"            # the sensor without contact
   pixel_size_m = [21.55e-6, 21.55e-6]    # x, y, on the sensing surface
@@ -46,11 +47,13 @@ SCENE.toml (paths are relative to it; PNG, PGM, JPEG or TIFF; colour becomes gre
   [[frames]]
   image = \"frame_2.png\"
   [object]
-  shape = \"sphere\"                       # or \"block\", \"cylinder\" (flat faces, no size), \"flat_punch\", \"unknown\"
+  shape = \"sphere\"                       # or \"block\", \"cylinder\" (flat faces, no size), \
+                        \"flat_punch\", \"unknown\"
   radius_m = 3e-3
   poisson_ratio = 0.5
   [waveguide]                            # from the object's side to the glass
-  layers = [{ refractive_index = 1.38, thickness_m = 2e-3, youngs_modulus_pa = 1.36e5, poisson_ratio = 0.5 }]")]
+  layers = [{ refractive_index = 1.38, thickness_m = 2e-3, youngs_modulus_pa = 1.36e5, \
+                        poisson_ratio = 0.5 }]")]
 pub struct MeasureArguments {
     /// Scene file with your own frames. See below. Without it a press is simulated.
     #[arg(value_name = "SCENE.toml")]
@@ -161,7 +164,9 @@ impl Simulation {
             };
             let error = match error {
                 SimulateError::CalibrationSaturates { .. } => {
-                    "the gain that suits so small --forces saturates the camera in the calibration up to 2 N: give larger ones".to_owned()
+                    "the gain that suits so small --forces saturates the camera in the calibration \
+                     up to 2 N: give larger ones"
+                        .to_owned()
                 }
                 // The library names its field, a user has written --forces.
                 error => error.to_string().replace("force_n", "the force in N"),
@@ -176,7 +181,8 @@ impl Simulation {
         let contacts = trial.simulation.truth.iter().map(|truth| &truth.contact);
         match contacts.max_by(|a, b| a.contact_radius_m.total_cmp(&b.contact_radius_m)) {
             Some(largest) if largest.contact_radius_m > corner_m => Err(Failure::input(format!(
-                "at {} N the contact has a radius of {} mm and covers the whole frame: give smaller --forces",
+                "at {} N the contact has a radius of {} mm and covers the whole frame: give \
+                 smaller --forces",
                 four_digits(largest.force_n),
                 four_digits(1e3 * largest.contact_radius_m),
             ))),

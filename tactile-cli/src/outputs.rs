@@ -66,7 +66,8 @@ impl Outputs {
             return Ok(());
         }
         Err(Failure::input(format!(
-            "{job} needs about {}, more than the {} allowed: {remedy}, or allow more with --memory-gb",
+            "{job} needs about {}, more than the {} allowed: {remedy}, or allow more with \
+             --memory-gb",
             size(bytes),
             size(self.limit_bytes)
         )))

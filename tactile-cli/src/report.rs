@@ -189,10 +189,12 @@ impl Report {
         let question = escaped(&self.question);
         writeln!(
             page,
-            "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
-             <meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; style-src 'unsafe-inline'; img-src data:\">\n\
-             <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
-             <title>{question}</title>\n<style>{STYLE}</style>\n</head>\n<body>\n<h1>{question}</h1>"
+            "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta \
+             http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; style-src \
+             'unsafe-inline'; img-src data:\">\n<meta name=\"viewport\" \
+             content=\"width=device-width, \
+             initial-scale=1\">\n<title>{question}</title>\n<style>{STYLE}</style>\n</head>\\
+             n<body>\n<h1>{question}</h1>"
         )?;
         if let Some((first, rest)) = self.answers.split_first() {
             writeln!(page, "<p class=\"answer\">{}</p>", escaped(first))?;
@@ -229,7 +231,8 @@ impl Report {
         }
         writeln!(
             page,
-            "</table>\n<h2>To repeat it</h2>\n<pre>{}</pre>\n<p>tactile {}. Hashes are SHA-256.</p>\n</body>\n</html>",
+            "</table>\n<h2>To repeat it</h2>\n<pre>{}</pre>\n<p>tactile {}. Hashes are \
+             SHA-256.</p>\n</body>\n</html>",
             escaped(&self.call),
             env!("CARGO_PKG_VERSION")
         )
@@ -336,11 +339,13 @@ h2 { font-size: 1.1rem; margin: 2rem 0 .5rem; border-bottom: 1px solid #8886; br
 .answer { font-size: 1.9rem; font-weight: 600; line-height: 1.2; margin: .3rem 0; }
 .beside { margin: .2rem 0; }
 .cautions li { margin: .4rem 0; }
-figure { margin: 1rem 0; padding: .5rem; background: #fff; border-radius: .5rem; break-inside: avoid; overflow-x: auto; }
+figure { margin: 1rem 0; padding: .5rem; background: #fff; border-radius: .5rem; break-inside: \
+                     avoid; overflow-x: auto; }
 figure svg { display: block; width: 100%; min-width: 40rem; height: auto; }
 @media print { figure svg { min-width: 0; } }
 table { border-collapse: collapse; }
-th, td { text-align: left; vertical-align: top; padding: .2rem 1.2rem .2rem 0; font-weight: 400; overflow-wrap: anywhere; }
+th, td { text-align: left; vertical-align: top; padding: .2rem 1.2rem .2rem 0; font-weight: 400; \
+                     overflow-wrap: anywhere; }
 th { opacity: .75; }
 .files td { font: .75rem/1.6 ui-monospace, monospace; }
 pre { font: .8rem/1.5 ui-monospace, monospace; overflow-x: auto; margin: .5rem 0; }

@@ -203,13 +203,15 @@ const HEADERS: [(&str, &str); 5] = [
     ("X-Content-Type-Options", "nosniff"),
     (
         "Content-Security-Policy",
-        "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; connect-src 'self'; img-src data:; frame-ancestors 'none'",
+        "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; connect-src \
+         'self'; img-src data:; frame-ancestors 'none'",
     ),
 ];
 
 fn send_events(request: Request, shared: &Shared) -> std::io::Result<()> {
     let mut output = request.into_writer();
-    let head = "HTTP/1.1 200 OK\r\nContent-Type: text/event-stream\r\nCache-Control: no-store\r\nConnection: close\r\n\r\n";
+    let head = "HTTP/1.1 200 OK\r\nContent-Type: text/event-stream\r\nCache-Control: \
+                no-store\r\nConnection: close\r\n\r\n";
     output.write_all(head.as_bytes())?;
     let mut seen = [0; 2];
     while let Some(event) = shared.next(&mut seen) {

@@ -29,7 +29,8 @@ use tactile_imaging::{StrainAt, StrainBetween};
 #[command(after_help = "\
 Examples:
   tactile strain examples/data/before.csv examples/data/after.csv
-  tactile strain examples/data/before.csv examples/data/after.csv --measure hencky --rotation any --out target/strain")]
+  tactile strain examples/data/before.csv examples/data/after.csv --measure hencky --rotation any \
+                        --out target/strain")]
 pub struct StrainArguments {
     /// Points before.
     before: PathBuf,
@@ -91,7 +92,8 @@ pub fn run(arguments: &StrainArguments, context: &mut Context) -> Result<Exit, F
     let files = format!("{} and {}", before.display(), after.display());
     if metres != also_metres {
         return Err(Failure::input(format!(
-            "only one of {files} names the unit of its coordinates: name it in both headers or in none"
+            "only one of {files} names the unit of its coordinates: name it in both headers or in \
+             none"
         )));
     }
     let unit = if metres { METRES } else { "the points' unit" };
@@ -225,8 +227,8 @@ impl<const D: usize> Grid<D> {
         let counts: Vec<f64> = self.counts.iter().map(|&c| c as f64).collect();
         let depth = if D == 2 { 1.0 } else { counts[D - 1] };
         let mut text = format!(
-            "# vtk DataFile Version 3.0\ndisplacement and strain\nASCII\nDATASET STRUCTURED_POINTS\n\
-             DIMENSIONS {} {} {depth}\nORIGIN {}\nSPACING {}\nPOINT_DATA {}\n",
+            "# vtk DataFile Version 3.0\ndisplacement and strain\nASCII\nDATASET \
+             STRUCTURED_POINTS\nDIMENSIONS {} {} {depth}\nORIGIN {}\nSPACING {}\nPOINT_DATA {}\n",
             counts[0],
             counts[1],
             three(self.origin.coords.as_slice()),

@@ -35,7 +35,8 @@ Examples:
   tactile stream --rate 20 --period 1 --allowed-late 100
   tactile stream --rate 20 --period 1 --allowed-late 100 --strain --json
   tactile stream examples/data/press/scene.toml --allowed-late 100 --out target/stream
-  tactile stream examples/data/press/scene.toml examples/data/press/frame_1.png examples/data/press/frame_2.png --allowed-late 100
+  tactile stream examples/data/press/scene.toml examples/data/press/frame_1.png \
+                        examples/data/press/frame_2.png --allowed-late 100
 
 A camera or a video, by a pipe (ffmpeg has names for the cameras of every system):
   ffmpeg -f v4l2 -i /dev/video0 -f yuv4mpegpipe -pix_fmt gray - | tactile stream scene.toml -
@@ -456,7 +457,8 @@ fn recorded(
 ) -> Result<Exit, Failure> {
     if arguments.strain && arguments.force.is_none() {
         return Err(Failure::input(
-            "--strain of recorded frames needs --force, the largest force in newtons: strain is counted from the first frame of a third of it",
+            "--strain of recorded frames needs --force, the largest force in newtons: strain is \
+             counted from the first frame of a third of it",
         ));
     }
     let scene = Scene::read(path).map_err(Failure::input)?;
@@ -529,7 +531,8 @@ fn recorded(
             "frames_missing",
             json!({ "frames": missing }),
             format_args!(
-                "{missing} missing in the numbers of the frames' names: times are counted by the numbers"
+                "{missing} missing in the numbers of the frames' names: times are counted by the \
+                 numbers"
             ),
         );
     }

@@ -28,8 +28,10 @@ use tactile_imaging::sfs::{
 #[command(after_help = "\
 Examples:
   tactile reconstruct examples/data/ball.pgm --light 0,0,1 --mask examples/data/ball.pgm
-  tactile reconstruct examples/data/ball.pgm --light 1,0,1 --method brooks-horn --out target/reconstruct
-Without --method: eikonal where heights are known, or under frontal light with a mask; else brooks-horn.")]
+  tactile reconstruct examples/data/ball.pgm --light 1,0,1 --method brooks-horn --out \
+                        target/reconstruct
+Without --method: eikonal where heights are known, or under frontal light with a mask; else \
+                        brooks-horn.")]
 pub struct ReconstructArguments {
     /// PNG, PGM or JPEG.
     image: PathBuf,
@@ -164,7 +166,8 @@ pub fn reconstruct(
             "reprojection",
             json!({ "rms_grey_levels": fit.1.rms }),
             format_args!(
-                "the heights shaded again are {} grey levels from the image: check --light, --intensity, --ambient and the mask",
+                "the heights shaded again are {} grey levels from the image: check --light, \
+                 --intensity, --ambient and the mask",
                 four_digits(fit.1.rms)
             ),
         );
@@ -277,8 +280,10 @@ fn reconstruction_page(
 #[command(after_help = "\
 Examples:
   tactile integrate examples/data/slope_x.csv examples/data/slope_y.csv
-  tactile integrate examples/data/slope_x.csv examples/data/slope_y.csv --pixel-size 5e-5 --out target/integrate
-Without --method: poisson, or least-squares where there is a mask, known heights or a slope that is NaN.")]
+  tactile integrate examples/data/slope_x.csv examples/data/slope_y.csv --pixel-size 5e-5 --out \
+                        target/integrate
+Without --method: poisson, or least-squares where there is a mask, known heights or a slope that \
+                        is NaN.")]
 pub struct IntegrateArguments {
     /// Slopes along x.
     p: PathBuf,

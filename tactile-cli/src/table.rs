@@ -16,7 +16,8 @@ use tactile_imaging::scene::solve_contact_table;
 /// table.toml. Ctrl-C stops without a table.
 #[derive(Args)]
 #[command(
-    after_help = "Example:\n  tactile table examples/data/press/scene.toml --moduli 2 --largest-ratio 0.5 --out target/table"
+    after_help = "Example:\n  tactile table examples/data/press/scene.toml --moduli 2 \
+                  --largest-ratio 0.5 --out target/table"
 )]
 pub struct TableArguments {
     /// Scene file, or a file with its tables `object` and `waveguide`.

@@ -21,8 +21,10 @@ use tactile_imaging::tps::{
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
-  tactile warp examples/data/sources.csv examples/data/targets.csv examples/data/queries.csv --lambda gcv
-  tactile warp examples/data/sources.csv examples/data/targets.csv examples/data/queries.csv --kernel r --out target/warp")]
+  tactile warp examples/data/sources.csv examples/data/targets.csv examples/data/queries.csv \
+                        --lambda gcv
+  tactile warp examples/data/sources.csv examples/data/targets.csv examples/data/queries.csv \
+                        --kernel r --out target/warp")]
 pub struct WarpArguments {
     /// Where points are.
     sources: PathBuf,
@@ -79,7 +81,8 @@ pub fn run(arguments: &WarpArguments, context: &mut Context) -> Result<Exit, Fai
     for (name, unit) in [(&names[1], targets.1), (&names[2], queries.1)] {
         if unit != metres {
             return Err(Failure::input(format!(
-                "only one of {} and {name} names the unit of its coordinates: name it in both headers or in none",
+                "only one of {} and {name} names the unit of its coordinates: name it in both \
+                 headers or in none",
                 names[0],
             )));
         }
@@ -191,7 +194,10 @@ fn warp<const D: usize, K: Kernel>(
         .outputs
         .add("warped.csv", table(&values[..warped], &jacobians[..warped]));
     if !report.converged() {
-        context.note("the iteration was stopped before it reached its tolerance; the residual says how far it came");
+        context.note(
+            "the iteration was stopped before it reached its tolerance; the residual says how far \
+             it came",
+        );
     }
     if warped < queries.len() {
         let all = queries.len();
@@ -286,7 +292,8 @@ fn in_files(arguments: &WarpArguments, error: TpsError) -> String {
             "stopped before there was a spline: the points were still being prepared".to_owned()
         }
         TpsError::Conflict { first, second } => format!(
-            "{sources}: points {} and {} coincide but their targets in {targets} differ: smooth with --lambda, or drop one",
+            "{sources}: points {} and {} coincide but their targets in {targets} differ: smooth \
+             with --lambda, or drop one",
             first + 1,
             second + 1,
         ),

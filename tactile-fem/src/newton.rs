@@ -42,9 +42,9 @@ impl ElementModel {
         self.solve_near(&mut Layout::new(self), loads, &[])
     }
 
-    /// [`Self::solve`] that first tries, for each load, to go there from a guess: the state of a model with
-    /// the same elements at about that load. `layout` is this model's or one's with the same
-    /// elements and supports: its analysis is used again.
+    /// [`Self::solve`] that first tries, for each load, to go there from a guess: the state of a
+    /// model with the same elements at about that load. `layout` is this model's or one's with
+    /// the same elements and supports: its analysis is used again.
     pub fn solve_near(
         &self,
         layout: &mut Layout,

@@ -14,7 +14,10 @@ use tactile_elasticity::ElasticityError;
 /// ```
 /// use tactile_fem::{GuideLayer, Material};
 ///
-/// let epidermis = GuideLayer { thickness_m: 2e-3, material: Material::new(136e3, 0.495).unwrap() };
+/// let epidermis = GuideLayer {
+///     thickness_m: 2e-3,
+///     material: Material::new(136e3, 0.495).unwrap(),
+/// };
 /// assert_eq!(epidermis.material.youngs_modulus_pa(), 136e3);
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -31,8 +34,15 @@ pub struct GuideLayer {
 /// ```
 /// use tactile_fem::{Guide, GuideLayer, Material};
 ///
-/// let layer = |thickness_m, modulus| GuideLayer { thickness_m, material: Material::new(modulus, 0.495).unwrap() };
-/// let guide = Guide::new(vec![layer(2e-3, 136e3), layer(3e-3, 80e3), layer(5e-3, 34e3)], 25e-3).unwrap();
+/// let layer = |thickness_m, modulus| GuideLayer {
+///     thickness_m,
+///     material: Material::new(modulus, 0.495).unwrap(),
+/// };
+/// let guide = Guide::new(
+///     vec![layer(2e-3, 136e3), layer(3e-3, 80e3), layer(5e-3, 34e3)],
+///     25e-3,
+/// )
+/// .unwrap();
 /// assert_eq!((guide.layers().len(), guide.radius_m()), (3, 25e-3));
 /// assert!(Guide::new(vec![], 25e-3).is_err());
 /// ```
@@ -90,7 +100,9 @@ impl Guide {
 ///
 /// let force = |object| {
 ///     let scene = ObjectPress::new(object, Material::new(100e3, 0.495)?)?.scene()?;
-///     Ok::<_, tactile_elasticity::ElasticityError>(scene.solve(&[AppliedLoad::Approach(0.2e-3)]).states[0].force_n())
+///     Ok::<_, tactile_elasticity::ElasticityError>(
+///         scene.solve(&[AppliedLoad::Approach(0.2e-3)]).states[0].force_n(),
+///     )
 /// };
 /// let ball = force(ObjectShape::Ball { radius_m: 3e-3 })?;
 /// let half_ball = force(ObjectShape::HalfBall { radius_m: 3e-3 })?;
@@ -140,12 +152,24 @@ pub enum ObjectShape {
 /// use tactile_fem::{Guide, GuideLayer, AppliedLoad, Material, ObjectShape, ObjectPress};
 ///
 /// let gel = Material::new(80e3, 0.495)?;
-/// let guide = Guide::new(vec![GuideLayer { thickness_m: 6e-3, material: gel }], 16e-3)?;
-/// let press = ObjectPress::new(ObjectShape::HalfBall { radius_m: 3e-3 }, Material::new(60e3, 0.495)?)?.on_guide(guide)?;
+/// let guide = Guide::new(
+///     vec![GuideLayer {
+///         thickness_m: 6e-3,
+///         material: gel,
+///     }],
+///     16e-3,
+/// )?;
+/// let press = ObjectPress::new(
+///     ObjectShape::HalfBall { radius_m: 3e-3 },
+///     Material::new(60e3, 0.495)?,
+/// )?
+/// .on_guide(guide)?;
 /// let coarse = press.clone().with_fineness(4)?.scene()?;
 /// let fine = press.with_fineness(8)?.scene()?;
 /// assert!(fine.element_count() > 2 * coarse.element_count());
-/// let force = |scene: &tactile_fem::FemScene| scene.solve(&[AppliedLoad::Approach(0.5e-3)]).states[0].force_n();
+/// let force = |scene: &tactile_fem::FemScene| {
+///     scene.solve(&[AppliedLoad::Approach(0.5e-3)]).states[0].force_n()
+/// };
 /// // Both meshes are fine enough for half a percent of the force.
 /// assert!((force(&coarse) / force(&fine) - 1.0).abs() < 5e-3);
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
@@ -190,7 +214,11 @@ impl ObjectPress {
     /// # fn main() -> Result<(), tactile_elasticity::ElasticityError> {
     /// let layer = GuideLayer { thickness_m: 10e-3, material: Material::new(80e3, 0.495)? };
     /// let guide = Guide::new(vec![layer], 25e-3)?;
-    /// let press = ObjectPress::new(ObjectShape::Ball { radius_m: 3e-3 }, Material::new(103e3, 0.495)?)?.on_guide(guide)?;
+    /// let press = ObjectPress::new(
+    ///     ObjectShape::Ball { radius_m: 3e-3 },
+    ///     Material::new(103e3, 0.495)?,
+    /// )?
+    /// .on_guide(guide)?;
     /// let state = &press.scene()?.solve(&[AppliedLoad::Approach(1e-3)]).states[0];
     /// // Softer than a rigid flat: less force, at the same approach, than six tenths of Hertz's.
     /// let hertz = 4.0 / 3.0 * 103e3 / (1.0 - 0.495 * 0.495) * 3e-3_f64.sqrt() * 1e-3_f64.powf(1.5);
@@ -200,7 +228,8 @@ impl ObjectPress {
     /// ```
     ///
     /// # Errors
-    /// [`ElasticityError::OutOfRange`] for a guide that is not wider than the object, unless this is a cylinder.
+    /// [`ElasticityError::OutOfRange`] for a guide that is not wider than the object, unless this
+    /// is a cylinder.
     pub fn on_guide(mut self, guide: Guide) -> Result<Self, ElasticityError> {
         let radius = self.object.radius_m();
         let may_cover = matches!(self.object, ObjectShape::Cylinder { .. });
@@ -222,10 +251,15 @@ impl ObjectPress {
     /// ```
     /// use tactile_fem::{Interface, AppliedLoad, Material, ObjectShape, ObjectPress};
     ///
-    /// let press = ObjectPress::new(ObjectShape::Ball { radius_m: 3e-3 }, Material::new(103e3, 0.3)?)?;
+    /// let press = ObjectPress::new(
+    ///     ObjectShape::Ball { radius_m: 3e-3 },
+    ///     Material::new(103e3, 0.3)?,
+    /// )?;
     /// let force = |interface| {
     ///     let scene = press.clone().with_interface(interface).scene()?;
-    ///     Ok::<_, tactile_elasticity::ElasticityError>(scene.solve(&[AppliedLoad::Approach(0.1e-3)]).states[0].force_n())
+    ///     Ok::<_, tactile_elasticity::ElasticityError>(
+    ///         scene.solve(&[AppliedLoad::Approach(0.1e-3)]).states[0].force_n(),
+    ///     )
     /// };
     /// // Without slip a ball on a rigid flat is stiffer by a few per cent, the more the smaller ν.
     /// let ratio = force(Interface::Bonded)? / force(Interface::Frictionless)?;

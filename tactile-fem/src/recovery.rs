@@ -329,7 +329,8 @@ impl ElementModel {
     /// with the shape functions. Forces of single nodes alternate. Their sums with the hat function
     /// φ of each corner do not:
     ///
-    /// $$ P_a = \frac{f_a}{\int \phi_a 2\pi r dr} = p(\bar r_a) + \tfrac12 \sigma_a^2 p'' + \dots $$
+    /// $$ P_a = \frac{f_a}{\int \phi_a 2\pi r dr} = p(\bar r_a) + \tfrac12 \sigma_a^2 p'' + \dots
+    /// $$
     ///
     /// with the mean and the variance of r under φ. The second term is taken off by the second
     /// difference of neighbouring means.

@@ -42,9 +42,22 @@ pub enum Interface {
 /// use tactile_fem::{Block, Lump, Material};
 ///
 /// let material = |modulus| Material::new(modulus, 0.495).unwrap();
-/// let lump = Lump { diameter_m: 8e-3, depth_m: 5e-3, material: material(40e3) };
-/// let block = Block { height_m: 30e-3, radius_m: 40e-3, material: material(4e3), lump: Some(lump) };
-/// assert!(block.lump.is_some_and(|lump| lump.depth_m + lump.diameter_m < block.height_m));
+/// let lump = Lump {
+///     diameter_m: 8e-3,
+///     depth_m: 5e-3,
+///     material: material(40e3),
+/// };
+/// let block = Block {
+///     height_m: 30e-3,
+///     radius_m: 40e-3,
+///     material: material(4e3),
+///     lump: Some(lump),
+/// };
+/// assert!(
+///     block
+///         .lump
+///         .is_some_and(|lump| lump.depth_m + lump.diameter_m < block.height_m)
+/// );
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -69,7 +82,15 @@ pub struct Lump {
 /// let layer = GuideLayer { thickness_m: 10e-3, material: stiff };
 /// let guide = Guide::new(vec![layer], 16e-3).unwrap();
 /// let scene = FemScene::block_under_guide(&block, &guide, Interface::Bonded).unwrap();
-/// let plain = FemScene::block_under_guide(&Block { lump: None, ..block }, &guide, Interface::Bonded).unwrap();
+/// let plain = FemScene::block_under_guide(
+///     &Block {
+///         lump: None,
+///         ..block
+///     },
+///     &guide,
+///     Interface::Bonded,
+/// )
+/// .unwrap();
 /// let force = |scene: &FemScene| scene.solve(&[AppliedLoad::Approach(1e-3)]).states[0].force_n();
 /// assert!(force(&scene) > force(&plain));
 /// ```
@@ -91,7 +112,12 @@ pub struct Block {
 /// ```
 /// use tactile_fem::{AppliedLoad, Material, ObjectShape, ObjectPress};
 ///
-/// let scene = ObjectPress::new(ObjectShape::Ball { radius_m: 3e-3 }, Material::new(103e3, 0.495).unwrap()).and_then(|press| press.scene()).unwrap();
+/// let scene = ObjectPress::new(
+///     ObjectShape::Ball { radius_m: 3e-3 },
+///     Material::new(103e3, 0.495).unwrap(),
+/// )
+/// .and_then(|press| press.scene())
+/// .unwrap();
 /// let solution = scene.solve(&[AppliedLoad::Force(0.2)]);
 /// let radius = solution.states[0].contact_radius().unwrap();
 /// assert!((radius.radius_m - 1.51e-3).abs() < 0.02e-3);
@@ -222,7 +248,12 @@ impl FemScene {
     ///
     /// ```
     /// # use tactile_fem::{Material, ObjectShape, ObjectPress};
-    /// let scene = ObjectPress::new(ObjectShape::Ball { radius_m: 3e-3 }, Material::new(1e5, 0.495).unwrap()).and_then(|press| press.scene()).unwrap();
+    /// let scene = ObjectPress::new(
+    ///     ObjectShape::Ball { radius_m: 3e-3 },
+    ///     Material::new(1e5, 0.495).unwrap(),
+    /// )
+    /// .and_then(|press| press.scene())
+    /// .unwrap();
     /// assert!(scene.element_count() > 100);
     /// ```
     pub fn element_count(&self) -> usize {
@@ -237,7 +268,12 @@ impl FemScene {
     ///
     /// ```
     /// # use tactile_fem::{AppliedLoad, Material, ObjectShape, ObjectPress};
-    /// let scene = ObjectPress::new(ObjectShape::Ball { radius_m: 3e-3 }, Material::new(1e5, 0.495).unwrap()).and_then(|press| press.scene()).unwrap();
+    /// let scene = ObjectPress::new(
+    ///     ObjectShape::Ball { radius_m: 3e-3 },
+    ///     Material::new(1e5, 0.495).unwrap(),
+    /// )
+    /// .and_then(|press| press.scene())
+    /// .unwrap();
     /// let state = &scene.solve(&[AppliedLoad::Approach(0.3e-3)]).states[0];
     /// // Pressed along the axis.
     /// assert!(scene.stress(state, [0.1e-3, 1e-3]).unwrap().zz_pa < 0.0);
@@ -320,8 +356,14 @@ pub struct SolverReport {
 /// use tactile_fem::{AppliedLoad, Material, ObjectShape, Outcome, ObjectPress};
 ///
 /// # fn main() -> Result<(), tactile_elasticity::ElasticityError> {
-/// let press = ObjectPress::new(ObjectShape::Ball { radius_m: 3e-3 }, Material::new(1e5, 0.495)?)?;
-/// let solution = press.scene()?.solve(&[AppliedLoad::Approach(0.3e-3), AppliedLoad::Approach(f64::NAN)]);
+/// let press = ObjectPress::new(
+///     ObjectShape::Ball { radius_m: 3e-3 },
+///     Material::new(1e5, 0.495)?,
+/// )?;
+/// let solution = press.scene()?.solve(&[
+///     AppliedLoad::Approach(0.3e-3),
+///     AppliedLoad::Approach(f64::NAN),
+/// ]);
 /// assert_eq!(solution.states.len(), 1);
 /// assert!(matches!(solution.report.outcome, Outcome::Stopped { load: 1, .. }));
 /// # Ok(())
@@ -352,7 +394,9 @@ impl FemScene {
     /// let material = Material::new(103e3, 0.495)?;
     /// let force = |faces| {
     ///     let scene = FemScene::cylinder_between_plates(6e-3, 6e-3, material, faces)?;
-    ///     Ok::<_, tactile_elasticity::ElasticityError>(scene.solve(&[AppliedLoad::Approach(0.15e-3)]).states[0].force_n())
+    ///     Ok::<_, tactile_elasticity::ElasticityError>(
+    ///         scene.solve(&[AppliedLoad::Approach(0.15e-3)]).states[0].force_n(),
+    ///     )
     /// };
     /// assert!(force(Interface::Bonded)? > 1.2 * force(Interface::Frictionless)?);
     /// # Ok::<(), tactile_elasticity::ElasticityError>(())

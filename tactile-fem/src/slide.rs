@@ -1,10 +1,10 @@
 //! Surfaces that slide far on each other without friction, at one approach.
 //!
-//! [`ElementModel::slide`](crate::model::ElementModel::slide) lets nodes of one place share their axial displacement. As the bodies
-//! spread by different amounts, such nodes part sideways by some tenths of a millimetre, which
-//! moves the pressure by up to 1.1 % at a tenth of the block's height. The upper body's mesh is
-//! therefore moved along its surface until nodes that share a displacement meet in the deformed
-//! state.
+//! [`ElementModel::slide`](crate::model::ElementModel::slide) lets nodes of one place share their
+//! axial displacement. As the bodies spread by different amounts, such nodes part sideways by some
+//! tenths of a millimetre, which moves the pressure by up to 1.1 % at a tenth of the block's
+//! height. The upper body's mesh is therefore moved along its surface until nodes that share a
+//! displacement meet in the deformed state.
 //!
 //! The pressure acts along the axis: its radial share p dz/dr on the slightly bent face is left
 //! out. CalculiX with faces tied in the same way agrees (`evidence/inclusion_scenes.py`, the test

@@ -14,7 +14,12 @@ use crate::recovery::ContactProfile;
 /// ```
 /// use tactile_fem::{AppliedLoad, Material, ObjectShape, ObjectPress};
 ///
-/// let scene = ObjectPress::new(ObjectShape::Ball { radius_m: 3e-3 }, Material::new(1e5, 0.495).unwrap()).and_then(|press| press.scene()).unwrap();
+/// let scene = ObjectPress::new(
+///     ObjectShape::Ball { radius_m: 3e-3 },
+///     Material::new(1e5, 0.495).unwrap(),
+/// )
+/// .and_then(|press| press.scene())
+/// .unwrap();
 /// let state = &scene.solve(&[AppliedLoad::Approach(0.3e-3)]).states[0];
 /// assert_eq!(state.approach_m(), 0.3e-3);
 /// assert!(state.force_n() > 0.0);
@@ -73,7 +78,12 @@ impl State {
     ///
     /// ```
     /// # use tactile_fem::{AppliedLoad, Material, ObjectShape, ObjectPress};
-    /// let scene = ObjectPress::new(ObjectShape::Ball { radius_m: 3e-3 }, Material::new(1e5, 0.495).unwrap()).and_then(|press| press.scene()).unwrap();
+    /// let scene = ObjectPress::new(
+    ///     ObjectShape::Ball { radius_m: 3e-3 },
+    ///     Material::new(1e5, 0.495).unwrap(),
+    /// )
+    /// .and_then(|press| press.scene())
+    /// .unwrap();
     /// let state = &scene.solve(&[AppliedLoad::Approach(0.3e-3)]).states[0];
     /// assert!(state.pressure_at(0.1e-3) > state.pressure_at(0.5e-3));
     /// ```
@@ -95,7 +105,12 @@ impl State {
 /// ```
 /// use tactile_fem::{AppliedLoad, Material, ObjectShape, ObjectPress};
 ///
-/// let scene = ObjectPress::new(ObjectShape::Ball { radius_m: 3e-3 }, Material::new(1e5, 0.495).unwrap()).and_then(|press| press.scene()).unwrap();
+/// let scene = ObjectPress::new(
+///     ObjectShape::Ball { radius_m: 3e-3 },
+///     Material::new(1e5, 0.495).unwrap(),
+/// )
+/// .and_then(|press| press.scene())
+/// .unwrap();
 /// let state = &scene.solve(&[AppliedLoad::Approach(0.3e-3)]).states[0];
 /// assert!(state.pressure()[0].pressure_pa > state.pressure()[5].pressure_pa);
 /// ```
@@ -115,7 +130,12 @@ pub struct PressurePoint {
 /// ```
 /// use tactile_fem::{AppliedLoad, Material, ObjectShape, ObjectPress};
 ///
-/// let scene = ObjectPress::new(ObjectShape::Ball { radius_m: 3e-3 }, Material::new(1e5, 0.495).unwrap()).and_then(|press| press.scene()).unwrap();
+/// let scene = ObjectPress::new(
+///     ObjectShape::Ball { radius_m: 3e-3 },
+///     Material::new(1e5, 0.495).unwrap(),
+/// )
+/// .and_then(|press| press.scene())
+/// .unwrap();
 /// let state = &scene.solve(&[AppliedLoad::Approach(0.3e-3)]).states[0];
 /// let radius = state.contact_radius().unwrap();
 /// assert!(radius.uncertainty_m < 0.01 * radius.radius_m);
@@ -159,7 +179,12 @@ pub fn pressure_at(points: &[PressurePoint], radius: f64) -> f64 {
 /// use tactile_fem::{Interface, AppliedLoad, Material, FemScene};
 ///
 /// // A cylinder free to slide between plates, squeezed by a thousandth: σzz = −E/1000 nearly.
-/// let scene = FemScene::cylinder_between_plates(2e-3, 2e-3, Material::new(1e5, 0.45)?, Interface::Frictionless)?;
+/// let scene = FemScene::cylinder_between_plates(
+///     2e-3,
+///     2e-3,
+///     Material::new(1e5, 0.45)?,
+///     Interface::Frictionless,
+/// )?;
 /// let state = &scene.solve(&[AppliedLoad::Approach(1e-6)]).states[0];
 /// let stress = scene.stress(state, [0.7e-3, 0.4e-3]).expect("a point of the cylinder");
 /// assert!((stress.zz_pa / -100.0 - 1.0).abs() < 5e-3 && stress.rr_pa.abs() < 0.5);

@@ -46,8 +46,8 @@ impl TableOptions {
     /// flat needs one and takes no other.
     ///
     /// # Errors
-    /// [`ElasticityError::NotPositive`]; [`ElasticityError::OutOfRange`] where the second is not above the first;
-    /// [`ElasticityError::LengthMismatch`] for fewer than two.
+    /// [`ElasticityError::NotPositive`]; [`ElasticityError::OutOfRange`] where the second is not
+    /// above the first; [`ElasticityError::LengthMismatch`] for fewer than two.
     pub fn with_moduli_pa(
         mut self,
         lowest_pa: f64,
@@ -156,8 +156,8 @@ const LARGEST_POISSON_RATIO: f64 = 0.499;
 /// ```
 ///
 /// # Errors
-/// [`ElasticityError::Cancelled`]; [`ElasticityError::NotReached`] where a modulus has fewer than four contacts; those of
-/// [`ContactTable::new`].
+/// [`ElasticityError::Cancelled`]; [`ElasticityError::NotReached`] where a modulus has fewer than
+/// four contacts; those of [`ContactTable::new`].
 pub fn solve_contact_table(
     radius_m: f64,
     poisson_ratio: f64,

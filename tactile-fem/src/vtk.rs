@@ -15,7 +15,12 @@ impl FemScene {
     /// ```
     /// use tactile_fem::{AppliedLoad, Material, ObjectShape, ObjectPress};
     ///
-    /// let scene = ObjectPress::new(ObjectShape::Ball { radius_m: 3e-3 }, Material::new(1e5, 0.495).unwrap()).and_then(|press| press.scene()).unwrap();
+    /// let scene = ObjectPress::new(
+    ///     ObjectShape::Ball { radius_m: 3e-3 },
+    ///     Material::new(1e5, 0.495).unwrap(),
+    /// )
+    /// .and_then(|press| press.scene())
+    /// .unwrap();
     /// let state = &scene.solve(&[AppliedLoad::Approach(0.3e-3)]).states[0];
     /// let mut file = Vec::new();
     /// scene.write_vtk(state, &mut file)?;

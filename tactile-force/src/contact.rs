@@ -242,7 +242,9 @@ mod read {
 ///
 /// ```
 /// use ndarray::Array2;
-/// use tactile_force::{ContactDetector, ContactOptions, Detection, DetectorWorkspace, ReferenceFrame};
+/// use tactile_force::{
+///     ContactDetector, ContactOptions, Detection, DetectorWorkspace, ReferenceFrame,
+/// };
 ///
 /// let mut frame = Array2::from_elem((64, 64), 12_u8);
 /// let reference = ReferenceFrame::new(frame.view())?;
@@ -306,14 +308,19 @@ impl DetectorWorkspace {
     ///
     /// ```
     /// use ndarray::Array2;
-    /// use tactile_force::{ContactDetector, ContactOptions, Detection, DetectorWorkspace, ReferenceFrame};
+    /// use tactile_force::{
+    ///     ContactDetector, ContactOptions, Detection, DetectorWorkspace, ReferenceFrame,
+    /// };
     ///
     /// let mut frame = Array2::from_elem((64, 64), 12_u8);
     /// let reference = ReferenceFrame::new(frame.view())?;
     /// frame.slice_mut(ndarray::s![20..40, 20..40]).fill(90);
     /// let mut workspace = DetectorWorkspace::default();
-    /// let found: Detection =
-    ///     ContactDetector::new(ContactOptions::default()).detect_with(&mut workspace, frame.view(), &reference)?;
+    /// let found: Detection = ContactDetector::new(ContactOptions::default()).detect_with(
+    ///     &mut workspace,
+    ///     frame.view(),
+    ///     &reference,
+    /// )?;
     /// let histogram = workspace.grey_histogram(4e-10).expect("a contact");
     /// let sum = found.contact.expect("a contact").integrated_pixel_value.value;
     /// assert!((histogram.integral(|grey| grey) / (4e-10 * sum) - 1.0).abs() < 1e-12);

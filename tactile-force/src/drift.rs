@@ -12,14 +12,19 @@ use crate::frame::{TILE_COLUMNS, TILE_ROWS, TileSum};
 ///
 /// ```
 /// use ndarray::Array2;
-/// use tactile_force::{ContactDetector, ContactOptions, Detection, DriftCorrection, ReferenceFrame};
+/// use tactile_force::{
+///     ContactDetector, ContactOptions, Detection, DriftCorrection, ReferenceFrame,
+/// };
 ///
 /// // Three grey levels of stray light everywhere are no contact.
 /// let reference = ReferenceFrame::new(Array2::from_elem((160, 160), 20_u8).view())?;
 /// let brighter = Array2::from_elem((160, 160), 23_u8);
 /// let options = ContactOptions::default().with_drift(DriftCorrection::Offset);
-/// let found: Detection =
-///     ContactDetector::new(options).detect_with(&mut Default::default(), brighter.view(), &reference)?;
+/// let found: Detection = ContactDetector::new(options).detect_with(
+///     &mut Default::default(),
+///     brighter.view(),
+///     &reference,
+/// )?;
 /// assert!(found.contact.is_none());
 /// assert!((found.drift.coefficients[0] - 3.0).abs() < 1e-9);
 /// # Ok::<(), tactile_force::ForceError>(())
@@ -50,15 +55,19 @@ pub enum DriftCorrection {
 /// ```
 /// use ndarray::Array2;
 /// use tactile_force::{
-///     ContactDetector, ContactOptions, Detection, DriftCorrection, DriftOutcome, ForceError, ReferenceFrame,
+///     ContactDetector, ContactOptions, Detection, DriftCorrection, DriftOutcome, ForceError,
+///     ReferenceFrame,
 /// };
 ///
 /// let options = ContactOptions::default().with_drift(DriftCorrection::Automatic);
 /// let outcome = |at_rest: u8, now: u8| -> Result<DriftOutcome, ForceError> {
 ///     let reference = ReferenceFrame::new(Array2::from_elem((160, 160), at_rest).view())?;
 ///     let frame = Array2::from_elem((160, 160), now);
-///     let found: Detection =
-///         ContactDetector::new(options).detect_with(&mut Default::default(), frame.view(), &reference)?;
+///     let found: Detection = ContactDetector::new(options).detect_with(
+///         &mut Default::default(),
+///         frame.view(),
+///         &reference,
+///     )?;
 ///     Ok(found.drift.outcome)
 /// };
 /// assert_eq!(outcome(100, 103)?, DriftOutcome::Corrected);
@@ -117,14 +126,19 @@ impl DriftCorrection {
 ///
 /// ```
 /// use ndarray::Array2;
-/// use tactile_force::{ContactDetector, ContactOptions, Detection, DriftCorrection, ReferenceFrame};
+/// use tactile_force::{
+///     ContactDetector, ContactOptions, Detection, DriftCorrection, ReferenceFrame,
+/// };
 ///
 /// // Illumination a tenth brighter.
 /// let reference = ReferenceFrame::new(Array2::from_elem((160, 160), 100_u8).view())?;
 /// let brighter = Array2::from_elem((160, 160), 110_u8);
 /// let options = ContactOptions::default().with_drift(DriftCorrection::Illumination);
-/// let found: Detection =
-///     ContactDetector::new(options).detect_with(&mut Default::default(), brighter.view(), &reference)?;
+/// let found: Detection = ContactDetector::new(options).detect_with(
+///     &mut Default::default(),
+///     brighter.view(),
+///     &reference,
+/// )?;
 /// assert!((found.drift.coefficients[0] - 1.1).abs() < 1e-9);
 /// assert_eq!(found.drift.tiles, 20 * 5);
 /// # Ok::<(), tactile_force::ForceError>(())
@@ -508,7 +522,8 @@ pub fn background_shift(frame: ArrayView2<'_, u8>, reference: ArrayView2<'_, u8>
 ///
 /// let reference = Array2::from_elem((40, 50), 90_u8);
 /// // A fifth of the pixels is two levels darker, the others one.
-/// let mut frame = Array2::from_shape_fn((40, 50), |(r, c)| if (r + c) % 5 == 0 { 88 } else { 89 });
+/// let mut frame =
+///     Array2::from_shape_fn((40, 50), |(r, c)| if (r + c) % 5 == 0 { 88 } else { 89 });
 /// frame.slice_mut(ndarray::s![8..24, 16..32]).fill(20);
 /// let contact = BoundingBox { row_start: 8, row_end: 24, column_start: 16, column_end: 32 };
 /// let shift = median_shift_outside(frame.view(), reference.view(), contact).expect("a frame");

@@ -46,7 +46,8 @@ pub enum ForceError {
     },
     /// A reference frame too dark to show how evenly it is lit.
     #[error(
-        "the reference's mean of {mean} grey levels is below the {required} needed to see its vignetting"
+        "the reference's mean of {mean} grey levels is below the {required} needed to see its \
+         vignetting"
     )]
     ReferenceTooDark {
         /// Its mean grey level.

@@ -311,7 +311,10 @@ pub fn trimmed_variance(histogram: &[u64]) -> f64 {
 ///     let (u, v) = ((x as f64 - 159.5) / 159.5, (y as f64 - 119.5) / 119.5);
 ///     (200.0 * (1.0 - 0.1 * (u * u + v * v))).round() as u8
 /// });
-/// let flat = ReferenceFrame::new(image.view())?.with_flat_field()?.flat_field().expect("asked for");
+/// let flat = ReferenceFrame::new(image.view())?
+///     .with_flat_field()?
+///     .flat_field()
+///     .expect("asked for");
 /// // L = Σ c_k (1, u, v, u², uv, v²)_k: 0.8 in the corner u = v = −1.
 /// let [c, u, v, uu, uv, vv] = flat.coefficients;
 /// assert!((c - u - v + uu + uv + vv - 0.8).abs() < 3e-3 && c == 1.0);

@@ -12,14 +12,21 @@ use crate::frame::TileSum;
 ///
 /// ```
 /// use ndarray::Array2;
-/// use tactile_force::{ContactDetector, ContactOptions, Detection, DetectorWorkspace, ReferenceFrame};
+/// use tactile_force::{
+///     ContactDetector, ContactOptions, Detection, DetectorWorkspace, ReferenceFrame,
+/// };
 ///
 /// let reference = ReferenceFrame::new(Array2::from_elem((160, 160), 50_u8).view())?;
 /// let frame = Array2::from_elem((160, 160), 51_u8);
 /// let mut workspace = DetectorWorkspace::default();
-/// let _: Detection =
-///     ContactDetector::new(ContactOptions::default()).detect_with(&mut workspace, frame.view(), &reference)?;
-/// let condition = workspace.condition(&reference).expect("a frame of that size");
+/// let _: Detection = ContactDetector::new(ContactOptions::default()).detect_with(
+///     &mut workspace,
+///     frame.view(),
+///     &reference,
+/// )?;
+/// let condition = workspace
+///     .condition(&reference)
+///     .expect("a frame of that size");
 /// assert!((condition.brightness.value - 1.02).abs() < 1e-9);
 /// assert!((condition.background_grey - 51.0).abs() < 1e-9);
 /// # Ok::<(), tactile_force::ForceError>(())
@@ -192,7 +199,11 @@ impl HealthOptions {
 ///
 /// let mut monitor = HealthMonitor::new(HealthOptions::default());
 /// let brightness = Estimate::new(1.0, 1e-3);
-/// let report = monitor.update(&FrameCondition { brightness, background_grey: 40.0, noise_ratio: 1.0 });
+/// let report = monitor.update(&FrameCondition {
+///     brightness,
+///     background_grey: 40.0,
+///     noise_ratio: 1.0,
+/// });
 /// assert_eq!(report.brightness, ChartState::Learning);
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -218,7 +229,11 @@ pub enum ChartState {
 /// ```
 /// use tactile_force::{ChartState, HealthReport};
 ///
-/// let report = HealthReport { brightness: ChartState::Changed, noise: ChartState::Healthy, background_grey: 41.0 };
+/// let report = HealthReport {
+///     brightness: ChartState::Changed,
+///     noise: ChartState::Healthy,
+///     background_grey: 41.0,
+/// };
 /// assert!(report.has_changed());
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -432,7 +447,9 @@ fn threshold(allowance: f64, interval: f64) -> f64 {
 ///
 /// let mut stuck = StuckPixels::new((40, 40))?;
 /// for k in 0..32_u32 {
-///     let mut frame = Array2::from_shape_fn((40, 40), |(y, x)| 50 + ((y * 7 + x * 13 + k as usize * 5) % 4) as u8);
+///     let mut frame = Array2::from_shape_fn((40, 40), |(y, x)| {
+///         50 + ((y * 7 + x * 13 + k as usize * 5) % 4) as u8
+///     });
 ///     frame[[12, 30]] = 255;
 ///     stuck.update(frame.view())?;
 /// }

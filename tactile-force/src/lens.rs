@@ -303,7 +303,8 @@ pub struct DotPair {
 /// ```
 /// use tactile_force::{DotPair, LensFit, LensGeometry};
 ///
-/// let truth = LensGeometry::new([20e-6, 21e-6])?.with_distortion([159.5, 119.5], 199.3, [0.04, 0.002])?;
+/// let truth =
+///     LensGeometry::new([20e-6, 21e-6])?.with_distortion([159.5, 119.5], 199.3, [0.04, 0.002])?;
 /// // 9 × 7 dots, 0.7 mm apart, on a target turned by 20 mrad.
 /// let (sin, cos) = 0.02_f64.sin_cos();
 /// let mut dots = Vec::new();
@@ -316,7 +317,9 @@ pub struct DotPair {
 /// let fit = LensFit::from_dots(&dots, (240, 320))?;
 /// assert!((fit.pixel_size_m[1].value / 21e-6 - 1.0).abs() < 1e-9);
 /// assert!((fit.distortion[0].value - 0.04).abs() < 1e-6);
-/// assert!((fit.geometry.to_metres([10.0, 12.0])[0] - truth.to_metres([10.0, 12.0])[0]).abs() < 1e-10);
+/// assert!(
+///     (fit.geometry.to_metres([10.0, 12.0])[0] - truth.to_metres([10.0, 12.0])[0]).abs() < 1e-10
+/// );
 /// # Ok::<(), tactile_force::ForceError>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -19,7 +19,9 @@ use crate::region::{Region, Run};
 ///
 /// ```
 /// use ndarray::Array2;
-/// use tactile_force::{CalibrationPair, ForceMeter, ForceWorkspace, LinearCalibration, ReferenceFrame};
+/// use tactile_force::{
+///     CalibrationPair, ForceMeter, ForceWorkspace, LinearCalibration, ReferenceFrame,
+/// };
 ///
 /// let pairs = [0.0, 1e5, 2e5].map(|v| CalibrationPair::loading(v, 1e-5 * v));
 /// let calibration = LinearCalibration::fit(&pairs, &Default::default())?;
@@ -27,7 +29,10 @@ use crate::region::{Region, Run};
 /// let reference = ReferenceFrame::new(frame.view())?;
 /// frame.slice_mut(ndarray::s![20..40, 20..40]).fill(112);
 ///
-/// let (meter, mut workspace) = (ForceMeter::new([20e-6; 2], &Default::default())?, ForceWorkspace::default());
+/// let (meter, mut workspace) = (
+///     ForceMeter::new([20e-6; 2], &Default::default())?,
+///     ForceWorkspace::default(),
+/// );
 /// let measured = meter.measure_with(&mut workspace, frame.view(), &reference, &calibration)?;
 /// // 400 pixels of 100 grey levels at 10 µN each.
 /// assert!((measured.force_n.value - 0.4_f64).abs() < 1e-9);
@@ -66,7 +71,8 @@ impl ForceMeter {
     /// ```
     /// use tactile_force::{ForceMeter, LensGeometry};
     ///
-    /// let lens = LensGeometry::new([21.6e-6, 22e-6])?.with_distortion([695.5, 520.5], 869.0, [0.03, 0.0])?;
+    /// let lens =
+    ///     LensGeometry::new([21.6e-6, 22e-6])?.with_distortion([695.5, 520.5], 869.0, [0.03, 0.0])?;
     /// let meter = ForceMeter::new(lens.pixel_size_m(), &Default::default())?.with_lens(lens);
     /// # let _ = meter;
     /// # Ok::<(), tactile_force::ForceError>(())
@@ -269,14 +275,22 @@ struct PixelSize {
 /// use ndarray::Array2;
 /// use tactile_force::{CalibrationPair, LinearCalibration, measure_force};
 ///
-/// let pairs: Vec<_> = (0..5).map(|k| CalibrationPair::loading(1e5 * k as f64, 0.5 * k as f64)).collect();
+/// let pairs: Vec<_> = (0..5)
+///     .map(|k| CalibrationPair::loading(1e5 * k as f64, 0.5 * k as f64))
+///     .collect();
 /// let calibration = LinearCalibration::fit(&pairs, &Default::default())?;
 /// let reference = Array2::from_elem((200, 200), 12_u8);
 /// let frame = Array2::from_shape_fn((200, 200), |(y, x)| {
 ///     let r2 = (x as f64 - 90.3).powi(2) + (y as f64 - 104.8).powi(2);
 ///     12 + (150.0 * (1.0 - r2 / 1600.0).max(0.0).sqrt()).round() as u8
 /// });
-/// let measured = measure_force(frame.view(), reference.view(), [20e-6, 20e-6], &calibration, &Default::default())?;
+/// let measured = measure_force(
+///     frame.view(),
+///     reference.view(),
+///     [20e-6, 20e-6],
+///     &calibration,
+///     &Default::default(),
+/// )?;
 /// let radius = measured.contact_radius_m.expect("contact");
 /// assert!((radius.value / 800e-6 - 1.0).abs() < 1e-3);
 /// assert!((measured.force_n.value - 2.51).abs() < 0.01);
@@ -356,8 +370,13 @@ impl ForceOptions {
 /// let pairs = [0.0, 1e5, 2e5].map(|v| CalibrationPair::loading(v, 1e-5 * v));
 /// let calibration = LinearCalibration::fit(&pairs, &Default::default())?;
 /// let at_rest = Array2::from_elem((64, 64), 12_u8);
-/// let m: ForceMeasurement =
-///     measure_force(at_rest.view(), at_rest.view(), [20e-6; 2], &calibration, &Default::default())?;
+/// let m: ForceMeasurement = measure_force(
+///     at_rest.view(),
+///     at_rest.view(),
+///     [20e-6; 2],
+///     &calibration,
+///     &Default::default(),
+/// )?;
 /// // No contact is an answer, not an error.
 /// assert_eq!((m.force_n.value, m.contact, m.mean_stress_pa), (0.0, None, None));
 /// # Ok::<(), tactile_force::ForceError>(())
@@ -448,7 +467,9 @@ fn mean_stress(force: Estimate, radius: Estimate) -> Estimate {
 ///
 /// ```
 /// use ndarray::Array2;
-/// use tactile_force::{CalibrationPair, ForceMeter, ForceWorkspace, LinearCalibration, ReferenceFrame};
+/// use tactile_force::{
+///     CalibrationPair, ForceMeter, ForceWorkspace, LinearCalibration, ReferenceFrame,
+/// };
 ///
 /// let pairs = [0.0, 1e5, 2e5].map(|v| CalibrationPair::loading(v, 1e-5 * v));
 /// let calibration = LinearCalibration::fit(&pairs, &Default::default())?;
@@ -482,13 +503,16 @@ impl ForceWorkspace {
     /// ```
     /// use ndarray::Array2;
     /// use tactile_force::{
-    ///     Branch, CalibrationFrame, ForceMeter, ForceWorkspace, GreyHistogram, PressureCurve, ReferenceFrame,
+    ///     Branch, CalibrationFrame, ForceMeter, ForceWorkspace, GreyHistogram, PressureCurve,
+    ///     ReferenceFrame,
     /// };
     ///
     /// // 2 kPa a grey level.
     /// let disc = |grey: f32| GreyHistogram::from_differences(std::iter::repeat_n(grey, 1000), 4e-10);
     /// let frames: Vec<_> = [20.0_f32, 40.0, 60.0, 80.0, 100.0]
-    ///     .map(|grey| CalibrationFrame::new(disc(grey), f64::from(grey) * 2e3 * 4e-7, Branch::Loading))
+    ///     .map(|grey| {
+    ///         CalibrationFrame::new(disc(grey), f64::from(grey) * 2e3 * 4e-7, Branch::Loading)
+    ///     })
     ///     .into_iter()
     ///     .collect::<Result<_, _>>()?;
     /// let curve = PressureCurve::fit(&frames, &Default::default())?;
@@ -499,7 +523,10 @@ impl ForceWorkspace {
     /// let meter = ForceMeter::new([20e-6; 2], &Default::default())?;
     /// let measured = meter.measure_with(&mut workspace, frame.view(), &reference, &curve)?;
     /// let (_, pressure) = workspace.pressure_pa().expect("a contact");
-    /// assert!((f64::from(pressure[[pressure.nrows() / 2, pressure.ncols() / 2]]) / 1e5 - 1.0).abs() < 1e-3);
+    /// assert!(
+    ///     (f64::from(pressure[[pressure.nrows() / 2, pressure.ncols() / 2]]) / 1e5 - 1.0).abs()
+    ///         < 1e-3
+    /// );
     /// let force = pressure.iter().map(|p| f64::from(*p) * 4e-10).sum::<f64>();
     /// assert!((force / measured.force_n.value - 1.0).abs() < 1e-5);
     /// # Ok::<(), tactile_force::ForceError>(())

@@ -131,7 +131,11 @@ impl Spring {
 ///     x.hypot(y)
 /// };
 /// let at_rest = [Estimate::default(); 2];
-/// let pulled = ShearMeasurement { displacement_m: at_rest, step_m: at_rest, force_n: [0.3, 0.4].map(|value| Estimate::new(value, 0.01)) };
+/// let pulled = ShearMeasurement {
+///     displacement_m: at_rest,
+///     step_m: at_rest,
+///     force_n: [0.3, 0.4].map(|value| Estimate::new(value, 0.01)),
+/// };
 /// assert_eq!(along(&pulled), 0.5);
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -155,18 +159,39 @@ pub struct ShearMeasurement {
 /// use ndarray::Array2;
 /// use tactile_force::*;
 ///
-/// let press = |x0: f64| Array2::from_shape_fn((120, 120), |(y, x)| {
-///     let r2 = (x as f64 - x0).powi(2) + (y as f64 - 60.0).powi(2);
-///     12 + (150.0 * (1.0 - r2 / 400.0).max(0.0).sqrt()).round() as u8
-/// });
-/// let force = LinearCalibration::fit(&[0.0, 1e5, 2e5].map(|v| CalibrationPair::loading(v, 1e-5 * v)), &Default::default())?;
-/// let shear = ShearCalibration::fit(&[1e-5, 2e-5].map(|u| ShearPair { centroid_step_m: [u, u], force_n: [2e3 * u; 2] }))?;
+/// let press = |x0: f64| {
+///     Array2::from_shape_fn((120, 120), |(y, x)| {
+///         let r2 = (x as f64 - x0).powi(2) + (y as f64 - 60.0).powi(2);
+///         12 + (150.0 * (1.0 - r2 / 400.0).max(0.0).sqrt()).round() as u8
+///     })
+/// };
+/// let force = LinearCalibration::fit(
+///     &[0.0, 1e5, 2e5].map(|v| CalibrationPair::loading(v, 1e-5 * v)),
+///     &Default::default(),
+/// )?;
+/// let shear = ShearCalibration::fit(&[1e-5, 2e-5].map(|u| ShearPair {
+///     centroid_step_m: [u, u],
+///     force_n: [2e3 * u; 2],
+/// }))?;
 /// let at_rest = Array2::from_elem((120, 120), 12_u8);
-/// let measure = |frame: &Array2<u8>| measure_force(frame.view(), at_rest.view(), [20e-6; 2], &force, &Default::default());
+/// let measure = |frame: &Array2<u8>| {
+///     measure_force(
+///         frame.view(),
+///         at_rest.view(),
+///         [20e-6; 2],
+///         &force,
+///         &Default::default(),
+///     )
+/// };
 ///
 /// let mut tracker = ShearTracker::new(shear);
 /// assert!(tracker.update(measure(&at_rest)?.centroid_m).is_none());
-/// assert_eq!(tracker.update(measure(&press(60.0))?.centroid_m).map(|s| s.force_n[0].value), Some(0.0));
+/// assert_eq!(
+///     tracker
+///         .update(measure(&press(60.0))?.centroid_m)
+///         .map(|s| s.force_n[0].value),
+///     Some(0.0)
+/// );
 /// // Two pixels to the right are 40 µm and 80 mN.
 /// let pulled = tracker.update(measure(&press(62.0))?.centroid_m).expect("contact");
 /// assert!((pulled.force_n[0].value - 0.08_f64).abs() < 1e-3);

@@ -5,10 +5,10 @@
 //! ```
 //!
 //! FOLDER holds `scenes.csv` and for every scene a file `NAME.csv` (load_index, x_m, y_m,
-//! pressure_pa on a grid of 0.5 mm over half the face, over a quarter where the lump has a twin), as
-//! `evidence/inclusion_pictures.py` makes them with CalculiX. Every scene is turned about the axis,
-//! sampled on cells of 1 mm, and searched with SEEDS draws of the sensor's errors. NAMES keeps the
-//! scenes whose names begin with one of them, separated by commas.
+//! pressure_pa on a grid of 0.5 mm over half the face, over a quarter where the lump has a twin),
+//! as `evidence/inclusion_pictures.py` makes them with CalculiX. Every scene is turned about the
+//! axis, sampled on cells of 1 mm, and searched with SEEDS draws of the sensor's errors. NAMES
+//! keeps the scenes whose names begin with one of them, separated by commas.
 #![allow(clippy::print_stdout)]
 
 use core::ops::ControlFlow;

@@ -6,7 +6,8 @@
 //! covariances of errors and prior, and s what a given inclusion would add to the pressures, the
 //! fall of the objective by a multiple of s, the homogeneous block's parameters fitted along, is
 //!
-//! $$ \frac{(s^T Q r)^2}{s^T Q s}, \qquad Q = C^{-1} - C^{-1} J (J^T C^{-1} J + P^{-1})^{-1} J^T C^{-1} $$
+//! $$ \frac{(s^T Q r)^2}{s^T Q s}, \qquad Q = C^{-1} - C^{-1} J (J^T C^{-1} J + P^{-1})^{-1} J^T
+//! C^{-1} $$
 //!
 //! and the odds of just that inclusion against none are $\exp(s^T Q r - \tfrac{1}{2} s^T Q s)$ (C.
 //! R. Rao, Proc. Cambridge Philos. Soc. 44 (1948) 50). What is added is that of small strain on a
@@ -125,8 +126,9 @@ impl Hypothesis {
         // of 162 inclusions there to 60 or more and the last, hardly to be found, to 33
         // (`inclusion_study`).
         let least_fall = 36.0;
-        // χ² over its degrees of freedom above which the model is not that of the block pressed, and
-        // a lump in it explains nothing. One that touches the surface brings it to some ten.
+        // χ² over its degrees of freedom above which the model is not that of the block pressed,
+        // and a lump in it explains nothing. One that touches the surface brings it to some
+        // ten.
         let largest_misfit = 50.0;
         let values = self.problem.measured.len() as f64;
         self.lump.as_ref().filter(|fit| {

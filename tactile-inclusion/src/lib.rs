@@ -10,7 +10,8 @@
 //! With y the measured ring means and forces, m(φ) the model's, C the covariance of the sensor's
 //! and the model's errors and a Gaussian prior of mean φ₀ and covariance P,
 //!
-//! $$ -2 \ln p(\varphi | y) = (y - m)^T C^{-1} (y - m) + (\varphi - \varphi_0)^T P^{-1} (\varphi - \varphi_0) + c $$
+//! $$ -2 \ln p(\varphi | y) = (y - m)^T C^{-1} (y - m) + (\varphi - \varphi_0)^T P^{-1} (\varphi -
+//! \varphi_0) + c $$
 //!
 //! is minimised over φ = (ln E₀, zero, ln H, ν, ln D, ln d, ln E₁). Its second derivative there
 //! gives errors and correlations, its determinant the evidence (Laplace). The ratio of the evidence

@@ -28,8 +28,8 @@ use tactile_fem::{Guide, Interface, Kinematics};
 const USED_FACE: f64 = 0.75;
 
 /// Radial displacement of tissue under a face over the radius and the mean strain of the block. Of
-/// incompressible tissue it is half the strain at its depth, which is larger than the mean by a half
-/// as the strain fades with the depth.
+/// incompressible tissue it is half the strain at its depth, which is larger than the mean by a
+/// half as the strain fades with the depth.
 const CARRIED: f64 = 0.75;
 
 /// Finds a spherical inclusion in a block from the pressure on a guide's face at some approaches.
@@ -136,8 +136,8 @@ impl InclusionSearch {
 
     /// As [`Self::search_with_progress`], from the whole face: the inclusion may lie off the axis.
     /// `positions_m` are the middles (x, y) of cells, from the axis, and `frames` have a pressure
-    /// for each. Cells of a fifteenth of the face's radius resolve what shows, and the time grows as
-    /// the third power of their number. The force is not used.
+    /// for each. Cells of a fifteenth of the face's radius resolve what shows, and the time grows
+    /// as the third power of their number. The force is not used.
     ///
     /// # Errors
     /// Those of [`Self::search_with_progress`].

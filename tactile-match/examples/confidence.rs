@@ -244,7 +244,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         );
     }
     println!(
-        "scenes, doubted, below 90 % right, of these without a doubt; of those without, within one standard deviation"
+        "scenes, doubted, below 90 % right, of these without a doubt; of those without, within \
+         one standard deviation"
     );
     for (name, tally) in families {
         println!(

@@ -199,7 +199,15 @@ impl TopSurface for Dimple {
 ///
 /// let slab = Slab::new(&[SlabLayer { index: 1.40_f64, thickness_m: 10e-3 }], 1.0, 30e-3)?;
 /// let dimple = Dimple::new([15e-3, 0.0], 4e-3, 0.2e-3)?;
-/// let finger = Touched::new(dimple, TouchingObject { index: 1.44, albedo: 0.6 }, [15e-3, 0.0], 2e-3)?;
+/// let finger = Touched::new(
+///     dimple,
+///     TouchingObject {
+///         index: 1.44,
+///         albedo: 0.6,
+///     },
+///     [15e-3, 0.0],
+///     2e-3,
+/// )?;
 /// let (led, options) = (Led::default(), TraceOptions::default());
 /// let pressed_by_air = trace(&slab, &led, &dimple, &options, &mut [])?;
 /// let pressed_by_finger = trace(&slab, &led, &finger, &options, &mut [])?;

@@ -114,7 +114,16 @@ impl<'a> Slab<'a> {
 /// use tactile_optics::surface::{Dimple, Flat};
 /// use tactile_optics::trace::{Slab, SlabLayer, TraceOptions, trace};
 ///
-/// let layers = [SlabLayer { index: 1.40_f64, thickness_m: 10e-3 }, SlabLayer { index: 1.41, thickness_m: 3e-3 }];
+/// let layers = [
+///     SlabLayer {
+///         index: 1.40_f64,
+///         thickness_m: 10e-3,
+///     },
+///     SlabLayer {
+///         index: 1.41,
+///         thickness_m: 3e-3,
+///     },
+/// ];
 /// let slab = Slab::new(&layers, 1.0, 30e-3)?;
 /// let (led, options) = (Led::default(), TraceOptions::default());
 /// let at_rest = trace(&slab, &led, &Flat, &options, &mut [])?;
@@ -222,7 +231,13 @@ fn launch(slab: &Slab<'_>, z: f64, y: f64, outside: [f64; 3]) -> (Ray, f64) {
 ///     .with_camera_half_angle(0.3)?
 ///     .with_emitter_half_width_m(2.5e-3)?;
 /// assert_ne!(quick, TraceOptions::default());
-/// assert!(matches!(quick.with_cutoff(f64::NAN), Err(OpticsError::OutOfRange { quantity: "cut-off", .. })));
+/// assert!(matches!(
+///     quick.with_cutoff(f64::NAN),
+///     Err(OpticsError::OutOfRange {
+///         quantity: "cut-off",
+///         ..
+///     })
+/// ));
 /// # Ok::<(), OpticsError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]

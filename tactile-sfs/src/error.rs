@@ -44,7 +44,8 @@ pub enum SfsError {
     Custom(CustomError),
     /// The contact of a calibration press is as large as the ball, or its radius is not finite.
     #[error(
-        "the contact radius is {found_m} m, which is not below the ball's radius of {ball_radius_m} m"
+        "the contact radius is {found_m} m, which is not below the ball's radius of \
+         {ball_radius_m} m"
     )]
     ContactBeyondBall {
         /// Radius of the contact in metres.
@@ -54,7 +55,8 @@ pub enum SfsError {
     },
     /// The light comes from behind the surface or grazes it (z ≤ 0): no shading carries shape then.
     #[error(
-        "the light direction ({x}, {y}, {z}) does not come from the viewer's side (z must be positive)"
+        "the light direction ({x}, {y}, {z}) does not come from the viewer's side (z must be \
+         positive)"
     )]
     LightFromBelow {
         /// x of the direction found.
@@ -80,7 +82,8 @@ pub enum SfsError {
     NoKnownHeight,
     /// A slope is NaN or infinite where the integrator cannot skip it.
     #[error(
-        "the slope at row {row}, column {column} is not finite; a masked integrator can leave it out"
+        "the slope at row {row}, column {column} is not finite; a masked integrator can leave it \
+         out"
     )]
     NonFiniteSlope {
         /// Row of the slope.
@@ -102,7 +105,9 @@ pub enum SfsError {
     },
     /// A calibration table does not tell the depth at zero signal.
     #[error(
-        "the table does not tell its depth at zero signal: it has {entries} entries above the threshold of contact (4 are needed), which a parabola misses by {misfit:.3} of their range (0.010 is allowed)"
+        "the table does not tell its depth at zero signal: it has {entries} entries above the \
+         threshold of contact (4 are needed), which a parabola misses by {misfit:.3} of their \
+         range (0.010 is allowed)"
     )]
     TableZero {
         /// Entries above the threshold of contact.

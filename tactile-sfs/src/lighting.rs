@@ -11,10 +11,10 @@ use tactile_core::Requirement;
 /// # Convention
 ///
 /// x is the column, y the row (so y points *down* the image), z points from the surface to the
-/// viewer. A surface z(x, y) with slopes p = ∂z/∂x and q = ∂z/∂y has the normal n = (−p, −q, 1)/√(1 +
-/// p² + q²). `direction` points *from the surface to the light*: (1, 0, 1) is a light to the right
-/// of the image, 45° above the surface. It brightens slopes that fall to the right. Texts whose y
-/// points up need the sign of y changed.
+/// viewer. A surface z(x, y) with slopes p = ∂z/∂x and q = ∂z/∂y has the normal
+/// n = (−p, −q, 1)/√(1 + p² + q²). `direction` points *from the surface to the light*: (1, 0, 1) is a light to the
+/// right of the image, 45° above the surface. It brightens slopes that fall to the right. Texts
+/// whose y points up need the sign of y changed.
 ///
 /// ```
 /// use tactile_sfs::Lighting;
@@ -115,8 +115,13 @@ impl<T: PixelScalar> Lighting<T> {
     ///
     /// ```
     /// use tactile_sfs::Lighting;
-    /// let light = Lighting::new([0.0, 0.0, 5.0])?.with_normal_intensity(204.0)?.with_ambient(10.0)?;
-    /// assert_eq!((light.direction(), light.normal_intensity()), ([0.0, 0.0, 1.0], 204.0));
+    /// let light = Lighting::new([0.0, 0.0, 5.0])?
+    ///     .with_normal_intensity(204.0)?
+    ///     .with_ambient(10.0)?;
+    /// assert_eq!(
+    ///     (light.direction(), light.normal_intensity()),
+    ///     ([0.0, 0.0, 1.0], 204.0)
+    /// );
     /// let grey = light.shade(1.0, 0.0); // 45° from the light
     /// assert!((grey - (10.0 + 204.0 * 0.5_f64.sqrt())).abs() < 1e-12);
     /// # Ok::<(), tactile_sfs::SfsError>(())

@@ -12,7 +12,13 @@ use crate::{Frame, Lighting, PixelScalar, SfsError};
 /// use ndarray::array;
 /// use tactile_sfs::{Alignment, height_error};
 /// let (z, truth) = (array![[0.0, 1.0, 2.0]], array![[1.0, 3.0, 5.0]]); // truth = 2 z + 1
-/// let rms = |alignment| Ok::<_, tactile_sfs::SfsError>(height_error(z.view(), truth.view(), None, alignment)?.error.rms);
+/// let rms = |alignment| {
+///     Ok::<_, tactile_sfs::SfsError>(
+///         height_error(z.view(), truth.view(), None, alignment)?
+///             .error
+///             .rms,
+///     )
+/// };
 /// assert!((rms(Alignment::None)? - (14.0_f64 / 3.0).sqrt()).abs() < 1e-12);
 /// assert!((rms(Alignment::Offset)? - (2.0_f64 / 3.0).sqrt()).abs() < 1e-12);
 /// assert!(rms(Alignment::Affine)? < 1e-12);
@@ -37,7 +43,16 @@ pub enum Alignment {
 /// let (z, truth) = (array![[3.0, 0.0, 4.0, f64::NAN]], array![[0.0, 0.0, 0.0, 0.0]]);
 /// let error = height_error(z.view(), truth.view(), None, Alignment::None)?.error;
 /// let rms = (25.0_f64 / 3.0).sqrt();
-/// assert_eq!(error, ErrorSummary { mean_absolute: 7.0 / 3.0, rms, max: 4.0, pixels: 3 }); // without the missing height
+/// assert_eq!(
+///     error,
+///     ErrorSummary {
+///         mean_absolute: 7.0 / 3.0,
+///         rms,
+///         max: 4.0,
+///         pixels: 3
+///     }
+/// ); // without the missing height
+///     
 /// # Ok::<(), tactile_sfs::SfsError>(())
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

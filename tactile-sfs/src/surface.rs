@@ -14,7 +14,10 @@ use crate::{BoundingBox, Domain, PixelScalar, SfsError, SurfaceWorkspace};
 /// use ndarray::array;
 /// use tactile_sfs::{DepthTable, Domain, PixelFlags, SurfaceReconstruction};
 /// let table = DepthTable::new(&[(0.0, 0.0), (10.0, 1e-3)])?;
-/// let surface = table.reconstruct(array![[5.0, 12.0, f64::NAN]].view().into(), &Domain::new([1e-4, 1e-4])?)?;
+/// let surface = table.reconstruct(
+///     array![[5.0, 12.0, f64::NAN]].view().into(),
+///     &Domain::new([1e-4, 1e-4])?,
+/// )?;
 /// assert_eq!(surface.flags[[0, 0]], PixelFlags::NONE);
 /// assert!(surface.flags[[0, 1]].contains(PixelFlags::OUT_OF_RANGE)); // the last depth was taken
 /// assert!((PixelFlags::DARK | PixelFlags::UNREACHED).contains(PixelFlags::DARK));
@@ -82,7 +85,9 @@ impl BitOrAssign for PixelFlags {
 /// let mask = array![[true, true, false, true], [true, true, false, true]]; // two contacts
 /// let slopes = Array2::<f64>::zeros((2, 4));
 /// let domain = Domain::default().with_mask(mask.view());
-/// let report = MaskedLeastSquares::default().integrate(slopes.view(), slopes.view(), &domain)?.report;
+/// let report = MaskedLeastSquares::default()
+///     .integrate(slopes.view(), slopes.view(), &domain)?
+///     .report;
 /// assert_eq!(report.components.len(), 2);
 /// assert_eq!(report.components[1], Component { pixels: 2, first: [0, 3], mean_height: 0.0 });
 /// # Ok::<(), tactile_sfs::SfsError>(())

@@ -18,7 +18,10 @@ type Callback = Box<dyn FnMut(Progress) -> ControlFlow<()> + Send + Sync>;
 /// ```
 /// use core::ops::ControlFlow;
 /// use ndarray::Array2;
-/// use tactile_sfs::{BrooksHorn, Domain, Frame, Lighting, Progress, Surface, SurfaceReconstruction, SurfaceWorkspace};
+/// use tactile_sfs::{
+///     BrooksHorn, Domain, Frame, Lighting, Progress, Surface, SurfaceReconstruction,
+///     SurfaceWorkspace,
+/// };
 /// let (send, receive) = std::sync::mpsc::channel();
 /// let mut workspace = SurfaceWorkspace::default();
 /// workspace.on_progress(move |progress: Progress| match send.send(progress) {
@@ -27,7 +30,12 @@ type Callback = Box<dyn FnMut(Progress) -> ControlFlow<()> + Send + Sync>;
 /// });
 /// let image = Array2::from_elem((8, 8), 0.9);
 /// let method = BrooksHorn::new(Lighting::default()).with_iterations(20, 5)?;
-/// method.reconstruct_with(&mut workspace, Frame::Real(image.view()), &Domain::default(), &mut Surface::default())?;
+/// method.reconstruct_with(
+///     &mut workspace,
+///     Frame::Real(image.view()),
+///     &Domain::default(),
+///     &mut Surface::default(),
+/// )?;
 /// let received: Vec<Progress> = receive.try_iter().collect();
 /// assert!(!received.is_empty() && received.iter().all(|p| p.done <= p.total && p.total == 20));
 /// # Ok::<(), tactile_sfs::SfsError>(())

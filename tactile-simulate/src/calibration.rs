@@ -61,9 +61,17 @@ impl Default for CalibrationRun {
 /// ```
 /// use tactile_simulate::{CalibrationRun, Camera, PressOptions, PressScene};
 /// let camera = Camera::default().coarser(16);
-/// let scene = PressScene::new(PressOptions { camera, ..PressOptions::default() })?;
-/// let series = scene.calibrate(&CalibrationRun { steps: 8, ..CalibrationRun::default() })?;
-/// let (light, force) = series.pairs.iter().fold((0.0, 0.0), |sum, p| (sum.0 + p.integrated_pixel_value, sum.1 + p.force_n));
+/// let scene = PressScene::new(PressOptions {
+///     camera,
+///     ..PressOptions::default()
+/// })?;
+/// let series = scene.calibrate(&CalibrationRun {
+///     steps: 8,
+///     ..CalibrationRun::default()
+/// })?;
+/// let (light, force) = series.pairs.iter().fold((0.0, 0.0), |sum, p| {
+///     (sum.0 + p.integrated_pixel_value, sum.1 + p.force_n)
+/// });
 /// let lens = 1.0 - camera.vignetting; // the most that the corners lose
 /// let slope = force / light / series.newton_per_grey;
 /// assert!((0.99..1.01 / lens).contains(&slope));
@@ -102,7 +110,8 @@ impl PressScene {
     /// ```
     ///
     /// # Errors
-    /// [`SimulateError::OutOfRange`] for an option without meaning; [`SimulateError::CalibrationSaturates`] where a pixel's light is beyond the
+    /// [`SimulateError::OutOfRange`] for an option without meaning;
+    /// [`SimulateError::CalibrationSaturates`] where a pixel's light is beyond the
     /// camera's range.
     pub fn calibrate(&self, options: &CalibrationRun) -> Result<CalibrationSeries, SimulateError> {
         options.validate()?;
@@ -145,7 +154,9 @@ impl PressScene {
     /// is too high for a small rigid ball.
     ///
     /// ```
-    /// use tactile_simulate::{CalibrationRun, Camera, Elastic, PressOptions, PressScene, ElasticSphere};
+    /// use tactile_simulate::{
+    ///     CalibrationRun, Camera, Elastic, ElasticSphere, PressOptions, PressScene,
+    /// };
     /// let camera = Camera::default().coarser(16);
     /// let object = ElasticSphere { radius_m: 20e-3, material: Elastic::CL2003X };
     /// let scene = PressScene::new(PressOptions { camera, object, ..PressOptions::default() })?;
@@ -156,8 +167,8 @@ impl PressScene {
     /// ```
     ///
     /// # Errors
-    /// [`SimulateError::OutOfRange`] for an option without meaning; [`SimulateError::CalibrationSaturates`] where the largest of these
-    /// saturates too.
+    /// [`SimulateError::OutOfRange`] for an option without meaning;
+    /// [`SimulateError::CalibrationSaturates`] where the largest of these saturates too.
     pub fn unsaturated(
         &self,
         mut options: CalibrationRun,

@@ -17,13 +17,28 @@ use std::f64::consts::{FRAC_PI_2, PI};
 /// ```
 /// use std::f64::consts::PI;
 /// use tactile_simulate::{PressLoad, PressOptions, PressScene};
-/// let scene = PressScene::new(PressOptions { loads: vec![PressLoad::normal(0.01)], ..PressOptions::default() })?;
+/// let scene = PressScene::new(PressOptions {
+///     loads: vec![PressLoad::normal(0.01)],
+///     ..PressOptions::default()
+/// })?;
 /// let contact = scene.truth(0).contact;
-/// let (a, r, e) = (contact.contact_radius_m, contact.sphere_radius_m, contact.effective_modulus_pa);
+/// let (a, r, e) = (
+///     contact.contact_radius_m,
+///     contact.sphere_radius_m,
+///     contact.effective_modulus_pa,
+/// );
 /// let near = |found: f64, expected: f64| (found / expected - 1.0).abs() < 1e-12;
-/// assert!(near(a.powi(3), 0.75 * 0.01 * r / e) && a / r < 0.3, "a³ = 3FR/(4E*)");
-/// assert!(near(contact.pressure_pa(0.0), 1.5 * 0.01 / (PI * a * a)) && contact.pressure_pa(a) == 0.0);
-/// assert!(near(contact.apparent_height_m(0.6 * a), 0.8 * a), "a hemisphere");
+/// assert!(
+///     near(a.powi(3), 0.75 * 0.01 * r / e) && a / r < 0.3,
+///     "a³ = 3FR/(4E*)"
+/// );
+/// assert!(
+///     near(contact.pressure_pa(0.0), 1.5 * 0.01 / (PI * a * a)) && contact.pressure_pa(a) == 0.0
+/// );
+/// assert!(
+///     near(contact.apparent_height_m(0.6 * a), 0.8 * a),
+///     "a hemisphere"
+/// );
 /// # Ok::<(), tactile_simulate::SimulateError>(())
 /// ```
 #[derive(Debug, Clone, PartialEq)]
@@ -206,7 +221,10 @@ impl SimulatedContact {
 /// assert!(tatara.indentation_m < hertz.indentation_m);
 /// // 0.7 N: a/R is 0.92. Springs in series make the layers too soft.
 /// let solved = contact(ContactModel::FiniteElements)?;
-/// assert!((solved.contact_radius_m / 2.75e-3 - 1.0).abs() < 0.01 && hertz.contact_radius_m > 1.15 * solved.contact_radius_m);
+/// assert!(
+///     (solved.contact_radius_m / 2.75e-3 - 1.0).abs() < 0.01
+///         && hertz.contact_radius_m > 1.15 * solved.contact_radius_m
+/// );
 /// # Ok::<(), tactile_simulate::SimulateError>(())
 /// ```
 #[derive(Debug, Clone, PartialEq, Default)]

@@ -5,12 +5,33 @@ use std::fmt;
 /// A scene's description was rejected.
 ///
 /// ```
-/// use tactile_simulate::{PressOptions, PressScene, SimulateError, UniaxialOptions, UniaxialScene};
-/// let none = PressScene::new(PressOptions { loads: vec![], ..PressOptions::default() }).unwrap_err();
-/// assert_eq!(none, SimulateError::TooFew { field: "loads", expected: 1, found: 0 });
-/// let crushed = UniaxialOptions { forces_n: vec![5.0], ..UniaxialOptions::default() };
-/// let Err(SimulateError::Overload { limit_n, .. }) = UniaxialScene::new(crushed) else { unreachable!() };
-/// assert!((limit_n - 103e3 * 144e-6 / 27f64.sqrt()).abs() < 1e-9, "E A₀/(3√3)");
+/// use tactile_simulate::{
+///     PressOptions, PressScene, SimulateError, UniaxialOptions, UniaxialScene,
+/// };
+/// let none = PressScene::new(PressOptions {
+///     loads: vec![],
+///     ..PressOptions::default()
+/// })
+/// .unwrap_err();
+/// assert_eq!(
+///     none,
+///     SimulateError::TooFew {
+///         field: "loads",
+///         expected: 1,
+///         found: 0
+///     }
+/// );
+/// let crushed = UniaxialOptions {
+///     forces_n: vec![5.0],
+///     ..UniaxialOptions::default()
+/// };
+/// let Err(SimulateError::Overload { limit_n, .. }) = UniaxialScene::new(crushed) else {
+///     unreachable!()
+/// };
+/// assert!(
+///     (limit_n - 103e3 * 144e-6 / 27f64.sqrt()).abs() < 1e-9,
+///     "E A₀/(3√3)"
+/// );
 /// ```
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -29,7 +50,8 @@ pub enum SimulateError {
     },
     /// Finite-element contacts of a ball or a waveguide that the crate has none of.
     #[error(
-        "finite-element contacts are there for balls of 3 mm radius of CL2000X or CL2003X on the default waveguide: give others as tabulated states"
+        "finite-element contacts are there for balls of 3 mm radius of CL2000X or CL2003X on the \
+         default waveguide: give others as tabulated states"
     )]
     NoFiniteElements,
     /// A list has fewer entries than needed.
@@ -55,7 +77,8 @@ pub enum SimulateError {
     /// A frame of the calibration is too bright for the camera: its sum would not be in proportion
     /// to the force.
     #[error(
-        "at {force_n} N the calibration's indenter lights pixels beyond the camera's range: take a larger indenter, or a smaller force"
+        "at {force_n} N the calibration's indenter lights pixels beyond the camera's range: take \
+         a larger indenter, or a smaller force"
     )]
     CalibrationSaturates {
         /// The smallest force of the calibration at which pixels saturate.

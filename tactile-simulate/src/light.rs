@@ -79,9 +79,20 @@ impl Response {
 /// ```
 /// use tactile_simulate::{Camera, Illumination, PressLoad, PressOptions, PressScene};
 /// let camera = Camera::default().coarser(16).ideal();
-/// let illumination = Illumination { level: 1.2, tilt: [0.1, 0.0] };
-/// let loads = vec![PressLoad { illumination, ..PressLoad::normal(0.0) }];
-/// let light = PressScene::new(PressOptions { camera, loads, ..PressOptions::default() })?.expected_frame(0);
+/// let illumination = Illumination {
+///     level: 1.2,
+///     tilt: [0.1, 0.0],
+/// };
+/// let loads = vec![PressLoad {
+///     illumination,
+///     ..PressLoad::normal(0.0)
+/// }];
+/// let light = PressScene::new(PressOptions {
+///     camera,
+///     loads,
+///     ..PressOptions::default()
+/// })?
+/// .expected_frame(0);
 /// for (column, share) in [(0, 1.15), (43, 1.2), (86, 1.25)] {
 ///     assert!((light[[0, column]] - share * camera.background_grey).abs() < 1e-9);
 /// }

@@ -40,7 +40,8 @@ impl PressScene {
     /// Checks `options` and solves the contact at every load.
     ///
     /// # Errors
-    /// [`SimulateError::OutOfRange`] or [`SimulateError::TooFew`] naming the first field that has no meaning.
+    /// [`SimulateError::OutOfRange`] or [`SimulateError::TooFew`] naming the first field that has
+    /// no meaning.
     pub fn new(options: PressOptions) -> Result<Self, SimulateError> {
         options.validate()?;
         let contacts = (options.loads.iter())
@@ -142,7 +143,9 @@ impl PressScene {
     /// balls, for instance.
     ///
     /// ```
-    /// use tactile_simulate::{Camera, ContactModel, Elastic, PressLoad, PressOptions, PressScene, ElasticSphere};
+    /// use tactile_simulate::{
+    ///     Camera, ContactModel, Elastic, ElasticSphere, PressLoad, PressOptions, PressScene,
+    /// };
     /// let camera = Camera::default().coarser(16);
     /// let scene = PressScene::new(PressOptions { camera, ..PressOptions::default() })?;
     /// let ball = ElasticSphere { radius_m: 10e-3, material: Elastic::RIGID };
@@ -321,7 +324,10 @@ impl ElasticSphere {
 ///     let scene = PressScene::new(PressOptions { waveguide, ..PressOptions::default() })?;
 ///     Ok::<_, tactile_simulate::SimulateError>(scene.truth(0).contact.contact_radius_m)
 /// };
-/// assert!(radius(waveguide)? < radius(LightGuide::default())?, "stiffer layers, a smaller contact");
+/// assert!(
+///     radius(waveguide)? < radius(LightGuide::default())?,
+///     "stiffer layers, a smaller contact"
+/// );
 /// # Ok::<(), tactile_simulate::SimulateError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -417,14 +423,22 @@ impl LightGuide {
 /// use tactile_simulate::{Camera, Gain, PressLoad, PressOptions, PressScene};
 /// let camera = Camera::default().coarser(16);
 /// let scene = |force_n, gain| {
-///     PressScene::new(PressOptions { camera, gain, loads: vec![PressLoad::normal(force_n)], ..Default::default() })
+///     PressScene::new(PressOptions {
+///         camera,
+///         gain,
+///         loads: vec![PressLoad::normal(force_n)],
+///         ..Default::default()
+///     })
 /// };
 /// let first = scene(1.2, Gain::PeakGrey(200.0))?;
 /// let peak_pa = first.truth(0).contact.peak_pressure_pa;
 /// assert!((first.truth(0).grey_per_pascal * peak_pa - 200.0).abs() < 1e-9);
 /// let same_sensor = scene(0.3, Gain::GreyPerPascal(first.truth(0).grey_per_pascal))?;
 /// let light = |scene: &PressScene| scene.truth(0).integrated_pixel_value;
-/// assert!((light(&first) / light(&same_sensor) - 4.0).abs() < 1e-9, "light in proportion to force");
+/// assert!(
+///     (light(&first) / light(&same_sensor) - 4.0).abs() < 1e-9,
+///     "light in proportion to force"
+/// );
 /// # Ok::<(), tactile_simulate::SimulateError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -461,8 +475,18 @@ impl Gain {
 /// ```
 /// use tactile_simulate::{Camera, PressLoad, PressOptions, PressScene};
 /// let camera = Camera::default().coarser(16);
-/// let loads = vec![PressLoad::normal(0.7), PressLoad { shear_n: [0.28, 0.0], ..PressLoad::normal(0.7) }];
-/// let scene = PressScene::new(PressOptions { camera, loads, ..PressOptions::default() })?;
+/// let loads = vec![
+///     PressLoad::normal(0.7),
+///     PressLoad {
+///         shear_n: [0.28, 0.0],
+///         ..PressLoad::normal(0.7)
+///     },
+/// ];
+/// let scene = PressScene::new(PressOptions {
+///     camera,
+///     loads,
+///     ..PressOptions::default()
+/// })?;
 /// let [x, sheared] = [0, 1].map(|k| scene.truth(k).centre_px[0]);
 /// let moved_m = (sheared - x) * camera.pixel_size_m[0];
 /// assert!((moved_m - 0.7e-3).abs() < 1e-12, "0.28 N over 400 N/m");
@@ -503,8 +527,17 @@ impl PressLoad {
 ///     ..PressOptions::default()
 /// };
 /// let made = PressScene::new(options.clone())?.simulate();
-/// assert!(made.truth.iter().all(|t| t.contact.contact_radius_m < 0.3 * 20e-3), "inside Hertz's range");
-/// assert_eq!(PressScene::new(options)?.simulate().frames, made.frames, "one seed, the same bits");
+/// assert!(
+///     made.truth
+///         .iter()
+///         .all(|t| t.contact.contact_radius_m < 0.3 * 20e-3),
+///     "inside Hertz's range"
+/// );
+/// assert_eq!(
+///     PressScene::new(options)?.simulate().frames,
+///     made.frames,
+///     "one seed, the same bits"
+/// );
 /// # Ok::<(), tactile_simulate::SimulateError>(())
 /// ```
 #[derive(Debug, Clone, PartialEq)]
@@ -587,8 +620,15 @@ impl PressOptions {
 /// let camera = Camera::default().coarser(16);
 /// let made = PressScene::new(PressOptions { camera, ..PressOptions::default() })?.simulate();
 /// let sum = |frame: &ndarray::Array2<u8>| frame.iter().map(|&v| f64::from(v)).sum::<f64>();
-/// let light = made.frames.iter().map(|frame| sum(frame) - sum(&made.reference)).collect::<Vec<_>>();
-/// assert!((light[1] / light[0] / (1.2 / 0.7) - 1.0).abs() < 0.02, "light in proportion to force");
+/// let light = made
+///     .frames
+///     .iter()
+///     .map(|frame| sum(frame) - sum(&made.reference))
+///     .collect::<Vec<_>>();
+/// assert!(
+///     (light[1] / light[0] / (1.2 / 0.7) - 1.0).abs() < 0.02,
+///     "light in proportion to force"
+/// );
 /// assert_eq!(made.youngs_modulus_pa, 103e3);
 /// # Ok::<(), tactile_simulate::SimulateError>(())
 /// ```
@@ -802,11 +842,19 @@ fn saturated_pixels(scene: &PressScene, load: usize) -> usize {
 /// ```
 /// use nalgebra::Point3;
 /// use tactile_simulate::SurfaceScaling;
-/// let map = SurfaceScaling { from_centre_m: [5e-3, 5e-3], to_centre_m: [6e-3, 5e-3], scale: 1.2, height_scale: 1.1 };
+/// let map = SurfaceScaling {
+///     from_centre_m: [5e-3, 5e-3],
+///     to_centre_m: [6e-3, 5e-3],
+///     scale: 1.2,
+///     height_scale: 1.1,
+/// };
 /// let moved = map.apply(&Point3::new(7e-3, 5e-3, 1e-3));
 /// assert!((moved - Point3::new(8.4e-3, 5e-3, 1.1e-3)).norm() < 1e-15);
 /// let strain = map.green_lagrange_strain();
-/// assert!((strain[(0, 0)] - 0.22).abs() < 1e-15 && (strain[(2, 2)] - 0.105).abs() < 1e-15, "½(s² − 1)");
+/// assert!(
+///     (strain[(0, 0)] - 0.22).abs() < 1e-15 && (strain[(2, 2)] - 0.105).abs() < 1e-15,
+///     "½(s² − 1)"
+/// );
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]

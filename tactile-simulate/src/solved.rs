@@ -19,7 +19,11 @@ impl ContactState {
     /// let solved = scene.solve(&[AppliedLoad::Force(0.2)]);
     /// let state = ContactState::from_solved(&solved.states[0]).expect("a contact");
     /// // Hertz: a³ = 3 F R (1 − ν²) / (4 E).
-    /// assert!((state.contact_radius_m / 1.49e-3 - 1.0).abs() < 0.03, "{}", state.contact_radius_m);
+    /// assert!(
+    ///     (state.contact_radius_m / 1.49e-3 - 1.0).abs() < 0.03,
+    ///     "{}",
+    ///     state.contact_radius_m
+    /// );
     /// assert_eq!(state.pressure_pa.last(), Some(&0.0));
     /// # Ok::<(), tactile_imaging::elasticity::ElasticityError>(())
     /// ```
@@ -53,20 +57,33 @@ impl ContactState {
     ///
     /// ```
     /// use tactile_imaging::fem::Interface;
-    /// use tactile_simulate::{Camera, ContactModel, ContactState, Elastic, PressLoad, PressOptions, PressScene};
-    /// let states = |faces| ContactState::of_squeezed_cylinder(6e-3, 6e-3, &Elastic::CL2000X, faces, &[0.5, 1.0]);
+    /// use tactile_simulate::{
+    ///     Camera, ContactModel, ContactState, Elastic, PressLoad, PressOptions, PressScene,
+    /// };
+    /// let states = |faces| {
+    ///     ContactState::of_squeezed_cylinder(6e-3, 6e-3, &Elastic::CL2000X, faces, &[0.5, 1.0])
+    /// };
     /// let [sliding, sticking] = [states(Interface::Frictionless)?, states(Interface::Bonded)?];
     /// assert!(sliding[1].contact_radius_m > 6.2e-3 && sticking[1].contact_radius_m == 6e-3);
     /// let camera = Camera::default().coarser(8);
-    /// let (law, loads) = (ContactModel::Tabulated(sticking), vec![PressLoad::normal(0.5), PressLoad::normal(1.0)]);
-    /// let scene = PressScene::new(PressOptions { law, loads, camera, ..PressOptions::default() })?;
+    /// let (law, loads) = (
+    ///     ContactModel::Tabulated(sticking),
+    ///     vec![PressLoad::normal(0.5), PressLoad::normal(1.0)],
+    /// );
+    /// let scene = PressScene::new(PressOptions {
+    ///     law,
+    ///     loads,
+    ///     camera,
+    ///     ..PressOptions::default()
+    /// })?;
     /// assert_eq!(scene.frame(1, 0).dim(), (130, 174));
     /// # Ok::<(), tactile_simulate::SimulateError>(())
     /// ```
     ///
     /// # Errors
-    /// [`SimulateError::OutOfRange`] for sizes, moduli and forces that are not positive or forces that do not grow, [`SimulateError::TooFew`] without a force,
-    /// [`SimulateError::Overload`] for a force that the solver does not reach.
+    /// [`SimulateError::OutOfRange`] for sizes, moduli and forces that are not positive or forces
+    /// that do not grow, [`SimulateError::TooFew`] without a force, [`SimulateError::Overload`]
+    /// for a force that the solver does not reach.
     pub fn of_squeezed_cylinder(
         radius_m: f64,
         height_m: f64,

@@ -12,12 +12,23 @@ use tactile_imaging::pipeline::FrameSource;
 /// ```
 /// use tactile_simulate::{Camera, LoadCycle, PressOptions, PressScene};
 /// let camera = Camera::default().coarser(16);
-/// let scene = PressScene::new(PressOptions { camera, ..PressOptions::default() })?;
-/// let cycle = LoadCycle { cycles: 2, rest_s: 0.5, light_drift_per_s: 0.01, ..LoadCycle::default() };
+/// let scene = PressScene::new(PressOptions {
+///     camera,
+///     ..PressOptions::default()
+/// })?;
+/// let cycle = LoadCycle {
+///     cycles: 2,
+///     rest_s: 0.5,
+///     light_drift_per_s: 0.01,
+///     ..LoadCycle::default()
+/// };
 /// let stream = scene.stream(cycle)?;
 /// assert_eq!(stream.len(), 200, "2.5 s at 80 frames per second");
 /// let forces: Vec<_> = stream.map(|f| f.truth.contact.force_n).collect();
-/// assert!(forces[..40].iter().all(|&n| n == 0.0) && (forces[80] - 1.2).abs() < 1e-12, "half a period after the rest");
+/// assert!(
+///     forces[..40].iter().all(|&n| n == 0.0) && (forces[80] - 1.2).abs() < 1e-12,
+///     "half a period after the rest"
+/// );
 /// # Ok::<(), tactile_simulate::SimulateError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -67,7 +78,12 @@ impl Default for LoadCycle {
 /// let cycle = LoadCycle { rest_s: 0.0, frame_rate_hz: 8.0, ..LoadCycle::default() };
 /// let frames: Vec<_> = scene.stream(cycle)?.collect();
 /// assert_eq!((frames[4].time_s, frames[4].frame.dim()), (0.5, (65, 87)));
-/// assert!(frames.windows(2).take(4).all(|f| f[0].truth.contact.force_n < f[1].truth.contact.force_n));
+/// assert!(
+///     frames
+///         .windows(2)
+///         .take(4)
+///         .all(|f| f[0].truth.contact.force_n < f[1].truth.contact.force_n)
+/// );
 /// # Ok::<(), tactile_simulate::SimulateError>(())
 /// ```
 #[derive(Debug, Clone)]

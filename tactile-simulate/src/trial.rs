@@ -1,7 +1,7 @@
 //! A simulated press, measured blindly and laid beside its truth.
 
 use crate::{
-    CalibrationRun, ContactModel, PressOptions, PressScene, PressSimulation, SimulateError,
+    CalibrationRun, Camera, ContactModel, PressOptions, PressScene, PressSimulation, SimulateError,
     WaveguideLayer,
 };
 use tactile_imaging::elasticity::contact::{Layer, Waveguide};
@@ -13,10 +13,8 @@ use tactile_imaging::{Object, Pipeline, Press};
 /// compare with.
 ///
 /// ```
-/// use tactile_simulate::{Trial, CalibrationRun, Camera, PressOptions};
-/// // A coarse camera: 174 × 130 pixels on 30 mm.
-/// let camera = Camera::default().coarser(8);
-/// let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationRun::default())?;
+/// use tactile_simulate::Trial;
+/// let trial = Trial::coarser(8)?;
 /// let pipeline = trial.pipeline()?;
 /// let modulus = trial.press(&pipeline)?.modulus()?;
 /// assert!((modulus.youngs_modulus_pa / trial.simulation.youngs_modulus_pa - 1.0).abs() < 0.0538);
@@ -51,9 +49,22 @@ impl Trial {
         })
     }
 
+    /// The default press on a camera of every `factor`-th pixel: quick, for examples and tests. The
+    /// paper's camera on 30 mm has 174 × 130 pixels at a factor of 8.
+    ///
+    /// # Errors
+    /// [`SimulateError`] for a factor that leaves no pixels.
+    pub fn coarser(factor: usize) -> Result<Self, SimulateError> {
+        let options = PressOptions {
+            camera: Camera::default().coarser(factor),
+            ..PressOptions::default()
+        };
+        Self::new(options, &CalibrationRun::default())
+    }
+
     /// The default pipeline for the simulated sensor: it knows the calibration, the pixel size, the
-    /// ball's radius and the waveguide, all exactly, and nothing of the truth. Where the scene obeys a closed
-    /// form (Hertz, Tatara), the estimator is Hertz's with the layers in series
+    /// ball's radius and the waveguide, all exactly, and nothing of the truth. Where the scene
+    /// obeys a closed form (Hertz, Tatara), the estimator is Hertz's with the layers in series
     /// ([`EstimatorChoice::Sphere`]), whose law the truth shares. Where its contacts come from
     /// elsewhere, the default.
     ///

@@ -47,7 +47,10 @@ use std::f64::consts::{FRAC_PI_2, PI};
 /// let scene = UniaxialScene::new(UniaxialOptions { camera, ..UniaxialOptions::default() })?;
 /// let [first, second] = [scene.states()[0], scene.states()[1]];
 /// // Counted from the first state, both are less by it, over λ₁².
-/// let (stress, strain) = (second.second_piola_zz_pa - first.second_piola_zz_pa, second.strain_zz - first.strain_zz);
+/// let (stress, strain) = (
+///     second.second_piola_zz_pa - first.second_piola_zz_pa,
+///     second.strain_zz - first.strain_zz,
+/// );
 /// assert!((stress / strain / 103e3 - 1.0).abs() < 1e-12);
 /// let frame = scene.frame(1, 0);
 /// assert_eq!(frame.dim(), (260, 348));
@@ -65,8 +68,8 @@ impl UniaxialScene {
     /// Checks `options`, solves every state and places the pattern.
     ///
     /// # Errors
-    /// [`SimulateError::OutOfRange`], [`SimulateError::TooFew`], or [`SimulateError::Overload`] for a force beyond
-    /// E A₀/(3√3).
+    /// [`SimulateError::OutOfRange`], [`SimulateError::TooFew`], or [`SimulateError::Overload`] for
+    /// a force beyond E A₀/(3√3).
     pub fn new(options: UniaxialOptions) -> Result<Self, SimulateError> {
         options.validate()?;
         let area0 = options.outline.area_m2(options.face_m);
@@ -133,9 +136,13 @@ impl UniaxialScene {
     /// let camera = Camera::default().coarser(16).ideal();
     /// let scene = UniaxialScene::new(UniaxialOptions { camera, ..UniaxialOptions::default() })?;
     /// let (light, dark) = (scene.expected_frame(1), scene.reference(0).mapv(f64::from));
-    /// let seen_n = (&light - &dark).sum() / scene.grey_per_pascal() * camera.pixel_size_m.iter().product::<f64>();
+    /// let seen_n = (&light - &dark).sum() / scene.grey_per_pascal()
+    ///     * camera.pixel_size_m.iter().product::<f64>();
     /// assert!((seen_n - scene.options().forces_n[1]).abs() < 1e-9);
-    /// assert!((scene.pressure_pa(1).sum() * camera.pixel_size_m.iter().product::<f64>() - 0.7).abs() < 1e-9);
+    /// assert!(
+    ///     (scene.pressure_pa(1).sum() * camera.pixel_size_m.iter().product::<f64>() - 0.7).abs()
+    ///         < 1e-9
+    /// );
     /// # Ok::<(), tactile_simulate::SimulateError>(())
     /// ```
     ///
@@ -226,7 +233,10 @@ impl UniaxialScene {
     /// let moved: Vec<_> = points.iter().map(|p| scene.deform(2, p)).collect();
     /// assert!((moved[5].z / points[5].z - state.stretch_z).abs() < 1e-12);
     /// let width = |p: &[nalgebra::Point3<f64>]| p[3].x - p[0].x;
-    /// assert!((width(&moved) / width(&points) - state.stretch_lateral).abs() < 1e-12, "it spreads");
+    /// assert!(
+    ///     (width(&moved) / width(&points) - state.stretch_lateral).abs() < 1e-12,
+    ///     "it spreads"
+    /// );
     /// # Ok::<(), tactile_simulate::SimulateError>(())
     /// ```
     ///
@@ -451,7 +461,12 @@ impl UniaxialState {
 /// ```
 /// use tactile_simulate::{Camera, FaceOutline, UniaxialOptions, UniaxialScene};
 /// let camera = Camera::default().coarser(16);
-/// let disc = UniaxialOptions { outline: FaceOutline::Ellipse, face_m: [12e-3; 2], camera, ..UniaxialOptions::default() };
+/// let disc = UniaxialOptions {
+///     outline: FaceOutline::Ellipse,
+///     face_m: [12e-3; 2],
+///     camera,
+///     ..UniaxialOptions::default()
+/// };
 /// let scene = UniaxialScene::new(disc)?;
 /// let state = scene.states()[0];
 /// let undeformed = state.area_m2 / state.stretch_lateral.powi(2);
@@ -494,8 +509,16 @@ impl FaceOutline {
 /// ```
 /// use tactile_simulate::{Camera, SurfacePattern, UniaxialOptions, UniaxialScene};
 /// let camera = Camera::default().coarser(16);
-/// let pattern = SurfacePattern { bumps: [3, 3], bump_height_m: [0.4e-3, 0.4e-3], ..SurfacePattern::default() };
-/// let scene = UniaxialScene::new(UniaxialOptions { camera, pattern, ..UniaxialOptions::default() })?;
+/// let pattern = SurfacePattern {
+///     bumps: [3, 3],
+///     bump_height_m: [0.4e-3, 0.4e-3],
+///     ..SurfacePattern::default()
+/// };
+/// let scene = UniaxialScene::new(UniaxialOptions {
+///     camera,
+///     pattern,
+///     ..UniaxialOptions::default()
+/// })?;
 /// let heights = scene.material_points(60, 60).into_iter().map(|p| p.z);
 /// let (low, high) = heights.fold((f64::MAX, 0.0_f64), |(l, h), z| (l.min(z), h.max(z)));
 /// assert!(low == 0.5e-3 && high > 0.89e-3 && high <= 0.9e-3, "0.4 mm bumps on a 0.5 mm base");

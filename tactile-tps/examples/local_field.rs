@@ -101,7 +101,8 @@ fn study<const D: usize>(
         rows.filter(|&(&k, &w)| k == kept && w == wrong).count()
     };
     println!(
-        "{D}-D {} noise {noise:<4} wrong {wrong:<4}: error {:.1e}, within 1.96: {:.1} %, noise found {:.2}, wrong kept {} of {}, right lost {} of {}, {seconds:.2} s",
+        "{D}-D {} noise {noise:<4} wrong {wrong:<4}: error {:.1e}, within 1.96: {:.1} %, noise \
+         found {:.2}, wrong kept {} of {}, right lost {} of {}, {seconds:.2} s",
         if steep { "steep " } else { "smooth" },
         (squares / all as f64).sqrt(),
         100.0 * within as f64 / all as f64,

@@ -80,8 +80,8 @@ fn intervals_from_few_pairs_hold() {
         let held = held.iter().map(|&held| held as f64 / DRAWS as f64);
         for (share, of) in held.zip(["0.7 N", "1.2 N", "the modulus"]) {
             println!("{count} pairs, noise of the reading {of_reading}, {of}: {share}");
-            // 92 to 98 %, and what 800 draws leave open. Errors of few degrees of freedom beside known
-            // ones make the modulus' interval a little too wide.
+            // 92 to 98 %, and what 800 draws leave open. Errors of few degrees of freedom beside
+            // known ones make the modulus' interval a little too wide.
             let most = if of == "the modulus" { 0.995 } else { 0.985 };
             assert!(
                 (0.91..=most).contains(&share),

@@ -73,7 +73,8 @@ fn the_ball_is_found_and_its_depth_is_right() {
     // publish 0.0462 mm.
     let error_m = stated_cap_error_m(surface);
     println!(
-        "mean absolute depth error {:.4} mm against the stated cap, {:.4} mm against the fitted ball",
+        "mean absolute depth error {:.4} mm against the stated cap, {:.4} mm against the fitted \
+         ball",
         error_m * 1e3,
         ball.mean_absolute_error_m * 1e3
     );

@@ -36,7 +36,8 @@ fn stretch(k: usize) {
         .sum();
     let local = (squares / found.strains.len() as f64).sqrt();
     println!(
-        "0 -> {k}: {} pairs, mean off by xx {:+.1e}, others {:.1e}, standard errors {:.1e}, local rms {local:.1e}",
+        "0 -> {k}: {} pairs, mean off by xx {:+.1e}, others {:.1e}, standard errors {:.1e}, local \
+         rms {local:.1e}",
         found.pairs.len(),
         gap[(0, 0)],
         (gap - Matrix3::from_diagonal(&[gap[(0, 0)], 0.0, 0.0].into())).amax(),
@@ -134,7 +135,8 @@ fn thousands_of_pairs_are_fitted_patch_by_patch() {
         if i != j {
             continue; // the first of them is the outermost corner
         }
-        // The field has no noise. What the pairs do not resolve is in the errors, mostly at corners.
+        // The field has no noise. What the pairs do not resolve is in the errors, mostly at
+        // corners.
         let limit = 1e-4 + 6.0 * found.standard_errors[k].amax();
         let off = (found.strains[k] - exact(&before[i])).amax();
         assert!(off < limit && limit < 0.05, "{k}: {off}, {limit}");

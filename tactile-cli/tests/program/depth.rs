@@ -27,7 +27,8 @@ fn the_grey_and_the_zero_are_those_of_the_table() {
     put("table.csv", table.as_bytes());
     let depth_mm = |options: &str| {
         let call = format!(
-            "depth --reference reference.ppm --table table.csv --pixel-um 100 pressed.ppm --json {options}"
+            "depth --reference reference.ppm --table table.csv --pixel-um 100 pressed.ppm --json \
+             {options}"
         );
         let output = run(folder.path(), &words(&call));
         let value: Value = serde_json::from_slice(&output.stdout)

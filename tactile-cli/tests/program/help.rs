@@ -79,7 +79,8 @@ const OTHER_ANSWERS: [&str; 5] = [
     "calibrate examples/data/press/calibration.csv --there-and-back",
     "stream examples/data/press/scene.toml --allowed-late 100",
     "indent examples/data/curve.csv --shape cone --half-angle 70.3",
-    "depth --reference examples/data/dark_reference.pgm --table examples/data/depth_table.csv --pixel-um 100 examples/data/dark_frame.pgm --ball-radius-mm 4",
+    "depth --reference examples/data/dark_reference.pgm --table examples/data/depth_table.csv \
+     --pixel-um 100 examples/data/dark_frame.pgm --ball-radius-mm 4",
 ];
 
 #[test]

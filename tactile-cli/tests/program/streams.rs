@@ -8,7 +8,8 @@ use std::process::{Output, Stdio};
 use tactile_imaging::io::{Grey, read_grey_image};
 
 const SCENE: &str = "examples/data/press/scene.toml";
-const CALIBRATED: &str = "--reference examples/data/press/reference.png --pairs examples/data/press/calibration.csv --pixel-um 40 --json";
+const CALIBRATED: &str = "--reference examples/data/press/reference.png --pairs \
+                          examples/data/press/calibration.csv --pixel-um 40 --json";
 
 /// Runs the program with these bytes on its standard input.
 fn piped(folder: &Path, call: &str, bytes: &[u8]) -> Output {
@@ -87,7 +88,8 @@ fn a_broken_pipe_keeps_what_was_measured() {
         let errors = text(&output.stderr);
         assert_eq!(output.status.code(), Some(1), "{call}: {errors}");
         let first = errors.lines().next().unwrap_or_default();
-        let says = "tactile: standard input, frame 2: expected 22620 bytes of samples, found the end after 22611";
+        let says = "tactile: standard input, frame 2: expected 22620 bytes of samples, found the \
+                    end after 22611";
         assert_eq!(first, says, "{call}");
         let value = value(&output);
         let kept = value.pointer(frames).and_then(Value::as_array).unwrap();

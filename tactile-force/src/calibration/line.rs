@@ -226,7 +226,10 @@ pub struct Hysteresis {
 /// assert_eq!((report.pairs, report.degrees_of_freedom), (4, 2));
 /// // Four pairs: the 95 % interval of the slope by Student's t with two degrees of freedom.
 /// let interval = report.parameters[1].interval_95();
-/// assert!(interval.contains(5e-6) && interval.upper.unwrap() > 5e-6 + 2.0 * report.parameters[1].standard_error);
+/// assert!(
+///     interval.contains(5e-6)
+///         && interval.upper.unwrap() > 5e-6 + 2.0 * report.parameters[1].standard_error
+/// );
 /// // The report of a curve of one's own, with one parameter.
 /// let own = CalibrationReport::new(&pairs, |v| 4.98e-6 * v, 1);
 /// assert!(own.residual_sd_n < 0.02 && own.degrees_of_freedom == 3);

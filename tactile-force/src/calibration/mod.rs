@@ -228,7 +228,8 @@ pub trait StressCalibration: Send + Sync {
 /// }
 ///
 /// let histogram = GreyHistogram::from_differences([50.0; 200].into_iter(), 4e-10);
-/// let reading = Proportional { pa_per_grey: 100.0 }.read(&histogram, &DifferenceNoise::white(2.0))?;
+/// let reading =
+///     Proportional { pa_per_grey: 100.0 }.read(&histogram, &DifferenceNoise::white(2.0))?;
 /// assert!((reading.force_n.value - 4e-4).abs() < 1e-15);
 /// // 200 pixels with √2 grey levels of noise each.
 /// assert!((reading.noise_n - 100.0 * 4e-10 * 400_f64.sqrt()).abs() < 1e-15);
@@ -382,7 +383,9 @@ pub enum Branch {
 /// use tactile_force::CalibrationPair;
 ///
 /// // A gauge's readings up and down again.
-/// let mut pairs = [(0.0, 0.0), (1.02e5, 0.5), (2.01e5, 1.0)].map(|(v, f)| CalibrationPair::loading(v, f)).to_vec();
+/// let mut pairs = [(0.0, 0.0), (1.02e5, 0.5), (2.01e5, 1.0)]
+///     .map(|(v, f)| CalibrationPair::loading(v, f))
+///     .to_vec();
 /// pairs.push(CalibrationPair::unloading(0.99e5, 0.5));
 /// assert_eq!(pairs[3].force_n, 0.5);
 /// ```
@@ -428,7 +431,9 @@ impl CalibrationPair {
 /// let mut pairs: Vec<_> = (0..10).map(pair).collect();
 /// pairs[7].force_n = 40.0;
 /// let slope = |robustness| {
-///     let options = CalibrationOptions::default().with_constant_noise().with_robustness(robustness);
+///     let options = CalibrationOptions::default()
+///         .with_constant_noise()
+///         .with_robustness(robustness);
 ///     LinearCalibration::fit(&pairs, &options).map(|line| line.sensitivity_n(0.0))
 /// };
 /// assert!((slope(Robustness::None)? - 2.0).abs() > 0.5);

@@ -197,38 +197,47 @@ impl fmt::Display for ShapeProblem {
         match self {
             Self::NoEdge { edge_ratio } => write!(
                 f,
-                "the pressure falls off towards the outline ({edge_ratio:.2} of that further inside), as under a ball: give shape = \"sphere\" with its radius_m"
+                "the pressure falls off towards the outline ({edge_ratio:.2} of that further \
+                 inside), as under a ball: give shape = \"sphere\" with its radius_m"
             ),
             Self::RaisedEdge { edge_ratio } => write!(
                 f,
-                "the pressure rises towards the outline ({edge_ratio:.2} of that further inside), as under a stiff punch or a face that sticks: give shape = \"flat_punch\", or press with less friction"
+                "the pressure rises towards the outline ({edge_ratio:.2} of that further inside), \
+                 as under a stiff punch or a face that sticks: give shape = \"flat_punch\", or \
+                 press with less friction"
             ),
             Self::Cut => write!(
                 f,
-                "the frame's edge cuts the contact: move the object, or give its shape and size if it is a ball"
+                "the frame's edge cuts the contact: move the object, or give its shape and size \
+                 if it is a ball"
             ),
             Self::Several { others } => write!(
                 f,
-                "there are {} contacts: press one face at a time, or give the shape if the others are not the object's",
+                "there are {} contacts: press one face at a time, or give the shape if the others \
+                 are not the object's",
                 others + 1
             ),
             Self::TooSmall => write!(
                 f,
-                "the contact is too small for its outline to be told from its inside: it takes some 20 pixels across"
+                "the contact is too small for its outline to be told from its inside: it takes \
+                 some 20 pixels across"
             ),
             Self::Grows { growth } => write!(
                 f,
-                "the contact grows by {:.0} % since the first load, more than a squeezed face: a round object; give its shape",
+                "the contact grows by {:.0} % since the first load, more than a squeezed face: a \
+                 round object; give its shape",
                 100.0 * growth
             ),
             Self::OutlineChanges { change } => write!(
                 f,
-                "the outline does not keep its shape ({:+.1} % in second moment since the first load): no uniaxial load; give the object's shape",
+                "the outline does not keep its shape ({:+.1} % in second moment since the first \
+                 load): no uniaxial load; give the object's shape",
                 100.0 * change
             ),
             Self::PressureChanges { change } => write!(
                 f,
-                "the pressure does not keep its distribution ({:+.1} % in second moment since the first load): friction, tilt or an object of another shape",
+                "the pressure does not keep its distribution ({:+.1} % in second moment since the \
+                 first load): friction, tilt or an object of another shape",
                 100.0 * change
             ),
         }

@@ -16,7 +16,10 @@ use crate::region::Region;
 /// use tactile_force::{ForceMeter, ForceOptions, HertzFitOptions};
 ///
 /// // A lens whose blur is known, over a background that is not.
-/// let hertz = HertzFitOptions::default().with_blur_px(1.2)?.with_fitted_background().with_max_iterations(20)?;
+/// let hertz = HertzFitOptions::default()
+///     .with_blur_px(1.2)?
+///     .with_fitted_background()
+///     .with_max_iterations(20)?;
 /// assert!(ForceMeter::new([20e-6; 2], &ForceOptions::default().with_hertz(hertz)).is_ok());
 /// # Ok::<(), tactile_force::ForceError>(())
 /// ```
@@ -106,8 +109,13 @@ mod read {
 ///     let frame = Array2::from_shape_fn((120, 120), |(y, x)| {
 ///         12 + level((x as f64 - 60.2).hypot(y as f64 - 59.7) / 30.0).round() as u8
 ///     });
-///     let m: ForceMeasurement =
-///         measure_force(frame.view(), at_rest.view(), [20e-6; 2], &calibration, &Default::default())?;
+///     let m: ForceMeasurement = measure_force(
+///         frame.view(),
+///         at_rest.view(),
+///         [20e-6; 2],
+///         &calibration,
+///         &Default::default(),
+///     )?;
 ///     Ok(m.profile.map(|p| p.shape))
 /// };
 /// assert_eq!(shape(&|r| 150.0 * (1.0 - r * r).max(0.0).sqrt())?, Some(ProfileShape::Hertz));
@@ -141,7 +149,13 @@ pub enum ProfileShape {
 ///     12 + (150.0 * (1.0 - r * r).max(0.0).sqrt()).round() as u8
 /// });
 /// let at_rest = Array2::from_elem((120, 120), 12);
-/// let measured = measure_force(frame.view(), at_rest.view(), [20e-6; 2], &calibration, &Default::default())?;
+/// let measured = measure_force(
+///     frame.view(),
+///     at_rest.view(),
+///     [20e-6; 2],
+///     &calibration,
+///     &Default::default(),
+/// )?;
 /// let fit: HertzFit = measured.profile.expect("a profile");
 /// assert!((fit.radius_px.value - 30.0).abs() < 0.02);
 /// assert!((fit.centre_px[0].value - 60.3).abs() < 0.01 && (fit.peak.value - 150.0).abs() < 0.3);

@@ -71,7 +71,8 @@ impl Tally {
     pub(crate) fn print(&mut self) {
         for (k, name) in ["D", "d", "E1"].into_iter().enumerate() {
             println!(
-                "{name:>3}: |error| / bound: median {:.2}, 95th centile {:.2} ({}); 95 % intervals hold {:.1} % ({}); wide and shallow: median error {:.1} % ({})",
+                "{name:>3}: |error| / bound: median {:.2}, 95th centile {:.2} ({}); 95 % \
+                 intervals hold {:.1} % ({}); wide and shallow: median error {:.1} % ({})",
                 quantile(&mut self.ratios[k], 0.5),
                 quantile(&mut self.ratios[k], 0.95),
                 self.ratios[k].len(),
@@ -82,7 +83,8 @@ impl Tally {
             );
         }
         println!(
-            "found {} of {} with a bound on D below 20 %; not told {} of {} with a bound above 30 %; false alarms {} of {}",
+            "found {} of {} with a bound on D below 20 %; not told {} of {} with a bound above 30 \
+             %; false alarms {} of {}",
             self.findable_found,
             self.findable,
             self.left_open,

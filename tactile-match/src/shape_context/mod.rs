@@ -2,11 +2,11 @@
 //!
 //! The context of a point is a histogram of the vectors to all other points, in bins of
 //! log-distance and direction
-//! [Belongie, Malik & Puzicha, *Shape matching and object recognition using shape contexts*, PAMI 24 (2002)]; two
-//! contexts are compared by the χ² distance `½ Σ (g − h)²/(g + h)` of the histograms over their
-//! mean count. In the plane directions are twelve sectors, in space the 26 neighbours of a cube's
-//! centre. Points between two sectors of the plane count for both in proportion, so that a small
-//! turn changes the histogram a little.
+//! [Belongie, Malik & Puzicha, *Shape matching and object recognition using shape contexts*, PAMI
+//! 24 (2002)]; two contexts are compared by the χ² distance `½ Σ (g − h)²/(g + h)` of the
+//! histograms over their mean count. In the plane directions are twelve sectors, in space the 26
+//! neighbours of a cube's centre. Points between two sectors of the plane count for both in
+//! proportion, so that a small turn changes the histogram a little.
 
 use crate::vectorised;
 use crate::{MatchError, error};

@@ -10,8 +10,8 @@ use nalgebra::{Matrix4, Matrix4x3, RowVector4, SVector, Vector3};
 // An annealing run ends at a thousandth of the radius, since the factor of its prior leaves out as
 // much. Pairs are decided there, and what is left is either the rounding of clean data or noise.
 // With hard pairs `zᵢ` the model is a full Gaussian process with free affine part,
-// `cov z = τ²(K + λ 1)`. Its restricted likelihood (Patterson & Thompson, Biometrika 58, 1971), with
-// τ profiled out, is that of λ and of the shape of K alone:
+// `cov z = τ²(K + λ 1)`. Its restricted likelihood (Patterson & Thompson, Biometrika 58, 1971),
+// with τ profiled out, is that of λ and of the shape of K alone:
 //
 // `−ln p = ½ [M ln S + D (ln det C + ln det PᵀC⁻¹P)]`, `C = K + λ 1`, `S = zᵀ B z`,
 // `B = C⁻¹ − C⁻¹P (PᵀC⁻¹P)⁻¹ PᵀC⁻¹`, `M = D (n − D − 1)`.

@@ -24,7 +24,8 @@ use crate::{Domain, PixelScalar, SfsError, Surface, SurfaceWorkspace};
 /// use tactile_sfs::{Domain, FrankotChellappa, SlopeIntegrator};
 /// let wave = core::f64::consts::TAU / 32.0;
 /// let p = Array2::from_shape_fn((16, 32), |(_, column)| wave * (wave * column as f64).cos());
-/// let surface = FrankotChellappa.integrate(p.view(), Array2::zeros((16, 32)).view(), &Domain::default())?;
+/// let surface =
+///     FrankotChellappa.integrate(p.view(), Array2::zeros((16, 32)).view(), &Domain::default())?;
 /// assert!((surface.heights[[3, 8]] - 1.0).abs() < 1e-12); // sin at a quarter of the period
 /// # Ok::<(), tactile_sfs::SfsError>(())
 /// ```

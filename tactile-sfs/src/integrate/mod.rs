@@ -53,12 +53,20 @@ pub trait SlopeIntegrator<T: PixelScalar> {
     ///
     /// ```
     /// use ndarray::Array2;
-    /// use tactile_sfs::{Domain, FrankotChellappa, CosinePoisson, SlopeIntegrator, Surface, SurfaceWorkspace};
+    /// use tactile_sfs::{
+    ///     CosinePoisson, Domain, FrankotChellappa, SlopeIntegrator, Surface, SurfaceWorkspace,
+    /// };
     /// let (mut workspace, mut surface) = (SurfaceWorkspace::default(), Surface::default());
     /// let methods: [&dyn SlopeIntegrator<f64>; 2] = [&CosinePoisson, &FrankotChellappa];
     /// let flat = Array2::zeros((16, 16));
     /// for method in methods {
-    ///     method.integrate_with(&mut workspace, flat.view(), flat.view(), &Domain::default(), &mut surface)?;
+    ///     method.integrate_with(
+    ///         &mut workspace,
+    ///         flat.view(),
+    ///         flat.view(),
+    ///         &Domain::default(),
+    ///         &mut surface,
+    ///     )?;
     ///     assert!(surface.heights.iter().all(|z| z.abs() < 1e-12));
     /// }
     /// # Ok::<(), tactile_sfs::SfsError>(())

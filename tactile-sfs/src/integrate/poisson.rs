@@ -31,7 +31,8 @@ use crate::{BoundingBox, Domain, PixelScalar, SfsError, Surface, SurfaceWorkspac
 /// use ndarray::Array2;
 /// use tactile_sfs::{CosinePoisson, Domain, SlopeIntegrator};
 /// let p = Array2::from_shape_fn((8, 9), |(_, column)| 2.0 * column as f64);
-/// let surface = CosinePoisson.integrate(p.view(), Array2::zeros((8, 9)).view(), &Domain::default())?;
+/// let surface =
+///     CosinePoisson.integrate(p.view(), Array2::zeros((8, 9)).view(), &Domain::default())?;
 /// // z = x²: rises are exact for slopes up to cubic ones.
 /// assert!((surface.heights[[3, 8]] - surface.heights[[3, 0]] - 64.0).abs() < 1e-10);
 /// # Ok::<(), tactile_sfs::SfsError>(())

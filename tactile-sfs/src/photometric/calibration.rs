@@ -109,9 +109,9 @@ impl PhotometricStereo {
     /// tenth of a pixel. Without drawn circles the start is the patch of large colour differences.
     ///
     /// A circle drawn by hand may be off by some pixels. The median offset between drawn and found
-    /// circles is the user's convention of where a contact ends, and it is kept. Beyond it the found
-    /// circles are used. A drawn circle is wrong if it misses by more than three times the median
-    /// misfit and more than a tenth of the ball's radius.
+    /// circles is the user's convention of where a contact ends, and it is kept. Beyond it the
+    /// found circles are used. A drawn circle is wrong if it misses by more than three times
+    /// the median misfit and more than a tenth of the ball's radius.
     ///
     /// Errors are those of presses left out in turn: the quantile of 68.3 % of the differences to
     /// the sphere through the circle, drawn where it is not wrong. They include the errors of the

@@ -38,8 +38,8 @@ pub fn contact(normals: &[Array2<f32>; 2]) -> Array2<bool> {
     let Some(patches) = filled(&opened) else {
         return mask;
     };
-    // A blur of the patches and half of it straighten the rim. A blur of deviation σ takes σ²/2a off
-    // the radius a of a circle: with σ² of 8 px² a tenth of a pixel at 40 px.
+    // A blur of the patches and half of it straighten the rim. A blur of deviation σ takes σ²/2a
+    // off the radius a of a circle: with σ² of 8 px² a tenth of a pixel at 40 px.
     let smooth = blurred(&patches.mapv(|inside| f32::from(u8::from(inside))), 2);
     for ((row, column), inside) in mask.indexed_iter_mut() {
         *inside = between(&smooth, row, column) > 0.5;

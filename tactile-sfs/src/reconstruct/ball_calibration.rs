@@ -22,8 +22,18 @@ use tactile_core::Requirement;
 /// };
 /// let image = Array2::from_shape_fn((61, 61), |(r, c)| (1e5 * depth(r, c)).max(0.0));
 /// let domain = Domain::new([1e-4, 1e-4])?;
-/// let BallCalibration { contact_radius_m, indentation_m, .. } =
-///     DepthTable::from_ball(Frame::Real(image.view()), Signal::Intensity, &domain, 4e-3, 1.0, None)?;
+/// let BallCalibration {
+///     contact_radius_m,
+///     indentation_m,
+///     ..
+/// } = DepthTable::from_ball(
+///     Frame::Real(image.view()),
+///     Signal::Intensity,
+///     &domain,
+///     4e-3,
+///     1.0,
+///     None,
+/// )?;
 /// assert!((contact_radius_m - 2e-3).abs() < 5e-5 && (indentation_m - 0.536e-3).abs() < 3e-5);
 /// # Ok::<(), tactile_sfs::SfsError>(())
 /// ```
@@ -60,7 +70,14 @@ impl<T: PixelScalar> DepthTable<T> {
     /// let depth = |r, c| (1600.0 - square(r, c)).sqrt() - 1200.0_f64.sqrt();
     /// let image = Array2::from_shape_fn((61, 61), |(r, c)| 20.0 * depth(r, c).max(0.0));
     /// let (frame, circle) = (Frame::Real(image.view()), ([30.0, 30.0], 20.0));
-    /// let found = DepthTable::from_ball(frame, Signal::Intensity, &Domain::default(), 40.0, 1.0, Some(circle))?;
+    /// let found = DepthTable::from_ball(
+    ///     frame,
+    ///     Signal::Intensity,
+    ///     &Domain::default(),
+    ///     40.0,
+    ///     1.0,
+    ///     Some(circle),
+    /// )?;
     /// assert!((found.table.depth(60.0).0 - 3.0).abs() < 0.05 && found.mean_residual_m < 0.05);
     /// # Ok::<(), tactile_sfs::SfsError>(())
     /// ```

@@ -75,7 +75,10 @@ impl<T: PixelScalar> Signal<T> {
 /// use ndarray::array;
 /// use tactile_sfs::{DepthTable, Domain, SurfaceReconstruction};
 /// let table = DepthTable::new(&[(0.0, 0.0), (10.0, 1e-3), (20.0, 1.5e-3)])?;
-/// let surface = table.reconstruct(array![[0.0, 5.0, 15.0]].view().into(), &Domain::new([1e-4, 1e-4])?)?;
+/// let surface = table.reconstruct(
+///     array![[0.0, 5.0, 15.0]].view().into(),
+///     &Domain::new([1e-4, 1e-4])?,
+/// )?;
 /// assert_eq!(surface.heights, array![[0.0, 0.5e-3, 1.25e-3]]);
 /// # Ok::<(), tactile_sfs::SfsError>(())
 /// ```
@@ -128,7 +131,12 @@ impl<T: PixelScalar> DepthTable<T> {
     /// let table = DepthTable::new(&[(0.0, 0.0), (10.0, 1e-3)])?
     ///     .with_signal(Signal::Brightening(dark))
     ///     .with_contact_threshold(2.0)?; // the camera's noise
-    /// let depth = table.reconstruct(array![[21.5, 25.0]].view().into(), &Domain::new([1e-4, 1e-4])?)?.heights;
+    /// let depth = table
+    ///     .reconstruct(
+    ///         array![[21.5, 25.0]].view().into(),
+    ///         &Domain::new([1e-4, 1e-4])?,
+    ///     )?
+    ///     .heights;
     /// assert_eq!(depth, array![[0.0, 0.5e-3]]); // 1.5 above the reference is no contact yet
     /// # Ok::<(), tactile_sfs::SfsError>(())
     /// ```

@@ -36,7 +36,10 @@ use crate::{
 /// let mask = Array2::from_shape_fn((size, size), |(r, c)| distance(r, c) < radius);
 /// let image = Array2::from_elem((size, size), 0.5_f64.sqrt());
 /// let method = Eikonal::new(Lighting::default()).with_boundary(BoundaryCondition::Height(0.0))?;
-/// let surface = method.reconstruct(image.view().into(), &Domain::default().with_mask(mask.view()))?;
+/// let surface = method.reconstruct(
+///     image.view().into(),
+///     &Domain::default().with_mask(mask.view()),
+/// )?;
 /// assert!((surface.heights[[20, 20]] - radius).abs() < 1.5);
 /// # Ok::<(), tactile_sfs::SfsError>(())
 /// ```
@@ -56,7 +59,9 @@ pub trait SurfaceReconstruction<T: PixelScalar> {
     ///
     /// ```
     /// use ndarray::array;
-    /// use tactile_sfs::{DepthTable, Domain, Frame, Surface, SurfaceReconstruction, SurfaceWorkspace};
+    /// use tactile_sfs::{
+    ///     DepthTable, Domain, Frame, Surface, SurfaceReconstruction, SurfaceWorkspace,
+    /// };
     /// let table = DepthTable::new(&[(0.0, 0.0), (200.0, 1e-3)])?;
     /// let (image, domain) = (array![[0_u8, 50, 100]], Domain::new([1e-4, 1e-4])?);
     /// let once = table.reconstruct(image.view().into(), &domain)?;

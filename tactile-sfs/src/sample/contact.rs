@@ -43,9 +43,15 @@ const NEIGHBOURS: [(isize, isize, f64); 8] = [
 /// // Two balls of 12.0 and 14.4 pixels: the second is the first, a fifth larger.
 /// let points = |radius: f64| {
 ///     let z = Array2::from_shape_fn((40, 40), |(r, c)| {
-///         (radius * radius - (r as f64 - 19.7).powi(2) - (c as f64 - 20.2).powi(2)).max(0.0).sqrt()
+///         (radius * radius - (r as f64 - 19.7).powi(2) - (c as f64 - 20.2).powi(2))
+///             .max(0.0)
+///             .sqrt()
 ///     });
-///     ContactSampler.sample(z.view(), &Domain::default().with_mask(z.mapv(|z| z > 0.0).view()), 50)
+///     ContactSampler.sample(
+///         z.view(),
+///         &Domain::default().with_mask(z.mapv(|z| z > 0.0).view()),
+///         50,
+///     )
 /// };
 /// let centre = nalgebra::Vector3::new(20.2, 19.7, 0.0);
 /// let farthest = points(12.0)?.iter().zip(points(14.4)?).map(|(small, large)| {

@@ -63,9 +63,19 @@ pub trait ControlPointSampler<T: PixelScalar> {
     /// ```
     /// use ndarray::Array2;
     /// use tactile_sfs::{ControlPointSampler, Domain, Random, SurfaceWorkspace};
-    /// let (z, mut workspace, mut points) = (Array2::<f64>::zeros((9, 9)), SurfaceWorkspace::default(), Vec::new());
+    /// let (z, mut workspace, mut points) = (
+    ///     Array2::<f64>::zeros((9, 9)),
+    ///     SurfaceWorkspace::default(),
+    ///     Vec::new(),
+    /// );
     /// for count in [20, 5] {
-    ///     Random { seed: 1 }.sample_with(&mut workspace, z.view(), &Domain::default(), count, &mut points)?;
+    ///     Random { seed: 1 }.sample_with(
+    ///         &mut workspace,
+    ///         z.view(),
+    ///         &Domain::default(),
+    ///         count,
+    ///         &mut points,
+    ///     )?;
     ///     assert_eq!(points.len(), count);
     /// }
     /// # Ok::<(), tactile_sfs::SfsError>(())
@@ -237,7 +247,10 @@ fn at_centroids<T: PixelScalar>(
 /// use ndarray::Array2;
 /// use tactile_sfs::{ControlPointSampler, CurvatureAdaptive, Domain};
 /// // Flat on the left, wavy on the right.
-/// let z = Array2::from_shape_fn((60, 80), |(_, c)| if c < 40 { 0.0 } else { (c as f64 * 0.5).sin() });
+/// let z = Array2::from_shape_fn(
+///     (60, 80),
+///     |(_, c)| if c < 40 { 0.0 } else { (c as f64 * 0.5).sin() },
+/// );
 /// let points = CurvatureAdaptive::new(4.0)?.sample(z.view(), &Domain::default(), 60)?;
 /// let right = points.iter().filter(|p| p.x >= 40.0).count();
 /// assert!(right > 40);

@@ -15,8 +15,8 @@ use patch::Patch;
 ///
 /// The sources are cut into blocks of two dozen neighbours. Each block has a patch: the 70 pairs in
 /// the plane, 110 in space, that lie next to it. There the displacement is an affine field plus a
-/// Gaussian process (kriging), `cov zᵢ zⱼ = τ²(k(|xᵢ − xⱼ|) + λ δᵢⱼ)`. Shape and length of k and the
-/// noise λ are those of the largest restricted likelihood (Patterson & Thompson, Biometrika 58,
+/// Gaussian process (kriging), `cov zᵢ zⱼ = τ²(k(|xᵢ − xⱼ|) + λ δᵢⱼ)`. Shape and length of k and
+/// the noise λ are those of the largest restricted likelihood (Patterson & Thompson, Biometrika 58,
 /// 1971) in this patch, so that a steep zone has its own. The posterior gives displacement,
 /// gradient and covariances, which hold noise and what the pairs do not resolve.
 ///
@@ -32,7 +32,12 @@ use patch::Patch;
 /// use tactile_tps::LocalField;
 /// # fn main() -> Result<(), tactile_tps::TpsError> {
 /// let sources: Vec<_> = (0..2000)
-///     .map(|i| Point2::new(f64::from(i % 50) + 0.3 * (7.1 * f64::from(i)).sin(), f64::from(i / 50)))
+///     .map(|i| {
+///         Point2::new(
+///             f64::from(i % 50) + 0.3 * (7.1 * f64::from(i)).sin(),
+///             f64::from(i / 50),
+///         )
+///     })
 ///     .collect();
 /// let bend = |p: &Point2<f64>| Point2::new(p.x + (0.1 * p.y).sin(), p.y);
 /// let mut targets: Vec<_> = sources.iter().map(bend).collect();

@@ -63,8 +63,8 @@ fn check<const D: usize>(count: usize, width: f64, noise: f64, wrong: f64) {
     }
     let share = within as f64 / (count * D * D) as f64;
     let scene = format!("{D}-D, width {width}, noise {noise}, wrong {wrong}");
-    // Neighbours share their errors: the share of some thirty patches varies by 2 %, and two of these
-    // below the 94 % of many fields are allowed.
+    // Neighbours share their errors: the share of some thirty patches varies by 2 %, and two of
+    // these below the 94 % of many fields are allowed.
     assert!((0.90..=0.99).contains(&share), "{scene}: {share} within");
     if wrong == 0.0 {
         assert!(

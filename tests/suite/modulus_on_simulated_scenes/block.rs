@@ -129,7 +129,8 @@ fn report(
     let truth = 0.5 * ((after.stretch_lateral / before.stretch_lateral).powi(2) - 1.0);
     let (mean, lateral) = (found.summary.mean, lateral(found));
     println!(
-        "E {modulus:.0}: {bumps} bumps, {} matched, noise {:.4} px, xx {:+.1e} yy {:+.1e}, force {:+.1e}, strain {:+.1e} +- {:.1e}, E {:+.2e} +- {:.1e}",
+        "E {modulus:.0}: {bumps} bumps, {} matched, noise {:.4} px, xx {:+.1e} yy {:+.1e}, force \
+         {:+.1e}, strain {:+.1e} +- {:.1e}, E {:+.2e} +- {:.1e}",
         found.pairs.len(),
         found.sigma / options.camera.pixel_size_m[0],
         mean[(0, 0)] / truth - 1.0,

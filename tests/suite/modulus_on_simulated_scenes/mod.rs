@@ -55,7 +55,8 @@ impl Study {
         }
         let first: Vec<f64> = study.errors.iter().take(30).copied().collect();
         println!(
-            "{name}: 30 seeds: median {:.3} %, worst {:.3} %; {count} seeds: worst {:.3} %, covered {:.1} %",
+            "{name}: 30 seeds: median {:.3} %, worst {:.3} %; {count} seeds: worst {:.3} %, \
+             covered {:.1} %",
             100.0 * median(&first),
             100.0 * worst(&first),
             100.0 * worst(&study.errors),

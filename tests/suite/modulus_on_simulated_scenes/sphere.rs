@@ -102,7 +102,8 @@ impl Presses {
         let (modulus, truth) = (self.modulus, self.sphere.truth(LOADS as usize - 1).contact);
         let radius = load.contact_radius_m.unwrap();
         println!(
-            "E {modulus:.0} R {:.4}: force {:+.1e} +- {:.1e}, radius {:+.1e} +- {:.1e}, E {:+.2e} +- {:.1e} chi2 {:.1}",
+            "E {modulus:.0} R {:.4}: force {:+.1e} +- {:.1e}, radius {:+.1e} +- {:.1e}, E {:+.2e} \
+             +- {:.1e} chi2 {:.1}",
             self.radius,
             measured.force_n.value / truth.force_n - 1.0,
             measured.force_n.standard_error / truth.force_n,

@@ -235,7 +235,8 @@ fn every_source_is_carried_rightly() {
         let propagated = experiment.propagate(share).unwrap().standard_error_pa;
         let redrawn = experiment.redraw(share, 2500).standard_error;
         println!(
-            "{name}: {propagated:.1} Pa by propagation, {redrawn:.1} Pa by redrawing, {:.0} % of the variance",
+            "{name}: {propagated:.1} Pa by propagation, {redrawn:.1} Pa by redrawing, {:.0} % of \
+             the variance",
             100.0 * propagated.powi(2) / whole
         );
         // 2500 draws know a standard deviation to 1.4 %.

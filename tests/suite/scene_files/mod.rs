@@ -343,7 +343,8 @@ fn a_gauge_alone_gives_force_contact_and_modulus() {
 
 #[test]
 fn a_waveguide_can_be_rigid() {
-    let layers = "[waveguide]\nlayers = [{ refractive_index = 1.41, thickness_m = 0.1, youngs_modulus_pa = 1e7 }]\n";
+    let layers = "[waveguide]\nlayers = [{ refractive_index = 1.41, thickness_m = 0.1, \
+                  youngs_modulus_pa = 1e7 }]\n";
     let without = VALID.replace(layers, "");
     for text in [without.clone(), format!("waveguide = \"rigid\"\n{without}")] {
         assert!(Scene::parse(&text, "scene.toml").unwrap().layers.is_empty());

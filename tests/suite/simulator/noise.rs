@@ -41,7 +41,8 @@ fn noise_has_the_stated_mean_and_variance() {
 
 #[test]
 fn faint_light_is_poisson() {
-    // 20 electrons a grey level and no read noise: at 2 grey levels the count is Poisson of mean 40.
+    // 20 electrons a grey level and no read noise: at 2 grey levels the count is Poisson of mean
+    // 40.
     let camera = Camera {
         shape: [400, 500],
         full_well_electrons: 5100.0,

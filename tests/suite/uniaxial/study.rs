@@ -107,7 +107,8 @@ fn moduli_of_blocks_and_cylinders_are_right_and_their_intervals_hold() {
         .sum::<f64>()
         / count as f64;
     println!(
-        "{count} specimens: median {:.3} %, worst {:.3} %, mean {:+.3} %, covered {:.1} %, mean squared deviation {z:.2} standard errors",
+        "{count} specimens: median {:.3} %, worst {:.3} %, mean {:+.3} %, covered {:.1} %, mean \
+         squared deviation {z:.2} standard errors",
         100.0 * median,
         100.0 * worst,
         100.0 * mean,

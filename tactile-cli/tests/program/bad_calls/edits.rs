@@ -130,7 +130,8 @@ pub(super) const OPTIONS: &[(&str, &[&str], &str)] = &[
         "pixel-um",
     ),
     (
-        "depth --reference dark_reference.pgm --table depth_table.csv --pixel-um 100 dark_frame.pgm --ball-radius-mm @",
+        "depth --reference dark_reference.pgm --table depth_table.csv --pixel-um 100 \
+         dark_frame.pgm --ball-radius-mm @",
         &["0", "nan", "inf", "4e6", "4e-9", "four"],
         "ball-radius-mm",
     ),
@@ -285,7 +286,8 @@ pub(super) const OPTIONS: &[(&str, &[&str], &str)] = &[
         "pixel-size",
     ),
     (
-        "force --reference reference.png --pairs calibration.csv --pixel-um 40 frame_1.png --memory-gb @",
+        "force --reference reference.png --pairs calibration.csv --pixel-um 40 frame_1.png \
+         --memory-gb @",
         &["1e-6", "0", "nan", "-1"],
         "memory-gb",
     ),
@@ -322,7 +324,8 @@ pub(super) const OPTIONS: &[(&str, &[&str], &str)] = &[
         "memory-gb",
     ),
     (
-        "depth --reference dark_reference.pgm --table depth_table.csv --pixel-um 100 dark_frame.pgm --memory-gb @",
+        "depth --reference dark_reference.pgm --table depth_table.csv --pixel-um 100 \
+         dark_frame.pgm --memory-gb @",
         &["1e-6"],
         "memory-gb",
     ),

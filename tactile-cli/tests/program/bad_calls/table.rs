@@ -241,19 +241,23 @@ pub(super) const CALLS: &[(&str, &str)] = &[
         "falling.csv",
     ),
     (
-        "depth --reference dark_reference.pgm --table depth_table.csv --pixel-um 100 dark_frame.pgm --grey green",
+        "depth --reference dark_reference.pgm --table depth_table.csv --pixel-um 100 \
+         dark_frame.pgm --grey green",
         "green",
     ),
     (
-        "depth --reference dark_reference.pgm --table three_depths.csv --pixel-um 100 dark_frame.pgm --zero-table",
+        "depth --reference dark_reference.pgm --table three_depths.csv --pixel-um 100 \
+         dark_frame.pgm --zero-table",
         "three_depths.csv",
     ),
     (
-        "depth --reference dark_reference.pgm --table depth_table.csv --pixel-um 100 dark_frame.pgm --ball --ball-radius-mm 4",
+        "depth --reference dark_reference.pgm --table depth_table.csv --pixel-um 100 \
+         dark_frame.pgm --ball --ball-radius-mm 4",
         "--ball",
     ),
     (
-        "depth --reference dark_reference.pgm --table depth_table.csv --pixel-um 100 dark_frame.pgm dark_frame.pgm --out results",
+        "depth --reference dark_reference.pgm --table depth_table.csv --pixel-um 100 \
+         dark_frame.pgm dark_frame.pgm --out results",
         "two inputs",
     ),
     ("measure absent.toml", "absent.toml"),

@@ -53,13 +53,25 @@ use profile::Profile;
 ///
 /// ```
 /// use ndarray::Array2;
-/// use tactile_sfs::{Domain, Eikonal, Lighting, BoundaryCondition, SfsError, SurfaceReconstruction};
-/// let mask = Array2::from_shape_fn((21, 21), |(r, c)| (r as f64 - 10.0).hypot(c as f64 - 10.0) < 8.0);
-/// let (image, domain) = (Array2::from_elem((21, 21), 0.5_f64.sqrt()), Domain::default().with_mask(mask.view()));
+/// use tactile_sfs::{
+///     BoundaryCondition, Domain, Eikonal, Lighting, SfsError, SurfaceReconstruction,
+/// };
+/// let mask = Array2::from_shape_fn((21, 21), |(r, c)| {
+///     (r as f64 - 10.0).hypot(c as f64 - 10.0) < 8.0
+/// });
+/// let (image, domain) = (
+///     Array2::from_elem((21, 21), 0.5_f64.sqrt()),
+///     Domain::default().with_mask(mask.view()),
+/// );
 /// let method = Eikonal::new(Lighting::default());
-/// let heights = method.with_boundary(BoundaryCondition::Height(3.0))?.reconstruct(image.view().into(), &domain)?.heights;
+/// let heights = method
+///     .with_boundary(BoundaryCondition::Height(3.0))?
+///     .reconstruct(image.view().into(), &domain)?
+///     .heights;
 /// assert!((heights[[10, 10]] - 11.0).abs() < 1.0); // slope 1 from the boundary, 8 px away
-/// let free = method.with_boundary(BoundaryCondition::Free)?.reconstruct(image.view().into(), &domain);
+/// let free = method
+///     .with_boundary(BoundaryCondition::Free)?
+///     .reconstruct(image.view().into(), &domain);
 /// assert_eq!(free, Err(SfsError::NoKnownHeight));
 /// # Ok::<(), SfsError>(())
 /// ```
@@ -83,7 +95,10 @@ pub enum BoundaryCondition<T> {
 /// let known = Array2::from_shape_fn((15, 15), |at| if at == (7, 7) { 10.0 } else { f64::NAN });
 /// let border = |branch| {
 ///     let method = Eikonal::new(Lighting::default()).with_branch(branch);
-///     let surface = method.reconstruct(image.view().into(), &Domain::default().with_known_heights(known.view()))?;
+///     let surface = method.reconstruct(
+///         image.view().into(),
+///         &Domain::default().with_known_heights(known.view()),
+///     )?;
 ///     Ok::<_, tactile_sfs::SfsError>(surface.heights[[7, 12]])
 /// };
 /// assert!((border(EikonalBranch::Convex)? - 15.0).abs() < 0.1); // a funnel
@@ -123,7 +138,10 @@ pub enum EikonalBranch {
 /// });
 /// let (image, mask) = (z.mapv(|z| z / 20.0), z.mapv(|z| z > 0.0));
 /// let method = Eikonal::new(Lighting::default()).with_boundary(BoundaryCondition::Height(0.0))?;
-/// let surface = method.reconstruct(image.view().into(), &Domain::default().with_mask(mask.view()))?;
+/// let surface = method.reconstruct(
+///     image.view().into(),
+///     &Domain::default().with_mask(mask.view()),
+/// )?;
 /// assert!((surface.heights[[22, 22]] - 20.0).abs() < 0.3);
 /// # Ok::<(), tactile_sfs::SfsError>(())
 /// ```
@@ -204,9 +222,13 @@ impl<T: PixelScalar> Eikonal<T> {
     ///
     /// ```
     /// use ndarray::array;
-    /// use tactile_sfs::{EikonalBranch, Domain, Eikonal, Lighting, PixelFlags, SurfaceReconstruction};
+    /// use tactile_sfs::{
+    ///     Domain, Eikonal, EikonalBranch, Lighting, PixelFlags, SurfaceReconstruction,
+    /// };
     /// let known = array![[0.0, f64::NAN, f64::NAN, f64::NAN]];
-    /// let method = Eikonal::new(Lighting::default()).with_branch(EikonalBranch::Convex).with_tolerance(1e-6)?;
+    /// let method = Eikonal::new(Lighting::default())
+    ///     .with_branch(EikonalBranch::Convex)
+    ///     .with_tolerance(1e-6)?;
     /// let domain = Domain::default().with_known_heights(known.view());
     /// let surface = method.reconstruct(array![[1.0, 1.0, 0.0, 1.0]].view().into(), &domain)?;
     /// assert!(surface.flags[[0, 2]].contains(PixelFlags::DARK)); // black would be infinitely steep
