@@ -24,8 +24,8 @@ use tactile_inclusion::{
 /// use tactile_imaging::inclusion::InclusionScene;
 ///
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
-/// # let folder = tempfile::tempdir()?;
-/// # let path = folder.path().join("scene.toml");
+/// let folder = tempfile::tempdir()?;
+/// let path = folder.path().join("scene.toml");
 /// let text = r#"
 ///     reference = "reference.png"            # the sensor without contact
 ///     pixel_size_m = [86e-6, 86e-6]          # x, y, on the face

@@ -15,8 +15,8 @@ use std::path::Path;
 /// ```
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// use tactile_imaging::io::{CasePoints, read_cases};
-/// # let folder = tempfile::tempdir()?;
-/// # let path = folder.path().join("two.txt");
+/// let folder = tempfile::tempdir()?;
+/// let path = folder.path().join("two.txt");
 /// let text = b"case flat 2 1 1\nm 0 1\nt 0.5 1\ncase solid 3 1 1\nm 0 1 2\nt 0 1 2.5\n";
 /// std::fs::write(&path, text)?;
 /// let moved = read_cases(&path)?.into_iter().map(|case| match case.points {
@@ -49,8 +49,8 @@ pub enum CasePoints {
 /// ```
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// use tactile_imaging::io::{CasePoints, MatchCase, read_cases};
-/// # let folder = tempfile::tempdir()?;
-/// # let path = folder.path().join("shift.txt");
+/// let folder = tempfile::tempdir()?;
+/// let path = folder.path().join("shift.txt");
 /// std::fs::write(&path, "case shift 2 1 1\nm 0 1\nt 0.5 1\n")?;
 /// let (model, target) = (vec![[0.0, 1.0].into()], vec![[0.5, 1.0].into()]);
 /// let points = CasePoints::Plane { model, target };

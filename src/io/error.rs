@@ -48,8 +48,8 @@ impl fmt::Display for FilePlace {
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// use tactile_imaging::io::{FileError, FilePlace, read_grid};
 /// use tactile_imaging::scene::Scene;
-/// # let folder = tempfile::tempdir()?;
-/// # let path = folder.path().join("depth.csv");
+/// let folder = tempfile::tempdir()?;
+/// let path = folder.path().join("depth.csv");
 /// std::fs::write(&path, "0.1,0.2\n0.3\n")?;
 /// let ragged = read_grid(&path).unwrap_err();
 /// assert!(ragged.to_string().ends_with("depth.csv, line 2: expected 2 columns, found 1"));

@@ -14,8 +14,8 @@ use std::path::Path;
 /// ```
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// use tactile_imaging::io::{Grey, read_grey_image};
-/// # let folder = tempfile::tempdir()?;
-/// # let path = folder.path().join("blue.ppm");
+/// let folder = tempfile::tempdir()?;
+/// let path = folder.path().join("blue.ppm");
 /// std::fs::write(&path, b"P6\n1 1\n255\n\x00\x00\x5a")?; // 90 levels of blue
 /// let levels = |grey| read_grey_image(&path, grey, None).map(|image| image.to_u8()[[0, 0]]);
 /// assert_eq!((levels(Grey::Mean)?, levels(Grey::default())?), (30, 10));
@@ -49,8 +49,8 @@ impl Grey {
 /// ```
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// use tactile_imaging::io::{Grey, read_grey_image};
-/// # let folder = tempfile::tempdir()?;
-/// # let path = folder.path().join("red_and_grey.ppm");
+/// let folder = tempfile::tempdir()?;
+/// let path = folder.path().join("red_and_grey.ppm");
 /// std::fs::write(&path, b"P6\n2 1\n255\n\xff\x00\x00\x0a\x0a\x0a")?;
 /// let image = read_grey_image(&path, Grey::Rec601, None)?;
 /// assert!(image.colour && image.bits == 8);
@@ -176,7 +176,7 @@ pub fn levels_of(
 /// ```
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// use tactile_imaging::io::read_colour_levels;
-/// # let folder = tempfile::tempdir()?;
+/// let folder = tempfile::tempdir()?;
 /// let path = folder.path().join("red.ppm");
 /// std::fs::write(&path, b"P6\n1 1\n255\n\xf0\x10\x00")?;
 /// assert_eq!(read_colour_levels(&path)?, ndarray::array![[[240, 16, 0]]]);

@@ -10,8 +10,8 @@ use std::path::{Path, PathBuf};
 /// ```
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// use tactile_imaging::io::read_table;
-/// # let folder = tempfile::tempdir()?;
-/// # let path = folder.path().join("pairs.csv");
+/// let folder = tempfile::tempdir()?;
+/// let path = folder.path().join("pairs.csv");
 /// std::fs::write(&path, "force_mN,pixel\n1,2\n\n3,4\n")?;
 /// let table = read_table(&path)?;
 /// assert_eq!((table.header[1].as_str(), table.values[[1, 1]]), ("pixel", 4.0));

@@ -208,8 +208,8 @@ impl Pipeline {
     ///
     /// ```
     /// use tactile_imaging::pipeline::{DarkContact, Object, Pipeline};
-    /// # use tactile_imaging::force::CalibrationPair;
-    /// # let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
+    /// use tactile_imaging::force::CalibrationPair;
+    /// let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
     /// let light =
     ///     Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?.with_control_points(80);
     /// let dark = light.with_contact(DarkContact::new(

@@ -15,12 +15,12 @@ use tactile_core::statistics::effective_degrees_of_freedom;
 /// use ndarray::ArrayView2;
 /// use tactile_imaging::force::{Estimate, ForceError, ReferenceFrame};
 /// use tactile_imaging::pipeline::{ContactStage, FrameContact, LightContact, Object, Pipeline};
-/// # use tactile_imaging::force::CalibrationPair;
-/// # let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
-/// # let hertz = |peak: f64| ndarray::Array2::from_shape_fn((64, 64), |(r, c)| {
-/// #     let d = ((r as f64 - 32.0).hypot(c as f64 - 32.0) / 20.0).min(1.0);
-/// #     10 + (peak * (1.0 - d * d).sqrt()).round() as u8
-/// # });
+/// use tactile_imaging::force::CalibrationPair;
+/// let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
+/// let hertz = |peak: f64| ndarray::Array2::from_shape_fn((64, 64), |(r, c)| {
+///     let d = ((r as f64 - 32.0).hypot(c as f64 - 32.0) / 20.0).min(1.0);
+///     10 + (peak * (1.0 - d * d).sqrt()).round() as u8
+/// });
 /// /// The contact by its light, the force of a spring scale that stands at 0.98 N.
 /// struct OnScale(LightContact);
 /// impl ContactStage for OnScale {
@@ -112,12 +112,12 @@ pub trait ContactStage: Send + Sync {
 ///
 /// ```
 /// use tactile_imaging::pipeline::{ContactReading, Object, Pipeline};
-/// # use tactile_imaging::force::CalibrationPair;
-/// # let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
-/// # let hertz = |peak: f64| ndarray::Array2::from_shape_fn((64, 64), |(r, c)| {
-/// #     let d = ((r as f64 - 32.0).hypot(c as f64 - 32.0) / 20.0).min(1.0);
-/// #     10 + (peak * (1.0 - d * d).sqrt()).round() as u8
-/// # });
+/// use tactile_imaging::force::CalibrationPair;
+/// let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
+/// let hertz = |peak: f64| ndarray::Array2::from_shape_fn((64, 64), |(r, c)| {
+///     let d = ((r as f64 - 32.0).hypot(c as f64 - 32.0) / 20.0).min(1.0);
+///     10 + (peak * (1.0 - d * d).sqrt()).round() as u8
+/// });
 /// // 1.005 N over a disc of 1 mm radius.
 /// let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?;
 /// let (reference, frame) = (hertz(0.0), hertz(120.0));
@@ -303,12 +303,12 @@ impl ContactReading {
 /// ```
 /// use tactile_imaging::force::ReferenceFrame;
 /// use tactile_imaging::pipeline::{ContactStage, LightContact};
-/// # use tactile_imaging::force::CalibrationPair;
-/// # let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
-/// # let hertz = |peak: f64| ndarray::Array2::from_shape_fn((64, 64), |(r, c)| {
-/// #     let d = ((r as f64 - 32.0).hypot(c as f64 - 32.0) / 20.0).min(1.0);
-/// #     10 + (peak * (1.0 - d * d).sqrt()).round() as u8
-/// # });
+/// use tactile_imaging::force::CalibrationPair;
+/// let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
+/// let hertz = |peak: f64| ndarray::Array2::from_shape_fn((64, 64), |(r, c)| {
+///     let d = ((r as f64 - 32.0).hypot(c as f64 - 32.0) / 20.0).min(1.0);
+///     10 + (peak * (1.0 - d * d).sqrt()).round() as u8
+/// });
 /// let stage = LightContact::from_pairs(&pairs, [50e-6; 2])?;
 /// let reference = ReferenceFrame::new(hertz(0.0).view())?;
 /// let contact = stage.measure(hertz(120.0).view(), &reference)?;

@@ -15,10 +15,10 @@ use std::sync::Arc;
 /// ```
 /// use tactile_imaging::force::{CalibrationOptions, CalibrationPair, Estimate, ForceOptions, LinearCalibration};
 /// use tactile_imaging::pipeline::{LightContact, Object, Pipeline};
-/// # let hertz = |peak: f64| ndarray::Array2::from_shape_fn((64, 64), |(r, c)| {
-/// #     let d = ((r as f64 - 32.0).hypot(c as f64 - 32.0) / 20.0).min(1.0);
-/// #     10 + (peak * (1.0 - d * d).sqrt()).round() as u8
-/// # });
+/// let hertz = |peak: f64| ndarray::Array2::from_shape_fn((64, 64), |(r, c)| {
+///     let d = ((r as f64 - 32.0).hypot(c as f64 - 32.0) / 20.0).min(1.0);
+///     10 + (peak * (1.0 - d * d).sqrt()).round() as u8
+/// });
 /// let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
 /// let line = LightContact::from_pairs(&pairs, [50e-6; 2])?;
 /// // The same, with the contact's radius read off its mask instead of fitted.

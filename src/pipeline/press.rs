@@ -126,12 +126,12 @@ impl Pipeline {
     /// ```
     /// use std::sync::Arc;
     /// use tactile_imaging::{Object, Pipeline, force::ReferenceFrame};
-    /// # use tactile_imaging::force::CalibrationPair;
-    /// # let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
-    /// # let hertz = |peak: f64| ndarray::Array2::from_shape_fn((64, 64), |(r, c)| {
-    /// #     let d = ((r as f64 - 32.0).hypot(c as f64 - 32.0) / 20.0).min(1.0);
-    /// #     10 + (peak * (1.0 - d * d).sqrt()).round() as u8
-    /// # });
+    /// use tactile_imaging::force::CalibrationPair;
+    /// let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
+    /// let hertz = |peak: f64| ndarray::Array2::from_shape_fn((64, 64), |(r, c)| {
+    ///     let d = ((r as f64 - 32.0).hypot(c as f64 - 32.0) / 20.0).min(1.0);
+    ///     10 + (peak * (1.0 - d * d).sqrt()).round() as u8
+    /// });
     /// let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?;
     /// let reference = Arc::new(ReferenceFrame::new(hertz(0.0).view())?);
     /// for (peak, newton) in [(60.0, 0.503), (120.0, 1.005)] {
@@ -177,10 +177,10 @@ impl<'a> Press<'a> {
     /// ```
     /// use tactile_imaging::force::Estimate;
     /// use tactile_imaging::pipeline::{DarkContact, Object, Pipeline, PipelineError};
-    /// # let hertz = |peak: f64| ndarray::Array2::from_shape_fn((64, 64), |(r, c)| {
-    /// #     let d = ((r as f64 - 32.0).hypot(c as f64 - 32.0) / 20.0).min(1.0);
-    /// #     10 + (peak * (1.0 - d * d).sqrt()).round() as u8
-    /// # });
+    /// let hertz = |peak: f64| ndarray::Array2::from_shape_fn((64, 64), |(r, c)| {
+    ///     let d = ((r as f64 - 32.0).hypot(c as f64 - 32.0) / 20.0).min(1.0);
+    ///     10 + (peak * (1.0 - d * d).sqrt()).round() as u8
+    /// });
     /// // A sensor that darkens measures depth, not force.
     /// let contact = DarkContact::new(&[(0.0, 0.0), (150.0, 0.5e-3)], [50e-6; 2])?;
     /// let pipeline = Pipeline::new(contact, Object::sphere(3e-3))?;
@@ -209,12 +209,12 @@ impl<'a> Press<'a> {
     ///
     /// ```
     /// use tactile_imaging::{Object, Pipeline};
-    /// # use tactile_imaging::force::CalibrationPair;
-    /// # let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
-    /// # let hertz = |peak: f64| ndarray::Array2::from_shape_fn((64, 64), |(r, c)| {
-    /// #     let d = ((r as f64 - 32.0).hypot(c as f64 - 32.0) / 20.0).min(1.0);
-    /// #     10 + (peak * (1.0 - d * d).sqrt()).round() as u8
-    /// # });
+    /// use tactile_imaging::force::CalibrationPair;
+    /// let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
+    /// let hertz = |peak: f64| ndarray::Array2::from_shape_fn((64, 64), |(r, c)| {
+    ///     let d = ((r as f64 - 32.0).hypot(c as f64 - 32.0) / 20.0).min(1.0);
+    ///     10 + (peak * (1.0 - d * d).sqrt()).round() as u8
+    /// });
     /// let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?;
     /// let mut press = pipeline.press(hertz(0.0).view())?;
     /// for peak in [60.0, 120.0] {
@@ -285,8 +285,8 @@ impl<'a> Press<'a> {
     ///
     /// ```
     /// use tactile_imaging::pipeline::{Flag, Object, Pipeline};
-    /// # use tactile_imaging::force::CalibrationPair;
-    /// # let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
+    /// use tactile_imaging::force::CalibrationPair;
+    /// let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
     /// let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?;
     /// let reference = ndarray::Array2::from_elem((64, 64), 60_u8);
     /// let mut press = pipeline.press(reference.view())?;
@@ -520,7 +520,7 @@ impl<'a> Press<'a> {
     /// ```
     /// use tactile_simulate::Trial;
     /// let trial = Trial::coarser(8)?;
-    /// # let pipeline = trial.pipeline()?;
+    /// let pipeline = trial.pipeline()?;
     /// let series = trial.press(&pipeline)?.load_series()?;
     /// let loads = series.loads();
     /// assert!((loads[1].force_n.value - 1.2).abs() < 0.01);

@@ -12,12 +12,12 @@ const BLOCKS: usize = 8;
 ///
 /// ```
 /// use tactile_imaging::{Object, Pipeline, pipeline::ReferenceLight};
-/// # use tactile_imaging::force::{CalibrationPair, ReferenceFrame};
-/// # let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
-/// # let hertz = |level: f64, peak: f64| ndarray::Array2::from_shape_fn((64, 64), |(r, c)| {
-/// #     let d = ((r as f64 - 32.0).hypot(c as f64 - 32.0) / 20.0).min(1.0);
-/// #     (level * (20.0 + peak * (1.0 - d * d).sqrt())).round() as u8
-/// # });
+/// use tactile_imaging::force::{CalibrationPair, ReferenceFrame};
+/// let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
+/// let hertz = |level: f64, peak: f64| ndarray::Array2::from_shape_fn((64, 64), |(r, c)| {
+///     let d = ((r as f64 - 32.0).hypot(c as f64 - 32.0) / 20.0).min(1.0);
+///     (level * (20.0 + peak * (1.0 - d * d).sqrt())).round() as u8
+/// });
 /// let calibrated = ReferenceFrame::new(hertz(1.0, 0.0).view())?;
 /// let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?.with_settings(
 ///     |settings| settings.calibrated_light = Some(ReferenceLight::of(&calibrated)),

@@ -98,8 +98,8 @@ impl fmt::Display for SkipReason {
 ///
 /// ```
 /// use tactile_imaging::pipeline::{Object, Pipeline, SkipReason, Stage};
-/// # use tactile_imaging::force::CalibrationPair;
-/// # let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
+/// use tactile_imaging::force::CalibrationPair;
+/// let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
 /// let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?;
 /// let empty = ndarray::Array2::from_elem((64, 64), 10_u8);
 /// let mut press = pipeline.press(empty.view())?;

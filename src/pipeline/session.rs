@@ -28,14 +28,13 @@ use std::sync::Arc;
 /// The answer of a stream to one frame.
 ///
 /// ```
-/// use std::sync::Arc;
 /// use tactile_imaging::pipeline::{Object, Pipeline, Session, Update};
-/// # use tactile_imaging::force::CalibrationPair;
-/// # let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
-/// # let hertz = |peak: f64| ndarray::Array2::from_shape_fn((64, 64), |(r, c)| {
-/// #     let d = ((r as f64 - 32.0).hypot(c as f64 - 32.0) / 20.0).min(1.0);
-/// #     10 + (peak * (1.0 - d * d).sqrt()).round() as u8
-/// # });
+/// use tactile_imaging::force::CalibrationPair;
+/// let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
+/// let hertz = |peak: f64| ndarray::Array2::from_shape_fn((64, 64), |(r, c)| {
+///     let d = ((r as f64 - 32.0).hypot(c as f64 - 32.0) / 20.0).min(1.0);
+///     10 + (peak * (1.0 - d * d).sqrt()).round() as u8
+/// });
 /// let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?;
 /// let mut session = Session::new(&pipeline, &[hertz(0.0).view()])?;
 /// let first: Update = session.push(hertz(120.0).view())?;
@@ -58,14 +57,13 @@ pub struct Update {
 /// levels: the mean of frame minus reference.
 ///
 /// ```
-/// use std::sync::Arc;
 /// use tactile_imaging::pipeline::{DriftWatch, Flag, Object, Pipeline, Session};
-/// # use tactile_imaging::force::CalibrationPair;
-/// # let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
-/// # let hertz = |peak: f64| ndarray::Array2::from_shape_fn((64, 64), |(r, c)| {
-/// #     let d = ((r as f64 - 32.0).hypot(c as f64 - 32.0) / 20.0).min(1.0);
-/// #     10 + (peak * (1.0 - d * d).sqrt()).round() as u8
-/// # });
+/// use tactile_imaging::force::CalibrationPair;
+/// let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
+/// let hertz = |peak: f64| ndarray::Array2::from_shape_fn((64, 64), |(r, c)| {
+///     let d = ((r as f64 - 32.0).hypot(c as f64 - 32.0) / 20.0).min(1.0);
+///     10 + (peak * (1.0 - d * d).sqrt()).round() as u8
+/// });
 /// let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?;
 /// let mut session = Session::new(&pipeline, &[hertz(0.0).view()])?;
 /// // The light fades by two grey levels and recovers by one.
@@ -158,7 +156,6 @@ impl SensorHealth {
 /// Follows a stream of frames from one sensor pressed on one object. `Send`: one session a thread.
 ///
 /// ```
-/// use std::sync::Arc;
 /// use tactile_imaging::pipeline::Session;
 /// use tactile_simulate::Trial;
 /// use tactile_simulate::{CalibrationRun, Camera, PressOptions};
@@ -204,14 +201,13 @@ impl Session {
     /// noise is measured too.
     ///
     /// ```
-    /// use std::sync::Arc;
     /// use tactile_imaging::pipeline::{Object, Pipeline, Session};
-    /// # use tactile_imaging::force::CalibrationPair;
-    /// # let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
-    /// # let hertz = |peak: f64| ndarray::Array2::from_shape_fn((64, 64), |(r, c)| {
-    /// #     let d = ((r as f64 - 32.0).hypot(c as f64 - 32.0) / 20.0).min(1.0);
-    /// #     10 + (peak * (1.0 - d * d).sqrt()).round() as u8
-    /// # });
+    /// use tactile_imaging::force::CalibrationPair;
+    /// let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
+    /// let hertz = |peak: f64| ndarray::Array2::from_shape_fn((64, 64), |(r, c)| {
+    ///     let d = ((r as f64 - 32.0).hypot(c as f64 - 32.0) / 20.0).min(1.0);
+    ///     10 + (peak * (1.0 - d * d).sqrt()).round() as u8
+    /// });
     /// let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?;
     /// let empty = hertz(0.0);
     /// let mut session = Session::new(&pipeline, &[empty.view(), empty.view(), empty.view()])?;
@@ -253,11 +249,10 @@ impl Session {
     ///
     /// ```
     /// use ndarray::Array2;
-    /// use std::sync::Arc;
     /// use tactile_imaging::force::{Estimate, ShearCalibration};
     /// use tactile_imaging::pipeline::{Object, Pipeline, Session};
-    /// # use tactile_imaging::force::CalibrationPair;
-    /// # let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
+    /// use tactile_imaging::force::CalibrationPair;
+    /// let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
     /// // A contact that slides along x by two pixels of 50 µm, held by 400 N/m.
     /// let press = |x: f64| Array2::from_shape_fn((64, 64), |(r, c)| {
     ///     let d = ((r as f64 - 32.0).hypot(c as f64 - x) / 20.0).min(1.0);
@@ -284,8 +279,8 @@ impl Session {
     /// ```
     /// use tactile_imaging::force::{ChartState, HealthOptions};
     /// use tactile_imaging::pipeline::{Object, Pipeline, Session};
-    /// # use tactile_imaging::force::CalibrationPair;
-    /// # let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
+    /// use tactile_imaging::force::CalibrationPair;
+    /// let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
     /// let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?;
     /// let frame = |k: usize, grey: usize| ndarray::Array2::from_shape_fn((96, 96), |(r, c)| {
     ///     (grey + (7 * r + 13 * c + 5 * k) % 4) as u8
@@ -376,12 +371,12 @@ impl Session {
     ///
     /// ```
     /// use tactile_imaging::pipeline::{Flag, Object, Pipeline, Session};
-    /// # use tactile_imaging::force::CalibrationPair;
-    /// # let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
-    /// # let hertz = |peak: f64| ndarray::Array2::from_shape_fn((64, 64), |(r, c)| {
-    /// #     let d = ((r as f64 - 32.0).hypot(c as f64 - 4.0) / 20.0).min(1.0);
-    /// #     10 + (peak * (1.0 - d * d).sqrt()).round() as u8
-    /// # });
+    /// use tactile_imaging::force::CalibrationPair;
+    /// let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
+    /// let hertz = |peak: f64| ndarray::Array2::from_shape_fn((64, 64), |(r, c)| {
+    ///     let d = ((r as f64 - 32.0).hypot(c as f64 - 4.0) / 20.0).min(1.0);
+    ///     10 + (peak * (1.0 - d * d).sqrt()).round() as u8
+    /// });
     /// let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?;
     /// let mut session = Session::new(&pipeline, &[hertz(0.0).view()])?;
     /// session.push(hertz(120.0).view())?;
@@ -415,15 +410,14 @@ impl Session {
     /// Loads kept apart so far, at most [`MOST_LOADS`](Self::MOST_LOADS).
     ///
     /// ```
-    /// # use std::sync::Arc;
-    /// # use tactile_imaging::pipeline::{Object, Pipeline, Session};
-    /// # use tactile_imaging::force::CalibrationPair;
-    /// # let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
-    /// # let hertz = |peak: f64| ndarray::Array2::from_shape_fn((64, 64), |(r, c)| {
-    /// #     let d = ((r as f64 - 32.0).hypot(c as f64 - 32.0) / 20.0).min(1.0);
-    /// #     10 + (peak * (1.0 - d * d).sqrt()).round() as u8
-    /// # });
-    /// # let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?;
+    /// use tactile_imaging::pipeline::{Object, Pipeline, Session};
+    /// use tactile_imaging::force::CalibrationPair;
+    /// let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
+    /// let hertz = |peak: f64| ndarray::Array2::from_shape_fn((64, 64), |(r, c)| {
+    ///     let d = ((r as f64 - 32.0).hypot(c as f64 - 32.0) / 20.0).min(1.0);
+    ///     10 + (peak * (1.0 - d * d).sqrt()).round() as u8
+    /// });
+    /// let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?;
     /// let mut session = Session::new(&pipeline, &[hertz(0.0).view()])?;
     /// for peak in [120.0, 60.0, 120.0] {
     ///     session.push(hertz(peak).view())?;
@@ -448,15 +442,14 @@ impl Session {
     ///
     /// ```
     /// use tactile_imaging::pipeline::Flag;
-    /// # use std::sync::Arc;
-    /// # use tactile_imaging::pipeline::{Object, Pipeline, Session};
-    /// # use tactile_imaging::force::CalibrationPair;
-    /// # let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
-    /// # let hertz = |peak: f64| ndarray::Array2::from_shape_fn((64, 64), |(r, c)| {
-    /// #     let d = ((r as f64 - 32.0).hypot(c as f64 - 32.0) / 20.0).min(1.0);
-    /// #     10 + (peak * (1.0 - d * d).sqrt()).round() as u8
-    /// # });
-    /// # let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?;
+    /// use tactile_imaging::pipeline::{Object, Pipeline, Session};
+    /// use tactile_imaging::force::CalibrationPair;
+    /// let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
+    /// let hertz = |peak: f64| ndarray::Array2::from_shape_fn((64, 64), |(r, c)| {
+    ///     let d = ((r as f64 - 32.0).hypot(c as f64 - 32.0) / 20.0).min(1.0);
+    ///     10 + (peak * (1.0 - d * d).sqrt()).round() as u8
+    /// });
+    /// let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?;
     /// let mut session = Session::new(&pipeline, &[hertz(0.0).view()])?;
     /// session.push(hertz(0.0).mapv(|v| v - 2).view())?;
     /// session.push(hertz(120.0).view())?;
@@ -483,8 +476,8 @@ impl Session {
     ///
     /// ```
     /// use tactile_imaging::pipeline::{Object, Pipeline, Session};
-    /// # use tactile_imaging::force::CalibrationPair;
-    /// # let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
+    /// use tactile_imaging::force::CalibrationPair;
+    /// let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
     /// let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?;
     /// let frame = |k: usize| ndarray::Array2::from_shape_fn((64, 64), |(r, c)| {
     ///     if (r, c) == (12, 30) { 44 } else { (40 + (7 * r + 13 * c + k / 64) % 4) as u8 }
@@ -503,14 +496,13 @@ impl Session {
     /// The stages that ran so far, and those that were skipped.
     ///
     /// ```
-    /// use std::sync::Arc;
     /// use tactile_imaging::pipeline::{Object, Pipeline, Session, SkipReason, Stage};
-    /// # use tactile_imaging::force::CalibrationPair;
-    /// # let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
-    /// # let hertz = |peak: f64| ndarray::Array2::from_shape_fn((64, 64), |(r, c)| {
-    /// #     let d = ((r as f64 - 32.0).hypot(c as f64 - 32.0) / 20.0).min(1.0);
-    /// #     10 + (peak * (1.0 - d * d).sqrt()).round() as u8
-    /// # });
+    /// use tactile_imaging::force::CalibrationPair;
+    /// let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
+    /// let hertz = |peak: f64| ndarray::Array2::from_shape_fn((64, 64), |(r, c)| {
+    ///     let d = ((r as f64 - 32.0).hypot(c as f64 - 32.0) / 20.0).min(1.0);
+    ///     10 + (peak * (1.0 - d * d).sqrt()).round() as u8
+    /// });
     /// let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?;
     /// let mut session = Session::new(&pipeline, &[hertz(0.0).view()])?;
     /// for peak in [0.0, 120.0, 120.0, 120.0] {
@@ -533,7 +525,6 @@ impl Session {
     /// strain of one frame. A call without a new frame costs nothing.
     ///
     /// ```
-    /// use std::sync::Arc;
     /// use tactile_imaging::pipeline::Session;
     /// use tactile_simulate::Trial;
     /// use tactile_simulate::{Camera, CalibrationRun, PressLoad, PressOptions};
@@ -581,11 +572,10 @@ impl Session {
     /// Counts strain anew, from the next load that [`strain`](Self::strain) is asked for.
     ///
     /// ```
-    /// # use std::sync::Arc;
-    /// # use tactile_imaging::pipeline::Session;
+    /// use tactile_imaging::pipeline::Session;
     /// use tactile_simulate::Trial;
     /// let trial = Trial::coarser(8)?;
-    /// # let mut session = Session::new(&trial.pipeline()?, &[trial.simulation.reference.view()])?;
+    /// let mut session = Session::new(&trial.pipeline()?, &[trial.simulation.reference.view()])?;
     /// session.push(trial.simulation.frames[0].view())?;
     /// assert!(session.strain()?.is_none());
     /// session.push(trial.simulation.frames[1].view())?;
@@ -628,8 +618,7 @@ impl Session {
 /// Strain of one frame of a stream.
 ///
 /// ```
-/// # use std::sync::Arc;
-/// # use tactile_imaging::pipeline::Session;
+/// use tactile_imaging::pipeline::Session;
 /// use tactile_simulate::Trial;
 /// let trial = Trial::coarser(8)?;
 /// let mut session = Session::new(&trial.pipeline()?, &[trial.simulation.reference.view()])?;

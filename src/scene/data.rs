@@ -47,13 +47,13 @@ pub enum LoadedCalibration {
 ///
 /// ```
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
-/// # use tactile_simulate::{CalibrationRun, Camera, PressOptions, PressScene, write_folder};
+/// use tactile_simulate::{CalibrationRun, Camera, PressOptions, PressScene, write_folder};
 /// use tactile_imaging::scene::{LoadedCalibration, Scene};
-/// # let camera = Camera::default().coarser(16);
-/// # let made = PressScene::new(PressOptions { camera, ..PressOptions::default() })?;
-/// # let folder = tempfile::tempdir()?;
-/// # let calibration = CalibrationRun { steps: 8, ..CalibrationRun::default() };
-/// # let path = write_folder(&made, &made.calibrate(&calibration)?, folder.path())?;
+/// let camera = Camera::default().coarser(16);
+/// let made = PressScene::new(PressOptions { camera, ..PressOptions::default() })?;
+/// let folder = tempfile::tempdir()?;
+/// let calibration = CalibrationRun { steps: 8, ..CalibrationRun::default() };
+/// let path = write_folder(&made, &made.calibrate(&calibration)?, folder.path())?;
 /// let data = Scene::read(&path)?.load()?; // a calibration up to 2 N in 8 steps and back
 /// assert!(data.frames.iter().all(|frame| frame.dim() == data.reference.dim()));
 /// let LoadedCalibration::Pairs(pairs) = &data.calibration else { unreachable!() };
@@ -145,15 +145,15 @@ impl Scene {
     ///
     /// ```
     /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
-    /// # use tactile_simulate::{CalibrationRun, Camera, PressLoad, PressOptions, PressScene};
-    /// # use tactile_simulate::write_folder;
+    /// use tactile_simulate::{CalibrationRun, Camera, PressLoad, PressOptions, PressScene};
+    /// use tactile_simulate::write_folder;
     /// use tactile_imaging::scene::Scene;
-    /// # let camera = Camera::default().coarser(16);
-    /// # let loads = vec![PressLoad::normal(0.7)];
-    /// # let made = PressScene::new(PressOptions { camera, loads, ..Default::default() })?;
-    /// # let folder = tempfile::tempdir()?;
-    /// # let calibration = CalibrationRun { steps: 8, ..CalibrationRun::default() };
-    /// # let path = write_folder(&made, &made.calibrate(&calibration)?, folder.path())?;
+    /// let camera = Camera::default().coarser(16);
+    /// let loads = vec![PressLoad::normal(0.7)];
+    /// let made = PressScene::new(PressOptions { camera, loads, ..Default::default() })?;
+    /// let folder = tempfile::tempdir()?;
+    /// let calibration = CalibrationRun { steps: 8, ..CalibrationRun::default() };
+    /// let path = write_folder(&made, &made.calibrate(&calibration)?, folder.path())?;
     /// let measured = Scene::measure_file(&path)?; // one frame, of a ball pressed with 0.7 N
     /// let frame = measured.frames[0].as_ref().expect("a contact");
     /// let force = frame.force_n.as_ref().expect("a calibration").value;
@@ -177,23 +177,23 @@ impl Scene {
     ///
     /// ```
     /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
-    /// # use tactile_imaging::force::CalibrationPair;
-    /// # use tactile_imaging::scene::{LoadedCalibration, Scene, SceneData};
-    /// # let scene = Scene::parse(r#"
-    /// #     reference = "reference.png"
-    /// #     pixel_size_m = [2e-5, 2e-5]
-    /// #     calibration = { pairs = "pairs.csv" }
-    /// #     frames = [{ image = "one.png" }]
-    /// #     object = { shape = "unknown" }
-    /// #     stages = { strain = "hencky" }
-    /// #     [waveguide]
-    /// #     layers = [{ refractive_index = 1.41, thickness_m = 2e-3, youngs_modulus_pa = 1.36e5 }]
-    /// # "#, "scene.toml")?;
-    /// # let pairs = [0.0, 1.0, 2.0].map(|f| CalibrationPair::loading(1e5 * f, f)).to_vec();
-    /// # let frame = ndarray::Array2::from_elem((20, 30), 10);
-    /// # let calibration = LoadedCalibration::Pairs(pairs);
-    /// # let frames = vec![frame.clone()];
-    /// # let data = SceneData { reference: frame, frames, calibration, contact_table: None };
+    /// use tactile_imaging::force::CalibrationPair;
+    /// use tactile_imaging::scene::{LoadedCalibration, Scene, SceneData};
+    /// let scene = Scene::parse(r#"
+    ///     reference = "reference.png"
+    ///     pixel_size_m = [2e-5, 2e-5]
+    ///     calibration = { pairs = "pairs.csv" }
+    ///     frames = [{ image = "one.png" }]
+    ///     object = { shape = "unknown" }
+    ///     stages = { strain = "hencky" }
+    ///     [waveguide]
+    ///     layers = [{ refractive_index = 1.41, thickness_m = 2e-3, youngs_modulus_pa = 1.36e5 }]
+    /// "#, "scene.toml")?;
+    /// let pairs = [0.0, 1.0, 2.0].map(|f| CalibrationPair::loading(1e5 * f, f)).to_vec();
+    /// let frame = ndarray::Array2::from_elem((20, 30), 10);
+    /// let calibration = LoadedCalibration::Pairs(pairs);
+    /// let frames = vec![frame.clone()];
+    /// let data = SceneData { reference: frame, frames, calibration, contact_table: None };
     /// // The file has strain = "hencky", and the program its own number of points.
     /// let pipeline = scene.pipeline(&data)?.with_control_points(60);
     /// let mut press = scene.press(&pipeline, &data)?;

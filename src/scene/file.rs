@@ -24,14 +24,14 @@ use std::path::{Path, PathBuf};
 ///
 /// ```
 /// use tactile_imaging::scene::{CalibrationSource, Scene};
-/// # let rest = r#"
-/// #     [[frames]]
-/// #     image = "frame.png"
-/// #     [object]
-/// #     shape = "unknown"
-/// #     [waveguide]
-/// #     layers = [{ refractive_index = 1.41, thickness_m = 2e-3, youngs_modulus_pa = 1e5 }]
-/// # "#;
+/// let rest = r#"
+///     [[frames]]
+///     image = "frame.png"
+///     [object]
+///     shape = "unknown"
+///     [waveguide]
+///     layers = [{ refractive_index = 1.41, thickness_m = 2e-3, youngs_modulus_pa = 1e5 }]
+/// "#;
 /// let head = "reference = \"reference.png\"\npixel_size_m = [2e-5, 2e-5]\n[calibration]\n";
 /// let source = |line: &str| {
 ///     Scene::parse(&format!("{head}{line}{rest}"), "scene.toml").map(|s| s.calibration)
@@ -60,14 +60,14 @@ pub enum CalibrationSource {
 ///
 /// ```
 /// use tactile_imaging::scene::{Scene, SceneFrame};
-/// # let rest = r#"
-/// #     [calibration]
-/// #     pairs = "pairs.csv"
-/// #     [object]
-/// #     shape = "unknown"
-/// #     [waveguide]
-/// #     layers = [{ refractive_index = 1.41, thickness_m = 2e-3, youngs_modulus_pa = 1e5 }]
-/// # "#;
+/// let rest = r#"
+///     [calibration]
+///     pairs = "pairs.csv"
+///     [object]
+///     shape = "unknown"
+///     [waveguide]
+///     layers = [{ refractive_index = 1.41, thickness_m = 2e-3, youngs_modulus_pa = 1e5 }]
+/// "#;
 /// let head = "reference = \"reference.png\"\npixel_size_m = [2e-5, 2e-5]";
 /// let frames = "[[frames]]\nimage = \"one.png\"\nforce_N = 0.7\n[[frames]]\nimage = \"two.png\"";
 /// let scene = Scene::parse(&format!("{head}\n{frames}\n{rest}"), "press/scene.toml")?;
@@ -109,16 +109,16 @@ impl SceneFrame {
 ///
 /// ```
 /// use tactile_imaging::scene::Scene;
-/// # let head = r#"
-/// #     reference = "reference.png"
-/// #     pixel_size_m = [2e-5, 2e-5]
-/// #     [calibration]
-/// #     pairs = "pairs.csv"
-/// #     [[frames]]
-/// #     image = "frame.png"
-/// #     [object]
-/// #     shape = "unknown"
-/// # "#;
+/// let head = r#"
+///     reference = "reference.png"
+///     pixel_size_m = [2e-5, 2e-5]
+///     [calibration]
+///     pairs = "pairs.csv"
+///     [[frames]]
+///     image = "frame.png"
+///     [object]
+///     shape = "unknown"
+/// "#;
 /// let waveguide = "
 ///     [[waveguide.layers]]
 ///     refractive_index = 1.41
@@ -252,16 +252,16 @@ fn stated<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<f64>, D::
 ///
 /// ```
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
-/// # use tactile_simulate::{CalibrationRun, Camera, PressOptions, PressScene, write_folder};
-/// # use tactile_simulate::{Elastic, ElasticSphere};
+/// use tactile_simulate::{CalibrationRun, Camera, PressOptions, PressScene, write_folder};
+/// use tactile_simulate::{Elastic, ElasticSphere};
 /// use tactile_imaging::scene::Scene;
-/// # let camera = Camera::default().coarser(16);
-/// # let object = ElasticSphere { radius_m: 20e-3, material: Elastic::CL2000X };
-/// # let made = PressScene::new(PressOptions { camera, object, ..PressOptions::default() })?;
-/// # let folder = tempfile::tempdir()?;
-/// # let indenter = ElasticSphere { radius_m: 60e-3, material: Elastic::RIGID };
-/// # let calibration = CalibrationRun { steps: 8, indenter, ..CalibrationRun::default() };
-/// # let path = write_folder(&made, &made.calibrate(&calibration)?, folder.path())?;
+/// let camera = Camera::default().coarser(16);
+/// let object = ElasticSphere { radius_m: 20e-3, material: Elastic::CL2000X };
+/// let made = PressScene::new(PressOptions { camera, object, ..PressOptions::default() })?;
+/// let folder = tempfile::tempdir()?;
+/// let indenter = ElasticSphere { radius_m: 60e-3, material: Elastic::RIGID };
+/// let calibration = CalibrationRun { steps: 8, indenter, ..CalibrationRun::default() };
+/// let path = write_folder(&made, &made.calibrate(&calibration)?, folder.path())?;
 /// let scene = Scene::read(&path)?; // a CL2000X ball, E = 103 kPa, at 0.7 N and 1.2 N
 /// let data = scene.load()?;
 /// let mut press = scene.press(&scene.pipeline(&data)?, &data)?;

@@ -72,8 +72,8 @@ impl SensorGeometry {
 /// ```
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// use tactile_imaging::sensor::Sensor;
-/// # let folder = tempfile::tempdir()?;
-/// # let path = folder.path().join("sensor.toml");
+/// let folder = tempfile::tempdir()?;
+/// let path = folder.path().join("sensor.toml");
 /// std::fs::write(&path, "date = \"2026-11-22\"\nflat_field = 3\n")?;
 /// let error = Sensor::read(&path).unwrap_err().to_string();
 /// assert!(error.contains("sensor.toml: field `flat_field`: invalid type: integer `3`, expected"));

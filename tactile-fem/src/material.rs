@@ -55,7 +55,7 @@ impl Material {
     /// Young's modulus, in pascals.
     ///
     /// ```
-    /// # use tactile_fem::Material;
+    /// use tactile_fem::Material;
     /// assert_eq!(Material::new(10e3, 0.495).unwrap().youngs_modulus_pa(), 10e3);
     /// ```
     pub fn youngs_modulus_pa(&self) -> f64 {
@@ -65,7 +65,7 @@ impl Material {
     /// Poisson's ratio.
     ///
     /// ```
-    /// # use tactile_fem::Material;
+    /// use tactile_fem::Material;
     /// assert_eq!(Material::new(10e3, 0.495).unwrap().poisson_ratio(), 0.495);
     /// ```
     pub fn poisson_ratio(&self) -> f64 {

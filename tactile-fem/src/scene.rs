@@ -247,7 +247,7 @@ impl FemScene {
     /// Number of elements of all bodies.
     ///
     /// ```
-    /// # use tactile_fem::{Material, ObjectShape, ObjectPress};
+    /// use tactile_fem::{Material, ObjectShape, ObjectPress};
     /// let scene = ObjectPress::new(
     ///     ObjectShape::Ball { radius_m: 3e-3 },
     ///     Material::new(1e5, 0.495).unwrap(),
@@ -267,7 +267,7 @@ impl FemScene {
     /// discontinuous between elements. O(elements).
     ///
     /// ```
-    /// # use tactile_fem::{AppliedLoad, Material, ObjectShape, ObjectPress};
+    /// use tactile_fem::{AppliedLoad, Material, ObjectShape, ObjectPress};
     /// let scene = ObjectPress::new(
     ///     ObjectShape::Ball { radius_m: 3e-3 },
     ///     Material::new(1e5, 0.495).unwrap(),

@@ -77,7 +77,7 @@ impl State {
     /// nearest points of [`Self::pressure`]. Constant beyond the last, zero without contact.
     ///
     /// ```
-    /// # use tactile_fem::{AppliedLoad, Material, ObjectShape, ObjectPress};
+    /// use tactile_fem::{AppliedLoad, Material, ObjectShape, ObjectPress};
     /// let scene = ObjectPress::new(
     ///     ObjectShape::Ball { radius_m: 3e-3 },
     ///     Material::new(1e5, 0.495).unwrap(),

@@ -282,12 +282,12 @@ impl DetectorWorkspace {
     /// of 8 × 32 pixels, evenly over the frame, or all of a smaller one: O(tiles).
     ///
     /// ```
-    /// # use ndarray::Array2;
-    /// # use tactile_force::{ContactDetector, ContactOptions, Detection, DetectorWorkspace, ReferenceFrame};
-    /// # let reference = ReferenceFrame::new(Array2::from_elem((160, 160), 50_u8).view())?;
+    /// use ndarray::Array2;
+    /// use tactile_force::{ContactDetector, ContactOptions, Detection, DetectorWorkspace, ReferenceFrame};
+    /// let reference = ReferenceFrame::new(Array2::from_elem((160, 160), 50_u8).view())?;
     /// let mut workspace = DetectorWorkspace::default();
     /// assert!(workspace.condition(&reference).is_none(), "no frame yet");
-    /// # let dimmed = Array2::from_elem((160, 160), 49_u8);
+    /// let dimmed = Array2::from_elem((160, 160), 49_u8);
     /// let _: Detection =
     ///     ContactDetector::new(ContactOptions::default()).detect_with(&mut workspace, dimmed.view(), &reference)?;
     /// let condition = workspace.condition(&reference).expect("a frame");

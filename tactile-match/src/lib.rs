@@ -1,5 +1,4 @@
-//! Matching of point sets in the plane and in space: which point is which, and the smooth warp
-//! between them.
+#![doc = include_str!("../README.md")]
 //!
 //! # Methods
 //! The default, [`AnnealedSoftassign`], alternates a soft assignment and a smooth warp while a

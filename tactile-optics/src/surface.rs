@@ -57,7 +57,7 @@ pub struct TouchingObject {
 ///     }
 /// }
 ///
-/// # use tactile_optics::{Led, trace::{Slab, SlabLayer, TraceOptions, trace}};
+/// use tactile_optics::{Led, trace::{Slab, SlabLayer, TraceOptions, trace}};
 /// let slab = Slab::new(&[SlabLayer { index: 1.40, thickness_m: 10e-3 }], 1.0, 30e-3)?;
 /// let budget = trace(&slab, &Led::default(), &Wedge, &TraceOptions::default(), &mut [])?;
 /// assert!(budget.above + budget.below + budget.camera > 0.01);

@@ -22,7 +22,7 @@ use tactile_imaging::pipeline::{
 
 /// What is pressed on the sensor. Lengths in metres.
 #[pyclass(frozen, module = "tactile_imaging")]
-pub struct Object(pub rust::Object);
+pub(crate) struct Object(pub rust::Object);
 
 #[pymethods]
 impl Object {
@@ -158,7 +158,7 @@ impl Object {
 /// ValueError
 ///     A name that is none, or a value that is not physical.
 #[pyclass(frozen, module = "tactile_imaging")]
-pub struct Pipeline(pub rust::Pipeline);
+pub(crate) struct Pipeline(pub rust::Pipeline);
 
 #[pymethods]
 impl Pipeline {

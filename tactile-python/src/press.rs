@@ -28,7 +28,7 @@ use tactile_imaging::scene::Scene;
 /// reference : (rows, columns) array of uint8
 ///     The frame without contact.
 #[pyclass(module = "tactile_imaging")]
-pub struct Press {
+pub(crate) struct Press {
     press: rust::Press<'static>,
     /// Threads that compute. A stage in Python that asks its own press would wait for itself.
     busy: Mutex<Vec<ThreadId>>,
@@ -321,7 +321,7 @@ pub fn modulus(estimate: &ModulusEstimate) -> Modulus {
 /// references : sequence of (rows, columns) arrays of uint8
 ///     One frame or more without contact.
 #[pyclass(module = "tactile_imaging")]
-pub struct Session(rust::pipeline::Session);
+pub(crate) struct Session(rust::pipeline::Session);
 
 #[pymethods]
 impl Session {

@@ -42,7 +42,7 @@ macro_rules! result {
     ($(#[$meta:meta])* $name:ident { $($(#[$doc:meta])* $field:ident: $kind:ty,)+ }) => {
         $(#[$meta])*
         #[pyclass(frozen, module = "tactile_imaging")]
-        pub struct $name {
+        pub(crate) struct $name {
             pub text: String,
             $($(#[$doc])* #[pyo3(get)] pub $field: $kind,)+
         }

@@ -11,7 +11,7 @@ use tactile_imaging::sensor::{Indenter, LayerInput, SensorCalibration, SensorPre
 
 /// A calibrated sensor: lens, light and layers with their errors.
 #[pyclass(frozen, module = "tactile_imaging")]
-pub struct Sensor(pub rust::Sensor);
+pub(crate) struct Sensor(pub rust::Sensor);
 
 #[pymethods]
 impl Sensor {

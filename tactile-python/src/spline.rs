@@ -61,7 +61,7 @@ impl<const D: usize, K: Kernel + Send + Sync> Fitted for Spline<f64, D, 3, K> {
 /// -----
 /// A fit of n points takes O(n³) time and O(n²) memory.
 #[pyclass(frozen, module = "tactile_imaging")]
-pub struct ThinPlateSpline {
+pub(crate) struct ThinPlateSpline {
     fitted: Box<dyn Fitted>,
     axes: usize,
     outputs: usize,

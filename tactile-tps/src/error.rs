@@ -9,8 +9,8 @@ use crate::{Scalar, Smoothing};
 /// Everything that can go wrong in this crate.
 ///
 /// ```
-/// # use nalgebra::Point2;
-/// # use tactile_tps::{FitOptions, ThinPlateSpline, TpsError};
+/// use nalgebra::Point2;
+/// use tactile_tps::{FitOptions, ThinPlateSpline, TpsError};
 /// let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 0.0]].map(Point2::from);
 /// let targets = [[0.0, 0.0], [1.0, 0.0], [0.0, 0.5]].map(Point2::from);
 /// let error = ThinPlateSpline::fit(&sources, &targets, &FitOptions::default()).unwrap_err();

@@ -113,8 +113,8 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel + Default> Default
 /// A spline that maps space onto itself.
 ///
 /// ```
-/// # use nalgebra::Point3;
-/// # use tactile_tps::{FitOptions, NegR, ThinPlateSpline};
+/// use nalgebra::Point3;
+/// use tactile_tps::{FitOptions, NegR, ThinPlateSpline};
 /// # fn main() -> Result<(), tactile_tps::TpsError> {
 /// let sources = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.3, 0.4,
 ///     0.2]].map(Point3::from);
@@ -273,12 +273,12 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
     /// Values with few digits are better replaced by those of the [affine part](Self::affine).
     ///
     /// ```
-    /// # use nalgebra::Point2;
-    /// # use tactile_tps::{FitOptions, ThinPlateSpline};
+    /// use nalgebra::Point2;
+    /// use tactile_tps::{FitOptions, ThinPlateSpline};
     /// # fn main() -> Result<(), tactile_tps::TpsError> {
-    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4,
-    /// #     0.6]].map(Point2::from);
-    /// # let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
+    /// let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4,
+    ///     0.6]].map(Point2::from);
+    /// let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
     /// let warp = ThinPlateSpline::fit(&sources, &targets, &FitOptions::default())?;
     /// let near = warp.digits(&Point2::new(0.5, 0.5));
     /// let far = warp.digits(&Point2::new(1e6, 1e6));
@@ -301,12 +301,12 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
     /// derivatives is 8π times this.
     ///
     /// ```
-    /// # use nalgebra::Point2;
-    /// # use tactile_tps::{FitOptions, ThinPlateSpline};
+    /// use nalgebra::Point2;
+    /// use tactile_tps::{FitOptions, ThinPlateSpline};
     /// # fn main() -> Result<(), tactile_tps::TpsError> {
-    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4,
-    /// #     0.6]].map(Point2::from);
-    /// # let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
+    /// let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4,
+    ///     0.6]].map(Point2::from);
+    /// let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
     /// let warp = ThinPlateSpline::fit(&sources, &targets, &FitOptions::default())?;
     /// let straight = ThinPlateSpline::fit(&sources, &sources, &FitOptions::default())?;
     /// assert!(warp.bending_energy() > 1e-4 && straight.bending_energy() < 1e-25);
@@ -338,12 +338,12 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
     /// units: the distinct source points, in their order.
     ///
     /// ```
-    /// # use nalgebra::Point2;
-    /// # use tactile_tps::{FitOptions, ThinPlateSpline};
+    /// use nalgebra::Point2;
+    /// use tactile_tps::{FitOptions, ThinPlateSpline};
     /// # fn main() -> Result<(), tactile_tps::TpsError> {
-    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4,
-    /// #     0.6]].map(Point2::from);
-    /// # let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
+    /// let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4,
+    ///     0.6]].map(Point2::from);
+    /// let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
     /// let warp = ThinPlateSpline::fit(&sources, &targets, &FitOptions::default())?;
     /// assert!(warp.terms().zip(&sources).all(|((centre, _),
     ///     source)| (centre - source).norm() < 1e-15));
@@ -373,12 +373,12 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
     /// Its sum is affine by the side conditions and is accounted for here.
     ///
     /// ```
-    /// # use nalgebra::Point2;
-    /// # use tactile_tps::{FitOptions, Kernel, R2LogR, ThinPlateSpline};
+    /// use nalgebra::Point2;
+    /// use tactile_tps::{FitOptions, Kernel, R2LogR, ThinPlateSpline};
     /// # fn main() -> Result<(), tactile_tps::TpsError> {
-    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4,
-    /// #     0.6]].map(Point2::from);
-    /// # let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
+    /// let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4,
+    ///     0.6]].map(Point2::from);
+    /// let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
     /// let warp = ThinPlateSpline::fit(&sources, &targets, &FitOptions::default())?;
     /// let (linear, offset) = warp.affine();
     /// let x = Point2::new(0.7, 0.2);
@@ -430,12 +430,12 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
     /// f(x).
     ///
     /// ```
-    /// # use nalgebra::Point2;
-    /// # use tactile_tps::{FitOptions, ThinPlateSpline};
+    /// use nalgebra::Point2;
+    /// use tactile_tps::{FitOptions, ThinPlateSpline};
     /// # fn main() -> Result<(), tactile_tps::TpsError> {
-    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4,
-    /// #     0.6]].map(Point2::from);
-    /// # let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
+    /// let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4,
+    ///     0.6]].map(Point2::from);
+    /// let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
     /// let warp = ThinPlateSpline::fit(&sources, &targets, &FitOptions::default())?;
     /// assert!((warp.apply(&sources[4]) - targets[4]).norm() < 1e-14);
     /// # Ok(())
@@ -453,12 +453,12 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
     /// term is left out.
     ///
     /// ```
-    /// # use nalgebra::Point2;
-    /// # use tactile_tps::{FitOptions, ThinPlateSpline};
+    /// use nalgebra::Point2;
+    /// use tactile_tps::{FitOptions, ThinPlateSpline};
     /// # fn main() -> Result<(), tactile_tps::TpsError> {
-    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4,
-    /// #     0.6]].map(Point2::from);
-    /// # let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
+    /// let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4,
+    ///     0.6]].map(Point2::from);
+    /// let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
     /// let warp = ThinPlateSpline::fit(&sources, &targets, &FitOptions::default())?;
     /// let (x, h) = (Point2::new(0.5, 0.5), nalgebra::Vector2::new(1e-5, 0.0));
     /// let difference = (warp.apply(&(x + h)) - warp.apply(&(x - h))) / 2e-5;
@@ -477,12 +477,12 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
     /// The Hessian of every output. At a centre where the kernel has none its own term is left out.
     ///
     /// ```
-    /// # use nalgebra::Point2;
-    /// # use tactile_tps::{FitOptions, ThinPlateSpline};
+    /// use nalgebra::Point2;
+    /// use tactile_tps::{FitOptions, ThinPlateSpline};
     /// # fn main() -> Result<(), tactile_tps::TpsError> {
-    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4,
-    /// #     0.6]].map(Point2::from);
-    /// # let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
+    /// let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4,
+    ///     0.6]].map(Point2::from);
+    /// let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
     /// let warp = ThinPlateSpline::fit(&sources, &targets, &FitOptions::default())?;
     /// let (x, h) = (Point2::<f64>::new(0.5, 0.5), nalgebra::Vector2::new(0.0, 1e-5));
     /// let difference = (warp.jacobian(&(x + h)) - warp.jacobian(&(x - h))) / 2e-5;
@@ -502,12 +502,12 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
     /// f at many points, into the caller's memory.
     ///
     /// ```
-    /// # use nalgebra::Point2;
-    /// # use tactile_tps::{FitOptions, ThinPlateSpline};
+    /// use nalgebra::Point2;
+    /// use tactile_tps::{FitOptions, ThinPlateSpline};
     /// # fn main() -> Result<(), tactile_tps::TpsError> {
-    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4,
-    /// #     0.6]].map(Point2::from);
-    /// # let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
+    /// let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4,
+    ///     0.6]].map(Point2::from);
+    /// let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
     /// let warp = ThinPlateSpline::fit(&sources, &targets, &FitOptions::default())?;
     /// let queries = [Point2::new(0.5, 0.5), Point2::new(0.1, 0.9)];
     /// let mut values = [Point2::origin(); 2];
@@ -532,12 +532,12 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
     /// Jacobians at many points, into the caller's memory.
     ///
     /// ```
-    /// # use nalgebra::Point2;
-    /// # use tactile_tps::{FitOptions, ThinPlateSpline};
+    /// use nalgebra::Point2;
+    /// use tactile_tps::{FitOptions, ThinPlateSpline};
     /// # fn main() -> Result<(), tactile_tps::TpsError> {
-    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4,
-    /// #     0.6]].map(Point2::from);
-    /// # let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
+    /// let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4,
+    ///     0.6]].map(Point2::from);
+    /// let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
     /// let warp = ThinPlateSpline::fit(&sources, &targets, &FitOptions::default())?;
     /// let mut jacobians = [nalgebra::Matrix2::zeros(); 5];
     /// warp.jacobian_into(&sources, &mut jacobians)?;
@@ -561,12 +561,12 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
     /// Values and Jacobians at many points in one pass, into the caller's memory.
     ///
     /// ```
-    /// # use nalgebra::Point2;
-    /// # use tactile_tps::{FitOptions, ThinPlateSpline};
+    /// use nalgebra::Point2;
+    /// use tactile_tps::{FitOptions, ThinPlateSpline};
     /// # fn main() -> Result<(), tactile_tps::TpsError> {
-    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4,
-    /// #     0.6]].map(Point2::from);
-    /// # let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
+    /// let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4,
+    ///     0.6]].map(Point2::from);
+    /// let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
     /// let warp = ThinPlateSpline::fit(&sources, &targets, &FitOptions::default())?;
     /// let queries = [Point2::new(0.5, 0.5), Point2::new(0.1, 0.9)];
     /// let (mut values, mut jacobians) = ([Point2::origin(); 2], [nalgebra::Matrix2::zeros(); 2]);
@@ -625,12 +625,12 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
     /// As [`apply_into`](Self::apply_into), over the threads of the current rayon pool.
     ///
     /// ```
-    /// # use nalgebra::Point2;
-    /// # use tactile_tps::{FitOptions, ThinPlateSpline};
+    /// use nalgebra::Point2;
+    /// use tactile_tps::{FitOptions, ThinPlateSpline};
     /// # fn main() -> Result<(), tactile_tps::TpsError> {
-    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4,
-    /// #     0.6]].map(Point2::from);
-    /// # let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
+    /// let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4,
+    ///     0.6]].map(Point2::from);
+    /// let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
     /// let warp = ThinPlateSpline::fit(&sources, &targets, &FitOptions::default())?;
     /// let queries: Vec<_> = (0..1000).map(|i| Point2::new(f64::from(i) / 1000.0, 0.5)).collect();
     /// let mut values = vec![Point2::origin(); 1000];
@@ -658,12 +658,12 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
     /// current rayon pool.
     ///
     /// ```
-    /// # use nalgebra::Point2;
-    /// # use tactile_tps::{FitOptions, ThinPlateSpline};
+    /// use nalgebra::Point2;
+    /// use tactile_tps::{FitOptions, ThinPlateSpline};
     /// # fn main() -> Result<(), tactile_tps::TpsError> {
-    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4,
-    /// #     0.6]].map(Point2::from);
-    /// # let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
+    /// let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4,
+    ///     0.6]].map(Point2::from);
+    /// let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
     /// let warp = ThinPlateSpline::fit(&sources, &targets, &FitOptions::default())?;
     /// let queries: Vec<_> = (0..1000).map(|i| Point2::new(f64::from(i) / 1000.0, 0.5)).collect();
     /// let mut values = vec![Point2::origin(); 1000];

@@ -11,7 +11,7 @@ use core::ops::{Add, Div, Mul, Neg, Sub};
 /// a select.
 ///
 /// ```
-/// # use tactile_tps::KernelScalar;
+/// use tactile_tps::KernelScalar;
 /// /// ln(1 + eˣ), in whatever arithmetic it is called.
 /// fn softplus<R: KernelScalar>(x: R) -> R {
 ///     (R::from_f64(1.0) + x.exp()).ln()
@@ -56,7 +56,7 @@ pub trait KernelScalar:
 /// second d dᵀ`.
 ///
 /// ```
-/// # use tactile_tps::{KernelDerivatives, Kernel, R3};
+/// use tactile_tps::{KernelDerivatives, Kernel, R3};
 /// // U = s^(3/2) at s = r² = 4.
 /// assert_eq!(R3.derivatives(4.0), KernelDerivatives { value: 8.0, first: 3.0, second: 0.375 });
 /// ```
@@ -124,7 +124,7 @@ pub trait Kernel: Clone + Send + Sync {
 /// same spline.
 ///
 /// ```
-/// # use tactile_tps::{Kernel, R2LogR};
+/// use tactile_tps::{Kernel, R2LogR};
 /// let r = 2.0f64;
 /// assert!((R2LogR.derivatives(r * r).value - r * r * r.ln()).abs() < 1e-15);
 /// assert_eq!(R2LogR.derivatives(0.0).value, 0.0);
@@ -137,7 +137,7 @@ pub struct R2LogR;
 /// point.
 ///
 /// ```
-/// # use tactile_tps::{Kernel, NegR};
+/// use tactile_tps::{Kernel, NegR};
 /// assert_eq!(NegR.derivatives(9.0).value, -3.0);
 /// assert_eq!(NegR.derivatives(0.0).first, 0.0); // the cusp, left out
 /// ```
@@ -148,7 +148,7 @@ pub struct NegR;
 /// U(r) = r³: one derivative smoother than −r (m = 3 in space, with an affine polynomial).
 ///
 /// ```
-/// # use tactile_tps::{Kernel, R3};
+/// use tactile_tps::{Kernel, R3};
 /// assert_eq!((R3.derivatives(4.0).value, R3.degree()), (8.0, Some(3)));
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -24,7 +24,7 @@ pub trait Lane<T>: KernelScalar {
 /// evaluated.
 ///
 /// ```
-/// # use tactile_tps::Scalar;
+/// use tactile_tps::Scalar;
 /// assert_eq!(<f64 as Scalar>::UNIT_ROUNDOFF, 0.5 * f64::EPSILON);
 /// ```
 pub trait Scalar: RealField + Copy + Default {

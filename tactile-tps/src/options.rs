@@ -8,8 +8,8 @@ use crate::{
 /// How the equations are solved.
 ///
 /// ```
-/// # use nalgebra::Point2;
-/// # use tactile_tps::{FitOptions, Solver, ThinPlateSpline};
+/// use nalgebra::Point2;
+/// use tactile_tps::{FitOptions, Solver, ThinPlateSpline};
 /// # fn main() -> Result<(), tactile_tps::TpsError> {
 /// let sources: Vec<Point2<f64>> =
 ///     (0..900).map(|i| Point2::new(f64::from(i % 30), f64::from(i / 30)
@@ -105,9 +105,9 @@ impl<T: Scalar, K> FitOptions<T, K> {
     /// Interpolation with this kernel, all points alike.
     ///
     /// ```
-    /// # use tactile_tps::{FitOptions, R3};
+    /// use tactile_tps::{FitOptions, R3};
     /// let options = FitOptions::<f64, _>::new(R3);
-    /// # let _ = options;
+    /// let _ = options;
     /// ```
     pub fn new(kernel: K) -> Self {
         Self {
@@ -123,12 +123,12 @@ impl<T: Scalar, K> FitOptions<T, K> {
     /// Sets the smoothing.
     ///
     /// ```
-    /// # use nalgebra::Point2;
-    /// # use tactile_tps::{FitOptions, Smoothing, ThinPlateSpline};
+    /// use nalgebra::Point2;
+    /// use tactile_tps::{FitOptions, Smoothing, ThinPlateSpline};
     /// # fn main() -> Result<(), tactile_tps::TpsError> {
-    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4,
-    /// #     0.6]].map(Point2::from);
-    /// # let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
+    /// let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4,
+    ///     0.6]].map(Point2::from);
+    /// let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
     /// let options = FitOptions::default().with_smoothing(Smoothing::Lambda(0.5))?;
     /// let warp = ThinPlateSpline::fit(&sources, &targets, &options)?;
     /// assert!((warp.report.lambda - 0.5).abs() < 1e-15 && warp.bending_energy() < 1e-3);
@@ -150,12 +150,12 @@ impl<T: Scalar, K> FitOptions<T, K> {
     /// weight.
     ///
     /// ```
-    /// # use nalgebra::Point2;
-    /// # use tactile_tps::{FitOptions, ThinPlateSpline};
+    /// use nalgebra::Point2;
+    /// use tactile_tps::{FitOptions, ThinPlateSpline};
     /// # fn main() -> Result<(), tactile_tps::TpsError> {
-    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4,
-    /// #     0.6]].map(Point2::from);
-    /// # let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
+    /// let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4,
+    ///     0.6]].map(Point2::from);
+    /// let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
     /// let warp = ThinPlateSpline::fit(&sources, &targets,
     ///     &FitOptions::default().with_weights(vec![1.0, 1.0, 1.0, 1.0, 0.0])?)?;
     /// assert_eq!(warp.report.ignored, 1);
@@ -199,8 +199,8 @@ impl<T: Scalar, K> FitOptions<T, K> {
     /// flat surface needs more: across it the spline's gradient is noise divided by thickness.
     ///
     /// ```
-    /// # use nalgebra::Point3;
-    /// # use tactile_tps::{FitOptions, NegR, ThinPlateSpline};
+    /// use nalgebra::Point3;
+    /// use tactile_tps::{FitOptions, NegR, ThinPlateSpline};
     /// # fn main() -> Result<(), tactile_tps::TpsError> {
     /// let sources = [[0.0, 0.0, 0.0], [1.0, 0.0, 1e-5], [0.0, 1.0, 0.0], [1.0, 1.0, 0.0], [0.4,
     ///     0.6, 1e-5]].map(Point3::from);
@@ -227,7 +227,7 @@ impl<T: Scalar, K> FitOptions<T, K> {
     /// Sets how the equations are solved.
     ///
     /// ```
-    /// # use tactile_tps::{FitOptions, Solver};
+    /// use tactile_tps::{FitOptions, Solver};
     /// let to_rounding = FitOptions::<f64>::default().with_solver(Solver::Direct);
     /// assert_ne!(to_rounding, FitOptions::default());
     /// ```
@@ -244,8 +244,8 @@ impl<T: Scalar, K> FitOptions<T, K> {
     /// residual that was reached.
     ///
     /// ```
-    /// # use nalgebra::Point2;
-    /// # use tactile_tps::{FitOptions, Solver, ThinPlateSpline};
+    /// use nalgebra::Point2;
+    /// use tactile_tps::{FitOptions, Solver, ThinPlateSpline};
     /// # fn main() -> Result<(), tactile_tps::TpsError> {
     /// let sources: Vec<Point2<f64>> =
     ///     (0..900).map(|i| Point2::new(f64::from(i % 30), f64::from(i / 30)
@@ -284,8 +284,8 @@ impl<T: Scalar, K> FitOptions<T, K> {
 /// How a spline was fitted and how far it can be trusted.
 ///
 /// ```
-/// # use nalgebra::Point2;
-/// # use tactile_tps::{FitOptions, ThinPlateSpline};
+/// use nalgebra::Point2;
+/// use tactile_tps::{FitOptions, ThinPlateSpline};
 /// # fn main() -> Result<(), tactile_tps::TpsError> {
 /// // Three points on a line: nothing is known across it.
 /// let sources = [[0.0, 0.0], [1.0, 1.0], [3.0, 3.0], [3.0, 3.0]].map(Point2::from);
@@ -347,9 +347,9 @@ impl FitReport {
     /// Whether the solver reached its tolerance. Direct solves always do.
     ///
     /// ```
-    /// # use nalgebra::Point2;
-    /// # use tactile_tps::{FitOptions, StopReason, ThinPlateSpline};
-    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]].map(Point2::from);
+    /// use nalgebra::Point2;
+    /// use tactile_tps::{FitOptions, StopReason, ThinPlateSpline};
+    /// let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]].map(Point2::from);
     /// let report = ThinPlateSpline::fit(&sources, &sources, &FitOptions::default())?.report;
     /// assert!(report.converged() && report.stop == StopReason::Direct);
     /// # Ok::<(), tactile_tps::TpsError>(())

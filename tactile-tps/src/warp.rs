@@ -83,12 +83,12 @@ pub trait Warp<T: Scalar, const D: usize> {
 /// [`Spline::fit`], [`Affine::fit`], [`Affine::fit_rigid`].
 ///
 /// ```
-/// # use nalgebra::Point2;
+/// use nalgebra::Point2;
 /// use std::sync::Arc;
 /// use tactile_tps::{AffineModel, FitOptions, Warp, WarpModel};
 /// # fn main() -> Result<(), tactile_tps::TpsError> {
-/// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
-/// # let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
+/// let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
+/// let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
 /// let models: [Arc<dyn WarpModel<f64, 2> + Send + Sync>; 2] = [Arc::new(FitOptions::default()),
 ///     Arc::new(AffineModel::General)];
 /// let mut misfits = Vec::new();
@@ -255,8 +255,8 @@ impl core::fmt::Debug for SeriesMemory {
 /// identity.
 ///
 /// ```
-/// # use nalgebra::{Matrix2, Point2, Vector2};
-/// # use tactile_tps::{Affine, Warp};
+/// use nalgebra::{Matrix2, Point2, Vector2};
+/// use tactile_tps::{Affine, Warp};
 /// let shear = Affine { linear: Matrix2::new(1.0, 0.5, 0.0, 1.0), offset: Vector2::new(0.0, 2.0) };
 /// assert_eq!(shear.apply(&Point2::new(1.0, 4.0)), Point2::new(3.0, 6.0));
 /// assert_eq!(shear.jacobian(&Point2::origin()), shear.linear);
@@ -292,8 +292,8 @@ impl<T: Scalar, const D: usize> Affine<T, D> {
     /// pseudo-inverse S⁺). O(n).
     ///
     /// ```
-    /// # use nalgebra::Point2;
-    /// # use tactile_tps::{Affine, Warp};
+    /// use nalgebra::Point2;
+    /// use tactile_tps::{Affine, Warp};
     /// # fn main() -> Result<(), tactile_tps::TpsError> {
     /// let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4,
     ///     0.6]].map(Point2::from);
@@ -332,8 +332,8 @@ impl<T: Scalar, const D: usize> Affine<T, D> {
     /// nearest to C = Σ w y xᵀ (Kabsch 1976; Umeyama 1991). O(n).
     ///
     /// ```
-    /// # use nalgebra::{Point2, Rotation2};
-    /// # use tactile_tps::Affine;
+    /// use nalgebra::{Point2, Rotation2};
+    /// use tactile_tps::Affine;
     /// # fn main() -> Result<(), tactile_tps::TpsError> {
     /// let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4,
     ///     0.6]].map(Point2::from);
@@ -441,10 +441,10 @@ fn nearest_rotation<const D: usize>(cross: &SMatrix<f64, D, D>) -> SMatrix<f64, 
 /// The [`WarpModel`] of affine maps: all of them, or rotations and translations alone.
 ///
 /// ```
-/// # use nalgebra::{Point2, Vector2};
-/// # use tactile_tps::{AffineModel, Warp, WarpModel};
+/// use nalgebra::{Point2, Vector2};
+/// use tactile_tps::{AffineModel, Warp, WarpModel};
 /// # fn main() -> Result<(), tactile_tps::TpsError> {
-/// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
+/// let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
 /// let doubled = sources.map(|p| p * 2.0 + Vector2::new(1.0, 2.0));
 /// let warp: Box<dyn Warp<f64, 2> + Send + Sync> = AffineModel::General.fit(&sources, &doubled,
 ///     None)?;

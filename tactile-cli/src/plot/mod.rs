@@ -32,11 +32,11 @@ pub use press::{circle, press_pages, summary_lines};
 ///
 /// ```
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
-/// # use tactile_simulate::{Trial, CalibrationRun, Camera, PressLoad, PressOptions};
-/// # let camera = Camera::default().coarser(16);
-/// # let options = PressOptions { camera, loads: vec![PressLoad::normal(0.7)], ..PressOptions::default() };
-/// # let trial = Trial::new(options, &CalibrationRun::default())?;
-/// # let pipeline = trial.pipeline()?;
+/// use tactile_simulate::{Trial, CalibrationRun, Camera, PressLoad, PressOptions};
+/// let camera = Camera::default().coarser(16);
+/// let options = PressOptions { camera, loads: vec![PressLoad::normal(0.7)], ..PressOptions::default() };
+/// let trial = Trial::new(options, &CalibrationRun::default())?;
+/// let pipeline = trial.pipeline()?;
 /// use tactile_cli::{PlotError, save_press_pages};
 /// let file = tempfile::NamedTempFile::new()?;
 /// let error = save_press_pages(&mut trial.press(&pipeline)?, file.path()).unwrap_err();

@@ -34,11 +34,11 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
     /// O(n²) time, O(n) memory.
     ///
     /// ```
-    /// # use nalgebra::Point2;
-    /// # use tactile_tps::{Factorization, FitOptions, NegR, TpsError};
+    /// use nalgebra::Point2;
+    /// use tactile_tps::{Factorization, FitOptions, NegR, TpsError};
     /// # fn main() -> Result<(), tactile_tps::TpsError> {
-    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4,
-    /// #     0.6]].map(Point2::from);
+    /// let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4,
+    ///     0.6]].map(Point2::from);
     /// let factorization = Factorization::new(&sources, &FitOptions::new(NegR))?;
     /// assert!(factorization.fit(&sources)?.report.points == 5);
     /// let five_weights = FitOptions::new(NegR).with_weights(vec![1.0; 5])?;
@@ -70,11 +70,11 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
     /// For points of the same number nothing is allocated.
     ///
     /// ```
-    /// # use nalgebra::Point2;
-    /// # use tactile_tps::{Factorization, FitOptions, Spline, TpsError, SplineWorkspace};
+    /// use nalgebra::Point2;
+    /// use tactile_tps::{Factorization, FitOptions, Spline, TpsError, SplineWorkspace};
     /// # fn main() -> Result<(), TpsError> {
-    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4,
-    /// #     0.6]].map(Point2::from);
+    /// let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4,
+    ///     0.6]].map(Point2::from);
     /// let options = FitOptions::default();
     /// let mut factorization = Factorization::new(&sources, &options)?;
     /// let (mut workspace, mut spline) = (SplineWorkspace::default(), Spline::default());
@@ -135,11 +135,11 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
     /// Measures the residual, and refines the solution where the condition number is large.
     ///
     /// ```
-    /// # use nalgebra::Point2;
-    /// # use tactile_tps::{Factorization, FitOptions};
+    /// use nalgebra::Point2;
+    /// use tactile_tps::{Factorization, FitOptions};
     /// # fn main() -> Result<(), tactile_tps::TpsError> {
-    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4,
-    /// #     0.6]].map(Point2::from);
+    /// let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4,
+    ///     0.6]].map(Point2::from);
     /// let factorization = Factorization::new(&sources, &FitOptions::default())?;
     /// // Any number of outputs: here a height.
     /// let heights = sources.map(|p| nalgebra::Point1::new(p.x * p.y));
@@ -205,11 +205,11 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
     /// preconditioner.
     ///
     /// ```
-    /// # use nalgebra::Point2;
-    /// # use tactile_tps::{Factorization, FitOptions, Smoothing, Spline, SplineWorkspace};
+    /// use nalgebra::Point2;
+    /// use tactile_tps::{Factorization, FitOptions, Smoothing, Spline, SplineWorkspace};
     /// # fn main() -> Result<(), tactile_tps::TpsError> {
-    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4,
-    /// #     0.6]].map(Point2::from);
+    /// let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4,
+    ///     0.6]].map(Point2::from);
     /// let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
     /// let factorization = Factorization::new(&sources,
     ///     &FitOptions::default().with_smoothing(Smoothing::Lambda(0.01))?)?;

@@ -77,10 +77,10 @@ pub struct Factorization<T: Scalar, const D: usize, K = R2LogR> {
 /// Buffers that refits reuse.
 ///
 /// ```
-/// # use nalgebra::Point2;
-/// # use tactile_tps::{Factorization, FitOptions, Spline, SplineWorkspace};
+/// use nalgebra::Point2;
+/// use tactile_tps::{Factorization, FitOptions, Spline, SplineWorkspace};
 /// # fn main() -> Result<(), tactile_tps::TpsError> {
-/// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
+/// let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
 /// let factorization = Factorization::new(&sources, &FitOptions::default())?;
 /// let (mut workspace, mut spline) = (SplineWorkspace::default(), Spline::default());
 /// for step in 1..=3 {

@@ -84,11 +84,11 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> LambdaPath<T, D, M, K
     /// allocated.
     ///
     /// ```
-    /// # use nalgebra::Point2;
-    /// # use tactile_tps::{FitOptions, LambdaPath};
+    /// use nalgebra::Point2;
+    /// use tactile_tps::{FitOptions, LambdaPath};
     /// # fn main() -> Result<(), tactile_tps::TpsError> {
-    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4,
-    /// #     0.6]].map(Point2::from);
+    /// let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4,
+    ///     0.6]].map(Point2::from);
     /// let options = FitOptions::default();
     /// let mut path = LambdaPath::fit(&sources, &sources, &options, &[1e-9, 1.0])?;
     /// let lifted = sources.map(|p| Point2::new(p.x, p.y + p.x * p.y));

@@ -9,8 +9,8 @@ pub use robust::{RobustFit, RobustSpline};
 /// How closely the spline follows its targets.
 ///
 /// ```
-/// # use nalgebra::Point2;
-/// # use tactile_tps::{FitOptions, Smoothing, ThinPlateSpline};
+/// use nalgebra::Point2;
+/// use tactile_tps::{FitOptions, Smoothing, ThinPlateSpline};
 /// # fn main() -> Result<(), tactile_tps::TpsError> {
 /// let sources: Vec<Point2<f64>> = (0..25).map(|i| Point2::new(f64::from(i % 5),
 ///     f64::from(i / 5))).collect();
