@@ -14,8 +14,7 @@ use tactile_imaging::fem::{
 };
 use tactile_imaging::inclusion::{
     AssumedInclusion, Estimated, Identifiable, InclusionEstimate, InclusionScene, InclusionSearch,
-    InclusionWarning, LoadedInclusion, PressureProfile, SearchProgress, Specimen, Verdict,
-    asymmetry_warnings,
+    LoadedInclusion, PressureProfile, SearchProgress, Specimen, Verdict, asymmetry_warnings,
 };
 use tactile_imaging::pipeline::with_error;
 
@@ -218,7 +217,7 @@ pub fn run(arguments: &InclusionArguments, context: &mut Context) -> Result<Exit
     for warning in &estimate.warnings {
         let numbers = json!(warning);
         let kind = numbers["kind"].as_str().unwrap_or_default().to_owned();
-        context.warn(&kind, numbers, sentence(warning));
+        context.warn(&kind, numbers, warning.to_string());
     }
     context.value(&json!({
         "verdict": estimate.verdict(), "found": estimate.found, "probability": estimate.probability, "inclusion": estimate.inclusion,
@@ -392,40 +391,6 @@ fn print(estimate: &InclusionEstimate, scan: &Scan, context: &mut Context) {
                  (simulated by the same finite elements)"
             ),
         );
-    }
-}
-
-fn sentence(warning: &InclusionWarning) -> String {
-    match warning {
-        InclusionWarning::PoorFit { excess } => format!(
-            "the best fit leaves {excess:.1} times what the errors explain: several lumps, one \
-             off the axis, or wrong sizes or forces; errors are widened"
-        ),
-        InclusionWarning::OneFrame => {
-            "one frame tells size and stiffness hardly apart: add approaches".into()
-        }
-        InclusionWarning::NotConverged => "the fit had not settled; nothing of it is told".into(),
-        InclusionWarning::UncertainInterface => {
-            "bonded and frictionless faces explain the frames about equally well".into()
-        }
-        InclusionWarning::AtBoundary => {
-            "the lump touches the surface or the base: beyond the model".into()
-        }
-        InclusionWarning::Asymmetric { asymmetry } => format!(
-            "the pressure is {:.1} % larger on one side: a lump off the axis, several, or a \
-             tilted block; the model is symmetric, and no size is given",
-            100.0 * asymmetry
-        ),
-        InclusionWarning::NotABall { axes } => format!(
-            "seen from above the lump's axes are {axes:.2} : 1; the model is a ball, and no size \
-             is given"
-        ),
-        InclusionWarning::NotRound { harmonics } => format!(
-            "around the axis the pressure varies by {:.1} %: a lump that is not round, several, \
-             or one off the axis; the model is symmetric, and no size is given",
-            100.0 * harmonics
-        ),
-        other => format!("{other:?}"),
     }
 }
 

@@ -1,5 +1,6 @@
 //! What a search found.
 
+use std::fmt;
 use tactile_fem::Interface;
 
 /// A value with its standard error and its 95 % interval.
@@ -136,7 +137,8 @@ pub struct Inclusion {
 /// ```
 /// use tactile_inclusion::InclusionWarning;
 ///
-/// assert_ne!(InclusionWarning::OneFrame, InclusionWarning::NotConverged);
+/// let sentence = InclusionWarning::OneFrame.to_string();
+/// assert!(sentence.ends_with("add approaches"));
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(
@@ -182,6 +184,45 @@ pub enum InclusionWarning {
         /// Root mean square of these harmonics over the pressure.
         harmonics: f64,
     },
+}
+
+impl fmt::Display for InclusionWarning {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::PoorFit { excess } => write!(
+                f,
+                "the best fit leaves {excess:.1} times what the errors explain: several lumps, one \
+                 off the axis, or wrong sizes or forces; errors are widened"
+            ),
+            Self::OneFrame => {
+                f.write_str("one frame tells size and stiffness hardly apart: add approaches")
+            }
+            Self::NotConverged => f.write_str("the fit had not settled; nothing of it is told"),
+            Self::UncertainInterface => {
+                f.write_str("bonded and frictionless faces explain the frames about equally well")
+            }
+            Self::AtBoundary => {
+                f.write_str("the lump touches the surface or the base: beyond the model")
+            }
+            Self::Asymmetric { asymmetry } => write!(
+                f,
+                "the pressure is {:.1} % larger on one side: a lump off the axis, several, or a \
+                 tilted block; the model is symmetric, and no size is given",
+                100.0 * asymmetry
+            ),
+            Self::NotABall { axes } => write!(
+                f,
+                "seen from above the lump's axes are {axes:.2} : 1; the model is a ball, and no \
+                 size is given"
+            ),
+            Self::NotRound { harmonics } => write!(
+                f,
+                "around the axis the pressure varies by {:.1} %: a lump that is not round, several, \
+                 or one off the axis; the model is symmetric, and no size is given",
+                100.0 * harmonics
+            ),
+        }
+    }
 }
 
 /// What a symmetric model does not explain of a picture: its first harmonic around the axis above

@@ -177,10 +177,6 @@ fn result(py: Python<'_>, found: &InclusionEstimate) -> PyResult<Inclusion> {
             Interface::Bonded => "bonded",
             _ => "frictionless",
         },
-        flags: found
-            .warnings
-            .iter()
-            .map(|warning| format!("{warning:?}"))
-            .collect(),
+        flags: found.warnings.iter().map(ToString::to_string).collect(),
     })
 }
