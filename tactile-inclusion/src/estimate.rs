@@ -217,8 +217,8 @@ impl fmt::Display for InclusionWarning {
             ),
             Self::NotRound { harmonics } => write!(
                 f,
-                "around the axis the pressure varies by {:.1} %: a lump that is not round, several, \
-                 or one off the axis; the model is symmetric, and no size is given",
+                "around the axis the pressure varies by {:.1} %: a lump that is not round, \
+                 several, or one off the axis; the model is symmetric, and no size is given",
                 100.0 * harmonics
             ),
         }
