@@ -144,7 +144,11 @@ impl InclusionScene {
     /// # Errors
     /// [`FileError`]: one sentence that names the file and the field.
     pub fn read(path: impl AsRef<Path>) -> Result<Self, FileError> {
-        let path = path.as_ref();
+        Self::from_file(path.as_ref())
+    }
+
+    /// Not generic, so that the parser is compiled once, not again in every crate that reads.
+    fn from_file(path: &Path) -> Result<Self, FileError> {
         let file: InclusionFile = read_toml(path)?;
         let mut frames = file.frames;
         let mut last_m = 0.0;

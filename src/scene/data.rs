@@ -167,9 +167,12 @@ impl Scene {
     /// # Errors
     /// [`FileError`]: one sentence that names the file and the field.
     pub fn measure_file(path: impl AsRef<Path>) -> Result<Measurement, FileError> {
-        let scene = Self::read(path)?;
-        let data = scene.load_without_frames()?;
-        let press = scene.press(&scene.pipeline(&data)?, &data)?;
+        Self::read(path)?.measure()
+    }
+
+    fn measure(&self) -> Result<Measurement, FileError> {
+        let data = self.load_without_frames()?;
+        let press = self.press(&self.pipeline(&data)?, &data)?;
         Ok(press.measure())
     }
 

@@ -334,8 +334,7 @@ impl Scene {
     /// # Errors
     /// As [`read`](Self::read).
     pub fn parse(text: &str, file: impl AsRef<Path>) -> Result<Self, FileError> {
-        let path = file.as_ref();
-        parse_toml::<SceneFile>(text, path)?.validate(path)
+        SceneFile::parse(text, file.as_ref())
     }
 }
 
@@ -483,6 +482,11 @@ struct StagesTable {
 }
 
 impl SceneFile {
+    /// Not generic, so that the parser is compiled once, not again in every crate that reads.
+    fn parse(text: &str, path: &Path) -> Result<Scene, FileError> {
+        parse_toml::<Self>(text, path)?.validate(path)
+    }
+
     /// Checks the fields against one another.
     fn validate(self, file: &Path) -> Result<Scene, FileError> {
         let error = |field: &str, reason: &str| FileError::field(file, field, reason);
@@ -674,7 +678,12 @@ impl StagesTable {
 /// # Errors
 /// [`FileError`], also for contacts that make no table, or a table of another version.
 pub fn read_contact_table(path: impl AsRef<Path>) -> Result<ContactTable, FileError> {
-    read_toml(path.as_ref())
+    contact_table_of(path.as_ref())
+}
+
+/// Not generic, so that the parser is compiled once, not again in every crate that reads.
+fn contact_table_of(path: &Path) -> Result<ContactTable, FileError> {
+    read_toml(path)
 }
 
 /// Writes a contact table as TOML. Numbers keep all their digits.

@@ -132,7 +132,11 @@ impl Sensor {
     /// # Errors
     /// [`FileError`]: one sentence that names the file, the field and what was expected.
     pub fn read(path: impl AsRef<Path>) -> Result<Self, FileError> {
-        let path = path.as_ref();
+        Self::from_file(path.as_ref())
+    }
+
+    /// Not generic, so that the parser is compiled once, not again in every crate that reads.
+    fn from_file(path: &Path) -> Result<Self, FileError> {
         let sensor: Self = read_toml(path)?;
         match sensor.mistake() {
             None => Ok(sensor),
@@ -145,7 +149,10 @@ impl Sensor {
     /// # Errors
     /// [`FileError::Write`].
     pub fn write(&self, path: impl AsRef<Path>) -> Result<(), FileError> {
-        let path = path.as_ref();
+        self.to_file(path.as_ref())
+    }
+
+    fn to_file(&self, path: &Path) -> Result<(), FileError> {
         let text = toml::to_string(self).map_err(|error| FileError::Write {
             path: path.into(),
             source: std::io::Error::other(error),

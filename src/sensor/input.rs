@@ -171,8 +171,7 @@ impl SensorCalibration {
     /// # Errors
     /// [`FileError`]: one sentence with file and field.
     pub fn read(path: impl AsRef<Path>) -> Result<Self, FileError> {
-        let path = path.as_ref();
-        read_toml::<CalibrationFile>(path)?.validate(path)
+        CalibrationFile::read(path.as_ref())
     }
 }
 
@@ -274,6 +273,11 @@ struct LayerTable {
 }
 
 impl CalibrationFile {
+    /// Not generic, so that the parser is compiled once, not again in every crate that reads.
+    fn read(path: &Path) -> Result<SensorCalibration, FileError> {
+        read_toml::<Self>(path)?.validate(path)
+    }
+
     /// Reads the images and checks their sizes.
     fn validate(self, file: &Path) -> Result<SensorCalibration, FileError> {
         let image = |field: &str, name: &Path, size| {

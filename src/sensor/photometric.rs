@@ -90,7 +90,11 @@ impl PhotometricPresses {
     /// # Errors
     /// [`FileError`]: one sentence that names the file, the field and what was expected.
     pub fn read(path: impl AsRef<Path>) -> Result<Self, FileError> {
-        let path = path.as_ref();
+        Self::from_file(path.as_ref())
+    }
+
+    /// Not generic, so that the parser is compiled once, not again in every crate that reads.
+    fn from_file(path: &Path) -> Result<Self, FileError> {
         let file: CalibrationFile = read_toml(path)?;
         let reference_path = beside(path, &file.reference);
         let reference = read_colour_levels(&reference_path)
@@ -187,7 +191,11 @@ impl PhotometricSensor {
     /// # Errors
     /// [`FileError`]: one sentence that names the file, the field and what was expected.
     pub fn read(path: impl AsRef<Path>) -> Result<PhotometricStereo, FileError> {
-        let path = path.as_ref();
+        Self::from_file(path.as_ref())
+    }
+
+    /// Not generic, so that the parser is compiled once, not again in every crate that reads.
+    fn from_file(path: &Path) -> Result<PhotometricStereo, FileError> {
         let file: Self = read_toml(path)?;
         let reference = read_colour_levels(beside(path, &file.reference));
         let reference = reference.map_err(|error| FileError::field(path, "reference", error))?;
