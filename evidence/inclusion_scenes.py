@@ -1,10 +1,11 @@
 #!/usr/bin/env python3
 """Makes scenes of a tissue block with a spherical inclusion under the sensor's guide, solved by CalculiX (`ccx`, Debian's calculix-ccx).
 
-    evidence/inclusion_scenes.py FOLDER [--size MM] [--seed N] [--part K/N] [NAMES ...]
+    evidence/inclusion_scenes.py FOLDER [--size MM] [--seed N] [--part K/N] [--spheroids] [NAMES ...]
 
 writes FOLDER/scenes.csv and FOLDER/NAME.csv as `tactile-elasticity/examples/inclusion_study` reads them: 108 blocks with an
-inclusion, 32 plain ones, drawn from a fixed seed or N. NAMES keeps some, `--part` shares them out; what is there is left. A scene takes 5 to 30 s.
+inclusion, 32 plain ones, drawn from a fixed seed or N. With --spheroids the inclusions are drawn with heights over widths from 1/1.75 to 1.75
+and the diameter is that of the ball of equal volume. NAMES keeps some, `--part` shares them out; what is there is left. A scene takes 5 to 30 s.
 
 Axisymmetric quadratic elements with reduced integration (CAX8R) at finite strain, compressible neo-Hooke
 U = C10 (I1 - 3) + (J - 1)^2 / D1 with C10 = mu/2, D1 = 2/kappa. The face's nodes are doubled and tied by equations, in both
@@ -34,10 +35,15 @@ GUIDE_POISSON = 0.495
 BLOCK_RADIUS = 40.0
 TISSUE = len(LAYERS)
 HEADER = ("scene,D_m,depth_m,E1_pa,E0_pa,block_height_m,block_radius_m,disc_radius_m,nu,contact,"
-          "approach_1_m,approach_2_m,approach_3_m,force_1_n,force_2_n,force_3_n")
+          "approach_1_m,approach_2_m,approach_3_m,force_1_n,force_2_n,force_3_n,aspect")
 
 
-def draw(seed):
+def half_axes(scene):
+    """Of the inclusion: half its width, half its height."""
+    return 0.5 * scene["D"] * scene["aspect"] ** (-1 / 3), 0.5 * scene["D"] * scene["aspect"] ** (2 / 3)
+
+
+def draw(seed, spheroids):
     """The scenes: dictionaries of lengths in mm and moduli in kPa."""
     rng = random.Random(seed)
     scenes = []
@@ -54,20 +60,22 @@ def draw(seed):
         part = part if sticks else 0.085 + 0.15 * (part - 0.08)
         step = round(part * scene["H"] / loads, 3)
         scene.update(name=name, sticks=sticks, approaches=[step * (k + 1) for k in range(loads)])
-        scenes.append({key: round(value, 3) if key in ("E0", "E1", "H", "R", "D", "d") else value for key, value in scene.items()})
+        scenes.append({key: round(value, 3) if key in ("E0", "E1", "H", "R", "D", "d", "aspect") else value for key, value in scene.items()})
 
     count = 0
     while count < 108:
         scene = block()
         scene.update(D=rng.uniform(6, 16), d=rng.uniform(2, 9))
         scene.update(E1=scene["E0"] * logarithmic(1.5, 15), nu=0.495)
-        if scene["D"] + scene["d"] + 2.0 > scene["H"] or 0.5 * scene["D"] > 0.6 * scene["R"]:
+        scene.update(aspect=logarithmic(1 / 1.75, 1.75) if spheroids else 1.0)
+        half_width, half_height = half_axes(scene)
+        if 2 * half_height + scene["d"] + 2.0 > scene["H"] or half_width > 0.6 * scene["R"]:
             continue
         finish(scene, f"own_{count:03}", count % 5 not in (1, 3), 2 if count % 3 == 0 else 3)
         count += 1
     for count in range(32):
         scene = block()
-        scene.update(D=0.0, d=0.0, E1=scene["E0"], nu=round(min(rng.gauss(0.495, 0.005), 0.499), 4))
+        scene.update(D=0.0, d=0.0, aspect=1.0, E1=scene["E0"], nu=round(min(rng.gauss(0.495, 0.005), 0.499), 4))
         finish(scene, f"plain_{count:03}", count % 2 == 0, 2 if count % 3 == 0 else 3)
     return scenes
 
@@ -119,9 +127,9 @@ class Mesh:
 
         self.block(len(rs) - 1, len(zs) - 1, region, lambda i, j: (at(rs, i), at(zs, j)))
 
-    def inclusion(self, radius, centre, width, low, high, n):
-        """The box [0, width] x [low, high] around a circle on the axis: a core, shells to the circle, shells to the box."""
-        half = 0.5 * radius
+    def inclusion(self, axes, centre, width, low, high, n):
+        """The box [0, width] x [low, high] around an ellipse on the axis: a core, shells to the ellipse, shells to the box."""
+        half, tall = 0.5 * axes[0], 0.5 * axes[1]
 
         def box(k, width, low, high):
             t = k / (2 * n)
@@ -132,14 +140,14 @@ class Mesh:
             return (4 - t) * width, high
 
         def core(k):
-            r, z = box(k, half, -half, half)
+            r, z = box(k, half, -tall, tall)
             # Sides that bulge towards the circle open the angles at the corners.
-            scale = 0.92 * (1 + 0.13 * (1 - (r / half) ** 2) + 0.13 * (1 - (z / half) ** 2))
+            scale = 0.92 * (1 + 0.13 * (1 - (r / half) ** 2) + 0.13 * (1 - (z / tall) ** 2))
             return r * scale, centre + z * scale
 
-        def circle(k):
+        def ellipse(k):
             angle = math.pi * k / (8 * n)
-            return radius * math.sin(angle), centre - radius * math.cos(angle)
+            return axes[0] * math.sin(angle), centre - axes[1] * math.cos(angle)
 
         def mixed(a, b, t):
             return a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1])
@@ -156,23 +164,23 @@ class Mesh:
             return tuple(across[k] + along[k] - corners[k] for k in (0, 1))
 
         inner, outer = max(1, round(0.3 * n)), max(1, round(0.35 * n))
-        self.block(inner, 4 * n, TISSUE + 1, lambda i, j: mixed(core(j), circle(j), i / (2 * inner)))
-        self.block(outer, 4 * n, TISSUE, lambda i, j: mixed(circle(j), box(j, width, low, high), i / (2 * outer)))
+        self.block(inner, 4 * n, TISSUE + 1, lambda i, j: mixed(core(j), ellipse(j), i / (2 * inner)))
+        self.block(outer, 4 * n, TISSUE, lambda i, j: mixed(ellipse(j), box(j, width, low, high), i / (2 * outer)))
         self.block(n, 2 * n, TISSUE + 1, filled)
 
 
 def build(scene, size):
     """Mesh with the block below z = 0 and the guide above, of elements of about `size`."""
     face, height, diameter, depth = scene["R"], scene["H"], scene["D"], scene["d"]
+    half_width, half_height = half_axes(scene)
     # A rim that sticks is resolved; one that slides turns over where it is finer than this.
     first, longest, growth = (0.2 * size, size, 1.3) if scene["sticks"] else (0.045 * face, 0.045 * face, 1.0)
     beyond = graded(face, BLOCK_RADIUS, first, 8 * size, 1.7)
     mesh = Mesh()
     if diameter > 0:
-        radius = 0.5 * diameter
-        width = radius + min(0.4 * radius, 0.5 * (face - radius))
-        top = depth - min(0.45 * depth, 0.4 * radius)
-        bottom = depth + diameter + min(0.5 * (height - depth - diameter), 0.4 * radius)
+        width = half_width + min(0.4 * half_width, 0.5 * (face - half_width))
+        top = depth - min(0.45 * depth, 0.4 * half_height)
+        bottom = depth + 2 * half_height + min(0.5 * (height - depth - 2 * half_height), 0.4 * half_height)
         n = max(math.ceil(width / size), 4)
         step = (bottom - top) / (2 * n)
         columns = [[width * k / n for k in range(n + 1)], graded(face, width, first, longest, growth)[::-1], beyond]
@@ -185,7 +193,7 @@ def build(scene, size):
     for row, zs in enumerate(rows):
         for column, rs in enumerate(columns):
             if diameter > 0 and (row, column) == (1, 0):
-                mesh.inclusion(radius, -(depth + radius), width, -bottom, -top, n)
+                mesh.inclusion((half_width, half_height), -(depth + half_height), width, -bottom, -top, n)
             else:
                 mesh.rectangle(rs, zs, TISSUE)
     z, step = 0.0, 0.5 * size
@@ -371,7 +379,7 @@ def write(scene, found, folder):
     values = [1e-3 * scene["D"], 1e-3 * scene["d"], 1e3 * scene["E1"], 1e3 * scene["E0"], 1e-3 * scene["H"], 1e-3 * BLOCK_RADIUS]
     values = [f"{x:.6g}" for x in [*values, 1e-3 * scene["R"], scene["nu"]]]
     row = [scene["name"], *values, "bonded" if scene["sticks"] else "frictionless",
-           *[f"{1e-3 * a:.6g}" for a in scene["approaches"]], *blank, *[f"{force:.8g}" for force, _ in found], *blank]
+           *[f"{1e-3 * a:.6g}" for a in scene["approaches"]], *blank, *[f"{force:.8g}" for force, _ in found], *blank, f"{scene['aspect']:.6g}"]
     (folder / f"{scene['name']}.row").write_text(",".join(row) + "\n")
 
 
@@ -382,9 +390,10 @@ def main():
     parser.add_argument("--size", type=float, default=0.9, help="length of elements in mm")
     parser.add_argument("--seed", type=int, default=20240613, help="of the draw: another one gives scenes that no constant was chosen on")
     parser.add_argument("--part", default="0/1", help="K/N: every N-th scene from the K-th")
+    parser.add_argument("--spheroids", action="store_true", help="inclusions wider or taller than balls")
     options = parser.parse_args()
     options.folder.mkdir(parents=True, exist_ok=True)
-    part, parts, scenes = *map(int, options.part.split("/")), draw(options.seed)
+    part, parts, scenes = *map(int, options.part.split("/")), draw(options.seed, options.spheroids)
     wanted = [scene for scene in scenes if not options.names or scene["name"] in options.names]
     for scene in wanted[part::parts]:
         if not (options.folder / f"{scene['name']}.row").exists():

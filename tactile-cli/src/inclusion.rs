@@ -23,10 +23,11 @@ use tactile_imaging::pipeline::with_error;
 /// SCENE.toml names frames of the guide pressed onto a flat block at known approaches, the block's
 /// size and the guide's layers (examples/data/inclusion/scene.toml is one). Without it a block with
 /// a lump is simulated. The pressure over the radius is compared with finite elements at finite
-/// strain, that over the whole face where it is not symmetric: the lump may lie off the axis. The
-/// answer is whether there is a lump, its place, diameter, depth and modulus with 95 % intervals,
-/// or which of them the frames leave open. --out gets profiles.csv and inclusion.svg. A search
-/// takes some five seconds for each kind of interface.
+/// strain, that over the whole face where it is not symmetric: the lump may lie off the axis. It may
+/// be flatter or taller than a ball, and its diameter is that of the ball of equal volume. The
+/// answer is whether there is a lump, its place, diameter, depth, modulus and height over width with
+/// 95 % intervals, or which of them the frames leave open. --out gets profiles.csv and
+/// inclusion.svg. A search takes some seven seconds for each kind of interface.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -126,6 +127,7 @@ impl Scan {
             material: tissue(5e3)?,
             lump: Some(Lump {
                 diameter_m: truth[0],
+                height_m: truth[0],
                 depth_m: truth[1],
                 material: tissue(truth[2])?,
             }),
@@ -364,6 +366,16 @@ fn print(estimate: &InclusionEstimate, scan: &Scan, context: &mut Context) {
             "its modulus",
             parameter(&inclusion.youngs_modulus_pa, 1e-3, "kPa"),
         );
+        if let Some(shape) = &inclusion.height_over_width {
+            let ball = inclusion.ball_probability;
+            context.row(
+                "height over width",
+                format_args!(
+                    "{}, a ball with probability {ball:.2}",
+                    interval(shape, 1.0, "")
+                ),
+            );
+        }
         let [[_, depth, modulus], [_, _, both], _] = inclusion.correlation;
         context.row("correlations", format_args!(
             "diameter–depth {depth:+.2}, diameter–modulus {modulus:+.2}, depth–modulus {both:+.2}"

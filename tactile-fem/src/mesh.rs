@@ -350,10 +350,11 @@ impl ContactMesh {
     }
 }
 
-/// A spherical inclusion on the axis.
+/// A spheroidal inclusion on the axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct InclusionSize {
-    pub radius: f64,
+    /// Across the axis and along it.
+    pub half_axes: [f64; 2],
     /// From the block's surface to the inclusion's top.
     pub depth: f64,
 }
@@ -621,14 +622,14 @@ impl BlockMesh {
     /// Box around the inclusion that takes a grid of its own: radius, lower and upper height.
     fn cell(&self) -> Option<(InclusionSize, [f64; 3])> {
         let inclusion = self.inclusion?;
-        let (radius, depth) = (inclusion.radius, inclusion.depth);
-        let below = self.block_height - depth - 2.0 * radius;
-        // Margins of the size of the circle's elements, where there is room.
-        let margin = |room: f64| (0.4 * radius).min(0.5 * room);
+        let ([radius, half_height], depth) = (inclusion.half_axes, inclusion.depth);
+        let bottom = depth + 2.0 * half_height;
+        // Margins of the size of the ellipse's elements, where there is room.
+        let margin = |half_axis: f64, room: f64| (0.4 * half_axis).min(0.5 * room);
         let cell = [
-            radius + margin(self.disc_radius - radius),
-            depth - margin(depth),
-            depth + 2.0 * radius + margin(below),
+            radius + margin(radius, self.disc_radius - radius),
+            depth - margin(half_height, depth),
+            bottom + margin(half_height, self.block_height - bottom),
         ];
         Some((inclusion, cell))
     }
@@ -745,7 +746,7 @@ impl BlockMesh {
     }
 }
 
-/// The box [0, r] × [low, high] with the inclusion: a core rectangle, shells to the circle, shells
+/// The box [0, r] × [low, high] with the inclusion: a core rectangle, shells to the ellipse, shells
 /// to the box. Regions: `region` outside, `region + 1` inside.
 fn add_cell(
     builder: &mut MeshBuilder,
@@ -754,10 +755,10 @@ fn add_cell(
     n: usize,
     region: usize,
 ) {
-    let radius = inclusion.radius;
-    let centre = inclusion.depth + radius;
-    // A core of half the radius leaves elements of about one size.
-    let core = 0.5 * radius;
+    let [radius, half_height] = inclusion.half_axes;
+    let centre = inclusion.depth + half_height;
+    // A core of half the size leaves elements of about one size.
+    let core = [0.5 * radius, 0.5 * half_height];
     let total = 4 * n;
     // Node k of 8n + 1 along the three sides of a box from its lower end on the axis.
     let along_box = |k: usize, width: f64, low: f64, high: f64| -> [f64; 2] {
@@ -771,15 +772,15 @@ fn add_cell(
         }
     };
     let on_core = |k: usize| {
-        // Sides bulge towards the circle, which opens the angles at the corners.
-        let [r, z] = along_box(k, core, -core, core);
-        let bulge = 0.15 * (1.0 - (r / core).powi(2)) + 0.15 * (1.0 - (z / core).powi(2));
+        // Sides bulge towards the ellipse, which opens the angles at the corners.
+        let [r, z] = along_box(k, core[0], -core[1], core[1]);
+        let bulge = 0.15 * (1.0 - (r / core[0]).powi(2)) + 0.15 * (1.0 - (z / core[1]).powi(2));
         let scale = 0.9 * (1.0 + bulge);
         [r * scale, centre + z * scale]
     };
-    let on_circle = |k: usize| {
+    let on_ellipse = |k: usize| {
         let angle = core::f64::consts::PI * k as f64 / (2 * total) as f64;
-        [radius * angle.sin(), centre - radius * angle.cos()]
+        [radius * angle.sin(), centre - half_height * angle.cos()]
     };
     let between =
         |a: [f64; 2], b: [f64; 2], t: f64| [a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1])];
@@ -787,14 +788,14 @@ fn add_cell(
     builder.block(inner_shells, total, region + 1, |i, j| {
         between(
             on_core(j),
-            on_circle(j),
+            on_ellipse(j),
             i as f64 / (2 * inner_shells) as f64,
         )
     });
     let outer_shells = n.div_ceil(3).max(1);
     builder.block(outer_shells, total, region, |i, j| {
         let t = i as f64 / (2 * outer_shells) as f64;
-        between(on_circle(j), along_box(j, width, low, high), t)
+        between(on_ellipse(j), along_box(j, width, low, high), t)
     });
     let side = |k: usize| on_core(k);
     let bottom: Vec<[f64; 2]> = (0..=2 * n).map(side).collect();

@@ -36,7 +36,7 @@ pub enum Interface {
     Frictionless,
 }
 
-/// A sphere of another material within a block, on its axis.
+/// A spheroid of another material within a block, on its axis: a ball where it is as tall as wide.
 ///
 /// ```
 /// use tactile_fem::{Block, Lump, Material};
@@ -44,6 +44,7 @@ pub enum Interface {
 /// let material = |modulus| Material::new(modulus, 0.495).unwrap();
 /// let lump = Lump {
 ///     diameter_m: 8e-3,
+///     height_m: 8e-3,
 ///     depth_m: 5e-3,
 ///     material: material(40e3),
 /// };
@@ -56,14 +57,16 @@ pub enum Interface {
 /// assert!(
 ///     block
 ///         .lump
-///         .is_some_and(|lump| lump.depth_m + lump.diameter_m < block.height_m)
+///         .is_some_and(|lump| lump.depth_m + lump.height_m < block.height_m)
 /// );
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Lump {
-    /// Its diameter, in metres.
+    /// Its diameter across the axis, in metres.
     pub diameter_m: f64,
+    /// Its height along the axis, in metres.
+    pub height_m: f64,
     /// From the block's surface to its top, in metres.
     pub depth_m: f64,
     /// What it is made of.
@@ -77,7 +80,7 @@ pub struct Lump {
 ///
 /// let soft = Material::new(5e3, 0.495).unwrap();
 /// let stiff = Material::new(5e4, 0.495).unwrap();
-/// let lump = Lump { diameter_m: 10e-3, depth_m: 6e-3, material: stiff };
+/// let lump = Lump { diameter_m: 10e-3, height_m: 10e-3, depth_m: 6e-3, material: stiff };
 /// let block = Block { height_m: 30e-3, radius_m: 40e-3, material: soft, lump: Some(lump) };
 /// let layer = GuideLayer { thickness_m: 10e-3, material: stiff };
 /// let guide = Guide::new(vec![layer], 16e-3).unwrap();
@@ -170,12 +173,14 @@ impl FemScene {
         }
         if let Some(lump) = block.lump {
             positive(lump.diameter_m, Quantity::Radius)?;
+            positive(lump.height_m, Quantity::Thickness)?;
             positive(lump.depth_m, Quantity::Thickness)?;
             // The number of elements grows as the face over the lump: below these parts of its
             // radius there would be thousands of them, for a lump that does not show.
             let (least_diameter, least_depth) = (0.02, 0.001);
             for (quantity, found, part) in [
                 (Quantity::Radius, lump.diameter_m, least_diameter),
+                (Quantity::Thickness, lump.height_m, least_diameter),
                 (Quantity::Thickness, lump.depth_m, least_depth),
             ] {
                 let limit = part * guide.radius_m();
@@ -183,7 +188,7 @@ impl FemScene {
                     return Err(out_of_range(quantity, found, limit));
                 }
             }
-            let bottom = lump.depth_m + lump.diameter_m;
+            let bottom = lump.depth_m + lump.height_m;
             if bottom >= block.height_m {
                 return Err(out_of_range(Quantity::Thickness, bottom, block.height_m));
             }
@@ -202,7 +207,7 @@ impl FemScene {
             disc_radius: guide.radius_m(),
             layers: guide.thicknesses(),
             inclusion: block.lump.map(|lump| InclusionSize {
-                radius: 0.5 * lump.diameter_m,
+                half_axes: [0.5 * lump.diameter_m, 0.5 * lump.height_m],
                 depth: lump.depth_m,
             }),
             bonded,

@@ -4,6 +4,7 @@ use crate::covariance::{Observed, Resolution};
 use crate::error::{Quantity, positive};
 use crate::fit::Problem;
 use crate::forward::LumpParameters;
+use crate::hypothesis::BLOCK_COORDINATES;
 use crate::search::InclusionSearch;
 use crate::specimen::check_approaches;
 use tactile_elasticity::ElasticityError;
@@ -58,7 +59,7 @@ impl InclusionSearch {
     ///
     /// $$ (J^T C^{-1} J + P^{-1})^{-1} $$
     ///
-    /// with what is known of block and sensor. `white_pa` is the white error of each ring's mean: a
+    /// with what is known of block, sensor and shape. `white_pa` is the white error of each ring's mean: a
     /// pixel's over the root of the ring's pixels, larger near the axis. The face counts as bonded
     /// unless the specimen says otherwise. One solution with derivatives.
     ///
@@ -105,6 +106,7 @@ impl InclusionSearch {
             diameter_m: assumed.diameter_m,
             depth_m: assumed.depth_m,
             youngs_modulus_pa: assumed.youngs_modulus_pa,
+            aspect: 1.0,
         });
         let forward = self.forward(&observed, approaches_m, interface, fineness);
         forward.scene(&parameters)?;
@@ -125,9 +127,7 @@ impl InclusionSearch {
             priors,
         };
         let errors = (problem.errors(&parameters)).ok_or(ElasticityError::NoSolution)?;
-        let [.., diameter, depth, youngs_modulus] = errors[..] else {
-            return Err(ElasticityError::NoSolution);
-        };
+        let [diameter, depth, youngs_modulus] = [0, 1, 2].map(|k| errors[BLOCK_COORDINATES + k]);
         Ok(ExpectedErrors {
             diameter,
             depth,

@@ -121,13 +121,18 @@ impl Identifiable {
 pub struct Inclusion {
     /// Its middle (x, y) from the face's axis, in metres. `None` from ring means: under the axis.
     pub position_m: Option<[Estimated; 2]>,
-    /// Diameter D, in metres: the posterior's median.
+    /// Diameter D of the ball of equal volume, in metres: the posterior's median.
     pub diameter_m: Identifiable,
     /// Depth of its top d, in metres: the posterior's median.
     pub depth_m: Identifiable,
     /// Young's modulus E₁, in pascals: of the best fit, for how stiff it may be at most is often
     /// known from the prior alone.
     pub youngs_modulus_pa: Identifiable,
+    /// Height along the axis over the width across it: the posterior's median. `None` where it was
+    /// said to be a ball.
+    pub height_over_width: Option<Estimated>,
+    /// Probability that it is a ball, where it is as likely as not beforehand.
+    pub ball_probability: f64,
     /// Correlations of ln D, ln d and ln E₁.
     pub correlation: [[f64; 3]; 3],
 }

@@ -28,9 +28,20 @@ pub struct Parameters {
 /// An inclusion's unknowns.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LumpParameters {
+    /// Of the ball of equal volume.
     pub diameter_m: f64,
     pub depth_m: f64,
     pub youngs_modulus_pa: f64,
+    /// Its height over its width.
+    pub aspect: f64,
+}
+
+impl LumpParameters {
+    /// Its width across the axis and its height along it.
+    pub fn axes_m(&self) -> [f64; 2] {
+        let root = self.aspect.cbrt();
+        [self.diameter_m / root, self.diameter_m * root * root]
+    }
 }
 
 /// An unknown as the fit sees it: logarithms of lengths and moduli, where errors are nearly
@@ -45,6 +56,8 @@ pub enum Coordinate {
     Depth,
     /// ln E₁.
     LumpModulus,
+    /// Logarithm of the height over the width.
+    Aspect,
     /// Zero of the approaches, in metres.
     Zero,
     /// ln H.
@@ -90,6 +103,7 @@ impl Parameters {
             Coordinate::Diameter => lump(|lump| lump.diameter_m),
             Coordinate::Depth => lump(|lump| lump.depth_m),
             Coordinate::LumpModulus => lump(|lump| lump.youngs_modulus_pa),
+            Coordinate::Aspect => lump(|lump| lump.aspect),
             Coordinate::Zero => self.zero_m,
             Coordinate::Height => self.height_m.ln(),
             Coordinate::PoissonRatio => self.poisson_ratio,
@@ -108,7 +122,14 @@ impl Parameters {
             (Coordinate::Diameter, Some(lump)) => lump.diameter_m *= factor,
             (Coordinate::Depth, Some(lump)) => lump.depth_m *= factor,
             (Coordinate::LumpModulus, Some(lump)) => lump.youngs_modulus_pa *= factor,
-            (Coordinate::Diameter | Coordinate::Depth | Coordinate::LumpModulus, None) => {}
+            (Coordinate::Aspect, Some(lump)) => lump.aspect *= factor,
+            (
+                Coordinate::Diameter
+                | Coordinate::Depth
+                | Coordinate::LumpModulus
+                | Coordinate::Aspect,
+                None,
+            ) => {}
             (Coordinate::Zero, _) => moved.zero_m += step,
             (Coordinate::Height, _) => moved.height_m *= factor,
             (Coordinate::PoissonRatio, _) => {
@@ -138,19 +159,21 @@ impl Parameters {
     /// diameter, or is as tall as the block allows.
     pub fn is_at_boundary(&self) -> bool {
         self.lump.is_some_and(|lump| {
-            let room = self.height_m - lump.depth_m - lump.diameter_m;
-            lump.depth_m.min(room) < 0.02 * lump.diameter_m
+            let height = lump.axes_m()[1];
+            let room = self.height_m - lump.depth_m - height;
+            lump.depth_m.min(room) < 0.02 * height
         })
     }
 }
 
-/// How points of the block move: the inclusion as a rigid circle that grows, the far side with the
+/// How points of the block move: the inclusion as an ellipse whose axes grow, the far side with the
 /// height, linearly in between, the face not at all.
 struct MeshMotion {
-    radius: f64,
+    /// The inclusion's half axes across and along the axis. Zero where there is none.
+    half_axes: [f64; 2],
     /// Depth of the inclusion's centre.
     centre: f64,
-    grown: f64,
+    grown: [f64; 2],
     sunk: f64,
     height: f64,
     raised: f64,
@@ -159,17 +182,17 @@ struct MeshMotion {
 
 impl MeshMotion {
     pub fn new(from: &Parameters, to: &Parameters, face_radius: f64) -> Self {
-        let circle = |parameters: &Parameters| {
+        let ellipse = |parameters: &Parameters| {
             let lump = parameters.lump.map(sizes);
-            lump.map_or([0.0; 2], |[diameter, depth]| {
-                [0.5 * diameter, depth + 0.5 * diameter]
+            lump.map_or(([0.0; 2], 0.0), |[width, height, depth]| {
+                ([0.5 * width, 0.5 * height], depth + 0.5 * height)
             })
         };
-        let ([radius, centre], [radius_after, centre_after]) = (circle(from), circle(to));
+        let ((half_axes, centre), (axes_after, centre_after)) = (ellipse(from), ellipse(to));
         Self {
-            radius,
+            half_axes,
             centre,
-            grown: radius_after - radius,
+            grown: [0, 1].map(|k| axes_after[k] - half_axes[k]),
             sunk: centre_after - centre,
             height: from.height_m,
             raised: to.height_m - from.height_m,
@@ -181,7 +204,7 @@ impl MeshMotion {
         if z <= 0.0 {
             return [r, z];
         }
-        let bottom = self.centre + self.radius;
+        let bottom = self.centre + self.half_axes[1];
         let lifted = self.raised * ((z - bottom) / (self.height - bottom)).max(0.0);
         let [along_r, along_z] = self.by_inclusion([r, z]);
         [r + along_r, z + along_z + lifted]
@@ -189,44 +212,48 @@ impl MeshMotion {
 
     fn by_inclusion(&self, [r, z]: [f64; 2]) -> [f64; 2] {
         let offset = z - self.centre;
-        let distance = r.hypot(offset);
-        if self.radius == 0.0 || distance == 0.0 {
+        let [radius, half_height] = self.half_axes;
+        // In units of the half axes; the ellipse is where their root of squares is one.
+        let [across, along] = [r / radius, offset / half_height];
+        let distance = across.hypot(along);
+        if radius == 0.0 || distance == 0.0 {
             return [0.0, self.sunk];
         }
-        let [across, along] = [r / distance, offset / distance];
-        if distance <= self.radius {
-            let growth = self.grown * distance / self.radius;
-            return [growth * across, growth * along + self.sunk];
+        if distance <= 1.0 {
+            let [wider, taller] = self.grown;
+            return [wider * across, taller * along + self.sunk];
         }
+        let [across, along] = [across / distance, along / distance];
         // The ray from the centre through the point ends at the face, the far side or below the
         // rim.
         let to_face = if along < 0.0 {
-            self.centre / -along
+            self.centre / (-along * half_height)
         } else {
             f64::INFINITY
         };
         let to_far = if along > 0.0 {
-            (self.height - self.centre) / along
+            (self.height - self.centre) / (along * half_height)
         } else {
             f64::INFINITY
         };
         let to_rim = if across > 0.0 {
-            self.face_radius / across
+            self.face_radius / (across * radius)
         } else {
             f64::INFINITY
         };
         let end = to_face.min(to_far).min(to_rim);
-        let part = ((end - distance) / (end - self.radius)).max(0.0);
+        let part = ((end - distance) / (end - 1.0)).max(0.0);
         [
-            part * self.grown * across,
-            part * (self.grown * along + self.sunk),
+            part * self.grown[0] * across,
+            part * (self.grown[1] * along + self.sunk),
         ]
     }
 }
 
-/// What the mesh depends on: diameter and depth.
-fn sizes(lump: LumpParameters) -> [f64; 2] {
-    [lump.diameter_m, lump.depth_m]
+/// What the mesh depends on: width, height and depth.
+fn sizes(lump: LumpParameters) -> [f64; 3] {
+    let [width, height] = lump.axes_m();
+    [width, height, lump.depth_m]
 }
 
 /// A block of given size under a guide, and where its pressure is wanted.
@@ -315,7 +342,8 @@ impl Forward {
         let lump = match parameters.lump {
             None => None,
             Some(lump) => Some(Lump {
-                diameter_m: lump.diameter_m,
+                diameter_m: lump.axes_m()[0],
+                height_m: lump.axes_m()[1],
                 depth_m: lump.depth_m,
                 material: material(lump.youngs_modulus_pa)?,
             }),

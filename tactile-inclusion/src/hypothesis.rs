@@ -38,23 +38,7 @@ pub fn is_poor(misfit: f64, observed: &Observed) -> bool {
     misfit > freedom + poor * (2.0 * freedom).sqrt()
 }
 
-/// The coordinates as they are fitted: those of the block first.
-const COORDINATES: [Coordinate; 12] = [
-    Coordinate::BlockModulus,
-    Coordinate::Zero,
-    Coordinate::Height,
-    Coordinate::PoissonRatio,
-    Coordinate::Diameter,
-    Coordinate::Depth,
-    Coordinate::LumpModulus,
-    Coordinate::Centre(0),
-    Coordinate::Centre(1),
-    Coordinate::Elongation(0),
-    Coordinate::Elongation(1),
-    Coordinate::Carried,
-];
-/// Index of those that only a picture of the whole face shows.
-const PLACE: usize = 7;
+/// Number of coordinates of the block. They stand first, and ln D, ln d and ln E₁ follow.
 pub const BLOCK_COORDINATES: usize = 4;
 
 /// The best fits under one assumption about the face.
@@ -78,7 +62,10 @@ impl Hypothesis {
             .filter(|fit| fit.evidence > self.homogeneous.evidence)
         {
             let ridge = self.problem.ridge(fit, go_on);
-            self.marginal = ridge.as_ref().and_then(Marginal::new);
+            let shape =
+                (self.problem.priors.iter()).position(|p| p.coordinate == Coordinate::Aspect);
+            let shape = shape.map(|index| (index, self.problem.priors[index].standard_error));
+            self.marginal = ridge.and_then(|ridge| Marginal::new(&ridge, shape));
         }
     }
 
@@ -133,7 +120,7 @@ impl Hypothesis {
         let values = self.problem.measured.len() as f64;
         self.lump.as_ref().filter(|fit| {
             let parameters = &fit.parameters;
-            let lowest = (parameters.lump).map_or(0.0, |lump| lump.depth_m + lump.diameter_m);
+            let lowest = (parameters.lump).map_or(0.0, |lump| lump.depth_m + lump.axes_m()[1]);
             let modulus = |coordinate| fit.parameters.get(coordinate);
             let contrast = modulus(Coordinate::LumpModulus) - modulus(Coordinate::BlockModulus);
             probability(log_odds) > least_probability
@@ -148,13 +135,17 @@ impl Hypothesis {
     ///
     /// Of a skewed posterior the optimum lies at an end of the interval: D and d are its medians.
     /// E₁'s upper tail is the prior's, and so would be its median: the optimum depends on it less.
-    fn posterior(&self, fit: &Fit, coordinate: usize, widened: f64) -> (f64, [f64; 2]) {
-        let best = fit.parameters.get(COORDINATES[coordinate]);
+    fn posterior(&self, fit: &Fit, coordinate: Coordinate, widened: f64) -> (f64, [f64; 2]) {
+        let is_modulus = coordinate == Coordinate::LumpModulus;
+        let mut best = fit.parameters.get(coordinate);
+        let coordinate = self.index(coordinate).unwrap_or(0);
         let is_lump = fit.covariance.nrows() > BLOCK_COORDINATES;
         let (at, [low, high]) = match self.marginal.as_ref().filter(|_| is_lump) {
             Some(marginal) => {
-                let is_modulus = COORDINATES[coordinate] == Coordinate::LumpModulus;
                 let median = marginal.median(coordinate);
+                if marginal.ball > 0.5 {
+                    best += self.step_to_ball(fit, coordinate);
+                }
                 let at = if is_modulus { best } else { median };
                 (at, marginal.interval(coordinate))
             }
@@ -165,6 +156,34 @@ impl Hypothesis {
         };
         let (down, up) = ((at - low).max(0.0), (high - at).max(0.0));
         (at, [at - widened * down, at + widened * up])
+    }
+
+    /// Whether an inclusion's outline is not round, but for 1 chance in 1000.
+    fn is_elongated(&self, fit: &Fit) -> bool {
+        // That of χ² with two degrees of freedom.
+        let largest = 13.8;
+        let Some(first) = self.index(Coordinate::Elongation(0)) else {
+            return false;
+        };
+        let covariance = fit.covariance.fixed_view::<2, 2>(first, first);
+        let elongation = Vector2::from(fit.parameters.place.elongation);
+        let inverse = covariance.into_owned().try_inverse();
+        inverse.is_some_and(|inverse| elongation.dot(&(inverse * elongation)) > largest)
+    }
+
+    /// Where a coordinate stands among those fitted.
+    fn index(&self, coordinate: Coordinate) -> Option<usize> {
+        let mut priors = self.problem.priors.iter();
+        priors.position(|prior| prior.coordinate == coordinate)
+    }
+
+    /// How far a coordinate is at a fit from where it would be, were the inclusion a ball.
+    fn step_to_ball(&self, fit: &Fit, coordinate: usize) -> f64 {
+        let away = self.index(Coordinate::Aspect).map(|shape| {
+            let c = &fit.covariance;
+            c[(coordinate, shape)] / c[(shape, shape)] * fit.parameters.get(Coordinate::Aspect)
+        });
+        -away.unwrap_or(0.0)
     }
 
     /// Correlations of ln D, ln d and ln E₁.
@@ -213,7 +232,7 @@ impl Hypothesis {
             warnings.push(InclusionWarning::AtBoundary);
         }
         let found = found.filter(|_| observed.cells.is_none() || !is_poor);
-        let elongated = found.filter(|fit| is_elongated(fit));
+        let elongated = found.filter(|fit| self.is_elongated(fit));
         if let Some(fit) = elongated {
             let [a, b] = fit.parameters.place.elongation;
             let axes = (2.0 * a.hypot(b)).exp();
@@ -221,7 +240,7 @@ impl Hypothesis {
         }
         let found = found.filter(|_| elongated.is_none());
         let is_reliable = chosen.converged && !is_poor && !is_unsolved && !is_at_boundary;
-        let estimated = |coordinate: usize| {
+        let estimated = |coordinate: Coordinate| {
             let (at, interval) = self.posterior(chosen, coordinate, widened);
             let other = rival.map(|rival| {
                 let lump = rival.lump.as_ref().filter(|_| found.is_some());
@@ -231,7 +250,8 @@ impl Hypothesis {
             });
             Estimated::within(at, other.map_or(interval, |other| hull(interval, other)))
         };
-        let position = |coordinate: usize| {
+        let position = |axis: usize| {
+            let coordinate = Coordinate::Centre(axis);
             let (at, interval) = self.posterior(chosen, coordinate, widened);
             let other = rival.and_then(|rival| {
                 let lump = rival.lump.as_ref()?;
@@ -240,13 +260,16 @@ impl Hypothesis {
             Estimated::new(at, other.map_or(interval, |other| hull(interval, other)))
         };
         let inclusion = found.map(|fit| {
-            let parameter =
-                |k: usize| Identifiable::new(estimated(BLOCK_COORDINATES + k), is_reliable);
+            let parameter = |coordinate| Identifiable::new(estimated(coordinate), is_reliable);
             Inclusion {
-                position_m: (observed.cells.as_ref()).map(|_| [PLACE, PLACE + 1].map(position)),
-                diameter_m: parameter(0),
-                depth_m: parameter(1),
-                youngs_modulus_pa: parameter(2),
+                position_m: (observed.cells.as_ref()).map(|_| [0, 1].map(position)),
+                diameter_m: parameter(Coordinate::Diameter),
+                depth_m: parameter(Coordinate::Depth),
+                youngs_modulus_pa: parameter(Coordinate::LumpModulus),
+                height_over_width: self
+                    .index(Coordinate::Aspect)
+                    .map(|_| estimated(Coordinate::Aspect)),
+                ball_probability: self.marginal.as_ref().map_or(1.0, |marginal| marginal.ball),
                 correlation: self.correlation(fit),
             }
         });
@@ -258,7 +281,7 @@ impl Hypothesis {
         InclusionEstimate {
             probability: probability(log_odds),
             found: is_found,
-            block_modulus_pa: estimated(0),
+            block_modulus_pa: estimated(Coordinate::BlockModulus),
             inclusion,
             interface: self.interface,
             misfit,
@@ -268,19 +291,6 @@ impl Hypothesis {
             homogeneous_pa: split(&self.homogeneous.predicted),
         }
     }
-}
-
-/// Whether an inclusion's outline is not round, but for 1 chance in 1000.
-fn is_elongated(fit: &Fit) -> bool {
-    // That of χ² with two degrees of freedom.
-    let largest = 13.8;
-    if fit.covariance.nrows() < PLACE + 4 {
-        return false;
-    }
-    let covariance = fit.covariance.fixed_view::<2, 2>(PLACE + 2, PLACE + 2);
-    let elongation = Vector2::from(fit.parameters.place.elongation);
-    let inverse = covariance.into_owned().try_inverse();
-    inverse.is_some_and(|inverse| elongation.dot(&(inverse * elongation)) > largest)
 }
 
 fn probability(log_odds: f64) -> f64 {

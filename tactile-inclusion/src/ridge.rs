@@ -190,6 +190,26 @@ pub struct Marginal {
     points: Vec<Node>,
     /// Logarithm of the evidence over that by the curvature at the optimum.
     pub gain: f64,
+    /// Probability that the inclusion is a ball, where it is as likely as not beforehand.
+    pub ball: f64,
+}
+
+impl Node {
+    /// This point of the ridge for an inclusion that is a ball: where the logarithm of its height
+    /// over its width, a coordinate of index `shape`, is zero. `density` is that of zero.
+    fn of_ball(&self, shape: usize) -> Self {
+        let gains = self.covariance.column(shape) / self.covariance[(shape, shape)];
+        let away = self.at[shape];
+        let variance = self.covariance[(shape, shape)];
+        let mut covariance = &self.covariance - variance * &gains * gains.transpose();
+        // A ball's is known; a quantile divides by its error.
+        covariance[(shape, shape)] = f64::MIN_POSITIVE;
+        Self {
+            density: -0.5 * (away * away / variance + variance.ln()),
+            at: &self.at - away * gains,
+            covariance,
+        }
+    }
 }
 
 /// A function of the nodes at `x` in the interval after node `k`: the mean of the parabolas through
@@ -280,7 +300,12 @@ impl Curve<'_> {
 
 impl Marginal {
     /// Of a ridge. `None` where neither side could be followed.
-    pub fn new(ridge: &Ridge) -> Option<Self> {
+    ///
+    /// `shape` is the index of the logarithm of an inclusion's height over its width and the
+    /// standard error it is known with beforehand. A ball and a spheroid are equally likely
+    /// beforehand, and the posterior is the mixture of both. With κ that logarithm, the odds of a
+    /// ball are p(κ = 0 | y) / p(κ = 0) (J. M. Dickey, Ann. Math. Stat. 42 (1971) 204).
+    pub fn new(ridge: &Ridge, shape: Option<(usize, f64)>) -> Option<Self> {
         // Points of the quadrature over u.
         let points_limit: usize = 200;
         let (nodes, index) = (&ridge.nodes, ridge.index);
@@ -305,11 +330,34 @@ impl Marginal {
             .fold(f64::NEG_INFINITY, f64::max);
         let weight = |point: &Node| (point.density - largest).exp();
         let sum: f64 = points.iter().map(weight).sum();
-        Some(Self {
+        let marginal = Self {
             weights: points.iter().map(|point| weight(point) / sum).collect(),
             points,
             gain: largest + (sum * step).ln() - ridge.laplace,
+            ball: if shape.is_some() { 0.0 } else { 1.0 },
+        };
+        Some(match shape {
+            Some((index, known)) => marginal.with_balls(index, known),
+            None => marginal,
         })
+    }
+
+    /// This posterior of a spheroid, mixed with that of a ball.
+    fn with_balls(mut self, shape: usize, known: f64) -> Self {
+        let balls: Vec<Node> = (self.points.iter())
+            .map(|point| point.of_ball(shape))
+            .collect();
+        let odds: Vec<f64> = (balls.iter().zip(&self.weights))
+            .map(|(ball, weight)| weight * ball.density.exp() * known)
+            .collect();
+        let sum: f64 = odds.iter().sum();
+        self.ball = sum / (1.0 + sum);
+        self.gain += (0.5 * (1.0 + sum)).ln();
+        let spheroids = self.weights.iter().map(|weight| weight / (1.0 + sum));
+        let balls_weights = odds.iter().map(|odds| odds / (1.0 + sum));
+        self.weights = spheroids.chain(balls_weights).collect();
+        self.points.extend(balls);
+        self
     }
 
     /// The value that a coordinate is as probably above as below: the optimum of a skewed posterior

@@ -177,6 +177,10 @@ fn result(py: Python<'_>, found: &InclusionEstimate) -> PyResult<Inclusion> {
             Interface::Bonded => "bonded",
             _ => "frictionless",
         },
+        height_over_width: (lump.and_then(|lump| lump.height_over_width.as_ref()))
+            .map(&estimate)
+            .transpose()?,
+        ball_probability: lump.map(|lump| lump.ball_probability),
         flags: found.warnings.iter().map(ToString::to_string).collect(),
     })
 }

@@ -237,14 +237,18 @@ result! {
         probability: f64,
         /// Young's modulus of the block in pascals.
         block_modulus: Py<Estimate>,
-        /// Diameter of the lump in metres.
+        /// Diameter of the ball of the lump's volume in metres.
         diameter: Option<Py<Estimate>>,
         /// Depth of its top in metres.
         depth: Option<Py<Estimate>>,
         /// Its Young's modulus in pascals.
         youngs_modulus: Option<Py<Estimate>>,
-        /// Names of those of the last three that the frames determine. Of the others the interval
-        /// alone is of use.
+        /// Its height along the axis over its width.
+        height_over_width: Option<Py<Estimate>>,
+        /// Probability that it is a ball.
+        ball_probability: Option<f64>,
+        /// Names of those of diameter, depth and modulus that the frames determine. Of the others
+        /// the interval alone is of use.
         identified: Vec<&'static str>,
         /// "bonded" or "frictionless", how the block lies on its ground.
         interface: &'static str,

@@ -1,7 +1,7 @@
 //! Errors of the inclusion search over a folder of solved scenes, against the Cramér–Rao bound.
 //!
 //! ```text
-//! cargo run --release -p tactile-elasticity --features fem --example inclusion_study -- FOLDER [SEEDS] [NAMES]
+//! cargo run --release -p tactile-inclusion --example inclusion_study -- FOLDER [SEEDS] [NAMES] [balls]
 //! ```
 //!
 //! FOLDER holds `scenes.csv` (scene, D_m, depth_m, E1_pa, E0_pa, block_height_m, block_radius_m,
@@ -11,7 +11,8 @@
 //! CalculiX. Every scene is searched with SEEDS (default 1) draws of the sensor's errors: white
 //! noise of pixels, smooth errors of the calibration, force, and of what is known of the block: its
 //! height and the approaches' zero; Poisson's ratio is said to be 0.495 ± 0.005 whatever it is.
-//! NAMES keeps the scenes whose names begin with one of them, separated by commas.
+//! NAMES keeps the scenes whose names begin with one of them, separated by commas. With `balls` the
+//! search is told that an inclusion is a ball.
 #![allow(clippy::print_stdout)]
 
 mod scenes;
@@ -123,8 +124,9 @@ fn measured(
     Ok((specimen, frames))
 }
 
-/// Cramér–Rao bounds of ln D, ln d and ln E₁ at the truth, of the sensor's errors alone.
-fn bounds(scene: &SolvedScene, lump: [f64; 3]) -> Result<ExpectedErrors, Box<dyn Error>> {
+/// Cramér–Rao bounds of ln D, ln d and ln E₁ at the truth, of the sensor's errors alone, for a ball
+/// that is known to be one.
+fn bounds(scene: &SolvedScene, lump: [f64; 4]) -> Result<ExpectedErrors, Box<dyn Error>> {
     let specimen = Specimen::new(scene.height_m, scene.radius_m)?.with_interface(scene.interface);
     let errors = SensorErrors {
         model: 0.0,
@@ -132,6 +134,7 @@ fn bounds(scene: &SolvedScene, lump: [f64; 3]) -> Result<ExpectedErrors, Box<dyn
     };
     let search =
         InclusionSearch::new(specimen, guide(scene.face_radius_m)?)?.with_sensor_errors(errors)?;
+    let search = search.with_shape_error(0.0)?;
     let assumed = AssumedInclusion {
         diameter_m: lump[0],
         depth_m: lump[1],
@@ -152,9 +155,12 @@ fn seconds() -> f64 {
 
 fn main() -> Result<(), Box<dyn Error>> {
     let mut arguments = std::env::args().skip(1);
-    let folder = arguments.next().ok_or("usage: FOLDER [SEEDS] [NAMES]")?;
+    let folder = arguments
+        .next()
+        .ok_or("usage: FOLDER [SEEDS] [NAMES] [balls]")?;
     let seeds: u64 = arguments.next().map_or(Ok(1), |text| text.parse())?;
     let names = arguments.next().unwrap_or_default();
+    let is_ball = arguments.next().is_some_and(|word| word == "balls");
     let mut tally = Tally::default();
     let mut searched = 0;
     for (index, scene) in scenes(Path::new(&folder))?.iter().enumerate() {
@@ -173,6 +179,11 @@ fn main() -> Result<(), Box<dyn Error>> {
         for seed in 0..seeds {
             let (specimen, frames) = measured(scene, seed * 1000 + index as u64)?;
             let search = InclusionSearch::new(specimen, guide(scene.face_radius_m)?)?;
+            let search = if is_ball {
+                search.with_shape_error(0.0)?
+            } else {
+                search
+            };
             let begun = seconds();
             let estimate = search.search(&scene.radii_m, &frames)?;
             let seconds = seconds() - begun;
@@ -208,6 +219,16 @@ fn main() -> Result<(), Box<dyn Error>> {
                         error / estimated.relative_error()
                     );
                 }
+                let [_, _, _, aspect] = lump;
+                if let Some(shape) = &inclusion.height_over_width {
+                    let [low, high] = shape.interval;
+                    print!(
+                        "; κ {:.3} [{low:.3} {high:.3}] for {aspect:.3}",
+                        shape.value
+                    );
+                    tally.add_shape(aspect, shape.interval);
+                }
+                print!(", ball {:.2}", inclusion.ball_probability);
             } else if let Some(inclusion) = &estimate.inclusion {
                 for (name, told) in ["D", "d", "E1"].iter().zip(parameters(inclusion)) {
                     print!("; {name} {:.3e}", told.estimate().value);

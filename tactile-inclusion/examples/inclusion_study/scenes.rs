@@ -6,8 +6,8 @@ use tactile_fem::Interface;
 
 pub(crate) struct SolvedScene {
     pub(crate) name: String,
-    /// D, d, E₁; `None` for a plain block.
-    pub(crate) lump: Option<[f64; 3]>,
+    /// D, d, E₁, and height over width; `None` for a plain block.
+    pub(crate) lump: Option<[f64; 4]>,
     pub(crate) block_modulus_pa: f64,
     pub(crate) height_m: f64,
     pub(crate) radius_m: f64,
@@ -73,7 +73,9 @@ pub(crate) fn scenes(folder: &Path) -> Result<Vec<SolvedScene>, Box<dyn Error>> 
             pressures_pa[load - 1].push(point[2].parse()?);
         }
         let diameter = number("D_m")?;
-        let lump = [diameter, number("depth_m")?, number("E1_pa")?];
+        // Folders of balls do without that column.
+        let aspect = number("aspect").unwrap_or(1.0);
+        let lump = [diameter, number("depth_m")?, number("E1_pa")?, aspect];
         scenes.push(SolvedScene {
             lump: (diameter > 0.0).then_some(lump),
             block_modulus_pa: number("E0_pa")?,

@@ -21,6 +21,11 @@ pub(crate) struct Tally {
     shallow: [Vec<f64>; 3],
     within: [usize; 3],
     told: [usize; 3],
+    shapes: usize,
+    shapes_within: usize,
+    /// Parameters told whose interval does not hold the truth, by how many standard errors at most.
+    wrong: usize,
+    worst: f64,
     /// Parameters whose bound is above 30 %, and those of them not told.
     open: usize,
     left_open: usize,
@@ -35,7 +40,7 @@ pub(crate) struct Tally {
 }
 
 impl Tally {
-    pub(crate) fn add(&mut self, lump: [f64; 3], bounds: [f64; 3], estimate: &InclusionEstimate) {
+    pub(crate) fn add(&mut self, lump: [f64; 4], bounds: [f64; 3], estimate: &InclusionEstimate) {
         if bounds[0] < 0.2 {
             self.findable += 1;
             self.findable_found += usize::from(estimate.found);
@@ -60,7 +65,18 @@ impl Tally {
             let [low, high] = estimated.interval;
             self.told[k] += 1;
             self.within[k] += usize::from((low..=high).contains(&lump[k]));
+            if told.value().is_some() && !(low..=high).contains(&lump[k]) {
+                self.wrong += 1;
+                self.worst = self.worst.max(error / estimated.relative_error());
+            }
         }
+    }
+
+    pub(crate) fn add_shape(&mut self, aspect: f64, [low, high]: [f64; 2]) {
+        self.shapes += 1;
+        // A ball's interval may be a point.
+        let within = low * (1.0 - 1e-9)..=high * (1.0 + 1e-9);
+        self.shapes_within += usize::from(within.contains(&aspect));
     }
 
     pub(crate) fn add_plain(&mut self, estimate: &InclusionEstimate) {
@@ -82,6 +98,11 @@ impl Tally {
                 self.shallow[k].len(),
             );
         }
+        println!(
+            "95 % intervals of height over width hold {} of {}; told wrong {} times, at most {:.1} \
+             standard errors off",
+            self.shapes_within, self.shapes, self.wrong, self.worst
+        );
         println!(
             "found {} of {} with a bound on D below 20 %; not told {} of {} with a bound above 30 \
              %; false alarms {} of {}",

@@ -35,6 +35,7 @@ fn load(header: &[&str], row: &str) -> Load {
         diameter_m: number("D_m"),
         depth_m: number("depth_m"),
         youngs_modulus_pa: number("E1_pa"),
+        aspect: number("aspect"),
     };
     Load {
         scene: cells["scene"].to_owned(),

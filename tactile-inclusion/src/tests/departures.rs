@@ -25,6 +25,7 @@ fn lump(diameter_m: f64, depth_m: f64, youngs_modulus_pa: f64) -> LumpParameters
         diameter_m,
         depth_m,
         youngs_modulus_pa,
+        aspect: 1.0,
     }
 }
 
@@ -146,6 +147,22 @@ fn as_assumed_the_told_is_right() {
     let estimate = searched(&frames(&solved(Some(truth), &ring_radii())));
     assert!(estimate.found && !is_poor(&estimate));
     assert!(told_is_right(&estimate, truth), "{estimate:?}");
+}
+
+#[test]
+fn a_flattened_inclusion_is_not_taken_for_a_ball() {
+    let truth = LumpParameters {
+        aspect: 0.68,
+        ..lump(10e-3, 4e-3, 40e3)
+    };
+    let estimate = searched(&frames(&solved(Some(truth), &ring_radii())));
+    assert!(told_is_right(&estimate, truth), "{estimate:?}");
+    let found = estimate.inclusion.unwrap();
+    let [low, high] = found.height_over_width.unwrap().interval;
+    assert!((low..high).contains(&truth.aspect), "{low} {high}");
+    assert!(high < 1.0 && found.ball_probability < 0.01, "{found:?}");
+    // The volume's ball, which is 14 % narrower than the outline from above.
+    assert!(found.diameter_m.value().is_some(), "{found:?}");
 }
 
 /// A search of a homogeneous block fits no inclusion: the grid's 27 solutions and a homogeneous

@@ -49,6 +49,7 @@ fn a_fit_from_afar_ends_at_the_truth_within_its_errors() {
         diameter_m: 9e-3,
         depth_m: 6e-3,
         youngs_modulus_pa: 15e3,
+        aspect: 1.0,
     });
     let fit = problem.fit(start, ANSWER_ENDING, || true).unwrap();
     assert!(fit.converged);
@@ -74,6 +75,7 @@ fn a_fit_goes_on_along_the_limit_of_poissons_ratio() {
         diameter_m: 14e-3,
         depth_m: 3e-3,
         youngs_modulus_pa: 60e3,
+        aspect: 1.0,
     });
     let fit = problem.fit(start, ANSWER_ENDING, || true).unwrap();
     assert!(fit.converged);
@@ -97,6 +99,7 @@ fn points_of_a_ridge_are_on_it() {
             diameter_m: 7e-3,
             depth_m: 8e-3,
             youngs_modulus_pa: 8.5e3,
+            aspect: 1.0,
         }),
         ..block(1.0)
     };

@@ -44,6 +44,7 @@ fn block(scale: f64) -> Parameters {
             diameter_m: 12e-3,
             depth_m: 4e-3,
             youngs_modulus_pa: scale * 30e3,
+            aspect: 1.0,
         }),
         place: Place::default(),
         zero_m: 0.0,
@@ -82,13 +83,14 @@ fn an_inclusion_as_soft_as_the_tissue_is_none() {
     assert!(distance(&with[..rings], &without[..rings]) < 2e-3);
 }
 
-const COORDINATES: [Coordinate; 7] = [
+const COORDINATES: [Coordinate; 8] = [
     Coordinate::BlockModulus,
     Coordinate::LumpModulus,
     Coordinate::Zero,
     Coordinate::PoissonRatio,
     Coordinate::Diameter,
     Coordinate::Depth,
+    Coordinate::Aspect,
     Coordinate::Height,
 ];
 
@@ -156,7 +158,12 @@ fn a_moved_mesh_is_as_good_as_a_new_one() {
     let model = forward(3, 1.0);
     let here = block(1.0);
     let (_, solved) = model.predict_near(&here, None).unwrap();
-    for coordinate in [Coordinate::Diameter, Coordinate::Depth, Coordinate::Height] {
+    for coordinate in [
+        Coordinate::Diameter,
+        Coordinate::Depth,
+        Coordinate::Aspect,
+        Coordinate::Height,
+    ] {
         for by in [-0.2, 0.2] {
             let there = here.moved(coordinate, by);
             let moved = model.predict_near(&there, Some(&solved)).unwrap().0.values;

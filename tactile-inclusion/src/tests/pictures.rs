@@ -46,6 +46,7 @@ fn block(centre_m: [f64; 2]) -> Parameters {
             diameter_m: 10e-3,
             depth_m: 4e-3,
             youngs_modulus_pa: 30e3,
+            aspect: 1.0,
         }),
         place: Place {
             centre_m,
