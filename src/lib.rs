@@ -36,11 +36,13 @@ pub mod scene;
 #[cfg(feature = "scene")]
 pub mod sensor;
 mod strain_between;
+mod strain_series;
 
 pub use pipeline::{Measurement, Object, Pipeline, Press};
 pub use strain_between::{
     PairsDoubt, StrainAt, StrainBetween, StrainBetweenError, StrainBetweenOptions, strain_between,
 };
+pub use strain_series::{SeriesStrain, StrainSeries};
 
 /// The types and traits of a program that measures with stages of its own: `use
 /// tactile_imaging::prelude::*`.

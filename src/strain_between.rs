@@ -2,7 +2,7 @@
 use crate::elasticity::ElasticityError;
 use crate::elasticity::field::{StrainField, StrainSummary};
 use crate::elasticity::strain::{Deformation, GreenLagrange, StrainMeasure};
-use crate::matching::{AnnealedSoftassign, Doubt, MatchError, PointMatcher};
+use crate::matching::{AnnealedSoftassign, Doubt, MatchError, Matching, PointMatcher};
 use crate::tps::{LocalField, LocalValue, RobustFit, ThinPlateSpline, TpsError};
 use nalgebra::{Matrix3, Point, SMatrix, SVector};
 use std::sync::Arc;
@@ -20,7 +20,7 @@ use std::sync::Arc;
 /// ```
 #[derive(Clone)]
 pub struct StrainBetweenOptions<const D: usize> {
-    matcher: Arc<dyn PointMatcher<D> + Send + Sync>,
+    pub(crate) matcher: Arc<dyn PointMatcher<D> + Send + Sync>,
     measure: Arc<dyn StrainMeasure + Send + Sync>,
     doubtful_pairs: bool,
 }
@@ -61,6 +61,25 @@ impl<const D: usize> StrainBetweenOptions<D> {
     pub fn with_doubtful_pairs(mut self) -> Self {
         self.doubtful_pairs = true;
         self
+    }
+
+    /// Strain from the pairs of tracks, however few of the points they are.
+    pub(crate) fn total(
+        &self,
+        before: &[Point<f64, D>],
+        after: &[Point<f64, D>],
+        pairs: &[(usize, usize)],
+    ) -> Result<StrainBetween<D>, StrainBetweenError> {
+        let found = StrainBetween::of_share(before, after, pairs, &*self.measure, pairs.len())?;
+        self.allow(found)
+    }
+
+    /// The strain, unless its pairs are doubtful and that was not asked for.
+    fn allow(&self, found: StrainBetween<D>) -> Result<StrainBetween<D>, StrainBetweenError> {
+        match found.doubt {
+            Some(doubt) if !self.doubtful_pairs => Err(StrainBetweenError::Doubtful(doubt)),
+            _ => Ok(found),
+        }
     }
 }
 
@@ -103,6 +122,9 @@ impl std::fmt::Display for PairsDoubt {
             }
             Self::Matcher(Doubt::LargeResiduals) => {
                 f.write_str("the residuals of the match are as large as those of scattered points")
+            }
+            Self::Matcher(Doubt::Symmetric) => {
+                f.write_str("the points look the same after a turn, and any rotation is allowed")
             }
             Self::Matcher(_) => f.write_str("one matched pair in twenty or more is wrong"),
             Self::FewPartners { share } => write!(
@@ -254,30 +276,33 @@ pub fn strain_between<const D: usize>(
     options: &StrainBetweenOptions<D>,
 ) -> Result<StrainBetween<D>, StrainBetweenError> {
     let matching = options.matcher.match_points(before, after)?;
-    let partner = |(i, j): (usize, &Option<usize>)| j.map(|j| (i, j));
-    let pairs: Vec<_> = matching
-        .assignment
-        .iter()
-        .enumerate()
-        .filter_map(partner)
-        .collect();
-    let mut found = StrainBetween::of_pairs(before, after, &pairs, options.measure.as_ref())?;
-    found.doubt = matching
-        .report
-        .doubt
-        .map(PairsDoubt::Matcher)
-        .or(found.doubt);
-    match found.doubt {
-        Some(doubt) if !options.doubtful_pairs => Err(StrainBetweenError::Doubtful(doubt)),
-        _ => Ok(found),
-    }
+    StrainBetween::of_matching(before, after, &matching, options)
 }
 
 impl<const D: usize> StrainBetween<D> {
     /// So many pairs are fitted patch by patch: one spline takes some seconds for them.
     pub const LARGE: usize = 1000;
 
-    /// Strain from the pairs of a match, rows of both sets: the second half of [`strain_between`].
+    /// Strain from a match of two sets: the second half of [`strain_between`].
+    ///
+    /// # Errors
+    /// [`StrainBetweenError`].
+    pub fn of_matching(
+        before: &[Point<f64, D>],
+        after: &[Point<f64, D>],
+        matching: &Matching<D>,
+        options: &StrainBetweenOptions<D>,
+    ) -> Result<Self, StrainBetweenError> {
+        let partner = |(i, j): (usize, &Option<usize>)| j.map(|j| (i, j));
+        let assignment = matching.assignment.iter().enumerate();
+        let pairs: Vec<_> = assignment.filter_map(partner).collect();
+        let mut found = Self::of_pairs(before, after, &pairs, options.measure.as_ref())?;
+        let doubt = matching.report.doubt.map(PairsDoubt::Matcher);
+        found.doubt = doubt.or(found.doubt);
+        options.allow(found)
+    }
+
+    /// Strain from pairs, rows of both sets. A [`doubt`](Self::doubt) is no error here.
     ///
     /// # Errors
     /// [`StrainBetweenError`].
@@ -287,6 +312,18 @@ impl<const D: usize> StrainBetween<D> {
         matched: &[(usize, usize)],
         measure: &dyn StrainMeasure,
     ) -> Result<Self, StrainBetweenError> {
+        let possible = before.len().min(after.len());
+        Self::of_share(before, after, matched, measure, possible)
+    }
+
+    /// The same where so many points can have a partner.
+    fn of_share(
+        before: &[Point<f64, D>],
+        after: &[Point<f64, D>],
+        matched: &[(usize, usize)],
+        measure: &dyn StrainMeasure,
+        possible: usize,
+    ) -> Result<Self, StrainBetweenError> {
         // Fewer leave the parts of the jackknife empty.
         let expected = 16;
         let found = matched.len();
@@ -294,7 +331,7 @@ impl<const D: usize> StrainBetween<D> {
             return Err(StrainBetweenError::TooFewPairs { expected, found });
         }
         if found >= Self::LARGE {
-            return Self::of_many(before, after, matched, measure);
+            return Self::of_many(before, after, matched, measure, possible);
         }
         let rough = fit(before, after, matched)?;
         let spacing = median_spacing(after);
@@ -320,7 +357,7 @@ impl<const D: usize> StrainBetween<D> {
             jackknife(&without) * robust.response
         };
         let displacement = |p: &Point<f64, D>| robust.spline.apply(p) - p;
-        let share = rows.len() as f64 / before.len().min(after.len()) as f64;
+        let share = rows.len() as f64 / possible as f64;
         Ok(Self {
             doubt: doubt(share, robust.sigma / spacing).or(shape_doubt(&sources, &field)),
             pairs: rows.iter().map(|&(i, j)| [before[i], after[j]]).collect(),
@@ -346,6 +383,7 @@ impl<const D: usize> StrainBetween<D> {
         after: &[Point<f64, D>],
         matched: &[(usize, usize)],
         measure: &dyn StrainMeasure,
+        possible: usize,
     ) -> Result<Self, StrainBetweenError> {
         let mut rows = matched.to_vec();
         let mut sources: Vec<_> = rows.iter().map(|&(i, _)| before[i]).collect();
@@ -378,7 +416,7 @@ impl<const D: usize> StrainBetween<D> {
         let patches = (rows.len() / LocalField::<D>::PATCH).max(2);
         let sigma = median(values.iter().map(|value| value.sigma));
         let kept = weights.iter().sum::<f64>();
-        let share = kept / before.len().min(after.len()) as f64;
+        let share = kept / possible as f64;
         Ok(Self {
             doubt: doubt(share, sigma / spacing).or(shape_doubt(&sources, &strained)),
             pairs: rows.iter().map(|&(i, j)| [before[i], after[j]]).collect(),
@@ -398,6 +436,23 @@ impl<const D: usize> StrainBetween<D> {
 }
 
 impl<const D: usize> StrainBetween<D> {
+    /// Whether a pair counts in the deformation, and was not left out as misplaced.
+    #[must_use]
+    pub fn is_kept(&self, pair: usize) -> bool {
+        self.weights.get(pair).is_some_and(|&weight| weight >= 1e-3)
+    }
+
+    /// Where the deformation takes points of the first set's space.
+    pub(crate) fn images(&self, points: &[Point<f64, D>]) -> Vec<Point<f64, D>> {
+        match &self.fit {
+            Fit::Local(field) => {
+                let moved = field.at(points, |_| {}).into_iter().zip(points);
+                moved.map(|(value, p)| p + value.displacement).collect()
+            }
+            Fit::Spline(robust) => points.iter().map(|p| robust.spline.apply(p)).collect(),
+        }
+    }
+
     /// Displacement and strain at any points of the first set's space.
     ///
     /// ```

@@ -1,12 +1,12 @@
 //! `tactile strain`: from two sets of points, before and after a deformation.
-use crate::console::{Context, Exit, Failure, four_digits};
+use crate::console::{Context, Exit, Failure, digits, four_digits};
 use crate::match_points::{self, Expectations};
 use crate::outputs::Csv;
 use crate::plot::{Colour, Page, Panel};
 use clap::{Args, ValueEnum};
 use nalgebra::{Matrix3, Point};
 use serde_json::{Map, Value, json};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use tactile_imaging::elasticity::strain::{
     Biot, EulerAlmansi, GreenLagrange, Hencky, Infinitesimal, StrainMeasure,
 };
@@ -14,34 +14,47 @@ use tactile_imaging::force::Estimate;
 use tactile_imaging::io::{PointTable, read_point_table};
 use tactile_imaging::matching::PointMatcher;
 use tactile_imaging::pipeline::with_error;
-use tactile_imaging::{StrainAt, StrainBetween};
+use tactile_imaging::{StrainAt, StrainBetween, StrainBetweenOptions};
 
-/// Match the points before and after a deformation and measure the strain between them
+mod series;
+
+/// Match the points of two frames or more and measure the strain between them
 ///
 /// The files are CSV, a point a row: columns x, y and, in space, z, found by name where there is a
 /// header. Points may come and go. A smoothing spline whose smoothing is chosen by cross-validation
-/// gives the strain. Misplaced points are found and left out. --out gets pairs.csv (rows, positions
-/// and displacements of the pairs), strain.csv (the strain at every point with its standard error)
-/// and strain.svg, and with --grid also grid.csv and grid.vtk (for ParaView): displacement, strain
-/// and standard error on a grid over the box of the points before. Far from the pairs the errors
-/// grow.
+/// gives the strain. Misplaced points are found and left out. Pairs that are not to be relied on
+/// give no strain.
+///
+/// --out gets pairs.csv (rows, positions and displacements of the pairs), strain.csv (the strain at
+/// every point with its standard error) and strain.svg (maps over the points, of a volume over the
+/// middle of z), and with --grid also grid.csv and grid.vtk
+/// (for ParaView): displacement, strain and standard error on a grid over the box of the points
+/// before. Far from the pairs the errors grow.
+///
+/// Three files and more are followed from frame to frame. The strain is then that of the last frame
+/// since the first, found where a direct match is not, and --out also gets tracks.csv (every point
+/// of every track: frame, row and position) and series.csv (strain of every step and since the
+/// first frame).
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
   tactile strain examples/data/before.csv examples/data/after.csv
   tactile strain examples/data/before.csv examples/data/after.csv --measure hencky --rotation any \
-                        --out target/strain")]
+                        --out target/strain
+  tactile strain frame0.csv frame1.csv frame2.csv --out target/series")]
 pub struct StrainArguments {
-    /// Points before.
-    before: PathBuf,
-    /// Points after.
-    after: PathBuf,
+    /// Points of the frames in their order: before and after, or more.
+    #[arg(required = true, num_args = 2.., value_name = "FRAMES")]
+    frames: Vec<PathBuf>,
     /// Measure of strain.
     #[arg(long, value_enum, default_value_t = Measure::GreenLagrange)]
     measure: Measure,
     /// Spacing of a grid to write displacement and strain on, in the points' unit.
     #[arg(long, value_name = "SPACING")]
     grid: Option<f64>,
+    /// Give the strain of doubtful pairs too, its doubt beside it.
+    #[arg(long)]
+    doubtful_pairs: bool,
     #[command(flatten)]
     expectations: Expectations,
 }
@@ -56,7 +69,7 @@ enum Measure {
 }
 
 impl Measure {
-    fn strain(self) -> &'static dyn StrainMeasure {
+    fn strain(self) -> &'static (dyn StrainMeasure + Send + Sync) {
         match self {
             Self::GreenLagrange => &GreenLagrange,
             Self::EulerAlmansi => &EulerAlmansi,
@@ -70,100 +83,176 @@ impl Measure {
 /// The unit of points whose headings name one.
 const METRES: &str = "m";
 
-const FILES: [&str; 5] = [
-    "pairs.csv",
-    "strain.csv",
-    "strain.svg",
-    "grid.csv",
-    "grid.vtk",
-];
+const FILES: [&str; 3] = ["pairs.csv", "strain.csv", "strain.svg"];
+const GRID_FILES: [&str; 2] = ["grid.csv", "grid.vtk"];
+const SERIES_FILES: [&str; 2] = ["tracks.csv", "series.csv"];
 
 pub fn run(arguments: &StrainArguments, context: &mut Context) -> Result<Exit, Failure> {
-    let (before, after) = (&arguments.before, &arguments.after);
+    let paths: Vec<&Path> = arguments.frames.iter().map(PathBuf::as_path).collect();
     if let Some(spacing) = arguments.grid.filter(|s| !(*s > 0.0 && s.is_finite())) {
         return Err(Failure::input(format!(
             "--grid {spacing}: give a spacing above zero"
         )));
     }
-    let files = if arguments.grid.is_some() { 5 } else { 3 };
-    context.outputs.plan(&FILES[..files], &[before, after])?;
-    let (a, metres) = read_point_table(before)?;
-    let (b, also_metres) = read_point_table(after)?;
-    let files = format!("{} and {}", before.display(), after.display());
-    if metres != also_metres {
-        return Err(Failure::input(format!(
-            "only one of {files} names the unit of its coordinates: name it in both headers or in \
-             none"
-        )));
+    let of_grid = &GRID_FILES[..if arguments.grid.is_some() { 2 } else { 0 }];
+    let of_series = &SERIES_FILES[..if paths.len() > 2 { 2 } else { 0 }];
+    let files = [&FILES, of_grid, of_series].concat();
+    context.outputs.plan(&files, &paths)?;
+    let (mut plane, mut space, mut metric) = (Vec::new(), Vec::new(), Vec::new());
+    for path in &paths {
+        let (table, metres) = read_point_table(path)?;
+        match table {
+            PointTable::Plane(points) => plane.push(points),
+            PointTable::Space(points) => space.push(points),
+        }
+        metric.push(metres);
+        let files = format!("{} and {}", paths[0].display(), path.display());
+        if metres != metric[0] {
+            return Err(Failure::input(format!(
+                "only one of {files} names the unit of its coordinates: name it in both headers or in none"
+            )));
+        }
+        if !plane.is_empty() && !space.is_empty() {
+            return Err(Failure::input(format!(
+                "{files} must both have two coordinates a point, or both three"
+            )));
+        }
     }
-    let unit = if metres { METRES } else { "the points' unit" };
-    match (a, b) {
-        (PointTable::Plane(a), PointTable::Plane(b)) => measured(a, b, unit, arguments, context),
-        (PointTable::Space(a), PointTable::Space(b)) => measured(a, b, unit, arguments, context),
-        _ => Err(Failure::input(format!(
-            "{files} must both have two coordinates a point, or both three"
-        ))),
+    let unit = if metric[0] {
+        METRES
+    } else {
+        "the points' unit"
+    };
+    if plane.is_empty() {
+        answer(space, unit, arguments, context)
+    } else {
+        answer(plane, unit, arguments, context)
     }
 }
 
-fn measured<const D: usize>(
-    before: Vec<Point<f64, D>>,
-    after: Vec<Point<f64, D>>,
+impl StrainArguments {
+    fn options<const D: usize>(&self) -> StrainBetweenOptions<D> {
+        let options = StrainBetweenOptions::default().with_matcher(self.expectations.matcher());
+        let options = match self.measure {
+            Measure::GreenLagrange => options.with_measure(GreenLagrange),
+            Measure::EulerAlmansi => options.with_measure(EulerAlmansi),
+            Measure::Hencky => options.with_measure(Hencky),
+            Measure::Biot => options.with_measure(Biot),
+            Measure::Infinitesimal => options.with_measure(Infinitesimal),
+        };
+        if self.doubtful_pairs {
+            options.with_doubtful_pairs()
+        } else {
+            options
+        }
+    }
+}
+
+/// The strain between two frames or along a series, its report and its files.
+fn answer<const D: usize>(
+    mut frames: Vec<Vec<Point<f64, D>>>,
     unit: &'static str,
     arguments: &StrainArguments,
     context: &mut Context,
 ) -> Result<Exit, Failure> {
     let remedy = "take every tenth point, or cut the sets into parts";
-    match_points::allow(context, before.len(), after.len(), remedy)?;
+    for pair in frames.windows(2) {
+        match_points::allow(context, pair[0].len(), pair[1].len(), remedy)?;
+    }
+    let measured = if frames.len() > 2 {
+        series::follow(&frames, unit, arguments, context)
+    } else {
+        let after = frames.pop().unwrap_or_default();
+        between(frames.remove(0), after, arguments, context)?
+    };
+    let Some(measured) = measured else {
+        return Ok(Exit::Interrupted);
+    };
+    let measure = arguments.measure.strain();
+    let report = StrainReport {
+        before: measured.before,
+        after: measured.after,
+        matched: measured.matched,
+        strain: measured.strain,
+        measure: measure.name(),
+        unit,
+    };
+    report.print(context);
+    let mut value = report.json();
+    if let Some(frames) = measured.frames {
+        value["frames"] = frames;
+    }
+    context.value(&value);
+    context.outputs.add(FILES[0], report.pairs());
+    let Ok(strain) = &report.strain else {
+        return Ok(Exit::complete_if(false));
+    };
+    context.outputs.add(FILES[1], report.table(strain));
+    context.outputs.page(FILES[2], || report.page(strain))?;
+    if let Some(spacing) = arguments.grid {
+        let grid = Grid::over(&report.before, spacing)?;
+        let (strain, points) = (strain.clone(), grid.points());
+        let job = format!("strain at {} points of the grid", points.len());
+        let Some(found) = context.wait(job, move || strain.at(&points, measure)) else {
+            return Ok(Exit::Interrupted);
+        };
+        let found = found.map_err(|error| Failure::input(error.to_string()))?;
+        let table = report.grid_table(&grid, &found);
+        context.outputs.add(GRID_FILES[0], table);
+        context.outputs.add(GRID_FILES[1], grid.vtk(&found));
+    }
+    Ok(Exit::complete_if(measured.complete))
+}
+
+/// A strain, as far as it came.
+struct Measured<const D: usize> {
+    before: Vec<Point<f64, D>>,
+    after: Vec<Point<f64, D>>,
+    /// Pairs of the matcher.
+    matched: Vec<(usize, usize)>,
+    strain: Result<StrainBetween<D>, String>,
+    /// The frames of a series.
+    frames: Option<Value>,
+    /// Whether all was found.
+    complete: bool,
+}
+
+/// The strain between two frames. None after Ctrl-C.
+fn between<const D: usize>(
+    before: Vec<Point<f64, D>>,
+    after: Vec<Point<f64, D>>,
+    arguments: &StrainArguments,
+    context: &mut Context,
+) -> Result<Option<Measured<D>>, Failure> {
     let matcher = arguments.expectations.matcher();
     let job = format!("matching {} to {} points", before.len(), after.len());
     let sets = (before.clone(), after.clone());
     let Some(matching) = context.wait(job, move || matcher.match_points(&sets.0, &sets.1)) else {
-        return Ok(Exit::Interrupted);
+        return Ok(None);
     };
-    let files = [&arguments.before, &arguments.after].map(|path| path.display());
+    let files = [0, 1].map(|k| arguments.frames[k].display());
     let matching = matching.map_err(|error| {
-        Failure::input(format!(
-            "{} and {} cannot be matched: {error}",
-            files[0], files[1]
-        ))
+        let [before, after] = files;
+        Failure::input(format!("{before} and {after} cannot be matched: {error}"))
     })?;
     let partner = |(i, j): (usize, &Option<usize>)| j.map(|j| (i, j));
     let assignment = matching.assignment.iter().enumerate();
     let matched: Vec<_> = assignment.filter_map(partner).collect();
     let job = format!("fitting {} pairs", matched.len());
-    let (from, to, pairs) = (before.clone(), after.clone(), matched.clone());
-    let measure = arguments.measure;
+    let (from, to, options) = (before.clone(), after.clone(), arguments.options());
     // Ctrl-C during the fit leaves the pairs, which took the longest.
     let found = context.wait(job, move || {
-        StrainBetween::of_pairs(&from, &to, &pairs, measure.strain())
+        StrainBetween::of_matching(&from, &to, &matching, &options)
             .map_err(|error| error.to_string())
     });
-    let report = StrainReport {
+    Ok(Some(Measured {
         before,
         after,
         matched,
         strain: found.unwrap_or_else(|| Err("stopped by Ctrl-C".to_owned())),
-        measure: measure.strain().name(),
-        unit,
-    };
-    report.print(context);
-    context.value(&report.json());
-    context.outputs.add(FILES[0], report.pairs());
-    if let Ok(strain) = &report.strain {
-        context.outputs.add(FILES[1], report.table(strain));
-        context.outputs.page(FILES[2], || report.page(strain))?;
-        if let Some(spacing) = arguments.grid {
-            let grid = Grid::over(&report.before, spacing)?;
-            let found = strain.at(&grid.points(), measure.strain());
-            let found = found.map_err(|error| Failure::input(error.to_string()))?;
-            context
-                .outputs
-                .add(FILES[3], report.grid_table(&grid, &found));
-            context.outputs.add(FILES[4], grid.vtk(&found));
-        }
-    }
-    Ok(Exit::complete_if(report.strain.is_ok()))
+        frames: None,
+        complete: true,
+    }))
 }
 
 /// The results, as far as they came.
@@ -266,9 +355,20 @@ fn components<const D: usize>() -> Vec<Component> {
     plane.iter().chain(more).copied().collect()
 }
 
-/// Whether a pair of this weight counts in the spline.
-fn counts(weight: f64) -> bool {
-    weight >= 1e-3
+/// Number of pairs that were left out of the deformation.
+fn left_out<const D: usize>(found: &StrainBetween<D>) -> usize {
+    (0..found.rows.len()).filter(|&k| !found.is_kept(k)).count()
+}
+
+/// The components of the mean strain with their standard errors.
+fn components_json<const D: usize>(found: &StrainBetween<D>) -> Map<String, Value> {
+    let component = |(name, i, j): Component| {
+        let (mean, error) = (found.summary.mean[(i, j)], found.standard_error[(i, j)]);
+        let mut value = json!(Estimate::new(mean, error));
+        value["spread"] = json!(found.summary.spread[(i, j)]);
+        (name.to_owned(), value)
+    };
+    components::<D>().into_iter().map(component).collect()
 }
 
 impl<const D: usize> StrainReport<D> {
@@ -294,8 +394,7 @@ impl<const D: usize> StrainReport<D> {
             Ok(found) => found,
             Err(reason) => return context.row("strain", format_args!("none: {reason}")),
         };
-        let left_out = found.weights.iter().filter(|w| !counts(**w)).count();
-        context.row("left out", format_args!("{left_out} as misplaced"));
+        context.row("left out", format_args!("{} as misplaced", left_out(found)));
         let noise = four_digits(found.sigma);
         context.row(
             "noise",
@@ -348,22 +447,15 @@ impl<const D: usize> StrainReport<D> {
     }
 
     fn strain_json(&self, found: &StrainBetween<D>) -> Value {
-        let component = |(name, i, j): Component| {
-            let (mean, error) = (found.summary.mean[(i, j)], found.standard_error[(i, j)]);
-            let mut value = json!(Estimate::new(mean, error));
-            value["spread"] = json!(found.summary.spread[(i, j)]);
-            (name.to_owned(), value)
-        };
-        let tensors: Map<String, Value> = components::<D>().into_iter().map(component).collect();
         json!({
             "measure": self.measure,
-            "left_out_as_misplaced": found.weights.iter().filter(|w| !counts(**w)).count(),
+            "left_out_as_misplaced": left_out(found),
             "noise_per_coordinate": found.sigma,
             "smoothing_over_squared_radius": found.relative_lambda,
             "degrees_of_freedom": found.degrees_of_freedom,
             "folded_points": found.summary.folded,
             "doubt": found.doubt.map(|doubt| doubt.to_string()),
-            "components": tensors,
+            "components": components_json(found),
         })
     }
 
@@ -425,15 +517,26 @@ impl<const D: usize> StrainReport<D> {
         csv.into_bytes()
     }
 
+    /// Displacement and strain as maps over the points, of a volume over its middle slice.
     fn page(&self, found: &StrainBetween<D>) -> Page {
         let unit = self.unit;
         let flat = |p: &Point<f64, D>| [p[0], p[1]];
+        let shown = shown_pairs(found);
         let pairs = |kept: bool| {
-            let weighted = found.pairs.iter().zip(&found.weights);
-            let chosen = weighted.filter(move |(_, w)| counts(**w) == kept);
-            chosen.map(move |(pair, _)| [flat(&pair[0]), flat(&pair[1])])
+            let chosen = shown.iter().filter(move |&&k| found.is_kept(k) == kept);
+            chosen.map(|&k| found.pairs[k].each_ref().map(flat))
         };
+        let heights = shown
+            .iter()
+            .map(|&k| found.pairs[k][0].iter().nth(2).copied());
+        let (low, high) = heights.fold((f64::MAX, f64::MIN), |(low, high), z| {
+            (low.min(z.unwrap_or(0.0)), high.max(z.unwrap_or(0.0)))
+        });
         let panel = |title: String| {
+            let title = match D {
+                2 => title,
+                _ => format!("{title}, z {} to {}", digits(low, 3), digits(high, 3)),
+            };
             Panel::new(title, format!("x ({unit})"), format!("y ({unit})")).equal_aspect()
         };
         let mut matches =
@@ -441,18 +544,34 @@ impl<const D: usize> StrainReport<D> {
         if pairs(false).next().is_some() {
             matches = matches.arrows(pairs(false), Colour::Red, "left out");
         }
-        let positions: Vec<_> = found.pairs.iter().map(|p| flat(&p[0])).collect();
-        let map = |(name, i, j): Component| {
+        let positions: Vec<_> = shown.iter().map(|&k| flat(&found.pairs[k][0])).collect();
+        let displacement = |axis: usize| {
+            let name = ["u_x", "u_y", "u_z"][axis];
+            let values = shown.iter().map(|&k| found.displacements[k][axis]);
+            let label = format!("{name} ({unit})");
+            panel(name.into()).valued_points(positions.clone(), values, &label)
+        };
+        let strain = |(name, i, j): Component| {
             let (mean, error) = (found.summary.mean[(i, j)], found.standard_error[(i, j)]);
-            let values = found.strains.iter().map(|e| e[(i, j)]);
+            let values = shown.iter().map(|&k| found.strains[k][(i, j)]);
             let title = format!("{name}: mean {}", with_error(mean, error, 1.0));
             panel(title).valued_points(positions.clone(), values, name)
         };
-        // In space the diagonal alone: shear seen from above would mislead.
-        let shown = components::<D>()
-            .into_iter()
-            .filter(|c| c.1 == c.2 || D == 2);
-        let panels = std::iter::once(matches).chain(shown.map(map)).collect();
+        let maps = (0..D).map(displacement);
+        let maps = maps.chain(components::<D>().into_iter().map(strain));
+        let panels = std::iter::once(matches).chain(maps).collect();
         Page::new("Strain between two point sets", 2, panels)
     }
+}
+
+/// The pairs that a page shows: of a volume the quarter in the middle of z, and no more than can be
+/// told apart in a picture.
+fn shown_pairs<const D: usize>(found: &StrainBetween<D>) -> Vec<usize> {
+    let mut rows: Vec<usize> = (0..found.pairs.len()).collect();
+    if D == 3 {
+        rows.sort_by(|&a, &b| found.pairs[a][0][D - 1].total_cmp(&found.pairs[b][0][D - 1]));
+        rows = rows[3 * rows.len() / 8..5 * rows.len() / 8].to_vec();
+    }
+    let step = rows.len().div_ceil(4000).max(1);
+    rows.into_iter().step_by(step).collect()
 }

@@ -213,6 +213,10 @@ pub enum Doubt {
     LargeResiduals,
     /// One pair in twenty or more is wrong, by the pairs' confidences.
     Undecided,
+    /// Any rotation is allowed, and one of a twelfth of a turn or a multiple, in space of a right
+    /// angle about an axis of the coordinates, takes the model onto itself: the answer may be
+    /// turned by it.
+    Symmetric,
 }
 
 /// How a match went.

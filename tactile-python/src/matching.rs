@@ -278,6 +278,7 @@ fn doubt(doubt: Doubt) -> &'static str {
     match doubt {
         Doubt::FewPairs => "the matched points are so few that they may have met by chance",
         Doubt::LargeResiduals => "the residuals are as large as those of scattered points",
+        Doubt::Symmetric => "the points look the same after a turn, and any rotation is allowed",
         _ => "one matched pair in twenty or more is wrong",
     }
 }

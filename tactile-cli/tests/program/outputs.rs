@@ -151,3 +151,51 @@ fn tables_of_a_strain_name_units_and_whole_rows() {
         );
     }
 }
+
+/// Three files and more are followed: tracks, the strain of every step and since the first frame.
+#[test]
+fn frames_of_a_series_give_tracks_and_strains() {
+    let folder = tempfile::tempdir().unwrap();
+    for frame in 0..4 {
+        let stretch = 1.0 + 0.05 * f64::from(frame);
+        let row = |k: i32| {
+            let x = f64::from(k % 7) + 0.05 * f64::from(k * k % 11);
+            format!("{},{}\n", stretch * x, k / 7)
+        };
+        // A point is missed in one frame.
+        let seen = (0..49).filter(|&k| frame != 2 || k != 20);
+        let rows: String = seen.map(row).collect();
+        fs::write(folder.path().join(format!("{frame}.csv")), rows).unwrap();
+    }
+    let output = run(
+        folder.path(),
+        &words("strain 0.csv 1.csv 2.csv 3.csv --json --out results"),
+    );
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+    let value: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    for (frame, stretch) in [(1, 1.05), (2, 1.1), (3, 1.15_f64)] {
+        let found = &value["frames"][frame - 1];
+        let mean = |part: &str| found[part]["components"]["e_xx"]["value"].as_f64().unwrap();
+        let step: f64 = stretch / (stretch - 0.05);
+        // The positions are exact to rounding, and a homogeneous stretch is what a spline smooths to.
+        assert!(
+            (mean("total") - 0.5 * (stretch * stretch - 1.0)).abs() < 1e-6,
+            "{found}"
+        );
+        assert!(
+            (mean("step") - 0.5 * (step * step - 1.0)).abs() < 1e-6,
+            "{found}"
+        );
+    }
+    let read = |name: &str| fs::read_to_string(folder.path().join("results").join(name)).unwrap();
+    assert!(read("tracks.csv").starts_with("track,frame,row,x,y\n0,0,0,"));
+    // The track of the point that was missed goes on.
+    let track = read("tracks.csv")
+        .lines()
+        .filter(|l| l.starts_with("20,"))
+        .count();
+    assert_eq!(track, 3);
+    assert_eq!(read("tracks.csv").lines().count(), 4 * 49);
+    assert!(read("series.csv").starts_with("frame,pairs_step,e_xx_step,"));
+    assert_eq!(read("series.csv").lines().count(), 4);
+}

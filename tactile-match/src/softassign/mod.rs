@@ -112,6 +112,8 @@ pub struct SoftassignWorkspace<const D: usize> {
     expected_share: f64,
     starts: usize,
     stopped: bool,
+    /// Whether any rotation is allowed and one takes the model onto itself.
+    symmetric: bool,
 }
 
 impl<const D: usize> SoftassignWorkspace<D> {
@@ -125,7 +127,10 @@ impl<const D: usize> SoftassignWorkspace<D> {
         // A larger share of residuals that the noise of the others does not explain is that of a
         // part of the set that lies aside.
         let misfit = by_chance || self.best.tail > 0.08;
-        doubt.or(misfit.then_some(Doubt::LargeResiduals))
+        let symmetric = self.symmetric.then_some(Doubt::Symmetric);
+        doubt
+            .or(misfit.then_some(Doubt::LargeResiduals))
+            .or(symmetric)
     }
 
     /// How much more likely the best answer makes the targets than points strewn over their

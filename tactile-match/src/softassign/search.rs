@@ -11,7 +11,7 @@ use super::{
     AnnealedSoftassign, Cooling, Mechanism, PriorScales, Rotation, Schedule, Search,
     SoftassignWorkspace, Transformation, starts,
 };
-use nalgebra::SMatrix;
+use nalgebra::{SMatrix, SVector};
 use std::ops::ControlFlow;
 
 /// Scales of the prior in the search.
@@ -176,6 +176,7 @@ impl AnnealedSoftassign {
         if ws.best.noisy {
             ws.answer.variance.clone_from(&ws.fine.variance);
         }
+        ws.symmetric = self.rotation == Rotation::Any && is_symmetric(ws);
     }
 
     /// All starts in turn until the best answer leaves no doubt, then the scales of the prior.
@@ -405,6 +406,32 @@ impl AnnealedSoftassign {
             && ws.best.matched >= wanted * points as f64
             && (ws.best.tail <= 0.01 || !dense)
     }
+}
+
+/// Whether a turn takes the model onto itself, by what the answer resolves. Then the answer may be
+/// turned as well.
+fn is_symmetric<const D: usize>(ws: &SoftassignWorkspace<D>) -> bool {
+    let n = ws.model.len();
+    let spacing = (bounding_volume(&ws.model) / n as f64).powf(1.0 / D as f64);
+    let reach = (3.0 * ws.best.sigma).min(0.25 * spacing);
+    // Two hundred points show a symmetry, and of a set without one the first few miss.
+    let step = n.div_ceil(200);
+    let misses = n / step / 20;
+    starts::rotations::<D>(Rotation::Any)
+        .skip(1)
+        .any(|rotation| {
+            let missed = |p: &&[f64; D]| {
+                let turned: [f64; D] = (rotation * SVector::from(**p)).into();
+                let square = |q: &[f64; D]| (0..D).map(|k| (turned[k] - q[k]).powi(2)).sum::<f64>();
+                ws.model.iter().all(|q| square(q) > reach * reach)
+            };
+            ws.model
+                .iter()
+                .step_by(step)
+                .filter(missed)
+                .nth(misses)
+                .is_none()
+        })
 }
 
 /// Volume of the bounding box. Thin sides count as a tenth of the model's radius.

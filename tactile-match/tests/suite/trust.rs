@@ -1,8 +1,10 @@
 //! What the default matcher says about its own answers: standard deviations, confidences, doubts.
 
 use crate::common::{Stream, bend, reordered, rotation, scattered};
-use nalgebra::{Point, SVector};
-use tactile_match::{AnnealedSoftassign, Doubt, Matching, PointMatcher, StopReason};
+use nalgebra::{Point, Point2, SVector};
+use tactile_match::{
+    AnnealedSoftassign, Doubt, Matching, PointMatcher, Rotation, StopReason, Transformation,
+};
 
 /// A model, its true positions, and targets with noise: `order[j]` is the model point of target
 /// `j`, rows beyond are outliers.
@@ -248,5 +250,31 @@ fn wrong_answers_are_doubted() {
             );
             assert!(scene.right(&found) > 0.9 || report.stop != StopReason::Exact);
         }
+    }
+}
+
+/// A lattice looks the same after half a turn, a quarter and none: where any rotation is allowed
+/// nothing decides between them. A point that sticks out does.
+#[test]
+fn a_lattice_that_may_be_turned_is_doubtful() {
+    let lattice: Vec<Point2<f64>> = (0..36)
+        .map(|k| Point2::new(f64::from(k % 6), f64::from(k / 6)))
+        .collect();
+    let mut marked = lattice.clone();
+    marked.push(Point2::new(7.5, 5.0));
+    for transformation in [Transformation::Rigid, Transformation::NonRigid] {
+        let matcher = AnnealedSoftassign::default().with_transformation(transformation);
+        let any = matcher.with_rotation(Rotation::Any);
+        let turned: Vec<_> = lattice
+            .iter()
+            .map(|p| Point2::new(5.0 - p.x, 5.0 - p.y))
+            .collect();
+        let doubt = |found: Matching<2>| found.report.doubt;
+        let found = any.match_points(&lattice, &turned).unwrap();
+        assert_eq!(doubt(found), Some(Doubt::Symmetric), "{transformation:?}");
+        let found = matcher.match_points(&lattice, &lattice).unwrap();
+        assert_eq!(doubt(found), None, "{transformation:?}");
+        let found = any.match_points(&marked, &marked).unwrap();
+        assert_eq!(doubt(found), None, "{transformation:?}");
     }
 }

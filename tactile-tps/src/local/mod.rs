@@ -80,6 +80,15 @@ pub struct LocalValue<const D: usize> {
     pub spacing: f64,
 }
 
+/// Why the field is looked up.
+#[derive(Clone, Copy, PartialEq)]
+enum Walk {
+    /// To judge the pairs. Smaller patches are enough, and take a sixth of the time.
+    Judge,
+    /// To read values and errors.
+    Read,
+}
+
 /// A value and how far the pair there, if there is one, is from what the others predict.
 struct Found<const D: usize> {
     value: LocalValue<D>,
@@ -112,10 +121,9 @@ impl<const D: usize> LocalField<D> {
             tree: Tree::default(),
         };
         // The first round judges with the wrong pairs among the others, the second without them.
-        // Smaller patches are enough, and take a sixth of the time.
         for _ in 0..2 {
             field.plant();
-            let found = field.walk(sources, true, Self::PATCH / 2, |_| {});
+            let found = field.walk(sources, Walk::Judge, |_| {});
             let wrong = contradicted(&found, sources);
             let same = (0..sources.len()).all(|i| field.kept[i] != wrong[i]);
             field.kept = wrong.into_iter().map(|wrong| !wrong).collect();
@@ -124,7 +132,7 @@ impl<const D: usize> LocalField<D> {
             }
         }
         field.plant();
-        let found = field.walk(sources, true, Self::PATCH, &mut progress);
+        let found = field.walk(sources, Walk::Read, &mut progress);
         field.values = found.into_iter().map(|found| found.value).collect();
         Ok(field)
     }
@@ -137,18 +145,21 @@ impl<const D: usize> LocalField<D> {
 
     /// The field at any points: O(1) time for each that has neighbours among them.
     pub fn at(&self, points: &[Point<f64, D>], progress: impl FnMut(f64)) -> Vec<LocalValue<D>> {
-        let found = self.walk(points, false, Self::PATCH, progress);
+        let found = self.walk(points, Walk::Read, progress);
         found.into_iter().map(|found| found.value).collect()
     }
 
-    /// The field at `points`, which are the sources where `own`.
+    /// The field at `points`, which are the sources where they are judged.
     fn walk(
         &self,
         points: &[Point<f64, D>],
-        own: bool,
-        count: usize,
+        purpose: Walk,
         mut progress: impl FnMut(f64),
     ) -> Vec<Found<D>> {
+        let count = match purpose {
+            Walk::Judge => Self::PATCH / 2,
+            Walk::Read => Self::PATCH,
+        };
         let blocks = Tree::new(points, (0..points.len()).collect());
         let mut patch = Patch::default();
         let mut found: Vec<Option<Found<D>>> = points.iter().map(|_| None).collect();
@@ -165,20 +176,25 @@ impl<const D: usize> LocalField<D> {
             let extent = block.iter().map(extent).fold(0.0, f64::max);
             // Sparse points beside dense pairs have patches of their own.
             let together = extent <= 0.8 * reach(&near);
+            let take = |patch: &mut Patch<D>, place: &SVector<f64, D>, near: &[_]| {
+                patch.take(&self.sources, &self.displacements, place, near);
+                if purpose == Walk::Read {
+                    patch.calibrate();
+                }
+            };
             if together {
-                patch.take(&self.sources, &self.displacements, &centre, &near);
+                take(&mut patch, &centre, &near);
             }
             for &i in block {
                 if !together {
                     near = self.tree.nearest(&self.sources, &points[i], count);
-                    patch.take(&self.sources, &self.displacements, &points[i].coords, &near);
+                    take(&mut patch, &points[i].coords, &near);
                 }
-                let row = if own { patch.row_of(i) } else { None };
                 let value = patch.value(&points[i]);
-                let (misfit, distance) = match row {
-                    Some(row) => patch.left_out(row),
-                    None if own => patch.beside(&value, &self.displacements[i]),
-                    None => (0.0, 0.0),
+                let (misfit, distance) = match (purpose, patch.row_of(i)) {
+                    (Walk::Read, _) => (0.0, 0.0),
+                    (Walk::Judge, Some(row)) => patch.left_out(row),
+                    (Walk::Judge, None) => value.beside(&self.displacements[i]),
                 };
                 found[i] = Some(Found {
                     value,

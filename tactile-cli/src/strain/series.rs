@@ -1,0 +1,160 @@
+//! `tactile strain` of three frames and more: points are followed from frame to frame.
+use super::{Measured, SERIES_FILES, StrainArguments, components, components_json};
+use crate::console::{Context, printable};
+use crate::outputs::Csv;
+use nalgebra::{Matrix3, Point};
+use serde_json::{Value, json};
+use tactile_imaging::pipeline::with_error;
+use tactile_imaging::{SeriesStrain, StrainBetween, StrainSeries};
+
+/// Follows the points and returns the strain of the last frame that has one since the first. None
+/// after Ctrl-C.
+pub fn follow<const D: usize>(
+    frames: &[Vec<Point<f64, D>>],
+    unit: &str,
+    arguments: &StrainArguments,
+    context: &mut Context,
+) -> Option<Measured<D>> {
+    let mut series = StrainSeries::new(&frames[0], arguments.options());
+    let mut report = SeriesReport::<D>::new(unit);
+    // Frames of the series are those that were not refused.
+    let mut followed = vec![0];
+    let mut measured = Measured {
+        before: frames[0].clone(),
+        after: Vec::new(),
+        matched: Vec::new(),
+        strain: Err("no frame could be followed".to_owned()),
+        frames: None,
+        complete: true,
+    };
+    for (k, next) in frames.iter().enumerate().skip(1) {
+        let name = printable(&arguments.frames[k].display().to_string());
+        let job = format!("following {} points to {name}", next.len());
+        let points = next.clone();
+        let found;
+        (found, series) = context.wait(job, move || (series.push(&points), series))?;
+        let total = found
+            .as_ref()
+            .map_or_else(Err, |found| found.total.as_ref());
+        measured.complete &= total.is_ok();
+        if found.is_ok() {
+            followed.push(k);
+        }
+        if let Ok(total) = total {
+            measured.after.clone_from(next);
+            measured.strain = Ok(total.clone());
+        }
+        report.add(k, &name, &found.map_err(|error| error.to_string()), context);
+    }
+    let mut tracks = Csv::new(&report.header);
+    for (track, places) in series.tracks().iter().enumerate() {
+        for &(frame, row) in places {
+            let frame = followed[frame];
+            let place = frames[frame][row];
+            let cells = [track, frame, row].map(|n| n as f64);
+            tracks.row(cells.into_iter().chain(place.iter().copied()));
+        }
+    }
+    context.outputs.add(SERIES_FILES[0], tracks.into_bytes());
+    context
+        .outputs
+        .add(SERIES_FILES[1], report.table.into_bytes());
+    measured.frames = Some(Value::Array(report.frames));
+    Some(measured)
+}
+
+/// What is known of the frames.
+struct SeriesReport<const D: usize> {
+    /// Columns of the tracks.
+    header: Vec<String>,
+    table: Csv,
+    frames: Vec<Value>,
+}
+
+impl<const D: usize> SeriesReport<D> {
+    fn new(unit: &str) -> Self {
+        let suffix = if unit == super::METRES { "_m" } else { "" };
+        let axes = ["x", "y", "z"][..D].iter().map(|a| format!("{a}{suffix}"));
+        let fixed = ["track", "frame", "row"].map(str::to_owned);
+        let header = fixed.into_iter().chain(axes).collect();
+        let mut columns = vec!["frame".to_owned()];
+        for part in ["step", "total"] {
+            columns.push(format!("pairs_{part}"));
+            columns.extend(components::<D>().iter().map(|c| format!("{}_{part}", c.0)));
+            columns.extend(
+                components::<D>()
+                    .iter()
+                    .map(|c| format!("se_{}_{part}", c.0)),
+            );
+        }
+        Self {
+            header,
+            table: Csv::new(&columns),
+            frames: Vec::new(),
+        }
+    }
+
+    fn add(
+        &mut self,
+        frame: usize,
+        file: &str,
+        found: &Result<SeriesStrain<D>, String>,
+        context: &mut Context,
+    ) {
+        let total = |found: &SeriesStrain<D>| found.total.clone().map_err(|e| e.to_string());
+        let total = found.as_ref().map_or_else(|e| Err(e.clone()), total);
+        let step = found.as_ref().map(|found| &found.step);
+        let parts = [
+            step.map_err(Clone::clone),
+            total.as_ref().map_err(Clone::clone),
+        ];
+        let mut cells = vec![Some(frame as f64)];
+        let mut value = json!({ "frame": frame, "file": file });
+        for (name, part) in ["step", "total"].into_iter().zip(&parts) {
+            match part {
+                Ok(strain) => {
+                    cells.push(Some(strain.rows.len() as f64));
+                    for tensor in [&strain.summary.mean, &strain.standard_error] {
+                        let component = |(_, i, j): super::Component| Some(tensor[(i, j)]);
+                        cells.extend(components::<D>().into_iter().map(component));
+                    }
+                    value[name] = json!({
+                        "pairs": strain.rows.len(), "noise_per_coordinate": strain.sigma,
+                        "doubt": strain.doubt.map(|doubt| doubt.to_string()),
+                        "components": components_json(strain),
+                    });
+                }
+                Err(reason) => {
+                    cells.extend(vec![None; 1 + 2 * components::<D>().len()]);
+                    value[name] = json!({ "error": reason });
+                }
+            }
+        }
+        self.table.cells(cells);
+        self.frames.push(value);
+        let text = parts.each_ref().map(|part| match part {
+            Ok(strain) => mean_text(strain),
+            Err(reason) => format!("none: {reason}"),
+        });
+        context.row(&format!("frame {frame}"), format_args!("step {}", text[0]));
+        context.row("", format_args!("since frame 0 {}", text[1]));
+    }
+}
+
+/// The pairs and the diagonal of the mean strain.
+fn mean_text<const D: usize>(strain: &StrainBetween<D>) -> String {
+    let at = |m: &Matrix3<f64>, k: usize| m[(k, k)];
+    let one = |k: usize| {
+        let (mean, error) = (at(&strain.summary.mean, k), at(&strain.standard_error, k));
+        format!(
+            ", {} {}",
+            ["e_xx", "e_yy", "e_zz"][k],
+            with_error(mean, error, 1.0)
+        )
+    };
+    let means: String = (0..D).map(one).collect();
+    let doubt = strain
+        .doubt
+        .map_or(String::new(), |doubt| format!(" (DOUBT: {doubt})"));
+    format!("{} pairs{means}{doubt}", strain.rows.len())
+}
