@@ -1,4 +1,5 @@
-//! Force: what a frame costs, with the error beside the time.
+//! Force: what a frame costs, with the error beside the time. The bench `work_precision` varies how
+//! the profile is fitted.
 //!
 //! Everything runs on the paper's frame, 1392 × 1042 pixels of 8 bits; the yardstick is adding up
 //! its bytes.
@@ -12,7 +13,7 @@ use tactile_imaging::force::{
     CalibrationOptions, CalibrationPair, ContactDetector, ContactOptions, DetectorWorkspace,
     ForceMeter, ForceOptions, ForceWorkspace, LinearCalibration, ReferenceFrame,
 };
-use tactile_simulate::{CalibrationRun as SimulatedRun, PressLoad, PressOptions, PressScene};
+use tactile_simulate::{PressLoad, PressOptions, PressScene};
 
 struct Scene {
     scene: PressScene,
@@ -139,57 +140,5 @@ fn contact(c: &mut Criterion) {
     }
 }
 
-fn hertz_fit(c: &mut Criterion) {
-    let s = scene();
-    let run = SimulatedRun {
-        steps: 5,
-        ..SimulatedRun::default()
-    };
-    let series = s.scene.calibrate(&run).expect("valid");
-    let pairs: Vec<_> = series
-        .pairs
-        .iter()
-        .map(|p| CalibrationPair::loading(p.integrated_pixel_value, p.force_n))
-        .collect();
-    let calibration =
-        LinearCalibration::fit(&pairs, &CalibrationOptions::default()).expect("enough pairs");
-    let truth = s.scene.truth(0);
-    let mut group = c.benchmark_group("force/hertz_fit");
-    for (name, skip_profile) in [
-        ("whole frame without the profile", true),
-        ("whole frame with the profile", false),
-    ] {
-        let options = if skip_profile {
-            ForceOptions::default().without_profile()
-        } else {
-            ForceOptions::default()
-        };
-        let meter = ForceMeter::new(truth.pixel_size_m, &options).expect("valid");
-        let mut workspace = ForceWorkspace::default();
-        let mut measure = || {
-            meter
-                .measure_with(
-                    &mut workspace,
-                    black_box(s.pressed.view()),
-                    &s.reference,
-                    &calibration,
-                )
-                .expect("valid")
-        };
-        let m = measure();
-        let force = m.force_n.value / truth.contact.force_n - 1.0;
-        let radius =
-            m.contact_radius_m.expect("contact").value / truth.contact.contact_radius_m - 1.0;
-        assert!(force.abs() < 5e-3 && radius.abs() < if skip_profile { 0.02 } else { 3e-3 });
-        eprintln!(
-            "force/hertz_fit/{name}: force off by {:+.3} %, radius by {:+.3} %",
-            100.0 * force,
-            100.0 * radius
-        );
-        group.bench_function(name, |b| b.iter(&mut measure));
-    }
-    group.finish();
-}
-
-criterion_group!(benches, pass, contact, hertz_fit);
+criterion_group!(benches, pass, contact);
 criterion_main!(benches);

@@ -7,7 +7,7 @@
 
 use std::hint::black_box;
 
-use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
+use criterion::{Criterion, criterion_group, criterion_main};
 use nalgebra::{Matrix3, Point3, Vector3};
 use rand::{RngExt, SeedableRng, rngs::SmallRng};
 use tactile_imaging::tps::{
@@ -65,40 +65,18 @@ impl Problem {
     }
 }
 
-fn kernels(c: &mut Criterion, name: &str, bench: impl Bench) {
-    let mut group = c.benchmark_group(format!("tps/{name}"));
-    for n in SIZES {
-        let problem = Problem::new(n);
-        bench.run(&mut group, &problem, "r2logr", R2LogR);
-        bench.run(&mut group, &problem, "r", NegR);
-        bench.run(&mut group, &problem, "r3", R3);
-    }
-    group.finish();
-}
-
-type Group<'a> = criterion::BenchmarkGroup<'a, criterion::measurement::WallTime>;
-
-trait Bench {
-    fn run<K: Kernel + Default>(
-        &self,
-        group: &mut Group<'_>,
-        problem: &Problem,
-        kernel_name: &str,
-        kernel: K,
-    );
-}
-
+/// Fits once, prints the error beside what the fit reports, and checks it.
 fn solved<K: Kernel + Default>(
     problem: &Problem,
-    kernel: K,
-    label: &str,
+    options: &FitOptions<f64, K>,
+    name: &str,
 ) -> ThinPlateSpline<f64, 3, K> {
-    let spline = ThinPlateSpline::fit(&problem.sources, &problem.targets, &FitOptions::new(kernel))
-        .expect("a spline");
+    let spline =
+        ThinPlateSpline::fit(&problem.sources, &problem.targets, options).expect("a spline");
     let error = problem.error(&spline);
     let report = &spline.report;
     println!(
-        "{label}/{}: rms error {error:.3e}, residual {:.1e}, condition {:.1e}, {} steps",
+        "{name}/{}: rms error {error:.3e}, residual {:.1e}, condition {:.1e}, {} steps",
         report.points,
         report.residual.unwrap_or(f64::NAN),
         report.condition,
@@ -109,121 +87,54 @@ fn solved<K: Kernel + Default>(
     spline
 }
 
-struct Fit;
+fn fit<K: Kernel + Default>(c: &mut Criterion, problem: &Problem, name: &str, kernel: K) {
+    let options = FitOptions::new(kernel);
+    solved(problem, &options, name);
+    let n = problem.sources.len();
+    c.bench_function(&format!("tps/fit/{name}/{n}"), |b| {
+        b.iter(|| ThinPlateSpline::fit(black_box(&problem.sources), &problem.targets, &options));
+    });
+}
 
-impl Bench for Fit {
-    fn run<K: Kernel + Default>(
-        &self,
-        group: &mut Group<'_>,
-        problem: &Problem,
-        name: &str,
-        kernel: K,
-    ) {
-        solved(problem, kernel.clone(), name);
-        let options = FitOptions::new(kernel);
-        group.bench_function(BenchmarkId::new(name, problem.sources.len()), |b| {
+/// New targets on the factors that are kept.
+fn refit<K: Kernel + Default>(c: &mut Criterion, problem: &Problem, name: &str, kernel: K) {
+    let n = problem.sources.len();
+    let factorization =
+        Factorization::new(&problem.sources, &FitOptions::new(kernel)).expect("a factor");
+    let (mut workspace, mut spline) = (SplineWorkspace::default(), Spline::default());
+    let smoothing = Smoothing::Lambda(0.01);
+    for (what, smoothing) in [("targets", None), ("lambda", Some(smoothing))] {
+        c.bench_function(&format!("tps/refit/{name}/{what}/{n}"), |b| {
             b.iter(|| {
-                ThinPlateSpline::fit(black_box(&problem.sources), &problem.targets, &options)
+                let targets = black_box(&problem.targets);
+                factorization.refit_with(&mut workspace, targets, None, smoothing, &mut spline)
             });
         });
     }
 }
 
-struct Refit;
-
-impl Bench for Refit {
-    fn run<K: Kernel + Default>(
-        &self,
-        group: &mut Group<'_>,
-        problem: &Problem,
-        name: &str,
-        kernel: K,
-    ) {
-        let n = problem.sources.len();
-        let expected = solved(problem, kernel.clone(), name);
-        let factorization = Factorization::new(&problem.sources, &FitOptions::new(kernel.clone()))
-            .expect("a factor");
-        let (mut workspace, mut spline) = (SplineWorkspace::default(), Spline::default());
-        factorization
-            .refit_with(&mut workspace, &problem.targets, None, None, &mut spline)
-            .expect("a fit");
-        assert!((problem.error(&spline) / problem.error(&expected) - 1.0).abs() < 1e-3);
-        group.bench_function(BenchmarkId::new(format!("{name}/targets"), n), |b| {
-            b.iter(|| {
-                factorization.refit_with(
-                    &mut workspace,
-                    black_box(&problem.targets),
-                    None,
-                    None,
-                    &mut spline,
-                )
-            });
-        });
-        if n > 256 {
-            return;
-        }
-        let weights: Vec<f64> = (0..n).map(|i| 0.5 + (i % 7) as f64 / 7.0).collect();
-        let smoothing = Smoothing::Lambda(0.01);
-        for (what, weights) in [("lambda", None), ("weights", Some(&weights[..]))] {
-            group.bench_function(BenchmarkId::new(format!("{name}/{what}"), n), |b| {
-                b.iter(|| {
-                    factorization.refit_with(
-                        &mut workspace,
-                        &problem.targets,
-                        weights,
-                        Some(smoothing),
-                        &mut spline,
-                    )
-                });
-            });
-        }
-    }
+fn evaluate<K: Kernel + Default>(c: &mut Criterion, problem: &Problem, name: &str, kernel: K) {
+    let spline = solved(problem, &FitOptions::new(kernel), name);
+    let n = problem.sources.len();
+    let queries = || black_box(&problem.queries);
+    let (mut values, mut jacobians) = (
+        vec![Point3::origin(); QUERIES],
+        vec![Matrix3::zeros(); QUERIES],
+    );
+    c.bench_function(&format!("tps/evaluate/{name}/{n}"), |b| {
+        b.iter(|| spline.apply_into(queries(), &mut values));
+    });
+    c.bench_function(&format!("tps/jacobian/{name}/{n}"), |b| {
+        b.iter(|| spline.apply_and_jacobian_into(queries(), &mut values, &mut jacobians));
+    });
 }
 
-struct Evaluate;
-
-impl Bench for Evaluate {
-    fn run<K: Kernel + Default>(
-        &self,
-        group: &mut Group<'_>,
-        problem: &Problem,
-        name: &str,
-        kernel: K,
-    ) {
-        let spline = solved(problem, kernel, name);
-        let mut values = vec![Point3::origin(); QUERIES];
-        group.throughput(Throughput::Elements(QUERIES as u64));
-        group.bench_function(BenchmarkId::new(name, problem.sources.len()), |b| {
-            b.iter(|| spline.apply_into(black_box(&problem.queries), &mut values));
-        });
-    }
-}
-
-struct Jacobian;
-
-impl Bench for Jacobian {
-    fn run<K: Kernel + Default>(
-        &self,
-        group: &mut Group<'_>,
-        problem: &Problem,
-        name: &str,
-        kernel: K,
-    ) {
-        let spline = solved(problem, kernel, name);
-        let (mut values, mut jacobians) = (
-            vec![Point3::origin(); QUERIES],
-            vec![Matrix3::zeros(); QUERIES],
-        );
-        group.throughput(Throughput::Elements(QUERIES as u64));
-        group.bench_function(BenchmarkId::new(name, problem.sources.len()), |b| {
-            b.iter(|| {
-                spline.apply_and_jacobian_into(
-                    black_box(&problem.queries),
-                    &mut values,
-                    &mut jacobians,
-                )
-            });
-        });
+fn kernel<K: Kernel + Default>(c: &mut Criterion, name: &str, kernel: K) {
+    for n in SIZES {
+        let problem = Problem::new(n);
+        fit(c, &problem, name, kernel.clone());
+        refit(c, &problem, name, kernel.clone());
+        evaluate(c, &problem, name, kernel.clone());
     }
 }
 
@@ -232,21 +143,21 @@ fn many(c: &mut Criterion) {
     if std::env::args().any(|argument| argument == "--test" || argument == "--quick") {
         return;
     }
-    let mut group = c.benchmark_group("tps/fit");
-    group.sample_size(10);
     let problem = Problem::new(10_000);
-    Fit.run(&mut group, &problem, "r2logr", R2LogR);
-    Fit.run(&mut group, &problem, "r", NegR);
-    group.finish();
+    fit(c, &problem, "r2logr", R2LogR);
+    fit(c, &problem, "r", NegR);
 }
 
 fn all(c: &mut Criterion) {
-    kernels(c, "fit", Fit);
+    kernel(c, "r2logr", R2LogR);
+    kernel(c, "r", NegR);
+    kernel(c, "r3", R3);
     many(c);
-    kernels(c, "refit", Refit);
-    kernels(c, "evaluate", Evaluate);
-    kernels(c, "jacobian", Jacobian);
 }
 
-criterion_group!(benches, all);
+criterion_group! {
+    name = benches;
+    config = Criterion::default().sample_size(20);
+    targets = all
+}
 criterion_main!(benches);

@@ -42,12 +42,10 @@ impl Worst {
 }
 
 /// The cases of a file of `tests/reference`, written by `evidence/reference_cases.py`.
-#[allow(dead_code)]
 pub fn cases(text: &str) -> Vec<serde_json::Value> {
     serde_json::from_str(text).expect("the file is JSON")
 }
 
-#[allow(dead_code)]
 pub fn numbers(value: &serde_json::Value) -> Vec<f64> {
     value
         .as_array()
@@ -57,7 +55,6 @@ pub fn numbers(value: &serde_json::Value) -> Vec<f64> {
         .collect()
 }
 
-#[allow(dead_code)]
 pub fn rows(value: &serde_json::Value) -> Vec<Vec<f64>> {
     value
         .as_array()

@@ -23,6 +23,7 @@ mod session_allocations;
 mod simulator;
 mod simulator_families;
 mod simulator_recorded;
+mod sound;
 mod stability;
 mod stated_errors;
 mod uniaxial;

@@ -2,9 +2,10 @@
 //! geometry.
 #![allow(clippy::print_stdout)]
 use ndarray::Array2;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use tactile_imaging::io::{Grey, read_columns, read_grey_image};
 use tactile_imaging::pipeline::{ContactSurface, DarkContact, Object, Pipeline, SurfaceInput};
+use test_support::published;
 
 const PIXEL_M: f64 = 0.0510151e-3;
 const BALL_M: f64 = 4.0e-3;
@@ -32,21 +33,9 @@ fn sensor(folder: &Path, grey: Grey, zeroed: bool) -> (Pipeline, [Array2<u8>; 2]
     (pipeline, images)
 }
 
-/// The folder of the data, if it is there.
-fn data() -> Option<PathBuf> {
-    let beside = concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/data");
-    let root = std::env::var_os("TACTILE_DATA").map_or(PathBuf::from(beside), PathBuf::from);
-    let folder = root.join("9dtact");
-    if folder.is_dir() {
-        return Some(folder);
-    }
-    println!("skipped: no folder {} (set TACTILE_DATA)", folder.display());
-    None
-}
-
 #[test]
 fn the_ball_is_found_and_its_depth_is_right() {
-    let Some(folder) = data() else {
+    let Some(folder) = published("9dtact") else {
         return;
     };
     let (pipeline, [reference, frame]) = sensor(&folder, Grey::Mean, true);
@@ -99,7 +88,7 @@ fn the_ball_is_found_and_its_depth_is_right() {
 /// is no depth.
 #[test]
 fn the_table_is_read_by_its_own_grey_and_from_no_darkness() {
-    let Some(folder) = data() else {
+    let Some(folder) = published("9dtact") else {
         return;
     };
     let error_mm = |grey: Grey, zeroed: bool| {

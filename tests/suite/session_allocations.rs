@@ -3,36 +3,6 @@ use tactile_imaging::pipeline::Session;
 use tactile_simulate::Trial;
 use tactile_simulate::{CalibrationRun, Camera, PressLoad, PressOptions};
 
-#[test]
-fn pushing_frames_allocates_nothing_after_warm_up() {
-    let camera = Camera::default().coarser(4);
-    let loads = vec![
-        PressLoad::normal(0.3),
-        PressLoad::normal(0.7),
-        PressLoad::normal(1.2),
-    ];
-    let options = PressOptions {
-        camera,
-        loads,
-        ..PressOptions::default()
-    };
-    let trial = Trial::new(options, &CalibrationRun::default()).unwrap();
-    let empty = trial.scene.reference(5);
-    let pipeline = trial.pipeline().unwrap();
-    let mut session = Session::new(&pipeline, &[trial.simulation.reference.view()]).unwrap();
-    let mut frames: Vec<_> = trial.simulation.frames.iter().collect();
-    frames.push(&empty);
-    for frame in frames.iter().cycle().take(4 * Session::MOST_LOADS) {
-        session.push(frame.view()).unwrap();
-    }
-    let count = allocation_counter::measure(|| {
-        for frame in frames.iter().cycle().take(40) {
-            session.push(frame.view()).unwrap();
-        }
-    });
-    assert_eq!(count.count_total, 0, "{count:?}");
-}
-
 /// Surface, control points, match, spline and strain of a frame work in the memory of the frames
 /// before.
 #[test]

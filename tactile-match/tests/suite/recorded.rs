@@ -7,13 +7,12 @@
 
 use crate::common::{Stream, bend, reordered, rotation, scattered};
 use nalgebra::{Point, Point2, SVector};
-use std::fmt::Write;
-use std::path::Path;
 use tactile_match::labelling::Neighbourhood;
 use tactile_match::{
     AnnealedSoftassign, CoherentPointDrift, LinearAssignment, Matching, Motion, NearestNeighbour,
     Outliers, PointMatcher, RelaxationLabelling, Rotation, Search, WarmStart,
 };
+use test_support::Answers;
 
 /// A model and its target.
 struct Scene<const D: usize> {
@@ -80,7 +79,7 @@ fn dense_scene() -> Scene<2> {
 
 /// Numbers that change when anything in an answer does: the counts and the report as they are, of
 /// the arrays their sums with weights that tell the rows apart.
-fn digest<const D: usize>(name: &str, found: &Matching<D>) -> String {
+fn digest<const D: usize>(answers: &mut Answers, name: &str, found: &Matching<D>) {
     let weight = |i: usize| (1.0 + i as f64).sin();
     let sum = |values: &mut dyn Iterator<Item = f64>| -> f64 {
         values.enumerate().map(|(i, v)| weight(i) * v).sum()
@@ -106,25 +105,10 @@ fn digest<const D: usize>(name: &str, found: &Matching<D>) -> String {
             .coords
             .sum(),
     ];
-    let mut line = format!("{name}: {:?}", report.stop);
-    for number in numbers {
-        write!(line, " {number:.15e}").expect("a string takes everything");
-    }
-    line
+    answers.add(format!("{name}: {:?}", report.stop), numbers);
 }
 
-/// All answers, a line each.
-fn answers() -> String {
-    let mut lines = Vec::new();
-    of_dimension::<2>(&mut lines);
-    of_dimension::<3>(&mut lines);
-    let scene = dense_scene();
-    let found = AnnealedSoftassign::default().match_points(&scene.model, &scene.target);
-    lines.push(digest("default, dense set", &found.expect("finite points")));
-    lines.join("\n") + "\n"
-}
-
-fn of_dimension<const D: usize>(lines: &mut Vec<String>) {
+fn of_dimension<const D: usize>(answers: &mut Answers) {
     let options = AnnealedSoftassign::default();
     let fast = |options| Box::new(options);
     let drift = |motion| {
@@ -158,7 +142,7 @@ fn of_dimension<const D: usize>(lines: &mut Vec<String>) {
         for (name, matcher) in &matchers {
             let found = matcher.match_points(&scene.model, &scene.target);
             let name = format!("{name}, {}, {D}-D", scene.name);
-            lines.push(digest(&name, &found.expect("finite points")));
+            digest(answers, &name, &found.expect("finite points"));
         }
     }
     let scenes = scenes::<D>();
@@ -167,10 +151,8 @@ fn of_dimension<const D: usize>(lines: &mut Vec<String>) {
     for step in 1..4 {
         let target = bend(model, 0.02 * f64::from(step));
         let found = matcher.match_next(&mut warm, model, &target);
-        lines.push(digest(
-            &format!("series, step {step}, {D}-D"),
-            &found.expect("finite points"),
-        ));
+        let name = format!("series, step {step}, {D}-D");
+        digest(answers, &name, &found.expect("finite points"));
     }
 }
 
@@ -180,26 +162,16 @@ const TOLERANCE: f64 = 1e-12;
 
 #[test]
 fn answers_are_those_recorded() {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/reference/recorded_answers.txt");
-    let found = answers();
-    if std::env::var_os("RECORD_ANSWERS").is_some() {
-        std::fs::write(&path, &found).expect("the folder can be written");
-    }
-    let recorded = std::fs::read_to_string(&path).expect("the record is committed");
-    assert_eq!(found.lines().count(), recorded.lines().count());
-    for (found, recorded) in found.lines().zip(recorded.lines()) {
-        let (name, numbers) = found.split_once(": ").expect("a name");
-        let (recorded_name, recorded) = recorded.split_once(": ").expect("a name");
-        assert_eq!(name, recorded_name);
-        for (a, b) in numbers.split(' ').zip(recorded.split(' ')) {
-            let same = match (a.parse::<f64>(), b.parse::<f64>()) {
-                (Ok(a), Ok(b)) => (a - b).abs() <= TOLERANCE * b.abs().max(1.0),
-                _ => a == b,
-            };
-            assert!(
-                same,
-                "{name}: {a}, recorded {b}\nfound    {numbers}\nrecorded {recorded}"
-            );
-        }
-    }
+    let mut answers = Answers::default();
+    of_dimension::<2>(&mut answers);
+    of_dimension::<3>(&mut answers);
+    let scene = dense_scene();
+    let found = AnnealedSoftassign::default().match_points(&scene.model, &scene.target);
+    let name = "default, dense set";
+    digest(&mut answers, name, &found.expect("finite points"));
+    let path = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/tests/reference/recorded_answers.txt"
+    );
+    answers.check(path, |_, recorded, _| TOLERANCE * recorded.abs().max(1.0));
 }

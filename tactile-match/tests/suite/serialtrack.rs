@@ -5,16 +5,12 @@
 
 use crate::common::{Stream, reordered};
 use nalgebra::Point;
-use std::path::PathBuf;
 use tactile_match::{AnnealedSoftassign, PointMatcher};
 
 /// Rows of `C` numbers. None where the file is not there. The line of names is no row.
 fn read<const C: usize>(file: &str) -> Option<Vec<[f64; C]>> {
-    let folder = std::env::var_os("TACTILE_DATA").map_or_else(
-        || PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/data")),
-        PathBuf::from,
-    );
-    let text = std::fs::read_to_string(folder.join("serialtrack").join(file)).ok()?;
+    let path = test_support::published(&format!("serialtrack/{file}"))?;
+    let text = std::fs::read_to_string(path).expect("readable");
     let row = |line: &str| {
         let mut fields = line.split(',').map(|field| field.trim().parse::<f64>());
         let mut row = [0.0; C];
@@ -35,7 +31,6 @@ fn check<const D: usize>(kind: &str, k: usize) {
         read::<1>(&format!("{kind}_truth{k:02}.csv")),
     );
     let (Some(model), Some(target), Some(truth)) = files else {
-        println!("skipped: no serialtrack/{kind}_*.csv");
         return;
     };
     let points = |rows: &[[f64; D]]| {
@@ -69,27 +64,13 @@ fn check<const D: usize>(kind: &str, k: usize) {
     );
 }
 
+/// Frames stretched by 5, 10 and, in the volume, 25 percent.
 #[test]
-fn volume_stretched_by_5_percent() {
-    check::<3>("stretch3d", 1);
-}
-
-#[test]
-fn volume_stretched_by_10_percent() {
-    check::<3>("stretch3d", 2);
-}
-
-#[test]
-fn volume_stretched_by_25_percent() {
-    check::<3>("stretch3d", 5);
-}
-
-#[test]
-fn plane_stretched_by_5_percent() {
-    check::<2>("stretch2d", 1);
-}
-
-#[test]
-fn plane_stretched_by_10_percent() {
-    check::<2>("stretch2d", 2);
+fn stretched_particles_are_matched() {
+    for k in [1, 2, 5] {
+        check::<3>("stretch3d", k);
+    }
+    for k in [1, 2] {
+        check::<2>("stretch2d", k);
+    }
 }

@@ -1,42 +1,16 @@
 //! Agreement with reference numbers computed to 80 digits. Skipped, with a line that says so, where
 //! they are absent.
 #![allow(clippy::print_stdout, clippy::print_stderr)]
-use std::path::PathBuf;
-
 use serde_json::Value;
 use tactile_optics::{
     Angle, Fresnel, acceptance_angle, critical_angle, fresnel, normal_incidence, propagation,
 };
+use test_support::numbers;
 
 const EPS: f64 = f64::EPSILON;
 
-fn reference() -> Option<Value> {
-    let home = std::env::var_os("TACTILE_DATA").map(PathBuf::from);
-    let home =
-        home.unwrap_or_else(|| concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/data").into());
-    let path = home.join("reference/optics.json");
-    let Ok(text) = std::fs::read_to_string(&path) else {
-        eprintln!("skipped: no reference numbers at {}", path.display());
-        return None;
-    };
-    let data: Value = serde_json::from_str(&text).unwrap();
-    for check in data["header"]["parse_check"].as_array().unwrap() {
-        let bits = u64::from_str_radix(&check["bits"].as_str().unwrap()[2..], 16).unwrap();
-        assert_eq!(
-            number(&check["value"]).to_bits(),
-            bits,
-            "numbers must parse to the nearest double"
-        );
-    }
-    Some(data)
-}
-
 fn number(value: &Value) -> f64 {
     value.as_f64().unwrap()
-}
-
-fn numbers(value: &Value) -> Vec<f64> {
-    value.as_array().unwrap().iter().map(number).collect()
 }
 
 /// Relative error; against zero, the absolute one.
@@ -257,7 +231,9 @@ fn check_partial(case: &Value, found: &Fresnel, score: &mut Score) {
 
 #[test]
 fn every_reference_case_agrees() {
-    let Some(data) = reference() else { return };
+    let Some(data) = test_support::reference("optics.json") else {
+        return;
+    };
     let (mut score, mut cases) = (Score::default(), 0);
     for case in data["cases"].as_array().unwrap() {
         match case["kind"].as_str().unwrap() {

@@ -2,7 +2,6 @@
 
 mod allocation;
 mod common;
-mod duals;
 mod evaluation;
 mod influence;
 mod input;

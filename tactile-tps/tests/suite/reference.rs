@@ -10,6 +10,7 @@ use std::collections::BTreeMap;
 use nalgebra::Point;
 use serde_json::Value;
 use tactile_tps::{FitOptions, Kernel, NegR, R2LogR, R3, Smoothing, Spline, TpsError};
+use test_support::numbers;
 
 type Fitted<const D: usize, K> = Result<Spline<f64, D, D, K>, TpsError>;
 
@@ -39,15 +40,6 @@ fn text(case: &Value, key: &str) -> String {
 
 fn number(value: &Value) -> f64 {
     value.as_f64().expect("a number")
-}
-
-fn numbers(value: &Value) -> Vec<f64> {
-    value
-        .as_array()
-        .expect("an array")
-        .iter()
-        .map(number)
-        .collect()
 }
 
 /// Rows of numbers as points, short rows padded with zero.
@@ -238,20 +230,10 @@ fn coefficients<const D: usize, K: Kernel>(
     }
 }
 
-fn run<const D: usize>(table: &mut Table, folder: &str) {
-    let path = format!("{folder}/reference/tps{D}.json");
-    let file = std::fs::read_to_string(&path).expect("readable");
-    let file: Value = serde_json::from_str(&file).expect("JSON");
-    for check in file["header"]["parse_check"].as_array().expect("rows") {
-        let bits = check["bits"]
-            .as_str()
-            .expect("bits")
-            .trim_start_matches("0x");
-        assert_eq!(
-            number(&check["value"]).to_bits(),
-            u64::from_str_radix(bits, 16).expect("hexadecimal")
-        );
-    }
+fn run<const D: usize>(table: &mut Table) {
+    let Some(file) = test_support::reference(&format!("tps{D}.json")) else {
+        return;
+    };
     for case in file["cases"].as_array().expect("cases") {
         match text(case, "kernel").as_str() {
             "r2logr" => check::<D, _>(table, case, R2LogR),
@@ -264,18 +246,9 @@ fn run<const D: usize>(table: &mut Table, folder: &str) {
 
 #[test]
 fn every_case_is_within_its_stated_tolerance() {
-    let default = concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/data");
-    let folder = std::env::var("TACTILE_DATA").unwrap_or_else(|_| default.to_owned());
-    if !std::path::Path::new(&folder)
-        .join("reference/tps2.json")
-        .exists()
-    {
-        println!("skipped: no reference numbers in {folder}");
-        return;
-    }
     let mut table = Table::default();
-    run::<2>(&mut table, &folder);
-    run::<3>(&mut table, &folder);
+    run::<2>(&mut table);
+    run::<3>(&mut table);
     println!("{} cases; worst error over tolerance:", table.cases);
     for ((category, quantity), (ratio, id)) in &table.rows {
         println!("{category:22} {quantity:14} {ratio:9.2e}  {id}");

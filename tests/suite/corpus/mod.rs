@@ -4,7 +4,7 @@
 //! `fuzz/README.md` says how to look for more.
 #![allow(clippy::print_stdout)] // the input that is checked, shown where a check fails
 
-mod readers;
+pub(crate) mod readers;
 
 use std::path::Path;
 

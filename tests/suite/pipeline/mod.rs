@@ -20,7 +20,7 @@ use tactile_imaging::force::CalibrationPair;
 use tactile_imaging::pipeline::{Object, PipelineError, Press, SkipReason, Stage};
 use tactile_imaging::sfs::{ControlPointSampler, Domain, EquallySpaced, SfsError};
 use tactile_simulate::Trial;
-use tactile_simulate::{CalibrationRun, Camera, Elastic, PressLoad, PressOptions, PressScene};
+use tactile_simulate::{CalibrationRun, Camera, PressLoad, PressOptions, PressScene};
 
 /// A press seen by a camera of 348 × 260 pixels: a sixteenth of the default's, to be quick.
 fn trial(forces: &[f64], seed: u64) -> Trial {
@@ -69,24 +69,6 @@ fn nothing_runs_before_it_is_asked_for() {
         [2, 2, 2, 1, 1, 1],
         "what is known is not computed again"
     );
-}
-
-#[test]
-fn both_polymers_come_out_within_the_papers_error() {
-    for material in [Elastic::CL2000X, Elastic::CL2003X] {
-        for seed in 0..4 {
-            let mut options = trial(&[0.7, 1.2], seed).scene.options().clone();
-            options.object.material = material;
-            let trial = Trial::new(options, &CalibrationRun::default()).unwrap();
-            let pipeline = trial.pipeline().unwrap();
-            let modulus = trial.press(&pipeline).unwrap().modulus().unwrap();
-            let error = modulus.youngs_modulus_pa / material.youngs_modulus_pa - 1.0;
-            assert!(
-                error.abs() < 0.0538,
-                "{material:?}, seed {seed}: error {error}"
-            );
-        }
-    }
 }
 
 #[test]
@@ -147,22 +129,6 @@ fn every_stage_can_be_swapped_in_one_line() {
     let press = trial.press(&pipeline).unwrap();
     assert_eq!(press.control_points(0).unwrap().len(), 100);
     assert!(press.strain(1).unwrap().measure.contains("Hencky"));
-}
-
-#[test]
-fn swapped_loads_give_the_same_modulus() {
-    let (up, down) = (trial(&[0.7, 1.2], 5), trial(&[1.2, 0.7], 5));
-    let modulus = |t: &Trial| {
-        let pipeline = t.pipeline().unwrap();
-        t.press(&pipeline).unwrap().modulus().unwrap()
-    };
-    let (a, b) = (modulus(&up), modulus(&down));
-    // Other noise in each frame: six standard errors.
-    let apart = (a.youngs_modulus_pa - b.youngs_modulus_pa).abs();
-    assert!(
-        apart < 6.0 * a.standard_error_pa.hypot(b.standard_error_pa),
-        "{apart}"
-    );
 }
 
 #[test]

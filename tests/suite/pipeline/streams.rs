@@ -1,9 +1,8 @@
 //! Sessions: the modulus refined, shear followed, drift watched, memory and answer kept.
 #![allow(clippy::print_stdout)]
 use super::trial;
-use ndarray::Array2;
 use tactile_imaging::force::{Estimate, ShearCalibration};
-use tactile_imaging::pipeline::{FrameSource, Session};
+use tactile_imaging::pipeline::Session;
 use tactile_simulate::Trial;
 use tactile_simulate::{CalibrationRun, Camera, Gain, LoadCycle, PressLoad, PressOptions};
 
@@ -22,29 +21,6 @@ fn a_session_refines_the_modulus_and_agrees_with_a_press() {
     assert!((modulus.youngs_modulus_pa / expected.youngs_modulus_pa - 1.0).abs() < 1e-9);
     session.push(trial.simulation.frames[1].view()).unwrap();
     assert_eq!(session.loads(), 2, "an equal frame is no further load");
-}
-
-#[test]
-fn a_session_over_a_stream_keeps_its_memory_and_its_answer() {
-    let trial = trial(&[1.5], 7);
-    let pipeline = trial.pipeline().unwrap();
-    let references: Vec<_> = (1..4).map(|k| trial.scene.reference(k)).collect();
-    let views: Vec<_> = references.iter().map(|r| r.view()).collect();
-    let mut session = Session::new(&pipeline, &views).unwrap();
-    let cycle = LoadCycle {
-        largest_force_n: 1.5,
-        cycles: 2,
-        ..LoadCycle::default()
-    };
-    let mut stream = trial.scene.stream(cycle).unwrap();
-    let mut frame = Array2::zeros((0, 0));
-    while stream.next_frame(&mut frame).unwrap().is_some() {
-        session.push(frame.view()).unwrap();
-    }
-    assert!(session.loads() <= Session::MOST_LOADS);
-    let modulus = session.modulus().unwrap();
-    let error = modulus.youngs_modulus_pa / trial.simulation.youngs_modulus_pa - 1.0;
-    assert!(error.abs() < 0.03, "error {error}");
 }
 
 #[test]

@@ -2,12 +2,11 @@
 
 mod uniaxial;
 
-use crate::hostile::Hostile;
 use proptest::prelude::*;
 use tactile_imaging::force::Branch;
 use tactile_simulate::{
-    CalibrationRun, Camera, Elastic, ElasticSphere, Gain, LoadCycle, PressOptions, PressScene,
-    Response, SimulateError, write_folder,
+    CalibrationRun, Camera, Elastic, ElasticSphere, LoadCycle, PressOptions, PressScene, Response,
+    SimulateError, write_folder,
 };
 
 fn camera(rows: usize, cols: usize) -> Camera {
@@ -176,44 +175,6 @@ fn a_scene_on_disk_has_the_files_its_description_names() {
     assert!(write_folder(&scene, &calibration, &blocked).is_err());
 }
 
-#[test]
-fn hostile_scenes_are_what_they_say() {
-    let base = press(66, 87);
-    let made = |kind: Hostile| kind.simulate(&base).unwrap();
-    let count =
-        |frame: &ndarray::Array2<u8>, value: u8| frame.iter().filter(|&&v| v == value).count();
-    let (saturated, black) = (made(Hostile::AllSaturated), made(Hostile::AllBlack));
-    assert_eq!(count(&saturated.frames[0], 255), 66 * 87);
-    assert_eq!(count(&saturated.reference, 255), 66 * 87);
-    assert_eq!(
-        count(&black.frames[0], 0) + count(&black.reference, 0),
-        2 * 66 * 87
-    );
-    assert_eq!(made(Hostile::NoiseOnly).truth[0].visible_force_n, 0.0);
-    assert!(count(&made(Hostile::SaturatedContact).frames[0], 255) > 100);
-    let several = made(Hostile::SeveralContacts);
-    assert_eq!(several.truth.len(), 3);
-    for pair in several.truth.windows(2) {
-        assert!(pair[0].contact.force_n > pair[1].contact.force_n);
-        let apart = (pair[0].centre_px[0] - pair[1].centre_px[0])
-            .hypot(pair[0].centre_px[1] - pair[1].centre_px[1]);
-        let radii = (pair[0].contact.contact_radius_m + pair[1].contact.contact_radius_m)
-            / base.camera.pixel_size_m[0];
-        assert!(apart > radii, "contacts must not touch");
-    }
-    let share = |kind: Hostile| {
-        let truth = &made(kind).truth[0];
-        truth.visible_force_n / truth.contact.force_n
-    };
-    assert!(relative(share(Hostile::CutByEdge), 0.5) < 1e-12);
-    assert!(relative(share(Hostile::InCorner), 0.25) < 1e-12);
-    assert!(share(Hostile::FillsFrame) < 0.5);
-    let sub = made(Hostile::SubPixelContact);
-    assert!(sub.truth[0].contact.contact_radius_m < 0.5 * sub.pixel_size_m[0]);
-    let pressed = made(Hostile::PressedReference);
-    assert!(pressed.reference[[33, 43]] > pressed.frames[0][[33, 43]] + 100);
-}
-
 proptest! {
     #![proptest_config(ProptestConfig { cases: 48, ..ProptestConfig::default() })]
 
@@ -260,20 +221,4 @@ proptest! {
         }
     }
 
-    /// Every hostile scene can be made on any camera.
-    #[test]
-    fn every_hostile_scene_exists_on_any_camera(
-        shape in (8_usize..50, 8_usize..50),
-        pixel in (2e-5_f64..4e-4, 2e-5_f64..4e-4),
-        seed in any::<u64>(),
-    ) {
-        let camera = Camera { shape: [shape.0, shape.1], pixel_size_m: [pixel.0, pixel.1], ..Camera::default() };
-        let base = PressOptions { camera, seed, gain: Gain::PeakGrey(100.0), ..PressOptions::default() };
-        for kind in Hostile::ALL {
-            let made = kind.simulate(&base).unwrap();
-            prop_assert_eq!(made.reference.dim(), shape);
-            prop_assert_eq!(made.frames[0].dim(), shape);
-            prop_assert!(!made.truth.is_empty());
-        }
-    }
 }

@@ -1,17 +1,57 @@
 //! A table of calls that cannot work: each ends with the right code and one sentence, and leaves
 //! everything as it was.
-mod edits;
 mod files;
-mod table;
 
 use super::bad_files;
 use super::harness::{run, text};
-use edits::{LUMP, OPTIONS, SCENE};
 use files::{good_files, lump_scene, more_files};
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
-use table::{CALLS, IMAGES, TABLES};
+
+/// Places where a file stands that must be an image, `@` for the file.
+const IMAGES: [&str; 7] = [
+    "force --reference @ --pairs calibration.csv --pixel-um 40 frame_1.png",
+    "force --reference reference.png --pairs calibration.csv --pixel-um 40 frame_1.png @",
+    "reconstruct @ --light 0,0,1",
+    "reconstruct ball.pgm --light 0,0,1 --mask @",
+    "depth --reference @ --table depth_table.csv --pixel-um 100 dark_frame.pgm",
+    "depth --reference dark_reference.pgm --table depth_table.csv --pixel-um 100 dark_frame.pgm @",
+    "integrate slope_x.csv slope_y.csv --mask @",
+];
+
+/// Places where a file stands that must be a table.
+const TABLES: [&str; 10] = [
+    "calibrate @",
+    "match @",
+    "warp @ after.csv before.csv",
+    "warp before.csv @ before.csv",
+    "warp before.csv before.csv @",
+    "strain @ after.csv",
+    "strain before.csv @",
+    "indent @ --shape sphere --radius 5e-3",
+    "integrate @ slope_y.csv",
+    "depth --reference dark_reference.pgm --table @ --pixel-um 100 dark_frame.pgm",
+];
+
+/// Lines of a file of cases, without the empty ones and those that explain.
+fn lines(text: &str) -> impl Iterator<Item = &str> {
+    text.lines()
+        .filter(|line| !line.is_empty() && !line.starts_with('#'))
+}
+
+/// The calls of `calls.txt`, each with a text of its sentence.
+fn calls() -> Vec<(String, String)> {
+    let mut calls = Vec::new();
+    for line in lines(include_str!("calls.txt")) {
+        let (call, says) = line.split_once(" => ").expect(line);
+        let (call, values) = call.split_once(" | ").unwrap_or((call, "@"));
+        for value in values.split_whitespace() {
+            calls.push((call.replace('@', value), says.to_owned()));
+        }
+    }
+    calls
+}
 
 /// The bytes of all regular files of the folder but the huge one.
 fn state(folder: &Path) -> BTreeMap<String, Vec<u8>> {
@@ -64,15 +104,32 @@ fn edited(folder: &Path) -> Vec<(String, String)> {
     let scene = fs::read_to_string(folder.join("scene.toml")).unwrap();
     let mut calls = Vec::new();
     for (kind, text, edits, commands) in [
-        ("scene", scene, SCENE, &["measure", "stream"][..]),
-        ("lump", lump_scene(), LUMP, &["inclusion"][..]),
+        (
+            "scene",
+            scene,
+            include_str!("scene_edits.txt"),
+            &["measure", "stream"][..],
+        ),
+        (
+            "lump",
+            lump_scene(),
+            include_str!("lump_edits.txt"),
+            &["inclusion"],
+        ),
     ] {
-        for (k, (from, to, says)) in edits.iter().enumerate() {
-            assert!(text.contains(from), "{from}");
+        let mut from = String::new();
+        for (k, line) in lines(edits).enumerate() {
+            let line = line.replace('¶', "\n");
+            let Some(edit) = line.strip_prefix("    ") else {
+                assert!(text.contains(&line), "{line}");
+                from = line;
+                continue;
+            };
+            let (to, says) = edit.split_once(" => ").expect(edit);
             let name = format!("{kind}_{k}.toml");
-            fs::write(folder.join(&name), text.replacen(from, to, 1)).unwrap();
+            fs::write(folder.join(&name), text.replacen(&from, to, 1)).unwrap();
             let calls_of = commands.iter().map(|command| format!("{command} {name}"));
-            calls.extend(calls_of.map(|call| (call, (*says).to_owned())));
+            calls.extend(calls_of.map(|call| (call, says.to_owned())));
         }
     }
     calls
@@ -87,7 +144,7 @@ fn every_bad_call_is_refused_in_one_sentence_and_changes_nothing() {
     more_files(folder);
     let edited = edited(folder);
     let before = state(folder);
-    let mut calls: Vec<(String, String)> = Vec::new();
+    let mut calls = self::calls();
     for (places, files) in [(&IMAGES[..], &images), (&TABLES[..], &tables)] {
         for place in places {
             for file in files {
@@ -103,16 +160,7 @@ fn every_bad_call_is_refused_in_one_sentence_and_changes_nothing() {
             }
         }
     }
-    calls.extend(
-        CALLS
-            .iter()
-            .map(|(call, says)| ((*call).to_owned(), (*says).to_owned())),
-    );
     calls.extend(edited);
-    for (call, values, says) in OPTIONS {
-        let calls_of = values.iter().map(|value| call.replace('@', value));
-        calls.extend(calls_of.map(|call| (call, (*says).to_owned())));
-    }
     assert!(calls.len() >= 600, "{} calls", calls.len());
     let complaints: Vec<String> = (calls.iter())
         .filter_map(|(call, says)| complaint(folder, call, says))

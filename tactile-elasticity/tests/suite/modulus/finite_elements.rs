@@ -1,7 +1,6 @@
 //! Estimators against balls pressed in finite elements at finite strain.
 
 use super::*;
-use std::path::PathBuf;
 use tactile_elasticity::curve::{
     Baseline, ContactPoint, CurveOptions, IndentationCurve, Indenter, fit_curve,
 };
@@ -17,17 +16,11 @@ struct Scene {
 }
 
 /// The scenes of `fem_press/scenes.csv`; none with one printed line where the data are not there.
-#[allow(clippy::print_stdout)]
 fn scenes() -> Vec<Scene> {
-    let folder = std::env::var_os("TACTILE_DATA").map_or_else(
-        || PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/data")),
-        PathBuf::from,
-    );
-    let path = folder.join("fem_press").join("scenes.csv");
-    let Ok(text) = std::fs::read_to_string(&path) else {
-        println!("skipped: no {} (set TACTILE_DATA)", path.display());
+    let Some(path) = test_support::published("fem_press/scenes.csv") else {
         return Vec::new();
     };
+    let text = std::fs::read_to_string(path).expect("readable");
     let mut scenes: Vec<Scene> = Vec::new();
     for line in text.lines().skip(1) {
         // The layers are a quoted JSON list with commas of its own.

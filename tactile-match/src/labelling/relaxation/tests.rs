@@ -14,6 +14,7 @@ use nalgebra::{Point2, Point3, Vector3};
 use proptest::prelude::*;
 use serde_json::Value;
 use std::collections::BTreeMap;
+use test_support::{numbers, rows};
 
 /// (19) as printed, row-major: the reference of the stored links.
 fn support<const D: usize>(
@@ -63,24 +64,6 @@ impl Table {
     }
 }
 
-fn numbers(value: &Value) -> Vec<f64> {
-    value
-        .as_array()
-        .expect("array")
-        .iter()
-        .map(|v| v.as_f64().expect("number"))
-        .collect()
-}
-
-fn rows(value: &Value) -> Vec<Vec<f64>> {
-    value
-        .as_array()
-        .expect("array")
-        .iter()
-        .map(numbers)
-        .collect()
-}
-
 fn matrix(value: &Value) -> MatchMatrix {
     let entries = rows(value);
     MatchMatrix::from_fn(entries.len() - 1, entries[0].len() - 1, |i, j| {
@@ -94,27 +77,9 @@ fn points<const D: usize>(value: &Value) -> Vec<Point<f64, D>> {
 
 #[test]
 fn agrees_with_the_reference_numbers() {
-    let folder = std::env::var("TACTILE_DATA")
-        .unwrap_or_else(|_| concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/data").to_owned());
-    let Ok(text) = std::fs::read_to_string(format!("{folder}/reference/matching.json")) else {
-        println!("skipped: no reference/matching.json in {folder}");
+    let Some(file) = test_support::reference("matching.json") else {
         return;
     };
-    let file: Value = serde_json::from_str(&text).expect("matching.json is JSON");
-    for check in file["header"]["parse_check"]
-        .as_array()
-        .expect("parse_check")
-    {
-        let bits = format!(
-            "0x{:016x}",
-            check["value"].as_f64().expect("value").to_bits()
-        );
-        assert_eq!(
-            check["bits"].as_str(),
-            Some(bits.as_str()),
-            "the parser must round correctly"
-        );
-    }
     let mut table = Table::default();
     let cases = file["cases"].as_array().expect("cases");
     for case in cases {

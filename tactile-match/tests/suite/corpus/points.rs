@@ -67,7 +67,7 @@ fn either_dimension<const D: usize>(
 
 /// Every matcher gives a consistent answer, or says that a coordinate cannot be used where one
 /// cannot.
-fn every_matcher<const D: usize>(model: &[Point<f64, D>], target: &[Point<f64, D>]) {
+pub(crate) fn every_matcher<const D: usize>(model: &[Point<f64, D>], target: &[Point<f64, D>]) {
     // A coordinate is usable where the square of a difference of two such is finite.
     let sixteen = 16.0;
     let usable = |p: &Point<f64, D>| p.iter().all(|&c| (c * c * sixteen).is_finite());
