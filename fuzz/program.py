@@ -2,8 +2,8 @@
 
     python3 fuzz/program.py --program target/debug/tactile --seconds 3600 --seed 1
 
-What must hold of every call: it ends within ten seconds with one of the program's exit codes and without a
-panic, takes no more memory than its limit, prints what is wrong in one sentence, and with --json either
+What must hold of every call: it ends within ten seconds of the processor's time with one of the program's exit
+codes and without a panic, takes no more memory than its limit, prints what is wrong in one sentence, and with --json either
 nothing or one object of which no measured number lacks its value. A call that breaks a rule is kept with
 its files in --found.
 """
@@ -14,6 +14,7 @@ import pathlib
 import random
 import resource
 import shutil
+import signal
 import subprocess
 import tempfile
 import time
@@ -91,14 +92,21 @@ def mutated_call(call: str, draw: random.Random) -> list[str]:
     return words
 
 
-def complaint(folder: pathlib.Path, program: pathlib.Path, words: list[str], longest_s: float) -> str | None:
+def complaint(folder: pathlib.Path, program: pathlib.Path, words: list[str], longest_s: int) -> str | None:
     """What is wrong with how a call ended; nothing where all is as it should be."""
-    limit = lambda: resource.setrlimit(resource.RLIMIT_AS, (ADDRESS_SPACE, ADDRESS_SPACE))
+
+    def limit() -> None:
+        resource.setrlimit(resource.RLIMIT_AS, (ADDRESS_SPACE, ADDRESS_SPACE))
+        # The processor's time, since others may keep the machine busy.
+        resource.setrlimit(resource.RLIMIT_CPU, (longest_s, longest_s))
+
     command = [program, *words, "--json", "--out", "results"]
     try:
-        ended = subprocess.run(command, cwd=folder, capture_output=True, timeout=longest_s, preexec_fn=limit, stdin=subprocess.DEVNULL)
+        ended = subprocess.run(command, cwd=folder, capture_output=True, timeout=60 * longest_s, preexec_fn=limit, stdin=subprocess.DEVNULL)
     except subprocess.TimeoutExpired:
-        return f"takes longer than {longest_s} s"
+        return f"takes longer than {60 * longest_s} s by the clock"
+    if ended.returncode in (-signal.SIGXCPU, -signal.SIGKILL):
+        return f"takes longer than {longest_s} s of the processor's time"
     errors = ended.stderr.decode(errors="replace")
     if "panicked" in errors or ended.returncode not in CODES:
         return f"ended with {ended.returncode}: {errors[:300]}"
@@ -134,7 +142,7 @@ def main() -> None:
     parser.add_argument("--program", type=pathlib.Path, default="target/debug/tactile")
     parser.add_argument("--seconds", type=float, default=60)
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--longest", type=float, default=10, help="seconds of a call, more on a busy machine")
+    parser.add_argument("--longest", type=int, default=10, help="seconds of the processor's time for a call")
     parser.add_argument("--found", type=pathlib.Path, default="fuzz/found/program")
     options = parser.parse_args()
     draw, end = random.Random(options.seed), time.monotonic() + options.seconds
