@@ -41,7 +41,8 @@ Examples:
   tactile strain examples/data/before.csv examples/data/after.csv
   tactile strain examples/data/before.csv examples/data/after.csv --measure hencky --rotation any \
                         --out target/strain
-  tactile strain frame0.csv frame1.csv frame2.csv --out target/series")]
+  tactile strain examples/data/before.csv examples/data/after.csv examples/data/before.csv \
+      --out target/series")]
 pub struct StrainArguments {
     /// Points of the frames in their order: before and after, or more.
     #[arg(required = true, num_args = 2.., value_name = "FRAMES")]
