@@ -25,6 +25,12 @@ use std::ops::ControlFlow;
 /// Sets of which both have so many points are matched coarse to fine.
 pub(super) const LARGE: usize = 4000;
 
+/// Runs that the residuals cool end where residuals and temperature, as variances, differ by less
+/// than this share. A tenth of it takes a tenth more time for the same errors. Ten iterations alone
+/// leave volumes three noise widths from the truth
+/// (`--example large_sets -- 20000 volume 0.01 0.2`).
+const STILL: f64 = 1e-3;
+
 impl AnnealedSoftassign {
     /// Whether sets of these sizes are matched coarse to fine.
     pub(super) fn is_large<const D: usize>(&self, ws: &SoftassignWorkspace<D>) -> bool {
@@ -69,14 +75,21 @@ impl AnnealedSoftassign {
                     sigma,
                     least: 1.0,
                     // Where noise hides the patterns, all points are annealed as the residuals
-                    // decide, until residuals and temperature, as variances, differ by less than
-                    // this share. A tenth of it takes a tenth more time for the same errors. Ten
-                    // iterations alone leave volumes three noise widths from the truth
-                    // (`--example large_sets -- 20000 volume 0.01 0.2`).
-                    still: 1e-3,
+                    // decide.
+                    still: STILL,
                     ..FAST
                 })
             };
+            flow = refine(ws, run, flow, observe);
+        }
+        // A run colder than the noise has lost pairs: again, as far as the residuals let it cool.
+        if ws.state.sigma <= CLEAN_SIGMA && ws.state.matched < 0.98 * smaller as f64 {
+            let run = self.schedule(Cooling {
+                sigma: 0.4 * ws.spacing,
+                least: 1.0,
+                still: STILL,
+                ..FAST
+            });
             flow = refine(ws, run, flow, observe);
         }
         let schedule = self.schedule(FAST);

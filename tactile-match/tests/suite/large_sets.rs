@@ -89,6 +89,27 @@ fn noise_of_a_spacing_leaves_the_field() {
     assert!(found.report.doubt.is_some());
 }
 
+/// Noise of a tenth of the spacing, which is below what the patterns of clean sets need: nearly all
+/// points have a partner. Of random points some have a neighbour within three noise widths, and
+/// trade places with it.
+#[test]
+fn noise_of_a_tenth_of_the_spacing_loses_no_pairs() {
+    let noise = 0.1 * (POINTS as f64).powf(-1.0 / 3.0);
+    let scene = Scene::<3>::new(noise, 0);
+    let matcher = AnnealedSoftassign::default();
+    let found = matcher
+        .match_points(&scene.model, &scene.target)
+        .expect("good points");
+    let matched = found.assignment.iter().flatten().count() as f64 / POINTS as f64;
+    let (right, sigma) = (scene.right(&found.assignment), found.report.sigma / noise);
+    assert!(
+        matched > 0.97 && right > 0.93,
+        "{matched} matched, {right} right"
+    );
+    assert!((0.9..1.1).contains(&sigma), "{sigma}");
+    assert_eq!(found.report.doubt, None);
+}
+
 #[test]
 fn a_caller_who_stops_has_an_answer_for_every_point() {
     let scene = Scene::<2>::new(0.0, 0);
