@@ -100,14 +100,16 @@ fn thousands_of_frames_are_one_measurement() {
         write_grey_image(folder.path().join(name), frame.view()).unwrap();
     }
     scene(folder.path(), "many.toml", REFERENCE, &names);
-    // The program, a thousand results and the frames, which are kept up to 64 MB, take 84 MB of
-    // address space. A matrix of all loads would add 8 MB, a mask of each frame's contact 20 MB.
-    let limit = 90_000;
+    // Beside the program itself, a thousand results and the frames, which are kept up to 64 MB, take
+    // 53 MB of address space. A matrix of all loads would add 8 MB, a mask of each frame's contact
+    // 20 MB.
+    let program = env!("CARGO_BIN_EXE_tactile");
+    let limit = fs::metadata(program).unwrap().len() / 1024 + 57_000;
     let output = Command::new("sh")
         .arg("-c")
         .arg(format!("ulimit -v {limit}; exec \"$@\""))
         .arg("sh")
-        .arg(env!("CARGO_BIN_EXE_tactile"))
+        .arg(program)
         .args(["measure", "many.toml"])
         .current_dir(folder.path())
         .output()
