@@ -100,16 +100,20 @@ pub fn replace_file(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
     }
     let folder = target.parent().filter(|f| !f.as_os_str().is_empty());
     let folder = folder.unwrap_or(Path::new("."));
-    let temporary = temporary(folder, bytes, permissions)?;
-    temporary.persist(&target).map_err(|error| error.error)
+    match temporary(folder, &target, bytes, permissions)? {
+        Some(temporary) => temporary.persist(&target).map_err(|error| error.error),
+        None => Ok(()),
+    }
 }
 
-/// A file with this content under a name of its own, which goes away with the value.
+/// A file with this content under a name of its own, which goes away with the value. `None` where
+/// it has that of the target already, which was free.
 fn temporary(
     folder: &Path,
+    #[cfg_attr(not(target_os = "linux"), allow(unused))] target: &Path,
     bytes: &[u8],
     permissions: Option<Permissions>,
-) -> std::io::Result<TempPath> {
+) -> std::io::Result<Option<TempPath>> {
     let fill = |mut file: &File| {
         file.write_all(bytes)?;
         permissions.map_or(Ok(()), |kept| file.set_permissions(kept))
@@ -126,16 +130,19 @@ fn temporary(
         let file = File::from(file);
         fill(&file)?;
         let own = format!("/proc/self/fd/{}", file.as_raw_fd());
-        let linked = name.make_in(folder, |path| {
-            let follow = AtFlags::SYMLINK_FOLLOW;
-            Ok(rustix::fs::linkat(CWD, &own, CWD, path, follow)?)
-        });
-        return Ok(linked?.into_temp_path());
+        let link = |path: &Path| rustix::fs::linkat(CWD, &own, CWD, path, AtFlags::SYMLINK_FOLLOW);
+        // A free name is taken at once.
+        if link(target).is_ok() {
+            return Ok(None);
+        }
+        // A name for the moment until it takes the place of another.
+        let linked = name.make_in(folder, |path| Ok(link(path)?));
+        return Ok(Some(linked?.into_temp_path()));
     }
     let create = |path: &Path| OpenOptions::new().write(true).create_new(true).open(path);
     let file = name.make_in(folder, create)?;
     fill(file.as_file())?;
-    Ok(file.into_temp_path())
+    Ok(Some(file.into_temp_path()))
 }
 
 #[cfg(unix)]

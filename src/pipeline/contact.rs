@@ -263,6 +263,17 @@ impl ContactReading {
         self.radius_common_m = self.radius_common_m.hypot(scale);
     }
 
+    /// The relative error of lengths that a caution about the shape stands for. Pixels whose sides
+    /// are wrongly stated, or a lens, make the longer half axis wrong by all of the elongation and
+    /// their mean by half of it, and a profile that is another by a share of its peak has another
+    /// radius by about as much.
+    pub(super) fn shape_doubt(&self) -> f64 {
+        let elongation = 0.5 * self.elongation.unwrap_or(0.0);
+        let misfit = self.profile_misfit.unwrap_or(0.0);
+        let bend = self.calibration_bend.unwrap_or(0.0);
+        elongation.hypot(misfit).hypot(bend)
+    }
+
     /// The contact is a flat face of that area: the radius is that of a disc as large.
     pub(super) fn take_area(&mut self, area_m2: Estimate) {
         let radius_m = (area_m2.value / PI).sqrt();

@@ -159,6 +159,11 @@ pub enum PipelineError {
         /// The frame.
         frame: usize,
     },
+    /// The frame's edge cuts every contact: force and radius are those of a part.
+    #[error(
+        "the frame's edge cuts every contact: no modulus can be read from a part of one, move the object to the middle of the frame"
+    )]
+    NoWholeContact,
     /// The time of a frame is negative or not finite.
     #[error("the time of frame {} must be zero or a positive number of seconds, found {found_s}", frame + 1)]
     Time {

@@ -111,6 +111,24 @@ pub enum Flag {
         /// Misfit as a share of the peak.
         misfit: f64,
     },
+    /// The object is said to be a punch, which touches with its whole face, but the contact has
+    /// another radius.
+    NotThePunch {
+        /// The frame.
+        frame: usize,
+        /// Contact radius in metres.
+        radius_m: f64,
+        /// That of the punch.
+        punch_m: f64,
+    },
+    /// The mean stress is one that no gel bears, or that no gel shows: a slip of a unit in the
+    /// forces, the light or the size of a pixel.
+    UnlikelyStress {
+        /// The frame.
+        frame: usize,
+        /// Mean stress in pascals.
+        mean_stress_pa: f64,
+    },
     /// The contact's outline is not round: the pixels are not as stated, the lens distorts, or the
     /// object is no ball.
     NotRound {
@@ -210,6 +228,10 @@ pub enum Flag {
     },
 }
 
+/// Mean stresses of contacts that can be: silicone rubbers tear at some megapascals, and one grey
+/// level of a sensor of the softest gel is some ten pascals.
+const GEL_STRESS_PA: [f64; 2] = [20.0, 2e6];
+
 impl ContactReading {
     /// The cautions about this reading, as one of frame number `frame` (from 0).
     pub fn flags(&self, frame: usize) -> impl Iterator<Item = Flag> {
@@ -249,8 +271,15 @@ impl ContactReading {
                 standard_error,
             })
         });
+        let stress = self.mean_stress_pa().map(|stress| stress.value);
+        let [least, most] = GEL_STRESS_PA;
+        let unlikely = stress.filter(|stress| !(least..=most).contains(&stress.abs()));
+        let stress = unlikely.map(|mean_stress_pa| Flag::UnlikelyStress {
+            frame,
+            mean_stress_pa,
+        });
         let others = [
-            saturated, outside, edge, several, fit, shape, outline, light,
+            saturated, outside, edge, several, fit, shape, outline, light, stress,
         ];
         others.into_iter().flatten().chain(unknown)
     }
@@ -347,6 +376,31 @@ impl fmt::Display for Flag {
                     100.0 * misfit
                 )
             }
+            Self::NotThePunch {
+                frame,
+                radius_m,
+                punch_m,
+            } => write!(
+                f,
+                "frame {}: the contact's radius is {:.3} mm, that of the punch {:.3} mm",
+                frame + 1,
+                1e3 * radius_m,
+                1e3 * punch_m
+            ),
+            Self::UnlikelyStress {
+                frame,
+                mean_stress_pa,
+            } => write!(
+                f,
+                "frame {}: a mean stress of {mean_stress_pa:.1e} Pa is one that no gel {}: are \
+                 the forces in newtons, the pixels in the unit asked for?",
+                frame + 1,
+                if *mean_stress_pa > 1.0e3 {
+                    "bears"
+                } else {
+                    "shows"
+                }
+            ),
             Self::NotRound { frame, elongation } => {
                 write!(
                     f,

@@ -514,8 +514,7 @@ impl<'a> Press<'a> {
     /// [estimators](crate::elasticity::modulus::ModulusEstimator).
     ///
     /// A frame whose contact repeats an earlier one carries no information, and a contact that the
-    /// frame's edge cuts is wrong: their loads have a force alone (where all are cut, there is
-    /// nothing better).
+    /// frame's edge cuts is wrong: their loads have a force alone.
     ///
     /// ```
     /// use tactile_simulate::Trial;
@@ -589,6 +588,7 @@ impl<'a> Press<'a> {
         let series = loads::series(loads.iter().copied(), pipeline.settings(), size)?;
         match self.stages.specimen {
             Specimen::Flat(flat) if with_strain => {
+                // Where all are cut the first is refused.
                 let all_cut = loads.iter().all(|load| load.contact.touches_edge);
                 let numbered = loads.iter().map(|load| &load.contact).enumerate();
                 flat.check(numbered.filter(|(_, contact)| all_cut || !contact.touches_edge))?;
@@ -599,9 +599,8 @@ impl<'a> Press<'a> {
     }
 
     /// Leaves out of the modulus the frames whose contact repeats an earlier one, bit for bit, and
-    /// those whose contact is cut by the frame's edge, unless all are.
+    /// those whose contact is cut by the frame's edge.
     fn leave_out(&self, loads: &mut [Load]) {
-        let all_cut = loads.iter().all(|load| load.contact.touches_edge);
         let mut seen = HashSet::new();
         for (load, frame) in loads.iter_mut().zip(&self.frames) {
             let (contact, gauge) = (&load.contact, frame.gauge.map(|gauge| gauge.value));
@@ -609,7 +608,7 @@ impl<'a> Press<'a> {
             // Noise moves every one of these: equal bits are those of one image.
             let values = [load.force_n.value, contact.contact_radius_m.value, x, y];
             let new = seen.insert((values.map(f64::to_bits), gauge.map(f64::to_bits)));
-            load.counts = new && (all_cut || !contact.touches_edge);
+            load.counts = new && !contact.touches_edge;
         }
     }
 

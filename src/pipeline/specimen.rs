@@ -105,6 +105,19 @@ impl Object {
         }
     }
 
+    /// Its Poisson ratio.
+    pub(super) fn poisson_ratio(&self) -> f64 {
+        match self {
+            Self::Sphere { poisson_ratio, .. }
+            | Self::FlatPunch { poisson_ratio, .. }
+            | Self::Layer { poisson_ratio, .. }
+            | Self::Cone { poisson_ratio, .. }
+            | Self::Block { poisson_ratio }
+            | Self::Cylinder { poisson_ratio }
+            | Self::Unknown { poisson_ratio } => *poisson_ratio,
+        }
+    }
+
     /// How the object is read.
     pub(super) fn specimen(self) -> Specimen {
         match self {

@@ -1,7 +1,7 @@
 //! The stages as functions: values in, values out. A press keeps the answers, a session the memory
 //! they are written to.
 use super::composition::Pipeline;
-use super::contact::{ContactStage, FrameContact};
+use super::contact::{ContactReading, ContactStage, FrameContact};
 use super::error::PipelineError;
 use super::flag::Flag;
 use super::reference_light::LightChange;
@@ -9,7 +9,9 @@ use super::report::{Report, SkipReason, Stage};
 use super::specimen::{Object, Specimen};
 use super::surface::{self, ContactSurface, ContactSurfaceWorkspace, ControlPoints};
 use crate::elasticity::field::{StrainField, StrainSummary, mean_strain_error};
-use crate::elasticity::modulus::{Estimate, LoadSeries, ModulusEstimate, ModulusEstimator};
+use crate::elasticity::modulus::{
+    Estimate, LoadSeries, LoadState, ModulusEstimate, ModulusEstimator, Warning,
+};
 use crate::force::{
     FaceReading, FaceWorkspace, ForceWorkspace, Polarity, ReferenceFrame, TextureStretch,
     background_shift, median_shift_outside, texture_spots,
@@ -179,7 +181,11 @@ impl Stages {
                 }
             }
             if let Some(reading) = &mut contact.reading {
-                reading.take_scales(force_scale, settings.length_scale());
+                // Above its level of saturation a Hertz profile has less than this share of its
+                // force.
+                let force_scale = force_scale.hypot(reading.saturated_share);
+                let length_scale = settings.length_scale().hypot(self.shape_doubt(reading));
+                reading.take_scales(force_scale, length_scale);
             }
             Ok(())
         })?;
@@ -187,6 +193,36 @@ impl Stages {
             bench.report.skipped(Stage::Surface, SkipReason::NoContact);
         }
         Ok(())
+    }
+
+    /// Whether the object is said to be a ball. What is said to be none need not look like one.
+    fn is_ball(&self) -> bool {
+        let object = self.pipeline.settings().object;
+        matches!(object, Object::Sphere { .. } | Object::Layer { .. })
+    }
+
+    /// The relative error of lengths in a contact that does not look like the object.
+    fn shape_doubt(&self, reading: &ContactReading) -> f64 {
+        match self.other_punch(reading) {
+            _ if self.is_ball() => reading.shape_doubt(),
+            // An error of twice a length is one that cannot be told.
+            Some(punch_m) => (reading.contact_radius_m.value / punch_m)
+                .ln()
+                .abs()
+                .min(2.0),
+            None => 0.0,
+        }
+    }
+
+    /// The radius of the punch that the object is said to be, where the contact has another one.
+    fn other_punch(&self, reading: &ContactReading) -> Option<f64> {
+        let Object::FlatPunch { radius_m, .. } = self.pipeline.settings().object else {
+            return None;
+        };
+        // A punch touches with its whole face. The radius of a small blurred disc is known to a
+        // tenth.
+        let ratio = reading.contact_radius_m.value / radius_m;
+        (ratio.ln().abs() > 0.1).then_some(radius_m)
     }
 
     /// The cautions about a frame: about its contact, the light around it, the gauge's reading of
@@ -212,11 +248,7 @@ impl Stages {
             });
             return caution.into_iter().collect();
         };
-        // What is said to be no ball need not look like one.
-        let ball = matches!(
-            self.pipeline.settings().object,
-            Object::Sphere { .. } | Object::Layer { .. }
-        );
+        let ball = self.is_ball();
         let own = reading
             .flags(frame)
             .filter(|flag| ball || !matches!(flag, Flag::NotABall { .. } | Flag::NotRound { .. }));
@@ -227,6 +259,13 @@ impl Stages {
         let radius_m = reading.contact_radius_m.value;
         if 2.0 * radius_m > narrowest_m {
             flags.push(Flag::WiderThanFrame { frame, radius_m });
+        }
+        if let Some(punch_m) = self.other_punch(reading) {
+            flags.push(Flag::NotThePunch {
+                frame,
+                radius_m,
+                punch_m,
+            });
         }
         if let Some(face) = &reading.face
             && face.sticks()
@@ -397,9 +436,32 @@ impl Stages {
         estimator: &dyn ModulusEstimator,
         loads: &LoadSeries,
     ) -> Result<ModulusEstimate, PipelineError> {
-        bench
+        let read = |load: &LoadState| load.contact_radius_m.is_some();
+        if !loads.loads().is_empty() && !loads.loads().iter().any(read) {
+            return Err(PipelineError::NoWholeContact);
+        }
+        let mut estimate = bench
             .timed(Stage::Modulus, |_| estimator.estimate(loads))
-            .map_err(PipelineError::Modulus)
+            .map_err(PipelineError::Modulus)?;
+        let slips = self.likely_slips(estimate.youngs_modulus_pa);
+        estimate.warnings.extend(slips);
+        Ok(estimate)
+    }
+
+    /// Warnings about what can be, but is more often a slip of a unit or a name.
+    fn likely_slips(&self, modulus_pa: f64) -> impl Iterator<Item = Warning> {
+        let settings = self.pipeline.settings();
+        let layers = settings.waveguide.iter().flat_map(|guide| guide.layers());
+        let moduli = layers.map(|layer| layer.youngs_modulus_pa);
+        let ratios = moduli.map(|layer_pa| modulus_pa / layer_pa);
+        // The ratio to the layer that is most like the sample.
+        let ratio = ratios.min_by(|a, b| a.ln().abs().total_cmp(&b.ln().abs()));
+        let unlike = ratio.filter(|ratio| ratio.ln().abs() > Warning::UNLIKE_GUIDE.ln());
+        let unlike = unlike.map(|ratio| Warning::UnlikeGuide { ratio });
+        let poisson_ratio = settings.object.poisson_ratio();
+        let negative =
+            (poisson_ratio < 0.0).then_some(Warning::NegativePoissonRatio { poisson_ratio });
+        unlike.into_iter().chain(negative)
     }
 }
 

@@ -222,8 +222,10 @@ impl Context {
     pub fn warn_of_frame(&mut self, flags: &[Flag]) {
         for flag in flags {
             let sentence = flag.to_string();
-            let words = sentence.strip_prefix("frame ");
-            let words = words.and_then(|s| Some(s.split_once(": ")?.1));
+            let words = sentence.split_once(": ").and_then(|(before, words)| {
+                let number = before.strip_prefix("frame ")?;
+                number.parse::<usize>().is_ok().then_some(words)
+            });
             self.aside(format_args!(
                 "{:<18}{}",
                 "caution",
@@ -330,7 +332,10 @@ impl Context {
         // The answer is printed by now: a folder that cannot be written withholds nothing.
         let ended = ended.and_then(|exit| {
             self.outputs.finish_report();
-            let [written, kept] = self.outputs.write(self.interrupt.requested())?;
+            let [written, kept] = {
+                let _whole = self.interrupt.writing.lock();
+                self.outputs.write(self.interrupt.requested())?
+            };
             if !written.is_empty() {
                 self.line(format_args!("wrote {}", written.join(", ")));
             }
@@ -374,6 +379,8 @@ impl Context {
 pub struct Interrupt {
     requested: Arc<AtomicBool>,
     polled: Arc<AtomicBool>,
+    /// Held while files get their names.
+    writing: Arc<Mutex<()>>,
 }
 
 impl Interrupt {
@@ -383,8 +390,9 @@ impl Interrupt {
         let copy = interrupt.clone();
         let _ = ctrlc::set_handler(move || {
             let again = copy.requested.swap(true, Ordering::SeqCst);
-            // Files are written whole or not at all, so that ending here leaves nothing half done.
             if again || !copy.polled.load(Ordering::SeqCst) {
+                // A file that replaces another has a name beside it for a moment.
+                let _whole = (!again).then(|| copy.writing.lock());
                 std::process::exit(Exit::Interrupted.code().into());
             }
         });

@@ -7,8 +7,9 @@ use ndarray::Array2;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use tactile_imaging::PairsDoubt;
 use tactile_imaging::core::Estimate;
-use tactile_imaging::io::{Grey, read_grey_image};
+use tactile_imaging::io::{Grey, image_size, read_grey_image};
 use tactile_imaging::markers::{MarkerField, find_markers, track_markers};
 
 /// Follow the markers of a gel from a reference to frames
@@ -53,6 +54,11 @@ pub fn run(arguments: &MarkersArguments, context: &mut Context) -> Result<Exit, 
         .collect();
     let inputs = frames.iter().chain([reference]).map(PathBuf::as_path);
     context.outputs.plan(&names, &inputs.collect::<Vec<_>>())?;
+    if let Some((rows, columns)) = image_size(reference) {
+        // Grey levels as numbers, the light around them, and the passes that find the dots.
+        let bytes = 80.0 * rows as f64 * columns as f64;
+        context.allow(bytes, "finding the markers", "give smaller images")?;
+    }
     let before = find_markers(grey(reference)?.view());
     let mut values = Vec::new();
     let mut exit = Exit::Complete;
@@ -121,7 +127,8 @@ impl MarkersArguments {
             format_args!("{followed}, by {} px at most", four_digits(largest)),
         );
         if let Some(doubt) = &field.doubt {
-            context.row("doubt", format_args!("{doubt:?}"));
+            let sentence = PairsDoubt::Matcher(*doubt);
+            context.warn("doubtful_pairs", json!({ "frame": frame }), sentence);
         }
         let strain = field.strain.as_ref().map(|strain| {
             [("xx", (0, 0)), ("yy", (1, 1)), ("xy", (0, 1))].map(|(name, at)| {
@@ -145,7 +152,7 @@ impl MarkersArguments {
         });
         json!({
             "frame": frame, "followed": followed, "largest_displacement_px": largest,
-            "doubt": field.doubt.map(|doubt| format!("{doubt:?}")),
+            "doubt": field.doubt.map(|doubt| PairsDoubt::Matcher(doubt).to_string()),
             "strain": strain, "shear": shear,
         })
     }

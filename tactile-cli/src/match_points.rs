@@ -233,7 +233,11 @@ fn solve<const D: usize>(
         .doubt
         .map(|doubt| PairsDoubt::Matcher(doubt).to_string());
     if let Some(doubt) = &doubt {
-        context.line(format_args!("{name}: DOUBT: {doubt}"));
+        context.warn(
+            "doubtful_pairs",
+            json!({ "case": name }),
+            format_args!("{name}: {doubt}"),
+        );
     }
     let _ = writeln!(
         text,

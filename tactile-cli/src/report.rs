@@ -57,7 +57,7 @@ impl Report {
 
     /// Adds a name and its value, which are printed too.
     pub fn row(&mut self, name: &str, value: &str) {
-        if ["warning", "caution", "DOUBT", "FOLDED"].contains(&name) {
+        if ["warning", "caution"].contains(&name) {
             self.caution(value, "");
         } else {
             let row = Printed::Row(name.to_owned(), value.to_owned());
@@ -279,10 +279,13 @@ fn remedy(flag: &Flag) -> &'static str {
         Flag::TouchesEdge { .. } => "Move the object to the middle of the frame.",
         Flag::SeveralContacts { .. } => "Press with one object, and clean the sensor.",
         Flag::LightDrifted { .. } => "Take a new reference shortly before the frames.",
-        Flag::NotABall { .. } => "State the object's true shape in the scene.",
+        Flag::NotABall { .. } | Flag::NotThePunch { .. } => {
+            "State the object's true shape in the scene."
+        }
         Flag::NotRound { .. } => "Press straight down, or state the object's true shape.",
         Flag::LightNotProportional { .. } => "Calibrate with more pairs, as a curve.",
         Flag::GaugeDisagrees { .. } => "Check the gauge's zero and the calibration.",
+        Flag::UnlikelyStress { .. } => "Check the units of forces, light and pixels.",
         Flag::Slip { .. } | Flag::FaceSticks { .. } => "Lubricate the face, or bond it.",
         Flag::SampleRelaxes { .. } => "State the times of the frames, and hold the load.",
         Flag::SensorDrifts { .. } => "Take references between the frames.",

@@ -410,12 +410,12 @@ impl<const D: usize> StrainReport<D> {
         };
         context.row("smoothing", smoothing);
         if let Some(doubt) = found.doubt {
-            context.row("DOUBT", doubt);
+            context.warn("doubtful_pairs", json!(null), doubt);
         }
         let folded = found.summary.folded.len();
         if folded > 0 {
-            let text = format!("at {folded} points (det F ≤ 0), left out of the mean");
-            context.row("FOLDED", text);
+            let text = format!("folded at {folded} points (det F ≤ 0), left out of the mean");
+            context.warn("folded", json!({ "points": folded }), text);
         }
         let measure = self.measure;
         context.line(format_args!(

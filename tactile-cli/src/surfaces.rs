@@ -325,6 +325,17 @@ pub fn integrate(arguments: &IntegrateArguments, context: &mut Context) -> Resul
     same_shape((q_path, q.dim()), first)?;
     let known = region.known_heights(first)?;
     let mask = region.bright_pixels(first)?;
+    if !p
+        .iter()
+        .zip(&q)
+        .any(|(p, q)| p.is_finite() && q.is_finite())
+    {
+        return Err(Failure::input(format!(
+            "{} and {} have no pixel with both slopes: heights cannot be told",
+            path.display(),
+            q_path.display()
+        )));
+    }
     // The cosine transform takes whole rectangles of numbers alone.
     let finite = p.iter().chain(&q).all(|slope| slope.is_finite());
     let whole = mask.is_none() && known.is_none() && finite;

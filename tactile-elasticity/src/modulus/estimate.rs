@@ -403,6 +403,22 @@ pub enum Warning {
         /// a/R.
         ratio: f64,
     },
+    /// The modulus is far from that of every layer of the guide, so that it is badly determined, or
+    /// one of the inputs is in another unit.
+    UnlikeGuide {
+        /// Modulus over that of the layer that is most like it.
+        ratio: f64,
+    },
+    /// Poisson's ratio is negative, which no rubber, gel or tissue has.
+    NegativePoissonRatio {
+        /// As it was stated.
+        poisson_ratio: f64,
+    },
+}
+
+impl Warning {
+    /// From this ratio of moduli on a sample is [unlike](Self::UnlikeGuide) its guide.
+    pub const UNLIKE_GUIDE: f64 = 10.0;
 }
 
 impl core::fmt::Display for Warning {
@@ -468,6 +484,22 @@ impl core::fmt::Display for Warning {
                     load + 1
                 )
             }
+            Self::UnlikeGuide { ratio } => {
+                let (times, word) = match *ratio < 1.0 {
+                    true => (1.0 / ratio, "softer"),
+                    false => (*ratio, "stiffer"),
+                };
+                write!(
+                    f,
+                    "the sample is {times:.0} times {word} than the guide: are its layers, the \
+                     forces, the radius and the size of a pixel in the units asked for?"
+                )
+            }
+            Self::NegativePoissonRatio { poisson_ratio } => write!(
+                f,
+                "no rubber, gel or tissue has a Poisson's ratio of {poisson_ratio}: soft samples \
+                 have 0.3 to 0.5"
+            ),
         }
     }
 }

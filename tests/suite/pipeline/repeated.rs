@@ -2,7 +2,7 @@
 use super::trial;
 use ndarray::s;
 use tactile_imaging::elasticity::modulus::ModulusEstimator;
-use tactile_imaging::pipeline::{Flag, PipelineError};
+use tactile_imaging::pipeline::{Flag, Object, PipelineError};
 
 #[test]
 fn a_frame_that_is_given_twice_counts_once() {
@@ -103,12 +103,68 @@ fn a_contact_that_the_border_cuts_is_left_out() {
     // Each load is weighted anew in a series: rounding.
     let relative = modulus.value / alone.youngs_modulus_pa - 1.0;
     assert!(relative.abs() < 1e-12, "{relative:e}");
-    // Where every contact is cut there is no better answer, but the caution.
+    // Where every contact is cut there is no modulus.
     let half = [150, 150].map(|left| cut(&frames[1], left));
     let reference = cut(&trial.simulation.reference, 150);
     let mut press = pipeline.press(reference.view()).unwrap();
     press.add_frame(half[0].view());
     let measurement = press.measure();
     assert!(measurement.flags.contains(&Flag::TouchesEdge { frame: 0 }));
-    assert!(measurement.youngs_modulus_pa.is_ok());
+    let modulus = measurement.youngs_modulus_pa;
+    assert_eq!(modulus.unwrap_err(), PipelineError::NoWholeContact);
+}
+
+/// Pixels a fifth wider than stated: the contact looks longer than wide, and the interval of the
+/// modulus, 30 % off, is as much wider.
+#[test]
+fn a_caution_about_the_shape_widens_the_interval() {
+    let trial = trial(&[0.7, 1.2], 6);
+    let pipeline = trial.pipeline().unwrap();
+    let narrow = |image: &ndarray::Array2<u8>| {
+        let kept: Vec<usize> = (0..image.ncols()).filter(|c| c % 6 != 5).collect();
+        image.select(ndarray::Axis(1), &kept)
+    };
+    let reference = narrow(&trial.simulation.reference);
+    let mut press = pipeline.press(reference.view()).unwrap();
+    let frames: Vec<_> = trial.simulation.frames.iter().map(narrow).collect();
+    for frame in &frames {
+        press.add_frame(frame.view());
+    }
+    let measurement = press.measure();
+    let elongated = |flag: &Flag| matches!(flag, Flag::NotRound { elongation, .. } if (elongation - 0.2).abs() < 0.02);
+    assert!(measurement.flags.iter().any(elongated), "{measurement}");
+    let modulus = measurement.youngs_modulus_pa.unwrap();
+    let (low, high) = modulus.interval_95;
+    assert!(modulus.value > 1.2 * 103e3, "{modulus:?}");
+    assert!(low < 103e3 && high > modulus.value, "{modulus:?}");
+}
+
+/// A punch touches with its whole face: a ball's contact, said to be that of a wider punch, has a
+/// caution, and its radius and stress cannot be told.
+#[test]
+fn a_contact_that_is_not_the_punchs_has_no_sure_stress() {
+    let trial = trial(&[0.7], 6);
+    let punch = |radius_m| {
+        let pipeline = trial.pipeline().unwrap();
+        let object = Object::FlatPunch {
+            radius_m,
+            poisson_ratio: 0.5,
+        };
+        let set = pipeline.with_settings(|settings| settings.object = object);
+        let pipeline = set.unwrap();
+        let mut press = pipeline.press(trial.simulation.reference.view()).unwrap();
+        press.add_frame(trial.simulation.frames[0].view());
+        let flags = press.cautions(0).unwrap();
+        let said = flags
+            .iter()
+            .any(|flag| matches!(flag, Flag::NotThePunch { .. }));
+        let contact = press.contact(0).unwrap().unwrap();
+        let radius = contact.contact_radius_m;
+        (said, radius.standard_error / radius.value, radius.value)
+    };
+    let (said, relative, radius_m) = punch(9e-3);
+    // ln(9 mm / 2.7 mm)
+    assert!(said && relative > 1.0, "{relative}");
+    let (said, relative, _) = punch(radius_m);
+    assert!(!said && relative < 0.05, "{relative}");
 }
