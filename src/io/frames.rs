@@ -1,11 +1,19 @@
-//! Frames one after the other, from a video, concatenated images, a stack of pages or one image.
+//! Frames one after the other, from a video, concatenated images, a stack of pages, arrays or one
+//! image.
+mod avi;
+mod npy;
+
+use self::avi::Avi;
+use self::npy::Arrays;
 use super::error::{FileError, FilePlace, quoted};
 use super::files::{LARGEST_FILE, open_file};
-use super::image::{Grey, largest_image, levels_of};
+use super::image::{Grey, eight_bit_levels, largest_image, levels_of};
 use crate::pipeline::FrameSource;
 use ndarray::Array2;
 use std::collections::HashSet;
-use std::io::{BufRead, BufReader, Cursor, Read, Result as IoResult, copy, sink, stdin};
+use std::io::{
+    BufRead, BufReader, Cursor, Error, ErrorKind, Read, Result as IoResult, copy, sink, stdin,
+};
 use std::mem::take;
 use std::path::{Path, PathBuf};
 
@@ -20,10 +28,15 @@ const LONGEST_HEADER: u64 = 4096;
 /// - **YUV4MPEG2**, as `ffmpeg -f yuv4mpegpipe` writes it. The luma plane is the grey, as it is
 ///   stored. Samples have 8 to 16 bits.
 /// - **PGM and PPM**, of binary samples, any number one after the other.
+/// - **AVI** of JPEG frames (MJPG), as webcams record them.
+/// - **NPY and NPZ** of NumPy: arrays of `uint8` or `uint16` in C order, of shape (rows, columns)
+///   or (frames, rows, columns), with 3 behind them for colours. Several arrays follow each other in
+///   an archive, and in a pipe that `numpy.save` writes to. An archive's arrays of other numbers are
+///   passed over.
 /// - **TIFF**, a frame a page.
 /// - Any other image of [`read_grey_image`](super::read_grey_image): one frame.
 ///
-/// Memory is that of one frame of videos and PGM, and that of the whole file of the others.
+/// Memory is that of one frame, but for TIFF and other images, which are read whole.
 ///
 /// ```
 /// use ndarray::{Array2, array};
@@ -65,6 +78,8 @@ impl std::fmt::Debug for FrameReader {
 
 enum Format {
     Video(Video),
+    Avi(Avi),
+    Arrays(Arrays),
     Anymaps,
     Pages(Pages),
     Image(Vec<u8>),
@@ -75,6 +90,8 @@ impl std::fmt::Debug for Format {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str(match self {
             Self::Video(_) => "YUV4MPEG2",
+            Self::Avi(_) => "AVI",
+            Self::Arrays(_) => "NPY or NPZ",
             Self::Anymaps => "PGM or PPM",
             Self::Pages(_) => "TIFF",
             Self::Image(_) => "image",
@@ -92,6 +109,11 @@ impl FrameReader {
     pub fn open(path: impl AsRef<Path>, frame_rate_hz: f64) -> Result<Self, FileError> {
         let path = path.as_ref();
         if path == Path::new("-") {
+            // A pipe holds 64 kB by default, a twentieth of a large frame. Each filling wakes both
+            // programs: with 1 MiB three times as many frames come through (1392 × 1042 pixels).
+            // What is no pipe, or may not grow, is read as it is.
+            #[cfg(target_os = "linux")]
+            let _ = rustix::pipe::fcntl_setpipe_size(stdin(), 1 << 20);
             return Self::new(stdin(), "standard input", frame_rate_hz);
         }
         let file = open_file(path).map_err(|source| FileError::Read {
@@ -124,25 +146,21 @@ impl FrameReader {
             .read_to_end(&mut start)
             .map_err(failed)?;
         let mut input = Cursor::new(start.clone()).chain(input);
+        let refused = |broken: Broken| broken.at(&name, FilePlace::File);
         let format = match start.as_slice() {
             b"YUV4MPEG2 " => {
                 let header = line(&mut input).map_err(failed)?;
-                let video = Video::parse(&header);
-                Format::Video(video.map_err(|found| {
-                    let expected = "the header of a YUV4MPEG2 video";
-                    FileError::content(&name, FilePlace::File, expected, found)
-                })?)
+                let expected = "the header of a YUV4MPEG2 video";
+                let video = Video::parse(&header).map_err(|found| Broken::new(expected, found));
+                Format::Video(video.map_err(refused)?)
             }
             [b'P', b'5' | b'6', ..] => Format::Anymaps,
-            [] => {
-                let expected = "a video or an image";
-                return Err(FileError::content(
-                    &name,
-                    FilePlace::File,
-                    expected,
-                    "no bytes",
-                ));
+            [b'R', b'I', b'F', b'F', .., b'A', b'V'] => {
+                Format::Avi(Avi::open(&mut input).map_err(refused)?)
             }
+            start if start.starts_with(Arrays::START[0]) => Format::Arrays(Arrays::new(false)),
+            start if start.starts_with(Arrays::START[1]) => Format::Arrays(Arrays::new(true)),
+            [] => return Err(refused(Broken::new("a video or an image", "no bytes"))),
             _ => {
                 let mut bytes = Vec::new();
                 let whole = input.by_ref().take(LARGEST_FILE).read_to_end(&mut bytes);
@@ -180,75 +198,69 @@ impl FrameReader {
     pub fn frame_rate_hz(&self) -> Option<f64> {
         match &self.format {
             Format::Video(video) => video.rate_hz,
+            Format::Avi(avi) => avi.rate_hz,
             _ => None,
         }
     }
 
     /// The next frame, in the memory of an older one where the format allows that.
-    fn read(&mut self, memory: Vec<u8>) -> Result<Option<Array2<u8>>, FileError> {
-        let place = || FilePlace::Frame(self.frames + 1);
-        let wrong = |expected: String, found: String| {
-            FileError::content(&self.name, place(), expected, found)
-        };
-        let failed = |source| FileError::Read {
-            path: self.name.clone(),
-            source,
-        };
+    fn read(&mut self, memory: Vec<u8>) -> Result<Option<Array2<u8>>, Broken> {
+        let input = &mut self.input;
         let levels = |bytes: &[u8]| levels_of(bytes, &self.name, self.grey, self.bits);
-        let cut = |expected: usize, found: usize| {
-            let expected = format!("{expected} bytes of samples");
-            Err(wrong(expected, format!("the end after {found}")))
-        };
-        match &mut self.format {
-            Format::Ended => Ok(None),
+        Ok(match &mut self.format {
+            Format::Ended => None,
             Format::Image(bytes) => {
                 let bytes = take(bytes);
                 self.format = Format::Ended;
-                levels(&bytes).map(Some)
+                Some(levels(&bytes)?)
             }
-            Format::Pages(pages) => pages.turn().map(&levels).transpose(),
+            Format::Pages(pages) => pages.turn().map(levels).transpose()?,
+            Format::Avi(avi) => avi.next(input)?.map(|jpeg| levels(&jpeg)).transpose()?,
+            Format::Arrays(arrays) => {
+                let grey = |image| eight_bit_levels(image, &[], &self.name, self.grey, self.bits);
+                arrays.next(input)?.map(grey).transpose()?
+            }
             Format::Anymaps => {
-                let header = anymap_header(&mut self.input).map_err(failed)?;
-                let Some(mut bytes) = header else {
+                let Some(mut bytes) = anymap_header(input)? else {
                     return Ok(None);
                 };
-                let found = quoted(&String::from_utf8_lossy(&bytes), 40);
                 let Some((_, samples)) = anymap_samples(&bytes) else {
+                    let found = quoted(&String::from_utf8_lossy(&bytes), 40);
                     let expected = "the header of a PGM or PPM image of at most 64 million pixels";
-                    return Err(wrong(expected.into(), found));
+                    return Err(Broken::new(expected, found));
                 };
                 let header = bytes.len();
-                append(&mut self.input, samples, &mut bytes).map_err(failed)?;
+                append(input, samples, &mut bytes)?;
                 if bytes.len() < header + samples {
-                    return cut(samples, bytes.len() - header);
+                    return Err(Broken::cut(samples, bytes.len() - header));
                 }
-                levels(&bytes).map(Some)
+                Some(levels(&bytes)?)
             }
             Format::Video(video) => {
-                let start = line(&mut self.input).map_err(failed)?;
+                let start = line(input)?;
                 if start.is_empty() {
                     return Ok(None);
                 }
                 if !(start.starts_with(b"FRAME") && start.ends_with(b"\n")) {
                     let found = quoted(&String::from_utf8_lossy(&start), 40);
-                    return Err(wrong("the word FRAME".into(), format!("`{found}`")));
+                    return Err(Broken::new("the word FRAME", format!("`{found}`")));
                 }
                 let luma = video.rows * video.columns * video.bytes_per_sample();
                 let mut samples = memory;
                 samples.clear();
-                append(&mut self.input, luma, &mut samples).map_err(failed)?;
-                let rest = (&mut self.input).take(video.chroma_bytes as u64);
-                let skipped = copy(&mut { rest }, &mut sink()).map_err(failed)? as usize;
+                append(input, luma, &mut samples)?;
+                let rest = input.take(video.chroma_bytes as u64);
+                let skipped = copy(&mut { rest }, &mut sink())? as usize;
                 if samples.len() + skipped < luma + video.chroma_bytes {
-                    return cut(luma + video.chroma_bytes, samples.len() + skipped);
+                    let found = samples.len() + skipped;
+                    return Err(Broken::cut(luma + video.chroma_bytes, found));
                 }
                 if video.depth > 8 {
-                    return levels(&video.anymap(&samples)).map(Some);
+                    return Ok(Some(levels(&video.anymap(&samples))?));
                 }
-                let frame = Array2::from_shape_vec((video.rows, video.columns), samples);
-                Ok(frame.ok())
+                Array2::from_shape_vec((video.rows, video.columns), samples).ok()
             }
-        }
+        })
     }
 }
 
@@ -273,9 +285,10 @@ impl FrameSource for FrameReader {
             }
             let expected = format!("{columns} × {rows} pixels as in the first");
             let found = format!("{} × {}", next.ncols(), next.nrows());
-            let place = FilePlace::Frame(self.frames + 1);
-            Err(FileError::content(&self.name, place, expected, found))
+            Err(Broken::new(expected, found))
         });
+        let place = FilePlace::Frame(self.frames + 1);
+        let read = read.map_err(|broken| broken.at(&self.name, place));
         match read {
             Ok(Some(next)) => {
                 *frame = next;
@@ -290,6 +303,54 @@ impl FrameSource for FrameReader {
     }
 }
 
+/// Why a stream does not go on.
+enum Broken {
+    Read(Error),
+    Content { expected: String, found: String },
+    File(FileError),
+}
+
+impl Broken {
+    fn new(expected: impl Into<String>, found: impl Into<String>) -> Self {
+        Self::Content {
+            expected: expected.into(),
+            found: found.into(),
+        }
+    }
+
+    /// A frame that is cut short.
+    fn cut(expected: usize, found: usize) -> Self {
+        let expected = format!("{expected} bytes of samples");
+        Self::new(expected, format!("the end after {found}"))
+    }
+
+    fn at(self, name: &Path, place: FilePlace) -> FileError {
+        match self {
+            Self::Read(source) => FileError::Read {
+                path: name.into(),
+                source,
+            },
+            Self::Content { expected, found } => FileError::content(name, place, expected, found),
+            Self::File(error) => error,
+        }
+    }
+}
+
+impl From<Error> for Broken {
+    fn from(error: Error) -> Self {
+        match error.kind() {
+            ErrorKind::UnexpectedEof => Self::new("more bytes", "the end"),
+            _ => Self::Read(error),
+        }
+    }
+}
+
+impl From<FileError> for Broken {
+    fn from(error: FileError) -> Self {
+        Self::File(error)
+    }
+}
+
 /// A line with its end, without one where the stream ends or the line is too long.
 fn line(input: &mut dyn BufRead) -> IoResult<Vec<u8>> {
     let mut line = Vec::new();
@@ -299,7 +360,7 @@ fn line(input: &mut dyn BufRead) -> IoResult<Vec<u8>> {
 
 /// Appends the next bytes, fewer at the end of the stream. Memory grows with what arrives, not with
 /// what a header announces.
-fn append(input: &mut dyn BufRead, length: usize, bytes: &mut Vec<u8>) -> IoResult<usize> {
+fn append(input: &mut dyn Read, length: usize, bytes: &mut Vec<u8>) -> IoResult<usize> {
     input.take(length as u64).read_to_end(bytes)
 }
 

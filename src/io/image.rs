@@ -160,7 +160,19 @@ pub fn levels_of(
     grey: Grey,
     bits: Option<u8>,
 ) -> Result<Array2<u8>, FileError> {
-    match decode(bytes, path)? {
+    eight_bit_levels(decode(bytes, path)?, bytes, path, grey, bits)
+}
+
+/// The levels of an image, whose encoded `bytes` may state the largest sample, in eight bits a
+/// pixel.
+pub fn eight_bit_levels(
+    image: DynamicImage,
+    bytes: &[u8],
+    path: &Path,
+    grey: Grey,
+    bits: Option<u8>,
+) -> Result<Array2<u8>, FileError> {
+    match image {
         // Samples that are grey levels already are taken as they stand.
         DynamicImage::ImageLuma8(image) => {
             let shape = (image.height() as usize, image.width() as usize);

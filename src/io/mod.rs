@@ -8,7 +8,7 @@
 //! | [`read_cases`] | point-matching case files (`m` and `t` rows) |
 //! | [`read_grey_image`] | PNG, PGM, JPEG, TIFF, grey or colour, 8 or 16 bits |
 //! | [`read_colour_levels`] | PNG, PPM, JPEG, TIFF in colour, in 8 bits |
-//! | [`FrameReader`] | frames of videos, pipes and stacks of images, one after the other |
+//! | [`FrameReader`] | frames of videos, pipes, arrays and stacks of images, one after the other |
 //!
 //! In CSV, fields are separated by commas, semicolons or tabs, and may stand in double quotes. A
 //! first line without any number is a header. Empty lines and lines that start with `#` are passed

@@ -375,8 +375,131 @@ fn pages(little_endian: bool) -> Vec<u8> {
     bytes
 }
 
+/// The same frames as NumPy and Pillow write them.
+const OF_OTHERS: [&[u8]; 6] = [
+    include_bytes!("../../tests/data/corpus/stream/stack.npy"),
+    include_bytes!("../../tests/data/corpus/stream/big_endian.npy"),
+    include_bytes!("../../tests/data/corpus/stream/one_by_one.npy"),
+    include_bytes!("../../tests/data/corpus/stream/stored.npz"),
+    include_bytes!("../../tests/data/corpus/stream/deflated.npz"),
+    include_bytes!("../../tests/data/corpus/stream/sixteen.tif"),
+];
+
+/// Three frames of 16 × 12 pixels at 25 Hz, written by ffmpeg: grey 40 k + 3 row + 2 column.
+const CLIP: &[u8] = include_bytes!("../../tests/data/corpus/stream/clip.avi");
+
+#[test]
+fn jpeg_frames_of_a_video_are_those_that_were_recorded() {
+    let (frames, broken) = frames_of(CLIP);
+    assert_eq!((frames.len(), broken), (3, None));
+    for (k, frame) in (1..).zip(frames) {
+        for ((row, column), level) in frame.indexed_iter() {
+            let recorded = 40 * k + 3 * row as i32 + 2 * column as i32;
+            // What JPEG of the best quality loses.
+            assert!(
+                (i32::from(*level) - recorded).abs() <= 2,
+                "frame {k}: {level}"
+            );
+        }
+    }
+    // What a recorder leaves that is killed: sizes and counts are none yet.
+    let mut killed = CLIP.to_vec();
+    killed[4..8].fill(0);
+    killed[48..52].fill(0);
+    let end = killed.windows(4).position(|name| name == b"idx1").unwrap();
+    assert_eq!(frames_of(&killed[..end]).0.len(), 3);
+    let mut another = CLIP.to_vec();
+    let codec = another
+        .windows(4)
+        .rposition(|name| name == b"MJPG")
+        .unwrap();
+    another[codec..codec + 4].copy_from_slice(b"H264");
+    let says = "pipe: expected a video of JPEG frames (MJPG), found the codec `H264`";
+    assert_eq!(frames_of(&another).1.as_deref(), Some(says));
+}
+
+#[test]
+fn arrays_that_are_damaged_or_no_frames_are_refused() {
+    let array = |header: &str| {
+        let mut bytes = b"\x93NUMPY\x01\0".to_vec();
+        bytes.extend((header.len() as u16).to_le_bytes());
+        bytes.extend(header.bytes().chain(*b"abcdef"));
+        bytes
+    };
+    let fields = |kind: &str, order: &str, shape: &str| {
+        array(&format!(
+            "{{'descr': '{kind}', 'fortran_order': {order}, 'shape': ({shape}), }}"
+        ))
+    };
+    let mut damaged = OF_OTHERS[3].to_vec();
+    let level = damaged
+        .windows(5)
+        .rposition(|levels| levels == [134, 135, 136, 137, 138]);
+    damaged[level.unwrap()] ^= 1;
+    for (bytes, kept, says) in [
+        (fields("|u1", "False", "2, 3"), 1, ""),
+        (fields("|u1", "False", "1, 2, 3"), 1, ""),
+        (fields("<u2", "False", "1, 3"), 1, ""),
+        (
+            fields("|u1", "True", "2, 1, 3"),
+            0,
+            "expected frames in C order, found Fortran order",
+        ),
+        (
+            fields("<f8", "False", "2, 1, 3"),
+            0,
+            "expected an array of frames",
+        ),
+        (
+            fields("|O", "False", "2, 1, 3"),
+            0,
+            "expected an array of frames",
+        ),
+        (
+            fields("|u1", "False", "0, 0"),
+            0,
+            "expected an array of frames",
+        ),
+        (
+            fields("|u1", "False", "65535, 65535"),
+            0,
+            "expected an array of frames",
+        ),
+        (
+            fields("|u1", "False", "9, 18446744073709551616, 3"),
+            0,
+            "expected an array of frames",
+        ),
+        (
+            fields("|u1", "False", "99, 2, 2"),
+            1,
+            "expected 4 bytes of samples, found the end after 2",
+        ),
+        (array(""), 0, "expected an array of frames"),
+        (damaged, 2, "its checksum differs"),
+        (
+            b"PK\x03\x04".to_vec(),
+            0,
+            "expected more bytes, found the end",
+        ),
+    ] {
+        let (frames, broken) = frames_of(&bytes);
+        let sentence = broken.unwrap_or_default();
+        assert_eq!(frames.len(), kept, "{says}: {sentence}");
+        assert!(sentence.contains(says), "`{sentence}` lacks `{says}`");
+    }
+}
+
 #[test]
 fn every_stream_gives_the_frames_that_went_in() {
+    for bytes in OF_OTHERS {
+        assert_eq!(
+            frames_of(bytes),
+            (three_frames(), None),
+            "{}",
+            bytes.escape_ascii()
+        );
+    }
     for bytes in [
         video("mono", 1, 0),
         video("420jpeg", 1, 2),
@@ -399,6 +522,10 @@ fn a_stream_may_break_anywhere() {
         video("mono12", 2, 0),
         anymaps(),
         pages(true),
+        OF_OTHERS[0].to_vec(),
+        OF_OTHERS[2].to_vec(),
+        OF_OTHERS[3].to_vec(),
+        OF_OTHERS[4].to_vec(),
     ] {
         for end in 0..bytes.len() {
             let (frames, broken) = frames_of(&bytes[..end]);
@@ -417,7 +544,8 @@ fn a_stream_may_break_anywhere() {
 /// Whether a frame of the stream ends here.
 fn is_between(bytes: &[u8], end: usize) -> bool {
     let rest = &bytes[end..];
-    rest.starts_with(b"FRAME") || rest.starts_with(b"P5") || bytes.starts_with(b"II")
+    let starts = [&b"FRAME"[..], b"P5", b"\x93NUMPY"];
+    starts.iter().any(|start| rest.starts_with(start)) || bytes.starts_with(b"II")
 }
 
 #[test]

@@ -134,7 +134,8 @@ impl Repetition {
 /// Pressed frames and the frame without contact.
 #[derive(Args)]
 pub struct SensorFrames {
-    /// Pressed frames: images (PNG, PGM, JPEG, TIFF), videos (YUV4MPEG2), `-` for a pipe of frames.
+    /// Pressed frames: images (PNG, PGM, JPEG, TIFF), videos (YUV4MPEG2, AVI of JPEG), arrays (NPY,
+    /// NPZ), `-` for a pipe of any of them.
     #[arg(required = true)]
     pub frames: Vec<PathBuf>,
     /// Frame of the sensor without contact.

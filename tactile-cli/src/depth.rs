@@ -4,7 +4,7 @@ use crate::console::{Context, Exit, Failure, four_digits, in_unit};
 use crate::frames::Frame;
 use crate::outputs::Csv;
 use crate::photometric::{self, unless_sensor};
-use crate::plot::{Colour, HeatMap, Page, Panel, circle};
+use crate::plot::{Colour, HeatMap, Page, Panel, circle, known_heights_mm};
 use crate::surfaces::span;
 use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
@@ -195,6 +195,13 @@ pub fn run(arguments: &DepthArguments, context: &mut Context) -> Result<Exit, Fa
         let size = surface.pixel_size_m.map(|m| 1e3 * m);
         let frame = HeatMap::of_frame(pixels.view(), size);
         let ball = found.ball.and_then(Result::ok);
+        if let Some(report) = &mut context.outputs.report {
+            report.surface(
+                &format!("depth in {name}"),
+                known_heights_mm(surface).view(),
+                size,
+            );
+        }
         let page = || page(surface, ball.as_ref(), frame);
         context.outputs.page(&names[2 * k + 1], page)?;
     }

@@ -23,7 +23,7 @@ mod paper;
 mod photometric;
 mod plot;
 mod record;
-mod report;
+pub mod report;
 mod serve;
 mod strain;
 mod stream;

@@ -2,7 +2,7 @@
 use crate::arguments::{Repetition, force_n, length_mm, modulus_kpa};
 use crate::console::{Bar, Context, Exit, Failure, four_digits, in_unit};
 use crate::frames::{Frame, Reading};
-use crate::plot::{PlotError, press_pages, summary_lines};
+use crate::plot::{PlotError, known_heights_mm, press_pages, summary_lines};
 use clap::{Args, ValueEnum};
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -58,8 +58,8 @@ pub struct MeasureArguments {
     /// Scene file with your own frames. See below. Without it a press is simulated.
     #[arg(value_name = "SCENE.toml")]
     scene: Option<PathBuf>,
-    /// Frames to measure instead of those of the scene: images, a video (YUV4MPEG2), `-` for a
-    /// pipe of frames.
+    /// Frames to measure instead of those of the scene: images, a video (YUV4MPEG2, AVI of
+    /// JPEG), an array (NPY, NPZ), `-` for a pipe of frames.
     #[arg(value_name = "FRAMES", requires = "scene")]
     frames: Vec<PathBuf>,
     #[command(flatten)]
@@ -380,6 +380,16 @@ pub fn run(arguments: &MeasureArguments, context: &mut Context) -> Result<Exit, 
     }
     if !context.outputs.draws() {
         return Ok(Exit::complete_if(complete));
+    }
+    if let (Some(report), Some(last)) = (&mut context.outputs.report, press.frames().checked_sub(1))
+        && let Ok(found) = press.surface(last)
+    {
+        let title = format!("surface of frame {}", last + 1);
+        report.surface(
+            &title,
+            known_heights_mm(found).view(),
+            found.pixel_size_m.map(|m| 1e3 * m),
+        );
     }
     // A press that was simulated is drawn beside its truth.
     let mut lines = summary_lines(&measurement);

@@ -87,8 +87,8 @@ impl Outputs {
                 self.allow(bytes, &job, "give smaller images")?;
             } else if let Ok(file) = path.metadata()
                 && file.is_file()
-                // A video is read frame by frame.
-                && path.extension().is_none_or(|name| name != "y4m")
+                // Videos and arrays of frames are read frame by frame.
+                && path.extension().is_none_or(|name| !["y4m", "avi", "npy", "npz"].iter().any(|v| name == *v))
             {
                 // Text, and its numbers of eight bytes for one or two characters and a comma.
                 let bytes = 6.0 * file.len() as f64;

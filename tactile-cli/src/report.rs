@@ -1,12 +1,42 @@
-//! `--report FILE.html`: the answer of a call as one page that needs nothing else.
+//! Answers as pages for people: one HTML file that needs nothing else.
 use crate::console::{four_digits, printable};
+use base64::Engine;
+use base64::prelude::BASE64_STANDARD;
 use hmac_sha256::Hash;
+use ndarray::ArrayView2;
 use std::ffi::OsString;
 use std::fmt::Write;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 use tactile_imaging::pipeline::{Flag, Measurement, Object, with_error};
 use tactile_imaging::scene::Scene;
+
+/// The page of a measurement: the modulus with its interval, cautions and what to do about them,
+/// where the error comes from, and all numbers.
+///
+/// It is one HTML file without scripts and requests. `tactile measure --report` adds pictures,
+/// what the scene states as exact, the inputs with their hashes, and the call.
+///
+/// ```
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// # use tactile_simulate::{CalibrationRun, Camera, PressOptions, Trial};
+/// # let camera = Camera::default().coarser(8);
+/// # let trial = Trial::new(PressOptions { camera, ..Default::default() }, &CalibrationRun::default())?;
+/// let pipeline = trial.pipeline()?;
+/// let measurement = trial.press(&pipeline)?.measure();
+/// let page = tactile_cli::report::of(&measurement);
+/// assert!(page.starts_with("<!DOCTYPE html>") && page.contains("with 95 % confidence"));
+/// # Ok(()) }
+/// ```
+#[must_use]
+pub fn of(measurement: &Measurement) -> String {
+    let question = "Young's modulus of an object from frames of a tactile sensor";
+    let mut report = Report::new(PathBuf::new(), &[], question.to_owned());
+    report.measurement(measurement);
+    measurement.flags.iter().for_each(|flag| report.flag(flag));
+    report.line(&measurement.to_string());
+    report.html()
+}
 
 /// A line of what was printed.
 enum Printed {
@@ -16,9 +46,9 @@ enum Printed {
 
 /// What a call is about, collected while it runs, and its page.
 ///
-/// The page has no script, and its policy allows no request. Nothing on it depends on when, where
-/// or how fast the call ran, so that two pages differ only where calls or data do.
-pub struct Report {
+/// The page's policy allows no request, and no script but the one that turns surfaces. Nothing on it
+/// depends on when, where or how fast the call ran, so that two pages differ only where calls or data do.
+pub(crate) struct Report {
     pub path: PathBuf,
     /// The call, ready for a shell.
     call: String,
@@ -28,6 +58,7 @@ pub struct Report {
     cautions: Vec<[String; 2]>,
     tables: Vec<(&'static str, Vec<[String; 2]>)>,
     pictures: Vec<String>,
+    surfaces: Vec<String>,
     inputs: Vec<PathBuf>,
 }
 
@@ -46,6 +77,7 @@ impl Report {
             cautions: Vec::new(),
             tables: Vec::new(),
             pictures: Vec::new(),
+            surfaces: Vec::new(),
             inputs: Vec::new(),
         }
     }
@@ -88,6 +120,51 @@ impl Report {
     /// Adds a picture, SVG of this program.
     pub fn picture(&mut self, svg: String) {
         self.pictures.push(svg);
+    }
+
+    /// Adds heights that the mouse turns, NaN where there is no surface. Heights and pixels are in
+    /// millimetres.
+    pub fn surface(&mut self, title: &str, heights: ArrayView2<'_, f64>, pixel: [f64; 2]) {
+        /// Points along a side, at most: more would be no clearer, and turn slowly.
+        const POINTS: usize = 80;
+        // The part that has a surface.
+        let known = heights
+            .indexed_iter()
+            .filter(|(_, height)| height.is_finite());
+        let (mut first, mut last) = ([usize::MAX; 2], [0; 2]);
+        let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+        for ((row, column), &height) in known {
+            for (side, at) in [row, column].into_iter().enumerate() {
+                first[side] = first[side].min(at);
+                last[side] = last[side].max(at);
+            }
+            (low, high) = (low.min(height), high.max(height));
+        }
+        if low >= high {
+            return;
+        }
+        let sides = [0, 1].map(|side| last[side] - first[side] + 1);
+        let step = sides[0].max(sides[1]).div_ceil(POINTS);
+        let rows = (first[0]..=last[0]).step_by(step);
+        let columns = (first[1]..=last[1]).step_by(step);
+        // A ten-thousandth of the height is finer than the page shows.
+        let unit = 1e-4 * (high - low);
+        let cell = |at: (usize, usize)| match heights[at] {
+            height if height.is_finite() => format!("{:.0}", (height - low) / unit),
+            _ => String::new(),
+        };
+        let width = columns.clone().count();
+        let cells = rows.flat_map(|row| columns.clone().map(move |column| (row, column)));
+        let cells: Vec<String> = cells.map(cell).collect();
+        let [dx, dy] = pixel.map(|side| side * step as f64);
+        self.surfaces.push(format!(
+            "<canvas class=\"surface\" tabindex=\"0\" width=\"900\" height=\"600\" \
+             data-columns=\"{width}\" data-steps=\"{dx:e},{dy:e},{unit:e}\" data-heights=\"{}\">\
+             </canvas><figcaption>{}: {} mm high. The mouse turns it</figcaption>",
+            cells.join(","),
+            escaped(title),
+            four_digits(high - low),
+        ));
     }
 
     /// Adds files that the answer depends on.
@@ -187,11 +264,12 @@ impl Report {
 
     fn write(&self, page: &mut String) -> std::fmt::Result {
         let question = escaped(&self.question);
+        let allowed = BASE64_STANDARD.encode(Hash::hash(TURN.as_bytes()));
         writeln!(
             page,
             "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta \
              http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; style-src \
-             'unsafe-inline'; img-src data:\">\n<meta name=\"viewport\" \
+             'unsafe-inline'; img-src data:; script-src 'sha256-{allowed}'\">\n<meta name=\"viewport\" \
              content=\"width=device-width, \
              initial-scale=1\">\n<title>{question}</title>\n<style>{STYLE}</style>\n</head>\\
              n<body>\n<h1>{question}</h1>"
@@ -211,8 +289,11 @@ impl Report {
             }
             writeln!(page, "</ul>")?;
         }
-        if !self.pictures.is_empty() {
+        if !self.pictures.is_empty() || !self.surfaces.is_empty() {
             writeln!(page, "<h2>Pictures</h2>")?;
+        }
+        for surface in &self.surfaces {
+            writeln!(page, "<figure>{surface}</figure>")?;
         }
         for svg in &self.pictures {
             writeln!(page, "<figure>{svg}</figure>")?;
@@ -225,17 +306,22 @@ impl Report {
             writeln!(page, "</table>")?;
         }
         self.write_printed(page)?;
-        writeln!(page, "<h2>Inputs</h2>\n<table class=\"files\">")?;
-        for file in &self.inputs {
-            row(page, &file.display().to_string(), &hash(file))?;
+        if !self.inputs.is_empty() {
+            writeln!(page, "<h2>Inputs</h2>\n<table class=\"files\">")?;
+            for file in &self.inputs {
+                row(page, &file.display().to_string(), &hash(file))?;
+            }
+            writeln!(page, "</table>\n<p>Hashes are SHA-256.</p>")?;
         }
-        writeln!(
-            page,
-            "</table>\n<h2>To repeat it</h2>\n<pre>{}</pre>\n<p>tactile {}. Hashes are \
-             SHA-256.</p>\n</body>\n</html>",
-            escaped(&self.call),
-            env!("CARGO_PKG_VERSION")
-        )
+        if !self.call.is_empty() {
+            let call = escaped(&self.call);
+            writeln!(page, "<h2>To repeat it</h2>\n<pre>{call}</pre>")?;
+        }
+        if !self.surfaces.is_empty() {
+            writeln!(page, "<script>{TURN}</script>")?;
+        }
+        let version = env!("CARGO_PKG_VERSION");
+        writeln!(page, "<p>tactile {version}</p>\n</body>\n</html>")
     }
 
     /// All that was printed: rows as tables, lines as they stand.
@@ -334,6 +420,9 @@ fn quoted(word: &str) -> String {
     format!("'{}'", word.replace('\'', r"'\''"))
 }
 
+/// Turns surfaces by the mouse, a finger or the arrow keys.
+const TURN: &str = include_str!("report.js");
+
 const STYLE: &str = "
 :root { color-scheme: light dark; }
 body { font: 16px/1.5 system-ui, sans-serif; max-width: 72rem; margin: 0 auto; padding: 1rem; }
@@ -344,6 +433,9 @@ h2 { font-size: 1.1rem; margin: 2rem 0 .5rem; border-bottom: 1px solid #8886; br
 .cautions li { margin: .4rem 0; }
 figure { margin: 1rem 0; padding: .5rem; background: #fff; border-radius: .5rem; break-inside: \
                      avoid; overflow-x: auto; }
+.surface { display: block; width: 100%; max-width: 45rem; margin: auto; cursor: grab; \
+                     touch-action: none; }
+figcaption { color: #444; text-align: center; font-size: .9rem; }
 figure svg { display: block; width: 100%; min-width: 40rem; height: auto; }
 @media print { figure svg { min-width: 0; } }
 table { border-collapse: collapse; }

@@ -43,13 +43,15 @@ A camera or a video, by a pipe (ffmpeg has names for the cameras of every system
   ffmpeg -i press.mp4 -f yuv4mpegpipe -pix_fmt gray - | tactile stream scene.toml - --out results
   … | tactile stream scene.toml - --record today.y4m --serve --report today.html
 
-Frames on the pipe are YUV4MPEG2 of 8 to 16 bits, or binary PGM and PPM one after the other.")]
+Frames on the pipe are YUV4MPEG2 of 8 to 16 bits, binary PGM and PPM one after the other, arrays of
+numpy.save, or an AVI of JPEG frames. `-` works in the same way in measure, force and depth.")]
 pub struct StreamArguments {
     /// Scene file of the sensor and the object, whose recorded frames are measured.
     #[arg(value_name = "SCENE.toml")]
     scene: Option<PathBuf>,
     /// Recorded frames: images, folders whose images are taken in the order of their names, videos
-    /// (YUV4MPEG2), `-` for a pipe of frames. Those of the scene if there is none here.
+    /// (YUV4MPEG2, AVI of JPEG), arrays (NPY, NPZ), `-` for a pipe of frames. Those of the scene if
+    /// there is none here.
     #[arg(value_name = "FRAMES", requires = "scene")]
     frames: Vec<PathBuf>,
     /// Frames per second: those that a video states, or 80.

@@ -26,7 +26,7 @@ use std::ops::Range;
 use std::path::PathBuf;
 use tactile_imaging::pipeline::PipelineError;
 
-pub use press::{circle, press_pages, summary_lines};
+pub use press::{circle, known_heights_mm, press_pages, summary_lines};
 
 /// Why a page could not be drawn or written.
 ///

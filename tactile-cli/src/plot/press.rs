@@ -4,7 +4,7 @@ use crate::console::in_unit;
 use ndarray::Array2;
 use std::path::{Path, PathBuf};
 use tactile_imaging::io::replace_file;
-use tactile_imaging::pipeline::{Measurement, PipelineError, Press, with_error};
+use tactile_imaging::pipeline::{ContactSurface, Measurement, PipelineError, Press, with_error};
 
 /// Writes every page that the press has results for to `folder`, as SVG, and returns their paths.
 ///
@@ -173,14 +173,7 @@ fn surfaces_page(press: &mut Press<'_>) -> Result<Page, PlotError> {
         let surface = press.surface(frame)?;
         let size = surface.pixel_size_m.map(|s| 1e3 * s);
         let origin = surface.origin_m.map(|o| 1e3 * o);
-        let (mask, heights) = (&surface.surface.mask, &surface.surface.heights);
-        let heights = Array2::from_shape_fn(heights.dim(), |at| {
-            if mask[at] {
-                1e3 * heights[at]
-            } else {
-                f64::NAN
-            }
-        });
+        let heights = known_heights_mm(surface);
         let map = HeatMap::of_pixels(heights.view(), size, "height (mm)").origin(origin);
         let panel = axes(title.clone()).heat_map(map);
         panels.push(panel.rings(dots, Colour::Red, ""));
@@ -200,6 +193,15 @@ fn surfaces_page(press: &mut Press<'_>) -> Result<Page, PlotError> {
         panels.len().min(3),
         panels,
     ))
+}
+
+/// Heights in millimetres, NaN outside the surface.
+pub fn known_heights_mm(found: &ContactSurface) -> Array2<f64> {
+    let (mask, heights) = (&found.surface.mask, &found.surface.heights);
+    Array2::from_shape_fn(heights.dim(), |at| match mask[at] {
+        true => 1e3 * heights[at],
+        false => f64::NAN,
+    })
 }
 
 /// Control points of both frames and their matches, from above and from the side.

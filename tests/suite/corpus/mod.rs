@@ -41,6 +41,11 @@ fn images() {
 }
 
 #[test]
+fn streams() {
+    replay("stream", readers::stream);
+}
+
+#[test]
 fn scenes_and_sensors() {
     replay("toml", readers::toml);
 }

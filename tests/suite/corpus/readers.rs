@@ -6,8 +6,10 @@
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
 use tactile_imaging::io::{
-    CasePoints, Grey, read_cases, read_columns, read_grey_image, read_grid, read_points,
+    CasePoints, FrameReader, Grey, read_cases, read_columns, read_grey_image, read_grid,
+    read_points,
 };
+use tactile_imaging::pipeline::FrameSource;
 use tactile_imaging::scene::{Scene, read_contact_table};
 use tactile_imaging::sensor::{Sensor, SensorCalibration};
 
@@ -68,6 +70,22 @@ pub(crate) fn image(bytes: &[u8]) {
     }
 }
 
+/// A stream of frames, of which the first hundred are read.
+pub(crate) fn stream(bytes: &[u8]) {
+    let input = std::io::Cursor::new(bytes.to_vec());
+    let Some(mut reader) = answer(bytes, FrameReader::new(input, "stream.y4m", 80.0)) else {
+        return;
+    };
+    let (mut frame, mut size) = (Default::default(), None);
+    for _ in 0..100 {
+        match answer(bytes, reader.next_frame(&mut frame)) {
+            Some(Some(time_s)) => assert!(time_s.is_finite() && !frame.is_empty()),
+            _ => break,
+        }
+        assert_eq!(*size.get_or_insert(frame.dim()), frame.dim());
+    }
+}
+
 /// A TOML file, read as a scene, a sensor, the presses of a calibration and a table of contacts.
 pub(crate) fn toml(bytes: &[u8]) {
     let text = String::from_utf8_lossy(bytes);
@@ -89,7 +107,13 @@ fn answer<T, E: Display>(bytes: &[u8], result: Result<T, E>) -> Option<T> {
         Ok(answer) => return Some(answer),
         Err(error) => error.to_string(),
     };
-    let files = ["table.csv", "cases.txt", "image.png", "file.toml"];
+    let files = [
+        "table.csv",
+        "cases.txt",
+        "image.png",
+        "stream.y4m",
+        "file.toml",
+    ];
     assert!(files.iter().any(|f| sentence.contains(f)), "{sentence}");
     // What is quoted is quoted without control characters.
     let file = String::from_utf8_lossy(bytes).replace(char::is_control, "");
