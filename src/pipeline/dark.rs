@@ -43,8 +43,8 @@ impl DarkContact {
     /// Darkening that counts as contact: above the noise of an 8-bit camera.
     pub const DEFAULT_THRESHOLD_GREY: f64 = 3.0;
 
-    /// With a table of (darkness in grey levels, depth in metres). Entries at or below the
-    /// threshold of contact are left out: what lies there is not contact.
+    /// With a table of (darkness in grey levels, depth in metres), read as by
+    /// [`depth_table`](Self::depth_table).
     ///
     /// # Errors
     /// [`PipelineError::DepthTable`].
@@ -57,29 +57,22 @@ impl DarkContact {
         })
     }
 
-    /// The indentation counted from no darkness instead of the table's own zero, often a contact
-    /// circle found at a threshold ([`DepthTable::zeroed`]). Depths want the same:
-    /// `DarkContact::depth_table(&entries)?.zeroed()`.
+    /// The table as a reconstruction, zero where there is no contact.
+    ///
+    /// No darkness is no depth. A table with the entry (0, 0) is read as it stands. Another counts
+    /// its depths from a contact circle that was found at some darkness, and it is
+    /// [zeroed](DepthTable::zeroed) where it determines its zero. Where it does not it is read as it
+    /// stands. Entries at or below the threshold of contact and negative ones are left out.
     ///
     /// ```
     /// use tactile_imaging::pipeline::DarkContact;
     /// // A level is 30 µm deep, and depth was counted from where three levels were seen.
-    /// let table: Vec<_> = (3..60).map(|s| (f64::from(s), 30e-6 * f64::from(s - 3))).collect();
-    /// let contact = DarkContact::new(&table, [0.1e-3; 2])?.zeroed()?;
-    /// let depths = DarkContact::depth_table(&table)?.zeroed()?;
-    /// assert!((depths.depth(10.0).0 - 0.3e-3).abs() < 1e-12);
-    /// # let _ = contact;
-    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// let mut table: Vec<_> = (3..60).map(|s| (f64::from(s), 30e-6 * f64::from(s - 3))).collect();
+    /// assert!((DarkContact::depth_table(&table)?.depth(10.0).0 - 0.30e-3).abs() < 1e-12);
+    /// table.insert(0, (0.0, 0.0));
+    /// assert!((DarkContact::depth_table(&table)?.depth(10.0).0 - 0.21e-3).abs() < 1e-12);
+    /// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
     /// ```
-    ///
-    /// # Errors
-    /// [`PipelineError::DepthTable`] where the table does not tell its zero.
-    pub fn zeroed(self) -> Result<Self, PipelineError> {
-        let table = self.table.zeroed().map_err(PipelineError::DepthTable)?;
-        Ok(Self { table, ..self })
-    }
-
-    /// The table as a reconstruction, zero where there is no contact.
     ///
     /// # Errors
     /// [`PipelineError::DepthTable`].
@@ -89,9 +82,13 @@ impl DarkContact {
             .copied()
             .filter(|(d, z)| *d >= 0.0 && *z >= 0.0)
             .collect();
-        DepthTable::new(&kept)
+        let stands = DepthTable::new(&kept)
             .and_then(|t| t.with_contact_threshold(Self::DEFAULT_THRESHOLD_GREY))
-            .map_err(PipelineError::DepthTable)
+            .map_err(PipelineError::DepthTable)?;
+        if kept.contains(&(0.0, 0.0)) {
+            return Ok(stands);
+        }
+        Ok(stands.clone().zeroed().unwrap_or(stands))
     }
 }
 

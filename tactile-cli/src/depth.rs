@@ -7,6 +7,7 @@ use crate::photometric::{self, unless_sensor};
 use crate::plot::{Colour, HeatMap, Page, Panel, circle, known_heights_mm};
 use crate::surfaces::span;
 use clap::{Args, ValueEnum};
+use ndarray::Array2;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use tactile_imaging::io::{Grey, read_columns};
@@ -15,15 +16,16 @@ use tactile_imaging::pipeline::{
     SurfaceInput,
 };
 use tactile_imaging::scene::doubt_of_depths;
-use tactile_imaging::sfs::DepthTable;
 
 /// Find the contact and its depth in frames of a sensor that grows darker with depth
 ///
 /// TABLE.csv says how deep a darkness is: columns darkness (grey levels below the reference, of the
 /// same --grey) and depth (m, mm, µm, by its heading, mm without one). With --ball-radius-mm a ball
 /// of this radius is fitted to the depth, with --ball one of any. --out gets NAME_depth.csv (m, NaN
-/// outside the contact) and NAME_depth.svg for every frame NAME. The table is that of the contact's
-/// window, whose place in the frame is printed.
+/// outside the contact, of the whole frame) and NAME_depth.svg for every frame NAME.
+///
+/// No darkness is no depth. A table with the row 0, 0 is read as it stands. Another counts from a
+/// contact circle that was found at some darkness, as those of 9DTact do: it is shifted.
 ///
 /// --sensor names a gel that is lit in colours, as `tactile calibrate` wrote it. It takes the place
 /// of reference, table and pixel size. --out gets NAME_depth.csv (m, of the whole frame, zero where
@@ -58,8 +60,8 @@ pub struct DepthArguments {
     /// Fit a ball of any radius.
     #[arg(long, conflicts_with = "ball_radius_mm")]
     ball: bool,
-    /// Shift the table so that no darkness is no depth: for tables counted from a contact circle
-    /// found at some darkness, as those of 9DTact are.
+    /// Shift the table so that no darkness is no depth, also one with the row 0, 0. Refused where
+    /// the table does not determine its zero.
     #[arg(long)]
     zero_table: bool,
     /// How the colours of a frame make its grey: as those of the table were made.
@@ -83,12 +85,20 @@ impl DepthArguments {
     fn pipeline(&self) -> Result<Pipeline, Failure> {
         let columns = [(&["darkness"][..], "grey_levels"), (&["depth"][..], "mm")];
         let [darkness, depth] = read_columns(&self.table, columns)?;
-        let entries: Vec<_> = darkness.into_iter().zip(depth).collect();
+        let mut entries: Vec<_> = darkness.into_iter().zip(depth).collect();
         if let Some(reason) = doubt_of_depths(&entries) {
             return Err(Failure::in_file(&self.table, reason));
         }
-        let stages = self.stages(&entries);
-        let (contact, table) = stages.map_err(|error| Failure::in_file(&self.table, error))?;
+        if self.zero_table {
+            entries.retain(|entry| *entry != (0.0, 0.0));
+        }
+        let in_table = |error| Failure::in_file(&self.table, error);
+        let contact = DarkContact::new(&entries, self.frames.pixel_m()).map_err(in_table)?;
+        let table = DarkContact::depth_table(&entries).map_err(in_table)?;
+        if self.zero_table {
+            let zeroed = table.clone().zeroed().map_err(PipelineError::DepthTable);
+            zeroed.map_err(in_table)?;
+        }
         // Depth is read from the table whatever the object is: it only says what may be fitted.
         let unknown = Object::Unknown {
             poisson_ratio: Object::DEFAULT_POISSON_RATIO,
@@ -97,20 +107,6 @@ impl DepthArguments {
         let object = self.ball_radius_mm.map_or(unknown, ball);
         let pipeline = Pipeline::new(contact, object).map_err(Failure::input)?;
         Ok(pipeline.with_surface(table, SurfaceInput::Signal))
-    }
-
-    /// The stages that read the table, of (grey levels, metres).
-    fn stages(
-        &self,
-        entries: &[(f64, f64)],
-    ) -> Result<(DarkContact, DepthTable<f64>), PipelineError> {
-        let contact = DarkContact::new(entries, self.frames.pixel_m())?;
-        let table = DarkContact::depth_table(entries)?;
-        if !self.zero_table {
-            return Ok((contact, table));
-        }
-        let zeroed = table.zeroed().map_err(PipelineError::DepthTable)?;
-        Ok((contact.zeroed()?, zeroed))
     }
 
     /// The ball that was asked for.
@@ -190,8 +186,8 @@ pub fn run(arguments: &DepthArguments, context: &mut Context) -> Result<Exit, Fa
         if matches!(found.ball, Some(Err(_))) {
             exit = Exit::Partial;
         }
-        let heights = Csv::of_grid(&surface.surface.heights);
-        context.outputs.add(&names[2 * k], heights);
+        let depth = Csv::of_grid(&whole(surface, pixels.dim()));
+        context.outputs.add(&names[2 * k], depth);
         let size = surface.pixel_size_m.map(|m| 1e3 * m);
         let frame = HeatMap::of_frame(pixels.view(), size);
         let ball = found.ball.and_then(Result::ok);
@@ -207,6 +203,19 @@ pub fn run(arguments: &DepthArguments, context: &mut Context) -> Result<Exit, Fa
     }
     context.value(&json!({ "frames": values }));
     Ok(exit)
+}
+
+/// The depth of every pixel of the frame, NaN around the contact's window.
+fn whole(surface: &ContactSurface, shape: (usize, usize)) -> Array2<f64> {
+    let mut depth = Array2::from_elem(shape, f64::NAN);
+    let [left, top] = [0, 1].map(|k: usize| surface.origin_m[k] / surface.pixel_size_m[k]);
+    for ((row, column), z) in surface.surface.heights.indexed_iter() {
+        let at = [top.round() as usize + row, left.round() as usize + column];
+        if let Some(to) = depth.get_mut(at) {
+            *to = *z;
+        }
+    }
+    depth
 }
 
 /// Prints a contact and returns it as JSON.
@@ -225,15 +234,10 @@ fn print(found: &Found, context: &mut Context) -> Value {
         Ok(surface) => {
             let heights = &surface.surface.heights;
             context.row("depth", span(heights, 1e3, "mm"));
-            let [x, y] = surface.origin_m.map(|m| four_digits(1e3 * m));
-            context.row(
-                "",
-                format_args!("its first pixel at ({x}, {y}) mm from the frame's"),
-            );
             let finite = heights.iter().copied().filter(|h| h.is_finite());
             json!({
                 "largest_depth_m": finite.fold(f64::NAN, f64::max),
-                "origin_m": surface.origin_m, "pixel_size_m": surface.pixel_size_m,
+                "origin_m": [0.0, 0.0], "pixel_size_m": surface.pixel_size_m,
             })
         }
         Err(reason) => {

@@ -10,7 +10,7 @@ use test_support::published;
 const PIXEL_M: f64 = 0.0510151e-3;
 const BALL_M: f64 = 4.0e-3;
 
-/// The sensor with its makers' table, as it stands or zeroed, and its images without and with the
+/// The sensor with its makers' table, with the row 0, 0 or without, and its images without and with the
 /// ball.
 fn sensor(folder: &Path, grey: Grey, zeroed: bool) -> (Pipeline, [Array2<u8>; 2]) {
     let images = ["rectify_crop_ref.png", "rectify_crop_sample.png"].map(|name| {
@@ -20,13 +20,12 @@ fn sensor(folder: &Path, grey: Grey, zeroed: bool) -> (Pipeline, [Array2<u8>; 2]
     let path = folder.join("grey_to_depth_mm.csv");
     let wanted: [(&[&str], &str); 2] = [(&["darkness"], "grey_levels"), (&["depth"], "mm")];
     let [darkness, depth] = read_columns(&path, wanted).unwrap();
-    let entries: Vec<_> = darkness.into_iter().zip(depth).collect();
-    let mut contact = DarkContact::new(&entries, [PIXEL_M; 2]).unwrap();
-    let mut depths = DarkContact::depth_table(&entries).unwrap();
-    if zeroed {
-        contact = contact.zeroed().unwrap();
-        depths = depths.zeroed().unwrap();
+    let mut entries: Vec<_> = darkness.into_iter().zip(depth).collect();
+    if !zeroed {
+        entries[0] = (0.0, 0.0);
     }
+    let contact = DarkContact::new(&entries, [PIXEL_M; 2]).unwrap();
+    let depths = DarkContact::depth_table(&entries).unwrap();
     let pipeline = Pipeline::new(contact, Object::sphere(BALL_M))
         .unwrap()
         .with_surface(depths, SurfaceInput::Signal);

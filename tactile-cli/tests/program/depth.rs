@@ -25,9 +25,11 @@ fn the_grey_and_the_zero_are_those_of_the_table() {
     let rows = (3..60).map(|s| format!("{s},{}\n", 0.03 * f64::from(s - 3)));
     let table = format!("darkness,depth_mm\n{}", rows.collect::<String>());
     put("table.csv", table.as_bytes());
-    let depth_mm = |options: &str| {
+    let from_flat = table.replace("depth_mm\n", "depth_mm\n0,0\n");
+    put("from_flat.csv", from_flat.as_bytes());
+    let depth_mm = |table: &str, options: &str| {
         let call = format!(
-            "depth --reference reference.ppm --table table.csv --pixel-um 100 pressed.ppm --json \
+            "depth --reference reference.ppm --table {table} --pixel-um 100 pressed.ppm --json \
              {options}"
         );
         let output = run(folder.path(), &words(&call));
@@ -41,13 +43,18 @@ fn the_grey_and_the_zero_are_those_of_the_table() {
     // 90 levels of blue are 30 of the mean, 0.114 · 90 = 10.3 of Rec. 601 and 0.0722 · 90 = 6.5 of
     // Rec. 709, of which frames of eight bits have 10 and 6.
     for (options, expected) in [
-        ("", 0.21),
-        ("--grey rec601", 0.21),
-        ("--grey rec709", 0.09),
-        ("--grey mean", 0.81),
+        ("", 0.30),
+        ("--grey rec601", 0.30),
+        ("--grey rec709", 0.18),
+        ("--grey mean", 0.90),
         ("--grey mean --zero-table", 0.90),
     ] {
-        let found = depth_mm(options);
+        let found = depth_mm("table.csv", options);
+        assert!((found - expected).abs() < 1e-9, "{options}: {found}");
+    }
+    // The row 0, 0 states that depth was counted from no darkness.
+    for (options, expected) in [("--grey mean", 0.81), ("--grey mean --zero-table", 0.90)] {
+        let found = depth_mm("from_flat.csv", options);
         assert!((found - expected).abs() < 1e-9, "{options}: {found}");
     }
 }
