@@ -1,6 +1,6 @@
 //! Where something touches: the pixels over which the normals turn outwards.
 
-use ndarray::{Array2, ArrayView2};
+use ndarray::{Array2, ArrayView2, Zip};
 
 /// Pixels of an object in contact.
 ///
@@ -67,38 +67,62 @@ fn blurred(image: &Array2<f32>, times: usize) -> Array2<f32> {
     let near = |k: usize, n: usize| [0, 1, 2, 3, 4].map(|j| (k + j).saturating_sub(2).min(n - 1));
     let mut image = image.clone();
     for _ in 0..times {
-        let across = Array2::from_shape_fn((rows, columns), |(r, c)| {
-            tap(near(c, columns).map(|c| image[[r, c]]))
-        });
-        image = Array2::from_shape_fn((rows, columns), |(r, c)| {
-            tap(near(r, rows).map(|r| across[[r, c]]))
-        });
+        let mut across = Array2::zeros((rows, columns));
+        for (from, mut to) in image.outer_iter().zip(across.outer_iter_mut()) {
+            for (k, to) in to.iter_mut().enumerate() {
+                *to = match k >= 2 && k + 2 < columns {
+                    true => tap([0, 1, 2, 3, 4].map(|j| from[k + j - 2])),
+                    false => tap(near(k, columns).map(|k| from[k])),
+                };
+            }
+        }
+        for (k, to) in image.outer_iter_mut().enumerate() {
+            let [a, b, c, d, e] = near(k, rows).map(|k| across.row(k));
+            Zip::from(to)
+                .and(a)
+                .and(b)
+                .and(c)
+                .and(d)
+                .and(e)
+                .for_each(|to, a, b, c, d, e| *to = tap([*a, *b, *c, *d, *e]));
+        }
     }
     image
 }
 
-/// The threshold between free gel and contact. `None` where there is one class alone.
+/// The threshold between free gel and contact, to a bin of a histogram. `None` where there is one
+/// class alone.
 fn threshold(divergence: &Array2<f32>) -> Option<f32> {
-    let largest = divergence.iter().copied().fold(0.0, f32::max);
-    let mut threshold = 0.5 * largest;
+    const BINS: usize = 4096;
+    let low = divergence.iter().copied().fold(f32::MAX, f32::min);
+    let high = divergence.iter().copied().fold(0.0, f32::max);
+    let scale = BINS as f32 / (high - low);
+    if !(scale > 0.0 && scale.is_finite()) {
+        return None;
+    }
+    let bin = |d: f32| (((d - low) * scale) as usize).min(BINS - 1);
+    // Number, sum and sum of squares of the pixels up to every bin.
+    let mut below = vec![[0.0_f64; 3]; BINS];
+    for &divergence in divergence {
+        let d = f64::from(divergence);
+        let sums = below[bin(divergence)].iter_mut().zip([1.0, d, d * d]);
+        sums.for_each(|(sum, d)| *sum += d);
+    }
+    let mut all = [0.0; 3];
+    for sums in &mut below {
+        all = [0, 1, 2].map(|k| all[k] + sums[k]);
+        *sums = all;
+    }
+    let mut threshold = 0.5 * high;
     for _ in 0..50 {
-        // Number, sum and sum of squares of both classes.
-        let mut classes = [[0.0_f64; 3]; 2];
-        for d in divergence {
-            let sums = &mut classes[usize::from(*d > threshold)];
-            let d = f64::from(*d);
-            [1.0, d, d * d]
-                .iter()
-                .zip(sums)
-                .for_each(|(d, sum)| *sum += d);
-        }
-        let [free, touched] = classes;
+        let free = below[bin(threshold)];
+        let touched = [0, 1].map(|k| all[k] - free[k]);
         if free[0] < 1.0 || touched[0] < 1.0 {
             return None;
         }
-        let [below, above] = [free, touched].map(|sums| sums[1] / sums[0]);
+        let (below, above) = (free[1] / free[0], touched[1] / touched[0]);
         let next = (0.5 * (below + above)) as f32;
-        if (next - threshold).abs() < 1e-4 * largest {
+        if (next - threshold).abs() < 1e-4 * high {
             let sd = (free[2] / free[0] - below * below).max(0.0).sqrt();
             // The halves of one normal distribution are 2.6 deviations of the lower half apart.
             return (above - below > 4.0 * sd).then_some(next);
