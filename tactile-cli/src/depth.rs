@@ -130,7 +130,7 @@ struct Found {
 pub fn run(arguments: &DepthArguments, context: &mut Context) -> Result<Exit, Failure> {
     let DepthArguments { frames, table, .. } = arguments;
     if let Some(sensor) = &arguments.sensor {
-        return photometric::depth(sensor, &frames.frames, context);
+        return photometric::depth(sensor, &frames.frames, false, context);
     }
     let pipeline = arguments.pipeline()?;
     let grey = match arguments.grey {

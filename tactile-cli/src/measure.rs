@@ -2,6 +2,7 @@
 use crate::arguments::{Repetition, force_n, length_mm, modulus_kpa};
 use crate::console::{Bar, Context, Exit, Failure, four_digits, in_unit};
 use crate::frames::{Frame, Reading};
+use crate::photometric;
 use crate::plot::{PlotError, known_heights_mm, press_pages, summary_lines};
 use clap::{Args, ValueEnum};
 use serde::Serialize;
@@ -12,6 +13,7 @@ use tactile_imaging::Pipeline;
 use tactile_imaging::io::{Grey, image_size};
 use tactile_imaging::pipeline::{ContactReading, Measurement, PipelineError, Press, Stage};
 use tactile_imaging::scene::{Scene, SceneData, SceneFrame};
+use tactile_imaging::sensor::PhotometricPresses;
 use tactile_simulate::{
     CalibrationRun, Camera, ContactModel, Elastic, ElasticSphere, PressLoad, PressOptions,
     PressSimulation, PressTruth, SimulateError, Trial,
@@ -21,7 +23,9 @@ use tactile_simulate::{
 ///
 /// Without SCENE.toml it simulates the paper's experiment (a ball of 3 mm radius pressed with 0.7 N
 /// and 1.2 N on the layered waveguide), measures the simulated frames blindly, and prints every
-/// result beside the truth. With SCENE.toml it measures your own frames. --repeat N gives the
+/// result beside the truth. With SCENE.toml it measures your own frames. With the sensor file of a
+/// gel that is lit in colours it gives depth, contact and force of every frame, and the files of
+/// `tactile depth --sensor`. --repeat N gives the
 /// median and the 99th centile of the times of every stage and of the whole. --out gets the plots:
 /// frames.svg, surfaces.svg, matches.svg, displacement.svg, strain.svg, summary.svg.
 #[derive(Args)]
@@ -322,6 +326,13 @@ struct Answer<'a> {
 type Contact = Result<Option<ContactReading>, PipelineError>;
 
 pub fn run(arguments: &MeasureArguments, context: &mut Context) -> Result<Exit, Failure> {
+    if let Some(sensor) = arguments
+        .scene
+        .as_deref()
+        .filter(|path| PhotometricPresses::names_kind(path))
+    {
+        return photometric::measure(sensor, &arguments.frames, context);
+    }
     let stages = [
         "frames",
         "surfaces",

@@ -4,12 +4,14 @@ use crate::outputs::{Csv, beside};
 use crate::plot::{HeatMap, Page, Panel};
 use clap::Arg;
 use clap::builder::ArgPredicate;
+use serde::Serialize;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
+use std::time::Instant;
 use tactile_imaging::core::Estimate;
 use tactile_imaging::io::{read_bytes, read_colour_levels};
-use tactile_imaging::sensor::{PhotometricPresses, PhotometricSensor};
-use tactile_imaging::sfs::{PhotometricCalibration, PhotometricReading};
+use tactile_imaging::sensor::{GelForce, PhotometricPresses, PhotometricSensor};
+use tactile_imaging::sfs::{PhotometricCalibration, PhotometricReading, PhotometricStereo};
 
 /// An argument that a sensor file takes the place of. `filler` is parsed and not used.
 pub fn unless_sensor(arg: Arg, filler: &'static str) -> Arg {
@@ -29,6 +31,12 @@ pub fn calibrate(path: &Path, sensor: &Path, context: &mut Context) -> Result<Ex
     let found = presses.calibrate();
     let found = found.map_err(|error| Failure::in_file(path, error))?;
     print(&presses.names, &found, context);
+    let gel = presses.gel(&found.sensor);
+    let gel = gel.map_err(|error| Failure::in_file(path, error))?;
+    if let Some(gel) = &gel {
+        let modulus = Estimate::new(gel.youngs_modulus_pa, gel.youngs_modulus_error_pa);
+        context.row("gel", in_unit(modulus, 1e-3) + " kPa");
+    }
     let model = found.sensor.model().clone();
     let circles: Vec<Value> = presses
         .names
@@ -40,10 +48,12 @@ pub fn calibrate(path: &Path, sensor: &Path, context: &mut Context) -> Result<Ex
         "presses": circles, "offset_px": found.offset_px,
         "median_angle_deg": found.median_angle_deg,
         "normal_standard_error": model.normal_standard_error,
-        "depth_standard_error_m": model.depth_standard_error_m,
+        "depth_standard_error_m": model.depth_standard_error_m, "gel": gel,
     }));
     if context.outputs.folder().is_some() {
-        let text = PhotometricSensor::new(&reference, model).to_toml();
+        let text = PhotometricSensor::new(&reference, model)
+            .with_gel(gel)
+            .to_toml();
         let text = text.map_err(Failure::output)?;
         context.outputs.add(sensor, text.into_bytes());
         context
@@ -103,8 +113,117 @@ fn print(names: &[PathBuf], found: &PhotometricCalibration, context: &mut Contex
     }
 }
 
-/// Reads gradients and depth of frames with a sensor file.
-pub fn depth(sensor: &Path, frames: &[PathBuf], context: &mut Context) -> Result<Exit, Failure> {
+/// Why a sensor without a gel's layer has no force.
+const NO_GEL: &str = "the sensor file has no [gel]: give its calibration the gel's thickness and modulus, or a frame under a known weight";
+
+/// A sensor with its law of forces, or why there is none.
+struct Reader {
+    stereo: PhotometricStereo,
+    law: Result<GelForce, String>,
+}
+
+impl Reader {
+    fn open(sensor: &Path) -> Result<Self, Failure> {
+        let (stereo, gel) = PhotometricSensor::read(sensor)?;
+        let law = gel.ok_or_else(|| NO_GEL.to_owned());
+        let law = law.and_then(|gel| GelForce::new(&gel, &stereo).map_err(|e| e.to_string()));
+        Ok(Self { stereo, law })
+    }
+
+    /// The force of a frame with contact, none without, or why it has none.
+    fn force(&self, reading: &PhotometricReading) -> Result<Option<Estimate>, String> {
+        let law = self.law.as_ref().map_err(String::clone)?;
+        law.force(reading).map_err(|error| error.to_string())
+    }
+}
+
+/// A force, null without contact, or an object with the reason why there is none.
+fn number_or_error(force: &Result<Option<Estimate>, String>) -> Value {
+    match force {
+        Ok(force) => json!(force),
+        Err(reason) => json!({ "error": reason }),
+    }
+}
+
+/// Reads depth, contact and force of frames with a sensor file, and gives the tables of `depth`.
+pub fn measure(sensor: &Path, frames: &[PathBuf], context: &mut Context) -> Result<Exit, Failure> {
+    if frames.is_empty() {
+        let sentence = "a sensor file names no frames: give images after it";
+        return Err(Failure::in_file(sensor, sentence));
+    }
+    depth(sensor, frames, true, context)
+}
+
+/// Reads images one after the other at `rate_hz`: a row of stream.csv for each. At most this share
+/// in per cent may take longer than a frame lasts.
+pub fn stream(
+    sensor: &Path,
+    frames: &[PathBuf],
+    rate_hz: f64,
+    allowed_late: f64,
+    context: &mut Context,
+) -> Result<Exit, Failure> {
+    let reader = Reader::open(sensor)?;
+    let size = reader.stereo.model().pixel_size_m;
+    let mut csv = Csv::new(&[
+        "time_s",
+        "force_N",
+        "force_error_N",
+        "contact_area_m2",
+        "largest_depth_m",
+        "largest_depth_error_m",
+    ]);
+    let (mut late, mut values) = (0, Vec::new());
+    for (k, path) in frames.iter().enumerate() {
+        if context.interrupt.requested() {
+            break;
+        }
+        let frame = read_colour_levels(path)?;
+        let start = Instant::now();
+        let reading = reader.stereo.read(frame.view());
+        let reading = reading.map_err(|error| Failure::in_file(path, error))?;
+        let contact = Contact::of(&reading, size);
+        let force = reader.force(&reading);
+        late += usize::from(start.elapsed().as_secs_f64() * rate_hz > 1.0);
+        let time_s = k as f64 / rate_hz;
+        values.push(json!({
+            "time_s": time_s, "force_n": number_or_error(&force), "contact": contact,
+        }));
+        let force = force.ok().flatten();
+        let area = contact.as_ref().map(|contact| contact.area_m2);
+        let depth = contact.as_ref().map(|contact| contact.largest_depth_m);
+        let [force_n, depth_m] = [force, depth]
+            .map(|pair| pair.map_or([None; 2], |e| [Some(e.value), Some(e.standard_error)]));
+        let cells = [[Some(time_s)].as_slice(), &force_n, &[area], &depth_m].concat();
+        csv.cells(cells);
+    }
+    let percent = 100.0 * late as f64 / values.len().max(1) as f64;
+    let count = values.len();
+    context.line(format_args!(
+        "{count} frames at {rate_hz} Hz, {late} late ({percent:.1} %)"
+    ));
+    if let Err(reason) = &reader.law {
+        context.answer("force", format_args!("none: {reason}"));
+    }
+    context.value(&json!({
+        "frames": count, "rate_hz": rate_hz, "late": late, "updates": values,
+    }));
+    context.outputs.add("stream.csv", csv.into_bytes());
+    if percent > allowed_late {
+        context.note(format_args!(
+            "{percent:.1} % of the frames came late, more than {allowed_late} %"
+        ));
+    }
+    Ok(Exit::complete_if(percent <= allowed_late))
+}
+
+/// Reads gradients and depth of frames with a sensor file, and their forces where `forces` is set.
+pub fn depth(
+    sensor: &Path,
+    frames: &[PathBuf],
+    forces: bool,
+    context: &mut Context,
+) -> Result<Exit, Failure> {
     let suffixes = [
         "_depth.csv",
         "_gradient_x.csv",
@@ -121,7 +240,8 @@ pub fn depth(sensor: &Path, frames: &[PathBuf], context: &mut Context) -> Result
         .chain([sensor])
         .collect();
     context.outputs.plan(&names, &inputs)?;
-    let stereo = PhotometricSensor::read(sensor)?;
+    let reader = Reader::open(sensor)?;
+    let stereo = &reader.stereo;
     let size = stereo.model().pixel_size_m;
     let images = frames.iter().map(read_colour_levels);
     let images = images.collect::<Result<Vec<_>, _>>()?;
@@ -130,9 +250,24 @@ pub fn depth(sensor: &Path, frames: &[PathBuf], context: &mut Context) -> Result
         let reading = stereo.read(images[k].view());
         let reading = reading.map_err(|error| Failure::in_file(path, error))?;
         context.line(format_args!("{}:", path.display()));
-        values.push(json!({
-            "frame": path.display().to_string(), "contact": reading_value(&reading, size, context),
-        }));
+        let contact = Contact::of(&reading, size);
+        match &contact {
+            Some(contact) => contact.print(context),
+            None => context.line("no contact"),
+        }
+        let mut value = json!({ "frame": path.display().to_string(), "contact": contact });
+        if forces && contact.is_some() {
+            let force = reader.force(&reading);
+            match &force {
+                Ok(Some(force)) => context.row("force", in_unit(*force, 1.0) + " N"),
+                Ok(None) => context.row("force", "none: the contact is smaller than a cell"),
+                Err(reason) => context.row("force", format_args!("none: {reason}")),
+            }
+            value["force_n"] = number_or_error(&force);
+        } else if forces {
+            value["force_n"] = Value::Null;
+        }
+        values.push(value);
         if context.outputs.folder().is_none() {
             continue;
         }
@@ -149,33 +284,42 @@ pub fn depth(sensor: &Path, frames: &[PathBuf], context: &mut Context) -> Result
     Ok(Exit::Complete)
 }
 
-/// Prints a contact and returns it as JSON, null without one.
-fn reading_value(reading: &PhotometricReading, size: f64, context: &mut Context) -> Value {
-    let mut sums = [0.0; 3];
-    for ((row, column), _) in reading
-        .contact
-        .indexed_iter()
-        .filter(|(_, inside)| **inside)
-    {
-        let more = [1.0, column as f64, row as f64];
-        sums.iter_mut()
-            .zip(more)
-            .for_each(|(sum, more)| *sum += more);
+/// What a frame's contact is printed by.
+#[derive(Serialize)]
+struct Contact {
+    centroid: [f64; 2],
+    area_m2: f64,
+    largest_depth_m: Estimate,
+}
+
+impl Contact {
+    fn of(reading: &PhotometricReading, size: f64) -> Option<Self> {
+        let mut sums = [0.0; 3];
+        let touched = reading
+            .contact
+            .indexed_iter()
+            .filter(|(_, inside)| **inside);
+        for ((row, column), _) in touched {
+            let more = [1.0, column as f64, row as f64];
+            sums = [0, 1, 2].map(|k: usize| sums[k] + more[k]);
+        }
+        let [pixels, x, y] = sums;
+        let deepest = reading.depth_m.iter().copied().fold(0.0, f64::max);
+        (pixels > 0.0).then(|| Self {
+            centroid: [x / pixels, y / pixels],
+            area_m2: pixels * size * size,
+            largest_depth_m: Estimate::new(deepest, reading.depth_standard_error_m),
+        })
     }
-    let [pixels, x, y] = sums;
-    if pixels == 0.0 {
-        context.line("no contact");
-        return Value::Null;
+
+    fn print(&self, context: &mut Context) {
+        let [x, y] = self.centroid.map(four_digits);
+        context.row("centroid", format_args!("({x}, {y}) px"));
+        let area = four_digits(1e6 * self.area_m2);
+        context.row("area", format_args!("{area} mm²"));
+        let depth = in_unit(self.largest_depth_m, 1e3);
+        context.row("depth", depth + " mm at the deepest pixel");
     }
-    let centroid = [x / pixels, y / pixels];
-    let deepest = reading.depth_m.iter().copied().fold(0.0, f64::max);
-    let area = pixels * size * size;
-    let depth = Estimate::new(deepest, reading.depth_standard_error_m);
-    let [x, y] = centroid.map(four_digits);
-    context.row("centroid", format_args!("({x}, {y}) px"));
-    context.row("area", format_args!("{} mm²", four_digits(1e6 * area)));
-    context.row("depth", in_unit(depth, 1e3) + " mm at the deepest pixel");
-    json!({ "centroid": centroid, "area_m2": area, "largest_depth_m": depth })
 }
 
 fn page(reading: &PhotometricReading, size: f64) -> Page {

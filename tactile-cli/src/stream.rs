@@ -4,6 +4,7 @@ use crate::arguments::{force_n, not_negative, positive};
 use crate::console::{Bar, Context, Exit, Failure};
 use crate::frames::{DEFAULT_RATE_HZ, Reading};
 use crate::outputs::Csv;
+use crate::photometric;
 use crate::record::FrameRecorder;
 use crate::serve::LivePage;
 use clap::Args;
@@ -19,6 +20,7 @@ use tactile_imaging::force::Estimate;
 use tactile_imaging::io::Grey;
 use tactile_imaging::pipeline::{Flag, FrameSource, PipelineError, Session, with_error};
 use tactile_imaging::scene::Scene;
+use tactile_imaging::sensor::PhotometricPresses;
 use tactile_simulate::{CalibrationRun, Camera, Gain, LoadCycle, PressLoad, PressOptions, Trial};
 
 /// Measure frame after frame: force, contact and modulus live
@@ -29,6 +31,8 @@ use tactile_simulate::{CalibrationRun, Camera, Gain, LoadCycle, PressLoad, Press
 /// modulus ends outside the tolerance. With SCENE.toml (see `tactile measure`), which describes
 /// sensor and object, recorded frames are measured one after the other, as fast as they can be. One
 /// is late if that takes longer than a frame at --rate lasts. --out gets stream.csv, a row a frame.
+/// In place of the scene goes the sensor file of a gel that is lit in colours, with images or
+/// folders of them: force, contact and depth.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -100,6 +104,9 @@ pub fn run(arguments: &StreamArguments, context: &mut Context) -> Result<Exit, F
     let inputs: Vec<_> = arguments.scene.iter().map(PathBuf::as_path).collect();
     context.outputs.plan(&["stream.csv"], &inputs)?;
     match &arguments.scene {
+        Some(sensor) if PhotometricPresses::names_kind(sensor) => {
+            coloured(sensor, arguments, context)
+        }
         Some(scene) => recorded(scene, arguments, context),
         None => simulated(arguments, context),
     }
@@ -540,6 +547,32 @@ fn recorded(
     }
     let exit = live.finish(arguments, context)?;
     Ok(if unusable > 0 { Exit::Partial } else { exit })
+}
+
+/// Measures images of a gel that is lit in colours.
+fn coloured(
+    sensor: &Path,
+    arguments: &StreamArguments,
+    context: &mut Context,
+) -> Result<Exit, Failure> {
+    let grey = [
+        ("--strain", arguments.strain),
+        ("--record", arguments.record.is_some()),
+        ("--serve", arguments.serve.is_some()),
+    ];
+    if let Some((name, _)) = grey.iter().find(|(_, given)| *given) {
+        return Err(Failure::input(format!(
+            "{name} is not there for a gel that is lit in colours"
+        )));
+    }
+    let frames = listed(&arguments.frames)?;
+    if frames.is_empty() {
+        let sentence = "a sensor file names no frames: give images or folders after it";
+        return Err(Failure::in_file(sensor, sentence));
+    }
+    context.outputs.protect(&frames)?;
+    let rate_hz = arguments.rate.unwrap_or(DEFAULT_RATE_HZ);
+    photometric::stream(sensor, &frames, rate_hz, arguments.allowed_late, context)
 }
 
 /// The numbers at the end of the frames' names, less the first one. `None` where a name has none or

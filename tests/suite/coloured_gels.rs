@@ -1,5 +1,6 @@
 //! Sensors that are lit in colours, on simulated frames whose depth is known at every pixel.
 use ndarray::{Array2, Array3};
+use tactile_imaging::elasticity::contact::{Bond, Layer, LayerEquation, LayerPlane, Waveguide};
 use tactile_imaging::sfs::{BallPress, PhotometricCalibration, PhotometricStereo};
 use tactile_simulate::{ColourGel, GelObject};
 
@@ -120,4 +121,50 @@ fn contacts_of_other_shapes() {
         "{touched} {area}"
     );
     assert!((reading.depth_m[[60, 80]] / PIXEL_M - 6.0).abs() < 1.5);
+}
+
+/// The force of a ball on a layer, against the integral equation of axisymmetric contact.
+#[test]
+fn a_ball_has_the_force_of_the_integral_equation() {
+    let layer = Layer {
+        thickness_m: 4e-3,
+        youngs_modulus_pa: 1e5,
+        poisson_ratio: 0.48,
+    };
+    let guide = Waveguide::new(vec![layer]).unwrap();
+    let cell = 1e-4;
+    let plane = LayerPlane::new(&guide, Bond::Bonded, [50, 54], cell).unwrap();
+    let reduced = 1e5 / (1.0 - 0.48_f64.powi(2));
+    for radius in [1.2e-3, 2e-3] {
+        let ball = 20e-3;
+        let truth = LayerEquation::of_layers(&guide, Bond::Bonded).unwrap();
+        let truth = truth.solve(radius / 4e-3).unwrap();
+        let depth = truth.indentation_ratio * radius * radius / ball;
+        let force = truth.force_ratio_same_radius * 4.0 * reduced * radius.powi(3) / (3.0 * ball);
+        let square = |at: usize| {
+            let [x, y] = [(at % 54) as f64 - 26.3, (at / 54) as f64 - 24.6];
+            (x * x + y * y) * cell * cell
+        };
+        let cells = 0..50 * 54;
+        let moved: Vec<f64> = cells
+            .clone()
+            .map(|at| depth - square(at) / (2.0 * ball))
+            .collect();
+        let contact: Vec<bool> = cells.map(|at| square(at) < radius * radius).collect();
+        let found = plane.force(&moved, &contact, 1e-6).unwrap();
+        // Cells of a twelfth of the radius and less.
+        assert!(
+            (found.value / force - 1.0).abs() < 0.03,
+            "{found:?} {force}"
+        );
+        let pressure = plane.pressure(&moved, &contact).unwrap();
+        let sum = pressure.iter().sum::<f64>() * cell * cell;
+        assert!((sum / found.value - 1.0).abs() < 2e-3, "{sum} {found:?}");
+        // A depth that is off by its error moves the force by its error.
+        let deeper: Vec<f64> = moved.iter().map(|u| u + 1e-6).collect();
+        let more = plane.force(&deeper, &contact, 0.0).unwrap().value - found.value;
+        assert!((more / found.standard_error - 1.0).abs() < 1e-6);
+    }
+    assert!(plane.force(&[0.0; 3], &[true; 3], 0.0).is_err());
+    assert!(plane.pressure(&[f64::NAN; 2700], &[true; 2700]).is_err());
 }

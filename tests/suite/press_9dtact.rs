@@ -10,8 +10,8 @@ use test_support::published;
 const PIXEL_M: f64 = 0.0510151e-3;
 const BALL_M: f64 = 4.0e-3;
 
-/// The sensor with its makers' table, with the row 0, 0 or without, and its images without and with the
-/// ball.
+/// The sensor with its makers' table, with the row 0, 0 or without, and its images without and with
+/// the ball.
 fn sensor(folder: &Path, grey: Grey, zeroed: bool) -> (Pipeline, [Array2<u8>; 2]) {
     let images = ["rectify_crop_ref.png", "rectify_crop_sample.png"].map(|name| {
         let image = read_grey_image(folder.join(name), grey, None);

@@ -309,7 +309,7 @@ impl LayerKernel {
 
     /// 1 − L(s): 1 for long waves, 0 for short ones. Below zero where a soft layer lies under a
     /// stiff one.
-    fn deficit(&self, s: f64) -> f64 {
+    pub(super) fn deficit(&self, s: f64) -> f64 {
         self.stack.deficit(s)
     }
 

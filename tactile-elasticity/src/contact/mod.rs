@@ -5,6 +5,7 @@
 //! | [`HertzContact`] | two spheres, small contact |
 //! | [`flat_punch`], [`cone`] | rigid punch and cone on a half-space |
 //! | [`LayerEquation`] | sphere on one or more bonded layers: the solution by an integral equation |
+//! | [`LayerPlane`] | displacement of a layered surface under a contact of any shape, to pressure |
 //! | [`LayerSeries`] | sphere on one layer: series in χ = √(Rδ)/h |
 //! | [`tatara_indentation_m`] | sphere squeezed between two plates, large deformation |
 //! | [`ContactTable`] | soft ball on a guide, tabulated by finite elements |
@@ -12,6 +13,7 @@
 
 mod hertz;
 mod layers;
+mod plane;
 mod table;
 mod waveguide;
 
@@ -21,6 +23,7 @@ pub use hertz::{
     relative_radius_m, sample_modulus_pa, tangent_of_degrees, tatara_indentation_m,
 };
 pub use layers::{Bond, LayerContact, LayerEquation, LayerSeries};
+pub use plane::LayerPlane;
 pub use table::{ContactCurve, ContactTable};
 pub use waveguide::{
     Layer, PARAMETERS_PER_LAYER, Waveguide, guide_compliance_error, guide_log_stiffness,

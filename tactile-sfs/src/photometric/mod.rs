@@ -93,6 +93,58 @@ pub struct PhotometricReading {
     pub depth_standard_error_m: f64,
 }
 
+impl PhotometricReading {
+    /// How far the gel's face has moved, in metres, and where it is touched, for blocks of this many
+    /// pixels a side. Incomplete blocks at the right and at the bottom are left out.
+    ///
+    /// The gradients of the whole face are integrated, also those of the free gel around a contact.
+    /// The median along the border is taken as its rest.
+    ///
+    /// # Errors
+    /// Those of [`CosinePoisson`], and [`SfsError::EmptyImage`] for a block larger than the frame.
+    pub fn displacement_m(
+        &self,
+        block: usize,
+        pixel_size_m: f64,
+    ) -> Result<(Array2<f64>, Array2<bool>), SfsError> {
+        let [rows, columns] =
+            [self.contact.nrows(), self.contact.ncols()].map(|n| n / block.max(1));
+        if rows == 0 || columns == 0 {
+            return Err(SfsError::EmptyImage { rows, columns });
+        }
+        let share = 1.0 / (block * block) as f64;
+        let mean = |gradient: &Array2<f32>| {
+            let blocks = gradient.exact_chunks((block, block));
+            let means = blocks.into_iter().map(|b| f64::from(b.sum()) * share);
+            Array2::from_shape_fn((rows, columns), {
+                let means: Vec<f64> = means.collect();
+                move |(row, column)| means[row * columns + column]
+            })
+        };
+        let [p, q] = self.gradient.each_ref().map(mean);
+        let domain = Domain::new([block as f64 * pixel_size_m; 2])?;
+        let mut moved = CosinePoisson
+            .integrate(p.view(), q.view(), &domain)?
+            .heights;
+        let edge = |(row, column): (usize, usize)| {
+            row == 0 || column == 0 || row + 1 == rows || column + 1 == columns
+        };
+        let around = moved.indexed_iter().filter(|(at, _)| edge(*at));
+        let mut around: Vec<f64> = around.map(|(_, z)| *z).collect();
+        let middle = around.len() / 2;
+        let rest = *around.select_nth_unstable_by(middle, f64::total_cmp).1;
+        moved -= rest;
+        let blocks: Vec<bool> = self
+            .contact
+            .exact_chunks((block, block))
+            .into_iter()
+            .map(|b| 2 * b.iter().filter(|touched| **touched).count() > block * block)
+            .collect();
+        let touched = Array2::from_shape_fn((rows, columns), |(r, c)| blocks[r * columns + c]);
+        Ok((moved, touched))
+    }
+}
+
 /// Largest sine of a slope. A steeper one is read as 76°: beyond it light hardly changes, and the
 /// slope itself has no end.
 const STEEPEST: f32 = 0.97;
@@ -121,6 +173,11 @@ impl PhotometricStereo {
     /// The numbers of the calibration.
     pub fn model(&self) -> &PhotometricModel {
         &self.model
+    }
+
+    /// Rows and columns of its frames.
+    pub fn shape(&self) -> (usize, usize) {
+        self.reference.dim()
     }
 
     /// Gradients, contact and depth of a frame of the reference's size.
