@@ -47,10 +47,13 @@ pub struct PhotometricPresses {
     /// Images of the presses, as the file names them.
     pub names: Vec<PathBuf>,
     /// The gel's layer, and what stands under known weights: frame and force.
-    gel: Option<(Gel, Vec<(Array3<u8>, Estimate)>)>,
+    gel: Option<(Gel, Vec<KnownWeight>)>,
     /// Frame, ball's radius in metres and drawn circle of each press.
     presses: Vec<(Array3<u8>, f64, Option<[f64; 3]>)>,
 }
+
+/// A frame of what stands under a weight, and the weight's force in newtons.
+type KnownWeight = (Array3<u8>, Estimate);
 
 /// The word of `kind` in files of these sensors.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -218,7 +221,7 @@ impl GelTable {
         self,
         path: &Path,
         reference: &Array3<u8>,
-    ) -> Result<(Gel, Vec<(Array3<u8>, Estimate)>), FileError> {
+    ) -> Result<(Gel, Vec<KnownWeight>), FileError> {
         let mut weights = Vec::new();
         for (k, weight) in self.weights.into_iter().enumerate() {
             let field = format!("gel.weights[{}].image", k + 1);
