@@ -131,12 +131,18 @@ fn a_caution_about_the_shape_widens_the_interval() {
         press.add_frame(frame.view());
     }
     let measurement = press.measure();
-    let elongated = |flag: &Flag| matches!(flag, Flag::NotRound { elongation, .. } if (elongation - 0.2).abs() < 0.02);
+    let elongated = |flag: &Flag| match flag {
+        Flag::NotRound { elongation, .. } => (elongation - 0.2).abs() < 0.02,
+        _ => false,
+    };
     assert!(measurement.flags.iter().any(elongated), "{measurement}");
     let modulus = measurement.youngs_modulus_pa.unwrap();
     let (low, high) = modulus.interval_95;
     assert!(modulus.value > 1.2 * 103e3, "{modulus:?}");
-    assert!(low < 103e3 && high > modulus.value, "{modulus:?}");
+    assert!(
+        low < 103e3 && high.is_none_or(|high| high > modulus.value),
+        "{modulus:?}"
+    );
 }
 
 /// A punch touches with its whole face: a ball's contact, said to be that of a wider punch, has a
