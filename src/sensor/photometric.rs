@@ -171,9 +171,7 @@ impl PhotometricPresses {
         let presses: Vec<_> = presses.collect();
         PhotometricStereo::calibrate(self.reference.view(), self.pixel_size_m, &presses)
     }
-}
 
-impl PhotometricPresses {
     /// The gel of the calibration file. Where weights are given, its modulus is that under which a
     /// calibrated sensor reads them.
     ///

@@ -12,9 +12,9 @@ use tactile_core::Estimate;
 ///
 /// A pressure of wavenumber k moves the surface by 2 L(kh)/(E* k), L and E* as in
 /// [`LayerEquation`](super::LayerEquation). Surroundings of the contact carry no pressure, and move
-/// as they like. The contact's pressure is solved for by conjugate gradients, with the law applied
-/// by Fourier transforms of twice the grid or more, which keeps copies apart. O(n log n) an iteration, some
-/// ten of them. Without friction, for slopes that are small. It is linear: adhesion shows as a
+/// freely. The contact's pressure is solved for by conjugate gradients, with the law applied by
+/// Fourier transforms of twice the grid or more, which keeps copies apart. O(n log n) an iteration,
+/// some ten of them. Without friction, for slopes that are small. It is linear: adhesion shows as a
 /// negative pressure, and so does an error of the displacement.
 ///
 /// ```
