@@ -173,15 +173,29 @@ pub fn stream(
         "largest_depth_m",
         "largest_depth_error_m",
     ]);
-    let (mut late, mut values) = (0, Vec::new());
+    // A frame that cannot be read is a caution, and the stream goes on.
+    let (mut late, mut unread, mut values) = (0, 0, Vec::new());
     for (k, path) in frames.iter().enumerate() {
         if context.interrupt.requested() {
             break;
         }
-        let frame = read_colour_levels(path)?;
+        let frame = match read_colour_levels(path) {
+            Ok(frame) => frame,
+            Err(error) => {
+                context.caution(error);
+                unread += 1;
+                continue;
+            }
+        };
         let start = Instant::now();
-        let reading = reader.stereo.read(frame.view());
-        let reading = reading.map_err(|error| Failure::in_file(path, error))?;
+        let reading = match reader.stereo.read(frame.view()) {
+            Ok(reading) => reading,
+            Err(error) => {
+                context.caution(Failure::in_file(path, error));
+                unread += 1;
+                continue;
+            }
+        };
         let contact = Contact::of(&reading, size);
         let force = reader.force(&reading);
         late += usize::from(start.elapsed().as_secs_f64() * rate_hz > 1.0);
@@ -214,7 +228,7 @@ pub fn stream(
             "{percent:.1} % of the frames came late, more than {allowed_late} %"
         ));
     }
-    Ok(Exit::complete_if(percent <= allowed_late))
+    Ok(Exit::complete_if(unread == 0 && percent <= allowed_late))
 }
 
 /// Reads gradients and depth of frames with a sensor file, and their forces where `forces` is set.
