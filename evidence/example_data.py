@@ -274,7 +274,76 @@ layers = [
 """
 
 
+# The same block, 60 mm in radius, without the lump and with it, at two approaches: pressure every 0.25 mm from the axis. Three
+# presses, each some tenths of a millimetre from where it is said to be, around the lump's middle at (8, 4) mm.
+SCAN_APPROACHES = [1.5e-3, 3e-3]
+SCAN_PLAIN = [[
+    461.4, 461.4, 461.5, 461.6, 461.8, 462.0, 462.2, 462.5, 462.9, 463.3, 463.7, 464.2, 464.7, 465.3, 466.0, 466.6,
+    467.4, 468.2, 469.0, 469.9, 470.9, 472.0, 473.1, 474.2, 475.5, 476.8, 478.2, 479.7, 481.3, 483.1, 484.9, 486.8,
+    488.9, 491.2, 493.6, 496.2, 499.0, 502.0, 505.3, 508.9, 512.8, 517.1, 521.8, 527.0, 532.7, 539.0, 546.1, 554.0,
+    562.8, 572.7, 584.0, 597.2, 611.6, 628.5, 648.9, 672.6, 699.5, 734.5, 779.0, 833.6, 911.3, 1021.7, 1150.8, 813.7,
+], [
+    932.6, 932.6, 932.8, 933.0, 933.3, 933.7, 934.1, 934.7, 935.3, 936.0, 936.8, 937.7, 938.7, 939.8, 941.0, 942.3,
+    943.6, 945.1, 946.7, 948.4, 950.2, 952.1, 954.1, 956.3, 958.6, 961.1, 963.7, 966.5, 969.4, 972.6, 976.0, 979.6,
+    983.5, 987.7, 992.2, 997.0, 1002.3, 1007.9, 1014.1, 1020.8, 1028.2, 1036.1, 1044.9, 1054.7, 1065.5, 1077.2,
+    1090.5, 1105.4, 1122.0, 1140.4, 1161.6, 1186.2, 1213.6, 1244.9, 1282.7, 1328.1, 1377.2, 1440.6, 1523.3, 1620.5,
+    1757.6, 1981.2, 2250.0, 699.1,
+]]
+SCAN_LUMP = [[
+    909.8, 908.7, 905.5, 900.2, 892.9, 883.8, 873.1, 860.8, 847.1, 832.1, 816.1, 799.3, 781.9, 764.1, 746.0, 728.0,
+    710.0, 692.3, 675.2, 658.5, 642.5, 627.3, 612.9, 599.5, 586.9, 575.4, 564.8, 555.2, 546.6, 538.9, 532.2, 526.4,
+    521.6, 517.6, 514.4, 512.1, 510.5, 509.7, 509.6, 510.3, 511.7, 513.9, 516.7, 520.4, 524.9, 530.2, 536.4, 543.6,
+    552.1, 561.5, 572.5, 585.4, 600.3, 616.9, 637.1, 661.6, 689.0, 723.5, 768.9, 822.6, 899.2, 1006.4, 1163.3, 822.4,
+], [
+    1873.9, 1871.8, 1865.1, 1854.2, 1839.2, 1820.4, 1798.2, 1772.7, 1744.2, 1713.0, 1679.7, 1644.6, 1608.2, 1570.8,
+    1532.8, 1494.7, 1456.8, 1419.3, 1382.9, 1347.5, 1313.4, 1280.9, 1250.1, 1221.2, 1194.2, 1169.4, 1146.5, 1125.7,
+    1107.0, 1090.4, 1075.7, 1063.0, 1052.2, 1043.2, 1036.0, 1030.4, 1026.5, 1024.1, 1023.3, 1023.9, 1026.1, 1029.7,
+    1034.8, 1041.3, 1049.5, 1059.4, 1070.9, 1084.4, 1100.1, 1118.1, 1138.5, 1162.6, 1190.8, 1222.0, 1259.2, 1304.5,
+    1356.7, 1419.2, 1501.1, 1599.4, 1731.8, 1944.4, 2245.3, 858.2,
+]]
+SCAN_LUMP_MM = (8.0, 4.0)
+SCAN_PRESSES = [((0, 0), (0.12, -0.2)), ((16, 0), (-0.15, 0.1)), ((8, 14), (0.05, 0.22))]  # said, and off by
+
+
+def scan_frame(press, load):
+    """A press's pressure, that of the lump laid around its place, in grey levels above 10 with the camera's noise."""
+    said, off = SCAN_PRESSES[press]
+
+    def read(values, mm):
+        k = min(int(mm / 0.25), len(values) - 2)
+        return values[k] + (mm / 0.25 - k) * (values[k + 1] - values[k])
+
+    def level(r, c):
+        x, y = 0.4 * (c - 47.8), 0.4 * (r - 47.3)
+        radius = math.hypot(x, y)
+        pressure = 0.0
+        if radius < 15.75:
+            lump = min(math.hypot(said[0] + off[0] + x - SCAN_LUMP_MM[0], said[1] + off[1] + y - SCAN_LUMP_MM[1]), 12.0)
+            pressure = read(SCAN_PLAIN[load], radius) * read(SCAN_LUMP[load], lump) / read(SCAN_PLAIN[load], lump)
+        noise = 2 * error(96 * r + c + 40_000 * (2 * press + load + 7), 0.7548776662)
+        return min(255, round(10 + noise + LUMP_GREY_PER_PA * pressure))
+    return png([[level(r, c) for c in range(96)] for r in range(96)])
+
+
+def scan_scene():
+    presses = "".join(f"""
+[[presses]]
+position_m = [{said[0] * 1e-3}, {said[1] * 1e-3}]
+frames = [
+    {{ image = "scan_{press + 1}_1.png", approach_m = {SCAN_APPROACHES[0]} }},
+    {{ image = "scan_{press + 1}_2.png", approach_m = {SCAN_APPROACHES[1]} }},
+]
+""" for press, (said, _) in enumerate(SCAN_PRESSES))
+    head, _, tail = lump_scene().partition("[[frames]]")
+    block = tail[tail.index("[object]"):].replace("radius_m = 40e-3", "radius_m = 60e-3")
+    head = head.replace("three approaches", "two approaches at each of three places").replace("\n[calibration]", "position_error_m = 0.2e-3\n\n[calibration]")
+    return head.rstrip() + "\n" + presses + "\n" + block
+
+
 FILES = {
+    **{f"inclusion/scan_{press + 1}_{load + 1}.png": lambda press=press, load=load: scan_frame(press, load)
+       for press in range(len(SCAN_PRESSES)) for load in range(2)},
+    "inclusion/scan.toml": scan_scene,
     "inclusion/reference.png": lambda: lump_frame([], 0),
     **{f"inclusion/frame_{k + 1}.png": lambda k=k, p=pressures: lump_frame(p, 40_000 * (k + 1)) for k, (_, _, pressures) in enumerate(LUMP_PRESSES)},
     "inclusion/calibration.csv": lump_calibration,

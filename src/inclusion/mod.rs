@@ -10,5 +10,5 @@ mod tests;
 
 pub use rings::{RingError, RingMeans, ring_means};
 #[cfg(feature = "scene")]
-pub use scene::{FacePicture, InclusionScene, LoadedInclusion};
+pub use scene::{InclusionScene, LoadedInclusion};
 pub use tactile_inclusion::*;

@@ -225,16 +225,15 @@ pub struct FaceCells {
 }
 
 impl FaceCells {
-    /// Those within three quarters of a face's radius around a centre in pixels.
+    /// Those within three quarters of a face's radius around a centre in pixels, of some width in
+    /// metres.
     pub fn new(
         size: (usize, usize),
         centre_px: [f64; 2],
         pixel_size_m: [f64; 2],
         face_radius_m: f64,
+        width: f64,
     ) -> Self {
-        // Cells in a radius: they are half as wide as the narrowest lump that shows.
-        let fineness = 15.0;
-        let width = face_radius_m / fineness;
         let mut indices = std::collections::HashMap::new();
         let mut sums: Vec<[f64; 3]> = Vec::new();
         let mut cells = Array2::from_elem(size, None);

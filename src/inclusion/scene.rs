@@ -3,8 +3,8 @@ use super::rings::{FaceCells, RingMeans, interpolated, ring_means};
 use crate::elasticity::ElasticityError;
 use crate::force::{CalibrationOptions, LinearCalibration, StressCalibration};
 use crate::io::{
-    FileError, beside, force, length, modulus, number, one_or_more, pixel_size, positive,
-    read_frame, read_toml,
+    FileError, beside, force, length, modulus, not_negative, number, one_or_more, pixel_size,
+    positive, read_frame, read_toml,
 };
 use crate::scene::force_pairs;
 use core::ops::ControlFlow;
@@ -14,11 +14,14 @@ use std::error::Error;
 use std::path::{Path, PathBuf};
 use tactile_fem::{Guide, GuideLayer, Interface, Material};
 use tactile_inclusion::{
-    InclusionEstimate, InclusionSearch, PressureProfile, SearchProgress, Specimen,
+    InclusionEstimate, InclusionSearch, PressureProfile, Scan, ScanPress, SearchProgress, Specimen,
     asymmetry_warnings,
 };
 
 /// A block of tissue, the guide pressed onto it, and the frames.
+///
+/// Of a scan, `[[presses]]` with `position_m` and `frames` each stand in place of the frames, and
+/// `position_error_m` is the standard error of their places (0.2 mm where it is absent).
 ///
 /// ```
 /// use tactile_imaging::inclusion::InclusionScene;
@@ -60,6 +63,16 @@ pub struct InclusionScene {
     reference: PathBuf,
     pixel_size_m: [f64; 2],
     calibration: Option<PathBuf>,
+    presses: Vec<Press>,
+    position_error_m: f64,
+}
+
+/// The frames of a press, and where it was.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Press {
+    position_m: [f64; 2],
+    #[serde(deserialize_with = "one_or_more")]
     frames: Vec<Frame>,
 }
 
@@ -83,28 +96,13 @@ struct Frame {
 /// ```
 #[derive(Clone, Debug)]
 pub struct LoadedInclusion {
-    /// Ring means of each frame.
+    /// Ring means of each frame, one press after the other.
     pub rings: Vec<RingMeans>,
-    /// The same as the search takes them, at the radii of the first frame.
+    /// Those of the first press as the search takes them, at the radii of its first frame.
     pub profiles: Vec<PressureProfile>,
-    /// The whole face, which shows a lump off the axis.
-    pub face: FacePicture,
-}
-
-/// Pressures on square cells within three quarters of a face's radius.
-///
-/// ```no_run
-/// use tactile_imaging::inclusion::InclusionScene;
-/// let face = InclusionScene::read("press/scene.toml")?.load()?.face;
-/// println!("{} cells, the first one at {:?}", face.positions_m.len(), face.positions_m[0]);
-/// # Ok::<(), tactile_imaging::io::FileError>(())
-/// ```
-#[derive(Clone, Debug)]
-pub struct FacePicture {
-    /// Middles (x, y) of the cells, in metres from the face's centre.
-    pub positions_m: Vec<[f64; 2]>,
-    /// Each frame's pressures.
-    pub profiles: Vec<PressureProfile>,
+    /// The whole face at each press, on square cells within three quarters of its radius, which
+    /// shows a lump off the axis.
+    pub scan: Scan,
 }
 
 impl LoadedInclusion {
@@ -118,8 +116,15 @@ impl LoadedInclusion {
         self.rings.iter().map(|r| r.harmonics).fold(0.0, f64::max)
     }
 
-    /// The lump that explains the frames best: one under the axis from the ring means where the
-    /// pressure is symmetric, else one anywhere from the whole face.
+    /// Whether the lump is looked for under the axis, from the ring means: where there is one press
+    /// and its pressure is symmetric.
+    pub fn is_axial(&self) -> bool {
+        self.scan.presses.len() == 1
+            && asymmetry_warnings(self.asymmetry(), self.harmonics()).is_empty()
+    }
+
+    /// The lump that explains the frames best: one under the axis where the pressure of one press
+    /// is symmetric, else one anywhere from the whole face of all presses.
     ///
     /// # Errors
     /// Those of [`InclusionSearch::search_with_progress`].
@@ -128,12 +133,11 @@ impl LoadedInclusion {
         search: &InclusionSearch,
         progress: &mut dyn FnMut(SearchProgress) -> ControlFlow<()>,
     ) -> Result<InclusionEstimate, ElasticityError> {
-        if asymmetry_warnings(self.asymmetry(), self.harmonics()).is_empty() {
+        if self.is_axial() {
             let radii_m = &self.rings[0].radii_m;
             search.search_with_progress(radii_m, &self.profiles, progress)
         } else {
-            let face = &self.face;
-            search.search_picture(&face.positions_m, &face.profiles, progress)
+            search.search_scan(&self.scan, progress)
         }
     }
 }
@@ -150,21 +154,53 @@ impl InclusionScene {
     /// Not generic, so that the parser is compiled once, not again in every crate that reads.
     fn from_file(path: &Path) -> Result<Self, FileError> {
         let file: InclusionFile = read_toml(path)?;
-        let mut frames = file.frames;
-        let mut last_m = 0.0;
-        for (index, frame) in frames.iter_mut().enumerate() {
-            // Contact grows with the approach, and the search starts each frame from the one
-            // before.
-            if frame.approach_m <= last_m {
-                let field = format!("frames[{}].approach_m", index + 1);
-                let reason = "expected an approach greater than that of the frame before";
-                return Err(FileError::field(path, field, reason));
+        let is_scan = !file.presses.is_empty();
+        let mut presses = file.presses;
+        if is_scan != file.frames.is_empty() {
+            let reason = "expected either frames or presses, each with its frames";
+            return Err(FileError::field(path, "frames", reason));
+        }
+        if !is_scan {
+            presses.push(Press {
+                position_m: [0.0; 2],
+                frames: file.frames,
+            });
+        }
+        for (index, press) in presses.iter_mut().enumerate() {
+            let field = |name: &str| press_field(is_scan.then_some(index), name);
+            if !press.position_m.iter().all(|x| x.is_finite()) {
+                return Err(FileError::field(
+                    path,
+                    field("position_m"),
+                    "expected two numbers",
+                ));
             }
-            last_m = frame.approach_m;
-            frame.image = beside(path, &frame.image);
+            let mut last_m = 0.0;
+            for (frame_index, frame) in press.frames.iter_mut().enumerate() {
+                // Contact grows with the approach, and the search starts each frame from the one
+                // before.
+                if frame.approach_m <= last_m {
+                    let field = field(&format!("frames[{}].approach_m", frame_index + 1));
+                    let reason = "expected an approach greater than that of the frame before";
+                    return Err(FileError::field(path, field, reason));
+                }
+                last_m = frame.approach_m;
+                frame.image = beside(path, &frame.image);
+            }
+        }
+        let approaches = |press: &Press| -> Vec<f64> {
+            press.frames.iter().map(|frame| frame.approach_m).collect()
+        };
+        let is_other = |press: &Press| approaches(press) != approaches(&presses[0]);
+        if let Some(index) = presses.iter().position(is_other) {
+            let field = format!("presses[{}].frames", index + 1);
+            let reason = "expected the approaches of presses[1]";
+            return Err(FileError::field(path, field, reason));
         }
         let specimen = file.object.specimen();
         let guide = file.waveguide.guide();
+        // Of a hand that places the guide on lines drawn on the block, or a simple robot.
+        let usual_position_error_m = 0.2e-3;
         Ok(Self {
             specimen: specimen.map_err(|error| FileError::field(path, "object", error))?,
             guide: guide.map_err(|error| FileError::field(path, "waveguide.layers", error))?,
@@ -172,13 +208,15 @@ impl InclusionScene {
             reference: beside(path, &file.reference),
             pixel_size_m: file.pixel_size_m,
             calibration: file.calibration.map(|table| beside(path, &table.pairs)),
-            frames,
+            presses,
+            position_error_m: file.position_error_m.unwrap_or(usual_position_error_m),
         })
     }
 
     /// The images, in the order of the file.
     pub fn images(&self) -> Vec<&Path> {
-        self.frames.iter().map(|f| f.image.as_path()).collect()
+        let frames = self.presses.iter().flat_map(|press| &press.frames);
+        frames.map(|frame| frame.image.as_path()).collect()
     }
 
     /// Reads the images and takes their ring means.
@@ -193,28 +231,43 @@ impl InclusionScene {
         let reference = self.image("reference", &self.reference, None)?;
         let newtons_per_grey = self.newtons_per_grey()?;
         let area = self.pixel_size_m[0] * self.pixel_size_m[1];
-        let mut rings = Vec::with_capacity(self.frames.len());
-        let mut images = Vec::with_capacity(self.frames.len());
-        for (index, frame) in self.frames.iter().enumerate() {
-            let field = format!("frames[{}].image", index + 1);
-            let image = self.image(&field, &frame.image, Some(reference.dim()))?;
-            let brightening = image - &reference;
-            let newtons = newtons_per_grey
-                .or_else(|| frame.force_n.map(|force| force / brightening.sum()))
-                .ok_or_else(|| {
-                    let field = format!("frames[{}].force_N", index + 1);
-                    let reason = "without a [calibration] every frame needs its force";
-                    FileError::field(&self.file, field, reason)
-                })?;
-            let (size, face) = (self.pixel_size_m, self.guide.radius_m());
-            let means = ring_means(&brightening.view(), size, newtons / area, face);
-            rings.push(means.map_err(|error| FileError::field(&self.file, field, error))?);
-            images.push(brightening * (newtons / area));
+        let mut rings: Vec<RingMeans> = Vec::new();
+        let mut scan = Scan {
+            presses: Vec::with_capacity(self.presses.len()),
+            position_error_m: self.position_error_m,
+        };
+        let is_scan = self.presses.len() > 1;
+        for (index, press) in self.presses.iter().enumerate() {
+            let first = rings.len();
+            let mut images = Vec::with_capacity(press.frames.len());
+            for (number, frame) in press.frames.iter().enumerate() {
+                let field = |name: &str| {
+                    let name = format!("frames[{}].{name}", number + 1);
+                    press_field(is_scan.then_some(index), &name)
+                };
+                let image = self.image(&field("image"), &frame.image, Some(reference.dim()))?;
+                let brightening = image - &reference;
+                let newtons = newtons_per_grey
+                    .or_else(|| frame.force_n.map(|force| force / brightening.sum()))
+                    .ok_or_else(|| {
+                        let reason = "without a [calibration] every frame needs its force";
+                        FileError::field(&self.file, field("force_N"), reason)
+                    })?;
+                let (size, face) = (self.pixel_size_m, self.guide.radius_m());
+                let means = ring_means(&brightening.view(), size, newtons / area, face);
+                rings.push(
+                    means.map_err(|error| FileError::field(&self.file, field("image"), error))?,
+                );
+                images.push(brightening * (newtons / area));
+            }
+            scan.presses
+                .push(self.face(press, &rings[first..], &images));
         }
         // The search compares frames ring by ring, so all are taken at the radii of the first.
         let first = rings.first().map(|first| first.radii_m.clone());
         let radii = first.unwrap_or_default();
-        let profiles = self.frames.iter().zip(&rings).map(|(frame, means)| {
+        let profiles = self.presses[0].frames.iter().zip(&rings);
+        let profiles = profiles.map(|(frame, means)| {
             let resampled = |values: &[f64]| -> Vec<f64> {
                 let at = |&radius| interpolated(&means.radii_m, values, radius);
                 radii.iter().map(at).collect()
@@ -227,33 +280,36 @@ impl InclusionScene {
                 standard_error_pa: resampled(&means.standard_error_pa),
             }
         });
-        let profiles = profiles.collect();
         Ok(LoadedInclusion {
-            face: self.face(&rings, &images),
-            profiles,
+            profiles: profiles.collect(),
             rings,
+            scan,
         })
     }
 
-    /// The pressures of all frames on cells of the face.
-    fn face(&self, rings: &[RingMeans], images: &[Array2<f64>]) -> FacePicture {
+    /// The pressures of a press's frames on cells of the face.
+    fn face(&self, press: &Press, rings: &[RingMeans], images: &[Array2<f64>]) -> ScanPress {
+        // Cells in a radius. Those of one press are half as wide as the narrowest lump that shows,
+        // and a search's time grows as the third power of the number of all cells.
+        let fineness = if self.presses.len() == 1 { 15.0 } else { 8.0 };
         // The face does not move in the picture: the mean of its centres is nearest to it.
         let mean = |axis: usize| {
             let centres = rings.iter().map(|rings| rings.centre_px[axis]);
             centres.sum::<f64>() / rings.len() as f64
         };
         let size = images.first().map_or((0, 0), Array2::dim);
-        let centre = [mean(0), mean(1)];
-        let cells = FaceCells::new(size, centre, self.pixel_size_m, self.guide.radius_m());
-        let frames = self.frames.iter().zip(rings).zip(images);
-        let profiles = frames.map(|((frame, rings), image)| PressureProfile {
+        let (centre, face) = ([mean(0), mean(1)], self.guide.radius_m());
+        let cells = FaceCells::new(size, centre, self.pixel_size_m, face, face / fineness);
+        let frames = press.frames.iter().zip(rings).zip(images);
+        let frames = frames.map(|((frame, rings), image)| PressureProfile {
             approach_m: frame.approach_m,
             force_n: None,
             pressure_pa: cells.means(&image.view()),
             standard_error_pa: cells.errors(rings.pixel_noise_pa),
         });
-        FacePicture {
-            profiles: profiles.collect(),
+        ScanPress {
+            axis_m: press.position_m,
+            frames: frames.collect(),
             positions_m: cells.positions_m.clone(),
         }
     }
@@ -284,6 +340,14 @@ impl InclusionScene {
     }
 }
 
+/// Name of a field of a press, by its number from zero in a file with several.
+fn press_field(press: Option<usize>, name: &str) -> String {
+    match press {
+        Some(index) => format!("presses[{}].{name}", index + 1),
+        None => name.to_owned(),
+    }
+}
+
 /// An inclusion scene as it stands in its file.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -292,8 +356,12 @@ struct InclusionFile {
     #[serde(deserialize_with = "pixel_size")]
     pixel_size_m: [f64; 2],
     calibration: Option<PairsTable>,
-    #[serde(deserialize_with = "one_or_more")]
+    #[serde(default, deserialize_with = "one_or_more")]
     frames: Vec<Frame>,
+    #[serde(default, deserialize_with = "one_or_more")]
+    presses: Vec<Press>,
+    #[serde(default, deserialize_with = "not_negative")]
+    position_error_m: Option<f64>,
     object: BlockTable,
     waveguide: GuideTable,
 }

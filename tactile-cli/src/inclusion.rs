@@ -23,20 +23,24 @@ use tactile_imaging::pipeline::with_error;
 /// SCENE.toml names frames of the guide pressed onto a flat block at known approaches, the block's
 /// size and the guide's layers (examples/data/inclusion/scene.toml is one). Without it a block with
 /// a lump is simulated. The pressure over the radius is compared with finite elements at finite
-/// strain, that over the whole face where it is not symmetric: the lump may lie off the axis. It may
-/// be flatter or taller than a ball, and its diameter is that of the ball of equal volume. The
-/// answer is whether there is a lump, its place, diameter, depth, modulus and height over width with
+/// strain, that over the whole face where it is not symmetric: the lump may lie off the axis. Of
+/// several presses at stated places the answer is one for all, and the lump may lie under any of
+/// them. It may be flatter or taller than a ball, and its diameter is that of the ball of equal
+/// volume. The answer is whether there is a lump, its place, diameter, depth, modulus and height over width with
 /// 95 % intervals, or which of them the frames leave open. --out gets profiles.csv and
 /// inclusion.svg. A search takes some seven seconds for each kind of interface.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
   tactile inclusion --design examples/data/inclusion/scene.toml
+  tactile inclusion examples/data/inclusion/scan.toml --out lump
 The scene file:
   reference = \"reference.png\"
   pixel_size_m = [3.44e-4, 3.44e-4]
   frames = [{ image = \"frame_1.png\", approach_m = 1e-3, force_N = 0.35 }]     growing \
                         approaches; three tell most
+  or, of a scan, for each press [[presses]] with position_m = [x, y] and frames, all with the same \
+                        approaches, and position_error_m (2e-4 if absent)
   [calibration]
   pairs = \"calibration.csv\"; without it the force_N of every frame, spread over its light, gives \
                         the pressure
@@ -98,21 +102,28 @@ impl Scan {
     fn of_scene(scene: &InclusionScene) -> Result<Self, Failure> {
         let loaded = scene.load().map_err(Failure::input)?;
         let (asymmetry, harmonics) = (loaded.asymmetry(), loaded.harmonics());
-        let is_symmetric = asymmetry_warnings(asymmetry, harmonics).is_empty();
         Ok(Self {
             specimen: scene.specimen,
             guide: scene.guide.clone(),
             radii_m: loaded.rings[0].radii_m.clone(),
             asymmetry,
             harmonics,
-            profiles: if is_symmetric {
+            profiles: if loaded.is_axial() {
                 loaded.profiles.clone()
             } else {
-                loaded.face.profiles.clone()
+                side_by_side(&loaded.scan)
             },
             truth: None,
             loaded: Some(loaded),
         })
+    }
+
+    /// Where the guide's axis was at each press.
+    fn axes_mm(&self) -> Vec<[f64; 2]> {
+        let loaded = self.loaded.as_ref();
+        let axes = loaded.map(|loaded| loaded.scan.presses.iter().map(|press| press.axis_m));
+        let axes_mm = axes.map(|axes| axes.map(|axis| axis.map(|x| 1e3 * x)).collect());
+        axes_mm.unwrap_or_else(|| vec![[0.0; 2]])
     }
 
     /// Frames of a block with a lump, and white noise of the camera.
@@ -171,6 +182,19 @@ impl Scan {
             loaded: None,
         })
     }
+}
+
+/// The frames of all presses, their cells one press after the other.
+fn side_by_side(scan: &tactile_imaging::inclusion::Scan) -> Vec<PressureProfile> {
+    let frames = scan.presses.iter().map(|press| press.frames.clone());
+    let joined = frames.reduce(|mut joined, frames| {
+        for (all, frame) in joined.iter_mut().zip(frames) {
+            all.pressure_pa.extend(frame.pressure_pa);
+            all.standard_error_pa.extend(frame.standard_error_pa);
+        }
+        joined
+    });
+    joined.unwrap_or_default()
 }
 
 /// A block of tissue as high as two faces, and a guide of three layers, the stiffest towards the
@@ -476,10 +500,13 @@ fn section(scan: &Scan, estimate: &InclusionEstimate) -> Panel {
         .into_iter()
         .chain([[radius, -height], [-radius, -height], top[0]]);
     let face = 1e3 * scan.guide.radius_m();
-    let panel = Panel::new("Section, to scale", "distance (mm)", "height (mm)")
+    let mut panel = Panel::new("Section, to scale", "x (mm)", "height (mm)")
         .equal_aspect()
-        .line(outline, Colour::Grey, "block")
-        .line([[-face, 0.5], [face, 0.5]], Colour::Blue, "guide's face");
+        .line(outline, Colour::Grey, "block");
+    for (k, [x, _]) in scan.axes_mm().into_iter().enumerate() {
+        let name = if k == 0 { "guide's face" } else { "" };
+        panel = panel.line([[x - face, 0.5], [x + face, 0.5]], Colour::Blue, name);
+    }
     let Some(inclusion) = &estimate.inclusion else {
         return panel;
     };
@@ -490,24 +517,33 @@ fn section(scan: &Scan, estimate: &InclusionEstimate) -> Panel {
     panel.line(rim, Colour::Orange, "lump")
 }
 
-/// The face and the lump from above, to scale, with the ends of its diameter's interval.
+/// The faces of all presses and the lump from above, to scale, with the ends of its diameter's
+/// interval and those of its place's.
 fn above(scan: &Scan, estimate: &InclusionEstimate) -> Panel {
     let face = 1e3 * scan.guide.radius_m();
-    let panel = Panel::new("From above, to scale", "x (mm)", "y (mm)")
-        .equal_aspect()
-        .line(circle([0.0; 2], face), Colour::Blue, "guide's face");
+    let mut panel = Panel::new("From above, to scale", "x (mm)", "y (mm)").equal_aspect();
+    for (k, axis) in scan.axes_mm().into_iter().enumerate() {
+        let name = if k == 0 { "guide's face" } else { "" };
+        panel = panel.line(circle(axis, face), Colour::Blue, name);
+    }
     let Some(inclusion) = &estimate.inclusion else {
         return panel;
     };
     let centre = (inclusion.position_m).map_or([0.0; 2], |at| at.map(|x| 1e3 * x.value));
     let diameter = inclusion.diameter_m.estimate();
     let [low, high] = diameter.interval;
+    if let Some([x, y]) = &inclusion.position_m {
+        let [[left, right], [down, up]] = [x, y].map(|at| at.interval.map(|end| 1e3 * end));
+        let [x, y] = centre;
+        let cross = [[[left, y], [right, y]], [[x, down], [x, up]]];
+        panel = panel.segments(cross, Colour::Orange, "its place, 95 %");
+    }
     panel
         .line(
             circle(centre, 0.5e3 * diameter.value),
             Colour::Orange,
             "lump",
         )
-        .dashed(circle(centre, 0.5e3 * low), Colour::Grey, "95 %")
+        .dashed(circle(centre, 0.5e3 * low), Colour::Grey, "its size, 95 %")
         .dashed(circle(centre, 0.5e3 * high), Colour::Grey, "")
 }

@@ -1,5 +1,6 @@
 //! Covariance of ring means: the sensor's errors and the model's.
 
+use crate::picture::CellPositions;
 use crate::specimen::SensorErrors;
 use nalgebra::DMatrix;
 use std::sync::Arc;
@@ -140,15 +141,18 @@ pub struct Observed {
 /// Cells of a face on which pressures were measured.
 #[derive(Debug, Clone)]
 pub struct ObservedCells {
-    /// (x, y) from the face's axis.
-    pub positions_m: Arc<[[f64; 2]]>,
+    pub positions: Arc<CellPositions>,
+    /// Standard error of a press's place, each way.
+    pub place_error_m: f64,
+    /// Standard error of the zero that the approaches of one press have of its own.
+    pub zero_error_m: f64,
     /// The reciprocal of each frame's approach.
     pub per_approach: Vec<f64>,
     /// Mean of each value and that of the cell on the other side of the axis, over the value: a
     /// tilted face's pressure without its tilt.
     pub even: Vec<f64>,
-    /// Relative error of the pressure of an inclusion off the axis.
-    pub aside: f64,
+    /// Relative error of the pressure of an inclusion off the axis, of each cell.
+    pub aside: Vec<f64>,
 }
 
 /// Error of the pressure of an inclusion off the axis, over its distance from the axis in radii of
@@ -166,15 +170,28 @@ fn kernel(distance: f64, length: f64) -> f64 {
 }
 
 impl ObservedCells {
-    /// Cells with their values, one frame after the other.
-    pub fn new(positions_m: Arc<[[f64; 2]]>, values: &[f64], approaches_m: &[f64]) -> Self {
+    /// Cells with their values, one frame after the other. `zero_error_m` is the standard error of
+    /// the zero of a press's approaches, which presses of a scan have each.
+    pub fn new(
+        positions: CellPositions,
+        [place_error_m, zero_error_m]: [f64; 2],
+        values: &[f64],
+        approaches_m: &[f64],
+    ) -> Self {
+        let CellPositions {
+            positions_m,
+            presses,
+            axes_m,
+        } = &positions;
         let count = positions_m.len();
-        let opposite = |[x, y]: &[f64; 2]| {
+        let opposite = |cell: usize| {
+            let [x, y] = positions_m[cell];
             let away = |k: &usize| (positions_m[*k][0] + x).hypot(positions_m[*k][1] + y);
-            let nearest = (0..count).min_by(|a, b| away(a).total_cmp(&away(b)));
-            nearest.unwrap_or(0)
+            let of_press = (0..count).filter(|k| presses[*k] == presses[cell]);
+            let nearest = of_press.min_by(|a, b| away(a).total_cmp(&away(b)));
+            nearest.unwrap_or(cell)
         };
-        let opposites: Vec<usize> = positions_m.iter().map(opposite).collect();
+        let opposites: Vec<usize> = (0..count).map(opposite).collect();
         let frames = values.chunks(count).take(approaches_m.len());
         let even = frames.flat_map(|frame| {
             let pairs = frame.iter().zip(&opposites);
@@ -183,9 +200,16 @@ impl ObservedCells {
         Self {
             even: even.collect(),
             per_approach: approaches_m.iter().map(|a| a.recip()).collect(),
-            aside: 0.0,
-            positions_m,
+            aside: vec![0.0; count],
+            zero_error_m: if axes_m.len() > 1 { zero_error_m } else { 0.0 },
+            place_error_m,
+            positions: Arc::new(positions),
         }
+    }
+
+    /// Whether two cells are of one press.
+    fn is_one_press(&self, i: usize, j: usize) -> bool {
+        self.positions.presses[i] == self.positions.presses[j]
     }
 }
 
@@ -199,32 +223,42 @@ impl Observed {
         sums.into_iter().map(|sum| sum / last).collect()
     }
 
-    /// These values with the error of the pressure of an inclusion so far from the axis that lifts
-    /// the pressure by this part.
-    pub fn with_lump_aside(&self, aside_m: f64, face_radius_m: f64, lift: f64) -> Self {
+    /// These values with the error of the pressure of an inclusion off the axis that lifts the
+    /// pressure by this part.
+    pub fn with_lump_aside(&self, centre_m: [f64; 2], face_radius_m: f64, lift: f64) -> Self {
         let mut observed = self.clone();
         if let Some(cells) = &mut observed.cells {
-            cells.aside = ASIDE * aside_m / face_radius_m * lift.min(1.0);
+            let CellPositions {
+                presses, axes_m, ..
+            } = &*cells.positions;
+            let aside = presses.iter().map(|press| {
+                let axis = axes_m[*press];
+                let aside_m = (centre_m[0] - axis[0]).hypot(centre_m[1] - axis[1]);
+                ASIDE * aside_m / face_radius_m * lift.min(1.0)
+            });
+            cells.aside = aside.collect();
         }
         observed
     }
 
-    fn aside(&self) -> f64 {
-        self.cells.as_ref().map_or(0.0, |cells| cells.aside)
+    /// Covariance of the relative errors of two cells by an inclusion off the axis.
+    fn aside(&self, i: usize, j: usize) -> f64 {
+        let cells = self.cells.as_ref().filter(|cells| cells.is_one_press(i, j));
+        cells.map_or(0.0, |cells| cells.aside[i] * cells.aside[j])
     }
 
-    /// Covariance of the relative pressures of two cells in two frames by the angle between face
-    /// and block, θ: a rigid punch's pressure grows by 2 θ x / δ at the approach δ. Ring means have
-    /// none.
-    fn tilt(&self, i: usize, j: usize, k: usize, l: usize) -> f64 {
+    /// Covariance of the relative pressures of two cells of a press in two frames by the angle
+    /// between face and block, θ: a rigid punch's pressure grows by 2 θ x / δ at the approach δ.
+    /// And by the zero of the press's approaches. Ring means have none.
+    fn posture(&self, i: usize, j: usize, k: usize, l: usize) -> f64 {
         let Some(cells) = &self.cells else {
             return 0.0;
         };
-        let [a, b] = [cells.positions_m[i], cells.positions_m[j]];
-        let cell_count = cells.positions_m.len();
-        let even = cells.even[k * cell_count + i] * cells.even[l * cell_count + j];
-        let both = even * cells.per_approach[k] * cells.per_approach[l];
-        (2.0 * TILT).powi(2) * (a[0] * b[0] + a[1] * b[1]) * both
+        let positions_m = &cells.positions.positions_m;
+        let [a, b] = [positions_m[i], positions_m[j]];
+        let even = cells.even[k * positions_m.len() + i] * cells.even[l * positions_m.len() + j];
+        let tilt = (2.0 * TILT).powi(2) * (a[0] * b[0] + a[1] * b[1]) * even;
+        (tilt + cells.zero_error_m.powi(2)) * cells.per_approach[k] * cells.per_approach[l]
     }
 
     /// Covariance of the values. Relative errors are of the values observed.
@@ -239,7 +273,7 @@ impl Observed {
         let outermost = self.radii_m.iter().copied().fold(0.0, f64::max);
         let correlation = |i: usize, k: usize, length: f64| match &self.cells {
             Some(cells) => {
-                let [a, b] = [cells.positions_m[i], cells.positions_m[k]];
+                let [a, b] = [i, k].map(|cell| cells.positions.positions_m[cell]);
                 kernel((a[0] - b[0]).hypot(a[1] - b[1]), length)
             }
             None => ring_kernel(self.radii_m[i], self.radii_m[k], length),
@@ -254,19 +288,29 @@ impl Observed {
                 let smooth = correlation(i, j, sensor.correlation_m);
                 let wide = correlation(i, j, SHAPE_LENGTH * outermost);
                 let short = correlation(i, j, model.element * outermost);
-                let shape = (model.shape.powi(2) + self.aside().powi(2)) * wide;
+                // Presses share what belongs to sensor and rim. What goes with the inclusion, the tilt
+                // and the errors of frames and of place are each press's own.
+                let is_one_press =
+                    (self.cells.as_ref()).is_none_or(|cells| cells.is_one_press(i, j));
+                let own = if is_one_press { 1.0 } else { 0.0 };
+                let shape = (model.shape.powi(2) + self.aside(i, j)) * wide;
                 let rough = model.rough.powi(2) * short;
                 let rim = (model.rim * a * b / outermost.powi(2)).powi(2);
-                let common = sensor.common.powi(2) * smooth + shape + rim + rough;
+                let common = sensor.common.powi(2) * smooth + rim + own * (shape + rough);
                 let waves = 0.5 + 0.5 * short;
                 let rise = (a * b / outermost.powi(2)).powi(6);
-                let grown = waves * model.sinking.powi(2) * rise + model.bent.powi(2) * wide;
+                let bent = own * model.bent.powi(2) * wide;
+                let grown = waves * model.sinking.powi(2) * rise + bent;
                 for k in 0..frames {
                     for l in 0..frames {
-                        let own = sensor.each_frame.powi(2) * smooth;
-                        let both = common + grown * loads[k] * loads[l] + self.tilt(i, j, k, l);
-                        let relative = if k == l { both + own } else { both };
                         let (row, column) = (k * rings + i, l * rings + j);
+                        let mut relative = common + grown * loads[k] * loads[l];
+                        if is_one_press {
+                            relative += self.posture(i, j, k, l);
+                            if k == l {
+                                relative += sensor.each_frame.powi(2) * smooth;
+                            }
+                        }
                         covariance[(row, column)] += relative * values[row] * values[column];
                     }
                 }

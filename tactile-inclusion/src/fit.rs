@@ -169,7 +169,7 @@ impl Problem {
             return None;
         }
         let scaled: Vec<f64> = predicted.values.iter().map(|m| factor * m).collect();
-        let mut parameters = *start;
+        let mut parameters = start.clone();
         parameters.block_modulus_pa *= factor;
         if let Some(lump) = &mut parameters.lump {
             lump.youngs_modulus_pa *= factor;
@@ -231,7 +231,7 @@ impl Problem {
     /// asked before each evaluation.
     pub fn fit(
         &self,
-        start: Parameters,
+        start: &Parameters,
         ending: Ending,
         mut go_on: impl FnMut() -> bool,
     ) -> Option<Fit> {
@@ -245,7 +245,7 @@ impl Problem {
         // Levenberg's damping: at first, and its bounds. Beyond the largest no step lowers the
         // objective.
         let first_damping = 1e-3;
-        let mut parameters = start;
+        let mut parameters = start.clone();
         let mut normal = self.normal(&parameters, None)?;
         let mut damping = first_damping;
         let mut evaluations = 1;
@@ -329,7 +329,7 @@ impl Problem {
 
     pub fn stepped(&self, parameters: &Parameters, step: &DVector<f64>) -> Parameters {
         let steps = self.priors.iter().zip(step.iter());
-        steps.fold(*parameters, |moved, (prior, &by)| {
+        steps.fold(parameters.clone(), |moved, (prior, &by)| {
             moved.moved(prior.coordinate, by)
         })
     }

@@ -4,7 +4,7 @@
 //!
 //! Interface pressure of a block with an inclusion under a guide, and its derivatives.
 
-use crate::picture::{Cells, Place};
+use crate::picture::{Cells, Place, PlainBlock};
 use std::sync::Arc;
 use tactile_elasticity::ElasticityError;
 use tactile_fem::{
@@ -12,12 +12,15 @@ use tactile_fem::{
 };
 
 /// A block's unknowns.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Parameters {
     pub block_modulus_pa: f64,
     pub lump: Option<LumpParameters>,
     /// Where the inclusion is, which pressures of cells depend on.
     pub place: Place,
+    /// How far the axis of each press was from where it is said to have been: of the first ones, the
+    /// others are where they are said to be.
+    pub strayed_m: Vec<[f64; 2]>,
     /// What the approaches read too little.
     pub zero_m: f64,
     pub height_m: f64,
@@ -70,6 +73,8 @@ pub enum Coordinate {
     Elongation(usize),
     /// How far the inclusion is carried from the axis.
     Carried,
+    /// x and y of how far a press was from where it is said to have been, in metres.
+    Strayed(usize, usize),
 }
 
 impl Coordinate {
@@ -77,7 +82,7 @@ impl Coordinate {
     pub fn unit(self) -> f64 {
         match self {
             Self::Zero => 1e-3,
-            Self::Centre(_) => 1e-2,
+            Self::Centre(_) | Self::Strayed(..) => 1e-2,
             Self::PoissonRatio => -1e-1,
             _ => 1.0,
         }
@@ -85,9 +90,20 @@ impl Coordinate {
 
     /// Whether a block solved with its inclusion under the axis does not depend on it.
     fn is_place(self) -> bool {
-        matches!(self, Self::Centre(_) | Self::Elongation(_) | Self::Carried)
+        matches!(
+            self,
+            Self::Centre(_) | Self::Elongation(_) | Self::Carried | Self::Strayed(..)
+        )
     }
 }
+
+/// Coordinates of the block.
+const BLOCK: [Coordinate; 4] = [
+    Coordinate::BlockModulus,
+    Coordinate::Zero,
+    Coordinate::Height,
+    Coordinate::PoissonRatio,
+];
 
 /// Largest Poisson ratio of a fit: the pressure differs from an incompressible block's by 0.1 %,
 /// and beyond it the derivatives by sizes lose digits as the bulk modulus grows.
@@ -110,12 +126,16 @@ impl Parameters {
             Coordinate::Centre(axis) => self.place.centre_m[axis],
             Coordinate::Elongation(part) => self.place.elongation[part],
             Coordinate::Carried => self.place.carried,
+            Coordinate::Strayed(press, axis) => self
+                .strayed_m
+                .get(press)
+                .map_or(0.0, |strayed| strayed[axis]),
         }
     }
 
     /// These parameters with one coordinate changed by `step`.
     pub fn moved(&self, coordinate: Coordinate, step: f64) -> Self {
-        let mut moved = *self;
+        let mut moved = self.clone();
         let factor = step.exp();
         match (coordinate, &mut moved.lump) {
             (Coordinate::BlockModulus, _) => moved.block_modulus_pa *= factor,
@@ -138,6 +158,11 @@ impl Parameters {
             (Coordinate::Centre(axis), _) => moved.place.centre_m[axis] += step,
             (Coordinate::Elongation(part), _) => moved.place.elongation[part] += step,
             (Coordinate::Carried, _) => moved.place.carried += step,
+            (Coordinate::Strayed(press, axis), _) => {
+                if let Some(strayed) = moved.strayed_m.get_mut(press) {
+                    strayed[axis] += step;
+                }
+            }
         }
         moved
     }
@@ -380,7 +405,7 @@ impl Forward {
                 let scene = self.scene(parameters).ok()?;
                 Arc::new(Meshed {
                     scene,
-                    parameters: *parameters,
+                    parameters: parameters.clone(),
                 })
             }
         };
@@ -404,14 +429,22 @@ impl Forward {
     pub fn with_plain(mut self, parameters: &Parameters) -> Option<Self> {
         let plain = Parameters {
             lump: None,
-            ..*parameters
+            ..parameters.clone()
         };
         if self.cells.is_some() {
             let (_, solved) = self.predict_near(&plain, None)?;
-            let frames = Arc::new(solved.frames);
-            self.cells
-                .iter_mut()
-                .for_each(|cells| cells.plain = Some(Arc::clone(&frames)));
+            let mut responses = self.responses(&plain, &BLOCK, &solved)?;
+            let unchanged = responses.pop()?;
+            let changes = (BLOCK.into_iter().zip(responses))
+                .map(|(c, after)| (c, plain.get(c), plain.small_step(c), after));
+            let plain = Arc::new(PlainBlock {
+                changes: changes.collect(),
+                unchanged,
+                frames: solved.frames,
+            });
+            if let Some(cells) = &mut self.cells {
+                cells.plain = Some(plain);
+            }
         }
         Some(self)
     }
@@ -443,18 +476,38 @@ impl Forward {
         parameters: &Parameters,
         frames: impl Iterator<Item = (P, f64)>,
     ) -> Prediction {
-        let place = parameters.lump.map(|_| parameters.place);
         let mut values = Vec::with_capacity(self.observations());
         let mut forces = Vec::with_capacity(self.approaches_m.len());
         for (frame, (pressure_at, force)) in frames.enumerate() {
             match &self.cells {
-                Some(cells) => values.extend(cells.pressures(frame, place.as_ref(), &pressure_at)),
+                Some(cells) => values.extend(cells.pressures(frame, parameters, &pressure_at)),
                 None => values.extend(self.radii_m.iter().map(|&r| pressure_at(r))),
             }
             forces.push(force);
         }
         values.extend(forces);
         Prediction { values }
+    }
+
+    /// What is found of a solved scene after a small step of each coordinate, and without one.
+    fn responses(
+        &self,
+        parameters: &Parameters,
+        coordinates: &[Coordinate],
+        solved: &Solved,
+    ) -> Option<Vec<Vec<FrameResponse>>> {
+        let moved = |&c: &Coordinate| parameters.moved(c, parameters.small_step(c));
+        let moved: Vec<Parameters> = coordinates.iter().map(moved).collect();
+        let changed = |scene: &FemScene| -> Option<Vec<FemScene>> {
+            (moved.iter())
+                .map(|moved| self.changed(scene, parameters, moved))
+                .collect()
+        };
+        let approaches = |frame: usize| {
+            let at = moved.iter().chain([parameters]);
+            at.map(|at| self.approaches_m[frame] + at.zero_m).collect()
+        };
+        solved.frames.responses(changed, approaches)
     }
 
     /// The derivatives of a solved scene's prediction, one column a coordinate.
@@ -469,22 +522,9 @@ impl Forward {
         coordinates: &[Coordinate],
         solved: &Solved,
     ) -> Option<Vec<Vec<f64>>> {
-        let moved_along =
-            |coordinate| parameters.moved(coordinate, parameters.small_step(coordinate));
-        let solved_for = coordinates
-            .iter()
-            .filter(|coordinate| !coordinate.is_place());
-        let moved: Vec<Parameters> = solved_for.map(|&c| moved_along(c)).collect();
-        let changed = |scene: &FemScene| -> Option<Vec<FemScene>> {
-            (moved.iter())
-                .map(|moved| self.changed(scene, parameters, moved))
-                .collect()
-        };
-        let approaches = |frame: usize| {
-            let at = moved.iter().chain([parameters]);
-            at.map(|at| self.approaches_m[frame] + at.zero_m).collect()
-        };
-        let answers = solved.frames.responses(changed, approaches)?;
+        let solved_for = coordinates.iter().copied();
+        let solved_for: Vec<Coordinate> = solved_for.filter(|c| !c.is_place()).collect();
+        let answers = self.responses(parameters, &solved_for, solved)?;
         let collect = |at: &Parameters, frames: &[FrameResponse]| {
             let frames = frames.iter();
             let frames = frames.map(|frame| (|r: f64| frame.pressure_at(r), frame.force_n()));
@@ -500,7 +540,10 @@ impl Forward {
             } else {
                 changed.next()?
             };
-            let there = collect(&moved_along(coordinate), frames);
+            let there = collect(
+                &parameters.moved(coordinate, parameters.small_step(coordinate)),
+                frames,
+            );
             let step = parameters.small_step(coordinate);
             let column = (there.values.iter().zip(&here.values))
                 .map(|(there, here)| (there - here) / step)

@@ -39,6 +39,7 @@ mod forward;
 mod hypothesis;
 mod picture;
 mod ridge;
+mod scan;
 mod search;
 mod specimen;
 
@@ -47,6 +48,7 @@ pub use estimate::{
     Estimated, Identifiable, Inclusion, InclusionEstimate, InclusionWarning, Verdict,
     asymmetry_warnings,
 };
+pub use scan::{Scan, ScanPress};
 pub use search::{InclusionSearch, SearchProgress};
 pub use specimen::{PressureProfile, SensorErrors, Specimen};
 

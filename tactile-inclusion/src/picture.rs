@@ -8,8 +8,9 @@
 //! It is exact on the axis. Its error grows as the rim comes nearer to the lump, and is part of the
 //! errors' covariance.
 
+use crate::forward::{Coordinate, Parameters};
 use std::sync::Arc;
-use tactile_fem::SolvedFrames;
+use tactile_fem::{FrameResponse, SolvedFrames};
 
 /// Where an inclusion is, seen from above, and how far its outline there is from a circle.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -49,51 +50,120 @@ impl Place {
     }
 }
 
-/// Cells of a face, and the plain block that carries a lump's pressure to them.
+/// Middles of a face's cells, or of the cells of the same face pressed at several places.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CellPositions {
+    /// (x, y) from the face's axis.
+    pub positions_m: Vec<[f64; 2]>,
+    /// The press each cell belongs to.
+    pub presses: Vec<usize>,
+    /// Where the axis of each press is said to have been.
+    pub axes_m: Vec<[f64; 2]>,
+}
+
+/// A block without a lump.
+#[derive(Debug, Clone)]
+pub struct PlainBlock {
+    pub frames: SolvedFrames,
+    /// Its pressures by the tangent, which those after a change are compared with.
+    pub unchanged: Vec<FrameResponse>,
+    /// Coordinates of the block with their values, a small step of each, and the pressures after
+    /// it.
+    pub changes: Vec<(Coordinate, f64, f64, Vec<FrameResponse>)>,
+}
+
+impl PlainBlock {
+    /// Pressure of a frame at a distance from the axis: powers of that of the block solved, for
+    /// pressures are nearly proportional to powers of moduli and lengths.
+    fn pressure_at(&self, frame: usize, radius_m: f64, block: &Parameters) -> f64 {
+        let pressure = self.frames.states()[frame].pressure_at(radius_m);
+        let before = self.unchanged[frame].pressure_at(radius_m);
+        let exponent = self.changes.iter().map(|(coordinate, value, step, after)| {
+            let slope = (after[frame].pressure_at(radius_m) / before).ln() / step;
+            slope * (block.get(*coordinate) - value)
+        });
+        pressure * exponent.sum::<f64>().exp()
+    }
+}
+
+/// Cells and the plain block that carries a lump's pressure to them.
 #[derive(Debug, Clone)]
 pub struct Cells {
-    /// (x, y) from the face's axis.
-    pub positions_m: Arc<[[f64; 2]]>,
+    pub positions: Arc<CellPositions>,
     /// The block without a lump, where it is solved.
-    pub plain: Option<Arc<SolvedFrames>>,
+    pub plain: Option<Arc<PlainBlock>>,
     /// Each frame's approach over the block's height.
     pub squeezed: Vec<f64>,
     /// Radius up to which solutions with and without a lump are compared. Beyond, the rim's
-    /// singular pressure differs between their meshes, and the ratio stays as it is there.
+    /// singular pressure differs between their meshes, and the ratio stays as it is there, or fades
+    /// where the lump is not under the face.
     pub reach_m: f64,
 }
 
+/// Middle of the least box around points, and half its longer side.
+pub fn extent(points: &[[f64; 2]]) -> ([f64; 2], f64) {
+    let range = |k: usize| {
+        let values = points.iter().map(|point| point[k]);
+        values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| {
+            [low.min(x), high.max(x)]
+        })
+    };
+    let [x, y] = [range(0), range(1)];
+    let middle = [0.5 * (x[0] + x[1]), 0.5 * (y[0] + y[1])];
+    (middle, 0.5 * (x[1] - x[0]).max(y[1] - y[0]))
+}
+
 impl Cells {
-    /// Pressures of a frame from those of a block with its lump at `place` under the axis, or
-    /// without one.
+    /// Pressures of a frame from those of a block with its lump under the axis, or without one.
     pub fn pressures(
         &self,
         frame: usize,
-        place: Option<&Place>,
+        parameters: &Parameters,
         axial: &impl Fn(f64) -> f64,
     ) -> Vec<f64> {
-        let states = self.plain.as_ref().map(|plain| plain.states());
-        let plain = states.and_then(|states| states.get(frame));
-        let at = |&position: &[f64; 2]| {
+        let lump = parameters.lump.map(|_| parameters.place);
+        let at = |(&position, &press): (&[f64; 2], &usize)| {
             let radius = position[0].hypot(position[1]);
-            match (place, plain) {
+            match (lump, &self.plain) {
                 (Some(place), Some(plain)) => {
-                    let distance = place
-                        .distance(position, self.squeezed[frame])
-                        .min(self.reach_m);
-                    plain.pressure_at(radius) * axial(distance) / plain.pressure_at(distance)
+                    let axis = self.positions.axes_m[press];
+                    let strayed = parameters.strayed_m.get(press).copied().unwrap_or_default();
+                    let from_axis = |k: usize| place.centre_m[k] - axis[k] - strayed[k];
+                    let place = Place {
+                        centre_m: [from_axis(0), from_axis(1)],
+                        ..place
+                    };
+                    let distance = place.distance(position, self.squeezed[frame]);
+                    let near = distance.min(self.reach_m);
+                    let ratio = axial(near) / plain.pressure_at(frame, near, parameters);
+                    let fade = self.fade(place.aside_m(), distance);
+                    plain.pressure_at(frame, radius, parameters) * (1.0 + fade * (ratio - 1.0))
                 }
                 _ => axial(radius),
             }
         };
-        self.positions_m.iter().map(at).collect()
+        let CellPositions {
+            positions_m,
+            presses,
+            ..
+        } = &*self.positions;
+        positions_m.iter().zip(presses).map(at).collect()
+    }
+
+    /// What is left of a lump's share at a distance from it, where it is so far from the axis: with
+    /// the third power of the distance, as that of a force pair under the surface.
+    fn fade(&self, aside_m: f64, distance_m: f64) -> f64 {
+        // From the used part's edge to twice as far out a lump passes from under the face.
+        let beyond = (aside_m / self.reach_m - 1.0).clamp(0.0, 1.0);
+        let far = (self.reach_m / distance_m.max(self.reach_m)).powi(3);
+        1.0 - beyond * (1.0 - far)
     }
 
     /// How much more than a plain block's the pressure above the lump is, in the last frame,
     /// relative.
     pub fn lift(&self, with_lump: &SolvedFrames) -> f64 {
         let last = |frames: &SolvedFrames| frames.states().last().map(|s| s.pressure_at(0.0));
-        let plain = self.plain.as_ref().and_then(|plain| last(plain));
+        let plain = self.plain.as_ref().and_then(|plain| last(&plain.frames));
         match (last(with_lump), plain) {
             (Some(with), Some(without)) if without > 0.0 => (with / without - 1.0).abs(),
             _ => 0.0,
@@ -106,11 +176,16 @@ impl Cells {
         let Some(plain) = &self.plain else {
             return [0.0; 2];
         };
-        let count = self.positions_m.len();
+        let CellPositions {
+            positions_m,
+            axes_m,
+            ..
+        } = &*self.positions;
+        let count = positions_m.len();
         let mut sums = vec![[0.0; 2]; count];
-        for (frame, state) in plain.states().iter().enumerate() {
+        for (frame, state) in plain.frames.states().iter().enumerate() {
             let values = &measured[frame * count..(frame + 1) * count];
-            for ((sum, value), [x, y]) in sums.iter_mut().zip(values).zip(&*self.positions_m) {
+            for ((sum, value), [x, y]) in sums.iter_mut().zip(values).zip(positions_m) {
                 sum[0] += value;
                 sum[1] += state.pressure_at(x.hypot(*y));
             }
@@ -121,14 +196,18 @@ impl Cells {
         let steps = [1.0 / 16.0, 1.0 / 64.0];
         // Lumps further out than this part of the face's radius are cut by the used part's edge.
         let farthest = 0.75 * face_radius_m;
-        let mut best = ([0.0; 2], f64::INFINITY);
-        for (step, reach) in steps.into_iter().zip([12, 4]) {
+        let is_under =
+            |[x, y]: [f64; 2]| (axes_m.iter()).any(|a| (x - a[0]).hypot(y - a[1]) <= farthest);
+        let (middle, half_width) = extent(axes_m);
+        let wide = 12 + (half_width / (steps[0] * face_radius_m)).ceil() as i32;
+        let mut best = (middle, f64::INFINITY);
+        for (step, reach) in steps.into_iter().zip([wide, 4]) {
             let middle: [f64; 2] = best.0;
             for i in -reach..=reach {
                 for k in -reach..=reach {
                     let off = [i, k].map(|steps| f64::from(steps) * step * face_radius_m);
                     let centre = [middle[0] + off[0], middle[1] + off[1]];
-                    if centre[0].hypot(centre[1]) <= farthest {
+                    if is_under(centre) {
                         let scatter = self.scatter(&ratios, centre, steps[0] * face_radius_m);
                         if scatter < best.1 {
                             best = (centre, scatter);
@@ -144,8 +223,15 @@ impl Cells {
     fn scatter(&self, values: &[f64], centre: [f64; 2], width_m: f64) -> f64 {
         // Number, sum and sum of squares in each ring.
         let mut rings: Vec<[f64; 3]> = Vec::new();
-        for (value, [x, y]) in values.iter().zip(&*self.positions_m) {
-            let ring = ((x - centre[0]).hypot(y - centre[1]) / width_m) as usize;
+        let CellPositions {
+            positions_m,
+            presses,
+            axes_m,
+        } = &*self.positions;
+        let cells = positions_m.iter().zip(presses);
+        for (value, ([x, y], press)) in values.iter().zip(cells) {
+            let off = [0, 1].map(|k| axes_m[*press][k] - centre[k]);
+            let ring = ((x + off[0]).hypot(y + off[1]) / width_m) as usize;
             if rings.len() <= ring {
                 rings.resize(ring + 1, [0.0; 3]);
             }

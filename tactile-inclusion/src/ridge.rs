@@ -79,6 +79,7 @@ impl Problem {
             let mut place = Place {
                 solved: fit.solved.clone(),
                 tangent: start.tangent.clone(),
+                parameters: start.parameters.clone(),
                 ..start
             };
             let mut part = 1.0;

@@ -9,14 +9,15 @@
 //! First fits under one assumption about the face, and the answer's from them.
 
 use crate::covariance::{Observed, ObservedCells, Resolution};
-use crate::error::{Quantity, finite, not_negative};
+use crate::error::{Quantity, not_negative};
 use crate::estimate::InclusionEstimate;
 use crate::fit::{ANSWER_ENDING, FIRST_FIT_ENDING, Fit, Prior, Problem};
 use crate::forward::{
     Coordinate, Forward, LARGEST_POISSON_RATIO, LumpParameters, Parameters, Prediction,
 };
 use crate::hypothesis::{BLOCK_COORDINATES, Hypothesis, LEAST_GAIN, Score};
-use crate::picture::{Cells, Place};
+use crate::picture::{Cells, Place, extent};
+use crate::scan::{Scan, ScanPress};
 use crate::specimen::{PressureProfile, SensorErrors, Specimen, check};
 use core::ops::ControlFlow;
 use std::sync::Arc;
@@ -164,24 +165,43 @@ impl InclusionSearch {
         frames: &[PressureProfile],
         progress: &mut dyn FnMut(SearchProgress) -> ControlFlow<()>,
     ) -> Result<InclusionEstimate, ElasticityError> {
-        for coordinate in positions_m.iter().flatten() {
-            finite(*coordinate, Quantity::Distance)?;
-        }
-        // A cell on the axis is one.
-        let radius = |[x, y]: &[f64; 2]| x.hypot(*y).max(f64::MIN_POSITIVE);
-        let radii_m: Vec<f64> = positions_m.iter().map(radius).collect();
-        let frames: Vec<PressureProfile> = (frames.iter().cloned())
-            .map(|frame| PressureProfile {
-                force_n: None,
-                ..frame
-            })
+        let press = ScanPress {
+            axis_m: [0.0; 2],
+            positions_m: positions_m.to_vec(),
+            frames: frames.to_vec(),
+        };
+        let scan = Scan {
+            presses: vec![press],
+            position_error_m: 0.0,
+        };
+        self.search_scan(&scan, progress)
+    }
+
+    /// As [`Self::search_picture`], from presses at several places of a block that is far wider than
+    /// the guide: one posterior over all of them, with one inclusion. How far each press was from
+    /// where it is said to have been is fitted along, and each has an error of its own of the
+    /// approaches' zero. The inclusion's place is given in the presses' coordinates. Only places
+    /// under the used part of some press's face are searched. The time grows as the third power of
+    /// the number of all cells: an eighth of the face's radius is narrow enough for five presses.
+    ///
+    /// # Errors
+    /// Those of [`Self::search_picture`]. No press. Approaches that differ between presses. An error
+    /// of place that is negative or NaN.
+    pub fn search_scan(
+        &self,
+        scan: &Scan,
+        progress: &mut dyn FnMut(SearchProgress) -> ControlFlow<()>,
+    ) -> Result<InclusionEstimate, ElasticityError> {
+        let (cells, frames) = scan.joined(USED_FACE * self.guide.radius_m())?;
+        let radii_m: Vec<f64> = (cells.positions_m.iter())
+            .map(|[x, y]| x.hypot(*y))
             .collect();
-        check(&radii_m, &frames)?;
         let approaches_m: Vec<f64> = frames.iter().map(|frame| frame.approach_m).collect();
         let mut observed = self.observed(&radii_m, &frames)?;
-        let used = self.rings_within_reach(&radii_m)?;
+        let [_, (_, zero_error_m), _] = self.specimen.known();
         observed.cells = Some(ObservedCells::new(
-            used.iter().map(|&k| positions_m[k]).collect(),
+            cells,
+            [scan.position_error_m, zero_error_m],
             &observed.values,
             &approaches_m,
         ));
@@ -314,7 +334,7 @@ impl InclusionSearch {
             approaches_m: approaches_m.to_vec(),
             radii_m: observed.radii_m.clone(),
             cells: observed.cells.as_ref().map(|cells| Cells {
-                positions_m: Arc::clone(&cells.positions_m),
+                positions: Arc::clone(&cells.positions),
                 plain: None,
                 squeezed: (approaches_m.iter())
                     .map(|approach| approach / self.specimen.height_m())
@@ -334,6 +354,7 @@ impl InclusionSearch {
                 carried: CARRIED,
                 ..Place::default()
             },
+            strayed_m: Vec::new(),
             zero_m: 0.0,
             height_m: self.specimen.height_m(),
             poisson_ratio: self.specimen.poisson_ratio().min(LARGEST_POISSON_RATIO),
@@ -374,18 +395,29 @@ impl InclusionSearch {
     }
 
     /// Where an inclusion may lie, where that shows: under the face, with axes up to 1.75 : 1 in
-    /// two of three.
+    /// two of three. And how far presses may have been from where they are said to have been.
     fn place_priors(&self, observed: &Observed) -> Vec<Prior> {
-        let centre = 0.4 * self.guide.radius_m();
+        let Some(cells) = &observed.cells else {
+            return Vec::new();
+        };
+        let axes_m = &cells.positions.axes_m;
+        let ([x, y], half_width) = extent(axes_m);
+        let centre = 0.4 * self.guide.radius_m() + half_width;
         let elongation = 0.2;
-        let known = [
-            Prior::new(Coordinate::Centre(0), (0.0, centre)),
-            Prior::new(Coordinate::Centre(1), (0.0, centre)),
+        let mut known = vec![
+            Prior::new(Coordinate::Centre(0), (x, centre)),
+            Prior::new(Coordinate::Centre(1), (y, centre)),
             Prior::new(Coordinate::Elongation(0), (0.0, elongation)),
             Prior::new(Coordinate::Elongation(1), (0.0, elongation)),
             Prior::new(Coordinate::Carried, (CARRIED, 0.3 * CARRIED)),
         ];
-        (observed.cells.iter()).flat_map(|_| known).collect()
+        let error = cells.place_error_m;
+        if error > 0.0 {
+            let strayed = |press| [0, 1].map(|axis| Coordinate::Strayed(press, axis));
+            let strayed = (0..axes_m.len()).flat_map(strayed);
+            known.extend(strayed.map(|coordinate| Prior::new(coordinate, (0.0, error))));
+        }
+        known
     }
 
     pub(crate) fn sensor(&self) -> &SensorErrors {
@@ -523,12 +555,13 @@ impl InclusionSearch {
         };
         let block = self.known_block(guess);
         let (_, start) = problem.scaled_start(&block, &forward.predict(&block)?)?;
-        let fit = problem.fit(start, FIRST_FIT_ENDING, || counter.step())?;
+        let fit = problem.fit(&start, FIRST_FIT_ENDING, || counter.step())?;
         // A homogeneous block that fits an inclusion's pressures is bent out of what is known of
         // it; starts are not.
         let mut known = self.known_block(fit.parameters.block_modulus_pa);
         problem.forward = problem.forward.with_plain(&known)?;
         if let Some(cells) = &problem.forward.cells {
+            known.strayed_m = vec![[0.0; 2]; cells.positions.axes_m.len()];
             known.place.centre_m = cells.most_symmetric(&observed.values, self.guide.radius_m());
         }
         let linear = Forward {
@@ -572,7 +605,7 @@ impl InclusionSearch {
             factor: covariance.cholesky()?,
             priors: problem.priors.clone(),
         };
-        let fit = problem.fit(homogeneous.parameters, ANSWER_ENDING, || counter.step())?;
+        let fit = problem.fit(&homogeneous.parameters, ANSWER_ENDING, || counter.step())?;
         let score = Score::new(&problem, &fit, grid)?;
         Some((fit, score))
     }
@@ -628,7 +661,7 @@ pub fn starts(
             }
             let with = |contrast: f64| Parameters {
                 lump: Some(lump(contrast)),
-                ..*homogeneous
+                ..homogeneous.clone()
             };
             if !counter.step() {
                 return None;
@@ -740,7 +773,7 @@ impl InclusionSearch {
         });
         let best = best.map(|(_, lump)| &lump.parameters);
         first_fits.lump = (best.into_iter().chain(&starts).take(fitted_starts))
-            .filter_map(|start| problem.fit(*start, ending, || counter.step()))
+            .filter_map(|start| problem.fit(start, ending, || counter.step()))
             .max_by(|a, b| a.evidence.total_cmp(&b.evidence));
         first_fits
     }
@@ -775,11 +808,11 @@ impl InclusionSearch {
         problem.forward = forward
             .with_plain((lump.as_ref()).map_or(&homogeneous.parameters, |lump| &lump.parameters))?;
         let observed = &match &lump {
-            Some(fit) => observed.with_lump_aside(
-                fit.parameters.place.aside_m(),
-                self.guide.radius_m(),
-                problem.forward.lift(&fit.solved),
-            ),
+            Some(fit) => {
+                let centre = fit.parameters.place.centre_m;
+                let lift = problem.forward.lift(&fit.solved);
+                observed.with_lump_aside(centre, self.guide.radius_m(), lift)
+            }
             None => observed.clone(),
         };
         let covariance = observed.covariance(self.sensor(), interface, Resolution::Answer);
@@ -789,7 +822,7 @@ impl InclusionSearch {
             None if is_certain => homogeneous,
             None => {
                 problem.priors = with_lump[..BLOCK_COORDINATES].to_vec();
-                problem.fit(homogeneous.parameters, ANSWER_ENDING, || counter.step())?
+                problem.fit(&homogeneous.parameters, ANSWER_ENDING, || counter.step())?
             }
         };
         problem.priors = with_lump;
@@ -800,7 +833,7 @@ impl InclusionSearch {
         };
         let lump = lump.and_then(|fit| {
             let ending = ending.below(problem.objective_at(needed, fit.volume));
-            problem.fit(fit.parameters, ending, || counter.step())
+            problem.fit(&fit.parameters, ending, || counter.step())
         });
         Some(Hypothesis {
             problem,

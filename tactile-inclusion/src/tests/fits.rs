@@ -43,7 +43,7 @@ fn problem() -> (Problem, Parameters) {
 #[test]
 fn a_fit_from_afar_ends_at_the_truth_within_its_errors() {
     let (problem, truth) = problem();
-    let mut start = truth;
+    let mut start = truth.clone();
     start.block_modulus_pa *= 1.2;
     start.lump = Some(LumpParameters {
         diameter_m: 9e-3,
@@ -51,7 +51,7 @@ fn a_fit_from_afar_ends_at_the_truth_within_its_errors() {
         youngs_modulus_pa: 15e3,
         aspect: 1.0,
     });
-    let fit = problem.fit(start, ANSWER_ENDING, || true).unwrap();
+    let fit = problem.fit(&start, ANSWER_ENDING, || true).unwrap();
     assert!(fit.converged);
     for (k, coordinate) in problem.coordinates().into_iter().enumerate() {
         let error = fit.covariance[(k, k)].sqrt();
@@ -68,7 +68,7 @@ fn a_fit_goes_on_along_the_limit_of_poissons_ratio() {
     let (problem, truth) = problem();
     // From the limit itself and far from the truth in all else: ν's prior and the data pull it
     // back, but first steps go beyond the limit.
-    let mut start = truth;
+    let mut start = truth.clone();
     start.poisson_ratio = LARGEST_POISSON_RATIO;
     start.block_modulus_pa *= 0.8;
     start.lump = Some(LumpParameters {
@@ -77,7 +77,7 @@ fn a_fit_goes_on_along_the_limit_of_poissons_ratio() {
         youngs_modulus_pa: 60e3,
         aspect: 1.0,
     });
-    let fit = problem.fit(start, ANSWER_ENDING, || true).unwrap();
+    let fit = problem.fit(&start, ANSWER_ENDING, || true).unwrap();
     assert!(fit.converged);
     // As of the fit from afar.
     assert!(fit.misfit < fit.predicted.len() as f64, "{}", fit.misfit);
@@ -87,7 +87,7 @@ fn a_fit_goes_on_along_the_limit_of_poissons_ratio() {
 fn a_step_that_may_not_go_on_ends_the_fit() {
     let (problem, mut start) = problem();
     start.block_modulus_pa *= 1.5;
-    let fit = problem.fit(start, ANSWER_ENDING, || false).unwrap();
+    let fit = problem.fit(&start, ANSWER_ENDING, || false).unwrap();
     assert!(!fit.converged);
 }
 
@@ -104,12 +104,12 @@ fn points_of_a_ridge_are_on_it() {
         ..block(1.0)
     };
     let problem = problem_of(&truth, Resolution::Answer);
-    let fit = problem.fit(truth, ANSWER_ENDING, || true).unwrap();
+    let fit = problem.fit(&truth, ANSWER_ENDING, || true).unwrap();
     let ridge = problem.ridge(&fit, || true).unwrap();
     assert!(ridge.nodes.len() > 4, "{}", ridge.nodes.len());
     for node in &ridge.nodes {
         let coordinates = problem.coordinates().into_iter().zip(node.at.iter());
-        let at = coordinates.fold(truth, |at, (coordinate, &value)| {
+        let at = coordinates.fold(truth.clone(), |at, (coordinate, &value)| {
             at.moved(coordinate, value - at.get(coordinate))
         });
         let normal = problem.normal(&at, None).unwrap();

@@ -47,6 +47,7 @@ fn block(scale: f64) -> Parameters {
             aspect: 1.0,
         }),
         place: Place::default(),
+        strayed_m: vec![],
         zero_m: 0.0,
         height_m: 30e-3,
         poisson_ratio: 0.49,
@@ -75,7 +76,10 @@ fn an_inclusion_as_soft_as_the_tissue_is_none() {
     if let Some(lump) = &mut same.lump {
         lump.youngs_modulus_pa = same.block_modulus_pa;
     }
-    let homogeneous = Parameters { lump: None, ..same };
+    let homogeneous = Parameters {
+        lump: None,
+        ..same.clone()
+    };
     let with = forward(3, 1.0).predict(&same).unwrap().values;
     let without = forward(3, 1.0).predict(&homogeneous).unwrap().values;
     // Two meshes of the same body: what the coarser one leaves.

@@ -76,6 +76,17 @@ pub(super) fn more_files(folder: &Path) {
         "lump_backwards.toml",
         &lump.replace("approach_m = 2e-3", "approach_m = 0.5e-3"),
     );
+    let press = |x: &str, approach: &str| {
+        let frame = format!("{{ image = \"frame_1.png\", approach_m = {approach}, force_N = 1 }}");
+        format!("[[presses]]\nposition_m = [{x}, 0]\nframes = [{frame}]\n")
+    };
+    let presses = |x, other| press(x, "1e-3") + &press("0.01", other);
+    let frames = &lump[lump.find("frames").unwrap()..lump.find("[object]").unwrap()];
+    let scan = |presses: String| lump.replace(frames, &presses);
+    let both = format!("{frames}{}", presses("0", "1e-3"));
+    put("lump_scan_two.toml", &scan(both));
+    put("lump_scan_other.toml", &scan(presses("0", "2e-3")));
+    put("lump_scan_nowhere.toml", &scan(presses("inf", "1e-3")));
     put(
         "lump_stiff.toml",
         &lump.replace("youngs_modulus_pa = 60e3", "youngs_modulus_pa = -1"),

@@ -1,0 +1,122 @@
+//! Several presses at stated places of one block.
+
+use crate::error::{Quantity, finite, not_negative};
+use crate::picture::CellPositions;
+use crate::specimen::{PressureProfile, check};
+use tactile_elasticity::ElasticityError;
+
+/// Presses at stated places of a block that is far wider than the guide.
+///
+/// ```
+/// use tactile_inclusion::{PressureProfile, Scan, ScanPress};
+///
+/// let frame = PressureProfile {
+///     approach_m: 1e-3,
+///     force_n: None,
+///     pressure_pa: vec![348.0; 2],
+///     standard_error_pa: vec![0.3; 2],
+/// };
+/// let press = |axis_m| ScanPress {
+///     axis_m,
+///     positions_m: vec![[0.0, 0.0], [2e-3, 0.0]],
+///     frames: vec![frame.clone()],
+/// };
+/// let presses = vec![press([0.0, 0.0]), press([20e-3, 0.0])];
+/// let scan = Scan { presses, position_error_m: 0.1e-3 };
+/// assert_eq!(scan.presses.len(), 2);
+/// ```
+#[derive(Debug, Clone, PartialEq)]
+pub struct Scan {
+    /// All with the same approaches.
+    pub presses: Vec<ScanPress>,
+    /// Standard error of each press's place, in x and in y: a robot's, or a hand's.
+    pub position_error_m: f64,
+}
+
+/// A press of a scan: the guide's face at one place of a block, pressed to some approaches.
+///
+/// ```
+/// use tactile_inclusion::ScanPress;
+///
+/// let press = ScanPress { axis_m: [20e-3, 0.0], positions_m: vec![], frames: vec![] };
+/// assert!(press.positions_m.is_empty(), "a scan with it is refused");
+/// ```
+#[derive(Debug, Clone, PartialEq)]
+pub struct ScanPress {
+    /// Where the guide's axis was (x, y), in metres.
+    pub axis_m: [f64; 2],
+    /// Middles (x, y) of the face's cells from that axis, in metres.
+    pub positions_m: Vec<[f64; 2]>,
+    /// Pressures of each approach on these cells. Forces are not used.
+    pub frames: Vec<PressureProfile>,
+}
+
+impl Scan {
+    /// The cells of all presses within a radius, and their frames side by side.
+    ///
+    /// # Errors
+    /// No press. An error of place that is negative or NaN. Approaches that do not grow or differ
+    /// between presses. Lengths that differ. Values that are not finite.
+    pub(crate) fn joined(
+        &self,
+        radius_m: f64,
+    ) -> Result<(CellPositions, Vec<PressureProfile>), ElasticityError> {
+        let too_few = ElasticityError::TooFewLoads {
+            expected: 1,
+            found: 0,
+        };
+        not_negative(self.position_error_m, Quantity::StandardError)?;
+        let first = self.presses.first().ok_or(too_few)?;
+        let mut joined: Vec<PressureProfile> = (first.frames.iter())
+            .map(|frame| PressureProfile {
+                approach_m: frame.approach_m,
+                force_n: None,
+                pressure_pa: Vec::new(),
+                standard_error_pa: Vec::new(),
+            })
+            .collect();
+        let mut cells = CellPositions {
+            positions_m: Vec::new(),
+            presses: Vec::new(),
+            axes_m: Vec::new(),
+        };
+        for (index, press) in self.presses.iter().enumerate() {
+            for coordinate in press.positions_m.iter().flatten().chain(&press.axis_m) {
+                finite(*coordinate, Quantity::Distance)?;
+            }
+            // A cell on the axis is one.
+            let radius = |[x, y]: &[f64; 2]| x.hypot(*y).max(f64::MIN_POSITIVE);
+            let radii_m: Vec<f64> = press.positions_m.iter().map(radius).collect();
+            check(&radii_m, &press.frames)?;
+            if press.frames.len() != joined.len() {
+                return Err(ElasticityError::LengthMismatch {
+                    quantity: Quantity::Distance,
+                    expected: joined.len(),
+                    found: press.frames.len(),
+                });
+            }
+            let used: Vec<usize> = (0..radii_m.len())
+                .filter(|&k| radii_m[k] <= radius_m)
+                .collect();
+            cells
+                .positions_m
+                .extend(used.iter().map(|&k| press.positions_m[k]));
+            cells.presses.resize(cells.positions_m.len(), index);
+            cells.axes_m.push(press.axis_m);
+            for (all, frame) in joined.iter_mut().zip(&press.frames) {
+                if all.approach_m != frame.approach_m {
+                    return Err(ElasticityError::OutOfRange {
+                        quantity: Quantity::Distance,
+                        found: frame.approach_m,
+                        limit: all.approach_m,
+                    });
+                }
+                let taken = |values: &[f64]| used.iter().map(|&k| values[k]).collect::<Vec<f64>>();
+                all.pressure_pa.extend(taken(&frame.pressure_pa));
+                all.standard_error_pa
+                    .extend(taken(&frame.standard_error_pa));
+            }
+        }
+        Ok((cells, joined))
+    }
+}
