@@ -36,7 +36,7 @@ pub use image::{
     Grey, GreyImage, image_size, read_colour_levels, read_grey_image, read_grey_levels,
     write_grey_image,
 };
-pub use range::Quantity;
+pub use range::InputQuantity;
 pub use table::{
     PointTable, Table, read_columns, read_grid, read_point_table, read_points, read_table,
 };

@@ -6,15 +6,15 @@ use serde::de::{self, Deserialize, Deserializer};
 /// can have.
 ///
 /// ```
-/// use tactile_imaging::io::Quantity;
+/// use tactile_imaging::io::InputQuantity;
 /// // 3 mm, and 3 m where metres are asked for.
-/// assert!(Quantity::Length.allows(3e-3) && !Quantity::Length.allows(3.0));
-/// assert!(Quantity::Modulus.allows(60e3) && !Quantity::Modulus.allows(f64::NAN));
-/// assert!(Quantity::PixelSide.allows(40e-6));
+/// assert!(InputQuantity::Length.allows(3e-3) && !InputQuantity::Length.allows(3.0));
+/// assert!(InputQuantity::Modulus.allows(60e3) && !InputQuantity::Modulus.allows(f64::NAN));
+/// assert!(InputQuantity::PixelSide.allows(40e-6));
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
-pub enum Quantity {
+pub enum InputQuantity {
     /// Radii, thicknesses and heights in metres.
     Length,
     /// The side of a pixel on the sensing surface in metres.
@@ -25,7 +25,7 @@ pub enum Quantity {
     Force,
 }
 
-impl Quantity {
+impl InputQuantity {
     /// The largest ratio of a pixel's sides.
     pub const MOST_UNEQUAL_SIDES: f64 = 10.0;
 
@@ -62,19 +62,21 @@ impl Quantity {
 }
 
 pub fn length<'de, D: Deserializer<'de>, T: From<f64>>(d: D) -> Result<T, D::Error> {
-    number(d, Quantity::Length.expected(), |v| {
-        Quantity::Length.allows(v)
+    number(d, InputQuantity::Length.expected(), |v| {
+        InputQuantity::Length.allows(v)
     })
 }
 
 pub fn modulus<'de, D: Deserializer<'de>, T: From<f64>>(d: D) -> Result<T, D::Error> {
-    number(d, Quantity::Modulus.expected(), |v| {
-        Quantity::Modulus.allows(v)
+    number(d, InputQuantity::Modulus.expected(), |v| {
+        InputQuantity::Modulus.allows(v)
     })
 }
 
 pub fn force<'de, D: Deserializer<'de>, T: From<f64>>(d: D) -> Result<T, D::Error> {
-    number(d, Quantity::Force.expected(), |v| Quantity::Force.allows(v))
+    number(d, InputQuantity::Force.expected(), |v| {
+        InputQuantity::Force.allows(v)
+    })
 }
 
 /// Width and height of a pixel, of which neither is ten times the other.
@@ -82,7 +84,7 @@ pub fn pixel_size<'de, D: Deserializer<'de>, T: From<[f64; 2]>>(d: D) -> Result<
     #[derive(serde::Deserialize)]
     struct Side(#[serde(deserialize_with = "side")] f64);
     let [width, height] = <[Side; 2]>::deserialize(d)?.map(|side| side.0);
-    if (width / height).max(height / width) > Quantity::MOST_UNEQUAL_SIDES {
+    if (width / height).max(height / width) > InputQuantity::MOST_UNEQUAL_SIDES {
         return Err(de::Error::custom(format_args!(
             "sides of {width:e} and {height:e} m are those of no pixel: is one of them in another \
              unit?"
@@ -92,7 +94,7 @@ pub fn pixel_size<'de, D: Deserializer<'de>, T: From<[f64; 2]>>(d: D) -> Result<
 }
 
 fn side<'de, D: Deserializer<'de>>(d: D) -> Result<f64, D::Error> {
-    number(d, Quantity::PixelSide.expected(), |v| {
-        Quantity::PixelSide.allows(v)
+    number(d, InputQuantity::PixelSide.expected(), |v| {
+        InputQuantity::PixelSide.allows(v)
     })
 }

@@ -5,7 +5,7 @@ use crate::elasticity::ElasticityError;
 use crate::elasticity::contact::ContactTable;
 use crate::elasticity::modulus::TabulatedContact;
 use crate::force::{CalibrationPair, ContactOptions, DriftCorrection, Estimate, ForceOptions};
-use crate::io::{FileError, FilePlace, Quantity, read_columns, read_frame, read_grey_levels};
+use crate::io::{FileError, FilePlace, InputQuantity, read_columns, read_frame, read_grey_levels};
 use crate::pipeline::{
     DarkContact, EstimatorChoice, LightContact, Measurement, Object, Pipeline, PipelineError,
     Press, SurfaceInput,
@@ -398,7 +398,7 @@ pub fn doubt_of_depths(rows: &[(f64, f64)]) -> Option<String> {
 #[must_use]
 pub fn doubt_of_pairs(pairs: &[CalibrationPair]) -> Option<String> {
     let forces = || pairs.iter().map(|pair| pair.force_n);
-    let [_, most] = Quantity::Force.limits();
+    let [_, most] = InputQuantity::Force.limits();
     if let Some(force) = forces().find(|force| force.abs() > most) {
         return Some(format!(
             "a force of {force:e} N is more than any sensor bears: are the columns swapped, or is \

@@ -6,7 +6,7 @@ use clap::{Args, ValueEnum};
 use ndarray::Array2;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
-use tactile_imaging::io::{Grey, Quantity, read_grey_image, read_grid};
+use tactile_imaging::io::{Grey, InputQuantity, read_grey_image, read_grid};
 
 fn number(text: &str, fits: impl Fn(f64) -> bool, expected: &str) -> Result<f64, String> {
     let value = text.parse().ok();
@@ -19,7 +19,7 @@ pub fn positive(text: &str) -> Result<f64, String> {
     number(text, |v| v > 0.0, "a number above zero")
 }
 
-fn physical(text: &str, quantity: Quantity, scale: f64, unit: &str) -> Result<f64, String> {
+fn physical(text: &str, quantity: InputQuantity, scale: f64, unit: &str) -> Result<f64, String> {
     let [least, greatest] = quantity.limits().map(|v| four_digits(v / scale));
     let expected = format!("a number from {least} to {greatest} {unit}");
     number(text, |v| quantity.allows(v * scale), &expected)
@@ -27,12 +27,12 @@ fn physical(text: &str, quantity: Quantity, scale: f64, unit: &str) -> Result<f6
 
 /// An argument that is a length in metres.
 pub fn length_m(text: &str) -> Result<f64, String> {
-    physical(text, Quantity::Length, 1.0, "m (3 mm are 3e-3)")
+    physical(text, InputQuantity::Length, 1.0, "m (3 mm are 3e-3)")
 }
 
 /// An argument that is a length in millimetres.
 pub fn length_mm(text: &str) -> Result<f64, String> {
-    physical(text, Quantity::Length, 1e-3, "mm")
+    physical(text, InputQuantity::Length, 1e-3, "mm")
 }
 
 /// An argument that is a size of a lump in millimetres. The mesh of a smaller one has no end.
@@ -43,21 +43,21 @@ pub fn lump_mm(text: &str) -> Result<f64, String> {
 
 /// An argument that is a modulus in kilopascals.
 pub fn modulus_kpa(text: &str) -> Result<f64, String> {
-    physical(text, Quantity::Modulus, 1e3, "kPa")
+    physical(text, InputQuantity::Modulus, 1e3, "kPa")
 }
 
 /// An argument that is a force in newtons.
 pub fn force_n(text: &str) -> Result<f64, String> {
-    physical(text, Quantity::Force, 1.0, "N")
+    physical(text, InputQuantity::Force, 1.0, "N")
 }
 
 /// An argument that is the size of a pixel on the sensor in micrometres, one or width and height.
 pub fn pixel_um(text: &str) -> Result<[f64; 2], String> {
     let [x, y] = one_or_two(text)?;
     for side in [x, y] {
-        physical(&side.to_string(), Quantity::PixelSide, 1e-6, "µm")?;
+        physical(&side.to_string(), InputQuantity::PixelSide, 1e-6, "µm")?;
     }
-    if (x / y).max(y / x) > Quantity::MOST_UNEQUAL_SIDES {
+    if (x / y).max(y / x) > InputQuantity::MOST_UNEQUAL_SIDES {
         return Err("expected sides of one unit, of which neither is ten times the other".into());
     }
     Ok([x, y])

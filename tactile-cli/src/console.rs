@@ -26,7 +26,7 @@ pub enum Exit {
     Input,
     /// The answer could not be written.
     Output,
-    /// Stopped by Ctrl-C, after the results at that time were printed.
+    /// Stopped by Ctrl-C or a signal of its kind, after the results at that time were printed.
     Interrupted,
 }
 
@@ -373,8 +373,8 @@ impl Context {
     }
 }
 
-/// Ctrl-C: work that polls it stops with its results so far, other work ends at once. A second one
-/// always ends.
+/// Ctrl-C, termination or a terminal that closes: work that polls it stops with its results so far,
+/// other work ends at once. A second one always ends.
 #[derive(Clone, Default)]
 pub struct Interrupt {
     requested: Arc<AtomicBool>,
@@ -384,9 +384,13 @@ pub struct Interrupt {
 }
 
 impl Interrupt {
-    /// Listens for Ctrl-C. Where the system allows no handler it ends the program, as without one.
+    /// Listens for the signals. Where the system allows no handler they end the program, as without
+    /// one. Under `nohup`, which lets no terminal close a program, they keep their meaning.
     fn install() -> Self {
         let interrupt = Self::default();
+        if hang_up_is_ignored() {
+            return interrupt;
+        }
         let copy = interrupt.clone();
         let _ = ctrlc::set_handler(move || {
             let again = copy.requested.swap(true, Ordering::SeqCst);
@@ -417,6 +421,17 @@ impl Interrupt {
     pub fn polled(&self, polled: bool) {
         self.polled.store(polled, Ordering::SeqCst);
     }
+}
+
+/// Whether the program was started with the signal of a closed terminal switched off.
+fn hang_up_is_ignored() -> bool {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let ignored = status
+        .lines()
+        .find_map(|line| line.strip_prefix("SigIgn:"))
+        .and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok());
+    // SIGHUP is signal 1, the mask's lowest bit.
+    ignored.is_some_and(|mask| mask & 1 == 1)
 }
 
 /// A bar on the terminal for a job that takes longer than a second. It is hidden where standard

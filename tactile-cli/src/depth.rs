@@ -1,7 +1,7 @@
 //! `tactile depth`: contact and depth of a sensor that grows darker where it is pressed.
 use crate::arguments::SensorFrames;
 use crate::console::{Context, Exit, Failure, four_digits, in_unit};
-use crate::frames::Frame;
+use crate::frames::NamedFrame;
 use crate::outputs::Csv;
 use crate::photometric::{self, unless_sensor};
 use crate::plot::{Colour, HeatMap, Page, Panel, circle, known_heights_mm};
@@ -157,7 +157,7 @@ pub fn run(arguments: &DepthArguments, context: &mut Context) -> Result<Exit, Fa
         press.add_frame(image.pixels.view());
     }
     let mut values = Vec::new();
-    for (k, Frame { name, pixels, .. }) in images.iter().enumerate() {
+    for (k, NamedFrame { name, pixels, .. }) in images.iter().enumerate() {
         let reading = press.contact(k).map(|reading| reading.copied());
         let reading = reading.map_err(|error| Failure::in_file(Path::new(name), error))?;
         let found = reading.map(|reading| {

@@ -2,7 +2,7 @@
 use crate::arguments::SensorFrames;
 use crate::calibrate::PairLine;
 use crate::console::{Bar, Context, Exit, Failure, in_unit};
-use crate::frames::Frame;
+use crate::frames::NamedFrame;
 use crate::outputs::Csv;
 use clap::Args;
 use serde::Serialize;
@@ -77,7 +77,7 @@ pub fn run(arguments: &ForceArguments, context: &mut Context) -> Result<Exit, Fa
         if context.interrupt.requested() {
             break;
         }
-        let Frame { name, pixels, .. } = match frame {
+        let NamedFrame { name, pixels, .. } = match frame {
             Ok(frame) => frame,
             Err(failure) if failure.exit == Exit::Partial => {
                 exit = Exit::Partial;

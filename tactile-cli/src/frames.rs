@@ -57,7 +57,7 @@ impl Reading<'_> {
         &self,
         paths: &[PathBuf],
         context: &mut Context,
-    ) -> Result<(Vec<Frame>, Exit), Failure> {
+    ) -> Result<(Vec<NamedFrame>, Exit), Failure> {
         let (mut frames, mut exit) = (Vec::new(), Exit::Complete);
         for frame in self.frames(paths) {
             match frame {
@@ -80,14 +80,14 @@ impl Reading<'_> {
 }
 
 /// A frame with its name.
-pub struct Frame {
+pub struct NamedFrame {
     pub name: String,
     /// What the files of its results begin with.
     pub stem: OsString,
     pub pixels: Array2<u8>,
 }
 
-impl Frame {
+impl NamedFrame {
     fn new(path: &Path, number: usize, pixels: Array2<u8>) -> Self {
         let (mut name, mut stem) = match path.to_str() {
             Some("-") => ("standard input".to_owned(), "stdin".into()),
@@ -121,7 +121,7 @@ pub struct Frames<'a> {
 }
 
 impl Iterator for Frames<'_> {
-    type Item = Result<Frame, Failure>;
+    type Item = Result<NamedFrame, Failure>;
 
     fn next(&mut self) -> Option<Self::Item> {
         loop {
@@ -146,7 +146,7 @@ impl Iterator for Frames<'_> {
             match next {
                 Ok(Some(())) => {
                     *frames += 1;
-                    return Some(Ok(Frame::new(path, *frames, frame)));
+                    return Some(Ok(NamedFrame::new(path, *frames, frame)));
                 }
                 Ok(None) => self.open = None,
                 Err(failure) => {

@@ -1,7 +1,7 @@
 //! `tactile measure`: everything, of a simulated press or of a user's own frames.
 use crate::arguments::{Repetition, force_n, length_mm, modulus_kpa};
 use crate::console::{Bar, Context, Exit, Failure, four_digits, in_unit};
-use crate::frames::{Frame, Reading};
+use crate::frames::{NamedFrame, Reading};
 use crate::photometric;
 use crate::plot::{PlotError, known_heights_mm, press_pages, summary_lines};
 use clap::{Args, ValueEnum};
@@ -218,7 +218,7 @@ impl Frames {
                 size: data.reference.dim(),
             };
             let (frames, exit) = reading.all(&arguments.frames, context)?;
-            let named = |frame: &Frame| SceneFrame::new(&frame.name);
+            let named = |frame: &NamedFrame| SceneFrame::new(&frame.name);
             let named = frames.iter().map(named).collect();
             data.frames = frames.into_iter().map(|frame| frame.pixels).collect();
             scene.frames = named;

@@ -148,6 +148,15 @@ impl CoherentPointDrift {
         model: &[Point<f64, D>],
         target: &[Point<f64, D>],
     ) -> Result<Matching<D>, MatchError> {
+        self.register_in(workspace, model, target)
+    }
+
+    pub(crate) fn register<const D: usize>(
+        &self,
+        workspace: &mut DriftWorkspace<D>,
+        model: &[Point<f64, D>],
+        target: &[Point<f64, D>],
+    ) -> Result<Matching<D>, MatchError> {
         point_sets(model, target)?;
         workspace.register(self, model, target);
         Ok(matching(self, workspace, model.len(), target.len()))

@@ -27,6 +27,12 @@ pub enum MatchError {
         /// The empty set, "model" or "target".
         set: &'static str,
     },
+    /// Points of another space than the plane and space, which the search has no instance for.
+    #[error("points have {dimension} coordinates, expected 2 or 3")]
+    Dimension {
+        /// Coordinates of a point.
+        dimension: usize,
+    },
     /// A coordinate is NaN, infinite or so large that its square is (beyond 10¹⁵³ in double, 10¹⁸
     /// in single precision).
     #[error(

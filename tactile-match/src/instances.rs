@@ -1,38 +1,116 @@
-//! The matchers for `f64` in the plane and in space, compiled with this crate.
+//! The matchers in the plane and in space, compiled with this crate.
 //!
-//! Builds at low optimisation share the instances of generic code that a dependency holds. Without
-//! these, every test, example and dependent crate compiles the matchers anew: half of the time a
-//! test build takes.
+//! Generic code is compiled anew in every crate that calls it, and the matchers are most of what
+//! the program, the Python package and a test compile. The generic methods below therefore take
+//! the compiled function of their dimension from a table.
 
+use crate::softassign::SoftassignWorkspace;
 use crate::{
-    AnnealedSoftassign, CoherentPointDrift, MatchError, MatchedPairs, Matching, PointMatcher,
-    RelaxationLabelling, WarmStart,
+    AnnealedSoftassign, CoherentPointDrift, DriftWorkspace, MatchError, MatchedPairs, Matching,
+    PointMatcher, RelaxationLabelling, WarmStart,
 };
 use nalgebra::Point;
+use std::any::Any;
+use std::ops::ControlFlow;
 
-type Once<M, const D: usize> =
-    fn(&M, &[Point<f64, D>], &[Point<f64, D>]) -> Result<Matching<D>, MatchError>;
-type Next<M, const D: usize> =
-    fn(&M, &mut WarmStart, &[Point<f64, D>], &[Point<f64, D>]) -> Result<Matching<D>, MatchError>;
+/// The same function for points of the plane and of space.
+struct Instances<F2, F3>(F2, F3);
 
-type NextPairs<M, const D: usize> = fn(
-    &M,
+impl<F2: 'static, F3: 'static> Instances<F2, F3> {
+    /// The one that has this type.
+    fn of<F: Copy + 'static>(&self, dimension: usize) -> Result<F, MatchError> {
+        let all: [&dyn Any; 2] = [&self.0, &self.1];
+        let found = all.iter().find_map(|instance| instance.downcast_ref());
+        found.copied().ok_or(MatchError::Dimension { dimension })
+    }
+}
+
+type Found<const D: usize> = Result<Matching<D>, MatchError>;
+type Once<M, const D: usize> = fn(&M, &[Point<f64, D>], &[Point<f64, D>]) -> Found<D>;
+type Next<const D: usize> =
+    fn(&AnnealedSoftassign, &mut WarmStart, &[Point<f64, D>], &[Point<f64, D>]) -> Found<D>;
+type NextPairs<const D: usize> = fn(
+    &AnnealedSoftassign,
     &mut WarmStart,
     &[Point<f64, D>],
     &[Point<f64, D>],
     &mut MatchedPairs,
 ) -> Result<(), MatchError>;
+type Search<const D: usize> = fn(
+    &AnnealedSoftassign,
+    &mut SoftassignWorkspace<D>,
+    &mut dyn FnMut(usize, f64) -> ControlFlow<()>,
+);
+type Register<const D: usize> =
+    fn(&CoherentPointDrift, &mut DriftWorkspace<D>, &[Point<f64, D>], &[Point<f64, D>]) -> Found<D>;
 
-/// A matcher's ways to match.
-type Ways<M, const D: usize> = (Once<M, D>, Next<M, D>, NextPairs<M, D>);
+type Both<M> = Instances<Once<M, 2>, Once<M, 3>>;
+static SOFTASSIGN: Both<AnnealedSoftassign> =
+    Instances(AnnealedSoftassign::once, AnnealedSoftassign::once);
+static NEXT: Instances<Next<2>, Next<3>> =
+    Instances(AnnealedSoftassign::next, AnnealedSoftassign::next);
+static NEXT_PAIRS: Instances<NextPairs<2>, NextPairs<3>> = Instances(
+    AnnealedSoftassign::next_pairs,
+    AnnealedSoftassign::next_pairs,
+);
+static SEARCH: Instances<Search<2>, Search<3>> =
+    Instances(AnnealedSoftassign::solve, AnnealedSoftassign::solve);
+static DRIFT: Instances<Register<2>, Register<3>> =
+    Instances(CoherentPointDrift::register, CoherentPointDrift::register);
+static LABELLING: Both<RelaxationLabelling> =
+    Instances(RelaxationLabelling::once, RelaxationLabelling::once);
 
-const fn ways<M: PointMatcher<D>, const D: usize>() -> Ways<M, D> {
-    (M::match_points, M::match_next, M::match_next_pairs)
+impl AnnealedSoftassign {
+    /// The search, compiled with this crate.
+    pub(crate) fn search_in<const D: usize>(
+        &self,
+        workspace: &mut SoftassignWorkspace<D>,
+        observe: &mut dyn FnMut(usize, f64) -> ControlFlow<()>,
+    ) -> Result<(), MatchError> {
+        SEARCH.of::<Search<D>>(D)?(self, workspace, observe);
+        Ok(())
+    }
 }
 
-#[used]
-static SOFTASSIGN: (Ways<AnnealedSoftassign, 2>, Ways<AnnealedSoftassign, 3>) = (ways(), ways());
-#[used]
-static DRIFT: (Ways<CoherentPointDrift, 2>, Ways<CoherentPointDrift, 3>) = (ways(), ways());
-#[used]
-static LABELLING: (Ways<RelaxationLabelling, 2>, Ways<RelaxationLabelling, 3>) = (ways(), ways());
+impl<const D: usize> PointMatcher<D> for AnnealedSoftassign {
+    fn match_points(&self, model: &[Point<f64, D>], target: &[Point<f64, D>]) -> Found<D> {
+        SOFTASSIGN.of::<Once<Self, D>>(D)?(self, model, target)
+    }
+
+    fn match_next(
+        &self,
+        warm: &mut WarmStart,
+        model: &[Point<f64, D>],
+        target: &[Point<f64, D>],
+    ) -> Found<D> {
+        NEXT.of::<Next<D>>(D)?(self, warm, model, target)
+    }
+
+    fn match_next_pairs(
+        &self,
+        warm: &mut WarmStart,
+        model: &[Point<f64, D>],
+        target: &[Point<f64, D>],
+        pairs: &mut MatchedPairs,
+    ) -> Result<(), MatchError> {
+        NEXT_PAIRS.of::<NextPairs<D>>(D)?(self, warm, model, target, pairs)
+    }
+}
+
+impl CoherentPointDrift {
+    /// The registration, compiled with this crate.
+    pub(crate) fn register_in<const D: usize>(
+        &self,
+        workspace: &mut DriftWorkspace<D>,
+        model: &[Point<f64, D>],
+        target: &[Point<f64, D>],
+    ) -> Found<D> {
+        DRIFT.of::<Register<D>>(D)?(self, workspace, model, target)
+    }
+}
+
+impl<const D: usize> PointMatcher<D> for RelaxationLabelling {
+    fn match_points(&self, model: &[Point<f64, D>], target: &[Point<f64, D>]) -> Found<D> {
+        LABELLING.of::<Once<Self, D>>(D)?(self, model, target)
+    }
+}

@@ -35,7 +35,6 @@ mod common;
 mod cpd;
 mod error;
 mod hard;
-#[cfg(all(debug_assertions, not(test)))]
 mod instances;
 pub mod labelling;
 mod matching;

@@ -69,15 +69,15 @@ pub enum PlotError {
 }
 
 /// A position in the units of the axes.
-pub type Place = [f64; 2];
+pub type PlotPoint = [f64; 2];
 
 /// Positions in any kind of list.
-pub trait Places: IntoIterator<Item = Place> {}
-impl<T: IntoIterator<Item = Place>> Places for T {}
+pub trait Places: IntoIterator<Item = PlotPoint> {}
+impl<T: IntoIterator<Item = PlotPoint>> Places for T {}
 
 /// Starts and ends in any kind of list.
-pub trait Ends: IntoIterator<Item = [Place; 2]> {}
-impl<T: IntoIterator<Item = [Place; 2]>> Ends for T {}
+pub trait Ends: IntoIterator<Item = [PlotPoint; 2]> {}
+impl<T: IntoIterator<Item = [PlotPoint; 2]>> Ends for T {}
 
 /// Colours that people with any colour vision tell apart (Okabe and Ito 2008), and two neutral
 /// ones.
@@ -152,7 +152,7 @@ impl HeatMap {
     }
 
     /// Puts the centre of the first cell at `origin` instead of (0, 0).
-    pub fn origin(mut self, origin: Place) -> Self {
+    pub fn origin(mut self, origin: PlotPoint) -> Self {
         for (edges, shift) in self.edges.iter_mut().zip(origin) {
             *edges = edges.map(|edge| edge + shift);
         }
@@ -205,15 +205,15 @@ fn shade(value: f64, [low, high]: [f64; 2], grey: bool) -> RGBColor {
 /// The shape of a layer.
 #[derive(Clone, Debug)]
 enum Marks {
-    Discs(Vec<Place>),
-    Rings(Vec<Place>),
+    Discs(Vec<PlotPoint>),
+    Rings(Vec<PlotPoint>),
     /// A position that is not finite breaks the line.
-    Line(Vec<Place>),
-    Dashes(Vec<Place>),
-    Segments(Vec<[Place; 2]>),
-    Arrows(Vec<[Place; 2]>),
+    Line(Vec<PlotPoint>),
+    Dashes(Vec<PlotPoint>),
+    Segments(Vec<[PlotPoint; 2]>),
+    Arrows(Vec<[PlotPoint; 2]>),
     /// Points coloured by a value.
-    Valued(Vec<Place>, Vec<f64>),
+    Valued(Vec<PlotPoint>, Vec<f64>),
     Heat(HeatMap),
 }
 
@@ -346,7 +346,7 @@ impl Panel {
 
 impl Layer {
     /// Every position that must be inside the axes.
-    fn places(&self) -> Vec<Place> {
+    fn places(&self) -> Vec<PlotPoint> {
         match &self.marks {
             Marks::Discs(at) | Marks::Rings(at) | Marks::Valued(at, _) => at.clone(),
             Marks::Line(at) | Marks::Dashes(at) => at.clone(),
@@ -616,7 +616,7 @@ impl Panel {
             .bold_line_style(grid)
             .light_line_style(TRANSPARENT)
             .draw()?;
-        let place = |at: Place| {
+        let place = |at: PlotPoint| {
             let finite = [0, 1].iter().all(|&k| axes[k].share(at[k]).is_finite());
             finite.then(|| chart.backend_coord(&(at[0], at[1])))
         };
@@ -715,9 +715,9 @@ fn dashes(area: &Area<'_>, at: &[Pixel], colour: RGBColor) -> Drawn<()> {
 impl Layer {
     /// Draws everything but a heat map. `place` brings a position to the page, where it has a
     /// finite place on the axes.
-    fn draw(&self, area: &Area<'_>, place: &dyn Fn(Place) -> Option<Pixel>) -> Drawn<()> {
+    fn draw(&self, area: &Area<'_>, place: &dyn Fn(PlotPoint) -> Option<Pixel>) -> Drawn<()> {
         let colour = self.colour.rgb();
-        let circles = |at: &[Place], radius: i32, style: ShapeStyle| -> Drawn<()> {
+        let circles = |at: &[PlotPoint], radius: i32, style: ShapeStyle| -> Drawn<()> {
             for pixel in at.iter().filter_map(|&at| place(at)) {
                 area.draw(&Circle::new(pixel, FINE * radius, style))?;
             }

@@ -1,5 +1,5 @@
 //! The pages of a press: frames, surfaces, matches, displacement, strain, summary.
-use super::{Colour, HeatMap, Page, Panel, Place, PlotError};
+use super::{Colour, HeatMap, Page, Panel, PlotError, PlotPoint};
 use crate::console::in_unit;
 use ndarray::Array2;
 use std::path::{Path, PathBuf};
@@ -127,7 +127,7 @@ fn axes(title: impl Into<String>) -> Panel {
 }
 
 /// From above, in millimetres.
-fn above(p: &nalgebra::Point3<f64>) -> Place {
+fn above(p: &nalgebra::Point3<f64>) -> PlotPoint {
     [1e3 * p.x, 1e3 * p.y]
 }
 
@@ -153,7 +153,7 @@ fn frames_page(press: &mut Press<'_>) -> Result<Page, PlotError> {
 }
 
 /// The vertices of a circle.
-pub fn circle([x, y]: Place, radius: f64) -> Vec<Place> {
+pub fn circle([x, y]: PlotPoint, radius: f64) -> Vec<PlotPoint> {
     let angles = (0..=120).map(|i| f64::from(i) * std::f64::consts::TAU / 120.0);
     let at = |angle: f64| [x + radius * angle.cos(), y + radius * angle.sin()];
     angles.map(at).collect()
@@ -169,7 +169,7 @@ fn surfaces_page(press: &mut Press<'_>) -> Result<Page, PlotError> {
     );
     for frame in 0..press.frames() {
         let title = force_title(press, frame)?;
-        let dots: Vec<Place> = press.control_points(frame)?.iter().map(above).collect();
+        let dots: Vec<PlotPoint> = press.control_points(frame)?.iter().map(above).collect();
         let surface = press.surface(frame)?;
         let size = surface.pixel_size_m.map(|s| 1e3 * s);
         let origin = surface.origin_m.map(|o| 1e3 * o);
@@ -181,7 +181,7 @@ fn surfaces_page(press: &mut Press<'_>) -> Result<Page, PlotError> {
         if let Some(((row, _), _)) = finite.max_by(|a, b| a.1.total_cmp(b.1)) {
             let cut = heights.row(row);
             let at = |(c, h): (usize, &f64)| [origin[0] + c as f64 * size[0], *h];
-            let line: Vec<Place> = cut.iter().enumerate().map(at).collect();
+            let line: Vec<PlotPoint> = cut.iter().enumerate().map(at).collect();
             // The colours repeat after six frames, and a legend of more would fill the panel.
             let label = if frame < 6 { title.as_str() } else { "" };
             cuts = cuts.line(line, Colour::category(frame), label);
@@ -247,7 +247,7 @@ fn displacement_page(press: &mut Press<'_>, last: usize) -> Result<Page, PlotErr
 
 /// The diagonal of the strain over the control points.
 fn strain_page(press: &mut Press<'_>, last: usize) -> Result<Page, PlotError> {
-    let places: Vec<Place> = press.control_points(0)?.iter().map(above).collect();
+    let places: Vec<PlotPoint> = press.control_points(0)?.iter().map(above).collect();
     let strain = press.strain(last)?;
     let panel = |(k, name): (usize, &str)| {
         let values = strain.field.strains.iter().map(|e| e[(k, k)]);

@@ -12,6 +12,16 @@ const SOON: Duration = Duration::from_secs(30);
 /// Starts the program, sends it Ctrl-C a moment after it has printed its first line, and returns
 /// what it printed and its exit code.
 fn interrupted(folder: &Path, arguments: &str, lines_before: usize) -> (String, Option<i32>) {
+    ended_by("-INT", folder, arguments, lines_before)
+}
+
+/// As [`interrupted`], by another signal.
+fn ended_by(
+    signal: &str,
+    folder: &Path,
+    arguments: &str,
+    lines_before: usize,
+) -> (String, Option<i32>) {
     let mut child = tactile(folder, &words(arguments))
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
@@ -32,7 +42,7 @@ fn interrupted(folder: &Path, arguments: &str, lines_before: usize) -> (String, 
     let id = child.id().to_string();
     assert!(
         Command::new("kill")
-            .args(["-INT", &id])
+            .args([signal, &id])
             .status()
             .unwrap()
             .success()
@@ -83,12 +93,17 @@ fn matching_leaves_the_cases_that_are_done() {
     assert!(printed.starts_with("small: 40 of 40"), "{printed}");
     let answers = fs::read_to_string(folder.path().join("results/both.txt")).unwrap();
     assert!(answers.contains("case small") && !answers.contains("case large"));
-    // An earlier result is not replaced by one in part.
-    fs::write(folder.path().join("results/both.txt"), "complete").unwrap();
-    let (_, code) = interrupted(folder.path(), "match both.txt --out results", 1);
-    assert_eq!(code, Some(130));
-    let kept = fs::read_to_string(folder.path().join("results/both.txt")).unwrap();
-    assert_eq!(kept, "complete");
+    // An earlier result is not replaced by one in part, nor is anything left beside it.
+    let results = folder.path().join("results");
+    let before = fs::read_dir(&results).unwrap().count();
+    fs::write(results.join("both.txt"), "complete").unwrap();
+    for signal in ["-INT", "-TERM", "-HUP"] {
+        let (_, code) = ended_by(signal, folder.path(), "match both.txt --out results", 1);
+        assert_eq!(code, Some(130), "{signal}");
+        let kept = fs::read_to_string(results.join("both.txt")).unwrap();
+        assert_eq!(kept, "complete", "{signal}");
+        assert_eq!(fs::read_dir(&results).unwrap().count(), before, "{signal}");
+    }
 }
 
 #[test]

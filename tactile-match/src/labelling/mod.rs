@@ -36,8 +36,8 @@ mod relaxation;
 use crate::Frame;
 use crate::error::{at_least_one, option_within, point_sets};
 use crate::{
-    MatchError, MatchReport, Matching, PointMatcher, SoftMatches, StopReason, hard,
-    linear_assignment, unmatched_rows,
+    MatchError, MatchReport, Matching, SoftMatches, StopReason, hard, linear_assignment,
+    unmatched_rows,
 };
 use nalgebra::{Point, SMatrix, SVector};
 use relaxation::{MatchMatrix, NeighbourGraph, energy, relax};
@@ -359,8 +359,9 @@ impl RelaxationLabelling {
     }
 }
 
-impl<const D: usize> PointMatcher<D> for RelaxationLabelling {
-    fn match_points(
+impl RelaxationLabelling {
+    /// [`PointMatcher::match_points`](crate::PointMatcher::match_points).
+    pub(crate) fn once<const D: usize>(
         &self,
         model: &[Point<f64, D>],
         target: &[Point<f64, D>],

@@ -46,7 +46,7 @@ pub use options::{
 };
 pub use result::SoftassignMatch;
 
-use crate::{Doubt, MatchError, MatchedPairs, Matching, PointMatcher, WarmStart, error};
+use crate::{Doubt, MatchError, MatchedPairs, Matching, WarmStart, error};
 use crate::{centre_and_radius, widened};
 use assign::{Blocks, TargetErrors};
 use confidence::PairOdds;
@@ -163,8 +163,8 @@ impl<const D: usize> SoftassignWorkspace<D> {
 }
 
 impl AnnealedSoftassign {
-    /// As [`PointMatcher::match_points`] in the caller's workspace. Nothing is allocated once that
-    /// has grown.
+    /// As [`match_points`](crate::PointMatcher::match_points) in the caller's workspace. Nothing is
+    /// allocated once that has grown.
     ///
     /// `observe` hears the iteration and the energy after every outer iteration and may stop the
     /// search: the best answer so far is then returned.
@@ -200,7 +200,7 @@ impl AnnealedSoftassign {
     /// ```
     ///
     /// # Errors
-    /// As [`PointMatcher::match_points`].
+    /// As [`match_points`](crate::PointMatcher::match_points).
     pub fn match_points_with<'w, const D: usize>(
         &self,
         workspace: &'w mut SoftassignWorkspace<D>,
@@ -209,13 +209,15 @@ impl AnnealedSoftassign {
         mut observe: impl FnMut(usize, f64) -> ControlFlow<()>,
     ) -> Result<SoftassignMatch<'w, D>, MatchError> {
         workspace.take(model, target)?;
-        self.solve(workspace, &mut observe);
+        self.search_in(workspace, &mut observe)?;
         Ok(SoftassignMatch::of(workspace))
     }
 }
 
-impl<const D: usize> PointMatcher<D> for AnnealedSoftassign {
-    fn match_points(
+// The methods of its matcher, which the crate compiles for the plane and for space.
+
+impl AnnealedSoftassign {
+    pub(crate) fn once<const D: usize>(
         &self,
         model: &[Point<f64, D>],
         target: &[Point<f64, D>],
@@ -227,7 +229,7 @@ impl<const D: usize> PointMatcher<D> for AnnealedSoftassign {
         Ok(found.to_matching(model))
     }
 
-    fn match_next(
+    pub(crate) fn next<const D: usize>(
         &self,
         warm: &mut WarmStart,
         model: &[Point<f64, D>],
@@ -238,7 +240,7 @@ impl<const D: usize> PointMatcher<D> for AnnealedSoftassign {
         Ok(series.matching())
     }
 
-    fn match_next_pairs(
+    pub(crate) fn next_pairs<const D: usize>(
         &self,
         warm: &mut WarmStart,
         model: &[Point<f64, D>],

@@ -90,7 +90,7 @@ enum Start<const D: usize> {
 type Observer<'a> = &'a mut dyn FnMut(usize, f64) -> ControlFlow<()>;
 
 impl AnnealedSoftassign {
-    pub(super) fn solve<const D: usize>(
+    pub(crate) fn solve<const D: usize>(
         &self,
         ws: &mut SoftassignWorkspace<D>,
         observe: Observer<'_>,
