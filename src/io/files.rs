@@ -1,12 +1,14 @@
 //! Whole files in and out, and TOML files as structs with checked numbers.
 use super::error::{FileError, FilePlace, quoted};
 use serde::de::{self, Deserialize, DeserializeOwned, Deserializer, Unexpected, Visitor};
-use serde_path_to_error::Segment;
 use std::fmt;
 use std::fs::{self, File, Metadata, OpenOptions, Permissions};
 use std::io::{Error, ErrorKind, Read, Write};
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 use tempfile::TempPath;
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
 #[cfg(target_os = "linux")]
 use {
     rustix::fs::{AtFlags, CWD, Mode, OFlags},
@@ -180,23 +182,38 @@ pub fn parse_toml<T: DeserializeOwned>(text: &str, path: &Path) -> Result<T, Fil
             .count();
         rejected(FilePlace::Line(line as u64), &error)
     })?;
-    serde_path_to_error::deserialize(parsed).map_err(|error| {
-        let mut field = String::new();
-        for segment in error.path() {
-            let dot = if field.is_empty() { "" } else { "." };
-            match segment {
-                Segment::Seq { index } => field += &format!("[{}]", index + 1),
-                Segment::Map { key } => field += &format!("{dot}{key}"),
-                Segment::Enum { variant } => field += &format!("{dot}{variant}"),
-                Segment::Unknown => {}
-            }
-        }
-        let place = match field.as_str() {
-            "" => FilePlace::File,
-            field => FilePlace::Field(quoted(field, 80)),
+    T::deserialize(parsed).map_err(|error| {
+        let place = match error.span().and_then(|span| field_at(&span, text)) {
+            None => FilePlace::File,
+            Some(field) => FilePlace::Field(quoted(&field, 80)),
         };
-        rejected(place, error.inner())
+        rejected(place, &error)
     })
+}
+
+/// The path of the field whose key or value stands at these bytes of a TOML text.
+fn field_at(bytes: &Range<usize>, text: &str) -> Option<String> {
+    // An array of tables has the place of its first table's header: the inner one is named.
+    fn within(bytes: &Range<usize>, path: String, value: &Spanned<DeValue<'_>>) -> Option<String> {
+        let inner = match value.get_ref() {
+            DeValue::Table(table) => in_table(bytes, &format!("{path}."), table),
+            DeValue::Array(array) => (1..)
+                .zip(array.iter())
+                .find_map(|(i, value)| within(bytes, format!("{path}[{i}]"), value)),
+            _ => None,
+        };
+        inner.or_else(|| (value.span() == *bytes).then_some(path))
+    }
+    fn in_table(bytes: &Range<usize>, prefix: &str, table: &DeTable<'_>) -> Option<String> {
+        table.iter().find_map(|(key, value)| {
+            let path = format!("{prefix}{}", key.get_ref());
+            if key.span() == *bytes {
+                return Some(path);
+            }
+            within(bytes, path, value)
+        })
+    }
+    in_table(bytes, "", DeTable::parse(text).ok()?.get_ref())
 }
 
 /// The path that a file names, relative to the folder of that file.
