@@ -13,8 +13,9 @@ use tactile_imaging::fem::{
     AppliedLoad, Block, FemScene, Guide, GuideLayer, Interface, Lump, Material,
 };
 use tactile_imaging::inclusion::{
-    AssumedInclusion, Estimated, Identifiable, InclusionEstimate, InclusionScene, InclusionSearch,
-    LoadedInclusion, PressureProfile, SearchProgress, Specimen, Verdict, asymmetry_warnings,
+    AssumedInclusion, Estimated, Identifiable, Inclusion, InclusionEstimate, InclusionScene,
+    InclusionSearch, LoadedInclusion, PressureProfile, SearchProgress, Specimen, Verdict,
+    asymmetry_warnings,
 };
 use tactile_imaging::pipeline::with_error;
 
@@ -247,7 +248,7 @@ pub fn run(arguments: &InclusionArguments, context: &mut Context) -> Result<Exit
     }
     context.value(&json!({
         "verdict": estimate.verdict(), "found": estimate.found, "probability": estimate.probability, "inclusion": estimate.inclusion,
-        "inclusions": estimate.inclusion.as_slice(),
+        "inclusions": estimate.inclusions(),
         "block_modulus_pa": estimate.block_modulus_pa, "interface": estimate.interface,
         "misfit": estimate.misfit, "asymmetry": scan.asymmetry, "harmonics": scan.harmonics, "is_asymmetric": is_asymmetric,
     }));
@@ -372,38 +373,20 @@ fn parameter(parameter: &Identifiable, scale: f64, unit: &str) -> String {
 }
 
 fn print(estimate: &InclusionEstimate, scan: &Scan, context: &mut Context) {
+    let lumps = estimate.inclusions();
     let verdict = match (estimate.verdict(), estimate.probability) {
+        (Verdict::Found, _) if lumps.len() > 1 => "two lumps".to_owned(),
         (Verdict::Found, _) => "a lump".to_owned(),
         (Verdict::Absent, _) => "no lump that these frames show".to_owned(),
         (Verdict::Uncertain, p) if p > 0.5 => format!("uncertain: a lump with probability {p:.2}"),
         (Verdict::Uncertain, _) => "uncertain: the model does not explain the frames".to_owned(),
     };
     context.answer("found", verdict);
-    if let Some(inclusion) = &estimate.inclusion {
-        if let Some([x, y]) = &inclusion.position_m {
-            context.answer("its middle, x", interval(x, 1e3, "mm"));
-            context.answer("its middle, y", interval(y, 1e3, "mm"));
+    for (index, lump) in lumps.iter().enumerate() {
+        if lumps.len() > 1 {
+            context.answer("lump", format_args!("{} of {}", index + 1, lumps.len()));
         }
-        context.answer("diameter", parameter(&inclusion.diameter_m, 1e3, "mm"));
-        context.answer("depth of its top", parameter(&inclusion.depth_m, 1e3, "mm"));
-        context.row(
-            "its modulus",
-            parameter(&inclusion.youngs_modulus_pa, 1e-3, "kPa"),
-        );
-        if let Some(shape) = &inclusion.height_over_width {
-            let ball = inclusion.ball_probability;
-            context.row(
-                "height over width",
-                format_args!(
-                    "{}, a ball with probability {ball:.2}",
-                    interval(shape, 1.0, "")
-                ),
-            );
-        }
-        let [[_, depth, modulus], [_, _, both], _] = inclusion.correlation;
-        context.row("correlations", format_args!(
-            "diameter–depth {depth:+.2}, diameter–modulus {modulus:+.2}, depth–modulus {both:+.2}"
-        ));
+        print_lump(lump, context);
     }
     context.row(
         "block's modulus",
@@ -428,6 +411,36 @@ fn print(estimate: &InclusionEstimate, scan: &Scan, context: &mut Context) {
             ),
         );
     }
+}
+
+fn print_lump(inclusion: &Inclusion, context: &mut Context) {
+    if let Some([x, y]) = &inclusion.position_m {
+        context.answer("its middle, x", interval(x, 1e3, "mm"));
+        context.answer("its middle, y", interval(y, 1e3, "mm"));
+    }
+    context.answer("diameter", parameter(&inclusion.diameter_m, 1e3, "mm"));
+    context.answer("depth of its top", parameter(&inclusion.depth_m, 1e3, "mm"));
+    context.row(
+        "its modulus",
+        parameter(&inclusion.youngs_modulus_pa, 1e-3, "kPa"),
+    );
+    if let Some(shape) = &inclusion.height_over_width {
+        let ball = inclusion.ball_probability;
+        context.row(
+            "height over width",
+            format_args!(
+                "{}, a ball with probability {ball:.2}",
+                interval(shape, 1.0, "")
+            ),
+        );
+    }
+    let [[_, depth, modulus], [_, _, both], _] = inclusion.correlation;
+    context.row(
+        "correlations",
+        format_args!(
+            "diameter–depth {depth:+.2}, diameter–modulus {modulus:+.2}, depth–modulus {both:+.2}"
+        ),
+    );
 }
 
 fn table(estimate: &InclusionEstimate, scan: &Scan) -> Vec<u8> {
@@ -491,7 +504,7 @@ fn page(estimate: &InclusionEstimate, scan: &Scan) -> Page {
     Page::new("Inclusion under the surface", 2, panels)
 }
 
-/// The block in section, to scale, with the lump.
+/// The block in section, to scale, with the lumps.
 fn section(scan: &Scan, estimate: &InclusionEstimate) -> Panel {
     let specimen = scan.specimen;
     let (height, radius) = (1e3 * specimen.height_m(), 1e3 * specimen.radius_m());
@@ -507,18 +520,17 @@ fn section(scan: &Scan, estimate: &InclusionEstimate) -> Panel {
         let name = if k == 0 { "guide's face" } else { "" };
         panel = panel.line([[x - face, 0.5], [x + face, 0.5]], Colour::Blue, name);
     }
-    let Some(inclusion) = &estimate.inclusion else {
-        return panel;
+    let of_lump = |inclusion: &Inclusion| {
+        let radius = 0.5e3 * inclusion.diameter_m.estimate().value;
+        let depth = inclusion.depth_m.estimate();
+        let x = inclusion.position_m.map_or(0.0, |[x, _]| 1e3 * x.value);
+        let [high, low] = depth.interval.map(|depth| [x, -1e3 * depth]);
+        ([x, -1e3 * depth.value - radius], vec![[high, low]])
     };
-    let lump_radius = 0.5e3 * inclusion.diameter_m.estimate().value;
-    let depth = 1e3 * inclusion.depth_m.estimate().value;
-    let x = inclusion.position_m.map_or(0.0, |[x, _]| 1e3 * x.value);
-    let rim = circle([x, -depth - lump_radius], lump_radius);
-    panel.line(rim, Colour::Orange, "lump")
+    with_lumps(panel, estimate, "its top, 95 %", of_lump)
 }
 
-/// The faces of all presses and the lump from above, to scale, with the ends of its diameter's
-/// interval and those of its place's.
+/// The faces of all presses and the lumps from above, to scale.
 fn above(scan: &Scan, estimate: &InclusionEstimate) -> Panel {
     let face = 1e3 * scan.guide.radius_m();
     let mut panel = Panel::new("From above, to scale", "x (mm)", "y (mm)").equal_aspect();
@@ -526,24 +538,38 @@ fn above(scan: &Scan, estimate: &InclusionEstimate) -> Panel {
         let name = if k == 0 { "guide's face" } else { "" };
         panel = panel.line(circle(axis, face), Colour::Blue, name);
     }
-    let Some(inclusion) = &estimate.inclusion else {
-        return panel;
-    };
-    let centre = (inclusion.position_m).map_or([0.0; 2], |at| at.map(|x| 1e3 * x.value));
-    let diameter = inclusion.diameter_m.estimate();
-    let [low, high] = diameter.interval;
-    if let Some([x, y]) = &inclusion.position_m {
+    let of_lump = |inclusion: &Inclusion| {
+        let Some([x, y]) = inclusion.position_m else {
+            return ([0.0; 2], vec![]);
+        };
         let [[left, right], [down, up]] = [x, y].map(|at| at.interval.map(|end| 1e3 * end));
-        let [x, y] = centre;
-        let cross = [[[left, y], [right, y]], [[x, down], [x, up]]];
-        panel = panel.segments(cross, Colour::Orange, "its place, 95 %");
+        let [x, y] = [x, y].map(|at| 1e3 * at.value);
+        let cross = vec![[[left, y], [right, y]], [[x, down], [x, up]]];
+        ([x, y], cross)
+    };
+    with_lumps(panel, estimate, "its place, 95 %", of_lump)
+}
+
+/// A panel with every lump and the ends of its diameter's interval. `of_lump` gives its middle and
+/// the lines of another interval, which are named.
+fn with_lumps(
+    mut panel: Panel,
+    estimate: &InclusionEstimate,
+    name: &'static str,
+    of_lump: impl Fn(&Inclusion) -> ([f64; 2], Vec<[[f64; 2]; 2]>),
+) -> Panel {
+    for (index, inclusion) in estimate.inclusions().iter().enumerate() {
+        // The legend names each kind of line once.
+        let named = |text: &'static str| if index == 0 { text } else { "" };
+        let (centre, lines) = of_lump(inclusion);
+        let diameter = inclusion.diameter_m.estimate();
+        let [low, high] = diameter.interval;
+        let rim = |diameter_m: f64| circle(centre, 0.5e3 * diameter_m);
+        panel = panel
+            .segments(lines, Colour::Orange, named(name))
+            .line(rim(diameter.value), Colour::Orange, named("lump"))
+            .dashed(rim(low), Colour::Grey, named("its size, 95 %"))
+            .dashed(rim(high), Colour::Grey, "");
     }
     panel
-        .line(
-            circle(centre, 0.5e3 * diameter.value),
-            Colour::Orange,
-            "lump",
-        )
-        .dashed(circle(centre, 0.5e3 * low), Colour::Grey, "its size, 95 %")
-        .dashed(circle(centre, 0.5e3 * high), Colour::Grey, "")
 }

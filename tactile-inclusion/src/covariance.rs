@@ -1,5 +1,6 @@
 //! Covariance of ring means: the sensor's errors and the model's.
 
+use crate::forward::Forward;
 use crate::picture::CellPositions;
 use crate::specimen::SensorErrors;
 use nalgebra::DMatrix;
@@ -223,18 +224,28 @@ impl Observed {
         sums.into_iter().map(|sum| sum / last).collect()
     }
 
+    /// These values with a relative error of the pressure that two inclusions have together, in
+    /// quadrature with that of each.
+    pub fn with_neighbours(mut self, error: f64) -> Self {
+        let aside = self.cells.iter_mut().flat_map(|cells| &mut cells.aside);
+        aside.for_each(|aside| *aside = aside.hypot(error));
+        self
+    }
+
     /// These values with the error of the pressure of an inclusion off the axis that lifts the
-    /// pressure by this part.
-    pub fn with_lump_aside(&self, centre_m: [f64; 2], face_radius_m: f64, lift: f64) -> Self {
+    /// pressure by this part, in quadrature with that of another. Far from a face it fades with what
+    /// the inclusion adds there.
+    pub fn with_lump_aside(&self, centre_m: [f64; 2], forward: &Forward, lift: f64) -> Self {
         let mut observed = self.clone();
-        if let Some(cells) = &mut observed.cells {
+        if let (Some(cells), Some(face)) = (&mut observed.cells, &forward.cells) {
             let CellPositions {
                 presses, axes_m, ..
             } = &*cells.positions;
-            let aside = presses.iter().map(|press| {
+            let aside = presses.iter().zip(&cells.aside).map(|(press, before)| {
                 let axis = axes_m[*press];
                 let aside_m = (centre_m[0] - axis[0]).hypot(centre_m[1] - axis[1]);
-                ASIDE * aside_m / face_radius_m * lift.min(1.0)
+                let share = lift.min(1.0) * face.fade(aside_m, aside_m);
+                before.hypot(ASIDE * aside_m / forward.guide.radius_m() * share)
             });
             cells.aside = aside.collect();
         }

@@ -154,8 +154,8 @@ pub struct Inclusion {
 #[non_exhaustive]
 pub enum InclusionWarning {
     /// The best fit leaves more than the errors explain (below 1 chance in 1000): several
-    /// inclusions, one off the axis, or errors larger than stated. Errors are widened by the root
-    /// of the excess, and no parameter counts as identified.
+    /// inclusions, one off the axis, a stiffer skin, or errors larger than stated. Errors are
+    /// widened by the root of the excess, and no parameter counts as identified.
     PoorFit {
         /// χ² over its degrees of freedom.
         excess: f64,
@@ -197,7 +197,7 @@ impl fmt::Display for InclusionWarning {
             Self::PoorFit { excess } => write!(
                 f,
                 "the best fit leaves {excess:.1} times what the errors explain: several lumps, one \
-                 off the axis, or wrong sizes or forces; errors are widened"
+                 off the axis, a stiffer skin, or wrong sizes or forces; errors are widened"
             ),
             Self::OneFrame => {
                 f.write_str("one frame tells size and stiffness hardly apart: add approaches")
@@ -295,6 +295,8 @@ pub struct InclusionEstimate {
     /// The inclusion that explains the frames best. `None` where none was found, and where the
     /// picture is not that of a ball: there is a warning.
     pub inclusion: Option<Inclusion>,
+    /// A second one, where two explain the picture and one does not.
+    pub second: Option<Inclusion>,
     /// How the face touches the block.
     pub interface: Interface,
     /// χ² of the fit over its degrees of freedom.
@@ -310,6 +312,11 @@ pub struct InclusionEstimate {
 }
 
 impl InclusionEstimate {
+    /// All inclusions of which parameters are given.
+    pub fn inclusions(&self) -> Vec<Inclusion> {
+        self.inclusion.into_iter().chain(self.second).collect()
+    }
+
     /// This estimate with what belongs to the asymmetry of the picture it is from: its first
     /// harmonic around the axis and the root mean square of the second to fourth, both over the
     /// pressure. Beyond what a symmetric model explains there is a warning and no inclusion's
@@ -319,7 +326,7 @@ impl InclusionEstimate {
         self.warnings
             .extend(asymmetry_warnings(asymmetry, harmonics));
         if self.is_asymmetric() {
-            self.inclusion = None;
+            (self.inclusion, self.second) = (None, None);
         }
         self
     }

@@ -77,6 +77,13 @@ pub const ANSWER_ENDING: Ending = Ending {
     needed: f64::INFINITY,
 };
 
+/// Of two inclusions: 0.2 standard errors of each of some 22 coordinates, below which the objective
+/// of moved meshes is rough.
+pub const PAIR_ENDING: Ending = Ending {
+    step: 1.0,
+    ..ANSWER_ENDING
+};
+
 /// Of the first fits, which a finer mesh moves by more. From a start of the grid, four to eight
 /// evaluations are taken, under the wrong assumption about the face any number.
 pub const FIRST_FIT_ENDING: Ending = Ending {

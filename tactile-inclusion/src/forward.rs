@@ -18,6 +18,8 @@ pub struct Parameters {
     pub lump: Option<LumpParameters>,
     /// Where the inclusion is, which pressures of cells depend on.
     pub place: Place,
+    /// A second inclusion and its place.
+    pub second: Option<(LumpParameters, Place)>,
     /// How far the axis of each press was from where it is said to have been: of the first ones, the
     /// others are where they are said to be.
     pub strayed_m: Vec<[f64; 2]>,
@@ -75,6 +77,8 @@ pub enum Coordinate {
     Carried,
     /// x and y of how far a press was from where it is said to have been, in metres.
     Strayed(usize, usize),
+    /// A coordinate of the second inclusion.
+    OfSecond(&'static Coordinate),
 }
 
 impl Coordinate {
@@ -84,8 +88,14 @@ impl Coordinate {
             Self::Zero => 1e-3,
             Self::Centre(_) | Self::Strayed(..) => 1e-2,
             Self::PoissonRatio => -1e-1,
+            Self::OfSecond(coordinate) => coordinate.unit(),
             _ => 1.0,
         }
+    }
+
+    /// The same coordinate of the second inclusion, where it is one of an inclusion's.
+    pub fn of_second(self) -> Option<Self> {
+        OF_LUMP.iter().find(|c| **c == self).map(Self::OfSecond)
     }
 
     /// Whether a block solved with its inclusion under the axis does not depend on it.
@@ -93,7 +103,7 @@ impl Coordinate {
         matches!(
             self,
             Self::Centre(_) | Self::Elongation(_) | Self::Carried | Self::Strayed(..)
-        )
+        ) || matches!(self, Self::OfSecond(coordinate) if coordinate.is_place())
     }
 }
 
@@ -103,6 +113,19 @@ const BLOCK: [Coordinate; 4] = [
     Coordinate::Zero,
     Coordinate::Height,
     Coordinate::PoissonRatio,
+];
+
+/// Coordinates of an inclusion.
+static OF_LUMP: [Coordinate; 9] = [
+    Coordinate::Diameter,
+    Coordinate::Depth,
+    Coordinate::LumpModulus,
+    Coordinate::Aspect,
+    Coordinate::Centre(0),
+    Coordinate::Centre(1),
+    Coordinate::Elongation(0),
+    Coordinate::Elongation(1),
+    Coordinate::Carried,
 ];
 
 /// Largest Poisson ratio of a fit: the pressure differs from an incompressible block's by 0.1 %,
@@ -126,6 +149,7 @@ impl Parameters {
             Coordinate::Centre(axis) => self.place.centre_m[axis],
             Coordinate::Elongation(part) => self.place.elongation[part],
             Coordinate::Carried => self.place.carried,
+            Coordinate::OfSecond(coordinate) => self.swapped().get(*coordinate),
             Coordinate::Strayed(press, axis) => self
                 .strayed_m
                 .get(press)
@@ -133,8 +157,21 @@ impl Parameters {
         }
     }
 
+    /// These parameters with the second inclusion first.
+    pub fn swapped(&self) -> Self {
+        let mut swapped = self.clone();
+        if let Some((lump, place)) = self.second {
+            swapped.second = self.lump.map(|first| (first, self.place));
+            (swapped.lump, swapped.place) = (Some(lump), place);
+        }
+        swapped
+    }
+
     /// These parameters with one coordinate changed by `step`.
     pub fn moved(&self, coordinate: Coordinate, step: f64) -> Self {
+        if let Coordinate::OfSecond(coordinate) = coordinate {
+            return self.swapped().moved(*coordinate, step).swapped();
+        }
         let mut moved = self.clone();
         let factor = step.exp();
         match (coordinate, &mut moved.lump) {
@@ -163,6 +200,7 @@ impl Parameters {
                     strayed[axis] += step;
                 }
             }
+            (Coordinate::OfSecond(_), _) => {}
         }
         moved
     }
@@ -310,6 +348,15 @@ pub struct Prediction {
 pub struct Solved {
     meshed: Arc<Meshed>,
     frames: SolvedFrames,
+    /// With the second inclusion in place of the first, where there are two.
+    second: Option<Box<Solved>>,
+}
+
+impl Solved {
+    /// Pressure of a frame at a distance from the axis.
+    pub fn pressure_at(&self, frame: usize, radius_m: f64) -> f64 {
+        self.frames.states()[frame].pressure_at(radius_m)
+    }
 }
 
 /// A scene as it was meshed, before its mesh is moved to other parameters or along the interface.
@@ -399,6 +446,27 @@ impl Forward {
         parameters: &Parameters,
         near: Option<&Solved>,
     ) -> Option<(Prediction, Solved)> {
+        let mut solved = self.solve_near(parameters, near)?;
+        if parameters.second.is_some() {
+            let near = near.and_then(|near| near.second.as_deref());
+            solved.second = Some(Box::new(self.solve_near(&parameters.swapped(), near)?));
+        }
+        let states = solved.frames.states();
+        let of_second = solved
+            .second
+            .as_ref()
+            .map_or(states, |second| second.frames.states());
+        let prediction = self.collect(
+            parameters,
+            &|frame, radius| states[frame].pressure_at(radius),
+            &|frame, radius| of_second[frame].pressure_at(radius),
+            &|frame| states[frame].force_n(),
+        );
+        Some((prediction, solved))
+    }
+
+    /// The block with the first inclusion under the axis, from a scene solved nearby.
+    fn solve_near(&self, parameters: &Parameters, near: Option<&Solved>) -> Option<Solved> {
         let meshed = match near {
             Some(near) if near.meshed.reaches(parameters) => Arc::clone(&near.meshed),
             _ => {
@@ -416,12 +484,11 @@ impl Forward {
         let sliding_depth = self.slides().then(|| sliding_depth(parameters));
         let near = near.map(|near| &near.frames);
         let frames = SolvedFrames::new(&scene, &approaches, sliding_depth, near)?;
-        let answers = frames.states().iter();
-        let prediction = self.collect(
-            parameters,
-            answers.map(|state| (|radius: f64| state.pressure_at(radius), state.force_n())),
-        );
-        Some((prediction, Solved { meshed, frames }))
+        Some(Solved {
+            meshed,
+            frames,
+            second: None,
+        })
     }
 
     /// This forward model with the plain block that carries the pressure of one with an inclusion
@@ -429,6 +496,7 @@ impl Forward {
     pub fn with_plain(mut self, parameters: &Parameters) -> Option<Self> {
         let plain = Parameters {
             lump: None,
+            second: None,
             ..parameters.clone()
         };
         if self.cells.is_some() {
@@ -470,22 +538,28 @@ impl Forward {
         scene.changed(&materials, moved).ok()
     }
 
-    /// Values of frames, each given by its pressure over the radius and its force.
-    fn collect<P: Fn(f64) -> f64>(
+    /// Values of frames, given by their pressures over the radius, with each inclusion under the
+    /// axis, and their forces.
+    fn collect(
         &self,
         parameters: &Parameters,
-        frames: impl Iterator<Item = (P, f64)>,
+        pressure: &dyn Fn(usize, f64) -> f64,
+        pressure_of_second: &dyn Fn(usize, f64) -> f64,
+        force: &dyn Fn(usize) -> f64,
     ) -> Prediction {
+        let frames = 0..self.approaches_m.len();
         let mut values = Vec::with_capacity(self.observations());
-        let mut forces = Vec::with_capacity(self.approaches_m.len());
-        for (frame, (pressure_at, force)) in frames.enumerate() {
+        for frame in frames.clone() {
+            let axial = |radius: f64| pressure(frame, radius);
+            let of_second = |radius: f64| pressure_of_second(frame, radius);
             match &self.cells {
-                Some(cells) => values.extend(cells.pressures(frame, parameters, &pressure_at)),
-                None => values.extend(self.radii_m.iter().map(|&r| pressure_at(r))),
+                Some(cells) => {
+                    values.extend(cells.pressures(frame, parameters, &axial, &of_second));
+                }
+                None => values.extend(self.radii_m.iter().map(|&r| axial(r))),
             }
-            forces.push(force);
         }
-        values.extend(forces);
+        values.extend(frames.map(force));
         Prediction { values }
     }
 
@@ -522,34 +596,59 @@ impl Forward {
         coordinates: &[Coordinate],
         solved: &Solved,
     ) -> Option<Vec<Vec<f64>>> {
-        let solved_for = coordinates.iter().copied();
-        let solved_for: Vec<Coordinate> = solved_for.filter(|c| !c.is_place()).collect();
-        let answers = self.responses(parameters, &solved_for, solved)?;
-        let collect = |at: &Parameters, frames: &[FrameResponse]| {
-            let frames = frames.iter();
-            let frames = frames.map(|frame| (|r: f64| frame.pressure_at(r), frame.force_n()));
-            self.collect(at, frames)
-        };
-        let (unchanged, changed) = answers.split_last()?;
-        let here = collect(parameters, unchanged);
-        let mut changed = changed.iter();
-        let mut columns = Vec::with_capacity(coordinates.len());
-        for &coordinate in coordinates {
-            let frames = if coordinate.is_place() {
-                unchanged
-            } else {
-                changed.next()?
+        let responses = |of_second: bool| -> Option<(Vec<Coordinate>, Vec<Vec<FrameResponse>>)> {
+            let named = |&coordinate: &Coordinate| match coordinate {
+                Coordinate::OfSecond(coordinate) => of_second.then_some(*coordinate),
+                _ => (!of_second || BLOCK.contains(&coordinate)).then_some(coordinate),
             };
-            let there = collect(
-                &parameters.moved(coordinate, parameters.small_step(coordinate)),
-                frames,
-            );
+            let named: Vec<Coordinate> = coordinates.iter().filter_map(named).collect();
+            let named: Vec<Coordinate> = named.into_iter().filter(|c| !c.is_place()).collect();
+            let found = if of_second {
+                let second = solved.second.as_deref()?;
+                self.responses(&parameters.swapped(), &named, second)?
+            } else {
+                self.responses(parameters, &named, solved)?
+            };
+            Some((named, found))
+        };
+        let (first, of_first) = responses(false)?;
+        let (second, of_second) = if parameters.second.is_some() {
+            responses(true)?
+        } else {
+            (vec![], vec![])
+        };
+        // What is found after a step of a coordinate, or without one.
+        let found = |named: &[Coordinate], c: Option<Coordinate>| {
+            c.and_then(|c| named.iter().position(|named| *named == c))
+                .unwrap_or(named.len())
+        };
+        let collect = |at: &Parameters, step: Option<Coordinate>| {
+            let of_lump = |coordinate| match coordinate {
+                Coordinate::OfSecond(coordinate) => *coordinate,
+                coordinate => coordinate,
+            };
+            let is_of_second = matches!(step, Some(Coordinate::OfSecond(_)));
+            let frames = &of_first[found(&first, step)];
+            let step_of_second = step
+                .filter(|c| is_of_second || BLOCK.contains(c))
+                .map(of_lump);
+            let others = of_second
+                .get(found(&second, step_of_second))
+                .unwrap_or(frames);
+            self.collect(
+                at,
+                &|frame, radius| frames[frame].pressure_at(radius),
+                &|frame, radius| others[frame].pressure_at(radius),
+                &|frame| frames[frame].force_n(),
+            )
+        };
+        let here = collect(parameters, None);
+        let columns = coordinates.iter().map(|&coordinate| {
             let step = parameters.small_step(coordinate);
-            let column = (there.values.iter().zip(&here.values))
-                .map(|(there, here)| (there - here) / step)
-                .collect();
-            columns.push(column);
-        }
-        Some(columns)
+            let there = collect(&parameters.moved(coordinate, step), Some(coordinate));
+            let pairs = there.values.iter().zip(&here.values);
+            pairs.map(|(there, here)| (there - here) / step).collect()
+        });
+        Some(columns.collect())
     }
 }

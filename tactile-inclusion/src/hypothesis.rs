@@ -73,14 +73,18 @@ impl Hypothesis {
         self.homogeneous.evidence.max(self.evidence_with())
     }
 
+    /// The fit with more evidence.
+    pub fn better(&self) -> &Fit {
+        match &self.lump {
+            Some(lump) if lump.evidence > self.homogeneous.evidence => lump,
+            _ => &self.homogeneous,
+        }
+    }
+
     /// χ² over its degrees of freedom, where that is more than one: what differences of log
     /// evidence are too large by.
     pub fn inflation(&self, observed: &Observed) -> f64 {
-        let best = match &self.lump {
-            Some(lump) if lump.evidence > self.homogeneous.evidence => lump,
-            _ => &self.homogeneous,
-        };
-        (best.misfit / observed.values.len() as f64).max(1.0)
+        (self.better().misfit / observed.values.len() as f64).max(1.0)
     }
 
     /// Log evidence with an inclusion: that of the grid where none was fitted.
@@ -283,6 +287,7 @@ impl Hypothesis {
             found: is_found,
             block_modulus_pa: estimated(Coordinate::BlockModulus),
             inclusion,
+            second: None,
             interface: self.interface,
             misfit,
             warnings,

@@ -114,45 +114,61 @@ pub fn extent(points: &[[f64; 2]]) -> ([f64; 2], f64) {
 }
 
 impl Cells {
-    /// Pressures of a frame from those of a block with its lump under the axis, or without one.
+    /// Pressures of a frame from those of a block with its lump under the axis, or without one, and
+    /// from those with a second lump there.
     pub fn pressures(
         &self,
         frame: usize,
         parameters: &Parameters,
-        axial: &impl Fn(f64) -> f64,
+        axial: &dyn Fn(f64) -> f64,
+        axial_of_second: &dyn Fn(f64) -> f64,
     ) -> Vec<f64> {
-        let lump = parameters.lump.map(|_| parameters.place);
-        let at = |(&position, &press): (&[f64; 2], &usize)| {
-            let radius = position[0].hypot(position[1]);
-            match (lump, &self.plain) {
-                (Some(place), Some(plain)) => {
-                    let axis = self.positions.axes_m[press];
-                    let strayed = parameters.strayed_m.get(press).copied().unwrap_or_default();
-                    let from_axis = |k: usize| place.centre_m[k] - axis[k] - strayed[k];
-                    let place = Place {
-                        centre_m: [from_axis(0), from_axis(1)],
-                        ..place
-                    };
-                    let distance = place.distance(position, self.squeezed[frame]);
-                    let near = distance.min(self.reach_m);
-                    let ratio = axial(near) / plain.pressure_at(frame, near, parameters);
-                    let fade = self.fade(place.aside_m(), distance);
-                    plain.pressure_at(frame, radius, parameters) * (1.0 + fade * (ratio - 1.0))
-                }
-                _ => axial(radius),
-            }
-        };
         let CellPositions {
             positions_m,
             presses,
             ..
         } = &*self.positions;
+        let second = parameters.second.map(|_| parameters.swapped());
+        let at = |(&position, &press): (&[f64; 2], &usize)| {
+            let radius = position[0].hypot(position[1]);
+            let Some(plain) = self.plain.as_ref().filter(|_| parameters.lump.is_some()) else {
+                return axial(radius);
+            };
+            let strayed = parameters.strayed_m.get(press).copied();
+            let strayed = strayed.unwrap_or_default();
+            let axis = [0, 1].map(|k| self.positions.axes_m[press][k] + strayed[k]);
+            let ratio = |block: &Parameters, axial: &dyn Fn(f64) -> f64| {
+                self.ratio(plain, frame, (position, axis), block, axial)
+            };
+            let of_second = (second.as_ref()).map_or(1.0, |second| ratio(second, axial_of_second));
+            plain.pressure_at(frame, radius, parameters) * ratio(parameters, axial) * of_second
+        };
         positions_m.iter().zip(presses).map(at).collect()
+    }
+
+    /// How many times as large as a plain block's the pressure of a frame is with a lump, at a cell
+    /// from an axis. `axial` is the pressure with the lump under the axis.
+    fn ratio(
+        &self,
+        plain: &PlainBlock,
+        frame: usize,
+        (position, axis): ([f64; 2], [f64; 2]),
+        block: &Parameters,
+        axial: &dyn Fn(f64) -> f64,
+    ) -> f64 {
+        let place = Place {
+            centre_m: [0, 1].map(|k| block.place.centre_m[k] - axis[k]),
+            ..block.place
+        };
+        let distance = place.distance(position, self.squeezed[frame]);
+        let near = distance.min(self.reach_m);
+        let ratio = axial(near) / plain.pressure_at(frame, near, block);
+        1.0 + self.fade(place.aside_m(), distance) * (ratio - 1.0)
     }
 
     /// What is left of a lump's share at a distance from it, where it is so far from the axis: with
     /// the third power of the distance, as that of a force pair under the surface.
-    fn fade(&self, aside_m: f64, distance_m: f64) -> f64 {
+    pub fn fade(&self, aside_m: f64, distance_m: f64) -> f64 {
         // From the used part's edge to twice as far out a lump passes from under the face.
         let beyond = (aside_m / self.reach_m - 1.0).clamp(0.0, 1.0);
         let far = (self.reach_m / distance_m.max(self.reach_m)).powi(3);

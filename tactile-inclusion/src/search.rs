@@ -76,6 +76,16 @@ pub struct InclusionSearch {
     shape_error: f64,
 }
 
+/// Difference of log evidence above which one assumption about the face is clearly better: 20 to 1
+/// and three times as much again for what the finite elements err by on a sliding face, which the
+/// covariance knows by its size alone. Two frames on soft tissue by CalculiX preferred the wrong
+/// one by up to 13, beside a poor fit (`inclusion_study` on the scenes of
+/// `evidence/inclusion_scenes.py`); the price is intervals that hold under both where the right one
+/// leads by less. Where the better one leaves more than the errors explain, differences count as
+/// much less (K. P. Burnham & D. R. Anderson, *Model Selection and Multimodel Inference* (2002),
+/// §2.5).
+pub const CLEAR_EVIDENCE: f64 = 12.0;
+
 /// Standard error of the logarithm of an inclusion's height over its width, where nothing is said:
 /// 1.75 to one and one to 1.75 are at its 95 % range's ends.
 const SHAPE_ERROR: f64 = 0.29;
@@ -178,10 +188,11 @@ impl InclusionSearch {
     }
 
     /// As [`Self::search_picture`], from presses at several places of a block that is far wider than
-    /// the guide: one posterior over all of them, with one inclusion. How far each press was from
+    /// the guide: one posterior over all of them, with one inclusion or two. How far each press was from
     /// where it is said to have been is fitted along, and each has an error of its own of the
     /// approaches' zero. The inclusion's place is given in the presses' coordinates. Only places
-    /// under the used part of some press's face are searched. The time grows as the third power of
+    /// under the used part of some press's face are searched. Two are told where one leaves more
+    /// than the errors explain and two do not. The time grows as the third power of
     /// the number of all cells: an eighth of the face's radius is narrow enough for five presses.
     ///
     /// # Errors
@@ -217,15 +228,6 @@ impl InclusionSearch {
         // Difference of log evidence beyond which another assumption about the face is not fitted
         // to the end.
         let rival_evidence = 16.0;
-        // Difference of log evidence above which one assumption about the face is clearly better:
-        // 20 to 1 and three times as much again for what the finite elements err by on a sliding
-        // face, which the covariance knows by its size alone. Two frames on soft tissue by CalculiX
-        // preferred the wrong one by up to 13, beside a poor fit (`inclusion_study` on the scenes
-        // of `evidence/inclusion_scenes.py`); the price is intervals that hold under both where the
-        // right one leads by less. Where the better one leaves more than the errors explain,
-        // differences count as much less (K. P. Burnham & D. R. Anderson, *Model Selection and
-        // Multimodel Inference* (2002), §2.5).
-        let clear_evidence = 12.0;
         let interfaces = self.specimen.interfaces();
         let mut counter = Counter {
             done: 0,
@@ -269,6 +271,11 @@ impl InclusionSearch {
             is_unsolved |= found.is_none();
             hypotheses.extend(found);
         }
+        hypotheses.sort_by(|a, b| b.evidence().total_cmp(&a.evidence()));
+        let pair = self.pair(observed, approaches_m, &hypotheses, &mut counter);
+        if let Some(pair) = pair.filter(|_| !counter.cancelled) {
+            return Ok(pair);
+        }
         let best = (hypotheses.iter()).map(Hypothesis::evidence);
         let needed = best.fold(f64::NEG_INFINITY, f64::max) - rival_evidence;
         for hypothesis in &mut hypotheses {
@@ -282,7 +289,7 @@ impl InclusionSearch {
         hypotheses.sort_by(|a, b| b.evidence().total_cmp(&a.evidence()));
         let mut hypotheses = hypotheses.into_iter();
         let best = hypotheses.next().ok_or(ElasticityError::NoSolution)?;
-        let clear = clear_evidence * best.inflation(observed);
+        let clear = CLEAR_EVIDENCE * best.inflation(observed);
         let rival = (hypotheses.next()).filter(|other| best.evidence() - other.evidence() < clear);
         Ok(best.estimate(observed, rival.as_ref(), is_unsolved))
     }
@@ -354,6 +361,7 @@ impl InclusionSearch {
                 carried: CARRIED,
                 ..Place::default()
             },
+            second: None,
             strayed_m: Vec::new(),
             zero_m: 0.0,
             height_m: self.specimen.height_m(),
@@ -624,8 +632,8 @@ impl InclusionSearch {
 }
 
 /// Diameters and depths over the face's radius, and contrasts E₁/E₀, that a face can see.
-const DIAMETERS: [f64; 3] = [0.35, 0.65, 1.05];
-const DEPTHS: [f64; 3] = [0.15, 0.3, 0.55];
+pub const DIAMETERS: [f64; 3] = [0.35, 0.65, 1.05];
+pub const DEPTHS: [f64; 3] = [0.15, 0.3, 0.55];
 const CONTRASTS: [f64; 2] = [2.5, 8.0];
 
 /// An inclusion in a block, and its pressures.
@@ -811,7 +819,7 @@ impl InclusionSearch {
             Some(fit) => {
                 let centre = fit.parameters.place.centre_m;
                 let lift = problem.forward.lift(&fit.solved);
-                observed.with_lump_aside(centre, self.guide.radius_m(), lift)
+                observed.with_lump_aside(centre, &problem.forward, lift)
             }
             None => observed.clone(),
         };

@@ -49,6 +49,7 @@ fn load(header: &[&str], row: &str) -> Load {
             block_modulus_pa: number("E0_pa"),
             lump: (lump.diameter_m > 0.0).then_some(lump),
             place: Place::default(),
+            second: None,
             strayed_m: vec![],
             zero_m: 0.0,
             height_m: number("block_height_m"),

@@ -49,6 +49,7 @@ fn solved_with(interface: Interface, lump: Option<LumpParameters>, radii_m: &[f6
         block_modulus_pa: 5e3,
         lump,
         place: Place::default(),
+        second: None,
         strayed_m: vec![],
         zero_m: 0.0,
         height_m: 30e-3,

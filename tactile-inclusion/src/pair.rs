@@ -1,0 +1,304 @@
+//! Two inclusions where one does not explain the pressure.
+//!
+//! The pressure is that of a plain block times the ratios of both,
+//!
+//! $$ p = p_\mathrm{plain} \prod_k \frac{p_k}{p_\mathrm{plain}} $$
+//!
+//! in which each p_k has its lump under the axis and is laid around its place. The parameters of
+//! both are fitted together.
+
+use crate::covariance::{Observed, Resolution};
+use crate::estimate::InclusionEstimate;
+use crate::fit::{FIRST_FIT_ENDING, Fit, PAIR_ENDING, Prior, Problem};
+use crate::forward::{Coordinate, Forward, LumpParameters, Parameters};
+use crate::hypothesis::{BLOCK_COORDINATES, Hypothesis, is_poor};
+use crate::picture::extent;
+use crate::search::{CLEAR_EVIDENCE, Counter, DEPTHS, DIAMETERS, InclusionSearch};
+use nalgebra::DVector;
+use tactile_fem::Kinematics;
+
+/// Error of the product of ratios, over the pressure, where two inclusions touch of which each
+/// doubles it. It falls with their distance, and grows with the root of the product of what they
+/// add.
+const NEIGHBOURS: f64 = 0.03;
+
+/// How far tissue that flows away from the axis carries an inclusion beside another.
+const CARRIED: Coordinate = Coordinate::Carried;
+
+/// Its standard error: two inclusions hold the tissue between them back, and come half as far in
+/// solutions in three dimensions.
+const CARRIED_ERROR: f64 = 0.4;
+
+/// Two inclusions under one assumption about the face.
+struct Pair {
+    lumps: [Hypothesis; 2],
+}
+
+impl Pair {
+    fn evidence(&self) -> f64 {
+        self.lumps[1].evidence()
+    }
+
+    /// These with that one first which is nearer to a place.
+    fn nearer_first(mut self, [x, y]: [f64; 2]) -> Self {
+        let places = self.fits().map(|fit| fit.parameters.place.centre_m);
+        let away: Vec<f64> = places.map(|at| (at[0] - x).hypot(at[1] - y)).collect();
+        if !away.is_sorted() {
+            self.lumps.reverse();
+        }
+        self
+    }
+
+    fn fits(&self) -> impl Iterator<Item = &Fit> {
+        self.lumps.iter().filter_map(|one| one.lump.as_ref())
+    }
+
+    /// Whether the fits settled, explain the pressure, and the inclusions do not overlap.
+    fn is_possible(&self, observed: &Observed) -> bool {
+        self.fits().all(|fit| {
+            fit.converged && !is_poor(fit.misfit, observed) && apart(&fit.parameters) > 1.0
+        })
+    }
+}
+
+/// Distance of two inclusions over that at which they touch.
+fn apart(both: &Parameters) -> f64 {
+    let of = |one: &Parameters| {
+        let width = one.lump.map_or(0.0, |lump| lump.axes_m()[0]);
+        (width, one.place.centre_m)
+    };
+    let ((width, at), (other_width, other_at)) = (of(both), of(&both.swapped()));
+    (at[0] - other_at[0]).hypot(at[1] - other_at[1]) / (0.5 * (width + other_width))
+}
+
+impl InclusionSearch {
+    /// Two inclusions, where the best fit of one is poor and one of two is good. `ones` are the
+    /// fits of one under each assumption about the face, the best first.
+    pub(crate) fn pair(
+        &self,
+        observed: &Observed,
+        approaches_m: &[f64],
+        ones: &[Hypothesis],
+        counter: &mut Counter<'_>,
+    ) -> Option<InclusionEstimate> {
+        // Log evidence by which two must exceed one: far more than what ellipsoids and the model's
+        // own error bring.
+        let least_gain = 100.0;
+        let one = ones.first()?.better();
+        if observed.cells.is_none() || !is_poor(one.misfit, observed) {
+            return None;
+        }
+        // Of a block that may be plain no inclusion was fitted.
+        let is_fitted = |one: &&Hypothesis| one.problem.priors.len() > BLOCK_COORDINATES;
+        let fitted: Vec<&Hypothesis> = ones.iter().filter(is_fitted).collect();
+        let mut pairs: Vec<Pair> = (fitted.iter())
+            .filter_map(|one| self.fit_pair(observed, approaches_m, one, counter))
+            .collect();
+        let is_unsolved = pairs.len() < fitted.len();
+        pairs.sort_by(|a, b| b.evidence().total_cmp(&a.evidence()));
+        let best = pairs.first()?.evidence();
+        pairs.retain(|pair| pair.evidence() > best - CLEAR_EVIDENCE);
+        if best < ones[0].evidence() + least_gain
+            || !pairs.iter().all(|pair| pair.is_possible(observed))
+        {
+            return None;
+        }
+        for lump in pairs.iter_mut().flat_map(|pair| &mut pair.lumps) {
+            lump.follow(|| counter.step());
+        }
+        let mut pairs = pairs.into_iter();
+        let best = pairs.next()?;
+        let at = best.fits().next()?.parameters.place.centre_m;
+        let rivals = pairs.next().map(|pair| pair.nearer_first(at).lumps);
+        let rival = |k: usize| rivals.as_ref().map(|rivals| &rivals[k]);
+        let [first, second] = best.lumps;
+        let mut answer = first.estimate(observed, rival(0), is_unsolved);
+        let second = second.estimate(observed, rival(1), is_unsolved);
+        answer.second = Some(second.inclusion?);
+        answer.inclusion?;
+        Some(answer)
+    }
+
+    fn fit_pair(
+        &self,
+        observed: &Observed,
+        approaches_m: &[f64],
+        one: &Hypothesis,
+        counter: &mut Counter<'_>,
+    ) -> Option<Pair> {
+        let mut at = self.pair_start(observed, one)?;
+        let mut priors = one.problem.priors.clone();
+        let of_second = one.problem.priors.iter().filter_map(|prior| {
+            let coordinate = prior.coordinate.of_second()?;
+            Some(Prior {
+                coordinate,
+                ..*prior
+            })
+        });
+        priors.extend(of_second);
+        for prior in &mut priors {
+            if prior.coordinate == CARRIED || prior.coordinate == Coordinate::OfSecond(&CARRIED) {
+                prior.standard_error = CARRIED_ERROR;
+            }
+        }
+        // Elements along an eighth of an inclusion's circumference.
+        for (fineness, resolution, ending) in [
+            (3, Resolution::FirstFits, FIRST_FIT_ENDING),
+            (5, Resolution::Answer, PAIR_ENDING),
+        ] {
+            let forward = self.forward(observed, approaches_m, one.interface, fineness);
+            let forward = forward.with_plain(&at)?;
+            let mut observed = observed.clone();
+            let mut lifts: f64 = 1.0;
+            for lump in [&at, &at.swapped()] {
+                let (_, solved) = forward.predict_near(lump, None)?;
+                let lift = forward.lift(&solved).min(1.0);
+                observed = observed.with_lump_aside(lump.place.centre_m, &forward, lift);
+                lifts *= lift;
+            }
+            observed = observed.with_neighbours(NEIGHBOURS * lifts.sqrt() / apart(&at).max(1.0));
+            let covariance = observed.covariance(self.sensor(), one.interface, resolution);
+            let problem = Problem {
+                forward,
+                measured: observed.values.clone(),
+                factor: covariance.cholesky()?,
+                priors: priors.clone(),
+            };
+            let fit = problem.fit(&at, ending, || counter.step())?;
+            at = fit.parameters.clone();
+            if resolution == Resolution::Answer {
+                // The same with the second one first, whose posterior is followed then.
+                let swapped = problem.fit(&at.swapped(), ending, || counter.step())?;
+                let again = Problem {
+                    forward: problem.forward.clone(),
+                    measured: problem.measured.clone(),
+                    factor: problem.factor.clone(),
+                    priors,
+                };
+                let both = [(problem, fit), (again, swapped)];
+                let lumps = both.map(|(problem, fit)| Hypothesis {
+                    problem,
+                    interface: one.interface,
+                    homogeneous: one.homogeneous.clone(),
+                    score: None,
+                    lump: Some(fit),
+                    marginal: None,
+                });
+                return Some(Pair { lumps });
+            }
+        }
+        None
+    }
+
+    /// Two like inclusions, the product of whose ratios is nearest to the last frame's pressure over
+    /// the plain block's.
+    ///
+    /// Logarithms of ratios add. Those of small strain under the axis are laid around each place of
+    /// a grid; for each two places the multiples that fit best are found.
+    fn pair_start(&self, observed: &Observed, one: &Hypothesis) -> Option<Parameters> {
+        let contrast: f64 = 8.0;
+        // Multiples of an inclusion's logarithm that a contrast can bring.
+        let possible = 0.15..2.5;
+        let fineness: usize = 2;
+        let forward = Forward {
+            kinematics: Kinematics::Linear,
+            fineness,
+            ..one.problem.forward.clone()
+        };
+        // A fit of one is bent out of what is known of the block.
+        let mut block = self.known_block(one.homogeneous.parameters.block_modulus_pa);
+        block.strayed_m =
+            vec![[0.0; 2]; one.problem.forward.cells.as_ref()?.positions.axes_m.len()];
+        let forward = forward.with_plain(&block)?;
+        let cells = forward.cells.as_ref()?;
+        let (count, frame) = (cells.positions.positions_m.len(), observed.frames - 1);
+        let face_m = forward.guide.radius_m();
+        let plain = Parameters {
+            lump: None,
+            ..block.clone()
+        };
+        let plain = forward.predict(&plain)?.values[frame * count..][..count].to_vec();
+        let relative = |values: &[f64]| {
+            let logarithms = values.iter().zip(&plain).map(|(p, plain)| (p / plain).ln());
+            let logarithms = DVector::from_iterator(count, logarithms);
+            let mean = logarithms.mean();
+            (logarithms.add_scalar(-mean), mean)
+        };
+        let (measured, level) = relative(&observed.values[frame * count..][..count]);
+        let (middle, half_width) = extent(&cells.positions.axes_m);
+        let step = face_m / 6.0;
+        let reach = ((half_width + cells.reach_m) / step).floor() as i32;
+        let grid = (-reach..=reach).flat_map(|i| (-reach..=reach).map(move |k| [i, k]));
+        let places: Vec<[f64; 2]> = grid
+            .map(|at| [0, 1].map(|k| middle[k] + step * f64::from(at[k])))
+            .filter(|at| {
+                let away = |axis: &[f64; 2]| (at[0] - axis[0]).hypot(at[1] - axis[1]);
+                cells
+                    .positions
+                    .axes_m
+                    .iter()
+                    .any(|axis| away(axis) <= cells.reach_m)
+            })
+            .collect();
+        let mut best: Option<(f64, Parameters)> = None;
+        for (diameter, depth) in DIAMETERS
+            .into_iter()
+            .flat_map(|d| DEPTHS.map(|depth| (d, depth)))
+        {
+            let at = |place: [f64; 2], contrast: f64| {
+                let mut parameters = block.clone();
+                parameters.lump = Some(LumpParameters {
+                    diameter_m: diameter * face_m,
+                    depth_m: depth * face_m,
+                    youngs_modulus_pa: contrast * block.block_modulus_pa,
+                    aspect: 1.0,
+                });
+                parameters.place.centre_m = place;
+                parameters.place.elongation = [0.0; 2];
+                parameters
+            };
+            let Some((_, solved)) = forward.predict_near(&at(middle, contrast), None) else {
+                continue;
+            };
+            let axial = |radius: f64| solved.pressure_at(frame, radius);
+            let (columns, means): (Vec<DVector<f64>>, Vec<f64>) = (places.iter())
+                .map(|place| {
+                    relative(&cells.pressures(frame, &at(*place, contrast), &axial, &axial))
+                })
+                .unzip();
+            let along: Vec<f64> = columns.iter().map(|column| column.dot(&measured)).collect();
+            let squares: Vec<f64> = columns.iter().map(|column| column.norm_squared()).collect();
+            for i in 0..places.len() {
+                for k in 0..i {
+                    let [a, b] = [places[i], places[k]];
+                    if (a[0] - b[0]).hypot(a[1] - b[1]) < diameter * face_m {
+                        continue;
+                    }
+                    let shared = columns[i].dot(&columns[k]);
+                    let determinant = squares[i] * squares[k] - shared * shared;
+                    let multiples = [
+                        (squares[k] * along[i] - shared * along[k]) / determinant,
+                        (squares[i] * along[k] - shared * along[i]) / determinant,
+                    ];
+                    let explained = multiples[0] * along[i] + multiples[1] * along[k];
+                    if multiples.iter().all(|multiple| possible.contains(multiple))
+                        && best.as_ref().is_none_or(|(most, _)| explained > *most)
+                    {
+                        let [first, second] = multiples;
+                        // Pressures are proportional to the moduli.
+                        let scale = level - first * means[i] - second * means[k];
+                        let start = |place, multiple: f64| {
+                            let mut start = at(place, contrast.powf(multiple) * scale.exp());
+                            start.block_modulus_pa *= scale.exp();
+                            start
+                        };
+                        let (mut both, other) = (start(a, first), start(b, second));
+                        both.second = other.lump.map(|lump| (lump, other.place));
+                        best = Some((explained, both));
+                    }
+                }
+            }
+        }
+        best.map(|(_, both)| both)
+    }
+}
