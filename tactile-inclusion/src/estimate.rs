@@ -45,6 +45,13 @@ impl Estimated {
         }
     }
 
+    /// With another standard error in quadrature.
+    pub(crate) fn widened(&self, error: f64) -> Self {
+        let reach = |end: f64| (end - self.value).hypot(TWO_SIDED_95 * error);
+        let [low, high] = self.interval.map(reach);
+        Self::new(self.value, [self.value - low, self.value + high])
+    }
+
     /// Standard error over value.
     pub fn relative_error(&self) -> f64 {
         self.standard_error / self.value
