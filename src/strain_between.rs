@@ -3,7 +3,7 @@ use crate::elasticity::ElasticityError;
 use crate::elasticity::field::{StrainField, StrainSummary};
 use crate::elasticity::strain::{Deformation, GreenLagrange, StrainMeasure};
 use crate::matching::{AnnealedSoftassign, Doubt, MatchError, Matching, PointMatcher};
-use crate::tps::{LocalField, LocalValue, RobustFit, ThinPlateSpline, TpsError};
+use crate::tps::{LocalField, LocalValue, RobustFit, ThinPlateSpline, TpsError, nearest_rows};
 use nalgebra::{Matrix3, Point, SMatrix, SVector};
 use std::sync::Arc;
 
@@ -117,16 +117,7 @@ pub enum PairsDoubt {
 impl std::fmt::Display for PairsDoubt {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
-            Self::Matcher(Doubt::FewPairs) => {
-                f.write_str("the matched points are so few that they may have met by chance")
-            }
-            Self::Matcher(Doubt::LargeResiduals) => {
-                f.write_str("the residuals of the match are as large as those of scattered points")
-            }
-            Self::Matcher(Doubt::Symmetric) => {
-                f.write_str("the points look the same after a turn, and any rotation is allowed")
-            }
-            Self::Matcher(_) => f.write_str("one matched pair in twenty or more is wrong"),
+            Self::Matcher(doubt) => doubt.fmt(f),
             Self::FewPartners { share } => write!(
                 f,
                 "{:.0} % of the smaller set have a partner on one smooth deformation",
@@ -385,7 +376,7 @@ impl<const D: usize> StrainBetween<D> {
         measure: &dyn StrainMeasure,
         possible: usize,
     ) -> Result<Self, StrainBetweenError> {
-        let mut rows = matched.to_vec();
+        let mut rows = among_matched(before, after, matched);
         let mut sources: Vec<_> = rows.iter().map(|&(i, _)| before[i]).collect();
         let targets: Vec<_> = rows.iter().map(|&(_, j)| after[j]).collect();
         let field = LocalField::fit(&sources, &targets, |_| {})?;
@@ -394,7 +385,7 @@ impl<const D: usize> StrainBetween<D> {
             .map(|&kept| f64::from(u8::from(kept)))
             .collect();
         let spacing = median(values.iter().map(|value| value.spacing));
-        let (missed, found) = missed_partners(before, after, matched, &field, spacing / 3.0);
+        let (missed, found) = missed_partners(before, after, &rows, &field, spacing / 3.0);
         sources.extend(missed.iter().map(|&(i, _)| before[i]));
         rows.extend(missed);
         values.extend(found);
@@ -550,6 +541,32 @@ fn strain_error<const D: usize>(
     squares.map(f64::sqrt)
 }
 
+/// The pairs without those around which most points of both sets have no partner: where a matcher
+/// fails, as in a corner that it took for one seen already, single points meet by chance. A part
+/// of one set that is not in the other has partners on the other side.
+fn among_matched<const D: usize>(
+    before: &[Point<f64, D>],
+    after: &[Point<f64, D>],
+    matched: &[(usize, usize)],
+) -> Vec<(usize, usize)> {
+    // Half of the usual share in both sets: of random outliers 1 pair in 10⁴ has as few.
+    let neighbours: usize = 16;
+    let matched_nearby = |set: &[Point<f64, D>], rows: &[usize]| -> Vec<bool> {
+        let mut has_partner = vec![false; set.len()];
+        rows.iter().for_each(|&row| has_partner[row] = true);
+        let least = 0.5 * (neighbours * rows.len()) as f64 / set.len() as f64;
+        let places: Vec<_> = rows.iter().map(|&row| set[row]).collect();
+        let near = nearest_rows(set, &places, neighbours).into_iter();
+        let partners = near.map(|near| near.iter().filter(|&&row| has_partner[row]).count());
+        partners.map(|count| count as f64 >= least).collect()
+    };
+    let (own, other): (Vec<_>, Vec<_>) = matched.iter().copied().unzip();
+    let (own, other) = (matched_nearby(before, &own), matched_nearby(after, &other));
+    let pairs = matched.iter().zip(own.iter().zip(&other));
+    let kept = pairs.filter(|(_, (own, other))| **own || **other);
+    kept.map(|(pair, _)| *pair).collect()
+}
+
 /// Pairs of points without a partner whose prediction meets a point without one, and the field
 /// there.
 fn missed_partners<const D: usize>(
@@ -571,6 +588,13 @@ fn missed_partners<const D: usize>(
     let values = field.at(&places, |_| {});
     let mut meetings = Vec::new();
     for (k, value) in values.iter().enumerate() {
+        // Four standard errors of the prediction and the point. Where they reach farther than a
+        // third of the spacing, a meeting is as likely by chance.
+        let error = (value.displacement_variance + value.sigma * value.sigma).sqrt();
+        if 4.0 * error > reach {
+            continue;
+        }
+        let reach = (4.0 * error).max(0.1 * reach);
         let predicted = places[k] + value.displacement;
         let first = free.partition_point(|&j| after[j][0] < predicted[0] - reach);
         let near = free[first..]

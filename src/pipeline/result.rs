@@ -419,15 +419,23 @@ impl Display for DriftWatch {
 /// the decimals.
 pub fn with_error(value: f64, error: f64, scale: f64) -> String {
     let (value, error) = (value * scale, error * scale);
-    if !(error > 0.0 && error.is_finite()) {
-        return format!("{value:.4}");
-    }
-    let decimals = (1 - error.log10().floor() as i32).max(0) as usize;
+    let known = error > 0.0 && error.is_finite();
+    let decimals = (1.0 - error.log10().floor()).max(0.0) as usize;
     // Beyond the twelfth decimal it is rounding.
-    if decimals > 12 {
-        return format!("{value:.4}");
+    let known = known && decimals <= 12;
+    let text = format!("{value:.*}", if known { decimals } else { 4 });
+    // Zero has no sign.
+    let is_zero = text.bytes().all(|c| matches!(c, b'-' | b'.' | b'0'));
+    let text = if is_zero {
+        text.trim_start_matches('-')
+    } else {
+        &text
+    };
+    if known {
+        format!("{text} ± {error:.decimals$}")
+    } else {
+        text.to_owned()
     }
-    format!("{value:.decimals$} ± {error:.decimals$}")
 }
 
 /// An estimate with its standard error, scaled to a unit.

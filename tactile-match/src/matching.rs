@@ -217,6 +217,29 @@ pub enum Doubt {
     /// angle about an axis of the coordinates, takes the model onto itself: the answer may be
     /// turned by it.
     Symmetric,
+    /// The model turned by a large angle explains the targets better, and such turns are excluded.
+    Turned,
+    /// A mirror image of the model explains the targets better: columns may be exchanged, or a sign
+    /// changed.
+    Mirrored,
+}
+
+impl std::fmt::Display for Doubt {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::FewPairs => "the matched points are so few that they may have met by chance",
+            Self::LargeResiduals => {
+                "the residuals of the match are as large as those of scattered points"
+            }
+            Self::Undecided => "one matched pair in twenty or more is wrong",
+            Self::Symmetric => "the points look the same after a turn, and any rotation is allowed",
+            Self::Turned => "turned by a large angle the points match better: allow any rotation",
+            Self::Mirrored => {
+                "a mirror image of the points matches better: are columns of the second set \
+                 exchanged, or a sign changed?"
+            }
+        })
+    }
 }
 
 /// How a match went.

@@ -12,7 +12,7 @@ use std::str::FromStr;
 use tactile_imaging::core::statistics::quantile_95;
 use tactile_imaging::matching::labelling::{Compatibility, LengthMaximum, Neighbourhood};
 use tactile_imaging::matching::{
-    AnnealedSoftassign, CoherentPointDrift, Doubt, LinearAssignment, MatchError, Matching, Motion,
+    AnnealedSoftassign, CoherentPointDrift, LinearAssignment, MatchError, Matching, Motion,
     NearestNeighbour, Normalization, Outliers, PointMatcher, RelaxationLabelling, Rotation,
     SoftassignWorkspace, Transformation,
 };
@@ -274,26 +274,12 @@ impl<const D: usize> PointMatcher<D> for Interruptible {
     }
 }
 
-fn doubt(doubt: Doubt) -> &'static str {
-    match doubt {
-        Doubt::FewPairs => "the matched points are so few that they may have met by chance",
-        Doubt::LargeResiduals => "the residuals are as large as those of scattered points",
-        Doubt::Symmetric => "the points look the same after a turn, and any rotation is allowed",
-        _ => "one matched pair in twenty or more is wrong",
-    }
-}
-
 pub fn answer<const D: usize>(py: Python<'_>, found: &Matching<D>) -> Match {
     let row = |row: &Option<usize>| row.map_or(-1, |row| row as i64);
     let pairs: Vec<_> = found.pairs().map(|(i, j, _)| (i, j)).collect();
     let report = &found.report;
     let (matched, points) = (pairs.len(), found.assignment.len());
-    let flags: Vec<String> = report
-        .doubt
-        .map(doubt)
-        .into_iter()
-        .map(Into::into)
-        .collect();
+    let flags: Vec<String> = report.doubt.iter().map(ToString::to_string).collect();
     let caution = flags
         .first()
         .map_or(String::new(), |flag| format!(", {flag}"));

@@ -48,7 +48,7 @@ pub use evaluate::{Spline, ThinPlateSpline};
 pub use fit::{Factorization, LambdaPath, SplineWorkspace};
 pub use kernel::{Kernel, KernelDerivatives, KernelScalar, NegR, R2LogR, R3};
 pub use lanes::Scalar;
-pub use local::{LocalField, LocalValue};
+pub use local::{LocalField, LocalValue, nearest_rows};
 pub use options::{FitOptions, FitReport, Solver};
 pub use smoothing::{RobustFit, RobustSpline, Smoothing, StrainSpline};
 pub use warp::{Affine, AffineModel, Pairs, SeriesMemory, Warp, WarpModel};

@@ -51,7 +51,7 @@ pub fn follow<const D: usize>(
         for &(frame, row) in places {
             let frame = followed[frame];
             let place = frames[frame][row];
-            let cells = [track, frame, row].map(|n| n as f64);
+            let cells = [track, frame + 1, row].map(|n| n as f64);
             tracks.row(cells.into_iter().chain(place.iter().copied()));
         }
     }
@@ -108,6 +108,7 @@ impl<const D: usize> SeriesReport<D> {
             step.map_err(Clone::clone),
             total.as_ref().map_err(Clone::clone),
         ];
+        let frame = frame + 1; // the first frame is frame 1
         let mut cells = vec![Some(frame as f64)];
         let mut value = json!({ "frame": frame, "file": file });
         for (name, part) in ["step", "total"].into_iter().zip(&parts) {
@@ -137,7 +138,14 @@ impl<const D: usize> SeriesReport<D> {
             Err(reason) => format!("none: {reason}"),
         });
         context.row(&format!("frame {frame}"), format_args!("step {}", text[0]));
-        context.row("", format_args!("since frame 0 {}", text[1]));
+        context.row("", format_args!("since frame 1 {}", text[1]));
+        for (name, part) in ["step", "total"].into_iter().zip(&parts) {
+            if let Some(doubt) = part.as_ref().ok().and_then(|strain| strain.doubt) {
+                let place = json!({ "frame": frame, "strain": name });
+                let text = format_args!("frame {frame}, {name}: {doubt}");
+                context.warn("doubtful_pairs", place, text);
+            }
+        }
     }
 }
 
@@ -153,8 +161,5 @@ fn mean_text<const D: usize>(strain: &StrainBetween<D>) -> String {
         )
     };
     let means: String = (0..D).map(one).collect();
-    let doubt = strain
-        .doubt
-        .map_or(String::new(), |doubt| format!(" (DOUBT: {doubt})"));
-    format!("{} pairs{means}{doubt}", strain.rows.len())
+    format!("{} pairs{means}", strain.rows.len())
 }

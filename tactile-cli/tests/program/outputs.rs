@@ -188,7 +188,7 @@ fn frames_of_a_series_give_tracks_and_strains() {
         );
     }
     let read = |name: &str| fs::read_to_string(folder.path().join("results").join(name)).unwrap();
-    assert!(read("tracks.csv").starts_with("track,frame,row,x,y\n0,0,0,"));
+    assert!(read("tracks.csv").starts_with("track,frame,row,x,y\n0,1,0,"));
     // The track of the point that was missed goes on.
     let track = read("tracks.csv")
         .lines()

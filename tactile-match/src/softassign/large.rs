@@ -108,6 +108,9 @@ impl AnnealedSoftassign {
                 .evaluate(&mut ws.state, self.share, ENERGY_RESOLUTION);
             ws.best.copy_from(&ws.state);
         }
+        if flow.is_continue() {
+            self.look_for_twins(ws);
+        }
         flow
     }
 

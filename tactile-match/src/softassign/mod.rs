@@ -40,6 +40,7 @@ mod patterns;
 mod result;
 mod search;
 mod starts;
+mod twins;
 
 pub use options::{
     AnnealedSoftassign, Landmark, Mechanism, Outliers, Rotation, Search, Transformation,
@@ -114,6 +115,10 @@ pub struct SoftassignWorkspace<const D: usize> {
     stopped: bool,
     /// Whether any rotation is allowed and one takes the model onto itself.
     symmetric: bool,
+    /// What explains the targets better than the answer and may not take its place, and by how much.
+    twin: Option<(f64, Doubt)>,
+    /// Points that the best run before the last had matched.
+    matched_before: f64,
 }
 
 impl<const D: usize> SoftassignWorkspace<D> {
@@ -128,7 +133,8 @@ impl<const D: usize> SoftassignWorkspace<D> {
         // part of the set that lies aside.
         let misfit = by_chance || self.best.tail > 0.08;
         let symmetric = self.symmetric.then_some(Doubt::Symmetric);
-        doubt
+        let twin = self.twin.map(|(_, doubt)| doubt);
+        twin.or(doubt)
             .or(misfit.then_some(Doubt::LargeResiduals))
             .or(symmetric)
     }

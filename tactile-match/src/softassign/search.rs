@@ -11,7 +11,7 @@ use super::{
     AnnealedSoftassign, Cooling, Mechanism, PriorScales, Rotation, Schedule, Search,
     SoftassignWorkspace, Transformation, starts,
 };
-use nalgebra::{SMatrix, SVector};
+use nalgebra::SMatrix;
 use std::ops::ControlFlow;
 
 /// Scales of the prior in the search.
@@ -136,6 +136,7 @@ impl AnnealedSoftassign {
         ws.annealer.soft.faintest = 1e-6;
         ws.annealer.volume = bounding_volume(&ws.target);
         ws.spacing = 0.0;
+        (ws.best.matched, ws.twin) = (0.0, None);
         ws.scales.spread.clear();
         ws.best.noisy = false;
         (ws.starts, ws.stopped) = (0, false);
@@ -176,7 +177,7 @@ impl AnnealedSoftassign {
         if ws.best.noisy {
             ws.answer.variance.clone_from(&ws.fine.variance);
         }
-        ws.symmetric = self.rotation == Rotation::Any && is_symmetric(ws);
+        ws.symmetric = self.rotation == Rotation::Any && ws.is_symmetric();
     }
 
     /// All starts in turn until the best answer leaves no doubt, then the scales of the prior.
@@ -198,10 +199,9 @@ impl AnnealedSoftassign {
         };
         let patterns =
             (dense && self.has(Mechanism::Patterns)).then_some((Start::Patterns, seeded));
+        // Each time they start from a better field, as long as more points are matched.
+        let patterns = [patterns; 6].into_iter();
         let first = [
-            patterns,
-            // The second time they start from a better field.
-            patterns,
             (dense && self.has(Mechanism::Tuples)).then_some((Start::Tuples, seeded)),
             self.has(Mechanism::Reheat).then_some((Start::Best, REHEAT)),
             self.has(Mechanism::Slow).then_some((Start::Centred, SLOW)),
@@ -214,12 +214,14 @@ impl AnnealedSoftassign {
         let last = self
             .has(Mechanism::LastReheat)
             .then_some((Start::Best, REHEAT));
-        for (start, cooling) in first.into_iter().flatten().chain(rotations).chain(last) {
+        let first = patterns.chain(first).flatten();
+        for (start, cooling) in first.chain(rotations).chain(last) {
             if self.is_done(ws) || self.resolve(ws) {
                 break;
             }
             self.run(ws, start, cooling, observe)?;
         }
+        self.look_for_twins(ws);
         let noisy = ws.best.sigma > CLEAN_SIGMA || ws.annealer.soft.errors.differ();
         if noisy && !ws.best.noisy && self.has(Mechanism::Scales) && !ws.annealer.rigid.is_active()
         {
@@ -310,6 +312,7 @@ impl AnnealedSoftassign {
             ..self.schedule(cooling)
         };
         ws.starts += 1;
+        ws.matched_before = ws.best.matched;
         ws.state.trace.clear();
         ws.state.iterations = 0;
         (ws.state.energy, ws.state.tail) = (f64::INFINITY, 0.0);
@@ -385,7 +388,8 @@ impl AnnealedSoftassign {
             return true;
         }
         if points >= MIN_DENSE_POINTS {
-            return best.sigma <= 0.15 * ws.spacing && matched >= 0.8 && best.tail <= 0.01;
+            let complete = matched >= wanted_share(ws);
+            return best.sigma <= 0.15 * ws.spacing && complete && best.tail <= 0.01;
         }
         let unequal = confidence::are_unequal(ws.model.len(), ws.target.len());
         let gain = if unequal { 1.2 } else { MIN_TELLING_GAIN };
@@ -401,37 +405,24 @@ impl AnnealedSoftassign {
     pub(super) fn is_exact<const D: usize>(&self, ws: &SoftassignWorkspace<D>) -> bool {
         let points = ws.model.len().min(ws.target.len());
         let dense = points >= MIN_DENSE_POINTS;
-        let wanted = if ws.starts == 1 || !dense { 0.98 } else { 0.8 };
         ws.best.sigma <= CLEAN_SIGMA
-            && ws.best.matched >= wanted * points as f64
+            && ws.best.matched >= wanted_share(ws) * points as f64
             && (ws.best.tail <= 0.01 || !dense)
     }
 }
 
-/// Whether a turn takes the model onto itself, by what the answer resolves. Then the answer may be
-/// turned as well.
-fn is_symmetric<const D: usize>(ws: &SoftassignWorkspace<D>) -> bool {
-    let n = ws.model.len();
-    let spacing = (bounding_volume(&ws.model) / n as f64).powf(1.0 / D as f64);
-    let reach = (3.0 * ws.best.sigma).min(0.25 * spacing);
-    // Two hundred points show a symmetry, and of a set without one the first few miss.
-    let step = n.div_ceil(200);
-    let misses = n / step / 20;
-    starts::rotations::<D>(Rotation::Any)
-        .skip(1)
-        .any(|rotation| {
-            let missed = |p: &&[f64; D]| {
-                let turned: [f64; D] = (rotation * SVector::from(**p)).into();
-                let square = |q: &[f64; D]| (0..D).map(|k| (turned[k] - q[k]).powi(2)).sum::<f64>();
-                ws.model.iter().all(|q| square(q) > reach * reach)
-            };
-            ws.model
-                .iter()
-                .step_by(step)
-                .filter(missed)
-                .nth(misses)
-                .is_none()
-        })
+/// Share of the smaller set that a complete answer matches. Dense sets may hold points that are in
+/// one of them alone, but only once another start of the patterns matches no more points: the first
+/// leaves the edges of a cropped set a point aside.
+fn wanted_share<const D: usize>(ws: &SoftassignWorkspace<D>) -> f64 {
+    let dense = ws.model.len().min(ws.target.len()) >= MIN_DENSE_POINTS;
+    // Fewer come and go with the temperature.
+    let grows = ws.best.matched > 1.005 * ws.matched_before;
+    if dense && ws.starts >= 3 && !grows {
+        0.8
+    } else {
+        0.98
+    }
 }
 
 /// Volume of the bounding box. Thin sides count as a tenth of the model's radius.

@@ -480,7 +480,7 @@ fn best_basis<const D: usize>(
     best.1
 }
 
-fn volume<const D: usize>(m: &SMatrix<f64, D, D>) -> f64 {
+pub(super) fn volume<const D: usize>(m: &SMatrix<f64, D, D>) -> f64 {
     match D {
         2 => m[(0, 0)] * m[(1, 1)] - m[(0, 1)] * m[(1, 0)],
         3 => {

@@ -244,7 +244,12 @@ fn wrong_answers_are_doubted() {
                 scene.right(&found) > 0.9
                     || matches!(
                         report.doubt,
-                        Some(Doubt::FewPairs | Doubt::LargeResiduals | Doubt::Undecided)
+                        Some(
+                            Doubt::FewPairs
+                                | Doubt::LargeResiduals
+                                | Doubt::Undecided
+                                | Doubt::Turned
+                        )
                     ),
                 "{report:?}"
             );
@@ -276,5 +281,43 @@ fn a_lattice_that_may_be_turned_is_doubtful() {
         assert_eq!(doubt(found), None, "{transformation:?}");
         let found = any.match_points(&marked, &marked).unwrap();
         assert_eq!(doubt(found), None, "{transformation:?}");
+    }
+}
+
+/// A jittered grid that was turned or mirrored has a match with itself near by, whose residuals are
+/// the jitter. Turns are found where they are allowed, and named where they are not. A mirror image
+/// is named. Without either there is no doubt.
+#[test]
+fn a_jittered_grid_is_told_from_its_twins() {
+    let mut stream = Stream::new(17);
+    for (side, jitter) in [(8, 0.3), (12, 0.15), (20, 0.5)] {
+        let place = |k: u32, stream: &mut Stream| f64::from(k) + jitter * (stream.next() - 0.5);
+        let model: Vec<_> = (0..side * side)
+            .map(|k| Point2::new(place(k % side, &mut stream), place(k / side, &mut stream)))
+            .collect();
+        type Change = fn(f64, f64) -> [f64; 2];
+        let cases: [(Change, Option<Doubt>, Option<Doubt>); 6] = [
+            (|x, y| [x, y], None, None),
+            (|x, y| [-y, x], None, Some(Doubt::Turned)),
+            (|x, y| [-x, -y], None, Some(Doubt::Turned)),
+            (|x, y| [y, -x], None, Some(Doubt::Turned)),
+            (|x, y| [-x, y], Some(Doubt::Mirrored), Some(Doubt::Mirrored)),
+            (|x, y| [y, x], Some(Doubt::Mirrored), Some(Doubt::Mirrored)),
+        ];
+        for (case, (change, of_any, of_limited)) in cases.into_iter().enumerate() {
+            let image = |p: &Point2<f64>| Point2::from(change(1.01 * p.x, p.y));
+            let target: Vec<_> = model
+                .iter()
+                .map(|p| image(p) + SVector::from_fn(|_, _| 0.02 * deviate(&mut stream)))
+                .collect();
+            for (range, doubt) in [(Rotation::Any, of_any), (Rotation::Limited, of_limited)] {
+                let matcher = AnnealedSoftassign::default().with_rotation(range);
+                let found = matcher.match_points(&model, &target).unwrap();
+                let scene = format!("{side} a side, jitter {jitter}, case {case}, {range:?}");
+                assert_eq!(found.report.doubt, doubt, "{scene}");
+                let right = (0..model.len()).filter(|&i| found.assignment[i] == Some(i));
+                assert_eq!(doubt.is_none(), right.count() == model.len(), "{scene}");
+            }
+        }
     }
 }

@@ -209,6 +209,26 @@ impl<const D: usize> LocalField<D> {
     }
 }
 
+/// Rows of the `count` points nearest to each place, nearest first. O(log n) for each place.
+///
+/// ```
+/// use nalgebra::Point2;
+/// use tactile_tps::nearest_rows;
+/// let points: Vec<_> = (0..100).map(|i| Point2::new(f64::from(i), 0.0)).collect();
+/// let found = nearest_rows(&points, &[Point2::new(41.9, 3.0)], 2);
+/// assert_eq!(found, [[42, 41]]);
+/// ```
+pub fn nearest_rows<const D: usize>(
+    points: &[Point<f64, D>],
+    places: &[Point<f64, D>],
+    count: usize,
+) -> Vec<Vec<usize>> {
+    let tree = Tree::new(points, (0..points.len()).collect());
+    let near = |place| tree.nearest(points, place, count);
+    let rows = |place| near(place).into_iter().map(|(_, row)| row).collect();
+    places.iter().map(rows).collect()
+}
+
 /// Whether each pair contradicts its neighbours.
 fn contradicted<const D: usize>(found: &[Found<D>], sources: &[Point<f64, D>]) -> Vec<bool> {
     let mut wrong = vec![false; found.len()];
