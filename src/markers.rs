@@ -5,8 +5,8 @@ use crate::StrainBetween;
 use crate::core::Estimate;
 use crate::elasticity::strain::GreenLagrange;
 use crate::matching::{AnnealedSoftassign, Doubt, MatchError, PointMatcher};
-use nalgebra::{Point2, Vector2};
-use ndarray::{Array2, ArrayView2};
+use nalgebra::{Matrix3, Matrix3x2, Point2, Vector2, Vector3};
+use ndarray::{Array2, ArrayView2, Zip};
 
 /// A dark marker.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -58,43 +58,47 @@ pub fn find_markers(grey: ArrayView2<'_, f64>) -> Vec<Marker> {
     }
     // Markers are smaller than an eighth of the frame, their distances too.
     let reach = rows.max(columns) / 16;
-    let grey = box_means(grey, grey.mapv(|_| 1.0).view(), 1);
-    let around = box_means(grey.view(), grey.mapv(|_| 1.0).view(), reach);
-    let bright = ndarray::Zip::from(&grey)
-        .and(&around)
-        .map_collect(|level, mean| f64::from(u8::from(level >= mean)));
-    let ground = box_means(grey.view(), bright.view(), reach);
-    let share = &grey / &ground.mapv(|level| level.max(1.0));
-    let Some((cut, noise)) = otsu(share.view()) else {
+    // Single precision is far below an 8-bit level, and memory is most of the time.
+    let mut share = Array2::zeros((rows, columns));
+    box_sums(&grey.mapv(|level| level as f32), 1, &mut share);
+    over_box_areas(&mut share, 1);
+    let (mut bright, mut count) = (share.clone(), share.clone());
+    box_sums(&share, reach, &mut bright);
+    over_box_areas(&mut bright, reach);
+    bright.zip_mut_with(&share, |mean, level| {
+        *mean = f32::from(u8::from(level >= mean))
+    });
+    box_sums(&bright, reach, &mut count);
+    bright *= &share;
+    let mut ground = Array2::zeros((rows, columns));
+    box_sums(&bright, reach, &mut ground);
+    // Levels over the mean of the brighter ones, which is taken as one level at least.
+    Zip::from(&mut share)
+        .and(&ground)
+        .and(&count)
+        .for_each(|share, sum, count| *share /= (sum / count.max(1.0)).max(1.0));
+    let Some((cut, noise)) = otsu(&share) else {
         return Vec::new();
     };
-    let dark = share.mapv(|share| share < cut);
-    let patches: Vec<Vec<usize>> = patches(&dark, true);
-    let patches = patches.into_iter().filter(|patch| patch.len() >= 9);
-    let mut found: Vec<Vec<usize>> = patches.collect();
+    let (mut found, owner) = patches(&share, cut);
     let Some(usual) = median(found.iter().map(|patch| patch.len() as f64)) else {
         return Vec::new();
     };
-    // A highlight is surrounded by its marker: the patch left of its first pixel.
-    let mut owner = vec![usize::MAX; rows * columns];
-    for (k, patch) in found.iter().enumerate() {
-        patch.iter().for_each(|&at| owner[at] = k);
-    }
-    for hole in self::patches(&dark, false) {
-        let border = |at: &usize| {
-            let (r, c) = (at / columns, at % columns);
-            r == 0 || c == 0 || r + 1 == rows || c + 1 == columns
-        };
-        let inside = (hole.len() as f64) < 0.5 * usual && !hole.iter().any(border);
-        if inside && let Some(patch) = found.get_mut(owner[hole[0] - 1]) {
-            patch.extend(hole);
+    // Larger patches are left out anyway.
+    for (k, patch) in found.iter_mut().enumerate() {
+        if (patch.len() as f64) < 1.8 * usual {
+            let holes = holes(patch, &owner, k, columns);
+            // A highlight is surrounded by its marker.
+            if (holes.len() as f64) < 0.5 * usual {
+                patch.extend(holes);
+            }
         }
     }
     let areas = found.iter().map(|patch| patch.len() as f64);
     let usual = median(areas).unwrap_or(usual);
     found.retain(|patch| (0.35 * usual..1.8 * usual).contains(&(patch.len() as f64)));
     let marker = |patch: &Vec<usize>| {
-        let darkness = |at: &usize| cut - share[[at / columns, at % columns]];
+        let darkness = |at: &usize| cut - f64::from(share[[at / columns, at % columns]]);
         let most = median(patch.iter().map(darkness)).unwrap_or(1.0).max(0.0);
         // Highlights weigh as the rest of the marker.
         let weight = |at: &usize| match darkness(at) {
@@ -118,50 +122,65 @@ pub fn find_markers(grey: ArrayView2<'_, f64>) -> Vec<Marker> {
     found.iter().map(marker).collect()
 }
 
-/// Means over boxes of 2 `reach` + 1 pixels, weighted, by sums over rectangles. 0 where no weight
-/// is.
-fn box_means(
-    values: ArrayView2<'_, f64>,
-    weights: ArrayView2<'_, f64>,
-    reach: usize,
-) -> Array2<f64> {
+/// Sums over boxes of 2 `reach` + 1 pixels a side, as far as they lie in the frame: running sums of
+/// columns, then of their row.
+fn box_sums(values: &Array2<f32>, reach: usize, sums: &mut Array2<f32>) {
     let (rows, columns) = values.dim();
-    let mut sums = Array2::from_elem((rows + 1, columns + 1), [0.0; 2]);
-    for r in 0..rows {
-        let mut line = [0.0; 2];
-        for c in 0..columns {
-            let w = weights[[r, c]];
-            line[0] += w * values[[r, c]];
-            line[1] += w;
-            let above = sums[[r, c + 1]];
-            sums[[r + 1, c + 1]] = [above[0] + line[0], above[1] + line[1]];
+    let mut tall = vec![0.0_f32; columns];
+    // The row's running sum from `reach` + 1 pixels before its first pixel to `reach` after its end.
+    let mut running = vec![0.0; columns + 2 * reach + 1];
+    for last in 0..rows + reach {
+        if last < rows {
+            let row = values.row(last);
+            tall.iter_mut().zip(row).for_each(|(sum, v)| *sum += v);
+        }
+        if let Some(first) = last.checked_sub(2 * reach + 1) {
+            let row = values.row(first);
+            tall.iter_mut().zip(row).for_each(|(sum, v)| *sum -= v);
+        }
+        let Some(centre) = last.checked_sub(reach) else {
+            continue;
+        };
+        let mut total = 0.0;
+        for (running, tall) in running[reach + 1..].iter_mut().zip(&tall) {
+            total += tall;
+            *running = total;
+        }
+        running[reach + 1 + columns..].fill(total);
+        let ends = running.iter().zip(&running[2 * reach + 1..]);
+        for (sum, (before, upto)) in sums.row_mut(centre).iter_mut().zip(ends) {
+            *sum = upto - before;
         }
     }
-    Array2::from_shape_fn((rows, columns), |(r, c)| {
-        let (top, left) = (r.saturating_sub(reach), c.saturating_sub(reach));
-        let (low, right) = ((r + reach + 1).min(rows), (c + reach + 1).min(columns));
-        let total = |k: usize| {
-            sums[[low, right]][k] - sums[[top, right]][k] - sums[[low, left]][k]
-                + sums[[top, left]][k]
-        };
-        total(0) / total(1).max(1e-9)
-    })
+}
+
+/// Turns sums over boxes into means.
+fn over_box_areas(sums: &mut Array2<f32>, reach: usize) {
+    let (rows, columns) = sums.dim();
+    let length = |k: usize, n: usize| ((k + reach + 1).min(n) - k.saturating_sub(reach)) as f32;
+    let widths: Vec<f32> = (0..columns).map(|c| length(c, columns)).collect();
+    for (r, mut row) in sums.outer_iter_mut().enumerate() {
+        let height = length(r, rows);
+        row.iter_mut()
+            .zip(&widths)
+            .for_each(|(sum, width)| *sum /= height * width);
+    }
 }
 
 /// Otsu's threshold of shares from 0 to 1.5, and the standard deviation of the brighter class.
 /// `None` for one class.
-fn otsu(share: ArrayView2<'_, f64>) -> Option<(f64, f64)> {
-    let bins = 300;
-    let mut histogram = vec![0.0; bins];
-    let bin = |v: f64| ((v / 1.5 * bins as f64) as usize).min(bins - 1);
-    share.iter().for_each(|v| histogram[bin(*v)] += 1.0);
-    let level = |k: usize| (k as f64 + 0.5) * 1.5 / bins as f64;
+fn otsu(share: &Array2<f32>) -> Option<(f64, f64)> {
+    /// A twentieth of a grey level in 100.
+    const WIDTH: f64 = 0.0005;
+    const PER_SHARE: f32 = (1.0 / WIDTH) as f32;
+    let mut histogram = vec![0.0; (1.5 / WIDTH) as usize];
+    let last = histogram.len() - 1;
+    let bins = share.iter().map(|v| ((v * PER_SHARE) as usize).min(last));
+    bins.for_each(|bin| histogram[bin] += 1.0);
+    let level = |k: usize| (k as f64 + 0.5) * WIDTH;
     let total: f64 = histogram.iter().sum();
-    let sum: f64 = histogram
-        .iter()
-        .enumerate()
-        .map(|(k, n)| n * level(k))
-        .sum();
+    let products = histogram.iter().enumerate().map(|(k, n)| n * level(k));
+    let sum: f64 = products.sum();
     let (mut below, mut sum_below, mut best) = (0.0, 0.0, None::<(f64, f64)>);
     for (k, n) in histogram.iter().enumerate() {
         below += n;
@@ -176,40 +195,109 @@ fn otsu(share: ArrayView2<'_, f64>) -> Option<(f64, f64)> {
     }
     let (_, cut) = best?;
     // The median deviation of the gel bears what is printed on it.
-    let gel = || share.iter().copied().filter(|v| *v >= cut);
-    let middle = median(gel())?;
-    let noise = 1.4826 * median(gel().map(|v| (v - middle).abs()))?;
-    (middle - cut > 3.0 * noise).then_some((cut, noise))
+    let first = ((cut / WIDTH) as usize).min(last);
+    let gel = &histogram[first..];
+    let half = 0.5 * gel.iter().sum::<f64>();
+    let mut sum = 0.0;
+    let middle = gel.iter().position(|n| {
+        sum += n;
+        sum >= half
+    })?;
+    let (mut within, mut distance) = (gel[middle], 0);
+    let mut more = within;
+    while within < half {
+        distance += 1;
+        let beside = [middle.checked_sub(distance), Some(middle + distance)];
+        let beside = beside.into_iter().flatten().filter_map(|k| gel.get(k));
+        more = beside.sum();
+        within += more;
+    }
+    // Pixels are spread evenly over the bins at that distance.
+    let share = (half - (within - more)) / more;
+    let bins = if distance == 0 {
+        0.5 * share
+    } else {
+        distance as f64 - 0.5 + share
+    };
+    let noise = 1.4826 * WIDTH * bins;
+    (level(middle + first) - cut > 3.0 * noise).then_some((cut, noise))
 }
 
-/// Parts of a mask of this value that are connected by their sides, as places in reading order.
-fn patches(mask: &Array2<bool>, value: bool) -> Vec<Vec<usize>> {
-    let (rows, columns) = mask.dim();
-    let mut open: Vec<bool> = mask.iter().map(|m| *m == value).collect();
+/// No patch owns the pixel.
+const NOBODY: u32 = u32::MAX;
+
+/// Patches of at least nine pixels below `cut` that are connected by their sides, as places in
+/// reading order, and the patch of every pixel.
+fn patches(share: &Array2<f32>, cut: f64) -> (Vec<Vec<usize>>, Vec<u32>) {
+    let columns = share.ncols();
+    let mut owner = vec![NOBODY; share.len()];
+    let mut dark: Vec<bool> = share.iter().map(|share| f64::from(*share) < cut).collect();
     let mut found = Vec::new();
-    for start in 0..open.len() {
-        if !core::mem::take(&mut open[start]) {
+    for start in 0..dark.len() {
+        if !core::mem::take(&mut dark[start]) {
             continue;
         }
         let (mut patch, mut next) = (vec![start], 0);
         while let Some(&at) = patch.get(next) {
             next += 1;
-            let (r, c) = (at / columns, at % columns);
+            let column = at % columns;
             let beside = [
-                (c > 0).then(|| at - 1),
-                (c + 1 < columns).then_some(at + 1),
-                (r > 0).then(|| at - columns),
-                (r + 1 < rows).then_some(at + columns),
+                (column > 0).then(|| at - 1),
+                (column + 1 < columns).then_some(at + 1),
+                at.checked_sub(columns),
+                Some(at + columns),
             ];
             for at in beside.into_iter().flatten() {
-                if core::mem::take(&mut open[at]) {
+                if dark.get_mut(at).is_some_and(core::mem::take) {
                     patch.push(at);
                 }
             }
         }
-        found.push(patch);
+        if patch.len() >= 9 {
+            let name = found.len() as u32;
+            patch.iter().for_each(|&at| owner[at] = name);
+            found.push(patch);
+        }
     }
-    found
+    (found, owner)
+}
+
+/// Places inside patch `k` that are not its own: those that no path from around it reaches.
+fn holes(patch: &[usize], owner: &[u32], k: usize, columns: usize) -> Vec<usize> {
+    let (low, high) = (
+        patch[0] / columns,
+        patch.iter().max().map_or(0, |at| at / columns),
+    );
+    let across = patch.iter().map(|at| at % columns);
+    let left = across.clone().min().unwrap_or(0);
+    let wide = across.max().unwrap_or(0) - left + 3;
+    let high = high - low + 3;
+    // The box of the patch with a rim of one pixel.
+    let place = |cell: usize| {
+        let (r, c) = (cell / wide, cell % wide);
+        let inside = r > 0 && r + 1 < high && c > 0 && c + 1 < wide;
+        inside.then(|| (low + r - 1) * columns + left + c - 1)
+    };
+    let own = |cell: usize| place(cell).is_some_and(|at| owner[at] == k as u32);
+    let mut open: Vec<bool> = (0..high * wide).map(|cell| !own(cell)).collect();
+    let mut outside = vec![0_usize];
+    open[0] = false;
+    while let Some(cell) = outside.pop() {
+        // The rim keeps steps to the side from wrapping into a patch.
+        let beside = [
+            cell.wrapping_sub(1),
+            cell + 1,
+            cell.wrapping_sub(wide),
+            cell + wide,
+        ];
+        for at in beside {
+            if open.get_mut(at).is_some_and(core::mem::take) {
+                outside.push(at);
+            }
+        }
+    }
+    let inner = (0..open.len()).filter(|&cell| open[cell]);
+    inner.filter_map(place).collect()
 }
 
 fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
@@ -243,7 +331,7 @@ pub struct MarkerField {
     /// Strain of the gel's surface, from smoothed displacements. `None` below 16 tracks or where
     /// they are not smooth.
     pub strain: Option<StrainBetween<2>>,
-    /// Why the pairs may be wrong, by the matcher.
+    /// Why the pairs may be wrong, by the matcher. `None` where it was not asked.
     pub doubt: Option<Doubt>,
 }
 
@@ -257,8 +345,12 @@ pub struct MarkerShear {
     pub torque_nm: Estimate,
 }
 
-/// Follows markers from the reference to a frame by [`AnnealedSoftassign`]: no order and no grid is
-/// assumed, markers may be missing in either.
+/// Follows markers from the reference to a frame: no order and no grid is assumed, markers may be
+/// missing in either.
+///
+/// Markers that have moved by less than half their distance are paired with the nearest, where the
+/// displacements are smooth and nearly none is left over. All others are paired by
+/// [`AnnealedSoftassign`].
 ///
 /// ```
 /// use nalgebra::Point2;
@@ -284,14 +376,18 @@ pub struct MarkerShear {
 pub fn track_markers(reference: &[Marker], frame: &[Marker]) -> Result<MarkerField, MatchError> {
     let [before, after] =
         [reference, frame].map(|set| set.iter().map(|m| m.position_px).collect::<Vec<_>>());
-    let matching = AnnealedSoftassign::default().match_points(&before, &after)?;
-    let partner = |(i, j): (usize, &Option<usize>)| j.map(|j| (i, j));
-    let mut pairs: Vec<_> = matching
-        .assignment
-        .iter()
-        .enumerate()
-        .filter_map(partner)
-        .collect();
+    let (mut pairs, doubt) = match nearest_pairs(&before, &after) {
+        Some(pairs) => (pairs, None),
+        None => {
+            let matching = AnnealedSoftassign::default().match_points(&before, &after)?;
+            let partner = |(i, j): (usize, &Option<usize>)| j.map(|j| (i, j));
+            let assignment = matching.assignment.iter().enumerate();
+            (
+                assignment.filter_map(partner).collect(),
+                matching.report.doubt,
+            )
+        }
+    };
     // A smooth deformation drops wrong pairs and finds markers that the matcher missed.
     let strain = StrainBetween::of_pairs(&before, &after, &pairs, &GreenLagrange).ok();
     if let Some(strain) = &strain {
@@ -312,8 +408,68 @@ pub fn track_markers(reference: &[Marker], frame: &[Marker]) -> Result<MarkerFie
     Ok(MarkerField {
         tracks: pairs.iter().map(track).collect(),
         strain,
-        doubt: matching.report.doubt,
+        doubt,
     })
+}
+
+/// Pairs of markers that have hardly moved: mutual nearest neighbours, where nothing else is smooth.
+///
+/// Every displacement must be within a quarter of the spacing of the one that the eight pairs next
+/// to it predict, an affine function, so that no other partner fits. One marker in a hundred may be
+/// left over in both sets: a grid that has moved by its pitch leaves a row at each end. `None`
+/// otherwise. O(n²).
+fn nearest_pairs(before: &[Point2<f64>], after: &[Point2<f64>]) -> Option<Vec<(usize, usize)>> {
+    if !before
+        .iter()
+        .chain(after)
+        .all(|p| p.x.is_finite() && p.y.is_finite())
+    {
+        return None;
+    }
+    let nearest = |p: &Point2<f64>, set: &[Point2<f64>], besides: Option<usize>| {
+        let distances = set.iter().map(|q| (q - p).norm_squared()).enumerate();
+        let others = distances.filter(|(k, _)| Some(*k) != besides);
+        others.min_by(|a, b| a.1.total_cmp(&b.1))
+    };
+    let spacing = |set: &[Point2<f64>]| {
+        let each = set.iter().enumerate();
+        median(each.filter_map(|(k, p)| Some(nearest(p, set, Some(k))?.1.sqrt())))
+    };
+    let spacing = spacing(before)?.min(spacing(after)?);
+    let back: Vec<_> = after.iter().map(|p| nearest(p, before, None)).collect();
+    let pair = |(i, p): (usize, &Point2<f64>)| {
+        let (j, square) = nearest(p, after, None)?;
+        let mutual = back[j].is_some_and(|(back, _)| back == i);
+        (mutual && square < 0.25 * spacing * spacing).then_some((i, j))
+    };
+    let pairs: Vec<_> = before.iter().enumerate().filter_map(pair).collect();
+    let left_over = before.len().min(after.len()) - pairs.len();
+    if pairs.len() < 16 || 100 * left_over > pairs.len() {
+        return None;
+    }
+    let moved: Vec<_> = pairs
+        .iter()
+        .map(|&(i, j)| (before[i], after[j] - before[i]))
+        .collect();
+    let smooth = |(own, displacement): &(Point2<f64>, Vector2<f64>)| {
+        let mut near: Vec<_> = moved.iter().map(|(p, u)| (p - own, *u)).collect();
+        near.select_nth_unstable_by(8, |a, b| a.0.norm_squared().total_cmp(&b.0.norm_squared()));
+        let others = near[..9]
+            .iter()
+            .filter(|(step, _)| step.norm_squared() > 0.0);
+        let (mut square, mut right) = (Matrix3::zeros(), Matrix3x2::zeros());
+        for (step, u) in others {
+            let row = Vector3::new(1.0, step.x / spacing, step.y / spacing);
+            square += row * row.transpose();
+            right += row * u.transpose();
+        }
+        // Markers of one line do not determine the plane.
+        let predicted = square
+            .cholesky()
+            .map(|factor| factor.solve(&right).row(0).transpose());
+        predicted.is_some_and(|predicted| (predicted - displacement).norm() < 0.25 * spacing)
+    };
+    moved.iter().all(smooth).then_some(pairs)
 }
 
 impl MarkerField {

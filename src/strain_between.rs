@@ -331,12 +331,15 @@ impl<const D: usize> StrainBetween<D> {
         if rows.len() < expected {
             return Err(StrainBetweenError::NotSmooth);
         }
-        let fit = fit(before, after, &rows)?;
-        let robust = fit.clone();
+        // A fit to the same pairs is the same.
+        let robust = match rows == matched {
+            true => rough,
+            false => fit(before, after, &rows)?,
+        };
         let sources: Vec<_> = rows.iter().map(|&(i, _)| before[i]).collect();
-        let strained = |spline| {
-            let gradients = gradients(spline, &sources);
-            StrainField::from_gradients(&gradients, None, measure)
+        let strained = |spline| -> Result<_, StrainBetweenError> {
+            let gradients = gradients(spline, &sources)?;
+            Ok(StrainField::from_gradients(&gradients, None, measure)?)
         };
         let field = strained(&robust.spline)?;
         let folds = (robust.folds.iter())
@@ -359,10 +362,10 @@ impl<const D: usize> StrainBetween<D> {
             summary: field.summary(),
             standard_error: jackknife(&means) * robust.response,
             degrees_of_freedom: means.len() - 1,
-            weights: robust.weights,
+            weights: robust.weights.clone(),
             sigma: robust.sigma,
             relative_lambda: Some(robust.relative_lambda),
-            fit: Fit::Spline(fit),
+            fit: Fit::Spline(robust),
         })
     }
 }
@@ -492,10 +495,11 @@ impl<const D: usize> StrainBetween<D> {
                 Ok(values.iter().zip(strained(&gradients)?).map(at).collect())
             }
             Fit::Spline(robust) => {
-                let strains = strained(&gradients(&robust.spline, points))?;
-                let folds = (robust.folds.iter())
-                    .map(|fold| strained(&gradients(fold, points)))
-                    .collect::<Result<Vec<_>, _>>()?;
+                let at = |spline| -> Result<_, StrainBetweenError> {
+                    Ok(strained(&gradients(spline, points)?)?)
+                };
+                let strains = at(&robust.spline)?;
+                let folds = (robust.folds.iter().map(at)).collect::<Result<Vec<_>, _>>()?;
                 let at = |(k, p): (usize, &Point<f64, D>)| {
                     let without: Vec<_> = folds.iter().map(|fold| fold[k]).collect();
                     StrainAt {
@@ -655,15 +659,12 @@ fn fit<const D: usize>(
 fn gradients<const D: usize>(
     spline: &ThinPlateSpline<f64, D>,
     points: &[Point<f64, D>],
-) -> Vec<Matrix3<f64>> {
-    points
-        .iter()
-        .map(|p| {
-            let mut h = spline.jacobian(p).fixed_resize::<3, 3>(0.0);
-            (0..D).for_each(|i| h[(i, i)] -= 1.0);
-            h
-        })
-        .collect()
+) -> Result<Vec<Matrix3<f64>>, TpsError> {
+    let mut jacobians = vec![SMatrix::zeros(); points.len()];
+    spline.jacobian_into(points, &mut jacobians)?;
+    let less_one =
+        |jacobian: &SMatrix<f64, D, D>| (jacobian - SMatrix::identity()).fixed_resize::<3, 3>(0.0);
+    Ok(jacobians.iter().map(less_one).collect())
 }
 
 /// Why a share of matched points or their residuals over the distance between neighbours cast doubt

@@ -80,3 +80,34 @@ fn markers_are_followed_through_strain_and_twist() {
         assert!((0.5 * square).sqrt() < 0.1, "{name}: {square}");
     }
 }
+
+/// Markers that move by most of their distance are not paired with the markers that come into their
+/// places, and those that hardly move are paired as by the matcher.
+#[test]
+fn nearest_markers_are_not_taken_for_partners() {
+    let marker = |p: Point2<f64>| Marker::new(p, 0.05, 60.0);
+    let reference: Vec<_> = places().into_iter().map(marker).collect();
+    let regular = |k: usize| Point2::new(25.0 * (k % 11) as f64, 25.0 * (k / 11) as f64);
+    let regular: Vec<_> = (0..88).map(|k| marker(regular(k))).collect();
+    for (set, step) in [
+        (&reference, 20.0),
+        (&reference, 3.0),
+        (&regular, 3.0),
+        (&regular, 20.0),
+    ] {
+        let moved = |m: &Marker| {
+            let p = m.position_px;
+            marker(Point2::new(p.x + step + 0.02 * p.y, p.y))
+        };
+        let frame: Vec<_> = set.iter().map(moved).collect();
+        let field = track_markers(set, &frame).unwrap();
+        assert_eq!(field.tracks.len(), 88, "{step}");
+        assert!(
+            field
+                .tracks
+                .iter()
+                .all(|track| track.rows[0] == track.rows[1]),
+            "{step}"
+        );
+    }
+}

@@ -1,6 +1,7 @@
 //! Colour differences against the reference, and the polynomial from them to normals.
 
 use ndarray::{Array2, ArrayView3};
+use pulp::Arch;
 
 /// Monomials up to the third degree of three colour differences.
 const MONOMIALS: usize = 20;
@@ -96,6 +97,7 @@ impl Blurred {
     }
 
     /// Differences to `reference` less the offset, in units of 50 grey levels, for one row.
+    #[inline(always)]
     fn differences(&self, reference: &Self, offset: [f32; 3], row: usize, out: &mut [Vec<f32>; 3]) {
         let width = 3 * self.columns;
         let lines = [self, reference].map(|image| &image.samples[row * width..][..width]);
@@ -184,42 +186,49 @@ pub fn normals(
     let mut line: [Vec<f32>; 3] = core::array::from_fn(|_| vec![0.0; padded]);
     let mut out = [(); 2].map(|()| Array2::zeros((rows, columns)));
     let weight = |component: usize, k: usize| coefficients[component][k] as f32;
-    for row in 0..rows {
-        frame.differences(reference, offset, row, &mut line);
-        let [_, y] = place(row, 0, (rows, columns));
-        // Along a row the coefficient of a monomial is a + b x.
-        let fixed: [[f32; MONOMIALS]; 2] = core::array::from_fn(|component| {
-            core::array::from_fn(|k| {
-                weight(component, k) + y * weight(component, k + 2 * MONOMIALS)
-            })
-        });
-        let along: [[f32; MONOMIALS]; 2] = core::array::from_fn(|component| {
-            core::array::from_fn(|k| weight(component, k + MONOMIALS))
-        });
-        for start in (0..padded).step_by(LANES) {
-            let lanes: [&[f32]; 3] = core::array::from_fn(|k| &line[k][start..][..LANES]);
-            let mut sums = [[0.0; LANES]; 2];
-            for lane in 0..LANES {
-                let colour = monomials([lanes[0][lane], lanes[1][lane], lanes[2][lane]]);
-                let x = (2.0 * (start + lane) as f32 + 1.0) / columns as f32 - 1.0;
-                for (sums, (fixed, along)) in sums.iter_mut().zip(fixed.iter().zip(&along)) {
-                    let (mut a, mut b) = (0.0, 0.0);
-                    for (k, monomial) in colour.iter().enumerate() {
-                        a += fixed[k] * monomial;
-                        b += along[k] * monomial;
+    // The widest instructions that the processor has.
+    Arch::new().dispatch(
+        #[inline(always)]
+        || {
+            for row in 0..rows {
+                frame.differences(reference, offset, row, &mut line);
+                let [_, y] = place(row, 0, (rows, columns));
+                // Along a row the coefficient of a monomial is a + b x.
+                let fixed: [[f32; MONOMIALS]; 2] = core::array::from_fn(|component| {
+                    core::array::from_fn(|k| {
+                        weight(component, k) + y * weight(component, k + 2 * MONOMIALS)
+                    })
+                });
+                let along: [[f32; MONOMIALS]; 2] = core::array::from_fn(|component| {
+                    core::array::from_fn(|k| weight(component, k + MONOMIALS))
+                });
+                for start in (0..padded).step_by(LANES) {
+                    let lanes: [&[f32]; 3] = core::array::from_fn(|k| &line[k][start..][..LANES]);
+                    let mut sums = [[0.0; LANES]; 2];
+                    for lane in 0..LANES {
+                        let colour = monomials([lanes[0][lane], lanes[1][lane], lanes[2][lane]]);
+                        let x = (2.0 * (start + lane) as f32 + 1.0) / columns as f32 - 1.0;
+                        for (sums, (fixed, along)) in sums.iter_mut().zip(fixed.iter().zip(&along))
+                        {
+                            let (mut a, mut b) = (0.0, 0.0);
+                            for (k, monomial) in colour.iter().enumerate() {
+                                a += fixed[k] * monomial;
+                                b += along[k] * monomial;
+                            }
+                            sums[lane] = a + x * b;
+                        }
                     }
-                    sums[lane] = a + x * b;
+                    for (out, sums) in out.iter_mut().zip(&sums) {
+                        let mut row = out.row_mut(row);
+                        if let Some(row) = row.as_slice_mut() {
+                            let row = &mut row[start..];
+                            let lanes = LANES.min(row.len());
+                            row[..lanes].copy_from_slice(&sums[..lanes]);
+                        }
+                    }
                 }
             }
-            for (out, sums) in out.iter_mut().zip(&sums) {
-                let mut row = out.row_mut(row);
-                if let Some(row) = row.as_slice_mut() {
-                    let row = &mut row[start..];
-                    let lanes = LANES.min(row.len());
-                    row[..lanes].copy_from_slice(&sums[..lanes]);
-                }
-            }
-        }
-    }
+        },
+    );
     out
 }

@@ -1,6 +1,8 @@
 //! Where something touches: the pixels over which the normals turn outwards.
 
-use ndarray::{Array2, ArrayView2, Zip};
+use ndarray::{Array2, ArrayView2, Axis, Zip};
+
+use crate::BoundingBox;
 
 /// Pixels of an object in contact.
 ///
@@ -17,19 +19,31 @@ pub fn contact(normals: &[Array2<f32>; 2]) -> Array2<bool> {
         return mask;
     }
     let coarse = |n: &Array2<f32>| {
-        let mean = Array2::from_shape_fn((high, wide), |(r, c)| {
-            0.25 * (n[[2 * r, 2 * c]]
-                + n[[2 * r, 2 * c + 1]]
-                + n[[2 * r + 1, 2 * c]]
-                + n[[2 * r + 1, 2 * c + 1]])
-        });
+        let mut mean = Array2::zeros((high, wide));
+        let mut two = vec![0.0; columns];
+        for (r, mut to) in mean.outer_iter_mut().enumerate() {
+            let rows = n.row(2 * r).into_iter().zip(n.row(2 * r + 1));
+            two.iter_mut()
+                .zip(rows)
+                .for_each(|(two, (a, b))| *two = a + b);
+            let pairs = to.iter_mut().zip(two.chunks_exact(2));
+            pairs.for_each(|(to, two)| *to = 0.25 * (two[0] + two[1]));
+        }
         blurred(&mean, 1)
     };
     let [nx, ny] = [coarse(&normals[0]), coarse(&normals[1])];
-    let divergence = Array2::from_shape_fn((high, wide), |(r, c)| {
-        let (r, c) = (r.clamp(1, high - 2), c.clamp(1, wide - 2));
-        0.5 * (nx[[r, c + 1]] - nx[[r, c - 1]] + ny[[r + 1, c]] - ny[[r - 1, c]])
-    });
+    let mut divergence = Array2::zeros((high, wide));
+    for (r, mut to) in divergence.outer_iter_mut().enumerate() {
+        // The border has the values beside it.
+        let r = r.clamp(1, high - 2);
+        let x = nx.row(r).into_iter().zip(nx.row(r).into_iter().skip(2));
+        let y = ny.row(r - 1).into_iter().zip(ny.row(r + 1)).skip(1);
+        let inner = to.iter_mut().skip(1).zip(x.zip(y));
+        inner.for_each(|(to, ((left, right), (above, below)))| {
+            *to = 0.5 * (right - left + below - above);
+        });
+        (to[0], to[wide - 1]) = (to[1], to[wide - 2]);
+    }
     let Some(threshold) = threshold(&divergence) else {
         return mask;
     };
@@ -41,23 +55,27 @@ pub fn contact(normals: &[Array2<f32>; 2]) -> Array2<bool> {
     // A blur of the patches and half of it straighten the rim. A blur of deviation σ takes σ²/2a
     // off the radius a of a circle: with σ² of 8 px² a tenth of a pixel at 40 px.
     let smooth = blurred(&patches.mapv(|inside| f32::from(u8::from(inside))), 2);
-    for ((row, column), inside) in mask.indexed_iter_mut() {
-        *inside = between(&smooth, row, column) > 0.5;
-    }
-    mask
-}
-
-/// The value at a pixel of the frame, linear between the means over 2 × 2 pixels.
-fn between(coarse: &Array2<f32>, row: usize, column: usize) -> f32 {
-    let (rows, columns) = coarse.dim();
+    // Values of pixels are linear between those of the means over 2 × 2.
     let split = |k: usize, n: usize| {
         let at = (0.5 * (k as f32 - 0.5)).clamp(0.0, (n - 1) as f32);
         let low = (at as usize).min(n - 2);
         (low, at - low as f32)
     };
-    let ((r, v), (c, u)) = (split(row, rows), split(column, columns));
-    let along = |r: usize| (1.0 - u) * coarse[[r, c]] + u * coarse[[r, c + 1]];
-    (1.0 - v) * along(r) + v * along(r + 1)
+    let across: Vec<(usize, f32)> = (0..columns).map(|column| split(column, wide)).collect();
+    let mut line = vec![0.0; wide];
+    for (row, mut to) in mask.outer_iter_mut().enumerate() {
+        let (r, v) = split(row, high);
+        let ends = smooth.row(r).into_iter().zip(smooth.row(r + 1));
+        for (line, (above, below)) in line.iter_mut().zip(ends) {
+            *line = (1.0 - v) * above + v * below;
+        }
+        if line.iter().any(|value| *value > 0.5) {
+            for (inside, &(c, u)) in to.iter_mut().zip(&across) {
+                *inside = (1.0 - u) * line[c] + u * line[c + 1] > 0.5;
+            }
+        }
+    }
+    mask
 }
 
 /// Blurs by (1, 4, 6, 4, 1)/16 along both axes, so many times. The border is continued.
@@ -66,14 +84,17 @@ fn blurred(image: &Array2<f32>, times: usize) -> Array2<f32> {
     let tap = |at: [f32; 5]| (at[0] + at[4] + 4.0 * (at[1] + at[3]) + 6.0 * at[2]) / 16.0;
     let near = |k: usize, n: usize| [0, 1, 2, 3, 4].map(|j| (k + j).saturating_sub(2).min(n - 1));
     let mut image = image.clone();
+    let mut across = Array2::zeros((rows, columns));
+    let mut padded = vec![0.0; columns + 4];
     for _ in 0..times {
-        let mut across = Array2::zeros((rows, columns));
         for (from, mut to) in image.outer_iter().zip(across.outer_iter_mut()) {
-            for (k, to) in to.iter_mut().enumerate() {
-                *to = match k >= 2 && k + 2 < columns {
-                    true => tap([0, 1, 2, 3, 4].map(|j| from[k + j - 2])),
-                    false => tap(near(k, columns).map(|k| from[k])),
-                };
+            for (padded, from) in padded[2..].iter_mut().zip(&from) {
+                *padded = *from;
+            }
+            padded[..2].fill(from[0]);
+            padded[columns + 2..].fill(from[columns - 1]);
+            for (to, taps) in to.iter_mut().zip(padded.windows(5)) {
+                *to = tap([0, 1, 2, 3, 4].map(|k| taps[k]));
             }
         }
         for (k, to) in image.outer_iter_mut().enumerate() {
@@ -134,19 +155,18 @@ fn threshold(divergence: &Array2<f32>) -> Option<f32> {
 
 /// Grows the pixels of this `value` by one in the four directions.
 fn grown(mask: &Array2<bool>, value: bool) -> Array2<bool> {
-    Array2::from_shape_fn(mask.dim(), |(r, c)| {
-        let beside = [
-            [r.wrapping_sub(1), c],
-            [r + 1, c],
-            [r, c.wrapping_sub(1)],
-            [r, c + 1],
-        ];
-        let any = mask[[r, c]] == value
-            || beside
-                .iter()
-                .any(|&at| mask.get(at).is_some_and(|&m| m == value));
-        any == value
-    })
+    let mut grown = mask.clone();
+    for axis in [Axis(0), Axis(1)] {
+        let n = mask.len_of(axis);
+        for (to, from) in [(0..n - 1, 1..n), (1..n, 0..n - 1)] {
+            let from = mask.slice_axis(axis, from.into());
+            let mut to = grown.slice_axis_mut(axis, to.into());
+            to.zip_mut_with(&from, |to, from| {
+                *to = if *from == value { value } else { *to }
+            });
+        }
+    }
+    grown
 }
 
 /// Patches of at least a tenth of the largest, with their holes. `None` without a patch of 25
@@ -160,32 +180,41 @@ fn filled(mask: &Array2<bool>) -> Option<Array2<bool>> {
     let mut kept = Array2::from_elem(mask.dim(), false);
     let large = patches.iter().filter(|patch| 10 * patch.len() >= largest);
     large.flatten().for_each(|&at| kept[at] = true);
-    let (rows, columns) = mask.dim();
+    // A part of the box around all patches that reaches its border is outside of them.
+    let mut window = BoundingBox::of_mask(kept.view())?.of_mut(kept.view_mut());
+    let (rows, columns) = window.dim();
     let border = |&[r, c]: &[usize; 2]| r == 0 || c == 0 || r + 1 == rows || c + 1 == columns;
-    let holes = parts(kept.view(), false);
+    let holes = parts(window.view(), false);
     let inner = holes.iter().filter(|hole| !hole.iter().any(border));
-    inner.flatten().for_each(|&at| kept[at] = true);
+    inner.flatten().for_each(|&at| window[at] = true);
     Some(kept)
 }
 
 /// The parts of a mask of this `value` that are connected by their sides, as `[row, column]`.
 pub fn parts(mask: ArrayView2<'_, bool>, value: bool) -> Vec<Vec<[usize; 2]>> {
-    let mut open = mask.mapv(|m| m == value);
-    let (rows, columns) = open.dim();
+    let columns = mask.ncols();
+    let mut open: Vec<bool> = mask.iter().map(|m| *m == value).collect();
     let mut parts = Vec::new();
-    for start in (0..rows * columns).map(|k| [k / columns, k % columns]) {
+    for start in 0..open.len() {
         if !core::mem::take(&mut open[start]) {
             continue;
         }
-        let mut part = vec![start];
+        let mut part = vec![[start / columns, start % columns]];
         let mut next = 0;
         while let Some(&[r, c]) = part.get(next) {
             next += 1;
-            let (above, left) = (r.wrapping_sub(1), c.wrapping_sub(1));
-            for beside in [[above, c], [r + 1, c], [r, left], [r, c + 1]] {
-                if open.get_mut(beside).is_some_and(core::mem::take) {
-                    part.push(beside);
-                }
+            let at = r * columns + c;
+            if c > 0 && core::mem::take(&mut open[at - 1]) {
+                part.push([r, c - 1]);
+            }
+            if c + 1 < columns && core::mem::take(&mut open[at + 1]) {
+                part.push([r, c + 1]);
+            }
+            if r > 0 && core::mem::take(&mut open[at - columns]) {
+                part.push([r - 1, c]);
+            }
+            if open.get_mut(at + columns).is_some_and(core::mem::take) {
+                part.push([r + 1, c]);
             }
         }
         parts.push(part);

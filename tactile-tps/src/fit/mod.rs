@@ -21,7 +21,7 @@ use faer::{
     Accum, Mat, MatMut, MatRef, Par, Spec,
     diag::DiagMut,
     dyn_stack::{MemStack, StackReq},
-    linalg::{cholesky::llt, evd, matmul::matmul},
+    linalg::{cholesky::llt, evd, matmul::matmul, triangular_inverse},
 };
 use nalgebra::Point;
 
@@ -868,6 +868,21 @@ impl<const D: usize> System<D> {
         heads
     }
 
+    /// The derivative of one active centre's weight by another's value, from the inverse of the
+    /// factor.
+    fn entry(&self, inverse: &Mat<f64>, lambda: f64, i: usize, j: usize) -> f64 {
+        let n = self.active.len();
+        // The inverse of the factor is a lower triangle.
+        let column = |k: usize| &inverse.col_as_slice(k)[i.max(j)..n];
+        let (a, b) = (column(i), column(j));
+        let affine = (0..self.affine.q).map(|c| {
+            let column = self.affine.column(c);
+            column[i] * column[j]
+        });
+        let scale = |i: usize| self.scales.get(i).copied().unwrap_or(1.0);
+        scale(i) * scale(j) * (dot(a, b) - affine.sum::<f64>() / (self.shift + lambda))
+    }
+
     /// Spreads the columns of `work`, each entry times its scale, over the centres.
     fn scatter(&self, work: &[f64], y: &mut [f64]) {
         let n = self.active.len();
@@ -969,6 +984,13 @@ impl Triangle {
         let columns = b.len() / self.n;
         let b = MatMut::from_column_major_slice_mut(b, self.n, columns);
         llt::solve::solve_in_place(self.view(), b, Par::Seq, MemStack::new(&mut []));
+    }
+
+    /// The inverse of the Cholesky factor.
+    fn inverse_factor(&self) -> Mat<f64> {
+        let mut inverse = Mat::zeros(self.n, self.n);
+        triangular_inverse::invert_lower_triangular(inverse.as_mut(), self.view(), Par::Seq);
+        inverse
     }
 
     /// An estimate of the 2-norm of A⁻¹: two steps of inverse iteration from the column of the

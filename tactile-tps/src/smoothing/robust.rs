@@ -3,7 +3,8 @@
 use nalgebra::{Point, SMatrix, SVector};
 
 use crate::{
-    FitOptions, Smoothing, ThinPlateSpline, TpsError, Warp, WarpModel, error::validate_pairs,
+    Factorization, FitOptions, Smoothing, SplineWorkspace, ThinPlateSpline, TpsError, Warp,
+    WarpModel, error::validate_pairs,
 };
 
 /// λ that are tried, in units of the squared radius of the points. The last one is affine.
@@ -108,7 +109,7 @@ impl<const D: usize> RobustFit<D> {
         let (mut folds, mut sigma, mut response) = (Vec::new(), 0.0, 1.0);
         for _ in 0..3 {
             let product: Vec<f64> = weights.iter().zip(&prior).map(|(w, p)| w * p).collect();
-            let held_out = hold_out(sources, targets, &product, lambda)?;
+            let held_out = hold_out(sources, targets, &product, lambda, true)?;
             sigma = noise::<D>(&held_out.distances).max(rounding);
             let scaled: Vec<f64> = (held_out.distances.iter())
                 .map(|d| d / (sigma * cutoff::<D>()))
@@ -157,7 +158,7 @@ fn one_standard_error_lambda<const D: usize>(
     let prior = thinned(prior, step);
     let mut distances = Vec::new();
     for lambda in LAMBDAS {
-        distances.push(hold_out(&sources, &targets, &prior, lambda * square)?.distances);
+        distances.push(hold_out(&sources, &targets, &prior, lambda * square, false)?.distances);
     }
     let sigma = distances
         .iter()
@@ -198,33 +199,106 @@ fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len() as f64
 }
 
-/// Predicts every point from a spline of the other parts.
+/// Predicts every point from a spline of the other parts. With `all_splines` those of all parts are
+/// kept, else only distances.
 fn hold_out<const D: usize>(
     sources: &[Point<f64, D>],
     targets: &[Point<f64, D>],
     weights: &[f64],
     lambda: f64,
+    all_splines: bool,
 ) -> Result<HeldOut<D>, TpsError> {
     // A few points can afford many parts, which make the jackknife's error more certain.
     let parts = if sources.len() < 300 { 32 } else { 12 };
-    // Scrambled, so that parts do not follow the order of the points.
-    let part_of =
-        |i: usize| ((i as u64 + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15) >> 40) as usize % parts;
-    let mut distances = vec![0.0; sources.len()];
-    let mut splines = Vec::new();
-    for part in 0..parts {
-        let without: Vec<f64> = weights
-            .iter()
-            .enumerate()
-            .map(|(i, &w)| if part_of(i) == part { 0.0 } else { w })
-            .collect();
-        let spline = weighted(sources, targets, &without, lambda)?;
-        for i in (0..sources.len()).filter(|&i| part_of(i) == part) {
-            distances[i] = (spline.apply(&sources[i]) - targets[i]).norm();
-        }
-        splines.push(spline);
+    let kept = Kept::new(sources, targets, weights);
+    let mut members = vec![Vec::new(); parts];
+    for (row, &i) in kept.rows.iter().enumerate() {
+        members[part_of(i, parts)].push(row);
     }
-    Ok(HeldOut { distances, splines })
+    // One factor for all parts, as long as each can be left out of it.
+    let factorization = Factorization::new(&kept.sources, &kept.options(lambda)?)?;
+    let misses = factorization.left_out(&kept.targets, &members);
+    let (mut workspace, mut shifted) = (SplineWorkspace::default(), kept.targets.clone());
+    let mut held_out = HeldOut {
+        distances: vec![0.0; sources.len()],
+        splines: Vec::new(),
+    };
+    if let Some(misses) = &misses {
+        for (&i, miss) in kept.rows.iter().zip(misses) {
+            held_out.distances[i] = miss.norm();
+        }
+    }
+    for (part, members) in members.iter().enumerate() {
+        let own = (0..sources.len()).filter(|&i| part_of(i, parts) == part);
+        let predicted = misses.is_some() && own.clone().all(|i| weights[i] > LEAST_WEIGHT);
+        if predicted && !all_splines {
+            continue;
+        }
+        let mut spline = ThinPlateSpline::default();
+        if let Some(misses) = &misses {
+            // Targets that the spline meets without them do not bend it.
+            members.iter().for_each(|&row| shifted[row] -= misses[row]);
+            factorization.refit_with(&mut workspace, &shifted, None, None, &mut spline)?;
+            members
+                .iter()
+                .for_each(|&row| shifted[row] = kept.targets[row]);
+        } else {
+            let without = |i: usize| {
+                if part_of(i, parts) == part {
+                    0.0
+                } else {
+                    weights[i]
+                }
+            };
+            let without: Vec<f64> = (0..sources.len()).map(without).collect();
+            spline = weighted(sources, targets, &without, lambda)?;
+        }
+        if !predicted {
+            own.for_each(|i| {
+                held_out.distances[i] = (spline.apply(&sources[i]) - targets[i]).norm()
+            });
+        }
+        held_out.splines.push(spline);
+    }
+    Ok(held_out)
+}
+
+/// The part of a point, scrambled, so that parts do not follow the order of the points.
+fn part_of(i: usize, parts: usize) -> usize {
+    ((i as u64 + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15) >> 40) as usize % parts
+}
+
+/// Pairs of less weight do not count.
+const LEAST_WEIGHT: f64 = 1e-3;
+
+/// The pairs whose weight matters.
+struct Kept<const D: usize> {
+    rows: Vec<usize>,
+    sources: Vec<Point<f64, D>>,
+    targets: Vec<Point<f64, D>>,
+    weights: Vec<f64>,
+}
+
+impl<const D: usize> Kept<D> {
+    fn new(sources: &[Point<f64, D>], targets: &[Point<f64, D>], weights: &[f64]) -> Self {
+        let rows: Vec<usize> = (0..sources.len())
+            .filter(|&i| weights[i] > LEAST_WEIGHT)
+            .collect();
+        let pick = |p: &[Point<f64, D>]| rows.iter().map(|&i| p[i]).collect();
+        let (sources, targets) = (pick(sources), pick(targets));
+        let weights = rows.iter().map(|&i| weights[i]).collect();
+        Self {
+            rows,
+            sources,
+            targets,
+            weights,
+        }
+    }
+
+    fn options(&self, lambda: f64) -> Result<FitOptions<f64>, TpsError> {
+        let options = FitOptions::default().with_smoothing(Smoothing::Lambda(lambda))?;
+        options.with_weights(self.weights.clone())
+    }
 }
 
 /// The spline through the pairs whose weight matters.
@@ -234,12 +308,8 @@ fn weighted<const D: usize>(
     weights: &[f64],
     lambda: f64,
 ) -> Result<ThinPlateSpline<f64, D>, TpsError> {
-    let kept: Vec<usize> = (0..sources.len()).filter(|&i| weights[i] > 1e-3).collect();
-    let pick = |p: &[Point<f64, D>]| kept.iter().map(|&i| p[i]).collect::<Vec<_>>();
-    let options = FitOptions::default()
-        .with_smoothing(Smoothing::Lambda(lambda))?
-        .with_weights(kept.iter().map(|&i| weights[i]).collect())?;
-    ThinPlateSpline::fit(&pick(sources), &pick(targets), &options)
+    let kept = Kept::new(sources, targets, weights);
+    ThinPlateSpline::fit(&kept.sources, &kept.targets, &kept.options(lambda)?)
 }
 
 fn squared_radius<const D: usize>(points: &[Point<f64, D>]) -> f64 {
@@ -285,4 +355,55 @@ fn biweight_slope<const D: usize>(u: f64) -> f64 {
 
 fn tukey_loss(u: f64) -> f64 {
     1.0 - if u < 1.0 { (1.0 - u * u).powi(3) } else { 0.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Point2;
+
+    /// Points left out of one factor, against splines fitted without them, also where weights
+    /// differ and a point counts not at all.
+    #[test]
+    fn parts_left_out_are_those_of_their_own_fits() {
+        let point = |i: usize| Point2::new((i % 9) as f64 + (i as f64).sin(), (i / 9) as f64);
+        let sources: Vec<_> = (0..80).map(point).collect();
+        let bent = |p: &Point2<f64>| Point2::new(p.x + 0.2 * (p.y + p.x).sin(), 1.1 * p.y);
+        let targets: Vec<_> = sources.iter().map(bent).collect();
+        let uneven = |i: usize| {
+            if i == 7 {
+                0.0
+            } else {
+                1.0 / (1 + i % 4) as f64
+            }
+        };
+        let weights: Vec<f64> = (0..80).map(uneven).collect();
+        for lambda in LAMBDAS {
+            let found = hold_out(&sources, &targets, &weights, lambda, true).unwrap();
+            let kept = Kept::new(&sources, &targets, &weights);
+            let factorization =
+                Factorization::new(&kept.sources, &kept.options(lambda).unwrap()).unwrap();
+            let alone: Vec<_> = (0..kept.rows.len()).map(|row| vec![row]).collect();
+            assert!(
+                factorization.left_out(&kept.targets, &alone).is_some(),
+                "{lambda}"
+            );
+            for (part, spline) in found.splines.iter().enumerate() {
+                let own: Vec<usize> = (0..80).filter(|&i| part_of(i, 32) == part).collect();
+                let without = |i: usize| if own.contains(&i) { 0.0 } else { weights[i] };
+                let without: Vec<f64> = (0..80).map(without).collect();
+                let alone = weighted(&sources, &targets, &without, lambda).unwrap();
+                // Rounding of systems whose condition number is 10⁵.
+                let place = Point2::new(3.3, 4.4);
+                assert!(
+                    (spline.apply(&place) - alone.apply(&place)).norm() < 1e-9,
+                    "{lambda}"
+                );
+                for i in own {
+                    let miss = (alone.apply(&sources[i]) - targets[i]).norm();
+                    assert!((miss - found.distances[i]).abs() < 1e-9, "{lambda} {i}");
+                }
+            }
+        }
+    }
 }
