@@ -50,21 +50,22 @@ impl AnnealedSoftassign {
         if ws.best.sigma < RESOLVED * spacing {
             return;
         }
-        ws.prepare_twins(spacing);
-        let own = ws.distance_after(&SMatrix::identity(), spacing, NEAR);
+        let linear = ws.prepare_twins(spacing);
+        let own = ws.distance_after(&SMatrix::identity(), &linear, spacing, NEAR);
         let Some(own) = own.filter(|&own| own > RESOLVED * spacing) else {
             return;
         };
         for reflection in [SMatrix::identity(), mirror()] {
+            let linear = ws.linear_part(); // of the answer, which a turned model may have replaced
             let mut best = (NEARER * own, None);
             for turn in starts::rotations::<D>(Rotation::Any).map(|turn| turn * reflection) {
-                let found = ws.distance_after(&turn, spacing, NEAR);
+                let found = ws.distance_after(&turn, &linear, spacing, NEAR);
                 if let Some(distance) = found.filter(|&distance| distance < best.0) {
                     best = (distance, Some(turn));
                 }
             }
             let Some(turn) = best.1 else { continue };
-            ws.start_from_twin(&turn);
+            ws.start_from_twin(&turn, &linear);
             // Warmer, points would leave the partners that they begin with.
             self.compare_twin(ws, 0.3 * spacing, &turn);
         }
@@ -132,21 +133,22 @@ impl<const D: usize> SoftassignWorkspace<D> {
     pub(super) fn is_symmetric(&mut self) -> bool {
         let spacing = self.mean_spacing();
         let reach = (3.0 * self.best.sigma).min(0.25 * spacing) / spacing;
-        self.prepare_twins(spacing);
-        let Some(own) = self.distance_after(&SMatrix::identity(), spacing, reach) else {
+        let linear = self.prepare_twins(spacing);
+        let Some(own) = self.distance_after(&SMatrix::identity(), &linear, spacing, reach) else {
             return false;
         };
         starts::rotations::<D>(Rotation::Any).skip(1).any(|turn| {
-            let distance = self.distance_after(&turn, spacing, reach);
+            let distance = self.distance_after(&turn, &linear, spacing, reach);
             // Medians of so many distances vary by a tenth. Below a hundredth is rounding.
             distance.is_some_and(|distance| distance <= 1.3 * own + 0.01 * spacing)
         })
     }
 
-    /// Puts model and targets where they are looked up.
-    fn prepare_twins(&mut self, spacing: f64) {
+    /// Puts model and targets where they are looked up. Returns the affine part of the answer.
+    fn prepare_twins(&mut self, spacing: f64) -> SMatrix<f64, D, D> {
         self.patterns.model.build(&self.model, spacing);
         self.patterns.targets.build(&self.target, spacing);
+        self.linear_part()
     }
 
     /// Median distance to the targets of the sample, turned. None where more than one point in
@@ -154,10 +156,10 @@ impl<const D: usize> SoftassignWorkspace<D> {
     fn distance_after(
         &mut self,
         turn: &SMatrix<f64, D, D>,
+        linear: &SMatrix<f64, D, D>,
         spacing: f64,
         reach: f64,
     ) -> Option<f64> {
-        let linear = self.linear_part();
         let step = self.model.len().div_ceil(SAMPLE);
         let share = if reach < NEAR { 20 } else { 5 };
         let mut misses = self.model.len() / step / share;
@@ -195,8 +197,7 @@ impl<const D: usize> SoftassignWorkspace<D> {
     }
 
     /// Puts `state` where the answer has the turned model.
-    fn start_from_twin(&mut self, turn: &SMatrix<f64, D, D>) {
-        let linear = self.linear_part();
+    fn start_from_twin(&mut self, turn: &SMatrix<f64, D, D>, linear: &SMatrix<f64, D, D>) {
         let spacing = self.mean_spacing();
         let to = SVector::from(mean(&self.best.warped));
         let state = &mut self.state;
