@@ -443,9 +443,7 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
     /// ```
     pub fn apply(&self, point: &Point<T, D>) -> Point<T, M> {
         let mut value = [Point::origin()];
-        self.each::<0>(core::slice::from_ref(point), |_, sample| {
-            value[0] = sample.point()
-        });
+        self.evaluate::<0>(core::slice::from_ref(point), (&mut value, &mut [], &mut []));
         value[0]
     }
 
@@ -467,11 +465,12 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
     /// # }
     /// ```
     pub fn jacobian(&self, point: &Point<T, D>) -> SMatrix<T, M, D> {
-        let mut jacobian = SMatrix::zeros();
-        self.each::<1>(core::slice::from_ref(point), |_, sample| {
-            jacobian = sample.jacobian()
-        });
-        jacobian
+        let mut jacobian = [SMatrix::zeros()];
+        self.evaluate::<1>(
+            core::slice::from_ref(point),
+            (&mut [], &mut jacobian, &mut []),
+        );
+        jacobian[0]
     }
 
     /// The Hessian of every output. At a centre where the kernel has none its own term is left out.
@@ -492,11 +491,12 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
     /// # }
     /// ```
     pub fn hessian(&self, point: &Point<T, D>) -> [SMatrix<T, D, D>; M] {
-        let mut hessian = [SMatrix::zeros(); M];
-        self.each::<2>(core::slice::from_ref(point), |_, sample| {
-            hessian = sample.hessian()
-        });
-        hessian
+        let mut hessian = [[SMatrix::zeros(); M]];
+        self.evaluate::<2>(
+            core::slice::from_ref(point),
+            (&mut [], &mut [], &mut hessian),
+        );
+        hessian[0]
     }
 
     /// f at many points, into the caller's memory.
@@ -525,7 +525,7 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
         values: &mut [Point<T, M>],
     ) -> Result<(), TpsError> {
         same_length(points.len(), values.len())?;
-        self.each::<0>(points, |i, sample| values[i] = sample.point());
+        self.evaluate::<0>(points, (values, &mut [], &mut []));
         Ok(())
     }
 
@@ -554,7 +554,7 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
         jacobians: &mut [SMatrix<T, M, D>],
     ) -> Result<(), TpsError> {
         same_length(points.len(), jacobians.len())?;
-        self.each::<1>(points, |i, sample| jacobians[i] = sample.jacobian());
+        self.evaluate::<1>(points, (&mut [], jacobians, &mut []));
         Ok(())
     }
 
@@ -588,21 +588,14 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
     ) -> Result<(), TpsError> {
         same_length(points.len(), values.len())?;
         same_length(points.len(), jacobians.len())?;
-        self.each::<1>(points, |i, sample| {
-            values[i] = sample.point();
-            jacobians[i] = sample.jacobian();
-        });
+        self.evaluate::<1>(points, (values, jacobians, &mut []));
         Ok(())
     }
 
-    /// Hands the sample at every point to `sink`, with derivatives up to `ORDER`.
-    fn each<const ORDER: usize>(
-        &self,
-        points: &[Point<T, D>],
-        sink: impl FnMut(usize, Sample<T, D, M>),
-    ) {
+    /// Values and derivatives up to `ORDER` at every point.
+    fn evaluate<const ORDER: usize>(&self, points: &[Point<T, D>], outputs: Outputs<'_, T, D, M>) {
         let (centres, weights) = self.columns();
-        dispatch(Each::<_, _, _, D, M, ORDER> {
+        dispatch(Evaluation::<_, _, D, M, ORDER> {
             sum: KernelSum {
                 kernel: &self.kernel,
                 centres,
@@ -611,7 +604,7 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
             affine: &self.affine,
             frame: self.frame,
             points,
-            sink,
+            outputs,
         });
     }
 }
@@ -698,47 +691,24 @@ fn digits<T: Scalar>(error: f64) -> f64 {
     f64::max(error, T::UNIT_ROUNDOFF).log10().min(0.0).abs()
 }
 
-/// A spline's value and derivatives at one point.
-#[derive(Clone, Copy)]
-struct Sample<T, const D: usize, const M: usize> {
-    value: [T; M],
-    gradient: [[T; D]; M],
-    hessian: [[[T; D]; D]; M],
-}
+/// Where values, Jacobians and Hessians of the points go. An empty slice takes none.
+type Outputs<'a, T, const D: usize, const M: usize> = (
+    &'a mut [Point<T, M>],
+    &'a mut [SMatrix<T, M, D>],
+    &'a mut [[SMatrix<T, D, D>; M]],
+);
 
-impl<T: Scalar, const D: usize, const M: usize> Sample<T, D, M> {
-    #[inline(always)]
-    fn point(&self) -> Point<T, M> {
-        Point::from(SVector::from(self.value))
-    }
-
-    #[inline(always)]
-    fn jacobian(&self) -> SMatrix<T, M, D> {
-        SMatrix::from_fn(|i, j| self.gradient[i][j])
-    }
-
-    #[inline(always)]
-    fn hessian(&self) -> [SMatrix<T, D, D>; M] {
-        self.hessian
-            .map(|h| SMatrix::from_fn(|i, j| if i >= j { h[i][j] } else { h[j][i] }))
-    }
-}
-
-/// Samples at all points, block by block.
-struct Each<'a, T: Scalar, K, F, const D: usize, const M: usize, const ORDER: usize> {
+/// Values and derivatives at all points, block by block.
+struct Evaluation<'a, T: Scalar, K, const D: usize, const M: usize, const ORDER: usize> {
     sum: KernelSum<'a, T, K, D, M>,
     affine: &'a AffinePart<T, D, M>,
     frame: Frame<D>,
     points: &'a [Point<T, D>],
-    sink: F,
+    outputs: Outputs<'a, T, D, M>,
 }
 
-impl<T, K, F, const D: usize, const M: usize, const ORDER: usize> Job<T>
-    for Each<'_, T, K, F, D, M, ORDER>
-where
-    T: Scalar,
-    K: Kernel,
-    F: FnMut(usize, Sample<T, D, M>),
+impl<T: Scalar, K: Kernel, const D: usize, const M: usize, const ORDER: usize> Job<T>
+    for Evaluation<'_, T, K, D, M, ORDER>
 {
     type Output = ();
 
@@ -754,13 +724,10 @@ where
     }
 }
 
-impl<T, K, F, const D: usize, const M: usize, const ORDER: usize> Each<'_, T, K, F, D, M, ORDER>
-where
-    T: Scalar,
-    K: Kernel,
-    F: FnMut(usize, Sample<T, D, M>),
+impl<T: Scalar, K: Kernel, const D: usize, const M: usize, const ORDER: usize>
+    Evaluation<'_, T, K, D, M, ORDER>
 {
-    /// Samples `used` ≤ `W` points from `start` on.
+    /// Evaluates at `used` ≤ `W` points from `start` on.
     #[inline(always)]
     fn chunk<L: Lane<T>, const W: usize>(&mut self, start: usize, used: usize) {
         let mut x = [[T::zero(); W]; D];
@@ -772,37 +739,47 @@ where
         self.sum.block::<L, W, ORDER>(&x, &mut sums);
         for l in 0..used {
             let point = core::array::from_fn(|k| x[k][l]);
-            let sample = self.finish::<L, W>(&point, &sums, l);
-            (self.sink)(start + l, sample);
+            self.finish::<L, W>(start + l, &point, &sums, l);
         }
     }
 
     /// Adds the affine part and returns to the units of the points.
     #[inline(always)]
     fn finish<L: Lane<T>, const W: usize>(
-        &self,
+        &mut self,
+        at: usize,
         x: &[T; D],
         sums: &Lanes<T, D, M, W>,
         l: usize,
-    ) -> Sample<T, D, M> {
+    ) {
         let (affine, scale) = (self.affine, T::narrow(self.frame.scale));
-        let mut sample = Sample {
-            value: [T::zero(); M],
-            gradient: [[T::zero(); D]; M],
-            hessian: [[[T::zero(); D]; D]; M],
-        };
-        for m in 0..M {
-            let start = L::new(sums.value[m][l]) + L::new(affine.constant[m]);
-            let along = |sum: L, k: usize| L::new(affine.gradient[m][k]).mul_add(L::new(x[k]), sum);
-            sample.value[m] = (0..D).fold(start, along).get();
-            for k in (0..D).filter(|_| ORDER > 0) {
-                sample.gradient[m][k] = (affine.gradient[m][k] + sums.gradient[m][k][l]) / scale;
-                for i in (0..=k).filter(|_| ORDER > 1) {
-                    sample.hessian[m][k][i] = sums.hessian[m][k][i][l] / scale / scale;
+        let (values, jacobians, hessians) = &mut self.outputs;
+        if let Some(value) = values.get_mut(at) {
+            for m in 0..M {
+                let start = L::new(sums.value[m][l]) + L::new(affine.constant[m]);
+                let along =
+                    |sum: L, k: usize| L::new(affine.gradient[m][k]).mul_add(L::new(x[k]), sum);
+                value[m] = (0..D).fold(start, along).get();
+            }
+        }
+        if let Some(jacobian) = jacobians.get_mut(at).filter(|_| ORDER > 0) {
+            for m in 0..M {
+                for k in 0..D {
+                    let slope = affine.gradient[m][k] + sums.gradient[m][k][l];
+                    jacobian[(m, k)] = slope / scale;
                 }
             }
         }
-        sample
+        if let Some(hessian) = hessians.get_mut(at).filter(|_| ORDER > 1) {
+            for m in 0..M {
+                for k in 0..D {
+                    for i in 0..=k {
+                        let curve = sums.hessian[m][k][i][l] / scale / scale;
+                        (hessian[m][(k, i)], hessian[m][(i, k)]) = (curve, curve);
+                    }
+                }
+            }
+        }
     }
 }
 
