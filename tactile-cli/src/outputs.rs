@@ -8,8 +8,11 @@ use std::collections::HashSet;
 use std::ffi::{OsStr, OsString};
 use std::fmt::Debug;
 use std::fs::Metadata;
+use std::io::{Cursor, Write};
 use std::path::{Path, PathBuf};
 use tactile_imaging::io::{image_size, write_bytes};
+use zip::write::SimpleFileOptions;
+use zip::{CompressionMethod, ZipWriter};
 
 /// The folder of the results, if one is wanted, and the files for it.
 pub struct Outputs {
@@ -344,5 +347,48 @@ impl Csv {
 
     pub fn into_bytes(self) -> Vec<u8> {
         self.text.into_bytes()
+    }
+}
+
+/// Named arrays as `numpy.load` reads them.
+pub struct Npz {
+    archive: ZipWriter<Cursor<Vec<u8>>>,
+}
+
+impl Npz {
+    pub fn new() -> Self {
+        let archive = ZipWriter::new(Cursor::new(Vec::new()));
+        Self { archive }
+    }
+
+    /// Adds an array in C order. `kind` is NumPy's name of its elements, `<f8` or `<i8`.
+    pub fn add(
+        &mut self,
+        name: &str,
+        kind: &str,
+        shape: &[usize],
+        elements: impl IntoIterator<Item = [u8; 8]>,
+    ) -> Result<(), Failure> {
+        let shape: String = shape.iter().map(|n| format!("{n}, ")).collect();
+        let mut header =
+            format!("{{'descr': '{kind}', 'fortran_order': False, 'shape': ({shape}), }}");
+        // Data begin at a multiple of 64 bytes; ten stand before the header, a line break ends it.
+        let padding = 63 - (10 + header.len()) % 64;
+        header.push_str(&" ".repeat(padding));
+        header.push('\n');
+        let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
+        bytes.extend((header.len() as u16).to_le_bytes());
+        bytes.extend(header.bytes());
+        bytes.extend(elements.into_iter().flatten());
+        let options = SimpleFileOptions::default().compression_method(CompressionMethod::Stored);
+        self.archive
+            .start_file(format!("{name}.npy"), options)
+            .map_err(Failure::output)?;
+        self.archive.write_all(&bytes).map_err(Failure::output)
+    }
+
+    pub fn into_bytes(self) -> Result<Vec<u8>, Failure> {
+        let archive = self.archive.finish().map_err(Failure::output)?;
+        Ok(archive.into_inner())
     }
 }

@@ -1,10 +1,10 @@
 //! `tactile strain`: from two sets of points, before and after a deformation.
 use crate::console::{Context, Exit, Failure, digits, four_digits};
 use crate::match_points::{self, Expectations};
-use crate::outputs::Csv;
+use crate::outputs::{Csv, Npz};
 use crate::plot::{Colour, Page, Panel};
 use clap::{Args, ValueEnum};
-use nalgebra::{Matrix3, Point};
+use nalgebra::{Matrix3, Point, SVector};
 use serde_json::{Map, Value, json};
 use std::path::{Path, PathBuf};
 use tactile_imaging::elasticity::strain::{
@@ -26,10 +26,11 @@ mod series;
 /// give no strain.
 ///
 /// --out gets pairs.csv (rows, positions and displacements of the pairs), strain.csv (the strain at
-/// every point with its standard error) and strain.svg (maps over the points, of a volume over the
-/// middle of z), and with --grid also grid.csv and grid.vtk
-/// (for ParaView): displacement, strain and standard error on a grid over the box of the points
-/// before. Far from the pairs the errors grow.
+/// every point with its standard error), strain.npz (the same for NumPy: row_before, points,
+/// displacement, strain and standard_error as tensors) and strain.svg (maps over the points, of a
+/// volume over the middle of z). With --grid there are also grid.csv, grid.vtk (for ParaView) and
+/// grid.npz (axes z, y, x): displacement, strain and standard error on a grid over the box of the
+/// points before. Far from the pairs the errors grow.
 ///
 /// Three files and more are followed from frame to frame. The strain is then that of the last frame
 /// since the first, found where a direct match is not, and --out also gets tracks.csv (every point
@@ -84,8 +85,8 @@ impl Measure {
 /// The unit of points whose headings name one.
 const METRES: &str = "m";
 
-const FILES: [&str; 3] = ["pairs.csv", "strain.csv", "strain.svg"];
-const GRID_FILES: [&str; 2] = ["grid.csv", "grid.vtk"];
+const FILES: [&str; 4] = ["pairs.csv", "strain.csv", "strain.npz", "strain.svg"];
+const GRID_FILES: [&str; 3] = ["grid.csv", "grid.vtk", "grid.npz"];
 const SERIES_FILES: [&str; 2] = ["tracks.csv", "series.csv"];
 
 pub fn run(arguments: &StrainArguments, context: &mut Context) -> Result<Exit, Failure> {
@@ -95,7 +96,7 @@ pub fn run(arguments: &StrainArguments, context: &mut Context) -> Result<Exit, F
             "--grid {spacing}: give a spacing above zero"
         )));
     }
-    let of_grid = &GRID_FILES[..if arguments.grid.is_some() { 2 } else { 0 }];
+    let of_grid = &GRID_FILES[..if arguments.grid.is_some() { 3 } else { 0 }];
     let of_series = &SERIES_FILES[..if paths.len() > 2 { 2 } else { 0 }];
     let files = [&FILES, of_grid, of_series].concat();
     context.outputs.plan(&files, &paths)?;
@@ -189,7 +190,8 @@ fn answer<const D: usize>(
         return Ok(Exit::complete_if(false));
     };
     context.outputs.add(FILES[1], report.table(strain));
-    context.outputs.page(FILES[2], || report.page(strain))?;
+    context.outputs.add(FILES[2], report.arrays(strain)?);
+    context.outputs.page(FILES[3], || report.page(strain))?;
     if let Some(spacing) = arguments.grid {
         let grid = Grid::over(&report.before, spacing)?;
         let (strain, points) = (strain.clone(), grid.points());
@@ -201,6 +203,7 @@ fn answer<const D: usize>(
         let table = report.grid_table(&grid, &found);
         context.outputs.add(GRID_FILES[0], table);
         context.outputs.add(GRID_FILES[1], grid.vtk(&found));
+        context.outputs.add(GRID_FILES[2], grid.arrays(&found)?);
     }
     Ok(Exit::complete_if(measured.complete))
 }
@@ -308,6 +311,25 @@ impl<const D: usize> Grid<D> {
         (0..self.counts.iter().product()).map(place).collect()
     }
 
+    /// Places, displacement, strain and its standard error as arrays with the axes z, y, x.
+    fn arrays(&self, found: &[StrainAt<D>]) -> Result<Vec<u8>, Failure> {
+        let shape: Vec<usize> = self.counts.iter().rev().copied().collect();
+        let strains: Vec<_> = found.iter().map(|at| at.strain).collect();
+        let errors: Vec<_> = found.iter().map(|at| at.standard_error).collect();
+        let mut npz = Npz::new();
+        let displacements = found.iter().map(|at| at.displacement);
+        add_vectors(
+            &mut npz,
+            "points",
+            &shape,
+            self.points().iter().map(|p| p.coords),
+        )?;
+        add_vectors(&mut npz, "displacement", &shape, displacements)?;
+        add_tensors::<D>(&mut npz, "strain", &shape, &strains)?;
+        add_tensors::<D>(&mut npz, "standard_error", &shape, &errors)?;
+        npz.into_bytes()
+    }
+
     /// The legacy format of VTK, as text.
     fn vtk(&self, found: &[StrainAt<D>]) -> Vec<u8> {
         let three = |v: &[f64]| {
@@ -343,6 +365,30 @@ impl<const D: usize> Grid<D> {
         }
         text.into_bytes()
     }
+}
+
+fn add_vectors<const D: usize>(
+    npz: &mut Npz,
+    name: &str,
+    shape: &[usize],
+    vectors: impl Iterator<Item = SVector<f64, D>>,
+) -> Result<(), Failure> {
+    let elements = vectors.flat_map(|v| <[f64; D]>::from(v).map(f64::to_le_bytes));
+    npz.add(name, "<f8", &[shape, &[D]].concat(), elements)
+}
+
+/// Adds tensors of the plane or of space.
+fn add_tensors<const D: usize>(
+    npz: &mut Npz,
+    name: &str,
+    shape: &[usize],
+    tensors: &[Matrix3<f64>],
+) -> Result<(), Failure> {
+    let places = || (0..D).flat_map(|i| (0..D).map(move |j| (i, j)));
+    let elements = tensors
+        .iter()
+        .flat_map(|tensor| places().map(|at| tensor[at].to_le_bytes()));
+    npz.add(name, "<f8", &[shape, &[D, D]].concat(), elements)
 }
 
 /// Name and indices of a component of the strain.
@@ -497,6 +543,21 @@ impl<const D: usize> StrainReport<D> {
             csv.row(row);
         }
         csv.into_bytes()
+    }
+
+    /// The strain at every point and its standard error, as arrays.
+    fn arrays(&self, found: &StrainBetween<D>) -> Result<Vec<u8>, Failure> {
+        let shape = [found.pairs.len()];
+        let rows = found.rows.iter().map(|row| (row.0 as i64).to_le_bytes());
+        let mut npz = Npz::new();
+        npz.add("row_before", "<i8", &shape, rows)?;
+        let points = found.pairs.iter().map(|pair| pair[0].coords);
+        add_vectors(&mut npz, "points", &shape, points)?;
+        let displacements = found.displacements.iter().copied();
+        add_vectors(&mut npz, "displacement", &shape, displacements)?;
+        add_tensors::<D>(&mut npz, "strain", &shape, &found.strains)?;
+        add_tensors::<D>(&mut npz, "standard_error", &shape, &found.standard_errors)?;
+        npz.into_bytes()
     }
 
     /// Displacement, strain and its standard error on the grid.

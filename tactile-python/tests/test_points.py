@@ -132,3 +132,19 @@ def test_hertz_forth_and_back():
     )
     # The same law: rounding alone.
     assert found.value == pytest.approx(modulus, rel=1e-9)
+
+
+def test_the_arrays_of_the_program_are_its_tables(tmp_path):
+    """`tactile strain` writes the same numbers as text and as arrays."""
+    before, after = (str(DATA / name) for name in ("before.csv", "after.csv"))
+    call = [sys.executable, "-m", "tactile_imaging", "strain", before, after]
+    subprocess.run([*call, "--grid", "0.002", "--out", str(tmp_path)], check=True)
+    for name in ("strain", "grid"):
+        table = np.genfromtxt(tmp_path / f"{name}.csv", delimiter=",", names=True)
+        arrays = np.load(tmp_path / f"{name}.npz")
+        points, strain = arrays["points"], arrays["strain"]
+        np.testing.assert_array_equal(points[..., 1].ravel(), table["y_m"])
+        np.testing.assert_array_equal(strain[..., 0, 1].ravel(), table["e_xy"])
+        np.testing.assert_array_equal(arrays["standard_error"][..., 1, 1].ravel(), table["se_e_yy"])
+    # Axes of a grid: y, then x.
+    assert np.ptp(points[:, 0, 0]) == 0 < np.ptp(points[:, 0, 1])
