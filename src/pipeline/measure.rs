@@ -5,6 +5,7 @@ use super::flag::Flag;
 use super::press::Press;
 use super::report::{SkipReason, Stage};
 use super::result::{FrameResult, MatchResult, Measurement, ModulusResult, StrainResult};
+use super::settings::SurfaceInput;
 use super::specimen::{Specimen, material_law};
 use super::time::{self, TimeResult};
 use crate::elasticity::modulus::{Estimate, LoadSeries, PaperRatio};
@@ -122,7 +123,13 @@ impl Press<'_> {
             contact_area_m2: reading.area_m2,
             mean_stress_pa: reading.mean_stress_pa(),
             surface_height_m,
+            surface_apparent: self.apparent(),
         })
+    }
+
+    /// Whether surfaces are the pressure, read as shading.
+    fn apparent(&self) -> bool {
+        self.pipeline().settings().surface_input == SurfaceInput::Shading
     }
 
     /// The height of a frame's surface. Of a press with many frames only the first, the last and
@@ -248,6 +255,7 @@ impl Press<'_> {
         }
         Ok(StrainResult {
             measure: strain.measure,
+            apparent: self.apparent() && !matches!(self.specimen(), Specimen::Flat(_)),
             mean: rows(&summary.mean),
             standard_error: rows(&summary.standard_error),
             spread: rows(&summary.spread),

@@ -91,10 +91,12 @@ pub struct FrameResult {
     pub contact_area_m2: f64,
     /// F/(π a²) in pascals.
     pub mean_stress_pa: Option<Estimate>,
-    /// Greatest height of the reconstructed surface in metres. The surface is apparent: it is the
-    /// pressure, read as shading.
+    /// Greatest height of the reconstructed surface in metres.
     #[cfg_attr(feature = "serde", serde(serialize_with = "outcome::one"))]
     pub surface_height_m: Result<Estimate, PipelineError>,
+    /// Whether that surface is apparent: the pressure, read as shading. The face of the sensor has
+    /// another shape.
+    pub surface_apparent: bool,
 }
 
 /// How the control points of the first and the last frame were matched.
@@ -147,6 +149,9 @@ pub struct MatchResult {
 pub struct StrainResult {
     /// The name of the measure of strain.
     pub measure: &'static str,
+    /// Whether it is that of apparent surfaces ([`FrameResult::surface_apparent`]), and not of a
+    /// material: under a ball e_zz is above zero.
+    pub apparent: bool,
     /// Mean over the control points, rows of the tensor (x, y, z).
     pub mean: [[f64; 3]; 3],
     /// Standard error of the mean.
@@ -271,11 +276,16 @@ impl Display for StrainResult {
         let e = |i: usize, j: usize| with_error(self.mean[i][j], error(i, j), 1.0);
         write!(
             f,
-            "{}: e_xx {}  e_yy {}  e_zz {}",
+            "{}: e_xx {}  e_yy {}  e_zz {}{}",
             self.measure,
             e(0, 0),
             e(1, 1),
-            e(2, 2)
+            e(2, 2),
+            if self.apparent {
+                "   (of the apparent surface: the pressure, read as shading)"
+            } else {
+                ""
+            }
         )
     }
 }

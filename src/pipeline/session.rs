@@ -191,6 +191,8 @@ pub struct Session {
     first_contact: Option<ContactReading>,
     drift: DriftWatch,
     health: SensorHealth,
+    /// The surface that was last asked for.
+    surface: ContactSurface,
 }
 
 impl Session {
@@ -241,6 +243,7 @@ impl Session {
             first_contact: None,
             drift: DriftWatch::default(),
             health: SensorHealth::new(HealthOptions::default()),
+            surface: ContactSurface::default(),
         })
     }
 
@@ -517,6 +520,46 @@ impl Session {
         &self.bench.report
     }
 
+    /// The surface of the last frame's contact, on the grid that suits its size. Every call computes
+    /// it, in memory that is kept.
+    ///
+    /// ```
+    /// use tactile_imaging::pipeline::Session;
+    /// use tactile_simulate::Trial;
+    /// let trial = Trial::coarser(8)?;
+    /// let mut session = Session::new(&trial.pipeline()?, &[trial.simulation.reference.view()])?;
+    /// session.push(trial.simulation.frames[0].view())?;
+    /// let heights = &session.surface()?.surface.heights;
+    /// let top = heights.iter().copied().filter(|h| h.is_finite()).fold(0.0, f64::max);
+    /// // Hertz's pressure read as shading is a hemisphere as high as the contact's radius.
+    /// let radius = trial.simulation.truth[0].contact.contact_radius_m;
+    /// assert!((top / radius - 1.0).abs() < 0.1);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`PipelineError::NoContact`] where nothing touches, [`PipelineError::Surface`].
+    pub fn surface(&mut self) -> Result<&ContactSurface, PipelineError> {
+        self.last_reading()?;
+        self.stages.surface(
+            &mut self.bench,
+            self.measured_frame as usize,
+            self.last.view(),
+            &self.contact,
+            self.contact.pixels(),
+            &mut self.surface,
+        )?;
+        Ok(&self.surface)
+    }
+
+    /// The last frame's contact, or that there is none.
+    fn last_reading(&self) -> Result<ContactReading, PipelineError> {
+        let reading = self.contact.reading.filter(|_| self.measured);
+        reading.ok_or(PipelineError::NoContact {
+            frame: self.frames.saturating_sub(1) as usize,
+        })
+    }
+
     /// Strain of the last frame against the load where strain began to be asked for. That load's
     /// own answer is `None`.
     ///
@@ -555,16 +598,11 @@ impl Session {
     /// [`PipelineError::NoContact`] where nothing touches. Those of a
     /// [`Press`](crate::pipeline::Press)'s strain.
     pub fn strain(&mut self) -> Result<Option<&SessionStrain>, PipelineError> {
-        let Some(reading) = self.contact.reading.filter(|_| self.measured) else {
-            return Err(PipelineError::NoContact {
-                frame: self.frames.saturating_sub(1) as usize,
-            });
-        };
         let frame = Frame {
+            reading: self.last_reading()?,
             number: self.measured_frame,
             image: self.last.view(),
             contact: &self.contact,
-            reading,
         };
         self.strain.follow(&self.stages, &mut self.bench, &frame)
     }

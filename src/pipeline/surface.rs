@@ -40,6 +40,9 @@ pub struct ContactSurface {
     /// Position (x, y) in metres of the grid's first pixel: from the middle of the frame's first
     /// pixel to that of the block.
     pub origin_m: [f64; 2],
+    /// Whether the surface is *apparent*: the pressure, read as shading. The face of the sensor has
+    /// another shape.
+    pub apparent: bool,
 }
 
 impl Default for ContactSurface {
@@ -51,6 +54,7 @@ impl Default for ContactSurface {
             binning: 1,
             pixel_size_m: [1.0; 2],
             origin_m: [0.0; 2],
+            apparent: false,
         }
     }
 }
@@ -247,6 +251,7 @@ pub fn reconstruct(
     )?;
     surface.origin_m = origin_m(&region, side, pixel_size_m);
     (surface.region, surface.binning, surface.pixel_size_m) = (region, side, pixel_size_m);
+    surface.apparent = settings.surface_input == SurfaceInput::Shading;
     Ok(())
 }
 

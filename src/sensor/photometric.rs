@@ -92,9 +92,9 @@ struct GelTable {
 #[serde(deny_unknown_fields)]
 struct WeightTable {
     image: PathBuf,
-    #[serde(deserialize_with = "positive")]
+    #[serde(rename = "force_N", deserialize_with = "positive")]
     force_n: f64,
-    #[serde(deserialize_with = "positive")]
+    #[serde(rename = "force_error_N", deserialize_with = "positive")]
     force_error_n: f64,
 }
 

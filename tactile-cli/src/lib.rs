@@ -23,6 +23,7 @@ mod paper;
 mod photometric;
 mod plot;
 mod record;
+mod relief;
 pub mod report;
 mod serve;
 mod strain;

@@ -395,7 +395,8 @@ pub fn run(arguments: &MeasureArguments, context: &mut Context) -> Result<Exit, 
     if let (Some(report), Some(last)) = (&mut context.outputs.report, press.frames().checked_sub(1))
         && let Ok(found) = press.surface(last)
     {
-        let title = format!("surface of frame {}", last + 1);
+        let apparent = if found.apparent { "apparent " } else { "" };
+        let title = format!("{apparent}surface of frame {}", last + 1);
         report.surface(
             &title,
             known_heights_mm(found).view(),
@@ -559,7 +560,7 @@ fn print(
         if let Ok(height) = &m.surface_height_m {
             let exact = 1e3 * t.contact.apparent_height_m(0.0);
             line(
-                format!("surface height {i}"),
+                format!("apparent height {i}"),
                 "mm",
                 1e3 * height.value,
                 exact,

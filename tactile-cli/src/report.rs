@@ -1,9 +1,11 @@
 //! Answers as pages for people: one HTML file that needs nothing else.
 use crate::console::{four_digits, printable};
+use crate::relief::Relief;
 use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
 use hmac_sha256::Hash;
 use ndarray::ArrayView2;
+use serde_json::json;
 use std::ffi::OsString;
 use std::fmt::Write;
 use std::io::Read;
@@ -125,45 +127,15 @@ impl Report {
     /// Adds heights that the mouse turns, NaN where there is no surface. Heights and pixels are in
     /// millimetres.
     pub fn surface(&mut self, title: &str, heights: ArrayView2<'_, f64>, pixel: [f64; 2]) {
-        /// Points along a side, at most: more would be no clearer, and turn slowly.
-        const POINTS: usize = 80;
-        // The part that has a surface.
-        let known = heights
-            .indexed_iter()
-            .filter(|(_, height)| height.is_finite());
-        let (mut first, mut last) = ([usize::MAX; 2], [0; 2]);
-        let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
-        for ((row, column), &height) in known {
-            for (side, at) in [row, column].into_iter().enumerate() {
-                first[side] = first[side].min(at);
-                last[side] = last[side].max(at);
-            }
-            (low, high) = (low.min(height), high.max(height));
-        }
-        if low >= high {
+        let Some(relief) = Relief::of(heights, pixel) else {
             return;
-        }
-        let sides = [0, 1].map(|side| last[side] - first[side] + 1);
-        let step = sides[0].max(sides[1]).div_ceil(POINTS);
-        let rows = (first[0]..=last[0]).step_by(step);
-        let columns = (first[1]..=last[1]).step_by(step);
-        // A ten-thousandth of the height is finer than the page shows.
-        let unit = 1e-4 * (high - low);
-        let cell = |at: (usize, usize)| match heights[at] {
-            height if height.is_finite() => format!("{:.0}", (height - low) / unit),
-            _ => String::new(),
         };
-        let width = columns.clone().count();
-        let cells = rows.flat_map(|row| columns.clone().map(move |column| (row, column)));
-        let cells: Vec<String> = cells.map(cell).collect();
-        let [dx, dy] = pixel.map(|side| side * step as f64);
         self.surfaces.push(format!(
             "<canvas class=\"surface\" tabindex=\"0\" width=\"900\" height=\"600\" \
-             data-columns=\"{width}\" data-steps=\"{dx:e},{dy:e},{unit:e}\" data-heights=\"{}\">\
-             </canvas><figcaption>{}: {} mm high. The mouse turns it</figcaption>",
-            cells.join(","),
+             data-relief='{}'></canvas><figcaption>{}: {} mm high. The mouse turns it</figcaption>",
+            json!(relief),
             escaped(title),
-            four_digits(high - low),
+            four_digits(relief.height_mm),
         ));
     }
 
@@ -420,8 +392,15 @@ fn quoted(word: &str) -> String {
     format!("'{}'", word.replace('\'', r"'\''"))
 }
 
-/// Turns surfaces by the mouse, a finger or the arrow keys.
-const TURN: &str = include_str!("report.js");
+/// Draws every surface of the page.
+const TURN: &str = concat!(
+    include_str!("relief.js"),
+    r#"for (const canvas of document.querySelectorAll("canvas.surface")) {
+  const stretch = turnable(canvas)(JSON.parse(canvas.dataset.relief));
+  if (stretch > 1) canvas.nextElementSibling.textContent += `, heights ×${stretch.toPrecision(2)}`;
+}
+"#
+);
 
 const STYLE: &str = "
 :root { color-scheme: light dark; }

@@ -5,7 +5,9 @@ use crate::console::{Bar, Context, Exit, Failure};
 use crate::frames::{DEFAULT_RATE_HZ, Reading};
 use crate::outputs::Csv;
 use crate::photometric;
+use crate::plot::known_heights_mm;
 use crate::record::FrameRecorder;
+use crate::relief::Relief;
 use crate::serve::LivePage;
 use clap::Args;
 use ndarray::{Array2, ArrayView2};
@@ -16,7 +18,7 @@ use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 use tactile_imaging::elasticity::modulus::ModulusEstimate;
-use tactile_imaging::force::Estimate;
+use tactile_imaging::force::{ChartState, Estimate};
 use tactile_imaging::io::Grey;
 use tactile_imaging::pipeline::{Flag, FrameSource, PipelineError, Session, with_error};
 use tactile_imaging::scene::Scene;
@@ -75,7 +77,7 @@ pub struct StreamArguments {
     /// video gives the same answers again.
     #[arg(long, value_name = "FILE.y4m")]
     record: Option<PathBuf>,
-    /// Show frame, force and modulus in browsers as they come. An address that other computers
+    /// Show frame, force, modulus, surface and the sensor's health in browsers as they come. An address that other computers
     /// reach gets a token.
     #[arg(long, value_name = "ADDRESS:PORT", num_args = 0..=1, default_missing_value = "127.0.0.1:8642")]
     serve: Option<SocketAddr>,
@@ -240,7 +242,21 @@ impl Live {
             "force_n": row.force_n.map(of), "centre": centre,
             "modulus_pa": row.modulus.map(|m| [m.value, m.standard_error]),
         });
-        page.show(numbers, frame);
+        let session = &mut self.session;
+        page.show(numbers, frame, || {
+            let health = health_words(session);
+            // A frame without contact has no surface.
+            let Ok(found) = session.surface() else {
+                return json!({ "health": health });
+            };
+            let name = match found.apparent {
+                true => "apparent surface (the pressure, read as shading)",
+                false => "surface",
+            };
+            let size = found.pixel_size_m.map(|m| 1e3 * m);
+            let relief = Relief::of(known_heights_mm(found).view(), size);
+            json!({ "name": name, "relief": relief, "health": health })
+        });
     }
 
     /// Measures a frame.
@@ -437,6 +453,29 @@ impl Live {
         }
         Ok(exit)
     }
+}
+
+/// The state of the sensor, as its background shows it.
+fn health_words(session: &Session) -> String {
+    let Some(health) = session.health() else {
+        return String::new();
+    };
+    let words = |state| match state {
+        ChartState::Learning => "not known yet",
+        ChartState::Healthy => "unchanged",
+        ChartState::Changed => "changed",
+        _ => "scatters too much to follow",
+    };
+    let stuck = match session.stuck_pixels().len() {
+        0 => String::new(),
+        count => format!(", {count} pixels stuck"),
+    };
+    format!(
+        "sensor: background {:.1} grey levels, brightness {}, noise {}{stuck}",
+        health.background_grey,
+        words(health.brightness),
+        words(health.noise),
+    )
 }
 
 /// A row a frame.

@@ -111,7 +111,8 @@ pub fn summary_lines(measurement: &Measurement) -> Vec<String> {
     }
     if let Ok(s) = &measurement.strain {
         let mean = with_error(s.mean[2][2], s.standard_error[2][2], 1.0);
-        lines.push(format!("mean strain e_zz\t{mean}"));
+        let apparent = if s.apparent { "apparent " } else { "" };
+        lines.push(format!("mean {apparent}strain e_zz\t{mean}"));
     }
     lines
 }
@@ -162,6 +163,7 @@ pub fn circle([x, y]: PlotPoint, radius: f64) -> Vec<PlotPoint> {
 /// Heights as maps, and a cut through the highest point of each.
 fn surfaces_page(press: &mut Press<'_>) -> Result<Page, PlotError> {
     let mut panels = Vec::new();
+    let mut heading = "Reconstructed surfaces";
     let mut cuts = Panel::new(
         "Cuts along x through the highest point",
         "x (mm)",
@@ -174,6 +176,9 @@ fn surfaces_page(press: &mut Press<'_>) -> Result<Page, PlotError> {
         let size = surface.pixel_size_m.map(|s| 1e3 * s);
         let origin = surface.origin_m.map(|o| 1e3 * o);
         let heights = known_heights_mm(surface);
+        if surface.apparent {
+            heading = "Apparent surfaces: the pressure, read as shading";
+        }
         let map = HeatMap::of_pixels(heights.view(), size, "height (mm)").origin(origin);
         let panel = axes(title.clone()).heat_map(map);
         panels.push(panel.rings(dots, Colour::Red, ""));
@@ -188,11 +193,7 @@ fn surfaces_page(press: &mut Press<'_>) -> Result<Page, PlotError> {
         }
     }
     panels.push(cuts);
-    Ok(Page::new(
-        "Reconstructed surfaces",
-        panels.len().min(3),
-        panels,
-    ))
+    Ok(Page::new(heading, panels.len().min(3), panels))
 }
 
 /// Heights in millimetres, NaN outside the surface.
@@ -256,7 +257,11 @@ fn strain_page(press: &mut Press<'_>, last: usize) -> Result<Page, PlotError> {
         panel.valued_points(places.iter().copied(), values, name)
     };
     let panels = ["e_xx", "e_yy", "e_zz"].into_iter().enumerate().map(panel);
-    let title = format!("{} strain", strain.measure);
+    let of = match press.surface(last)?.apparent {
+        true => " of the apparent surface",
+        false => "",
+    };
+    let title = format!("{} strain{of}", strain.measure);
     Ok(Page::new(title, 3, panels.collect()))
 }
 

@@ -69,7 +69,7 @@ fn a_known_weight_makes_forces() {
     };
     let calibration = folder.path().join("examples/data/colour/calibration.toml");
     let calibration = fs::read_to_string(calibration).unwrap();
-    let weight = "[[gel.weights]]\nimage = \"press_6.png\"\nforce_n = 2\nforce_error_n = 0.1";
+    let weight = "[[gel.weights]]\nimage = \"press_6.png\"\nforce_N = 2\nforce_error_N = 0.1";
     let weighed = format!("{calibration}\n[gel]\nthickness_m = 4e-3\n{weight}\n");
     let weighed = ["press", "reference"].iter().fold(weighed, |text, name| {
         text.replace(

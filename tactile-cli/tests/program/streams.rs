@@ -153,7 +153,7 @@ fn a_report_is_one_page_that_changes_with_the_data_only() {
     }
     // Nothing is fetched, and nothing runs but the script that turns the surface.
     assert_eq!(first.matches("<script").count(), 1);
-    assert!(first.contains("script-src 'sha256-") && first.contains("data-heights="));
+    assert!(first.contains("script-src 'sha256-") && first.contains("data-relief="));
     for part in ["src=\"http", "url(", "@import", "<link", "<iframe"] {
         assert!(!first.contains(part), "the page has {part}");
     }
@@ -195,7 +195,9 @@ fn browsers_of_this_computer_see_the_stream() {
     assert!(get("/../../etc/passwd", &address).starts_with("HTTP/1.1 404"));
     let events = get("/events", &address);
     assert!(
-        events.contains("data: {") && events.contains("\"grey\":"),
+        ["data: {", "\"grey\":", "\"relief\":{", "sensor: background"]
+            .iter()
+            .all(|part| events.contains(part)),
         "{events:.300}"
     );
     assert!(events.contains("event: end"));
