@@ -90,7 +90,7 @@ impl ErrorSource {
         match self {
             Self::Noise => "more frames of the same loads",
             Self::Force => "more pairs of the calibration, by a better gauge",
-            Self::Coupling => "one press of this object under a known weight (coupling_error)",
+            Self::Coupling => "a press of this object under a known weight ([[check]])",
             Self::PixelSize => "a frame of a target of known pitch",
             Self::ObjectRadius => "a calliper on the object (radius_error_m)",
             Self::PoissonRatio => "a statement of its error (poisson_ratio_error)",
@@ -101,10 +101,11 @@ impl ErrorSource {
 
     /// Whether nothing was stated of it.
     fn is_assumed(self, settings: &Settings) -> bool {
+        let checked = settings.checked_gain.map(|checked| checked.gain.value);
         match self {
             Self::Noise | Self::Law => false,
             Self::Force => settings.force_scale_error.is_none(),
-            Self::Coupling => settings.coupling_error.is_none(),
+            Self::Coupling => settings.coupling_error.or(checked).is_none(),
             Self::PixelSize => settings.length_scale_error.is_none(),
             Self::ObjectRadius => settings.object_radius_error_m.is_none(),
             Self::PoissonRatio => settings.poisson_ratio_error.is_none(),

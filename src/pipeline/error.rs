@@ -55,6 +55,12 @@ pub enum PipelineError {
     /// The waveguide or the object is not physical.
     #[error("the waveguide or the object is not physical: {0}")]
     Material(#[source] ElasticityError),
+    /// A press of known force is not usable.
+    #[error("the press of known force is not usable: {reason}")]
+    Check {
+        /// Why not.
+        reason: &'static str,
+    },
     /// A relative error is negative or not finite.
     #[error("a relative error must be finite and not negative, found {found}")]
     ScaleError {

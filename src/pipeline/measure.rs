@@ -55,6 +55,7 @@ impl Press<'_> {
         Measurement {
             youngs_modulus_pa,
             time,
+            checked_gain: self.pipeline().settings().checked_gain,
             error_budget,
             estimators: estimates.iter().map(ModulusResult::from).collect(),
             frames,

@@ -29,6 +29,7 @@
 //! what to tell the program if not ([`PipelineError::NotUniaxial`]).
 mod batch;
 mod budget;
+mod check;
 mod composition;
 mod contact;
 mod dark;
@@ -55,6 +56,7 @@ pub use crate::force::{FaceReading, ShapeProblem};
 pub use crate::sfs::{BallFit, Binning};
 pub use batch::contacts;
 pub use budget::{ErrorShare, ErrorSource};
+pub use check::{CheckPress, CheckedGain, CheckedObject};
 pub use composition::Pipeline;
 pub use contact::{ContactReading, ContactStage, FrameContact};
 pub use dark::DarkContact;

@@ -1,5 +1,6 @@
 //! The answers of a press as plain data, for people ([`Display`]) and programs (feature `serde`).
 use super::budget::{self, ErrorShare};
+use super::check::CheckedGain;
 use super::contact::ContactReading;
 use super::error::PipelineError;
 use super::flag::Flag;
@@ -189,6 +190,8 @@ pub struct Measurement {
     /// The time that the modulus is of, where frames say when they were taken, and whether it
     /// changed meanwhile.
     pub time: Option<TimeResult>,
+    /// The gain that presses of known force show, where there are any.
+    pub checked_gain: Option<CheckedGain>,
     /// Which inputs the modulus' error comes from, the largest first. Empty without a modulus.
     pub error_budget: Vec<ErrorShare>,
     /// By every estimator that the frames allow, the paper's ratio first.
@@ -346,6 +349,9 @@ impl Display for Measurement {
         line(f, "Young's modulus", &self.youngs_modulus_pa)?;
         if let Some(sentence) = budget::sentence(&self.error_budget) {
             writeln!(f, "{:<16} {sentence}", "error budget")?;
+        }
+        if let Some(checked) = &self.checked_gain {
+            writeln!(f, "{:<16} {checked}", "check")?;
         }
         if let Some(time) = &self.time {
             writeln!(f, "{:<16} {time}", "over time")?;

@@ -1,4 +1,5 @@
 //! Settings of a pipeline beside its stages.
+use super::check::CheckedGain;
 use super::error::PipelineError;
 use super::reference_light::ReferenceLight;
 use super::specimen::Object;
@@ -95,6 +96,9 @@ pub struct Settings {
     /// divided by the factor by which a press's reference is brighter. `None`: the light is taken
     /// to be the same.
     pub calibrated_light: Option<ReferenceLight>,
+    /// The gain that presses of known force show. Forces that are read from light are divided by
+    /// it, and its error stands in place of `coupling_error`.
+    pub checked_gain: Option<CheckedGain>,
 }
 
 impl Settings {
@@ -115,6 +119,7 @@ impl Settings {
             poisson_ratio_error: None,
             layer_covariance: None,
             calibrated_light: None,
+            checked_gain: None,
         }
     }
 
@@ -157,7 +162,16 @@ impl Settings {
         self.force_scale_error.unwrap_or(0.2e-2_f64.hypot(0.1e-2))
     }
 
+    /// Relative error of the gain of the light, beside that of the calibration.
     pub(super) fn coupling(&self) -> f64 {
+        match self.checked_gain {
+            Some(checked) => checked.gain.relative_error(),
+            None => self.unchecked_coupling(),
+        }
+    }
+
+    /// That without presses of known force.
+    pub(crate) fn unchecked_coupling(&self) -> f64 {
         self.coupling_error.unwrap_or(0.06)
     }
 

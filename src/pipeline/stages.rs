@@ -154,7 +154,13 @@ impl Stages {
                     force_scale = force_scale.hypot(settings.coupling());
                     if let Some(light) = self.light {
                         reading.divide_by_gain(light.gain.value);
-                        force_scale = force_scale.hypot(light.gain.relative_error());
+                        // Presses of known force were read by the same factor.
+                        if settings.checked_gain.is_none() {
+                            force_scale = force_scale.hypot(light.gain.relative_error());
+                        }
+                    }
+                    if let Some(checked) = &settings.checked_gain {
+                        reading.divide_by_gain(checked.gain.value);
                     }
                 }
             }

@@ -7,8 +7,8 @@ use crate::elasticity::modulus::TabulatedContact;
 use crate::force::{CalibrationPair, ContactOptions, DriftCorrection, Estimate, ForceOptions};
 use crate::io::{FileError, FilePlace, InputQuantity, read_columns, read_frame, read_grey_levels};
 use crate::pipeline::{
-    DarkContact, EstimatorChoice, LightContact, Measurement, Object, Pipeline, PipelineError,
-    Press, SurfaceInput,
+    CheckPress, CheckedGain, DarkContact, EstimatorChoice, LightContact, Measurement, Object,
+    Pipeline, PipelineError, Press, SurfaceInput,
 };
 use crate::sensor::Sensor;
 use ndarray::{Array2, ArrayView2};
@@ -71,6 +71,8 @@ pub struct SceneData {
     pub calibration: LoadedCalibration,
     /// The table of contacts, where the scene names one.
     pub contact_table: Option<ContactTable>,
+    /// The images of the presses of known force, in the order of the scene.
+    pub checks: Vec<Array2<u8>>,
 }
 
 impl Scene {
@@ -117,6 +119,12 @@ impl Scene {
                 LoadedCalibration::DepthTable(rows)
             }
         };
+        let checks = self.checks.iter().enumerate().map(|(k, check)| {
+            let field = format!("check[{}].image", k + 1);
+            let size = Some(reference.dim());
+            read_frame(&self.file, &field, &check.image, self.bits, size)
+        });
+        let checks = checks.collect::<Result<_, _>>()?;
         // Errors of a table or a sensor name fields of their own file.
         let contact_table = self.contact_table.as_ref().map(read_contact_table);
         Ok(SceneData {
@@ -124,6 +132,7 @@ impl Scene {
             frames: Vec::new(),
             calibration,
             contact_table: contact_table.transpose()?,
+            checks,
         })
     }
 
@@ -196,7 +205,7 @@ impl Scene {
     /// let frame = ndarray::Array2::from_elem((20, 30), 10);
     /// let calibration = LoadedCalibration::Pairs(pairs);
     /// let frames = vec![frame.clone()];
-    /// let data = SceneData { reference: frame, frames, calibration, contact_table: None };
+    /// let data = SceneData { reference: frame, frames, calibration, contact_table: None, checks: vec![] };
     /// // The file has strain = "hencky", and the program its own number of points.
     /// let pipeline = scene.pipeline(&data)?.with_control_points(60);
     /// let mut press = scene.press(&pipeline, &data)?;
@@ -207,7 +216,30 @@ impl Scene {
     /// # Errors
     /// [`FileError::Rejected`] where the calibration or the waveguide is not usable.
     pub fn pipeline(&self, data: &SceneData) -> Result<Pipeline, FileError> {
-        self.build(data).map_err(|e| self.measure_error(e))
+        let pipeline = self.build(data).map_err(|e| self.measure_error(e))?;
+        self.checked(pipeline, data)
+    }
+
+    /// The pipeline with the gain that the presses of known force show.
+    fn checked(&self, pipeline: Pipeline, data: &SceneData) -> Result<Pipeline, FileError> {
+        if self.checks.is_empty() {
+            return Ok(pipeline);
+        }
+        let mut presses = Vec::new();
+        for (k, (check, image)) in self.checks.iter().zip(&data.checks).enumerate() {
+            let error_n = check.force_error_n.unwrap_or(0.2e-2 * check.force_n);
+            let known_n = Estimate::new(check.force_n, error_n);
+            let views = [data.reference.view(), image.view()];
+            let press = CheckPress::measure(&pipeline, views, known_n, check.object);
+            let field = format!("check[{}].image", k + 1);
+            presses.push(press.map_err(|error| FileError::field(&self.file, field, error))?);
+        }
+        let coupling = pipeline.settings().unchecked_coupling();
+        let in_check = |error: PipelineError| FileError::field(&self.file, "check", error);
+        let checked = CheckedGain::of(&presses, coupling).map_err(in_check)?;
+        pipeline
+            .with_settings(|settings| settings.checked_gain = Some(checked))
+            .map_err(in_check)
     }
 
     /// The scene's frames on a pipeline, ready to be measured. Those that `data` lacks are read

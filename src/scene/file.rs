@@ -5,11 +5,11 @@ use crate::elasticity::contact::{ContactTable, Layer, PARAMETERS_PER_LAYER, Wave
 use crate::fem::{TableOptions, TableProgress};
 use crate::io::{
     FileError, beside, force, length, modulus, not_negative, number, one_or_more, parse_toml,
-    pixel_size, poisson_ratio, read_bytes, read_toml, write_bytes,
+    pixel_size, poisson_ratio, positive, read_bytes, read_toml, write_bytes,
 };
 use crate::pipeline::{
-    EstimatorChoice, IntegratorChoice, MatcherChoice, Object, ReconstructionChoice, SamplerChoice,
-    Settings, StagesConfig, StrainChoice, WarpChoice,
+    CheckedObject, EstimatorChoice, IntegratorChoice, MatcherChoice, Object, ReconstructionChoice,
+    SamplerChoice, Settings, StagesConfig, StrainChoice, WarpChoice,
 };
 use nalgebra::DMatrix;
 use serde::de::value::MapAccessDeserializer;
@@ -103,6 +103,43 @@ impl SceneFrame {
             time_s: None,
         }
     }
+}
+
+/// A press of known force beside the frames ([`CheckPress`](crate::pipeline::CheckPress)).
+///
+/// ```
+/// use tactile_imaging::pipeline::CheckedObject;
+/// use tactile_imaging::scene::Scene;
+/// let text = r#"
+///     reference = "reference.png"
+///     pixel_size_m = [2e-5, 2e-5]
+///     calibration = { pairs = "pairs.csv" }
+///     frames = [{ image = "frame.png" }]
+///     object = { shape = "sphere", radius_m = 3e-3 }
+///     [[check]]
+///     image = "weight.png"
+///     force_N = 1.0
+///     object = "sample"
+/// "#;
+/// let check = &Scene::parse(text, "press/scene.toml")?.checks[0];
+/// assert_eq!(check.image, std::path::Path::new("press/weight.png"));
+/// assert_eq!((check.force_n, check.object), (1.0, CheckedObject::Sample));
+/// assert_eq!(check.force_error_n, None, "0.2 % are assumed");
+/// # Ok::<(), tactile_imaging::io::FileError>(())
+/// ```
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SceneCheck {
+    /// The image.
+    pub image: PathBuf,
+    /// The force of the weight or of a gauge in newtons.
+    #[serde(rename = "force_N", deserialize_with = "positive")]
+    pub force_n: f64,
+    /// Its standard error in newtons. 0.2 % of it are assumed where none is stated.
+    #[serde(default, rename = "force_error_N", deserialize_with = "not_negative")]
+    pub force_error_n: Option<f64>,
+    /// What was pressed.
+    pub object: CheckedObject,
 }
 
 /// A layer of the waveguide.
@@ -291,6 +328,8 @@ pub struct Scene {
     pub calibration: CalibrationSource,
     /// The frames, in the order of the file.
     pub frames: Vec<SceneFrame>,
+    /// Presses of known force, before or after the frames.
+    pub checks: Vec<SceneCheck>,
     /// The pressed object.
     pub object: Object,
     /// The waveguide's layers from the object's side, rigid if empty.
@@ -361,6 +400,8 @@ struct SceneFile {
     calibration: Option<CalibrationTable>,
     #[serde(deserialize_with = "one_or_more")]
     frames: Vec<SceneFrame>,
+    #[serde(default)]
+    check: Vec<SceneCheck>,
     object: ObjectTable,
     waveguide: Option<WaveguideTable>,
     contact_table: Option<PathBuf>,
@@ -503,6 +544,14 @@ impl SceneFile {
             }
             last_s = time_s;
         }
+        let by_light = matches!(
+            calibration,
+            CalibrationSource::Pairs(_) | CalibrationSource::Sensor(_)
+        );
+        if !self.check.is_empty() && !by_light {
+            let reason = "expected none: no force is read from light";
+            return Err(error("check", reason));
+        }
         let stages = self.stages.choices();
         // A stage that is named but would not run is a misunderstanding of the file.
         let unused = match calibration {
@@ -534,6 +583,10 @@ impl SceneFile {
         for frame in &mut frames {
             frame.image = beside(file, &frame.image);
         }
+        let mut checks = self.check;
+        for check in &mut checks {
+            check.image = beside(file, &check.image);
+        }
         Ok(Scene {
             file: file.into(),
             reference: beside(file, &self.reference),
@@ -553,6 +606,7 @@ impl SceneFile {
             },
             calibration,
             frames,
+            checks,
             object: self.object.object(file)?,
             layers: self
                 .waveguide

@@ -66,6 +66,18 @@
 //! estimator = "best"                     # EstimatorChoice
 //! ```
 //!
+//! Presses of known force show the sensor's gain on the day. Forces are divided by it, and its error
+//! stands in place of `coupling_error`:
+//!
+//! ```toml
+//! [[check]]
+//! image = "weight.png"                   # before or after the frames, of the same reference
+//! force_N = 0.981
+//! force_error_N = 0.001                  # 0.2 % if absent
+//! object = "sample"                      # what was pressed: the object that is measured, or the
+//!                                        # "calibrator", which leaves the object's coupling open
+//! ```
+//!
 //! Inputs have standard errors. What is not stated is assumed, and the result names it:
 //!
 //! ```toml
@@ -90,7 +102,7 @@ pub use data::{LoadedCalibration, SceneData, doubt_of_depths, doubt_of_pairs};
 #[cfg(feature = "fem")]
 pub use file::solve_contact_table;
 pub use file::{
-    CalibrationSource, Scene, SceneFrame, SceneLayer, StatedErrors, read_contact_table,
+    CalibrationSource, Scene, SceneCheck, SceneFrame, SceneLayer, StatedErrors, read_contact_table,
     write_contact_table,
 };
 

@@ -64,6 +64,7 @@ pub fn pipeline(error: PipelineError) -> PyErr {
         | E::NoSlopes
         | E::DepthTable(_)
         | E::Material(_)
+        | E::Check { .. }
         | E::ScaleError { .. }
         | E::InputError { .. }
         | E::LayerCovariance { .. }

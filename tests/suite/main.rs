@@ -3,6 +3,7 @@
 
 mod architecture;
 mod assumptions;
+mod check_presses;
 mod coloured_gels;
 mod corpus;
 mod few_pairs;
