@@ -7,7 +7,7 @@ const POINTS: usize = 80;
 
 /// Heights on a grid, as `relief.js` draws them.
 #[derive(Serialize)]
-pub struct Relief {
+pub struct HeightGrid {
     columns: usize,
     /// Size of a grid cell along x and y and of a step of height, in millimetres.
     steps_mm: [f64; 3],
@@ -17,7 +17,7 @@ pub struct Relief {
     pub height_mm: f64,
 }
 
-impl Relief {
+impl HeightGrid {
     /// The part of `heights` that is not NaN, thinned. Heights and pixels are in millimetres. `None`
     /// where there is no part, or a level one.
     pub fn of(heights: ArrayView2<'_, f64>, pixel: [f64; 2]) -> Option<Self> {

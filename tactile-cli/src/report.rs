@@ -1,6 +1,6 @@
 //! Answers as pages for people: one HTML file that needs nothing else.
 use crate::console::{four_digits, printable};
-use crate::relief::Relief;
+use crate::relief::HeightGrid;
 use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
 use hmac_sha256::Hash;
@@ -127,7 +127,7 @@ impl Report {
     /// Adds heights that the mouse turns, NaN where there is no surface. Heights and pixels are in
     /// millimetres.
     pub fn surface(&mut self, title: &str, heights: ArrayView2<'_, f64>, pixel: [f64; 2]) {
-        let Some(relief) = Relief::of(heights, pixel) else {
+        let Some(relief) = HeightGrid::of(heights, pixel) else {
             return;
         };
         self.surfaces.push(format!(

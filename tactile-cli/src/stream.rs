@@ -7,7 +7,7 @@ use crate::outputs::Csv;
 use crate::photometric;
 use crate::plot::known_heights_mm;
 use crate::record::FrameRecorder;
-use crate::relief::Relief;
+use crate::relief::HeightGrid;
 use crate::serve::LivePage;
 use clap::Args;
 use ndarray::{Array2, ArrayView2};
@@ -254,7 +254,7 @@ impl Live {
                 false => "surface",
             };
             let size = found.pixel_size_m.map(|m| 1e3 * m);
-            let relief = Relief::of(known_heights_mm(found).view(), size);
+            let relief = HeightGrid::of(known_heights_mm(found).view(), size);
             json!({ "name": name, "relief": relief, "health": health })
         });
     }
