@@ -94,7 +94,7 @@ impl ErrorSource {
             Self::PixelSize => "a frame of a target of known pitch",
             Self::ObjectRadius => "a calliper on the object (radius_error_m)",
             Self::PoissonRatio => "a statement of its error (poisson_ratio_error)",
-            Self::Guide => "a calibration of the layers by balls of known radius",
+            Self::Guide => "a press of a ball of known radius and modulus ([[check]])",
             Self::Law => "a contact table by finite elements",
         }
     }

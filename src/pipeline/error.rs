@@ -56,8 +56,10 @@ pub enum PipelineError {
     #[error("the waveguide or the object is not physical: {0}")]
     Material(#[source] ElasticityError),
     /// A press of known force is not usable.
-    #[error("the press of known force is not usable: {reason}")]
+    #[error("press {} of known force is not usable: {reason}", press + 1)]
     Check {
+        /// Which, counted from 0.
+        press: usize,
         /// Why not.
         reason: &'static str,
     },

@@ -56,6 +56,7 @@ impl Press<'_> {
             youngs_modulus_pa,
             time,
             checked_gain: self.pipeline().settings().checked_gain,
+            checked_guide: self.pipeline().settings().checked_guide,
             error_budget,
             estimators: estimates.iter().map(ModulusResult::from).collect(),
             frames,

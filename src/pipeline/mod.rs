@@ -56,7 +56,7 @@ pub use crate::force::{FaceReading, ShapeProblem};
 pub use crate::sfs::{BallFit, Binning};
 pub use batch::contacts;
 pub use budget::{ErrorShare, ErrorSource};
-pub use check::{CheckPress, CheckedGain, CheckedObject};
+pub use check::{CheckPress, CheckedGain, CheckedGuide, CheckedObject, KnownBall};
 pub use composition::Pipeline;
 pub use contact::{ContactReading, ContactStage, FrameContact};
 pub use dark::DarkContact;

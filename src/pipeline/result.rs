@@ -1,6 +1,6 @@
 //! The answers of a press as plain data, for people ([`Display`]) and programs (feature `serde`).
 use super::budget::{self, ErrorShare};
-use super::check::CheckedGain;
+use super::check::{CheckedGain, CheckedGuide};
 use super::contact::ContactReading;
 use super::error::PipelineError;
 use super::flag::Flag;
@@ -192,6 +192,8 @@ pub struct Measurement {
     pub time: Option<TimeResult>,
     /// The gain that presses of known force show, where there are any.
     pub checked_gain: Option<CheckedGain>,
+    /// What presses of balls of known modulus show of the guide, where there are any.
+    pub checked_guide: Option<CheckedGuide>,
     /// Which inputs the modulus' error comes from, the largest first. Empty without a modulus.
     pub error_budget: Vec<ErrorShare>,
     /// By every estimator that the frames allow, the paper's ratio first.
@@ -351,6 +353,9 @@ impl Display for Measurement {
             writeln!(f, "{:<16} {sentence}", "error budget")?;
         }
         if let Some(checked) = &self.checked_gain {
+            writeln!(f, "{:<16} {checked}", "check")?;
+        }
+        if let Some(checked) = &self.checked_guide {
             writeln!(f, "{:<16} {checked}", "check")?;
         }
         if let Some(time) = &self.time {

@@ -1,5 +1,5 @@
 //! Settings of a pipeline beside its stages.
-use super::check::CheckedGain;
+use super::check::{CheckedGain, CheckedGuide};
 use super::error::PipelineError;
 use super::reference_light::ReferenceLight;
 use super::specimen::Object;
@@ -99,6 +99,9 @@ pub struct Settings {
     /// The gain that presses of known force show. Forces that are read from light are divided by
     /// it, and its error stands in place of `coupling_error`.
     pub checked_gain: Option<CheckedGain>,
+    /// What presses of balls of known modulus show of the waveguide. `waveguide` and
+    /// `layer_covariance` are those after these presses.
+    pub checked_guide: Option<CheckedGuide>,
 }
 
 impl Settings {
@@ -120,6 +123,7 @@ impl Settings {
             layer_covariance: None,
             calibrated_light: None,
             checked_gain: None,
+            checked_guide: None,
         }
     }
 

@@ -7,8 +7,8 @@ use crate::elasticity::modulus::TabulatedContact;
 use crate::force::{CalibrationPair, ContactOptions, DriftCorrection, Estimate, ForceOptions};
 use crate::io::{FileError, FilePlace, InputQuantity, read_columns, read_frame, read_grey_levels};
 use crate::pipeline::{
-    CheckPress, CheckedGain, DarkContact, EstimatorChoice, LightContact, Measurement, Object,
-    Pipeline, PipelineError, Press, SurfaceInput,
+    CheckPress, DarkContact, EstimatorChoice, LightContact, Measurement, Object, Pipeline,
+    PipelineError, Press, SurfaceInput,
 };
 use crate::sensor::Sensor;
 use ndarray::{Array2, ArrayView2};
@@ -220,26 +220,21 @@ impl Scene {
         self.checked(pipeline, data)
     }
 
-    /// The pipeline with the gain that the presses of known force show.
+    /// The pipeline with what the presses of known force show.
     fn checked(&self, pipeline: Pipeline, data: &SceneData) -> Result<Pipeline, FileError> {
         if self.checks.is_empty() {
             return Ok(pipeline);
         }
-        let mut presses = Vec::new();
-        for (k, (check, image)) in self.checks.iter().zip(&data.checks).enumerate() {
-            let error_n = check.force_error_n.unwrap_or(0.2e-2 * check.force_n);
-            let known_n = Estimate::new(check.force_n, error_n);
-            let views = [data.reference.view(), image.view()];
-            let press = CheckPress::measure(&pipeline, views, known_n, check.object);
-            let field = format!("check[{}].image", k + 1);
-            presses.push(press.map_err(|error| FileError::field(&self.file, field, error))?);
-        }
-        let coupling = pipeline.settings().unchecked_coupling();
-        let in_check = |error: PipelineError| FileError::field(&self.file, "check", error);
-        let checked = CheckedGain::of(&presses, coupling).map_err(in_check)?;
-        pipeline
-            .with_settings(|settings| settings.checked_gain = Some(checked))
-            .map_err(in_check)
+        let stated = self.checks.iter().zip(&data.checks);
+        let presses = stated.map(|(c, image)| CheckPress::new(image.view(), c.known_n, c.object));
+        let presses: Vec<_> = presses.collect();
+        let checked = pipeline.with_checks(data.reference.view(), &presses);
+        checked.map_err(|error| match error {
+            PipelineError::Check { press, reason } => {
+                FileError::field(&self.file, format!("check[{}]", press + 1), reason)
+            }
+            error => FileError::field(&self.file, "check", error),
+        })
     }
 
     /// The scene's frames on a pipeline, ready to be measured. Those that `data` lacks are read

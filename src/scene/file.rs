@@ -1,4 +1,5 @@
 //! What a scene file may hold, and contact tables as files.
+use crate::core::Estimate;
 use crate::elasticity::ElasticityError;
 use crate::elasticity::contact::{ContactTable, Layer, PARAMETERS_PER_LAYER, Waveguide};
 #[cfg(feature = "fem")]
@@ -8,8 +9,8 @@ use crate::io::{
     pixel_size, poisson_ratio, positive, read_bytes, read_toml, write_bytes,
 };
 use crate::pipeline::{
-    CheckedObject, EstimatorChoice, IntegratorChoice, MatcherChoice, Object, ReconstructionChoice,
-    SamplerChoice, Settings, StagesConfig, StrainChoice, WarpChoice,
+    CheckedObject, EstimatorChoice, IntegratorChoice, KnownBall, MatcherChoice, Object,
+    ReconstructionChoice, SamplerChoice, Settings, StagesConfig, StrainChoice, WarpChoice,
 };
 use nalgebra::DMatrix;
 use serde::de::value::MapAccessDeserializer;
@@ -123,23 +124,94 @@ impl SceneFrame {
 /// "#;
 /// let check = &Scene::parse(text, "press/scene.toml")?.checks[0];
 /// assert_eq!(check.image, std::path::Path::new("press/weight.png"));
-/// assert_eq!((check.force_n, check.object), (1.0, CheckedObject::Sample));
-/// assert_eq!(check.force_error_n, None, "0.2 % are assumed");
+/// assert_eq!((check.known_n.value, check.object), (1.0, CheckedObject::Sample));
+/// assert_eq!(check.known_n.standard_error, 2e-3, "0.2 % are assumed");
 /// # Ok::<(), tactile_imaging::io::FileError>(())
 /// ```
-#[derive(Clone, Debug, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct SceneCheck {
     /// The image.
     pub image: PathBuf,
-    /// The force of the weight or of a gauge in newtons.
-    #[serde(rename = "force_N", deserialize_with = "positive")]
-    pub force_n: f64,
-    /// Its standard error in newtons. 0.2 % of it are assumed where none is stated.
-    #[serde(default, rename = "force_error_N", deserialize_with = "not_negative")]
-    pub force_error_n: Option<f64>,
-    /// What was pressed.
+    /// The force of the weight or of a gauge in newtons. 0.2 % of it are its error where none is
+    /// stated.
+    pub known_n: Estimate,
+    /// What was pressed. Of a ball 0.5 % of the radius, 2 % of the modulus and 0.01 of Poisson's
+    /// ratio are the errors where none are stated.
     pub object: CheckedObject,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct CheckTable {
+    image: PathBuf,
+    #[serde(rename = "force_N", deserialize_with = "positive")]
+    force_n: f64,
+    #[serde(default, rename = "force_error_N", deserialize_with = "not_negative")]
+    force_error_n: Option<f64>,
+    object: Option<OpticalCheck>,
+    ball: Option<BallTable>,
+}
+
+/// Objects whose light is checked.
+#[derive(Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum OpticalCheck {
+    Sample,
+    Calibrator,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct BallTable {
+    #[serde(deserialize_with = "length")]
+    radius_m: f64,
+    #[serde(default, deserialize_with = "stated")]
+    radius_error_m: Option<f64>,
+    /// Without it the ball is rigid.
+    #[serde(default, deserialize_with = "modulus")]
+    youngs_modulus_pa: Option<f64>,
+    #[serde(default, deserialize_with = "stated")]
+    youngs_modulus_error_pa: Option<f64>,
+    #[serde(default = "incompressible", deserialize_with = "poisson_ratio")]
+    poisson_ratio: f64,
+    #[serde(default, deserialize_with = "stated")]
+    poisson_ratio_error: Option<f64>,
+}
+
+impl BallTable {
+    fn known(&self) -> KnownBall {
+        let radius_error_m = self.radius_error_m.unwrap_or(0.5e-2 * self.radius_m);
+        let radius_m = Estimate::new(self.radius_m, radius_error_m);
+        let Some(modulus) = self.youngs_modulus_pa else {
+            return KnownBall::rigid(radius_m);
+        };
+        let modulus_error = self.youngs_modulus_error_pa.unwrap_or(2e-2 * modulus);
+        let mut ball = KnownBall::elastic(radius_m, Estimate::new(modulus, modulus_error));
+        let poisson_error = self.poisson_ratio_error.unwrap_or(0.01);
+        ball.poisson_ratio = Estimate::new(self.poisson_ratio, poisson_error);
+        ball
+    }
+}
+
+impl CheckTable {
+    /// The check, its image beside `file`, or the field that is missing or too many.
+    fn check(self, file: &Path) -> Result<SceneCheck, (&'static str, &'static str)> {
+        let object = match (self.object, self.ball) {
+            (Some(OpticalCheck::Sample), None) => CheckedObject::Sample,
+            (Some(OpticalCheck::Calibrator), None) => CheckedObject::Calibrator,
+            (None, Some(ball)) => CheckedObject::Ball(ball.known()),
+            (Some(_), Some(_)) => return Err(("ball", "expected none beside object")),
+            (None, None) => {
+                return Err(("object", "expected \"sample\", \"calibrator\" or a ball"));
+            }
+        };
+        let error_n = self.force_error_n.unwrap_or(0.2e-2 * self.force_n);
+        Ok(SceneCheck {
+            image: beside(file, &self.image),
+            known_n: Estimate::new(self.force_n, error_n),
+            object,
+        })
+    }
 }
 
 /// A layer of the waveguide.
@@ -401,7 +473,7 @@ struct SceneFile {
     #[serde(deserialize_with = "one_or_more")]
     frames: Vec<SceneFrame>,
     #[serde(default)]
-    check: Vec<SceneCheck>,
+    check: Vec<CheckTable>,
     object: ObjectTable,
     waveguide: Option<WaveguideTable>,
     contact_table: Option<PathBuf>,
@@ -548,7 +620,8 @@ impl SceneFile {
             calibration,
             CalibrationSource::Pairs(_) | CalibrationSource::Sensor(_)
         );
-        if !self.check.is_empty() && !by_light {
+        let of_light = |check: &CheckTable| check.object.is_some();
+        if self.check.iter().any(of_light) && !by_light {
             let reason = "expected none: no force is read from light";
             return Err(error("check", reason));
         }
@@ -583,9 +656,17 @@ impl SceneFile {
         for frame in &mut frames {
             frame.image = beside(file, &frame.image);
         }
-        let mut checks = self.check;
-        for check in &mut checks {
-            check.image = beside(file, &check.image);
+        let mut checks = Vec::with_capacity(self.check.len());
+        for (index, check) in self.check.into_iter().enumerate() {
+            checks.push(check.check(file).map_err(|(field, reason)| {
+                let field = format!("check[{}].{field}", index + 1);
+                FileError::field(file, field, reason)
+            })?);
+        }
+        let of_ball = |check: &SceneCheck| matches!(check.object, CheckedObject::Ball(_));
+        if self.contact_table.is_some() && checks.iter().any(of_ball) {
+            let reason = "expected none beside checks by balls: it is of the layers as stated";
+            return Err(error("contact_table", reason));
         }
         Ok(Scene {
             file: file.into(),

@@ -66,8 +66,9 @@
 //! estimator = "best"                     # EstimatorChoice
 //! ```
 //!
-//! Presses of known force show the sensor's gain on the day. Forces are divided by it, and its error
-//! stands in place of `coupling_error`:
+//! Presses of known force show the sensor as it is on the day. Of the sample or the calibrator they
+//! show the gain: forces are divided by it, and its error stands in place of `coupling_error`. Of a
+//! ball of known modulus they show the layers of the guide, by its contact radius:
 //!
 //! ```toml
 //! [[check]]
@@ -76,6 +77,16 @@
 //! force_error_N = 0.001                  # 0.2 % if absent
 //! object = "sample"                      # what was pressed: the object that is measured, or the
 //!                                        # "calibrator", which leaves the object's coupling open
+//! [[check]]
+//! image = "ball.png"
+//! force_N = 0.981
+//! [check.ball]                           # instead of object
+//! radius_m = 0.003
+//! radius_error_m = 5e-6                  # 0.5 % if absent
+//! youngs_modulus_pa = 62e3               # a rigid ball if absent
+//! youngs_modulus_error_pa = 600.0        # 2 % if absent
+//! poisson_ratio = 0.5                    # 0.5 if absent
+//! poisson_ratio_error = 0.002            # 0.01 if absent
 //! ```
 //!
 //! Inputs have standard errors. What is not stated is assumed, and the result names it:

@@ -3,6 +3,7 @@
 #![allow(clippy::too_many_arguments)]
 
 mod arrays;
+mod check;
 mod errors;
 mod inclusion;
 mod laws;
@@ -27,6 +28,8 @@ fn run_program(py: Python<'_>, arguments: Vec<String>) -> u8 {
 
 #[pymodule]
 mod _native {
+    #[pymodule_export]
+    use super::check::CheckPress;
     #[pymodule_export]
     use super::errors::TactileError;
     #[pymodule_export]

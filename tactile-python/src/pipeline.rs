@@ -1,5 +1,6 @@
 //! The stages, by name or as objects of Python.
 use crate::arrays;
+use crate::check::CheckPress;
 use crate::errors::{self, invalid};
 use crate::matching::Matcher;
 use crate::own::{OwnContact, OwnStage};
@@ -259,6 +260,37 @@ impl Pipeline {
     /// A press on this pipeline, with the frame without contact.
     fn press(&self, py: Python<'_>, reference: &Bound<'_, PyAny>) -> PyResult<Press> {
         Press::on(py, self, reference)
+    }
+
+    /// A pipeline that takes presses of known force into account.
+    ///
+    /// Presses of the sample or the calibrator give the gain of the light, by which forces are
+    /// divided. Presses of balls of known modulus give the layers of the waveguide.
+    ///
+    /// Parameters
+    /// ----------
+    /// reference : (rows, columns) array of uint8
+    ///     The frame without contact, of all these presses.
+    /// checks : sequence of CheckPress
+    ///
+    /// Raises
+    /// ------
+    /// ValueError
+    ///     A press that cannot be trusted, or that contradicts what is stated.
+    fn with_checks(
+        &self,
+        py: Python<'_>,
+        reference: &Bound<'_, PyAny>,
+        checks: Vec<PyRef<'_, CheckPress>>,
+    ) -> PyResult<Self> {
+        let reference = arrays::frame("reference", reference)?;
+        let view = reference.as_array();
+        let presses = checks.iter();
+        let presses: Vec<_> = presses
+            .map(|c| rust::pipeline::CheckPress::new(c.frame.view(), c.known_n, c.object))
+            .collect();
+        let checked = py.detach(|| self.0.clone().with_checks(view, &presses));
+        checked.map(Self).map_err(errors::pipeline)
     }
 
     fn __repr__(&self) -> String {

@@ -156,3 +156,25 @@ def test_a_press_is_drawn(scene, tmp_path):
     figure = ti.press_of(scene).plot()
     figure.savefig(tmp_path / "press.png")
     assert (tmp_path / "press.png").stat().st_size > 1000
+
+
+def test_presses_of_known_force_give_gain_and_layers(scene):
+    pipeline, reference = ti.pipeline_of(scene, coupling_error=0.06), scene.reference
+    # The second frame is 1.2 N, and here stated as 1.3.
+    weight = ti.CheckPress.sample(scene.frames[1], 1.3, force_error=1e-3)
+    press = pipeline.with_checks(reference, [weight]).press(reference)
+    press.add_frame(scene.frames[1])
+    force = press.contact(0).force
+    assert abs(force.value / 1.3 - 1) < 1e-6 and force.standard_error < 0.02
+    # A ball as it is confirms the layers, and one far softer contradicts them.
+    ball = {"youngs_modulus": scene.truth["youngs_modulus"], "radius": 3e-3}
+    known = ti.CheckPress.ball(scene.frames[1], 1.2, **ball)
+    checked = pipeline.with_checks(reference, [known]).press(reference)
+    for frame in scene.frames:
+        checked.add_frame(frame)
+    low, high = checked.modulus().interval_95
+    assert low < scene.truth["youngs_modulus"] < high
+    softer = ti.CheckPress.ball(scene.frames[1], 1.2, radius=3e-3, youngs_modulus=1e4)
+    with pytest.raises(ValueError, match="contradicts the stated layers"):
+        pipeline.with_checks(reference, [softer])
+    assert repr(weight) == "CheckPress.sample(1.3 N)"

@@ -1,7 +1,7 @@
 //! Presses of known force: what an object reflects and what the lamps give then needs no assumption.
 use ndarray::Array2;
 use tactile_imaging::force::Estimate;
-use tactile_imaging::pipeline::{CheckPress, CheckedGain, CheckedObject, Measurement};
+use tactile_imaging::pipeline::{CheckPress, CheckedObject, Measurement};
 use tactile_simulate::{CalibrationRun, Camera, PressLoad, PressOptions, Trial};
 
 /// A press with 0.7, 1.2 and, for the check, 1 N. With a factor that its light has.
@@ -36,12 +36,8 @@ fn measured(trial: &Trial, frames: &[Array2<u8>], object: Option<CheckedObject>)
     let reference = trial.simulation.reference.view();
     if let Some(object) = object {
         let known_n = Estimate::new(1.0, 2e-3);
-        let views = [reference, frames[2].view()];
-        let check = CheckPress::measure(&pipeline, views, known_n, object).unwrap();
-        let checked = CheckedGain::of(&[check], 0.06).unwrap();
-        pipeline = pipeline
-            .with_settings(|settings| settings.checked_gain = Some(checked))
-            .unwrap();
+        let check = CheckPress::new(frames[2].view(), known_n, object);
+        pipeline = pipeline.with_checks(reference, &[check]).unwrap();
     }
     let mut press = pipeline.press(reference).unwrap();
     for frame in &frames[..2] {

@@ -11,6 +11,7 @@ to the object. (0, 0) is the centre of the first pixel.
 """
 
 from ._native import (
+    CheckPress,
     Contact,
     Estimate,
     HertzContact,
@@ -44,6 +45,7 @@ from ._native import (
 from ._simulated import pipeline_of, press_of
 
 __all__ = [
+    "CheckPress",
     "Contact",
     "Estimate",
     "HertzContact",

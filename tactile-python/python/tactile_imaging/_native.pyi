@@ -342,6 +342,32 @@ class Pipeline:
         poisson_ratio_error: float | None = None,
     ) -> Pipeline: ...
     def press(self, reference: ArrayLike) -> Press: ...
+    def with_checks(self, reference: ArrayLike, checks: Sequence[CheckPress]) -> Pipeline: ...
+
+@final
+class CheckPress:
+    @classmethod
+    def sample(
+        cls, frame: ArrayLike, force: float, *, force_error: float | None = None
+    ) -> CheckPress: ...
+    @classmethod
+    def calibrator(
+        cls, frame: ArrayLike, force: float, *, force_error: float | None = None
+    ) -> CheckPress: ...
+    @classmethod
+    def ball(
+        cls,
+        frame: ArrayLike,
+        force: float,
+        radius: float,
+        *,
+        force_error: float | None = None,
+        radius_error: float | None = None,
+        youngs_modulus: float | None = None,
+        youngs_modulus_error: float | None = None,
+        poisson_ratio: float = 0.5,
+        poisson_ratio_error: float = 0.01,
+    ) -> CheckPress: ...
 
 @final
 class Press:

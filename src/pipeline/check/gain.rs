@@ -1,107 +1,19 @@
-//! Presses of known force beside the frames: the gain of the sensor as it is on the day.
-use super::composition::Pipeline;
-use super::error::PipelineError;
+//! The gain of the sensor as it is on the day, from forces that are read and known.
+use super::CheckedObject;
 use crate::core::Estimate;
 use crate::core::statistics::quantile_95;
-use ndarray::ArrayView2;
 use std::fmt::{self, Display, Formatter};
 
-/// What a press of known force presses.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-#[cfg_attr(
-    feature = "serde",
-    derive(serde::Serialize, serde::Deserialize),
-    serde(rename_all = "lowercase")
-)]
-pub enum CheckedObject {
-    /// The object that is measured: the light that it couples is checked too.
-    Sample,
-    /// The object that the sensor was calibrated with.
-    Calibrator,
-}
-
-/// A press of known force, before or after the frames.
-///
-/// ```
-/// use tactile_imaging::force::{CalibrationPair, Estimate};
-/// use tactile_imaging::pipeline::{CheckPress, CheckedGain, CheckedObject, Object, Pipeline};
-/// let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
-/// let hertz = |peak: f64| ndarray::Array2::from_shape_fn((64, 64), |(r, c)| {
-///     let d = ((r as f64 - 32.0).hypot(c as f64 - 32.0) / 20.0).min(1.0);
-///     10 + (peak * (1.0 - d * d).sqrt()).round() as u8
-/// });
-/// let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?;
-/// let (reference, frame) = (hertz(0.0), hertz(120.0));
-/// // A weight of 1.117 N shows the light of 1.005 N: the lamps are a tenth darker.
-/// let known_n = Estimate::new(1.117, 1e-3);
-/// let views = [reference.view(), frame.view()];
-/// let check = CheckPress::measure(&pipeline, views, known_n, CheckedObject::Sample)?;
-/// let checked = CheckedGain::of(&[check], 0.06)?;
-/// assert!((checked.gain.value / 0.9 - 1.0).abs() < 0.01);
-/// let pipeline = pipeline.with_settings(|settings| settings.checked_gain = Some(checked))?;
-/// let mut press = pipeline.press(reference.view())?;
-/// press.add_frame(frame.view());
-/// let force = press.contact(0)?.and_then(|contact| contact.force_n).expect("a force");
-/// assert!((force.value / 1.117 - 1.0).abs() < 1e-6 && force.relative_error() < 0.01);
-/// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
-/// ```
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct CheckPress {
-    /// The force that the sensor reads, with the error that is this press' own.
+/// A force that was read, beside the one that is known.
+#[derive(Clone, Copy, Debug)]
+pub struct GainCheck {
+    /// With the error that is this press' own.
     pub measured_n: Estimate,
-    /// The force of the weight or of a gauge.
     pub known_n: Estimate,
-    /// What was pressed.
     pub object: CheckedObject,
 }
 
-impl CheckPress {
-    /// Reads the force of a frame, given its reference and the frame, as the sensor was calibrated.
-    ///
-    /// # Errors
-    /// [`PipelineError::Check`] where the frame shows no force, or one that cannot be trusted: a
-    /// contact that is cut, saturated, beside others or outside the calibration. Those of a
-    /// [`Press`](super::Press)'s contact.
-    pub fn measure(
-        pipeline: &Pipeline,
-        [reference, frame]: [ArrayView2<'_, u8>; 2],
-        known_n: Estimate,
-        object: CheckedObject,
-    ) -> Result<Self, PipelineError> {
-        // Errors of scale are what is checked.
-        let unscaled = pipeline.clone().with_settings(|settings| {
-            settings.checked_gain = None;
-            settings.coupling_error = Some(0.0);
-            settings.force_scale_error = Some(0.0);
-        })?;
-        let mut press = unscaled.press(reference)?;
-        press.add_frame(frame);
-        let refused = |reason| PipelineError::Check { reason };
-        let contact = press.contact(0)?.ok_or(refused("it shows no contact"))?;
-        let force_n = contact.force_n;
-        let measured_n = force_n.ok_or(refused("its force is not read from light"))?;
-        let doubts = [
-            (
-                contact.touches_edge,
-                "its contact is cut by the frame's edge",
-            ),
-            (contact.saturated_share > 0.0, "its contact is saturated"),
-            (contact.other_contacts > 0, "it shows several contacts"),
-            (
-                contact.out_of_calibration,
-                "its light is outside the calibration",
-            ),
-        ];
-        if let Some(&(_, reason)) = doubts.iter().find(|(doubted, _)| *doubted) {
-            return Err(refused(reason));
-        }
-        Ok(Self {
-            measured_n,
-            known_n,
-            object,
-        })
-    }
-
+impl GainCheck {
     /// Logarithm of the gain, and its variance.
     fn log_gain(&self) -> (f64, f64) {
         let ratio = self.measured_n.value / self.known_n.value;
@@ -139,13 +51,9 @@ impl CheckedGain {
     /// `coupling_error`² besides. The means of both objects are weighted by their variances.
     ///
     /// # Errors
-    /// [`PipelineError::Check`] without presses, for forces or errors that are no positive numbers,
-    /// and for a gain below a half or above two: a wrong unit, rather than a sensor.
-    pub fn of(checks: &[CheckPress], coupling_error: f64) -> Result<Self, PipelineError> {
-        let refused = |reason| Err(PipelineError::Check { reason });
-        if checks.is_empty() {
-            return refused("there is none");
-        }
+    /// Forces or errors that are no positive numbers, and a gain below a half or above two: a wrong
+    /// unit, rather than a sensor.
+    pub(super) fn of(checks: &[GainCheck], coupling_error: f64) -> Result<Self, &'static str> {
         let positive = |e: Estimate| e.value > 0.0 && e.value.is_finite();
         let error = |e: Estimate| e.standard_error >= 0.0 && e.standard_error.is_finite();
         let usable = |e: Estimate| positive(e) && error(e);
@@ -153,12 +61,12 @@ impl CheckedGain {
             .iter()
             .all(|c| usable(c.measured_n) && usable(c.known_n))
         {
-            return refused("its forces must be positive numbers");
+            return Err("its forces must be positive numbers");
         }
         let groups = [CheckedObject::Sample, CheckedObject::Calibrator].map(|object| {
             let of_object = checks.iter().filter(move |check| check.object == object);
             of_object
-                .map(CheckPress::log_gain)
+                .map(GainCheck::log_gain)
                 // No force is known to a part in a million.
                 .map(|(x, variance)| (x, variance.max(1e-12)))
                 .collect::<Vec<_>>()
@@ -180,7 +88,7 @@ impl CheckedGain {
         }
         let log_gain = sum / weight;
         if log_gain.abs() > std::f64::consts::LN_2 {
-            return refused("the force that is read is not half to twice the one that is known");
+            return Err("the force that is read is not half to twice the one that is known");
         }
         let (gain, error) = (log_gain.exp(), weight.recip().sqrt().hypot(allowed));
         Ok(Self {
@@ -228,7 +136,7 @@ fn drift(groups: &[Vec<(f64, f64)>; 2]) -> (f64, f64) {
 
 impl Display for CheckedGain {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        let gain = super::result::with_error(self.gain.value, self.gain.standard_error, 1.0);
+        let gain = crate::pipeline::with_error(self.gain.value, self.gain.standard_error, 1.0);
         let s = if self.presses == 1 { "" } else { "es" };
         write!(
             f,
@@ -246,8 +154,8 @@ impl Display for CheckedGain {
 mod tests {
     use super::*;
 
-    fn check(measured: f64, known: f64, error: f64, object: CheckedObject) -> CheckPress {
-        CheckPress {
+    fn check(measured: f64, known: f64, error: f64, object: CheckedObject) -> GainCheck {
+        GainCheck {
             measured_n: Estimate::new(measured, error * measured),
             known_n: Estimate::new(known, error * known),
             object,
@@ -261,7 +169,7 @@ mod tests {
         assert!((gain.value - 0.8).abs() < 1e-12);
         let own = 0.0002_f64.sqrt().hypot(ASSUMED_DRIFT);
         assert!((gain.relative_error() - own).abs() < 1e-12);
-        let calibrator = CheckPress {
+        let calibrator = GainCheck {
             object: CheckedObject::Calibrator,
             ..sample
         };
@@ -277,17 +185,13 @@ mod tests {
     fn what_is_no_check_is_refused() {
         let sample = |measured, known| check(measured, known, 0.01, CheckedObject::Sample);
         for checks in [
-            vec![],
             vec![sample(1.0, 0.0)],
             vec![sample(f64::NAN, 1.0)],
             vec![sample(1e-3, 1.0)],
             vec![sample(2.1, 1.0)],
         ] {
             let refused = CheckedGain::of(&checks, 0.06);
-            assert!(
-                matches!(refused, Err(PipelineError::Check { .. })),
-                "{checks:?}"
-            );
+            assert!(refused.is_err(), "{checks:?}");
         }
     }
 
@@ -317,7 +221,7 @@ mod tests {
                 let checks: Vec<_> = (0..presses)
                     .map(|_| {
                         let gain = (drift * normal() + own * normal()).exp();
-                        CheckPress {
+                        GainCheck {
                             measured_n: Estimate::new(gain, own * gain),
                             known_n: Estimate::exact(1.0),
                             object: CheckedObject::Sample,

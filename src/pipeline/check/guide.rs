@@ -1,0 +1,310 @@
+//! The guide's layers as they are on the day, from contact radii of balls of known modulus.
+//!
+//! A contact of radius a carries ln F = ln E* + ln f(a, layers). With x the departures of ln E, ln h
+//! and ν of all layers from their stated values, C their covariance and V that of what else moves
+//! ln F, the departures after the presses are x = C Hᵀ (H C Hᵀ + V)⁻¹ (ln F − ln F(x) + H x), H the
+//! derivatives of ln F(x) at x: the iterated Kalman update. Parameters that the presses do not
+//! determine stay as they were stated.
+use super::{KnownBall, is_known};
+use crate::core::Estimate;
+use crate::elasticity::contact::{
+    Bond, Layer, PARAMETERS_PER_LAYER, Waveguide, guide_compliance_error, guide_log_stiffness,
+    stepped_layers,
+};
+use crate::elasticity::modulus::{ContactLaw, LogForce, WaveguideLaw};
+use crate::pipeline::contact::ContactReading;
+use crate::pipeline::settings::Settings;
+use nalgebra::{DMatrix, DVector};
+use std::fmt::{self, Display, Formatter};
+
+/// What presses of balls of known modulus show of the guide's layers. The layers of the pipeline
+/// and their covariance are those after the presses.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[non_exhaustive]
+pub struct CheckedGuide {
+    /// Stiffness of the guide under contacts of the presses' mean radius, over that as stated.
+    pub stiffness: Estimate,
+    /// The number of presses.
+    pub presses: usize,
+}
+
+/// A contact radius of a known ball under a known force.
+#[derive(Clone, Copy, Debug)]
+pub struct GuideCheck {
+    ball: KnownBall,
+    known_n: Estimate,
+    /// With the error that is this contact's own.
+    radius_m: Estimate,
+}
+
+/// Standard errors by which a press may contradict what was stated before it is refused.
+const LARGEST_DEVIATION: f64 = 4.0;
+
+/// Step of the derivatives. Downwards, because ν is at most ½.
+const STEP: f64 = -1e-3;
+
+impl GuideCheck {
+    pub fn new(
+        contact: &ContactReading,
+        known_n: Estimate,
+        ball: KnownBall,
+    ) -> Result<Self, &'static str> {
+        let positive = |e: Estimate| is_known(e) && e.value > 0.0;
+        if !positive(ball.radius_m) || !ball.youngs_modulus_pa.is_none_or(positive) {
+            return Err("the ball's radius and modulus must be positive numbers");
+        }
+        let poisson = ball.poisson_ratio;
+        if !is_known(poisson) || !(0.0..=0.5).contains(&poisson.value) {
+            return Err("the ball's Poisson ratio must be a number from 0 to 0.5");
+        }
+        Ok(Self {
+            ball,
+            known_n,
+            radius_m: contact.contact_radius_m,
+        })
+    }
+
+    /// ln F at the measured radius on these layers.
+    fn log_force(&self, layers: &[Layer]) -> Option<LogForce> {
+        log_force(&self.ball, layers, self.radius_m.value)
+    }
+
+    /// Relative error of F from the law itself.
+    fn law_error(&self, guide: &Waveguide) -> Option<f64> {
+        let (radius, a) = (self.ball.radius_m.value, self.radius_m.value);
+        if self.ball.youngs_modulus_pa.is_none() {
+            // From taking the ball for a parabola and strains as small, as calibrations of layers.
+            return Some(0.1 * (a / radius).powi(2));
+        }
+        let law =
+            WaveguideLaw::new(radius, self.ball.poisson_ratio.value, guide, Bond::Bonded).ok()?;
+        Some(law.model_error(Some(a), None))
+    }
+
+    /// Errors of ln F: those that presses of this ball share.
+    fn ball_errors(&self, layers: &[Layer], here: &LogForce) -> Option<[f64; 3]> {
+        let beside = |ball: KnownBall| {
+            let there = log_force(&ball, layers, self.radius_m.value)?;
+            Some((there.value - here.value) / STEP)
+        };
+        let radius = here.size_slope * self.ball.radius_m.relative_error();
+        let Some(modulus) = self.ball.youngs_modulus_pa else {
+            return Some([radius, 0.0, 0.0]);
+        };
+        let softer = Estimate::new(modulus.value * STEP.exp(), modulus.standard_error);
+        let by_modulus = beside(KnownBall {
+            youngs_modulus_pa: Some(softer),
+            ..self.ball
+        })?;
+        let poisson = self.ball.poisson_ratio;
+        let lower = Estimate::new(poisson.value + STEP, poisson.standard_error);
+        let by_poisson = beside(KnownBall {
+            poisson_ratio: lower,
+            ..self.ball
+        })?;
+        Some([
+            radius,
+            by_modulus * modulus.relative_error(),
+            by_poisson * poisson.standard_error,
+        ])
+    }
+}
+
+/// ln F of a ball with a contact of radius a (m), with its slopes in ln a and ln R.
+fn log_force(ball: &KnownBall, layers: &[Layer], a: f64) -> Option<LogForce> {
+    let radius = ball.radius_m.value;
+    let Some(modulus) = ball.youngs_modulus_pa else {
+        let stiffness = |a: f64| guide_log_stiffness(layers, a);
+        let here = stiffness(a)?;
+        let slope = (stiffness(a * STEP.exp())? - here) / STEP;
+        let value = (4.0 / 3.0_f64).ln() + 3.0 * a.ln() - radius.ln() + here;
+        return Some(LogForce::new(value, 3.0 + slope, -1.0));
+    };
+    let guide = Waveguide::new(layers.to_vec()).ok()?;
+    let poisson = ball.poisson_ratio.value;
+    let law = WaveguideLaw::new(radius, poisson, &guide, Bond::Bonded).ok()?;
+    let compliance = |modulus: f64, poisson: f64| (1.0 - poisson * poisson) / modulus;
+    let own = compliance(modulus.value, poisson);
+    let top = layers.first()?;
+    let touched = compliance(top.youngs_modulus_pa, top.poisson_ratio);
+    let mut force = law.log_force_at_radius(a, touched / (touched + own))?;
+    force.value -= (touched + own).ln();
+    Some(force)
+}
+
+/// Covariance of ln E, ln h and ν of all layers before the presses.
+fn prior(settings: &Settings, layers: usize) -> DMatrix<f64> {
+    let assumed = Settings::ASSUMED_LAYER_ERROR.powi(2);
+    let of_moduli = |i: usize, j: usize| if i.max(j) < layers { assumed } else { 0.0 };
+    let count = PARAMETERS_PER_LAYER * layers;
+    match &settings.layer_covariance {
+        Some(stated) => stated.clone(),
+        None => DMatrix::from_fn(count, count, of_moduli),
+    }
+}
+
+/// ln F of all presses on layers that are moved by x, with the derivatives by x.
+struct Prediction {
+    forces: Vec<LogForce>,
+    slopes: DMatrix<f64>,
+}
+
+impl Prediction {
+    fn at(
+        checks: &[GuideCheck],
+        stated: &[Layer],
+        x: &DVector<f64>,
+        moves: impl Fn(usize) -> bool,
+    ) -> Option<Self> {
+        let layers = stepped_layers(stated, x);
+        let all = |layers: &[Layer]| {
+            let forces = checks.iter().map(|check| check.log_force(layers));
+            forces.collect::<Option<Vec<_>>>()
+        };
+        let forces = all(&layers)?;
+        let mut slopes = DMatrix::zeros(checks.len(), x.len());
+        for k in (0..x.len()).filter(|&k| moves(k)) {
+            let mut beside = x.clone();
+            beside[k] += STEP;
+            let there = all(&stepped_layers(stated, &beside))?;
+            for (i, (there, here)) in there.iter().zip(&forces).enumerate() {
+                slopes[(i, k)] = (there.value - here.value) / STEP;
+            }
+        }
+        Some(Self { forces, slopes })
+    }
+}
+
+/// Covariance of ln F of all presses from all but the layers.
+fn noise(
+    checks: &[GuideCheck],
+    guide: &Waveguide,
+    forces: &[LogForce],
+    length_scale: f64,
+) -> Option<DMatrix<f64>> {
+    let mut noise = DMatrix::zeros(checks.len(), checks.len());
+    let laws = checks.iter().map(|check| check.law_error(guide));
+    let laws: Vec<f64> = laws.collect::<Option<_>>()?;
+    let balls = checks.iter().zip(forces);
+    let balls = balls.map(|(check, force)| check.ball_errors(guide.layers(), force));
+    let balls: Vec<[f64; 3]> = balls.collect::<Option<_>>()?;
+    for (i, first) in checks.iter().enumerate() {
+        let force = first.known_n.relative_error();
+        for (j, second) in checks.iter().enumerate() {
+            // The size of a pixel, the law, and the weights as far as they share an error.
+            noise[(i, j)] = forces[i].slope * forces[j].slope * length_scale * length_scale
+                + laws[i] * laws[j]
+                + force * second.known_n.relative_error();
+            if first.ball == second.ball {
+                let products = balls[i].iter().zip(&balls[j]).map(|(a, b)| a * b);
+                noise[(i, j)] += products.sum::<f64>();
+            }
+        }
+        // Whether weights share an error is not known: it counts as their own, too.
+        let own = forces[i].slope * first.radius_m.relative_error();
+        noise[(i, i)] += own * own + force * force;
+    }
+    Some(noise)
+}
+
+/// The layers and their covariance after the presses.
+pub fn of(
+    checks: &[GuideCheck],
+    settings: &Settings,
+) -> Result<(CheckedGuide, Waveguide, DMatrix<f64>), &'static str> {
+    let guide = settings
+        .waveguide
+        .as_ref()
+        .filter(|guide| !guide.layers().is_empty())
+        .ok_or("the guide is rigid beside the ball: it has no layers to check")?;
+    let unsolved = "the contact of the ball with the stated layers cannot be solved";
+    let stated = guide.layers();
+    let prior = prior(settings, stated.len());
+    let moves = |k: usize| prior[(k, k)] > 0.0;
+    let log_known = DVector::from_iterator(
+        checks.len(),
+        checks.iter().map(|check| check.known_n.value.ln()),
+    );
+    let mut x = DVector::zeros(prior.nrows());
+    let predicted = |x: &DVector<f64>| Prediction::at(checks, stated, x, moves).ok_or(unsolved);
+    let mut here = predicted(&x)?;
+    let noise = noise(checks, guide, &here.forces, settings.length_scale()).ok_or(unsolved)?;
+    let mut covariance = prior.clone();
+    // ln F is nearly linear in x: the third round moves it by 10⁻⁶.
+    for round in 0..4 {
+        let values = here.forces.iter().map(|force| force.value);
+        let gap = &log_known - DVector::from_iterator(checks.len(), values);
+        let slopes = &here.slopes;
+        let whole = slopes * &prior * slopes.transpose() + &noise;
+        let expected = whole.diagonal().map(f64::sqrt);
+        if round == 0 && gap.component_div(&expected).amax() > LARGEST_DEVIATION {
+            return Err(
+                "its contact radius contradicts the stated layers and ball by more than four \
+                 standard errors",
+            );
+        }
+        let inverse = whole.cholesky().ok_or(unsolved)?.inverse();
+        let gain = &prior * slopes.transpose() * inverse;
+        x = &gain * (gap + slopes * &x);
+        // Joseph's form stays positive where a parameter is exact.
+        let left = DMatrix::identity(x.len(), x.len()) - &gain * slopes;
+        covariance = &left * &prior * left.transpose() + &gain * &noise * gain.transpose();
+        here = predicted(&x)?;
+    }
+    let layers = stepped_layers(stated, &x);
+    let sum: f64 = checks.iter().map(|check| check.radius_m.value).sum();
+    let mean_m = sum / checks.len() as f64;
+    let stiffness = |layers: &[Layer]| guide_log_stiffness(layers, mean_m).ok_or(unsolved);
+    let ratio = (stiffness(&layers)? - stiffness(stated)?).exp();
+    let error = guide_compliance_error(&layers, &covariance, mean_m).ok_or(unsolved)?;
+    // Earlier presses moved the layers from where they were stated.
+    let earlier = settings.checked_guide;
+    let ratio = ratio * earlier.map_or(1.0, |earlier| earlier.stiffness.value);
+    let checked = CheckedGuide {
+        stiffness: Estimate::new(ratio, ratio * error),
+        presses: checks.len() + earlier.map_or(0, |earlier| earlier.presses),
+    };
+    let guide = Waveguide::new(layers).map_err(|_| unsolved)?;
+    Ok((checked, guide, covariance))
+}
+
+impl Display for CheckedGuide {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        let stiffness = self.stiffness;
+        let ratio = crate::pipeline::with_error(stiffness.value, stiffness.standard_error, 1.0);
+        let s = if self.presses == 1 { "" } else { "es" };
+        write!(
+            f,
+            "the guide is {ratio} times as stiff as stated ({} press{s} of known balls)",
+            self.presses
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_hard_ball_with_a_small_contact_is_a_rigid_one() {
+        let gel = Layer {
+            thickness_m: 10e-3,
+            youngs_modulus_pa: 75e3,
+            poisson_ratio: 0.5,
+        };
+        let radius_m = Estimate::exact(10e-3);
+        let rigid = KnownBall::rigid(radius_m);
+        let hard = KnownBall::elastic(radius_m, Estimate::exact(200e9));
+        let [rigid, hard] = [rigid, hard].map(|ball| log_force(&ball, &[gel], 0.3e-3).unwrap());
+        // Finite strain goes as a/R: a few thousandths here.
+        assert!(
+            (rigid.value - hard.value).abs() < 5e-3,
+            "{rigid:?} {hard:?}"
+        );
+        assert!(
+            (rigid.slope - hard.slope).abs() < 1e-2,
+            "{rigid:?} {hard:?}"
+        );
+    }
+}

@@ -1,0 +1,237 @@
+//! Presses of known force beside the frames: the sensor and its guide as they are on the day.
+mod gain;
+mod guide;
+
+use super::composition::Pipeline;
+use super::contact::ContactReading;
+use super::error::PipelineError;
+use super::specimen::Object;
+use crate::core::Estimate;
+use gain::GainCheck;
+use guide::GuideCheck;
+use ndarray::ArrayView2;
+
+pub use gain::CheckedGain;
+pub use guide::CheckedGuide;
+
+/// A ball whose radius and modulus are known.
+///
+/// ```
+/// use tactile_imaging::{force::Estimate, pipeline::KnownBall};
+/// let steel = KnownBall::rigid(Estimate::new(10e-3, 5e-6));
+/// assert!(steel.youngs_modulus_pa.is_none());
+/// let silicone = KnownBall::elastic(Estimate::new(3e-3, 5e-6), Estimate::new(62e3, 1e3));
+/// assert_eq!(silicone.poisson_ratio.value, 0.5);
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct KnownBall {
+    /// In metres.
+    pub radius_m: Estimate,
+    /// In pascals. `None`: rigid.
+    pub youngs_modulus_pa: Option<Estimate>,
+    /// Of an elastic ball.
+    pub poisson_ratio: Estimate,
+}
+
+impl KnownBall {
+    /// A ball far stiffer than the guide.
+    #[must_use]
+    pub const fn rigid(radius_m: Estimate) -> Self {
+        Self {
+            radius_m,
+            youngs_modulus_pa: None,
+            poisson_ratio: Estimate::exact(0.5),
+        }
+    }
+
+    /// An incompressible ball, Poisson's ratio known to 0.01.
+    #[must_use]
+    pub const fn elastic(radius_m: Estimate, youngs_modulus_pa: Estimate) -> Self {
+        Self {
+            radius_m,
+            youngs_modulus_pa: Some(youngs_modulus_pa),
+            poisson_ratio: Estimate::new(0.5, 0.01),
+        }
+    }
+}
+
+/// What a press of known force presses.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum CheckedObject {
+    /// The object that is measured: the light that it couples is checked too.
+    Sample,
+    /// The object that the sensor was calibrated with: the gain is checked, but for what the sample
+    /// couples otherwise.
+    Calibrator,
+    /// A ball of known modulus: the guide's layers are checked by its contact radius. Its light is
+    /// not used.
+    Ball(KnownBall),
+}
+
+/// A press of known force, before or after the frames, for
+/// [`Pipeline::with_checks`].
+#[derive(Clone, Copy, Debug)]
+pub struct CheckPress<'a> {
+    /// The image.
+    pub frame: ArrayView2<'a, u8>,
+    /// The force of the weight or of a gauge.
+    pub known_n: Estimate,
+    /// What was pressed.
+    pub object: CheckedObject,
+}
+
+impl<'a> CheckPress<'a> {
+    /// A press of an object with a force.
+    ///
+    /// ```
+    /// use tactile_imaging::{force::Estimate, pipeline::{CheckPress, CheckedObject}};
+    /// let frame = ndarray::Array2::zeros((480, 640));
+    /// let weight_n = Estimate::new(0.981, 1e-3);
+    /// let check = CheckPress::new(frame.view(), weight_n, CheckedObject::Sample);
+    /// assert_eq!(check.object, CheckedObject::Sample);
+    /// ```
+    #[must_use]
+    pub const fn new(frame: ArrayView2<'a, u8>, known_n: Estimate, object: CheckedObject) -> Self {
+        Self {
+            frame,
+            known_n,
+            object,
+        }
+    }
+}
+
+impl Pipeline {
+    /// Takes presses of known force into account: of the sample or the calibrator the gain of the
+    /// light ([`CheckedGain`]), of balls of known modulus the layers of the guide ([`CheckedGuide`]).
+    /// All have one reference.
+    ///
+    /// ```
+    /// use tactile_imaging::force::{CalibrationPair, Estimate};
+    /// use tactile_imaging::pipeline::{CheckPress, CheckedObject, Object, Pipeline};
+    /// let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
+    /// let hertz = |peak: f64| ndarray::Array2::from_shape_fn((64, 64), |(r, c)| {
+    ///     let d = ((r as f64 - 32.0).hypot(c as f64 - 32.0) / 20.0).min(1.0);
+    ///     10 + (peak * (1.0 - d * d).sqrt()).round() as u8
+    /// });
+    /// let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?;
+    /// let (reference, frame) = (hertz(0.0), hertz(120.0));
+    /// // A weight of 1.117 N shows the light of 1.005 N: the lamps are a tenth darker.
+    /// let weight_n = Estimate::new(1.117, 1e-3);
+    /// let check = CheckPress::new(frame.view(), weight_n, CheckedObject::Sample);
+    /// let pipeline = pipeline.with_checks(reference.view(), &[check])?;
+    /// let gain = pipeline.settings().checked_gain.expect("a gain").gain;
+    /// assert!((gain.value / 0.9 - 1.0).abs() < 0.01);
+    /// let mut press = pipeline.press(reference.view())?;
+    /// press.add_frame(frame.view());
+    /// let force = press.contact(0)?.and_then(|contact| contact.force_n).expect("a force");
+    /// assert!((force.value / 1.117 - 1.0).abs() < 1e-6 && force.relative_error() < 0.01);
+    /// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`PipelineError::Check`] for a press that shows no contact or one that cannot be trusted, whose
+    /// known values are not physical, that contradicts the sensor or the stated layers, or, of a ball,
+    /// where the guide has no layers. Those of a
+    /// [`Press`](super::Press)'s contact.
+    pub fn with_checks(
+        self,
+        reference: ArrayView2<'_, u8>,
+        checks: &[CheckPress<'_>],
+    ) -> Result<Self, PipelineError> {
+        let (mut gains, mut guides) = (Vec::new(), Vec::new());
+        for (press, check) in checks.iter().enumerate() {
+            let refused = |reason| PipelineError::Check { press, reason };
+            let contact = self.checked_contact(reference, check)?.map_err(refused)?;
+            if let CheckedObject::Ball(ball) = check.object {
+                guides.push(GuideCheck::new(&contact, check.known_n, ball).map_err(refused)?);
+                continue;
+            }
+            if contact.out_of_calibration {
+                return Err(refused("its light is outside the calibration"));
+            }
+            let no_force = refused("its force is not read from light");
+            gains.push(GainCheck {
+                measured_n: contact.force_n.ok_or(no_force)?,
+                known_n: check.known_n,
+                object: check.object,
+            });
+        }
+        let first = |is_ball: bool| {
+            let of_kind =
+                |c: &CheckPress<'_>| matches!(c.object, CheckedObject::Ball(_)) == is_ball;
+            checks.iter().position(of_kind).unwrap_or_default()
+        };
+        let mut pipeline = self;
+        if !gains.is_empty() {
+            let coupling = pipeline.settings().unchecked_coupling();
+            let press = first(false);
+            let checked = CheckedGain::of(&gains, coupling)
+                .map_err(|reason| PipelineError::Check { press, reason })?;
+            pipeline = pipeline.with_settings(|settings| settings.checked_gain = Some(checked))?;
+        }
+        if !guides.is_empty() {
+            let press = first(true);
+            let (checked, layers, covariance) = guide::of(&guides, pipeline.settings())
+                .map_err(|reason| PipelineError::Check { press, reason })?;
+            pipeline = pipeline.with_settings(|settings| {
+                settings.waveguide = Some(layers);
+                settings.layer_covariance = Some(covariance);
+                settings.checked_guide = Some(checked);
+            })?;
+        }
+        Ok(pipeline)
+    }
+
+    /// The contact of a check with the errors that are its own, or why it is not usable.
+    fn checked_contact(
+        &self,
+        reference: ArrayView2<'_, u8>,
+        check: &CheckPress<'_>,
+    ) -> Result<Result<ContactReading, &'static str>, PipelineError> {
+        if !(is_known(check.known_n) && check.known_n.value > 0.0) {
+            return Ok(Err("its force must be a positive number"));
+        }
+        let pipeline = self.clone().with_settings(|settings| {
+            settings.checked_gain = None;
+            // Errors that all presses share are accounted for once, with what is checked.
+            settings.coupling_error = Some(0.0);
+            settings.force_scale_error = Some(0.0);
+            if let CheckedObject::Ball(ball) = check.object {
+                settings.length_scale_error = Some(0.0);
+                settings.object = Object::Sphere {
+                    radius_m: ball.radius_m.value,
+                    poisson_ratio: ball.poisson_ratio.value,
+                };
+            }
+        })?;
+        let mut press = pipeline.press(reference)?;
+        press.add_frame(check.frame);
+        Ok(match press.contact(0)? {
+            Some(contact) => trusted(contact),
+            None => Err("it shows no contact"),
+        })
+    }
+}
+
+/// Whether a value and its error are numbers.
+fn is_known(estimate: Estimate) -> bool {
+    let error = estimate.standard_error;
+    estimate.value.is_finite() && error >= 0.0 && error.is_finite()
+}
+
+/// A contact whose force and radius are those of the whole object.
+fn trusted(contact: &ContactReading) -> Result<ContactReading, &'static str> {
+    let doubts = [
+        (
+            contact.touches_edge,
+            "its contact is cut by the frame's edge",
+        ),
+        (contact.saturated_share > 0.0, "its contact is saturated"),
+        (contact.other_contacts > 0, "it shows several contacts"),
+    ];
+    match doubts.iter().find(|(doubted, _)| *doubted) {
+        Some(&(_, reason)) => Err(reason),
+        None => Ok(*contact),
+    }
+}

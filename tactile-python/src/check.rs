@@ -1,0 +1,99 @@
+//! Presses of known force beside the frames.
+use crate::arrays;
+use ndarray::Array2;
+use pyo3::prelude::*;
+use pyo3::types::PyType;
+use tactile_imaging::core::Estimate;
+use tactile_imaging::pipeline::{CheckedObject, KnownBall};
+
+/// A press of known force, before or after the frames, for `Pipeline.with_checks`.
+///
+/// Forces in newtons, lengths in metres, moduli in pascals. Errors are standard errors. Those that
+/// are not given are assumed: 0.2 % of a force, 0.5 % of a radius, 2 % of a modulus, 0.01 of
+/// Poisson's ratio.
+#[pyclass(frozen, module = "tactile_imaging")]
+pub(crate) struct CheckPress {
+    pub frame: Array2<u8>,
+    pub known_n: Estimate,
+    pub object: CheckedObject,
+}
+
+impl CheckPress {
+    fn new(
+        frame: &Bound<'_, PyAny>,
+        force: f64,
+        force_error: Option<f64>,
+        object: CheckedObject,
+    ) -> PyResult<Self> {
+        Ok(Self {
+            frame: arrays::frame("frame", frame)?.as_array().to_owned(),
+            known_n: Estimate::new(force, force_error.unwrap_or(0.2e-2 * force)),
+            object,
+        })
+    }
+}
+
+#[pymethods]
+impl CheckPress {
+    /// Of the object that is measured: the gain of the light, and what the object couples.
+    #[classmethod]
+    #[pyo3(signature = (frame, force, *, force_error=None))]
+    fn sample(
+        _class: &Bound<'_, PyType>,
+        frame: &Bound<'_, PyAny>,
+        force: f64,
+        force_error: Option<f64>,
+    ) -> PyResult<Self> {
+        Self::new(frame, force, force_error, CheckedObject::Sample)
+    }
+
+    /// Of the object that the sensor was calibrated with: the gain of the light.
+    #[classmethod]
+    #[pyo3(signature = (frame, force, *, force_error=None))]
+    fn calibrator(
+        _class: &Bound<'_, PyType>,
+        frame: &Bound<'_, PyAny>,
+        force: f64,
+        force_error: Option<f64>,
+    ) -> PyResult<Self> {
+        Self::new(frame, force, force_error, CheckedObject::Calibrator)
+    }
+
+    /// Of a ball of known radius and modulus: the layers of the waveguide. Without a modulus the
+    /// ball is rigid.
+    #[classmethod]
+    #[pyo3(signature = (
+        frame, force, radius, *, force_error=None, radius_error=None, youngs_modulus=None,
+        youngs_modulus_error=None, poisson_ratio=0.5, poisson_ratio_error=0.01
+    ))]
+    fn ball(
+        _class: &Bound<'_, PyType>,
+        frame: &Bound<'_, PyAny>,
+        force: f64,
+        radius: f64,
+        force_error: Option<f64>,
+        radius_error: Option<f64>,
+        youngs_modulus: Option<f64>,
+        youngs_modulus_error: Option<f64>,
+        poisson_ratio: f64,
+        poisson_ratio_error: f64,
+    ) -> PyResult<Self> {
+        let with = |value: f64, error: Option<f64>, assumed: f64| {
+            Estimate::new(value, error.unwrap_or(assumed * value))
+        };
+        let mut ball = KnownBall::rigid(with(radius, radius_error, 0.5e-2));
+        ball.youngs_modulus_pa =
+            youngs_modulus.map(|modulus| with(modulus, youngs_modulus_error, 2e-2));
+        ball.poisson_ratio = Estimate::new(poisson_ratio, poisson_ratio_error);
+        Self::new(frame, force, force_error, CheckedObject::Ball(ball))
+    }
+
+    fn __repr__(&self) -> String {
+        let object = match self.object {
+            CheckedObject::Sample => "sample",
+            CheckedObject::Calibrator => "calibrator",
+            CheckedObject::Ball(_) => "ball",
+        };
+        format!("CheckPress.{object}({} N)", self.known_n.value)
+    }
+}
