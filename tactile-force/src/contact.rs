@@ -84,7 +84,7 @@ pub struct Detection {
     pub statistics: FrameStatistics,
     /// The correction of illumination and stray light.
     pub drift: IlluminationDrift,
-    /// The noise that the errors are computed from; `None` without contact.
+    /// The noise that the errors are computed from. `None` without contact.
     pub noise: Option<DifferenceNoise>,
     /// The contact, if there is one.
     pub contact: Option<Contact>,
@@ -113,7 +113,7 @@ pub struct ContactOptions {
     pub(crate) polarity: Polarity,
     #[cfg_attr(feature = "serde", serde(deserialize_with = "read::false_alarm_rate"))]
     false_alarm_rate: f64,
-    /// Width of the smoothing box; `None` picks one by the signal.
+    /// Width of the smoothing box. `None` picks one by the signal.
     #[cfg_attr(feature = "serde", serde(deserialize_with = "read::smoothing_px"))]
     smoothing_px: Option<usize>,
     margin_px: usize,
@@ -269,7 +269,7 @@ pub struct DetectorWorkspace {
 
 impl DetectorWorkspace {
     /// The mask of the last frame's contact (1 inside, 0 outside) over a region, and the region's
-    /// place in the frame; `None` if there was no contact.
+    /// place in the frame. `None` if there was no contact.
     pub fn mask(&self) -> Option<(BoundingBox, ArrayView2<'_, u8>)> {
         let place = self.region.place?;
         let view =
@@ -278,18 +278,20 @@ impl DetectorWorkspace {
     }
 
     /// Brightness and noise of the last frame outside the contact, against the reference that it
-    /// was compared with; `None` if no frame of the reference's size was. From at most 1,500 tiles
+    /// was compared with. `None` if no frame of the reference's size was. From at most 1,500 tiles
     /// of 8 × 32 pixels, evenly over the frame, or all of a smaller one: O(tiles).
     ///
     /// ```
     /// use ndarray::Array2;
-    /// use tactile_force::{ContactDetector, ContactOptions, Detection, DetectorWorkspace, ReferenceFrame};
+    /// use tactile_force::{
+    ///     ContactDetector, ContactOptions, Detection, DetectorWorkspace, ReferenceFrame,
+    /// };
     /// let reference = ReferenceFrame::new(Array2::from_elem((160, 160), 50_u8).view())?;
     /// let mut workspace = DetectorWorkspace::default();
     /// assert!(workspace.condition(&reference).is_none(), "no frame yet");
     /// let dimmed = Array2::from_elem((160, 160), 49_u8);
-    /// let _: Detection =
-    ///     ContactDetector::new(ContactOptions::default()).detect_with(&mut workspace, dimmed.view(), &reference)?;
+    /// let detector = ContactDetector::new(ContactOptions::default());
+    /// let _: Detection = detector.detect_with(&mut workspace, dimmed.view(), &reference)?;
     /// let condition = workspace.condition(&reference).expect("a frame");
     /// assert!((condition.brightness.value - 0.98).abs() < 1e-9);
     /// # Ok::<(), tactile_force::ForceError>(())
@@ -390,6 +392,7 @@ impl ContactDetector {
             noise: None,
             contact: None,
         };
+        // Frames without contact end here, after one pass.
         let Some(suspect) = self.suspect(
             &workspace.pass,
             reference,
@@ -461,6 +464,7 @@ impl ContactDetector {
         let mut place = suspect.grown(TILE_COLUMNS, frame.dim());
         loop {
             let signal = region.load(frame, reference, place, drift, sign);
+            // Trials are the pixels of the region alone. The test of the whole frame came before.
             let z = quantile(self.options.false_alarm_rate, region.difference.len());
             let width = self
                 .options
@@ -475,6 +479,7 @@ impl ContactDetector {
             let needed = region
                 .bounds(&region.mask)?
                 .grown(self.options.margin_px + 1, frame.dim());
+            // The mask and its margin lie inside: the region's border has cut nothing off.
             if needed.union(place) == place {
                 return Some(extent);
             }
@@ -562,6 +567,7 @@ fn summarise(
     let origin = [place.column_start as f64, place.row_start as f64];
     let centroid =
         |k: usize| Estimate::from_variance(origin[k] + local[k], sums.centroid_variance(k, noise));
+    // `grown` stops at the frame's edge. A box that cannot grow freely touches it.
     let aperture = region.bounds(&region.aperture).unwrap_or(place);
     Contact {
         bounding_box: region.bounds(&region.mask).unwrap_or(place),
@@ -635,6 +641,7 @@ impl ContactDetector {
         drift: &IlluminationDrift,
         sd: f64,
     ) -> Option<BoundingBox> {
+        // The sum of n pixels has √n times the noise of one.
         let z = quantile(0.5 * self.options.false_alarm_rate, tiles.sums.len()) * sd;
         let sign = self.options.polarity.sign();
         let stands_out = |k: usize| {

@@ -200,6 +200,8 @@ impl IlluminationDrift {
         let [value, per_column, per_row] = self.coefficients;
         let y = row as f64 - self.middle[1];
         let x = first_column as f64 - self.middle[0];
+        // In double precision for the line's start. A step from there in single precision is
+        // enough.
         let start = value + per_column * x + per_row * y;
         DriftLine {
             multiplicative: self.correction.is_multiplicative(),
@@ -318,6 +320,8 @@ impl IlluminationDrift {
     ///
     /// Places count from the frame's middle in units of half the frame.
     fn step<const TERMS: usize>(&mut self, tiles: &[TileSum], limit: f64, sd: f64) -> usize {
+        // Slopes in half frames keep the three columns of the same size, and the matrix well
+        // conditioned.
         let scale = [1.0, self.middle[0].max(1.0), self.middle[1].max(1.0)];
         let (mut matrix, mut right) = (Matrix3::<f64>::identity(), Vector3::<f64>::zeros());
         matrix.view_mut((0, 0), (TERMS, TERMS)).fill(0.0);
@@ -335,6 +339,7 @@ impl IlluminationDrift {
                 (tile.y - self.middle[1]) / scale[2],
             ];
             for i in 0..TERMS {
+                // The variance of a tile's sum is proportional to its number of pixels.
                 let by = weight * at[i] / tile.pixels;
                 right[i] += by * residual;
                 for j in 0..TERMS {
@@ -408,18 +413,22 @@ pub(crate) fn fit(
             .iter()
             .map(|tile| drift.residual(tile) / drift.weight(tile)),
     );
+    // A contact that covers less than half of the tiles shifts the median little.
     drift.coefficients[0] += median(values, scratch);
     let noise = sd / ((TILE_ROWS * TILE_COLUMNS) as f64).sqrt();
     for _ in 0..20 {
         values.clear();
         let level = |tile: &TileSum| (drift.residual(tile) / tile.pixels).abs();
         values.extend(tiles.iter().map(level));
+        // Scatter from the median, which tiles of the contact hardly widen, and no less than the
+        // noise.
         let limit = 3.0 * (1.4826 * median(values, scratch)).max(noise);
         let before = drift.tiles;
         drift.tiles = match correction.terms() {
             1 => drift.step::<1>(tiles, limit, sd),
             _ => drift.step::<3>(tiles, limit, sd),
         };
+        // The same number of tiles nearly always is the same tiles, and the fit has settled.
         if drift.tiles == before {
             break;
         }
@@ -431,7 +440,7 @@ pub(crate) fn fit(
     drift
 }
 
-/// The upper median, by [`f64::total_cmp`] (0 of no values); `scratch` is overwritten. A sample
+/// The upper median, by [`f64::total_cmp`] (0 of no values). `scratch` is overwritten. A sample
 /// brackets it, so that most values are only counted. The answer does not depend on the sample:
 /// where the bracket missed, all values are looked through.
 pub(crate) fn median(values: &[f64], scratch: &mut Vec<f64>) -> f64 {

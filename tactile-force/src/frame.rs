@@ -53,7 +53,7 @@ pub struct FrameStatistics {
     pub greatest: i16,
     /// Number of pixels of the frame at 255.
     pub saturated: usize,
-    /// Box around every pixel with |d| above the threshold; `None` if there is none.
+    /// Box around every pixel with |d| above the threshold. `None` if there is none.
     pub bounding_box: Option<BoundingBox>,
 }
 
@@ -288,6 +288,7 @@ pub fn trimmed_variance(histogram: &[u64]) -> f64 {
             return 0.0;
         }
         let next = total / count / if variance.is_finite() { CUT } else { 1.0 };
+        // The variance only falls while tails are cut. The first that does not ends the cutting.
         if next >= variance {
             break;
         }
@@ -362,6 +363,7 @@ impl FlatField {
         }
         let cholesky = normal.cholesky()?;
         let (found, inverse) = (cholesky.solve(&right), cholesky.inverse());
+        // Relative to the frame's middle, where u and v are zero.
         let level = found[0];
         (level > 0.0).then(|| Self {
             coefficients: std::array::from_fn(|k| found[k] / level),
@@ -375,6 +377,7 @@ impl FlatField {
     /// Variance of the relative brightness at a pixel: the ratio of two correlated levels.
     pub(crate) fn variance_at(&self, x: f64, y: f64) -> f64 {
         let mut by = terms(self.middle, x, y);
+        // The level in the middle appears in numerator and denominator of the ratio.
         by[0] -= self.at(x, y);
         let row = |i: usize| {
             by.iter()
@@ -655,6 +658,7 @@ impl ReferenceFrame {
 
     /// Variance of one pixel's difference frame − reference where nothing presses.
     pub(crate) fn difference_variance(&self) -> f64 {
+        // One frame's variance and the mean's, which is a share 1/n of it.
         self.own_variance() * (self.frames as f64 + 1.0)
     }
 
@@ -668,7 +672,7 @@ impl ReferenceFrame {
         self.gain_known.then_some(self.noise.gain)
     }
 
-    /// Every tile of the last pass; `None` if that was of a frame of another size, or none.
+    /// Every tile of the last pass. `None` if that was of a frame of another size, or none.
     pub(crate) fn tile_sums<'a>(
         &'a self,
         passed: &'a Tiles,
@@ -736,6 +740,7 @@ fn sum_means(mean: ArrayView2<'_, f32>, tiles: &mut Tiles) {
     for tile in 0..tiles.sums.len() {
         let pixels = tiles.pixels(tile, mean.dim()).of(mean);
         let sum: f64 = pixels.iter().map(|m| f64::from(*m)).sum();
+        // Rounded after the summing: half a grey level at most in a sum of 256 pixels.
         tiles.sums[tile] = sum.round() as i32;
     }
 }
@@ -1049,6 +1054,8 @@ impl Pair<'_> {
     /// Greatest f − r and greatest r − f, zero if negative.
     fn greatest(&self) -> [u8; 2] {
         let tiles = self.frame.tiles;
+        // Bounds from the extremes of both images decide nearly all tiles without a look at their
+        // pixels.
         let mut greatest = self.least();
         for band in 0..tiles.rows {
             let here = self.band(band);

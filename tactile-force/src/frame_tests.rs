@@ -33,11 +33,13 @@ proptest! {
     /// one.
     #[test]
     fn a_tile_is_its_pixels(
-        pixels in proptest::collection::vec(any::<u8>(), TILE_ROWS * TILE_COLUMNS), low in 0_u8..255, span in 0_u8..=255
+        pixels in proptest::collection::vec(any::<u8>(), TILE_ROWS * TILE_COLUMNS),
+        low in 0_u8..255, span in 0_u8..=255
     ) {
         // Anywhere within any range of grey levels.
         let grey = |p: u8| (u32::from(low) + u32::from(p) * u32::from(span) / 255).min(255) as u8;
-        let tile: [Row; TILE_ROWS] = std::array::from_fn(|k| std::array::from_fn(|j| grey(pixels[TILE_COLUMNS * k + j])));
+        let row = |k: usize| std::array::from_fn(|j| grey(pixels[TILE_COLUMNS * k + j]));
+        let tile: [Row; TILE_ROWS] = std::array::from_fn(row);
         let all = tile.as_flattened();
         let sum: i32 = all.iter().map(|p| i32::from(*p)).sum();
         let expected = (sum, [*all.iter().min().unwrap(), *all.iter().max().unwrap()]);

@@ -45,7 +45,7 @@ pub struct FrameCondition {
 
 impl FrameCondition {
     /// Every how many of `tiles`, in rows of `columns`, are looked at. No divisor in common with
-    /// the columns: else whole columns were never seen.
+    /// the columns: else whole columns would never be looked at.
     pub(crate) fn tile_step(tiles: usize, columns: usize) -> usize {
         // Tiles that a condition is read from. The ratio of noise, a median, is known from these to
         // 3 %, where charts look for 20 %, and the brightness to a hundredth of what they look for.
@@ -57,7 +57,7 @@ impl FrameCondition {
         (least..).find(shares_none).unwrap_or(least)
     }
 
-    /// From the tiles of a frame of the given size; `sd` is the noise of one pixel's difference.
+    /// From the tiles of a frame of the given size. `sd` is the noise of one pixel's difference.
     /// `None` without background.
     pub(crate) fn of(
         size: (usize, usize),
@@ -261,7 +261,7 @@ impl HealthReport {
 /// scatters by 0.5 %, a change of 2 % is found in 5 frames on average. Where it scatters by 2.9 %
 /// (±5 % from frame to frame) in some 45. O(1) a frame.
 ///
-/// The background shows the product of illumination and camera gain, so a change of either is seen.
+/// The background shows the product of illumination and camera gain, so a change of either shows.
 /// Light that leaks from contacts can also change on its own, which only a known load shows.
 ///
 /// ```
@@ -343,6 +343,7 @@ impl Chart {
         let sd = (self.squares / (count - 1.0))
             .sqrt()
             .max(0.01 * change * self.mean.abs());
+        // The change that is looked for, in standard deviations of one frame.
         let shift = change * self.mean.abs() / sd;
         let cusum = self
             .cusum
@@ -381,6 +382,8 @@ impl Cusum {
         let allowance = 0.5 * shift.min(2.0);
         Self {
             allowance,
+            // A baseline that is off by its own error brings the sums nearer to the threshold by as
+            // much a frame.
             threshold: threshold((allowance - mean_error).max(0.1 * allowance), interval),
             above: 0.0,
             below: 0.0,
@@ -420,6 +423,7 @@ fn run_length(drift: f64, threshold: f64) -> f64 {
 /// twice as many.
 fn threshold(allowance: f64, interval: f64) -> f64 {
     let (mut low, mut high) = (0.0, 1.0);
+    // The run length grows exponentially with the threshold, so that few doublings bracket it.
     while run_length(-allowance, high) < 2.0 * interval {
         high *= 2.0;
     }
@@ -500,6 +504,7 @@ impl StuckPixels {
                     });
             }
         }
+        // A long search stops counting instead of starting again at zero.
         self.frames = self.frames.saturating_add(1);
         Ok(())
     }

@@ -152,7 +152,7 @@ impl LensGeometry {
         self.local(pixel).metres
     }
 
-    /// The pixel [x, y] of a place in metres, by Newton's method; `None` where no pixel within
+    /// The pixel [x, y] of a place in metres, by Newton's method. `None` where no pixel within
     /// three radii of the centre is seen there.
     pub fn to_pixels(&self, metres: [f64; 2]) -> Option<[f64; 2]> {
         let undistorted = |k: usize| metres[k] / self.pixel_size_m[k];
@@ -173,6 +173,8 @@ impl LensGeometry {
             ];
             pixel = [pixel[0] + step[0], pixel[1] + step[1]];
             let away = (pixel[0] - self.centre_px[0]).hypot(pixel[1] - self.centre_px[1]);
+            // Where the image folds the determinant changes its sign, and a place has several
+            // pixels.
             if !(determinant > 0.0 && away < 3.0 * self.radius_px) {
                 return None;
             }
@@ -203,8 +205,10 @@ impl LensGeometry {
     /// ```
     /// use tactile_force::LensGeometry;
     ///
-    /// let lens = LensGeometry::new([20e-6; 2])?.with_distortion([100.0, 100.0], 100.0, [0.05, 0.0])?;
-    /// // Around the centre of distortion pixels grow by 4 k₁ρ², on average over the pressure by 4 k₁ · 0.4 a²/R².
+    /// let plain = LensGeometry::new([20e-6; 2])?;
+    /// let lens = plain.with_distortion([100.0, 100.0], 100.0, [0.05, 0.0])?;
+    /// // Around the centre of distortion pixels grow by 4 k₁ρ², on average over the pressure by
+    /// // 4 k₁ · 0.4 a²/R².
     /// let mean = lens.mean_pixel_area_m2([100.0, 100.0], 30.0);
     /// assert!((mean / 4e-10 - 1.0 - 4.0 * 0.05 * 0.4 * 0.09).abs() < 1e-4);
     /// # Ok::<(), tactile_force::ForceError>(())
@@ -224,6 +228,8 @@ impl LensGeometry {
         aspect: f64,
     ) -> ([f64; 2], f64) {
         let (mut centre, mut weights) = ([0.0; 2], 0.0);
+        // Weighted with the area of a pixel, so that the mean is one over the surface, not over the
+        // image.
         for pixel in Self::ring(centre_px, HERTZ_RADIUS * radius_px, aspect) {
             let (place, weight) = (self.to_metres(pixel), self.pixel_area_m2(pixel));
             centre = [centre[0] + weight * place[0], centre[1] + weight * place[1]];
@@ -235,6 +241,7 @@ impl LensGeometry {
         let closed = contour.clone().chain(contour.take(1));
         for place in closed {
             if let Some(last) = before {
+                // Twice the area of a polygon, by the shoelace formula.
                 twice_area += last[0] * place[1] - last[1] * place[0];
             }
             before = Some(place);
@@ -450,6 +457,7 @@ impl Problem<'_> {
     fn start(&mut self) -> Result<Vector, ForceError> {
         let (mut normal, mut right) = (Matrix3::zeros(), [Vector3::zeros(); 2]);
         for dot in self.dots {
+            // Places from −1 to 1 keep the normal equations well conditioned.
             let u = (dot.pixel[0] - self.centre[0]) / self.radius;
             let v = (dot.pixel[1] - self.centre[1]) / self.radius;
             let row = Vector3::new(u, v, 1.0);
@@ -506,6 +514,8 @@ impl Problem<'_> {
             let (x, y) = (dot.target_m[0], self.mirror * dot.target_m[1]);
             let turned = [cos * x - sin * y, sin * x + cos * y];
             let seen = [hx * (self.centre[0] + u * s), hy * (self.centre[1] + v * s)];
+            // Derivatives of the residual with the sign turned. By the angle a turned place changes
+            // by (−y, x).
             let along_x = Vector::from([
                 self.centre[0] + u * s + hx * u * slope * rho2_by_hx,
                 hx * u * slope * rho2_by_hy,

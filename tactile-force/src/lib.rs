@@ -15,7 +15,7 @@
 //! | `contact` | detection, mask, aperture, sums over the aperture |
 //! | `health` | changes of a sensor since its calibration: brightness, noise, stuck pixels |
 //! | `profile` | the contact radius from the pressure profile |
-//! | `calibration` | pixel value to force and stress, (5) and (6): a line of frame sums, a local curve f |
+//! | `calibration` | pixel value to force and stress, (5) and (6): a line, a local curve f |
 //! | `measure`, `batch` | the force of one frame; of many |
 //! | `shear` | (9) to (12) |
 //! | `lens` | pixels to metres: sizes along x and y, radial distortion, fit to a dot target |

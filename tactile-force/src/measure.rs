@@ -71,8 +71,8 @@ impl ForceMeter {
     /// ```
     /// use tactile_force::{ForceMeter, LensGeometry};
     ///
-    /// let lens =
-    ///     LensGeometry::new([21.6e-6, 22e-6])?.with_distortion([695.5, 520.5], 869.0, [0.03, 0.0])?;
+    /// let plain = LensGeometry::new([21.6e-6, 22e-6])?;
+    /// let lens = plain.with_distortion([695.5, 520.5], 869.0, [0.03, 0.0])?;
     /// let meter = ForceMeter::new(lens.pixel_size_m(), &Default::default())?.with_lens(lens);
     /// # let _ = meter;
     /// # Ok::<(), tactile_force::ForceError>(())
@@ -140,6 +140,7 @@ impl ForceMeter {
             profile = start
                 .and_then(|start| self.fitter.fit_with(rings, region, start, variance, sizes))
                 .map(|fit: HertzFit| match local.per_grey_pa() {
+                    // Back to grey levels, in which the fields of the fit are stated.
                     Some(per_grey) => fit.with_levels_scaled(per_grey.recip()),
                     None => fit,
                 });
@@ -190,7 +191,7 @@ impl ForceMeter {
         }
     }
 
-    /// Where the fit of the profile starts, in pixels of the region; `integral` is in the units of
+    /// Where the fit of the profile starts, in pixels of the region. `integral` is in the units of
     /// its levels.
     fn start(
         &self,
@@ -204,6 +205,7 @@ impl ForceMeter {
         let [hx, hy] = pixel.step;
         Some(Start {
             centre: [x - place.column_start as f64, y - place.row_start as f64],
+            // From the radius of equal area in pixels to pixel widths.
             radius: contact.equivalent_radius_px * (hy / hx).sqrt(),
             integral,
         })
@@ -237,6 +239,7 @@ impl ForceMeter {
             }
         }
         let radius = contact_radius(&contact, profile, pixel.area.sqrt());
+        // Without a profile the brightest pixel stands for the peak, taken as good to a grey level.
         let brightest = Estimate::new(contact.peak, 1.0);
         let peak = profile.map_or(brightest, |p| p.peak);
         ForceMeasurement {
@@ -386,10 +389,10 @@ impl ForceOptions {
 pub struct ForceMeasurement {
     /// Normal force in newtons, equation (6). Zero without contact.
     pub force_n: Estimate,
-    /// The parts of the force's error, and whether the calibration was used outside its range;
+    /// The parts of the force's error, and whether the calibration was used outside its range.
     /// `None` without contact.
     pub reading: Option<ForceReading>,
-    /// The contact; `None` if the frame shows none.
+    /// The contact. `None` if the frame shows none.
     pub contact: Option<Contact>,
     /// The fitted Hertz profile, if it was asked for and could be fitted.
     pub profile: Option<HertzFit>,
@@ -413,7 +416,7 @@ pub struct ForceMeasurement {
     pub statistics: FrameStatistics,
     /// The correction of illumination and stray light.
     pub drift: IlluminationDrift,
-    /// The noise that the errors are computed from; `None` without contact.
+    /// The noise that the errors are computed from. `None` without contact.
     pub noise: Option<DifferenceNoise>,
 }
 
@@ -437,7 +440,7 @@ impl ForceMeasurement {
     }
 }
 
-/// The profile's radius, else the mask's with half a pixel as its error; `side` is that of a square
+/// The profile's radius, else the mask's with half a pixel as its error. `side` is that of a square
 /// pixel of equal area.
 fn contact_radius(contact: &Contact, profile: Option<HertzFit>, side: f64) -> Estimate {
     let half = 0.5 * side;
@@ -452,6 +455,7 @@ fn mean_stress(force: Estimate, radius: Estimate) -> Estimate {
     let parts = [
         (force.relative_error().powi(2), force.degrees_of_freedom),
         (
+            // The radius enters squared, so that its relative error counts twice.
             4.0 * radius.relative_error().powi(2),
             radius.degrees_of_freedom,
         ),
@@ -497,7 +501,7 @@ pub struct ForceWorkspace {
 
 impl ForceWorkspace {
     /// The pressure of the last contact in pascals over its region (zero outside the aperture), and
-    /// the region's place in the frame; `None` without contact, or if the calibration had no [local
+    /// the region's place in the frame. `None` without contact, or if the calibration had no [local
     /// curve](crate::StressCalibration::local). O(pixels of the region).
     ///
     /// ```
@@ -508,7 +512,8 @@ impl ForceWorkspace {
     /// };
     ///
     /// // 2 kPa a grey level.
-    /// let disc = |grey: f32| GreyHistogram::from_differences(std::iter::repeat_n(grey, 1000), 4e-10);
+    /// let pixels = |grey: f32| std::iter::repeat_n(grey, 1000);
+    /// let disc = |grey: f32| GreyHistogram::from_differences(pixels(grey), 4e-10);
     /// let frames: Vec<_> = [20.0_f32, 40.0, 60.0, 80.0, 100.0]
     ///     .map(|grey| {
     ///         CalibrationFrame::new(disc(grey), f64::from(grey) * 2e3 * 4e-7, Branch::Loading)
@@ -678,6 +683,7 @@ impl Local {
             }
             let variance = noise.background + noise.gain * grey;
             let sd = variance.sqrt();
+            // A secant over the noise, not the tangent: within a pixel's noise the curve may bend.
             let slope = (pressure(grey + sd) - pressure(grey - sd)) / (2.0 * sd);
             // A curve that is level over the noise has no less than a thousandth of the mean slope.
             slope.max(1e-3 * per_grey_pa).powi(2) * variance
@@ -720,6 +726,7 @@ fn elongation(mask: &[Run], jacobian: [[f64; 2]; 2]) -> Option<f64> {
     for run in mask {
         let (len, middle) = pixels(run);
         let (u, v) = (middle - x, f64::from(run.row) - y);
+        // Pixels are squares, not points: a run has the second moment of a bar of its length.
         xx += len * (u * u + len * len / 12.0);
         xy += len * u * v;
         yy += len * (v * v + 1.0 / 12.0);

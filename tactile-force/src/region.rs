@@ -74,6 +74,7 @@ impl Region {
     pub fn segment(&mut self, width: usize, limit: f32, notable: usize) -> Extent {
         let columns = self.columns();
         let rows = self.difference.len() / columns;
+        // Compared with sums instead of means, which spares a division a pixel.
         let limit = limit * (width * width) as f32;
         let smooth = if width == 1 {
             &self.difference
@@ -176,6 +177,7 @@ fn box_sums(
                 .zip(row(y - half - 1))
                 .for_each(|(s, d)| *s -= d);
         }
+        // Sums of a window slide along rows and columns: the cost does not grow with its width.
         let mut running: f32 = scratch[..half.min(columns)].iter().sum();
         for (x, sum) in sums[y * columns..(y + 1) * columns].iter_mut().enumerate() {
             running += scratch.get(x + half).copied().unwrap_or(0.0);
@@ -401,6 +403,7 @@ impl Components {
 
     fn root(&mut self, mut k: u32) -> u32 {
         while self.parent[k as usize] != k {
+            // Halving the path keeps later searches short.
             let up = self.parent[self.parent[k as usize] as usize];
             self.parent[k as usize] = up;
             k = up;
@@ -410,6 +413,7 @@ impl Components {
 
     fn unite(&mut self, a: u32, b: u32) {
         let (a, b) = (self.root(a), self.root(b));
+        // The first run of a component stays its root, whatever the order of the joins.
         self.parent[a.max(b) as usize] = a.min(b);
     }
 
@@ -469,6 +473,8 @@ impl Components {
         columns: usize,
     ) -> usize {
         complement(runs, background, rows, columns);
+        // The object is joined at corners, so that the background must not be: else the two could
+        // cross.
         self.join(background, false);
         self.mark_open(background, rows as u32, columns as u32);
         let before = runs.len();
@@ -587,6 +593,7 @@ pub fn gain(region: &Region, workspace: &mut NoiseWorkspace, background: f64, pe
         if row == 0 || row + 1 >= rows || !every_row.contains(row) {
             continue;
         }
+        // The filter reaches one pixel to every side.
         let inner = (run.start as usize).max(1)..(run.end as usize).min(columns - 1);
         if inner.is_empty() {
             continue;
@@ -602,14 +609,14 @@ pub fn gain(region: &Region, workspace: &mut NoiseWorkspace, background: f64, pe
                 *bend = up - 2.0 * here + down;
             }
         });
-        // Walked by the iterator itself: a loop over two chained parts asks at every step which one
-        // it is in.
+        // Walked by the iterator itself: a loop over two chained parts tests at every step which of
+        // them it is in.
         every_column.within(inner).for_each(|column| {
             let at = column - span.start;
             if here[at] > 0.5 * peak {
                 let [left, middle, right] = [bends[at - 1], bends[at], bends[at + 1]];
                 let response = (left - 2.0 * middle + right).abs();
-                // Rounds; `round` itself is a call where the processor is not known to have it.
+                // Rounds. `round` itself is a call where the processor is not known to have it.
                 let bin = ((response + 0.5) as i32 as usize).min(RESPONSES - 1);
                 histogram[bin] += 1;
                 highest = bin.max(highest);
@@ -623,6 +630,8 @@ pub fn gain(region: &Region, workspace: &mut NoiseWorkspace, background: f64, pe
         return 0.0;
     }
     let seen = &histogram[..=highest];
+    // The filter has 36 times the variance of a pixel. What exceeds the background's grows with the
+    // signal.
     ((trimmed_variance(seen) / 36.0 - background) * count as f64 / signal).max(0.0)
 }
 
@@ -736,6 +745,8 @@ impl Sums {
     /// Variance of Σ d: every pixel's, and that of errors of background and scale common to all,
     /// which go together.
     pub fn variance(&self, noise: &DifferenceNoise) -> f64 {
+        // Own noise adds by squares. Errors of background and scale have one cause and add before
+        // squaring.
         noise.background * self.plain[0]
             + noise.gain * self.weighted[0].max(0.0)
             + (noise.common.sqrt() * self.plain[0] + noise.scale.sqrt() * self.weighted[0]).powi(2)

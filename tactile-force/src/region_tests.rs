@@ -4,7 +4,8 @@ use proptest::prelude::*;
 proptest! {
     #[test]
     fn box_sums_are_sums_over_boxes(
-        values in proptest::collection::vec(-255_i32..256, 1..200), columns in 1_usize..20, half in 0_usize..7
+        values in proptest::collection::vec(-255_i32..256, 1..200),
+        columns in 1_usize..20, half in 0_usize..7
     ) {
         let rows = values.len() / columns;
         prop_assume!(rows > 0);
@@ -69,7 +70,9 @@ fn reached(mask: &[bool], seed: usize, diagonal: bool) -> Vec<bool> {
 
 proptest! {
     #[test]
-    fn agrees_with_painting(mask in proptest::collection::vec(proptest::bool::weighted(0.45), 9 * COLUMNS)) {
+    fn agrees_with_painting(
+        mask in proptest::collection::vec(proptest::bool::weighted(0.45), 9 * COLUMNS)
+    ) {
         let rows = 9;
         let sets: Vec<Vec<bool>> =
             (0..mask.len()).filter(|p| mask[*p]).map(|p| reached(&mask, p, true)).collect();
@@ -81,7 +84,9 @@ proptest! {
         let kept = mask_of(&runs, rows);
         prop_assert!(area == 0 || sets.contains(&kept));
         let filled_by = Components::default().fill_holes(&mut runs, &mut Vec::new(), rows, COLUMNS);
-        let border = |p: usize| [0, rows - 1].contains(&(p / COLUMNS)) || [0, COLUMNS - 1].contains(&(p % COLUMNS));
+        let border = |p: usize| {
+            [0, rows - 1].contains(&(p / COLUMNS)) || [0, COLUMNS - 1].contains(&(p % COLUMNS))
+        };
         let mut expected = kept.clone();
         for p in (0..kept.len()).filter(|p| !kept[*p]) {
             let set = reached(&kept, p, false);
@@ -93,12 +98,14 @@ proptest! {
 
     #[test]
     fn growing_is_a_maximum_over_the_square(
-        mask in proptest::collection::vec(proptest::bool::weighted(0.1), 9 * COLUMNS), margin in 0_usize..4
+        mask in proptest::collection::vec(proptest::bool::weighted(0.1), 9 * COLUMNS),
+        margin in 0_usize..4
     ) {
         let mut grown = Vec::new();
         grow(&runs_of(&mask), &mut grown, margin, 9, COLUMNS);
         let near = |p: usize| (0..mask.len()).any(|q| {
-            let (dy, dx) = ((p / COLUMNS).abs_diff(q / COLUMNS), (p % COLUMNS).abs_diff(q % COLUMNS));
+            let dy = (p / COLUMNS).abs_diff(q / COLUMNS);
+            let dx = (p % COLUMNS).abs_diff(q % COLUMNS);
             mask[q] && dy.max(dx) <= margin
         });
         prop_assert_eq!(mask_of(&grown, 9), (0..mask.len()).map(near).collect::<Vec<_>>());
@@ -109,7 +116,8 @@ proptest! {
 proptest! {
     #[test]
     fn those_within_are_those_contained_and_mirroring_changes_none(
-        start in 0_usize..20, length in 1_usize..40, step in 1_usize..7, from in 0_usize..60, count in 0_usize..60
+        start in 0_usize..20, length in 1_usize..40, step in 1_usize..7,
+        from in 0_usize..60, count in 0_usize..60
     ) {
         let every = EveryNth::of(start..start + length, step);
         let mut found: Vec<usize> = every.within(from..from + count).collect();

@@ -112,6 +112,7 @@ impl Spring {
         for p in pairs {
             squares += (force(p) - stiffness * step(p)).powi(2);
         }
+        // One parameter was fitted.
         let residual_variance = squares / (pairs.len() - 1) as f64;
         Ok(Self {
             stiffness,
@@ -225,6 +226,7 @@ impl ShearTracker {
         let zero = [Estimate::default(); 2];
         let displacement_m = self.first.map_or(zero, |from| difference(now, from));
         let step_m = self.last.map_or(zero, |from| difference(now, from));
+        // Kept for the whole contact, so that errors of the frames between do not add up.
         self.first.get_or_insert(now);
         self.last = Some(now);
         Some(ShearMeasurement {

@@ -10,7 +10,7 @@
 //! are answers, not errors.
 //!
 //! The formulas used are θ_c = atan2(n₀, √((nᵢ − n₀)(nᵢ + n₀))) and θᵢ = atan2(√((nᵢ − n₀)(nᵢ +
-//! n₀)), √(2n₀² − nᵢ²)), They keep all digits where the textbook ones lose half of them: nᵢ near n₀
+//! n₀)), √(2n₀² − nᵢ²)). They keep all digits where the textbook ones lose half of them: nᵢ near n₀
 //! and near √2 n₀. Whether nᵢ² ≥ 2n₀² is decided exactly.
 //!
 //! Propagation angles through a stack: n sin θ is the same in every layer.
@@ -27,7 +27,8 @@ use crate::error::{OpticsError, index, within};
 /// ```
 /// use tactile_optics::critical_angle;
 ///
-/// // An index 10⁻¹⁴ above the ambient's: the complement keeps the digits that π/2 minus the angle has lost.
+/// // An index 10⁻¹⁴ above the ambient's: the complement keeps the digits that π/2 minus the angle
+/// // has lost.
 /// let angle = critical_angle(1.0 + 1e-14_f64, 1.0)?.expect("denser than its ambient");
 /// assert!((angle.complement / 1.4136e-7 - 1.0).abs() < 1e-2);
 /// # Ok::<(), tactile_optics::OpticsError>(())
@@ -107,6 +108,7 @@ pub fn acceptance_angle(n: f64, ambient: f64) -> Result<Angle, OpticsError> {
             complement: FRAC_PI_2,
         });
     }
+    // Beyond √2 n₀ every ray is trapped. The exact comparison below holds up to 2n₀ only.
     if n >= n0 + n0 {
         return Ok(Angle::right());
     }

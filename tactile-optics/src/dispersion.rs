@@ -109,6 +109,7 @@ impl Dispersion {
             shortest * (1.0 - 1e-7),
             longest * (1.0 + 1e-7),
         )?;
+        // λ² in µm², the unit of the published coefficients.
         let square = (wavelength_m * 1e6).powi(2);
         Ok(match self {
             Self::Cauchy {

@@ -6,7 +6,10 @@
 /// use tactile_optics::{OpticsError, critical_angle};
 ///
 /// let error = critical_angle(-1.4_f64, 1.0).unwrap_err();
-/// assert!(matches!(error, OpticsError::OutOfRange { quantity: "refractive index", found, .. } if found == -1.4));
+/// assert!(matches!(
+///     error,
+///     OpticsError::OutOfRange { quantity: "refractive index", found, .. } if found == -1.4
+/// ));
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[non_exhaustive]

@@ -126,13 +126,14 @@ pub(crate) fn from_sine_and_cosine(n1: f64, n2: f64, sine: f64, cosine: f64) -> 
 
 /// n₂ cos θ₂, or `None` when reflection is total.
 fn refracted_normal(n1: f64, n2: f64, sine: f64, cosine: f64) -> Option<f64> {
-    // n₂ − n₁ sin θ₁; towards grazing incidence the sine has rounded to 1 and the cosine carries
-    // the digits.
+    // The margin is n₂ − n₁ sin θ₁. Towards grazing incidence the sine has rounded to 1 and the
+    // cosine carries the digits.
     let margin = if sine > 0.8 {
         margin_from_cosine(n1, n2, sine, cosine)
     } else {
         (-n1).mul_add(sine, n2)
     };
+    // A margin of 0 is the critical angle itself, where light still travels along the interface.
     (margin >= 0.0).then(|| margin.sqrt() * (n2 + n1 * sine).sqrt())
 }
 
@@ -147,6 +148,7 @@ fn margin_from_cosine(n1: f64, n2: f64, sine: f64, cosine: f64) -> f64 {
 /// multiply–adds (slow where the processor is not known to have them).
 pub(crate) fn crossing(n1: f64, n2: f64, sine: f64, cosine: f64) -> Option<(f64, f64)> {
     let margin = margin_from_cosine(n1, n2, sine, cosine);
+    // At the critical angle nothing is transmitted, so a tracer may count it as total reflection.
     if margin <= 0.0 {
         return None;
     }

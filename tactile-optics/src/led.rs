@@ -14,9 +14,11 @@ use crate::error::{OpticsError, within};
 /// ```
 /// use tactile_optics::{Geometry, Led, acceptance_angle};
 ///
-/// // In space more of the light slips past the layer's plane sideways, so less of it is lost than in a section.
+/// // In space more of the light leaves the axis sideways, within the layer's plane. Less of it is
+/// // lost than in a section.
 /// let acceptance = acceptance_angle(1.38_f64, 1.0)?;
-/// let [section, volume] = [Geometry::Section, Geometry::Volume].map(|g| Led::default().trapped_share(acceptance, g));
+/// let share = |geometry| Led::default().trapped_share(acceptance, geometry);
+/// let [section, volume] = [Geometry::Section, Geometry::Volume].map(share);
 /// assert!(section > 0.95 && volume > section && volume < 1.0);
 /// # Ok::<(), tactile_optics::OpticsError>(())
 /// ```
@@ -100,19 +102,23 @@ impl Led {
     ///
     /// ```
     /// use tactile_optics::{Geometry, Led, acceptance_angle};
-    /// let share = Led::default().trapped_share(acceptance_angle(1.38_f64, 1.0)?, Geometry::Section);
+    /// let acceptance = acceptance_angle(1.38_f64, 1.0)?;
+    /// let share = Led::default().trapped_share(acceptance, Geometry::Section);
     /// assert!((share - (1.38_f64 * 1.38 - 1.0).sqrt()).abs() < 1e-12);
     /// # Ok::<(), tactile_optics::OpticsError>(())
     /// ```
     pub fn trapped_share(&self, acceptance: Angle, geometry: Geometry) -> f64 {
+        // An LED narrower than the acceptance angle emits nothing beyond its own half angle.
         let limit = acceptance.radians.min(self.half_angle);
         if geometry == Geometry::Section {
             let intensity = |t: f64| t.cos().max(0.0).powf(self.exponent);
             return integral(0.0, limit, intensity) / integral(0.0, self.half_angle, intensity);
         }
+        // sin θ is the solid angle of a ring of directions about the axis, the 2π cancelled in the
+        // ratio.
         let flux = |t: f64| t.cos().max(0.0).powf(self.exponent) * t.sin();
         let slope = acceptance.radians.sin();
-        // Beyond θᵢ the trapped part falls with an infinite slope; substituting θ = θᵢ + t² removes
+        // Beyond θᵢ the trapped part falls with an infinite slope. Substituting θ = θᵢ + t² removes
         // it.
         let outer = |t: f64| {
             let theta = limit + t * t;
@@ -125,20 +131,25 @@ impl Led {
     }
 
     /// The direction that two numbers in [0, 1) stand for: components along the axis, across it in
-    /// the slab's plane, and along the slab's normal. Returned with the weight of the direction, 1
-    /// on average.
+    /// the slab's plane, and along the slab's normal. Returned with the weight of the direction,
+    /// its share of the light but for a factor common to all.
     pub(crate) fn direction(&self, u: f64, v: f64, geometry: Geometry) -> ([f64; 3], f64) {
         let one = 1.0;
         if geometry == Geometry::Section {
+            // For a general m the integral of cosᵐ has no inverse in closed form. Angles are
+            // therefore even and carry the intensity as weight.
             let theta = (u + u - one) * self.half_angle;
             return (
                 [theta.cos(), 0.0, theta.sin()],
                 theta.cos().max(0.0).powf(self.exponent),
             );
         }
+        // On the sphere the integral of cosᵐ θ sin θ inverts in closed form. All directions then
+        // weigh the same.
         let power = self.exponent + one;
         let edge = self.half_angle.cos().max(0.0).powf(power);
         let cosine = (one - u * (one - edge)).powf(power.recip());
+        // As a product, because 1 − cos² loses half of the digits near the axis.
         let sine = ((one - cosine) * (one + cosine)).max(0.0).sqrt();
         let (across, up) = ((v + v) * PI).sin_cos();
         ([cosine, sine * across, sine * up], one)

@@ -4,10 +4,10 @@
 //!
 //! | functions and types | contents |
 //! |---|---|
-//! | [`critical_angle`], [`acceptance_angle`], [`propagation`] | the angles of a layer, (1)–(4), and through a stack |
+//! | [`critical_angle`], [`acceptance_angle`], [`propagation`] | angles in a layer, (1)–(4) |
 //! | [`fresnel`] | reflectance and transmittance, s, p and unpolarised |
 //! | [`normal_incidence`], [`led_cone`] | a stack of layers in its ambient |
-//! | [`Dispersion`] | refractive index as a function of wavelength, of PDMS and borosilicate glass |
+//! | [`Dispersion`] | refractive index of PDMS and borosilicate glass by wavelength |
 //! | [`Led`] | radiation pattern and the share of it that is trapped |
 //! | [`surface`] | the slab's deformed top and the object that touches it |
 //! | [`trace`](mod@trace) | ray tracing through the slab: the light budget of a press |

@@ -61,7 +61,8 @@ pub struct SensorParameters {
 /// )?;
 /// assert_eq!(sensor.grid_elements.round(), 6452.0);
 /// assert_eq!(sensor.temporal_resolution_s, 12.5e-3);
-/// // Three σ of the difference of two frames' sums over 100 × 100 pixels: 3 √2 · 100 grey levels of 1 µN.
+/// // Three σ of the difference of two frames' sums over 100 × 100 pixels: 3 √2 · 100 grey levels
+/// // of 1 µN.
 /// assert!((sensor.force_resolution_n - 4.243e-4).abs() < 1e-7);
 /// assert_eq!(sensor.force_levels.floor(), 4714.0);
 /// # Ok::<(), tactile_optics::OpticsError>(())
@@ -110,6 +111,7 @@ impl SensorSpecification {
             within(name, value, f64::MIN_POSITIVE, f64::MAX)?;
         }
         within("noise of a pixel", p.pixel_noise_grey, 0.0, f64::MAX)?;
+        // The variances of the frame and of the reference add, each that of the summed pixels.
         let two = 1.0 + 1.0;
         let force_resolution_n =
             sigmas * p.pixel_noise_grey * (two * p.summed_pixels).sqrt() * p.newton_per_grey;

@@ -87,6 +87,7 @@ pub fn normal_incidence(indices: &[f64], ambient: f64) -> Result<NormalIncidence
     let mut before = ambient;
     for after in indices.iter().copied().chain(core::iter::once(ambient)) {
         let (sum, step) = (before + after, before - after);
+        // Ratios stay below 1 where products of indices could overflow.
         single_pass *= four * (before / sum) * (after / sum);
         reflected += step / before * (step / after) / four;
         before = after;
@@ -128,6 +129,8 @@ pub fn led_cone(indices: &[f64], ambient: f64, full_angle: f64) -> Result<LedCon
         full_angle,
         weakest,
         margin,
+        // A weakest layer that traps every ray has no limit to exceed, even for a cone of π and a
+        // margin of 0.
         trapped: weakest.radians > 0.0 && (weakest.complement == 0.0 || margin > 0.0),
     })
 }

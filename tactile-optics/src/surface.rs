@@ -167,6 +167,7 @@ impl TopSurface for Dimple {
         let Some((phase, r)) = self.phase(x, y) else {
             return [0.0; 2];
         };
+        // The direction of the slope is undefined at the centre, where the slope is 0.
         if r == 0.0 {
             return [0.0; 2];
         }
@@ -306,6 +307,7 @@ pub(crate) fn march<S: TopSurface + ?Sized>(
         let [x, y, z] = at(t);
         surface.height(x, y) - z
     };
+    // A ray that descends more steeply than any slope of the surface never meets it.
     let closing = direction[2] + surface.steepest() * direction[0].hypot(direction[1]);
     if closing <= 0.0 {
         return Meeting::Missed;
@@ -319,6 +321,7 @@ pub(crate) fn march<S: TopSurface + ?Sized>(
         if opening <= 0.0 {
             return Meeting::At(t);
         }
+        // Twice the tolerance, so that the point just left is not found again.
         t += (tolerance + tolerance) / opening;
         g = gap(t);
     }

@@ -52,8 +52,10 @@ pub struct SlabLayer {
 /// ```
 /// use tactile_optics::trace::{Slab, SlabLayer};
 ///
-/// // Epidermis, dermis and subcutanea on a plate of glass: the paper's indices (§3.3) and thicknesses.
-/// let layers = [(1.38, 2e-3), (1.39, 3e-3), (1.40, 5e-3), (1.41, 3e-3)].map(|(index, thickness_m)| SlabLayer { index, thickness_m });
+/// // Epidermis, dermis and subcutanea on a plate of glass: the paper's indices (§3.3) and
+/// // thicknesses.
+/// let layers = [(1.38, 2e-3), (1.39, 3e-3), (1.40, 5e-3), (1.41, 3e-3)]
+///     .map(|(index, thickness_m)| SlabLayer { index, thickness_m });
 /// assert!(Slab::new(&layers, 1.0_f64, 30e-3).is_ok());
 /// assert!(Slab::new(&layers, 1.0_f64, 0.0).is_err());
 /// # Ok::<(), tactile_optics::OpticsError>(())
@@ -146,6 +148,7 @@ pub fn trace<S: TopSurface + ?Sized>(
     for i in 0..u64::from(options.rays) {
         let [z, u, v, y] = points.point(i);
         let (outside, weight) = led.direction(u, v, options.geometry);
+        // The sum of the weights is not known beforehand. It divides every share at the end.
         total.add(RayOutcome::Entry, weight);
         let across = match options.geometry {
             Geometry::Section => 0.0,
@@ -154,6 +157,8 @@ pub fn trace<S: TopSurface + ?Sized>(
         let entry = launch(slab, z, across, outside);
         let transmitted = weight * entry.1;
         tracer.tally.add(RayOutcome::Entry, weight - transmitted);
+        // Random numbers of its own for each ray: what one ray scatters does not change the next
+        // ray's.
         tracer.stream = hash(options.seed ^ hash(i));
         tracer.follow(Ray {
             power: transmitted,
@@ -203,7 +208,7 @@ fn launch(slab: &Slab<'_>, z: f64, y: f64, outside: [f64; 3]) -> (Ray, f64) {
     let n = slab.layers[layer].index;
     let across = outside[1].hypot(outside[2]);
     let edge = from_sine_and_cosine(slab.ambient, n, across, outside[0].max(0.0));
-    // n sin θ is kept; a denser ambient can turn light back at the edge altogether.
+    // n sin θ is kept. A denser ambient can reflect all light at the edge: the power is then 0.
     let ratio = slab.ambient / n;
     let (uy, uz) = (outside[1] * ratio, outside[2] * ratio);
     let along = (1.0 - uy * uy - uz * uz).max(0.0).sqrt();
@@ -257,8 +262,8 @@ impl Default for TraceOptions {
         Self {
             geometry: Geometry::Volume,
             // The guided share to 2×10⁻⁴ in 20 ms:
-            // `cargo bench -p tactile-benches --bench work_precision -- optics` shows what more
-            // rays buy.
+            // `cargo bench -p tactile-benches --bench work_precision -- optics` gives the error for
+            // more rays.
             rays: 4096,
             seed: 1,
             cutoff: 1e-6,
@@ -448,6 +453,7 @@ pub fn path<S: TopSurface + ?Sized>(
     vertices: &mut [[f64; 3]],
 ) -> Result<usize, OpticsError> {
     within("share of the slab's depth", depth_share, 0.0, 1.0)?;
+    // A ray at a larger angle would start backwards, out of the lit edge.
     let right = FRAC_PI_2;
     within("angle of the ray", angle, -right, right)?;
     let options = TraceOptions::default();
@@ -460,6 +466,7 @@ pub fn path<S: TopSurface + ?Sized>(
         vertices[written] = ray.position;
         written += 1;
         current = stronger_part(&mut tracer, ray);
+        // The path also has the point where its light leaves.
         if current.is_none() && written < vertices.len() {
             let (distance, _) = tracer.next(&ray);
             vertices[written] = ray.at(distance);
@@ -517,6 +524,8 @@ enum Next {
 impl<S: TopSurface + ?Sized> Tracer<'_, '_, S> {
     /// Follows a ray and all its branches.
     fn follow(&mut self, first: Ray) {
+        // The cut-off is relative to each ray, so that weak rays are followed as deep as strong
+        // ones.
         let smallest = first.power * self.options.cutoff;
         let mut branches = Branches::new();
         let mut current = Some(first);
@@ -551,6 +560,8 @@ impl<S: TopSurface + ?Sized> Tracer<'_, '_, S> {
             }
             Next::Top => return self.top(ray, branches),
             Next::Up => {
+                // Put exactly on the face. Rounding could leave the ray outside the layer that it
+                // enters.
                 ray.position[2] = self.slab.face(ray.layer);
                 return self.inside(ray, ray.layer - 1, branches);
             }
@@ -569,6 +580,7 @@ impl<S: TopSurface + ?Sized> Tracer<'_, '_, S> {
     /// Distance to and kind of the nearest obstacle: edge, face of the layer, or top.
     fn next(&self, ray: &Ray) -> (f64, Next) {
         let (zero, [ux, _, uz]) = (0.0, ray.direction);
+        // The slab has no sides: across its width a ray travels on without an obstacle.
         let edge = match ux {
             u if u > zero => (self.slab.length - ray.position[0]) / u,
             u if u < zero => ray.position[0] / -u,
@@ -588,6 +600,8 @@ impl<S: TopSurface + ?Sized> Tracer<'_, '_, S> {
         } else if uz > zero && ray.layer > 0 {
             offer((self.slab.face(ray.layer) - ray.position[2]) / uz, Next::Up);
         }
+        // Only the top layer meets the deformed surface, which `new_tracer` keeps above its lower
+        // face.
         if ray.layer > 0 {
             return nearest;
         }
@@ -627,6 +641,8 @@ impl<S: TopSurface + ?Sized> Tracer<'_, '_, S> {
                 Meeting::Missed
             }
         };
+        // The flat top decides where the support is empty, lies behind the ray, or begins beyond
+        // the crossing of z = 0.
         if left >= right || leave <= zero || plane < enter {
             return meets_plane(plane);
         }
@@ -640,6 +656,7 @@ impl<S: TopSurface + ?Sized> Tracer<'_, '_, S> {
             [enter, leave.min(limit)],
             self.tolerance,
         ) {
+            // Past the support the top is the plane z = 0 again, which counts from there on only.
             Meeting::Missed => meets_plane(plane.max(leave)),
             met => met,
         }
@@ -651,6 +668,7 @@ impl<S: TopSurface + ?Sized> Tracer<'_, '_, S> {
         let [x, y, _] = ray.position;
         let [left, right] = self.surface.support();
         let deformed = x > left && x < right;
+        // Slopes and object count inside the support only, as in `meet_top`.
         let [gx, gy] = if deformed {
             self.surface.gradient(x, y)
         } else {
@@ -668,6 +686,7 @@ impl<S: TopSurface + ?Sized> Tracer<'_, '_, S> {
             None
         };
         let outside = object.map_or(self.slab.ambient, |o| o.index);
+        // Against an object that touches, its own index decides, which may end total reflection.
         let transmitted = ray.power * self.transmittance(&ray, &normal, outside);
         match object {
             None => self.tally.add(RayOutcome::Above, transmitted),
@@ -694,6 +713,7 @@ impl<S: TopSurface + ?Sized> Tracer<'_, '_, S> {
         let normal = [0.0, 0.0, 1.0];
         let transmitted = ray.power * self.transmittance(&ray, &normal, self.slab.ambient);
         let sine = ray.direction[0].hypot(ray.direction[1]);
+        // The camera's angle holds outside the slab. Snell's law brings it to the ray's own layer.
         let seen = self.slab.layers[ray.layer].index * sine <= self.slab.ambient * self.camera_sine;
         self.tally.add(
             if seen {
@@ -722,12 +742,15 @@ impl<S: TopSurface + ?Sized> Tracer<'_, '_, S> {
         );
         let [ux, uy, uz] = ray.direction;
         let (sine, cosine) = (ux.hypot(uy), uz.abs());
+        // Total reflection needs no branch, since nothing is transmitted.
         let Some((share, along)) = crossing(n1, n2, sine, cosine) else {
             return Some(ray.mirrored(&normal, ray.power));
         };
         let transmitted = ray.power * share.min(1.0);
         self.keep(ray.mirrored(&normal, ray.power - transmitted), branches);
         let ratio = n1 / n2;
+        // Snell's law keeps n times the tangential part. The normal part comes from `crossing`,
+        // free of cancellation at grazing.
         let direction = normalised([ux * ratio, uy * ratio, (along / n2).copysign(uz)]);
         Some(Ray {
             direction,
@@ -756,6 +779,7 @@ impl<S: TopSurface + ?Sized> Tracer<'_, '_, S> {
         self.stream = hash(self.stream);
         let u = unit(self.stream);
         if self.options.geometry == Geometry::Section {
+            // In a plane Lambert's law spreads the sine of the angle evenly over −1 to 1.
             let across = u + u - 1.0;
             let inward = ((1.0 - across) * (1.0 + across)).sqrt();
             return normalised([
@@ -766,8 +790,11 @@ impl<S: TopSurface + ?Sized> Tracer<'_, '_, S> {
         }
         self.stream = hash(self.stream);
         let (sin, cos) = (unit(self.stream) * (PI + PI)).sin_cos();
+        // Even points of a disc, raised to the hemisphere, obey Lambert's law in space (Malley's
+        // method).
         let (radius, inward) = (u.sqrt(), (1.0 - u).sqrt());
-        // Two directions in the tangent plane; the normal is never along x.
+        // Two directions in the tangent plane. The normal is never along y, its z part being
+        // positive, so that `first` has a length.
         let first = normalised([normal[2], 0.0, -normal[0]]);
         let second = [
             normal[1] * first[2] - normal[2] * first[1],
@@ -801,6 +828,7 @@ impl Ray {
         let along = dot(&self.direction, n);
         let direction = core::array::from_fn(|k| self.direction[k] - (along + along) * n[k]);
         Self {
+            // Rounding would otherwise grow over thousands of reflections.
             direction: normalised(direction),
             power,
             ..*self
@@ -886,6 +914,7 @@ impl Points {
     /// The numbers of point `i`, in [0, 1).
     fn point(&self, i: u64) -> [f64; 4] {
         core::array::from_fn(|k| {
+            // Wrapping at 2⁶⁴ takes the fractional part exactly, for any number of points.
             unit(self.shift[k].wrapping_add(self.steps[k].wrapping_mul(i + 1)))
         })
     }

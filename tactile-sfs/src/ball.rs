@@ -12,12 +12,14 @@ use crate::Domain;
 /// ```
 /// use ndarray::Array2;
 /// use tactile_sfs::{BallFit, Domain};
-/// // A ball of 4 mm radius, in contact up to 2.4 mm from its axis, is 4 − √(4² − 2.4²) = 0.8 mm deep.
+/// // A ball of 4 mm radius, in contact up to 2.4 mm from its axis, is 4 − √(4² − 2.4²) = 0.8 mm
+/// // deep.
 /// let depth_m = |(r, c): (usize, usize)| {
 ///     let square = 1e-8 * ((r as f64 - 32.0).powi(2) + (c as f64 - 32.0).powi(2));
 ///     (16e-6 - square).sqrt() - 3.2e-3
 /// };
-/// let heights = Array2::from_shape_fn((64, 64), depth_m).mapv(|z| if z > 0.0 { z } else { f64::NAN });
+/// let touched = |z: f64| if z > 0.0 { z } else { f64::NAN };
+/// let heights = Array2::from_shape_fn((64, 64), depth_m).mapv(touched);
 /// let domain = Domain::new([1e-4; 2])?;
 /// let fit = BallFit::of_radius(heights.view(), &domain, 4e-3).expect("a cap");
 /// assert!((fit.contact_radius_m - 2.4e-3).abs() < 1e-9 && fit.mean_absolute_error_m < 1e-9);
@@ -132,6 +134,8 @@ fn fit(pixels: &[[f64; 3]], radius_m: f64) -> Option<BallFit> {
         return None;
     }
     let mean = |k: usize| pixels.iter().map(|p| p[k]).sum::<f64>() / pixels.len() as f64;
+    // Centre and height of the equator. Under a cap less than half a ball deep the latter is
+    // negative.
     let mut at = Vector3::new(mean(0), mean(1), 0.0);
     let mut iterations = 0;
     while iterations < 50 {
@@ -150,11 +154,13 @@ fn fit(pixels: &[[f64; 3]], radius_m: f64) -> Option<BallFit> {
         }
         let step = normal.cholesky()?.solve(&right);
         at += step;
+        // Far below any pixel, and above the rounding of coordinates.
         if step.amax() < 1e-9 * radius_m {
             break;
         }
     }
     let contact_radius_m = (radius_m * radius_m - at.z * at.z).sqrt();
+    // An equator above depth zero would mean more than half of a ball. NaN fails both comparisons.
     if !(at.z < 0.0 && contact_radius_m > 0.0) {
         return None;
     }

@@ -1,8 +1,8 @@
 //! The image and mask of a contact on a coarser grid, ready for reconstruction.
 //!
-//! A contact of 10⁵ pixels carries 200 control points, and nobody asks for the heights between
-//! them. Means over blocks of pixels cost one pass, lower the noise by the block's width, and leave
-//! the reconstruction a small grid.
+//! A contact of 10⁵ pixels carries 200 control points, and the heights between them are not used.
+//! Means over blocks of pixels cost one pass, lower the noise by the block's width, and leave the
+//! reconstruction a small grid.
 
 use ndarray::{Array2, ArrayView2, Axis, Slice, Zip, aview_mut1};
 
@@ -12,7 +12,8 @@ use crate::surface::fill_shape;
 ///
 /// ```
 /// use tactile_sfs::Binning;
-/// // 3,200 pixels for 200 control points leave 16 for each: every pixel is kept. Four times as many allow 2 × 2 blocks.
+/// // 3,200 pixels for 200 control points leave 16 for each: every pixel is kept. Four times as
+/// // many allow 2 × 2 blocks.
 /// assert_eq!(Binning::Auto.side(3_200, 200), 1);
 /// assert_eq!(Binning::Auto.side(12_800, 200), 2);
 /// assert_eq!(Binning::Blocks(5).side(10, 200), 5);
@@ -85,6 +86,7 @@ impl BinnedContact {
         let reference = reference.slice_axis_move(Axis(1), pixels);
         let scale = scale / (side * side) as f64;
         for (band, mut blocks) in self.signal.rows_mut().into_iter().enumerate() {
+            // Whole numbers are summed over the rows of a band: exact, and in wide instructions.
             self.sums.clear();
             self.sums.resize(columns * side, 0);
             for row in band * side..(band + 1) * side {
@@ -169,6 +171,7 @@ impl BinnedContact {
     /// assert!((contact.signal[[10, 10]] - 0.04_f64).abs() < 1e-12); // (1/5)² after two passes
     /// ```
     pub fn smooth(&mut self, width: usize, share: impl Fn(f64) -> f64) {
+        // A box of one pixel changes nothing.
         if width < 2 || self.signal.is_empty() {
             return;
         }

@@ -103,7 +103,7 @@ pub enum SfsError {
         /// Index of the offending entry.
         index: usize,
     },
-    /// A calibration table does not tell the depth at zero signal.
+    /// A calibration table does not determine the depth at zero signal.
     #[error(
         "the table does not tell its depth at zero signal: it has {entries} entries above the \
          threshold of contact (4 are needed), which a parabola misses by {misfit:.3} of their \

@@ -12,9 +12,9 @@ use tactile_core::Requirement;
 ///
 /// x is the column, y the row (so y points *down* the image), z points from the surface to the
 /// viewer. A surface z(x, y) with slopes p = ∂z/∂x and q = ∂z/∂y has the normal
-/// n = (−p, −q, 1)/√(1 + p² + q²). `direction` points *from the surface to the light*: (1, 0, 1) is a light to the
-/// right of the image, 45° above the surface. It brightens slopes that fall to the right. Texts
-/// whose y points up need the sign of y changed.
+/// n = (−p, −q, 1)/√(1 + p² + q²). `direction` points *from the surface to the light*: (1, 0, 1)
+/// is a light to the right of the image, 45° above the surface. It brightens slopes that fall to
+/// the right. Texts whose y points up need the sign of y changed.
 ///
 /// ```
 /// use tactile_sfs::Lighting;
@@ -50,6 +50,7 @@ impl<T: PixelScalar> Lighting<T> {
     /// [`SfsError::LightFromBelow`] for z ≤ 0.
     pub fn new(direction: [T; 3]) -> Result<Self, SfsError> {
         let [x, y, z] = direction.map(T::as_f64);
+        // Normalised in double precision, so that a direction in `f32` is rounded only once.
         let length = (x * x + y * y + z * z).sqrt();
         Requirement::Positive.check("length of the light direction", length)?;
         if z <= 0.0 {
@@ -128,6 +129,7 @@ impl<T: PixelScalar> Lighting<T> {
     /// ```
     pub fn shade(&self, p: T, q: T) -> T {
         let [x, y, z] = self.direction;
+        // n·s with the normal (−p, −q, 1) divided by its length.
         let cosine = (z - p * x - q * y) / (T::one() + p * p + q * q).sqrt();
         self.intensity(cosine.max(T::zero()))
     }

@@ -94,8 +94,10 @@ impl ErrorSummary {
 /// let (z, truth) = (array![[0.1, 0.1, 0.2]], array![[1.0, 1.0, 4.0]]);
 /// let result = height_error(z.view(), truth.view(), None, Alignment::Offset)?;
 /// assert!((result.offset - (2.0 - 0.4 / 3.0_f64)).abs() < 1e-12 && result.scale == 1.0);
-/// assert_eq!((result.range, result.constant_guess), (3.0, 1.0)); // the median 1 misses 3 at one pixel of three
-/// assert!(result.error.mean_absolute > result.constant_guess); // this surface says less than a constant
+/// // The median 1 misses 3 at one pixel of three.
+/// assert_eq!((result.range, result.constant_guess), (3.0, 1.0));
+/// // This surface is worse than a constant.
+/// assert!(result.error.mean_absolute > result.constant_guess);
 /// # Ok::<(), tactile_sfs::SfsError>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -182,6 +184,7 @@ fn align(pairs: &[(f64, f64)], alignment: Alignment) -> (f64, f64) {
         Alignment::Affine => {
             let (mut zz, mut zt) = (0.0, 0.0);
             for pair in pairs {
+                // About the means: raw second moments of heights far from 0 cancel.
                 zz += (pair.0 - z) * (pair.0 - z);
                 zt += (pair.0 - z) * (pair.1 - t);
             }
@@ -277,12 +280,15 @@ pub fn render<T: PixelScalar>(
 /// use ndarray::Array2;
 /// use tactile_sfs::{Frame, Lighting, render, reprojection};
 /// let light = Lighting::new([0.3, 0.0, 1.0])?;
-/// let bump = Array2::from_shape_fn((9, 9), |(r, c)| -0.05 * ((r as f64 - 4.0).powi(2) + (c as f64 - 4.0).powi(2)));
+/// let square = |r: usize, c: usize| (r as f64 - 4.0).powi(2) + (c as f64 - 4.0).powi(2);
+/// let bump = Array2::from_shape_fn((9, 9), |(r, c)| -0.05 * square(r, c));
 /// let image = render(bump.view(), [1.0, 1.0], &light);
 /// let rms = |z: &Array2<f64>| {
-///     Ok::<_, tactile_sfs::SfsError>(reprojection(z.view(), Frame::Real(image.view()), [1.0, 1.0], &light)?.1.rms)
+///     let (_, error) = reprojection(z.view(), Frame::Real(image.view()), [1.0, 1.0], &light)?;
+///     Ok::<_, tactile_sfs::SfsError>(error.rms)
 /// };
-/// assert!(rms(&bump)? < 1e-12 && rms(&-&bump)? > 0.1); // a hollow shades otherwise under oblique light
+/// // A hollow shades otherwise under oblique light.
+/// assert!(rms(&bump)? < 1e-12 && rms(&-&bump)? > 0.1);
 /// # Ok::<(), tactile_sfs::SfsError>(())
 /// ```
 ///

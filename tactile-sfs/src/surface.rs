@@ -108,9 +108,11 @@ pub struct Component<T> {
 /// use ndarray::array;
 /// use tactile_sfs::{DepthTable, Domain, StopReason, SurfaceReconstruction};
 /// let table = DepthTable::new(&[(0.0, 0.0), (10.0, 1e-3)])?;
-/// let report = table.reconstruct(array![[5.0, 12.0, f64::NAN]].view().into(), &Domain::new([1e-4, 1e-4])?)?.report;
+/// let (image, domain) = (array![[5.0, 12.0, f64::NAN]], Domain::new([1e-4, 1e-4])?);
+/// let report = table.reconstruct(image.view().into(), &domain)?.report;
 /// assert_eq!((report.stop, report.iterations), (StopReason::Direct, 0));
-/// assert_eq!((report.solved, report.flagged), (2, 2)); // one pixel out of range, one without a height
+/// // One pixel is out of range, one has no height.
+/// assert_eq!((report.solved, report.flagged), (2, 2));
 /// # Ok::<(), tactile_sfs::SfsError>(())
 /// ```
 #[derive(Clone, Debug, PartialEq)]
@@ -155,7 +157,8 @@ impl<T: Default> Default for SurfaceReport<T> {
 /// use tactile_sfs::{CosinePoisson, Domain, SlopeIntegrator, Surface, SurfaceWorkspace};
 /// let mask = array![[true, true, true, false], [true, true, true, false]];
 /// let (p, q) = (Array2::from_elem((2, 4), 1.0), Array2::zeros((2, 4)));
-/// let (mut workspace, mut surface) = (SurfaceWorkspace::default(), Surface::<f64>::default()); // used again for every frame
+/// // Both are used again for every frame.
+/// let (mut workspace, mut surface) = (SurfaceWorkspace::default(), Surface::<f64>::default());
 /// let domain = Domain::default().with_mask(mask.view());
 /// CosinePoisson.integrate_with(&mut workspace, p.view(), q.view(), &domain, &mut surface)?;
 /// assert!(surface.heights[[0, 3]].is_nan() && !surface.mask[[0, 3]]);
@@ -242,6 +245,7 @@ impl<T: PixelScalar> Surface<T> {
             fill_shape(&mut self.flags, shape, PixelFlags::NONE);
         }
         self.bounding_box = area;
+        // The list keeps its memory, so that a stream of frames does not allocate.
         let mut components = core::mem::take(&mut self.report.components);
         components.clear();
         self.report = SurfaceReport {

@@ -26,7 +26,7 @@ type Callback = Box<dyn FnMut(Progress) -> ControlFlow<()> + Send + Sync>;
 /// let mut workspace = SurfaceWorkspace::default();
 /// workspace.on_progress(move |progress: Progress| match send.send(progress) {
 ///     Ok(()) => ControlFlow::Continue(()),
-///     Err(_) => ControlFlow::Break(()), // nobody listens any more
+///     Err(_) => ControlFlow::Break(()), // the receiver is gone
 /// });
 /// let image = Array2::from_elem((8, 8), 0.9);
 /// let method = BrooksHorn::new(Lighting::default()).with_iterations(20, 5)?;

@@ -100,7 +100,8 @@ impl PressScene {
     /// let camera = Camera::default().coarser(16);
     /// let scene = PressScene::new(PressOptions { camera, ..PressOptions::default() })?;
     /// let series = scene.calibrate(&CalibrationRun { steps: 8, ..CalibrationRun::default() })?;
-    /// let pipeline = Pipeline::from_pairs(&series.pairs, camera.pixel_size_m, Object::sphere(3e-3))?;
+    /// let ball = Object::sphere(3e-3);
+    /// let pipeline = Pipeline::from_pairs(&series.pairs, camera.pixel_size_m, ball)?;
     /// let (reference, frame) = (scene.reference(0), scene.frame(0, 0));
     /// let mut press = pipeline.press(reference.view())?;
     /// press.add_frame(frame.view());
@@ -132,6 +133,7 @@ impl PressScene {
                 let force_n = true_force_n;
                 return Err(SimulateError::CalibrationSaturates { force_n });
             }
+            // Exposure 0 is the reference.
             let sum = exposure(light.view(), k + 1);
             let normal: f64 = StandardNormal.sample(&mut gauge);
             let force_n = true_force_n + options.gauge_noise_n * normal;
@@ -225,6 +227,8 @@ impl CalibrationRun {
         match branch {
             Branch::Loading => force_n,
             Branch::Unloading => {
+                // The parabola vanishes at both ends, where the branches meet, and is greatest
+                // half-way.
                 force_n + 4.0 * self.hysteresis * self.largest_force_n * x * (1.0 - x)
             }
         }

@@ -27,11 +27,13 @@ struct NoiseLaw {
 /// use tactile_simulate::Camera;
 /// let camera = Camera { shape: [200, 300], ..Camera::default() };
 /// assert!((camera.pixel_size_m[0] - 21.55e-6).abs() < 1e-8);
-/// // 15 000 electrons at 255 grey levels: photon noise √(200/58.8), read noise 0.5, rounding; together 1.93.
+/// // 15 000 electrons at 255 grey levels: photon noise √(200/58.8), read noise 0.5 and rounding
+/// // are 1.93 together.
 /// let light = ndarray::Array2::from_elem((200, 300), 200.0);
 /// let mean = |camera: Camera| camera.expose(light.view(), 1, 0).mapv(f64::from).mean();
 /// assert_eq!(mean(camera.ideal()), Some(200.0));
-/// assert!(mean(camera).is_some_and(|m| m != 200.0 && (m - 200.0).abs() < 5.0 * 1.93 / 60e3_f64.sqrt()));
+/// let limit = 5.0 * 1.93 / 60e3_f64.sqrt();
+/// assert!(mean(camera).is_some_and(|m| m != 200.0 && (m - 200.0).abs() < limit));
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -126,6 +128,7 @@ impl Camera {
         Plane {
             middle_px: middle,
             pixel_size_m: self.pixel_size_m,
+            // A frame of one pixel has no corner to refer to.
             bend: self.barrel / (corner * corner).max(f64::MIN_POSITIVE),
         }
     }
@@ -173,6 +176,8 @@ impl Camera {
     fn noisy(&self, grey: f64, law: &NoiseLaw, rng: &mut ChaCha8Rng) -> f64 {
         let normal: f64 = StandardNormal.sample(rng);
         if grey >= law.normal_from_grey {
+            // Photon and read noise are independent, so their variances add and one deviate draws
+            // both.
             return grey + (grey * law.variance_per_grey + law.read_variance).sqrt() * normal;
         }
         let photons = match Poisson::new(grey / law.variance_per_grey) {
@@ -195,6 +200,7 @@ impl Camera {
 
     /// Pixels that a patch must reach beyond the contact so that the blur has all its light.
     pub(crate) fn blur_reach(&self) -> usize {
+        // Beyond four standard deviations lie 6e-5 of a Gaussian's weight.
         (4.0 * self.blur_sigma_px).ceil() as usize
     }
 
@@ -205,8 +211,10 @@ impl Camera {
             return;
         }
         let weight = |k: usize| (-0.5 * (k as f64 / self.blur_sigma_px).powi(2)).exp();
+        // The weights that are kept add up to 1, so that the blur keeps the sum of the light.
         let total = 1.0 + 2.0 * (1..=reach).map(weight).sum::<f64>();
         let kernel: Vec<f64> = (0..=reach).map(|k| weight(k) / total).collect();
+        // A Gaussian is separable: two passes of one dimension replace one of two.
         for axis in [Axis(0), Axis(1)] {
             let source = patch.values.clone();
             patch.values.map_inplace(|v| *v *= kernel[0]);
@@ -244,6 +252,7 @@ impl Camera {
             patch.add_to(&mut frame);
         }
         let [cx, cy] = self.middle_px();
+        // Relative to the corner, where the loss is the share stated.
         let fall = self.vignetting / (cx * cx + cy * cy).max(f64::MIN_POSITIVE);
         let tilt = [
             illumination.tilt[0] / (2.0 * cx).max(1.0),
@@ -254,6 +263,7 @@ impl Camera {
             for (c, value) in line.iter_mut().enumerate() {
                 let dx = c as f64 - cx;
                 let lens = 1.0 - fall * (dx * dx + dy * dy);
+                // A strong tilt must not turn the light negative on the dark side.
                 *value *= lens * (illumination.level + tilt[0] * dx + tilt[1] * dy).max(0.0);
             }
         }
@@ -317,6 +327,7 @@ impl Camera {
 
     pub(crate) fn validate(&self) -> Result<(), SimulateError> {
         at_least("shape", self.shape[0].min(self.shape[1]), 1)?;
+        // A row's number takes 16 bits of its noise stream's number.
         within(
             "shape",
             self.shape[0].max(self.shape[1]) as f64,
@@ -360,6 +371,7 @@ pub fn row_stream(seed: u64, purpose: Purpose, frame: u64, row: usize) -> ChaCha
     key[..8].copy_from_slice(&seed.to_le_bytes());
     key[8] = purpose as u8;
     let mut rng = ChaCha8Rng::from_seed(key);
+    // Seed and purpose make the key, frame and row the stream: no two of them share numbers.
     rng.set_stream(frame << 16 | row as u64);
     rng
 }

@@ -181,11 +181,13 @@ impl ColourGel {
         let [rows, columns] = self.shape;
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let noise = Normal::new(0.0, self.noise).ok();
+        // The surface is continued level beyond the frame's edge.
         let at = |row: usize, column: usize| depth_px[[row.min(rows - 1), column.min(columns - 1)]];
         let mut frame = Array3::zeros((rows, columns, 3));
         for ((row, column, channel), level) in frame.indexed_iter_mut() {
             let p = 0.5 * (at(row, column + 1) - at(row, column.saturating_sub(1)));
             let q = 0.5 * (at(row + 1, column) - at(row.saturating_sub(1), column));
+            // The offset keeps the lamps off the pixel axes.
             let angle = core::f64::consts::TAU * (channel as f64 / 3.0 + 0.1);
             let (sin, cos) = angle.sin_cos();
             let across = (column as f64 / columns as f64 - 0.5) * cos

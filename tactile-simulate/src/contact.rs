@@ -1,11 +1,8 @@
 //! A sphere pressed on the waveguide: pressure, contact radius, indentation and surface
 //! displacement.
 //!
-//! Where the contact at a force comes from: a closed form or states computed elsewhere.
-//!
-//! A contact computed elsewhere, given as numbers over the radius.
-//!
-//! Contacts by finite elements that come with the crate.
+//! The contact at a force comes from a closed form or from states computed elsewhere, which are
+//! numbers over the radius. States by finite elements for two balls come with the crate.
 
 use crate::error::{SimulateError, at_least, finite, not_negative, positive, within};
 use crate::press::{Elastic, ElasticSphere, LightGuide};
@@ -78,6 +75,8 @@ impl SimulatedContact {
         within("force_n", force_n, 0.0, largest)?;
         let hertz = Self::hertz(sphere, waveguide, force_n);
         if let Some(states) = law.states(sphere, waveguide)? {
+            // Without force there is no state to scale down to: the contact then is Hertz's of
+            // radius 0.
             let state = (force_n > 0.0).then(|| ContactState::at_force(&states, force_n));
             return Ok(match state.flatten() {
                 Some(state) => hertz.with_state(state),
@@ -101,6 +100,7 @@ impl SimulatedContact {
         let effective_modulus_pa = 1.0 / (sphere_compliance + waveguide_compliance);
         let radius = sphere.radius_m;
         let a = (0.75 * force_n * radius / effective_modulus_pa).cbrt();
+        // Without load the quotient would be 0/0.
         let peak_pressure_pa = if a > 0.0 {
             1.5 * force_n / (PI * a * a)
         } else {
@@ -120,6 +120,8 @@ impl SimulatedContact {
 
     fn with_state(self, state: ContactState) -> Self {
         Self {
+            // The effective modulus and the guide's share stay Hertz's: a state has none of its
+            // own.
             contact_radius_m: state.contact_radius_m,
             indentation_m: state.indentation_m,
             peak_pressure_pa: state.peak_pressure_pa(),
@@ -142,6 +144,7 @@ impl SimulatedContact {
         }
         match &self.given {
             Some(state) => state.pressure_at_pa(r_m),
+            // The product keeps the digits near the rim, where a² − r² cancels.
             None => self.peak_pressure_pa * ((a - r_m) * (a + r_m)).sqrt() / a,
         }
     }
@@ -163,13 +166,14 @@ impl SimulatedContact {
         let Some(state) = &self.given else {
             return ((a - r_m) * (a + r_m)).sqrt();
         };
-        // With r = a sin φ the integrand stays finite at the rim, where p falls as √(a − r);
-        // midpoint rule.
+        // With r = a sin φ the integrand stays finite at the rim, where p falls as √(a − r). The
+        // midpoint rule leaves out the rim itself, where the ratio is infinite.
         const STEPS: usize = 64;
         let first = (r_m / a).asin();
         let step = (FRAC_PI_2 - first) / STEPS as f64;
         let slope_at = |phi: f64| {
             let ratio = self.peak_pressure_pa / state.pressure_at_pa(a * phi.sin());
+            // Interpolation can exceed the largest sample by rounding, hence the guard of the root.
             (ratio * ratio - 1.0).max(0.0).sqrt() * a * phi.cos()
         };
         let angles = (0..STEPS).map(|k| first + (k as f64 + 0.5) * step);
@@ -194,6 +198,8 @@ impl SimulatedContact {
             self.peak_pressure_pa,
             self.effective_modulus_pa,
         );
+        // The profile is a paraboloid inside and the field of the whole load outside, equal at r =
+        // a.
         if r <= a {
             return PI * p0 * (2.0 * a * a - r * r) / (4.0 * a * e);
         }
@@ -265,6 +271,7 @@ impl ContactModel {
         };
         at_least("states", states.len(), 1)?;
         states.iter().try_for_each(ContactState::validate)?;
+        // Equal forces would leave no interval to interpolate in.
         for pair in states.windows(2) {
             within(
                 "force_n",
@@ -287,6 +294,7 @@ impl ContactModel {
     ) -> Result<f64, SimulateError> {
         let states = self.states(sphere, waveguide)?;
         let largest = |last: &ContactState| last.force_n * (1.0 + EQUAL_FORCES);
+        // A closed form holds at any force. A table ends at its last state.
         Ok(states.map_or(f64::MAX, |s| s.last().map_or(0.0, largest)))
     }
 
@@ -382,7 +390,7 @@ impl ContactState {
     pub(crate) fn validate(&self) -> Result<(), SimulateError> {
         // Largest relative difference allowed between a state's force and the integral of its
         // pressure. Finite-element pressures recovered at nodes miss the force by up to some
-        // percent where the mesh is coarse; a wrong unit misses it by far more.
+        // percent where the mesh is coarse. A wrong unit misses it by far more.
         let largest_force_mismatch = 0.05;
         positive("force_n", self.force_n)?;
         positive("contact_radius_m", self.contact_radius_m)?;
@@ -401,6 +409,7 @@ impl ContactState {
                 });
             }
         }
+        // The pressure at the centre must be a sample, since nothing is extrapolated inwards.
         within("radius_m", self.radius_m[0], 0.0, 0.0)?;
         for pair in self.radius_m.windows(2) {
             positive("radius_m", pair[1] - pair[0])?;
@@ -439,8 +448,10 @@ impl ContactState {
         let rim = self.contact_radius_m;
         let mut force = 0.0;
         for pair in self.radius_m.windows(2) {
+            // A stretch that reaches past the rim counts up to it, one beyond has no width.
             let [from, to] = [pair[0].min(rim), pair[1].min(rim)];
             let [p0, p1] = [self.sampled_pressure_pa(from), self.sampled_pressure_pa(to)];
+            // In terms of p the rule needs no root, but 0/0 must be kept out.
             if p0 + p1 > 0.0 {
                 let mean = (p0 * p0 + p0 * p1 + p1 * p1) / (p0 + p1);
                 force += 2.0 * PI / 3.0 * (to * to - from * from) * mean;
@@ -476,6 +487,7 @@ impl ContactState {
             last
         };
         let [from, to] = [self.radius_m[k].powi(2), end * end];
+        // The rim may coincide with the sample before it: the stretch is then empty.
         let t = if to > from {
             ((r_m * r_m - from) / (to - from)).clamp(0.0, 1.0)
         } else {
@@ -509,6 +521,7 @@ impl ContactState {
     /// Below the first, that one shrunk by Hertz's scaling, a ∝ F^⅓ and z ∝ F^⅔. None above the
     /// last.
     pub(crate) fn at_force(states: &[Self], force_n: f64) -> Option<Self> {
+        // The first state at or above the force, one within the tolerance included.
         let next = states.partition_point(|s| s.force_n < force_n * (1.0 - EQUAL_FORCES));
         let upper = states.get(next)?;
         let scale = (force_n / upper.force_n).cbrt();
@@ -556,6 +569,7 @@ impl ContactState {
             let normalised = mix(&|s| s.height_at_m(ratio * s.contact_radius_m) / depth(s.force_n));
             normalised * depth(force_n)
         };
+        // The samples are the upper state's. The lower one is interpolated at the same r/a.
         let ratios: Vec<f64> = (upper.radius_m.iter())
             .map(|r| r / upper.contact_radius_m)
             .collect();
@@ -584,6 +598,7 @@ pub fn finite_element_states(
 ) -> Option<Vec<ContactState>> {
     // R of the balls.
     let radius_m_limit = 3e-3;
+    // Compared exactly: a body that differs at all is one that was not computed.
     let known = [Elastic::CL2000X, Elastic::CL2003X].contains(&sphere.material);
     let elastic = |w: &LightGuide| -> Vec<(f64, Elastic)> {
         w.layers
@@ -616,6 +631,7 @@ pub fn finite_element_states(
         if modulus != sphere.material.youngs_modulus_pa {
             continue;
         }
+        // The rows of a state stand together: another force begins the next state.
         if states.last().is_none_or(|s| s.force_n != force_n) {
             states.push(ContactState {
                 force_n,

@@ -37,7 +37,10 @@ use std::fmt;
 #[non_exhaustive]
 pub enum SimulateError {
     /// A value lies outside the range that has a meaning (NaN always does).
-    #[error("{field} is {}, expected a number in {} to {}", Short(*found), Short(six_digits(*minimum)), Short(six_digits(*maximum)))]
+    #[error(
+        "{field} is {}, expected a number in {} to {}",
+        Short(*found), Short(six_digits(*minimum)), Short(six_digits(*maximum))
+    )]
     OutOfRange {
         /// The field's name.
         field: &'static str,
@@ -94,7 +97,7 @@ pub enum SimulateError {
     },
 }
 
-/// A limit to six significant digits: more say nothing to a reader.
+/// A limit to six significant digits, which suffice in a message.
 fn six_digits(limit: f64) -> f64 {
     format!("{limit:.5e}").parse().unwrap_or(limit)
 }
@@ -119,6 +122,7 @@ pub fn within(
     minimum: f64,
     maximum: f64,
 ) -> Result<(), SimulateError> {
+    // Both comparisons fail for NaN.
     if found >= minimum && found <= maximum {
         Ok(())
     } else {

@@ -63,6 +63,7 @@ fn description(scene: &PressScene) -> Table {
             ("force_N", Value::Float(load.force_n)),
         ]))
     };
+    // The object's modulus is left out: a measurement of the folder is to find it.
     let object = table([
         ("shape", Value::String("sphere".to_owned())),
         ("radius_m", Value::Float(options.object.radius_m)),
@@ -72,7 +73,7 @@ fn description(scene: &PressScene) -> Table {
         ),
     ]);
     let layers = Value::Array(options.waveguide.layers.iter().map(layer).collect());
-    // A closed form is read by its own law; contacts from elsewhere by the default one.
+    // A closed form is read by its own law, contacts from elsewhere by the default one.
     let estimator = match options.law {
         ContactModel::Hertz | ContactModel::Tatara => "sphere",
         _ => "best",

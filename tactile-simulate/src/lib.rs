@@ -8,14 +8,14 @@
 //! | module | contents |
 //! |---|---|
 //! | [`press`](PressScene) | one sphere pressed at several loads: frames and [`PressTruth`] |
-//! | [`contact`](ContactModel) | sphere on waveguide by closed forms, or contacts computed elsewhere ([`ContactState`]) |
+//! | [`contact`](ContactModel) | closed forms, or contacts computed elsewhere ([`ContactState`]) |
 //! | `solved` | balls and cylinders by the finite elements of `tactile-fem` (feature `fem`) |
 //! | `pixel_average` | exact averages of the contact pressure over pixels |
 //! | [`light`](Response) | pressure → grey levels |
 //! | [`camera`](Camera) | blur, vignetting, photon and read noise, quantisation |
 //! | [`calibration`](CalibrationSeries) | light against gauge force, loading and unloading |
-//! | [`stream`](FrameStream) | frames of loading cycles at camera rate, with drifting illumination |
-//! | [`uniaxial`](UniaxialScene) | a patterned block squeezed between plates: stress over strain is the modulus exactly |
+//! | [`stream`](FrameStream) | frames of loading cycles at camera rate, with drifting light |
+//! | [`uniaxial`](UniaxialScene) | a squeezed block, whose stress over strain is the modulus |
 //! | `folder` | a scene written as files (feature `scene`) |
 //!
 //! # Conventions

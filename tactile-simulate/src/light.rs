@@ -138,6 +138,7 @@ pub struct LightLaw {
 impl LightLaw {
     /// Light at a pressure, in grey levels above the background.
     pub fn grey_at(&self, pressure_pa: f64) -> f64 {
+        // A scene without any load has no peak to refer to.
         if self.largest_pressure_pa == 0.0 {
             return 0.0;
         }
@@ -172,6 +173,8 @@ impl LightLaw {
             .map_inplace(|v| *v *= self.grey_per_pascal * peak);
         let droop = self.response.droop() / self.largest_pressure_pa;
         if droop > 0.0 {
+            // The square of Hertz's pressure is p₀² (1 − ρ²), which the paraboloid averages
+            // exactly.
             let square = disc.average(Profile::Paraboloid, window);
             patch
                 .values

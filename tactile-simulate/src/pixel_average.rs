@@ -1,9 +1,9 @@
 //! Averages of the contact's pressure over pixels, exact also at the rim.
 //!
-//! A pixel sees the mean of the light over its square, not the value at its centre. With G(x, y) =
-//! ∫₀ˣ∫₀ʸ f(s² + t²) ds dt the integral over a pixel is the inclusion–exclusion sum of G at its
-//! corners. Summed over all pixels the inner corners cancel, so the frame's sum is the force. In
-//! units of the contact radius
+//! A pixel records the mean of the light over its square, not the value at its centre. With
+//! G(x, y) = ∫₀ˣ∫₀ʸ f(s² + t²) ds dt the integral over a pixel is the inclusion–exclusion sum of G
+//! at its corners. Summed over all pixels the inner corners cancel, so the frame's sum is the
+//! force. In units of the contact radius
 //!
 //! * f = √(1 − ρ²): 6G = 2xyz + x(3 − x²) atan(y/z) + y(3 − y²) atan(x/z) − 2 atan(xy/z), z = √(1 −
 //!   x² − y²)
@@ -101,6 +101,7 @@ impl Disc {
             .map(|k| Span::new(edge(0, k), size[0]))
             .collect();
         let xs: Vec<f64> = (col0..=col1).map(|k| edge(0, k)).collect();
+        // Neighbouring pixels share a corner's value, which cancels exactly in their sum.
         let mut corners = Corners::new(profile, &xs);
         for (r, mut line) in values.rows_mut().into_iter().enumerate() {
             let row = Span::new(edge(1, row0 + r as isize), size[1]);
@@ -178,6 +179,7 @@ impl Span {
             nearest_squared: nearest * nearest,
             farthest_squared: first.abs().max(last.abs()).powi(2),
             nodes_squared: GAUSS.map(|(node, _)| (middle + node * size).powi(2)),
+            // Exact: the square's mean is that of its middle plus the variance of an even spread.
             mean_squared: middle * middle + size * size / 12.0,
         }
     }
@@ -244,10 +246,12 @@ impl<'a> Corners<'a> {
 
 /// G(x, y), odd in x and in y.
 pub fn corner(profile: Profile, x: f64, y: f64) -> f64 {
+    // Beyond the disc's extent G no longer grows.
     let (u, v) = (x.abs().min(1.0), y.abs().min(1.0));
     let outside = u * u + v * v >= 1.0;
     let g = match (profile, outside) {
         (Profile::Hemisphere, false) => {
+            // Arctangents of quotients by z as `atan2`, since z falls to 0 at the rim.
             let z = (1.0 - u * u - v * v).sqrt();
             let atans = u * (3.0 - u * u) * v.atan2(z) + v * (3.0 - v * v) * u.atan2(z);
             (2.0 * u * v * z + atans - 2.0 * (u * v).atan2(z)) / 6.0
@@ -277,7 +281,7 @@ impl Disc {
     /// Four by four Gauss nodes inside. At the rim 16 by 16 midpoints, with an error of some 1e-5
     /// of the light.
     pub fn average_radial(&self, window: Window, value: impl Fn(f64) -> f64) -> Patch {
-        // Bound on the steps a side, for contacts far below a pixel, whose light nobody sees.
+        // Bound on the steps a side, for contacts far below a pixel, whose light is negligible.
         let most_steps = 512.0;
         // Least steps in the contact's radius, for contacts below a pixel.
         let steps_in_radius = 24.0;
@@ -401,7 +405,7 @@ impl Disc {
     pub fn average_bent(&self, plane: Plane, window: Window, value: impl Fn(f64) -> f64) -> Patch {
         // Pixels this close to the rim, in pixels, are averaged over the fine grid.
         let bent_rim_zone = 2.0;
-        // Steps a side in a pixel near the rim; twice as many change the light by some 10⁻⁴ of the
+        // Steps a side in a pixel near the rim. Twice as many change the light by some 10⁻⁴ of the
         // rim's pixels.
         let bent_rim_steps: usize = 8;
         let [[row0, row1], [col0, col1]] = window;

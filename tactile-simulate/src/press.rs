@@ -16,7 +16,7 @@ use crate::pixel_average::{Disc, Patch};
 use nalgebra::{Matrix3, Point3};
 use ndarray::Array2;
 
-/// A checked scene that makes frames and knows the truth.
+/// A checked scene that makes frames and gives their truth.
 ///
 /// ```
 /// use tactile_simulate::{Camera, PressOptions, PressScene};
@@ -61,6 +61,8 @@ impl PressScene {
         let response = options.response;
         let grey_per_pascal = options
             .gain
+            // Of the light at the peak, not of the pressure: a response that droops needs a higher
+            // gain.
             .grey_per_pascal(largest_pressure_pa * response.light(1.0));
         let light = LightLaw {
             response,
@@ -170,6 +172,7 @@ impl PressScene {
             ..self.options.clone()
         })?;
         Ok(Self {
+            // A gain by peak grey level would otherwise be set anew by the other object's pressure.
             light: self.light,
             ..changed
         })
@@ -208,6 +211,7 @@ impl PressScene {
             return None;
         }
         let (plane, contact) = (camera.plane(), &self.contacts[load]);
+        // The blur takes in light from its reach around the frame, so the window extends by it.
         let mut patch = if plane.is_flat() {
             let window = disc.window(camera.shape, camera.blur_reach());
             self.light.patch(contact, &disc, window)
@@ -397,6 +401,7 @@ impl LightGuide {
             .sum();
         Elastic {
             youngs_modulus_pa: height / compliance,
+            // The mean of equal ratios of ½ can exceed ½ by rounding.
             poisson_ratio: (weighted / height).min(0.5),
         }
     }
@@ -599,6 +604,7 @@ impl PressOptions {
         self.response.validate()?;
         self.law.validate()?;
         at_least("loads", self.loads.len(), 1)?;
+        // A load's number takes 16 bits of its noise stream's number, 0 being the reference frame.
         within("loads", self.loads.len() as f64, 1.0, 65534.0)?;
         for load in &self.loads {
             not_negative("force_n", load.force_n)?;
@@ -667,13 +673,16 @@ impl PressScene {
 /// let camera = Camera::default().coarser(16);
 /// let scene = PressScene::new(PressOptions { camera, ..PressOptions::default() })?;
 /// let (truth, later) = (scene.truth(0), scene.truth(1));
-/// assert!((truth.pressure_pa().sum() * camera.pixel_size_m.iter().product::<f64>() - 0.7).abs() < 1e-9, "the force");
+/// let pixel_m2 = camera.pixel_size_m.iter().product::<f64>();
+/// assert!((truth.pressure_pa().sum() * pixel_m2 - 0.7).abs() < 1e-9, "the force");
 /// let middle = [32, 43];
 /// assert_eq!(truth.apparent_height_m()[middle], truth.contact.contact_radius_m);
-/// assert!(later.waveguide_height_m()[middle] < truth.waveguide_height_m()[middle], "pressed deeper");
+/// let [first, second] = [&truth, &later].map(|t| t.waveguide_height_m()[middle]);
+/// assert!(second < first, "pressed deeper");
 /// assert_eq!(truth.centre_px, later.centre_px);
-/// // The light above the background, over the grey levels of a pascal, times the area of a pixel: 0.7 N.
-/// let seen_n = truth.integrated_pixel_value / truth.grey_per_pascal * camera.pixel_size_m.iter().product::<f64>();
+/// // The light above the background, over the grey levels of a pascal, times the area of a pixel:
+/// // 0.7 N.
+/// let seen_n = truth.integrated_pixel_value / truth.grey_per_pascal * pixel_m2;
 /// assert!((seen_n / 0.7 - 1.0).abs() < 1e-9);
 /// assert!((truth.scaling_to(&later).scale - (1.2_f64 / 0.7).cbrt()).abs() < 1e-12);
 /// # Ok::<(), tactile_simulate::SimulateError>(())
@@ -799,6 +808,7 @@ impl PressTruth {
             return;
         }
         let disc = self.disc();
+        // No margin for the blur: the truth is the light before it.
         let window = disc.window(self.shape, 0);
         let pressure = pressure_patch(&self.contact, &disc, window);
         let (mut sum, mut sum_x, mut sum_y) = (0.0, 0.0, 0.0);
@@ -808,6 +818,8 @@ impl PressTruth {
             sum_y += v * r as f64;
         }
         if sum > 0.0 {
+            // Moments are summed within the window, where the coordinates are small, and shifted
+            // afterwards.
             let [row0, col0] = pressure.origin;
             self.centroid_px = [sum_x / sum + col0 as f64, sum_y / sum + row0 as f64];
         }
@@ -822,6 +834,7 @@ fn saturated_pixels(scene: &PressScene, load: usize) -> usize {
     let peak = scene.contact(load).peak_pressure_pa;
     let brightest = options.camera.background_grey + scene.light().grey_at(peak);
     let lit = illumination.level + 0.5 * (illumination.tilt[0].abs() + illumination.tilt[1].abs());
+    // Lens and blur only take light away from the brightest place.
     if brightest * lit <= 255.0 {
         return 0;
     }
@@ -836,7 +849,7 @@ fn saturated_pixels(scene: &PressScene, load: usize) -> usize {
 /// contact's centre.
 ///
 /// The surface read from a press follows Hertz's law, or nearly: a hemisphere of the contact's
-/// radius, which grows by (F₂/F₁)^⅓ whatever the object's modulus. Its strain says nothing about
+/// radius, which grows by (F₂/F₁)^⅓ whatever the object's modulus. Its strain does not depend on
 /// the modulus. At finite strain the surface grows less along z than across.
 ///
 /// ```
@@ -881,6 +894,7 @@ impl SurfaceScaling {
     /// The Green–Lagrange strain of the map, ½(s² − 1) along each axis.
     pub fn green_lagrange_strain(&self) -> Matrix3<f64> {
         let along = [self.scale, self.scale, self.height_scale];
+        // As a product, because s² − 1 loses digits at small strain.
         Matrix3::from_diagonal(&along.map(|s| 0.5 * (s - 1.0) * (s + 1.0)).into())
     }
 }
@@ -890,6 +904,7 @@ fn height_scale(from: &SimulatedContact, to: &SimulatedContact) -> f64 {
     const RINGS: i32 = 32;
     let (mut product, mut square) = (0.0, 0.0);
     for ring in 0..RINGS {
+        // Rings of equal area, so that every ring has the same weight.
         let rho = ((f64::from(ring) + 0.5) / f64::from(RINGS)).sqrt();
         let [first, second] = [from, to].map(|c| c.apparent_height_m(rho * c.contact_radius_m));
         product += first * second;

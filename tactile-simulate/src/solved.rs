@@ -91,8 +91,8 @@ impl ContactState {
         faces: Interface,
         forces_n: &[f64],
     ) -> Result<Vec<Self>, SimulateError> {
-        // ν = ½ has no finite bulk modulus; at this one the volume changes by less than 1e-4 of the
-        // pressure over E.
+        // ν = ½ has no finite bulk modulus. At this one the volume of a squeezed block changes by
+        // (1 − 2ν) σ/E, which is 2e-4 of the stress over E.
         let largest_poisson_ratio = 0.4999;
         positive("radius_m", radius_m)?;
         positive("height_m", height_m)?;
@@ -145,6 +145,7 @@ impl ContactState {
         let mut pressure_pa = vec![middle_pa];
         for point in points {
             radius_m.push(point.r_m);
+            // A contact state has no tension: negative pressures would be refused.
             pressure_pa.push(point.pressure_pa.max(0.0));
         }
         radius_m.push(rim_m);

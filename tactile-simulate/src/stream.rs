@@ -166,6 +166,8 @@ impl FrameStream {
     fn load_at(&self, time_s: f64) -> PressLoad {
         let c = &self.cycle;
         let phase = ((time_s - c.rest_s) / c.period_s).max(0.0);
+        // The rate of loading is 0 at the start and the end of a cycle, so that cycles join without
+        // a kink.
         let share = (PI * phase).sin().powi(2);
         let level = (1.0 + c.light_drift_per_s * time_s).max(0.0);
         let tilt = c.light_tilt_per_s.map(|rate| rate * time_s);

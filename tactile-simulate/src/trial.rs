@@ -62,8 +62,8 @@ impl Trial {
         Self::new(options, &CalibrationRun::default())
     }
 
-    /// The default pipeline for the simulated sensor: it knows the calibration, the pixel size, the
-    /// ball's radius and the waveguide, all exactly, and nothing of the truth. Where the scene
+    /// The default pipeline for the simulated sensor: it is given the calibration, the pixel size,
+    /// the ball's radius and the waveguide, all exactly, and nothing of the truth. Where the scene
     /// obeys a closed form (Hertz, Tatara), the estimator is Hertz's with the layers in series
     /// ([`EstimatorChoice::Sphere`]), whose law the truth shares. Where its contacts come from
     /// elsewhere, the default.

@@ -198,6 +198,8 @@ impl UniaxialScene {
             self.options.camera.pixel_size_m,
         );
         Array2::from_shape_fn(self.options.camera.shape, |(row, col)| {
+            // The relief is given over the undeformed face, so the pixel's place is taken back
+            // there.
             let x = (col as f64 - centre[0]) * size[0] / s.stretch_lateral;
             let y = (row as f64 - centre[1]) * size[1] / s.stretch_lateral;
             s.stretch_z * self.relief.height_m([x, y])
@@ -261,6 +263,7 @@ impl UniaxialScene {
     fn pressure(&self, load: usize) -> Patch {
         let (s, camera, relief) = (&self.states[load], &self.options.camera, &self.relief);
         let centre = self.centre_px();
+        // A pixel's size in material coordinates: the face spreads while the pixel keeps its size.
         let pixel: [f64; 2] = std::array::from_fn(|k| camera.pixel_size_m[k] / s.stretch_lateral);
         // First pixel and pixel edges in material coordinates, along x and y.
         let span = |k: usize, length: usize| {
@@ -294,6 +297,7 @@ impl UniaxialScene {
             let profile = |k: usize| means(k, &|x| relief.bump_integral(bump, k, x));
             add_product(&mut values, bump.height_m, &profile(1), &profile(0));
         }
+        // The deformed face is larger by λ_t². The pixels' pressures then add up to the force.
         let scale = s.force_n / (relief.volume_m3() * s.stretch_lateral * s.stretch_lateral);
         values.map_inplace(|v| *v *= scale);
         Patch {
@@ -305,6 +309,7 @@ impl UniaxialScene {
 
 /// values += height · column ⊗ line, where both differ from zero.
 fn add_product(values: &mut Array2<f64>, height: f64, column: &[f64], line: &[f64]) {
+    // A bump covers few of the pixels. The rest of the products are zero.
     let first = line.iter().position(|&v| v != 0.0).unwrap_or(line.len());
     let last = line
         .iter()
@@ -441,6 +446,7 @@ impl UniaxialState {
         }
         // λ³ − λ + 2·load = 0: the largest of three real roots by the cosine formula.
         let stretch = 2.0 / 3.0_f64.sqrt() * ((-load / limit).acos() / 3.0).cos();
+        // As a product, because λ² − 1 loses digits at small strain.
         let strain_zz = 0.5 * (stretch - 1.0) * (stretch + 1.0);
         let stretch_lateral = (1.0 - 2.0 * material.poisson_ratio * strain_zz).sqrt();
         let area_m2 = area0_m2 * stretch_lateral * stretch_lateral;
@@ -592,6 +598,7 @@ impl SurfacePattern {
                 });
             }
         }
+        // Left out after all numbers are drawn: the outline does not move the bumps that stay.
         bumps.retain(|bump: &Bump| outline.holds(bump.centre_m, half_width_m, size_m));
         Relief {
             outline,
@@ -664,6 +671,7 @@ impl Relief {
             let covered = corners[[r + 1, c + 1]] - corners[[r + 1, c]] - corners[[r, c + 1]]
                 + corners[[r, c]];
             let cell = (rows[r + 1] - rows[r]) * (columns[c + 1] - columns[c]);
+            // Differences of areas near 1 leave rounding below 0 and above 1.
             (covered / cell).clamp(0.0, 1.0)
         })
     }
@@ -692,8 +700,8 @@ pub fn disc_below(x: f64, y: f64) -> f64 {
     let inside = |to: f64| to.clamp(-c, c) + c;
     let whole = half_disc(x) - half_disc(-1.0);
     let chord = half_disc(x.clamp(-c, c)) - half_disc(-c);
-    // Where the line is inside: y + h; outside the chord: 2 h above the disc's middle, nothing
-    // below it.
+    // Where the line lies inside, y + h. Beside the chord, 2 h for a line above the disc's middle
+    // and nothing for one below it.
     let beside = whole - chord;
     y * inside(x) + chord + if y >= 0.0 { 2.0 * beside } else { 0.0 }
 }

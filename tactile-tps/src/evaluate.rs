@@ -55,6 +55,7 @@ impl<const D: usize> Frame<D> {
                 high[k] = high[k].max(point[k].widen());
             }
         }
+        // Halved before the difference, which could overflow.
         let halves = (0..D).map(|k| 0.5 * high[k] - 0.5 * low[k]);
         let half = halves.fold(0.0, f64::max);
         // The bits of the exponent alone: the power of two that brings `half` into [1, 2).
@@ -68,6 +69,7 @@ impl<const D: usize> Frame<D> {
 
     #[inline(always)]
     pub(crate) fn inside<T: Scalar>(&self, point: &Point<T, D>) -> [f64; D] {
+        // Division by a power of two is exact.
         core::array::from_fn(|k| (point[k].widen() - self.centre[k]) / self.scale)
     }
 }
@@ -295,7 +297,7 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
         digits::<T>(self.rounding(distance_squared) / f64::max(size, self.level))
     }
 
-    /// wᵀKw, summed over the outputs, in the kernel's own units; O(n²).
+    /// wᵀKw, summed over the outputs, in the kernel's own units. O(n²).
     ///
     /// In the plane with r² ln r, and in space with −r, the integral ∫ |∂²f|² of all second
     /// derivatives is 8π times this.
@@ -326,6 +328,7 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
         let mut negative = vec![0.0; M * self.count()];
         sum.subtract(places, 0..self.count(), &mut negative);
         let products = weights.iter().flatten().zip(&negative).map(|(w, r)| -w * r);
+        // An affine spline has the energy 0, which rounding can make negative.
         f64::max(products.sum(), 0.0) / self.unit()
     }
 
@@ -394,6 +397,8 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
         let Frame { centre, scale } = self.frame;
         let linear = SMatrix::from_fn(|i, j| self.affine.gradient[i][j].widen() / scale);
         let kernel = |s: f64| self.kernel.derivatives(s).value;
+        // What the scaling of the kernel leaves, per r². For r² ln r it is the logarithm of the
+        // scale.
         let square = kernel(scale * scale) / self.unit() - kernel(1.0);
         let n = self.count();
         let offset = SVector::from_fn(|i, _| {
@@ -732,6 +737,7 @@ impl<T: Scalar, K: Kernel, const D: usize, const M: usize, const ORDER: usize>
     fn chunk<L: Lane<T>, const W: usize>(&mut self, start: usize, used: usize) {
         let mut x = [[T::zero(); W]; D];
         for l in 0..W {
+            // Lanes beyond the last point repeat it, so that the loop has a fixed length.
             let inside = self.frame.inside(&self.points[start + l.min(used - 1)]);
             (0..D).for_each(|k| x[k][l] = T::narrow(inside[k]));
         }
@@ -773,6 +779,7 @@ impl<T: Scalar, K: Kernel, const D: usize, const M: usize, const ORDER: usize>
         if let Some(hessian) = hessians.get_mut(at).filter(|_| ORDER > 1) {
             for m in 0..M {
                 for k in 0..D {
+                    // One half of the symmetric Hessian was summed.
                     for i in 0..=k {
                         let curve = sums.hessian[m][k][i][l] / scale / scale;
                         (hessian[m][(k, i)], hessian[m][(i, k)]) = (curve, curve);
@@ -879,6 +886,7 @@ impl<T: Scalar, K: Kernel, const D: usize, const M: usize> KernelSum<'_, T, K, D
         let n = self.centres[0].len();
         let centres = self.centres.map(|axis| &axis[..n]);
         let weights = self.weights.map(|output| &output[..n]);
+        // The centre's numbers are read once for all queries of the block.
         for j in 0..n {
             let centre: [L; D] = core::array::from_fn(|k| L::new(centres[k][j]));
             let weight: [L; M] = core::array::from_fn(|m| L::new(weights[m][j]));

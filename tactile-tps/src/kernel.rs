@@ -169,10 +169,12 @@ impl Kernel for R2LogR {
     #[inline(always)]
     fn derivatives<R: KernelScalar>(&self, s: R) -> KernelDerivatives<R> {
         let half = R::from_f64(0.5);
+        // s ln s tends to 0 at the centre, where the logarithm has no value.
         let log = off_centre(s, s.ln());
         let half_log = half * log;
         KernelDerivatives {
             value: s * half_log,
+            // dU/ds of ½ s ln s is ½ (ln s + 1).
             first: off_centre(s, half_log + half),
             second: off_centre(s, half / s),
         }

@@ -170,6 +170,7 @@ impl<T: Scalar, J: Job<T>> pulp::WithSimd for Dispatched<T, J> {
     type Output = J::Output;
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) -> J::Output {
+        // Without a fused instruction `mul_add` is a slow call of a library.
         if S::IS_SCALAR || cfg!(target_arch = "wasm32") {
             self.0.run::<T::Plain>()
         } else {
@@ -217,6 +218,8 @@ fn ln_f64(x: f64, fma: impl Fn(f64, f64, f64) -> f64) -> f64 {
     let ln2_high: f64 = 6.931_471_803_691_238e-1;
     let ln2_low: f64 = 1.908_214_929_270_587_7e-10;
     let shifted = x.to_bits().wrapping_add(one - root_half);
+    // The exponent as the low bits of 2⁵²: a conversion to a float that vectorises on every
+    // processor.
     let k = f64::from_bits(two_52 | (shifted >> 52)) - (4_503_599_627_370_496.0 + 1023.0);
     let f = f64::from_bits((shifted & mantissa).wrapping_add(root_half)) - 1.0;
     let t = f / (2.0 + f);
@@ -234,6 +237,7 @@ fn ln_f64(x: f64, fma: impl Fn(f64, f64, f64) -> f64) -> f64 {
         0.666_666_666_666_673_5,
     ) * z;
     let half_square = 0.5 * f * f;
+    // ln 2 is split in two: k times the upper part is exact.
     let tail = fma(t, half_square + (odd + even), k * ln2_low);
     fma(k, ln2_high, f - (half_square - tail))
 }

@@ -306,7 +306,7 @@ pub struct FitReport {
     pub merged: usize,
     /// Points left out because their weight is zero.
     pub ignored: usize,
-    /// Rank of [1 X]: one more than the number of directions the points span; D + 1 when they span
+    /// Rank of [1 X]: one more than the number of directions the points span. D + 1 when they span
     /// space.
     pub rank: usize,
     /// Root mean square extent of the points along their principal directions relative to the

@@ -22,8 +22,8 @@ pub trait Warp<T: Scalar, const D: usize> {
     /// The image of a point.
     fn apply(&self, point: &Point<T, D>) -> Point<T, D>;
 
-    /// The Jacobian ∂fᵢ/∂xⱼ at a point (row i, column j); for a deformation this is the deformation
-    /// gradient.
+    /// The Jacobian ∂fᵢ/∂xⱼ at a point (row i, column j). For a deformation this is the
+    /// deformation gradient.
     fn jacobian(&self, point: &Point<T, D>) -> SMatrix<T, D, D>;
 
     /// The images of many points, into the caller's memory.
@@ -166,7 +166,7 @@ pub struct Pairs<'a, T: Scalar, const D: usize> {
     pub sources: &'a [Point<T, D>],
     /// To where.
     pub targets: &'a [Point<T, D>],
-    /// How much each pair counts; without weights all count alike.
+    /// How much each pair counts. Without weights all count alike.
     pub weights: Option<&'a [T]>,
 }
 
@@ -388,6 +388,8 @@ impl<const D: usize> Moments<D> {
         let vector = |p: &Point<T, D>| p.coords.map(T::widen);
         let total: f64 = (0..sources.len()).map(weight).sum();
         let mean = |points: &[Point<T, D>]| {
+            // Means of differences to a point keep their digits where all points lie far from the
+            // origin.
             let origin = vector(&points[0]);
             let sum =
                 |sum: SVector<f64, D>, (i, p)| sum + (vector(p) - origin) * (weight(i) / total);
@@ -430,6 +432,7 @@ fn nearest_rotation<const D: usize>(cross: &SMatrix<f64, D, D>) -> SMatrix<f64, 
     let (Some(mut u), Some(vt)) = (svd.u, svd.v_t) else {
         return SMatrix::identity();
     };
+    // A reflection would be nearer. Turning the weakest direction costs the least.
     if (&u * &vt).determinant() < 0.0 {
         let smallest = svd.singular_values.imin();
         u.column_mut(smallest).neg_mut();

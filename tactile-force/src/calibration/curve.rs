@@ -293,6 +293,7 @@ impl PressureCurve {
             branch: f.branch,
         };
         let pairs: Vec<_> = frames.iter().map(pair).collect();
+        // The curve passes through the origin, and so does the line of the same frames.
         let through_origin = CalibrationOptions::default().with_zero_at_origin();
         Ok(Self {
             coefficients,
@@ -516,6 +517,7 @@ impl Problem {
             vv += integral * integral;
             vf += integral * frame.force_n / error;
         }
+        // Slopes in units of the best straight line are numbers near one.
         let unit = vf / vv;
         if !(unit > 0.0 && unit.is_finite()) {
             return Err(ForceError::NotMonotone { from: 0.0, to: top });
@@ -559,10 +561,13 @@ impl Problem {
         let weight = smoothness * data.trace() / KNOTS as f64;
         // A trace of first differences keeps the matrix definite where the frames leave a straight
         // slope undetermined.
+        // Second differences of the slopes: a curve whose slope is straight in the knots costs
+        // nothing.
         let normal = data
             + differences([1.0, -2.0, 1.0]) * weight
             + differences([-1.0, 1.0]) * (1e-6 * weight);
         let (slopes, free) = nonnegative(&normal, &right);
+        // Slopes held at zero are known, and have no variance.
         let mut inverse = bound(&normal, &free)
             .cholesky()
             .map_or(Normal::zeros(), |c| c.inverse());
@@ -596,6 +601,7 @@ impl Problem {
         let mut best = (0.0, f64::INFINITY);
         for smoothness in [1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1.0, 10.0, 100.0, 1000.0] {
             let here = error(smoothness);
+            // Of equal errors the smoother curve.
             if here <= best.1 {
                 best = (smoothness, here);
             }

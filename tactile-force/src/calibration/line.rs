@@ -57,6 +57,7 @@ impl LinearCalibration {
         };
         let greatest = |from: f64| values.iter().map(|v| (v - from).abs()).fold(0.0, f64::max);
         let scale = greatest(centre);
+        // Values that differ by rounding alone do not determine a slope.
         if scale <= 4.0 * f64::EPSILON * greatest(0.0) || scale == 0.0 {
             return Err(ForceError::DegeneratePairs { span: scale });
         }
@@ -346,6 +347,7 @@ impl Hysteresis {
             .iter()
             .filter_map(|&(v, r)| interpolate(&up, v).map(|other| other - r));
         let differences: Vec<f64> = at_loading.chain(at_unloading).collect();
+        // The greatest by size keeps its sign.
         let by_size = |a: &&f64, b: &&f64| a.abs().total_cmp(&b.abs());
         let greatest_n = *differences.iter().max_by(by_size)?;
         let n = differences.len() as f64;
@@ -454,9 +456,9 @@ impl Fit {
 /// force, as that of a gauge of so many per cent of the reading.
 ///
 /// Of k = 0, 4 (the degrees of freedom, where there are fewer) and 30 the one of the greatest
-/// restricted likelihood is taken. Few pairs cannot tell: there the middle one, which is preferred
-/// by 0.8 in the likelihood's logarithm, holds 92 to 98 % of its 95 % intervals in the middle of
-/// the range whichever noise there is. Robust fits weigh by their residuals.
+/// restricted likelihood is taken. Few pairs do not decide. There the middle one is preferred by
+/// 0.8 in the likelihood's logarithm. Of its 95 % intervals 92 to 98 % then hold in the middle of
+/// the range, whichever noise there is. Robust fits weigh by their residuals.
 fn noise_weights(
     design: &DMatrix<f64>,
     forces: &[f64],
@@ -478,6 +480,8 @@ fn noise_weights(
         if fit.residual_sd <= 1e-12 * largest {
             return Ok(even);
         }
+        // The logarithm of the restricted likelihood, but for constants (Patterson and Thompson
+        // 1971).
         let of_rows = 0.5 * rows.iter().map(|w| w.ln()).sum::<f64>();
         let gram = &fit.covariance / fit.residual_sd.powi(2);
         let of_fit = 0.5 * gram.determinant().ln() - freedom * fit.residual_sd.ln();
@@ -499,6 +503,7 @@ fn weighted(
     for mut column in scaled.column_iter_mut() {
         column.component_mul_assign(&root);
     }
+    // By QR, because the normal equations would square the condition number.
     let qr = scaled.qr();
     let rhs = qr.q().transpose() * y.component_mul(&root);
     let r = qr.r();

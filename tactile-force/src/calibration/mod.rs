@@ -5,7 +5,7 @@
 //! standard error and, shared out over the pixels in proportion to their grey level, the stress
 //!
 //! ```text
-//! P_ij = (I_ij − I_ref,ij) F(V) / (V A),   A = area of a pixel,   so that  Σ P_ij A = F(V)  exactly.
+//! P_ij = (I_ij − I_ref,ij) F(V) / (V A),   A = area of a pixel,   so that  Σ P_ij A = F(V).
 //! ```
 //!
 //! It holds for contacts shaped like those it was made with. A local curve ([`PressureCurve`]) of
@@ -328,6 +328,7 @@ impl GreyHistogram {
         let place = f64::from(difference.clamp(-255.0, 255.0)) + 256.0;
         let below = place as usize;
         let (share, area) = (place - below as f64, pixels * self.pixel_area_m2);
+        // Shared out in proportion, the first moment of the bins is that of the difference.
         self.area_m2[below] += (1.0 - share) * area;
         self.area_m2[below + 1] += share * area;
     }
@@ -354,6 +355,7 @@ impl GreyHistogram {
             common += area * slope;
             scale += area * slope * grey;
         }
+        // Both come from one estimate of the drift and add before squaring.
         let shared = common * noise.common.sqrt() + scale * noise.scale.sqrt();
         (white * self.pixel_area_m2 + shared * shared + noise.flat_field * scale * scale).sqrt()
     }

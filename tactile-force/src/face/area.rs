@@ -105,6 +105,8 @@ impl FaceWorkspace {
         Zip::from(&mut self.signal)
             .and(window.of(frame))
             .and(window.of(reference))
+            // Differences keep their sign: outside the face noise of both signs has to cancel in
+            // the sum.
             .for_each(|s, &f, &r| *s = sign * (f32::from(f) - f32::from(r)));
         let part = BoundingBox {
             row_start: region.row_start - window.row_start,
@@ -141,6 +143,8 @@ impl FaceWorkspace {
             below += pixels;
             below > quarter
         })?;
+        // The lower quartile, not the mean: bright spots of a texture would raise the level above
+        // its dark ones.
         let level = 0.5 * (quartile as f32 - 255.0);
         if level <= 0.0 {
             return None;
@@ -229,6 +233,7 @@ impl FaceWorkspace {
                 (tile.slope, tile.mean, tile.pixels) = (0.0, all / count, count);
                 continue;
             }
+            // Least squares of the light over the depth, about the means of both.
             let spread = sums.depth_squared - sums.depth * sums.depth / sums.count;
             let slope = (sums.depth_light - sums.depth * sums.light / sums.count) / spread;
             // Below three standard errors extrapolating the noise would make the area of plain
@@ -253,6 +258,7 @@ impl FaceWorkspace {
             let (inside, distance) = (self.inside[at], self.distance[at]);
             let signal = f64::from(self.signal[at]);
             let (x, y) = (column as f64 * hx, row as f64 * hy);
+            // Further out there is nothing of the face, and further in every pixel counts whole.
             if distance > BAND {
                 if inside {
                     area.add(1.0, x, y);
@@ -266,6 +272,8 @@ impl FaceWorkspace {
                 continue;
             }
             let tile = &mut self.tiles[[row / TILE, column / TILE]];
+            // Outside pixels have the light of the outline itself, half a pixel before the first
+            // one inside.
             let depth = if inside { f64::from(distance) } else { 0.5 };
             let level = tile.mean + tile.slope * (depth - RING_MIDDLE);
             if level <= 0.0 {
@@ -273,6 +281,7 @@ impl FaceWorkspace {
             }
             let share = signal / level;
             tile.covered += share;
+            // A grey level of this pixel changes the area by 1/P.
             of_pixels += tile.mean.powi(-2);
             area.add(share, x, y);
             light.add(signal, x, y);
@@ -329,6 +338,8 @@ impl FaceWorkspace {
         for ((row, column), tile) in self.tiles.indexed_iter() {
             if tile.count > 0.0 {
                 let near = around(&self.tiles, row, column);
+                // A grey level of the ring changes the mean light of nine tiles, and thereby the
+                // shares there.
                 let weight: f64 = near.map(|t| t.covered / (t.pixels * t.mean)).sum();
                 sum += tile.count * weight * weight;
             }
@@ -374,6 +385,8 @@ fn distance_to_outline(inside: &Array2<bool>, distance: &mut Array2<u8>) {
 /// within the column, it is the least of max(|k|, g(x + k)) over the columns x + k near by.
 fn distance_to_side(inside: &Array2<bool>, side: bool) -> Array2<u8> {
     let (rows, columns) = inside.dim();
+    // Two passes along the columns, down and up, leave g. The rows then combine the columns near
+    // by.
     let mut distance = inside.mapv(|pixel| if pixel == side { 0 } else { FARTHEST });
     for row in 1..rows {
         let (above, mut below) = distance.view_mut().split_at(Axis(0), row);

@@ -69,6 +69,7 @@ impl TextureStretch {
             let place = predict(point);
             let squares = target.iter().map(|q| (q - place).norm_squared());
             let (nearest, square) = squares.enumerate().min_by(|a, b| a.1.total_cmp(&b.1))?;
+            // Two spots must not share a partner: the nearer keeps it.
             let is_nearer = partners[nearest].is_none_or(|(_, other)| square < other);
             if square <= reach_m * reach_m && is_nearer {
                 partners[nearest] = Some((*point, square));
@@ -89,6 +90,7 @@ impl TextureStretch {
         });
         let [from, to] = sum.map(|sum| sum / n);
         let about = || pairs.iter().map(|(p, q)| (p.coords - from, q.coords - to));
+        // About the centroids the shift drops out of the least squares.
         let (mut spread, mut along, mut across) = (0.0, 0.0, 0.0);
         for (p, q) in about() {
             spread += p.norm_squared();
@@ -260,6 +262,7 @@ fn peak(light: &Array2<f32>, row: usize, column: usize) -> Option<[f64; 2]> {
         all += value;
     }
     let slope = 1.0 / (side * squares);
+    // Curvatures are orthogonal to the mean level only after their own mean is taken off.
     let bend = 1.0 / (side * (fourths - squares * squares / side));
     let (gx, gy) = (gx * slope, gy * slope);
     let mean_square = squares / side;
@@ -269,6 +272,7 @@ fn peak(light: &Array2<f32>, row: usize, column: usize) -> Option<[f64; 2]> {
     );
     let hxy = xy / (squares * squares);
     let determinant = hxx * hyy - hxy * hxy;
+    // A maximum curves downwards in every direction.
     if hxx >= 0.0 || determinant <= 0.0 {
         return None;
     }

@@ -26,7 +26,7 @@ use crate::region::Region;
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct HertzFitOptions {
-    /// Standard deviation of the optical blur; `None` fits it.
+    /// Standard deviation of the optical blur. `None` fits it.
     #[cfg_attr(feature = "serde", serde(deserialize_with = "read::blur_px"))]
     blur_px: Option<f64>,
     fit_background: bool,
@@ -281,6 +281,8 @@ impl HertzFitter {
         let place = region.place?;
         let aspect = pixel_size_m[1] / pixel_size_m[0];
         let blur = self.options.blur_px.map_or(0.5, |b| b * b) + PIXEL;
+        // Of Hertz's profile with this integral, 2π/3 A a² over pixels `aspect` times as high as
+        // wide.
         let peak =
             1.5 * start.integral * aspect / (std::f64::consts::PI * start.radius * start.radius);
         let mut state = State {
@@ -418,10 +420,12 @@ impl HertzFitter {
         let stepped = Shape {
             peak: shape.peak + step[0],
             background: shape.background + step[1],
+            // A full step from a poor start can leave the range in which the linear model holds.
             radius: (shape.radius + step[2]).clamp(0.5 * shape.radius, 2.0 * shape.radius),
             blur: if self.options.blur_px.is_some() {
                 shape.blur
             } else {
+                // A pixel's own width is the least blur.
                 (shape.blur + step[3]).clamp(PIXEL, 4.0 * shape.blur)
             },
             bend: (shape.bend + step[BEND]).clamp(-LARGEST_BEND, LARGEST_BEND),
@@ -442,6 +446,8 @@ impl HertzFitter {
             let r2 = ring.place[3] / n;
             let spread = (ring.r4 / n - r2 * r2).max(0.0);
             let level = level(&self.edge, shape, r2, spread);
+            // By the variance at the fitted level: at the measured one, pixels dark by noise would
+            // weigh more.
             let weight = 1.0 / variance.at(level.value);
             e.add(ring, &level, weight, r2, spread);
         }
@@ -449,6 +455,7 @@ impl HertzFitter {
         for k in self.fixed(state) {
             e.normal.fill_row(k, 0.0);
             e.normal.fill_column(k, 0.0);
+            // The factorisation then exists, and the step of such a parameter is zero.
             e.normal[(k, k)] = 1.0;
             e.gradient[k] = 0.0;
         }
@@ -481,7 +488,9 @@ impl HertzFitter {
         }
         let fitted = 7 - fixed.count();
         let reduced = equations.chi2 / (equations.pixels - fitted as f64).max(1.0);
+        // By the residuals: the noise model's own error and a misfit widen all errors alike.
         covariance *= reduced;
+        // The fit counts rows in pixel widths, the report in rows.
         covariance.row_mut(5).unscale_mut(aspect);
         covariance.column_mut(5).unscale_mut(aspect);
         Some((covariance, reduced))
@@ -668,6 +677,7 @@ impl Misfit {
             count += 1.0;
         }
         let share = |excess: f64| (excess.max(0.0) / weights).sqrt() / shape.peak;
+        // χ² of all pixels splits into that of the means and that about the means.
         let around_chi2 = chi2 - radial_chi2;
         let radial = share(radial_chi2 - count);
         let azimuthal = share(around_chi2 - (pixels - count));

@@ -32,10 +32,13 @@ impl BlurredEdge {
         const D0: f64 = 0.430_019_993_662_259_85;
         let mut table = vec![[0.0; TERMS]; NODES];
         let zero = (-LOW / STEP) as usize;
+        // From zero, where h and h′ are known in closed form.
         for direction in [1.0, -1.0] {
             let (mut h, mut d) = (H0, D0);
             let mut node = zero;
             loop {
+                // Thirty terms carry a step to rounding. The table keeps as many as half a step
+                // needs.
                 let series = taylor::<30>(LOW + STEP * node as f64, h, d);
                 table[node].copy_from_slice(&series[..TERMS]);
                 h = horner(&series, direction * STEP);
@@ -58,6 +61,7 @@ impl BlurredEdge {
         if z >= HIGH - 0.5 * STEP {
             return far(z);
         }
+        // So far outside the edge the light is below rounding.
         if z <= LOW {
             return [0.0; 6];
         }
@@ -157,13 +161,14 @@ impl Power {
 /// B + A E √x₊ (1 − c + c x) with x = 1 − |r + ε|²/a², ε normal with the blur's variance w along
 /// each axis.
 ///
-/// |r + ε|² is w times a noncentral χ² with two degrees of freedom: mean r² + 2w, variance 4r²w + 4w², third cumulant
-/// 24 r²w² + 16 w³. The mean of the root is that of a normal variable, corrected for the skewness
-/// (Edgeworth). The error is of order (blur/a)². `spread` is the variance of r² among the pixels
-/// that share this distance.
+/// |r + ε|² is w times a noncentral χ² with two degrees of freedom: mean r² + 2w, variance 4r²w +
+/// 4w², third cumulant 24 r²w² + 16 w³. The mean of the root is that of a normal variable,
+/// corrected for the skewness (Edgeworth). The error is of order (blur/a)². `spread` is the
+/// variance of r² among the pixels that share this distance.
 pub fn level(edge: &BlurredEdge, shape: &Shape, r2: f64, spread: f64) -> Level {
     let (w, inverse) = (shape.blur, 1.0 / (shape.radius * shape.radius));
     let inverse2 = inverse * inverse;
+    // Cumulants of x, which is one less a scaled noncentral χ².
     let mean = 1.0 - (r2 + 2.0 * w) * inverse;
     let variance = (4.0 * r2 * w + 4.0 * w * w + spread) * inverse2;
     let skew = -(24.0 * r2 * w * w + 16.0 * w * w * w) * inverse2 * inverse;
@@ -171,6 +176,7 @@ pub fn level(edge: &BlurredEdge, shape: &Shape, r2: f64, spread: f64) -> Level {
     let z = mean / sd;
     let h = edge.derivatives(z);
     let q = skew / (6.0 * variance * sd);
+    // √x = √sd √(z + N): the root of the standard deviation scales the tabulated edge.
     let scale = sd.sqrt();
     let root = Power {
         value: scale * (h[0] + q * h[3]),

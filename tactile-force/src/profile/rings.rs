@@ -28,7 +28,7 @@ impl Rings {
         self.rings.iter().filter(|ring| ring.place[0] > 0.0)
     }
 
-    /// Gathers the pixels of the aperture. The centre is relative to the region's first pixel;
+    /// Gathers the pixels of the aperture. The centre is relative to the region's first pixel.
     /// `aspect` is the pixel's height over its width, and distances are in pixel widths. `radius`
     /// is about that of the contact.
     pub fn gather(&mut self, region: &Region, centre: [f64; 2], aspect: f64, radius: f64) {
@@ -44,6 +44,7 @@ impl Rings {
         }
         for run in &region.aperture {
             let span = &mut spans[run.row as usize];
+            // Blocks need unbroken rows. Pixels of shorter runs in the row are added one by one.
             if run.len() > span[1] - span[0] {
                 *span = [run.start as usize, run.end as usize];
             }
@@ -215,6 +216,7 @@ impl pulp::NullaryFnOnce for Gather<'_> {
         for run in aperture {
             let (row, start, end) = (run.row as usize, run.start as usize, run.end as usize);
             let [from, to] = self.taken[row];
+            // The run that blocks were taken from: only what is left at both sides of them.
             if from < to && start <= from && to <= end {
                 self.pixels(row, start..from);
                 self.pixels(row, to..end);
@@ -372,6 +374,7 @@ impl<const SIDE: usize> RingBlock<SIDE> {
         let [qq, qqqq] = [aspect2 * pp, aspect2 * aspect2 * pppp];
         let (u2, v2) = (u * u, v * v);
         // Over one row and one column: the square, of which the block has as many as its side.
+        // Σ(u + p)² over a row is side u² + Σp², since Σp vanishes about the block's centre.
         let (row_uu, column_vv) = (side * u2 + pp, side * v2 + qq);
         let (uu, vv) = (side * row_uu, side * column_vv);
         let r2u = u * (uu + 2.0 * side * pp + vv);

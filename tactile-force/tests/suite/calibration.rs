@@ -160,7 +160,9 @@ proptest! {
         // Forces and pixel values in other units: the same curve in those units.
         let pairs = cycle(10, 5e-3, seed, bent);
         let scaled: Pairs = pairs.iter().map(|p| CalibrationPair {
-            integrated_pixel_value: p.integrated_pixel_value * scale, force_n: p.force_n / scale, branch: p.branch
+            integrated_pixel_value: p.integrated_pixel_value * scale,
+            force_n: p.force_n / scale,
+            branch: p.branch
         }).collect();
         let (a, b) = (fitted(&pairs), fitted(&scaled));
         let (fa, fb) = (a.force_n(1.3e6), b.force_n(1.3e6 * scale) * scale);

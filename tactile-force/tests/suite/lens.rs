@@ -172,7 +172,8 @@ proptest! {
         // Newton's last step is below 1e-12 radii.
         prop_assert!((back[0] - x).hypot(back[1] - y) < 1e-8);
         let corner = |dx: f64, dy: f64| lens.to_metres([x + dx, y + dy]);
-        let (a, b, c, d) = (corner(-0.5, -0.5), corner(0.5, -0.5), corner(0.5, 0.5), corner(-0.5, 0.5));
+        let (a, b) = (corner(-0.5, -0.5), corner(0.5, -0.5));
+        let (c, d) = (corner(0.5, 0.5), corner(-0.5, 0.5));
         let twice = (c[0] - a[0]) * (d[1] - b[1]) - (d[0] - b[0]) * (c[1] - a[1]);
         // Finite differences over a pixel: second order in 1/200.
         prop_assert!((lens.pixel_area_m2([x, y]) / (0.5 * twice) - 1.0).abs() < 1e-4);

@@ -223,7 +223,8 @@ proptest! {
         // Forces that fall throughout leave the sums without a rising curve. That is refused.
         if let Ok(curve) = PressureCurve::fit(&frames, &PressureCurveOptions::default()) {
             prop_assert_eq!(curve.pressure_pa(0.0).value, 0.0);
-            let pressures: Vec<f64> = (-10..=260).map(|g| curve.pressure_pa(f64::from(g)).value).collect();
+            let pressure = |g: i32| curve.pressure_pa(f64::from(g)).value;
+            let pressures: Vec<f64> = (-10..=260).map(pressure).collect();
             prop_assert!(pressures.windows(2).all(|w| w[1] >= w[0]));
             prop_assert!(curve.pressure_pa(100.0).standard_error.is_finite());
         }

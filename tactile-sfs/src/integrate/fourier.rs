@@ -163,6 +163,7 @@ impl FourierBuffers {
             for c in 0..columns {
                 let i = r * columns + c;
                 let j = (rows - r) % rows * columns + (columns - c) % columns;
+                // Done together with its partner.
                 if j < i {
                     continue;
                 }
@@ -171,6 +172,8 @@ impl FourierBuffers {
                 let (p, q) = ((here + there).scale(0.5), (here - there).scale(0.5));
                 let q = Complex::new(q.im, -q.re);
                 let square = u * u + v * v;
+                // Frequency 0 is the constant that slopes leave open. The scale undoes the
+                // transforms' factor.
                 let factor = if square > 0.0 { scale / square } else { 0.0 };
                 let sum = (p.scale(u) + q.scale(v)).scale(factor);
                 let z = Complex::new(sum.im, -sum.re);

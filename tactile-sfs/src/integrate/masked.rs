@@ -100,11 +100,13 @@ impl<'a, T: PixelScalar> MaskedLeastSquares<'a, T> {
         match (usable(from), usable(to)) {
             (Some([b, v]), Some([c, w])) => {
                 let mean = match (slope(before), slope(beyond)) {
+                    // Integrals over the edge of the polynomial through the slopes that there are.
                     (Some(a), Some(d)) => (13.0 * (b + c) - a - d) / 24.0,
                     (Some(a), None) => (5.0 * c + 8.0 * b - a) / 12.0,
                     (None, Some(d)) => (5.0 * b + 8.0 * c - d) / 12.0,
                     (None, None) => 0.5 * (b + c),
                 };
+                // The harmonic mean is governed by the less certain of the two slopes.
                 [mean, 2.0 * v * w / (v + w)]
             }
             (Some(one), None) | (None, Some(one)) => one,
@@ -172,6 +174,7 @@ impl<T: PixelScalar> SlopeIntegrator<T> for MaskedLeastSquares<'_, T> {
         }
         if self.is_poisson(domain, area) {
             match CosinePoisson.integrate_with(workspace, p, q, domain, surface) {
+                // The general solver can leave such slopes out.
                 Err(SfsError::NonFiniteSlope { .. }) => {}
                 other => {
                     other?;
@@ -225,6 +228,7 @@ impl<T: PixelScalar> MaskedLeastSquares<'_, T> {
                     continue;
                 };
                 let [slope, weight] = self.edge(slopes[axis], [before[axis], here, next, beyond]);
+                // The squared rise over the step is minimised, scaled by h_y².
                 let (step, factor) = [(hx, (hy / hx).powi(2)), (hy, 1.0)][axis];
                 let height = |[row, column]: [usize; 2]| domain.known(row, column).map(T::as_f64);
                 let ends = [from, to].map(|at| (buffers.number_of(at, area), height(at)));
@@ -280,6 +284,7 @@ impl MaskedBuffers {
                 self.rhs[end] += weight * (sign * rise + other.unwrap_or(0.0));
             }
         }
+        // A known end is no unknown: its height has gone to the right-hand side.
         if i.1.is_none() && j.1.is_none() {
             self.edges.push((i.0, j.0, weight));
         }
@@ -335,6 +340,8 @@ impl MaskedBuffers {
         for part in self.parts.iter().filter(|part| !part.anchored) {
             // A part of one pixel has no edge.
             let held = &mut self.diagonal[self.number[part.first]];
+            // The spring is as stiff as the pixel's edges, which keeps the condition of the
+            // equations.
             *held = if *held > 0.0 { 2.0 * *held } else { 1.0 };
         }
         let entry = Triplet::<usize, usize, f64>::new;

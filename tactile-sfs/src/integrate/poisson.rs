@@ -110,6 +110,7 @@ impl CosineTransform {
         for (k, twiddle) in self.twiddles.iter().enumerate() {
             // The transforms of the two rows are (V_k + V̄_−k)/2 and (V_k − V̄_−k)/2i.
             let (here, there) = (self.line[k], self.line[(n - k) % n].conj());
+            // The transform of two real rows separates by its symmetry in frequency.
             a[k] = 0.5 * (twiddle * (here + there)).re;
             b[k] = 0.5 * (twiddle * (here - there)).im;
         }
@@ -120,6 +121,8 @@ impl CosineTransform {
         let n = self.line.len();
         self.line[0] = Complex::new(a[0], b[0]);
         for k in 1..n {
+            // The inverse of the separation above, with the two rows again as real and imaginary
+            // part.
             let both = Complex::new(a[k] + b[n - k], b[k] - a[n - k]);
             self.line[k] = self.twiddles[k].conj() * both;
         }
@@ -245,6 +248,7 @@ impl PoissonBuffers {
         let mut lambda = [1.0; LANES];
         for (lane, lambda) in lambda.iter_mut().enumerate().take(lanes) {
             let angle = core::f64::consts::PI * (left + lane) as f64 / (2 * columns) as f64;
+            // 4 sin²(x/2) for 2 − 2 cos x, which cancels at low frequencies.
             *lambda = aspect2 * 4.0 * angle.sin().powi(2);
         }
         let (mut pivot, mut carry) = ([0.0; LANES], [0.0; LANES]);

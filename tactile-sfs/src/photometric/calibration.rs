@@ -73,6 +73,7 @@ impl Sums {
     /// Sums over rows of terms, then n_x and n_y.
     fn of(rows: &[f64]) -> Self {
         let all = DMatrix::from_row_slice(rows.len() / (TERMS + 2), TERMS + 2, rows);
+        // One product of matrices gives both sides of the normal equations.
         let products = all.tr_mul(&all);
         Self {
             square: products.view((0, 0), (TERMS, TERMS)).into_owned(),
@@ -164,8 +165,11 @@ impl PhotometricStereo {
             let kept = circle.drawn_px.filter(|_| !circle.wrong).or(circle.used_px);
             if let Some(circle) = kept {
                 let mut others = total.clone();
+                // Sums of the normal equations add over presses. Leaving one out is a subtraction.
                 others.add(sums, -1.0);
                 let model = PhotometricModel {
+                    // With an error of 1 the reading's errors are the factors from normals to
+                    // gradients.
                     normal_standard_error: 1.0,
                     ..PhotometricModel::new(pixel_size_m, others.solve()?)
                 };
@@ -217,9 +221,12 @@ impl Press {
         samples(&self.frame, reference, |row, column, terms| {
             let [x, y] = [column as f64 - x0, row as f64 - y0];
             let square = x * x + y * y;
+            // Neighbours share most of their noise after the blur, so that fewer pixels lose
+            // little.
             if square < radius * radius && (column + 7 * row).is_multiple_of(3) {
                 rows.extend(terms());
                 rows.extend([x / self.ball_px, y / self.ball_px]);
+            // Nearer to the contact the free gel is not flat: it hangs from the rim.
             } else if square > 9.0 * radius * radius && (5 * column + 7 * row).is_multiple_of(31) {
                 rows.extend(terms());
                 rows.extend([0.0; 2]);
@@ -329,11 +336,14 @@ fn judged(presses: &[Press], found: &[Option<[f64; 3]>]) -> (Vec<CircleFinding>,
     let usual = quantile(&mut misfits, 0.5);
     let judge = |(press, found): (&Press, &Option<[f64; 3]>)| {
         let misfit_px = press.drawn.zip(*found).map(misfit);
+        // Where all circles are drawn well the median misfit is small. The second limit keeps them
+        // right.
         let limit = (3.0 * usual).max(0.1 * press.ball_px);
         let shifted = found.map(|found| [0, 1, 2].map(|k| found[k] + offset[k]));
         CircleFinding {
             drawn_px: press.drawn,
             found_px: *found,
+            // A press without a contact found still counts with the circle that the user drew.
             used_px: shifted.or(press.drawn).map(|circle| press.within(circle)),
             misfit_px,
             wrong: misfit_px.is_some_and(|misfit| misfit > limit),
@@ -359,6 +369,7 @@ impl Misses {
         [x0, y0, radius]: [f64; 3],
     ) -> Result<(), SfsError> {
         let reading = without.read_blurred(&press.frame)?;
+        // Depth counts from the contact circle: the cap's height less that of its rim.
         let rim = (press.ball_px.powi(2) - radius * radius).sqrt();
         for ((row, column), depth) in reading.depth_m.indexed_iter() {
             let [x, y] = [column as f64 - x0, row as f64 - y0];
@@ -378,6 +389,7 @@ impl Misses {
             let length = |[p, q]: [f64; 2]| (1.0 + p * p + q * q).sqrt();
             let cosine =
                 (1.0 + found[0] * truth[0] + found[1] * truth[1]) / (length(found) * length(truth));
+            // Rounding can take the cosine of equal normals above 1.
             self.angles.push(cosine.min(1.0).acos().to_degrees());
         }
         Ok(())

@@ -37,9 +37,11 @@ impl Blurred {
                 line[k] = line[6 + k % 3];
                 line[6 + width + k] = line[3 + width + k % 3];
             }
+            // Neighbours of one channel lie three samples apart.
             let taps = |k: usize| &line[3 * k..][..width];
             let (a, b, c, d, e) = (taps(0), taps(1), taps(2), taps(3), taps(4));
             for (i, out) in out.iter_mut().enumerate() {
+                // Not divided by 16: the sum of whole numbers is exact.
                 *out = a[i] + e[i] + 4 * (b[i] + d[i]) + 6 * c[i];
             }
         }

@@ -48,6 +48,7 @@ pub fn contact(normals: &[Array2<f32>; 2]) -> Array2<bool> {
         return mask;
     };
     let above = divergence.mapv(|d| d > threshold);
+    // Shrinking before growing removes specks of noise and keeps the size of patches.
     let opened = grown(&grown(&above, false), true);
     let Some(patches) = filled(&opened) else {
         return mask;
@@ -69,6 +70,7 @@ pub fn contact(normals: &[Array2<f32>; 2]) -> Array2<bool> {
         for (line, (above, below)) in line.iter_mut().zip(ends) {
             *line = (1.0 - v) * above + v * below;
         }
+        // Most rows do not meet the contact, and their interpolation is spared.
         if line.iter().any(|value| *value > 0.5) {
             for (inside, &(c, u)) in to.iter_mut().zip(&across) {
                 *inside = (1.0 - u) * line[c] + u * line[c + 1] > 0.5;
@@ -116,6 +118,7 @@ fn blurred(image: &Array2<f32>, times: usize) -> Array2<f32> {
 fn threshold(divergence: &Array2<f32>) -> Option<f32> {
     const BINS: usize = 4096;
     let low = divergence.iter().copied().fold(f32::MAX, f32::min);
+    // Contacts have positive divergence, so that the largest value is at least 0.
     let high = divergence.iter().copied().fold(0.0, f32::max);
     let scale = BINS as f32 / (high - low);
     if !(scale > 0.0 && scale.is_finite()) {
@@ -130,6 +133,7 @@ fn threshold(divergence: &Array2<f32>) -> Option<f32> {
         sums.for_each(|(sum, d)| *sum += d);
     }
     let mut all = [0.0; 3];
+    // Running sums give the moments of both classes at any threshold without another pass.
     for sums in &mut below {
         all = [0, 1, 2].map(|k| all[k] + sums[k]);
         *sums = all;
@@ -138,6 +142,7 @@ fn threshold(divergence: &Array2<f32>) -> Option<f32> {
     for _ in 0..50 {
         let free = below[bin(threshold)];
         let touched = [0, 1].map(|k| all[k] - free[k]);
+        // An empty class has no mean.
         if free[0] < 1.0 || touched[0] < 1.0 {
             return None;
         }
@@ -178,6 +183,7 @@ fn filled(mask: &Array2<bool>) -> Option<Array2<bool>> {
         return None;
     }
     let mut kept = Array2::from_elem(mask.dim(), false);
+    // Several objects may touch at once. What is far smaller than the largest is noise.
     let large = patches.iter().filter(|patch| 10 * patch.len() >= largest);
     large.flatten().for_each(|&at| kept[at] = true);
     // A part of the box around all patches that reaches its border is outside of them.

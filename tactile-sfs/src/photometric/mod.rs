@@ -94,8 +94,8 @@ pub struct PhotometricReading {
 }
 
 impl PhotometricReading {
-    /// How far the gel's face has moved, in metres, and where it is touched, for blocks of this many
-    /// pixels a side. Incomplete blocks at the right and at the bottom are left out.
+    /// How far the gel's face has moved, in metres, and where it is touched, for blocks of this
+    /// many pixels a side. Incomplete blocks at the right and at the bottom are left out.
     ///
     /// The gradients of the whole face are integrated, also those of the free gel around a contact.
     /// The median along the border is taken as its rest.
@@ -132,6 +132,7 @@ impl PhotometricReading {
         let around = moved.indexed_iter().filter(|(at, _)| edge(*at));
         let mut around: Vec<f64> = around.map(|(_, z)| *z).collect();
         let middle = around.len() / 2;
+        // The median is not moved by a contact that reaches the border, as a mean would be.
         let rest = *around.select_nth_unstable_by(middle, f64::total_cmp).1;
         moved -= rest;
         let blocks: Vec<bool> = self
@@ -204,6 +205,7 @@ impl PhotometricStereo {
             .and(error_q)
             .for_each(|nx, ny, error_p, error_q| {
                 let sine = (*nx * *nx + *ny * *ny).sqrt();
+                // Both components shrink alike, so that the direction of the slope is kept.
                 let cut = STEEPEST / sine.max(STEEPEST);
                 let (x, y) = (*nx * cut, *ny * cut);
                 let up2 = 1.0 - x * x - y * y;
@@ -240,6 +242,8 @@ impl PhotometricStereo {
         let [p, q] = slopes.map(|slope| {
             let mut slope = area.of(slope.view()).mapv(f64::from);
             slope.zip_mut_with(&inside, |slope, inside| {
+                // The free gel's slopes are left out: its sag around the contact is not the
+                // object's depth.
                 *slope *= f64::from(u8::from(*inside))
             });
             slope
@@ -250,6 +254,7 @@ impl PhotometricStereo {
             .heights;
         let around = heights.iter().zip(&inside).filter(|(_, inside)| !**inside);
         let (sum, count) = around.fold((0.0, 0_usize), |(sum, n), (z, _)| (sum + z, n + 1));
+        // Integration leaves the height open to a constant. Around the contact the depth is 0.
         let zero = sum / count.max(1) as f64;
         let mut to = area.of_mut(depth.view_mut());
         Zip::from(&mut to)
@@ -257,6 +262,7 @@ impl PhotometricStereo {
             .and(&inside)
             .for_each(|to, z, inside| {
                 if *inside {
+                    // A touched place cannot lie above the free face.
                     *to = (z - zero).max(0.0);
                 }
             });
@@ -275,6 +281,7 @@ impl<T: PixelScalar> SurfaceReconstruction<T> for PhotometricStereo {
         };
         let reading = self.read(frame)?;
         domain.bounding_box(reading.depth_m.dim())?;
+        // The model's depths are in metres of its own pixels. The domain may count in another unit.
         let scale = domain.pixel_size_m[0].as_f64() / self.model.pixel_size_m;
         let heights = Array2::from_shape_fn(reading.depth_m.dim(), |(row, column)| {
             match domain.contains(row, column) {

@@ -101,6 +101,7 @@ impl<T: PixelScalar> DepthTable<T> {
         let found = || contact_circle(&signals, threshold.as_f64(), step);
         let (centre_px, radius) = circle.map_or_else(found, Ok)?;
         let ball = ball_radius_m.as_f64();
+        // A contact circle as wide as the ball has no cap.
         if radius.is_nan() || radius >= ball {
             return Err(SfsError::ContactBeyondBall {
                 found_m: radius,
@@ -185,6 +186,7 @@ fn monotone_means(samples: &[(f64, f64)]) -> Vec<(f64, f64)> {
         .iter()
         .map(|&(s, d)| (s.round() as i64, s, d))
         .collect();
+    // The whole tuple decides, so that sums do not depend on the order of equal levels.
     sorted.sort_by(|a, b| {
         a.0.cmp(&b.0)
             .then(a.1.total_cmp(&b.1))
@@ -199,6 +201,7 @@ fn monotone_means(samples: &[(f64, f64)]) -> Vec<(f64, f64)> {
             level.iter().map(|e| e.1).sum(),
             level.iter().map(|e| e.2).sum(),
         ));
+        // Pooling adjacent violators: blocks whose means do not rise are merged until they do.
         while let [.., a, b] = blocks[..] {
             if b.2 / b.0 > a.2 / a.0 {
                 break;
@@ -212,6 +215,7 @@ fn monotone_means(samples: &[(f64, f64)]) -> Vec<(f64, f64)> {
         blocks
             .iter()
             .map(|b| (b.1 / b.0, b.2 / b.0))
+            // The entry (0, 0) stands for signals up to 0, and signals of a table must increase.
             .filter(|e| e.0 > 0.0),
     );
     entries
@@ -221,7 +225,7 @@ fn monotone_means(samples: &[(f64, f64)]) -> Vec<(f64, f64)> {
 const FEWEST: usize = 100;
 
 /// Centroid (px) and radius of equal area (m) of the largest connected patch above the threshold:
-/// whatever else exceeds it, uneven light at the frame's edge say, is no contact. O(pixels).
+/// other patches, such as uneven light at the frame's edge, are no contact. O(pixels).
 ///
 /// Stray pixels are kept from counting by demanding that four of the eight neighbours are above the
 /// threshold too.
@@ -246,6 +250,7 @@ fn contact_circle(
     }
     let n = patch.len() as f64;
     let mean = |axis: usize| patch.iter().map(|at| at[axis] as f64).sum::<f64>() / n;
+    // By area, because single pixels at the rim move it far less than they move an outline.
     let radius = (n * step[0] * step[1] / core::f64::consts::PI).sqrt();
     Ok(([mean(1), mean(0)], radius))
 }

@@ -28,8 +28,10 @@ use crate::{
 /// use ndarray::Array2;
 /// use tactile_sfs::{BrooksHorn, Domain, Lighting, SurfaceReconstruction};
 /// let image = Array2::from_elem((16, 16), 1.0);
-/// let surface = BrooksHorn::new(Lighting::default()).reconstruct(image.view().into(), &Domain::default())?;
-/// assert!(surface.heights.iter().all(|z: &f64| z.abs() < 1e-9)); // facing the light everywhere: flat
+/// let method = BrooksHorn::new(Lighting::default());
+/// let surface = method.reconstruct(image.view().into(), &Domain::default())?;
+/// // Facing the light everywhere: flat.
+/// assert!(surface.heights.iter().all(|z: &f64| z.abs() < 1e-9));
 /// # Ok::<(), tactile_sfs::SfsError>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -97,8 +99,10 @@ impl<T: PixelScalar> BrooksHorn<T> {
     ///     .with_occluding_boundary(true)
     ///     .with_smoothness(0.05)?
     ///     .with_iterations(100, 20)?;
-    /// let heights = method.reconstruct(image.view().into(), &Domain::default().with_mask(mask.view()))?.heights;
-    /// assert!(heights[[12, 12]] - heights[[12, 4]] > 2.0); // a bump: the boundary says so, the light does not
+    /// let domain = Domain::default().with_mask(mask.view());
+    /// let heights = method.reconstruct(image.view().into(), &domain)?.heights;
+    /// // A bump by the boundary alone: the light would allow a hollow.
+    /// assert!(heights[[12, 12]] - heights[[12, 4]] > 2.0);
     /// # Ok::<(), tactile_sfs::SfsError>(())
     /// ```
     pub fn with_occluding_boundary(self, occluding_boundary: bool) -> Self {
@@ -180,6 +184,7 @@ impl<T: PixelScalar> BrooksHorn<T> {
         report.stop = StopReason::IterationLimit;
         for step in 1..=self.iterations {
             report.iterations = step;
+            // Between projections the normals move freely and need not belong to any surface.
             report.residual = self.relax(&mut workspace.field, area, frame);
             if step % self.project_every == 0 || step == self.iterations {
                 match integrator {
@@ -192,6 +197,8 @@ impl<T: PixelScalar> BrooksHorn<T> {
                     report.stop = stop;
                     break;
                 }
+                // After the last step the heights are the answer, and the normals are not used
+                // again.
                 if step < self.iterations {
                     follow(workspace, domain.pixel_size_m, area);
                 }
@@ -221,6 +228,7 @@ impl<T: PixelScalar> BrooksHorn<T> {
                 mean[2] + pull * light[2],
             ]);
         }
+        // Jacobi, not Gauss–Seidel: the answer does not depend on the order of the pixels.
         core::mem::swap(&mut field.normals, &mut field.next);
         (sum / T::of(count.max(1) as f64)).sqrt()
     }
@@ -343,12 +351,14 @@ pub(crate) struct SlopeBuffers<T> {
 }
 
 impl<T: PixelScalar> BrooksHorn<T> {
-    /// The slopes of a normal, zero where the image says nothing.
+    /// The slopes of a normal, zero where the image has no value.
     fn slopes(&self, normal: &[T; 3], reflectance: T) -> [T; 2] {
         if reflectance.is_nan() {
             return [T::zero(); 2];
         }
         let least = T::one() / (T::one() + self.max_slope * self.max_slope).sqrt();
+        // Normals near the image plane have slopes without bound, which would dominate the
+        // projection.
         let z = normal[2].max(least);
         [normal[0], normal[1]].map(|n| (-n / z).max(-self.max_slope).min(self.max_slope))
     }

@@ -2,8 +2,7 @@
 //!
 //! Each pixel's signal (its grey level, or its darkening or brightening against a reference image)
 //! is looked up in a calibrated table, linearly between the entries. No neighbour is involved, so
-//! nothing accumulates. The price is a calibration and even illumination.
-
+//! nothing accumulates. It needs a calibration and even illumination.
 //!
 //! A table calibrated on a ball counts depth from the contact circle. That circle is where the
 //! signal crossed a threshold, often with its radius rounded to a pixel. The surface is already
@@ -28,7 +27,8 @@ use crate::{
 /// use ndarray::{Array2, array};
 /// use tactile_sfs::{DepthTable, Domain, Signal, SurfaceReconstruction};
 /// let (reference, image) = (Array2::from_elem((1, 2), 200.0), array![[200.0, 180.0]]);
-/// let table = DepthTable::new(&[(0.0, 0.0), (40.0, 1e-3)])?; // a millimetre darkens by 40 grey levels
+/// // A millimetre darkens by 40 grey levels.
+/// let table = DepthTable::new(&[(0.0, 0.0), (40.0, 1e-3)])?;
 /// let method = table.with_signal(Signal::Darkening(reference));
 /// let depth = method.reconstruct(image.view().into(), &Domain::new([1e-4, 1e-4])?)?.heights;
 /// assert_eq!(depth, array![[0.0, 0.5e-3]]);
@@ -155,6 +155,7 @@ impl<T: PixelScalar> DepthTable<T> {
     pub fn depth(&self, signal: T) -> (T, bool) {
         let entries = &self.entries;
         let (first, last) = (entries[0], entries[entries.len() - 1]);
+        // Nothing is extrapolated: beyond its ends the table is constant.
         if signal <= first.0 {
             return (first.1, signal == first.0);
         }
@@ -247,7 +248,7 @@ impl<T: PixelScalar> DepthTable<T> {
     ///
     /// ```
     /// use tactile_sfs::DepthTable;
-    /// // A level is 30 µm deep; the makers counted depth from where they saw the contact, at three levels.
+    /// // A level is 30 µm deep. The makers counted depth from the contact's rim, at three levels.
     /// let entries: Vec<_> = (3..60).map(|s| (f64::from(s), 30e-6 * f64::from(s - 3))).collect();
     /// let table = DepthTable::new(&entries)?.with_contact_threshold(3.0)?;
     /// assert!((table.depth(40.0).0 - 1.11e-3).abs() < 1e-12);
@@ -266,6 +267,7 @@ impl<T: PixelScalar> DepthTable<T> {
             .map(|(signal, depth)| (signal.as_f64(), depth.as_f64()))
             .collect();
         let zero = depth_at_zero(&kept)?;
+        // A depth below that of no signal would be noise of the fit.
         let moved = |&(s, d): &(f64, f64)| (T::of(s), T::of((d - zero).max(0.0)));
         self.entries = vec![(T::zero(), T::zero())];
         self.entries.extend(kept.iter().map(moved));
@@ -295,6 +297,7 @@ fn depth_at_zero(entries: &[(f64, f64)]) -> Result<f64, SfsError> {
         Vector3::new(1.0, x, x * x)
     };
     let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
+    // Depths count from the first entry, which removes their common offset from the sums.
     for &(signal, depth) in entries {
         normal += row(signal) * row(signal).transpose();
         right += row(signal) * (depth - first.1);

@@ -94,16 +94,21 @@ pub trait SurfaceReconstruction<T: PixelScalar> {
     /// ```
     /// use std::sync::Arc;
     /// use ndarray::Array2;
-    /// use tactile_sfs::{BrooksHorn, Domain, Eikonal, Lighting, MaskedLeastSquares, SurfaceReconstruction};
-    /// // A hemisphere of radius 10 px; least squares over the mask alone do not take its surroundings as flat.
+    /// use tactile_sfs::{
+    ///     BrooksHorn, Domain, Eikonal, Lighting, MaskedLeastSquares, SurfaceReconstruction,
+    /// };
+    /// // A hemisphere of radius 10 px. Least squares over the mask alone do not take its
+    /// // surroundings as flat.
     /// let z = Array2::from_shape_fn((25, 25), |(r, c)| {
     ///     (100.0 - (r as f64 - 12.0).powi(2) - (c as f64 - 12.0).powi(2)).max(0.0).sqrt()
     /// });
     /// let (image, mask) = (z.mapv(|z| z / 10.0), z.mapv(|z| z > 0.0));
     /// let domain = Domain::default().with_mask(mask.view());
     /// let fourier = BrooksHorn::new(Lighting::default()).with_occluding_boundary(true);
-    /// let masked = fourier.with_slope_integrator(Arc::new(MaskedLeastSquares::default())).expect("slopes");
-    /// let error = |heights: &Array2<f64>| ((heights[[12, 12]] - heights[[12, 5]]) / (z[[12, 12]] - z[[12, 5]]) - 1.0).abs();
+    /// let integrator = Arc::new(MaskedLeastSquares::default());
+    /// let masked = fourier.with_slope_integrator(integrator).expect("slopes");
+    /// let rise = |heights: &Array2<f64>| heights[[12, 12]] - heights[[12, 5]];
+    /// let error = |heights: &Array2<f64>| (rise(heights) / rise(&z) - 1.0).abs();
     /// let [periodic, least_squares] = [
     ///     fourier.reconstruct(image.view().into(), &domain)?.heights,
     ///     masked.reconstruct(image.view().into(), &domain)?.heights,
@@ -190,6 +195,7 @@ impl<T: PixelScalar> FieldBuffers<T> {
             surface.flags[[row, column]] =
                 PixelFlags::of_reflectance(value, T::min_positive_value());
             usable |= value.is_finite();
+            // No lit normal has a cosine outside 0 to 1. The flags record that the value was cut.
             let clamped = value.max(T::zero()).min(T::one());
             self.reflectance
                 .push(if value.is_finite() { clamped } else { T::nan() });

@@ -89,13 +89,16 @@ impl<T: PixelScalar> TsaiShah<T> {
     /// ```
     /// use ndarray::Array2;
     /// use tactile_sfs::{Domain, Lighting, SurfaceReconstruction, TsaiShah};
-    /// let image = Array2::from_shape_fn((17, 17), |(r, c)| 1.0 - 1e-3 * ((r as f64 - 8.0).powi(2) + (c as f64 - 8.0).powi(2)));
+    /// let square = |r: usize, c: usize| (r as f64 - 8.0).powi(2) + (c as f64 - 8.0).powi(2);
+    /// let image = Array2::from_shape_fn((17, 17), |(r, c)| 1.0 - 1e-3 * square(r, c));
     /// let top = |start_slope| {
-    ///     let method = TsaiShah::new(Lighting::default()).with_noise(0.05)?.with_start_slope(start_slope)?;
+    ///     let method = TsaiShah::new(Lighting::default()).with_noise(0.05)?;
+    ///     let method = method.with_start_slope(start_slope)?;
     ///     let z = method.reconstruct(image.view().into(), &Domain::default())?.heights;
     ///     Ok::<f64, tactile_sfs::SfsError>(z[[8, 8]] - z[[8, 1]])
     /// };
-    /// assert!(top(0.5)? > 0.0 && top(-0.5)? < 0.0); // bump or hollow: the caller's choice under frontal light
+    /// // Bump or hollow: the caller's choice under frontal light.
+    /// assert!(top(0.5)? > 0.0 && top(-0.5)? < 0.0);
     /// assert!(top(0.0)?.abs() < 1e-9);
     /// # Ok::<(), tactile_sfs::SfsError>(())
     /// ```
@@ -147,6 +150,7 @@ impl<T: PixelScalar> TsaiShah<T> {
         let largest = 0.5 * (xx + yy) + (0.5 * (xx - yy)).hypot(xy);
         let minor = 2.0 * (determinant / largest).sqrt();
         let curvature = -0.5 * self.start_slope.as_f64() * minor / (4.0 * determinant);
+        // The quadratic form of C⁻¹, whose determinant has gone into the factor.
         for (i, z) in field.heights.iter_mut().enumerate() {
             let (x, y) = (at(i).0 - cx, at(i).1 - cy);
             *z = T::of(curvature * (yy * x * x - 2.0 * xy * x * y + xx * y * y));
@@ -237,6 +241,7 @@ impl<T: PixelScalar> TsaiShah<T> {
     /// One step at every pixel. Returns the root mean square misfit before it.
     fn iterate(&self, field: &mut FieldBuffers<T>, grid: &Grid<T>, iteration: usize) -> T {
         let sign = |back: bool| if back { T::one() } else { -T::one() };
+        // Four iterations take all four corners.
         let back = [iteration & 1 == 0, iteration & 2 == 0];
         let per = [sign(back[0]) / grid.step[0], sign(back[1]) / grid.step[1]];
         let cut = |slope: T| slope.max(-self.max_slope).min(self.max_slope);
@@ -254,6 +259,7 @@ impl<T: PixelScalar> TsaiShah<T> {
             let (f, slope) = self.residual(reflectance, slopes, per);
             let variance = field.variance[i];
             let gain = variance * slope / (self.noise + slope * slope * variance);
+            // The variance only falls, so that later iterations change less and less.
             field.variance[i] = (T::one() - gain * slope) * variance;
             field.next_heights[i] = z - gain * f;
             sum += f * f;
@@ -271,6 +277,7 @@ impl<T: PixelScalar> TsaiShah<T> {
         let w = w2.sqrt();
         let cosine = (sz - sx * p - sy * q) / w;
         let slope = (sx * ax + sy * ay) / w + cosine * (p * ax + q * ay) / w2;
+        // The derivative is not cut in attached shadow: it leads the pixel back into the light.
         (reflectance - cosine.max(T::zero()), slope)
     }
 }

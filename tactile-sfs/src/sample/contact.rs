@@ -1,5 +1,5 @@
-//! Points of a round body that meets a plane: to the sub-pixel contour, and with heights that know
-//! of the vertical boundary.
+//! Points of a round body that meets a plane: to the sub-pixel contour, and with heights that
+//! follow the vertical boundary.
 //!
 //! Near the boundary z rises as the square root of the distance, and no interpolation of z between
 //! pixels follows it. Its square does: z² = a² − x² − y² for a ball, a smooth function whose zero
@@ -155,6 +155,8 @@ impl<T: PixelScalar> Field<T> {
             }
         }
         for height in &mut squares {
+            // Squares of depths above the plane. Negative heights would otherwise have the squares
+            // of positive ones.
             *height = (*height - plane).powi(2);
         }
         let mut field = Self {
@@ -190,7 +192,7 @@ impl<T: PixelScalar> Field<T> {
             }
         };
         for row in 0..self.rows {
-            // Whether one of a column's three places about this row has a square; of the columns
+            // Whether one of a column's three places about this row has a square, for the columns
             // before, at and after the present one.
             let is_reached = |column: usize| {
                 (row.saturating_sub(1)..(row + 2).min(self.rows))
@@ -274,6 +276,7 @@ impl<T: PixelScalar> Field<T> {
                 } else {
                     (0.5 + here / change).max(0.0)
                 };
+                // With s = z² the slope is ∇s/(2z), so that its square is |∇s|²/(4s).
                 let slope_squared = if here > 0.0 {
                     (gx * gx + (gy / self.aspect).powi(2)) / (4.0 * here)
                 } else {
@@ -311,6 +314,7 @@ impl<T: PixelScalar> Field<T> {
             }
         }
         let square = if total > 0.0 { sum / total } else { 0.0 };
+        // Beyond the contour the interpolated square is negative, and the point lies in the plane.
         let height = self.plane + square.max(0.0).sqrt();
         let [width_m, height_m] = self.pixel_size_m;
         Point3::new(

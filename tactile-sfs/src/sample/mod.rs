@@ -209,6 +209,7 @@ fn spread<T: PixelScalar>(
     // Points nearly as dense as the nodes: nodes themselves, evenly in reading order.
     points.clear();
     let nodes = lattice.nodes().enumerate();
+    // In whole numbers exactly `count` of the nodes pass.
     let chosen = nodes.filter(|(k, _)| (k + 1) * count / lattice.count > k * count / lattice.count);
     points.extend(chosen.map(|(_, node)| lattice.point(lattice.pixel(node))));
 }
@@ -306,6 +307,7 @@ impl<T: PixelScalar> ControlPointSampler<T> for CurvatureAdaptive {
         if mean > 0.0 {
             let nodes = lattice.weight.iter_mut().filter(|weight| **weight > 0.0);
             for (weight, curvature) in nodes.zip(curvatures) {
+                // Relative to the mean, so that the emphasis has no unit.
                 *weight *= 1.0 + self.emphasis * (*curvature / mean).sqrt();
             }
         }
@@ -412,7 +414,7 @@ fn unit(state: &mut u64) -> f64 {
 /// other pixel to a third.
 const NODES_PER_POINT: usize = 100;
 /// Steeper ground counts as this steep (63°). At the rim of a round body the slope has no end: how
-/// much of it a lattice sees depends on the pixels, and points would follow those, not the body.
+/// much of it a lattice covers depends on the pixels. Points would follow those, not the body.
 const STEEPEST: f64 = 2.0;
 /// Fewest nodes per point that leave points room to move.
 const ROOM: usize = 8;
@@ -463,6 +465,7 @@ impl<'s, 'd, T: PixelScalar> Lattice<'s, 'd, T> {
             if stride == 1 || lattice.has_room_for(points) {
                 return lattice.enough_for(points);
             }
+            // A thin or small mask in a large box has fewer nodes than the box would hold.
             stride /= 2;
             weight = lattice.weight;
         }
@@ -683,6 +686,7 @@ impl Strips {
 /// Number of strips that makes cells about as wide as high.
 fn bands(grid: &Weights<'_>, points: usize) -> usize {
     let width = grid.count / grid.rows as f64;
+    // Cells of side s: rows · aspect/s strips of width/s cells each make up the points.
     let square = points as f64 * grid.rows as f64 * grid.aspect / width;
     (square.sqrt().round() as usize).clamp(1, points)
 }

@@ -97,18 +97,22 @@ impl Placed {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 24, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig {
+        cases: 24, failure_persistence: None, ..ProptestConfig::default()
+    })]
 
     #[test]
     fn neither_the_place_nor_what_is_outside_the_mask_matters(
         top in 0usize..20, left in 0usize..20, rows in 37usize..50, columns in 43usize..60,
-        a in 2.0f64..11.0, b in 2.0f64..8.0, outside in prop_oneof![Just(f64::NAN), Just(1e300), -3.0f64..3.0],
+        a in 2.0f64..11.0, b in 2.0f64..8.0,
+        outside in prop_oneof![Just(f64::NAN), Just(1e300), -3.0f64..3.0],
     ) {
         let here = Placed::new(PATCH, [0, 0], [a, b], 0.0).heights([0, 0]);
         let there = Placed::new((rows, columns), [top, left], [a, b], outside).heights([top, left]);
         for ((name, here), (_, there)) in here.iter().zip(&there) {
             // The box is solved by the same operations wherever it lies: the same bits.
-            let same = here.iter().zip(there).all(|(x, y)| x.to_bits() == y.to_bits() || x.is_nan() && y.is_nan());
+            let equal = |x: &f64, y: &f64| x.to_bits() == y.to_bits() || x.is_nan() && y.is_nan();
+            let same = here.iter().zip(there).all(|(x, y)| equal(x, y));
             prop_assert!(same, "{}", name);
         }
     }
@@ -121,11 +125,13 @@ proptest! {
             [Box::new(CosinePoisson), Box::new(FrankotChellappa)];
         for method in integrators {
             let once = method.integrate(case.p.view(), case.q.view(), &domain).unwrap().heights;
-            let scaled = method.integrate((&case.p * scale).view(), (&case.q * scale).view(), &domain).unwrap();
+            let (p, q) = (&case.p * scale, &case.q * scale);
+            let scaled = method.integrate(p.view(), q.view(), &domain).unwrap();
             let largest = once.iter().fold(0.0f64, |m, z| m.max(z.abs()));
             for (z, s) in once.iter().zip(&scaled.heights) {
                 // Rounding only: some hundred operations.
-                prop_assert!((scale * z - s).abs() <= 1e-12 * scale.abs() * largest + f64::MIN_POSITIVE);
+                let limit = 1e-12 * scale.abs() * largest + f64::MIN_POSITIVE;
+                prop_assert!((scale * z - s).abs() <= limit);
             }
         }
     }

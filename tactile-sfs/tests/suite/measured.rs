@@ -351,8 +351,8 @@ fn tsai_shah_is_no_worse_than_the_plain_method() {
     );
 }
 
-/// Height 0 outside the object, and the height where the surface faces the light: where z + (s_x x +
-/// s_y y)/s_z has a maximum, a minimum or a saddle.
+/// Height 0 outside the object, and the height where the surface faces the light: where
+/// z + (s_x x + s_y y)/s_z has a maximum, a minimum or a saddle.
 fn singular_heights(z: &Array2<f64>, mask: &Array2<bool>, light: [f64; 3]) -> Array2<f64> {
     const RING: [[usize; 2]; 8] = [
         [0, 0],

@@ -106,6 +106,7 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
     ) -> Result<Self, TpsError> {
         let mut this = self.with_points(sources, options)?;
         let lambda = this.inner_lambda(this.smoothing);
+        // Taken out, because `setting` borrows the rest.
         let mut system = core::mem::take(&mut this.system);
         let iterative = this.iterative.take();
         let (setting, weights) = (this.setting(), &this.centre_weights[..]);
@@ -322,13 +323,17 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
         let gcv = task.smoothing == Smoothing::Gcv;
         let mut lambda = self.inner_lambda(task.smoothing);
         self.check(targets)?;
+        // An interpolant cannot meet two targets at one point. Smoothing takes their mean.
         if lambda == 0.0 && !gcv {
             centres.agree(targets, task.weights)?;
         }
+        // Targets far from zero lose digits. Differences to the first are exact where they are
+        // close to it.
         let origin: [f64; M] = core::array::from_fn(|k| targets[0][k].widen());
         centres.gather(targets, task.weights, &origin, buffers);
         if gcv {
             let (needed, found) = (system.affine.q, system.active.len());
+            // Affine functions alone meet all targets: there is no residual to validate with.
             if found <= needed {
                 return Err(TpsError::TooFewForValidation { needed, found });
             }
@@ -499,6 +504,7 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
     ) -> Option<Vec<SVector<T, M>>> {
         let (n, system) = (self.centres.len(), &self.system);
         let lambda = self.inner_lambda(self.smoothing);
+        // A row of a part must be a row of the system.
         let whole = n == self.centres.inputs && n == system.active.len() && n == targets.len();
         if !whole || self.iterative.is_some() || lambda == 0.0 {
             return None;
@@ -576,6 +582,7 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
         self.system.solve_adjoint(targets, conditions, work);
         for (r, found) in targets.chunks_exact(n).enumerate() {
             for i in 0..self.len() {
+                // The target of a centre is the weighted mean of its points.
                 let influence = found[self.centres.centre(i)] * self.share(i);
                 sink(r, i, T::narrow(influence / sides[r].unit));
             }
@@ -655,6 +662,7 @@ impl<K: Kernel, const D: usize> Job<f64> for Fill<'_, K, D> {
             let s = d.iter().fold(L::from_f64(0.0), |s, d| d.mul_add(*d, s));
             *term = match self.side.axis {
                 None => self.kernel.derivatives(s).value.get(),
+                // The gradient is 2 dU/ds d, s being the squared distance.
                 Some(axis) => (L::from_f64(2.0) * self.kernel.derivatives(s).first * d[axis]).get(),
             };
         }
@@ -682,6 +690,7 @@ impl<K: Kernel, const D: usize> Equations<'_, K, D> {
             spare,
             ..
         } = &mut *buffers;
+        // The solver works in place, and refinement needs the targets again.
         weights.clone_from(targets);
         let affine = self.system.solve(weights, self.lambda, work, spare);
         let mut outcome = Outcome::new(affine, self.system.condition(self.lambda));
@@ -766,6 +775,7 @@ impl<K: Kernel, const D: usize> Equations<'_, K, D> {
     ) -> f64 {
         let (n, active) = (self.centres.len(), &self.system.active);
         let count = active.len().min(BLOCK);
+        // All residuals would cost O(n²), as much as the solve. One block of them costs O(n).
         let pick = |i: usize| i * active.len() / count;
         let Buffers {
             targets,

@@ -41,6 +41,7 @@ impl<const D: usize> Iterative<D> {
         watch: &mut Watch<'_>,
     ) -> ControlFlow<()> {
         system.spectrum = None;
+        // Not scaled by the roots of weights: here they stand on the diagonal as λ/weight.
         system.choose(setting.centres.len(), weights, false);
         // Every point is ordered first, and then given its weights.
         let n = system.active.len();
@@ -95,7 +96,7 @@ impl<const D: usize> Iterative<D> {
 }
 
 impl<K: Kernel, const D: usize> Run<'_, K, D> {
-    /// Solves for the targets in `buffers`; weights come there. Stops early if `watch` returns
+    /// Solves for the targets in `buffers`. Weights come there. Stops early if `watch` returns
     /// `Break`.
     pub(super) fn solve<const M: usize>(
         &self,
@@ -120,6 +121,7 @@ impl<K: Kernel, const D: usize> Run<'_, K, D> {
         solution.clear();
         solution.resize(M * n, 0.0);
         let (mut answer, mut broken) = (Outcome::new([[0.0; MAX]; M], 1.0), false);
+        // At most three runs of steps. The fourth turn only measures the last residual.
         for start in 0..=3 {
             let (affine, residual) = self.residual::<M>(vectors);
             (answer.affine, answer.residual) = (affine, Some(residual));
@@ -158,6 +160,7 @@ impl<K: Kernel, const D: usize> Run<'_, K, D> {
         vectors.direction.resize(vectors.residual.len(), 0.0);
         let (mut size, mut best) = ([0.0; M], (f64::INFINITY, answer.iterations));
         while answer.iterations < STEPS {
+            // The residual of the recurrence, which costs no product with the matrix.
             let left = relative(largest(&vectors.residual), &vectors.target);
             let done = answer.iterations;
             let progress = Progress::new(done, STEPS).with_residual(left);
@@ -166,6 +169,7 @@ impl<K: Kernel, const D: usize> Run<'_, K, D> {
                 best = (left, done);
             }
             // Where 25 steps do not halve the residual, rounding allows no more.
+            // Half the tolerance leaves room for the drift of the recurrence.
             if left <= 0.5 * self.tolerance || done >= best.1 + 25 {
                 break;
             }
@@ -176,7 +180,7 @@ impl<K: Kernel, const D: usize> Run<'_, K, D> {
         ControlFlow::Continue(())
     }
 
-    /// The next direction p ← M⁻¹r + βp; `size` is rᵀM⁻¹r of each output.
+    /// The next direction p ← M⁻¹r + βp. `size` is rᵀM⁻¹r of each output.
     fn turn<const M: usize>(&self, vectors: &mut Vectors, size: &mut [f64; M]) {
         let n = self.system.active.len();
         let Vectors {
@@ -190,6 +194,7 @@ impl<K: Kernel, const D: usize> Run<'_, K, D> {
         self.iterative
             .preconditioner
             .apply::<M>(residual, preconditioned, n, coarse);
+        // Rounding leads out of the complement, where the matrix need not be definite.
         self.complement(preconditioned);
         let new = inner::<M>(residual, preconditioned);
         for m in 0..M {
@@ -243,8 +248,8 @@ impl<K: Kernel, const D: usize> Run<'_, K, D> {
     ) -> ControlFlow<()> {
         let (n, places) = (self.system.active.len(), self.iterative.axes());
         let weights: [&[f64]; M] = core::array::from_fn(|m| &w[m * n..(m + 1) * n]);
-        // Whole blocks, so that the sums are the same however often it is asked.
-        // Some seconds lie between two questions: 2³⁰ kernels.
+        // Whole blocks, so that the sums are the same however often `still_wanted` is called.
+        // Some seconds lie between two calls: 2³⁰ kernels.
         let run = ((1 << 30) / BLOCK / n.max(1)).max(1) * BLOCK;
         for start in (0..n).step_by(run) {
             if start > 0 {
@@ -362,6 +367,7 @@ impl<const D: usize> Job<f64> for Approach<'_, D> {
             let s = squared::<L, D>(axes, i, self.from);
             self.near[i] = if s < self.near[i] { s } else { self.near[i] };
         }
+        // Eight running maxima, which the compiler turns into one vector.
         let mut largest = [-1.0; 8];
         let chunks = self.near.chunks_exact(8);
         let rest = chunks.remainder();
@@ -455,6 +461,8 @@ impl Nearest {
                 .iter()
                 .copied()
                 .enumerate()
+                // A scan of the distances avoids a search tree and stays within the O(n²) of the
+                // set-up.
                 .filter(|&(_, d)| d <= reach * spacing);
             self.candidates.clear();
             self.candidates.extend(within.map(|(j, d)| (d, j)));
@@ -585,6 +593,7 @@ impl<const D: usize> Preconditioner<D> {
         let n = points.order.len();
         self.coarse_points = n.min(COARSE_POINTS);
         let first: Vec<usize> = (0..self.coarse_points).collect();
+        // Without a coarse factor all points from D + 2 on have a row of their own.
         if !points.factor(
             &first,
             &mut points.centres.clone(),
@@ -598,6 +607,7 @@ impl<const D: usize> Preconditioner<D> {
         self.weights.clear();
         let (mut cardinal, mut nearest, mut places) =
             (Cardinal::new(points), Nearest::default(), Vec::new());
+        // A spline of fewer than D + 2 points is affine and has no weights.
         for i in self.coarse_points.max(D + 2)..n {
             if i % 64 == 0 {
                 watch(i)?;
@@ -612,6 +622,8 @@ impl<const D: usize> Preconditioner<D> {
     /// Takes over the weights of a cardinal spline, scaled to unit energy.
     fn push(&mut self, places: &[usize], unit: &[f64]) {
         let own = unit[unit.len() - 1];
+        // Without a factor or by rounding the energy may not be positive. The point then adds
+        // nothing.
         let scale = if own > 0.0 && own.is_finite() {
             1.0 / own.sqrt()
         } else {
@@ -621,6 +633,7 @@ impl<const D: usize> Preconditioner<D> {
         self.weights.extend(unit.iter().map(|w| w * scale));
         let padding = self.row - places.len();
         self.places
+            // Rows of one length need no table of starts. Padding has weight 0.
             .extend(core::iter::repeat_n(places[0] as u32, padding));
         self.weights.extend(core::iter::repeat_n(0.0, padding));
     }

@@ -130,6 +130,7 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
             self.weights = None;
         }
         self.kernel.clone_from(&options.kernel);
+        // A kernel with a length of its own would become another one under a change of scale.
         self.centres.take(sources, self.kernel.degree().is_some())?;
         self.centres
             .weigh(self.weights.as_deref(), &mut self.centre_weights);
@@ -264,6 +265,7 @@ impl<const D: usize> Centres<D> {
             return Err(TpsError::Empty("source points"));
         }
         finite(points, "source points")?;
+        // The frame first: grain and coordinates are relative to it.
         self.frame = Frame::around(points, rescale);
         self.merge(points);
         for (k, axis) in self.axes.iter_mut().enumerate() {
@@ -294,6 +296,7 @@ impl<const D: usize> Centres<D> {
             let differ = (0..D).map(|k| points[i][k].widen().partial_cmp(&points[j][k].widen()));
             differ.flatten().find(|o| o.is_ne()).unwrap_or(i.cmp(&j))
         };
+        // Sorted by coordinates, equal points stand next to each other, the first one first.
         order.sort_unstable_by(compare);
         if order.windows(2).all(|w| points[w[0]] != points[w[1]]) {
             return;
@@ -341,6 +344,7 @@ impl<const D: usize> Centres<D> {
         for second in (0..self.centre_of.len()).filter(|&i| counts(i)) {
             let centre = self.centre_of[second];
             let same = |&i: &usize| self.centre_of[i] == centre && counts(i);
+            // Points of weight 0 are passed over. They may disagree with the others.
             let first = (self.first[centre]..second).find(same).unwrap_or(second);
             if targets[first] != targets[second] {
                 return Err(TpsError::Conflict { first, second });
@@ -369,6 +373,7 @@ impl<const D: usize> Centres<D> {
                 let (centre, weight) = (self.centre(i), weights.map_or(1.0, |w| w[i].widen()));
                 let value = target[k].widen() - origin[k];
                 totals[centre] += weight;
+                // Only points of weight 0 came before, whose targets do not count.
                 if totals[centre] == weight {
                     column[centre] = value;
                 } else if weight > 0.0 {
@@ -422,6 +427,7 @@ impl<const D: usize> Span<D> {
     /// the largest.
     fn new(columns: &mut [f64], grain: f64, tolerance: f64) -> Self {
         let n = columns.len() / D;
+        // Centred, so that an offset of all points is no extent.
         for column in columns.chunks_exact_mut(n) {
             let mean = column.iter().sum::<f64>() / n as f64;
             column.iter_mut().for_each(|x| *x -= mean);
@@ -447,11 +453,14 @@ impl<const D: usize> Span<D> {
         let mut order: [usize; D] = core::array::from_fn(|k| k);
         order.sort_unstable_by(|&i, &j| size(j).total_cmp(&size(i)));
         let sizes = order.map(size);
+        // Rounding of n coordinates adds up to √n of that of one.
         let rounding = 8.0 * (grain + f64::EPSILON) * (n as f64).sqrt();
         let noise = f64::max(rounding, tolerance * sizes[0]);
         let directions = sizes.iter().filter(|size| **size > noise).count();
         Self {
             directions,
+            // The coordinate axes where all directions are spanned: the coefficients then are the
+            // gradient.
             basis: if directions < D {
                 order.map(|k| vectors[k])
             } else {
@@ -504,6 +513,7 @@ fn orthogonalise<const D: usize>(
         return false;
     }
     let zeta = (b - a) / (2.0 * c);
+    // The smaller of the two angles, by the form that does not cancel.
     let tangent = zeta.signum() / (zeta.abs() + (1.0 + zeta * zeta).sqrt());
     let cosine = 1.0 / (1.0 + tangent * tangent).sqrt();
     let sine = cosine * tangent;
@@ -547,6 +557,8 @@ impl AffineBasis {
             fill(k, column);
             for _ in 0..2 {
                 for (i, earlier) in done.chunks_exact(n).enumerate() {
+                    // Modified Gram–Schmidt: each share is taken from what is left, not from the
+                    // original column.
                     let share = dot(earlier, column);
                     self.r[i][k] += share;
                     subtract(share, earlier, column);
@@ -651,6 +663,7 @@ impl<const D: usize> System<D> {
             return Ok(());
         }
         self.condition = 1.0;
+        // With affine functions alone nothing but σ is left of the matrix.
         if self.active.len() > self.affine.q {
             let inverse = self.matrix.inverse_norm(&mut self.scratch);
             self.condition = f64::max(1.0, (size + lambda) * inverse);
@@ -706,6 +719,7 @@ impl<const D: usize> System<D> {
             |i: usize, k: usize| dot(self.affine.column(i), &self.coupling[k * n..(k + 1) * n]);
         let trace = self.matrix.trace() - (0..q).map(|k| head(k, k)).sum::<f64>();
         // No point is left where all of them are affine functions' own.
+        // The trace on the range of Π is the whole trace less that on the affine functions.
         let mean = trace / (n - q).max(1) as f64;
         let shift = if mean > 0.0 && n > q { mean } else { 1.0 };
         let x = &mut self.scratch;
@@ -724,6 +738,7 @@ impl<const D: usize> System<D> {
             x,
             matrix: &mut self.matrix,
         });
+        // The update has added σ in q directions, which are no part of ΠSΠ.
         f64::max(squares - q as f64 * shift * shift, 0.0).sqrt()
     }
 
@@ -813,8 +828,10 @@ impl<const D: usize> System<D> {
         let mut heads = self.reduce::<M>(y, work);
         solver(work);
         for (head, column) in heads.iter_mut().zip(work.chunks_exact_mut(n)) {
+            // The exact solution lies in the range of Π. Rounding is taken off.
             self.affine.remove(column);
             for (head, coupling) in head.iter_mut().zip(self.coupling.chunks_exact(n)) {
+                // Qᵀ of the first equation: R a = Qᵀ(W^½y − S v).
                 *head -= dot(coupling, column);
             }
             *head = self.affine.coefficients(head);
@@ -880,6 +897,8 @@ impl<const D: usize> System<D> {
             column[i] * column[j]
         });
         let scale = |i: usize| self.scales.get(i).copied().unwrap_or(1.0);
+        // The inverse has 1/(σ + λ) on the affine functions, where the map from values to weights
+        // has 0.
         scale(i) * scale(j) * (dot(a, b) - affine.sum::<f64>() / (self.shift + lambda))
     }
 
@@ -997,6 +1016,8 @@ impl Triangle {
     /// least pivot.
     fn inverse_norm(&self, x: &mut Vec<f64>) -> f64 {
         let pivot = |j: usize| self.data[j * self.stride + j];
+        // The column of the least pivot tends to be close to the direction that the inverse
+        // enlarges most.
         let start = (1..self.n).fold(
             0,
             |least, j| if pivot(j) < pivot(least) { j } else { least },
@@ -1088,6 +1109,7 @@ impl Spectrum {
         self.coefficients(b, spare);
         for column in spare.chunks_exact_mut(self.values.len()) {
             let pairs = column.iter_mut().zip(&self.values);
+            // In the eigenvectors λ is a shift of the eigenvalues: any λ costs two products.
             pairs.for_each(|(c, mu)| *c /= mu + lambda);
         }
         self.product(self.vectors.as_ref(), spare, b);

@@ -9,8 +9,8 @@ use crate::{
     lanes::{Job, Lane, dispatch},
 };
 
-/// The splines through the same pairs for several λ: what cross-validation over left-out points
-/// asks for.
+/// The splines through the same pairs for several λ, as cross-validation over left-out points needs
+/// them.
 ///
 /// The matrix is assembled once for all λ and factored for each. The values at a point share its
 /// kernels.
@@ -112,6 +112,8 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> LambdaPath<T, D, M, K
     ) -> Result<Self, TpsError> {
         for &lambda in lambdas {
             validate_smoothing(&Smoothing::Lambda(lambda))?;
+            // An interpolant needs targets that agree where points coincide, which is not checked
+            // here.
             if lambda.widen() == 0.0 {
                 return Err(TpsError::Lambda { value: 0.0 });
             }
@@ -120,6 +122,7 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> LambdaPath<T, D, M, K
         self.points.check(targets)?;
         let points = &self.points;
         let (setting, weights) = (points.setting(), &points.centre_weights);
+        // Without λ, which is added to a copy for each of them.
         self.system.assemble(&setting, weights, true);
         self.origin = core::array::from_fn(|k| targets[0][k].widen());
         let weights = points.weights.as_deref();
@@ -128,6 +131,7 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> LambdaPath<T, D, M, K
             .centres
             .gather(targets, weights, &self.origin, buffers);
         let n = points.centres.len();
+        // Weights of one centre stand side by side: a kernel is read once for all λ.
         let width = (lambdas.len() * M).next_multiple_of(TOGETHER).max(TOGETHER);
         self.weights.clear();
         self.weights.resize(n * width, 0.0);

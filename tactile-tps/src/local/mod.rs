@@ -125,6 +125,7 @@ impl<const D: usize> LocalField<D> {
             field.plant();
             let found = field.walk(sources, Walk::Judge, |_| {});
             let wrong = contradicted(&found, sources);
+            // `kept` is the opposite of `wrong`: nothing has changed where they differ everywhere.
             let same = (0..sources.len()).all(|i| field.kept[i] != wrong[i]);
             field.kept = wrong.into_iter().map(|wrong| !wrong).collect();
             if same {
@@ -160,6 +161,7 @@ impl<const D: usize> LocalField<D> {
             Walk::Judge => Self::PATCH / 2,
             Walk::Read => Self::PATCH,
         };
+        // One patch serves all points of a block, which are neighbours.
         let blocks = Tree::new(points, (0..points.len()).collect());
         let mut patch = Patch::default();
         let mut found: Vec<Option<Found<D>>> = points.iter().map(|_| None).collect();
@@ -178,6 +180,8 @@ impl<const D: usize> LocalField<D> {
             let together = extent <= 0.8 * reach(&near);
             let take = |patch: &mut Patch<D>, place: &SVector<f64, D>, near: &[_]| {
                 patch.take(&self.sources, &self.displacements, place, near);
+                // Judging compares a pair with the median of its block, in which a common factor
+                // cancels.
                 if purpose == Walk::Read {
                     patch.calibrate();
                 }

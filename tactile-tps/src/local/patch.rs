@@ -33,7 +33,7 @@ const POWERS: std::ops::RangeInclusive<i32> = -19..=5;
 const MIDDLE: usize = 24;
 
 impl Shape {
-    /// k(r), k'(r)/r and −k''(0).
+    /// k(r) and k'(r)/r, which at r = 0 is k''(0).
     fn of(self, square: f64) -> (f64, f64) {
         match self {
             Self::Gaussian(length) => {
@@ -135,6 +135,7 @@ impl<const D: usize> Patch<D> {
         self.squares.resize(n * n, 0.0);
         for i in 0..n {
             for j in i..n {
+                // The upper triangle alone. Distances serve all shapes and λ.
                 self.squares[i * n + j] = (self.points[i] - self.points[j]).norm_squared();
             }
         }
@@ -150,6 +151,7 @@ impl<const D: usize> Patch<D> {
         self.best = best.1;
         self.taken += 1;
         self.choose(SHAPES[self.best]);
+        // Other shapes may have been tried last: factor and columns are made again.
         self.energy(4_f64.powi(self.last[self.best]));
         self.solve();
     }
@@ -160,6 +162,7 @@ impl<const D: usize> Patch<D> {
         let (least, most) = (*POWERS.start(), *POWERS.end());
         let mut at = self.last[s];
         let mut energy = self.energy(4_f64.powi(at));
+        // Large steps for the first patch. Later ones start at their neighbour's λ, which is close.
         let steps = if self.taken == 0 {
             &[-4, 4, -1, 1][..]
         } else {
@@ -303,6 +306,8 @@ impl<const D: usize> Patch<D> {
 
     fn product(&self, a: &White, b: &White) -> f64 {
         let dot: f64 = a.column.iter().zip(&b.column).map(|(a, b)| a * b).sum();
+        // Variance of the affine part that the pairs leave open, less what they explain of the
+        // process.
         (a.basis * self.normal * b.basis.transpose())[0] - dot
     }
 
@@ -342,6 +347,7 @@ impl<const D: usize> Patch<D> {
             displacement,
             displacement_variance: self.scale * (at_zero + self.product(&whole, &whole)).max(0.0),
             gradient: gradient / self.radius,
+            // Lengths are in radii of the patch, so that a derivative has one over the radius.
             gradient_covariance: covariance * (self.scale / (self.radius * self.radius)),
             sigma: self.sigma,
             spacing: self.radius * (ball / n).powf(1.0 / D as f64),
@@ -358,6 +364,7 @@ impl<const D: usize> Patch<D> {
         let [white] = self.whitened([column], [RowVector4::zeros()]);
         let square: f64 = white.column.iter().map(|c| c * c).sum();
         let explained = (white.basis * self.normal * white.basis.transpose())[0];
+        // Bᵢᵢ, from the whitened unit vector of the pair.
         let precision = (square - explained).max(f64::MIN_POSITIVE);
         self.column = white.column;
         let weight = self.weights[row].norm();
@@ -376,6 +383,7 @@ impl<const D: usize> Patch<D> {
         let misfits: f64 = (0..middle).map(|row| self.left_out(row).0).sum();
         let ratio = misfits / (D * middle) as f64;
         if ratio.is_finite() {
+            // Only raised: few residuals that happen to be small do not prove small errors.
             self.scale *= ratio.max(1.0);
         }
     }
@@ -414,6 +422,8 @@ impl Job<f64> for Factorise<'_> {
             let rows = &mut done[first * n..];
             for k in first..end {
                 let (row, below) = rows[(k - first) * n..].split_at_mut(n);
+                // The diagonal of the covariances is at least 1. A pivot at the floor is rounding
+                // alone.
                 let root = row[k].max(1e-15).sqrt();
                 log_det += 2.0 * root.ln();
                 row[k] = root;

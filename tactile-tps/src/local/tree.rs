@@ -39,6 +39,7 @@ impl<const D: usize> Tree<D> {
             let (low, high) = rows.iter().fold((f64::MAX, f64::MIN), range);
             high - low
         };
+        // Cut across the longest axis: blocks stay compact, and searches end early.
         let axis = (1..D).fold(0, |best, a| if extent(a) > extent(best) { a } else { best });
         let middle = rows.len() / 2;
         let by_place =
@@ -62,6 +63,8 @@ impl<const D: usize> Tree<D> {
                 leaves.push(rows);
             } else {
                 let (low, high) = rows.split_at(rows.len() / 2);
+                // The low half is taken from the stack first, so that leaves follow the order of
+                // the tree.
                 open.extend([high, low]);
             }
         }
@@ -116,6 +119,7 @@ impl<const D: usize> Tree<D> {
         let low = (2 * node + 1, range.start..middle);
         let high = (2 * node + 2, middle..range.end);
         let beyond = place[axis] - cut;
+        // The half that holds the place first: it narrows the limit for the other.
         let (first, second) = if beyond < 0.0 {
             (low, high)
         } else {

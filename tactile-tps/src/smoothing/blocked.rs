@@ -124,6 +124,7 @@ impl Default for Fitter {
 
 impl Fitter {
     fn fit(&mut self, pairs: Pairs<'_, f64, 3>) -> Result<(), TpsError> {
+        // λ is chosen on halves, the spline itself goes through all pairs.
         let smoothing = match self.one_standard_error_lambda(pairs) {
             Some(lambda) => Smoothing::Lambda(lambda),
             None => Smoothing::Gcv,
@@ -147,10 +148,11 @@ impl Fitter {
         )
     }
 
-    /// The greatest λ that predicts left-out runs as well as the best, to one standard error;
+    /// The greatest λ that predicts left-out runs as well as the best, to one standard error.
     /// `None` where too few pairs, or too badly placed ones, are there to be split.
     fn one_standard_error_lambda(&mut self, pairs: Pairs<'_, f64, 3>) -> Option<f64> {
         let n = pairs.sources.len();
+        // Lengths that differ are left to the fit, which names them in its error.
         let as_many = pairs.targets.len() == n && pairs.weights.is_none_or(|w| w.len() == n);
         if n < 4 * StrainSpline::RUN_LENGTH || !as_many {
             return None;
@@ -163,6 +165,7 @@ impl Fitter {
         self.lambdas.extend(POWERS.map(|power| 0.5 * lambda(power)));
         self.errors.resize_with(self.lambdas.len(), Vec::new);
         self.errors.iter_mut().for_each(Vec::clear);
+        // Each half predicts the other, so that every pair is predicted once.
         self.predict(0)?;
         self.predict(1)?;
         let scores = || self.errors.iter().map(|errors| mean_with_error(errors));
@@ -204,6 +207,7 @@ impl Fitter {
         for ((source, target), weight) in pairs.zip(&other.weights) {
             let values = path.values(source);
             for (errors, value) in self.errors.iter_mut().zip(values) {
+                // A pair of little weight counts as little here as in the fit.
                 errors.push(weight * (value - target).norm_squared());
             }
         }
@@ -321,8 +325,8 @@ mod tests {
             (sources.iter().map(square).sum::<f64>() / sources.len() as f64).sqrt()
         };
         let [stiff, loose] = [stiff, loose.expect("a spline")].map(|warp| error(&*warp));
-        // An affine fit knows it to the error of 0.03 × 1.2/√3 of 50 groups over the spread 1/√12
-        // of z: 0.010; to two and a half standard deviations.
+        // An affine fit has the error of 0.03 × 1.2/√3 of 50 groups over the spread 1/√12 of z,
+        // 0.010. The limit is two and a half standard deviations.
         assert!(stiff < 0.025, "{stiff}, interpolated {loose}");
         assert!(stiff < 0.5 * loose, "{stiff}, interpolated {loose}");
     }
@@ -342,8 +346,8 @@ mod tests {
         let chosen = error(&*chosen.expect("a spline"));
         let [affine, interpolated] = [Smoothing::Lambda(1e9), Smoothing::None]
             .map(|smoothing| error(&fit_spline(smoothing, &sources, &targets)));
-        // What the gradient of a spline through points of a surface can tell of the bending is
-        // told, to a third of the whole.
+        // Of the bending that the gradient of a spline through points of a surface can have, all
+        // but a third is found.
         assert!(
             chosen < interpolated + affine / 3.0,
             "{chosen}: {interpolated} to {affine}"

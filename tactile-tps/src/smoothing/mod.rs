@@ -54,6 +54,7 @@ pub(crate) fn least_gcv(values: &[f64], energies: &[f64], affine: usize, shift: 
         let pairs = values.iter().zip(energies);
         let rss: f64 = pairs.map(|(&mu, e)| filter(mu).powi(2) * e).sum();
         let all: f64 = values.iter().map(|&mu| filter(mu)).sum();
+        // The affine directions have the eigenvalue σ, which is no part of the fit.
         let trace = all - affine as f64 * filter(shift);
         values.len() as f64 * rss / (trace * trace)
     };
@@ -65,6 +66,8 @@ pub(crate) fn least_gcv(values: &[f64], energies: &[f64], affine: usize, shift: 
 /// The least of a function on a grid, then by golden section around it. The larger argument where
 /// values are equal.
 fn minimise(low: f64, high: f64, f: impl Fn(f64) -> f64) -> f64 {
+    // Half a power of two a step: the score can have several minima, which the golden section would
+    // miss.
     let steps = 148;
     let at = |i: usize| low + (high - low) * i as f64 / steps as f64;
     let scores = (0..=steps).map(|i| (f(at(i)), i));

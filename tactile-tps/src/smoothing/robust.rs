@@ -106,10 +106,15 @@ impl<const D: usize> RobustFit<D> {
         // misplaced.
         let rounding = 1e-12 * square.sqrt();
         let mut weights = vec![1.0; sources.len()];
+        // All pairs count fully at first. The held-out residuals of a wrong pair are large all the
+        // same.
         let (mut folds, mut sigma, mut response) = (Vec::new(), 0.0, 1.0);
+        // Weights and scale determine each other. λ stays fixed meanwhile.
         for _ in 0..3 {
             let product: Vec<f64> = weights.iter().zip(&prior).map(|(w, p)| w * p).collect();
             let held_out = hold_out(sources, targets, &product, lambda, true)?;
+            // From the median of the distances, which stays bounded while less than half of the
+            // pairs are wrong.
             sigma = noise::<D>(&held_out.distances).max(rounding);
             let scaled: Vec<f64> = (held_out.distances.iter())
                 .map(|d| d / (sigma * cutoff::<D>()))
@@ -160,6 +165,7 @@ fn one_standard_error_lambda<const D: usize>(
     for lambda in LAMBDAS {
         distances.push(hold_out(&sources, &targets, &prior, lambda * square, false)?.distances);
     }
+    // One scale for all λ, so that their losses compare. The least is that of the best prediction.
     let sigma = distances
         .iter()
         .map(|d| noise::<D>(d))
@@ -180,6 +186,7 @@ fn one_standard_error_lambda<const D: usize>(
             .collect();
         let centre = mean(&gaps);
         let squares: Vec<f64> = gaps.iter().map(|g| (g - centre).powi(2)).collect();
+        // The error of the paired difference: what both λ share of a point's noise cancels.
         centre <= mean(&squares).sqrt() / (gaps.len() as f64).sqrt()
     };
     Ok(LAMBDAS[(best..LAMBDAS.len()).rev().find(as_good).unwrap_or(best)])
@@ -189,6 +196,7 @@ fn one_standard_error_lambda<const D: usize>(
 fn thinned<V: Clone>(values: &[V], step: usize) -> Vec<V> {
     values
         .iter()
+        // Half a step in, so that neither end of the series is favoured.
         .skip(step / 2)
         .step_by(step)
         .cloned()
@@ -216,6 +224,7 @@ fn hold_out<const D: usize>(
         members[part_of(i, parts)].push(row);
     }
     // One factor for all parts, as long as each can be left out of it.
+    // Left out of one inverse, all parts cost as much as one factorisation more, not one each.
     let factorization = Factorization::new(&kept.sources, &kept.options(lambda)?)?;
     let misses = factorization.left_out(&kept.targets, &members);
     let (mut workspace, mut shifted) = (SplineWorkspace::default(), kept.targets.clone());
@@ -230,6 +239,8 @@ fn hold_out<const D: usize>(
     }
     for (part, members) in members.iter().enumerate() {
         let own = (0..sources.len()).filter(|&i| part_of(i, parts) == part);
+        // Pairs without weight are in no factor. They are predicted by the spline of the other
+        // parts.
         let predicted = misses.is_some() && own.clone().all(|i| weights[i] > LEAST_WEIGHT);
         if predicted && !all_splines {
             continue;
@@ -333,6 +344,7 @@ fn noise<const D: usize>(distances: &[f64]) -> f64 {
     let mut sorted = distances.to_vec();
     sorted.sort_by(f64::total_cmp);
     let median = sorted.get(sorted.len() / 2).copied().unwrap_or(0.0);
+    // Medians of χ with one to three degrees. The floor keeps distances over it finite.
     (median / [0.674_5, 1.177_4, 1.538_2][D.clamp(1, 3) - 1]).max(f64::MIN_POSITIVE)
 }
 

@@ -26,6 +26,8 @@ impl<T: PixelScalar> EikonalBuffers<T> {
             BoundaryCondition::Free => None,
         };
         // The darkest reflectance that is told from black.
+        // R = 1/√(1 + slope²) at the largest slope. A darker pixel would be steeper than any
+        // allowed.
         let least = (T::one() + method.max_slope.powi(2)).sqrt().recip();
         let (frame_rows, frame_columns) = frame.dim();
         let (mut known_inside, mut known_outside) = (false, false);
@@ -39,6 +41,7 @@ impl<T: PixelScalar> EikonalBuffers<T> {
             let known = domain.known(row, column);
             if !domain.contains(row, column) {
                 if let Some(height) = known.or(at_border) {
+                    // The grid counts in widths of a pixel, in which slopes have no unit.
                     self.given[i] = height / hx;
                     known_outside = true;
                 }
@@ -63,6 +66,8 @@ impl<T: PixelScalar> EikonalBuffers<T> {
         }
         self.fill_holes(area.area())?;
         for (sine, &cosine) in self.sine.iter_mut().zip(&self.cosine) {
+            // As a product, because 1 − cos² loses half of the digits where the surface faces the
+            // light.
             *sine = ((T::one() - cosine) * (T::one() + cosine))
                 .max(T::zero())
                 .sqrt();
@@ -124,6 +129,7 @@ impl<T: PixelScalar> EikonalBuffers<T> {
                 {
                     return Err(SfsError::EmptyMask);
                 }
+                // No neighbour has a value: the rest is a part of the mask by itself.
                 self.holes.drain(..).for_each(|i| self.cosine[i] = T::one());
             }
         }
@@ -153,13 +159,14 @@ impl<T: PixelScalar> EikonalBuffers<T> {
         // A floor keeps flat parts (slope 0) from dividing by zero: 10⁻⁶ pixels per pixel.
         let floor = T::of(1e-6);
         let metric = |sine: [T; 2], cosine: [T; 2], step: T| {
+            // The tangent of the mean angle, from sines and cosines without any arctangent.
             let slope = (sine[0] + sine[1]) / (cosine[0] + cosine[1]);
             (slope.max(floor) * step).powi(-2)
         };
         let (width, aspect) = (self.width, self.aspect);
         let rest = self.node.len() - 2 * width;
-        // Every node and those after and below it, as slices of one length: no step asks where it
-        // is.
+        // Every node and those after and below it, as slices of one length. No step has to check
+        // bounds.
         let (sine, cosine) = (&self.sine[width..], &self.cosine[width..]);
         let (sine_right, cosine_right) = (&sine[1..=rest], &cosine[1..=rest]);
         let (sine_below, cosine_below) = (&sine[width..][..rest], &cosine[width..][..rest]);
@@ -233,6 +240,8 @@ impl<T: PixelScalar> EikonalBuffers<T> {
             self.active[i] = self.node[i] == Node::Unknown;
             self.value[i] = match self.node[i] {
                 Node::Known => sign * self.given[i],
+                // The surface rises from the boundary in the convex branch, and in the concave one
+                // seen upside down.
                 Node::Unknown if !self.offset[i].is_nan() => self.lowest(i, sign) + self.offset[i],
                 _ => T::infinity(),
             };
@@ -258,6 +267,7 @@ impl<T: PixelScalar> EikonalBuffers<T> {
         let [gx, gy] = self.gradient(i);
         let length = gx.hypot(gy);
         if length > T::zero() {
+            // Projection of the step to the next pixel, along the steeper axis, on the gradient.
             let step = gx.abs().max(gy.abs() * self.aspect) / length;
             [length, step]
         } else {
@@ -279,9 +289,12 @@ impl<T: PixelScalar> EikonalBuffers<T> {
         let (sine, cosine) = (self.sine[i], self.cosine[i]);
         let (gradient, occluding) = self.around(i);
         if occluding {
+            // Radius of curvature times cos θ: the height above the contour, where the normal lies
+            // in the image plane.
             return cosine / gradient;
         }
         let half_step = T::of(0.5) * self.edges[i][1];
+        // Continued outwards, the sine may exceed 1.
         let boundary_sine = (sine + half_step * gradient).min(T::one());
         let boundary_cosine = (T::one() - boundary_sine * boundary_sine)
             .max(T::zero())

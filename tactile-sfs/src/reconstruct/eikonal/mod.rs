@@ -27,7 +27,7 @@
 //! triangles around a pixel is solved with its causality condition (Kao, Osher & Qian 2004, Qian,
 //! Zhang & Zhao 2007).
 //!
-//! A fitted profile also tells nearly the order in which a front from the rim reaches the pixels.
+//! A fitted profile also gives nearly the order in which a front from the rim reaches the pixels.
 //! Every node is upwind of those that it lowers: visited in the order of their values, all have
 //! their final value after one pass (Tsitsiklis 1995, Sethian 1996). That order is only a start:
 //! sweeps follow until nothing changes.
@@ -78,7 +78,7 @@ use profile::Profile;
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum BoundaryCondition<T> {
-    /// Nothing is known there but what the domain's known heights say.
+    /// Nothing is known there but the domain's known heights.
     Free,
     /// The surface meets this height at the border of the mask (not where the frame cuts it off).
     Height(T),
@@ -196,13 +196,17 @@ impl<T: PixelScalar> Eikonal<T> {
     /// ```
     /// use ndarray::Array2;
     /// use tactile_sfs::{BoundaryCondition, Domain, Eikonal, Lighting, SurfaceReconstruction};
-    /// // A hemisphere of radius 20 px in a frame that a lens blurs: each pixel the mean of those around it.
+    /// // A hemisphere of radius 20 px in a frame that a lens blurs: each pixel is the mean of
+    /// // those around it.
     /// let square = |r: usize, c: usize| (r as f64 - 25.3).powi(2) + (c as f64 - 24.6).powi(2);
-    /// let sharp = Array2::from_shape_fn((52, 52), |(r, c)| (400.0 - square(r, c)).max(0.0).sqrt() / 20.0);
-    /// let image = Array2::from_shape_fn((50, 50), |(r, c)| sharp.slice(ndarray::s![r..r + 3, c..c + 3]).sum() / 9.0);
+    /// let light = |r: usize, c: usize| (400.0 - square(r, c)).max(0.0).sqrt() / 20.0;
+    /// let sharp = Array2::from_shape_fn((52, 52), |(r, c)| light(r, c));
+    /// let around = |r: usize, c: usize| sharp.slice(ndarray::s![r..r + 3, c..c + 3]);
+    /// let image = Array2::from_shape_fn((50, 50), |(r, c)| around(r, c).sum() / 9.0);
     /// let mask = image.mapv(|light| light > 0.1);
     /// let domain = Domain::default().with_mask(mask.view());
-    /// let plain = Eikonal::new(Lighting::default()).with_boundary(BoundaryCondition::Height(0.0))?;
+    /// let rim = BoundaryCondition::Height(0.0);
+    /// let plain = Eikonal::new(Lighting::default()).with_boundary(rim)?;
     /// let error = |method: Eikonal<f64>| {
     ///     let surface = method.reconstruct(image.view().into(), &domain)?;
     ///     Ok::<_, tactile_sfs::SfsError>((surface.heights[[24, 24]] - 20.0).abs())
@@ -231,7 +235,8 @@ impl<T: PixelScalar> Eikonal<T> {
     ///     .with_tolerance(1e-6)?;
     /// let domain = Domain::default().with_known_heights(known.view());
     /// let surface = method.reconstruct(array![[1.0, 1.0, 0.0, 1.0]].view().into(), &domain)?;
-    /// assert!(surface.flags[[0, 2]].contains(PixelFlags::DARK)); // black would be infinitely steep
+    /// // Black would be infinitely steep.
+    /// assert!(surface.flags[[0, 2]].contains(PixelFlags::DARK));
     /// assert!(surface.heights[[0, 3]].is_finite());
     /// # Ok::<(), tactile_sfs::SfsError>(())
     /// ```
@@ -266,6 +271,7 @@ impl<T: PixelScalar> SurfaceReconstruction<T> for Eikonal<T> {
             return self.reconstruct_as_given(workspace, &frame, domain, None, surface);
         };
         let area = domain.bounding_box(frame.dim())?;
+        // Taken out, because the solve below borrows the whole workspace.
         let mut buffers = core::mem::take(&mut workspace.profile);
         let profile = if self.lighting.is_frontal() {
             buffers.fill(&frame, mask, area, &self.lighting)
@@ -366,6 +372,7 @@ impl<T: PixelScalar> Eikonal<T> {
         surface.report.stop = outcome.stop;
         surface.report.iterations = outcome.sweeps;
         surface.report.residual = outcome.change * width;
+        // The concave branch was solved for −z. The grid counts in widths of a pixel.
         let scale = if outcome.convex { width } else { -width };
         workspace.eikonal.store(scale, domain, surface);
         surface.finish(domain);
@@ -380,6 +387,7 @@ impl<T: PixelScalar> Eikonal<T> {
             return first;
         }
         let grid = &mut workspace.eikonal;
+        // The convex branch is put aside while the concave one uses the same arrays.
         grid.kept.clone_from(&grid.value);
         let second = self.solve(workspace, false);
         let sweeps = first.sweeps + second.sweeps;
@@ -400,6 +408,8 @@ impl<T: PixelScalar> Eikonal<T> {
         grid.corrected = convex && grid.directed;
         let corrected = grid.corrected;
         let first = self.sweep(workspace, convex, 0);
+        // The second solve is for frontal light alone and needs the directions of a converged
+        // surface.
         if corrected || !self.lighting.is_frontal() || first.stop != StopReason::Converged {
             return first;
         }
@@ -476,6 +486,7 @@ impl<T: PixelScalar> EikonalBuffers<T> {
             let q = half * (value[i + width] - value[i - width]) / self.aspect;
             let shade = (z - x * p - y * q) / (T::one() + p * p + q * q).sqrt();
             let difference = shade.max(T::zero()) - self.cosine[i];
+            // A slope whose square overflows has no shading. It counts as the largest misfit.
             sum += if difference.is_finite() {
                 difference * difference
             } else {

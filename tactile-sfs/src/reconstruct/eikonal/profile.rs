@@ -70,6 +70,7 @@ impl<T: PixelScalar> ProfileBuffers<T> {
                 self.image[[row, column]] = light;
                 self.mask[[row, column]] = true;
                 let reflectance = lighting.reflectance(light).as_f64();
+                // With its sign, so that noise about 0 does not become a positive mean.
                 let squared = reflectance * reflectance.abs();
                 if squared.is_finite() {
                     self.samples.push(Sample {
@@ -91,6 +92,7 @@ impl<T: PixelScalar> ProfileBuffers<T> {
                 let at = [row, column];
                 if !self.mask[at] {
                     let squared = profile.squared_reflectance(at);
+                    // The fitted contour decides which of the boundary's pixels are inside.
                     self.mask[at] = squared > 0.0;
                     self.image[at] = lighting.intensity(T::of(squared.clamp(0.0, 1.0).sqrt()));
                 }
@@ -145,6 +147,7 @@ impl Profile {
         });
         let side = Vector6::from_fn(|i, _| moments.weighted[POWERS[i][1]][POWERS[i][0]]);
         profile.coefficients = matrix.cholesky()?.solve(&side);
+        // A contact is brightest in the middle, so that R² curves downwards along both axes.
         let curved_down = profile.coefficients[3] < 0.0 && profile.coefficients[5] < 0.0;
         let top = profile.top().filter(|top| curved_down && *top > 0.0)?;
         let mean = side[0] / matrix[(0, 0)];
@@ -154,6 +157,7 @@ impl Profile {
             let quadratic = profile.quadratic(sample.at);
             residual += sample.weight * (sample.squared - quadratic).powi(2);
             variance += sample.weight * (sample.squared - mean).powi(2);
+            // s is 0 at the top and 1 on the quadratic's contour.
             means.add(1.0 - quadratic / top, sample.squared, sample.weight);
         }
         // Noise of two grey levels in 200 leaves 0.98 of the variance of a round contact of 19
@@ -319,6 +323,7 @@ impl Bend {
     fn fit(means: &RadialMeans, top: f64, residual: f64, samples: usize) -> Option<Self> {
         let mut bend = Self {
             top,
+            // The quadratic itself: its amplitude, its contour and no bend.
             parameters: Vector3::new(top, 1.0, 0.0),
         };
         for _ in 0..8 {

@@ -21,6 +21,8 @@ impl<T: PixelScalar> EikonalBuffers<T> {
         for r in 1..rows - 1 {
             let r = if order & 1 == 1 { rows - 1 - r } else { r };
             for c in 1..width - 1 {
+                // The four orders together follow every direction a front can come from (Zhao
+                // 2005).
                 let forwards = order == 0 || order == 3;
                 let i = r * width + if forwards { c } else { width - 1 - c };
                 if self.active[i] {
@@ -60,7 +62,7 @@ impl<T: PixelScalar> EikonalBuffers<T> {
             self.along_x[i] = T::of(pp / (pp + qq));
             (least, most) = (least.min(-quadratic), most.max(-quadratic));
         }
-        // 4096 levels tell the nodes apart; those of one level keep their order.
+        // 4096 levels order the nodes finely enough. Those of one level keep their order.
         let scale = 4095.0 / (most - least).max(f64::MIN_POSITIVE);
         self.front.reserve(self.node.len());
         for i in (0..self.node.len()).filter(unknown) {
@@ -83,6 +85,7 @@ impl<T: PixelScalar> EikonalBuffers<T> {
             let value = &self.value;
             let p = value[i + 1] - value[i - 1];
             let q = (value[i + width] - value[i - width]) / self.aspect;
+            // NaN where a neighbour is not reached, or where the surface is flat.
             let along_x = p * p / (p * p + q * q);
             self.along_x[i] = if along_x.is_nan() && !self.offset[i].is_nan() {
                 self.boundary_along_x(i)
@@ -95,17 +98,20 @@ impl<T: PixelScalar> EikonalBuffers<T> {
     /// Updates a node and wakes the neighbours that its new value can lower. Returns the change.
     #[inline(always)]
     fn visit(&mut self, i: usize, light: Option<[T; 3]>, tolerance: T) -> T {
+        // Cleared before the update. A neighbour that improves later sets it again.
         self.active[i] = false;
         let old = self.value[i];
         let new = match light {
             None => self.frontal(i),
             Some(light) => self.oblique(i, light),
         };
+        // Values start at infinity or at given heights and only fall.
         if new >= old {
             return T::zero();
         }
         self.value[i] = new;
         let change = old - new;
+        // Smaller changes are kept but not passed on, which ends the sweeps.
         if change > tolerance {
             for j in [i - 1, i + 1, i - self.width, i + self.width] {
                 // Under oblique light a surface may fall along the way of the front.
@@ -186,8 +192,8 @@ struct UpwindEdge<T> {
 }
 
 /// k of the second solve, from means of the node and its neighbours: half of the difference of the
-/// neighbours is left. Where the direction turns within a pixel (along ridges) such means say
-/// nothing, and the first order is better.
+/// neighbours is left. Where the direction turns within a pixel (along ridges) such means are
+/// wrong, and the first order is better.
 #[inline(always)]
 fn correction<T: PixelScalar>(x: UpwindEdge<T>, y: UpwindEdge<T>) -> T {
     let turn = T::of(0.5) * (x.along_x - y.along_x);
@@ -222,6 +228,7 @@ fn update<T: PixelScalar>(x: UpwindEdge<T>, y: UpwindEdge<T>, k: T) -> T {
             .sqrt();
         return (x.metric * x.value + y.metric * y.value + root) / sum;
     }
+    // The front arrives along one axis alone.
     lower.value + (k / lower.metric).sqrt()
 }
 
@@ -242,10 +249,12 @@ fn straight<T: PixelScalar>(reflectance: T, [x, y, z]: [T; 3], d: [T; 2]) -> T {
     let (along, across) = (x * d[0] + y * d[1], x * d[1] - y * d[0]);
     let sine2 = T::one() - reflectance * reflectance;
     let discriminant = reflectance * reflectance - across * across;
+    // The light is so far out of the direction's vertical plane that every ascent meets the bound.
     if discriminant < T::zero() {
         return T::infinity();
     }
     let root = (sine2 * discriminant).sqrt();
+    // Two forms of the same root: each adds terms of one sign where the other would cancel.
     if along >= T::zero() {
         let denominator = along * z + root;
         return if denominator > T::zero() {
@@ -270,7 +279,8 @@ fn triangle<T: PixelScalar>([x, y, z]: [T; 3], ex: Edge<T>, ey: Edge<T>) -> T {
     let r = (ex.reflectance + ey.reflectance) / two;
     let (px, qy) = (ex.step.recip(), ey.step.recip());
     let d = ey.value - ex.value;
-    // With u = z − a: p = px u, q = qy (u − d); R² (1 + p² + q²) = (z − x p − y q)².
+    // With u = z − a, p = px u and q = qy (u − d). Squared, the equation is R² (1 + p² + q²) =
+    // (z − x p − y q)².
     let m = x * px + y * qy;
     let k = z + y * qy * d;
     let r2 = r * r;
@@ -281,6 +291,8 @@ fn triangle<T: PixelScalar>([x, y, z]: [T; 3], ex: Edge<T>, ey: Edge<T>) -> T {
     for u in roots(qa, qb, qc) {
         let (p, q) = (px * u, qy * (u - d));
         let w = (T::one() + p * p + q * q).sqrt();
+        // The characteristic runs along R ∇z/√(1 + |∇z|²) + (s_x, s_y). It has to come from the
+        // neighbours.
         let upwind_x = (r * p / w + x) * ex.step >= T::zero();
         let upwind_y = (r * q / w + y) * ey.step >= T::zero();
         if u.is_finite() && z - x * p - y * q >= T::zero() && upwind_x && upwind_y {
@@ -298,6 +310,7 @@ fn roots<T: PixelScalar>(a: T, b: T, c: T) -> [T; 2] {
         return [T::infinity(); 2];
     }
     let root = discriminant.sqrt();
+    // The root without cancellation first. The other follows from their product c/a.
     let far = if b >= T::zero() { b + root } else { b - root };
     [
         far / a,
