@@ -534,7 +534,7 @@ impl StuckPixels {
                 };
                 if (y, x) != (row, column) {
                     all += 1;
-                    lively += usize::from(4 * changes >= self.frames);
+                    lively += usize::from(4 * u32::from(*changes) >= u32::from(self.frames));
                 }
             }
         }

@@ -623,7 +623,7 @@ impl Problem {
             }
             let scale = pf / pp;
             let variance = (ff - scale * pf).max(0.0) / f64::from(count - 1) / pp;
-            (count >= 3).then_some(
+            (count >= 3 && pp > 0.0).then_some(
                 Estimate::from_variance(scale, variance)
                     .with_degrees_of_freedom(f64::from(count - 1)),
             )

@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 
 __version__: str
 __all__ = [
+    "CheckPress",
     "Contact",
     "Estimate",
     "HertzContact",

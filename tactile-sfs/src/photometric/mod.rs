@@ -101,14 +101,15 @@ impl PhotometricReading {
     /// The median along the border is taken as its rest.
     ///
     /// # Errors
-    /// Those of [`CosinePoisson`], and [`SfsError::EmptyImage`] for a block larger than the frame.
+    /// Those of [`CosinePoisson`], and [`SfsError::EmptyImage`] for a block of no pixel or larger
+    /// than the frame.
     pub fn displacement_m(
         &self,
         block: usize,
         pixel_size_m: f64,
     ) -> Result<(Array2<f64>, Array2<bool>), SfsError> {
         let [rows, columns] =
-            [self.contact.nrows(), self.contact.ncols()].map(|n| n / block.max(1));
+            [self.contact.nrows(), self.contact.ncols()].map(|n| n.checked_div(block).unwrap_or(0));
         if rows == 0 || columns == 0 {
             return Err(SfsError::EmptyImage { rows, columns });
         }
