@@ -115,6 +115,7 @@ impl BoundingBox {
     /// ```
     #[must_use]
     pub fn centre(&self) -> (f64, f64) {
+        // Pixel centres have whole coordinates, and `to` is one past the last.
         let half = |from: usize, to: usize| 0.5 * ((from + to) as f64 - 1.0);
         (
             half(self.column_start, self.column_end),

@@ -130,6 +130,7 @@ impl Mul<f64> for Estimate {
     fn mul(self, factor: f64) -> Self {
         Self {
             value: self.value * factor,
+            // A change of sign turns the value round, its spread has none.
             standard_error: self.standard_error * factor.abs(),
             ..self
         }

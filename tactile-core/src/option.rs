@@ -80,6 +80,8 @@ impl Requirement {
                 value >= 1.0 && value.is_finite() && value.fract() == 0.0,
                 "a whole number of at least one",
             ),
+            // The remainder of an infinity is NaN, so this rule needs no test of finiteness of its
+            // own.
             Self::Odd => (value >= 1.0 && value % 2.0 == 1.0, "an odd whole number"),
         };
         if holds {

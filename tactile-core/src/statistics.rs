@@ -14,6 +14,8 @@ use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
 pub fn quantile_95(degrees: Option<f64>) -> f64 {
     const UPPER_TAIL: f64 = 0.975;
     let z = Normal::standard().inverse_cdf(UPPER_TAIL);
+    // A count that is NaN, zero or negative has no distribution. The normal quantile stands in for
+    // it.
     match degrees.and_then(|n| Some((n, StudentsT::new(0.0, 1.0, n).ok()?))) {
         // The iteration behind the inverse loses digits with the degrees of freedom, and does not
         // end for millions of them, as where a calibration is free of scatter. The expansion about
@@ -51,12 +53,14 @@ pub fn quantile_95(degrees: Option<f64>) -> f64 {
 pub fn effective_degrees_of_freedom(parts: &[(f64, Option<f64>)]) -> Option<f64> {
     let counts = |part: &&(f64, Option<f64>)| part.0 > 0.0;
     let mut counted = parts.iter().filter(counts);
+    // One part alone keeps its count exactly, without the error of the interpolation.
     if let (Some((_, degrees)), None) = (counted.next(), counted.next()) {
         return *degrees;
     }
     let (mut total, mut estimated) = (0.0, 0.0);
     for (variance, degrees) in parts.iter().filter(counts) {
         total += variance;
+        // A known variance widens the sum, but its quantile is the normal one.
         estimated += degrees.map_or(0.0, |n| variance * excess_of(n));
     }
     (estimated > 0.0).then(|| degrees_of(estimated / total))
