@@ -118,7 +118,8 @@ impl Signals {
     /// Whether the work goes on.
     pub fn check(&mut self) -> ControlFlow<()> {
         // Rare enough to cost nothing, often enough for a person.
-        if self.looked.elapsed() > Duration::from_millis(50) {
+        // What was raised once stays raised until `finish`, however often the work asks again.
+        if self.raised.is_none() && self.looked.elapsed() > Duration::from_millis(50) {
             self.looked = Instant::now();
             self.raised = Python::attach(|py| py.check_signals().err());
         }

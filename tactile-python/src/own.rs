@@ -353,6 +353,7 @@ impl Warp<f64, 3> for OwnWarp {
         images: &mut [Point3<f64>],
     ) -> Result<(), TpsError> {
         let found = Python::attach(|py| self.images(py, points)).map_err(TpsError::custom)?;
+        same_length("images", found.len(), images.len())?;
         images.copy_from_slice(&found);
         Ok(())
     }
@@ -363,8 +364,21 @@ impl Warp<f64, 3> for OwnWarp {
         jacobians: &mut [SMatrix<f64, 3, 3>],
     ) -> Result<(), TpsError> {
         let found = Python::attach(|py| self.jacobians(py, points)).map_err(TpsError::custom)?;
+        same_length("jacobians", found.len(), jacobians.len())?;
         jacobians.copy_from_slice(&found);
         Ok(())
+    }
+}
+
+/// Slices of a caller are as long as what the stage returned for its points.
+fn same_length(input: &'static str, expected: usize, found: usize) -> Result<(), TpsError> {
+    match found == expected {
+        true => Ok(()),
+        false => Err(TpsError::Length {
+            input,
+            expected,
+            found,
+        }),
     }
 }
 
@@ -406,8 +420,11 @@ impl OwnContact {
         }
         let radius = estimate("radius")?.ok_or_else(wrong)?;
         let mut reading = ContactReading::new(estimate("force")?, radius);
-        if let Some(centre) = answer.get_item("centre")? {
+        if let Some(centre) = answer.get_item("centre")?.filter(|given| !given.is_none()) {
             let centre: [f64; 2] = centre.extract()?;
+            if centre.iter().any(|place| !place.is_finite()) {
+                return Err(invalid("centre must be finite"));
+            }
             reading.centroid_px = centre.map(CoreEstimate::exact);
         }
         Ok(FrameContact::new(reading, mask.view()))

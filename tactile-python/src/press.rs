@@ -116,6 +116,12 @@ impl Press {
     ///     Force in newtons that a gauge read, and its standard error.
     /// time : float
     ///     Seconds since the first frame.
+    ///
+    /// Raises
+    /// ------
+    /// ValueError
+    ///     A time that is negative or before that of an earlier frame. The press has the frame then,
+    ///     without a time.
     #[pyo3(signature = (frame, *, gauge=None, gauge_error=0.0, time=None))]
     fn add_frame(
         &mut self,

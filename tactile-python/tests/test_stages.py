@@ -103,6 +103,12 @@ class Broken:
         ("estimator", "estimate", lambda loads: 1.0, "standard error"),
         ("estimator", "estimate", lambda loads: (np.nan, 1.0), "finite"),
         ("contact", "measure", lambda f, r: {"radius": (1.0, 0.1)}, "mask"),
+        (
+            "contact",
+            "measure",
+            lambda f, r: {"radius": (1.0, 0.1), "mask": f > 0, "centre": (np.nan, 1.0)},
+            "centre must be finite",
+        ),
     ],
 )
 def test_a_broken_stage_is_one_clear_error(scene, stage, method, answer, sentence):
