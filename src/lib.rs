@@ -1,4 +1,47 @@
-#![doc = include_str!("../README.md")]
+//! Force, shape, strain and Young's modulus, each with its error, from the frames of an optical
+//! tactile sensor.
+//!
+//! A [`Pipeline`] holds the stages from a frame to the modulus, a [`Press`] the frames at one load
+//! or more. Only what is asked for is computed:
+//!
+//! ```
+//! use tactile_imaging::force::CalibrationPair;
+//! use tactile_imaging::{Object, Pipeline};
+//!
+//! // Integrated pixel value (grey minus reference, summed) and force, as a gauge read it.
+//! let pairs = [0.0, 0.1, 0.2, 0.3, 0.4].map(|n| CalibrationPair::loading(2e5 * n, n));
+//! let pipeline = Pipeline::from_pairs(&pairs, [86.2e-6; 2], Object::sphere(3e-3))?;
+//!
+//! let ball = |peak: f64, radius_px: f64| {
+//!     ndarray::Array2::from_shape_fn((120, 160), |(y, x)| {
+//!         let r = (x as f64 - 80.0).hypot(y as f64 - 60.0) / radius_px;
+//!         12 + (peak * (1.0 - r * r).max(0.0).sqrt()).round() as u8
+//!     })
+//! };
+//! let reference = ball(0.0, 1.0);
+//! let mut press = pipeline.press(reference.view())?;
+//! let frames = [ball(60.0, 12.0), ball(90.0, 18.0)];
+//! for frame in &frames {
+//!     press.add_frame(frame.view());
+//! }
+//! let contact = press.contact(0)?.expect("something touches");
+//! assert!((contact.contact_radius_m.value / (12.0 * 86.2e-6) - 1.0).abs() < 0.01);
+//! let modulus = press.modulus()?;
+//! assert!(modulus.interval_95.contains(modulus.youngs_modulus_pa));
+//! # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
+//! ```
+//!
+//! # Where to look
+//!
+//! - A sensor's frames to every result: [`pipeline`], with scene files [`scene`], calibrations
+//!   [`sensor`], images, tables and streams [`io`] (feature `scene`).
+//! - Two point sets to displacement and strain with an error: [`strain_between()`].
+//! - Printed markers: [`markers`]. A lump under a surface: [`inclusion`] (feature `inclusion`).
+//! - The stages alone: the crates below. A stage of one's own implements one trait of the
+//!   [`prelude`].
+//!
+//! "The paper", whose equation numbers stand in brackets, is *The Novel Artificial Intelligence
+//! Based Sub-Surface Inclusion Detection Device and Algorithm*.
 //!
 //! # Equations
 //! What the stages compute. Each crate's page has its own.
@@ -14,6 +57,12 @@
 //! - Strain $E = \frac{1}{2}(F^T F - I)$ (25)–(30) and modulus $E = S_{zz}/\bar e_{zz}$ (31), or
 //!   Hertz's $a^3 = 3FR/(4E^{\ast})$: [`elasticity`].
 #![forbid(unsafe_code)]
+
+// The examples of the README run with the documentation's. Its links are of the repository.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
+
 pub use tactile_core as core;
 pub use tactile_elasticity as elasticity;
 pub use tactile_force as force;

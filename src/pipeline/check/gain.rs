@@ -26,7 +26,7 @@ impl GainCheck {
 }
 
 /// The gain that presses of known force show. Forces that are read from light are divided by it,
-/// and its error stands in place of [`Settings::coupling_error`](super::Settings::coupling_error).
+/// and its error stands in place of [`Settings::coupling_error`](crate::pipeline::Settings::coupling_error).
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
