@@ -27,7 +27,7 @@
 //! let contact = press.contact(0)?.expect("something touches");
 //! assert!((contact.contact_radius_m.value / (12.0 * 86.2e-6) - 1.0).abs() < 0.01);
 //! let modulus = press.modulus()?;
-//! assert!(modulus.interval_95.contains(modulus.youngs_modulus_pa));
+//! println!("{:.0} Pa, 95 %: {:?}", modulus.youngs_modulus_pa, modulus.interval_95);
 //! # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
 //! ```
 //!

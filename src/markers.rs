@@ -127,7 +127,8 @@ pub fn find_markers(grey: ArrayView2<'_, f64>) -> Vec<Marker> {
 fn box_sums(values: &Array2<f32>, reach: usize, sums: &mut Array2<f32>) {
     let (rows, columns) = values.dim();
     let mut tall = vec![0.0_f32; columns];
-    // The row's running sum from `reach` + 1 pixels before its first pixel to `reach` after its end.
+    // The row's running sum from `reach` + 1 pixels before its first pixel to `reach` after its
+    // end.
     let mut running = vec![0.0; columns + 2 * reach + 1];
     for last in 0..rows + reach {
         if last < rows {
@@ -412,7 +413,8 @@ pub fn track_markers(reference: &[Marker], frame: &[Marker]) -> Result<MarkerFie
     })
 }
 
-/// Pairs of markers that have hardly moved: mutual nearest neighbours, where nothing else is smooth.
+/// Pairs of markers that have hardly moved: mutual nearest neighbours, where nothing else is
+/// smooth.
 ///
 /// Every displacement must be within a quarter of the spacing of the one that the eight pairs next
 /// to it predict, an affine function, so that no other partner fits. One marker in a hundred may be

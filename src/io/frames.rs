@@ -30,9 +30,9 @@ const LONGEST_HEADER: u64 = 4096;
 /// - **PGM and PPM**, of binary samples, any number one after the other.
 /// - **AVI** of JPEG frames (MJPG), as webcams record them.
 /// - **NPY and NPZ** of NumPy: arrays of `uint8` or `uint16` in C order, of shape (rows, columns)
-///   or (frames, rows, columns), with 3 behind them for colours. Several arrays follow each other in
-///   an archive, and in a pipe that `numpy.save` writes to. An archive's arrays of other numbers are
-///   passed over.
+///   or (frames, rows, columns), with 3 behind them for colours. Several arrays follow each other
+///   in an archive, and in a pipe that `numpy.save` writes to. An archive's arrays of other numbers
+///   are passed over.
 /// - **TIFF**, a frame a page.
 /// - Any other image of [`read_grey_image`](super::read_grey_image): one frame.
 ///

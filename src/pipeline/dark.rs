@@ -61,8 +61,8 @@ impl DarkContact {
     ///
     /// No darkness is no depth. A table with the entry (0, 0) is read as it stands. Another counts
     /// its depths from a contact circle that was found at some darkness, and it is
-    /// [zeroed](DepthTable::zeroed) where it determines its zero. Where it does not it is read as it
-    /// stands. Entries at or below the threshold of contact and negative ones are left out.
+    /// [zeroed](DepthTable::zeroed) where it determines its zero. Where it does not it is read as
+    /// it stands. Entries at or below the threshold of contact and negative ones are left out.
     ///
     /// ```
     /// use tactile_imaging::pipeline::DarkContact;

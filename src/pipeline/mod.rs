@@ -56,6 +56,8 @@ pub use crate::force::{FaceReading, ShapeProblem};
 pub use crate::sfs::{BallFit, Binning};
 pub use batch::contacts;
 pub use budget::{ErrorShare, ErrorSource};
+#[cfg(feature = "scene")]
+pub(crate) use check::PARABOLA_ERROR;
 pub use check::{CheckPress, CheckedGain, CheckedGuide, CheckedObject, KnownBall};
 pub use composition::Pipeline;
 pub use contact::{ContactReading, ContactStage, FrameContact};

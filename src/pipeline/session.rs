@@ -520,8 +520,8 @@ impl Session {
         &self.bench.report
     }
 
-    /// The surface of the last frame's contact, on the grid that suits its size. Every call computes
-    /// it, in memory that is kept.
+    /// The surface of the last frame's contact, on the grid that suits its size. Every call
+    /// computes it, in memory that is kept.
     ///
     /// ```
     /// use tactile_imaging::pipeline::Session;

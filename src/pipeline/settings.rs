@@ -130,6 +130,20 @@ impl Settings {
     /// Relative error of the layers' moduli where none is stated.
     pub(super) const ASSUMED_LAYER_ERROR: f64 = 0.05;
 
+    /// Covariance of ln E, ln h and ν of all layers whose moduli are wrong by one factor with this
+    /// relative error.
+    pub(crate) fn common_layer_covariance(layers: usize, error: f64) -> DMatrix<f64> {
+        let parameters = PARAMETERS_PER_LAYER * layers;
+        // The logarithms of the moduli come first.
+        let is_modulus = |parameter: usize| parameter < layers;
+        DMatrix::from_fn(parameters, parameters, |i, j| {
+            match is_modulus(i) && is_modulus(j) {
+                true => error * error,
+                false => 0.0,
+            }
+        })
+    }
+
     /// States that every input which is not stated yet is exact, but for light that is uneven over
     /// the frame: for frames whose truth is known.
     ///

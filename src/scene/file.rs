@@ -1,7 +1,7 @@
 //! What a scene file may hold, and contact tables as files.
 use crate::core::Estimate;
 use crate::elasticity::ElasticityError;
-use crate::elasticity::contact::{ContactTable, Layer, PARAMETERS_PER_LAYER, Waveguide};
+use crate::elasticity::contact::{ContactTable, Layer, Waveguide};
 #[cfg(feature = "fem")]
 use crate::fem::{TableOptions, TableProgress};
 use crate::io::{
@@ -9,10 +9,9 @@ use crate::io::{
     pixel_size, poisson_ratio, positive, read_bytes, read_toml, write_bytes,
 };
 use crate::pipeline::{
-    CheckedObject, EstimatorChoice, IntegratorChoice, KnownBall, MatcherChoice, Object,
+    CheckPress, CheckedObject, EstimatorChoice, IntegratorChoice, KnownBall, MatcherChoice, Object,
     ReconstructionChoice, SamplerChoice, Settings, StagesConfig, StrainChoice, WarpChoice,
 };
-use nalgebra::DMatrix;
 use serde::de::value::MapAccessDeserializer;
 use serde::de::{self, Deserializer, MapAccess, Unexpected, Visitor};
 use serde::{Deserialize, Serialize};
@@ -180,15 +179,16 @@ struct BallTable {
 
 impl BallTable {
     fn known(&self) -> KnownBall {
-        let radius_error_m = self.radius_error_m.unwrap_or(0.5e-2 * self.radius_m);
-        let radius_m = Estimate::new(self.radius_m, radius_error_m);
-        let Some(modulus) = self.youngs_modulus_pa else {
+        let radius_m = KnownBall::radius(self.radius_m, self.radius_error_m);
+        let Some(modulus_pa) = self.youngs_modulus_pa else {
             return KnownBall::rigid(radius_m);
         };
-        let modulus_error = self.youngs_modulus_error_pa.unwrap_or(2e-2 * modulus);
-        let mut ball = KnownBall::elastic(radius_m, Estimate::new(modulus, modulus_error));
-        let poisson_error = self.poisson_ratio_error.unwrap_or(0.01);
-        ball.poisson_ratio = Estimate::new(self.poisson_ratio, poisson_error);
+        let modulus_pa = KnownBall::modulus(modulus_pa, self.youngs_modulus_error_pa);
+        let mut ball = KnownBall::elastic(radius_m, modulus_pa);
+        ball.poisson_ratio.value = self.poisson_ratio;
+        if let Some(error) = self.poisson_ratio_error {
+            ball.poisson_ratio.standard_error = error;
+        }
         ball
     }
 }
@@ -205,10 +205,9 @@ impl CheckTable {
                 return Err(("object", "expected \"sample\", \"calibrator\" or a ball"));
             }
         };
-        let error_n = self.force_error_n.unwrap_or(0.2e-2 * self.force_n);
         Ok(SceneCheck {
             image: beside(file, &self.image),
-            known_n: Estimate::new(self.force_n, error_n),
+            known_n: CheckPress::force(self.force_n, self.force_error_n),
             object,
         })
     }
@@ -326,17 +325,8 @@ impl StatedErrors {
         set(&mut settings.object_radius_error_m, self.radius_m);
         set(&mut settings.poisson_ratio_error, self.poisson_ratio);
         if let (Some(error), Some(guide)) = (self.layers, &settings.waveguide) {
-            let layers = guide.layers().len();
-            let parameters = PARAMETERS_PER_LAYER * layers;
-            // The logarithms of the moduli come first.
-            let entry = |i: usize, j: usize| {
-                if i.max(j) < layers {
-                    error * error
-                } else {
-                    0.0
-                }
-            };
-            settings.layer_covariance = Some(DMatrix::from_fn(parameters, parameters, entry));
+            let covariance = Settings::common_layer_covariance(guide.layers().len(), error);
+            settings.layer_covariance = Some(covariance);
         }
     }
 }

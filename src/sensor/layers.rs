@@ -10,6 +10,7 @@ use crate::elasticity::contact::{
     Layer, PARAMETERS_PER_LAYER, guide_log_stiffness, stepped_layers,
 };
 use crate::force::Estimate;
+use crate::pipeline::PARABOLA_ERROR;
 use crate::scene::{SceneLayer, elastic_layers};
 use nalgebra::{DMatrix, DVector};
 
@@ -54,9 +55,6 @@ impl LayerFit {
 /// Nodes in ln a between which ln E_g is a polynomial. Five leave an error of 10⁻⁵ over a decade,
 /// and each costs a solution of the layer equation.
 const NODES: usize = 5;
-/// Relative error of F at a/R = 1 from taking the ball for a parabola and strains as small. It goes
-/// as (a/R)².
-const MODEL_ERROR: f64 = 0.1;
 /// Standard errors by which a stated value, or the whole fit, may be off before it is refused.
 const LARGEST_DEVIATION: f64 = 4.0;
 /// Standard error of a parameter that is stated as exact, far below any that presses determine.
@@ -258,7 +256,7 @@ impl<'a> Problem<'a> {
             } else {
                 balls
                     .get(k - layer_parameters)
-                    .map_or(MODEL_ERROR, |b| b.radius_error)
+                    .map_or(PARABOLA_ERROR, |b| b.radius_error)
             };
             error.max(EXACT)
         });

@@ -27,9 +27,9 @@ use tactile_imaging::pipeline::with_error;
 /// strain, that over the whole face where it is not symmetric: the lump may lie off the axis. Of
 /// several presses at stated places the answer is one for all, and the lump may lie under any of
 /// them. It may be flatter or taller than a ball, and its diameter is that of the ball of equal
-/// volume. The answer is whether there is a lump, its place, diameter, depth, modulus and height over width with
-/// 95 % intervals, or which of them the frames leave open. --out gets profiles.csv and
-/// inclusion.svg. A search takes some seven seconds for each kind of interface.
+/// volume. The answer is whether there is a lump, its place, diameter, depth, modulus and height
+/// over width with 95 % intervals, or which of them the frames leave open. --out gets profiles.csv
+/// and inclusion.svg. A search takes some seven seconds for each kind of interface.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:

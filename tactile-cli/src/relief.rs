@@ -18,8 +18,8 @@ pub struct HeightGrid {
 }
 
 impl HeightGrid {
-    /// The part of `heights` that is not NaN, thinned. Heights and pixels are in millimetres. `None`
-    /// where there is no part, or a level one.
+    /// The part of `heights` that is not NaN, thinned. Heights and pixels are in millimetres.
+    /// `None` where there is no part, or a level one.
     pub fn of(heights: ArrayView2<'_, f64>, pixel: [f64; 2]) -> Option<Self> {
         let known = heights
             .indexed_iter()

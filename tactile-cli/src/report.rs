@@ -48,8 +48,9 @@ enum Printed {
 
 /// What a call is about, collected while it runs, and its page.
 ///
-/// The page's policy allows no request, and no script but the one that turns surfaces. Nothing on it
-/// depends on when, where or how fast the call ran, so that two pages differ only where calls or data do.
+/// The page's policy allows no request, and no script but the one that turns surfaces. Nothing on
+/// it depends on when, where or how fast the call ran, so that two pages differ only where calls or
+/// data do.
 pub(crate) struct Report {
     pub path: PathBuf,
     /// The call, ready for a shell.

@@ -34,8 +34,8 @@ mod series;
 ///
 /// Three files and more are followed from frame to frame. The strain is then that of the last frame
 /// since the first, found where a direct match is not, and --out also gets tracks.csv (every point
-/// of every track: frame from 1, row from 0 and position) and series.csv (strain of every step and since the
-/// first frame).
+/// of every track: frame from 1, row from 0 and position) and series.csv (strain of every step and
+/// since the first frame).
 #[derive(Args)]
 #[command(after_help = "\
 Examples:

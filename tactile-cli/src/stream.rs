@@ -77,8 +77,8 @@ pub struct StreamArguments {
     /// video gives the same answers again.
     #[arg(long, value_name = "FILE.y4m")]
     record: Option<PathBuf>,
-    /// Show frame, force, modulus, surface and the sensor's health in browsers as they come. An address that other computers
-    /// reach gets a token.
+    /// Show frame, force, modulus, surface and the sensor's health in browsers as they come. An
+    /// address that other computers reach gets a token.
     #[arg(long, value_name = "ADDRESS:PORT", num_args = 0..=1, default_missing_value = "127.0.0.1:8642")]
     serve: Option<SocketAddr>,
     #[command(flatten)]

@@ -233,8 +233,8 @@ impl Observed {
     }
 
     /// These values with the error of the pressure of an inclusion off the axis that lifts the
-    /// pressure by this part, in quadrature with that of another. Far from a face it fades with what
-    /// the inclusion adds there.
+    /// pressure by this part, in quadrature with that of another. Far from a face it fades with
+    /// what the inclusion adds there.
     pub fn with_lump_aside(&self, centre_m: [f64; 2], forward: &Forward, lift: f64) -> Self {
         let mut observed = self.clone();
         if let (Some(cells), Some(face)) = (&mut observed.cells, &forward.cells) {
@@ -299,8 +299,8 @@ impl Observed {
                 let smooth = correlation(i, j, sensor.correlation_m);
                 let wide = correlation(i, j, SHAPE_LENGTH * outermost);
                 let short = correlation(i, j, model.element * outermost);
-                // Presses share what belongs to sensor and rim. What goes with the inclusion, the tilt
-                // and the errors of frames and of place are each press's own.
+                // Presses share what belongs to sensor and rim. What goes with the inclusion, the
+                // tilt and the errors of frames and of place are each press's own.
                 let is_one_press =
                     (self.cells.as_ref()).is_none_or(|cells| cells.is_one_press(i, j));
                 let own = if is_one_press { 1.0 } else { 0.0 };

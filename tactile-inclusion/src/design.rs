@@ -59,9 +59,9 @@ impl InclusionSearch {
     ///
     /// $$ (J^T C^{-1} J + P^{-1})^{-1} $$
     ///
-    /// with what is known of block, sensor and shape. `white_pa` is the white error of each ring's mean: a
-    /// pixel's over the root of the ring's pixels, larger near the axis. The face counts as bonded
-    /// unless the specimen says otherwise. One solution with derivatives.
+    /// with what is known of block, sensor and shape. `white_pa` is the white error of each ring's
+    /// mean: a pixel's over the root of the ring's pixels, larger near the axis. The face counts as
+    /// bonded unless the specimen says otherwise. One solution with derivatives.
     ///
     /// # Errors
     /// A length, modulus or error that is not positive. Approaches that do not grow. Not one error

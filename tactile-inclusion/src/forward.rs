@@ -20,8 +20,8 @@ pub struct Parameters {
     pub place: Place,
     /// A second inclusion and its place.
     pub second: Option<(LumpParameters, Place)>,
-    /// How far the axis of each press was from where it is said to have been: of the first ones, the
-    /// others are where they are said to be.
+    /// How far the axis of each press was from where it is said to have been: of the first ones,
+    /// the others are where they are said to be.
     pub strayed_m: Vec<[f64; 2]>,
     /// What the approaches read too little.
     pub zero_m: f64,

@@ -201,8 +201,8 @@ impl InclusionSearch {
         None
     }
 
-    /// Two like inclusions, the product of whose ratios is nearest to the last frame's pressure over
-    /// the plain block's.
+    /// Two like inclusions, the product of whose ratios is nearest to the last frame's pressure
+    /// over the plain block's.
     ///
     /// Logarithms of ratios add. Those of small strain under the axis are laid around each place of
     /// a grid; for each two places the multiples that fit best are found.

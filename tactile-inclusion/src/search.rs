@@ -36,10 +36,10 @@ const CARRIED: f64 = 0.75;
 /// Finds a spheroidal inclusion in a block from the pressure on a guide's face at some approaches.
 ///
 /// Maximum a posteriori over ln D, ln d, ln E₁, the inclusion's height over its width, ln E₀, the
-/// block's height, ν and the approaches' zero by Levenberg–Marquardt on finite-strain finite elements from several starts. A score test
-/// first shows whether an inclusion would explain more than the homogeneous block. Intervals by
-/// following the posterior along ln E₁. An inclusion's probability from the evidence with and
-/// without one.
+/// block's height, ν and the approaches' zero by Levenberg–Marquardt on finite-strain finite
+/// elements from several starts. A score test first shows whether an inclusion would explain more
+/// than the homogeneous block. Intervals by following the posterior along ln E₁. An inclusion's
+/// probability from the evidence with and without one.
 ///
 /// ```no_run
 /// use tactile_fem::{Guide, GuideLayer, Material};
@@ -187,17 +187,17 @@ impl InclusionSearch {
         self.search_scan(&scan, progress)
     }
 
-    /// As [`Self::search_picture`], from presses at several places of a block that is far wider than
-    /// the guide: one posterior over all of them, with one inclusion or two. How far each press was from
-    /// where it is said to have been is fitted along, and each has an error of its own of the
-    /// approaches' zero. The inclusion's place is given in the presses' coordinates. Only places
-    /// under the used part of some press's face are searched. Two are told where one leaves more
-    /// than the errors explain and two do not. The time grows as the third power of
+    /// As [`Self::search_picture`], from presses at several places of a block that is far wider
+    /// than the guide: one posterior over all of them, with one inclusion or two. How far each
+    /// press was from where it is said to have been is fitted along, and each has an error of its
+    /// own of the approaches' zero. The inclusion's place is given in the presses' coordinates.
+    /// Only places under the used part of some press's face are searched. Two are told where one
+    /// leaves more than the errors explain and two do not. The time grows as the third power of
     /// the number of all cells: an eighth of the face's radius is narrow enough for five presses.
     ///
     /// # Errors
-    /// Those of [`Self::search_picture`]. No press. Approaches that differ between presses. An error
-    /// of place that is negative or NaN.
+    /// Those of [`Self::search_picture`]. No press. Approaches that differ between presses. An
+    /// error of place that is negative or NaN.
     pub fn search_scan(
         &self,
         scan: &Scan,

@@ -4,7 +4,7 @@ use ndarray::Array2;
 use pyo3::prelude::*;
 use pyo3::types::PyType;
 use tactile_imaging::core::Estimate;
-use tactile_imaging::pipeline::{CheckedObject, KnownBall};
+use tactile_imaging::pipeline::{self as rust, CheckedObject, KnownBall};
 
 /// A press of known force, before or after the frames, for `Pipeline.with_checks`.
 ///
@@ -27,7 +27,7 @@ impl CheckPress {
     ) -> PyResult<Self> {
         Ok(Self {
             frame: arrays::frame("frame", frame)?.as_array().to_owned(),
-            known_n: Estimate::new(force, force_error.unwrap_or(0.2e-2 * force)),
+            known_n: rust::CheckPress::force(force, force_error),
             object,
         })
     }
@@ -78,12 +78,9 @@ impl CheckPress {
         poisson_ratio: f64,
         poisson_ratio_error: f64,
     ) -> PyResult<Self> {
-        let with = |value: f64, error: Option<f64>, assumed: f64| {
-            Estimate::new(value, error.unwrap_or(assumed * value))
-        };
-        let mut ball = KnownBall::rigid(with(radius, radius_error, 0.5e-2));
+        let mut ball = KnownBall::rigid(KnownBall::radius(radius, radius_error));
         ball.youngs_modulus_pa =
-            youngs_modulus.map(|modulus| with(modulus, youngs_modulus_error, 2e-2));
+            youngs_modulus.map(|modulus| KnownBall::modulus(modulus, youngs_modulus_error));
         ball.poisson_ratio = Estimate::new(poisson_ratio, poisson_ratio_error);
         Self::new(frame, force, force_error, CheckedObject::Ball(ball))
     }

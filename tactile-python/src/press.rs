@@ -120,8 +120,8 @@ impl Press {
     /// Raises
     /// ------
     /// ValueError
-    ///     A time that is negative or before that of an earlier frame. The press has the frame then,
-    ///     without a time.
+    ///     A time that is negative or before that of an earlier frame. The press has the frame
+    ///     then, without a time.
     #[pyo3(signature = (frame, *, gauge=None, gauge_error=0.0, time=None))]
     fn add_frame(
         &mut self,

@@ -250,7 +250,8 @@ result! {
         /// Names of those of diameter, depth and modulus that the frames determine. Of the others
         /// the interval alone is of use.
         identified: Vec<&'static str>,
-        /// "bonded" or "frictionless", whether the guide's face sticks to the block or slides on it.
+        /// "bonded" or "frictionless", whether the guide's face sticks to the block or slides on
+        /// it.
         interface: &'static str,
         /// What is doubtful about it, a sentence each.
         flags: Vec<String>,

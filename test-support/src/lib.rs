@@ -1,4 +1,5 @@
-//! What the tests of several crates share: recorded answers, tables of worst errors, published data.
+//! What the tests of several crates share: recorded answers, tables of worst errors, published
+//! data.
 #![forbid(unsafe_code)]
 #![allow(missing_docs, clippy::print_stdout)]
 

@@ -1,4 +1,5 @@
-//! Presses of known force: what an object reflects and what the lamps give then needs no assumption.
+//! Presses of known force: what an object reflects and what the lamps give then needs no
+//! assumption.
 use ndarray::Array2;
 use tactile_imaging::force::Estimate;
 use tactile_imaging::pipeline::{CheckPress, CheckedObject, Measurement};

@@ -431,12 +431,15 @@ fn presses_of_known_balls_make_the_layers_right() {
         let [before, after] =
             [&unchecked, &pipeline].map(|p| trial.press(p).unwrap().modulus().unwrap());
         let error = |m: &ModulusEstimate| m.youngs_modulus_pa / sample.youngs_modulus_pa - 1.0;
-        let half_width = 1.96 * after.standard_error_pa / sample.youngs_modulus_pa;
+        let half_width =
+            |m: &ModulusEstimate| 1.96 * m.standard_error_pa / sample.youngs_modulus_pa;
         let errors = [error(&before), error(&after)];
-        let case = format!("layers by {top}, {others}: {errors:?} ± {half_width}");
-        // The law's own error, a hundredth at these a/R, bounds what two balls show of three layers:
-        // 4 % beside the 13 % of the layers as stated.
-        assert!(errors[1].abs() < half_width && half_width < 0.045, "{case}");
+        let half_widths = [half_width(&before), half_width(&after)];
+        let case = format!("layers by {top}, {others}: {errors:?} ± {half_widths:?}");
+        // The law's own error, a hundredth at these a/R, bounds what two balls show of three
+        // layers: 4 % beside 8 % or more of the layers as stated.
+        assert!(half_widths[0] > 0.08 && half_widths[1] < 0.045, "{case}");
+        assert!(errors[1].abs() < half_widths[1].min(0.015), "{case}");
         if [*top, *others] != [1.0; 2] {
             assert!(errors[1].abs() < 0.3 * errors[0].abs(), "{case}");
         }

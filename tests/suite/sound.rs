@@ -1,5 +1,5 @@
-//! What must hold of every press and stream, whatever its frames are: a typed error, a finite answer,
-//! or a flag that says what is wrong; never a panic, never a silent NaN.
+//! What must hold of every press and stream, whatever its frames are: a typed error, a finite
+//! answer, or a flag that says what is wrong; never a panic, never a silent NaN.
 use ndarray::Array2;
 use tactile_imaging::Pipeline;
 use tactile_imaging::elasticity::modulus::ModulusEstimate;

@@ -1,19 +1,43 @@
 //! The gain of the sensor as it is on the day, from forces that are read and known.
-use super::CheckedObject;
+use super::{CheckedObject, is_positive};
 use crate::core::Estimate;
 use crate::core::statistics::quantile_95;
+use crate::pipeline::contact::ContactReading;
 use std::fmt::{self, Display, Formatter};
 
 /// A force that was read, beside the one that is known.
 #[derive(Clone, Copy, Debug)]
 pub struct GainCheck {
     /// With the error that is this press' own.
-    pub measured_n: Estimate,
-    pub known_n: Estimate,
-    pub object: CheckedObject,
+    measured_n: Estimate,
+    known_n: Estimate,
+    object: CheckedObject,
 }
 
 impl GainCheck {
+    pub fn new(
+        contact: &ContactReading,
+        known_n: Estimate,
+        object: CheckedObject,
+    ) -> Result<Self, &'static str> {
+        let measured_n = contact.force_n.ok_or("its force is not read from light")?;
+        let check = Self {
+            measured_n,
+            known_n,
+            object,
+        };
+        match () {
+            () if contact.out_of_calibration => Err("its light is outside the calibration"),
+            () if check.is_plausible() => Ok(check),
+            () => Err("the force that is read is not half to twice the one that is known"),
+        }
+    }
+
+    /// A gain below a half or above two is a wrong unit, rather than a sensor.
+    fn is_plausible(&self) -> bool {
+        is_positive(self.measured_n) && self.log_gain().0.abs() < std::f64::consts::LN_2
+    }
+
     /// Logarithm of the gain, and its variance.
     fn log_gain(&self) -> (f64, f64) {
         let ratio = self.measured_n.value / self.known_n.value;
@@ -26,7 +50,8 @@ impl GainCheck {
 }
 
 /// The gain that presses of known force show. Forces that are read from light are divided by it,
-/// and its error stands in place of [`Settings::coupling_error`](crate::pipeline::Settings::coupling_error).
+/// and its error stands in place of
+/// [`Settings::coupling_error`](crate::pipeline::Settings::coupling_error).
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
@@ -45,24 +70,11 @@ impl CheckedGain {
     ///
     /// With x = ln(measured/known) of each press and its variance v: where presses of one object
     /// scatter by more than v explains, the drift's variance τ² is that of DerSimonian and Laird
-    /// (1986, Control. Clin. Trials 7, 177), and the gain of the frames drifts by as much again. Of a
-    /// sensor that drifts by 2 %, two presses let 88 of 100 intervals hold, and four 92.
+    /// (1986, Control. Clin. Trials 7, 177), and the gain of the frames drifts by as much again.
+    /// Of a sensor that drifts by 2 %, two presses let 88 of 100 intervals hold, and four 92.
     /// The calibrator lacks the object's own coupling: its mean has the variance
     /// `coupling_error`² besides. The means of both objects are weighted by their variances.
-    ///
-    /// # Errors
-    /// Forces or errors that are no positive numbers, and a gain below a half or above two: a wrong
-    /// unit, rather than a sensor.
-    pub(super) fn of(checks: &[GainCheck], coupling_error: f64) -> Result<Self, &'static str> {
-        let positive = |e: Estimate| e.value > 0.0 && e.value.is_finite();
-        let error = |e: Estimate| e.standard_error >= 0.0 && e.standard_error.is_finite();
-        let usable = |e: Estimate| positive(e) && error(e);
-        if !checks
-            .iter()
-            .all(|c| usable(c.measured_n) && usable(c.known_n))
-        {
-            return Err("its forces must be positive numbers");
-        }
+    pub(super) fn of(checks: &[GainCheck], coupling_error: f64) -> Self {
         let groups = [CheckedObject::Sample, CheckedObject::Calibrator].map(|object| {
             let of_object = checks.iter().filter(move |check| check.object == object);
             of_object
@@ -87,15 +99,12 @@ impl CheckedGain {
             weight += of_group;
         }
         let log_gain = sum / weight;
-        if log_gain.abs() > std::f64::consts::LN_2 {
-            return Err("the force that is read is not half to twice the one that is known");
-        }
         let (gain, error) = (log_gain.exp(), weight.recip().sqrt().hypot(allowed));
-        Ok(Self {
+        Self {
             gain: Estimate::new(gain, gain * error),
             drift,
             presses: checks.len(),
-        })
+        }
     }
 }
 
@@ -153,6 +162,8 @@ impl Display for CheckedGain {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
+    use rand_distr::StandardNormal;
 
     fn check(measured: f64, known: f64, error: f64, object: CheckedObject) -> GainCheck {
         GainCheck {
@@ -165,7 +176,7 @@ mod tests {
     #[test]
     fn a_press_of_the_sample_replaces_the_coupling_and_one_of_the_calibrator_does_not() {
         let sample = check(0.8, 1.0, 0.01, CheckedObject::Sample);
-        let gain = CheckedGain::of(&[sample], 0.06).unwrap().gain;
+        let gain = CheckedGain::of(&[sample], 0.06).gain;
         assert!((gain.value - 0.8).abs() < 1e-12);
         let own = 0.0002_f64.sqrt().hypot(ASSUMED_DRIFT);
         assert!((gain.relative_error() - own).abs() < 1e-12);
@@ -173,44 +184,40 @@ mod tests {
             object: CheckedObject::Calibrator,
             ..sample
         };
-        let gain = CheckedGain::of(&[calibrator], 0.06).unwrap().gain;
+        let gain = CheckedGain::of(&[calibrator], 0.06).gain;
         assert!((gain.relative_error() - own.hypot(0.06)).abs() < 1e-12);
         // Of both the sample counts for more.
         let darker = check(0.9, 1.0, 0.01, CheckedObject::Calibrator);
-        let both = CheckedGain::of(&[sample, darker], 0.06).unwrap();
+        let both = CheckedGain::of(&[sample, darker], 0.06);
         assert!(both.gain.value > 0.8 && both.gain.value < 0.81 && both.drift == 0.0);
     }
 
     #[test]
     fn what_is_no_check_is_refused() {
         let sample = |measured, known| check(measured, known, 0.01, CheckedObject::Sample);
-        for checks in [
-            vec![sample(1.0, 0.0)],
-            vec![sample(f64::NAN, 1.0)],
-            vec![sample(1e-3, 1.0)],
-            vec![sample(2.1, 1.0)],
+        assert!(sample(0.51, 1.0).is_plausible() && sample(1.99, 1.0).is_plausible());
+        for (measured, known) in [
+            (1.0, 0.0),
+            (f64::NAN, 1.0),
+            (-1.0, 1.0),
+            (0.49, 1.0),
+            (2.1, 1.0),
         ] {
-            let refused = CheckedGain::of(&checks, 0.06);
-            assert!(refused.is_err(), "{checks:?}");
+            assert!(
+                !sample(measured, known).is_plausible(),
+                "{measured} for {known}"
+            );
         }
     }
 
     /// The gain at the time of the frames is one more draw of the same drift.
     #[test]
     fn intervals_hold_the_gain_of_a_drifting_sensor() {
-        let mut state = 1_u64;
-        let mut uniform = || {
-            state = state
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1);
-            ((state >> 11) as f64 + 0.5) / (1_u64 << 53) as f64
-        };
-        let mut normal = || {
-            let radius = (-2.0 * uniform().ln()).sqrt();
-            radius * (std::f64::consts::TAU * uniform()).cos()
-        };
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        let mut normal = || -> f64 { rng.sample(StandardNormal) };
         // Drift and own error of a press, relative. With two or three presses the drift is not
-        // always seen.
+        // always seen. Without drift the one that is assumed, and what scatters by chance, let more
+        // than 95 of 100 hold: 99.5 of three presses.
         for (drift, own, presses, least) in [
             (0.0, 0.01, 1, 0.93),
             (0.0, 0.01, 3, 0.93),
@@ -229,11 +236,11 @@ mod tests {
                     })
                     .collect();
                 let truth = (drift * normal()).exp();
-                let gain = CheckedGain::of(&checks, 0.06).unwrap().gain;
+                let gain = CheckedGain::of(&checks, 0.06).gain;
                 (gain.value - truth).abs() < 1.96 * gain.standard_error
             });
             let share = held.count() as f64 / 2000.0;
-            assert!(share > least && share < 0.995, "{drift} {presses}: {share}");
+            assert!(share > least && share < 0.998, "{drift} {presses}: {share}");
         }
     }
 }

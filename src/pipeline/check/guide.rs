@@ -1,15 +1,14 @@
 //! The guide's layers as they are on the day, from contact radii of balls of known modulus.
 //!
-//! A contact of radius a carries ln F = ln E* + ln f(a, layers). With x the departures of ln E, ln h
-//! and ν of all layers from their stated values, C their covariance and V that of what else moves
-//! ln F, the departures after the presses are x = C Hᵀ (H C Hᵀ + V)⁻¹ (ln F − ln F(x) + H x), H the
-//! derivatives of ln F(x) at x: the iterated Kalman update. Parameters that the presses do not
-//! determine stay as they were stated.
-use super::{KnownBall, is_known};
+//! A contact of radius a carries ln F = ln E* + ln f(a, layers). Let x be the departures of ln E,
+//! ln h and ν of all layers from their stated values and C their covariance, V that of what else
+//! moves ln F, and H the derivatives of ln F by x. The departures after the presses are
+//! x = C Hᵀ (H C Hᵀ + V)⁻¹ (ln F − ln F(x) + H x), the iterated Kalman update. Parameters that the
+//! presses do not determine stay as they were stated.
+use super::{KnownBall, is_known, is_positive};
 use crate::core::Estimate;
 use crate::elasticity::contact::{
-    Bond, Layer, PARAMETERS_PER_LAYER, Waveguide, guide_compliance_error, guide_log_stiffness,
-    stepped_layers,
+    Bond, Layer, Waveguide, guide_compliance_error, guide_log_stiffness, stepped_layers,
 };
 use crate::elasticity::modulus::{ContactLaw, LogForce, WaveguideLaw};
 use crate::pipeline::contact::ContactReading;
@@ -41,6 +40,16 @@ pub struct GuideCheck {
 /// Standard errors by which a press may contradict what was stated before it is refused.
 const LARGEST_DEVIATION: f64 = 4.0;
 
+/// Relative error of F at a/R = 1 from taking a rigid ball for a parabola and strains as small. It
+/// goes as (a/R)².
+pub(crate) const PARABOLA_ERROR: f64 = 0.1;
+
+/// Move of x below which the update has settled: a hundredth of any error that layers have.
+const SETTLED: f64 = 1e-5;
+
+/// The update is nearly linear in x and settles in three or four rounds.
+const MOST_ROUNDS: usize = 10;
+
 /// Step of the derivatives. Downwards, because ν is at most ½.
 const STEP: f64 = -1e-3;
 
@@ -50,13 +59,12 @@ impl GuideCheck {
         known_n: Estimate,
         ball: KnownBall,
     ) -> Result<Self, &'static str> {
-        let positive = |e: Estimate| is_known(e) && e.value > 0.0;
-        if !positive(ball.radius_m) || !ball.youngs_modulus_pa.is_none_or(positive) {
+        if !is_positive(ball.radius_m) || !ball.youngs_modulus_pa.is_none_or(is_positive) {
             return Err("the ball's radius and modulus must be positive numbers");
         }
         let poisson = ball.poisson_ratio;
-        if !is_known(poisson) || !(0.0..=0.5).contains(&poisson.value) {
-            return Err("the ball's Poisson ratio must be a number from 0 to 0.5");
+        if !(is_known(poisson) && poisson.value > -1.0 && poisson.value <= 0.5) {
+            return Err("the ball's Poisson ratio must be above -1 and at most 0.5");
         }
         Ok(Self {
             ball,
@@ -67,25 +75,22 @@ impl GuideCheck {
 
     /// ln F at the measured radius on these layers.
     fn log_force(&self, layers: &[Layer]) -> Option<LogForce> {
-        log_force(&self.ball, layers, self.radius_m.value)
+        self.ball.log_force(layers, self.radius_m.value)
     }
 
     /// Relative error of F from the law itself.
-    fn law_error(&self, guide: &Waveguide) -> Option<f64> {
-        let (radius, a) = (self.ball.radius_m.value, self.radius_m.value);
-        if self.ball.youngs_modulus_pa.is_none() {
-            // From taking the ball for a parabola and strains as small, as calibrations of layers.
-            return Some(0.1 * (a / radius).powi(2));
+    fn law_error(&self, layers: &[Layer]) -> Option<f64> {
+        let a = self.radius_m.value;
+        match self.ball.youngs_modulus_pa {
+            Some(_) => Some(self.ball.law(layers)?.model_error(Some(a), None)),
+            None => Some(PARABOLA_ERROR * (a / self.ball.radius_m.value).powi(2)),
         }
-        let law =
-            WaveguideLaw::new(radius, self.ball.poisson_ratio.value, guide, Bond::Bonded).ok()?;
-        Some(law.model_error(Some(a), None))
     }
 
     /// Errors of ln F: those that presses of this ball share.
     fn ball_errors(&self, layers: &[Layer], here: &LogForce) -> Option<[f64; 3]> {
         let beside = |ball: KnownBall| {
-            let there = log_force(&ball, layers, self.radius_m.value)?;
+            let there = ball.log_force(layers, self.radius_m.value)?;
             Some((there.value - here.value) / STEP)
         };
         let radius = here.size_slope * self.ball.radius_m.relative_error();
@@ -111,83 +116,72 @@ impl GuideCheck {
     }
 }
 
-/// ln F of a ball with a contact of radius a (m), with its slopes in ln a and ln R.
-fn log_force(ball: &KnownBall, layers: &[Layer], a: f64) -> Option<LogForce> {
-    let radius = ball.radius_m.value;
-    let Some(modulus) = ball.youngs_modulus_pa else {
-        let stiffness = |a: f64| guide_log_stiffness(layers, a);
-        let here = stiffness(a)?;
-        let slope = (stiffness(a * STEP.exp())? - here) / STEP;
-        let value = (4.0 / 3.0_f64).ln() + 3.0 * a.ln() - radius.ln() + here;
-        return Some(LogForce::new(value, 3.0 + slope, -1.0));
-    };
-    let guide = Waveguide::new(layers.to_vec()).ok()?;
-    let poisson = ball.poisson_ratio.value;
-    let law = WaveguideLaw::new(radius, poisson, &guide, Bond::Bonded).ok()?;
-    let compliance = |modulus: f64, poisson: f64| (1.0 - poisson * poisson) / modulus;
-    let own = compliance(modulus.value, poisson);
-    let top = layers.first()?;
-    let touched = compliance(top.youngs_modulus_pa, top.poisson_ratio);
-    let mut force = law.log_force_at_radius(a, touched / (touched + own))?;
-    force.value -= (touched + own).ln();
-    Some(force)
-}
-
-/// Covariance of ln E, ln h and ν of all layers before the presses.
-fn prior(settings: &Settings, layers: usize) -> DMatrix<f64> {
-    let assumed = Settings::ASSUMED_LAYER_ERROR.powi(2);
-    let of_moduli = |i: usize, j: usize| if i.max(j) < layers { assumed } else { 0.0 };
-    let count = PARAMETERS_PER_LAYER * layers;
-    match &settings.layer_covariance {
-        Some(stated) => stated.clone(),
-        None => DMatrix::from_fn(count, count, of_moduli),
+impl KnownBall {
+    /// The contact law of an elastic ball on layers.
+    fn law(&self, layers: &[Layer]) -> Option<WaveguideLaw> {
+        let guide = Waveguide::new(layers.to_vec()).ok()?;
+        let (radius, poisson) = (self.radius_m.value, self.poisson_ratio.value);
+        WaveguideLaw::new(radius, poisson, &guide, Bond::Bonded).ok()
     }
-}
 
-/// ln F of all presses on layers that are moved by x, with the derivatives by x.
-struct Prediction {
-    forces: Vec<LogForce>,
-    slopes: DMatrix<f64>,
-}
-
-impl Prediction {
-    fn at(
-        checks: &[GuideCheck],
-        stated: &[Layer],
-        x: &DVector<f64>,
-        moves: impl Fn(usize) -> bool,
-    ) -> Option<Self> {
-        let layers = stepped_layers(stated, x);
-        let all = |layers: &[Layer]| {
-            let forces = checks.iter().map(|check| check.log_force(layers));
-            forces.collect::<Option<Vec<_>>>()
+    /// ln F of a contact of radius a (m), with its slopes in ln a and ln R.
+    fn log_force(&self, layers: &[Layer], a: f64) -> Option<LogForce> {
+        let Some(modulus) = self.youngs_modulus_pa else {
+            let stiffness = |a: f64| guide_log_stiffness(layers, a);
+            let here = stiffness(a)?;
+            let slope = (stiffness(a * STEP.exp())? - here) / STEP;
+            let hertz = (4.0 / 3.0_f64).ln() + 3.0 * a.ln() - self.radius_m.value.ln();
+            return Some(LogForce::new(hertz + here, 3.0 + slope, -1.0));
         };
-        let forces = all(&layers)?;
-        let mut slopes = DMatrix::zeros(checks.len(), x.len());
-        for k in (0..x.len()).filter(|&k| moves(k)) {
-            let mut beside = x.clone();
-            beside[k] += STEP;
-            let there = all(&stepped_layers(stated, &beside))?;
-            for (i, (there, here)) in there.iter().zip(&forces).enumerate() {
-                slopes[(i, k)] = (there.value - here.value) / STEP;
-            }
-        }
-        Some(Self { forces, slopes })
+        let compliance = |modulus: f64, poisson: f64| (1.0 - poisson * poisson) / modulus;
+        let own = compliance(modulus.value, self.poisson_ratio.value);
+        let top = layers.first()?;
+        let touched = compliance(top.youngs_modulus_pa, top.poisson_ratio);
+        let share = touched / (touched + own);
+        let mut force = self.law(layers)?.log_force_at_radius(a, share)?;
+        force.value -= (touched + own).ln();
+        Some(force)
     }
 }
 
-/// Covariance of ln F of all presses from all but the layers.
+/// ln F of all presses on these layers.
+fn log_forces(checks: &[GuideCheck], layers: &[Layer]) -> Option<Vec<LogForce>> {
+    let forces = checks.iter().map(|check| check.log_force(layers));
+    forces.collect()
+}
+
+/// Derivatives of ln F of all presses by x, at x. Parameters without an error do not move.
+fn slopes(
+    checks: &[GuideCheck],
+    stated: &[Layer],
+    x: &DVector<f64>,
+    prior: &DMatrix<f64>,
+) -> Option<DMatrix<f64>> {
+    let here = log_forces(checks, &stepped_layers(stated, x))?;
+    let mut slopes = DMatrix::zeros(checks.len(), x.len());
+    for k in (0..x.len()).filter(|&k| prior[(k, k)] > 0.0) {
+        let mut beside = x.clone();
+        beside[k] += STEP;
+        let there = log_forces(checks, &stepped_layers(stated, &beside))?;
+        for (i, (there, here)) in there.iter().zip(&here).enumerate() {
+            slopes[(i, k)] = (there.value - here.value) / STEP;
+        }
+    }
+    Some(slopes)
+}
+
+/// Covariance of ln F of all presses from all but the layers, at the stated layers.
 fn noise(
     checks: &[GuideCheck],
-    guide: &Waveguide,
+    layers: &[Layer],
     forces: &[LogForce],
     length_scale: f64,
 ) -> Option<DMatrix<f64>> {
     let mut noise = DMatrix::zeros(checks.len(), checks.len());
-    let laws = checks.iter().map(|check| check.law_error(guide));
+    let laws = checks.iter().map(|check| check.law_error(layers));
     let laws: Vec<f64> = laws.collect::<Option<_>>()?;
     let balls = checks.iter().zip(forces);
-    let balls = balls.map(|(check, force)| check.ball_errors(guide.layers(), force));
+    let balls = balls.map(|(check, force)| check.ball_errors(layers, force));
     let balls: Vec<[f64; 3]> = balls.collect::<Option<_>>()?;
     for (i, first) in checks.iter().enumerate() {
         let force = first.known_n.relative_error();
@@ -208,49 +202,58 @@ fn noise(
     Some(noise)
 }
 
-/// The layers and their covariance after the presses.
-pub fn of(
+/// The layers and their covariance after the presses, or which press is not usable and why.
+pub fn update(
     checks: &[GuideCheck],
     settings: &Settings,
-) -> Result<(CheckedGuide, Waveguide, DMatrix<f64>), &'static str> {
-    let guide = settings
-        .waveguide
-        .as_ref()
-        .filter(|guide| !guide.layers().is_empty())
-        .ok_or("the guide is rigid beside the ball: it has no layers to check")?;
-    let unsolved = "the contact of the ball with the stated layers cannot be solved";
-    let stated = guide.layers();
-    let prior = prior(settings, stated.len());
-    let moves = |k: usize| prior[(k, k)] > 0.0;
-    let log_known = DVector::from_iterator(
-        checks.len(),
-        checks.iter().map(|check| check.known_n.value.ln()),
+) -> Result<(CheckedGuide, Waveguide, DMatrix<f64>), (usize, &'static str)> {
+    let guide = settings.waveguide.as_ref();
+    let stated = guide.map_or(&[][..], Waveguide::layers);
+    if stated.is_empty() {
+        let rigid = "the guide is rigid beside the ball: it has no layers to check";
+        return Err((0, rigid));
+    }
+    let unsolved = (
+        0,
+        "the contact of the ball with the stated layers cannot be solved",
     );
+    let prior = match &settings.layer_covariance {
+        Some(covariance) => covariance.clone(),
+        None => Settings::common_layer_covariance(stated.len(), Settings::ASSUMED_LAYER_ERROR),
+    };
+    let forces = log_forces(checks, stated).ok_or(unsolved)?;
+    let noise = noise(checks, stated, &forces, settings.length_scale()).ok_or(unsolved)?;
+    let known = checks.iter().map(|check| check.known_n.value.ln());
+    let log_known = DVector::from_iterator(checks.len(), known);
     let mut x = DVector::zeros(prior.nrows());
-    let predicted = |x: &DVector<f64>| Prediction::at(checks, stated, x, moves).ok_or(unsolved);
-    let mut here = predicted(&x)?;
-    let noise = noise(checks, guide, &here.forces, settings.length_scale()).ok_or(unsolved)?;
     let mut covariance = prior.clone();
-    // ln F is nearly linear in x: the third round moves it by 10⁻⁶.
-    for round in 0..4 {
-        let values = here.forces.iter().map(|force| force.value);
-        let gap = &log_known - DVector::from_iterator(checks.len(), values);
-        let slopes = &here.slopes;
-        let whole = slopes * &prior * slopes.transpose() + &noise;
-        let expected = whole.diagonal().map(f64::sqrt);
-        if round == 0 && gap.component_div(&expected).amax() > LARGEST_DEVIATION {
-            return Err(
-                "its contact radius contradicts the stated layers and ball by more than four \
-                 standard errors",
-            );
+    for round in 0..MOST_ROUNDS {
+        let forces = log_forces(checks, &stepped_layers(stated, &x)).ok_or(unsolved)?;
+        let predicted = DVector::from_iterator(checks.len(), forces.iter().map(|f| f.value));
+        let gap = &log_known - predicted;
+        let slopes = slopes(checks, stated, &x, &prior).ok_or(unsolved)?;
+        let whole = &slopes * &prior * slopes.transpose() + &noise;
+        if round == 0 {
+            let deviations = gap.component_div(&whole.diagonal().map(f64::sqrt)).abs();
+            if deviations.max() > LARGEST_DEVIATION {
+                return Err((
+                    deviations.imax(),
+                    "its contact radius contradicts the stated layers and ball by more than four \
+                     standard errors",
+                ));
+            }
         }
         let inverse = whole.cholesky().ok_or(unsolved)?.inverse();
         let gain = &prior * slopes.transpose() * inverse;
-        x = &gain * (gap + slopes * &x);
+        let next = &gain * (gap + &slopes * &x);
         // Joseph's form stays positive where a parameter is exact.
-        let left = DMatrix::identity(x.len(), x.len()) - &gain * slopes;
+        let left = DMatrix::identity(x.len(), x.len()) - &gain * &slopes;
         covariance = &left * &prior * left.transpose() + &gain * &noise * gain.transpose();
-        here = predicted(&x)?;
+        let moved = (&next - &x).amax();
+        x = next;
+        if moved < SETTLED {
+            break;
+        }
     }
     let layers = stepped_layers(stated, &x);
     let sum: f64 = checks.iter().map(|check| check.radius_m.value).sum();
@@ -296,7 +299,7 @@ mod tests {
         let radius_m = Estimate::exact(10e-3);
         let rigid = KnownBall::rigid(radius_m);
         let hard = KnownBall::elastic(radius_m, Estimate::exact(200e9));
-        let [rigid, hard] = [rigid, hard].map(|ball| log_force(&ball, &[gel], 0.3e-3).unwrap());
+        let [rigid, hard] = [rigid, hard].map(|ball| ball.log_force(&[gel], 0.3e-3).unwrap());
         // Finite strain goes as a/R: a few thousandths here.
         assert!(
             (rigid.value - hard.value).abs() < 5e-3,

@@ -13,6 +13,8 @@ use ndarray::ArrayView2;
 
 pub use gain::CheckedGain;
 pub use guide::CheckedGuide;
+#[cfg(feature = "scene")]
+pub(crate) use guide::PARABOLA_ERROR;
 
 /// A ball whose radius and modulus are known.
 ///
@@ -53,6 +55,18 @@ impl KnownBall {
             youngs_modulus_pa: Some(youngs_modulus_pa),
             poisson_ratio: Estimate::new(0.5, 0.01),
         }
+    }
+
+    /// A radius in metres, its error 0.5 % where none is stated.
+    #[must_use]
+    pub fn radius(radius_m: f64, error_m: Option<f64>) -> Estimate {
+        Estimate::new(radius_m, error_m.unwrap_or(0.5e-2 * radius_m))
+    }
+
+    /// A modulus in pascals, its error 2 % where none is stated.
+    #[must_use]
+    pub fn modulus(modulus_pa: f64, error_pa: Option<f64>) -> Estimate {
+        Estimate::new(modulus_pa, error_pa.unwrap_or(2e-2 * modulus_pa))
     }
 }
 
@@ -99,12 +113,20 @@ impl<'a> CheckPress<'a> {
             object,
         }
     }
+
+    /// A force in newtons, its error 0.2 % where none is stated.
+    #[must_use]
+    pub fn force(force_n: f64, error_n: Option<f64>) -> Estimate {
+        Estimate::new(force_n, error_n.unwrap_or(0.2e-2 * force_n))
+    }
 }
 
 impl Pipeline {
     /// Takes presses of known force into account: of the sample or the calibrator the gain of the
-    /// light ([`CheckedGain`]), of balls of known modulus the layers of the guide ([`CheckedGuide`]).
-    /// All have one reference.
+    /// light ([`CheckedGain`]), of balls of known modulus the layers of the guide
+    /// ([`CheckedGuide`]). All have one reference. Of one call the errors that presses share (pixel
+    /// size, contact law, ball) are counted as shared. Presses of a later call are taken as
+    /// independent of those before. A ball costs some dozen solutions of its contact.
     ///
     /// ```
     /// use tactile_imaging::force::{CalibrationPair, Estimate};
@@ -130,50 +152,45 @@ impl Pipeline {
     /// ```
     ///
     /// # Errors
-    /// [`PipelineError::Check`] for a press that shows no contact or one that cannot be trusted, whose
-    /// known values are not physical, that contradicts the sensor or the stated layers, or, of a ball,
-    /// where the guide has no layers. Those of a
-    /// [`Press`](super::Press)'s contact.
+    /// [`PipelineError::Check`] for a press that shows no contact or one that cannot be trusted,
+    /// whose known values are not physical, that contradicts the sensor or the stated layers, or,
+    /// of a ball, where the guide has no layers. Those of a [`Press`](super::Press)'s contact.
     pub fn with_checks(
         self,
         reference: ArrayView2<'_, u8>,
         checks: &[CheckPress<'_>],
     ) -> Result<Self, PipelineError> {
-        let (mut gains, mut guides) = (Vec::new(), Vec::new());
+        let (mut gains, mut guides, mut balls) = (Vec::new(), Vec::new(), Vec::new());
         for (press, check) in checks.iter().enumerate() {
             let refused = |reason| PipelineError::Check { press, reason };
-            let contact = self.checked_contact(reference, check)?.map_err(refused)?;
-            if let CheckedObject::Ball(ball) = check.object {
-                guides.push(GuideCheck::new(&contact, check.known_n, ball).map_err(refused)?);
-                continue;
+            if !is_positive(check.known_n) {
+                return Err(refused("its force must be a positive number"));
             }
-            if contact.out_of_calibration {
-                return Err(refused("its light is outside the calibration"));
+            let contact = self.checked_contact(reference, check)?;
+            let contact = contact.ok_or(refused("it shows no contact"))?;
+            trusted(&contact).map_err(refused)?;
+            match check.object {
+                CheckedObject::Ball(ball) => {
+                    guides.push(GuideCheck::new(&contact, check.known_n, ball).map_err(refused)?);
+                    balls.push(press);
+                }
+                object => {
+                    gains.push(GainCheck::new(&contact, check.known_n, object).map_err(refused)?)
+                }
             }
-            let no_force = refused("its force is not read from light");
-            gains.push(GainCheck {
-                measured_n: contact.force_n.ok_or(no_force)?,
-                known_n: check.known_n,
-                object: check.object,
-            });
         }
-        let first = |is_ball: bool| {
-            let of_kind =
-                |c: &CheckPress<'_>| matches!(c.object, CheckedObject::Ball(_)) == is_ball;
-            checks.iter().position(of_kind).unwrap_or_default()
-        };
         let mut pipeline = self;
         if !gains.is_empty() {
             let coupling = pipeline.settings().unchecked_coupling();
-            let press = first(false);
-            let checked = CheckedGain::of(&gains, coupling)
-                .map_err(|reason| PipelineError::Check { press, reason })?;
+            let checked = CheckedGain::of(&gains, coupling);
             pipeline = pipeline.with_settings(|settings| settings.checked_gain = Some(checked))?;
         }
         if !guides.is_empty() {
-            let press = first(true);
-            let (checked, layers, covariance) = guide::of(&guides, pipeline.settings())
-                .map_err(|reason| PipelineError::Check { press, reason })?;
+            let checked = guide::update(&guides, pipeline.settings());
+            let (checked, layers, covariance) = checked.map_err(|(ball, reason)| {
+                let press = balls[ball];
+                PipelineError::Check { press, reason }
+            })?;
             pipeline = pipeline.with_settings(|settings| {
                 settings.waveguide = Some(layers);
                 settings.layer_covariance = Some(covariance);
@@ -183,15 +200,12 @@ impl Pipeline {
         Ok(pipeline)
     }
 
-    /// The contact of a check with the errors that are its own, or why it is not usable.
+    /// The contact of a check with the errors that are its own.
     fn checked_contact(
         &self,
         reference: ArrayView2<'_, u8>,
         check: &CheckPress<'_>,
-    ) -> Result<Result<ContactReading, &'static str>, PipelineError> {
-        if !(is_known(check.known_n) && check.known_n.value > 0.0) {
-            return Ok(Err("its force must be a positive number"));
-        }
+    ) -> Result<Option<ContactReading>, PipelineError> {
         let pipeline = self.clone().with_settings(|settings| {
             settings.checked_gain = None;
             // Errors that all presses share are accounted for once, with what is checked.
@@ -207,11 +221,13 @@ impl Pipeline {
         })?;
         let mut press = pipeline.press(reference)?;
         press.add_frame(check.frame);
-        Ok(match press.contact(0)? {
-            Some(contact) => trusted(contact),
-            None => Err("it shows no contact"),
-        })
+        Ok(press.contact(0)?.copied())
     }
+}
+
+/// Whether a value and its error are numbers, the value a positive one.
+fn is_positive(estimate: Estimate) -> bool {
+    estimate.value > 0.0 && is_known(estimate)
 }
 
 /// Whether a value and its error are numbers.
@@ -220,8 +236,8 @@ fn is_known(estimate: Estimate) -> bool {
     estimate.value.is_finite() && error >= 0.0 && error.is_finite()
 }
 
-/// A contact whose force and radius are those of the whole object.
-fn trusted(contact: &ContactReading) -> Result<ContactReading, &'static str> {
+/// Refuses a contact whose force and radius are not those of the whole object.
+fn trusted(contact: &ContactReading) -> Result<(), &'static str> {
     let doubts = [
         (
             contact.touches_edge,
@@ -232,6 +248,6 @@ fn trusted(contact: &ContactReading) -> Result<ContactReading, &'static str> {
     ];
     match doubts.iter().find(|(doubted, _)| *doubted) {
         Some(&(_, reason)) => Err(reason),
-        None => Ok(*contact),
+        None => Ok(()),
     }
 }

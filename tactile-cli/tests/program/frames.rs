@@ -100,9 +100,9 @@ fn thousands_of_frames_are_one_measurement() {
         write_grey_image(folder.path().join(name), frame.view()).unwrap();
     }
     scene(folder.path(), "many.toml", REFERENCE, &names);
-    // Beside the program itself, a thousand results and the frames, which are kept up to 64 MB, take
-    // 53 MB of address space. A matrix of all loads would add 8 MB, a mask of each frame's contact
-    // 20 MB.
+    // Beside the program itself, a thousand results and the frames, which are kept up to 64 MB,
+    // take 53 MB of address space. A matrix of all loads would add 8 MB, a mask of each frame's
+    // contact 20 MB.
     let program = env!("CARGO_BIN_EXE_tactile");
     let limit = fs::metadata(program).unwrap().len() / 1024 + 57_000;
     let output = Command::new("sh")

@@ -177,7 +177,8 @@ fn frames_of_a_series_give_tracks_and_strains() {
         let found = &value["frames"][frame - 1];
         let mean = |part: &str| found[part]["components"]["e_xx"]["value"].as_f64().unwrap();
         let step: f64 = stretch / (stretch - 0.05);
-        // The positions are exact to rounding, and a homogeneous stretch is what a spline smooths to.
+        // The positions are exact to rounding, and a homogeneous stretch is what a spline smooths
+        // to.
         assert!(
             (mean("total") - 0.5 * (stretch * stretch - 1.0)).abs() < 1e-6,
             "{found}"

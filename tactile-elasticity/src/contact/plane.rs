@@ -64,8 +64,8 @@ impl LayerPlane {
         let plane_strain = top.map_or(f64::INFINITY, |layer| {
             layer.youngs_modulus_pa / (1.0 - layer.poisson_ratio.powi(2))
         });
-        // Beyond four thicknesses a bonded layer is at rest. The room is bounded for layers that are
-        // much thicker than the grid is wide.
+        // Beyond four thicknesses a bonded layer is at rest. The room is bounded for layers that
+        // are much thicker than the grid is wide.
         let reach = (4.0 * thickness / cell_m).ceil() as usize;
         let padded = shape.map(|cells| cells + reach.clamp(cells, 3 * cells));
         let count = (padded[0] * padded[1]) as f64;
@@ -115,8 +115,8 @@ impl LayerPlane {
     /// Normal force in newtons of a contact, with the error from one of all displacements together.
     ///
     /// The law is symmetric: with q the pressure that moves the contact by 1 everywhere, the force
-    /// is Σ q u over the cells, and the error of u counts with Σ q, the stiffness of a flat punch of
-    /// this outline.
+    /// is Σ q u over the cells, and the error of u counts with Σ q, the stiffness of a flat punch
+    /// of this outline.
     ///
     /// # Errors
     /// Those of [`pressure`](Self::pressure).

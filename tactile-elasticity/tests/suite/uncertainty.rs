@@ -1,6 +1,6 @@
-//! An error that all loads share carried to the modulus, against redrawing the whole experiment. The
-//! covariance of displacements is checked the same way with the spline that it comes from, in the
-//! facade's tests.
+//! An error that all loads share carried to the modulus, against redrawing the whole experiment.
+//! The covariance of displacements is checked the same way with the spline that it comes from, in
+//! the facade's tests.
 
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 use rand_distr::StandardNormal;
@@ -9,8 +9,8 @@ use tactile_elasticity::modulus::{
     Estimate, HertzSphere, LoadSeries, LoadState, ModulusEstimator, SharedErrors,
 };
 
-/// The standard deviation of 4000 redrawn moduli is itself known to 1.1 %: 5 % is four and a half of
-/// its standard deviations.
+/// The standard deviation of 4000 redrawn moduli is itself known to 1.1 %: 5 % is four and a half
+/// of its standard deviations.
 #[test]
 fn a_calibrations_error_does_not_average_out() {
     let reduced = reduced_modulus_pa(Body::rigid(), Body::elastic(50e3, 0.5).unwrap()).unwrap();

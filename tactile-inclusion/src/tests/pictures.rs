@@ -228,8 +228,8 @@ fn a_scan_finds_an_inclusion_between_its_presses() {
             assert!((error - 1.0).abs() < 0.15, "{told:?}");
         }
     }
-    // Of 15 intervals of 95 % three or more miss in 4 of 100 draws, and χ² of six degrees of freedom
-    // exceeds 16.8 in one.
+    // Of 15 intervals of 95 % three or more miss in 4 of 100 draws, and χ² of six degrees of
+    // freedom exceeds 16.8 in one.
     assert!(missed < 3 && squares < 16.8, "{missed} {squares}");
 
     // Of the press that is far from it, nothing.

@@ -115,7 +115,8 @@ pub struct SoftassignWorkspace<const D: usize> {
     stopped: bool,
     /// Whether any rotation is allowed and one takes the model onto itself.
     symmetric: bool,
-    /// What explains the targets better than the answer and may not take its place, and by how much.
+    /// What explains the targets better than the answer and may not take its place, and by how
+    /// much.
     twin: Option<(f64, Doubt)>,
     /// Points that the best run before the last had matched.
     matched_before: f64,
