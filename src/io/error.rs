@@ -143,7 +143,8 @@ impl FileError {
 
 /// Text from a file as it can stand in a sentence: one line of at most `length` characters.
 pub fn quoted(text: &str, length: usize) -> String {
-    let clean: String = text.trim().chars().filter(|c| !c.is_control()).collect();
+    let visible = |c: char| if c.is_control() { ' ' } else { c };
+    let clean: String = text.trim().chars().map(visible).collect();
     match clean.char_indices().nth(length) {
         Some((end, _)) => format!("{}…", &clean[..end]),
         None => clean,

@@ -165,7 +165,15 @@ impl FrameReader {
                 let mut bytes = Vec::new();
                 let whole = input.by_ref().take(LARGEST_FILE).read_to_end(&mut bytes);
                 whole.map_err(failed)?;
-                Pages::of(&bytes).map_or_else(|| Format::Image(take(&mut bytes)), Format::Pages)
+                match Pages::of(&bytes) {
+                    Some(pages) => Format::Pages(pages),
+                    None if image::guess_format(&bytes).is_ok() => Format::Image(bytes),
+                    None => {
+                        let expected = "a video or an image, known by its first bytes";
+                        let found = start.escape_ascii().to_string();
+                        return Err(refused(Broken::new(expected, found)));
+                    }
+                }
             }
         };
         Ok(Self {

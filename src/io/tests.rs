@@ -601,7 +601,11 @@ fn what_is_no_stream_is_refused_in_a_sentence() {
             "frame 4: expected 5 × 3 pixels as in the first, found 3 × 5",
         ),
         (lost, 3, "frame 4: expected the word FRAME, found `garbage`"),
-        (b"no stream at all".to_vec(), 0, "cannot use the image pipe"),
+        (
+            b"no stream at all".to_vec(),
+            0,
+            "known by its first bytes, found no stream",
+        ),
         (
             b"II*\0\xff\xff\xff\x7f".to_vec(),
             0,

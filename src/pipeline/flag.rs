@@ -325,11 +325,18 @@ impl fmt::Display for Flag {
                 value,
                 standard_error,
             } => {
+                // Every length is printed in millimetres.
+                let (factor, unit) = match *quantity {
+                    "force" => (1.0, "N"),
+                    _ => (1e3, "mm"),
+                };
                 write!(
                     f,
-                    "frame {}: the {quantity} cannot be told, its error ({standard_error:.1e}) is \
-                     larger than its value ({value:.1e})",
-                    frame + 1
+                    "frame {}: the {quantity} cannot be told, its error ({:.1e} {unit}) is \
+                     larger than its value ({:.1e} {unit})",
+                    frame + 1,
+                    factor * standard_error,
+                    factor * value
                 )
             }
             Self::OppositeSignal { frame, grey } => {
