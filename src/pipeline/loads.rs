@@ -2,7 +2,6 @@
 use super::contact::ContactReading;
 use super::error::PipelineError;
 use super::settings::Settings;
-use crate::elasticity::contact::guide_compliance_error;
 use crate::elasticity::modulus::{Estimate, LoadSeries, LoadState, SharedErrors};
 
 /// A contact as a load, before errors are split into its own and those that all loads share.
@@ -116,23 +115,13 @@ pub fn series(
 
 /// Relative error of the guide's compliance under contacts of the mean radius.
 fn guide_error_at(loads: impl Iterator<Item = Load>, settings: &Settings) -> f64 {
-    let Some(guide) = settings
-        .waveguide
-        .as_ref()
-        .filter(|g| !g.layers().is_empty())
-    else {
-        return 0.0;
-    };
-    let Some(covariance) = &settings.layer_covariance else {
-        return Settings::ASSUMED_LAYER_ERROR;
-    };
     let (mut sum, mut count) = (0.0, 0.0);
     for load in loads.filter(|load| load.counts) {
         sum += load.contact.contact_radius_m.value;
         count += 1.0;
     }
     // Without a radius the mean is NaN, which the compliance refuses.
-    guide_compliance_error(guide.layers(), covariance, sum / count).unwrap_or(0.0)
+    settings.guide_error(sum / count)
 }
 
 /// Loads that a session keeps apart. More are merged.

@@ -126,6 +126,9 @@ impl Press<'_> {
             mean_stress_pa: reading.mean_stress_pa(),
             surface_height_m,
             surface_apparent: self.apparent(),
+            guide_depression_m: self
+                .guide_depression_m(frame, &[0.0])?
+                .and_then(|depths| depths.first().copied()),
         })
     }
 

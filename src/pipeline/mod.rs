@@ -33,6 +33,7 @@ mod check;
 mod composition;
 mod contact;
 mod dark;
+mod depression;
 mod error;
 mod estimators;
 mod flag;

@@ -1,13 +1,14 @@
 //! A press: frames at one or more loads, of which nothing is computed before it is asked for.
 use super::composition::Pipeline;
 use super::contact::{ContactReading, FrameContact};
+use super::depression;
 use super::error::PipelineError;
 use super::estimators::that_fit;
 use super::flag::Flag;
 use super::loads::{self, Load};
 use super::reference_light::LightChange;
 use super::report::{Report, SkipReason, Stage};
-use super::specimen::Specimen;
+use super::specimen::{Object, Specimen};
 use super::stages::{Bench, MatchedPoints, PairStrain, Stages};
 use super::surface::{ContactSurface, ControlPoints};
 use crate::elasticity::modulus::{LoadSeries, ModulusEstimate};
@@ -278,6 +279,43 @@ impl<'a> Press<'a> {
     /// [`PipelineError::Contact`], [`PipelineError::NoSuchFrame`].
     pub fn contact(&self, frame: usize) -> Result<Option<&ContactReading>, PipelineError> {
         Ok(self.known(frame)?.contact.reading.as_ref())
+    }
+
+    /// Depths in metres to which a ball presses the guide at distances (m) from the contact's
+    /// centre: the real surface beside the apparent one of [`surface`](Self::surface). `None` where
+    /// nothing touches, the object is no ball, or the force or the guide's layers are not known.
+    ///
+    /// [`depression_m`](crate::elasticity::contact::depression_m) under the force and the contact
+    /// radius of the frame. The standard error is that of force, radius, layers and of the law,
+    /// which is for small strains.
+    ///
+    /// ```
+    /// use tactile_simulate::{CalibrationRun, Camera, ContactModel, PressOptions, Trial};
+    /// let options = PressOptions {
+    ///     law: ContactModel::FiniteElements,
+    ///     camera: Camera::default().coarser(8),
+    ///     ..PressOptions::default()
+    /// };
+    /// let trial = Trial::new(options, &CalibrationRun::default())?;
+    /// let press = trial.press(&trial.pipeline()?)?;
+    /// let depths = press.guide_depression_m(1, &[0.0, 2e-3])?.expect("a ball on layers");
+    /// // The guide yields by 2.13 mm on the axis under 1.2 N.
+    /// assert!((depths[0].value - 2.134e-3).abs() < 1.96 * depths[0].standard_error);
+    /// assert!(depths[1].value < depths[0].value);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// Those of [`contact`](Self::contact).
+    pub fn guide_depression_m(
+        &self,
+        frame: usize,
+        distances_m: &[f64],
+    ) -> Result<Option<Vec<Estimate>>, PipelineError> {
+        let settings = self.pipeline().settings();
+        let is_ball = matches!(settings.object, Object::Sphere { .. });
+        let contact = self.contact(frame)?.filter(|_| is_ball);
+        Ok(contact.and_then(|contact| depression::depths(contact, settings, distances_m)))
     }
 
     /// The cautions about a frame's contact, or about a frame without one, which

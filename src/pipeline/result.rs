@@ -98,6 +98,9 @@ pub struct FrameResult {
     /// Whether that surface is apparent: the pressure, read as shading. The face of the sensor has
     /// another shape.
     pub surface_apparent: bool,
+    /// Depth in metres to which a ball presses the guide on the axis, by the law of its layers. See
+    /// [`Press::guide_depression_m`](super::Press::guide_depression_m).
+    pub guide_depression_m: Option<Estimate>,
 }
 
 /// How the control points of the first and the last frame were matched.
@@ -247,6 +250,13 @@ impl Display for FrameResult {
         write!(f, "   contact radius {} mm", with_its_error(radius, 1e3))?;
         if let Some(ratio) = self.contact_ratio {
             write!(f, "   a/R {ratio:.3}")?;
+        }
+        if let Some(depth) = self.guide_depression_m {
+            write!(
+                f,
+                "   guide pressed in by {} mm",
+                with_its_error(depth, 1e3)
+            )?;
         }
         let [x, y] = self.centroid_px.map(|c| c.value);
         write!(f, "   centroid ({x:.2}, {y:.2}) px")?;

@@ -3,7 +3,7 @@ use super::check::{CheckedGain, CheckedGuide};
 use super::error::PipelineError;
 use super::reference_light::ReferenceLight;
 use super::specimen::Object;
-use crate::elasticity::contact::{PARAMETERS_PER_LAYER, Waveguide};
+use crate::elasticity::contact::{PARAMETERS_PER_LAYER, Waveguide, guide_compliance_error};
 use crate::sfs::Binning;
 use nalgebra::DMatrix;
 
@@ -195,6 +195,19 @@ impl Settings {
 
     pub(super) fn length_scale(&self) -> f64 {
         self.length_scale_error.unwrap_or(0.3e-2)
+    }
+
+    /// Relative error of the guide's compliance under a contact of this radius. Zero of a rigid
+    /// guide.
+    pub(super) fn guide_error(&self, contact_radius_m: f64) -> f64 {
+        let layers = self.waveguide.as_ref().map_or(&[][..], Waveguide::layers);
+        match &self.layer_covariance {
+            _ if layers.is_empty() => 0.0,
+            None => Self::ASSUMED_LAYER_ERROR,
+            Some(covariance) => {
+                guide_compliance_error(layers, covariance, contact_radius_m).unwrap_or(0.0)
+            }
+        }
     }
 
     pub(super) fn poisson_error(&self) -> f64 {

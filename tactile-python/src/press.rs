@@ -4,7 +4,7 @@ use crate::errors;
 use crate::matching::{answer, tensor_text};
 use crate::pipeline::Pipeline;
 use crate::results::{Contact, Estimate, Match, Modulus, Strain, Surface, ends};
-use numpy::PyArray2;
+use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyType;
 use std::path::PathBuf;
@@ -156,6 +156,37 @@ impl Press {
         reading
             .map(|reading| contact(py, frame, &reading))
             .transpose()
+    }
+
+    /// Depths to which a ball presses the guide, by the law of its layers.
+    ///
+    /// Parameters
+    /// ----------
+    /// frame : int
+    /// distances : array_like
+    ///     Distances from the contact's centre in metres.
+    ///
+    /// Returns
+    /// -------
+    /// depth, standard_error : ndarray
+    ///     In metres. None where nothing touches, the object is no ball, or force or layers are not
+    ///     known.
+    #[allow(clippy::type_complexity)]
+    fn guide_depression<'py>(
+        &self,
+        py: Python<'py>,
+        frame: usize,
+        distances: Vec<f64>,
+    ) -> PyResult<Option<(Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>)>> {
+        let depths = self.ask(py, |press| press.guide_depression_m(frame, &distances))?;
+        Ok(depths.map(|depths| {
+            let values = depths.iter().map(|depth| depth.value);
+            let errors = depths.iter().map(|depth| depth.standard_error);
+            (
+                PyArray1::from_iter(py, values),
+                PyArray1::from_iter(py, errors),
+            )
+        }))
     }
 
     /// The reconstructed surface of a frame.

@@ -6,12 +6,16 @@
 mod solved;
 
 use nalgebra::{DMatrix, DVector};
+use ndarray::{Array2, ArrayView2};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use tactile_imaging::elasticity::contact::{ContactTable, Layer, Waveguide as Guide};
 use tactile_imaging::elasticity::modulus::{HertzSphere, ModulusEstimate, TabulatedContact};
-use tactile_imaging::force::{CalibrationPair, Estimate};
-use tactile_imaging::pipeline::{CheckPress, CheckedObject, KnownBall, Object, Pipeline};
+use tactile_imaging::force::{CalibrationPair, Estimate, ForceError, ReferenceFrame};
+use tactile_imaging::pipeline::{
+    CheckPress, CheckedObject, ContactReading, ContactStage, FrameContact, KnownBall, Object,
+    Pipeline,
+};
 use tactile_simulate::Trial;
 use tactile_simulate::{
     CalibrationRun, Camera, ContactModel, ContactState, Elastic, ElasticSphere, LightGuide,
@@ -445,4 +449,83 @@ fn presses_of_known_balls_make_the_layers_right() {
         }
         assert_eq!(pipeline.settings().checked_guide.unwrap().presses, 2);
     }
+}
+
+/// A contact of known force and radius in every frame.
+struct Known(ContactReading);
+
+impl ContactStage for Known {
+    fn measure(
+        &self,
+        frame: ArrayView2<'_, u8>,
+        _: &ReferenceFrame,
+    ) -> Result<FrameContact, ForceError> {
+        let mask = Array2::from_elem(frame.dim(), true);
+        Ok(FrameContact::new(self.0, mask.view()))
+    }
+
+    fn pixel_size_m(&self) -> [f64; 2] {
+        [50e-6; 2]
+    }
+}
+
+/// `PRESSES=48` adds as many balls whose loads, moduli and guides the law's stated error was not
+/// chosen on, in some minutes.
+#[test]
+fn depressions_of_the_guide_hold_those_of_finite_elements() {
+    let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
+    let frame = Array2::from_elem((8, 8), 60_u8);
+    let (mut held, mut all) = (0, 0);
+    let count = std::env::var("PRESSES").ok().and_then(|n| n.parse().ok());
+    let mut balls = recorded_balls();
+    balls.extend((100..100 + count.unwrap_or(0)).map(solved::ball));
+    for ball in balls.iter().filter(|ball| !ball.layers.is_empty()) {
+        let layer = |&(thickness_m, youngs_modulus_pa): &(f64, f64)| Layer {
+            thickness_m,
+            youngs_modulus_pa,
+            poisson_ratio: 0.5,
+        };
+        let guide = Guide::new(ball.layers.iter().map(layer).collect()).unwrap();
+        let object = Object::sphere(ball.radius_m);
+        let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], object).unwrap();
+        let pipeline = pipeline.with_settings(|settings| {
+            settings.waveguide = Some(guide);
+            settings.state_exact();
+        });
+        let pipeline = pipeline.unwrap();
+        for state in &ball.states {
+            let [force, radius] = [state.force_n, state.contact_radius_m].map(Estimate::exact);
+            let contact = ContactReading::new(Some(force), radius);
+            let known = pipeline.clone().with_contact(Known(contact));
+            let mut press = known.press(frame.view()).unwrap();
+            press.add_frame(frame.view());
+            // The axis, and a half and three quarters of the way to the rim, whose place coarse
+            // meshes know to a part of an element.
+            let rim = state.radius_m.len() - 2;
+            let nodes = [0, rim / 2, 3 * rim / 4];
+            let distances = nodes.map(|node| state.radius_m[node]);
+            let depths = press.guide_depression_m(0, &distances).unwrap().unwrap();
+            for (depth, node) in depths.iter().zip(nodes) {
+                let error = (depth.value + state.height_m[node]).abs();
+                held += usize::from(error < 1.96 * depth.standard_error);
+                all += 1;
+                // A law that is wrong in kind is off by more than its error twice over.
+                assert!(
+                    error < 4.0 * depth.standard_error,
+                    "{}: {depth} {error}",
+                    ball.name
+                );
+                let greatest = depths[0];
+                assert!(
+                    greatest.relative_error() < 0.09,
+                    "{}: {greatest}",
+                    ball.name
+                );
+            }
+        }
+    }
+    assert!(
+        held as f64 > 0.95 * f64::from(all) && all > 60,
+        "{held} of {all}"
+    );
 }

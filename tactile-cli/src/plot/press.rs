@@ -193,7 +193,34 @@ fn surfaces_page(press: &mut Press<'_>) -> Result<Page, PlotError> {
         }
     }
     panels.push(cuts);
+    panels.extend(depressions(press)?);
     Ok(Page::new(heading, panels.len().min(3), panels))
+}
+
+/// The guide's surface under a ball, by the law of its layers.
+fn depressions(press: &Press<'_>) -> Result<Option<Panel>, PlotError> {
+    let mut panel = Panel::new(
+        "The guide's surface, by the contact law",
+        "from the centre (mm)",
+        "height (mm)",
+    );
+    let mut known = false;
+    for frame in 0..press.frames() {
+        let Some(contact) = press.contact(frame)? else {
+            continue;
+        };
+        // To twice the contact radius, where most of the depression has faded.
+        let step = contact.contact_radius_m.value / 20.0;
+        let distances: Vec<f64> = (-40..=40).map(|k| f64::from(k) * step).collect();
+        let Some(depths) = press.guide_depression_m(frame, &distances)? else {
+            continue;
+        };
+        let points = distances.iter().zip(&depths);
+        let line = points.map(|(r, depth)| [1e3 * r, -1e3 * depth.value]);
+        panel = panel.line(line.collect::<Vec<_>>(), Colour::category(frame), "");
+        known = true;
+    }
+    Ok(known.then_some(panel))
 }
 
 /// Heights in millimetres, NaN outside the surface.

@@ -326,7 +326,7 @@ impl LayerKernel {
     }
 
     /// Nodes s and weights w·(1 − L(s)), for integrands that turn as fast as cos²(s·x).
-    fn samples(&self, x: f64) -> Vec<(f64, f64)> {
+    pub(super) fn samples(&self, x: f64) -> Vec<(f64, f64)> {
         // The deficit falls as s²e^(−2s) in units of the touched layer: at 25 it is below 10⁻¹⁸.
         let end = 25.0 / self.top_thickness();
         // Sixteen Gauss points resolve a decay by e⁻⁵ and an argument of 16 to the last digits.

@@ -4,6 +4,7 @@
 //! |---|---|
 //! | [`HertzContact`] | two spheres, small contact |
 //! | [`flat_punch`], [`cone`] | rigid punch and cone on a half-space |
+//! | [`depression_m`] | surface of layers under a ball's contact |
 //! | [`LayerEquation`] | sphere on one or more bonded layers: the solution by an integral equation |
 //! | [`LayerPlane`] | displacement of a layered surface under a contact of any shape, to pressure |
 //! | [`LayerSeries`] | sphere on one layer: series in χ = √(Rδ)/h |
@@ -11,12 +12,14 @@
 //! | [`ContactTable`] | soft ball on a guide, tabulated by finite elements |
 //! | [`Waveguide`] | the layers of a sensor |
 
+mod depression;
 mod hertz;
 mod layers;
 mod plane;
 mod table;
 mod waveguide;
 
+pub use depression::depression_m;
 pub use hertz::{
     Body, ConeContact, HertzContact, PunchContact, cone, flat_punch, hertz_surface_displacement_m,
     reduced_modulus_from_contact_radius, reduced_modulus_from_indentation, reduced_modulus_pa,

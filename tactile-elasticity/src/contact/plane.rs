@@ -57,13 +57,7 @@ impl LayerPlane {
         positive(shape[0].min(shape[1]) as f64, Quantity::Elements)?;
         let kernel = LayerKernel::of_layers(waveguide, bond)?;
         let thickness = waveguide.thickness_m();
-        let top = waveguide
-            .layers()
-            .iter()
-            .find(|layer| layer.thickness_m > 0.0);
-        let plane_strain = top.map_or(f64::INFINITY, |layer| {
-            layer.youngs_modulus_pa / (1.0 - layer.poisson_ratio.powi(2))
-        });
+        let plane_strain = waveguide.touched_plane_strain_pa();
         // Beyond four thicknesses a bonded layer is at rest. The room is bounded for layers that
         // are much thicker than the grid is wide.
         let reach = (4.0 * thickness / cell_m).ceil() as usize;

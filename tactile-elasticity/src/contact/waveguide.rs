@@ -142,6 +142,14 @@ impl Waveguide {
         Body::from_compliance(compliance / self.thickness_m())
     }
 
+    /// E/(1 − ν²) of the layer that is touched. Infinite where there is none.
+    pub(crate) fn touched_plane_strain_pa(&self) -> f64 {
+        let touched = self.layers.iter().find(|layer| layer.thickness_m > 0.0);
+        touched.map_or(f64::INFINITY, |layer| {
+            layer.youngs_modulus_pa / (1.0 - layer.poisson_ratio.powi(2))
+        })
+    }
+
     fn sum(&self, density: impl Fn(&Layer) -> f64) -> f64 {
         self.layers
             .iter()
