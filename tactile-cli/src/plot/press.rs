@@ -194,7 +194,8 @@ fn surfaces_page(press: &mut Press<'_>) -> Result<Page, PlotError> {
     }
     panels.push(cuts);
     panels.extend(depressions(press)?);
-    Ok(Page::new(heading, panels.len().min(3), panels))
+    let columns = if panels.len() == 4 { 2 } else { 3 };
+    Ok(Page::new(heading, panels.len().min(columns), panels))
 }
 
 /// The guide's surface under a ball, by the law of its layers.
