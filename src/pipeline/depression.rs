@@ -13,11 +13,8 @@ const MOST_SLOPE: f64 = 0.5;
 /// Relative standard error at a/h = 1 by the flatter pressure on thin layers. It goes as (a/h)².
 ///
 /// These three leave 95 of 100 intervals true beside finite elements at a/R up to 1.15 and a/h up
-/// to 1.4 (`cargo test --test suite depressions`).
+/// to 1.4 (`PRESSES=48 cargo test --release --test suite depressions`).
 const THIN_LAYER_ERROR: f64 = 0.025;
-
-/// Step of the derivative by the contact radius.
-const STEP: f64 = 1e-3;
 
 /// Depths in metres at distances from the contact's centre. `None` where the force is not known or
 /// the guide has no layers.
@@ -31,18 +28,19 @@ pub fn depths(
     let guide = settings.waveguide.as_ref()?;
     let force = contact.force_n?;
     let radius = contact.contact_radius_m;
-    let at = |a: f64| depression_m(guide, Bond::Bonded, force.value, a, distances_m).ok();
-    let (here, beside) = (at(radius.value)?, at(radius.value * STEP.exp())?);
-    let axis = depression_m(guide, Bond::Bonded, force.value, radius.value, &[0.0]).ok()?[0];
-    let scale = law_error(guide, radius.value, axis)
+    let places: Vec<f64> = std::iter::once(0.0)
+        .chain(distances_m.iter().copied())
+        .collect();
+    let found = depression_m(guide, Bond::Bonded, force.value, radius.value, &places).ok()?;
+    let (&greatest, asked) = found.split_first()?;
+    // On a half-space the depth on the axis goes as 1/a, on layers and elsewhere it changes less.
+    let share = law_error(guide, radius.value, greatest)
         .hypot(force.relative_error())
+        .hypot(radius.relative_error())
         .hypot(settings.guide_error(radius.value));
-    let depth = |(&u, &moved): (&f64, &f64)| {
-        let by_radius = (moved - u) / STEP * radius.relative_error();
-        // The law is off by a share of the greatest depth, at the rim too.
-        Estimate::new(u, (scale * axis).hypot(by_radius))
-    };
-    Some(here.iter().zip(&beside).map(depth).collect())
+    // The law is off by a share of the greatest depth, at the rim too.
+    let depth = |&depth_m: &f64| Estimate::new(depth_m, share * greatest);
+    Some(asked.iter().map(depth).collect())
 }
 
 fn law_error(guide: &Waveguide, contact_radius_m: f64, depth_m: f64) -> f64 {

@@ -17,6 +17,9 @@ use tactile_imaging::io::FileError;
 use tactile_imaging::pipeline::{ContactReading, ContactSurface, Flag, PairStrain, PipelineError};
 use tactile_imaging::scene::Scene;
 
+/// Values and their standard errors.
+type ValuesAndErrors<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>);
+
 /// Frames at one or more loads. Nothing is computed before it is asked for, and all of it once.
 ///
 /// Frames are counted from zero. Threads may share a press, and the interpreter's lock is free
@@ -171,13 +174,12 @@ impl Press {
     /// depth, standard_error : ndarray
     ///     In metres. None where nothing touches, the object is no ball, or force or layers are not
     ///     known.
-    #[allow(clippy::type_complexity)]
     fn guide_depression<'py>(
         &self,
         py: Python<'py>,
         frame: usize,
         distances: Vec<f64>,
-    ) -> PyResult<Option<(Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>)>> {
+    ) -> PyResult<Option<ValuesAndErrors<'py>>> {
         let depths = self.ask(py, |press| press.guide_depression_m(frame, &distances))?;
         Ok(depths.map(|depths| {
             let values = depths.iter().map(|depth| depth.value);

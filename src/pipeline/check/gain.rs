@@ -26,11 +26,13 @@ impl GainCheck {
             known_n,
             object,
         };
-        match () {
-            () if contact.out_of_calibration => Err("its light is outside the calibration"),
-            () if check.is_plausible() => Ok(check),
-            () => Err("the force that is read is not half to twice the one that is known"),
+        if contact.out_of_calibration {
+            return Err("its light is outside the calibration");
         }
+        if !check.is_plausible() {
+            return Err("the force that is read is not half to twice the one that is known");
+        }
+        Ok(check)
     }
 
     /// A gain below a half or above two is a wrong unit, rather than a sensor.
