@@ -59,10 +59,15 @@ impl Display for ErrorSource {
 /// let trial = Trial::coarser(8)?;
 /// use tactile_imaging::pipeline::{ErrorShare, ErrorSource};
 /// // A ball of 3 mm whose radius is known to 0.3 mm.
-/// let pipeline = trial.pipeline()?.with_settings(|settings| settings.object_radius_error_m = Some(0.3e-3))?;
+/// let pipeline = trial
+///     .pipeline()?
+///     .with_settings(|settings| settings.object_radius_error_m = Some(0.3e-3))?;
 /// let budget: Vec<ErrorShare> = trial.press(&pipeline)?.measure().error_budget;
 /// assert_eq!(budget[0].source, ErrorSource::ObjectRadius, "the largest first");
-/// assert!(budget[0].relative_error > 0.1, "E is proportional to R, and the guide takes a part of the compliance");
+/// assert!(
+///     budget[0].relative_error > 0.1,
+///     "E is proportional to R, and the guide takes a part of the compliance"
+/// );
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -43,15 +43,19 @@ use std::sync::Arc;
 /// // 10⁵ grey levels in all are 1 N; a pixel is 50 µm wide; the ball has a radius of 3 mm.
 /// let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
 /// let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?;
-/// // Hertz's pressure p₀√(1 − r²/a²), a = 20 pixels = 1 mm: (2π/3) a² p₀ grey levels, 1.005 N for p₀ = 120.
-/// let hertz = |peak: f64| Array2::from_shape_fn((64, 64), |(r, c)| {
-///     let d = ((r as f64 - 32.0).hypot(c as f64 - 32.0) / 20.0).min(1.0);
-///     10 + (peak * (1.0 - d * d).sqrt()).round() as u8
-/// });
+/// // Hertz's pressure p₀√(1 − r²/a²), a = 20 pixels = 1 mm: (2π/3) a² p₀ grey levels, 1.005 N for
+/// // p₀ = 120.
+/// let hertz = |peak: f64| {
+///     Array2::from_shape_fn((64, 64), |(r, c)| {
+///         let d = ((r as f64 - 32.0).hypot(c as f64 - 32.0) / 20.0).min(1.0);
+///         10 + (peak * (1.0 - d * d).sqrt()).round() as u8
+///     })
+/// };
 /// let (reference, frame) = (hertz(0.0), hertz(120.0));
 /// let mut press = pipeline.press(reference.view())?;
 /// press.add_frame(frame.view());
-/// // Hertz has E = (1 − ν²) 3FR/(4a³) of a ball on a rigid flat; finite strain changes it by some percents at a/R = 1/3.
+/// // Hertz has E = (1 − ν²) 3FR/(4a³) of a ball on a rigid flat; finite strain changes it by some
+/// // percents at a/R = 1/3.
 /// let hertz = 0.75 * 3.0 * 1.005 * 3e-3 / (4.0 * 1e-9);
 /// assert!((press.modulus()?.youngs_modulus_pa / hertz - 1.0).abs() < 0.1);
 /// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
@@ -141,17 +145,30 @@ impl Pipeline {
     /// let press = trial.press(&pipeline)?;
     /// let camera = trial.scene.options().camera;
     /// assert!((press.surface(0)?.pixel_size_m[0] / camera.pixel_size_m[0] - 2.0).abs() < 1e-12);
-    /// // E is proportional to the radius, but for the guide's share of the compliance and the correction for finite strain.
-    /// let relative = |m: &tactile_imaging::elasticity::modulus::ModulusEstimate| m.standard_error_pa / m.youngs_modulus_pa;
-    /// let of_the_radius = relative(&press.modulus()?).powi(2) - relative(&trial.press(&exact)?.modulus()?).powi(2);
+    /// // E is proportional to the radius, but for the guide's share of the compliance and the
+    /// // correction for finite strain.
+    /// let relative = |m: &tactile_imaging::elasticity::modulus::ModulusEstimate| {
+    ///     m.standard_error_pa / m.youngs_modulus_pa
+    /// };
+    /// let of_the_radius = relative(&press.modulus()?).powi(2)
+    ///     - relative(&trial.press(&exact)?.modulus()?).powi(2);
     /// assert!(of_the_radius.sqrt() > 0.03);
-    /// // On a rigid flat instead of the layered guide the ball would be softer for the same contact.
+    /// // On a rigid flat instead of the layered guide the ball would be softer for the same
+    /// // contact.
     /// let rigid = exact.clone().with_settings(|settings| {
     ///     (settings.waveguide, settings.layer_covariance) = (None, None);
     /// })?;
-    /// assert!(trial.press(&rigid)?.modulus()?.youngs_modulus_pa < trial.press(&exact)?.modulus()?.youngs_modulus_pa);
-    /// assert!(exact.clone().with_settings(|settings| settings.smoothing_px = 8).is_err(), "no middle");
-    /// assert!(exact.with_settings(|settings| settings.force_scale_error = Some(f64::NAN)).is_err());
+    /// assert!(
+    ///     trial.press(&rigid)?.modulus()?.youngs_modulus_pa
+    ///         < trial.press(&exact)?.modulus()?.youngs_modulus_pa
+    /// );
+    /// assert!(
+    ///     exact.clone().with_settings(|settings| settings.smoothing_px = 8).is_err(),
+    ///     "no middle"
+    /// );
+    /// assert!(
+    ///     exact.with_settings(|settings| settings.force_scale_error = Some(f64::NAN)).is_err()
+    /// );
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     ///
@@ -250,8 +267,12 @@ impl Pipeline {
     /// let press = trial.press(&pipeline)?;
     /// let heights = press.surface(0)?.surface.heights.iter().copied().filter(|h| h.is_finite());
     /// // Its heights have mean zero: from the rim to the top they are those of the truth.
-    /// let (low, high) = heights.fold((0.0, 0.0), |(low, high): (f64, f64), h| (low.min(h), high.max(h)));
-    /// assert!(((high - low) / trial.simulation.truth[0].contact.apparent_height_m(0.0) - 1.0).abs() < 0.1);
+    /// let (low, high) =
+    ///     heights.fold((0.0, 0.0), |(low, high): (f64, f64), h| (low.min(h), high.max(h)));
+    /// assert!(
+    ///     ((high - low) / trial.simulation.truth[0].contact.apparent_height_m(0.0) - 1.0).abs()
+    ///         < 0.1
+    /// );
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     #[must_use]
@@ -281,15 +302,18 @@ impl Pipeline {
     /// let eikonal = trial.pipeline()?;
     /// let refused = eikonal.clone().with_slope_integrator(MaskedLeastSquares::default());
     /// assert_eq!(refused.unwrap_err(), PipelineError::NoSlopes);
-    /// // Brooks and Horn's has; least squares over the contact alone need not take the frame as periodic.
+    /// // Brooks and Horn's has; least squares over the contact alone need not take the frame as
+    /// // periodic.
     /// let variational = BrooksHorn::new(Lighting::default()).with_occluding_boundary(true);
     /// let fourier = eikonal.with_surface(variational, SurfaceInput::Shading);
     /// let masked = fourier.clone().with_slope_integrator(MaskedLeastSquares::default())?;
     /// let truth = trial.simulation.truth[0].contact.apparent_height_m(0.0);
     /// for pipeline in [fourier, masked] {
     ///     let press = trial.press(&pipeline)?;
-    ///     let heights = press.surface(0)?.surface.heights.iter().copied().filter(|h| h.is_finite());
-    ///     let (low, high) = heights.fold((0.0, 0.0), |(low, high): (f64, f64), h| (low.min(h), high.max(h)));
+    ///     let heights =
+    ///         press.surface(0)?.surface.heights.iter().copied().filter(|h| h.is_finite());
+    ///     let (low, high) =
+    ///         heights.fold((0.0, 0.0), |(low, high): (f64, f64), h| (low.min(h), high.max(h)));
     ///     assert!(((high - low) / truth - 1.0).abs() < 0.1);
     /// }
     /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -357,10 +381,14 @@ impl Pipeline {
     /// use tactile_simulate::Trial;
     /// let trial = Trial::coarser(8)?;
     /// use tactile_imaging::matching::{LinearAssignment, PointMatcher};
-    /// let pipeline = trial.pipeline()?.with_matcher(LinearAssignment::default()).with_control_points(60);
+    /// let pipeline =
+    ///     trial.pipeline()?.with_matcher(LinearAssignment::default()).with_control_points(60);
     /// let press = trial.press(&pipeline)?;
     /// let matching = press.matching(1)?;
-    /// assert!(matching.assignment.iter().all(Option::is_some), "without a limit to the distance every point has a partner");
+    /// assert!(
+    ///     matching.assignment.iter().all(Option::is_some),
+    ///     "without a limit to the distance every point has a partner"
+    /// );
     /// let chosen: Box<dyn PointMatcher<3> + Send + Sync> = Box::new(LinearAssignment::default());
     /// let pipeline = pipeline.with_matcher(chosen);
     /// assert_eq!(trial.press(&pipeline)?.matching(1)?.assignment, matching.assignment);

@@ -13,19 +13,23 @@ use tactile_core::statistics::effective_degrees_of_freedom;
 ///
 /// ```
 /// use ndarray::ArrayView2;
+/// use tactile_imaging::force::CalibrationPair;
 /// use tactile_imaging::force::{Estimate, ForceError, ReferenceFrame};
 /// use tactile_imaging::pipeline::{ContactStage, FrameContact, LightContact, Object, Pipeline};
-/// use tactile_imaging::force::CalibrationPair;
 /// let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
-/// let hertz = |peak: f64| ndarray::Array2::from_shape_fn((64, 64), |(r, c)| {
-///     let d = ((r as f64 - 32.0).hypot(c as f64 - 32.0) / 20.0).min(1.0);
-///     10 + (peak * (1.0 - d * d).sqrt()).round() as u8
-/// });
+/// let hertz = |peak: f64| {
+///     ndarray::Array2::from_shape_fn((64, 64), |(r, c)| {
+///         let d = ((r as f64 - 32.0).hypot(c as f64 - 32.0) / 20.0).min(1.0);
+///         10 + (peak * (1.0 - d * d).sqrt()).round() as u8
+///     })
+/// };
 /// /// The contact by its light, the force of a spring scale that stands at 0.98 N.
 /// struct OnScale(LightContact);
 /// impl ContactStage for OnScale {
 ///     fn measure(
-///         &self, frame: ArrayView2<'_, u8>, reference: &ReferenceFrame,
+///         &self,
+///         frame: ArrayView2<'_, u8>,
+///         reference: &ReferenceFrame,
 ///     ) -> Result<FrameContact, ForceError> {
 ///         let mut contact = self.0.measure(frame, reference)?;
 ///         if let Some(reading) = &mut contact.reading {
@@ -33,11 +37,14 @@ use tactile_core::statistics::effective_degrees_of_freedom;
 ///         }
 ///         Ok(contact)
 ///     }
-///     fn pixel_size_m(&self) -> [f64; 2] { self.0.pixel_size_m() }
+///     fn pixel_size_m(&self) -> [f64; 2] {
+///         self.0.pixel_size_m()
+///     }
 /// }
 /// let (reference, frame) = (hertz(0.0), hertz(120.0));
 /// let stage = OnScale(LightContact::from_pairs(&pairs, [50e-6; 2])?);
-/// // Neither a lens nor a local curve: coordinates stand as they are, shading is taken from the light.
+/// // Neither a lens nor a local curve: coordinates stand as they are, shading is taken from the
+/// // light.
 /// assert!(stage.lens().is_none() && stage.pressure_curve().is_none());
 /// let pipeline = Pipeline::new(stage, Object::sphere(3e-3))?;
 /// let mut press = pipeline.press(reference.view())?;
@@ -351,8 +358,12 @@ impl FrameContact {
     /// is no contact.
     ///
     /// ```
-    /// use tactile_imaging::{force::Estimate, pipeline::{ContactReading, FrameContact}};
-    /// let mask = ndarray::Array2::from_shape_fn((64, 64), |(r, c)| (20..40).contains(&r) && c > 50);
+    /// use tactile_imaging::{
+    ///     force::Estimate,
+    ///     pipeline::{ContactReading, FrameContact},
+    /// };
+    /// let mask =
+    ///     ndarray::Array2::from_shape_fn((64, 64), |(r, c)| (20..40).contains(&r) && c > 50);
     /// let reading = ContactReading::new(None, Estimate::exact(1e-3));
     /// let contact = FrameContact::new(reading, mask.view());
     /// // A margin of one pixel.

@@ -76,7 +76,11 @@ pub enum PipelineError {
         found: f64,
     },
     /// The covariance of the waveguide's layers has another size than they have parameters.
-    #[error("the covariance of the layers must have {expected} rows and columns, three a layer, found {} × {}", found.0, found.1)]
+    #[error(
+        "the covariance of the layers must have {expected} rows and columns, three a layer, found \
+         {} × {}",
+        found.0, found.1
+    )]
     LayerCovariance {
         /// Parameters of all layers.
         expected: usize,
@@ -110,7 +114,8 @@ pub enum PipelineError {
     },
     /// The surface of a frame was left out of a measurement of many.
     #[error(
-        "frame {}: no surface was reconstructed; of {frames} frames only those are whose strain is worked out (`Press::surface` gives any)",
+        "frame {}: no surface was reconstructed; of {frames} frames only those are whose strain \
+         is worked out (`Press::surface` gives any)",
         frame + 1
     )]
     NotReconstructed {
@@ -129,7 +134,8 @@ pub enum PipelineError {
     },
     /// What a contact stage left behind does not fit the frame.
     #[error(
-        "frame {}: the contact stage gave a mask of {} × {} pixels for a box of {} × {} pixels in a frame of {} × {}",
+        "frame {}: the contact stage gave a mask of {} × {} pixels for a box of {} × {} pixels in \
+         a frame of {} × {}",
         frame + 1, mask.0, mask.1, region.0, region.1, image.0, image.1
     )]
     ContactMask {
@@ -143,14 +149,18 @@ pub enum PipelineError {
         image: (usize, usize),
     },
     /// A frame shows no contact, but one is needed.
-    #[error("frame {} shows no contact: it does not differ from the reference by more than its noise", frame + 1)]
+    #[error(
+        "frame {} shows no contact: it does not differ from the reference by more than its noise",
+        frame + 1
+    )]
     NoContact {
         /// The frame.
         frame: usize,
     },
     /// A frame shows no contact, but differs from the reference, the other way than a contact does.
     #[error(
-        "frame {} shows no contact, though it is up to {:.0} grey levels {} than the reference: were the two swapped, or has the light changed?",
+        "frame {} shows no contact, though it is up to {:.0} grey levels {} than the reference: \
+         were the two swapped, or has the light changed?",
         frame + 1,
         .grey.abs(),
         if *.grey < 0.0 { "darker" } else { "brighter" }
@@ -162,18 +172,26 @@ pub enum PipelineError {
         grey: f64,
     },
     /// The force of a frame is not known: no calibration and no gauge reading.
-    #[error("the force of frame {} is not known: without a calibration it takes a gauge reading (`force_N`)", frame + 1)]
+    #[error(
+        "the force of frame {} is not known: without a calibration it takes a gauge reading \
+         (`force_N`)",
+        frame + 1
+    )]
     NoForce {
         /// The frame.
         frame: usize,
     },
     /// The frame's edge cuts every contact: force and radius are those of a part.
     #[error(
-        "the frame's edge cuts every contact: no modulus can be read from a part of one, move the object to the middle of the frame"
+        "the frame's edge cuts every contact: no modulus can be read from a part of one, move the \
+         object to the middle of the frame"
     )]
     NoWholeContact,
     /// The time of a frame is negative or not finite.
-    #[error("the time of frame {} must be zero or a positive number of seconds, found {found_s}", frame + 1)]
+    #[error(
+        "the time of frame {} must be zero or a positive number of seconds, found {found_s}",
+        frame + 1
+    )]
     Time {
         /// The frame.
         frame: usize,
@@ -181,7 +199,10 @@ pub enum PipelineError {
         found_s: f64,
     },
     /// Frames do not follow each other in time.
-    #[error("frame {} was taken at {found_s} s, before the one that it follows ({before_s} s)", frame + 1)]
+    #[error(
+        "frame {} was taken at {found_s} s, before the one that it follows ({before_s} s)",
+        frame + 1
+    )]
     TimeDecreases {
         /// The frame.
         frame: usize,
@@ -215,7 +236,10 @@ pub enum PipelineError {
         source: MatchError,
     },
     /// Too few control points have partners.
-    #[error("frames {} and {}: only {found} control points have a partner, {expected} are needed", from + 1, to + 1)]
+    #[error(
+        "frames {} and {}: only {found} control points have a partner, {expected} are needed",
+        from + 1, to + 1
+    )]
     TooFewMatches {
         /// The first frame.
         from: usize,
@@ -256,7 +280,10 @@ pub enum PipelineError {
         problem: ShapeProblem,
     },
     /// A face shows no texture whose points could be matched.
-    #[error("frames {} and {}: the face has no texture to match, its strain is that of its outline", from + 1, to + 1)]
+    #[error(
+        "frames {} and {}: the face has no texture to match, its strain is that of its outline",
+        from + 1, to + 1
+    )]
     NoTexture {
         /// The first frame.
         from: usize,

@@ -8,13 +8,15 @@ use std::fmt;
 /// A caution about a result. Frames are counted from 0 in the fields and from 1 in the sentences.
 ///
 /// ```
-/// use tactile_imaging::pipeline::{Flag, Object, Pipeline};
 /// use tactile_imaging::force::{CalibrationPair, Estimate};
+/// use tactile_imaging::pipeline::{Flag, Object, Pipeline};
 /// let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
-/// let hertz = |peak: f64| ndarray::Array2::from_shape_fn((64, 64), |(r, c)| {
-///     let d = ((r as f64 - 32.0).hypot(c as f64 - 32.0) / 20.0).min(1.0);
-///     10 + (peak * (1.0 - d * d).sqrt()).round() as u8
-/// });
+/// let hertz = |peak: f64| {
+///     ndarray::Array2::from_shape_fn((64, 64), |(r, c)| {
+///         let d = ((r as f64 - 32.0).hypot(c as f64 - 32.0) / 20.0).min(1.0);
+///         10 + (peak * (1.0 - d * d).sqrt()).round() as u8
+///     })
+/// };
 /// let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?;
 /// let (reference, frame) = (hertz(0.0), hertz(120.0));
 /// // The camera sees the right half of the contact, and a gauge reads 1 N.
@@ -23,7 +25,11 @@ use std::fmt;
 /// press.add_gauged_frame(half, Some(Estimate::new(1.0, 0.0)));
 /// let flags = press.measure().flags;
 /// assert!(flags.contains(&Flag::TouchesEdge { frame: 0 }));
-/// assert!(flags.iter().any(|flag| matches!(flag, Flag::GaugeDisagrees { measured_n, .. } if *measured_n < 0.6)));
+/// assert!(
+///     flags.iter().any(
+///         |flag| matches!(flag, Flag::GaugeDisagrees { measured_n, .. } if *measured_n < 0.6)
+///     )
+/// );
 /// assert_eq!(flags[0].to_string(), "frame 1: the contact reaches the frame's edge");
 /// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
 /// ```

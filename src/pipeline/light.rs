@@ -13,12 +13,16 @@ use std::sync::Arc;
 /// force is a gauge's.
 ///
 /// ```
-/// use tactile_imaging::force::{CalibrationOptions, CalibrationPair, Estimate, ForceOptions, LinearCalibration};
+/// use tactile_imaging::force::{
+///     CalibrationOptions, CalibrationPair, Estimate, ForceOptions, LinearCalibration,
+/// };
 /// use tactile_imaging::pipeline::{LightContact, Object, Pipeline};
-/// let hertz = |peak: f64| ndarray::Array2::from_shape_fn((64, 64), |(r, c)| {
-///     let d = ((r as f64 - 32.0).hypot(c as f64 - 32.0) / 20.0).min(1.0);
-///     10 + (peak * (1.0 - d * d).sqrt()).round() as u8
-/// });
+/// let hertz = |peak: f64| {
+///     ndarray::Array2::from_shape_fn((64, 64), |(r, c)| {
+///         let d = ((r as f64 - 32.0).hypot(c as f64 - 32.0) / 20.0).min(1.0);
+///         10 + (peak * (1.0 - d * d).sqrt()).round() as u8
+///     })
+/// };
 /// let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
 /// let line = LightContact::from_pairs(&pairs, [50e-6; 2])?;
 /// // The same, with the contact's radius read off its mask instead of fitted.
@@ -34,7 +38,8 @@ use std::sync::Arc;
 ///     press.add_gauged_frame(frame.view(), Some(Estimate::new(1.005, 2e-3)));
 ///     moduli.push(press.modulus()?.youngs_modulus_pa);
 /// }
-/// // A radius read off the mask is uncertain by half a pixel in twenty: E, which goes as a⁻³, by 8 %.
+/// // A radius read off the mask is uncertain by half a pixel in twenty: E, which goes as a⁻³, by 8
+/// // %.
 /// assert!(moduli.iter().all(|e| (e / moduli[0] - 1.0).abs() < 0.08));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
@@ -109,8 +114,11 @@ impl LightContact {
     /// ```
     /// use tactile_imaging::force::LensGeometry;
     /// use tactile_imaging::pipeline::{ContactStage, LightContact};
-    /// let lens =
-    ///     LensGeometry::new([21.6e-6, 22e-6])?.with_distortion([695.5, 520.5], 869.0, [0.03, 0.0])?;
+    /// let lens = LensGeometry::new([21.6e-6, 22e-6])?.with_distortion(
+    ///     [695.5, 520.5],
+    ///     869.0,
+    ///     [0.03, 0.0],
+    /// )?;
     /// let contact = LightContact::gauged([21e-6; 2], &Default::default())?.with_lens(lens);
     /// assert_eq!(contact.pixel_size_m(), [21.6e-6, 22e-6]);
     /// assert_eq!(contact.lens(), Some(&lens));

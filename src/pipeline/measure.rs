@@ -24,9 +24,17 @@ impl Press<'_> {
     /// let measurement = trial.press(&pipeline)?.measure();
     /// let first = measurement.frames[0].as_ref().expect("a contact");
     /// let height = first.surface_height_m.as_ref().expect("a surface");
-    /// assert!((height.value / trial.simulation.truth[0].contact.apparent_height_m(0.0) - 1.0).abs() < 0.1);
+    /// assert!(
+    ///     (height.value / trial.simulation.truth[0].contact.apparent_height_m(0.0) - 1.0).abs()
+    ///         < 0.1
+    /// );
     /// // At 0.7 N the ball is in contact beyond its own radius: Hertz holds for a/R up to 0.3.
-    /// assert!(measurement.flags.iter().any(|flag| flag.to_string().contains("small-contact theory does not hold")));
+    /// assert!(
+    ///     measurement
+    ///         .flags
+    ///         .iter()
+    ///         .any(|flag| flag.to_string().contains("small-contact theory does not hold"))
+    /// );
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn measure(&self) -> Measurement {

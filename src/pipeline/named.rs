@@ -100,7 +100,8 @@ choice! {
     ReconstructionChoice, "reconstruction":
     /// [`Eikonal`](crate::sfs::Eikonal), zero height at the contour of the fitted profile.
     Eikonal = "eikonal",
-    /// [`TsaiShah`](crate::sfs::TsaiShah): quick, and much too low on the fine frames of a whole contact.
+    /// [`TsaiShah`](crate::sfs::TsaiShah): quick, and much too low on the fine frames of a whole
+    /// contact.
     TsaiShah = "tsai-shah",
     /// [`BrooksHorn`](crate::sfs::BrooksHorn), the rim of the contact occluding.
     BrooksHorn = "brooks-horn",
@@ -132,7 +133,8 @@ choice! {
     /// assert_eq!(SamplerChoice::default().to_string(), "contact");
     /// ```
     SamplerChoice, "sampler":
-    /// [`ContactSampler`](crate::sfs::ContactSampler): equally spaced up to the sub-pixel contour of the contact.
+    /// [`ContactSampler`](crate::sfs::ContactSampler): equally spaced up to the sub-pixel contour
+    /// of the contact.
     Contact = "contact",
     /// [`EquallySpaced`](crate::sfs::EquallySpaced).
     EquallySpaced = "equally-spaced",
@@ -222,25 +224,32 @@ choice! {
     Best = "best",
     /// [`PaperRatio`](crate::elasticity::modulus::PaperRatio): stress over strain, equation (31).
     PaperRatio = "paper-ratio",
-    /// [`StressStrainRegression`](crate::elasticity::modulus::StressStrainRegression) over three loads or more.
+    /// [`StressStrainRegression`](crate::elasticity::modulus::StressStrainRegression) over three
+    /// loads or more.
     Regression = "regression",
-    /// [`HertzSphere`](crate::elasticity::modulus::HertzSphere), the waveguide's layers in series: small contacts on deep layers. A ball alone.
+    /// [`HertzSphere`](crate::elasticity::modulus::HertzSphere), the waveguide's layers in series:
+    /// small contacts on deep layers. A ball alone.
     Sphere = "sphere",
-    /// [`SphereOnWaveguide`](crate::elasticity::modulus::SphereOnWaveguide). A ball alone, on the waveguide's layers or a rigid flat.
+    /// [`SphereOnWaveguide`](crate::elasticity::modulus::SphereOnWaveguide). A ball alone, on the
+    /// waveguide's layers or a rigid flat.
     SphereOnWaveguide = "sphere-on-waveguide",
-    /// [`TabulatedContact`](crate::elasticity::modulus::TabulatedContact). A ball alone, and with a table of its contacts.
+    /// [`TabulatedContact`](crate::elasticity::modulus::TabulatedContact). A ball alone, and with a
+    /// table of its contacts.
     TabulatedContact = "tabulated-contact",
     /// [`SphereBetweenPlates`](crate::elasticity::modulus::SphereBetweenPlates). A ball alone.
     SphereBetweenPlates = "sphere-between-plates",
     /// [`TataraSphere`](crate::elasticity::modulus::TataraSphere). A ball alone.
     TataraSphere = "tatara-sphere",
-    /// [`BondedLayer`](crate::elasticity::modulus::BondedLayer) by its integral equation. A layer alone.
+    /// [`BondedLayer`](crate::elasticity::modulus::BondedLayer) by its integral equation. A layer
+    /// alone.
     BondedLayer = "bonded-layer",
     /// [`Cone`](crate::elasticity::modulus::Cone). A cone alone, and from depths.
     Cone = "cone",
-    /// [`BestOf`](crate::elasticity::modulus::BestOf): of all contact laws of a ball or a layer the one with the least Akaike criterion.
+    /// [`BestOf`](crate::elasticity::modulus::BestOf): of all contact laws of a ball or a layer the
+    /// one with the least Akaike criterion.
     LeastAkaike = "least-akaike",
-    /// [`FlatPunch`](crate::elasticity::modulus::FlatPunch). A flat-ended cylinder alone, and from depths (a depth table's).
+    /// [`FlatPunch`](crate::elasticity::modulus::FlatPunch). A flat-ended cylinder alone, and from
+    /// depths (a depth table's).
     FlatPunch = "flat-punch",
 }
 

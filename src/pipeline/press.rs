@@ -95,10 +95,17 @@ struct KnownContact {
 /// use tactile_imaging::pipeline::Stage;
 /// let pipeline = trial.pipeline()?.with_control_points(60);
 /// let press = trial.press(&pipeline)?;
-/// assert_eq!((press.frames(), press.report().work(Stage::Contact).runs), (2, 0), "nothing is asked for yet");
+/// assert_eq!(
+///     (press.frames(), press.report().work(Stage::Contact).runs),
+///     (2, 0),
+///     "nothing is asked for yet"
+/// );
 /// let force = press.contact(0)?.and_then(|c| c.force_n).expect("a force");
 /// assert!((force.value / 0.7 - 1.0).abs() < 0.02);
-/// assert!((press.modulus()?.youngs_modulus_pa / 103e3 - 1.0).abs() < 0.0538, "Hertz, from both contacts");
+/// assert!(
+///     (press.modulus()?.youngs_modulus_pa / 103e3 - 1.0).abs() < 0.0538,
+///     "Hertz, from both contacts"
+/// );
 /// assert_eq!(press.report().work(Stage::Surface).runs, 0, "no surface so far");
 /// press.strain(1)?;
 /// assert_eq!(press.report().work(Stage::Surface).runs, 2);
@@ -403,7 +410,8 @@ impl<'a> Press<'a> {
     /// let pipeline = trial.pipeline()?;
     /// let press = trial.press(&pipeline)?;
     /// let surface = press.surface(0)?;
-    /// let top = surface.surface.heights.iter().copied().filter(|h| h.is_finite()).fold(0.0, f64::max);
+    /// let top =
+    ///     surface.surface.heights.iter().copied().filter(|h| h.is_finite()).fold(0.0, f64::max);
     /// // Hertz's pressure read as shading is a hemisphere as high as the contact's radius.
     /// let radius = trial.simulation.truth[0].contact.contact_radius_m;
     /// assert!((top / radius - 1.0).abs() < 0.1);
@@ -439,7 +447,9 @@ impl<'a> Press<'a> {
     /// assert_eq!(points.len(), 60);
     /// // All within the contact, whose middle is the frame's: (86.5, 64.5) pixels.
     /// let radius = 1.1 * trial.simulation.truth[0].contact.contact_radius_m;
-    /// assert!(points.iter().all(|p| (p.x - 86.5 * 172.4e-6).hypot(p.y - 64.5 * 172.4e-6) < radius));
+    /// assert!(
+    ///     points.iter().all(|p| (p.x - 86.5 * 172.4e-6).hypot(p.y - 64.5 * 172.4e-6) < radius)
+    /// );
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     ///

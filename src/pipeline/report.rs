@@ -12,7 +12,8 @@ use std::time::Duration;
 /// let pipeline = trial.pipeline()?;
 /// let press = trial.press(&pipeline)?;
 /// press.modulus()?;
-/// let ran: Vec<_> = Stage::ALL.into_iter().filter(|stage| press.report().work(*stage).runs > 0).collect();
+/// let ran: Vec<_> =
+///     Stage::ALL.into_iter().filter(|stage| press.report().work(*stage).runs > 0).collect();
 /// assert_eq!(ran, [Stage::Contact, Stage::Modulus]);
 /// assert_eq!(Stage::Contact.to_string(), "contact and force");
 /// # Ok::<(), Box<dyn std::error::Error>>(())

@@ -15,11 +15,17 @@ use std::fmt::{self, Display, Formatter};
 /// A modulus with its error.
 ///
 /// ```
-/// use tactile_imaging::elasticity::modulus::{Estimate, HertzSphere, LoadSeries, LoadState, ModulusEstimator};
+/// use tactile_imaging::elasticity::modulus::{
+///     Estimate, HertzSphere, LoadSeries, LoadState, ModulusEstimator,
+/// };
 /// use tactile_imaging::pipeline::ModulusResult;
 /// // A ball of 3 mm radius under 10 mN, in contact up to 0.5 mm: E = (1 − ν²) 3FR/(4a³) = 135 kPa.
-/// let load = LoadState { contact_radius_m: Some(Estimate::new(0.5e-3, 1e-6)), ..LoadState::new(Estimate::new(10e-3, 0.1e-3)) };
-/// let modulus = ModulusResult::from(&HertzSphere::new(3e-3, 0.5)?.estimate(&LoadSeries::new([load]))?);
+/// let load = LoadState {
+///     contact_radius_m: Some(Estimate::new(0.5e-3, 1e-6)),
+///     ..LoadState::new(Estimate::new(10e-3, 0.1e-3))
+/// };
+/// let modulus =
+///     ModulusResult::from(&HertzSphere::new(3e-3, 0.5)?.estimate(&LoadSeries::new([load]))?);
 /// assert!((modulus.value - 135e3).abs() < 1.0);
 /// assert!(modulus.interval_95.0 < modulus.value && modulus.warnings.is_empty());
 /// assert!(modulus.to_string().starts_with("135.0 ± 1.6 kPa"));
@@ -113,7 +119,10 @@ pub struct FrameResult {
 /// let matching: MatchResult = trial.press(&pipeline)?.measure().matching?;
 /// assert_eq!(matching.points, 60);
 /// assert!(matching.matched > 50 && matching.mean_confidence > 0.5);
-/// assert!(matching.residual_m < matching.mean_displacement_m, "the warp takes points to their partners");
+/// assert!(
+///     matching.residual_m < matching.mean_displacement_m,
+///     "the warp takes points to their partners"
+/// );
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Debug, PartialEq)]

@@ -252,22 +252,26 @@ impl Session {
     ///
     /// ```
     /// use ndarray::Array2;
+    /// use tactile_imaging::force::CalibrationPair;
     /// use tactile_imaging::force::{Estimate, ShearCalibration};
     /// use tactile_imaging::pipeline::{Object, Pipeline, Session};
-    /// use tactile_imaging::force::CalibrationPair;
     /// let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
     /// // A contact that slides along x by two pixels of 50 µm, held by 400 N/m.
-    /// let press = |x: f64| Array2::from_shape_fn((64, 64), |(r, c)| {
-    ///     let d = ((r as f64 - 32.0).hypot(c as f64 - x) / 20.0).min(1.0);
-    ///     10 + (120.0 * (1.0 - d * d).sqrt()).round() as u8
-    /// });
+    /// let press = |x: f64| {
+    ///     Array2::from_shape_fn((64, 64), |(r, c)| {
+    ///         let d = ((r as f64 - 32.0).hypot(c as f64 - x) / 20.0).min(1.0);
+    ///         10 + (120.0 * (1.0 - d * d).sqrt()).round() as u8
+    ///     })
+    /// };
     /// let stiffness_n_per_m = [Estimate::new(400.0, 4.0); 2];
     /// let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?;
     /// let mut session = Session::new(&pipeline, &[Array2::from_elem((64, 64), 10).view()])?
     ///     .with_shear(ShearCalibration { stiffness_n_per_m, residual_sd_n: [0.0; 2] });
     /// session.push(press(32.0).view())?;
     /// let shear = session.push(press(34.0).view())?.shear.expect("stiffnesses are known");
-    /// assert!((shear.force_n[0].value - 0.04).abs() < 1e-3 && shear.force_n[1].value.abs() < 1e-3);
+    /// assert!(
+    ///     (shear.force_n[0].value - 0.04).abs() < 1e-3 && shear.force_n[1].value.abs() < 1e-3
+    /// );
     /// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
     /// ```
     #[must_use]

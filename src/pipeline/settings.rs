@@ -14,7 +14,8 @@ pub(crate) const DEFAULT_CONTROL_POINTS: usize = 200;
 ///
 /// ```
 /// use tactile_imaging::pipeline::{DarkContact, Object, Pipeline, SurfaceInput};
-/// // A table of depths wants grey levels; shape from shading, the default, the cosine of the slope.
+/// // A table of depths wants grey levels; shape from shading, the default, the cosine of the
+/// // slope.
 /// use tactile_imaging::force::CalibrationPair;
 /// let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
 /// let shading = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(4e-3))?;

@@ -12,11 +12,15 @@ use ndarray::{ArrayView2, Axis, Slice};
 /// ```
 /// use ndarray::Array2;
 /// use tactile_imaging::pipeline::{DarkContact, Object, Pipeline, SurfaceInput};
-/// // A grey level is 5 µm, a pixel 0.1 mm; a ball of 4 mm radius lies 0.8 mm deep around pixel (32, 32).
+/// // A grey level is 5 µm, a pixel 0.1 mm; a ball of 4 mm radius lies 0.8 mm deep around pixel
+/// // (32, 32).
 /// let table = [(0.0, 0.0), (200.0, 1e-3)];
 /// let depth_mm = |x: f64, y: f64| (16.0 - 0.01 * (x * x + y * y)).sqrt() - 3.2;
-/// let grey = |(r, c): (usize, usize)| 220 - (depth_mm(c as f64 - 32.0, r as f64 - 32.0) / 5e-3).round() as u8;
-/// let (reference, frame) = (Array2::from_elem((64, 64), 220_u8), Array2::from_shape_fn((64, 64), grey));
+/// let grey = |(r, c): (usize, usize)| {
+///     220 - (depth_mm(c as f64 - 32.0, r as f64 - 32.0) / 5e-3).round() as u8
+/// };
+/// let (reference, frame) =
+///     (Array2::from_elem((64, 64), 220_u8), Array2::from_shape_fn((64, 64), grey));
 /// let pipeline = Pipeline::new(DarkContact::new(&table, [1e-4; 2])?, Object::sphere(4e-3))?
 ///     .with_surface(DarkContact::depth_table(&table)?, SurfaceInput::Signal);
 /// let mut press = pipeline.press(reference.view())?;

@@ -205,7 +205,8 @@ impl Scene {
     /// let frame = ndarray::Array2::from_elem((20, 30), 10);
     /// let calibration = LoadedCalibration::Pairs(pairs);
     /// let frames = vec![frame.clone()];
-    /// let data = SceneData { reference: frame, frames, calibration, contact_table: None, checks: vec![] };
+    /// let (contact_table, checks) = (None, vec![]);
+    /// let data = SceneData { reference: frame, frames, calibration, contact_table, checks };
     /// // The file has strain = "hencky", and the program its own number of points.
     /// let pipeline = scene.pipeline(&data)?.with_control_points(60);
     /// let mut press = scene.press(&pipeline, &data)?;

@@ -107,7 +107,8 @@ pub fn name(value: impl ValueEnum) -> String {
 #[derive(Args, Clone, Copy)]
 pub struct Repetition {
     /// Do the work N times. The median of the times is given.
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..), allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", default_value_t = 1,
+          value_parser = clap::value_parser!(u32).range(1..), allow_negative_numbers = true)]
     pub repeat: u32,
 }
 

@@ -156,7 +156,8 @@ impl PairLine {
         json!({
             "pairs": report.pairs, "offset_n": offset, "slope_n_per_grey_level": slope,
             "r_squared": report.r_squared, "residual_sd_n": report.residual_sd_n,
-            "linearity_error": report.linearity_error, "sensitivity_n_per_grey_level": report.sensitivity_n,
+            "linearity_error": report.linearity_error,
+            "sensitivity_n_per_grey_level": report.sensitivity_n,
             "smallest_force_n": report.smallest_force_n, "full_scale_n": report.full_scale_n,
             "range_grey_levels": self.line.range(), "residuals_n": report.residuals_n,
             "hysteresis": report.hysteresis.map(|h| json!({

@@ -49,7 +49,9 @@ pub struct DepthArguments {
     #[command(flatten)]
     frames: SensorFrames,
     /// Sensor file of a gel that is lit in colours.
-    #[arg(long, value_name = "SENSOR.toml", conflicts_with_all = ["reference", "pixel_um", "table", "ball", "ball_radius_mm", "zero_table"])]
+    #[arg(long, value_name = "SENSOR.toml",
+          conflicts_with_all = ["reference", "pixel_um", "table", "ball", "ball_radius_mm",
+                                "zero_table"])]
     sensor: Option<PathBuf>,
     /// Table of darkness and depth.
     #[arg(long, value_name = "TABLE.csv")]
@@ -248,15 +250,23 @@ fn print(found: &Found, context: &mut Context) -> Value {
     let ball = found.ball.as_ref().map(|ball| match ball {
         Ok(ball) => {
             let depth_m = ball.depth_m(ball.centre_m);
-            let lengths = [ball.radius_m, depth_m, ball.contact_radius_m, ball.mean_absolute_error_m];
+            let lengths = [
+                ball.radius_m,
+                depth_m,
+                ball.contact_radius_m,
+                ball.mean_absolute_error_m,
+            ];
             let [radius, depth, contact, error] = lengths.map(|m| four_digits(1e3 * m));
-            let text = format!("of radius {radius} mm, {depth} mm deep, contact radius {contact} mm");
+            let text =
+                format!("of radius {radius} mm, {depth} mm deep, contact radius {contact} mm");
             context.row("ball", text);
             let text = format!("mean absolute error {error} mm over {} pixels", ball.pixels);
             context.row("", text);
             json!({
-                "radius_m": ball.radius_m, "centre_m": ball.centre_m, "contact_radius_m": ball.contact_radius_m,
-                "depth_m": depth_m, "mean_absolute_error_m": ball.mean_absolute_error_m, "pixels": ball.pixels,
+                "radius_m": ball.radius_m, "centre_m": ball.centre_m,
+                "contact_radius_m": ball.contact_radius_m,
+                "depth_m": depth_m, "mean_absolute_error_m": ball.mean_absolute_error_m,
+                "pixels": ball.pixels,
             })
         }
         Err(reason) => {

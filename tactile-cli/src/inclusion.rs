@@ -63,16 +63,20 @@ pub struct InclusionArguments {
     #[arg(long)]
     design: bool,
     /// Design: diameter of the lump, in millimetres.
-    #[arg(long, value_name = "MM", default_value = "10", value_parser = lump_mm, requires = "design")]
+    #[arg(long, value_name = "MM", default_value = "10", value_parser = lump_mm,
+          requires = "design")]
     diameter_mm: f64,
     /// Design: depth of its top, in millimetres.
-    #[arg(long, value_name = "MM", default_value = "4", value_parser = lump_mm, requires = "design")]
+    #[arg(long, value_name = "MM", default_value = "4", value_parser = lump_mm,
+          requires = "design")]
     depth_mm: f64,
     /// Design: its modulus, in kPa.
-    #[arg(long, value_name = "KPA", default_value = "40", value_parser = modulus_kpa, requires = "design")]
+    #[arg(long, value_name = "KPA", default_value = "40", value_parser = modulus_kpa,
+          requires = "design")]
     lump_kpa: f64,
     /// Design: the tissue's modulus, in kPa.
-    #[arg(long, value_name = "KPA", default_value = "5", value_parser = modulus_kpa, requires = "design")]
+    #[arg(long, value_name = "KPA", default_value = "5", value_parser = modulus_kpa,
+          requires = "design")]
     tissue_kpa: f64,
     /// Simulation: seed of the camera's noise.
     #[arg(
@@ -247,10 +251,12 @@ pub fn run(arguments: &InclusionArguments, context: &mut Context) -> Result<Exit
         context.warn(&kind, numbers, warning.to_string());
     }
     context.value(&json!({
-        "verdict": estimate.verdict(), "found": estimate.found, "probability": estimate.probability, "inclusion": estimate.inclusion,
+        "verdict": estimate.verdict(), "found": estimate.found,
+        "probability": estimate.probability, "inclusion": estimate.inclusion,
         "inclusions": estimate.inclusions(),
         "block_modulus_pa": estimate.block_modulus_pa, "interface": estimate.interface,
-        "misfit": estimate.misfit, "asymmetry": scan.asymmetry, "harmonics": scan.harmonics, "is_asymmetric": is_asymmetric,
+        "misfit": estimate.misfit, "asymmetry": scan.asymmetry, "harmonics": scan.harmonics,
+        "is_asymmetric": is_asymmetric,
     }));
     context.outputs.add(names[0], table(&estimate, &scan));
     context.outputs.page(names[1], || page(&estimate, &scan))?;

@@ -76,7 +76,8 @@ pub struct IndentArguments {
     #[arg(long, conflicts_with = "model")]
     no_slip: bool,
     /// Poisson's ratio of the sample.
-    #[arg(long, value_name = "NU", default_value_t = 0.5, value_parser = poisson, allow_negative_numbers = true)]
+    #[arg(long, value_name = "NU", default_value_t = 0.5, value_parser = poisson,
+          allow_negative_numbers = true)]
     poisson: f64,
     /// Law to fit, or auto.
     #[arg(long, value_enum, default_value_t = Law::Auto)]

@@ -17,7 +17,8 @@ use tactile_imaging::optics::{Dispersion, Geometry, Led, OpticsError, acceptance
 #[command(after_help = "Example:\n  tactile light --rays 2000 --out target/light")]
 pub struct LightArguments {
     /// Rays for each point of a curve.
-    #[arg(long, default_value_t = 8000, value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
+    #[arg(long, default_value_t = 8000,
+          value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
     rays: u32,
 }
 

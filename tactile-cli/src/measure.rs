@@ -69,7 +69,8 @@ pub struct MeasureArguments {
     #[command(flatten)]
     repetition: Repetition,
     /// Number of control points on each surface.
-    #[arg(long, value_name = "COUNT", default_value_t = 200, value_parser = clap::value_parser!(u32).range(8..=5000))]
+    #[arg(long, value_name = "COUNT", default_value_t = 200,
+          value_parser = clap::value_parser!(u32).range(8..=5000))]
     points: u32,
     #[command(flatten)]
     simulation: Simulation,
@@ -82,13 +83,16 @@ struct Simulation {
     #[arg(long, value_enum, default_value_t = Polymer::Cl2000x, conflicts_with = "scene")]
     polymer: Polymer,
     /// Simulation: the ball's Young's modulus in kPa, instead of a polymer's.
-    #[arg(long, value_name = "KPA", value_parser = modulus_kpa, conflicts_with_all = ["scene", "polymer"])]
+    #[arg(long, value_name = "KPA", value_parser = modulus_kpa,
+          conflicts_with_all = ["scene", "polymer"])]
     modulus_kpa: Option<f64>,
     /// Simulation: the ball's radius in mm.
-    #[arg(long, value_name = "MM", default_value_t = 3.0, value_parser = length_mm, conflicts_with = "scene")]
+    #[arg(long, value_name = "MM", default_value_t = 3.0, value_parser = length_mm,
+          conflicts_with = "scene")]
     radius_mm: f64,
     /// Simulation: the loads in newtons.
-    #[arg(long, value_name = "N,N,...", value_delimiter = ',', default_values_t = [0.7, 1.2], value_parser = force_n, conflicts_with = "scene")]
+    #[arg(long, value_name = "N,N,...", value_delimiter = ',', default_values_t = [0.7, 1.2],
+          value_parser = force_n, conflicts_with = "scene")]
     forces: Vec<f64>,
     /// Simulation: where the contacts come from. Finite elements are there for the two polymers, 3
     /// mm, up to 1.3 N.

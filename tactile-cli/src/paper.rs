@@ -488,7 +488,9 @@ fn labelling(trial: &Trial, dense: bool) -> Result<Experiment, Failure> {
         ));
         values.insert(
             key.into(),
-            json!({ "time_s": seconds, "right": right, "points": count, "mean_error_um": error_um }),
+            json!({
+                "time_s": seconds, "right": right, "points": count, "mean_error_um": error_um,
+            }),
         );
     }
     Ok(Experiment {
@@ -601,7 +603,9 @@ fn light() -> Result<Experiment, Failure> {
         key: "light",
         rows,
         panels: Vec::new(),
-        value: json!({ "acceptance_degrees": angles, "cone_of_140_degrees_is_trapped": cone.trapped }),
+        value: json!({
+            "acceptance_degrees": angles, "cone_of_140_degrees_is_trapped": cone.trapped,
+        }),
     })
 }
 

@@ -114,7 +114,8 @@ fn print(names: &[PathBuf], found: &PhotometricCalibration, context: &mut Contex
 }
 
 /// Why a sensor without a gel's layer has no force.
-const NO_GEL: &str = "the sensor file has no [gel]: give its calibration the gel's thickness and modulus, or a frame under a known weight";
+const NO_GEL: &str = "the sensor file has no [gel]: give its calibration the gel's thickness \
+    and modulus, or a frame under a known weight";
 
 /// A sensor with its law of forces, or why there is none.
 struct Reader {

@@ -111,7 +111,8 @@ pub fn run(arguments: &StrainArguments, context: &mut Context) -> Result<Exit, F
         let files = format!("{} and {}", paths[0].display(), path.display());
         if metres != metric[0] {
             return Err(Failure::input(format!(
-                "only one of {files} names the unit of its coordinates: name it in both headers or in none"
+                "only one of {files} names the unit of its coordinates: name it in both headers \
+                 or in none"
             )));
         }
         if !plane.is_empty() && !space.is_empty() {

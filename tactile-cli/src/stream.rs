@@ -79,7 +79,8 @@ pub struct StreamArguments {
     record: Option<PathBuf>,
     /// Show frame, force, modulus, surface and the sensor's health in browsers as they come. An
     /// address that other computers reach gets a token.
-    #[arg(long, value_name = "ADDRESS:PORT", num_args = 0..=1, default_missing_value = "127.0.0.1:8642")]
+    #[arg(long, value_name = "ADDRESS:PORT", num_args = 0..=1,
+          default_missing_value = "127.0.0.1:8642")]
     serve: Option<SocketAddr>,
     #[command(flatten)]
     simulation: Simulation,
@@ -89,16 +90,19 @@ pub struct StreamArguments {
 #[derive(Args)]
 struct Simulation {
     /// Simulation: seconds of one load and unload.
-    #[arg(long, value_name = "S", default_value_t = 2.0, value_parser = positive, conflicts_with = "scene")]
+    #[arg(long, value_name = "S", default_value_t = 2.0, value_parser = positive,
+          conflicts_with = "scene")]
     period: f64,
     /// Simulation: cycles.
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..), conflicts_with = "scene")]
+    #[arg(long, value_name = "N", default_value_t = 1,
+          value_parser = clap::value_parser!(u32).range(1..), conflicts_with = "scene")]
     cycles: u32,
     /// Simulation: frames of 1392 × 1042 pixels instead of 348 × 260.
     #[arg(long, conflicts_with = "scene")]
     full_size: bool,
     /// Simulation: error of the modulus in per cent beyond which the run fails.
-    #[arg(long, value_name = "PERCENT", default_value_t = 3.0, value_parser = positive, conflicts_with = "scene")]
+    #[arg(long, value_name = "PERCENT", default_value_t = 3.0, value_parser = positive,
+          conflicts_with = "scene")]
     tolerance: f64,
 }
 

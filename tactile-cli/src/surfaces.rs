@@ -44,7 +44,8 @@ pub struct ReconstructArguments {
     #[command(flatten)]
     region: HeightRegion,
     /// Height at the border of the mask, px (eikonal). It is 0 if there are no known heights.
-    #[arg(long = "boundary", value_name = "PX", allow_negative_numbers = true, value_parser = finite)]
+    #[arg(long = "boundary", value_name = "PX", allow_negative_numbers = true,
+          value_parser = finite)]
     boundary: Option<f64>,
     /// Which way the surface bulges (eikonal).
     #[arg(long, value_enum)]
@@ -295,7 +296,8 @@ pub struct IntegrateArguments {
     #[command(flatten)]
     region: HeightRegion,
     /// Size of a pixel, or its width and height. Heights have its unit.
-    #[arg(long, value_name = "X[,Y]", default_value = "1", value_parser = one_or_two, allow_negative_numbers = true)]
+    #[arg(long, value_name = "X[,Y]", default_value = "1", value_parser = one_or_two,
+          allow_negative_numbers = true)]
     pixel_size: [f64; 2],
     #[command(flatten)]
     repetition: Repetition,

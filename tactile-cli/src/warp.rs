@@ -37,7 +37,8 @@ pub struct WarpArguments {
     kernel: KernelName,
     /// Smoothing parameter, a number of at least zero, or gcv for the one of least generalised
     /// cross-validation.
-    #[arg(long, value_name = "X|gcv", default_value = "0", value_parser = smoothing, allow_negative_numbers = true)]
+    #[arg(long, value_name = "X|gcv", default_value = "0", value_parser = smoothing,
+          allow_negative_numbers = true)]
     lambda: Smoothing<f64>,
     #[command(flatten)]
     repetition: Repetition,
@@ -158,7 +159,8 @@ fn warp<const D: usize, K: Kernel>(
     context.value(&json!({
         "points": report.points, "queries": warped, "lambda": report.lambda,
         "bending_energy": bending_energy, "condition": report.condition, "rank": report.rank,
-        "merged": report.merged, "extents": report.extents, "residual": report.residual, "digits": report.digits,
+        "merged": report.merged, "extents": report.extents, "residual": report.residual,
+        "digits": report.digits,
         "iterations": report.iterations, "converged": report.converged(), "fit_ms": fit_ms,
         "evaluate_ms": evaluate_ms,
     }));

@@ -209,19 +209,18 @@ impl ObjectPress {
     /// ends with [`Outcome::Stopped`](crate::Outcome::Stopped).
     ///
     /// ```
-    /// use tactile_fem::{Guide, GuideLayer, AppliedLoad, Material, ObjectShape, ObjectPress};
+    /// use tactile_fem::{AppliedLoad, Guide, GuideLayer, Material, ObjectPress, ObjectShape};
     ///
     /// # fn main() -> Result<(), tactile_elasticity::ElasticityError> {
     /// let layer = GuideLayer { thickness_m: 10e-3, material: Material::new(80e3, 0.495)? };
     /// let guide = Guide::new(vec![layer], 25e-3)?;
-    /// let press = ObjectPress::new(
-    ///     ObjectShape::Ball { radius_m: 3e-3 },
-    ///     Material::new(103e3, 0.495)?,
-    /// )?
-    /// .on_guide(guide)?;
+    /// let press =
+    ///     ObjectPress::new(ObjectShape::Ball { radius_m: 3e-3 }, Material::new(103e3, 0.495)?)?
+    ///         .on_guide(guide)?;
     /// let state = &press.scene()?.solve(&[AppliedLoad::Approach(1e-3)]).states[0];
     /// // Softer than a rigid flat: less force, at the same approach, than six tenths of Hertz's.
-    /// let hertz = 4.0 / 3.0 * 103e3 / (1.0 - 0.495 * 0.495) * 3e-3_f64.sqrt() * 1e-3_f64.powf(1.5);
+    /// let hertz =
+    ///     4.0 / 3.0 * 103e3 / (1.0 - 0.495 * 0.495) * 3e-3_f64.sqrt() * 1e-3_f64.powf(1.5);
     /// assert!(state.force_n() > 0.0 && state.force_n() < 0.6 * hertz);
     /// # Ok(())
     /// # }

@@ -145,12 +145,14 @@ const LARGEST_POISSON_RATIO: f64 = 0.499;
 ///     steps = progress.total;
 ///     ControlFlow::Continue(())
 /// })?;
-/// // On a rigid flat one modulus is enough; at a/R = 0.4 finite strain takes some 3 % off Hertz's force.
+/// // On a rigid flat one modulus is enough; at a/R = 0.4 finite strain takes some 3 % off Hertz's
+/// // force.
 /// assert_eq!(steps, 1);
 /// let hertz_n = 4.0 / 3.0 * 103e3 / (1.0 - 0.495_f64.powi(2)) * 1.2e-3_f64.powi(3) / 3e-3;
 /// let ratio = table.force_n(1.2e-3, 103e3).unwrap() / hertz_n;
 /// assert!((0.95..0.98).contains(&ratio), "{ratio}");
-/// let cancelled = solve_contact_table(3e-3, 0.495, &Waveguide::rigid(), &options, |_| ControlFlow::Break(()));
+/// let cancelled =
+///     solve_contact_table(3e-3, 0.495, &Waveguide::rigid(), &options, |_| ControlFlow::Break(()));
 /// assert!(cancelled.is_err());
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
 /// ```

@@ -42,8 +42,8 @@ const CARRIED: f64 = 0.75;
 /// probability from the evidence with and without one.
 ///
 /// ```no_run
-/// use tactile_fem::{Guide, GuideLayer, Material};
 /// use core::ops::ControlFlow;
+/// use tactile_fem::{Guide, GuideLayer, Material};
 /// use tactile_inclusion::{
 ///     AssumedInclusion, InclusionSearch, PressureProfile, SensorErrors, Specimen,
 /// };
@@ -53,10 +53,17 @@ const CARRIED: f64 = 0.75;
 /// let guide = Guide::new(vec![layer], 16e-3)?;
 /// let search = InclusionSearch::new(Specimen::new(30e-3, 40e-3)?, guide)?;
 /// // A sensor whose calibration is twice as good as usual.
-/// let search = search.with_sensor_errors(SensorErrors { common: 1.5e-3, ..SensorErrors::default() })?;
+/// let search =
+///     search.with_sensor_errors(SensorErrors { common: 1.5e-3, ..SensorErrors::default() })?;
 /// // Would two frames tell enough of a small lump?
-/// let lump = AssumedInclusion { diameter_m: 8e-3, depth_m: 4e-3, youngs_modulus_pa: 40e3, block_modulus_pa: 5e3 };
-/// let errors = search.expected_errors(&lump, &[1.5e-3, 3e-3], &radii_m, &vec![1.0; radii_m.len()])?;
+/// let lump = AssumedInclusion {
+///     diameter_m: 8e-3,
+///     depth_m: 4e-3,
+///     youngs_modulus_pa: 40e3,
+///     block_modulus_pa: 5e3,
+/// };
+/// let errors =
+///     search.expected_errors(&lump, &[1.5e-3, 3e-3], &radii_m, &vec![1.0; radii_m.len()])?;
 /// println!("its diameter would be known within {:.0} %", 100.0 * errors.diameter);
 /// let estimate = search.search_with_progress(&radii_m, &frames, &mut |progress| {
 ///     println!("{} of {}", progress.done, progress.expected);

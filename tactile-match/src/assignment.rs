@@ -29,7 +29,8 @@ use crate::MatchError;
 ///     4.0, 1.0, 3.0, //
 ///     2.0, 0.0, 5.0,
 /// ];
-/// assert_eq!(linear_assignment(&costs, 2, 3)?, [Some(1), Some(0)]); // 1 + 2; the greedy 0 + 3 costs as much
+/// // 1 + 2; the greedy 0 + 3 costs as much.
+/// assert_eq!(linear_assignment(&costs, 2, 3)?, [Some(1), Some(0)]);
 /// # Ok::<(), tactile_match::MatchError>(())
 /// ```
 pub fn linear_assignment(

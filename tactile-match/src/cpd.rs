@@ -1282,7 +1282,8 @@ fn matching<const D: usize>(
             .filter(|p| p.1 > 1e-4)
             .collect();
         let mass = row.iter().map(|p| p.1).sum::<f64>();
-        let share = |p: f64| p / mass.max(1.0); // many targets may have one model point; a row of M has sum one
+        // Many targets may have one model point; a row of M has sum one.
+        let share = |p: f64| p / mass.max(1.0);
         soft.push_row(row.iter().map(|&(n, p)| (n, share(p))));
         let sure = partner.map_or(1.0 - mass.min(1.0), |n| share(posterior[n * model_len + m]));
         confidence.push(sure.clamp(0.0, 1.0));

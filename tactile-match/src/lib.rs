@@ -138,7 +138,8 @@ impl<const D: usize> Frame<D> {
 /// Centroid of a set and its root mean square radius, zero where all points coincide.
 fn centre_and_radius<const D: usize>(points: &[Point<f64, D>]) -> (SVector<f64, D>, f64) {
     let n = points.len() as f64;
-    let origin = widened(&points[0]); // sums of differences keep the digits of sets far from the origin
+    // Sums of differences keep the digits of sets far from the origin.
+    let origin = widened(&points[0]);
     let centre = origin
         + points
             .iter()

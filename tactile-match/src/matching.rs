@@ -248,11 +248,13 @@ impl std::fmt::Display for Doubt {
 /// use nalgebra::Point2;
 /// use tactile_match::{CoherentPointDrift, Motion, PointMatcher};
 /// let model = [[0.0, 0.0], [3.0, 0.0], [0.0, 3.0], [3.0, 3.0]].map(Point2::from);
-/// let target = [[0.0, 0.0], [3.0, 0.0], [0.0, 3.0], [3.2, 3.2]].map(Point2::from); // one corner is drawn out
+/// // One corner is drawn out.
+/// let target = [[0.0, 0.0], [3.0, 0.0], [0.0, 3.0], [3.2, 3.2]].map(Point2::from);
 /// let options = CoherentPointDrift::default().with_motion(Motion::Rigid)?;
 /// let report = options.match_points(&model, &target)?.report;
 /// assert!(report.iterations > 0 && report.starts == 1);
-/// assert!(report.residual > 0.05 && report.residual < 0.2); // what no rigid motion explains, in units of the points
+/// // What no rigid motion explains, in units of the points.
+/// assert!(report.residual > 0.05 && report.residual < 0.2);
 /// # Ok::<(), tactile_match::MatchError>(())
 /// ```
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -32,9 +32,10 @@ pub use press::{circle, known_heights_mm, press_pages, summary_lines};
 ///
 /// ```
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
-/// use tactile_simulate::{Trial, CalibrationRun, Camera, PressLoad, PressOptions};
+/// use tactile_simulate::{CalibrationRun, Camera, PressLoad, PressOptions, Trial};
 /// let camera = Camera::default().coarser(16);
-/// let options = PressOptions { camera, loads: vec![PressLoad::normal(0.7)], ..PressOptions::default() };
+/// let options =
+///     PressOptions { camera, loads: vec![PressLoad::normal(0.7)], ..PressOptions::default() };
 /// let trial = Trial::new(options, &CalibrationRun::default())?;
 /// let pipeline = trial.pipeline()?;
 /// use tactile_cli::{PlotError, save_press_pages};

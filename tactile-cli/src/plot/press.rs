@@ -13,14 +13,20 @@ use tactile_imaging::pipeline::{ContactSurface, Measurement, PipelineError, Pres
 ///
 /// ```
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
-/// use tactile_simulate::{CalibrationRun, Camera, PressLoad, PressOptions, PressScene};
-/// use tactile_imaging::{Object, Pipeline};
 /// use tactile_cli::save_press_pages;
+/// use tactile_imaging::{Object, Pipeline};
+/// use tactile_simulate::{CalibrationRun, Camera, PressLoad, PressOptions, PressScene};
 /// let camera = Camera::default().coarser(16);
-/// let scene = PressScene::new(PressOptions { camera, loads: vec![PressLoad::normal(0.7)], ..Default::default() })?;
+/// let scene = PressScene::new(PressOptions {
+///     camera,
+///     loads: vec![PressLoad::normal(0.7)],
+///     ..Default::default()
+/// })?;
 /// let calibration = scene.calibrate(&CalibrationRun { steps: 8, ..Default::default() })?;
 /// let made = scene.simulate();
-/// let pipeline = Pipeline::from_pairs(&calibration.pairs, made.pixel_size_m, Object::sphere(3e-3))?.with_control_points(40);
+/// let pipeline =
+///     Pipeline::from_pairs(&calibration.pairs, made.pixel_size_m, Object::sphere(3e-3))?
+///         .with_control_points(40);
 /// let mut press = pipeline.press(made.reference.view())?;
 /// press.add_frame(made.frames[0].view());
 /// let folder = tempfile::tempdir()?;

@@ -92,7 +92,8 @@ impl<const D: usize> Annealer<D> {
             let floor = self.floor(schedule).powi(2);
             // Temperatures (variances) below this are cold: a tenth of the model's radius.
             if variance < 0.01 && state.matched < schedule.collapse {
-                break; // the temperature fell below the noise: points lose their partners, and none comes back
+                // The temperature fell below the noise: points lose their partners, and none comes back.
+                break;
             }
             // Soft partners spread less than this, relative to the temperature, are as good as
             // decided: no need to go slowly.

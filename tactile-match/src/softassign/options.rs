@@ -120,7 +120,8 @@ pub enum Outliers {
 /// ```
 /// use nalgebra::Point2;
 /// use tactile_match::{AnnealedSoftassign, PointMatcher, Search};
-/// let loaded = |p: &Point2<f64>| Point2::new(1.02 * p.x, p.y + 0.01 * p.x * p.x); // the same contact at a higher load
+/// // The same contact at a higher load.
+/// let loaded = |p: &Point2<f64>| Point2::new(1.02 * p.x, p.y + 0.01 * p.x * p.x);
 /// let model: Vec<_> = (0..12)
 ///     .map(f64::from)
 ///     .map(|k| Point2::new(k % 4.0 + 0.3 * k.sin(), (k / 4.0).floor()))

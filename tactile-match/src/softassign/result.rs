@@ -51,7 +51,8 @@ use tactile_tps::{Scalar, Smoothing, TpsError, Warp};
 /// );
 /// assert!(found.report.residual < 1e-9); // units of the points
 /// let matching = found.to_matching(&model);
-/// assert!((matching.warp.jacobian(&model[4]).determinant() - 1.1).abs() < 1e-6); // areas grow by a tenth
+/// // Areas grow by a tenth.
+/// assert!((matching.warp.jacobian(&model[4]).determinant() - 1.1).abs() < 1e-6);
 /// # Ok::<(), tactile_match::MatchError>(())
 /// ```
 #[derive(Clone, Debug)]
