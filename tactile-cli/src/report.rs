@@ -240,12 +240,18 @@ impl Report {
         let allowed = BASE64_STANDARD.encode(Hash::hash(TURN.as_bytes()));
         writeln!(
             page,
-            "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta \
-             http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; style-src \
-             'unsafe-inline'; img-src data:; script-src 'sha256-{allowed}'\">\n<meta name=\"viewport\" \
-             content=\"width=device-width, \
-             initial-scale=1\">\n<title>{question}</title>\n<style>{STYLE}</style>\n</head>\\
-             n<body>\n<h1>{question}</h1>"
+            r#"<!DOCTYPE html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta http-equiv="Content-Security-Policy" content="default-src 'none';
+style-src 'unsafe-inline'; img-src data:; script-src 'sha256-{allowed}'">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<title>{question}</title>
+<style>{STYLE}</style>
+</head>
+<body>
+<h1>{question}</h1>"#
         )?;
         if let Some((first, rest)) = self.answers.split_first() {
             writeln!(page, "<p class=\"answer\">{}</p>", escaped(first))?;
