@@ -3,7 +3,7 @@
 
     evidence/inclusion_scenes.py FOLDER [--size MM] [--seed N] [--part K/N] [--spheroids] [NAMES ...]
 
-writes FOLDER/scenes.csv and FOLDER/NAME.csv as `tactile-elasticity/examples/inclusion_study` reads them: 108 blocks with an
+writes FOLDER/scenes.csv and FOLDER/NAME.csv as `tactile-inclusion/examples/inclusion_study` reads them: 108 blocks with an
 inclusion, 32 plain ones, drawn from a fixed seed or N. With --spheroids the inclusions are drawn with heights over widths from 1/1.75 to 1.75
 and the diameter is that of the ball of equal volume. NAMES keeps some, `--part` shares them out; what is there is left. A scene takes 5 to 30 s.
 

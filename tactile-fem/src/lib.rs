@@ -31,8 +31,8 @@
 //!   where that is refined, 0.3 % in both. Without friction 1.6 % and 0.7 %.
 //!
 //! The bench `finite_elements` and the tests `against_calculix` of `tactile-inclusion` print these.
-//! Without slip a flat punch follows Spence within 0.05 % at ν = 0, 0.3 and 0.45. A ball's
-//! stiffness follows Borodich and Keer within 0.5 % at ν = 0.3.
+//! Without slip a flat punch follows Spence within 0.05 % at ν = 0, 0.3 and 0.45. The forces of a
+//! ball and a cone follow Borodich and Keer within 0.3 % at ν = 0.
 //!
 //! # References
 //! D. A. Spence, Proc. R. Soc. A 305 (1968) 55–80. F. M. Borodich and L. M. Keer, Int. J. Solids

@@ -18,9 +18,8 @@ fn curve(
     sticks: bool,
 ) -> IndentationCurve {
     let inner = 1.1 * contact;
-    let mut lines = contact_lines(0.2 * contact, 5, 1.1, 1e9, inner);
     let outer = contact_lines(0.1 * contact, 1, 1.4, 1e9, depth.max(10.0 * contact));
-    lines.extend(outer.iter().skip(1).map(|r| inner + r));
+    let lines = continued(contact_lines(0.2 * contact, 5, 1.1, 1e9, inner), &outer);
     let mesh = Mesh::layered_disc(&[depth], &lines, 0.05 * contact, 1.4);
     let mut model = ElementModel::new(Kinematics::Finite);
     let material = Material::new(MODULUS, poisson_ratio).unwrap();

@@ -12,3 +12,19 @@ mod sparse;
 mod squeeze;
 mod stick;
 mod vtk;
+
+/// A guide of one layer.
+fn layer(thickness_m: f64, material: Material, radius_m: f64) -> Guide {
+    let layer = GuideLayer {
+        thickness_m,
+        material,
+    };
+    Guide::new(vec![layer], radius_m).unwrap()
+}
+
+/// Lines that go on where `inner` ends.
+fn continued(mut inner: Vec<f64>, outer: &[f64]) -> Vec<f64> {
+    let end = inner[inner.len() - 1];
+    inner.extend(outer.iter().skip(1).map(|r| end + r));
+    inner
+}

@@ -81,14 +81,8 @@ fn balls_on_guides_solve_to_contact_radii_beyond_their_own() {
 
 #[test]
 fn objects_of_every_shape_are_pressed_on_a_flat_and_on_a_guide() {
-    let gel = Material::new(80e3, 0.495).unwrap();
-    let layer = GuideLayer {
-        thickness_m: 6e-3,
-        material: gel,
-    };
-    let guide = Guide::new(vec![layer], 12e-3).unwrap();
+    let guide = layer(6e-3, Material::new(80e3, 0.495).unwrap(), 12e-3);
     let objects = [
-        ObjectShape::Ball { radius_m: 3e-3 },
         ObjectShape::HalfBall { radius_m: 3e-3 },
         ObjectShape::Cylinder {
             radius_m: 2e-3,
@@ -145,14 +139,11 @@ fn presses_of_other_proportions_are_refused() {
     ));
     let ball = ObjectPress::new(ObjectShape::Ball { radius_m: 3e-3 }, gel).unwrap();
     assert!(ball.clone().with_fineness(1).is_err());
-    let layer = GuideLayer {
-        thickness_m: 6e-3,
-        material: gel,
-    };
-    assert!(
-        ball.on_guide(Guide::new(vec![layer], 3e-3).unwrap())
-            .is_err()
-    );
+    assert!(ball.on_guide(layer(6e-3, gel, 3e-3)).is_err());
+    for [radius, height] in [[f64::NAN, 1e-2], [0.0, 1e-2], [1e-2, -1e-3]] {
+        let scene = FemScene::cylinder_between_plates(radius, height, gel, Interface::Bonded);
+        assert!(matches!(scene, Err(ElasticityError::NotPositive { .. })));
+    }
 }
 
 /// The ball's shells stay clear of its core whatever the number of elements.
@@ -190,11 +181,7 @@ fn the_rim_of_the_guide_is_not_felt() {
     // The thickest guide beside the ball, where the rim is nearest in thicknesses.
     for (ball, thickness_m) in [(3e-3, 10e-3), (8e-3, 10e-3)] {
         let contact = |guide_radius| {
-            let layer = GuideLayer {
-                thickness_m,
-                material: material(60e3),
-            };
-            let guide = Guide::new(vec![layer], guide_radius).unwrap();
+            let guide = layer(thickness_m, material(60e3), guide_radius);
             let scene = FemScene::ball_on_guide(ball, material(100e3), &guide).unwrap();
             let state = &scene.solve(&[AppliedLoad::Approach(0.6 * ball)]).states[0];
             (state.force_n(), state.contact_radius().unwrap().radius_m)
@@ -215,17 +202,10 @@ fn a_finer_mesh_moves_the_table_little() {
     let press = press.on_guide(guide).unwrap();
     let loads = [0.05, 0.3, 1.0].map(AppliedLoad::Force);
     let radii = |fineness| -> Vec<f64> {
-        let scene = press
-            .clone()
-            .with_fineness(fineness)
-            .unwrap()
-            .scene()
-            .unwrap();
-        let states = scene.solve(&loads).states;
-        states
-            .iter()
-            .map(|s| s.contact_radius().unwrap().radius_m)
-            .collect()
+        let finer = press.clone().with_fineness(fineness).unwrap();
+        let states = finer.scene().unwrap().solve(&loads).states;
+        let radii = states.iter().map(|s| s.contact_radius().unwrap().radius_m);
+        radii.collect()
     };
     for (default, fine) in radii(5).iter().zip(radii(8)) {
         // F at a given radius goes with its third to fourth power: estimates carry a standard error

@@ -44,13 +44,9 @@ fn a_file_holds_mesh_displacements_and_stresses() {
 
 #[test]
 fn a_state_of_another_scene_is_refused() {
-    let ball = |radius| {
-        let gel = Material::new(1e5, 0.495).unwrap();
-        let object = ObjectShape::Ball { radius_m: radius };
-        ObjectPress::new(object, gel).unwrap()
-    };
-    let scene = ball(3e-3).with_fineness(3).unwrap().scene().unwrap();
-    let other = ball(3e-3).with_fineness(4).unwrap().scene().unwrap();
+    let gel = Material::new(1e5, 0.495).unwrap();
+    let ball = ObjectPress::new(ObjectShape::Ball { radius_m: 3e-3 }, gel).unwrap();
+    let [scene, other] = [3, 4].map(|n| ball.clone().with_fineness(n).unwrap().scene().unwrap());
     let state = &scene.solve(&[AppliedLoad::Approach(1e-4)]).states[0];
     assert!(other.write_vtk(state, &mut Vec::new()).is_err());
 }

@@ -4,21 +4,17 @@
 //! of `size_mm`: a row a load.
 #![allow(clippy::print_stdout)]
 
-use crate::forward::{Forward, LumpParameters, Parameters};
-use crate::picture::Place;
+use super::{block, forward, lump};
+use crate::forward::{Forward, Parameters};
 use std::collections::BTreeMap;
-use tactile_fem::{Guide, GuideLayer, Interface, Kinematics, Material};
+use tactile_fem::{Guide, GuideLayer, Interface, Material};
 
-/// A block at one approach.
+/// A block at one approach: what predicts it, and what CalculiX finds.
 struct Load {
     scene: String,
-    interface: Interface,
-    guide_radius_m: f64,
-    block_radius_m: f64,
+    forward: Forward,
     parameters: Parameters,
-    approach_m: f64,
     force_n: f64,
-    radii_m: Vec<f64>,
     pressures_pa: Vec<f64>,
 }
 
@@ -26,39 +22,35 @@ fn load(header: &[&str], row: &str) -> Load {
     let cells: BTreeMap<&str, &str> = header.iter().copied().zip(row.split(',')).collect();
     let number = |name: &str| cells[name].parse::<f64>().unwrap();
     let guide_radius_m = number("disc_radius_m");
-    let parts: Vec<&str> = (header.iter().copied())
-        .filter(|name| name.starts_with("pressure_at_"))
-        .collect();
-    let radius =
-        |name: &&str| guide_radius_m * name["pressure_at_".len()..].parse::<f64>().unwrap();
-    let lump = LumpParameters {
-        diameter_m: number("D_m"),
-        depth_m: number("depth_m"),
-        youngs_modulus_pa: number("E1_pa"),
-        aspect: number("aspect"),
+    let pressure = |name: &&str| {
+        let part = name.strip_prefix("pressure_at_")?.parse::<f64>().unwrap();
+        Some((guide_radius_m * part, number(name)))
     };
+    let (radii_m, pressures_pa) = header.iter().filter_map(pressure).unzip();
+    let mut ball = lump(number("D_m"), number("depth_m"), number("E1_pa"));
+    ball.aspect = number("aspect");
     Load {
         scene: cells["scene"].to_owned(),
-        interface: match cells["contact"] {
-            "bonded" => Interface::Bonded,
-            _ => Interface::Frictionless,
+        forward: Forward {
+            guide: guide(guide_radius_m),
+            block_radius_m: number("block_radius_m"),
+            interface: match cells["contact"] {
+                "bonded" => Interface::Bonded,
+                _ => Interface::Frictionless,
+            },
+            approaches_m: vec![number("approach_m")],
+            radii_m,
+            ..forward(5)
         },
-        guide_radius_m,
-        block_radius_m: number("block_radius_m"),
         parameters: Parameters {
             block_modulus_pa: number("E0_pa"),
-            lump: (lump.diameter_m > 0.0).then_some(lump),
-            place: Place::default(),
-            second: None,
-            strayed_m: vec![],
-            zero_m: 0.0,
+            lump: (ball.diameter_m > 0.0).then_some(ball),
             height_m: number("block_height_m"),
             poisson_ratio: number("nu"),
+            ..block()
         },
-        approach_m: number("approach_m"),
         force_n: number("force_n"),
-        radii_m: parts.iter().map(radius).collect(),
-        pressures_pa: parts.iter().map(|name| number(name)).collect(),
+        pressures_pa,
     }
 }
 
@@ -78,21 +70,10 @@ fn pressures_within_three_quarters_of_the_face_are_those_of_calculix() {
     let header: Vec<&str> = lines.next().unwrap().split(',').collect();
     for row in lines {
         let load = load(&header, row);
-        let forward = Forward {
-            guide: guide(load.guide_radius_m),
-            block_radius_m: load.block_radius_m,
-            interface: load.interface,
-            approaches_m: vec![load.approach_m],
-            radii_m: load.radii_m.clone(),
-            cells: None,
-            fineness: 5,
-            kinematics: Kinematics::Finite,
-        };
-        let found = forward.predict(&load.parameters).unwrap().values;
-        let (pressures, force) = found.split_at(load.radii_m.len());
-        for ((found, expected), radius) in
-            (pressures.iter().zip(&load.pressures_pa)).zip(&load.radii_m)
-        {
+        let radii = &load.forward.radii_m;
+        let found = load.forward.predict(&load.parameters).unwrap().values;
+        let (pressures, force) = found.split_at(radii.len());
+        for ((found, expected), radius) in pressures.iter().zip(&load.pressures_pa).zip(radii) {
             let error = found / expected - 1.0;
             println!("{} r {radius:.4} {:+.2} %", load.scene, 100.0 * error);
             // 0.2 % by CalculiX's mesh (its pressures fall by 0.15 % from elements of 1 mm to 0.6

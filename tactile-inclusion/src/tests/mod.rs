@@ -16,17 +16,26 @@ mod fits;
 mod marginal;
 mod pictures;
 
-fn guide(scale: f64) -> Guide {
+fn guide() -> Guide {
     let layer = |thickness_m, modulus: f64| GuideLayer {
         thickness_m,
-        material: Material::new(scale * modulus, 0.495).unwrap(),
+        material: Material::new(modulus, 0.495).unwrap(),
     };
     Guide::new(vec![layer(4e-3, 120e3), layer(6e-3, 40e3)], 16e-3).unwrap()
 }
 
-fn forward(fineness: usize, scale: f64) -> Forward {
+fn specimen() -> Specimen {
+    Specimen::new(30e-3, 40e-3).unwrap()
+}
+
+/// A search of a block that the face sticks to.
+fn search() -> InclusionSearch {
+    InclusionSearch::new(specimen().with_interface(Interface::Bonded), guide()).unwrap()
+}
+
+fn forward(fineness: usize) -> Forward {
     Forward {
-        guide: guide(scale),
+        guide: guide(),
         block_radius_m: 40e-3,
         interface: Interface::Bonded,
         approaches_m: vec![1.2e-3, 2.4e-3],
@@ -37,15 +46,10 @@ fn forward(fineness: usize, scale: f64) -> Forward {
     }
 }
 
-fn block(scale: f64) -> Parameters {
+fn block() -> Parameters {
     Parameters {
-        block_modulus_pa: scale * 5e3,
-        lump: Some(LumpParameters {
-            diameter_m: 12e-3,
-            depth_m: 4e-3,
-            youngs_modulus_pa: scale * 30e3,
-            aspect: 1.0,
-        }),
+        block_modulus_pa: 5e3,
+        lump: Some(lump(12e-3, 4e-3, 30e3)),
         place: Place::default(),
         second: None,
         strayed_m: vec![],
@@ -55,37 +59,25 @@ fn block(scale: f64) -> Parameters {
     }
 }
 
+fn lump(diameter_m: f64, depth_m: f64, youngs_modulus_pa: f64) -> LumpParameters {
+    LumpParameters {
+        diameter_m,
+        depth_m,
+        youngs_modulus_pa,
+        aspect: 1.0,
+    }
+}
+
+fn is_poor(estimate: &InclusionEstimate) -> bool {
+    let poor = |warning: &InclusionWarning| matches!(warning, InclusionWarning::PoorFit { .. });
+    estimate.warnings.iter().any(poor)
+}
+
 /// Largest difference over the largest value.
 fn distance(a: &[f64], b: &[f64]) -> f64 {
     let largest = b.iter().fold(0.0f64, |m, x| m.max(x.abs()));
     let differences = a.iter().zip(b).map(|(a, b)| (a - b).abs());
     differences.fold(0.0, f64::max) / largest
-}
-
-#[test]
-fn pressures_are_proportional_to_all_moduli_together() {
-    let soft = forward(2, 1.0).predict(&block(1.0)).unwrap().values;
-    let stiff = forward(2, 7.0).predict(&block(7.0)).unwrap().values;
-    let scaled: Vec<f64> = soft.iter().map(|p| 7.0 * p).collect();
-    // Newton's method ends with 1e-8 of the forces out of balance.
-    assert!(distance(&stiff, &scaled) < 1e-6);
-}
-
-#[test]
-fn an_inclusion_as_soft_as_the_tissue_is_none() {
-    let mut same = block(1.0);
-    if let Some(lump) = &mut same.lump {
-        lump.youngs_modulus_pa = same.block_modulus_pa;
-    }
-    let homogeneous = Parameters {
-        lump: None,
-        ..same.clone()
-    };
-    let with = forward(3, 1.0).predict(&same).unwrap().values;
-    let without = forward(3, 1.0).predict(&homogeneous).unwrap().values;
-    // Two meshes of the same body: what the coarser one leaves.
-    let rings = 32;
-    assert!(distance(&with[..rings], &without[..rings]) < 2e-3);
 }
 
 const COORDINATES: [Coordinate; 8] = [
@@ -129,9 +121,9 @@ fn derivatives_are_those_of_solutions_at_changed_parameters() {
     for (poisson_ratio, tolerance) in [(0.45, 2e-4), (0.495, 1e-3), (0.498, 2e-3)] {
         let here = Parameters {
             poisson_ratio,
-            ..block(1.0)
+            ..block()
         };
-        for (coordinate, error) in derivative_errors(&forward(2, 1.0), &here) {
+        for (coordinate, error) in derivative_errors(&forward(2), &here) {
             assert!(
                 error < tolerance,
                 "ν {poisson_ratio}, {coordinate:?}: {error}"
@@ -144,9 +136,9 @@ fn derivatives_are_those_of_solutions_at_changed_parameters() {
 fn derivatives_without_friction_know_how_the_face_slides() {
     let model = Forward {
         interface: Interface::Frictionless,
-        ..forward(2, 1.0)
+        ..forward(2)
     };
-    for (coordinate, error) in derivative_errors(&model, &block(1.0)) {
+    for (coordinate, error) in derivative_errors(&model, &block()) {
         // Faces of the solutions meet within 2e-6 of the radius, which a quotient by ν, whose step
         // is the smallest, shows as a percent. Left out, sliding would change the derivative by ν
         // by 8 %.
@@ -160,8 +152,8 @@ fn derivatives_without_friction_know_how_the_face_slides() {
 
 #[test]
 fn a_moved_mesh_is_as_good_as_a_new_one() {
-    let model = forward(3, 1.0);
-    let here = block(1.0);
+    let model = forward(3);
+    let here = block();
     let (_, solved) = model.predict_near(&here, None).unwrap();
     for coordinate in [
         Coordinate::Diameter,
@@ -183,8 +175,8 @@ fn a_moved_mesh_is_as_good_as_a_new_one() {
 
 #[test]
 fn the_answers_mesh_is_fine_enough() {
-    let answers = forward(5, 1.0).predict(&block(1.0)).unwrap().values;
-    let finer = forward(8, 1.0).predict(&block(1.0)).unwrap().values;
+    let answers = forward(5).predict(&block()).unwrap().values;
+    let finer = forward(8).predict(&block()).unwrap().values;
     // The model's error that the fit counts with: 0.2 % of scale, 0.07 % of shape.
     assert!(distance(&answers[..32], &finer[..32]) < 2e-3);
     // Half of the force's error: the rim's singular traction.
@@ -192,31 +184,10 @@ fn the_answers_mesh_is_fine_enough() {
 }
 
 #[test]
-fn small_strain_is_the_limit_of_small_approaches() {
-    let at = |kinematics| {
-        let model = Forward {
-            approaches_m: vec![3e-6],
-            kinematics,
-            ..forward(2, 1.0)
-        };
-        model.predict(&block(1.0)).unwrap().values
-    };
-    let (linear, finite) = (at(Kinematics::Linear), at(Kinematics::Finite));
-    // A strain of 1e-4, of which a second-order effect has a few times as much.
-    assert!(distance(&linear, &finite) < 1e-3);
-}
-
-fn search() -> InclusionSearch {
-    let specimen = Specimen::new(30e-3, 40e-3).unwrap();
-    InclusionSearch::new(specimen.with_interface(Interface::Bonded), guide(1.0)).unwrap()
-}
-
-#[test]
 fn a_block_said_to_be_incompressible_is_fitted_at_the_limit() {
     // A prior beyond the limit, narrow against the distance, would pull against every step.
-    let specimen = Specimen::new(30e-3, 40e-3).unwrap();
-    let specimen = specimen.with_poisson_ratio(0.4999, 1e-4).unwrap();
-    let search = InclusionSearch::new(specimen, guide(1.0)).unwrap();
+    let specimen = specimen().with_poisson_ratio(0.4999, 1e-4).unwrap();
+    let search = InclusionSearch::new(specimen, guide()).unwrap();
     let start = search.known_block(5e3);
     assert_eq!(start.poisson_ratio, LARGEST_POISSON_RATIO);
     for prior in search.block_priors(5e3) {
@@ -237,7 +208,7 @@ fn frame(approach_m: f64) -> PressureProfile {
 
 #[test]
 fn frames_that_cannot_be_searched_are_refused() {
-    let radii = forward(2, 1.0).radii_m;
+    let radii = forward(2).radii_m;
     let refused = |frames: &[PressureProfile]| search().search(&radii, frames).unwrap_err();
     assert!(matches!(refused(&[]), ElasticityError::TooFewLoads { .. }));
     let backwards = refused(&[frame(2e-3), frame(1e-3)]);
@@ -246,10 +217,8 @@ fn frames_that_cannot_be_searched_are_refused() {
     assert!(matches!(nowhere, ElasticityError::NotPositive { .. }));
     let mut dark = frame(1e-3);
     dark.pressure_pa[3] = f64::NAN;
-    assert!(matches!(
-        refused(&[dark]),
-        ElasticityError::NotFinite { .. }
-    ));
+    let dark = refused(&[dark]);
+    assert!(matches!(dark, ElasticityError::NotFinite { .. }));
     let mut short = frame(1e-3);
     short.pressure_pa.pop();
     let short = refused(&[short]);
@@ -269,7 +238,7 @@ fn frames_that_cannot_be_searched_are_refused() {
 
 #[test]
 fn a_search_ends_when_told_to() {
-    let radii = forward(2, 1.0).radii_m;
+    let radii = forward(2).radii_m;
     let mut heard = 0;
     let ended = search().search_with_progress(&radii, &[frame(1e-3)], &mut |_| {
         heard += 1;
@@ -280,21 +249,19 @@ fn a_search_ends_when_told_to() {
 
 #[test]
 fn more_frames_tell_more_of_an_inclusion() {
-    let radii = forward(2, 1.0).radii_m;
+    let radii = forward(2).radii_m;
     let assumed = AssumedInclusion {
         diameter_m: 12e-3,
         depth_m: 4e-3,
         youngs_modulus_pa: 30e3,
         block_modulus_pa: 5e3,
     };
-    let expected = |approaches: &[f64]| {
-        let errors = search().expected_errors(&assumed, approaches, &radii, &[0.5; 16]);
-        errors.unwrap()
-    };
-    let one = expected(&[2.4e-3]);
-    let two = expected(&[1.2e-3, 2.4e-3]);
+    let expected =
+        |approaches: &[f64]| search().expected_errors(&assumed, approaches, &radii, &[0.5; 16]);
+    let one = expected(&[2.4e-3]).unwrap();
+    let two = expected(&[1.2e-3, 2.4e-3]).unwrap();
     assert!(two.diameter < one.diameter && two.youngs_modulus < one.youngs_modulus);
-    let none = search().expected_errors(&assumed, &[], &radii, &[0.5; 16]);
+    let none = expected(&[]);
     assert!(matches!(none, Err(ElasticityError::TooFewLoads { .. })));
 }
 
@@ -302,26 +269,19 @@ fn more_frames_tell_more_of_an_inclusion() {
 fn what_is_not_known_within_a_quarter_both_ways_is_not_told() {
     let within = |down, up| crate::Estimated::within(2f64.ln(), [2f64.ln() - down, 2f64.ln() + up]);
     let estimated = |error: f64| within(1.96 * error, 1.96 * error);
-    assert!(matches!(
-        Identifiable::new(estimated(0.1), true),
-        Identifiable::Yes(_)
-    ));
-    assert!(matches!(
-        Identifiable::new(estimated(0.1), false),
-        Identifiable::No(_)
-    ));
-    assert!(matches!(
-        Identifiable::new(estimated(0.26), true),
-        Identifiable::No(_)
-    ));
-    // As wide, but open upwards.
-    assert!(matches!(
-        Identifiable::new(within(0.1, 0.6), true),
-        Identifiable::No(_)
-    ));
-    let interval = estimated(0.1).interval;
+    // The last reaches as far, but upwards alone.
+    for (estimated, is_reliable, is_told) in [
+        (estimated(0.1), true, true),
+        (estimated(0.1), false, false),
+        (estimated(0.26), true, false),
+        (within(0.1, 0.6), true, false),
+    ] {
+        let told = Identifiable::new(estimated, is_reliable);
+        assert_eq!(told.value().is_some(), is_told, "{told:?}");
+    }
+    let [low, high] = estimated(0.1).interval;
     assert!(
-        (interval[0] * interval[1] - 4.0).abs() < 1e-12,
+        (low * high - 4.0).abs() < 1e-12,
         "symmetric in the logarithm"
     );
 }

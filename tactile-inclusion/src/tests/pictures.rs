@@ -1,15 +1,15 @@
 //! Searches from the whole face: a lump off the axis, and what no single ball explains.
 
-use super::guide;
-use crate::forward::{Coordinate, Forward, LumpParameters, Parameters};
+use super::{is_poor, lump, search};
+use crate::forward::{Coordinate, Forward, Parameters};
 use crate::picture::{CellPositions, Cells, Place};
-use crate::{Inclusion, InclusionEstimate, InclusionSearch, InclusionWarning};
-use crate::{PressureProfile, Scan, ScanPress, SearchProgress, Specimen, Verdict};
+use crate::{
+    Inclusion, InclusionEstimate, PressureProfile, Scan, ScanPress, SearchProgress, Verdict,
+};
 use core::ops::ControlFlow;
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 use rand_distr::StandardNormal;
 use std::sync::Arc;
-use tactile_fem::{Interface, Kinematics};
 
 const APPROACHES_M: [f64; 2] = [1.5e-3, 3e-3];
 /// White error over the pressure, which is not drawn: what is left of a fit is the departure alone.
@@ -26,9 +26,6 @@ fn positions() -> Vec<[f64; 2]> {
 fn forward(fineness: usize) -> Forward {
     let positions = positions();
     Forward {
-        guide: guide(1.0),
-        block_radius_m: 40e-3,
-        interface: Interface::Bonded,
         approaches_m: APPROACHES_M.to_vec(),
         radii_m: positions.iter().map(|[x, y]| x.hypot(*y)).collect(),
         cells: Some(Cells {
@@ -41,30 +38,20 @@ fn forward(fineness: usize) -> Forward {
             squeezed: APPROACHES_M.map(|approach| approach / 30e-3).to_vec(),
             reach_m: 12e-3,
         }),
-        fineness,
-        kinematics: Kinematics::Finite,
+        ..super::forward(fineness)
     }
 }
 
 fn block(centre_m: [f64; 2]) -> Parameters {
     Parameters {
-        block_modulus_pa: 5e3,
-        lump: Some(LumpParameters {
-            diameter_m: 10e-3,
-            depth_m: 4e-3,
-            youngs_modulus_pa: 30e3,
-            aspect: 1.0,
-        }),
+        lump: Some(lump(10e-3, 4e-3, 30e3)),
         place: Place {
             centre_m,
             elongation: [0.05, -0.03],
             carried: 0.75,
         },
-        second: None,
-        strayed_m: vec![],
-        zero_m: 0.0,
-        height_m: 30e-3,
         poisson_ratio: 0.495,
+        ..super::block()
     }
 }
 
@@ -101,11 +88,8 @@ fn derivatives_by_the_place_are_those_of_the_pressure() {
         let step = part * coordinate.unit();
         let at = |step: f64| {
             let moved = parameters.moved(coordinate, step);
-            forward
-                .predict_near(&moved, Some(&solved))
-                .unwrap()
-                .0
-                .values
+            let near = forward.predict_near(&moved, Some(&solved));
+            near.unwrap().0.values
         };
         let (high, low) = (at(step), at(-step));
         let largest = column.iter().fold(0.0f64, |most, d| most.max(d.abs()));
@@ -144,11 +128,6 @@ fn frames(values: &[f64]) -> Vec<PressureProfile> {
             standard_error_pa: pressures.iter().map(|p| NOISE * p).collect(),
         })
         .collect()
-}
-
-fn search() -> InclusionSearch {
-    let specimen = Specimen::new(30e-3, 40e-3).unwrap();
-    InclusionSearch::new(specimen.with_interface(Interface::Bonded), guide(1.0)).unwrap()
 }
 
 fn go_on(_: SearchProgress) -> ControlFlow<()> {
@@ -201,9 +180,8 @@ const POSITION_ERROR_M: f64 = 0.2e-3;
 fn a_scan_finds_an_inclusion_between_its_presses() {
     let mut parameters = block([9e-3, 5e-3]);
     parameters.place.elongation = [0.0; 2];
-    let seeds = 1..=3;
     let (mut missed, mut squares) = (0, 0.0);
-    for seed in seeds.clone() {
+    for seed in 1..=3 {
         let found = search()
             .search_scan(&scan(&parameters, seed), &mut go_on)
             .unwrap();
@@ -253,11 +231,12 @@ fn a_scan_finds_an_inclusion_between_its_presses() {
     refused(&with(&[], 0.0));
 }
 
-/// That this is the block's inclusion at this place, which is known this well.
-fn assert_found(inclusion: &Inclusion, place_m: [f64; 2], known_m: f64) {
+/// That this is the block's inclusion at this place.
+fn assert_found(inclusion: &Inclusion, place_m: [f64; 2]) {
     let [x, y] = inclusion.position_m.unwrap();
     let away = (x.value - place_m[0]).hypot(y.value - place_m[1]);
-    assert!(away < known_m, "{away}");
+    // Between two lumps the pressures of both rise.
+    assert!(away < 0.2e-3, "{away}");
     for (told, truth) in [
         (inclusion.diameter_m, 10e-3),
         (inclusion.depth_m, 4e-3),
@@ -269,18 +248,12 @@ fn assert_found(inclusion: &Inclusion, place_m: [f64; 2], known_m: f64) {
 }
 
 #[test]
-fn a_ball_off_the_axis_is_found_where_it_is_and_two_are_told_apart() {
+fn two_balls_off_the_axis_are_told_apart_and_three_are_not_explained() {
     let mut parameters = block([5e-3, -2e-3]);
     parameters.place.elongation = [0.0; 2];
     let forward = forward(5).with_plain(&parameters).unwrap();
     let one = forward.predict(&parameters).unwrap().values;
     let count = 2 * positions().len();
-    let found = searched(&one[..count]);
-    let inclusion = found.inclusion.expect("a ball alone is explained");
-    assert!(found.second.is_none());
-    // The search's mesh differs by 0.1 % of the pressure, which rises by 10 % a millimetre.
-    assert_found(&inclusion, [5e-3, -2e-3], 0.1e-3);
-
     // A second one on the other side, 1.3 diameters away, each lifting the pressure as if alone.
     parameters.place.centre_m = [-7.5e-3, 2.5e-3];
     let other = forward.predict(&parameters).unwrap().values;
@@ -297,9 +270,8 @@ fn a_ball_off_the_axis_is_found_where_it_is_and_two_are_told_apart() {
     let x = |one: &Inclusion| one.position_m.unwrap()[0].value;
     two.sort_by(|a, b| x(b).total_cmp(&x(a)));
     assert!(found.warnings.is_empty() && two.len() == 2, "{found:?}");
-    // Between two lumps the pressures of both rise.
-    assert_found(&two[0], [5e-3, -2e-3], 0.2e-3);
-    assert_found(&two[1], [-7.5e-3, 2.5e-3], 0.2e-3);
+    assert_found(&two[0], [5e-3, -2e-3]);
+    assert_found(&two[1], [-7.5e-3, 2.5e-3]);
 
     // Three are neither one nor two.
     parameters.place.centre_m = [3e-3, 9e-3];
@@ -308,9 +280,8 @@ fn a_ball_off_the_axis_is_found_where_it_is_and_two_are_told_apart() {
         .map(|((both, third), p)| both * third / p)
         .collect();
     let found = searched(&three[..count]);
-    let is_poor = |warning: &InclusionWarning| matches!(warning, InclusionWarning::PoorFit { .. });
     assert!(
-        found.inclusions().is_empty() && found.warnings.iter().any(is_poor),
+        found.inclusions().is_empty() && is_poor(&found),
         "{found:?}"
     );
     assert_ne!(found.verdict(), Verdict::Absent);

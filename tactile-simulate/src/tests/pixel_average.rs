@@ -1,5 +1,5 @@
 //! Averages against brute force, their sum, and the reference numbers.
-#![allow(clippy::print_stderr)]
+
 use crate::pixel_average::{Disc, Profile, SMOOTH, corner};
 use std::f64::consts::PI;
 
@@ -122,25 +122,14 @@ fn quadrature_and_corners_agree_where_both_hold() {
 
 #[test]
 fn averages_agree_with_the_reference_numbers() {
-    let home = std::env::var_os("TACTILE_DATA").map(std::path::PathBuf::from);
-    let home =
-        home.unwrap_or_else(|| concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/data").into());
-    let Ok(text) = std::fs::read_to_string(home.join("reference/image.json")) else {
-        eprintln!("skipped: no reference numbers at {}", home.display());
+    let Some(data) = test_support::reference("image.json") else {
         return;
     };
-    let data: serde_json::Value = serde_json::from_str(&text).unwrap();
     let mut cases = 0;
-    for case in data["cases"]
-        .as_array()
-        .unwrap()
-        .iter()
-        .filter(|c| c["kind"] == "hertz")
-    {
-        let (pitch, size) = (
-            case["pitch"].as_f64().unwrap(),
-            case["size"].as_u64().unwrap() as usize,
-        );
+    let all = data["cases"].as_array().unwrap();
+    for case in all.iter().filter(|case| case["kind"] == "hertz") {
+        let pitch = case["pitch"].as_f64().unwrap();
+        let size = case["size"].as_u64().unwrap() as isize;
         let at = |name: &str| case["params"][name].as_f64().unwrap();
         // There, pixel (0, 0) covers [0, h] × [0, h]; here its centre is the origin.
         let centre_px = [at("cx") / pitch - 0.5, at("cy") / pitch - 0.5];
@@ -149,19 +138,13 @@ fn averages_agree_with_the_reference_numbers() {
             radius_m: at("a"),
             pixel_size_m: [pitch; 2],
         };
-        let found = disc.average(
-            Profile::Hemisphere,
-            [[0, size as isize], [0, size as isize]],
-        );
+        let found = disc.average(Profile::Hemisphere, [[0, size], [0, size]]);
         // Near the rim, corners are of size 1 in units of the radius, a pixel of (h/a)²; the discs
         // met by the rim have radii below 10 pixels.
         let cancelled = 20.0 * f64::EPSILON * (at("a") / pitch).clamp(1.0, 10.0).powi(2);
         let Some(expected) = case["expected"]["pixels"].as_array() else {
-            assert!(
-                found.values.iter().all(|&v| v == 0.0),
-                "{} is empty",
-                case["id"]
-            );
+            let is_empty = found.values.iter().all(|&v| v == 0.0);
+            assert!(is_empty, "{}", case["id"]);
             continue;
         };
         let expected = expected.iter().flat_map(|line| line.as_array().unwrap());
