@@ -255,6 +255,9 @@ fn decode(bytes: &[u8], path: &Path) -> Result<DynamicImage, FileError> {
         let mut decoder = reader.into_decoder()?;
         decoder.set_limits(limits)?;
         let (width, height) = decoder.dimensions();
+        if width == 0 || height == 0 {
+            return Ok(Err("it has no pixels".to_owned()));
+        }
         if u64::from(width) * u64::from(height) > pixels {
             return Ok(Err(format!(
                 "{width} × {height} pixels are more than the {} million that are read",
