@@ -34,7 +34,7 @@ use tactile_imaging::pipeline::with_error;
 #[command(after_help = "\
 Examples:
   tactile inclusion --design examples/data/inclusion/scene.toml
-  tactile inclusion examples/data/inclusion/scan.toml --out lump
+  tactile inclusion examples/data/inclusion/scan.toml --out target/lump
 The scene file:
   reference = \"reference.png\"
   pixel_size_m = [3.44e-4, 3.44e-4]
