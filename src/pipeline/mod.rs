@@ -73,7 +73,9 @@ pub use named::{
 pub use press::Press;
 pub use reference_light::ReferenceLight;
 pub use report::{Report, Skip, SkipReason, Stage, Work};
-pub use result::{FrameResult, MatchResult, Measurement, ModulusResult, StrainResult, with_error};
+pub use result::{
+    FrameResult, MatchResult, Measurement, ModulusResult, StrainResult, interval_text, with_error,
+};
 pub use session::{DriftWatch, Session, SessionStrain, Update};
 pub use settings::{Settings, SurfaceInput};
 pub use source::FrameSource;

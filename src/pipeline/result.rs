@@ -231,16 +231,11 @@ pub struct Measurement {
 
 impl Display for ModulusResult {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        let k = |v: f64| v * 1e-3;
-        write!(
-            f,
-            "{} kPa",
-            with_error(self.value, self.standard_error, 1e-3)
-        )?;
+        let error = self.standard_error;
+        write!(f, "{} kPa", with_error(self.value, error, 1e-3))?;
         match self.interval_95 {
-            (low, Some(high)) => write!(f, "   95 %: {:.2} to {:.2} kPa", k(low), k(high))?,
-            (low, None) if low > 0.0 => write!(f, "   95 %: above {:.2} kPa", k(low))?,
-            (_, None) => f.write_str("   no interval: the errors are not known")?,
+            (low, None) if low <= 0.0 => f.write_str("   no interval: the errors are not known")?,
+            ends => write!(f, "   95 %: {} kPa", interval_text(ends, error, 1e-3))?,
         }
         write!(f, "   ({})", self.estimator)
     }
@@ -456,25 +451,54 @@ impl Display for DriftWatch {
 }
 
 /// A value with its standard error, scaled to a unit: two significant digits of the error decide
-/// the decimals.
+/// the decimals. An error of zero, or beyond the twelfth decimal, is not printed.
+///
+/// ```
+/// use tactile_imaging::pipeline::with_error;
+/// assert_eq!(with_error(3.27124e-3, 4.1e-8, 1e3), "3.271240 ± 0.000041");
+/// assert_eq!(with_error(103_384.0, 140.0, 1e-3), "103.38 ± 0.14");
+/// assert_eq!(with_error(0.7, 3e-17, 1.0), "0.7000");
+/// ```
 pub fn with_error(value: f64, error: f64, scale: f64) -> String {
     let (value, error) = (value * scale, error * scale);
-    let known = error > 0.0 && error.is_finite();
+    match decimals_of(error) {
+        Some(decimals) => format!("{} ± {error:.decimals$}", fixed(value, decimals)),
+        None => fixed(value, 4),
+    }
+}
+
+/// The ends of an interval, scaled to a unit, in the digits of the standard error: `98.6 to 106.0`,
+/// or `above 98.6` without an upper end.
+///
+/// ```
+/// use tactile_imaging::pipeline::interval_text;
+/// assert_eq!(interval_text((81_314.0, Some(138_607.0)), 14e3, 1e-3), "81 to 139");
+/// assert_eq!(interval_text((81_314.0, None), 140.0, 1e-3), "above 81.31");
+/// ```
+pub fn interval_text(ends: (f64, Option<f64>), error: f64, scale: f64) -> String {
+    let decimals = decimals_of(error * scale).unwrap_or(4);
+    let low = fixed(ends.0 * scale, decimals);
+    match ends.1 {
+        Some(high) => format!("{low} to {}", fixed(high * scale, decimals)),
+        None => format!("above {low}"),
+    }
+}
+
+/// Decimals that show two significant digits of an error. `None` of an error that is not known, and
+/// of one beyond the twelfth decimal, which is rounding.
+fn decimals_of(error: f64) -> Option<usize> {
     let decimals = (1.0 - error.log10().floor()).max(0.0) as usize;
-    // Beyond the twelfth decimal it is rounding.
-    let known = known && decimals <= 12;
-    let text = format!("{value:.*}", if known { decimals } else { 4 });
-    // Zero has no sign.
+    (error > 0.0 && error.is_finite() && decimals <= 12).then_some(decimals)
+}
+
+/// A number with so many decimals. Zero has no sign.
+fn fixed(value: f64, decimals: usize) -> String {
+    let text = format!("{value:.decimals$}");
     let is_zero = text.bytes().all(|c| matches!(c, b'-' | b'.' | b'0'));
-    let text = if is_zero {
-        text.trim_start_matches('-')
+    if is_zero {
+        text.trim_start_matches('-').to_owned()
     } else {
-        &text
-    };
-    if known {
-        format!("{text} ± {error:.decimals$}")
-    } else {
-        text.to_owned()
+        text
     }
 }
 
@@ -534,22 +558,5 @@ pub(super) mod outcome {
         serializer: S,
     ) -> Result<S::Ok, S::Error> {
         serializer.collect_seq(values.iter().map(ToString::to_string))
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::with_error;
-
-    #[test]
-    fn a_value_has_the_digits_that_its_error_allows() {
-        assert_eq!(with_error(3.27124e-3, 4.1e-8, 1e3), "3.271240 ± 0.000041");
-        assert_eq!(with_error(103_384.0, 140.0, 1e-3), "103.38 ± 0.14");
-        assert_eq!(with_error(0.7, 0.0, 1.0), "0.7000");
-        assert_eq!(
-            with_error(0.7, 3e-17, 1.0),
-            "0.7000",
-            "rounding is no error"
-        );
     }
 }

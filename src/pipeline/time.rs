@@ -1,5 +1,5 @@
 //! Whether the modulus changes over the time of a press.
-use super::result::with_error;
+use super::result::{interval_text, with_error};
 use crate::elasticity::modulus::{
     Estimate, Interval, LoadSeries, LoadState, ModulusEstimator, SharedErrors,
 };
@@ -88,23 +88,10 @@ impl Display for TimeResult {
 
 /// A value with its unit and its 95 % interval.
 fn within(value: f64, interval: Interval, scale: f64, unit: &str) -> String {
-    let half_width = interval.upper.map_or(value, |upper| upper - interval.lower) * 0.5;
-    // Two digits of the interval's half width.
-    let decimals = (1.0 - (half_width * scale).log10().floor()).clamp(0.0, 9.0) as usize;
-    let digits = |v: f64| format!("{:.decimals$}", v * scale);
-    match interval.upper {
-        Some(upper) => format!(
-            "{} {unit} (95 %: {} to {})",
-            digits(value),
-            digits(interval.lower),
-            digits(upper)
-        ),
-        None => format!(
-            "{} {unit} (95 %: above {})",
-            digits(value),
-            digits(interval.lower)
-        ),
-    }
+    // A normal error of this interval: four of them are its width.
+    let error = interval.upper.map_or(value, |upper| upper - interval.lower) / 4.0;
+    let ends = interval_text((interval.lower, interval.upper), error, scale);
+    format!("{} {unit} (95 %: {ends})", with_error(value, error, scale))
 }
 
 /// An error that is taken out, relative: an estimator without any error gives no interval.

@@ -17,7 +17,7 @@ use tactile_imaging::inclusion::{
     InclusionSearch, LoadedInclusion, PressureProfile, SearchProgress, Specimen, Verdict,
     asymmetry_warnings,
 };
-use tactile_imaging::pipeline::with_error;
+use tactile_imaging::pipeline::{interval_text, with_error};
 
 /// Find a lump under the surface of a block: its size, depth and stiffness
 ///
@@ -364,8 +364,9 @@ fn rings(face_radius_m: f64) -> (Vec<f64>, f64) {
 
 fn interval(estimated: &Estimated, scale: f64, unit: &str) -> String {
     let value = with_error(estimated.value, estimated.standard_error, scale);
-    let [low, high] = estimated.interval.map(|limit| limit * scale);
-    format!("{value} {unit}   (95 %: {low:.3} to {high:.3})")
+    let [low, high] = estimated.interval;
+    let ends = interval_text((low, Some(high)), estimated.standard_error, scale);
+    format!("{value} {unit}   (95 %: {ends})")
 }
 
 fn parameter(parameter: &Identifiable, scale: f64, unit: &str) -> String {

@@ -15,7 +15,7 @@ use tactile_imaging::elasticity::curve::{
 };
 use tactile_imaging::elasticity::modulus::EstimatorKind;
 use tactile_imaging::io::read_table;
-use tactile_imaging::pipeline::with_error;
+use tactile_imaging::pipeline::{interval_text, with_error};
 
 /// Measure Young's modulus from a force–indentation curve
 ///
@@ -398,12 +398,9 @@ fn print(found: &CurveSelection, points: usize, context: &mut Context) {
     let fit = found.chosen();
     // All limits in the unit of the value, so that they compare at a glance.
     let (scale, unit) = unit(fit.youngs_modulus_pa);
-    let lower = digits(fit.interval_95.lower * scale, 5);
-    let interval = match fit.interval_95.upper {
-        Some(upper) => format!("{lower} to {} {unit}", digits(upper * scale, 5)),
-        None => format!("above {lower} {unit}"),
-    };
-    let text = format!("{}   (95 %: {interval})", modulus(fit));
+    let ends = (fit.interval_95.lower, fit.interval_95.upper);
+    let ends = interval_text(ends, fit.standard_error_pa, scale);
+    let text = format!("{}   (95 %: {ends} {unit})", modulus(fit));
     context.row("Young's modulus", text);
     context.row("law", format_args!("{}: {}", fit.model, reason(found)));
     if fit.model_error > 0.0 {

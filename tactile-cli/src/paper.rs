@@ -10,7 +10,7 @@ use tactile_imaging::force::{CalibrationOptions, CalibrationPair, LinearCalibrat
 use tactile_imaging::matching::labelling::Compatibility;
 use tactile_imaging::matching::{AnnealedSoftassign, PointMatcher, RelaxationLabelling};
 use tactile_imaging::optics::{SensorParameters, SensorSpecification, acceptance_angle, led_cone};
-use tactile_imaging::pipeline::{EstimatorChoice, StagesConfig};
+use tactile_imaging::pipeline::{EstimatorChoice, StagesConfig, interval_text};
 use tactile_simulate::{
     CalibrationRun, ContactModel, ContactState, Elastic, ElasticSphere, PressLoad, PressOptions,
     PressScene, PressTruth, Trial,
@@ -354,17 +354,15 @@ fn moduli(trials: &[(&str, Trial)], dense: bool) -> Result<Experiment, Failure> 
         ));
         let estimate = measured.youngs_modulus_pa;
         let interval = measured.interval_95;
-        let upper = interval
-            .upper
-            .map_or("open".to_owned(), |u| digits(kpa(u), 4));
+        let ends = (interval.lower, interval.upper);
+        let ends = interval_text(ends, measured.standard_error_pa, 1e-3);
         rows.push(row(
             &format!("{name}, {:.0} kPa: default stages", kpa(truth)),
             "",
             format!(
-                "{} kPa ({:+.2} %), 95 %: {} to {upper}",
+                "{} kPa ({:+.2} %), 95 %: {ends}",
                 digits(kpa(estimate), 4),
                 percent(estimate),
-                digits(kpa(interval.lower), 4)
             ),
         ));
         printed_places.push([kpa(truth), kpa(printed)]);

@@ -10,7 +10,7 @@ use std::ffi::OsString;
 use std::fmt::Write;
 use std::io::Read;
 use std::path::{Path, PathBuf};
-use tactile_imaging::pipeline::{Flag, Measurement, Object, with_error};
+use tactile_imaging::pipeline::{Flag, Measurement, Object, interval_text, with_error};
 use tactile_imaging::scene::Scene;
 
 /// The page of a measurement: the modulus with its interval, cautions and what to do about them,
@@ -155,13 +155,8 @@ impl Report {
             Ok(found) => {
                 let value = with_error(found.value, found.standard_error, 1e-3);
                 self.answer(format!("Young's modulus {value} kPa"));
-                let [low, high] = [Some(found.interval_95.0), found.interval_95.1]
-                    .map(|end| end.map(|pa| format!("{:.2}", 1e-3 * pa)));
-                let low = low.unwrap_or_default();
-                self.answer(match high {
-                    Some(high) => format!("with 95 % confidence {low} to {high} kPa"),
-                    None => format!("with 95 % confidence above {low} kPa, without an upper bound"),
-                });
+                let ends = interval_text(found.interval_95, found.standard_error, 1e-3);
+                self.answer(format!("with 95 % confidence {ends} kPa"));
                 self.answer(format!("by the estimator {}", found.estimator));
                 for warning in &found.warnings {
                     let remedy = "The estimator assumes otherwise: compare the other estimators.";

@@ -2,7 +2,7 @@
 //! contact.
 
 use nalgebra::{Matrix3, Vector3};
-use ndarray::{ArrayView2, Axis, Slice};
+use ndarray::{ArrayView2, Axis, AxisDescription, Slice};
 use tactile_core::{BoundingBox, Estimate};
 
 use crate::frame::{TILE_COLUMNS, TILE_ROWS, TileSum};
@@ -483,7 +483,8 @@ pub(crate) fn median(values: &[f64], scratch: &mut Vec<f64>) -> f64 {
 }
 
 /// How far the light of a frame without contact is from the reference's, in grey levels: the mean
-/// difference of the block of 8 × 8 pixels where it is greatest.
+/// difference of the block of 8 × 8 pixels where it is greatest. The last blocks end at the frame's
+/// edge.
 ///
 /// `None` up to 4 grey levels, which noise may be, and for images that differ in size. A shift
 /// means other light, or that frame and reference were swapped. O(pixels).
@@ -497,18 +498,30 @@ pub(crate) fn median(values: &[f64], scratch: &mut Vec<f64>) -> f64 {
 /// assert_eq!(background_shift(frame.view(), reference.view()), None);
 /// frame.slice_mut(ndarray::s![8..24, 16..32]).fill(20);
 /// assert_eq!(background_shift(frame.view(), reference.view()), Some(-70.0));
+/// // A band of two columns at the right edge, in a block of eight.
+/// let mut frame = reference.clone();
+/// frame.slice_mut(ndarray::s![.., 48..]).fill(50);
+/// assert_eq!(background_shift(frame.view(), reference.view()), Some(-10.0));
 /// ```
 #[must_use]
 pub fn background_shift(frame: ArrayView2<'_, u8>, reference: ArrayView2<'_, u8>) -> Option<f64> {
-    if frame.dim() != reference.dim() {
+    if frame.dim() != reference.dim() || frame.is_empty() {
         return None;
     }
     // Smaller than contacts that can be measured, and large enough to average noise.
-    let side = [8.min(frame.nrows()), 8.min(frame.ncols())];
-    let blocks = frame.exact_chunks(side).into_iter();
+    let side = |length: usize| length.min(8);
+    let (height, width) = (side(frame.nrows()), side(frame.ncols()));
+    let starts = |length: usize| {
+        (0..length)
+            .step_by(8)
+            .map(move |s| s.min(length - side(length)))
+    };
+    let blocks = starts(frame.nrows()).flat_map(|row| starts(frame.ncols()).map(move |c| [row, c]));
     let shift = blocks
-        .zip(reference.exact_chunks(side))
-        .map(|(block, reference)| {
+        .map(|[row, column]| {
+            let sides = [row..row + height, column..column + width].map(Slice::from);
+            let part = |along: AxisDescription| sides[along.axis.index()];
+            let (block, reference) = (frame.slice_each_axis(part), reference.slice_each_axis(part));
             let both = block.iter().zip(reference);
             let sum: i32 = both.map(|(&f, &r)| i32::from(f) - i32::from(r)).sum();
             f64::from(sum) / block.len() as f64

@@ -2,7 +2,7 @@
 //! calibrated.
 
 use ndarray::{Array2, ArrayView2};
-use tactile_core::{Estimate, Requirement};
+use tactile_core::{Estimate, InvalidOption, Requirement};
 
 use crate::drift::{DriftCorrection, FitWorkspace, IlluminationDrift, fit, median};
 use crate::error::ForceError;
@@ -186,7 +186,10 @@ impl HealthOptions {
     /// # Errors
     /// Fewer than ten frames.
     pub fn with_baseline_frames(mut self, frames: usize) -> Result<Self, ForceError> {
-        Requirement::NonNegative.check("baseline_frames", frames as f64 - 10.0)?;
+        if frames < 10 {
+            let found = frames as f64;
+            return Err(InvalidOption::new("baseline_frames", found, "at least ten frames").into());
+        }
         self.baseline_frames = frames;
         Ok(self)
     }

@@ -155,8 +155,7 @@ pub(crate) fn crossing(n1: f64, n2: f64, sine: f64, cosine: f64) -> Option<(f64,
     let b = (margin * (n2 + n1 * sine)).sqrt();
     let a = n1 * cosine;
     let (s, p) = (a + b, n2 * cosine + n1 * (b / n2));
-    let two = 1.0 + 1.0;
-    Some((two * a * b * ((s * s).recip() + (p * p).recip()), b))
+    Some((2.0 * a * b * ((s * s).recip() + (p * p).recip()), b))
 }
 
 /// a·b − c·d with one rounding of each product removed (Kahan): the error is below 1.5 ulp of the

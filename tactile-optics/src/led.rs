@@ -134,11 +134,10 @@ impl Led {
     /// the slab's plane, and along the slab's normal. Returned with the weight of the direction,
     /// its share of the light but for a factor common to all.
     pub(crate) fn direction(&self, u: f64, v: f64, geometry: Geometry) -> ([f64; 3], f64) {
-        let one = 1.0;
         if geometry == Geometry::Section {
             // For a general m the integral of cosᵐ has no inverse in closed form. Angles are
             // therefore even and carry the intensity as weight.
-            let theta = (u + u - one) * self.half_angle;
+            let theta = (u + u - 1.0) * self.half_angle;
             return (
                 [theta.cos(), 0.0, theta.sin()],
                 theta.cos().max(0.0).powf(self.exponent),
@@ -146,13 +145,13 @@ impl Led {
         }
         // On the sphere the integral of cosᵐ θ sin θ inverts in closed form. All directions then
         // weigh the same.
-        let power = self.exponent + one;
+        let power = self.exponent + 1.0;
         let edge = self.half_angle.cos().max(0.0).powf(power);
-        let cosine = (one - u * (one - edge)).powf(power.recip());
+        let cosine = (1.0 - u * (1.0 - edge)).powf(power.recip());
         // As a product, because 1 − cos² loses half of the digits near the axis.
-        let sine = ((one - cosine) * (one + cosine)).max(0.0).sqrt();
+        let sine = ((1.0 - cosine) * (1.0 + cosine)).max(0.0).sqrt();
         let (across, up) = ((v + v) * PI).sin_cos();
-        ([cosine, sine * across, sine * up], one)
+        ([cosine, sine * across, sine * up], 1.0)
     }
 }
 

@@ -112,9 +112,8 @@ impl SensorSpecification {
         }
         within("noise of a pixel", p.pixel_noise_grey, 0.0, f64::MAX)?;
         // The variances of the frame and of the reference add, each that of the summed pixels.
-        let two = 1.0 + 1.0;
         let force_resolution_n =
-            sigmas * p.pixel_noise_grey * (two * p.summed_pixels).sqrt() * p.newton_per_grey;
+            sigmas * p.pixel_noise_grey * (2.0 * p.summed_pixels).sqrt() * p.newton_per_grey;
         Ok(Self {
             grid_elements: p.side_m / p.pixel_m,
             temporal_resolution_s: p.frame_rate_hz.recip(),

@@ -82,14 +82,13 @@ pub struct LedCone {
 /// ```
 pub fn normal_incidence(indices: &[f64], ambient: f64) -> Result<NormalIncidence, OpticsError> {
     checked(indices, ambient)?;
-    let four = 4.0;
     let (mut single_pass, mut reflected) = (1.0, 0.0);
     let mut before = ambient;
     for after in indices.iter().copied().chain(core::iter::once(ambient)) {
         let (sum, step) = (before + after, before - after);
         // Ratios stay below 1 where products of indices could overflow.
-        single_pass *= four * (before / sum) * (after / sum);
-        reflected += step / before * (step / after) / four;
+        single_pass *= 4.0 * (before / sum) * (after / sum);
+        reflected += step / before * (step / after) / 4.0;
         before = after;
     }
     Ok(NormalIncidence {

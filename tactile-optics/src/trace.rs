@@ -579,25 +579,25 @@ impl<S: TopSurface + ?Sized> Tracer<'_, '_, S> {
 
     /// Distance to and kind of the nearest obstacle: edge, face of the layer, or top.
     fn next(&self, ray: &Ray) -> (f64, Next) {
-        let (zero, [ux, _, uz]) = (0.0, ray.direction);
+        let [ux, _, uz] = ray.direction;
         // The slab has no sides: across its width a ray travels on without an obstacle.
         let edge = match ux {
-            u if u > zero => (self.slab.length - ray.position[0]) / u,
-            u if u < zero => ray.position[0] / -u,
+            u if u > 0.0 => (self.slab.length - ray.position[0]) / u,
+            u if u < 0.0 => ray.position[0] / -u,
             _ => f64::INFINITY,
         };
-        let mut nearest = (edge.max(zero), Next::Edge);
+        let mut nearest = (edge.max(0.0), Next::Edge);
         let mut offer = |distance: f64, next: Next| {
             if distance < nearest.0 {
-                nearest = (distance.max(zero), next);
+                nearest = (distance.max(0.0), next);
             }
         };
-        if uz < zero {
+        if uz < 0.0 {
             offer(
                 (self.slab.face(ray.layer + 1) - ray.position[2]) / uz,
                 Next::Down,
             );
-        } else if uz > zero && ray.layer > 0 {
+        } else if uz > 0.0 && ray.layer > 0 {
             offer((self.slab.face(ray.layer) - ray.position[2]) / uz, Next::Up);
         }
         // Only the top layer meets the deformed surface, which `new_tracer` keeps above its lower
@@ -608,31 +608,30 @@ impl<S: TopSurface + ?Sized> Tracer<'_, '_, S> {
         match self.meet_top(ray, nearest.0) {
             Meeting::At(distance) => (distance, Next::Top),
             Meeting::Missed => nearest,
-            Meeting::Undecided => (zero, Next::Nothing),
+            Meeting::Undecided => (0.0, Next::Nothing),
         }
     }
 
     /// Where the ray meets the top before the distance `limit`: the plane z = 0 outside the
     /// surface's support, the surface itself inside.
     fn meet_top(&self, ray: &Ray, limit: f64) -> Meeting {
-        let zero = 0.0;
         let ([x, _, z], [ux, _, uz]) = (ray.position, ray.direction);
         let [left, right] = self.surface.support();
-        let plane = if uz > zero {
-            ((-z) / uz).max(zero)
+        let plane = if uz > 0.0 {
+            ((-z) / uz).max(0.0)
         } else {
             f64::INFINITY
         };
         // The part of the path inside the support.
-        let (enter, leave) = if ux == zero {
+        let (enter, leave) = if ux == 0.0 {
             if x >= left && x <= right {
-                (zero, limit)
+                (0.0, limit)
             } else {
                 (f64::INFINITY, f64::INFINITY)
             }
         } else {
             let (a, b) = ((left - x) / ux, (right - x) / ux);
-            (a.min(b).max(zero), a.max(b))
+            (a.min(b).max(0.0), a.max(b))
         };
         let meets_plane = |distance: f64| {
             if distance <= limit {
@@ -643,7 +642,7 @@ impl<S: TopSurface + ?Sized> Tracer<'_, '_, S> {
         };
         // The flat top decides where the support is empty, lies behind the ray, or begins beyond
         // the crossing of z = 0.
-        if left >= right || leave <= zero || plane < enter {
+        if left >= right || leave <= 0.0 || plane < enter {
             return meets_plane(plane);
         }
         if enter > limit {
