@@ -1,7 +1,7 @@
 //! Colour differences against the reference, and the polynomial from them to normals.
 
 use ndarray::{Array2, ArrayView3};
-use pulp::Arch;
+use pulp::{Arch, Simd, WithSimd};
 
 /// Monomials up to the third degree of three colour differences.
 const MONOMIALS: usize = 20;
@@ -38,24 +38,15 @@ impl Blurred {
                 line[6 + width + k] = line[3 + width + k % 3];
             }
             // Neighbours of one channel lie three samples apart.
-            let taps = |k: usize| &line[3 * k..][..width];
-            let (a, b, c, d, e) = (taps(0), taps(1), taps(2), taps(3), taps(4));
-            for (i, out) in out.iter_mut().enumerate() {
-                // Not divided by 16: the sum of whole numbers is exact.
-                *out = a[i] + e[i] + 4 * (b[i] + d[i]) + 6 * c[i];
-            }
+            binomial([0, 1, 2, 3, 4].map(|k| &line[3 * k..][..width]), out);
         }
         let mut samples = vec![0_u16; rows * width];
-        for (row, row_out) in samples.chunks_exact_mut(width).enumerate() {
-            let at = |step: isize| {
-                let row = (row as isize + step).clamp(0, rows as isize - 1) as usize;
-                &across[row * width..][..width]
-            };
-            let (a, b, c, d, e) = (at(-2), at(-1), at(0), at(1), at(2));
-            for (i, out) in row_out.iter_mut().enumerate() {
-                // 255 · 256 is the largest sum.
-                *out = a[i] + e[i] + 4 * (b[i] + d[i]) + 6 * c[i];
-            }
+        for (row, out) in samples.chunks_exact_mut(width).enumerate() {
+            let near = |k: usize| (row + k).saturating_sub(2).min(rows - 1);
+            binomial(
+                [0, 1, 2, 3, 4].map(|k| &across[near(k) * width..][..width]),
+                out,
+            );
         }
         Self {
             rows,
@@ -111,6 +102,36 @@ impl Blurred {
             }
         }
     }
+}
+
+/// Runs a closure compiled for the widest instructions that the processor has. All it calls has to
+/// be inlined into it: a function of its own is compiled for the least processor.
+pub fn vectorised(work: impl FnMut()) {
+    struct Work<F>(F);
+    impl<F: FnMut()> WithSimd for Work<F> {
+        type Output = ();
+        #[inline(always)]
+        fn with_simd<S: Simd>(mut self, _: S) {
+            // As `FnMut`: called as `FnOnce`, a closure goes through a function of the standard
+            // library that is not inlined.
+            (self.0)();
+        }
+    }
+    Arch::new().dispatch(Work(work));
+}
+
+/// The sum with weights 1, 4, 6, 4, 1. It is not divided by 16: of whole numbers it is exact, and of
+/// two passes over 8-bit samples at most 255 · 256.
+fn binomial(taps: [&[u16]; 5], out: &mut [u16]) {
+    let [a, b, c, d, e] = taps.map(|tap| &tap[..out.len()]);
+    vectorised(
+        #[inline(always)]
+        || {
+            for (i, out) in out.iter_mut().enumerate() {
+                *out = a[i] + e[i] + 4 * (b[i] + d[i]) + 6 * c[i];
+            }
+        },
+    );
 }
 
 /// All monomials of one pixel's differences, from 1 to the third degree.
@@ -188,8 +209,7 @@ pub fn normals(
     let mut line: [Vec<f32>; 3] = core::array::from_fn(|_| vec![0.0; padded]);
     let mut out = [(); 2].map(|()| Array2::zeros((rows, columns)));
     let weight = |component: usize, k: usize| coefficients[component][k] as f32;
-    // The widest instructions that the processor has.
-    Arch::new().dispatch(
+    vectorised(
         #[inline(always)]
         || {
             for row in 0..rows {

@@ -14,7 +14,7 @@ use ndarray::{Array2, ArrayView3, Zip};
 use tactile_core::Requirement;
 
 pub use calibration::{BallPress, CircleFinding, PhotometricCalibration};
-use colour::{Blurred, TERMS, normals};
+use colour::{Blurred, TERMS, normals, vectorised};
 use contact::contact;
 
 use crate::domain::same_shape;
@@ -198,25 +198,18 @@ impl PhotometricStereo {
         let touched = contact(&normals);
         let [mut p, mut q] = normals;
         let mut errors = [Array2::zeros(p.dim()), Array2::zeros(p.dim())];
-        let [error_p, error_q] = &mut errors;
         let sd = self.model.normal_standard_error as f32;
-        Zip::from(&mut p)
-            .and(&mut q)
-            .and(error_p)
-            .and(error_q)
-            .for_each(|nx, ny, error_p, error_q| {
-                let sine = (*nx * *nx + *ny * *ny).sqrt();
-                // Both components shrink alike, so that the direction of the slope is kept.
-                let cut = STEEPEST / sine.max(STEEPEST);
-                let (x, y) = (*nx * cut, *ny * cut);
-                let up2 = 1.0 - x * x - y * y;
-                let (up, [xx, xy, yy]) = (up2.sqrt(), [x * x, x * y, y * y].map(|v| v / up2));
-                // The derivative of n/n_z by n is (1 + n nᵀ/n_z²)/n_z.
-                *error_p = sd / up * ((1.0 + xx).powi(2) + xy * xy).sqrt();
-                *error_q = sd / up * ((1.0 + yy).powi(2) + xy * xy).sqrt();
-                // Outward normals of the gel rise where depth falls.
-                (*nx, *ny) = (-x / up, -y / up);
-            });
+        let [error_p, error_q] = &mut errors;
+        let rows = p.outer_iter_mut().zip(q.outer_iter_mut());
+        let errors_of_rows = error_p.outer_iter_mut().zip(error_q.outer_iter_mut());
+        for ((mut p, mut q), (mut error_p, mut error_q)) in rows.zip(errors_of_rows) {
+            // Rows of arrays that were made here are slices.
+            let row = [&mut p, &mut q, &mut error_p, &mut error_q];
+            if let [Some(p), Some(q), Some(error_p), Some(error_q)] = row.map(|r| r.as_slice_mut())
+            {
+                slopes([p, q], [error_p, error_q], sd);
+            }
+        }
         let depth_m = self.depth([&p, &q], &touched)?;
         Ok(PhotometricReading {
             gradient: [p, q],
@@ -269,6 +262,31 @@ impl PhotometricStereo {
             });
         Ok(depth)
     }
+}
+
+/// Turns normals into slopes, and gives the standard errors of both for one of the normals.
+fn slopes(normals: [&mut [f32]; 2], errors: [&mut [f32]; 2], sd: f32) {
+    let [p, q] = normals;
+    let (q, [error_p, error_q]) = (&mut q[..p.len()], errors.map(|e| &mut e[..p.len()]));
+    vectorised(
+        #[inline(always)]
+        || {
+            for k in 0..p.len() {
+                let (nx, ny) = (p[k], q[k]);
+                let sine = (nx * nx + ny * ny).sqrt();
+                // Both components shrink alike, so that the direction of the slope is kept.
+                let cut = STEEPEST / sine.max(STEEPEST);
+                let (x, y) = (nx * cut, ny * cut);
+                let up2 = 1.0 - x * x - y * y;
+                let (up, [xx, xy, yy]) = (up2.sqrt(), [x * x, x * y, y * y].map(|v| v / up2));
+                // The derivative of n/n_z by n is (1 + n nᵀ/n_z²)/n_z.
+                error_p[k] = sd / up * ((1.0 + xx).powi(2) + xy * xy).sqrt();
+                error_q[k] = sd / up * ((1.0 + yy).powi(2) + xy * xy).sqrt();
+                // Outward normals of the gel rise where depth falls.
+                (p[k], q[k]) = (-x / up, -y / up);
+            }
+        },
+    );
 }
 
 impl<T: PixelScalar> SurfaceReconstruction<T> for PhotometricStereo {
