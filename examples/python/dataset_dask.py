@@ -68,15 +68,23 @@ def write(rows, results):
     os.replace(draft, part)
 
 
-def run(client, folder, results, rows_per_file=100):
-    """Measures what is left and writes it as it comes in."""
+def measure_all(folder, scenes):
+    return [measure(folder, scene) for scene in scenes]
+
+
+def run(client, folder, results, rows_per_file=100, scenes_per_task=20):
+    """Measures what is left and writes it as it comes in.
+
+    A scene may take ten milliseconds and a task costs the scheduler a few, hence some scenes a task.
+    """
     folder = Path(folder).resolve()
     scenes = left(folder, results)
-    futures = client.map(measure, [str(folder)] * len(scenes), scenes, pure=False)
+    tasks = [scenes[k : k + scenes_per_task] for k in range(0, len(scenes), scenes_per_task)]
+    futures = client.map(measure_all, [str(folder)] * len(tasks), tasks, pure=False)
     rows = []
     try:
-        for _, row in as_completed(futures, with_results=True):
-            rows.append(row)
+        for _, found in as_completed(futures, with_results=True):
+            rows += found
             if len(rows) >= rows_per_file:
                 write(rows, results)
                 rows = []
@@ -98,7 +106,7 @@ def main():
         with Client(given.scheduler) as client:
             count = run(client, given.scenes, given.results)
     else:
-        # One thread each: a process that is killed takes one scene with it.
+        # One thread each: a process that is killed takes one task with it.
         local = LocalCluster(n_workers=given.workers, threads_per_worker=1, dashboard_address=None)
         with local as cluster, Client(cluster) as client:
             count = run(client, given.scenes, given.results)

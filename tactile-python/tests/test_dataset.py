@@ -45,7 +45,7 @@ def test_a_killed_worker_loses_nothing_and_a_second_run_goes_on(folder, tmp_path
             write(rows, results)
 
         monkeypatch.setattr(dataset, "write", kill_and_write)
-        assert dataset.run(client, folder, results, rows_per_file=2) == 7
+        assert dataset.run(client, folder, results, rows_per_file=2, scenes_per_task=1) == 7
         assert not workers
         assert dataset.run(client, folder, results) == 0
     assert table(results) == serial
