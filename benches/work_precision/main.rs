@@ -5,12 +5,12 @@
 //! cargo bench -p tactile-benches --bench work_precision              # some minutes
 //! cargo bench -p tactile-benches --bench work_precision -- --quick   # under two minutes: fewer repeats, smaller problems
 //! cargo bench -p tactile-benches --bench work_precision -- matching  # one study
-//! cargo bench -p tactile-benches --bench work_precision -- --quick --within=1.5   # judged less strictly: a machine that is not ours alone
+//! cargo bench -p tactile-benches --bench work_precision -- --quick --within=1.5   # fails where a default lies further behind
 //! ```
 //! Writes `target/work_precision/STUDY.csv` and `.svg` (time on one axis, error on the other, the
-//! front drawn, defaults marked) and fails if a default lies more than 20 % behind the front of its
-//! study in time or in error, whichever is worse: if some setting is more than 1.2 times faster and
-//! no less accurate, or more than 1.2 times more accurate and no slower. With `--test` everything
+//! front drawn, defaults marked). A default is behind the front where some setting is more than 1.2
+//! times faster and no less accurate, or more than 1.2 times more accurate and no slower. With
+//! `--within=FACTOR` that factor counts, and such a default fails the run. With `--test` everything
 //! runs once and nothing is judged: one timing is none.
 #![allow(missing_docs, clippy::print_stdout)]
 
@@ -29,7 +29,7 @@ use std::path::Path;
 use std::process::ExitCode;
 use study::{Effort, Study};
 
-/// How far behind the front a default may lie, unless `--within=` says otherwise.
+/// How far behind the front a default may lie without a mark, unless `--within=` is given.
 const WITHIN: f64 = 1.2;
 
 /// A name and what fills the study of that name.
@@ -61,9 +61,8 @@ fn main() -> ExitCode {
     };
     let named: Vec<&String> = arguments.iter().filter(|a| !a.starts_with("--")).collect();
     let within = arguments.iter().find_map(|a| a.strip_prefix("--within="));
-    let within = within.map_or(WITHIN, |text| {
-        text.parse().expect("--within= a factor such as 1.5")
-    });
+    let within: Option<f64> =
+        within.map(|text| text.parse().expect("--within= a factor such as 1.5"));
     let folder = Path::new(concat!(
         env!("CARGO_MANIFEST_DIR"),
         "/../target/work_precision"
@@ -80,10 +79,10 @@ fn main() -> ExitCode {
             .write_csv(&folder.join(format!("{name}.csv")))
             .expect("a written table");
         picture::save(&study, &folder.join(format!("{name}.svg"))).expect("a written picture");
-        behind += study.judge(within);
+        behind += study.judge(within.unwrap_or(WITHIN));
     }
     println!("results in {}", folder.display());
-    if behind == 0 || effort == Effort::Once {
+    if behind == 0 || within.is_none() || effort == Effort::Once {
         ExitCode::SUCCESS
     } else {
         ExitCode::FAILURE

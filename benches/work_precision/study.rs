@@ -130,6 +130,10 @@ impl Study {
     /// Prints the table; returns how many defaults lie further behind the front than `within`.
     pub(crate) fn judge(&self, within: f64) -> usize {
         println!("\n{} ({})", self.name, self.error_label);
+        println!(
+            "  {:<16} {:<28} {:>13} {:>10} {:>6} verdict",
+            "option", "setting", "time", "error", "behind"
+        );
         let mut failures = 0;
         for e in &self.entries {
             let behind = self.behind(e);

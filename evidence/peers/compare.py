@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Run `tactile` and other packages on the same problems, in one run, and write one table of errors beside times.
 
-    cargo build --release --features cli
+    cargo build --release -p tactile-cli
     evidence/peers/compare.py                                    # synthetic cases, splines, slopes
     evidence/peers/compare.py --cases FOLDER --only matching     # also case files of yours, such as Chui and Rangarajan's
 
@@ -309,7 +309,7 @@ def markdown(rows, conditions):
 def main():
     options = arguments()
     if not options.program.is_file():
-        sys.exit(f"{options.program} is not there: cargo build --release --features cli")
+        sys.exit(f"{options.program} is not there: cargo build --release -p tactile-cli")
     in_environment(options)
     import importlib.metadata
 
