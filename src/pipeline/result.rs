@@ -233,9 +233,12 @@ impl Display for ModulusResult {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         let error = self.standard_error;
         write!(f, "{} kPa", with_error(self.value, error, 1e-3))?;
-        match self.interval_95 {
-            (low, None) if low <= 0.0 => f.write_str("   no interval: the errors are not known")?,
-            ends => write!(f, "   95 %: {} kPa", interval_text(ends, error, 1e-3))?,
+        let (low, high) = self.interval_95;
+        if high.is_some() || low > 0.0 {
+            let ends = interval_text((low, high), error, 1e-3);
+            write!(f, "   95 %: {ends} kPa")?;
+        } else {
+            f.write_str("   no interval: the errors are not known")?;
         }
         write!(f, "   ({})", self.estimator)
     }
@@ -457,6 +460,7 @@ impl Display for DriftWatch {
 /// use tactile_imaging::pipeline::with_error;
 /// assert_eq!(with_error(3.27124e-3, 4.1e-8, 1e3), "3.271240 ± 0.000041");
 /// assert_eq!(with_error(103_384.0, 140.0, 1e-3), "103.38 ± 0.14");
+/// assert_eq!(with_error(0.7, 0.0, 1.0), "0.7000");
 /// assert_eq!(with_error(0.7, 3e-17, 1.0), "0.7000");
 /// ```
 pub fn with_error(value: f64, error: f64, scale: f64) -> String {
@@ -486,13 +490,13 @@ pub fn interval_text(ends: (f64, Option<f64>), error: f64, scale: f64) -> String
 
 /// Decimals that show two significant digits of an error. `None` of an error that is not known, and
 /// of one beyond the twelfth decimal, which is rounding.
-fn decimals_of(error: f64) -> Option<usize> {
+pub(super) fn decimals_of(error: f64) -> Option<usize> {
     let decimals = (1.0 - error.log10().floor()).max(0.0) as usize;
     (error > 0.0 && error.is_finite() && decimals <= 12).then_some(decimals)
 }
 
-/// A number with so many decimals. Zero has no sign.
-fn fixed(value: f64, decimals: usize) -> String {
+/// A number with this number of decimals. Zero has no sign.
+pub(super) fn fixed(value: f64, decimals: usize) -> String {
     let text = format!("{value:.decimals$}");
     let is_zero = text.bytes().all(|c| matches!(c, b'-' | b'.' | b'0'));
     if is_zero {

@@ -1,5 +1,5 @@
 //! Whether the modulus changes over the time of a press.
-use super::result::{interval_text, with_error};
+use super::result::{decimals_of, fixed, interval_text, with_error};
 use crate::elasticity::modulus::{
     Estimate, Interval, LoadSeries, LoadState, ModulusEstimator, SharedErrors,
 };
@@ -88,10 +88,12 @@ impl Display for TimeResult {
 
 /// A value with its unit and its 95 % interval.
 fn within(value: f64, interval: Interval, scale: f64, unit: &str) -> String {
-    // A normal error of this interval: four of them are its width.
-    let error = interval.upper.map_or(value, |upper| upper - interval.lower) / 4.0;
-    let ends = interval_text((interval.lower, interval.upper), error, scale);
-    format!("{} {unit} (95 %: {ends})", with_error(value, error, scale))
+    // The digits are those of a quarter of its width, as of a normal error. The error itself is not
+    // known, so that none is printed.
+    let digits_of = interval.upper.map_or(value, |upper| upper - interval.lower) / 4.0;
+    let ends = interval_text((interval.lower, interval.upper), digits_of, scale);
+    let value = fixed(value * scale, decimals_of(digits_of * scale).unwrap_or(4));
+    format!("{value} {unit} (95 %: {ends})")
 }
 
 /// An error that is taken out, relative: an estimator without any error gives no interval.

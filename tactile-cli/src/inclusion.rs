@@ -364,17 +364,20 @@ fn rings(face_radius_m: f64) -> (Vec<f64>, f64) {
 
 fn interval(estimated: &Estimated, scale: f64, unit: &str) -> String {
     let value = with_error(estimated.value, estimated.standard_error, scale);
+    format!("{value} {unit}   (95 %: {})", ends(estimated, scale))
+}
+
+fn ends(estimated: &Estimated, scale: f64) -> String {
     let [low, high] = estimated.interval;
-    let ends = interval_text((low, Some(high)), estimated.standard_error, scale);
-    format!("{value} {unit}   (95 %: {ends})")
+    interval_text((low, Some(high)), estimated.standard_error, scale)
 }
 
 fn parameter(parameter: &Identifiable, scale: f64, unit: &str) -> String {
     match parameter {
         Identifiable::Yes(estimated) => interval(estimated, scale, unit),
         Identifiable::No(estimated) => {
-            let [low, high] = estimated.interval.map(|limit| limit * scale);
-            format!("cannot be told from these frames (95 %: {low:.2} to {high:.2} {unit})")
+            let ends = ends(estimated, scale);
+            format!("cannot be told from these frames (95 %: {ends} {unit})")
         }
     }
 }

@@ -152,20 +152,12 @@ impl PressScene {
         }
         let frames = (cycle.rest_s + cycle.period_s * cycle.cycles as f64) * cycle.frame_rate_hz;
         within("frames", frames, 0.0, 1e9)?;
-        let stream = FrameStream {
+        Ok(FrameStream {
             scene: self.clone(),
             cycle,
             next: 0,
             count: frames.ceil() as usize,
-        };
-        // Light changes steadily: where the last frame can be lit, all can.
-        let last = stream.load_at(frames / cycle.frame_rate_hz);
-        let most = PressLoad {
-            force_n: cycle.largest_force_n,
-            ..last
-        };
-        self.with_press(options.object, options.law.clone(), most)?;
-        Ok(stream)
+        })
     }
 }
 

@@ -200,15 +200,10 @@ impl PhotometricStereo {
         let mut errors = [Array2::zeros(p.dim()), Array2::zeros(p.dim())];
         let sd = self.model.normal_standard_error as f32;
         let [error_p, error_q] = &mut errors;
-        let rows = p.outer_iter_mut().zip(q.outer_iter_mut());
-        let errors_of_rows = error_p.outer_iter_mut().zip(error_q.outer_iter_mut());
-        for ((mut p, mut q), (mut error_p, mut error_q)) in rows.zip(errors_of_rows) {
-            // Rows of arrays that were made here are slices.
-            let row = [&mut p, &mut q, &mut error_p, &mut error_q];
-            if let [Some(p), Some(q), Some(error_p), Some(error_q)] = row.map(|r| r.as_slice_mut())
-            {
-                slopes([p, q], [error_p, error_q], sd);
-            }
+        // Arrays that were made here are slices.
+        let all = [&mut p, &mut q, error_p, error_q].map(|array| array.as_slice_mut());
+        if let [Some(p), Some(q), Some(error_p), Some(error_q)] = all {
+            slopes([p, q], [error_p, error_q], sd);
         }
         let depth_m = self.depth([&p, &q], &touched)?;
         Ok(PhotometricReading {
