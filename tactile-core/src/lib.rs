@@ -7,9 +7,11 @@ mod estimate;
 mod option;
 mod report;
 pub mod statistics;
+mod vectorised;
 
 pub use bounding_box::BoundingBox;
 pub use error::CustomError;
 pub use estimate::{Estimate, Interval};
 pub use option::{InvalidOption, Requirement};
 pub use report::{Polarity, Progress, StopReason};
+pub use vectorised::{Loop, vectorised};

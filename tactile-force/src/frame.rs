@@ -4,20 +4,9 @@ use std::ops::Range;
 
 use nalgebra::{SMatrix, SVector};
 use ndarray::{Array2, ArrayView2, Zip};
-use tactile_core::{BoundingBox, Requirement};
+use tactile_core::{BoundingBox, Requirement, vectorised};
 
 use crate::error::ForceError;
-
-/// Runs `work`, whose loops are compiled for AVX2 as well, and takes those where the processor has
-/// them. No result depends on it: sums are taken in the same order, and nothing is fused.
-#[inline]
-pub fn vectorized<W: pulp::NullaryFnOnce>(work: W) -> W::Output {
-    #[cfg(target_arch = "x86_64")]
-    if let Some(simd) = pulp::x86::V3::try_new() {
-        return simd.vectorize(work);
-    }
-    work.call()
-}
 
 /// Sums and extremes of the signed difference d = frame − reference of a whole frame, exact in
 /// integers.
@@ -158,18 +147,21 @@ impl NoiseModel {
         let mut counts = Counts::new();
         let mut lines = [0, 1, 2].map(|_| vec![0_i16; columns]);
         let mut scratch = [vec![0_i16; columns], vec![0_i16; columns]];
-        pulp::Arch::new().dispatch(|| {
-            for (row, pixels) in frame.rows().into_iter().enumerate() {
-                lines.rotate_left(1);
-                match pixels.as_slice() {
-                    Some(pixels) => widen(pixels.iter(), &mut lines[2]),
-                    None => widen(pixels.iter(), &mut lines[2]),
+        vectorised(
+            #[inline(always)]
+            || {
+                for (row, pixels) in frame.rows().into_iter().enumerate() {
+                    lines.rotate_left(1);
+                    match pixels.as_slice() {
+                        Some(pixels) => widen(pixels.iter(), &mut lines[2]),
+                        None => widen(pixels.iter(), &mut lines[2]),
+                    }
+                    if row >= 2 && columns >= 3 {
+                        counts.add(respond(&lines, &mut scratch));
+                    }
                 }
-                if row >= 2 && columns >= 3 {
-                    counts.add(respond(&lines, &mut scratch));
-                }
-            }
-        });
+            },
+        );
         let histogram = counts.histogram();
         Self {
             read_variance: (trimmed_variance(&histogram) / 36.0).max(QUANTISATION),
@@ -1145,51 +1137,57 @@ impl Pair<'_> {
     fn differences(&self, tile: usize) -> [u8; 2] {
         let at = self.frame.tiles.pixels(tile, self.size);
         let images = [self.frame.image, self.reference.image];
-        vectorized(|| {
-            let (mut above, mut below) = ([0_u8; TILE_COLUMNS], [0_u8; TILE_COLUMNS]);
-            for row in at.row_start..at.row_end {
-                let first = row * self.size.1;
-                let span = first + at.column_start..first + at.column_end;
-                let [f, r] = images.map(|image| &image[span.clone()]);
-                // Whole tiles, as nearly all are, take wide instructions.
-                match (
-                    <&[u8; TILE_COLUMNS]>::try_from(f),
-                    <&[u8; TILE_COLUMNS]>::try_from(r),
-                ) {
-                    (Ok(f), Ok(r)) => {
-                        for k in 0..TILE_COLUMNS {
-                            above[k] = above[k].max(f[k].saturating_sub(r[k]));
-                            below[k] = below[k].max(r[k].saturating_sub(f[k]));
+        vectorised(
+            #[inline(always)]
+            || {
+                let (mut above, mut below) = ([0_u8; TILE_COLUMNS], [0_u8; TILE_COLUMNS]);
+                for row in at.row_start..at.row_end {
+                    let first = row * self.size.1;
+                    let span = first + at.column_start..first + at.column_end;
+                    let [f, r] = images.map(|image| &image[span.clone()]);
+                    // Whole tiles, as nearly all are, take wide instructions.
+                    match (
+                        <&[u8; TILE_COLUMNS]>::try_from(f),
+                        <&[u8; TILE_COLUMNS]>::try_from(r),
+                    ) {
+                        (Ok(f), Ok(r)) => {
+                            for k in 0..TILE_COLUMNS {
+                                above[k] = above[k].max(f[k].saturating_sub(r[k]));
+                                below[k] = below[k].max(r[k].saturating_sub(f[k]));
+                            }
                         }
-                    }
-                    _ => {
-                        for (k, (f, r)) in f.iter().zip(r).enumerate() {
-                            above[k] = above[k].max(f.saturating_sub(*r));
-                            below[k] = below[k].max(r.saturating_sub(*f));
+                        _ => {
+                            for (k, (f, r)) in f.iter().zip(r).enumerate() {
+                                above[k] = above[k].max(f.saturating_sub(*r));
+                                below[k] = below[k].max(r.saturating_sub(*f));
+                            }
                         }
                     }
                 }
-            }
-            [above, below].map(|lanes| lanes.into_iter().fold(0, u8::max))
-        })
+                [above, below].map(|lanes| lanes.into_iter().fold(0, u8::max))
+            },
+        )
     }
 }
 
 /// The greatest a − b of two lists of numbers, zero if negative.
 fn excess(a: &[u8], b: &[u8]) -> u8 {
-    vectorized(|| {
-        let (a, rest_of_a) = a.as_chunks::<16>();
-        let (b, rest_of_b) = b.as_chunks::<16>();
-        let mut lanes = [0_u8; 16];
-        for (a, b) in a.iter().zip(b) {
-            for k in 0..16 {
-                lanes[k] = lanes[k].max(a[k].saturating_sub(b[k]));
+    vectorised(
+        #[inline(always)]
+        || {
+            let (a, rest_of_a) = a.as_chunks::<16>();
+            let (b, rest_of_b) = b.as_chunks::<16>();
+            let mut lanes = [0_u8; 16];
+            for (a, b) in a.iter().zip(b) {
+                for k in 0..16 {
+                    lanes[k] = lanes[k].max(a[k].saturating_sub(b[k]));
+                }
             }
-        }
-        let rest = rest_of_a.iter().zip(rest_of_b);
-        let rest = rest.map(|(a, b)| a.saturating_sub(*b));
-        lanes.into_iter().chain(rest).fold(0, u8::max)
-    })
+            let rest = rest_of_a.iter().zip(rest_of_b);
+            let rest = rest.map(|(a, b)| a.saturating_sub(*b));
+            lanes.into_iter().chain(rest).fold(0, u8::max)
+        },
+    )
 }
 
 /// Shrinks a box of whole tiles to the pixels with |frame − reference| > threshold. Both images lie
@@ -1199,46 +1197,49 @@ fn tighten(mut tight: BoundingBox, images: [&[u8]; 2], width: usize, threshold: 
         let span = row * width + columns.start..row * width + columns.end;
         images.map(|image| &image[span.clone()])
     };
-    vectorized(|| {
-        let is_over = |at: usize, tight: &BoundingBox| {
-            let [f, r] = row(at, tight.column_start..tight.column_end);
-            let differences = f.iter().zip(r).map(|(f, r)| f.abs_diff(*r));
-            differences.fold(0, u8::max) > threshold
-        };
-        while tight.rows() > 1 && !is_over(tight.row_start, &tight) {
-            tight.row_start += 1;
-        }
-        while tight.rows() > 1 && !is_over(tight.row_end - 1, &tight) {
-            tight.row_end -= 1;
-        }
-        // Greatest |frame − reference| of every column of a strip, at most a tile wide.
-        let greatest = |strip: Range<usize>| {
-            let mut greatest = [0_u8; TILE_COLUMNS];
-            for at in tight.row_start..tight.row_end {
-                let [f, r] = row(at, strip.clone());
-                for ((greatest, f), r) in greatest.iter_mut().zip(f).zip(r) {
-                    *greatest = f.abs_diff(*r).max(*greatest);
-                }
+    vectorised(
+        #[inline(always)]
+        || {
+            let is_over = |at: usize, tight: &BoundingBox| {
+                let [f, r] = row(at, tight.column_start..tight.column_end);
+                let differences = f.iter().zip(r).map(|(f, r)| f.abs_diff(*r));
+                differences.fold(0, u8::max) > threshold
+            };
+            while tight.rows() > 1 && !is_over(tight.row_start, &tight) {
+                tight.row_start += 1;
             }
-            greatest.map(|level| level > threshold)
-        };
-        // The outermost tile of a side has the pixel looked for, or the box had been smaller.
-        let (start, end) = (tight.column_start, tight.column_end);
-        let width = (end - start).min(TILE_COLUMNS);
-        if let Some(at) = greatest(start..start + width)[..width]
-            .iter()
-            .position(|over| *over)
-        {
-            tight.column_start = start + at;
-        }
-        if let Some(at) = greatest(end - width..end)[..width]
-            .iter()
-            .rposition(|over| *over)
-        {
-            tight.column_end = end - width + at + 1;
-        }
-        tight
-    })
+            while tight.rows() > 1 && !is_over(tight.row_end - 1, &tight) {
+                tight.row_end -= 1;
+            }
+            // Greatest |frame − reference| of every column of a strip, at most a tile wide.
+            let greatest = |strip: Range<usize>| {
+                let mut greatest = [0_u8; TILE_COLUMNS];
+                for at in tight.row_start..tight.row_end {
+                    let [f, r] = row(at, strip.clone());
+                    for ((greatest, f), r) in greatest.iter_mut().zip(f).zip(r) {
+                        *greatest = f.abs_diff(*r).max(*greatest);
+                    }
+                }
+                greatest.map(|level| level > threshold)
+            };
+            // The outermost tile of a side has the pixel looked for, or the box had been smaller.
+            let (start, end) = (tight.column_start, tight.column_end);
+            let width = (end - start).min(TILE_COLUMNS);
+            if let Some(at) = greatest(start..start + width)[..width]
+                .iter()
+                .position(|over| *over)
+            {
+                tight.column_start = start + at;
+            }
+            if let Some(at) = greatest(end - width..end)[..width]
+                .iter()
+                .rposition(|over| *over)
+            {
+                tight.column_end = end - width + at + 1;
+            }
+            tight
+        },
+    )
 }
 
 #[cfg(test)]

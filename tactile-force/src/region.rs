@@ -6,11 +6,11 @@
 use std::ops::Range;
 
 use ndarray::ArrayView2;
-use tactile_core::BoundingBox;
+use tactile_core::{BoundingBox, Loop, vectorised};
 
 use crate::drift::{DriftLine, IlluminationDrift};
 use crate::frame::{
-    DifferenceNoise, FlatField, FlatLine, Levels, ReferenceFrame, trimmed_variance, vectorized,
+    DifferenceNoise, FlatField, FlatLine, Levels, ReferenceFrame, trimmed_variance,
 };
 
 /// Differences over one box, row-major, and the contact in it as runs.
@@ -90,11 +90,14 @@ impl Region {
         };
         self.mask.clear();
         let mask = &mut self.mask;
-        vectorized(|| {
-            for (y, row) in smooth.chunks(columns).enumerate() {
-                push_runs(mask, y, row, |s| *s > limit);
-            }
-        });
+        vectorised(
+            #[inline(always)]
+            || {
+                for (y, row) in smooth.chunks(columns).enumerate() {
+                    push_runs(mask, y, row, |s| *s > limit);
+                }
+            },
+        );
         let (kept, others) = self.components.keep_largest(&mut self.mask, notable);
         let filled = self
             .components
@@ -236,7 +239,7 @@ impl Rows<'_> {
                     sign: self.sign,
                     differences,
                 };
-                greatest = larger(greatest, vectorized(row));
+                greatest = larger(greatest, vectorised(row));
             };
             match (frame.to_slice(), levels.to_slice()) {
                 (Some(frame), Some(levels)) => take(frame, levels),
@@ -257,11 +260,11 @@ struct Row<'a, P> {
     differences: &'a mut [f32],
 }
 
-impl<P: Copy + Into<f32>> pulp::NullaryFnOnce for Row<'_, P> {
+impl<P: Copy + Into<f32>> Loop for Row<'_, P> {
     type Output = f32;
 
     #[inline(always)]
-    fn call(self) -> f32 {
+    fn run(self) -> f32 {
         let Self {
             differences, sign, ..
         } = self;
@@ -291,7 +294,10 @@ impl<P: Copy + Into<f32>> pulp::NullaryFnOnce for Row<'_, P> {
 
 /// Greatest of the values, zero if none is positive.
 pub fn greatest(values: &[f32]) -> f32 {
-    vectorized(|| greatest_of(values))
+    vectorised(
+        #[inline(always)]
+        || greatest_of(values),
+    )
 }
 
 #[inline(always)]
@@ -604,11 +610,14 @@ pub fn gain(region: &Region, workspace: &mut NoiseWorkspace, background: f64, pe
         bends.clear();
         bends.resize(span.len(), 0.0);
         let (up, down) = (line(row - 1), line(row + 1));
-        vectorized(|| {
-            for (((bend, up), here), down) in bends.iter_mut().zip(up).zip(here).zip(down) {
-                *bend = up - 2.0 * here + down;
-            }
-        });
+        vectorised(
+            #[inline(always)]
+            || {
+                for (((bend, up), here), down) in bends.iter_mut().zip(up).zip(here).zip(down) {
+                    *bend = up - 2.0 * here + down;
+                }
+            },
+        );
         // Walked by the iterator itself: a loop over two chained parts tests at every step which of
         // them it is in.
         every_column.within(inner).for_each(|column| {
@@ -718,7 +727,7 @@ impl Sums {
         }
         columns.clear();
         columns.resize(region.columns(), 0.0);
-        let [d, dy, dyy] = vectorized(Moments { region, columns });
+        let [d, dy, dyy] = vectorised(Moments { region, columns });
         let (mut dx, mut dxx) = (0.0, 0.0);
         for (x, column) in columns.iter().enumerate() {
             let x = x as f64;
@@ -773,11 +782,11 @@ struct Moments<'a> {
     columns: &'a mut [f64],
 }
 
-impl pulp::NullaryFnOnce for Moments<'_> {
+impl Loop for Moments<'_> {
     type Output = [f64; 3];
 
     #[inline(always)]
-    fn call(self) -> [f64; 3] {
+    fn run(self) -> [f64; 3] {
         const LANES: usize = 8;
         let width = self.region.columns();
         let mut moments = [0.0; 3];

@@ -24,8 +24,8 @@ use crate::{
     AssignmentWorkspace, MatchError, MatchReport, Matching, PointMatcher, SoftMatches, StopReason,
     unmatched_rows,
 };
-use crate::{Loop, vectorised};
 use nalgebra::{Cholesky, DMatrix, Dyn, Point, SMatrix, SVector, VecStorage};
+use tactile_core::{Loop, vectorised};
 use tactile_tps::{Affine, Warp};
 
 /// How the model may move.

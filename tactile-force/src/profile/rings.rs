@@ -2,8 +2,8 @@
 
 use std::ops::Range;
 
-use crate::frame::vectorized;
 use crate::region::Region;
+use tactile_core::{Loop, vectorised};
 
 /// Rings a quarter of a pixel wide at the contact's edge, one pixel further in and four pixels
 /// where the profile hardly bends. Reused from fit to fit.
@@ -57,7 +57,7 @@ impl Rings {
         // work_precision -- force` shows the error.
         let wide = inside(20.0);
         let pixels = std::f64::consts::PI * wide * wide / aspect;
-        vectorized(Gather {
+        vectorised(Gather {
             rings,
             taken,
             region,
@@ -198,11 +198,11 @@ impl Gather<'_> {
     }
 }
 
-impl pulp::NullaryFnOnce for Gather<'_> {
+impl Loop for Gather<'_> {
     type Output = ();
 
     #[inline(always)]
-    fn call(mut self) {
+    fn run(mut self) {
         self.clear();
         let aperture = &self.region.aperture;
         let (Some(first), Some(last)) = (aperture.first(), aperture.last()) else {

@@ -8,9 +8,9 @@
 //! neighbours of a cube's centre. Points between two sectors of the plane count for both in
 //! proportion, so that a small turn changes the histogram a little.
 
-use crate::vectorised;
 use crate::{MatchError, error};
 use nalgebra::Point;
+use tactile_core::vectorised;
 
 /// Radial bins: the outermost ends at the largest radius, each further one at half the radius.
 const SHELLS: usize = 5;

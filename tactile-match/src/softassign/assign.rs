@@ -2,7 +2,7 @@
 //! near targets.
 
 use super::{AllMoments, Gaussian, RowMoments, SoftAssignment};
-use crate::vectorised;
+use tactile_core::vectorised;
 
 // Soft assignment: the match matrix M from distances, made doubly stochastic with slack (Sinkhorn).
 //

@@ -4,8 +4,8 @@ use super::anneal::median_of_chi_squared;
 use super::confidence::CLEAN_SIGMA;
 use super::model::cholesky;
 use super::{AnnealedSoftassign, Search, SoftassignWorkspace, State, Transformation};
-use crate::vectorised;
 use nalgebra::{Matrix4, Matrix4x3, RowVector4, SVector, Vector3};
+use tactile_core::vectorised;
 
 // An annealing run ends at a thousandth of the radius, since the factor of its prior leaves out as
 // much. Pairs are decided there, and what is left is either the rounding of clean data or noise.

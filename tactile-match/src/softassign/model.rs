@@ -2,8 +2,8 @@
 //! scales, and rigid motions in its place.
 
 use super::{Axes, PriorScales, Regression, Request, State, Transformation};
-use crate::vectorised;
 use nalgebra::{Matrix3, Point, SMatrix, SVector, Vector3};
+use tactile_core::vectorised;
 use tactile_tps::Affine;
 
 // The prior on warps: a Gaussian process, kept as a low-rank factor.

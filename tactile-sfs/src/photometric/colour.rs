@@ -1,7 +1,7 @@
 //! Colour differences against the reference, and the polynomial from them to normals.
 
 use ndarray::{Array2, ArrayView3};
-use pulp::{Arch, Simd, WithSimd};
+use tactile_core::vectorised;
 
 /// Monomials up to the third degree of three colour differences.
 const MONOMIALS: usize = 20;
@@ -102,22 +102,6 @@ impl Blurred {
             }
         }
     }
-}
-
-/// Runs a closure compiled for the widest instructions that the processor has. All it calls has to
-/// be inlined into it: a function of its own is compiled for the least processor.
-pub fn vectorised(work: impl FnMut()) {
-    struct Work<F>(F);
-    impl<F: FnMut()> WithSimd for Work<F> {
-        type Output = ();
-        #[inline(always)]
-        fn with_simd<S: Simd>(mut self, _: S) {
-            // As `FnMut`: called as `FnOnce`, a closure goes through a function of the standard
-            // library that is not inlined.
-            (self.0)();
-        }
-    }
-    Arch::new().dispatch(Work(work));
 }
 
 /// The sum with weights 1, 4, 6, 4, 1. It is not divided by 16: of whole numbers it is exact, and of

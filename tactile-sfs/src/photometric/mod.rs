@@ -11,10 +11,10 @@ mod colour;
 mod contact;
 
 use ndarray::{Array2, ArrayView3, Zip};
-use tactile_core::Requirement;
+use tactile_core::{Requirement, vectorised};
 
 pub use calibration::{BallPress, CircleFinding, PhotometricCalibration};
-use colour::{Blurred, TERMS, normals, vectorised};
+use colour::{Blurred, TERMS, normals};
 use contact::contact;
 
 use crate::domain::same_shape;

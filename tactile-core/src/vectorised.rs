@@ -1,0 +1,49 @@
+//! Loops compiled for the instructions that the processor has.
+
+/// A loop: a closure, or a type of its own. Mark closure or `run`, and what it calls,
+/// `#[inline(always)]`: a function that is not inlined is compiled for the least processor.
+pub trait Loop {
+    /// What it gives.
+    type Output;
+
+    /// Runs it.
+    fn run(self) -> Self::Output;
+}
+
+impl<R, F: FnMut() -> R> Loop for F {
+    type Output = R;
+    #[inline(always)]
+    fn run(mut self) -> R {
+        // As `FnMut`: called as `FnOnce`, a closure goes through a function of the standard library
+        // that is not inlined.
+        self()
+    }
+}
+
+struct Vectorised<L>(L);
+
+impl<L: Loop> pulp::WithSimd for Vectorised<L> {
+    type Output = L::Output;
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, _: S) -> L::Output {
+        self.0.run()
+    }
+}
+
+/// Runs a loop compiled for the widest instructions that the processor has.
+///
+/// The loop is plain Rust without fused operations: wider registers change its speed, not one bit
+/// of its result.
+///
+/// ```
+/// use tactile_core::vectorised;
+/// let (a, mut b) = ([1.0_f32; 100], [0.5_f32; 100]);
+/// vectorised(
+///     #[inline(always)]
+///     || b.iter_mut().zip(&a).for_each(|(b, a)| *b += a),
+/// );
+/// assert_eq!(b, [1.5; 100]);
+/// ```
+pub fn vectorised<L: Loop>(work: L) -> L::Output {
+    pulp::Arch::new().dispatch(Vectorised(work))
+}
