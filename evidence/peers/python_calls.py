@@ -6,6 +6,7 @@
 Times are processor times of the thread, the least of the rounds.
 """
 import time
+from itertools import cycle
 
 import numpy as np
 import packages
@@ -25,12 +26,13 @@ def least(call, rounds, calls=1):
 
 
 def sessions():
-    """A frame so small that the call is all there is, and a full one."""
+    """A frame so small that the call is all there is, and the full ones of `force_of_a_frame`, which
+    `cargo bench --bench pipeline` times."""
     for coarser, rounds in ((64, 200), (1, 200)):
-        scene = ti.simulate(coarser=coarser)
+        scene = ti.simulate(coarser=coarser, physics="hertz")
         session = ti.Session(ti.pipeline_of(scene), [scene.reference])
-        session.push(scene.frames[0])
-        seconds = least(lambda: session.push(scene.frames[1]), rounds, 2000 // rounds)
+        frames = cycle(scene.frames)
+        seconds = least(lambda: session.push(next(frames)), rounds, 2000 // rounds)
         print(f"session, frame of {scene.reference.shape}: {seconds * 1e6:.1f} µs")
 
 
