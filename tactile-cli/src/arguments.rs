@@ -41,6 +41,13 @@ pub fn lump_mm(text: &str) -> Result<f64, String> {
     number(text, |mm| (0.5..=200.0).contains(&mm), expected)
 }
 
+/// An argument that is an inclusion's modulus over that around it. Within a tenth of one it does
+/// not show.
+pub fn contrast(text: &str) -> Result<f64, String> {
+    let fits = |ratio: f64| (1.1..=1e3).contains(&ratio) || (1e-3..=0.9).contains(&ratio);
+    number(text, fits, "a ratio from 1.1 to 1000, or from 0.001 to 0.9")
+}
+
 /// An argument that is a modulus in kilopascals.
 pub fn modulus_kpa(text: &str) -> Result<f64, String> {
     physical(text, InputQuantity::Modulus, 1e3, "kPa")

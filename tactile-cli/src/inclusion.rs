@@ -1,6 +1,7 @@
 //! `tactile inclusion`: size, depth and stiffness of a lump under the surface of a block.
-use crate::arguments::{lump_mm, modulus_kpa};
+use crate::arguments::{contrast, lump_mm, modulus_kpa};
 use crate::console::{Bar, Context, Exit, Failure};
+use crate::hidden::Hidden;
 use crate::outputs::Csv;
 use crate::plot::{Colour, Page, Panel, circle};
 use clap::Args;
@@ -86,6 +87,11 @@ pub struct InclusionArguments {
         conflicts_with = "scene"
     )]
     seed: u64,
+    /// Also compute how large a ball could be there without being found, place by place. RATIO is
+    /// its modulus over the tissue's.
+    #[arg(long, value_name = "RATIO", requires = "scene", conflicts_with = "design",
+          value_parser = contrast, allow_negative_numbers = true)]
+    hidden: Option<f64>,
 }
 
 /// The input of a search, and the truth where it is known.
@@ -243,8 +249,20 @@ pub fn run(arguments: &InclusionArguments, context: &mut Context) -> Result<Exit
         Err(error @ ElasticityError::NoSolution) => return Err(Failure::no_answer(error)),
         Err(error) => return Err(unusable(file, &error)),
     };
+    let hidden = match (arguments.hidden, &scan.loaded) {
+        (Some(contrast), Some(loaded)) => Some(Hidden::new(&search, loaded, contrast, context)),
+        _ => None,
+    };
+    let hidden = match hidden.transpose() {
+        Ok(hidden) => hidden,
+        Err(ElasticityError::Cancelled) => return Ok(Exit::Interrupted),
+        Err(error) => return Err(unusable(file, &error)),
+    };
     let is_asymmetric = !asymmetry_warnings(scan.asymmetry, scan.harmonics).is_empty();
     print(&estimate, &scan, context);
+    if let Some(hidden) = &hidden {
+        hidden.print(context);
+    }
     for warning in &estimate.warnings {
         let numbers = json!(warning);
         let kind = numbers["kind"].as_str().unwrap_or_default().to_owned();
@@ -256,10 +274,12 @@ pub fn run(arguments: &InclusionArguments, context: &mut Context) -> Result<Exit
         "inclusions": estimate.inclusions(),
         "block_modulus_pa": estimate.block_modulus_pa, "interface": estimate.interface,
         "misfit": estimate.misfit, "asymmetry": scan.asymmetry, "harmonics": scan.harmonics,
-        "is_asymmetric": is_asymmetric,
+        "is_asymmetric": is_asymmetric, "hidden": hidden,
     }));
     context.outputs.add(names[0], table(&estimate, &scan));
-    context.outputs.page(names[1], || page(&estimate, &scan))?;
+    context
+        .outputs
+        .page(names[1], || page(&estimate, &scan, hidden.as_ref()))?;
     Ok(Exit::Complete)
 }
 
@@ -477,7 +497,7 @@ fn table(estimate: &InclusionEstimate, scan: &Scan) -> Vec<u8> {
     csv.into_bytes()
 }
 
-fn page(estimate: &InclusionEstimate, scan: &Scan) -> Page {
+fn page(estimate: &InclusionEstimate, scan: &Scan, hidden: Option<&Hidden>) -> Page {
     let axes = |title, y| Panel::new(title, "distance from the axis (mm)", y);
     let mut pressures = axes("Pressure on the guide's face", "pressure (Pa)");
     let mut residuals = axes("Residuals of all frames", "measured − fitted (Pa)");
@@ -505,12 +525,13 @@ fn page(estimate: &InclusionEstimate, scan: &Scan) -> Page {
         };
         residuals = residuals.points(curve(&rest), Colour::Blue, "");
     }
-    let panels = vec![
+    let mut panels = vec![
         pressures,
         residuals,
         section(scan, estimate),
         above(scan, estimate),
     ];
+    panels.extend(hidden.into_iter().flat_map(Hidden::panels));
     Page::new("Inclusion under the surface", 2, panels)
 }
 

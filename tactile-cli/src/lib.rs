@@ -12,6 +12,7 @@ mod console;
 mod depth;
 mod force;
 mod frames;
+mod hidden;
 mod inclusion;
 mod indent;
 mod light;

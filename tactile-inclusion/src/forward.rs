@@ -451,18 +451,21 @@ impl Forward {
             let near = near.and_then(|near| near.second.as_deref());
             solved.second = Some(Box::new(self.solve_near(&parameters.swapped(), near)?));
         }
+        let prediction = self.of_solved(parameters, &solved);
+        Some((prediction, solved))
+    }
+
+    /// The pressures and forces of a block solved with its inclusions under the axis, at the places
+    /// that `parameters` have for them.
+    pub fn of_solved(&self, parameters: &Parameters, solved: &Solved) -> Prediction {
         let states = solved.frames.states();
-        let of_second = solved
-            .second
-            .as_ref()
-            .map_or(states, |second| second.frames.states());
-        let prediction = self.collect(
+        let of_second = (solved.second.as_ref()).map_or(states, |second| second.frames.states());
+        self.collect(
             parameters,
             &|frame, radius| states[frame].pressure_at(radius),
             &|frame, radius| of_second[frame].pressure_at(radius),
             &|frame| states[frame].force_n(),
-        );
-        Some((prediction, solved))
+        )
     }
 
     /// The block with the first inclusion under the axis, from a scene solved nearby.

@@ -22,7 +22,7 @@ use crate::fit::{Fit, Problem};
 use crate::forward::Coordinate;
 use crate::ridge::Marginal;
 use crate::search::GridStart;
-use nalgebra::{DMatrix, DVector, Vector2};
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Vector2};
 use tactile_fem::Interface;
 
 /// Fall of the objective without which an inclusion is not that probable, 2 ln(p / (1 − p)). The
@@ -307,6 +307,44 @@ fn hull(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
     [a[0].min(b[0]), a[1].max(b[1])]
 }
 
+/// A homogeneous fit and its derivatives, to weigh changes of its pressures by.
+pub struct PlainFit {
+    predicted: Vec<f64>,
+    /// Whitened derivatives by the block's parameters.
+    columns: DMatrix<f64>,
+    gradient: DVector<f64>,
+    precision: Cholesky<f64, Dyn>,
+}
+
+impl PlainFit {
+    /// `None` where the fit has no derivatives.
+    pub fn new(problem: &Problem, fit: &Fit) -> Option<Self> {
+        let normal = problem.normal(&fit.parameters, Some(&fit.solved))?;
+        Some(Self {
+            columns: DMatrix::from_columns(&normal.columns),
+            precision: normal.matrix.cholesky()?,
+            gradient: normal.gradient,
+            predicted: normal.predicted,
+        })
+    }
+
+    /// The whitened change of the values by relative changes.
+    pub fn added(&self, problem: &Problem, relative: &[f64]) -> DVector<f64> {
+        let added = relative
+            .iter()
+            .zip(&self.predicted)
+            .map(|(part, p)| part * p);
+        problem.whitened(DVector::from_iterator(self.predicted.len(), added))
+    }
+
+    /// Fall of χ² by a whitened change where it is there, less what the block's own parameters take
+    /// up of it: sᵀ Q s.
+    pub fn gain(&self, added: &DVector<f64>) -> f64 {
+        let shared = self.columns.tr_mul(added);
+        added.norm_squared() - shared.dot(&self.precision.solve(&shared))
+    }
+}
+
 /// What a grid of inclusions would change of a homogeneous fit.
 #[derive(Debug, Clone, Copy)]
 pub struct Score {
@@ -319,19 +357,15 @@ pub struct Score {
 impl Score {
     /// Of a fit without inclusion. `None` where it has no derivatives.
     pub fn new(problem: &Problem, homogeneous: &Fit, grid: &[GridStart]) -> Option<Self> {
-        let normal = problem.normal(&homogeneous.parameters, Some(&homogeneous.solved))?;
-        let residual = problem.whitened(problem.residual(&normal.predicted));
-        let columns = DMatrix::from_columns(&normal.columns);
-        let precision = normal.matrix.cholesky()?;
+        let plain = PlainFit::new(problem, homogeneous)?;
+        let residual = problem.whitened(problem.residual(&plain.predicted));
         // What the homogeneous block's own parameters cannot take up.
-        let left = &residual - &columns * precision.solve(&normal.gradient);
+        let left = &residual - &plain.columns * plain.precision.solve(&plain.gradient);
         let mut odds = Vec::new();
         let mut predicted_gain = 0.0f64;
         for start in grid {
-            let added = (start.added.iter().zip(&normal.predicted)).map(|(part, p)| part * p);
-            let added = problem.whitened(DVector::from_iterator(normal.predicted.len(), added));
-            let shared = columns.tr_mul(&added);
-            let square = added.norm_squared() - shared.dot(&precision.solve(&shared));
+            let added = plain.added(problem, &start.added);
+            let square = plain.gain(&added);
             if square <= 0.0 {
                 continue;
             }

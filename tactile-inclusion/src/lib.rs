@@ -37,6 +37,7 @@ mod estimate;
 mod fit;
 mod forward;
 mod hypothesis;
+mod limits;
 mod pair;
 mod picture;
 mod ridge;

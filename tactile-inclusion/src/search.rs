@@ -26,7 +26,7 @@ use tactile_fem::{Guide, Interface, Kinematics};
 
 /// Part of the guide's radius within which pressures are used: further out the singular rim rules,
 /// where meshes disagree by percents.
-const USED_FACE: f64 = 0.75;
+pub const USED_FACE: f64 = 0.75;
 
 /// Radial displacement of tissue under a face over the radius and the mean strain of the block. Of
 /// incompressible tissue it is half the strain at its depth, which is larger than the mean by a
@@ -78,7 +78,7 @@ const CARRIED: f64 = 0.75;
 #[derive(Debug, Clone)]
 pub struct InclusionSearch {
     specimen: Specimen,
-    guide: Guide,
+    pub(crate) guide: Guide,
     sensor: SensorErrors,
     shape_error: f64,
 }
@@ -210,19 +210,7 @@ impl InclusionSearch {
         scan: &Scan,
         progress: &mut dyn FnMut(SearchProgress) -> ControlFlow<()>,
     ) -> Result<InclusionEstimate, ElasticityError> {
-        let (cells, frames) = scan.joined(USED_FACE * self.guide.radius_m())?;
-        let radii_m: Vec<f64> = (cells.positions_m.iter())
-            .map(|[x, y]| x.hypot(*y))
-            .collect();
-        let approaches_m: Vec<f64> = frames.iter().map(|frame| frame.approach_m).collect();
-        let mut observed = self.observed(&radii_m, &frames)?;
-        let [_, (_, zero_error_m), _] = self.specimen.known();
-        observed.cells = Some(ObservedCells::new(
-            cells,
-            [scan.position_error_m, zero_error_m],
-            &observed.values,
-            &approaches_m,
-        ));
+        let (observed, approaches_m) = self.observed_scan(scan)?;
         self.search_observed(&observed, &approaches_m, progress)
     }
 
@@ -236,13 +224,8 @@ impl InclusionSearch {
         // to the end.
         let rival_evidence = 16.0;
         let interfaces = self.specimen.interfaces();
-        let mut counter = Counter {
-            done: 0,
-            // Per interface: a homogeneous fit, the grid, two first fits, the answer's.
-            expected: interfaces.len() * 55,
-            progress,
-            cancelled: false,
-        };
+        // Per interface: a homogeneous fit, the grid, two first fits, the answer's.
+        let mut counter = Counter::new(interfaces.len() * 55, progress);
         let blocks: Vec<HomogeneousFit> = (interfaces.into_iter())
             .filter_map(|face| self.homogeneous(observed, approaches_m, face, &mut counter))
             .collect();
@@ -299,6 +282,27 @@ impl InclusionSearch {
         let clear = CLEAR_EVIDENCE * best.inflation(observed);
         let rival = (hypotheses.next()).filter(|other| best.evidence() - other.evidence() < clear);
         Ok(best.estimate(observed, rival.as_ref(), is_unsolved))
+    }
+
+    /// The values of all presses, and the approaches of each.
+    pub(crate) fn observed_scan(
+        &self,
+        scan: &Scan,
+    ) -> Result<(Observed, Vec<f64>), ElasticityError> {
+        let (cells, frames) = scan.joined(USED_FACE * self.guide.radius_m())?;
+        let radii_m: Vec<f64> = (cells.positions_m.iter())
+            .map(|[x, y]| x.hypot(*y))
+            .collect();
+        let approaches_m: Vec<f64> = frames.iter().map(|frame| frame.approach_m).collect();
+        let mut observed = self.observed(&radii_m, &frames)?;
+        let [_, (_, zero_error_m), _] = self.specimen.known();
+        observed.cells = Some(ObservedCells::new(
+            cells,
+            [scan.position_error_m, zero_error_m],
+            &observed.values,
+            &approaches_m,
+        ));
+        Ok((observed, approaches_m))
     }
 
     fn observed(
@@ -486,10 +490,22 @@ pub struct Counter<'a> {
     pub done: usize,
     pub expected: usize,
     pub progress: &'a mut dyn FnMut(SearchProgress) -> ControlFlow<()>,
-    cancelled: bool,
+    pub cancelled: bool,
 }
 
-impl Counter<'_> {
+impl<'a> Counter<'a> {
+    pub fn new(
+        expected: usize,
+        progress: &'a mut dyn FnMut(SearchProgress) -> ControlFlow<()>,
+    ) -> Self {
+        Self {
+            done: 0,
+            expected,
+            progress,
+            cancelled: false,
+        }
+    }
+
     /// Reports a solution. `false` where the search is to end.
     pub fn step(&mut self) -> bool {
         if self.cancelled {
@@ -511,7 +527,7 @@ impl Counter<'_> {
 /// inclusion, which move its size and depth by one bound. Where the face slides they move χ² by up
 /// to ten, enough to take it for one that sticks. On an inclusion that hardly shows the noise errs
 /// by more than five elements do.
-fn answer_fineness(is_certain: bool) -> usize {
+pub fn answer_fineness(is_certain: bool) -> usize {
     if is_certain { 7 } else { 5 }
 }
 
@@ -525,6 +541,9 @@ pub struct HomogeneousFit {
     /// may be plain.
     pub settled: Option<(Fit, Score)>,
     pub grid: Vec<GridStart>,
+    /// Small strain on the plain block as it is known, which the grid is solved by.
+    pub linear: Forward,
+    pub known: Parameters,
 }
 
 impl HomogeneousFit {
@@ -596,6 +615,8 @@ impl InclusionSearch {
             fit,
             settled,
             grid,
+            linear,
+            known,
         })
     }
 

@@ -1,7 +1,7 @@
 //! Searches from the whole face: a lump off the axis, and what no single ball explains.
 
 use super::{is_poor, lump, search};
-use crate::forward::{Coordinate, Forward, Parameters};
+use crate::forward::{Coordinate, Forward, LumpParameters, Parameters};
 use crate::picture::{CellPositions, Cells, Place};
 use crate::{
     Inclusion, InclusionEstimate, PressureProfile, Scan, ScanPress, SearchProgress, Verdict,
@@ -294,4 +294,57 @@ fn two_balls_off_the_axis_are_told_apart_and_three_are_not_explained() {
     });
     let tilted: Vec<f64> = tilted.collect();
     assert_eq!(searched(&tilted).verdict(), Verdict::Absent);
+}
+
+#[test]
+fn balls_above_the_detection_limit_are_found_and_those_below_are_not() {
+    let (place, contrast, depth_m) = ([5e-3, -2e-3], 2.5, 8e-3);
+    let mut rng = ChaCha8Rng::seed_from_u64(5);
+    let mut noise = move || NOISE * rng.sample::<f64, _>(StandardNormal);
+    let mut press = |lump: Option<LumpParameters>| {
+        let mut parameters = block(place);
+        parameters.place.elongation = [0.0; 2];
+        parameters.lump = lump;
+        let forward = forward(5).with_plain(&parameters).unwrap();
+        let mut values = forward.predict(&parameters).unwrap().values;
+        values.truncate(2 * positions().len());
+        values.iter_mut().for_each(|value| *value *= 1.0 + noise());
+        Scan {
+            presses: vec![ScanPress {
+                axis_m: [0.0; 2],
+                positions_m: positions(),
+                frames: frames(&values),
+            }],
+            position_error_m: 0.0,
+        }
+    };
+    let plain = press(None);
+    let places = [place, [10e-3, 0.0], [13e-3, 0.0]];
+    let limits = |scan: &Scan, contrast: f64| {
+        let depths = [depth_m, 1.5 * depth_m];
+        search().detection_limits(scan, contrast, &places, &depths, &mut go_on)
+    };
+    let found = limits(&plain, contrast).unwrap();
+    let limit = found[0][0];
+    // Deeper a ball has to be larger. Beyond the used part none is searched.
+    assert!(
+        found[1][0] > limit && found[0][1].is_finite() && found[0][2].is_infinite(),
+        "{found:?}"
+    );
+    // Stiffer ones show more.
+    assert!(limits(&plain, 2.0 * contrast).unwrap()[0][0] < limit);
+    // The fall of χ² grows as the sixth power of the diameter: at 1.1 times the limit it is 195,
+    // far above what searches find, and at 0.7 times 13, far below.
+    for (part, verdict) in [(1.1, Verdict::Found), (0.7, Verdict::Absent)] {
+        let ball = lump(part * limit, depth_m, contrast * 5e3);
+        for _ in 0..2 {
+            let found = search()
+                .search_scan(&press(Some(ball)), &mut go_on)
+                .unwrap();
+            assert_eq!(found.verdict(), verdict, "{part} {found:?}");
+        }
+    }
+    for wrong in [0.0, -1.0, f64::NAN] {
+        assert!(limits(&plain, wrong).is_err());
+    }
 }
