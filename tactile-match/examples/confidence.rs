@@ -6,10 +6,11 @@
 //! cargo run --release -p tactile-match --example confidence -- [FIRST_SEED SEEDS]
 //! ```
 //!
-//! The constants of the confidences were chosen on seeds 0 to 19. Others are held out (default: 100
-//! to 103). Prints for every tenth of confidence the pairs, their mean confidence and the share
-//! that is right. For every kind of scene the share of coordinates within one standard deviation of
-//! the truth, and how many scenes have less than 90 % right pairs, with and without a doubt.
+//! The constants of the confidences were chosen on seeds 0 to 19, those of answers with a doubt on 0
+//! to 7. Others are held out (default: 100 to 103). Prints for every tenth of confidence the pairs,
+//! their mean confidence and the share that is right. For every kind of scene the share of
+//! coordinates within one standard deviation of the truth, and how many scenes have less than 90 %
+//! right pairs, with and without a doubt.
 #![allow(clippy::print_stdout)]
 use nalgebra::{Point, SVector};
 use tactile_match::{AnnealedSoftassign, MatchError, Matching, PointMatcher};

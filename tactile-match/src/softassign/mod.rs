@@ -120,24 +120,30 @@ pub struct SoftassignWorkspace<const D: usize> {
     twin: Option<(f64, Doubt)>,
     /// Points that the best run before the last had matched.
     matched_before: f64,
+    /// Why the answer is not to be relied on.
+    doubt: Option<Doubt>,
 }
 
 impl<const D: usize> SoftassignWorkspace<D> {
-    /// Why the answer is not to be relied on.
-    fn doubt(&self) -> Option<Doubt> {
+    /// Decides why the answer is not to be relied on, and lowers its confidences by that.
+    fn settle_doubt(&mut self) {
         let smaller = self.model.len().min(self.target.len());
         let doubt = self.answer.doubt(smaller, self.expected_share);
-        let by_chance = self
-            .gain()
-            .is_some_and(|gain| gain < confidence::MIN_TELLING_GAIN);
+        // An exact answer explains the targets as well as can be.
+        let gain = self.gain().unwrap_or(f64::INFINITY);
+        let by_chance = gain < confidence::MIN_TELLING_GAIN;
         // A larger share of residuals that the noise of the others does not explain is that of a
         // part of the set that lies aside.
         let misfit = by_chance || self.best.tail > 0.08;
         let symmetric = self.symmetric.then_some(Doubt::Symmetric);
         let twin = self.twin.map(|(_, doubt)| doubt);
-        twin.or(doubt)
+        self.doubt = twin
+            .or(doubt)
             .or(misfit.then_some(Doubt::LargeResiduals))
-            .or(symmetric)
+            .or(symmetric);
+        if let Some(doubt) = self.doubt {
+            self.answer.lower_confidences(doubt, gain);
+        }
     }
 
     /// How much more likely the best answer makes the targets than points strewn over their

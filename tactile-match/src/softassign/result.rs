@@ -80,7 +80,7 @@ impl<'w, const D: usize> SoftassignMatch<'w, D> {
                 starts: workspace.starts,
                 residual: workspace.answer.residual * scale,
                 sigma: workspace.fine.sigma.unwrap_or(workspace.best.sigma) * scale,
-                doubt: workspace.doubt(),
+                doubt: workspace.doubt,
             },
         }
     }
@@ -154,7 +154,7 @@ fn stop_reason<const D: usize>(workspace: &SoftassignWorkspace<D>) -> StopReason
         () if workspace.best.sigma <= 1.000_001 * confidence::MIN_SIGMA
             && !workspace.annealer.soft.errors.differ()
             && !workspace.fine.found
-            && workspace.doubt().is_none() =>
+            && workspace.doubt.is_none() =>
         {
             StopReason::Exact
         }

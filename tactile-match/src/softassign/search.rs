@@ -178,6 +178,7 @@ impl AnnealedSoftassign {
             ws.answer.variance.clone_from(&ws.fine.variance);
         }
         ws.symmetric = self.rotation == Rotation::Any && ws.is_symmetric();
+        ws.settle_doubt();
     }
 
     /// All starts in turn until the best answer leaves no doubt, then the scales of the prior.
