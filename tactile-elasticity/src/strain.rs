@@ -348,6 +348,10 @@ impl Deformation {
 
     fn volume_change_from_h(&self) -> f64 {
         let h = &self.h;
+        let [change, size] = volume_change_plain(h);
+        if CANCELLED * change.abs() >= size {
+            return change;
+        }
         let mut sum = determinant(h);
         for i in 0..3 {
             let (j, k) = ((i + 1) % 3, (i + 2) % 3);
@@ -425,6 +429,26 @@ fn green_lagrange_plain(h: &Matrix3<f64>) -> Matrix3<f64> {
     Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz)
 }
 
+/// tr H + II(H) + det H in working precision, and the sum of the terms' sizes.
+fn volume_change_plain(h: &Matrix3<f64>) -> [f64; 2] {
+    let mut sums = [0.0; 2];
+    let mut add = |term: f64| sums = [sums[0] + term, sums[1] + term.abs()];
+    for i in 0..3 {
+        let (j, k) = ((i + 1) % 3, (i + 2) % 3);
+        let (positive, negative) = (h[(1, j)] * h[(2, k)], h[(1, k)] * h[(2, j)]);
+        add(h[(0, i)] * positive);
+        add(-h[(0, i)] * negative);
+        add(h[(j, j)] * h[(k, k)]);
+        add(-h[(j, k)] * h[(k, j)]);
+        add(h[(i, i)]);
+    }
+    sums
+}
+
+/// A sum that is smaller by this factor than what it was summed from has lost two digits, and is
+/// summed again in double-double.
+const CANCELLED: f64 = 128.0;
+
 /// Whether E is so much smaller than what it was summed from that more than two digits are gone.
 #[inline(always)]
 fn cancels(h: &Matrix3<f64>, e: &Matrix3<f64>) -> bool {
@@ -434,8 +458,7 @@ fn cancels(h: &Matrix3<f64>, e: &Matrix3<f64>) -> bool {
             + (h[(2, 0)].abs() + (h[(1, 2)].abs() + h[(2, 1)].abs())));
     let diagonal = (e[(0, 0)].abs() + e[(1, 1)].abs()) + e[(2, 2)].abs();
     let shear = (e[(0, 1)].abs() + e[(0, 2)].abs()) + e[(1, 2)].abs();
-    let many: f64 = 128.0;
-    (diagonal + shear) * many < of_h
+    (diagonal + shear) * CANCELLED < of_h
 }
 
 fn determinant(m: &Matrix3<f64>) -> DoubleDouble {

@@ -72,6 +72,25 @@ proptest! {
         prop_assert!((product / d.jacobian() - 1.0).abs() < 1e-14);
     }
 
+    /// A rotation rounded to 2⁻²⁰ changes the volume by some 1e-6, which integers give exactly. What
+    /// it is summed from is as large as one: in working precision six digits would be lost.
+    #[test]
+    fn the_volume_change_of_a_rotation_keeps_its_digits(q in rotation()) {
+        let whole = (q - Matrix3::identity()).map(|x| (x * f64::from(1 << 20)).round() as i128);
+        let minor = |r: [usize; 2], c: [usize; 2]| {
+            whole[(r[0], c[0])] * whole[(r[1], c[1])] - whole[(r[0], c[1])] * whole[(r[1], c[0])]
+        };
+        let pairs = [[0, 1], [0, 2], [1, 2]];
+        let second: i128 = pairs.iter().map(|&pair| minor(pair, pair)).sum();
+        let third = whole[(0, 0)] * minor([1, 2], [1, 2]) - whole[(0, 1)] * minor([1, 2], [0, 2])
+            + whole[(0, 2)] * minor([1, 2], [0, 1]);
+        let change = ((whole.trace() << 40) + (second << 20) + third) as f64 / 2f64.powi(60);
+        let h = whole.map(|x| x as f64 / f64::from(1 << 20));
+        let found = Deformation::from_displacement_gradient(h).volume_change();
+        // A sum that keeps all but two digits counts as good.
+        prop_assert!((found / change - 1.0).abs() < 1e-13 || change == 0.0, "{found:e} {change:e}");
+    }
+
     /// Invariants do not depend on the axes.
     #[test]
     fn invariants_are_invariant(q in rotation(), h in gradient(1.0)) {
