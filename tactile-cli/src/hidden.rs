@@ -3,7 +3,7 @@ use crate::console::{Bar, Context};
 use crate::plot::{Colour, Panel, circle};
 use serde::Serialize;
 use tactile_imaging::elasticity::ElasticityError;
-use tactile_imaging::inclusion::{InclusionSearch, LoadedInclusion};
+use tactile_imaging::inclusion::{InclusionSearch, LoadedInclusion, Specimen};
 
 /// The largest balls that searches miss, on a grid of places and depths.
 #[derive(Serialize)]
@@ -14,6 +14,8 @@ pub struct Hidden {
     depths_m: Vec<f64>,
     /// For each depth, one for each place. Infinite where every ball would be missed.
     diameters_m: Vec<Vec<f64>>,
+    /// Where the next press would search most.
+    next_position_m: Option<[f64; 2]>,
     #[serde(skip)]
     faces_m: Vec<([f64; 2], f64)>,
 }
@@ -23,6 +25,7 @@ impl Hidden {
     pub fn new(
         search: &InclusionSearch,
         loaded: &LoadedInclusion,
+        block: &Specimen,
         contrast: f64,
         context: &Context,
     ) -> Result<Self, ElasticityError> {
@@ -32,24 +35,12 @@ impl Hidden {
         let reach = cells.map(|[x, y]| x.hypot(*y)).fold(0.0, f64::max);
         // Places across a face: the limits change little from one to the next.
         let places = 16.0;
-        let span = [0, 1].map(|k| {
-            let along = axes.iter().map(|axis| axis[k]);
-            let low = along.clone().fold(f64::INFINITY, f64::min);
-            [low - reach, along.fold(f64::NEG_INFINITY, f64::max) + reach]
-        });
         let step = 2.0 * reach / places;
-        let grid = span.map(|[low, high]| {
-            let count = ((high - low) / step).ceil();
-            (
-                0.5 * (low + high - (count - 1.0) * step),
-                step,
-                count as usize,
-            )
-        });
-        let [(left, dx, columns), (bottom, dy, rows)] = grid;
-        let at = |row: usize, column: usize| [left + column as f64 * dx, bottom + row as f64 * dy];
-        let positions_m: Vec<[f64; 2]> = (0..rows)
-            .flat_map(|row| (0..columns).map(move |column| at(row, column)))
+        let steps = (block.radius_m() / step).floor() as i32;
+        let line = (-steps..=steps).map(|k| f64::from(k) * step);
+        let positions_m: Vec<[f64; 2]> = (line.clone())
+            .flat_map(|y| line.clone().map(move |x| [x, y]))
+            .filter(|[x, y]| x.hypot(*y) < block.radius_m())
             .collect();
         // From just under the surface to as deep as a face is wide to the edge of its used part.
         let depths_m: Vec<f64> = (1..=6).map(|k| f64::from(k) * reach / 6.0).collect();
@@ -68,9 +59,29 @@ impl Hidden {
             },
         );
         interrupt.polled(false);
+        let diameters_m = limits?;
+        // A press is solved as if it were in the middle of the block: a block's height away from its
+        // rim, or as near as those that were made.
+        let made = axes.iter().map(|[x, y]| x.hypot(*y)).fold(0.0, f64::max);
+        let face = reach / 0.75;
+        let farthest = (block.radius_m() - block.height_m() - face).max(made);
+        // A press on top of another searches little more.
+        let is_new = |[x, y]: [f64; 2]| {
+            let mut axes = axes.iter();
+            axes.all(|axis| (x - axis[0]).hypot(y - axis[1]) >= 0.5 * reach)
+        };
+        let candidates: Vec<[f64; 2]> = (positions_m.iter().copied())
+            .filter(|[x, y]| x.hypot(*y) <= farthest && is_new([*x, *y]))
+            .collect();
         Ok(Self {
             contrast,
-            diameters_m: limits?,
+            next_position_m: search.next_position(
+                &loaded.scan,
+                &positions_m,
+                &diameters_m,
+                &candidates,
+            ),
+            diameters_m,
             positions_m,
             depths_m,
             faces_m: axes.into_iter().map(|axis| (axis, reach)).collect(),
@@ -100,6 +111,10 @@ impl Hidden {
             };
             context.row(&format!("{:.1} mm deep", 1e3 * depth), text);
         }
+        if let Some([x, y]) = self.next_position_m {
+            let place = format!("at ({:.1}, {:.1}) mm would search most", 1e3 * x, 1e3 * y);
+            context.row("next press", place);
+        }
     }
 
     fn is_searched(&self, [x, y]: [f64; 2]) -> bool {
@@ -123,7 +138,11 @@ impl Hidden {
             let outline = circle(axis.map(|x| 1e3 * x), 1e3 * reach);
             above = above.line(outline, Colour::Orange, name);
         }
-        let row = self.positions_m[self.positions_m.len() / 2][1];
+        let (axis, _) = self.faces_m[0];
+        let away = |place: &&[f64; 2]| (place[1] - axis[1]).abs();
+        let rows = self.positions_m.iter();
+        let row = rows.min_by(|a, b| away(a).total_cmp(&away(b)));
+        let row = row.map_or(0.0, |place| place[1]);
         let levels = self
             .depths_m
             .iter()

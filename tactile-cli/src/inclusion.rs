@@ -250,7 +250,13 @@ pub fn run(arguments: &InclusionArguments, context: &mut Context) -> Result<Exit
         Err(error) => return Err(unusable(file, &error)),
     };
     let hidden = match (arguments.hidden, &scan.loaded) {
-        (Some(contrast), Some(loaded)) => Some(Hidden::new(&search, loaded, contrast, context)),
+        (Some(contrast), Some(loaded)) => Some(Hidden::new(
+            &search,
+            loaded,
+            &scan.specimen,
+            contrast,
+            context,
+        )),
         _ => None,
     };
     let hidden = match hidden.transpose() {

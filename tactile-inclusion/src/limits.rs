@@ -115,6 +115,47 @@ impl InclusionSearch {
         }
         Ok(limits)
     }
+
+    /// The one of `candidates_m` where the next press of a scan would search most: under the used
+    /// part of its face the mean volume of the balls that could hide is the largest. `limits_m` are
+    /// [`Self::detection_limits`] at `places_m`. Where nothing is searched yet a ball as wide as the
+    /// face's radius could hide. Of candidates that are as good the one nearest to the scan's
+    /// presses. `None` without a candidate that has places under its face.
+    pub fn next_position(
+        &self,
+        scan: &Scan,
+        places_m: &[[f64; 2]],
+        limits_m: &[Vec<f64>],
+        candidates_m: &[[f64; 2]],
+    ) -> Option<[f64; 2]> {
+        let face_m = self.guide.radius_m();
+        let volume = |limit: &f64| (limit / face_m).min(1.0).powi(3);
+        let hidden = |place: usize| limits_m.iter().map(|limits| volume(&limits[place])).sum();
+        let hidden: Vec<f64> = (0..places_m.len()).map(hidden).collect();
+        let away = |a: [f64; 2], b: [f64; 2]| (a[0] - b[0]).hypot(a[1] - b[1]);
+        let found = candidates_m.iter().filter_map(|&candidate| {
+            let under = places_m.iter().zip(&hidden);
+            let under = under.filter(|(place, _)| away(**place, candidate) <= USED_FACE * face_m);
+            let (sum, count) = under.fold((0.0, 0), |(sum, n), (_, hidden)| (sum + hidden, n + 1));
+            let presses = scan
+                .presses
+                .iter()
+                .map(|press| away(press.axis_m, candidate));
+            let nearest = presses.fold(f64::INFINITY, f64::min);
+            (count > 0).then_some((sum / f64::from(count), nearest, candidate))
+        });
+        let best = found.reduce(|best, other| {
+            // Equal shares of places differ by rounding.
+            let is_better = other.0 > best.0 + 1e-9;
+            let is_as_good_and_nearer = other.0 > best.0 - 1e-9 && other.1 < best.1;
+            if is_better || is_as_good_and_nearer {
+                other
+            } else {
+                best
+            }
+        });
+        best.map(|(_, _, candidate)| candidate)
+    }
 }
 
 /// A ball under the axis, and the same mesh with the block's modulus in its place.

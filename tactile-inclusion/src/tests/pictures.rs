@@ -331,6 +331,17 @@ fn balls_above_the_detection_limit_are_found_and_those_below_are_not() {
         found[1][0] > limit && found[0][1].is_finite() && found[0][2].is_infinite(),
         "{found:?}"
     );
+    // The next press is beside this one, where it searches as much as any other and is nearest, and
+    // not on it.
+    let next = |candidates: &[[f64; 2]]| {
+        let nowhere = vec![vec![f64::INFINITY; places.len()]];
+        search().next_position(&plain, &places, &nowhere, candidates)
+    };
+    let aside = [10e-3, 1e-3];
+    assert_eq!(next(&[[25e-3, 0.0], aside, [20e-3, 0.0]]), Some(aside));
+    assert_eq!(next(&[[90e-3, 0.0]]), None);
+    let seen = search().next_position(&plain, &places, &found, &[[0.0; 2], [13e-3, 0.0]]);
+    assert_eq!(seen, Some([13e-3, 0.0]));
     // Stiffer ones show more.
     assert!(limits(&plain, 2.0 * contrast).unwrap()[0][0] < limit);
     // The fall of χ² grows as the sixth power of the diameter: at 1.1 times the limit it is 195,
