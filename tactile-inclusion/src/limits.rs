@@ -39,6 +39,22 @@ impl InclusionSearch {
     /// specimen says otherwise. s is that of small strain, its size right within some ten per cent,
     /// and the diameter within some three.
     ///
+    /// ```no_run
+    /// use core::ops::ControlFlow;
+    /// use tactile_inclusion::{InclusionSearch, Scan};
+    ///
+    /// # fn example(search: InclusionSearch, scan: Scan) -> Result<(), tactile_elasticity::ElasticityError> {
+    /// let (places, depths) = ([[0.0, 0.0], [8e-3, 0.0]], [2e-3, 6e-3]);
+    /// let limits = search.detection_limits(&scan, 4.0, &places, &depths, &mut |_| {
+    ///     ControlFlow::Continue(())
+    /// })?;
+    /// println!("6 mm deep, balls of up to {:.1} mm can hide", 1e3 * limits[1][0]);
+    /// let beside = [[16e-3, 0.0], [0.0, 16e-3]];
+    /// let next = search.next_position(&scan, &places, &limits, &beside);
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
     /// # Errors
     /// Those of [`Self::search_scan`]. A contrast or a depth that is not positive. A place that is
     /// not finite.

@@ -2,7 +2,7 @@
 use crate::arrays;
 use crate::errors::{self, Signals, invalid};
 use crate::pipeline::guide;
-use crate::results::{Estimate, Inclusion};
+use crate::results::{Estimate, Inclusion, Lump};
 use pyo3::prelude::*;
 use std::path::PathBuf;
 use tactile_imaging::elasticity::ElasticityError;
@@ -11,6 +11,7 @@ use tactile_imaging::inclusion::{
     Estimated, Identifiable, InclusionEstimate, InclusionScene, InclusionSearch, PressureProfile,
     Specimen, Verdict,
 };
+use tactile_imaging::pipeline::with_error;
 
 /// Searches for a lump in a block by the frames that a scene file names, as `tactile inclusion`.
 ///
@@ -144,21 +145,6 @@ fn searched(
 }
 
 fn result(py: Python<'_>, found: &InclusionEstimate) -> PyResult<Inclusion> {
-    let estimate = |given: &Estimated| {
-        let [low, high] = given.interval;
-        Estimate::within(py, given.value, given.standard_error, (low, Some(high)))
-    };
-    let lump = found.inclusion.as_ref();
-    let part = |given: Option<&Identifiable>| given.map(|g| estimate(g.estimate())).transpose();
-    let named = |lump: &tactile_imaging::inclusion::Inclusion| {
-        [
-            ("diameter", lump.diameter_m),
-            ("depth", lump.depth_m),
-            ("youngs_modulus", lump.youngs_modulus_pa),
-        ]
-    };
-    let identified = lump.into_iter().flat_map(named);
-    let identified = identified.filter(|(_, part)| part.value().is_some());
     let verdict = match found.verdict() {
         Verdict::Found => "found",
         Verdict::Absent => "absent",
@@ -168,19 +154,50 @@ fn result(py: Python<'_>, found: &InclusionEstimate) -> PyResult<Inclusion> {
         text: format!("{verdict}, probability {:.3}", found.probability),
         verdict: verdict.into(),
         probability: found.probability,
-        block_modulus: estimate(&found.block_modulus_pa)?,
-        diameter: part(lump.map(|lump| &lump.diameter_m))?,
-        depth: part(lump.map(|lump| &lump.depth_m))?,
-        youngs_modulus: part(lump.map(|lump| &lump.youngs_modulus_pa))?,
-        identified: identified.map(|(name, _)| name).collect(),
+        block_modulus: estimate(py, &found.block_modulus_pa)?,
+        lumps: (found.inclusions().iter())
+            .map(|lump| Py::new(py, one(py, lump)?))
+            .collect::<PyResult<_>>()?,
         interface: match found.interface {
             Interface::Bonded => "bonded",
             _ => "frictionless",
         },
-        height_over_width: (lump.and_then(|lump| lump.height_over_width.as_ref()))
-            .map(&estimate)
-            .transpose()?,
-        ball_probability: lump.map(|lump| lump.ball_probability),
         flags: found.warnings.iter().map(ToString::to_string).collect(),
+    })
+}
+
+fn estimate(py: Python<'_>, given: &Estimated) -> PyResult<Py<Estimate>> {
+    let [low, high] = given.interval;
+    Estimate::within(py, given.value, given.standard_error, (low, Some(high)))
+}
+
+fn one(py: Python<'_>, lump: &tactile_imaging::inclusion::Inclusion) -> PyResult<Lump> {
+    let parts = [
+        ("diameter", &lump.diameter_m),
+        ("depth", &lump.depth_m),
+        ("youngs_modulus", &lump.youngs_modulus_pa),
+    ];
+    let part = |given: &Identifiable| estimate(py, given.estimate());
+    let of = |given: &Estimated| estimate(py, given);
+    let text = parts[..2].iter().map(|(name, part)| {
+        let Estimated {
+            value,
+            standard_error,
+            ..
+        } = part.estimate();
+        format!("{name} {} mm", with_error(*value, *standard_error, 1e3))
+    });
+    let identified = parts.iter().filter(|(_, part)| part.value().is_some());
+    let [x, y] = [0, 1].map(|k| lump.position_m.as_ref().map(|position| of(&position[k])));
+    Ok(Lump {
+        text: text.collect::<Vec<_>>().join(", "),
+        x: x.transpose()?,
+        y: y.transpose()?,
+        diameter: part(&lump.diameter_m)?,
+        depth: part(&lump.depth_m)?,
+        youngs_modulus: part(&lump.youngs_modulus_pa)?,
+        height_over_width: lump.height_over_width.as_ref().map(of).transpose()?,
+        ball_probability: lump.ball_probability,
+        identified: identified.map(|(name, _)| *name).collect(),
     })
 }

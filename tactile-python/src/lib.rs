@@ -44,8 +44,8 @@ mod _native {
     use super::press::{Press, Session};
     #[pymodule_export]
     use super::results::{
-        Contact, Estimate, HertzContact, Inclusion, Load, Match, Modulus, SimulatedPress, Strain,
-        StrainBetween, Surface,
+        Contact, Estimate, HertzContact, Inclusion, Load, Lump, Match, Modulus, SimulatedPress,
+        Strain, StrainBetween, Surface,
     };
     #[pymodule_export]
     use super::run_program;

@@ -1,21 +1,28 @@
 //! Frozen results: fields, a sentence, a table for notebooks, a dictionary.
 use crate::arrays::{Matrix, Tensors, Vector};
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
+use pyo3::types::{PyDict, PyList};
 use tactile_imaging::core::{Estimate as CoreEstimate, Interval};
 
 /// The fields of a result by name. Results inside become dictionaries too.
 pub fn to_dict<'py>(result: &Bound<'py, PyAny>, names: &[&str]) -> PyResult<Bound<'py, PyDict>> {
     let dict = PyDict::new(result.py());
     for &name in names {
-        let value = result.getattr(name)?;
-        let value = match value.hasattr("to_dict")? {
-            true => value.call_method0("to_dict")?,
-            false => value,
-        };
-        dict.set_item(name, value)?;
+        dict.set_item(name, plain(result.getattr(name)?)?)?;
     }
     Ok(dict)
+}
+
+/// A result, or a list of results, as dictionaries. Other values as they are.
+fn plain(value: Bound<'_, PyAny>) -> PyResult<Bound<'_, PyAny>> {
+    if let Ok(list) = value.cast::<PyList>() {
+        let values = list.iter().map(plain).collect::<PyResult<Vec<_>>>()?;
+        return Ok(PyList::new(value.py(), values)?.into_any());
+    }
+    match value.hasattr("to_dict")? {
+        true => value.call_method0("to_dict"),
+        false => Ok(value),
+    }
 }
 
 /// A table of two columns. Values are escaped: they may hold text of the caller. Of arrays larger
@@ -229,6 +236,29 @@ result! {
 }
 
 result! {
+    /// A lump under the surface of a block.
+    Lump {
+        /// Its middle from the axis of the guide, or of a scan in the coordinates of its presses,
+        /// in metres. None where it was searched under the axis.
+        x: Option<Py<Estimate>>,
+        y: Option<Py<Estimate>>,
+        /// Diameter of the ball of its volume in metres.
+        diameter: Py<Estimate>,
+        /// Depth of its top in metres.
+        depth: Py<Estimate>,
+        /// Its Young's modulus in pascals.
+        youngs_modulus: Py<Estimate>,
+        /// Its height along the axis over its width.
+        height_over_width: Option<Py<Estimate>>,
+        /// Probability that it is a ball.
+        ball_probability: f64,
+        /// Names of those of diameter, depth and modulus that the frames determine. Of the others
+        /// the interval alone is of use.
+        identified: Vec<&'static str>,
+    }
+}
+
+result! {
     /// What a search for a lump in a block found.
     Inclusion {
         /// "found", "absent" or "uncertain".
@@ -237,19 +267,8 @@ result! {
         probability: f64,
         /// Young's modulus of the block in pascals.
         block_modulus: Py<Estimate>,
-        /// Diameter of the ball of the lump's volume in metres.
-        diameter: Option<Py<Estimate>>,
-        /// Depth of its top in metres.
-        depth: Option<Py<Estimate>>,
-        /// Its Young's modulus in pascals.
-        youngs_modulus: Option<Py<Estimate>>,
-        /// Its height along the axis over its width.
-        height_over_width: Option<Py<Estimate>>,
-        /// Probability that it is a ball.
-        ball_probability: Option<f64>,
-        /// Names of those of diameter, depth and modulus that the frames determine. Of the others
-        /// the interval alone is of use.
-        identified: Vec<&'static str>,
+        /// The lump, or two of them. None where the frames show none, or it is not explained.
+        lumps: Vec<Py<Lump>>,
         /// "bonded" or "frictionless", whether the guide's face sticks to the block or slides on
         /// it.
         interface: &'static str,

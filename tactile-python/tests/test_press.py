@@ -99,12 +99,25 @@ def test_depth_is_read_from_a_table():
 
 def test_a_lump_is_found():
     found = ti.inclusion_of_scene(DATA / "inclusion" / "scene.toml")
-    assert found.verdict == "found" and "diameter" in found.identified
+    (lump,) = found.lumps
+    assert found.verdict == "found" and "diameter" in lump.identified and lump.x is None
     # The block of the example is one of 5 kPa with a lump of 12 mm and 40 kPa, 4 mm deep.
-    truth = {"block_modulus": 5e3, "diameter": 12e-3, "depth": 4e-3, "youngs_modulus": 40e3}
+    low, high = found.block_modulus.interval_95
+    assert low < 5e3 < high
+    truth = {"diameter": 12e-3, "depth": 4e-3, "youngs_modulus": 40e3}
     for name, value in truth.items():
-        low, high = getattr(found, name).interval_95
+        low, high = getattr(lump, name).interval_95
         assert low < value < high
+    assert found.to_dict()["lumps"][0]["depth"]["value"] == lump.depth.value
+
+
+def test_a_lump_between_presses_has_its_place():
+    found = ti.inclusion_of_scene(DATA / "inclusion" / "scan.toml")
+    (lump,) = found.lumps
+    # The lump of the example scan lies at (8, 4) mm.
+    for place, truth in ((lump.x, 8e-3), (lump.y, 4e-3)):
+        low, high = place.interval_95
+        assert low < truth < high
 
 
 def session_answer(pipeline, scene):
