@@ -249,25 +249,24 @@ pub fn run(arguments: &InclusionArguments, context: &mut Context) -> Result<Exit
         Err(error @ ElasticityError::NoSolution) => return Err(Failure::no_answer(error)),
         Err(error) => return Err(unusable(file, &error)),
     };
-    let hidden = match (arguments.hidden, &scan.loaded) {
-        (Some(contrast), Some(loaded)) => Some(Hidden::new(
-            &search,
-            loaded,
-            &scan.specimen,
-            contrast,
-            context,
-        )),
-        _ => None,
-    };
-    let hidden = match hidden.transpose() {
-        Ok(hidden) => hidden,
-        Err(ElasticityError::Cancelled) => return Ok(Exit::Interrupted),
-        Err(error) => return Err(unusable(file, &error)),
-    };
     let is_asymmetric = !asymmetry_warnings(scan.asymmetry, scan.harmonics).is_empty();
     print(&estimate, &scan, context);
-    if let Some(hidden) = &hidden {
-        hidden.print(context);
+    let mut exit = Exit::Complete;
+    let mut hidden = None;
+    if let (Some(contrast), Some(loaded)) = (arguments.hidden, &scan.loaded) {
+        // What was found stands, whatever becomes of what was not.
+        match Hidden::new(&search, loaded, &scan.specimen, contrast, context) {
+            Ok(found) => {
+                found.print(context);
+                hidden = Some(found);
+            }
+            Err(ElasticityError::Cancelled) => exit = Exit::Interrupted,
+            Err(error) => {
+                let text = format!("what could hide is not known: {error}");
+                context.warn("hidden_unknown", json!({}), text);
+                exit = Exit::Partial;
+            }
+        }
     }
     for warning in &estimate.warnings {
         let numbers = json!(warning);
@@ -286,7 +285,7 @@ pub fn run(arguments: &InclusionArguments, context: &mut Context) -> Result<Exit
     context
         .outputs
         .page(names[1], || page(&estimate, &scan, hidden.as_ref()))?;
-    Ok(Exit::Complete)
+    Ok(exit)
 }
 
 fn unusable(file: Option<&Path>, error: &ElasticityError) -> Failure {

@@ -146,7 +146,10 @@ impl InclusionSearch {
     ) -> Option<[f64; 2]> {
         let face_m = self.guide.radius_m();
         let volume = |limit: &f64| (limit / face_m).min(1.0).powi(3);
-        let hidden = |place: usize| limits_m.iter().map(|limits| volume(&limits[place])).sum();
+        let hidden = |place: usize| {
+            let limits = limits_m.iter().filter_map(|limits| limits.get(place));
+            limits.map(volume).sum()
+        };
         let hidden: Vec<f64> = (0..places_m.len()).map(hidden).collect();
         let away = |a: [f64; 2], b: [f64; 2]| (a[0] - b[0]).hypot(a[1] - b[1]);
         let found = candidates_m.iter().filter_map(|&candidate| {
