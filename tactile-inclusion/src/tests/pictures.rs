@@ -344,9 +344,9 @@ fn balls_above_the_detection_limit_are_found_and_those_below_are_not() {
     assert_eq!(seen, Some([13e-3, 0.0]));
     // Stiffer ones show more.
     assert!(limits(&plain, 2.0 * contrast).unwrap()[0][0] < limit);
-    // The fall of χ² grows as the sixth power of the diameter: at 1.1 times the limit it is 195,
-    // far above what searches find, and at 0.7 times 13, far below.
-    for (part, verdict) in [(1.1, Verdict::Found), (0.7, Verdict::Absent)] {
+    // The fall of χ² grows as the sixth power of the diameter: at 1.1 times the limit it is 266,
+    // far above what searches find, and at 0.65 times 11, far below.
+    for (part, verdict) in [(1.1, Verdict::Found), (0.65, Verdict::Absent)] {
         let ball = lump(part * limit, depth_m, contrast * 5e3);
         for _ in 0..2 {
             let found = search()
