@@ -34,9 +34,9 @@ impl InclusionSearch {
     ///
     /// $$ s^T Q s, \qquad Q = C^{-1} - C^{-1} J (J^T C^{-1} J + P^{-1})^{-1} J^T C^{-1} $$
     ///
-    /// The least diameter is where this is 150, from which 95 of 100 searches or more find it. The block is
-    /// plain but for this ball: beside an inclusion that is there less is found. The errors and the
-    /// block's modulus are those of the scan's frames. The face counts as bonded unless the
+    /// The least diameter is where this is 150, from which 95 of 100 searches or more find it. The
+    /// block is plain but for this ball: beside an inclusion that is there less is found. The errors
+    /// and the block's modulus are those of the scan's frames. The face counts as bonded unless the
     /// specimen says otherwise. s is that of small strain, its size right within some ten per cent,
     /// and the diameter within some three.
     ///
@@ -44,7 +44,8 @@ impl InclusionSearch {
     /// use core::ops::ControlFlow;
     /// use tactile_inclusion::{InclusionSearch, Scan};
     ///
-    /// # fn example(search: InclusionSearch, scan: Scan) -> Result<(), tactile_elasticity::ElasticityError> {
+    /// # use tactile_elasticity::ElasticityError;
+    /// # fn example(search: InclusionSearch, scan: Scan) -> Result<(), ElasticityError> {
     /// let (places, depths) = ([[0.0, 0.0], [8e-3, 0.0]], [2e-3, 6e-3]);
     /// let limits = search.detection_limits(&scan, 4.0, &places, &depths, &mut |_| {
     ///     ControlFlow::Continue(())
