@@ -1,5 +1,6 @@
 //! Where a lump could be without being found.
-use crate::console::{Bar, Context};
+use crate::console::Context;
+use crate::inclusion::reported;
 use crate::plot::{Colour, Panel, circle};
 use serde::Serialize;
 use tactile_imaging::elasticity::ElasticityError;
@@ -16,62 +17,48 @@ pub struct Hidden {
     diameters_m: Vec<Vec<f64>>,
     /// Where the next press would search most.
     next_position_m: Option<[f64; 2]>,
+    /// Where the guide's axis was at each press, and the radius that is searched about it.
     #[serde(skip)]
-    faces_m: Vec<([f64; 2], f64)>,
+    axes_m: Vec<[f64; 2]>,
+    #[serde(skip)]
+    reach_m: f64,
 }
 
 impl Hidden {
-    /// With progress, which Ctrl-C ends.
+    /// With its progress, which Ctrl-C ends.
     pub fn new(
         search: &InclusionSearch,
         loaded: &LoadedInclusion,
         block: &Specimen,
+        face_m: f64,
         contrast: f64,
         context: &Context,
     ) -> Result<Self, ElasticityError> {
         let presses = &loaded.scan.presses;
-        let axes: Vec<[f64; 2]> = presses.iter().map(|press| press.axis_m).collect();
+        let axes_m: Vec<[f64; 2]> = presses.iter().map(|press| press.axis_m).collect();
         let cells = presses.iter().flat_map(|press| &press.positions_m);
-        let reach = cells.map(|[x, y]| x.hypot(*y)).fold(0.0, f64::max);
+        let reach_m = cells.map(|[x, y]| x.hypot(*y)).fold(0.0, f64::max);
         // Places across a face: the limits change little from one to the next.
         let places = 16.0;
-        let step = 2.0 * reach / places;
+        let step = 2.0 * reach_m / places;
         let steps = (block.radius_m() / step).floor() as i32;
         let line = (-steps..=steps).map(|k| f64::from(k) * step);
         let positions_m: Vec<[f64; 2]> = (line.clone())
             .flat_map(|y| line.clone().map(move |x| [x, y]))
             .filter(|[x, y]| x.hypot(*y) < block.radius_m())
             .collect();
-        // From just under the surface to as deep as a face is wide to the edge of its used part.
-        let depths_m: Vec<f64> = (1..=6).map(|k| f64::from(k) * reach / 6.0).collect();
-        let mut bar: Option<Bar> = None;
-        let interrupt = &context.interrupt;
-        interrupt.polled(true);
-        let limits = search.detection_limits(
-            &loaded.scan,
-            contrast,
-            &positions_m,
-            &depths_m,
-            &mut |now| {
-                let bar = bar.get_or_insert_with(|| Bar::of(now.expected, "what could hide"));
-                bar.done(now.done);
-                interrupt.flow()
-            },
-        );
-        interrupt.polled(false);
-        let diameters_m = limits?;
-        // A press is solved as if it were in the middle of the block: a block's height away from its
-        // rim, or as near as those that were made.
-        let made = axes.iter().map(|[x, y]| x.hypot(*y)).fold(0.0, f64::max);
-        let face = reach / 0.75;
-        let farthest = (block.radius_m() - block.height_m() - face).max(made);
-        // A press on top of another searches little more.
-        let is_new = |[x, y]: [f64; 2]| {
-            let mut axes = axes.iter();
-            axes.all(|axis| (x - axis[0]).hypot(y - axis[1]) >= 0.5 * reach)
-        };
+        // Down to the radius of the searched part of a face.
+        let depths_m: Vec<f64> = (1..=6).map(|k| f64::from(k) * reach_m / 6.0).collect();
+        let diameters_m = reported(context, "what could hide", |report| {
+            search.detection_limits(&loaded.scan, contrast, &positions_m, &depths_m, report)
+        })?;
+        // A press is solved as if it were in the middle of the block: a block's height away from
+        // its rim, or as near as those that were made. On top of another it searches little more.
+        let made = axes_m.iter().map(|[x, y]| x.hypot(*y)).fold(0.0, f64::max);
+        let farthest = (block.radius_m() - block.height_m() - face_m).max(made);
         let candidates: Vec<[f64; 2]> = (positions_m.iter().copied())
-            .filter(|[x, y]| x.hypot(*y) <= farthest && is_new([*x, *y]))
+            .filter(|place| place[0].hypot(place[1]) <= farthest)
+            .filter(|place| nearest(&axes_m, *place) >= 0.5 * reach_m)
             .collect();
         Ok(Self {
             contrast,
@@ -84,7 +71,8 @@ impl Hidden {
             diameters_m,
             positions_m,
             depths_m,
-            faces_m: axes.into_iter().map(|axis| (axis, reach)).collect(),
+            axes_m,
+            reach_m,
         })
     }
 
@@ -96,7 +84,8 @@ impl Hidden {
         ));
         for (depth, diameters) in self.depths_m.iter().zip(&self.diameters_m) {
             let searched = self.positions_m.iter().zip(diameters);
-            let searched = searched.filter(|(place, _)| self.is_searched(**place));
+            let searched =
+                searched.filter(|(place, _)| nearest(&self.axes_m, **place) <= self.reach_m);
             let range = searched.fold([f64::INFINITY, 0.0f64], |[low, high], (_, diameter)| {
                 [low.min(*diameter), high.max(*diameter)]
             });
@@ -117,11 +106,6 @@ impl Hidden {
         }
     }
 
-    fn is_searched(&self, [x, y]: [f64; 2]) -> bool {
-        let mut faces = self.faces_m.iter();
-        faces.any(|([u, v], reach)| (x - u).hypot(y - v) <= *reach)
-    }
-
     /// From above at one depth, and in section.
     pub fn panels(&self) -> [Panel; 2] {
         let label = "hidden up to (mm)";
@@ -133,16 +117,16 @@ impl Hidden {
         let mut above = Panel::new(title, "x (mm)", "y (mm)")
             .equal_aspect()
             .valued_points(places, diameters, label);
-        for (index, (axis, reach)) in self.faces_m.iter().enumerate() {
+        for (index, axis) in self.axes_m.iter().enumerate() {
             let name = if index == 0 { "searched" } else { "" };
-            let outline = circle(axis.map(|x| 1e3 * x), 1e3 * reach);
+            let outline = circle(axis.map(|x| 1e3 * x), 1e3 * self.reach_m);
             above = above.line(outline, Colour::Orange, name);
         }
-        let (axis, _) = self.faces_m[0];
-        let away = |place: &&[f64; 2]| (place[1] - axis[1]).abs();
-        let rows = self.positions_m.iter();
+        // The row of places that is nearest to the first press's axis.
+        let rows = self.positions_m.iter().map(|place| place[1]);
+        let away = |y: &f64| (y - self.axes_m[0][1]).abs();
         let row = rows.min_by(|a, b| away(a).total_cmp(&away(b)));
-        let row = row.map_or(0.0, |place| place[1]);
+        let row = row.unwrap_or_default();
         let levels = self
             .depths_m
             .iter()
@@ -169,4 +153,10 @@ impl Hidden {
         let limits = limits.filter(move |(place, limit)| is_shown(**place) && limit.is_finite());
         limits.map(|(place, limit)| (place.map(|x| 1e3 * x), 1e3 * limit))
     }
+}
+
+/// Distance of a place from the nearest of some axes.
+fn nearest(axes_m: &[[f64; 2]], [x, y]: [f64; 2]) -> f64 {
+    let distances = axes_m.iter().map(|axis| (x - axis[0]).hypot(y - axis[1]));
+    distances.fold(f64::INFINITY, f64::min)
 }

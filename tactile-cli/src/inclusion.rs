@@ -8,6 +8,7 @@ use clap::Args;
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 use rand_distr::StandardNormal;
 use serde_json::json;
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use tactile_imaging::elasticity::ElasticityError;
 use tactile_imaging::fem::{
@@ -255,7 +256,8 @@ pub fn run(arguments: &InclusionArguments, context: &mut Context) -> Result<Exit
     let mut hidden = None;
     if let (Some(contrast), Some(loaded)) = (arguments.hidden, &scan.loaded) {
         // What was found stands, whatever becomes of what was not.
-        match Hidden::new(&search, loaded, &scan.specimen, contrast, context) {
+        let face_m = scan.guide.radius_m();
+        match Hidden::new(&search, loaded, &scan.specimen, face_m, contrast, context) {
             Ok(found) => {
                 found.print(context);
                 hidden = Some(found);
@@ -295,24 +297,31 @@ fn unusable(file: Option<&Path>, error: &ElasticityError) -> Failure {
     }
 }
 
-/// The search with its progress, which Ctrl-C ends.
 fn found(
     search: &InclusionSearch,
     scan: &Scan,
     context: &Context,
 ) -> Result<InclusionEstimate, ElasticityError> {
+    reported(context, "searching", |report| match &scan.loaded {
+        Some(loaded) => loaded.search(search, report),
+        None => search.search_with_progress(&scan.radii_m, &scan.profiles, report),
+    })
+}
+
+/// Runs a search with its progress, which Ctrl-C ends.
+pub fn reported<T>(
+    context: &Context,
+    name: &'static str,
+    search: impl FnOnce(&mut dyn FnMut(SearchProgress) -> ControlFlow<()>) -> T,
+) -> T {
     let mut progress: Option<Bar> = None;
     let interrupt = &context.interrupt;
     interrupt.polled(true);
-    let mut report = |now: SearchProgress| {
-        let bar = progress.get_or_insert_with(|| Bar::of(now.expected, "searching"));
+    let found = search(&mut |now| {
+        let bar = progress.get_or_insert_with(|| Bar::of(now.expected, name));
         bar.done(now.done);
         interrupt.flow()
-    };
-    let found = match &scan.loaded {
-        Some(loaded) => loaded.search(search, &mut report),
-        None => search.search_with_progress(&scan.radii_m, &scan.profiles, &mut report),
-    };
+    });
     interrupt.polled(false);
     found
 }

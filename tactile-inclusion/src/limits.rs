@@ -19,9 +19,9 @@ const DIAMETERS: [f64; 6] = [0.09, 0.15, 0.25, 0.4, 0.65, 1.05];
 const DEEPEST: f64 = 0.95;
 
 /// Expected fall of χ² by an inclusion that 95 of 100 searches find. Half of the searches found
-/// balls that lower it by 58, 58 and 78, at three places with 16 draws of the noise for each of five
-/// diameters. At 110 19, 19 and 16 of 20 found them; the last ball was small and shallow. Less
-/// promises too much there, more calls larger balls hidden.
+/// balls that lower it by 58, 58 and 78, at three places with 16 draws of the noise for each of
+/// five diameters. At 110 19, 19 and 16 of 20 found them; the last ball was small and shallow, and
+/// 20 of 20 found it at 150. Less promises too much there, more calls larger balls hidden.
 const FOUND_GAIN: f64 = 150.0;
 
 impl InclusionSearch {
@@ -35,7 +35,7 @@ impl InclusionSearch {
     /// $$ s^T Q s, \qquad Q = C^{-1} - C^{-1} J (J^T C^{-1} J + P^{-1})^{-1} J^T C^{-1} $$
     ///
     /// The least diameter is where this is 150, from which 95 of 100 searches or more find it. The
-    /// block is plain but for this ball: beside an inclusion that is there less is found. The errors
+    /// block is plain but for this ball: beside an inclusion that is there less is found. Errors
     /// and the block's modulus are those of the scan's frames. The face counts as bonded unless the
     /// specimen says otherwise. s is that of small strain, its size right within some ten per cent,
     /// and the diameter within some three.
@@ -126,8 +126,7 @@ impl InclusionSearch {
                     let added = ball.added(&block.linear, *place);
                     plain.gain(&plain.added(&problem, &added))
                 };
-                let gains = balls.iter().map(|ball| (ball.diameter_m(), gain(ball)));
-                least_found(&gains.collect::<Vec<_>>())
+                least_found(balls.iter().map(|ball| (ball.diameter_m(), gain(ball))))
             };
             limits.push(places_m.iter().map(limit).collect());
         }
@@ -136,8 +135,8 @@ impl InclusionSearch {
 
     /// The one of `candidates_m` where the next press of a scan would search most: under the used
     /// part of its face the mean volume of the balls that could hide is the largest. `limits_m` are
-    /// [`Self::detection_limits`] at `places_m`. Where nothing is searched yet a ball as wide as the
-    /// face's radius could hide. Of candidates that are as good the one nearest to the scan's
+    /// [`Self::detection_limits`] at `places_m`. Where nothing is searched yet, a ball as wide as
+    /// the face's radius could hide. Of candidates that are as good the one nearest to the scan's
     /// presses. `None` without a candidate that has places under its face.
     pub fn next_position(
         &self,
@@ -231,17 +230,21 @@ impl Ball {
 }
 
 /// The diameter from which χ² falls by enough, from falls at growing diameters. They grow nearly as
-/// a power of the diameter.
-fn least_found(gains: &[(f64, f64)]) -> f64 {
-    let Some(at) = gains.iter().position(|&(_, gain)| gain >= FOUND_GAIN) else {
-        return f64::INFINITY;
-    };
-    let (diameter, gain) = gains[at];
-    match at.checked_sub(1).map(|before| gains[before]) {
-        Some((smaller, less)) if less > 0.0 => {
-            let part = (FOUND_GAIN / less).ln() / (gain / less).ln();
-            smaller * (diameter / smaller).powf(part)
+/// a power of the diameter, and are computed up to the first that is enough.
+fn least_found(gains: impl Iterator<Item = (f64, f64)>) -> f64 {
+    let mut before = None;
+    for (diameter, gain) in gains {
+        if gain < FOUND_GAIN {
+            before = Some((diameter, gain));
+            continue;
         }
-        _ => diameter,
+        return match before {
+            Some((smaller, less)) if less > 0.0 => {
+                let part = (FOUND_GAIN / less).ln() / (gain / less).ln();
+                smaller * (diameter / smaller).powf(part)
+            }
+            _ => diameter,
+        };
     }
+    f64::INFINITY
 }

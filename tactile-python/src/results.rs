@@ -238,9 +238,10 @@ result! {
 result! {
     /// A lump under the surface of a block.
     Lump {
-        /// Its middle from the axis of the guide, or of a scan in the coordinates of its presses,
-        /// in metres. None where it was searched under the axis.
+        /// Its middle along x from the axis of the guide, or of a scan in the coordinates of its
+        /// presses, in metres. None where it was searched under the axis.
         x: Option<Py<Estimate>>,
+        /// The same along y.
         y: Option<Py<Estimate>>,
         /// Diameter of the ball of its volume in metres.
         diameter: Py<Estimate>,

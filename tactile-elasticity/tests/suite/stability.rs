@@ -72,8 +72,8 @@ proptest! {
         prop_assert!((product / d.jacobian() - 1.0).abs() < 1e-14);
     }
 
-    /// A rotation rounded to 2⁻²⁰ changes the volume by some 1e-6, which integers give exactly. What
-    /// it is summed from is as large as one: in working precision six digits would be lost.
+    /// A rotation rounded to 2⁻²⁰ changes the volume by some 1e-6, which integers give exactly.
+    /// What it is summed from is as large as one: in working precision six digits would be lost.
     #[test]
     fn the_volume_change_of_a_rotation_keeps_its_digits(q in rotation()) {
         let whole = (q - Matrix3::identity()).map(|x| (x * f64::from(1 << 20)).round() as i128);
