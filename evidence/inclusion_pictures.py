@@ -179,7 +179,8 @@ class Mesh:
         lower = near(z, 0) & (self.body == 0)
         tissue, guide = np.flatnonzero(lower & (np.hypot(x, y) < s.a + 1e-6)), np.flatnonzero(near(z, 0) & (self.body == 1))
         far, match = cKDTree(self.x[guide]).query(self.x[tissue])
-        assert far.max() < 1e-5 and len(guide) == len(tissue)
+        if far.max() > 1e-5 or len(guide) != len(tissue):
+            raise ArithmeticError("the meshes of face and guide do not meet")
         self.sets = {"mirror": np.flatnonzero(near(y, 0)), "base": np.flatnonzero(near(z, -s.H)), "tissue": tissue, "guide": guide[match],
                      "glass": np.flatnonzero(near(z, sum(h for h, _ in LAYERS))), "mirrorx": np.flatnonzero(near(x, 0)) if s.twin else np.array([], int)}
         on = np.isin(self.el, tissue)
@@ -346,8 +347,9 @@ if __name__ == "__main__":
     for name, scene in drawn(count, seed).items():
         if name in known:
             continue
-        begun, mesh = time.time(), Mesh(scene)
+        begun = time.time()
         try:
+            mesh = Mesh(scene)
             write(folder, name, scene, mesh, solve(scene, mesh))
         except ArithmeticError as error:
             print(f"{name}: {error}", flush=True)
