@@ -7,9 +7,10 @@ use self::avi::Avi;
 use self::npy::Arrays;
 use super::error::{FileError, FilePlace, quoted};
 use super::files::{LARGEST_FILE, open_file};
-use super::image::{Grey, eight_bit_levels, largest_image, levels_of};
+use super::image::{Grey, colour_levels, decode, eight_bit_levels, largest_image};
 use crate::pipeline::FrameSource;
-use ndarray::Array2;
+use ::image::DynamicImage;
+use ndarray::{Array2, Array3};
 use std::collections::HashSet;
 use std::io::{
     BufRead, BufReader, Cursor, Error, ErrorKind, Read, Result as IoResult, copy, sink, stdin,
@@ -35,6 +36,9 @@ const LONGEST_HEADER: u64 = 4096;
 ///   are passed over.
 /// - **TIFF**, a frame a page.
 /// - Any other image of [`read_grey_image`](super::read_grey_image): one frame.
+///
+/// As a [`FrameSource`] it gives grey frames. [`next_colour_frame`](Self::next_colour_frame) gives
+/// those of a gel that is lit in colours.
 ///
 /// Memory is that of one frame, but for TIFF and other images, which are read whole.
 ///
@@ -211,22 +215,102 @@ impl FrameReader {
         }
     }
 
-    /// The next frame, in the memory of an older one where the format allows that.
-    fn read(&mut self, memory: Vec<u8>) -> Result<Option<Array2<u8>>, Broken> {
+    /// The next frame in red, green and blue, `[row, column, channel]`, and its time in seconds,
+    /// counted from the first. Samples of 16 bits are rounded to 8.
+    ///
+    /// ```
+    /// use tactile_imaging::io::FrameReader;
+    /// let video = b"P6\n1 1\n255\n\xf0\x10\x00P6\n1 1\n255\n\xf1\x11\x01";
+    /// let mut camera = FrameReader::new(&video[..], "pipe", 25.0)?;
+    /// let mut frame = ndarray::Array3::zeros((0, 0, 0));
+    /// assert_eq!(camera.next_colour_frame(&mut frame)?, Some(0.0));
+    /// assert_eq!(camera.next_colour_frame(&mut frame)?, Some(1.0 / 25.0));
+    /// assert_eq!(frame, ndarray::array![[[241, 17, 1]]]);
+    /// assert_eq!(camera.next_colour_frame(&mut frame)?, None);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// As the grey frames, and [`FileError::Content`] for grey ones. A YUV4MPEG2 video counts as
+    /// grey: most halve the resolution of colours.
+    pub fn next_colour_frame(&mut self, frame: &mut Array3<u8>) -> Result<Option<f64>, FileError> {
+        let colours = |found: &str| Broken::new("a frame in red, green and blue", found);
+        let convert = |encoded: Encoded<'_>, name: &Path| {
+            let image = match encoded {
+                Encoded::Luma { .. } => return Err(colours("a video in luma and chroma")),
+                Encoded::File(bytes) => decode(bytes, name)?,
+                Encoded::Decoded(image) => image,
+            };
+            colour_levels(image).ok_or_else(|| colours("a grey one"))
+        };
+        let size = |frame: &Array3<u8>| (frame.dim().0, frame.dim().1);
+        let next = self.next_of(Vec::new(), convert, size)?;
+        Ok(next.map(|(time_s, next)| {
+            *frame = next;
+            time_s
+        }))
+    }
+
+    /// The next frame and its time. `convert` makes it, and `size` gives its rows and columns.
+    fn next_of<T>(
+        &mut self,
+        memory: Vec<u8>,
+        convert: impl Fn(Encoded<'_>, &Path) -> Result<T, Broken>,
+        size: impl Fn(&T) -> (usize, usize),
+    ) -> Result<Option<(f64, T)>, FileError> {
+        let rate_hz = self.frame_rate_hz().unwrap_or(self.default_rate_hz);
+        let name = self.name.clone();
+        let read = self.read(memory, |encoded| convert(encoded, &name));
+        let read = read.and_then(|next| {
+            let Some(next) = next else {
+                return Ok(None);
+            };
+            let found = size(&next);
+            let (rows, columns) = *self.size.get_or_insert(found);
+            if found == (rows, columns) {
+                return Ok(Some(next));
+            }
+            let expected = format!("{columns} × {rows} pixels as in the first");
+            let found = format!("{} × {}", found.1, found.0);
+            Err(Broken::new(expected, found))
+        });
+        let place = FilePlace::Frame(self.frames + 1);
+        let read = read.map_err(|broken| broken.at(&name, place));
+        match read {
+            Ok(Some(next)) => {
+                self.frames += 1;
+                Ok(Some(((self.frames - 1) as f64 / rate_hz, next)))
+            }
+            ended => {
+                self.format = Format::Ended;
+                ended.map(|_| None)
+            }
+        }
+    }
+
+    /// The next frame as `convert` makes it, in the memory of an older one where the format allows
+    /// that.
+    fn read<T>(
+        &mut self,
+        memory: Vec<u8>,
+        convert: impl Fn(Encoded<'_>) -> Result<T, Broken>,
+    ) -> Result<Option<T>, Broken> {
         let input = &mut self.input;
-        let levels = |bytes: &[u8]| levels_of(bytes, &self.name, self.grey, self.bits);
+        let file = |bytes: &[u8]| convert(Encoded::File(bytes));
         Ok(match &mut self.format {
             Format::Ended => None,
             Format::Image(bytes) => {
                 let bytes = take(bytes);
                 self.format = Format::Ended;
-                Some(levels(&bytes)?)
+                Some(file(&bytes)?)
             }
-            Format::Pages(pages) => pages.turn().map(levels).transpose()?,
-            Format::Avi(avi) => avi.next(input)?.map(|jpeg| levels(&jpeg)).transpose()?,
+            Format::Pages(pages) => pages.turn().map(file).transpose()?,
+            Format::Avi(avi) => avi.next(input)?.map(|jpeg| file(&jpeg)).transpose()?,
             Format::Arrays(arrays) => {
-                let grey = |image| eight_bit_levels(image, &[], &self.name, self.grey, self.bits);
-                arrays.next(input)?.map(grey).transpose()?
+                let image = arrays.next(input)?;
+                image
+                    .map(|image| convert(Encoded::Decoded(image)))
+                    .transpose()?
             }
             Format::Anymaps => {
                 let Some(mut bytes) = anymap_header(input)? else {
@@ -242,7 +326,7 @@ impl FrameReader {
                 if bytes.len() < header + samples {
                     return Err(Broken::cut(samples, bytes.len() - header));
                 }
-                Some(levels(&bytes)?)
+                Some(file(&bytes)?)
             }
             Format::Video(video) => {
                 let start = line(input)?;
@@ -263,13 +347,21 @@ impl FrameReader {
                     let found = samples.len() + skipped;
                     return Err(Broken::cut(luma + video.chroma_bytes, found));
                 }
-                if video.depth > 8 {
-                    return Ok(Some(levels(&video.anymap(&samples))?));
-                }
-                Array2::from_shape_vec((video.rows, video.columns), samples).ok()
+                Some(convert(Encoded::Luma { video, samples })?)
             }
         })
     }
+}
+
+/// A frame as its stream stores it.
+enum Encoded<'a> {
+    /// An image with its header.
+    File(&'a [u8]),
+    Decoded(DynamicImage),
+    Luma {
+        video: &'a Video,
+        samples: Vec<u8>,
+    },
 }
 
 impl FrameSource for FrameReader {
@@ -281,33 +373,28 @@ impl FrameSource for FrameReader {
     /// [`FileError::Content`] where a frame is cut short, is none, or has another size than the
     /// first, and [`FileError::Image`] where it cannot be decoded. The stream has then ended.
     fn next_frame(&mut self, frame: &mut Array2<u8>) -> Result<Option<f64>, Self::Error> {
-        let rate_hz = self.frame_rate_hz().unwrap_or(self.default_rate_hz);
         let memory = take(frame).into_raw_vec_and_offset().0;
-        let read = self.read(memory).and_then(|next| {
-            let Some(next) = next else {
-                return Ok(None);
-            };
-            let (rows, columns) = *self.size.get_or_insert(next.dim());
-            if next.dim() == (rows, columns) {
-                return Ok(Some(next));
-            }
-            let expected = format!("{columns} × {rows} pixels as in the first");
-            let found = format!("{} × {}", next.ncols(), next.nrows());
-            Err(Broken::new(expected, found))
-        });
-        let place = FilePlace::Frame(self.frames + 1);
-        let read = read.map_err(|broken| broken.at(&self.name, place));
-        match read {
-            Ok(Some(next)) => {
-                *frame = next;
-                self.frames += 1;
-                Ok(Some((self.frames - 1) as f64 / rate_hz))
-            }
-            ended => {
-                self.format = Format::Ended;
-                ended.map(|_| None)
-            }
-        }
+        let (grey, bits) = (self.grey, self.bits);
+        let convert = |encoded: Encoded<'_>, name: &Path| {
+            let levels =
+                |bytes: &[u8]| eight_bit_levels(decode(bytes, name)?, bytes, name, grey, bits);
+            Ok(match encoded {
+                Encoded::File(bytes) => levels(bytes)?,
+                Encoded::Decoded(image) => eight_bit_levels(image, &[], name, grey, bits)?,
+                Encoded::Luma { video, samples } if video.depth > 8 => {
+                    levels(&video.anymap(&samples))?
+                }
+                Encoded::Luma { video, samples } => {
+                    let shape = (video.rows, video.columns);
+                    Array2::from_shape_vec(shape, samples).unwrap_or_else(|_| Array2::zeros(shape))
+                }
+            })
+        };
+        let next = self.next_of(memory, convert, Array2::dim)?;
+        Ok(next.map(|(time_s, next)| {
+            *frame = next;
+            time_s
+        }))
     }
 }
 

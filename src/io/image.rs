@@ -150,17 +150,8 @@ pub fn image_size(path: impl AsRef<Path>) -> Option<(usize, usize)> {
 /// # Errors
 /// As [`read_grey_image`].
 pub fn read_grey_levels(path: &Path, bits: Option<u8>) -> Result<Array2<u8>, FileError> {
-    levels_of(&read_bytes(path)?, path, Grey::default(), bits)
-}
-
-/// The levels of an encoded image in eight bits a pixel. Errors call it `path`.
-pub fn levels_of(
-    bytes: &[u8],
-    path: &Path,
-    grey: Grey,
-    bits: Option<u8>,
-) -> Result<Array2<u8>, FileError> {
-    eight_bit_levels(decode(bytes, path)?, bytes, path, grey, bits)
+    let bytes = read_bytes(path)?;
+    eight_bit_levels(decode(&bytes, path)?, &bytes, path, Grey::default(), bits)
 }
 
 /// The levels of an image, whose encoded `bytes` may state the largest sample, in eight bits a
@@ -203,13 +194,17 @@ pub fn eight_bit_levels(
 pub fn read_colour_levels(path: impl AsRef<Path>) -> Result<Array3<u8>, FileError> {
     let path = path.as_ref();
     let image = decode(&read_bytes(path)?, path)?;
+    colour_levels(image).ok_or_else(|| refused(path, "it is grey, a colour image is needed"))
+}
+
+/// Red, green and blue in eight bits. `None` for a grey image.
+pub fn colour_levels(image: DynamicImage) -> Option<Array3<u8>> {
     if !image.color().has_color() {
-        return Err(refused(path, "it is grey, a colour image is needed"));
+        return None;
     }
     let image = image.into_rgb8();
     let shape = (image.height() as usize, image.width() as usize, 3);
-    let levels = Array3::from_shape_vec(shape, image.into_raw());
-    Ok(levels.unwrap_or_else(|_| Array3::zeros(shape)))
+    Array3::from_shape_vec(shape, image.into_raw()).ok()
 }
 
 /// Reads the image that a field of `file` names. It has to have the size of the reference, where
@@ -241,7 +236,7 @@ pub fn largest_image() -> (u32, u64) {
     (30_000, 64_000_000)
 }
 
-fn decode(bytes: &[u8], path: &Path) -> Result<DynamicImage, FileError> {
+pub fn decode(bytes: &[u8], path: &Path) -> Result<DynamicImage, FileError> {
     let (side, pixels) = largest_image();
     let mut limits = Limits::default();
     limits.max_image_width = Some(side);

@@ -142,7 +142,7 @@ pub fn run(arguments: &DepthArguments, context: &mut Context) -> Result<Exit, Fa
     };
     let reference = frames.read_reference(grey)?;
     let reading = frames.reading(grey, &reference);
-    let (images, mut exit) = reading.all(&frames.frames, context)?;
+    let (images, mut exit) = reading.all::<Array2<u8>>(&frames.frames, context)?;
     // Frames are held, and each has a surface with its plot.
     let pixels = (reference.len() * images.len()) as f64;
     let job = format!("the depth of {} frames", images.len());

@@ -5,6 +5,7 @@ use crate::console::{Bar, Context, Exit, Failure, in_unit};
 use crate::frames::NamedFrame;
 use crate::outputs::Csv;
 use clap::Args;
+use ndarray::Array2;
 use serde::Serialize;
 use serde_json::json;
 use std::path::PathBuf;
@@ -73,7 +74,7 @@ pub fn run(arguments: &ForceArguments, context: &mut Context) -> Result<Exit, Fa
     ]);
     let mut bar = Bar::of(frames.frames.len(), "measuring");
     context.interrupt.polled(true);
-    for (k, frame) in reading.frames(&frames.frames).enumerate() {
+    for (k, frame) in reading.frames::<Array2<u8>>(&frames.frames).enumerate() {
         if context.interrupt.requested() {
             break;
         }

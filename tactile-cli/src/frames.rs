@@ -1,14 +1,44 @@
 //! The frames of images, stacks, videos and pipes, as several subcommands measure them.
 use crate::arguments::same_shape;
 use crate::console::{Context, Exit, Failure};
-use ndarray::Array2;
+use ndarray::{Array2, Array3};
 use std::ffi::OsString;
+use std::marker::PhantomData;
 use std::path::{Path, PathBuf};
-use tactile_imaging::io::{FrameReader, Grey};
+use tactile_imaging::io::{FileError, FrameReader, Grey};
 use tactile_imaging::pipeline::FrameSource;
 
 /// Frames per second where neither stream nor argument states them: those of the paper's camera.
 pub const DEFAULT_RATE_HZ: f64 = 80.0;
+
+/// The pixels of a frame, grey or in colours.
+pub trait Pixels: Default {
+    /// Reads the next frame in place of this one, and returns its time in seconds.
+    fn read_next(&mut self, reader: &mut FrameReader) -> Result<Option<f64>, FileError>;
+
+    /// Rows and columns.
+    fn size(&self) -> (usize, usize);
+}
+
+impl Pixels for Array2<u8> {
+    fn read_next(&mut self, reader: &mut FrameReader) -> Result<Option<f64>, FileError> {
+        reader.next_frame(self)
+    }
+
+    fn size(&self) -> (usize, usize) {
+        self.dim()
+    }
+}
+
+impl Pixels for Array3<u8> {
+    fn read_next(&mut self, reader: &mut FrameReader) -> Result<Option<f64>, FileError> {
+        reader.next_colour_frame(self)
+    }
+
+    fn size(&self) -> (usize, usize) {
+        (self.dim().0, self.dim().1)
+    }
+}
 
 /// How frames are read: the colours' grey, the camera's bits and the reference they have to fit.
 #[derive(Clone, Copy)]
@@ -27,14 +57,14 @@ impl Reading<'_> {
     }
 
     /// Refuses a frame of another size than the reference.
-    pub fn fits(&self, path: &Path, frame: &Array2<u8>) -> Result<(), Failure> {
-        same_shape((path, frame.dim()), (self.reference, self.size))
+    pub fn fits(&self, path: &Path, frame: &impl Pixels) -> Result<(), Failure> {
+        same_shape((path, frame.size()), (self.reference, self.size))
     }
 
     /// Finds a file that cannot be read before the first one is measured. A pipe is read once.
     pub fn check(&self, paths: &[PathBuf]) -> Result<(), Failure> {
         let files = paths.iter().filter(|path| *path != Path::new("-"));
-        let mut frame = Array2::default((0, 0));
+        let mut frame = Array2::zeros((0, 0));
         for path in files {
             self.open(path)?.next_frame(&mut frame)?;
             self.fits(path, &frame)?;
@@ -43,21 +73,22 @@ impl Reading<'_> {
     }
 
     /// The frames of these files, each with its name.
-    pub fn frames<'a>(&'a self, paths: &'a [PathBuf]) -> Frames<'a> {
+    pub fn frames<'a, P: Pixels>(&'a self, paths: &'a [PathBuf]) -> Frames<'a, P> {
         Frames {
             reading: self,
             paths: paths.iter(),
             open: None,
+            pixels: PhantomData,
         }
     }
 
     /// All frames of these files. A stream that breaks off leaves those before, and makes the
     /// answer a partial one.
-    pub fn all(
+    pub fn all<P: Pixels>(
         &self,
         paths: &[PathBuf],
         context: &mut Context,
-    ) -> Result<(Vec<NamedFrame>, Exit), Failure> {
+    ) -> Result<(Vec<NamedFrame<P>>, Exit), Failure> {
         let (mut frames, mut exit) = (Vec::new(), Exit::Complete);
         for frame in self.frames(paths) {
             match frame {
@@ -80,15 +111,15 @@ impl Reading<'_> {
 }
 
 /// A frame with its name.
-pub struct NamedFrame {
+pub struct NamedFrame<P = Array2<u8>> {
     pub name: String,
     /// What the files of its results begin with.
     pub stem: OsString,
-    pub pixels: Array2<u8>,
+    pub pixels: P,
 }
 
-impl NamedFrame {
-    fn new(path: &Path, number: usize, pixels: Array2<u8>) -> Self {
+impl<P> NamedFrame<P> {
+    fn new(path: &Path, number: usize, pixels: P) -> Self {
         let (mut name, mut stem) = match path.to_str() {
             Some("-") => ("standard input".to_owned(), "stdin".into()),
             _ => (
@@ -113,15 +144,16 @@ impl NamedFrame {
 
 /// Frames one after the other. The failure of a stream that breaks off after its first frame is a
 /// partial answer, that of any other file an input that cannot be used.
-pub struct Frames<'a> {
+pub struct Frames<'a, P> {
     reading: &'a Reading<'a>,
     paths: std::slice::Iter<'a, PathBuf>,
     /// The file that is read, and the number of its frames so far.
     open: Option<(&'a Path, FrameReader, usize)>,
+    pixels: PhantomData<P>,
 }
 
-impl Iterator for Frames<'_> {
-    type Item = Result<NamedFrame, Failure>;
+impl<P: Pixels> Iterator for Frames<'_, P> {
+    type Item = Result<NamedFrame<P>, Failure>;
 
     fn next(&mut self) -> Option<Self::Item> {
         loop {
@@ -133,8 +165,8 @@ impl Iterator for Frames<'_> {
                 }
                 continue;
             };
-            let mut frame = Array2::default((0, 0));
-            let next = reader.next_frame(&mut frame).map_err(Failure::from);
+            let mut frame = P::default();
+            let next = frame.read_next(reader).map_err(Failure::from);
             let next = next.and_then(|time_s| {
                 let fits = time_s.map(|_| self.reading.fits(path, &frame));
                 fits.transpose()

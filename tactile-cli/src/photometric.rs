@@ -1,15 +1,16 @@
 //! Sensors with a gel that is lit in colours: `tactile calibrate` and `tactile depth` for them.
 use crate::console::{Context, Exit, Failure, four_digits, in_unit};
+use crate::frames::{NamedFrame, Reading};
 use crate::outputs::{Csv, beside};
 use crate::plot::{HeatMap, Page, Panel};
 use clap::Arg;
 use clap::builder::ArgPredicate;
+use ndarray::Array3;
 use serde::Serialize;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
-use std::time::Instant;
 use tactile_imaging::core::Estimate;
-use tactile_imaging::io::{read_bytes, read_colour_levels};
+use tactile_imaging::io::{Grey, read_bytes};
 use tactile_imaging::sensor::{GelForce, PhotometricPresses, PhotometricSensor};
 use tactile_imaging::sfs::{PhotometricCalibration, PhotometricReading, PhotometricStereo};
 
@@ -117,29 +118,43 @@ fn print(names: &[PathBuf], found: &PhotometricCalibration, context: &mut Contex
 const NO_GEL: &str = "the sensor file has no [gel]: give its calibration the gel's thickness \
     and modulus, or a frame under a known weight";
 
+/// Why nothing is measured.
+pub const NO_FRAMES: &str =
+    "a sensor file names no frames: give images, a video or - for a pipe after it";
+
 /// A sensor with its law of forces, or why there is none.
-struct Reader {
-    stereo: PhotometricStereo,
-    law: Result<GelForce, String>,
+pub struct Reader {
+    pub stereo: PhotometricStereo,
+    pub law: Result<GelForce, String>,
 }
 
 impl Reader {
-    fn open(sensor: &Path) -> Result<Self, Failure> {
+    pub fn open(sensor: &Path) -> Result<Self, Failure> {
         let (stereo, gel) = PhotometricSensor::read(sensor)?;
         let law = gel.ok_or_else(|| NO_GEL.to_owned());
         let law = law.and_then(|gel| GelForce::new(&gel, &stereo).map_err(|e| e.to_string()));
         Ok(Self { stereo, law })
     }
 
+    /// How its frames are read.
+    pub fn reading<'a>(&self, sensor: &'a Path) -> Reading<'a> {
+        Reading {
+            grey: Grey::default(),
+            bits: None,
+            reference: sensor,
+            size: self.stereo.shape(),
+        }
+    }
+
     /// The force of a frame with contact, none without, or why it has none.
-    fn force(&self, reading: &PhotometricReading) -> Result<Option<Estimate>, String> {
+    pub fn force(&self, reading: &PhotometricReading) -> Result<Option<Estimate>, String> {
         let law = self.law.as_ref().map_err(String::clone)?;
         law.force(reading).map_err(|error| error.to_string())
     }
 }
 
 /// A force, null without contact, or an object with the reason why there is none.
-fn number_or_error(force: &Result<Option<Estimate>, String>) -> Value {
+pub fn number_or_error(force: &Result<Option<Estimate>, String>) -> Value {
     match force {
         Ok(force) => json!(force),
         Err(reason) => json!({ "error": reason }),
@@ -149,87 +164,9 @@ fn number_or_error(force: &Result<Option<Estimate>, String>) -> Value {
 /// Reads depth, contact and force of frames with a sensor file, and gives the tables of `depth`.
 pub fn measure(sensor: &Path, frames: &[PathBuf], context: &mut Context) -> Result<Exit, Failure> {
     if frames.is_empty() {
-        let sentence = "a sensor file names no frames: give images after it";
-        return Err(Failure::in_file(sensor, sentence));
+        return Err(Failure::in_file(sensor, NO_FRAMES));
     }
     depth(sensor, frames, true, context)
-}
-
-/// Reads images one after the other at `rate_hz`: a row of stream.csv for each. At most this share
-/// in per cent may take longer than a frame lasts.
-pub fn stream(
-    sensor: &Path,
-    frames: &[PathBuf],
-    rate_hz: f64,
-    allowed_late: f64,
-    context: &mut Context,
-) -> Result<Exit, Failure> {
-    let reader = Reader::open(sensor)?;
-    let size = reader.stereo.model().pixel_size_m;
-    let mut csv = Csv::new(&[
-        "time_s",
-        "force_N",
-        "force_error_N",
-        "contact_area_m2",
-        "largest_depth_m",
-        "largest_depth_error_m",
-    ]);
-    // A frame that cannot be read is a caution, and the stream goes on.
-    let (mut late, mut unread, mut values) = (0, 0, Vec::new());
-    for (k, path) in frames.iter().enumerate() {
-        if context.interrupt.requested() {
-            break;
-        }
-        let frame = match read_colour_levels(path) {
-            Ok(frame) => frame,
-            Err(error) => {
-                context.caution(error);
-                unread += 1;
-                continue;
-            }
-        };
-        let start = Instant::now();
-        let reading = match reader.stereo.read(frame.view()) {
-            Ok(reading) => reading,
-            Err(error) => {
-                context.caution(Failure::in_file(path, error));
-                unread += 1;
-                continue;
-            }
-        };
-        let contact = Contact::of(&reading, size);
-        let force = reader.force(&reading);
-        late += usize::from(start.elapsed().as_secs_f64() * rate_hz > 1.0);
-        let time_s = k as f64 / rate_hz;
-        values.push(json!({
-            "time_s": time_s, "force_n": number_or_error(&force), "contact": contact,
-        }));
-        let force = force.ok().flatten();
-        let area = contact.as_ref().map(|contact| contact.area_m2);
-        let depth = contact.as_ref().map(|contact| contact.largest_depth_m);
-        let [force_n, depth_m] = [force, depth]
-            .map(|pair| pair.map_or([None; 2], |e| [Some(e.value), Some(e.standard_error)]));
-        let cells = [[Some(time_s)].as_slice(), &force_n, &[area], &depth_m].concat();
-        csv.cells(cells);
-    }
-    let percent = 100.0 * late as f64 / values.len().max(1) as f64;
-    let count = values.len();
-    context.line(format_args!(
-        "{count} frames at {rate_hz} Hz, {late} late ({percent:.1} %)"
-    ));
-    if let Err(reason) = &reader.law {
-        context.answer("force", format_args!("none: {reason}"));
-    }
-    context.value(&json!({
-        "frames": count, "rate_hz": rate_hz, "late": late, "updates": values,
-    }));
-    context.outputs.add("stream.csv", csv.into_bytes());
-    if percent > allowed_late {
-        context.note(format_args!(
-            "{percent:.1} % of the frames came late, more than {allowed_late} %"
-        ));
-    }
-    Ok(Exit::complete_if(unread == 0 && percent <= allowed_late))
 }
 
 /// Reads gradients and depth of frames with a sensor file, and their forces where `forces` is set.
@@ -239,15 +176,20 @@ pub fn depth(
     forces: bool,
     context: &mut Context,
 ) -> Result<Exit, Failure> {
+    let reader = Reader::open(sensor)?;
+    let stereo = &reader.stereo;
+    let size = stereo.model().pixel_size_m;
+    let source = reader.reading(sensor);
+    let (images, exit) = source.all::<Array3<u8>>(frames, context)?;
     let suffixes = [
         "_depth.csv",
         "_gradient_x.csv",
         "_gradient_y.csv",
         "_depth.svg",
     ];
-    let names = frames
+    let names = images
         .iter()
-        .flat_map(|frame| suffixes.map(|suffix| beside(frame, suffix)));
+        .flat_map(|image| suffixes.map(|suffix| image.file(suffix)));
     let names: Vec<_> = names.collect();
     let inputs: Vec<&Path> = frames
         .iter()
@@ -255,22 +197,17 @@ pub fn depth(
         .chain([sensor])
         .collect();
     context.outputs.plan(&names, &inputs)?;
-    let reader = Reader::open(sensor)?;
-    let stereo = &reader.stereo;
-    let size = stereo.model().pixel_size_m;
-    let images = frames.iter().map(read_colour_levels);
-    let images = images.collect::<Result<Vec<_>, _>>()?;
     let mut values = Vec::new();
-    for (k, path) in frames.iter().enumerate() {
-        let reading = stereo.read(images[k].view());
-        let reading = reading.map_err(|error| Failure::in_file(path, error))?;
-        context.line(format_args!("{}:", path.display()));
+    for (k, NamedFrame { name, pixels, .. }) in images.iter().enumerate() {
+        let reading = stereo.read(pixels.view());
+        let reading = reading.map_err(|error| Failure::in_file(Path::new(name), error))?;
+        context.line(format_args!("{name}:"));
         let contact = Contact::of(&reading, size);
         match &contact {
             Some(contact) => contact.print(context),
             None => context.line("no contact"),
         }
-        let mut value = json!({ "frame": path.display().to_string(), "contact": contact });
+        let mut value = json!({ "frame": name, "contact": contact });
         if forces && contact.is_some() {
             let force = reader.force(&reading);
             match &force {
@@ -296,19 +233,19 @@ pub fn depth(
             .page(&names[4 * k + 3], || page(&reading, size))?;
     }
     context.value(&json!({ "frames": values }));
-    Ok(Exit::Complete)
+    Ok(exit)
 }
 
 /// What a frame's contact is printed by.
 #[derive(Serialize)]
-struct Contact {
-    centroid: [f64; 2],
-    area_m2: f64,
-    largest_depth_m: Estimate,
+pub struct Contact {
+    pub centroid: [f64; 2],
+    pub area_m2: f64,
+    pub largest_depth_m: Estimate,
 }
 
 impl Contact {
-    fn of(reading: &PhotometricReading, size: f64) -> Option<Self> {
+    pub fn of(reading: &PhotometricReading, size: f64) -> Option<Self> {
         let mut sums = [0.0; 3];
         let touched = reading
             .contact

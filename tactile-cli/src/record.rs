@@ -1,12 +1,12 @@
-//! `tactile stream --record FILE.y4m`: the frames as they came, with their answers beside them.
+//! `tactile stream --record FILE`: the frames as they came, with their answers beside them.
 use crate::console::Failure;
-use ndarray::ArrayView2;
+use ndarray::{ArrayView3, Axis};
 use std::fs::File;
 use std::io::{BufWriter, Result as IoResult, Write};
 use std::path::{Path, PathBuf};
 
-/// A video of grey frames, which `tactile stream` measures again to the same bits, and a table of
-/// the answers.
+/// Frames that `tactile stream` measures again to the same bits, and a table of the answers: a
+/// video of grey frames, or PPM images one after the other, for the colours of a video are coarser.
 ///
 /// Both grow frame by frame: a run that is killed leaves all frames but perhaps the last.
 pub struct FrameRecorder {
@@ -34,22 +34,26 @@ impl FrameRecorder {
         })
     }
 
-    /// Adds a frame.
-    pub fn frame(&mut self, frame: ArrayView2<'_, u8>, rate_hz: f64) -> Result<(), Failure> {
+    /// Adds a frame of one or three channels, `[row, column, channel]`.
+    pub fn frame(&mut self, frame: ArrayView3<'_, u8>, rate_hz: f64) -> Result<(), Failure> {
         self.written(|recorder| {
             let video = &mut recorder.video;
-            if !recorder.started {
-                let (rows, columns) = frame.dim();
-                // A rate is a fraction there. Six decimals hold those of all cameras.
-                let rate = (1e6 * rate_hz).round();
-                writeln!(
-                    video,
-                    "YUV4MPEG2 W{columns} H{rows} F{rate}:1000000 Ip A1:1 Cmono"
-                )?;
-                recorder.started = true;
+            let (rows, columns, channels) = frame.dim();
+            if channels == 3 {
+                write!(video, "P6\n{columns} {rows}\n255\n")?;
+            } else {
+                if !recorder.started {
+                    // A rate is a fraction there. Six decimals hold those of all cameras.
+                    let rate = (1e6 * rate_hz).round();
+                    writeln!(
+                        video,
+                        "YUV4MPEG2 W{columns} H{rows} F{rate}:1000000 Ip A1:1 Cmono"
+                    )?;
+                    recorder.started = true;
+                }
+                video.write_all(b"FRAME\n")?;
             }
-            video.write_all(b"FRAME\n")?;
-            for row in frame.rows() {
+            for row in frame.axis_iter(Axis(0)) {
                 match row.as_slice() {
                     Some(row) => video.write_all(row)?,
                     None => row

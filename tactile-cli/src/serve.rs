@@ -2,7 +2,7 @@
 use crate::console::Failure;
 use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
-use ndarray::ArrayView2;
+use ndarray::{ArrayView3, Axis, Slice};
 use serde_json::{Value, json};
 use std::error::Error;
 use std::io::Write;
@@ -121,12 +121,12 @@ impl LivePage {
         Ok(page)
     }
 
-    /// Shows the numbers of a frame, and its picture and its surface where the last ones are old
-    /// enough and somebody looks.
+    /// Shows the numbers of a frame of one or three channels, `[row, column, channel]`, and its
+    /// picture and its surface where the last ones are old enough and somebody looks.
     pub fn show(
         &mut self,
         numbers: Value,
-        frame: ArrayView2<'_, u8>,
+        frame: ArrayView3<'_, u8>,
         surface: impl FnOnce() -> Value,
     ) {
         let watched = self.shared.viewers.load(Ordering::Relaxed) > 0;
@@ -158,14 +158,14 @@ impl LivePage {
 }
 
 /// A thinned frame.
-fn picture(frame: ArrayView2<'_, u8>) -> Value {
-    let step = frame.ncols().div_ceil(PICTURE_COLUMNS).max(1);
-    let rows = frame.rows().into_iter().step_by(step);
-    let bytes: Vec<u8> = rows
-        .flat_map(|row| row.into_iter().step_by(step).copied())
-        .collect();
-    let width = frame.ncols().div_ceil(step);
-    json!({ "width": width, "grey": BASE64_STANDARD.encode(bytes) })
+fn picture(frame: ArrayView3<'_, u8>) -> Value {
+    let (_, columns, channels) = frame.dim();
+    let step = columns.div_ceil(PICTURE_COLUMNS).max(1);
+    let every = Slice::new(0, None, step as isize);
+    let rows = frame.slice_axis(Axis(0), every);
+    let bytes: Vec<u8> = rows.slice_axis(Axis(1), every).iter().copied().collect();
+    let width = columns.div_ceil(step);
+    json!({ "width": width, "channels": channels, "levels": BASE64_STANDARD.encode(bytes) })
 }
 
 impl Drop for LivePage {

@@ -1,16 +1,20 @@
 //! `tactile stream`: force and modulus live, from a simulated series at camera rate or from
 //! recorded frames.
+mod coloured;
+mod watch;
+
+use self::coloured::coloured;
+use self::watch::{Progress, Watcher, listed, watch};
 use crate::arguments::{force_n, not_negative, positive};
 use crate::console::{Bar, Context, Exit, Failure};
 use crate::frames::{DEFAULT_RATE_HZ, Reading};
 use crate::outputs::Csv;
-use crate::photometric;
 use crate::plot::known_heights_mm;
 use crate::record::FrameRecorder;
 use crate::relief::HeightGrid;
 use crate::serve::LivePage;
 use clap::Args;
-use ndarray::{Array2, ArrayView2};
+use ndarray::{Array2, ArrayView2, ArrayView3, Axis};
 use serde::Serialize;
 use serde_json::{Value, json};
 use std::mem::discriminant;
@@ -33,8 +37,8 @@ use tactile_simulate::{CalibrationRun, Camera, Gain, LoadCycle, PressLoad, Press
 /// modulus ends outside the tolerance. With SCENE.toml (see `tactile measure`), which describes
 /// sensor and object, recorded frames are measured one after the other, as fast as they can be. One
 /// is late if that takes longer than a frame at --rate lasts. --out gets stream.csv, a row a frame.
-/// In place of the scene goes the sensor file of a gel that is lit in colours, with images or
-/// folders of them: force, contact and depth.
+/// In place of the scene goes the sensor file of a gel that is lit in colours, with its frames:
+/// force, contact and depth.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -48,6 +52,7 @@ A camera or a video, by a pipe (ffmpeg has names for the cameras of every system
   ffmpeg -f v4l2 -i /dev/video0 -f yuv4mpegpipe -pix_fmt gray - | tactile stream scene.toml -
   ffmpeg -i press.mp4 -f yuv4mpegpipe -pix_fmt gray - | tactile stream scene.toml - --out results
   … | tactile stream scene.toml - --record today.y4m --serve --report today.html
+  ffmpeg -f v4l2 -i /dev/video0 -f image2pipe -c:v ppm - | tactile stream coloured_sensor.toml -
 
 Frames on the pipe are YUV4MPEG2 of 8 to 16 bits, binary PGM and PPM one after the other, arrays of
 numpy.save, or an AVI of JPEG frames. `-` works in the same way in measure, force and depth.")]
@@ -73,8 +78,9 @@ pub struct StreamArguments {
     /// Share of frames in per cent that may come late.
     #[arg(long, value_name = "PERCENT", default_value_t = 0.0, value_parser = not_negative)]
     allowed_late: f64,
-    /// Record the frames as they come to this video, and their answers beside it as FILE.csv. The
-    /// video gives the same answers again.
+    /// Record the frames as they come to this file, and their answers beside it as FILE.csv. The
+    /// file gives the same answers again: a video, or PPM images one after the other where the
+    /// gel is lit in colours.
     #[arg(long, value_name = "FILE.y4m")]
     record: Option<PathBuf>,
     /// Show frame, force, modulus, surface and the sensor's health in browsers as they come. An
@@ -170,14 +176,8 @@ struct Live {
     rows: Vec<Row>,
     /// One of every kind, of the frame where it came first.
     cautions: Vec<Flag>,
-    late: usize,
-    rate_hz: f64,
-    /// The number of frames that came, measured or not.
-    seen: usize,
-    /// Those, and the files, that could not be measured.
-    unusable: usize,
-    page: Option<LivePage>,
-    recording: Option<FrameRecorder>,
+    progress: Progress,
+    shown: Shown,
     /// Where the frames are simulated.
     truth_pa: Option<f64>,
     /// Strain is measured in frames of at least this force.
@@ -192,62 +192,32 @@ impl Live {
         context: &Context,
     ) -> Result<Self, Failure> {
         let largest_n = arguments.force.unwrap_or(SIMULATED_FORCE_N);
-        let page = arguments.serve.map(LivePage::serve).transpose()?;
-        if let Some(page) = &page {
-            context.note(format_args!("the measurement is shown at {}", page.url));
-        }
-        let recording = arguments.record.as_deref().map(FrameRecorder::create);
         Ok(Self {
-            seen: 0,
-            unusable: 0,
-            page,
-            recording: recording.transpose()?,
+            shown: Shown::new(arguments, context)?,
+            progress: Progress::new(arguments.rate.unwrap_or(DEFAULT_RATE_HZ)),
             session,
             rows: Vec::new(),
             cautions: Vec::new(),
-            late: 0,
-            rate_hz: arguments.rate.unwrap_or(DEFAULT_RATE_HZ),
             truth_pa,
             strained_above_n: arguments.strain.then_some(largest_n / 3.0),
         })
     }
 
-    /// Records a frame, measures it and shows its answer. Returns how long measuring and showing
-    /// took.
-    fn take(&mut self, time_s: f64, frame: ArrayView2<'_, u8>) -> Result<Duration, Failure> {
-        if let Some(recording) = &mut self.recording {
-            recording.frame(frame, self.rate_hz)?;
-        }
-        let start = Instant::now();
-        let pushed = self.push(time_s, frame);
-        pushed.map_err(|error| Failure::no_answer(format!("frame {}: {error}", self.seen)))?;
-        self.show(frame);
-        let took = start.elapsed();
-        if let (Some(recording), Some(row)) = (&mut self.recording, self.rows.last()) {
-            let mut csv = match self.rows.len() {
-                1 => Csv::new(&COLUMNS),
-                _ => Csv::default(),
-            };
-            row.add_to(&mut csv);
-            recording.answers(&csv.into_bytes())?;
-        }
-        Ok(took)
-    }
-
     fn show(&mut self, frame: ArrayView2<'_, u8>) {
-        let (Some(page), Some(row)) = (&mut self.page, self.rows.last()) else {
+        let (Some(page), Some(row)) = (&mut self.shown.page, self.rows.last()) else {
             return;
         };
         let cautions: Vec<String> = self.cautions.iter().map(ToString::to_string).collect();
         let centre = row.centre_px.map(|c| c.map(|c| c / frame.ncols() as f64));
         let of = |e: Estimate| [e.value, e.standard_error];
         let numbers = json!({
-            "frame": self.seen, "time_s": row.time_s, "late": self.late, "cautions": cautions,
+            "frame": self.progress.seen, "time_s": row.time_s, "late": self.progress.late,
+            "cautions": cautions,
             "force_n": row.force_n.map(of), "centre": centre,
             "modulus_pa": row.modulus.map(|m| [m.value, m.standard_error]),
         });
         let session = &mut self.session;
-        page.show(numbers, frame, || {
+        page.show(numbers, frame.insert_axis(Axis(2)), || {
             let health = health_words(session);
             // A frame without contact has no surface.
             let Ok(found) = session.surface() else {
@@ -292,40 +262,6 @@ impl Live {
         Ok(())
     }
 
-    /// Measures the frames of a file or a pipe as they come, in the memory of `frame`.
-    fn watch(
-        &mut self,
-        path: &Path,
-        reading: Reading<'_>,
-        arguments: &StreamArguments,
-        frame: &mut Array2<u8>,
-        context: &mut Context,
-    ) -> Result<(), Failure> {
-        let mut source = reading.open(path)?;
-        let own_hz = arguments.rate.or(source.frame_rate_hz());
-        self.rate_hz = own_hz.unwrap_or(self.rate_hz);
-        while !context.interrupt.requested() && source.next_frame(frame)?.is_some() {
-            reading.fits(path, frame)?;
-            let time_s = self.seen as f64 / self.rate_hz;
-            self.seen += 1;
-            // Reading the file is not part of the measurement.
-            match self.take(time_s, frame.view()) {
-                Ok(took) => self.late += usize::from(took.as_secs_f64() > 1.0 / self.rate_hz),
-                // A frame without an answer does not end a stream, and thousands of them are one
-                // trouble.
-                Err(failure) if failure.exit == Exit::Partial => {
-                    self.unusable += 1;
-                    if self.unusable <= 3 {
-                        context.caution(Failure::in_file(path, failure));
-                    }
-                }
-                Err(failure) => return Err(failure),
-            }
-            self.print_last(self.rows.len() <= 32, context);
-        }
-        Ok(())
-    }
-
     /// Mean strain along x and z. It is none in the frame that strain is counted from, and where
     /// the match has too few points.
     fn strain(&mut self) -> Result<Option<[f64; 2]>, PipelineError> {
@@ -334,10 +270,6 @@ impl Live {
             Err(PipelineError::TooFewMatches { .. } | PipelineError::Surface { .. }) => Ok(None),
             Err(error) => Err(error),
         }
-    }
-
-    fn late_percent(&self) -> f64 {
-        100.0 * self.late as f64 / self.rows.len().max(1) as f64
     }
 
     fn print_heading(&self, context: &mut Context) {
@@ -351,40 +283,15 @@ impl Live {
         ));
     }
 
-    /// Prints a line for every frame or, of a long series, for one out of sixteen.
-    fn print_last(&self, every_one: bool, context: &mut Context) {
-        let Some(row) = self.rows.last() else {
-            return;
-        };
-        if !every_one && !(self.rows.len() - 1).is_multiple_of(16) {
-            return;
-        }
-        let unknown = || "-".to_owned();
-        let number = |number: Option<Estimate>, scale: f64| {
-            number.map_or_else(unknown, |e| format!("{:.4}", e.value * scale))
-        };
-        let [force, radius] = [number(row.force_n, 1.0), number(row.radius_m, 1e3)];
-        let kpa = |m: Modulus| with_error(m.value, m.standard_error, 1e-3);
-        let modulus = row.modulus.map_or_else(unknown, kpa);
-        let strain = row.strain_xx_zz.map(|[x, z]| format!("{x:+.3}, {z:+.3}"));
-        let (time, late) = (row.time_s, self.late_percent());
-        let strain = strain.unwrap_or_default();
-        let line =
-            format!("{time:8.3} {force:>11} {radius:>13} {late:10.1}   {modulus:<18}{strain}");
-        context.line(line.trim_end());
-    }
-
     /// Prints the results of the whole series, and adds its table to the files.
     fn finish(
         mut self,
         arguments: &StreamArguments,
         context: &mut Context,
     ) -> Result<Exit, Failure> {
-        let (frames, late, rate) = (self.rows.len(), self.late, self.rate_hz);
-        let percent = self.late_percent();
-        context.line(format_args!(
-            "{frames} frames at {rate} Hz, {late} late ({percent:.1} %)"
-        ));
+        let (frames, late, rate) = (self.rows.len(), self.progress.late, self.progress.rate_hz);
+        let percent = self.progress.late_percent(frames);
+        self.progress.print(frames, context);
         let modulus = self.session.modulus();
         let error = |pa: f64| self.truth_pa.map(|truth| 100.0 * (pa / truth - 1.0));
         let answer = match &modulus {
@@ -456,6 +363,100 @@ impl Live {
             }
         }
         Ok(exit)
+    }
+}
+
+impl Watcher for Live {
+    type Frame = Array2<u8>;
+
+    fn progress(&mut self) -> &mut Progress {
+        &mut self.progress
+    }
+
+    fn measured(&self) -> usize {
+        self.rows.len()
+    }
+
+    fn take(&mut self, time_s: f64, frame: &Array2<u8>) -> Result<Duration, Failure> {
+        let seen = self.progress.seen;
+        self.shown
+            .record(frame.view().insert_axis(Axis(2)), self.progress.rate_hz)?;
+        let start = Instant::now();
+        let pushed = self.push(time_s, frame.view());
+        pushed.map_err(|error| Failure::no_answer(format!("frame {seen}: {error}")))?;
+        self.show(frame.view());
+        let took = start.elapsed();
+        if let Some(row) = self.rows.last() {
+            self.shown
+                .record_answer(self.rows.len(), &COLUMNS, |csv| row.add_to(csv))?;
+        }
+        Ok(took)
+    }
+
+    fn print_last(&self, every_one: bool, context: &mut Context) {
+        let Some(row) = self.rows.last() else {
+            return;
+        };
+        if !every_one && !(self.rows.len() - 1).is_multiple_of(16) {
+            return;
+        }
+        let unknown = || "-".to_owned();
+        let number = |number: Option<Estimate>, scale: f64| {
+            number.map_or_else(unknown, |e| format!("{:.4}", e.value * scale))
+        };
+        let [force, radius] = [number(row.force_n, 1.0), number(row.radius_m, 1e3)];
+        let kpa = |m: Modulus| with_error(m.value, m.standard_error, 1e-3);
+        let modulus = row.modulus.map_or_else(unknown, kpa);
+        let strain = row.strain_xx_zz.map(|[x, z]| format!("{x:+.3}, {z:+.3}"));
+        let (time, late) = (row.time_s, self.progress.late_percent(self.measured()));
+        let strain = strain.unwrap_or_default();
+        let line =
+            format!("{time:8.3} {force:>11} {radius:>13} {late:10.1}   {modulus:<18}{strain}");
+        context.line(line.trim_end());
+    }
+}
+
+/// Where the frames of a stream go, beside its answers: a page for browsers and a file.
+struct Shown {
+    page: Option<LivePage>,
+    recording: Option<FrameRecorder>,
+}
+
+impl Shown {
+    fn new(arguments: &StreamArguments, context: &Context) -> Result<Self, Failure> {
+        let page = arguments.serve.map(LivePage::serve).transpose()?;
+        if let Some(page) = &page {
+            context.note(format_args!("the measurement is shown at {}", page.url));
+        }
+        let recording = arguments.record.as_deref().map(FrameRecorder::create);
+        Ok(Self {
+            page,
+            recording: recording.transpose()?,
+        })
+    }
+
+    /// Records a frame, `[row, column, channel]`.
+    fn record(&mut self, frame: ArrayView3<'_, u8>, rate_hz: f64) -> Result<(), Failure> {
+        let recording = self.recording.as_mut();
+        recording.map_or(Ok(()), |recording| recording.frame(frame, rate_hz))
+    }
+
+    /// Records a row of answers. The first one comes with the names of the columns.
+    fn record_answer(
+        &mut self,
+        number: usize,
+        columns: &[&str],
+        add: impl FnOnce(&mut Csv),
+    ) -> Result<(), Failure> {
+        let Some(recording) = &mut self.recording else {
+            return Ok(());
+        };
+        let mut csv = match number {
+            1 => Csv::new(columns),
+            _ => Csv::default(),
+        };
+        add(&mut csv);
+        recording.answers(&csv.into_bytes())
     }
 }
 
@@ -540,154 +541,16 @@ fn recorded(
         .map_err(|error| Failure::input(scene.measure_error(error)))?;
     let mut live = Live::new(session, arguments, None, context)?;
     live.print_heading(context);
-    // The clock of a recording is the number in its frames' names, where they have one.
-    let numbers = numbers(&frames);
-    let last = numbers.as_deref().and_then(<[_]>::last);
-    let missing = last.map_or(0, |&last| last + 1 - frames.len() as u64);
     let reading = Reading {
         grey: Grey::default(),
         bits: scene.bits,
         reference: &scene.reference,
         size: data.reference.dim(),
     };
-    let mut bar = Bar::of(frames.len(), "measuring");
-    let mut frame = Array2::zeros((0, 0));
-    context.interrupt.polled(true);
-    for (k, path) in frames.iter().enumerate() {
-        if context.interrupt.requested() {
-            break;
-        }
-        if let Some(numbers) = &numbers {
-            live.seen = numbers[k] as usize;
-        }
-        // A torn frame does not end a recording. Of a stream it ends what comes from there.
-        if let Err(failure) = live.watch(path, reading, arguments, &mut frame, context) {
-            if failure.exit == Exit::Output {
-                return Err(failure);
-            }
-            live.unusable += 1;
-            live.seen = live.seen.max(k + 1);
-            context.caution(failure);
-        }
-        bar.done(k + 1);
-    }
-    drop(bar);
-    let unusable = live.unusable;
-    if live.rows.is_empty() && unusable > 0 {
-        return Err(Failure::input(format!(
-            "none of the {unusable} inputs can be measured"
-        )));
-    }
-    if missing > 0 {
-        context.warn(
-            "frames_missing",
-            json!({ "frames": missing }),
-            format_args!(
-                "{missing} missing in the numbers of the frames' names: times are counted by the \
-                 numbers"
-            ),
-        );
-    }
+    watch(&mut live, &frames, reading, arguments.rate, context)?;
+    let unusable = live.progress.unusable;
     let exit = live.finish(arguments, context)?;
     Ok(if unusable > 0 { Exit::Partial } else { exit })
-}
-
-/// Measures images of a gel that is lit in colours.
-fn coloured(
-    sensor: &Path,
-    arguments: &StreamArguments,
-    context: &mut Context,
-) -> Result<Exit, Failure> {
-    let grey = [
-        ("--strain", arguments.strain),
-        ("--record", arguments.record.is_some()),
-        ("--serve", arguments.serve.is_some()),
-    ];
-    if let Some((name, _)) = grey.iter().find(|(_, given)| *given) {
-        return Err(Failure::input(format!(
-            "{name} is not there for a gel that is lit in colours"
-        )));
-    }
-    let frames = listed(&arguments.frames)?;
-    if frames.is_empty() {
-        let sentence = "a sensor file names no frames: give images or folders after it";
-        return Err(Failure::in_file(sensor, sentence));
-    }
-    context.outputs.protect(&frames)?;
-    let rate_hz = arguments.rate.unwrap_or(DEFAULT_RATE_HZ);
-    photometric::stream(sensor, &frames, rate_hz, arguments.allowed_late, context)
-}
-
-/// The numbers at the end of the frames' names, less the first one. `None` where a name has none or
-/// they do not rise.
-fn numbers(frames: &[PathBuf]) -> Option<Vec<u64>> {
-    let number = |path: &PathBuf| -> Option<u64> {
-        let stem = path.file_stem()?.to_str()?;
-        let digits = stem.trim_end_matches(|c: char| c.is_ascii_digit()).len();
-        stem[digits..].parse().ok()
-    };
-    let numbers = frames.iter().map(number).collect::<Option<Vec<u64>>>()?;
-    let first = *numbers.first()?;
-    // More than a tenth missing is a way of naming (times, dates), not a gap.
-    let last = numbers.last()?.checked_sub(first)?;
-    let few_gaps = last < frames.len() as u64 + (frames.len() as u64 / 10).max(2);
-    let rising = numbers.windows(2).all(|pair| pair[0] < pair[1]);
-    (rising && few_gaps).then(|| numbers.iter().map(|n| n - first).collect())
-}
-
-/// The images that are named, and those of the folders that are named in the order of their names.
-fn listed(paths: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
-    let mut frames = Vec::new();
-    for path in paths {
-        if !path.is_dir() {
-            frames.push(path.clone());
-            continue;
-        }
-        let name = path.display();
-        let entries = std::fs::read_dir(path).and_then(|entries| {
-            let paths = entries.map(|entry| entry.map(|e| e.path()));
-            paths.collect::<std::io::Result<Vec<PathBuf>>>()
-        });
-        let unreadable = |error| Failure::input(format!("cannot list the folder {name}: {error}"));
-        let mut images = entries.map_err(unreadable)?;
-        images.retain(|file| is_image(file));
-        if images.is_empty() {
-            return Err(Failure::input(format!(
-                "the folder {name} has no PNG, PGM, JPEG or TIFF images"
-            )));
-        }
-        images.sort_by_cached_key(|image| natural(image));
-        frames.append(&mut images);
-    }
-    Ok(frames)
-}
-
-fn is_image(path: &Path) -> bool {
-    let extension = path.extension().and_then(|e| e.to_str());
-    let extension = extension.unwrap_or_default().to_ascii_lowercase();
-    ["png", "pgm", "ppm", "jpg", "jpeg", "tif", "tiff"].contains(&extension.as_str())
-}
-
-/// The parts of a file's name, numbers by their value: frame_2 comes before frame_10.
-fn natural(path: &Path) -> Vec<(u64, String)> {
-    let name = path.file_name().unwrap_or_default().to_string_lossy();
-    let mut parts: Vec<(u64, String)> = vec![(0, String::new())];
-    let mut in_number = false;
-    for character in name.chars() {
-        let digit = character.to_digit(10);
-        if digit.is_some() && !in_number {
-            parts.push((0, String::new()));
-        }
-        in_number = digit.is_some();
-        let Some((number, text)) = parts.last_mut() else {
-            continue;
-        };
-        match digit {
-            Some(digit) => *number = number.saturating_mul(10).saturating_add(digit.into()),
-            None => text.push(character),
-        }
-    }
-    parts
 }
 
 /// Largest force of a simulation where none is given.
@@ -779,9 +642,9 @@ fn play(
         let due = Duration::from_secs_f64(*time_s);
         // A camera would deliver the frame now.
         std::thread::sleep(due.saturating_sub(start.elapsed()));
-        live.seen += 1;
-        live.take(*time_s, frame.view())?;
-        live.late += usize::from(start.elapsed() > due + period);
+        live.progress.seen += 1;
+        live.take(*time_s, frame)?;
+        live.progress.late += usize::from(start.elapsed() > due + period);
         live.print_last(false, context);
     }
     Ok(())

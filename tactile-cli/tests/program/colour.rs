@@ -1,7 +1,9 @@
 //! Gels that are lit in colours: calibrated, wrong circles named, and depth of the whole frame.
 use super::harness::{folder_with_examples, run, text, words};
 use super::json::assert_keeps_to_schema;
+use super::streams::{piped, value};
 use std::fs;
+use tactile_imaging::io::read_colour_levels;
 
 #[test]
 fn a_calibrated_gel_gives_depth_and_gradients() {
@@ -119,4 +121,79 @@ fn a_known_weight_makes_forces() {
         .parse()
         .unwrap();
     assert!((force - 2.0).abs() < 1e-6, "{rows}");
+}
+
+/// A camera's frames, as PPM images one after the other, have the answers of the files.
+#[test]
+fn a_pipe_of_colours_gives_the_answers_of_the_files() {
+    let folder = folder_with_examples();
+    let sensor = "examples/data/colour/sensor.toml";
+    let names = [3, 6].map(|k| format!("examples/data/colour/press_{k}.png"));
+    let mut camera = Vec::new();
+    for name in &names {
+        camera.extend(b"P6\n120 90\n255\n");
+        camera.extend(read_colour_levels(folder.path().join(name)).unwrap());
+    }
+    let files = |call: &str| {
+        let output = run(folder.path(), &words(call));
+        assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+        value(&output)
+    };
+    let stream = format!("stream {sensor} --rate 25 --allowed-late 100 --json");
+    let measured = files(&format!("{stream} {}", names.join(" ")));
+    assert_keeps_to_schema(&measured, "stream");
+    let live = piped(
+        folder.path(),
+        &format!("{stream} --record kept.ppm -"),
+        &camera,
+    );
+    assert_eq!(live.status.code(), Some(0), "{}", text(&live.stderr));
+    // Images named by hand lie as many frames apart as their numbers.
+    let contacts = |of: &serde_json::Value| [0, 1].map(|k| of["updates"][k]["contact"].clone());
+    assert_eq!(contacts(&value(&live)), contacts(&measured));
+    assert_eq!(value(&live)["updates"][1]["time_s"], 0.04);
+    assert_eq!(fs::read(folder.path().join("kept.ppm")).unwrap(), camera);
+    let again = files(&format!("{stream} kept.ppm"));
+    assert_eq!(again["updates"], value(&live)["updates"]);
+    let rows = fs::read_to_string(folder.path().join("kept.csv")).unwrap();
+    assert_eq!(rows.lines().count(), 3, "{rows}");
+    let depth = format!("depth --sensor {sensor} --json");
+    let piped_depth = value(&piped(folder.path(), &format!("{depth} -"), &camera));
+    let of_files = files(&format!("{depth} {}", names.join(" ")));
+    for k in [0, 1] {
+        assert_eq!(
+            piped_depth["frames"][k]["contact"],
+            of_files["frames"][k]["contact"]
+        );
+    }
+}
+
+/// One sentence for each, and what came before is kept.
+#[test]
+fn frames_without_colours_are_refused() {
+    let folder = folder_with_examples();
+    let stream = "stream examples/data/colour/sensor.toml - --allowed-late 100 --json";
+    for (bytes, found) in [
+        (
+            &b"YUV4MPEG2 W2 H1 F25:1 Cmono\nFRAME\n\x0a\x14"[..],
+            "a video in luma and chroma",
+        ),
+        (b"P5\n2 1\n255\nab", "a grey one"),
+        (b"P6\n2 1\n255\nabcdef", "has 1 rows and 2 columns"),
+    ] {
+        let output = piped(folder.path(), stream, bytes);
+        let errors = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{errors}");
+        assert!(
+            errors.contains(found) && output.stdout.is_empty(),
+            "{errors}"
+        );
+    }
+    let press = folder.path().join("examples/data/colour/press_3.png");
+    let mut cut = b"P6\n120 90\n255\n".to_vec();
+    cut.extend(read_colour_levels(press).unwrap());
+    cut.extend(b"P6\n120 90\n255\nabc");
+    let output = piped(folder.path(), stream, &cut);
+    assert_eq!(output.status.code(), Some(1), "{}", text(&output.stderr));
+    assert_eq!(value(&output)["frames"], 1);
 }

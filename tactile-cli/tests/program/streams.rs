@@ -12,7 +12,7 @@ const CALIBRATED: &str = "--reference examples/data/press/reference.png --pairs 
                           examples/data/press/calibration.csv --pixel-um 40 --json";
 
 /// Runs the program with these bytes on its standard input.
-fn piped(folder: &Path, call: &str, bytes: &[u8]) -> Output {
+pub fn piped(folder: &Path, call: &str, bytes: &[u8]) -> Output {
     let mut command = tactile(folder, &words(call));
     let mut child = command
         .stdin(Stdio::piped())
@@ -29,7 +29,7 @@ fn piped(folder: &Path, call: &str, bytes: &[u8]) -> Output {
     output
 }
 
-fn value(output: &Output) -> Value {
+pub fn value(output: &Output) -> Value {
     serde_json::from_slice(&output.stdout)
         .unwrap_or_else(|e| panic!("{e}: {}", text(&output.stderr)))
 }
@@ -196,9 +196,14 @@ fn browsers_of_this_computer_see_the_stream() {
     assert!(get("/../../etc/passwd", &address).starts_with("HTTP/1.1 404"));
     let events = get("/events", &address);
     assert!(
-        ["data: {", "\"grey\":", "\"relief\":{", "sensor: background"]
-            .iter()
-            .all(|part| events.contains(part)),
+        [
+            "data: {",
+            "\"levels\":",
+            "\"relief\":{",
+            "sensor: background"
+        ]
+        .iter()
+        .all(|part| events.contains(part)),
         "{events:.300}"
     );
     assert!(events.contains("event: end"));
