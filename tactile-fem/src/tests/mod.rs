@@ -7,6 +7,7 @@ use crate::*;
 mod contact;
 mod elements;
 mod indentation;
+mod phantoms;
 mod press;
 mod sparse;
 mod squeeze;
