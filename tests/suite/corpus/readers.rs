@@ -3,10 +3,11 @@
 //!
 //! Shared by the replay of the kept corpus and by the fuzz targets of `fuzz/`.
 
+use ndarray::{Array, Dimension};
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
 use tactile_imaging::io::{
-    CasePoints, FrameReader, Grey, read_cases, read_columns, read_grey_image, read_grid,
+    CasePoints, FileError, FrameReader, Grey, read_cases, read_columns, read_grey_image, read_grid,
     read_points,
 };
 use tactile_imaging::pipeline::FrameSource;
@@ -70,19 +71,27 @@ pub(crate) fn image(bytes: &[u8]) {
     }
 }
 
-/// A stream of frames, of which the first hundred are read.
+/// A stream of frames, of which the first hundred are read, grey and in colours.
 pub(crate) fn stream(bytes: &[u8]) {
+    frames(bytes, |reader, frame| reader.next_frame(frame));
+    frames(bytes, |reader, frame| reader.next_colour_frame(frame));
+}
+
+fn frames<D: Dimension>(
+    bytes: &[u8],
+    next: impl Fn(&mut FrameReader, &mut Array<u8, D>) -> Result<Option<f64>, FileError>,
+) {
     let input = std::io::Cursor::new(bytes.to_vec());
     let Some(mut reader) = answer(bytes, FrameReader::new(input, "stream.y4m", 80.0)) else {
         return;
     };
-    let (mut frame, mut size) = (Default::default(), None);
+    let (mut frame, mut size) = (Array::default(D::default()), None);
     for _ in 0..100 {
-        match answer(bytes, reader.next_frame(&mut frame)) {
+        match answer(bytes, next(&mut reader, &mut frame)) {
             Some(Some(time_s)) => assert!(time_s.is_finite() && !frame.is_empty()),
             _ => break,
         }
-        assert_eq!(*size.get_or_insert(frame.dim()), frame.dim());
+        assert_eq!(*size.get_or_insert(frame.raw_dim()), frame.raw_dim());
     }
 }
 
