@@ -178,6 +178,9 @@ pub enum InclusionWarning {
     /// The inclusion lies nearer to the surface or to the stage than half an element: the model
     /// does not reach that far.
     AtBoundary,
+    /// A sixth of the inclusion or more lies under the rim of the face: the model places it, and
+    /// does not reach its size.
+    AtRim,
     /// The pressure is larger on one side of the axis by more than 3 %: an inclusion off the axis,
     /// several, or a tilted block. The model is symmetric.
     Asymmetric {
@@ -216,6 +219,9 @@ impl fmt::Display for InclusionWarning {
             Self::AtBoundary => {
                 f.write_str("the lump touches the surface or the base: beyond the model")
             }
+            Self::AtRim => f.write_str(
+                "part of the lump lies under the rim of the face: press nearer to it for its size",
+            ),
             Self::Asymmetric { asymmetry } => write!(
                 f,
                 "the pressure is {:.1} % larger on one side: a lump off the axis, several, or a \

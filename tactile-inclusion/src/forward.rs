@@ -75,6 +75,8 @@ pub enum Coordinate {
     Elongation(usize),
     /// How far the inclusion is carried from the axis.
     Carried,
+    /// How far the load spreads from the axis.
+    Spread,
     /// x and y of how far a press was from where it is said to have been, in metres.
     Strayed(usize, usize),
     /// A coordinate of the second inclusion.
@@ -102,7 +104,11 @@ impl Coordinate {
     fn is_place(self) -> bool {
         matches!(
             self,
-            Self::Centre(_) | Self::Elongation(_) | Self::Carried | Self::Strayed(..)
+            Self::Centre(_)
+                | Self::Elongation(_)
+                | Self::Carried
+                | Self::Spread
+                | Self::Strayed(..)
         ) || matches!(self, Self::OfSecond(coordinate) if coordinate.is_place())
     }
 }
@@ -116,7 +122,7 @@ const BLOCK: [Coordinate; 4] = [
 ];
 
 /// Coordinates of an inclusion.
-static OF_LUMP: [Coordinate; 9] = [
+static OF_LUMP: [Coordinate; 10] = [
     Coordinate::Diameter,
     Coordinate::Depth,
     Coordinate::LumpModulus,
@@ -126,6 +132,7 @@ static OF_LUMP: [Coordinate; 9] = [
     Coordinate::Elongation(0),
     Coordinate::Elongation(1),
     Coordinate::Carried,
+    Coordinate::Spread,
 ];
 
 /// Largest Poisson ratio of a fit: the pressure differs from an incompressible block's by 0.1 %,
@@ -149,6 +156,7 @@ impl Parameters {
             Coordinate::Centre(axis) => self.place.centre_m[axis],
             Coordinate::Elongation(part) => self.place.elongation[part],
             Coordinate::Carried => self.place.carried,
+            Coordinate::Spread => self.place.spread,
             Coordinate::OfSecond(coordinate) => self.swapped().get(*coordinate),
             Coordinate::Strayed(press, axis) => self
                 .strayed_m
@@ -195,6 +203,7 @@ impl Parameters {
             (Coordinate::Centre(axis), _) => moved.place.centre_m[axis] += step,
             (Coordinate::Elongation(part), _) => moved.place.elongation[part] += step,
             (Coordinate::Carried, _) => moved.place.carried += step,
+            (Coordinate::Spread, _) => moved.place.spread += step,
             (Coordinate::Strayed(press, axis), _) => {
                 if let Some(strayed) = moved.strayed_m.get_mut(press) {
                     strayed[axis] += step;

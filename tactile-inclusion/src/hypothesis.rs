@@ -19,10 +19,10 @@ use crate::estimate::{
     Estimated, Identifiable, Inclusion, InclusionEstimate, InclusionWarning, TWO_SIDED_95,
 };
 use crate::fit::{Fit, Problem};
-use crate::forward::Coordinate;
+use crate::forward::{Coordinate, Parameters};
 use crate::ridge::Marginal;
 use crate::search::GridStart;
-use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Vector2};
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix2, Vector2};
 use tactile_fem::Interface;
 
 /// Fall of the objective without which an inclusion is not that probable, 2 ln(p / (1 − p)). The
@@ -169,10 +169,23 @@ impl Hypothesis {
         let Some(first) = self.index(Coordinate::Elongation(0)) else {
             return false;
         };
-        let covariance = fit.covariance.fixed_view::<2, 2>(first, first);
+        // Standard error of the elongation that a ball off the axis shows: 0.02 in solutions in
+        // three dimensions.
+        let of_model = Matrix2::identity() * 0.02_f64.powi(2);
+        let covariance = fit.covariance.fixed_view::<2, 2>(first, first) + of_model;
         let elongation = Vector2::from(fit.parameters.place.elongation);
-        let inverse = covariance.into_owned().try_inverse();
+        let inverse = covariance.try_inverse();
         inverse.is_some_and(|inverse| elongation.dot(&(inverse * elongation)) > largest)
+    }
+
+    /// Whether a sixth of an inclusion lies beyond the used part of every press's face.
+    fn is_at_rim(&self, parameters: &Parameters) -> bool {
+        let (Some(lump), Some(cells)) = (parameters.lump, &self.problem.forward.cells) else {
+            return false;
+        };
+        let [x, y] = parameters.place.centre_m;
+        let mut axes_m = cells.positions.axes_m.iter();
+        axes_m.all(|axis| (x - axis[0]).hypot(y - axis[1]) + lump.diameter_m / 3.0 > cells.reach_m)
     }
 
     /// Where a coordinate stands among those fitted.
@@ -235,6 +248,10 @@ impl Hypothesis {
         if is_at_boundary {
             warnings.push(InclusionWarning::AtBoundary);
         }
+        let is_at_rim = self.is_at_rim(&chosen.parameters);
+        if is_at_rim {
+            warnings.push(InclusionWarning::AtRim);
+        }
         let found = found.filter(|_| observed.cells.is_none() || !is_poor);
         let elongated = found.filter(|fit| self.is_elongated(fit));
         if let Some(fit) = elongated {
@@ -243,7 +260,8 @@ impl Hypothesis {
             warnings.push(InclusionWarning::NotABall { axes });
         }
         let found = found.filter(|_| elongated.is_none());
-        let is_reliable = chosen.converged && !is_poor && !is_unsolved && !is_at_boundary;
+        let is_reliable =
+            chosen.converged && !is_poor && !is_unsolved && !is_at_boundary && !is_at_rim;
         let estimated = |coordinate: Coordinate| {
             let (at, interval) = self.posterior(chosen, coordinate, widened);
             let other = rival.map(|rival| {

@@ -55,6 +55,7 @@ fn contrast(thickness_mm: f64, strain: f64, stiffness: f64) -> f64 {
 /// The makers found the cylinder 6 to 9 times as stiff as the block. Friction at the glass is not
 /// stated: with faces that slide contrasts are 0.2 to 0.4 lower.
 #[test]
+#[allow(clippy::print_stdout)]
 fn stiff_cylinders_in_phantoms_have_the_contrast_that_was_measured() {
     for [thickness_mm, strain, measured, deviation] in MEASURED {
         let found = [6.0, 7.5, 9.0].map(|stiffness| contrast(thickness_mm, strain, stiffness));

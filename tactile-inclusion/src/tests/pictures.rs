@@ -36,6 +36,7 @@ fn forward(fineness: usize) -> Forward {
             }),
             plain: None,
             squeezed: APPROACHES_M.map(|approach| approach / 30e-3).to_vec(),
+            face_radius_m: 16e-3,
             reach_m: 12e-3,
         }),
         ..super::forward(fineness)
@@ -48,7 +49,8 @@ fn block(centre_m: [f64; 2]) -> Parameters {
         place: Place {
             centre_m,
             elongation: [0.05, -0.03],
-            carried: 0.75,
+            carried: 0.6,
+            spread: 0.2,
         },
         poisson_ratio: 0.495,
         ..super::block()
@@ -67,6 +69,8 @@ fn derivatives_by_the_place_are_those_of_the_pressure() {
         Coordinate::Elongation(0),
         Coordinate::Elongation(1),
         Coordinate::Carried,
+        Coordinate::Spread,
+        Coordinate::Depth,
         Coordinate::Diameter,
     ];
     let of_second: Vec<Coordinate> = coordinates.iter().filter_map(|c| c.of_second()).collect();
@@ -81,7 +85,8 @@ fn derivatives_by_the_place_are_those_of_the_pressure() {
         // A place has no error of the elements, but kinks where the ratio ends.
         let part = match coordinate {
             Coordinate::Diameter
-            | Coordinate::OfSecond(Coordinate::Diameter)
+            | Coordinate::Depth
+            | Coordinate::OfSecond(Coordinate::Diameter | Coordinate::Depth)
             | Coordinate::Height => 1e-3,
             _ => 1e-5,
         };
