@@ -7,7 +7,7 @@ use crate::{
     Verdict,
 };
 use core::ops::ControlFlow;
-use tactile_fem::Interface;
+use tactile_fem::{Guide, GuideLayer, Interface, Material};
 
 const RINGS: usize = 24;
 const APPROACHES_M: [f64; 2] = [1.5e-3, 3e-3];
@@ -25,6 +25,28 @@ fn solved(interface: Interface, lump: Option<LumpParameters>, radii_m: &[f64]) -
         poisson_ratio: 0.495,
         ..block()
     };
+    forward.predict(&block).unwrap().values
+}
+
+/// The same of a block with a stiffer skin, which moves with the guide as a layer of it.
+fn under_a_skin(thickness_m: f64, modulus_pa: f64, lump: Option<LumpParameters>) -> Vec<f64> {
+    let skin = GuideLayer {
+        thickness_m,
+        material: Material::new(modulus_pa, 0.495).unwrap(),
+    };
+    let layers = [&[skin], guide().layers()].concat();
+    let forward = Forward {
+        guide: Guide::new(layers, guide().radius_m()).unwrap(),
+        approaches_m: APPROACHES_M.to_vec(),
+        radii_m: ring_radii(),
+        ..forward(5)
+    };
+    let mut block = Parameters {
+        lump,
+        poisson_ratio: 0.495,
+        ..block()
+    };
+    block.height_m -= thickness_m;
     forward.predict(&block).unwrap().values
 }
 
@@ -201,6 +223,39 @@ fn an_inclusion_off_the_axis_is_not_told_confidently() {
         is_poor(&estimate) || told_is_right(&estimate, truth),
         "{estimate:?}"
     );
+}
+
+#[test]
+fn a_stiffer_skin_is_no_lump_and_hides_none() {
+    for (thickness_m, times) in [(1e-3, 3.0), (1e-3, 10.0), (2e-3, 3.0), (2e-3, 10.0)] {
+        let skin = times * block().block_modulus_pa;
+        let estimate = searched(&frames(&under_a_skin(thickness_m, skin, None)));
+        assert_ne!(estimate.verdict(), Verdict::Found, "{estimate:?}");
+    }
+    // The depth of a lump counts from under the skin.
+    let truth = lump(10e-3, 2.5e-3, 40e3);
+    let estimate = searched(&frames(&under_a_skin(1.5e-3, 25e3, Some(truth))));
+    assert!(
+        estimate.verdict() == Verdict::Found && told_is_right(&estimate, truth),
+        "{estimate:?}"
+    );
+}
+
+/// A face with a radius of curvature of 60 mm, and one nearly flat. As on a bed of springs, the
+/// pressure falls with the approach that is left at a distance from the axis.
+#[test]
+fn a_curved_face_is_a_poor_fit() {
+    for curvature_m in [0.06, 0.3] {
+        let mut values = bonded(None);
+        let rings = values[..2 * RINGS].chunks_mut(RINGS);
+        for (pressures, approach_m) in rings.zip(APPROACHES_M) {
+            for (pressure, radius) in pressures.iter_mut().zip(ring_radii()) {
+                let left = 1.0 - radius * radius / (2.0 * curvature_m * approach_m);
+                *pressure *= left.max(0.02);
+            }
+        }
+        assert!(is_poor(&searched(&frames(&values))), "{curvature_m}");
+    }
 }
 
 #[test]

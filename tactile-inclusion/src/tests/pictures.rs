@@ -4,7 +4,8 @@ use super::{is_poor, lump, search};
 use crate::forward::{Coordinate, Forward, LumpParameters, Parameters};
 use crate::picture::{CellPositions, Cells, Place};
 use crate::{
-    Inclusion, InclusionEstimate, PressureProfile, Scan, ScanPress, SearchProgress, Verdict,
+    Inclusion, InclusionEstimate, InclusionWarning, PressureProfile, Scan, ScanPress,
+    SearchProgress, Verdict,
 };
 use core::ops::ControlFlow;
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
@@ -299,6 +300,24 @@ fn two_balls_off_the_axis_are_told_apart_and_three_are_not_explained() {
     });
     let tilted: Vec<f64> = tilted.collect();
     assert_eq!(searched(&tilted).verdict(), Verdict::Absent);
+}
+
+#[test]
+fn a_ball_under_the_rim_has_a_place_and_no_size() {
+    let mut parameters = block([6e-3, -8e-3]);
+    parameters.place.elongation = [0.0; 2];
+    let forward = forward(5).with_plain(&parameters).unwrap();
+    let values = forward.predict(&parameters).unwrap().values;
+    let found = searched(&values[..2 * positions().len()]);
+    assert!(
+        found.warnings.contains(&InclusionWarning::AtRim),
+        "{found:?}"
+    );
+    let inclusion = found.inclusion.unwrap();
+    let [x, y] = inclusion.position_m.unwrap();
+    let away = (x.value - 6e-3).hypot(y.value + 8e-3);
+    assert!(away < 0.2e-3, "{away}");
+    assert!(inclusion.diameter_m.value().is_none(), "{found:?}");
 }
 
 #[test]
