@@ -149,28 +149,45 @@ pub struct ContactRadius {
     pub uncertainty_m: f64,
 }
 
-/// Pressure at a radius, by the cubic through the four nearest points. Constant beyond the last.
+/// Pressure at a radius, by the cubic between the two nearest points with the
+/// [slopes](slope_at) there. Constant beyond the last.
+///
+/// The slope is continuous: a fit that moves an inclusion sees no kinks.
 pub fn pressure_at(points: &[PressurePoint], radius: f64) -> f64 {
     let after = points.partition_point(|point| point.r_m < radius);
     let Some(last) = points.last() else {
         return 0.0;
     };
-    if after == points.len() {
+    if after == points.len() || points.len() < 2 {
         return last.pressure_pa;
     }
-    let first = after.saturating_sub(2).min(points.len().saturating_sub(4));
-    let near = &points[first..points.len().min(first + 4)];
-    let mut sum = 0.0;
-    for (i, point) in near.iter().enumerate() {
-        let mut weight = 1.0;
-        for (j, other) in near.iter().enumerate() {
-            if i != j {
-                weight *= (radius - other.r_m) / (point.r_m - other.r_m);
-            }
-        }
-        sum += weight * point.pressure_pa;
-    }
-    sum
+    // Before the first point the first cubic goes on.
+    let right = after.max(1);
+    let [from, to] = [right - 1, right].map(|k| &points[k]);
+    let (length, rise) = (to.r_m - from.r_m, to.pressure_pa - from.pressure_pa);
+    let t = (radius - from.r_m) / length;
+    let [first, second] = [right - 1, right].map(|k| length * slope_at(points, k));
+    let bent = (1.0 - t) * (first - rise) + t * (rise - second);
+    from.pressure_pa + t * (rise + (1.0 - t) * bent)
+}
+
+/// Slope of the pressure at a point, by the polynomial through the five nearest.
+fn slope_at(points: &[PressurePoint], at: usize) -> f64 {
+    let first = at.saturating_sub(2).min(points.len().saturating_sub(5));
+    let near = &points[first..points.len().min(first + 5)];
+    let here = &points[at];
+    // The barycentric weights of Lagrange's polynomial.
+    let weight = |j: usize| {
+        let others = near.iter().enumerate().filter(|(k, _)| *k != j);
+        let product: f64 = others.map(|(_, other)| near[j].r_m - other.r_m).product();
+        product.recip()
+    };
+    let own = weight(at - first);
+    let others = near.iter().enumerate().filter(|(j, _)| first + j != at);
+    let parts = others.map(|(j, other)| {
+        weight(j) / own * (other.pressure_pa - here.pressure_pa) / (here.r_m - other.r_m)
+    });
+    parts.sum()
 }
 
 /// The Cauchy stress at a point, in pascals, tension positive. The components rθ and zθ are zero.

@@ -17,9 +17,9 @@ use crate::search::{CLEAR_EVIDENCE, Counter, DEPTHS, DIAMETERS, InclusionSearch}
 use nalgebra::DVector;
 use tactile_fem::Kinematics;
 
-/// Error of the product of ratios, over the pressure, where two inclusions touch of which each
-/// doubles it. It falls with their distance, and grows with the root of the product of what they
-/// add.
+/// Error of the product of ratios, over the pressure, where two shallow inclusions touch of which
+/// each doubles it. It falls with their distance, and grows with the root of the product of what
+/// they add, and with their depth over their distance ([`side_by_side`]).
 const NEIGHBOURS: f64 = 0.03;
 
 /// How far tissue that flows away from the axis carries an inclusion beside another.
@@ -73,6 +73,19 @@ fn apart(both: &Parameters) -> f64 {
     };
     let ((width, at), (other_width, other_at)) = (of(both), of(&both.swapped()));
     (at[0] - other_at[0]).hypot(at[1] - other_at[1]) / (0.5 * (width + other_width))
+}
+
+/// How many times as large the error of the product of ratios is as that of shallow inclusions: the
+/// pressures that deep ones add overlap. Two with their middles as deep as they are apart were told
+/// three of their errors too wide without.
+fn side_by_side(both: &Parameters) -> f64 {
+    let middle = |one: &Parameters| {
+        let lump = one.lump.map(|lump| lump.depth_m + 0.5 * lump.axes_m()[1]);
+        (lump.unwrap_or(0.0), one.place.centre_m)
+    };
+    let ((depth, at), (other_depth, other)) = (middle(both), middle(&both.swapped()));
+    let distance = (at[0] - other[0]).hypot(at[1] - other[1]);
+    1.0 + 3.0 * (0.5 * (depth + other_depth) / distance).powi(4)
 }
 
 impl InclusionSearch {
@@ -167,7 +180,8 @@ impl InclusionSearch {
                 observed = observed.with_lump_aside(lump.place.centre_m, &forward, lift);
                 lifts *= lift;
             }
-            observed = observed.with_neighbours(NEIGHBOURS * lifts.sqrt() / apart(&at).max(1.0));
+            let alone = NEIGHBOURS * lifts.sqrt() / apart(&at).max(1.0);
+            observed = observed.with_neighbours(alone * side_by_side(&at));
             let covariance = observed.covariance(self.sensor(), one.interface, resolution);
             let problem = Problem {
                 forward,
@@ -175,11 +189,21 @@ impl InclusionSearch {
                 factor: covariance.cholesky()?,
                 priors: priors.clone(),
             };
-            let fit = problem.fit(&at, ending, || counter.step())?;
+            let mut settled = |start: &Parameters| -> Option<Fit> {
+                let mut fit = problem.fit(start, ending, || counter.step())?;
+                // A mesh that was moved far holds a fit up: it goes on with one of its own.
+                for _ in 0..2 {
+                    if !fit.converged {
+                        fit = problem.fit(&fit.parameters, ending, || counter.step())?;
+                    }
+                }
+                Some(fit)
+            };
+            let fit = settled(&at)?;
             at = fit.parameters.clone();
             if resolution == Resolution::Answer {
                 // The same with the second one first, whose posterior is followed then.
-                let swapped = problem.fit(&at.swapped(), ending, || counter.step())?;
+                let swapped = settled(&at.swapped())?;
                 let again = Problem {
                     forward: problem.forward.clone(),
                     measured: problem.measured.clone(),
