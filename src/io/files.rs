@@ -73,8 +73,9 @@ pub fn write_bytes(path: &Path, bytes: &[u8]) -> Result<(), FileError> {
 /// Writes a whole file, creating its folder where needed.
 ///
 /// A reader finds the old file or the new one. A full disk, a limit of the file's size and the end
-/// of the process, whatever ends it, leave the old one and nothing beside it. Permissions of a file
-/// that is replaced are kept, and a link is followed. A device (`/dev/stdout`) is written to as it
+/// of the process, whatever ends it, leave the old one and nothing beside it, but for the instant in
+/// which the whole new one has a name of its own (`.part`). Permissions of a file that is replaced
+/// are kept, and a link is followed. A device (`/dev/stdout`) is written to as it
 /// is.
 ///
 /// # Errors

@@ -202,7 +202,7 @@ pub fn depth(
         let reading = stereo.read(pixels.view());
         let reading = reading.map_err(|error| Failure::in_file(Path::new(name), error))?;
         context.line(format_args!("{name}:"));
-        let contact = Contact::of(&reading, size);
+        let contact = GelContact::of(&reading, size);
         match &contact {
             Some(contact) => contact.print(context),
             None => context.line("no contact"),
@@ -238,13 +238,13 @@ pub fn depth(
 
 /// What a frame's contact is printed by.
 #[derive(Serialize)]
-pub struct Contact {
+pub struct GelContact {
     pub centroid: [f64; 2],
     pub area_m2: f64,
     pub largest_depth_m: Estimate,
 }
 
-impl Contact {
+impl GelContact {
     pub fn of(reading: &PhotometricReading, size: f64) -> Option<Self> {
         let mut sums = [0.0; 3];
         let touched = reading

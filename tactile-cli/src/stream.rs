@@ -4,7 +4,7 @@ mod coloured;
 mod watch;
 
 use self::coloured::coloured;
-use self::watch::{Progress, Watcher, listed, watch};
+use self::watch::{FrameCounts, Watcher, listed, watch};
 use crate::arguments::{force_n, not_negative, positive};
 use crate::console::{Bar, Context, Exit, Failure};
 use crate::frames::{DEFAULT_RATE_HZ, Reading};
@@ -176,7 +176,7 @@ struct Live {
     rows: Vec<Row>,
     /// One of every kind, of the frame where it came first.
     cautions: Vec<Flag>,
-    progress: Progress,
+    progress: FrameCounts,
     shown: Shown,
     /// Where the frames are simulated.
     truth_pa: Option<f64>,
@@ -194,7 +194,7 @@ impl Live {
         let largest_n = arguments.force.unwrap_or(SIMULATED_FORCE_N);
         Ok(Self {
             shown: Shown::new(arguments, context)?,
-            progress: Progress::new(arguments.rate.unwrap_or(DEFAULT_RATE_HZ)),
+            progress: FrameCounts::new(arguments.rate.unwrap_or(DEFAULT_RATE_HZ)),
             session,
             rows: Vec::new(),
             cautions: Vec::new(),
@@ -369,7 +369,7 @@ impl Live {
 impl Watcher for Live {
     type Frame = Array2<u8>;
 
-    fn progress(&mut self) -> &mut Progress {
+    fn progress(&mut self) -> &mut FrameCounts {
         &mut self.progress
     }
 

@@ -8,8 +8,8 @@
 //! It is exact on the axis. Off it the load spreads below the face: with x and z the distances of
 //! the lump's middle from the axis and from the face, and s the outward part of the distance from
 //! where it shows, all in radii of the face, the lump shows at x/(1 + k z³), and ρ is that distance
-//! times (1 + n (x z)²)(1 + m (1 − 3 x²) x z s). The numbers k, n and m were fitted to ten blocks
-//! with a lump solved in three dimensions. What they leave grows as the rim comes nearer to the
+//! times (1 + n (x z)²)(1 + m (1 − 3 x²) x z s). The numbers k, n and m were fitted to
+//! blocks with a lump solved in three dimensions. What they leave grows as the rim comes nearer to the
 //! lump, and is part of the errors' covariance.
 
 use crate::forward::{Coordinate, Parameters};

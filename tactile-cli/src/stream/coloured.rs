@@ -1,10 +1,10 @@
 //! `tactile stream` with a gel that is lit in colours: force, contact and depth live.
-use super::watch::{Progress, Watcher, listed, watch};
+use super::watch::{FrameCounts, Watcher, listed, watch};
 use super::{Shown, StreamArguments};
 use crate::console::{Context, Exit, Failure};
 use crate::frames::DEFAULT_RATE_HZ;
 use crate::outputs::Csv;
-use crate::photometric::{Contact, NO_FRAMES, Reader, number_or_error};
+use crate::photometric::{GelContact, NO_FRAMES, Reader, number_or_error};
 use crate::relief::HeightGrid;
 use ndarray::{Array2, Array3};
 use serde_json::{Value, json};
@@ -17,7 +17,7 @@ struct Row {
     time_s: f64,
     /// None without contact, or why it has none.
     force_n: Result<Option<Estimate>, String>,
-    contact: Option<Contact>,
+    contact: Option<GelContact>,
 }
 
 impl Row {
@@ -53,7 +53,7 @@ const COLUMNS: [&str; 6] = [
 struct Live {
     reader: Reader,
     rows: Vec<Row>,
-    progress: Progress,
+    progress: FrameCounts,
     shown: Shown,
 }
 
@@ -114,7 +114,7 @@ impl Live {
 impl Watcher for Live {
     type Frame = Array3<u8>;
 
-    fn progress(&mut self) -> &mut Progress {
+    fn progress(&mut self) -> &mut FrameCounts {
         &mut self.progress
     }
 
@@ -132,7 +132,7 @@ impl Watcher for Live {
         self.rows.push(Row {
             time_s,
             force_n: self.reader.force(&reading),
-            contact: Contact::of(&reading, self.reader.stereo.model().pixel_size_m),
+            contact: GelContact::of(&reading, self.reader.stereo.model().pixel_size_m),
         });
         self.show(frame, &reading.depth_m);
         let took = start.elapsed();
@@ -187,7 +187,7 @@ pub fn coloured(
     let mut live = Live {
         reader,
         rows: Vec::new(),
-        progress: Progress::new(arguments.rate.unwrap_or(DEFAULT_RATE_HZ)),
+        progress: FrameCounts::new(arguments.rate.unwrap_or(DEFAULT_RATE_HZ)),
         shown: Shown::new(arguments, context)?,
     };
     Live::print_heading(context);

@@ -10,7 +10,7 @@ pub trait Watcher {
     /// Frames as it takes them.
     type Frame: Pixels;
 
-    fn progress(&mut self) -> &mut Progress;
+    fn progress(&mut self) -> &mut FrameCounts;
 
     /// The number of frames with an answer.
     fn measured(&self) -> usize;
@@ -24,7 +24,7 @@ pub trait Watcher {
 
 /// Counts of a stream's frames.
 #[derive(Clone, Copy)]
-pub struct Progress {
+pub struct FrameCounts {
     pub rate_hz: f64,
     /// The number of frames that came, measured or not.
     pub seen: usize,
@@ -34,7 +34,7 @@ pub struct Progress {
     pub late: usize,
 }
 
-impl Progress {
+impl FrameCounts {
     pub fn new(rate_hz: f64) -> Self {
         Self {
             rate_hz,
