@@ -178,14 +178,17 @@ impl Hypothesis {
         inverse.is_some_and(|inverse| elongation.dot(&(inverse * elongation)) > largest)
     }
 
-    /// Whether a sixth of an inclusion lies beyond the used part of every press's face.
+    /// Whether a sixth of an inclusion lies beyond the used part of every press's face. Two presses
+    /// with its middle under their used parts show it from two sides.
     fn is_at_rim(&self, parameters: &Parameters) -> bool {
         let (Some(lump), Some(cells)) = (parameters.lump, &self.problem.forward.cells) else {
             return false;
         };
         let [x, y] = parameters.place.centre_m;
-        let mut axes_m = cells.positions.axes_m.iter();
-        axes_m.all(|axis| (x - axis[0]).hypot(y - axis[1]) + lump.diameter_m / 3.0 > cells.reach_m)
+        let axes_m = cells.positions.axes_m.iter();
+        let asides: Vec<f64> = axes_m.map(|[a, b]| (x - a).hypot(y - b)).collect();
+        let is_cut = |aside: &f64| aside + lump.diameter_m / 3.0 > cells.reach_m;
+        asides.iter().all(is_cut) && asides.iter().filter(|a| **a < cells.reach_m).count() < 2
     }
 
     /// Where a coordinate stands among those fitted.
