@@ -393,13 +393,8 @@ impl Watcher for Live {
         Ok(took)
     }
 
-    fn print_last(&self, every_one: bool, context: &mut Context) {
-        let Some(row) = self.rows.last() else {
-            return;
-        };
-        if !every_one && !(self.rows.len() - 1).is_multiple_of(16) {
-            return;
-        }
+    fn last_line(&self) -> Option<String> {
+        let row = self.rows.last()?;
         let unknown = || "-".to_owned();
         let number = |number: Option<Estimate>, scale: f64| {
             number.map_or_else(unknown, |e| format!("{:.4}", e.value * scale))
@@ -410,9 +405,9 @@ impl Watcher for Live {
         let strain = row.strain_xx_zz.map(|[x, z]| format!("{x:+.3}, {z:+.3}"));
         let (time, late) = (row.time_s, self.progress.late_percent(self.measured()));
         let strain = strain.unwrap_or_default();
-        let line =
-            format!("{time:8.3} {force:>11} {radius:>13} {late:10.1}   {modulus:<18}{strain}");
-        context.line(line.trim_end());
+        Some(format!(
+            "{time:8.3} {force:>11} {radius:>13} {late:10.1}   {modulus:<18}{strain}"
+        ))
     }
 }
 

@@ -143,13 +143,8 @@ impl Watcher for Live {
         Ok(took)
     }
 
-    fn print_last(&self, every_one: bool, context: &mut Context) {
-        let Some(row) = self.rows.last() else {
-            return;
-        };
-        if !every_one && !(self.rows.len() - 1).is_multiple_of(16) {
-            return;
-        }
+    fn last_line(&self) -> Option<String> {
+        let row = self.rows.last()?;
         let number = |value: Option<f64>, digits: usize| {
             value.map_or_else(|| "-".to_owned(), |value| format!("{value:.digits$}"))
         };
@@ -158,9 +153,9 @@ impl Watcher for Live {
         let depth = number(contact.map(|c| 1e3 * c.largest_depth_m.value), 3);
         let area = number(contact.map(|c| 1e6 * c.area_m2), 2);
         let (time, late) = (row.time_s, self.progress.late_percent(self.rows.len()));
-        context.line(format_args!(
+        Some(format!(
             "{time:8.3} {force:>11} {depth:>20} {area:>15} {late:10.1}"
-        ));
+        ))
     }
 }
 

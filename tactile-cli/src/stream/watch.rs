@@ -18,8 +18,17 @@ pub trait Watcher {
     /// Measures a frame and shows its answer. Returns how long that took.
     fn take(&mut self, time_s: f64, frame: &Self::Frame) -> Result<Duration, Failure>;
 
+    /// The last frame's answer as a line. None before the first.
+    fn last_line(&self) -> Option<String>;
+
     /// Prints a line for every frame or, of a long series, for one out of sixteen.
-    fn print_last(&self, every_one: bool, context: &mut Context);
+    fn print_last(&self, every_one: bool, context: &mut Context) {
+        if let Some(line) = self.last_line()
+            && (every_one || (self.measured() - 1).is_multiple_of(16))
+        {
+            context.line(line.trim_end());
+        }
+    }
 }
 
 /// Counts of a stream's frames.
