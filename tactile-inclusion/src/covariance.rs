@@ -157,8 +157,8 @@ pub struct ObservedCells {
 }
 
 /// Error of the pressure of an inclusion off the axis, over its distance from the axis in radii of
-/// the face and the part by which it lifts the pressure. Against solutions in three dimensions it
-/// is 0.4 % of the pressure at 0.12 radii, 0.9 % at 0.25, 1.2 % at 0.37 and 2 % at 0.56.
+/// the face and the part by which it lifts the pressure. Solutions in three dimensions differ by 0.2
+/// to 0.6 % of the pressure at 0.25 to 0.5 radii, of lumps that lift it by a fifth to twice.
 const ASIDE: f64 = 0.034;
 
 /// What elements leave of the pressure on a whole face within their length, beyond what they leave

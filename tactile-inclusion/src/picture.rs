@@ -8,9 +8,9 @@
 //! It is exact on the axis. Off it the load spreads below the face: with x and z the distances of
 //! the lump's middle from the axis and from the face, and s the outward part of the distance from
 //! where it shows, all in radii of the face, the lump shows at x/(1 + k z³), and ρ is that distance
-//! times (1 + n (x z)²)(1 + m (1 − 3 x²) x z s). The numbers k, n and m were fitted to
-//! blocks with a lump solved in three dimensions. What they leave grows as the rim comes nearer to the
-//! lump, and is part of the errors' covariance.
+//! times (1 + n (x z)²)(1 + m (1 − 3 x²) x z s). The numbers k, n and m were fitted to blocks with
+//! a lump that were solved in three dimensions. What they leave grows as the rim comes nearer to
+//! the lump, and is part of the errors' covariance.
 
 use crate::forward::{Coordinate, Parameters};
 use std::sync::Arc;
@@ -55,10 +55,12 @@ impl Place {
     pub fn distance(&self, [x, y]: [f64; 2], squeezed: f64, depth: f64, face_m: f64) -> f64 {
         let shown = self.shown(squeezed, depth);
         let [dx, dy] = [x - shown * self.centre_m[0], y - shown * self.centre_m[1]];
-        let aside = self.aside_m() / face_m;
+        // Further out no lump was solved.
+        let aside = (self.aside_m() / face_m).min(0.6);
         let outwards = (dx * self.centre_m[0] + dy * self.centre_m[1]) / face_m.powi(2);
         let skew = SKEW * depth * (1.0 - 3.0 * aside.powi(2)).max(0.0);
         let narrowed = 1.0 + NARROWED * (depth * aside).powi(2);
+        // Far on the inner side the skew would turn the distance around.
         let scale = narrowed * (1.0 + skew * outwards).max(0.5);
         let [a, b] = self.elongation;
         let size = a.hypot(b);
@@ -154,53 +156,57 @@ impl Cells {
             presses,
             ..
         } = &*self.positions;
+        let radius = |[x, y]: [f64; 2]| x.hypot(y);
+        let Some(plain) = self.plain.as_ref().filter(|_| parameters.lump.is_some()) else {
+            return positions_m.iter().map(|at| axial(radius(*at))).collect();
+        };
         let second = parameters.second.map(|_| parameters.swapped());
+        let of_first = self.ratio(plain, frame, parameters, axial);
+        let of_second = (second.as_ref()).map(|s| self.ratio(plain, frame, s, axial_of_second));
         let at = |(&position, &press): (&[f64; 2], &usize)| {
-            let radius = position[0].hypot(position[1]);
-            let Some(plain) = self.plain.as_ref().filter(|_| parameters.lump.is_some()) else {
-                return axial(radius);
-            };
             let strayed = parameters.strayed_m.get(press).copied();
             let strayed = strayed.unwrap_or_default();
             let axis = [0, 1].map(|k| self.positions.axes_m[press][k] + strayed[k]);
-            let ratio = |block: &Parameters, axial: &dyn Fn(f64) -> f64| {
-                self.ratio(plain, frame, (position, axis), block, axial)
-            };
-            let of_second = (second.as_ref()).map_or(1.0, |second| ratio(second, axial_of_second));
-            plain.pressure_at(frame, radius, parameters) * ratio(parameters, axial) * of_second
+            plain.pressure_at(frame, radius(position), parameters)
+                * of_first(position, axis)
+                * of_second
+                    .as_ref()
+                    .map_or(1.0, |ratio| ratio(position, axis))
         };
         positions_m.iter().zip(presses).map(at).collect()
     }
 
     /// How many times as large as a plain block's the pressure of a frame is with a lump, at a cell
     /// from an axis. `axial` is the pressure with the lump under the axis.
-    fn ratio(
-        &self,
-        plain: &PlainBlock,
+    fn ratio<'a>(
+        &'a self,
+        plain: &'a PlainBlock,
         frame: usize,
-        (position, axis): ([f64; 2], [f64; 2]),
-        block: &Parameters,
-        axial: &dyn Fn(f64) -> f64,
-    ) -> f64 {
-        let place = Place {
-            centre_m: [0, 1].map(|k| block.place.centre_m[k] - axis[k]),
-            ..block.place
-        };
+        block: &'a Parameters,
+        axial: &'a dyn Fn(f64) -> f64,
+    ) -> impl Fn([f64; 2], [f64; 2]) -> f64 + 'a {
         let middle_m = (block.lump).map_or(0.0, |lump| lump.depth_m + 0.5 * lump.axes_m()[1]);
         let (squeezed, face_m) = (self.squeezed[frame], self.face_radius_m);
-        let distance = place.distance(position, squeezed, middle_m / face_m, face_m);
-        let ratio = |distance: f64| axial(distance) / plain.pressure_at(frame, distance, block);
-        let ratio = match distance - self.reach_m {
-            beyond if beyond > 0.0 => {
-                // The slope goes on and fades, as it does between there and the rim.
-                let (step, length) = (face_m / 16.0, face_m / 5.0);
-                let edge = ratio(self.reach_m);
-                let slope = (edge - ratio(self.reach_m - step)) / step;
+        let inside =
+            move |distance: f64| axial(distance) / plain.pressure_at(frame, distance, block);
+        // Beyond the edge the slope goes on and fades, as it does between there and the rim.
+        let (step, length) = (face_m / 16.0, face_m / 5.0);
+        let edge = inside(self.reach_m);
+        let slope = (edge - inside(self.reach_m - step)) / step;
+        move |position, axis| {
+            let place = Place {
+                centre_m: [0, 1].map(|k| block.place.centre_m[k] - axis[k]),
+                ..block.place
+            };
+            let distance = place.distance(position, squeezed, middle_m / face_m, face_m);
+            let beyond = distance - self.reach_m;
+            let ratio = if beyond > 0.0 {
                 edge + slope * length * (1.0 - (-beyond / length).exp())
-            }
-            _ => ratio(distance),
-        };
-        1.0 + self.fade(place.aside_m(), distance) * (ratio - 1.0)
+            } else {
+                inside(distance)
+            };
+            1.0 + self.fade(place.aside_m(), distance) * (ratio - 1.0)
+        }
     }
 
     /// What is left of a lump's share at a distance from it, where it is so far from the axis: with

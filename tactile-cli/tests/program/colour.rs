@@ -148,7 +148,7 @@ fn a_pipe_of_colours_gives_the_answers_of_the_files() {
         &camera,
     );
     assert_eq!(live.status.code(), Some(0), "{}", text(&live.stderr));
-    // Images named by hand lie as many frames apart as their numbers.
+    // Times of files are counted by the numbers in their names, those of a pipe by its frames.
     let contacts = |of: &serde_json::Value| [0, 1].map(|k| of["updates"][k]["contact"].clone());
     assert_eq!(contacts(&value(&live)), contacts(&measured));
     assert_eq!(value(&live)["updates"][1]["time_s"], 0.04);
