@@ -67,7 +67,7 @@ struct Program {
     #[arg(long, global = true, value_name = "FILE.html")]
     report: Option<PathBuf>,
     /// Refuse a job that needs more memory than this, in GB.
-    #[arg(long, global = true, value_name = "GB", default_value = "4",
+    #[arg(long, global = true, value_name = "GB", default_value = "6",
           value_parser = arguments::positive, allow_negative_numbers = true)]
     memory_gb: f64,
 }

@@ -44,6 +44,17 @@ pub enum MatchError {
         /// Its row.
         row: usize,
     },
+    /// So many points of a large set lie in one place that each is a candidate for each: the table
+    /// of candidates grows with the square of their number.
+    #[error("{count} points of the {set} lie in one place, at most {limit} can be matched")]
+    Coincident {
+        /// The set, "model" or "target".
+        set: &'static str,
+        /// Points in one place.
+        count: usize,
+        /// The most that are allowed.
+        limit: usize,
+    },
     /// An option is outside its range (or NaN).
     #[error("option {option} = {value} is outside {expected}")]
     InvalidOption {
@@ -148,6 +159,35 @@ pub(crate) fn point_set<const D: usize>(
         Some(row) => Err(MatchError::NotFinite { set, row }),
         None => Ok(()),
     }
+}
+
+/// Most points of a large set in one place. Their candidates take 5 MB.
+const MAX_COINCIDENT: usize = 1000;
+
+/// Rejects a set with too many points in one place: O(n log n), in the memory of `rows`.
+pub(crate) fn spread_out<const D: usize>(
+    set: &'static str,
+    points: &[Point<f64, D>],
+    rows: &mut Vec<usize>,
+) -> Result<(), MatchError> {
+    rows.clear();
+    rows.extend(0..points.len());
+    let order = |&a: &usize, &b: &usize| {
+        let axes = points[a].iter().zip(points[b].iter());
+        axes.map(|(x, y)| x.total_cmp(y))
+            .fold(std::cmp::Ordering::Equal, std::cmp::Ordering::then)
+    };
+    rows.sort_unstable_by(order);
+    let together = rows.chunk_by(|&a, &b| points[a] == points[b]);
+    let count = together.map(<[_]>::len).max().unwrap_or(0);
+    if count > MAX_COINCIDENT {
+        return Err(MatchError::Coincident {
+            set,
+            count,
+            limit: MAX_COINCIDENT,
+        });
+    }
+    Ok(())
 }
 
 /// The largest distance of a pair, which must be positive and finite.

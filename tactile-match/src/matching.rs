@@ -211,7 +211,8 @@ pub enum Doubt {
     /// well. Or those of a part of the set are far larger than the others', which may lie a point
     /// aside.
     LargeResiduals,
-    /// One pair in twenty or more is wrong, by the pairs' confidences.
+    /// More than one pair in ten may be wrong, by the pairs' confidences, by the points without a
+    /// partner, and by the residuals.
     Undecided,
     /// Any rotation is allowed, and one of a twelfth of a turn or a multiple, in space of a right
     /// angle about an axis of the coordinates, takes the model onto itself: the answer may be
@@ -231,7 +232,7 @@ impl std::fmt::Display for Doubt {
             Self::LargeResiduals => {
                 "the residuals of the match are as large as those of scattered points"
             }
-            Self::Undecided => "one matched pair in twenty or more is wrong",
+            Self::Undecided => "more than one matched pair in ten may be wrong",
             Self::Symmetric => "the points look the same after a turn, and any rotation is allowed",
             Self::Turned => "turned by a large angle the points match better: allow any rotation",
             Self::Mirrored => {

@@ -85,7 +85,10 @@ impl<const D: usize> Annealer<D> {
         state.settled = false;
         self.predicted.clone_from(&state.warped);
         for iteration in 0..schedule.limit {
-            let residual = self.step(state, schedule, variance);
+            let mut residual = self.step(state, schedule, variance);
+            if schedule.cooling.open {
+                residual += self.open();
+            }
             state.iterations += 1;
             state.trace.push(self.free_energy(state, variance));
             observe(state.iterations, *state.trace.last().unwrap_or(&0.0))?;
@@ -158,18 +161,18 @@ impl<const D: usize> Annealer<D> {
         self.predicted.clone_from(&state.warped);
         for _ in 0..rounds {
             let residual = self.step(state, schedule, state.sigma * state.sigma);
-            let moments = &self.soft.moments;
-            let weights = &moments.by_squared_precision().weight;
-            let spread = weights
-                .iter()
-                .zip(&self.regression.variance)
-                .map(|(w, v)| w * v)
-                .sum::<f64>();
-            let total: f64 = moments.by_precision().weight.iter().sum();
-            let open = spread / total.max(1e-9);
-            state.sigma = (residual + open).sqrt().max(self.floor(schedule));
+            state.sigma = (residual + self.open()).sqrt().max(self.floor(schedule));
             self.predicted.clone_from(&state.warped);
         }
+    }
+
+    /// Mean variance, along an axis, of where the last fit puts the matched points.
+    fn open(&self) -> f64 {
+        let moments = &self.soft.moments;
+        let weights = &moments.by_squared_precision().weight;
+        let variances = weights.iter().zip(&self.regression.variance);
+        let total: f64 = moments.by_precision().weight.iter().sum();
+        variances.map(|(w, v)| w * v).sum::<f64>() / total.max(1e-9)
     }
 
     /// The lowest temperature: the schedule's, or the least error of the targets where that is
@@ -270,6 +273,19 @@ impl<const D: usize> Annealer<D> {
     /// whose share is estimated. Residuals under `resolution` count as that, so that an exact fit
     /// does not win by an infinite margin.
     pub(super) fn evaluate(&mut self, state: &mut State<D>, share: f64, resolution: f64) {
+        self.evaluate_undecided(state, share, resolution, 1.0);
+    }
+
+    /// As [`evaluate`](Self::evaluate), with the share of the matches' information on the warp that
+    /// is left where partners are `decided` in part (Louis, J. R. Stat. Soc. B 44, 1982). The whole
+    /// of it would let the stiffest warp win.
+    pub(super) fn evaluate_undecided(
+        &mut self,
+        state: &mut State<D>,
+        share: f64,
+        resolution: f64,
+        decided: f64,
+    ) {
         let variance = state.sigma.max(resolution).powi(2);
         let (n, m) = (state.warped.len(), self.soft.targets());
         let gaussian = n as f64 * (TAU * variance).powf(0.5 * D as f64);
@@ -308,6 +324,7 @@ impl<const D: usize> Annealer<D> {
             .for_each(|s| *s = gauss / (gauss * *s + outlier));
         self.soft.errors.weigh(&mut self.sums);
         self.soft.row_totals(&self.sums, &mut self.weights);
+        self.weights.iter_mut().for_each(|w| *w *= decided);
         self.weights.resize(self.prior.stride, 0.0);
         let rows = state.warped.iter().zip(&state.base);
         self.residuals.fill(

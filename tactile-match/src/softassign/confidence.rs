@@ -28,21 +28,45 @@ pub(super) fn are_unequal(model: usize, target: usize) -> bool {
 }
 
 impl<const D: usize> Answer<D> {
-    /// Why the pairs are not to be relied on: `smaller` points could have a partner, `share` of
-    /// them are expected to have none.
-    pub(super) fn doubt(&self, smaller: usize, share: f64) -> Option<Doubt> {
+    /// Why the pairs are not to be relied on. `smaller` points could have a partner, `share` of them
+    /// are expected to have none. `gain` is the logarithm, a point, of how much more
+    /// likely the answer makes the targets than chance does, `tail` the share of residuals that the
+    /// noise of the others does not explain.
+    pub(super) fn doubt(&self, smaller: usize, share: f64, gain: f64, tail: f64) -> Option<Doubt> {
         let pairs = self.assignment.iter().flatten().count() as f64;
         // An answer with fewer pairs, relative to the smaller set, may be one of chance: wrong
         // basins of sets that were stretched or turned matched up to two fifths. The same where the
         // caller expects most points to have no partner.
         let enough = 0.55_f64.min(1.0 - 1.5 * share).max(0.1);
-        match () {
-            () if pairs < enough * smaller as f64 => Some(Doubt::FewPairs),
-            // Least mean confidence of pairs: of a hundred pairs the share that is right varies by
-            // two points about its mean, and scenes with less than nine in ten are to be doubted.
-            () if self.sureness() < 0.95 => Some(Doubt::Undecided),
-            () => None,
+        if pairs < enough * smaller as f64 {
+            return Some(Doubt::FewPairs);
         }
+        // Trades false alarms for silence. On held-out scenes of `--example confidence` 37 of 674
+        // right answers are doubted and 10 of 238 wrong ones are not; at 0.4 it is 22 and 13.
+        if self.risk(smaller, gain, tail) < 0.25 {
+            return None;
+        }
+        // That large a tail is of a part of the set that lies aside.
+        let misfit = gain < MIN_TELLING_GAIN || tail > 0.08;
+        Some(if misfit {
+            Doubt::LargeResiduals
+        } else {
+            Doubt::Undecided
+        })
+    }
+
+    /// Probability that fewer than nine in ten pairs are right. Logistic in the share of wrong pairs
+    /// and of missed ones by their confidences, in the gain, and in the tail. Fitted to the scenes of
+    /// `--example confidence`, seeds 0 to 5, and every second one of Chui and Rangarajan's published
+    /// sets.
+    fn risk(&self, smaller: usize, gain: f64, tail: f64) -> f64 {
+        let rows = self.assignment.iter().zip(&self.confidence);
+        let without = rows.filter(|(partner, _)| partner.is_none());
+        let missed: f64 = without.map(|(_, free)| 1.0 - free).sum::<f64>() / smaller as f64;
+        let wrong = (1.01 - self.sureness()).ln();
+        let logit = 6.94 + 2.76 * wrong + 30.8 * missed.min(1.0) - 1.5 * gain.clamp(-1.0, 1.0)
+            + 66.6 * tail.min(0.2);
+        1.0 / (1.0 + (-logit).exp())
     }
 
     /// Mean confidence of the pairs. 1 where there are none.

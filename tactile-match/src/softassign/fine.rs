@@ -3,6 +3,7 @@
 use super::anneal::median_of_chi_squared;
 use super::confidence::CLEAN_SIGMA;
 use super::model::cholesky;
+use super::search::is_cold;
 use super::{AnnealedSoftassign, Search, SoftassignWorkspace, State, Transformation};
 use nalgebra::{Matrix4, Matrix4x3, RowVector4, SVector, Vector3};
 use tactile_core::vectorised;
@@ -82,9 +83,7 @@ impl AnnealedSoftassign {
         let bends = thorough && self.transformation == Transformation::NonRigid;
         let plain = ws.known.is_empty() && !ws.annealer.soft.errors.differ();
         let smaller = ws.model.len().min(ws.target.len()) as f64;
-        // A run colder than the noise has lost some of its pairs.
-        let cold = ws.best.sigma < 0.1 * ws.spacing && ws.best.matched < 0.95 * smaller;
-        if !bends || !plain || !(ws.best.sigma <= CLEAN_SIGMA || cold) {
+        if !bends || !plain || !(ws.best.sigma <= CLEAN_SIGMA || is_cold(ws)) {
             return false;
         }
         // Those lie this far from their targets at most.

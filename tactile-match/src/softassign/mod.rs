@@ -111,6 +111,8 @@ pub struct SoftassignWorkspace<const D: usize> {
     spacing: f64,
     /// Share of points without a partner that the caller expects.
     expected_share: f64,
+    /// Rows of a set, sorted by their coordinates.
+    rows: Vec<usize>,
     starts: usize,
     stopped: bool,
     /// Whether any rotation is allowed and one takes the model onto itself.
@@ -128,19 +130,13 @@ impl<const D: usize> SoftassignWorkspace<D> {
     /// Decides why the answer is not to be relied on, and lowers its confidences by that.
     fn settle_doubt(&mut self) {
         let smaller = self.model.len().min(self.target.len());
-        let doubt = self.answer.doubt(smaller, self.expected_share);
         // An exact answer explains the targets as well as can be.
         let gain = self.gain().unwrap_or(f64::INFINITY);
-        let by_chance = gain < confidence::MIN_TELLING_GAIN;
-        // A larger share of residuals that the noise of the others does not explain is that of a
-        // part of the set that lies aside.
-        let misfit = by_chance || self.best.tail > 0.08;
+        let share = self.expected_share;
+        let doubt = self.answer.doubt(smaller, share, gain, self.best.tail);
         let symmetric = self.symmetric.then_some(Doubt::Symmetric);
         let twin = self.twin.map(|(_, doubt)| doubt);
-        self.doubt = twin
-            .or(doubt)
-            .or(misfit.then_some(Doubt::LargeResiduals))
-            .or(symmetric);
+        self.doubt = twin.or(doubt).or(symmetric);
         if let Some(doubt) = self.doubt {
             self.answer.lower_confidences(doubt, gain);
         }
@@ -163,6 +159,10 @@ impl<const D: usize> SoftassignWorkspace<D> {
         target: &[Point<f64, D>],
     ) -> Result<(), MatchError> {
         error::point_sets(model, target)?;
+        if model.len().min(target.len()) >= large::LARGE {
+            error::spread_out("model", model, &mut self.rows)?;
+            error::spread_out("target", target, &mut self.rows)?;
+        }
         let frame = Frame::new(model, target);
         self.frame = frame;
         self.model.clear();
@@ -293,6 +293,9 @@ struct Cooling {
     /// Undecided matches stand still when residuals and temperature, as variances, differ by less
     /// than this share.
     still: f64,
+    /// Whether residuals count what the posterior of the warp leaves open. Without it the warp of a
+    /// few points follows their noise, and the temperature falls below it.
+    open: bool,
 }
 
 /// One annealing run.

@@ -535,7 +535,7 @@ fn solve<const D: usize>(factor: &[f64], n: usize, b: &mut [[f64; D]]) {
 /// Lengths ℓ over which the warp may bend, in radii of the model, and amplitudes τ at the first of
 /// them: a factor √2 and 2 apart, about what the evidence of a hundred points tells apart.
 const LENGTHS: [f64; 4] = [1.2, 1.7, 2.4, 3.4];
-const AMPLITUDES: [f64; 5] = [0.35, 0.2, 0.1, 0.05, 0.025];
+pub(super) const AMPLITUDES: [f64; 5] = [0.35, 0.2, 0.1, 0.05, 0.025];
 
 /// Memory of the average.
 #[derive(Clone, Debug, Default)]
@@ -552,9 +552,12 @@ pub(super) struct ScaleAverage<const D: usize> {
     solution: Vec<[f64; D]>,
     weighted: Vec<f64>,
     displacement: Axes<D>,
+    /// Sums over all scales by their evidence, relative to the least energy: of the displacements,
+    /// of their squares, of the weights.
     mean: Axes<D>,
-    /// Sum of the squared displacements under all scales, by their evidence.
     square: Vec<f64>,
+    total: f64,
+    least: f64,
     /// Variance of the displacements between the scales, along one axis.
     pub(super) spread: Vec<f64>,
 }
@@ -579,11 +582,8 @@ impl<const D: usize> ScaleAverage<D> {
         // Scales whose evidence is so many units of the logarithm below the best do not count:
         // together less than a hundredth.
         let limit = self.energies.iter().copied().fold(f64::INFINITY, f64::min) + 8.0;
-        let mut best = (f64::INFINITY, PriorScales::default());
-        let mut total = 0.0;
-        for axis in &mut self.mean.0 {
-            axis.clear();
-        }
+        let mut best = PriorScales::default();
+        self.clear(model.len());
         for (l, length) in LENGTHS.into_iter().enumerate() {
             let scales = l * AMPLITUDES.len();
             let of_length = &self.energies[scales..scales + AMPLITUDES.len()];
@@ -598,43 +598,76 @@ impl<const D: usize> ScaleAverage<D> {
                 let bending = amplitude * length / LENGTHS[0];
                 let energy = self.fit(request, bending, affine, variance);
                 self.energies[scales + a] = energy;
-                if energy < best.0 {
-                    // What was summed so far is counted relative to the new best.
-                    let fade = if best.0.is_finite() {
-                        (energy - best.0).exp()
-                    } else {
-                        0.0
+                if energy < self.least {
+                    best = PriorScales {
+                        length,
+                        bending,
+                        affine,
                     };
-                    total *= fade;
-                    self.fade(fade);
-                    best = (
-                        energy,
-                        PriorScales {
-                            length,
-                            bending,
-                            affine,
-                        },
-                    );
                 }
-                let weight = (best.0 - energy).exp();
-                total += weight;
+                let weight = self.weigh(energy);
                 // Below this the mean does not change by a thousandth of the noise.
                 if weight > 1e-4 {
                     self.add(l, bending, affine, weight);
                 }
             }
         }
+        self.place(state);
+        best
+    }
+
+    /// Forgets all sums.
+    pub(super) fn clear(&mut self, points: usize) {
+        (self.total, self.least) = (0.0, f64::INFINITY);
+        for axis in self.mean.0.iter_mut().chain([&mut self.square]) {
+            axis.clear();
+            axis.resize(points, 0.0);
+        }
+    }
+
+    /// The weight of a scale by its energy. What was summed so far is made relative to the least.
+    fn weigh(&mut self, energy: f64) -> f64 {
+        if energy < self.least {
+            let fade = if self.least.is_finite() {
+                (energy - self.least).exp()
+            } else {
+                0.0
+            };
+            self.total *= fade;
+            for axis in self.mean.0.iter_mut().chain([&mut self.square]) {
+                axis.iter_mut().for_each(|v| *v *= fade);
+            }
+            self.least = energy;
+        }
+        let weight = (self.least - energy).exp();
+        self.total += weight;
+        weight
+    }
+
+    /// Adds the positions of a state to the sums, by its energy.
+    pub(super) fn add_state(&mut self, state: &State<D>) {
+        let weight = self.weigh(state.energy);
+        for (i, (warped, base)) in state.warped.iter().zip(&state.base).enumerate() {
+            for k in 0..D {
+                let moved = warped[k] - base[k];
+                self.mean.0[k][i] += weight * moved;
+                self.square[i] += weight * moved * moved;
+            }
+        }
+    }
+
+    /// Puts the points at the mean of what was summed, and sets `spread`.
+    pub(super) fn place(&mut self, state: &mut State<D>) {
         self.spread.clear();
         for (i, warped) in state.warped.iter_mut().enumerate() {
-            let mut square = self.square[i] / total;
+            let mut square = self.square[i] / self.total;
             for k in 0..D {
-                let mean = self.mean.0[k][i] / total;
+                let mean = self.mean.0[k][i] / self.total;
                 warped[k] = state.base[i][k] + mean;
                 square -= mean * mean;
             }
             self.spread.push((square / D as f64).max(0.0));
         }
-        best.1
     }
 
     /// Factor and Gram matrix of one length.
@@ -690,14 +723,6 @@ impl<const D: usize> ScaleAverage<D> {
                 );
             },
         );
-        if self.mean.0[0].is_empty() {
-            self.mean
-                .0
-                .iter_mut()
-                .for_each(|axis| axis.resize(stride, 0.0));
-            self.square.clear();
-            self.square.resize(stride, 0.0);
-        }
     }
 
     /// The energy of one amplitude. Leaves the coefficients in `solution`.
@@ -749,12 +774,6 @@ impl<const D: usize> ScaleAverage<D> {
             })
             .sum();
         0.5 * ((squares - explained) / noise + D as f64 * log_det)
-    }
-
-    fn fade(&mut self, factor: f64) {
-        for axis in self.mean.0.iter_mut().chain([&mut self.square]) {
-            axis.iter_mut().for_each(|v| *v *= factor);
-        }
     }
 
     /// Adds the displacements of the present coefficients to the mean.

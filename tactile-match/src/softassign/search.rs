@@ -7,6 +7,7 @@
 //! prior.
 
 use super::confidence::{self, CLEAN_SIGMA, MIN_TELLING_GAIN};
+use super::model::AMPLITUDES;
 use super::{
     AnnealedSoftassign, Cooling, Mechanism, PriorScales, Rotation, Schedule, Search,
     SoftassignWorkspace, Transformation, starts,
@@ -38,6 +39,7 @@ pub(super) const FAST: Cooling = Cooling {
     stuck: usize::MAX,
     sweeps: 3,
     still: 1e-4,
+    open: false,
 };
 /// Further runs follow the residuals. They end when the temperature has stood still for `patience`
 /// iterations: matches that have not settled by then wander for hundreds.
@@ -48,6 +50,12 @@ const SLOW: Cooling = Cooling {
     stuck: 8,
     sweeps: 5,
     ..FAST
+};
+/// Where a few points have lost their partners below the noise.
+const OPEN: Cooling = Cooling {
+    rate: 0.75,
+    open: true,
+    ..SLOW
 };
 /// From the best answer so far.
 const REHEAT: Cooling = Cooling {
@@ -222,6 +230,9 @@ impl AnnealedSoftassign {
             }
             self.run(ws, start, cooling, observe)?;
         }
+        if !dense && is_cold(ws) && !self.is_done(ws) && !self.resolve(ws) {
+            self.run(ws, Start::Centred, OPEN, observe)?;
+        }
         self.look_for_twins(ws);
         let noisy = ws.best.sigma > CLEAN_SIGMA || ws.annealer.soft.errors.differ();
         if noisy && !ws.best.noisy && self.has(Mechanism::Scales) && !ws.annealer.rigid.is_active()
@@ -346,6 +357,7 @@ impl AnnealedSoftassign {
         // Soft partners that spread more than this hide the evidence of a warp behind that of its
         // matches.
         if ambiguity > 0.3 {
+            self.average_amplitudes(ws, &schedule);
             return;
         }
         let average = |ws: &mut SoftassignWorkspace<D>, likely: bool| {
@@ -362,6 +374,38 @@ impl AnnealedSoftassign {
         ws.annealer.settle(&mut ws.state, &schedule, 2);
         ws.best.sigma = ws.state.sigma;
         average(ws, true);
+    }
+
+    /// The mean over the amplitudes of the prior where soft partners spread over several points: a
+    /// noise wider than the spacing bends the search's warp to every cluster. Each amplitude is
+    /// weighted by its evidence, with the information that undecided partners leave.
+    fn average_amplitudes<const D: usize>(
+        &self,
+        ws: &mut SoftassignWorkspace<D>,
+        schedule: &Schedule,
+    ) {
+        let (sigma, decided) = (ws.best.sigma, (1.0 - ws.annealer.ambiguity).max(0.0));
+        let mut likeliest = (f64::INFINITY, SCALES);
+        ws.scales.clear(ws.model.len());
+        for bending in AMPLITUDES {
+            let scales = PriorScales { bending, ..SCALES };
+            ws.annealer.prior.build(&ws.model, scales);
+            ws.state.copy_from(&ws.best);
+            // More rounds do not change the errors of `--example noise_band`. Partners so wide would
+            // raise a free noise level in each of them.
+            for _ in 0..10 {
+                ws.annealer.settle(&mut ws.state, schedule, 1);
+                ws.state.sigma = sigma;
+            }
+            ws.annealer
+                .evaluate_undecided(&mut ws.state, self.share, ENERGY_RESOLUTION, decided);
+            ws.scales.add_state(&ws.state);
+            if ws.state.energy < likeliest.0 {
+                likeliest = (ws.state.energy, scales);
+            }
+        }
+        ws.scales.place(&mut ws.best);
+        ws.annealer.prior.build(&ws.model, likeliest.1);
     }
 
     pub(super) fn schedule(&self, mut cooling: Cooling) -> Schedule {
@@ -410,6 +454,12 @@ impl AnnealedSoftassign {
             && ws.best.matched >= wanted_share(ws) * points as f64
             && (ws.best.tail <= 0.01 || !dense)
     }
+}
+
+/// Whether the best run so far ended below the noise: so it lost some of its pairs.
+pub(super) fn is_cold<const D: usize>(ws: &SoftassignWorkspace<D>) -> bool {
+    let smaller = ws.model.len().min(ws.target.len()) as f64;
+    ws.best.sigma < 0.1 * ws.spacing && ws.best.matched < 0.95 * smaller
 }
 
 /// Share of the smaller set that a complete answer matches. Dense sets may hold points that are in

@@ -3,7 +3,9 @@
 use crate::common::{Stream, bend, reordered, scattered};
 use nalgebra::{Point, SVector};
 use std::ops::ControlFlow;
-use tactile_match::{AnnealedSoftassign, PointMatcher, SoftassignWorkspace, StopReason};
+use tactile_match::{
+    AnnealedSoftassign, MatchError, PointMatcher, SoftassignWorkspace, StopReason,
+};
 
 /// Enough for two levels, and few enough for a debug build.
 const POINTS: usize = 4500;
@@ -71,6 +73,23 @@ fn clean_sets_are_matched_in_the_plane() {
 #[test]
 fn clean_sets_are_matched_in_space() {
     check_clean::<3>();
+}
+
+/// Each of a heap is a candidate for each: a million would take terabytes.
+#[test]
+fn a_heap_in_one_place_is_refused() {
+    let mut heap = scattered::<2>(POINTS, 33);
+    heap[500..1501].fill(Point::from([0.5, 0.25]));
+    let spread = scattered::<2>(POINTS, 34);
+    let matcher = AnnealedSoftassign::default();
+    assert!(matches!(
+        matcher.match_points(&spread, &heap),
+        Err(MatchError::Coincident {
+            set: "target",
+            count: 1001,
+            limit: 1000
+        })
+    ));
 }
 
 /// Noise of a spacing hides the pairs, and their density alone tells the field: what moves points

@@ -186,6 +186,26 @@ fn small_noise_costs_no_pair_and_is_found() {
     }
 }
 
+/// A warp that follows the noise of fifty points in space loses a third of the partners.
+#[test]
+fn noise_of_few_points_costs_no_pair() {
+    for seed in 0..8 {
+        let model = scattered::<3>(50, seed);
+        let truth = bend(&model, 0.03);
+        let scene = Scene::new(model, truth, |_| true, (0.015, 0.0), seed + 60);
+        let found = scene.matched();
+        // One pair in fifty may be exchanged: the noise is a twentieth of the spacing.
+        assert!(scene.right(&found) >= 0.98, "seed {seed}");
+        assert!(found.unmatched_model.is_empty(), "seed {seed}");
+        // 150 coordinates less what the warp takes, two standard deviations and more.
+        assert!(
+            (found.report.sigma / 0.015 - 1.0).abs() < 0.25,
+            "seed {seed}: noise {}",
+            found.report.sigma
+        );
+    }
+}
+
 /// A set stretched along x and seen through its old window.
 fn stretched<const D: usize>(n: usize, stretch: f64, outliers: f64, seed: u64) -> Scene<D> {
     let model = scattered::<D>(n, seed);

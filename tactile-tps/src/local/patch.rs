@@ -29,6 +29,11 @@ const SHAPES: [Shape; 4] = [
 /// λ = 4ᵏ, from the rounding of the covariances to fields that are affine beside their noise.
 const POWERS: std::ops::RangeInclusive<i32> = -19..=5;
 
+/// Variances are raised by this, since shape and λ are taken as known. Over 45 fields with noise of
+/// 0 to 0.3 spacings, in the plane and in space, 91 to 97 % of the slopes' 95 % intervals hold
+/// without it, and 93 to 98 % with it.
+const UNCERTAIN_SHAPE: f64 = 1.1;
+
 /// Pairs in the middle of a patch whose residuals calibrate its errors, as many as a block has.
 const MIDDLE: usize = 24;
 
@@ -384,7 +389,7 @@ impl<const D: usize> Patch<D> {
         let ratio = misfits / (D * middle) as f64;
         if ratio.is_finite() {
             // Only raised: few residuals that happen to be small do not prove small errors.
-            self.scale *= ratio.max(1.0);
+            self.scale *= UNCERTAIN_SHAPE * ratio.max(1.0);
         }
     }
 }
