@@ -287,8 +287,13 @@ impl<const D: usize> StrainBetween<D> {
         let partner = |(i, j): (usize, &Option<usize>)| j.map(|j| (i, j));
         let assignment = matching.assignment.iter().enumerate();
         let pairs: Vec<_> = assignment.filter_map(partner).collect();
-        let mut found = Self::of_pairs(before, after, &pairs, options.measure.as_ref())?;
         let doubt = matching.report.doubt.map(PairsDoubt::Matcher);
+        if let Some(doubt) = doubt
+            && !options.doubtful_pairs
+        {
+            return Err(StrainBetweenError::Doubtful(doubt));
+        }
+        let mut found = Self::of_pairs(before, after, &pairs, options.measure.as_ref())?;
         found.doubt = doubt.or(found.doubt);
         options.allow(found)
     }

@@ -80,8 +80,8 @@ pub struct Settings {
     pub force_scale_error: Option<f64>,
     /// Relative standard error common to all forces read from light: a bare guide scatters by what
     /// touches it, and the object may reflect otherwise than what it was calibrated with. Zero
-    /// under a fixed diffusing skin, or for the calibrator itself. `None`: 6 % are assumed, the
-    /// force of an object that reflects a tenth less lies in the interval.
+    /// under a fixed diffusing skin, or for the calibrator itself. `None`: 12 % are assumed, and the
+    /// force of an object that reflects a fifth less lies in the interval.
     pub coupling_error: Option<f64>,
     /// Relative standard error common to all lengths: that of the pixel size. `None`: 0.3 % are
     /// assumed.
@@ -191,7 +191,7 @@ impl Settings {
 
     /// That without presses of known force.
     pub(crate) fn unchecked_coupling(&self) -> f64 {
-        self.coupling_error.unwrap_or(0.06)
+        self.coupling_error.unwrap_or(0.12)
     }
 
     pub(super) fn length_scale(&self) -> f64 {

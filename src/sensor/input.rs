@@ -147,7 +147,7 @@ impl SensorCalibration {
     /// flat_field = true                   # the default
     /// gauge_error = 1e-3                  # relative, common to all forces
     /// gauge_noise_N = 2e-3
-    /// coupling_error = 0.0                # under a fixed diffusing skin, 0.06 if absent
+    /// coupling_error = 0.0                # under a fixed diffusing skin, 0.12 if absent
     /// covers_N = [0.1, 1.2]               # forces of later scenes, may be left out
     /// target = { image = "target.png", pitch_m = 1e-3, error = 5e-4 }
     ///

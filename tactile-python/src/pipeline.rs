@@ -152,7 +152,7 @@ impl Object {
 ///     Whether frames are divided by the reference's own brightness.
 /// force_scale_error, coupling_error, length_scale_error, radius_error, poisson_ratio_error : float
 ///     Standard errors that all loads share: three relative ones, in metres, absolute. What is not
-///     given is assumed: 0.22 %, 6 %, 0.3 %, 0.5 % of the radius, 0.01.
+///     given is assumed: 0.22 %, 12 %, 0.3 %, 0.5 % of the radius, 0.01.
 ///
 /// Raises
 /// ------

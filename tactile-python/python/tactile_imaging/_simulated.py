@@ -8,6 +8,8 @@ from ._native import Object, Pipeline, Press, SimulatedPress
 def pipeline_of(scene: SimulatedPress, **stages: Any) -> Pipeline:
     """The default pipeline of a simulated sensor and its ball.
 
+    Simulated light follows the pressure whatever presses, so that `coupling_error` is 0.
+
     Parameters
     ----------
     scene : SimulatedPress
@@ -24,6 +26,7 @@ def pipeline_of(scene: SimulatedPress, **stages: Any) -> Pipeline:
         "pixel_size": scene.pixel_size,
         "waveguide": scene.waveguide,
         "estimator": scene.estimator,
+        "coupling_error": 0.0,
     }
     return Pipeline(**(arguments | stages))
 
