@@ -317,6 +317,9 @@ fn a_ball_under_the_rim_has_a_place_and_no_size() {
     let [x, y] = inclusion.position_m.unwrap();
     let away = (x.value - 6e-3).hypot(y.value + 8e-3);
     assert!(away < 0.2e-3, "{away}");
+    // Its place is less well known than the pressures tell.
+    let [low, high] = x.interval;
+    assert!(high - low > 2.0 * 1.96 * 0.03 * 16e-3, "{x:?}");
     assert!(inclusion.diameter_m.value().is_none(), "{found:?}");
 }
 
