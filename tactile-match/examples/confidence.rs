@@ -15,9 +15,15 @@
 use nalgebra::{Point, SVector};
 use tactile_match::{AnnealedSoftassign, MatchError, Matching, PointMatcher};
 
+#[path = "support/scene.rs"]
+mod scene;
 #[path = "support/stream.rs"]
 mod stream;
+#[path = "support/tenths.rs"]
+mod tenths;
+use scene::Scene;
 use stream::Stream;
+use tenths::Tenths;
 
 /// What is done to the points of the unit cube.
 #[derive(Clone, Copy, PartialEq)]
@@ -41,14 +47,6 @@ struct Kind {
     outliers: f64,
     /// Random points in place of a jittered grid.
     random: bool,
-}
-
-/// A model, where its points truly go, and targets, of which `order` tells the model rows.
-struct Scene<const D: usize> {
-    model: Vec<Point<f64, D>>,
-    truth: Vec<Point<f64, D>>,
-    target: Vec<Point<f64, D>>,
-    order: Vec<usize>,
 }
 
 impl<const D: usize> Scene<D> {
@@ -80,10 +78,6 @@ impl<const D: usize> Scene<D> {
             target,
             order,
         }
-    }
-
-    fn is_right(&self, i: usize, j: usize) -> bool {
-        self.order.get(j) == Some(&i)
     }
 }
 
@@ -166,9 +160,6 @@ struct Tally {
     coordinates: f64,
 }
 
-/// Pairs, sum of confidences, right pairs.
-type Tenths = [[f64; 3]; 10];
-
 fn add<const D: usize>(
     kind: Kind,
     seed: u64,
@@ -180,12 +171,10 @@ fn add<const D: usize>(
     let (mut right, mut pairs) = (0.0, 0.0);
     for (i, partner) in found.assignment.iter().enumerate() {
         let &Some(j) = partner else { continue };
-        let own = f64::from(u8::from(scene.is_right(i, j)));
-        (right, pairs) = (right + own, pairs + 1.0);
-        let tenth = &mut tenths[((10.0 * found.confidence[i]) as usize).min(9)];
-        tenth[0] += 1.0;
-        tenth[1] += found.confidence[i];
-        tenth[2] += own;
+        let is_right = scene.is_right(i, j);
+        right += f64::from(u8::from(is_right));
+        pairs += 1.0;
+        tenths.add(found.confidence[i], is_right);
     }
     let doubted = found.report.doubt.is_some();
     tally.scenes += 1;
@@ -236,14 +225,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             add::<3>(kind, seed, &mut families[family].1, &mut tenths)?;
         }
     }
-    println!("pairs, mean confidence, share right");
-    for [pairs, confidence, right] in tenths {
-        println!(
-            "  {pairs:>6} {:.3} {:.3}",
-            confidence / pairs,
-            right / pairs
-        );
-    }
+    tenths.print();
     println!(
         "scenes, doubted, below 90 % right, of these without a doubt; of those without, within \
          one standard deviation"

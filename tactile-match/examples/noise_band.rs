@@ -13,17 +13,12 @@
 use nalgebra::{Point, SVector};
 use tactile_match::{AnnealedSoftassign, CoherentPointDrift, MatchError, Matching, PointMatcher};
 
+#[path = "support/scene.rs"]
+mod scene;
 #[path = "support/stream.rs"]
 mod stream;
+use scene::Scene;
 use stream::Stream;
-
-/// A model, where its points truly go, and noisy targets, of which `order` has the model rows.
-struct Scene<const D: usize> {
-    model: Vec<Point<f64, D>>,
-    truth: Vec<Point<f64, D>>,
-    target: Vec<Point<f64, D>>,
-    order: Vec<usize>,
-}
 
 impl<const D: usize> Scene<D> {
     fn new(points: usize, noise: f64, bent: bool, seed: u64) -> Self {
@@ -90,7 +85,7 @@ impl Row {
             for (i, partner) in found.assignment.iter().enumerate() {
                 match *partner {
                     None => row.unmatched += per_point,
-                    Some(j) if scene.order[j] != i => row.wrong += per_point,
+                    Some(j) if !scene.is_right(i, j) => row.wrong += per_point,
                     Some(_) => {}
                 }
             }

@@ -1,5 +1,7 @@
 //! Matches the cases of a file with the default matcher, writes the answers in the same kind of
-//! file, and prints one line a level.
+//! file, and prints one line a level: besides error and time the answers with a doubt, those with
+//! fewer than nine in ten right pairs, and those of the latter without a doubt. Then what the
+//! confidences of all pairs are worth.
 //!
 //! ```text
 //! cargo run --release -p tactile-match --example peer_cases -- CASES.txt [RESULTS.txt]
@@ -16,6 +18,10 @@ use std::fmt::Write as _;
 use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 use tactile_match::{AnnealedSoftassign, MatchError, SoftassignWorkspace};
+
+#[path = "support/tenths.rs"]
+mod tenths;
+use tenths::Tenths;
 
 /// One case as it stands in the file.
 #[derive(Default)]
@@ -34,6 +40,9 @@ struct Score {
     right: f64,
     milliseconds: f64,
     starts: usize,
+    doubted: bool,
+    /// Whether fewer than nine in ten of the pairs that were found are right.
+    wrong: bool,
 }
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -44,10 +53,11 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let cases = read(&std::fs::read_to_string(path)?)?;
     let mut results = String::new();
     let mut levels: BTreeMap<String, Vec<Score>> = BTreeMap::new();
+    let mut tenths = Tenths::default();
     for case in &cases {
         let score = match case.dimension {
-            2 => solve::<2>(case, &mut results)?,
-            3 => solve::<3>(case, &mut results)?,
+            2 => solve::<2>(case, &mut results, &mut tenths)?,
+            3 => solve::<3>(case, &mut results, &mut tenths)?,
             other => return Err(format!("{}: dimension {other}", case.name).into()),
         };
         let level = case
@@ -57,21 +67,26 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         levels.entry(level.to_owned()).or_default().push(score);
     }
     println!(
-        "{:<24} {:>10} {:>7} {:>9} {:>7}",
-        "level", "error", "right", "ms", "starts"
+        "{:<24} {:>10} {:>7} {:>9} {:>7} {:>8} {:>6} {:>7}",
+        "level", "error", "right", "ms", "starts", "doubted", "wrong", "silent"
     );
     for (level, scores) in &levels {
         let mean = |f: fn(&Score) -> f64| scores.iter().map(f).sum::<f64>() / scores.len() as f64;
+        let count = |f: fn(&Score) -> bool| scores.iter().filter(|score| f(score)).count();
         let mut times: Vec<f64> = scores.iter().map(|score| score.milliseconds).collect();
         times.sort_by(f64::total_cmp);
         println!(
-            "{level:<24} {:>10.5} {:>7.3} {:>9.2} {:>7.1}",
+            "{level:<24} {:>10.5} {:>7.3} {:>9.2} {:>7.1} {:>8} {:>6} {:>7}",
             mean(|score| score.error),
             mean(|score| score.right),
             times[times.len() / 2],
             mean(|score| score.starts as f64),
+            count(|score| score.doubted),
+            count(|score| score.wrong),
+            count(|score| score.wrong && !score.doubted),
         );
     }
+    tenths.print();
     if let Some(path) = arguments.next() {
         std::fs::write(path, results)?;
     }
@@ -110,7 +125,11 @@ fn read(text: &str) -> Result<Vec<Case>, Box<dyn std::error::Error>> {
     Ok(cases)
 }
 
-fn solve<const D: usize>(case: &Case, results: &mut String) -> Result<Score, MatchError> {
+fn solve<const D: usize>(
+    case: &Case,
+    results: &mut String,
+    tenths: &mut Tenths,
+) -> Result<Score, MatchError> {
     let points = |rows: &[Vec<f64>]| -> Vec<Point<f64, D>> {
         rows.iter().map(|row| Point::from_slice(row)).collect()
     };
@@ -136,11 +155,15 @@ fn solve<const D: usize>(case: &Case, results: &mut String) -> Result<Score, Mat
     let milliseconds = 1e3 * least.as_secs_f64();
     // Writing to a string cannot fail.
     let _ = writeln!(results, "case {} {milliseconds:.6}", case.name);
-    let (mut error, mut right, mut paired) = (0.0, 0.0, 0.0);
+    let (mut error, mut right, mut paired, mut found_pairs) = (0.0, 0.0, 0.0, 0.0);
     for (i, (place, assigned)) in warped.iter().zip(found.assignment).enumerate() {
         let coordinates: Vec<String> = place.iter().map(|c| format!("{c:?}")).collect();
         let row = assigned.map_or(-1, |j| i64::try_from(j).unwrap_or(-1));
         let _ = writeln!(results, "w {}\na {row}", coordinates.join(" "));
+        if assigned.is_some() {
+            found_pairs += 1.0;
+            tenths.add(found.confidence[i], row == case.partner[i]);
+        }
         if case.partner[i] >= 0 {
             paired += 1.0;
             error += (place - truth[i]).norm();
@@ -152,5 +175,7 @@ fn solve<const D: usize>(case: &Case, results: &mut String) -> Result<Score, Mat
         right: right / paired,
         milliseconds,
         starts: found.report.starts,
+        doubted: found.report.doubt.is_some(),
+        wrong: right < 0.9 * found_pairs,
     })
 }

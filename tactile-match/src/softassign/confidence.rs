@@ -28,10 +28,10 @@ pub(super) fn are_unequal(model: usize, target: usize) -> bool {
 }
 
 impl<const D: usize> Answer<D> {
-    /// Why the pairs are not to be relied on. `smaller` points could have a partner, `share` of them
-    /// are expected to have none. `gain` is the logarithm, a point, of how much more
-    /// likely the answer makes the targets than chance does, `tail` the share of residuals that the
-    /// noise of the others does not explain.
+    /// Why the pairs are not to be relied on. `smaller` points could have a partner, `share` of
+    /// them are expected to have none. `gain` is the logarithm, a point, of how much more likely
+    /// the answer makes the targets than chance does, `tail` the share of residuals that the noise
+    /// of the others does not explain.
     pub(super) fn doubt(&self, smaller: usize, share: f64, gain: f64, tail: f64) -> Option<Doubt> {
         let pairs = self.assignment.iter().flatten().count() as f64;
         // An answer with fewer pairs, relative to the smaller set, may be one of chance: wrong

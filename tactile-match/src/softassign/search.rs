@@ -53,7 +53,7 @@ const SLOW: Cooling = Cooling {
 };
 /// Where a few points have lost their partners below the noise.
 const OPEN: Cooling = Cooling {
-    rate: 0.75,
+    rate: FAST.rate,
     open: true,
     ..SLOW
 };
