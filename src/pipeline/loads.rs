@@ -97,12 +97,20 @@ pub fn series(
     let common = smallest(Load::calibration, settings.force_scale());
     let common_length = smallest(Load::common_length, settings.length_scale());
     let pixel_m = (pixel_size_m[0] * pixel_size_m[1]).sqrt();
+    let radius_m = mean_radius_m(loads.clone());
+    let other_body = settings.guide_error(radius_m);
+    let errors = common_length * other_body;
     let shared = SharedErrors {
         force_scale: common,
         length_scale: common_length,
         size: settings.size_error(),
         poisson_ratio: settings.poisson_error(),
-        other_body: guide_error_at(loads.clone(), settings),
+        other_body,
+        length_with_other_body: if errors > 0.0 {
+            (settings.guide_with_length(radius_m) / errors).clamp(-1.0, 1.0)
+        } else {
+            0.0
+        },
     };
     LoadSeries::new(
         loads
@@ -113,15 +121,14 @@ pub fn series(
     .map_err(PipelineError::Modulus)
 }
 
-/// Relative error of the guide's compliance under contacts of the mean radius.
-fn guide_error_at(loads: impl Iterator<Item = Load>, settings: &Settings) -> f64 {
+/// Mean radius of the contacts. NaN without one, which the guide's compliance refuses.
+fn mean_radius_m(loads: impl Iterator<Item = Load>) -> f64 {
     let (mut sum, mut count) = (0.0, 0.0);
     for load in loads.filter(|load| load.counts) {
         sum += load.contact.contact_radius_m.value;
         count += 1.0;
     }
-    // Without a radius the mean is NaN, which the compliance refuses.
-    settings.guide_error(sum / count)
+    sum / count
 }
 
 /// Loads that a session keeps apart. More are merged.

@@ -3,9 +3,11 @@ use super::check::{CheckedGain, CheckedGuide};
 use super::error::PipelineError;
 use super::reference_light::ReferenceLight;
 use super::specimen::Object;
-use crate::elasticity::contact::{PARAMETERS_PER_LAYER, Waveguide, guide_compliance_error};
+use crate::elasticity::contact::{
+    PARAMETERS_PER_LAYER, Waveguide, guide_compliance_covariance, guide_compliance_error,
+};
 use crate::sfs::Binning;
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 
 /// Control points on each surface where nothing else is asked for: the paper's number.
 pub(crate) const DEFAULT_CONTROL_POINTS: usize = 200;
@@ -93,6 +95,10 @@ pub struct Settings {
     /// Covariance of ln E of all layers of the waveguide, then of ln h, then of ν. `None`: the
     /// moduli of all layers are assumed to be wrong by one factor, of 5 %.
     pub layer_covariance: Option<DMatrix<f64>>,
+    /// Covariances of the same parameters with the logarithm of measured lengths: the pixels that
+    /// measure the object have measured the contacts of the balls that checked the layers, too.
+    /// `None`: zero.
+    pub layers_with_length: Option<DVector<f64>>,
     /// The light of the reference that forces were calibrated on. Forces read from light are
     /// divided by the factor by which a press's reference is brighter. `None`: the light is taken
     /// to be the same.
@@ -122,6 +128,7 @@ impl Settings {
             object_radius_error_m: None,
             poisson_ratio_error: None,
             layer_covariance: None,
+            layers_with_length: None,
             calibrated_light: None,
             checked_gain: None,
             checked_guide: None,
@@ -211,6 +218,16 @@ impl Settings {
         }
     }
 
+    /// Covariance of the logarithms of measured lengths and of the guide's compliance under a
+    /// contact of this radius.
+    pub(super) fn guide_with_length(&self, contact_radius_m: f64) -> f64 {
+        let layers = self.waveguide.as_ref().map_or(&[][..], Waveguide::layers);
+        let covariances = self.layers_with_length.as_ref();
+        covariances
+            .and_then(|c| guide_compliance_covariance(layers, c, contact_radius_m))
+            .unwrap_or(0.0)
+    }
+
     pub(super) fn poisson_error(&self) -> f64 {
         self.poisson_ratio_error.unwrap_or(0.01)
     }
@@ -255,15 +272,24 @@ impl Settings {
         if let Some(&found) = inputs.iter().flatten().find(|e| !is_error(e)) {
             return Err(PipelineError::InputError { found });
         }
+        let layers = self.waveguide.as_ref().map_or(0, |w| w.layers().len());
+        let expected = PARAMETERS_PER_LAYER * layers;
+        if let Some(covariances) = &self.layers_with_length {
+            if covariances.len() != expected {
+                let found = covariances.shape();
+                return Err(PipelineError::LayerCovariance { expected, found });
+            }
+            if let Some(&found) = covariances.iter().find(|c| !c.is_finite()) {
+                return Err(PipelineError::InputError { found });
+            }
+        }
         match &self.layer_covariance {
-            Some(covariance) => self.check_covariance(covariance),
+            Some(covariance) => Self::check_covariance(covariance, expected),
             None => Ok(()),
         }
     }
 
-    fn check_covariance(&self, covariance: &DMatrix<f64>) -> Result<(), PipelineError> {
-        let layers = self.waveguide.as_ref().map_or(0, |w| w.layers().len());
-        let expected = PARAMETERS_PER_LAYER * layers;
+    fn check_covariance(covariance: &DMatrix<f64>, expected: usize) -> Result<(), PipelineError> {
         let found = covariance.shape();
         if found != (expected, expected) {
             return Err(PipelineError::LayerCovariance { expected, found });

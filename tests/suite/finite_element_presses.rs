@@ -22,13 +22,13 @@ use tactile_simulate::{
     PressLoad, PressOptions, PressScene, WaveguideLayer,
 };
 
-struct Ball {
+pub(crate) struct Ball {
     name: String,
-    youngs_modulus_pa: f64,
-    radius_m: f64,
+    pub(crate) youngs_modulus_pa: f64,
+    pub(crate) radius_m: f64,
     /// Thickness and modulus of each layer; none on a rigid flat.
     layers: Vec<(f64, f64)>,
-    states: Vec<ContactState>,
+    pub(crate) states: Vec<ContactState>,
 }
 
 fn data(name: &str) -> PathBuf {
@@ -38,7 +38,7 @@ fn data(name: &str) -> PathBuf {
 }
 
 /// Contacts as `cargo run --example contact_states -- presses` writes them.
-fn recorded_balls() -> Vec<Ball> {
+pub(crate) fn recorded_balls() -> Vec<Ball> {
     let text = std::fs::read_to_string(data("finite_element_presses.csv")).unwrap();
     let mut balls: Vec<Ball> = Vec::new();
     for line in text.lines().skip(1) {

@@ -126,7 +126,7 @@ impl Pipeline {
     /// light ([`CheckedGain`]), of balls of known modulus the layers of the guide
     /// ([`CheckedGuide`]). All have one reference. Of one call the errors that presses share (pixel
     /// size, contact law, ball) are counted as shared. Presses of a later call are taken as
-    /// independent of those before. A ball costs some dozen solutions of its contact.
+    /// independent of those before, but for the size of a pixel. A ball costs some dozen solutions of its contact.
     ///
     /// ```
     /// use tactile_imaging::force::{CalibrationPair, Estimate};
@@ -187,14 +187,15 @@ impl Pipeline {
         }
         if !guides.is_empty() {
             let checked = guide::update(&guides, pipeline.settings());
-            let (checked, layers, covariance) = checked.map_err(|(ball, reason)| {
+            let updated = checked.map_err(|(ball, reason)| {
                 let press = balls[ball];
                 PipelineError::Check { press, reason }
             })?;
             pipeline = pipeline.with_settings(|settings| {
-                settings.waveguide = Some(layers);
-                settings.layer_covariance = Some(covariance);
-                settings.checked_guide = Some(checked);
+                settings.waveguide = Some(updated.layers);
+                settings.layer_covariance = Some(updated.covariance);
+                settings.layers_with_length = Some(updated.with_length);
+                settings.checked_guide = Some(updated.checked);
             })?;
         }
         Ok(pipeline)

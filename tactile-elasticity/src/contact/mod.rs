@@ -29,8 +29,8 @@ pub use layers::{Bond, LayerContact, LayerEquation, LayerSeries};
 pub use plane::LayerPlane;
 pub use table::{ContactCurve, ContactTable};
 pub use waveguide::{
-    Layer, PARAMETERS_PER_LAYER, Waveguide, guide_compliance_error, guide_log_stiffness,
-    stepped_layers,
+    Layer, PARAMETERS_PER_LAYER, Waveguide, guide_compliance_covariance, guide_compliance_error,
+    guide_log_stiffness, stepped_layers,
 };
 
 pub(crate) use hertz::Squeeze;

@@ -242,6 +242,29 @@ pub fn guide_compliance_error(
         .then(|| slopes.dot(&(covariance * &slopes)).max(0.0).sqrt())
 }
 
+/// Covariance of the logarithm of the guide's compliance under a contact of radius a (m) with
+/// another quantity, from its covariances with ln E of all layers, ln h and ν. None as of
+/// [`guide_compliance_error`].
+///
+/// ```
+/// use nalgebra::DVector;
+/// use tactile_elasticity::contact::{Layer, guide_compliance_covariance};
+///
+/// let gel = Layer { thickness_m: 10e-3, youngs_modulus_pa: 75e3, poisson_ratio: 0.5 };
+/// // A stiffer gel yields less.
+/// let with_modulus = DVector::from_column_slice(&[4e-4, 0.0, 0.0]);
+/// let covariance = guide_compliance_covariance(&[gel], &with_modulus, 1e-3).unwrap();
+/// assert!((covariance + 4e-4).abs() < 1e-7);
+/// ```
+pub fn guide_compliance_covariance(
+    layers: &[Layer],
+    covariances: &DVector<f64>,
+    radius_m: f64,
+) -> Option<f64> {
+    let slopes = log_stiffness_gradient(layers, radius_m)?;
+    (covariances.len() == slopes.len()).then(|| -slopes.dot(covariances))
+}
+
 #[cfg(test)]
 #[path = "waveguide_tests.rs"]
 mod tests;

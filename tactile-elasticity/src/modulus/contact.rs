@@ -271,14 +271,28 @@ impl<L: ContactLaw> ContactEstimator<L> {
     ///
     /// With p the sample's part of the compliance, 1 − C E* on a deep body, ln E moves by 1/p of ln
     /// F, by 1 − 1/p of ln C and by 2ν/(1 − ν²) of ν. Beside ln E* an error of ln C counts 1 − p
-    /// times, one of ν p·2ν/(1 − ν²) times.
-    fn standard_error(&self, series: &LoadSeries, mean: &CommonMean, sample_part: f64) -> f64 {
+    /// times, one of ν p·2ν/(1 − ν²) times, and one of lengths minus the mean slope of ln F.
+    fn standard_error(
+        &self,
+        series: &LoadSeries,
+        all: &[Observation],
+        mean: &CommonMean,
+        sample_part: f64,
+    ) -> f64 {
         let shared = series.shared_errors();
         let nu_slope = 2.0 * self.poisson_ratio / (1.0 - self.poisson_ratio.powi(2));
         let of_other_body = (1.0 - sample_part) * shared.other_body;
         let of_poisson_ratio = sample_part * nu_slope * shared.poisson_ratio;
-        mean.standard_error
-            .hypot(of_other_body.hypot(of_poisson_ratio))
+        let slopes = mean
+            .weights
+            .iter()
+            .zip(all)
+            .map(|(w, o)| w * o.log_force.slope);
+        let of_lengths = -slopes.sum::<f64>() * shared.length_scale;
+        let together = 2.0 * shared.length_with_other_body * of_lengths * of_other_body;
+        let apart = mean.standard_error.powi(2) + of_other_body.powi(2) + of_poisson_ratio.powi(2);
+        // Of one cause both may cancel, but for rounding.
+        (apart + together).max(0.0).sqrt()
     }
 
     /// The sample's part of the compliance under the mean of the contacts.
@@ -310,8 +324,14 @@ impl<L: ContactLaw> ContactEstimator<L> {
         let mut log_reduced = mean.mean;
         // Without a step an infinite error must not become NaN.
         if reach != 0.0 {
+            // The assumed fraction is the one that follows only where the law asks for it.
+            let fraction = if self.law.depends_on_compliance_fraction() {
+                fraction
+            } else {
+                self.fraction_at(mean.mean)
+            };
             let part = self.sample_part(&observations, fraction);
-            let error = self.standard_error(series, &mean, part);
+            let error = self.standard_error(series, &observations, &mean, part);
             log_reduced += reach * quantile_95(mean.degrees) * error;
         }
         Ok(Consistent {
@@ -397,7 +417,8 @@ impl<L: ContactLaw> ContactEstimator<L> {
         };
         let upper = if known { limit(1.0) } else { None };
         let part = self.sample_part(&centre.observations, self.fraction_at(centre.log_reduced));
-        let error = modulus / part * self.standard_error(series, &centre.mean, part);
+        let error =
+            modulus / part * self.standard_error(series, &centre.observations, &centre.mean, part);
         // Errors at rounding level may put an end on the wrong side of the estimate by a rounding.
         let upper = upper.map(|upper| upper.max(modulus));
         Ok((modulus, error, Interval::new(lower.min(modulus), upper)))

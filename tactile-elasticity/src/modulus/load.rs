@@ -125,6 +125,9 @@ pub struct SharedErrors {
     /// Relative error of the other body's compliance: the moduli of a waveguide's layers, all by
     /// one factor.
     pub other_body: f64,
+    /// Correlation of the errors of lengths and of the other body's compliance, from -1 to 1.
+    /// Above zero where the body was checked by contact radii that the same pixels measured.
+    pub length_with_other_body: f64,
 }
 
 impl SharedErrors {
@@ -138,6 +141,14 @@ impl SharedErrors {
             errors.other_body,
         ] {
             not_negative(error, Quantity::StandardError)?;
+        }
+        let correlation = errors.length_with_other_body;
+        if !(-1.0..=1.0).contains(&correlation) {
+            return Err(ElasticityError::OutOfRange {
+                quantity: Quantity::Correlation,
+                found: correlation,
+                limit: 1.0,
+            });
         }
         Ok(self)
     }

@@ -208,12 +208,17 @@ impl TabulatedContact {
         let model = self.table.interpolation_error().hypot(ELEMENT_ERROR);
         let nu = self.table.poisson_ratio();
         let of_poisson_ratio = 2.0 * nu / (1.0 - nu * nu) * shared.poisson_ratio;
+        let of_other_body = |i: usize| over(i, (1.0 - forces[i].modulus_slope) * shared.other_body);
+        let correlation = shared.length_with_other_body;
         let of_all = none
-            .with_shared(|i| over(i, forces[i].radius_slope * shared.length_scale))
+            .with_shared(|i| {
+                let of_length = over(i, forces[i].radius_slope * shared.length_scale);
+                correlation * of_other_body(i) - of_length
+            })
             // F has the dimension E R²: what does not follow a follows R, what does not follow E
             // follows the guide's moduli.
             .with_shared(|i| over(i, (2.0 - forces[i].radius_slope) * shared.size))
-            .with_shared(|i| over(i, (1.0 - forces[i].modulus_slope) * shared.other_body))
+            .with_shared(|i| (1.0 - correlation * correlation).sqrt() * of_other_body(i))
             .with_shared(|i| over(i, forces[i].modulus_slope * of_poisson_ratio))
             .with_model_errors(|i| over(i, model));
         [

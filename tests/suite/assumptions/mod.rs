@@ -5,6 +5,7 @@
 //! assumes in one respect or in all; its answer's interval holds the truth, or a flag about the
 //! modulus says what is wrong, or the row is one that [`UNSEEN`] names.
 #![allow(clippy::print_stdout)]
+mod drawn;
 mod worlds;
 
 use std::collections::BTreeSet;
@@ -216,7 +217,7 @@ impl Row {
     fn run(&self, seeds: u64) -> Found {
         let mut found = Found::default();
         for seed in 0..seeds {
-            let measured = self.world.measure(&self.stated, 1 + seed);
+            let measured = self.world.measure(&self.stated, 1 + seed).unwrap();
             let modulus = match measured.youngs_modulus_pa {
                 Ok(modulus) => modulus,
                 Err(error) => {

@@ -1,20 +1,22 @@
 //! A sensor and a press as they are, and as the user states them.
+use crate::finite_element_presses::recorded_balls;
 use nalgebra::DMatrix;
+use ndarray::Array2;
 use tactile_imaging::elasticity::contact::{Layer, Waveguide};
 use tactile_imaging::fem::{self, Guide, Interface, Material, ObjectPress};
-use tactile_imaging::force::ReferenceFrame;
+use tactile_imaging::force::{Estimate, ReferenceFrame};
 use tactile_imaging::pipeline::{
-    EstimatorChoice, Measurement, Object, Pipeline, ReferenceLight, StagesConfig,
+    CheckPress, CheckedObject, EstimatorChoice, KnownBall, Measurement, Object, Pipeline,
+    PipelineError, ReferenceLight, StagesConfig,
 };
 use tactile_simulate::Trial;
 use tactile_simulate::{
     CalibrationRun, Camera, ContactModel, ContactState, Illumination, PressLoad, PressOptions,
-    Response,
+    PressScene, Response,
 };
 
 pub(super) const RADIUS_M: f64 = 3e-3;
 pub(super) const MODULUS_PA: f64 = 103e3;
-const LOADS_N: [f64; 2] = [0.7, 1.2];
 
 /// What is pressed: always solved by finite elements at finite strain.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -47,6 +49,50 @@ pub(super) struct World {
     pub(super) reflectance: f64,
     /// Brightness of the lamps over that during the calibration. The reference is taken anew.
     pub(super) lamps: f64,
+    pub(super) loads_n: [f64; 2],
+    pub(super) check: Option<Check>,
+}
+
+/// A press of known force beside the frames.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Check {
+    /// The sample.
+    Sample,
+    /// A ball of 180 kPa and 3 mm.
+    KnownBall,
+}
+
+impl Check {
+    /// One of the forces that the known ball was solved for.
+    const KNOWN_BALL_N: f64 = 0.3;
+
+    /// Its frame beside those of the trial, its force, and what it is stated to press.
+    fn press(self, trial: &Trial, stated: &Stated) -> (Array2<u8>, f64, CheckedObject) {
+        let mut options = trial.scene.options().clone();
+        options.seed += 1 << 32;
+        let mut object = CheckedObject::Sample;
+        if self == Self::KnownBall {
+            let mut balls = recorded_balls().into_iter();
+            let ball = balls.find(|ball| ball.youngs_modulus_pa == 180e3).unwrap();
+            let [radius_m, modulus_pa] = [ball.radius_m, ball.youngs_modulus_pa];
+            options.object.radius_m = radius_m;
+            options.object.material.youngs_modulus_pa = modulus_pa;
+            options.law = ContactModel::Tabulated(ball.states);
+            options.loads = vec![PressLoad::normal(Self::KNOWN_BALL_N)];
+            object = CheckedObject::Ball(KnownBall::elastic(
+                KnownBall::radius(stated.known_ball[0] * radius_m, None),
+                KnownBall::modulus(stated.known_ball[1] * modulus_pa, None),
+            ));
+        }
+        // The last load of the trial again, as the camera's gain follows from all of them.
+        let made = PressScene::new(options).unwrap().simulate();
+        let force_n = made.truth.last().unwrap().contact.force_n;
+        (
+            made.frames.into_iter().next_back().unwrap(),
+            force_n,
+            object,
+        )
+    }
 }
 
 /// What the user says of them: relative to the truth, with relative standard errors.
@@ -64,6 +110,9 @@ pub(super) struct Stated {
     pub(super) poisson_error: Option<f64>,
     /// Whether the light of the calibration's reference was kept.
     pub(super) keeps_light: bool,
+    /// The weight of a check, radius and modulus of a known ball.
+    pub(super) weight: f64,
+    pub(super) known_ball: [f64; 2],
 }
 
 impl Default for World {
@@ -78,6 +127,8 @@ impl Default for World {
             gauge: 1.0,
             reflectance: 1.0,
             lamps: 1.0,
+            loads_n: [0.7, 1.2],
+            check: None,
         }
     }
 }
@@ -97,6 +148,8 @@ impl Default for Stated {
             radius_error: None,
             poisson_error: None,
             keeps_light: true,
+            weight: 1.0,
+            known_ball: [1.0; 2],
         }
     }
 }
@@ -105,6 +158,7 @@ impl Sample {
     /// The contacts at both loads; none where the simulator brings them along.
     fn states(self, options: &PressOptions) -> Option<Vec<ContactState>> {
         let material = options.object.material;
+        let forces_n: Vec<f64> = options.loads.iter().map(|load| load.force_n).collect();
         match self {
             Self::Ball => None,
             Self::Compressible(poisson_ratio) => Some(on_the_guide(
@@ -116,7 +170,7 @@ impl Sample {
             Self::Face(faces) => {
                 let (radius_m, height_m) = (6e-3, 8e-3);
                 let states = ContactState::of_squeezed_cylinder(
-                    radius_m, height_m, &material, faces, &LOADS_N,
+                    radius_m, height_m, &material, faces, &forces_n,
                 );
                 Some(states.unwrap())
             }
@@ -146,14 +200,21 @@ fn on_the_guide(
     let press = press.on_guide(Guide::new(layers.collect(), 28e-3).unwrap());
     let press = press.unwrap().with_interface(interface);
     let scene = press.scene().unwrap();
-    let states = scene.solve(&LOADS_N.map(fem::AppliedLoad::Force)).states;
+    let loads = options.loads.iter();
+    let loads: Vec<_> = loads
+        .map(|load| fem::AppliedLoad::Force(load.force_n))
+        .collect();
+    let states = scene.solve(&loads).states;
     let contact = |state| ContactState::from_solved(state).expect("a contact");
     states.iter().map(contact).collect()
 }
 
 impl World {
     /// Calibrated, pressed and measured as the user states it.
-    pub(super) fn measure(&self, stated: &Stated, seed: u64) -> Measurement {
+    ///
+    /// # Errors
+    /// A check that is refused.
+    pub(super) fn measure(&self, stated: &Stated, seed: u64) -> Result<Measurement, PipelineError> {
         let load = |(force_n, level): (f64, f64)| PressLoad {
             illumination: Illumination {
                 level,
@@ -167,7 +228,12 @@ impl World {
                 1.0 => Response::Linear,
                 exponent => Response::Power { exponent },
             },
-            loads: LOADS_N.into_iter().zip(self.levels).map(load).collect(),
+            loads: self
+                .loads_n
+                .into_iter()
+                .zip(self.levels)
+                .map(load)
+                .collect(),
             seed,
             law: ContactModel::FiniteElements,
             ..PressOptions::default()
@@ -185,8 +251,15 @@ impl World {
             pair.force_n *= self.gauge;
             pair.integrated_pixel_value /= self.reflectance * self.lamps;
         }
-        let pipeline = stated.pipeline(&trial, self.lamps);
-        trial.press(&pipeline).unwrap().measure()
+        let mut pipeline = stated.pipeline(&trial, self.lamps);
+        if let Some(check) = self.check {
+            let (frame, force_n, object) = check.press(&trial, stated);
+            let known_n = Estimate::new(stated.weight * force_n, 2e-3 * force_n);
+            let check = CheckPress::new(frame.view(), known_n, object);
+            let reference = trial.simulation.reference.view();
+            pipeline = pipeline.with_checks(reference, &[check])?;
+        }
+        Ok(trial.press(&pipeline)?.measure())
     }
 }
 

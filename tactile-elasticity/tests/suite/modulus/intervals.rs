@@ -38,6 +38,57 @@ fn intervals_cover_what_they_promise() {
     assert!((1860..=1940).contains(&covered), "{covered} of 2000");
 }
 
+/// 2000 experiments whose lengths and guide are wrong together, as where the guide was checked by
+/// the same pixels: 95 % ± four standard deviations of the count.
+#[test]
+fn intervals_cover_where_lengths_and_the_guide_err_together() {
+    let loads = hertz_loads(waveguide().as_body(), &[2e-3, 6e-3]);
+    let (length_scale, other_body) = (0.01, 0.05);
+    for correlation in [0.9, -0.9] {
+        let shared = SharedErrors {
+            length_scale,
+            other_body,
+            length_with_other_body: correlation,
+            ..SharedErrors::default()
+        };
+        let mut rng = ChaCha8Rng::seed_from_u64(11);
+        let mut covered = 0;
+        for _ in 0..2000 {
+            let mut normal = || rng.sample::<f64, _>(StandardNormal);
+            let (both, own) = (normal(), normal());
+            let of_guide = correlation * both + (1.0 - correlation * correlation).sqrt() * own;
+            let guide = waveguide();
+            let layers = guide.layers().iter().map(|layer| Layer {
+                youngs_modulus_pa: layer.youngs_modulus_pa / (1.0 + other_body * of_guide),
+                ..*layer
+            });
+            let stated = Waveguide::new(layers.collect()).unwrap();
+            let measured = loads.iter().map(|load| {
+                let a = load.contact_radius_m.unwrap().value * (1.0 + length_scale * both);
+                LoadState {
+                    contact_radius_m: Some(exact(a)),
+                    indentation_m: None,
+                    ..*load
+                }
+            });
+            let series = LoadSeries::new(measured.collect::<Vec<_>>());
+            let series = series.with_shared_errors(shared).unwrap();
+            let estimator = HertzSphere::new(4e-3, NU).unwrap();
+            let found = estimator.with_waveguide(&stated).estimate(&series).unwrap();
+            covered += usize::from(found.interval_95.contains(SAMPLE));
+        }
+        assert!(
+            (1860..=1940).contains(&covered),
+            "{correlation}: {covered} of 2000"
+        );
+    }
+    let wrong = SharedErrors {
+        length_with_other_body: 1.1,
+        ..SharedErrors::default()
+    };
+    assert!(LoadSeries::new(loads).with_shared_errors(wrong).is_err());
+}
+
 #[test]
 fn a_force_covariance_says_the_same_as_a_shared_scale() {
     let loads = hertz_loads(Body::rigid(), &[1e-3, 3e-3]);

@@ -1,0 +1,144 @@
+//! Worlds drawn at random: everything that is stated is wrong by as much as its stated error
+//! allows, and the light or the camera departs from what is assumed in up to three respects.
+use super::worlds::{Check, MODULUS_PA, Stated, World};
+use super::{ball, concerns_modulus};
+use rand::{Rng, RngExt, SeedableRng, rngs::ChaCha8Rng, seq::IndexedRandom};
+use rand_distr::StandardNormal;
+use tactile_imaging::pipeline::{Measurement, PipelineError};
+
+type Departure = (&'static str, fn(&mut World, f64));
+
+/// Departures of the light and the camera, by a number from -1 to 1. An object that reflects
+/// otherwise is not among them: the coupling's error states it.
+const DEPARTURES: [Departure; 10] = [
+    ("lamps since the calibration", |w, x| {
+        w.lamps = 1.0 + 0.1 * x
+    }),
+    ("lamps in the frames", |w, x| w.levels = [1.0 + 0.05 * x; 2]),
+    ("lamps between the frames", |w, x| {
+        w.levels = [1.0, 1.0 + 0.05 * x]
+    }),
+    ("light as a power of the pressure", |w, x| {
+        w.exponent = 1.0 + 0.1 * x
+    }),
+    ("hysteresis", |w, x| w.hysteresis = 0.03 * x.abs()),
+    ("vignetting", |w, x| w.camera.vignetting = 0.1 * x.abs()),
+    ("barrel distortion", |w, x| w.camera.barrel = 0.03 * x),
+    ("pixels that are not square", |w, x| {
+        w.camera.pixel_size_m[1] *= 1.0 + 0.02 * x
+    }),
+    ("noise", |w, x| {
+        w.camera.full_well_electrons /= 1.0 + 8.0 * x.abs();
+        w.camera.read_noise_grey *= 1.0 + 2.0 * x.abs();
+    }),
+    ("coarse pixels", |w, _| w.camera = w.camera.coarser(2)),
+];
+
+/// A world whose inputs have the errors that are assumed where none is stated.
+fn honest(rng: &mut impl Rng, check: Option<Check>) -> (World, Stated) {
+    let mut normal = || rng.sample::<f64, _>(StandardNormal);
+    let mut world = World {
+        check,
+        gauge: 1.0 + 2e-3 * normal(),
+        ..World::default()
+    };
+    let mut stated = Stated {
+        layer_moduli: (0.05 * normal()).exp(),
+        pixel_size: 1.0 + 3e-3 * normal(),
+        object: ball(0.5 - 0.01 * normal().abs(), 1.0 + 5e-3 * normal()),
+        weight: 1.0 + 2e-3 * normal(),
+        known_ball: [5e-3, 0.02].map(|error| 1.0 + error * normal()),
+        ..Stated::default()
+    };
+    // A guide under a skin where a known ball is pressed, a bare one otherwise.
+    let reflectance = (0.12 * normal()).exp();
+    if check != Some(Check::KnownBall) {
+        world.reflectance = reflectance;
+        stated.coupling_error = None;
+    }
+    world.loads_n = *[[0.1, 0.3], [0.3, 0.7], [0.7, 1.2]].choose(rng).unwrap();
+    (world, stated)
+}
+
+struct Outcome {
+    error: f64,
+    half_width: f64,
+    held: bool,
+    flagged: bool,
+}
+
+impl Outcome {
+    fn of(found: Result<Measurement, PipelineError>) -> Option<Self> {
+        let found = found.ok()?;
+        let modulus = found.youngs_modulus_pa.ok()?;
+        let (lower, upper) = modulus.interval_95;
+        let upper = upper.unwrap_or(f64::INFINITY);
+        Some(Self {
+            error: modulus.value / MODULUS_PA - 1.0,
+            half_width: 0.5 * (upper - lower) / MODULUS_PA,
+            held: (lower..=upper).contains(&MODULUS_PA),
+            flagged: found.flags.iter().any(concerns_modulus),
+        })
+    }
+}
+
+fn median(values: impl Iterator<Item = f64>) -> f64 {
+    let mut values: Vec<f64> = values.collect();
+    values.sort_by(f64::total_cmp);
+    values[values.len() / 2]
+}
+
+/// Worlds with this check and so many departures.
+fn draw(check: Option<Check>, departures: usize, count: u64) -> Vec<Outcome> {
+    let mut rng = ChaCha8Rng::seed_from_u64(1);
+    let mut outcomes = Vec::new();
+    for seed in 0..count {
+        let (mut world, stated) = honest(&mut rng, check);
+        let mut names = Vec::new();
+        for (name, change) in DEPARTURES.sample(&mut rng, departures) {
+            names.push(name);
+            change(&mut world, rng.random_range(-1.0..1.0));
+        }
+        // What is refused is not silent.
+        let outcome = Outcome::of(world.measure(&stated, 100 + seed));
+        if let Some(outcome) = &outcome
+            && !outcome.held
+            && !outcome.flagged
+        {
+            let percent = 100.0 * outcome.error;
+            println!("silent: {percent:+.1} % at {:?} N {names:?}", world.loads_n);
+        }
+        outcomes.extend(outcome);
+    }
+    outcomes
+}
+
+/// `WORLDS=300` draws as many of each kind: minutes, for `.ci/run studies`.
+#[test]
+fn drawn_worlds_are_held_or_flagged() {
+    let count = std::env::var("WORLDS").ok().and_then(|n| n.parse().ok());
+    let count = count.unwrap_or(8);
+    for check in [None, Some(Check::Sample), Some(Check::KnownBall)] {
+        for departures in [0, 3] {
+            let outcomes = draw(check, departures, count);
+            let all = outcomes.len() as f64;
+            let share = |is: fn(&Outcome) -> bool| {
+                outcomes.iter().filter(|outcome| is(outcome)).count() as f64 / all
+            };
+            let held = share(|outcome| outcome.held);
+            let silent = share(|outcome| !outcome.held && !outcome.flagged);
+            println!(
+                "| {check:?} | {departures} | {:.1} % | ± {:.1} % | {:.1} % | {:.1} % | {:.1} % |",
+                100.0 * median(outcomes.iter().map(|outcome| outcome.error.abs())),
+                100.0 * median(outcomes.iter().map(|outcome| outcome.half_width)),
+                100.0 * held,
+                100.0 * share(|outcome| outcome.flagged),
+                100.0 * silent,
+            );
+            // Three standard deviations of so many draws.
+            let slack = 3.0 * (0.05 * 0.95 / all).sqrt();
+            assert!(silent < 0.05 + slack, "{check:?}, {departures}: {silent}");
+            assert!(departures > 0 || held > 0.95 - slack, "{check:?}: {held}");
+        }
+    }
+}
