@@ -30,6 +30,8 @@ pub enum ErrorSource {
     ObjectRadius,
     /// Poisson's ratio of the object.
     PoissonRatio,
+    /// Adhesion of a ball.
+    Adhesion,
     /// Moduli, thicknesses and Poisson ratios of the guide's layers.
     Guide,
     /// The contact law, and what else the estimator adds.
@@ -45,6 +47,7 @@ impl Display for ErrorSource {
             Self::PixelSize => "the size of a pixel",
             Self::ObjectRadius => "the object's radius",
             Self::PoissonRatio => "the object's Poisson ratio",
+            Self::Adhesion => "adhesion",
             Self::Guide => "the guide's layers",
             Self::Law => "the contact law",
         })
@@ -99,6 +102,7 @@ impl ErrorSource {
             Self::PixelSize => "a frame of a target of known pitch",
             Self::ObjectRadius => "a calliper on the object (radius_error_m)",
             Self::PoissonRatio => "a statement of its error (poisson_ratio_error)",
+            Self::Adhesion => "larger forces, or talc and a statement of adhesion_error_j_per_m2",
             Self::Guide => "a press of a ball of known radius and modulus ([[check]])",
             Self::Law => "a contact table by finite elements",
         }
@@ -114,6 +118,7 @@ impl ErrorSource {
             Self::PixelSize => settings.length_scale_error.is_none(),
             Self::ObjectRadius => settings.object_radius_error_m.is_none(),
             Self::PoissonRatio => settings.poisson_ratio_error.is_none(),
+            Self::Adhesion => settings.adhesion_error_j_per_m2.is_none(),
             Self::Guide => settings.layer_covariance.is_none(),
         }
     }
@@ -189,6 +194,13 @@ pub fn error_budget(
             ErrorSource::PoissonRatio,
             without(SharedErrors {
                 poisson_ratio: 0.0,
+                ..shared
+            }),
+        ),
+        (
+            ErrorSource::Adhesion,
+            without(SharedErrors {
+                adhesion_n: 0.0,
                 ..shared
             }),
         ),

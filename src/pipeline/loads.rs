@@ -106,6 +106,7 @@ pub fn series(
         size: settings.size_error(),
         poisson_ratio: settings.poisson_error(),
         other_body,
+        adhesion_n: settings.adhesion_n(),
         length_with_other_body: if errors > 0.0 {
             (settings.guide_with_length(radius_m) / errors).clamp(-1.0, 1.0)
         } else {

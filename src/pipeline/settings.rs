@@ -92,6 +92,9 @@ pub struct Settings {
     pub object_radius_error_m: Option<f64>,
     /// Standard error of the object's Poisson ratio. `None`: 0.01 is assumed.
     pub poisson_ratio_error: Option<f64>,
+    /// Work of adhesion that a ball may have, in J/m², one standard deviation. `None`: 1 mJ/m² is
+    /// assumed, as of a dusted ball. Clean dry silicone has some tens.
+    pub adhesion_error_j_per_m2: Option<f64>,
     /// Covariance of ln E of all layers of the waveguide, then of ln h, then of ν. `None`: the
     /// moduli of all layers are assumed to be wrong by one factor, of 5 %.
     pub layer_covariance: Option<DMatrix<f64>>,
@@ -127,6 +130,7 @@ impl Settings {
             length_scale_error: None,
             object_radius_error_m: None,
             poisson_ratio_error: None,
+            adhesion_error_j_per_m2: None,
             layer_covariance: None,
             layers_with_length: None,
             calibrated_light: None,
@@ -175,6 +179,7 @@ impl Settings {
             &mut self.length_scale_error,
             &mut self.object_radius_error_m,
             &mut self.poisson_ratio_error,
+            &mut self.adhesion_error_j_per_m2,
         ] {
             error.get_or_insert(0.0);
         }
@@ -232,6 +237,15 @@ impl Settings {
         self.poisson_ratio_error.unwrap_or(0.01)
     }
 
+    /// 6πwR of the work of adhesion that a ball may have, in newtons. Zero of other objects.
+    pub(super) fn adhesion_n(&self) -> f64 {
+        let Object::Sphere { radius_m, .. } = self.object else {
+            return 0.0;
+        };
+        let work = self.adhesion_error_j_per_m2.unwrap_or(1e-3);
+        6.0 * std::f64::consts::PI * work * radius_m
+    }
+
     /// Relative error of the object's size.
     pub(super) fn size_error(&self) -> f64 {
         let radius_m = match self.object {
@@ -268,7 +282,11 @@ impl Settings {
         if let Some(&found) = scales.iter().flatten().find(|e| !is_error(e)) {
             return Err(PipelineError::ScaleError { found });
         }
-        let inputs = [self.object_radius_error_m, self.poisson_ratio_error];
+        let inputs = [
+            self.object_radius_error_m,
+            self.poisson_ratio_error,
+            self.adhesion_error_j_per_m2,
+        ];
         if let Some(&found) = inputs.iter().flatten().find(|e| !is_error(e)) {
             return Err(PipelineError::InputError { found });
         }

@@ -313,6 +313,8 @@ pub struct StatedErrors {
     pub radius_m: Option<f64>,
     /// Of the object's Poisson ratio.
     pub poisson_ratio: Option<f64>,
+    /// Of a ball's work of adhesion, in J/m².
+    pub adhesion_j_per_m2: Option<f64>,
 }
 
 impl StatedErrors {
@@ -324,6 +326,8 @@ impl StatedErrors {
         set(&mut settings.length_scale_error, self.pixel_size);
         set(&mut settings.object_radius_error_m, self.radius_m);
         set(&mut settings.poisson_ratio_error, self.poisson_ratio);
+        let adhesion = &mut settings.adhesion_error_j_per_m2;
+        set(adhesion, self.adhesion_j_per_m2);
         if let (Some(error), Some(guide)) = (self.layers, &settings.waveguide) {
             let covariance = Settings::common_layer_covariance(guide.layers().len(), error);
             settings.layer_covariance = Some(covariance);
@@ -514,6 +518,8 @@ struct ObjectTable {
     radius_error_m: Option<f64>,
     #[serde(default, deserialize_with = "stated")]
     poisson_ratio_error: Option<f64>,
+    #[serde(default, deserialize_with = "stated")]
+    adhesion_error_j_per_m2: Option<f64>,
 }
 
 #[derive(Deserialize)]
@@ -674,6 +680,7 @@ impl SceneFile {
                 layers: self.layer_error,
                 radius_m: self.object.radius_error_m,
                 poisson_ratio: self.object.poisson_ratio_error,
+                adhesion_j_per_m2: self.object.adhesion_error_j_per_m2,
             },
             calibration,
             frames,

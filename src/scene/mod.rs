@@ -95,11 +95,12 @@
 //! pixel_size_error = 1e-3                # relative, 0.3 % if absent
 //! gauge_error = 1e-3                     # relative, of all forces, 0.2 % if absent
 //! coupling_error = "exact"               # of the light that another object than the calibrator
-//!                                        # couples: exact under a diffusing skin, 6 % if absent
+//!                                        # couples: exact under a diffusing skin, 12 % if absent
 //! layer_error = 0.02                     # of the moduli of all layers, 5 % if absent
 //! [object]
 //! radius_error_m = 5e-6                  # 0.5 % of the radius if absent
 //! poisson_ratio_error = 0.002            # 0.01 if absent
+//! adhesion_error_j_per_m2 = 0.0005       # of a ball, 0.001 if absent
 //! ```
 //!
 //! The names of a stage are those of its choice in [`StagesConfig`](crate::pipeline::StagesConfig).

@@ -150,9 +150,10 @@ impl Object {
 ///     attribute `needs_strain` says whether loads have strains.
 /// flat_field : bool
 ///     Whether frames are divided by the reference's own brightness.
-/// force_scale_error, coupling_error, length_scale_error, radius_error, poisson_ratio_error : float
-///     Standard errors that all loads share: three relative ones, in metres, absolute. What is not
-///     given is assumed: 0.22 %, 12 %, 0.3 %, 0.5 % of the radius, 0.01.
+/// force_scale_error, coupling_error, length_scale_error, radius_error, poisson_ratio_error,
+/// adhesion_error : float
+///     Standard errors that all loads share: three relative ones, in metres, absolute, in J/m². What
+///     is not given is assumed: 0.22 %, 12 %, 0.3 %, 0.5 % of the radius, 0.01, 0.001 J/m².
 ///
 /// Raises
 /// ------
@@ -169,7 +170,7 @@ impl Pipeline {
         waveguide=None, control_points=200, surface=None, integrator=None, sampler=None,
         matcher=None, matcher_options=None, warp=None, strain=None, estimator=None,
         flat_field=None, force_scale_error=None, coupling_error=None, length_scale_error=None,
-        radius_error=None, poisson_ratio_error=None
+        radius_error=None, poisson_ratio_error=None, adhesion_error=None
     ))]
     fn new(
         object: &Object,
@@ -194,6 +195,7 @@ impl Pipeline {
         length_scale_error: Option<f64>,
         radius_error: Option<f64>,
         poisson_ratio_error: Option<f64>,
+        adhesion_error: Option<f64>,
     ) -> PyResult<Self> {
         let input = Input {
             pairs,
@@ -230,6 +232,7 @@ impl Pipeline {
             set(&mut settings.length_scale_error, length_scale_error);
             set(&mut settings.object_radius_error_m, radius_error);
             set(&mut settings.poisson_ratio_error, poisson_ratio_error);
+            set(&mut settings.adhesion_error_j_per_m2, adhesion_error);
         }))
         .map_err(errors::pipeline)?
         .with_control_points(control_points)

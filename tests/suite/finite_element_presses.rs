@@ -3,6 +3,9 @@
 //! `tests/data/finite_element_presses.csv` holds contacts computed by the crate's own finite
 //! elements (neo-Hookean, ν = 0.4999, no friction), of moduli, radii, guides and loads that the
 //! layered law was not fitted to and that no table holds; `examples/contact_states.rs` makes it.
+//! `tests/data/calculix_presses.csv` holds those of another program; `evidence/ball_presses.py`
+//! makes it.
+mod calculix;
 mod solved;
 
 use nalgebra::{DMatrix, DVector};
@@ -39,7 +42,11 @@ fn data(name: &str) -> PathBuf {
 
 /// Contacts as `cargo run --example contact_states -- presses` writes them.
 pub(crate) fn recorded_balls() -> Vec<Ball> {
-    let text = std::fs::read_to_string(data("finite_element_presses.csv")).unwrap();
+    balls_of("finite_element_presses.csv")
+}
+
+fn balls_of(file: &str) -> Vec<Ball> {
+    let text = std::fs::read_to_string(data(file)).unwrap();
     let mut balls: Vec<Ball> = Vec::new();
     for line in text.lines().skip(1) {
         let cells: Vec<&str> = line.split(',').collect();

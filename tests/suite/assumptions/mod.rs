@@ -13,7 +13,7 @@ use tactile_imaging::Object;
 use tactile_imaging::fem::Interface;
 use tactile_imaging::pipeline::{EstimatorChoice, Flag};
 use tactile_simulate::Camera;
-use worlds::{MODULUS_PA, RADIUS_M, Sample, Stated, World};
+use worlds::{Distortion, MODULUS_PA, RADIUS_M, Sample, Stated, World};
 
 struct Row {
     assumed: &'static str,
@@ -143,6 +143,31 @@ fn rows() -> Vec<Row> {
         row(
             "a flat face, stated a ball",
             |w| w.sample = Sample::Face(Interface::Frictionless),
+            nothing,
+        ),
+        row(
+            "adhesion 3 mJ/m², 10 and 20 mN",
+            |w| (w.sample, w.loads_n) = (Sample::Adhering(3e-3), [0.01, 0.02]),
+            nothing,
+        ),
+        row(
+            "no adhesion, 10 and 20 mN",
+            |w| w.loads_n = [0.01, 0.02],
+            nothing,
+        ),
+        row(
+            "camera gamma 1.05 since the calibration",
+            |w| w.distortion = Some(Distortion::Gamma(1.05)),
+            nothing,
+        ),
+        row(
+            "pressure 10 % higher at one side: tilt",
+            |w| w.distortion = Some(Distortion::Skew(0.1)),
+            nothing,
+        ),
+        row(
+            "a halo of 5 % of the light",
+            |w| w.distortion = Some(Distortion::Halo(0.05)),
             nothing,
         ),
         row(

@@ -30,6 +30,60 @@ pub(super) enum Sample {
     Sticking,
     /// The flat face of a cylinder between plates, sliding or sticking.
     Face(Interface),
+    /// The same ball with this work of adhesion, in J/m².
+    Adhering(f64),
+}
+
+/// What becomes of the frames' light on the way to the file.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Distortion {
+    /// 255 (g/255)^(1/γ), of the reference too.
+    Gamma(f64),
+    /// Light times 1 + s x/a, as of a press whose force is not along the axis.
+    Skew(f64),
+    /// This share of the light is spread evenly over a square with sides of the frame's height.
+    Halo(f64),
+}
+
+impl Distortion {
+    fn apply(self, trial: &mut Trial) {
+        let plain = trial.simulation.reference.mapv(f64::from);
+        if let Self::Gamma(gamma) = self {
+            let curve = |grey: u8| (255.0 * (f64::from(grey) / 255.0).powf(1.0 / gamma)) as u8;
+            trial.simulation.reference.mapv_inplace(curve);
+            trial
+                .simulation
+                .frames
+                .iter_mut()
+                .for_each(|f| f.mapv_inplace(curve));
+            return;
+        }
+        let pixel_m = trial.simulation.pixel_size_m[0];
+        for (frame, truth) in trial
+            .simulation
+            .frames
+            .iter_mut()
+            .zip(&trial.simulation.truth)
+        {
+            let light = frame.mapv(f64::from) - &plain;
+            let (rows, columns) = frame.dim();
+            let spread = light.sum() / (rows * rows) as f64;
+            let around = columns.abs_diff(rows) / 2;
+            for ((row, column), grey) in frame.indexed_iter_mut() {
+                let here = light[(row, column)];
+                let x = (column as f64 - truth.centre_px[0]) * pixel_m;
+                let seen = match self {
+                    Self::Skew(skew) => here * (1.0 + skew * x / truth.contact.contact_radius_m),
+                    Self::Halo(share) => {
+                        let inside = (around..columns - around).contains(&column);
+                        (1.0 - share) * here + if inside { share * spread } else { 0.0 }
+                    }
+                    Self::Gamma(_) => here,
+                };
+                *grey = (plain[(row, column)] + seen).round() as u8;
+            }
+        }
+    }
 }
 
 /// How things are.
@@ -51,6 +105,7 @@ pub(super) struct World {
     pub(super) lamps: f64,
     pub(super) loads_n: [f64; 2],
     pub(super) check: Option<Check>,
+    pub(super) distortion: Option<Distortion>,
 }
 
 /// A press of known force beside the frames.
@@ -129,6 +184,7 @@ impl Default for World {
             lamps: 1.0,
             loads_n: [0.7, 1.2],
             check: None,
+            distortion: None,
         }
     }
 }
@@ -166,6 +222,7 @@ impl Sample {
                 Interface::Frictionless,
                 options,
             )),
+            Self::Adhering(work) => Some(adhering(work, options)),
             Self::Sticking => Some(on_the_guide(NEARLY_HALF, Interface::Bonded, options)),
             Self::Face(faces) => {
                 let (radius_m, height_m) = (6e-3, 8e-3);
@@ -209,6 +266,33 @@ fn on_the_guide(
     states.iter().map(contact).collect()
 }
 
+/// Johnson, Kendall and Roberts (1971, Proc. R. Soc. A 324, 301): a contact under the force F has
+/// the radius of one without adhesion under P₁ = F + Q, Q² = 6π w R P₁, and the pressure of that
+/// less Q/(2πa²)/√(1 − r²/a²). Where this is below zero nothing presses and no light leaks.
+fn adhering(work: f64, options: &PressOptions) -> Vec<ContactState> {
+    let pull_off_n = 3.0 * std::f64::consts::PI * work * RADIUS_M;
+    let mut hertz = options.clone();
+    for load in &mut hertz.loads {
+        let force_n = load.force_n;
+        load.force_n += pull_off_n + (pull_off_n * (2.0 * force_n + pull_off_n)).sqrt();
+    }
+    let states = on_the_guide(NEARLY_HALF, Interface::Frictionless, &hertz);
+    let loads = options.loads.iter();
+    states
+        .into_iter()
+        .zip(loads)
+        .map(|(mut state, load)| {
+            let (a, pull_n) = (state.contact_radius_m, state.force_n - load.force_n);
+            for (p, r) in state.pressure_pa.iter_mut().zip(&state.radius_m) {
+                let edge = (1.0 - (r / a).powi(2)).max(1e-9).sqrt();
+                *p = (*p - pull_n / (2.0 * std::f64::consts::PI * a * a * edge)).max(0.0);
+            }
+            state.force_n = load.force_n;
+            state
+        })
+        .collect()
+}
+
 impl World {
     /// Calibrated, pressed and measured as the user states it.
     ///
@@ -250,6 +334,9 @@ impl World {
         for pair in &mut trial.pairs {
             pair.force_n *= self.gauge;
             pair.integrated_pixel_value /= self.reflectance * self.lamps;
+        }
+        if let Some(distortion) = self.distortion {
+            distortion.apply(&mut trial);
         }
         let mut pipeline = stated.pipeline(&trial, self.lamps);
         if let Some(check) = self.check {

@@ -33,6 +33,7 @@ fn pipeline(sensor: &Sensor) -> Pipeline {
         .with_settings(|settings| {
             settings.object_radius_error_m = Some(BALL_ERROR * SAMPLE_RADIUS_M);
             settings.poisson_ratio_error = Some(POISSON_ERROR);
+            settings.adhesion_error_j_per_m2 = Some(0.0);
         })
         .unwrap()
         .with_estimator(estimator(SAMPLE_RADIUS_M, SAMPLE_POISSON, &guide))

@@ -132,6 +132,7 @@ fn pipeline(calibration: &SensorCalibration, sensor: &Sensor, left_out: LeftOut)
             settings.layer_covariance = Some(covariance);
             settings.object_radius_error_m = Some(BALL_ERROR * SAMPLE_RADIUS_M);
             settings.poisson_ratio_error = Some(POISSON_ERROR);
+            settings.adhesion_error_j_per_m2 = Some(0.0);
         })
         .unwrap()
         .with_estimator(estimator(

@@ -1,0 +1,86 @@
+//! Balls that another program pressed: its contacts beside those of this project's elements, and the
+//! moduli that are read from frames of them.
+#![allow(clippy::print_stdout)]
+use super::{Ball, balls_of, error};
+use tactile_imaging::fem::{self, AppliedLoad, Material, ObjectPress, ObjectShape};
+
+const FILE: &str = "calculix_presses.csv";
+
+/// That of its bodies.
+const POISSON_RATIO: f64 = 0.499;
+
+/// The press with the rim that the other program's guides have.
+fn scene(ball: &Ball) -> fem::FemScene {
+    let material = |modulus| Material::new(modulus, POISSON_RATIO).unwrap();
+    let shape = ObjectShape::Ball {
+        radius_m: ball.radius_m,
+    };
+    let mut press = ObjectPress::new(shape, material(ball.youngs_modulus_pa)).unwrap();
+    let layers = ball
+        .layers
+        .iter()
+        .map(|&(thickness_m, modulus)| fem::GuideLayer {
+            thickness_m,
+            material: material(modulus),
+        });
+    let layers: Vec<_> = layers.collect();
+    if !layers.is_empty() {
+        let thickness_m: f64 = ball.layers.iter().map(|layer| layer.0).sum();
+        let rim_m = (5.0 * ball.radius_m).max(3.0 * thickness_m);
+        press = press
+            .on_guide(fem::Guide::new(layers, rim_m).unwrap())
+            .unwrap();
+    }
+    press.with_fineness(10).unwrap().scene().unwrap()
+}
+
+/// At one approach both programs find one force and one contact radius.
+#[test]
+fn contacts_are_those_of_another_program() {
+    for ball in balls_of(FILE) {
+        let loads = ball
+            .states
+            .iter()
+            .map(|state| AppliedLoad::Approach(state.indentation_m));
+        let solved = scene(&ball).solve(&loads.collect::<Vec<_>>()).states;
+        assert_eq!(solved.len(), ball.states.len(), "{}", ball.name);
+        for (own, other) in solved.iter().zip(&ball.states) {
+            let force = own.force_n() / other.force_n - 1.0;
+            let radius = own.contact_radius().unwrap().radius_m / other.contact_radius_m - 1.0;
+            println!(
+                "{}: a/R {:.2}, force {:+.3} %, radius {:+.3} %",
+                ball.name,
+                other.contact_radius_m / ball.radius_m,
+                100.0 * force,
+                100.0 * radius
+            );
+            assert!(force.abs() < 3e-3 && radius.abs() < 1e-3, "{}", ball.name);
+        }
+    }
+}
+
+/// Rendered with the camera's noise and read blindly, two loads at a time.
+#[test]
+fn moduli_of_balls_of_another_program_are_right() {
+    for (k, ball) in balls_of(FILE).iter().enumerate() {
+        for first in (0..ball.states.len()).step_by(2) {
+            let reading = ball.read(first, 500 + (10 * k + first) as u64, &[]);
+            let off = error(&reading.layered, ball.youngs_modulus_pa);
+            let interval = reading.layered.interval_95;
+            println!(
+                "{}: a/R {:.2}, {:+.2} % ± {:.2} %, radii {:+.3?} %",
+                ball.name,
+                reading.largest_ratio,
+                100.0 * off,
+                100.0 * reading.layered.standard_error_pa / reading.layered.youngs_modulus_pa,
+                reading.radius_errors.map(|e| 100.0 * e)
+            );
+            let holds = interval.contains(ball.youngs_modulus_pa);
+            assert!(
+                holds && off.abs() < 0.015,
+                "{}: {off} {interval:?}",
+                ball.name
+            );
+        }
+    }
+}
