@@ -1,7 +1,7 @@
 //! Errors of the inclusion search over a folder of solved scenes, against the Cramér–Rao bound.
 //!
 //! ```text
-//! cargo run --release -p tactile-inclusion --example inclusion_study -- FOLDER [SEEDS] [NAMES] [balls]
+//! cargo run --release -p tactile-inclusion --example inclusion_study -- FOLDER [SEEDS] [NAMES] [balls] [KERNEL]
 //! ```
 //!
 //! FOLDER holds `scenes.csv` (scene, D_m, depth_m, E1_pa, E0_pa, block_height_m, block_radius_m,
@@ -12,7 +12,9 @@
 //! noise of pixels, smooth errors of the calibration, force, and of what is known of the block: its
 //! height and the approaches' zero; Poisson's ratio is said to be 0.495 ± 0.005 whatever it is.
 //! NAMES keeps the scenes whose names begin with one of them, separated by commas. With `balls` the
-//! search is told that an inclusion is a ball.
+//! search is told that an inclusion is a ball. KERNEL draws the calibration's errors otherwise than
+//! the search takes them to be: `1mm` and `6mm` correlated over another length, `vignetting` as the
+//! square of the radius, `speckle` of 1 % over 0.3 mm.
 #![allow(clippy::print_stdout)]
 
 mod scenes;
@@ -77,6 +79,42 @@ fn smooth_field(radii_m: &[f64], length_m: f64, rng: &mut ChaCha8Rng) -> Vec<f64
     means
 }
 
+/// How the calibration's errors are drawn.
+#[derive(Clone, Copy, PartialEq)]
+enum Kernel {
+    /// Over a length in metres, as many times as large as the search takes them to be.
+    Smooth(f64, f64),
+    Vignetting,
+}
+
+impl Kernel {
+    fn named(name: &str) -> Option<Self> {
+        Some(match name {
+            "1mm" => Self::Smooth(1e-3, 1.0),
+            "6mm" => Self::Smooth(6e-3, 1.0),
+            "speckle" => Self::Smooth(0.3e-3, 3.3),
+            "vignetting" => Self::Vignetting,
+            _ => return None,
+        })
+    }
+
+    /// Ring means of unit variance, or so many times that.
+    fn draw(self, radii_m: &[f64], rng: &mut ChaCha8Rng) -> Vec<f64> {
+        match self {
+            Self::Smooth(length_m, scale) => {
+                let mut field = smooth_field(radii_m, length_m, rng);
+                field.iter_mut().for_each(|value| *value *= scale);
+                field
+            }
+            Self::Vignetting => {
+                let (size, rim) = (3.0_f64.sqrt() * normal(rng), radii_m[radii_m.len() - 1]);
+                let at = |r: &f64| size * (2.0 * (r / rim).powi(2) - 1.0);
+                radii_m.iter().map(at).collect()
+            }
+        }
+    }
+}
+
 /// White errors of the rings' means.
 fn white_errors(scene: &SolvedScene) -> Vec<f64> {
     let width = scene.radii_m[1] - scene.radii_m[0];
@@ -98,17 +136,18 @@ fn white_errors(scene: &SolvedScene) -> Vec<f64> {
 fn measured(
     scene: &SolvedScene,
     seed: u64,
+    kernel: Kernel,
 ) -> Result<(Specimen, Vec<PressureProfile>), Box<dyn Error>> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let sensor = SensorErrors::default();
     let said_height = scene.height_m * (0.02 * normal(&mut rng)).exp();
     let zero = 20e-6 * normal(&mut rng);
     let specimen = Specimen::new(said_height, scene.radius_m)?;
-    let common = smooth_field(&scene.radii_m, sensor.correlation_m, &mut rng);
+    let common = kernel.draw(&scene.radii_m, &mut rng);
     let white = white_errors(scene);
     let mut frames = Vec::new();
     for (load, pressures) in scene.pressures_pa.iter().enumerate() {
-        let own = smooth_field(&scene.radii_m, sensor.correlation_m, &mut rng);
+        let own = kernel.draw(&scene.radii_m, &mut rng);
         let mut read = Vec::new();
         for (k, pressure) in pressures.iter().enumerate() {
             let smooth = sensor.common * common[k] + sensor.each_frame * own[k];
@@ -157,10 +196,18 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut arguments = std::env::args().skip(1);
     let folder = arguments
         .next()
-        .ok_or("usage: FOLDER [SEEDS] [NAMES] [balls]")?;
+        .ok_or("usage: FOLDER [SEEDS] [NAMES] [balls] [KERNEL]")?;
     let seeds: u64 = arguments.next().map_or(Ok(1), |text| text.parse())?;
     let names = arguments.next().unwrap_or_default();
-    let is_ball = arguments.next().is_some_and(|word| word == "balls");
+    let mut is_ball = false;
+    let mut kernel = Kernel::Smooth(SensorErrors::default().correlation_m, 1.0);
+    for word in arguments {
+        match Kernel::named(&word) {
+            Some(named) => kernel = named,
+            None if word == "balls" => is_ball = true,
+            None => return Err(format!("{word} is neither balls nor a kernel").into()),
+        }
+    }
     let mut tally = Tally::default();
     let mut searched = 0;
     for (index, scene) in scenes(Path::new(&folder))?.iter().enumerate() {
@@ -177,7 +224,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             None => [f64::INFINITY; 3],
         };
         for seed in 0..seeds {
-            let (specimen, frames) = measured(scene, seed * 1000 + index as u64)?;
+            let (specimen, frames) = measured(scene, seed * 1000 + index as u64, kernel)?;
             let search = InclusionSearch::new(specimen, guide(scene.face_radius_m)?)?;
             let search = if is_ball {
                 search.with_shape_error(0.0)?

@@ -4,7 +4,7 @@ use super::worlds::{Check, MODULUS_PA, Stated, World};
 use super::{ball, concerns_modulus};
 use rand::{Rng, RngExt, SeedableRng, rngs::ChaCha8Rng, seq::IndexedRandom};
 use rand_distr::StandardNormal;
-use tactile_imaging::pipeline::{Measurement, PipelineError};
+use tactile_imaging::pipeline::{Flag, Measurement, PipelineError};
 
 type Departure = (&'static str, fn(&mut World, f64));
 
@@ -141,4 +141,39 @@ fn drawn_worlds_are_held_or_flagged() {
             assert!(departures > 0 || held > 0.95 - slack, "{check:?}: {held}");
         }
     }
+}
+
+/// Lamps or exposure change since the calibration, with a new reference or after it. `WORLDS=300`
+/// draws as many sessions.
+#[test]
+fn forces_under_changed_lamps_are_held_or_flagged() {
+    let count = std::env::var("WORLDS").ok().and_then(|n| n.parse().ok());
+    let count: u64 = count.unwrap_or(14);
+    let of_light =
+        |flag: &Flag| matches!(flag, Flag::LightChanged { .. } | Flag::LightDrifted { .. });
+    let changes = [1.0, 0.9, 0.95, 0.98, 1.02, 1.05, 1.1];
+    let (mut silent, mut alarms, mut unchanged) = (0, 0, 0);
+    for seed in 0..count {
+        let change = changes[seed as usize % changes.len()];
+        let mut world = World {
+            loads_n: [1.0, 1.2],
+            ..World::default()
+        };
+        match seed as usize / changes.len() % 2 {
+            0 => world.lamps = change,
+            _ => world.levels = [change; 2],
+        }
+        let found = world.measure(&Stated::default(), 900 + seed).unwrap();
+        let frame = found.frames[0].as_ref().unwrap();
+        let force = frame.force_n.clone().unwrap();
+        let held = (force.value - 1.0).abs() < 1.96 * force.standard_error;
+        let flagged = found.flags.iter().any(of_light);
+        silent += u64::from(!held && !flagged);
+        if change == 1.0 {
+            unchanged += 1;
+            alarms += u64::from(flagged);
+        }
+    }
+    println!("{silent} of {count} silent, {alarms} alarms in {unchanged} sessions without change");
+    assert!(silent as f64 <= 0.05 * count as f64 + 1.0 && alarms <= 1);
 }
