@@ -78,3 +78,42 @@ fn deviations_from_the_truth_are_those_stated() {
         assert!(worst < 3.5, "{name}: {z:.2?}");
     }
 }
+
+/// Heights of contacts of 6 to 140 pixels. `SEEDS=6` takes more draws of the noise than one.
+#[test]
+fn heights_of_small_contacts_have_the_error_they_state() {
+    let seeds = std::env::var("SEEDS").ok().and_then(|n| n.parse().ok());
+    let mut all = Vec::new();
+    for coarser in [2, 3, 5, 7] {
+        for loads_n in [[0.03, 0.08], [0.15, 0.3], [0.5, 0.9]] {
+            for seed in 0..seeds.unwrap_or(1) {
+                let options = PressOptions {
+                    camera: Camera::default().coarser(coarser),
+                    loads: loads_n.map(PressLoad::normal).to_vec(),
+                    law: ContactModel::FiniteElements,
+                    seed: 700 + seed,
+                    ..PressOptions::default()
+                };
+                let trial = Trial::new(options, &CalibrationRun::default()).unwrap();
+                let found = trial.press(&trial.pipeline().unwrap()).unwrap().measure();
+                for (frame, truth) in found.frames.iter().zip(&trial.simulation.truth) {
+                    let found = *frame.as_ref().unwrap().surface_height_m.as_ref().unwrap();
+                    let height_m = truth.contact.apparent_height_m(0.0);
+                    let z = (found.value - height_m) / found.standard_error;
+                    let radius_px = truth.contact.contact_radius_m / truth.pixel_size_m[0];
+                    println!(
+                        "{radius_px:.1} px: {:+.3} z {z:+.2}",
+                        found.value / height_m - 1.0
+                    );
+                    all.push(z);
+                }
+            }
+        }
+    }
+    let count = all.len() as f64;
+    let rms = (all.iter().map(|z| z * z).sum::<f64>() / count).sqrt();
+    let held = all.iter().filter(|z| z.abs() < 1.96).count() as f64 / count;
+    println!("rms {rms:.2}, {held:.3} held of {count}");
+    // Biases of some sizes repeat in all draws: of 24 contacts one may be out.
+    assert!((0.5..1.3).contains(&rms) && held > 0.92, "{rms} {held}");
+}
