@@ -1,7 +1,7 @@
 //! Which inputs the error of a modulus comes from, and which of them were assumed.
 use super::settings::Settings;
 use super::time::{NEGLIGIBLE, quiet};
-use crate::elasticity::modulus::{LoadSeries, ModulusEstimator, SharedErrors};
+use crate::elasticity::modulus::{LoadSeries, ModulusEstimator};
 use std::fmt::{self, Display, Formatter};
 
 /// An input whose error a modulus carries.
@@ -152,7 +152,6 @@ pub fn error_budget(
         return Vec::new();
     };
     let shared = *series.shared_errors();
-    let without = |shared: SharedErrors| series.clone().with_shared_errors(shared).ok();
     let coupling = if by_light { settings.coupling() } else { 0.0 };
     let uncoupled = (shared.force_scale.powi(2) - coupling.powi(2))
         .max(0.0)
@@ -160,62 +159,36 @@ pub fn error_budget(
     let quiet = LoadSeries::new(series.loads().iter().map(quiet).collect::<Vec<_>>())
         .with_shared_errors(shared)
         .ok();
-    let reduced = [
-        (ErrorSource::Noise, quiet),
-        (
-            ErrorSource::Coupling,
-            without(SharedErrors {
-                force_scale: uncoupled.max(NEGLIGIBLE),
-                ..shared
-            }),
-        ),
-        (
-            ErrorSource::Force,
-            without(SharedErrors {
-                force_scale: coupling.max(NEGLIGIBLE),
-                ..shared
-            }),
-        ),
-        (
-            ErrorSource::PixelSize,
-            without(SharedErrors {
-                length_scale: 0.0,
-                ..shared
-            }),
-        ),
-        (
-            ErrorSource::ObjectRadius,
-            without(SharedErrors {
-                size: 0.0,
-                ..shared
-            }),
-        ),
-        (
-            ErrorSource::PoissonRatio,
-            without(SharedErrors {
-                poisson_ratio: 0.0,
-                ..shared
-            }),
-        ),
-        (
-            ErrorSource::Adhesion,
-            without(SharedErrors {
-                adhesion_n: 0.0,
-                ..shared
-            }),
-        ),
-        (
-            ErrorSource::Guide,
-            without(SharedErrors {
-                other_body: 0.0,
-                ..shared
-            }),
-        ),
+    let without = |source: ErrorSource| {
+        let mut errors = shared;
+        match source {
+            ErrorSource::Noise => return quiet.clone(),
+            ErrorSource::Coupling => errors.force_scale = uncoupled.max(NEGLIGIBLE),
+            ErrorSource::Force => errors.force_scale = coupling.max(NEGLIGIBLE),
+            ErrorSource::PixelSize => errors.length_scale = 0.0,
+            ErrorSource::ObjectRadius => errors.size = 0.0,
+            ErrorSource::PoissonRatio => errors.poisson_ratio = 0.0,
+            ErrorSource::Adhesion => errors.adhesion_n = 0.0,
+            ErrorSource::Guide => errors.other_body = 0.0,
+            // What is left of all.
+            ErrorSource::Law => return None,
+        }
+        series.clone().with_shared_errors(errors).ok()
+    };
+    let sources = [
+        ErrorSource::Noise,
+        ErrorSource::Coupling,
+        ErrorSource::Force,
+        ErrorSource::PixelSize,
+        ErrorSource::ObjectRadius,
+        ErrorSource::PoissonRatio,
+        ErrorSource::Adhesion,
+        ErrorSource::Guide,
     ];
     let mut rest = all;
     let mut shares = Vec::new();
-    for (source, reduced) in reduced {
-        let left = reduced.and_then(|series| relative_variance(estimator, &series));
+    for source in sources {
+        let left = without(source).and_then(|series| relative_variance(estimator, &series));
         let part = left.map_or(0.0, |left| (all - left).clamp(0.0, rest));
         rest -= part;
         shares.push(ErrorShare {

@@ -249,7 +249,7 @@ impl<L: ContactLaw> ContactEstimator<L> {
         let common = none
             .with_shared(|i| all[i].log_force.slope * shared.length_scale)
             .with_shared(|i| all[i].log_force.size_slope * shared.size)
-            .with_shared(|i| shared.adhesion(all[i].force.value))
+            .with_model_errors(|i| shared.adhesion(all[i].force.value))
             .with_model_errors(|i| all[i].model_error);
         let force_degrees = fewest(all.iter().map(|o| o.force.degrees_of_freedom));
         let length_degrees = fewest(all.iter().map(|o| o.length.degrees_of_freedom));

@@ -220,7 +220,7 @@ impl TabulatedContact {
             .with_shared(|i| over(i, (2.0 - forces[i].radius_slope) * shared.size))
             .with_shared(|i| (1.0 - correlation * correlation).sqrt() * of_other_body(i))
             .with_shared(|i| over(i, forces[i].modulus_slope * of_poisson_ratio))
-            .with_shared(|i| over(i, shared.adhesion(contacts[i].force.value)))
+            .with_model_errors(|i| over(i, shared.adhesion(contacts[i].force.value)))
             .with_model_errors(|i| over(i, model));
         [
             (
