@@ -58,7 +58,6 @@ mod state;
 mod stick;
 mod system;
 mod table;
-mod vtk;
 
 pub use material::{Kinematics, Material};
 pub use nearby::{FrameResponse, SolvedFrames};

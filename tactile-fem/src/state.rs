@@ -60,12 +60,6 @@ impl State {
         self.fields.approach
     }
 
-    /// Displacement (r, z) of every node, in metres.
-    pub(crate) fn displacements(&self) -> Vec<[f64; 2]> {
-        let pairs = self.fields.displacement.chunks_exact(2);
-        pairs.map(|pair| [pair[0], pair[1]]).collect()
-    }
-
     /// Pressure at the elements' ends in contact, or at the nodes of a bonded interface, from the
     /// axis outwards. Of [`PressurePoint`]'s example. Within a contact's outermost two elements it
     /// is that of a smooth edge which carries the elements' force.

@@ -12,7 +12,6 @@ mod press;
 mod sparse;
 mod squeeze;
 mod stick;
-mod vtk;
 
 /// A guide of one layer.
 fn layer(thickness_m: f64, material: Material, radius_m: f64) -> Guide {
