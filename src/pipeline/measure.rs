@@ -13,12 +13,17 @@ use crate::elasticity::relaxation::TimeDependence;
 use crate::matching::StopReason;
 use nalgebra::Matrix3;
 
-/// Errors of the height of a surface from shading: cells of its grid, and the part of a contact of
-/// [`RIM_RADIUS_PX`] pixels, which goes with the cube of the pixels across. Chosen on balls by finite
-/// elements of 6 to 150 pixels (`cargo test --test suite heights -- --nocapture`).
+/// Error of the height of a surface from shading, in cells of its grid. This and the next are
+/// chosen on balls by finite elements of 6 to 150 pixels: smaller ones leave out more of them
+/// (`SEEDS=6 cargo test --test suite heights -- --nocapture`).
 const CELL_ERROR: f64 = 0.3;
+
+/// Relative error beside it of a contact of [`RIM_RADIUS_PX`] pixels. It falls with the cube of the
+/// pixels.
 const RIM_ERROR: f64 = 0.15;
 const RIM_RADIUS_PX: f64 = 20.0;
+
+/// Heights of the smallest contacts are off by no more.
 const LARGEST_RIM_ERROR: f64 = 0.4;
 
 impl Press<'_> {

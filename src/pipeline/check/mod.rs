@@ -126,7 +126,8 @@ impl Pipeline {
     /// light ([`CheckedGain`]), of balls of known modulus the layers of the guide
     /// ([`CheckedGuide`]). All have one reference. Of one call the errors that presses share (pixel
     /// size, contact law, ball) are counted as shared. Presses of a later call are taken as
-    /// independent of those before, but for the size of a pixel. A ball costs some dozen solutions of its contact.
+    /// independent of those before, but for the size of a pixel. A ball costs some dozen solutions
+    /// of its contact.
     ///
     /// ```
     /// use tactile_imaging::force::{CalibrationPair, Estimate};

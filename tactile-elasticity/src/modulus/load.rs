@@ -128,9 +128,10 @@ pub struct SharedErrors {
     /// Correlation of the errors of lengths and of the other body's compliance, from -1 to 1.
     /// Above zero where the body was checked by contact radii that the same pixels measured.
     pub length_with_other_body: f64,
-    /// 6πwR in newtons, of a work of adhesion w (J/m²) that a ball of radius R may have. Its contact
-    /// under a force F looks softer by ½ √(6πwR/F), to first order in √w (Johnson, Kendall and
-    /// Roberts 1971): the radius is that of F + √(6πwR F), and of the pressure the rim is missing.
+    /// 6πwR in newtons, of a work of adhesion w (J/m²) that a ball of radius R may have. Its
+    /// contact under a force F looks softer by ½ √(6πwR/F), to first order in √w (Johnson, Kendall
+    /// and Roberts 1971): the radius is that of F + √(6πwR F), and of the pressure the rim is
+    /// missing.
     pub adhesion_n: f64,
 }
 

@@ -270,11 +270,11 @@ fn on_the_guide(
 /// the radius of one without adhesion under P₁ = F + Q, Q² = 6π w R P₁, and the pressure of that
 /// less Q/(2πa²)/√(1 − r²/a²). Where this is below zero nothing presses and no light leaks.
 fn adhering(work: f64, options: &PressOptions) -> Vec<ContactState> {
-    let pull_off_n = 3.0 * std::f64::consts::PI * work * RADIUS_M;
+    let attraction_n = 3.0 * std::f64::consts::PI * work * RADIUS_M;
     let mut hertz = options.clone();
     for load in &mut hertz.loads {
         let force_n = load.force_n;
-        load.force_n += pull_off_n + (pull_off_n * (2.0 * force_n + pull_off_n)).sqrt();
+        load.force_n += attraction_n + (attraction_n * (2.0 * force_n + attraction_n)).sqrt();
     }
     let states = on_the_guide(NEARLY_HALF, Interface::Frictionless, &hertz);
     let loads = options.loads.iter();

@@ -1,5 +1,5 @@
-//! Balls that another program pressed: its contacts beside those of this project's elements, and the
-//! moduli that are read from frames of them.
+//! Balls that another program pressed: its contacts beside those of this project's elements, and
+//! the moduli that are read from frames of them.
 #![allow(clippy::print_stdout)]
 use super::{Ball, balls_of, error};
 use tactile_imaging::fem::{self, AppliedLoad, Material, ObjectPress, ObjectShape};
