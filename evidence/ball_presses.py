@@ -24,7 +24,7 @@ import pathlib
 import subprocess
 import tempfile
 
-from inclusion_scenes import even_spline, graded, pressures, printed
+from inclusion_scenes import TISSUE, Mesh, even_spline, graded, pressures, printed
 
 # The paper's guide: thickness (mm) and Young's modulus (kPa) from the ball's side; mN, mm and kPa throughout.
 PAPER = ((2.0, 136.0), (3.0, 80.0), (5.0, 34.0))
@@ -44,7 +44,8 @@ BALLS = {
     "flat_middle": (62.0, 5.0, (), (0.45, 0.6)),
     "flat_high": (150.0, 3.0, (), (0.7, 0.8)),
 }
-BALL = -1
+# Above those of the layers.
+BALL = TISSUE
 HEADER = "youngs_modulus_pa,radius_m,layers,force_n,contact_radius_m,indentation_m,r_m,pressure_pa,height_m"
 # Radii that are written of a load.
 POINTS = 40
@@ -52,32 +53,17 @@ POINTS = 40
 MOST_ROUNDS = 40
 
 
-class Mesh:
-    """Eight-node quadrilaterals; nodes of a body that coincide are one."""
+def fill(mesh, us, vs, region, position):
+    """An element for each cell of the lines us and vs."""
+    def at(lines, k):
+        return 0.5 * (lines[k // 2] + lines[(k + 1) // 2])
 
-    def __init__(self):
-        self.nodes, self.elements, self.index = [], [], {}
+    mesh.block(len(us) - 1, len(vs) - 1, region, lambda i, j: position(at(us, i), at(vs, j)))
 
-    def node(self, point, body):
-        key = (body, round(point[0] * 1e7), round(point[1] * 1e7))
-        if key not in self.index:
-            self.nodes.append(point)
-            self.index[key] = len(self.nodes)
-        return self.index[key]
 
-    def block(self, us, vs, region, position):
-        """An element for each cell of the lines us and vs."""
-        def nodes(i, j):
-            def at(a, b):
-                u = 0.5 * (us[(i + a) // 2] + us[(i + a + 1) // 2])
-                v = 0.5 * (vs[(j + b) // 2] + vs[(j + b + 1) // 2])
-                return self.node(position(u, v), region == BALL)
-
-            return [at(0, 0), at(2, 0), at(2, 2), at(0, 2), at(1, 0), at(2, 1), at(1, 2), at(0, 1)]
-
-        for j in range(0, 2 * (len(vs) - 1), 2):
-            for i in range(0, 2 * (len(us) - 1), 2):
-                self.elements.append((region, nodes(i, j)))
+def node(mesh, point, region):
+    """That of a body: at z = 0 the ball's are its own."""
+    return mesh.node(point, region == BALL and abs(point[1]) < 1e-9)
 
 
 def refined(start, edge, end, first, coarse, longest):
@@ -103,13 +89,13 @@ def ball_mesh(mesh, radius, contact, size):
         return outer[0] + t * (inner[0] - outer[0]), radius - outer[1] - t * (inner[1] - outer[1])
 
     depths = graded(0.0, 1.0, 2 * first, 0.2 * size, 1.3)
-    mesh.block(depths, angles, BALL, shell)
+    fill(mesh, depths, angles, BALL, shell)
     across = [on_core(angle)[0] for angle in angles[:half + 1]]
     along = [on_core(angle)[1] for angle in angles[half:]][::-1]
-    mesh.block(across, along, BALL, lambda x, y: (x, radius - y))
+    fill(mesh, across, along, BALL, lambda x, y: (x, radius - y))
     # The nodes that touch, middles too, from the pole outwards.
     touching = [a for k in range(len(angles) - 1) if angles[k + 1] <= contact + 1e-9 for a in (angles[k], 0.5 * (angles[k] + angles[k + 1]))]
-    return [mesh.node(shell(0.0, angle), True) for angle in [*touching, contact]]
+    return [node(mesh, shell(0.0, angle), BALL) for angle in [*touching, contact]]
 
 
 def layer_mesh(mesh, layers, radius, places, size):
@@ -118,9 +104,8 @@ def layer_mesh(mesh, layers, radius, places, size):
     first = places[-1] - places[-3]
     corners = places[::2] + graded(edge, rim, first, 0.15 * rim * size, 1.3)[1:]
     middles = dict(zip(corners, places[1::2]))
-    # The lines of the mesh by number, so that middles stay where they are wanted.
-    count = len(corners)
 
+    # Lines go by number, so that middles stay where they are wanted.
     def position(u, v):
         k = math.floor(u)
         if u == k:
@@ -131,9 +116,9 @@ def layer_mesh(mesh, layers, radius, places, size):
     for region, (thickness, _) in enumerate(layers):
         lines = graded(top, top - thickness, step, 0.3 * thickness * size + 0.1, 1.3)
         step = lines[-2] - lines[-1]
-        mesh.block(list(range(count)), lines, region, position)
+        fill(mesh, list(range(len(corners))), lines, region, position)
         top -= thickness
-    return [mesh.node((r, 0.0), False) for r in places], top
+    return [node(mesh, (r, 0.0), 0) for r in places], top
 
 
 def clockwise(mesh, nodes):

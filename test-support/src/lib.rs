@@ -10,3 +10,9 @@ mod worst;
 pub use published::{published, reference};
 pub use recorded::Answers;
 pub use worst::{Worst, cases, numbers, rows};
+
+/// How many draws a study takes: the number in the environment's variable, or what a test takes.
+pub fn draws(variable: &str, otherwise: u64) -> u64 {
+    let given = std::env::var(variable).ok();
+    given.and_then(|n| n.parse().ok()).unwrap_or(otherwise)
+}

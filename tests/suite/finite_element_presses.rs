@@ -352,9 +352,10 @@ fn balls_are_measured_within_their_intervals() {
 /// for `.ci/run studies`.
 #[test]
 fn study_of_solved_presses() {
-    let Some(count) = std::env::var("PRESSES").ok().and_then(|n| n.parse().ok()) else {
+    let count = test_support::draws("PRESSES", 0);
+    if count == 0 {
         return; // a study, not a test
-    };
+    }
     // `WITHOUT_TABLES=1` leaves out what takes longest; the layered law is read all the same.
     let with_tables = std::env::var_os("WITHOUT_TABLES").is_none();
     let sensors = solved::SENSORS.iter().filter(|_| with_tables);
@@ -483,9 +484,9 @@ fn depressions_of_the_guide_hold_those_of_finite_elements() {
     let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
     let frame = Array2::from_elem((8, 8), 60_u8);
     let (mut held, mut all) = (0, 0);
-    let count = std::env::var("PRESSES").ok().and_then(|n| n.parse().ok());
+    let count = test_support::draws("PRESSES", 0);
     let mut balls = recorded_balls();
-    balls.extend((100..100 + count.unwrap_or(0)).map(solved::ball));
+    balls.extend((100..100 + count).map(solved::ball));
     for ball in balls.iter().filter(|ball| !ball.layers.is_empty()) {
         let layer = |&(thickness_m, youngs_modulus_pa): &(f64, f64)| Layer {
             thickness_m,

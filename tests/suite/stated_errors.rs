@@ -47,23 +47,29 @@ fn deviations(found: &Measurement, made: &PressSimulation) -> Vec<(usize, f64)> 
     all
 }
 
+/// A press of the paper's ball, and what is found of it. One of the pixels is `coarser` of the
+/// paper's.
+fn press(loads_n: [f64; 2], coarser: usize, seed: u64) -> (PressSimulation, Measurement) {
+    let options = PressOptions {
+        camera: Camera::default().coarser(coarser),
+        loads: loads_n.map(PressLoad::normal).to_vec(),
+        law: ContactModel::FiniteElements,
+        seed,
+        ..PressOptions::default()
+    };
+    let trial = Trial::new(options, &CalibrationRun::default()).unwrap();
+    let found = trial.press(&trial.pipeline().unwrap()).unwrap().measure();
+    (trial.simulation, found)
+}
+
 /// `SEEDS=40` takes more draws of the noise than one.
 #[test]
 fn deviations_from_the_truth_are_those_stated() {
-    let seeds = std::env::var("SEEDS").ok().and_then(|n| n.parse().ok());
     let mut all: [Vec<f64>; QUANTITIES.len()] = Default::default();
-    for seed in 0..seeds.unwrap_or(1) {
+    for seed in 0..test_support::draws("SEEDS", 1) {
         for (loads_n, coarser) in PRESSES {
-            let options = PressOptions {
-                camera: Camera::default().coarser(coarser),
-                loads: loads_n.map(PressLoad::normal).to_vec(),
-                law: ContactModel::FiniteElements,
-                seed: 500 + seed,
-                ..PressOptions::default()
-            };
-            let trial = Trial::new(options, &CalibrationRun::default()).unwrap();
-            let found = trial.press(&trial.pipeline().unwrap()).unwrap().measure();
-            for (quantity, deviation) in deviations(&found, &trial.simulation) {
+            let (made, found) = press(loads_n, coarser, 500 + seed);
+            for (quantity, deviation) in deviations(&found, &made) {
                 all[quantity].push(deviation);
             }
         }
@@ -82,21 +88,12 @@ fn deviations_from_the_truth_are_those_stated() {
 /// Heights of contacts of 6 to 140 pixels. `SEEDS=6` takes more draws of the noise than one.
 #[test]
 fn heights_of_small_contacts_have_the_error_they_state() {
-    let seeds = std::env::var("SEEDS").ok().and_then(|n| n.parse().ok());
     let mut all = Vec::new();
     for coarser in [2, 3, 5, 7] {
         for loads_n in [[0.03, 0.08], [0.15, 0.3], [0.5, 0.9]] {
-            for seed in 0..seeds.unwrap_or(1) {
-                let options = PressOptions {
-                    camera: Camera::default().coarser(coarser),
-                    loads: loads_n.map(PressLoad::normal).to_vec(),
-                    law: ContactModel::FiniteElements,
-                    seed: 700 + seed,
-                    ..PressOptions::default()
-                };
-                let trial = Trial::new(options, &CalibrationRun::default()).unwrap();
-                let found = trial.press(&trial.pipeline().unwrap()).unwrap().measure();
-                for (frame, truth) in found.frames.iter().zip(&trial.simulation.truth) {
+            for seed in 0..test_support::draws("SEEDS", 1) {
+                let (made, found) = press(loads_n, coarser, 700 + seed);
+                for (frame, truth) in found.frames.iter().zip(&made.truth) {
                     let found = *frame.as_ref().unwrap().surface_height_m.as_ref().unwrap();
                     let height_m = truth.contact.apparent_height_m(0.0);
                     let z = (found.value - height_m) / found.standard_error;

@@ -52,7 +52,7 @@ fn honest(rng: &mut impl Rng, check: Option<Check>) -> (World, Stated) {
     };
     // A guide under a skin where a known ball is pressed, a bare one otherwise.
     let reflectance = (0.12 * normal()).exp();
-    if check != Some(Check::KnownBall) {
+    if !matches!(check, Some(Check::KnownBall(_))) {
         world.reflectance = reflectance;
         stated.coupling_error = None;
     }
@@ -116,30 +116,38 @@ fn draw(check: Option<Check>, departures: usize, count: u64) -> Vec<Outcome> {
 /// `WORLDS=300` draws as many of each kind: minutes, for `.ci/run studies`.
 #[test]
 fn drawn_worlds_are_held_or_flagged() {
-    let count = std::env::var("WORLDS").ok().and_then(|n| n.parse().ok());
-    let count = count.unwrap_or(8);
-    for check in [None, Some(Check::Sample), Some(Check::KnownBall)] {
-        for departures in [0, 3] {
-            let outcomes = draw(check, departures, count);
-            let all = outcomes.len() as f64;
-            let share = |is: fn(&Outcome) -> bool| {
-                outcomes.iter().filter(|outcome| is(outcome)).count() as f64 / all
-            };
-            let held = share(|outcome| outcome.held);
-            let silent = share(|outcome| !outcome.held && !outcome.flagged);
-            println!(
-                "| {check:?} | {departures} | {:.1} % | ± {:.1} % | {:.1} % | {:.1} % | {:.1} % |",
-                100.0 * median(outcomes.iter().map(|outcome| outcome.error.abs())),
-                100.0 * median(outcomes.iter().map(|outcome| outcome.half_width)),
-                100.0 * held,
-                100.0 * share(|outcome| outcome.flagged),
-                100.0 * silent,
-            );
-            // Three standard deviations of so many draws.
-            let slack = 3.0 * (0.05 * 0.95 / all).sqrt();
-            assert!(silent < 0.05 + slack, "{check:?}, {departures}: {silent}");
-            assert!(departures > 0 || held > 0.95 - slack, "{check:?}: {held}");
-        }
+    let count = test_support::draws("WORLDS", 8);
+    let sample = Some(Check::Sample);
+    let [gently, firmly] = [0.3, 1.1].map(|force_n| Some(Check::KnownBall(force_n)));
+    let kinds = [
+        (None, 0),
+        (None, 3),
+        (sample, 0),
+        (sample, 3),
+        (gently, 0),
+        (gently, 3),
+        (firmly, 0),
+    ];
+    for (check, departures) in kinds {
+        let outcomes = draw(check, departures, count);
+        let all = outcomes.len() as f64;
+        let share = |is: fn(&Outcome) -> bool| {
+            outcomes.iter().filter(|outcome| is(outcome)).count() as f64 / all
+        };
+        let held = share(|outcome| outcome.held);
+        let silent = share(|outcome| !outcome.held && !outcome.flagged);
+        println!(
+            "| {check:?} | {departures} | {:.1} % | ± {:.1} % | {:.1} % | {:.1} % | {:.1} % |",
+            100.0 * median(outcomes.iter().map(|outcome| outcome.error.abs())),
+            100.0 * median(outcomes.iter().map(|outcome| outcome.half_width)),
+            100.0 * held,
+            100.0 * share(|outcome| outcome.flagged),
+            100.0 * silent,
+        );
+        // Three standard deviations of so many draws.
+        let slack = 3.0 * (0.05 * 0.95 / all).sqrt();
+        assert!(silent < 0.05 + slack, "{check:?}, {departures}: {silent}");
+        assert!(departures > 0 || held > 0.95 - slack, "{check:?}: {held}");
     }
 }
 
@@ -147,8 +155,7 @@ fn drawn_worlds_are_held_or_flagged() {
 /// draws as many sessions.
 #[test]
 fn forces_under_changed_lamps_are_held_or_flagged() {
-    let count = std::env::var("WORLDS").ok().and_then(|n| n.parse().ok());
-    let count: u64 = count.unwrap_or(14);
+    let count = test_support::draws("WORLDS", 14);
     let of_light =
         |flag: &Flag| matches!(flag, Flag::LightChanged { .. } | Flag::LightDrifted { .. });
     let changes = [1.0, 0.9, 0.95, 0.98, 1.02, 1.05, 1.1];

@@ -287,8 +287,7 @@ impl Found {
 /// `SEEDS=5` takes more draws of the noise than one.
 #[test]
 fn a_world_that_is_not_as_assumed_stays_within_the_interval_or_is_flagged() {
-    let seeds = std::env::var("SEEDS").ok().and_then(|n| n.parse().ok());
-    let seeds = seeds.unwrap_or(1);
+    let seeds = test_support::draws("SEEDS", 1);
     let mut silent = Vec::new();
     for row in rows() {
         let found = row.run(seeds);

@@ -113,27 +113,24 @@ pub(super) struct World {
 pub(super) enum Check {
     /// The sample.
     Sample,
-    /// A ball of 180 kPa and 3 mm.
-    KnownBall,
+    /// A ball of 180 kPa and 3 mm, by a force (N) that it was solved for.
+    KnownBall(f64),
 }
 
 impl Check {
-    /// One of the forces that the known ball was solved for.
-    const KNOWN_BALL_N: f64 = 0.3;
-
     /// Its frame beside those of the trial, its force, and what it is stated to press.
     fn press(self, trial: &Trial, stated: &Stated) -> (Array2<u8>, f64, CheckedObject) {
         let mut options = trial.scene.options().clone();
         options.seed += 1 << 32;
         let mut object = CheckedObject::Sample;
-        if self == Self::KnownBall {
+        if let Self::KnownBall(force_n) = self {
             let mut balls = recorded_balls().into_iter();
             let ball = balls.find(|ball| ball.youngs_modulus_pa == 180e3).unwrap();
             let [radius_m, modulus_pa] = [ball.radius_m, ball.youngs_modulus_pa];
             options.object.radius_m = radius_m;
             options.object.material.youngs_modulus_pa = modulus_pa;
             options.law = ContactModel::Tabulated(ball.states);
-            options.loads = vec![PressLoad::normal(Self::KNOWN_BALL_N)];
+            options.loads = vec![PressLoad::normal(force_n)];
             object = CheckedObject::Ball(KnownBall::elastic(
                 KnownBall::radius(stated.known_ball[0] * radius_m, None),
                 KnownBall::modulus(stated.known_ball[1] * modulus_pa, None),

@@ -29,10 +29,7 @@ const GAUGE: f64 = 1e-3;
 /// Scenes per study: thirty for the errors; coverage, which takes more, is tight in `.ci/run
 /// studies`. `SCENES` overrides.
 fn scenes(default: u64) -> u64 {
-    std::env::var("SCENES")
-        .ok()
-        .and_then(|s| s.parse().ok())
-        .unwrap_or(default)
+    test_support::draws("SCENES", default)
 }
 
 struct Study {

@@ -113,13 +113,8 @@ fn check(kinds: [usize; 2], seed: usize, spoilt: [u8; 2], object: u8) {
     }
 }
 
-fn cases() -> u32 {
-    let given = std::env::var("HOSTILE").ok().and_then(|n| n.parse().ok());
-    given.unwrap_or(500)
-}
-
 proptest! {
-    #![proptest_config(ProptestConfig { cases: cases(), max_shrink_iters: 200, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: test_support::draws("HOSTILE", 500) as u32, max_shrink_iters: 200, ..ProptestConfig::default() })]
 
     #[test]
     fn hostile_presses_end_civilly(

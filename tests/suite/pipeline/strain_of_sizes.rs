@@ -8,12 +8,6 @@ use tactile_simulate::{CalibrationRun, Camera, PressOptions};
 /// Widths and heights of frames that show the same 30 mm × 22.5 mm.
 const SIZES: [[usize; 2]; 5] = [[174, 130], [348, 260], [464, 347], [696, 521], [1392, 1042]];
 
-/// Seeds of each size: `STRAIN_SEEDS`, or a few.
-fn seeds() -> u64 {
-    let given = std::env::var("STRAIN_SEEDS").ok();
-    given.and_then(|n| n.parse().ok()).unwrap_or(2)
-}
-
 /// The paper's press in a camera of this size; every seed has its own noise and its own place
 /// between the pixels.
 fn trial([width, height]: [usize; 2], seed: u64) -> Trial {
@@ -47,15 +41,16 @@ fn cautions(flags: &[Flag]) -> bool {
 
 /// Every mean strain lies within three stated standard errors of the truth, or a caution says that
 /// it may not: 3 is what one normal number in 370 exceeds, and the errors are stated for the worst
-/// size.
+/// size. `STRAIN_SEEDS` takes more draws of each size than two.
 #[test]
 fn strains_are_within_their_errors_at_every_size_or_flagged() {
+    let seeds = test_support::draws("STRAIN_SEEDS", 2);
     let mut failures = Vec::new();
     for size in SIZES {
         let mut worst: BTreeMap<&str, f64> = BTreeMap::new();
         let mut errors: BTreeMap<&str, Vec<f64>> = BTreeMap::new();
         let mut flagged = 0;
-        for seed in 0..seeds() {
+        for seed in 0..seeds {
             let trial = trial(size, seed);
             let pipeline = trial.pipeline().unwrap();
             let measurement = trial.press(&pipeline).unwrap().measure();
@@ -89,7 +84,7 @@ fn strains_are_within_their_errors_at_every_size_or_flagged() {
         }
         println!(
             "{size:?}: {flagged} of {} flagged, greatest z {worst:.2?}",
-            seeds()
+            seeds
         );
         for (name, errors) in &errors {
             let n = errors.len() as f64;

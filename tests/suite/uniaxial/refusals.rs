@@ -121,8 +121,7 @@ fn frame(
 /// Two turns of every outline; `SEEDS=5` takes more.
 #[test]
 fn shapes_that_fit_nothing_are_refused_or_their_interval_holds_the_truth() {
-    let seeds = std::env::var("SEEDS").ok().and_then(|n| n.parse().ok());
-    let seeds: u64 = seeds.unwrap_or(2);
+    let seeds = test_support::draws("SEEDS", 2);
     let per_grey = PIXEL_M * PIXEL_M / GREY_PER_PA;
     let pairs = [0.0, 1e5, 2e5, 4e5, 8e5].map(|v| CalibrationPair::loading(v, per_grey * v));
     let (mut scenes, mut refused) = (0_u64, 0_u64);

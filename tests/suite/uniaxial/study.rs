@@ -93,8 +93,7 @@ fn trial(seed: u64) -> Outcome {
 /// A dozen specimens by default; `SCENES=100` for the study (`.ci/run studies`).
 #[test]
 fn moduli_of_blocks_and_cylinders_are_right_and_their_intervals_hold() {
-    let scenes = std::env::var("SCENES").ok().and_then(|s| s.parse().ok());
-    let count: u64 = scenes.unwrap_or(12);
+    let count = test_support::draws("SCENES", 12);
     let outcomes: Vec<Outcome> = (0..count).map(trial).collect();
     let mut errors: Vec<f64> = outcomes.iter().map(|o| o.relative_error.abs()).collect();
     errors.sort_by(f64::total_cmp);

@@ -311,13 +311,18 @@ proptest! {
         ratios in prop::collection::vec(0.1..1.1f64, 1..4),
     ) {
         let radius = 4e-3;
-        let layer = |thickness_m, youngs_modulus_pa| Layer { thickness_m, youngs_modulus_pa, poisson_ratio: nu };
+        let layer = |thickness_m, youngs_modulus_pa| Layer {
+            thickness_m,
+            youngs_modulus_pa,
+            poisson_ratio: nu,
+        };
         let total = thickness * radius;
         let layers = vec![layer(split * total, 1e5), layer((1.0 - split) * total, 1e5 * below)];
         let guide = Waveguide::new(layers).unwrap();
         let ball = SphereOnWaveguide::new(radius, 0.49, &guide, Bond::Bonded).unwrap();
         let modulus = 10f64.powf(ball_pa);
-        let reduced = reduced_modulus_pa(Body::elastic(modulus, 0.49).unwrap(), Body::elastic(1e5, nu).unwrap()).unwrap();
+        let bodies = [(modulus, 0.49), (1e5, nu)].map(|(e, nu)| Body::elastic(e, nu).unwrap());
+        let reduced = reduced_modulus_pa(bodies[0], bodies[1]).unwrap();
         let loads: Vec<_> = ratios
             .iter()
             .map(|ratio| {
