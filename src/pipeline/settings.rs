@@ -82,8 +82,8 @@ pub struct Settings {
     pub force_scale_error: Option<f64>,
     /// Relative standard error common to all forces read from light: a bare guide scatters by what
     /// touches it, and the object may reflect otherwise than what it was calibrated with. Zero
-    /// under a fixed diffusing skin, or for the calibrator itself. `None`: 12 % are assumed, and the
-    /// force of an object that reflects a fifth less lies in the interval.
+    /// under a fixed diffusing skin, or for the calibrator itself. `None`: 12 % are assumed, and
+    /// the force of an object that reflects a fifth less lies in the interval.
     pub coupling_error: Option<f64>,
     /// Relative standard error common to all lengths: that of the pixel size. `None`: 0.3 % are
     /// assumed.

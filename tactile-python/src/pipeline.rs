@@ -152,8 +152,8 @@ impl Object {
 ///     Whether frames are divided by the reference's own brightness.
 /// force_scale_error, coupling_error, length_scale_error, radius_error, poisson_ratio_error,
 /// adhesion_error : float
-///     Standard errors that all loads share: three relative ones, in metres, absolute, in J/m². What
-///     is not given is assumed: 0.22 %, 12 %, 0.3 %, 0.5 % of the radius, 0.01, 0.001 J/m².
+///     Standard errors that all loads share: three relative ones, in metres, absolute, in J/m².
+///     What is not given is assumed: 0.22 %, 12 %, 0.3 %, 0.5 % of the radius, 0.01, 0.001 J/m².
 ///
 /// Raises
 /// ------

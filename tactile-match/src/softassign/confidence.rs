@@ -41,9 +41,9 @@ impl<const D: usize> Answer<D> {
         if pairs < enough * smaller as f64 {
             return Some(Doubt::FewPairs);
         }
-        // Trades false alarms for silence: of 912 held-out answers (`--example confidence -- 100 6`)
-        // 39 right ones are doubted and 10 of 235 wrong ones are not. When it was chosen it was 37
-        // and 10, and 22 and 13 at 0.4.
+        // Trades false alarms for silence: of 912 held-out answers (`--example confidence -- 100
+        // 6`) 39 right ones are doubted and 10 of 235 wrong ones are not. When it was chosen it
+        // was 37 and 10, and 22 and 13 at 0.4.
         if self.risk(smaller, gain, tail) < 0.25 {
             return None;
         }
@@ -56,10 +56,10 @@ impl<const D: usize> Answer<D> {
         })
     }
 
-    /// Probability that fewer than nine in ten pairs are right. Logistic in the share of wrong pairs
-    /// and of missed ones by their confidences, in the gain, and in the tail. Fitted to the scenes of
-    /// `--example confidence`, seeds 0 to 5, and every second one of Chui and Rangarajan's published
-    /// sets.
+    /// Probability that fewer than nine in ten pairs are right. Logistic in the share of wrong
+    /// pairs and of missed ones by their confidences, in the gain, and in the tail. Fitted to the
+    /// scenes of `--example confidence`, seeds 0 to 5, and every second one of Chui and
+    /// Rangarajan's published sets.
     fn risk(&self, smaller: usize, gain: f64, tail: f64) -> f64 {
         let rows = self.assignment.iter().zip(&self.confidence);
         let without = rows.filter(|(partner, _)| partner.is_none());

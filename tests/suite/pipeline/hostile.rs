@@ -114,7 +114,11 @@ fn check(kinds: [usize; 2], seed: usize, spoilt: [u8; 2], object: u8) {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: test_support::draws("HOSTILE", 500) as u32, max_shrink_iters: 200, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig {
+        cases: test_support::draws("HOSTILE", 500) as u32,
+        max_shrink_iters: 200,
+        ..ProptestConfig::default()
+    })]
 
     #[test]
     fn hostile_presses_end_civilly(
