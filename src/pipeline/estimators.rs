@@ -22,20 +22,15 @@ fn default_of(
     object: Object,
     waveguide: Option<&Waveguide>,
 ) -> Result<SharedEstimator, ElasticityError> {
+    let nu = object.poisson_ratio();
     match object {
-        Object::Sphere {
-            radius_m,
-            poisson_ratio,
-        } => shared(on_waveguide(radius_m, poisson_ratio, waveguide)?),
+        Object::Sphere { radius_m, .. } => shared(on_waveguide(radius_m, nu, waveguide)?),
         Object::Layer {
             indenter_radius_m,
             thickness_m,
-            poisson_ratio,
-        } => shared(layer(indenter_radius_m, thickness_m, poisson_ratio)?),
-        Object::Cone {
-            half_angle_rad,
-            poisson_ratio,
-        } => shared(Cone::new(half_angle_rad, poisson_ratio)?),
+            ..
+        } => shared(layer(indenter_radius_m, thickness_m, nu)?),
+        Object::Cone { half_angle_rad, .. } => shared(Cone::new(half_angle_rad, nu)?),
         Object::Block { .. } | Object::Cylinder { .. } | Object::Unknown { .. } => {
             shared(StressStrainRegression::default())
         }
@@ -49,21 +44,16 @@ pub fn that_fit(
     object: Object,
     waveguide: Option<&Waveguide>,
 ) -> Result<Vec<SharedEstimator>, PipelineError> {
+    let nu = object.poisson_ratio();
     let build = || {
         let mut estimators = vec![shared(paper_ratio(object)?)?];
         match object {
-            Object::FlatPunch {
-                radius_m,
-                poisson_ratio,
-            } => {
-                let punch = FlatPunch::new(radius_m, poisson_ratio)?;
+            Object::FlatPunch { radius_m, .. } => {
+                let punch = FlatPunch::new(radius_m, nu)?;
                 estimators.push(shared(punch.with_other_body(pressed_on(waveguide)))?);
             }
-            Object::Sphere {
-                radius_m,
-                poisson_ratio,
-            } => {
-                let ball = HertzSphere::new(radius_m, poisson_ratio)?;
+            Object::Sphere { radius_m, .. } => {
+                let ball = HertzSphere::new(radius_m, nu)?;
                 estimators.push(shared(ball.with_other_body(pressed_on(waveguide)))?);
             }
             Object::Layer { .. } | Object::Cone { .. } => {
@@ -88,45 +78,32 @@ fn named(
         needs,
     };
     const BALL: &str = "a ball as the object";
-    let ball = || match object {
-        Object::Sphere {
-            radius_m,
-            poisson_ratio,
-        } => Ok((radius_m, poisson_ratio)),
-        _ => Err(needs(BALL)),
-    };
+    let nu = object.poisson_ratio();
+    let radius = || object.sphere_radius_m().ok_or(needs(BALL));
+    let guide = pressed_on(waveguide);
     let built = match choice {
         EstimatorChoice::Best => default_of(object, waveguide),
         EstimatorChoice::PaperRatio => paper_ratio(object).and_then(shared),
         EstimatorChoice::Regression => shared(StressStrainRegression::default()),
         EstimatorChoice::Sphere => {
-            let (radius_m, poisson_ratio) = ball()?;
-            HertzSphere::new(radius_m, poisson_ratio)
-                .and_then(|e| shared(e.with_other_body(pressed_on(waveguide))))
+            HertzSphere::new(radius()?, nu).and_then(|e| shared(e.with_other_body(guide)))
         }
         EstimatorChoice::SphereOnWaveguide => {
-            let (radius_m, poisson_ratio) = ball()?;
-            on_waveguide(radius_m, poisson_ratio, waveguide).and_then(shared)
+            on_waveguide(radius()?, nu, waveguide).and_then(shared)
         }
         EstimatorChoice::TabulatedContact => {
             return Err(needs("a table of the ball's contacts"));
         }
         EstimatorChoice::SphereBetweenPlates => {
-            let (radius_m, poisson_ratio) = ball()?;
-            SphereBetweenPlates::new(radius_m, poisson_ratio)
-                .and_then(|e| shared(e.with_other_body(pressed_on(waveguide))))
+            SphereBetweenPlates::new(radius()?, nu).and_then(|e| shared(e.with_other_body(guide)))
         }
         EstimatorChoice::TataraSphere => {
-            let (radius_m, poisson_ratio) = ball()?;
-            TataraSphere::new(radius_m, poisson_ratio)
-                .and_then(|e| shared(e.with_other_body(pressed_on(waveguide))))
+            TataraSphere::new(radius()?, nu).and_then(|e| shared(e.with_other_body(guide)))
         }
         EstimatorChoice::FlatPunch => match object {
-            Object::FlatPunch {
-                radius_m,
-                poisson_ratio,
-            } => FlatPunch::new(radius_m, poisson_ratio)
-                .and_then(|e| shared(e.with_other_body(pressed_on(waveguide)))),
+            Object::FlatPunch { radius_m, .. } => {
+                FlatPunch::new(radius_m, nu).and_then(|e| shared(e.with_other_body(guide)))
+            }
             _ => return Err(needs("a flat punch as the object")),
         },
         EstimatorChoice::Cone => match object {
@@ -148,29 +125,17 @@ fn least_akaike(
     waveguide: Option<&Waveguide>,
     wrong_object: PipelineError,
 ) -> Result<SharedEstimator, PipelineError> {
-    let build = match (object, waveguide) {
-        (
-            Object::Sphere {
-                radius_m,
-                poisson_ratio,
-            },
-            Some(waveguide),
-        ) => BestOf::sphere_as_sample(radius_m, poisson_ratio, waveguide),
-        (
-            Object::Sphere {
-                radius_m,
-                poisson_ratio,
-            },
-            None,
-        ) => sphere_on_rigid_flat(radius_m, poisson_ratio),
-        (
-            Object::Layer {
-                indenter_radius_m,
-                thickness_m,
-                poisson_ratio,
-            },
-            _,
-        ) => BestOf::sphere_on_sample(indenter_radius_m, poisson_ratio, Some(thickness_m)),
+    let nu = object.poisson_ratio();
+    let build = match object {
+        Object::Sphere { radius_m, .. } => match waveguide {
+            Some(waveguide) => BestOf::sphere_as_sample(radius_m, nu, waveguide),
+            None => sphere_on_rigid_flat(radius_m, nu),
+        },
+        Object::Layer {
+            indenter_radius_m,
+            thickness_m,
+            ..
+        } => BestOf::sphere_on_sample(indenter_radius_m, nu, Some(thickness_m)),
         _ => return Err(wrong_object),
     };
     build.and_then(shared).map_err(PipelineError::Material)

@@ -3,9 +3,9 @@ use super::contact::ContactReading;
 use super::error::PipelineError;
 use crate::elasticity::modulus::Warning;
 use crate::force::Estimate;
-use std::fmt;
 
 /// A caution about a result. Frames are counted from 0 in the fields and from 1 in the sentences.
+/// It is an [`Error`](std::error::Error) too, for those who take no result with a caution.
 ///
 /// ```
 /// use tactile_imaging::force::{CalibrationPair, Estimate};
@@ -33,7 +33,7 @@ use std::fmt;
 /// assert_eq!(flags[0].to_string(), "frame 1: the contact reaches the frame's edge");
 /// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
 /// ```
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[cfg_attr(
     feature = "serde",
     derive(serde::Serialize),
@@ -42,6 +42,7 @@ use std::fmt;
 #[non_exhaustive]
 pub enum Flag {
     /// Some of the contact's pixels are saturated: force and radius are low.
+    #[error("frame {}: {:.2} % of the contact is saturated", frame + 1, 100.0 * share)]
     Saturated {
         /// The frame.
         frame: usize,
@@ -49,17 +50,24 @@ pub enum Flag {
         share: f64,
     },
     /// The signal lies outside the range of the calibration.
+    #[error("frame {}: outside the range of the calibration", frame + 1)]
     OutOfCalibration {
         /// The frame.
         frame: usize,
     },
     /// The contact reaches the edge of the frame.
+    #[error("frame {}: the contact reaches the frame's edge", frame + 1)]
     TouchesEdge {
         /// The frame.
         frame: usize,
     },
     /// The contact is wider than the frame: most of it is not seen, or the light has changed
     /// everywhere.
+    #[error(
+        "frame {}: the contact, {:.3} mm in radius, is wider than the frame: its size cannot be \
+         told",
+        frame + 1, 1e3 * radius_m
+    )]
     WiderThanFrame {
         /// The frame.
         frame: usize,
@@ -67,6 +75,10 @@ pub enum Flag {
         radius_m: f64,
     },
     /// A number whose error is larger than the number.
+    #[error(
+        "frame {}: the {quantity} cannot be told, its error ({}) is larger than its value ({})",
+        frame + 1, in_unit(quantity, *standard_error), in_unit(quantity, *value)
+    )]
     CannotBeTold {
         /// The frame.
         frame: usize,
@@ -78,6 +90,7 @@ pub enum Flag {
         standard_error: f64,
     },
     /// No contact, though the frame differs from the reference the other way than a contact does.
+    #[error("{}", PipelineError::OppositeSignal { frame: *frame, grey: *grey })]
     OppositeSignal {
         /// The frame.
         frame: usize,
@@ -85,6 +98,7 @@ pub enum Flag {
         grey: f64,
     },
     /// The frame shows more than one contact. The largest is measured, and theory knows of one.
+    #[error("frame {}: {} beside the one measured", frame + 1, other_contacts(*others))]
     SeveralContacts {
         /// The frame.
         frame: usize,
@@ -92,12 +106,18 @@ pub enum Flag {
         others: usize,
     },
     /// The light has changed since the reference was taken.
+    #[error("the light has drifted by {grey:+.2} grey levels since the reference was taken")]
     LightDrifted {
         /// Mean of frame minus reference without contact, in grey levels.
         grey: f64,
     },
     /// The reference is brighter or darker than that of the calibration: forces are divided by the
     /// factor, with its error.
+    #[error(
+        "the reference is {:+.1} % brighter than the calibration's, unevenly by {:.1} %: forces \
+         are divided by that factor",
+        100.0 * change, 100.0 * uneven
+    )]
     LightChanged {
         /// The common factor less one.
         change: f64,
@@ -105,12 +125,17 @@ pub enum Flag {
         uneven: f64,
     },
     /// The fit of the contact's profile did not converge.
+    #[error("frame {}: the profile's fit did not converge", frame + 1)]
     ProfileNotConverged {
         /// The frame.
         frame: usize,
     },
     /// The profile of the contact's pressure is not that of a ball: the contact radius is that of
     /// the best ball.
+    #[error(
+        "frame {}: the pressure is not that of a ball, by {:.1} % of its peak",
+        frame + 1, 100.0 * misfit
+    )]
     NotABall {
         /// The frame.
         frame: usize,
@@ -119,6 +144,10 @@ pub enum Flag {
     },
     /// The object is said to be a punch, which touches with its whole face, but the contact has
     /// another radius.
+    #[error(
+        "frame {}: the contact's radius is {:.3} mm, that of the punch {:.3} mm",
+        frame + 1, 1e3 * radius_m, 1e3 * punch_m
+    )]
     NotThePunch {
         /// The frame.
         frame: usize,
@@ -129,6 +158,11 @@ pub enum Flag {
     },
     /// The mean stress is one that no gel bears, or that no gel shows: a slip of a unit in the
     /// forces, the light or the size of a pixel.
+    #[error(
+        "frame {}: a mean stress of {mean_stress_pa:.1e} Pa is one that no gel {}: are the forces \
+         in newtons, the pixels in the unit asked for?",
+        frame + 1, if *mean_stress_pa > 1.0e3 { "bears" } else { "shows" }
+    )]
     UnlikelyStress {
         /// The frame.
         frame: usize,
@@ -137,6 +171,7 @@ pub enum Flag {
     },
     /// The contact's outline is not round: the pixels are not as stated, the lens distorts, or the
     /// object is no ball.
+    #[error("frame {}: the contact is longer than wide by {:.1} %", frame + 1, 100.0 * elongation)]
     NotRound {
         /// The frame.
         frame: usize,
@@ -146,6 +181,11 @@ pub enum Flag {
     /// The pairs of the calibration do not lie on a line: light is not proportional to pressure, so
     /// that the light's profile and its radius are not those of the pressure. A sensor calibrated
     /// from frames has the local curve.
+    #[error(
+        "frame {}: the calibration's pairs depart from a line by {:.1} % of the full scale: light \
+         is not proportional to pressure",
+        frame + 1, 100.0 * departure
+    )]
     LightNotProportional {
         /// The frame.
         frame: usize,
@@ -153,6 +193,9 @@ pub enum Flag {
         departure: f64,
     },
     /// The calibration and the gauge disagree by more than three standard errors and two per cent.
+    #[error(
+        "frame {}: {measured_n:.4} N measured, but the gauge read {gauge_n:.4} N", frame + 1
+    )]
     GaugeDisagrees {
         /// The frame.
         frame: usize,
@@ -163,6 +206,11 @@ pub enum Flag {
     },
     /// The material points of a face and its outline stretch differently: the face slips, sticks or
     /// bulges, and the modulus is off by as much as the strain.
+    #[error(
+        "frame {}: the outline has stretched by {:.3} % since the first frame, the texture by \
+         {:.3} %: the face slips or sticks",
+        frame + 1, 100.0 * outline_strain, 100.0 * texture_strain
+    )]
     Slip {
         /// The frame.
         frame: usize,
@@ -173,6 +221,11 @@ pub enum Flag {
     },
     /// The pressure rises to the outline of a flat face, as where it sticks: it does not spread
     /// freely, and its strain is not that of its material.
+    #[error(
+        "frame {}: the pressure rises towards the outline ({edge_ratio:.2} of that further \
+         inside): the face sticks, its strain is not that of its material",
+        frame + 1
+    )]
     FaceSticks {
         /// The frame.
         frame: usize,
@@ -180,6 +233,11 @@ pub enum Flag {
         edge_ratio: f64,
     },
     /// A face is squeezed so far that the modulus depends on the law between stress and strain.
+    #[error(
+        "at a strain of {:.1} % the modulus depends on the law of the material: of a rubber-like \
+         sample it is {:.0} % off (strain = \"hencky\" is closest)",
+        100.0 * strain, 100.0 * excess
+    )]
     MaterialLaw {
         /// The largest strain e_zz, of the pipeline's measure.
         strain: f64,
@@ -187,6 +245,11 @@ pub enum Flag {
         excess: f64,
     },
     /// The sample relaxes: the modulus is a mean over the time of the frames.
+    #[error(
+        "the sample relaxes from {:.1} to {:.1} kPa with {time_constant_s:.2} s: the modulus is a \
+         mean over the time of the frames",
+        1e-3 * instantaneous_pa, 1e-3 * equilibrium_pa
+    )]
     SampleRelaxes {
         /// Modulus of a load too fast to relax, in pascals.
         instantaneous_pa: f64,
@@ -196,34 +259,50 @@ pub enum Flag {
         time_constant_s: f64,
     },
     /// The sensor's gain changes with time.
+    #[error("the sensor's gain changes by {:+.1} % over the frames", 100.0 * change)]
     SensorDrifts {
         /// Relative change over the frames.
         change: f64,
     },
     /// The modulus changes with time, and it cannot be told whether it is the sample or the sensor.
+    #[error(
+        "the modulus changes by {:+.1} % over the frames: a relaxing sample or a drifting sensor, \
+         which the frames do not tell apart",
+        100.0 * change
+    )]
     ChangesWithTime {
         /// Relative change over the frames.
         change: f64,
     },
     /// The matcher stopped before it converged.
+    #[error("the match did not converge")]
     MatchNotConverged,
     /// Some control points have no partner.
+    #[error(
+        "{points} control {} no partner", if *points == 1 { "point has" } else { "points have" }
+    )]
     Unmatched {
         /// How many.
         points: usize,
     },
     /// The first contact is so small, in pixels, that its surface and the strain counted from it
     /// may be off by more than their errors say.
+    #[error(
+        "the contact has a radius of {radius_px:.1} pixels: too few for the strain's error to be \
+         sure"
+    )]
     CoarseStrain {
         /// Radius of the smaller contact in pixels.
         radius_px: f64,
     },
     /// The warp folds over at some control points. They are left out of the strain.
+    #[error("the warp folds over at {points} control point{}", if *points == 1 { "" } else { "s" })]
     Folded {
         /// How many.
         points: usize,
     },
     /// An assumption of the estimator is broken.
+    #[error("{warning}")]
     Assumption {
         /// Which.
         #[cfg_attr(
@@ -291,217 +370,18 @@ impl ContactReading {
     }
 }
 
-impl fmt::Display for Flag {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Saturated { frame, share } => {
-                write!(
-                    f,
-                    "frame {}: {:.2} % of the contact is saturated",
-                    frame + 1,
-                    100.0 * share
-                )
-            }
-            Self::OutOfCalibration { frame } => {
-                write!(
-                    f,
-                    "frame {}: outside the range of the calibration",
-                    frame + 1
-                )
-            }
-            Self::TouchesEdge { frame } => {
-                write!(
-                    f,
-                    "frame {}: the contact reaches the frame's edge",
-                    frame + 1
-                )
-            }
-            Self::WiderThanFrame { frame, radius_m } => {
-                write!(
-                    f,
-                    "frame {}: the contact, {:.3} mm in radius, is wider than the frame: its size \
-                     cannot be told",
-                    frame + 1,
-                    1e3 * radius_m
-                )
-            }
-            Self::CannotBeTold {
-                frame,
-                quantity,
-                value,
-                standard_error,
-            } => {
-                // Every length is printed in millimetres.
-                let (factor, unit) = match *quantity {
-                    "force" => (1.0, "N"),
-                    _ => (1e3, "mm"),
-                };
-                write!(
-                    f,
-                    "frame {}: the {quantity} cannot be told, its error ({:.1e} {unit}) is \
-                     larger than its value ({:.1e} {unit})",
-                    frame + 1,
-                    factor * standard_error,
-                    factor * value
-                )
-            }
-            Self::OppositeSignal { frame, grey } => {
-                let (frame, grey) = (*frame, *grey);
-                PipelineError::OppositeSignal { frame, grey }.fmt(f)
-            }
-            Self::SeveralContacts { frame, others: 1 } => {
-                write!(
-                    f,
-                    "frame {}: another contact beside the one measured",
-                    frame + 1
-                )
-            }
-            Self::SeveralContacts { frame, others } => {
-                write!(
-                    f,
-                    "frame {}: {others} other contacts beside the one measured",
-                    frame + 1
-                )
-            }
-            Self::LightDrifted { grey } => {
-                write!(
-                    f,
-                    "the light has drifted by {grey:+.2} grey levels since the reference was taken"
-                )
-            }
-            Self::LightChanged { change, uneven } => {
-                write!(
-                    f,
-                    "the reference is {:+.1} % brighter than the calibration's, unevenly by {:.1} \
-                     %: forces are divided by that factor",
-                    100.0 * change,
-                    100.0 * uneven
-                )
-            }
-            Self::ProfileNotConverged { frame } => {
-                write!(f, "frame {}: the profile's fit did not converge", frame + 1)
-            }
-            Self::NotABall { frame, misfit } => {
-                write!(
-                    f,
-                    "frame {}: the pressure is not that of a ball, by {:.1} % of its peak",
-                    frame + 1,
-                    100.0 * misfit
-                )
-            }
-            Self::NotThePunch {
-                frame,
-                radius_m,
-                punch_m,
-            } => write!(
-                f,
-                "frame {}: the contact's radius is {:.3} mm, that of the punch {:.3} mm",
-                frame + 1,
-                1e3 * radius_m,
-                1e3 * punch_m
-            ),
-            Self::UnlikelyStress {
-                frame,
-                mean_stress_pa,
-            } => write!(
-                f,
-                "frame {}: a mean stress of {mean_stress_pa:.1e} Pa is one that no gel {}: are \
-                 the forces in newtons, the pixels in the unit asked for?",
-                frame + 1,
-                if *mean_stress_pa > 1.0e3 {
-                    "bears"
-                } else {
-                    "shows"
-                }
-            ),
-            Self::NotRound { frame, elongation } => {
-                write!(
-                    f,
-                    "frame {}: the contact is longer than wide by {:.1} %",
-                    frame + 1,
-                    100.0 * elongation
-                )
-            }
-            Self::LightNotProportional { frame, departure } => {
-                write!(
-                    f,
-                    "frame {}: the calibration's pairs depart from a line by {:.1} % of the full \
-                     scale: light is not proportional to pressure",
-                    frame + 1,
-                    100.0 * departure
-                )
-            }
-            Self::GaugeDisagrees {
-                frame,
-                measured_n,
-                gauge_n,
-            } => {
-                write!(
-                    f,
-                    "frame {}: {measured_n:.4} N measured, but the gauge read {gauge_n:.4} N",
-                    frame + 1
-                )
-            }
-            Self::Slip {
-                frame,
-                outline_strain,
-                texture_strain,
-            } => {
-                write!(
-                    f,
-                    "frame {}: the outline has stretched by {:.3} % since the first frame, the \
-                     texture by {:.3} %: the face slips or sticks",
-                    frame + 1,
-                    100.0 * outline_strain,
-                    100.0 * texture_strain
-                )
-            }
-            Self::FaceSticks { frame, edge_ratio } => write!(
-                f,
-                "frame {}: the pressure rises towards the outline ({edge_ratio:.2} of that \
-                 further inside): the face sticks, its strain is not that of its material",
-                frame + 1
-            ),
-            Self::MaterialLaw { strain, excess } => write!(
-                f,
-                "at a strain of {:.1} % the modulus depends on the law of the material: of a \
-                 rubber-like sample it is {:.0} % off (strain = \"hencky\" is closest)",
-                100.0 * strain,
-                100.0 * excess
-            ),
-            Self::SampleRelaxes {
-                instantaneous_pa,
-                equilibrium_pa,
-                time_constant_s,
-            } => write!(
-                f,
-                "the sample relaxes from {:.1} to {:.1} kPa with {time_constant_s:.2} s: the \
-                 modulus is a mean over the time of the frames",
-                instantaneous_pa * 1e-3,
-                equilibrium_pa * 1e-3
-            ),
-            Self::SensorDrifts { change } => write!(
-                f,
-                "the sensor's gain changes by {:+.1} % over the frames",
-                100.0 * change
-            ),
-            Self::ChangesWithTime { change } => write!(
-                f,
-                "the modulus changes by {:+.1} % over the frames: a relaxing sample or a drifting \
-                 sensor, which the frames do not tell apart",
-                100.0 * change
-            ),
-            Self::MatchNotConverged => write!(f, "the match did not converge"),
-            Self::Unmatched { points: 1 } => write!(f, "1 control point has no partner"),
-            Self::Unmatched { points } => write!(f, "{points} control points have no partner"),
-            Self::CoarseStrain { radius_px } => write!(
-                f,
-                "the contact has a radius of {radius_px:.1} pixels: too few for the strain's \
-                 error to be sure"
-            ),
-            Self::Folded { points: 1 } => write!(f, "the warp folds over at 1 control point"),
-            Self::Folded { points } => write!(f, "the warp folds over at {points} control points"),
-            Self::Assumption { warning } => write!(f, "{warning}"),
-        }
+/// A force in newtons, a length in millimetres.
+fn in_unit(quantity: &str, value: f64) -> String {
+    match quantity {
+        "force" => format!("{value:.1e} N"),
+        _ => format!("{:.1e} mm", 1e3 * value),
+    }
+}
+
+/// The contacts beside the largest.
+fn other_contacts(others: usize) -> String {
+    match others {
+        1 => "another contact".to_owned(),
+        _ => format!("{others} other contacts"),
     }
 }

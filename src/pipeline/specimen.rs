@@ -121,46 +121,34 @@ impl Object {
     /// How the object is read.
     pub(super) fn specimen(self) -> Specimen {
         match self {
-            Self::Block { poisson_ratio } | Self::Cylinder { poisson_ratio } => {
+            Self::Block { poisson_ratio }
+            | Self::Cylinder { poisson_ratio }
+            | Self::Unknown { poisson_ratio } => {
+                let stated = !matches!(self, Self::Unknown { .. });
                 Specimen::Flat(FlatSpecimen {
                     poisson_ratio,
-                    stated: true,
+                    stated,
                 })
             }
-            Self::Unknown { poisson_ratio } => Specimen::Flat(FlatSpecimen {
-                poisson_ratio,
-                stated: false,
-            }),
             _ => Specimen::Curved,
         }
     }
 
     /// Refuses what is not physical.
     pub(super) fn checked(self) -> Result<Self, PipelineError> {
-        let length_and_ratio =
-            |length_m, poisson_ratio| HertzSphere::new(length_m, poisson_ratio).map(drop);
+        let nu = self.poisson_ratio();
+        let with_length = |length_m| HertzSphere::new(length_m, nu).map(drop);
         let checked = match self {
-            Self::Sphere {
-                radius_m,
-                poisson_ratio,
+            Self::Sphere { radius_m, .. } | Self::FlatPunch { radius_m, .. } => {
+                with_length(radius_m)
             }
-            | Self::FlatPunch {
-                radius_m,
-                poisson_ratio,
-            } => length_and_ratio(radius_m, poisson_ratio),
             Self::Layer {
                 indenter_radius_m,
                 thickness_m,
-                poisson_ratio,
-            } => length_and_ratio(indenter_radius_m, poisson_ratio)
-                .and_then(|()| length_and_ratio(thickness_m, poisson_ratio)),
-            Self::Cone {
-                half_angle_rad,
-                poisson_ratio,
-            } => Cone::new(half_angle_rad, poisson_ratio).map(drop),
-            Self::Block { poisson_ratio }
-            | Self::Cylinder { poisson_ratio }
-            | Self::Unknown { poisson_ratio } => length_and_ratio(1.0, poisson_ratio),
+                ..
+            } => with_length(indenter_radius_m).and_then(|()| with_length(thickness_m)),
+            Self::Cone { half_angle_rad, .. } => Cone::new(half_angle_rad, nu).map(drop),
+            Self::Block { .. } | Self::Cylinder { .. } | Self::Unknown { .. } => with_length(1.0),
         };
         checked.map(|()| self).map_err(PipelineError::Material)
     }
