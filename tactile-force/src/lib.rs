@@ -53,7 +53,7 @@ mod shear;
 pub use calibration::{
     Branch, CalibrationFrame, CalibrationOptions, CalibrationPair, CalibrationReport,
     CurveHysteresis, ForceReading, GreyHistogram, Hysteresis, LinearCalibration, LocalCalibration,
-    PressureCurve, PressureCurveOptions, PressureCurveReport, Robustness, StressCalibration,
+    PressureCurve, PressureCurveOptions, PressureCurveReport, StressCalibration,
 };
 pub use contact::{Contact, ContactDetector, ContactOptions, Detection, DetectorWorkspace};
 pub use drift::{

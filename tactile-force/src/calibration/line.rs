@@ -1,9 +1,9 @@
 //! The straight line F = b + s V, its report, and the least squares behind it.
 
-use nalgebra::{DMatrix, DVector};
-use tactile_core::{Estimate, StopReason};
+use nalgebra::{Matrix2, Vector2};
+use tactile_core::Estimate;
 
-use super::{Branch, CalibrationOptions, CalibrationPair, Robustness, StressCalibration};
+use super::{Branch, CalibrationOptions, CalibrationPair, StressCalibration};
 use crate::error::ForceError;
 
 /// A straight line from integrated pixel value to force, F = b + s V, or F = s V through the
@@ -61,27 +61,21 @@ impl LinearCalibration {
         if scale <= 4.0 * f64::EPSILON * greatest(0.0) || scale == 0.0 {
             return Err(ForceError::DegeneratePairs { span: scale });
         }
-        let design = DMatrix::from_fn(values.len(), columns, |i, j| {
-            if j + 1 == columns {
-                (values[i] - centre) / scale
-            } else {
-                1.0
-            }
-        });
-        let rows = noise_weights(&design, &forces, options)?;
-        let fit = Fit::solve(&design, &forces, &rows, options.robustness)?;
+        let x: Vec<f64> = values.iter().map(|v| (v - centre) / scale).collect();
+        let fit = Fit::weighted(&x, &forces, options)
+            .ok_or(ForceError::DegeneratePairs { span: scale })?;
         let degrees = (pairs.len() - columns) as f64;
         let estimate = |value: f64, variance: f64| {
             Estimate::from_variance(value, variance).with_degrees_of_freedom(degrees)
         };
-        let last = columns - 1;
-        let slope_variance = fit.covariance[(last, last)] / (scale * scale);
-        let slope_n = estimate(fit.coefficients[last] / scale, slope_variance);
+        let [level, slope] = fit.coefficients.into();
+        let errors = fit.inverse * fit.residual_sd.powi(2);
+        let slope_variance = errors[(1, 1)] / (scale * scale);
+        let slope_n = estimate(slope / scale, slope_variance);
         let (level_n, covariance, parameters) = if options.through_origin {
             (Estimate::exact(0.0), 0.0, vec![slope_n])
         } else {
-            let (level, variance) = (fit.coefficients[0], fit.covariance[(0, 0)]);
-            let covariance = fit.covariance[(0, 1)] / scale;
+            let (variance, covariance) = (errors[(0, 0)], errors[(0, 1)] / scale);
             let offset = estimate(
                 level - slope_n.value * centre,
                 variance - 2.0 * covariance * centre + slope_variance * centre * centre,
@@ -91,14 +85,7 @@ impl LinearCalibration {
         let curve = |v: f64| level_n.value + slope_n.value * (v - centre);
         let mut report = CalibrationReport::new(pairs, curve, columns);
         report.parameters = parameters;
-        report.r_squared = r_squared(&forces, &fit.residuals);
-        if rows.iter().all(|weight| *weight == 1.0) {
-            report.residual_sd_n = fit.residual_sd;
-        }
         report.smallest_force_n = 3.0 * fit.residual_sd;
-        report.residuals_n = fit.residuals;
-        report.weights = fit.weights;
-        (report.iterations, report.stop) = (fit.iterations, fit.stop);
         Ok(Self {
             centre,
             level_n,
@@ -249,13 +236,10 @@ pub struct CalibrationReport {
     pub degrees_of_freedom: usize,
     /// Coefficient of determination, 1 − Σr²/Σ(F − F̄)².
     pub r_squared: f64,
-    /// Standard deviation of the residuals, √(Σr²/(n − p)), in newtons. A robust scale where
-    /// outliers were discounted.
+    /// Standard deviation of the residuals, √(Σr²/(n − p)), in newtons.
     pub residual_sd_n: f64,
     /// Residual of every pair, measured minus fitted, in newtons.
     pub residuals_n: Vec<f64>,
-    /// Weight of every pair: 1 for a trusted one, 0 for an outlier that counts nothing.
-    pub weights: Vec<f64>,
     /// Loading against unloading. `None` unless both branches were given and overlap.
     pub hysteresis: Option<Hysteresis>,
     /// Greatest distance of a pair from the curve, as a share of the full scale.
@@ -268,10 +252,6 @@ pub struct CalibrationReport {
     pub full_scale_n: f64,
     /// The curve rises between the pairs' pixel values.
     pub monotone: bool,
-    /// Solves, one if nothing was reweighted.
-    pub iterations: usize,
-    /// Why the fit stopped.
-    pub stop: StopReason,
 }
 
 impl CalibrationReport {
@@ -298,15 +278,12 @@ impl CalibrationReport {
             degrees_of_freedom,
             r_squared: r_squared(&forces, &residuals_n),
             residual_sd_n,
-            weights: vec![1.0; pairs.len()],
             hysteresis: Hysteresis::of(pairs, &residuals_n, full_scale_n),
             linearity_error: farthest / full_scale_n,
             sensitivity_n,
             smallest_force_n: 3.0 * residual_sd_n,
             full_scale_n,
             monotone: sensitivity_n > 0.0 && fitted.is_sorted(),
-            iterations: 1,
-            stop: StopReason::Direct,
             residuals_n,
         }
     }
@@ -379,212 +356,79 @@ fn interpolate(points: &[(f64, f64)], v: f64) -> Option<f64> {
     Some(r0 + (r1 - r0) * (v - v0) / (v1 - v0))
 }
 
-/// A solved linear model y = X c + e.
+/// Least squares of a level and a slope over x, or of a slope alone.
 struct Fit {
-    coefficients: DVector<f64>,
-    /// Covariance of the coefficients.
-    covariance: DMatrix<f64>,
-    residuals: Vec<f64>,
-    /// Weight of every observation, 1 for a trusted one.
-    weights: Vec<f64>,
-    /// Standard deviation of the errors: least squares, or robust scale.
+    coefficients: Vector2<f64>,
+    /// (XᵀWX)⁻¹. Of a level that is not fitted the identity's.
+    inverse: Matrix2<f64>,
+    /// Standard deviation of the error of a pair of weight 1.
     residual_sd: f64,
-    iterations: usize,
-    stop: StopReason,
 }
 
 impl Fit {
-    /// Least squares for the coefficients of the design's columns, reweighted for outliers. `rows`
-    /// are the weights that the pairs have by their noise: the residual standard deviation is that
-    /// of a pair of weight 1.
-    fn solve(
-        design: &DMatrix<f64>,
-        y: &[f64],
-        rows: &[f64],
-        robustness: Robustness,
-    ) -> Result<Self, ForceError> {
-        let root = DVector::from_iterator(y.len(), rows.iter().map(|w| w.sqrt()));
-        let y = DVector::from_column_slice(y).component_mul(&root);
-        let mut design = design.clone();
-        for mut column in design.column_iter_mut() {
-            column.component_mul_assign(&root);
+    /// The fit with weights 1/(1 + k F²/F_max²): pairs whose noise has a constant part and one that
+    /// grows with the force, as that of a gauge of so many per cent of the reading.
+    ///
+    /// Of k = 0, 4 (the degrees of freedom, where there are fewer) and 30 the one of the greatest
+    /// restricted likelihood is taken. Few pairs do not decide. There the middle one is preferred
+    /// by 0.8 in the likelihood's logarithm. Of its 95 % intervals 92 to 98 % then hold in the
+    /// middle of the range, whichever noise there is.
+    fn weighted(x: &[f64], forces: &[f64], options: &CalibrationOptions) -> Option<Self> {
+        let largest = forces.iter().fold(0.0, |m: f64, f| m.max(f.abs()));
+        let columns = if options.through_origin { 1 } else { 2 };
+        let freedom = (x.len() - columns) as f64;
+        let even = Self::solve(x, forces, &vec![1.0; x.len()], options.through_origin)?;
+        if options.constant_noise || largest == 0.0 {
+            return Some(even);
         }
-        let design = &design;
-        let mut weights = vec![1.0; y.len()];
-        let mut coefficients = weighted(design, &y, &weights)?;
-        let (mut iterations, mut stop, mut scale) = (1, StopReason::Direct, 0.0);
-        let stages: &[Robustness] = match robustness {
-            Robustness::None => &[],
-            Robustness::Huber => &[Robustness::Huber],
-            Robustness::Tukey => &[Robustness::Huber, Robustness::Tukey],
-        };
-        for &stage in stages {
-            stop = StopReason::IterationLimit;
-            for _ in 0..100 {
-                iterations += 1;
-                let residuals = &y - design * &coefficients;
-                scale = robust_scale(residuals.as_slice(), design.ncols());
-                for (w, r) in weights.iter_mut().zip(residuals.iter()) {
-                    *w = robust_weight(stage, *r, scale);
-                }
-                let next = weighted(design, &y, &weights)?;
-                let step = (design * (&next - &coefficients)).amax();
-                coefficients = next;
-                if step <= 1e-10 * scale {
-                    stop = StopReason::Converged;
-                    break;
-                }
+        let mut best = (f64::NEG_INFINITY, None);
+        for (growth, prior) in [(0.0, 0.0), (freedom.min(4.0), 0.8), (30.0, 0.0)] {
+            let weight = |f: &f64| 1.0 / (1.0 + growth * (f / largest).powi(2));
+            let weights: Vec<f64> = forces.iter().map(weight).collect();
+            let fit = Self::solve(x, forces, &weights, options.through_origin)?;
+            // Pairs without noise leave rounding, which has no likelihood.
+            if fit.residual_sd <= 1e-12 * largest {
+                return Some(even);
+            }
+            // The logarithm of the restricted likelihood, but for constants (Patterson and Thompson
+            // 1971).
+            let of_weights = 0.5 * weights.iter().map(|w| w.ln()).sum::<f64>();
+            let of_fit = 0.5 * fit.inverse.determinant().ln() - freedom * fit.residual_sd.ln();
+            let likelihood = prior + of_weights + of_fit;
+            if likelihood > best.0 {
+                best = (likelihood, Some(fit));
             }
         }
-        let scaled = &y - design * &coefficients;
-        let (variance, residual_sd) =
-            error_variance(robustness, scaled.as_slice(), scale, design.ncols());
-        let residuals = scaled.component_div(&root).as_slice().to_vec();
-        Ok(Self {
-            covariance: inverse_gram(design)? * variance,
+        best.1.or(Some(even))
+    }
+
+    /// `None` where x is not finite: it is of order one, and then determines both.
+    fn solve(x: &[f64], y: &[f64], weights: &[f64], through_origin: bool) -> Option<Self> {
+        let level = if through_origin { 0.0 } else { 1.0 };
+        let pairs = || {
+            x.iter()
+                .map(|x| Vector2::new(level, *x))
+                .zip(y)
+                .zip(weights)
+        };
+        let (mut gram, mut right) = (Matrix2::zeros(), Vector2::zeros());
+        for ((row, y), w) in pairs() {
+            gram += row * row.transpose() * *w;
+            right += row * (w * y);
+        }
+        if through_origin {
+            gram[(0, 0)] = 1.0;
+        }
+        let cholesky = gram.cholesky()?;
+        let coefficients = cholesky.solve(&right);
+        let of_pair =
+            |((row, y), w): ((Vector2<f64>, &f64), &f64)| w * (y - row.dot(&coefficients)).powi(2);
+        let squares: f64 = pairs().map(of_pair).sum();
+        let columns = if through_origin { 1 } else { 2 };
+        Some(Self {
             coefficients,
-            residuals,
-            weights,
-            residual_sd,
-            iterations,
-            stop,
+            inverse: cholesky.inverse(),
+            residual_sd: (squares / (x.len() - columns) as f64).sqrt(),
         })
     }
-}
-
-/// Weights 1/(1 + k F²/F_max²) of pairs whose noise has a constant part and one that grows with the
-/// force, as that of a gauge of so many per cent of the reading.
-///
-/// Of k = 0, 4 (the degrees of freedom, where there are fewer) and 30 the one of the greatest
-/// restricted likelihood is taken. Few pairs do not decide. There the middle one is preferred by
-/// 0.8 in the likelihood's logarithm. Of its 95 % intervals 92 to 98 % then hold in the middle of
-/// the range, whichever noise there is. Robust fits weigh by their residuals.
-fn noise_weights(
-    design: &DMatrix<f64>,
-    forces: &[f64],
-    options: &CalibrationOptions,
-) -> Result<Vec<f64>, ForceError> {
-    let even = vec![1.0; forces.len()];
-    let largest = forces.iter().fold(0.0, |m: f64, f| m.max(f.abs()));
-    let weighs = options.robustness == Robustness::None && !options.constant_noise;
-    if !weighs || largest == 0.0 {
-        return Ok(even);
-    }
-    let mut best = (f64::NEG_INFINITY, even.clone());
-    let freedom = (forces.len() - design.ncols()) as f64;
-    for (growth, prior) in [(0.0, 0.0), (freedom.min(4.0), 0.8), (30.0, 0.0)] {
-        let weight = |f: &f64| 1.0 / (1.0 + growth * (f / largest).powi(2));
-        let rows: Vec<f64> = forces.iter().map(weight).collect();
-        let fit = Fit::solve(design, forces, &rows, Robustness::None)?;
-        // Pairs without noise leave rounding, which has no likelihood.
-        if fit.residual_sd <= 1e-12 * largest {
-            return Ok(even);
-        }
-        // The logarithm of the restricted likelihood, but for constants (Patterson and Thompson
-        // 1971).
-        let of_rows = 0.5 * rows.iter().map(|w| w.ln()).sum::<f64>();
-        let gram = &fit.covariance / fit.residual_sd.powi(2);
-        let of_fit = 0.5 * gram.determinant().ln() - freedom * fit.residual_sd.ln();
-        let likelihood = prior + of_rows + of_fit;
-        if likelihood > best.0 {
-            best = (likelihood, rows);
-        }
-    }
-    Ok(best.1)
-}
-
-fn weighted(
-    design: &DMatrix<f64>,
-    y: &DVector<f64>,
-    weights: &[f64],
-) -> Result<DVector<f64>, ForceError> {
-    let root = DVector::from_iterator(y.len(), weights.iter().map(|w| w.sqrt()));
-    let mut scaled = design.clone();
-    for mut column in scaled.column_iter_mut() {
-        column.component_mul_assign(&root);
-    }
-    // By QR, because the normal equations would square the condition number.
-    let qr = scaled.qr();
-    let rhs = qr.q().transpose() * y.component_mul(&root);
-    let r = qr.r();
-    check_rank(&r)?;
-    r.solve_upper_triangular(&rhs)
-        .ok_or(ForceError::DegeneratePairs { span: 0.0 })
-}
-
-/// (XᵀX)⁻¹ by QR.
-fn inverse_gram(design: &DMatrix<f64>) -> Result<DMatrix<f64>, ForceError> {
-    let r = design.clone().qr().r();
-    check_rank(&r)?;
-    let inverse = r
-        .solve_upper_triangular(&DMatrix::identity(r.ncols(), r.ncols()))
-        .ok_or(ForceError::DegeneratePairs { span: 0.0 })?;
-    Ok(&inverse * inverse.transpose())
-}
-
-/// The design's columns are of order one, so a pivot at rounding level means they do not span.
-fn check_rank(r: &DMatrix<f64>) -> Result<(), ForceError> {
-    let diagonal = r.diagonal().abs();
-    let (least, greatest) = (diagonal.min(), diagonal.max());
-    if least > 1e-13 * greatest {
-        Ok(())
-    } else {
-        Err(ForceError::DegeneratePairs { span: least })
-    }
-}
-
-/// Median absolute residual over Φ⁻¹(3/4), with the p residuals that a fit makes zero left out: the
-/// standard deviation of a normal sample.
-fn robust_scale(residuals: &[f64], parameters: usize) -> f64 {
-    let mut sizes: Vec<f64> = residuals.iter().map(|r| r.abs()).collect();
-    sizes.sort_by(f64::total_cmp);
-    let kept = &sizes[parameters.min(sizes.len() - 1)..];
-    1.482_602_218_505_602 * 0.5 * (kept[kept.len() / 2] + kept[(kept.len() - 1) / 2])
-}
-
-/// Scaled residuals at which Huber's and Tukey's weights begin to fall and end: both are 95 %
-/// efficient on normal errors.
-const HUBER: f64 = 1.345;
-const TUKEY: f64 = 4.685;
-
-fn robust_weight(stage: Robustness, residual: f64, scale: f64) -> f64 {
-    if residual == 0.0 {
-        return 1.0;
-    }
-    let u = residual.abs() / scale;
-    match stage {
-        Robustness::None => 1.0,
-        Robustness::Huber => (HUBER / u).min(1.0),
-        Robustness::Tukey => (1.0 - (u / TUKEY).powi(2)).max(0.0).powi(2),
-    }
-}
-
-/// Variance to put before (XᵀX)⁻¹, and the standard deviation of one error.
-///
-/// Robust fits take Huber's K² [s² Σψ²/(n − p)] / (mean ψ′)² (Huber 1981, section 7.6).
-fn error_variance(robustness: Robustness, residuals: &[f64], scale: f64, p: usize) -> (f64, f64) {
-    let n = residuals.len() as f64;
-    let freedom = n - p as f64;
-    if robustness == Robustness::None || scale == 0.0 {
-        let variance = residuals.iter().map(|r| r * r).sum::<f64>() / freedom;
-        return (variance, variance.sqrt());
-    }
-    let psi = |r: f64| robust_weight(robustness, r, scale) * r / scale;
-    let slope = |r: f64| {
-        if robustness == Robustness::Huber {
-            return f64::from(r.abs() <= HUBER * scale);
-        }
-        let q = (r / (TUKEY * scale)).powi(2);
-        if q < 1.0 {
-            (1.0 - q) * (1.0 - 5.0 * q)
-        } else {
-            0.0
-        }
-    };
-    let mean = residuals.iter().map(|&r| slope(r)).sum::<f64>() / n;
-    let squares: f64 = residuals.iter().map(|&r| (slope(r) - mean).powi(2)).sum();
-    let correction = 1.0 + p as f64 / n * (squares / n) / (mean * mean);
-    let psi2 = residuals.iter().map(|&r| psi(r).powi(2)).sum::<f64>() / freedom;
-    let variance = correction.powi(2) * scale * scale * psi2 / (mean * mean);
-    (variance, scale)
 }

@@ -421,52 +421,15 @@ impl CalibrationPair {
     }
 }
 
-/// The weight of pairs far from the line.
-///
-/// ```
-/// use tactile_force::{
-///     CalibrationOptions, CalibrationPair, LinearCalibration, Robustness, StressCalibration,
-/// };
-///
-/// // One reading in ten is grossly wrong.
-/// let pair = |k: i32| CalibrationPair::loading(f64::from(k), 2.0 * f64::from(k));
-/// let mut pairs: Vec<_> = (0..10).map(pair).collect();
-/// pairs[7].force_n = 40.0;
-/// let slope = |robustness| {
-///     let options = CalibrationOptions::default()
-///         .with_constant_noise()
-///         .with_robustness(robustness);
-///     LinearCalibration::fit(&pairs, &options).map(|line| line.sensitivity_n(0.0))
-/// };
-/// assert!((slope(Robustness::None)? - 2.0).abs() > 0.5);
-/// assert!((slope(Robustness::Tukey)? - 2.0).abs() < 1e-6);
-/// # Ok::<(), tactile_force::ForceError>(())
-/// ```
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[non_exhaustive]
-pub enum Robustness {
-    /// Least squares: every pair has the same weight.
-    #[default]
-    None,
-    /// Huber's weights, min(1, k/|u|) with k = 1.345: 95 % efficient on normal errors.
-    Huber,
-    /// Tukey's biweight, (1 − u²/k²)² with k = 4.685, after Huber's: gross outliers have no weight.
-    Tukey,
-}
-
 /// The options of a calibration fit.
 ///
 /// ```
 /// use tactile_force::{
-///     CalibrationOptions, CalibrationPair, LinearCalibration, Robustness, StressCalibration,
+///     CalibrationOptions, CalibrationPair, LinearCalibration, StressCalibration,
 /// };
 ///
 /// let pairs = [1.0, 2.0, 3.0].map(|v| CalibrationPair::loading(v, 2.0 * v + 0.1));
-/// let options = CalibrationOptions::default()
-///     .with_zero_at_origin()
-///     .with_constant_noise()
-///     .with_robustness(Robustness::None);
+/// let options = CalibrationOptions::default().with_zero_at_origin().with_constant_noise();
 /// let line = LinearCalibration::fit(&pairs, &options)?;
 /// assert_eq!(line.force_n(0.0), 0.0);
 /// assert!((line.sensitivity_n(1.0) - (2.0 + 0.1 * 6.0 / 14.0)).abs() < 1e-12);
@@ -476,7 +439,6 @@ pub enum Robustness {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct CalibrationOptions {
     through_origin: bool,
-    robustness: Robustness,
     #[cfg_attr(feature = "serde", serde(default))]
     constant_noise: bool,
 }
@@ -495,13 +457,6 @@ impl CalibrationOptions {
     #[must_use]
     pub fn with_constant_noise(mut self) -> Self {
         self.constant_noise = true;
-        self
-    }
-
-    /// Weights pairs far from the line in this way. By default all alike.
-    #[must_use]
-    pub fn with_robustness(mut self, robustness: Robustness) -> Self {
-        self.robustness = robustness;
         self
     }
 }
