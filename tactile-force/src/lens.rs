@@ -28,9 +28,6 @@ use crate::error::ForceError;
 /// assert_eq!(lens.to_metres([695.5, 520.5]), plain.to_metres([695.5, 520.5]));
 /// let corner = lens.to_metres([0.0, 0.0]);
 /// assert!(corner[0] < -0.4e-3);
-/// // And back.
-/// let [x, y] = lens.to_pixels(corner).expect("in the lens's range");
-/// assert!(x.abs() < 1e-9 && y.abs() < 1e-9);
 /// // A pixel in the corner covers 1 + 3 k₁ along the radius and 1 + k₁ across it.
 /// assert!((lens.pixel_area_m2([0.0, 0.0]) / (21.6e-6 * 22.0e-6) - 1.09 * 1.03).abs() < 2e-3);
 /// # Ok::<(), tactile_force::ForceError>(())
@@ -150,39 +147,6 @@ impl LensGeometry {
     /// be without distortion.
     pub fn to_metres(&self, pixel: [f64; 2]) -> [f64; 2] {
         self.local(pixel).metres
-    }
-
-    /// The pixel [x, y] of a place in metres, by Newton's method. `None` where no pixel within
-    /// three radii of the centre is seen there.
-    pub fn to_pixels(&self, metres: [f64; 2]) -> Option<[f64; 2]> {
-        let undistorted = |k: usize| metres[k] / self.pixel_size_m[k];
-        let mut pixel = [undistorted(0), undistorted(1)];
-        if self.distortion == [0.0; 2] {
-            return Some(pixel);
-        }
-        for _ in 0..50 {
-            let Local {
-                metres: here,
-                jacobian: [[xu, xv], [yu, yv]],
-            } = self.local(pixel);
-            let (ex, ey) = (metres[0] - here[0], metres[1] - here[1]);
-            let determinant = xu * yv - xv * yu;
-            let step = [
-                (yv * ex - xv * ey) / determinant,
-                (xu * ey - yu * ex) / determinant,
-            ];
-            pixel = [pixel[0] + step[0], pixel[1] + step[1]];
-            let away = (pixel[0] - self.centre_px[0]).hypot(pixel[1] - self.centre_px[1]);
-            // Where the image folds the determinant changes its sign, and a place has several
-            // pixels.
-            if !(determinant > 0.0 && away < 3.0 * self.radius_px) {
-                return None;
-            }
-            if step[0].hypot(step[1]) <= 1e-12 * self.radius_px {
-                return Some(pixel);
-            }
-        }
-        None
     }
 
     /// Distances [x, y] in metres that one pixel step covers at a pixel: h_x and h_y without
@@ -312,14 +276,13 @@ pub struct DotPair {
 ///
 /// let truth =
 ///     LensGeometry::new([20e-6, 21e-6])?.with_distortion([159.5, 119.5], 199.3, [0.04, 0.002])?;
-/// // 9 × 7 dots, 0.7 mm apart, on a target turned by 20 mrad.
+/// // 9 × 7 dots on a target turned by 20 mrad.
 /// let (sin, cos) = 0.02_f64.sin_cos();
 /// let mut dots = Vec::new();
 /// for k in 0..63 {
-///     let target_m = [0.7e-3 * f64::from(k % 9), 0.7e-3 * f64::from(k / 9)];
-///     let [x, y] = target_m;
-///     let place = [0.3e-3 + cos * x - sin * y, 0.2e-3 + sin * x + cos * y];
-///     dots.push(DotPair { pixel: truth.to_pixels(place).unwrap(), target_m });
+///     let pixel = [15.0 + 35.0 * f64::from(k % 9), 15.0 + 35.0 * f64::from(k / 9)];
+///     let [x, y] = truth.to_metres(pixel);
+///     dots.push(DotPair { pixel, target_m: [cos * x - sin * y, sin * x + cos * y] });
 /// }
 /// let fit = LensFit::from_dots(&dots, (240, 320))?;
 /// assert!((fit.pixel_size_m[1].value / 21e-6 - 1.0).abs() < 1e-9);
