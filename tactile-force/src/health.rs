@@ -2,9 +2,9 @@
 //! calibrated.
 
 use ndarray::{Array2, ArrayView2};
-use tactile_core::{Estimate, InvalidOption, Requirement};
+use tactile_core::{Estimate, InvalidOption};
 
-use crate::drift::{DriftCorrection, FitWorkspace, IlluminationDrift, fit, median};
+use crate::drift::{DriftCorrection, FitWorkspace, fit, median};
 use crate::error::ForceError;
 use crate::frame::TileSum;
 
@@ -81,7 +81,8 @@ impl FrameCondition {
                 (number, noise) = (tile.pixels, sd * tile.pixels.sqrt());
             }
             let residual = drift.residual(tile) / noise;
-            if drift_agrees(residual) {
+            // Within five standard deviations of the fitted brightness it is background.
+            if residual.abs() < 5.0 {
                 values.push(residual.abs());
                 grey += tile.reference + tile.difference;
                 pixels += tile.pixels;
@@ -91,7 +92,7 @@ impl FrameCondition {
             return None;
         }
         Some(Self {
-            brightness: brightness(&drift),
+            brightness: Estimate::new(drift.coefficients[0], drift.standard_error),
             background_grey: grey / pixels,
             // The median of |z| of a normal sample is 0.6745.
             noise_ratio: median(values, scratch) / 0.674_489_750_196_081_7,
@@ -107,45 +108,25 @@ fn greatest_common_divisor(a: usize, b: usize) -> usize {
     }
 }
 
-fn brightness(drift: &IlluminationDrift) -> Estimate {
-    Estimate::new(drift.coefficients[0], drift.standard_error)
-}
-
-/// A tile within five standard deviations of the fitted brightness is background.
-fn drift_agrees(score: f64) -> bool {
-    score.abs() < 5.0
-}
-
-/// What counts as a change, and how often a healthy sensor may be suspected.
+/// From how many frames the healthy sensor is learned. Looked for are a change of brightness by 2 %
+/// and one of noise by 20 %, with one false alarm in 40 000 frames.
 ///
 /// ```
 /// use tactile_force::HealthOptions;
 ///
-/// let strict = HealthOptions::default()
-///     .with_brightness_change(0.01)?
-///     .with_noise_change(0.1)?
-///     .with_false_alarm_interval(100_000.0)?
-///     .with_baseline_frames(800)?;
-/// assert!(strict.with_brightness_change(f64::NAN).is_err());
+/// let patient = HealthOptions::default().with_baseline_frames(800)?;
+/// assert!(patient.with_baseline_frames(9).is_err());
 /// # Ok::<(), tactile_force::ForceError>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HealthOptions {
-    brightness_change: f64,
-    noise_change: f64,
-    false_alarm_interval: f64,
     baseline_frames: usize,
 }
 
 impl Default for HealthOptions {
-    /// A change of brightness by 2 % or of noise by 20 %, one false alarm in 40 000 frames, a
-    /// baseline of 400 frames.
+    /// A baseline of 400 frames.
     fn default() -> Self {
         Self {
-            brightness_change: 0.02,
-            noise_change: 0.2,
-            // Half as often as one in 20 000: the baseline's own scatter takes the rest.
-            false_alarm_interval: 40_000.0,
             // Five seconds at 80 frames a second. A mean known to a twentieth of a frame's scatter.
             baseline_frames: 400,
         }
@@ -153,34 +134,6 @@ impl Default for HealthOptions {
 }
 
 impl HealthOptions {
-    /// Looks for this relative change of brightness.
-    ///
-    /// # Errors
-    /// A change that is not above zero and below one.
-    pub fn with_brightness_change(mut self, share: f64) -> Result<Self, ForceError> {
-        self.brightness_change = Requirement::OpenUnitInterval.check("brightness_change", share)?;
-        Ok(self)
-    }
-
-    /// Looks for this relative change of the noise's standard deviation.
-    ///
-    /// # Errors
-    /// A change that is not above zero and below one.
-    pub fn with_noise_change(mut self, share: f64) -> Result<Self, ForceError> {
-        self.noise_change = Requirement::OpenUnitInterval.check("noise_change", share)?;
-        Ok(self)
-    }
-
-    /// Allows one false alarm in this number of frames, all charts together.
-    ///
-    /// # Errors
-    /// Fewer than one frame, or not finite.
-    pub fn with_false_alarm_interval(mut self, frames: f64) -> Result<Self, ForceError> {
-        self.false_alarm_interval =
-            Requirement::AtLeastOne.check("false_alarm_interval", frames)?;
-        Ok(self)
-    }
-
     /// Learns mean and scatter of a healthy sensor from this number of frames.
     ///
     /// # Errors
@@ -303,19 +256,12 @@ impl HealthMonitor {
 
     /// Takes the condition of the next frame.
     pub fn update(&mut self, condition: &FrameCondition) -> HealthReport {
-        let o = &self.options;
-        // The charts share the false alarms.
-        let interval = 2.0 * o.false_alarm_interval;
-        let chart = |chart: &mut Chart, value: f64, change: f64| {
-            chart.update(value, change, interval, o.baseline_frames)
-        };
+        let baseline = self.options.baseline_frames;
         HealthReport {
-            brightness: chart(
-                &mut self.brightness,
-                condition.brightness.value,
-                o.brightness_change,
-            ),
-            noise: chart(&mut self.noise, condition.noise_ratio, o.noise_change),
+            brightness: self
+                .brightness
+                .update(condition.brightness.value, 0.02, baseline),
+            noise: self.noise.update(condition.noise_ratio, 0.2, baseline),
             background_grey: condition.background_grey,
         }
     }
@@ -331,8 +277,13 @@ struct Chart {
     cusum: Option<Cusum>,
 }
 
+/// Frames from one false alarm of a chart to the next, on average. Both charts together raise one
+/// in 40 000, half as often as one in 20 000: the baseline's own scatter takes the rest.
+const INTERVAL: f64 = 80_000.0;
+
 impl Chart {
-    fn update(&mut self, value: f64, change: f64, interval: f64, baseline: usize) -> ChartState {
+    /// Looks for a relative `change` of the mean.
+    fn update(&mut self, value: f64, change: f64, baseline: usize) -> ChartState {
         if self.count < baseline {
             // Welford's running mean and variance.
             self.count += 1;
@@ -350,7 +301,7 @@ impl Chart {
         let shift = change * self.mean.abs() / sd;
         let cusum = self
             .cusum
-            .get_or_insert_with(|| Cusum::new(shift, interval, count.sqrt().recip()));
+            .get_or_insert_with(|| Cusum::new(shift, INTERVAL, count.sqrt().recip()));
         let delay_frames = cusum.delay(shift);
         if cusum.update((value - self.mean) / sd) {
             ChartState::Changed

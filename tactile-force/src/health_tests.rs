@@ -34,16 +34,8 @@ fn tiles_looked_at_are_enough_and_in_every_column() {
 #[test]
 fn a_part_of_the_tiles_knows_the_frame() {
     let (rows, columns, sd) = (131, 44, 2.0);
-    let mut state = 1_u64;
-    let mut normal = || {
-        let mut uniform = || {
-            state = state
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1);
-            (state >> 11) as f64 / (1_u64 << 53) as f64
-        };
-        (-2.0 * (1.0 - uniform()).ln()).sqrt() * (std::f64::consts::TAU * uniform()).cos()
-    };
+    let mut rng = ChaCha8Rng::seed_from_u64(1);
+    let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
     // 1.2 times the reference's noise, and light that falls off from column to column.
     let tiles: Vec<_> = (0..rows * columns)
         .map(|i| {
@@ -78,33 +70,6 @@ fn a_part_of_the_tiles_knows_the_frame() {
     assert!(error < 4.0 * 1.17 / looked_at.sqrt(), "{part:?}");
     // Every column is looked at as often as others: the fall of the light leaves no trace.
     assert!((part.background_grey - all.background_grey).abs() < 0.1);
-}
-
-/// Mean number of frames between alarms, each followed by a fresh chart.
-fn simulated_interval(shift: f64, interval: f64, frames: usize) -> f64 {
-    let mut rng = ChaCha8Rng::seed_from_u64(7);
-    let fresh = Cusum::new(shift, interval, 0.0);
-    let (mut chart, mut alarms) = (fresh, 0);
-    for _ in 0..frames {
-        if chart.update(StandardNormal.sample(&mut rng)) {
-            alarms += 1;
-            chart = fresh;
-        }
-    }
-    frames as f64 / f64::from(alarms)
-}
-
-#[test]
-fn false_alarms_come_as_seldom_as_asked() {
-    for shift in [0.5, 1.0, 2.0, 20.0] {
-        let interval = 2000.0;
-        let found = simulated_interval(shift, interval, 2_000_000);
-        // Siegmund's approximation is good to some 10 %. 1000 alarms are known to 3 %.
-        assert!(
-            (0.85..1.35).contains(&(found / interval)),
-            "shift {shift}: {found}"
-        );
-    }
 }
 
 #[test]
