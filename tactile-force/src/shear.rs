@@ -66,11 +66,10 @@ impl ShearCalibration {
         if let Some(index) = pairs.iter().position(|p| !finite(p)) {
             return Err(ForceError::NonFinitePair { index });
         }
-        let [x, y] = [Spring::fit(pairs, 0)?, Spring::fit(pairs, 1)?];
-        let stiffness = |s: &Spring| Estimate::from_variance(s.stiffness, s.variance);
+        let [(k_x, sd_x), (k_y, sd_y)] = [stiffness(pairs, 0)?, stiffness(pairs, 1)?];
         Ok(Self {
-            stiffness_n_per_m: [stiffness(&x), stiffness(&y)],
-            residual_sd_n: [x.residual_sd, y.residual_sd],
+            stiffness_n_per_m: [k_x, k_y],
+            residual_sd_n: [sd_x, sd_y],
         })
     }
 
@@ -87,39 +86,24 @@ impl ShearCalibration {
     }
 }
 
-/// Least squares along one axis.
-struct Spring {
-    stiffness: f64,
-    /// Variance of the stiffness.
-    variance: f64,
-    residual_sd: f64,
-}
-
-impl Spring {
-    fn fit(pairs: &[ShearPair], axis: usize) -> Result<Self, ForceError> {
-        let step = |p: &ShearPair| p.centroid_step_m[axis];
-        let force = |p: &ShearPair| p.force_n[axis];
-        let (mut uu, mut uf) = (0.0, 0.0);
-        for p in pairs {
-            uu += step(p) * step(p);
-            uf += step(p) * force(p);
-        }
-        if uu == 0.0 {
-            return Err(ForceError::DegeneratePairs { span: 0.0 });
-        }
-        let stiffness = uf / uu;
-        let mut squares = 0.0;
-        for p in pairs {
-            squares += (force(p) - stiffness * step(p)).powi(2);
-        }
-        // One parameter was fitted.
-        let residual_variance = squares / (pairs.len() - 1) as f64;
-        Ok(Self {
-            stiffness,
-            variance: residual_variance / uu,
-            residual_sd: residual_variance.sqrt(),
-        })
+/// Least squares along one axis: the stiffness, and the standard deviation of the residuals.
+fn stiffness(pairs: &[ShearPair], axis: usize) -> Result<(Estimate, f64), ForceError> {
+    let both = || {
+        pairs
+            .iter()
+            .map(|p| (p.centroid_step_m[axis], p.force_n[axis]))
+    };
+    let uu: f64 = both().map(|(u, _)| u * u).sum();
+    let uf: f64 = both().map(|(u, f)| u * f).sum();
+    if uu == 0.0 {
+        return Err(ForceError::DegeneratePairs { span: 0.0 });
     }
+    let stiffness = uf / uu;
+    let squares: f64 = both().map(|(u, f)| (f - stiffness * u).powi(2)).sum();
+    // One parameter was fitted.
+    let variance = squares / (pairs.len() - 1) as f64;
+    let estimate = Estimate::from_variance(stiffness, variance / uu);
+    Ok((estimate, variance.sqrt()))
 }
 
 /// Shear force and centroid displacement of one frame.

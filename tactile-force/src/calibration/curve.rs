@@ -9,6 +9,8 @@
 //! f rises, passes through the origin and is as smooth as cross-validation finds best.
 
 use nalgebra::{SMatrix, SVector};
+#[cfg(feature = "serde")]
+use tactile_core::InvalidOption;
 use tactile_core::statistics::effective_degrees_of_freedom;
 use tactile_core::{Estimate, Requirement};
 
@@ -204,9 +206,10 @@ pub struct PressureCurveReport {
 #[cfg_attr(
     feature = "serde",
     derive(serde::Serialize, serde::Deserialize),
-    serde(try_from = "Unchecked")
+    serde(deny_unknown_fields)
 )]
 pub struct PressureCurve {
+    #[cfg_attr(feature = "serde", serde(deserialize_with = "checked"))]
     coefficients: Coefficients,
     /// How well the curve fits its frames, and which grey levels these determine.
     pub report: PressureCurveReport,
@@ -215,22 +218,12 @@ pub struct PressureCurve {
 }
 
 /// A curve as a file has it.
+/// Coefficients from a file. Refuses what no fit gives: a curve that falls, or numbers that are not
+/// finite.
 #[cfg(feature = "serde")]
-#[derive(serde::Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Unchecked {
-    coefficients: Coefficients,
-    report: PressureCurveReport,
-    sums: LinearCalibration,
-}
-
-#[cfg(feature = "serde")]
-impl TryFrom<Unchecked> for PressureCurve {
-    type Error = ForceError;
-
-    /// Refuses what no fit gives: a curve that falls, or numbers that are not finite.
-    fn try_from(given: Unchecked) -> Result<Self, ForceError> {
-        let c = &given.coefficients;
+fn checked<'de, D: serde::Deserializer<'de>>(from: D) -> Result<Coefficients, D::Error> {
+    let c: Coefficients = serde::Deserialize::deserialize(from)?;
+    let check = || {
         Requirement::Positive.check("basis.top", c.basis.top)?;
         Requirement::Positive.check("degrees_of_freedom", c.degrees_of_freedom)?;
         for slope in c.slopes {
@@ -242,12 +235,10 @@ impl TryFrom<Unchecked> for PressureCurve {
                 .try_for_each(|c| Requirement::Finite.check("covariance", *c).map(drop))?;
             Requirement::NonNegative.check("the diagonal of covariance", row[j])?;
         }
-        Ok(Self {
-            coefficients: given.coefficients,
-            report: given.report,
-            sums: given.sums,
-        })
-    }
+        Ok(())
+    };
+    check().map_err(|error: InvalidOption| serde::de::Error::custom(error))?;
+    Ok(c)
 }
 
 impl PressureCurve {

@@ -30,8 +30,6 @@
 mod area;
 mod texture;
 
-use std::fmt;
-
 pub use area::FaceWorkspace;
 use tactile_core::Estimate;
 pub use texture::{TextureStretch, texture_spots};
@@ -148,7 +146,7 @@ impl FaceReading {
 /// let problem = ShapeProblem::NoEdge { edge_ratio: 0.7 };
 /// assert!(problem.to_string().contains("shape = \"sphere\""), "the shape to state");
 /// ```
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[cfg_attr(
     feature = "serde",
     derive(serde::Serialize, serde::Deserialize),
@@ -157,89 +155,74 @@ impl FaceReading {
 #[non_exhaustive]
 pub enum ShapeProblem {
     /// The pressure falls to zero at the outline, as a ball's does.
+    #[error(
+        "the pressure falls off towards the outline ({edge_ratio:.2} of that further inside), as \
+         under a ball: give shape = \"sphere\" with its radius_m"
+    )]
     NoEdge {
         /// Light just inside the outline over that further inside.
         edge_ratio: f64,
     },
     /// The pressure rises to the outline.
+    #[error(
+        "the pressure rises towards the outline ({edge_ratio:.2} of that further inside), as under \
+         a stiff punch or a face that sticks: give shape = \"flat_punch\", or press with less \
+         friction"
+    )]
     RaisedEdge {
         /// Light just inside the outline over that further inside.
         edge_ratio: f64,
     },
     /// The frame's edge cuts the contact.
+    #[error(
+        "the frame's edge cuts the contact: move the object, or give its shape and size if it is a \
+         ball"
+    )]
     Cut,
     /// There is more than one contact.
+    #[error(
+        "there are {} contacts: press one face at a time, or give the shape if the others are not \
+         the object's",
+        .others + 1
+    )]
     Several {
         /// How many beside the largest.
         others: usize,
     },
     /// The contact is too small, or too irregular, to have an inside.
+    #[error(
+        "the contact is too small for its outline to be told from its inside: it takes some 20 \
+         pixels across"
+    )]
     TooSmall,
     /// The contact grows by more than a squeezed specimen's face.
+    #[error(
+        "the contact grows by {:.0} % since the first load, more than a squeezed face: a round \
+         object; give its shape",
+        100.0 * .growth
+    )]
     Grows {
         /// Relative growth of the area since the first load.
         growth: f64,
     },
     /// The outline does not keep its shape from load to load.
+    #[error(
+        "the outline does not keep its shape ({:+.1} % in second moment since the first load): no \
+         uniaxial load; give the object's shape",
+        100.0 * .change
+    )]
     OutlineChanges {
         /// Relative change of its second moment since the first load.
         change: f64,
     },
     /// The pressure does not keep its distribution from load to load.
+    #[error(
+        "the pressure does not keep its distribution ({:+.1} % in second moment since the first \
+         load): friction, tilt or an object of another shape",
+        100.0 * .change
+    )]
     PressureChanges {
         /// Relative change of its second moment since the first load.
         change: f64,
     },
-}
-
-impl fmt::Display for ShapeProblem {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::NoEdge { edge_ratio } => write!(
-                f,
-                "the pressure falls off towards the outline ({edge_ratio:.2} of that further \
-                 inside), as under a ball: give shape = \"sphere\" with its radius_m"
-            ),
-            Self::RaisedEdge { edge_ratio } => write!(
-                f,
-                "the pressure rises towards the outline ({edge_ratio:.2} of that further inside), \
-                 as under a stiff punch or a face that sticks: give shape = \"flat_punch\", or \
-                 press with less friction"
-            ),
-            Self::Cut => write!(
-                f,
-                "the frame's edge cuts the contact: move the object, or give its shape and size \
-                 if it is a ball"
-            ),
-            Self::Several { others } => write!(
-                f,
-                "there are {} contacts: press one face at a time, or give the shape if the others \
-                 are not the object's",
-                others + 1
-            ),
-            Self::TooSmall => write!(
-                f,
-                "the contact is too small for its outline to be told from its inside: it takes \
-                 some 20 pixels across"
-            ),
-            Self::Grows { growth } => write!(
-                f,
-                "the contact grows by {:.0} % since the first load, more than a squeezed face: a \
-                 round object; give its shape",
-                100.0 * growth
-            ),
-            Self::OutlineChanges { change } => write!(
-                f,
-                "the outline does not keep its shape ({:+.1} % in second moment since the first \
-                 load): no uniaxial load; give the object's shape",
-                100.0 * change
-            ),
-            Self::PressureChanges { change } => write!(
-                f,
-                "the pressure does not keep its distribution ({:+.1} % in second moment since the \
-                 first load): friction, tilt or an object of another shape",
-                100.0 * change
-            ),
-        }
-    }
 }

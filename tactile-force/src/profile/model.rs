@@ -19,12 +19,6 @@ pub struct BlurredEdge {
     table: Vec<[f64; TERMS]>,
 }
 
-impl Default for BlurredEdge {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
 impl BlurredEdge {
     /// Steps the differential equation away from zero in both directions.
     pub fn new() -> Self {

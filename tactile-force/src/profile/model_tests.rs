@@ -61,59 +61,18 @@ fn derivatives_agree_with_differences() {
             let here = at(shape, r * r);
             let e = 1e-4;
             let central = |change: &dyn Fn(f64) -> f64| (change(e) - change(-e)) / (2.0 * e);
+            let along = |change: fn(&mut Shape, f64)| {
+                central(&|e| {
+                    let mut moved = shape;
+                    change(&mut moved, e);
+                    at(moved, r * r).value
+                })
+            };
             let slopes = [
-                (
-                    here.by_peak,
-                    central(&|e| {
-                        at(
-                            Shape {
-                                peak: shape.peak + e,
-                                ..shape
-                            },
-                            r * r,
-                        )
-                        .value
-                    }),
-                ),
-                (
-                    here.by_radius,
-                    central(&|e| {
-                        at(
-                            Shape {
-                                radius: shape.radius + e,
-                                ..shape
-                            },
-                            r * r,
-                        )
-                        .value
-                    }),
-                ),
-                (
-                    here.by_blur,
-                    central(&|e| {
-                        at(
-                            Shape {
-                                blur: shape.blur + e,
-                                ..shape
-                            },
-                            r * r,
-                        )
-                        .value
-                    }),
-                ),
-                (
-                    here.by_bend,
-                    central(&|e| {
-                        at(
-                            Shape {
-                                bend: shape.bend + e,
-                                ..shape
-                            },
-                            r * r,
-                        )
-                        .value
-                    }),
-                ),
+                (here.by_peak, along(|shape, e| shape.peak += e)),
+                (here.by_radius, along(|shape, e| shape.radius += e)),
+                (here.by_blur, along(|shape, e| shape.blur += e)),
+                (here.by_bend, along(|shape, e| shape.bend += e)),
                 (here.by_r2, central(&|e| at(shape, r * r + e).value)),
             ];
             for (k, (slope, difference)) in slopes.into_iter().enumerate() {
