@@ -99,8 +99,6 @@ pub struct Detection {
 ///     .with_polarity(Polarity::Brighter)
 ///     .with_drift(DriftCorrection::Offset)
 ///     .with_margin_px(6)
-///     .with_smoothing_px(3)?
-///     .with_minimum_area_px(9)?
 ///     .with_saturation_limit(0.05)?
 ///     .with_false_alarm_rate(1e-6)?;
 /// assert_ne!(options, ContactOptions::default());
@@ -113,30 +111,22 @@ pub struct ContactOptions {
     pub(crate) polarity: Polarity,
     #[cfg_attr(feature = "serde", serde(deserialize_with = "read::false_alarm_rate"))]
     false_alarm_rate: f64,
-    /// Width of the smoothing box. `None` picks one by the signal.
-    #[cfg_attr(feature = "serde", serde(deserialize_with = "read::smoothing_px"))]
-    smoothing_px: Option<usize>,
     margin_px: usize,
-    #[cfg_attr(feature = "serde", serde(deserialize_with = "read::minimum_area_px"))]
-    minimum_area_px: usize,
     drift: DriftCorrection,
     #[cfg_attr(feature = "serde", serde(deserialize_with = "read::saturation_limit"))]
     saturation_limit: f64,
 }
 
 impl Default for ContactOptions {
-    /// Brighter contact, one false alarm in a thousand frames, smoothing chosen by the signal, a
-    /// margin of 4 pixels, at least 4 pixels of contact, drift corrected where the frame shows it,
-    /// at most 1 % of the contact saturated.
+    /// Brighter contact, one false alarm in a thousand frames, a margin of 4 pixels, drift corrected
+    /// where the frame shows it, at most 1 % of the contact saturated.
     fn default() -> Self {
         Self {
             polarity: Polarity::Brighter,
             false_alarm_rate: 1e-3,
-            smoothing_px: None,
             // Beyond 4 pixels the blurred edge of a sharp lens is below the noise. More adds noise
             // to the force alone.
             margin_px: 4,
-            minimum_area_px: 4,
             drift: DriftCorrection::Automatic,
             saturation_limit: 0.01,
         }
@@ -159,32 +149,10 @@ impl ContactOptions {
         Ok(self)
     }
 
-    /// Smooths with a box of this odd width in pixels. By default the narrowest is taken that puts
-    /// the threshold below a tenth of the contact's signal (1, no smoothing, for all but faint
-    /// contacts).
-    ///
-    /// # Errors
-    /// A width that is even.
-    pub fn with_smoothing_px(mut self, width: usize) -> Result<Self, ForceError> {
-        Requirement::Odd.check("smoothing_px", width as f64)?;
-        self.smoothing_px = Some(width);
-        Ok(self)
-    }
-
     /// Grows the mask by this number of pixels to the aperture that is summed.
     pub fn with_margin_px(mut self, margin: usize) -> Self {
         self.margin_px = margin;
         self
-    }
-
-    /// Takes components of fewer pixels for noise.
-    ///
-    /// # Errors
-    /// An area of zero.
-    pub fn with_minimum_area_px(mut self, area: usize) -> Result<Self, ForceError> {
-        Requirement::AtLeastOne.check("minimum_area_px", area as f64)?;
-        self.minimum_area_px = area;
-        Ok(self)
     }
 
     /// Corrects this change of illumination or stray light.
@@ -215,19 +183,6 @@ mod read {
         options
             .map(|o| o.false_alarm_rate)
             .map_err(D::Error::custom)
-    }
-
-    pub fn smoothing_px<'de, D: Deserializer<'de>>(d: D) -> Result<Option<usize>, D::Error> {
-        let Some(width) = Option::deserialize(d)? else {
-            return Ok(None);
-        };
-        let options = ContactOptions::default().with_smoothing_px(width);
-        options.map(|o| o.smoothing_px).map_err(D::Error::custom)
-    }
-
-    pub fn minimum_area_px<'de, D: Deserializer<'de>>(d: D) -> Result<usize, D::Error> {
-        let options = ContactOptions::default().with_minimum_area_px(usize::deserialize(d)?);
-        options.map(|o| o.minimum_area_px).map_err(D::Error::custom)
     }
 
     pub fn saturation_limit<'de, D: Deserializer<'de>>(d: D) -> Result<f64, D::Error> {
@@ -339,6 +294,9 @@ impl DetectorWorkspace {
         ))
     }
 }
+
+/// Components of fewer pixels are noise.
+const MINIMUM_AREA_PX: usize = 4;
 
 /// Finds the contact in frames of one sensor.
 ///
@@ -466,13 +424,10 @@ impl ContactDetector {
             let signal = region.load(frame, reference, place, drift, sign);
             // Trials are the pixels of the region alone. The test of the whole frame came before.
             let z = quantile(self.options.false_alarm_rate, region.difference.len());
-            let width = self
-                .options
-                .smoothing_px
-                .unwrap_or_else(|| smoothing_width(z * sd, f64::from(signal)));
+            let width = smoothing_width(z * sd, f64::from(signal));
             let limit = z * sd / width as f64;
-            let extent = region.segment(width, limit as f32, self.options.minimum_area_px);
-            if extent.area < self.options.minimum_area_px {
+            let extent = region.segment(width, limit as f32, MINIMUM_AREA_PX);
+            if extent.area < MINIMUM_AREA_PX {
                 return None;
             }
             region.finish(self.options.margin_px);
@@ -534,10 +489,7 @@ impl ContactDetector {
         let in_run = |run: &Run| {
             let row = frame.row(run.row as usize);
             let row = row.slice_axis(Axis(0), Slice::from(run.start as usize..run.end as usize));
-            match row.to_slice() {
-                Some(pixels) => pixels.iter().filter(|p| **p == full).count(),
-                None => row.iter().filter(|p| **p == full).count(),
-            }
+            row.iter().filter(|p| **p == full).count()
         };
         let saturated = region.mask.iter().map(in_run).sum();
         let (share, limit) = (
@@ -567,7 +519,6 @@ fn summarise(
     let origin = [place.column_start as f64, place.row_start as f64];
     let centroid =
         |k: usize| Estimate::from_variance(origin[k] + local[k], sums.centroid_variance(k, noise));
-    // `grown` stops at the frame's edge. A box that cannot grow freely touches it.
     let aperture = region.bounds(&region.aperture).unwrap_or(place);
     Contact {
         bounding_box: region.bounds(&region.mask).unwrap_or(place),
@@ -579,7 +530,10 @@ fn summarise(
         aperture_px: region.aperture.iter().map(Run::len).sum(),
         saturated_px,
         other_contacts: extent.others,
-        touches_edge: aperture.grown(1, size) != grown_freely(aperture),
+        touches_edge: aperture.row_start == 0
+            || aperture.column_start == 0
+            || aperture.row_end == size.0
+            || aperture.column_end == size.1,
     }
 }
 
@@ -591,17 +545,6 @@ fn peak(region: &Region) -> f32 {
         .iter()
         .map(|run| greatest(&region.difference[run.span(columns)]))
         .fold(0.0, f32::max)
-}
-
-/// The box one pixel larger on every side, whether or not the frame is. A box at the first row or
-/// column cannot be.
-fn grown_freely(b: BoundingBox) -> BoundingBox {
-    BoundingBox {
-        row_start: b.row_start.wrapping_sub(1),
-        row_end: b.row_end + 1,
-        column_start: b.column_start.wrapping_sub(1),
-        column_end: b.column_end + 1,
-    }
 }
 
 /// The narrowest odd box for which the threshold on its mean, limit/width, is a tenth of the signal

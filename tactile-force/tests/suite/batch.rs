@@ -3,11 +3,10 @@
 
 use ndarray::{Array2, ArrayView2};
 use tactile_force::{
-    CalibrationPair, ForceMeasurement, ForceMeter, ForceOptions, ForceWorkspace, LinearCalibration,
-    ReferenceFrame, measure_force,
+    ForceMeasurement, ForceMeter, ForceOptions, ForceWorkspace, ReferenceFrame, measure_force,
 };
 
-use crate::blob::hertz;
+use crate::blob::{calibration, hertz};
 
 fn frame(radius: f64, x: f64) -> Array2<u8> {
     let peak = if radius > 1.0 { 140.0 } else { 0.0 };
@@ -26,11 +25,7 @@ fn the_same_bits_alone_in_series_and_in_parallel() {
     let views: Vec<ArrayView2<'_, u8>> = frames.iter().map(|f| f.view()).collect();
     let dark = frame(0.5, 3.0);
     let reference = ReferenceFrame::new(dark.view()).unwrap();
-    let pairs: Vec<_> = (0..5)
-        .map(|k| 1e5 * f64::from(k))
-        .map(|v| CalibrationPair::loading(v, 1e-6 * v))
-        .collect();
-    let calibration = LinearCalibration::fit(&pairs, &Default::default()).unwrap();
+    let calibration = calibration();
     let options = ForceOptions::default();
     let meter = ForceMeter::new([2e-5; 2], &options).unwrap();
     let single: Vec<ForceMeasurement> = views

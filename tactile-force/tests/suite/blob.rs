@@ -1,6 +1,30 @@
-//! Images of contacts for the tests.
+//! Images of contacts for the tests, numbers without pattern, and a calibration.
 
 use ndarray::Array2;
+use tactile_force::{CalibrationPair, LinearCalibration};
+
+/// A line of 1 µN a grey level.
+pub(crate) fn calibration() -> LinearCalibration {
+    let pairs = [0.0, 1e5, 2e5, 3e5, 4e5].map(|v| CalibrationPair::loading(v, 1e-6 * v));
+    LinearCalibration::fit(&pairs, &Default::default()).unwrap()
+}
+
+/// Bytes without pattern, the same for the same seed.
+pub(crate) fn bytes(seed: u64) -> impl FnMut() -> u8 {
+    let mut state = seed;
+    move || {
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        (state >> 56) as u8
+    }
+}
+
+/// Noise from −2 to 1.75 grey levels, by quarters.
+pub(crate) fn noise(seed: u64) -> impl FnMut() -> f64 {
+    let mut next = bytes(seed);
+    move || f64::from(next() >> 4) / 4.0 - 2.0
+}
 
 /// Hertz's pressure A √(1 − r²/a²) averaged over the pixels of an image: along y in closed form,
 /// along x by midpoints, many where the edge may cut the pixel.

@@ -4,6 +4,8 @@ use ndarray::{Array2, ArrayView2, Axis, ShapeBuilder, Slice};
 use proptest::prelude::*;
 use tactile_force::{BoundingBox, FrameStatistics, ReferenceFrame};
 
+use crate::blob::bytes;
+
 fn slow(
     frame: ArrayView2<'_, u8>,
     reference: ArrayView2<'_, u8>,
@@ -48,13 +50,7 @@ fn images() -> impl Strategy<Value = (Array2<u8>, Array2<u8>)> {
     let size = (1_usize..90, 1_usize..2200);
     (size, any::<u64>(), 0_u8..=255, 0_u8..=255, any::<bool>()).prop_map(
         |((h, w), seed, level, spread, bright)| {
-            let mut state = seed | 1;
-            let mut next = move || {
-                state = state
-                    .wrapping_mul(6_364_136_223_846_793_005)
-                    .wrapping_add(1_442_695_040_888_963_407);
-                (state >> 56) as u8
-            };
+            let mut next = bytes(seed | 1);
             let mut image = || {
                 Array2::from_shape_simple_fn((h, w), || {
                     level.saturating_add(((u16::from(next()) * u16::from(spread)) >> 8) as u8)

@@ -2,20 +2,15 @@
 
 use ndarray::{Array2, ArrayView2};
 use tactile_force::{
-    CalibrationPair, ContactOptions, DriftCorrection, ForceMeter, ForceOptions, ForceWorkspace,
-    LinearCalibration, ReferenceFrame, ShearCalibration, ShearPair, ShearTracker,
+    Branch, ContactOptions, DriftCorrection, ForceMeter, ForceOptions, ForceWorkspace, NoiseModel,
+    ReferenceFrame, ShearCalibration, ShearPair, ShearTracker,
 };
 
-use crate::blob::hertz;
+use crate::blob::{calibration, hertz, noise};
+use crate::simulated::{PIXEL_M, Sensor};
 
 fn frame(radius: f64, seed: u64) -> Array2<u8> {
-    let mut state = seed;
-    let mut noise = move || {
-        state = state
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
-        f64::from((state >> 60) as u8) / 4.0 - 2.0
-    };
+    let mut noise = noise(seed);
     let peak = if radius > 1.0 { 150.0 } else { 0.0 };
     hertz((200, 240), [118.3, 96.1], radius, peak).mapv(|v| (v + 20.0 + noise()).round() as u8)
 }
@@ -34,11 +29,7 @@ fn measuring_with_a_workspace_allocates_nothing() {
         frame(55.0, 4),
     ];
     let reference = ReferenceFrame::new(frame(0.5, 9).view()).unwrap();
-    let pairs: Vec<_> = (0..9)
-        .map(|k| 1e5 * f64::from(k))
-        .map(|v| CalibrationPair::loading(v, 1e-6 * v))
-        .collect();
-    let calibration = LinearCalibration::fit(&pairs, &Default::default()).unwrap();
+    let calibration = calibration();
     let shear_pairs = [1.0, 2.0].map(|u| ShearPair {
         centroid_step_m: [u, u],
         force_n: [u, u],
@@ -61,4 +52,19 @@ fn measuring_with_a_workspace_allocates_nothing() {
         });
         assert_eq!(allocations, 0, "{drift:?}");
     }
+    // By a local curve, and with a noise that was stated.
+    let sensor = Sensor::default();
+    let reference = sensor
+        .reference()
+        .with_noise(NoiseModel::new(0.5, 0.02).unwrap());
+    let curve = sensor.curve(&reference, 5);
+    let pressed = [sensor.frame(0.4, 2.5e-3, [121.3, 97.6], Branch::Loading, 8)];
+    let meter = ForceMeter::new([PIXEL_M; 2], &ForceOptions::default()).unwrap();
+    let mut workspace = ForceWorkspace::default();
+    let allocations = count(&pressed, |f| {
+        meter
+            .measure_with(&mut workspace, f, &reference, &curve)
+            .unwrap();
+    });
+    assert_eq!(allocations, 0);
 }

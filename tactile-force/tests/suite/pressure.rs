@@ -5,12 +5,11 @@
 
 use proptest::prelude::*;
 use tactile_force::{
-    Branch, CalibrationFrame, CalibrationOptions, ForceError, ForceMeter, ForceOptions,
-    ForceWorkspace, GreyHistogram, LinearCalibration, LocalCalibration, NoiseModel, PressureCurve,
-    PressureCurveOptions, StressCalibration,
+    Branch, CalibrationFrame, CalibrationOptions, ForceError, GreyHistogram, LinearCalibration,
+    LocalCalibration, PressureCurve, PressureCurveOptions, StressCalibration,
 };
 
-use crate::simulated::{AREA_M2, PIXEL_M, Sensor, contact_radius, measure};
+use crate::simulated::{AREA_M2, Sensor, contact_radius, measure};
 
 fn sensor(q: f64) -> Sensor {
     Sensor {
@@ -183,27 +182,6 @@ fn frames_that_determine_no_curve_are_refused() {
         );
     }
     assert!(options.with_force_error(0.0, 0.0).is_err() && options.with_smoothness(0.0).is_err());
-}
-
-#[test]
-fn measuring_with_a_curve_allocates_nothing_after_a_warm_up() {
-    let sensor = sensor(1.1);
-    let reference = sensor
-        .reference()
-        .with_noise(NoiseModel::new(0.5, 0.02).unwrap());
-    let curve = sensor.curve(&reference, 5);
-    let frame = sensor.frame(0.4, 2.5e-3, [121.3, 97.6], Branch::Loading, 8);
-    let meter = ForceMeter::new([PIXEL_M; 2], &ForceOptions::default()).unwrap();
-    let mut workspace = ForceWorkspace::default();
-    let mut run = || {
-        meter
-            .measure_with(&mut workspace, frame.view(), &reference, &curve)
-            .unwrap()
-    };
-    let first = run();
-    let mut second = None;
-    let counted = allocation_counter::measure(|| second = Some(run()));
-    assert_eq!((counted.count_total, second), (0, Some(first)));
 }
 
 proptest! {

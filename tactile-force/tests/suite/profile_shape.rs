@@ -5,11 +5,12 @@ use ndarray::Array2;
 use rand::{SeedableRng, rngs::ChaCha8Rng};
 use rand_distr::{Distribution, StandardNormal};
 use tactile_force::{
-    Branch, CalibrationOptions, CalibrationPair, ForceOptions, HertzFit, HertzFitOptions,
-    LinearCalibration, ProfileShape, ReferenceFrame, StopReason, measure_force,
+    ForceOptions, HertzFit, HertzFitOptions, ProfileShape, ReferenceFrame, StopReason,
+    measure_force,
 };
 
-use crate::simulated::{SHAPE, Sensor, measure};
+use crate::blob::calibration;
+use crate::simulated::{SHAPE, measure};
 
 /// Light at (x, y).
 type Level = dyn Fn(f64, f64) -> f64;
@@ -37,9 +38,9 @@ fn fitted(level: impl Fn(f64, f64) -> f64, seed: u64) -> HertzFit {
         })
     };
     let reference = ReferenceFrame::new(frame(false).view()).unwrap();
-    let pairs = [0.0, 1e5, 2e5].map(|v| CalibrationPair::loading(v, 1e-6 * v));
-    let line = LinearCalibration::fit(&pairs, &CalibrationOptions::default()).unwrap();
-    measure(&frame(true), &reference, &line).profile.unwrap()
+    measure(&frame(true), &reference, &calibration())
+        .profile
+        .unwrap()
 }
 
 fn radius2(x: f64, y: f64) -> f64 {
@@ -139,30 +140,6 @@ fn punches_pads_ellipses_and_rings_are_not() {
     }
 }
 
-#[test]
-fn the_curve_turns_a_balls_light_back_into_a_balls_pressure() {
-    let sensor = Sensor {
-        q: 0.8,
-        ..Sensor::default()
-    };
-    let reference = sensor.reference();
-    let curve = sensor.curve(&reference, 1);
-    let options = CalibrationOptions::default().with_zero_at_origin();
-    let sums = LinearCalibration::fit(&sensor.calibration(&reference, 1).1, &options).unwrap();
-    let frame = sensor.frame(0.4, 2.5e-3, [121.3, 97.6], Branch::Loading, 8);
-    let (pressure, light) = (
-        measure(&frame, &reference, &curve).profile.unwrap(),
-        measure(&frame, &reference, &sums).profile.unwrap(),
-    );
-    println!(
-        "pressure {:.4}, light {:.4}",
-        pressure.radial_misfit, light.radial_misfit
-    );
-    assert_eq!(pressure.shape, ProfileShape::Hertz);
-    // Light ∝ p^0.8 is (1 − r²)^0.4: the misfit shows, pressure has a third of it at most.
-    assert!(pressure.radial_misfit < 0.4 * light.radial_misfit);
-}
-
 /// The limit holds over all rounds of the fit, and a fit that it ends reports it.
 #[test]
 fn no_fit_takes_more_steps_than_allowed() {
@@ -171,8 +148,7 @@ fn no_fit_takes_more_steps_than_allowed() {
         let light = ball((x as f64 - 121.3) / 35.0, (y as f64 - 97.6) / 35.0);
         (40.0 + 120.0 * light).round() as u8
     });
-    let pairs = [0.0, 1e5, 2e5].map(|v| CalibrationPair::loading(v, 1e-6 * v));
-    let line = LinearCalibration::fit(&pairs, &CalibrationOptions::default()).unwrap();
+    let line = calibration();
     for steps in 1..4 {
         let hertz = HertzFitOptions::default().with_max_iterations(steps);
         let options = ForceOptions::default().with_hertz(hertz.unwrap());
