@@ -128,23 +128,6 @@ impl Dispersion {
         })
     }
 
-    /// Abbe number (n_d − 1)/(n_F − n_C), from 587.56, 486.13 and 656.27 nm.
-    ///
-    /// # Errors
-    /// [`OpticsError::OutOfRange`] if one of them lies outside the fit.
-    ///
-    /// ```
-    /// use tactile_optics::Dispersion;
-    ///
-    /// // Schott's catalogue has 64.17.
-    /// assert!((Dispersion::N_BK7.abbe_number()? - 64.17).abs() < 0.01);
-    /// # Ok::<(), tactile_optics::OpticsError>(())
-    /// ```
-    pub fn abbe_number(&self) -> Result<f64, OpticsError> {
-        let [d, f, c] = [587.56e-9, 486.13e-9, 656.27e-9].map(|w| self.index(w));
-        Ok((d? - 1.0) / (f? - c?))
-    }
-
     /// Shortest and longest wavelength of the fit in metres.
     fn range_m(&self) -> [f64; 2] {
         match self {

@@ -87,19 +87,10 @@ pub fn fresnel(n1: f64, n2: f64, incidence: f64) -> Result<Fresnel, OpticsError>
         0.0,
         FRAC_PI_2 * (1.0 + 1e-7),
     )?;
-    let (sine, cosine) = incidence.sin_cos();
-    Ok(from_sine_and_cosine(
-        index(n1)?,
-        index(n2)?,
-        sine,
-        cosine.max(0.0),
-    ))
-}
-
-/// [`fresnel`] for an incidence given by sine and cosine, as a ray tracer has it.
-pub(crate) fn from_sine_and_cosine(n1: f64, n2: f64, sine: f64, cosine: f64) -> Fresnel {
+    let (n1, n2) = (index(n1)?, index(n2)?);
+    let (sine, cosine) = (incidence.sin(), incidence.cos().max(0.0));
     let Some(b) = refracted_normal(n1, n2, sine, cosine) else {
-        return Fresnel::total();
+        return Ok(Fresnel::total());
     };
     let a = n1 * cosine;
     let across = n1 * sine;
@@ -113,7 +104,7 @@ pub(crate) fn from_sine_and_cosine(n1: f64, n2: f64, sine: f64, cosine: f64) -> 
     let (reflectance_s, reflectance_p) = (r_s * r_s, r_p * r_p);
     let transmittance_s = flow / (a + b) * (b / (a + b));
     let transmittance_p = flow / (c + d) * (b / (c + d));
-    Fresnel {
+    Ok(Fresnel {
         refraction: Some(Angle::from_legs(across, b)),
         reflectance_s,
         reflectance_p,
@@ -121,7 +112,7 @@ pub(crate) fn from_sine_and_cosine(n1: f64, n2: f64, sine: f64, cosine: f64) -> 
         transmittance_p,
         reflectance: (reflectance_s + reflectance_p) * 0.5,
         transmittance: (transmittance_s + transmittance_p) * 0.5,
-    }
+    })
 }
 
 /// n₂ cos θ₂, or `None` when reflection is total.
@@ -155,7 +146,8 @@ pub(crate) fn crossing(n1: f64, n2: f64, sine: f64, cosine: f64) -> Option<(f64,
     let b = (margin * (n2 + n1 * sine)).sqrt();
     let a = n1 * cosine;
     let (s, p) = (a + b, n2 * cosine + n1 * (b / n2));
-    Some((2.0 * a * b * ((s * s).recip() + (p * p).recip()), b))
+    let share = 2.0 * a * b * ((s * s).recip() + (p * p).recip());
+    Some((share.min(1.0), b))
 }
 
 /// a·b − c·d with one rounding of each product removed (Kahan): the error is below 1.5 ulp of the

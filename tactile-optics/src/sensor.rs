@@ -82,15 +82,6 @@ pub struct SensorSpecification {
 }
 
 impl SensorSpecification {
-    /// The sensor's force sensitivity in newtons, 2.5 mN, as the paper's text gives it. Table 1
-    /// swaps it with [`FINGERTIP_FORCE_SENSITIVITY_N`](Self::FINGERTIP_FORCE_SENSITIVITY_N).
-    pub const PAPER_FORCE_SENSITIVITY_N: f64 = 2.5e-3;
-
-    /// The force sensitivity of a human fingertip in newtons, 20 mN, as the paper's text gives it.
-    pub const FINGERTIP_FORCE_SENSITIVITY_N: f64 = 2.0e-2;
-}
-
-impl SensorSpecification {
     /// The specification of a sensor whose smallest force stands out by `sigmas` standard
     /// deviations of the noise.
     ///

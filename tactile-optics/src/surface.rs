@@ -325,19 +325,6 @@ pub(crate) fn march<S: TopSurface + ?Sized>(
         t += (tolerance + tolerance) / opening;
         g = gap(t);
     }
-    approach(gap, [t, g], to, closing, tolerance)
-}
-
-/// Steps from the distance t, where the gap is g, until the gap is below `tolerance`. It closes no
-/// faster than `closing`.
-#[inline]
-fn approach(
-    gap: impl Fn(f64) -> f64,
-    [mut t, mut g]: [f64; 2],
-    to: f64,
-    closing: f64,
-    tolerance: f64,
-) -> Meeting {
     for _ in 0..MAX_STEPS {
         if t > to {
             return Meeting::Missed;

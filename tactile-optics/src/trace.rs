@@ -25,7 +25,7 @@ use core::f64::consts::{FRAC_PI_2, FRAC_PI_6, PI};
 use num_traits::Float;
 
 use crate::error::{OpticsError, within};
-use crate::fresnel::{crossing, from_sine_and_cosine};
+use crate::fresnel::crossing;
 use crate::led::{Geometry, Led};
 use crate::surface::{Meeting, TopSurface, contact_gap, march};
 
@@ -207,7 +207,7 @@ fn launch(slab: &Slab<'_>, z: f64, y: f64, outside: [f64; 3]) -> (Ray, f64) {
     }
     let n = slab.layers[layer].index;
     let across = outside[1].hypot(outside[2]);
-    let edge = from_sine_and_cosine(slab.ambient, n, across, outside[0].max(0.0));
+    let edge = crossing(slab.ambient, n, across, outside[0].max(0.0));
     // n sin θ is kept. A denser ambient can reflect all light at the edge: the power is then 0.
     let ratio = slab.ambient / n;
     let (uy, uz) = (outside[1] * ratio, outside[2] * ratio);
@@ -220,7 +220,7 @@ fn launch(slab: &Slab<'_>, z: f64, y: f64, outside: [f64; 3]) -> (Ray, f64) {
         power: 0.0,
         events: 0,
     };
-    (ray, edge.transmittance)
+    (ray, edge.map_or(0.0, |(share, _)| share))
 }
 
 /// The number of rays, their starting points, and which of them reach the camera.
@@ -745,7 +745,7 @@ impl<S: TopSurface + ?Sized> Tracer<'_, '_, S> {
         let Some((share, along)) = crossing(n1, n2, sine, cosine) else {
             return Some(ray.mirrored(&normal, ray.power));
         };
-        let transmitted = ray.power * share.min(1.0);
+        let transmitted = ray.power * share;
         self.keep(ray.mirrored(&normal, ray.power - transmitted), branches);
         let ratio = n1 / n2;
         // Snell's law keeps n times the tangential part. The normal part comes from `crossing`,
@@ -763,7 +763,7 @@ impl<S: TopSurface + ?Sized> Tracer<'_, '_, S> {
         let inside = self.slab.layers[ray.layer].index;
         let cosine = dot(&ray.direction, normal).abs().min(1.0);
         let sine = sine_between(&ray.direction, normal);
-        crossing(inside, outside, sine, cosine).map_or(0.0, |(share, _)| share.min(1.0))
+        crossing(inside, outside, sine, cosine).map_or(0.0, |(share, _)| share)
     }
 
     /// Stores a branch for later, or counts it as unresolved when the stack is full.

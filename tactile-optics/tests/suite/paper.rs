@@ -58,11 +58,6 @@ fn the_specification() {
     let one_sigma = 0.76 * (2.0 * 1392.0 * 1042.0_f64).sqrt() * 8.7e-8;
     assert!((sensor.force_resolution_n - 3.0 * one_sigma).abs() < 1e-18);
     assert!((sensor.force_levels * 3.0 * one_sigma - 2.0).abs() < 1e-12);
-    let (paper, fingertip) = (
-        SensorSpecification::PAPER_FORCE_SENSITIVITY_N,
-        SensorSpecification::FINGERTIP_FORCE_SENSITIVITY_N,
-    );
-    assert_eq!((2.0 / paper, fingertip / paper), (800.0, 8.0));
     let refused = |change: fn(&mut SensorParameters)| {
         let mut changed = camera;
         change(&mut changed);
@@ -77,13 +72,13 @@ fn the_specification() {
 
 #[test]
 fn indices_and_abbe_numbers_of_the_materials() {
-    let d = 587.56e-9_f64;
     for (material, index, abbe, tolerance) in [
         (Dispersion::N_BK7, 1.5168, 64.17, 2e-5),
         (Dispersion::BOROFLOAT_33, 1.471, 65.41, 6e-4),
     ] {
-        assert!((material.index(d).unwrap() - index).abs() < tolerance);
-        assert!((material.abbe_number().unwrap() / abbe - 1.0).abs() < 0.02);
+        let [d, f, c] = [587.56e-9, 486.13e-9, 656.27e-9].map(|w| material.index(w).unwrap());
+        assert!((d - index).abs() < tolerance);
+        assert!(((d - 1.0) / (f - c) / abbe - 1.0).abs() < 0.02);
     }
     // Tabulated values at 0.5 and 0.6 µm; the fits' residuals stay below 5.6e-4.
     for (material, at_500, at_600) in [

@@ -76,24 +76,7 @@ fn guided_by_unfolding(n: f64, thickness: f64, length: f64, steps: usize) -> f64
 }
 
 #[test]
-fn a_flat_layer_guides_what_unfolding_says() {
-    let layer = [SlabLayer {
-        index: 1.38,
-        thickness_m: 10e-3,
-    }];
-    let expected = guided_by_unfolding(1.38, 10e-3, 30e-3, 20_000);
-    let found = flat(&layer, 30e-3, &section(1 << 16));
-    assert_conserved(&found);
-    // 65 536 even points against jumps in the number of reflections: the next test shows the rate.
-    assert!(
-        (found.guided - expected).abs() < 2e-5,
-        "{} against {expected}",
-        found.guided
-    );
-}
-
-#[test]
-fn the_error_falls_faster_than_with_random_rays() {
+fn a_flat_layer_guides_what_unfolding_says_and_the_error_falls_faster_than_with_random_rays() {
     let layer = [SlabLayer {
         index: 1.38,
         thickness_m: 10e-3,
@@ -105,6 +88,8 @@ fn the_error_falls_faster_than_with_random_rays() {
         ((0..16).map(|s| of_seed(s).powi(2)).sum::<f64>() / 16.0).sqrt()
     };
     let errors = [256, 4096, 65536].map(error);
+    // What is left are jumps in the number of reflections.
+    assert!(errors[2] < 2e-5, "{errors:?}");
     println!("rms error of the guided share at 256, 4096, 65536 rays: {errors:?}");
     // Random rays would gain a factor of 16 in all; even points gain more in each of the two steps.
     assert!(errors[0] / errors[2] > 64.0, "{errors:?}");
@@ -230,30 +215,6 @@ fn a_press_lights_up_the_camera_more_the_steeper_it_is_and_most_where_an_object_
 }
 
 #[test]
-fn every_seed_tells_the_same_and_a_section_stays_in_its_plane() {
-    let slab = Slab::new(&PAPER, 1.0, 30e-3).unwrap();
-    let dimple = Dimple::new([15e-3, 0.0], 5e-3, 1.5e-3).unwrap();
-    // In space one ray in twenty meets the dimple: 800 of 16 000, known to 3.5 % each.
-    for (geometry, spread) in [(Geometry::Section, 0.02), (Geometry::Volume, 0.12)] {
-        let leaked_by = |seed: u64| {
-            let options = with_rays(16_000)
-                .with_geometry(geometry)
-                .with_seed(seed)
-                .with_emitter_half_width_m(5e-3)
-                .unwrap();
-            let led = Led::new(1.0, 1.2).unwrap();
-            leaked(&trace(&slab, &led, &dimple, &options, &mut []).unwrap())
-        };
-        let seeds: Vec<f64> = [1, 2, 99, 12345].map(leaked_by).to_vec();
-        let (least, most) = (
-            seeds.iter().copied().fold(1.0, f64::min),
-            seeds.iter().copied().fold(0.0, f64::max),
-        );
-        assert!(most < least * (1.0 + spread), "{geometry:?} {seeds:?}");
-    }
-}
-
-#[test]
 fn mirror_images_shine_alike() {
     // Mirroring y leaves the budget of a symmetric LED alone, to the sampling's error.
     let slab = Slab::new(&PAPER, 1.0, 30e-3).unwrap();
@@ -316,7 +277,6 @@ fn options_without_meaning_are_named() {
             && Led::new(1.0, 0.0).is_err()
             && Led::new(1.0, 1.6).is_err()
     );
-    assert!(Led::from_half_intensity_angle(1.6).is_err());
     assert!(
         Dimple::new([0.0, f64::NAN], 1.0, 0.1).is_err()
             && Dimple::new([0.0, 0.0], 1.0, -0.1).is_err()
