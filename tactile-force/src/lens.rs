@@ -179,7 +179,7 @@ impl LensGeometry {
     /// ```
     pub fn mean_pixel_area_m2(&self, centre_px: [f64; 2], radius_px: f64) -> f64 {
         let ring = Self::ring(centre_px, HERTZ_RADIUS * radius_px, 1.0);
-        ring.map(|p| self.pixel_area_m2(p)).sum::<f64>() / DIRECTIONS as f64
+        ring.map(|p| self.pixel_area_m2(p)).iter().sum::<f64>() / DIRECTIONS as f64
     }
 
     /// Undistorted centre [X, Y] and radius, in metres, of a contact seen as a circle of
@@ -199,17 +199,10 @@ impl LensGeometry {
             centre = [centre[0] + weight * place[0], centre[1] + weight * place[1]];
             weights += weight;
         }
-        let mut twice_area = 0.0;
-        let mut before: Option<[f64; 2]> = None;
+        // Twice the area of the contour's polygon, by the shoelace formula.
         let contour = Self::ring(centre_px, radius_px, aspect).map(|p| self.to_metres(p));
-        let closed = contour.clone().chain(contour.take(1));
-        for place in closed {
-            if let Some(last) = before {
-                // Twice the area of a polygon, by the shoelace formula.
-                twice_area += last[0] * place[1] - last[1] * place[0];
-            }
-            before = Some(place);
-        }
+        let ends = (0..DIRECTIONS).map(|k| [contour[k], contour[(k + 1) % DIRECTIONS]]);
+        let twice_area: f64 = ends.map(|[a, b]| a[0] * b[1] - b[0] * a[1]).sum();
         // A regular polygon with n corners on a circle has n sin(2π/n)/2 of its squared radius.
         let turn = std::f64::consts::TAU / DIRECTIONS as f64;
         let radius = (twice_area / (DIRECTIONS as f64 * turn.sin())).sqrt();
@@ -217,12 +210,8 @@ impl LensGeometry {
     }
 
     /// Pixels on a circle of `radius_px` pixel widths.
-    fn ring(
-        centre_px: [f64; 2],
-        radius_px: f64,
-        aspect: f64,
-    ) -> impl Iterator<Item = [f64; 2]> + Clone {
-        (0..DIRECTIONS).map(move |k| {
+    fn ring(centre_px: [f64; 2], radius_px: f64, aspect: f64) -> [[f64; 2]; DIRECTIONS] {
+        std::array::from_fn(|k| {
             let (sin, cos) = (std::f64::consts::TAU * k as f64 / DIRECTIONS as f64).sin_cos();
             [
                 centre_px[0] + radius_px * cos,

@@ -675,24 +675,20 @@ impl EveryNth {
         away.is_multiple_of(self.step)
     }
 
-    /// Those within a range, from the middle up and then from the middle down.
+    /// Those within a range, in order.
     #[inline]
     pub fn within(&self, range: Range<usize>) -> impl Iterator<Item = usize> {
         let step = self.step;
+        let first = range.start + self.low.saturating_sub(range.start) % step;
+        let down = (first..range.end.min(self.low + 1)).step_by(step);
         // Where both middles are one, it is counted once.
         let above = if self.low == self.high {
             self.high + step
         } else {
             self.high
         };
-        let skipped = range.start.saturating_sub(above).div_ceil(step);
-        let up = (above + skipped * step..range.end).step_by(step);
-        let skipped = (self.low + 1).saturating_sub(range.end).div_ceil(step);
-        let first_down = self.low.checked_sub(skipped * step);
-        let room = first_down.and_then(|first| (first + 1).checked_sub(range.start));
-        let (first, room) = (first_down.unwrap_or(0), room.unwrap_or(0));
-        let down = (0..room.div_ceil(step)).map(move |k| first - k * step);
-        up.chain(down)
+        let skipped = range.start.saturating_sub(above).next_multiple_of(step);
+        down.chain((above + skipped..range.end).step_by(step))
     }
 }
 

@@ -1,5 +1,6 @@
 //! The area within a contact's outline, from the light of the pixels that the outline cuts.
 
+use nalgebra::{Vector4, Vector5};
 use ndarray::{Array2, ArrayView1, ArrayView2, ArrayViewMut1, Axis, Zip};
 use tactile_core::{BoundingBox, Estimate, Polarity};
 
@@ -25,12 +26,8 @@ const FEWEST: f64 = 8.0;
 /// Sums of the ring's light in one tile.
 #[derive(Clone, Copy, Debug, Default)]
 struct Tile {
-    count: f64,
-    light: f64,
-    /// Σ of the depth t below the ring's middle, of t², and of t times the light.
-    depth: f64,
-    depth_squared: f64,
-    depth_light: f64,
+    /// Σ of one, the light, the depth t below the ring's middle, t², and t times the light.
+    ring: Vector5<f64>,
     /// Change of the light with the depth, where it is more than noise.
     slope: f64,
     /// Mean light at the ring's middle in this tile and those around it, and the pixels in it.
@@ -40,35 +37,9 @@ struct Tile {
     covered: f64,
 }
 
-/// Sums for moments: of one, x, y and x² + y².
-#[derive(Clone, Copy, Debug, Default)]
-struct Moments {
-    one: f64,
-    x: f64,
-    y: f64,
-    square: f64,
-}
-
-impl Moments {
-    fn add(&mut self, weight: f64, x: f64, y: f64) {
-        self.one += weight;
-        self.x += weight * x;
-        self.y += weight * y;
-        self.square += weight * (x * x + y * y);
-    }
-
-    /// Adds a row's sums of the weights, and of the weights times the column and its square.
-    fn add_row(&mut self, [one, column, square]: [f64; 3], hx: f64, y: f64) {
-        self.one += one;
-        self.x += column * hx;
-        self.y += one * y;
-        self.square += square * hx * hx + one * y * y;
-    }
-
-    /// Σ w r² about (x, y), over Σ w.
-    fn about(&self, x: f64, y: f64) -> f64 {
-        (self.square - 2.0 * (x * self.x + y * self.y)) / self.one + x * x + y * y
-    }
+/// A pixel's terms of moments: one, x, y and x² + y².
+fn moments(x: f64, y: f64) -> Vector4<f64> {
+    Vector4::new(1.0, x, y, x * x + y * y)
 }
 
 /// Measures flat faces, with buffers that are kept from frame to frame.
@@ -200,48 +171,37 @@ impl FaceWorkspace {
             (rows.div_ceil(TILE), columns.div_ceil(TILE)),
         );
         self.tiles.fill(Tile::default());
-        let (mut all, mut count) = (0.0, 0.0);
+        let mut all = Vector5::zeros();
         for &at in &self.near {
             let distance = self.distance[at];
             if self.inside[at] && (BAND + 1..=BAND + RING).contains(&distance) {
-                let tile = &mut self.tiles[at.map(|k| k / TILE)];
                 let light = f64::from(self.signal[at]);
-                let depth = f64::from(distance) - RING_MIDDLE;
-                tile.count += 1.0;
-                tile.light += light;
-                tile.depth += depth;
-                tile.depth_squared += depth * depth;
-                tile.depth_light += depth * light;
-                all += light;
-                count += 1.0;
+                let t = f64::from(distance) - RING_MIDDLE;
+                let terms = Vector5::new(1.0, light, t, t * t, t * light);
+                self.tiles[at.map(|k| k / TILE)].ring += terms;
+                all += terms;
             }
         }
-        if count < FEWEST || all <= 0.0 {
+        if all[0] < FEWEST || all[1] <= 0.0 {
             return None;
         }
         for (row, column) in ndarray::indices(self.tiles.dim()) {
-            let mut sums = Tile::default();
-            for tile in around(&self.tiles, row, column) {
-                sums.count += tile.count;
-                sums.light += tile.light;
-                sums.depth += tile.depth;
-                sums.depth_squared += tile.depth_squared;
-                sums.depth_light += tile.depth_light;
-            }
+            let near = around(&self.tiles, row, column).map(|tile| tile.ring);
+            let [count, light, t, tt, t_light] = near.sum::<Vector5<f64>>().into();
             let tile = &mut self.tiles[[row, column]];
-            if sums.count < FEWEST || sums.light <= 0.0 {
-                (tile.slope, tile.mean, tile.pixels) = (0.0, all / count, count);
+            if count < FEWEST || light <= 0.0 {
+                (tile.slope, tile.mean, tile.pixels) = (0.0, all[1] / all[0], all[0]);
                 continue;
             }
             // Least squares of the light over the depth, about the means of both.
-            let spread = sums.depth_squared - sums.depth * sums.depth / sums.count;
-            let slope = (sums.depth_light - sums.depth * sums.light / sums.count) / spread;
+            let spread = tt - t * t / count;
+            let slope = (t_light - t * light / count) / spread;
             // Below three standard errors extrapolating the noise would make the area of plain
             // faces ten times as noisy.
             let is_clear = spread > 0.0 && slope * slope * spread > 9.0 * variance;
             tile.slope = if is_clear { slope } else { 0.0 };
-            tile.mean = (sums.light - tile.slope * sums.depth) / sums.count;
-            tile.pixels = sums.count;
+            tile.mean = (light - tile.slope * t) / count;
+            tile.pixels = count;
         }
         Some(())
     }
@@ -261,8 +221,8 @@ impl FaceWorkspace {
             // Further out there is nothing of the face, and further in every pixel counts whole.
             if distance > BAND {
                 if inside {
-                    area.add(1.0, x, y);
-                    light.add(signal, x, y);
+                    area += moments(x, y);
+                    light += moments(x, y) * signal;
                     match distance {
                         4..=5 => near = [near[0] + signal, near[1] + 1.0],
                         8..=9 => far = [far[0] + signal, far[1] + 1.0],
@@ -283,32 +243,34 @@ impl FaceWorkspace {
             tile.covered += share;
             // A grey level of this pixel changes the area by 1/P.
             of_pixels += tile.mean.powi(-2);
-            area.add(share, x, y);
-            light.add(signal, x, y);
+            area += moments(x, y) * share;
+            light += moments(x, y) * signal;
             outline += f64::from(inside && distance == 1);
         }
-        if far[1] < FEWEST || area.one <= 0.0 || light.one <= 0.0 {
+        if far[1] < FEWEST || area[0] <= 0.0 || light[0] <= 0.0 {
             return None;
         }
         // Of the outline's mean place sampling, rounding to grey levels and the slope of a texture
         // leave 5e-4 pixels.
         let noise = variance * (of_pixels + self.weights_squared());
         let error = noise.sqrt().hypot(5e-4 * outline);
-        let centre = [area.x / area.one, area.y / area.one];
-        let [of_area, of_light] = [area, light].map(|m| m.about(centre[0], centre[1]));
+        // Σ w r² about the area's centre, over Σ w.
+        let (x, y) = (area[1] / area[0], area[2] / area[0]);
+        let [of_area, of_light] =
+            [area, light].map(|m| (m[3] - 2.0 * (x * m[1] + y * m[2])) / m[0] + x * x + y * y);
         let pixel = hx * hy;
         Some(FaceReading {
-            area_m2: Estimate::new(area.one * pixel, error * pixel),
+            area_m2: Estimate::new(area[0] * pixel, error * pixel),
             edge_ratio: near[0] * far[1] / (near[1] * far[0]),
-            outline_moment: 2.0 * std::f64::consts::PI * of_area / (area.one * pixel),
+            outline_moment: 2.0 * std::f64::consts::PI * of_area / (area[0] * pixel),
             light_moment: of_light / of_area,
         })
     }
 
     /// Moments of the area and of the light over the pixels beyond `FARTHEST` from the outline,
     /// which are nearly all: row by row, since a column's place is common to them.
-    fn deep_moments(&self, [hx, hy]: [f64; 2]) -> [Moments; 2] {
-        let [mut area, mut light] = [Moments::default(); 2];
+    fn deep_moments(&self, [hx, hy]: [f64; 2]) -> [Vector4<f64>; 2] {
+        let [mut area, mut light] = [Vector4::zeros(); 2];
         let rows = self.signal.rows().into_iter();
         let rows = rows.zip(self.inside.rows()).zip(self.distance.rows());
         for (row, ((signal, inside), distance)) in rows.enumerate() {
@@ -326,8 +288,13 @@ impl FaceWorkspace {
                 }
             }
             let y = row as f64 * hy;
-            area.add_row(ones.map(|sum| sum as f64), hx, y);
-            light.add_row(signals, hx, y);
+            // From sums of the weights, and of the weights times the column and its square.
+            let of_row = |[one, column, square]: [f64; 3]| {
+                let squares = square * hx * hx + one * y * y;
+                Vector4::new(one, column * hx, one * y, squares)
+            };
+            area += of_row(ones.map(|sum| sum as f64));
+            light += of_row(signals);
         }
         [area, light]
     }
@@ -336,12 +303,12 @@ impl FaceWorkspace {
     fn weights_squared(&self) -> f64 {
         let mut sum = 0.0;
         for ((row, column), tile) in self.tiles.indexed_iter() {
-            if tile.count > 0.0 {
+            if tile.ring[0] > 0.0 {
                 let near = around(&self.tiles, row, column);
                 // A grey level of the ring changes the mean light of nine tiles, and thereby the
                 // shares there.
                 let weight: f64 = near.map(|t| t.covered / (t.pixels * t.mean)).sum();
-                sum += tile.count * weight * weight;
+                sum += tile.ring[0] * weight * weight;
             }
         }
         sum
