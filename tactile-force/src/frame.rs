@@ -3,13 +3,13 @@
 use std::ops::Range;
 
 use nalgebra::{SMatrix, SVector};
-use ndarray::{Array2, ArrayView2, Zip};
+use ndarray::{Array2, ArrayView2};
 use tactile_core::{BoundingBox, Requirement, vectorised};
 
 use crate::error::ForceError;
 
-/// Sums and extremes of the signed difference d = frame − reference of a whole frame, exact in
-/// integers.
+/// The sum of the signed difference d = frame − reference of a whole frame, exact in integers, and
+/// where it is large.
 ///
 /// Differences keep their sign: clamping the negative ones to zero would turn noise into force.
 ///
@@ -22,7 +22,7 @@ use crate::error::ForceError;
 /// frame.slice_mut(ndarray::s![10..13, 20..29]).fill(107);
 /// frame[[0, 0]] = 5;
 /// let statistics = reference.compare(frame.view(), 10)?;
-/// assert_eq!((statistics.sum, statistics.least, statistics.greatest), (2698, -2, 100));
+/// assert_eq!(statistics.sum, 2698);
 /// let found = statistics.bounding_box.expect("pixels above the threshold");
 /// assert_eq!((found.rows(), found.columns()), (3, 9));
 /// # Ok::<(), tactile_force::ForceError>(())
@@ -36,10 +36,6 @@ pub struct FrameStatistics {
     pub columns: usize,
     /// Σ d.
     pub sum: i64,
-    /// Least difference.
-    pub least: i16,
-    /// Greatest difference.
-    pub greatest: i16,
     /// Number of pixels of the frame at 255.
     pub saturated: usize,
     /// Box around every pixel with |d| above the threshold. `None` if there is none.
@@ -572,7 +568,7 @@ impl ReferenceFrame {
     /// let mut frame = Array2::from_elem((40, 50), 7);
     /// frame[[20, 30]] = 107;
     /// let statistics = reference.compare(frame.view(), 10)?;
-    /// assert_eq!((statistics.sum, statistics.greatest), (100, 100));
+    /// assert_eq!(statistics.sum, 100);
     /// let at = statistics.bounding_box.expect("a pixel above the threshold");
     /// assert_eq!((at.row_start, at.column_start), (20, 30));
     /// # Ok::<(), tactile_force::ForceError>(())
@@ -613,7 +609,6 @@ impl ReferenceFrame {
             },
             size: frame.dim(),
         };
-        let [above, below] = pair.greatest();
         let bounding_box = pair
             .tiles_above(threshold)
             .map(|b| tighten(b, [pixels, image], frame.ncols(), threshold));
@@ -622,17 +617,13 @@ impl ReferenceFrame {
             .iter_mut()
             .zip(&self.tiles.sums)
             .for_each(|(f, r)| *f -= r);
-        let mut s = FrameStatistics {
+        FrameStatistics {
             rows: frame.nrows(),
             columns: frame.ncols(),
             sum,
-            least: -i16::from(below),
-            greatest: i16::from(above),
             saturated,
             bounding_box,
-        };
-        s.correct_extremes(frame, self.image());
-        s
+        }
     }
 
     /// The image before rounding.
@@ -872,23 +863,6 @@ fn summarise_band(rows: &[u8], width: usize, mut tiles: OfTiles<'_>) {
     }
 }
 
-impl FrameStatistics {
-    /// The tiles give extremes on their own side of zero only. Where every difference is on one
-    /// side, computes them anew.
-    fn correct_extremes(&mut self, frame: ArrayView2<'_, u8>, reference: ArrayView2<'_, u8>) {
-        let all_equal = self.least == 0 && self.greatest == 0;
-        if all_equal || (self.least < 0 && self.greatest > 0) {
-            return;
-        }
-        (self.least, self.greatest) = (i16::MAX, i16::MIN);
-        Zip::from(frame).and(reference).for_each(|&f, &r| {
-            let d = i16::from(f) - i16::from(r);
-            self.least = self.least.min(d);
-            self.greatest = self.greatest.max(d);
-        });
-    }
-}
-
 /// A row of a tile.
 type Row = [u8; TILE_COLUMNS];
 
@@ -1043,34 +1017,12 @@ struct Pair<'a> {
 }
 
 impl Pair<'_> {
-    /// Greatest f − r and greatest r − f, zero if negative.
-    fn greatest(&self) -> [u8; 2] {
-        let tiles = self.frame.tiles;
-        // Bounds from the extremes of both images decide nearly all tiles without a look at their
-        // pixels.
-        let mut greatest = self.least();
-        for band in 0..tiles.rows {
-            let here = self.band(band);
-            if !self.may_exceed(here.clone(), greatest) {
-                continue;
-            }
-            for tile in here {
-                let [above, below] = self.of_tile(tile).map(|[_, most]| most);
-                if above > greatest[0] || below > greatest[1] {
-                    let [a, b] = self.differences(tile);
-                    greatest = [greatest[0].max(a), greatest[1].max(b)];
-                }
-            }
-        }
-        greatest
-    }
-
     /// The box of the tiles in which |f − r| exceeds a threshold.
     fn tiles_above(&self, threshold: u8) -> Option<BoundingBox> {
         let (size, tiles) = (self.size, self.frame.tiles);
         let of_band = |band: usize| {
             let mut here = self.band(band);
-            if !self.may_exceed(here.clone(), [threshold; 2]) {
+            if !self.may_exceed(here.clone(), threshold) {
                 return None;
             }
             // Those between the outermost are not looked at.
@@ -1092,79 +1044,43 @@ impl Pair<'_> {
 
     /// Whether |f − r| exceeds a threshold in a tile.
     fn exceeds(&self, tile: usize, threshold: u8) -> bool {
-        let exceeds = |[above, below]: [u8; 2]| above.max(below) > threshold;
-        let [above, below] = self.of_tile(tile);
-        exceeds([above[1], below[1]])
-            && (exceeds([above[0], below[0]]) || exceeds(self.differences(tile)))
-    }
-
-    /// Whether f − r or r − f may exceed these in some tiles.
-    fn may_exceed(&self, tiles: Range<usize>, [above, below]: [u8; 2]) -> bool {
-        let most = self.most(tiles);
-        most[0] > above || most[1] > below
-    }
-
-    /// The greatest f − r of a tile, what it is at least and at most, and the greatest r − f.
-    #[inline]
-    fn of_tile(&self, tile: usize) -> [[u8; 2]; 2] {
         let [f, r] = [self.frame.tiles, self.reference.tiles];
         let (dark, bright) = (f.darkest[tile], f.brightest[tile]);
         let (darkest, brightest) = (r.darkest[tile], r.brightest[tile]);
-        [
-            [brightest, darkest].map(|level| bright.saturating_sub(level)),
-            [darkest, brightest].map(|level| level.saturating_sub(dark)),
-        ]
+        // The extremes of both images decide nearly all tiles without a look at their pixels.
+        let most = u8::max(
+            bright.saturating_sub(darkest),
+            brightest.saturating_sub(dark),
+        );
+        let least = u8::max(bright.abs_diff(brightest), dark.abs_diff(darkest));
+        most > threshold && (least > threshold || self.difference(tile) > threshold)
     }
 
-    /// What the greatest f − r and the greatest r − f are at least.
-    fn least(&self) -> [u8; 2] {
-        let [f, r] = [self.frame.tiles, self.reference.tiles];
-        [
-            excess(&f.brightest, &r.brightest),
-            excess(&r.darkest, &f.darkest),
-        ]
-    }
-
-    /// What the greatest f − r and the greatest r − f of some tiles are at most.
-    fn most(&self, tiles: Range<usize>) -> [u8; 2] {
+    /// Whether |f − r| may exceed a threshold in some tiles.
+    fn may_exceed(&self, tiles: Range<usize>, threshold: u8) -> bool {
         let [f, r] = [self.frame.tiles, self.reference.tiles];
         let [dark, bright] = [&f.darkest[tiles.clone()], &f.brightest[tiles.clone()]];
         let [darkest, brightest] = [&r.darkest[tiles.clone()], &r.brightest[tiles]];
-        [excess(bright, darkest), excess(brightest, dark)]
+        excess(bright, darkest).max(excess(brightest, dark)) > threshold
     }
 
-    /// Greatest f − r and greatest r − f of a tile, zero if negative.
-    fn differences(&self, tile: usize) -> [u8; 2] {
+    /// Greatest |f − r| of a tile.
+    fn difference(&self, tile: usize) -> u8 {
         let at = self.frame.tiles.pixels(tile, self.size);
         let images = [self.frame.image, self.reference.image];
         vectorised(
             #[inline(always)]
             || {
-                let (mut above, mut below) = ([0_u8; TILE_COLUMNS], [0_u8; TILE_COLUMNS]);
+                let mut greatest = [0_u8; TILE_COLUMNS];
                 for row in at.row_start..at.row_end {
                     let first = row * self.size.1;
                     let span = first + at.column_start..first + at.column_end;
                     let [f, r] = images.map(|image| &image[span.clone()]);
-                    // Whole tiles, as nearly all are, take wide instructions.
-                    match (
-                        <&[u8; TILE_COLUMNS]>::try_from(f),
-                        <&[u8; TILE_COLUMNS]>::try_from(r),
-                    ) {
-                        (Ok(f), Ok(r)) => {
-                            for k in 0..TILE_COLUMNS {
-                                above[k] = above[k].max(f[k].saturating_sub(r[k]));
-                                below[k] = below[k].max(r[k].saturating_sub(f[k]));
-                            }
-                        }
-                        _ => {
-                            for (k, (f, r)) in f.iter().zip(r).enumerate() {
-                                above[k] = above[k].max(f.saturating_sub(*r));
-                                below[k] = below[k].max(r.saturating_sub(*f));
-                            }
-                        }
+                    for ((greatest, f), r) in greatest.iter_mut().zip(f).zip(r) {
+                        *greatest = f.abs_diff(*r).max(*greatest);
                     }
                 }
-                [above, below].map(|lanes| lanes.into_iter().fold(0, u8::max))
+                greatest.into_iter().fold(0, u8::max)
             },
         )
     }

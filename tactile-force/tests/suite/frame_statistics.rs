@@ -16,16 +16,12 @@ fn slow(
         rows,
         columns,
         sum: 0,
-        least: i16::MAX,
-        greatest: i16::MIN,
         saturated: 0,
         bounding_box: None,
     };
     for ((y, x), &f) in frame.indexed_iter() {
         let d = i16::from(f) - i16::from(reference[[y, x]]);
         s.sum += i64::from(d);
-        s.least = s.least.min(d);
-        s.greatest = s.greatest.max(d);
         s.saturated += usize::from(f == 255);
         if d.unsigned_abs() > u16::from(threshold) {
             let here = BoundingBox {

@@ -119,9 +119,7 @@ fn calibrations(answers: &mut Answers) {
 
 fn measurement(answers: &mut Answers, name: &str, m: &ForceMeasurement) {
     answers.estimate(&format!("{name}.force"), m.force_n);
-    for moment in [m.statistics.sum, i64::from(m.statistics.greatest)] {
-        answers.add(&format!("{name}.sums"), moment as f64);
-    }
+    answers.add(&format!("{name}.sums"), m.statistics.sum as f64);
     for c in m.drift.coefficients {
         answers.add(&format!("{name}.drift"), c);
     }
