@@ -144,7 +144,7 @@ pub fn trace<S: TopSurface + ?Sized>(
     camera_profile.fill(0.0);
     let mut tracer = new_tracer(slab, surface, options, camera_profile)?;
     let points = Points::new(options.geometry == Geometry::Volume, options.seed);
-    let mut total = Tally::new();
+    let mut total = Tally::default();
     for i in 0..u64::from(options.rays) {
         let [z, u, v, y] = points.point(i);
         let (outside, weight) = led.direction(u, v, options.geometry);
@@ -190,7 +190,7 @@ fn new_tracer<'a, 's, S: TopSurface + ?Sized>(
         options,
         tolerance: contact_gap(slab.thickness_m()),
         camera_sine: options.camera_half_angle.sin(),
-        tally: Tally::new(),
+        tally: Tally::default(),
         camera_profile,
         stream: 0,
     })
@@ -379,20 +379,13 @@ enum RayOutcome {
 }
 
 /// Compensated sums (Neumaier), one for each outcome: a million rays add up without loss.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 struct Tally {
     sums: [f64; 8],
     errors: [f64; 8],
 }
 
 impl Tally {
-    fn new() -> Self {
-        Self {
-            sums: [0.0; 8],
-            errors: [0.0; 8],
-        }
-    }
-
     fn add(&mut self, outcome: RayOutcome, power: f64) {
         let k = outcome as usize;
         let (old, new) = (self.sums[k], self.sums[k] + power);
@@ -479,7 +472,7 @@ pub fn path<S: TopSurface + ?Sized>(
 /// The strongest of the parts into which the next obstacle splits a ray. `None` if more than half
 /// of its light leaves there.
 fn stronger_part<S: TopSurface + ?Sized>(tracer: &mut Tracer<'_, '_, S>, ray: Ray) -> Option<Ray> {
-    let mut waiting = Branches::new();
+    let mut waiting = Branches::default();
     let mut best = tracer.advance(ray, &mut waiting);
     while let Some(branch) = waiting.pop() {
         if best.is_none_or(|b| b.power < branch.power) {
@@ -527,7 +520,7 @@ impl<S: TopSurface + ?Sized> Tracer<'_, '_, S> {
         // The cut-off is relative to each ray, so that weak rays are followed as deep as strong
         // ones.
         let smallest = first.power * self.options.cutoff;
-        let mut branches = Branches::new();
+        let mut branches = Branches::default();
         let mut current = Some(first);
         while let Some(ray) = current {
             current = if ray.power <= smallest || ray.events >= MAX_EVENTS {
@@ -853,20 +846,13 @@ fn sine_between(a: &[f64; 3], b: &[f64; 3]) -> f64 {
 }
 
 /// Branches waiting to be followed. A fixed size, so that tracing never allocates.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 struct Branches {
     rays: [Option<Ray>; 32],
     count: usize,
 }
 
 impl Branches {
-    fn new() -> Self {
-        Self {
-            rays: [None; 32],
-            count: 0,
-        }
-    }
-
     /// Stores a ray. False when the stack is full.
     fn push(&mut self, ray: Ray) -> bool {
         let Some(slot) = self.rays.get_mut(self.count) else {
