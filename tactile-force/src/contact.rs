@@ -398,13 +398,12 @@ impl ContactDetector {
         size: (usize, usize),
         sd: f64,
     ) -> IlluminationDrift {
-        if self.options.drift == DriftCorrection::None {
-            return IlluminationDrift::none();
+        match reference.tile_sums(&workspace.pass.tiles) {
+            Some(tiles) if self.options.drift != DriftCorrection::None => {
+                drift::fit(self.options.drift, size, tiles, sd, &mut workspace.drift)
+            }
+            _ => IlluminationDrift::default(),
         }
-        let Some(tiles) = reference.tile_sums(&workspace.pass.tiles) else {
-            return IlluminationDrift::none();
-        };
-        drift::fit(self.options.drift, size, tiles, sd, &mut workspace.drift)
     }
 
     /// The mask in a region around the suspect pixels, which grows while the aperture meets its

@@ -187,11 +187,6 @@ impl DriftLine {
 }
 
 impl IlluminationDrift {
-    /// No correction of a frame of the given size.
-    pub(crate) fn none() -> Self {
-        Self::default()
-    }
-
     pub(crate) fn is_zero(&self) -> bool {
         self.correction == DriftCorrection::None
     }
@@ -295,7 +290,7 @@ impl IlluminationDrift {
         let known = standard_error > 0.0 && standard_error <= 0.005 && self.reference > 0.0;
         let refused = |outcome| Self {
             outcome,
-            ..Self::none()
+            ..Self::default()
         };
         if !known {
             return refused(DriftOutcome::TooDark { standard_error });
@@ -402,7 +397,7 @@ pub(crate) fn fit(
     let mut drift = IlluminationDrift {
         correction,
         middle: [0.5 * (columns as f64 - 1.0), 0.5 * (rows as f64 - 1.0)],
-        ..IlluminationDrift::none()
+        ..IlluminationDrift::default()
     };
     if correction.is_multiplicative() {
         drift.coefficients[0] = 1.0;

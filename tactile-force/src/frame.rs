@@ -699,7 +699,16 @@ pub enum Levels<'a> {
 /// The size that all frames have.
 fn common_size(frames: &[ArrayView2<'_, u8>]) -> Result<(usize, usize), ForceError> {
     let size = frames.first().map_or((0, 0), |f| f.dim());
-    check_size(size)?;
+    let (rows, columns) = size;
+    if rows == 0 || columns == 0 {
+        return Err(ForceError::EmptyImage { rows, columns });
+    }
+    if rows.max(columns) > LONGEST_SIDE {
+        return Err(ForceError::ImageTooLarge {
+            found: rows.max(columns),
+            limit: LONGEST_SIDE,
+        });
+    }
     match frames.iter().find(|f| f.dim() != size) {
         Some(other) => Err(ForceError::SizeMismatch {
             expected: size,
@@ -726,19 +735,6 @@ fn sum_means(mean: ArrayView2<'_, f32>, tiles: &mut Tiles) {
         // Rounded after the summing: half a grey level at most in a sum of 256 pixels.
         tiles.sums[tile] = sum.round() as i32;
     }
-}
-
-fn check_size((rows, columns): (usize, usize)) -> Result<(), ForceError> {
-    if rows == 0 || columns == 0 {
-        return Err(ForceError::EmptyImage { rows, columns });
-    }
-    if rows.max(columns) > LONGEST_SIDE {
-        return Err(ForceError::ImageTooLarge {
-            found: rows.max(columns),
-            limit: LONGEST_SIDE,
-        });
-    }
-    Ok(())
 }
 
 /// Rows of a tile.

@@ -2,7 +2,7 @@
 
 use ndarray::{Array2, ArrayView2};
 use tactile_core::statistics::effective_degrees_of_freedom;
-use tactile_core::{BoundingBox, Estimate, Polarity, Requirement};
+use tactile_core::{BoundingBox, Estimate, Polarity};
 
 use crate::calibration::{ForceReading, GreyHistogram, LocalCalibration, StressCalibration};
 use crate::contact::{Contact, ContactDetector, ContactOptions, Detection, DetectorWorkspace};
@@ -43,8 +43,7 @@ pub struct ForceMeter {
     detector: ContactDetector,
     fitter: HertzFitter,
     skip_profile: bool,
-    pixel_size_m: [f64; 2],
-    lens: Option<LensGeometry>,
+    lens: LensGeometry,
 }
 
 impl ForceMeter {
@@ -53,15 +52,11 @@ impl ForceMeter {
     /// # Errors
     /// A pixel size that is not positive and finite.
     pub fn new(pixel_size_m: [f64; 2], options: &ForceOptions) -> Result<Self, ForceError> {
-        for size in pixel_size_m {
-            Requirement::Positive.check("pixel_size_m", size)?;
-        }
         Ok(Self {
             detector: ContactDetector::new(options.contact),
             fitter: HertzFitter::new(options.hertz),
             skip_profile: options.skip_profile,
-            pixel_size_m,
-            lens: None,
+            lens: LensGeometry::new(pixel_size_m)?,
         })
     }
 
@@ -78,7 +73,7 @@ impl ForceMeter {
     /// # Ok::<(), tactile_force::ForceError>(())
     /// ```
     pub fn with_lens(mut self, lens: LensGeometry) -> Self {
-        self.lens = Some(lens);
+        self.lens = lens;
         self
     }
 
@@ -160,13 +155,9 @@ impl ForceMeter {
 
     /// Metres [x, y] for a step of one pixel along x and along y at a contact, in rows.
     fn jacobian(&self, contact: &Contact) -> [[f64; 2]; 2] {
-        let Some(lens) = &self.lens else {
-            let [hx, hy] = self.pixel_size_m;
-            return [[hx, 0.0], [0.0, hy]];
-        };
         let [x, y] = contact.centroid_px.map(|c| c.value);
         let step = |from: [f64; 2], to: [f64; 2]| {
-            let (from, to) = (lens.to_metres(from), lens.to_metres(to));
+            let (from, to) = (self.lens.to_metres(from), self.lens.to_metres(to));
             [to[0] - from[0], to[1] - from[1]]
         };
         let along_x = step([x - 0.5, y], [x + 0.5, y]);
@@ -176,18 +167,12 @@ impl ForceMeter {
 
     /// The size of a pixel at a contact.
     fn pixel_at(&self, contact: &Contact) -> PixelSize {
-        let Some(lens) = &self.lens else {
-            let [hx, hy] = self.pixel_size_m;
-            return PixelSize {
-                step: [hx, hy],
-                area: hx * hy,
-            };
-        };
         let place = contact.centroid_px.map(|c| c.value);
-        let area = lens.mean_pixel_area_m2(place, contact.equivalent_radius_px);
         PixelSize {
-            step: lens.pixel_step_m(place),
-            area,
+            step: self.lens.pixel_step_m(place),
+            area: self
+                .lens
+                .mean_pixel_area_m2(place, contact.equivalent_radius_px),
         }
     }
 
@@ -215,47 +200,40 @@ impl ForceMeter {
         &self,
         found: Detection,
         contact: Contact,
-        profile: Option<HertzFit>,
+        mut profile: Option<HertzFit>,
         stress: Stress,
         pixel: PixelSize,
     ) -> ForceMeasurement {
-        let Stress {
-            reading,
-            per_grey_pa,
-        } = stress;
-        let [x, y] = contact.centroid_px;
-        let mut centroid_m = [x * pixel.step[0], y * pixel.step[1]];
-        let mut profile = profile;
-        if let Some(lens) = &self.lens {
-            let aspect = pixel.step[1] / pixel.step[0];
-            let seen = profile.map_or(contact.equivalent_radius_px, |p| p.radius_px.value);
-            let centre = [x.value, y.value];
-            let (place, radius_m) = lens.contact_m(centre, seen, aspect);
-            centroid_m[0].value = place[0];
-            centroid_m[1].value = place[1];
-            if let Some(profile) = &mut profile {
-                let undistorted = radius_m / profile.radius_m.value;
-                profile.radius_m = profile.radius_m * undistorted;
-            }
+        let centre = contact.centroid_px.map(|c| c.value);
+        let aspect = pixel.step[1] / pixel.step[0];
+        let seen = profile.map_or(contact.equivalent_radius_px, |p| p.radius_px.value);
+        let (place, radius_m) = self.lens.contact_m(centre, seen, aspect);
+        let mut centroid_m = [0, 1].map(|k| contact.centroid_px[k] * pixel.step[k]);
+        (centroid_m[0].value, centroid_m[1].value) = (place[0], place[1]);
+        if let Some(profile) = &mut profile {
+            let undistorted = radius_m / profile.radius_m.value;
+            profile.radius_m = profile.radius_m * undistorted;
         }
-        let radius = contact_radius(&contact, profile, pixel.area.sqrt());
-        // Without a profile the brightest pixel stands for the peak, taken as good to a grey level.
+        // Without a profile the mask's radius with half a pixel as its error, and the brightest
+        // pixel for the peak, taken as good to a grey level.
+        let side = pixel.area.sqrt();
+        let of_mask = Estimate::new(contact.equivalent_radius_px * side, 0.5 * side);
+        let radius = profile.map_or(of_mask, |p| p.radius_m);
         let brightest = Estimate::new(contact.peak, 1.0);
         let peak = profile.map_or(brightest, |p| p.peak);
+        let force_n = stress.reading.force_n;
         ForceMeasurement {
-            force_n: reading.force_n,
-            reading: Some(reading),
+            force_n,
+            reading: Some(stress.reading),
             centroid_m: Some(centroid_m),
             contact_area_m2: Some((contact.area_px as f64) * pixel.area),
             contact_radius_m: Some(radius),
-            mean_stress_pa: Some(mean_stress(reading.force_n, radius)),
-            peak_stress_pa: Some(peak * per_grey_pa),
+            mean_stress_pa: Some(mean_stress(force_n, radius)),
+            peak_stress_pa: Some(peak * stress.per_grey_pa),
             contact: Some(contact),
             profile,
-            elongation: None,
-            statistics: found.statistics,
-            drift: found.drift,
             noise: found.noise,
+            ..ForceMeasurement::without_contact(found)
         }
     }
 }
@@ -438,14 +416,6 @@ impl ForceMeasurement {
             noise: None,
         }
     }
-}
-
-/// The profile's radius, else the mask's with half a pixel as its error. `side` is that of a square
-/// pixel of equal area.
-fn contact_radius(contact: &Contact, profile: Option<HertzFit>, side: f64) -> Estimate {
-    let half = 0.5 * side;
-    let of_mask = Estimate::new(contact.equivalent_radius_px * side, half);
-    profile.map_or(of_mask, |p| p.radius_m)
 }
 
 /// F/(π a²) with its standard error.
