@@ -1,6 +1,6 @@
 //! The pass against the obvious loop: integers, so equality is exact.
 
-use ndarray::{Array2, ArrayView2, Axis, ShapeBuilder, Slice};
+use ndarray::{Array2, ArrayView2, Axis, Slice};
 use proptest::prelude::*;
 use tactile_force::{BoundingBox, FrameStatistics, ReferenceFrame};
 
@@ -70,26 +70,9 @@ proptest! {
         let prepared = ReferenceFrame::new(reference.view()).unwrap();
         let found = prepared.compare(frame.view(), threshold).unwrap();
         prop_assert_eq!(found, slow(frame.view(), reference.view(), threshold));
+        // The same pixels, column after column in memory.
+        let [frame, reference] = [frame, reference].map(|i| i.t().as_standard_layout().into_owned());
+        let prepared = ReferenceFrame::new(reference.t()).unwrap();
+        prop_assert_eq!(prepared.compare(frame.t(), threshold).unwrap(), found);
     }
-}
-
-#[test]
-fn strides_do_not_matter() {
-    let value = |(y, x): (usize, usize)| ((y * 31 + x * 17) % 251) as u8;
-    let reference = Array2::from_shape_fn((70, 90), |(y, x)| ((y + x) % 7) as u8);
-    let prepared = ReferenceFrame::new(reference.view()).unwrap();
-    let rows_first = Array2::from_shape_fn((70, 90), value);
-    let columns_first = Array2::from_shape_fn((70, 90).f(), value);
-    let wider = Array2::from_shape_fn((70, 200), |(y, x)| value((y, x.saturating_sub(20))));
-    let cropped = wider.slice_axis(Axis(1), Slice::from(20..110));
-    let expected = slow(rows_first.view(), reference.view(), 9);
-    for view in [rows_first.view(), columns_first.view(), cropped] {
-        assert_eq!(prepared.compare(view, 9).unwrap(), expected);
-    }
-    let from_columns =
-        ReferenceFrame::new(Array2::from_shape_fn((70, 90).f(), |i| reference[i]).view()).unwrap();
-    assert_eq!(
-        from_columns.compare(rows_first.view(), 9).unwrap(),
-        expected
-    );
 }

@@ -1,31 +1,10 @@
 //! Drift of the illumination, frame by frame, estimated outside the contact and divided out.
 
-use tactile_force::{
-    Branch, ContactOptions, DriftCorrection, DriftOutcome, ForceMeasurement, ForceMeter,
-    ForceOptions, ForceWorkspace, ReferenceFrame, StressCalibration,
-};
+use tactile_force::{Branch, DriftCorrection, DriftOutcome, ReferenceFrame};
 
-use crate::simulated::{PIXEL_M, Sensor, contact_radius};
+use crate::simulated::{Sensor, contact_radius, measure};
 
-fn measure(
-    sensor: &Sensor,
-    reference: &ReferenceFrame,
-    calibration: &dyn StressCalibration,
-    (force, ball, seed): (f64, f64, u64),
-    drift: DriftCorrection,
-) -> ForceMeasurement {
-    let options = ForceOptions::default().with_contact(ContactOptions::default().with_drift(drift));
-    let frame = sensor.frame(force, ball, [121.3, 97.6], Branch::Loading, seed);
-    ForceMeter::new([PIXEL_M; 2], &options)
-        .unwrap()
-        .measure_with(
-            &mut ForceWorkspace::default(),
-            frame.view(),
-            reference,
-            calibration,
-        )
-        .unwrap()
-}
+const CENTRE: [f64; 2] = [121.3, 97.6];
 
 #[test]
 fn five_percent_from_frame_to_frame_are_divided_out() {
@@ -42,8 +21,9 @@ fn five_percent_from_frame_to_frame_are_divided_out() {
             ..sensor
         };
         for (j, force) in [0.1, 0.2, 0.4].into_iter().enumerate() {
-            let scene = (force, 2.5e-3, (10 * k + j) as u64);
-            let found = measure(&lit, &reference, &curve, scene, DriftCorrection::Automatic);
+            let seed = (10 * k + j) as u64;
+            let frame = lit.frame(force, 2.5e-3, CENTRE, Branch::Loading, seed);
+            let found = measure(&frame, &reference, &curve, DriftCorrection::Automatic);
             assert_eq!(found.drift.outcome, DriftOutcome::Corrected);
             let level = (found.drift.coefficients[0], found.drift.standard_error);
             inside += usize::from((level.0 - illumination).abs() < 2.0 * level.1);
@@ -56,7 +36,7 @@ fn five_percent_from_frame_to_frame_are_divided_out() {
                 "{illumination} {force}: {error} {radius}"
             );
             if illumination == 1.05 {
-                let plain = measure(&lit, &reference, &curve, scene, DriftCorrection::None);
+                let plain = measure(&frame, &reference, &curve, DriftCorrection::None);
                 assert!((plain.force_n.value / force - 1.0).abs() > 0.04);
             }
         }
@@ -77,36 +57,20 @@ fn what_cannot_be_told_is_said_and_left_alone() {
     let reference = ReferenceFrame::new(at_rest.view()).unwrap();
     let bright = Sensor::default();
     let curve = bright.curve(&bright.reference(), 2);
-    let found = measure(
-        &dark,
-        &reference,
-        &curve,
-        (0.2, 2.5e-3, 5),
-        DriftCorrection::Automatic,
-    );
+    let frame = dark.frame(0.2, 2.5e-3, CENTRE, Branch::Loading, 5);
+    let found = measure(&frame, &reference, &curve, DriftCorrection::Automatic);
     assert!(
         matches!(found.drift.outcome, DriftOutcome::TooDark { .. }),
         "{:?}",
         found.drift
     );
-    let plain = measure(
-        &dark,
-        &reference,
-        &curve,
-        (0.2, 2.5e-3, 5),
-        DriftCorrection::None,
-    );
+    let plain = measure(&frame, &reference, &curve, DriftCorrection::None);
     assert_eq!(found.force_n, plain.force_n);
     assert_eq!(plain.drift.outcome, DriftOutcome::NotRequested);
     // A contact of 85 pixels' radius covers most of the frame.
     let reference = bright.reference();
-    let found = measure(
-        &bright,
-        &reference,
-        &curve,
-        (0.25, 45e-3, 6),
-        DriftCorrection::Automatic,
-    );
+    let frame = bright.frame(0.25, 45e-3, CENTRE, Branch::Loading, 6);
+    let found = measure(&frame, &reference, &curve, DriftCorrection::Automatic);
     assert!(
         matches!(
             found.drift.outcome,

@@ -5,8 +5,8 @@
 
 use proptest::prelude::*;
 use tactile_force::{
-    Branch, CalibrationFrame, CalibrationOptions, ForceError, GreyHistogram, LinearCalibration,
-    LocalCalibration, PressureCurve, PressureCurveOptions, StressCalibration,
+    Branch, CalibrationFrame, CalibrationOptions, DriftCorrection, ForceError, GreyHistogram,
+    LinearCalibration, LocalCalibration, PressureCurve, PressureCurveOptions, StressCalibration,
 };
 
 use crate::simulated::{AREA_M2, Sensor, contact_radius, measure};
@@ -37,7 +37,7 @@ fn force_and_radius_of_another_ball_are_right_whatever_the_power() {
                 (&mut local, &curve as &dyn StressCalibration),
                 (&mut summed, &sums),
             ] {
-                let m = measure(&frame, &reference, calibration);
+                let m = measure(&frame, &reference, calibration, DriftCorrection::Automatic);
                 worst[0] = worst[0].max((m.force_n.value / force - 1.0).abs());
                 worst[1] = worst[1].max((m.contact_radius_m.unwrap().value / radius - 1.0).abs());
             }
@@ -79,7 +79,7 @@ fn stated_errors_cover_the_truth() {
     for seed in 0..12 {
         let curve = sensor.curve(&reference, seed);
         for (force, frame) in &frames {
-            let found = measure(frame, &reference, &curve).force_n;
+            let found = measure(frame, &reference, &curve, DriftCorrection::Automatic).force_n;
             inside += usize::from((found.value - force).abs() < 2.0 * found.standard_error);
             count += 1;
         }
@@ -124,7 +124,9 @@ fn the_report_says_what_was_learned() {
     }
     // A reading is no surer than half of the lag.
     let frame = sensor.frame(0.4, 2.5e-3, [121.3, 97.6], Branch::Loading, 8);
-    let reading = measure(&frame, &reference, &curve).reading.unwrap();
+    let reading = measure(&frame, &reference, &curve, DriftCorrection::Automatic)
+        .reading
+        .unwrap();
     assert!(reading.calibration_n >= lag.width * reading.force_n.value && !reading.out_of_range);
 }
 
@@ -136,7 +138,7 @@ fn grey_levels_beyond_those_seen_are_flagged() {
     // A small ball presses harder than any of the calibration.
     let frame = sensor.frame(0.15, 1.2e-3, [121.3, 97.6], Branch::Loading, 9);
     assert!(
-        measure(&frame, &reference, &curve)
+        measure(&frame, &reference, &curve, DriftCorrection::Automatic)
             .reading
             .unwrap()
             .out_of_range

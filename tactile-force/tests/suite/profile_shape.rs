@@ -5,8 +5,8 @@ use ndarray::Array2;
 use rand::{SeedableRng, rngs::ChaCha8Rng};
 use rand_distr::{Distribution, StandardNormal};
 use tactile_force::{
-    ForceOptions, HertzFit, HertzFitOptions, ProfileShape, ReferenceFrame, StopReason,
-    measure_force,
+    DriftCorrection, ForceOptions, HertzFit, HertzFitOptions, ProfileShape, ReferenceFrame,
+    StopReason, measure_force,
 };
 
 use crate::blob::calibration;
@@ -38,9 +38,14 @@ fn fitted(level: impl Fn(f64, f64) -> f64, seed: u64) -> HertzFit {
         })
     };
     let reference = ReferenceFrame::new(frame(false).view()).unwrap();
-    measure(&frame(true), &reference, &calibration())
-        .profile
-        .unwrap()
+    measure(
+        &frame(true),
+        &reference,
+        &calibration(),
+        DriftCorrection::Automatic,
+    )
+    .profile
+    .unwrap()
 }
 
 fn radius2(x: f64, y: f64) -> f64 {

@@ -7,8 +7,8 @@ use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 use rand_distr::{Distribution, StandardNormal};
 use tactile_force::{
     Branch, CalibrationFrame, CalibrationPair, ContactDetector, ContactOptions, Detection,
-    DetectorWorkspace, ForceMeasurement, ForceMeter, ForceOptions, ForceWorkspace, PressureCurve,
-    PressureCurveOptions, ReferenceFrame, StressCalibration,
+    DetectorWorkspace, DriftCorrection, ForceMeasurement, ForceMeter, ForceOptions, ForceWorkspace,
+    PressureCurve, PressureCurveOptions, ReferenceFrame, StressCalibration,
 };
 
 pub(crate) const SHAPE: (usize, usize) = (200, 240);
@@ -190,14 +190,11 @@ pub(crate) fn measure(
     frame: &Array2<u8>,
     reference: &ReferenceFrame,
     calibration: &dyn StressCalibration,
+    drift: DriftCorrection,
 ) -> ForceMeasurement {
-    let meter = ForceMeter::new([PIXEL_M; 2], &ForceOptions::default()).unwrap();
-    meter
-        .measure_with(
-            &mut ForceWorkspace::default(),
-            frame.view(),
-            reference,
-            calibration,
-        )
-        .unwrap()
+    let options = ForceOptions::default().with_contact(ContactOptions::default().with_drift(drift));
+    let meter = ForceMeter::new([PIXEL_M; 2], &options).unwrap();
+    let mut workspace = ForceWorkspace::default();
+    let found = meter.measure_with(&mut workspace, frame.view(), reference, calibration);
+    found.unwrap()
 }
