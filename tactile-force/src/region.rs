@@ -9,9 +9,7 @@ use ndarray::ArrayView2;
 use tactile_core::{BoundingBox, Loop, vectorised};
 
 use crate::drift::{DriftLine, IlluminationDrift};
-use crate::frame::{
-    DifferenceNoise, FlatField, FlatLine, Levels, ReferenceFrame, trimmed_variance,
-};
+use crate::frame::{DifferenceNoise, FlatLine, Levels, ReferenceFrame, trimmed_variance};
 
 /// Differences over one box, row-major, and the contact in it as runs.
 #[derive(Clone, Debug, Default)]
@@ -58,15 +56,17 @@ impl Region {
         self.place = Some(place);
         // Every pixel is written below.
         self.difference.resize(place.rows() * place.columns(), 0.0);
-        let rows = Rows {
-            frame,
-            levels: reference.levels(),
-            place,
-            drift: (!drift.is_zero()).then_some(drift),
-            flat: reference.flat_field(),
-            sign,
+        let (first_column, flat) = (place.column_start, reference.flat_field());
+        let lines = |y: usize| {
+            let row = place.row_start + y;
+            let drift = (!drift.is_zero()).then(|| drift.line(row, first_column));
+            (drift, flat.map(|flat| flat.line(row, first_column)))
         };
-        rows.take(&mut self.difference)
+        let (frame, differences) = (place.of(frame), &mut self.difference);
+        match reference.levels() {
+            Levels::Whole(levels) => take(frame, place.of(levels), lines, sign, differences),
+            Levels::Fine(levels) => take(frame, place.of(levels), lines, sign, differences),
+        }
     }
 
     /// Thresholds the mean over a box of `width` pixels, keeps the largest component and fills its
@@ -192,62 +192,37 @@ fn box_sums(
     }
 }
 
-/// The rows of a box, and how their differences are corrected.
-pub struct Rows<'a> {
-    pub frame: ArrayView2<'a, u8>,
-    pub levels: Levels<'a>,
-    pub place: BoundingBox,
-    pub drift: Option<&'a IlluminationDrift>,
-    pub flat: Option<FlatField>,
-    /// −1 where contact darkens.
-    pub sign: f32,
-}
-
-impl Rows<'_> {
-    /// Writes the differences and returns the greatest of them, zero if none is positive.
-    pub fn take(&self, differences: &mut [f32]) -> f32 {
-        match self.levels {
-            Levels::Whole(levels) => self.take_from(levels, differences),
-            Levels::Fine(levels) => self.take_from(levels, differences),
-        }
-    }
-
-    fn take_from<P: Copy + Into<f32>>(
-        &self,
-        levels: ArrayView2<'_, P>,
-        differences: &mut [f32],
-    ) -> f32 {
-        let (frame, levels) = (self.place.of(self.frame), self.place.of(levels));
-        let first_column = self.place.column_start;
-        let rows = differences.chunks_exact_mut(self.place.columns());
-        let mut greatest = 0.0;
-        for ((y, differences), (frame, levels)) in rows
-            .enumerate()
-            .zip(frame.rows().into_iter().zip(levels.rows()))
-        {
-            let row = self.place.row_start + y;
-            let (drift, flat) = (
-                self.drift.map(|drift| drift.line(row, first_column)),
-                self.flat.map(|flat| flat.line(row, first_column)),
-            );
-            let mut take = |frame: &[u8], levels: &[P]| {
-                let row = Row {
-                    frame,
-                    levels,
-                    drift,
-                    flat,
-                    sign: self.sign,
-                    differences,
-                };
-                greatest = larger(greatest, vectorised(row));
+/// Writes the differences of a box and returns the greatest of them, zero if none is positive.
+/// `lines` has the corrections along a row, `sign` is −1 where contact darkens.
+fn take<P: Copy + Into<f32>>(
+    frame: ArrayView2<'_, u8>,
+    levels: ArrayView2<'_, P>,
+    lines: impl Fn(usize) -> (Option<DriftLine>, Option<FlatLine>),
+    sign: f32,
+    differences: &mut [f32],
+) -> f32 {
+    let rows = differences.chunks_exact_mut(frame.ncols()).enumerate();
+    let mut greatest = 0.0;
+    for ((y, differences), (frame, levels)) in rows.zip(frame.rows().into_iter().zip(levels.rows()))
+    {
+        let (drift, flat) = lines(y);
+        let mut take = |frame: &[u8], levels: &[P]| {
+            let row = Row {
+                frame,
+                levels,
+                drift,
+                flat,
+                sign,
+                differences,
             };
-            match (frame.to_slice(), levels.to_slice()) {
-                (Some(frame), Some(levels)) => take(frame, levels),
-                _ => take(&frame.to_vec(), &levels.to_vec()),
-            }
+            greatest = larger(greatest, vectorised(row));
+        };
+        match (frame.to_slice(), levels.to_slice()) {
+            (Some(frame), Some(levels)) => take(frame, levels),
+            _ => take(&frame.to_vec(), &levels.to_vec()),
         }
-        greatest
     }
+    greatest
 }
 
 /// One row. The greatest difference is taken while the row is in the nearest cache.
@@ -457,18 +432,6 @@ impl Components {
         (area, others)
     }
 
-    /// Marks the components of the background that reach the border.
-    fn mark_open(&mut self, background: &[Run], rows: u32, columns: u32) {
-        self.area.clear();
-        self.area.resize(background.len(), 0);
-        for (k, b) in background.iter().enumerate() {
-            if b.row == 0 || b.row == rows - 1 || b.start == 0 || b.end == columns {
-                let root = self.root(k as u32) as usize;
-                self.area[root] = OPEN;
-            }
-        }
-    }
-
     /// Adds everything the runs enclose: the background that no 4-path joins to the border. Returns
     /// the area filled.
     pub fn fill_holes(
@@ -482,7 +445,16 @@ impl Components {
         // The object is joined at corners, so that the background must not be: else the two could
         // cross.
         self.join(background, false);
-        self.mark_open(background, rows as u32, columns as u32);
+        // Components of the background that reach the border are open.
+        let (last, columns) = (rows as u32 - 1, columns as u32);
+        self.area.clear();
+        self.area.resize(background.len(), 0);
+        for (k, b) in background.iter().enumerate() {
+            if b.row == 0 || b.row == last || b.start == 0 || b.end == columns {
+                let root = self.root(k as u32) as usize;
+                self.area[root] = OPEN;
+            }
+        }
         let before = runs.len();
         let mut filled = 0;
         for (k, run) in background.iter().enumerate() {

@@ -111,9 +111,7 @@ proptest! {
         prop_assert_eq!(mask_of(&grown, 9), (0..mask.len()).map(near).collect::<Vec<_>>());
         prop_assert!(grown.windows(2).all(|w| w[0].row < w[1].row || w[0].end < w[1].start));
     }
-}
 
-proptest! {
     #[test]
     fn those_within_are_those_contained_and_mirroring_changes_none(
         start in 0_usize..20, length in 1_usize..40, step in 1_usize..7,
