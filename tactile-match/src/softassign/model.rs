@@ -1,8 +1,8 @@
 //! The model of the warp: a Gaussian-process prior, the regression under it, the average over its
 //! scales, and rigid motions in its place.
 
-use super::{Axes, PriorScales, Regression, Request, State, Transformation};
-use nalgebra::{Matrix3, Point, SMatrix, SVector, Vector3};
+use super::{Axes, FARTHEST, PriorScales, Regression, Request, State, Transformation};
+use nalgebra::{Matrix3, Point, SMatrix, SVector, SymmetricEigen, Vector3};
 use tactile_core::vectorised;
 use tactile_tps::Affine;
 
@@ -895,13 +895,14 @@ impl<const D: usize> RigidFit<D> {
             let r = p.coords - from;
             let image = linear * r + to;
             let arm = in_space(&r).cross_matrix();
-            let turned = (arm * turning * arm.transpose()).trace();
+            let turned = (arm * turning * arm.transpose()).trace().max(0.0);
             let grown = if scaled {
                 r.norm_squared() / extent
             } else {
                 0.0
             };
             let variance = noise * (1.0 / total + (turned + grown) / D as f64);
+            let variance = variance.min(FARTHEST); // hardly anything is matched
             (std::array::from_fn(|k| image[k] - base[i][k]), variance)
         });
     }
@@ -920,7 +921,12 @@ fn rotations_covariance<const D: usize>(inertia: &Matrix3<f64>) -> Matrix3<f64> 
         let variance = if about > 0.0 { about.recip() } else { 0.0 };
         return Matrix3::from_diagonal(&Vector3::new(0.0, 0.0, variance));
     }
-    inertia.try_inverse().unwrap_or_else(Matrix3::zeros)
+    let axes = SymmetricEigen::new(*inertia);
+    // Moments below this share of the largest are rounding: of points that lie on one line.
+    let least = 1e-9 * axes.eigenvalues.max();
+    let inverse = |moment: f64| if moment > least { moment.recip() } else { 0.0 };
+    let turn = &axes.eigenvectors;
+    turn * Matrix3::from_diagonal(&axes.eigenvalues.map(inverse)) * turn.transpose()
 }
 
 #[cfg(test)]
