@@ -52,7 +52,7 @@ pub fn linear_assignment(
 /// assert_eq!(workspace.row_prices.iter().chain(&workspace.column_prices).sum::<f64>(), 2.0);
 /// # Ok::<(), tactile_match::MatchError>(())
 /// ```
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct AssignmentWorkspace {
     assignment: Vec<Option<usize>>,
     /// `u` of the last solution.
@@ -62,19 +62,6 @@ pub struct AssignmentWorkspace {
     /// The matrix turned so that it is not taller than wide.
     turned: Vec<f64>,
     search: Search,
-}
-
-impl Default for AssignmentWorkspace {
-    /// Without memory yet.
-    fn default() -> Self {
-        Self {
-            assignment: Vec::new(),
-            row_prices: Vec::new(),
-            column_prices: Vec::new(),
-            turned: Vec::new(),
-            search: Search::new(),
-        }
-    }
 }
 
 impl AssignmentWorkspace {
@@ -158,19 +145,6 @@ struct Search {
 }
 
 impl Search {
-    fn new() -> Self {
-        Self {
-            column_of: Vec::new(),
-            row_of: Vec::new(),
-            prices: Vec::new(),
-            free: Vec::new(),
-            waiting: Vec::new(),
-            distance: Vec::new(),
-            before: Vec::new(),
-            order: Vec::new(),
-        }
-    }
-
     fn run(&mut self, costs: &[f64], rows: usize, columns: usize) {
         reset(&mut self.column_of, rows, NONE);
         reset(&mut self.row_of, columns, NONE);
@@ -316,8 +290,7 @@ impl Search {
 /// The columns with the least and the second least reduced cost `c − v`, with these costs. `+∞`
 /// where there is no second.
 fn two_cheapest(costs: &[f64], prices: &[f64]) -> ((usize, f64), (usize, f64)) {
-    let infinite = 1.0 / 0.0;
-    let (mut best, mut second) = ((0, infinite), (0, infinite));
+    let (mut best, mut second) = ((0, f64::INFINITY), (0, f64::INFINITY));
     for (j, (&c, &v)) in costs.iter().zip(prices).enumerate() {
         let reduced = c - v;
         if reduced < second.1 {

@@ -18,12 +18,12 @@
 //! `P` is never stored while iterating, and the Gaussian kernel is factorised once, to the rank it
 //! numerically has, instead of solving an `M × M` system in every iteration.
 
-use crate::Frame;
 use crate::error::{at_least_one, option_within, point_sets};
 use crate::{
     AssignmentWorkspace, MatchError, MatchReport, Matching, PointMatcher, SoftMatches, StopReason,
     unmatched_rows,
 };
+use crate::{Axes, BestMotion, Frame, spread};
 use nalgebra::{Cholesky, DMatrix, Dyn, Point, SMatrix, SVector, VecStorage};
 use tactile_core::{Loop, vectorised};
 use tactile_tps::{Affine, Warp};
@@ -159,7 +159,7 @@ impl CoherentPointDrift {
     ) -> Result<Matching<D>, MatchError> {
         point_sets(model, target)?;
         workspace.register(self, model, target);
-        Ok(matching(self, workspace, model.len(), target.len()))
+        Ok(matching(workspace))
     }
 }
 
@@ -335,51 +335,25 @@ impl CoherentPointDrift {
 /// assert!((found.warp.apply(&model[5]) - found.warped[5]).norm() < 1e-6);
 /// # Ok::<(), tactile_match::MatchError>(())
 /// ```
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct DriftWorkspace<const D: usize> {
+    /// Those of the last registration.
+    options: CoherentPointDrift,
     model_frame: Frame<D>,
     target_frame: Frame<D>,
-    model: Columns<D>,
-    target: Columns<D>,
-    moved: Columns<D>,
+    model: Axes<D>,
+    target: Axes<D>,
+    moved: Axes<D>,
     posterior: Posterior<D>,
     sigma2: f64,
     energy: Vec<f64>,
     stop: StopReason,
-    motion: Motion,
     kernel: KernelFactor,
     non_rigid: NonRigidStep,
     global: GlobalStep<D>,
 }
 
-impl<const D: usize> Default for DriftWorkspace<D> {
-    fn default() -> Self {
-        // Without memory yet.
-        let columns = || std::array::from_fn(|_| Vec::new());
-        Self {
-            model_frame: Frame::default(),
-            target_frame: Frame::default(),
-            model: columns(),
-            target: columns(),
-            moved: columns(),
-            posterior: Posterior::default(),
-            sigma2: 0.0,
-            energy: Vec::new(),
-            stop: StopReason::default(),
-            motion: Motion::NON_RIGID,
-            kernel: KernelFactor::default(),
-            non_rigid: NonRigidStep::default(),
-            global: GlobalStep::default(),
-        }
-    }
-}
-
 impl<const D: usize> DriftWorkspace<D> {
-    /// Iterations of the last registration.
-    fn iterations(&self) -> usize {
-        self.energy.len()
-    }
-
     /// Registers `model` to `target`. Both have points and finite coordinates.
     fn register(
         &mut self,
@@ -387,12 +361,12 @@ impl<const D: usize> DriftWorkspace<D> {
         model: &[Point<f64, D>],
         target: &[Point<f64, D>],
     ) {
-        self.enter_frames(options, model, target);
-        self.global.reset();
-        self.motion = options.motion;
+        self.options = *options;
+        self.enter_frames(model, target);
+        self.global.map = Affine::default();
         if let Motion::NonRigid { beta, rank, .. } = options.motion {
             self.kernel.build(
-                &self.model,
+                &self.model.0,
                 beta,
                 rank.unwrap_or(model.len()),
                 // What is left of the kernel's diagonal when its factorisation ends: far below what
@@ -409,7 +383,7 @@ impl<const D: usize> DriftWorkspace<D> {
         self.stop = StopReason::IterationLimit;
         for _ in 0..options.max_iterations {
             let before = self.sigma2;
-            self.iterate(options);
+            self.iterate();
             if (self.sigma2 - before).abs() <= options.tolerance {
                 self.stop = StopReason::Converged;
                 break;
@@ -417,12 +391,8 @@ impl<const D: usize> DriftWorkspace<D> {
         }
     }
 
-    fn enter_frames(
-        &mut self,
-        options: &CoherentPointDrift,
-        model: &[Point<f64, D>],
-        target: &[Point<f64, D>],
-    ) {
+    fn enter_frames(&mut self, model: &[Point<f64, D>], target: &[Point<f64, D>]) {
+        let options = &self.options;
         self.model_frame = Frame::of(model);
         self.target_frame = match options.normalization {
             Normalization::Each => Frame::of(target),
@@ -439,13 +409,13 @@ impl<const D: usize> DriftWorkspace<D> {
         }
         self.model_frame.enter(model, &mut self.model);
         self.target_frame.enter(target, &mut self.target);
-        self.moved.clone_from(&self.model);
+        self.moved.0.clone_from(&self.model.0);
     }
 
     /// Mean squared distance of all pairs, per axis.
     fn initial_variance(&self) -> f64 {
         let mut sum = 0.0;
-        for (y, x) in self.model.iter().zip(&self.target) {
+        for (y, x) in self.model.0.iter().zip(&self.target.0) {
             let moments = |v: &[f64]| {
                 let n = v.len() as f64;
                 (
@@ -460,42 +430,39 @@ impl<const D: usize> DriftWorkspace<D> {
     }
 
     /// One E-step and one M-step.
-    fn iterate(&mut self, options: &CoherentPointDrift) {
-        let uniform = self.uniform(options);
+    fn iterate(&mut self) {
+        let uniform = self.uniform();
         self.posterior
-            .update(&self.moved, &self.target, self.sigma2, uniform);
+            .update(&self.moved.0, &self.target.0, self.sigma2, uniform);
         self.energy.push(self.posterior.energy);
-        match options.motion {
+        let (posterior, model, moved) = (&self.posterior, &self.model.0, &mut self.moved.0);
+        match self.options.motion {
             Motion::NonRigid { lambda, .. } => {
                 let ridge = lambda * self.sigma2;
-                self.non_rigid.solve(
-                    &self.kernel,
-                    &self.posterior,
-                    &self.model,
-                    ridge,
-                    &mut self.moved,
-                );
+                self.non_rigid
+                    .solve(&self.kernel, posterior, model, ridge, moved);
             }
-            motion => self
-                .global
-                .solve(motion, &self.posterior, &self.model, &mut self.moved),
+            motion => self.global.solve(motion, posterior, model, moved),
         }
-        self.update_variance(options.tolerance);
+        self.update_variance();
     }
 
-    /// Weight of the uniform component at the present variance.
-    fn uniform(&self, options: &CoherentPointDrift) -> f64 {
-        uniform_weight::<D>(
-            self.sigma2,
-            options.outlier_weight,
-            self.model[0].len(),
-            self.target[0].len(),
-        )
+    /// Weight of the uniform component relative to one Gaussian's peak at the present variance,
+    /// `(2πσ²)^{D/2} w M / ((1 − w) N)`.
+    fn uniform(&self) -> f64 {
+        let (w, [m, n]) = (self.options.outlier_weight, self.lengths());
+        let volume = (std::f64::consts::TAU * self.sigma2).powf(0.5 * D as f64);
+        volume * w / (1.0 - w) * m as f64 / n as f64
+    }
+
+    /// Points of the model and of the target.
+    fn lengths(&self) -> [usize; 2] {
+        [self.model.0[0].len(), self.target.0[0].len()]
     }
 
     /// `σ² = Σ P_mn |x_n − T(y_m)|² / (D Σ P_mn)`. A tenth of the tolerance where rounding makes it
     /// zero or less.
-    fn update_variance(&mut self, tolerance: f64) {
+    fn update_variance(&mut self) {
         let mass: f64 = self.posterior.model_mass.iter().sum();
         if mass <= f64::MIN_POSITIVE {
             return; // all are outliers: nothing to learn from
@@ -505,8 +472,8 @@ impl<const D: usize> DriftWorkspace<D> {
         };
         let mut sum = 0.0;
         for d in 0..D {
-            let (x, t) = (&self.target[d], &self.moved[d]);
-            let cross: f64 = self.posterior.weighted[d]
+            let (x, t) = (&self.target.0[d], &self.moved.0[d]);
+            let cross: f64 = self.posterior.weighted.0[d]
                 .iter()
                 .zip(t)
                 .map(|(p, t)| p * t)
@@ -520,16 +487,15 @@ impl<const D: usize> DriftWorkspace<D> {
         self.sigma2 = if variance > 0.0 {
             variance
         } else {
-            0.1 * tolerance
+            0.1 * self.options.tolerance
         }
         .max(least);
     }
 
     /// The model points where the last registration left them.
     fn warped(&self) -> Vec<Point<f64, D>> {
-        let at = |m: usize| SVector::from_fn(|d, _| self.moved[d][m]);
-        (0..self.moved[0].len())
-            .map(|m| self.target_frame.leave(at(m)))
+        (0..self.lengths()[0])
+            .map(|m| self.target_frame.leave(at(&self.moved.0, m)))
             .collect()
     }
 
@@ -538,14 +504,14 @@ impl<const D: usize> DriftWorkspace<D> {
         let mut warp = DriftWarp {
             model: self.model_frame,
             target: self.target_frame,
-            linear: self.global.linear,
-            offset: self.global.offset,
+            map: self.global.map,
             centres: Vec::new(),
             weights: Vec::new(),
             beta: 1.0,
         };
-        if let (Motion::NonRigid { beta, .. }, false) = (self.motion, self.energy.is_empty()) {
-            (warp.linear, warp.offset, warp.beta) = (SMatrix::identity(), SVector::zeros(), beta);
+        let motion = self.options.motion;
+        if let (Motion::NonRigid { beta, .. }, false) = (motion, self.energy.is_empty()) {
+            warp.beta = beta;
             let coefficients: Vec<_> = (0..self.kernel.rank())
                 .map(|k| self.non_rigid.coefficient(k))
                 .collect();
@@ -555,8 +521,8 @@ impl<const D: usize> DriftWorkspace<D> {
                 .into_iter()
                 .map(SVector::from)
                 .collect();
-            let at = |&m: &usize| SVector::from_fn(|d, _| self.model[d][m]);
-            warp.centres = self.kernel.pivots.iter().map(at).collect();
+            let pivots = self.kernel.pivots.iter();
+            warp.centres = pivots.map(|&m| at(&self.model.0, m)).collect();
         }
         warp
     }
@@ -568,43 +534,24 @@ impl<const D: usize> DriftWorkspace<D> {
 /// `D` coordinates, each contiguous over the points.
 type Columns<const D: usize> = [Vec<f64>; D];
 
+/// Point `m` of these.
+fn at<const D: usize>(columns: &Columns<D>, m: usize) -> SVector<f64, D> {
+    SVector::from_fn(|d, _| columns[d][m])
+}
+
 /// The sums over the posterior that the M-steps need, for `M` model and `N` target points.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 struct Posterior<const D: usize> {
     /// `P 1`: how much of the target every model point has.
     model_mass: Vec<f64>,
     /// `Pᵀ 1`: how much of every target point is no outlier.
     target_mass: Vec<f64>,
     /// `P X`.
-    weighted: Columns<D>,
+    weighted: Axes<D>,
     /// Negative log-likelihood, up to a constant that depends on the sizes alone.
     energy: f64,
     /// One column of `P`.
     column: Vec<f64>,
-}
-
-impl<const D: usize> Default for Posterior<D> {
-    fn default() -> Self {
-        Self {
-            model_mass: Vec::new(),
-            target_mass: Vec::new(),
-            weighted: std::array::from_fn(|_| Vec::new()),
-            energy: 0.0,
-            column: Vec::new(),
-        }
-    }
-}
-
-/// Weight of the uniform component relative to one Gaussian's peak,
-/// `(2πσ²)^{D/2} w M / ((1 − w) N)`.
-fn uniform_weight<const D: usize>(
-    sigma2: f64,
-    outlier_weight: f64,
-    model: usize,
-    target: usize,
-) -> f64 {
-    let volume = (std::f64::consts::TAU * sigma2).powf(0.5 * D as f64);
-    volume * outlier_weight / (1.0 - outlier_weight) * model as f64 / target as f64
 }
 
 impl<const D: usize> Posterior<D> {
@@ -613,6 +560,7 @@ impl<const D: usize> Posterior<D> {
         let (model_len, target_len) = (moved[0].len(), target[0].len());
         for sums in self
             .weighted
+            .0
             .iter_mut()
             .chain([&mut self.model_mass, &mut self.column])
         {
@@ -657,7 +605,7 @@ impl<const D: usize> Loop for Accumulate<'_, D> {
             sums.energy -= total.ln();
             sums.target_mass[n] = sum / total;
             scale_and_add(&mut sums.column, &mut sums.model_mass, 1.0 / total);
-            for (weighted, x) in sums.weighted.iter_mut().zip(x) {
+            for (weighted, x) in sums.weighted.0.iter_mut().zip(x) {
                 for (sum, &p) in weighted.iter_mut().zip(&sums.column) {
                     *sum += p * x;
                 }
@@ -988,7 +936,7 @@ impl<const D: usize> Loop for Assemble<'_, D> {
         for (m, &p) in mass.iter().enumerate() {
             let row = self.kernel.row(m);
             for d in 0..D {
-                let residual = self.posterior.weighted[d][m] - p * self.model[d][m];
+                let residual = self.posterior.weighted.0[d][m] - p * self.model[d][m];
                 add_scaled(&mut coefficients[d * rank..][..rank], row, residual);
             }
         }
@@ -1063,34 +1011,15 @@ impl<const D: usize> Loop for Apply<'_, D> {
 // that the step is the weighted fit to these means: Myronenko & Song (2010), figures 2 and 3.
 
 /// `y ↦ A y + b`, and the memory to find it.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 struct GlobalStep<const D: usize> {
-    linear: SMatrix<f64, D, D>,
-    offset: SVector<f64, D>,
+    map: Affine<f64, D>,
     sources: Vec<Point<f64, D>>,
     means: Vec<Point<f64, D>>,
     weights: Vec<f64>,
 }
 
-impl<const D: usize> Default for GlobalStep<D> {
-    fn default() -> Self {
-        let (sources, means, weights) = Default::default();
-        Self {
-            linear: SMatrix::identity(),
-            offset: SVector::zeros(),
-            sources,
-            means,
-            weights,
-        }
-    }
-}
-
 impl<const D: usize> GlobalStep<D> {
-    /// Back to the identity.
-    fn reset(&mut self) {
-        (self.linear, self.offset) = (SMatrix::identity(), SVector::zeros());
-    }
-
     /// Fits `motion` and moves `model` into `moved`. `O(M)`. A posterior without mass leaves the
     /// last motion.
     fn solve(
@@ -1101,17 +1030,19 @@ impl<const D: usize> GlobalStep<D> {
         moved: &mut Columns<D>,
     ) {
         self.collect(posterior, model);
-        match motion {
-            Motion::Rigid => self.fit_rigid(false),
-            Motion::Similarity => self.fit_rigid(true),
-            _ => {
-                if let Ok(fit) = Affine::fit(&self.sources, &self.means, Some(&self.weights)) {
-                    (self.linear, self.offset) = (fit.linear, fit.offset);
-                }
-            }
-        }
+        let (sources, means, weights) = (&self.sources, &self.means, &self.weights);
+        let found = if motion == Motion::Affine {
+            Affine::fit(sources, means, Some(weights)).ok()
+        } else {
+            let scaled = motion == Motion::Similarity;
+            BestMotion::of(sources, means, weights, scaled).map(|fit| Affine {
+                linear: fit.linear,
+                offset: fit.to - fit.linear * fit.from,
+            })
+        };
+        self.map = found.unwrap_or(self.map);
         for m in 0..model[0].len() {
-            let image = self.linear * SVector::from_fn(|d, _| model[d][m]) + self.offset;
+            let image = self.map.apply(&Point::from(at(model, m)));
             (0..D).for_each(|d| moved[d][m] = image[d]);
         }
     }
@@ -1126,50 +1057,11 @@ impl<const D: usize> GlobalStep<D> {
             .enumerate()
             .filter(|(_, mass)| **mass > f64::MIN_POSITIVE)
         {
-            self.sources
-                .push(Point::from(SVector::from_fn(|d, _| model[d][m])));
-            self.means.push(Point::from(SVector::from_fn(|d, _| {
-                posterior.weighted[d][m] / mass
-            })));
+            self.sources.push(Point::from(at(model, m)));
+            let mean = at(&posterior.weighted.0, m) / mass;
+            self.means.push(Point::from(mean));
             self.weights.push(mass);
         }
-    }
-
-    fn fit_rigid(&mut self, scaled: bool) {
-        let Ok(fit) = Affine::fit_rigid(&self.sources, &self.means, Some(&self.weights)) else {
-            return;
-        };
-        let scale = if scaled { self.scale(&fit.linear) } else { 1.0 };
-        let (source, mean) = (
-            self.weighted_mean(&self.sources),
-            self.weighted_mean(&self.means),
-        );
-        self.linear = fit.linear * scale;
-        self.offset = mean - self.linear * source;
-    }
-
-    /// `tr(Aᵀ R) / tr(Yᵀ diag(P1) Y)` about the weighted means. One where the model has no extent.
-    fn scale(&self, rotation: &SMatrix<f64, D, D>) -> f64 {
-        let (source, mean) = (
-            self.weighted_mean(&self.sources),
-            self.weighted_mean(&self.means),
-        );
-        let (mut along, mut extent) = (0.0, 0.0);
-        for ((y, x), w) in self.sources.iter().zip(&self.means).zip(&self.weights) {
-            let y = y.coords - source;
-            along += w * (x.coords - mean).dot(&(rotation * y));
-            extent += w * y.norm_squared();
-        }
-        if extent > 0.0 { along / extent } else { 1.0 }
-    }
-
-    fn weighted_mean(&self, points: &[Point<f64, D>]) -> SVector<f64, D> {
-        let total: f64 = self.weights.iter().sum();
-        points
-            .iter()
-            .zip(&self.weights)
-            .map(|(p, w)| p.coords * (w / total))
-            .sum()
     }
 }
 
@@ -1183,8 +1075,7 @@ impl<const D: usize> GlobalStep<D> {
 struct DriftWarp<const D: usize> {
     model: Frame<D>,
     target: Frame<D>,
-    linear: SMatrix<f64, D, D>,
-    offset: SVector<f64, D>,
+    map: Affine<f64, D>,
     centres: Vec<SVector<f64, D>>,
     weights: Vec<SVector<f64, D>>,
     beta: f64,
@@ -1199,7 +1090,7 @@ impl<const D: usize> DriftWarp<D> {
 impl<const D: usize> Warp<f64, D> for DriftWarp<D> {
     fn apply(&self, point: &Point<f64, D>) -> Point<f64, D> {
         let y = self.model.inside(point);
-        let mut image = self.linear * y + self.offset;
+        let mut image = self.map.linear * y + self.map.offset;
         for (centre, weight) in self.centres.iter().zip(&self.weights) {
             image += weight * self.gaussian(&(y - centre));
         }
@@ -1208,7 +1099,7 @@ impl<const D: usize> Warp<f64, D> for DriftWarp<D> {
 
     fn jacobian(&self, point: &Point<f64, D>) -> SMatrix<f64, D, D> {
         let y = self.model.inside(point);
-        let mut jacobian = self.linear;
+        let mut jacobian = self.map.linear;
         for (centre, weight) in self.centres.iter().zip(&self.weights) {
             let step = y - centre;
             jacobian -=
@@ -1221,17 +1112,14 @@ impl<const D: usize> Warp<f64, D> for DriftWarp<D> {
 // From the mixture at its end to a [`Matching`]: posterior, pairs, confidences, covariances.
 
 /// The posterior `P` at the end, a row of `M` entries per target point.
-fn posterior<const D: usize>(
-    options: &CoherentPointDrift,
-    workspace: &DriftWorkspace<D>,
-) -> Vec<f64> {
-    let (model_len, target_len) = (workspace.moved[0].len(), workspace.target[0].len());
+fn posterior<const D: usize>(workspace: &DriftWorkspace<D>) -> Vec<f64> {
+    let [model_len, target_len] = workspace.lengths();
     let sigma2 = workspace.sigma2.max(f64::MIN_POSITIVE);
-    let uniform = workspace.uniform(options);
+    let uniform = workspace.uniform();
     let mut rows = vec![0.0; model_len * target_len];
     for (n, row) in rows.chunks_exact_mut(model_len).enumerate() {
-        let x = std::array::from_fn(|d| workspace.target[d][n]);
-        let total = gaussians(row, &workspace.moved, x, sigma2) + uniform;
+        let x = at(&workspace.target.0, n).into();
+        let total = gaussians(row, &workspace.moved.0, x, sigma2) + uniform;
         if total > 0.0 {
             row.iter_mut().for_each(|p| *p /= total);
         }
@@ -1263,14 +1151,10 @@ fn pairs(posterior: &[f64], model_len: usize, target_len: usize) -> Vec<Option<u
     assignment
 }
 
-/// Assembles the result. Lengths are those of the model and the target.
-fn matching<const D: usize>(
-    options: &CoherentPointDrift,
-    workspace: &DriftWorkspace<D>,
-    model_len: usize,
-    target_len: usize,
-) -> Matching<D> {
-    let posterior = posterior(options, workspace);
+/// Assembles the result.
+fn matching<const D: usize>(workspace: &DriftWorkspace<D>) -> Matching<D> {
+    let [model_len, target_len] = workspace.lengths();
+    let posterior = posterior(workspace);
     let assignment = pairs(&posterior, model_len, target_len);
     let scale = workspace.target_frame.scale;
     let (mut soft, mut confidence, mut covariance) =
@@ -1287,7 +1171,10 @@ fn matching<const D: usize>(
         soft.push_row(row.iter().map(|&(n, p)| (n, share(p))));
         let sure = partner.map_or(1.0 - mass.min(1.0), |n| share(posterior[n * model_len + m]));
         confidence.push(sure.clamp(0.0, 1.0));
-        covariance.push(spread(workspace, &row, mass) * (scale * scale));
+        // The spread of the soft matches about their mean, and the noise σ² of the mixture.
+        let spread = spread(row.iter().map(|&(n, p)| (at(&workspace.target.0, n), p)));
+        let noise = SMatrix::identity() * workspace.sigma2;
+        covariance.push((spread + noise) * (scale * scale));
     }
     let (unmatched_model, unmatched_target) = unmatched_rows(&assignment, target_len);
     Matching {
@@ -1304,25 +1191,6 @@ fn matching<const D: usize>(
     }
 }
 
-/// Covariance of a displacement: the spread of the soft matches about their mean, and the noise
-/// `σ²` of the mixture.
-fn spread<const D: usize>(
-    workspace: &DriftWorkspace<D>,
-    row: &[(usize, f64)],
-    mass: f64,
-) -> SMatrix<f64, D, D> {
-    let at = |n: usize| SVector::<f64, D>::from_fn(|d, _| workspace.target[d][n]);
-    let noise = SMatrix::identity() * workspace.sigma2;
-    if mass <= 0.0 {
-        return noise;
-    }
-    let mean: SVector<f64, D> = row.iter().map(|&(n, p)| at(n) * (p / mass)).sum();
-    row.iter().fold(noise, |sum, &(n, p)| {
-        let step = at(n) - mean;
-        sum + step * step.transpose() * (p / mass)
-    })
-}
-
 fn report<const D: usize>(
     workspace: &DriftWorkspace<D>,
     assignment: &[Option<usize>],
@@ -1331,19 +1199,15 @@ fn report<const D: usize>(
         .iter()
         .enumerate()
         .filter_map(|(m, n)| n.map(|n| (m, n)))
-        .map(|(m, n)| {
-            (0..D)
-                .map(|d| (workspace.moved[d][m] - workspace.target[d][n]).powi(2))
-                .sum::<f64>()
-        });
+        .map(|(m, n)| (at(&workspace.moved.0, m) - at(&workspace.target.0, n)).norm_squared());
     let (count, sum) = squares.fold((0.0_f64, 0.0), |(count, sum), s| (count + 1.0, sum + s));
     let scale = workspace.target_frame.scale;
     MatchReport {
         stop: workspace.stop,
-        iterations: workspace.iterations(),
+        iterations: workspace.energy.len(),
         starts: 1,
-        residual: (scale * (sum / count.max(1.0)).sqrt()),
-        sigma: (scale * workspace.sigma2.sqrt()),
+        residual: scale * (sum / count.max(1.0)).sqrt(),
+        sigma: scale * workspace.sigma2.sqrt(),
         doubt: None,
     }
 }

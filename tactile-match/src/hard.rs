@@ -1,13 +1,13 @@
 //! From pairs alone to a [`Matching`]: what nearest neighbours and linear assignment have in
 //! common.
 
-use crate::Frame;
 use crate::error::{point_sets, valid_distance};
+use crate::{Frame, spread};
 use crate::{
     MatchError, MatchReport, Matching, PointMatcher, SoftMatches, StopReason, linear_assignment,
     unmatched_rows,
 };
-use nalgebra::{DMatrix, Point, SMatrix, SVector};
+use nalgebra::{DMatrix, Point, SVector};
 use tactile_tps::{Affine, Factorization, FitOptions, NegR, R2LogR, Smoothing, TpsError, Warp};
 
 /// Both sets in one frame, with all squared distances between them.
@@ -59,18 +59,6 @@ impl<const D: usize> Distances<D> {
         p.iter_mut().for_each(|p| *p /= sum);
         p
     }
-
-    fn spread(&self, p: &[f64]) -> SMatrix<f64, D, D> {
-        let mean: SVector<f64, D> = self.target.iter().zip(p).map(|(y, &p)| y * p).sum();
-        let sum = self
-            .target
-            .iter()
-            .zip(p)
-            .fold(SMatrix::zeros(), |sum, (y, &p)| {
-                sum + (y - mean) * (y - mean).transpose() * p
-            });
-        sum * (self.frame.scale * self.frame.scale)
-    }
 }
 
 /// The result for these pairs: the warp interpolates them, confidences and covariances come from
@@ -88,12 +76,14 @@ fn matching<const D: usize>(
         .collect();
     let total: f64 = pairs.iter().map(|&(i, j)| distances.squared[(i, j)]).sum();
     let variance = total / (pairs.len().max(1) * D) as f64;
+    let scale = distances.frame.scale;
     let (mut soft, mut confidence, mut covariance) =
         (SoftMatches::default(), Vec::new(), Vec::new());
     for (i, partner) in assignment.iter().enumerate() {
         let p = distances.posterior(i, variance);
         confidence.push(partner.map_or(0.0, |j| p[j]));
-        covariance.push(distances.spread(&p));
+        let places = distances.target.iter().copied().zip(p.iter().copied());
+        covariance.push(spread(places) * (scale * scale));
         // Soft matches below this weight are left out.
         let kept = p
             .iter()
@@ -104,13 +94,11 @@ fn matching<const D: usize>(
     let sources: Vec<_> = pairs.iter().map(|&(i, _)| model[i]).collect();
     let images: Vec<_> = pairs.iter().map(|&(_, j)| target[j]).collect();
     let (warp, warped) = through(model, &sources, &images);
-    let residual = pairs
+    let squares = pairs
         .iter()
-        .map(|&(i, j)| (warped[i] - target[j]).norm_squared())
-        .fold(0.0, |s, r| s + r);
-    let count: f64 = pairs.len().max(1) as f64;
+        .map(|&(i, j)| (warped[i] - target[j]).norm_squared());
+    let residual = (squares.sum::<f64>() / pairs.len().max(1) as f64).sqrt();
     let (unmatched_model, unmatched_target) = unmatched_rows(&assignment, target.len());
-    let scale = distances.frame.scale;
     Matching {
         warp,
         warped,
@@ -120,12 +108,12 @@ fn matching<const D: usize>(
         unmatched_model,
         unmatched_target,
         displacement_covariance: covariance,
-        energy: vec![(total * scale * scale)],
+        energy: vec![total * scale * scale],
         report: MatchReport {
             stop: StopReason::Converged,
             iterations: 1,
             starts: 1,
-            residual: (residual / count).sqrt(),
+            residual,
             sigma: 0.0,
             doubt: None,
         },
@@ -274,7 +262,7 @@ fn follows<const D: usize>(
     spline.apply_into(sources, &mut found).is_ok()
         && found.iter().zip(images).all(|(found, image)| {
             let miss = (found - image).amax();
-            miss.is_finite() && (!exact || miss <= size * (1e-3))
+            miss.is_finite() && (!exact || miss <= size * 1e-3)
         })
 }
 
@@ -336,7 +324,7 @@ impl<const D: usize> PointMatcher<D> for NearestNeighbour {
 }
 
 /// The least of some distances, the first of equals.
-fn nearest(distances: impl Iterator<Item = f64>) -> (usize, f64) {
+pub(crate) fn nearest(distances: impl Iterator<Item = f64>) -> (usize, f64) {
     distances.enumerate().fold(
         (0, f64::INFINITY),
         |best, d| if d.1 < best.1 { d } else { best },

@@ -50,9 +50,9 @@ pub use cpd::{CoherentPointDrift, DriftWorkspace, Motion, Normalization};
 pub use error::MatchError;
 pub use hard::{LinearAssignment, NearestNeighbour};
 pub use labelling::RelaxationLabelling;
+use matching::unmatched_rows;
 pub use matching::{
     Doubt, MatchReport, MatchedPairs, Matching, PointMatcher, SoftMatches, WarmStart,
-    unmatched_rows,
 };
 pub use nalgebra;
 pub use shape_context::ShapeContexts;
@@ -62,7 +62,8 @@ pub use softassign::{
 };
 pub use tactile_core::{CustomError, StopReason};
 
-use ::nalgebra::{Point, SVector};
+use ::nalgebra::{Point, SMatrix, SVector};
+use tactile_tps::Affine;
 
 // A frame to work in: centre and size taken out, so that no parameter depends on the units of the
 // points and no square under- or overflows.
@@ -83,11 +84,6 @@ impl<const D: usize> Default for Frame<D> {
     }
 }
 
-/// The point in double precision.
-fn widened<const D: usize>(point: &Point<f64, D>) -> SVector<f64, D> {
-    point.coords.map(|c| c)
-}
-
 impl<const D: usize> Frame<D> {
     /// Centre and root mean square radius of a set. Scale one where all points coincide.
     fn of(points: &[Point<f64, D>]) -> Self {
@@ -105,7 +101,7 @@ impl<const D: usize> Frame<D> {
         let largest = model
             .iter()
             .chain(target)
-            .map(|p| (widened(p) - centre).amax())
+            .map(|p| (p.coords - centre).amax())
             .fold(0.0, f64::max);
         Self {
             centre,
@@ -115,17 +111,17 @@ impl<const D: usize> Frame<D> {
 
     /// A point in this frame.
     fn inside(&self, point: &Point<f64, D>) -> SVector<f64, D> {
-        (widened(point) - self.centre) / self.scale
+        (point.coords - self.centre) / self.scale
     }
 
     /// All points in this frame.
-    fn enter(&self, points: &[Point<f64, D>], columns: &mut [Vec<f64>; D]) {
-        columns.iter_mut().for_each(Vec::clear);
+    fn enter(&self, points: &[Point<f64, D>], axes: &mut Axes<D>) {
+        axes.0.iter_mut().for_each(Vec::clear);
         for point in points {
-            columns
-                .iter_mut()
-                .zip(self.inside(point).iter())
-                .for_each(|(column, &c)| column.push(c));
+            let inside = self.inside(point);
+            for (axis, &c) in axes.0.iter_mut().zip(inside.iter()) {
+                axis.push(c);
+            }
         }
     }
 
@@ -139,24 +135,92 @@ impl<const D: usize> Frame<D> {
 fn centre_and_radius<const D: usize>(points: &[Point<f64, D>]) -> (SVector<f64, D>, f64) {
     let n = points.len() as f64;
     // Sums of differences keep the digits of sets far from the origin.
-    let origin = widened(&points[0]);
+    let origin = points[0].coords;
     let centre = origin
         + points
             .iter()
-            .map(|p| widened(p) - origin)
+            .map(|p| p.coords - origin)
             .sum::<SVector<f64, D>>()
             / n;
     // The largest radius taken out first: no square under- or overflows.
     let largest = points
         .iter()
-        .map(|p| (widened(p) - centre).amax())
+        .map(|p| (p.coords - centre).amax())
         .fold(0.0, f64::max);
     if !(largest > 0.0 && largest.is_finite()) {
         return (centre, 0.0);
     }
     let squares: f64 = points
         .iter()
-        .map(|p| ((widened(p) - centre) / largest).norm_squared())
+        .map(|p| ((p.coords - centre) / largest).norm_squared())
         .sum();
     (centre, largest * (squares / n).sqrt())
+}
+
+/// Covariance of a place drawn from these with their weights. Zero where there is no weight.
+fn spread<const D: usize>(
+    places: impl Iterator<Item = (SVector<f64, D>, f64)> + Clone,
+) -> SMatrix<f64, D, D> {
+    let mass: f64 = places.clone().map(|(_, weight)| weight).sum();
+    if mass <= 0.0 {
+        return SMatrix::zeros();
+    }
+    let shares = places.map(|(place, weight)| (place, weight / mass));
+    let mean: SVector<f64, D> = shares.clone().map(|(place, share)| place * share).sum();
+    shares.fold(SMatrix::zeros(), |sum, (place, share)| {
+        let step = place - mean;
+        sum + step * step.transpose() * share
+    })
+}
+
+/// The rigid motion or similarity `x ↦ A (x − from) + to` of least weighted squares (Kabsch 1976;
+/// Umeyama 1991).
+struct BestMotion<const D: usize> {
+    linear: SMatrix<f64, D, D>,
+    from: SVector<f64, D>,
+    to: SVector<f64, D>,
+    /// `Σ wᵢ |xᵢ − from|²`.
+    extent: f64,
+}
+
+impl<const D: usize> BestMotion<D> {
+    /// `O(I)`. None without any weight, or of numbers that are not finite.
+    fn of(
+        sources: &[Point<f64, D>],
+        images: &[Point<f64, D>],
+        weights: &[f64],
+        scaled: bool,
+    ) -> Option<Self> {
+        let total: f64 = weights.iter().sum();
+        let fit = Affine::fit_rigid(sources, images, Some(weights)).ok();
+        let rotation = fit.filter(|_| total > 0.0)?.linear;
+        let mean = |points: &[Point<f64, D>]| -> SVector<f64, D> {
+            let rows = points.iter().zip(weights);
+            rows.map(|(p, w)| p.coords * (w / total)).sum()
+        };
+        let (from, to) = (mean(sources), mean(images));
+        let (mut along, mut extent) = (0.0, 0.0);
+        for ((x, y), w) in sources.iter().zip(images).zip(weights) {
+            let arm = x.coords - from;
+            along += w * (y.coords - to).dot(&(rotation * arm));
+            extent += w * arm.norm_squared();
+        }
+        let grows = scaled && extent > 0.0;
+        Some(Self {
+            linear: rotation * if grows { along / extent } else { 1.0 },
+            from,
+            to,
+            extent,
+        })
+    }
+}
+
+/// One array an axis.
+#[derive(Clone, Debug)]
+struct Axes<const D: usize>([Vec<f64>; D]);
+
+impl<const D: usize> Default for Axes<D> {
+    fn default() -> Self {
+        Self(std::array::from_fn(|_| Vec::new()))
+    }
 }

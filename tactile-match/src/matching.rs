@@ -424,14 +424,10 @@ impl<const D: usize> Matching<D> {
 
 /// Rows without a partner on both sides, `(model, target)`, ascending, for `target_len` target
 /// points.
-///
-/// ```
-/// use tactile_match::unmatched_rows;
-/// let assignment = [Some(2), None, Some(0)]; // three model points, four targets
-/// assert_eq!(unmatched_rows(&assignment, 4), (vec![1], vec![1, 3]));
-/// ```
-#[must_use]
-pub fn unmatched_rows(assignment: &[Option<usize>], target_len: usize) -> (Vec<usize>, Vec<usize>) {
+pub(crate) fn unmatched_rows(
+    assignment: &[Option<usize>],
+    target_len: usize,
+) -> (Vec<usize>, Vec<usize>) {
     let mut taken = vec![false; target_len];
     for &row in assignment.iter().flatten() {
         taken[row] = true;

@@ -4,7 +4,7 @@ use super::*;
 use crate::common::{bend, scattered};
 
 #[test]
-fn a_used_workspace_registers_without_allocating() {
+fn a_used_workspace_forgets_the_last_match_and_registers_without_allocating() {
     let options = CoherentPointDrift::default();
     let mut workspace = DriftWorkspace::default();
     let sets: Vec<_> = [(40, 5), (20, 6), (40, 7)]
@@ -13,7 +13,9 @@ fn a_used_workspace_registers_without_allocating() {
         .map(|model| (bend(&model, 0.05), model))
         .collect();
     for (target, model) in &sets {
-        workspace.register(&options, model, target);
+        let again = options.match_with(&mut workspace, model, target).unwrap();
+        let anew = options.match_points(model, target).unwrap();
+        assert_eq!(again.warped, anew.warped);
     }
     let counted = allocation_counter::measure(|| {
         for (target, model) in &sets {

@@ -33,13 +33,13 @@
 
 mod relaxation;
 
-use crate::Frame;
 use crate::error::{at_least_one, option_within, point_sets};
+use crate::{Frame, spread};
 use crate::{
     MatchError, MatchReport, Matching, SoftMatches, StopReason, hard, linear_assignment,
     unmatched_rows,
 };
-use nalgebra::{Point, SMatrix, SVector};
+use nalgebra::{Point, SVector};
 use relaxation::{MatchMatrix, NeighbourGraph, energy, relax};
 use tactile_tps::Smoothing;
 
@@ -425,7 +425,7 @@ impl<const D: usize> Run<D> {
     /// Mean partner of model point `i` and its weight, one less the slack.
     fn partner(&self, i: usize) -> (SVector<f64, D>, f64) {
         let weights = &self.matches.row(i)[..self.target.len()];
-        let mass = weights.iter().fold(0.0, |sum, &w| sum + w);
+        let mass: f64 = weights.iter().sum();
         let sum = self
             .target
             .iter()
@@ -474,7 +474,7 @@ impl<const D: usize> Run<D> {
         let mut assignment =
             linear_assignment(&costs, rows, columns).unwrap_or_else(|_| vec![None; rows]);
         for (i, partner) in assignment.iter_mut().enumerate() {
-            let slack = self.matches.slack_of_row(i);
+            let slack = self.matches[(i, columns)];
             *partner =
                 partner.filter(|&j| self.matches[(i, j)] > 0.0 && self.matches[(i, j)] >= slack);
         }
@@ -499,37 +499,28 @@ impl<const D: usize> Run<D> {
             let row = &self.matches.row(i)[..target.len()];
             // Sinkhorn's normalisation ends with the columns: a row may sum to a little more than
             // one.
-            let sum = self
-                .matches
-                .row(i)
-                .iter()
-                .fold(0.0, |sum, &p| sum + p)
-                .max(1.0);
+            let sum = self.matches.row(i).iter().sum::<f64>().max(1.0);
             // Soft matches below this weight are left out.
             let kept = row.iter().copied().enumerate().filter(|p| p.1 > 1e-4);
             soft.push_row(kept.map(|(j, p)| (j, p / sum)));
-            confidence.push(partner.map_or(self.matches.slack_of_row(i), |j| row[j]) / sum);
-            covariance.push(spread(target, row));
+            confidence.push(partner.map_or(self.matches[(i, target.len())], |j| row[j]) / sum);
+            let places = target.iter().map(|y| y - target[0]);
+            covariance.push(spread(places.zip(row.iter().copied())));
         }
-        let squares = |(i, j): (usize, usize)| (warped[i] - target[j]).norm_squared();
-        let pairs = || {
-            assignment
-                .iter()
-                .enumerate()
-                .filter_map(|(i, j)| j.map(|j| (i, j)))
-        };
-        let count: f64 = pairs().count().max(1) as f64;
-        let residual = (pairs().map(squares).fold(0.0, |s, r| s + r) / count).sqrt();
+        let pairs = assignment.iter().zip(&warped);
+        let squares: Vec<f64> = pairs
+            .filter_map(|(j, w)| Some((w - target[(*j)?]).norm_squared()))
+            .collect();
+        let residual = (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt();
         let (unmatched_model, unmatched_target) = unmatched_rows(&assignment, target.len());
         let report = MatchReport {
             stop: self.stop,
             iterations: self.energy.len(),
             starts: 1,
             residual,
-            sigma: residual / ((D as f64).sqrt()),
+            sigma: residual / (D as f64).sqrt(),
             doubt: None,
         };
-        let energy = self.energy;
         Matching {
             warp,
             warped,
@@ -539,30 +530,8 @@ impl<const D: usize> Run<D> {
             unmatched_model,
             unmatched_target,
             displacement_covariance: covariance,
-            energy,
+            energy: self.energy,
             report,
         }
     }
-}
-
-/// Covariance of the partners of one model point.
-fn spread<const D: usize>(target: &[Point<f64, D>], row: &[f64]) -> SMatrix<f64, D, D> {
-    let mass = row.iter().fold(0.0, |sum, &p| sum + p);
-    if mass <= 0.0 {
-        return SMatrix::zeros();
-    }
-    let origin = target[0];
-    let mean = target
-        .iter()
-        .zip(row)
-        .fold(SVector::zeros(), |sum, (y, &p)| {
-            sum + (y - origin) * (p / mass)
-        });
-    target
-        .iter()
-        .zip(row)
-        .fold(SMatrix::zeros(), |sum, (y, &p)| {
-            let step = y - origin - mean;
-            sum + step * step.transpose() * (p / mass)
-        })
 }

@@ -47,11 +47,7 @@ impl<const D: usize> NeighbourGraph<D> {
                 }
                 Neighbourhood::Nearest(k) => {
                     let distance = |&a: &usize| (points[a] - points[i]).norm();
-                    neighbours.sort_by(|a, b| {
-                        distance(a)
-                            .partial_cmp(&distance(b))
-                            .unwrap_or(std::cmp::Ordering::Equal)
-                    });
+                    neighbours.sort_by(|a, b| distance(a).total_cmp(&distance(b)));
                     neighbours.truncate(k);
                     neighbours.sort_unstable();
                 }
@@ -123,7 +119,7 @@ fn median_pairwise_distance<const D: usize>(points: &[Point<f64, D>]) -> Option<
     for (i, p) in points.iter().enumerate() {
         distances.extend(points[i + 1..].iter().map(|q| (q - p).norm()));
     }
-    distances.sort_by(|a, b| a.partial_cmp(b).unwrap_or(std::cmp::Ordering::Equal));
+    distances.sort_by(f64::total_cmp);
     let n = distances.len();
     match n {
         0 => None,
@@ -256,14 +252,6 @@ impl MatchMatrix {
         &mut self.entries[i * (self.columns + 1)..][..=self.columns]
     }
 
-    /// Probability that model point `i` has no partner.
-    ///
-    /// # Panics
-    /// If `i` exceeds the number of rows.
-    pub(super) fn slack_of_row(&self, i: usize) -> f64 {
-        self[(i, self.columns)]
-    }
-
     /// The largest change of an entry, `max |M − M'|`. The matrices must have the same size.
     fn largest_change(&self, other: &Self) -> f64 {
         self.entries
@@ -318,15 +306,6 @@ pub(super) fn energy<const D: usize>(
     energy
 }
 
-/// How far [`sinkhorn`] came.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct SinkhornReport {
-    /// Sweeps done.
-    pub sweeps: usize,
-    /// `max_i |1 − Σ_j M_ij|`: how far the rows are from one, the columns being one.
-    pub row_defect: f64,
-}
-
 /// (20): every model row becomes `[M_ij S_ij, M_i,slack · slack_gain]` over its sum. Returns the
 /// rows whose sum was zero, which stay as they were. `support` is row-major `I × J`. The slack row
 /// is not touched.
@@ -345,10 +324,8 @@ fn update(m: &mut MatchMatrix, support: &[f64], slack_gain: f64) -> Vec<usize> {
             .iter()
             .copied()
             .chain([slack_gain]);
-        let largest = m
-            .row(i)
-            .iter()
-            .copied()
+        let entries = m.row(i).iter().copied();
+        let largest = entries
             .zip(gains.clone())
             .fold(None, |best, (p, s)| match best {
                 _ if p <= 0.0 || s <= 0.0 => best,
@@ -378,13 +355,9 @@ fn update(m: &mut MatchMatrix, support: &[f64], slack_gain: f64) -> Vec<usize> {
 /// Alternate normalisation with slack. Each sweep divides the rows `0..I` by their sums over
 /// `J + 1` entries, then the columns `0..J` by their sums over `I + 1` entries. The slack row and
 /// column are not normalised, sums of zero are skipped. Stops after `sweeps`, or when no row is
-/// further than `tolerance` from one.
-fn sinkhorn(m: &mut MatchMatrix, sweeps: usize, tolerance: f64) -> SinkhornReport {
-    let mut report = SinkhornReport {
-        sweeps: 0,
-        row_defect: row_defect(m),
-    };
-    while report.sweeps < sweeps {
+/// further than `tolerance` from one. Returns `max_i |1 − Σ_j M_ij|`, the columns being one.
+fn sinkhorn(m: &mut MatchMatrix, sweeps: usize, tolerance: f64) -> f64 {
+    for _ in 0..sweeps {
         for i in 0..m.rows {
             divide_by_sum(m.row_mut(i));
         }
@@ -394,19 +367,15 @@ fn sinkhorn(m: &mut MatchMatrix, sweeps: usize, tolerance: f64) -> SinkhornRepor
                 (0..=m.rows).for_each(|i| m[(i, j)] /= sum);
             }
         }
-        report = SinkhornReport {
-            sweeps: report.sweeps + 1,
-            row_defect: row_defect(m),
-        };
-        if report.row_defect <= tolerance {
+        if row_defect(m) <= tolerance {
             break;
         }
     }
-    report
+    row_defect(m)
 }
 
 fn divide_by_sum(row: &mut [f64]) {
-    let sum = row.iter().fold(0.0, |sum, &p| sum + p);
+    let sum: f64 = row.iter().sum();
     if sum > 0.0 {
         row.iter_mut().for_each(|p| *p /= sum);
     }
@@ -414,8 +383,7 @@ fn divide_by_sum(row: &mut [f64]) {
 
 fn row_defect(m: &MatchMatrix) -> f64 {
     (0..m.rows).fold(0.0, |worst, i| {
-        let sum = m.row(i).iter().fold(0.0, |sum, &p| sum + p);
-        worst.max((1.0 - sum).abs())
+        worst.max((1.0 - m.row(i).iter().sum::<f64>()).abs())
     })
 }
 
@@ -424,14 +392,14 @@ fn contexts<const D: usize>(points: &[Point<f64, D>]) -> Option<ShapeContexts> {
     let distances = points
         .iter()
         .flat_map(|p| points.iter().map(move |q| (q - p).norm()));
-    let sum = distances.fold(0.0, |sum, d| sum + d);
+    let sum: f64 = distances.sum();
     let pairs = points.len() * points.len().saturating_sub(1);
     ShapeContexts::new(points, 2.0 * sum / (pairs.max(1) as f64)).ok()
 }
 
 /// The first match matrix: `exp(−C_ij / temperature)` of the shape-context distances `C`, `slack`
 /// relative to the likeliest partner in the slack entries, after one sweep of
-/// [`sinkhorn`](sinkhorn). `O(I J)` times the number of bins.
+/// [`sinkhorn`]. `O(I J)` times the number of bins.
 fn first_matches<const D: usize>(
     model: &[Point<f64, D>],
     target: &[Point<f64, D>],
@@ -507,7 +475,7 @@ fn slack_gain(support: &[f64], columns: usize, share: f64) -> f64 {
 /// The target that has all of a row, so that no other can still come up: what they have is below a
 /// hundred roundings.
 fn settled_on(row: &[f64]) -> Option<usize> {
-    let sum = row.iter().fold(0.0, |sum, &p| sum + p);
+    let sum: f64 = row.iter().sum();
     let enough = sum * (1.0 - 100.0 * f64::UNIT_ROUNDOFF);
     row[..row.len() - 1]
         .iter()
@@ -523,13 +491,7 @@ fn keep_likeliest(m: &mut MatchMatrix, count: usize) {
         order.clear();
         order.extend(0..columns);
         let row = m.row_mut(i);
-        let unlikely = |a: &usize, b: &usize| {
-            row[*b]
-                .partial_cmp(&row[*a])
-                .unwrap_or(std::cmp::Ordering::Equal)
-                .then(a.cmp(b))
-        };
-        order.sort_unstable_by(unlikely);
+        order.sort_unstable_by(|&a, &b| row[b].total_cmp(&row[a]).then(a.cmp(&b)));
         order.iter().skip(count).for_each(|&j| row[j] = 0.0);
     }
 }

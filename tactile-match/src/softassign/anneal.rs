@@ -1,6 +1,7 @@
 //! One annealing run: soft assignment at a falling temperature, then the warp that it asks for.
 
 use super::{Annealer, Gaussian, Known, Request, Schedule, Slack, State};
+use super::{difference, squared_distance};
 use std::f64::consts::TAU;
 use std::ops::ControlFlow;
 
@@ -10,8 +11,7 @@ impl<const D: usize> Known<D> {
     /// Energy of a model point that was put there: minus the logarithm of its density, but for a
     /// constant.
     fn energy(&self, warped: &[f64; D]) -> f64 {
-        let square: f64 = (0..D).map(|k| (warped[k] - self.position[k]).powi(2)).sum();
-        0.5 * square / self.variance
+        0.5 * squared_distance(warped, &self.position) / self.variance
     }
 }
 
@@ -272,17 +272,14 @@ impl<const D: usize> Annealer<D> {
     /// The targets are a mixture of Gaussians about the warped points and of uniform outliers,
     /// whose share is estimated. Residuals under `resolution` count as that, so that an exact fit
     /// does not win by an infinite margin.
-    pub(super) fn evaluate(&mut self, state: &mut State<D>, share: f64, resolution: f64) {
-        self.evaluate_undecided(state, share, resolution, 1.0);
-    }
-
-    /// As [`evaluate`](Self::evaluate), with the share of the matches' information on the warp that
-    /// is left where partners are `decided` in part (Louis, J. R. Stat. Soc. B 44, 1982). The whole
-    /// of it would let the stiffest warp win.
-    pub(super) fn evaluate_undecided(
+    ///
+    /// Of the matches' information on the warp the share counts that is left where partners are
+    /// `decided` in part (Louis, J. R. Stat. Soc. B 44, 1982). The whole of it would let the
+    /// stiffest warp win.
+    pub(super) fn evaluate(
         &mut self,
         state: &mut State<D>,
-        share: f64,
+        mut share: f64,
         resolution: f64,
         decided: f64,
     ) {
@@ -298,7 +295,6 @@ impl<const D: usize> Annealer<D> {
         self.soft.column_totals(&mut self.sums);
         let sums = &self.sums[..m];
         let density = 1.0 / gaussian;
-        let mut share = share;
         // Fixed-point rounds for the share of outliers.
         for _ in 0..8 {
             let outlier = share / self.volume;
@@ -327,10 +323,8 @@ impl<const D: usize> Annealer<D> {
         self.weights.iter_mut().for_each(|w| *w *= decided);
         self.weights.resize(self.prior.stride, 0.0);
         let rows = state.warped.iter().zip(&state.base);
-        self.residuals.fill(
-            self.prior.stride,
-            rows.map(|(w, b)| std::array::from_fn(|k| w[k] - b[k])),
-        );
+        self.residuals
+            .fill(self.prior.stride, rows.map(|(w, b)| difference(w, b)));
         self.regression
             .fit(&self.prior, &self.weights, &self.residuals, variance);
         state.energy =

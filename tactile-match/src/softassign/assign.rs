@@ -14,24 +14,6 @@ use tactile_core::vectorised;
 // The targets are put into blocks of neighbours ([`blocks`](super::blocks)); of a row only the
 // blocks within reach of its Gaussian are kept. At a low temperature that is a small part of `I J`.
 
-impl<const D: usize> Default for SoftAssignment<D> {
-    fn default() -> Self {
-        Self {
-            blocks: Blocks::default(),
-            errors: TargetErrors::default(),
-            faintest: 1e-6,
-            starts: Vec::new(),
-            active: Vec::new(),
-            reach: Vec::new(),
-            kernel: Vec::new(),
-            row_scale: Vec::new(),
-            column_scale: Vec::new(),
-            column_sum: Vec::new(),
-            moments: AllMoments::default(),
-        }
-    }
-}
-
 impl<const D: usize> SoftAssignment<D> {
     /// Takes the target points and their standard deviations, where those are known.
     pub(super) fn set_targets(&mut self, targets: &[[f64; D]], deviations: &[f64]) {

@@ -1,13 +1,10 @@
 //! From the last soft assignment to the answer: hard matches, confidences, positions and
 //! covariances.
 
-use super::Annealer;
-use super::SoftAssignment;
-use super::{Answer, Mechanism, Slack, State};
+use super::{Annealer, Answer, Mechanism, Slack, SoftAssignment, State};
+use super::{difference, dot, squared, squared_distance};
 use crate::Doubt;
 use std::f64::consts::TAU;
-
-// From the last soft assignment to the answer: hard matches, confidences, positions, covariances.
 
 /// Residuals below this (radii of the model) are what the prior's factor leaves out: the data are
 /// clean.
@@ -187,32 +184,21 @@ impl<const D: usize> Answer<D> {
     /// The positions, on their targets where it `snaps`. The variance, along one axis, of what the
     /// warp alone leaves to the targets.
     fn place(&mut self, state: &State<D>, targets: &[[f64; D]], snaps: bool) -> f64 {
-        let square =
-            |a: &[f64; D], b: &[f64; D]| (0..D).map(|k| (a[k] - b[k]).powi(2)).sum::<f64>();
         self.warped.clone_from(&state.warped);
         let (mut left, mut squares, mut pairs) = (0.0, 0.0, 0);
         for (i, partner) in self.assignment.iter().enumerate() {
             let &Some(j) = partner else { continue };
-            left += square(&self.warped[i], &targets[j]);
+            left += squared_distance(&self.warped[i], &targets[j]);
             if snaps {
                 self.warped[i] = targets[j];
             }
-            squares += square(&self.warped[i], &targets[j]);
+            squares += squared_distance(&self.warped[i], &targets[j]);
             pairs += 1;
         }
         let count = f64::from(pairs.max(1));
         self.residual = (squares / count).sqrt();
         left / (D as f64 * count)
     }
-}
-
-/// Soft matches of row i worth reporting.
-pub(super) fn soft_row<const D: usize>(
-    soft: &SoftAssignment<D>,
-    i: usize,
-) -> impl Iterator<Item = (usize, f64)> + '_ {
-    // Soft matches below this are not reported.
-    soft.entries(i).filter(|&(_, p)| p > 1e-3)
 }
 
 // How sure a pair is: the odds of the assignments that take it apart.
@@ -512,7 +498,7 @@ impl PairOdds {
 impl<const D: usize> Fitted<'_, D> {
     /// From where the warp puts point i to target j.
     fn offset(&self, i: usize, j: usize) -> [f64; D] {
-        std::array::from_fn(|k| self.targets[j][k] - self.warped[i][k])
+        difference(&self.targets[j], &self.warped[i])
     }
 
     /// Variance of a target over the noise's.
@@ -539,14 +525,6 @@ impl<const D: usize> Fitted<'_, D> {
 
     /// From one target to another.
     fn step(&self, from: usize, to: usize) -> [f64; D] {
-        std::array::from_fn(|k| self.targets[to][k] - self.targets[from][k])
+        difference(&self.targets[to], &self.targets[from])
     }
-}
-
-fn dot<const D: usize>(a: &[f64; D], b: &[f64; D]) -> f64 {
-    (0..D).map(|k| a[k] * b[k]).sum()
-}
-
-fn squared<const D: usize>(a: &[f64; D]) -> f64 {
-    dot(a, a)
 }

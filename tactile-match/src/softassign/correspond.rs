@@ -1,5 +1,6 @@
 //! Pairs from the points' surroundings: shape contexts propose, relaxation labelling decides.
 
+use super::{difference, dot, squared, squared_distance};
 use crate::shape_context::ShapeContexts;
 use std::f64::consts::PI;
 
@@ -85,7 +86,7 @@ impl Correspondence {
                 difference(&model[a], &model[i]),
                 difference(&target[b], &target[j]),
             );
-            let gamma = 1.0 - 0.7 * norm(&u) / reach[i];
+            let gamma = 1.0 - 0.7 * squared(&u).sqrt() / reach[i];
             compatibility(&u, &v) * gamma / kept as f64
         };
         self.labels.link(weight, near);
@@ -106,17 +107,17 @@ impl Correspondence {
         for (i, x) in model.iter().enumerate() {
             self.order.clear();
             self.order.extend((0..model.len()).filter(|&a| a != i));
-            let square = |a: usize| norm(&difference(&model[a], x));
+            let distance = |a: usize| squared_distance(&model[a], x).sqrt();
             if kept > 0 {
                 self.order.select_nth_unstable_by(kept - 1, |&a, &b| {
-                    square(a).total_cmp(&square(b)).then(a.cmp(&b))
+                    distance(a).total_cmp(&distance(b)).then(a.cmp(&b))
                 });
             }
             self.order.truncate(kept);
             self.reach.push(
                 self.order
                     .iter()
-                    .map(|&a| square(a))
+                    .map(|&a| distance(a))
                     .fold(f64::MIN_POSITIVE, f64::max),
             );
             self.neighbours.extend_from_slice(&self.order);
@@ -125,22 +126,14 @@ impl Correspondence {
     }
 }
 
-fn difference<const D: usize>(a: &[f64; D], b: &[f64; D]) -> [f64; D] {
-    std::array::from_fn(|k| a[k] - b[k])
-}
-
-fn norm<const D: usize>(v: &[f64; D]) -> f64 {
-    v.iter().map(|x| x * x).sum::<f64>().sqrt()
-}
-
 /// αβ⁴ of two edges: (15) with the maximum of the pair, (16) sharpened, because a neighbourhood's
 /// edges differ in direction more than in length.
 fn compatibility<const D: usize>(u: &[f64; D], v: &[f64; D]) -> f64 {
-    let (p, q) = (norm(u), norm(v));
+    let (p, q) = (squared(u).sqrt(), squared(v).sqrt());
     if p == 0.0 || q == 0.0 {
         return 0.0;
     }
-    let cosine = (0..D).map(|k| u[k] * v[k]).sum::<f64>() / (p * q);
+    let cosine = dot(u, v) / (p * q);
     let beta = 1.0 - cosine.clamp(-1.0, 1.0).acos() / PI;
     p.min(q) / p.max(q) * beta.powi(4)
 }

@@ -5,7 +5,9 @@ use super::confidence::CLEAN_SIGMA;
 use super::model::cholesky;
 use super::search::is_cold;
 use super::{AnnealedSoftassign, Search, SoftassignWorkspace, State, Transformation};
-use nalgebra::{Matrix4, Matrix4x3, RowVector4, SVector, Vector3};
+use super::{difference, in_space, squared, squared_distance};
+use crate::hard;
+use nalgebra::{Matrix4, Matrix4x3, RowVector4, SVector};
 use tactile_core::vectorised;
 
 // An annealing run ends at a thousandth of the radius, since the factor of its prior leaves out as
@@ -132,6 +134,9 @@ impl<const D: usize> FineFit<D> {
             centre_first(model, &mut self.pairs, PATCH);
         }
         self.pairs.retain_mut(|pair| {
+            let nearest = |place: &[f64; D], points: &[[f64; D]]| {
+                hard::nearest(points.iter().map(|p| squared_distance(place, p))).0
+            };
             pair.1 = nearest(&warped[pair.0], target);
             nearest(&target[pair.1], warped) == pair.0
         });
@@ -304,9 +309,7 @@ impl<const D: usize> System<D> {
         self.points.clear();
         self.points.extend(pairs.iter().map(|&(i, _)| model[i]));
         self.displacements.clear();
-        let displacement = |&(i, j): &(usize, usize)| -> [f64; D] {
-            std::array::from_fn(|d| target[j][d] - base[i][d])
-        };
+        let displacement = |&(i, j): &(usize, usize)| difference(&target[j], &base[i]);
         self.displacements.extend(pairs.iter().map(displacement));
         let n = pairs.len();
         self.kernel.clear();
@@ -353,7 +356,7 @@ impl<const D: usize> System<D> {
             log_det += 2.0 * row[i].ln();
             normal += p.transpose() * p;
             squares += z.norm_squared();
-            moments += p.transpose() * in_three(&z).transpose();
+            moments += p.transpose() * in_space(&z).transpose();
             self.whitened.push((p, z));
         }
         (D + 1..4).for_each(|c| normal[(c, c)] = 1.0);
@@ -457,27 +460,4 @@ impl<const D: usize> System<D> {
         let affine = (basis * self.normal * basis.transpose())[0];
         (displacement, (variance.max(0.0) + affine) / self.lambda)
     }
-}
-
-fn in_three<const D: usize>(v: &SVector<f64, D>) -> Vector3<f64> {
-    Vector3::from_fn(|k, _| if k < D { v[k] } else { 0.0 })
-}
-
-fn nearest<const D: usize>(place: &[f64; D], points: &[[f64; D]]) -> usize {
-    let mut best = (f64::INFINITY, 0);
-    for (j, point) in points.iter().enumerate() {
-        let square = squared_distance(place, point);
-        if square < best.0 {
-            best = (square, j);
-        }
-    }
-    best.1
-}
-
-fn squared_distance<const D: usize>(a: &[f64; D], b: &[f64; D]) -> f64 {
-    (0..D).map(|k| (a[k] - b[k]).powi(2)).sum()
-}
-
-fn squared<const D: usize>(a: &[f64; D]) -> f64 {
-    a.iter().map(|c| c * c).sum()
 }

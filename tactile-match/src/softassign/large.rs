@@ -1,13 +1,12 @@
 //! Large sets, coarse to fine.
 
-use super::Annealer;
-use super::Axes;
 use super::assign::Blocks;
 use super::confidence::CLEAN_SIGMA;
 use super::model::Prior;
 use super::search::{ENERGY_RESOLUTION, FAST, MAX_PATTERN_REACH, SCALES};
 use super::{
-    AnnealedSoftassign, Cooling, Mechanism, Rotation, Schedule, SoftassignWorkspace, State, starts,
+    AnnealedSoftassign, Annealer, Axes, Cooling, Mechanism, Rotation, Schedule,
+    SoftassignWorkspace, State, squared_distance, starts,
 };
 use std::ops::ControlFlow;
 
@@ -105,7 +104,7 @@ impl AnnealedSoftassign {
         ws.best.copy_from(&ws.state);
         if !self.is_exact(ws) {
             ws.annealer
-                .evaluate(&mut ws.state, self.share, ENERGY_RESOLUTION);
+                .evaluate(&mut ws.state, self.share, ENERGY_RESOLUTION, 1.0);
             ws.best.copy_from(&ws.state);
         }
         if flow.is_continue() {
@@ -171,32 +170,24 @@ impl AnnealedSoftassign {
         stride: usize,
         observe: &mut dyn FnMut(usize, f64) -> ControlFlow<()>,
     ) -> ControlFlow<()> {
-        starts::centred(&ws.model, &ws.target, &mut levels.base);
-        self.enter(ws, levels, stride);
-        ws.state.warped.clone_from(&ws.state.base);
-        let run = self.sampled(ws, FAST.sigma);
-        refine(ws, run, ControlFlow::Continue(()), observe)?;
-        if self.rotation == Rotation::Limited {
-            return ControlFlow::Continue(());
-        }
-        ws.annealer
-            .evaluate(&mut ws.state, self.share, ENERGY_RESOLUTION);
-        ws.best.copy_from(&ws.state);
-        let mut base = levels.base.clone();
-        for rotation in starts::rotations::<D>(self.rotation) {
-            starts::moments(&ws.model, &ws.target, &rotation, &mut levels.base);
-            levels.sample(
-                &ws.model,
-                (&ws.target, &ws.deviations),
-                stride,
-                &mut ws.state,
-            );
+        let mut base = Vec::new();
+        let rotations = starts::rotations::<D>(self.rotation).map(Some);
+        for rotation in std::iter::once(None).chain(rotations) {
+            let sets = (&*ws.model, &*ws.target);
+            match rotation {
+                None => starts::centred(sets.0, sets.1, &mut levels.base),
+                Some(turn) => starts::moments(sets.0, sets.1, &turn, &mut levels.base),
+            }
+            self.enter(ws, levels, stride);
             ws.state.warped.clone_from(&ws.state.base);
             let run = self.sampled(ws, FAST.sigma);
             refine(ws, run, ControlFlow::Continue(()), observe)?;
+            if self.rotation == Rotation::Limited {
+                return ControlFlow::Continue(());
+            }
             ws.annealer
-                .evaluate(&mut ws.state, self.share, ENERGY_RESOLUTION);
-            if ws.state.energy < ws.best.energy {
+                .evaluate(&mut ws.state, self.share, ENERGY_RESOLUTION, 1.0);
+            if base.is_empty() || ws.state.energy < ws.best.energy {
                 ws.best.copy_from(&ws.state);
                 base.clone_from(&levels.base);
             }
@@ -288,8 +279,7 @@ fn agreement<const D: usize>(
     distance: f64,
 ) -> f64 {
     let near = |((j, _), w): &(&(usize, f64), &[f64; D])| {
-        let square: f64 = (0..D).map(|k| (target[*j][k] - w[k]).powi(2)).sum();
-        square < distance * distance
+        squared_distance(&target[*j], w) < distance * distance
     };
     let agreeing = pairs.iter().zip(warped).filter(near).count();
     agreeing as f64 / pairs.len().max(1) as f64

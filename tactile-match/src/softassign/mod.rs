@@ -47,15 +47,15 @@ pub use options::{
 };
 pub use result::SoftassignMatch;
 
+use crate::{Axes, centre_and_radius};
 use crate::{Doubt, MatchError, MatchedPairs, Matching, WarmStart, error};
-use crate::{centre_and_radius, widened};
 use assign::{Blocks, TargetErrors};
 use confidence::PairOdds;
 use correspond::Correspondence;
 use fine::FineFit;
 use large::Levels;
 use model::{Prior, RigidFit, ScaleAverage};
-use nalgebra::{Point, SVector};
+use nalgebra::{Point, SVector, Vector3};
 use patterns::{Candidate, Cells, Consensus, GatedNearest};
 use result::Series;
 use starts::Tuples;
@@ -400,12 +400,12 @@ impl<const D: usize> Frame<D> {
 
     /// A model point in the frame.
     fn model(&self, point: &Point<f64, D>) -> [f64; D] {
-        self.inward(widened(point) - self.model)
+        self.inward(point.coords - self.model)
     }
 
     /// A target point in the frame.
     fn target(&self, point: &Point<f64, D>) -> [f64; D] {
-        self.inward(widened(point) - self.target)
+        self.inward(point.coords - self.target)
     }
 
     fn inward(&self, offset: SVector<f64, D>) -> [f64; D] {
@@ -427,6 +427,27 @@ fn mean<const D: usize>(points: &[[f64; D]]) -> [f64; D] {
         (0..D).for_each(|k| centre[k] += point[k]);
     }
     centre.map(|c| c / points.len() as f64)
+}
+
+fn difference<const D: usize>(a: &[f64; D], b: &[f64; D]) -> [f64; D] {
+    std::array::from_fn(|k| a[k] - b[k])
+}
+
+fn dot<const D: usize>(a: &[f64; D], b: &[f64; D]) -> f64 {
+    (0..D).map(|k| a[k] * b[k]).sum()
+}
+
+fn squared<const D: usize>(v: &[f64; D]) -> f64 {
+    dot(v, v)
+}
+
+fn squared_distance<const D: usize>(a: &[f64; D], b: &[f64; D]) -> f64 {
+    squared(&difference(a, b))
+}
+
+/// The vector with zeros for the dimensions that it lacks.
+fn in_space<const D: usize>(v: &SVector<f64, D>) -> Vector3<f64> {
+    Vector3::from_fn(|k, _| if k < D { v[k] } else { 0.0 })
 }
 
 /// Scales of the prior, in radii of the model.
@@ -524,7 +545,7 @@ struct AllMoments<const D: usize> {
 
 /// The match matrix in factored form, with the moments of its rows. Columns stand in the order of
 /// the blocks.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 struct SoftAssignment<const D: usize> {
     blocks: Blocks<D>,
     /// How precise the targets are.
@@ -542,10 +563,6 @@ struct SoftAssignment<const D: usize> {
     /// Moments of the rows.
     moments: AllMoments<D>,
 }
-
-/// One array an axis, each padded with zeros to whole vectors.
-#[derive(Clone, Debug)]
-struct Axes<const D: usize>([Vec<f64>; D]);
 
 /// Memory and answer of a regression.
 #[derive(Clone, Debug, Default)]

@@ -1,10 +1,10 @@
 //! The model of the warp: a Gaussian-process prior, the regression under it, the average over its
 //! scales, and rigid motions in its place.
 
-use super::{Axes, FARTHEST, PriorScales, Regression, Request, State, Transformation};
-use nalgebra::{Matrix3, Point, SMatrix, SVector, SymmetricEigen, Vector3};
+use super::{Axes, FARTHEST, PriorScales, Regression, Request, State, Transformation, in_space};
+use crate::BestMotion;
+use nalgebra::{Matrix3, Point, SVector, SymmetricEigen, Vector3};
 use tactile_core::vectorised;
-use tactile_tps::Affine;
 
 // The prior on warps: a Gaussian process, kept as a low-rank factor.
 //
@@ -125,12 +125,6 @@ fn largest(values: &[f64]) -> usize {
 }
 
 // Coordinates kept as one padded array an axis.
-
-impl<const D: usize> Default for Axes<D> {
-    fn default() -> Self {
-        Self(std::array::from_fn(|_| Vec::new()))
-    }
-}
 
 impl<const D: usize> Axes<D> {
     /// Takes `rows`, padded to `stride`.
@@ -700,15 +694,7 @@ impl<const D: usize> ScaleAverage<D> {
             weighted,
             ..
         } = self;
-        let smooth = &priors[l];
-        let column = |p: usize| {
-            let smooth_columns = count - D - 1;
-            if p < smooth_columns {
-                smooth.column(p)
-            } else {
-                &affine[(p - smooth_columns) * stride..][..stride]
-            }
-        };
+        let column = |p: usize| column_of(&priors[l], affine, count - D - 1, p);
         vectorised(
             #[inline(always)]
             || {
@@ -789,14 +775,7 @@ impl<const D: usize> ScaleAverage<D> {
             square,
             ..
         } = self;
-        let prior = &priors[l];
-        let column = |p: usize| {
-            if p < smooth {
-                prior.column(p)
-            } else {
-                &functions[(p - smooth) * stride..][..stride]
-            }
-        };
+        let column = |p: usize| column_of(&priors[l], functions, smooth, p);
         for (p, c) in solution.iter_mut().enumerate() {
             let amplitude = if p < smooth { bending } else { affine };
             *c = c.map(|c| c * amplitude);
@@ -816,11 +795,19 @@ impl<const D: usize> ScaleAverage<D> {
     }
 }
 
+/// Column `p` of `[Lₛ X]`, `smooth` of which are the prior's.
+fn column_of<'a>(prior: &'a Prior, affine: &'a [f64], smooth: usize, p: usize) -> &'a [f64] {
+    if p < smooth {
+        prior.column(p)
+    } else {
+        &affine[(p - smooth) * prior.stride..][..prior.stride]
+    }
+}
+
 // Rigid motions and similarities in place of a warp that bends.
 //
 // The soft matches pull model point `xᵢ` with weight `wᵢ` to `zᵢ`; the motion of least
-// `Σ wᵢ |s R xᵢ + b − zᵢ|²` is closed-form (Kabsch 1976; Umeyama 1991). To first order in the noise
-// σ² the image of the point at the offset `r` from the weighted centroid has the covariance
+// `Σ wᵢ |s R xᵢ + b − zᵢ|²` is closed-form ([`BestMotion`]). To first order in the noise σ² the image of the point at the offset `r` from the weighted centroid has the covariance
 // `σ² (1/W + [r]× Θ⁻¹ [r]×ᵀ)` with `W = Σ wᵢ` and the tensor of inertia
 // `Θ = Σ wᵢ (|rᵢ|² 1 − rᵢ rᵢᵀ)`, and where the size is free `σ² r rᵀ/Σ wᵢ|rᵢ|²` beside it.
 
@@ -863,41 +850,30 @@ impl<const D: usize> RigidFit<D> {
                 .map(|(i, b)| Point::from(SVector::from_fn(|k, _| b[k] + displacements.0[k][i]))),
         );
         let weights = &weights[..base.len()];
-        let total: f64 = weights.iter().sum();
-        let centre = |points: &[Point<f64, D>]| -> SVector<f64, D> {
-            let rows = points.iter().zip(weights);
-            rows.map(|(p, w)| p.coords * (w / total)).sum()
-        };
-        let fit = Affine::fit_rigid(&self.model, &self.wanted, Some(weights));
+        let scaled = self.transformation == Transformation::Similarity;
         // Nothing matched, or nothing finite: the model stays where it is.
-        let Some(rotation) = fit.ok().filter(|_| total > 0.0).map(|fit| fit.linear) else {
+        let Some(fit) = BestMotion::of(&self.model, &self.wanted, weights, scaled) else {
             regression.set(displacements.0[0].len(), |_| ([0.0; D], 0.0));
             return;
         };
-        let (from, to) = (centre(&self.model), centre(&self.wanted));
-        let (mut along, mut extent) = (0.0, 0.0);
+        let total: f64 = weights.iter().sum();
         let mut inertia = Matrix3::zeros();
-        for ((p, z), w) in self.model.iter().zip(&self.wanted).zip(weights) {
-            let r = p.coords - from;
-            along += w * (z.coords - to).dot(&(rotation * r));
-            extent += w * r.norm_squared();
-            let r = in_space(&r);
+        for (p, w) in self.model.iter().zip(weights) {
+            let r = in_space(&(p.coords - fit.from));
             inertia += (Matrix3::identity() * r.norm_squared() - r * r.transpose()) * *w;
         }
-        let scaled = self.transformation == Transformation::Similarity && extent > 0.0;
-        let linear: SMatrix<f64, D, D> = rotation * if scaled { along / extent } else { 1.0 };
         let turning = rotations_covariance::<D>(&inertia);
         let model = &self.model;
         regression.set(displacements.0[0].len(), |i| {
             let Some(p) = model.get(i) else {
                 return ([0.0; D], 0.0);
             };
-            let r = p.coords - from;
-            let image = linear * r + to;
+            let r = p.coords - fit.from;
+            let image = fit.linear * r + fit.to;
             let arm = in_space(&r).cross_matrix();
             let turned = (arm * turning * arm.transpose()).trace().max(0.0);
-            let grown = if scaled {
-                r.norm_squared() / extent
+            let grown = if scaled && fit.extent > 0.0 {
+                r.norm_squared() / fit.extent
             } else {
                 0.0
             };
@@ -906,11 +882,6 @@ impl<const D: usize> RigidFit<D> {
             (std::array::from_fn(|k| image[k] - base[i][k]), variance)
         });
     }
-}
-
-/// The vector with zeros for the dimensions that it lacks.
-fn in_space<const D: usize>(v: &SVector<f64, D>) -> Vector3<f64> {
-    Vector3::from_fn(|k, _| if k < D { v[k] } else { 0.0 })
 }
 
 /// Covariance of the rotation vector at unit noise: the inverse of the inertia, in the plane about

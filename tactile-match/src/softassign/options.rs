@@ -560,14 +560,13 @@ impl<const D: usize> SoftassignWorkspace<D> {
                 found: deviations.len(),
             });
         }
-        let positive = |s: &f64| *s > 0.0 && s.is_finite();
-        let widened = deviations.iter().copied();
-        if let Some(row) = widened.clone().position(|s| !positive(&s)) {
+        let positive = |s: f64| s > 0.0 && s.is_finite();
+        if let Some(row) = deviations.iter().position(|&s| !positive(s)) {
             let value = deviations[row];
             return Err(MatchError::TargetDeviation { row, value });
         }
         let scale = self.frame.scale;
-        self.deviations.extend(widened.map(|s| s / scale));
+        self.deviations.extend(deviations.iter().map(|s| s / scale));
         Ok(())
     }
 }

@@ -1,10 +1,8 @@
 //! Local patterns: which target a point is follows from where its neighbours come to lie. With the
 //! robust fit of doubtful pairs.
 
-use super::Annealer;
-use super::Axes;
 use super::model::Prior;
-use super::{LocalPatterns, PriorScales, State};
+use super::{Annealer, Axes, LocalPatterns, PriorScales, State, difference, squared_distance};
 use nalgebra::{SMatrix, SVector};
 use std::f64::consts::TAU;
 
@@ -68,7 +66,7 @@ impl<const D: usize> LocalPatterns<D> {
         for i in (0..target.len()).step_by(step) {
             let others = target.iter().enumerate().filter(|&(j, _)| j != i);
             let nearest = others
-                .map(|(_, t)| squared(&difference(t, &target[i])))
+                .map(|(_, t)| squared_distance(t, &target[i]))
                 .fold(f64::INFINITY, f64::min);
             self.distances.push((nearest, i));
         }
@@ -215,14 +213,6 @@ impl<const D: usize> LocalPatterns<D> {
         };
         self.pairs.extend(self.best.iter().map(pair));
     }
-}
-
-fn difference<const D: usize>(a: &[f64; D], b: &[f64; D]) -> [f64; D] {
-    std::array::from_fn(|k| a[k] - b[k])
-}
-
-fn squared<const D: usize>(v: &[f64; D]) -> f64 {
-    v.iter().map(|x| x * x).sum()
 }
 
 // The point nearest to a place within a fixed gate, for many places: one look-up instead of one for
@@ -400,10 +390,6 @@ impl<const D: usize> Cells<D> {
     }
 }
 
-fn squared_distance<const D: usize>(a: &[f64; D], b: &[f64; D]) -> f64 {
-    (0..D).map(|k| (a[k] - b[k]).powi(2)).sum()
-}
-
 // A warp from doubtful pairs: a robust fit keeps those that agree.
 
 /// Rounds of the fit. The first half with a nearly affine warp.
@@ -460,10 +446,8 @@ impl<const D: usize> Consensus<D> {
     fn take(&mut self, target: &[[f64; D]], pairs: &[(usize, f64)], base: &[[f64; D]]) {
         let stride = self.prior.stride;
         let rows = pairs.iter().zip(base);
-        self.wanted.fill(
-            stride,
-            rows.map(|((j, _), b)| std::array::from_fn(|k| target[*j][k] - b[k])),
-        );
+        self.wanted
+            .fill(stride, rows.map(|((j, _), b)| difference(&target[*j], b)));
         self.trust.clear();
         self.trust
             .extend(pairs.iter().map(|(_, trust)| trust.clamp(0.05, 0.95)));

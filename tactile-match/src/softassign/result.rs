@@ -3,12 +3,12 @@
 use super::assign::Blocks;
 use super::confidence::{self, CLEAN_SIGMA};
 use super::large::LARGE;
-use super::{AnnealedSoftassign, Frame, SoftassignWorkspace, mean};
+use super::{AnnealedSoftassign, Frame, SoftassignWorkspace, mean, squared_distance};
+use crate::centre_and_radius;
 use crate::hard::{self, Interpolation};
 use crate::{
     MatchError, MatchReport, MatchedPairs, Matching, SoftMatches, StopReason, error, unmatched_rows,
 };
-use crate::{centre_and_radius, widened};
 use nalgebra::{Point, SMatrix};
 use std::ops::ControlFlow;
 use std::sync::{Arc, OnceLock};
@@ -102,19 +102,6 @@ impl<'w, const D: usize> SoftassignMatch<'w, D> {
         self.interpolated(model, &ModelSpline::new(model))
     }
 
-    /// The report in the type of the points.
-    fn narrow_report(&self) -> MatchReport {
-        let report = &self.report;
-        MatchReport {
-            stop: report.stop,
-            iterations: report.iterations,
-            starts: report.starts,
-            residual: report.residual,
-            sigma: report.sigma,
-            doubt: report.doubt,
-        }
-    }
-
     /// As [`to_matching`](Self::to_matching), with the factorised system of the model's spline.
     fn interpolated(&self, model: &[Point<f64, D>], spline: &ModelSpline<D>) -> Matching<D> {
         let workspace = self.workspace;
@@ -124,7 +111,14 @@ impl<'w, const D: usize> SoftassignMatch<'w, D> {
         let (mut soft, mut row) = (SoftMatches::default(), Vec::new());
         for i in 0..model.len() {
             row.clear();
-            row.extend(confidence::soft_row(&workspace.annealer.soft, i));
+            // Soft matches below this are not reported.
+            row.extend(
+                workspace
+                    .annealer
+                    .soft
+                    .entries(i)
+                    .filter(|&(_, p)| p > 1e-3),
+            );
             row.sort_unstable_by_key(|entry| entry.0);
             soft.push_row(row.iter().copied());
         }
@@ -136,13 +130,13 @@ impl<'w, const D: usize> SoftassignMatch<'w, D> {
             warp,
             warped,
             assignment: answer.assignment.clone(),
-            confidence: answer.confidence.to_vec(),
+            confidence: answer.confidence.clone(),
             soft,
             unmatched_model,
             unmatched_target,
             displacement_covariance: answer.variance.iter().map(covariance).collect(),
-            energy: workspace.best.trace.to_vec(),
-            report: self.narrow_report(),
+            energy: workspace.best.trace.clone(),
+            report: self.report.clone(),
         }
     }
 }
@@ -252,25 +246,16 @@ impl<const D: usize> ModelSpline<D> {
 
 /// A spline that is fitted when it is first asked for: who wants the pairs alone does not wait for
 /// it.
-#[derive(Debug)]
 struct Lazy<const D: usize> {
     sources: Arc<Sources<D>>,
     images: Vec<Point<f64, D>>,
-    spline: OnceLock<Fitted<D>>,
-}
-
-struct Fitted<const D: usize>(Box<dyn Warp<f64, D> + Send + Sync>);
-
-impl<const D: usize> std::fmt::Debug for Fitted<D> {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Fitted").finish_non_exhaustive()
-    }
+    spline: OnceLock<Box<dyn Warp<f64, D> + Send + Sync>>,
 }
 
 impl<const D: usize> Lazy<D> {
     fn spline(&self) -> &dyn Warp<f64, D> {
-        let fit = || Fitted(warp_through(&self.sources, &mut self.images.clone()));
-        &*self.spline.get_or_init(fit).0
+        let fit = || warp_through(&self.sources, &mut self.images.clone());
+        &**self.spline.get_or_init(fit)
     }
 }
 
@@ -307,7 +292,7 @@ fn are_apart<const D: usize>(points: &[Point<f64, D>]) -> bool {
     if !ORDINARY.contains(&radius) {
         return false;
     }
-    let inside = |p: &Point<f64, D>| (widened(p) - centre) / radius;
+    let inside = |p: &Point<f64, D>| (p.coords - centre) / radius;
     let mut sorted: Vec<_> = points.iter().map(inside).collect();
     // Only neighbours along the first axis can be near.
     sorted.sort_unstable_by(|a, b| a[0].total_cmp(&b[0]));
@@ -345,7 +330,7 @@ fn agrees<const D: usize>(
     let size = warped
         .iter()
         .fold(0.0_f64, |size, p| size.max(p.coords.amax()));
-    let tolerance = size * (f64::UNIT_ROUNDOFF.sqrt());
+    let tolerance = size * f64::UNIT_ROUNDOFF.sqrt();
     // All at once: a spline samples points several at a time.
     let mut images = model.to_vec();
     warp.apply_into(model, &mut images).is_ok()
@@ -359,7 +344,7 @@ fn agrees<const D: usize>(
 
 /// Where the last match put the model, the factorisation of the spline between its points, the
 /// matcher's memory. Given another model it forgets the old one.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Series<const D: usize> {
     model: Vec<Point<f64, D>>,
     /// Empty where nothing was matched yet.
@@ -373,20 +358,6 @@ pub(super) struct Series<const D: usize> {
     /// Holds the answer of the last match.
     workspace: SoftassignWorkspace<D>,
     spline: Option<ModelSpline<D>>,
-}
-
-impl<const D: usize> Default for Series<D> {
-    fn default() -> Self {
-        Self {
-            model: Vec::new(),
-            last: Vec::new(),
-            start: Vec::new(),
-            matched: 0,
-            sigma: 0.0,
-            workspace: SoftassignWorkspace::default(),
-            spline: None,
-        }
-    }
 }
 
 impl<const D: usize> Series<D> {
@@ -427,9 +398,8 @@ impl<const D: usize> Series<D> {
         pairs.assignment.clear();
         pairs.assignment.extend_from_slice(found.assignment);
         pairs.confidence.clear();
-        let confidence = found.confidence.iter();
-        pairs.confidence.extend(confidence.copied());
-        pairs.report = found.narrow_report();
+        pairs.confidence.extend_from_slice(found.confidence);
+        pairs.report = found.report;
     }
 }
 
@@ -494,13 +464,13 @@ impl AnnealedSoftassign {
 fn apart<const D: usize>(a: &[[f64; D]], b: &[[f64; D]]) -> f64 {
     let [(p, r), (q, s)] = [a, b].map(|points| {
         let centre = mean(points);
-        let square = |p: &[f64; D]| (0..D).map(|k| (p[k] - centre[k]).powi(2)).sum::<f64>();
+        let square = |p: &[f64; D]| squared_distance(p, &centre);
         (
             centre,
             (points.iter().map(square).sum::<f64>() / points.len() as f64).sqrt(),
         )
     });
-    (0..D).map(|k| (p[k] - q[k]).powi(2)).sum::<f64>().sqrt() + (r - s).abs()
+    squared_distance(&p, &q).sqrt() + (r - s).abs()
 }
 
 #[cfg(test)]

@@ -287,10 +287,10 @@ impl AnnealedSoftassign {
             }
             Start::Tuples => {
                 let limited = self.rotation == Rotation::Limited;
-                if !ws.tuples.find(model, target, ws.spacing, limited) {
+                let base = &mut state.base;
+                if !ws.tuples.find(model, target, ws.spacing, limited, base) {
                     return false;
                 }
-                ws.tuples.apply(model, &mut state.base);
             }
             Start::Labelling => {
                 // Where noise hides which point is which, the points' surroundings hold nothing.
@@ -317,19 +317,9 @@ impl AnnealedSoftassign {
         cooling: Cooling,
         observe: Observer<'_>,
     ) -> ControlFlow<()> {
-        let smaller = ws.model.len().min(ws.target.len()) as f64;
-        let schedule = Schedule {
-            collapse: 0.5 * smaller,
-            partners: smaller,
-            ..self.schedule(cooling)
-        };
-        ws.starts += 1;
         ws.matched_before = ws.best.matched;
-        ws.state.trace.clear();
-        ws.state.iterations = 0;
         (ws.state.energy, ws.state.tail) = (f64::INFINITY, 0.0);
-        ws.state.noisy = false;
-        let flow = ws.annealer.run(&mut ws.state, &schedule, observe);
+        let flow = self.anneal_only(ws, cooling, observe);
         if ws.starts == 1 {
             ws.best.copy_from(&ws.state);
             if self.is_exact(ws) {
@@ -339,11 +329,30 @@ impl AnnealedSoftassign {
         }
         ws.state.tail = ws.annealer.tail(0.1 * ws.spacing);
         ws.annealer
-            .evaluate(&mut ws.state, self.share, ENERGY_RESOLUTION);
+            .evaluate(&mut ws.state, self.share, ENERGY_RESOLUTION, 1.0);
         if ws.state.energy < ws.best.energy || ws.starts == 1 {
             ws.best.copy_from(&ws.state);
         }
         flow
+    }
+
+    /// Anneals `ws.state` from its place.
+    pub(super) fn anneal_only<const D: usize>(
+        &self,
+        ws: &mut SoftassignWorkspace<D>,
+        cooling: Cooling,
+        observe: Observer<'_>,
+    ) -> ControlFlow<()> {
+        let smaller = ws.model.len().min(ws.target.len()) as f64;
+        let schedule = Schedule {
+            collapse: 0.5 * smaller,
+            partners: smaller,
+            ..self.schedule(cooling)
+        };
+        ws.starts += 1;
+        ws.state.trace.clear();
+        (ws.state.iterations, ws.state.noisy) = (0, false);
+        ws.annealer.run(&mut ws.state, &schedule, observe)
     }
 
     /// The mean over the prior's scales, by their evidence, twice: the first changes matches and
@@ -398,7 +407,7 @@ impl AnnealedSoftassign {
                 ws.state.sigma = sigma;
             }
             ws.annealer
-                .evaluate_undecided(&mut ws.state, self.share, ENERGY_RESOLUTION, decided);
+                .evaluate(&mut ws.state, self.share, ENERGY_RESOLUTION, decided);
             ws.scales.add_state(&ws.state);
             if ws.state.energy < likeliest.0 {
                 likeliest = (ws.state.energy, scales);

@@ -1,10 +1,8 @@
 //! Where a run may start: first guesses of the affine part of the warp.
 
 use super::patterns::Cells;
-use super::{Rotation, mean};
+use super::{Rotation, mean, squared_distance};
 use nalgebra::{Matrix3, SMatrix, SVector, SymmetricEigen};
-
-// Where a run may start: first guesses of the affine part of the warp.
 
 /// The model moved so that the centroids meet.
 pub(super) fn centred<const D: usize>(
@@ -137,8 +135,8 @@ const TESTED: usize = 10;
 const OFFERED: usize = 5;
 /// A hit is a target within this many spacings.
 const GATE: f64 = 0.3;
-/// Memory of the start, and the map found.
-#[derive(Clone, Debug)]
+/// Memory of the start.
+#[derive(Clone, Debug, Default)]
 pub(super) struct Tuples<const D: usize> {
     targets: Cells<D>,
     order: Vec<(f64, usize)>,
@@ -146,47 +144,18 @@ pub(super) struct Tuples<const D: usize> {
     near: Vec<(f64, usize)>,
     offsets: Vec<SVector<f64, D>>,
     offered: Vec<SVector<f64, D>>,
-    linear: SMatrix<f64, D, D>,
-    from: SVector<f64, D>,
-    to: SVector<f64, D>,
-}
-
-impl<const D: usize> Default for Tuples<D> {
-    fn default() -> Self {
-        Self {
-            targets: Cells::default(),
-            order: Vec::new(),
-            seeds: Vec::new(),
-            near: Vec::new(),
-            offsets: Vec::new(),
-            offered: Vec::new(),
-            linear: SMatrix::identity(),
-            from: SVector::zeros(),
-            to: SVector::zeros(),
-        }
-    }
 }
 
 impl<const D: usize> Tuples<D> {
-    /// The map, applied to the model.
-    pub(super) fn apply(&self, model: &[[f64; D]], base: &mut Vec<[f64; D]>) {
-        let map = Local {
-            linear: self.linear,
-            from: self.from,
-            to: self.to,
-        };
-        base.clear();
-        base.extend(model.iter().map(|p| map.apply(p)));
-    }
-
-    /// Looks for the map. False where no tuples agree. `limited` leaves out rotations beyond some
-    /// 60°.
+    /// Puts the model to `base` by the map. False where no tuples agree. `limited` leaves out
+    /// rotations beyond some 60°.
     pub(super) fn find(
         &mut self,
         model: &[[f64; D]],
         target: &[[f64; D]],
         spacing: f64,
         limited: bool,
+        base: &mut Vec<[f64; D]>,
     ) -> bool {
         let is_degenerate = spacing.is_nan() || spacing <= 0.0;
         if is_degenerate || model.len().min(target.len()) < 2 * TESTED * D {
@@ -212,7 +181,8 @@ impl<const D: usize> Tuples<D> {
             }
         }
         let Some((_, map)) = best else { return false };
-        (self.linear, self.from, self.to) = (map.linear, map.from, map.to);
+        base.clear();
+        base.extend(model.iter().map(|p| map.apply(p)));
         true
     }
 
@@ -222,7 +192,7 @@ impl<const D: usize> Tuples<D> {
         let by_distance = model
             .iter()
             .enumerate()
-            .map(|(i, p)| (squared(p, &centre), i));
+            .map(|(i, p)| (squared_distance(p, &centre), i));
         self.order.extend(by_distance);
         self.order
             .sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
@@ -238,7 +208,7 @@ impl<const D: usize> Tuples<D> {
         let distances = points
             .iter()
             .enumerate()
-            .map(|(i, p)| (squared(p, place), i));
+            .map(|(i, p)| (squared_distance(p, place), i));
         self.near.extend(distances);
         let count = count.min(points.len());
         let by_distance =
@@ -417,10 +387,6 @@ impl<const D: usize> Tuples<D> {
             count *= 2;
         }
     }
-}
-
-fn squared<const D: usize>(a: &[f64; D], b: &[f64; D]) -> f64 {
-    (0..D).map(|k| (a[k] - b[k]).powi(2)).sum()
 }
 
 // Affine maps about a pair of points: what determines one, and which are plausible.

@@ -2,7 +2,7 @@
 
 use super::confidence::MIN_SIGMA;
 use super::search::{ENERGY_RESOLUTION, FAST, bounding_volume};
-use super::{AnnealedSoftassign, Cooling, Rotation, Schedule, SoftassignWorkspace, mean, starts};
+use super::{AnnealedSoftassign, Cooling, Rotation, SoftassignWorkspace, mean, starts};
 use crate::Doubt;
 use nalgebra::{SMatrix, SVector};
 use std::ops::ControlFlow;
@@ -84,22 +84,13 @@ impl AnnealedSoftassign {
             ws.state.base.extend(ws.model.iter().map(turned));
             ws.annealer.rigid.set(self.transformation, &ws.state.base);
         }
-        ws.starts += 1;
-        ws.state.trace.clear();
-        (ws.state.iterations, ws.state.noisy) = (0, false);
-        let smaller = ws.model.len().min(ws.target.len()) as f64;
-        let schedule = Schedule {
-            collapse: 0.5 * smaller,
-            partners: smaller,
-            ..self.schedule(Cooling { sigma, ..FOLLOW })
-        };
         // There is no observer that could stop it.
         let silent = &mut |_, _| ControlFlow::Continue(());
-        let _ = ws.annealer.run(&mut ws.state, &schedule, silent);
+        let _ = self.anneal_only(ws, Cooling { sigma, ..FOLLOW }, silent);
         ws.state.tail = ws.annealer.tail(0.1 * ws.spacing);
         let energy = ws.best.energy;
         for state in [&mut ws.state, &mut ws.best] {
-            ws.annealer.evaluate(state, self.share, MIN_SIGMA);
+            ws.annealer.evaluate(state, self.share, MIN_SIGMA, 1.0);
         }
         let gain = ws.best.energy - ws.state.energy;
         ws.best.energy = energy;
@@ -112,7 +103,8 @@ impl AnnealedSoftassign {
                 (false, Rotation::Limited) => Some((gain, Doubt::Turned)),
                 (false, Rotation::Any) => {
                     let state = &mut ws.state;
-                    ws.annealer.evaluate(state, self.share, ENERGY_RESOLUTION);
+                    ws.annealer
+                        .evaluate(state, self.share, ENERGY_RESOLUTION, 1.0);
                     ws.best.copy_from(state);
                     None
                 }

@@ -7,7 +7,10 @@ mod soft_assign {
         let targets: Vec<[f64; 2]> = (0..41)
             .map(|i| [f64::from(i) * 0.1, f64::from(i * i % 7) * 0.2])
             .collect();
-        let mut soft = SoftAssignment::default();
+        let mut soft = SoftAssignment {
+            faintest: 1e-6,
+            ..SoftAssignment::default()
+        };
         soft.set_targets(&targets, &[]);
         (
             targets

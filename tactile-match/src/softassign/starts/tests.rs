@@ -26,9 +26,8 @@ fn a_stretched_and_cropped_grid_is_put_onto_its_targets() {
     let kept = target.len();
     target.extend((0..kept / 10).map(|i| [1.1 * scatter(i + 400, 0), 1.1 * scatter(i + 400, 1)]));
     let mut tuples = Tuples::default();
-    assert!(tuples.find(&model, &target, 0.12, true));
     let mut base = Vec::new();
-    tuples.apply(&model, &mut base);
+    assert!(tuples.find(&model, &target, 0.12, true, &mut base));
     for (p, b) in model.iter().zip(&base) {
         let truth = moved(p);
         // Well below the spacing: the fit is to exact pairs, and a few outliers that were hit.
