@@ -40,39 +40,6 @@ fn a_batch_of_small_matches_allocates_nothing_after_the_first() {
 }
 
 #[test]
-fn a_dense_set_allocates_nothing_the_second_time() {
-    // Turned so far that the first run leaves parts aside: the patterns of the points are looked at
-    // as well.
-    let place = |i: u32, angle: f64| {
-        let (r, turn) = (
-            ((f64::from(i) + 0.5) / 700.0).sqrt(),
-            2.399_963 * f64::from(i) + angle,
-        );
-        Point2::new(
-            r * turn.cos() + 0.005 * (0.618 * f64::from(i * i)).fract(),
-            r * turn.sin(),
-        )
-    };
-    let model: Vec<_> = (0..700).map(|i| place(i, 0.0)).collect();
-    let target: Vec<_> = (0..700).map(|i| place(i, 0.15)).collect();
-    let matcher = AnnealedSoftassign::default();
-    let mut workspace = SoftassignWorkspace::default();
-    let mut run = || {
-        let go = |_, _| ControlFlow::Continue(());
-        matcher
-            .match_points_with(&mut workspace, &model, &target, go)
-            .expect("finite points")
-            .report
-            .starts
-    };
-    assert!(run() > 1);
-    assert_eq!(
-        allocation_counter::measure(|| assert!(run() > 1)).count_total,
-        0
-    );
-}
-
-#[test]
 fn pairs_along_a_series_allocate_nothing() {
     let place = |i: u32, stretch: f64| {
         let (r, turn) = (0.1 * f64::from(i).sqrt(), 2.4 * f64::from(i));

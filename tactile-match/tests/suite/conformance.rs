@@ -1,7 +1,7 @@
 //! What every [`PointMatcher`] must do, in 2-D and 3-D.
 
 use crate::common::{
-    Stream, assert_consistent, bend, grid, largest_step, matchers, reordered, scattered,
+    Scene, Stream, bend, grid, largest_step, matched, matchers, reordered, scattered,
 };
 use nalgebra::{Point, SVector};
 use tactile_match::{MatchError, PointMatcher};
@@ -19,29 +19,21 @@ macro_rules! for_all {
     };
 }
 
-/// A match that must succeed and be consistent.
-fn run<const D: usize>(
-    name: &str,
-    matcher: &dyn PointMatcher<D>,
-    model: &[Point<f64, D>],
-    target: &[Point<f64, D>],
-) -> tactile_match::Matching<D> {
-    let matching = matcher
-        .match_points(model, target)
-        .unwrap_or_else(|error| panic!("{name}: {error}"));
-    assert_consistent(name, model, target, &matching);
-    matching
-}
-
+/// Scattered points, and a regular grid, whose neighbours are as near as any other's.
 #[test]
 fn identical_sets_match_themselves() {
     fn check<const D: usize>(name: &str, matcher: &dyn PointMatcher<D>) {
-        let points = scattered::<D>(40, 1);
-        let matching = run(name, matcher, &points, &points);
-        let expected: Vec<_> = (0..40).map(Some).collect();
-        assert_eq!(matching.assignment, expected, "{name}");
-        // A tenth of the spacing 1/7: what a registration that stops early may leave.
-        assert!(largest_step(&matching.warped, &points) < 0.014, "{name}");
+        let side = if D == 2 { 6 } else { 4 };
+        for (points, spacing) in [(scattered(40, 1), 0.14), (grid(side), 1.0)] {
+            let matching = matched(name, matcher, &points, &points);
+            let expected: Vec<_> = (0..points.len()).map(Some).collect();
+            assert_eq!(matching.assignment, expected, "{name}");
+            // A tenth of the spacing: what a registration that stops early may leave.
+            assert!(
+                largest_step(&matching.warped, &points) < 0.1 * spacing,
+                "{name}"
+            );
+        }
     }
     for_all!(check);
 }
@@ -51,10 +43,10 @@ fn the_order_of_the_points_does_not_matter() {
     fn check<const D: usize>(name: &str, matcher: &dyn PointMatcher<D>) {
         let model = scattered::<D>(40, 2);
         let target = bend(&model, 0.02);
-        let plain = run(name, matcher, &model, &target);
+        let plain = matched(name, matcher, &model, &target);
         let mut stream = Stream::new(3);
         let (rows, columns) = (stream.permutation(40), stream.permutation(40));
-        let shuffled = run(
+        let shuffled = matched(
             name,
             matcher,
             &reordered(&model, &rows),
@@ -80,14 +72,9 @@ fn the_order_of_the_points_does_not_matter() {
 #[test]
 fn a_small_deformation_is_found() {
     fn check<const D: usize>(name: &str, matcher: &dyn PointMatcher<D>) {
-        let model = scattered::<D>(60, 4);
-        let target = bend(&model, 0.02);
-        let order = Stream::new(5).permutation(60);
-        let matching = run(name, matcher, &model, &reordered(&target, &order));
-        let right = (0..60)
-            .filter(|&i| matching.assignment[i].is_some_and(|j| order[j] == i))
-            .count();
-        assert_eq!(right, 60, "{name}");
+        let scene = Scene::<D>::bent(60, 0.02, 4);
+        let matching = matched(name, matcher, &scene.model, &scene.target);
+        assert_eq!(scene.right(&matching.assignment), 60, "{name}");
     }
     for_all!(check);
 }
@@ -97,37 +84,13 @@ fn sets_of_different_size_are_matched() {
     fn check<const D: usize>(name: &str, matcher: &dyn PointMatcher<D>) {
         let points = scattered::<D>(50, 6);
         for (model, target) in [(&points[..], &points[..45]), (&points[..45], &points[..])] {
-            let matching = run(name, matcher, model, target);
+            let matching = matched(name, matcher, model, target);
             let right = (0..45)
                 .filter(|&i| matching.assignment[i] == Some(i))
                 .count();
             // What the leftover points lie on has no answer of its own; nine tenths of the rest
             // must be right.
             assert!(right >= 41, "{name}: {right} of 45");
-        }
-    }
-    for_all!(check);
-}
-
-#[test]
-fn few_points_are_answered() {
-    fn check<const D: usize>(name: &str, matcher: &dyn PointMatcher<D>) {
-        let points = scattered::<D>(9, 7);
-        for rows in 1..=4 {
-            for columns in (1..=4).chain([9]) {
-                run(
-                    &format!("{name}, {rows} to {columns}"),
-                    matcher,
-                    &points[..rows],
-                    &points[..columns],
-                );
-                run(
-                    &format!("{name}, {columns} to {rows}"),
-                    matcher,
-                    &points[..columns],
-                    &points[..rows],
-                );
-            }
         }
     }
     for_all!(check);
@@ -150,23 +113,9 @@ fn coincident_and_collinear_points_are_answered() {
         ];
         for (a, model) in sets {
             for (b, target) in sets {
-                run(&format!("{name}, {a} to {b}"), matcher, model, target);
+                matched(&format!("{name}, {a} to {b}"), matcher, model, target);
             }
         }
-    }
-    for_all!(check);
-}
-
-#[test]
-fn regular_grids_match_themselves() {
-    fn check<const D: usize>(name: &str, matcher: &dyn PointMatcher<D>) {
-        let points = grid::<D>(if D == 2 { 6 } else { 4 });
-        let matching = run(name, matcher, &points, &points);
-        assert!(
-            (0..points.len()).all(|i| matching.assignment[i] == Some(i)),
-            "{name}: {:?}",
-            matching.assignment
-        );
     }
     for_all!(check);
 }
@@ -211,8 +160,8 @@ fn the_same_input_gives_the_same_bits() {
         let model = scattered::<D>(30, 10);
         let target = bend(&model, 0.05);
         let (a, b) = (
-            run(name, matcher, &model, &target),
-            run(name, matcher, &model, &target),
+            matched(name, matcher, &model, &target),
+            matched(name, matcher, &model, &target),
         );
         assert_eq!(a.warped, b.warped, "{name}");
         assert_eq!(

@@ -2,7 +2,7 @@
 //! parts one point aside.
 use nalgebra::{Point, Point2, Point3};
 use std::ops::ControlFlow;
-use tactile_match::{AnnealedSoftassign, PointMatcher, SoftassignWorkspace};
+use tactile_match::{AnnealedSoftassign, PointMatcher, SoftassignMatch, SoftassignWorkspace};
 
 /// A number of (−1, 1), without pattern and the same on every machine.
 fn scatter(i: usize, k: usize) -> f64 {
@@ -97,33 +97,42 @@ fn a_dense_surface_in_space_is_matched() {
 }
 
 #[test]
-fn what_a_workspace_did_before_changes_no_answer() {
-    let scene = |n: usize, noise: f64| {
+fn what_a_workspace_did_before_changes_no_answer_and_saves_the_memory() {
+    let scene = |n: usize, noise: f64, angle: f64| {
         let model = sunflower(n);
         let off = |i: usize| noise * Point2::new(scatter(i + 7, 0), scatter(i + 7, 1)).coords;
         let target: Vec<_> = model
             .iter()
             .enumerate()
-            .map(|(i, p)| warp(p, 0.0) + off(i))
+            .map(|(i, p)| warp(p, angle) + off(i))
             .collect();
         (model, target)
     };
-    let matcher = AnnealedSoftassign::default();
-    let run = |workspace: &mut SoftassignWorkspace<2>,
-               (model, target): &(Vec<Point2<f64>>, Vec<Point2<f64>>)| {
+    let check = |workspace: &mut SoftassignWorkspace<2>,
+                 (model, target): &(Vec<Point2<f64>>, Vec<Point2<f64>>),
+                 seen: &mut dyn FnMut(SoftassignMatch<'_, 2>)| {
         let go = |_, _| ControlFlow::Continue(());
-        let found = matcher
-            .match_points_with(workspace, model, target, go)
-            .unwrap();
-        (found.report, found.assignment.to_vec())
+        let found = AnnealedSoftassign::default().match_points_with(workspace, model, target, go);
+        seen(found.unwrap());
     };
-    // In the first scene patterns are looked at, with a wider spacing than the second's, whose
-    // first run is nearly right.
-    let (coarse, dense) = (scene(500, 0.01), scene(700, 0.006));
+    // The first scene is turned so far that patterns are looked at, with a wider spacing than the
+    // second's, whose first run is nearly right.
+    let (coarse, dense) = (scene(700, 0.0, 0.15), scene(900, 0.006, 0.0));
     let mut used = SoftassignWorkspace::default();
-    run(&mut used, &coarse);
-    assert_eq!(
-        run(&mut used, &dense),
-        run(&mut SoftassignWorkspace::default(), &dense)
-    );
+    check(&mut used, &coarse, &mut |found| {
+        assert!(found.report.starts > 1)
+    });
+    check(&mut used, &dense, &mut |found| {
+        check(&mut SoftassignWorkspace::default(), &dense, &mut |fresh| {
+            assert_eq!(
+                (&found.report, found.assignment),
+                (&fresh.report, fresh.assignment)
+            );
+        });
+    });
+    let counted = allocation_counter::measure(|| {
+        check(&mut used, &coarse, &mut |_| {});
+        check(&mut used, &dense, &mut |_| {});
+    });
+    assert_eq!(counted.count_total, 0);
 }

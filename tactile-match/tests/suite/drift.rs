@@ -1,7 +1,7 @@
 //! Coherent point drift against its equations written out slowly, and against what it must not
 //! depend on.
 
-use crate::common::{Stream, bend, reordered, rotation, scattered};
+use crate::common::{Stream, bend, largest_step, reordered, rotation, scattered};
 use nalgebra::{DMatrix, Point, Point2, Point3, SVector, Vector3};
 use proptest::prelude::*;
 use tactile_match::{
@@ -70,13 +70,6 @@ fn slow_non_rigid<const D: usize>(
             .collect(),
         done,
     )
-}
-
-fn largest_step<const D: usize>(a: &[Point<f64, D>], b: &[Point<f64, D>]) -> f64 {
-    a.iter()
-        .zip(b)
-        .map(|(a, b)| (a - b).norm())
-        .fold(0.0, f64::max)
 }
 
 /// The tolerance is that of the kernel's factorisation, 1e-12, over the ridge λσ² ≥ 1e-4 of the
@@ -218,28 +211,6 @@ fn outliers_are_left_without_a_partner() {
         found.assignment
     );
     assert_eq!(found.unmatched_target, (60..75).collect::<Vec<_>>());
-}
-
-#[test]
-fn a_workspace_forgets_the_last_match() {
-    let matcher = CoherentPointDrift::default();
-    let mut workspace = DriftWorkspace::default();
-    let sets: Vec<_> = [(40, 5), (20, 6), (40, 7)]
-        .into_iter()
-        .map(|(n, seed)| {
-            (
-                scattered::<3>(n, seed),
-                bend(&scattered::<3>(n, seed), 0.05),
-            )
-        })
-        .collect();
-    for (model, target) in &sets {
-        let again = matcher.match_with(&mut workspace, model, target).unwrap();
-        assert_eq!(
-            again.warped,
-            matcher.match_points(model, target).unwrap().warped
-        );
-    }
 }
 
 #[test]

@@ -21,11 +21,6 @@ struct Scene<const D: usize> {
     target: Vec<Point<f64, D>>,
 }
 
-/// A normal deviate, nearly: the sum of twelve uniform ones.
-fn deviate(stream: &mut Stream) -> f64 {
-    (0..12).map(|_| stream.next()).sum::<f64>() - 6.0
-}
-
 /// The scenes that every matcher is recorded on.
 fn scenes<const D: usize>() -> Vec<Scene<D>> {
     let mut stream = Stream::new(11);
@@ -35,7 +30,7 @@ fn scenes<const D: usize>() -> Vec<Scene<D>> {
     let clean = reordered(&bent, &order);
     let noise: Vec<_> = clean
         .iter()
-        .map(|p| p + SVector::from_fn(|_, _| 0.015 * deviate(&mut stream)))
+        .map(|p| p + SVector::from_fn(|_, _| 0.015 * stream.normal()))
         .collect();
     let mut outliers = clean.clone();
     outliers

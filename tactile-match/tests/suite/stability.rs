@@ -1,57 +1,29 @@
 //! Every matcher far from size one and from the origin, on points that nearly coincide or lie in a
 //! plane, and in single precision.
 
-use crate::common::{
-    Stream, assert_consistent, bend, largest_step, matchers, reordered, scattered,
-};
+use crate::common::{Scene, largest_step, matched, matchers};
 use nalgebra::{Point, Point3, SVector};
-use tactile_match::{Matching, PointMatcher};
 use tactile_tps::Scalar;
 
 const POINTS: usize = 40;
 
-/// A model, its deformed copy in another order, and that order.
-fn scene<const D: usize>(
-    seed: u64,
-    size: f64,
-) -> (Vec<Point<f64, D>>, Vec<Point<f64, D>>, Vec<usize>) {
-    let model = scattered::<D>(POINTS, seed);
-    let order = Stream::new(seed).permutation(POINTS);
-    let target = reordered(&bend(&model, size), &order);
-    (model, target, order)
-}
-
-fn run<const D: usize>(
-    name: &str,
-    matcher: &dyn PointMatcher<D>,
-    model: &[Point<f64, D>],
-    target: &[Point<f64, D>],
-) -> Matching<D> {
-    let matching = matcher
-        .match_points(model, target)
-        .unwrap_or_else(|error| panic!("{name}: {error}"));
-    assert_consistent(name, model, target, &matching);
-    matching
-}
-
-fn right(assignment: &[Option<usize>], order: &[usize]) -> usize {
-    (0..order.len())
-        .filter(|&i| assignment[i].is_some_and(|j| order[j] == i))
-        .count()
-}
-
 /// The answer must scale with the points. Powers of ten round every coordinate: the input differs
 /// by the scalar's epsilon, which iterations and ill-conditioned splines enlarge by up to `growth`.
 fn check_scale<const D: usize>(growth: f64) {
-    let (model, target, _) = scene::<D>(1, 0.03);
+    let scene = Scene::<D>::bent(POINTS, 0.03, 1);
     for (name, matcher) in matchers::<D>() {
-        let plain = run(name, &*matcher, &model, &target);
+        let plain = matched(name, &*matcher, &scene.model, &scene.target);
         for exponent in [-9, -6, -3, 3, 6, 9] {
             let scale: f64 = 10_f64.powi(exponent);
             let scaled =
                 |points: &[Point<f64, D>]| points.iter().map(|p| p * scale).collect::<Vec<_>>();
             let name = format!("{name}, scale 1e{exponent}, {}-D", D);
-            let other = run(&name, &*matcher, &scaled(&model), &scaled(&target));
+            let other = matched(
+                &name,
+                &*matcher,
+                &scaled(&scene.model),
+                &scaled(&scene.target),
+            );
             assert_eq!(other.assignment, plain.assignment, "{name}");
             let error = largest_step(&other.warped, &scaled(&plain.warped)) / 10_f64.powi(exponent);
             assert!(error <= growth * f64::UNIT_ROUNDOFF, "{name}: {error:e}");
@@ -68,17 +40,17 @@ fn the_scale_does_not_matter_in_double_precision() {
 #[test]
 fn an_offset_of_a_million_diameters_does_not_matter() {
     fn check<const D: usize>() {
-        let (model, target, order) = scene::<D>(2, 0.03);
+        let scene = Scene::<D>::bent(POINTS, 0.03, 2);
         // A power of two keeps what is lost to rounding at 2⁻³³ of the diameter.
         let offset = SVector::<f64, D>::repeat(f64::from(1 << 20));
         let moved =
             |points: &[Point<f64, D>]| points.iter().map(|p| p + offset).collect::<Vec<_>>();
         for (name, matcher) in matchers::<D>() {
-            let plain = run(name, &*matcher, &model, &target);
-            let other = run(name, &*matcher, &moved(&model), &moved(&target));
+            let plain = matched(name, &*matcher, &scene.model, &scene.target);
+            let other = matched(name, &*matcher, &moved(&scene.model), &moved(&scene.target));
             assert_eq!(
-                right(&other.assignment, &order),
-                right(&plain.assignment, &order),
+                scene.right(&other.assignment),
+                scene.right(&plain.assignment),
                 "{name}, {D}-D"
             );
             let error = largest_step(&other.warped, &moved(&plain.warped));
@@ -91,19 +63,20 @@ fn an_offset_of_a_million_diameters_does_not_matter() {
 
 #[test]
 fn sets_far_apart_are_matched() {
-    let (model, target, order) = scene::<3>(3, 0.03);
-    let far: Vec<_> = target
+    let scene = Scene::<3>::bent(POINTS, 0.03, 3);
+    let far: Vec<_> = scene
+        .target
         .iter()
         .map(|p| p + SVector::<f64, 3>::repeat(1e5))
         .collect();
     for (name, matcher) in matchers::<3>() {
-        let matching = run(name, &*matcher, &model, &far);
+        let matching = matched(name, &*matcher, &scene.model, &far);
         // Nearest neighbours are the only matcher that goes by where the sets lie.
         if name != "nearest neighbour" {
             assert!(
-                right(&matching.assignment, &order) >= POINTS - 2,
+                scene.right(&matching.assignment) >= POINTS - 2,
                 "{name}: {}",
-                right(&matching.assignment, &order)
+                scene.right(&matching.assignment)
             );
         }
     }
@@ -111,7 +84,7 @@ fn sets_far_apart_are_matched() {
 
 #[test]
 fn a_nearly_flat_set_is_matched() {
-    let (model, target, order) = scene::<3>(4, 0.03);
+    let scene = Scene::<3>::bent(POINTS, 0.03, 4);
     for thickness in [1e-3, 1e-6, 1e-9, 1e-12, 0.0] {
         let flat = |points: &[Point3<f64>]| {
             points
@@ -119,16 +92,16 @@ fn a_nearly_flat_set_is_matched() {
                 .map(|p| Point3::new(p.x, p.y, 5.0 + thickness * p.z))
                 .collect::<Vec<_>>()
         };
-        let (model, target) = (flat(&model), flat(&target));
+        let (model, target) = (flat(&scene.model), flat(&scene.target));
         for (name, matcher) in matchers::<3>() {
             let name = format!("{name}, thickness {thickness}");
-            let matching = run(&name, &*matcher, &model, &target);
+            let matching = matched(&name, &*matcher, &model, &target);
             // Projecting a jittered cube brings points close to one another; most are still told
             // apart by their plane positions.
             assert!(
-                right(&matching.assignment, &order) >= POINTS / 2,
+                scene.right(&matching.assignment) >= POINTS / 2,
                 "{name}: {}",
-                right(&matching.assignment, &order)
+                scene.right(&matching.assignment)
             );
             let off_plane = matching
                 .warped
@@ -145,7 +118,7 @@ fn a_nearly_flat_set_is_matched() {
 
 #[test]
 fn near_duplicates_are_answered() {
-    let (model, target, order) = scene::<2>(5, 0.02);
+    let scene = Scene::<2>::bent(POINTS, 0.02, 5);
     for distance in [1e-3, 1e-6, 1e-9, 1e-12, 1e-15] {
         let doubled = |points: &[Point<f64, 2>]| {
             let near = points
@@ -155,10 +128,15 @@ fn near_duplicates_are_answered() {
         };
         for (name, matcher) in matchers::<2>() {
             let name = format!("{name}, duplicates at {distance:e}");
-            let matching = run(&name, &*matcher, &doubled(&model), &doubled(&target));
+            let matching = matched(
+                &name,
+                &*matcher,
+                &doubled(&scene.model),
+                &doubled(&scene.target),
+            );
             let right = (0..2 * POINTS)
                 .filter(|&i| {
-                    matching.assignment[i].is_some_and(|j| order[j % POINTS] == i % POINTS)
+                    matching.assignment[i].is_some_and(|j| scene.order[j % POINTS] == i % POINTS)
                 })
                 .count();
             // Which of the two is no question of right or wrong.

@@ -1,83 +1,44 @@
 //! Targets that were measured with different precision.
 
-use crate::common::{Stream, bend, reordered, scattered};
-use nalgebra::{Point, SVector};
+use crate::common::{Scene, Stream, bend, scattered};
 use tactile_match::{AnnealedSoftassign, MatchError, Matching, PointMatcher, Transformation};
 
-/// A normal deviate, nearly: the sum of twelve uniform ones.
-fn deviate(stream: &mut Stream) -> f64 {
-    (0..12).map(|_| stream.next()).sum::<f64>() - 6.0
-}
-
-/// A model, its true positions, targets with noise of known deviations and which model point each
-/// of them is.
-struct Scene<const D: usize> {
-    model: Vec<Point<f64, D>>,
-    truth: Vec<Point<f64, D>>,
-    target: Vec<Point<f64, D>>,
+/// Points bent, and targets with noise of known standard deviations.
+struct Measured<const D: usize> {
+    scene: Scene<D>,
     deviations: Vec<f64>,
-    order: Vec<usize>,
 }
 
-impl<const D: usize> Scene<D> {
-    /// `n` points bent. The deviations of the targets, in spacings, are drawn from `choices`.
+impl<const D: usize> Measured<D> {
+    /// `n` points. The deviations of the targets, in spacings, are drawn from `choices`.
     fn new(n: usize, choices: &[f64], seed: u64) -> Self {
         let mut stream = Stream::new(seed + 500);
         let model = scattered::<D>(n, seed);
-        let truth = bend(&model, 0.06);
-        let order = stream.permutation(n);
+        let (truth, order) = (bend(&model, 0.06), stream.permutation(n));
         let spacing = (n as f64).powf(-1.0 / D as f64);
         let deviations: Vec<f64> = (0..n)
             .map(|_| choices[(stream.next() * choices.len() as f64) as usize] * spacing)
             .collect();
-        let target = reordered(&truth, &order)
-            .iter()
-            .zip(&deviations)
-            .map(|(p, s)| p + SVector::from_fn(|_, _| s * deviate(&mut stream)))
-            .collect();
-        Self {
-            model,
-            truth,
-            target,
-            deviations,
-            order,
-        }
+        let scene = Scene::new(model, truth, order, |j| deviations[j], 0, &mut stream);
+        Self { scene, deviations }
     }
 
-    fn weighted(&self) -> Matching<D> {
-        AnnealedSoftassign::default()
-            .match_with_target_errors(&self.model, &self.target, &self.deviations)
-            .expect("good points and deviations")
-    }
-
-    fn plain(&self) -> Matching<D> {
-        AnnealedSoftassign::default()
-            .match_points(&self.model, &self.target)
-            .expect("good points")
-    }
-
-    /// Root mean square distance of the warped points from the truth.
-    fn error(&self, found: &Matching<D>) -> f64 {
-        let pairs = found.warped.iter().zip(&self.truth);
-        let squares: f64 = pairs.map(|(w, t)| (w - t).norm_squared()).sum();
-        (squares / self.model.len() as f64).sqrt()
-    }
-
-    fn right(&self, found: &Matching<D>) -> usize {
-        let rows = found.assignment.iter().enumerate();
-        rows.filter(|&(i, partner)| partner.is_some_and(|j| self.order[j] == i))
-            .count()
+    /// With the deviations, and without.
+    fn matched(&self, matcher: AnnealedSoftassign) -> [Matching<D>; 2] {
+        let Scene { model, target, .. } = &self.scene;
+        [
+            matcher.match_with_target_errors(model, target, &self.deviations),
+            matcher.match_points(model, target),
+        ]
+        .map(|found| found.expect("good points and deviations"))
     }
 }
 
 /// Equal errors say nothing that the residuals do not.
 fn check_equal<const D: usize>(choices: &[f64]) {
-    let scene = Scene::<D>::new(60, choices, 3);
-    let equal = vec![0.37; scene.target.len()];
-    let weighted = AnnealedSoftassign::default()
-        .match_with_target_errors(&scene.model, &scene.target, &equal)
-        .expect("good points");
-    let plain = scene.plain();
+    let mut measured = Measured::<D>::new(60, choices, 3);
+    measured.deviations.fill(0.37);
+    let [weighted, plain] = measured.matched(AnnealedSoftassign::default());
     assert_eq!(weighted.warped, plain.warped);
     assert_eq!(weighted.assignment, plain.assignment);
     assert_eq!(weighted.confidence, plain.confidence);
@@ -102,12 +63,12 @@ fn check_halved<const D: usize>() {
     let (mut weighted, mut plain) = (0.0, 0.0);
     let (mut right, mut right_plain) = (0, 0);
     for seed in 0..8 {
-        let scene = Scene::<D>::new(120, &[0.02, 0.15], seed);
-        let (with, without) = (scene.weighted(), scene.plain());
-        weighted += scene.error(&with);
-        plain += scene.error(&without);
-        right += scene.right(&with);
-        right_plain += scene.right(&without);
+        let measured = Measured::<D>::new(120, &[0.02, 0.15], seed);
+        let [with, without] = measured.matched(AnnealedSoftassign::default());
+        weighted += measured.scene.error(&with.warped);
+        plain += measured.scene.error(&without.warped);
+        right += measured.scene.right(&with.assignment);
+        right_plain += measured.scene.right(&without.assignment);
     }
     // Sixty precise points alone would leave a quarter, but for the field's finest modes.
     assert!(
@@ -130,8 +91,10 @@ fn known_errors_halve_the_error_of_the_field() {
 fn coverage<const D: usize>(choices: &[f64]) -> f64 {
     let (mut within, mut all) = (0, 0);
     for seed in 20..60 {
-        let scene = Scene::<D>::new(105, choices, seed);
-        let found = scene.weighted();
+        let Measured { scene, deviations } = Measured::<D>::new(105, choices, seed);
+        let found = AnnealedSoftassign::default()
+            .match_with_target_errors(&scene.model, &scene.target, &deviations)
+            .expect("good points and deviations");
         for ((w, t), covariance) in found
             .warped
             .iter()
@@ -162,31 +125,19 @@ fn standard_deviations_hold_where_errors_differ() {
 /// A rigid motion follows the precise points.
 #[test]
 fn a_rigid_fit_counts_precise_targets_more() {
-    let options = AnnealedSoftassign::default().with_transformation(Transformation::Rigid);
-    let matcher = options;
+    let matcher = AnnealedSoftassign::default().with_transformation(Transformation::Rigid);
     let (mut weighted, mut plain) = (0.0, 0.0);
     for seed in 0..8 {
-        let bent = Scene::<2>::new(60, &[0.03, 0.15], seed);
+        let mut measured = Measured::<2>::new(60, &[0.03, 0.15], seed);
         // The truth is the model itself here: what the bending added is taken away again.
-        let moved = bent.target.iter().zip(&bent.order);
-        let target = moved
-            .map(|(t, &i)| bent.model[i] + (t - bent.truth[i]))
-            .collect();
-        let scene = Scene {
-            truth: bent.model.clone(),
-            target,
-            ..bent
-        };
-        let found = |with: bool| {
-            let (model, target) = (&scene.model, &scene.target);
-            if with {
-                matcher.match_with_target_errors(model, target, &scene.deviations)
-            } else {
-                matcher.match_points(model, target)
-            }
-        };
-        weighted += scene.error(&found(true).expect("good points"));
-        plain += scene.error(&found(false).expect("good points"));
+        let scene = &mut measured.scene;
+        for (t, &i) in scene.target.iter_mut().zip(&scene.order) {
+            *t = scene.model[i] + (*t - scene.truth[i]);
+        }
+        scene.truth.clone_from(&scene.model);
+        let [with, without] = measured.matched(matcher);
+        weighted += measured.scene.error(&with.warped);
+        plain += measured.scene.error(&without.warped);
     }
     // Three parameters from thirty points of 0.03 spacings instead of sixty of 0.11 in the root
     // mean square: two fifths.
@@ -199,21 +150,20 @@ fn a_rigid_fit_counts_precise_targets_more() {
 /// Large sets, which are matched coarse to fine, count errors too.
 #[test]
 fn large_sets_count_errors() {
-    let scene = Scene::<2>::new(4200, &[0.01, 0.08], 1);
-    let (with, without) = (scene.weighted(), scene.plain());
-    assert!(scene.right(&with) > scene.right(&without));
+    let measured = Measured::<2>::new(4200, &[0.01, 0.08], 1);
+    let found = measured.matched(AnnealedSoftassign::default());
+    let [right, right_plain] = found
+        .each_ref()
+        .map(|m| measured.scene.right(&m.assignment));
+    assert!(right > right_plain);
     // Half of the points with an eighth of the error.
-    assert!(
-        scene.error(&with) < 0.5 * scene.error(&without),
-        "{} with errors, {} without",
-        scene.error(&with),
-        scene.error(&without)
-    );
+    let [error, plain] = found.map(|m| measured.scene.error(&m.warped));
+    assert!(error < 0.5 * plain, "{error} with errors, {plain} without");
 }
 
 #[test]
 fn deviations_out_of_range_are_typed_errors() {
-    let scene = Scene::<2>::new(12, &[0.1], 1);
+    let Measured { scene, .. } = Measured::<2>::new(12, &[0.1], 1);
     let found = |deviations: &[f64]| {
         AnnealedSoftassign::default()
             .match_with_target_errors(&scene.model, &scene.target, deviations)

@@ -4,7 +4,7 @@ use nalgebra::Point;
 use tactile_match::labelling::Neighbourhood;
 use tactile_match::{
     AnnealedSoftassign, CoherentPointDrift, LinearAssignment, Matching, Motion, NearestNeighbour,
-    PointMatcher, RelaxationLabelling,
+    PointMatcher, RelaxationLabelling, Rotation, Transformation,
 };
 use tactile_tps::Scalar;
 
@@ -49,6 +49,20 @@ pub(crate) fn matchers<const D: usize>() -> Matchers<D> {
             "coherent point drift, affine",
             Box::new(drift(Motion::Affine)),
         ),
+    ]
+}
+
+/// The modes of the default matcher that search otherwise.
+pub(crate) fn modes<const D: usize>() -> Matchers<D> {
+    let options = AnnealedSoftassign::default();
+    let moves = |transformation| Box::new(options.with_transformation(transformation));
+    vec![
+        (
+            "any rotation",
+            Box::new(options.with_rotation(Rotation::Any)),
+        ),
+        ("rigid", moves(Transformation::Rigid)),
+        ("similarity", moves(Transformation::Similarity)),
     ]
 }
 

@@ -6,6 +6,7 @@ pub(crate) mod contract;
 pub(crate) use contract::{assert_consistent, matchers};
 use nalgebra::{Point, SMatrix, SVector};
 use proptest::prelude::*;
+use tactile_match::{Matching, PointMatcher};
 
 /// Largest distance of two points of the same row.
 pub(crate) fn largest_step<const D: usize>(a: &[Point<f64, D>], b: &[Point<f64, D>]) -> f64 {
@@ -32,6 +33,11 @@ impl Stream {
         ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
     }
 
+    /// A normal deviate, nearly: the sum of twelve uniform ones.
+    pub(crate) fn normal(&mut self) -> f64 {
+        (0..12).map(|_| self.next()).sum::<f64>() - 6.0
+    }
+
     /// A permutation of `0..n`.
     pub(crate) fn permutation(&mut self, n: usize) -> Vec<usize> {
         let mut order: Vec<usize> = (0..n).collect();
@@ -40,6 +46,79 @@ impl Stream {
         }
         order
     }
+}
+
+/// A model, where its points truly go, and targets: `order[j]` is the model row of target `j`, rows
+/// beyond are outliers.
+pub(crate) struct Scene<const D: usize> {
+    pub(crate) model: Vec<Point<f64, D>>,
+    pub(crate) truth: Vec<Point<f64, D>>,
+    pub(crate) target: Vec<Point<f64, D>>,
+    pub(crate) order: Vec<usize>,
+}
+
+impl<const D: usize> Scene<D> {
+    /// The true positions in this order, each with its standard deviation of Gaussian noise, and
+    /// outliers in the unit cube.
+    pub(crate) fn new(
+        model: Vec<Point<f64, D>>,
+        truth: Vec<Point<f64, D>>,
+        order: Vec<usize>,
+        noise: impl Fn(usize) -> f64,
+        outliers: usize,
+        stream: &mut Stream,
+    ) -> Self {
+        let mut target = reordered(&truth, &order);
+        for (j, p) in target.iter_mut().enumerate() {
+            *p += SVector::from_fn(|_, _| noise(j) * stream.normal());
+        }
+        target.extend((0..outliers).map(|_| Point::from(SVector::from_fn(|_, _| stream.next()))));
+        Self {
+            model,
+            truth,
+            target,
+            order,
+        }
+    }
+
+    /// `n` points of the unit cube, bent and in another order.
+    pub(crate) fn bent(n: usize, size: f64, seed: u64) -> Self {
+        let (model, mut stream) = (scattered(n, seed), Stream::new(seed));
+        let (truth, order) = (bend(&model, size), stream.permutation(n));
+        Self::new(model, truth, order, |_| 0.0, 0, &mut stream)
+    }
+
+    pub(crate) fn is_right(&self, i: usize, j: usize) -> bool {
+        self.order.get(j) == Some(&i)
+    }
+
+    /// How many model points have their own partner.
+    pub(crate) fn right(&self, assignment: &[Option<usize>]) -> usize {
+        let rows = assignment.iter().enumerate();
+        rows.filter(|&(i, partner)| partner.is_some_and(|j| self.is_right(i, j)))
+            .count()
+    }
+
+    /// Root mean square distance of the warped points from the truth.
+    pub(crate) fn error(&self, warped: &[Point<f64, D>]) -> f64 {
+        let pairs = warped.iter().zip(&self.truth);
+        let squares: f64 = pairs.map(|(w, t)| (w - t).norm_squared()).sum();
+        (squares / warped.len() as f64).sqrt()
+    }
+}
+
+/// A match that must succeed and be consistent.
+pub(crate) fn matched<const D: usize>(
+    name: &str,
+    matcher: &dyn PointMatcher<D>,
+    model: &[Point<f64, D>],
+    target: &[Point<f64, D>],
+) -> Matching<D> {
+    let matching = matcher
+        .match_points(model, target)
+        .unwrap_or_else(|error| panic!("{name}: {error}"));
+    assert_consistent(name, model, target, &matching);
+    matching
 }
 
 /// `n` points, no two closer than about half the spacing of a regular arrangement: a jittered
@@ -72,7 +151,6 @@ pub(crate) fn grid<const D: usize>(side: usize) -> Vec<Point<f64, D>> {
 
 /// A smooth, fold-free deformation of the unit cube. `size` is the largest displacement.
 pub(crate) fn bend<const D: usize>(points: &[Point<f64, D>], size: f64) -> Vec<Point<f64, D>> {
-    let size: f64 = size;
     let wave = |x: f64, phase: f64| (x * 2.1 + phase).sin();
     points
         .iter()

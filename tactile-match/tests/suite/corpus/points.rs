@@ -2,7 +2,7 @@
 //!
 //! Shared by the replay of the kept corpus and by the fuzz target `matcher` of `fuzz/`.
 
-use super::contract::{assert_consistent, matchers};
+use super::contract::{assert_consistent, matchers, modes};
 use nalgebra::{Point, SVector};
 use tactile_match::MatchError;
 
@@ -72,7 +72,7 @@ pub(crate) fn every_matcher<const D: usize>(model: &[Point<f64, D>], target: &[P
     let sixteen = 16.0;
     let usable = |p: &Point<f64, D>| p.iter().all(|&c| (c * c * sixteen).is_finite());
     let all_usable = model.iter().chain(target).all(usable);
-    for (name, matcher) in matchers::<D>() {
+    for (name, matcher) in matchers::<D>().into_iter().chain(modes()) {
         match matcher.match_points(model, target) {
             Ok(matching) => {
                 assert!(all_usable, "{name}: an answer to {model:?} and {target:?}");

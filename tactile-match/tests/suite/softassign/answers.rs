@@ -1,17 +1,8 @@
-//! What is found: clean and noisy warps, large and nearly regular sets, rotations, outliers.
+//! What is found: clean and noisy warps, outliers.
 use super::{bend, cloud, shuffled};
 use crate::common;
-use nalgebra::{Point2, Point3, Rotation2};
-use tactile_match::{AnnealedSoftassign, Outliers, PointMatcher, Rotation, StopReason};
-
-/// Every model point of `partner` has its own. Targets beyond them may have none.
-fn assert_pairs(assignment: &[Option<usize>], partner: &[usize], scene: &str) {
-    let mut pairs = assignment.iter().zip(partner);
-    assert!(
-        pairs.all(|(a, &j)| *a == Some(j)),
-        "{scene}: {assignment:?}"
-    );
-}
+use nalgebra::{Point2, Point3};
+use tactile_match::{AnnealedSoftassign, Outliers, PointMatcher, StopReason};
 
 fn all_right<const D: usize>(n: usize) {
     let model = cloud::<D>(n);
@@ -38,6 +29,7 @@ fn all_right<const D: usize>(n: usize) {
 fn clean_warps_of_plane_and_space_are_found_exactly() {
     all_right::<2>(52);
     all_right::<3>(61);
+    all_right::<2>(502);
 }
 
 /// Where noise is well below the spacing, the first run ends at the noise: it does not fall below
@@ -74,24 +66,6 @@ fn noise_below_the_spacing_rarely_takes_a_second_start() {
     // Where a point of the eight sets has strayed too far to be called matched, a second start
     // looks for it; without a sign of noise all take two.
     assert!(of_one_start >= 4, "{of_one_start}");
-}
-
-#[test]
-fn the_warp_goes_through_every_point_of_a_large_set() {
-    all_right::<2>(502);
-}
-
-#[test]
-fn any_rotation_is_found_when_asked_for() {
-    let model = cloud::<2>(52);
-    let (target, partner) = shuffled(&model);
-    let matcher = AnnealedSoftassign::default().with_rotation(Rotation::Any);
-    for degrees in [75.0_f64, 180.0, -120.0] {
-        let turn = Rotation2::new(degrees.to_radians());
-        let turned: Vec<Point2<f64>> = target.iter().map(|p| turn * p).collect();
-        let found = matcher.match_points(&model, &turned).unwrap();
-        assert_pairs(&found.assignment, &partner, &format!("{degrees}"));
-    }
 }
 
 /// Where no outliers are expected every point gets a partner. Where they are, a far point is left

@@ -1,46 +1,10 @@
-//! How it is called: odd and wrong input, the callback, reused workspaces, batches.
+//! How it is called: wrong options, the callback, reused workspaces, batches.
 use super::{bend, cloud, shuffled};
-use crate::common::assert_consistent;
-use nalgebra::{Point, Point2, Point3};
+use nalgebra::Point2;
 use std::ops::ControlFlow;
 use tactile_match::{
-    AnnealedSoftassign, MatchError, PointMatcher, Rotation, SoftassignWorkspace, StopReason,
+    AnnealedSoftassign, MatchError, PointMatcher, SoftassignWorkspace, StopReason,
 };
-
-/// An answer for every odd input, from every direction.
-fn is_sound<const D: usize>(model: &[Point<f64, D>], target: &[Point<f64, D>]) {
-    let matcher = AnnealedSoftassign::default().with_rotation(Rotation::Any);
-    let found = matcher.match_points(model, target).unwrap();
-    assert_consistent("any rotation", model, target, &found);
-}
-
-#[test]
-fn degenerate_sets_have_answers() {
-    let (one, few) = (cloud::<2>(1), cloud::<2>(3));
-    let many = cloud::<2>(40);
-    for (a, b) in [
-        (&one, &one),
-        (&one, &many),
-        (&many, &one),
-        (&few, &many),
-        (&many, &few),
-        (&many, &many),
-    ] {
-        is_sound(a, b);
-    }
-    let same = vec![Point3::new(1.0, 2.0, 3.0); 7];
-    is_sound(&same, &same);
-    is_sound(&same, &cloud::<3>(9));
-    is_sound(&cloud::<3>(9), &same);
-    let line: Vec<Point2<f64>> = (0..20)
-        .map(|i| Point2::new(f64::from(i), 2.0 * f64::from(i)))
-        .collect();
-    is_sound(&line, &line);
-    let grid: Vec<Point2<f64>> = (0..49)
-        .map(|i| Point2::new(f64::from(i % 7), f64::from(i / 7)))
-        .collect();
-    is_sound(&grid, &grid);
-}
 
 #[test]
 fn options_out_of_range_are_errors() {
