@@ -17,8 +17,16 @@ use std::ops::ControlFlow;
 use std::time::Instant;
 use tactile_match::{AnnealedSoftassign, MatchError, Mechanism, SoftassignWorkspace};
 
+#[path = "support/cases.rs"]
+mod cases;
+#[path = "support/disc.rs"]
+mod disc;
+#[path = "support/points.rs"]
+mod points;
 #[path = "support/stream.rs"]
 mod stream;
+use disc::disc;
+use points::{bend, cube, stretch, turn};
 use stream::Stream;
 
 struct Scene<const D: usize> {
@@ -122,41 +130,6 @@ impl<const D: usize> Scene<D> {
     }
 }
 
-/// A jittered sunflower disc of radius 1, in space under a bell.
-fn disc<const D: usize>(n: usize, jitter: f64, stream: &mut Stream) -> Vec<Point<f64, D>> {
-    let place = |i: usize| {
-        let (r, angle) = (
-            ((i as f64 + 0.5) / n as f64).sqrt(),
-            2.399_963_229_728_653 * i as f64,
-        );
-        let step = jitter * (std::f64::consts::PI / n as f64).sqrt();
-        let [x, y] = [angle.cos(), angle.sin()].map(|c| r * c + step * stream.normal());
-        Point::from(SVector::from_fn(|k, _| {
-            [x, y, 0.6 * (-(x * x + y * y).min(1.0) / 0.405).exp()][k]
-        }))
-    };
-    (0..n).map(place).collect()
-}
-
-/// Points of the unit cube: random, or a jittered grid.
-fn cube<const D: usize>(n: usize, random: bool, stream: &mut Stream) -> Vec<Point<f64, D>> {
-    let side = (n as f64).powf(1.0 / D as f64).ceil() as usize;
-    let cells = stream.permutation(side.pow(D as u32));
-    cells[..n]
-        .iter()
-        .map(|&cell| {
-            Point::from(SVector::from_fn(|d, _| {
-                let at = (cell / side.pow(d as u32) % side) as f64;
-                if random {
-                    stream.next()
-                } else {
-                    (at + 0.25 + 0.5 * stream.next()) / side as f64
-                }
-            }))
-        })
-        .collect()
-}
-
 /// Six broad Gaussian bumps and an affine part whose root mean square displacement is `size`.
 fn warp<const D: usize>(
     model: &[Point<f64, D>],
@@ -182,13 +155,6 @@ fn warp<const D: usize>(
     let squares: f64 = model.iter().map(|p| field(p).norm_squared()).sum();
     let factor = size / (squares / model.len() as f64).sqrt();
     model.iter().map(|p| p + field(p) * factor).collect()
-}
-
-fn bend<const D: usize>(p: &Point<f64, D>) -> Point<f64, D> {
-    let wave = |x: f64, phase: f64| (2.1 * x + phase).sin();
-    Point::from(SVector::from_fn(|d, _| {
-        p[d] + 0.06 * wave(p[(d + 1) % D], d as f64) * wave(p[d], 0.7)
-    }))
 }
 
 /// Bells and discs of 105 to 200 points: three sizes of the deformation, clean, noisy, with
@@ -260,29 +226,19 @@ fn cubes<const D: usize>(seed: u64, scenes: &mut Vec<Scene<D>>) {
             for noise in [0.05, 0.15] {
                 add("cropped", 150, noise, 0.5 * clutter, random, &bend, 0.75);
                 for degrees in [15.0_f64, 30.0, 45.0] {
-                    let (sin, cos) = degrees.to_radians().sin_cos();
-                    let turn = move |p: &Point<f64, D>| {
-                        let mut q = bend(p);
-                        let (x, y) = (q[0] - 0.5, q[1] - 0.5);
-                        (q[0], q[1]) = (0.5 + cos * x - sin * y, 0.5 + sin * x + cos * y);
-                        q
-                    };
-                    add("turned", 105, noise, 0.5 * clutter, random, &turn, 1e9);
+                    let turned = move |p: &_| turn(p, degrees);
+                    add("turned", 105, noise, 0.5 * clutter, random, &turned, 1e9);
                 }
             }
             for (noise, factor) in [(0.02, 1.25), (0.02, 1.5), (0.02, 2.0), (0.1, 1.5)] {
-                let stretch = move |p: &Point<f64, D>| {
-                    let mut q = *p;
-                    q[0] = 0.5 + factor * (p[0] - 0.5);
-                    q
-                };
+                let stretched = move |p: &_| stretch(p, factor);
                 add(
                     "stretched",
                     200,
                     noise,
                     0.5 * clutter,
                     random,
-                    &stretch,
+                    &stretched,
                     1.0,
                 );
             }
@@ -349,7 +305,7 @@ fn large(n: usize, seed: u64, scenes: &mut Vec<Scene<3>>) {
 }
 
 /// The published benchmark, where its data are.
-fn published(scenes: &mut Vec<Scene<2>>) {
+fn published(scenes: &mut Vec<Scene<2>>) -> Result<(), Box<dyn std::error::Error>> {
     let root = std::env::var("TACTILE_DATA").unwrap_or_else(|_| "../shared/data".into());
     for kind in ["def", "noise", "outlier", "occlusion", "rot"] {
         let family = match kind {
@@ -365,35 +321,24 @@ fn published(scenes: &mut Vec<Scene<2>>) {
             else {
                 continue;
             };
-            for block in text.split("case ").skip(1) {
-                let mut scene = Scene {
+            let points =
+                |rows: &[Vec<f64>]| rows.iter().map(|row| Point::from_slice(row)).collect();
+            scenes.extend(cases::read(&text)?.iter().map(|case| {
+                Scene {
                     family,
-                    model: vec![],
-                    target: vec![],
-                    truth: vec![],
-                    partner: vec![],
-                };
-                for line in block.lines().skip(1) {
-                    let numbers: Vec<f64> = line
-                        .split_whitespace()
-                        .skip(1)
-                        .filter_map(|word| word.parse().ok())
-                        .collect();
-                    let point = || Point::from_slice(&numbers[..2]);
-                    match line.as_bytes().first() {
-                        Some(b'm') => scene.model.push(point()),
-                        Some(b't') => scene.target.push(point()),
-                        Some(b'g') => scene.truth.push(point()),
-                        Some(b'p') => scene
-                            .partner
-                            .push((numbers[0] >= 0.0).then_some(numbers[0] as usize)),
-                        _ => {}
-                    }
+                    model: points(&case.model),
+                    target: points(&case.target),
+                    truth: points(&case.truth),
+                    partner: case
+                        .partner
+                        .iter()
+                        .map(|&row| usize::try_from(row).ok())
+                        .collect(),
                 }
-                scenes.push(scene);
-            }
+            }));
         }
     }
+    Ok(())
 }
 
 fn all<const D: usize>(
@@ -424,7 +369,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let (first, count) = (number(0, 0)?, number(1, 3)?);
     let wanted = arguments.get(2..).unwrap_or_default();
     let (mut plane, mut space) = (Vec::new(), Vec::new());
-    published(&mut plane);
+    published(&mut plane)?;
     for seed in first..first + count {
         bells(105, seed, &mut plane);
         bells(105, seed, &mut space);

@@ -15,12 +15,15 @@
 use nalgebra::{Point, SVector};
 use tactile_match::{AnnealedSoftassign, MatchError, Matching, PointMatcher};
 
+#[path = "support/points.rs"]
+mod points;
 #[path = "support/scene.rs"]
 mod scene;
 #[path = "support/stream.rs"]
 mod stream;
 #[path = "support/tenths.rs"]
 mod tenths;
+use points::{bend, cube, stretch, turn};
 use scene::Scene;
 use stream::Stream;
 use tenths::Tenths;
@@ -57,7 +60,7 @@ impl<const D: usize> Scene<D> {
             Change::Cropped => 150,
             Change::Stretched(_) => 200,
         };
-        let model = points::<D>(n, kind.random, &mut stream);
+        let model = cube::<D>(n, kind.random, &mut stream);
         let truth: Vec<_> = model.iter().map(|p| kind.change.apply(p)).collect();
         let mut order = stream.permutation(n);
         order.retain(|&i| match kind.change {
@@ -81,47 +84,14 @@ impl<const D: usize> Scene<D> {
     }
 }
 
-fn points<const D: usize>(n: usize, random: bool, stream: &mut Stream) -> Vec<Point<f64, D>> {
-    let side = (n as f64).powf(1.0 / D as f64).ceil() as usize;
-    let cells = stream.permutation(side.pow(D as u32));
-    let mut place = |cell: usize| {
-        Point::from(SVector::from_fn(|d, _| {
-            let at = (cell / side.pow(d as u32) % side) as f64;
-            if random {
-                stream.next()
-            } else {
-                (at + 0.25 + 0.5 * stream.next()) / side as f64
-            }
-        }))
-    };
-    cells[..n].iter().map(|&cell| place(cell)).collect()
-}
-
 impl Change {
     fn apply<const D: usize>(self, p: &Point<f64, D>) -> Point<f64, D> {
         match self {
             Self::Bent | Self::Cropped => bend(p),
-            Self::Turned(degrees) => {
-                let (sin, cos) = degrees.to_radians().sin_cos();
-                let mut q = bend(p);
-                let (x, y) = (q[0] - 0.5, q[1] - 0.5);
-                (q[0], q[1]) = (0.5 + cos * x - sin * y, 0.5 + sin * x + cos * y);
-                q
-            }
-            Self::Stretched(factor) => {
-                let mut q = *p;
-                q[0] = 0.5 + factor * (p[0] - 0.5);
-                q
-            }
+            Self::Turned(degrees) => turn(p, degrees),
+            Self::Stretched(factor) => stretch(p, factor),
         }
     }
-}
-
-fn bend<const D: usize>(p: &Point<f64, D>) -> Point<f64, D> {
-    let wave = |x: f64, phase: f64| (2.1 * x + phase).sin();
-    Point::from(SVector::from_fn(|d, _| {
-        p[d] + 0.06 * wave(p[(d + 1) % D], d as f64) * wave(p[d], 0.7)
-    }))
 }
 
 fn kinds() -> Vec<Kind> {

@@ -13,25 +13,20 @@ use std::ops::ControlFlow;
 use std::time::Instant;
 use tactile_match::{AnnealedSoftassign, SoftassignWorkspace};
 
+#[path = "support/disc.rs"]
+mod disc;
 #[path = "support/stream.rs"]
 mod stream;
+use disc::disc;
 use stream::Stream;
 
-/// A bell over a jittered sunflower disc of diameter 2, or points strewn in a cube of side 2.
+/// A bell over a jittered disc of diameter 2, or points strewn in a cube of side 2.
 fn points(n: usize, surface: bool, stream: &mut Stream) -> Vec<Point3<f64>> {
-    let place = |i: usize| {
-        if !surface {
-            return Point3::from(Vector3::from_fn(|_, _| 2.0 * stream.next() - 1.0));
-        }
-        let (r, angle) = (
-            ((i as f64 + 0.5) / n as f64).sqrt(),
-            2.399_963_229_728_653 * i as f64,
-        );
-        let jitter = 0.15 * (std::f64::consts::PI / n as f64).sqrt();
-        let [x, y] = [angle.cos(), angle.sin()].map(|c| r * c + jitter * stream.normal());
-        Point3::new(x, y, 0.6 * (-(x * x + y * y).min(1.0) / 0.405).exp())
-    };
-    (0..n).map(place).collect()
+    if surface {
+        return disc(n, 0.15, stream);
+    }
+    let mut place = || Point3::from(Vector3::from_fn(|_, _| 2.0 * stream.next() - 1.0));
+    (0..n).map(|_| place()).collect()
 }
 
 /// Six broad Gaussian bumps whose root mean square displacement is a tenth of the size.

@@ -7,10 +7,9 @@
 //! cargo run --release -p tactile-match --example peer_cases -- CASES.txt [RESULTS.txt]
 //! ```
 //!
-//! A case is `case NAME D n_model n_target`, then rows `m` (model), `t` (target), `g` (true
-//! position of each model row) and `p` (row of its true partner, −1 for none). A result is
-//! `case NAME milliseconds`, then for each model row `w` (warped) and `a` (target row or −1). The
-//! time is the least of five calls through a warm workspace.
+//! Cases are those of `support/cases.rs`. A result is `case NAME milliseconds`, then for each model
+//! row `w` (warped) and `a` (target row or −1). The time is the least of five calls through a warm
+//! workspace.
 #![allow(clippy::print_stdout)]
 use nalgebra::Point;
 use std::collections::BTreeMap;
@@ -19,20 +18,12 @@ use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 use tactile_match::{AnnealedSoftassign, MatchError, SoftassignWorkspace};
 
+#[path = "support/cases.rs"]
+mod cases;
 #[path = "support/tenths.rs"]
 mod tenths;
+use cases::Case;
 use tenths::Tenths;
-
-/// One case as it stands in the file.
-#[derive(Default)]
-struct Case {
-    name: String,
-    dimension: usize,
-    model: Vec<Vec<f64>>,
-    target: Vec<Vec<f64>>,
-    truth: Vec<Vec<f64>>,
-    partner: Vec<i64>,
-}
 
 /// What is printed of one case.
 struct Score {
@@ -50,7 +41,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let path = arguments
         .next()
         .ok_or("usage: peer_cases CASES.txt [RESULTS.txt]")?;
-    let cases = read(&std::fs::read_to_string(path)?)?;
+    let cases = cases::read(&std::fs::read_to_string(path)?)?;
     let mut results = String::new();
     let mut levels: BTreeMap<String, Vec<Score>> = BTreeMap::new();
     let mut tenths = Tenths::default();
@@ -91,38 +82,6 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         std::fs::write(path, results)?;
     }
     Ok(())
-}
-
-fn read(text: &str) -> Result<Vec<Case>, Box<dyn std::error::Error>> {
-    let mut cases: Vec<Case> = Vec::new();
-    for line in text.lines() {
-        let mut words = line.split_whitespace();
-        let tag = words.next().unwrap_or_default();
-        if tag == "case" {
-            let name = words.next().ok_or("a case without a name")?.to_owned();
-            let dimension = words.next().ok_or("a case without a dimension")?.parse()?;
-            cases.push(Case {
-                name,
-                dimension,
-                ..Case::default()
-            });
-            continue;
-        }
-        let case = cases.last_mut().ok_or("a row before the first case")?;
-        if tag == "p" {
-            case.partner
-                .push(words.next().ok_or("a partner without a row")?.parse()?);
-            continue;
-        }
-        let row = words.map(str::parse).collect::<Result<Vec<f64>, _>>()?;
-        match tag {
-            "m" => case.model.push(row),
-            "t" => case.target.push(row),
-            "g" => case.truth.push(row),
-            _ => {}
-        }
-    }
-    Ok(cases)
 }
 
 fn solve<const D: usize>(
