@@ -19,11 +19,11 @@
 //! numerically has, instead of solving an `M × M` system in every iteration.
 
 use crate::error::{at_least_one, option_within, point_sets};
+use crate::{Axes, BestMotion, Frame, spread};
 use crate::{
-    AssignmentWorkspace, MatchError, MatchReport, Matching, PointMatcher, SoftMatches, StopReason,
+    MatchError, MatchReport, Matching, PointMatcher, SoftMatches, StopReason, linear_assignment,
     unmatched_rows,
 };
-use crate::{Axes, BestMotion, Frame, spread};
 use nalgebra::{Cholesky, DMatrix, Dyn, Point, SMatrix, SVector, VecStorage};
 use tactile_core::{Loop, vectorised};
 use tactile_tps::{Affine, Warp};
@@ -1131,12 +1131,9 @@ fn posterior<const D: usize>(workspace: &DriftWorkspace<D>) -> Vec<f64> {
 /// target is at least as likely the model point's as an outlier.
 fn pairs(posterior: &[f64], model_len: usize, target_len: usize) -> Vec<Option<usize>> {
     let costs: Vec<f64> = posterior.iter().map(|p| -p).collect();
-    let mut workspace = AssignmentWorkspace::default();
     let mut assignment = vec![None; model_len];
     // The costs are probabilities: finite, and of the right number.
-    let columns = workspace
-        .solve(&costs, target_len, model_len)
-        .unwrap_or_default();
+    let columns = linear_assignment(&costs, target_len, model_len).unwrap_or_default();
     for (n, m) in columns
         .iter()
         .enumerate()

@@ -211,8 +211,9 @@ impl<const D: usize> Interpolation<D> {
             None => None,
         };
         let exact = self.smoothing == Smoothing::None;
+        let share = if exact { 1e-3 } else { f64::INFINITY };
         spline
-            .filter(|spline| follows(&**spline, sources, images, exact))
+            .filter(|spline| follows(&**spline, sources, images, share))
             .unwrap_or_else(|| {
                 let affine = Affine::fit(sources, images, self.weights.as_deref());
                 Box::new(affine.unwrap_or_else(|_| Affine::default()))
@@ -248,21 +249,21 @@ pub(crate) fn spline<const D: usize>(
     Interpolation::new(sources, weights, smoothing).through(sources, images)
 }
 
-/// Whether the spline is any good: where sources nearly coincide and their images do not, no digit
-/// is left in it.
-fn follows<const D: usize>(
-    spline: &(dyn Warp<f64, D> + Send + Sync),
+/// Whether a warp takes the sources to these images, to a share of the size: where sources nearly
+/// coincide and their images do not, no digit is left in a spline.
+pub(crate) fn follows<const D: usize>(
+    warp: &(dyn Warp<f64, D> + Send + Sync),
     sources: &[Point<f64, D>],
     images: &[Point<f64, D>],
-    exact: bool,
+    share: f64,
 ) -> bool {
     let size = images.iter().fold(0.0_f64, |m, p| m.max(p.coords.amax()));
     // All at once: a spline samples points several at a time.
     let mut found = sources.to_vec();
-    spline.apply_into(sources, &mut found).is_ok()
+    warp.apply_into(sources, &mut found).is_ok()
         && found.iter().zip(images).all(|(found, image)| {
             let miss = (found - image).amax();
-            miss.is_finite() && (!exact || miss <= size * 1e-3)
+            miss.is_finite() && (share.is_infinite() || miss <= size * share)
         })
 }
 

@@ -375,7 +375,15 @@ impl RelaxationLabelling {
                 .collect()
         };
         let (start, goal) = (enter(&frames[0], model), enter(&frames[1], target));
-        let mut run = Run::new(start, goal, frames[1]);
+        let mut run = Run {
+            matches: MatchMatrix::zeros(start.len(), goal.len()),
+            warped: start.clone(),
+            model: start,
+            target: goal,
+            stop: StopReason::IterationLimit,
+            energy: Vec::new(),
+            frame: frames[1],
+        };
         for k in 0..self.max_iterations {
             run.matches = relax(self, &run.warped, &run.target);
             run.record_energy(self.neighbourhood);
@@ -402,19 +410,6 @@ struct Run<const D: usize> {
 }
 
 impl<const D: usize> Run<D> {
-    fn new(model: Vec<Point<f64, D>>, target: Vec<Point<f64, D>>, frame: Frame<D>) -> Self {
-        let matches = MatchMatrix::zeros(model.len(), target.len());
-        Self {
-            warped: model.clone(),
-            model,
-            target,
-            matches,
-            stop: StopReason::IterationLimit,
-            energy: Vec::new(),
-            frame,
-        }
-    }
-
     /// Keeps the energy (14) of the present match matrix.
     fn record_energy(&mut self, neighbourhood: Neighbourhood) {
         let [x, y] =
@@ -442,8 +437,7 @@ impl<const D: usize> Run<D> {
     fn fit(&mut self, smoothing: Smoothing<f64>) -> f64 {
         let (means, weights): (Vec<_>, Vec<_>) =
             (0..self.model.len()).map(|i| self.partner(i)).unzip();
-        let floor: f64 = 1e-6;
-        let kept: Vec<usize> = (0..weights.len()).filter(|&i| weights[i] > floor).collect();
+        let kept: Vec<usize> = (0..weights.len()).filter(|&i| weights[i] > 1e-6).collect();
         if kept.is_empty() {
             return 0.0;
         }

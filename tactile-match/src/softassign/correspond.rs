@@ -176,10 +176,6 @@ impl CandidateLabels {
     /// Appends a model point with its candidates.
     fn push_row(&mut self, row: impl Iterator<Item = (usize, f64)>, slack: f64) {
         for (column, probability) in row {
-            assert!(
-                column < self.column_slack.len(),
-                "candidate beyond the targets"
-            );
             self.columns.push(column);
             self.entries.push(probability);
         }
@@ -189,19 +185,18 @@ impl CandidateLabels {
 
     /// Computes the links: `weight((i, j), (a, b))` for the points `a` of `neighbours(i)` and their
     /// candidates; zeros are left out.
-    fn link<N: AsRef<[usize]>>(
+    fn link<'a>(
         &mut self,
-        mut weight: impl FnMut((usize, usize), (usize, usize)) -> f64,
-        mut neighbours: impl FnMut(usize) -> N,
+        weight: impl Fn((usize, usize), (usize, usize)) -> f64,
+        neighbours: impl Fn(usize) -> &'a [usize],
     ) {
         self.link_starts.clear();
         self.link_from.clear();
         self.link_weight.clear();
         self.link_starts.push(0);
         for i in 0..self.rows() {
-            let near = neighbours(i);
             for e in self.starts[i]..self.starts[i + 1] {
-                for &a in near.as_ref() {
+                for &a in neighbours(i) {
                     for f in self.starts[a]..self.starts[a + 1] {
                         let w = weight((i, self.columns[e]), (a, self.columns[f]));
                         if w > 0.0 {
@@ -268,30 +263,23 @@ impl CandidateLabels {
     }
 
     fn normalise(&mut self) {
-        self.sums.clear();
-        self.sums.extend_from_slice(&self.column_slack);
+        let or_one = |sum: f64| if sum > 0.0 { sum } else { 1.0 };
+        self.sums.clone_from(&self.column_slack);
         for i in 0..self.rows() {
             let range = self.starts[i]..self.starts[i + 1];
-            let sum = self.entries[range.clone()].iter().sum::<f64>() + self.row_slack[i];
+            let sum = or_one(self.entries[range.clone()].iter().sum::<f64>() + self.row_slack[i]);
             for e in range {
-                self.entries[e] /= if sum > 0.0 { sum } else { 1.0 };
+                self.entries[e] /= sum;
                 self.sums[self.columns[e]] += self.entries[e];
             }
-            self.row_slack[i] /= if sum > 0.0 { sum } else { 1.0 };
+            self.row_slack[i] /= sum;
         }
-        self.entries
-            .iter_mut()
-            .zip(&self.columns)
-            .for_each(|(p, &j)| {
-                *p /= if self.sums[j] > 0.0 {
-                    self.sums[j]
-                } else {
-                    1.0
-                };
-            });
-        self.column_slack
-            .iter_mut()
-            .zip(&self.sums)
-            .for_each(|(s, &sum)| *s /= if sum > 0.0 { sum } else { 1.0 });
+        self.sums.iter_mut().for_each(|sum| *sum = or_one(*sum));
+        for (p, &j) in self.entries.iter_mut().zip(&self.columns) {
+            *p /= self.sums[j];
+        }
+        for (slack, sum) in self.column_slack.iter_mut().zip(&self.sums) {
+            *slack /= sum;
+        }
     }
 }

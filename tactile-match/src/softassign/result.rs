@@ -311,7 +311,8 @@ fn warp_through<const D: usize>(
 ) -> Box<dyn Warp<f64, D> + Send + Sync> {
     let model = &sources.points;
     let exact = sources.system().through(model, warped);
-    if agrees(&*exact, model, warped) {
+    // To half the digits.
+    if hard::follows(&*exact, model, warped, f64::UNIT_ROUNDOFF.sqrt()) {
         return exact;
     }
     // Smoothing of the spline where none goes through all positions.
@@ -319,25 +320,6 @@ fn warp_through<const D: usize>(
     // As many points in as out.
     let _ = warp.apply_into(model, warped);
     warp
-}
-
-/// Whether a warp takes the model to these positions, to half the digits.
-fn agrees<const D: usize>(
-    warp: &(dyn Warp<f64, D> + Send + Sync),
-    model: &[Point<f64, D>],
-    warped: &[Point<f64, D>],
-) -> bool {
-    let size = warped
-        .iter()
-        .fold(0.0_f64, |size, p| size.max(p.coords.amax()));
-    let tolerance = size * f64::UNIT_ROUNDOFF.sqrt();
-    // All at once: a spline samples points several at a time.
-    let mut images = model.to_vec();
-    warp.apply_into(model, &mut images).is_ok()
-        && images
-            .iter()
-            .zip(warped)
-            .all(|(image, w)| (image - w).amax() <= tolerance)
 }
 
 // What the matcher keeps of one model along a series of targets.
