@@ -1,24 +1,19 @@
 //! What is found: clean and noisy warps, outliers.
-use super::{bend, cloud, shuffled};
-use crate::common;
+use crate::common::{self, Scene};
 use nalgebra::{Point2, Point3};
 use tactile_match::{AnnealedSoftassign, Outliers, PointMatcher, StopReason};
 
 fn all_right<const D: usize>(n: usize) {
-    let model = cloud::<D>(n);
-    let (target, partner) = shuffled(&model);
+    let scene = Scene::<D>::bent(n, 0.06, 21);
     let found = AnnealedSoftassign::default()
-        .match_points(&model, &target)
+        .match_points(&scene.model, &scene.target)
         .unwrap();
-    assert_eq!(
-        found.assignment,
-        partner.iter().map(|&j| Some(j)).collect::<Vec<_>>()
-    );
+    assert_eq!(scene.right(&found.assignment), n);
     assert_eq!(found.report.stop, StopReason::Exact);
-    for (i, p) in model.iter().enumerate() {
+    for (i, (p, truth)) in scene.model.iter().zip(&scene.truth).enumerate() {
         // Interpolation of clean pairs: rounding of the spline's solution alone.
-        assert!((found.warp.apply(p) - bend(p)).norm() < 1e-9);
-        assert!((found.warped[i] - bend(p)).norm() < 1e-12 && found.confidence[i] > 0.9);
+        assert!((found.warp.apply(p) - truth).norm() < 1e-9);
+        assert!((found.warped[i] - truth).norm() < 1e-12 && found.confidence[i] > 0.9);
     }
     assert!(found.unmatched_model.is_empty() && found.unmatched_target.is_empty());
     // Exact says that the points returned lie on their partners.
@@ -72,16 +67,13 @@ fn noise_below_the_spacing_rarely_takes_a_second_start() {
 /// without.
 #[test]
 fn the_outliers_option_says_which_side_may_stay_alone() {
-    let model = cloud::<2>(31);
-    let (mut target, partner) = shuffled(&model);
-    target.push(Point2::new(2.5, 2.5));
+    let mut scene = Scene::<2>::bent(31, 0.06, 22);
+    scene.target.push(Point2::new(2.5, 2.5));
+    let (model, target) = (&scene.model, &scene.target);
     for side in [Outliers::Both, Outliers::Target] {
         let options = AnnealedSoftassign::default().with_outliers(side);
-        let found = options.match_points(&model, &target).unwrap();
-        assert_eq!(
-            found.assignment,
-            partner.iter().map(|&j| Some(j)).collect::<Vec<_>>()
-        );
+        let found = options.match_points(model, target).unwrap();
+        assert_eq!(scene.right(&found.assignment), 31);
         assert_eq!(found.unmatched_target, [31]);
         // The sides change places: now it is a model point that has no partner.
         let other = if side == Outliers::Target {
@@ -90,7 +82,7 @@ fn the_outliers_option_says_which_side_may_stay_alone() {
             side
         };
         let options = AnnealedSoftassign::default().with_outliers(other);
-        let found = options.match_points(&target, &model).unwrap();
+        let found = options.match_points(target, model).unwrap();
         assert_eq!(
             (found.unmatched_model, found.unmatched_target),
             (vec![31], vec![])

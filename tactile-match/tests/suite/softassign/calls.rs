@@ -1,5 +1,5 @@
 //! How it is called: wrong options, the callback, reused workspaces, batches.
-use super::{bend, cloud, shuffled};
+use crate::common::{Scene, bend, scattered};
 use nalgebra::Point2;
 use std::ops::ControlFlow;
 use tactile_match::{
@@ -17,12 +17,11 @@ fn options_out_of_range_are_errors() {
 
 #[test]
 fn the_callback_hears_every_iteration_and_stops_the_search() {
-    let model = cloud::<2>(52);
-    let (target, _) = shuffled(&model);
+    let scene = Scene::<2>::bent(52, 0.06, 23);
     let mut heard = 0;
     let mut workspace = SoftassignWorkspace::default();
     let found = AnnealedSoftassign::default()
-        .match_points_with(&mut workspace, &model, &target, |_, energy| {
+        .match_points_with(&mut workspace, &scene.model, &scene.target, |_, energy| {
             assert!(energy.is_finite());
             heard += 1;
             if heard == 4 {
@@ -42,16 +41,15 @@ fn the_callback_hears_every_iteration_and_stops_the_search() {
 /// colour the next.
 #[test]
 fn a_batch_gives_the_bits_of_single_matches() {
-    let models = [cloud::<2>(31), cloud::<2>(24), Vec::new(), cloud::<2>(37)];
+    let models = [31, 24, 0, 37].map(|n| scattered::<2>(n, 24));
     let targets: Vec<Vec<Point2<f64>>> = models
         .iter()
         .enumerate()
         .map(|(k, model)| {
             let noise = if k == 1 { 0.02 } else { 0.0 };
-            model
-                .iter()
-                .enumerate()
-                .map(|(i, p)| bend(p).map(|c| c + noise * (7.3 * i as f64).sin()))
+            let moved = bend(model, 0.06).into_iter().enumerate();
+            moved
+                .map(|(i, p)| p.map(|c| c + noise * (7.3 * i as f64).sin()))
                 .collect()
         })
         .collect();
