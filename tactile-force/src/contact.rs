@@ -82,7 +82,7 @@ pub struct Contact {
 pub struct Detection {
     /// Sums over the whole frame.
     pub statistics: FrameStatistics,
-    /// The correction of illumination.
+    /// The correction of illumination and stray light.
     pub drift: IlluminationDrift,
     /// The noise that the errors are computed from. `None` without contact.
     pub noise: Option<DifferenceNoise>,
@@ -97,7 +97,7 @@ pub struct Detection {
 ///
 /// let options = ContactOptions::default()
 ///     .with_polarity(Polarity::Brighter)
-///     .with_drift(DriftCorrection::Illumination)
+///     .with_drift(DriftCorrection::Offset)
 ///     .with_margin_px(6)
 ///     .with_saturation_limit(0.05)?
 ///     .with_false_alarm_rate(1e-6)?;
@@ -155,7 +155,7 @@ impl ContactOptions {
         self
     }
 
-    /// Corrects this change of illumination.
+    /// Corrects this change of illumination or stray light.
     pub fn with_drift(mut self, correction: DriftCorrection) -> Self {
         self.drift = correction;
         self

@@ -1,4 +1,5 @@
-//! Drift of illumination since the reference was taken, from the pixels outside the contact.
+//! Drift of illumination and stray light since the reference was taken, from the pixels outside the
+//! contact.
 
 use nalgebra::{Matrix3, Vector3};
 use ndarray::{ArrayView2, Axis, AxisDescription, Slice};
@@ -6,8 +7,8 @@ use tactile_core::{BoundingBox, Estimate};
 
 use crate::frame::{TILE_COLUMNS, TILE_ROWS, TileSum};
 
-/// The change of illumination that is corrected. Detection takes [`Automatic`](Self::Automatic) by
-/// default.
+/// The change of illumination or stray light that is corrected. Detection takes
+/// [`Automatic`](Self::Automatic) by default.
 ///
 /// ```
 /// use ndarray::Array2;
@@ -15,17 +16,17 @@ use crate::frame::{TILE_COLUMNS, TILE_ROWS, TileSum};
 ///     ContactDetector, ContactOptions, Detection, DriftCorrection, ReferenceFrame,
 /// };
 ///
-/// // Light that is brighter everywhere is no contact.
+/// // Three grey levels of stray light everywhere are no contact.
 /// let reference = ReferenceFrame::new(Array2::from_elem((160, 160), 20_u8).view())?;
 /// let brighter = Array2::from_elem((160, 160), 23_u8);
-/// let options = ContactOptions::default().with_drift(DriftCorrection::Illumination);
+/// let options = ContactOptions::default().with_drift(DriftCorrection::Offset);
 /// let found: Detection = ContactDetector::new(options).detect_with(
 ///     &mut Default::default(),
 ///     brighter.view(),
 ///     &reference,
 /// )?;
 /// assert!(found.contact.is_none());
-/// assert!((found.drift.coefficients[0] - 1.15).abs() < 1e-9);
+/// assert!((found.drift.coefficients[0] - 3.0).abs() < 1e-9);
 /// # Ok::<(), tactile_force::ForceError>(())
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -35,6 +36,10 @@ pub enum DriftCorrection {
     /// Frames are taken as they are.
     #[default]
     None,
+    /// Stray light added everywhere alike: d = f − r − b.
+    Offset,
+    /// Stray light with a gradient: d = f − r − (b + bₓ x + b_y y).
+    Plane,
     /// Illumination brighter or darker, background and signal alike: d = f/g − r.
     Illumination,
     /// Illumination that also changed its distribution, as when an LED moves: d = f/(g + gₓ x + g_y
@@ -99,7 +104,25 @@ pub enum DriftOutcome {
     },
 }
 
-/// The drift found in one frame.
+impl DriftCorrection {
+    fn is_multiplicative(self) -> bool {
+        matches!(
+            self,
+            Self::Illumination | Self::TiltedIllumination | Self::Automatic
+        )
+    }
+
+    fn terms(self) -> usize {
+        match self {
+            Self::None => 0,
+            Self::Offset | Self::Illumination | Self::Automatic => 1,
+            Self::Plane | Self::TiltedIllumination => 3,
+        }
+    }
+}
+
+/// The drift found in one frame. `coefficients` are [value, per column, per row] about the frame's
+/// middle: grey levels for stray light, shares for illumination.
 ///
 /// ```
 /// use ndarray::Array2;
@@ -127,8 +150,8 @@ pub struct IlluminationDrift {
     pub correction: DriftCorrection,
     /// Whether the drift is known.
     pub outcome: DriftOutcome,
-    /// Relative illumination (1 for unchanged) in the frame's middle, and its change per column and
-    /// per row. Zero without a correction.
+    /// Offset (grey levels) or relative illumination (1 for unchanged) in the frame's middle, and
+    /// its change per column and per row.
     pub coefficients: [f64; 3],
     /// Standard error of the first coefficient.
     pub standard_error: f64,
@@ -144,6 +167,7 @@ pub struct IlluminationDrift {
 /// The correction along one row.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct DriftLine {
+    multiplicative: bool,
     start: f32,
     step: f32,
 }
@@ -153,8 +177,12 @@ impl DriftLine {
     #[inline(always)]
     pub(crate) fn difference(&self, x: usize, frame: f32, reference: f32) -> f32 {
         // Frames are narrower than 2³¹, and this conversion has wide instructions.
-        let light = self.start + self.step * (x as i32) as f32;
-        frame / light - reference
+        let level = self.start + self.step * (x as i32) as f32;
+        if self.multiplicative {
+            frame / level - reference
+        } else {
+            frame - reference - level
+        }
     }
 }
 
@@ -171,6 +199,7 @@ impl IlluminationDrift {
         // enough.
         let start = value + per_column * x + per_row * y;
         DriftLine {
+            multiplicative: self.correction.is_multiplicative(),
             start: start as f32,
             step: per_column as f32,
         }
@@ -186,7 +215,22 @@ impl IlluminationDrift {
                 variance += at[i] * self.covariance[i][j] * at[j];
             }
         }
-        [variance * self.reference * self.reference, variance]
+        if self.correction.is_multiplicative() {
+            [variance * self.reference * self.reference, variance]
+        } else {
+            [variance, 0.0]
+        }
+    }
+
+    /// Background that the correction subtracts from a frame at a place where the reference is
+    /// `reference`.
+    fn level(&self, x: f64, y: f64, reference: f64) -> f64 {
+        let at = self.at(x, y);
+        if self.correction.is_multiplicative() {
+            reference * (at - 1.0)
+        } else {
+            at
+        }
     }
 
     #[inline]
@@ -205,17 +249,20 @@ impl IlluminationDrift {
         let corners = [[0.0, 0.0], [right, 0.0], [0.0, bottom], [right, bottom]];
         corners
             .iter()
-            .map(|[x, y]| (mean * (self.at(*x, *y) - 1.0)).abs())
+            .map(|[x, y]| self.level(*x, *y, mean).abs())
             .fold(0.0, f64::max)
     }
 
     /// A tile's summed difference after the correction.
     #[inline]
     pub(crate) fn residual(&self, tile: &TileSum) -> f64 {
-        if self.is_zero() {
-            return tile.difference;
-        }
-        tile.difference - tile.reference * (self.at(tile.x, tile.y) - 1.0)
+        let at = self.at(tile.x, tile.y);
+        let background = if self.correction.is_multiplicative() {
+            tile.reference * (at - 1.0)
+        } else {
+            tile.pixels * at
+        };
+        tile.difference - background
     }
 
     /// The automatic correction if its error is small enough, else none and the reason.
@@ -280,7 +327,7 @@ impl IlluminationDrift {
             if !is_near {
                 continue;
             }
-            let weight = tile.reference.max(1.0);
+            let weight = self.weight(tile);
             let at = [
                 1.0,
                 (tile.x - self.middle[0]) / scale[1],
@@ -312,6 +359,15 @@ impl IlluminationDrift {
         self.reference = reference / f64::max(pixels, 1.0);
         count
     }
+
+    /// Derivative of a tile's sum by the first coefficient.
+    fn weight(&self, tile: &TileSum) -> f64 {
+        if self.correction.is_multiplicative() {
+            tile.reference.max(1.0)
+        } else {
+            tile.pixels
+        }
+    }
 }
 
 /// Buffers of the fit.
@@ -341,14 +397,16 @@ pub(crate) fn fit(
     let mut drift = IlluminationDrift {
         correction,
         middle: [0.5 * (columns as f64 - 1.0), 0.5 * (rows as f64 - 1.0)],
-        coefficients: [1.0, 0.0, 0.0],
         ..IlluminationDrift::default()
     };
+    if correction.is_multiplicative() {
+        drift.coefficients[0] = 1.0;
+    }
     values.clear();
     values.extend(
         tiles
             .iter()
-            .map(|tile| drift.residual(tile) / tile.reference.max(1.0)),
+            .map(|tile| drift.residual(tile) / drift.weight(tile)),
     );
     // A contact that covers less than half of the tiles shifts the median little.
     drift.coefficients[0] += median(values, scratch);
@@ -361,9 +419,9 @@ pub(crate) fn fit(
         // noise.
         let limit = 3.0 * (1.4826 * median(values, scratch)).max(noise);
         let before = drift.tiles;
-        drift.tiles = match correction {
-            DriftCorrection::TiltedIllumination => drift.step::<3>(tiles, limit, sd),
-            _ => drift.step::<1>(tiles, limit, sd),
+        drift.tiles = match correction.terms() {
+            1 => drift.step::<1>(tiles, limit, sd),
+            _ => drift.step::<3>(tiles, limit, sd),
         };
         // The same number of tiles nearly always is the same tiles, and the fit has settled.
         if drift.tiles == before {

@@ -11,7 +11,7 @@
 //! |---|---|
 //! | `frame` | the pass over a frame, the reference, the noise of both, vignetting |
 //! | `face` | area and shape of flat faces, stretch of their texture |
-//! | `drift` | drift of the illumination since the reference was taken |
+//! | `drift` | drift of illumination and stray light since the reference was taken |
 //! | `contact` | detection, mask, aperture, sums over the aperture |
 //! | `health` | changes of a sensor since its calibration: brightness, noise, stuck pixels |
 //! | `profile` | the contact radius from the pressure profile |

@@ -392,7 +392,7 @@ pub struct ForceMeasurement {
     pub elongation: Option<f64>,
     /// Sums over the whole frame.
     pub statistics: FrameStatistics,
-    /// The correction of illumination.
+    /// The correction of illumination and stray light.
     pub drift: IlluminationDrift,
     /// The noise that the errors are computed from. `None` without contact.
     pub noise: Option<DifferenceNoise>,

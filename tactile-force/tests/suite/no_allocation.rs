@@ -35,7 +35,11 @@ fn measuring_with_a_workspace_allocates_nothing() {
         force_n: [u, u],
     });
     let mut tracker = ShearTracker::new(ShearCalibration::fit(&shear_pairs).unwrap());
-    for drift in [DriftCorrection::None, DriftCorrection::TiltedIllumination] {
+    for drift in [
+        DriftCorrection::None,
+        DriftCorrection::Plane,
+        DriftCorrection::TiltedIllumination,
+    ] {
         let contact = ContactOptions::default().with_drift(drift);
         let options = ForceOptions::default().with_contact(contact);
         let meter = ForceMeter::new([1e-5; 2], &options).unwrap();

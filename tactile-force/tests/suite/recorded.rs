@@ -192,7 +192,7 @@ fn frames(answers: &mut Answers) {
     let drift = |correction| options().with_contact(contact.with_drift(correction));
     let hertz = HertzFitOptions::default();
     let darker_contact = contact.with_polarity(Polarity::Darker);
-    let cases: [(&str, &ReferenceFrame, &Array2<u8>, ForceOptions); 11] = [
+    let cases: [(&str, &ReferenceFrame, &Array2<u8>, ForceOptions); 13] = [
         ("quiet", &plain, &quiet[1], options()),
         ("firm", &plain, &firm, options()),
         ("firm mean", &mean, &firm, options()),
@@ -211,6 +211,8 @@ fn frames(answers: &mut Answers) {
             &firm,
             options().with_hertz(hertz.with_fitted_background()),
         ),
+        ("offset", &plain, &brighter, drift(DriftCorrection::Offset)),
+        ("plane", &plain, &brighter, drift(DriftCorrection::Plane)),
         (
             "brighter",
             &plain,
