@@ -72,6 +72,33 @@ fn a_part_of_the_tiles_knows_the_frame() {
     assert!((part.background_grey - all.background_grey).abs() < 0.1);
 }
 
+/// Frames from one false alarm to the next.
+fn simulated_interval(shift: f64, interval: f64, frames: usize) -> f64 {
+    let mut rng = ChaCha8Rng::seed_from_u64(7);
+    let fresh = Cusum::new(shift, interval, 0.0);
+    let (mut chart, mut alarms) = (fresh, 0);
+    for _ in 0..frames {
+        if chart.update(StandardNormal.sample(&mut rng)) {
+            alarms += 1;
+            chart = fresh;
+        }
+    }
+    frames as f64 / f64::from(alarms)
+}
+
+#[test]
+fn false_alarms_come_as_seldom_as_asked() {
+    for shift in [0.5, 1.0, 2.0, 20.0] {
+        let interval = 2000.0;
+        let found = simulated_interval(shift, interval, 2_000_000);
+        // Siegmund's approximation is good to some 10 %. 1000 alarms are known to 3 %.
+        assert!(
+            (0.85..1.35).contains(&(found / interval)),
+            "shift {shift}: {found}"
+        );
+    }
+}
+
 #[test]
 fn shifts_are_found_after_the_stated_delay() {
     let mut rng = ChaCha8Rng::seed_from_u64(9);

@@ -217,7 +217,6 @@ pub struct PressureCurve {
     sums: LinearCalibration,
 }
 
-/// A curve as a file has it.
 /// Coefficients from a file. Refuses what no fit gives: a curve that falls, or numbers that are not
 /// finite.
 #[cfg(feature = "serde")]
