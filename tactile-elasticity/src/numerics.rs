@@ -141,7 +141,3 @@ impl<const N: usize> Chebyshev<N> {
         std::f64::consts::PI * (j as f64 + 0.5) / N as f64
     }
 }
-
-#[cfg(test)]
-#[path = "numerics_tests.rs"]
-mod tests;

@@ -2,15 +2,6 @@ use super::memory;
 use approx::assert_relative_eq;
 
 #[test]
-fn what_is_held_is_forgotten_exponentially() {
-    let times = [0.0, 0.5, 0.5, 2.0];
-    for (found, time) in memory(&times, &[3.0; 4], 0.8).iter().zip(times) {
-        // Products of exponentials against one: some units in the last place.
-        assert_relative_eq!(*found, (-time / 0.8_f64).exp(), max_relative = 1e-14);
-    }
-}
-
-#[test]
 fn a_ramp_is_its_integral_and_a_sudden_change_counts_whole() {
     // u = 1 at once, then to 2 over a second: e^{-1} + (1 − e^{-1}) at τ = 1, over u = 2.
     let ramp = memory(&[0.0, 1.0], &[1.0, 2.0], 1.0);

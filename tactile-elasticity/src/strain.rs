@@ -901,7 +901,3 @@ fn careful(h: &Matrix3<f64>) -> Matrix3<f64> {
         .strain(h)
         .unwrap_or_else(|_| Matrix3::repeat(f64::NAN))
 }
-
-#[cfg(test)]
-#[path = "strain_tests.rs"]
-mod tests;

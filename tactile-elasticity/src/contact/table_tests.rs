@@ -33,26 +33,10 @@ fn a_polynomial_is_found_again_with_its_slopes() {
 #[test]
 fn the_error_is_that_of_a_sample_left_out() {
     // ±0.1 % of alternating scatter, which no polynomial of degree 6 follows.
-    let scatter = |x: f64| {
-        1e-3 * if (x * 10.0).round() % 2.0 == 0.0 {
-            1.0
-        } else {
-            -1.0
-        }
-    };
+    let scatter = |x: f64| 1e-3 * (-1f64).powf((x * 10.0).round());
     let surface = Surface::fit(&samples(|x, m| x * m + scatter(x)), 8).unwrap();
-    assert!(
-        (1e-3..4e-3).contains(&surface.error()),
-        "{}",
-        surface.error()
-    );
-}
-
-#[test]
-fn one_modulus_makes_a_surface_that_does_not_depend_on_it() {
-    let one: Vec<_> = samples(|x, _| x).into_iter().take(12).collect();
-    let value = Surface::fit(&one, 1).unwrap().at(0.5, 25.0);
-    assert!((value.value - 0.5).abs() < 1e-12 && value.modulus_slope == 0.0);
+    let error = surface.error();
+    assert!((1e-3..4e-3).contains(&error), "{error}");
 }
 
 const RADIUS: f64 = 3e-3;
@@ -174,123 +158,84 @@ fn what_the_table_does_not_hold_is_not_answered() {
     assert_eq!(table.force_n(1.2 * RADIUS, 380e3), None);
 
     let estimator = TabulatedContact::new(table, RADIUS, 0.495, &guide()).unwrap();
-    let far = LoadSeries::new([load(1.4 * RADIUS, 60e3)]);
-    assert!(matches!(
-        estimator.estimate(&far),
-        Err(ElasticityError::OutOfRange {
-            quantity: Quantity::ContactRadius,
-            ..
-        })
-    ));
+    let refused = |a: f64, e: f64| {
+        let error = estimator.estimate(&LoadSeries::new([load(a, e)]));
+        error.unwrap_err()
+    };
+    let far = refused(1.4 * RADIUS, 60e3).to_string();
+    assert!(far.starts_with("contact radius = "), "{far}");
     // With a load inside, the one outside is left out and named.
     let both = LoadSeries::new([load(0.8 * RADIUS, 60e3), load(1.4 * RADIUS, 60e3)]);
     let found = estimator.estimate(&both).unwrap();
     assert!(!found.loads[1].used && found.fit.observations == 1);
-    assert!(matches!(
-        found.warnings[0],
-        Warning::LargeContact { load: 1, .. }
-    ));
-    let stiff = LoadSeries::new([load(0.8 * RADIUS, 2e6)]);
-    assert!(matches!(
-        estimator.estimate(&stiff),
-        Err(ElasticityError::StifferThanResolvable { lower_bound_pa: Some(bound) }) if bound > 250e3
-    ));
-    let soft = LoadSeries::new([load(0.8 * RADIUS, 5e3)]);
-    assert!(matches!(
-        estimator.estimate(&soft),
-        Err(ElasticityError::OutOfRange {
-            quantity: Quantity::YoungsModulus,
-            ..
-        })
-    ));
+    let warning = found.warnings[0];
+    assert!(matches!(warning, Warning::LargeContact { load: 1, .. }));
+    let stiff = refused(0.8 * RADIUS, 2e6);
+    assert!(
+        matches!(stiff, ElasticityError::StifferThanResolvable { lower_bound_pa: Some(bound) } if bound > 250e3)
+    );
+    let soft = refused(0.8 * RADIUS, 5e3).to_string();
+    assert!(soft.starts_with("Young's modulus = "), "{soft}");
 }
 
 #[test]
 fn another_ball_or_guide_is_refused() {
-    let refused =
-        |radius, nu, guide: &Waveguide| match TabulatedContact::new(table(), radius, nu, guide) {
-            Err(ElasticityError::TableMismatch { quantity, .. }) => Some(quantity),
-            _ => None,
-        };
+    let refused = |radius, nu, guide: &Waveguide| {
+        let refused = TabulatedContact::new(table(), radius, nu, guide);
+        refused.err().map(|error| match error {
+            ElasticityError::TableMismatch { quantity, .. } => quantity,
+            other => panic!("{other}"),
+        })
+    };
     assert_eq!(refused(RADIUS, 0.495, &guide()), None);
     assert_eq!(refused(3.01e-3, 0.495, &guide()), Some(Quantity::Radius));
     assert_eq!(refused(RADIUS, 0.5, &guide()), Some(Quantity::PoissonRatio));
-    assert_eq!(
-        refused(RADIUS, 0.495, &Waveguide::rigid()),
-        Some(Quantity::Layers)
-    );
-    let changed = |change: fn(&mut Layer)| {
+    let flat = Waveguide::rigid();
+    assert_eq!(refused(RADIUS, 0.495, &flat), Some(Quantity::Layers));
+    let changed: [(Quantity, fn(&mut Layer)); 3] = [
+        (Quantity::Thickness, |l| l.thickness_m *= 1.1),
+        (Quantity::YoungsModulus, |l| l.youngs_modulus_pa *= 1.1),
+        (Quantity::PoissonRatio, |l| l.poisson_ratio = 0.49),
+    ];
+    for (quantity, change) in changed {
         let mut layers = guide().layers().to_vec();
         change(&mut layers[1]);
-        refused(RADIUS, 0.495, &Waveguide::new(layers).unwrap())
-    };
-    assert_eq!(changed(|l| l.thickness_m *= 1.1), Some(Quantity::Thickness));
-    assert_eq!(
-        changed(|l| l.youngs_modulus_pa *= 1.1),
-        Some(Quantity::YoungsModulus)
-    );
-    assert_eq!(
-        changed(|l| l.poisson_ratio = 0.49),
-        Some(Quantity::PoissonRatio)
-    );
+        let other = Waveguide::new(layers).unwrap();
+        assert_eq!(refused(RADIUS, 0.495, &other), Some(quantity));
+    }
 }
 
 #[test]
 fn curves_without_meaning_are_refused() {
-    let refused = |change: fn(&mut Vec<ContactCurve>)| {
+    let refused: [(&str, fn(&mut Vec<ContactCurve>)); 8] = [
+        ("Young's modulus: expected 2 entries, found 1", |c| {
+            c.truncate(1)
+        }),
+        ("Young's modulus = 30000 is beyond", |c| c.swap(0, 1)),
+        ("Young's modulus must be greater", |c| {
+            c[0].youngs_modulus_pa = f64::NAN
+        }),
+        ("contact radius: expected 4", |c| {
+            c[1].contact_radius_m.truncate(3)
+        }),
+        ("contact radius must be greater", |c| {
+            c[1].contact_radius_m[4] = -1.0
+        }),
+        ("force: expected 16 entries, found 5", |c| {
+            c[1].force_n.truncate(5)
+        }),
+        ("force = ", |c| c[1].force_n.swap(2, 3)),
+        // The stiffer ball needs the smaller force.
+        ("the table's force does not grow", |c| {
+            c[1].force_n.iter_mut().for_each(|f| *f *= 0.3)
+        }),
+    ];
+    for (message, change) in refused {
         let mut curves = vec![curve(30e3, 1.0), curve(60e3, 1.0), curve(120e3, 1.0)];
         change(&mut curves);
-        ContactTable::new(RADIUS, 0.495, &guide(), curves).unwrap_err()
-    };
-    use ElasticityError::{LengthMismatch, NotMonotone, NotPositive, OutOfRange};
-    assert!(matches!(
-        refused(|c| c.truncate(1)),
-        LengthMismatch {
-            quantity: Quantity::YoungsModulus,
-            ..
-        }
-    ));
-    assert!(matches!(
-        refused(|c| c.swap(0, 1)),
-        OutOfRange {
-            quantity: Quantity::YoungsModulus,
-            ..
-        }
-    ));
-    assert!(matches!(
-        refused(|c| c[0].youngs_modulus_pa = f64::NAN),
-        NotPositive { .. }
-    ));
-    assert!(matches!(
-        refused(|c| c[1].contact_radius_m.truncate(3)),
-        LengthMismatch {
-            quantity: Quantity::ContactRadius,
-            ..
-        }
-    ));
-    assert!(matches!(
-        refused(|c| c[1].force_n.truncate(5)),
-        LengthMismatch {
-            quantity: Quantity::Force,
-            ..
-        }
-    ));
-    assert!(matches!(
-        refused(|c| c[1].force_n.swap(2, 3)),
-        OutOfRange {
-            quantity: Quantity::Force,
-            ..
-        }
-    ));
-    assert!(matches!(
-        refused(|c| c[1].contact_radius_m[4] = -1.0),
-        NotPositive { .. }
-    ));
-    // The stiffer ball needs the smaller force.
-    assert!(matches!(
-        refused(|c| c[1].force_n.iter_mut().for_each(|f| *f *= 0.3)),
-        NotMonotone
-    ));
+        let error = ContactTable::new(RADIUS, 0.495, &guide(), curves).unwrap_err();
+        assert!(error.to_string().starts_with(message), "{error}");
+    }
 }
 
 #[cfg(feature = "serde")]

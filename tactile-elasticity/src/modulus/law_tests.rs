@@ -2,9 +2,10 @@ use super::*;
 
 #[test]
 fn nothing_changes_without_a_change_of_volume() {
-    let [sphere, punch, cone] = factors(0.5);
     // A sum of 160 terms of order one.
-    assert!(sphere.abs() < 1e-14 && punch == 0.0 && cone == 0.0);
+    assert!(NoSlipLaw::sphere(1.0, 0.5).unwrap().at_indentation.abs() < 1e-14);
+    assert_eq!(NoSlipLaw::punch(1.0, 0.5).unwrap().at_indentation, 0.0);
+    assert_eq!(NoSlipLaw::cone(1.0, 0.5).unwrap().at_indentation, 0.0);
 }
 
 /// ∫ tanh x cos(2θx)/cosh² x dx = ½ − θ ∫ sin(2θx)/cosh² x dx, the last by e⁻²ˣ's series: 4 Σ
@@ -23,22 +24,5 @@ fn the_parabolas_integral_is_its_series() {
             (found - (0.5 - theta * sum)).abs() < 1e-11,
             "{theta}: {found}"
         );
-    }
-}
-
-/// Spence's factor and those of Borodich and Keer at one indentation.
-fn factors(nu: f64) -> [f64; 3] {
-    [
-        NoSlipLaw::sphere(1.0, nu).unwrap().at_indentation,
-        NoSlipLaw::punch(1.0, nu).unwrap().at_indentation,
-        NoSlipLaw::cone(1.0, nu).unwrap().at_indentation,
-    ]
-}
-
-#[test]
-fn sticking_stiffens_more_the_more_volume_changes() {
-    let ratios = [0.5, 0.45, 0.3, 0.1, 0.0, -0.5].map(factors);
-    for pair in ratios.windows(2) {
-        assert!(pair[0].iter().zip(&pair[1]).all(|(less, more)| less < more));
     }
 }

@@ -2,20 +2,6 @@ use super::*;
 
 use approx::assert_relative_eq;
 
-#[test]
-fn a_shared_error_is_not_averaged_away() {
-    let shared = Covariance::none(0..4)
-        .with_own(|_| 0.2)
-        .with_shared(|_| 0.1);
-    let mean = common_mean(&[1.0, 1.2, 0.9, 0.9], &shared).unwrap();
-    assert_relative_eq!(mean.mean, 1.0, epsilon = 1e-12);
-    assert_relative_eq!(
-        mean.standard_error.powi(2),
-        0.01 + 0.04 / 4.0,
-        max_relative = 1e-12
-    );
-}
-
 /// The mean, its variance, χ² and the weights against the plain formulas with the matrix of all
 /// pairs.
 #[test]

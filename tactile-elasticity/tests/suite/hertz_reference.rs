@@ -15,11 +15,22 @@ fn of_kind(kind: &str) -> Vec<Value> {
 
 fn close(case: &Value, what: &str, found: f64, expected: f64, tolerance: f64) {
     let gap = (found - expected).abs() / if expected == 0.0 { 1.0 } else { expected.abs() };
-    assert!(
-        gap <= tolerance,
-        "{} {what}: {found:e} for {expected:e}, off by {gap:.1e}",
-        case["id"]
-    );
+    let id = &case["id"];
+    assert!(gap <= tolerance, "{id} {what}: {found:e} for {expected:e}");
+}
+
+/// Each number found against the one of its name.
+fn all_close(case: &Value, expected: &Value, tolerance: f64, found: &[(&str, f64)]) {
+    for (key, found) in found {
+        close(case, key, *found, number(&expected[key]), tolerance);
+    }
+}
+
+fn bond(case: &Value) -> Bond {
+    match case["bonded"].as_bool().unwrap() {
+        true => Bond::Bonded,
+        false => Bond::Free,
+    }
 }
 
 fn body(modulus: &Value, nu: &Value) -> Body {
@@ -33,24 +44,16 @@ fn contacts() {
     for case in of_kind("hertz") {
         let radius = relative_radius_m(optional(&case["R1"]), optional(&case["R2"]));
         if case["status"] == "conforming" {
-            assert!(
-                matches!(radius, Err(ElasticityError::Conforming { .. })),
-                "{}",
-                case["id"]
-            );
+            let refused = matches!(radius, Err(ElasticityError::Conforming { .. }));
+            assert!(refused, "{}", case["id"]);
             continue;
         }
-        let (one, other) = (
-            body(&case["E1"], &case["nu1"]),
-            body(&case["E2"], &case["nu2"]),
-        );
-        let contact = HertzContact::from_force(
-            number(&case["F"]),
-            radius.unwrap(),
-            reduced_modulus_pa(one, other).unwrap(),
-        )
-        .unwrap();
-        for (key, found) in [
+        let one = body(&case["E1"], &case["nu1"]);
+        let other = body(&case["E2"], &case["nu2"]);
+        let reduced = reduced_modulus_pa(one, other).unwrap();
+        let contact = HertzContact::from_force(number(&case["F"]), radius.unwrap(), reduced);
+        let contact = contact.unwrap();
+        let found = [
             ("R", contact.radius_m),
             ("E_star", contact.reduced_modulus_pa),
             ("a", contact.contact_radius_m),
@@ -58,9 +61,8 @@ fn contacts() {
             ("p0", contact.peak_pressure_pa),
             ("p_mean", contact.mean_pressure_pa),
             ("stiffness", contact.stiffness_n_per_m),
-        ] {
-            close(&case, key, found, number(&case["expected"][key]), 1e-12);
-        }
+        ];
+        all_close(&case, &case["expected"], 1e-12, &found);
     }
 }
 
@@ -71,17 +73,16 @@ fn inverses() {
         let other = body(&case["E1"], &case["nu1"]);
         let from_a = |a| reduced_modulus_from_contact_radius(force, radius, a);
         let from_delta = |d| reduced_modulus_from_indentation(force, radius, d);
-        for (key, input) in [("from_a", "a"), ("from_delta", "delta")] {
+        let reduced = [
+            ("from_a", case["a"].as_f64().map(from_a)),
+            ("from_delta", case["delta"].as_f64().map(from_delta)),
+        ];
+        for (key, reduced) in reduced {
             let expected = &case["expected"][key];
-            let Some(x) = case[input].as_f64().filter(|_| !expected.is_null()) else {
+            let Some(reduced) = reduced.filter(|_| !expected.is_null()) else {
                 continue;
             };
-            let reduced = if key == "from_a" {
-                from_a(x)
-            } else {
-                from_delta(x)
-            }
-            .unwrap();
+            let reduced = reduced.unwrap();
             close(&case, "E*", reduced, number(&expected["E_star"]), 1e-12);
             match sample_modulus_pa(reduced, nu, other) {
                 Ok(e2) => {
@@ -91,11 +92,8 @@ fn inverses() {
                     close(&case, "E2", e2, number(&expected["E2"]), tolerance);
                 }
                 Err(ElasticityError::StifferThanResolvable { .. }) => {
-                    assert_eq!(
-                        expected["status"], "stiffer_than_indenter",
-                        "{}",
-                        case["id"]
-                    );
+                    let id = &case["id"];
+                    assert_eq!(expected["status"], "stiffer_than_indenter", "{id}");
                 }
                 Err(e) => panic!("{}: {e}", case["id"]),
             }
@@ -106,11 +104,7 @@ fn inverses() {
 #[test]
 fn surfaces() {
     for case in of_kind("surface") {
-        let (a, p0, e) = (
-            number(&case["a"]),
-            number(&case["p0"]),
-            number(&case["E_star"]),
-        );
+        let [a, p0, e] = ["a", "p0", "E_star"].map(|key| number(&case[key]));
         for (i, r) in case["r"].as_array().unwrap().iter().enumerate() {
             let found = hertz_surface_displacement_m(number(r), a, p0, e);
             close(&case, "u", found, number(&case["expected"]["u"][i]), 1e-12);
@@ -130,13 +124,8 @@ fn stacks() {
             })
             .collect();
         let stack = Waveguide::new(layers).unwrap();
-        close(
-            &case,
-            "series",
-            stack.series_modulus_pa(),
-            number(&case["expected"]["series_E"]),
-            1e-12,
-        );
+        let found = [("series_E", stack.series_modulus_pa())];
+        all_close(&case, &case["expected"], 1e-12, &found);
         match case["expected"]["confined_M"].as_f64() {
             Some(m) => close(&case, "confined", stack.confined_modulus_pa(), m, 1e-12),
             None => assert!(stack.confined_modulus_pa().is_infinite()),
@@ -147,93 +136,45 @@ fn stacks() {
 #[test]
 fn punches_and_cones() {
     for case in of_kind("punch") {
-        let (e, d, a) = (
-            number(&case["E_star"]),
-            number(&case["delta"]),
-            number(&case["a"]),
-        );
-        let expected = |key: &str| number(&case["expected"][key]);
+        let [e, d, a, angle] =
+            ["E_star", "delta", "a", "half_angle_deg"].map(|key| number(&case[key]));
         let flat = flat_punch(e, a, d).unwrap();
-        close(&case, "flat F", flat.force_n, expected("flat_F"), 1e-12);
-        close(
-            &case,
-            "flat p",
-            flat.mean_pressure_pa,
-            expected("flat_p_mean"),
-            1e-12,
-        );
-        let cone = cone(
-            e,
-            tangent_of_degrees(number(&case["half_angle_deg"])).unwrap(),
-            d,
-        )
-        .unwrap();
-        close(&case, "cone F", cone.force_n, expected("cone_F"), 1e-12);
-        close(
-            &case,
-            "cone a",
-            cone.contact_radius_m,
-            expected("cone_a"),
-            1e-12,
-        );
-        close(
-            &case,
-            "cone p",
-            cone.mean_pressure_pa,
-            expected("cone_p_mean"),
-            1e-12,
-        );
+        let cone = cone(e, tangent_of_degrees(angle).unwrap(), d).unwrap();
+        let found = [
+            ("flat_F", flat.force_n),
+            ("flat_p_mean", flat.mean_pressure_pa),
+            ("cone_F", cone.force_n),
+            ("cone_a", cone.contact_radius_m),
+            ("cone_p_mean", cone.mean_pressure_pa),
+        ];
+        all_close(&case, &case["expected"], 1e-12, &found);
     }
 }
 
 #[test]
 fn layers() {
     for case in of_kind("layer") {
-        let (e, nu, r, h) = (
-            number(&case["E"]),
-            number(&case["nu"]),
-            number(&case["R"]),
-            number(&case["h"]),
-        );
-        let bond = if case["bonded"].as_bool().unwrap() {
-            Bond::Bonded
-        } else {
-            Bond::Free
-        };
-        let published = LayerSeries::published(bond, nu).unwrap();
+        let [e, nu, r, h] = ["E", "nu", "R", "h"].map(|key| number(&case[key]));
+        let published = LayerSeries::published(bond(&case), nu).unwrap();
         for (k, c) in published.coefficients.iter().enumerate() {
-            close(
-                &case,
-                "coefficient",
-                *c,
-                number(&case["expected"]["coefficients"][k]),
-                1e-12,
-            );
+            let expected = number(&case["expected"]["coefficients"][k]);
+            close(&case, "coefficient", *c, expected, 1e-12);
         }
         for row in case["expected"]["rows"].as_array().unwrap() {
             let d = number(&row["delta"]);
             let chi = (r * d).sqrt() / h;
-            close(&case, "chi", chi, number(&row["chi"]), 1e-12);
-            close(
-                &case,
-                "correction",
-                published.force_ratio(chi),
-                number(&row["correction"]),
-                1e-12,
-            );
             let hertz = 4.0 / 3.0 * e / (1.0 - nu * nu) * r.sqrt() * d.powf(1.5);
-            close(&case, "F_hertz", hertz, number(&row["F_hertz"]), 1e-12);
-            close(
-                &case,
-                "F",
-                hertz * published.force_ratio(chi),
-                number(&row["F"]),
-                1e-12,
-            );
+            let ratio = published.force_ratio(chi);
+            let found = [
+                ("chi", chi),
+                ("correction", ratio),
+                ("F_hertz", hertz),
+                ("F", hertz * ratio),
+            ];
+            all_close(&case, row, 1e-12, &found);
             if let Some(modulus) = row["E_from_F_of_1N"].as_f64() {
                 let reduced = reduced_modulus_from_indentation(1.0, r, d).unwrap();
-                let found = sample_modulus_pa(reduced, nu, Body::rigid()).unwrap()
-                    / published.force_ratio(chi);
+                let found = sample_modulus_pa(reduced, nu, Body::rigid()).unwrap() / ratio;
                 close(&case, "E", found, modulus, 1e-12);
             }
         }
@@ -245,43 +186,20 @@ fn layers() {
 #[test]
 fn layers_solved() {
     for case in of_kind("layer") {
-        let bond = if case["bonded"].as_bool().unwrap() {
-            Bond::Bonded
-        } else {
-            Bond::Free
-        };
-        let nu = number(&case["nu"]);
+        let (bond, nu) = (bond(&case), number(&case["nu"]));
         let expected = &case["integral_equation"];
         let series = LayerSeries::corrected(bond, nu, 1.0).unwrap();
         for (k, c) in series.coefficients.iter().enumerate() {
-            close(
-                &case,
-                "series",
-                *c,
-                number(&expected["series_exact"][k]),
-                1e-9,
-            );
+            let expected = number(&expected["series_exact"][k]);
+            close(&case, "series", *c, expected, 1e-9);
         }
+        let equation = LayerEquation::new(bond, nu).unwrap();
         for sample in expected["samples"].as_array().unwrap() {
-            let contact = LayerEquation::new(bond, nu)
-                .unwrap()
-                .solve(number(&sample["a_over_h"]))
-                .unwrap();
-            close(&case, "chi", contact.chi, number(&sample["chi"]), 1e-9);
-            close(
-                &case,
-                "F ratio",
-                contact.force_ratio,
-                number(&sample["F_ratio"]),
-                1e-9,
-            );
-            close(
-                &case,
-                "series ratio",
-                series.force_ratio(contact.chi),
-                number(&sample["series_exact_ratio"]),
-                1e-8,
-            );
+            let contact = equation.solve(number(&sample["a_over_h"])).unwrap();
+            let found = [("chi", contact.chi), ("F_ratio", contact.force_ratio)];
+            all_close(&case, sample, 1e-9, &found);
+            let found = [("series_exact_ratio", series.force_ratio(contact.chi))];
+            all_close(&case, sample, 1e-8, &found);
         }
     }
 }

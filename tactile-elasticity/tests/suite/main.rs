@@ -10,4 +10,3 @@ mod relaxation;
 mod stability;
 mod stability_scale;
 mod strain_reference;
-mod uncertainty;
