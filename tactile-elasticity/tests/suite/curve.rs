@@ -3,7 +3,7 @@
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 use rand_distr::StandardNormal;
 use tactile_elasticity::ElasticityError;
-use tactile_elasticity::contact::{Bond, LayerEquation, LayerSeries};
+use tactile_elasticity::contact::{Bond, LayerEquation, LayerSeries, tatara_indentation_m};
 use tactile_elasticity::curve::*;
 use tactile_elasticity::modulus::{EstimatorKind, Warning};
 
@@ -46,23 +46,33 @@ fn layer(d: f64) -> f64 {
     hertz(d) * series.force_ratio(chi)
 }
 
+/// The curve through depths and forces.
+fn through(points: impl Iterator<Item = (f64, f64)>) -> IndentationCurve {
+    let (z, f): (Vec<f64>, Vec<f64>) = points.unzip();
+    IndentationCurve::new(&z, &f).unwrap()
+}
+
+fn fitted(curve: &IndentationCurve, indenter: &Indenter, kind: EstimatorKind) -> CurveFit {
+    fit_curve(curve, indenter, NU, kind, &CurveOptions::default()).unwrap()
+}
+
+fn chosen(curve: &IndentationCurve, indenter: &Indenter) -> CurveSelection {
+    let options = CurveOptions::default();
+    select_model(curve, indenter, NU, Model::Auto, &options).unwrap()
+}
+
+/// That the modulus is right, but for a relative error.
+fn assert_found(fit: &CurveFit, tolerance: f64) {
+    let error = fit.youngs_modulus_pa / E - 1.0;
+    assert!(error.abs() < tolerance, "{error:e}");
+}
+
 #[test]
 fn clean_curves_are_found_exactly() {
     for offset in [0.0, 0.01] {
         let c = curve(hertz, offset, 0.0, 0);
-        let fit = fit_curve(
-            &c,
-            &sphere(None),
-            NU,
-            EstimatorKind::HertzSphere,
-            &CurveOptions::default(),
-        )
-        .unwrap();
-        assert!(
-            (fit.youngs_modulus_pa / E - 1.0).abs() < 1e-6,
-            "{}",
-            fit.youngs_modulus_pa
-        );
+        let fit = fitted(&c, &sphere(None), EstimatorKind::HertzSphere);
+        assert_found(&fit, 1e-6);
         assert!((fit.contact_point_m - 3e-4).abs() < 1e-9 && (fit.offset_n - offset).abs() < 1e-8);
     }
 }
@@ -73,14 +83,7 @@ fn intervals_cover() {
     let covered = (0..200)
         .filter(|&seed| {
             let c = curve(hertz, 0.002, 0.01, seed);
-            let fit = fit_curve(
-                &c,
-                &sphere(None),
-                NU,
-                EstimatorKind::HertzSphere,
-                &CurveOptions::default(),
-            )
-            .unwrap();
+            let fit = fitted(&c, &sphere(None), EstimatorKind::HertzSphere);
             fit.interval_95.contains(E)
         })
         .count();
@@ -90,31 +93,18 @@ fn intervals_cover() {
 #[test]
 fn the_law_is_chosen_that_made_the_curve() {
     let thick = sphere(Some(3e-3));
-    let auto = |c: &IndentationCurve, i: &Indenter| {
-        select_model(c, i, NU, Model::Auto, &CurveOptions::default()).unwrap()
-    };
-    let chosen = auto(&curve(layer, 0.0, 0.002, 1), &thick);
-    assert_eq!(chosen.chosen().model, EstimatorKind::LayerIntegralEquation);
-    assert!(
-        (chosen.chosen().youngs_modulus_pa / E - 1.0).abs() < 0.02,
-        "{}",
-        chosen.chosen().youngs_modulus_pa
-    );
-    let half_space = chosen
-        .fits
-        .iter()
-        .find(|f| f.model == EstimatorKind::HertzSphere)
-        .unwrap();
+    let selection = chosen(&curve(layer, 0.0, 0.002, 1), &thick);
+    let fit = selection.chosen();
+    assert_eq!(fit.model, EstimatorKind::LayerIntegralEquation);
+    assert_found(fit, 0.02);
+    let is_hertz = |fit: &&CurveFit| fit.model == EstimatorKind::HertzSphere;
+    let half_space = selection.fits.iter().find(is_hertz).unwrap();
     assert!(half_space.youngs_modulus_pa > 1.1 * E);
-    let only = auto(&curve(hertz, 0.0, 0.002, 2), &sphere(None));
+    let deep = curve(hertz, 0.0, 0.002, 2);
+    let only = chosen(&deep, &sphere(None));
     assert_eq!(only.reason, SelectionReason::OnlyCandidate);
-    let asked = select_model(
-        &curve(hertz, 0.0, 0.002, 2),
-        &thick,
-        NU,
-        Model::Named(EstimatorKind::LayerPublishedSeries),
-        &CurveOptions::default(),
-    );
+    let named = Model::Named(EstimatorKind::LayerPublishedSeries);
+    let asked = select_model(&deep, &thick, NU, named, &CurveOptions::default());
     assert_eq!(asked.unwrap().reason, SelectionReason::Asked);
 }
 
@@ -123,67 +113,32 @@ fn a_thin_layer_needs_the_integral_equation() {
     let h = 0.3e-3;
     let equation = LayerEquation::new(Bond::Bonded, NU).unwrap();
     // Positions by contact radius, so that no law has to be inverted.
-    let points: Vec<_> = (1..120)
-        .map(|i| {
-            let contact = equation.solve(0.02 * f64::from(i)).unwrap();
-            let d = (contact.chi * h).powi(2) / R;
-            (d, hertz(d) * contact.force_ratio)
-        })
-        .collect();
-    let z: Vec<f64> = points.iter().map(|p| p.0).collect();
-    let f: Vec<f64> = points.iter().map(|p| p.1).collect();
-    let c = IndentationCurve::new(&z, &f).unwrap();
-    let found = select_model(
-        &c,
-        &sphere(Some(h)),
-        NU,
-        Model::Auto,
-        &CurveOptions::default(),
-    )
-    .unwrap();
+    let c = through((1..120).map(|i| {
+        let contact = equation.solve(0.02 * f64::from(i)).unwrap();
+        let d = (contact.chi * h).powi(2) / R;
+        (d, hertz(d) * contact.force_ratio)
+    }));
+    let found = chosen(&c, &sphere(Some(h)));
     assert_eq!(found.chosen().model, EstimatorKind::LayerIntegralEquation);
     assert!(matches!(found.reason, SelectionReason::BetterFit { margin } if margin > 10.0));
-    assert!(
-        (found.chosen().youngs_modulus_pa / E - 1.0).abs() < 1e-3,
-        "{}",
-        found.chosen().youngs_modulus_pa
-    );
-    let published = fit_curve(
-        &c,
-        &sphere(Some(h)),
-        NU,
-        EstimatorKind::LayerPublishedSeries,
-        &CurveOptions::default(),
-    );
-    let published = published.unwrap();
-    assert!(
-        published
-            .warnings
-            .iter()
-            .any(|w| matches!(w, Warning::ThinLayer { .. }))
-    );
+    assert_found(found.chosen(), 1e-3);
+    let published = fitted(&c, &sphere(Some(h)), EstimatorKind::LayerPublishedSeries);
+    let is_thin = |w: &Warning| matches!(w, Warning::ThinLayer { .. });
+    assert!(published.warnings.iter().any(is_thin));
     assert!(published.residual_autocorrelation > 0.5);
 }
 
 #[test]
 fn squeezed_balls_are_tataras() {
     let e = E / (1.0 - NU * NU);
-    let points: Vec<_> = (1..80)
-        .map(|i| {
-            let a = R * 0.55 * f64::from(i) / 79.0;
-            (
-                tactile_elasticity::contact::tatara_indentation_m(a, R, NU).unwrap(),
-                4.0 / 3.0 * e * a.powi(3) / R,
-            )
-        })
-        .collect();
-    let z: Vec<f64> = points.iter().map(|p| p.0).collect();
-    let f: Vec<f64> = points.iter().map(|p| p.1).collect();
-    let c = IndentationCurve::new(&z, &f).unwrap();
-    let ball = Indenter::Ball { radius_m: R };
-    let found = select_model(&c, &ball, NU, Model::Auto, &CurveOptions::default()).unwrap();
+    let c = through((1..80).map(|i| {
+        let a = R * 0.55 * f64::from(i) / 79.0;
+        let depth = tatara_indentation_m(a, R, NU).unwrap();
+        (depth, 4.0 / 3.0 * e * a.powi(3) / R)
+    }));
+    let found = chosen(&c, &Indenter::Ball { radius_m: R });
     assert_eq!(found.chosen().model, EstimatorKind::TataraSphere);
-    assert!((found.chosen().youngs_modulus_pa / E - 1.0).abs() < 1e-4);
+    assert_found(found.chosen(), 1e-4);
     assert!(found.chosen().warnings.is_empty());
 }
 
@@ -191,21 +146,19 @@ fn squeezed_balls_are_tataras() {
 #[test]
 fn a_tip_on_a_ball_on_a_plate() {
     let (tip, ball, reduced) = (2e-3_f64, 5e-3_f64, E / (1.0 - NU * NU));
-    let forces: Vec<f64> = (1..40).map(|i| 1e-5 * f64::from(i)).collect();
     let depth = |f: f64| {
         let relative = tip * ball / (tip + ball);
         (0.75 * f / reduced).powf(2.0 / 3.0) * (relative.powf(-1.0 / 3.0) + ball.powf(-1.0 / 3.0))
     };
-    let z: Vec<f64> = forces.iter().map(|&f| depth(f)).collect();
-    let curve = IndentationCurve::new(&z, &forces).unwrap();
+    let forces = (1..40).map(|i| 1e-5 * f64::from(i));
+    let curve = through(forces.map(|f| (depth(f), f)));
     let indenter = Indenter::TipOnBall {
         tip_radius_m: tip,
         ball_radius_m: ball,
     };
-    let found = select_model(&curve, &indenter, NU, Model::Auto, &CurveOptions::default());
-    let found = found.unwrap();
+    let found = chosen(&curve, &indenter);
     assert_eq!(found.chosen().model, EstimatorKind::TipOnBall);
-    assert!((found.chosen().youngs_modulus_pa / E - 1.0).abs() < 1e-6);
+    assert_found(found.chosen(), 1e-6);
 }
 
 /// A curve does not tell friction from a stiffer sample: the law is named, and what is on a layer
@@ -231,9 +184,7 @@ fn contact_without_slip_is_asked_for() {
 #[test]
 fn the_error_stated_of_a_law_grows_with_the_strain() {
     let error = |indenter: &Indenter, kind, force: &dyn Fn(f64) -> f64| {
-        let curve = curve(force, 0.0, 0.0, 0);
-        let fit = fit_curve(&curve, indenter, NU, kind, &CurveOptions::default()).unwrap();
-        fit.model_error
+        fitted(&curve(force, 0.0, 0.0, 0), indenter, kind).model_error
     };
     let cone = |half_angle_tangent: f64| {
         let indenter = Indenter::Cone { half_angle_tangent };

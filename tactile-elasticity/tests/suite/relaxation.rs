@@ -307,7 +307,8 @@ fn what_is_no_series_is_refused() {
         refused(&[]),
         ElasticityError::TooFewLoads { expected, found }
     );
-    let changes: [(&str, &[f64], fn(&mut TimedModulus, f64)); 4] = [
+    type Change = fn(&mut TimedModulus, f64);
+    let changes: [(&str, &[f64], Change); 4] = [
         (
             "time must not be",
             &[-1.0, f64::NAN, f64::INFINITY],

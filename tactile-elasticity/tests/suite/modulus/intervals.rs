@@ -259,12 +259,7 @@ fn twenty_thousand_loads_are_one_linear_regression() {
 /// and missed its own estimate.
 #[test]
 fn a_thin_layer_on_a_stiff_base_has_an_interval_around_its_estimate() {
-    let gel = Layer {
-        thickness_m: 1e-3,
-        youngs_modulus_pa: 100e3,
-        poisson_ratio: 0.495,
-    };
-    let guide = Waveguide::new(vec![gel]).unwrap();
+    let guide = guide(&[[1e-3, 100e3]], 0.495);
     let ball = SphereOnWaveguide::new(6e-3, 0.495, &guide, Bond::Bonded).unwrap();
     for radius in [1.5e-3, 2e-3, 3e-3, 4e-3] {
         for force in [0.05, 0.2, 1.0] {
@@ -311,14 +306,8 @@ proptest! {
         ratios in prop::collection::vec(0.1..1.1f64, 1..4),
     ) {
         let radius = 4e-3;
-        let layer = |thickness_m, youngs_modulus_pa| Layer {
-            thickness_m,
-            youngs_modulus_pa,
-            poisson_ratio: nu,
-        };
         let total = thickness * radius;
-        let layers = vec![layer(split * total, 1e5), layer((1.0 - split) * total, 1e5 * below)];
-        let guide = Waveguide::new(layers).unwrap();
+        let guide = guide(&[[split * total, 1e5], [(1.0 - split) * total, 1e5 * below]], nu);
         let ball = SphereOnWaveguide::new(radius, 0.49, &guide, Bond::Bonded).unwrap();
         let modulus = 10f64.powf(ball_pa);
         let bodies = [(modulus, 0.49), (1e5, nu)].map(|(e, nu)| Body::elastic(e, nu).unwrap());

@@ -129,12 +129,7 @@ fn a_rigid_flat_and_a_deep_layer_are_hertz() {
     finds(&flat.clone().without_finite_strain(), &loads);
     let top = Body::elastic(80e3, 0.5).unwrap();
     let loads = hertz_loads(top, &[1e-6, 4e-6]);
-    let deep = Layer {
-        thickness_m: 10.0,
-        youngs_modulus_pa: 80e3,
-        poisson_ratio: 0.5,
-    };
-    let deep = Waveguide::new(vec![deep]).unwrap();
+    let deep = guide(&[[10.0, 80e3]], 0.5);
     let layered = SphereOnWaveguide::new(4e-3, NU, &deep, Bond::Bonded).unwrap();
     let found = layered
         .without_finite_strain()
@@ -237,16 +232,7 @@ fn one_load_is_answered_by_the_most_general_law() {
 /// compliance that belongs to the answer is found everywhere.
 #[test]
 fn balls_of_every_stiffness_and_size_invert_on_layers() {
-    let guides = [
-        waveguide(),
-        Waveguide::new(vec![Layer {
-            thickness_m: 4e-3,
-            youngs_modulus_pa: 50e3,
-            poisson_ratio: 0.495,
-        }])
-        .unwrap(),
-    ];
-    for guide in &guides {
+    for guide in &[waveguide(), guide(&[[4e-3, 50e3]], 0.495)] {
         for radius in [3e-3, 10e-3, 20e-3] {
             let estimator = SphereOnWaveguide::new(radius, NU, guide, Bond::Bonded)
                 .unwrap()

@@ -24,18 +24,20 @@ fn exact(x: f64) -> Estimate {
     Estimate::exact(x)
 }
 
+/// Layers of thicknesses and moduli.
+fn guide(layers: &[[f64; 2]], poisson_ratio: f64) -> Waveguide {
+    let layers = layers
+        .iter()
+        .map(|&[thickness_m, youngs_modulus_pa]| Layer {
+            thickness_m,
+            youngs_modulus_pa,
+            poisson_ratio,
+        });
+    Waveguide::new(layers.collect()).unwrap()
+}
+
 fn waveguide() -> Waveguide {
-    let layer = |thickness_m, youngs_modulus_pa| Layer {
-        thickness_m,
-        youngs_modulus_pa,
-        poisson_ratio: 0.5,
-    };
-    Waveguide::new(vec![
-        layer(2e-3, 1.36e5),
-        layer(3e-3, 8.0e4),
-        layer(5e-3, 3.4e4),
-    ])
-    .unwrap()
+    guide(&[[2e-3, 1.36e5], [3e-3, 8.0e4], [5e-3, 3.4e4]], 0.5)
 }
 
 fn reduced() -> f64 {
