@@ -9,7 +9,7 @@
 //! Residuals that follow one another (the sign of a wrong law) widen them.
 
 use crate::contact::{Bond, Waveguide};
-use crate::error::{ElasticityError, Quantity, finite, poisson};
+use crate::error::{ElasticityError, Quantity, poisson};
 pub use crate::modulus::SelectionReason;
 use crate::modulus::{
     ConeLaw, ContactLaw, EstimatorKind, FitStatistics, HertzLaw, LayerLaw, LayerTheory, NoSlipLaw,
@@ -100,6 +100,15 @@ impl IndentationCurve {
             self.position_m[0],
             self.position_m[self.position_m.len() - 1],
         )
+    }
+
+    fn unreachable(&self) -> ElasticityError {
+        let (first, last) = self.span();
+        ElasticityError::OutOfRange {
+            quantity: Quantity::Indentation,
+            found: last - first,
+            limit: 0.0,
+        }
     }
 }
 
@@ -273,12 +282,8 @@ pub fn fit_curve(
     model: EstimatorKind,
     options: &CurveOptions,
 ) -> Result<CurveFit, ElasticityError> {
-    let unreachable = ElasticityError::OutOfRange {
-        quantity: Quantity::Indentation,
-        found: curve.span().1 - curve.span().0,
-        limit: 0.0,
-    };
-    let law = indenter.law(model, poisson(nu)?)?.ok_or(unreachable)?;
+    let law = indenter.law(model, poisson(nu)?)?;
+    let law = law.ok_or(curve.unreachable())?;
     let solve = |offset: bool| {
         let problem = Problem {
             curve,
@@ -304,14 +309,9 @@ pub fn fit_curve(
 fn solve(problem: &Problem<'_>, contact: ContactPoint) -> Result<Profile, ElasticityError> {
     let best = match contact {
         ContactPoint::Search => problem.best(),
-        ContactPoint::At(z) => problem.at(finite(z, Quantity::Indentation)?),
+        ContactPoint::At(z) => problem.at(Quantity::Indentation.finite(z)?),
     };
-    let (first, last) = problem.curve.span();
-    best.ok_or(ElasticityError::OutOfRange {
-        quantity: Quantity::Indentation,
-        found: last - first,
-        limit: 0.0,
-    })
+    best.ok_or(problem.curve.unreachable())
 }
 
 /// n ln(S₀/S₁) > ln n.
@@ -390,14 +390,16 @@ fn widened((lower, upper): (f64, f64), modulus: f64, model_error: f64) -> (f64, 
 }
 
 fn force(law: &dyn ContactLaw, p: &Profile, z: f64) -> f64 {
-    let d = z - p.contact_m;
-    let pressed = if d > 0.0 {
-        law.log_force_at_indentation(d, 0.0)
-            .map_or(f64::NAN, |l| l.value.exp())
+    p.offset + p.modulus * shape(law, z - p.contact_m).unwrap_or(f64::NAN)
+}
+
+/// f of an indentation, zero before contact. None where the law does not reach so far.
+fn shape(law: &dyn ContactLaw, indentation: f64) -> Option<f64> {
+    if indentation > 0.0 {
+        Some(law.log_force_at_indentation(indentation, 0.0)?.value.exp())
     } else {
-        0.0
-    };
-    p.offset + p.modulus * pressed
+        Some(0.0)
+    }
 }
 
 /// Lag-one autocorrelation.
@@ -492,17 +494,8 @@ const DOWN_TO_ROUNDING: usize = 70;
 impl Problem<'_> {
     /// f(z − z₀) of every point. None where the law does not reach so far.
     fn shape(&self, contact: f64) -> Option<Vec<f64>> {
-        let of = |z: &f64| {
-            let d = z - contact;
-            if d > 0.0 {
-                self.law
-                    .log_force_at_indentation(d, 0.0)
-                    .map(|l| l.value.exp())
-            } else {
-                Some(0.0)
-            }
-        };
-        self.curve.position_m().iter().map(of).collect()
+        let positions = self.curve.position_m().iter();
+        positions.map(|z| shape(self.law, z - contact)).collect()
     }
 
     /// Minimum over offset and modulus.
@@ -852,7 +845,16 @@ pub fn select_model(
         Model::Named(kind) => vec![kind],
         Model::Auto => indenter.candidates(),
     };
-    let fits = fit_each(curve, indenter, nu, &candidates, options)?;
+    let mut errors = Vec::new();
+    let mut fitted = |kind| {
+        let fit = fit_curve(curve, indenter, nu, kind, options);
+        fit.map_err(|error| errors.push(error)).ok()
+    };
+    let fits: Vec<CurveFit> = candidates.into_iter().filter_map(&mut fitted).collect();
+    if fits.is_empty() {
+        // Of the most general law: there is a candidate at least.
+        return Err(errors.swap_remove(0));
+    }
     let criteria: Vec<f64> = fits.iter().map(|f| f.statistics.aicc).collect();
     let (order, reason) = rank(&criteria);
     let reason = if matches!(model, Model::Named(_)) {
@@ -866,30 +868,4 @@ pub fn select_model(
         weights,
         reason,
     })
-}
-
-/// The fits of the laws that can be fitted. The first error where none can.
-fn fit_each(
-    curve: &IndentationCurve,
-    indenter: &Indenter,
-    nu: f64,
-    candidates: &[EstimatorKind],
-    options: &CurveOptions,
-) -> Result<Vec<CurveFit>, ElasticityError> {
-    let mut first_error = None;
-    let mut fits = Vec::new();
-    for &kind in candidates {
-        match fit_curve(curve, indenter, nu, kind, options) {
-            Ok(fit) => fits.push(fit),
-            Err(e) => first_error = first_error.or(Some(e)),
-        }
-    }
-    if fits.is_empty() {
-        let missing = ElasticityError::TooFewLoads {
-            expected: FEWEST_POINTS,
-            found: 0,
-        };
-        return Err(first_error.unwrap_or(missing));
-    }
-    Ok(fits)
 }

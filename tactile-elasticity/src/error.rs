@@ -214,8 +214,6 @@ impl ElasticityError {
 #[allow(missing_docs)]
 pub enum Quantity {
     DeformationGradient,
-    DisplacementGradient,
-    Stress,
     Strain,
     Force,
     ContactRadius,
@@ -233,7 +231,6 @@ pub enum Quantity {
     Correlation,
     DegreesOfFreedom,
     Weight,
-    Confidence,
     Layers,
     Samples,
     PoissonRatio,
@@ -244,8 +241,6 @@ impl core::fmt::Display for Quantity {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         f.write_str(match self {
             Self::DeformationGradient => "deformation gradient",
-            Self::DisplacementGradient => "displacement gradient",
-            Self::Stress => "stress",
             Self::Strain => "strain",
             Self::Force => "force",
             Self::ContactRadius => "contact radius",
@@ -263,7 +258,6 @@ impl core::fmt::Display for Quantity {
             Self::Correlation => "correlation",
             Self::DegreesOfFreedom => "degrees of freedom",
             Self::Weight => "weight",
-            Self::Confidence => "confidence level",
             Self::Layers => "layers",
             Self::Samples => "samples",
             Self::PoissonRatio => "Poisson ratio",
@@ -320,21 +314,6 @@ impl Quantity {
             Err(ElasticityError::NotFinite { quantity: self })
         }
     }
-}
-
-/// `value` if it is finite and above zero.
-pub(crate) fn positive(value: f64, quantity: Quantity) -> Result<f64, ElasticityError> {
-    quantity.positive(value)
-}
-
-/// `value` if it is finite and not below zero.
-pub(crate) fn not_negative(value: f64, quantity: Quantity) -> Result<f64, ElasticityError> {
-    quantity.not_negative(value)
-}
-
-/// `value` if it is finite.
-pub(crate) fn finite(value: f64, quantity: Quantity) -> Result<f64, ElasticityError> {
-    quantity.finite(value)
 }
 
 /// `value` if it is a Poisson ratio in (−1, ½].

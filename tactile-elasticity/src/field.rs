@@ -1,6 +1,6 @@
 //! Strain at many points: its mean, spread and error.
 
-use crate::error::{ElasticityError, Quantity, not_negative, positive};
+use crate::error::{ElasticityError, Quantity};
 use crate::strain::{Deformation, StrainMeasure};
 use nalgebra::{Matrix3, Matrix6, Point3, SMatrix, Vector3};
 
@@ -130,7 +130,10 @@ impl StrainField {
         match weights {
             None => self.weights.resize(gradients.len(), 1.0),
             Some(weights) => {
-                check_weights(gradients.len(), weights)?;
+                check_length(gradients.len(), weights)?;
+                for &weight in weights {
+                    Quantity::Weight.not_negative(weight)?;
+                }
                 self.weights.extend_from_slice(weights);
             }
         }
@@ -229,18 +232,15 @@ impl StrainField {
     }
 }
 
-fn check_weights(n: usize, weights: &[f64]) -> Result<(), ElasticityError> {
-    if weights.len() != n {
-        return Err(ElasticityError::LengthMismatch {
-            quantity: Quantity::Weight,
-            expected: n,
-            found: weights.len(),
-        });
+fn check_length(expected: usize, weights: &[f64]) -> Result<(), ElasticityError> {
+    if weights.len() == expected {
+        return Ok(());
     }
-    for &w in weights {
-        not_negative(w, Quantity::Weight)?;
-    }
-    Ok(())
+    Err(ElasticityError::LengthMismatch {
+        quantity: Quantity::Weight,
+        expected,
+        found: weights.len(),
+    })
 }
 
 /// How a field is averaged.
@@ -334,33 +334,6 @@ fn centre_and_spread(values: &[f64], weights: &[f64], how: Averaging) -> (f64, f
 // Order of the components in covariances of strain: xx, yy, zz, xy, xz, yz.
 const PAIRS: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)];
 
-/// Covariance of the Green–Lagrange strain (xx, yy, zz, xy, xz, yz) from that of H, whose nine
-/// entries are taken column by column.
-///
-/// ```
-/// use nalgebra::{Matrix3, SMatrix};
-/// use tactile_elasticity::field::strain_covariance;
-///
-/// // Small strains: xx follows its own entry, xy the mean of two.
-/// let covariance = strain_covariance(
-///     &Matrix3::zeros(),
-///     &(SMatrix::<f64, 9, 9>::identity() * 1e-8),
-/// );
-/// assert_eq!((covariance[(0, 0)], covariance[(3, 3)]), (1e-8, 0.5e-8));
-/// ```
-pub fn strain_covariance(gradient: &Matrix3<f64>, covariance: &SMatrix<f64, 9, 9>) -> Matrix6<f64> {
-    let f = gradient + Matrix3::identity();
-    let half: f64 = 0.5;
-    // ∂E_ab/∂H_kl = ½(δ_bl F_ka + δ_al F_kb)
-    let jacobian = SMatrix::<f64, 6, 9>::from_fn(|row, column| {
-        let ((a, b), (k, l)) = (PAIRS[row], (column % 3, column / 3));
-        let first = if b == l { f[(k, a)] } else { 0.0 };
-        let second = if a == l { f[(k, b)] } else { 0.0 };
-        (first + second) * half
-    });
-    jacobian * covariance * jacobian.transpose()
-}
-
 /// Covariance of the weighted mean Green–Lagrange strain (xx, yy, zz, xy, xz, yz).
 ///
 /// `gradients` and `weights` are those of the sample points i. `influence(i, j)` is aᵢⱼ, how the
@@ -389,16 +362,9 @@ pub fn mean_strain_covariance(
     influence: impl Fn(usize, usize) -> Vector3<f64>,
     displacement_covariance: &[Matrix3<f64>],
 ) -> Result<Matrix6<f64>, ElasticityError> {
-    if weights.len() != gradients.len() {
-        let (expected, found) = (gradients.len(), weights.len());
-        return Err(ElasticityError::LengthMismatch {
-            quantity: Quantity::Weight,
-            expected,
-            found,
-        });
-    }
+    check_length(gradients.len(), weights)?;
     let total = weights.iter().fold(0.0, |s, &w| s + w);
-    positive(total, Quantity::Weight)?;
+    Quantity::Weight.positive(total)?;
     let half: f64 = 0.5;
     let mut sum = Matrix6::zeros();
     for (j, sigma) in displacement_covariance.iter().enumerate() {

@@ -27,7 +27,7 @@
 //! Assoc. 90 (1995) 773. R. B. Davies, Biometrika 74 (1987) 33: a time constant that has no meaning
 //! where nothing relaxes makes the likelihood ratio larger than χ².
 
-use crate::error::{ElasticityError, Quantity, not_negative, positive};
+use crate::error::{ElasticityError, Quantity};
 use crate::numerics::golden_section;
 use nalgebra::{Matrix3, Vector3};
 use tactile_core::{Estimate, Interval, statistics::quantile_95};
@@ -227,8 +227,8 @@ pub fn time_dependence(
     scale_error: f64,
     law_error: f64,
 ) -> Result<TimeDependence, ElasticityError> {
-    let scale_error = not_negative(scale_error, Quantity::StandardError)?;
-    let law_error = not_negative(law_error, Quantity::StandardError)?;
+    let scale_error = Quantity::StandardError.not_negative(scale_error)?;
+    let law_error = Quantity::StandardError.not_negative(law_error)?;
     let times = checked_times(moduli)?;
     if times < 2 {
         return Ok(TimeDependence::Steady);
@@ -279,13 +279,10 @@ fn checked_times(moduli: &[TimedModulus]) -> Result<usize, ElasticityError> {
     let mut different = 0;
     let mut before_s = f64::NEG_INFINITY;
     for (load, modulus) in moduli.iter().enumerate() {
-        let found_s = not_negative(modulus.time_s, Quantity::Time)?;
-        positive(modulus.force_n, Quantity::Force)?;
-        positive(modulus.youngs_modulus_pa.value, Quantity::YoungsModulus)?;
-        positive(
-            modulus.youngs_modulus_pa.standard_error,
-            Quantity::StandardError,
-        )?;
+        let found_s = Quantity::Time.not_negative(modulus.time_s)?;
+        Quantity::Force.positive(modulus.force_n)?;
+        Quantity::YoungsModulus.positive(modulus.youngs_modulus_pa.value)?;
+        Quantity::StandardError.positive(modulus.youngs_modulus_pa.standard_error)?;
         if found_s < before_s {
             return Err(ElasticityError::TimeDecreases {
                 load,

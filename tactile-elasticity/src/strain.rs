@@ -12,7 +12,7 @@
 //! | [`Infinitesimal`] | ½(H + Hᵀ) | λ − 1 |
 
 use crate::error::{ElasticityError, Quantity};
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Matrix3;
 use std::sync::Arc;
 
 /// A way to measure strain: a symmetric tensor that vanishes when the material only moves and turns
@@ -188,15 +188,13 @@ impl StrainMeasure for EulerAlmansi {
             .inverse()
             .ok_or(ElasticityError::SingularDeformation)?;
         let e = deformation.green_lagrange();
-        let quarter: f64 = 0.25;
-        let small = e.iter().all(|x| x.abs() < quarter);
-        let half: f64 = 0.5;
+        let small = e.iter().all(|x| x.abs() < 0.25);
         let strain = if small {
             inverse.transpose() * e * inverse
         } else {
-            (Matrix3::identity() - inverse.transpose() * inverse) * half
+            (Matrix3::identity() - inverse.transpose() * inverse) * 0.5
         };
-        Ok((strain + strain.transpose()) * half)
+        Ok((strain + strain.transpose()) * 0.5)
     }
 
     fn name(&self) -> &'static str {
@@ -390,25 +388,20 @@ impl Deformation {
     }
 
     fn green_lagrange_double_double(&self) -> Matrix3<f64> {
-        let half: f64 = 0.5;
         let mut e = Matrix3::zeros();
         for i in 0..3 {
             for j in i..3 {
-                let m = if self.given == Given::F {
-                    &self.f
-                } else {
-                    &self.h
+                let column = |m: &Matrix3<f64>| {
+                    (0..3).fold(DoubleDouble::zero(), |sum, k| {
+                        sum.add_product(m[(k, i)], m[(k, j)])
+                    })
                 };
-                let mut sum = DoubleDouble::zero();
-                for k in 0..3 {
-                    sum = sum.add_product(m[(k, i)], m[(k, j)]);
-                }
-                sum = match self.given {
-                    Given::H => sum.add(m[(i, j)]).add(m[(j, i)]),
-                    Given::F if i == j => sum.add(-1.0),
-                    Given::F => sum,
+                let sum = match self.given {
+                    Given::H => column(&self.h).add(self.h[(i, j)]).add(self.h[(j, i)]),
+                    Given::F if i == j => column(&self.f).add(-1.0),
+                    Given::F => column(&self.f),
                 };
-                e[(i, j)] = half * sum.value();
+                e[(i, j)] = 0.5 * sum.value();
                 e[(j, i)] = e[(i, j)];
             }
         }
@@ -419,10 +412,9 @@ impl Deformation {
 /// ½(H + Hᵀ + HᵀH) in working precision.
 #[inline(always)]
 fn green_lagrange_plain(h: &Matrix3<f64>) -> Matrix3<f64> {
-    let half: f64 = 0.5;
     let term = |i: usize, j: usize| {
         let product = h[(0, i)] * h[(0, j)] + h[(1, i)] * h[(1, j)] + h[(2, i)] * h[(2, j)];
-        half * ((h[(i, j)] + h[(j, i)]) + product)
+        0.5 * ((h[(i, j)] + h[(j, i)]) + product)
     };
     let (xx, yy, zz) = (term(0, 0), term(1, 1), term(2, 2));
     let (xy, xz, yz) = (term(0, 1), term(0, 2), term(1, 2));
@@ -572,10 +564,9 @@ impl From<&Deformation> for PrincipalStretches {
     /// digit of a tiny stretch.
     fn from(deformation: &Deformation) -> Self {
         let e = deformation.green_lagrange();
-        let quarter: f64 = 0.25;
         let largest = e.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
         // |eigenvalue| ≤ 3 max |e|: within this bound C is between ½I and 3⁄2 I.
-        if largest * 3.0 <= quarter {
+        if largest * 3.0 <= 0.25 {
             Self::from_small_strain(&e)
         } else {
             Self::from_singular_values(deformation)
@@ -586,21 +577,19 @@ impl From<&Deformation> for PrincipalStretches {
 impl PrincipalStretches {
     fn from_small_strain(e: &Matrix3<f64>) -> Self {
         let (values, directions) = symmetric_eigen(e);
-        let two: f64 = 2.0;
-        let elongation = |x: f64| two * x / (1.0 + (1.0 + two * x).sqrt());
+        let elongation = |x: f64| 2.0 * x / (1.0 + (1.0 + 2.0 * x).sqrt());
         let elongations = values.map(elongation);
         Self {
             stretches: elongations.map(|x| 1.0 + x),
             elongations,
-            logarithms: values.map(|x| (two * x).ln_1p() / two),
+            logarithms: values.map(|x| (2.0 * x).ln_1p() / 2.0),
             directions,
         }
     }
 
     fn from_singular_values(deformation: &Deformation) -> Self {
         let (mut s, directions) = one_sided_jacobi(&deformation.deformation_gradient());
-        let thousandth: f64 = 1e-3;
-        if s[2] < s[0] * thousandth && s[1] > 0.0 {
+        if s[2] < s[0] * 1e-3 && s[1] > 0.0 {
             // λ₁λ₂λ₃ = |J|, and J is accurate to its last digit.
             s[2] = deformation.jacobian().abs() / s[0] / s[1];
         }
@@ -614,28 +603,14 @@ impl PrincipalStretches {
 
     /// Σ gᵢ vᵢ vᵢᵀ.
     fn compose(&self, g: [f64; 3]) -> Matrix3<f64> {
-        let mut sum = Matrix3::zeros();
-        for (i, &gi) in g.iter().enumerate() {
-            let v: Vector3<f64> = self.directions.column(i).into();
-            for r in 0..3 {
-                for c in r..3 {
-                    sum[(r, c)] += gi * v[r] * v[c];
-                }
-            }
-        }
-        for r in 0..3 {
-            for c in 0..r {
-                sum[(r, c)] = sum[(c, r)];
-            }
-        }
-        sum
+        let sum = self.directions * Matrix3::from_diagonal(&g.into()) * self.directions.transpose();
+        (sum + sum.transpose()) * 0.5
     }
 }
 
 /// Rotation (c, s) that makes the off-diagonal of [[app, apq], [apq, aqq]] vanish.
 fn jacobi_rotation(app: f64, aqq: f64, apq: f64) -> (f64, f64, f64) {
-    let two: f64 = 2.0;
-    let theta = (aqq - app) / (two * apq);
+    let theta = (aqq - app) / (2.0 * apq);
     let t = 1.0 / (theta.abs() + (theta * theta + 1.0).sqrt());
     let t = if theta < 0.0 { -t } else { t };
     let c = 1.0 / (t * t + 1.0).sqrt();
@@ -719,31 +694,6 @@ fn sorted(values: [f64; 3], v: Matrix3<f64>) -> ([f64; 3], Matrix3<f64>) {
     (order.map(|i| values[i]), Matrix3::from_columns(&columns))
 }
 
-/// Principal values, largest first, and their directions.
-///
-/// ```
-/// use nalgebra::Matrix3;
-/// use tactile_elasticity::strain::PrincipalValues;
-/// let shear = Matrix3::new(0.0, 0.5, 0.0, 0.5, 0.0, 0.0, 0.0, 0.0, 0.0);
-/// assert_eq!(PrincipalValues::from(&shear).values, [0.5, 0.0, -0.5]);
-/// ```
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize))]
-pub struct PrincipalValues {
-    /// The eigenvalues, largest first.
-    pub values: [f64; 3],
-    /// Column i is the direction of value i, of length 1.
-    pub directions: Matrix3<f64>,
-}
-
-impl From<&Matrix3<f64>> for PrincipalValues {
-    /// Of a symmetric tensor.
-    fn from(tensor: &Matrix3<f64>) -> Self {
-        let (values, directions) = symmetric_eigen(tensor);
-        Self { values, directions }
-    }
-}
-
 /// I₁ = tr A, I₂ = ½(tr² A − tr A²), I₃ = det A.
 ///
 /// ```
@@ -775,30 +725,14 @@ impl From<&Matrix3<f64>> for Invariants {
     }
 }
 
-/// Equivalent strain √(⅔ dev A : dev A), dev A = A − ⅓ tr A I.
-///
-/// The form conjugate to the von Mises stress of an incompressible solid. The other one in use,
-/// √(3⁄2 e:e)/(1 + ν), is the same at ν = ½ only.
-///
-/// ```
-/// use nalgebra::{Matrix3, Vector3};
-/// use tactile_elasticity::strain::von_mises_strain;
-/// let isochoric = Matrix3::from_diagonal(&Vector3::new(0.02, -0.01, -0.01));
-/// assert!((von_mises_strain(&isochoric) - 0.02f64).abs() < 1e-17);
-/// ```
-pub fn von_mises_strain(a: &Matrix3<f64>) -> f64 {
-    scaled_norm(&deviator(a), 2.0 / 3.0)
-}
-
 /// A − ⅓ tr A I.
 pub fn deviator(a: &Matrix3<f64>) -> Matrix3<f64> {
     // Differences of the diagonal: exact where its entries are close, and zero for c·I.
-    let third: f64 = 1.0 / 3.0;
     let (x, y, z) = (a[(0, 0)], a[(1, 1)], a[(2, 2)]);
     let mut dev = *a;
-    dev[(0, 0)] = ((x - y) + (x - z)) * third;
-    dev[(1, 1)] = ((y - x) + (y - z)) * third;
-    dev[(2, 2)] = ((z - x) + (z - y)) * third;
+    dev[(0, 0)] = ((x - y) + (x - z)) * (1.0 / 3.0);
+    dev[(1, 1)] = ((y - x) + (y - z)) * (1.0 / 3.0);
+    dev[(2, 2)] = ((z - x) + (z - y)) * (1.0 / 3.0);
     dev
 }
 

@@ -4,7 +4,7 @@
 //! τ : d. Equation (31) divides components of one pair: the second Piola–Kirchhoff stress by
 //! Green–Lagrange strain.
 
-use crate::error::{ElasticityError, Quantity, poisson, positive};
+use crate::error::{ElasticityError, Quantity, poisson};
 use crate::strain::{Biot, Deformation, StrainMeasure, deviator, scaled_norm, upright};
 use nalgebra::Matrix3;
 
@@ -155,7 +155,7 @@ pub fn saint_venant_kirchhoff(
     youngs_modulus_pa: f64,
     poisson_ratio: f64,
 ) -> Result<Matrix3<f64>, ElasticityError> {
-    positive(youngs_modulus_pa, Quantity::YoungsModulus)?;
+    Quantity::YoungsModulus.positive(youngs_modulus_pa)?;
     let found = poisson(poisson_ratio)?;
     if found == 0.5 {
         return Err(ElasticityError::PoissonRatio { found });

@@ -2,7 +2,7 @@
 use super::hertz::hertz_surface_displacement_m;
 use super::layers::{Bond, LayerKernel};
 use super::waveguide::Waveguide;
-use crate::error::{ElasticityError, Quantity, positive};
+use crate::error::{ElasticityError, Quantity};
 
 /// Depth in metres to which a ball's contact presses the surface of layers at each distance from
 /// its centre.
@@ -39,8 +39,8 @@ pub fn depression_m(
     contact_radius_m: f64,
     distances_m: &[f64],
 ) -> Result<Vec<f64>, ElasticityError> {
-    let force = positive(force_n, Quantity::Force)?;
-    let a = positive(contact_radius_m, Quantity::ContactRadius)?;
+    let force = Quantity::Force.positive(force_n)?;
+    let a = Quantity::ContactRadius.positive(contact_radius_m)?;
     let kernel = LayerKernel::of_layers(guide, bond)?;
     if distances_m.iter().any(|r| !r.is_finite()) {
         return Err(ElasticityError::NotFinite {

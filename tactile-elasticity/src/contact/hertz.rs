@@ -1,6 +1,6 @@
 //! Hertz's contact of two elastic bodies with spherical surfaces.
 
-use crate::error::{ElasticityError, Quantity, finite, not_negative, poisson, positive};
+use crate::error::{ElasticityError, Quantity, poisson};
 use std::f64::consts::PI;
 
 /// A sphere pressed with a known force (Johnson 1985, *Contact Mechanics*, §4.2).
@@ -47,16 +47,11 @@ impl HertzContact {
         radius_m: f64,
         reduced_modulus_pa: f64,
     ) -> Result<Self, ElasticityError> {
-        not_negative(force_n, Quantity::Force)?;
-        positive(radius_m, Quantity::Radius)?;
-        positive(reduced_modulus_pa, Quantity::ReducedModulus)?;
-        let three_quarters: f64 = 0.75;
-        let a = (three_quarters * force_n / reduced_modulus_pa * radius_m).cbrt();
-        let mean = if a > 0.0 {
-            force_n / a / a / std::f64::consts::PI
-        } else {
-            0.0
-        };
+        Quantity::Force.not_negative(force_n)?;
+        Quantity::Radius.positive(radius_m)?;
+        Quantity::ReducedModulus.positive(reduced_modulus_pa)?;
+        let a = (0.75 * force_n / reduced_modulus_pa * radius_m).cbrt();
+        let mean = if a > 0.0 { force_n / a / a / PI } else { 0.0 };
         Ok(Self {
             force_n,
             radius_m,
@@ -121,26 +116,24 @@ pub fn hertz_surface_displacement_m(
         return 0.0;
     }
     let unit = peak_pressure_pa * a / reduced_modulus_pa;
-    let two: f64 = 2.0;
     if r <= a {
         let x = r / a;
-        return unit * std::f64::consts::FRAC_PI_4 * (two - x * x);
+        return unit * std::f64::consts::FRAC_PI_4 * (2.0 - x * x);
     }
-    let half: f64 = 0.5;
     let x = a / r;
-    if x > half {
+    if x > 0.5 {
         let y = r / a;
         let chord = ((r - a) / a * ((r + a) / a)).sqrt();
         // asin(a/r) through its tangent: near the rim a/r has lost what r − a keeps.
-        return unit * half * ((two - y * y) * 1f64.atan2(chord) + chord);
+        return unit * 0.5 * ((2.0 - y * y) * 1f64.atan2(chord) + chord);
     }
-    unit * half * far_series(x)
+    unit * 0.5 * far_series(x)
 }
 
 fn far_series(x: f64) -> f64 {
     let (mut power, mut b, mut sum) = (x, 1.0, 0.0);
     for k in 0..40 {
-        let k: f64 = f64::from(k);
+        let k = f64::from(k);
         let odd = k + k + 1.0;
         let term = b * power * 4.0 / (odd * (odd + 2.0));
         sum += term;
@@ -151,55 +144,6 @@ fn far_series(x: f64) -> f64 {
         power *= x * x;
     }
     sum
-}
-
-/// E* = 3FR/(4a³) from a force (N) and the contact radius (m) it makes.
-///
-/// # Errors
-/// [`ElasticityError::NotPositive`].
-///
-/// ```
-/// use tactile_elasticity::contact::{HertzContact, reduced_modulus_from_contact_radius};
-///
-/// let contact = HertzContact::from_force(1e-3_f64, 5e-3, 50e3)?;
-/// let back = reduced_modulus_from_contact_radius(1e-3, 5e-3, contact.contact_radius_m)?;
-/// assert!((back - 50e3).abs() < 1e-9);
-/// # Ok::<(), tactile_elasticity::ElasticityError>(())
-/// ```
-pub fn reduced_modulus_from_contact_radius(
-    force_n: f64,
-    radius_m: f64,
-    contact_radius_m: f64,
-) -> Result<f64, ElasticityError> {
-    positive(force_n, Quantity::Force)?;
-    positive(radius_m, Quantity::Radius)?;
-    positive(contact_radius_m, Quantity::ContactRadius)?;
-    let a = contact_radius_m;
-    Ok(0.75 * (force_n / a) / a * (radius_m / a))
-}
-
-/// E* = 3F/(4√R δ^{3⁄2}) from a force (N) and the indentation (m) it makes.
-///
-/// # Errors
-/// [`ElasticityError::NotPositive`].
-///
-/// ```
-/// use tactile_elasticity::contact::{HertzContact, reduced_modulus_from_indentation};
-///
-/// let contact = HertzContact::from_force(1e-3_f64, 5e-3, 50e3)?;
-/// let back = reduced_modulus_from_indentation(1e-3, 5e-3, contact.indentation_m)?;
-/// assert!((back - 50e3).abs() < 1e-9);
-/// # Ok::<(), tactile_elasticity::ElasticityError>(())
-/// ```
-pub fn reduced_modulus_from_indentation(
-    force_n: f64,
-    radius_m: f64,
-    indentation_m: f64,
-) -> Result<f64, ElasticityError> {
-    positive(force_n, Quantity::Force)?;
-    positive(radius_m, Quantity::Radius)?;
-    positive(indentation_m, Quantity::Indentation)?;
-    Ok(0.75 * (force_n / indentation_m) / (radius_m * indentation_m).sqrt())
 }
 
 /// An isotropic elastic body, or a rigid one.
@@ -224,7 +168,7 @@ impl Body {
     /// # Errors
     /// [`ElasticityError::NotPositive`], [`ElasticityError::PoissonRatio`].
     pub fn elastic(youngs_modulus_pa: f64, poisson_ratio: f64) -> Result<Self, ElasticityError> {
-        positive(youngs_modulus_pa, Quantity::YoungsModulus)?;
+        Quantity::YoungsModulus.positive(youngs_modulus_pa)?;
         poisson(poisson_ratio)?;
         Ok(Self {
             compliance_per_pa: (1.0 - poisson_ratio) * (1.0 + poisson_ratio) / youngs_modulus_pa,
@@ -261,7 +205,7 @@ impl Body {
 /// ```
 pub fn reduced_modulus_pa(one: Body, other: Body) -> Result<f64, ElasticityError> {
     let compliance = one.compliance_per_pa + other.compliance_per_pa;
-    positive(compliance, Quantity::ReducedModulus)?;
+    Quantity::ReducedModulus.positive(compliance)?;
     Ok(1.0 / compliance)
 }
 
@@ -283,7 +227,7 @@ pub fn reduced_modulus_pa(one: Body, other: Body) -> Result<f64, ElasticityError
 /// ```
 pub fn relative_radius_m(one: Option<f64>, other: Option<f64>) -> Result<f64, ElasticityError> {
     for radius in [one, other].into_iter().flatten() {
-        let radius = finite(radius, Quantity::Radius)?;
+        let radius = Quantity::Radius.finite(radius)?;
         if radius == 0.0 {
             return Err(ElasticityError::NotPositive {
                 quantity: Quantity::Radius,
@@ -317,43 +261,6 @@ pub fn relative_radius_m(one: Option<f64>, other: Option<f64>) -> Result<f64, El
             curvature_per_m: 1.0 / radius,
         })
     }
-}
-
-/// Young's modulus (Pa) of one body from E* and the other body: E = (1 − ν²)/(1/E* − (1 − ν₁²)/E₁).
-///
-/// # Errors
-/// [`ElasticityError::StifferThanResolvable`] where the other body alone is already softer than the
-/// contact. [`ElasticityError::NotPositive`], [`ElasticityError::PoissonRatio`].
-///
-/// ```
-/// use tactile_elasticity::{
-///     ElasticityError,
-///     contact::{Body, sample_modulus_pa},
-/// };
-/// let waveguide = Body::elastic(100e3, 0.48)?;
-/// let soft = sample_modulus_pa(50e3, 0.48, waveguide)?;
-/// assert!(soft > 50e3);
-/// assert!(matches!(
-///     sample_modulus_pa(150e3, 0.48, waveguide),
-///     Err(ElasticityError::StifferThanResolvable { .. })
-/// ));
-/// # Ok::<(), ElasticityError>(())
-/// ```
-pub fn sample_modulus_pa(
-    reduced_modulus_pa: f64,
-    poisson_ratio: f64,
-    other: Body,
-) -> Result<f64, ElasticityError> {
-    positive(reduced_modulus_pa, Quantity::ReducedModulus)?;
-    poisson(poisson_ratio)?;
-    // 1/E* − C = (1 − C E*)/E*, the product rounded once.
-    let left = (-other.compliance_per_pa).mul_add(reduced_modulus_pa, 1.0);
-    if left <= 0.0 {
-        return Err(ElasticityError::StifferThanResolvable {
-            lower_bound_pa: None,
-        });
-    }
-    Ok((1.0 - poisson_ratio) * (1.0 + poisson_ratio) * reduced_modulus_pa / left)
 }
 
 /// A flat circular punch: F = 2E*aδ.
@@ -391,13 +298,13 @@ pub fn flat_punch(
     radius_m: f64,
     indentation_m: f64,
 ) -> Result<PunchContact, ElasticityError> {
-    positive(reduced_modulus_pa, Quantity::ReducedModulus)?;
-    positive(radius_m, Quantity::Radius)?;
-    not_negative(indentation_m, Quantity::Indentation)?;
+    Quantity::ReducedModulus.positive(reduced_modulus_pa)?;
+    Quantity::Radius.positive(radius_m)?;
+    Quantity::Indentation.not_negative(indentation_m)?;
     let force_n = 2.0 * reduced_modulus_pa * radius_m * indentation_m;
     Ok(PunchContact {
         force_n,
-        mean_pressure_pa: force_n / radius_m / radius_m / std::f64::consts::PI,
+        mean_pressure_pa: force_n / radius_m / radius_m / PI,
     })
 }
 
@@ -443,9 +350,9 @@ pub fn cone(
     half_angle_tangent: f64,
     indentation_m: f64,
 ) -> Result<ConeContact, ElasticityError> {
-    positive(reduced_modulus_pa, Quantity::ReducedModulus)?;
-    positive(half_angle_tangent, Quantity::HalfAngle)?;
-    not_negative(indentation_m, Quantity::Indentation)?;
+    Quantity::ReducedModulus.positive(reduced_modulus_pa)?;
+    Quantity::HalfAngle.positive(half_angle_tangent)?;
+    Quantity::Indentation.not_negative(indentation_m)?;
     let slope = half_angle_tangent * indentation_m * std::f64::consts::FRAC_2_PI;
     Ok(ConeContact {
         force_n: reduced_modulus_pa * slope * indentation_m,
@@ -469,22 +376,20 @@ pub fn cone(
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
 /// ```
 pub fn tangent_of_degrees(degrees: f64) -> Result<f64, ElasticityError> {
-    let found = positive(degrees, Quantity::HalfAngle)?;
-    let right: f64 = 90.0;
-    if degrees >= right {
+    let found = Quantity::HalfAngle.positive(degrees)?;
+    if degrees >= 90.0 {
         return Err(ElasticityError::OutOfRange {
             quantity: Quantity::HalfAngle,
             found,
             limit: 90.0,
         });
     }
-    let radian = std::f64::consts::PI / 180.0;
-    let half: f64 = 45.0;
+    let radian = PI / 180.0;
     // 90° − α is exact from 45° on.
-    Ok(if degrees <= half {
+    Ok(if degrees <= 45.0 {
         (degrees * radian).tan()
     } else {
-        1.0 / ((right - degrees) * radian).tan()
+        1.0 / ((90.0 - degrees) * radian).tan()
     })
 }
 
@@ -517,9 +422,9 @@ pub fn tatara_indentation_m(
     radius_m: f64,
     poisson_ratio: f64,
 ) -> Result<f64, ElasticityError> {
-    let a = not_negative(contact_radius_m, Quantity::ContactRadius)?;
+    let a = Quantity::ContactRadius.not_negative(contact_radius_m)?;
     let squeeze = Squeeze::new(
-        positive(radius_m, Quantity::Radius)?,
+        Quantity::Radius.positive(radius_m)?,
         poisson(poisson_ratio)?,
         1.0,
     );

@@ -11,7 +11,7 @@
 //! exponentially.
 
 use super::Waveguide;
-use crate::error::{ElasticityError, Quantity, poisson, positive};
+use crate::error::{ElasticityError, Quantity, poisson};
 use crate::numerics::{Chebyshev, cubic, gauss_legendre, gauss_panels, panel_edges};
 use nalgebra::{DMatrix, DVector, Matrix2, Matrix2x4, Matrix4, Matrix4x2, Vector4};
 use std::f64::consts::{FRAC_2_PI, PI};
@@ -81,10 +81,7 @@ impl LayerEquation {
     /// # Errors
     /// [`ElasticityError::PoissonRatio`].
     pub fn new(bond: Bond, poisson_ratio: f64) -> Result<Self, ElasticityError> {
-        Ok(Self {
-            kernel: LayerKernel::new(bond, poisson_ratio)?,
-            share: 1.0,
-        })
+        Ok(Self::of_kernel(&LayerKernel::new(bond, poisson_ratio)?))
     }
 
     /// Of layers bonded to one another, the touched one first, under a rigid sphere. `bond` is that
@@ -93,10 +90,7 @@ impl LayerEquation {
     /// # Errors
     /// [`ElasticityError::NotPositive`] thickness: a rigid waveguide has no layers.
     pub fn of_layers(waveguide: &Waveguide, bond: Bond) -> Result<Self, ElasticityError> {
-        Ok(Self {
-            kernel: LayerKernel::of_layers(waveguide, bond)?,
-            share: 1.0,
-        })
+        Ok(Self::of_kernel(&LayerKernel::of_layers(waveguide, bond)?))
     }
 
     /// With a sphere that yields too: `share` is the touched layer's part of 1/E*, in [0, 1].
@@ -159,7 +153,7 @@ struct DiscreteKernel {
 
 impl DiscreteKernel {
     fn new(kernel: &LayerKernel, a_over_h: f64) -> Result<Self, ElasticityError> {
-        positive(a_over_h, Quantity::ContactRadius)?;
+        Quantity::ContactRadius.positive(a_over_h)?;
         if a_over_h > LARGEST_A_OVER_H {
             return Err(out_of_range(a_over_h));
         }
@@ -188,8 +182,15 @@ impl DiscreteKernel {
         let (rule, kernel) = (&self.rule, &self.values);
         let n = rule.len();
         let scale = FRAC_2_PI * self.a_over_h * share;
-        let (flat, round) =
-            flat_and_round(rule, kernel, scale).ok_or(out_of_range(self.a_over_h))?;
+        let matrix = DMatrix::from_fn(n, n, |i, j| {
+            f64::from(i == j) - scale * kernel[(i, j)] * rule[j].1
+        });
+        let lu = matrix.lu();
+        // φ for the right sides 1 and s², those of a flat punch and of the sphere's roundness.
+        let ones = DVector::from_element(n, 1.0);
+        let squares = DVector::from_fn(n, |i, _| rule[i].0 * rule[i].0);
+        let flat = lu.solve(&ones).ok_or(out_of_range(self.a_over_h))?;
+        let round = lu.solve(&squares).ok_or(out_of_range(self.a_over_h))?;
         // φ at the rim by Nyström's own interpolation. The last row of the kernel belongs to s = a.
         let rim = |phi: &DVector<f64>, rhs: f64| {
             let integral = (0..n).map(|j| kernel[(n, j)] * rule[j].1 * phi[j]);
@@ -214,22 +215,6 @@ fn out_of_range(found: f64) -> ElasticityError {
         found,
         limit: LARGEST_A_OVER_H,
     }
-}
-
-/// φ for the right sides 1 and s², those of a flat punch and of the sphere's roundness.
-fn flat_and_round(
-    rule: &[(f64, f64)],
-    kernel: &DMatrix<f64>,
-    scale: f64,
-) -> Option<(DVector<f64>, DVector<f64>)> {
-    let n = rule.len();
-    let matrix = DMatrix::from_fn(n, n, |i, j| {
-        f64::from(i == j) - scale * kernel[(i, j)] * rule[j].1
-    });
-    let ones = DVector::from_element(n, 1.0);
-    let squares = DVector::from_fn(n, |i, _| rule[i].0 * rule[i].0);
-    let lu = matrix.lu();
-    Some((lu.solve(&ones)?, lu.solve(&squares)?))
 }
 
 // How much stiffer than a half-space layers on a rigid base are, by wavenumber.
@@ -260,7 +245,9 @@ pub enum Bond {
 /// The deficit 1 − L(s) of layers on a rigid base, s = ξh with h their total thickness.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LayerKernel {
-    stack: Stack,
+    /// The touched one first. Never empty.
+    layers: Vec<StackLayer>,
+    bond: Bond,
 }
 
 impl LayerKernel {
@@ -275,7 +262,8 @@ impl LayerKernel {
             poisson_ratio: poisson(poisson_ratio)?,
         };
         Ok(Self {
-            stack: Stack::new(vec![layer], bond),
+            layers: vec![layer],
+            bond,
         })
     }
 
@@ -285,7 +273,7 @@ impl LayerKernel {
     /// # Errors
     /// [`ElasticityError::NotPositive`] thickness: a rigid waveguide has no layers.
     pub fn of_layers(waveguide: &Waveguide, bond: Bond) -> Result<Self, ElasticityError> {
-        let total = positive(waveguide.thickness_m(), Quantity::Thickness)?;
+        let total = Quantity::Thickness.positive(waveguide.thickness_m())?;
         let layers: Vec<_> = waveguide
             .layers()
             .iter()
@@ -302,15 +290,27 @@ impl LayerKernel {
             ..layer
         };
         let layers = layers.into_iter().map(in_units_of_top).collect();
-        Ok(Self {
-            stack: Stack::new(layers, bond),
-        })
+        Ok(Self { layers, bond })
     }
 
-    /// 1 − L(s): 1 for long waves, 0 for short ones. Below zero where a soft layer lies under a
-    /// stiff one.
+    /// 1 − L(s): how much less the surface yields at s = kh than a half-space of the touched layer,
+    /// over what that yields. 1 for long waves, 0 for short ones. Below zero where a soft layer
+    /// lies under a stiff one.
     pub(super) fn deficit(&self, s: f64) -> f64 {
-        self.stack.deficit(s)
+        let Some((top, lower)) = self.layers.split_first().filter(|_| s > 1e-9) else {
+            return 1.0; // long waves move nothing
+        };
+        let mut below = Face::Base(self.bond);
+        for layer in lower.iter().rev() {
+            below = Face::Compliant(layer.compliance(s, &below));
+        }
+        let half_space = top.half_space()[(0, 0)];
+        let y = s * top.thickness;
+        if y > 1.0 {
+            top.less_than_half_space(y, &below)[(0, 0)] / half_space
+        } else {
+            1.0 - top.compliance(s, &below)[(0, 0)] / half_space
+        }
     }
 
     /// m₀ = ∫(1 − L) ds and m₂ = ∫s²(1 − L) ds over [0, ∞), which fix the series in χ.
@@ -322,7 +322,7 @@ impl LayerKernel {
 
     /// Thickness of the touched layer over the total.
     fn top_thickness(&self) -> f64 {
-        self.stack.top_thickness()
+        self.layers[0].thickness
     }
 
     /// Nodes s and weights w·(1 − L(s)), for integrands that turn as fast as cos²(s·x).
@@ -362,45 +362,8 @@ struct StackLayer {
     poisson_ratio: f64,
 }
 
-/// Layers on a rigid base, the touched one first. Never empty.
-#[derive(Debug, Clone, PartialEq)]
-struct Stack {
-    layers: Vec<StackLayer>,
-    bond: Bond,
-}
-
 // Beyond this kh a layer is a half-space to the last digit: what lies below counts with y²e^(−2y).
 const DEEP: f64 = 30.0;
-
-impl Stack {
-    fn new(layers: Vec<StackLayer>, bond: Bond) -> Self {
-        Self { layers, bond }
-    }
-
-    /// Thickness of the touched layer over that of the stack.
-    fn top_thickness(&self) -> f64 {
-        self.layers[0].thickness
-    }
-
-    /// 1 − L(s): how much less the surface yields at s = kh than a half-space of the touched layer,
-    /// over what that yields.
-    fn deficit(&self, s: f64) -> f64 {
-        let Some((top, lower)) = self.layers.split_first().filter(|_| s > 1e-9) else {
-            return 1.0; // long waves move nothing
-        };
-        let mut below = Face::Base(self.bond);
-        for layer in lower.iter().rev() {
-            below = Face::Compliant(layer.compliance(s, &below));
-        }
-        let half_space = top.half_space()[(0, 0)];
-        let y = s * top.thickness;
-        if y > 1.0 {
-            top.less_than_half_space(y, &below)[(0, 0)] / half_space
-        } else {
-            1.0 - top.compliance(s, &below)[(0, 0)] / half_space
-        }
-    }
-}
 
 /// What a layer's lower face lies on.
 enum Face {

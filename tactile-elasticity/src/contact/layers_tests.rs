@@ -36,6 +36,11 @@ fn layer(thickness: f64, shear_modulus: f64, poisson_ratio: f64) -> StackLayer {
     }
 }
 
+fn kernel(layers: &[StackLayer], bond: Bond) -> LayerKernel {
+    let layers = layers.to_vec();
+    LayerKernel { layers, bond }
+}
+
 /// 1 − L of one layer in closed form: with q = e^(−2s) bonded, k = 3 − 4ν, (2kq² + (1 + k² + 4s² +
 /// 4s)q)/(k(1 + q²) + (1 + k² + 4s²)q), free 2q(2s + 1 − q)/(1 − q² + 4sq).
 fn closed_form(s: f64, nu: f64, bond: Bond) -> f64 {
@@ -51,9 +56,9 @@ fn closed_form(s: f64, nu: f64, bond: Bond) -> f64 {
 fn one_layer_has_its_closed_form_and_may_be_cut() {
     for nu in [-0.3, 0.0, 0.3, 0.4999, 0.5] {
         for bond in [Bond::Bonded, Bond::Free] {
-            let one = Stack::new(vec![layer(1.0, 1.0, nu)], bond);
+            let one = kernel(&[layer(1.0, 1.0, nu)], bond);
             let cut = [0.301, 0.001, 0.198, 0.5].map(|h| layer(h, 1.0, nu));
-            let cut = Stack::new(cut.to_vec(), bond);
+            let cut = kernel(&cut, bond);
             for s in [0.01, 0.3, 0.99, 1.01, 4.0, 11.0, 25.0] {
                 let exact = closed_form(s, nu, bond);
                 let whole = one.deficit(s) / exact - 1.0;
@@ -71,11 +76,11 @@ fn one_layer_has_its_closed_form_and_may_be_cut() {
 #[test]
 fn short_waves_see_the_top_and_a_stiff_base_is_rigid() {
     let soft_below = [layer(0.2, 1.0, 0.45), layer(0.8, 0.1, 0.5)];
-    let soft_below = Stack::new(soft_below.to_vec(), Bond::Bonded);
+    let soft_below = kernel(&soft_below, Bond::Bonded);
     assert!(soft_below.deficit(100.0).abs() < 1e-12);
     assert!(soft_below.deficit(1.0) < -0.1);
     let on_steel = [layer(0.2, 1.0, 0.45), layer(0.8, 1e9, 0.3)];
-    let on_steel = Stack::new(on_steel.to_vec(), Bond::Bonded);
+    let on_steel = kernel(&on_steel, Bond::Bonded);
     for s in [2.0, 7.0, 60.0] {
         let thin = closed_form(s * 0.2, 0.45, Bond::Bonded);
         // Steel yields by 10⁻⁹ of the layer.

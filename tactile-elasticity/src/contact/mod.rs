@@ -22,8 +22,7 @@ mod waveguide;
 pub use depression::depression_m;
 pub use hertz::{
     Body, ConeContact, HertzContact, PunchContact, cone, flat_punch, hertz_surface_displacement_m,
-    reduced_modulus_from_contact_radius, reduced_modulus_from_indentation, reduced_modulus_pa,
-    relative_radius_m, sample_modulus_pa, tangent_of_degrees, tatara_indentation_m,
+    reduced_modulus_pa, relative_radius_m, tangent_of_degrees, tatara_indentation_m,
 };
 pub use layers::{Bond, LayerContact, LayerEquation, LayerSeries};
 pub use plane::LayerPlane;

@@ -2,7 +2,7 @@
 
 use super::layers::LayerKernel;
 use super::{Bond, Waveguide};
-use crate::error::{ElasticityError, Quantity, positive};
+use crate::error::{ElasticityError, Quantity};
 use rustfft::num_complex::Complex;
 use rustfft::{Fft, FftPlanner};
 use std::sync::Arc;
@@ -53,8 +53,8 @@ impl LayerPlane {
         shape: [usize; 2],
         cell_m: f64,
     ) -> Result<Self, ElasticityError> {
-        positive(cell_m, Quantity::Distance)?;
-        positive(shape[0].min(shape[1]) as f64, Quantity::Elements)?;
+        Quantity::Distance.positive(cell_m)?;
+        Quantity::Elements.positive(shape[0].min(shape[1]) as f64)?;
         let kernel = LayerKernel::of_layers(waveguide, bond)?;
         let thickness = waveguide.thickness_m();
         let plane_strain = waveguide.touched_plane_strain_pa();

@@ -1,7 +1,7 @@
 //! Contacts of a soft ball with one guide, computed once and interpolated.
 
 use super::{Layer, Waveguide};
-use crate::error::{ElasticityError, Quantity, poisson, positive};
+use crate::error::{ElasticityError, Quantity, poisson};
 use nalgebra::{DMatrix, DVector};
 
 /// Force over contact radius and modulus for a ball of one radius on one guide, or on a rigid flat.
@@ -105,7 +105,7 @@ impl ContactTable {
         guide: &Waveguide,
         curves: Vec<ContactCurve>,
     ) -> Result<Self, ElasticityError> {
-        positive(radius_m, Quantity::Radius)?;
+        Quantity::Radius.positive(radius_m)?;
         poisson(poisson_ratio)?;
         let rigid = guide.layers().is_empty();
         at_least(
@@ -175,7 +175,7 @@ impl ContactTable {
     /// misses when it is left out, but for those at the ends of the curves and of the softest and
     /// the stiffest ball, where that would show how well the fit extrapolates.
     pub fn interpolation_error(&self) -> f64 {
-        self.surface.error()
+        self.surface.error
     }
 
     /// The force in newtons at a contact radius (m) and a modulus (Pa). None outside the table.
@@ -309,7 +309,7 @@ fn at_least(found: usize, expected: usize, quantity: Quantity) -> Result<(), Ela
 fn growing(values: impl Iterator<Item = f64>, quantity: Quantity) -> Result<(), ElasticityError> {
     let mut last = 0.0;
     for value in values {
-        positive(value, quantity)?;
+        quantity.positive(value)?;
         if value <= last {
             return Err(ElasticityError::OutOfRange {
                 quantity,
@@ -402,7 +402,7 @@ impl ContactCurve {
     pub const FEWEST_CONTACTS: usize = 4;
 
     fn check(&self) -> Result<(), ElasticityError> {
-        positive(self.youngs_modulus_pa, Quantity::YoungsModulus)?;
+        Quantity::YoungsModulus.positive(self.youngs_modulus_pa)?;
         at_least(
             self.contact_radius_m.len(),
             Self::FEWEST_CONTACTS,
@@ -559,10 +559,6 @@ impl Surface {
         surface.error = (squares / count as f64).sqrt();
         surface.coefficients = DMatrix::from_column_slice(rows, columns, solution.as_slice());
         solution.iter().all(|c| c.is_finite()).then_some(surface)
-    }
-
-    fn error(&self) -> f64 {
-        self.error
     }
 
     /// Whether there are contacts on both sides of one: at the ends of its curve and for the

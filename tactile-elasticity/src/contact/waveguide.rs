@@ -1,7 +1,7 @@
 //! The elastic layers of a sensor.
 
 use super::{Body, Bond, LayerEquation};
-use crate::error::{ElasticityError, Quantity, not_negative, poisson, positive};
+use crate::error::{ElasticityError, Quantity, poisson};
 use nalgebra::{DMatrix, DVector};
 
 /// One elastic layer of the waveguide.
@@ -57,12 +57,12 @@ impl Waveguide {
     /// Poisson ratio out of range.
     pub fn new(layers: Vec<Layer>) -> Result<Self, ElasticityError> {
         for layer in &layers {
-            not_negative(layer.thickness_m, Quantity::Thickness)?;
-            positive(layer.youngs_modulus_pa, Quantity::YoungsModulus)?;
+            Quantity::Thickness.not_negative(layer.thickness_m)?;
+            Quantity::YoungsModulus.positive(layer.youngs_modulus_pa)?;
             poisson(layer.poisson_ratio)?;
         }
         let waveguide = Self { layers };
-        positive(waveguide.thickness_m(), Quantity::Thickness)?;
+        Quantity::Thickness.positive(waveguide.thickness_m())?;
         Ok(waveguide)
     }
 

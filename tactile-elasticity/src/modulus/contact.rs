@@ -16,7 +16,7 @@ use super::load::{LoadSeries, LoadState, validated};
 use super::statistics::{CommonMean, Covariance, LogErrors, common_mean, fewest, total};
 use super::waveguide_law::WaveguideLaw;
 use crate::contact::{Body, Bond, Waveguide};
-use crate::error::{ElasticityError, Quantity, poisson, positive};
+use crate::error::{ElasticityError, Quantity, poisson};
 use tactile_core::{Estimate, Interval, statistics::quantile_95};
 
 /// Which of the observations a contact estimator uses.
@@ -196,8 +196,8 @@ impl<L: ContactLaw> ContactEstimator<L> {
             for (length, quantity) in lengths {
                 let Some(length) = length else { continue };
                 let length = validated(length, quantity)?;
-                positive(length.value, quantity)?;
-                positive(force.value, Quantity::Force)?;
+                quantity.positive(length.value)?;
+                Quantity::Force.positive(force.value)?;
                 let x = length.value;
                 let of_radius = quantity == Quantity::ContactRadius;
                 let (log_force, model_error) = if of_radius {
@@ -714,7 +714,7 @@ impl ContactEstimator<ConeLaw> {
     /// [`ElasticityError::PoissonRatio`].
     pub fn new(half_angle_rad: f64, poisson_ratio: f64) -> Result<Self, ElasticityError> {
         let (angle, limit) = (half_angle_rad, std::f64::consts::FRAC_PI_2);
-        positive(angle, Quantity::HalfAngle)?;
+        Quantity::HalfAngle.positive(angle)?;
         if angle >= limit {
             return Err(ElasticityError::OutOfRange {
                 quantity: Quantity::HalfAngle,

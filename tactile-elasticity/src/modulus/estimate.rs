@@ -424,66 +424,52 @@ impl Warning {
 impl core::fmt::Display for Warning {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         match self {
-            Self::LargeContact { load, ratio, limit } => {
-                write!(
-                    f,
-                    "load {}: a/R = {ratio:.3} is beyond {limit:.2}, \
+            Self::LargeContact { load, ratio, limit } => write!(
+                f,
+                "load {}: a/R = {ratio:.3} is beyond {limit:.2}, \
                      small-contact theory does not hold",
-                    load + 1
-                )
-            }
-            Self::ThinLayer { load, ratio, limit } => {
-                write!(
-                    f,
-                    "load {}: contact over layer thickness = {ratio:.3} \
+                load + 1
+            ),
+            Self::ThinLayer { load, ratio, limit } => write!(
+                f,
+                "load {}: contact over layer thickness = {ratio:.3} \
                      is beyond {limit:.2} for this law",
-                    load + 1
-                )
-            }
+                load + 1
+            ),
             Self::LargeStrain {
                 load,
                 strain,
                 limit,
-            } => {
-                write!(
-                    f,
-                    "load {}: strain {strain:.3} is beyond {limit:.2}, \
+            } => write!(
+                f,
+                "load {}: strain {strain:.3} is beyond {limit:.2}, \
                      the linear law does not hold",
-                    load + 1
-                )
-            }
+                load + 1
+            ),
             Self::ExcessScatter {
                 reduced_chi_squared,
-            } => {
-                write!(
-                    f,
-                    "scatter exceeds the stated errors \
+            } => write!(
+                f,
+                "scatter exceeds the stated errors \
                      (reduced chi-squared {reduced_chi_squared:.2})"
-                )
-            }
+            ),
             Self::UnboundedAbove => write!(f, "the data do not bound the modulus from above"),
             Self::Intercept {
                 intercept_pa,
                 p_value,
-            } => {
-                write!(
-                    f,
-                    "the stress at zero strain is {intercept_pa:.1} Pa (p = {p_value:.4}), not zero"
-                )
-            }
-            Self::NoErrorEstimate => {
-                write!(
-                    f,
-                    "no standard errors and no repetition: the interval is unknown"
-                )
-            }
-            Self::RatioOnSphere { load, ratio } => {
-                write!(
-                    f,
-                    "load {}: stress over strain is biased on a sphere (a/R = {ratio:.3})",
-                    load + 1
-                )
-            }
+            } => write!(
+                f,
+                "the stress at zero strain is {intercept_pa:.1} Pa (p = {p_value:.4}), not zero"
+            ),
+            Self::NoErrorEstimate => write!(
+                f,
+                "no standard errors and no repetition: the interval is unknown"
+            ),
+            Self::RatioOnSphere { load, ratio } => write!(
+                f,
+                "load {}: stress over strain is biased on a sphere (a/R = {ratio:.3})",
+                load + 1
+            ),
             Self::UnlikeGuide { ratio } => {
                 let (times, word) = match *ratio < 1.0 {
                     true => (1.0 / ratio, "softer"),

@@ -4,7 +4,7 @@ use super::EstimatorKind;
 use crate::contact::{
     Bond, LayerContact, LayerEquation, LayerKernel, LayerSeries, LayerTable, Squeeze,
 };
-use crate::error::{ElasticityError, Quantity, poisson, positive};
+use crate::error::{ElasticityError, Quantity, poisson};
 use crate::numerics::gauss_panels;
 
 /// ln f = ln(F/E*) at one x, with its slopes in ln x and in the logarithm of the indenter's size.
@@ -121,7 +121,7 @@ impl HertzLaw {
     /// [`ElasticityError::NotPositive`].
     pub fn new(radius_m: f64) -> Result<Self, ElasticityError> {
         Ok(Self {
-            radius_m: positive(radius_m, Quantity::Radius)?,
+            radius_m: Quantity::Radius.positive(radius_m)?,
         })
     }
 }
@@ -165,7 +165,7 @@ impl PunchLaw {
     /// [`ElasticityError::NotPositive`].
     pub fn new(radius_m: f64) -> Result<Self, ElasticityError> {
         Ok(Self {
-            radius_m: positive(radius_m, Quantity::Radius)?,
+            radius_m: Quantity::Radius.positive(radius_m)?,
         })
     }
 }
@@ -182,10 +182,6 @@ impl ContactLaw for PunchLaw {
     fn log_force_at_indentation(&self, d: f64, _: f64) -> Option<LogForce> {
         Some(LogForce::new((2.0 * self.radius_m).ln() + d.ln(), 1.0, 1.0))
     }
-
-    fn contact_ratio(&self, _: Option<f64>, _: Option<f64>) -> Option<f64> {
-        None
-    }
 }
 
 /// A cone of half opening angle α: F = (2/π)E* tan α δ² = E* π a²/(2 tan α) (Sneddon 1965).
@@ -201,7 +197,7 @@ impl ConeLaw {
     /// [`ElasticityError::NotPositive`].
     pub fn new(tangent: f64) -> Result<Self, ElasticityError> {
         Ok(Self {
-            tangent: positive(tangent, Quantity::HalfAngle)?,
+            tangent: Quantity::HalfAngle.positive(tangent)?,
         })
     }
 }
@@ -219,10 +215,6 @@ impl ContactLaw for ConeLaw {
     fn log_force_at_indentation(&self, d: f64, _: f64) -> Option<LogForce> {
         let value = (std::f64::consts::FRAC_2_PI * self.tangent).ln() + 2.0 * d.ln();
         Some(LogForce::new(value, 2.0, 1.0))
-    }
-
-    fn contact_ratio(&self, _: Option<f64>, _: Option<f64>) -> Option<f64> {
-        None
     }
 }
 
@@ -299,8 +291,8 @@ impl TipOnBallLaw {
     /// # Errors
     /// [`ElasticityError::NotPositive`].
     pub fn new(tip_radius_m: f64, ball_radius_m: f64) -> Result<Self, ElasticityError> {
-        let tip = positive(tip_radius_m, Quantity::Radius)?;
-        let ball = positive(ball_radius_m, Quantity::Radius)?;
+        let tip = Quantity::Radius.positive(tip_radius_m)?;
+        let ball = Quantity::Radius.positive(ball_radius_m)?;
         let relative = tip / (tip + ball) * ball;
         let (under_tip, on_plate) = (relative.cbrt().recip(), ball.cbrt().recip());
         Ok(Self {
@@ -338,7 +330,6 @@ impl ContactLaw for TipOnBallLaw {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TataraLaw {
     sphere: HertzLaw,
-    radius_m: f64,
     poisson_ratio: f64,
 }
 
@@ -348,19 +339,14 @@ impl TataraLaw {
     /// # Errors
     /// [`ElasticityError::NotPositive`], [`ElasticityError::PoissonRatio`].
     pub fn new(radius_m: f64, poisson_ratio: f64) -> Result<Self, ElasticityError> {
-        let (radius_m, poisson_ratio) = (
-            positive(radius_m, Quantity::Radius)?,
-            poisson(poisson_ratio)?,
-        );
         Ok(Self {
             sphere: HertzLaw::new(radius_m)?,
-            radius_m,
-            poisson_ratio,
+            poisson_ratio: poisson(poisson_ratio)?,
         })
     }
 
     fn squeeze(&self, share: f64) -> Squeeze {
-        Squeeze::new(self.radius_m, self.poisson_ratio, 1.0 - share)
+        Squeeze::new(self.sphere.radius_m, self.poisson_ratio, 1.0 - share)
     }
 }
 
@@ -385,7 +371,7 @@ impl ContactLaw for TataraLaw {
     fn contact_ratio(&self, contact_radius: Option<f64>, indentation: Option<f64>) -> Option<f64> {
         let a = contact_radius
             .or_else(|| indentation.and_then(|d| self.squeeze(0.0).contact_radius(d)));
-        a.map(|a| a / self.radius_m)
+        self.sphere.contact_ratio(a, None)
     }
 
     fn contact_ratio_limit(&self) -> f64 {
@@ -434,13 +420,8 @@ impl NoSlipLaw<HertzLaw> {
     pub fn sphere(radius_m: f64, nu: f64) -> Result<Self, ElasticityError> {
         // δ I = a²/2R: at one indentation a² grows as 2I.
         let integral = 2.0 * parabola_integral(theta(nu));
-        Ok(Self {
-            frictionless: HertzLaw::new(radius_m)?,
-            kind: EstimatorKind::SphereWithoutSlip,
-            at_radius: (stiffening(nu) / integral).ln(),
-            at_indentation: (stiffening(nu) * integral.sqrt()).ln(),
-            radius: integral.sqrt(),
-        })
+        let (law, kind) = (HertzLaw::new(radius_m)?, EstimatorKind::SphereWithoutSlip);
+        Ok(Self::new(law, kind, nu, integral, integral.sqrt()))
     }
 }
 
@@ -450,13 +431,8 @@ impl NoSlipLaw<PunchLaw> {
     /// # Errors
     /// [`ElasticityError::NotPositive`].
     pub fn punch(radius_m: f64, nu: f64) -> Result<Self, ElasticityError> {
-        Ok(Self {
-            frictionless: PunchLaw::new(radius_m)?,
-            kind: EstimatorKind::FlatPunchWithoutSlip,
-            at_radius: stiffening(nu).ln(),
-            at_indentation: stiffening(nu).ln(),
-            radius: 1.0,
-        })
+        let kind = EstimatorKind::FlatPunchWithoutSlip;
+        Ok(Self::new(PunchLaw::new(radius_m)?, kind, nu, 1.0, 1.0))
     }
 }
 
@@ -468,13 +444,23 @@ impl NoSlipLaw<ConeLaw> {
     pub fn cone(half_angle_tangent: f64, nu: f64) -> Result<Self, ElasticityError> {
         // δ I = (π/2) a cot α: at one indentation a grows as I.
         let integral = cone_integral(theta(nu));
-        Ok(Self {
-            frictionless: ConeLaw::new(half_angle_tangent)?,
-            kind: EstimatorKind::ConeWithoutSlip,
+        let law = ConeLaw::new(half_angle_tangent)?;
+        let kind = EstimatorKind::ConeWithoutSlip;
+        Ok(Self::new(law, kind, nu, integral, integral))
+    }
+}
+
+impl<L> NoSlipLaw<L> {
+    /// With δ's factor at one contact radius, 1/I over its value without friction, and the contact
+    /// radius's at one indentation. F is in proportion to c a δ.
+    fn new(frictionless: L, kind: EstimatorKind, nu: f64, integral: f64, radius: f64) -> Self {
+        Self {
+            frictionless,
+            kind,
             at_radius: (stiffening(nu) / integral).ln(),
-            at_indentation: (stiffening(nu) * integral).ln(),
-            radius: integral,
-        })
+            at_indentation: (stiffening(nu) * radius).ln(),
+            radius,
+        }
     }
 }
 
@@ -485,12 +471,12 @@ impl<L: ContactLaw> ContactLaw for NoSlipLaw<L> {
 
     fn log_force_at_radius(&self, a: f64, share: f64) -> Option<LogForce> {
         let slides = self.frictionless.log_force_at_radius(a, share)?;
-        Some(stiffer(slides, self.at_radius))
+        Some(corrected(slides, self.at_radius, 0.0, 0.0))
     }
 
     fn log_force_at_indentation(&self, d: f64, share: f64) -> Option<LogForce> {
         let slides = self.frictionless.log_force_at_indentation(d, share)?;
-        Some(stiffer(slides, self.at_indentation))
+        Some(corrected(slides, self.at_indentation, 0.0, 0.0))
     }
 
     fn contact_ratio(&self, contact_radius: Option<f64>, indentation: Option<f64>) -> Option<f64> {
@@ -502,13 +488,6 @@ impl<L: ContactLaw> ContactLaw for NoSlipLaw<L> {
 
     fn contact_ratio_limit(&self) -> f64 {
         self.frictionless.contact_ratio_limit()
-    }
-}
-
-fn stiffer(law: LogForce, log_factor: f64) -> LogForce {
-    LogForce {
-        value: law.value + log_factor,
-        ..law
     }
 }
 
@@ -589,7 +568,6 @@ pub enum LayerTheory {
 #[derive(Debug, Clone, PartialEq)]
 pub struct LayerLaw {
     sphere: HertzLaw,
-    radius_m: f64,
     thickness_m: f64,
     bond: Bond,
     theory: LayerTheory,
@@ -610,16 +588,15 @@ impl LayerLaw {
         bond: Bond,
         theory: LayerTheory,
     ) -> Result<Self, ElasticityError> {
-        let radius_m = positive(radius_m, Quantity::Radius)?;
-        let thickness_m = positive(thickness_m, Quantity::Thickness)?;
+        let sphere = HertzLaw::new(radius_m)?;
+        let thickness_m = Quantity::Thickness.positive(thickness_m)?;
         let kernel = LayerKernel::new(bond, poisson_ratio)?;
         let series = match theory {
             LayerTheory::PublishedSeries => LayerSeries::published(bond, poisson_ratio)?,
             _ => LayerSeries::of_kernel(&kernel, 1.0),
         };
         Ok(Self {
-            sphere: HertzLaw::new(radius_m)?,
-            radius_m,
+            sphere,
             thickness_m,
             bond,
             theory,
@@ -638,7 +615,7 @@ impl LayerLaw {
     }
 
     fn chi(&self, d: f64) -> f64 {
-        (self.radius_m * d).sqrt() / self.thickness_m
+        (self.sphere.radius_m * d).sqrt() / self.thickness_m
     }
 
     /// ln(F/F_Hertz) at χ and its slope in ln χ.
@@ -718,12 +695,12 @@ impl ContactLaw for LayerLaw {
     }
 }
 
-/// Hertz's ln f with a correction and what it adds to the slopes.
-fn corrected(hertz: LogForce, value: f64, slope: f64, size_slope: f64) -> LogForce {
+/// ln f of a law with a correction and what it adds to the slopes.
+fn corrected(law: LogForce, value: f64, slope: f64, size_slope: f64) -> LogForce {
     LogForce::new(
-        hertz.value + value,
-        hertz.slope + slope,
-        hertz.size_slope + size_slope,
+        law.value + value,
+        law.slope + slope,
+        law.size_slope + size_slope,
     )
 }
 

@@ -1,6 +1,6 @@
 //! What was measured at one load.
 
-use crate::error::{ElasticityError, Quantity, not_negative};
+use crate::error::{ElasticityError, Quantity};
 use nalgebra::DMatrix;
 use tactile_core::Estimate;
 
@@ -55,25 +55,16 @@ impl LoadState {
     pub fn new(force_n: Estimate) -> Self {
         Self {
             force_n,
-            contact_radius_m: None,
-            contact_area_m2: None,
-            indentation_m: None,
-            mean_strain: None,
+            ..Self::default()
         }
     }
 
     /// F over the area given, or over πa². None where neither is known or the area is zero.
     pub fn stress_pa(&self) -> Option<f64> {
-        let area = match (self.contact_area_m2, self.contact_radius_m) {
-            (Some(area), _) => area.value,
-            (None, Some(a)) => std::f64::consts::PI * a.value * a.value,
-            (None, None) => return None,
-        };
+        let area = self.area()?.value;
         (area > 0.0).then(|| self.force_n.value / area)
     }
-}
 
-impl LoadState {
     /// The area given, or πa².
     pub(crate) fn area(&self) -> Option<Estimate> {
         let disc = |a: Estimate| {
@@ -151,7 +142,7 @@ impl SharedErrors {
             errors.other_body,
             errors.adhesion_n,
         ] {
-            not_negative(error, Quantity::StandardError)?;
+            Quantity::StandardError.not_negative(error)?;
         }
         let correlation = errors.length_with_other_body;
         if !(-1.0..=1.0).contains(&correlation) {
@@ -320,16 +311,6 @@ impl LoadSeries {
         }
     }
 
-    /// The series with other loads.
-    pub(crate) fn with_loads(&self, loads: Vec<LoadState>) -> Self {
-        Self {
-            loads,
-            ..self.clone()
-        }
-    }
-}
-
-impl LoadSeries {
     /// Relative error that all ratios of stress to strain share beside that of the forces. Areas go
     /// as the square of lengths, strains derived from lateral stretches as one over Poisson's
     /// ratio.

@@ -3,7 +3,7 @@
 use super::estimate::{EstimatorKind, LoadDiagnostics, ModulusEstimate, ModulusEstimator, Warning};
 use super::load::{LoadSeries, LoadState, validated};
 use super::statistics::{CommonMean, Covariance, LogErrors, common_mean, fewest, total};
-use crate::error::{ElasticityError, Quantity, positive};
+use crate::error::{ElasticityError, Quantity};
 use tactile_core::statistics::{effective_degrees_of_freedom, quantile_95};
 use tactile_core::{Estimate, Interval};
 
@@ -104,7 +104,7 @@ impl PaperRatio {
     /// # Errors
     /// [`ElasticityError::NotPositive`].
     pub fn with_sphere_radius(mut self, radius_m: f64) -> Result<Self, ElasticityError> {
-        self.sphere_radius_m = Some(positive(radius_m, Quantity::Radius)?);
+        self.sphere_radius_m = Some(Quantity::Radius.positive(radius_m)?);
         Ok(self)
     }
 
@@ -296,14 +296,14 @@ pub(crate) fn stress(load: usize, state: &LoadState) -> Result<Estimate, Elastic
         .contact_radius_m
         .filter(|_| state.contact_area_m2.is_none())
     {
-        positive(radius.value, quantity)?;
+        quantity.positive(radius.value)?;
     }
     let missing = ElasticityError::Missing {
         load,
         quantity: Quantity::ContactArea,
     };
     let area = validated(state.area().ok_or(missing)?, quantity)?;
-    positive(area.value, quantity)?;
+    quantity.positive(area.value)?;
     let value = force.value / area.value;
     let standard_error = (force.standard_error / area.value).hypot(value * area.relative_error());
     let parts = [force, area].map(|e| (e.relative_error().powi(2), e.degrees_of_freedom));

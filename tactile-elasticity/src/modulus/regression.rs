@@ -6,7 +6,7 @@ use super::estimate::{
 use super::load::{LoadSeries, LoadState, derived, validated};
 use super::ratio::{LINEAR_STRAIN, strain_warnings, stress};
 use super::statistics::{chi_squared_tail, fewest, t_tail};
-use crate::error::{ElasticityError, Quantity, positive};
+use crate::error::{ElasticityError, Quantity};
 use crate::strain::StrainMeasure;
 use nalgebra::Matrix3;
 use tactile_core::statistics::{effective_degrees_of_freedom, quantile_95};
@@ -83,12 +83,6 @@ impl StressStrainRegression {
             }
         }
         Ok(points)
-    }
-
-    /// Slope and intercept of the line through all loads that have a strain.
-    fn line_through(&self, series: &LoadSeries) -> Result<(f64, f64), ElasticityError> {
-        let line = self.line(&Self::points(series.loads())?)?;
-        Ok((line.slope, line.intercept))
     }
 
     /// The line with a slope above zero.
@@ -426,24 +420,23 @@ impl UniaxialLoads {
         measure: &dyn StrainMeasure,
     ) -> Result<Self, ElasticityError> {
         let law = LateralLaw {
-            poisson_ratio: positive(poisson_ratio, Quantity::PoissonRatio)?,
+            poisson_ratio: Quantity::PoissonRatio.positive(poisson_ratio)?,
             measure,
         };
         let faces = series.loads().iter().filter_map(|l| l.contact_area_m2);
         let mut unloaded = f64::INFINITY;
         for face in faces {
-            let area = positive(
-                validated(face, Quantity::ContactArea)?.value,
-                Quantity::ContactArea,
-            )?;
+            let area =
+                Quantity::ContactArea.positive(validated(face, Quantity::ContactArea)?.value)?;
             unloaded = unloaded.min(area);
         }
         let regression = StressStrainRegression::default();
         for _ in 0..AREA_STEPS {
-            let strained = law.strained(series, unloaded)?;
-            let (slope, intercept) = regression.line_through(&strained.series)?;
+            let line = regression.line(&StressStrainRegression::points(
+                &law.strained(series, unloaded)?.0,
+            )?)?;
             // The strain at which the line has no stress is that of the unloaded face.
-            let strain = -intercept / slope;
+            let strain = -line.intercept / line.slope;
             let ratio = (1.0
                 - 2.0 * law.poisson_ratio * strain.clamp(-LINEAR_STRAIN, LINEAR_STRAIN))
             .recip();
@@ -452,18 +445,13 @@ impl UniaxialLoads {
                 break;
             }
         }
-        let found = law.strained(series, unloaded)?;
+        let (loads, stretches) = law.strained(series, unloaded)?;
         Ok(Self {
-            series: series.uniaxial(found.series.loads().to_vec(), poisson_ratio),
-            stretches: found.stretches,
+            series: series.uniaxial(loads, poisson_ratio),
+            stretches,
             unloaded_area_m2: unloaded,
         })
     }
-}
-
-struct Strained {
-    series: LoadSeries,
-    stretches: Vec<[f64; 2]>,
 }
 
 /// f(λ_t) = −ν f(λ_z).
@@ -508,7 +496,12 @@ impl LateralLaw<'_> {
         Ok(0.5 * (low + high))
     }
 
-    fn strained(&self, series: &LoadSeries, unloaded_m2: f64) -> Result<Strained, ElasticityError> {
+    /// The loads with their strains, and the stretches of each.
+    fn strained(
+        &self,
+        series: &LoadSeries,
+        unloaded_m2: f64,
+    ) -> Result<(Vec<LoadState>, Vec<[f64; 2]>), ElasticityError> {
         let mut loads = Vec::with_capacity(series.loads().len());
         let mut stretches = Vec::with_capacity(series.loads().len());
         for state in series.loads() {
@@ -538,9 +531,6 @@ impl LateralLaw<'_> {
             });
             stretches.push([lateral, axial]);
         }
-        Ok(Strained {
-            series: series.with_loads(loads),
-            stretches,
-        })
+        Ok((loads, stretches))
     }
 }

@@ -5,7 +5,7 @@ use super::estimate::{EstimatorKind, LoadDiagnostics, ModulusEstimate, ModulusEs
 use super::load::{LoadSeries, LoadState, validated};
 use super::statistics::{CommonMean, Covariance, LogErrors, common_mean, fewest, total};
 use crate::contact::{ContactTable, TabulatedForce, Waveguide};
-use crate::error::{ElasticityError, Quantity, positive};
+use crate::error::{ElasticityError, Quantity};
 use std::sync::Arc;
 use tactile_core::{Estimate, Interval, statistics::quantile_95};
 
@@ -87,8 +87,8 @@ impl TabulatedContact {
                 continue;
             };
             let radius = validated(radius, Quantity::ContactRadius)?;
-            positive(radius.value, Quantity::ContactRadius)?;
-            positive(force.value, Quantity::Force)?;
+            Quantity::ContactRadius.positive(radius.value)?;
+            Quantity::Force.positive(force.value)?;
             contacts.push(Contact {
                 load,
                 force,

@@ -3,7 +3,7 @@
 use super::EstimatorKind;
 use super::law::{ContactLaw, HertzLaw, LogForce};
 use crate::contact::{Bond, LayerKernel, SharedLayerTable, Waveguide};
-use crate::error::{ElasticityError, Quantity, poisson, positive};
+use crate::error::{ElasticityError, Quantity, poisson};
 
 /// F = E* f(a): the linear contact of a ball with bonded layers on a rigid base, solved by its
 /// integral equation and tabulated, with what finite strain adds. E* is that of the ball and the
@@ -34,7 +34,7 @@ impl WaveguideLaw {
         waveguide: &Waveguide,
         bond: Bond,
     ) -> Result<Self, ElasticityError> {
-        let radius = positive(radius_m, Quantity::Radius)?;
+        let radius = Quantity::Radius.positive(radius_m)?;
         let thickness_m = waveguide.thickness_m();
         let layers = if waveguide.layers().is_empty() {
             None
