@@ -49,14 +49,8 @@ impl IndentationCurve {
     /// [`ElasticityError::NotFinite`], and [`ElasticityError::EqualLoads`] where all forces or all
     /// positions are equal.
     pub fn new(position_m: &[f64], force_n: &[f64]) -> Result<Self, ElasticityError> {
-        let (expected, found) = (position_m.len(), force_n.len());
-        if expected != found {
-            return Err(ElasticityError::LengthMismatch {
-                quantity: Quantity::Force,
-                expected,
-                found,
-            });
-        }
+        let found = force_n.len();
+        Quantity::Force.entries(found, position_m.len())?;
         if found < FEWEST_POINTS {
             return Err(ElasticityError::TooFewLoads {
                 expected: FEWEST_POINTS,
@@ -68,8 +62,8 @@ impl IndentationCurve {
             (&position_m, Quantity::Indentation),
             (&force_n, Quantity::Force),
         ] {
-            if !values.iter().all(|x| x.is_finite()) {
-                return Err(ElasticityError::NotFinite { quantity });
+            for &value in values {
+                quantity.finite(value)?;
             }
             if values.iter().all(|x| *x == values[0]) {
                 return Err(ElasticityError::EqualLoads);
@@ -104,11 +98,7 @@ impl IndentationCurve {
 
     fn unreachable(&self) -> ElasticityError {
         let (first, last) = self.span();
-        ElasticityError::OutOfRange {
-            quantity: Quantity::Indentation,
-            found: last - first,
-            limit: 0.0,
-        }
+        Quantity::Indentation.beyond(last - first, 0.0)
     }
 }
 

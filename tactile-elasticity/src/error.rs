@@ -314,6 +314,64 @@ impl Quantity {
             Err(ElasticityError::NotFinite { quantity: self })
         }
     }
+
+    /// Refuses another number of entries than expected.
+    ///
+    /// # Errors
+    /// [`ElasticityError::LengthMismatch`].
+    pub fn entries(self, found: usize, expected: usize) -> Result<(), ElasticityError> {
+        self.between(found, expected, expected)
+    }
+
+    /// Refuses fewer entries than expected.
+    ///
+    /// # Errors
+    /// [`ElasticityError::LengthMismatch`].
+    pub fn at_least(self, found: usize, expected: usize) -> Result<(), ElasticityError> {
+        self.between(found, expected, usize::MAX)
+    }
+
+    fn between(self, found: usize, fewest: usize, most: usize) -> Result<(), ElasticityError> {
+        if (fewest..=most).contains(&found) {
+            return Ok(());
+        }
+        Err(ElasticityError::LengthMismatch {
+            quantity: self,
+            expected: fewest,
+            found,
+        })
+    }
+
+    /// Refuses numbers that are not above zero, and each above the one before.
+    ///
+    /// # Errors
+    /// [`ElasticityError::NotPositive`], [`ElasticityError::OutOfRange`].
+    pub fn growing(self, values: impl IntoIterator<Item = f64>) -> Result<(), ElasticityError> {
+        let mut last = 0.0;
+        for value in values {
+            self.positive(value)?;
+            if value <= last {
+                return Err(self.beyond(value, last));
+            }
+            last = value;
+        }
+        Ok(())
+    }
+
+    /// The error of a value beyond a limit.
+    ///
+    /// ```
+    /// use tactile_elasticity::Quantity;
+    /// let error = Quantity::ContactRadius.beyond(2e-3, 1e-3);
+    /// assert_eq!(error.to_string(), "contact radius = 0.002 is beyond the law's reach (0.001)");
+    /// ```
+    pub fn beyond(self, found: f64, limit: f64) -> ElasticityError {
+        ElasticityError::OutOfRange {
+            quantity: self,
+            found,
+            limit,
+        }
+    }
 }
 
 /// `value` if it is a Poisson ratio in (−1, ½].

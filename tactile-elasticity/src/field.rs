@@ -130,7 +130,7 @@ impl StrainField {
         match weights {
             None => self.weights.resize(gradients.len(), 1.0),
             Some(weights) => {
-                check_length(gradients.len(), weights)?;
+                Quantity::Weight.entries(weights.len(), gradients.len())?;
                 for &weight in weights {
                     Quantity::Weight.not_negative(weight)?;
                 }
@@ -230,17 +230,6 @@ impl StrainField {
             folded: self.folded.clone(),
         }
     }
-}
-
-fn check_length(expected: usize, weights: &[f64]) -> Result<(), ElasticityError> {
-    if weights.len() == expected {
-        return Ok(());
-    }
-    Err(ElasticityError::LengthMismatch {
-        quantity: Quantity::Weight,
-        expected,
-        found: weights.len(),
-    })
 }
 
 /// How a field is averaged.
@@ -362,7 +351,7 @@ pub fn mean_strain_covariance(
     influence: impl Fn(usize, usize) -> Vector3<f64>,
     displacement_covariance: &[Matrix3<f64>],
 ) -> Result<Matrix6<f64>, ElasticityError> {
-    check_length(gradients.len(), weights)?;
+    Quantity::Weight.entries(weights.len(), gradients.len())?;
     let total = weights.iter().fold(0.0, |s, &w| s + w);
     Quantity::Weight.positive(total)?;
     let half: f64 = 0.5;

@@ -313,13 +313,8 @@ fn relative_slope(series: &Series, trend: &Line) -> Estimate {
 }
 
 fn undecided(series: &Series, trend: &Line) -> TimeDependence {
-    let [first, last] = [0, series.times_s.len() - 1].map(|k| {
-        let response = trend.a + trend.b * series.times_s[k];
-        match series.form {
-            Form::Relaxation => response,
-            Form::Creep => 1.0 / response,
-        }
-    });
+    let [first, last] = [0, series.times_s.len() - 1]
+        .map(|k| series.form.modulus(trend.a + trend.b * series.times_s[k]));
     TimeDependence::Undecided {
         change: last / first - 1.0,
     }
@@ -332,6 +327,16 @@ enum Form {
     Relaxation,
     /// 1/E on the history of the force.
     Creep,
+}
+
+impl Form {
+    /// E of what is fitted, or that of E.
+    fn modulus(self, response: f64) -> f64 {
+        match self {
+            Self::Relaxation => response,
+            Self::Creep => 1.0 / response,
+        }
+    }
 }
 
 /// Moduli ready to be fitted.
@@ -384,12 +389,7 @@ impl Series {
             Form::Relaxation => without_noise(deformations, &relative),
             Form::Creep => forces.clone(),
         };
-        let response: Vec<f64> = moduli_pa()
-            .map(|e| match form {
-                Form::Relaxation => e.value,
-                Form::Creep => 1.0 / e.value,
-            })
-            .collect();
+        let response: Vec<f64> = moduli_pa().map(|e| form.modulus(e.value)).collect();
         let mean_log = mean(forces.iter().map(|force| force.ln()));
         let law = (forces.iter().zip(&response))
             .map(|(force, y)| law_error * (force.ln() - mean_log) * y);
@@ -609,14 +609,12 @@ impl<'a> Profile<'a> {
                 Some(value * factor(range.upper)).filter(|limit| limit.is_finite()),
             )
         };
-        let ([instantaneous_pa, equilibrium_pa], [instantaneous, equilibrium]) =
-            match self.series.form {
-                Form::Relaxation => ([first, last], [fresh, settled]),
-                Form::Creep => (
-                    [1.0 / first, 1.0 / last],
-                    [fresh.inverse(), settled.inverse()],
-                ),
-            };
+        let [instantaneous_pa, equilibrium_pa] =
+            [first, last].map(|response| self.series.form.modulus(response));
+        let [instantaneous, equilibrium] = match self.series.form {
+            Form::Relaxation => [fresh, settled],
+            Form::Creep => [fresh.inverse(), settled.inverse()],
+        };
         let (time_constant, _) = self.relaxation_time(time_constant_s, &best);
         Some(StandardLinearSolid {
             instantaneous_pa,
@@ -669,16 +667,10 @@ impl Range {
 
     /// The interval of one over what is positive.
     fn inverse(self) -> Self {
-        let below = |limit: f64| {
-            if limit > 0.0 {
-                1.0 / limit
-            } else {
-                f64::INFINITY
-            }
-        };
         Self {
             lower: 1.0 / self.upper,
-            upper: below(self.lower),
+            // Of zero and below: infinity.
+            upper: 1.0 / self.lower.max(0.0),
         }
     }
 }

@@ -13,7 +13,7 @@
 
 use crate::error::{ElasticityError, Quantity};
 use nalgebra::Matrix3;
-use std::sync::Arc;
+use std::ops::Deref;
 
 /// A way to measure strain: a symmetric tensor that vanishes when the material only moves and turns
 /// (the infinitesimal one: only moves).
@@ -65,21 +65,8 @@ pub trait StrainMeasure {
     }
 }
 
-impl<M: StrainMeasure + ?Sized> StrainMeasure for Box<M> {
-    fn of(&self, deformation: &Deformation) -> Result<Matrix3<f64>, ElasticityError> {
-        (**self).of(deformation)
-    }
-
-    fn name(&self) -> &'static str {
-        (**self).name()
-    }
-
-    fn strain(&self, h: &Matrix3<f64>) -> Result<Matrix3<f64>, ElasticityError> {
-        (**self).strain(h)
-    }
-}
-
-impl<M: StrainMeasure + ?Sized> StrainMeasure for Arc<M> {
+/// Boxed, shared and borrowed measures.
+impl<P: Deref<Target: StrainMeasure>> StrainMeasure for P {
     fn of(&self, deformation: &Deformation) -> Result<Matrix3<f64>, ElasticityError> {
         (**self).of(deformation)
     }
@@ -767,7 +754,7 @@ pub fn green_lagrange_into(
     gradients: &[Matrix3<f64>],
     strains: &mut [Matrix3<f64>],
 ) -> Result<(), ElasticityError> {
-    same_length(gradients, strains)?;
+    Quantity::Strain.entries(strains.len(), gradients.len())?;
     fill(gradients, strains);
     Ok(())
 }
@@ -798,24 +785,12 @@ pub fn green_lagrange_par_into(
 ) -> Result<(), ElasticityError> {
     use rayon::prelude::*;
     const CHUNK: usize = 4096;
-    same_length(gradients, strains)?;
+    Quantity::Strain.entries(strains.len(), gradients.len())?;
     gradients
         .par_chunks(CHUNK)
         .zip(strains.par_chunks_mut(CHUNK))
         .for_each(|(h, e)| fill(h, e));
     Ok(())
-}
-
-fn same_length<A, B>(gradients: &[A], strains: &[B]) -> Result<(), ElasticityError> {
-    let (expected, found) = (gradients.len(), strains.len());
-    if expected == found {
-        return Ok(());
-    }
-    Err(ElasticityError::LengthMismatch {
-        quantity: Quantity::Strain,
-        expected,
-        found,
-    })
 }
 
 fn fill(gradients: &[Matrix3<f64>], strains: &mut [Matrix3<f64>]) {

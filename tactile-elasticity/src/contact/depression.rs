@@ -42,10 +42,8 @@ pub fn depression_m(
     let force = Quantity::Force.positive(force_n)?;
     let a = Quantity::ContactRadius.positive(contact_radius_m)?;
     let kernel = LayerKernel::of_layers(guide, bond)?;
-    if distances_m.iter().any(|r| !r.is_finite()) {
-        return Err(ElasticityError::NotFinite {
-            quantity: Quantity::Distance,
-        });
+    for &distance in distances_m {
+        Quantity::Distance.finite(distance)?;
     }
     let h = guide.thickness_m();
     let plane_strain = guide.touched_plane_strain_pa();

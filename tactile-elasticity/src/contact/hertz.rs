@@ -378,11 +378,7 @@ pub fn cone(
 pub fn tangent_of_degrees(degrees: f64) -> Result<f64, ElasticityError> {
     let found = Quantity::HalfAngle.positive(degrees)?;
     if degrees >= 90.0 {
-        return Err(ElasticityError::OutOfRange {
-            quantity: Quantity::HalfAngle,
-            found,
-            limit: 90.0,
-        });
+        return Err(Quantity::HalfAngle.beyond(found, 90.0));
     }
     let radian = PI / 180.0;
     // 90° − α is exact from 45° on.

@@ -210,11 +210,7 @@ impl DiscreteKernel {
 }
 
 fn out_of_range(found: f64) -> ElasticityError {
-    ElasticityError::OutOfRange {
-        quantity: Quantity::ContactRadius,
-        found,
-        limit: LARGEST_A_OVER_H,
-    }
+    Quantity::ContactRadius.beyond(found, LARGEST_A_OVER_H)
 }
 
 // How much stiffer than a half-space layers on a rigid base are, by wavenumber.
@@ -637,12 +633,10 @@ impl LayerTable {
 /// What a contact of given a/h is beside Hertz's of the same radius, with slopes in ln a.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SharedContact {
-    /// ln of the force over Hertz's.
-    pub force: f64,
-    pub force_slope: f64,
-    /// ln of the indentation over Hertz's.
-    pub indentation: f64,
-    pub indentation_slope: f64,
+    /// ln of the force over Hertz's, and its slope.
+    pub force: [f64; 2],
+    /// ln of the indentation over Hertz's, and its slope.
+    pub indentation: [f64; 2],
 }
 
 /// Contacts of a sphere that yields with the layers: cubic in ln(a/h), Chebyshev in the touched
@@ -688,10 +682,8 @@ impl SharedLayerTable {
             let shrink = (at - self.first).exp();
             let (force, indentation) = rows[0].at(share);
             return Some(SharedContact {
-                force: force * shrink,
-                force_slope: force * shrink,
-                indentation: indentation * shrink,
-                indentation_slope: indentation * shrink,
+                force: [force * shrink; 2],
+                indentation: [indentation * shrink; 2],
             });
         }
         let start = (place as usize).saturating_sub(1).min(rows.len() - 4);
@@ -699,13 +691,9 @@ impl SharedLayerTable {
             let k = start + i;
             (self.first + STEP * k as f64, rows[k].at(share))
         });
-        let (force, force_slope) = cubic(window.map(|(x, v)| (x, v.0)), at);
-        let (indentation, indentation_slope) = cubic(window.map(|(x, v)| (x, v.1)), at);
         Some(SharedContact {
-            force,
-            force_slope,
-            indentation,
-            indentation_slope,
+            force: cubic(window.map(|(x, v)| (x, v.0)), at).into(),
+            indentation: cubic(window.map(|(x, v)| (x, v.1)), at).into(),
         })
     }
 }

@@ -138,19 +138,11 @@ impl LayerPlane {
     ) -> Result<Vec<usize>, ElasticityError> {
         let cells = self.shape[0] * self.shape[1];
         for found in [displacement_m.len(), contact.len()] {
-            if found != cells {
-                return Err(ElasticityError::LengthMismatch {
-                    quantity: Quantity::Elements,
-                    expected: cells,
-                    found,
-                });
-            }
+            Quantity::Elements.entries(found, cells)?;
         }
         let touched: Vec<usize> = (0..cells).filter(|&at| contact[at]).collect();
-        if touched.iter().any(|&at| !displacement_m[at].is_finite()) {
-            return Err(ElasticityError::NotFinite {
-                quantity: Quantity::Indentation,
-            });
+        for &at in &touched {
+            Quantity::Indentation.finite(displacement_m[at])?;
         }
         Ok(touched)
     }

@@ -108,18 +108,11 @@ impl ContactTable {
         Quantity::Radius.positive(radius_m)?;
         poisson(poisson_ratio)?;
         let rigid = guide.layers().is_empty();
-        at_least(
-            curves.len(),
-            if rigid { 1 } else { 2 },
-            Quantity::YoungsModulus,
-        )?;
+        Quantity::YoungsModulus.at_least(curves.len(), if rigid { 1 } else { 2 })?;
         for curve in &curves {
             curve.check()?;
         }
-        growing(
-            curves.iter().map(|c| c.youngs_modulus_pa),
-            Quantity::YoungsModulus,
-        )?;
+        Quantity::YoungsModulus.growing(curves.iter().map(|c| c.youngs_modulus_pa))?;
         let samples: Vec<Sample> = curves
             .iter()
             .flat_map(|curve| curve.samples(radius_m, poisson_ratio))
@@ -294,34 +287,6 @@ fn log_hertz(a: f64, log_modulus: f64, radius_m: f64, poisson_ratio: f64) -> f64
     log_modulus + shape.ln()
 }
 
-fn at_least(found: usize, expected: usize, quantity: Quantity) -> Result<(), ElasticityError> {
-    if found < expected {
-        return Err(ElasticityError::LengthMismatch {
-            quantity,
-            expected,
-            found,
-        });
-    }
-    Ok(())
-}
-
-/// Positive numbers, each above the one before.
-fn growing(values: impl Iterator<Item = f64>, quantity: Quantity) -> Result<(), ElasticityError> {
-    let mut last = 0.0;
-    for value in values {
-        quantity.positive(value)?;
-        if value <= last {
-            return Err(ElasticityError::OutOfRange {
-                quantity,
-                found: value,
-                limit: last,
-            });
-        }
-        last = value;
-    }
-    Ok(())
-}
-
 /// The table as files hold it.
 #[cfg(feature = "serde")]
 #[derive(serde::Serialize, serde::Deserialize)]
@@ -403,23 +368,11 @@ impl ContactCurve {
 
     fn check(&self) -> Result<(), ElasticityError> {
         Quantity::YoungsModulus.positive(self.youngs_modulus_pa)?;
-        at_least(
-            self.contact_radius_m.len(),
-            Self::FEWEST_CONTACTS,
-            Quantity::ContactRadius,
-        )?;
-        if self.force_n.len() != self.contact_radius_m.len() {
-            return Err(ElasticityError::LengthMismatch {
-                quantity: Quantity::Force,
-                expected: self.contact_radius_m.len(),
-                found: self.force_n.len(),
-            });
-        }
-        growing(
-            self.contact_radius_m.iter().copied(),
-            Quantity::ContactRadius,
-        )?;
-        growing(self.force_n.iter().copied(), Quantity::Force)
+        let contacts = self.contact_radius_m.len();
+        Quantity::ContactRadius.at_least(contacts, Self::FEWEST_CONTACTS)?;
+        Quantity::Force.entries(self.force_n.len(), contacts)?;
+        Quantity::ContactRadius.growing(self.contact_radius_m.iter().copied())?;
+        Quantity::Force.growing(self.force_n.iter().copied())
     }
 
     fn samples(&self, radius_m: f64, poisson_ratio: f64) -> impl Iterator<Item = Sample> {

@@ -209,36 +209,29 @@ fn another_ball_or_guide_is_refused() {
 
 #[test]
 fn curves_without_meaning_are_refused() {
-    type Change = fn(&mut Vec<ContactCurve>);
-    let refused: [(&str, Change); 8] = [
-        ("Young's modulus: expected 2 entries, found 1", |c| {
-            c.truncate(1)
-        }),
-        ("Young's modulus = 30000 is beyond", |c| c.swap(0, 1)),
-        ("Young's modulus must be greater", |c| {
-            c[0].youngs_modulus_pa = f64::NAN
-        }),
-        ("contact radius: expected 4", |c| {
-            c[1].contact_radius_m.truncate(3)
-        }),
-        ("contact radius must be greater", |c| {
-            c[1].contact_radius_m[4] = -1.0
-        }),
-        ("force: expected 16 entries, found 5", |c| {
-            c[1].force_n.truncate(5)
-        }),
-        ("force = ", |c| c[1].force_n.swap(2, 3)),
-        // The stiffer ball needs the smaller force.
-        ("the table's force does not grow", |c| {
-            c[1].force_n.iter_mut().for_each(|f| *f *= 0.3)
-        }),
-    ];
-    for (message, change) in refused {
+    let refuses = |message: &str, change: fn(&mut Vec<ContactCurve>)| {
         let mut curves = vec![curve(30e3, 1.0), curve(60e3, 1.0), curve(120e3, 1.0)];
         change(&mut curves);
         let error = ContactTable::new(RADIUS, 0.495, &guide(), curves).unwrap_err();
         assert!(error.to_string().starts_with(message), "{error}");
-    }
+    };
+    refuses("Young's modulus: expected 2", |c| c.truncate(1));
+    refuses("Young's modulus = 30000 is beyond", |c| c.swap(0, 1));
+    refuses("Young's modulus must be", |c| {
+        c[0].youngs_modulus_pa = f64::NAN
+    });
+    refuses("contact radius: expected 4", |c| {
+        c[1].contact_radius_m.truncate(3)
+    });
+    refuses("contact radius must be", |c| {
+        c[1].contact_radius_m[4] = -1.0
+    });
+    refuses("force: expected 16", |c| c[1].force_n.truncate(5));
+    refuses("force = ", |c| c[1].force_n.swap(2, 3));
+    // The stiffer ball needs the smaller force.
+    refuses("the table's force does not grow", |c| {
+        c[1].force_n.iter_mut().for_each(|f| *f *= 0.3);
+    });
 }
 
 #[cfg(feature = "serde")]

@@ -716,11 +716,7 @@ impl ContactEstimator<ConeLaw> {
         let (angle, limit) = (half_angle_rad, std::f64::consts::FRAC_PI_2);
         Quantity::HalfAngle.positive(angle)?;
         if angle >= limit {
-            return Err(ElasticityError::OutOfRange {
-                quantity: Quantity::HalfAngle,
-                found: angle,
-                limit,
-            });
+            return Err(Quantity::HalfAngle.beyond(angle, limit));
         }
         Self::from_law(ConeLaw::new(angle.tan())?, poisson_ratio)
     }

@@ -2,7 +2,7 @@
 
 use super::load::LoadSeries;
 use crate::error::ElasticityError;
-use std::sync::Arc;
+use std::ops::Deref;
 use tactile_core::{Estimate, Interval};
 
 /// Estimates Young's modulus from a series of loads.
@@ -66,21 +66,8 @@ pub trait ModulusEstimator {
     }
 }
 
-impl<E: ModulusEstimator + ?Sized> ModulusEstimator for Box<E> {
-    fn estimate(&self, series: &LoadSeries) -> Result<ModulusEstimate, ElasticityError> {
-        (**self).estimate(series)
-    }
-
-    fn kind(&self) -> EstimatorKind {
-        (**self).kind()
-    }
-
-    fn needs_strain(&self) -> bool {
-        (**self).needs_strain()
-    }
-}
-
-impl<E: ModulusEstimator + ?Sized> ModulusEstimator for Arc<E> {
+/// Boxed, shared and borrowed estimators.
+impl<P: Deref<Target: ModulusEstimator>> ModulusEstimator for P {
     fn estimate(&self, series: &LoadSeries) -> Result<ModulusEstimate, ElasticityError> {
         (**self).estimate(series)
     }

@@ -696,7 +696,7 @@ impl ContactLaw for LayerLaw {
 }
 
 /// ln f of a law with a correction and what it adds to the slopes.
-fn corrected(law: LogForce, value: f64, slope: f64, size_slope: f64) -> LogForce {
+pub(super) fn corrected(law: LogForce, value: f64, slope: f64, size_slope: f64) -> LogForce {
     LogForce::new(
         law.value + value,
         law.slope + slope,

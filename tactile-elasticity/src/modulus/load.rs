@@ -146,11 +146,7 @@ impl SharedErrors {
         }
         let correlation = errors.length_with_other_body;
         if !(-1.0..=1.0).contains(&correlation) {
-            return Err(ElasticityError::OutOfRange {
-                quantity: Quantity::Correlation,
-                found: correlation,
-                limit: 1.0,
-            });
+            return Err(Quantity::Correlation.beyond(correlation, 1.0));
         }
         Ok(self)
     }
@@ -267,19 +263,12 @@ impl LoadSeries {
         covariance: &DMatrix<f64>,
         quantity: Quantity,
     ) -> Result<DMatrix<f64>, ElasticityError> {
-        if !covariance.iter().all(|x| x.is_finite()) {
-            return Err(ElasticityError::NotFinite { quantity });
+        for &entry in covariance {
+            quantity.finite(entry)?;
         }
-        let expected = self.loads.len();
-        let sizes = [covariance.nrows(), covariance.ncols()];
-        match sizes.into_iter().find(|&n| n != expected) {
-            Some(found) => Err(ElasticityError::LengthMismatch {
-                quantity,
-                expected,
-                found,
-            }),
-            None => Ok(covariance.clone()),
-        }
+        quantity.entries(covariance.nrows(), self.loads.len())?;
+        quantity.entries(covariance.ncols(), self.loads.len())?;
+        Ok(covariance.clone())
     }
 
     /// The loads, in the order given.

@@ -122,11 +122,7 @@ impl TabulatedContact {
             let (found, limit) = (first.radius.value, limit * self.table.radius_m());
             contacts.retain(|c| self.table.covers(c.radius.value, fit.log_modulus));
             if contacts.is_empty() {
-                return Err(ElasticityError::OutOfRange {
-                    quantity: Quantity::ContactRadius,
-                    found,
-                    limit,
-                });
+                return Err(Quantity::ContactRadius.beyond(found, limit));
             }
         }
     }
@@ -329,11 +325,8 @@ impl ModulusEstimator for TabulatedContact {
             });
         }
         if fit.below {
-            return Err(ElasticityError::OutOfRange {
-                quantity: Quantity::YoungsModulus,
-                found: fit.mean.mean.exp(),
-                limit: self.table.log_moduli()[0].exp(),
-            });
+            return Err(Quantity::YoungsModulus
+                .beyond(fit.mean.mean.exp(), self.table.log_moduli()[0].exp()));
         }
         let upper = if known {
             self.limit(&contacts, &fit, reach)

@@ -1,7 +1,7 @@
 //! A soft sphere, the sample, on the layers of a waveguide.
 
 use super::EstimatorKind;
-use super::law::{ContactLaw, HertzLaw, LogForce};
+use super::law::{ContactLaw, HertzLaw, LogForce, corrected};
 use crate::contact::{Bond, LayerKernel, SharedLayerTable, Waveguide};
 use crate::error::{ElasticityError, Quantity, poisson};
 
@@ -65,43 +65,45 @@ impl WaveguideLaw {
         if x > TABULATED.1 {
             return None;
         }
-        let mut contact = Contact {
-            log_force: self.sphere.log_force_at_radius(a, share)?,
-            log_indentation: 2.0 * a.ln() - self.sphere.radius_m().ln(),
-            indentation_slope: 2.0,
-            ball_part: 1.0,
-        };
-        let mut linear = LinearContact {
+        let rigid = LinearContact {
             ratio: x,
             ball: 1.0,
             layer_ratio: 0.0,
             log_force: [0.0; 2],
             log_indentation: [0.0; 2],
         };
-        if let Some(table) = &self.layers {
-            let layers = table.at(a / self.thickness_m, share)?;
-            contact.log_force.value += layers.force;
-            contact.log_force.slope += layers.force_slope;
-            contact.log_indentation += layers.indentation;
-            contact.indentation_slope += layers.indentation_slope;
-            // The ball's compliance (1 − s)/E* times the stiffness that the contact has, F/F_Hertz
-            // times E*.
-            linear.ball = ((1.0 - share) * layers.force.exp()).clamp(0.0, 1.0);
-            contact.ball_part = linear.ball;
-            linear.layer_ratio = a / self.thickness_m;
-            linear.log_force = [layers.force, layers.force_slope];
-            linear.log_indentation = [layers.indentation, layers.indentation_slope];
-        }
-        if let Some(strain) = &self.finite_strain {
-            let force = strain.force(&linear);
-            contact.log_force.value += force.value;
-            contact.log_force.slope += force.slope;
-            contact.log_force.size_slope -= force.ratio_slope;
-            let indentation = strain.indentation(&linear);
-            contact.log_indentation += indentation.value;
-            contact.indentation_slope += indentation.slope;
-        }
-        Some(contact)
+        let linear = match &self.layers {
+            None => rigid,
+            Some(table) => {
+                let layers = table.at(a / self.thickness_m, share)?;
+                // The ball's compliance (1 − s)/E* times the stiffness that the contact has,
+                // F/F_Hertz times E*.
+                let ball = ((1.0 - share) * layers.force[0].exp()).clamp(0.0, 1.0);
+                LinearContact {
+                    ball,
+                    layer_ratio: a / self.thickness_m,
+                    log_force: layers.force,
+                    log_indentation: layers.indentation,
+                    ..rigid
+                }
+            }
+        };
+        let strain = self.finite_strain.as_ref();
+        let force = strain.map_or_else(Correction::default, |s| s.force(&linear));
+        let depth = strain.map_or_else(Correction::default, |s| s.indentation(&linear));
+        let hertz = corrected(
+            self.sphere.log_force_at_radius(a, share)?,
+            linear.log_force[0],
+            linear.log_force[1],
+            0.0,
+        );
+        let hertz_depth = 2.0 * a.ln() - self.sphere.radius_m().ln();
+        Some(Contact {
+            log_force: corrected(hertz, force.value, force.slope, -force.ratio_slope),
+            log_indentation: hertz_depth + linear.log_indentation[0] + depth.value,
+            indentation_slope: 2.0 + linear.log_indentation[1] + depth.slope,
+            ball_part: linear.ball,
+        })
     }
 
     /// The contact radius of an indentation, by Newton's method in logarithms.
@@ -249,7 +251,7 @@ impl LinearContact {
 }
 
 /// A correction and its slopes.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 struct Correction {
     value: f64,
     /// In ln a.

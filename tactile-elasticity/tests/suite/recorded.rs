@@ -31,6 +31,12 @@ impl Answers {
         self.0.add(name, [value]);
     }
 
+    fn all<const N: usize>(&mut self, name: &str, values: [(&str, f64); N]) {
+        for (of, value) in values {
+            self.add(&format!("{name} {of}"), value);
+        }
+    }
+
     fn tensor(&mut self, name: &str, tensor: &Matrix3<f64>) {
         for (i, x) in tensor.iter().enumerate() {
             self.add(&format!("{name} {i}"), *x);
@@ -39,24 +45,23 @@ impl Answers {
 
     fn estimate(&mut self, name: &str, estimator: &dyn ModulusEstimator, series: &LoadSeries) {
         let e = estimator.estimate(series).expect(name);
-        self.add(&format!("{name} E"), e.youngs_modulus_pa);
-        self.add(&format!("{name} error"), e.standard_error_pa);
-        self.add(&format!("{name} lower"), e.interval_95.lower);
-        self.add(
-            &format!("{name} upper"),
-            e.interval_95.upper.unwrap_or(-1.0),
+        self.all(
+            name,
+            [
+                ("E", e.youngs_modulus_pa),
+                ("error", e.standard_error_pa),
+                ("lower", e.interval_95.lower),
+                ("upper", e.interval_95.upper.unwrap_or(-1.0)),
+                ("aicc", e.fit.aicc),
+                ("warnings", e.warnings.len() as f64),
+            ],
         );
-        self.add(&format!("{name} aicc"), e.fit.aicc);
-        self.add(&format!("{name} warnings"), e.warnings.len() as f64);
         for (i, load) in e.loads.iter().enumerate() {
-            self.add(
-                &format!("{name} load {i} E"),
-                load.youngs_modulus_pa.unwrap_or(-1.0),
-            );
-            self.add(
-                &format!("{name} load {i} residual"),
-                load.standardized_residual.unwrap_or(-1.0),
-            );
+            let of_load = [
+                ("E", load.youngs_modulus_pa.unwrap_or(-1.0)),
+                ("residual", load.standardized_residual.unwrap_or(-1.0)),
+            ];
+            self.all(&format!("{name} load {i}"), of_load);
         }
     }
 }
@@ -101,15 +106,9 @@ fn contacts(answers: &mut Answers) {
     let hertz = HertzContact::from_force(0.05, 3e-3, 45e3).unwrap();
     for r in [0.0, 1e-3, 2.5e-3, 7e-3] {
         answers.add(&format!("Hertz pressure {r}"), hertz.pressure_pa(r));
-        answers.add(
-            &format!("Hertz displacement {r}"),
-            hertz_surface_displacement_m(
-                r,
-                hertz.contact_radius_m,
-                hertz.peak_pressure_pa,
-                hertz.reduced_modulus_pa,
-            ),
-        );
+        let (a, p0) = (hertz.contact_radius_m, hertz.peak_pressure_pa);
+        let u = hertz_surface_displacement_m(r, a, p0, hertz.reduced_modulus_pa);
+        answers.add(&format!("Hertz displacement {r}"), u);
     }
     answers.add("Tatara", tatara_indentation_m(1.4e-3, 3e-3, 0.47).unwrap());
     for (name, bond, nu) in [
@@ -119,23 +118,14 @@ fn contacts(answers: &mut Answers) {
     ] {
         let series = LayerSeries::corrected(bond, nu, 0.7).unwrap();
         for ratio in [0.01, 0.4, 1.5, 7.0] {
-            let contact = LayerEquation::new(bond, nu)
-                .unwrap()
-                .with_share(0.8)
-                .solve(ratio)
-                .unwrap();
-            answers.add(
-                &format!("layer {name} {ratio} force"),
-                contact.force_ratio_same_radius,
-            );
-            answers.add(
-                &format!("layer {name} {ratio} indentation"),
-                contact.indentation_ratio,
-            );
-            answers.add(
-                &format!("layer {name} {ratio} series"),
-                series.force_ratio(ratio),
-            );
+            let equation = LayerEquation::new(bond, nu).unwrap().with_share(0.8);
+            let contact = equation.solve(ratio).unwrap();
+            let found = [
+                ("force", contact.force_ratio_same_radius),
+                ("indentation", contact.indentation_ratio),
+                ("series", series.force_ratio(ratio)),
+            ];
+            answers.all(&format!("layer {name} {ratio}"), found);
         }
     }
 }
@@ -254,11 +244,14 @@ fn curves(answers: &mut Answers) {
     let selection =
         select_model(&curve, &sphere, 0.48, Model::Auto, &CurveOptions::default()).unwrap();
     for (k, fit) in selection.fits.iter().enumerate() {
-        answers.add(&format!("curve {k} E"), fit.youngs_modulus_pa);
-        answers.add(&format!("curve {k} error"), fit.standard_error_pa);
-        answers.add(&format!("curve {k} contact"), fit.contact_point_m);
-        answers.add(&format!("curve {k} offset"), fit.offset_n);
-        answers.add(&format!("curve {k} aicc"), fit.statistics.aicc);
+        let found = [
+            ("E", fit.youngs_modulus_pa),
+            ("error", fit.standard_error_pa),
+            ("contact", fit.contact_point_m),
+            ("offset", fit.offset_n),
+            ("aicc", fit.statistics.aicc),
+        ];
+        answers.all(&format!("curve {k}"), found);
     }
 }
 

@@ -141,14 +141,8 @@ fn a_batch_has_the_bits_of_one_at_a_time() {
         assert_eq!(parallel, batch);
     }
     let missing = green_lagrange_into(&gradients, &mut batch[1..]).unwrap_err();
-    assert_eq!(
-        missing,
-        ElasticityError::LengthMismatch {
-            quantity: Quantity::Strain,
-            expected: 300,
-            found: 299
-        }
-    );
+    let message = "strain: expected 300 entries, found 299";
+    assert_eq!(missing.to_string(), message);
 }
 
 #[test]
@@ -169,34 +163,19 @@ fn batches_and_measures_allocate_nothing() {
 #[test]
 fn bad_gradients_are_named() {
     let broken = Matrix3::from_diagonal_element(f64::NAN);
+    let quantity = Quantity::DeformationGradient;
     for measure in measures() {
         let error = measure.strain(&broken).unwrap_err();
-        assert_eq!(
-            error,
-            ElasticityError::NotFinite {
-                quantity: Quantity::DeformationGradient
-            },
-            "{}",
-            measure.name()
-        );
+        assert_eq!(error, ElasticityError::NotFinite { quantity });
     }
-    let flat = Deformation::from_deformation_gradient(Matrix3::from_diagonal(&Vector3::new(
-        1.0, 1.0, 0.0,
-    )));
-    assert_eq!(
-        Hencky.of(&flat).unwrap_err(),
-        ElasticityError::SingularDeformation
-    );
+    let flat = Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, 0.0));
+    let flat = Hencky.of(&Deformation::from_deformation_gradient(flat));
+    assert_eq!(flat, Err(ElasticityError::SingularDeformation));
     let field = StrainField::from_gradients(&[broken], None, &GreenLagrange);
-    assert!(matches!(field, Err(ElasticityError::NotFinite { .. })));
+    assert_eq!(field, Err(ElasticityError::NotFinite { quantity }));
     let weights = StrainField::from_gradients(&[Matrix3::zeros()], Some(&[-1.0]), &GreenLagrange);
-    assert!(matches!(
-        weights,
-        Err(ElasticityError::Negative {
-            quantity: Quantity::Weight,
-            ..
-        })
-    ));
+    let error = weights.unwrap_err().to_string();
+    assert!(error.starts_with("weight must not be negative"), "{error}");
 }
 
 #[test]
@@ -210,21 +189,15 @@ fn robust_averages_withstand_wild_points() {
     assert!(field.summary().mean[(0, 0)] > 0.08);
     for averaging in [Averaging::Huber, Averaging::Median] {
         let summary = field.summary_with(averaging);
-        assert!(
-            (summary.mean[(0, 0)] - 0.01).abs() < 2e-5,
-            "{averaging:?} {}",
-            summary.mean[(0, 0)]
-        );
+        let mean = summary.mean[(0, 0)];
+        assert!((mean - 0.01).abs() < 2e-5, "{averaging:?} {mean}");
         assert!(summary.spread[(0, 0)] < 6e-4 && summary.standard_error[(0, 0)] < 1e-4);
     }
 }
 
 #[test]
 fn weights_are_areas() {
-    let gradients = [
-        Matrix3::from_diagonal_element(0.0),
-        Matrix3::from_diagonal_element(0.04),
-    ];
+    let gradients = [0.0, 0.04].map(Matrix3::from_diagonal_element);
     let field = StrainField::from_gradients(&gradients, Some(&[3.0, 1.0]), &Infinitesimal).unwrap();
     assert!((field.summary().mean[(1, 1)] - 0.01f64).abs() < 1e-17);
 }

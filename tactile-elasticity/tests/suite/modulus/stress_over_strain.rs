@@ -63,6 +63,11 @@ fn strain_counted_from_the_first_load() {
     assert_eq!(refused(&[second; 2]), ElasticityError::EqualLoads);
 }
 
+fn refuses(estimator: &dyn ModulusEstimator, loads: &[LoadState], message: &str) {
+    let error = estimator.estimate(&LoadSeries::new(loads)).unwrap_err();
+    assert!(error.to_string().starts_with(message), "{error}");
+}
+
 #[test]
 fn bad_input_is_named() {
     let with_radius = |force: f64, radius: f64| LoadState {
@@ -77,60 +82,23 @@ fn bad_input_is_named() {
         mean_strain: Some(exact(0.1)),
         ..LoadState::new(exact(1.0))
     };
-    let few = "0 usable loads, at least 1";
-    let ratio: &dyn ModulusEstimator = &PaperRatio::default();
-    let line: &dyn ModulusEstimator = &StressStrainRegression::default();
-    let sphere: &dyn ModulusEstimator = &HertzSphere::new(4e-3, NU).unwrap();
-    for (estimator, loads, message) in [
-        (ratio, vec![strained(100.0, 0.0)], "the strain is zero"),
-        (
-            ratio,
-            vec![strained(100.0, -0.1)],
-            "stress (100 Pa) and strain (-0.1)",
-        ),
-        (
-            ratio,
-            vec![with_area(0.0)],
-            "contact area must be greater than zero and finite, found 0",
-        ),
-        (
-            ratio,
-            vec![with_area(-1e-6)],
-            "contact area must be greater",
-        ),
-        (
-            ratio,
-            vec![strained(f64::NAN, 0.1)],
-            "force is not a finite number",
-        ),
-        (
-            ratio,
-            vec![strained(100.0, f64::NAN)],
-            "strain is not a finite number",
-        ),
-        (ratio, vec![LoadState::new(exact(1.0))], few),
-        (ratio, vec![bare], "load 0 has no contact area"),
-        (line, vec![strained(10.0, 0.1); 3], "all loads are equal"),
-        (
-            line,
-            vec![strained(10.0, 0.1)],
-            "1 usable loads, at least 3",
-        ),
-        (sphere, vec![], few),
-        (
-            sphere,
-            vec![with_radius(-1.0, 1e-3)],
-            "force must be greater",
-        ),
-        (
-            sphere,
-            vec![with_radius(1.0, 0.0)],
-            "contact radius must be greater",
-        ),
-    ] {
-        let error = estimator.estimate(&LoadSeries::new(loads)).unwrap_err();
-        assert!(error.to_string().starts_with(message), "{error}");
-    }
+    let ratio = PaperRatio::default();
+    let line = StressStrainRegression::default();
+    let sphere = HertzSphere::new(4e-3, NU).unwrap();
+    refuses(&ratio, &[strained(100.0, 0.0)], "the strain is zero");
+    let opposite = "stress (100 Pa) and strain (-0.1)";
+    refuses(&ratio, &[strained(100.0, -0.1)], opposite);
+    refuses(&ratio, &[with_area(0.0)], "contact area must be");
+    refuses(&ratio, &[with_area(-1e-6)], "contact area must be");
+    refuses(&ratio, &[strained(f64::NAN, 0.1)], "force is not a");
+    refuses(&ratio, &[strained(100.0, f64::NAN)], "strain is not a");
+    refuses(&ratio, &[LoadState::new(exact(1.0))], "0 usable loads");
+    refuses(&ratio, &[bare], "load 0 has no contact area");
+    refuses(&line, &[strained(10.0, 0.1); 3], "all loads are equal");
+    refuses(&line, &[strained(10.0, 0.1)], "1 usable loads, at least 3");
+    refuses(&sphere, &[], "0 usable loads, at least 1");
+    refuses(&sphere, &[with_radius(-1.0, 1e-3)], "force must be");
+    refuses(&sphere, &[with_radius(1.0, 0.0)], "contact radius must");
     for nu in [-1.0, 0.500001, f64::NAN, 7.0] {
         let refused = HertzSphere::new(1e-3, nu);
         assert!(matches!(refused, Err(ElasticityError::PoissonRatio { .. })));
@@ -146,14 +114,13 @@ fn bad_input_is_named() {
         |shared, error| shared.poisson_ratio = error,
         |shared, error| shared.other_body = error,
     ];
-    for (set, error) in wrong
-        .iter()
-        .flat_map(|set| [-0.1, f64::NAN, f64::INFINITY].map(|e| (set, e)))
-    {
-        let mut shared = SharedErrors::default();
-        set(&mut shared, error);
-        let refused = LoadSeries::new([bare]).with_shared_errors(shared);
-        assert!(matches!(refused, Err(ElasticityError::Negative { .. })));
+    for set in wrong {
+        for error in [-0.1, f64::NAN, f64::INFINITY] {
+            let mut shared = SharedErrors::default();
+            set(&mut shared, error);
+            let refused = LoadSeries::new([bare]).with_shared_errors(shared);
+            assert!(matches!(refused, Err(ElasticityError::Negative { .. })));
+        }
     }
 }
 
