@@ -31,15 +31,9 @@ use crate::stick::Slip;
 pub enum Opposite {
     /// Another body's surface.
     Surface(SurfaceCurve),
-    /// A rigid shape above (+1) or below (−1) the surface.
-    Rigid {
-        shape: RigidShape,
-        side: f64,
-        /// Height of the shape's pole in the reference configuration.
-        height: f64,
-        /// Whether the approach moves it.
-        driven: bool,
-    },
+    /// A rigid shape above (+1) or below (−1) the surface, whose pole is at z = 0 in the reference
+    /// configuration. One below moves by the approach.
+    Rigid { shape: RigidShape, side: f64 },
 }
 
 /// Half of an edge of a contact surface, between two of its nodes.
@@ -239,13 +233,7 @@ const BEND: Weights = [1.0, -2.0, 1.0];
 impl CurvePoint {
     /// Weighted sum over the nodes.
     pub fn sum(&self, weights: &Weights, at: impl Fn(usize) -> [f64; 2]) -> [f64; 2] {
-        let mut sum = [0.0; 2];
-        for (&node, weight) in self.nodes.iter().zip(weights) {
-            let point = at(node);
-            sum[0] += weight * point[0];
-            sum[1] += weight * point[1];
-        }
-        sum
+        combine(weights, self.nodes, at)
     }
 }
 
@@ -310,9 +298,7 @@ impl Placement<'_> {
     pub fn moved(&self, node: usize) -> [f64; 2] {
         [self.displacement[2 * node], self.displacement[2 * node + 1]]
     }
-}
 
-impl Placement<'_> {
     /// Deformed area over reference area at a point of an edge with these shape functions (one in
     /// linear kinematics).
     pub fn stretch(&self, shape: &[f64; 3], derivative: &[f64; 3], nodes: [usize; 3]) -> f64 {
@@ -399,12 +385,7 @@ impl Placement<'_> {
     /// The gap of a point, `None` where there is nothing opposite to it.
     pub fn gap(&self, point: &GapPoint, opposite: &Opposite) -> Option<Gap> {
         match opposite {
-            Opposite::Rigid {
-                shape,
-                side,
-                height,
-                driven,
-            } => self.rigid_gap(point, *shape, *side, *height, *driven),
+            Opposite::Rigid { shape, side } => self.rigid_gap(point, *shape, *side),
             Opposite::Surface(curve) => match self.kinematics {
                 Kinematics::Finite => self.surface_gap(point, curve),
                 Kinematics::Linear => self.vertical_gap(point, curve),
@@ -412,14 +393,8 @@ impl Placement<'_> {
         }
     }
 
-    fn rigid_gap(
-        &self,
-        point: &GapPoint,
-        shape: RigidShape,
-        side: f64,
-        height: f64,
-        driven: bool,
-    ) -> Option<Gap> {
+    fn rigid_gap(&self, point: &GapPoint, shape: RigidShape, side: f64) -> Option<Gap> {
+        let driven = side < 0.0;
         let reference = combine(&point.shape, point.nodes, |n| self.nodes[n]);
         let position = combine(&point.shape, point.nodes, |n| self.current(n));
         let linear = self.kinematics == Kinematics::Linear;
@@ -428,7 +403,7 @@ impl Placement<'_> {
         let (slope, bend) = if linear { (0.0, 0.0) } else { (slope, bend) };
         let moved = if driven { self.approach } else { 0.0 };
         // Above the surface (side +1) the shape's pole is its lowest point; below, its highest.
-        let value = side * (height + moved - position[1]) + profile;
+        let value = side * (moved - position[1]) + profile;
         let mut dofs = Vec::with_capacity(7);
         let mut first = Vec::with_capacity(7);
         for (node, n) in point.nodes.iter().zip(&point.shape) {

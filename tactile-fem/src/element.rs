@@ -71,12 +71,12 @@ pub struct ElementGeometry {
     inverse_mass: [[f64; 3]; 3],
 }
 
-/// The point ξ, η of an element: position, gradients, Jacobian's determinant.
-pub fn map(nodes: &[[f64; 2]; 9], xi: f64, eta: f64) -> ([f64; 2], [[f64; 3]; 9], f64) {
-    let shapes = shape(xi, eta);
+/// Where shape functions put the point of an element, the derivatives of that by ξ and η, and their
+/// determinant.
+pub fn position(nodes: &[[f64; 2]; 9], shapes: &[[f64; 3]; 9]) -> ([f64; 2], [[f64; 2]; 2], f64) {
     let mut position = [0.0; 2];
     let mut jacobian = [[0.0; 2]; 2];
-    for (node, [n, by_xi, by_eta]) in nodes.iter().zip(&shapes) {
+    for (node, [n, by_xi, by_eta]) in nodes.iter().zip(shapes) {
         for k in 0..2 {
             position[k] += n * node[k];
             jacobian[0][k] += by_xi * node[k];
@@ -84,6 +84,13 @@ pub fn map(nodes: &[[f64; 2]; 9], xi: f64, eta: f64) -> ([f64; 2], [[f64; 3]; 9]
         }
     }
     let determinant = jacobian[0][0] * jacobian[1][1] - jacobian[0][1] * jacobian[1][0];
+    (position, jacobian, determinant)
+}
+
+/// The point ξ, η of an element: position, gradients, Jacobian's determinant.
+pub fn map(nodes: &[[f64; 2]; 9], xi: f64, eta: f64) -> ([f64; 2], [[f64; 3]; 9], f64) {
+    let shapes = shape(xi, eta);
+    let (position, jacobian, determinant) = position(nodes, &shapes);
     let gradients = shapes.map(|[n, by_xi, by_eta]| {
         [
             (jacobian[1][1] * by_xi - jacobian[0][1] * by_eta) / determinant,

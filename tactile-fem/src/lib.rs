@@ -43,7 +43,6 @@
 
 mod contact;
 mod element;
-mod error;
 mod material;
 mod mesh;
 mod model;

@@ -1,7 +1,6 @@
 //! Materials and the stress they give.
 
-use crate::error::{Quantity, positive};
-use tactile_elasticity::ElasticityError;
+use tactile_elasticity::{ElasticityError, Quantity};
 
 /// Largest Poisson ratio the elements take: at ½ the bulk modulus is infinite.
 const LARGEST_POISSON_RATIO: f64 = 0.4999;
@@ -33,18 +32,14 @@ impl Material {
     /// # Errors
     /// A modulus that is not positive. a Poisson ratio outside (−1, 0.4999].
     pub fn new(youngs_modulus_pa: f64, poisson_ratio: f64) -> Result<Self, ElasticityError> {
-        positive(youngs_modulus_pa, Quantity::YoungsModulus)?;
+        Quantity::YoungsModulus.positive(youngs_modulus_pa)?;
         if !(poisson_ratio > -1.0 && poisson_ratio <= 0.5) {
             return Err(ElasticityError::PoissonRatio {
                 found: poisson_ratio,
             });
         }
         if poisson_ratio > LARGEST_POISSON_RATIO {
-            return Err(ElasticityError::OutOfRange {
-                quantity: Quantity::PoissonRatio,
-                found: poisson_ratio,
-                limit: LARGEST_POISSON_RATIO,
-            });
+            return Err(Quantity::PoissonRatio.beyond(poisson_ratio, LARGEST_POISSON_RATIO));
         }
         Ok(Self {
             youngs_modulus_pa,

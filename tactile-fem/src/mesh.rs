@@ -47,29 +47,7 @@ impl Mesh {
         self.regions.iter().max().map_or(0, |last| last + 1)
     }
 
-    /// A rectangle of one region with elements between the given lines. Its top is
-    /// [`Boundary::Contact`], its bottom [`Boundary::Base`].
-    #[cfg(test)]
-    pub fn rectangle(r_lines: &[f64], z_lines: &[f64]) -> Self {
-        let mut builder = MeshBuilder::default();
-        builder.rectangle(r_lines, z_lines, 0);
-        let mut mesh = builder.build();
-        let (bottom, top) = (z_lines[0], z_lines[z_lines.len() - 1]);
-        mesh.name_outer_edges(|[r, z]| {
-            if r <= 0.0 {
-                Boundary::Axis
-            } else if z <= bottom {
-                Boundary::Base
-            } else if z >= top {
-                Boundary::Contact
-            } else {
-                Boundary::Side
-            }
-        });
-        mesh
-    }
-
-    /// Gives every outer edge the name that `name` finds for its middle node.
+    /// Gives every outer edge off the axis the name that `name` finds for its middle node.
     fn name_outer_edges(&mut self, name: impl Fn([f64; 2]) -> Boundary) {
         let mut uses: BTreeMap<usize, usize> = BTreeMap::new();
         for element in &self.elements {
@@ -82,7 +60,10 @@ impl Mesh {
                 let middle = element[edge[1]];
                 if uses[&middle] == 1 {
                     let nodes = edge.map(|local| element[local]);
-                    let boundary = name(self.nodes[middle]);
+                    let boundary = match self.nodes[middle] {
+                        [r, _] if r <= 0.0 => Boundary::Axis,
+                        node => name(node),
+                    };
                     self.boundaries.entry(boundary).or_default().push(nodes);
                 }
             }
@@ -315,7 +296,12 @@ pub fn contact_lines(inner: f64, count: usize, growth: f64, largest: f64, end: f
     let mut lines: Vec<f64> = (0..=count)
         .map(|k| inner * k as f64 / count as f64)
         .collect();
-    let mut step = inner / count as f64;
+    grow(&mut lines, inner / count as f64, growth, largest, end);
+    lines
+}
+
+/// Lines after the last up to `end`: each step is `growth` times the one before, at most `largest`.
+fn grow(lines: &mut Vec<f64>, mut step: f64, growth: f64, largest: f64, end: f64) {
     loop {
         step = (step * growth).min(largest);
         let last = lines[lines.len() - 1];
@@ -325,7 +311,7 @@ pub fn contact_lines(inner: f64, count: usize, growth: f64, largest: f64, end: f
             if left > 0.0 {
                 lines.push(end);
             }
-            return lines;
+            return;
         }
         lines.push(last + step);
     }
@@ -371,11 +357,13 @@ struct Pole<S> {
     corner: [f64; 2],
     /// The surface over its parameter, from the pole at zero.
     surface: S,
+    /// Of the body's flat end.
+    height: f64,
 }
 
 impl<S: Fn(f64) -> [f64; 2]> Pole<S> {
     /// With shells at `parameters` (those of elements' ends and middles), where `shell` gives node
-    /// k of 4m + 1 from the surface to the axis. Boundaries without names.
+    /// k of 4m + 1 from the surface to the axis.
     fn mesh(&self, parameters: &[f64], shell: impl Fn(f64, usize) -> [f64; 2]) -> Mesh {
         let m = self.elements;
         let line = |a: [f64; 2], b: [f64; 2]| -> Vec<[f64; 2]> {
@@ -412,7 +400,15 @@ impl<S: Fn(f64) -> [f64; 2]> Pole<S> {
         builder.block(parameters.len() / 2, 2 * m, 0, |i, j| {
             shell(parameters[i], j)
         });
-        builder.build()
+        let mut mesh = builder.build();
+        mesh.name_outer_edges(|[_, z]| {
+            if z >= self.height * (1.0 - 1e-12) {
+                Boundary::Base
+            } else {
+                Boundary::Contact
+            }
+        });
+        mesh
     }
 }
 
@@ -435,16 +431,7 @@ impl Mesh {
         let limit = core::f64::consts::FRAC_PI_2;
         let largest = 1.6 * limit / (2.0 * m as f64);
         let mut angles = vec![start];
-        let mut step = first / radius;
-        loop {
-            step = (step * size.growth).min(largest);
-            let last = angles[angles.len() - 1];
-            if limit - last <= 1.5 * step {
-                angles.push(limit);
-                break;
-            }
-            angles.push(last + step);
-        }
+        grow(&mut angles, first / radius, size.growth, largest, limit);
         let angles = with_middles(&angles);
         // Node k of 4m + 1 from the surface to the axis on the shell at `angle`.
         let shell = |angle: f64, k: usize| -> [f64; 2] {
@@ -476,30 +463,19 @@ impl Mesh {
                 let half = (0.5 * angle).sin();
                 [radius * angle.sin(), 2.0 * radius * half * half]
             },
+            height: radius,
         };
-        let mut mesh = pole.mesh(&angles, shell);
-        mesh.name_outer_edges(|[r, z]| {
-            if r <= 0.0 {
-                Boundary::Axis
-            } else if z >= radius * (1.0 - 1e-12) {
-                Boundary::Base
-            } else {
-                Boundary::Contact
-            }
-        });
-        mesh
+        pole.mesh(&angles, shell)
     }
 
-    /// A cylinder on z = 0, its lower end [`Boundary::Contact`], its upper end [`Boundary::Base`].
+    /// A cylinder of one region, its lower end [`Boundary::Contact`], its upper [`Boundary::Base`].
     pub fn cylinder(r_lines: &[f64], z_lines: &[f64]) -> Self {
         let mut builder = MeshBuilder::default();
         builder.rectangle(r_lines, z_lines, 0);
         let mut mesh = builder.build();
-        let top = z_lines[z_lines.len() - 1];
-        mesh.name_outer_edges(|[r, z]| {
-            if r <= 0.0 {
-                Boundary::Axis
-            } else if z <= 0.0 {
+        let (bottom, top) = (z_lines[0], z_lines[z_lines.len() - 1]);
+        mesh.name_outer_edges(|[_, z]| {
+            if z <= bottom {
                 Boundary::Contact
             } else if z >= top {
                 Boundary::Base
@@ -523,16 +499,7 @@ impl Mesh {
         let start = size.inner + first;
         let largest = 1.6 * side / (2.0 * m as f64);
         let mut distances = vec![start];
-        let mut step = first;
-        loop {
-            step = (step * size.growth).min(largest);
-            let last = distances[distances.len() - 1];
-            if side - last <= 1.5 * step {
-                distances.push(side);
-                break;
-            }
-            distances.push(last + step);
-        }
+        grow(&mut distances, first, size.growth, largest, side);
         // Height on the axis of the shell at a distance along the side: the distance itself near
         // the tip, the cone's at its end.
         let on_axis = |s: f64| s / (1.0 + s / side * (1.0 / cos - 1.0));
@@ -552,18 +519,9 @@ impl Mesh {
             // On the middle of the shell between the core's ends and the first.
             corner: shell(size.inner + 0.5 * first, 2 * m),
             surface: |s: f64| [s * sin, s * cos],
+            height,
         };
-        let mut mesh = pole.mesh(&with_middles(&distances), shell);
-        mesh.name_outer_edges(|[r, z]| {
-            if r <= 0.0 {
-                Boundary::Axis
-            } else if z >= height * (1.0 - 1e-12) {
-                Boundary::Base
-            } else {
-                Boundary::Contact
-            }
-        });
-        mesh
+        pole.mesh(&with_middles(&distances), shell)
     }
 
     /// Bonded layers below z = 0, the first on top, of thicknesses `thickness` and radius `radius`.
@@ -582,10 +540,8 @@ impl Mesh {
             top -= thickness;
         }
         let mut mesh = builder.build();
-        mesh.name_outer_edges(|[r, z]| {
-            if r <= 0.0 {
-                Boundary::Axis
-            } else if z >= 0.0 {
+        mesh.name_outer_edges(|[_, z]| {
+            if z >= 0.0 {
                 Boundary::Contact
             } else if z <= top * (1.0 - 1e-9) {
                 Boundary::Base
@@ -731,9 +687,7 @@ impl BlockMesh {
         mesh.name_outer_edges(|[r, z]| {
             // Positions come from the same expressions as the limits: rounding alone tells them
             // apart.
-            if r <= 0.0 {
-                Boundary::Axis
-            } else if z <= glass * (1.0 - 1e-9) {
+            if z <= glass * (1.0 - 1e-9) {
                 Boundary::Base
             } else if z >= stage * (1.0 - 1e-9) {
                 Boundary::Stage

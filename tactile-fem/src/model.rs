@@ -8,13 +8,12 @@
 
 use crate::contact::{ContactNode, ContactSegment, Opposite, SurfaceCurve, contact_segments};
 use crate::element::{ALL, ElementGeometry};
-use crate::error::Quantity;
 use crate::material::{Kinematics, Material};
 use crate::mesh::{Boundary, Mesh};
 use crate::stick::Anchor;
 use std::collections::BTreeMap;
 use std::sync::Arc;
-use tactile_elasticity::ElasticityError;
+use tactile_elasticity::{ElasticityError, Quantity};
 
 /// A body of an [`ElementModel`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -48,7 +47,7 @@ pub struct Part {
 ///
 /// The approach δ, one number, moves every boundary that is [driven](Self::drive) by δ along +z. SI
 /// units. The axis of revolution is r = 0. Guides lie below z = 0 and objects above.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct ElementModel {
     pub kinematics: Kinematics,
     pub nodes: Vec<[f64; 2]>,
@@ -79,20 +78,7 @@ impl ElementModel {
     pub fn new(kinematics: Kinematics) -> Self {
         Self {
             kinematics,
-            nodes: Vec::new(),
-            elements: Vec::new(),
-            regions: Vec::new(),
-            geometry: Vec::new(),
-            materials: Vec::new(),
-            parts: Vec::new(),
-            motion: Vec::new(),
-            opposites: Vec::new(),
-            segments: Vec::new(),
-            contact_nodes: Vec::new(),
-            sticks: false,
-            interface: None,
-            partners: Vec::new(),
-            external: Vec::new(),
+            ..Self::default()
         }
     }
 
@@ -105,13 +91,7 @@ impl ElementModel {
         mesh: &Mesh,
         materials: &[Material],
     ) -> Result<BodyIndex, ElasticityError> {
-        if materials.len() != mesh.region_count() {
-            return Err(ElasticityError::LengthMismatch {
-                quantity: Quantity::Layers,
-                expected: mesh.region_count(),
-                found: materials.len(),
-            });
-        }
+        Quantity::Layers.entries(materials.len(), mesh.region_count())?;
         let mut geometry = Vec::with_capacity(mesh.elements.len());
         for (index, element) in mesh.elements.iter().enumerate() {
             let element = ElementGeometry::new(&element.map(|node| mesh.nodes[node]));
@@ -149,11 +129,6 @@ impl ElementModel {
             boundaries: shifted.collect(),
         });
         Ok(BodyIndex(self.parts.len() - 1))
-    }
-
-    /// Number of elements of all bodies.
-    pub fn element_count(&self) -> usize {
-        self.elements.len()
     }
 
     /// Materials of a body, by region.
@@ -195,8 +170,7 @@ impl ElementModel {
         }
     }
 
-    /// Lets two bodies' [`Boundary::Contact`] touch without friction, as
-    /// [`FemScene::ball_on_guide`](crate::FemScene::ball_on_guide) does.
+    /// Lets two bodies' [`Boundary::Contact`] touch without friction.
     ///
     /// Gaps are measured from `first`, which had better be the one with the finer mesh or the more
     /// convex of the two.
@@ -240,32 +214,12 @@ impl ElementModel {
         self.interface = Some(BondedInterface::new(&shared, &self.elements, is_upper, 1.0));
     }
 
-    /// Lets a body's [`Boundary::Contact`] touch a rigid body above it without friction, whose pole
-    /// is at `height_m` and does not move.
-    #[cfg(test)]
-    pub fn contact_rigid_above(&mut self, body: BodyIndex, shape: RigidShape, height_m: f64) {
-        let opposite = Opposite::Rigid {
-            shape,
-            side: 1.0,
-            height: height_m,
-            driven: false,
-        };
+    /// Lets a body's [`Boundary::Contact`] touch a rigid body without friction, whose pole is at
+    /// z = 0: above it (`side` +1) one that does not move, below it (−1) one that moves by the
+    /// approach.
+    pub fn contact_rigid(&mut self, body: BodyIndex, shape: RigidShape, side: f64) {
         let softer = self.softest(body);
-        self.add_points(body, opposite, softer);
-    }
-
-    /// Lets a body's [`Boundary::Contact`] touch a rigid body below it without friction, whose pole
-    /// starts at `height_m` and moves by the approach, as
-    /// [`FemScene::ball_on_flat`](crate::FemScene::ball_on_flat) does.
-    pub fn contact_rigid_below(&mut self, body: BodyIndex, shape: RigidShape, height_m: f64) {
-        let opposite = Opposite::Rigid {
-            shape,
-            side: -1.0,
-            height: height_m,
-            driven: true,
-        };
-        let softer = self.softest(body);
-        self.add_points(body, opposite, softer);
+        self.add_points(body, Opposite::Rigid { shape, side }, softer);
     }
 
     /// Forbids slip in all contacts of the model, as with unlimited friction: what touches stays

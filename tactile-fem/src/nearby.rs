@@ -21,22 +21,22 @@ impl FemScene {
         materials: &[(usize, Material)],
         moved: Option<&dyn Fn([f64; 2]) -> [f64; 2]>,
     ) -> Result<Self, ElasticityError> {
-        let mut model = self.model().clone();
+        let mut model = self.model.clone();
         for &(region, material) in materials {
             model.materials[region] = material;
         }
         if let Some(moved) = moved {
             model.move_nodes(|_, node| moved(node))?;
         }
-        Ok(Self::from_model(model))
+        Ok(Self { model })
     }
 
     /// The equations of this scene and of those [changed](Self::changed) from it, analysed. `None`
     /// where there is no memory for them.
     fn layout(&self) -> Option<Layout> {
-        let mut layout = Layout::new(self.model());
+        let mut layout = Layout::new(&self.model);
         layout
-            .pattern(&self.model().elements, core::iter::empty())
+            .pattern(&self.model.elements, core::iter::empty())
             .ok()?;
         Some(layout)
     }
@@ -47,7 +47,7 @@ impl FemScene {
         layout: &mut Layout,
         state: &'a State,
     ) -> Option<SolvedNeighbourhood<'a>> {
-        let model = self.model();
+        let model = &self.model;
         let system = model.assemble(layout, &state.fields, 0.0)?;
         let (tangent, slots, eliminations) = system.into_parts();
         Some(SolvedNeighbourhood {
@@ -243,7 +243,7 @@ impl SolvedNeighbourhood<'_> {
         let mut changes = Vec::with_capacity(nearby.len());
         for (scene, _) in nearby {
             let mut right = self.tangent.right.clone();
-            changes.push(self.change(scene.model(), &mut right)?);
+            changes.push(self.change(&scene.model, &mut right)?);
             columns.append(&mut right);
         }
         columns.extend(&self.tangent.driver_column);
@@ -254,7 +254,7 @@ impl SolvedNeighbourhood<'_> {
             let solution = &columns[k * size..(k + 1) * size];
             let approach = approach_m - self.fields.approach;
             let step = |equation: usize| solution[equation] - approach * by_approach[equation];
-            found.push(self.interface(scene.model(), &changes[k], approach, step)?);
+            found.push(self.interface(&scene.model, &changes[k], approach, step)?);
         }
         Some(found)
     }

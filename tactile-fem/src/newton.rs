@@ -16,7 +16,7 @@ use crate::model::{ElementModel, Equilibrium, ModelFields};
 use crate::scene::{AppliedLoad, Outcome, Solution, SolverReport};
 use crate::sparse::Factors;
 use crate::state::State;
-use crate::system::{Goal, Layout, Slot, Tangent};
+use crate::system::{Layout, Slot, Tangent};
 use std::sync::Arc;
 
 /// First step of a contact, over the bodies' height.
@@ -102,7 +102,7 @@ impl Solver<'_> {
         let AppliedLoad::Approach(approach) = load else {
             return false;
         };
-        let found = self.newton(guess.fields.clone(), Goal::Approach(approach));
+        let found = self.newton(guess.fields.clone(), AppliedLoad::Approach(approach));
         let is_found = found.is_some();
         if let Some(found) = found {
             self.before = Some(core::mem::replace(&mut self.last, found));
@@ -113,19 +113,14 @@ impl Solver<'_> {
 
     fn reach(&mut self, load: AppliedLoad) -> bool {
         let reached = match load {
-            AppliedLoad::Approach(approach) => {
-                approach.is_finite()
-                    && self.walk(|_| approach)
-                    && self.advance(Goal::Approach(approach))
-            }
+            AppliedLoad::Approach(approach) => approach.is_finite() && self.walk(|_| approach),
             AppliedLoad::Force(force) => {
                 force.is_finite()
                     && self.touch(force)
                     && self.walk(|solver| solver.approach_for(force))
-                    && self.advance(Goal::Force(force))
             }
         };
-        reached && self.augment(load)
+        reached && self.advance(load) && self.augment(load)
     }
 
     /// Goes towards an approach, which may change on the way, in steps that two deformable surfaces
@@ -155,7 +150,7 @@ impl Solver<'_> {
             if target(self) <= next {
                 return true;
             }
-            if !self.advance(Goal::Approach(next)) {
+            if !self.advance(AppliedLoad::Approach(next)) {
                 // Rounding may hide a first approach as small as this from the penalty.
                 if here != 0.0 || first >= FIRST_STEP * height {
                     return false;
@@ -180,7 +175,7 @@ impl Solver<'_> {
             if self.last.force.abs() > 1e-6 * force.abs() || force == 0.0 {
                 return true;
             }
-            if !self.advance(Goal::Approach(self.last.fields.approach + step)) {
+            if !self.advance(AppliedLoad::Approach(self.last.fields.approach + step)) {
                 return false;
             }
             step *= 2.0;
@@ -188,27 +183,21 @@ impl Solver<'_> {
         false
     }
 
-    fn advance(&mut self, goal: Goal) -> bool {
+    fn advance(&mut self, goal: AppliedLoad) -> bool {
         // Halvings of a load step before the solver stops.
         let max_halvings: usize = 10;
         let mut fraction = 1.0;
         let mut halvings = 0;
         loop {
             let now = self.position(goal, &self.last);
-            let target = match goal {
-                Goal::Approach(target) | Goal::Force(target) => target,
-            };
             let done = fraction == 1.0;
-            let next = if done {
-                target
-            } else {
-                now + fraction * (target - now)
+            let part = |target: f64| now + fraction * (target - now);
+            let next = match goal {
+                _ if done => goal,
+                AppliedLoad::Approach(target) => AppliedLoad::Approach(part(target)),
+                AppliedLoad::Force(target) => AppliedLoad::Force(part(target)),
             };
-            let step_goal = match goal {
-                Goal::Approach(_) => Goal::Approach(next),
-                Goal::Force(_) => Goal::Force(next),
-            };
-            match self.equilibrium(step_goal) {
+            match self.equilibrium(next) {
                 Some(mut found) => {
                     if self.model.sticks {
                         let before = &self.last.fields;
@@ -234,15 +223,15 @@ impl Solver<'_> {
         }
     }
 
-    fn position(&self, goal: Goal, equilibrium: &Equilibrium) -> f64 {
+    fn position(&self, goal: AppliedLoad, equilibrium: &Equilibrium) -> f64 {
         match goal {
-            Goal::Approach(_) => equilibrium.fields.approach,
-            Goal::Force(_) => equilibrium.force,
+            AppliedLoad::Approach(_) => equilibrium.fields.approach,
+            AppliedLoad::Force(_) => equilibrium.force,
         }
     }
 
     /// Equilibrium at the goal, from an extrapolation of the last two, else from the last.
-    fn equilibrium(&mut self, goal: Goal) -> Option<Equilibrium> {
+    fn equilibrium(&mut self, goal: AppliedLoad) -> Option<Equilibrium> {
         if let Some(guess) = self.extrapolated(goal)
             && let Some(found) = self.newton(guess, goal)
         {
@@ -251,7 +240,7 @@ impl Solver<'_> {
         self.newton(self.last.fields.clone(), goal)
     }
 
-    fn extrapolated(&self, goal: Goal) -> Option<ModelFields> {
+    fn extrapolated(&self, goal: AppliedLoad) -> Option<ModelFields> {
         if self.slides() {
             // Nodes that came into contact since do not go on as they did.
             return None;
@@ -259,7 +248,7 @@ impl Solver<'_> {
         let before = self.before.as_ref()?;
         let (from, to) = (self.position(goal, before), self.position(goal, &self.last));
         let target = match goal {
-            Goal::Approach(target) | Goal::Force(target) => target,
+            AppliedLoad::Approach(target) | AppliedLoad::Force(target) => target,
         };
         let ratio = (target - to) / (to - from);
         // Farther than three steps back reach, a linear extrapolation is worse than none.
@@ -283,8 +272,8 @@ impl Solver<'_> {
 
     /// Equilibrium at the goal. Without contacts by simplified Newton iterations where they
     /// converge.
-    fn newton(&mut self, start: ModelFields, goal: Goal) -> Option<Equilibrium> {
-        if let (Goal::Approach(to), true) = (goal, self.model.contact_nodes.is_empty()) {
+    fn newton(&mut self, start: ModelFields, goal: AppliedLoad) -> Option<Equilibrium> {
+        if let (AppliedLoad::Approach(to), true) = (goal, self.model.contact_nodes.is_empty()) {
             let iterations = &mut self.report.iterations;
             let found = simplified(self.model, self.layout, &start, to, iterations);
             return found.or_else(|| self.full(start, goal));
@@ -292,7 +281,7 @@ impl Solver<'_> {
         self.full(start, goal)
     }
 
-    fn full(&mut self, start: ModelFields, goal: Goal) -> Option<Equilibrium> {
+    fn full(&mut self, start: ModelFields, goal: AppliedLoad) -> Option<Equilibrium> {
         // Imbalance at a guessed approach below which the force takes over.
         let switch_to_force = 1e-2;
         // Part of a Newton step below which it is given up, where elements are turned inside out
@@ -306,19 +295,19 @@ impl Solver<'_> {
         // A force is reached at a guessed approach first: the tangent of a contact that has only
         // begun is no guide to where a force will be.
         let mut goal = match goal {
-            Goal::Force(force) => Goal::Approach(self.approach_for(force)),
-            Goal::Approach(_) => goal,
+            AppliedLoad::Force(force) => AppliedLoad::Approach(self.approach_for(force)),
+            AppliedLoad::Approach(_) => goal,
         };
-        let margin = |goal: Goal, fields: &ModelFields| match goal {
-            Goal::Approach(target) => target - fields.approach,
-            Goal::Force(_) => 0.0,
+        let margin = |goal: AppliedLoad, fields: &ModelFields| match goal {
+            AppliedLoad::Approach(target) => target - fields.approach,
+            AppliedLoad::Force(_) => 0.0,
         };
         let mut system = model.assemble(self.layout, &fields, margin(goal, &fields))?;
         let mut worst = f64::INFINITY;
         for iteration in 0..max_iterations {
             let there = match goal {
-                Goal::Approach(target) => fields.approach == target,
-                Goal::Force(_) => true,
+                AppliedLoad::Approach(target) => fields.approach == target,
+                AppliedLoad::Force(_) => true,
             };
             let imbalance = system.imbalance(goal);
             if there && goal != wanted && imbalance < switch_to_force {
@@ -345,7 +334,7 @@ impl Solver<'_> {
             let mut length = 1.0;
             (fields, system) = loop {
                 let mut trial = step.apply(&fields, length);
-                if let (Goal::Approach(target), true) = (goal, length == 1.0) {
+                if let (AppliedLoad::Approach(target), true) = (goal, length == 1.0) {
                     // Free of the rounding of the sum.
                     trial.approach = target;
                 }
@@ -386,24 +375,18 @@ impl Solver<'_> {
 
     /// Updates the contact multipliers at the last equilibrium and balances again.
     fn augment(&mut self, load: AppliedLoad) -> bool {
-        // Updates of the contact multipliers a load.
-        let augmentations: usize = 1;
-        for _ in 0..augmentations {
-            let mut fields = self.last.fields.clone();
-            if self.model.contact_nodes.is_empty() {
-                return true;
-            }
-            fields.multipliers.clone_from(&fields.contact);
-            let goal = match load {
-                AppliedLoad::Approach(approach) => Goal::Approach(approach),
-                AppliedLoad::Force(force) => Goal::Force(force),
-            };
-            match self.newton(fields, goal) {
-                Some(found) => self.last = found,
-                None => return false,
-            }
+        if self.model.contact_nodes.is_empty() {
+            return true;
         }
-        true
+        let mut fields = self.last.fields.clone();
+        fields.multipliers.clone_from(&fields.contact);
+        match self.newton(fields, load) {
+            Some(found) => {
+                self.last = found;
+                true
+            }
+            None => false,
+        }
     }
 }
 

@@ -2,12 +2,11 @@
 //!
 //! Objects pressed on a guide or on a rigid flat.
 
-use crate::error::{Quantity, positive};
 use crate::material::{Kinematics, Material};
 use crate::mesh::{Boundary, ContactMesh, Mesh, contact_lines, graded};
 use crate::model::{ElementModel, RigidShape, Support};
 use crate::scene::{FemScene, Interface};
-use tactile_elasticity::ElasticityError;
+use tactile_elasticity::{ElasticityError, Quantity};
 
 /// A layer of a [`Guide`].
 ///
@@ -59,16 +58,10 @@ impl Guide {
     /// # Errors
     /// No layer. A thickness or a radius that is not positive.
     pub fn new(layers: Vec<GuideLayer>, radius_m: f64) -> Result<Self, ElasticityError> {
-        positive(radius_m, Quantity::Radius)?;
-        if layers.is_empty() {
-            return Err(ElasticityError::LengthMismatch {
-                quantity: Quantity::Layers,
-                expected: 1,
-                found: 0,
-            });
-        }
+        Quantity::Radius.positive(radius_m)?;
+        Quantity::Layers.at_least(layers.len(), 1)?;
         for layer in &layers {
-            positive(layer.thickness_m, Quantity::Thickness)?;
+            Quantity::Thickness.positive(layer.thickness_m)?;
         }
         Ok(Self { layers, radius_m })
     }
@@ -233,11 +226,7 @@ impl ObjectPress {
         let radius = self.object.radius_m();
         let may_cover = matches!(self.object, ObjectShape::Cylinder { .. });
         if guide.radius_m() <= radius && !may_cover {
-            return Err(ElasticityError::OutOfRange {
-                quantity: Quantity::Radius,
-                found: radius,
-                limit: guide.radius_m(),
-            });
+            return Err(Quantity::Radius.beyond(radius, guide.radius_m()));
         }
         self.guide = Some(guide);
         Ok(self)
@@ -278,11 +267,7 @@ impl ObjectPress {
     pub fn with_fineness(mut self, elements: usize) -> Result<Self, ElasticityError> {
         const FEWEST: usize = 2;
         if elements < FEWEST {
-            return Err(ElasticityError::OutOfRange {
-                quantity: Quantity::Elements,
-                found: elements as f64,
-                limit: FEWEST as f64,
-            });
+            return Err(Quantity::Elements.beyond(elements as f64, FEWEST as f64));
         }
         self.fineness = elements;
         Ok(self)
@@ -301,7 +286,7 @@ impl ObjectPress {
         };
         model.hold(object, Boundary::Base, far_side);
         match &self.guide {
-            None => model.contact_rigid_below(object, RigidShape::Flat, 0.0),
+            None => model.contact_rigid(object, RigidShape::Flat, -1.0),
             Some(guide) => {
                 let disc = model.add(&self.guide_mesh(guide), &guide.materials())?;
                 model.drive(disc, Boundary::Base, Support::Bonded);
@@ -321,8 +306,12 @@ impl ObjectPress {
 
     fn size(&self) -> ContactMesh {
         let radius = match self.object {
-            ObjectShape::Cone { .. } => self.object.side_m(),
-            _ => self.object.radius_m(),
+            // The length of its side.
+            ObjectShape::Cone {
+                half_angle_rad,
+                height_m,
+            } => height_m / half_angle_rad.cos(),
+            object => object.radius_m(),
         };
         ContactMesh {
             inner: 0.06 * radius,
@@ -409,25 +398,21 @@ impl ObjectShape {
     fn check(&self) -> Result<(), ElasticityError> {
         match *self {
             Self::Ball { radius_m } | Self::HalfBall { radius_m } => {
-                positive(radius_m, Quantity::Radius)?;
+                Quantity::Radius.positive(radius_m)?;
             }
             Self::Cylinder { radius_m, height_m } => {
-                positive(radius_m, Quantity::Radius)?;
-                positive(height_m, Quantity::Thickness)?;
+                Quantity::Radius.positive(radius_m)?;
+                Quantity::Thickness.positive(height_m)?;
             }
             Self::Cone {
                 half_angle_rad,
                 height_m,
             } => {
-                positive(half_angle_rad, Quantity::HalfAngle)?;
-                positive(height_m, Quantity::Thickness)?;
+                Quantity::HalfAngle.positive(half_angle_rad)?;
+                Quantity::Thickness.positive(height_m)?;
                 let limit = core::f64::consts::FRAC_PI_2;
                 if half_angle_rad >= limit {
-                    return Err(ElasticityError::OutOfRange {
-                        quantity: Quantity::HalfAngle,
-                        found: half_angle_rad,
-                        limit,
-                    });
+                    return Err(Quantity::HalfAngle.beyond(half_angle_rad, limit));
                 }
             }
         }
@@ -445,43 +430,5 @@ impl ObjectShape {
                 height_m,
             } => height_m * half_angle_rad.tan(),
         }
-    }
-
-    /// Length of a cone's side. The radius of anything else.
-    fn side_m(&self) -> f64 {
-        match *self {
-            Self::Cone {
-                half_angle_rad,
-                height_m,
-            } => height_m / half_angle_rad.cos(),
-            _ => self.radius_m(),
-        }
-    }
-}
-
-impl FemScene {
-    /// The half of a ball next to its contact with a rigid flat. Its equator slides freely, as it
-    /// does where the ball is pressed the same way from both sides. [`ObjectPress`] has other
-    /// objects.
-    ///
-    /// # Errors
-    /// A radius that is not positive.
-    pub(crate) fn ball_on_flat(radius_m: f64, material: Material) -> Result<Self, ElasticityError> {
-        ObjectPress::new(ObjectShape::Ball { radius_m }, material)?.scene()
-    }
-
-    /// The half of a ball on a guide, without friction. The ball's equator slides freely at its
-    /// height, the glass moves by the approach. [`ObjectPress`] has other objects.
-    ///
-    /// # Errors
-    /// A radius that is not positive. A guide that is not wider than the ball.
-    pub(crate) fn ball_on_guide(
-        radius_m: f64,
-        material: Material,
-        guide: &Guide,
-    ) -> Result<Self, ElasticityError> {
-        ObjectPress::new(ObjectShape::Ball { radius_m }, material)?
-            .on_guide(guide.clone())?
-            .scene()
     }
 }

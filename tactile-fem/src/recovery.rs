@@ -16,42 +16,31 @@ use core::f64::consts::{PI, TAU};
 use nalgebra::DVector;
 use std::collections::BTreeMap;
 
-/// Pressures of a contact and its radius.
-pub struct ContactProfile {
-    pub points: Vec<PressurePoint>,
-    pub radius: Option<ContactRadius>,
-}
-
-impl ContactProfile {
-    /// From the pressures at all nodes in contact, from the axis outwards, and the force they
-    /// carry.
-    pub fn new(points: Vec<PressurePoint>, force: f64) -> Self {
-        // Outermost edge ends left out of the fit: the contact's edge lies somewhere within the
-        // last element, whose pressures and half of its neighbour's are bent by it.
-        let left_out_limit: usize = 2;
-        // A contact of few nodes, or one that does not reach the axis, keeps its pressures.
-        if points.len() < 5 || points[0].r_m != 0.0 {
-            return Self {
-                points,
-                radius: None,
-            };
-        }
-        let means = means(&points);
-        let fit = |left_out| Fit::new(&points, force, &means, left_out);
-        let fine = fit(left_out_limit);
-        let radius = fine.as_ref().map(|fine| ContactRadius {
-            radius_m: fine.square.sqrt(),
-            uncertainty_m: match fit(left_out_limit + 1) {
-                Some(coarse) => (fine.square.sqrt() - coarse.square.sqrt()).abs(),
-                // Nothing to compare with: half the distance between the outermost nodes.
-                None => 0.5 * (points[points.len() - 1].r_m - points[points.len() - 2].r_m),
-            },
-        });
-        Self {
-            points: smooth(&points, &means, fine.as_ref()),
-            radius,
-        }
+/// Smooth pressures of a contact and its radius, from the pressures at all nodes in contact, those
+/// from the axis outwards, and the force they carry.
+pub fn contact_profile(
+    points: Vec<PressurePoint>,
+    force: f64,
+) -> (Vec<PressurePoint>, Option<ContactRadius>) {
+    // Outermost edge ends left out of the fit: the contact's edge lies somewhere within the last
+    // element, whose pressures and half of its neighbour's are bent by it.
+    let left_out_limit: usize = 2;
+    // A contact of few nodes, or one that does not reach the axis, keeps its pressures.
+    if points.len() < 5 || points[0].r_m != 0.0 {
+        return (points, None);
     }
+    let means = means(&points);
+    let fit = |left_out| Fit::new(&points, force, &means, left_out);
+    let fine = fit(left_out_limit);
+    let radius = fine.as_ref().map(|fine| ContactRadius {
+        radius_m: fine.square.sqrt(),
+        uncertainty_m: match fit(left_out_limit + 1) {
+            Some(coarse) => (fine.square.sqrt() - coarse.square.sqrt()).abs(),
+            // Nothing to compare with: half the distance between the outermost nodes.
+            None => 0.5 * (points[points.len() - 1].r_m - points[points.len() - 2].r_m),
+        },
+    });
+    (smooth(&points, &means, fine.as_ref()), radius)
 }
 
 /// Mean pressure over the hat function of an edge's end, with mean and variance of r² there.
@@ -295,9 +284,7 @@ impl ElementModel {
         points.sort_by(|a, b| a.0.r_m.total_cmp(&b.0.r_m));
         points.into_iter().unzip()
     }
-}
 
-impl ElementModel {
     /// Axial forces that press the bodies together at the interface's nodes.
     pub fn interface_forces(
         &self,

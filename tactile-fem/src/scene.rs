@@ -4,13 +4,12 @@
 //!
 //! A cylinder squeezed between two rigid plates.
 
-use crate::error::{Quantity, positive};
 use crate::material::{Kinematics, Material};
 use crate::mesh::{BlockMesh, Boundary, InclusionSize};
 use crate::model::{BondedInterface, ElementModel, Support};
 use crate::press::{Guide, ObjectPress, ObjectShape};
 use crate::state::{State, Stress};
-use tactile_elasticity::ElasticityError;
+use tactile_elasticity::{ElasticityError, Quantity};
 
 /// Whether two surfaces that are pressed together slide.
 ///
@@ -157,24 +156,15 @@ impl FemScene {
         fineness: usize,
         kinematics: Kinematics,
     ) -> Result<Self, ElasticityError> {
-        positive(block.height_m, Quantity::Thickness)?;
-        positive(block.radius_m, Quantity::Radius)?;
-        let out_of_range = |quantity, found, limit| ElasticityError::OutOfRange {
-            quantity,
-            found,
-            limit,
-        };
+        Quantity::Thickness.positive(block.height_m)?;
+        Quantity::Radius.positive(block.radius_m)?;
         if block.radius_m <= guide.radius_m() {
-            return Err(out_of_range(
-                Quantity::Radius,
-                guide.radius_m(),
-                block.radius_m,
-            ));
+            return Err(Quantity::Radius.beyond(guide.radius_m(), block.radius_m));
         }
         if let Some(lump) = block.lump {
-            positive(lump.diameter_m, Quantity::Radius)?;
-            positive(lump.height_m, Quantity::Thickness)?;
-            positive(lump.depth_m, Quantity::Thickness)?;
+            Quantity::Radius.positive(lump.diameter_m)?;
+            Quantity::Thickness.positive(lump.height_m)?;
+            Quantity::Thickness.positive(lump.depth_m)?;
             // The number of elements grows as the face over the lump: below these parts of its
             // radius there would be thousands of them, for a lump that does not show.
             let (least_diameter, least_depth) = (0.02, 0.001);
@@ -185,19 +175,16 @@ impl FemScene {
             ] {
                 let limit = part * guide.radius_m();
                 if found < limit {
-                    return Err(out_of_range(quantity, found, limit));
+                    return Err(quantity.beyond(found, limit));
                 }
             }
             let bottom = lump.depth_m + lump.height_m;
             if bottom >= block.height_m {
-                return Err(out_of_range(Quantity::Thickness, bottom, block.height_m));
+                return Err(Quantity::Thickness.beyond(bottom, block.height_m));
             }
-            if lump.diameter_m >= 2.0 * guide.radius_m() {
-                return Err(out_of_range(
-                    Quantity::Radius,
-                    lump.diameter_m,
-                    2.0 * guide.radius_m(),
-                ));
+            let face = 2.0 * guide.radius_m();
+            if lump.diameter_m >= face {
+                return Err(Quantity::Radius.beyond(lump.diameter_m, face));
             }
         }
         let bonded = interface == Interface::Bonded;
@@ -241,14 +228,6 @@ impl FemScene {
         self.model.solve(loads)
     }
 
-    pub(crate) fn from_model(model: ElementModel) -> Self {
-        Self { model }
-    }
-
-    pub(crate) fn model(&self) -> &ElementModel {
-        &self.model
-    }
-
     /// Number of elements of all bodies.
     ///
     /// ```
@@ -262,7 +241,7 @@ impl FemScene {
     /// assert!(scene.element_count() > 100);
     /// ```
     pub fn element_count(&self) -> usize {
-        self.model.element_count()
+        self.model.elements.len()
     }
 
     /// Cauchy stress at the material point with reference coordinates (r, z) in metres. `None`
@@ -431,6 +410,6 @@ impl FemScene {
         let face = model.edges(cylinder, Boundary::Contact);
         // The only body is above its face.
         model.interface = Some(BondedInterface::new(face, &model.elements, |_| true, 1.0));
-        Ok(Self::from_model(model))
+        Ok(Self { model })
     }
 }

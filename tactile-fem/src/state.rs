@@ -4,10 +4,10 @@
 //!
 //! Stresses at any point of a state.
 
-use crate::element::{ALL, map, pressure_functions, shape};
+use crate::element::{ALL, map, position, pressure_functions, shape};
 use crate::material::{Gradient, Kinematics, PointDeformation};
 use crate::model::{ElementModel, Equilibrium, ModelFields};
-use crate::recovery::ContactProfile;
+use crate::recovery::contact_profile;
 
 /// The deformed bodies at one load.
 ///
@@ -35,10 +35,7 @@ pub struct State {
 impl State {
     pub(crate) fn new(model: &ElementModel, equilibrium: &Equilibrium) -> Self {
         let (nodes, forces) = model.contact_pressure(&equilibrium.fields);
-        let ContactProfile {
-            points: mut pressure,
-            radius,
-        } = ContactProfile::new(nodes, forces.iter().sum());
+        let (mut pressure, radius) = contact_profile(nodes, forces.iter().sum());
         if let Some(interface) = &model.interface {
             pressure = model.interface_pressure(interface, &equilibrium.fields);
         }
@@ -229,17 +226,6 @@ impl ElementModel {
         } else {
             xi
         };
-        self.element_stress(state, index, [xi, eta])
-    }
-
-    /// Cauchy stress within an element, off the axis. `None` where it is turned inside out.
-    pub fn element_stress(
-        &self,
-        state: &State,
-        index: usize,
-        [xi, eta]: [f64; 2],
-    ) -> Option<Stress> {
-        let fields = &state.fields;
         let nodes = self.elements[index].map(|node| self.nodes[node]);
         let (position, gradients, _) = map(&nodes, xi, eta);
         let u: [f64; ALL] = fields.element(&self.elements[index]);
@@ -303,21 +289,11 @@ fn inverse_map(nodes: &[[f64; 2]; 9], point: [f64; 2]) -> Option<[f64; 2]> {
     let size = (nodes[2][0] - nodes[0][0]).hypot(nodes[2][1] - nodes[0][1]);
     let mut at = [0.0; 2];
     for _ in 0..20 {
-        let shapes = shape(at[0], at[1]);
-        let mut position = [0.0; 2];
-        let mut jacobian = [[0.0; 2]; 2];
-        for (node, [n, by_xi, by_eta]) in nodes.iter().zip(&shapes) {
-            for k in 0..2 {
-                position[k] += n * node[k];
-                jacobian[0][k] += by_xi * node[k];
-                jacobian[1][k] += by_eta * node[k];
-            }
-        }
-        let [dr, dz] = [point[0] - position[0], point[1] - position[1]];
+        let (here, jacobian, determinant) = position(nodes, &shape(at[0], at[1]));
+        let [dr, dz] = [point[0] - here[0], point[1] - here[1]];
         if dr.hypot(dz) <= 1e-13 * size {
             break;
         }
-        let determinant = jacobian[0][0] * jacobian[1][1] - jacobian[0][1] * jacobian[1][0];
         at[0] += (jacobian[1][1] * dr - jacobian[1][0] * dz) / determinant;
         at[1] += (jacobian[0][0] * dz - jacobian[0][1] * dr) / determinant;
         if !at.iter().all(|x| x.abs() < 3.0) {

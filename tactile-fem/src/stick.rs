@@ -124,15 +124,10 @@ impl Placement<'_> {
     fn anchor(&self, node: usize, opposite: &Opposite) -> Option<Anchor> {
         let mut weights = vec![(node, 1.0)];
         let (direction, driven) = match opposite {
-            Opposite::Rigid {
-                shape,
-                side,
-                driven,
-                ..
-            } => {
+            Opposite::Rigid { shape, side } => {
                 let [r, _] = self.current(node);
                 let [_, slope, _] = shape.profile(r)?;
-                ([1.0, side * slope], *driven)
+                ([1.0, side * slope], *side < 0.0)
             }
             Opposite::Surface(curve) => {
                 let at = match self.kinematics {

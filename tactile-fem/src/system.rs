@@ -10,6 +10,7 @@ use crate::contact::{Candidate, DRIVER};
 use crate::element::{Elimination, OUTER};
 use crate::model::{DofMotion, ElementModel, ModelFields};
 use crate::newton::Chord;
+use crate::scene::AppliedLoad;
 use crate::sparse::{Factors, Pattern, Singular, Symmetric};
 use crate::stick::Slip;
 use std::sync::Arc;
@@ -138,9 +139,7 @@ impl Layout {
         self.pattern = Some(Arc::clone(&pattern));
         Ok(pattern)
     }
-}
 
-impl Layout {
     /// Places of every element's stiffness in the pattern asked for last.
     pub(crate) fn places(&self) -> Arc<[Places]> {
         Arc::clone(&self.places)
@@ -163,13 +162,6 @@ impl Layout {
         }
         places
     }
-}
-
-/// What a step is to reach.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Goal {
-    Approach(f64),
-    Force(f64),
 }
 
 /// A symmetric linear system with one more unknown, the approach.
@@ -259,7 +251,7 @@ impl Tangent {
     pub fn solve(
         &self,
         factors: &Factors,
-        goal: Goal,
+        goal: AppliedLoad,
         present: f64,
     ) -> Result<(Vec<f64>, f64), Singular> {
         // Two right-hand sides: the residual's, and that of a unit approach.
@@ -270,8 +262,8 @@ impl Tangent {
         let mut solution = columns;
         let dot = |a: &[f64], b: &[f64]| -> f64 { a.iter().zip(b).map(|(a, b)| a * b).sum() };
         let approach = match goal {
-            Goal::Approach(target) => target - present,
-            Goal::Force(target) => {
+            AppliedLoad::Approach(target) => target - present,
+            AppliedLoad::Force(target) => {
                 let stiffness = self.driver_stiffness - dot(&self.driver_column, &by_approach);
                 (target - self.force - dot(&self.driver_column, &solution)) / stiffness
             }
@@ -402,11 +394,11 @@ impl ElementModel {
 
 impl System<'_> {
     /// Unbalanced force over the scale of the forces.
-    pub fn imbalance(&self, goal: Goal) -> f64 {
+    pub fn imbalance(&self, goal: AppliedLoad) -> f64 {
         let squares: f64 = self.unbalanced.iter().map(|f| f * f).sum();
         let driver = match goal {
-            Goal::Approach(_) => 0.0,
-            Goal::Force(force) => force - self.force,
+            AppliedLoad::Approach(_) => 0.0,
+            AppliedLoad::Force(force) => force - self.force,
         };
         if squares == 0.0 && driver == 0.0 {
             return 0.0;
@@ -415,7 +407,7 @@ impl System<'_> {
     }
 
     /// The Newton step from `fields` towards the goal.
-    pub fn step(&self, fields: &ModelFields, goal: Goal) -> Result<NewtonStep, Singular> {
+    pub fn step(&self, fields: &ModelFields, goal: AppliedLoad) -> Result<NewtonStep, Singular> {
         // Changes of the active set within a Newton iteration; more are rounding's toss between two
         // sets.
         let max_changes: usize = 15;

@@ -1,11 +1,10 @@
 //! Contact tables by finite elements.
 
-use crate::error::{Quantity, positive};
-use crate::{AppliedLoad, FemScene, Guide, GuideLayer, Material, State};
+use crate::{AppliedLoad, FemScene, Guide, GuideLayer, Material, ObjectPress, ObjectShape, State};
 use core::ops::ControlFlow;
-use tactile_elasticity::ElasticityError;
 use tactile_elasticity::contact::{Bond, ContactCurve, ContactTable, Waveguide};
 use tactile_elasticity::modulus::{ContactLaw, WaveguideLaw};
+use tactile_elasticity::{ElasticityError, Quantity};
 
 /// What a table is to cover.
 ///
@@ -54,22 +53,12 @@ impl TableOptions {
         highest_pa: f64,
         count: usize,
     ) -> Result<Self, ElasticityError> {
-        positive(lowest_pa, Quantity::YoungsModulus)?;
-        positive(highest_pa, Quantity::YoungsModulus)?;
+        Quantity::YoungsModulus.positive(lowest_pa)?;
+        Quantity::YoungsModulus.positive(highest_pa)?;
         if highest_pa <= lowest_pa {
-            return Err(ElasticityError::OutOfRange {
-                quantity: Quantity::YoungsModulus,
-                found: highest_pa,
-                limit: lowest_pa,
-            });
+            return Err(Quantity::YoungsModulus.beyond(highest_pa, lowest_pa));
         }
-        if count < 2 {
-            return Err(ElasticityError::LengthMismatch {
-                quantity: Quantity::YoungsModulus,
-                expected: 2,
-                found: count,
-            });
-        }
+        Quantity::YoungsModulus.at_least(count, 2)?;
         (self.lowest_pa, self.highest_pa, self.moduli) = (lowest_pa, highest_pa, count);
         Ok(self)
     }
@@ -86,7 +75,7 @@ impl TableOptions {
     /// # Errors
     /// [`ElasticityError::NotPositive`].
     pub fn with_largest_ratio(mut self, ratio: f64) -> Result<Self, ElasticityError> {
-        self.largest_ratio = positive(ratio, Quantity::ContactRadius)?;
+        self.largest_ratio = Quantity::ContactRadius.positive(ratio)?;
         Ok(self)
     }
 
@@ -240,8 +229,10 @@ impl Ball {
     fn scene(&self, guide: &Waveguide) -> Result<FemScene, ElasticityError> {
         let material = |e, nu: f64| Material::new(e, nu.min(LARGEST_POISSON_RATIO));
         let ball = material(self.youngs_modulus_pa, self.poisson_ratio)?;
+        let radius_m = self.radius_m;
+        let press = ObjectPress::new(ObjectShape::Ball { radius_m }, ball)?;
         if guide.layers().is_empty() {
-            return FemScene::ball_on_flat(self.radius_m, ball);
+            return press.scene();
         }
         let present = guide.layers().iter().filter(|l| l.thickness_m > 0.0);
         let layers: Result<Vec<_>, _> = present
@@ -253,7 +244,7 @@ impl Ball {
             })
             .collect();
         let radius = (GUIDE_RADIUS[0] * self.radius_m).max(GUIDE_RADIUS[1] * guide.thickness_m());
-        FemScene::ball_on_guide(self.radius_m, ball, &Guide::new(layers?, radius)?)
+        press.on_guide(Guide::new(layers?, radius)?)?.scene()
     }
 
     /// Forces at which the layered law expects contact radii in equal steps.

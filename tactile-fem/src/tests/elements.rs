@@ -9,7 +9,7 @@ use crate::scene::{AppliedLoad, Outcome};
 /// An annulus (0 ≤ r ≤ 1, 0 ≤ z ≤ 1) of n × n elements with its inner nodes displaced.
 fn distorted(n: usize) -> Mesh {
     let lines: Vec<f64> = (0..=n).map(|k| k as f64 / n as f64).collect();
-    let mut mesh = Mesh::rectangle(&lines, &lines);
+    let mut mesh = Mesh::cylinder(&lines, &lines);
     for node in &mut mesh.nodes {
         let [r, z] = *node;
         let bubble = 0.05 * (16.0 * r * (1.0 - r) * z * (1.0 - z));

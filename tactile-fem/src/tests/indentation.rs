@@ -25,7 +25,7 @@ fn curve(
     let material = Material::new(MODULUS, poisson_ratio).unwrap();
     let sample = model.add(&mesh, &[material]).unwrap();
     model.drive(sample, Boundary::Base, Support::Bonded);
-    model.contact_rigid_above(sample, shape, 0.0);
+    model.contact_rigid(sample, shape, 1.0);
     if sticks {
         model.forbid_slip();
     }

@@ -22,6 +22,12 @@ fn layer(thickness_m: f64, material: Material, radius_m: f64) -> Guide {
     Guide::new(vec![layer], radius_m).unwrap()
 }
 
+/// A ball on a guide, without friction.
+fn ball_on_guide(radius_m: f64, material: Material, guide: &Guide) -> FemScene {
+    let press = ObjectPress::new(ObjectShape::Ball { radius_m }, material).unwrap();
+    press.on_guide(guide.clone()).unwrap().scene().unwrap()
+}
+
 /// Lines that go on where `inner` ends.
 fn continued(mut inner: Vec<f64>, outer: &[f64]) -> Vec<f64> {
     let end = inner[inner.len() - 1];

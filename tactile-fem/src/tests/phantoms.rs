@@ -27,7 +27,7 @@ fn contrast(thickness_mm: f64, strain: f64, stiffness: f64) -> f64 {
     let below = continued(lines(-thickness_mm, 0.0, 10), &lines(0.0, 1.1, 6));
     let cylinder = continued(below, &lines(0.0, 3.0, 12));
     let z_lines = continued(cylinder, &lines(0.0, block_mm - 4.1, 5));
-    let mut mesh = Mesh::rectangle(&r_lines, &z_lines);
+    let mut mesh = Mesh::cylinder(&r_lines, &z_lines);
     for (element, region) in mesh.elements.iter().zip(&mut mesh.regions) {
         let [r, z] = mesh.nodes[element[8]];
         *region = usize::from(r < 1.9e-3 && (1.1e-3..4.1e-3).contains(&z));
@@ -36,9 +36,9 @@ fn contrast(thickness_mm: f64, strain: f64, stiffness: f64) -> f64 {
     let mut model = ElementModel::new(Kinematics::Finite);
     let materials = [silicone(1.0), silicone(stiffness)];
     let body = model.add(&mesh, &materials).unwrap();
-    model.drive(body, Boundary::Base, Support::Bonded);
-    model.hold(body, Boundary::Contact, Support::Bonded);
-    let scene = FemScene::from_model(model);
+    model.drive(body, Boundary::Contact, Support::Bonded);
+    model.hold(body, Boundary::Base, Support::Bonded);
+    let scene = FemScene { model };
     let approach_m = 1e-3 * strain * (thickness_mm + block_mm);
     let solution = scene.solve(&[AppliedLoad::Approach(approach_m)]);
     assert_eq!(solution.report.outcome, Outcome::Solved);

@@ -18,7 +18,7 @@ fn paper_guide(radius_m: f64) -> Guide {
 fn a_ball_on_a_layered_guide_agrees_with_another_program_at_large_contact_radii() {
     let material = |modulus| Material::new(modulus, 0.495).unwrap();
     let guide = paper_guide(25e-3);
-    let scene = FemScene::ball_on_guide(3e-3, material(103e3), &guide).unwrap();
+    let scene = ball_on_guide(3e-3, material(103e3), &guide);
     // Force, contact radius and approach by an independent program: axisymmetric elements at finite
     // strain, neo-Hookean, without friction, extrapolated over its meshes.
     let reference = [
@@ -43,7 +43,7 @@ fn balls_on_guides_solve_to_contact_radii_beyond_their_own() {
     let material = |modulus| Material::new(modulus, 0.495).unwrap();
     for (radius, modulus, approach) in [(3e-3, 250e3, 1.2), (12e-3, 30e3, 0.7)] {
         let guide = paper_guide(5.0 * radius);
-        let scene = FemScene::ball_on_guide(radius, material(modulus), &guide).unwrap();
+        let scene = ball_on_guide(radius, material(modulus), &guide);
         let loads = [0.4, 0.7, 1.0].map(|part| AppliedLoad::Approach(part * approach * radius));
         let solution = scene.solve(&loads);
         assert_eq!(solution.report.outcome, Outcome::Solved);
@@ -182,7 +182,7 @@ fn the_rim_of_the_guide_is_not_felt() {
     for (ball, thickness_m) in [(3e-3, 10e-3), (8e-3, 10e-3)] {
         let contact = |guide_radius| {
             let guide = layer(thickness_m, material(60e3), guide_radius);
-            let scene = FemScene::ball_on_guide(ball, material(100e3), &guide).unwrap();
+            let scene = ball_on_guide(ball, material(100e3), &guide);
             let state = &scene.solve(&[AppliedLoad::Approach(0.6 * ball)]).states[0];
             (state.force_n(), state.contact_radius().unwrap().radius_m)
         };
