@@ -11,48 +11,19 @@
 //! keeps the scenes whose names begin with one of them, separated by commas.
 #![allow(clippy::print_stdout)]
 
+#[path = "inclusion_study/shared.rs"]
+mod shared;
+
 use core::ops::ControlFlow;
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
-use rand_distr::StandardNormal;
+use shared::{guide, normal, number, table, wave};
 use std::collections::HashMap;
 use std::error::Error;
 use std::path::Path;
-use tactile_fem::{Guide, GuideLayer, Interface, Material};
+use tactile_fem::Interface;
 use tactile_inclusion::{
     Identifiable, Inclusion, InclusionSearch, PressureProfile, SensorErrors, Specimen,
 };
-
-/// A file's rows by the names of their columns.
-fn table(path: &Path) -> Result<Vec<HashMap<String, String>>, Box<dyn Error>> {
-    let text = std::fs::read_to_string(path)?;
-    let mut lines = text.lines();
-    let names: Vec<&str> = lines.next().ok_or("an empty file")?.split(',').collect();
-    let row = |line: &str| {
-        let cells = names.iter().zip(line.split(','));
-        cells
-            .map(|(name, cell)| ((*name).to_owned(), cell.to_owned()))
-            .collect()
-    };
-    Ok(lines.map(row).collect())
-}
-
-fn number(row: &HashMap<String, String>, name: &str) -> Result<f64, Box<dyn Error>> {
-    let text = row.get(name).ok_or_else(|| format!("no column {name}"))?;
-    Ok(text.parse()?)
-}
-
-fn guide(radius_m: f64) -> Result<Guide, Box<dyn Error>> {
-    let layers = [(2e-3, 136e3), (3e-3, 80e3), (5e-3, 34e3)];
-    let layers: Result<Vec<GuideLayer>, Box<dyn Error>> = (layers.into_iter())
-        .map(|(thickness_m, modulus)| {
-            Ok(GuideLayer {
-                thickness_m,
-                material: Material::new(modulus, 0.495)?,
-            })
-        })
-        .collect();
-    Ok(Guide::new(layers?, radius_m)?)
-}
 
 /// Pressures of each load on cells of 1 mm, whose middles are given.
 struct Picture {
@@ -108,20 +79,12 @@ fn picture(path: &Path, loads: usize, is_quarter: bool) -> Result<Picture, Box<d
     })
 }
 
-fn normal(rng: &mut ChaCha8Rng) -> f64 {
-    rng.sample(StandardNormal)
-}
-
-/// A smooth random field of unit variance with Matérn's kernel of order 3/2: a sum of waves whose
-/// wave vectors follow the kernel's spectrum, Student's t with three degrees of freedom.
+/// A smooth random field of unit variance.
 fn smooth_field(positions_m: &[[f64; 2]], length_m: f64, rng: &mut ChaCha8Rng) -> Vec<f64> {
     let waves = 400;
     let mut field = vec![0.0; positions_m.len()];
     for _ in 0..waves {
-        let chi_squared: f64 = (0..3).map(|_| normal(rng).powi(2)).sum();
-        let scale = (3.0 / chi_squared).sqrt() / length_m;
-        let wave = [scale * normal(rng), scale * normal(rng)];
-        let phase = core::f64::consts::TAU * rng.random::<f64>();
+        let (wave, phase) = wave(length_m, rng);
         for (value, [x, y]) in field.iter_mut().zip(positions_m) {
             *value += (2.0 / f64::from(waves)).sqrt() * (wave[0] * x + wave[1] * y + phase).cos();
         }

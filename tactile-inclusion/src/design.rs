@@ -1,13 +1,12 @@
 //! What a scan can tell before it is made.
 
 use crate::covariance::{Observed, Resolution};
-use crate::error::{Quantity, positive};
 use crate::fit::Problem;
 use crate::forward::LumpParameters;
 use crate::hypothesis::BLOCK_COORDINATES;
 use crate::search::InclusionSearch;
 use crate::specimen::check_approaches;
-use tactile_elasticity::ElasticityError;
+use tactile_elasticity::{ElasticityError, Quantity};
 
 /// An inclusion assumed for planning a scan.
 ///
@@ -77,19 +76,13 @@ impl InclusionSearch {
         // a mesh twice as fine; of three elements, the errors of a small shallow inclusion came out
         // at half.
         let fineness: usize = 5;
-        positive(assumed.diameter_m, Quantity::Radius)?;
-        positive(assumed.depth_m, Quantity::Distance)?;
-        positive(assumed.youngs_modulus_pa, Quantity::YoungsModulus)?;
-        positive(assumed.block_modulus_pa, Quantity::YoungsModulus)?;
-        if white_pa.len() != radii_m.len() {
-            return Err(ElasticityError::LengthMismatch {
-                quantity: Quantity::StandardError,
-                expected: radii_m.len(),
-                found: white_pa.len(),
-            });
-        }
+        Quantity::Radius.positive(assumed.diameter_m)?;
+        Quantity::Distance.positive(assumed.depth_m)?;
+        Quantity::YoungsModulus.positive(assumed.youngs_modulus_pa)?;
+        Quantity::YoungsModulus.positive(assumed.block_modulus_pa)?;
+        Quantity::StandardError.entries(white_pa.len(), radii_m.len())?;
         for &white in white_pa {
-            positive(white, Quantity::StandardError)?;
+            Quantity::StandardError.positive(white)?;
         }
         check_approaches(approaches_m.iter().copied())?;
         let used = self.rings_within_reach(radii_m)?;
@@ -102,12 +95,11 @@ impl InclusionSearch {
         };
         let interface = self.specimen().interfaces()[0];
         let mut parameters = self.known_block(assumed.block_modulus_pa);
-        parameters.lump = Some(LumpParameters {
-            diameter_m: assumed.diameter_m,
-            depth_m: assumed.depth_m,
-            youngs_modulus_pa: assumed.youngs_modulus_pa,
-            aspect: 1.0,
-        });
+        parameters.lump = Some(LumpParameters::ball(
+            assumed.diameter_m,
+            assumed.depth_m,
+            assumed.youngs_modulus_pa,
+        ));
         let forward = self.forward(&observed, approaches_m, interface, fineness);
         forward.scene(&parameters)?;
         let predicted = (forward.predict(&parameters)).ok_or(ElasticityError::NoSolution)?;
@@ -115,8 +107,8 @@ impl InclusionSearch {
             .flat_map(|_| used.iter().map(|&ring| white_pa[ring]))
             .collect();
         // Forces have no noise of pixels.
-        observed.white.resize(predicted.values.len(), 0.0);
-        observed.values = predicted.values;
+        observed.white.resize(predicted.len(), 0.0);
+        observed.values = predicted;
         let covariance = observed.covariance(self.sensor(), interface, Resolution::Answer);
         let mut priors = self.block_priors(assumed.block_modulus_pa);
         priors.extend(self.lump_priors(assumed.block_modulus_pa));

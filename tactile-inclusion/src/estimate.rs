@@ -330,39 +330,15 @@ impl InclusionEstimate {
         self.inclusion.into_iter().chain(self.second).collect()
     }
 
-    /// This estimate with what belongs to the asymmetry of the picture it is from: its first
-    /// harmonic around the axis and the root mean square of the second to fourth, both over the
-    /// pressure. Beyond what a symmetric model explains there is a warning and no inclusion's
-    /// parameters are given.
-    #[must_use]
-    pub fn with_asymmetry(mut self, asymmetry: f64, harmonics: f64) -> Self {
-        self.warnings
-            .extend(asymmetry_warnings(asymmetry, harmonics));
-        if self.is_asymmetric() {
-            (self.inclusion, self.second) = (None, None);
-        }
-        self
-    }
-
-    /// Whether the picture is less symmetric than the model.
-    pub fn is_asymmetric(&self) -> bool {
-        self.warnings.iter().any(|warning| {
-            matches!(
-                warning,
-                InclusionWarning::Asymmetric { .. } | InclusionWarning::NotRound { .. }
-            )
-        })
-    }
-
     /// Whether there is an inclusion. That there is none is certain only where the model explains
-    /// the frames: beside a poor fit, one that did not settle, or an asymmetric picture it is not.
+    /// the frames: beside a poor fit or one that did not settle it is not.
     pub fn verdict(&self) -> Verdict {
         let is_model_in_doubt = self.warnings.iter().any(|warning| {
             matches!(
                 warning,
                 InclusionWarning::PoorFit { .. } | InclusionWarning::NotConverged
             )
-        }) || self.is_asymmetric();
+        });
         if self.found {
             Verdict::Found
         } else if is_model_in_doubt || self.probability > 0.5 {

@@ -1,6 +1,6 @@
 //! Maximum a posteriori fit of a block's parameters to measured profiles.
 
-use crate::forward::{Coordinate, Forward, LARGEST_POISSON_RATIO, Parameters, Prediction, Solved};
+use crate::forward::{Coordinate, Forward, LARGEST_POISSON_RATIO, Parameters, Solved};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 /// What is known of a coordinate beforehand: a Gaussian.
@@ -22,6 +22,7 @@ impl Prior {
 }
 
 /// Measured values with their covariance, and what is known beforehand.
+#[derive(Clone)]
 pub struct Problem {
     pub forward: Forward,
     pub measured: Vec<f64>,
@@ -151,10 +152,8 @@ impl Problem {
     }
 
     /// −2 ln of the posterior, up to a constant.
-    fn objective(&self, parameters: &Parameters, predicted: &Prediction) -> f64 {
-        let misfit = self
-            .whitened(self.residual(&predicted.values))
-            .norm_squared();
+    fn objective(&self, parameters: &Parameters, predicted: &[f64]) -> f64 {
+        let misfit = self.whitened(self.residual(predicted)).norm_squared();
         misfit + self.penalty(parameters)
     }
 
@@ -164,18 +163,14 @@ impl Problem {
     ///
     /// Pressures are nearly proportional to the moduli of block and inclusion as long as the guide
     /// is stiffer than they are.
-    pub fn scaled_start(
-        &self,
-        start: &Parameters,
-        predicted: &Prediction,
-    ) -> Option<(f64, Parameters)> {
-        let measured = self.measured.iter().zip(&predicted.values);
+    pub fn scaled_start(&self, start: &Parameters, predicted: &[f64]) -> Option<(f64, Parameters)> {
+        let measured = self.measured.iter().zip(predicted);
         let factor = measured.map(|(y, m)| y * m).sum::<f64>()
-            / predicted.values.iter().map(|m| m * m).sum::<f64>();
+            / predicted.iter().map(|m| m * m).sum::<f64>();
         if !(factor > 0.0 && factor.is_finite()) {
             return None;
         }
-        let scaled: Vec<f64> = predicted.values.iter().map(|m| factor * m).collect();
+        let scaled: Vec<f64> = predicted.iter().map(|m| factor * m).collect();
         let mut parameters = start.clone();
         parameters.block_modulus_pa *= factor;
         if let Some(lump) = &mut parameters.lump {
@@ -192,19 +187,19 @@ impl Problem {
     }
 
     pub fn normal(&self, parameters: &Parameters, near: Option<&Solved>) -> Option<Normal> {
-        let (prediction, solved) = self.forward.predict_near(parameters, near)?;
-        self.normal_at(parameters, prediction, solved)
+        let (predicted, solved) = self.forward.predict_near(parameters, near)?;
+        self.normal_at(parameters, predicted, solved)
     }
 
     /// The quadratic model at parameters whose scene is solved.
     fn normal_at(
         &self,
         parameters: &Parameters,
-        prediction: Prediction,
+        predicted: Vec<f64>,
         solved: Solved,
     ) -> Option<Normal> {
         let columns = (self.forward).derivatives(parameters, &self.coordinates(), &solved)?;
-        let residual = self.whitened(self.residual(&prediction.values));
+        let residual = self.whitened(self.residual(&predicted));
         let columns: Vec<DVector<f64>> = columns
             .into_iter()
             .map(|column| self.whitened(DVector::from_vec(column)))
@@ -223,7 +218,7 @@ impl Problem {
             misfit: residual.norm_squared(),
             penalty: self.penalty(parameters),
             columns,
-            predicted: prediction.values,
+            predicted,
             solved,
         })
     }

@@ -42,6 +42,15 @@ pub struct LumpParameters {
 }
 
 impl LumpParameters {
+    pub fn ball(diameter_m: f64, depth_m: f64, youngs_modulus_pa: f64) -> Self {
+        Self {
+            diameter_m,
+            depth_m,
+            youngs_modulus_pa,
+            aspect: 1.0,
+        }
+    }
+
     /// Its width across the axis and its height along it.
     pub fn axes_m(&self) -> [f64; 2] {
         let root = self.aspect.cbrt();
@@ -346,12 +355,6 @@ pub struct Forward {
     pub kinematics: Kinematics,
 }
 
-/// Pressures of all frames, one frame after the other, then their forces.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Prediction {
-    pub values: Vec<f64>,
-}
-
 /// A solved scene, from which scenes nearby are solved in fewer iterations.
 #[derive(Debug, Clone)]
 pub struct Solved {
@@ -445,7 +448,7 @@ impl Forward {
     }
 
     /// The frames' pressures and forces. `None` where the block cannot be meshed or solved.
-    pub fn predict(&self, parameters: &Parameters) -> Option<Prediction> {
+    pub fn predict(&self, parameters: &Parameters) -> Option<Vec<f64>> {
         Some(self.predict_near(parameters, None)?.0)
     }
 
@@ -454,7 +457,7 @@ impl Forward {
         &self,
         parameters: &Parameters,
         near: Option<&Solved>,
-    ) -> Option<(Prediction, Solved)> {
+    ) -> Option<(Vec<f64>, Solved)> {
         let mut solved = self.solve_near(parameters, near)?;
         if parameters.second.is_some() {
             let near = near.and_then(|near| near.second.as_deref());
@@ -466,7 +469,7 @@ impl Forward {
 
     /// The pressures and forces of a block solved with its inclusions under the axis, at the places
     /// that `parameters` have for them.
-    pub fn of_solved(&self, parameters: &Parameters, solved: &Solved) -> Prediction {
+    pub fn of_solved(&self, parameters: &Parameters, solved: &Solved) -> Vec<f64> {
         let states = solved.frames.states();
         let of_second = (solved.second.as_ref()).map_or(states, |second| second.frames.states());
         self.collect(
@@ -558,7 +561,7 @@ impl Forward {
         pressure: &dyn Fn(usize, f64) -> f64,
         pressure_of_second: &dyn Fn(usize, f64) -> f64,
         force: &dyn Fn(usize) -> f64,
-    ) -> Prediction {
+    ) -> Vec<f64> {
         let frames = 0..self.approaches_m.len();
         let mut values = Vec::with_capacity(self.observations());
         for frame in frames.clone() {
@@ -572,7 +575,7 @@ impl Forward {
             }
         }
         values.extend(frames.map(force));
-        Prediction { values }
+        values
     }
 
     /// What is found of a solved scene after a small step of each coordinate, and without one.
@@ -658,7 +661,7 @@ impl Forward {
         let columns = coordinates.iter().map(|&coordinate| {
             let step = parameters.small_step(coordinate);
             let there = collect(&parameters.moved(coordinate, step), Some(coordinate));
-            let pairs = there.values.iter().zip(&here.values);
+            let pairs = there.iter().zip(&here);
             pairs.map(|(there, here)| (there - here) / step).collect()
         });
         Some(columns.collect())

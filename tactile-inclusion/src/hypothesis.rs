@@ -38,6 +38,12 @@ pub fn is_poor(misfit: f64, observed: &Observed) -> bool {
     misfit > freedom + poor * (2.0 * freedom).sqrt()
 }
 
+/// The fit with more evidence, of one without an inclusion and one with it.
+pub fn better<'a>(homogeneous: &'a Fit, lump: Option<&'a Fit>) -> &'a Fit {
+    lump.filter(|lump| lump.evidence > homogeneous.evidence)
+        .unwrap_or(homogeneous)
+}
+
 /// Number of coordinates of the block. They stand first, and ln D, ln d and ln E₁ follow.
 pub const BLOCK_COORDINATES: usize = 4;
 
@@ -75,10 +81,7 @@ impl Hypothesis {
 
     /// The fit with more evidence.
     pub fn better(&self) -> &Fit {
-        match &self.lump {
-            Some(lump) if lump.evidence > self.homogeneous.evidence => lump,
-            _ => &self.homogeneous,
-        }
+        better(&self.homogeneous, self.lump.as_ref())
     }
 
     /// χ² over its degrees of freedom, where that is more than one: what differences of log

@@ -32,7 +32,6 @@
 
 mod covariance;
 mod design;
-mod error;
 mod estimate;
 mod fit;
 mod forward;

@@ -1,16 +1,11 @@
 //! How small an inclusion can be and still be found, place by place.
 
-use crate::covariance::Resolution;
-use crate::error::{Quantity, finite, positive};
-use crate::fit::Problem;
 use crate::forward::{Forward, LumpParameters, Parameters, Solved};
 use crate::hypothesis::PlainFit;
 use crate::scan::Scan;
-use crate::search::{
-    Counter, HomogeneousFit, InclusionSearch, SearchProgress, USED_FACE, answer_fineness,
-};
+use crate::search::{Counter, HomogeneousFit, InclusionSearch, SearchProgress, USED_FACE};
 use core::ops::ControlFlow;
-use tactile_elasticity::ElasticityError;
+use tactile_elasticity::{ElasticityError, Quantity};
 
 /// Diameters over the face's radius that are solved. Smaller ones count as large as the first.
 const DIAMETERS: [f64; 6] = [0.09, 0.15, 0.25, 0.4, 0.65, 1.05];
@@ -44,7 +39,7 @@ impl InclusionSearch {
     /// use core::ops::ControlFlow;
     /// use tactile_inclusion::{InclusionSearch, Scan};
     ///
-    /// # use tactile_elasticity::ElasticityError;
+    /// # use tactile_elasticity::{ElasticityError, Quantity};
     /// # fn example(search: InclusionSearch, scan: Scan) -> Result<(), ElasticityError> {
     /// let (places, depths) = ([[0.0, 0.0], [8e-3, 0.0]], [2e-3, 6e-3]);
     /// let limits = search.detection_limits(&scan, 4.0, &places, &depths, &mut |_| {
@@ -68,12 +63,12 @@ impl InclusionSearch {
         depths_m: &[f64],
         progress: &mut dyn FnMut(SearchProgress) -> ControlFlow<()>,
     ) -> Result<Vec<Vec<f64>>, ElasticityError> {
-        positive(contrast, Quantity::YoungsModulus)?;
+        Quantity::YoungsModulus.positive(contrast)?;
         for depth in depths_m {
-            positive(*depth, Quantity::Distance)?;
+            Quantity::Distance.positive(*depth)?;
         }
         for coordinate in places_m.iter().flatten() {
-            finite(*coordinate, Quantity::Distance)?;
+            Quantity::Distance.finite(*coordinate)?;
         }
         let (observed, approaches_m) = self.observed_scan(scan)?;
         let solutions = 20 + 2 * depths_m.len() * DIAMETERS.len();
@@ -84,16 +79,8 @@ impl InclusionSearch {
             return Err(ElasticityError::Cancelled);
         }
         let block = block.ok_or(ElasticityError::NoSolution)?;
-        let covariance = observed.covariance(self.sensor(), interface, Resolution::Answer);
-        let problem = Problem {
-            forward: Forward {
-                fineness: answer_fineness(false),
-                ..block.problem.forward.clone()
-            },
-            measured: observed.values.clone(),
-            factor: covariance.cholesky().ok_or(ElasticityError::NoSolution)?,
-            priors: block.problem.priors.clone(),
-        };
+        let problem = self.on_answers_mesh(&block.problem, &observed);
+        let problem = problem.ok_or(ElasticityError::NoSolution)?;
         let plain = PlainFit::new(&problem, &block.fit).ok_or(ElasticityError::NoSolution)?;
         let axes_m = scan.presses.iter().map(|press| press.axis_m);
         let reach_m = USED_FACE * self.guide.radius_m();
@@ -105,12 +92,9 @@ impl InclusionSearch {
         for &depth_m in depths_m {
             let mut balls = Vec::new();
             for diameter in DIAMETERS {
-                let lump = LumpParameters {
-                    diameter_m: diameter * self.guide.radius_m(),
-                    depth_m,
-                    youngs_modulus_pa: contrast * block.known.block_modulus_pa,
-                    aspect: 1.0,
-                };
+                let diameter_m = diameter * self.guide.radius_m();
+                let modulus_pa = contrast * block.known.block_modulus_pa;
+                let lump = LumpParameters::ball(diameter_m, depth_m, modulus_pa);
                 if lump.diameter_m + depth_m < DEEPEST * self.specimen().height_m() {
                     balls.extend(Ball::new(&block, lump, &mut counter));
                 }
@@ -224,7 +208,7 @@ impl Ball {
         parameters.place.centre_m = centre_m;
         let [with, without] =
             [&self.with, &self.without].map(|solved| linear.of_solved(&parameters, solved));
-        let pairs = with.values.iter().zip(&without.values);
+        let pairs = with.iter().zip(&without);
         pairs.map(|(with, without)| with / without - 1.0).collect()
     }
 }

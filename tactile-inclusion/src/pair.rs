@@ -204,13 +204,7 @@ impl InclusionSearch {
             if resolution == Resolution::Answer {
                 // The same with the second one first, whose posterior is followed then.
                 let swapped = settled(&at.swapped())?;
-                let again = Problem {
-                    forward: problem.forward.clone(),
-                    measured: problem.measured.clone(),
-                    factor: problem.factor.clone(),
-                    priors,
-                };
-                let both = [(problem, fit), (again, swapped)];
+                let both = [(problem.clone(), fit), (problem, swapped)];
                 let lumps = both.map(|(problem, fit)| Hypothesis {
                     problem,
                     interface: one.interface,
@@ -252,7 +246,7 @@ impl InclusionSearch {
             lump: None,
             ..block.clone()
         };
-        let plain = forward.predict(&plain)?.values[frame * count..][..count].to_vec();
+        let plain = forward.predict(&plain)?[frame * count..][..count].to_vec();
         let relative = |values: &[f64]| {
             let logarithms = values.iter().zip(&plain).map(|(p, plain)| (p / plain).ln());
             let logarithms = DVector::from_iterator(count, logarithms);
@@ -282,12 +276,11 @@ impl InclusionSearch {
         {
             let at = |place: [f64; 2], contrast: f64| {
                 let mut parameters = block.clone();
-                parameters.lump = Some(LumpParameters {
-                    diameter_m: diameter * face_m,
-                    depth_m: depth * face_m,
-                    youngs_modulus_pa: contrast * block.block_modulus_pa,
-                    aspect: 1.0,
-                });
+                parameters.lump = Some(LumpParameters::ball(
+                    diameter * face_m,
+                    depth * face_m,
+                    contrast * block.block_modulus_pa,
+                ));
                 parameters.place.centre_m = place;
                 parameters.place.elongation = [0.0; 2];
                 parameters

@@ -1,9 +1,8 @@
 //! Several presses at stated places of one block.
 
-use crate::error::{Quantity, finite, not_negative};
 use crate::picture::CellPositions;
 use crate::specimen::{PressureProfile, check};
-use tactile_elasticity::ElasticityError;
+use tactile_elasticity::{ElasticityError, Quantity};
 
 /// Presses at stated places of a block that is far wider than the guide.
 ///
@@ -65,7 +64,7 @@ impl Scan {
             expected: 1,
             found: 0,
         };
-        not_negative(self.position_error_m, Quantity::StandardError)?;
+        Quantity::StandardError.not_negative(self.position_error_m)?;
         let first = self.presses.first().ok_or(too_few)?;
         let mut joined: Vec<PressureProfile> = (first.frames.iter())
             .map(|frame| PressureProfile {
@@ -82,19 +81,13 @@ impl Scan {
         };
         for (index, press) in self.presses.iter().enumerate() {
             for coordinate in press.positions_m.iter().flatten().chain(&press.axis_m) {
-                finite(*coordinate, Quantity::Distance)?;
+                Quantity::Distance.finite(*coordinate)?;
             }
             // A cell on the axis is one.
             let radius = |[x, y]: &[f64; 2]| x.hypot(*y).max(f64::MIN_POSITIVE);
             let radii_m: Vec<f64> = press.positions_m.iter().map(radius).collect();
             check(&radii_m, &press.frames)?;
-            if press.frames.len() != joined.len() {
-                return Err(ElasticityError::LengthMismatch {
-                    quantity: Quantity::Distance,
-                    expected: joined.len(),
-                    found: press.frames.len(),
-                });
-            }
+            Quantity::Distance.entries(press.frames.len(), joined.len())?;
             let used: Vec<usize> = (0..radii_m.len())
                 .filter(|&k| radii_m[k] <= radius_m)
                 .collect();
@@ -105,11 +98,7 @@ impl Scan {
             cells.axes_m.push(press.axis_m);
             for (all, frame) in joined.iter_mut().zip(&press.frames) {
                 if all.approach_m != frame.approach_m {
-                    return Err(ElasticityError::OutOfRange {
-                        quantity: Quantity::Distance,
-                        found: frame.approach_m,
-                        limit: all.approach_m,
-                    });
+                    return Err(Quantity::Distance.beyond(frame.approach_m, all.approach_m));
                 }
                 let taken = |values: &[f64]| used.iter().map(|&k| values[k]).collect::<Vec<f64>>();
                 all.pressure_pa.extend(taken(&frame.pressure_pa));

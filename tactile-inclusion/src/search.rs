@@ -9,19 +9,16 @@
 //! First fits under one assumption about the face, and the answer's from them.
 
 use crate::covariance::{Observed, ObservedCells, Resolution};
-use crate::error::{Quantity, not_negative};
 use crate::estimate::InclusionEstimate;
 use crate::fit::{ANSWER_ENDING, FIRST_FIT_ENDING, Fit, Prior, Problem};
-use crate::forward::{
-    Coordinate, Forward, LARGEST_POISSON_RATIO, LumpParameters, Parameters, Prediction,
-};
-use crate::hypothesis::{BLOCK_COORDINATES, Hypothesis, LEAST_GAIN, Score};
+use crate::forward::{Coordinate, Forward, LARGEST_POISSON_RATIO, LumpParameters, Parameters};
+use crate::hypothesis::{BLOCK_COORDINATES, Hypothesis, LEAST_GAIN, Score, better};
 use crate::picture::{Cells, Place, extent};
 use crate::scan::{Scan, ScanPress};
 use crate::specimen::{PressureProfile, SensorErrors, Specimen, check};
 use core::ops::ControlFlow;
 use std::sync::Arc;
-use tactile_elasticity::ElasticityError;
+use tactile_elasticity::{ElasticityError, Quantity};
 use tactile_fem::{Guide, Interface, Kinematics};
 
 /// Part of the guide's radius within which pressures are used: further out the singular rim rules,
@@ -108,11 +105,7 @@ impl InclusionSearch {
     /// A block that is no wider than the guide.
     pub fn new(specimen: Specimen, guide: Guide) -> Result<Self, ElasticityError> {
         if specimen.radius_m() <= guide.radius_m() {
-            return Err(ElasticityError::OutOfRange {
-                quantity: Quantity::Radius,
-                found: specimen.radius_m(),
-                limit: guide.radius_m(),
-            });
+            return Err(Quantity::Radius.beyond(specimen.radius_m(), guide.radius_m()));
         }
         Ok(Self {
             specimen,
@@ -129,7 +122,7 @@ impl InclusionSearch {
     /// # Errors
     /// Negative or NaN.
     pub fn with_shape_error(mut self, error: f64) -> Result<Self, ElasticityError> {
-        self.shape_error = not_negative(error, Quantity::StandardError)?;
+        self.shape_error = Quantity::StandardError.not_negative(error)?;
         Ok(self)
     }
 
@@ -465,13 +458,7 @@ impl InclusionSearch {
         let used: Vec<usize> = (0..radii_m.len())
             .filter(|&k| radii_m[k] <= limit)
             .collect();
-        if used.len() < min_rings {
-            return Err(ElasticityError::LengthMismatch {
-                quantity: Quantity::Samples,
-                expected: min_rings,
-                found: used.len(),
-            });
-        }
+        Quantity::Samples.at_least(used.len(), min_rings)?;
         Ok(used)
     }
 }
@@ -637,20 +624,28 @@ impl InclusionSearch {
         grid: &[GridStart],
         counter: &mut Counter<'_>,
     ) -> Option<(Fit, Score)> {
+        let problem = self.on_answers_mesh(problem, observed)?;
+        let fit = problem.fit(&homogeneous.parameters, ANSWER_ENDING, || counter.step())?;
+        let score = Score::new(&problem, &fit, grid)?;
+        Some((fit, score))
+    }
+
+    /// A problem of first fits on the answer's mesh, with the errors that are left there.
+    pub(crate) fn on_answers_mesh(
+        &self,
+        problem: &Problem,
+        observed: &Observed,
+    ) -> Option<Problem> {
         let interface = problem.forward.interface;
         let covariance = observed.covariance(self.sensor(), interface, Resolution::Answer);
-        let problem = Problem {
+        Some(Problem {
             forward: Forward {
                 fineness: answer_fineness(false),
                 ..problem.forward.clone()
             },
-            measured: problem.measured.clone(),
             factor: covariance.cholesky()?,
-            priors: problem.priors.clone(),
-        };
-        let fit = problem.fit(&homogeneous.parameters, ANSWER_ENDING, || counter.step())?;
-        let score = Score::new(&problem, &fit, grid)?;
-        Some((fit, score))
+            ..problem.clone()
+        })
     }
 
     /// Modulus of a homogeneous block by the mean pressure over the mean strain: right within a
@@ -675,7 +670,7 @@ const CONTRASTS: [f64; 2] = [2.5, 8.0];
 #[derive(Debug, Clone)]
 pub struct GridStart {
     pub parameters: Parameters,
-    pub predicted: Prediction,
+    pub predicted: Vec<f64>,
     /// Part by which each value exceeds that of a homogeneous block on the same mesh.
     pub added: Vec<f64>,
 }
@@ -693,17 +688,15 @@ pub fn starts(
     let mut starts = Vec::new();
     for diameter in DIAMETERS {
         for depth in DEPTHS {
-            let lump = |contrast: f64| LumpParameters {
-                diameter_m: diameter * face_radius_m,
-                depth_m: depth * face_radius_m,
-                youngs_modulus_pa: contrast * homogeneous.block_modulus_pa,
-                aspect: 1.0,
-            };
             if (diameter + depth) * face_radius_m >= deepest * homogeneous.height_m {
                 continue;
             }
             let with = |contrast: f64| Parameters {
-                lump: Some(lump(contrast)),
+                lump: Some(LumpParameters::ball(
+                    diameter * face_radius_m,
+                    depth * face_radius_m,
+                    contrast * homogeneous.block_modulus_pa,
+                )),
                 ..homogeneous.clone()
             };
             if !counter.step() {
@@ -720,7 +713,7 @@ pub fn starts(
                 let Some(predicted) = forward.predict(&parameters) else {
                     continue;
                 };
-                let added = predicted.values.iter().zip(&none.values);
+                let added = predicted.iter().zip(&none);
                 starts.push(GridStart {
                     parameters,
                     added: added.map(|(with, none)| with / none - 1.0).collect(),
@@ -761,10 +754,7 @@ impl FirstFits {
     }
 
     fn better(&self) -> &Fit {
-        match &self.lump {
-            Some(lump) if lump.evidence > self.homogeneous.evidence => lump,
-            _ => &self.homogeneous,
-        }
+        better(&self.homogeneous, self.lump.as_ref())
     }
 
     /// Log evidence of the better fit.

@@ -2,8 +2,7 @@
 //!
 //! Measured pressures over the radius.
 
-use crate::error::{Quantity, finite, not_negative, positive};
-use tactile_elasticity::ElasticityError;
+use tactile_elasticity::{ElasticityError, Quantity};
 use tactile_fem::{Interface, Material};
 
 /// A cylindrical block of tissue on a rigid stage: what is known of it before it is pressed, each
@@ -44,8 +43,8 @@ impl Specimen {
     /// # Errors
     /// A length that is not positive.
     pub fn new(height_m: f64, radius_m: f64) -> Result<Self, ElasticityError> {
-        positive(height_m, Quantity::Thickness)?;
-        positive(radius_m, Quantity::Radius)?;
+        Quantity::Thickness.positive(height_m)?;
+        Quantity::Radius.positive(radius_m)?;
         Ok(Self {
             height_m,
             height_error_m: 0.02 * height_m,
@@ -63,7 +62,7 @@ impl Specimen {
     /// # Errors
     /// Not positive.
     pub fn with_height_error_m(mut self, error_m: f64) -> Result<Self, ElasticityError> {
-        self.height_error_m = positive(error_m, Quantity::StandardError)?;
+        self.height_error_m = Quantity::StandardError.positive(error_m)?;
         Ok(self)
     }
 
@@ -74,7 +73,7 @@ impl Specimen {
     pub fn with_poisson_ratio(mut self, value: f64, error: f64) -> Result<Self, ElasticityError> {
         Material::new(1.0, value)?;
         self.poisson_ratio = value;
-        self.poisson_ratio_error = positive(error, Quantity::StandardError)?;
+        self.poisson_ratio_error = Quantity::StandardError.positive(error)?;
         Ok(self)
     }
 
@@ -83,7 +82,7 @@ impl Specimen {
     /// # Errors
     /// Not positive.
     pub fn with_approach_error_m(mut self, error_m: f64) -> Result<Self, ElasticityError> {
-        self.approach_error_m = positive(error_m, Quantity::StandardError)?;
+        self.approach_error_m = Quantity::StandardError.positive(error_m)?;
         Ok(self)
     }
 
@@ -97,8 +96,8 @@ impl Specimen {
         value_pa: f64,
         error_pa: f64,
     ) -> Result<Self, ElasticityError> {
-        positive(value_pa, Quantity::YoungsModulus)?;
-        positive(error_pa, Quantity::StandardError)?;
+        Quantity::YoungsModulus.positive(value_pa)?;
+        Quantity::StandardError.positive(error_pa)?;
         self.block_modulus = Some((value_pa.ln(), error_pa / value_pa));
         Ok(self)
     }
@@ -183,11 +182,11 @@ impl Default for SensorErrors {
 
 impl SensorErrors {
     pub(crate) fn checked(self) -> Result<Self, ElasticityError> {
-        not_negative(self.common, Quantity::StandardError)?;
-        not_negative(self.each_frame, Quantity::StandardError)?;
-        positive(self.correlation_m, Quantity::Distance)?;
-        positive(self.force, Quantity::StandardError)?;
-        not_negative(self.model, Quantity::StandardError)?;
+        Quantity::StandardError.not_negative(self.common)?;
+        Quantity::StandardError.not_negative(self.each_frame)?;
+        Quantity::Distance.positive(self.correlation_m)?;
+        Quantity::StandardError.positive(self.force)?;
+        Quantity::StandardError.not_negative(self.model)?;
         Ok(self)
     }
 }
@@ -219,54 +218,33 @@ pub struct PressureProfile {
 
 /// Checks that there are approaches, positive and growing.
 pub fn check_approaches(approaches_m: impl Iterator<Item = f64>) -> Result<(), ElasticityError> {
-    let mut last = 0.0;
-    for approach in approaches_m {
-        positive(approach, Quantity::Distance)?;
-        if approach <= last {
-            return Err(ElasticityError::OutOfRange {
-                quantity: Quantity::Distance,
-                found: approach,
-                limit: last,
-            });
-        }
-        last = approach;
-    }
-    if last == 0.0 {
+    let mut approaches_m = approaches_m.peekable();
+    if approaches_m.peek().is_none() {
         return Err(ElasticityError::TooFewLoads {
             expected: 1,
             found: 0,
         });
     }
-    Ok(())
+    Quantity::Distance.growing(approaches_m)
 }
 
 /// Checks frames against the rings' radii.
 pub fn check(radii_m: &[f64], frames: &[PressureProfile]) -> Result<(), ElasticityError> {
     check_approaches(frames.iter().map(|frame| frame.approach_m))?;
     for &radius in radii_m {
-        positive(radius, Quantity::Radius)?;
+        Quantity::Radius.positive(radius)?;
     }
     for frame in frames {
         if let Some(force) = frame.force_n {
-            positive(force, Quantity::Force)?;
+            Quantity::Force.positive(force)?;
         }
-        for (values, quantity) in [
-            (&frame.pressure_pa, Quantity::Pressure),
-            (&frame.standard_error_pa, Quantity::StandardError),
-        ] {
-            if values.len() != radii_m.len() {
-                return Err(ElasticityError::LengthMismatch {
-                    quantity,
-                    expected: radii_m.len(),
-                    found: values.len(),
-                });
-            }
-        }
+        Quantity::Pressure.entries(frame.pressure_pa.len(), radii_m.len())?;
+        Quantity::StandardError.entries(frame.standard_error_pa.len(), radii_m.len())?;
         for &pressure in &frame.pressure_pa {
-            finite(pressure, Quantity::Pressure)?;
+            Quantity::Pressure.finite(pressure)?;
         }
         for &error in &frame.standard_error_pa {
-            positive(error, Quantity::StandardError)?;
+            Quantity::StandardError.positive(error)?;
         }
     }
     Ok(())

@@ -18,14 +18,14 @@
 #![allow(clippy::print_stdout)]
 
 mod scenes;
+mod shared;
 mod tally;
 
-use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
-use rand_distr::StandardNormal;
+use rand::{SeedableRng, rngs::ChaCha8Rng};
 use scenes::{SolvedScene, scenes};
+use shared::{guide, normal, wave};
 use std::error::Error;
 use std::path::Path;
-use tactile_fem::{Guide, GuideLayer, Material};
 use tactile_inclusion::{
     AssumedInclusion, ExpectedErrors, InclusionSearch, PressureProfile, SensorErrors, Specimen,
 };
@@ -37,34 +37,14 @@ const PIXEL_NOISE: f64 = 7.5e-3;
 /// Scenes after which the figures so far are printed.
 const SUMMARY_EVERY: usize = 10;
 
-/// The sensor's guide in all scenes.
-fn guide(radius_m: f64) -> Result<Guide, Box<dyn Error>> {
-    let layer = |thickness_m, modulus| -> Result<GuideLayer, Box<dyn Error>> {
-        Ok(GuideLayer {
-            thickness_m,
-            material: Material::new(modulus, 0.495)?,
-        })
-    };
-    let layers = vec![layer(2e-3, 136e3)?, layer(3e-3, 80e3)?, layer(5e-3, 34e3)?];
-    Ok(Guide::new(layers, radius_m)?)
-}
-
-fn normal(rng: &mut ChaCha8Rng) -> f64 {
-    rng.sample(StandardNormal)
-}
-
-/// Ring means of a smooth random field in the plane of unit variance with Matérn's kernel of order
-/// 3/2: a sum of waves whose wave vectors follow the kernel's spectrum, Student's t with three
-/// degrees of freedom.
+/// Ring means of a smooth random field of unit variance.
 fn smooth_field(radii_m: &[f64], length_m: f64, rng: &mut ChaCha8Rng) -> Vec<f64> {
     const WAVES: usize = 400;
     const ANGLES: usize = 32;
     let mut means = vec![0.0; radii_m.len()];
     for _ in 0..WAVES {
-        let chi_squared: f64 = (0..3).map(|_| normal(rng).powi(2)).sum();
-        let scale = (3.0 / chi_squared).sqrt() / length_m;
-        let wave_number = scale * normal(rng).hypot(normal(rng));
-        let phase = core::f64::consts::TAU * rng.random::<f64>();
+        let ([x, y], phase) = wave(length_m, rng);
+        let wave_number = x.hypot(y);
         for (mean, radius) in means.iter_mut().zip(radii_m) {
             let around: f64 = (0..ANGLES)
                 .map(|k| {

@@ -1,5 +1,6 @@
 //! Scenes solved by another program.
 
+use crate::shared::{self, number, table, text};
 use std::error::Error;
 use std::path::Path;
 use tactile_fem::Interface;
@@ -19,50 +20,26 @@ pub(crate) struct SolvedScene {
     pub(crate) pressures_pa: Vec<Vec<f64>>,
 }
 
-/// A CSV file.
-struct Table {
-    header: Vec<String>,
-    rows: Vec<Vec<String>>,
-}
-
-fn table(path: &Path) -> Result<Table, Box<dyn Error>> {
-    let text = std::fs::read_to_string(path)?;
-    let mut lines = text
-        .lines()
-        .map(|line| line.split(',').map(str::to_owned).collect::<Vec<_>>());
-    let header = lines.next().ok_or("an empty file")?;
-    Ok(Table {
-        header,
-        rows: lines.collect(),
-    })
-}
-
 pub(crate) fn scenes(folder: &Path) -> Result<Vec<SolvedScene>, Box<dyn Error>> {
-    let Table { header, rows } = table(&folder.join("scenes.csv"))?;
     let mut scenes = Vec::new();
-    for row in rows {
-        let text = |name: &str| -> Result<&str, String> {
-            let column = header.iter().position(|column| column == name);
-            let found = column.and_then(|column| row.get(column));
-            found.map(String::as_str).ok_or(format!("no column {name}"))
-        };
-        let number =
-            |name: &str| -> Result<f64, Box<dyn Error>> { Ok(text(name)?.parse::<f64>()?) };
-        let name = text("scene")?.to_owned();
-        let loads = header.iter().filter(|c| c.starts_with("approach_")).count();
+    for row in table(&folder.join("scenes.csv"))? {
+        let number = |name: &str| number(&row, name);
+        let name = text(&row, "scene")?.to_owned();
+        let loads = row.keys().filter(|c| c.starts_with("approach_")).count();
         let numbers = |prefix: &str, unit: &str| -> Result<Vec<f64>, Box<dyn Error>> {
             let names = (1..=loads).map(|load| format!("{prefix}_{load}_{unit}"));
             names
-                .filter(|name| text(name).is_ok_and(|text| !text.is_empty()))
+                .filter(|name| text(&row, name).is_ok_and(|text| !text.is_empty()))
                 .map(|name| number(&name))
                 .collect()
         };
         let approaches_m = numbers("approach", "m")?;
-        let points = table(&folder.join(format!("{name}.csv")))?.rows;
+        let points = table(&folder.join(format!("{name}.csv")))?;
         let mut radii_m = Vec::new();
         let mut pressures_pa = vec![Vec::new(); approaches_m.len()];
         for point in points {
-            let (load, radius): (usize, f64) = (point[0].parse()?, point[1].parse()?);
+            let load: usize = text(&point, "load_index")?.parse()?;
+            let radius = shared::number(&point, "r_m")?;
             if radius == 0.0 {
                 // A ring has an area.
                 continue;
@@ -70,7 +47,7 @@ pub(crate) fn scenes(folder: &Path) -> Result<Vec<SolvedScene>, Box<dyn Error>> 
             if load == 1 {
                 radii_m.push(radius);
             }
-            pressures_pa[load - 1].push(point[2].parse()?);
+            pressures_pa[load - 1].push(shared::number(&point, "pressure_pa")?);
         }
         let diameter = number("D_m")?;
         // Folders of balls do without that column.
@@ -82,7 +59,7 @@ pub(crate) fn scenes(folder: &Path) -> Result<Vec<SolvedScene>, Box<dyn Error>> 
             height_m: number("block_height_m")?,
             radius_m: number("block_radius_m")?,
             face_radius_m: number("disc_radius_m")?,
-            interface: match text("contact")? {
+            interface: match text(&row, "contact")? {
                 "bonded" => Interface::Bonded,
                 _ => Interface::Frictionless,
             },

@@ -73,7 +73,7 @@ fn pressures_within_three_quarters_of_the_face_are_those_of_calculix() {
     for row in lines {
         let load = load(&header, row);
         let radii = &load.forward.radii_m;
-        let found = load.forward.predict(&load.parameters).unwrap().values;
+        let found = load.forward.predict(&load.parameters).unwrap();
         let (pressures, force) = found.split_at(radii.len());
         for ((found, expected), radius) in pressures.iter().zip(&load.pressures_pa).zip(radii) {
             let error = found / expected - 1.0;
@@ -128,7 +128,7 @@ fn off_calculix(place: Place) -> f64 {
         ..forward(5)
     };
     let found = forward.with_plain(&parameters).unwrap();
-    let found = found.predict(&parameters).unwrap().values;
+    let found = found.predict(&parameters).unwrap();
     let ratios: Vec<f64> = (ASIDE_PA.iter().zip(&found)).map(|(p, q)| p / q).collect();
     let mean = ratios.iter().sum::<f64>() / ratios.len() as f64;
     let squares = ratios.iter().map(|ratio| (ratio / mean - 1.0).powi(2));

@@ -10,7 +10,7 @@ use tactile_fem::Interface;
 /// Values without noise from a finer mesh than the fit's, with the errors of a first fit.
 fn problem_of(truth: &Parameters, resolution: Resolution) -> Problem {
     let finer = forward(5);
-    let values = finer.predict(truth).unwrap().values;
+    let values = finer.predict(truth).unwrap();
     let observed = Observed {
         radii_m: finer.radii_m,
         white: values.iter().map(|p| 1e-3 * p).collect(),

@@ -60,12 +60,7 @@ fn block() -> Parameters {
 }
 
 fn lump(diameter_m: f64, depth_m: f64, youngs_modulus_pa: f64) -> LumpParameters {
-    LumpParameters {
-        diameter_m,
-        depth_m,
-        youngs_modulus_pa,
-        aspect: 1.0,
-    }
+    LumpParameters::ball(diameter_m, depth_m, youngs_modulus_pa)
 }
 
 fn is_poor(estimate: &InclusionEstimate) -> bool {
@@ -101,7 +96,7 @@ fn derivative_errors(model: &Forward, here: &Parameters) -> Vec<(Coordinate, f64
         let step = 200.0 * here.small_step(coordinate).abs();
         let at = |by| {
             let moved = here.moved(coordinate, by);
-            model.predict_near(&moved, Some(&solved)).unwrap().0.values
+            model.predict_near(&moved, Some(&solved)).unwrap().0
         };
         let (low, high) = (at(-step), at(step));
         let quotient: Vec<f64> = (low.iter().zip(&high))
@@ -163,8 +158,8 @@ fn a_moved_mesh_is_as_good_as_a_new_one() {
     ] {
         for by in [-0.2, 0.2] {
             let there = here.moved(coordinate, by);
-            let moved = model.predict_near(&there, Some(&solved)).unwrap().0.values;
-            let new = model.predict(&there).unwrap().values;
+            let moved = model.predict_near(&there, Some(&solved)).unwrap().0;
+            let new = model.predict(&there).unwrap();
             // The roughness that first fits count with.
             let off = distance(&moved[..32], &new[..32]);
             assert!(off < 8e-3, "{coordinate:?} by {by}: {off}");
@@ -175,8 +170,8 @@ fn a_moved_mesh_is_as_good_as_a_new_one() {
 
 #[test]
 fn the_answers_mesh_is_fine_enough() {
-    let answers = forward(5).predict(&block()).unwrap().values;
-    let finer = forward(8).predict(&block()).unwrap().values;
+    let answers = forward(5).predict(&block()).unwrap();
+    let finer = forward(8).predict(&block()).unwrap();
     // The model's error that the fit counts with: 0.2 % of scale, 0.07 % of shape.
     assert!(distance(&answers[..32], &finer[..32]) < 2e-3);
     // Half of the force's error: the rim's singular traction.
@@ -226,14 +221,7 @@ fn frames_that_cannot_be_searched_are_refused() {
     let narrow: Vec<f64> = (1..=16).map(|k| f64::from(k) * 1.6e-3).collect();
     let few = search().search(&narrow, &[frame(1e-3)]).unwrap_err();
     // Seven of the rings lie within three quarters of 16 mm.
-    assert_eq!(
-        few,
-        ElasticityError::LengthMismatch {
-            quantity: crate::error::Quantity::Samples,
-            expected: 8,
-            found: 7
-        }
-    );
+    assert_eq!(few.to_string(), "samples: expected 8 entries, found 7");
 }
 
 #[test]
@@ -306,12 +294,4 @@ fn that_there_is_none_is_certain_only_where_the_model_explains_the_frames() {
     assert_eq!(estimate(0.7, &[]).verdict(), Verdict::Uncertain);
     let poor = InclusionWarning::PoorFit { excess: 9.0 };
     assert_eq!(estimate(1e-3, &[poor]).verdict(), Verdict::Uncertain);
-    // One per cent of asymmetry is harmless, six are not.
-    let of_picture = |first, higher| estimate(1e-3, &[]).with_asymmetry(first, higher);
-    assert_eq!(of_picture(0.01, 0.004).verdict(), Verdict::Absent);
-    assert!(of_picture(0.01, 0.004).warnings.is_empty());
-    for asymmetric in [of_picture(0.06, 0.0), of_picture(0.0, 0.019)] {
-        assert_eq!(asymmetric.verdict(), Verdict::Uncertain);
-        assert_eq!(asymmetric.warnings.len(), 1);
-    }
 }

@@ -95,7 +95,7 @@ fn derivatives_by_the_place_are_those_of_the_pressure() {
         let at = |step: f64| {
             let moved = parameters.moved(coordinate, step);
             let near = forward.predict_near(&moved, Some(&solved));
-            near.unwrap().0.values
+            near.unwrap().0
         };
         let (high, low) = (at(step), at(-step));
         let largest = column.iter().fold(0.0f64, |most, d| most.max(d.abs()));
@@ -117,7 +117,7 @@ fn under_the_axis_the_picture_is_the_axial_pressure() {
         cells: None,
         ..picture.clone()
     };
-    let both = [&picture, &axial].map(|forward| forward.predict(&parameters).unwrap().values);
+    let both = [&picture, &axial].map(|forward| forward.predict(&parameters).unwrap());
     for (a, b) in both[0].iter().zip(&both[1]) {
         assert!((a - b).abs() < 1e-12 * b.abs());
     }
@@ -164,7 +164,7 @@ fn scan(parameters: &Parameters, seed: u64) -> Scan {
             Arc::make_mut(&mut cells.positions).axes_m = vec![axis];
         }
         let forward = forward.with_plain(&parameters).unwrap();
-        let mut values = forward.predict(&parameters).unwrap().values;
+        let mut values = forward.predict(&parameters).unwrap();
         for value in &mut values {
             *value *= 1.0 + normal(NOISE);
         }
@@ -258,16 +258,16 @@ fn two_balls_off_the_axis_are_told_apart_and_three_are_not_explained() {
     let mut parameters = block([5e-3, -2e-3]);
     parameters.place.elongation = [0.0; 2];
     let forward = forward(5).with_plain(&parameters).unwrap();
-    let one = forward.predict(&parameters).unwrap().values;
+    let one = forward.predict(&parameters).unwrap();
     let count = 2 * positions().len();
     // A second one on the other side, 1.3 diameters away, each lifting the pressure as if alone.
     parameters.place.centre_m = [-7.5e-3, 2.5e-3];
-    let other = forward.predict(&parameters).unwrap().values;
+    let other = forward.predict(&parameters).unwrap();
     let without = Parameters {
         lump: None,
         ..parameters.clone()
     };
-    let plain = forward.predict(&without).unwrap().values;
+    let plain = forward.predict(&without).unwrap();
     let both: Vec<f64> = (one.iter().zip(&other).zip(&plain))
         .map(|((a, b), p)| a * b / p)
         .collect();
@@ -281,7 +281,7 @@ fn two_balls_off_the_axis_are_told_apart_and_three_are_not_explained() {
 
     // Three are neither one nor two.
     parameters.place.centre_m = [3e-3, 9e-3];
-    let third = forward.predict(&parameters).unwrap().values;
+    let third = forward.predict(&parameters).unwrap();
     let three: Vec<f64> = (both.iter().zip(&third).zip(&plain))
         .map(|((both, third), p)| both * third / p)
         .collect();
@@ -307,7 +307,7 @@ fn a_ball_under_the_rim_has_a_place_and_no_size() {
     let mut parameters = block([6e-3, -8e-3]);
     parameters.place.elongation = [0.0; 2];
     let forward = forward(5).with_plain(&parameters).unwrap();
-    let values = forward.predict(&parameters).unwrap().values;
+    let values = forward.predict(&parameters).unwrap();
     let found = searched(&values[..2 * positions().len()]);
     assert!(
         found.warnings.contains(&InclusionWarning::AtRim),
@@ -333,7 +333,7 @@ fn balls_above_the_detection_limit_are_found_and_those_below_are_not() {
         parameters.place.elongation = [0.0; 2];
         parameters.lump = lump;
         let forward = forward(5).with_plain(&parameters).unwrap();
-        let mut values = forward.predict(&parameters).unwrap().values;
+        let mut values = forward.predict(&parameters).unwrap();
         values.truncate(2 * positions().len());
         values.iter_mut().for_each(|value| *value *= 1.0 + noise());
         Scan {
