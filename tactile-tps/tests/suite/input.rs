@@ -70,6 +70,15 @@ fn directions_that_are_not_spanned_are_dropped() {
     );
     assert_eq!(dropped.report.rank, 3);
     assert!(dropped.report.extents[2] < 1e-3);
+    for scale in [1e-9, 1.0, 1e9] {
+        let line: Vec<_> = (0..25)
+            .map(|i| Point3::from([scale * f64::from(i); 3]))
+            .collect();
+        let spline = fit(&line, &targets, &FitOptions::new(NegR));
+        assert_eq!(spline.report.rank, 2, "one direction at scale {scale}");
+    }
+    let report = fit(&[exact[0]; 5], &[targets[0]; 5], &FitOptions::new(NegR)).report;
+    assert_eq!((report.rank, report.merged), (1, 4));
 }
 
 #[test]
@@ -104,6 +113,13 @@ fn bad_input_is_named() {
         let refused = plain().with_rank_tolerance(tolerance);
         assert!(
             matches!(refused, Err(TpsError::RankTolerance { .. })),
+            "{tolerance}"
+        );
+    }
+    for tolerance in [0.0, 1.0, -1.0, f64::NAN] {
+        let refused = plain().with_tolerance(tolerance);
+        assert!(
+            matches!(refused, Err(TpsError::Tolerance { .. })),
             "{tolerance}"
         );
     }

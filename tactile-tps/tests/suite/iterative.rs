@@ -172,23 +172,3 @@ fn a_watch_stops_the_fit() {
         "{told:e} {reported:e}"
     );
 }
-
-#[test]
-fn tolerances_are_checked_and_kept() {
-    let sources = Uniform(13).points::<2>(POINTS);
-    let targets: Vec<_> = sources.iter().map(bend).collect();
-    for value in [0.0, 1.0, -1.0, f64::NAN] {
-        let found = FitOptions::<f64>::default().with_tolerance(value);
-        assert!(matches!(found, Err(TpsError::Tolerance { .. })), "{value}");
-    }
-    let rough = FitOptions::default()
-        .with_solver(Solver::Iterative)
-        .with_tolerance(1e-4)
-        .expect("a tolerance");
-    let rough = ThinPlateSpline::fit(&sources, &targets, &rough).expect("a fit");
-    let report = rough.report;
-    assert!(
-        report.converged() && report.residual <= Some(1e-4) && report.iterations < 8,
-        "{report:?}"
-    );
-}

@@ -1,23 +1,17 @@
 //! Local fields: gradients within their errors, wrong pairs found, answers at any point.
 
+use crate::common::Uniform;
 use nalgebra::{Point, SMatrix, SVector};
 use tactile_tps::LocalField;
 
-/// SplitMix64.
-struct Stream(u64);
+/// A number from 0 to 1.
+fn share(random: &mut Uniform) -> f64 {
+    0.5 * (random.next() + 1.0)
+}
 
-impl Stream {
-    fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
-    }
-
-    fn normal(&mut self) -> f64 {
-        (0..12).map(|_| self.next()).sum::<f64>() - 6.0
-    }
+/// Of variance 1.
+fn normal(random: &mut Uniform) -> f64 {
+    0.5 * (0..12).map(|_| random.next()).sum::<f64>()
 }
 
 /// A dimple about the centre of the unit cube, steep or as wide as the set, and its gradient.
@@ -34,17 +28,17 @@ fn dimple<const D: usize>(width: f64, p: &Point<f64, D>) -> (SVector<f64, D>, SM
 
 /// Scattered points, displaced with noise: a share of them anywhere within two spacings.
 fn check<const D: usize>(count: usize, width: f64, noise: f64, wrong: f64) {
-    let mut stream = Stream(count as u64 + 5);
+    let mut random = Uniform(count as u64 + 5);
     let spacing = (count as f64).powf(-1.0 / D as f64);
     let (mut sources, mut targets, mut is_wrong) = (Vec::new(), Vec::new(), Vec::new());
     for _ in 0..count {
-        let p = Point::from(SVector::<f64, D>::from_fn(|_, _| stream.next()));
-        let misplaced = stream.next() < wrong;
+        let p = Point::from(SVector::<f64, D>::from_fn(|_, _| share(&mut random)));
+        let misplaced = share(&mut random) < wrong;
         let offset = SVector::<f64, D>::from_fn(|_, _| {
             if misplaced {
-                3.0 * spacing * (stream.next() - 0.5)
+                3.0 * spacing * (share(&mut random) - 0.5)
             } else {
-                noise * spacing * stream.normal()
+                noise * spacing * normal(&mut random)
             }
         });
         sources.push(p);
@@ -99,10 +93,10 @@ fn gradients_lie_within_their_errors_and_wrong_pairs_are_left_out() {
 /// A homogeneous field is exact, inside and outside, whatever its unit.
 #[test]
 fn an_affine_field_is_exact_at_any_point() {
-    let mut stream = Stream(3);
+    let mut random = Uniform(3);
     for unit in [1e-9, 1.0, 1e6] {
         let sources: Vec<Point<f64, 3>> = (0..600)
-            .map(|_| Point::from(SVector::from_fn(|_, _| unit * stream.next())))
+            .map(|_| Point::from(SVector::from_fn(|_, _| unit * share(&mut random))))
             .collect();
         let linear = SMatrix::<f64, 3, 3>::new(0.1, 0.02, 0.0, -0.03, 0.2, 0.01, 0.0, 0.04, -0.1);
         let targets: Vec<_> = sources.iter().map(|p| p + linear * p.coords).collect();

@@ -7,7 +7,6 @@ mod influence;
 mod input;
 mod iterative;
 mod local;
-mod models;
 mod path;
 mod properties;
 mod recorded;

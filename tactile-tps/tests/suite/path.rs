@@ -1,5 +1,6 @@
 //! Values for many λ against one fit after the other.
 
+use crate::common::{Uniform, bend};
 use nalgebra::{Point2, Point3};
 use tactile_tps::{
     Factorization, FitOptions, Kernel, LambdaPath, NegR, R2LogR, Smoothing, Solver, Spline,
@@ -8,29 +9,15 @@ use tactile_tps::{
 
 const LAMBDAS: [f64; 4] = [1e-4, 0.02, 1.0, 300.0];
 
-/// Points of a jittered dome, flattened towards a plane by `height`.
-fn dome(n: usize, height: f64) -> Vec<Point3<f64>> {
-    let point = |i: usize| {
-        let (r, angle) = (0.1 * (i as f64).sqrt(), 2.4 * i as f64);
-        let jitter = 0.02 * ((i * i) as f64).sin();
-        Point3::new(
-            r * angle.cos() + jitter,
-            r * angle.sin() - jitter,
-            height * (1.0 - r * r),
-        )
-    };
-    (0..n).map(point).collect()
+/// Points in space, flattened towards a plane by `height`.
+fn cloud(n: usize, height: f64) -> Vec<Point3<f64>> {
+    let points = Uniform(n as u64).points::<3>(n);
+    let flatten = |p: &Point3<f64>| Point3::new(p.x, p.y, height * p.z);
+    points.iter().map(flatten).collect()
 }
 
 fn moved(points: &[Point3<f64>]) -> Vec<Point3<f64>> {
-    let map = |p: &Point3<f64>| {
-        Point3::new(
-            1.2 * p.x + 0.1 * (3.0 * p.y).sin(),
-            p.y,
-            p.z + 0.3 * p.x * p.y,
-        )
-    };
-    points.iter().map(map).collect()
+    points.iter().map(bend).collect()
 }
 
 /// Greatest distance of the values from those of one fit for each λ, relative to the targets.
@@ -61,16 +48,16 @@ const ROUNDING: f64 = 1e-10;
 
 #[test]
 fn values_are_those_of_one_fit_after_the_other() {
-    let sources = dome(60, 1.0);
+    let sources = cloud(60, 1.0);
     let targets = moved(&sources);
-    let points = dome(37, 0.9);
+    let points = cloud(37, 0.9);
     let plain = FitOptions::new(NegR);
     assert!(worst(&sources, &targets, &plain, &points) < ROUNDING);
     let weights = (0..60).map(|i| f64::from(i % 4) * 0.3).collect();
     let weighted = plain.clone().with_weights(weights).unwrap();
     assert!(worst(&sources, &targets, &weighted, &points) < ROUNDING);
     // Coplanar points: the spline has no direction across.
-    let (flat, plane) = (dome(60, 0.0), dome(5, 0.0));
+    let (flat, plane) = (cloud(60, 0.0), cloud(5, 0.0));
     assert!(worst(&flat, &moved(&flat), &plain, &plane) < ROUNDING);
     // Points given twice, with targets that differ.
     let (mut twice, mut both) = (sources.clone(), targets.clone());
@@ -82,11 +69,8 @@ fn values_are_those_of_one_fit_after_the_other() {
 #[test]
 fn so_are_those_in_the_plane_and_of_few_points() {
     for n in [1, 2, 3, 4, 9, 30] {
-        let sources: Vec<_> = dome(n, 1.0).iter().map(|p| Point2::new(p.x, p.y)).collect();
-        let targets: Vec<_> = sources
-            .iter()
-            .map(|p| Point2::new(p.x.exp(), p.x * p.y))
-            .collect();
+        let sources = Uniform(n).points::<2>(n as usize);
+        let targets: Vec<_> = sources.iter().map(bend).collect();
         let points = [Point2::new(0.2, 0.1), Point2::new(-3.0, 1.0)];
         let error = worst(&sources, &targets, &FitOptions::new(R2LogR), &points);
         assert!(error < ROUNDING, "{n}: {error}");
@@ -95,7 +79,7 @@ fn so_are_those_in_the_plane_and_of_few_points() {
 
 #[test]
 fn what_cannot_be_fitted_is_refused() {
-    let sources = dome(20, 1.0);
+    let sources = cloud(20, 1.0);
     let (targets, options) = (moved(&sources), FitOptions::new(NegR));
     let fit = |lambda: f64, targets: &[Point3<f64>]| {
         LambdaPath::fit(&sources, targets, &options, &[lambda])
@@ -123,7 +107,7 @@ fn what_was_fitted_before_leaves_no_trace() {
     let weights = |n: usize| (0..n).map(|i| f64::from(i as u32 % 3)).collect::<Vec<_>>();
     let plain = FitOptions::new(NegR);
     let path = |n: usize, lambdas: &[f64], options: &FitOptions<f64, NegR>| {
-        let sources = dome(n, 1.0);
+        let sources = cloud(n, 1.0);
         LambdaPath::fit(&sources, &moved(&sources), options, lambdas).unwrap()
     };
     let mut kept = path(70, &LAMBDAS, &plain);
@@ -133,7 +117,7 @@ fn what_was_fitted_before_leaves_no_trace() {
         (12, true, true),
         (91, false, false),
     ] {
-        let mut sources = dome(n, 1.0);
+        let mut sources = cloud(n, 1.0);
         if twice {
             sources[5] = sources[2];
         }
@@ -148,7 +132,7 @@ fn what_was_fitted_before_leaves_no_trace() {
         assert_eq!(kept.values(&query), new.values(&query), "{n}");
         let smooth = options.with_smoothing(Smoothing::Lambda(0.02)).unwrap();
         let factored = Factorization::new(
-            &dome(33, 1.0),
+            &cloud(33, 1.0),
             &plain.clone().with_smoothing(Smoothing::Gcv).unwrap(),
         );
         let again = factored.unwrap().refactor(&sources, &smooth).unwrap();
@@ -170,7 +154,7 @@ fn what_was_fitted_before_leaves_no_trace() {
 /// its number of points, is solved anew.
 #[test]
 fn a_factor_of_other_points_is_not_used() {
-    let (old, sources) = (dome(40, 0.7), dome(40, 1.0));
+    let (old, sources) = (cloud(40, 0.7), cloud(40, 1.0));
     let targets = moved(&sources);
     let weights: Vec<_> = (0..40).map(|i| 1.0 + f64::from(i % 3)).collect();
     let query = Point3::new(0.2, 0.1, 0.7);

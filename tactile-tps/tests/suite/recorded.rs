@@ -4,15 +4,13 @@
 //! `RECORD_ANSWERS=1 cargo test -p tactile-tps --test suite recorded` writes the record anew; the
 //! commit says why numbers moved.
 
-use test_support as record;
-
 use nalgebra::{Point, Point1, SVector};
 use tactile_tps::{
     Affine, Factorization, FitOptions, Kernel, NegR, R2LogR, R3, Smoothing, Spline,
     SplineWorkspace, ThinPlateSpline, Warp,
 };
+use test_support::Answers;
 
-use self::record::Answers;
 use super::common::{Uniform, bend, options};
 
 /// Relative to the largest number of a line: sums of 40 terms in another order differ by 1e-15,
