@@ -210,7 +210,9 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
         options: &FitOptions<T, K>,
         mut watch: impl FnMut(&Progress) -> ControlFlow<()>,
     ) -> Result<Self, TpsError> {
-        Factorization::new_watched(sources, options, &mut watch)?.fit_watched(targets, watch)
+        Factorization::without_points(options.kernel.clone())
+            .refactor_watched(sources, options, &mut watch)?
+            .fit_watched(targets, watch)
     }
 
     /// A spline that is zero everywhere, to be filled by a fit.

@@ -15,14 +15,6 @@
 //! | accept any warp | the object-safe trait [`Warp`]: splines, [`Affine`] |
 //! | fit any kind of warp | the trait [`WarpModel`]: [`FitOptions`], [`AffineModel`] |
 //!
-//! # Equations
-//! $$f(x) = a_0 + A x + \sum_i w_i U(|x - x_i|),
-//! \qquad \sum_i w_i = 0, \quad \sum_i w_i x_i^T = 0$$
-//!
-//! is the least of $\sum_i v_i |f(x_i) - y_i|^2 + \lambda w^T K w$, with weights $v_i$ and $K_{ij}
-//! = U(|x_i - x_j|)$. Kernels: $r^2 \ln r$ (plane), $-r$ (space), $r^3$. Bending energy: $8\pi w^T
-//! K w = \int |\partial^2 f|^2$ for the first two in their own dimension.
-//!
 //! Jacobian: $\nabla f = A + \sum_i w_i U^{\prime}(r_i) (x - x_i)^T/r_i$. Costs for n points: fit
 //! $n^3/3$, new targets $O(n^2)$, a query $O(n)$. Beyond 3000 points a fit takes O(steps × n²) time
 //! and O(n) memory. Lengths are in any unit, errors are [`TpsError`].

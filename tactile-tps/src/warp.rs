@@ -312,16 +312,11 @@ impl<T: Scalar, const D: usize> Affine<T, D> {
         weights: Option<&[T]>,
     ) -> Result<Self, TpsError> {
         let moments = Moments::new(sources, targets, weights)?;
-        let (values, vectors) = symmetric_eigen(&moments.scatter);
-        let largest = values.iter().copied().fold(0.0, f64::max);
-        let mut linear = SMatrix::<f64, D, D>::zeros();
-        for (k, &value) in values.iter().enumerate() {
-            // Below this the extent is the rounding of the moments.
-            if value > largest * 1e-13 {
-                let axis = SVector::<f64, D>::from_fn(|i, _| vectors[(i, k)]);
-                linear += moments.cross * axis * axis.transpose() / value;
-            }
-        }
+        let scatter = DMatrix::from_fn(D, D, |i, j| moments.scatter[(i, j)]).svd(true, true);
+        // Below this the extent is the rounding of the moments.
+        let rounding = 1e-13 * scatter.singular_values.max();
+        let inverse = scatter.pseudo_inverse(rounding).map_err(TpsError::custom)?;
+        let linear = moments.cross * SMatrix::from_fn(|i, j| inverse[(i, j)]);
         Ok(Self {
             linear: linear.map(T::narrow),
             offset: moments.offset(&linear),
@@ -413,16 +408,6 @@ impl<const D: usize> Moments<D> {
     fn offset<T: Scalar>(&self, linear: &SMatrix<f64, D, D>) -> SVector<T, D> {
         (self.target_mean - linear * self.source_mean).map(T::narrow)
     }
-}
-
-/// Eigenvalues and vectors of a symmetric `D` × `D` matrix.
-fn symmetric_eigen<const D: usize>(matrix: &SMatrix<f64, D, D>) -> (Vec<f64>, DMatrix<f64>) {
-    let dynamic = DMatrix::from_fn(D, D, |i, j| matrix[(i, j)]);
-    let eigen = dynamic.symmetric_eigen();
-    (
-        eigen.eigenvalues.iter().copied().collect(),
-        eigen.eigenvectors,
-    )
 }
 
 /// The rotation R that maximises tr(Rᵀ C): U diag(1, …, det(U Vᵀ)) Vᵀ of the singular value

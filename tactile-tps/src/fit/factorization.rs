@@ -5,11 +5,11 @@ use core::ops::ControlFlow;
 use nalgebra::{DMatrix, Point, SVector};
 
 use super::{
-    Buffers, Centres, Coefficients, Factorization, Iterative, MAX, Outcome, Run, SplineWorkspace,
-    System, Watch, largest, relative,
+    Buffers, Centres, Coefficients, Factorization, Iterative, Run, SplineWorkspace, System, Watch,
+    largest, relative,
 };
 use crate::{
-    FitOptions, FitReport, Kernel, Progress, Scalar, Smoothing, Spline, TpsError,
+    FitOptions, FitReport, Kernel, Progress, Scalar, Smoothing, Spline, StopReason, TpsError,
     error::{same_length, validate_smoothing, validate_weights},
     evaluate::{BLOCK, KernelSum, Solution},
     lanes::{Job, Lane, dispatch},
@@ -51,18 +51,7 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
     /// # Errors
     /// [`TpsError`] for bad input, or a kernel that is not definite on these points.
     pub fn new(sources: &[Point<T, D>], options: &FitOptions<T, K>) -> Result<Self, TpsError> {
-        Self::new_watched(sources, options, |_| ControlFlow::Continue(()))
-    }
-
-    /// As [`new`](Self::new), reporting the progress of an iterative solver's preparation to
-    /// `watch`, which may stop it.
-    pub(crate) fn new_watched(
-        sources: &[Point<T, D>],
-        options: &FitOptions<T, K>,
-        mut watch: impl FnMut(&Progress) -> ControlFlow<()>,
-    ) -> Result<Self, TpsError> {
-        let this = Self::without_points(options.kernel.clone());
-        this.refactored(sources, options, &mut watch)
+        Self::without_points(options.kernel.clone()).refactor(sources, options)
     }
 
     /// As [`new`](Self::new), in the memory of this factorisation. O(n³/3).
@@ -95,33 +84,33 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
         sources: &[Point<T, D>],
         options: &FitOptions<T, K>,
     ) -> Result<Self, TpsError> {
-        self.refactored(sources, options, &mut |_| ControlFlow::Continue(()))
+        self.refactor_watched(sources, options, &mut |_| ControlFlow::Continue(()))
     }
 
-    fn refactored(
+    /// As [`refactor`](Self::refactor), reporting the progress of an iterative solver's preparation
+    /// to `watch`, which may stop it.
+    pub(crate) fn refactor_watched(
         self,
         sources: &[Point<T, D>],
         options: &FitOptions<T, K>,
         watch: &mut Watch<'_>,
     ) -> Result<Self, TpsError> {
         let mut this = self.with_points(sources, options)?;
-        let lambda = this.inner_lambda(this.smoothing);
-        // Taken out, because `setting` borrows the rest.
+        let iterates = options.iterates(this.centres.len());
+        // Taken out, because the rest is read.
         let mut system = core::mem::take(&mut this.system);
-        let iterative = this.iterative.take();
-        let (setting, weights) = (this.setting(), &this.centre_weights[..]);
-        if this.smoothing == Smoothing::Gcv {
-            system.decompose(&setting, weights);
-        } else if options.iterates(this.centres.len()) {
-            let mut iterative = iterative.unwrap_or_default();
-            let built = iterative.build(&setting, weights, lambda, &mut system, watch);
-            if built.is_break() {
-                return Err(TpsError::Stopped);
-            }
-            this.iterative = Some(iterative);
-        } else {
-            system.factor(&setting, weights, lambda)?;
-        }
+        let mut iterative = this.iterative.take().unwrap_or_default();
+        let (smoothing, weights) = (this.smoothing, &this.centre_weights);
+        let built = this.build(
+            smoothing,
+            weights,
+            iterates,
+            &mut system,
+            &mut iterative,
+            watch,
+        );
+        built?;
+        this.iterative = iterates.then_some(iterative);
         this.system = system;
         Ok(this)
     }
@@ -258,13 +247,22 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
                 ..self.own_task()
             }
         } else {
-            self.build(smoothing, centre_weights, system, iterative)?;
+            let iterates = !gcv && self.iterative.is_some();
+            let watch = &mut |_: &Progress| ControlFlow::Continue(());
+            self.build(
+                smoothing,
+                centre_weights,
+                iterates,
+                system,
+                iterative,
+                watch,
+            )?;
             Task {
                 system,
                 weights,
                 smoothing,
                 careful: false,
-                iterative: (!gcv && self.iterative.is_some()).then_some(&*iterative),
+                iterative: iterates.then_some(&*iterative),
             }
         };
         // Nothing stops a fit without a callback.
@@ -293,19 +291,21 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
         &self,
         smoothing: Smoothing<T>,
         centre_weights: &[f64],
+        iterates: bool,
         system: &mut System<D>,
         iterative: &mut Iterative<D>,
+        watch: &mut Watch<'_>,
     ) -> Result<(), TpsError> {
         let (setting, lambda) = (self.setting(), self.inner_lambda(smoothing));
         if smoothing == Smoothing::Gcv {
             system.decompose(&setting, centre_weights);
-        } else if self.iterative.is_none() {
-            system.factor(&setting, centre_weights, lambda)?;
+        } else if iterates {
+            let built = iterative.build(&setting, centre_weights, lambda, system, watch);
+            if built.is_break() {
+                return Err(TpsError::Stopped);
+            }
         } else {
-            // Without a callback nothing stops it.
-            let _ = iterative.build(&setting, centre_weights, lambda, system, &mut |_| {
-                ControlFlow::Continue(())
-            });
+            system.factor(&setting, centre_weights, lambda)?;
         }
         Ok(())
     }
@@ -345,45 +345,7 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
             } = buffers;
             lambda = system.cross_validate::<M>(targets, work, spare);
         }
-        let outcome: Outcome<M> = match task.iterative {
-            Some(iterative) => Run {
-                kernel: &self.kernel,
-                system,
-                iterative,
-                tolerance: self.tolerance,
-            }
-            .solve(buffers, watch),
-            None => Equations {
-                kernel: &self.kernel,
-                centres,
-                system,
-                lambda,
-            }
-            .solve(buffers, task.careful),
-        };
-        self.record(&outcome, system, lambda, &mut spline.report);
-        let numbers = targets.iter().flat_map(|t| t.iter());
-        let solution = Solution {
-            frame: centres.frame,
-            axes: &centres.axes,
-            weights: &buffers.weights,
-            constant: core::array::from_fn(|k| origin[k] + outcome.affine[k][0]),
-            gradient: outcome.affine.map(|a| system.span.gradient(&a)),
-            level: numbers.fold(0.0, |m, x| f64::max(m, x.widen().abs())),
-        };
-        spline.assign(&self.kernel, &solution);
-        Ok(())
-    }
-
-    /// Writes a solution's numbers into the report.
-    fn record<const M: usize>(
-        &self,
-        outcome: &Outcome<M>,
-        system: &System<D>,
-        lambda: f64,
-        report: &mut FitReport,
-    ) {
-        let centres = &self.centres;
+        let report = &mut spline.report;
         report.points = centres.inputs;
         report.merged = centres.inputs - centres.len();
         report.ignored = centres.len() - system.active.len();
@@ -391,11 +353,33 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
         report.extents.clear();
         report.extents.extend_from_slice(&system.span.extents);
         report.lambda = lambda * self.unit();
-        report.condition = outcome.condition;
-        report.residual = outcome.residual;
-        report.refinements = outcome.refinements;
-        report.iterations = outcome.iterations;
-        report.stop = outcome.stop;
+        let affine: [Coefficients; M] = match task.iterative {
+            Some(iterative) => Run {
+                kernel: &self.kernel,
+                system,
+                iterative,
+                tolerance: self.tolerance,
+            }
+            .solve(buffers, report, watch),
+            None => Equations {
+                kernel: &self.kernel,
+                centres,
+                system,
+                lambda,
+            }
+            .solve(buffers, report, task.careful),
+        };
+        let numbers = targets.iter().flat_map(|t| t.iter());
+        let solution = Solution {
+            frame: centres.frame,
+            axes: &centres.axes,
+            weights: &buffers.weights,
+            constant: core::array::from_fn(|k| origin[k] + affine[k][0]),
+            gradient: affine.map(|a| system.span.gradient(&a)),
+            level: numbers.fold(0.0, |m, x| f64::max(m, x.widen().abs())),
+        };
+        spline.assign(&self.kernel, &solution);
+        Ok(())
     }
 
     /// Influence of each target on the spline's value at each point: aⱼ in f(x) = Σⱼ aⱼ yⱼ.
@@ -437,7 +421,7 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
         self.linear(points.len(), influence.len())?;
         // Four right-hand sides at a time read the factor once.
         for (points, rows) in points.chunks(4).zip(influence.chunks_mut(4 * self.len())) {
-            let side = |r: usize| Side::value(self, &points[r.min(points.len() - 1)]);
+            let side = |r: usize| Side::new(self, &points[r.min(points.len() - 1)], None);
             let sides: [Side<D>; 4] = core::array::from_fn(side);
             self.follow(&sides, &mut workspace.buffers, |r, i, a| {
                 if r < points.len() {
@@ -482,7 +466,7 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
     ) -> Result<(), TpsError> {
         self.linear(points.len(), influence.len())?;
         for (point, row) in points.iter().zip(influence.chunks_exact_mut(self.len())) {
-            let sides: [Side<D>; D] = core::array::from_fn(|k| Side::slope(self, point, k));
+            let sides: [Side<D>; D] = core::array::from_fn(|k| Side::new(self, point, Some(k)));
             self.follow(&sides, &mut workspace.buffers, |k, i, b| row[i][k] = b);
         }
         Ok(())
@@ -611,32 +595,23 @@ struct Side<const D: usize> {
 }
 
 impl<const D: usize> Side<D> {
-    fn value<T: Scalar, K>(factorization: &Factorization<T, D, K>, point: &Point<T, D>) -> Self {
-        let span = &factorization.system.span;
-        let point = factorization.centres.frame.inside(point);
-        let mut affine = [0.0; MAX];
-        (0..=span.directions).for_each(|c| affine[c] = span.value(c, &point));
-        Self {
-            point,
-            axis: None,
-            affine,
-            unit: 1.0,
-        }
-    }
-
-    fn slope<T: Scalar, K>(
+    fn new<T: Scalar, K>(
         factorization: &Factorization<T, D, K>,
         point: &Point<T, D>,
-        axis: usize,
+        axis: Option<usize>,
     ) -> Self {
         let (span, frame) = (&factorization.system.span, &factorization.centres.frame);
-        let mut affine = [0.0; MAX];
-        (0..=span.directions).for_each(|c| affine[c] = span.slope(c, axis));
+        let point = frame.inside(point);
+        let function = |c: usize| match axis {
+            _ if c > span.directions => 0.0,
+            None => span.value(c, &point),
+            Some(axis) => span.slope(c, axis),
+        };
         Self {
-            point: frame.inside(point),
-            axis: Some(axis),
-            affine,
-            unit: frame.scale,
+            point,
+            axis,
+            affine: core::array::from_fn(function),
+            unit: axis.map_or(1.0, |_| frame.scale),
         }
     }
 }
@@ -682,7 +657,12 @@ impl<K: Kernel, const D: usize> Equations<'_, K, D> {
     /// Solves for the targets in `buffers`, and refines where the condition number is large.
     ///
     /// `careful` measures the residual and refines from a lower condition number on.
-    fn solve<const M: usize>(&self, buffers: &mut Buffers, careful: bool) -> Outcome<M> {
+    fn solve<const M: usize>(
+        &self,
+        buffers: &mut Buffers,
+        report: &mut FitReport,
+        careful: bool,
+    ) -> [Coefficients; M] {
         let Buffers {
             targets,
             weights,
@@ -692,8 +672,10 @@ impl<K: Kernel, const D: usize> Equations<'_, K, D> {
         } = &mut *buffers;
         // The solver works in place, and refinement needs the targets again.
         weights.clone_from(targets);
-        let affine = self.system.solve(weights, self.lambda, work, spare);
-        let mut outcome = Outcome::new(affine, self.system.condition(self.lambda));
+        let mut affine = self.system.solve(weights, self.lambda, work, spare);
+        report.condition = self.system.condition(self.lambda);
+        (report.residual, report.refinements) = (None, 0);
+        (report.iterations, report.stop) = (0, StopReason::Direct);
         let n = self.centres.len();
         // For a few points a step of refinement costs next to nothing, and is taken sooner.
         let threshold = match careful {
@@ -701,20 +683,25 @@ impl<K: Kernel, const D: usize> Equations<'_, K, D> {
             true => 1e6,
             false => 1e8,
         };
-        if outcome.condition > threshold {
-            self.refine(buffers, &mut outcome);
+        if report.condition > threshold {
+            self.refine(buffers, &mut affine, report);
         }
-        if careful && outcome.refinements == 0 {
-            outcome.residual = Some(self.sampled_residual(&outcome.affine, buffers));
+        if careful && report.refinements == 0 {
+            report.residual = Some(self.sampled_residual(&affine, buffers));
         }
-        outcome
+        affine
     }
 
     /// Iterative refinement, in at most four steps.
-    fn refine<const M: usize>(&self, buffers: &mut Buffers, outcome: &mut Outcome<M>) {
+    fn refine<const M: usize>(
+        &self,
+        buffers: &mut Buffers,
+        affine: &mut [Coefficients; M],
+        report: &mut FitReport,
+    ) {
         let mut last = f64::INFINITY;
         for _ in 0..4 {
-            outcome.residual = Some(self.residual(&outcome.affine, buffers));
+            report.residual = Some(self.residual(affine, buffers));
             let Buffers {
                 weights,
                 residuals,
@@ -722,7 +709,7 @@ impl<K: Kernel, const D: usize> Equations<'_, K, D> {
                 spare,
                 ..
             } = &mut *buffers;
-            let affine: [Coefficients; M] = self.system.solve(residuals, self.lambda, work, spare);
+            let more: [Coefficients; M] = self.system.solve(residuals, self.lambda, work, spare);
             let step = largest(residuals) / largest(weights).max(f64::MIN_POSITIVE);
             // A step that is no shorter than half the one before is rounding.
             if step.is_nan() || step > 0.5 * last {
@@ -730,11 +717,9 @@ impl<K: Kernel, const D: usize> Equations<'_, K, D> {
             }
             let pairs = weights.iter_mut().zip(residuals.iter());
             pairs.for_each(|(w, r)| *w += r);
-            let pairs = outcome.affine.iter_mut().flatten();
-            pairs
-                .zip(affine.iter().flatten())
-                .for_each(|(a, d)| *a += d);
-            outcome.refinements += 1;
+            let pairs = affine.iter_mut().flatten().zip(more.iter().flatten());
+            pairs.for_each(|(a, d)| *a += d);
+            report.refinements += 1;
             if step < 1e-8 {
                 return;
             }

@@ -10,13 +10,13 @@
 use core::ops::ControlFlow;
 
 use super::{
-    AffineBasis, Buffers, Centres, Coefficients, Iterative, MAX, Outcome, Run, Setting, System,
-    Vectors, Watch, largest, relative,
+    AffineBasis, Buffers, Centres, Coefficients, Iterative, MAX, Run, Setting, System, Vectors,
+    Watch, largest, relative,
 };
 use crate::{
-    Kernel, Progress, StopReason,
+    FitReport, Kernel, Progress, StopReason,
     evaluate::{BLOCK, KernelSum},
-    lanes::{Job, Lane, dispatch, dot},
+    lanes::{Job, Lane, dispatch, dot, squared_distance},
 };
 
 /// Earlier points that a point is predicted from. With more the set-up costs more, with fewer there
@@ -101,8 +101,9 @@ impl<K: Kernel, const D: usize> Run<'_, K, D> {
     pub(super) fn solve<const M: usize>(
         &self,
         buffers: &mut Buffers,
+        report: &mut FitReport,
         watch: &mut Watch<'_>,
-    ) -> Outcome<M> {
+    ) -> [Coefficients; M] {
         let (active, n) = (&self.system.active, self.system.active.len());
         let Buffers {
             targets,
@@ -120,23 +121,25 @@ impl<K: Kernel, const D: usize> Run<'_, K, D> {
         });
         solution.clear();
         solution.resize(M * n, 0.0);
-        let (mut answer, mut broken) = (Outcome::new([[0.0; MAX]; M], 1.0), false);
+        (report.condition, report.iterations, report.refinements) = (1.0, 0, 0);
+        let (mut affine, mut broken) = ([[0.0; MAX]; M], false);
         // At most three runs of steps. The fourth turn only measures the last residual.
         for start in 0..=3 {
-            let (affine, residual) = self.residual::<M>(vectors);
-            (answer.affine, answer.residual) = (affine, Some(residual));
-            answer.stop = match residual <= self.tolerance {
+            let residual;
+            (affine, residual) = self.residual::<M>(vectors);
+            report.residual = Some(residual);
+            report.stop = match residual <= self.tolerance {
                 true => StopReason::Converged,
                 false if broken => StopReason::Cancelled,
-                false if answer.iterations >= STEPS => StopReason::IterationLimit,
+                false if report.iterations >= STEPS => StopReason::IterationLimit,
                 false => StopReason::Stagnated,
             };
             // Restarts from a residual formed anew, from which rounding has made the iterated one
             // drift.
-            if answer.stop != StopReason::Stagnated || start == 3 {
+            if report.stop != StopReason::Stagnated || start == 3 {
                 break;
             }
-            broken = self.steps::<M>(vectors, &mut answer, watch).is_break();
+            broken = self.steps::<M>(vectors, report, watch).is_break();
         }
         weights.clear();
         weights.resize(M * centres, 0.0);
@@ -146,23 +149,23 @@ impl<K: Kernel, const D: usize> Run<'_, K, D> {
                 .zip(column)
                 .for_each(|(&centre, w)| weights[m * centres + centre] = *w);
         }
-        answer
+        affine
     }
 
     /// Iterates until the residual it carries along is small enough.
     fn steps<const M: usize>(
         &self,
         vectors: &mut Vectors,
-        answer: &mut Outcome<M>,
+        report: &mut FitReport,
         watch: &mut Watch<'_>,
     ) -> ControlFlow<()> {
         vectors.direction.clear();
         vectors.direction.resize(vectors.residual.len(), 0.0);
-        let (mut size, mut best) = ([0.0; M], (f64::INFINITY, answer.iterations));
-        while answer.iterations < STEPS {
+        let (mut size, mut best) = ([0.0; M], (f64::INFINITY, report.iterations));
+        while report.iterations < STEPS {
             // The residual of the recurrence, which costs no product with the matrix.
             let left = relative(largest(&vectors.residual), &vectors.target);
-            let done = answer.iterations;
+            let done = report.iterations;
             let progress = Progress::new(done, STEPS).with_residual(left);
             watch(&progress)?;
             if left < 0.5 * best.0 {
@@ -175,7 +178,7 @@ impl<K: Kernel, const D: usize> Run<'_, K, D> {
             }
             self.turn::<M>(vectors, &mut size);
             self.advance::<M>(vectors, &size, &mut || watch(&progress))?;
-            answer.iterations += 1;
+            report.iterations += 1;
         }
         ControlFlow::Continue(())
     }
@@ -362,9 +365,9 @@ impl<const D: usize> Job<f64> for Approach<'_, D> {
     #[inline(always)]
     fn run<L: Lane<f64>>(self) -> f64 {
         let n = self.near.len();
-        let axes = self.axes.map(|axis| &axis[..n]);
+        let (axes, place) = (self.axes.map(|axis| &axis[..n]), self.from.map(L::new));
         for i in 0..n {
-            let s = squared::<L, D>(axes, i, self.from);
+            let s = squared_distance(axes, i, place).get();
             self.near[i] = if s < self.near[i] { s } else { self.near[i] };
         }
         // Eight running maxima, which the compiler turns into one vector.
@@ -386,14 +389,6 @@ impl<const D: usize> Job<f64> for Approach<'_, D> {
     }
 }
 
-#[inline(always)]
-fn squared<L: Lane<f64>, const D: usize>(axes: [&[f64]; D], i: usize, from: [f64; D]) -> f64 {
-    let d: [L; D] = core::array::from_fn(|k| L::new(axes[k][i]) - L::new(from[k]));
-    d.iter()
-        .fold(L::from_f64(0.0), |s, d| d.mul_add(*d, s))
-        .get()
-}
-
 /// Squared distances of the first points from a place.
 struct Distances<'a, const D: usize> {
     axes: [&'a [f64]; D],
@@ -407,9 +402,9 @@ impl<const D: usize> Job<f64> for Distances<'_, D> {
     #[inline(always)]
     fn run<L: Lane<f64>>(self) {
         let n = self.distances.len();
-        let axes = self.axes.map(|axis| &axis[..n]);
+        let (axes, place) = (self.axes.map(|axis| &axis[..n]), self.from.map(L::new));
         for (i, distance) in self.distances.iter_mut().enumerate() {
-            *distance = squared::<L, D>(axes, i, self.from);
+            *distance = squared_distance(axes, i, place).get();
         }
     }
 }

@@ -28,10 +28,10 @@ use nalgebra::Point;
 pub use path::LambdaPath;
 
 use crate::{
-    FitOptions, Kernel, Progress, R2LogR, Scalar, Smoothing, StopReason, TpsError,
+    FitOptions, Kernel, Progress, R2LogR, Scalar, Smoothing, TpsError,
     error::{finite, same_count},
     evaluate::Frame,
-    lanes::{Job, Lane, dispatch, dot},
+    lanes::{Job, Lane, dispatch, dot, squared_distance},
     smoothing::least_gcv,
 };
 
@@ -102,7 +102,7 @@ pub struct SplineWorkspace<const D: usize> {
 
 impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
     /// No points yet: memory for [`with_points`](Self::with_points).
-    fn without_points(kernel: K) -> Self {
+    pub(crate) fn without_points(kernel: K) -> Self {
         const { assert!(D >= 1 && D < MAX, "splines have one to three dimensions") };
         Self {
             kernel,
@@ -166,32 +166,6 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
     fn check<const M: usize>(&self, targets: &[Point<T, M>]) -> Result<(), TpsError> {
         same_count("target points", self.centres.inputs, targets.len())?;
         finite(targets, "target points")
-    }
-}
-
-/// The affine parts of a solution and how it was found. The weights stand in the buffers.
-struct Outcome<const M: usize> {
-    affine: [Coefficients; M],
-    /// Largest residual relative to the largest target, where it was measured.
-    residual: Option<f64>,
-    refinements: usize,
-    /// Steps of conjugate gradients.
-    iterations: usize,
-    condition: f64,
-    stop: StopReason,
-}
-
-impl<const M: usize> Outcome<M> {
-    /// Of a direct solve.
-    fn new(affine: [Coefficients; M], condition: f64) -> Self {
-        Self {
-            affine,
-            residual: None,
-            refinements: 0,
-            iterations: 0,
-            condition,
-            stop: StopReason::Direct,
-        }
     }
 }
 
@@ -1151,11 +1125,7 @@ impl<K: Kernel, const D: usize> Job<f64> for Assemble<'_, K, D> {
             let own: [L; D] = core::array::from_fn(|k| L::new(axes[k][0]));
             let own_scale = L::new(scales[0]);
             for (i, value) in column.iter_mut().enumerate() {
-                let mut s = L::from_f64(0.0);
-                for k in 0..D {
-                    let d = L::new(axes[k][i]) - own[k];
-                    s = d.mul_add(d, s);
-                }
+                let s = squared_distance(axes, i, own);
                 let scale = L::new(scales[i]) * own_scale;
                 *value = (self.kernel.derivatives(s).value * scale).get();
             }

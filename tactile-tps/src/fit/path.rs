@@ -6,7 +6,7 @@ use super::{Buffers, Coefficients, Factorization, System, Triangle};
 use crate::{
     FitOptions, Kernel, R2LogR, Scalar, Smoothing, TpsError,
     error::validate_smoothing,
-    lanes::{Job, Lane, dispatch},
+    lanes::{Job, Lane, dispatch, squared_distance},
 };
 
 /// The splines through the same pairs for several λ, as cross-validation over left-out points needs
@@ -197,13 +197,12 @@ impl<K: Kernel, const D: usize> Job<f64> for Evaluate<'_, K, D> {
     #[inline(always)]
     fn run<L: Lane<f64>>(self) {
         let n = self.kernels.len();
-        let axes = self.axes.each_ref().map(|axis| &axis[..n]);
+        let (axes, place) = (
+            self.axes.each_ref().map(|axis| &axis[..n]),
+            self.place.map(L::new),
+        );
         for (i, value) in self.kernels.iter_mut().enumerate() {
-            let mut s = L::from_f64(0.0);
-            for k in 0..D {
-                let d = L::new(self.place[k]) - L::new(axes[k][i]);
-                s = d.mul_add(d, s);
-            }
+            let s = squared_distance(axes, i, place);
             *value = self.kernel.derivatives(s).value.get();
         }
         let width = self.sums.len();

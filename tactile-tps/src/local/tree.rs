@@ -16,42 +16,10 @@ pub(super) struct Tree<const D: usize> {
 
 impl<const D: usize> Tree<D> {
     /// The tree of some rows of `points`.
-    pub(super) fn new(points: &[Point<f64, D>], rows: Vec<usize>) -> Self {
-        let mut tree = Self {
-            order: rows,
-            cuts: Vec::new(),
-        };
-        let mut order = std::mem::take(&mut tree.order);
-        tree.split(points, &mut order, 0);
-        tree.order = order;
-        tree
-    }
-
-    fn split(&mut self, points: &[Point<f64, D>], rows: &mut [usize], node: usize) {
-        if rows.len() <= LEAF {
-            return;
-        }
-        let extent = |axis: usize| {
-            let range = |(low, high): (f64, f64), &i: &usize| {
-                let x: f64 = points[i][axis];
-                (low.min(x), high.max(x))
-            };
-            let (low, high) = rows.iter().fold((f64::MAX, f64::MIN), range);
-            high - low
-        };
-        // Cut across the longest axis: blocks stay compact, and searches end early.
-        let axis = (1..D).fold(0, |best, a| if extent(a) > extent(best) { a } else { best });
-        let middle = rows.len() / 2;
-        let by_place =
-            |&a: &usize, &b: &usize| points[a][axis].total_cmp(&points[b][axis]).then(a.cmp(&b));
-        let (_, &mut cut, _) = rows.select_nth_unstable_by(middle, by_place);
-        if self.cuts.len() <= node {
-            self.cuts.resize(node + 1, (0, 0.0));
-        }
-        self.cuts[node] = (axis, points[cut][axis]);
-        let (low, high) = rows.split_at_mut(middle);
-        self.split(points, low, 2 * node + 1);
-        self.split(points, high, 2 * node + 2);
+    pub(super) fn new(points: &[Point<f64, D>], mut order: Vec<usize>) -> Self {
+        let mut cuts = Vec::new();
+        split(points, &mut order, 0, &mut cuts);
+        Self { order, cuts }
     }
 
     /// The leaves, neighbours after each other.
@@ -130,6 +98,39 @@ impl<const D: usize> Tree<D> {
             self.collect(points, place, count, second, found, limit);
         }
     }
+}
+
+/// Orders rows by halves, and notes where they were cut.
+fn split<const D: usize>(
+    points: &[Point<f64, D>],
+    rows: &mut [usize],
+    node: usize,
+    cuts: &mut Vec<(usize, f64)>,
+) {
+    if rows.len() <= LEAF {
+        return;
+    }
+    let extent = |axis: usize| {
+        let range = |(low, high): (f64, f64), &i: &usize| {
+            let x: f64 = points[i][axis];
+            (low.min(x), high.max(x))
+        };
+        let (low, high) = rows.iter().fold((f64::MAX, f64::MIN), range);
+        high - low
+    };
+    // Cut across the longest axis: blocks stay compact, and searches end early.
+    let axis = (1..D).fold(0, |best, a| if extent(a) > extent(best) { a } else { best });
+    let middle = rows.len() / 2;
+    let by_place =
+        |&a: &usize, &b: &usize| points[a][axis].total_cmp(&points[b][axis]).then(a.cmp(&b));
+    let (_, &mut cut, _) = rows.select_nth_unstable_by(middle, by_place);
+    if cuts.len() <= node {
+        cuts.resize(node + 1, (0, 0.0));
+    }
+    cuts[node] = (axis, points[cut][axis]);
+    let (low, high) = rows.split_at_mut(middle);
+    split(points, low, 2 * node + 1, cuts);
+    split(points, high, 2 * node + 2, cuts);
 }
 
 fn by_distance(a: &(f64, usize), b: &(f64, usize)) -> std::cmp::Ordering {
