@@ -1,6 +1,7 @@
 //! Contacts of few pixels in frames as a camera gives them: heights, and points that correspond
 //! from load to load.
 
+use crate::common::from_rim;
 use ndarray::Array2;
 use tactile_sfs::*;
 
@@ -50,12 +51,6 @@ fn contact(radius: f64, centre: [f64; 2], bend: f64) -> (Array2<f64>, Array2<boo
     (image, mask)
 }
 
-fn eikonal() -> Eikonal<f64> {
-    Eikonal::new(Lighting::default())
-        .with_boundary(BoundaryCondition::Height(0.0))
-        .expect("a height")
-}
-
 fn surface(method: &Eikonal<f64>, radius: f64, centre: [f64; 2]) -> Surface<f64> {
     let (image, mask) = contact(radius, centre, 0.0);
     let domain = Domain::default().with_mask(mask.view());
@@ -84,7 +79,11 @@ fn a_fitted_profile_keeps_the_height_of_small_contacts() {
         (19.0, [25.2, 24.6]),
         (38.0, [44.1, 43.7]),
     ] {
-        let fitted = height_bias(&eikonal().with_fitted_profile(true), radius, centre);
+        let fitted = height_bias(
+            &from_rim(Lighting::<f64>::default()).with_fitted_profile(true),
+            radius,
+            centre,
+        );
         // What is left is the blur's part inside the ring and the rounding near the top, where half
         // a grey level is a slope of 0.07: half a pixel in all.
         assert!(fitted.abs() < 0.5 / radius, "{radius}: {fitted}");
@@ -111,7 +110,7 @@ fn a_bent_profile_keeps_the_height() {
         let (radius, centre) = (60.0, [66.2, 65.7]);
         let (image, mask) = contact(radius, centre, bend);
         let domain = Domain::default().with_mask(mask.view());
-        let surface = eikonal().with_fitted_profile(true);
+        let surface = from_rim(Lighting::<f64>::default()).with_fitted_profile(true);
         let surface = surface.reconstruct(image.view().into(), &domain).unwrap();
         let height = surface.heights[[66, 66]] / middle_height(radius, bend);
         // Half a pixel of the blur, and half a grey level at the top: a slope of 0.07 over a tenth
@@ -126,8 +125,10 @@ fn a_contact_that_is_no_ellipse_is_taken_as_it_is() {
     let mask = Array2::from_shape_fn((41, 41), inside);
     let image = mask.mapv(|inside| if inside { 0.8 } else { 0.0 });
     let domain = Domain::default().with_mask(mask.view());
-    let plain = eikonal().reconstruct(image.view().into(), &domain).unwrap();
-    let fitted = eikonal().with_fitted_profile(true);
+    let plain = from_rim(Lighting::<f64>::default())
+        .reconstruct(image.view().into(), &domain)
+        .unwrap();
+    let fitted = from_rim(Lighting::<f64>::default()).with_fitted_profile(true);
     let fitted = fitted.reconstruct(image.view().into(), &domain).unwrap();
     assert_eq!(plain.mask, fitted.mask);
     assert!(
@@ -142,7 +143,7 @@ fn a_contact_that_is_no_ellipse_is_taken_as_it_is() {
 /// Stretch along z between the points of two loads, by least squares over the nearest points, over
 /// that of the radii.
 fn stretch(sampler: &dyn ControlPointSampler<f64>, radii: [f64; 2], centre: [f64; 2]) -> f64 {
-    let method = eikonal().with_fitted_profile(true);
+    let method = from_rim(Lighting::<f64>::default()).with_fitted_profile(true);
     let [small, large] = radii.map(|radius| {
         let surface = surface(&method, radius, centre);
         let (heights, mask) = (surface.heights.view(), surface.mask.view());

@@ -1,7 +1,6 @@
 //! The tests of `tactile-sfs`, in one program: the generic code is compiled once for all of them.
 
 mod behaviour;
-mod boundaries;
 mod common;
 mod contacts;
 mod depth_maps;
@@ -9,7 +8,6 @@ mod hard_input;
 mod invariants;
 mod large;
 mod measured;
-mod methods;
 mod order;
 mod recorded;
 mod samplers;

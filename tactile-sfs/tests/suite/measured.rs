@@ -2,6 +2,7 @@
 //! are not there.
 #![allow(clippy::print_stdout)]
 
+use crate::common::{errors, from_rim};
 use ndarray::Array2;
 use tactile_sfs::*;
 use test_support::published as data;
@@ -9,19 +10,11 @@ use test_support::published as data;
 /// Channel means of an image: the grey the makers' table was calibrated with.
 fn channel_mean(name: &str) -> Option<Array2<f64>> {
     let image = image::open(data(name)?).unwrap().into_rgb8();
-    let (width, height) = image.dimensions();
-    Some(Array2::from_shape_fn(
-        (height as usize, width as usize),
-        |(r, c)| {
-            image
-                .get_pixel(c as u32, r as u32)
-                .0
-                .iter()
-                .map(|&v| f64::from(v))
-                .sum::<f64>()
-                / 3.0
-        },
-    ))
+    let shape = (image.height() as usize, image.width() as usize);
+    Some(Array2::from_shape_fn(shape, |(r, c)| {
+        let levels = image.get_pixel(c as u32, r as u32).0;
+        levels.map(f64::from).iter().sum::<f64>() / 3.0
+    }))
 }
 
 /// The survey's vase at 128 pixels: heights in pixels, slopes and mask.
@@ -63,22 +56,10 @@ fn survey_vase_from_its_rim() {
             0
         }
     });
-    let method = Eikonal::new(light)
-        .with_boundary(BoundaryCondition::Height(0.0))
-        .unwrap();
-    let surface = method
-        .reconstruct(
-            image.view().into(),
-            &Domain::default().with_mask(mask.view()),
-        )
-        .unwrap();
-    let error = height_error(
-        surface.heights.view(),
-        z.view(),
-        Some(mask.view()),
-        Alignment::None,
-    )
-    .unwrap();
+    let domain = Domain::default().with_mask(mask.view());
+    let surface = from_rim(light).reconstruct(image.view().into(), &domain);
+    let heights = surface.unwrap().heights;
+    let error = height_error(heights.view(), z.view(), None, Alignment::None).unwrap();
     println!("vase, 8 bits, rim at 0: {error:?}");
     assert!((error.range - 36.2).abs() < 0.1 && error.constant_guess > 7.0);
     assert!(error.error.mean_absolute < 0.6);
@@ -174,18 +155,8 @@ impl PressedBall {
     /// Mean absolute error of a table's surface within a mask, in metres.
     fn error(&self, table: &DepthTable<f64>, mask: &Array2<bool>) -> f64 {
         let domain = Domain::new([PIXEL, PIXEL]).unwrap().with_mask(mask.view());
-        let surface = table
-            .reconstruct(self.pressed.view().into(), &domain)
-            .unwrap();
-        height_error(
-            surface.heights.view(),
-            self.cap.view(),
-            Some(mask.view()),
-            Alignment::None,
-        )
-        .unwrap()
-        .error
-        .mean_absolute
+        let surface = table.reconstruct(self.pressed.view().into(), &domain);
+        errors(&surface.unwrap(), &self.cap, Alignment::None).mean_absolute
     }
 
     /// The contact circle's even or odd sixteenths.
@@ -289,15 +260,8 @@ fn tsai_shah_errors(
         let surface = TsaiShah::new(lighting)
             .reconstruct(image.view().into(), &domain)
             .unwrap();
-        let error = |alignment| {
-            height_error(
-                surface.heights.view(),
-                z.view(),
-                Some(mask.view()),
-                alignment,
-            )
-            .unwrap()
-        };
+        let heights = surface.heights.view();
+        let error = |alignment| height_error(heights, z.view(), None, alignment).unwrap();
         let (offset, affine) = (error(Alignment::Offset), error(Alignment::Affine));
         let errors = [offset.error.mean_absolute, affine.error.mean_absolute];
         let [a, b] = errors;
@@ -398,15 +362,7 @@ fn surfaces_from_the_heights_of_their_singular_points() {
             let masked = Domain::default().with_mask(mask.view());
             let error = |method: &dyn SurfaceReconstruction<f64>, domain, alignment| {
                 let surface = method.reconstruct(image.view().into(), domain).unwrap();
-                height_error(
-                    surface.heights.view(),
-                    z.view(),
-                    Some(mask.view()),
-                    alignment,
-                )
-                .unwrap()
-                .error
-                .mean_absolute
+                errors(&surface, z, alignment).mean_absolute
             };
             let informed = masked.with_known_heights(known.view());
             let eikonal = error(&Eikonal::new(lighting), &informed, Alignment::None);

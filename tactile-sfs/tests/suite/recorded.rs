@@ -4,8 +4,6 @@
 //! `RECORD_ANSWERS=1 cargo test -p tactile-sfs --test suite recorded` writes the record anew; the
 //! commit says why numbers moved.
 
-use test_support as record;
-
 use ndarray::Array2;
 use tactile_sfs::{
     Alignment, BoundaryCondition, BrooksHorn, ControlPointSampler, CosinePoisson,
@@ -13,9 +11,9 @@ use tactile_sfs::{
     FrankotChellappa, Lighting, MaskedLeastSquares, Random, Signal, SlopeIntegrator, Surface,
     SurfaceReconstruction, TsaiShah, height_error, render, reprojection, slopes,
 };
+use test_support::Answers;
 
-use self::record::Answers;
-use super::common::{Sampled, ellipsoid, gaussian, paraboloid, sphere, waves};
+use super::common::{Sampled, ellipsoid, from_rim, gaussian, paraboloid, sphere, waves};
 
 /// Relative to the largest number of a line: the last bits of square roots and sums in another
 /// order, times the few hundred steps that some methods take.
@@ -46,38 +44,19 @@ fn reconstructions(answers: &mut Answers) {
         let scene = Sampled::new(SIDE, shape);
         let domain = Domain::new([scene.pixel, 1.1 * scene.pixel]).expect("a size");
         let domain = domain.with_mask(scene.mask.view());
-        let solve = |method: &dyn SurfaceReconstruction<f64>, image: &Array2<f64>| {
-            method
-                .reconstruct(image.view().into(), &domain)
-                .expect("a surface")
-        };
-        add_surface(
-            answers,
-            &format!("eikonal/{name}"),
-            &solve(&steep, &scene.image),
-        );
         let lit = render(scene.z.view(), [scene.pixel; 2], &oblique);
-        let oblique_steep = Eikonal::new(oblique)
-            .with_boundary(BoundaryCondition::Height(0.0))
-            .expect("a height");
-        add_surface(
-            answers,
-            &format!("eikonal_oblique/{name}"),
-            &solve(&oblique_steep, &lit),
-        );
-        add_surface(
-            answers,
-            &format!("tsai_shah/{name}"),
-            &solve(&TsaiShah::new(frontal), &scene.image),
-        );
-        add_surface(
-            answers,
-            &format!("brooks_horn/{name}"),
-            &solve(
-                &BrooksHorn::new(frontal).with_occluding_boundary(true),
-                &scene.image,
-            ),
-        );
+        let brooks_horn = BrooksHorn::new(frontal).with_occluding_boundary(true);
+        let methods: [(_, &dyn SurfaceReconstruction<f64>, _); 4] = [
+            ("eikonal", &steep, &scene.image),
+            ("eikonal_oblique", &from_rim(oblique), &lit),
+            ("tsai_shah", &TsaiShah::new(frontal), &scene.image),
+            ("brooks_horn", &brooks_horn, &scene.image),
+        ];
+        for (method_name, method, image) in methods {
+            let surface = method.reconstruct(image.view().into(), &domain);
+            let surface = surface.expect("a surface");
+            add_surface(answers, &format!("{method_name}/{name}"), &surface);
+        }
     }
     both_branches(answers, frontal);
     depth_table(answers);

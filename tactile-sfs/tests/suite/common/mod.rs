@@ -1,7 +1,9 @@
-//! Surfaces with closed forms, and their images under frontal light.
+//! Surfaces with closed forms and their images under frontal light, and all implementations, for
+//! tests that must hold for each.
 #![allow(unreachable_pub)]
 
 use ndarray::Array2;
+use tactile_sfs::*;
 
 /// Heights and slopes of a closed form at a point of the square [−1, 1]²; `None` outside its
 /// support.
@@ -42,6 +44,53 @@ impl Sampled {
             image,
         }
     }
+
+    /// Its pixels inside the mask.
+    pub fn domain(&self) -> Domain<'_, f64> {
+        let domain = Domain::new([self.pixel; 2]).unwrap();
+        domain.with_mask(self.mask.view())
+    }
+}
+
+/// Errors of a surface where it has heights, as they are or but for a constant.
+pub fn errors<T: PixelScalar>(
+    surface: &Surface<T>,
+    truth: &Array2<f64>,
+    alignment: Alignment,
+) -> ErrorSummary {
+    let heights = surface.heights.mapv(|z| z.as_f64());
+    let error = height_error(heights.view(), truth.view(), None, alignment);
+    error.unwrap().error
+}
+
+/// The eikonal method from a boundary at height zero.
+pub fn from_rim<T: PixelScalar>(lighting: Lighting<T>) -> Eikonal<T> {
+    let method = Eikonal::new(lighting);
+    method
+        .with_boundary(BoundaryCondition::Height(T::zero()))
+        .unwrap()
+}
+
+pub fn reconstructions(
+    light: Lighting<f64>,
+) -> Vec<(&'static str, Box<dyn SurfaceReconstruction<f64>>)> {
+    let brooks_horn = BrooksHorn::new(light).with_iterations(20, 5).unwrap();
+    let table = DepthTable::new(&[(0.0, 0.0), (1.0, 2.0)]).unwrap();
+    vec![
+        ("eikonal", Box::new(from_rim(Lighting::default()))),
+        ("eikonal oblique", Box::new(from_rim(light))),
+        ("tsai-shah", Box::new(TsaiShah::new(light))),
+        ("brooks-horn", Box::new(brooks_horn)),
+        ("depth table", Box::new(table)),
+    ]
+}
+
+pub fn integrators<T: PixelScalar>() -> Vec<(&'static str, Box<dyn SlopeIntegrator<T>>)> {
+    vec![
+        ("poisson", Box::new(CosinePoisson)),
+        ("frankot-chellappa", Box::new(FrankotChellappa)),
+        ("least squares", Box::new(MaskedLeastSquares::default())),
+    ]
 }
 
 /// A hemisphere of radius 0.8: vertical at its rim.
