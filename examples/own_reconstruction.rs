@@ -2,7 +2,9 @@
 //! method of the library.
 #![allow(clippy::print_stdout)]
 use ndarray::{Array2, array};
-use tactile_imaging::sfs::{Domain, Frame, SfsError, Surface, SurfaceReconstruction};
+use tactile_imaging::sfs::{
+    Domain, Frame, SfsError, Surface, SurfaceReconstruction, SurfaceWorkspace,
+};
 
 /// Light that fades as exp(−z/length) with the depth z in metres.
 struct Absorption {
@@ -10,11 +12,13 @@ struct Absorption {
 }
 
 impl SurfaceReconstruction<f64> for Absorption {
-    fn reconstruct(
+    fn reconstruct_with(
         &self,
+        _workspace: &mut SurfaceWorkspace<f64>,
         frame: Frame<'_, f64>,
         domain: &Domain<'_, f64>,
-    ) -> Result<Surface<f64>, SfsError> {
+        surface: &mut Surface<f64>,
+    ) -> Result<(), SfsError> {
         domain.bounding_box(frame.dim())?;
         let heights = Array2::from_shape_fn(frame.dim(), |(row, column)| {
             let depth_m = -self.length_m * frame.at(row, column).ln();
@@ -27,7 +31,8 @@ impl SurfaceReconstruction<f64> for Absorption {
         if heights.iter().any(|depth| depth.is_infinite()) {
             return Err(SfsError::custom("a pixel is black: its depth has no end"));
         }
-        Ok(Surface::from_heights(heights))
+        *surface = Surface::from_heights(heights);
+        Ok(())
     }
 }
 

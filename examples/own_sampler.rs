@@ -3,24 +3,28 @@
 #![allow(clippy::print_stdout)]
 use ndarray::{Array2, ArrayView2};
 use tactile_imaging::sfs::nalgebra::Point3;
-use tactile_imaging::sfs::{ControlPointSampler, Domain, SfsError};
+use tactile_imaging::sfs::{ControlPointSampler, Domain, SfsError, SurfaceWorkspace};
 
 struct Highest;
 
 impl ControlPointSampler<f64> for Highest {
-    fn sample(
+    fn sample_with(
         &self,
+        _workspace: &mut SurfaceWorkspace<f64>,
         heights: ArrayView2<'_, f64>,
         domain: &Domain<'_, f64>,
         count: usize,
-    ) -> Result<Vec<Point3<f64>>, SfsError> {
+        points: &mut Vec<Point3<f64>>,
+    ) -> Result<(), SfsError> {
         let [hx, hy] = domain.pixel_size_m;
-        let mut points: Vec<_> = (domain.bounding_box(heights.dim())?.pixels())
+        let pixels = (domain.bounding_box(heights.dim())?.pixels())
             .filter(|at| domain.contains(at.0, at.1) && heights[*at].is_finite())
-            .map(|at| Point3::new(at.1 as f64 * hx, at.0 as f64 * hy, heights[at]))
-            .collect();
+            .map(|at| Point3::new(at.1 as f64 * hx, at.0 as f64 * hy, heights[at]));
+        points.clear();
+        points.extend(pixels);
         let available = points.len();
         if available < count {
+            points.clear();
             return Err(SfsError::TooManyPoints {
                 requested: count,
                 available,
@@ -28,7 +32,7 @@ impl ControlPointSampler<f64> for Highest {
         }
         points.sort_by(|a, b| b.z.total_cmp(&a.z));
         points.truncate(count);
-        Ok(points)
+        Ok(())
     }
 }
 

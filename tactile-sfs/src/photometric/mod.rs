@@ -20,7 +20,7 @@ use contact::contact;
 use crate::domain::same_shape;
 use crate::{
     BoundingBox, CosinePoisson, Domain, Frame, PixelScalar, SfsError, SlopeIntegrator, Surface,
-    SurfaceReconstruction,
+    SurfaceReconstruction, SurfaceWorkspace,
 };
 
 /// The numbers that a calibration of [`PhotometricStereo`] finds, as a file keeps them.
@@ -285,11 +285,13 @@ fn slopes(normals: [&mut [f32]; 2], errors: [&mut [f32]; 2], sd: f32) {
 }
 
 impl<T: PixelScalar> SurfaceReconstruction<T> for PhotometricStereo {
-    fn reconstruct(
+    fn reconstruct_with(
         &self,
+        _workspace: &mut SurfaceWorkspace<T>,
         frame: Frame<'_, T>,
         domain: &Domain<'_, T>,
-    ) -> Result<Surface<T>, SfsError> {
+        surface: &mut Surface<T>,
+    ) -> Result<(), SfsError> {
         let Frame::Colour(frame) = frame else {
             return Err(SfsError::NoColour);
         };
@@ -303,7 +305,8 @@ impl<T: PixelScalar> SurfaceReconstruction<T> for PhotometricStereo {
                 false => T::nan(),
             }
         });
-        Ok(Surface::from_heights(heights))
+        *surface = Surface::from_heights(heights);
+        Ok(())
     }
 }
 

@@ -18,7 +18,9 @@ use tactile_imaging::Pipeline;
 use tactile_imaging::elasticity::strain::Hencky;
 use tactile_imaging::force::CalibrationPair;
 use tactile_imaging::pipeline::{Object, PipelineError, Press, SkipReason, Stage};
-use tactile_imaging::sfs::{ControlPointSampler, Domain, EquallySpaced, SfsError};
+use tactile_imaging::sfs::{
+    ControlPointSampler, Domain, EquallySpaced, SfsError, SurfaceWorkspace,
+};
 use tactile_simulate::Trial;
 use tactile_simulate::{CalibrationRun, Camera, PressLoad, PressOptions, PressScene};
 
@@ -108,13 +110,15 @@ fn a_frame_without_contact_stops_there() {
 struct Half;
 
 impl ControlPointSampler<f64> for Half {
-    fn sample(
+    fn sample_with(
         &self,
+        workspace: &mut SurfaceWorkspace<f64>,
         heights: ArrayView2<'_, f64>,
         domain: &Domain<'_, f64>,
         count: usize,
-    ) -> Result<Vec<Point3<f64>>, SfsError> {
-        EquallySpaced.sample(heights, domain, count / 2)
+        points: &mut Vec<Point3<f64>>,
+    ) -> Result<(), SfsError> {
+        EquallySpaced.sample_with(workspace, heights, domain, count / 2, points)
     }
 }
 
