@@ -161,3 +161,35 @@ pub(crate) fn same_shape(
         found: found.into(),
     })
 }
+
+/// The parts of a mask of this `value` that are connected by their sides, as `[row, column]`.
+pub(crate) fn parts(mask: ArrayView2<'_, bool>, value: bool) -> Vec<Vec<[usize; 2]>> {
+    let columns = mask.ncols();
+    let mut open: Vec<bool> = mask.iter().map(|m| *m == value).collect();
+    let mut parts = Vec::new();
+    for start in 0..open.len() {
+        if !core::mem::take(&mut open[start]) {
+            continue;
+        }
+        let mut part = vec![[start / columns, start % columns]];
+        let mut next = 0;
+        while let Some(&[r, c]) = part.get(next) {
+            next += 1;
+            let at = r * columns + c;
+            if c > 0 && core::mem::take(&mut open[at - 1]) {
+                part.push([r, c - 1]);
+            }
+            if c + 1 < columns && core::mem::take(&mut open[at + 1]) {
+                part.push([r, c + 1]);
+            }
+            if r > 0 && core::mem::take(&mut open[at - columns]) {
+                part.push([r - 1, c]);
+            }
+            if open.get_mut(at + columns).is_some_and(core::mem::take) {
+                part.push([r + 1, c]);
+            }
+        }
+        parts.push(part);
+    }
+    parts
+}

@@ -1,8 +1,4 @@
-//! Surfaces from one image: shape from shading, slope integration, control points.
-//!
-//! Three traits, each with several implementations: [`SurfaceReconstruction`] (image → heights),
-//! [`SlopeIntegrator`] (slopes → heights) and [`ControlPointSampler`] (surface → points). All work
-//! on a [`Domain`] (mask, pixel size, known heights), for `f32` and `f64`.
+//! Surfaces from one image, on a [`Domain`] (mask, pixel size, known heights).
 //!
 //! Images are indexed `[row, column]`. Here x is the column, y the row, z points to the viewer. A
 //! pixel's coordinate is its centre. Slopes are p = ∂z/∂x and q = ∂z/∂y. See [`Lighting`] for the

@@ -11,10 +11,10 @@
 use faer::linalg::solvers::Solve;
 use faer::sparse::{SparseColMat, Triplet};
 use faer::{Mat, Side};
-use ndarray::ArrayView2;
+use ndarray::{Array2, ArrayView2};
 
 use super::{CosinePoisson, SlopeIntegrator};
-use crate::domain::same_shape;
+use crate::domain::{parts, same_shape};
 use crate::surface::Component;
 use crate::{BoundingBox, Domain, PixelFlags, PixelScalar, SfsError, Surface, SurfaceWorkspace};
 
@@ -130,20 +130,8 @@ pub(crate) struct MaskedBuffers {
     rhs: Vec<f64>,
     /// Edges between unknowns: the two numbers and the weight.
     edges: Vec<(usize, usize, f64)>,
-    /// Connected part of every pixel of the box, [`OUTSIDE`] for those of none.
-    part: Vec<usize>,
-    parts: Vec<Part>,
-    queue: Vec<usize>,
-}
-
-/// A connected part of the mask.
-#[derive(Clone, Copy, Debug)]
-struct Part {
-    /// Place in the box of its first pixel in reading order.
-    first: usize,
-    anchored: bool,
-    pixels: usize,
-    sum: f64,
+    /// The connected parts of the mask, in the order of their first pixels.
+    parts: Vec<Vec<[usize; 2]>>,
 }
 
 /// Marks of pixels outside the mask, and of known height.
@@ -181,9 +169,9 @@ impl<T: PixelScalar> SlopeIntegrator<T> for MaskedLeastSquares<'_, T> {
         surface.enter_slopes(p, q, domain)?;
         let buffers = &mut workspace.masked;
         buffers.enumerate(domain, surface, [p, q]);
-        buffers.label(area.columns());
+        buffers.label(area);
         self.assemble(buffers, [p, q], domain, area);
-        let heights = buffers.solve()?;
+        let heights = buffers.solve(area)?;
         buffers.write_levelled(&heights, surface);
         surface.finish(domain);
         Ok(())
@@ -281,56 +269,36 @@ impl MaskedBuffers {
         }
     }
 
-    /// Finds the connected parts of the mask (four neighbours), in the order of their first pixels.
-    fn label(&mut self, columns: usize) {
-        self.part.clear();
-        self.part.resize(self.number.len(), OUTSIDE);
-        self.parts.clear();
-        for first in 0..self.number.len() {
-            if self.number[first] == OUTSIDE || self.part[first] != OUTSIDE {
-                continue;
-            }
-            let label = self.parts.len();
-            self.part[first] = label;
-            self.queue.clear();
-            self.queue.push(first);
-            let (mut next, mut anchored) = (0, false);
-            while let Some(&place) = self.queue.get(next) {
-                next += 1;
-                anchored |= self.number[place] == KNOWN;
-                let column = place % columns;
-                let beside = [
-                    (column > 0).then(|| place - 1),
-                    (column + 1 < columns).then_some(place + 1),
-                    place.checked_sub(columns),
-                    Some(place + columns).filter(|&below| below < self.number.len()),
-                ];
-                for near in beside.into_iter().flatten() {
-                    if self.number[near] != OUTSIDE && self.part[near] == OUTSIDE {
-                        self.part[near] = label;
-                        self.queue.push(near);
-                    }
-                }
-            }
-            self.parts.push(Part {
-                first,
-                anchored,
-                pixels: self.queue.len(),
-                sum: 0.0,
-            });
+    /// Finds the connected parts of the mask (four neighbours).
+    fn label(&mut self, area: BoundingBox) {
+        let (rows, columns) = (area.rows(), area.columns());
+        let inside = |(row, column)| self.number[row * columns + column] != OUTSIDE;
+        self.parts = parts(Array2::from_shape_fn((rows, columns), inside).view(), true);
+        for [row, column] in self.parts.iter_mut().flatten() {
+            *row += area.row_start;
+            *column += area.column_start;
         }
+    }
+
+    /// Whether a part holds a known height.
+    fn is_anchored(&self, part: &[[usize; 2]], area: BoundingBox) -> bool {
+        part.iter().any(|&at| self.number_of(at, area) == KNOWN)
     }
 
     /// The heights of the unknowns. A part without a known height is held at height 0 by a spring
     /// at its first pixel. It exerts no force: the right-hand side of such a part has the sum 0.
-    fn solve(&mut self) -> Result<Vec<f64>, SfsError> {
+    fn solve(&mut self, area: BoundingBox) -> Result<Vec<f64>, SfsError> {
         let n = self.pixels.len();
         if n == 0 {
             return Ok(Vec::new());
         }
-        for part in self.parts.iter().filter(|part| !part.anchored) {
+        for part in &self.parts {
+            if self.is_anchored(part, area) {
+                continue;
+            }
             // A part of one pixel has no edge.
-            let held = &mut self.diagonal[self.number[part.first]];
+            let first = self.number_of(part[0], area);
+            let held = &mut self.diagonal[first];
             // The spring is as stiff as the pixel's edges, which keeps the condition of the
             // equations.
             *held = if *held > 0.0 { 2.0 * *held } else { 1.0 };
@@ -349,39 +317,24 @@ impl MaskedBuffers {
     }
 
     /// Writes the heights, gives parts without a known height the mean 0, and reports all parts.
-    fn write_levelled<T: PixelScalar>(&mut self, heights: &[f64], surface: &mut Surface<T>) {
+    fn write_levelled<T: PixelScalar>(&self, heights: &[f64], surface: &mut Surface<T>) {
         let area = surface.bounding_box;
-        for ((&number, &part), at) in self.number.iter().zip(&self.part).zip(area.pixels()) {
-            if number != OUTSIDE {
-                let known = || surface.heights[at].as_f64();
-                self.parts[part].sum += heights.get(number).copied().unwrap_or_else(known);
+        let unknown = |at| heights.get(self.number_of(at, area)).copied();
+        for part in &self.parts {
+            let height = |&at| unknown(at).unwrap_or(surface.heights[at].as_f64());
+            let mean = part.iter().map(height).sum::<f64>() / part.len() as f64;
+            let anchored = self.is_anchored(part, area);
+            let shift = if anchored { 0.0 } else { mean };
+            for &at in part {
+                if let Some(height) = unknown(at) {
+                    surface.set(at[0], at[1], T::of(height - shift));
+                }
             }
+            surface.report.components.push(Component {
+                pixels: part.len(),
+                first: part[0],
+                mean_height: T::of(mean - shift),
+            });
         }
-        for ((&number, &part), at) in self.number.iter().zip(&self.part).zip(area.pixels()) {
-            if let Some(height) = heights.get(number) {
-                let Part {
-                    sum,
-                    pixels,
-                    anchored,
-                    ..
-                } = self.parts[part];
-                let shift = if anchored { 0.0 } else { sum / pixels as f64 };
-                surface.set(at.0, at.1, T::of(height - shift));
-            }
-        }
-        let columns = area.columns();
-        let reported = self.parts.iter().map(|part| Component {
-            pixels: part.pixels,
-            first: [
-                area.row_start + part.first / columns,
-                area.column_start + part.first % columns,
-            ],
-            mean_height: if part.anchored {
-                T::of(part.sum / part.pixels as f64)
-            } else {
-                T::zero()
-            },
-        });
-        surface.report.components.extend(reported);
     }
 }

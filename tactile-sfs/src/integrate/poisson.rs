@@ -308,35 +308,3 @@ fn add_rises(p: &[f64], scale: f64, out: &mut [f64]) {
         }
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// The heights satisfy the equations that a dense matrix states.
-    #[test]
-    fn solves_the_equation() {
-        let (rows, columns, aspect2) = (7, 20, 1.7);
-        let mut buffers = PoissonBuffers::default();
-        let mut source: Vec<f64> = (0..rows * columns)
-            .map(|i| ((i * i + 3) % 17) as f64)
-            .collect();
-        let mean = source.iter().sum::<f64>() / source.len() as f64;
-        source.iter_mut().for_each(|f| *f -= mean);
-        buffers.grid.clone_from(&source);
-        buffers.solve(rows, columns, aspect2);
-        let z = |r: usize, c: usize| buffers.grid[r * columns + c];
-        for (i, f) in source.iter().enumerate() {
-            let (r, c) = (i / columns, i % columns);
-            let mut sum = 0.0;
-            for (dr, dc, weight) in [(0, -1, aspect2), (0, 1, aspect2), (-1, 0, 1.0), (1, 0, 1.0)] {
-                let (row, column) = (r.wrapping_add_signed(dr), c.wrapping_add_signed(dc));
-                if row < rows && column < columns {
-                    sum += weight * (z(row, column) - z(r, c));
-                }
-            }
-            // Rounding of heights of some hundreds.
-            assert!((sum - f).abs() < 1e-11, "{i}: {sum} {f}");
-        }
-    }
-}

@@ -5,10 +5,10 @@ use ndarray::{Array2, ArrayView3};
 use tactile_core::Requirement;
 
 use super::colour::{Blurred, TERMS, normals, samples};
-use super::contact::{contact, parts};
+use super::contact::contact;
 use super::{PhotometricModel, PhotometricStereo, colour_image};
 use crate::SfsError;
-use crate::domain::same_shape;
+use crate::domain::{parts, same_shape};
 
 /// A frame of a ball pressed into the gel.
 #[derive(Clone, Copy, Debug)]

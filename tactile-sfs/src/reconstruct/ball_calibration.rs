@@ -7,6 +7,7 @@
 use ndarray::Array2;
 
 use super::depth_table::{DepthTable, Signal};
+use crate::domain::parts;
 use crate::{Domain, Frame, PixelScalar, SfsError};
 use tactile_core::Requirement;
 
@@ -241,7 +242,9 @@ fn contact_circle(
             .count();
         above(r, c) && near > 4
     });
-    let patch = largest_patch(counted);
+    // Of patches as large as each other the first.
+    let patches = parts(counted.view(), true).into_iter().rev();
+    let patch = patches.max_by_key(Vec::len).unwrap_or_default();
     if patch.len() < FEWEST {
         return Err(SfsError::TooFewPixels {
             needed: FEWEST,
@@ -253,33 +256,4 @@ fn contact_circle(
     // By area, because single pixels at the rim move it far less than they move an outline.
     let radius = (n * step[0] * step[1] / core::f64::consts::PI).sqrt();
     Ok(([mean(1), mean(0)], radius))
-}
-
-/// The most pixels, `[row, column]`, that are connected by their sides.
-fn largest_patch(mut open: Array2<bool>) -> Vec<[usize; 2]> {
-    let (rows, columns) = open.dim();
-    let mut largest = Vec::new();
-    for start in 0..rows * columns {
-        let start = [start / columns, start % columns];
-        let mut patch = Vec::new();
-        if core::mem::take(&mut open[start]) {
-            patch.push(start);
-        }
-        let mut next = 0;
-        while let Some(&[r, c]) = patch.get(next) {
-            next += 1;
-            let (above, left) = (r.wrapping_sub(1), c.wrapping_sub(1));
-            for beside in [[above, c], [r + 1, c], [r, left], [r, c + 1]] {
-                if let Some(pixel) = open.get_mut(beside)
-                    && core::mem::take(pixel)
-                {
-                    patch.push(beside);
-                }
-            }
-        }
-        if patch.len() > largest.len() {
-            largest = patch;
-        }
-    }
-    largest
 }

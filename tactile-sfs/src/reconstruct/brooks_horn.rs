@@ -259,22 +259,16 @@ fn neighbours<T: PixelScalar>(
 ) -> ([T; 3], [i32; 2]) {
     let (mut sum, mut outward) = ([T::zero(); 3], [0, 0]);
     for (dr, dc) in [(0, -1), (0, 1), (-1, 0), (1, 0)] {
-        let (row, column) = (r as isize + dr, c as isize + dc);
-        let in_box = row >= 0
-            && column >= 0
-            && row < area.rows() as isize
-            && column < area.columns() as isize;
-        if !in_box {
-            outward = [outward[0] + dc as i32, outward[1] + dr as i32];
-            continue;
-        }
-        let j = row as usize * area.columns() + column as usize;
-        if reflectance[j].is_nan() {
-            outward = [outward[0] + dc as i32, outward[1] + dr as i32];
-        } else {
+        // Beyond the box on its near sides these are numbers that no box reaches.
+        let (row, column) = (r.wrapping_add_signed(dr), c.wrapping_add_signed(dc));
+        let in_box = row < area.rows() && column < area.columns();
+        let j = row.wrapping_mul(area.columns()).wrapping_add(column);
+        if in_box && !reflectance[j].is_nan() {
             for (sum, &n) in sum.iter_mut().zip(&normals[j]) {
                 *sum += n;
             }
+        } else {
+            outward = [outward[0] + dc as i32, outward[1] + dr as i32];
         }
     }
     (sum, outward)

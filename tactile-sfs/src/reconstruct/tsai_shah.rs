@@ -7,9 +7,9 @@
 //! here:
 //!
 //! - the step is K = f′ S/(W + f′² S) · f, S the pixel's own variance, which shrinks as (1 − K f′)
-//!   S. This is a Kalman gain instead of 1/f′ (the authors' own remedy), with W as the stated noise
-//!   of the image.
-//! - slopes used in f and f′ are cut to `max_slope`.
+//!   S. This is a Kalman gain instead of 1/f′ (the authors' own remedy), with W as the noise of
+//!   the image.
+//! - slopes used in f and f′ are cut to 5.
 //! - the start is a gently convex paraboloid with the centre and the axes of the mask, not the
 //!   stationary plane.
 //! - the four corners are taken in turn (left/right, above/below), so that no diagonal is
@@ -26,6 +26,15 @@ use crate::{
     SurfaceWorkspace,
 };
 use tactile_core::Requirement;
+
+/// Variance W of the reflectance.
+const NOISE: f64 = 1e-2;
+
+/// Slopes count up to here.
+const MAX_SLOPE: f64 = 5.0;
+
+/// Slope of the start at the nearest point of its boundary.
+const START_SLOPE: f64 = 0.5;
 
 /// Shape from shading by Newton's method on each pixel.
 ///
@@ -44,22 +53,15 @@ use tactile_core::Requirement;
 pub struct TsaiShah<T> {
     lighting: Lighting<T>,
     iterations: usize,
-    noise: T,
-    max_slope: T,
-    start_slope: T,
 }
 
 impl<T: PixelScalar> TsaiShah<T> {
     /// 12 iterations, noise variance 10⁻², slopes up to 5, a start that falls with slope 0.5 at the
     /// nearest point of its boundary.
     pub fn new(lighting: Lighting<T>) -> Self {
-        let (noise, max_slope, start_slope) = (T::of(1e-2), T::of(5.0), T::of(0.5));
         Self {
             lighting,
             iterations: 12,
-            noise,
-            max_slope,
-            start_slope,
         }
     }
 
@@ -72,51 +74,10 @@ impl<T: PixelScalar> TsaiShah<T> {
         Ok(Self { iterations, ..self })
     }
 
-    /// Variance W of the reflectance: larger damps more.
-    ///
-    /// # Errors
-    /// [`SfsError::InvalidOption`] unless positive and finite.
-    pub fn with_noise(self, noise: T) -> Result<Self, SfsError> {
-        Requirement::Positive.check("noise variance", noise.as_f64())?;
-        Ok(Self { noise, ..self })
-    }
-}
-
-impl<T: PixelScalar> TsaiShah<T> {
-    /// Slope at the boundary of the paraboloid the iteration starts from: positive for a bump,
-    /// negative for a hollow, 0 for the plane (which frontal light never leaves).
-    ///
-    /// ```
-    /// use ndarray::Array2;
-    /// use tactile_sfs::{Domain, Lighting, SurfaceReconstruction, TsaiShah};
-    /// let square = |r: usize, c: usize| (r as f64 - 8.0).powi(2) + (c as f64 - 8.0).powi(2);
-    /// let image = Array2::from_shape_fn((17, 17), |(r, c)| 1.0 - 1e-3 * square(r, c));
-    /// let top = |start_slope| {
-    ///     let method = TsaiShah::new(Lighting::default()).with_noise(0.05)?;
-    ///     let method = method.with_start_slope(start_slope)?;
-    ///     let z = method.reconstruct(image.view().into(), &Domain::default())?.heights;
-    ///     Ok::<f64, tactile_sfs::SfsError>(z[[8, 8]] - z[[8, 1]])
-    /// };
-    /// // Bump or hollow: the caller's choice under frontal light.
-    /// assert!(top(0.5)? > 0.0 && top(-0.5)? < 0.0);
-    /// assert!(top(0.0)?.abs() < 1e-9);
-    /// # Ok::<(), tactile_sfs::SfsError>(())
-    /// ```
-    ///
-    /// # Errors
-    /// [`SfsError::InvalidOption`] unless finite.
-    pub fn with_start_slope(self, start_slope: T) -> Result<Self, SfsError> {
-        Requirement::Finite.check("slope of the start", start_slope.as_f64())?;
-        Ok(Self {
-            start_slope,
-            ..self
-        })
-    }
-
     /// z = −½ s a xᵀ(4C)⁻¹x: the paraboloid whose contours are ellipses of the centre and
     /// covariance C of the pixels that carry data (a uniform ellipse ends at xᵀC⁻¹x = 4). Here s is
     /// its slope at the ends of the minor half axis a = 2 √λ_min(C).
-    fn start(&self, field: &mut FieldBuffers<T>, grid: &Grid<T>) {
+    fn start(field: &mut FieldBuffers<T>, grid: &Grid<T>) {
         let aspect = grid.step[1].as_f64();
         let at = |i: usize| {
             (
@@ -149,7 +110,7 @@ impl<T: PixelScalar> TsaiShah<T> {
         let determinant = xx * yy - xy * xy;
         let largest = 0.5 * (xx + yy) + (0.5 * (xx - yy)).hypot(xy);
         let minor = 2.0 * (determinant / largest).sqrt();
-        let curvature = -0.5 * self.start_slope.as_f64() * minor / (4.0 * determinant);
+        let curvature = -0.5 * START_SLOPE * minor / (4.0 * determinant);
         // The quadratic form of C⁻¹, whose determinant has gone into the factor.
         for (i, z) in field.heights.iter_mut().enumerate() {
             let (x, y) = (at(i).0 - cx, at(i).1 - cy);
@@ -214,7 +175,7 @@ impl<T: PixelScalar> TsaiShah<T> {
             vector.clear();
             vector.resize(area.area(), value);
         }
-        self.start(field, &grid);
+        Self::start(field, &grid);
         surface.report.stop = StopReason::IterationLimit;
         for iteration in 0..self.iterations {
             let misfit = self.iterate(field, &grid, iteration);
@@ -234,7 +195,8 @@ impl<T: PixelScalar> TsaiShah<T> {
         // Four iterations take all four corners.
         let back = [iteration & 1 == 0, iteration & 2 == 0];
         let per = [sign(back[0]) / grid.step[0], sign(back[1]) / grid.step[1]];
-        let cut = |slope: T| slope.max(-self.max_slope).min(self.max_slope);
+        let max_slope = T::of(MAX_SLOPE);
+        let cut = |slope: T| slope.max(-max_slope).min(max_slope);
         let (mut sum, mut count) = (T::zero(), 0usize);
         for i in 0..grid.rows * grid.columns {
             let (r, c) = (i / grid.columns, i % grid.columns);
@@ -248,7 +210,7 @@ impl<T: PixelScalar> TsaiShah<T> {
             let slopes = [cut(per[0] * (z - beside)), cut(per[1] * (z - above))];
             let (f, slope) = self.residual(reflectance, slopes, per);
             let variance = field.variance[i];
-            let gain = variance * slope / (self.noise + slope * slope * variance);
+            let gain = variance * slope / (T::of(NOISE) + slope * slope * variance);
             // The variance only falls, so that later iterations change less and less.
             field.variance[i] = (T::one() - gain * slope) * variance;
             field.next_heights[i] = z - gain * f;

@@ -171,17 +171,6 @@ impl<T: PixelScalar> Field<T> {
     /// zero (a cliff at the boundary), the contour is put halfway.
     fn continue_outwards(&mut self, inner: &mut Vec<f64>) {
         inner.clone_from(&self.squares);
-        let at = |row: isize, column: isize| -> f64 {
-            let inside = row >= 0
-                && column >= 0
-                && (row as usize) < self.rows
-                && (column as usize) < self.columns;
-            if inside {
-                inner[row as usize * self.columns + column as usize]
-            } else {
-                f64::NAN
-            }
-        };
         for row in 0..self.rows {
             // Whether one of a column's three places about this row has a square, for the columns
             // before, at and after the present one.
@@ -200,11 +189,11 @@ impl<T: PixelScalar> Field<T> {
                 let (r, c) = (row as isize, column as isize);
                 let (mut sum, mut nearest, mut total) = (0.0, 0.0, 0.0);
                 for (down, right, weight) in NEIGHBOURS {
-                    let near = at(r + down, c + right);
+                    let near = self.of(inner, r + down, c + right);
                     if near.is_nan() {
                         continue;
                     }
-                    let far = at(r + 2 * down, c + 2 * right);
+                    let far = self.of(inner, r + 2 * down, c + 2 * right);
                     if far.is_nan() {
                         continue;
                     }
@@ -225,13 +214,14 @@ impl<T: PixelScalar> Field<T> {
         }
     }
 
-    fn square(&self, row: isize, column: isize) -> f64 {
+    /// One of the squares. NaN outside the field.
+    fn of(&self, squares: &[f64], row: isize, column: isize) -> f64 {
         let inside = row >= 0
             && column >= 0
             && (row as usize) < self.rows
             && (column as usize) < self.columns;
         if inside {
-            self.squares[row as usize * self.columns + column as usize]
+            squares[row as usize * self.columns + column as usize]
         } else {
             f64::NAN
         }
@@ -298,7 +288,7 @@ impl<T: PixelScalar> Field<T> {
             (1, 0, down * (1.0 - right)),
             (1, 1, down * right),
         ] {
-            let square = self.square(top as isize + row, left as isize + column);
+            let square = self.of(&self.squares, top as isize + row, left as isize + column);
             if !square.is_nan() {
                 sum += share * square;
                 total += share;
