@@ -147,7 +147,7 @@ impl PressScene {
         Ok(CalibrationSeries {
             pairs,
             true_forces_n,
-            newton_per_grey: camera.pixel_area_m2() / self.grey_per_pascal(),
+            newton_per_grey: camera.pixel_area_m2() / self.light.grey_per_pascal,
         })
     }
 
@@ -201,7 +201,7 @@ impl PressScene {
             ContactModel::Tabulated(_) | ContactModel::FiniteElements => ContactModel::Hertz,
             closed_form => closed_form.clone(),
         };
-        let press = self.with_press(indenter, law, PressLoad::normal(force_n))?;
+        let press = self.with_object(indenter, law, vec![PressLoad::normal(force_n)])?;
         Ok(press.expected_frame(0))
     }
 }

@@ -274,6 +274,24 @@ fn paraboloid_cap(x: f64) -> f64 {
     (1.5 * x.acos() - x * s * (2.5 - x * x)) / 6.0
 }
 
+/// The midpoint rule of so many steps on [−½, ½]: places and weights.
+fn midpoints(steps: usize) -> Vec<(f64, f64)> {
+    let weight = 1.0 / steps as f64;
+    let place = |k: usize| (k as f64 + 0.5) / steps as f64 - 0.5;
+    (0..steps).map(|k| (place(k), weight)).collect()
+}
+
+/// The mean over a pixel by one rule along both of its sides.
+fn mean_over(nodes: &[(f64, f64)], value: impl Fn(f64, f64) -> f64) -> f64 {
+    let mut sum = 0.0;
+    for &(v, weight_y) in nodes {
+        for &(u, weight_x) in nodes {
+            sum += weight_x * weight_y * value(u, v);
+        }
+    }
+    sum
+}
+
 impl Disc {
     /// Pixel averages over `window` of `value`, a function of the distance from the centre in
     /// metres that is zero from the rim on.
@@ -296,9 +314,7 @@ impl Disc {
         let smooth_below = self.radius_m - rim_zone * width.max(height);
         let least = (steps_in_radius * width.max(height) / self.radius_m).ceil();
         let steps = least.clamp(rim_steps, most_steps) as usize;
-        let midpoints: Vec<(f64, f64)> = (0..steps)
-            .map(|k| ((k as f64 + 0.5) / steps as f64 - 0.5, 1.0 / steps as f64))
-            .collect();
+        let midpoints = midpoints(steps);
         let shape = ((row1 - row0) as usize, (col1 - col0) as usize);
         let values = Array2::from_shape_fn(shape, |(r, c)| {
             let x = ((col0 + c as isize) as f64 - self.centre_px[0]) * width;
@@ -315,15 +331,9 @@ impl Disc {
             } else {
                 &midpoints
             };
-            let mut sum = 0.0;
-            for &(v, weight_y) in nodes {
-                let y2 = (y + v * height).powi(2);
-                for &(u, weight_x) in nodes {
-                    let distance = ((x + u * width).powi(2) + y2).sqrt();
-                    sum += weight_x * weight_y * value(distance);
-                }
-            }
-            sum
+            mean_over(nodes, |u, v| {
+                value(((x + u * width).powi(2) + (y + v * height).powi(2)).sqrt())
+            })
         });
         Patch {
             origin: [row0, col0],
@@ -415,12 +425,7 @@ impl Disc {
             (place[0] - centre[0]).hypot(place[1] - centre[1])
         };
         let reach = bent_rim_zone * self.pixel_size_m[0].max(self.pixel_size_m[1]);
-        let fine: Vec<(f64, f64)> = (0..bent_rim_steps)
-            .map(|k| {
-                let steps = bent_rim_steps as f64;
-                ((k as f64 + 0.5) / steps - 0.5, 1.0 / steps)
-            })
-            .collect();
+        let fine = midpoints(bent_rim_steps);
         let shape = ((row1 - row0) as usize, (col1 - col0) as usize);
         let values = Array2::from_shape_fn(shape, |(r, c)| {
             let pixel = [(col0 + c as isize) as f64, (row0 + r as isize) as f64];
@@ -429,14 +434,7 @@ impl Disc {
                 return 0.0;
             }
             let nodes = if from_rim < -reach { &GAUSS[..] } else { &fine };
-            let mut sum = 0.0;
-            for &(v, weight_y) in nodes {
-                for &(u, weight_x) in nodes {
-                    let at = distance([pixel[0] + u, pixel[1] + v]);
-                    sum += weight_x * weight_y * value(at);
-                }
-            }
-            sum
+            mean_over(nodes, |u, v| value(distance([pixel[0] + u, pixel[1] + v])))
         });
         Patch {
             origin: [row0, col0],

@@ -1,12 +1,5 @@
-//! The main scene: one sphere pressed on the waveguide at several loads.
-//!
-//! The two bodies in contact: the pressed sphere and the layered waveguide.
-//!
-//! What describes a press: object, waveguide, loads, light and camera.
-//!
-//! All frames of a scene with their truth.
-//!
-//! What a measurement of a simulated press should find, stage by stage.
+//! The main scene: one sphere pressed on the layered waveguide at several loads. Its options, its
+//! frames, and what a measurement of them should find, stage by stage.
 
 use crate::camera::Camera;
 use crate::contact::{ContactModel, SimulatedContact};
@@ -33,7 +26,7 @@ use ndarray::Array2;
 pub struct PressScene {
     options: PressOptions,
     contacts: Vec<SimulatedContact>,
-    light: LightLaw,
+    pub(crate) light: LightLaw,
 }
 
 impl PressScene {
@@ -81,11 +74,6 @@ impl PressScene {
         &self.options
     }
 
-    /// Grey levels per pascal.
-    pub(crate) fn grey_per_pascal(&self) -> f64 {
-        self.light.grey_per_pascal
-    }
-
     /// An exposure without contact. Each `repeat` has its own noise.
     pub fn reference(&self, repeat: u32) -> Array2<u8> {
         self.options
@@ -131,16 +119,6 @@ impl PressScene {
             .compose(leaked.as_slice(), &self.options.loads[load].illumination)
     }
 
-    /// The same sensor with another object under one load.
-    pub(crate) fn with_press(
-        &self,
-        object: ElasticSphere,
-        law: ContactModel,
-        load: PressLoad,
-    ) -> Result<Self, SimulateError> {
-        self.with_object(object, law, vec![load])
-    }
-
     /// Another object on the same sensor, with the same light, camera and centre: a calibration's
     /// balls, for instance.
     ///
@@ -176,16 +154,6 @@ impl PressScene {
             light: self.light,
             ..changed
         })
-    }
-
-    /// From pressure to light.
-    fn light(&self) -> &LightLaw {
-        &self.light
-    }
-
-    /// Contact of load `load`.
-    fn contact(&self, load: usize) -> &SimulatedContact {
-        &self.contacts[load]
     }
 
     /// The contact's disc on the image plane.
@@ -719,30 +687,41 @@ impl PressScene {
     /// # Panics
     /// If there is no such load.
     pub fn truth(&self, load: usize) -> PressTruth {
-        PressTruth::new(self, load)
-    }
-}
-
-impl PressTruth {
-    fn new(scene: &PressScene, load: usize) -> Self {
-        let (contact, options) = (scene.contact(load).clone(), scene.options());
-        let disc = scene.disc(load);
-        let mut truth = Self {
+        let (contact, options) = (self.contacts[load].clone(), &self.options);
+        let disc = self.disc(load);
+        let mut truth = PressTruth {
             contact,
             load: options.loads[load],
             centre_px: disc.centre_px,
             centroid_px: [f64::NAN; 2],
             visible_force_n: 0.0,
             integrated_pixel_value: 0.0,
-            grey_per_pascal: scene.grey_per_pascal(),
-            saturated_pixels: saturated_pixels(scene, load),
+            grey_per_pascal: self.light.grey_per_pascal,
+            saturated_pixels: self.saturated_pixels(load),
             pixel_size_m: disc.pixel_size_m,
             shape: options.camera.shape,
         };
-        truth.add_moments(scene.light());
+        truth.add_moments(&self.light);
         truth
     }
 
+    /// Pixels whose expected grey level exceeds 255. The frame is made only where one can.
+    fn saturated_pixels(&self, load: usize) -> usize {
+        let (options, illumination) = (&self.options, self.options.loads[load].illumination);
+        let peak = self.contacts[load].peak_pressure_pa;
+        let brightest = options.camera.background_grey + self.light.grey_at(peak);
+        let lit =
+            illumination.level + 0.5 * (illumination.tilt[0].abs() + illumination.tilt[1].abs());
+        // Lens and blur only take light away from the brightest place.
+        if brightest * lit <= 255.0 {
+            return 0;
+        }
+        let light = self.expected_frame(load);
+        light.iter().filter(|&&v| v > 255.0).count()
+    }
+}
+
+impl PressTruth {
     /// Pressure in pascal, averaged over each pixel. Its sum times the pixel's area is the visible
     /// force.
     pub fn pressure_pa(&self) -> Array2<f64> {
@@ -826,23 +805,6 @@ impl PressTruth {
         self.visible_force_n = sum * self.pixel_size_m[0] * self.pixel_size_m[1];
         self.integrated_pixel_value = light.patch(&self.contact, &disc, window).values.sum();
     }
-}
-
-/// Pixels whose expected grey level exceeds 255. The frame is made only where one can.
-fn saturated_pixels(scene: &PressScene, load: usize) -> usize {
-    let (options, illumination) = (scene.options(), scene.options().loads[load].illumination);
-    let peak = scene.contact(load).peak_pressure_pa;
-    let brightest = options.camera.background_grey + scene.light().grey_at(peak);
-    let lit = illumination.level + 0.5 * (illumination.tilt[0].abs() + illumination.tilt[1].abs());
-    // Lens and blur only take light away from the brightest place.
-    if brightest * lit <= 255.0 {
-        return 0;
-    }
-    scene
-        .expected_frame(load)
-        .iter()
-        .filter(|&&v| v > 255.0)
-        .count()
 }
 
 /// The map that takes the apparent surface of one load to that of another: it scales about the

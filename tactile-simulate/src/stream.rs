@@ -2,7 +2,7 @@
 
 use crate::error::{SimulateError, finite, not_negative, positive, within};
 use crate::light::Illumination;
-use crate::press::{PressLoad, PressScene, PressTruth};
+use crate::press::{PressLoad, PressOptions, PressScene, PressTruth};
 use ndarray::Array2;
 use std::f64::consts::PI;
 use tactile_imaging::pipeline::FrameSource;
@@ -190,11 +190,9 @@ impl Iterator for FrameStream {
         self.next += 1;
         let time_s = k as f64 / self.cycle.frame_rate_hz;
         let load = self.load_at(time_s);
-        let (object, law) = (
-            self.scene.options().object,
-            self.scene.options().law.clone(),
-        );
-        let scene = self.scene.with_press(object, law, load).ok()?;
+        let PressOptions { object, law, .. } = self.scene.options();
+        let scene = self.scene.with_object(*object, law.clone(), vec![load]);
+        let scene = scene.ok()?;
         let light = scene.expected_frame(0);
         let camera = scene.options().camera;
         // Above the frames a scene makes itself, whose numbers stay below 2⁴⁷.

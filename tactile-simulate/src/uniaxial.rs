@@ -16,20 +16,13 @@
 //!
 //! The frame shows pressure in proportion to the pattern's height, normalised to carry the force.
 //!
-//! What describes the squeezed block: material, face, forces, light and camera.
-//!
-//! Stretch, strain and stress of the squeezed block in closed form. The equations are in
-//! [`uniaxial`](super::uniaxial).
-//!
-//! A surface pattern of bumps whose pixel averages are exact.
-//!
 //! On a rectangular face the height is h(X, Y) = h₀ + h₁ Σₖ b((X − Xₖ)/w) b((Y − Yₖ)/w) with b(t) =
 //! cos²(πt/2) for |t| < 1, 0 beyond. It is continuous with its slope, and each bump lies wholly on
 //! the face. The integral ∫b = (t + sin(πt)/π)/2 in closed form makes every pixel's average a
 //! product of two differences.
 
 use crate::camera::{Camera, Purpose, row_stream};
-use crate::error::{SimulateError, at_least, finite, not_negative, positive};
+use crate::error::{SimulateError, at_least, finite, not_negative, positive, within};
 use crate::light::Illumination;
 use crate::pixel_average::{Patch, touched};
 use crate::press::{Elastic, Gain};
@@ -559,20 +552,20 @@ impl SurfacePattern {
     fn validate(&self) -> Result<(), SimulateError> {
         positive("base_height_m", self.base_height_m)?;
         not_negative("bump_height_m", self.bump_height_m[0])?;
-        crate::error::within(
+        within(
             "bump_height_m",
             self.bump_height_m[1],
             self.bump_height_m[0],
             f64::MAX,
         )?;
         at_least("bumps", self.bumps[0].min(self.bumps[1]), 1)?;
-        crate::error::within(
+        within(
             "bumps",
             self.bumps[0].max(self.bumps[1]) as f64,
             1.0,
             1000.0,
         )?;
-        crate::error::within("bump_share", self.bump_share, 1e-6, 0.5)
+        within("bump_share", self.bump_share, 1e-6, 0.5)
     }
 
     /// Places the bumps on a face of `size_m` centred on the origin.
