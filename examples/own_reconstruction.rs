@@ -2,9 +2,7 @@
 //! method of the library.
 #![allow(clippy::print_stdout)]
 use ndarray::{Array2, array};
-use tactile_imaging::sfs::{
-    Domain, Frame, SfsError, Surface, SurfaceReconstruction, SurfaceWorkspace,
-};
+use tactile_imaging::sfs::{Domain, Frame, SfsError, Surface, SurfaceReconstruction};
 
 /// Light that fades as exp(−z/length) with the depth z in metres.
 struct Absorption {
@@ -12,13 +10,11 @@ struct Absorption {
 }
 
 impl SurfaceReconstruction<f64> for Absorption {
-    fn reconstruct_with(
+    fn reconstruct(
         &self,
-        _workspace: &mut SurfaceWorkspace<f64>,
         frame: Frame<'_, f64>,
         domain: &Domain<'_, f64>,
-        surface: &mut Surface<f64>,
-    ) -> Result<(), SfsError> {
+    ) -> Result<Surface<f64>, SfsError> {
         domain.bounding_box(frame.dim())?;
         let heights = Array2::from_shape_fn(frame.dim(), |(row, column)| {
             let depth_m = -self.length_m * frame.at(row, column).ln();
@@ -31,8 +27,7 @@ impl SurfaceReconstruction<f64> for Absorption {
         if heights.iter().any(|depth| depth.is_infinite()) {
             return Err(SfsError::custom("a pixel is black: its depth has no end"));
         }
-        *surface = Surface::from_heights(heights);
-        Ok(())
+        Ok(Surface::from_heights(heights))
     }
 }
 

@@ -3,28 +3,24 @@
 #![allow(clippy::print_stdout)]
 use ndarray::{Array2, ArrayView2};
 use tactile_imaging::sfs::nalgebra::Point3;
-use tactile_imaging::sfs::{ControlPointSampler, Domain, SfsError, SurfaceWorkspace};
+use tactile_imaging::sfs::{ControlPointSampler, Domain, SfsError};
 
 struct Highest;
 
 impl ControlPointSampler<f64> for Highest {
-    fn sample_with(
+    fn sample(
         &self,
-        _workspace: &mut SurfaceWorkspace<f64>,
         heights: ArrayView2<'_, f64>,
         domain: &Domain<'_, f64>,
         count: usize,
-        points: &mut Vec<Point3<f64>>,
-    ) -> Result<(), SfsError> {
+    ) -> Result<Vec<Point3<f64>>, SfsError> {
         let [hx, hy] = domain.pixel_size_m;
-        let pixels = (domain.bounding_box(heights.dim())?.pixels())
+        let mut points: Vec<_> = (domain.bounding_box(heights.dim())?.pixels())
             .filter(|at| domain.contains(at.0, at.1) && heights[*at].is_finite())
-            .map(|at| Point3::new(at.1 as f64 * hx, at.0 as f64 * hy, heights[at]));
-        points.clear();
-        points.extend(pixels);
+            .map(|at| Point3::new(at.1 as f64 * hx, at.0 as f64 * hy, heights[at]))
+            .collect();
         let available = points.len();
         if available < count {
-            points.clear();
             return Err(SfsError::TooManyPoints {
                 requested: count,
                 available,
@@ -32,7 +28,7 @@ impl ControlPointSampler<f64> for Highest {
         }
         points.sort_by(|a, b| b.z.total_cmp(&a.z));
         points.truncate(count);
-        Ok(())
+        Ok(points)
     }
 }
 

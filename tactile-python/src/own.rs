@@ -20,7 +20,6 @@ use tactile_imaging::matching::{MatchError, Matching, PointMatcher};
 use tactile_imaging::pipeline::{ContactReading, ContactStage, FrameContact};
 use tactile_imaging::sfs::{
     ControlPointSampler, Domain, Frame, SfsError, SlopeIntegrator, Surface, SurfaceReconstruction,
-    SurfaceWorkspace,
 };
 use tactile_imaging::tps::{TpsError, Warp, WarpModel};
 
@@ -143,13 +142,11 @@ fn mask_of(domain: &Domain<'_, f64>, shape: (usize, usize)) -> Array2<bool> {
 
 /// `reconstruct(image, mask, pixel_size)` returns heights in the unit of the pixel's size.
 impl SurfaceReconstruction<f64> for OwnStage {
-    fn reconstruct_with(
+    fn reconstruct(
         &self,
-        _workspace: &mut SurfaceWorkspace<f64>,
         frame: Frame<'_, f64>,
         domain: &Domain<'_, f64>,
-        surface: &mut Surface<f64>,
-    ) -> Result<(), SfsError> {
+    ) -> Result<Surface<f64>, SfsError> {
         let shape = frame.dim();
         let heights = Python::attach(|py| {
             let image = Array2::from_shape_fn(shape, |(row, column)| frame.at(row, column));
@@ -163,21 +160,18 @@ impl SurfaceReconstruction<f64> for OwnStage {
             )?;
             self.heights(&answer, shape)
         });
-        *surface = Surface::from_heights(heights.map_err(SfsError::custom)?);
-        Ok(())
+        Ok(Surface::from_heights(heights.map_err(SfsError::custom)?))
     }
 }
 
 /// `integrate(slope_x, slope_y, mask, pixel_size)` returns heights in the unit of the pixel's size.
 impl SlopeIntegrator<f64> for OwnStage {
-    fn integrate_with(
+    fn integrate(
         &self,
-        _workspace: &mut SurfaceWorkspace<f64>,
         p: ArrayView2<'_, f64>,
         q: ArrayView2<'_, f64>,
         domain: &Domain<'_, f64>,
-        surface: &mut Surface<f64>,
-    ) -> Result<(), SfsError> {
+    ) -> Result<Surface<f64>, SfsError> {
         let shape = p.dim();
         let heights = Python::attach(|py| {
             let answer = self.call(
@@ -191,23 +185,19 @@ impl SlopeIntegrator<f64> for OwnStage {
             )?;
             self.heights(&answer, shape)
         });
-        *surface = Surface::from_heights(heights.map_err(SfsError::custom)?);
-        Ok(())
+        Ok(Surface::from_heights(heights.map_err(SfsError::custom)?))
     }
 }
 
 /// `sample(heights, mask, pixel_size, count)` returns `count` points, (count, 3).
 impl ControlPointSampler<f64> for OwnStage {
-    fn sample_with(
+    fn sample(
         &self,
-        _workspace: &mut SurfaceWorkspace<f64>,
         heights: ArrayView2<'_, f64>,
         domain: &Domain<'_, f64>,
         count: usize,
-        points: &mut Vec<Point3<f64>>,
-    ) -> Result<(), SfsError> {
-        points.clear();
-        let found = Python::attach(|py| {
+    ) -> Result<Vec<Point3<f64>>, SfsError> {
+        let points = Python::attach(|py| {
             let mask = mask_of(domain, heights.dim());
             let answer = self.call(
                 py,
@@ -227,8 +217,7 @@ impl ControlPointSampler<f64> for OwnStage {
                 ))),
             }
         });
-        *points = found.map_err(SfsError::custom)?;
-        Ok(())
+        points.map_err(SfsError::custom)
     }
 }
 

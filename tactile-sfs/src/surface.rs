@@ -6,7 +6,7 @@ use ndarray::{Array2, ArrayView2};
 use tactile_core::StopReason;
 
 use crate::domain::same_shape;
-use crate::{BoundingBox, Domain, PixelScalar, SfsError};
+use crate::{BoundingBox, Domain, PixelScalar, SfsError, SurfaceWorkspace};
 
 /// What happened at one pixel: a set of the constants below.
 ///
@@ -218,6 +218,15 @@ impl<T: PixelScalar> Surface<T> {
             heights,
             mask,
         }
+    }
+
+    /// What a method writes with a workspace and a surface of its own.
+    pub(crate) fn made_by(
+        method: impl FnOnce(&mut SurfaceWorkspace<T>, &mut Self) -> Result<(), SfsError>,
+    ) -> Result<Self, SfsError> {
+        let mut surface = Self::default();
+        method(&mut SurfaceWorkspace::default(), &mut surface)?;
+        Ok(surface)
     }
 
     /// Where every reconstruction enters: checks the domain against an image of this shape, empties

@@ -52,6 +52,15 @@ struct Plans {
 }
 
 impl<T: PixelScalar> SlopeIntegrator<T> for FrankotChellappa {
+    fn integrate(
+        &self,
+        p: ArrayView2<'_, T>,
+        q: ArrayView2<'_, T>,
+        domain: &Domain<'_, T>,
+    ) -> Result<Surface<T>, SfsError> {
+        Surface::made_by(|workspace, surface| self.integrate_with(workspace, p, q, domain, surface))
+    }
+
     fn integrate_with(
         &self,
         workspace: &mut SurfaceWorkspace<T>,

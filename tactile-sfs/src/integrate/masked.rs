@@ -139,6 +139,15 @@ const OUTSIDE: usize = usize::MAX;
 const KNOWN: usize = usize::MAX - 1;
 
 impl<T: PixelScalar> SlopeIntegrator<T> for MaskedLeastSquares<'_, T> {
+    fn integrate(
+        &self,
+        p: ArrayView2<'_, T>,
+        q: ArrayView2<'_, T>,
+        domain: &Domain<'_, T>,
+    ) -> Result<Surface<T>, SfsError> {
+        Surface::made_by(|workspace, surface| self.integrate_with(workspace, p, q, domain, surface))
+    }
+
     fn integrate_with(
         &self,
         workspace: &mut SurfaceWorkspace<T>,

@@ -24,7 +24,7 @@ use crate::{BoundingBox, Domain, PixelScalar, SfsError, Surface, SurfaceWorkspac
 ///
 /// Slopes are dimensionless (metres per metre), and heights come out in the unit of the pixel size.
 /// A height is known up to a constant: the mean is 0, unless the domain's known heights fix it.
-/// Object safe. An implementor writes [`integrate_with`](Self::integrate_with) alone.
+/// Object safe. An implementor writes [`integrate`](Self::integrate) alone.
 ///
 /// ```
 /// use ndarray::Array2;
@@ -47,11 +47,7 @@ pub trait SlopeIntegrator<T: PixelScalar> {
         p: ArrayView2<'_, T>,
         q: ArrayView2<'_, T>,
         domain: &Domain<'_, T>,
-    ) -> Result<Surface<T>, SfsError> {
-        let mut surface = Surface::default();
-        self.integrate_with(&mut SurfaceWorkspace::default(), p, q, domain, &mut surface)?;
-        Ok(surface)
-    }
+    ) -> Result<Surface<T>, SfsError>;
 
     /// The same into `surface`, with its arrays and the buffers of `workspace` used again.
     ///
@@ -85,11 +81,24 @@ pub trait SlopeIntegrator<T: PixelScalar> {
         q: ArrayView2<'_, T>,
         domain: &Domain<'_, T>,
         surface: &mut Surface<T>,
-    ) -> Result<(), SfsError>;
+    ) -> Result<(), SfsError> {
+        let _ = workspace;
+        *surface = self.integrate(p, q, domain)?;
+        Ok(())
+    }
 }
 
 /// A shared integrator is one, as trait objects need it.
 impl<T: PixelScalar, M: SlopeIntegrator<T> + ?Sized> SlopeIntegrator<T> for Arc<M> {
+    fn integrate(
+        &self,
+        p: ArrayView2<'_, T>,
+        q: ArrayView2<'_, T>,
+        domain: &Domain<'_, T>,
+    ) -> Result<Surface<T>, SfsError> {
+        (**self).integrate(p, q, domain)
+    }
+
     fn integrate_with(
         &self,
         workspace: &mut SurfaceWorkspace<T>,

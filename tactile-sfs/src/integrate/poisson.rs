@@ -140,6 +140,15 @@ impl CosineTransform {
 const LANES: usize = 16;
 
 impl<T: PixelScalar> SlopeIntegrator<T> for CosinePoisson {
+    fn integrate(
+        &self,
+        p: ArrayView2<'_, T>,
+        q: ArrayView2<'_, T>,
+        domain: &Domain<'_, T>,
+    ) -> Result<Surface<T>, SfsError> {
+        Surface::made_by(|workspace, surface| self.integrate_with(workspace, p, q, domain, surface))
+    }
+
     fn integrate_with(
         &self,
         workspace: &mut SurfaceWorkspace<T>,

@@ -20,7 +20,7 @@ use contact::contact;
 use crate::domain::same_shape;
 use crate::{
     BoundingBox, CosinePoisson, Domain, Frame, PixelScalar, SfsError, SlopeIntegrator, Surface,
-    SurfaceReconstruction, SurfaceWorkspace,
+    SurfaceReconstruction,
 };
 
 /// The numbers that a calibration of [`PhotometricStereo`] finds, as a file keeps them.
@@ -285,13 +285,11 @@ fn slopes(normals: [&mut [f32]; 2], errors: [&mut [f32]; 2], sd: f32) {
 }
 
 impl<T: PixelScalar> SurfaceReconstruction<T> for PhotometricStereo {
-    fn reconstruct_with(
+    fn reconstruct(
         &self,
-        _workspace: &mut SurfaceWorkspace<T>,
         frame: Frame<'_, T>,
         domain: &Domain<'_, T>,
-        surface: &mut Surface<T>,
-    ) -> Result<(), SfsError> {
+    ) -> Result<Surface<T>, SfsError> {
         let Frame::Colour(frame) = frame else {
             return Err(SfsError::NoColour);
         };
@@ -305,8 +303,7 @@ impl<T: PixelScalar> SurfaceReconstruction<T> for PhotometricStereo {
                 false => T::nan(),
             }
         });
-        *surface = Surface::from_heights(heights);
-        Ok(())
+        Ok(Surface::from_heights(heights))
     }
 }
 

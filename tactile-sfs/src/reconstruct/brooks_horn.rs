@@ -114,6 +114,16 @@ impl<T: PixelScalar> BrooksHorn<T> {
 }
 
 impl<T: PixelScalar> SurfaceReconstruction<T> for BrooksHorn<T> {
+    fn reconstruct(
+        &self,
+        frame: Frame<'_, T>,
+        domain: &Domain<'_, T>,
+    ) -> Result<Surface<T>, SfsError> {
+        Surface::made_by(|workspace, surface| {
+            self.reconstruct_with(workspace, frame, domain, surface)
+        })
+    }
+
     fn reconstruct_with(
         &self,
         workspace: &mut SurfaceWorkspace<T>,
@@ -294,6 +304,16 @@ struct Integrated<T> {
 }
 
 impl<T: PixelScalar> SurfaceReconstruction<T> for Integrated<T> {
+    fn reconstruct(
+        &self,
+        frame: Frame<'_, T>,
+        domain: &Domain<'_, T>,
+    ) -> Result<Surface<T>, SfsError> {
+        Surface::made_by(|workspace, surface| {
+            self.reconstruct_with(workspace, frame, domain, surface)
+        })
+    }
+
     fn reconstruct_with(
         &self,
         workspace: &mut SurfaceWorkspace<T>,

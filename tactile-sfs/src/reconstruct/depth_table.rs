@@ -187,6 +187,16 @@ impl<T: PixelScalar> DepthTable<T> {
 }
 
 impl<T: PixelScalar> SurfaceReconstruction<T> for DepthTable<T> {
+    fn reconstruct(
+        &self,
+        frame: Frame<'_, T>,
+        domain: &Domain<'_, T>,
+    ) -> Result<Surface<T>, SfsError> {
+        Surface::made_by(|workspace, surface| {
+            self.reconstruct_with(workspace, frame, domain, surface)
+        })
+    }
+
     fn reconstruct_with(
         &self,
         _workspace: &mut SurfaceWorkspace<T>,

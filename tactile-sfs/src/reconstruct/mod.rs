@@ -24,7 +24,7 @@ use crate::{
 /// A way from one image to a surface.
 ///
 /// Object safe: `Box<dyn SurfaceReconstruction<f32>>` lets a user pick at run time. An implementor
-/// writes [`reconstruct_with`](Self::reconstruct_with) alone.
+/// writes [`reconstruct`](Self::reconstruct) alone.
 ///
 /// ```
 /// use ndarray::Array2;
@@ -52,20 +52,10 @@ pub trait SurfaceReconstruction<T: PixelScalar> {
         &self,
         frame: Frame<'_, T>,
         domain: &Domain<'_, T>,
-    ) -> Result<Surface<T>, SfsError> {
-        let mut surface = Surface::default();
-        self.reconstruct_with(
-            &mut SurfaceWorkspace::default(),
-            frame,
-            domain,
-            &mut surface,
-        )?;
-        Ok(surface)
-    }
+    ) -> Result<Surface<T>, SfsError>;
 
     /// The same into `surface`, with its arrays and the buffers of `workspace` used again: the
-    /// methods of this crate do not allocate after the first frame of a stream. A method without
-    /// buffers ignores the workspace and assigns a new surface.
+    /// methods of this crate do not allocate after the first frame of a stream.
     ///
     /// ```
     /// use ndarray::array;
@@ -90,7 +80,11 @@ pub trait SurfaceReconstruction<T: PixelScalar> {
         frame: Frame<'_, T>,
         domain: &Domain<'_, T>,
         surface: &mut Surface<T>,
-    ) -> Result<(), SfsError>;
+    ) -> Result<(), SfsError> {
+        let _ = workspace;
+        *surface = self.reconstruct(frame, domain)?;
+        Ok(())
+    }
 
     /// The same method with its slopes made into heights by `integrator`.
     ///
@@ -136,6 +130,14 @@ pub trait SurfaceReconstruction<T: PixelScalar> {
 
 /// A shared method is one, as trait objects need it.
 impl<T: PixelScalar, M: SurfaceReconstruction<T> + ?Sized> SurfaceReconstruction<T> for Arc<M> {
+    fn reconstruct(
+        &self,
+        frame: Frame<'_, T>,
+        domain: &Domain<'_, T>,
+    ) -> Result<Surface<T>, SfsError> {
+        (**self).reconstruct(frame, domain)
+    }
+
     fn reconstruct_with(
         &self,
         workspace: &mut SurfaceWorkspace<T>,

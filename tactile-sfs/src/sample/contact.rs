@@ -9,7 +9,7 @@
 use nalgebra::Point3;
 use ndarray::ArrayView2;
 
-use super::{ControlPointSampler, SampleBuffers, Weights};
+use super::{ControlPointSampler, SampleBuffers, Weights, made_by};
 use crate::{BoundingBox, Domain, PixelScalar, SfsError, SurfaceWorkspace};
 
 /// Squared slope above which ground counts no steeper (63°), as for
@@ -64,6 +64,15 @@ const NEIGHBOURS: [(isize, isize, f64); 8] = [
 pub struct ContactSampler;
 
 impl<T: PixelScalar> ControlPointSampler<T> for ContactSampler {
+    fn sample(
+        &self,
+        heights: ArrayView2<'_, T>,
+        domain: &Domain<'_, T>,
+        count: usize,
+    ) -> Result<Vec<Point3<T>>, SfsError> {
+        made_by(|workspace, points| self.sample_with(workspace, heights, domain, count, points))
+    }
+
     fn sample_with(
         &self,
         workspace: &mut SurfaceWorkspace<T>,

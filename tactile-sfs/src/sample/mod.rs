@@ -24,7 +24,7 @@ use crate::{BoundingBox, Domain, PixelScalar, SfsError, SurfaceWorkspace};
 /// the height is interpolated. None lies outside the mask (for [`ContactSampler`]: outside the
 /// contour) or where the height is not finite, no two coincide, and the same input gives the same
 /// points. Exactly `count` points are returned. Object safe. An implementor writes
-/// [`sample_with`](Self::sample_with) alone.
+/// [`sample`](Self::sample) alone.
 ///
 /// ```
 /// use ndarray::Array2;
@@ -55,12 +55,7 @@ pub trait ControlPointSampler<T: PixelScalar> {
         heights: ArrayView2<'_, T>,
         domain: &Domain<'_, T>,
         count: usize,
-    ) -> Result<Vec<Point3<T>>, SfsError> {
-        let mut points = Vec::new();
-        let workspace = &mut SurfaceWorkspace::default();
-        self.sample_with(workspace, heights, domain, count, &mut points)?;
-        Ok(points)
-    }
+    ) -> Result<Vec<Point3<T>>, SfsError>;
 
     /// The same into `points`, whose contents are replaced, with the buffers of `workspace`. The
     /// samplers of this crate allocate nothing once both have grown.
@@ -95,11 +90,25 @@ pub trait ControlPointSampler<T: PixelScalar> {
         domain: &Domain<'_, T>,
         count: usize,
         points: &mut Vec<Point3<T>>,
-    ) -> Result<(), SfsError>;
+    ) -> Result<(), SfsError> {
+        let _ = workspace;
+        points.clear();
+        *points = self.sample(heights, domain, count)?;
+        Ok(())
+    }
 }
 
 /// A shared sampler is one, as trait objects need it.
 impl<T: PixelScalar, S: ControlPointSampler<T> + ?Sized> ControlPointSampler<T> for Arc<S> {
+    fn sample(
+        &self,
+        heights: ArrayView2<'_, T>,
+        domain: &Domain<'_, T>,
+        count: usize,
+    ) -> Result<Vec<Point3<T>>, SfsError> {
+        (**self).sample(heights, domain, count)
+    }
+
     fn sample_with(
         &self,
         workspace: &mut SurfaceWorkspace<T>,
@@ -110,6 +119,15 @@ impl<T: PixelScalar, S: ControlPointSampler<T> + ?Sized> ControlPointSampler<T> 
     ) -> Result<(), SfsError> {
         (**self).sample_with(workspace, heights, domain, count, points)
     }
+}
+
+/// The points that a method finds with a workspace of its own.
+fn made_by<T: PixelScalar>(
+    method: impl FnOnce(&mut SurfaceWorkspace<T>, &mut Vec<Point3<T>>) -> Result<(), SfsError>,
+) -> Result<Vec<Point3<T>>, SfsError> {
+    let mut points = Vec::new();
+    method(&mut SurfaceWorkspace::default(), &mut points)?;
+    Ok(points)
 }
 
 /// Buffers of the samplers, kept between calls.
@@ -151,6 +169,15 @@ pub(crate) struct SampleBuffers {
 pub struct EquallySpaced;
 
 impl<T: PixelScalar> ControlPointSampler<T> for EquallySpaced {
+    fn sample(
+        &self,
+        heights: ArrayView2<'_, T>,
+        domain: &Domain<'_, T>,
+        count: usize,
+    ) -> Result<Vec<Point3<T>>, SfsError> {
+        made_by(|workspace, points| self.sample_with(workspace, heights, domain, count, points))
+    }
+
     fn sample_with(
         &self,
         workspace: &mut SurfaceWorkspace<T>,
@@ -247,6 +274,15 @@ impl CurvatureAdaptive {
 }
 
 impl<T: PixelScalar> ControlPointSampler<T> for CurvatureAdaptive {
+    fn sample(
+        &self,
+        heights: ArrayView2<'_, T>,
+        domain: &Domain<'_, T>,
+        count: usize,
+    ) -> Result<Vec<Point3<T>>, SfsError> {
+        made_by(|workspace, points| self.sample_with(workspace, heights, domain, count, points))
+    }
+
     fn sample_with(
         &self,
         workspace: &mut SurfaceWorkspace<T>,
@@ -321,6 +357,15 @@ pub struct Random {
 }
 
 impl<T: PixelScalar> ControlPointSampler<T> for Random {
+    fn sample(
+        &self,
+        heights: ArrayView2<'_, T>,
+        domain: &Domain<'_, T>,
+        count: usize,
+    ) -> Result<Vec<Point3<T>>, SfsError> {
+        made_by(|workspace, points| self.sample_with(workspace, heights, domain, count, points))
+    }
+
     fn sample_with(
         &self,
         workspace: &mut SurfaceWorkspace<T>,
@@ -712,5 +757,21 @@ mod tests {
         // Without any weight they are numbers all the same.
         cuts.find([0.0; 3].into_iter(), [0.5, 1.0].into_iter());
         assert_eq!(cuts.at, [1.0, 1.0]);
+    }
+
+    #[test]
+    fn the_centroid_of_one_cell_is_that_of_all() {
+        let pieces = [1.0, 3.0]
+            .map(|weight| Piece {
+                weight,
+                moment: 2.0 * weight,
+            })
+            .to_vec();
+        let mut strips = Strips {
+            pieces,
+            ..Strips::default()
+        };
+        strips.split(1);
+        assert_eq!(strips.places, [[0.75, 2.0]]);
     }
 }

@@ -18,9 +18,7 @@ use tactile_imaging::Pipeline;
 use tactile_imaging::elasticity::strain::Hencky;
 use tactile_imaging::force::CalibrationPair;
 use tactile_imaging::pipeline::{Object, PipelineError, Press, SkipReason, Stage};
-use tactile_imaging::sfs::{
-    ControlPointSampler, Domain, EquallySpaced, SfsError, SurfaceWorkspace,
-};
+use tactile_imaging::sfs::{ControlPointSampler, Domain, EquallySpaced, SfsError};
 use tactile_simulate::Trial;
 use tactile_simulate::{CalibrationRun, Camera, PressLoad, PressOptions, PressScene};
 
@@ -110,15 +108,13 @@ fn a_frame_without_contact_stops_there() {
 struct Half;
 
 impl ControlPointSampler<f64> for Half {
-    fn sample_with(
+    fn sample(
         &self,
-        workspace: &mut SurfaceWorkspace<f64>,
         heights: ArrayView2<'_, f64>,
         domain: &Domain<'_, f64>,
         count: usize,
-        points: &mut Vec<Point3<f64>>,
-    ) -> Result<(), SfsError> {
-        EquallySpaced.sample_with(workspace, heights, domain, count / 2, points)
+    ) -> Result<Vec<Point3<f64>>, SfsError> {
+        EquallySpaced.sample(heights, domain, count / 2)
     }
 }
 

@@ -250,6 +250,16 @@ impl<T: PixelScalar> Eikonal<T> {
 }
 
 impl<T: PixelScalar> SurfaceReconstruction<T> for Eikonal<T> {
+    fn reconstruct(
+        &self,
+        frame: Frame<'_, T>,
+        domain: &Domain<'_, T>,
+    ) -> Result<Surface<T>, SfsError> {
+        Surface::made_by(|workspace, surface| {
+            self.reconstruct_with(workspace, frame, domain, surface)
+        })
+    }
+
     fn reconstruct_with(
         &self,
         workspace: &mut SurfaceWorkspace<T>,
