@@ -80,6 +80,7 @@ pub mod inclusion;
 pub mod io;
 pub mod markers;
 pub mod pipeline;
+mod regions;
 #[cfg(feature = "scene")]
 pub mod scene;
 #[cfg(feature = "scene")]

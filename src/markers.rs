@@ -1,10 +1,12 @@
 //! Markers printed on a gel: found in a frame, followed from the reference, and the shear and
 //! torque that their displacements carry.
 
-use crate::StrainBetween;
 use crate::core::Estimate;
 use crate::elasticity::strain::GreenLagrange;
 use crate::matching::{AnnealedSoftassign, Doubt, MatchError, PointMatcher};
+use crate::regions::{otsu, regions};
+use crate::strain_between::{StrainBetween, median, median_spacing, mutually_nearest};
+use crate::tps::nearest_rows;
 use nalgebra::{Matrix3, Matrix3x2, Point2, Vector2, Vector3};
 use ndarray::{Array2, ArrayView2, Zip};
 
@@ -77,7 +79,7 @@ pub fn find_markers(grey: ArrayView2<'_, f64>) -> Vec<Marker> {
         .and(&ground)
         .and(&count)
         .for_each(|share, sum, count| *share /= (sum / count.max(1.0)).max(1.0));
-    let Some((cut, noise)) = otsu(&share) else {
+    let Some((cut, noise)) = threshold(&share) else {
         return Vec::new();
     };
     let (mut found, owner) = patches(&share, cut);
@@ -170,7 +172,7 @@ fn over_box_areas(sums: &mut Array2<f32>, reach: usize) {
 
 /// Otsu's threshold of shares from 0 to 1.5, and the standard deviation of the brighter class.
 /// `None` for one class.
-fn otsu(share: &Array2<f32>) -> Option<(f64, f64)> {
+fn threshold(share: &Array2<f32>) -> Option<(f64, f64)> {
     /// A twentieth of a grey level in 100.
     const WIDTH: f64 = 0.0005;
     const PER_SHARE: f32 = (1.0 / WIDTH) as f32;
@@ -179,22 +181,7 @@ fn otsu(share: &Array2<f32>) -> Option<(f64, f64)> {
     let bins = share.iter().map(|v| ((v * PER_SHARE) as usize).min(last));
     bins.for_each(|bin| histogram[bin] += 1.0);
     let level = |k: usize| (k as f64 + 0.5) * WIDTH;
-    let total: f64 = histogram.iter().sum();
-    let products = histogram.iter().enumerate().map(|(k, n)| n * level(k));
-    let sum: f64 = products.sum();
-    let (mut below, mut sum_below, mut best) = (0.0, 0.0, None::<(f64, f64)>);
-    for (k, n) in histogram.iter().enumerate() {
-        below += n;
-        sum_below += n * level(k);
-        if below > 0.0 && below < total {
-            let [low, high] = [sum_below / below, (sum - sum_below) / (total - below)];
-            let between = below * (total - below) * (high - low).powi(2);
-            if best.is_none_or(|best| between > best.0) {
-                best = Some((between, 0.5 * (low + high)));
-            }
-        }
-    }
-    let (_, cut) = best?;
+    let cut = otsu(&histogram, level)?;
     // The median deviation of the gel bears what is printed on it.
     let first = ((cut / WIDTH) as usize).min(last);
     let gel = &histogram[first..];
@@ -230,35 +217,13 @@ const NOBODY: u32 = u32::MAX;
 /// Patches of at least nine pixels below `cut` that are connected by their sides, as places in
 /// reading order, and the patch of every pixel.
 fn patches(share: &Array2<f32>, cut: f64) -> (Vec<Vec<usize>>, Vec<u32>) {
-    let columns = share.ncols();
     let mut owner = vec![NOBODY; share.len()];
     let mut dark: Vec<bool> = share.iter().map(|share| f64::from(*share) < cut).collect();
     let mut found = Vec::new();
-    for start in 0..dark.len() {
-        if !core::mem::take(&mut dark[start]) {
-            continue;
-        }
-        let (mut patch, mut next) = (vec![start], 0);
-        while let Some(&at) = patch.get(next) {
-            next += 1;
-            let column = at % columns;
-            let beside = [
-                (column > 0).then(|| at - 1),
-                (column + 1 < columns).then_some(at + 1),
-                at.checked_sub(columns),
-                Some(at + columns),
-            ];
-            for at in beside.into_iter().flatten() {
-                if dark.get_mut(at).is_some_and(core::mem::take) {
-                    patch.push(at);
-                }
-            }
-        }
-        if patch.len() >= 9 {
-            let name = found.len() as u32;
-            patch.iter().for_each(|&at| owner[at] = name);
-            found.push(patch);
-        }
+    for patch in regions(&mut dark, share.ncols()).filter(|patch| patch.len() >= 9) {
+        let name = found.len() as u32;
+        patch.iter().for_each(|&at| owner[at] = name);
+        found.push(patch);
     }
     (found, owner)
 }
@@ -281,32 +246,9 @@ fn holes(patch: &[usize], owner: &[u32], k: usize, columns: usize) -> Vec<usize>
     };
     let own = |cell: usize| place(cell).is_some_and(|at| owner[at] == k as u32);
     let mut open: Vec<bool> = (0..high * wide).map(|cell| !own(cell)).collect();
-    let mut outside = vec![0_usize];
-    open[0] = false;
-    while let Some(cell) = outside.pop() {
-        // The rim keeps steps to the side from wrapping into a patch.
-        let beside = [
-            cell.wrapping_sub(1),
-            cell + 1,
-            cell.wrapping_sub(wide),
-            cell + wide,
-        ];
-        for at in beside {
-            if open.get_mut(at).is_some_and(core::mem::take) {
-                outside.push(at);
-            }
-        }
-    }
-    let inner = (0..open.len()).filter(|&cell| open[cell]);
+    // The region around the patch begins with the rim.
+    let inner = regions(&mut open, wide).skip(1).flatten();
     inner.filter_map(place).collect()
-}
-
-fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
-    let mut values: Vec<f64> = values.collect();
-    let middle = values.len() / 2;
-    let place =
-        (middle < values.len()).then(|| values.select_nth_unstable_by(middle, f64::total_cmp));
-    place.map(|(_, value, _)| *value)
 }
 
 /// A marker of the reference and where it went.
@@ -428,37 +370,21 @@ fn nearest_pairs(before: &[Point2<f64>], after: &[Point2<f64>]) -> Option<Vec<(u
     {
         return None;
     }
-    let nearest = |p: &Point2<f64>, set: &[Point2<f64>], besides: Option<usize>| {
-        let distances = set.iter().map(|q| (q - p).norm_squared()).enumerate();
-        let others = distances.filter(|(k, _)| Some(*k) != besides);
-        others.min_by(|a, b| a.1.total_cmp(&b.1))
-    };
-    let spacing = |set: &[Point2<f64>]| {
-        let each = set.iter().enumerate();
-        median(each.filter_map(|(k, p)| Some(nearest(p, set, Some(k))?.1.sqrt())))
-    };
-    let spacing = spacing(before)?.min(spacing(after)?);
-    let back: Vec<_> = after.iter().map(|p| nearest(p, before, None)).collect();
-    let pair = |(i, p): (usize, &Point2<f64>)| {
-        let (j, square) = nearest(p, after, None)?;
-        let mutual = back[j].is_some_and(|(back, _)| back == i);
-        (mutual && square < 0.25 * spacing * spacing).then_some((i, j))
-    };
-    let pairs: Vec<_> = before.iter().enumerate().filter_map(pair).collect();
+    let spacing = median_spacing(before)?.min(median_spacing(after)?);
+    let mut pairs = mutually_nearest(before, after);
+    pairs.retain(|&(i, j)| (after[j] - before[i]).norm() < 0.5 * spacing);
     let left_over = before.len().min(after.len()) - pairs.len();
     if pairs.len() < 16 || 100 * left_over > pairs.len() {
         return None;
     }
-    let moved: Vec<_> = pairs
-        .iter()
-        .map(|&(i, j)| (before[i], after[j] - before[i]))
-        .collect();
-    let smooth = |(own, displacement): &(Point2<f64>, Vector2<f64>)| {
-        let mut near: Vec<_> = moved.iter().map(|(p, u)| (p - own, *u)).collect();
-        near.select_nth_unstable_by(8, |a, b| a.0.norm_squared().total_cmp(&b.0.norm_squared()));
-        let others = near[..9]
+    let places: Vec<_> = pairs.iter().map(|&(i, _)| before[i]).collect();
+    let moved: Vec<_> = pairs.iter().map(|&(i, j)| after[j] - before[i]).collect();
+    let near = nearest_rows(&places, &places, 9);
+    let smooth = |k: usize| {
+        let steps = near[k]
             .iter()
-            .filter(|(step, _)| step.norm_squared() > 0.0);
+            .map(|&row| (places[row] - places[k], moved[row]));
+        let others = steps.filter(|(step, _)| step.norm_squared() > 0.0);
         let (mut square, mut right) = (Matrix3::zeros(), Matrix3x2::zeros());
         for (step, u) in others {
             let row = Vector3::new(1.0, step.x / spacing, step.y / spacing);
@@ -469,9 +395,9 @@ fn nearest_pairs(before: &[Point2<f64>], after: &[Point2<f64>]) -> Option<Vec<(u
         let predicted = square
             .cholesky()
             .map(|factor| factor.solve(&right).row(0).transpose());
-        predicted.is_some_and(|predicted| (predicted - displacement).norm() < 0.25 * spacing)
+        predicted.is_some_and(|predicted| (predicted - moved[k]).norm() < 0.25 * spacing)
     };
-    moved.iter().all(smooth).then_some(pairs)
+    (0..pairs.len()).all(smooth).then_some(pairs)
 }
 
 impl MarkerField {
@@ -498,15 +424,11 @@ impl MarkerField {
     /// # Ok::<(), tactile_imaging::matching::MatchError>(())
     /// ```
     pub fn shear(&self, stiffness_pa_per_m: f64, pixel_size_m: f64) -> Option<MarkerShear> {
-        let spacing = median(self.tracks.iter().filter_map(|track| {
-            let others = self.tracks.iter().filter(|other| other.rows != track.rows);
-            let distances = others.map(|other| (other.position_px - track.position_px).norm());
-            distances.min_by(f64::total_cmp)
-        }))?;
+        let places: Vec<_> = self.tracks.iter().map(|track| track.position_px).collect();
+        let spacing = median_spacing(&places)?;
         let scale = stiffness_pa_per_m * (spacing * pixel_size_m).powi(2) * pixel_size_m;
         let n = self.tracks.len() as f64;
-        let coords = self.tracks.iter().map(|track| track.position_px.coords);
-        let mean = coords.sum::<Vector2<f64>>() / n;
+        let mean = places.iter().map(|p| p.coords).sum::<Vector2<f64>>() / n;
         let (mut force, mut torque, mut variances) = (Vector2::zeros(), 0.0, [0.0; 2]);
         for track in &self.tracks {
             let (r, u) = (track.position_px.coords - mean, track.displacement_px);

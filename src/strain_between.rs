@@ -330,7 +330,7 @@ impl<const D: usize> StrainBetween<D> {
             return Self::of_many(before, after, matched, measure, possible);
         }
         let rough = fit(before, after, matched)?;
-        let spacing = median_spacing(after);
+        let spacing = median_spacing(after).unwrap_or(0.0);
         // A point that lies where the spline predicts is a partner, whatever the matcher's answer.
         let rows = partners(before, after, &rough, spacing);
         if rows.len() < expected {
@@ -373,9 +373,7 @@ impl<const D: usize> StrainBetween<D> {
             fit: Fit::Spline(robust),
         })
     }
-}
 
-impl<const D: usize> StrainBetween<D> {
     /// Strain by local fits.
     fn of_many(
         before: &[Point<f64, D>],
@@ -392,17 +390,13 @@ impl<const D: usize> StrainBetween<D> {
         let mut weights: Vec<f64> = (field.kept.iter())
             .map(|&kept| f64::from(u8::from(kept)))
             .collect();
-        let spacing = median(values.iter().map(|value| value.spacing));
+        let spacing = median(values.iter().map(|value| value.spacing)).unwrap_or(0.0);
         let (missed, found) = missed_partners(before, after, &rows, &field, spacing / 3.0);
         sources.extend(missed.iter().map(|&(i, _)| before[i]));
         rows.extend(missed);
         values.extend(found);
         weights.resize(rows.len(), 1.0);
-        let gradients: Vec<_> = values
-            .iter()
-            .map(|v| v.gradient.fixed_resize(0.0))
-            .collect();
-        let strained = StrainField::from_gradients(&gradients, None, measure)?;
+        let strained = StrainField::from_gradients(&gradients_of(&values), None, measure)?;
         let errors = |value: &LocalValue<D>| strain_error(value, measure);
         let standard_errors: Vec<_> = values.iter().map(errors).collect();
         let finite = standard_errors
@@ -413,7 +407,7 @@ impl<const D: usize> StrainBetween<D> {
         // Points of one patch share their errors. Those of neighbouring patches cancel in part, so
         // that this is at least the error of the mean.
         let patches = (rows.len() / LocalField::<D>::PATCH).max(2);
-        let sigma = median(values.iter().map(|value| value.sigma));
+        let sigma = median(values.iter().map(|value| value.sigma)).unwrap_or(0.0);
         let kept = weights.iter().sum::<f64>();
         let share = kept / possible as f64;
         Ok(Self {
@@ -432,9 +426,7 @@ impl<const D: usize> StrainBetween<D> {
             relative_lambda: None,
         })
     }
-}
 
-impl<const D: usize> StrainBetween<D> {
     /// Whether a pair counts in the deformation, and was not left out as misplaced.
     #[must_use]
     pub fn is_kept(&self, pair: usize) -> bool {
@@ -488,16 +480,16 @@ impl<const D: usize> StrainBetween<D> {
         match &self.fit {
             Fit::Local(field) => {
                 let values = field.at(points, |_| {});
-                let gradients: Vec<_> = values
-                    .iter()
-                    .map(|v| v.gradient.fixed_resize(0.0))
-                    .collect();
                 let at = |(value, strain): (&LocalValue<D>, Matrix3<f64>)| StrainAt {
                     displacement: value.displacement,
                     strain,
                     standard_error: strain_error(value, measure),
                 };
-                Ok(values.iter().zip(strained(&gradients)?).map(at).collect())
+                Ok(values
+                    .iter()
+                    .zip(strained(&gradients_of(&values))?)
+                    .map(at)
+                    .collect())
             }
             Fit::Spline(robust) => {
                 let at = |spline| -> Result<_, StrainBetweenError> {
@@ -517,6 +509,12 @@ impl<const D: usize> StrainBetween<D> {
             }
         }
     }
+}
+
+/// H at every place of local fits, in three dimensions.
+fn gradients_of<const D: usize>(values: &[LocalValue<D>]) -> Vec<Matrix3<f64>> {
+    let gradients = values.iter().map(|value| value.gradient.fixed_resize(0.0));
+    gradients.collect()
 }
 
 /// Standard error of the strain, to first order in the gradient's.
@@ -625,10 +623,13 @@ fn missed_partners<const D: usize>(
     (pairs, found)
 }
 
-fn median(values: impl Iterator<Item = f64>) -> f64 {
+/// The middle value, the upper of two.
+pub(crate) fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
     let mut values: Vec<f64> = values.collect();
-    values.sort_unstable_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(0.0)
+    let middle = values.len() / 2;
+    let place =
+        (middle < values.len()).then(|| values.select_nth_unstable_by(middle, f64::total_cmp));
+    place.map(|(_, value, _)| *value)
 }
 
 /// Doubt about sets whose strain has no meaning.
@@ -688,21 +689,12 @@ fn doubt(share: f64, ratio: f64) -> Option<PairsDoubt> {
     }
 }
 
-/// The point of a set nearest to `p`, without the one of row `not`.
-fn nearest<const D: usize>(p: &Point<f64, D>, set: &[Point<f64, D>], not: usize) -> Option<usize> {
-    let distance = |k: usize| (set[k] - p).norm_squared();
-    (0..set.len())
-        .filter(|&k| k != not)
-        .min_by(|&a, &b| distance(a).total_cmp(&distance(b)))
-}
-
-/// Median distance to the nearest neighbour.
-fn median_spacing<const D: usize>(points: &[Point<f64, D>]) -> f64 {
-    let mut spacing: Vec<f64> = (0..points.len())
-        .filter_map(|j| nearest(&points[j], points, j).map(|k| (points[k] - points[j]).norm()))
-        .collect();
-    spacing.sort_by(f64::total_cmp);
-    spacing.get(spacing.len() / 2).copied().unwrap_or(0.0)
+/// Median distance to the nearest neighbour. `None` of fewer than two points.
+pub(crate) fn median_spacing<const D: usize>(points: &[Point<f64, D>]) -> Option<f64> {
+    let near = nearest_rows(points, points, 2).into_iter().zip(points);
+    let distance =
+        |(near, p): (Vec<usize>, &Point<f64, D>)| Some((points[*near.get(1)?] - p).norm());
+    median(near.filter_map(distance))
 }
 
 /// Mutual nearest neighbours of prediction and target, within a third of the targets' usual
@@ -715,10 +707,21 @@ fn partners<const D: usize>(
 ) -> Vec<(usize, usize)> {
     let predicted: Vec<_> = before.iter().map(|p| rough.spline.apply(p)).collect();
     let reach = spacing / 3.0;
-    (0..before.len())
-        .filter_map(|i| nearest(&predicted[i], after, usize::MAX).map(|j| (i, j)))
-        .filter(|&(i, j)| (after[j] - predicted[i]).norm() <= reach)
-        .filter(|&(i, j)| nearest(&after[j], &predicted, usize::MAX) == Some(i))
+    let mut pairs = mutually_nearest(&predicted, after);
+    pairs.retain(|&(i, j)| (after[j] - predicted[i]).norm() <= reach);
+    pairs
+}
+
+/// Pairs of rows whose points are each other's nearest.
+pub(crate) fn mutually_nearest<const D: usize>(
+    own: &[Point<f64, D>],
+    other: &[Point<f64, D>],
+) -> Vec<(usize, usize)> {
+    let (there, back) = (nearest_rows(other, own, 1), nearest_rows(own, other, 1));
+    let pairs = there.iter().enumerate();
+    let pairs = pairs.filter_map(|(i, there)| Some((i, *there.first()?)));
+    pairs
+        .filter(|&(i, j)| back[j].first() == Some(&i))
         .collect()
 }
 

@@ -120,10 +120,15 @@ pub fn ring_means(
     let mut rings = vec![Ring::default(); count];
     let mut harmonic = [0.0; 2];
     let mut mean = 0.0;
+    let offset = |y: usize, x: usize| {
+        let (dx, dy) = (
+            (x as f64 - centre_px[0]) * sx,
+            (y as f64 - centre_px[1]) * sy,
+        );
+        (dx, dy, dx.hypot(dy))
+    };
     for ((y, x), &value) in image.indexed_iter() {
-        let dx = (x as f64 - centre_px[0]) * sx;
-        let dy = (y as f64 - centre_px[1]) * sy;
-        let radius = dx.hypot(dy);
+        let (dx, dy, radius) = offset(y, x);
         let index = (radius / width) as usize;
         if let Some(ring) = rings.get_mut(index) {
             ring.count += 1.0;
@@ -136,20 +141,14 @@ pub fn ring_means(
             mean += value;
         }
     }
-    let noise = pixel_noise(image, |y, x| {
-        let dx = (x as f64 - centre_px[0]) * sx;
-        let dy = (y as f64 - centre_px[1]) * sy;
-        dx.hypot(dy) < used_radius_m
-    });
+    let noise = pixel_noise(image, |y, x| offset(y, x).2 < used_radius_m);
     let filled: Vec<Ring> = rings.into_iter().filter(|ring| ring.count > 0.0).collect();
     let radii_m: Vec<f64> = (filled.iter())
         .map(|ring| ring.radius / ring.count)
         .collect();
     let means: Vec<f64> = filled.iter().map(|ring| ring.sum / ring.count).collect();
     let pixels = image.indexed_iter().filter_map(|((y, x), &value)| {
-        let dx = (x as f64 - centre_px[0]) * sx;
-        let dy = (y as f64 - centre_px[1]) * sy;
-        let radius = dx.hypot(dy);
+        let (dx, dy, radius) = offset(y, x);
         let off = value - interpolated(&radii_m, &means, radius);
         (radius < used_radius_m).then(|| (radius / used_radius_m, dy.atan2(dx), value, off))
     });

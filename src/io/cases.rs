@@ -1,8 +1,6 @@
 //! Case files of point matching, and the result files that answer them.
 //!
-//! A case is a line `case NAME D n_model n_target`, then rows `m` (a model point) and `t` (a target
-//! point). Rows `g` and `p`, which hold the truth for a scorer, are passed over unread. A result is
-//! a line `case NAME time_ms`, then for every model row a line `w` (its warped position) and a line
+//! [`read_cases`] says what a case is. A result is a line `case NAME time_ms`, then for every model row a line `w` (its warped position) and a line
 //! `a` (the target row assigned to it, −1 for none).
 use super::error::{FileError, FilePlace, quoted};
 use super::files::read_bytes;

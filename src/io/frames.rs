@@ -7,7 +7,7 @@ use self::avi::Avi;
 use self::npy::Arrays;
 use super::error::{FileError, FilePlace, quoted};
 use super::files::{LARGEST_FILE, open_file};
-use super::image::{Grey, colour_levels, decode, eight_bit_levels, largest_image};
+use super::image::{Grey, colour_levels, decode, eight_bit_levels, header_words, largest_image};
 use crate::pipeline::FrameSource;
 use ::image::DynamicImage;
 use ndarray::{Array2, Array3};
@@ -75,7 +75,6 @@ impl std::fmt::Debug for FrameReader {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_struct("FrameReader")
             .field("name", &self.name)
-            .field("format", &self.format)
             .finish_non_exhaustive()
     }
 }
@@ -88,20 +87,6 @@ enum Format {
     Pages(Pages),
     Image(Vec<u8>),
     Ended,
-}
-
-impl std::fmt::Debug for Format {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(match self {
-            Self::Video(_) => "YUV4MPEG2",
-            Self::Avi(_) => "AVI",
-            Self::Arrays(_) => "NPY or NPZ",
-            Self::Anymaps => "PGM or PPM",
-            Self::Pages(_) => "TIFF",
-            Self::Image(_) => "image",
-            Self::Ended => "ended",
-        })
-    }
 }
 
 impl FrameReader {
@@ -316,7 +301,7 @@ impl FrameReader {
                 let Some(mut bytes) = anymap_header(input)? else {
                     return Ok(None);
                 };
-                let Some((_, samples)) = anymap_samples(&bytes) else {
+                let Some(samples) = anymap_samples(&bytes) else {
                     let found = quoted(&String::from_utf8_lossy(&bytes), 40);
                     let expected = "the header of a PGM or PPM image of at most 64 million pixels";
                     return Err(Broken::new(expected, found));
@@ -569,13 +554,9 @@ fn anymap_header(input: &mut dyn BufRead) -> IoResult<Option<Vec<u8>>> {
     Ok(Some(header).filter(|header| !header.is_empty()))
 }
 
-/// Size, and the bytes of the samples, of an image with this header.
-fn anymap_samples(header: &[u8]) -> Option<([usize; 2], usize)> {
-    let text = std::str::from_utf8(header).ok()?;
-    let lines = text
-        .lines()
-        .map(|line| line.split('#').next().unwrap_or(""));
-    let words: Vec<&str> = lines.flat_map(str::split_ascii_whitespace).collect();
+/// Bytes of the samples of an image with this header.
+fn anymap_samples(header: &[u8]) -> Option<usize> {
+    let words: Vec<&str> = header_words(std::str::from_utf8(header).ok()?).collect();
     let &[magic, width, height, largest] = words.as_slice() else {
         return None;
     };
@@ -590,7 +571,7 @@ fn anymap_samples(header: &[u8]) -> Option<([usize; 2], usize)> {
         256..=65_535_u32 => 2,
         _ => return None,
     };
-    is_read(width, height).then(|| ([width, height], width * height * channels * bytes))
+    is_read(width, height).then(|| width * height * channels * bytes)
 }
 
 /// The pages of a TIFF file.
@@ -617,17 +598,17 @@ impl Pages {
             next: 0,
             seen: HashSet::new(),
         };
-        pages.next = pages.offset(4)?;
+        pages.next = pages.number(4, 4)?;
         Some(pages)
     }
 
-    fn offset(&self, at: usize) -> Option<usize> {
-        let bytes: [u8; 4] = self.bytes.get(at..at.checked_add(4)?)?.try_into().ok()?;
-        let offset = match self.little_endian {
-            true => u32::from_le_bytes(bytes),
-            false => u32::from_be_bytes(bytes),
-        };
-        Some(offset as usize)
+    /// A whole number of so many bytes.
+    fn number(&self, at: usize, bytes: usize) -> Option<usize> {
+        let mut digits = self.bytes.get(at..at.checked_add(bytes)?)?.to_vec();
+        if self.little_endian {
+            digits.reverse();
+        }
+        Some((digits.iter()).fold(0, |sum, digit| 256 * sum + usize::from(*digit)))
     }
 
     /// The file with the next page as its first, which is the one that decoders of images read.
@@ -637,21 +618,12 @@ impl Pages {
         if !self.seen.is_empty() && page == 0 || !self.seen.insert(page) {
             return None;
         }
-        let count: Option<[u8; 2]> = self
-            .bytes
-            .get(page..)
-            .and_then(|d| d.get(..2)?.try_into().ok());
-        let entries = count.map_or(0, |count| match self.little_endian {
-            true => u16::from_le_bytes(count),
-            false => u16::from_be_bytes(count),
-        });
-        self.next = self
-            .offset(page + 2 + 12 * usize::from(entries))
-            .unwrap_or(0);
-        let first = match self.little_endian {
-            true => (page as u32).to_le_bytes(),
-            false => (page as u32).to_be_bytes(),
-        };
+        let entries = self.number(page, 2).unwrap_or(0);
+        self.next = self.number(page + 2 + 12 * entries, 4).unwrap_or(0);
+        let mut first = (page as u32).to_le_bytes();
+        if !self.little_endian {
+            first.reverse();
+        }
         self.bytes[4..8].copy_from_slice(&first);
         Some(&self.bytes)
     }

@@ -366,15 +366,19 @@ fn white_of(samples: &[u16], bytes: &[u8], bits: Option<u8>) -> Result<f64, Stri
     Err(format!("no sample of 16 bits is above {brightest}: {bits}"))
 }
 
+/// The words of an anymap's header, comments left out.
+pub fn header_words(header: &str) -> impl Iterator<Item = &str> {
+    let lines = header.lines();
+    let lines = lines.map(|line| line.split('#').next().unwrap_or(""));
+    lines.flat_map(str::split_ascii_whitespace)
+}
+
 /// The largest value of a sample that the header of a PGM, PPM or PAM announces.
 fn announced_maximum(bytes: &[u8]) -> Option<u16> {
     let kind = bytes.strip_prefix(b"P")?.first()?;
     // No header is longer. Words beyond it are samples.
     let header = String::from_utf8_lossy(&bytes[..bytes.len().min(4096)]);
-    let lines = header
-        .lines()
-        .map(|line| line.split('#').next().unwrap_or(""));
-    let mut words = lines.flat_map(str::split_ascii_whitespace);
+    let mut words = header_words(&header);
     let word = match kind {
         b'2' | b'3' | b'5' | b'6' => words.nth(3),
         b'7' => words.skip_while(|word| *word != "MAXVAL").nth(1),

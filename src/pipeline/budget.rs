@@ -1,6 +1,7 @@
 //! Which inputs the error of a modulus comes from, and which of them were assumed.
+use super::loads::beyond;
 use super::settings::Settings;
-use super::time::{NEGLIGIBLE, quiet};
+use super::time::{NEGLIGIBLE, quiet, with_relative_error};
 use crate::elasticity::modulus::{LoadSeries, ModulusEstimator};
 use std::fmt::{self, Display, Formatter};
 
@@ -153,9 +154,7 @@ pub fn error_budget(
     };
     let shared = *series.shared_errors();
     let coupling = if by_light { settings.coupling() } else { 0.0 };
-    let uncoupled = (shared.force_scale.powi(2) - coupling.powi(2))
-        .max(0.0)
-        .sqrt();
+    let uncoupled = beyond(shared.force_scale, coupling);
     let quiet = LoadSeries::new(series.loads().iter().map(quiet).collect::<Vec<_>>())
         .with_shared_errors(shared)
         .ok();
@@ -207,7 +206,5 @@ pub fn error_budget(
 }
 
 fn relative_variance(estimator: &dyn ModulusEstimator, series: &LoadSeries) -> Option<f64> {
-    let estimate = estimator.estimate(series).ok()?;
-    let relative = estimate.standard_error_pa / estimate.youngs_modulus_pa;
-    relative.is_finite().then_some(relative * relative)
+    with_relative_error(estimator, series).map(|(_, relative)| relative * relative)
 }

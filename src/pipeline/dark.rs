@@ -6,6 +6,7 @@ use super::error::PipelineError;
 use crate::force::{
     BoundingBox, Estimate, ForceError, Polarity, ReferenceFrame, median_shift_outside,
 };
+use crate::regions::regions;
 use crate::sfs::DepthTable;
 use ndarray::{Array2, ArrayView2};
 
@@ -202,35 +203,14 @@ fn largest_patch(
     (rows, columns): (usize, usize),
     inside: impl Fn([usize; 2]) -> bool,
 ) -> Vec<[usize; 2]> {
-    let mut open = Array2::from_shape_fn((rows, columns), |(r, c)| inside([r, c]));
-    let mut largest: Vec<[usize; 2]> = Vec::new();
-    for start in 0..rows * columns {
-        let start = [start / columns, start % columns];
-        if !std::mem::take(&mut open[start]) {
-            continue;
-        }
-        let mut patch = vec![start];
-        let mut next = 0;
-        while let Some(&[r, c]) = patch.get(next) {
-            next += 1;
-            let beside = [
-                [r.wrapping_sub(1), c],
-                [r + 1, c],
-                [r, c.wrapping_sub(1)],
-                [r, c + 1],
-            ];
-            for at in beside {
-                if open.get(at).copied().unwrap_or(false) {
-                    open[at] = false;
-                    patch.push(at);
-                }
-            }
-        }
-        if patch.len() > largest.len() {
-            largest = patch;
-        }
-    }
-    largest
+    let place = |at: usize| [at / columns, at % columns];
+    let mut open: Vec<bool> = (0..rows * columns).map(|at| inside(place(at))).collect();
+    let larger = |first: Vec<usize>, other: Vec<usize>| match other.len() > first.len() {
+        true => other,
+        false => first,
+    };
+    let largest = regions(&mut open, columns).reduce(larger);
+    largest.into_iter().flatten().map(place).collect()
 }
 
 #[cfg(test)]

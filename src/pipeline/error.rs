@@ -13,12 +13,8 @@ use crate::tps::TpsError;
 /// use tactile_imaging::pipeline::{Object, Pipeline, PipelineError};
 /// use tactile_imaging::force::CalibrationPair;
 /// let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
-/// let hertz = |peak: f64| ndarray::Array2::from_shape_fn((64, 64), |(r, c)| {
-///     let d = ((r as f64 - 32.0).hypot(c as f64 - 32.0) / 20.0).min(1.0);
-///     10 + (peak * (1.0 - d * d).sqrt()).round() as u8
-/// });
 /// let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?;
-/// let empty = hertz(0.0);
+/// let empty = ndarray::Array2::from_elem((64, 64), 10_u8);
 /// let mut press = pipeline.press(empty.view())?;
 /// press.add_frame(empty.view());
 /// let error = press.surface(0).unwrap_err();

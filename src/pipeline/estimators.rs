@@ -29,7 +29,11 @@ fn default_of(
             indenter_radius_m,
             thickness_m,
             ..
-        } => shared(layer(indenter_radius_m, thickness_m, nu)?),
+        } => {
+            let (bond, theory) = (Bond::Bonded, LayerTheory::IntegralEquation);
+            let layer = BondedLayer::new(indenter_radius_m, thickness_m, nu, bond, theory);
+            layer.and_then(shared)
+        }
         Object::Cone { half_angle_rad, .. } => shared(Cone::new(half_angle_rad, nu)?),
         Object::Block { .. } | Object::Cylinder { .. } | Object::Unknown { .. } => {
             shared(StressStrainRegression::default())
@@ -129,7 +133,11 @@ fn least_akaike(
     let build = match object {
         Object::Sphere { radius_m, .. } => match waveguide {
             Some(waveguide) => BestOf::sphere_as_sample(radius_m, nu, waveguide),
-            None => sphere_on_rigid_flat(radius_m, nu),
+            None => TataraSphere::new(radius_m, nu).and_then(|tatara| {
+                Ok(BestOf::new(tatara)
+                    .or(SphereBetweenPlates::new(radius_m, nu)?)
+                    .or(HertzSphere::new(radius_m, nu)?))
+            }),
         },
         Object::Layer {
             indenter_radius_m,
@@ -139,27 +147,6 @@ fn least_akaike(
         _ => return Err(wrong_object),
     };
     build.and_then(shared).map_err(PipelineError::Material)
-}
-
-fn sphere_on_rigid_flat(radius_m: f64, poisson_ratio: f64) -> Result<BestOf, ElasticityError> {
-    Ok(BestOf::new(TataraSphere::new(radius_m, poisson_ratio)?)
-        .or(SphereBetweenPlates::new(radius_m, poisson_ratio)?)
-        .or(HertzSphere::new(radius_m, poisson_ratio)?))
-}
-
-fn layer(
-    indenter_radius_m: f64,
-    thickness_m: f64,
-    poisson_ratio: f64,
-) -> Result<BondedLayer, ElasticityError> {
-    let theory = LayerTheory::IntegralEquation;
-    BondedLayer::new(
-        indenter_radius_m,
-        thickness_m,
-        poisson_ratio,
-        Bond::Bonded,
-        theory,
-    )
 }
 
 /// A ball on the layers of a waveguide. On a rigid flat where they are not known.

@@ -320,24 +320,7 @@ const GEL_STRESS_PA: [f64; 2] = [20.0, 2e6];
 impl ContactReading {
     /// The cautions about this reading, as one of frame number `frame` (from 0).
     pub fn flags(&self, frame: usize) -> impl Iterator<Item = Flag> {
-        let share = self.saturated_share;
-        let saturated = (share > 0.0).then_some(Flag::Saturated { frame, share });
-        let outside = self
-            .out_of_calibration
-            .then_some(Flag::OutOfCalibration { frame });
-        let edge = self.touches_edge.then_some(Flag::TouchesEdge { frame });
-        let others = self.other_contacts;
-        let several = (others > 0).then_some(Flag::SeveralContacts { frame, others });
-        let fit = (!self.converged).then_some(Flag::ProfileNotConverged { frame });
-        let shape = self
-            .profile_misfit
-            .map(|misfit| Flag::NotABall { frame, misfit });
-        let outline = self
-            .elongation
-            .map(|elongation| Flag::NotRound { frame, elongation });
-        let light = self
-            .calibration_bend
-            .map(|departure| Flag::LightNotProportional { frame, departure });
+        let (share, others) = (self.saturated_share, self.other_contacts);
         let numbers = [
             ("force", self.force_n),
             ("contact radius", Some(self.contact_radius_m)),
@@ -359,14 +342,25 @@ impl ContactReading {
         let stress = self.mean_stress_pa().map(|stress| stress.value);
         let [least, most] = GEL_STRESS_PA;
         let unlikely = stress.filter(|stress| !(least..=most).contains(&stress.abs()));
-        let stress = unlikely.map(|mean_stress_pa| Flag::UnlikelyStress {
-            frame,
-            mean_stress_pa,
-        });
-        let others = [
-            saturated, outside, edge, several, fit, shape, outline, light, stress,
+        let with = |holds: bool, flag: Flag| holds.then_some(flag);
+        let flags = [
+            with(share > 0.0, Flag::Saturated { frame, share }),
+            with(self.out_of_calibration, Flag::OutOfCalibration { frame }),
+            with(self.touches_edge, Flag::TouchesEdge { frame }),
+            with(others > 0, Flag::SeveralContacts { frame, others }),
+            with(!self.converged, Flag::ProfileNotConverged { frame }),
+            self.profile_misfit
+                .map(|misfit| Flag::NotABall { frame, misfit }),
+            self.elongation
+                .map(|elongation| Flag::NotRound { frame, elongation }),
+            self.calibration_bend
+                .map(|departure| Flag::LightNotProportional { frame, departure }),
+            unlikely.map(|mean_stress_pa| Flag::UnlikelyStress {
+                frame,
+                mean_stress_pa,
+            }),
         ];
-        others.into_iter().flatten().chain(unknown)
+        flags.into_iter().flatten().chain(unknown)
     }
 }
 

@@ -196,17 +196,9 @@ impl ContactStage for LightContact {
         {
             contact.region = Some(region);
             resize(&mut contact.mask, mask.dim());
-            match (contact.mask.as_slice_mut(), mask.as_slice()) {
-                // Slices, which do not overlap, turn into wide instructions.
-                (Some(to), Some(from)) => {
-                    to.iter_mut()
-                        .zip(from)
-                        .for_each(|(to, from)| *to = *from == 1);
-                }
-                _ => contact
-                    .mask
-                    .zip_mut_with(&mask, |to, from| *to = *from == 1),
-            }
+            contact
+                .mask
+                .zip_mut_with(&mask, |to, from| *to = *from == 1);
         }
         Ok(())
     }

@@ -77,7 +77,7 @@ impl Load {
 }
 
 /// The part of an error beside another one.
-fn beyond(whole: f64, part: f64) -> f64 {
+pub fn beyond(whole: f64, part: f64) -> f64 {
     (whole * whole - part * part).max(0.0).sqrt()
 }
 
@@ -97,7 +97,12 @@ pub fn series(
     let common = smallest(Load::calibration, settings.force_scale());
     let common_length = smallest(Load::common_length, settings.length_scale());
     let pixel_m = (pixel_size_m[0] * pixel_size_m[1]).sqrt();
-    let radius_m = mean_radius_m(loads.clone());
+    let counted = loads.clone().filter(|load| load.counts);
+    let radii: Vec<f64> = counted
+        .map(|load| load.contact.contact_radius_m.value)
+        .collect();
+    // NaN without a contact, which the guide's compliance refuses.
+    let radius_m = radii.iter().sum::<f64>() / radii.len() as f64;
     let other_body = settings.guide_error(radius_m);
     let errors = common_length * other_body;
     let shared = SharedErrors {
@@ -120,16 +125,6 @@ pub fn series(
     )
     .with_shared_errors(shared)
     .map_err(PipelineError::Modulus)
-}
-
-/// Mean radius of the contacts. NaN without one, which the guide's compliance refuses.
-fn mean_radius_m(loads: impl Iterator<Item = Load>) -> f64 {
-    let (mut sum, mut count) = (0.0, 0.0);
-    for load in loads.filter(|load| load.counts) {
-        sum += load.contact.contact_radius_m.value;
-        count += 1.0;
-    }
-    sum / count
 }
 
 /// Loads that a session keeps apart. More are merged.
@@ -229,10 +224,7 @@ fn merged((one, frames): (Load, f64), (other, more): (Load, f64)) -> (Load, f64)
         ..*s
     };
     let strains = one.mean_strain.zip(other.mean_strain);
-    let mean_strain = strains.map(|(s, o)| {
-        let standard_error = error(s.standard_error, o.standard_error);
-        Estimate::new(a * s.value + b * o.value, standard_error)
-    });
+    let mean_strain = strains.map(|(s, o)| mean(s, o));
     let load = Load {
         contact,
         force_n,

@@ -90,7 +90,7 @@ impl Press<'_> {
 
     /// The reference is not lit as that of the calibration was.
     fn light_changed(&self) -> Option<Flag> {
-        let light = self.light_change().filter(|light| light.seen)?;
+        let light = self.stages.light.filter(|light| light.seen)?;
         Some(Flag::LightChanged {
             change: light.gain.value - 1.0,
             uneven: light.uneven,
@@ -111,7 +111,7 @@ impl Press<'_> {
 
     /// A caution where a flat face is squeezed so far that the law of its material matters.
     fn material_law(&self) -> Option<Flag> {
-        let Specimen::Flat(_) = self.specimen() else {
+        let Specimen::Flat(_) = self.stages.specimen else {
             return None;
         };
         let series = self.loads(true).ok()?;
@@ -195,7 +195,7 @@ impl Press<'_> {
 
     fn match_result(&self, flags: &mut Vec<Flag>) -> Result<MatchResult, PipelineError> {
         let last = self.last()?;
-        if let Specimen::Flat(_) = self.specimen() {
+        if let Specimen::Flat(_) = self.stages.specimen {
             return self.texture_result(last, flags);
         }
         let model = self.control_points(0)?;
@@ -288,7 +288,7 @@ impl Press<'_> {
         }
         Ok(StrainResult {
             measure: strain.measure,
-            apparent: self.apparent() && !matches!(self.specimen(), Specimen::Flat(_)),
+            apparent: self.apparent() && !matches!(self.stages.specimen, Specimen::Flat(_)),
             mean: rows(&summary.mean),
             standard_error: rows(&summary.standard_error),
             spread: rows(&summary.spread),
@@ -312,7 +312,7 @@ impl Press<'_> {
             return Ok(None);
         }
         let estimator = self.pipeline().estimator()?;
-        let flat = matches!(self.specimen(), Specimen::Flat(_));
+        let flat = matches!(self.stages.specimen, Specimen::Flat(_));
         // A strain since the first frame gives no modulus of one load; that of a face is since the
         // unloaded state.
         if estimator.needs_strain() && !flat {

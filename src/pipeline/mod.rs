@@ -57,9 +57,9 @@ pub use crate::force::{FaceReading, ShapeProblem};
 pub use crate::sfs::{BallFit, Binning};
 pub use batch::contacts;
 pub use budget::{ErrorShare, ErrorSource};
-#[cfg(feature = "scene")]
-pub(crate) use check::PARABOLA_ERROR;
 pub use check::{CheckPress, CheckedGain, CheckedGuide, CheckedObject, KnownBall};
+#[cfg(feature = "scene")]
+pub(crate) use check::{PARABOLA_ERROR, slopes};
 pub use composition::Pipeline;
 pub use contact::{ContactReading, ContactStage, FrameContact};
 pub use dark::DarkContact;
@@ -79,8 +79,6 @@ pub use result::{
 pub use session::{DriftWatch, Session, SessionStrain, Update};
 pub use settings::{Settings, SurfaceInput};
 pub use source::FrameSource;
-#[cfg(feature = "scene")]
-pub use source::ImageFolder;
 pub use specimen::Object;
 pub use stages::PairStrain;
 pub use surface::ContactSurface;

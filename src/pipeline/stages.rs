@@ -4,6 +4,7 @@ use super::composition::Pipeline;
 use super::contact::{ContactReading, ContactStage, FrameContact};
 use super::error::PipelineError;
 use super::flag::Flag;
+use super::loads::beyond;
 use super::reference_light::LightChange;
 use super::report::{Report, SkipReason, Stage};
 use super::specimen::{Object, Specimen};
@@ -13,8 +14,8 @@ use crate::elasticity::modulus::{
     Estimate, LoadSeries, LoadState, ModulusEstimate, ModulusEstimator, Warning,
 };
 use crate::force::{
-    FaceReading, FaceWorkspace, ForceWorkspace, Polarity, ReferenceFrame, TextureStretch,
-    background_shift, median_shift_outside, texture_spots,
+    FaceReading, FaceWorkspace, ForceWorkspace, ReferenceFrame, TextureStretch, background_shift,
+    median_shift_outside, texture_spots,
 };
 use crate::matching::{MatchedPairs, Matching, WarmStart};
 use crate::tps::{Pairs, SeriesMemory, StrainSpline};
@@ -242,12 +243,9 @@ impl Stages {
     ) -> Vec<Flag> {
         let reference = self.reference.image();
         let Some(reading) = &contact.reading else {
-            let against = match self.contact.polarity() {
-                Polarity::Darker => 1.0,
-                _ => -1.0,
-            };
+            let sign = f64::from(self.contact.polarity().sign());
             let shift = background_shift(image, reference);
-            let caution = shift.map(|grey| match grey * against > 0.0 {
+            let caution = shift.map(|grey| match grey * sign < 0.0 {
                 true => Flag::OppositeSignal { frame, grey },
                 // The light that was corrected, or a contact too faint or small to be one.
                 false => Flag::LightDrifted { grey },
@@ -284,8 +282,7 @@ impl Stages {
             let apart = (gauge_n - measured_n).abs();
             // What the object couples is what a gauge shows: its error excuses no difference.
             let coupling = self.pipeline.settings().coupling() * measured_n;
-            let variance = force_n.standard_error.powi(2) - coupling.powi(2);
-            if apart > 3.0 * variance.max(0.0).sqrt() && apart > 0.02 * gauge_n {
+            if apart > 3.0 * beyond(force_n.standard_error, coupling) && apart > 0.02 * gauge_n {
                 flags.push(Flag::GaugeDisagrees {
                     frame,
                     measured_n,

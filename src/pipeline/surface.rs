@@ -2,10 +2,10 @@
 use super::composition::Pipeline;
 use super::contact::FrameContact;
 use super::settings::{Settings, SurfaceInput};
-use crate::force::{BoundingBox, LensGeometry, LocalCalibration, Polarity};
+use crate::force::{BoundingBox, LensGeometry, LocalCalibration};
 use crate::sfs::{self, BallFit, BinnedContact, Domain, Frame, SfsError, Surface};
 use nalgebra::Point3;
-use ndarray::{ArrayView2, Axis, Slice};
+use ndarray::ArrayView2;
 
 /// A reconstructed surface and its place in the frame.
 ///
@@ -199,14 +199,13 @@ fn trimmed(
 /// A contact's mask over a part of its region.
 fn mask_over(contact: &FrameContact, part: BoundingBox) -> ArrayView2<'_, bool> {
     let whole = contact.region.unwrap_or(part);
-    let mut mask = contact.mask.view();
-    for (axis, start, length) in [
-        (0, part.row_start - whole.row_start, part.rows()),
-        (1, part.column_start - whole.column_start, part.columns()),
-    ] {
-        mask.slice_axis_inplace(Axis(axis), Slice::from(start..start + length));
-    }
-    mask
+    let within = BoundingBox {
+        row_start: part.row_start - whole.row_start,
+        row_end: part.row_end - whole.row_start,
+        column_start: part.column_start - whole.column_start,
+        column_end: part.column_end - whole.column_start,
+    };
+    within.of(contact.mask.view())
 }
 
 /// Reconstructs the surface of a contact on a grid as fine as a contact of `pixels` pixels asks
@@ -232,11 +231,7 @@ pub fn reconstruct(
         (SurfaceInput::Shading, Some(_)) | (SurfaceInput::Signal, _) => 1.0,
     };
     let peak = curve.map(|curve| (curve, curve.value_pa(reading.peak_grey)));
-    let scale = if pipeline.contact().polarity() == Polarity::Darker {
-        -scale
-    } else {
-        scale
-    };
+    let scale = scale * f64::from(pipeline.contact().polarity().sign());
     let side = settings.binning.side(pixels, settings.control_points);
     let bounds = contact.bounds().unwrap_or(region);
     let region = trimmed(region, bounds, side, settings.smoothing_px / side);

@@ -1,4 +1,5 @@
 //! Whether the modulus changes over the time of a press.
+use super::loads::beyond;
 use super::result::{decimals_of, fixed, interval_text, with_error};
 use crate::elasticity::modulus::{
     Estimate, Interval, LoadSeries, LoadState, ModulusEstimator, SharedErrors,
@@ -112,15 +113,15 @@ pub fn of_moduli(
         let Some(time_s) = *time_s else {
             continue;
         };
-        let Some(alone) = SingleLoad::of(estimator, load, series.shared_errors()) else {
+        let Some((modulus_pa, law, scale)) = alone(estimator, load, series.shared_errors()) else {
             continue;
         };
-        law_error = law_error.max(alone.law_error);
-        scale_error = scale_error.max(alone.scale_error);
+        law_error = law_error.max(law);
+        scale_error = scale_error.max(scale);
         moduli.push(TimedModulus {
             time_s,
             force_n: load.force_n.value,
-            youngs_modulus_pa: alone.modulus_pa,
+            youngs_modulus_pa: modulus_pa,
         });
     }
     result(&moduli, scale_error, law_error)
@@ -157,45 +158,41 @@ fn result(moduli: &[TimedModulus], scale_error: f64, law_error: f64) -> Option<T
     })
 }
 
-/// What one load alone says, and where its error comes from.
-struct SingleLoad {
-    /// The modulus with the load's own error.
-    modulus_pa: Estimate,
-    /// Relative error of the law.
-    law_error: f64,
-    /// Relative error that is common to all loads, the law's among it.
-    scale_error: f64,
+/// Modulus in pascals and its relative standard error, where both are known.
+pub fn with_relative_error(
+    estimator: &dyn ModulusEstimator,
+    series: &LoadSeries,
+) -> Option<(f64, f64)> {
+    let estimate = estimator.estimate(series).ok()?;
+    let relative = estimate.standard_error_pa / estimate.youngs_modulus_pa;
+    let found = (estimate.youngs_modulus_pa, relative);
+    relative.is_finite().then_some(found)
 }
 
-impl SingleLoad {
-    fn of(
-        estimator: &dyn ModulusEstimator,
-        load: &LoadState,
-        shared: &SharedErrors,
-    ) -> Option<Self> {
-        let none = SharedErrors {
-            force_scale: NEGLIGIBLE,
-            ..SharedErrors::default()
-        };
-        let with = |load: LoadState, shared: &SharedErrors| {
-            let series = LoadSeries::new([load]).with_shared_errors(*shared).ok()?;
-            let estimate = estimator.estimate(&series).ok()?;
-            let relative = estimate.standard_error_pa / estimate.youngs_modulus_pa;
-            relative
-                .is_finite()
-                .then_some((estimate.youngs_modulus_pa, relative))
-        };
-        let (value, all) = with(*load, shared)?;
-        let (_, own_and_law) = with(*load, &none)?;
-        let (_, law_error) = with(quiet(load), &none)?;
-        let beyond = |whole: f64, part: f64| (whole * whole - part * part).max(0.0).sqrt();
-        let own = beyond(own_and_law, law_error);
-        Some(Self {
-            modulus_pa: Estimate::new(value, own * value),
-            law_error,
-            scale_error: beyond(all, own),
-        })
-    }
+/// What one load alone says: the modulus with the load's own error, the relative error of the law,
+/// and that which is common to all loads, the law's among it.
+fn alone(
+    estimator: &dyn ModulusEstimator,
+    load: &LoadState,
+    shared: &SharedErrors,
+) -> Option<(Estimate, f64, f64)> {
+    let none = SharedErrors {
+        force_scale: NEGLIGIBLE,
+        ..SharedErrors::default()
+    };
+    let with = |load: LoadState, shared: &SharedErrors| {
+        let series = LoadSeries::new([load]).with_shared_errors(*shared).ok()?;
+        with_relative_error(estimator, &series)
+    };
+    let (value, all) = with(*load, shared)?;
+    let (_, own_and_law) = with(*load, &none)?;
+    let (_, law_error) = with(quiet(load), &none)?;
+    let own = beyond(own_and_law, law_error);
+    Some((
+        Estimate::new(value, own * value),
+        law_error,
+        beyond(all, own),
+    ))
 }
 
 /// The load without errors of its own.

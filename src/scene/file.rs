@@ -6,7 +6,7 @@ use crate::elasticity::contact::{ContactTable, Layer, Waveguide};
 use crate::fem::{TableOptions, TableProgress};
 use crate::io::{
     FileError, beside, force, length, modulus, not_negative, number, one_or_more, parse_toml,
-    pixel_size, poisson_ratio, positive, read_bytes, read_toml, write_bytes,
+    pixel_size, poisson_ratio, positive, read_bytes, read_toml,
 };
 use crate::pipeline::{
     CheckPress, CheckedObject, EstimatorChoice, IntegratorChoice, KnownBall, MatcherChoice, Object,
@@ -792,15 +792,15 @@ impl StagesTable {
 /// ```
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// use tactile_imaging::elasticity::contact::{ContactCurve, ContactTable, Waveguide};
-/// use tactile_imaging::scene::{read_contact_table, write_contact_table};
+/// use tactile_imaging::scene::read_contact_table;
 ///
 /// let contact_radius_m: Vec<f64> = (1..=10).map(|k| 0.1e-3 * f64::from(k)).collect();
 /// let force_n = contact_radius_m.iter().map(|a| 4.0 / 3.0 * 80e3 * a.powi(3) / 3e-3).collect();
 /// let curve = ContactCurve { youngs_modulus_pa: 60e3, contact_radius_m, force_n };
 /// let table = ContactTable::new(3e-3, 0.5, &Waveguide::rigid(), vec![curve])?;
-/// let path = tempfile::tempdir()?.path().join("table.toml");
-/// # std::fs::create_dir_all(path.parent().unwrap())?;
-/// write_contact_table(&path, &table)?;
+/// let folder = tempfile::tempdir()?;
+/// let path = folder.path().join("table.toml");
+/// std::fs::write(&path, toml::to_string(&table)?)?;
 /// assert_eq!(read_contact_table(&path)?, table);
 /// std::fs::write(&path, "version = 7")?;
 /// assert!(read_contact_table(&path).is_err());
@@ -810,33 +810,11 @@ impl StagesTable {
 /// # Errors
 /// [`FileError`], also for contacts that make no table, or a table of another version.
 pub fn read_contact_table(path: impl AsRef<Path>) -> Result<ContactTable, FileError> {
-    contact_table_of(path.as_ref())
-}
-
-/// Not generic, so that the parser is compiled once, not again in every crate that reads.
-fn contact_table_of(path: &Path) -> Result<ContactTable, FileError> {
-    read_toml(path)
-}
-
-/// Writes a contact table as TOML. Numbers keep all their digits.
-///
-/// ```no_run
-/// # use tactile_imaging::elasticity::contact::ContactTable;
-/// # fn keep(table: &ContactTable) -> Result<(), tactile_imaging::io::FileError> {
-/// use tactile_imaging::scene::write_contact_table;
-/// write_contact_table("table.toml", table)
-/// # }
-/// ```
-///
-/// # Errors
-/// [`FileError::Write`].
-pub fn write_contact_table(path: impl AsRef<Path>, table: &ContactTable) -> Result<(), FileError> {
-    let path = path.as_ref();
-    let text = toml::to_string(table).map_err(|error| FileError::Write {
-        path: path.into(),
-        source: std::io::Error::other(error),
-    })?;
-    write_bytes(path, text.as_bytes())
+    // Not generic, so that the parser is compiled once, not again in every crate that reads.
+    fn read(path: &Path) -> Result<ContactTable, FileError> {
+        read_toml(path)
+    }
+    read(path.as_ref())
 }
 
 /// Computes the contact table of the ball and the waveguide that a file describes.

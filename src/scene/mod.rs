@@ -115,9 +115,8 @@ pub use data::{LoadedCalibration, SceneData, doubt_of_depths, doubt_of_pairs};
 pub use file::solve_contact_table;
 pub use file::{
     CalibrationSource, Scene, SceneCheck, SceneFrame, SceneLayer, StatedErrors, read_contact_table,
-    write_contact_table,
 };
 
 #[cfg(feature = "inclusion")]
 pub(crate) use data::force_pairs;
-pub(crate) use file::{elastic_layers, refractive_index};
+pub(crate) use file::{elastic_layers, guide, refractive_index};

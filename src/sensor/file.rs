@@ -6,7 +6,7 @@ use crate::force::{
 };
 use crate::io::{FileError, finite, not_negative, read_toml, write_bytes};
 use crate::pipeline::{LightContact, Object, Pipeline, PipelineError, ReferenceLight};
-use crate::scene::{SceneLayer, elastic_layers};
+use crate::scene::{SceneLayer, guide};
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -165,10 +165,7 @@ impl Sensor {
     /// # Errors
     /// [`PipelineError::Material`].
     pub fn waveguide(&self) -> Result<Waveguide, PipelineError> {
-        if self.layers.is_empty() {
-            return Ok(Waveguide::rigid());
-        }
-        Waveguide::new(elastic_layers(&self.layers)).map_err(PipelineError::Material)
+        guide(&self.layers).map_err(PipelineError::Material)
     }
 
     /// The options that contacts are found with: changes of the lamps since the reference are

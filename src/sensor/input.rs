@@ -225,12 +225,13 @@ struct PressTable {
     image: PathBuf,
     #[serde(rename = "force_N", deserialize_with = "not_negative")]
     force_n: f64,
-    branch: BranchName,
+    #[serde(deserialize_with = "BranchName::deserialize")]
+    branch: Branch,
     indenter: IndenterTable,
 }
 
 #[derive(Deserialize)]
-#[serde(rename_all = "lowercase")]
+#[serde(remote = "Branch", rename_all = "lowercase")]
 enum BranchName {
     Loading,
     Unloading,
@@ -295,10 +296,7 @@ impl CalibrationFile {
             presses.push(SensorPress {
                 frame,
                 force_n: table.force_n,
-                branch: match table.branch {
-                    BranchName::Loading => Branch::Loading,
-                    BranchName::Unloading => Branch::Unloading,
-                },
+                branch: table.branch,
                 indenter: table.indenter.indenter(),
             });
         }

@@ -10,7 +10,7 @@ use crate::elasticity::contact::{
     Layer, PARAMETERS_PER_LAYER, guide_log_stiffness, stepped_layers,
 };
 use crate::force::Estimate;
-use crate::pipeline::PARABOLA_ERROR;
+use crate::pipeline::{PARABOLA_ERROR, slopes};
 use crate::scene::{SceneLayer, elastic_layers};
 use nalgebra::{DMatrix, DVector};
 
@@ -196,11 +196,9 @@ struct Stiffness {
 
 impl Stiffness {
     fn new(layers: &[Layer], contacts: &[BallContact]) -> Option<Self> {
-        let logs = || contacts.iter().map(|c| c.radius_m.ln());
-        let (low, high) = (
-            logs().fold(f64::INFINITY, f64::min),
-            logs().fold(f64::NEG_INFINITY, f64::max),
-        );
+        let logs: DVector<f64> =
+            DVector::from_iterator(contacts.len(), contacts.iter().map(|c| c.radius_m.ln()));
+        let (low, high) = (logs.min(), logs.max());
         // A single radius has a span of its own, so that no nodes coincide.
         let half = (0.5 * (high - low)).max(0.05);
         // Chebyshev's nodes keep the interpolation from swinging at the ends.
@@ -304,7 +302,9 @@ impl<'a> Problem<'a> {
         // The law is nearly linear in the logarithms. A step of a tenth leaves some 10⁻³ of itself.
         for _ in 0..4 {
             let here = self.predicted(layers, &parameters)?;
-            let slopes = self.slopes(layers, &parameters, &here)?;
+            // Parameters that are stated as exact do not move.
+            let moves = |k: usize| self.prior[k] > EXACT;
+            let slopes = slopes(&here, &parameters, moves, |x| self.predicted(layers, x))?;
             // The priors keep the normal equations regular where the presses determine nothing.
             let mut normal = DMatrix::from_diagonal(&self.prior.map(|sd| (sd * sd).recip()));
             let mut right = -(&normal * &parameters);
@@ -328,37 +328,12 @@ impl<'a> Problem<'a> {
         })
     }
 
-    fn slopes(
-        &self,
-        layers: &[Layer],
-        parameters: &DVector<f64>,
-        here: &[f64],
-    ) -> Option<DMatrix<f64>> {
-        // Downwards, because ν is at most ½.
-        let step = -1e-3;
-        let mut slopes = DMatrix::zeros(here.len(), self.prior.len());
-        for k in 0..self.prior.len() {
-            // Parameters that are stated as exact do not move.
-            if self.prior[k] <= EXACT {
-                continue;
-            }
-            let mut beside = parameters.clone();
-            beside[k] += step;
-            let there = self.predicted(layers, &beside)?;
-            for (i, (there, here)) in there.iter().zip(here).enumerate() {
-                slopes[(i, k)] = (there - here) / step;
-            }
-        }
-        Some(slopes)
-    }
-
     /// Refuses a fit that needs a stated value far from what was stated, or that does not fit.
     fn plausible(&self, solution: &Solution) -> Result<(), SensorError> {
         let moved = solution.parameters.component_div(&self.prior);
         let freedom = self.contacts.len() as f64;
         let excess = (solution.chi_squared - freedom) / (2.0 * freedom).sqrt();
-        let prior_excess = moved.norm_squared().sqrt();
-        let deviation = prior_excess.max(moved.amax());
+        let deviation = moved.norm();
         // The stated errors of the presses are those of noise alone. Ten times their χ² is a wrong
         // law, not a wrong error.
         let misfit = solution.chi_squared > 10.0 * freedom && excess > LARGEST_DEVIATION;

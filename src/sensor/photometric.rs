@@ -131,16 +131,12 @@ impl PhotometricPresses {
     fn from_file(path: &Path) -> Result<Self, FileError> {
         let file: CalibrationFile = read_toml(path)?;
         let reference_path = beside(path, &file.reference);
-        let reference = read_colour_levels(&reference_path)
-            .map_err(|error| FileError::field(path, "reference", error))?;
+        let reference = frame(path, "reference", &file.reference, None)?;
         let mut names = Vec::new();
         let mut presses = Vec::new();
         for (k, press) in file.presses.into_iter().enumerate() {
             let field = format!("presses[{}].image", k + 1);
-            let frame = read_colour_levels(beside(path, &press.image));
-            let frame = frame.map_err(|error| FileError::field(path, &field, error))?;
-            check_size(&frame, &reference)
-                .map_err(|reason| FileError::field(path, &field, reason))?;
+            let frame = frame(path, &field, &press.image, Some(&reference))?;
             presses.push((frame, press.ball_radius_m, press.circle_px));
             names.push(press.image);
         }
@@ -223,10 +219,7 @@ impl GelTable {
         let mut weights = Vec::new();
         for (k, weight) in self.weights.into_iter().enumerate() {
             let field = format!("gel.weights[{}].image", k + 1);
-            let frame = read_colour_levels(beside(path, &weight.image));
-            let frame = frame.map_err(|error| FileError::field(path, &field, error))?;
-            check_size(&frame, reference)
-                .map_err(|reason| FileError::field(path, &field, reason))?;
+            let frame = frame(path, &field, &weight.image, Some(reference))?;
             weights.push((frame, Estimate::new(weight.force_n, weight.force_error_n)));
         }
         let modulus = match (self.youngs_modulus_pa, self.youngs_modulus_error_pa) {
@@ -354,14 +347,23 @@ impl GelForce {
     }
 }
 
-fn check_size(frame: &Array3<u8>, reference: &Array3<u8>) -> Result<(), String> {
-    if frame.dim() == reference.dim() {
-        return Ok(());
+/// The colour image that a field of `file` names, of the reference's size.
+fn frame(
+    file: &Path,
+    field: &str,
+    name: &Path,
+    reference: Option<&Array3<u8>>,
+) -> Result<Array3<u8>, FileError> {
+    let frame = read_colour_levels(beside(file, name));
+    let frame = frame.map_err(|error| FileError::field(file, field, error))?;
+    let [(rows, columns, _), (high, wide, _)] =
+        [&frame, reference.unwrap_or(&frame)].map(Array3::dim);
+    if (rows, columns) == (high, wide) {
+        return Ok(frame);
     }
-    let [(rows, columns, _), (high, wide, _)] = [frame.dim(), reference.dim()];
-    Err(format!(
-        "the image is {columns} × {rows} pixels, but the reference is {wide} × {high}"
-    ))
+    let reason =
+        format!("the image is {columns} × {rows} pixels, but the reference is {wide} × {high}");
+    Err(FileError::field(file, field, reason))
 }
 
 /// The file of a calibrated sensor of this kind.
@@ -428,8 +430,7 @@ impl PhotometricSensor {
         if let Some(gel) = &file.gel {
             gel.check(path)?;
         }
-        let reference = read_colour_levels(beside(path, &file.reference));
-        let reference = reference.map_err(|error| FileError::field(path, "reference", error))?;
+        let reference = frame(path, "reference", &file.reference, None)?;
         let stereo = PhotometricStereo::new(file.model, reference.view());
         let stereo = stereo.map_err(|error| FileError::field(path, "model", error))?;
         Ok((stereo, file.gel))

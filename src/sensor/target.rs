@@ -1,6 +1,7 @@
 //! The dots of a target: found in its frame, and given their places on the grid.
 use super::calibration::SensorError;
 use crate::force::DotPair;
+use crate::regions::{otsu, regions};
 use ndarray::ArrayView2;
 
 /// Finds the dots of a target, dark on bright or bright on dark, and pairs them with their places
@@ -31,77 +32,33 @@ pub fn find_dots(frame: ArrayView2<'_, u8>, pitch_m: f64) -> Result<Vec<DotPair>
     Ok(placed.iter().map(pair).collect())
 }
 
-/// Otsu's threshold: it parts the frame into two classes of the least variance.
-fn threshold(frame: ArrayView2<'_, u8>) -> f64 {
-    let mut histogram = [0.0; 256];
-    frame.iter().for_each(|v| histogram[usize::from(*v)] += 1.0);
-    let total: f64 = histogram.iter().sum();
-    let sum: f64 = histogram
-        .iter()
-        .enumerate()
-        .map(|(k, n)| k as f64 * n)
-        .sum();
-    let (mut below, mut sum_below, mut best) = (0.0, 0.0, (f64::NEG_INFINITY, 0.0, 0.0));
-    for (level, count) in histogram.iter().enumerate() {
-        below += count;
-        sum_below += level as f64 * count;
-        if below == 0.0 || below == total {
-            continue;
-        }
-        let [low, high] = [sum_below / below, (sum - sum_below) / (total - below)];
-        let between = below * (total - below) * (high - low).powi(2);
-        if between > best.0 {
-            best = (between, low, high);
-        }
-    }
-    0.5 * (best.1 + best.2)
-}
-
 /// Centres (x, y) of the connected regions of the rarer level.
 fn centres(frame: ArrayView2<'_, u8>) -> Vec<[f64; 2]> {
-    let cut = threshold(frame);
+    let mut histogram = [0.0; 256];
+    frame.iter().for_each(|v| histogram[usize::from(*v)] += 1.0);
+    let cut = otsu(&histogram, |level| level as f64).unwrap_or(0.0);
     let above = frame.iter().filter(|v| f64::from(**v) > cut).count();
     // Dots cover less than half of the frame, whether dark or bright.
     let sign = if 2 * above < frame.len() { 1.0 } else { -1.0 };
+    let weights: Vec<f64> = frame.iter().map(|v| sign * (f64::from(*v) - cut)).collect();
     let (rows, columns) = frame.dim();
-    let weight = |r: usize, c: usize| sign * (f64::from(frame[[r, c]]) - cut);
-    // A stack of its own instead of recursion: a region may be as large as the frame.
-    let mut seen = vec![false; rows * columns];
-    let (mut stack, mut found) = (Vec::new(), Vec::new());
-    for start in 0..rows * columns {
-        if seen[start] || weight(start / columns, start % columns) <= 0.0 {
-            continue;
-        }
-        let (mut sums, mut area, mut inside) = ([0.0; 3], 0.0, true);
-        seen[start] = true;
-        stack.push(start);
-        while let Some(at) = stack.pop() {
+    let mut open: Vec<bool> = weights.iter().map(|weight| *weight > 0.0).collect();
+    let centre = |region: Vec<usize>| {
+        let mut sums = [0.0; 3];
+        let mut inside = true;
+        for &at in &region {
             let (r, c) = (at / columns, at % columns);
-            let w = weight(r, c);
-            sums[0] += w;
-            sums[1] += w * c as f64;
-            sums[2] += w * r as f64;
-            area += 1.0;
+            let weight = weights[at];
+            sums[0] += weight;
+            sums[1] += weight * c as f64;
+            sums[2] += weight * r as f64;
             inside &= r > 0 && c > 0 && r + 1 < rows && c + 1 < columns;
-            let beside = [
-                (c > 0).then(|| at - 1),
-                (c + 1 < columns).then_some(at + 1),
-                (r > 0).then(|| at - columns),
-                (r + 1 < rows).then_some(at + columns),
-            ];
-            for next in beside.into_iter().flatten() {
-                if !seen[next] && weight(next / columns, next % columns) > 0.0 {
-                    seen[next] = true;
-                    stack.push(next);
-                }
-            }
         }
         // Smaller blobs are noise.
-        if inside && area >= 9.0 {
-            found.push([sums[1] / sums[0], sums[2] / sums[0]]);
-        }
-    }
-    found
+        let is_dot = inside && region.len() >= 9;
+        is_dot.then(|| [sums[1] / sums[0], sums[2] / sums[0]])
+    };
+    regions(&mut open, columns).filter_map(centre).collect()
 }
 
 /// Dots with their places on the grid, followed from the dot nearest to the frame's middle.

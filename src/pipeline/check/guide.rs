@@ -163,21 +163,19 @@ fn log_forces(checks: &[GuideCheck], layers: &[Layer]) -> Option<Vec<LogForce>> 
     forces.collect()
 }
 
-/// Derivatives of ln F of all presses by x, at x. Parameters without an error do not move.
-fn slopes(
-    checks: &[GuideCheck],
-    stated: &[Layer],
+/// Derivatives by x of values that are `here` at x. Parameters that do not move have none.
+pub(crate) fn slopes(
+    here: &[f64],
     x: &DVector<f64>,
-    prior: &DMatrix<f64>,
+    moves: impl Fn(usize) -> bool,
+    values: impl Fn(&DVector<f64>) -> Option<Vec<f64>>,
 ) -> Option<DMatrix<f64>> {
-    let here = log_forces(checks, &stepped_layers(stated, x))?;
-    let mut slopes = DMatrix::zeros(checks.len(), x.len());
-    for k in (0..x.len()).filter(|&k| prior[(k, k)] > 0.0) {
+    let mut slopes = DMatrix::zeros(here.len(), x.len());
+    for k in (0..x.len()).filter(|&k| moves(k)) {
         let mut beside = x.clone();
         beside[k] += STEP;
-        let there = log_forces(checks, &stepped_layers(stated, &beside))?;
-        for (i, (there, here)) in there.iter().zip(&here).enumerate() {
-            slopes[(i, k)] = (there.value - here.value) / STEP;
+        for (i, (there, here)) in values(&beside)?.iter().zip(here).enumerate() {
+            slopes[(i, k)] = (there - here) / STEP;
         }
     }
     Some(slopes)
@@ -246,11 +244,15 @@ pub fn update(
     let mut with_length = earlier.clone();
     let by_length = forces.iter().map(|force| force.slope);
     let by_length = DVector::from_iterator(checks.len(), by_length);
+    let predicted = |x: &DVector<f64>| -> Option<Vec<f64>> {
+        let forces = log_forces(checks, &stepped_layers(stated, x))?;
+        Some(forces.iter().map(|force| force.value).collect())
+    };
     for round in 0..MOST_ROUNDS {
-        let forces = log_forces(checks, &stepped_layers(stated, &x)).ok_or(unsolved)?;
-        let predicted = DVector::from_iterator(checks.len(), forces.iter().map(|f| f.value));
-        let gap = &log_known - predicted;
-        let slopes = slopes(checks, stated, &x, &prior).ok_or(unsolved)?;
+        let here = predicted(&x).ok_or(unsolved)?;
+        let moves = |k: usize| prior[(k, k)] > 0.0;
+        let slopes = slopes(&here, &x, moves, predicted).ok_or(unsolved)?;
+        let gap = &log_known - DVector::from_vec(here);
         let whole = &slopes * &prior * slopes.transpose() + &noise;
         if round == 0 {
             let deviations = gap.component_div(&whole.diagonal().map(f64::sqrt)).abs();

@@ -14,7 +14,7 @@ use ndarray::ArrayView2;
 pub use gain::CheckedGain;
 pub use guide::CheckedGuide;
 #[cfg(feature = "scene")]
-pub(crate) use guide::PARABOLA_ERROR;
+pub(crate) use guide::{PARABOLA_ERROR, slopes};
 
 /// A ball whose radius and modulus are known.
 ///

@@ -1,8 +1,6 @@
 //! Results: sentences for people, JSON for programs, and what may cross threads.
 use super::trial;
-use tactile_imaging::pipeline::{
-    BallFit, ImageFolder, PipelineError, Press, Report, Session, Update,
-};
+use tactile_imaging::pipeline::{BallFit, PipelineError, Press, Report, Session, Update};
 use tactile_imaging::sfs::Domain;
 
 #[test]
@@ -15,7 +13,6 @@ fn everything_can_cross_threads() {
     crosses::<Press<'_>>();
     crosses::<Update>();
     crosses::<Report>();
-    crosses::<ImageFolder>();
     crosses::<tactile_simulate::FrameStream>();
 }
 

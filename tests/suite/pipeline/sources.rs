@@ -1,8 +1,7 @@
-//! Frames from a batch, from a folder of images, and of another size.
+//! Frames from a batch, and of another size.
 use super::trial;
 use ndarray::Array2;
-use tactile_imaging::io::write_grey_image;
-use tactile_imaging::pipeline::{FrameSource, ImageFolder, PipelineError, contacts};
+use tactile_imaging::pipeline::{PipelineError, contacts};
 
 #[test]
 fn a_batch_reads_as_frames_one_by_one() {
@@ -17,27 +16,6 @@ fn a_batch_reads_as_frames_one_by_one() {
             press.contact(i).unwrap()
         );
     }
-}
-
-#[test]
-fn a_folder_of_images_streams_as_the_frames_it_was_written_from() {
-    let trial = trial(&[0.4, 0.9], 12);
-    let folder = tempfile::tempdir().unwrap();
-    for (i, frame) in trial.simulation.frames.iter().enumerate() {
-        write_grey_image(folder.path().join(format!("{i}.png")), frame.view()).unwrap();
-    }
-    std::fs::write(folder.path().join("notes.txt"), "no image").unwrap();
-    let mut source = ImageFolder::open(folder.path(), 80.0).unwrap();
-    let mut frame = Array2::zeros((0, 0));
-    for (i, written) in trial.simulation.frames.iter().enumerate() {
-        assert_eq!(
-            source.next_frame(&mut frame).unwrap(),
-            Some(i as f64 / 80.0)
-        );
-        assert_eq!(frame, written);
-    }
-    assert_eq!(source.next_frame(&mut frame).unwrap(), None);
-    assert!(ImageFolder::open(folder.path().join("none"), 80.0).is_err());
 }
 
 #[test]

@@ -1,0 +1,48 @@
+//! Two classes of pixels, and the connected regions of one of them.
+
+/// Otsu's threshold: it parts a histogram into two classes of the least variance, half way between
+/// their means. `None` for one class.
+pub fn otsu(histogram: &[f64], level: impl Fn(usize) -> f64) -> Option<f64> {
+    let total: f64 = histogram.iter().sum();
+    let products = histogram.iter().enumerate().map(|(k, n)| n * level(k));
+    let sum: f64 = products.sum();
+    let (mut below, mut sum_below, mut best) = (0.0, 0.0, None::<(f64, f64)>);
+    for (k, n) in histogram.iter().enumerate() {
+        below += n;
+        sum_below += n * level(k);
+        if below > 0.0 && below < total {
+            let [low, high] = [sum_below / below, (sum - sum_below) / (total - below)];
+            let between = below * (total - below) * (high - low).powi(2);
+            if best.is_none_or(|best| between > best.0) {
+                best = Some((between, 0.5 * (low + high)));
+            }
+        }
+    }
+    best.map(|(_, cut)| cut)
+}
+
+/// Regions of the pixels inside, row by row, that are connected by their sides: places of their
+/// pixels, the first in reading order first. What was given out is no longer inside. O(pixels).
+pub fn regions(inside: &mut [bool], columns: usize) -> impl Iterator<Item = Vec<usize>> {
+    let mut starts = 0..inside.len();
+    std::iter::from_fn(move || {
+        let start = starts.find(|&at| std::mem::take(&mut inside[at]))?;
+        let (mut region, mut next) = (vec![start], 0);
+        while let Some(&at) = region.get(next) {
+            next += 1;
+            let column = at % columns;
+            let beside = [
+                (column > 0).then(|| at - 1),
+                (column + 1 < columns).then_some(at + 1),
+                at.checked_sub(columns),
+                Some(at + columns),
+            ];
+            for at in beside.into_iter().flatten() {
+                if inside.get_mut(at).is_some_and(std::mem::take) {
+                    region.push(at);
+                }
+            }
+        }
+        Some(region)
+    })
+}
