@@ -6,7 +6,9 @@ use clap::{Args, ValueEnum};
 use ndarray::Array2;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
-use tactile_imaging::io::{Grey, InputQuantity, read_grey_image, read_grid};
+use tactile_imaging::io::{
+    Grey, InputQuantity, PointTable, read_grey_image, read_grid, read_point_table,
+};
 
 fn number(text: &str, fits: impl Fn(f64) -> bool, expected: &str) -> Result<f64, String> {
     let value = text.parse().ok();
@@ -170,7 +172,7 @@ impl SensorFrames {
 
     /// The frame without contact, in eight bits.
     pub fn read_reference(&self, grey: Grey) -> Result<Array2<u8>, Failure> {
-        eight_bits(&self.reference, grey, self.bits)
+        Ok(read_grey_image(&self.reference, grey, self.bits)?.to_u8())
     }
 
     /// How the pressed frames are read.
@@ -184,9 +186,23 @@ impl SensorFrames {
     }
 }
 
-/// An image in eight bits, of a camera with these bits where they are given.
-pub fn eight_bits(path: &Path, grey: Grey, bits: Option<u8>) -> Result<Array2<u8>, Failure> {
-    Ok(read_grey_image(path, grey, bits)?.to_u8())
+/// Tables of points, and whether their coordinates have a unit: those of all files or of none.
+pub fn read_points(paths: &[impl AsRef<Path>]) -> Result<(Vec<PointTable>, bool), Failure> {
+    let (mut tables, mut units) = (Vec::new(), Vec::new());
+    for path in paths {
+        let (table, unit) = read_point_table(path)?;
+        tables.push(table);
+        units.push(unit);
+        if unit != units[0] {
+            return Err(Failure::input(format!(
+                "only one of {} and {} names the unit of its coordinates: name it in both headers \
+                 or in none",
+                paths[0].as_ref().display(),
+                path.as_ref().display()
+            )));
+        }
+    }
+    Ok((tables, units.contains(&true)))
 }
 
 /// Rows and columns of a file.
@@ -251,7 +267,3 @@ impl HeightRegion {
         Ok(Some(mask))
     }
 }
-
-#[cfg(test)]
-#[path = "arguments_tests.rs"]
-mod tests;

@@ -124,7 +124,7 @@ pub struct Context {
     pub interrupt: Interrupt,
     pub outputs: Outputs,
     /// The subcommand, for the JSON object.
-    command: &'static str,
+    command: String,
     /// All cautions of the answer, as its JSON object has them.
     cautions: Vec<Value>,
     reader_left: bool,
@@ -145,7 +145,7 @@ struct Envelope<'a, T> {
 }
 
 impl Context {
-    pub fn new(command: &'static str, json: bool, outputs: Outputs) -> Self {
+    pub fn new(command: String, json: bool, outputs: Outputs) -> Self {
         Self {
             command,
             cautions: Vec::new(),
@@ -259,7 +259,7 @@ impl Context {
         let mut output = BufWriter::new(stdout().lock());
         let value = Envelope {
             schema: SCHEMA,
-            command: self.command,
+            command: &self.command,
             answer,
             cautions: &self.cautions,
         };

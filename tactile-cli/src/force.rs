@@ -59,19 +59,10 @@ pub fn run(arguments: &ForceArguments, context: &mut Context) -> Result<Exit, Fa
     line.print(context);
     let mut exit = Exit::Complete;
     let mut values = Vec::new();
-    let mut csv = Csv::new(&[
-        "frame",
-        "force_N",
-        "se_force_N",
-        "radius_m",
-        "se_radius_m",
-        "x_m",
-        "se_x_m",
-        "y_m",
-        "se_y_m",
-        "mean_stress_Pa",
-        "se_mean_stress_Pa",
-    ]);
+    let mut csv = Csv::new(
+        "frame,force_N,se_force_N,radius_m,se_radius_m,x_m,se_x_m,y_m,se_y_m,mean_stress_Pa,\
+         se_mean_stress_Pa",
+    );
     let mut bar = Bar::of(frames.frames.len(), "measuring");
     context.interrupt.polled(true);
     for (k, frame) in reading.frames::<Array2<u8>>(&frames.frames).enumerate() {

@@ -1,9 +1,8 @@
 //! The frames of images, stacks, videos and pipes, as several subcommands measure them.
 use crate::arguments::same_shape;
 use crate::console::{Context, Exit, Failure};
-use ndarray::{Array2, Array3};
+use ndarray::{Array2, Array3, ArrayView3, Axis};
 use std::ffi::OsString;
-use std::marker::PhantomData;
 use std::path::{Path, PathBuf};
 use tactile_imaging::io::{FileError, FrameReader, Grey};
 use tactile_imaging::pipeline::FrameSource;
@@ -18,6 +17,9 @@ pub trait Pixels: Default {
 
     /// Rows and columns.
     fn size(&self) -> (usize, usize);
+
+    /// `[row, column, channel]`.
+    fn channels(&self) -> ArrayView3<'_, u8>;
 }
 
 impl Pixels for Array2<u8> {
@@ -28,6 +30,10 @@ impl Pixels for Array2<u8> {
     fn size(&self) -> (usize, usize) {
         self.dim()
     }
+
+    fn channels(&self) -> ArrayView3<'_, u8> {
+        self.view().insert_axis(Axis(2))
+    }
 }
 
 impl Pixels for Array3<u8> {
@@ -37,6 +43,10 @@ impl Pixels for Array3<u8> {
 
     fn size(&self) -> (usize, usize) {
         (self.dim().0, self.dim().1)
+    }
+
+    fn channels(&self) -> ArrayView3<'_, u8> {
+        self.view()
     }
 }
 
@@ -72,14 +82,35 @@ impl Reading<'_> {
         Ok(())
     }
 
-    /// The frames of these files, each with its name.
-    pub fn frames<'a, P: Pixels>(&'a self, paths: &'a [PathBuf]) -> Frames<'a, P> {
-        Frames {
-            reading: self,
-            paths: paths.iter(),
-            open: None,
-            pixels: PhantomData,
-        }
+    /// The frames of these files one after the other, each with its name. The failure of a stream
+    /// that breaks off after its first frame is a partial answer, that of any other file an input
+    /// that cannot be used.
+    pub fn frames<P: Pixels>(
+        &self,
+        paths: &[PathBuf],
+    ) -> impl Iterator<Item = Result<NamedFrame<P>, Failure>> {
+        paths.iter().flat_map(move |path| {
+            let (mut source, mut number) = (Some(self.open(path)), 0);
+            std::iter::from_fn(move || {
+                let mut frame = P::default();
+                let read = source.take()?.and_then(|mut reader| {
+                    if frame.read_next(&mut reader)?.is_none() {
+                        return Ok(None);
+                    }
+                    self.fits(path, &frame)?;
+                    Ok(Some(reader))
+                });
+                match read {
+                    Ok(reader) => {
+                        source = Some(Ok(reader?));
+                        number += 1;
+                        Some(Ok(NamedFrame::new(path, number, frame)))
+                    }
+                    Err(failure) if number > 0 => Some(Err(Failure::no_answer(failure))),
+                    Err(failure) => Some(Err(failure)),
+                }
+            })
+        })
     }
 
     /// All frames of these files. A stream that breaks off leaves those before, and makes the
@@ -139,54 +170,5 @@ impl<P> NamedFrame<P> {
         let mut name = self.stem.clone();
         name.push(suffix);
         name
-    }
-}
-
-/// Frames one after the other. The failure of a stream that breaks off after its first frame is a
-/// partial answer, that of any other file an input that cannot be used.
-pub struct Frames<'a, P> {
-    reading: &'a Reading<'a>,
-    paths: std::slice::Iter<'a, PathBuf>,
-    /// The file that is read, and the number of its frames so far.
-    open: Option<(&'a Path, FrameReader, usize)>,
-    pixels: PhantomData<P>,
-}
-
-impl<P: Pixels> Iterator for Frames<'_, P> {
-    type Item = Result<NamedFrame<P>, Failure>;
-
-    fn next(&mut self) -> Option<Self::Item> {
-        loop {
-            let Some((path, reader, frames)) = &mut self.open else {
-                let path = self.paths.next()?;
-                match self.reading.open(path) {
-                    Ok(reader) => self.open = Some((path, reader, 0)),
-                    Err(failure) => return Some(Err(failure)),
-                }
-                continue;
-            };
-            let mut frame = P::default();
-            let next = frame.read_next(reader).map_err(Failure::from);
-            let next = next.and_then(|time_s| {
-                let fits = time_s.map(|_| self.reading.fits(path, &frame));
-                fits.transpose()
-            });
-            let failed = |failure: Failure| match *frames {
-                0 => failure,
-                _ => Failure::no_answer(failure),
-            };
-            match next {
-                Ok(Some(())) => {
-                    *frames += 1;
-                    return Some(Ok(NamedFrame::new(path, *frames, frame)));
-                }
-                Ok(None) => self.open = None,
-                Err(failure) => {
-                    let failure = failed(failure);
-                    self.open = None;
-                    return Some(Err(failure));
-                }
-            }
-        }
     }
 }

@@ -232,7 +232,7 @@ pub fn run(arguments: &InclusionArguments, context: &mut Context) -> Result<Exit
     }
     let file = arguments.scene.as_deref();
     let names = ["profiles.csv", "inclusion.svg"];
-    context.outputs.plan(&names, file.as_slice())?;
+    context.outputs.plan(&names, arguments.scene.as_slice())?;
     let scene = file.map(InclusionScene::read).transpose();
     let scene = scene.map_err(Failure::input)?;
     if arguments.design {
@@ -488,14 +488,7 @@ fn print_lump(inclusion: &Inclusion, context: &mut Context) {
 }
 
 fn table(estimate: &InclusionEstimate, scan: &Scan) -> Vec<u8> {
-    let mut csv = Csv::new(&[
-        "frame",
-        "radius_m",
-        "pressure_pa",
-        "standard_error_pa",
-        "fitted_pa",
-        "plain_block_pa",
-    ]);
+    let mut csv = Csv::new("frame,radius_m,pressure_pa,standard_error_pa,fitted_pa,plain_block_pa");
     for (frame, profile) in scan.profiles.iter().enumerate() {
         for (k, radius) in estimate.radii_m.iter().enumerate() {
             csv.row([

@@ -310,7 +310,7 @@ pub fn run(arguments: &IndentArguments, context: &mut Context) -> Result<Exit, F
     print(&found, points, context);
     doubts(&curve, chosen, arguments.contact.is_some(), context);
     context.value(&value(&found));
-    let mut csv = Csv::new(&["position_m", "force_N", "fitted_N"]);
+    let mut csv = Csv::new("position_m,force_N,fitted_N");
     for (i, fitted) in chosen.fitted_n.iter().enumerate() {
         csv.row([curve.position_m()[i], curve.force_n()[i], *fitted]);
     }

@@ -36,7 +36,7 @@ mod warp;
 pub use plot::{PlotError, save_press_pages};
 
 use clap::error::ErrorKind;
-use clap::{CommandFactory, Parser, Subcommand};
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use console::{Context, Exit, Failure, printable};
 use outputs::Outputs;
 use report::Report;
@@ -122,28 +122,6 @@ enum Command {
 }
 
 impl Command {
-    /// The name on the command line.
-    fn name(&self) -> &'static str {
-        match self {
-            Self::Measure(_) => "measure",
-            Self::Force(_) => "force",
-            Self::Calibrate(_) => "calibrate",
-            Self::Match(_) => "match",
-            Self::Warp(_) => "warp",
-            Self::Strain(_) => "strain",
-            Self::Reconstruct(_) => "reconstruct",
-            Self::Integrate(_) => "integrate",
-            Self::Depth(_) => "depth",
-            Self::Inclusion(_) => "inclusion",
-            Self::Indent(_) => "indent",
-            Self::Stream(_) => "stream",
-            Self::Light(_) => "light",
-            Self::Markers(_) => "markers",
-            Self::Table(_) => "table",
-            Self::Paper(_) => "paper",
-        }
-    }
-
     fn run(&self, context: &mut Context) -> Result<Exit, Failure> {
         match self {
             Self::Measure(arguments) => measure::run(arguments, context),
@@ -192,27 +170,28 @@ pub fn run() -> ExitCode {
 /// ```
 pub fn run_with(arguments: impl IntoIterator<Item: Into<OsString> + Clone>) -> u8 {
     let arguments: Vec<OsString> = arguments.into_iter().map(Into::into).collect();
-    let program = match Program::try_parse_from(&arguments) {
-        Ok(program) => program,
+    let mut command = Program::command();
+    let matches = command.try_get_matches_from_mut(&arguments);
+    let parsed = matches.and_then(|found| {
+        let name = found.subcommand_name().unwrap_or_default().to_owned();
+        Ok((name, Program::from_arg_matches(&found)?))
+    });
+    let (name, program) = match parsed {
+        Ok(parsed) => parsed,
         Err(error) => return explain(&error).code(),
     };
     let mut outputs = Outputs::new(program.out, program.memory_gb);
-    outputs.report = program
-        .report
-        .map(|path| Report::new(path, &arguments, question(&arguments)));
-    let name = program.command.name();
+    outputs.report = program.report.map(|path| {
+        // What the subcommand is for, the first sentence of its help.
+        let about = command
+            .find_subcommand(&name)
+            .and_then(clap::Command::get_about);
+        let question = about.map_or(String::new(), ToString::to_string);
+        Report::new(path, &arguments, question)
+    });
     let mut context = Context::new(name, program.json, outputs);
     let ended = program.command.run(&mut context);
     context.close(ended).code()
-}
-
-/// What the subcommand of a call is for, the first sentence of its help.
-fn question(arguments: &[OsString]) -> String {
-    let program = Program::command();
-    let mut words = arguments.iter().skip(1);
-    let command = words.find_map(|word| program.find_subcommand(word));
-    let about = command.and_then(clap::Command::get_about);
-    about.map_or(String::new(), ToString::to_string)
 }
 
 /// Prints the help where it was asked for, else the error in the arguments as one sentence.

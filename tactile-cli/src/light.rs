@@ -28,7 +28,7 @@ const CENTRE_M: [f64; 2] = [15e-3, 0.0];
 const HALF_WIDTH_M: f64 = 5e-3;
 
 pub fn run(arguments: &LightArguments, context: &mut Context) -> Result<Exit, Failure> {
-    context.outputs.plan(&["light.svg"], &[])?;
+    context.outputs.plan(&["light.svg"], &[""; 0])?;
     let page = traced(arguments, context).map_err(Failure::no_answer)?;
     if let Some(page) = page {
         context.outputs.page("light.svg", || page)?;

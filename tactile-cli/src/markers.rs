@@ -52,8 +52,8 @@ pub fn run(arguments: &MarkersArguments, context: &mut Context) -> Result<Exit, 
         .iter()
         .map(|frame| beside(frame, "_markers.csv"))
         .collect();
-    let inputs = frames.iter().chain([reference]).map(PathBuf::as_path);
-    context.outputs.plan(&names, &inputs.collect::<Vec<_>>())?;
+    let inputs: Vec<_> = frames.iter().chain([reference]).collect();
+    context.outputs.plan(&names, &inputs)?;
     if let Some((rows, columns)) = image_size(reference) {
         // Grey levels as numbers, the light around them, and the passes that find the dots.
         let bytes = 80.0 * rows as f64 * columns as f64;
@@ -93,16 +93,7 @@ fn grey(path: &Path) -> Result<Array2<f64>, Failure> {
 }
 
 fn table(field: &MarkerField) -> Vec<u8> {
-    let mut csv = Csv::new(&[
-        "x_px",
-        "y_px",
-        "dx_px",
-        "dy_px",
-        "x_error_px",
-        "y_error_px",
-        "dx_error_px",
-        "dy_error_px",
-    ]);
+    let mut csv = Csv::new("x_px,y_px,dx_px,dy_px,x_error_px,y_error_px,dx_error_px,dy_error_px");
     for track in &field.tracks {
         let (p, u, [own, moved]) = (
             track.position_px,

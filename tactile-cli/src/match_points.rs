@@ -6,7 +6,7 @@ use nalgebra::Point;
 use serde_json::{Value, json};
 use std::ffi::OsString;
 use std::io::Write as _;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use tactile_imaging::PairsDoubt;
 use tactile_imaging::io::{CasePoints, read_cases, write_case_result};
 use tactile_imaging::matching::{
@@ -135,10 +135,9 @@ pub fn run(arguments: &MatchArguments, context: &mut Context) -> Result<Exit, Fa
              or them",
         ));
     }
-    let inputs: Vec<&Path> = arguments.cases.iter().map(PathBuf::as_path).collect();
-    let name = |path: &&Path| path.file_name().unwrap_or_default().to_owned();
-    let names: Vec<OsString> = inputs.iter().map(name).collect();
-    context.outputs.plan(&names, &inputs)?;
+    let name = |path: &PathBuf| path.file_name().unwrap_or_default().to_owned();
+    let names: Vec<OsString> = arguments.cases.iter().map(name).collect();
+    context.outputs.plan(&names, &arguments.cases)?;
     // All files are read before the first case is matched, so that a mistake in the last costs no
     // time.
     let mut files = Vec::new();

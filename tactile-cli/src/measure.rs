@@ -345,10 +345,8 @@ pub fn run(arguments: &MeasureArguments, context: &mut Context) -> Result<Exit, 
         "strain",
         "summary",
     ];
-    let inputs: Vec<_> = arguments.scene.iter().map(PathBuf::as_path).collect();
-    context
-        .outputs
-        .plan(&stages.map(|name| format!("{name}.svg")), &inputs)?;
+    let names = stages.map(|name| format!("{name}.svg"));
+    context.outputs.plan(&names, arguments.scene.as_slice())?;
     // It lives as long as the program, so that Ctrl-C can leave work on it undone.
     let frames: &'static Frames = Box::leak(Box::new(Frames::open(arguments, context)?));
     let pipeline = frames.pipeline(arguments.points as usize)?;

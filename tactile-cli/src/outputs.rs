@@ -43,7 +43,11 @@ impl Outputs {
     /// Announces the names of the files to be written and the inputs. No result may replace an
     /// input, also none that a scene or calibration file names, no two may have one name, the
     /// folder must allow writing, and every input must fit into the memory that is allowed.
-    pub fn plan<N: AsRef<OsStr>>(&mut self, names: &[N], inputs: &[&Path]) -> Result<(), Failure> {
+    pub fn plan(
+        &mut self,
+        names: &[impl AsRef<OsStr>],
+        inputs: &[impl AsRef<Path>],
+    ) -> Result<(), Failure> {
         let Some(folder) = self.folder.clone() else {
             let named = self.allow_inputs(inputs)?;
             return self.plan_report(inputs, &named);
@@ -78,9 +82,9 @@ impl Outputs {
 
     /// Refuses inputs that take more memory than is allowed, before they are decoded. Returns the
     /// files that scenes and calibrations among them name.
-    fn allow_inputs(&self, inputs: &[&Path]) -> Result<Vec<PathBuf>, Failure> {
-        let named: Vec<PathBuf> = inputs.iter().flat_map(|path| named_in(path, 0)).collect();
-        let all = inputs.iter().copied();
+    fn allow_inputs(&self, inputs: &[impl AsRef<Path>]) -> Result<Vec<PathBuf>, Failure> {
+        let all = inputs.iter().map(AsRef::<Path>::as_ref);
+        let named: Vec<PathBuf> = all.clone().flat_map(|path| named_in(path, 0)).collect();
         for path in all.chain(named.iter().map(PathBuf::as_path)) {
             let name = path.display();
             if let Some((rows, columns)) = image_size(path) {
@@ -107,11 +111,15 @@ impl Outputs {
     }
 
     /// Announces the page to be written. It replaces no input.
-    fn plan_report(&mut self, inputs: &[&Path], named: &[PathBuf]) -> Result<(), Failure> {
+    fn plan_report(
+        &mut self,
+        inputs: &[impl AsRef<Path>],
+        named: &[PathBuf],
+    ) -> Result<(), Failure> {
         let Some(report) = &mut self.report else {
             return Ok(());
         };
-        let inputs = inputs.iter().map(|input| input.to_path_buf());
+        let inputs = inputs.iter().map(|input| input.as_ref().to_path_buf());
         let inputs: Vec<PathBuf> = inputs.chain(named.iter().cloned()).collect();
         report.inputs(inputs.clone());
         self.planned.push(report.path.clone());
@@ -127,11 +135,11 @@ impl Outputs {
     }
 
     /// As [`plan`](Self::plan), where `--out` names a file in this folder.
-    pub fn plan_in<N: AsRef<OsStr>>(
+    pub fn plan_in(
         &mut self,
         folder: &Path,
-        names: &[N],
-        inputs: &[&Path],
+        names: &[impl AsRef<OsStr>],
+        inputs: &[impl AsRef<Path>],
     ) -> Result<(), Failure> {
         let named = self.allow_inputs(inputs)?;
         self.plan_report(inputs, &named)?;
@@ -316,9 +324,8 @@ pub struct Csv {
 }
 
 impl Csv {
-    pub fn new<H: AsRef<str>>(header: &[H]) -> Self {
-        let names: Vec<&str> = header.iter().map(AsRef::as_ref).collect();
-        let text = names.join(",") + "\n";
+    pub fn new(header: &str) -> Self {
+        let text = format!("{header}\n");
         Self { text }
     }
 

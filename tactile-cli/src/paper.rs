@@ -4,6 +4,7 @@ use crate::plot::{Colour, Page, Panel};
 use clap::Args;
 use nalgebra::Point3;
 use serde_json::{Map, Value, json};
+use std::error::Error;
 use std::time::Instant;
 use tactile_imaging::Pipeline;
 use tactile_imaging::force::{CalibrationOptions, CalibrationPair, LinearCalibration};
@@ -44,26 +45,49 @@ pub struct PaperArguments {
     seed: u64,
 }
 
-/// One experiment: its rows of text, its panel, and its numbers.
+/// One experiment: its rows of text, its panels, and its numbers.
 struct Experiment {
     title: &'static str,
     key: &'static str,
     /// What, the paper's figure, and the figure here.
     rows: Vec<[String; 3]>,
     panels: Vec<Panel>,
-    value: Value,
+    values: Map<String, Value>,
 }
 
+impl Experiment {
+    fn new(title: &'static str, key: &'static str) -> Self {
+        Self {
+            title,
+            key,
+            rows: Vec::new(),
+            panels: Vec::new(),
+            values: Map::new(),
+        }
+    }
+
+    fn row(&mut self, what: impl Into<String>, paper: &str, here: impl Into<String>) {
+        self.rows.push([what.into(), paper.into(), here.into()]);
+    }
+
+    fn value(&mut self, key: &str, value: impl Into<Value>) {
+        self.values.insert(key.to_owned(), value.into());
+    }
+}
+
+type Found<T> = Result<T, Box<dyn Error>>;
+
 pub fn run(arguments: &PaperArguments, context: &mut Context) -> Result<Exit, Failure> {
-    context.outputs.plan(&["paper.svg"], &[])?;
+    context.outputs.plan(&["paper.svg"], &[""; 0])?;
     let mut bar = Bar::of(6, "repeating the paper's experiments");
     let polymers = [("CL2000X", Elastic::CL2000X), ("CL2003X", Elastic::CL2003X)];
     let mut trials = Vec::new();
     for (name, material) in polymers {
-        trials.push((name, trial(material, arguments.seed)?));
+        let trial = trial(material, arguments.seed).map_err(Failure::no_answer)?;
+        trials.push((name, trial));
     }
     let first = &trials[0].1;
-    let parts: [&dyn Fn() -> Result<Experiment, Failure>; 6] = [
+    let parts: [&dyn Fn() -> Found<Experiment>; 6] = [
         &|| flat_tip(arguments.seed),
         &|| centroid_line(first),
         &|| moduli(&trials, arguments.dense),
@@ -73,14 +97,14 @@ pub fn run(arguments: &PaperArguments, context: &mut Context) -> Result<Exit, Fa
     ];
     let (mut values, mut panels) = (Map::new(), Vec::new());
     for (done, part) in parts.iter().enumerate() {
-        let experiment = part()?;
+        let experiment = part().map_err(Failure::no_answer)?;
         bar.done(done + 1);
         context.line(format_args!("\n{}", experiment.title));
         context.line(format_args!("  {:54} {:>22}   {}", "", "paper", "here"));
         for [what, paper, here] in experiment.rows {
             context.line(format_args!("  {what:54} {paper:>22}   {here}"));
         }
-        values.insert(experiment.key.to_owned(), experiment.value);
+        values.insert(experiment.key.to_owned(), experiment.values.into());
         panels.extend(experiment.panels);
     }
     context.value(&values);
@@ -92,7 +116,7 @@ pub fn run(arguments: &PaperArguments, context: &mut Context) -> Result<Exit, Fa
 }
 
 /// A ball of 3 mm at 0.7 N and 1.2 N (§5), its contacts by finite elements.
-fn trial(material: Elastic, seed: u64) -> Result<Trial, Failure> {
+fn trial(material: Elastic, seed: u64) -> Found<Trial> {
     let object = ElasticSphere {
         radius_m: 3e-3,
         material,
@@ -104,11 +128,11 @@ fn trial(material: Elastic, seed: u64) -> Result<Trial, Failure> {
         seed,
         ..PressOptions::default()
     };
-    Trial::new(options, &CalibrationRun::default()).map_err(Failure::no_answer)
+    Ok(Trial::new(options, &CalibrationRun::default())?)
 }
 
 /// §5.1 and Fig. 9: a flat tip of 2 mm radius from 0 to 2 N and back in steps of 0.1 N.
-fn flat_tip(seed: u64) -> Result<Experiment, Failure> {
+fn flat_tip(seed: u64) -> Found<Experiment> {
     let (radius_m, steps) = (2e-3, 20_u32);
     let forces: Vec<f64> = (1..=steps).map(|k| 0.1 * f64::from(k)).collect();
     let options = PressOptions {
@@ -117,7 +141,7 @@ fn flat_tip(seed: u64) -> Result<Experiment, Failure> {
         seed,
         ..PressOptions::default()
     };
-    let scene = PressScene::new(options).map_err(Failure::no_answer)?;
+    let scene = PressScene::new(options)?;
     let reference = scene.reference(0);
     let sum = |frame: ndarray::Array2<u8>| -> f64 {
         let pixels = frame.iter().zip(&reference);
@@ -131,29 +155,26 @@ fn flat_tip(seed: u64) -> Result<Experiment, Failure> {
     let mut pairs = vec![CalibrationPair::loading(sum(scene.reference(1)), 0.0)];
     pairs.extend(up.chain(down));
     pairs.push(CalibrationPair::unloading(sum(scene.reference(2)), 0.0));
-    let line = LinearCalibration::fit(&pairs, &CalibrationOptions::default())
-        .map_err(Failure::no_answer)?;
+    let line = LinearCalibration::fit(&pairs, &CalibrationOptions::default())?;
     let report = line.report();
-    let hysteresis = report.hysteresis.as_ref();
-    let loop_percent = 100.0 * hysteresis.map_or(f64::NAN, |h| h.share_of_full_scale);
+    let loop_percent = loop_percent(&line);
     let departure_percent = 100.0 * report.linearity_error;
-    let rows = vec![
-        row(
-            "response",
-            "nearly linear",
-            format!("R² {:.6}", report.r_squared),
-        ),
-        row(
-            "largest departure from the line",
-            "not stated",
-            format!("{departure_percent:.2} % of 2 N"),
-        ),
-        row(
-            "loop between loading and unloading",
-            "none seen",
-            format!("{loop_percent:.2} % of 2 N"),
-        ),
-    ];
+    let mut found = Experiment::new(
+        "Calibration with a flat tip of 2 mm radius (§5.1, Fig. 9)",
+        "flat_tip",
+    );
+    found.row(
+        "response",
+        "nearly linear",
+        format!("R² {:.6}", report.r_squared),
+    );
+    let departure = format!("{departure_percent:.2} % of 2 N");
+    found.row("largest departure from the line", "not stated", departure);
+    let here = format!("{loop_percent:.2} % of 2 N");
+    found.row("loop between loading and unloading", "none seen", here);
+    found.value("r_squared", report.r_squared);
+    found.value("linearity_error_percent", departure_percent);
+    found.value("hysteresis_percent", loop_percent);
     let place = |p: &CalibrationPair| [p.force_n, 1e-6 * p.integrated_pixel_value];
     let (loading, unloading) = pairs.split_at(pairs.len() / 2);
     let ends = [0.0, 2.0].map(|f| [f, 1e-6 * line.integrated_pixel_value(f).unwrap_or(f64::NAN)]);
@@ -165,17 +186,14 @@ fn flat_tip(seed: u64) -> Result<Experiment, Failure> {
     .line(ends, Colour::Grey, "line")
     .points(loading.iter().map(place), Colour::Blue, "loading")
     .rings(unloading.iter().map(place), Colour::Orange, "unloading");
-    Ok(Experiment {
-        title: "Calibration with a flat tip of 2 mm radius (§5.1, Fig. 9)",
-        key: "flat_tip",
-        rows,
-        panels: vec![panel],
-        value: json!({
-            "r_squared": report.r_squared,
-            "linearity_error_percent": departure_percent,
-            "hysteresis_percent": loop_percent,
-        }),
-    })
+    found.panels.push(panel);
+    Ok(found)
+}
+
+/// The loop between loading and unloading in per cent of the full scale.
+fn loop_percent(line: &LinearCalibration) -> f64 {
+    let hysteresis = line.report().hysteresis.as_ref();
+    100.0 * hysteresis.map_or(f64::NAN, |h| h.share_of_full_scale)
 }
 
 /// A rigid flat punch on an elastic half-space (Boussinesq): p = F/(2πa √(a² − r²)).
@@ -202,12 +220,12 @@ fn punch(force_n: f64, radius_m: f64) -> ContactState {
 }
 
 /// Fig. 8: the grey levels along the row through the centroid, and three curves through them.
-fn centroid_line(trial: &Trial) -> Result<Experiment, Failure> {
+fn centroid_line(trial: &Trial) -> Found<Experiment> {
     let simulation = &trial.simulation;
-    let pipeline = trial.pipeline().map_err(Failure::no_answer)?;
-    let press = trial.press(&pipeline).map_err(Failure::no_answer)?;
-    let contact = press.contact(0).map_err(Failure::no_answer)?;
-    let contact = contact.ok_or_else(|| Failure::no_answer("the frame shows no contact"))?;
+    let pipeline = trial.pipeline()?;
+    let press = trial.press(&pipeline)?;
+    let contact = press.contact(0)?;
+    let contact = contact.ok_or("the frame shows no contact")?;
     let [x, y] = contact.centroid_px.map(|c| c.value);
     let (row_px, pixel_mm) = (y.round() as usize, 1e3 * simulation.pixel_size_m[0]);
     let line: Vec<[f64; 2]> = simulation.frames[0]
@@ -248,27 +266,20 @@ fn centroid_line(trial: &Trial) -> Result<Experiment, Failure> {
         "pixel less curve (grey levels)",
     );
     let mut residuals = Panel::new(title, axes.0, axes.1);
-    let (mut rows, mut values) = (Vec::new(), Map::new());
+    let title = "The line through the centroid at 0.7 N (Fig. 8)";
+    let mut found = Experiment::new(title, "centroid_line");
     for (name, key, colour, basis) in curves {
         let (scale_mm, fitted, rms) = fit_line(&line, basis);
         let paper = if key == "gaussian" { "drawn" } else { "" };
-        rows.push(row(
-            &format!("{name}: rms residual"),
-            paper,
-            format!("{rms:.2} grey levels"),
-        ));
-        values.insert(key.into(), json!({ "rms_grey": rms, "scale_mm": scale_mm }));
+        let here = format!("{rms:.2} grey levels");
+        found.row(format!("{name}: rms residual"), paper, here);
+        found.value(key, json!({ "rms_grey": rms, "scale_mm": scale_mm }));
         let left = line.iter().zip(&fitted).map(|(p, f)| [p[0], p[1] - f[1]]);
         residuals = residuals.line(left, colour, name);
         panel = panel.line(fitted, colour, name);
     }
-    Ok(Experiment {
-        title: "The line through the centroid at 0.7 N (Fig. 8)",
-        key: "centroid_line",
-        rows,
-        panels: vec![panel, residuals],
-        value: Value::Object(values),
-    })
+    found.panels = vec![panel, residuals];
+    Ok(found)
 }
 
 /// The functions of r/s whose sum is a profile.
@@ -307,8 +318,11 @@ fn fit_line(line: &[[f64; 2]], basis: Basis<'_>) -> (f64, Vec<[f64; 2]>, f64) {
 
 /// Figs 10 to 12: both polymers at 1392 × 1042 pixels with 200 control points, by the printed
 /// stages and by the default ones.
-fn moduli(trials: &[(&str, Trial)], dense: bool) -> Result<Experiment, Failure> {
-    let (mut rows, mut values) = (Vec::new(), Map::new());
+fn moduli(trials: &[(&str, Trial)], dense: bool) -> Found<Experiment> {
+    let mut found = Experiment::new(
+        "Young's modulus of both polymers, 200 control points (Figs 10 to 12)",
+        "moduli",
+    );
     let kpa = |pa: f64| 1e-3 * pa;
     let title = "Figs 10 to 12: Young's modulus of both polymers";
     let mut panel = Panel::new(title, "true modulus (kPa)", "measured modulus (kPa)").dashed(
@@ -320,58 +334,46 @@ fn moduli(trials: &[(&str, Trial)], dense: bool) -> Result<Experiment, Failure> 
     let (mut default_places, mut intervals) = (Vec::new(), Vec::new());
     for ((name, trial), paper) in trials.iter().zip(["4.23 % off", "5.38 % off"]) {
         let truth = trial.simulation.youngs_modulus_pa;
-        let pipeline = trial.pipeline().map_err(Failure::no_answer)?;
-        let measured = trial
-            .press(&pipeline)
-            .and_then(|press| press.modulus())
-            .map_err(Failure::no_answer)?;
+        let pipeline = trial.pipeline()?;
+        let measured = trial.press(&pipeline).and_then(|press| press.modulus())?;
         let stated = printed(&pipeline, dense)?;
         let (printed, printed_strain) = stress_over_strain(trial, &stated)?;
         let ratio = StagesConfig {
             estimator: EstimatorChoice::PaperRatio,
             ..StagesConfig::default()
         };
-        let pipeline = pipeline.with_stages(&ratio).map_err(Failure::no_answer)?;
+        let pipeline = pipeline.with_stages(&ratio)?;
         let (ratio, strain) = stress_over_strain(trial, &pipeline)?;
         let percent = |e: f64| 100.0 * (e / truth - 1.0);
-        rows.push(row(
-            &format!("{name}, {:.0} kPa: printed stages, (31)", kpa(truth)),
-            paper,
-            format!(
-                "{:.1} kPa ({:+.0} %), mean e_zz {printed_strain:.3}",
-                kpa(printed),
-                percent(printed)
-            ),
-        ));
-        rows.push(row(
-            &format!("{name}: (31) on the default surface and match"),
-            "",
+        let beside = |pa: f64, strain: f64| {
             format!(
                 "{:.1} kPa ({:+.0} %), mean e_zz {strain:.3}",
-                kpa(ratio),
-                percent(ratio)
-            ),
-        ));
+                kpa(pa),
+                percent(pa)
+            )
+        };
+        let ball = format!("{name}, {:.0} kPa", kpa(truth));
+        let here = beside(printed, printed_strain);
+        found.row(format!("{ball}: printed stages, (31)"), paper, here);
+        let what = format!("{name}: (31) on the default surface and match");
+        found.row(what, "", beside(ratio, strain));
         let estimate = measured.youngs_modulus_pa;
         let interval = measured.interval_95;
         let ends = (interval.lower, interval.upper);
         let ends = interval_text(ends, measured.standard_error_pa, 1e-3);
-        rows.push(row(
-            &format!("{name}, {:.0} kPa: default stages", kpa(truth)),
-            "",
-            format!(
-                "{} kPa ({:+.2} %), 95 %: {ends}",
-                digits(kpa(estimate), 4),
-                percent(estimate),
-            ),
-        ));
+        let here = format!(
+            "{} kPa ({:+.2} %), 95 %: {ends}",
+            digits(kpa(estimate), 4),
+            percent(estimate),
+        );
+        found.row(format!("{ball}: default stages"), "", here);
         printed_places.push([kpa(truth), kpa(printed)]);
         ratio_places.push([kpa(truth), kpa(ratio)]);
         default_places.push([kpa(truth), kpa(estimate)]);
         let ends = [interval.lower, interval.upper.unwrap_or(interval.lower)];
         intervals.push(ends.map(|end| [kpa(truth), kpa(end)]));
-        values.insert(
-            (*name).to_owned(),
+        found.value(
+            name,
             json!({
                 "true_pa": truth,
                 "printed_pa": printed, "printed_mean_strain_zz": printed_strain,
@@ -381,43 +383,35 @@ fn moduli(trials: &[(&str, Trial)], dense: bool) -> Result<Experiment, Failure> 
         );
     }
     // Between two loads the apparent surface of any ball scales by (F₂/F₁)^⅓.
-    rows.push(row(
+    found.row(
         "e_zz of Hertz's contact, ½((F₂/F₁)^⅔ − 1), for any ball",
         "",
         format!("{:.3}", 0.5 * ((1.2_f64 / 0.7).powf(2.0 / 3.0) - 1.0)),
-    ));
+    );
     panel = panel
         .segments(intervals, Colour::Blue, "")
         .points(default_places, Colour::Blue, "default stages, 95 %")
         .rings(ratio_places, Colour::Orange, "(31) on the default surface")
         .rings(printed_places, Colour::Red, "printed stages, (31)");
-    Ok(Experiment {
-        title: "Young's modulus of both polymers, 200 control points (Figs 10 to 12)",
-        key: "moduli",
-        rows,
-        panels: vec![panel],
-        value: Value::Object(values),
-    })
+    found.panels.push(panel);
+    Ok(found)
 }
 
 /// The modulus of (31) and the mean strain along z that it divides by.
-fn stress_over_strain(trial: &Trial, pipeline: &Pipeline) -> Result<(f64, f64), Failure> {
-    let press = trial.press(pipeline).map_err(Failure::no_answer)?;
-    let modulus = press.modulus().map_err(Failure::no_answer)?;
-    let strain = press.strain(1).map_err(Failure::no_answer)?;
+fn stress_over_strain(trial: &Trial, pipeline: &Pipeline) -> Found<(f64, f64)> {
+    let press = trial.press(pipeline)?;
+    let modulus = press.modulus()?;
+    let strain = press.strain(1)?;
     Ok((modulus.youngs_modulus_pa, strain.summary.mean[(2, 2)]))
 }
 
 /// The printed stages, with the labelling over few candidates unless `dense`.
-fn printed(pipeline: &Pipeline, dense: bool) -> Result<Pipeline, Failure> {
-    let pipeline = pipeline
-        .clone()
-        .with_stages(&StagesConfig::as_printed())
-        .map_err(Failure::no_answer)?;
+fn printed(pipeline: &Pipeline, dense: bool) -> Found<Pipeline> {
+    let pipeline = pipeline.clone().with_stages(&StagesConfig::as_printed())?;
     Ok(if dense {
         pipeline
     } else {
-        pipeline.with_matcher(sparse_labelling()?)
+        pipeline.with_matcher(printed_labelling().with_candidates(12)?)
     })
 }
 
@@ -425,28 +419,24 @@ fn printed_labelling() -> RelaxationLabelling {
     RelaxationLabelling::default().with_compatibility(Compatibility::Printed)
 }
 
-fn sparse_labelling() -> Result<RelaxationLabelling, Failure> {
-    let sparse = printed_labelling().with_candidates(12);
-    sparse.map_err(Failure::no_answer)
-}
-
 /// 105 control points at 0.7 N matched to where the truth moves them at 1.2 N, in another order.
-fn labelling(trial: &Trial, dense: bool) -> Result<Experiment, Failure> {
-    let pipeline = trial.pipeline().map_err(Failure::no_answer)?;
-    let press = trial
-        .press(&pipeline.with_control_points(105))
-        .map_err(Failure::no_answer)?;
-    let model = press.control_points(0).map_err(Failure::no_answer)?;
-    let [first, second]: &[PressTruth; 2] = trial.simulation.truth[..]
-        .try_into()
-        .map_err(Failure::no_answer)?;
+fn labelling(trial: &Trial, dense: bool) -> Found<Experiment> {
+    let pipeline = trial.pipeline()?;
+    let press = trial.press(&pipeline.with_control_points(105))?;
+    let model = press.control_points(0)?;
+    let [first, second]: &[PressTruth; 2] = trial.simulation.truth[..].try_into()?;
     let scaling = first.scaling_to(second);
     let moved: Vec<Point3<f64>> = model.iter().map(|p| scaling.apply(p)).collect();
     let target: Vec<Point3<f64>> = moved.iter().rev().copied().collect();
-    let sparse = sparse_labelling()?;
     let full = printed_labelling();
+    let sparse = full.clone().with_candidates(12)?;
     let default = AnnealedSoftassign::default();
     let mut matchers: Vec<(&str, &str, &dyn PointMatcher<3>)> = vec![
+        (
+            "printed labelling, all candidates",
+            "dense_labelling",
+            &full,
+        ),
         (
             "printed labelling, 12 candidates",
             "sparse_labelling",
@@ -454,73 +444,53 @@ fn labelling(trial: &Trial, dense: bool) -> Result<Experiment, Failure> {
         ),
         ("default matcher", "default", &default),
     ];
-    if dense {
-        matchers.insert(
-            0,
-            (
-                "printed labelling, all candidates",
-                "dense_labelling",
-                &full,
-            ),
-        );
+    if !dense {
+        matchers.remove(0);
     }
-    let (mut rows, mut values) = (Vec::new(), Map::new());
+    let title = "A match of 105 to 105 control points (§5)";
+    let mut answer = Experiment::new(title, "match_105");
     for (name, key, matcher) in matchers {
         let start = Instant::now();
-        let found = matcher
-            .match_points(model, &target)
-            .map_err(Failure::no_answer)?;
+        let found = matcher.match_points(model, &target)?;
         let seconds = start.elapsed().as_secs_f64();
         let count = model.len();
         let right = (0..count).filter(|&i| found.assignment[i] == Some(count - 1 - i));
         let right = right.count();
         let errors = found.warped.iter().zip(&moved).map(|(w, m)| (w - m).norm());
         let error_um = 1e6 * errors.sum::<f64>() / count as f64;
-        rows.push(row(
-            &format!("{name}: time"),
-            "1.69 s",
-            format!(
-                "{} s, {right} of {count} right, {error_um:.2} µm off",
-                digits(seconds, 3)
-            ),
-        ));
-        values.insert(
-            key.into(),
-            json!({
-                "time_s": seconds, "right": right, "points": count, "mean_error_um": error_um,
-            }),
+        let here = format!(
+            "{} s, {right} of {count} right, {error_um:.2} µm off",
+            digits(seconds, 3)
         );
+        answer.row(format!("{name}: time"), "1.69 s", here);
+        let value = json!({
+            "time_s": seconds, "right": right, "points": count, "mean_error_um": error_um,
+        });
+        answer.value(key, value);
     }
-    Ok(Experiment {
-        title: "A match of 105 to 105 control points (§5)",
-        key: "match_105",
-        rows,
-        panels: Vec::new(),
-        value: Value::Object(values),
-    })
+    Ok(answer)
 }
 
 /// Table 1, measured on the simulated sensor.
-fn specification(trial: &Trial) -> Result<Experiment, Failure> {
+fn specification(trial: &Trial) -> Found<Experiment> {
     let simulation = &trial.simulation;
-    let pipeline = trial.pipeline().map_err(Failure::no_answer)?;
-    let line = LinearCalibration::fit(&trial.pairs, &CalibrationOptions::default())
-        .map_err(Failure::no_answer)?;
+    let pipeline = trial.pipeline()?;
+    let line = LinearCalibration::fit(&trial.pairs, &CalibrationOptions::default())?;
     let second = trial.scene.reference(1);
     let squares = second.iter().zip(&simulation.reference).map(|(&a, &b)| {
         let difference = f64::from(a) - f64::from(b);
         difference * difference
     });
     let noise_grey = (0.5 * squares.sum::<f64>() / second.len() as f64).sqrt();
-    let press = trial.press(&pipeline).map_err(Failure::no_answer)?;
+    let press = trial.press(&pipeline)?;
     let (mut times, mut contact) = (Vec::new(), None);
     for _ in 0..20 {
         let again = press.renewed();
         let start = Instant::now();
-        contact = again.contact(0).map_err(Failure::no_answer)?.copied();
+        contact = again.contact(0)?.copied();
         times.push(start.elapsed());
     }
-    let contact = contact.ok_or_else(|| Failure::no_answer("the frame shows no contact"))?;
+    let contact = contact.ok_or("the frame shows no contact")?;
     let area_m2 = std::f64::consts::PI * contact.contact_radius_m.value.powi(2);
     let specification = SensorSpecification::new(
         &SensorParameters {
@@ -533,80 +503,57 @@ fn specification(trial: &Trial) -> Result<Experiment, Failure> {
             summed_pixels: area_m2 / simulation.pixel_size_m.iter().product::<f64>(),
         },
         3.0,
-    )
-    .map_err(Failure::no_answer)?;
+    )?;
     let rate_hz = 1.0 / specification.temporal_resolution_s;
-    let hysteresis = line.report().hysteresis.as_ref();
-    let loop_percent = 100.0 * hysteresis.map_or(f64::NAN, |h| h.share_of_full_scale);
-    let rows = vec![
-        row(
-            "smallest force, three standard deviations",
-            "2.5 mN",
-            format!("{} mN", digits(1e3 * specification.force_resolution_n, 2)),
-        ),
-        row("hysteresis", "none", format!("{loop_percent:.2} % of 2 N")),
-        row(
-            "frames a second (forces of whole frames here)",
-            "80",
-            digits(rate_hz, 3),
-        ),
-        row(
-            "pixel on the sensing surface",
-            "4.65 µm (on the chip)",
-            format!("{:.2} µm", 1e6 * simulation.pixel_size_m[0]),
-        ),
-        row(
-            "contact radius at 0.7 N",
-            "",
-            format!("{} mm", in_unit(contact.contact_radius_m, 1e3)),
-        ),
-    ];
-    Ok(Experiment {
-        title: "Specification of the sensor (Table 1)",
-        key: "specification",
-        rows,
-        panels: Vec::new(),
-        value: json!({
-            "force_resolution_n": specification.force_resolution_n,
-            "hysteresis_percent": loop_percent,
-            "forces_per_second": rate_hz,
-            "pixel_m": simulation.pixel_size_m[0],
-        }),
-    })
+    let (loop_percent, pixel_m) = (loop_percent(&line), simulation.pixel_size_m[0]);
+    let force_n = specification.force_resolution_n;
+    let mut found = Experiment::new("Specification of the sensor (Table 1)", "specification");
+    let smallest = format!("{} mN", digits(1e3 * force_n, 2));
+    found.row(
+        "smallest force, three standard deviations",
+        "2.5 mN",
+        smallest,
+    );
+    found.row("hysteresis", "none", format!("{loop_percent:.2} % of 2 N"));
+    let rate = digits(rate_hz, 3);
+    found.row("frames a second (forces of whole frames here)", "80", rate);
+    let pixel = format!("{:.2} µm", 1e6 * pixel_m);
+    found.row(
+        "pixel on the sensing surface",
+        "4.65 µm (on the chip)",
+        pixel,
+    );
+    let radius = format!("{} mm", in_unit(contact.contact_radius_m, 1e3));
+    found.row("contact radius at 0.7 N", "", radius);
+    found.value("force_resolution_n", force_n);
+    found.value("hysteresis_percent", loop_percent);
+    found.value("forces_per_second", rate_hz);
+    found.value("pixel_m", pixel_m);
+    Ok(found)
 }
 
 /// (1) to (4): within which angle each layer traps light, and whether the cone of the LED fits.
-fn light() -> Result<Experiment, Failure> {
+fn light() -> Found<Experiment> {
     let indices = [1.38, 1.39, 1.40, 1.41];
     let printed = ["71.98°", "74.89°", "78.46°", "83.73°"];
-    let (mut rows, mut angles) = (Vec::new(), Vec::new());
+    let mut found = Experiment::new(
+        "Total internal reflection in the guide (§3.4, (1) to (4))",
+        "light",
+    );
+    let mut angles = Vec::new();
     for (index, paper) in indices.iter().zip(printed) {
-        let angle = acceptance_angle(*index, 1.0).map_err(Failure::no_answer)?;
-        let degrees = angle.radians.to_degrees();
-        rows.push(row(
-            &format!("acceptance angle of a layer of index {index:.2}"),
-            paper,
-            format!("{degrees:.2}°"),
-        ));
+        let degrees = acceptance_angle(*index, 1.0)?.radians.to_degrees();
+        let what = format!("acceptance angle of a layer of index {index:.2}");
+        found.row(what, paper, format!("{degrees:.2}°"));
         angles.push(degrees);
     }
-    let cone = led_cone(&indices, 1.0, 140_f64.to_radians()).map_err(Failure::no_answer)?;
-    rows.push(row(
+    let trapped = led_cone(&indices, 1.0, 140_f64.to_radians())?.trapped;
+    found.row(
         "an LED cone of 140° is trapped by every layer",
         "yes, below 143.96°",
-        if cone.trapped { "yes" } else { "no" }.into(),
-    ));
-    Ok(Experiment {
-        title: "Total internal reflection in the guide (§3.4, (1) to (4))",
-        key: "light",
-        rows,
-        panels: Vec::new(),
-        value: json!({
-            "acceptance_degrees": angles, "cone_of_140_degrees_is_trapped": cone.trapped,
-        }),
-    })
-}
-
-fn row(what: &str, paper: &str, here: String) -> [String; 3] {
-    [what.to_owned(), paper.to_owned(), here]
+        if trapped { "yes" } else { "no" },
+    );
+    found.value("acceptance_degrees", angles);
+    found.value("cone_of_140_degrees_is_trapped", trapped);
+    Ok(found)
 }

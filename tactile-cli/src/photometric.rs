@@ -191,11 +191,7 @@ pub fn depth(
         .iter()
         .flat_map(|image| suffixes.map(|suffix| image.file(suffix)));
     let names: Vec<_> = names.collect();
-    let inputs: Vec<&Path> = frames
-        .iter()
-        .map(PathBuf::as_path)
-        .chain([sensor])
-        .collect();
+    let inputs: Vec<&Path> = (frames.iter().map(PathBuf::as_path).chain([sensor])).collect();
     context.outputs.plan(&names, &inputs)?;
     let mut values = Vec::new();
     for (k, NamedFrame { name, pixels, .. }) in images.iter().enumerate() {

@@ -226,14 +226,10 @@ fn answer(request: Request, query: &str, shared: &Arc<Shared>) {
 
 /// Whether a `Host` is a number or this computer, with or without a port.
 fn is_address(host: &str) -> bool {
-    let name = host
-        .rsplit_once(':')
-        .map_or(host, |(name, port)| match port.parse::<u16>() {
-            Ok(_) => name,
-            Err(_) => host,
-        });
-    let bare = name.trim_start_matches('[').trim_end_matches(']');
-    name == "localhost" || bare.parse::<IpAddr>().is_ok()
+    let with_port = host.rsplit_once(':');
+    let with_port = with_port.filter(|(_, port)| port.parse::<u16>().is_ok());
+    let name = with_port.map_or(host, |(name, _)| name);
+    name == "localhost" || name.trim_matches(['[', ']']).parse::<IpAddr>().is_ok()
 }
 
 const HEADERS: [(&str, &str); 5] = [

@@ -1,4 +1,5 @@
 //! `tactile strain`: from two sets of points, before and after a deformation.
+use crate::arguments::read_points;
 use crate::console::{Context, Exit, Failure, digits, four_digits};
 use crate::match_points::{self, Expectations};
 use crate::outputs::{Csv, Npz};
@@ -6,12 +7,12 @@ use crate::plot::{Colour, Page, Panel};
 use clap::{Args, ValueEnum};
 use nalgebra::{Matrix3, Point, SVector};
 use serde_json::{Map, Value, json};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use tactile_imaging::elasticity::strain::{
     Biot, EulerAlmansi, GreenLagrange, Hencky, Infinitesimal, StrainMeasure,
 };
 use tactile_imaging::force::Estimate;
-use tactile_imaging::io::{PointTable, read_point_table};
+use tactile_imaging::io::PointTable;
 use tactile_imaging::matching::PointMatcher;
 use tactile_imaging::pipeline::with_error;
 use tactile_imaging::{StrainAt, StrainBetween, StrainBetweenOptions};
@@ -71,13 +72,13 @@ enum Measure {
 }
 
 impl Measure {
-    fn strain(self) -> &'static (dyn StrainMeasure + Send + Sync) {
+    fn strain(self) -> Box<dyn StrainMeasure + Send + Sync> {
         match self {
-            Self::GreenLagrange => &GreenLagrange,
-            Self::EulerAlmansi => &EulerAlmansi,
-            Self::Hencky => &Hencky,
-            Self::Biot => &Biot,
-            Self::Infinitesimal => &Infinitesimal,
+            Self::GreenLagrange => Box::new(GreenLagrange),
+            Self::EulerAlmansi => Box::new(EulerAlmansi),
+            Self::Hencky => Box::new(Hencky),
+            Self::Biot => Box::new(Biot),
+            Self::Infinitesimal => Box::new(Infinitesimal),
         }
     }
 }
@@ -90,7 +91,7 @@ const GRID_FILES: [&str; 3] = ["grid.csv", "grid.vtk", "grid.npz"];
 const SERIES_FILES: [&str; 2] = ["tracks.csv", "series.csv"];
 
 pub fn run(arguments: &StrainArguments, context: &mut Context) -> Result<Exit, Failure> {
-    let paths: Vec<&Path> = arguments.frames.iter().map(PathBuf::as_path).collect();
+    let paths = &arguments.frames;
     if let Some(spacing) = arguments.grid.filter(|s| !(*s > 0.0 && s.is_finite())) {
         return Err(Failure::input(format!(
             "--grid {spacing}: give a spacing above zero"
@@ -99,33 +100,23 @@ pub fn run(arguments: &StrainArguments, context: &mut Context) -> Result<Exit, F
     let of_grid = &GRID_FILES[..if arguments.grid.is_some() { 3 } else { 0 }];
     let of_series = &SERIES_FILES[..if paths.len() > 2 { 2 } else { 0 }];
     let files = [&FILES, of_grid, of_series].concat();
-    context.outputs.plan(&files, &paths)?;
-    let (mut plane, mut space, mut metric) = (Vec::new(), Vec::new(), Vec::new());
-    for path in &paths {
-        let (table, metres) = read_point_table(path)?;
+    context.outputs.plan(&files, paths)?;
+    let (tables, metric) = read_points(paths)?;
+    let (mut plane, mut space) = (Vec::new(), Vec::new());
+    for (path, table) in paths.iter().zip(tables) {
         match table {
             PointTable::Plane(points) => plane.push(points),
             PointTable::Space(points) => space.push(points),
         }
-        metric.push(metres);
-        let files = format!("{} and {}", paths[0].display(), path.display());
-        if metres != metric[0] {
-            return Err(Failure::input(format!(
-                "only one of {files} names the unit of its coordinates: name it in both headers \
-                 or in none"
-            )));
-        }
         if !plane.is_empty() && !space.is_empty() {
             return Err(Failure::input(format!(
-                "{files} must both have two coordinates a point, or both three"
+                "{} and {} must both have two coordinates a point, or both three",
+                paths[0].display(),
+                path.display()
             )));
         }
     }
-    let unit = if metric[0] {
-        METRES
-    } else {
-        "the points' unit"
-    };
+    let unit = if metric { METRES } else { "the points' unit" };
     if plane.is_empty() {
         answer(space, unit, arguments, context)
     } else {
@@ -136,13 +127,7 @@ pub fn run(arguments: &StrainArguments, context: &mut Context) -> Result<Exit, F
 impl StrainArguments {
     fn options<const D: usize>(&self) -> StrainBetweenOptions<D> {
         let options = StrainBetweenOptions::default().with_matcher(self.expectations.matcher());
-        let options = match self.measure {
-            Measure::GreenLagrange => options.with_measure(GreenLagrange),
-            Measure::EulerAlmansi => options.with_measure(EulerAlmansi),
-            Measure::Hencky => options.with_measure(Hencky),
-            Measure::Biot => options.with_measure(Biot),
-            Measure::Infinitesimal => options.with_measure(Infinitesimal),
-        };
+        let options = options.with_measure(self.measure.strain());
         if self.doubtful_pairs {
             options.with_doubtful_pairs()
         } else {
@@ -166,23 +151,14 @@ fn answer<const D: usize>(
         series::follow(&frames, unit, arguments, context)
     } else {
         let after = frames.pop().unwrap_or_default();
-        between(frames.remove(0), after, arguments, context)?
+        between(frames.remove(0), after, unit, arguments, context)?
     };
-    let Some(measured) = measured else {
+    let Some(mut report) = measured else {
         return Ok(Exit::Interrupted);
-    };
-    let measure = arguments.measure.strain();
-    let report = StrainReport {
-        before: measured.before,
-        after: measured.after,
-        matched: measured.matched,
-        strain: measured.strain,
-        measure: measure.name(),
-        unit,
     };
     report.print(context);
     let mut value = report.json();
-    if let Some(frames) = measured.frames {
+    if let Some(frames) = report.frames.take() {
         value["frames"] = frames;
     }
     context.value(&value);
@@ -196,21 +172,26 @@ fn answer<const D: usize>(
     if let Some(spacing) = arguments.grid {
         let grid = Grid::over(&report.before, spacing)?;
         let (strain, points) = (strain.clone(), grid.points());
+        let measure = arguments.measure.strain();
         let job = format!("strain at {} points of the grid", points.len());
-        let Some(found) = context.wait(job, move || strain.at(&points, measure)) else {
+        let Some(found) = context.wait(job, move || strain.at(&points, &*measure)) else {
             return Ok(Exit::Interrupted);
         };
         let found = found.map_err(|error| Failure::input(error.to_string()))?;
+        let known = |at: &StrainAt<D>| (at.displacement, at.strain, at.standard_error);
+        let found: Vec<Known<D>> = found.iter().map(known).collect();
+        let shape: Vec<usize> = grid.counts.iter().rev().copied().collect();
         let table = report.grid_table(&grid, &found);
+        let arrays = arrays(Npz::new(), &shape, &grid.points(), &found)?;
         context.outputs.add(GRID_FILES[0], table);
         context.outputs.add(GRID_FILES[1], grid.vtk(&found));
-        context.outputs.add(GRID_FILES[2], grid.arrays(&found)?);
+        context.outputs.add(GRID_FILES[2], arrays);
     }
-    Ok(Exit::complete_if(measured.complete))
+    Ok(Exit::complete_if(report.complete))
 }
 
-/// A strain, as far as it came.
-struct Measured<const D: usize> {
+/// The strain of a call and what it comes from, as far as it came.
+struct StrainReport<const D: usize> {
     before: Vec<Point<f64, D>>,
     after: Vec<Point<f64, D>>,
     /// Pairs of the matcher.
@@ -220,15 +201,18 @@ struct Measured<const D: usize> {
     frames: Option<Value>,
     /// Whether all was found.
     complete: bool,
+    measure: &'static str,
+    unit: &'static str,
 }
 
 /// The strain between two frames. None after Ctrl-C.
 fn between<const D: usize>(
     before: Vec<Point<f64, D>>,
     after: Vec<Point<f64, D>>,
+    unit: &'static str,
     arguments: &StrainArguments,
     context: &mut Context,
-) -> Result<Option<Measured<D>>, Failure> {
+) -> Result<Option<StrainReport<D>>, Failure> {
     let matcher = arguments.expectations.matcher();
     let job = format!("matching {} to {} points", before.len(), after.len());
     let sets = (before.clone(), after.clone());
@@ -250,25 +234,16 @@ fn between<const D: usize>(
         StrainBetween::of_matching(&from, &to, &matching, &options)
             .map_err(|error| error.to_string())
     });
-    Ok(Some(Measured {
+    Ok(Some(StrainReport {
         before,
         after,
         matched,
         strain: found.unwrap_or_else(|| Err("stopped by Ctrl-C".to_owned())),
         frames: None,
         complete: true,
+        measure: arguments.measure.strain().name(),
+        unit,
     }))
-}
-
-/// The results, as far as they came.
-struct StrainReport<const D: usize> {
-    before: Vec<Point<f64, D>>,
-    after: Vec<Point<f64, D>>,
-    /// Pairs of the matcher.
-    matched: Vec<(usize, usize)>,
-    strain: Result<StrainBetween<D>, String>,
-    measure: &'static str,
-    unit: &'static str,
 }
 
 /// Points on equal distances over a box, x fastest.
@@ -312,27 +287,8 @@ impl<const D: usize> Grid<D> {
         (0..self.counts.iter().product()).map(place).collect()
     }
 
-    /// Places, displacement, strain and its standard error as arrays with the axes z, y, x.
-    fn arrays(&self, found: &[StrainAt<D>]) -> Result<Vec<u8>, Failure> {
-        let shape: Vec<usize> = self.counts.iter().rev().copied().collect();
-        let strains: Vec<_> = found.iter().map(|at| at.strain).collect();
-        let errors: Vec<_> = found.iter().map(|at| at.standard_error).collect();
-        let mut npz = Npz::new();
-        let displacements = found.iter().map(|at| at.displacement);
-        add_vectors(
-            &mut npz,
-            "points",
-            &shape,
-            self.points().iter().map(|p| p.coords),
-        )?;
-        add_vectors(&mut npz, "displacement", &shape, displacements)?;
-        add_tensors::<D>(&mut npz, "strain", &shape, &strains)?;
-        add_tensors::<D>(&mut npz, "standard_error", &shape, &errors)?;
-        npz.into_bytes()
-    }
-
     /// The legacy format of VTK, as text.
-    fn vtk(&self, found: &[StrainAt<D>]) -> Vec<u8> {
+    fn vtk(&self, found: &[Known<D>]) -> Vec<u8> {
         let three = |v: &[f64]| {
             let at = |a: usize| v.get(a).copied().unwrap_or(0.0);
             format!("{:e} {:e} {:e}", at(0), at(1), at(2))
@@ -349,47 +305,49 @@ impl<const D: usize> Grid<D> {
             found.len()
         );
         text.push_str("VECTORS displacement double\n");
-        for at in found {
-            text.push_str(&three(at.displacement.as_slice()));
+        for (displacement, ..) in found {
+            text.push_str(&three(displacement.as_slice()));
             text.push('\n');
         }
-        let strains = found.iter().map(|at| at.strain).collect();
-        let errors = found.iter().map(|at| at.standard_error).collect();
-        for (name, tensors) in [("strain", strains), ("standard_error", errors)] {
-            let tensors: Vec<Matrix3<f64>> = tensors;
+        let parts: [(&str, fn(&Known<D>) -> Matrix3<f64>); 2] =
+            [("strain", |at| at.1), ("standard_error", |at| at.2)];
+        for (name, part) in parts {
             text.push_str(&format!("TENSORS {name} double\n"));
-            // Symmetric: columns are rows.
-            for column in tensors.iter().flat_map(|tensor| tensor.column_iter()) {
-                text.push_str(&three(&[column[0], column[1], column[2]]));
-                text.push('\n');
+            for tensor in found.iter().map(part) {
+                // Symmetric: columns are rows.
+                for column in tensor.column_iter() {
+                    text.push_str(&three(&[column[0], column[1], column[2]]));
+                    text.push('\n');
+                }
             }
         }
         text.into_bytes()
     }
 }
 
-fn add_vectors<const D: usize>(
-    npz: &mut Npz,
-    name: &str,
-    shape: &[usize],
-    vectors: impl Iterator<Item = SVector<f64, D>>,
-) -> Result<(), Failure> {
-    let elements = vectors.flat_map(|v| <[f64; D]>::from(v).map(f64::to_le_bytes));
-    npz.add(name, "<f8", &[shape, &[D]].concat(), elements)
-}
+/// Displacement, strain and its standard error at a place.
+type Known<const D: usize> = (SVector<f64, D>, Matrix3<f64>, Matrix3<f64>);
 
-/// Adds tensors of the plane or of space.
-fn add_tensors<const D: usize>(
-    npz: &mut Npz,
-    name: &str,
+/// Completes arrays with places and what is known there, tensors of the plane or of space.
+fn arrays<const D: usize>(
+    mut npz: Npz,
     shape: &[usize],
-    tensors: &[Matrix3<f64>],
-) -> Result<(), Failure> {
+    points: &[Point<f64, D>],
+    found: &[Known<D>],
+) -> Result<Vec<u8>, Failure> {
+    let vector = |v: SVector<f64, D>| <[f64; D]>::from(v).map(f64::to_le_bytes);
     let places = || (0..D).flat_map(|i| (0..D).map(move |j| (i, j)));
-    let elements = tensors
-        .iter()
-        .flat_map(|tensor| places().map(|at| tensor[at].to_le_bytes()));
-    npz.add(name, "<f8", &[shape, &[D, D]].concat(), elements)
+    let tensor = |m: Matrix3<f64>| places().map(move |at| m[at].to_le_bytes());
+    let [vectors, tensors] = [&[D][..], &[D, D]].map(|axes| [shape, axes].concat());
+    let points = points.iter().flat_map(|point| vector(point.coords));
+    npz.add("points", "<f8", &vectors, points)?;
+    let displacements = found.iter().flat_map(|at| vector(at.0));
+    npz.add("displacement", "<f8", &vectors, displacements)?;
+    let strains = found.iter().flat_map(|at| tensor(at.1));
+    npz.add("strain", "<f8", &tensors, strains)?;
+    let errors = found.iter().flat_map(|at| tensor(at.2));
+    npz.add("standard_error", "<f8", &tensors, errors)?;
+    npz.into_bytes()
 }
 
 /// Name and indices of a component of the strain.
@@ -401,6 +359,28 @@ fn components<const D: usize>() -> Vec<Component> {
     let space = [("e_zz", 2, 2), ("e_xz", 0, 2), ("e_yz", 1, 2)];
     let more = if D == 2 { &[][..] } else { &space };
     plane.iter().chain(more).copied().collect()
+}
+
+/// Headings of the components and of their standard errors.
+fn strain_headings<const D: usize>(suffix: &str) -> Vec<String> {
+    let named = |before| components::<D>().into_iter().map(move |c| (before, c.0));
+    let names = named("").chain(named("se_"));
+    names
+        .map(|(before, name)| format!("{before}{name}{suffix}"))
+        .collect()
+}
+
+/// The components of a strain and of its standard error.
+fn strain_cells<const D: usize>(
+    strain: &Matrix3<f64>,
+    error: &Matrix3<f64>,
+) -> impl Iterator<Item = f64> {
+    let of = |tensor: Matrix3<f64>| {
+        components::<D>()
+            .into_iter()
+            .map(move |c| tensor[(c.1, c.2)])
+    };
+    of(*strain).chain(of(*error))
 }
 
 /// Number of pairs that were left out of the deformation.
@@ -425,9 +405,12 @@ impl<const D: usize> StrainReport<D> {
         self.strain.as_ref().map_or(&self.matched, |s| &s.rows)
     }
 
-    /// The ending of headings, empty where the unit of the points is not known.
-    fn suffix(&self) -> &'static str {
-        if self.unit == METRES { "_m" } else { "" }
+    /// Headings of coordinates with their unit, where it is known.
+    fn headings(&self, before: &str, after: &str) -> Vec<String> {
+        let unit = if self.unit == METRES { "_m" } else { "" };
+        let axes = ["x", "y", "z"][..D].iter();
+        axes.map(|axis| format!("{before}{axis}{after}{unit}"))
+            .collect()
     }
 
     fn print(&self, context: &mut Context) {
@@ -483,7 +466,16 @@ impl<const D: usize> StrainReport<D> {
 
     fn json(&self) -> Value {
         let strain = match &self.strain {
-            Ok(found) => self.strain_json(found),
+            Ok(found) => json!({
+                "measure": self.measure,
+                "left_out_as_misplaced": left_out(found),
+                "noise_per_coordinate": found.sigma,
+                "smoothing_over_squared_radius": found.relative_lambda,
+                "degrees_of_freedom": found.degrees_of_freedom,
+                "folded_points": found.summary.folded,
+                "doubt": found.doubt.map(|doubt| doubt.to_string()),
+                "components": components_json(found),
+            }),
             Err(reason) => json!({ "error": reason }),
         };
         json!({
@@ -494,29 +486,15 @@ impl<const D: usize> StrainReport<D> {
         })
     }
 
-    fn strain_json(&self, found: &StrainBetween<D>) -> Value {
-        json!({
-            "measure": self.measure,
-            "left_out_as_misplaced": left_out(found),
-            "noise_per_coordinate": found.sigma,
-            "smoothing_over_squared_radius": found.relative_lambda,
-            "degrees_of_freedom": found.degrees_of_freedom,
-            "folded_points": found.summary.folded,
-            "doubt": found.doubt.map(|doubt| doubt.to_string()),
-            "components": components_json(found),
-        })
-    }
-
     /// Rows (counted from 0), positions and displacements of the pairs, and their weights in the
     /// spline.
     fn pairs(&self) -> Vec<u8> {
-        let (axes, suffix) = (&["x", "y", "z"][..D], self.suffix());
         let mut header = vec!["row_before".to_owned(), "row_after".to_owned()];
-        header.extend(axes.iter().map(|a| format!("{a}{suffix}")));
-        header.extend(axes.iter().map(|a| format!("{a}_after{suffix}")));
-        header.extend(axes.iter().map(|a| format!("u_{a}{suffix}")));
+        header.extend(self.headings("", ""));
+        header.extend(self.headings("", "_after"));
+        header.extend(self.headings("u_", ""));
         header.push("weight".to_owned());
-        let mut csv = Csv::new(&header);
+        let mut csv = Csv::new(&header.join(","));
         for (k, &(i, j)) in self.rows().iter().enumerate() {
             let (a, b) = (self.before[i], self.after[j]);
             let mut row = vec![i as f64, j as f64];
@@ -529,18 +507,17 @@ impl<const D: usize> StrainReport<D> {
 
     /// The strain at every point, and its standard error.
     fn table(&self, found: &StrainBetween<D>) -> Vec<u8> {
-        let (suffix, components) = (self.suffix(), components::<D>());
         let mut header = vec!["row_before".to_owned()];
-        header.extend(["x", "y", "z"][..D].iter().map(|a| format!("{a}{suffix}")));
-        header.extend(components.iter().map(|c| c.0.to_owned()));
-        header.extend(components.iter().map(|c| format!("se_{}", c.0)));
-        let mut csv = Csv::new(&header);
+        header.extend(self.headings("", ""));
+        header.extend(strain_headings::<D>(""));
+        let mut csv = Csv::new(&header.join(","));
         for (k, pair) in found.pairs.iter().enumerate() {
             let mut row = vec![found.rows[k].0 as f64];
             row.extend(pair[0].iter());
-            for tensor in [&found.strains[k], &found.standard_errors[k]] {
-                row.extend(components.iter().map(|c| tensor[(c.1, c.2)]));
-            }
+            row.extend(strain_cells::<D>(
+                &found.strains[k],
+                &found.standard_errors[k],
+            ));
             csv.row(row);
         }
         csv.into_bytes()
@@ -552,30 +529,27 @@ impl<const D: usize> StrainReport<D> {
         let rows = found.rows.iter().map(|row| (row.0 as i64).to_le_bytes());
         let mut npz = Npz::new();
         npz.add("row_before", "<i8", &shape, rows)?;
-        let points = found.pairs.iter().map(|pair| pair[0].coords);
-        add_vectors(&mut npz, "points", &shape, points)?;
-        let displacements = found.displacements.iter().copied();
-        add_vectors(&mut npz, "displacement", &shape, displacements)?;
-        add_tensors::<D>(&mut npz, "strain", &shape, &found.strains)?;
-        add_tensors::<D>(&mut npz, "standard_error", &shape, &found.standard_errors)?;
-        npz.into_bytes()
+        let points: Vec<_> = found.pairs.iter().map(|pair| pair[0]).collect();
+        let known = |k| {
+            (
+                found.displacements[k],
+                found.strains[k],
+                found.standard_errors[k],
+            )
+        };
+        let known: Vec<Known<D>> = (0..points.len()).map(known).collect();
+        arrays(npz, &shape, &points, &known)
     }
 
     /// Displacement, strain and its standard error on the grid.
-    fn grid_table(&self, grid: &Grid<D>, found: &[StrainAt<D>]) -> Vec<u8> {
-        let (axes, suffix, components) = (&["x", "y", "z"][..D], self.suffix(), components::<D>());
-        let mut header: Vec<_> = axes.iter().map(|a| format!("{a}{suffix}")).collect();
-        header.extend(axes.iter().map(|a| format!("u_{a}{suffix}")));
-        header.extend(components.iter().map(|c| c.0.to_owned()));
-        header.extend(components.iter().map(|c| format!("se_{}", c.0)));
-        let mut csv = Csv::new(&header);
-        for (point, at) in grid.points().iter().zip(found) {
-            let mut row: Vec<f64> = point.iter().copied().collect();
-            row.extend(at.displacement.iter());
-            for tensor in [&at.strain, &at.standard_error] {
-                row.extend(components.iter().map(|c| tensor[(c.1, c.2)]));
-            }
-            csv.row(row);
+    fn grid_table(&self, grid: &Grid<D>, found: &[Known<D>]) -> Vec<u8> {
+        let mut header = self.headings("", "");
+        header.extend(self.headings("u_", ""));
+        header.extend(strain_headings::<D>(""));
+        let mut csv = Csv::new(&header.join(","));
+        for (point, (displacement, strain, error)) in grid.points().iter().zip(found) {
+            let places = point.iter().chain(displacement.iter()).copied();
+            csv.row(places.chain(strain_cells::<D>(strain, error)));
         }
         csv.into_bytes()
     }

@@ -4,19 +4,17 @@ mod coloured;
 mod watch;
 
 use self::coloured::coloured;
-use self::watch::{FrameCounts, Watcher, listed, watch};
+use self::watch::{Meter, Watch, listed, watch};
 use crate::arguments::{force_n, not_negative, positive};
 use crate::console::{Bar, Context, Exit, Failure};
 use crate::frames::{DEFAULT_RATE_HZ, Reading};
-use crate::outputs::Csv;
 use crate::plot::known_heights_mm;
-use crate::record::FrameRecorder;
 use crate::relief::HeightGrid;
-use crate::serve::LivePage;
 use clap::Args;
-use ndarray::{Array2, ArrayView2, ArrayView3, Axis};
+use ndarray::Array2;
 use serde::Serialize;
 use serde_json::{Value, json};
+use std::error::Error;
 use std::mem::discriminant;
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
@@ -113,8 +111,8 @@ struct Simulation {
 }
 
 pub fn run(arguments: &StreamArguments, context: &mut Context) -> Result<Exit, Failure> {
-    let inputs: Vec<_> = arguments.scene.iter().map(PathBuf::as_path).collect();
-    context.outputs.plan(&["stream.csv"], &inputs)?;
+    let outputs = &mut context.outputs;
+    outputs.plan(&["stream.csv"], arguments.scene.as_slice())?;
     match &arguments.scene {
         Some(sensor) if PhotometricPresses::names_kind(sensor) => {
             coloured(sensor, arguments, context)
@@ -126,7 +124,6 @@ pub fn run(arguments: &StreamArguments, context: &mut Context) -> Result<Exit, F
 
 /// The results of one frame, each number with its standard error.
 struct Row {
-    time_s: f64,
     force_n: Option<Estimate>,
     radius_m: Option<Estimate>,
     /// The modulus from all frames so far.
@@ -134,21 +131,6 @@ struct Row {
     strain_xx_zz: Option<[f64; 2]>,
     /// Centroid of the contact, for the page.
     centre_px: Option<[f64; 2]>,
-}
-
-impl Row {
-    /// Adds the row, with empty cells for unknown values.
-    fn add_to(&self, csv: &mut Csv) {
-        let of = |e: Estimate| [e.value, e.standard_error];
-        let pairs = [
-            self.force_n.map(of),
-            self.radius_m.map(of),
-            self.modulus.map(|m| [m.value, m.standard_error]),
-            self.strain_xx_zz,
-        ];
-        let cells = pairs.map(|pair| pair.map_or([None; 2], |pair| pair.map(Some)));
-        csv.cells(std::iter::once(Some(self.time_s)).chain(cells.concat()));
-    }
 }
 
 /// A modulus as JSON has it.
@@ -170,96 +152,23 @@ impl From<&ModulusEstimate> for Modulus {
     }
 }
 
-/// A session with the results of every frame so far.
+/// A session with its cautions.
 struct Live {
     session: Session,
-    rows: Vec<Row>,
     /// One of every kind, of the frame where it came first.
     cautions: Vec<Flag>,
-    progress: FrameCounts,
-    shown: Shown,
-    /// Where the frames are simulated.
-    truth_pa: Option<f64>,
     /// Strain is measured in frames of at least this force.
     strained_above_n: Option<f64>,
 }
 
 impl Live {
-    fn new(
-        session: Session,
-        arguments: &StreamArguments,
-        truth_pa: Option<f64>,
-        context: &Context,
-    ) -> Result<Self, Failure> {
+    fn new(session: Session, arguments: &StreamArguments) -> Self {
         let largest_n = arguments.force.unwrap_or(SIMULATED_FORCE_N);
-        Ok(Self {
-            shown: Shown::new(arguments, context)?,
-            progress: FrameCounts::new(arguments.rate.unwrap_or(DEFAULT_RATE_HZ)),
+        Self {
             session,
-            rows: Vec::new(),
             cautions: Vec::new(),
-            truth_pa,
             strained_above_n: arguments.strain.then_some(largest_n / 3.0),
-        })
-    }
-
-    fn show(&mut self, frame: ArrayView2<'_, u8>) {
-        let (Some(page), Some(row)) = (&mut self.shown.page, self.rows.last()) else {
-            return;
-        };
-        let cautions: Vec<String> = self.cautions.iter().map(ToString::to_string).collect();
-        let centre = row.centre_px.map(|c| c.map(|c| c / frame.ncols() as f64));
-        let of = |e: Estimate| [e.value, e.standard_error];
-        let numbers = json!({
-            "frame": self.progress.seen, "time_s": row.time_s, "late": self.progress.late,
-            "cautions": cautions,
-            "force_n": row.force_n.map(of), "centre": centre,
-            "modulus_pa": row.modulus.map(|m| [m.value, m.standard_error]),
-        });
-        let session = &mut self.session;
-        page.show(numbers, frame.insert_axis(Axis(2)), || {
-            let health = health_words(session);
-            // A frame without contact has no surface.
-            let Ok(found) = session.surface() else {
-                return json!({ "health": health });
-            };
-            let name = match found.apparent {
-                true => "apparent surface (the pressure, read as shading)",
-                false => "surface",
-            };
-            let size = found.pixel_size_m.map(|m| 1e3 * m);
-            let relief = HeightGrid::of(known_heights_mm(found).view(), size);
-            json!({ "name": name, "relief": relief, "health": health })
-        });
-    }
-
-    /// Measures a frame.
-    fn push(&mut self, time_s: f64, frame: ArrayView2<'_, u8>) -> Result<(), PipelineError> {
-        let contact = self.session.push(frame)?.contact;
-        let force = contact.and_then(|c| c.force_n);
-        let least = self.strained_above_n;
-        let strained = least.is_some_and(|least| force.is_some_and(|f| f.value > least));
-        for flag in self.session.cautions() {
-            let kind = discriminant(&flag);
-            if self
-                .cautions
-                .iter()
-                .all(|known| discriminant(known) != kind)
-            {
-                self.cautions.push(flag);
-            }
         }
-        let modulus = self.session.modulus().ok();
-        let strain_xx_zz = if strained { self.strain()? } else { None };
-        self.rows.push(Row {
-            time_s,
-            force_n: force,
-            radius_m: contact.map(|c| c.contact_radius_m),
-            modulus: modulus.as_ref().map(Modulus::from),
-            strain_xx_zz,
-            centre_px: contact.map(|c| c.centroid_px.map(|c| c.value)),
-        });
-        Ok(())
     }
 
     /// Mean strain along x and z. It is none in the frame that strain is counted from, and where
@@ -271,130 +180,59 @@ impl Live {
             Err(error) => Err(error),
         }
     }
-
-    fn print_heading(&self, context: &mut Context) {
-        let strain = if self.strained_above_n.is_some() {
-            "   strain xx, zz"
-        } else {
-            ""
-        };
-        context.line(format_args!(
-            "time (s)   force (N)   radius (mm)   late (%)   modulus (kPa)     {strain}"
-        ));
-    }
-
-    /// Prints the results of the whole series, and adds its table to the files.
-    fn finish(
-        mut self,
-        arguments: &StreamArguments,
-        context: &mut Context,
-    ) -> Result<Exit, Failure> {
-        let (frames, late, rate) = (self.rows.len(), self.progress.late, self.progress.rate_hz);
-        let percent = self.progress.late_percent(frames);
-        self.progress.print(frames, context);
-        let modulus = self.session.modulus();
-        let error = |pa: f64| self.truth_pa.map(|truth| 100.0 * (pa / truth - 1.0));
-        let answer = match &modulus {
-            Ok(m) => {
-                let kpa = with_error(m.youngs_modulus_pa, m.standard_error_pa, 1e-3);
-                let beside = error(m.youngs_modulus_pa).zip(self.truth_pa);
-                let beside = beside.map_or(String::new(), |(error, truth)| {
-                    format!(", true {:.2} kPa ({error:+.2} %)", truth * 1e-3)
-                });
-                context.answer("modulus", format_args!("{kpa} kPa{beside}"));
-                json!(Modulus::from(m))
-            }
-            Err(reason) => {
-                context.answer("modulus", format_args!("none: {reason}"));
-                json!({ "error": reason.to_string() })
-            }
-        };
-        context.aside(self.session.report());
-        let drifted = |flag: &Flag| matches!(flag, Flag::LightDrifted { .. });
-        if !self.cautions.iter().any(drifted) {
-            self.cautions.extend(self.session.drift().caution.clone());
-        }
-        if let Ok(found) = &modulus {
-            let warnings = found.warnings.iter();
-            let flags = warnings.map(|&warning| Flag::Assumption { warning });
-            self.cautions.extend(flags);
-        }
-        for caution in &self.cautions {
-            context.aside(format_args!("{:<18}{caution}", "caution"));
-        }
-        context.keep_cautions(&self.cautions);
-        let update = |row: &Row| {
-            json!({
-                "time_s": row.time_s, "force_n": row.force_n, "contact_radius_m": row.radius_m,
-                "youngs_modulus_pa": row.modulus, "strain_xx_zz": row.strain_xx_zz,
-            })
-        };
-        let mut value = json!({
-            "frames": frames, "rate_hz": rate, "late": late,
-            "updates": self.rows.iter().map(update).collect::<Vec<Value>>(),
-            "youngs_modulus_pa": answer,
-        });
-        if let Some(truth_pa) = self.truth_pa {
-            value["true_youngs_modulus_pa"] = json!(truth_pa);
-        }
-        context.value(&value);
-        context.outputs.add("stream.csv", table(&self.rows));
-        let mut exit = Exit::Complete;
-        let mut fail = |note: String| {
-            exit = Exit::Partial;
-            context.note(note);
-        };
-        let allowed = arguments.allowed_late;
-        if percent > allowed {
-            fail(format!(
-                "{percent:.1} % of the frames came late, more than {allowed} %"
-            ));
-        }
-        match &modulus {
-            Err(reason) => fail(format!("there is no modulus: {reason}")),
-            Ok(m) => {
-                let tolerance = arguments.simulation.tolerance;
-                let beyond = error(m.youngs_modulus_pa).filter(|e| e.abs() > tolerance);
-                if let Some(error) = beyond {
-                    fail(format!(
-                        "the modulus is off by {error:+.2} %, more than {tolerance} %"
-                    ));
-                }
-            }
-        }
-        Ok(exit)
-    }
 }
 
-impl Watcher for Live {
+impl Meter for Live {
     type Frame = Array2<u8>;
+    type Row = Row;
 
-    fn progress(&mut self) -> &mut FrameCounts {
-        &mut self.progress
+    fn heading(&self) -> String {
+        let strain = match self.strained_above_n {
+            Some(_) => "   strain xx, zz",
+            None => "",
+        };
+        format!("time (s)   force (N)   radius (mm)   late (%)   modulus (kPa)     {strain}")
     }
 
-    fn measured(&self) -> usize {
-        self.rows.len()
-    }
+    const COLUMNS: &'static str = "force_N,force_error_N,contact_radius_m,contact_radius_error_m,\
+                           youngs_modulus_Pa,youngs_modulus_error_Pa,strain_xx,strain_zz";
 
-    fn take(&mut self, time_s: f64, frame: &Array2<u8>) -> Result<Duration, Failure> {
-        let seen = self.progress.seen;
-        self.shown
-            .record(frame.view().insert_axis(Axis(2)), self.progress.rate_hz)?;
-        let start = Instant::now();
-        let pushed = self.push(time_s, frame.view());
-        pushed.map_err(|error| Failure::no_answer(format!("frame {seen}: {error}")))?;
-        self.show(frame.view());
-        let took = start.elapsed();
-        if let Some(row) = self.rows.last() {
-            self.shown
-                .record_answer(self.rows.len(), &COLUMNS, |csv| row.add_to(csv))?;
+    fn measure(&mut self, frame: &Array2<u8>) -> Result<Row, Box<dyn Error>> {
+        let contact = self.session.push(frame.view())?.contact;
+        let force = contact.and_then(|c| c.force_n);
+        let least = self.strained_above_n;
+        let strained = least.is_some_and(|least| force.is_some_and(|f| f.value > least));
+        for flag in self.session.cautions() {
+            let kind = discriminant(&flag);
+            let mut known = self.cautions.iter().map(discriminant);
+            if known.all(|known| known != kind) {
+                self.cautions.push(flag);
+            }
         }
-        Ok(took)
+        let modulus = self.session.modulus().ok();
+        Ok(Row {
+            force_n: force,
+            radius_m: contact.map(|c| c.contact_radius_m),
+            modulus: modulus.as_ref().map(Modulus::from),
+            strain_xx_zz: if strained { self.strain()? } else { None },
+            centre_px: contact.map(|c| c.centroid_px.map(|c| c.value)),
+        })
     }
 
-    fn last_line(&self) -> Option<String> {
-        let row = self.rows.last()?;
+    fn cells(row: &Row) -> Vec<Option<f64>> {
+        let of = |e: Estimate| [e.value, e.standard_error];
+        let pairs = [
+            row.force_n.map(of),
+            row.radius_m.map(of),
+            row.modulus.map(|m| [m.value, m.standard_error]),
+            row.strain_xx_zz,
+        ];
+        pairs
+            .map(|pair| pair.map_or([None; 2], |pair| pair.map(Some)))
+            .concat()
+    }
+
+    fn line(row: &Row, time_s: f64, late_percent: f64) -> String {
         let unknown = || "-".to_owned();
         let number = |number: Option<Estimate>, scale: f64| {
             number.map_or_else(unknown, |e| format!("{:.4}", e.value * scale))
@@ -403,56 +241,106 @@ impl Watcher for Live {
         let kpa = |m: Modulus| with_error(m.value, m.standard_error, 1e-3);
         let modulus = row.modulus.map_or_else(unknown, kpa);
         let strain = row.strain_xx_zz.map(|[x, z]| format!("{x:+.3}, {z:+.3}"));
-        let (time, late) = (row.time_s, self.progress.late_percent(self.measured()));
         let strain = strain.unwrap_or_default();
-        Some(format!(
-            "{time:8.3} {force:>11} {radius:>13} {late:10.1}   {modulus:<18}{strain}"
-        ))
+        format!("{time_s:8.3} {force:>11} {radius:>13} {late_percent:10.1}   {modulus:<18}{strain}")
     }
-}
 
-/// Where the frames of a stream go, beside its answers: a page for browsers and a file.
-struct Shown {
-    page: Option<LivePage>,
-    recording: Option<FrameRecorder>,
-}
-
-impl Shown {
-    fn new(arguments: &StreamArguments, context: &Context) -> Result<Self, Failure> {
-        let page = arguments.serve.map(LivePage::serve).transpose()?;
-        if let Some(page) = &page {
-            context.note(format_args!("the measurement is shown at {}", page.url));
-        }
-        let recording = arguments.record.as_deref().map(FrameRecorder::create);
-        Ok(Self {
-            page,
-            recording: recording.transpose()?,
+    fn update(row: &Row) -> Value {
+        json!({
+            "force_n": row.force_n, "contact_radius_m": row.radius_m,
+            "youngs_modulus_pa": row.modulus, "strain_xx_zz": row.strain_xx_zz,
         })
     }
 
-    /// Records a frame, `[row, column, channel]`.
-    fn record(&mut self, frame: ArrayView3<'_, u8>, rate_hz: f64) -> Result<(), Failure> {
-        let recording = self.recording.as_mut();
-        recording.map_or(Ok(()), |recording| recording.frame(frame, rate_hz))
+    fn shown(&self, row: &Row, columns: f64) -> Value {
+        let cautions: Vec<String> = self.cautions.iter().map(ToString::to_string).collect();
+        let of = |e: Estimate| [e.value, e.standard_error];
+        json!({
+            "cautions": cautions, "force_n": row.force_n.map(of),
+            "centre": row.centre_px.map(|c| c.map(|c| c / columns)),
+            "modulus_pa": row.modulus.map(|m| [m.value, m.standard_error]),
+        })
     }
 
-    /// Records a row of answers. The first one comes with the names of the columns.
-    fn record_answer(
-        &mut self,
-        number: usize,
-        columns: &[&str],
-        add: impl FnOnce(&mut Csv),
-    ) -> Result<(), Failure> {
-        let Some(recording) = &mut self.recording else {
-            return Ok(());
+    fn surface(&mut self) -> Value {
+        let health = health_words(&self.session);
+        // A frame without contact has no surface.
+        let Ok(found) = self.session.surface() else {
+            return json!({ "health": health });
         };
-        let mut csv = match number {
-            1 => Csv::new(columns),
-            _ => Csv::default(),
+        let name = match found.apparent {
+            true => "apparent surface (the pressure, read as shading)",
+            false => "surface",
         };
-        add(&mut csv);
-        recording.answers(&csv.into_bytes())
+        let size = found.pixel_size_m.map(|m| 1e3 * m);
+        let relief = HeightGrid::of(known_heights_mm(found).view(), size);
+        json!({ "name": name, "relief": relief, "health": health })
     }
+}
+
+/// Prints the results of the whole series, simulated where the true modulus is known, and adds its
+/// table to the files.
+fn finish(
+    mut live: Watch<Live>,
+    truth_pa: Option<f64>,
+    arguments: &StreamArguments,
+    context: &mut Context,
+) -> Result<Exit, Failure> {
+    live.counts.print(live.rows.len(), context);
+    let Live {
+        session, cautions, ..
+    } = &mut live.meter;
+    let modulus = session.modulus();
+    let error = |pa: f64| truth_pa.map(|truth| 100.0 * (pa / truth - 1.0));
+    let answer = match &modulus {
+        Ok(m) => {
+            let kpa = with_error(m.youngs_modulus_pa, m.standard_error_pa, 1e-3);
+            let beside = error(m.youngs_modulus_pa).zip(truth_pa);
+            let beside = beside.map_or(String::new(), |(error, truth)| {
+                format!(", true {:.2} kPa ({error:+.2} %)", truth * 1e-3)
+            });
+            context.answer("modulus", format_args!("{kpa} kPa{beside}"));
+            json!(Modulus::from(m))
+        }
+        Err(reason) => {
+            context.answer("modulus", format_args!("none: {reason}"));
+            json!({ "error": reason.to_string() })
+        }
+    };
+    context.aside(session.report());
+    let drifted = |flag: &Flag| matches!(flag, Flag::LightDrifted { .. });
+    if !cautions.iter().any(drifted) {
+        cautions.extend(session.drift().caution.clone());
+    }
+    if let Ok(found) = &modulus {
+        let warnings = found.warnings.iter();
+        let flags = warnings.map(|&warning| Flag::Assumption { warning });
+        cautions.extend(flags);
+    }
+    for caution in &*cautions {
+        context.aside(format_args!("{:<18}{caution}", "caution"));
+    }
+    context.keep_cautions(cautions);
+    let mut value = live.value();
+    value["youngs_modulus_pa"] = answer;
+    if let Some(truth_pa) = truth_pa {
+        value["true_youngs_modulus_pa"] = json!(truth_pa);
+    }
+    context.value(&value);
+    let mut exit = live.close(arguments.allowed_late, context);
+    let tolerance = arguments.simulation.tolerance;
+    let failed = match &modulus {
+        Err(reason) => Some(format!("there is no modulus: {reason}")),
+        Ok(m) => {
+            let beyond = error(m.youngs_modulus_pa).filter(|e| e.abs() > tolerance);
+            beyond.map(|e| format!("the modulus is off by {e:+.2} %, more than {tolerance} %"))
+        }
+    };
+    if let Some(note) = failed {
+        exit = Exit::Partial;
+        context.note(note);
+    }
+    Ok(exit)
 }
 
 /// The state of the sensor, as its background shows it.
@@ -477,25 +365,6 @@ fn health_words(session: &Session) -> String {
         words(health.noise),
     )
 }
-
-/// A row a frame.
-fn table(rows: &[Row]) -> Vec<u8> {
-    let mut csv = Csv::new(&COLUMNS);
-    rows.iter().for_each(|row| row.add_to(&mut csv));
-    csv.into_bytes()
-}
-
-const COLUMNS: [&str; 9] = [
-    "time_s",
-    "force_N",
-    "force_error_N",
-    "contact_radius_m",
-    "contact_radius_error_m",
-    "youngs_modulus_Pa",
-    "youngs_modulus_error_Pa",
-    "strain_xx",
-    "strain_zz",
-];
 
 /// Measures recorded frames: those of a scene, or images and folders of images.
 fn recorded(
@@ -534,8 +403,7 @@ fn recorded(
     let pipeline = scene.pipeline(&data).map_err(Failure::input)?;
     let session = Session::new(&pipeline, &[data.reference.view()])
         .map_err(|error| Failure::input(scene.measure_error(error)))?;
-    let mut live = Live::new(session, arguments, None, context)?;
-    live.print_heading(context);
+    let mut live = Watch::new(Live::new(session, arguments), arguments, context)?;
     let reading = Reading {
         grey: Grey::default(),
         bits: scene.bits,
@@ -543,8 +411,8 @@ fn recorded(
         size: data.reference.dim(),
     };
     watch(&mut live, &frames, reading, arguments.rate, context)?;
-    let unusable = live.progress.unusable;
-    let exit = live.finish(arguments, context)?;
+    let unusable = live.counts.unusable;
+    let exit = finish(live, None, arguments, context)?;
     Ok(if unusable > 0 { Exit::Partial } else { exit })
 }
 
@@ -587,9 +455,9 @@ fn simulated(arguments: &StreamArguments, context: &mut Context) -> Result<Exit,
     let pipeline = trial.pipeline().map_err(Failure::no_answer)?;
     let session = Session::new(&pipeline, &views).map_err(Failure::no_answer)?;
     let truth_pa = trial.simulation.youngs_modulus_pa;
-    let mut live = Live::new(session, arguments, Some(truth_pa), context)?;
+    let mut live = Watch::new(Live::new(session, arguments), arguments, context)?;
     play(&mut live, &frames, rate_hz, context)?;
-    live.finish(arguments, context)
+    finish(live, Some(truth_pa), arguments, context)
 }
 
 /// Times in seconds and frames.
@@ -615,7 +483,7 @@ fn record(trial: &Trial, cycle: LoadCycle, context: &Context) -> Result<Recordin
 
 /// Gives every frame to the session when it is due.
 fn play(
-    live: &mut Live,
+    live: &mut Watch<Live>,
     frames: &[(f64, Array2<u8>)],
     rate_hz: f64,
     context: &mut Context,
@@ -625,11 +493,12 @@ fn play(
     };
     let period = Duration::from_secs_f64(1.0 / rate_hz);
     // Buffers get their size before the clock starts.
-    live.session
+    live.meter
+        .session
         .push(first.view())
         .map_err(Failure::no_answer)?;
     let start = Instant::now();
-    live.print_heading(context);
+    context.line(live.meter.heading());
     for (time_s, frame) in frames {
         if context.interrupt.requested() {
             break;
@@ -637,9 +506,9 @@ fn play(
         let due = Duration::from_secs_f64(*time_s);
         // A camera would deliver the frame now.
         std::thread::sleep(due.saturating_sub(start.elapsed()));
-        live.progress.seen += 1;
+        live.counts.seen += 1;
         live.take(*time_s, frame)?;
-        live.progress.late += usize::from(start.elapsed() > due + period);
+        live.counts.late += usize::from(start.elapsed() > due + period);
         live.print_last(false, context);
     }
     Ok(())

@@ -1,5 +1,5 @@
 //! `tactile warp`: a thin-plate spline through pairs of points.
-use crate::arguments::Repetition;
+use crate::arguments::{Repetition, read_points};
 use crate::console::{Bar, Context, Exit, Failure, count, four_digits, median_ms};
 use crate::outputs::Csv;
 use clap::{Args, ValueEnum};
@@ -7,7 +7,7 @@ use nalgebra::{Point, SMatrix};
 use serde_json::json;
 use std::path::PathBuf;
 use std::time::Instant;
-use tactile_imaging::io::{PointTable, read_point_table};
+use tactile_imaging::io::PointTable;
 use tactile_imaging::tps::{
     FitOptions, Kernel, NegR, R2LogR, R3, Smoothing, ThinPlateSpline, TpsError,
 };
@@ -73,42 +73,36 @@ const TOLERANCE: f64 = 1e-10;
 
 pub fn run(arguments: &WarpArguments, context: &mut Context) -> Result<Exit, Failure> {
     let inputs = [&arguments.sources, &arguments.targets, &arguments.queries];
-    context
-        .outputs
-        .plan(&["warped.csv"], &inputs.map(PathBuf::as_path))?;
-    let names = inputs.map(|path| path.display());
-    let [sources, targets, queries] = inputs.map(read_point_table);
-    let ((sources, metres), targets, queries) = (sources?, targets?, queries?);
-    for (name, unit) in [(&names[1], targets.1), (&names[2], queries.1)] {
-        if unit != metres {
-            return Err(Failure::input(format!(
-                "only one of {} and {name} names the unit of its coordinates: name it in both \
-                 headers or in none",
-                names[0],
-            )));
+    context.outputs.plan(&["warped.csv"], &inputs)?;
+    let (tables, _) = read_points(&inputs)?;
+    match &tables[..] {
+        [
+            PointTable::Plane(a),
+            PointTable::Plane(b),
+            PointTable::Plane(q),
+        ] => with_kernel(arguments, context, [a, b, q]),
+        [
+            PointTable::Space(a),
+            PointTable::Space(b),
+            PointTable::Space(q),
+        ] => with_kernel(arguments, context, [a, b, q]),
+        _ => {
+            let [sources, targets, queries] = inputs.map(|path| path.display());
+            Err(Failure::input(format!(
+                "{sources}, {targets} and {queries} must all have two coordinates a point, or all \
+                 three"
+            )))
         }
-    }
-    match (sources, targets.0, queries.0) {
-        (PointTable::Plane(a), PointTable::Plane(b), PointTable::Plane(q)) => {
-            with_kernel(arguments, context, &[a, b, q])
-        }
-        (PointTable::Space(a), PointTable::Space(b), PointTable::Space(q)) => {
-            with_kernel(arguments, context, &[a, b, q])
-        }
-        _ => Err(Failure::input(format!(
-            "{}, {} and {} must all have two coordinates a point, or all three",
-            names[0], names[1], names[2],
-        ))),
     }
 }
 
 /// Sources, targets and queries.
-type Sets<const D: usize> = [Vec<Point<f64, D>>; 3];
+type Sets<'a, const D: usize> = [&'a [Point<f64, D>]; 3];
 
 fn with_kernel<const D: usize>(
     arguments: &WarpArguments,
     context: &mut Context,
-    sets: &Sets<D>,
+    sets: Sets<'_, D>,
 ) -> Result<Exit, Failure> {
     match arguments.kernel {
         KernelName::R2logr => warp(arguments, context, R2LogR, sets),
@@ -121,7 +115,7 @@ fn warp<const D: usize, K: Kernel>(
     arguments: &WarpArguments,
     context: &mut Context,
     kernel: K,
-    sets: &Sets<D>,
+    sets: Sets<'_, D>,
 ) -> Result<Exit, Failure> {
     let [sources, targets, queries] = sets;
     // Cross-validation is direct whatever the number of points: it takes the eigenvalues of a dense
@@ -314,7 +308,7 @@ fn table<const D: usize>(values: &[Point<f64, D>], jacobians: &[SMatrix<f64, D, 
     for i in axes {
         header.extend(axes.iter().map(|j| format!("df{i}_d{j}")));
     }
-    let mut csv = Csv::new(&header);
+    let mut csv = Csv::new(&header.join(","));
     for (value, jacobian) in values.iter().zip(jacobians) {
         let transposed = jacobian.transpose();
         csv.row(value.iter().chain(transposed.iter()));

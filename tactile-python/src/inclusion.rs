@@ -128,20 +128,11 @@ pub fn inclusion(
         .and_then(|layers| Guide::new(layers, guide_radius))
         .and_then(|guide| InclusionSearch::new(specimen, guide))
         .map_err(invalid)?;
-    result(py, &searched(py, &search, &radii, &profiles)?)
-}
-
-fn searched(
-    py: Python<'_>,
-    search: &InclusionSearch,
-    radii: &[f64],
-    profiles: &[PressureProfile],
-) -> PyResult<InclusionEstimate> {
     let mut signals = Signals::new();
     let found =
-        py.detach(|| search.search_with_progress(radii, profiles, &mut |_| signals.check()));
+        py.detach(|| search.search_with_progress(&radii, &profiles, &mut |_| signals.check()));
     signals.finish()?;
-    found.map_err(errors::refused)
+    result(py, &found.map_err(errors::refused)?)
 }
 
 fn result(py: Python<'_>, found: &InclusionEstimate) -> PyResult<Inclusion> {

@@ -418,61 +418,51 @@ pub fn strain_between(
     ];
     let sets = sets.each_ref().map(|set| set.as_array());
     let matcher = Matcher::new(matcher, options, AnnealedSoftassign::default())?;
-    let task = StrainTask {
-        sets,
-        matcher,
-        measure,
-        with_doubtful_pairs,
-    };
     match arrays::dimension(["before", "after"], sets)? {
-        2 => task.run::<2>(py),
-        _ => task.run::<3>(py),
+        2 => strained::<2>(py, sets, matcher, measure, with_doubtful_pairs),
+        _ => strained::<3>(py, sets, matcher, measure, with_doubtful_pairs),
     }
 }
 
-struct StrainTask<'a, 'py> {
-    sets: [ArrayView2<'a, f64>; 2],
+fn strained<const D: usize>(
+    py: Python<'_>,
+    sets: [ArrayView2<'_, f64>; 2],
     matcher: Matcher,
-    measure: Option<&'a Bound<'py, PyAny>>,
+    measure: Option<&Bound<'_, PyAny>>,
     with_doubtful_pairs: bool,
-}
-
-impl StrainTask<'_, '_> {
-    fn run<const D: usize>(self, py: Python<'_>) -> PyResult<StrainBetween> {
-        let matcher = self.matcher.interruptible::<D>();
-        let mut options = StrainBetweenOptions::<D>::default().with_matcher(matcher);
-        if let Some(given) = self.measure {
-            options = options.with_measure(crate::pipeline::strain_measure("measure", given)?);
-        }
-        if self.with_doubtful_pairs {
-            options = options.with_doubtful_pairs();
-        }
-        let sets = self.sets;
-        let found = py.detach(|| {
-            let [before, after] = sets.map(arrays::points);
-            strain_of_sets(&before, &after, &options)
-        });
-        let found = found.map_err(errors::strain_between)?;
-        let (mean, error) = (found.summary.mean, found.standard_error);
-        let half = error * quantile_95(Some(found.degrees_of_freedom as f64));
-        let displaced = |(i, k): (usize, usize)| found.displacements[i][k];
-        let count = found.rows.len();
-        Ok(StrainBetween {
-            text: format!("{count} points, {}", tensor_text(&mean, &error)),
-            value: arrays::kept_tensor(py, &mean),
-            standard_error: arrays::kept_tensor(py, &error),
-            interval_95: (
-                arrays::kept_tensor(py, &(mean - half)),
-                arrays::kept_tensor(py, &(mean + half)),
-            ),
-            pairs: arrays::kept(py, rows_of_pairs(&found.rows)),
-            displacements: arrays::kept(py, Array2::from_shape_fn((count, D), displaced)),
-            strains: arrays::kept_tensors(py, &found.strains),
-            standard_errors: arrays::kept_tensors(py, &found.standard_errors),
-            sigma: found.sigma,
-            flags: found.doubt.iter().map(ToString::to_string).collect(),
-        })
+) -> PyResult<StrainBetween> {
+    let matcher = matcher.interruptible::<D>();
+    let mut options = StrainBetweenOptions::<D>::default().with_matcher(matcher);
+    if let Some(given) = measure {
+        options = options.with_measure(crate::pipeline::strain_measure("measure", given)?);
     }
+    if with_doubtful_pairs {
+        options = options.with_doubtful_pairs();
+    }
+    let found = py.detach(|| {
+        let [before, after] = sets.map(arrays::points);
+        strain_of_sets(&before, &after, &options)
+    });
+    let found = found.map_err(errors::strain_between)?;
+    let (mean, error) = (found.summary.mean, found.standard_error);
+    let half = error * quantile_95(Some(found.degrees_of_freedom as f64));
+    let displaced = |(i, k): (usize, usize)| found.displacements[i][k];
+    let count = found.rows.len();
+    Ok(StrainBetween {
+        text: format!("{count} points, {}", tensor_text(&mean, &error)),
+        value: arrays::kept_tensor(py, &mean),
+        standard_error: arrays::kept_tensor(py, &error),
+        interval_95: (
+            arrays::kept_tensor(py, &(mean - half)),
+            arrays::kept_tensor(py, &(mean + half)),
+        ),
+        pairs: arrays::kept(py, rows_of_pairs(&found.rows)),
+        displacements: arrays::kept(py, Array2::from_shape_fn((count, D), displaced)),
+        strains: arrays::kept_tensors(py, &found.strains),
+        standard_errors: arrays::kept_tensors(py, &found.standard_errors),
+        sigma: found.sigma,
+        flags: found.doubt.iter().map(ToString::to_string).collect(),
+    })
 }
 
 pub fn tensor_text(mean: &Matrix3<f64>, error: &Matrix3<f64>) -> String {

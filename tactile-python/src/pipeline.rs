@@ -197,13 +197,6 @@ impl Pipeline {
         poisson_ratio_error: Option<f64>,
         adhesion_error: Option<f64>,
     ) -> PyResult<Self> {
-        let input = Input {
-            pairs,
-            sensor,
-            depth_table,
-            contact,
-            pixel_size,
-        };
         let (surface_name, own_surface) = stage("surface", "reconstruct", surface)?;
         let (integrator_name, own_integrator) = stage("integrator", "integrate", integrator)?;
         let (sampler_name, own_sampler) = stage("sampler", "sample", sampler)?;
@@ -220,7 +213,8 @@ impl Pipeline {
         let near = AnnealedSoftassign::default().with_search(Search::Near);
         let matcher = Matcher::new(matcher, matcher_options, near)?;
         let guide = waveguide.map(guide).transpose()?;
-        let pipeline = input.pipeline(object.0, &config)?;
+        let sources = [pairs, depth_table, contact];
+        let pipeline = started(object.0, &config, sensor, sources, pixel_size)?;
         let mut pipeline = (pipeline.with_settings(|settings| {
             if guide.is_some() {
                 settings.waveguide = guide;
@@ -303,66 +297,59 @@ impl Pipeline {
     }
 }
 
-/// Where force and contact come from: one of the first four.
-struct Input<'a, 'py> {
-    pairs: Option<&'a Bound<'py, PyAny>>,
-    sensor: Option<&'a Sensor>,
-    depth_table: Option<&'a Bound<'py, PyAny>>,
-    contact: Option<&'a Bound<'py, PyAny>>,
-    pixel_size: Option<&'a Bound<'py, PyAny>>,
-}
-
-impl Input<'_, '_> {
-    fn pipeline(&self, object: rust::Object, config: &StagesConfig) -> PyResult<rust::Pipeline> {
-        let given = [
-            self.pairs.is_some(),
-            self.sensor.is_some(),
-            self.depth_table.is_some(),
-            self.contact.is_some(),
-        ];
-        if given.into_iter().filter(|given| *given).count() > 1 {
-            return Err(PyTypeError::new_err(
-                "only one of pairs, sensor, depth_table and contact may be given",
-            ));
-        }
-        if let Some(Sensor(sensor)) = self.sensor {
-            let pipeline = sensor.pipeline(object);
-            let staged = pipeline.and_then(|pipeline| pipeline.with_stages(config));
-            return staged.map_err(errors::pipeline);
-        }
-        let missing = || PyTypeError::new_err("pixel_size is missing");
-        let size = arrays::pixel_size(self.pixel_size.ok_or_else(missing)?)?;
-        let pipeline = if let Some(contact) = self.contact {
-            let stage = OwnStage::new("contact", "measure", contact)?;
-            let pixel_size_m = size;
-            rust::Pipeline::new(
-                OwnContact {
-                    stage,
-                    pixel_size_m,
-                },
-                object,
-            )
-        } else if let Some(table) = self.depth_table {
-            let table = arrays::columns::<2>("depth_table", table)?;
-            let table: Vec<(f64, f64)> = table.into_iter().map(Into::into).collect();
-            let contact = DarkContact::new(&table, size).map_err(errors::pipeline)?;
-            let depths = DarkContact::depth_table(&table).map_err(errors::pipeline)?;
-            return rust::Pipeline::new(contact, object)
-                .and_then(|pipeline| pipeline.with_stages(config))
-                .map(|pipeline| pipeline.with_surface(depths, SurfaceInput::Signal))
-                .map_err(errors::pipeline);
-        } else if let Some(pairs) = self.pairs {
-            let pair = |[light, force]: [f64; 2]| CalibrationPair::loading(light, force);
-            let pairs = arrays::columns::<2>("pairs", pairs)?;
-            let pairs: Vec<_> = pairs.into_iter().map(pair).collect();
-            rust::Pipeline::from_pairs(&pairs, size, object)
-        } else {
-            LightContact::gauged(size, &ForceOptions::default())
-                .and_then(|contact| rust::Pipeline::new(contact, object))
-        };
-        let staged = pipeline.and_then(|pipeline| pipeline.with_stages(config));
-        staged.map_err(errors::pipeline)
+/// Where force and contact come from: a sensor, or one of calibration pairs, a table of depths and
+/// an object at most.
+fn started(
+    object: rust::Object,
+    config: &StagesConfig,
+    sensor: Option<&Sensor>,
+    sources: [Option<&Bound<'_, PyAny>>; 3],
+    pixel_size: Option<&Bound<'_, PyAny>>,
+) -> PyResult<rust::Pipeline> {
+    let others = sources.iter().filter(|given| given.is_some()).count();
+    if others + usize::from(sensor.is_some()) > 1 {
+        return Err(PyTypeError::new_err(
+            "only one of pairs, sensor, depth_table and contact may be given",
+        ));
     }
+    if let Some(Sensor(sensor)) = sensor {
+        let pipeline = sensor.pipeline(object);
+        let staged = pipeline.and_then(|pipeline| pipeline.with_stages(config));
+        return staged.map_err(errors::pipeline);
+    }
+    let [pairs, depth_table, contact] = sources;
+    let missing = || PyTypeError::new_err("pixel_size is missing");
+    let size = arrays::pixel_size(pixel_size.ok_or_else(missing)?)?;
+    let pipeline = if let Some(contact) = contact {
+        let stage = OwnStage::new("contact", "measure", contact)?;
+        let pixel_size_m = size;
+        rust::Pipeline::new(
+            OwnContact {
+                stage,
+                pixel_size_m,
+            },
+            object,
+        )
+    } else if let Some(table) = depth_table {
+        let table = arrays::columns::<2>("depth_table", table)?;
+        let table: Vec<(f64, f64)> = table.into_iter().map(Into::into).collect();
+        let contact = DarkContact::new(&table, size).map_err(errors::pipeline)?;
+        let depths = DarkContact::depth_table(&table).map_err(errors::pipeline)?;
+        return rust::Pipeline::new(contact, object)
+            .and_then(|pipeline| pipeline.with_stages(config))
+            .map(|pipeline| pipeline.with_surface(depths, SurfaceInput::Signal))
+            .map_err(errors::pipeline);
+    } else if let Some(pairs) = pairs {
+        let pair = |[light, force]: [f64; 2]| CalibrationPair::loading(light, force);
+        let pairs = arrays::columns::<2>("pairs", pairs)?;
+        let pairs: Vec<_> = pairs.into_iter().map(pair).collect();
+        rust::Pipeline::from_pairs(&pairs, size, object)
+    } else {
+        LightContact::gauged(size, &ForceOptions::default())
+            .and_then(|contact| rust::Pipeline::new(contact, object))
+    };
+    let staged = pipeline.and_then(|pipeline| pipeline.with_stages(config));
+    staged.map_err(errors::pipeline)
 }
 
 /// A stage as its name, or none and the object.

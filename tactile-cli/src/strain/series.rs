@@ -1,5 +1,7 @@
 //! `tactile strain` of three frames and more: points are followed from frame to frame.
-use super::{Measured, SERIES_FILES, StrainArguments, components, components_json};
+use super::{
+    SERIES_FILES, StrainArguments, StrainReport, components_json, strain_cells, strain_headings,
+};
 use crate::console::{Context, printable};
 use crate::outputs::Csv;
 use nalgebra::{Matrix3, Point};
@@ -11,21 +13,23 @@ use tactile_imaging::{SeriesStrain, StrainBetween, StrainSeries};
 /// after Ctrl-C.
 pub fn follow<const D: usize>(
     frames: &[Vec<Point<f64, D>>],
-    unit: &str,
+    unit: &'static str,
     arguments: &StrainArguments,
     context: &mut Context,
-) -> Option<Measured<D>> {
+) -> Option<StrainReport<D>> {
     let mut series = StrainSeries::new(&frames[0], arguments.options());
-    let mut report = SeriesReport::<D>::new(unit);
+    let mut report = SeriesReport::<D>::new();
     // Frames of the series are those that were not refused.
     let mut followed = vec![0];
-    let mut measured = Measured {
+    let mut measured = StrainReport {
         before: frames[0].clone(),
         after: Vec::new(),
         matched: Vec::new(),
         strain: Err("no frame could be followed".to_owned()),
         frames: None,
         complete: true,
+        measure: arguments.measure.strain().name(),
+        unit,
     };
     for (k, next) in frames.iter().enumerate().skip(1) {
         let name = printable(&arguments.frames[k].display().to_string());
@@ -46,7 +50,9 @@ pub fn follow<const D: usize>(
         }
         report.add(k, &name, &found.map_err(|error| error.to_string()), context);
     }
-    let mut tracks = Csv::new(&report.header);
+    let mut header = ["track", "frame", "row"].map(str::to_owned).to_vec();
+    header.extend(measured.headings("", ""));
+    let mut tracks = Csv::new(&header.join(","));
     for (track, places) in series.tracks().iter().enumerate() {
         for &(frame, row) in places {
             let frame = followed[frame];
@@ -65,31 +71,19 @@ pub fn follow<const D: usize>(
 
 /// What is known of the frames.
 struct SeriesReport<const D: usize> {
-    /// Columns of the tracks.
-    header: Vec<String>,
     table: Csv,
     frames: Vec<Value>,
 }
 
 impl<const D: usize> SeriesReport<D> {
-    fn new(unit: &str) -> Self {
-        let suffix = if unit == super::METRES { "_m" } else { "" };
-        let axes = ["x", "y", "z"][..D].iter().map(|a| format!("{a}{suffix}"));
-        let fixed = ["track", "frame", "row"].map(str::to_owned);
-        let header = fixed.into_iter().chain(axes).collect();
+    fn new() -> Self {
         let mut columns = vec!["frame".to_owned()];
         for part in ["step", "total"] {
             columns.push(format!("pairs_{part}"));
-            columns.extend(components::<D>().iter().map(|c| format!("{}_{part}", c.0)));
-            columns.extend(
-                components::<D>()
-                    .iter()
-                    .map(|c| format!("se_{}_{part}", c.0)),
-            );
+            columns.extend(strain_headings::<D>(&format!("_{part}")));
         }
         Self {
-            header,
-            table: Csv::new(&columns),
+            table: Csv::new(&columns.join(",")),
             frames: Vec::new(),
         }
     }
@@ -115,10 +109,8 @@ impl<const D: usize> SeriesReport<D> {
             match part {
                 Ok(strain) => {
                     cells.push(Some(strain.rows.len() as f64));
-                    for tensor in [&strain.summary.mean, &strain.standard_error] {
-                        let component = |(_, i, j): super::Component| Some(tensor[(i, j)]);
-                        cells.extend(components::<D>().into_iter().map(component));
-                    }
+                    let means = strain_cells::<D>(&strain.summary.mean, &strain.standard_error);
+                    cells.extend(means.map(Some));
                     value[name] = json!({
                         "pairs": strain.rows.len(), "noise_per_coordinate": strain.sigma,
                         "doubt": strain.doubt.map(|doubt| doubt.to_string()),
@@ -126,7 +118,7 @@ impl<const D: usize> SeriesReport<D> {
                     });
                 }
                 Err(reason) => {
-                    cells.extend(vec![None; 1 + 2 * components::<D>().len()]);
+                    cells.extend(vec![None; 1 + strain_headings::<D>("").len()]);
                     value[name] = json!({ "error": reason });
                 }
             }

@@ -1,20 +1,17 @@
 //! `tactile stream` with a gel that is lit in colours: force, contact and depth live.
-use super::watch::{FrameCounts, Watcher, listed, watch};
-use super::{Shown, StreamArguments};
+use super::StreamArguments;
+use super::watch::{Meter, Watch, listed, watch};
 use crate::console::{Context, Exit, Failure};
-use crate::frames::DEFAULT_RATE_HZ;
-use crate::outputs::Csv;
 use crate::photometric::{GelContact, NO_FRAMES, Reader, number_or_error};
 use crate::relief::HeightGrid;
 use ndarray::{Array2, Array3};
 use serde_json::{Value, json};
+use std::error::Error;
 use std::path::Path;
-use std::time::{Duration, Instant};
 use tactile_imaging::core::Estimate;
 
 /// The results of one frame.
-struct Row {
-    time_s: f64,
+pub struct Row {
     /// None without contact, or why it has none.
     force_n: Result<Option<Estimate>, String>,
     contact: Option<GelContact>,
@@ -24,127 +21,48 @@ impl Row {
     fn force(&self) -> Option<Estimate> {
         self.force_n.as_ref().ok().copied().flatten()
     }
-
-    /// Adds the row, with empty cells for unknown values.
-    fn add_to(&self, csv: &mut Csv) {
-        let pair = |of: Option<Estimate>| of.map_or([None; 2], |e| pair(e).map(Some));
-        let contact = self.contact.as_ref();
-        let force = pair(self.force());
-        let area = contact.map(|contact| contact.area_m2);
-        let depth = pair(contact.map(|contact| contact.largest_depth_m));
-        csv.cells([&[Some(self.time_s)][..], &force, &[area], &depth].concat());
-    }
 }
 
 fn pair(of: Estimate) -> [f64; 2] {
     [of.value, of.standard_error]
 }
 
-const COLUMNS: [&str; 6] = [
-    "time_s",
-    "force_N",
-    "force_error_N",
-    "contact_area_m2",
-    "largest_depth_m",
-    "largest_depth_error_m",
-];
-
-/// A sensor with the results of every frame so far.
-struct Live {
+/// A sensor with the depth in the last frame.
+struct Gel {
     reader: Reader,
-    rows: Vec<Row>,
-    progress: FrameCounts,
-    shown: Shown,
+    depth_m: Array2<f64>,
 }
 
-impl Live {
-    fn show(&mut self, frame: &Array3<u8>, depth_m: &Array2<f64>) {
-        let (Some(page), Some(row)) = (&mut self.shown.page, self.rows.last()) else {
-            return;
-        };
-        let contact = row.contact.as_ref();
-        let columns = frame.dim().1 as f64;
-        let numbers = json!({
-            "frame": self.progress.seen, "time_s": row.time_s, "late": self.progress.late,
-            "cautions": [], "force_n": row.force().map(pair),
-            "centre": contact.map(|contact| contact.centroid.map(|c| c / columns)),
-            "depth_m": contact.map(|contact| pair(contact.largest_depth_m)),
-        });
-        let size = 1e3 * self.reader.stereo.model().pixel_size_m;
-        page.show(numbers, frame.view(), || {
-            let relief = HeightGrid::of(depth_m.mapv(|z| 1e3 * z).view(), [size; 2]);
-            json!({ "name": "depth", "relief": relief, "health": "" })
-        });
-    }
-
-    fn print_heading(context: &mut Context) {
-        context.line("time (s)   force (N)   largest depth (mm)   contact (mm²)   late (%)");
-    }
-
-    /// Prints the results of the whole series, and adds its table to the files.
-    fn finish(self, allowed_late: f64, context: &mut Context) -> Exit {
-        let (count, progress) = (self.rows.len(), self.progress);
-        progress.print(count, context);
-        if let Err(reason) = &self.reader.law {
-            context.answer("force", format_args!("none: {reason}"));
-        }
-        let update = |row: &Row| {
-            json!({
-                "time_s": row.time_s, "force_n": number_or_error(&row.force_n),
-                "contact": row.contact,
-            })
-        };
-        context.value(&json!({
-            "frames": count, "rate_hz": progress.rate_hz, "late": progress.late,
-            "updates": self.rows.iter().map(update).collect::<Vec<Value>>(),
-        }));
-        let mut csv = Csv::new(&COLUMNS);
-        self.rows.iter().for_each(|row| row.add_to(&mut csv));
-        context.outputs.add("stream.csv", csv.into_bytes());
-        let percent = progress.late_percent(count);
-        if percent > allowed_late {
-            context.note(format_args!(
-                "{percent:.1} % of the frames came late, more than {allowed_late} %"
-            ));
-        }
-        Exit::complete_if(progress.unusable == 0 && percent <= allowed_late)
-    }
-}
-
-impl Watcher for Live {
+impl Meter for Gel {
     type Frame = Array3<u8>;
+    type Row = Row;
 
-    fn progress(&mut self) -> &mut FrameCounts {
-        &mut self.progress
+    fn heading(&self) -> String {
+        "time (s)   force (N)   largest depth (mm)   contact (mm²)   late (%)".to_owned()
     }
 
-    fn measured(&self) -> usize {
-        self.rows.len()
-    }
+    const COLUMNS: &'static str =
+        "force_N,force_error_N,contact_area_m2,largest_depth_m,largest_depth_error_m";
 
-    fn take(&mut self, time_s: f64, frame: &Array3<u8>) -> Result<Duration, Failure> {
-        self.shown.record(frame.view(), self.progress.rate_hz)?;
-        let start = Instant::now();
-        let reading = self.reader.stereo.read(frame.view());
-        let reading = reading.map_err(|error| {
-            Failure::no_answer(format!("frame {}: {error}", self.progress.seen))
-        })?;
-        self.rows.push(Row {
-            time_s,
+    fn measure(&mut self, frame: &Array3<u8>) -> Result<Row, Box<dyn Error>> {
+        let reading = self.reader.stereo.read(frame.view())?;
+        let row = Row {
             force_n: self.reader.force(&reading),
             contact: GelContact::of(&reading, self.reader.stereo.model().pixel_size_m),
-        });
-        self.show(frame, &reading.depth_m);
-        let took = start.elapsed();
-        if let Some(row) = self.rows.last() {
-            self.shown
-                .record_answer(self.rows.len(), &COLUMNS, |csv| row.add_to(csv))?;
-        }
-        Ok(took)
+        };
+        self.depth_m = reading.depth_m;
+        Ok(row)
     }
 
-    fn last_line(&self) -> Option<String> {
-        let row = self.rows.last()?;
+    fn cells(row: &Row) -> Vec<Option<f64>> {
+        let cells = |of: Option<Estimate>| of.map_or([None; 2], |e| pair(e).map(Some));
+        let contact = row.contact.as_ref();
+        let area = contact.map(|contact| contact.area_m2);
+        let depth = cells(contact.map(|contact| contact.largest_depth_m));
+        [&cells(row.force())[..], &[area], &depth].concat()
+    }
+
+    fn line(row: &Row, time_s: f64, late_percent: f64) -> String {
         let number = |value: Option<f64>, digits: usize| {
             value.map_or_else(|| "-".to_owned(), |value| format!("{value:.digits$}"))
         };
@@ -152,10 +70,26 @@ impl Watcher for Live {
         let force = number(row.force().map(|force| force.value), 3);
         let depth = number(contact.map(|c| 1e3 * c.largest_depth_m.value), 3);
         let area = number(contact.map(|c| 1e6 * c.area_m2), 2);
-        let (time, late) = (row.time_s, self.progress.late_percent(self.rows.len()));
-        Some(format!(
-            "{time:8.3} {force:>11} {depth:>20} {area:>15} {late:10.1}"
-        ))
+        format!("{time_s:8.3} {force:>11} {depth:>20} {area:>15} {late_percent:10.1}")
+    }
+
+    fn update(row: &Row) -> Value {
+        json!({ "force_n": number_or_error(&row.force_n), "contact": row.contact })
+    }
+
+    fn shown(&self, row: &Row, columns: f64) -> Value {
+        let contact = row.contact.as_ref();
+        json!({
+            "cautions": [], "force_n": row.force().map(pair),
+            "centre": contact.map(|contact| contact.centroid.map(|c| c / columns)),
+            "depth_m": contact.map(|contact| pair(contact.largest_depth_m)),
+        })
+    }
+
+    fn surface(&mut self) -> Value {
+        let size = 1e3 * self.reader.stereo.model().pixel_size_m;
+        let relief = HeightGrid::of(self.depth_m.mapv(|z| 1e3 * z).view(), [size; 2]);
+        json!({ "name": "depth", "relief": relief, "health": "" })
     }
 }
 
@@ -179,13 +113,21 @@ pub fn coloured(
     }
     let reader = Reader::open(sensor)?;
     let reading = reader.reading(sensor);
-    let mut live = Live {
+    let gel = Gel {
         reader,
-        rows: Vec::new(),
-        progress: FrameCounts::new(arguments.rate.unwrap_or(DEFAULT_RATE_HZ)),
-        shown: Shown::new(arguments, context)?,
+        depth_m: Array2::default((0, 0)),
     };
-    Live::print_heading(context);
+    let mut live = Watch::new(gel, arguments, context)?;
     watch(&mut live, &frames, reading, arguments.rate, context)?;
-    Ok(live.finish(arguments.allowed_late, context))
+    // Prints the results of the whole series.
+    live.counts.print(live.rows.len(), context);
+    if let Err(reason) = &live.meter.reader.law {
+        context.answer("force", format_args!("none: {reason}"));
+    }
+    context.value(&live.value());
+    let exit = live.close(arguments.allowed_late, context);
+    Ok(match live.counts.unusable {
+        0 => exit,
+        _ => Exit::Partial,
+    })
 }

@@ -1,33 +1,143 @@
 //! The frames of a stream one after the other: from images, folders, videos and pipes.
+use super::StreamArguments;
 use crate::console::{Bar, Context, Exit, Failure};
-use crate::frames::{Pixels, Reading};
-use serde_json::json;
+use crate::frames::{DEFAULT_RATE_HZ, Pixels, Reading};
+use crate::outputs::Csv;
+use crate::record::FrameRecorder;
+use crate::serve::LivePage;
+use serde_json::{Value, json};
+use std::error::Error;
 use std::path::{Path, PathBuf};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// What measures the frames of a stream.
-pub trait Watcher {
+pub trait Meter {
     /// Frames as it takes them.
     type Frame: Pixels;
+    /// The answer of a frame.
+    type Row;
 
-    fn progress(&mut self) -> &mut FrameCounts;
+    /// What stands above the lines, and in a table above the cells.
+    fn heading(&self) -> String;
+    const COLUMNS: &'static str;
 
-    /// The number of frames with an answer.
-    fn measured(&self) -> usize;
+    fn measure(&mut self, frame: &Self::Frame) -> Result<Self::Row, Box<dyn Error>>;
 
-    /// Measures a frame and shows its answer. Returns how long that took.
-    fn take(&mut self, time_s: f64, frame: &Self::Frame) -> Result<Duration, Failure>;
+    /// The answer as cells of a table, the unknown ones empty.
+    fn cells(row: &Self::Row) -> Vec<Option<f64>>;
 
-    /// The last frame's answer as a line. None before the first.
-    fn last_line(&self) -> Option<String>;
+    /// The answer as a line between the frame's time and the share that came late.
+    fn line(row: &Self::Row, time_s: f64, late_percent: f64) -> String;
+
+    /// The answer as JSON has it.
+    fn update(row: &Self::Row) -> Value;
+
+    /// The answer for browsers. A frame has this many columns.
+    fn shown(&self, row: &Self::Row, columns: f64) -> Value;
+
+    /// The surface in the last frame, for browsers.
+    fn surface(&mut self) -> Value;
+}
+
+/// A meter with the results of every frame so far.
+pub struct Watch<M: Meter> {
+    pub meter: M,
+    /// Times in seconds and answers.
+    pub rows: Vec<(f64, M::Row)>,
+    pub counts: FrameCounts,
+    page: Option<LivePage>,
+    recording: Option<FrameRecorder>,
+}
+
+impl<M: Meter> Watch<M> {
+    pub fn new(meter: M, arguments: &StreamArguments, context: &Context) -> Result<Self, Failure> {
+        let page = arguments.serve.map(LivePage::serve).transpose()?;
+        if let Some(page) = &page {
+            context.note(format_args!("the measurement is shown at {}", page.url));
+        }
+        let recording = arguments.record.as_deref().map(FrameRecorder::create);
+        Ok(Self {
+            meter,
+            rows: Vec::new(),
+            counts: FrameCounts::new(arguments.rate.unwrap_or(DEFAULT_RATE_HZ)),
+            page,
+            recording: recording.transpose()?,
+        })
+    }
+
+    /// Measures a frame, shows and records it. Returns how long the measuring and showing took.
+    pub fn take(&mut self, time_s: f64, frame: &M::Frame) -> Result<Duration, Failure> {
+        let FrameCounts { seen, late, .. } = self.counts;
+        if let Some(recording) = &mut self.recording {
+            recording.frame(frame.channels(), self.counts.rate_hz)?;
+        }
+        let start = Instant::now();
+        let row = self.meter.measure(frame);
+        let row = row.map_err(|error| Failure::no_answer(format!("frame {seen}: {error}")))?;
+        if let Some(page) = &mut self.page {
+            let mut shown = self.meter.shown(&row, frame.size().1 as f64);
+            shown["frame"] = json!(seen);
+            shown["time_s"] = json!(time_s);
+            shown["late"] = json!(late);
+            page.show(shown, frame.channels(), || self.meter.surface());
+        }
+        let took = start.elapsed();
+        self.rows.push((time_s, row));
+        if let Some(recording) = &mut self.recording {
+            let (before, last) = self.rows.split_at(self.rows.len() - 1);
+            recording.answers(&Self::table(last, before.is_empty()))?;
+        }
+        Ok(took)
+    }
+
+    /// A row a frame. The first one comes with the names of the columns.
+    fn table(rows: &[(f64, M::Row)], with_names: bool) -> Vec<u8> {
+        let mut csv = match with_names {
+            true => Csv::new(&format!("time_s,{}", M::COLUMNS)),
+            false => Csv::default(),
+        };
+        for (time_s, row) in rows {
+            csv.cells(std::iter::once(Some(*time_s)).chain(M::cells(row)));
+        }
+        csv.into_bytes()
+    }
 
     /// Prints a line for every frame or, of a long series, for one out of sixteen.
-    fn print_last(&self, every_one: bool, context: &mut Context) {
-        if let Some(line) = self.last_line()
-            && (every_one || (self.measured() - 1).is_multiple_of(16))
+    pub fn print_last(&self, every_one: bool, context: &mut Context) {
+        if let Some((time_s, row)) = self.rows.last()
+            && (every_one || (self.rows.len() - 1).is_multiple_of(16))
         {
-            context.line(line.trim_end());
+            let late = self.counts.late_percent(self.rows.len());
+            context.line(M::line(row, *time_s, late).trim_end());
         }
+    }
+
+    /// What the answer has whatever is measured.
+    pub fn value(&self) -> Value {
+        let update = |(time_s, row): &(f64, M::Row)| {
+            let mut value = M::update(row);
+            value["time_s"] = json!(time_s);
+            value
+        };
+        json!({
+            "frames": self.rows.len(), "rate_hz": self.counts.rate_hz, "late": self.counts.late,
+            "updates": self.rows.iter().map(update).collect::<Vec<Value>>(),
+        })
+    }
+
+    /// Adds the table of the series to the files. Complete if no more frames came late than allowed
+    /// in per cent.
+    pub fn close(&self, allowed_late: f64, context: &mut Context) -> Exit {
+        context
+            .outputs
+            .add("stream.csv", Self::table(&self.rows, true));
+        let percent = self.counts.late_percent(self.rows.len());
+        if percent > allowed_late {
+            context.note(format_args!(
+                "{percent:.1} % of the frames came late, more than {allowed_late} %"
+            ));
+        }
+        Exit::complete_if(percent <= allowed_late)
     }
 }
 
@@ -68,42 +178,42 @@ impl FrameCounts {
 
 /// Measures the frames of these files as they come. A file that breaks off or cannot be read is a
 /// caution, and the next one follows.
-pub fn watch<W: Watcher>(
-    watcher: &mut W,
+pub fn watch<M: Meter>(
+    watch: &mut Watch<M>,
     frames: &[PathBuf],
     reading: Reading<'_>,
     rate_hz: Option<f64>,
     context: &mut Context,
 ) -> Result<(), Failure> {
+    context.line(watch.meter.heading());
     // The clock of a recording is the number in its frames' names, where they have one.
     let numbers = numbers(frames);
     let last = numbers.as_deref().and_then(<[_]>::last);
     let missing = last.map_or(0, |&last| last + 1 - frames.len() as u64);
     let mut bar = Bar::of(frames.len(), "measuring");
-    let mut frame = W::Frame::default();
+    let mut frame = M::Frame::default();
     context.interrupt.polled(true);
     for (k, path) in frames.iter().enumerate() {
         if context.interrupt.requested() {
             break;
         }
         if let Some(numbers) = &numbers {
-            watcher.progress().seen = numbers[k] as usize;
+            watch.counts.seen = numbers[k] as usize;
         }
         // A torn frame does not end a recording. Of a stream it ends what comes from there.
-        if let Err(failure) = file(watcher, path, reading, rate_hz, &mut frame, context) {
+        if let Err(failure) = file(watch, path, reading, rate_hz, &mut frame, context) {
             if failure.exit == Exit::Output {
                 return Err(failure);
             }
-            let progress = watcher.progress();
-            progress.unusable += 1;
-            progress.seen = progress.seen.max(k + 1);
+            watch.counts.unusable += 1;
+            watch.counts.seen = watch.counts.seen.max(k + 1);
             context.caution(failure);
         }
         bar.done(k + 1);
     }
     drop(bar);
-    let unusable = watcher.progress().unusable;
-    if watcher.measured() == 0 && unusable > 0 {
+    let unusable = watch.counts.unusable;
+    if watch.rows.is_empty() && unusable > 0 {
         return Err(Failure::input(format!(
             "none of the {unusable} inputs can be measured"
         )));
@@ -122,40 +232,39 @@ pub fn watch<W: Watcher>(
 }
 
 /// Measures the frames of a file or a pipe as they come, in the memory of `frame`.
-fn file<W: Watcher>(
-    watcher: &mut W,
+fn file<M: Meter>(
+    watch: &mut Watch<M>,
     path: &Path,
     reading: Reading<'_>,
     rate_hz: Option<f64>,
-    frame: &mut W::Frame,
+    frame: &mut M::Frame,
     context: &mut Context,
 ) -> Result<(), Failure> {
     let mut source = reading.open(path)?;
     if let Some(rate_hz) = rate_hz.or(source.frame_rate_hz()) {
-        watcher.progress().rate_hz = rate_hz;
+        watch.counts.rate_hz = rate_hz;
     }
     while !context.interrupt.requested() && frame.read_next(&mut source)?.is_some() {
         reading.fits(path, frame)?;
-        let progress = watcher.progress();
-        let rate_hz = progress.rate_hz;
-        let time_s = progress.seen as f64 / rate_hz;
-        progress.seen += 1;
+        let rate_hz = watch.counts.rate_hz;
+        let time_s = watch.counts.seen as f64 / rate_hz;
+        watch.counts.seen += 1;
         // Reading the file is not part of the measurement.
-        match watcher.take(time_s, frame) {
+        match watch.take(time_s, frame) {
             Ok(took) => {
-                watcher.progress().late += usize::from(took.as_secs_f64() > 1.0 / rate_hz);
+                watch.counts.late += usize::from(took.as_secs_f64() > 1.0 / rate_hz);
             }
             // A frame without an answer does not end a stream, and thousands of them are one
             // trouble.
             Err(failure) if failure.exit == Exit::Partial => {
-                watcher.progress().unusable += 1;
-                if watcher.progress().unusable <= 3 {
+                watch.counts.unusable += 1;
+                if watch.counts.unusable <= 3 {
                     context.caution(Failure::in_file(path, failure));
                 }
             }
             Err(failure) => return Err(failure),
         }
-        watcher.print_last(watcher.measured() <= 32, context);
+        watch.print_last(watch.rows.len() <= 32, context);
     }
     Ok(())
 }

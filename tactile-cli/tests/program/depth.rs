@@ -1,7 +1,6 @@
 //! Depth from a table: the grey that it is entered with, and where its depths are counted from.
-use super::harness::{run, text, words};
+use super::harness::{run, value, words};
 use super::json::assert_keeps_to_schema;
-use serde_json::Value;
 use std::fs;
 
 /// A frame of 40 × 40 pixels of grey 200, a stamp of 20 × 20 in the middle darker by this much in
@@ -33,8 +32,7 @@ fn the_grey_and_the_zero_are_those_of_the_table() {
              {options}"
         );
         let output = run(folder.path(), &words(&call));
-        let value: Value = serde_json::from_slice(&output.stdout)
-            .unwrap_or_else(|e| panic!("{e}: {}", text(&output.stderr)));
+        let value = value(&output);
         assert_keeps_to_schema(&value, &call);
         1e3 * value["frames"][0]["contact"]["surface"]["largest_depth_m"]
             .as_f64()

@@ -1,4 +1,5 @@
 //! Running the program.
+use serde_json::Value;
 use std::ffi::OsStr;
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
@@ -22,6 +23,20 @@ pub(crate) fn tactile(folder: &Path, arguments: &[impl AsRef<OsStr>]) -> Command
 
 pub(crate) fn run(folder: &Path, arguments: &[impl AsRef<OsStr>]) -> Output {
     tactile(folder, arguments).output().expect("sh runs")
+}
+
+/// What a call prints that ends well.
+pub(crate) fn printed(folder: &Path, call: &str) -> String {
+    let output = run(folder, &words(call));
+    let errors = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(0), "tactile {call}: {errors}");
+    text(&output.stdout)
+}
+
+/// The JSON object of a call.
+pub(crate) fn value(output: &Output) -> Value {
+    serde_json::from_slice(&output.stdout)
+        .unwrap_or_else(|e| panic!("{e}: {}", text(&output.stderr)))
 }
 
 /// The words of a line of a shell, without quotes.

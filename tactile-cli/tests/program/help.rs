@@ -1,5 +1,5 @@
 //! Every example in the help runs as it stands.
-use super::harness::{folder_with_examples, run, text, words};
+use super::harness::{folder_with_examples, printed, words};
 use super::json::assert_keeps_to_schema;
 use std::collections::BTreeSet;
 
@@ -13,16 +13,14 @@ fn examples(help: &str) -> Vec<String> {
         .collect()
 }
 
-fn help(arguments: &[&str]) -> String {
+fn help(arguments: &str) -> String {
     let folder = tempfile::tempdir().unwrap();
-    let output = run(folder.path(), arguments);
-    assert_eq!(output.status.code(), Some(0), "{arguments:?}");
-    text(&output.stdout)
+    printed(folder.path(), arguments)
 }
 
 /// The subcommands that the help lists.
 fn subcommands() -> Vec<String> {
-    let help = help(&["--help"]);
+    let help = help("--help");
     let list = help.split("Commands:").nth(1).expect("a list of commands");
     let lines = list
         .lines()
@@ -37,13 +35,8 @@ fn subcommands() -> Vec<String> {
 
 fn runs(example: &str) {
     let folder = folder_with_examples();
-    let output = run(folder.path(), &words(example));
-    let errors = text(&output.stderr);
-    assert_eq!(output.status.code(), Some(0), "tactile {example}: {errors}");
-    assert!(
-        !output.stdout.is_empty(),
-        "tactile {example} prints nothing"
-    );
+    let printed = printed(folder.path(), example);
+    assert!(!printed.is_empty(), "tactile {example} prints nothing");
     // Files go to --out and nowhere else.
     let entries = std::fs::read_dir(folder.path()).unwrap();
     let left: BTreeSet<_> = entries.map(|e| e.unwrap().file_name()).collect();
@@ -56,7 +49,7 @@ fn every_example_of_every_subcommand_runs() {
     let names = subcommands();
     assert!(names.len() >= 12, "{names:?}");
     for name in names {
-        let found = examples(&help(&[&name, "--help"]));
+        let found = examples(&help(&format!("{name} --help")));
         assert!(!found.is_empty(), "the help of {name} shows no example");
         found.iter().for_each(|example| runs(example));
     }
@@ -64,7 +57,7 @@ fn every_example_of_every_subcommand_runs() {
 
 #[test]
 fn the_first_help_shows_one_example_for_each_subcommand() {
-    let shown = examples(&help(&["--help"]));
+    let shown = examples(&help("--help"));
     let names: Vec<_> = shown.iter().map(|example| words(example)[0]).collect();
     // The next test runs them.
     let distinct: BTreeSet<_> = names.iter().copied().collect();
@@ -86,17 +79,13 @@ const OTHER_ANSWERS: [&str; 5] = [
 #[test]
 fn json_of_every_example_keeps_to_the_schema() {
     let folder = folder_with_examples();
-    let mut calls = examples(&help(&["--help"]));
+    let mut calls = examples(&help("--help"));
     // Other answers of the same subcommands.
     calls.extend(OTHER_ANSWERS.map(str::to_owned));
     for example in calls {
-        let mut arguments = words(&example);
-        arguments.push("--json");
-        let output = run(folder.path(), &arguments);
-        let errors = text(&output.stderr);
-        assert_eq!(output.status.code(), Some(0), "tactile {example}: {errors}");
-        let value: serde_json::Value = serde_json::from_slice(&output.stdout)
-            .unwrap_or_else(|e| panic!("tactile {example}: {e}"));
+        let printed = printed(folder.path(), &format!("{example} --json"));
+        let value: serde_json::Value =
+            serde_json::from_str(&printed).unwrap_or_else(|e| panic!("tactile {example}: {e}"));
         assert_keeps_to_schema(&value, &example);
     }
 }

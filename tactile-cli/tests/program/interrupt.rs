@@ -9,13 +9,8 @@ use std::time::{Duration, Instant};
 /// Longest time from Ctrl-C to the end, on a busy machine: the work itself would go on for minutes.
 const SOON: Duration = Duration::from_secs(30);
 
-/// Starts the program, sends it Ctrl-C a moment after it has printed its first line, and returns
-/// what it printed and its exit code.
-fn interrupted(folder: &Path, arguments: &str, lines_before: usize) -> (String, Option<i32>) {
-    ended_by("-INT", folder, arguments, lines_before)
-}
-
-/// As [`interrupted`], by another signal.
+/// Starts the program, sends it a signal (that of Ctrl-C is `-INT`) a moment after it has printed
+/// some lines, and returns what it printed and its exit code.
 fn ended_by(
     signal: &str,
     folder: &Path,
@@ -88,7 +83,7 @@ fn matching_leaves_the_cases_that_are_done() {
         |name: &str, n: usize| format!("case {name} 2 {n} {n}\n{}{}", rows(n, "m"), rows(n, "t"));
     let cases = case("small", 40) + &case("large", LARGE);
     fs::write(folder.path().join("both.txt"), cases).unwrap();
-    let (printed, code) = interrupted(folder.path(), "match both.txt --out results", 1);
+    let (printed, code) = ended_by("-INT", folder.path(), "match both.txt --out results", 1);
     assert_eq!(code, Some(130), "{printed}");
     assert!(printed.starts_with("small: 40 of 40"), "{printed}");
     let answers = fs::read_to_string(folder.path().join("results/both.txt")).unwrap();
@@ -111,7 +106,7 @@ fn a_stream_ends_with_what_it_has_measured() {
     let folder = folder_with_examples();
     let call = "stream --rate 20 --period 60 --allowed-late 100 --out results";
     // Making the frames is interrupted, then the frames that are there are not played.
-    let (printed, code) = interrupted(folder.path(), call, 0);
+    let (printed, code) = ended_by("-INT", folder.path(), call, 0);
     assert_eq!(code, Some(130), "{printed}");
 }
 
@@ -130,7 +125,7 @@ fn work_that_has_nothing_yet_ends_at_once() {
         ("light --rays 9000000", 1),
         ("measure --repeat 4000", 0),
     ] {
-        let (printed, code) = interrupted(folder.path(), call, lines);
+        let (printed, code) = ended_by("-INT", folder.path(), call, lines);
         assert_eq!(code, Some(130), "tactile {call}: {printed}");
     }
     assert!(!folder.path().join("results").exists());

@@ -1,5 +1,5 @@
 //! A sensor calibrated from frames by the program.
-use super::harness::{run, text, words};
+use super::harness::{printed, run, text, words};
 use super::json::assert_keeps_to_schema;
 use std::fs;
 use std::path::Path;
@@ -25,12 +25,8 @@ fn calibration(from: &str, to: &str) -> TempDir {
 #[test]
 fn a_calibration_writes_a_sensor_and_a_report_and_says_what_was_learned() {
     let folder = calibration("", "");
-    let output = run(
-        folder.path(),
-        &words("calibrate calibration.toml --out made/sensor.toml --json"),
-    );
-    assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
-    let value: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    let call = "calibrate calibration.toml --out made/sensor.toml --json";
+    let value: serde_json::Value = serde_json::from_str(&printed(folder.path(), call)).unwrap();
     assert_keeps_to_schema(&value, "calibrate");
     // The frames are those of a layer of 100 kPa whose maker states 95 ± 10 kPa.
     let modulus = &value["layers"][0];
@@ -56,7 +52,7 @@ fn a_calibration_writes_a_sensor_and_a_report_and_says_what_was_learned() {
 }
 
 /// A change of the calibration, the call's end, and what the sentence says.
-const MISTAKES: [(&str, &str, &str, &str); 12] = [
+const MISTAKES: [(&str, &str, &str, &str); 9] = [
     ("date = ", "date ", "", "calibration.toml"),
     ("gauge_error = 1e-3", "gauge_error = -1", "", "gauge_error"),
     ("gauge_error", "gauge_eror", "", "gauge_eror"),
@@ -72,24 +68,6 @@ const MISTAKES: [(&str, &str, &str, &str); 12] = [
         "covers_N = [0.003, 0.2]",
         "",
         "scenes will have 0.003 N to 0.200 N",
-    ),
-    (
-        "covers_N = [0.003, 0.02]",
-        "covers_N = [0.0005, 0.02]",
-        "",
-        "scenes will have",
-    ),
-    (
-        "radius_m = 0.003",
-        "radius_m = 0.0055",
-        "",
-        "check the ball's radius",
-    ),
-    (
-        "image = \"press_01.png\"\nforce_N",
-        "image = \"press_04.png\"\nforce_N",
-        "",
-        "times their stated error",
     ),
     ("", "", "--out made", "ends with .toml"),
     ("", "", "--out calibration.toml", "would replace the input"),
@@ -120,13 +98,5 @@ fn every_bad_calibration_is_refused_in_one_sentence_and_nothing_is_written() {
     for (from, to, end, says) in MISTAKES {
         complaints.extend(complaint(calibration(from, to).path(), end, says));
     }
-    // Four of the ten presses.
-    let few = calibration("", "");
-    let file = few.path().join("calibration.toml");
-    let said = fs::read_to_string(&file).unwrap();
-    let parts: Vec<&str> = said.split("\n[[presses]]").collect();
-    let layers = said.find("\n[[layers]]").unwrap();
-    fs::write(&file, parts[..5].join("\n[[presses]]") + &said[layers..]).unwrap();
-    complaints.extend(complaint(few.path(), "", "at least 5 are needed"));
     assert!(complaints.is_empty(), "{}", complaints.join("\n"));
 }

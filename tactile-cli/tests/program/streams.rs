@@ -1,5 +1,5 @@
 //! Frames that come by a pipe.
-use super::harness::{folder_with_examples, tactile, text, words};
+use super::harness::{folder_with_examples, printed, tactile, text, value, words};
 use serde_json::Value;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
@@ -27,11 +27,6 @@ pub fn piped(folder: &Path, call: &str, bytes: &[u8]) -> Output {
     let output = child.wait_with_output().unwrap();
     writer.join().unwrap();
     output
-}
-
-pub fn value(output: &Output) -> Value {
-    serde_json::from_slice(&output.stdout)
-        .unwrap_or_else(|e| panic!("{e}: {}", text(&output.stderr)))
 }
 
 /// The two frames of the examples as a video of 80 Hz.
@@ -135,8 +130,7 @@ fn a_report_is_one_page_that_changes_with_the_data_only() {
     let folder = folder_with_examples();
     let call = format!("measure {SCENE} --report page.html");
     let page = || {
-        let output = tactile(folder.path(), &words(&call)).output().unwrap();
-        assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+        printed(folder.path(), &call);
         std::fs::read_to_string(folder.path().join("page.html")).unwrap()
     };
     let first = page();
@@ -210,12 +204,6 @@ fn browsers_of_this_computer_see_the_stream() {
     assert!(child.wait().unwrap().success());
 }
 
-/// A frame of the examples' size as a binary PGM.
-fn pgm(video: &[u8]) -> Vec<u8> {
-    let frame = &video[video.len() - 174 * 130..];
-    [b"P5\n174 130\n255\n", frame].concat()
-}
-
 /// A TIFF of one strip whose header states a size, and no sample.
 fn empty_tiff(columns: u32, rows: u32) -> Vec<u8> {
     let entries = [
@@ -250,55 +238,6 @@ fn empty_npy(shape: &str) -> Vec<u8> {
     [b"\x93NUMPY\x01\0", &length[..], header.as_bytes()].concat()
 }
 
-/// An archive of one array: of zeros, of which a thousandth is stored.
-fn inflating_npz(header: &[u8], zeros: usize) -> Vec<u8> {
-    let mut archive = zip::ZipWriter::new(std::io::Cursor::new(Vec::new()));
-    let deflated = zip::write::SimpleFileOptions::default()
-        .compression_method(zip::CompressionMethod::Deflated);
-    archive.start_file("frames.npy", deflated).unwrap();
-    archive.write_all(header).unwrap();
-    for _ in 0..zeros >> 20 {
-        archive.write_all(&[0; 1 << 20]).unwrap();
-    }
-    archive.finish().unwrap().into_inner()
-}
-
-#[test]
-fn streams_that_break_off_anywhere_keep_their_whole_frames() {
-    let folder = folder_with_examples();
-    let video = video(folder.path());
-    let images = pgm(&video).repeat(2);
-    let two_frames = |bytes: &[u8], header: usize, frame: usize| {
-        let tenths = (0..10).map(|tenth| bytes.len() * tenth / 10 + 7);
-        let cases = tenths.map(|cut| (cut, cut.saturating_sub(header) / frame));
-        cases
-            .map(|(cut, whole)| (bytes[..cut].to_vec(), whole))
-            .collect::<Vec<_>>()
-    };
-    let header = video.iter().position(|&b| b == b'\n').unwrap() + 1;
-    let cases = [
-        two_frames(&video, header, 6 + 174 * 130),
-        two_frames(&images, 0, images.len() / 2),
-    ];
-    for (bytes, whole) in cases.concat() {
-        let output = piped(folder.path(), &format!("force {CALIBRATED} -"), &bytes);
-        let case = format!("{} bytes: {}", bytes.len(), text(&output.stderr));
-        assert_eq!(
-            output.status.code(),
-            Some(if whole == 0 { 2 } else { 1 }),
-            "{case}"
-        );
-        assert_eq!(sentences(&output), 1, "{case}");
-        if whole > 0 {
-            assert_eq!(
-                value(&output)["frames"].as_array().unwrap().len(),
-                whole,
-                "{case}"
-            );
-        }
-    }
-}
-
 /// The errors that a run wrote.
 fn sentences(output: &Output) -> usize {
     let errors = text(&output.stderr);
@@ -311,31 +250,15 @@ fn sentences(output: &Output) -> usize {
 #[test]
 fn what_is_no_stream_is_refused_in_one_sentence() {
     let folder = folder_with_examples();
+    // The readers' own tests have all that can be wrong, and `bad_calls` damaged images.
     let frame = [b"FRAME\n", &video(folder.path())[..174 * 130]].concat();
     let piped_cases = [
-        "YUV4MPEG2\n",
-        "YUV4MPEG2 W174\n",
-        "YUV4MPEG2 H130 F80:1 Cmono\n",
-        "YUV4MPEG2 W0 H0 F80:1 Cmono\n",
-        "YUV4MPEG2 W174 H0 F80:1 Cmono\n",
         "YUV4MPEG2 W-174 H130 F80:1 Cmono\n",
-        "YUV4MPEG2 W65535 H65535 F80:1 Cmono\n",
-        "YUV4MPEG2 W99999999999999999999 H1 F80:1 Cmono\n",
         "YUV4MPEG2 W4294967295 H4294967295 F80:1 Cmono\n",
-        "YUV4MPEG2 W174 H130 F80:1 Cpurple\n",
-        "YUV4MPEG2 W173 H130 F80:1 Cmono\n",
-        "YUV4MPEG3 W174 H130 F80:1 Cmono\n",
         "YUV4MPEG2 W174 H130 F80:1 Cmono",
-        "P5\n0 0\n255\n",
         "P5\n65535 65535\n255\n",
-        "P5\n174 130\n0\n",
-        "P5\n174 130\n70000\n",
-        "P5\n-174 130\n255\n",
-        "P5\n",
         "P9\n174 130\n255\n",
-        "RIFF",
         "\u{89}PNG\r\n",
-        "GIF89a",
     ];
     let run = |case: &str, call: &str, bytes: &[u8]| {
         let output = piped(folder.path(), &format!("force {CALIBRATED} {call}"), bytes);
@@ -347,35 +270,15 @@ fn what_is_no_stream_is_refused_in_one_sentence() {
     for header in piped_cases {
         run(header, "-", &[header.as_bytes(), &frame].concat());
     }
-    let png = std::fs::read(folder.path().join("examples/data/press/frame_1.png")).unwrap();
-    let npy = [empty_npy("(1, 130, 174)"), frame[6..].to_vec()].concat();
     let files = [
-        ("half.png", png[..png.len() / 2].to_vec()),
-        ("head.png", png[..20].to_vec()),
-        ("empty.png", Vec::new()),
         ("no_sample.tiff", empty_tiff(174, 130)),
         ("nothing.tiff", empty_tiff(0, 0)),
         ("huge.tiff", empty_tiff(65_535, 65_535)),
-        ("head.tiff", b"II*\0\x08\0\0\0".to_vec()),
-        ("half.npy", npy[..npy.len() / 2].to_vec()),
-        ("nothing.npy", empty_npy("(0, 0, 0)")),
-        ("huge.npy", empty_npy("(1, 65535, 65535)")),
-        (
-            "vast.npy",
-            empty_npy("(4294967295, 4294967295, 4294967295)"),
-        ),
-        ("no_shape.npy", empty_npy("(")),
         ("five.npy", empty_npy("(1, 2, 3, 4, 5)")),
-        ("cut.npz", inflating_npz(&npy, 0)[..200].to_vec()),
-        (
-            "inflating.npz",
-            inflating_npz(&empty_npy("(1, 65535, 65535)"), 1 << 30),
-        ),
         (
             "no_video.avi",
             b"RIFF\xff\xff\xff\xffAVI LIST\xff\xff\xff\xff".to_vec(),
         ),
-        ("cut.y4m", b"YUV4MPEG2 W174 H130".to_vec()),
     ];
     for (name, bytes) in files {
         std::fs::write(folder.path().join(name), bytes).unwrap();
