@@ -1,4 +1,5 @@
-//! Strain of many gradients, contacts on layers and moduli: time, with the error printed beside it.
+//! Strain of many gradients, contacts on layers and curves: time, with the error printed beside it.
+//! The bench `work_precision` has the laws of a ball.
 #![allow(clippy::print_stdout, missing_docs)]
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
@@ -8,9 +9,6 @@ use std::hint::black_box;
 use tactile_imaging::elasticity::contact::{Bond, LayerEquation};
 use tactile_imaging::elasticity::curve::{
     CurveOptions, IndentationCurve, Indenter, Model, select_model,
-};
-use tactile_imaging::elasticity::modulus::{
-    Estimate, HertzSphere, LoadSeries, LoadState, ModulusEstimator, SharedErrors,
 };
 use tactile_imaging::elasticity::strain::{
     Biot, EulerAlmansi, GreenLagrange, Hencky, StrainMeasure, green_lagrange_into,
@@ -77,29 +75,7 @@ fn layers(c: &mut Criterion) {
     });
 }
 
-fn moduli(c: &mut Criterion) {
-    let loads: Vec<_> = (1..=12)
-        .map(|k| {
-            let f = 1e-3 * f64::from(k);
-            let a = (0.75 * f * 4e-3 / 80e3).cbrt();
-            LoadState {
-                contact_radius_m: Some(Estimate::new(a, 1e-3 * a)),
-                ..LoadState::new(Estimate::new(f, 1e-2 * f))
-            }
-        })
-        .collect();
-    let shared = SharedErrors {
-        force_scale: 0.01,
-        ..SharedErrors::default()
-    };
-    let loads = LoadSeries::new(loads).with_shared_errors(shared).unwrap();
-    let estimator = HertzSphere::new(4e-3, 0.5).unwrap();
-    let error = estimator.estimate(&loads).unwrap().youngs_modulus_pa / 60e3 - 1.0;
-    assert!(error.abs() < 1e-12);
-    println!("modulus from twelve loads: off by {error:.1e}");
-    c.bench_function("Hertz sphere, 12 loads", |b| {
-        b.iter(|| estimator.estimate(black_box(&loads)))
-    });
+fn curve(c: &mut Criterion) {
     let z: Vec<f64> = (0..200).map(|i| f64::from(i) * 2e-6).collect();
     let f: Vec<f64> = z
         .iter()
@@ -120,5 +96,5 @@ fn moduli(c: &mut Criterion) {
         .bench_function("200 points", |b| b.iter(fit));
 }
 
-criterion_group!(benches, strain, layers, moduli);
+criterion_group!(benches, strain, layers, curve);
 criterion_main!(benches);

@@ -1,15 +1,11 @@
-//! Finite elements: time of a ball on the paper's guide, of its contact table and of an inversion;
-//! agreement with another program.
+//! Finite elements: time of a ball on the paper's guide, of its contact table and of an inversion.
 //!
 //! ```console
 //! cargo bench -p tactile-benches --features fem --bench finite_elements              # some two minutes; the table alone, once: -- table
 //! ```
-//! Times are seconds of processor where the system tells them (a busy machine counts for nothing),
-//! else of the clock.
 #![allow(clippy::print_stdout, missing_docs)]
 
 use std::ops::ControlFlow;
-use std::path::PathBuf;
 use std::time::Instant;
 use tactile_imaging::elasticity::contact::{Layer, Waveguide};
 use tactile_imaging::elasticity::modulus::{
@@ -34,24 +30,10 @@ fn paper_guide() -> fem::Guide {
     fem::Guide::new(layers.to_vec(), 25e-3).expect("a guide")
 }
 
-/// Seconds of processor that this process has taken, by the clock where the system does not tell.
-fn processor_seconds(clock: Instant) -> f64 {
-    let ticks = std::fs::read_to_string("/proc/self/stat")
-        .ok()
-        .and_then(|text| {
-            // After the command's closing bracket: utime and stime are the 12th and 13th fields, in
-            // hundredths of a second.
-            let fields: Vec<&str> = text.rsplit(')').next()?.split_whitespace().collect();
-            Some(fields.get(11)?.parse::<f64>().ok()? + fields.get(12)?.parse::<f64>().ok()?)
-        });
-    ticks.map_or_else(|| clock.elapsed().as_secs_f64(), |ticks| 0.01 * ticks)
-}
-
 fn timed<R>(job: impl FnOnce() -> R) -> (R, f64) {
-    let clock = Instant::now();
-    let start = processor_seconds(clock);
+    let start = Instant::now();
     let answer = job();
-    (answer, processor_seconds(clock) - start)
+    (answer, start.elapsed().as_secs_f64())
 }
 
 /// A ball of 3 mm on the paper's guide up to 1.2 N, on three meshes.
@@ -93,81 +75,6 @@ fn ball_on_guide(is_test: bool) {
             return;
         }
         assert!(fineness != 5 || worst < 2e-3, "{worst}");
-    }
-}
-
-/// A ball pressed by another program.
-struct Published {
-    name: String,
-    youngs_modulus_pa: f64,
-    radius_m: f64,
-    on_flat: bool,
-    /// Force and contact radius.
-    loads: Vec<[f64; 2]>,
-}
-
-/// From here on the default mesh tells a contact radius.
-const SMALLEST_RATIO: f64 = 0.12;
-
-/// Forces at the contact radii of another program's presses.
-fn another_program() {
-    let folder = std::env::var_os("TACTILE_DATA").map_or_else(
-        || PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/data")),
-        PathBuf::from,
-    );
-    let path = folder.join("fem_press/scenes.csv");
-    let Ok(text) = std::fs::read_to_string(&path) else {
-        println!("skipped: no {} (set TACTILE_DATA)", path.display());
-        return;
-    };
-    let mut presses: Vec<Published> = Vec::new();
-    for line in text.lines().skip(1) {
-        let before: Vec<&str> = line.split(',').take(4).collect();
-        let after: Vec<&str> = line[line.find(']').expect("layers") + 1..]
-            .split(',')
-            .collect();
-        let number = |text: &str| text.parse::<f64>().expect("a number");
-        let load = [number(after[1]), number(after[3])];
-        match presses.last_mut().filter(|p| p.name == before[0]) {
-            Some(press) => press.loads.push(load),
-            None => presses.push(Published {
-                name: before[0].to_owned(),
-                youngs_modulus_pa: number(before[1]),
-                radius_m: number(before[3]),
-                on_flat: line.contains("[]"),
-                loads: vec![load],
-            }),
-        }
-    }
-    for press in presses {
-        let Published { name, loads, .. } = &press;
-        let (radius, ball) = (press.radius_m, material(press.youngs_modulus_pa));
-        let object = ObjectShape::Ball { radius_m: radius };
-        let mut on = ObjectPress::new(object, ball).expect("a ball");
-        if !press.on_flat {
-            on = on.on_guide(paper_guide()).expect("a wide guide");
-        }
-        let scene = on.scene();
-        let forces: Vec<AppliedLoad> = loads.iter().map(|l| AppliedLoad::Force(l[0])).collect();
-        let states = scene.expect("a scene").solve(&forces).states;
-        assert_eq!(states.len(), loads.len());
-        for (state, [force_n, contact_radius_m]) in states.iter().zip(loads) {
-            let ratio = contact_radius_m / radius;
-            let Some(found) = state.contact_radius() else {
-                println!(
-                    "{name} at {force_n} N, a/R {ratio:.2}: too few elements touch to tell a radius"
-                );
-                assert!(ratio < SMALLEST_RATIO, "{name} {force_n}");
-                continue;
-            };
-            // At the other program's radius, by the exponent between its loads: some 3.2.
-            let off = (contact_radius_m / found.radius_m).powf(3.2) - 1.0;
-            println!(
-                "{name} at {force_n} N, a/R {ratio:.2}: force at the same contact radius {:+.2} %",
-                100.0 * off
-            );
-            assert!(off.abs() < 1e-2, "{name} {force_n}: {off}");
-        }
     }
 }
 
@@ -234,9 +141,6 @@ fn main() {
     let wanted = |name: &str| named.is_empty() || named.contains(&name);
     if wanted("ball") {
         ball_on_guide(is_test);
-    }
-    if wanted("presses") && !is_test {
-        another_program();
     }
     if wanted("table") {
         table(is_test);

@@ -1,16 +1,14 @@
-//! Surfaces: a contact's share of the frame, control points, depth tables and slope integration.
+//! Surfaces: a contact's share of the frame, control points and depth tables.
 //!
-//! The bench `work_precision` compares the methods of shape from shading.
-#![allow(clippy::print_stderr)]
+//! The bench `work_precision` compares the methods of shape from shading and of slope integration.
 
 use std::hint::black_box;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use ndarray::Array2;
 use tactile_imaging::sfs::{
-    ControlPointSampler, CosinePoisson, CurvatureAdaptive, DepthTable, Domain, Eikonal,
-    EikonalBranch, EquallySpaced, Frame, FrankotChellappa, Lighting, MaskedLeastSquares,
-    PixelScalar, Random, SlopeIntegrator, Surface, SurfaceReconstruction, SurfaceWorkspace,
+    ControlPointSampler, CurvatureAdaptive, DepthTable, Domain, Eikonal, EikonalBranch,
+    EquallySpaced, Frame, Lighting, Random, Surface, SurfaceReconstruction, SurfaceWorkspace,
 };
 
 /// A contact of a given share of the frame against one that fills it.
@@ -68,19 +66,14 @@ fn points(criterion: &mut Criterion) {
         ("adaptive", Box::new(CurvatureAdaptive::new(2.0).unwrap())),
     ];
     for (name, sampler) in samplers {
-        assert_eq!(
+        let sample = || {
             sampler
-                .sample(z.view(), &Domain::default(), 200)
+                .sample(black_box(z.view()), &Domain::default(), 200)
                 .unwrap()
-                .len(),
-            200
-        );
+        };
+        assert_eq!(sample().len(), 200);
         group.bench_function(BenchmarkId::new(name, "200/300x300"), |bencher| {
-            bencher.iter(|| {
-                sampler
-                    .sample(black_box(z.view()), &Domain::default(), 200)
-                    .unwrap()
-            });
+            bencher.iter(sample)
         });
     }
     group.finish();
@@ -105,93 +98,5 @@ fn depth_table(criterion: &mut Criterion) {
     group.finish();
 }
 
-/// Eight Gaussian bumps in the inner half of the frame, heights and slopes in closed form, mean 0.
-fn bumps(rows: usize, columns: usize) -> [Array2<f64>; 3] {
-    let mut state = 20u64;
-    let mut uniform = move || {
-        state = state
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
-        (state >> 11) as f64 / (1u64 << 53) as f64
-    };
-    let least = rows.min(columns) as f64;
-    let [mut z, mut p, mut q] = [0, 1, 2].map(|_| Array2::zeros((rows, columns)));
-    for _ in 0..8 {
-        let (cx, cy) = (
-            columns as f64 * (0.25 + 0.5 * uniform()),
-            rows as f64 * (0.25 + 0.5 * uniform()),
-        );
-        let (sigma, height) = (
-            least * (0.04 + 0.08 * uniform()),
-            least * 0.04 * (uniform() - 0.5),
-        );
-        for ((r, c), z) in z.indexed_iter_mut() {
-            let (x, y) = (c as f64 - cx, r as f64 - cy);
-            let bump = height * (-(x * x + y * y) / (2.0 * sigma * sigma)).exp();
-            *z += bump;
-            p[[r, c]] -= bump * x / (sigma * sigma);
-            q[[r, c]] -= bump * y / (sigma * sigma);
-        }
-    }
-    let mean = z.mean().unwrap_or(0.0);
-    z.mapv_inplace(|z| z - mean);
-    [z, p, q]
-}
-
-fn integrate_as<T: PixelScalar>(
-    criterion: &mut Criterion,
-    scalar: &str,
-    rows: usize,
-    columns: usize,
-) {
-    let [z, p, q] = bumps(rows, columns);
-    let (p, q) = (p.mapv(T::of), q.mapv(T::of));
-    let mut group = criterion.benchmark_group("integrate");
-    group
-        .throughput(Throughput::Elements((rows * columns) as u64))
-        .sample_size(10);
-    let methods: [(&str, Box<dyn SlopeIntegrator<T>>, f64); 3] = [
-        ("cosine-poisson", Box::new(CosinePoisson), 1e-3),
-        ("frankot-chellappa", Box::new(FrankotChellappa), 0.2),
-        (
-            "least-squares",
-            Box::new(MaskedLeastSquares::default()),
-            1e-3,
-        ),
-    ];
-    for (name, method, bound) in methods {
-        let (mut workspace, mut surface) = (SurfaceWorkspace::default(), Surface::default());
-        let domain = Domain::default();
-        method
-            .integrate_with(&mut workspace, p.view(), q.view(), &domain, &mut surface)
-            .unwrap();
-        let norm =
-            |values: &mut dyn Iterator<Item = f64>| values.map(|v| v * v).sum::<f64>().sqrt();
-        let difference = norm(&mut surface.heights.iter().zip(&z).map(|(a, b)| a.as_f64() - b));
-        let relative = difference / norm(&mut z.iter().copied());
-        eprintln!("integrate/{name}/{columns}x{rows}/{scalar}: relative error {relative:.3e}");
-        assert!(relative < bound);
-        group.bench_function(
-            BenchmarkId::new(name, format!("{columns}x{rows}/{scalar}")),
-            |bencher| {
-                bencher.iter(|| {
-                    let (p, q) = (black_box(p.view()), q.view());
-                    method
-                        .integrate_with(&mut workspace, p, q, &domain, &mut surface)
-                        .unwrap();
-                });
-            },
-        );
-    }
-    group.finish();
-}
-
-fn integrate(criterion: &mut Criterion) {
-    for (rows, columns) in [(480, 640), (1042, 1392)] {
-        integrate_as::<f64>(criterion, "f64", rows, columns);
-        integrate_as::<f32>(criterion, "f32", rows, columns);
-    }
-}
-
-criterion_group!(benches, contact_share, points, depth_table, integrate);
+criterion_group!(benches, contact_share, points, depth_table);
 criterion_main!(benches);

@@ -8,8 +8,8 @@
 use std::hint::black_box;
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use nalgebra::{Matrix3, Point3, Vector3};
-use rand::{RngExt, SeedableRng, rngs::SmallRng};
+use nalgebra::{Matrix3, Point3};
+use tactile_benches::Problem;
 use tactile_imaging::tps::{
     Factorization, FitOptions, Kernel, NegR, R2LogR, R3, Smoothing, Spline, SplineWorkspace,
     ThinPlateSpline,
@@ -18,51 +18,8 @@ use tactile_imaging::tps::{
 const SIZES: [usize; 3] = [105, 200, 1000];
 const QUERIES: usize = 10_000;
 
-/// Points, where they go, and the map in between.
-struct Problem {
-    bumps: Vec<(Point3<f64>, Vector3<f64>)>,
-    sources: Vec<Point3<f64>>,
-    targets: Vec<Point3<f64>>,
-    queries: Vec<Point3<f64>>,
-}
-
-impl Problem {
-    fn new(n: usize) -> Self {
-        let mut random = SmallRng::seed_from_u64(n as u64);
-        let mut point =
-            |size: f64| Point3::from(Vector3::from_fn(|_, _| random.random_range(-size..size)));
-        let bumps: Vec<_> = (0..5).map(|_| (point(1.0), point(0.17).coords)).collect();
-        let sources: Vec<_> = (0..n).map(|_| point(1.0)).collect();
-        let queries = (0..QUERIES).map(|_| point(0.95)).collect();
-        let mut problem = Self {
-            bumps,
-            sources,
-            targets: Vec::new(),
-            queries,
-        };
-        problem.targets = problem.sources.iter().map(|p| problem.map(p)).collect();
-        problem
-    }
-
-    fn map(&self, p: &Point3<f64>) -> Point3<f64> {
-        self.bumps.iter().fold(*p, |q, (c, a)| {
-            q + a * (-(p - c).norm_squared() / 0.72).exp()
-        })
-    }
-
-    /// Root mean square error at the queries.
-    fn error<K: Kernel + Default>(&self, spline: &ThinPlateSpline<f64, 3, K>) -> f64 {
-        let mut values = vec![Point3::origin(); QUERIES];
-        spline
-            .apply_into(&self.queries, &mut values)
-            .expect("equal lengths");
-        let squares = self
-            .queries
-            .iter()
-            .zip(&values)
-            .map(|(q, v)| (self.map(q) - v).norm_squared());
-        (squares.sum::<f64>() / QUERIES as f64).sqrt()
-    }
+fn problem(n: usize) -> Problem {
+    Problem::new(n as u64, n, 0.0, QUERIES)
 }
 
 /// Fits once, prints the error beside what the fit reports, and checks it.
@@ -131,7 +88,7 @@ fn evaluate<K: Kernel + Default>(c: &mut Criterion, problem: &Problem, name: &st
 
 fn kernel<K: Kernel + Default>(c: &mut Criterion, name: &str, kernel: K) {
     for n in SIZES {
-        let problem = Problem::new(n);
+        let problem = problem(n);
         fit(c, &problem, name, kernel.clone());
         refit(c, &problem, name, kernel.clone());
         evaluate(c, &problem, name, kernel.clone());
@@ -143,7 +100,7 @@ fn many(c: &mut Criterion) {
     if std::env::args().any(|argument| argument == "--test" || argument == "--quick") {
         return;
     }
-    let problem = Problem::new(10_000);
+    let problem = problem(10_000);
     fit(c, &problem, "r2logr", R2LogR);
     fit(c, &problem, "r", NegR);
 }

@@ -2,8 +2,8 @@
 //! or those of a test.
 //!
 //! ```console
-//! cargo run --release --features fem,simulate --example contact_states > src/simulate/finite_elements.csv
-//! cargo run --release --features fem,simulate --example contact_states -- presses > tests/data/finite_element_presses.csv
+//! cargo run --release --example contact_states > tactile-simulate/src/finite_elements.csv
+//! cargo run --release --example contact_states -- presses > tests/data/finite_element_presses.csv
 //! ```
 //!
 //! Neo-Hookean balls on neo-Hookean layers or on a rigid flat, without friction. ν = ½ is computed

@@ -2,8 +2,8 @@
 //! estimator: a table beside the truth.
 //!
 //! ```console
-//! cargo run --release --features cli -- table examples/data/contact_table/scene.toml --out target/table   # some minutes, for the last row
-//! cargo run --release --features cli --example paper_samples -- target/paper_samples target/table/table.toml
+//! cargo run --release -- table examples/data/contact_table/scene.toml --out target/table   # some minutes, for the last row
+//! cargo run --release --example paper_samples -- target/paper_samples target/table/table.toml
 //! ```
 //! It simulates the presses by finite elements, writes each as a scene file with its frames, and
 //! measures those files. Without a table that row is left out; without a folder it writes to

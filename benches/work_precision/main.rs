@@ -7,8 +7,7 @@
 //! cargo bench -p tactile-benches --bench work_precision -- matching  # one study
 //! cargo bench -p tactile-benches --bench work_precision -- --quick --within=1.5   # fails where a default lies further behind
 //! ```
-//! Writes `target/work_precision/STUDY.csv` and `.svg` (time on one axis, error on the other, the
-//! front drawn, defaults marked). A default is behind the front where some setting is more than 1.2
+//! Writes `target/work_precision/STUDY.csv`. A default is behind the front where some setting is more than 1.2
 //! times faster and no less accurate, or more than 1.2 times more accurate and no slower. With
 //! `--within=FACTOR` that factor counts, and such a default fails the run. With `--test` everything
 //! runs once and nothing is judged: one timing is none.
@@ -18,8 +17,6 @@ mod elasticity;
 mod force;
 mod matching;
 mod optics;
-mod peers;
-mod picture;
 mod pipeline;
 mod sfs;
 mod study;
@@ -78,7 +75,6 @@ fn main() -> ExitCode {
         study
             .write_csv(&folder.join(format!("{name}.csv")))
             .expect("a written table");
-        picture::save(&study, &folder.join(format!("{name}.svg"))).expect("a written picture");
         behind += study.judge(within.unwrap_or(WITHIN));
     }
     println!("results in {}", folder.display());

@@ -38,20 +38,15 @@ fn run(
     knob: &'static str,
     setting: &str,
     is_default: bool,
-    pipeline: impl Fn(&Trial) -> Pipeline,
+    change: &dyn Fn(Pipeline) -> Pipeline,
 ) {
+    let pipeline = |trial: &Trial| change(trial.pipeline().expect("a calibrated sensor"));
     let pipelines: Vec<_> = trials.iter().map(pipeline).collect();
     let strain = |(trial, pipeline): (&Trial, &Pipeline)| {
         let measured = trial.press(pipeline).map(|press| press.measure());
         measured.expect("a press").strain.expect("a strain").mean
     };
-    let job = || {
-        trials
-            .iter()
-            .zip(&pipelines)
-            .map(strain)
-            .collect::<Vec<_>>()
-    };
+    let job = || -> Vec<_> { trials.iter().zip(&pipelines).map(strain).collect() };
     study.run(knob, setting, is_default, job, |found| {
         let worst = |(mean, trial): (&[[f64; 3]; 3], &Trial)| {
             let frames = &trial.simulation.truth;
@@ -69,83 +64,36 @@ pub(crate) fn strain(study: &mut Study) {
     study.error_label = "largest error of a normal strain, relative";
     let count = study.choose(4, 12);
     let usual = trials(Camera::default().shape, count);
-    let with = |change: fn(Pipeline, usize) -> Pipeline, value: usize| {
-        move |trial: &Trial| -> Pipeline {
-            change(trial.pipeline().expect("a calibrated sensor"), value)
-        }
+    let sides = study.choose(vec![3, 6], vec![2, 3, 5, 6, 8]);
+    let shapes = study.choose(vec![[260, 348]], vec![[130, 174], [260, 348], [521, 696]]);
+    let mut with = |knob, setting: &str, change: &dyn Fn(Pipeline) -> Pipeline| {
+        run(study, &usual, knob, setting, setting == "default", change);
     };
-    run(
-        study,
-        &usual,
-        "pipeline",
-        "default",
-        true,
-        with(|pipeline, _| pipeline, 0),
-    );
+    with("pipeline", "default", &|pipeline| pipeline);
     for points in [50, 100, 400] {
-        let changed = with(
-            |pipeline, points| pipeline.with_control_points(points),
-            points,
-        );
-        run(
-            study,
-            &usual,
-            "control points",
-            &points.to_string(),
-            false,
-            changed,
-        );
+        with("control points", &points.to_string(), &|pipeline| {
+            pipeline.with_control_points(points)
+        });
     }
     for width in [1, 3, 11] {
-        let changed = with(
-            |pipeline, width| {
-                pipeline
-                    .with_settings(|settings| settings.smoothing_px = width)
-                    .expect("odd")
-            },
-            width,
-        );
-        run(
-            study,
-            &usual,
-            "smoothing",
-            &format!("{width} px"),
-            false,
-            changed,
-        );
+        with("smoothing", &format!("{width} px"), &|pipeline| {
+            let set = pipeline.with_settings(|settings| settings.smoothing_px = width);
+            set.expect("odd")
+        });
     }
-    for side in study.choose(vec![3, 6], vec![2, 3, 5, 6, 8]) {
-        let changed = with(
-            |pipeline, side| {
-                pipeline
-                    .with_settings(|settings| settings.binning = Binning::Blocks(side))
-                    .expect("a block")
-            },
-            side,
-        );
-        run(
-            study,
-            &usual,
-            "binning",
-            &format!("{side} px"),
-            false,
-            changed,
-        );
+    for side in sides {
+        with("binning", &format!("{side} px"), &|pipeline| {
+            let binning = Binning::Blocks(side);
+            let set = pipeline.with_settings(|settings| settings.binning = binning);
+            set.expect("a block")
+        });
     }
-    let drift = |trial: &Trial| -> Pipeline {
-        let pipeline = trial.pipeline().expect("a calibrated sensor");
+    with("matcher", "point drift", &|pipeline| {
         pipeline.with_matcher(CoherentPointDrift::default())
-    };
-    run(study, &usual, "matcher", "point drift", false, drift);
-    for shape in study.choose(vec![[260, 348]], vec![[130, 174], [260, 348], [521, 696]]) {
+    });
+    for shape in shapes {
         let name = format!("{} × {}", shape[1], shape[0]);
-        run(
-            study,
-            &trials(shape, count),
-            "camera",
-            &name,
-            false,
-            with(|pipeline, _| pipeline, 0),
-        );
+        let trials = trials(shape, count);
+        run(study, &trials, "camera", &name, false, &|pipeline| pipeline);
     }
 }

@@ -1,6 +1,6 @@
 //! Surfaces from images and from slopes: method, grid, sweeps, tolerance, scalar type.
 
-use crate::study::Study;
+use crate::study::{Effort, Study};
 use ndarray::Array2;
 use tactile_imaging::sfs::{
     Alignment, BoundaryCondition, BrooksHorn, CosinePoisson, Domain, Eikonal, FrankotChellappa,
@@ -8,10 +8,12 @@ use tactile_imaging::sfs::{
     height_error,
 };
 
-/// A field over n × n pixels of the square [−1, 1]².
-fn field<T>(n: usize, at: impl Fn(f64, f64) -> T) -> Array2<T> {
-    let position = |k: usize| (k as f64 + 0.5) * 2.0 / n as f64 - 1.0;
-    Array2::from_shape_fn((n, n), |(r, c)| at(position(c), position(r)))
+/// A field over the pixels of the square [−1, 1]².
+fn field<T>([rows, columns]: [usize; 2], at: impl Fn(f64, f64) -> T) -> Array2<T> {
+    let position = |k: usize, n: usize| (k as f64 + 0.5) * 2.0 / n as f64 - 1.0;
+    Array2::from_shape_fn((rows, columns), |(r, c)| {
+        at(position(c, columns), position(r, rows))
+    })
 }
 
 /// Mean absolute error over the height of the surface, a constant being free.
@@ -36,46 +38,30 @@ pub(crate) fn surfaces(study: &mut Study) {
     let eikonal = Eikonal::new(light)
         .with_boundary(BoundaryCondition::Height(0.0))
         .expect("valid");
+    let tolerances = [1e-1, 1e-2, 1e-3, 1e-8];
+    let sizes = study.choose(vec![48, 192], vec![24, 48, 192, 384]);
+    let sweeps = study.choose(vec![100], vec![30, 100, 300, 1000]);
+    let mut run = |knob, setting: &str, n, method: &dyn SurfaceReconstruction<f64>| {
+        surface(study, knob, setting, setting == "default", n, method);
+    };
     let n = 96;
-    surface(study, "eikonal", "default", true, n, &eikonal);
-    for tolerance in [1e-1, 1e-2, 1e-3, 1e-8] {
-        surface(
-            study,
-            "tolerance",
-            &format!("{tolerance}"),
-            false,
-            n,
-            &eikonal.with_tolerance(tolerance).expect("valid"),
-        );
+    run("eikonal", "default", n, &eikonal);
+    for tolerance in tolerances {
+        let method = eikonal.with_tolerance(tolerance).expect("valid");
+        run("tolerance", &tolerance.to_string(), n, &method);
     }
-    for n in study.choose(vec![48, 192], vec![24, 48, 192, 384]) {
-        surface(study, "grid", &format!("{n} × {n}"), false, n, &eikonal);
+    for n in sizes {
+        run("grid", &format!("{n} × {n}"), n, &eikonal);
     }
     for iterations in [1, 3, 12, 48] {
-        let method = TsaiShah::new(light)
-            .with_iterations(iterations)
-            .expect("valid");
-        surface(
-            study,
-            "Tsai–Shah",
-            &format!("{iterations} iterations"),
-            false,
-            n,
-            &method,
-        );
+        let method = TsaiShah::new(light).with_iterations(iterations);
+        let setting = format!("{iterations} iterations");
+        run("Tsai–Shah", &setting, n, &method.expect("valid"));
     }
-    for iterations in study.choose(vec![100], vec![30, 100, 300, 1000]) {
-        let method = BrooksHorn::new(light)
-            .with_iterations(iterations, 20)
-            .expect("valid");
-        surface(
-            study,
-            "Brooks–Horn",
-            &format!("{iterations} iterations"),
-            false,
-            n,
-            &method,
-        );
+    for iterations in sweeps {
+        let method = BrooksHorn::new(light).with_iterations(iterations, 20);
+        let setting = format!("{iterations} iterations");
+        run("Brooks–Horn", &setting, n, &method.expect("valid"));
     }
 }
 
@@ -88,15 +74,16 @@ fn surface(
     method: &dyn SurfaceReconstruction<f64>,
 ) {
     let height = |x: f64, y: f64| 0.4 - 0.625 * (x * x + y * y);
-    let mask = field(n, |x, y| height(x, y) > 0.0);
-    let image = field(n, |x, y| {
+    let shape = [n; 2];
+    let mask = field(shape, |x, y| height(x, y) > 0.0);
+    let image = field(shape, |x, y| {
         if height(x, y) > 0.0 {
             1.0 / (1.0 + 1.5625 * (x * x + y * y)).sqrt()
         } else {
             0.0
         }
     });
-    let truth = field(n, |x, y| height(x, y).max(0.0));
+    let truth = field(shape, |x, y| height(x, y).max(0.0));
     let domain = Domain::new([2.0 / n as f64; 2])
         .expect("valid")
         .with_mask(mask.view());
@@ -114,42 +101,44 @@ fn surface(
 /// A Gaussian bump from its slopes, over a square that it does not fill.
 pub(crate) fn slopes(study: &mut Study) {
     study.error_label = "mean error over the height";
-    for n in study.choose(vec![64, 128], vec![64, 128, 256, 512]) {
-        let size = format!("{n} × {n}");
-        integral::<f64>(study, "cosine Poisson", &size, true, n, &CosinePoisson);
-        integral::<f32>(study, "cosine, f32", &size, false, n, &CosinePoisson);
-        integral::<f64>(
-            study,
-            "Frankot–Chellappa",
-            &size,
-            false,
-            n,
-            &FrankotChellappa,
-        );
+    let square = |n: usize| [n; 2];
+    let quick = [64, 128].map(square).to_vec();
+    let full = [64, 128, 256, 512].map(square).to_vec();
+    for shape in study.choose(quick, full) {
+        integral::<f64>(study, "cosine Poisson", shape, true, &CosinePoisson);
+        integral::<f32>(study, "cosine, f32", shape, false, &CosinePoisson);
+        integral::<f64>(study, "Frankot–Chellappa", shape, false, &FrankotChellappa);
         let method = MaskedLeastSquares::default();
-        integral::<f64>(study, "least squares", &size, false, n, &method);
+        integral::<f64>(study, "least squares", shape, false, &method);
+    }
+    if study.effort == Effort::Full {
+        // The paper's frames.
+        integral::<f64>(study, "cosine, frame", [1042, 1392], false, &CosinePoisson);
+        integral::<f32>(study, "frame, f32", [1042, 1392], false, &CosinePoisson);
     }
 }
 
 fn integral<T: PixelScalar>(
     study: &mut Study,
     knob: &'static str,
-    setting: &str,
+    [rows, columns]: [usize; 2],
     is_default: bool,
-    n: usize,
     method: &dyn SlopeIntegrator<T>,
 ) {
     let height = |x: f64, y: f64| 0.3 * (-((x - 0.1).powi(2) + (y + 0.05).powi(2)) / 0.18).exp();
-    let p = field(n, |x, y| T::of(-(x - 0.1) / 0.09 * height(x, y)));
-    let q = field(n, |x, y| T::of(-(y + 0.05) / 0.09 * height(x, y)));
-    let truth = field(n, height);
-    let domain = Domain::new([T::of(2.0 / n as f64); 2]).expect("valid");
+    let shape = [rows, columns];
+    let p = field(shape, |x, y| T::of(-(x - 0.1) / 0.09 * height(x, y)));
+    let q = field(shape, |x, y| T::of(-(y + 0.05) / 0.09 * height(x, y)));
+    let truth = field(shape, height);
+    let side = |n: usize| T::of(2.0 / n as f64);
+    let domain = Domain::new([side(columns), side(rows)]).expect("valid");
     let job = || {
         method
             .integrate(p.view(), q.view(), &domain)
             .expect("a surface")
             .heights
     };
+    let setting = format!("{columns} × {rows}");
     study.run(knob, setting, is_default, job, |z| {
         let wide = z.mapv(|v| num_traits::ToPrimitive::to_f64(&v).expect("a number"));
         mean_error(&wide, &truth, None, 0.3)

@@ -31,8 +31,6 @@ pub(crate) struct Study {
     pub(crate) name: &'static str,
     pub(crate) error_label: &'static str,
     pub(crate) entries: Vec<Entry>,
-    /// Points of other packages: label, seconds, error.
-    pub(crate) peers: Vec<(String, f64, f64)>,
     pub(crate) effort: Effort,
 }
 
@@ -42,7 +40,6 @@ impl Study {
             name,
             error_label: "error",
             entries: Vec::new(),
-            peers: Vec::new(),
             effort,
         }
     }
@@ -96,24 +93,6 @@ impl Study {
         });
     }
 
-    /// Settings that no other beats in both, by time.
-    pub(crate) fn front(&self) -> Vec<&Entry> {
-        let mut order: Vec<&Entry> = self.entries.iter().collect();
-        order.sort_by(|a, b| {
-            (a.seconds, a.error)
-                .partial_cmp(&(b.seconds, b.error))
-                .expect("finite")
-        });
-        let mut least = f64::INFINITY;
-        order.retain(|e| {
-            e.error < least && {
-                least = e.error;
-                true
-            }
-        });
-        order
-    }
-
     /// How far behind the front a setting lies, in time or in error, whichever is worse: times
     /// faster that one is which is no less accurate, or times more accurate one that is no slower.
     /// One on the front.
@@ -164,13 +143,6 @@ impl Study {
                 file,
                 "{},{},\"{}\",{},{:e},{:e},{behind:.3}",
                 self.name, e.knob, e.setting, e.is_default, e.seconds, e.error
-            )?;
-        }
-        for (label, seconds, error) in &self.peers {
-            writeln!(
-                file,
-                "{},peer,\"{label}\",false,{seconds:e},{error:e},",
-                self.name
             )?;
         }
         Ok(())

@@ -85,18 +85,10 @@ fn headings_are_cut_into_name_and_unit() {
         ("depth cm", 1e-2),
         ("depth", 1.0),
     ] {
-        let [depth, force] = curve(&format!("time_s;{heading};force_mN\n0;3;7\n")).unwrap();
-        assert_eq!(
-            (depth[0], force[0]),
-            (3.0 * factor, 7.0 * 1e-3),
-            "{heading}"
-        );
+        let columns = curve(&format!("time_s;{heading};force_mN\n0;3;7\n")).unwrap();
+        assert_eq!(columns, [[3.0 * factor], [7.0 * 1e-3]], "{heading}");
     }
-    assert_eq!(
-        curve("0.5;2\n").unwrap(),
-        [vec![0.5], vec![2.0]],
-        "by position"
-    );
+    assert_eq!(curve("0.5;2\n").unwrap(), [[0.5], [2.0]], "by position");
     let counts = file("darkness_grey_levels,integrated_pixel_value\n1,2\n");
     let wanted: [(&[&str], &str); 2] = [(&["darkness"], "1"), (&["integrated_pixel_value"], "1")];
     assert_eq!(read_columns(&counts.path, wanted).unwrap(), [[1.0], [2.0]]);
@@ -110,59 +102,34 @@ fn quotes_marks_and_line_ends_of_other_programs_are_understood() {
     assert_eq!(table.values, ndarray::array![[1.0, 2.0]]);
 }
 
+/// Lines of a text of a file and the end of the sentence that refuses it.
+fn refused<T: std::fmt::Debug>(read: fn(&str) -> Result<T, FileError>, cases: &str) {
+    for case in cases.lines() {
+        let (text, end) = case.split_once(" => ").unwrap();
+        let text = text.replace("\\n", "\n").replace("\\r", "\r");
+        assert_eq!(sentence(read(&text)), end, "{text}");
+    }
+}
+
 #[test]
 fn errors_name_line_column_and_what_was_found() {
-    for (text, end) in [
-        (
-            "depth,force\n1,2\n1,two\n",
-            ", line 3, column 2: expected a finite number, found `two`",
-        ),
-        (
-            "1,2\n\n# three\n3\n",
-            ", line 4: expected 2 columns, found 1",
-        ),
-        (
-            "1,2\r\n \r\n3,x\r\n",
-            ", line 3, column 2: expected a finite number, found `x`",
-        ),
-        (
-            "1,inf\n",
-            ", line 1, column 2: expected a finite number, found `inf`",
-        ),
-        (
-            "depth,force\n",
-            ": expected at least one row of numbers, found none",
-        ),
-        ("1,2,3\n", ", line 1: expected 2 columns, found 3"),
-        (
-            "depth_m,load_kg\n1,2\n",
-            ": expected a column named `force`, found `depth_m`, `load_kg`",
-        ),
-        (
-            "depth_m,force_N,force_mN\n1,2,3\n",
-            ": expected one column named `force`, found more than one",
-        ),
-        (
-            "depth_m,force (lbf)\n1,2\n",
-            ": expected the column `force` in N or a multiple of it, found `lbf`",
-        ),
-        (
-            "depth_m,force_mm\n1,2\n",
-            ": expected the column `force` in N or a multiple of it, found `mm`",
-        ),
-        // The largest number is 1.8e308: a finite number of kilonewtons need not be one of newtons.
-        (
-            "depth_m,force_kN\n1,-9e307\n",
-            ": expected values of the column `force` that SI units can hold, found -9e307",
-        ),
-    ] {
-        assert_eq!(sentence(curve(text)), end, "{text}");
-    }
+    let cases = r"1,2,3\n => , line 1: expected 2 columns, found 3
+depth,force\n1,2\n1,two\n => , line 3, column 2: expected a finite number, found `two`
+1,2\n\n# three\n3\n => , line 4: expected 2 columns, found 1
+1,2\r\n \r\n3,x\r\n => , line 3, column 2: expected a finite number, found `x`
+1,inf\n => , line 1, column 2: expected a finite number, found `inf`
+depth,force\n => : expected at least one row of numbers, found none
+depth_m,load_kg\n1,2\n => : expected a column named `force`, found `depth_m`, `load_kg`
+depth_m,force_N,force_mN\n1,2,3\n => : expected one column named `force`, found more than one
+depth_m,force (lbf)\n1,2\n => : expected the column `force` in N or a multiple of it, found `lbf`
+depth_m,force_mm\n1,2\n => : expected the column `force` in N or a multiple of it, found `mm`";
+    refused(curve, cases);
+    // The largest number is 1.8e308: a finite number of kilonewtons need not be one of newtons.
+    let end = ": expected values of the column `force` that SI units can hold, found -9e307";
+    assert_eq!(sentence(curve("depth_m,force_kN\n1,-9e307\n")), end);
     let utf_16 = file([0xff, 0xfe, b'1', 0]);
-    assert_eq!(
-        sentence(read_table(&utf_16.path)),
-        ": expected UTF-8 text, found UTF-16 text"
-    );
+    let end = ": expected UTF-8 text, found UTF-16 text";
+    assert_eq!(sentence(read_table(&utf_16.path)), end);
 }
 
 #[test]
@@ -170,27 +137,12 @@ fn case_files_are_read_without_their_truth_and_errors_name_the_line() {
     let case = file("case a_1 2 1 2\nm 1 2\nt 3 4\nt 5 6\ng not read\np x\n# note\n");
     let cases = read_cases(&case.path).unwrap();
     assert!(matches!(&cases[0].points, CasePoints::Plane { target, .. } if target[1].y == 6.0));
-    for (text, end) in [
-        (
-            "case a 2 1 1\nm 1 x\n",
-            ", line 2, column 3: expected a finite number, found `x`",
-        ),
-        (
-            "case a 2 2 0\nm 1 2\n",
-            ", line 1: expected 2 rows tagged m, found 1",
-        ),
-        (
-            "case a 4 0 0\n",
-            ", line 1, column 3: expected dimension 2 or 3, found `4`",
-        ),
-        (
-            "m 1 2\n",
-            ", line 1, column 1: expected `case NAME D n_model n_target`, found `m`",
-        ),
-        ("", ": expected `case NAME D n_model n_target`, found none"),
-    ] {
-        assert_eq!(sentence(read_cases(&file(text).path)), end);
-    }
+    let cases = r"case a 2 1 1\nm 1 x\n => , line 2, column 3: expected a finite number, found `x`
+case a 2 2 0\nm 1 2\n => , line 1: expected 2 rows tagged m, found 1
+case a 4 0 0\n => , line 1, column 3: expected dimension 2 or 3, found `4`
+m 1 2\n => , line 1, column 1: expected `case NAME D n_model n_target`, found `m`
+ => : expected `case NAME D n_model n_target`, found none";
+    refused(|text| read_cases(&file(text).path), cases);
 }
 
 #[test]
@@ -303,13 +255,11 @@ fn video(space: &str, bytes_per_sample: usize, chroma_planes: usize) -> Vec<u8> 
         bytes.extend(b"FRAME Ip\n");
         for level in frame {
             // Of 12 bits 4095 is as white as 255 of 8.
-            let sample = ((u32::from(level) * 4095 / 255) as u16).to_le_bytes();
-            let eight = [level];
-            bytes.extend(if bytes_per_sample == 2 {
-                &sample[..]
-            } else {
-                &eight
-            });
+            let twelve = ((u32::from(level) * 4095 / 255) as u16).to_le_bytes();
+            match bytes_per_sample {
+                2 => bytes.extend(twelve),
+                _ => bytes.push(level),
+            }
         }
         bytes.extend(vec![128; 6 * bytes_per_sample * chroma_planes]);
     }
@@ -317,60 +267,39 @@ fn video(space: &str, bytes_per_sample: usize, chroma_planes: usize) -> Vec<u8> 
 }
 
 fn anymaps() -> Vec<u8> {
-    let frame = |frame: ndarray::Array2<u8>| {
-        [
-            b"P5 # a comment\n5 3\n255\n",
-            frame.into_raw_vec_and_offset().0.as_slice(),
-        ]
-        .concat()
-    };
-    three_frames().into_iter().flat_map(frame).collect()
+    let mut bytes = Vec::new();
+    for frame in three_frames() {
+        bytes.extend(b"P5 # a comment\n5 3\n255\n");
+        bytes.extend(frame);
+    }
+    bytes
 }
 
 /// A TIFF of three pages, each its samples and its directory.
 fn pages(little_endian: bool) -> Vec<u8> {
-    let two = |v: u16| {
-        if little_endian {
-            v.to_le_bytes()
-        } else {
-            v.to_be_bytes()
+    let end_for_end = |mut bytes: Vec<u8>| {
+        if !little_endian {
+            bytes.reverse();
         }
+        bytes
     };
-    let four = |v: u32| {
-        if little_endian {
-            v.to_le_bytes()
-        } else {
-            v.to_be_bytes()
-        }
-    };
+    let two = |v: u16| end_for_end(v.to_le_bytes().into());
+    let four = |v: u32| end_for_end(v.to_le_bytes().into());
     let magic: &[u8] = if little_endian { b"II*\0" } else { b"MM\0*" };
-    let mut bytes = [magic, &four(8 + 15)].concat();
+    let mut bytes = [magic.to_vec(), four(8 + 15)].concat();
     for (k, frame) in three_frames().into_iter().enumerate() {
         let samples = bytes.len() as u32;
         bytes.extend(frame);
         // Width, height, bits, compression, black is zero, strips, samples, rows, bytes.
-        let entries = [
-            (256, 5),
-            (257, 3),
-            (258, 8),
-            (259, 1),
-            (262, 1),
-            (273, samples),
-            (277, 1),
-            (278, 3),
-            (279, 15),
-        ];
-        bytes.extend(two(entries.len() as u16));
-        for (tag, value) in entries {
+        let tags = [256, 257, 258, 259, 262, 273, 277, 278, 279];
+        let values = [5, 3, 8, 1, 1, samples, 1, 3, 15];
+        bytes.extend(two(tags.len() as u16));
+        for (tag, value) in tags.into_iter().zip(values) {
             bytes.extend([two(tag), two(4)].concat());
             bytes.extend([four(1), four(value)].concat());
         }
-        let next = if k < 2 {
-            bytes.len() as u32 + 4 + 15
-        } else {
-            0
-        };
-        bytes.extend(four(next));
+        let next = bytes.len() as u32 + 4 + 15;
+        bytes.extend(four(if k < 2 { next } else { 0 }));
     }
     bytes
 }
@@ -418,6 +347,14 @@ fn jpeg_frames_of_a_video_are_those_that_were_recorded() {
     assert_eq!(frames_of(&another).1.as_deref(), Some(says));
 }
 
+/// So many frames come of the bytes, then a sentence with these words.
+fn breaks_off(bytes: &[u8], kept: usize, says: &str) {
+    let (frames, broken) = frames_of(bytes);
+    let sentence = broken.unwrap_or_default();
+    assert_eq!(frames.len(), kept, "{says}: {sentence}");
+    assert!(sentence.contains(says), "`{sentence}` lacks `{says}`");
+}
+
 #[test]
 fn arrays_that_are_damaged_or_no_frames_are_refused() {
     let array = |header: &str| {
@@ -426,79 +363,44 @@ fn arrays_that_are_damaged_or_no_frames_are_refused() {
         bytes.extend(header.bytes().chain(*b"abcdef"));
         bytes
     };
-    let fields = |kind: &str, order: &str, shape: &str| {
-        array(&format!(
-            "{{'descr': '{kind}', 'fortran_order': {order}, 'shape': ({shape}), }}"
-        ))
-    };
+    let none = "expected an array of frames";
+    for (kind, order, shape, kept, says) in [
+        ("|u1", "False", "2, 3", 1, ""),
+        ("|u1", "False", "1, 2, 3", 1, ""),
+        ("<u2", "False", "1, 3", 1, ""),
+        ("|u1", "True", "2, 1, 3", 0, "C order, found Fortran order"),
+        ("<f8", "False", "2, 1, 3", 0, none),
+        ("|O", "False", "2, 1, 3", 0, none),
+        ("|u1", "False", "0, 0", 0, none),
+        ("|u1", "False", "65535, 65535", 0, none),
+        ("|u1", "False", "9, 18446744073709551616, 3", 0, none),
+        (
+            "|u1",
+            "False",
+            "99, 2, 2",
+            1,
+            "4 bytes of samples, found the end after 2",
+        ),
+    ] {
+        let order = format!("'fortran_order': {order}");
+        let header = format!("{{'descr': '{kind}', {order}, 'shape': ({shape}), }}");
+        breaks_off(&array(&header), kept, says);
+    }
+    breaks_off(&array(""), 0, none);
+    breaks_off(b"PK\x03\x04", 0, "expected more bytes, found the end");
     let mut damaged = OF_OTHERS[3].to_vec();
     let level = damaged
         .windows(5)
         .rposition(|levels| levels == [134, 135, 136, 137, 138]);
     damaged[level.unwrap()] ^= 1;
-    for (bytes, kept, says) in [
-        (fields("|u1", "False", "2, 3"), 1, ""),
-        (fields("|u1", "False", "1, 2, 3"), 1, ""),
-        (fields("<u2", "False", "1, 3"), 1, ""),
-        (
-            fields("|u1", "True", "2, 1, 3"),
-            0,
-            "expected frames in C order, found Fortran order",
-        ),
-        (
-            fields("<f8", "False", "2, 1, 3"),
-            0,
-            "expected an array of frames",
-        ),
-        (
-            fields("|O", "False", "2, 1, 3"),
-            0,
-            "expected an array of frames",
-        ),
-        (
-            fields("|u1", "False", "0, 0"),
-            0,
-            "expected an array of frames",
-        ),
-        (
-            fields("|u1", "False", "65535, 65535"),
-            0,
-            "expected an array of frames",
-        ),
-        (
-            fields("|u1", "False", "9, 18446744073709551616, 3"),
-            0,
-            "expected an array of frames",
-        ),
-        (
-            fields("|u1", "False", "99, 2, 2"),
-            1,
-            "expected 4 bytes of samples, found the end after 2",
-        ),
-        (array(""), 0, "expected an array of frames"),
-        (damaged, 2, "its checksum differs"),
-        (
-            b"PK\x03\x04".to_vec(),
-            0,
-            "expected more bytes, found the end",
-        ),
-    ] {
-        let (frames, broken) = frames_of(&bytes);
-        let sentence = broken.unwrap_or_default();
-        assert_eq!(frames.len(), kept, "{says}: {sentence}");
-        assert!(sentence.contains(says), "`{sentence}` lacks `{says}`");
-    }
+    breaks_off(&damaged, 2, "its checksum differs");
 }
 
 #[test]
 fn every_stream_gives_the_frames_that_went_in() {
     for bytes in OF_OTHERS {
-        assert_eq!(
-            frames_of(bytes),
-            (three_frames(), None),
-            "{}",
-            bytes.escape_ascii()
-        );
+        let name = bytes.escape_ascii();
+        assert_eq!(frames_of(bytes), (three_frames(), None), "{name}");
     }
     for bytes in [
         video("mono", 1, 0),
@@ -550,72 +452,54 @@ fn is_between(bytes: &[u8], end: usize) -> bool {
 
 #[test]
 fn what_is_no_stream_is_refused_in_a_sentence() {
-    let with = |header: &str| format!("YUV4MPEG2 {header}\nFRAME\nabc").into_bytes();
-    let mut another_size = anymaps();
-    another_size.extend(b"P5\n3 5\n255\n123456789012345");
-    let mut lost = video("mono", 1, 0);
-    lost.extend(b"garbage");
+    let pgm = "pipe, frame 1: expected the header of a PGM";
+    for (text, says) in [
+        ("", "pipe: expected a video or an image, found no bytes"),
+        (
+            "no stream at all",
+            "known by its first bytes, found no stream",
+        ),
+        ("P5\n0 0\n255\n", pgm),
+        ("P5\n3 1\n70000\nabc", pgm),
+        ("P5\n3 1\n0\nabc", pgm),
+        ("P5\n30000 2000\n255\nabc", "found the end after 3"),
+        (
+            "P6\n65535 65535\n255\n",
+            "at most 64 million pixels, found P6",
+        ),
+    ] {
+        breaks_off(text.as_bytes(), 0, says);
+    }
+    for (header, says) in [
+        ("W0 H0", "found 0 × 0 pixels"),
+        ("W65535 H65535", "found 65535 × 65535 pixels"),
+        ("W30000 H30000", "found 30000 × 30000 pixels"),
+        ("W-3 H1", "found `YUV4MPEG2 W-3 H1`"),
+        ("W3", "found `"),
+        ("W99999999999999999999 H1", "found `"),
+        ("W3 H1 Cpalette", "the colour space `palette`"),
+        ("W3 H1 Cmono99", "the colour space `mono99`"),
+        (&"X".repeat(5000), "a first line of more than"),
+        (
+            "W3 H1 Cmono16",
+            "frame 1: expected 6 bytes of samples, found the end after 3",
+        ),
+    ] {
+        let text = format!("YUV4MPEG2 {header}\nFRAME\nabc");
+        breaks_off(text.as_bytes(), 0, says);
+    }
+    breaks_off(b"II*\0\xff\xff\xff\x7f", 0, "cannot use the image pipe");
+    let another_size = [&anymaps()[..], b"P5\n3 5\n255\n123456789012345"].concat();
+    let says = "frame 4: expected 5 × 3 pixels as in the first, found 3 × 5";
+    breaks_off(&another_size, 3, says);
+    let lost = [&video("mono", 1, 0)[..], b"garbage"].concat();
+    breaks_off(
+        &lost,
+        3,
+        "frame 4: expected the word FRAME, found `garbage`",
+    );
     let mut endless = pages(true);
     let last = endless.len() - 4;
     endless[last..].copy_from_slice(&23_u32.to_le_bytes());
-    for (bytes, kept, says) in [
-        (
-            b"".to_vec(),
-            0,
-            "pipe: expected a video or an image, found no bytes",
-        ),
-        (with("W0 H0"), 0, "found 0 × 0 pixels"),
-        (with("W65535 H65535"), 0, "found 65535 × 65535 pixels"),
-        (with("W30000 H30000"), 0, "found 30000 × 30000 pixels"),
-        (with("W-3 H1"), 0, "found `YUV4MPEG2 W-3 H1`"),
-        (with("W3"), 0, "found `"),
-        (with("W99999999999999999999 H1"), 0, "found `"),
-        (with("W3 H1 Cpalette"), 0, "the colour space `palette`"),
-        (with("W3 H1 Cmono99"), 0, "the colour space `mono99`"),
-        (with(&"X".repeat(5000)), 0, "a first line of more than"),
-        (
-            with("W3 H1 Cmono16"),
-            0,
-            "frame 1: expected 6 bytes of samples, found the end after 3",
-        ),
-        (
-            b"P5\n0 0\n255\n".to_vec(),
-            0,
-            "pipe, frame 1: expected the header of a PGM",
-        ),
-        (
-            b"P6\n65535 65535\n255\n".to_vec(),
-            0,
-            "at most 64 million pixels, found P6",
-        ),
-        (b"P5\n3 1\n70000\nabc".to_vec(), 0, "expected the header"),
-        (b"P5\n3 1\n0\nabc".to_vec(), 0, "expected the header"),
-        (
-            b"P5\n30000 2000\n255\nabc".to_vec(),
-            0,
-            "found the end after 3",
-        ),
-        (
-            another_size,
-            3,
-            "frame 4: expected 5 × 3 pixels as in the first, found 3 × 5",
-        ),
-        (lost, 3, "frame 4: expected the word FRAME, found `garbage`"),
-        (
-            b"no stream at all".to_vec(),
-            0,
-            "known by its first bytes, found no stream",
-        ),
-        (
-            b"II*\0\xff\xff\xff\x7f".to_vec(),
-            0,
-            "cannot use the image pipe",
-        ),
-        (endless, 3, ""),
-    ] {
-        let (frames, broken) = frames_of(&bytes);
-        assert_eq!(frames.len(), kept, "{says}");
-        let sentence = broken.unwrap_or_default();
-        assert!(sentence.contains(says), "`{sentence}` lacks `{says}`");
-    }
+    breaks_off(&endless, 3, "");
 }

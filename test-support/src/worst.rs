@@ -14,10 +14,10 @@ impl Worst {
         }
     }
 
-    /// Enters an error in units of ε·cond; `bound` is what the check allows.
+    /// Enters an error in units of ε·cond; `bound` is what the check allows. NaN stays.
     pub fn enter(&mut self, check: &str, units: f64, bound: f64) {
         match self.rows.iter_mut().find(|row| row.0 == check) {
-            Some(row) if units <= row.1 => {}
+            Some(row) if row.1.is_nan() || units <= row.1 => {}
             Some(row) => (row.1, row.2) = (units, bound),
             None => self.rows.push((check.to_owned(), units, bound)),
         }

@@ -1,28 +1,22 @@
 //! Presses of known force: what an object reflects and what the lamps give then needs no
 //! assumption.
+use crate::common::{press_of, trial};
 use ndarray::Array2;
 use tactile_imaging::force::Estimate;
 use tactile_imaging::pipeline::{CheckPress, CheckedObject, Measurement};
-use tactile_simulate::{CalibrationRun, Camera, PressLoad, PressOptions, Trial};
+use tactile_simulate::{Camera, Trial};
 
 /// A press with 0.7, 1.2 and, for the check, 1 N. With a factor that its light has.
 fn press(seed: u64, light: f64) -> (Trial, Vec<Array2<u8>>) {
-    let options = PressOptions {
-        camera: Camera::default().coarser(4),
-        loads: [0.7, 1.2, 1.0].map(PressLoad::normal).to_vec(),
-        seed,
-        ..PressOptions::default()
-    };
-    let trial = Trial::new(options, &CalibrationRun::default()).unwrap();
+    let trial = trial(Camera::default().coarser(4), &[0.7, 1.2, 1.0], seed);
     let reference = &trial.simulation.reference;
     let dimmed = |frame: &Array2<u8>| {
         let dim = |frame: u8, reference: u8| {
             let reference = f64::from(reference);
             (reference + light * (f64::from(frame) - reference)).round() as u8
         };
-        ndarray::Zip::from(frame)
-            .and(reference)
-            .map_collect(|&frame, &reference| dim(frame, reference))
+        let both = ndarray::Zip::from(frame).and(reference);
+        both.map_collect(|&frame, &reference| dim(frame, reference))
     };
     let frames = trial.simulation.frames.iter().map(dimmed).collect();
     (trial, frames)
@@ -40,11 +34,7 @@ fn measured(trial: &Trial, frames: &[Array2<u8>], object: Option<CheckedObject>)
         let check = CheckPress::new(frames[2].view(), known_n, object);
         pipeline = pipeline.with_checks(reference, &[check]).unwrap();
     }
-    let mut press = pipeline.press(reference).unwrap();
-    for frame in &frames[..2] {
-        press.add_frame(frame.view());
-    }
-    press.measure()
+    press_of(&pipeline, reference, frames[..2].to_vec()).measure()
 }
 
 #[test]

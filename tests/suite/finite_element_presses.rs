@@ -8,9 +8,10 @@
 mod calculix;
 mod solved;
 
+use crate::common::{Study, press_of};
 use nalgebra::{DMatrix, DVector};
 use ndarray::{Array2, ArrayView2};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 use tactile_imaging::elasticity::contact::{ContactTable, Layer, Waveguide as Guide};
 use tactile_imaging::elasticity::modulus::{HertzSphere, ModulusEstimate, TabulatedContact};
@@ -19,10 +20,9 @@ use tactile_imaging::pipeline::{
     CheckPress, CheckedObject, ContactReading, ContactStage, FrameContact, KnownBall, Object,
     Pipeline,
 };
-use tactile_simulate::Trial;
 use tactile_simulate::{
     CalibrationRun, Camera, ContactModel, ContactState, Elastic, ElasticSphere, LightGuide,
-    PressLoad, PressOptions, PressScene, WaveguideLayer,
+    PressLoad, PressOptions, PressScene, Trial, WaveguideLayer,
 };
 
 pub(crate) struct Ball {
@@ -34,19 +34,14 @@ pub(crate) struct Ball {
     pub(crate) states: Vec<ContactState>,
 }
 
-fn data(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("tests/data")
-        .join(name)
-}
-
 /// Contacts as `cargo run --example contact_states -- presses` writes them.
 pub(crate) fn recorded_balls() -> Vec<Ball> {
     balls_of("finite_element_presses.csv")
 }
 
 fn balls_of(file: &str) -> Vec<Ball> {
-    let text = std::fs::read_to_string(data(file)).unwrap();
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data");
+    let text = std::fs::read_to_string(path.join(file)).unwrap();
     let mut balls: Vec<Ball> = Vec::new();
     for line in text.lines().skip(1) {
         let cells: Vec<&str> = line.split(',').collect();
@@ -105,43 +100,48 @@ struct Reading {
     radius_errors: [f64; 2],
 }
 
+/// Layers of ν = ½ by thickness and modulus; none is a rigid flat.
+fn guide(layers: &[(f64, f64)]) -> Guide {
+    if layers.is_empty() {
+        return Guide::rigid();
+    }
+    let layer = |&(thickness_m, youngs_modulus_pa): &(f64, f64)| Layer {
+        thickness_m,
+        youngs_modulus_pa,
+        poisson_ratio: 0.5,
+    };
+    Guide::new(layers.iter().map(layer).collect()).unwrap()
+}
+
 impl Ball {
-    fn layers(&self) -> Vec<WaveguideLayer> {
-        let layer = |&(thickness_m, youngs_modulus_pa): &(f64, f64)| WaveguideLayer {
-            refractive_index: 1.4,
-            thickness_m,
-            material: Elastic {
-                youngs_modulus_pa,
-                poisson_ratio: 0.5,
-            },
-        };
-        self.layers.iter().map(layer).collect()
+    fn elastic(youngs_modulus_pa: f64) -> Elastic {
+        Elastic {
+            youngs_modulus_pa,
+            poisson_ratio: 0.5,
+        }
     }
 
     /// A press with the loads of the states.
     fn options(&self, states: &[ContactState], camera: Camera, seed: u64) -> PressOptions {
-        let rigid = vec![WaveguideLayer {
+        let layer = |thickness_m, material| WaveguideLayer {
             refractive_index: 1.4,
-            thickness_m: 1e-2,
-            material: Elastic::RIGID,
-        }];
-        let layers = self.layers();
+            thickness_m,
+            material,
+        };
+        let layers = self.layers.iter();
+        let mut layers: Vec<_> = layers.map(|l| layer(l.0, Self::elastic(l.1))).collect();
+        if layers.is_empty() {
+            layers.push(layer(1e-2, Elastic::RIGID));
+        }
+        let loads = states.iter().map(|s| PressLoad::normal(s.force_n));
         PressOptions {
             object: ElasticSphere {
                 radius_m: self.radius_m,
-                material: Elastic {
-                    youngs_modulus_pa: self.youngs_modulus_pa,
-                    poisson_ratio: 0.5,
-                },
+                material: Self::elastic(self.youngs_modulus_pa),
             },
-            waveguide: LightGuide {
-                layers: if layers.is_empty() { rigid } else { layers },
-            },
+            waveguide: LightGuide { layers },
             law: ContactModel::Tabulated(self.states.clone()),
-            loads: states
-                .iter()
-                .map(|s| PressLoad::normal(s.force_n))
-                .collect(),
+            loads: loads.collect(),
             camera,
             seed,
             ..PressOptions::default()
@@ -153,10 +153,7 @@ impl Ball {
         let pair = &self.states[first..first + 2];
         // The camera stands so far away that contacts, the calibration's too, take half of the
         // frame at most.
-        let largest_m = self
-            .states
-            .last()
-            .map_or(0.0, |state| state.contact_radius_m);
+        let largest_m = self.states.last().map_or(0.0, |s| s.contact_radius_m);
         let camera = camera(43.1e-6 * (largest_m / 5e-3).max(1.0));
         let options = self.options(pair, camera, seed);
         let calibration = CalibrationRun {
@@ -184,26 +181,18 @@ impl Ball {
             false => trial.pairs.clone(),
         };
         let pipeline = Pipeline::from_pairs(&pairs, size, Object::sphere(self.radius_m)).unwrap();
-        let guide = self.guide();
-        let pipeline = match self.layers.is_empty() {
-            true => pipeline,
-            false => pipeline
-                .with_settings(|settings| settings.waveguide = Some(guide.clone()))
-                .unwrap(),
-        };
-        // All is as it is stated.
-        let pipeline = pipeline
-            .with_settings(tactile_imaging::pipeline::Settings::state_exact)
-            .unwrap();
+        let guide = guide(&self.layers);
+        let pipeline = pipeline.with_settings(|settings| {
+            if !self.layers.is_empty() {
+                settings.waveguide = Some(guide.clone());
+            }
+            // All is as it is stated.
+            settings.state_exact();
+        });
+        let pipeline = pipeline.unwrap();
         let press = trial.press(&pipeline).unwrap();
-        let layered = match press.modulus() {
-            Ok(layered) => layered,
-            Err(error) => panic!(
-                "{}, states {first}: {error}\n{}",
-                self.name,
-                press.measure()
-            ),
-        };
+        let layered = press.modulus();
+        let layered = layered.unwrap_or_else(|error| panic!("{} {first}: {error}", self.name));
         let radius_errors = [0, 1].map(|frame| {
             let contact = press.contact(frame).unwrap().unwrap();
             contact.contact_radius_m.value / pair[frame].contact_radius_m - 1.0
@@ -229,79 +218,30 @@ impl Ball {
             radius_errors,
         }
     }
-
-    fn guide(&self) -> Guide {
-        if self.layers.is_empty() {
-            return Guide::rigid();
-        }
-        let layer = |&(thickness_m, youngs_modulus_pa): &(f64, f64)| Layer {
-            thickness_m,
-            youngs_modulus_pa,
-            poisson_ratio: 0.5,
-        };
-        Guide::new(self.layers.iter().map(layer).collect()).unwrap()
-    }
 }
 
 fn error(estimate: &ModulusEstimate, truth_pa: f64) -> f64 {
     estimate.youngs_modulus_pa / truth_pa - 1.0
 }
 
-/// Sizes of the relative errors, and the part of the intervals that hold the truth.
-#[derive(Debug)]
-struct Summary {
-    count: usize,
-    median: f64,
-    worst: f64,
-    held: f64,
+/// Errors no larger than these, and intervals that hold.
+fn check(study: &Study, median: f64, worst: f64) {
+    let found = study.median_and_worst();
+    assert!(found[0] < median && found[1] < worst, "{found:?}");
+    // Three standard deviations of a true 92 % of so many.
+    let slack = 3.0 * (0.92 * 0.08 / study.errors.len() as f64).sqrt();
+    assert!(study.held() > 0.92 - slack, "{study:?}");
 }
 
-impl Summary {
-    fn of<'a>(all: impl Iterator<Item = (&'a ModulusEstimate, f64)>) -> Self {
-        let all: Vec<_> = all.collect();
-        if all.is_empty() {
-            let [median, worst, held] = [f64::NAN; 3];
-            return Self {
-                count: 0,
-                median,
-                worst,
-                held,
-            };
-        }
-        let mut sizes: Vec<f64> = (all.iter())
-            .map(|(m, truth)| error(m, *truth).abs())
-            .collect();
-        sizes.sort_by(f64::total_cmp);
-        let held = (all.iter()).filter(|(m, truth)| m.interval_95.contains(*truth));
-        Self {
-            count: all.len(),
-            median: sizes[sizes.len() / 2],
-            worst: sizes[sizes.len() - 1],
-            held: held.count() as f64 / all.len() as f64,
-        }
-    }
-
-    fn check(&self, median: f64, worst: f64) {
-        assert!(self.median < median && self.worst < worst, "{self:?}");
-        // Three standard deviations of a true 92 % of so many.
-        let slack = 3.0 * (0.92 * 0.08 / self.count as f64).sqrt();
-        assert!(self.held > 0.92 - slack, "{self:?}");
-    }
-
-    /// 92 to 98 %, widened by two binomial standard deviations.
-    fn check_coverage(&self) {
-        let slack = 2.0 * (0.05 * 0.95 / self.count as f64).sqrt();
-        assert!(
-            (0.92 - slack..=0.98 + slack).contains(&self.held),
-            "{self:?}"
-        );
-    }
-}
-
-/// Prints every reading beside what layers in series give, then the summary of both laws.
+/// Prints every reading beside what layers in series give, then the errors of both laws.
 #[allow(clippy::print_stdout)]
-fn summaries(readings: &[Reading]) -> [Summary; 2] {
+fn studies(readings: &[Reading]) -> [Study; 2] {
+    let [mut layered, mut tabulated] = [Study::default(), Study::default()];
     for r in readings {
+        layered.add(&r.layered, r.truth_pa);
+        r.tabulated
+            .iter()
+            .for_each(|found| tabulated.add(found, r.truth_pa));
         let interval = |m: &ModulusEstimate| {
             let held = m.interval_95.contains(r.truth_pa);
             format!(
@@ -321,10 +261,8 @@ fn summaries(readings: &[Reading]) -> [Summary; 2] {
             100.0 * r.radius_errors[1],
         );
     }
-    let layered = Summary::of(readings.iter().map(|r| (&r.layered, r.truth_pa)));
-    let tabulated = (readings.iter()).filter_map(|r| Some((r.tabulated.as_ref()?, r.truth_pa)));
-    let tabulated = Summary::of(tabulated);
-    println!("layered {layered:?}\ntabulated {tabulated:?}");
+    layered.print("layered");
+    tabulated.print("tabulated");
     [layered, tabulated]
 }
 
@@ -345,7 +283,7 @@ fn balls_are_measured_within_their_intervals() {
         .fold(0.0, |worst: f64, e| worst.max(e.abs()));
     assert!(radius < 2e-3, "{radius}");
     // As near as a contact table is to come; measured 0.4 and 1.9 %.
-    summaries(&readings)[0].check(0.01, 0.04);
+    check(&studies(&readings)[0], 0.01, 0.04);
 }
 
 /// Random balls solved anew, on other meshes than the tables', against tables solved here: minutes,
@@ -367,17 +305,20 @@ fn study_of_solved_presses() {
             readings.push(ball.read(first, 10 * seed + first as u64, &tables));
         }
     }
-    let [layered, tabulated] = summaries(&readings);
+    let [layered, tabulated] = studies(&readings);
     layered.check_coverage();
     // Where the contact is in the law's range and the camera's noise lets a modulus be known to a
     // few per cent.
     let clear = |r: &&Reading| {
         r.largest_ratio < 1.2 && r.layered.standard_error_pa < 0.03 * r.layered.youngs_modulus_pa
     };
-    let clear = readings.iter().filter(clear);
-    Summary::of(clear.map(|r| (&r.layered, r.truth_pa))).check(0.03, 0.10);
+    let mut study = Study::default();
+    for reading in readings.iter().filter(clear) {
+        study.add(&reading.layered, reading.truth_pa);
+    }
+    check(&study, 0.03, 0.10);
     if with_tables {
-        tabulated.check(0.01, 0.04);
+        check(&tabulated, 0.01, 0.04);
         tabulated.check_coverage();
     }
 }
@@ -393,30 +334,19 @@ fn presses_of_known_balls_make_the_layers_right() {
     };
     let (sample, checks) = (of(80e3, 3e-3), [of(180e3, 3e-3), of(60e3, 8e-3)]);
     let camera = camera(50e-6);
-    let trial = Trial::new(
-        sample.options(&sample.states[2..4], camera, 1),
-        &CalibrationRun::default(),
-    )
-    .unwrap();
+    let options = sample.options(&sample.states[2..4], camera, 1);
+    let trial = Trial::new(options, &CalibrationRun::default()).unwrap();
     let pairs = trial.pairs.clone();
     let size = trial.simulation.pixel_size_m;
-    for (k, [top, others]) in [[1.0, 1.0], [0.9, 0.9], [1.1, 1.1], [0.85, 1.0]]
-        .iter()
-        .enumerate()
-    {
-        let stated = sample
-            .layers
-            .iter()
-            .enumerate()
-            .map(|(i, &(thickness_m, modulus_pa))| Layer {
-                thickness_m,
-                youngs_modulus_pa: modulus_pa * if i == 0 { top } else { others },
-                poisson_ratio: 0.5,
-            });
-        let stated = Guide::new(stated.collect()).unwrap();
+    let factors = [[1.0, 1.0], [0.9, 0.9], [1.1, 1.1], [0.85, 1.0]];
+    for (k, [top, others]) in factors.iter().enumerate() {
+        let mut stated = sample.layers.clone();
+        for (i, layer) in stated.iter_mut().enumerate() {
+            layer.1 *= if i == 0 { top } else { others };
+        }
         let pipeline = Pipeline::from_pairs(&pairs, size, Object::sphere(sample.radius_m)).unwrap();
         let unchecked = pipeline.with_settings(|settings| {
-            settings.waveguide = Some(stated);
+            settings.waveguide = Some(guide(&stated));
             // Of every layer 10 % of the modulus, by itself.
             let variances = DVector::from_fn(9, |i, _| if i < 3 { 1e-2 } else { 0.0 });
             settings.layer_covariance = Some(DMatrix::from_diagonal(&variances));
@@ -426,19 +356,16 @@ fn presses_of_known_balls_make_the_layers_right() {
         let mut pipeline = unchecked.clone();
         for (ball, load) in checks.iter().zip([3, 2]) {
             let states = &ball.states[load..=load];
-            let made = PressScene::new(ball.options(states, camera, 2 + k as u64))
-                .unwrap()
-                .simulate();
-            let known = KnownBall::elastic(
-                Estimate::new(ball.radius_m, 1e-3 * ball.radius_m),
-                Estimate::new(ball.youngs_modulus_pa, 5e-3 * ball.youngs_modulus_pa),
-            );
-            let weight_n = Estimate::new(states[0].force_n, 2e-3 * states[0].force_n);
-            let check =
-                CheckPress::new(made.frames[0].view(), weight_n, CheckedObject::Ball(known));
-            pipeline = pipeline
-                .with_checks(made.reference.view(), &[check])
-                .unwrap();
+            let made = PressScene::new(ball.options(states, camera, 2 + k as u64));
+            let made = made.unwrap().simulate();
+            let known = |value: f64, error: f64| Estimate::new(value, error * value);
+            let modulus = known(ball.youngs_modulus_pa, 5e-3);
+            let object =
+                CheckedObject::Ball(KnownBall::elastic(known(ball.radius_m, 1e-3), modulus));
+            let weight_n = known(states[0].force_n, 2e-3);
+            let check = CheckPress::new(made.frames[0].view(), weight_n, object);
+            let checked = pipeline.with_checks(made.reference.view(), &[check]);
+            pipeline = checked.unwrap();
         }
         let [before, after] =
             [&unchecked, &pipeline].map(|p| trial.press(p).unwrap().modulus().unwrap());
@@ -488,16 +415,10 @@ fn depressions_of_the_guide_hold_those_of_finite_elements() {
     let mut balls = recorded_balls();
     balls.extend((100..100 + count).map(solved::ball));
     for ball in balls.iter().filter(|ball| !ball.layers.is_empty()) {
-        let layer = |&(thickness_m, youngs_modulus_pa): &(f64, f64)| Layer {
-            thickness_m,
-            youngs_modulus_pa,
-            poisson_ratio: 0.5,
-        };
-        let guide = Guide::new(ball.layers.iter().map(layer).collect()).unwrap();
         let object = Object::sphere(ball.radius_m);
         let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], object).unwrap();
         let pipeline = pipeline.with_settings(|settings| {
-            settings.waveguide = Some(guide);
+            settings.waveguide = Some(guide(&ball.layers));
             settings.state_exact();
         });
         let pipeline = pipeline.unwrap();
@@ -505,8 +426,7 @@ fn depressions_of_the_guide_hold_those_of_finite_elements() {
             let [force, radius] = [state.force_n, state.contact_radius_m].map(Estimate::exact);
             let contact = ContactReading::new(Some(force), radius);
             let known = pipeline.clone().with_contact(Known(contact));
-            let mut press = known.press(frame.view()).unwrap();
-            press.add_frame(frame.view());
+            let press = press_of(&known, frame.view(), [frame.clone()]);
             // The axis, and a half and three quarters of the way to the rim, whose place coarse
             // meshes know to a part of an element.
             let rim = state.radius_m.len() - 2;
@@ -518,22 +438,12 @@ fn depressions_of_the_guide_hold_those_of_finite_elements() {
                 held += usize::from(error < 1.96 * depth.standard_error);
                 all += 1;
                 // A law that is wrong in kind is off by more than its error twice over.
-                assert!(
-                    error < 4.0 * depth.standard_error,
-                    "{}: {depth} {error}",
-                    ball.name
-                );
-                let greatest = depths[0];
-                assert!(
-                    greatest.relative_error() < 0.09,
-                    "{}: {greatest}",
-                    ball.name
-                );
+                let case = format!("{}: {depth} {error}", ball.name);
+                assert!(error < 4.0 * depth.standard_error, "{case}");
+                assert!(depths[0].relative_error() < 0.09, "{case}");
             }
         }
     }
-    assert!(
-        held as f64 > 0.95 * f64::from(all) && all > 60,
-        "{held} of {all}"
-    );
+    let share = held as f64 / all as f64;
+    assert!(share > 0.95 && all > 60, "{held} of {all}");
 }

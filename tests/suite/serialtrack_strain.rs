@@ -3,65 +3,35 @@
 #![allow(clippy::print_stdout)]
 
 use nalgebra::{Matrix3, Point, Point3};
-use std::path::PathBuf;
 use tactile_imaging::elasticity::strain::GreenLagrange;
 use tactile_imaging::io::read_points;
 use tactile_imaging::{
     PairsDoubt, StrainBetween, StrainBetweenOptions, StrainSeries, strain_between,
 };
+use test_support::published;
 
 fn frame<const D: usize>(k: usize) -> Option<Vec<Point<f64, D>>> {
-    let folder = std::env::var_os("TACTILE_DATA").map_or_else(
-        || PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/data")),
-        PathBuf::from,
-    );
-    let path = folder.join(format!("serialtrack/stretch{D}d_frame{k:02}.csv"));
-    if !path.exists() {
-        println!("skipped: no {} (set TACTILE_DATA)", path.display());
-        return None;
-    }
+    let path = published(&format!("serialtrack/stretch{D}d_frame{k:02}.csv"))?;
     Some(read_points(&path).expect("a column for each axis"))
 }
 
-fn stretch(k: usize) {
-    let (Some(before), Some(after)) = (frame::<3>(0), frame(k)) else {
-        return;
-    };
-    let found = strain_between(&before, &after, &StrainBetweenOptions::default()).unwrap();
-    let mut matrix = Matrix3::zeros();
-    matrix[(0, 0)] = exact(1.0 + 0.05 * k as f64);
-    let gap = found.summary.mean - matrix;
-    let squares: f64 = found
-        .strains
-        .iter()
-        .map(|e| (e - matrix).norm_squared())
-        .sum();
-    let local = (squares / found.strains.len() as f64).sqrt();
-    println!(
-        "0 -> {k}: {} pairs, mean off by xx {:+.1e}, others {:.1e}, standard errors {:.1e}, local \
-         rms {local:.1e}",
-        found.pairs.len(),
-        gap[(0, 0)],
-        (gap - Matrix3::from_diagonal(&[gap[(0, 0)], 0.0, 0.0].into())).amax(),
-        found.standard_error.amax()
-    );
-    assert!(gap.amax() < 5e-4, "{gap}");
-    assert!(local < 0.01, "{local}");
-}
-
 #[test]
-fn five_percent() {
-    stretch(1);
-}
-
-#[test]
-fn ten_percent() {
-    stretch(2);
-}
-
-#[test]
-fn twenty_five_percent() {
-    stretch(5);
+fn particles_of_a_stretched_volume_have_their_local_strain() {
+    for k in [1, 2, 5] {
+        let (Some(before), Some(after)) = (frame::<3>(0), frame(k)) else {
+            return;
+        };
+        let found = strain_between(&before, &after, &StrainBetweenOptions::default()).unwrap();
+        let mut matrix = Matrix3::zeros();
+        matrix[(0, 0)] = exact(1.0 + 0.05 * k as f64);
+        let gap = (found.summary.mean - matrix).abs();
+        let squares = found.strains.iter().map(|e| (e - matrix).norm_squared());
+        let local = (squares.sum::<f64>() / found.strains.len() as f64).sqrt();
+        let (pairs, errors) = (found.pairs.len(), found.standard_error.amax());
+        println!("0 -> {k}: {pairs} pairs, errors {errors:.1e}, local rms {local:.1e}");
+        assert!(gap.amax() < 5e-4, "{gap}");
+        assert!(local < 0.01, "{local}");
+    }
 }
 
 /// Green–Lagrange e_xx of a stretch.
@@ -74,14 +44,10 @@ fn exact(stretch: f64) -> f64 {
 fn check<const D: usize>(found: &StrainBetween<D>, stretch: f64, scene: &str) -> f64 {
     let error = found.standard_error[(0, 0)];
     let off = found.summary.mean[(0, 0)] - exact(stretch);
-    println!(
-        "{scene}: {} pairs, off by {off:+.1e} ± {error:.1e}",
-        found.rows.len()
-    );
-    assert!(
-        off.abs() < (5.0 * error).max(1e-3 * exact(stretch)),
-        "{scene}: {off} ± {error}"
-    );
+    let pairs = found.rows.len();
+    println!("{scene}: {pairs} pairs, off by {off:+.1e} ± {error:.1e}");
+    let allowed = (5.0 * error).max(1e-3 * exact(stretch));
+    assert!(off.abs() < allowed, "{scene}: {off} ± {error}");
     off / error
 }
 
@@ -178,10 +144,7 @@ fn a_volume_is_followed_to_three_times_its_length() {
         resumed += usize::from(pair[1].0 > pair[0].0 + 1);
     }
     println!("{links} links, {wrong} wrong, {resumed} over a gap");
-    assert!(
-        wrong * 1000 <= links && resumed > 100,
-        "{wrong} of {links}, {resumed}"
-    );
+    assert!(wrong * 1000 <= links && resumed > 100);
 }
 
 /// Scattered points of a unit cube, other ones for another seed.
@@ -217,11 +180,8 @@ fn a_large_stretch_is_exact_or_refused() {
 /// Two sets that have nothing to do with each other have no strain.
 #[test]
 fn unrelated_sets_are_refused() {
-    let found = strain_between(
-        &scattered(0.1, 80),
-        &scattered(0.37, 80),
-        &StrainBetweenOptions::default(),
-    );
+    let [before, after] = [0.1, 0.37].map(|seed| scattered(seed, 80));
+    let found = strain_between(&before, &after, &StrainBetweenOptions::default());
     assert!(found.is_err(), "{:?}", found.map(|f| f.summary.mean));
 }
 
@@ -237,13 +197,7 @@ fn thousands_of_pairs_are_fitted_patch_by_patch() {
         |p: &Point3<f64>| Point3::new(p.x + 0.04 * p.x * p.x, p.y + 0.01 * (3.0 * p.z).sin(), p.z);
     let after: Vec<_> = before.iter().map(bend).collect();
     // Every fiftieth pair has its neighbour's partner, every fortieth is missing.
-    let partner = |i: usize| {
-        if i.is_multiple_of(50) {
-            (i, i + 1)
-        } else {
-            (i, i)
-        }
-    };
+    let partner = |i: usize| (i, i + usize::from(i.is_multiple_of(50)));
     let pairs: Vec<_> = (0..2399).filter(|i| i % 40 != 7).map(partner).collect();
     let found = StrainBetween::of_pairs(&before, &after, &pairs, &GreenLagrange).unwrap();
     let exact = |p: &Point3<f64>| {
@@ -269,17 +223,15 @@ fn thousands_of_pairs_are_fitted_patch_by_patch() {
     let at = found.at(&[centre], &GreenLagrange).unwrap()[0];
     assert!((at.strain - exact(&centre)).amax() < 1e-5);
     // A set in a plane of space has no strain across it, and a mirror image none at all.
-    let flat: Vec<_> = before.iter().map(|p| Point3::new(p.x, p.y, 0.0)).collect();
     let all: Vec<_> = (0..2400).map(|i| (i, i)).collect();
-    let doubt = StrainBetween::of_pairs(&flat, &flat, &all, &GreenLagrange)
-        .unwrap()
-        .doubt;
-    assert_eq!(doubt, Some(PairsDoubt::Flat));
+    let doubt = |before: &[Point3<f64>], after: &[Point3<f64>]| {
+        let found = StrainBetween::of_pairs(before, after, &all, &GreenLagrange);
+        found.unwrap().doubt
+    };
+    let flat: Vec<_> = before.iter().map(|p| Point3::new(p.x, p.y, 0.0)).collect();
+    assert_eq!(doubt(&flat, &flat), Some(PairsDoubt::Flat));
     let mirrored: Vec<_> = before.iter().map(|p| Point3::new(-p.x, p.y, p.z)).collect();
-    let doubt = StrainBetween::of_pairs(&before, &mirrored, &all, &GreenLagrange)
-        .unwrap()
-        .doubt;
-    assert_eq!(doubt, Some(PairsDoubt::Mirrored));
+    assert_eq!(doubt(&before, &mirrored), Some(PairsDoubt::Mirrored));
 }
 
 /// A plane is stretched or moved, and seen through its old window. Points whose partners have left

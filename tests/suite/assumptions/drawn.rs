@@ -1,10 +1,10 @@
 //! Worlds drawn at random: everything that is stated is wrong by as much as its stated error
 //! allows, and the light or the camera departs from what is assumed in up to three respects.
-use super::worlds::{Check, MODULUS_PA, Stated, World};
-use super::{ball, concerns_modulus};
+use super::worlds::{Check, Stated, World};
+use super::{Outcome, ball};
 use rand::{Rng, RngExt, SeedableRng, rngs::ChaCha8Rng, seq::IndexedRandom};
 use rand_distr::StandardNormal;
-use tactile_imaging::pipeline::{Flag, Measurement, PipelineError};
+use tactile_imaging::pipeline::Flag;
 
 type Departure = (&'static str, fn(&mut World, f64));
 
@@ -60,28 +60,6 @@ fn honest(rng: &mut impl Rng, check: Option<Check>) -> (World, Stated) {
     (world, stated)
 }
 
-struct Outcome {
-    error: f64,
-    half_width: f64,
-    held: bool,
-    flagged: bool,
-}
-
-impl Outcome {
-    fn of(found: Result<Measurement, PipelineError>) -> Option<Self> {
-        let found = found.ok()?;
-        let modulus = found.youngs_modulus_pa.ok()?;
-        let (lower, upper) = modulus.interval_95;
-        let upper = upper.unwrap_or(f64::INFINITY);
-        Some(Self {
-            error: modulus.value / MODULUS_PA - 1.0,
-            half_width: 0.5 * (upper - lower) / MODULUS_PA,
-            held: (lower..=upper).contains(&MODULUS_PA),
-            flagged: found.flags.iter().any(concerns_modulus),
-        })
-    }
-}
-
 fn median(values: impl Iterator<Item = f64>) -> f64 {
     let mut values: Vec<f64> = values.collect();
     values.sort_by(f64::total_cmp);
@@ -100,11 +78,8 @@ fn draw(check: Option<Check>, departures: usize, count: u64) -> Vec<Outcome> {
             change(&mut world, rng.random_range(-1.0..1.0));
         }
         // What is refused is not silent.
-        let outcome = Outcome::of(world.measure(&stated, 100 + seed));
-        if let Some(outcome) = &outcome
-            && !outcome.held
-            && !outcome.flagged
-        {
+        let outcome = Outcome::of(world.measure(&stated, 100 + seed)).ok();
+        if let Some(outcome) = outcome.as_ref().filter(|outcome| outcome.is_silent()) {
             let percent = 100.0 * outcome.error;
             println!("silent: {percent:+.1} % at {:?} N {names:?}", world.loads_n);
         }
@@ -135,13 +110,13 @@ fn drawn_worlds_are_held_or_flagged() {
             outcomes.iter().filter(|outcome| is(outcome)).count() as f64 / all
         };
         let held = share(|outcome| outcome.held);
-        let silent = share(|outcome| !outcome.held && !outcome.flagged);
+        let silent = share(Outcome::is_silent);
         println!(
             "| {check:?} | {departures} | {:.1} % | ± {:.1} % | {:.1} % | {:.1} % | {:.1} % |",
             100.0 * median(outcomes.iter().map(|outcome| outcome.error.abs())),
             100.0 * median(outcomes.iter().map(|outcome| outcome.half_width)),
             100.0 * held,
-            100.0 * share(|outcome| outcome.flagged),
+            100.0 * share(|outcome| !outcome.flags.is_empty()),
             100.0 * silent,
         );
         // Three standard deviations of so many draws.

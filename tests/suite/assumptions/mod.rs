@@ -11,7 +11,7 @@ mod worlds;
 use std::collections::BTreeSet;
 use tactile_imaging::Object;
 use tactile_imaging::fem::Interface;
-use tactile_imaging::pipeline::{EstimatorChoice, Flag};
+use tactile_imaging::pipeline::{EstimatorChoice, Flag, Measurement, PipelineError};
 use tactile_simulate::Camera;
 use worlds::{Distortion, MODULUS_PA, RADIUS_M, Sample, Stated, World};
 
@@ -224,64 +224,60 @@ fn concerns_modulus(flag: &Flag) -> bool {
     )
 }
 
-/// What was found of a row in so many draws of the noise.
-#[derive(Default)]
-struct Found {
-    errors: Vec<f64>,
-    /// Half widths of the intervals, relative to the truth.
-    half_widths: Vec<f64>,
-    held: usize,
-    flagged: usize,
-    refused: usize,
-    /// Draws with neither.
-    silent: usize,
-    flags: BTreeSet<String>,
+/// What a measurement says of the modulus.
+struct Outcome {
+    error: f64,
+    /// Of the interval, relative to the truth.
+    half_width: f64,
+    held: bool,
+    flags: Vec<String>,
 }
 
-impl Row {
-    fn run(&self, seeds: u64) -> Found {
-        let mut found = Found::default();
-        for seed in 0..seeds {
-            let measured = self.world.measure(&self.stated, 1 + seed).unwrap();
-            let modulus = match measured.youngs_modulus_pa {
-                Ok(modulus) => modulus,
-                Err(error) => {
-                    found.refused += 1;
-                    found.flags.insert(error.to_string());
-                    continue;
-                }
-            };
-            let (lower, upper) = modulus.interval_95;
-            let upper = upper.unwrap_or(f64::INFINITY);
-            let held = (lower..=upper).contains(&MODULUS_PA);
-            found.errors.push(modulus.value / MODULUS_PA - 1.0);
-            found.half_widths.push(0.5 * (upper - lower) / MODULUS_PA);
-            let mut flags = measured.flags.iter().filter(|f| concerns_modulus(f));
-            found.flags.extend(flags.clone().map(ToString::to_string));
-            let flagged = flags.next().is_some();
-            found.held += usize::from(held);
-            found.flagged += usize::from(flagged);
-            found.silent += usize::from(!held && !flagged);
-        }
-        found
+impl Outcome {
+    /// Of a refusal its sentence.
+    fn of(found: Result<Measurement, PipelineError>) -> Result<Self, PipelineError> {
+        let found = found?;
+        let modulus = found.youngs_modulus_pa?;
+        let (lower, upper) = modulus.interval_95;
+        let upper = upper.unwrap_or(f64::INFINITY);
+        let flags = found.flags.iter().filter(|flag| concerns_modulus(flag));
+        Ok(Self {
+            error: modulus.value / MODULUS_PA - 1.0,
+            half_width: 0.5 * (upper - lower) / MODULUS_PA,
+            held: (lower..=upper).contains(&MODULUS_PA),
+            flags: flags.map(ToString::to_string).collect(),
+        })
+    }
+
+    /// Wrong, and nothing says so.
+    fn is_silent(&self) -> bool {
+        !self.held && self.flags.is_empty()
     }
 }
 
-impl Found {
-    fn print(&self, assumed: &str, seeds: u64) {
-        let largest = |values: &[f64]| {
-            let values = values.iter().map(|v| 100.0 * v);
-            values.max_by(|a, b| a.abs().total_cmp(&b.abs()))
-        };
-        let error = largest(&self.errors).map_or("none".to_owned(), |e| format!("{e:+.1} %"));
-        let width = largest(&self.half_widths).map_or("–".to_owned(), |w| format!("± {w:.1} %"));
-        println!(
-            "| {assumed} | {error} | {width} | {} of {seeds} | {} of {seeds} | {} |",
-            self.held,
-            self.flagged + self.refused,
-            self.flags.iter().cloned().collect::<Vec<_>>().join("; ")
-        );
-    }
+/// Prints what was found of a row in so many draws of the noise.
+fn print(assumed: &str, found: &[Result<Outcome, PipelineError>]) {
+    let outcomes = || found.iter().flatten();
+    let largest = |of: fn(&Outcome) -> f64| {
+        let values = outcomes().map(|outcome| 100.0 * of(outcome));
+        values.max_by(|a, b| a.abs().total_cmp(&b.abs()))
+    };
+    let error = largest(|o| o.error).map_or("none".to_owned(), |e| format!("{e:+.1} %"));
+    let width = largest(|o| o.half_width).map_or("–".to_owned(), |w| format!("± {w:.1} %"));
+    let said = found.iter().flat_map(|found| match found {
+        Ok(outcome) => outcome.flags.clone(),
+        Err(error) => vec![error.to_string()],
+    });
+    let said: Vec<_> = said.collect::<BTreeSet<_>>().into_iter().collect();
+    let (held, quiet) = (
+        outcomes().filter(|o| o.held).count(),
+        outcomes().filter(|o| o.flags.is_empty()).count(),
+    );
+    let (seeds, said) = (found.len(), said.join("; "));
+    let flagged = seeds - quiet;
+    println!(
+        "| {assumed} | {error} | {width} | {held} of {seeds} | {flagged} of {seeds} | {said} |"
+    );
 }
 
 /// `SEEDS=5` takes more draws of the noise than one.
@@ -290,10 +286,12 @@ fn a_world_that_is_not_as_assumed_stays_within_the_interval_or_is_flagged() {
     let seeds = test_support::draws("SEEDS", 1);
     let mut silent = Vec::new();
     for row in rows() {
-        let found = row.run(seeds);
-        found.print(row.assumed, seeds);
+        let measure = |seed| Outcome::of(Ok(row.world.measure(&row.stated, 1 + seed).unwrap()));
+        let found: Vec<_> = (0..seeds).map(measure).collect();
+        print(row.assumed, &found);
+        let outcomes = found.iter().flatten();
         // Of five draws one may miss an interval of 95 %.
-        if found.silent as u64 > seeds / 5 {
+        if outcomes.filter(|o| o.is_silent()).count() as u64 > seeds / 5 {
             silent.push(row.assumed);
         }
     }

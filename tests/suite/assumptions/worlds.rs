@@ -9,10 +9,9 @@ use tactile_imaging::pipeline::{
     CheckPress, CheckedObject, EstimatorChoice, KnownBall, Measurement, Object, Pipeline,
     PipelineError, ReferenceLight, StagesConfig,
 };
-use tactile_simulate::Trial;
 use tactile_simulate::{
-    CalibrationRun, Camera, ContactModel, ContactState, Illumination, PressLoad, PressOptions,
-    PressScene, Response,
+    CalibrationRun, Camera, ContactModel, ContactState, PressLoad, PressOptions, PressScene,
+    Response, Trial,
 };
 
 pub(super) const RADIUS_M: f64 = 3e-3;
@@ -47,24 +46,16 @@ pub(super) enum Distortion {
 
 impl Distortion {
     fn apply(self, trial: &mut Trial) {
-        let plain = trial.simulation.reference.mapv(f64::from);
+        let made = &mut trial.simulation;
+        let plain = made.reference.mapv(f64::from);
         if let Self::Gamma(gamma) = self {
             let curve = |grey: u8| (255.0 * (f64::from(grey) / 255.0).powf(1.0 / gamma)) as u8;
-            trial.simulation.reference.mapv_inplace(curve);
-            trial
-                .simulation
-                .frames
-                .iter_mut()
-                .for_each(|f| f.mapv_inplace(curve));
+            made.reference.mapv_inplace(curve);
+            made.frames.iter_mut().for_each(|f| f.mapv_inplace(curve));
             return;
         }
-        let pixel_m = trial.simulation.pixel_size_m[0];
-        for (frame, truth) in trial
-            .simulation
-            .frames
-            .iter_mut()
-            .zip(&trial.simulation.truth)
-        {
+        let pixel_m = made.pixel_size_m[0];
+        for (frame, truth) in made.frames.iter_mut().zip(&made.truth) {
             let light = frame.mapv(f64::from) - &plain;
             let (rows, columns) = frame.dim();
             let spread = light.sum() / (rows * rows) as f64;
@@ -139,11 +130,8 @@ impl Check {
         // The last load of the trial again, as the camera's gain follows from all of them.
         let made = PressScene::new(options).unwrap().simulate();
         let force_n = made.truth.last().unwrap().contact.force_n;
-        (
-            made.frames.into_iter().next_back().unwrap(),
-            force_n,
-            object,
-        )
+        let frame = made.frames.into_iter().next_back().unwrap();
+        (frame, force_n, object)
     }
 }
 
@@ -214,19 +202,12 @@ impl Sample {
         let forces_n: Vec<f64> = options.loads.iter().map(|load| load.force_n).collect();
         match self {
             Self::Ball => None,
-            Self::Compressible(poisson_ratio) => Some(on_the_guide(
-                poisson_ratio,
-                Interface::Frictionless,
-                options,
-            )),
+            Self::Compressible(nu) => Some(on_the_guide(nu, Interface::Frictionless, options)),
             Self::Adhering(work) => Some(adhering(work, options)),
             Self::Sticking => Some(on_the_guide(NEARLY_HALF, Interface::Bonded, options)),
             Self::Face(faces) => {
-                let (radius_m, height_m) = (6e-3, 8e-3);
-                let states = ContactState::of_squeezed_cylinder(
-                    radius_m, height_m, &material, faces, &forces_n,
-                );
-                Some(states.unwrap())
+                let solve = ContactState::of_squeezed_cylinder;
+                Some(solve(6e-3, 8e-3, &material, faces, &forces_n).unwrap())
             }
         }
     }
@@ -241,23 +222,18 @@ fn on_the_guide(
     options: &PressOptions,
 ) -> Vec<ContactState> {
     let material = Material::new(MODULUS_PA, poisson_ratio).unwrap();
-    let layers = options
-        .waveguide
-        .layers
-        .iter()
-        .map(|layer| fem::GuideLayer {
-            thickness_m: layer.thickness_m,
-            material: Material::new(layer.material.youngs_modulus_pa, NEARLY_HALF).unwrap(),
-        });
+    let layers = options.waveguide.layers.iter();
+    let layers = layers.map(|layer| fem::GuideLayer {
+        thickness_m: layer.thickness_m,
+        material: Material::new(layer.material.youngs_modulus_pa, NEARLY_HALF).unwrap(),
+    });
     let ball = fem::ObjectShape::Ball { radius_m: RADIUS_M };
     let press = ObjectPress::new(ball, material).unwrap();
     let press = press.on_guide(Guide::new(layers.collect(), 28e-3).unwrap());
     let press = press.unwrap().with_interface(interface);
     let scene = press.scene().unwrap();
-    let loads = options.loads.iter();
-    let loads: Vec<_> = loads
-        .map(|load| fem::AppliedLoad::Force(load.force_n))
-        .collect();
+    let forces = options.loads.iter().map(|load| load.force_n);
+    let loads: Vec<_> = forces.map(fem::AppliedLoad::Force).collect();
     let states = scene.solve(&loads).states;
     let contact = |state| ContactState::from_solved(state).expect("a contact");
     states.iter().map(contact).collect()
@@ -296,25 +272,19 @@ impl World {
     /// # Errors
     /// A check that is refused.
     pub(super) fn measure(&self, stated: &Stated, seed: u64) -> Result<Measurement, PipelineError> {
-        let load = |(force_n, level): (f64, f64)| PressLoad {
-            illumination: Illumination {
-                level,
-                ..Illumination::default()
-            },
-            ..PressLoad::normal(force_n)
+        let load = |(force_n, level): (f64, f64)| {
+            let mut load = PressLoad::normal(force_n);
+            load.illumination.level = level;
+            load
         };
+        let loads = self.loads_n.into_iter().zip(self.levels);
         let mut options = PressOptions {
             camera: self.camera,
             response: match self.exponent {
                 1.0 => Response::Linear,
                 exponent => Response::Power { exponent },
             },
-            loads: self
-                .loads_n
-                .into_iter()
-                .zip(self.levels)
-                .map(load)
-                .collect(),
+            loads: loads.map(load).collect(),
             seed,
             law: ContactModel::FiniteElements,
             ..PressOptions::default()

@@ -4,48 +4,37 @@
 //! `fuzz/README.md` says how to look for more.
 #![allow(clippy::print_stdout)] // the input that is checked, shown where a check fails
 
-pub(crate) mod readers;
+mod readers;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-/// Reads all files of a folder of `tests/data/corpus`.
-fn replay(folder: &str, check: fn(&[u8])) {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("tests/data/corpus")
-        .join(folder);
-    let mut files: Vec<_> = std::fs::read_dir(&folder)
-        .expect("the corpus")
-        .map(|entry| entry.expect("an entry of the corpus").path())
-        .collect();
-    files.sort();
-    assert!(!files.is_empty(), "no input in {}", folder.display());
-    for file in files {
-        println!("input {}", file.display());
-        check(&std::fs::read(&file).expect("an input of the corpus"));
+/// A folder of `tests/data/corpus` and what must hold of its inputs.
+pub(crate) const READERS: [(&str, fn(&[u8])); 5] = [
+    ("table", readers::table),
+    ("case", readers::case),
+    ("image", readers::image),
+    ("stream", readers::stream),
+    ("toml", readers::toml),
+];
+
+/// The inputs of a folder, by name.
+pub(crate) fn inputs(folder: &str) -> Vec<(PathBuf, Vec<u8>)> {
+    let corpus = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/corpus");
+    let files = std::fs::read_dir(corpus.join(folder)).expect("the corpus");
+    let read = |path: PathBuf| (path.clone(), std::fs::read(path).expect("an input"));
+    let mut inputs: Vec<_> = files.map(|file| read(file.unwrap().path())).collect();
+    inputs.sort();
+    inputs
+}
+
+#[test]
+fn every_input_ends_as_it_should() {
+    for (folder, check) in READERS {
+        let inputs = inputs(folder);
+        assert!(!inputs.is_empty(), "no input in {folder}");
+        for (path, bytes) in inputs {
+            println!("input {}", path.display());
+            check(&bytes);
+        }
     }
-}
-
-#[test]
-fn tables() {
-    replay("table", readers::table);
-}
-
-#[test]
-fn cases() {
-    replay("case", readers::case);
-}
-
-#[test]
-fn images() {
-    replay("image", readers::image);
-}
-
-#[test]
-fn streams() {
-    replay("stream", readers::stream);
-}
-
-#[test]
-fn scenes_and_sensors() {
-    replay("toml", readers::toml);
 }

@@ -1,48 +1,23 @@
 //! Balls that another program pressed: its contacts beside those of this project's elements, and
 //! the moduli that are read from frames of them.
 #![allow(clippy::print_stdout)]
-use super::{Ball, balls_of, error};
-use tactile_imaging::fem::{self, AppliedLoad, Material, ObjectPress, ObjectShape};
+use super::{balls_of, error, solved};
+use tactile_imaging::fem::AppliedLoad;
 
 const FILE: &str = "calculix_presses.csv";
 
 /// That of its bodies.
 const POISSON_RATIO: f64 = 0.499;
 
-/// The press with the rim that the other program's guides have.
-fn scene(ball: &Ball) -> fem::FemScene {
-    let material = |modulus| Material::new(modulus, POISSON_RATIO).unwrap();
-    let shape = ObjectShape::Ball {
-        radius_m: ball.radius_m,
-    };
-    let mut press = ObjectPress::new(shape, material(ball.youngs_modulus_pa)).unwrap();
-    let layers = ball
-        .layers
-        .iter()
-        .map(|&(thickness_m, modulus)| fem::GuideLayer {
-            thickness_m,
-            material: material(modulus),
-        });
-    let layers: Vec<_> = layers.collect();
-    if !layers.is_empty() {
-        let thickness_m: f64 = ball.layers.iter().map(|layer| layer.0).sum();
-        let rim_m = (5.0 * ball.radius_m).max(3.0 * thickness_m);
-        press = press
-            .on_guide(fem::Guide::new(layers, rim_m).unwrap())
-            .unwrap();
-    }
-    press.with_fineness(10).unwrap().scene().unwrap()
-}
-
 /// At one approach both programs find one force and one contact radius.
 #[test]
 fn contacts_are_those_of_another_program() {
     for ball in balls_of(FILE) {
-        let loads = ball
-            .states
-            .iter()
-            .map(|state| AppliedLoad::Approach(state.indentation_m));
-        let solved = scene(&ball).solve(&loads.collect::<Vec<_>>()).states;
+        let approaches = ball.states.iter().map(|state| state.indentation_m);
+        let loads = approaches.map(AppliedLoad::Approach);
+        let modulus = ball.youngs_modulus_pa;
+        let scene = solved::press(ball.radius_m, &ball.layers, modulus, POISSON_RATIO, 10);
+        let solved = scene.solve(&loads.collect::<Vec<_>>()).states;
         assert_eq!(solved.len(), ball.states.len(), "{}", ball.name);
         for (own, other) in solved.iter().zip(&ball.states) {
             let force = own.force_n() / other.force_n - 1.0;
@@ -76,11 +51,7 @@ fn moduli_of_balls_of_another_program_are_right() {
                 reading.radius_errors.map(|e| 100.0 * e)
             );
             let holds = interval.contains(ball.youngs_modulus_pa);
-            assert!(
-                holds && off.abs() < 0.015,
-                "{}: {off} {interval:?}",
-                ball.name
-            );
+            assert!(holds && off.abs() < 0.015, "{}: {interval:?}", ball.name);
         }
     }
 }

@@ -1,6 +1,6 @@
 //! Presses and tables solved when asked for.
 
-use super::{Ball, Guide, Layer};
+use super::{Ball, guide};
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -32,15 +32,7 @@ const LARGEST_RATIO: f64 = 1.2;
 const POISSON_RATIO: f64 = 0.4999;
 
 pub(super) fn table((radius_m, layers): &Sensor) -> Arc<ContactTable> {
-    let layer = |&(thickness_m, youngs_modulus_pa): &(f64, f64)| Layer {
-        thickness_m,
-        youngs_modulus_pa,
-        poisson_ratio: 0.5,
-    };
-    let guide = match layers {
-        [] => Guide::rigid(),
-        layers => Guide::new(layers.iter().map(layer).collect()).unwrap(),
-    };
+    let guide = guide(layers);
     let options = TableOptions::default();
     let table = fem::solve_contact_table(*radius_m, 0.5, &guide, &options, |_| {
         ControlFlow::Continue(())
@@ -67,9 +59,8 @@ pub(super) fn ball(seed: u64) -> Ball {
     let loads: Vec<AppliedLoad> = (ratios.iter())
         .map(|x| AppliedLoad::Approach(part * x.min(1.15).powi(2) * radius_m))
         .collect();
-    let states = press(radius_m, layers, modulus, fineness)
-        .solve(&loads)
-        .states;
+    let scene = press(radius_m, layers, modulus, POISSON_RATIO, fineness);
+    let states = scene.solve(&loads).states;
     let states: Vec<ContactState> = states
         .iter()
         .filter_map(ContactState::from_solved)
@@ -84,20 +75,24 @@ pub(super) fn ball(seed: u64) -> Ball {
     }
 }
 
-fn press(radius_m: f64, layers: &[(f64, f64)], modulus: f64, fineness: usize) -> fem::FemScene {
-    let material = |modulus| Material::new(modulus, POISSON_RATIO).unwrap();
+/// A press of a ball on layers (thickness, modulus), whose guide has another rim than the tables'.
+pub(super) fn press(
+    radius_m: f64,
+    layers: &[(f64, f64)],
+    modulus: f64,
+    poisson_ratio: f64,
+    fineness: usize,
+) -> fem::FemScene {
+    let material = |modulus| Material::new(modulus, poisson_ratio).unwrap();
     let mut press = ObjectPress::new(ObjectShape::Ball { radius_m }, material(modulus)).unwrap();
     if !layers.is_empty() {
         let thickness: f64 = layers.iter().map(|layer| layer.0).sum();
-        let layers = layers
-            .iter()
-            .map(|&(thickness_m, modulus)| fem::GuideLayer {
-                thickness_m,
-                material: material(modulus),
-            });
-        // Another rim than the tables' guides have.
+        let layer = |&(thickness_m, modulus): &(f64, f64)| fem::GuideLayer {
+            thickness_m,
+            material: material(modulus),
+        };
         let rim = (5.0 * radius_m).max(3.0 * thickness);
-        let guide = fem::Guide::new(layers.collect(), rim).unwrap();
+        let guide = fem::Guide::new(layers.iter().map(layer).collect(), rim).unwrap();
         press = press.on_guide(guide).unwrap();
     }
     press.with_fineness(fineness).unwrap().scene().unwrap()

@@ -34,13 +34,8 @@ impl Errors {
     }
 
     pub(super) fn inside_one_sigma(&self) -> f64 {
-        let inside = self
-            .errors
-            .iter()
-            .zip(&self.stated)
-            .filter(|(e, s)| e.abs() < **s)
-            .count();
-        inside as f64 / self.errors.len() as f64
+        let both = self.errors.iter().zip(&self.stated);
+        both.filter(|(e, s)| e.abs() < **s).count() as f64 / self.errors.len() as f64
     }
 
     fn show(&self) {
@@ -60,6 +55,13 @@ pub(super) struct Study {
     pub(super) centroid: [Errors; 2],
     pub(super) centre: Errors,
     pub(super) radius: Errors,
+}
+
+impl Study {
+    pub(super) fn all(&self) -> [&Errors; 5] {
+        let [x, y] = &self.centroid;
+        [&self.force, x, y, &self.centre, &self.radius]
+    }
 }
 
 pub(super) fn study(scene: &PressScene, seeds: u64, options: &ForceOptions) -> Study {
@@ -106,14 +108,6 @@ pub(super) fn study_with(
             truth.contact.contact_radius_m,
         );
     }
-    for errors in [
-        &s.force,
-        &s.centroid[0],
-        &s.centroid[1],
-        &s.centre,
-        &s.radius,
-    ] {
-        errors.show();
-    }
+    s.all().iter().for_each(|errors| errors.show());
     s
 }

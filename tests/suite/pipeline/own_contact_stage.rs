@@ -1,6 +1,7 @@
 //! A contact stage of a user's own may err.
+use crate::common::press_of;
 use ndarray::{Array2, ArrayView2};
-use tactile_imaging::force::{BoundingBox, ForceError, ReferenceFrame};
+use tactile_imaging::force::{ForceError, ReferenceFrame};
 use tactile_imaging::pipeline::{ContactStage, FrameContact, LightContact, PipelineError};
 use tactile_imaging::{Object, Pipeline};
 
@@ -37,22 +38,15 @@ fn frames() -> [Array2<u8>; 2] {
 
 #[test]
 fn a_mask_that_does_not_fit_is_an_error_and_no_panic() {
+    // The first and the last row of the region become others.
+    fn rows(contact: &mut FrameContact, change: fn([usize; 2]) -> [usize; 2]) {
+        let region = contact.region.as_mut().unwrap();
+        [region.row_start, region.row_end] = change([region.row_start, region.row_end]);
+    }
     let spoils: [fn(&mut FrameContact); 3] = [
         |contact| contact.mask = Array2::default((3, 5)),
-        |contact| {
-            contact.region = contact.region.map(|region| BoundingBox {
-                row_end: region.row_end + 100,
-                row_start: region.row_start + 100,
-                ..region
-            });
-        },
-        |contact| {
-            contact.region = contact.region.map(|region| BoundingBox {
-                row_end: region.row_start,
-                row_start: region.row_end,
-                ..region
-            });
-        },
+        |contact| rows(contact, |[start, end]| [start + 100, end + 100]),
+        |contact| rows(contact, |[start, end]| [end, start]),
     ];
     let [reference, face] = frames();
     let block = Object::Block { poisson_ratio: 0.5 };
@@ -60,8 +54,7 @@ fn a_mask_that_does_not_fit_is_an_error_and_no_panic() {
         for spoil in spoils {
             let light = LightContact::gauged([50e-6; 2], &Default::default()).unwrap();
             let pipeline = Pipeline::new(Spoiled { light, spoil }, object).unwrap();
-            let mut press = pipeline.press(reference.view()).unwrap();
-            press.add_frame(face.view());
+            let press = press_of(&pipeline, reference.view(), [face.clone()]);
             let error = press.contact(0).unwrap_err();
             assert!(
                 matches!(error, PipelineError::ContactMask { frame: 0, .. }),

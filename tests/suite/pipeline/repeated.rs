@@ -1,7 +1,8 @@
 //! What frames say that repeat others, are cut, or do not belong to their reference.
 use super::trial;
-use ndarray::s;
-use tactile_imaging::elasticity::modulus::ModulusEstimator;
+use crate::common::press_of;
+use ndarray::{Array2, Axis, s};
+use tactile_imaging::elasticity::modulus::{ModulusEstimator, PaperRatio};
 use tactile_imaging::pipeline::{Flag, Object, PipelineError};
 
 #[test]
@@ -9,10 +10,8 @@ fn a_frame_that_is_given_twice_counts_once() {
     let trial = trial(&[0.7, 1.2], 6);
     let pipeline = trial.pipeline().unwrap();
     let once = trial.press(&pipeline).unwrap().modulus().unwrap();
-    let mut press = trial.press(&pipeline).unwrap();
-    for frame in trial.simulation.frames.iter().cycle().take(100) {
-        press.add_frame(frame.view());
-    }
+    let again = trial.simulation.frames.iter().cycle().take(102).cloned();
+    let press = press_of(&pipeline, trial.simulation.reference.view(), again);
     let often = press.modulus().unwrap();
     assert_eq!(often.youngs_modulus_pa, once.youngs_modulus_pa);
     assert_eq!(often.standard_error_pa, once.standard_error_pa);
@@ -20,22 +19,18 @@ fn a_frame_that_is_given_twice_counts_once() {
     assert_eq!(often.loads.iter().filter(|load| load.used).count(), 2);
     // The estimators that use strain count it once as well.
     let series = press.load_series().unwrap();
-    let strained = series
-        .loads()
-        .iter()
-        .filter(|load| load.mean_strain.is_some());
-    assert_eq!(strained.count(), 1);
-    let ratio = tactile_imaging::elasticity::modulus::PaperRatio::default();
-    assert_eq!(ratio.estimate(&series).unwrap().fit.observations, 1);
+    let loads = series.loads().iter();
+    assert_eq!(loads.filter(|load| load.mean_strain.is_some()).count(), 1);
+    let ratio = PaperRatio::default().estimate(&series).unwrap();
+    assert_eq!(ratio.fit.observations, 1);
 }
 
 #[test]
 fn a_swapped_reference_is_told_from_a_frame_without_contact() {
     let trial = trial(&[0.7, 1.2], 6);
     let pipeline = trial.pipeline().unwrap();
-    let pressed = &trial.simulation.frames[1];
-    let mut press = pipeline.press(pressed.view()).unwrap();
-    press.add_frame(trial.simulation.reference.view());
+    let [pressed, reference] = [&trial.simulation.frames[1], &trial.simulation.reference];
+    let press = press_of(&pipeline, pressed.view(), [reference.clone()]);
     let error = press.modulus().unwrap_err();
     assert!(
         matches!(error, PipelineError::OppositeSignal { frame: 0, grey } if grey < -20.0),
@@ -49,15 +44,9 @@ fn darker_frames_are_flagged() {
     let trial = trial(&[0.7, 1.2], 6);
     let pipeline = trial.pipeline().unwrap();
     let drift = |step: u8| {
-        let frames = &trial.simulation.frames;
-        let darker: Vec<_> = frames
-            .iter()
-            .map(|f| f.mapv(|v| v.saturating_sub(step)))
-            .collect();
-        let mut press = pipeline.press(trial.simulation.reference.view()).unwrap();
-        darker.iter().for_each(|frame| {
-            press.add_frame(frame.view());
-        });
+        let darker = |frame: &Array2<u8>| frame.mapv(|v| v.saturating_sub(step));
+        let darker = trial.simulation.frames.iter().map(darker);
+        let press = press_of(&pipeline, trial.simulation.reference.view(), darker);
         let measurement = press.measure();
         let found = measurement.flags.iter().find_map(|flag| match flag {
             Flag::LightDrifted { grey } => Some(*grey),
@@ -78,37 +67,23 @@ fn darker_frames_are_flagged() {
 fn a_contact_that_the_border_cuts_is_left_out() {
     let trial = trial(&[0.7, 1.2], 6);
     let pipeline = trial.pipeline().unwrap();
-    let frames = &trial.simulation.frames;
     // The contacts' middle is (174, 130); their radii are some 38 and 45 pixels.
-    let cut = |image: &ndarray::Array2<u8>, left: usize| image.slice(s![.., left..]).to_owned();
-    let (reference, small, large) = (
-        cut(&trial.simulation.reference, 130),
-        cut(&frames[0], 130),
-        cut(&frames[1], 130),
-    );
-    let mut press = pipeline.press(reference.view()).unwrap();
-    press.add_frame(small.view());
-    press.add_frame(large.view());
-    let measurement = press.measure();
-    assert!(
-        measurement.flags.contains(&Flag::TouchesEdge { frame: 1 }),
-        "{measurement}"
-    );
-    let alone = {
-        let mut press = pipeline.press(reference.view()).unwrap();
-        press.add_frame(small.view());
-        press.modulus().unwrap()
+    let cut = |left: usize, frames: &[usize]| {
+        let cut = |image: &Array2<u8>| image.slice(s![.., left..]).to_owned();
+        let reference = cut(&trial.simulation.reference);
+        let frames = frames.iter().map(|&k| cut(&trial.simulation.frames[k]));
+        press_of(&pipeline, reference.view(), frames)
     };
+    let measurement = cut(130, &[0, 1]).measure();
+    let edge = Flag::TouchesEdge { frame: 1 };
+    assert!(measurement.flags.contains(&edge), "{measurement}");
+    let alone = cut(130, &[0]).modulus().unwrap();
     let modulus = measurement.youngs_modulus_pa.unwrap();
     // Each load is weighted anew in a series: rounding.
     let relative = modulus.value / alone.youngs_modulus_pa - 1.0;
     assert!(relative.abs() < 1e-12, "{relative:e}");
     // Where every contact is cut there is no modulus.
-    let half = [150, 150].map(|left| cut(&frames[1], left));
-    let reference = cut(&trial.simulation.reference, 150);
-    let mut press = pipeline.press(reference.view()).unwrap();
-    press.add_frame(half[0].view());
-    let measurement = press.measure();
+    let measurement = cut(150, &[1]).measure();
     assert!(measurement.flags.contains(&Flag::TouchesEdge { frame: 0 }));
     let modulus = measurement.youngs_modulus_pa;
     assert_eq!(modulus.unwrap_err(), PipelineError::NoWholeContact);
@@ -120,17 +95,13 @@ fn a_contact_that_the_border_cuts_is_left_out() {
 fn a_caution_about_the_shape_widens_the_interval() {
     let trial = trial(&[0.7, 1.2], 6);
     let pipeline = trial.pipeline().unwrap();
-    let narrow = |image: &ndarray::Array2<u8>| {
+    let narrow = |image: &Array2<u8>| {
         let kept: Vec<usize> = (0..image.ncols()).filter(|c| c % 6 != 5).collect();
-        image.select(ndarray::Axis(1), &kept)
+        image.select(Axis(1), &kept)
     };
     let reference = narrow(&trial.simulation.reference);
-    let mut press = pipeline.press(reference.view()).unwrap();
-    let frames: Vec<_> = trial.simulation.frames.iter().map(narrow).collect();
-    for frame in &frames {
-        press.add_frame(frame.view());
-    }
-    let measurement = press.measure();
+    let frames = trial.simulation.frames.iter().map(narrow);
+    let measurement = press_of(&pipeline, reference.view(), frames).measure();
     let elongated = |flag: &Flag| match flag {
         Flag::NotRound { elongation, .. } => (elongation - 0.2).abs() < 0.02,
         _ => false,
@@ -139,10 +110,8 @@ fn a_caution_about_the_shape_widens_the_interval() {
     let modulus = measurement.youngs_modulus_pa.unwrap();
     let (low, high) = modulus.interval_95;
     assert!(modulus.value > 1.2 * 103e3, "{modulus:?}");
-    assert!(
-        low < 103e3 && high.is_none_or(|high| high > modulus.value),
-        "{modulus:?}"
-    );
+    let holds = low < 103e3 && high.is_none_or(|high| high > modulus.value);
+    assert!(holds, "{modulus:?}");
 }
 
 /// A punch touches with its whole face: a ball's contact, said to be that of a wider punch, has a
@@ -151,21 +120,18 @@ fn a_caution_about_the_shape_widens_the_interval() {
 fn a_contact_that_is_not_the_punchs_has_no_sure_stress() {
     let trial = trial(&[0.7], 6);
     let punch = |radius_m| {
-        let pipeline = trial.pipeline().unwrap();
-        let object = Object::FlatPunch {
-            radius_m,
-            poisson_ratio: 0.5,
-        };
-        let set = pipeline.with_settings(|settings| settings.object = object);
-        let pipeline = set.unwrap();
-        let mut press = pipeline.press(trial.simulation.reference.view()).unwrap();
-        press.add_frame(trial.simulation.frames[0].view());
+        let poisson_ratio = 0.5;
+        let pipeline = trial.pipeline().unwrap().with_settings(|settings| {
+            settings.object = Object::FlatPunch {
+                radius_m,
+                poisson_ratio,
+            };
+        });
+        let press = trial.press(&pipeline.unwrap()).unwrap();
         let flags = press.cautions(0).unwrap();
-        let said = flags
-            .iter()
-            .any(|flag| matches!(flag, Flag::NotThePunch { .. }));
-        let contact = press.contact(0).unwrap().unwrap();
-        let radius = contact.contact_radius_m;
+        let said = |flag: &Flag| matches!(flag, Flag::NotThePunch { .. });
+        let said = flags.iter().any(said);
+        let radius = press.contact(0).unwrap().unwrap().contact_radius_m;
         (said, radius.standard_error / radius.value, radius.value)
     };
     let (said, relative, radius_m) = punch(9e-3);

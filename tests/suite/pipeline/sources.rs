@@ -1,5 +1,6 @@
 //! Frames from a batch, and of another size.
 use super::trial;
+use crate::common::press_of;
 use ndarray::Array2;
 use tactile_imaging::pipeline::{PipelineError, contacts};
 
@@ -11,10 +12,8 @@ fn a_batch_reads_as_frames_one_by_one() {
     let batch = contacts(&pipeline, trial.simulation.reference.view(), &views).unwrap();
     let press = trial.press(&pipeline).unwrap();
     for (i, reading) in batch.iter().enumerate() {
-        assert_eq!(
-            reading.as_ref().unwrap().as_ref(),
-            press.contact(i).unwrap()
-        );
+        let reading = reading.as_ref().unwrap().as_ref();
+        assert_eq!(reading, press.contact(i).unwrap());
     }
 }
 
@@ -22,11 +21,14 @@ fn a_batch_reads_as_frames_one_by_one() {
 fn frames_of_another_size_are_an_error() {
     let trial = trial(&[0.7], 1);
     let pipeline = trial.pipeline().unwrap();
-    let small = Array2::zeros((10, 10));
-    let mut press = pipeline.press(trial.simulation.reference.view()).unwrap();
-    press.add_frame(small.view());
-    assert!(matches!(
-        press.contact(0),
-        Err(PipelineError::Contact { frame: 0, .. })
-    ));
+    let press = press_of(
+        &pipeline,
+        trial.simulation.reference.view(),
+        [Array2::zeros((10, 10))],
+    );
+    let error = press.contact(0).unwrap_err();
+    assert!(
+        matches!(error, PipelineError::Contact { frame: 0, .. }),
+        "{error}"
+    );
 }

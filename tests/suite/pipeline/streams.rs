@@ -1,39 +1,17 @@
-//! Sessions: the modulus refined, shear followed, drift watched, memory and answer kept.
+//! Sessions: shear followed, drift watched, memory and answer kept.
 #![allow(clippy::print_stdout)]
 use super::trial;
-use tactile_imaging::force::{Estimate, ShearCalibration};
+use tactile_imaging::force::{Estimate, ShearCalibration, ShearMeasurement};
 use tactile_imaging::pipeline::Session;
 use tactile_simulate::Trial;
 use tactile_simulate::{CalibrationRun, Camera, Gain, LoadCycle, PressLoad, PressOptions};
 
 #[test]
-fn a_session_refines_the_modulus_and_agrees_with_a_press() {
-    let trial = trial(&[0.7, 1.2], 6);
-    let pipeline = trial.pipeline().unwrap();
-    let expected = trial.press(&pipeline).unwrap().modulus().unwrap();
-    let mut session = Session::new(&pipeline, &[trial.simulation.reference.view()]).unwrap();
-    assert!(session.modulus().is_err(), "no load yet");
-    for frame in &trial.simulation.frames {
-        session.push(frame.view()).unwrap();
-    }
-    let modulus = session.modulus().unwrap();
-    // The same two loads; only the calibration's share of the error is averaged in another order.
-    assert!((modulus.youngs_modulus_pa / expected.youngs_modulus_pa - 1.0).abs() < 1e-9);
-    session.push(trial.simulation.frames[1].view()).unwrap();
-    assert_eq!(session.loads(), 2, "an equal frame is no further load");
-}
-
-#[test]
 fn shear_is_the_way_of_the_centroid_since_contact_began() {
     let mut options = trial(&[0.7], 9).scene.options().clone();
     let shear_n = [0.05, -0.08];
-    options.loads = vec![
-        PressLoad::normal(0.9),
-        PressLoad {
-            shear_n,
-            ..PressLoad::normal(1.1)
-        },
-    ];
+    options.loads = [0.9, 1.1].map(PressLoad::normal).to_vec();
+    options.loads[1].shear_n = shear_n;
     let stiffness = options.shear_stiffness_n_per_m;
     let trial = Trial::new(options, &CalibrationRun::default()).unwrap();
     let calibration = ShearCalibration {
@@ -44,43 +22,22 @@ fn shear_is_the_way_of_the_centroid_since_contact_began() {
     let session = Session::new(&pipeline, &[trial.simulation.reference.view()]).unwrap();
     let mut session = session.with_shear(calibration);
     let [first, second] = [0, 1].map(|k| trial.simulation.frames[k].view());
-    assert_eq!(
-        session
-            .push(first)
-            .unwrap()
-            .shear
-            .unwrap()
-            .force_n
-            .map(|f| f.value),
-        [0.0; 2]
-    );
-    let shear = session.push(second).unwrap().shear.unwrap();
-    for (found, truth) in shear.force_n.iter().zip(shear_n) {
+    let empty = trial.scene.reference(3);
+    let mut shear = |frame| session.push(frame).unwrap().shear;
+    let forces = |shear: &ShearMeasurement| shear.force_n.map(|f| f.value);
+    assert_eq!(forces(&shear(first).unwrap()), [0.0; 2]);
+    let found = shear(second).unwrap();
+    for (force, truth) in found.force_n.iter().zip(shear_n) {
         // Six standard errors, and a hundredth of a pixel for what rounding and vignetting do to
         // the centroid.
-        let tolerance = 6.0 * found.standard_error + 0.01 * 86.2e-6 * stiffness[0];
-        assert!(
-            (found.value - truth).abs() < tolerance,
-            "{found} N, true {truth} N"
-        );
+        let tolerance = 6.0 * force.standard_error + 0.01 * 86.2e-6 * stiffness[0];
+        let miss = (force.value - truth).abs();
+        assert!(miss < tolerance, "{force} N, true {truth} N");
     }
-    assert_eq!(
-        session.push(second).unwrap().shear.unwrap().displacement_m,
-        shear.displacement_m
-    );
-    assert!(
-        session
-            .push(trial.scene.reference(3).view())
-            .unwrap()
-            .shear
-            .is_none()
-    );
-    let anew = session.push(second).unwrap().shear.unwrap();
-    assert_eq!(
-        anew.force_n.map(|f| f.value),
-        [0.0; 2],
-        "a new contact starts anew"
-    );
+    assert_eq!(shear(second).unwrap().displacement_m, found.displacement_m);
+    assert!(shear(empty.view()).is_none());
+    // A new contact starts anew.
+    assert_eq!(forces(&shear(second).unwrap()), [0.0; 2]);
 }
 
 #[test]
@@ -106,12 +63,10 @@ fn drift_of_the_light_is_seen_in_frames_without_contact() {
 /// apart are full after a few hundred.
 #[test]
 fn four_thousand_frames_leave_memory_and_answer_alone() {
-    let camera = Camera::default().coarser(16);
-    let (loads, gain) = (vec![PressLoad::normal(1.5)], Gain::PeakGrey(180.0));
     let options = PressOptions {
-        camera,
-        loads,
-        gain,
+        camera: Camera::default().coarser(16),
+        loads: vec![PressLoad::normal(1.5)],
+        gain: Gain::PeakGrey(180.0),
         seed: 3,
         ..PressOptions::default()
     };
@@ -149,4 +104,25 @@ fn four_thousand_frames_leave_memory_and_answer_alone() {
     assert!(drift.abs() < 0.01, "drift {drift}");
     assert!(error.abs() < 0.03, "error {error}");
     assert!(session.drift().caution.is_none(), "{:?}", session.drift());
+}
+
+/// Surface, control points, match, spline and strain of a frame work in the memory of the frames
+/// before.
+#[test]
+fn following_strain_allocates_nothing_after_warm_up() {
+    let trial = trial(&[0.7, 0.8, 0.95, 1.1, 1.2], 1);
+    let pipeline = trial.pipeline().unwrap();
+    let mut session = Session::new(&pipeline, &[trial.simulation.reference.view()]).unwrap();
+    let mut cycle = trial.simulation.frames.iter().cycle();
+    let mut follow = |session: &mut Session, frames: usize| {
+        for frame in cycle.by_ref().take(frames) {
+            session.push(frame.view()).unwrap();
+            if let Some(found) = session.strain().unwrap() {
+                assert!(found.matched > 190 && found.strain.field.strains.len() == 200);
+            }
+        }
+    };
+    follow(&mut session, 4 * Session::MOST_LOADS);
+    let count = allocation_counter::measure(|| follow(&mut session, 20));
+    assert_eq!(count.count_total, 0, "{count:?}");
 }

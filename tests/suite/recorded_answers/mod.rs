@@ -6,7 +6,6 @@
 //! the difference of the text file says what moved.
 
 mod readings;
-use test_support as record;
 mod scenes;
 
 /// Largest difference from a recorded number, relative to the largest number of its line: sums
@@ -19,31 +18,16 @@ const TOLERANCE: f64 = 1e-12;
 /// AVX2 strains differ by up to 4e-10.
 const STRAIN_TOLERANCE: f64 = 1e-8;
 
-/// One line: what the numbers are, then the numbers.
-struct Answer {
-    name: String,
-    numbers: Vec<f64>,
-}
-
 /// Answers under the name of a scene.
+#[derive(Default)]
 struct Answers {
     scene: &'static str,
-    all: Vec<Answer>,
+    record: test_support::Answers,
 }
 
 impl Answers {
-    fn of(scene: &'static str) -> Self {
-        Self {
-            scene,
-            all: Vec::new(),
-        }
-    }
-
     fn add(&mut self, name: impl std::fmt::Display, numbers: impl IntoIterator<Item = f64>) {
-        self.all.push(Answer {
-            name: format!("{}/{name}", self.scene),
-            numbers: numbers.into_iter().collect(),
-        });
+        self.record.add(format!("{}/{name}", self.scene), numbers);
     }
 }
 
@@ -63,35 +47,27 @@ fn tolerance(name: &str, _recorded: f64, largest: f64) -> f64 {
     (relative * largest).max(floor)
 }
 
-fn record_of(answers: Vec<Answer>) -> record::Answers {
-    let mut record = record::Answers::default();
-    for answer in answers {
-        record.add(answer.name, answer.numbers);
-    }
-    record
-}
-
 #[test]
 fn answers_are_those_recorded() {
-    let file = concat!(
-        env!("CARGO_MANIFEST_DIR"),
-        "/tests/suite/recorded_answers/answers.txt"
-    );
-    record_of(scenes::all()).check(file, tolerance);
+    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/suite/recorded_answers");
+    let mut answers = Answers::default();
+    scenes::all(&mut answers);
+    answers
+        .record
+        .check(&format!("{folder}/answers.txt"), tolerance);
 }
 
 #[test]
 fn a_number_that_moves_by_more_than_rounding_is_seen() {
-    let answer = |last: f64| {
-        record_of(vec![Answer {
-            name: "scene/mean force".into(),
-            numbers: vec![2.0, last],
-        }])
+    let differences = |line: &str, last: f64| {
+        let mut record = test_support::Answers::default();
+        record.add("scene/mean force", [2.0, last]);
+        record.differences(line, tolerance).len()
     };
-    let differences = |line: &str, last: f64| answer(last).differences(line, tolerance).len();
-    assert_eq!(differences("scene/mean force: 2e0 5e-1", 0.5 + 1e-12), 0);
+    let line = "scene/mean force: 2e0 5e-1";
+    assert_eq!(differences(line, 0.5 + 1e-12), 0);
     for line in [
-        "scene/mean force: 2e0 5e-1",
+        line,
         "scene/radius: 2e0 5.1e-1",
         "scene/mean force: 2e0",
         "",

@@ -1,37 +1,23 @@
 //! What of a press is recorded: readings, moduli, surfaces, matches, strains.
 use super::Answers;
-use nalgebra::Matrix3;
+use nalgebra::{Matrix3, Point3};
 use tactile_imaging::elasticity::modulus::ModulusEstimate;
+use tactile_imaging::force::Estimate;
 use tactile_imaging::pipeline::{ContactReading, Press};
 
 pub(super) fn contact(answers: &mut Answers, name: &str, reading: &ContactReading) {
-    let force = reading
-        .force_n
-        .map_or([0.0; 2], |f| [f.value, f.standard_error]);
-    let radius = reading.contact_radius_m;
+    let both = |e: Estimate| [e.value, e.standard_error];
+    let force = reading.force_n.map_or([0.0; 2], both);
     answers.add(format!("{name}/force"), force);
-    answers.add(
-        format!("{name}/force errors"),
-        [reading.force_noise_n, reading.force_calibration_n],
-    );
-    answers.add(
-        format!("{name}/radius"),
-        [radius.value, radius.standard_error],
-    );
-    answers.add(
-        format!("{name}/centroid"),
-        reading
-            .centroid_px
-            .iter()
-            .flat_map(|c| [c.value, c.standard_error]),
-    );
+    let errors = [reading.force_noise_n, reading.force_calibration_n];
+    answers.add(format!("{name}/force errors"), errors);
+    answers.add(format!("{name}/radius"), both(reading.contact_radius_m));
+    let centroid = reading.centroid_px.map(both).concat();
+    answers.add(format!("{name}/centroid"), centroid);
     answers.add(format!("{name}/area"), [reading.area_m2]);
     answers.add(format!("{name}/peak"), [reading.peak_grey]);
     if let Some(depth) = reading.indentation_m {
-        answers.add(
-            format!("{name}/indentation"),
-            [depth.value, depth.standard_error],
-        );
+        answers.add(format!("{name}/indentation"), both(depth));
     }
 }
 
@@ -51,59 +37,39 @@ pub(super) fn tensor(m: &Matrix3<f64>) -> impl Iterator<Item = f64> + '_ {
 pub(super) fn press(answers: &mut Answers, name: &str, press: &mut Press<'_>) {
     for frame in 0..press.frames() {
         let name = format!("{name}frame {frame}");
-        let reading = *press
-            .contact(frame)
-            .expect("a measurement")
-            .expect("a contact");
-        contact(answers, &name, &reading);
+        let reading = press.contact(frame).expect("a measurement");
+        contact(answers, &name, reading.expect("a contact"));
+        let mut add = |what: &str, numbers: Vec<f64>| {
+            answers.add(format!("{name}/{what}"), numbers);
+        };
+        let some = |points: &[Point3<f64>]| {
+            let some = points.iter().step_by(13);
+            some.flat_map(|p| [p.x, p.y, p.z]).collect()
+        };
         let heights = &press.surface(frame).expect("a surface").surface.heights;
-        let finite = || heights.iter().copied().filter(|h| h.is_finite());
-        answers.add(
-            format!("{name}/height sums"),
-            [finite().sum::<f64>(), finite().map(f64::abs).sum()],
-        );
-        answers.add(format!("{name}/heights"), finite().step_by(151));
+        let heights: Vec<f64> = heights.iter().copied().filter(|h| h.is_finite()).collect();
+        let sums = [heights.iter().sum(), heights.iter().map(|h| h.abs()).sum()];
+        add("height sums", sums.into());
+        add("heights", heights.into_iter().step_by(151).collect());
         let points = press.control_points(frame).expect("control points");
-        answers.add(format!("{name}/control points"), [points.len() as f64]);
-        answers.add(
-            format!("{name}/some control points"),
-            points.iter().step_by(13).flat_map(|p| [p.x, p.y, p.z]),
-        );
+        add("control points", vec![points.len() as f64]);
+        add("some control points", some(points));
         if frame == 0 {
             continue;
         }
         let matching = press.matching(frame).expect("a match");
-        answers.add(
-            format!("{name}/partners"),
-            matching
-                .assignment
-                .iter()
-                .map(|a| a.map_or(-1.0, |j| j as f64)),
-        );
-        answers.add(
-            format!("{name}/confidence"),
-            matching.confidence.iter().copied().step_by(7),
-        );
-        answers.add(
-            format!("{name}/warped"),
-            matching
-                .warped
-                .iter()
-                .step_by(13)
-                .flat_map(|p| [p.x, p.y, p.z]),
-        );
-        answers.add(format!("{name}/residual"), [matching.report.residual]);
-        answers.add(
-            format!("{name}/iterations"),
-            [matching.report.iterations as f64],
-        );
+        let partners = matching.assignment.iter();
+        let partners = partners.map(|a| a.map_or(-1.0, |j| j as f64));
+        add("partners", partners.collect());
+        let confidence = matching.confidence.iter().copied();
+        add("confidence", confidence.step_by(7).collect());
+        add("warped", some(&matching.warped));
+        add("residual", vec![matching.report.residual]);
+        add("iterations", vec![matching.report.iterations as f64]);
         let summary = &press.strain(frame).expect("a strain").summary;
-        answers.add(format!("{name}/strain"), tensor(&summary.mean));
-        answers.add(
-            format!("{name}/strain error"),
-            tensor(&summary.standard_error),
-        );
-        answers.add(format!("{name}/strain spread"), tensor(&summary.spread));
+        add("strain", tensor(&summary.mean).collect());
+        add("strain error", tensor(&summary.standard_error).collect());
+        add("strain spread", tensor(&summary.spread).collect());
     }
 }
 

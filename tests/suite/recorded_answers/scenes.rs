@@ -1,6 +1,7 @@
 //! The scenes whose numbers are recorded.
+use super::Answers;
 use super::readings::{contact, estimates, modulus, press, tensor};
-use super::{Answer, Answers};
+use crate::common::press_of;
 use ndarray::Array2;
 use tactile_imaging::elasticity::modulus::{FlatPunch, HertzSphere, PaperRatio, StrainReference};
 use tactile_imaging::force::{CalibrationPair, Estimate};
@@ -9,20 +10,18 @@ use tactile_imaging::pipeline::{
     SamplerChoice, Session, StagesConfig, StrainChoice, SurfaceInput, WarpChoice,
 };
 use tactile_imaging::scene::Scene;
-use tactile_simulate::Trial;
 use tactile_simulate::{
-    CalibrationRun, Camera, Elastic, ElasticSphere, Gain, PressLoad, PressOptions, PressScene,
+    CalibrationRun, Camera, Elastic, ElasticSphere, Gain, PressOptions, PressScene, Trial,
     UniaxialOptions, UniaxialScene, write_folder,
 };
 
-pub(super) fn all() -> Vec<Answer> {
-    let mut answers = ball();
-    answers.extend(block());
-    answers.extend(dark());
-    answers.extend(stages_by_name());
-    answers.extend(stream());
-    answers.extend(scene_file());
-    answers
+pub(super) fn all(answers: &mut Answers) {
+    ball(answers);
+    block(answers);
+    dark(answers);
+    stages_by_name(answers);
+    stream(answers);
+    scene_file(answers);
 }
 
 /// A camera of 174 × 130 pixels on 30 mm × 22 mm.
@@ -35,37 +34,27 @@ fn coarse() -> Camera {
 }
 
 fn trial(forces: &[f64], seed: u64) -> Trial {
-    let options = PressOptions {
-        camera: coarse(),
-        loads: forces
-            .iter()
-            .map(|&force| PressLoad::normal(force))
-            .collect(),
-        seed,
-        ..PressOptions::default()
-    };
-    Trial::new(options, &CalibrationRun::default()).expect("a trial")
+    crate::common::trial(coarse(), forces, seed)
 }
 
-fn ball() -> Vec<Answer> {
-    let mut answers = Answers::of("ball");
+fn ball(answers: &mut Answers) {
+    answers.scene = "ball";
     let trial = trial(&[0.7, 1.2], 1);
     let pipeline = trial
         .pipeline()
         .expect("a pipeline")
         .with_control_points(100);
     let mut measured = trial.press(&pipeline).expect("a press");
-    press(&mut answers, "", &mut measured);
-    estimates(&mut answers, &mut measured);
+    press(answers, "", &mut measured);
+    estimates(answers, &mut measured);
     let everything = measured.measure();
     answers.add("flags", [everything.flags.len() as f64]);
-    answers.all
 }
 
 /// A patterned block between plates: nothing is known of its shape, the modulus is stress over
 /// strain.
-fn block() -> Vec<Answer> {
-    let mut answers = Answers::of("block");
+fn block(answers: &mut Answers) {
+    answers.scene = "block";
     let scene = UniaxialScene::new(UniaxialOptions {
         camera: Camera {
             shape: [120, 120],
@@ -88,13 +77,9 @@ fn block() -> Vec<Answer> {
         .with_control_points(60);
     let reference = scene.reference(0);
     let frames = [0, 1, 2].map(|load| scene.frame(load, 0));
-    let mut measured = pipeline.press(reference.view()).expect("a press");
-    for frame in &frames {
-        measured.add_frame(frame.view());
-    }
-    press(&mut answers, "", &mut measured);
-    estimates(&mut answers, &mut measured);
-    answers.all
+    let mut measured = press_of(&pipeline, reference.view(), frames);
+    press(answers, "", &mut measured);
+    estimates(answers, &mut measured);
 }
 
 fn exactly(value: f64) -> Estimate {
@@ -102,8 +87,8 @@ fn exactly(value: f64) -> Estimate {
 }
 
 /// A sensor that darkens with depth, forces from a gauge.
-fn dark() -> Vec<Answer> {
-    let mut answers = Answers::of("dark");
+fn dark(answers: &mut Answers) {
+    answers.scene = "dark";
     let table = [(0.0, 0.0), (50.0, 0.2e-3), (200.0, 1e-3)];
     let pixel_m = 0.1e-3;
     // A ball of 4 mm; the grey is rounded, and noise that repeats keeps its levels from being flat.
@@ -124,15 +109,12 @@ fn dark() -> Vec<Answer> {
     };
     let contact = DarkContact::new(&table, [pixel_m; 2]).expect("a table");
     let depths = DarkContact::depth_table(&table).expect("a table");
-    let objects = [
-        Object::sphere(4e-3),
-        Object::FlatPunch {
-            radius_m: 2e-3,
-            poisson_ratio: 0.45,
-        },
-    ];
-    for (name, object) in ["ball/", "punch/"].into_iter().zip(objects) {
-        let mut pipeline = Pipeline::new(contact.clone(), object)
+    let punch = Object::FlatPunch {
+        radius_m: 2e-3,
+        poisson_ratio: 0.45,
+    };
+    for (name, object) in [("ball/", Object::sphere(4e-3)), ("punch/", punch)] {
+        let pipeline = Pipeline::new(contact.clone(), object)
             .expect("a pipeline")
             .with_surface(depths.clone(), SurfaceInput::Signal)
             .with_settings(|settings| {
@@ -141,25 +123,23 @@ fn dark() -> Vec<Answer> {
             })
             .expect("errors")
             .with_control_points(80);
-        pipeline = if name == "punch/" {
-            pipeline.with_estimator(FlatPunch::new(2e-3, 0.45).expect("a punch"))
-        } else {
-            pipeline.with_estimator(HertzSphere::new(4e-3, 0.5).expect("a ball"))
+        let pipeline = match name {
+            "punch/" => pipeline.with_estimator(FlatPunch::new(2e-3, 0.45).expect("a punch")),
+            _ => pipeline.with_estimator(HertzSphere::new(4e-3, 0.5).expect("a ball")),
         };
         let (reference, frames) = (frame(0.0), [frame(0.4e-3), frame(0.6e-3)]);
         let mut measured = pipeline.press(reference.view()).expect("a press");
         measured.add_gauged_frame(frames[0].view(), Some(exactly(0.4)));
         measured.add_gauged_frame(frames[1].view(), Some(exactly(0.8)));
-        press(&mut answers, name, &mut measured);
+        press(answers, name, &mut measured);
         let name = format!("{name}modulus");
-        modulus(&mut answers, &name, &measured.modulus().expect("a modulus"));
+        modulus(answers, &name, &measured.modulus().expect("a modulus"));
     }
-    answers.all
 }
 
 /// Every stage that a configuration can name, one at a time.
-fn stages_by_name() -> Vec<Answer> {
-    let mut answers = Answers::of("by name");
+fn stages_by_name(answers: &mut Answers) {
+    answers.scene = "by name";
     let trial = trial(&[0.7, 1.2], 2);
     let default = StagesConfig {
         // The law that the simulated contacts obey.
@@ -167,52 +147,45 @@ fn stages_by_name() -> Vec<Answer> {
         ..StagesConfig::default()
     };
     let mut configs: Vec<(&str, StagesConfig)> = Vec::new();
-    for reconstruction in [
+    let mut choose = |name, set: &dyn Fn(&mut StagesConfig)| {
+        let mut config = default;
+        set(&mut config);
+        configs.push((name, config));
+    };
+    for choice in [
         ReconstructionChoice::TsaiShah,
         ReconstructionChoice::BrooksHorn,
     ] {
-        configs.push((
-            reconstruction.into(),
-            StagesConfig {
-                reconstruction,
-                ..default
-            },
-        ));
+        choose(choice.into(), &|config| config.reconstruction = choice);
     }
-    for sampler in [SamplerChoice::Curvature, SamplerChoice::Random] {
-        configs.push((sampler.into(), StagesConfig { sampler, ..default }));
+    for choice in [SamplerChoice::Curvature, SamplerChoice::Random] {
+        choose(choice.into(), &|config| config.sampler = choice);
     }
-    for matcher in [
+    for choice in [
         MatcherChoice::RelaxationLabelling,
         MatcherChoice::CoherentPointDrift,
         MatcherChoice::LinearAssignment,
         MatcherChoice::NearestNeighbour,
     ] {
-        configs.push((matcher.into(), StagesConfig { matcher, ..default }));
+        choose(choice.into(), &|config| config.matcher = choice);
     }
-    for warp in [
+    for choice in [
         WarpChoice::CubicSpline,
         WarpChoice::Affine,
         WarpChoice::Rigid,
     ] {
-        configs.push((warp.into(), StagesConfig { warp, ..default }));
+        choose(choice.into(), &|config| config.warp = choice);
     }
-    for strain in [
+    for choice in [
         StrainChoice::EulerAlmansi,
         StrainChoice::Hencky,
         StrainChoice::Biot,
         StrainChoice::Infinitesimal,
     ] {
-        configs.push((strain.into(), StagesConfig { strain, ..default }));
+        choose(choice.into(), &|config| config.strain = choice);
     }
-    let estimator = EstimatorChoice::PaperRatio;
-    configs.push((
-        estimator.into(),
-        StagesConfig {
-            estimator,
-            ..default
-        },
-    ));
+    let ratio = EstimatorChoice::PaperRatio;
+    choose(ratio.into(), &|config| config.estimator = ratio);
     for (name, config) in configs {
         let pipeline = trial
             .pipeline()
@@ -239,14 +212,13 @@ fn stages_by_name() -> Vec<Answer> {
         let strain = measured.strain(1).map(|strain| strain.summary.mean);
         answers.add(format!("{name}/strain"), strain.iter().flat_map(tensor));
         let found = measured.modulus().expect("a modulus");
-        modulus(&mut answers, &format!("{name}/modulus"), &found);
+        modulus(answers, &format!("{name}/modulus"), &found);
     }
-    answers.all
 }
 
 /// A stream whose strain is followed.
-fn stream() -> Vec<Answer> {
-    let mut answers = Answers::of("stream");
+fn stream(answers: &mut Answers) {
+    answers.scene = "stream";
     let trial = trial(&[0.7, 0.9, 1.2, 1.0], 3);
     let pipeline = trial
         .pipeline()
@@ -271,7 +243,7 @@ fn stream() -> Vec<Answer> {
             .expect("an update")
             .contact
             .expect("a contact");
-        contact(&mut answers, &name, &reading);
+        contact(answers, &name, &reading);
         if let Some(found) = session.strain().expect("a strain") {
             answers.add(format!("{name}/matched"), [found.matched as f64]);
             answers.add(format!("{name}/residual"), [found.report.residual]);
@@ -282,22 +254,14 @@ fn stream() -> Vec<Answer> {
             );
         }
     }
-    modulus(
-        &mut answers,
-        "modulus",
-        &session.modulus().expect("a modulus"),
-    );
-    modulus(
-        &mut answers,
-        "modulus by strain",
-        &by_strain.modulus().expect("a modulus"),
-    );
-    answers.all
+    for (name, mut session) in [("modulus", session), ("modulus by strain", by_strain)] {
+        modulus(answers, name, &session.modulus().expect("a modulus"));
+    }
 }
 
 /// A scene file with its images, measured as a user does.
-fn scene_file() -> Vec<Answer> {
-    let mut answers = Answers::of("scene file");
+fn scene_file(answers: &mut Answers) {
+    answers.scene = "scene file";
     let options = PressOptions {
         camera: coarse(),
         object: ElasticSphere {
@@ -322,7 +286,6 @@ fn scene_file() -> Vec<Answer> {
         .expect("its pipeline")
         .with_control_points(60);
     let mut measured = scene.press(&pipeline, &data).expect("a press");
-    press(&mut answers, "", &mut measured);
-    estimates(&mut answers, &mut measured);
-    answers.all
+    press(answers, "", &mut measured);
+    estimates(answers, &mut measured);
 }

@@ -12,31 +12,18 @@ use tactile_imaging::pipeline::{MatcherChoice, Measurement, PipelineError, Stage
 use tactile_imaging::scene::{LoadedCalibration, Scene};
 use tactile_imaging::sfs::CurvatureAdaptive;
 use tactile_imaging::tps::AffineModel;
-use tactile_simulate::{
-    CalibrationRun, Camera, Elastic, ElasticSphere, PressOptions, PressScene, write_folder,
-};
+use tactile_simulate::{CalibrationRun, Camera, Elastic, PressOptions, PressScene, write_folder};
 
 /// The paper's error: ±5.38 % on both polymers.
 const PAPER_ERROR: f64 = 0.0538;
-
-fn scene_of(material: Elastic, seed: u64) -> PressScene {
-    let object = ElasticSphere {
-        radius_m: 3e-3,
-        material,
-    };
-    PressScene::new(PressOptions {
-        object,
-        seed,
-        ..PressOptions::default()
-    })
-    .unwrap()
-}
 
 #[test]
 fn a_simulated_scene_on_disk_gives_the_polymers_moduli() {
     for (material, seed) in [(Elastic::CL2000X, 3), (Elastic::CL2003X, 4)] {
         let folder = tempfile::tempdir().unwrap();
-        let scene = scene_of(material, seed);
+        let mut options = PressOptions::default();
+        (options.object.material, options.seed) = (material, seed);
+        let scene = PressScene::new(options).unwrap();
         let calibration = scene.calibrate(&CalibrationRun::default()).unwrap();
         let path = write_folder(&scene, &calibration, folder.path()).unwrap();
         let measured = Scene::measure_file(path).unwrap();
@@ -44,45 +31,40 @@ fn a_simulated_scene_on_disk_gives_the_polymers_moduli() {
         let error = modulus.value / material.youngs_modulus_pa - 1.0;
         assert!(error.abs() < PAPER_ERROR, "error {error}");
         assert_eq!(modulus.estimator, EstimatorKind::HertzSphere);
-        assert!(
-            measured.estimators[0].estimator == EstimatorKind::PaperRatio,
-            "the paper's ratio is first"
-        );
-        assert!(
-            measured.flags.iter().any(|f| f.to_string().contains("a/R")),
-            "a/R beyond 0.3 is flagged"
-        );
+        assert_eq!(measured.estimators[0].estimator, EstimatorKind::PaperRatio);
+        // a/R beyond 0.3 is flagged.
+        let mut flags = measured.flags.iter().map(ToString::to_string);
+        assert!(flags.any(|flag| flag.contains("a/R")));
     }
 }
 
-/// A small valid scene: frames of 60 × 80 pixels with a bright round blob.
-fn small_scene(folder: &Path) {
-    let blob = |peak: f64| {
-        Array2::from_shape_fn((60, 80), |(r, c)| {
-            let square = (c as f64 - 40.2).powi(2) + (r as f64 - 30.4).powi(2);
-            10 + (peak * (1.0 - square / 400.0).max(0.0).sqrt()).round() as u8
-        })
-    };
-    write_grey_image(
-        folder.join("reference.png"),
-        Array2::from_elem((60, 80), 10).view(),
-    )
-    .unwrap();
-    write_grey_image(folder.join("one.png"), blob(100.0).view()).unwrap();
-    write_grey_image(folder.join("two.pgm"), blob(130.0).view()).unwrap();
-    fs::write(
-        folder.join("pairs.csv"),
-        "integrated_pixel_value,force_N\n0,0\n50000,0.5\n100000,1.0\n150000,1.5\n",
-    )
-    .unwrap();
-    fs::write(
-        folder.join("depth.csv"),
-        "darkness_grey_levels,depth_mm\n1,0.02\n60,1.9\n",
-    )
-    .unwrap();
+/// A round blob that rises to `peak`.
+fn blob(peak: f64) -> Array2<u8> {
+    Array2::from_shape_fn((60, 80), |(r, c)| {
+        let square = (c as f64 - 40.2).powi(2) + (r as f64 - 30.4).powi(2);
+        (peak * (1.0 - square / 400.0).max(0.0).sqrt()).round() as u8
+    })
 }
 
-const VALID: &str = r#"
+fn write_image(path: impl AsRef<Path>, image: Array2<u8>) {
+    write_grey_image(path.as_ref(), image.view()).unwrap();
+}
+
+/// A small valid scene: frames of 60 × 80 pixels with a bright round blob.
+pub(crate) fn small_scene(folder: &Path) {
+    write_image(
+        folder.join("reference.png"),
+        Array2::from_elem((60, 80), 10),
+    );
+    write_image(folder.join("one.png"), 10 + blob(100.0));
+    write_image(folder.join("two.pgm"), 10 + blob(130.0));
+    let pairs = "integrated_pixel_value,force_N\n0,0\n50000,0.5\n100000,1.0\n150000,1.5\n";
+    fs::write(folder.join("pairs.csv"), pairs).unwrap();
+    let depths = "darkness_grey_levels,depth_mm\n1,0.02\n60,1.9\n";
+    fs::write(folder.join("depth.csv"), depths).unwrap();
+}
+
+pub(crate) const VALID: &str = r#"
 reference = "reference.png"
 pixel_size_m = [1e-4, 1e-4]
 [calibration]
@@ -117,18 +99,11 @@ fn every_mistake_gets_one_sentence_with_file_and_field() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     small_scene(at);
-    write_grey_image(at.join("small.png"), Array2::from_elem((5, 7), 10).view()).unwrap();
-    write_grey_image(
-        at.join("white.png"),
-        Array2::from_elem((60, 80), 255).view(),
-    )
-    .unwrap();
+    write_image(at.join("small.png"), Array2::from_elem((5, 7), 10));
+    write_image(at.join("white.png"), Array2::from_elem((60, 80), 255));
     fs::write(at.join("short.csv"), "1,2\n").unwrap();
-    fs::write(
-        at.join("bad.csv"),
-        "integrated_pixel_value,force_N\n1,2\n3,x\n",
-    )
-    .unwrap();
+    let bad = "integrated_pixel_value,force_N\n1,2\n3,x\n";
+    fs::write(at.join("bad.csv"), bad).unwrap();
     let mistakes = include_str!("mistakes.txt").lines();
     let mut from = String::new();
     for line in mistakes.filter(|line| !line.is_empty() && !line.starts_with('#')) {
@@ -154,31 +129,19 @@ fn every_mistake_gets_one_sentence_with_file_and_field() {
 fn a_depth_table_needs_gauge_readings() {
     let folder = tempfile::tempdir().unwrap();
     small_scene(folder.path());
-    let dark = Array2::from_shape_fn((60, 80), |(r, c)| {
-        let square = (c as f64 - 40.2).powi(2) + (r as f64 - 30.4).powi(2);
-        200 - (50.0 * (1.0 - square / 400.0).max(0.0).sqrt()).round() as u8
-    });
-    write_grey_image(
-        folder.path().join("bright.png"),
-        Array2::from_elem((60, 80), 200).view(),
-    )
-    .unwrap();
-    write_grey_image(folder.path().join("dark.png"), dark.view()).unwrap();
+    let bright = Array2::from_elem((60, 80), 200);
+    write_image(folder.path().join("bright.png"), bright.clone());
+    write_image(folder.path().join("dark.png"), bright - blob(50.0));
     let text = VALID
         .replace("pairs = \"pairs.csv\"", "depth_table = \"depth.csv\"")
         .replace("reference.png", "bright.png")
         .replace("one.png", "dark.png")
         .replace("[[frames]]\nimage = \"two.pgm\"\n", "");
-    assert!(
-        sentence(folder.path(), &text).starts_with("measured "),
-        "{}",
-        sentence(folder.path(), &text)
-    );
+    let answer = sentence(folder.path(), &text);
+    assert!(answer.starts_with("measured "), "{answer}");
     let answer = sentence(folder.path(), &text.replace("force_N = 0.8\n", ""));
-    assert!(
-        answer.contains("frames[1].force_N") && answer.contains("gauge"),
-        "{answer}"
-    );
+    let named = answer.contains("frames[1].force_N") && answer.contains("gauge");
+    assert!(named, "{answer}");
 }
 
 #[test]
@@ -199,28 +162,30 @@ fn measured(scene: &Scene, pipeline: &Pipeline) -> String {
 #[test]
 fn stages_by_name_are_those_given_as_values() {
     let folder = tempfile::tempdir().unwrap();
-    let camera = Camera::default().coarser(8);
     let made = PressScene::new(PressOptions {
-        camera,
+        camera: Camera::default().coarser(8),
         ..PressOptions::default()
-    })
-    .unwrap();
+    });
+    let made = made.unwrap();
     let calibration = made.calibrate(&CalibrationRun::default()).unwrap();
     let path = write_folder(&made, &calibration, folder.path()).unwrap();
     let text = fs::read_to_string(&path).unwrap();
     // Without the simulator's own choice of an estimator.
     let text = text.replace("[stages]\nestimator = \"sphere\"\n", "");
     fs::write(&path, &text).unwrap();
+    let scene_of =
+        |table: &str| Scene::parse(&format!("{text}\n[stages]\n{table}"), &path).unwrap();
     let by_name = |table: &str| {
-        let scene = Scene::parse(&format!("{text}\n[stages]\n{table}"), &path).unwrap();
+        let scene = scene_of(table);
         measured(&scene, &scene.pipeline(&scene.load().unwrap()).unwrap())
     };
     let scene = Scene::read(&path).unwrap();
-    let LoadedCalibration::Pairs(pairs) = scene.load().unwrap().calibration else {
+    let data = scene.load().unwrap();
+    let of_scene = scene.pipeline(&data).unwrap();
+    let LoadedCalibration::Pairs(pairs) = &data.calibration else {
         panic!("pairs")
     };
-    let of_scene = scene.pipeline(&scene.load().unwrap()).unwrap();
-    let pipeline = Pipeline::from_pairs(&pairs, scene.pixel_size_m, scene.object).unwrap();
+    let pipeline = Pipeline::from_pairs(pairs, scene.pixel_size_m, scene.object).unwrap();
     let waveguide = of_scene.settings().waveguide.clone();
     let pipeline = pipeline
         .with_settings(|settings| settings.waveguide = waveguide)
@@ -229,48 +194,26 @@ fn stages_by_name_are_those_given_as_values() {
     assert_eq!(by_name(""), measured(&scene, &pipeline));
     let named = by_name("sampler = \"curvature\"\nwarp = \"affine\"\nstrain = \"hencky\"");
     let swapped = pipeline.with_sampler(CurvatureAdaptive::new(4.0).unwrap());
-    assert_eq!(
-        named,
-        measured(
-            &scene,
-            &swapped.with_warp(AffineModel::General).with_strain(Hencky)
-        )
-    );
-    let printed = "as_printed = true\nmatcher = \"coherent-point-drift\"";
-    let printed = Scene::parse(&format!("{text}\n[stages]\n{printed}"), &path).unwrap();
+    let swapped = swapped.with_warp(AffineModel::General).with_strain(Hencky);
+    assert_eq!(named, measured(&scene, &swapped));
+    let printed = scene_of("as_printed = true\nmatcher = \"coherent-point-drift\"");
     let expected = StagesConfig {
         matcher: MatcherChoice::CoherentPointDrift,
         ..StagesConfig::as_printed()
     };
     assert_eq!(printed.stages, expected);
-    let ratio = Scene::parse(
-        &format!("{text}\n[stages]\nestimator = \"paper-ratio\""),
-        &path,
-    )
-    .unwrap();
-    assert_eq!(
-        ratio
-            .pipeline(&ratio.load().unwrap())
-            .unwrap()
-            .estimator()
-            .unwrap()
-            .kind(),
-        EstimatorKind::PaperRatio
-    );
-    let data = scene.load().unwrap();
-    let heights = |name: &str| {
-        let scene = Scene::parse(
-            &format!("{text}\n[stages]\nreconstruction = \"{name}\""),
-            &path,
-        )
+    let ratio = scene_of("estimator = \"paper-ratio\"")
+        .pipeline(&data)
         .unwrap();
+    assert_eq!(ratio.estimator().unwrap().kind(), EstimatorKind::PaperRatio);
+    let heights = |name: &str| {
+        let scene = scene_of(&format!("reconstruction = \"{name}\""));
         let pipeline = scene.pipeline(&data).unwrap();
         let press = scene.press(&pipeline, &data).unwrap();
         press.surface(1).unwrap().surface.heights.clone()
     };
-    assert!(
-        heights("tsai-shah") != heights("eikonal") && heights("brooks-horn") != heights("eikonal")
-    );
+    let [tsai, brooks, eikonal] = ["tsai-shah", "brooks-horn", "eikonal"].map(heights);
+    assert!(tsai != eikonal && brooks != eikonal);
 }
 
 #[test]
@@ -283,14 +226,8 @@ fn a_flat_field_is_asked_for_by_its_key() {
     ] {
         let scene = Scene::parse(&text, folder.path().join("scene.toml")).unwrap();
         assert_eq!(scene.flat_field, wanted);
-        assert_eq!(
-            scene
-                .pipeline(&scene.load().unwrap())
-                .unwrap()
-                .settings()
-                .flat_field,
-            wanted
-        );
+        let pipeline = scene.pipeline(&scene.load().unwrap()).unwrap();
+        assert_eq!(pipeline.settings().flat_field, wanted);
     }
 }
 
@@ -310,24 +247,16 @@ fn a_gauge_alone_gives_force_contact_and_modulus() {
     let path = folder.path().join("scene.toml");
     fs::write(&path, &gauged).unwrap();
     let measured = Scene::measure_file(&path).unwrap();
-    let frames: Vec<_> = measured
-        .frames
-        .iter()
-        .map(|f| f.as_ref().unwrap())
-        .collect();
-    let forces = [0, 1].map(|k| frames[k].force_n.clone().unwrap());
-    assert_eq!(
-        forces.map(|f| (f.value, f.standard_error)),
-        [(0.8, 0.0), (1.1, 0.02)]
-    );
+    let force = |frame: usize| {
+        let force = measured.frames[frame].as_ref().unwrap().force_n.clone();
+        force.map(|f| (f.value, f.standard_error)).unwrap()
+    };
+    assert_eq!([force(0), force(1)], [(0.8, 0.0), (1.1, 0.02)]);
     fs::write(&path, VALID).unwrap();
     let calibrated = Scene::measure_file(&path).unwrap();
     let radius = |m: &Measurement| m.frames[0].as_ref().unwrap().contact_radius_m;
-    assert_eq!(
-        radius(&measured),
-        radius(&calibrated),
-        "the contact is that of the light"
-    );
+    // The contact is that of the light.
+    assert_eq!(radius(&measured), radius(&calibrated));
     assert!(measured.youngs_modulus_pa.is_ok());
     // One frame without its force: a calibration is missing.
     let half = gauged.replace("force_N = 1.1\nforce_error_N = 0.02", "");
@@ -342,12 +271,9 @@ fn a_waveguide_can_be_rigid() {
     for text in [without.clone(), format!("waveguide = \"rigid\"\n{without}")] {
         assert!(Scene::parse(&text, "scene.toml").unwrap().layers.is_empty());
     }
-    let wrong =
-        Scene::parse(&format!("waveguide = \"soft\"\n{without}"), "scene.toml").unwrap_err();
-    assert!(
-        wrong.to_string().contains("expected a table with `layers`"),
-        "{wrong}"
-    );
+    let wrong = Scene::parse(&format!("waveguide = \"soft\"\n{without}"), "scene.toml");
+    let wrong = wrong.unwrap_err().to_string();
+    assert!(wrong.contains("expected a table with `layers`"), "{wrong}");
 }
 
 #[test]

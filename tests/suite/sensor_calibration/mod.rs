@@ -4,6 +4,7 @@ mod health;
 mod sensors;
 mod uncalibrated;
 
+use crate::common::{Study, press_of};
 use sensors::{
     BALL_ERROR, Effects, POISSON_ERROR, SAMPLE_PA, SAMPLE_POISSON, SAMPLE_RADIUS_M, Simulated,
     estimator,
@@ -20,15 +21,16 @@ fn drift_corrected() -> ForceOptions {
     ForceOptions::default().with_contact(contact)
 }
 
+const SAMPLE: Object = Object::Sphere {
+    radius_m: SAMPLE_RADIUS_M,
+    poisson_ratio: SAMPLE_POISSON,
+};
+
 /// The pipeline of the study: the estimator is the linear law that the contacts were made by.
 fn pipeline(sensor: &Sensor) -> Pipeline {
-    let object = Object::Sphere {
-        radius_m: SAMPLE_RADIUS_M,
-        poisson_ratio: SAMPLE_POISSON,
-    };
     let guide = sensor.waveguide().unwrap();
     sensor
-        .pipeline(object)
+        .pipeline(SAMPLE)
         .unwrap()
         .with_settings(|settings| {
             settings.object_radius_error_m = Some(BALL_ERROR * SAMPLE_RADIUS_M);
@@ -39,19 +41,8 @@ fn pipeline(sensor: &Sensor) -> Pipeline {
         .with_estimator(estimator(SAMPLE_RADIUS_M, SAMPLE_POISSON, &guide))
 }
 
-/// Relative errors of the modulus, and how many intervals hold it.
-struct Study {
-    errors: Vec<f64>,
-    stated: Vec<f64>,
-    held: usize,
-}
-
 fn study(exponents: &[f64], camera: Camera, sensors: u64, presses: u32) -> Study {
-    let mut study = Study {
-        errors: Vec::new(),
-        stated: Vec::new(),
-        held: 0,
-    };
+    let mut study = Study::default();
     for seed in 0..sensors {
         let effects = Effects {
             exponent: exponents[seed as usize % exponents.len()],
@@ -59,61 +50,24 @@ fn study(exponents: &[f64], camera: Camera, sensors: u64, presses: u32) -> Study
         };
         let mut simulated = Simulated::new(effects, camera, 1000 + seed);
         let calibrated = simulated.calibration().run().unwrap();
-        let report = &calibrated.sensor.curve.report;
+        let scatter = calibrated.sensor.curve.report.residual_sd;
         println!(
-            "sensor {seed}, p^{}: scatter {:.2}, layers {:?}",
-            effects.exponent,
-            report.residual_sd,
-            calibrated
-                .layers
-                .iter()
-                .filter(|l| l.identified)
-                .map(|l| (l.layer, l.parameter))
-                .collect::<Vec<_>>()
+            "sensor {seed}, p^{}: scatter {scatter:.2}",
+            effects.exponent
         );
         let pipeline = pipeline(&calibrated.sensor);
         let reference = simulated.reference();
         for repeat in 0..presses {
-            let frames = simulated.press(repeat);
-            let mut press = pipeline.press(reference.view()).unwrap();
-            for frame in &frames {
-                press.add_frame(frame.view());
-            }
+            let press = press_of(&pipeline, reference.view(), simulated.press(repeat));
             let modulus = press.modulus().unwrap();
             if repeat == 0 {
                 println!("  {:?}", press.measure().error_budget);
             }
-            study
-                .errors
-                .push(modulus.youngs_modulus_pa / SAMPLE_PA - 1.0);
-            study.stated.push(modulus.standard_error_pa / SAMPLE_PA);
-            study.held += usize::from(modulus.interval_95.contains(SAMPLE_PA));
+            study.add(&modulus, SAMPLE_PA);
         }
     }
+    study.print("every effect at once");
     study
-}
-
-impl Study {
-    fn sorted(&self) -> Vec<f64> {
-        let mut sizes: Vec<f64> = self.errors.iter().map(|e| e.abs()).collect();
-        sizes.sort_by(f64::total_cmp);
-        sizes
-    }
-
-    fn print(&self) {
-        let sizes = self.sorted();
-        let mean = self.errors.iter().sum::<f64>() / sizes.len() as f64;
-        let stated = self.stated.iter().sum::<f64>() / sizes.len() as f64;
-        println!(
-            "{} presses: median {:.4}, worst {:.4}, mean {:+.4}, stated {:.4}, held {:.3}",
-            sizes.len(),
-            sizes[sizes.len() / 2],
-            sizes[sizes.len() - 1],
-            mean,
-            stated,
-            self.held as f64 / sizes.len() as f64
-        );
-    }
 }
 
 /// The paper's camera with pixels twice as wide over the same 30 mm: small enough for a test, and
@@ -126,11 +80,10 @@ fn half() -> Camera {
 #[test]
 fn a_sensor_with_every_effect_is_calibrated() {
     let study = study(&[0.8, 1.2], half(), 2, 4);
-    study.print();
-    let sizes = study.sorted();
+    let [median, worst] = study.median_and_worst();
     // The bounds of the full study; eight draws can hardly tell more.
-    assert!(sizes[4] < 0.02 && sizes[7] < 0.06, "{:?}", study.errors);
-    assert!(study.held >= 4);
+    assert!(median < 0.02 && worst < 0.06, "{:?}", study.errors);
+    assert!(study.held() >= 0.5);
 }
 
 /// Every mistake ends in one sentence that names what is wrong, before anything is written.
@@ -157,30 +110,24 @@ fn mistakes_of_a_calibration_are_named() {
         "{uncovered}"
     );
     // All balls twice as large as stated: layers twice as soft, seven times their stated error.
-    let wrong_balls = sentence(&|c| {
+    let balls = sentence(&|c| {
         for press in &mut c.presses {
             if let Indenter::Ball { radius_m, .. } = &mut press.indenter {
                 *radius_m *= 2.0;
             }
         }
     });
-    assert!(
-        matches!(wrong_balls, SensorError::Radius { .. }),
-        "{wrong_balls}"
-    );
+    assert!(matches!(balls, SensorError::Radius { .. }), "{balls}");
     // The largest force of the largest ball, whose pressures the other balls have too: the curve
     // cannot bend to it.
-    let wrong_force = sentence(&|c| c.presses[37].force_n *= 1.3);
+    let force = sentence(&|c| c.presses[37].force_n *= 1.3);
     assert!(
-        matches!(wrong_force, SensorError::Scatter { worst: 37, .. }),
-        "{wrong_force}"
+        matches!(force, SensorError::Scatter { worst: 37, .. }),
+        "{force}"
     );
-    let no_target = sentence(&|c| c.target = Some((c.references[0].clone(), 1e-3, 0.0)));
-    assert!(
-        matches!(no_target, SensorError::Target { .. }),
-        "{no_target}"
-    );
-    for error in [few, uncovered, wrong_balls, wrong_force, no_target] {
+    let target = sentence(&|c| c.target = Some((c.references[0].clone(), 1e-3, 0.0)));
+    assert!(matches!(target, SensorError::Target { .. }), "{target}");
+    for error in [few, uncovered, balls, force, target] {
         let text = error.to_string();
         assert!(!text.contains('\n') && text.len() < 200, "{text}");
     }
@@ -212,11 +159,8 @@ fn a_sensor_file_is_read_as_it_was_written() {
         ("radius_px = ", "radius_px = -", "radius_px"),
     ] {
         let error = broken(from, to);
-        assert!(
-            error.contains("sensor.toml: ") && error.contains(field),
-            "{error}"
-        );
-        assert!(!error.contains('\n'), "{error}");
+        let named = error.contains("sensor.toml: ") && error.contains(field);
+        assert!(named && !error.contains('\n'), "{error}");
     }
 }
 
@@ -225,13 +169,7 @@ fn a_sensor_file_is_read_as_it_was_written() {
 #[ignore = "minutes: run by the step `studies` of the checks"]
 fn study_moduli_with_every_effect_at_once() {
     let study = study(&[0.8, 0.9, 1.0, 1.1, 1.2], Camera::default(), 20, 10);
-    study.print();
-    let sizes = study.sorted();
-    assert!(sizes[100] < 0.02, "median {}", sizes[100]);
-    assert!(sizes[199] < 0.06, "worst {}", sizes[199]);
-    let held = study.held as f64 / 200.0;
-    assert!(
-        (0.92..=0.98).contains(&held),
-        "{held} of the intervals hold"
-    );
+    let [median, worst] = study.median_and_worst();
+    assert!(median < 0.02 && worst < 0.06, "{median} {worst}");
+    assert!((0.92..=0.98).contains(&study.held()), "{study:?}");
 }

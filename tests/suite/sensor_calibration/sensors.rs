@@ -14,8 +14,8 @@ use tactile_imaging::force::Branch;
 use tactile_imaging::scene::SceneLayer;
 use tactile_imaging::sensor::{Indenter, LayerInput, SensorCalibration, SensorPress};
 use tactile_simulate::{
-    Camera, ContactModel, ContactState, Elastic, ElasticSphere, Illumination, PressLoad,
-    PressOptions, PressScene, Response,
+    Camera, ContactModel, ContactState, Elastic, ElasticSphere, PressLoad, PressOptions,
+    PressScene, Response,
 };
 
 /// What is not as the short form of a calibration takes it to be.
@@ -186,15 +186,12 @@ impl Simulated {
                 poisson_ratio_error: 0.0,
             });
         }
-        let camera = Camera {
+        let mut camera = Camera {
             vignetting: effects.vignetting,
             barrel: effects.barrel,
-            pixel_size_m: [
-                camera.pixel_size_m[0],
-                effects.aspect * camera.pixel_size_m[1],
-            ],
             ..camera
         };
+        camera.pixel_size_m[1] *= effects.aspect;
         let balls = BALLS.map(|b| b.0 * (1.0 + CALIBRATION_BALL_ERROR * normal(&mut rng)));
         let states = rigid_states(&truth, balls[0], &[BALLS[0].1]);
         let scene = PressScene::new(PressOptions {
@@ -227,14 +224,9 @@ impl Simulated {
 
     fn load(&mut self, force_n: f64) -> PressLoad {
         let level = 1.0 + self.effects.lamps * (2.0 * self.rng.random::<f64>() - 1.0);
-        let illumination = Illumination {
-            level,
-            ..Illumination::default()
-        };
-        PressLoad {
-            illumination,
-            ..PressLoad::normal(force_n)
-        }
+        let mut load = PressLoad::normal(force_n);
+        load.illumination.level = level;
+        load
     }
 
     /// Anywhere that a contact of some 4 mm fits in.
@@ -270,12 +262,8 @@ impl Simulated {
                 .collect();
             let states = rigid_states(&self.truth, self.balls[ball], &forces);
             let down = forces.iter().rev().skip(1).map(|f| (*f, Branch::Unloading));
-            let all: Vec<_> = forces
-                .iter()
-                .map(|f| (*f, Branch::Loading))
-                .chain(down)
-                .collect();
-            for (k, (force, branch)) in all.into_iter().enumerate() {
+            let up = forces.iter().map(|f| (*f, Branch::Loading));
+            for (k, (force, branch)) in up.chain(down).enumerate() {
                 let (load, place) = (self.load(force), self.place());
                 let law = ContactModel::Tabulated(states.clone());
                 let scene = centred(&self.scene, place);

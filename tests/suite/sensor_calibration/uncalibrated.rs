@@ -1,13 +1,15 @@
 //! Each effect alone on a sensor that was not calibrated for it: the answer moves by less than its
 //! interval, or it is flagged.
 #![allow(clippy::print_stdout)]
+use super::SAMPLE;
 use super::sensors::{
     BALL_ERROR, Effects, POISSON_ERROR, SAMPLE_POISSON, SAMPLE_RADIUS_M, Simulated, estimator,
 };
+use crate::common::press_of;
 use std::collections::BTreeSet;
 use tactile_imaging::elasticity::modulus::ModulusEstimate;
 use tactile_imaging::force::{CalibrationPair, ForceOptions};
-use tactile_imaging::pipeline::{Flag, LightContact, Object, Pipeline};
+use tactile_imaging::pipeline::{Flag, LightContact, Pipeline};
 use tactile_imaging::sensor::{Sensor, SensorCalibration, SensorError};
 use tactile_simulate::Camera;
 
@@ -25,74 +27,23 @@ enum LeftOut {
     Layers,
 }
 
-const CASES: [(&str, Effects, LeftOut); 7] = [
-    (
-        "light goes as p^0.8",
-        Effects {
-            exponent: 0.8,
-            ..Effects::NONE
-        },
-        LeftOut::Curve,
-    ),
-    (
-        "light goes as p^1.2",
-        Effects {
-            exponent: 1.2,
-            ..Effects::NONE
-        },
-        LeftOut::Curve,
-    ),
+/// What an effect is called, what it does, and what is left out of the calibration.
+const CASES: [(&str, fn(&mut Effects), LeftOut); 7] = [
+    ("light goes as p^0.8", |e| e.exponent = 0.8, LeftOut::Curve),
+    ("light goes as p^1.2", |e| e.exponent = 1.2, LeftOut::Curve),
     (
         "vignetting of 10 %",
-        Effects {
-            vignetting: 0.1,
-            ..Effects::NONE
-        },
+        |e| e.vignetting = 0.1,
         LeftOut::FlatField,
     ),
-    (
-        "barrel distortion of 3 %",
-        Effects {
-            barrel: 0.03,
-            ..Effects::NONE
-        },
-        LeftOut::Target,
-    ),
-    (
-        "pixels 2 % higher than wide",
-        Effects {
-            aspect: 1.02,
-            ..Effects::NONE
-        },
-        LeftOut::Target,
-    ),
-    (
-        "lamps change by up to 5 %",
-        Effects {
-            lamps: 0.05,
-            ..Effects::NONE
-        },
-        LeftOut::Drift,
-    ),
-    (
-        "layer moduli 10 % wrong",
-        Effects {
-            moduli: 0.1,
-            ..Effects::NONE
-        },
-        LeftOut::Layers,
-    ),
+    ("barrel of 3 %", |e| e.barrel = 0.03, LeftOut::Target),
+    ("pixels 2 % too high", |e| e.aspect = 1.02, LeftOut::Target),
+    ("lamps change by 5 %", |e| e.lamps = 0.05, LeftOut::Drift),
+    ("layers 10 % wrong", |e| e.moduli = 0.1, LeftOut::Layers),
 ];
 
 /// A modulus with its cautions, or the sentence by which the calibration refused.
 type Answer = Result<(ModulusEstimate, Vec<Flag>), SensorError>;
-
-fn object() -> Object {
-    Object::Sphere {
-        radius_m: SAMPLE_RADIUS_M,
-        poisson_ratio: SAMPLE_POISSON,
-    }
-}
 
 /// Sums of the frames of the largest ball, as a line is fitted to.
 fn pairs(calibration: &SensorCalibration) -> Vec<CalibrationPair> {
@@ -118,13 +69,14 @@ fn pipeline(calibration: &SensorCalibration, sensor: &Sensor, left_out: LeftOut)
         LeftOut::Drift => sensor.contact(&ForceOptions::default()).unwrap(),
         _ => sensor.contact(&super::drift_corrected()).unwrap(),
     };
-    let whole = sensor.pipeline(object()).unwrap();
+    let whole = sensor.pipeline(SAMPLE).unwrap();
     let n = sensor.layer_covariance.len();
     let covariance = nalgebra::DMatrix::from_fn(n, n, |i, j| sensor.layer_covariance[i][j]);
-    Pipeline::new(stage, object())
+    let guide = sensor.waveguide().unwrap();
+    Pipeline::new(stage, SAMPLE)
         .unwrap()
         .with_settings(|settings| {
-            settings.waveguide = Some(sensor.waveguide().unwrap());
+            settings.waveguide = Some(guide.clone());
             settings.flat_field = sensor.flat_field;
             settings.force_scale_error = Some(sensor.gauge_error);
             settings.coupling_error = sensor.coupling_error;
@@ -135,15 +87,12 @@ fn pipeline(calibration: &SensorCalibration, sensor: &Sensor, left_out: LeftOut)
             settings.adhesion_error_j_per_m2 = Some(0.0);
         })
         .unwrap()
-        .with_estimator(estimator(
-            SAMPLE_RADIUS_M,
-            SAMPLE_POISSON,
-            &sensor.waveguide().unwrap(),
-        ))
+        .with_estimator(estimator(SAMPLE_RADIUS_M, SAMPLE_POISSON, &guide))
 }
 
 /// The modulus on a simulated sensor, with part of the calibration left out.
-fn answer(effects: Effects, left_out: Option<LeftOut>, camera: Camera, seed: u64) -> Answer {
+fn answer(effects: Effects, left_out: Option<LeftOut>, seed: u64) -> Answer {
+    let camera = Camera::default().coarser(4);
     let mut simulated = Simulated::new(effects, camera, seed);
     let mut calibration = simulated.calibration();
     match left_out {
@@ -170,19 +119,12 @@ fn answer(effects: Effects, left_out: Option<LeftOut>, camera: Camera, seed: u64
             .powi(2);
         }
     }
-    let pipeline = pipeline(
-        &calibration,
-        &sensor,
-        left_out.unwrap_or(LeftOut::FlatField),
-    );
-    let (reference, frames) = (simulated.reference(), simulated.press(0));
-    let mut press = pipeline.press(reference.view()).unwrap();
-    for frame in &frames {
-        press.add_frame(frame.view());
-    }
+    let left_out = left_out.unwrap_or(LeftOut::FlatField);
+    let pipeline = pipeline(&calibration, &sensor, left_out);
+    let press = press_of(&pipeline, simulated.reference().view(), simulated.press(0));
     let modulus = press.modulus().unwrap();
     let mut flags = Vec::new();
-    for k in 0..frames.len() {
+    for k in 0..press.frames() {
         let reading = press.contact(k).unwrap().expect("a contact");
         flags.extend(reading.flags(k));
     }
@@ -194,28 +136,19 @@ fn answer(effects: Effects, left_out: Option<LeftOut>, camera: Camera, seed: u64
 fn table(seeds: u64) -> Vec<(&'static str, u32)> {
     // The same draws without an effect.
     let ideal = |seed: u64| {
-        let (modulus, flags) = answer(
-            Effects::NONE,
-            None,
-            Camera::default().coarser(4),
-            500 + seed,
-        )
-        .unwrap();
+        let (modulus, flags) = answer(Effects::NONE, None, 500 + seed).unwrap();
         assert!(flags.is_empty(), "flags without an effect: {flags:?}");
         modulus.youngs_modulus_pa
     };
     let ideals: Vec<f64> = (0..seeds).map(ideal).collect();
     let mut unseen = Vec::new();
-    for (name, effects, left_out) in CASES {
+    for (name, change, left_out) in CASES {
+        let mut effects = Effects::NONE;
+        change(&mut effects);
         let (mut worst, mut widest, mut flagged, mut outside) = (0.0_f64, 0.0_f64, 0, 0_u32);
         let mut flags = BTreeSet::new();
         for (seed, ideal_pa) in (0..).zip(&ideals) {
-            let (found, raised) = match answer(
-                effects,
-                Some(left_out),
-                Camera::default().coarser(4),
-                500 + seed,
-            ) {
+            let (found, raised) = match answer(effects, Some(left_out), 500 + seed) {
                 Ok(answer) => answer,
                 Err(error) => {
                     flagged += 1;

@@ -44,21 +44,15 @@ fn a_table_of_hertz_is_seen_as_hertz() {
         assert!(difference < 1e-3 * peak, "{difference} of {peak} Pa");
         assert!(relative(found.visible_force_n, expected.visible_force_n) < 2e-5);
         assert!(relative(found.pressure_pa().sum() * area, expected.contact.force_n) < 2e-5);
-        assert!(
-            relative(
-                found.integrated_pixel_value,
-                expected.integrated_pixel_value
-            ) < 2e-5
-        );
+        let [seen, wanted] = [&found, &expected].map(|truth| truth.integrated_pixel_value);
+        assert!(relative(seen, wanted) < 2e-5);
         let (seen, wanted) = (table.frame(load, 0), exact.frame(load, 0));
         let other = seen.iter().zip(&wanted).filter(|(a, b)| a != b).count();
         // The same noise falls on the same light: a difference of 1e-4 grey levels moves the
         // rounding of one pixel in 10⁴.
         assert!(other < 20, "{other} of {} pixels", seen.len());
-        let apparent = found
-            .contact
-            .apparent_height_m(0.6 * found.contact.contact_radius_m);
-        assert!(relative(apparent, 0.8 * found.contact.contact_radius_m) < 1e-3);
+        let a = found.contact.contact_radius_m;
+        assert!(relative(found.contact.apparent_height_m(0.6 * a), 0.8 * a) < 1e-3);
     }
 }
 
@@ -67,37 +61,24 @@ fn a_tabulated_contact_refuses_loads_beyond_its_last_state() {
     let scene = PressScene::new(small()).unwrap();
     let law = ContactModel::Tabulated(vec![tabulated(&scene, 0, 40)]);
     let with = |force_n: f64| {
-        let loads = vec![PressLoad::normal(force_n)];
-        let law = law.clone();
         PressScene::new(PressOptions {
-            law,
-            loads,
+            law: law.clone(),
+            loads: vec![PressLoad::normal(force_n)],
             ..small()
         })
     };
-    assert!(with(0.7).is_ok() && with(0.1).is_ok() && with(0.0).is_ok());
-    let beyond = with(0.71).unwrap_err();
-    assert!(matches!(
-        beyond,
-        SimulateError::OutOfRange {
-            field: "force_n",
-            maximum,
-            ..
-        } if (maximum / 0.7 - 1.0).abs() < 1e-8
-    ));
     // A solver's state carries the force it was asked for but for its tolerance.
-    assert!(with(0.7 * (1.0 + 1e-10)).is_ok());
-    let cycle = LoadCycle::default();
-    assert!(
-        with(0.7).unwrap().stream(cycle).is_err(),
-        "1.2 N in the cycle"
-    );
-    let reachable = LoadCycle {
-        largest_force_n: 0.7,
-        ..cycle
-    };
+    assert!(with(0.7 * (1.0 + 1e-10)).is_ok() && with(0.0).is_ok());
+    let reaches = |maximum: f64| (maximum / 0.7 - 1.0).abs() < 1e-8;
+    assert!(matches!(
+        with(0.71),
+        Err(SimulateError::OutOfRange { field: "force_n", maximum, .. }) if reaches(maximum)
+    ));
     let scene = with(0.7).unwrap();
-    assert_eq!(scene.stream(reachable).unwrap().count(), 88);
+    let mut cycle = LoadCycle::default();
+    assert!(scene.stream(cycle).is_err(), "1.2 N in the cycle");
+    cycle.largest_force_n = 0.7;
+    assert_eq!(scene.stream(cycle).unwrap().count(), 88);
     // Below the only state the contact shrinks as Hertz's does.
     let radius = |scene: &PressScene| scene.truth(0).contact.contact_radius_m;
     let shrunk = radius(&with(0.1).unwrap()) / radius(&scene);

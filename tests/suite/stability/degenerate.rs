@@ -16,17 +16,17 @@ fn dome((rows, columns): (usize, usize), radius: f64, peak: f64) -> Array2<u8> {
     })
 }
 
+const SHAPE: (usize, usize) = (48, 64);
+
 /// Only these pixels, counted from the middle, are bright.
-fn pixels(shape: (usize, usize), bright: &[(isize, isize)]) -> Array2<u8> {
-    let mut frame = Array2::from_elem(shape, 15);
+fn pixels(bright: &[(isize, isize)]) -> Array2<u8> {
+    let mut frame = Array2::from_elem(SHAPE, 15);
     for (r, c) in bright {
         let at = |n: usize, by: isize| (n / 2).saturating_add_signed(by);
-        frame[[at(shape.0, *r), at(shape.1, *c)]] = 215;
+        frame[[at(SHAPE.0, *r), at(SHAPE.1, *c)]] = 215;
     }
     frame
 }
-
-const SHAPE: (usize, usize) = (48, 64);
 
 /// Reference and two frames.
 type Case = (String, [Array2<u8>; 3]);
@@ -34,6 +34,7 @@ type Case = (String, [Array2<u8>; 3]);
 fn frames_of_every_kind() -> Vec<Case> {
     let even = |grey: u8| Array2::from_elem(SHAPE, grey);
     let sound = dome(SHAPE, 12.0, 150.0);
+    let white = sound.mapv(|v| if v > 15 { 255 } else { 15 });
     let five = [(0, 0), (0, 1), (0, -1), (1, 0), (-1, 0)];
     let stripes = Array2::from_shape_fn(SHAPE, |(_, c)| if c % 2 == 0 { 15 } else { 200 });
     let board = Array2::from_shape_fn(SHAPE, |(r, c)| if (r + c) % 2 == 0 { 0 } else { 255 });
@@ -44,19 +45,13 @@ fn frames_of_every_kind() -> Vec<Case> {
         ("a level above the reference", even(16)),
         ("brighter all over", even(115)),
         ("saturated contact", dome(SHAPE, 12.0, 900.0)),
-        (
-            "a contact of white alone",
-            sound.mapv(|v| if v > 15 { 255 } else { 15 }),
-        ),
-        ("one bright pixel", pixels(SHAPE, &[(0, 0)])),
-        (
-            "one bright pixel in the corner",
-            pixels(SHAPE, &[(-24, -32)]),
-        ),
-        ("a contact of five pixels", pixels(SHAPE, &five)),
+        ("a contact of white alone", white),
+        ("one bright pixel", pixels(&[(0, 0)])),
+        ("one bright pixel in the corner", pixels(&[(-24, -32)])),
+        ("a contact of five pixels", pixels(&five)),
         (
             "five pixels in a row",
-            pixels(SHAPE, &[(0, -2), (0, -1), (0, 0), (0, 1), (0, 2)]),
+            pixels(&[-2, -1, 0, 1, 2].map(|c| (0, c))),
         ),
         ("a contact as large as the frame", dome(SHAPE, 45.0, 150.0)),
         ("a contact larger than the frame", dome(SHAPE, 400.0, 150.0)),
@@ -64,16 +59,11 @@ fn frames_of_every_kind() -> Vec<Case> {
         ("a board of black and white", board),
         ("a sound contact", sound.clone()),
     ];
-    let references = [
-        ("constant", even(15)),
-        ("black", even(0)),
-        ("white", even(255)),
-    ];
     let mut cases = Vec::new();
-    for (on, reference) in &references {
+    for grey in [15, 0, 255] {
         for (what, frame) in &frames {
-            let name = |order: &str| format!("{what}, {order}, on a {on} reference");
-            let [r, f, s] = [reference, frame, &sound].map(Array2::clone);
+            let name = |order: &str| format!("{what}, {order}, on a reference of {grey}");
+            let [r, f, s] = [&even(grey), frame, &sound].map(Array2::clone);
             cases.push((name("twice"), [r.clone(), f.clone(), f.clone()]));
             cases.push((name("first"), [r.clone(), f.clone(), s.clone()]));
             cases.push((name("last"), [r, s, f]));
@@ -84,16 +74,8 @@ fn frames_of_every_kind() -> Vec<Case> {
 
 fn frames_of_every_size() -> Vec<Case> {
     let mut cases = Vec::new();
-    for shape in [
-        (1, 1),
-        (2, 2),
-        (3, 3),
-        (1, 1000),
-        (1000, 1),
-        (2, 500),
-        (5, 5),
-        (8, 8),
-    ] {
+    let sides = [1, 2, 3, 5, 8].map(|n| (n, n));
+    for shape in sides.into_iter().chain([(1, 1000), (1000, 1), (2, 500)]) {
         let flat = |grey: u8| Array2::from_elem(shape, grey);
         let small = dome(shape, 2.0, 150.0);
         let wide = dome(shape, 30.0, 200.0);
@@ -112,22 +94,18 @@ fn frames_of_every_size() -> Vec<Case> {
 
 fn pipelines() -> Vec<Pipeline> {
     let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
+    let punch = Object::FlatPunch {
+        radius_m: 2e-3,
+        poisson_ratio: 0.5,
+    };
+    let unknown = Object::Unknown {
+        poisson_ratio: 0.45,
+    };
     let objects = [
         (Object::sphere(3e-3), EstimatorChoice::Best),
         (Object::sphere(3e-3), EstimatorChoice::PaperRatio),
-        (
-            Object::FlatPunch {
-                radius_m: 2e-3,
-                poisson_ratio: 0.5,
-            },
-            EstimatorChoice::FlatPunch,
-        ),
-        (
-            Object::Unknown {
-                poisson_ratio: 0.45,
-            },
-            EstimatorChoice::Best,
-        ),
+        (punch, EstimatorChoice::FlatPunch),
+        (unknown, EstimatorChoice::Best),
     ];
     let made = objects.map(|(object, estimator)| {
         let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], object).unwrap();

@@ -9,8 +9,7 @@ use tactile_imaging::force::{
     ReferenceFrame,
 };
 use tactile_imaging::pipeline::{EstimatorChoice, LightContact, Object, StagesConfig};
-use tactile_simulate::Trial;
-use tactile_simulate::{CalibrationRun, Camera, Gain, PressLoad, PressOptions};
+use tactile_simulate::{CalibrationRun, Camera, Gain, PressLoad, PressOptions, Trial};
 
 /// 348 × 260 pixels on 15 mm: the contact is as large in pixels as a camera of 696 × 520 sees it,
 /// for 200 control points enough.
@@ -29,12 +28,10 @@ pub(crate) fn coarse_camera() -> Camera {
 
 /// A press at these forces seen by a camera, its brightest pixel at this grey above the background.
 pub(crate) fn trial(camera: Camera, peak_grey: f64, forces: &[f64]) -> Trial {
-    let loads = forces.iter().map(|&f| PressLoad::normal(f)).collect();
-    let gain = Gain::PeakGrey(peak_grey);
     let options = PressOptions {
         camera,
-        loads,
-        gain,
+        loads: forces.iter().map(|&f| PressLoad::normal(f)).collect(),
+        gain: Gain::PeakGrey(peak_grey),
         seed: 3,
         ..PressOptions::default()
     };
@@ -138,8 +135,8 @@ pub(crate) struct Answer {
     pub(crate) force_n: Vec<f64>,
     pub(crate) radius_m: Vec<f64>,
     pub(crate) centroid_px: Vec<[f64; 2]>,
-    pub(crate) modulus_pa: f64,
-    pub(crate) modulus_error_pa: f64,
+    /// And its standard error.
+    pub(crate) modulus_pa: [f64; 2],
     /// From the first frame to the last, with its standard error.
     pub(crate) strain: Matrix3<f64>,
     pub(crate) strain_error: Matrix3<f64>,
@@ -149,15 +146,12 @@ pub(crate) fn answer(pipeline: &Pipeline, images: &Images) -> Answer {
     let references = images.references.each_ref().map(|image| image.view());
     let reference = ReferenceFrame::from_frames(&references).expect("two exposures");
     let mut press = pipeline.press_on(Arc::new(reference));
-    images.frames.iter().for_each(|image| {
+    for image in &images.frames {
         press.add_frame(image.view());
-    });
+    }
     let (mut force_n, mut radius_m, mut centroid_px) = (Vec::new(), Vec::new(), Vec::new());
     for frame in 0..press.frames() {
-        let contact = press
-            .contact(frame)
-            .expect("sound frames")
-            .expect("a contact");
+        let contact = press.contact(frame).unwrap().expect("a contact");
         force_n.push(contact.force_n.expect("a force").value);
         radius_m.push(contact.contact_radius_m.value);
         centroid_px.push(contact.centroid_px.map(|c| c.value));
@@ -168,8 +162,7 @@ pub(crate) fn answer(pipeline: &Pipeline, images: &Images) -> Answer {
         force_n,
         radius_m,
         centroid_px,
-        modulus_pa: modulus.youngs_modulus_pa,
-        modulus_error_pa: modulus.standard_error_pa,
+        modulus_pa: [modulus.youngs_modulus_pa, modulus.standard_error_pa],
         strain: strain.mean,
         strain_error: strain.standard_error,
     }

@@ -28,14 +28,8 @@ pub(crate) fn shifts(table: &mut Table, trial: &Trial, expected: &Answer) {
         let moved = Images::of(trial).map(|image| shifted(image, by));
         let found = answer(&pipeline(trial, SI), &moved);
         let there = |c: [f64; 2]| [c[0] + by[0] as f64, c[1] + by[1] as f64];
-        compare(
-            table,
-            "moved by whole pixels",
-            &found,
-            expected,
-            (there, Matrix3::identity()),
-            RIM,
-        );
+        let there = (there, Matrix3::identity());
+        compare(table, "moved by whole pixels", &found, expected, there, RIM);
     }
 }
 
@@ -96,19 +90,13 @@ pub(crate) fn turns(table: &mut Table, trial: &Trial, expected: &Answer) {
         let turned = Images::of(trial).map(|image| turn.image(image));
         let found = answer(&pipeline(trial, SI), &turned);
         let there = |c| turn.point(c, [columns as f64, rows as f64]);
+        let there = (there, turn.rotation());
         let case = if turn.transposed {
             "turned"
         } else {
             "mirrored"
         };
-        compare(
-            table,
-            case,
-            &found,
-            expected,
-            (there, turn.rotation()),
-            [EXACT, EXACT, 1e-10],
-        );
+        compare(table, case, &found, expected, there, [EXACT, EXACT, 1e-10]);
     }
 }
 
@@ -122,39 +110,31 @@ fn compare(
     (there, rotation): (impl Fn([f64; 2]) -> [f64; 2], Matrix3<f64>),
     [of_force, of_radius, of_pixel]: [f64; 3],
 ) {
-    let centroid = found
-        .centroid_px
-        .iter()
-        .zip(&expected.centroid_px)
-        .map(|(f, e)| {
-            let e = there(*e);
-            (f[0] - e[0]).hypot(f[1] - e[1])
-        });
+    let centroids = found.centroid_px.iter().zip(&expected.centroid_px);
+    let centroid = centroids.map(|(f, e)| {
+        let e = there(*e);
+        (f[0] - e[0]).hypot(f[1] - e[1])
+    });
     let strain = rotation * expected.strain * rotation.transpose();
     let gap = (found.strain - strain).abs();
     let across = gap[(0, 0)].max(gap[(1, 1)]).max(gap[(0, 1)]);
     let up = gap[(2, 2)].max(gap[(0, 2)]).max(gap[(1, 2)]);
-    let rows = [
-        (
-            "force",
-            relative(&found.force_n, &expected.force_n, 1.0),
-            of_force,
-        ),
-        (
-            "radius",
-            relative(&found.radius_m, &expected.radius_m, 1.0),
-            of_radius,
-        ),
-        ("centroid in pixels", centroid.fold(0.0, f64::max), of_pixel),
-        (
-            "modulus",
-            relative(&[found.modulus_pa], &[expected.modulus_pa], 1.0),
-            3.0 * of_force.max(of_radius),
-        ),
-        ("strain e_xx, e_yy, e_xy", across, STRAIN[0]),
-        ("strain e_zz, e_xz, e_yz", up, STRAIN[2]),
-    ];
-    for (what, error, tolerance) in rows {
+    let mut enter = |what: &str, error, tolerance| {
         table.enter(&format!("{case}: {what}"), error, tolerance);
-    }
+    };
+    let modulus = relative(&found.modulus_pa[..1], &expected.modulus_pa[..1], 1.0);
+    enter(
+        "force",
+        relative(&found.force_n, &expected.force_n, 1.0),
+        of_force,
+    );
+    enter(
+        "radius",
+        relative(&found.radius_m, &expected.radius_m, 1.0),
+        of_radius,
+    );
+    enter("centroid in pixels", centroid.fold(0.0, f64::max), of_pixel);
+    enter("modulus", modulus, 3.0 * of_force.max(of_radius));
+    enter("strain e_xx, e_yy, e_xy", across, STRAIN[0]);
+    enter("strain e_zz, e_xz, e_yz", up, STRAIN[2]);
 }

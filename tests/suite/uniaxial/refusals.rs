@@ -1,5 +1,6 @@
 //! Contacts of shapes that fit nothing: a refusal that says what to tell the program, or an
 //! interval that holds the truth.
+use crate::common::press_of;
 use ndarray::Array2;
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 use std::f64::consts::TAU;
@@ -134,30 +135,20 @@ fn shapes_that_fit_nothing_are_refused_or_their_interval_holds_the_truth() {
                 let pipeline = Pipeline::from_pairs(&pairs, [PIXEL_M; 2], object).unwrap();
                 let dark = Array2::from_elem((SIDE, SIDE), DARK_GREY);
                 let reference = camera().expose(dark.view(), seed, 9);
-                let frames: Vec<_> = (0..3)
-                    .map(|k| frame(outline, contact, FORCES_N[k], turn, (seed, k as u64)))
-                    .collect();
-                let mut press = pipeline.press(reference.view()).unwrap();
-                for frame in &frames {
-                    press.add_frame(frame.view());
-                }
+                let frame = |k| frame(outline, contact, FORCES_N[k], turn, (seed, k as u64));
+                let press = press_of(&pipeline, reference.view(), (0..3).map(frame));
                 scenes += 1;
+                let scene = format!("{seed} {outline:?} {contact:?}");
                 match press.modulus() {
                     Err(PipelineError::NotUniaxial { problem, .. }) => {
                         refused += 1;
-                        println!("{seed} {outline:?} {contact:?}: {problem}");
+                        println!("{scene}: {problem}");
                     }
-                    Err(error) => panic!("{outline:?} {contact:?}: {error}"),
+                    Err(error) => panic!("{scene}: {error}"),
                     Ok(found) => {
-                        println!(
-                            "{seed} {outline:?} {contact:?}: {} Pa",
-                            found.youngs_modulus_pa
-                        );
-                        assert_eq!(contact, Contact::Specimen, "{seed} {outline:?}");
-                        assert!(
-                            found.interval_95.contains(MODULUS_PA),
-                            "{seed} {outline:?} {contact:?}: {found:?}"
-                        );
+                        println!("{scene}: {} Pa", found.youngs_modulus_pa);
+                        assert_eq!(contact, Contact::Specimen, "{scene}");
+                        assert!(found.interval_95.contains(MODULUS_PA), "{scene}: {found:?}");
                     }
                 }
             }
@@ -165,8 +156,6 @@ fn shapes_that_fit_nothing_are_refused_or_their_interval_holds_the_truth() {
     }
     println!("{scenes} scenes, {refused} refused");
     assert_eq!(scenes, 8 * seeds);
-    assert!(
-        refused >= 6 * seeds,
-        "all but stars and rings that are specimens: {refused}"
-    );
+    // All but stars and rings that are specimens.
+    assert!(refused >= 6 * seeds, "{refused}");
 }

@@ -1,7 +1,7 @@
 //! Simulated faces and the sensor that reads them.
-use ndarray::Array2;
+use crate::common::press_of;
 use tactile_imaging::force::CalibrationPair;
-use tactile_imaging::pipeline::{Measurement, Settings};
+use tactile_imaging::pipeline::{Press, Settings};
 use tactile_imaging::{Object, Pipeline};
 use tactile_simulate::{
     Camera, Elastic, FaceOutline, SurfacePattern, UniaxialOptions, UniaxialScene,
@@ -88,6 +88,13 @@ impl Face {
         let pipeline = Pipeline::from_pairs(&pairs, self.camera.pixel_size_m, object).unwrap();
         pipeline.with_settings(Settings::state_exact).unwrap()
     }
+
+    /// All loads of a scene of this face.
+    pub(super) fn press(&self, scene: &UniaxialScene, object: Object) -> Press<'static> {
+        let frames = (0..self.squeezes.len()).map(|load| scene.frame(load, 0));
+        let pipeline = self.pipeline(scene, object);
+        press_of(&pipeline, scene.reference(0).view(), frames)
+    }
 }
 
 /// A calibration without errors, `per_grey` newtons a grey level.
@@ -96,19 +103,4 @@ pub(super) fn exact_pairs(per_grey: f64) -> Vec<CalibrationPair> {
     values
         .map(|v| CalibrationPair::loading(v, per_grey * v))
         .to_vec()
-}
-
-/// Everything that the frames of a face say.
-pub(super) fn measured(face: &Face, object: Object, seed: u64) -> Measurement {
-    let scene = face.scene(seed);
-    let pipeline = face.pipeline(&scene, object);
-    let reference = scene.reference(0);
-    let frames: Vec<Array2<u8>> = (0..face.squeezes.len())
-        .map(|load| scene.frame(load, 0))
-        .collect();
-    let mut press = pipeline.press(reference.view()).unwrap();
-    for frame in &frames {
-        press.add_frame(frame.view());
-    }
-    press.measure()
 }

@@ -1,6 +1,7 @@
 //! Cylinders solved by finite elements, their faces sliding or sticking: what the pipeline says of
 //! them.
 use super::scenes::exact_pairs;
+use crate::common::press_of;
 use tactile_imaging::elasticity::strain::Hencky;
 use tactile_imaging::fem::Interface;
 use tactile_imaging::pipeline::{Flag, Measurement, Settings};
@@ -38,10 +39,7 @@ fn measured(
     };
     let scene = PressScene::new(PressOptions {
         law: ContactModel::Tabulated(states),
-        loads: forces
-            .iter()
-            .map(|&force| PressLoad::normal(force))
-            .collect(),
+        loads: forces.iter().map(|&f| PressLoad::normal(f)).collect(),
         gain: Gain::PeakGrey(200.0),
         camera,
         seed,
@@ -56,13 +54,8 @@ fn measured(
         true => pipeline.with_strain(Hencky),
         false => pipeline,
     };
-    let reference = scene.reference(0);
-    let frames: Vec<_> = (0..forces.len()).map(|k| scene.frame(k, 0)).collect();
-    let mut press = pipeline.press(reference.view()).unwrap();
-    for frame in &frames {
-        press.add_frame(frame.view());
-    }
-    press.measure()
+    let made = scene.simulate();
+    press_of(&pipeline, made.reference.view(), made.frames).measure()
 }
 
 /// What was found of a cylinder.
@@ -117,10 +110,8 @@ fn sticking_faces_are_right_or_flagged() {
                 if let Ok(modulus) = &found.youngs_modulus_pa {
                     let sticks = |flag: &Flag| matches!(flag, Flag::FaceSticks { .. });
                     let error = modulus.value / modulus_pa - 1.0;
-                    assert!(
-                        error.abs() < 0.05 || found.flags.iter().any(sticks),
-                        "{said}"
-                    );
+                    let is_flagged = found.flags.iter().any(sticks);
+                    assert!(error.abs() < 0.05 || is_flagged, "{said}");
                 }
             }
         }

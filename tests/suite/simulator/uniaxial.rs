@@ -1,7 +1,9 @@
 //! Uniaxial compression: the law of its states, its frames and its limits.
 
-use super::{camera, relative};
-use tactile_simulate::{Elastic, SimulateError, SurfacePattern, UniaxialOptions, UniaxialScene};
+use super::relative;
+use tactile_simulate::{
+    Camera, Elastic, SimulateError, SurfacePattern, UniaxialOptions, UniaxialScene,
+};
 
 #[test]
 fn uniaxial_states_obey_their_law_and_balance_the_force() {
@@ -13,7 +15,6 @@ fn uniaxial_states_obey_their_law_and_balance_the_force() {
             poisson_ratio: 0.45,
         },
         face_m: [9e-3, 11e-3],
-        camera: camera(600, 700),
         ..UniaxialOptions::default()
     })
     .unwrap();
@@ -45,7 +46,7 @@ fn uniaxial_states_obey_their_law_and_balance_the_force() {
 #[test]
 fn uniaxial_frames_carry_the_force_and_the_points_deform_as_the_states_say() {
     let mut options = UniaxialOptions {
-        camera: camera(261, 348).ideal(),
+        camera: Camera::default().coarser(4).ideal(),
         ..UniaxialOptions::default()
     };
     options.centre_px = Some([170.2, 133.9]);
@@ -90,14 +91,8 @@ fn largest_inner_difference(a: &ndarray::Array2<f64>, b: &ndarray::Array2<f64>) 
     let mut worst = 0.0_f64;
     for r in 1..rows - 1 {
         for c in 1..cols - 1 {
-            let near = [
-                a[[r - 1, c]],
-                a[[r + 1, c]],
-                a[[r, c - 1]],
-                a[[r, c + 1]],
-                a[[r, c]],
-            ];
-            if near.iter().all(|&h| h > 0.0) {
+            let near = [[r - 1, c], [r + 1, c], [r, c - 1], [r, c + 1], [r, c]];
+            if near.iter().all(|&at| a[at] > 0.0) {
                 worst = worst.max((a[[r, c]] - b[[r, c]]).abs());
             }
         }
@@ -108,39 +103,21 @@ fn largest_inner_difference(a: &ndarray::Array2<f64>, b: &ndarray::Array2<f64>) 
 #[test]
 fn a_force_beyond_the_material_law_is_an_error_and_so_are_bad_patterns() {
     let limit = 103e3 * 144e-6 / 27.0_f64.sqrt();
-    let at = |force: f64| {
-        UniaxialScene::new(UniaxialOptions {
-            forces_n: vec![force],
-            camera: camera(261, 348),
+    let with = |force_n: f64, change: fn(&mut SurfacePattern)| {
+        let mut options = UniaxialOptions {
+            forces_n: vec![force_n],
+            camera: Camera::default().coarser(4),
             ..UniaxialOptions::default()
-        })
+        };
+        change(&mut options.pattern);
+        UniaxialScene::new(options)
     };
-    assert!(at(0.999 * limit).is_ok());
+    let at = |force_n| with(force_n, |_| {});
+    assert!(at(0.999 * limit).is_ok() && at(f64::NAN).is_err());
     assert!(matches!(
         at(1.001 * limit),
         Err(SimulateError::Overload { .. })
     ));
-    assert!(at(f64::NAN).is_err());
-    let pattern = SurfacePattern {
-        bump_share: 0.6,
-        ..SurfacePattern::default()
-    };
-    assert!(
-        UniaxialScene::new(UniaxialOptions {
-            pattern,
-            ..UniaxialOptions::default()
-        })
-        .is_err()
-    );
-    let pattern = SurfacePattern {
-        bump_height_m: [2e-3, 1e-3],
-        ..SurfacePattern::default()
-    };
-    assert!(
-        UniaxialScene::new(UniaxialOptions {
-            pattern,
-            ..UniaxialOptions::default()
-        })
-        .is_err()
-    );
+    assert!(with(0.2, |pattern| pattern.bump_share = 0.6).is_err());
+    assert!(with(0.2, |pattern| pattern.bump_height_m = [2e-3, 1e-3]).is_err());
 }
