@@ -429,7 +429,7 @@ fn labelling(trial: &Trial, dense: bool) -> Found<Experiment> {
     let moved: Vec<Point3<f64>> = model.iter().map(|p| scaling.apply(p)).collect();
     let target: Vec<Point3<f64>> = moved.iter().rev().copied().collect();
     let full = printed_labelling();
-    let sparse = full.clone().with_candidates(12)?;
+    let sparse = full.with_candidates(12)?;
     let default = AnnealedSoftassign::default();
     let mut matchers: Vec<(&str, &str, &dyn PointMatcher<3>)> = vec![
         (

@@ -309,11 +309,11 @@ impl<const D: usize> Grid<D> {
             text.push_str(&three(displacement.as_slice()));
             text.push('\n');
         }
-        let parts: [(&str, fn(&Known<D>) -> Matrix3<f64>); 2] =
-            [("strain", |at| at.1), ("standard_error", |at| at.2)];
-        for (name, part) in parts {
+        let strains: Vec<_> = found.iter().map(|at| at.1).collect();
+        let errors: Vec<_> = found.iter().map(|at| at.2).collect();
+        for (name, tensors) in [("strain", strains), ("standard_error", errors)] {
             text.push_str(&format!("TENSORS {name} double\n"));
-            for tensor in found.iter().map(part) {
+            for tensor in tensors {
                 // Symmetric: columns are rows.
                 for column in tensor.column_iter() {
                     text.push_str(&three(&[column[0], column[1], column[2]]));

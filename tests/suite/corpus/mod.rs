@@ -9,7 +9,9 @@ mod readers;
 use std::path::{Path, PathBuf};
 
 /// A folder of `tests/data/corpus` and what must hold of its inputs.
-pub(crate) const READERS: [(&str, fn(&[u8])); 5] = [
+type Reader = (&'static str, fn(&[u8]));
+
+pub(crate) const READERS: [Reader; 5] = [
     ("table", readers::table),
     ("case", readers::case),
     ("image", readers::image),

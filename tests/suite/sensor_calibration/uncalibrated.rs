@@ -28,7 +28,9 @@ enum LeftOut {
 }
 
 /// What an effect is called, what it does, and what is left out of the calibration.
-const CASES: [(&str, fn(&mut Effects), LeftOut); 7] = [
+type Case = (&'static str, fn(&mut Effects), LeftOut);
+
+const CASES: [Case; 7] = [
     ("light goes as p^0.8", |e| e.exponent = 0.8, LeftOut::Curve),
     ("light goes as p^1.2", |e| e.exponent = 1.2, LeftOut::Curve),
     (

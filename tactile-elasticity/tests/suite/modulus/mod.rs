@@ -9,13 +9,13 @@ use nalgebra::DMatrix;
 use proptest::prelude::*;
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 use rand_distr::StandardNormal;
+use tactile_elasticity::ElasticityError;
 use tactile_elasticity::contact::{
     Body, Bond, HertzContact, Layer, LayerEquation, Waveguide, cone, flat_punch,
     reduced_modulus_pa, tatara_indentation_m,
 };
 use tactile_elasticity::curve::SelectionReason;
 use tactile_elasticity::modulus::*;
-use tactile_elasticity::{ElasticityError, Quantity};
 
 const SAMPLE: f64 = 60e3;
 const NU: f64 = 0.48;
