@@ -1,5 +1,4 @@
 //! Problems that several benches have in common: points to be matched, and maps of space.
-#![allow(missing_docs)]
 
 use nalgebra::{Point, Point3, SVector, Vector3};
 use rand::{RngExt, SeedableRng, rngs::SmallRng};
@@ -7,8 +6,11 @@ use tactile_imaging::tps::{Kernel, ThinPlateSpline};
 
 /// A model, a target, and where each model point truly goes.
 pub struct Scene<const D: usize> {
+    /// The points to be matched.
     pub model: Vec<Point<f64, D>>,
+    /// Their images in another order, with noise and outliers.
     pub target: Vec<Point<f64, D>>,
+    /// Their images without noise, in the order of the model.
     pub truth: Vec<Point<f64, D>>,
 }
 
@@ -55,13 +57,18 @@ impl<const D: usize> Scene<D> {
 
 /// Uniform points of the cube [−1, 1]³ moved by five Gaussian bumps, and where others go.
 pub struct Problem {
+    /// Points with a known image.
     pub sources: Vec<Point3<f64>>,
+    /// Their images, with noise.
     pub targets: Vec<Point3<f64>>,
+    /// Other points.
     pub queries: Vec<Point3<f64>>,
+    /// The images of these.
     pub truth: Vec<Point3<f64>>,
 }
 
 impl Problem {
+    /// `n` sources and `queries` other points. Targets are off by up to `noise` along each axis.
     pub fn new(seed: u64, n: usize, noise: f64, queries: usize) -> Self {
         let mut random = SmallRng::seed_from_u64(seed);
         let mut point =
@@ -97,6 +104,7 @@ impl Problem {
         self.error_of(&values)
     }
 
+    /// Root mean square distance of values at the queries from the truth.
     pub fn error_of(&self, values: &[Point3<f64>]) -> f64 {
         let both = values.iter().zip(&self.truth);
         let squares = both.map(|(v, t)| (v - t).norm_squared());

@@ -111,3 +111,18 @@ fn nearest_markers_are_not_taken_for_partners() {
         );
     }
 }
+
+/// Fewer markers than have neighbours leave nothing to compare with: an answer or an error.
+#[test]
+fn few_or_no_markers_are_no_panic() {
+    let markers: Vec<_> = (0..3)
+        .map(|k| Marker::new(Point2::new(20.0 * f64::from(k), 5.0), 0.1, 30.0))
+        .collect();
+    for before in 0..=markers.len() {
+        for after in 0..=markers.len() {
+            if let Ok(field) = track_markers(&markers[..before], &markers[..after]) {
+                assert!(field.tracks.len() <= before.min(after) && field.strain.is_none());
+            }
+        }
+    }
+}
