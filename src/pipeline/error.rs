@@ -1,5 +1,4 @@
 //! Why a measurement could not be made.
-use super::named::EstimatorChoice;
 use crate::elasticity::ElasticityError;
 use crate::force::{ForceError, ShapeProblem};
 use crate::matching::MatchError;
@@ -289,8 +288,8 @@ pub enum PipelineError {
     /// The estimator that was chosen is for another object.
     #[error("the estimator \"{estimator}\" needs {needs}")]
     WrongEstimator {
-        /// The estimator.
-        estimator: EstimatorChoice,
+        /// Its name.
+        estimator: &'static str,
         /// What it needs.
         needs: &'static str,
     },

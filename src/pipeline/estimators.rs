@@ -78,7 +78,7 @@ fn named(
     waveguide: Option<&Waveguide>,
 ) -> Result<SharedEstimator, PipelineError> {
     let needs = |needs| PipelineError::WrongEstimator {
-        estimator: choice,
+        estimator: choice.name(),
         needs,
     };
     const BALL: &str = "a ball as the object";

@@ -307,7 +307,7 @@ pub enum Flag {
         /// Which.
         #[cfg_attr(
             feature = "serde",
-            serde(serialize_with = "super::result::outcome::text")
+            serde(serialize_with = "super::text::outcome::text")
         )]
         warning: Warning,
     },

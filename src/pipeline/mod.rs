@@ -27,6 +27,7 @@
 //! stress over strain, regressed over all loads, the strain from the growth of the face's area. An
 //! object of unknown shape is read so if its contacts are those of a flat face, and refused with
 //! what to tell the program if not ([`PipelineError::NotUniaxial`]).
+mod assumptions;
 mod batch;
 mod budget;
 mod check;
@@ -50,14 +51,17 @@ mod settings;
 mod source;
 mod specimen;
 mod stages;
+mod strain;
 mod surface;
+mod text;
 mod time;
 
 pub use crate::force::{FaceReading, ShapeProblem};
 pub use crate::sfs::{BallFit, Binning};
+pub use assumptions::{CheckedGain, CheckedGuide};
 pub use batch::contacts;
 pub use budget::{ErrorShare, ErrorSource};
-pub use check::{CheckPress, CheckedGain, CheckedGuide, CheckedObject, KnownBall};
+pub use check::{CheckPress, CheckedObject, KnownBall};
 #[cfg(feature = "scene")]
 pub(crate) use check::{PARABOLA_ERROR, slopes};
 pub use composition::Pipeline;
@@ -73,13 +77,12 @@ pub use named::{
 pub use press::Press;
 pub use reference_light::ReferenceLight;
 pub use report::{Report, Skip, SkipReason, Stage, Work};
-pub use result::{
-    FrameResult, MatchResult, Measurement, ModulusResult, StrainResult, interval_text, with_error,
-};
+pub use result::{FrameResult, MatchResult, Measurement, ModulusResult, StrainResult};
 pub use session::{DriftWatch, Session, SessionStrain, Update};
 pub use settings::{Settings, SurfaceInput};
 pub use source::FrameSource;
 pub use specimen::Object;
-pub use stages::PairStrain;
+pub use strain::PairStrain;
 pub use surface::ContactSurface;
+pub use text::{interval_text, with_error};
 pub use time::TimeResult;

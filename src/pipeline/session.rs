@@ -14,7 +14,8 @@ use super::flag::Flag;
 use super::loads::{self, Load, MOST_LOADS, SeenLoads};
 use super::report::{Report, SkipReason, Stage};
 use super::specimen::{FlatSpecimen, Specimen};
-use super::stages::{Bench, MatchedPoints, PairStrain, Stages};
+use super::stages::{Bench, MatchedPoints, Stages};
+use super::strain::PairStrain;
 use super::surface::{ContactSurface, ControlPoints};
 use crate::elasticity::modulus::ModulusEstimate;
 use crate::force::{

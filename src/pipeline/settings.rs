@@ -1,5 +1,5 @@
 //! Settings of a pipeline beside its stages.
-use super::check::{CheckedGain, CheckedGuide};
+use super::assumptions::{CheckedGain, CheckedGuide};
 use super::error::PipelineError;
 use super::reference_light::ReferenceLight;
 use super::specimen::Object;

@@ -3,7 +3,7 @@
 use super::contact::ContactReading;
 use super::error::PipelineError;
 use super::flag::Flag;
-use super::stages::PairStrain;
+use super::strain::PairStrain;
 use crate::elasticity::field::StrainField;
 use crate::elasticity::modulus::{
     Cone, Estimate, HertzSphere, LoadSeries, LoadState, UniaxialLoads,

@@ -8,8 +8,9 @@ use super::loads::beyond;
 use super::reference_light::LightChange;
 use super::report::{Report, SkipReason, Stage};
 use super::specimen::{Object, Specimen};
+use super::strain::PairStrain;
 use super::surface::{self, ContactSurface, ContactSurfaceWorkspace, ControlPoints};
-use crate::elasticity::field::{StrainField, StrainSummary, mean_strain_error};
+use crate::elasticity::field::mean_strain_error;
 use crate::elasticity::modulus::{
     Estimate, LoadSeries, LoadState, ModulusEstimate, ModulusEstimator, Warning,
 };
@@ -23,55 +24,6 @@ use nalgebra::{Matrix3, Point2, Point3};
 use ndarray::ArrayView2;
 use std::sync::Arc;
 use std::time::Instant;
-
-/// The strain between two frames.
-///
-/// ```
-/// use tactile_simulate::Trial;
-/// let trial = Trial::coarser(8)?;
-/// use tactile_imaging::pipeline::PairStrain;
-/// let pipeline = trial.pipeline()?.with_control_points(60);
-/// let press = trial.press(&pipeline)?;
-/// let strain: &PairStrain = press.strain(1)?;
-/// assert_eq!(strain.field.strains.len(), 60, "one at every control point of the first frame");
-/// let found = strain.summary.mean[(0, 0)];
-/// let [first, last] = [&trial.simulation.truth[0], &trial.simulation.truth[1]];
-/// assert!((found - first.scaling_to(last).green_lagrange_strain()[(0, 0)]).abs() < 0.03);
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
-#[derive(Clone, Debug)]
-pub struct PairStrain {
-    /// Name of the measure.
-    pub measure: &'static str,
-    /// Strain at every control point of the first frame.
-    pub field: StrainField,
-    /// Mean, spread and standard error.
-    pub summary: StrainSummary,
-}
-
-impl Default for PairStrain {
-    /// No strain yet, to be filled.
-    fn default() -> Self {
-        let field = StrainField::default();
-        Self {
-            measure: "",
-            summary: field.summary(),
-            field,
-        }
-    }
-}
-
-impl PairStrain {
-    /// The apparent strain of a ball's load for equation (31). The surface that its pressure is
-    /// read as swells where the load rises, in all directions, so that (31) takes the size of the
-    /// mean e_zz, with the sign of `force_step_n`, the step of the load from the first frame to the
-    /// second. (Specimens with a flat face have signed strains.)
-    pub(super) fn of_load(&self, force_step_n: f64) -> Estimate {
-        let size = self.summary.mean[(2, 2)].abs();
-        let error = self.summary.standard_error[(2, 2)];
-        Estimate::new(size.copysign(force_step_n), error)
-    }
-}
 
 /// What a press or a session asks its stages of: nothing in it changes.
 #[derive(Clone)]

@@ -1,6 +1,6 @@
 //! Whether the modulus changes over the time of a press.
 use super::loads::beyond;
-use super::result::{decimals_of, fixed, interval_text, with_error};
+use super::text::{decimals_of, fixed, interval_text, with_error};
 use crate::elasticity::modulus::{
     Estimate, Interval, LoadSeries, LoadState, ModulusEstimator, SharedErrors,
 };

@@ -327,7 +327,7 @@ impl Scene {
                 } = self.object
                 else {
                     return Err(PipelineError::WrongEstimator {
-                        estimator: EstimatorChoice::TabulatedContact,
+                        estimator: EstimatorChoice::TabulatedContact.name(),
                         needs: "a ball as the object",
                     });
                 };

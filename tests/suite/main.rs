@@ -4,6 +4,7 @@
 mod architecture;
 mod assumptions;
 mod check_presses;
+mod circles;
 mod coloured_gels;
 mod common;
 mod corpus;

@@ -2,8 +2,8 @@
 use super::{CheckedObject, is_positive};
 use crate::core::Estimate;
 use crate::core::statistics::quantile_95;
+use crate::pipeline::assumptions::CheckedGain;
 use crate::pipeline::contact::ContactReading;
-use std::fmt::{self, Display, Formatter};
 
 /// A force that was read, beside the one that is known.
 #[derive(Clone, Copy, Debug)]
@@ -51,62 +51,44 @@ impl GainCheck {
     }
 }
 
-/// The gain that presses of known force show. Forces that are read from light are divided by it,
-/// and its error stands in place of
-/// [`Settings::coupling_error`](crate::pipeline::Settings::coupling_error).
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize))]
-#[non_exhaustive]
-pub struct CheckedGain {
-    /// Force that is read over force that is known.
-    pub gain: Estimate,
-    /// Standard deviation of the gain between presses beyond their own errors, relative. The error
-    /// of the gain allows for it, and for 0.5 % where it is less.
-    pub drift: f64,
-    /// The number of presses.
-    pub presses: usize,
-}
-
-impl CheckedGain {
-    /// The gain of presses in any order.
-    ///
-    /// With x = ln(measured/known) of each press and its variance v: where presses of one object
-    /// scatter by more than v explains, the drift's variance τ² is that of DerSimonian and Laird
-    /// (1986, Control. Clin. Trials 7, 177), and the gain of the frames drifts by as much again.
-    /// Of a sensor that drifts by 2 %, two presses let 88 of 100 intervals hold, and four 92.
-    /// The calibrator lacks the object's own coupling: its mean has the variance
-    /// `coupling_error`² besides. The means of both objects are weighted by their variances.
-    pub(super) fn of(checks: &[GainCheck], coupling_error: f64) -> Self {
-        let groups = [CheckedObject::Sample, CheckedObject::Calibrator].map(|object| {
-            let of_object = checks.iter().filter(move |check| check.object == object);
-            of_object
-                .map(GainCheck::log_gain)
-                // No force is known to a part in a million.
-                .map(|(x, variance)| (x, variance.max(1e-12)))
-                .collect::<Vec<_>>()
-        });
-        let (drift, allowance) = drift(&groups);
-        let allowed = (allowance * drift).max(ASSUMED_DRIFT);
-        let variance = |v: f64| v + (allowance * drift).powi(2);
-        let own = [0.0, coupling_error];
-        let (mut sum, mut weight) = (0.0, 0.0);
-        for (group, own) in groups
-            .iter()
-            .zip(own)
-            .filter(|(group, _)| !group.is_empty())
-        {
-            let (mean, total, _) = weighted(group, &variance);
-            let of_group = (total.recip() + own * own).recip();
-            sum += of_group * mean;
-            weight += of_group;
-        }
-        let log_gain = sum / weight;
-        let (gain, error) = (log_gain.exp(), weight.recip().sqrt().hypot(allowed));
-        Self {
-            gain: Estimate::new(gain, gain * error),
-            drift,
-            presses: checks.len(),
-        }
+/// The gain of presses in any order.
+///
+/// With x = ln(measured/known) of each press and its variance v: where presses of one object
+/// scatter by more than v explains, the drift's variance τ² is that of DerSimonian and Laird
+/// (1986, Control. Clin. Trials 7, 177), and the gain of the frames drifts by as much again.
+/// Of a sensor that drifts by 2 %, two presses let 88 of 100 intervals hold, and four 92.
+/// The calibrator lacks the object's own coupling: its mean has the variance
+/// `coupling_error`² besides. The means of both objects are weighted by their variances.
+pub fn checked(checks: &[GainCheck], coupling_error: f64) -> CheckedGain {
+    let groups = [CheckedObject::Sample, CheckedObject::Calibrator].map(|object| {
+        let of_object = checks.iter().filter(move |check| check.object == object);
+        of_object
+            .map(GainCheck::log_gain)
+            // No force is known to a part in a million.
+            .map(|(x, variance)| (x, variance.max(1e-12)))
+            .collect::<Vec<_>>()
+    });
+    let (drift, allowance) = drift(&groups);
+    let allowed = (allowance * drift).max(ASSUMED_DRIFT);
+    let variance = |v: f64| v + (allowance * drift).powi(2);
+    let own = [0.0, coupling_error];
+    let (mut sum, mut weight) = (0.0, 0.0);
+    for (group, own) in groups
+        .iter()
+        .zip(own)
+        .filter(|(group, _)| !group.is_empty())
+    {
+        let (mean, total, _) = weighted(group, &variance);
+        let of_group = (total.recip() + own * own).recip();
+        sum += of_group * mean;
+        weight += of_group;
+    }
+    let log_gain = sum / weight;
+    let (gain, error) = (log_gain.exp(), weight.recip().sqrt().hypot(allowed));
+    CheckedGain {
+        gain: Estimate::new(gain, gain * error),
+        drift,
+        presses: checks.len(),
     }
 }
 
@@ -145,22 +127,6 @@ fn drift(groups: &[Vec<(f64, f64)>; 2]) -> (f64, f64) {
     ((excess / scale).sqrt(), factor)
 }
 
-impl Display for CheckedGain {
-    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        let gain = crate::pipeline::with_error(self.gain.value, self.gain.standard_error, 1.0);
-        let s = if self.presses == 1 { "" } else { "es" };
-        write!(
-            f,
-            "forces read from light are divided by {gain} ({} press{s} of known force)",
-            self.presses
-        )?;
-        match self.drift {
-            0.0 => Ok(()),
-            drift => write!(f, ", which drifts by {:.1} %", 100.0 * drift),
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -178,7 +144,7 @@ mod tests {
     #[test]
     fn a_press_of_the_sample_replaces_the_coupling_and_one_of_the_calibrator_does_not() {
         let sample = check(0.8, 1.0, 0.01, CheckedObject::Sample);
-        let gain = CheckedGain::of(&[sample], 0.06).gain;
+        let gain = checked(&[sample], 0.06).gain;
         assert!((gain.value - 0.8).abs() < 1e-12);
         let own = 0.0002_f64.sqrt().hypot(ASSUMED_DRIFT);
         assert!((gain.relative_error() - own).abs() < 1e-12);
@@ -186,11 +152,11 @@ mod tests {
             object: CheckedObject::Calibrator,
             ..sample
         };
-        let gain = CheckedGain::of(&[calibrator], 0.06).gain;
+        let gain = checked(&[calibrator], 0.06).gain;
         assert!((gain.relative_error() - own.hypot(0.06)).abs() < 1e-12);
         // Of both the sample counts for more.
         let darker = check(0.9, 1.0, 0.01, CheckedObject::Calibrator);
-        let both = CheckedGain::of(&[sample, darker], 0.06);
+        let both = checked(&[sample, darker], 0.06);
         assert!(both.gain.value > 0.8 && both.gain.value < 0.81 && both.drift == 0.0);
     }
 
@@ -238,7 +204,7 @@ mod tests {
                     })
                     .collect();
                 let truth = (drift * normal()).exp();
-                let gain = CheckedGain::of(&checks, 0.06).gain;
+                let gain = checked(&checks, 0.06).gain;
                 (gain.value - truth).abs() < 1.96 * gain.standard_error
             });
             let share = held.count() as f64 / 2000.0;

@@ -15,22 +15,10 @@ use crate::elasticity::contact::{
     Bond, Layer, Waveguide, guide_compliance_error, guide_log_stiffness, stepped_layers,
 };
 use crate::elasticity::modulus::{ContactLaw, LogForce, WaveguideLaw};
+use crate::pipeline::assumptions::CheckedGuide;
 use crate::pipeline::contact::ContactReading;
 use crate::pipeline::settings::Settings;
 use nalgebra::{DMatrix, DVector};
-use std::fmt::{self, Display, Formatter};
-
-/// What presses of balls of known modulus show of the guide's layers. The layers of the pipeline
-/// and their covariance are those after the presses.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize))]
-#[non_exhaustive]
-pub struct CheckedGuide {
-    /// Stiffness of the guide under contacts of the presses' mean radius, over that as stated.
-    pub stiffness: Estimate,
-    /// The number of presses.
-    pub presses: usize,
-}
 
 /// The layers after the presses.
 pub struct UpdatedGuide {
@@ -299,19 +287,6 @@ pub fn update(
         covariance,
         with_length,
     })
-}
-
-impl Display for CheckedGuide {
-    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        let stiffness = self.stiffness;
-        let ratio = crate::pipeline::with_error(stiffness.value, stiffness.standard_error, 1.0);
-        let s = if self.presses == 1 { "" } else { "es" };
-        write!(
-            f,
-            "the guide is {ratio} times as stiff as stated ({} press{s} of known balls)",
-            self.presses
-        )
-    }
 }
 
 #[cfg(test)]

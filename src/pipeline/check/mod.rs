@@ -11,8 +11,6 @@ use gain::GainCheck;
 use guide::GuideCheck;
 use ndarray::ArrayView2;
 
-pub use gain::CheckedGain;
-pub use guide::CheckedGuide;
 #[cfg(feature = "scene")]
 pub(crate) use guide::{PARABOLA_ERROR, slopes};
 
@@ -183,7 +181,7 @@ impl Pipeline {
         let mut pipeline = self;
         if !gains.is_empty() {
             let coupling = pipeline.settings().unchecked_coupling();
-            let checked = CheckedGain::of(&gains, coupling);
+            let checked = gain::checked(&gains, coupling);
             pipeline = pipeline.with_settings(|settings| settings.checked_gain = Some(checked))?;
         }
         if !guides.is_empty() {
