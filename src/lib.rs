@@ -66,6 +66,7 @@ struct Readme;
 pub use tactile_core as core;
 pub use tactile_elasticity as elasticity;
 pub use tactile_force as force;
+pub use tactile_gel as gel;
 pub use tactile_match as matching;
 pub use tactile_optics as optics;
 pub use tactile_sfs as sfs;

@@ -45,4 +45,4 @@ mod target;
 pub use calibration::{CalibratedSensor, LayerFinding, PressFinding, SensorError};
 pub use file::{Sensor, SensorGeometry};
 pub use input::{Indenter, LayerInput, SensorCalibration, SensorPress};
-pub use photometric::{Gel, GelError, GelForce, PhotometricPresses, PhotometricSensor};
+pub use photometric::{PhotometricPresses, PhotometricSensor};

@@ -1,13 +1,8 @@
 //! Sensors with a gel that is lit in colours: calibration file and sensor file.
 use crate::core::Estimate;
-use crate::elasticity::ElasticityError;
-use crate::elasticity::contact::{Bond, Layer, LayerPlane, Waveguide};
+use crate::gel::{BallPress, CalibrationReport, GelError, GelLayer, GelModel, GelSensor};
 use crate::io::{
     FileError, beside, one_or_more, positive, read_bytes, read_colour_levels, read_toml,
-};
-use crate::sfs::{
-    BallPress, PhotometricCalibration, PhotometricModel, PhotometricReading, PhotometricStereo,
-    SfsError,
 };
 use ndarray::Array3;
 use serde::{Deserialize, Serialize};
@@ -29,7 +24,7 @@ use std::path::{Path, PathBuf};
 /// ```no_run
 /// use tactile_imaging::sensor::PhotometricPresses;
 /// let presses = PhotometricPresses::read("calibration.toml")?;
-/// let found = presses.calibrate()?;
+/// let (sensor, found) = presses.calibrate()?;
 /// for (name, circle) in presses.names.iter().zip(&found.circles).filter(|(_, c)| c.wrong) {
 ///     println!("{}: drawn {:?}, found {:?}", name.display(), circle.drawn_px, circle.found_px);
 /// }
@@ -47,7 +42,7 @@ pub struct PhotometricPresses {
     /// Images of the presses, as the file names them.
     pub names: Vec<PathBuf>,
     /// The gel's layer, and what stands under known weights: frame and force.
-    gel: Option<(Gel, Vec<KnownWeight>)>,
+    gel: Option<(GelLayer, Vec<KnownWeight>)>,
     /// Frame, ball's radius in metres and drawn circle of each press.
     presses: Vec<(Array3<u8>, f64, Option<[f64; 3]>)>,
 }
@@ -154,8 +149,8 @@ impl PhotometricPresses {
     /// Calibrates the sensor.
     ///
     /// # Errors
-    /// Those of [`PhotometricStereo::calibrate`].
-    pub fn calibrate(&self) -> Result<PhotometricCalibration, crate::sfs::SfsError> {
+    /// Those of [`GelSensor::calibrate`].
+    pub fn calibrate(&self) -> Result<(GelSensor, CalibrationReport), GelError> {
         let presses = self
             .presses
             .iter()
@@ -165,7 +160,7 @@ impl PhotometricPresses {
                 circle_px: *circle,
             });
         let presses: Vec<_> = presses.collect();
-        PhotometricStereo::calibrate(self.reference.view(), self.pixel_size_m, &presses)
+        GelSensor::calibrate(self.reference.view(), self.pixel_size_m, &presses)
     }
 
     /// The gel of the calibration file. Where weights are given, its modulus is that under which a
@@ -173,40 +168,15 @@ impl PhotometricPresses {
     ///
     /// # Errors
     /// [`GelError`]: [`GelError::NoContact`] for a weight without contact.
-    pub fn gel(&self, sensor: &PhotometricStereo) -> Result<Option<Gel>, GelError> {
+    pub fn gel(&self, sensor: &GelSensor) -> Result<Option<GelLayer>, GelError> {
         let Some((gel, weights)) = &self.gel else {
             return Ok(None);
         };
         if weights.is_empty() {
             return Ok(Some(*gel));
         }
-        let law = GelForce::new(gel, sensor)?;
-        // Moduli in units of 1 Pa, as the law is linear. Each is weighted by its relative error.
-        let (mut sum, mut total) = (0.0, 0.0);
-        let mut moduli = Vec::new();
-        for (frame, force) in weights {
-            let reading = sensor.read(frame.view())?;
-            let unit = law.force(&reading)?.ok_or(GelError::NoContact)?;
-            let modulus = force.value / unit.value;
-            if !(modulus > 0.0 && modulus.is_finite()) {
-                return Err(GelError::NoContact);
-            }
-            let error =
-                (unit.standard_error / unit.value).hypot(force.standard_error / force.value);
-            sum += modulus / (error * error);
-            total += 1.0 / (error * error);
-            moduli.push(modulus);
-        }
-        let mean = sum / total;
-        let count = moduli.len() as f64;
-        let square = moduli.iter().map(|e| (e / mean - 1.0).powi(2)).sum::<f64>() / count;
-        // Errors of depth are the sensor's own: more weights do not average them out.
-        let known = (count / total).sqrt();
-        Ok(Some(Gel {
-            youngs_modulus_pa: mean,
-            youngs_modulus_error_pa: mean * known.max((square / count).sqrt()),
-            ..*gel
-        }))
+        let weights: Vec<_> = weights.iter().map(|(f, n)| (f.view(), *n)).collect();
+        gel.weighed(sensor, &weights).map(Some)
     }
 }
 
@@ -215,7 +185,7 @@ impl GelTable {
         self,
         path: &Path,
         reference: &Array3<u8>,
-    ) -> Result<(Gel, Vec<KnownWeight>), FileError> {
+    ) -> Result<(GelLayer, Vec<KnownWeight>), FileError> {
         let mut weights = Vec::new();
         for (k, weight) in self.weights.into_iter().enumerate() {
             let field = format!("gel.weights[{}].image", k + 1);
@@ -230,121 +200,28 @@ impl GelTable {
                 return Err(FileError::field(path, "gel", wanted));
             }
         };
-        let gel = Gel {
-            thickness_m: self.thickness_m,
-            poisson_ratio: self.poisson_ratio.unwrap_or(Gel::DEFAULT_POISSON_RATIO),
-            youngs_modulus_pa: modulus[0],
-            youngs_modulus_error_pa: modulus[1],
-        };
-        gel.check(path)?;
+        let ratio = self
+            .poisson_ratio
+            .unwrap_or(GelLayer::DEFAULT_POISSON_RATIO);
+        let gel = GelLayer::new(self.thickness_m, ratio, modulus);
+        check(&gel, path)?;
         Ok((gel, weights))
     }
 }
 
 /// The layer of gel on its rigid plate, as the files of a sensor name it in `[gel]`.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-#[non_exhaustive]
-pub struct Gel {
-    /// Thickness in metres.
-    pub thickness_m: f64,
-    /// Poisson's ratio.
-    pub poisson_ratio: f64,
-    /// Young's modulus in pascals.
-    pub youngs_modulus_pa: f64,
-    /// Its standard error in pascals.
-    pub youngs_modulus_error_pa: f64,
-}
-
-impl Gel {
-    /// Of silicones, which hardly yield in volume.
-    pub const DEFAULT_POISSON_RATIO: f64 = 0.48;
-
-    fn guide(&self) -> Result<Waveguide, ElasticityError> {
-        Waveguide::new(vec![Layer {
-            thickness_m: self.thickness_m,
-            youngs_modulus_pa: self.youngs_modulus_pa,
-            poisson_ratio: self.poisson_ratio,
-        }])
+fn check(gel: &GelLayer, path: &Path) -> Result<(), FileError> {
+    let error = gel.youngs_modulus_error_pa;
+    if !(error >= 0.0 && error.is_finite()) {
+        let wanted = "expected a number of 0 or more";
+        return Err(FileError::field(
+            path,
+            "gel.youngs_modulus_error_pa",
+            wanted,
+        ));
     }
-
-    fn check(&self, path: &Path) -> Result<(), FileError> {
-        let error = self.youngs_modulus_error_pa;
-        if !(error >= 0.0 && error.is_finite()) {
-            let wanted = "expected a number of 0 or more";
-            return Err(FileError::field(
-                path,
-                "gel.youngs_modulus_error_pa",
-                wanted,
-            ));
-        }
-        let guide = self.guide().map(|_| ());
-        guide.map_err(|error| FileError::field(path, "gel", error))
-    }
-}
-
-/// Why a frame has no force.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum GelError {
-    /// A frame of a known weight without contact.
-    #[error("a frame of a known weight shows no contact that carries a force")]
-    NoContact,
-    /// The frame cannot be read.
-    #[error(transparent)]
-    Surface(#[from] SfsError),
-    /// The law of the layer has no answer.
-    #[error(transparent)]
-    Law(#[from] ElasticityError),
-}
-
-/// Force from the shape of a gel's face, by the linear law of its layer.
-///
-/// The face is read in blocks of pixels, 48 along the longer side of the frame: the force is a sum,
-/// and finer ones change it little.
-pub struct GelForce {
-    plane: LayerPlane,
-    block: usize,
-    pixel_size_m: f64,
-    modulus_error: f64,
-}
-
-impl GelForce {
-    /// For the frames of this sensor.
-    ///
-    /// # Errors
-    /// [`GelError::Law`] for a layer without thickness, modulus or a Poisson ratio.
-    pub fn new(gel: &Gel, sensor: &PhotometricStereo) -> Result<Self, GelError> {
-        let (rows, columns) = sensor.shape();
-        let block = rows.max(columns).div_ceil(48).min(rows).min(columns);
-        let pixel_size_m = sensor.model().pixel_size_m;
-        let shape = [rows / block, columns / block];
-        let cell_m = block as f64 * pixel_size_m;
-        Ok(Self {
-            plane: LayerPlane::new(&gel.guide()?, Bond::Bonded, shape, cell_m)?,
-            block,
-            pixel_size_m,
-            modulus_error: gel.youngs_modulus_error_pa / gel.youngs_modulus_pa,
-        })
-    }
-
-    /// The normal force in newtons with the errors of depth and modulus. `None` without contact.
-    ///
-    /// # Errors
-    /// [`GelError`].
-    pub fn force(&self, reading: &PhotometricReading) -> Result<Option<Estimate>, GelError> {
-        let (moved, touched) = reading.displacement_m(self.block, self.pixel_size_m)?;
-        if !touched.iter().any(|touched| *touched) {
-            return Ok(None);
-        }
-        let moved = moved.into_raw_vec_and_offset().0;
-        let touched = touched.into_raw_vec_and_offset().0;
-        let force = self
-            .plane
-            .force(&moved, &touched, reading.depth_standard_error_m)?;
-        let error = force.standard_error.hypot(self.modulus_error * force.value);
-        Ok(Some(Estimate::new(force.value, error)))
-    }
+    let guide = gel.guide().map(|_| ());
+    guide.map_err(|error| FileError::field(path, "gel", error))
 }
 
 /// The colour image that a field of `file` names, of the reference's size.
@@ -384,15 +261,15 @@ pub struct PhotometricSensor {
     /// Frame without contact, relative to the sensor file.
     pub reference: PathBuf,
     /// Numbers of the calibration.
-    pub model: PhotometricModel,
+    pub model: GelModel,
     /// The gel's layer, for forces.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub gel: Option<Gel>,
+    pub gel: Option<GelLayer>,
 }
 
 impl PhotometricSensor {
     /// A sensor file with this frame without contact, relative to the file.
-    pub fn new(reference: impl Into<PathBuf>, model: PhotometricModel) -> Self {
+    pub fn new(reference: impl Into<PathBuf>, model: GelModel) -> Self {
         Self {
             kind: Kind::Photometric,
             reference: reference.into(),
@@ -402,7 +279,7 @@ impl PhotometricSensor {
     }
 
     /// With the gel's layer.
-    pub fn with_gel(mut self, gel: Option<Gel>) -> Self {
+    pub fn with_gel(mut self, gel: Option<GelLayer>) -> Self {
         self.gel = gel;
         self
     }
@@ -420,18 +297,18 @@ impl PhotometricSensor {
     ///
     /// # Errors
     /// [`FileError`]: one sentence that names the file, the field and what was expected.
-    pub fn read(path: impl AsRef<Path>) -> Result<(PhotometricStereo, Option<Gel>), FileError> {
+    pub fn read(path: impl AsRef<Path>) -> Result<(GelSensor, Option<GelLayer>), FileError> {
         Self::from_file(path.as_ref())
     }
 
     /// Not generic, so that the parser is compiled once, not again in every crate that reads.
-    fn from_file(path: &Path) -> Result<(PhotometricStereo, Option<Gel>), FileError> {
+    fn from_file(path: &Path) -> Result<(GelSensor, Option<GelLayer>), FileError> {
         let file: Self = read_toml(path)?;
         if let Some(gel) = &file.gel {
-            gel.check(path)?;
+            check(gel, path)?;
         }
         let reference = frame(path, "reference", &file.reference, None)?;
-        let stereo = PhotometricStereo::new(file.model, reference.view());
+        let stereo = GelSensor::new(file.model, reference.view());
         let stereo = stereo.map_err(|error| FileError::field(path, "model", error))?;
         Ok((stereo, file.gel))
     }

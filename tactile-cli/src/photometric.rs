@@ -10,9 +10,9 @@ use serde::Serialize;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use tactile_imaging::core::Estimate;
+use tactile_imaging::gel::{CalibrationReport, GelForce, GelFrame, GelSensor};
 use tactile_imaging::io::{Grey, read_bytes};
-use tactile_imaging::sensor::{GelForce, PhotometricPresses, PhotometricSensor};
-use tactile_imaging::sfs::{PhotometricCalibration, PhotometricReading, PhotometricStereo};
+use tactile_imaging::sensor::{PhotometricPresses, PhotometricSensor};
 
 /// An argument that a sensor file takes the place of. `filler` is parsed and not used.
 pub fn unless_sensor(arg: Arg, filler: &'static str) -> Arg {
@@ -30,15 +30,15 @@ pub fn calibrate(path: &Path, sensor: &Path, context: &mut Context) -> Result<Ex
         context.outputs.plan_in(&folder, &[&reference], &[path])?;
     }
     let found = presses.calibrate();
-    let found = found.map_err(|error| Failure::in_file(path, error))?;
-    print(&presses.names, &found, context);
-    let gel = presses.gel(&found.sensor);
+    let (calibrated, found) = found.map_err(|error| Failure::in_file(path, error))?;
+    print(&presses.names, &calibrated, &found, context);
+    let gel = presses.gel(&calibrated);
     let gel = gel.map_err(|error| Failure::in_file(path, error))?;
     if let Some(gel) = &gel {
         let modulus = Estimate::new(gel.youngs_modulus_pa, gel.youngs_modulus_error_pa);
         context.row("gel", in_unit(modulus, 1e-3) + " kPa");
     }
-    let model = found.sensor.model().clone();
+    let model = calibrated.model().clone();
     let circles: Vec<Value> = presses
         .names
         .iter()
@@ -70,7 +70,7 @@ fn reference_name(sensor: &Path, reference: &Path) -> PathBuf {
     beside(sensor, &format!("_reference.{extension}")).into()
 }
 
-fn print(names: &[PathBuf], found: &PhotometricCalibration, context: &mut Context) {
+fn print(names: &[PathBuf], sensor: &GelSensor, found: &CalibrationReport, context: &mut Context) {
     let used = found
         .circles
         .iter()
@@ -80,7 +80,7 @@ fn print(names: &[PathBuf], found: &PhotometricCalibration, context: &mut Contex
         used.count(),
         names.len()
     ));
-    let model = found.sensor.model();
+    let model = sensor.model();
     let angle = four_digits(found.median_angle_deg);
     context.row(
         "normals",
@@ -124,7 +124,7 @@ pub const NO_FRAMES: &str =
 
 /// A sensor with its law of forces, or why there is none.
 pub struct Reader {
-    pub stereo: PhotometricStereo,
+    pub stereo: GelSensor,
     pub law: Result<GelForce, String>,
 }
 
@@ -147,7 +147,7 @@ impl Reader {
     }
 
     /// The force of a frame with contact, none without, or why it has none.
-    pub fn force(&self, reading: &PhotometricReading) -> Result<Option<Estimate>, String> {
+    pub fn force(&self, reading: &GelFrame) -> Result<Option<Estimate>, String> {
         let law = self.law.as_ref().map_err(String::clone)?;
         law.force(reading).map_err(|error| error.to_string())
     }
@@ -241,7 +241,7 @@ pub struct GelContact {
 }
 
 impl GelContact {
-    pub fn of(reading: &PhotometricReading, size: f64) -> Option<Self> {
+    pub fn of(reading: &GelFrame, size: f64) -> Option<Self> {
         let mut sums = [0.0; 3];
         let touched = reading
             .contact
@@ -270,7 +270,7 @@ impl GelContact {
     }
 }
 
-fn page(reading: &PhotometricReading, size: f64) -> Page {
+fn page(reading: &GelFrame, size: f64) -> Page {
     let depth = reading.depth_m.mapv(|z| 1e3 * z);
     let map = HeatMap::of_pixels(depth.view(), [1e3 * size; 2], "depth (mm)");
     let panel = Panel::new("Depth", "x (mm)", "y (mm)").heat_map(map);

@@ -66,17 +66,6 @@ pub enum SfsError {
         /// z of the direction found.
         z: f64,
     },
-    /// Photometric stereo was given a frame of one channel.
-    #[error("the frame is grey: photometric stereo reads frames of three channels")]
-    NoColour,
-    /// Too few presses show a contact.
-    #[error("{available} presses show a contact, {needed} are needed")]
-    TooFewPresses {
-        /// Presses needed.
-        needed: usize,
-        /// Presses with a contact.
-        available: usize,
-    },
     /// The eikonal equation needs at least one height to start from.
     #[error("no height is known: give known heights or a height at the boundary")]
     NoKnownHeight,

@@ -30,7 +30,6 @@ mod error;
 mod frame;
 mod integrate;
 mod lighting;
-mod photometric;
 mod quality;
 mod reconstruct;
 mod sample;
@@ -45,10 +44,6 @@ pub use error::SfsError;
 pub use frame::Frame;
 pub use integrate::{CosinePoisson, FrankotChellappa, MaskedLeastSquares, SlopeIntegrator};
 pub use lighting::Lighting;
-pub use photometric::{
-    BallPress, CircleFinding, PhotometricCalibration, PhotometricModel, PhotometricReading,
-    PhotometricStereo,
-};
 pub use quality::{
     Alignment, ErrorSummary, HeightError, height_error, render, reprojection, slopes,
 };

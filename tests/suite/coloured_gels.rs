@@ -1,7 +1,7 @@
 //! Sensors that are lit in colours, on simulated frames whose depth is known at every pixel.
 use ndarray::{Array2, Array3};
 use tactile_imaging::elasticity::contact::{Bond, Layer, LayerEquation, LayerPlane, Waveguide};
-use tactile_imaging::sfs::{BallPress, PhotometricCalibration, PhotometricStereo};
+use tactile_imaging::gel::{BallPress, CalibrationReport, GelSensor};
 use tactile_simulate::{ColourGel, GelObject};
 
 const PIXEL_M: f64 = 5e-5;
@@ -36,7 +36,9 @@ fn reference() -> Array3<u8> {
     gel.frame(&Array2::zeros((gel.shape[0], gel.shape[1])), 0)
 }
 
-fn calibrated(drawn: impl Fn(usize, [f64; 3]) -> Option<[f64; 3]>) -> PhotometricCalibration {
+fn calibrated(
+    drawn: impl Fn(usize, [f64; 3]) -> Option<[f64; 3]>,
+) -> (GelSensor, CalibrationReport) {
     let frames: Vec<_> = circles().into_iter().map(|circle| ball(circle).1).collect();
     let presses = circles().into_iter().zip(&frames).enumerate();
     let presses: Vec<_> = presses
@@ -46,14 +48,14 @@ fn calibrated(drawn: impl Fn(usize, [f64; 3]) -> Option<[f64; 3]>) -> Photometri
             circle_px: drawn(k, circle),
         })
         .collect();
-    PhotometricStereo::calibrate(reference().view(), PIXEL_M, &presses).unwrap()
+    GelSensor::calibrate(reference().view(), PIXEL_M, &presses).unwrap()
 }
 
 /// Without drawn circles the presses are found, and a press that was not among them has the depth
 /// and the normals of its ball.
 #[test]
 fn a_press_has_its_depth_without_drawn_circles() {
-    let found = calibrated(|_, _| None);
+    let (sensor, found) = calibrated(|_, _| None);
     for (circle, truth) in found.circles.iter().zip(circles()) {
         let seen = circle.found_px.expect("a contact");
         // The mask is that of pairs of pixels, the blur of the frames has a deviation of one.
@@ -63,7 +65,7 @@ fn a_press_has_its_depth_without_drawn_circles() {
     }
     let circle = [70.0, 66.0, 22.0];
     let (truth, frame) = ball(circle);
-    let reading = found.sensor.read(frame.view()).unwrap();
+    let reading = sensor.read(frame.view()).unwrap();
     let (mut depth, mut inside, mut held) = (0.0, 0.0, 0.0);
     for ((row, column), z) in reading.depth_m.indexed_iter() {
         let distance = (column as f64 - circle[0]).hypot(row as f64 - circle[1]);
@@ -88,10 +90,10 @@ fn a_press_has_its_depth_without_drawn_circles() {
 /// A circle that is drawn wrong is named, and the answer hardly changes.
 #[test]
 fn a_wrong_circle_is_named() {
-    let right = calibrated(|_, circle| Some(circle));
+    let (_, right) = calibrated(|_, circle| Some(circle));
     assert!(right.circles.iter().all(|circle| !circle.wrong));
     let moved = |k: usize, [x, y, r]: [f64; 3]| Some([if k == 4 { x + 9.0 } else { x }, y, r]);
-    let found = calibrated(moved);
+    let (_, found) = calibrated(moved);
     let wrong: Vec<_> = (0..9).filter(|&k| found.circles[k].wrong).collect();
     assert_eq!(wrong, [4]);
     // Both are fitted with the circles that are found.
@@ -101,7 +103,7 @@ fn a_wrong_circle_is_named() {
 /// Noise is no contact, and a flat punch touches where it stands.
 #[test]
 fn contacts_of_other_shapes() {
-    let sensor = calibrated(|_, _| None).sensor;
+    let sensor = calibrated(|_, _| None).0;
     let gel = ColourGel::default();
     let none = Array2::zeros((gel.shape[0], gel.shape[1]));
     let reading = sensor.read(gel.frame(&none, 7).view()).unwrap();

@@ -1,9 +1,8 @@
 //! Where something touches: the pixels over which the normals turn outwards.
 
-use ndarray::{Array2, Axis, Zip};
+use ndarray::{Array2, ArrayView2, Axis, Zip};
 
-use crate::BoundingBox;
-use crate::domain::parts;
+use tactile_core::BoundingBox;
 
 /// Pixels of an object in contact.
 ///
@@ -195,4 +194,36 @@ fn filled(mask: &Array2<bool>) -> Option<Array2<bool>> {
     let inner = holes.iter().filter(|hole| !hole.iter().any(border));
     inner.flatten().for_each(|&at| window[at] = true);
     Some(kept)
+}
+
+/// The parts of a mask of this `value` that are connected by their sides, as `[row, column]`.
+pub(crate) fn parts(mask: ArrayView2<'_, bool>, value: bool) -> Vec<Vec<[usize; 2]>> {
+    let columns = mask.ncols();
+    let mut open: Vec<bool> = mask.iter().map(|m| *m == value).collect();
+    let mut parts = Vec::new();
+    for start in 0..open.len() {
+        if !core::mem::take(&mut open[start]) {
+            continue;
+        }
+        let mut part = vec![[start / columns, start % columns]];
+        let mut next = 0;
+        while let Some(&[r, c]) = part.get(next) {
+            next += 1;
+            let at = r * columns + c;
+            if c > 0 && core::mem::take(&mut open[at - 1]) {
+                part.push([r, c - 1]);
+            }
+            if c + 1 < columns && core::mem::take(&mut open[at + 1]) {
+                part.push([r, c + 1]);
+            }
+            if r > 0 && core::mem::take(&mut open[at - columns]) {
+                part.push([r - 1, c]);
+            }
+            if open.get_mut(at + columns).is_some_and(core::mem::take) {
+                part.push([r + 1, c]);
+            }
+        }
+        parts.push(part);
+    }
+    parts
 }

@@ -1,4 +1,4 @@
-//! Photometric stereo: the colours of a gel that is lit from several sides, to slopes and depth.
+//! A gel that is lit in colours: from a frame to gradients, contact and depth.
 //!
 //! The colour of a pixel, less that of the untouched gel, depends on the surface's normal and on
 //! the place in the image. A polynomial of third degree in the three colour differences, whose
@@ -6,37 +6,31 @@
 //! of one ball determine it: inside the contact circle n = (x − x₀, y − y₀)/R. Over presses left
 //! out in turn it was as good as polynomials of higher degree, with fewer numbers to determine.
 
-mod calibration;
-mod colour;
-mod contact;
-
 use ndarray::{Array2, ArrayView3, Zip};
 use tactile_core::{Requirement, vectorised};
 
-pub use calibration::{BallPress, CircleFinding, PhotometricCalibration};
-use colour::{Blurred, TERMS, normals};
-use contact::contact;
+use tactile_core::BoundingBox;
+use tactile_sfs::{CosinePoisson, Domain, SlopeIntegrator};
 
-use crate::domain::same_shape;
-use crate::{
-    BoundingBox, CosinePoisson, Domain, Frame, PixelScalar, SfsError, SlopeIntegrator, Surface,
-    SurfaceReconstruction,
-};
+use crate::GelError;
+use crate::contacts::contact;
+use crate::error::same_shape;
+use crate::gradients::{Blurred, TERMS, normals};
 
-/// The numbers that a calibration of [`PhotometricStereo`] finds, as a file keeps them.
+/// The numbers that a calibration of [`GelSensor`] finds, as a file keeps them.
 ///
 /// ```
-/// use tactile_sfs::{PhotometricModel, PhotometricStereo};
-/// let model = PhotometricModel::new(5e-5, [vec![0.0; 60], vec![0.0; 60]]);
+/// use tactile_gel::{GelModel, GelSensor};
+/// let model = GelModel::new(5e-5, [vec![0.0; 60], vec![0.0; 60]]);
 /// let flat = ndarray::Array3::from_elem((40, 60, 3), 90);
-/// let sensor = PhotometricStereo::new(model, flat.view())?;
+/// let sensor = GelSensor::new(model, flat.view())?;
 /// assert!(sensor.read(flat.view())?.depth_m.iter().all(|z| *z == 0.0));
-/// # Ok::<(), tactile_sfs::SfsError>(())
+/// # Ok::<(), tactile_gel::GelError>(())
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
-pub struct PhotometricModel {
+pub struct GelModel {
     /// Size of a pixel on the gel in metres.
     pub pixel_size_m: f64,
     /// Coefficients of n_x and n_y, 60 each. They belong to the 20 monomials of the differences in
@@ -48,7 +42,7 @@ pub struct PhotometricModel {
     pub depth_standard_error_m: f64,
 }
 
-impl PhotometricModel {
+impl GelModel {
     /// A model without errors.
     pub fn new(pixel_size_m: f64, coefficients: [Vec<f64>; 2]) -> Self {
         Self {
@@ -65,13 +59,10 @@ impl PhotometricModel {
 /// Reads 8-bit frames of three channels. A shift of all levels of a channel between frames is
 /// taken off by the median over the frame's border. [`calibrate`](Self::calibrate) makes one from
 /// presses of a ball. O(pixels) a frame, and O(n log n) for the n pixels of the contact's box.
-///
-/// As a [`SurfaceReconstruction`] it takes [`Frame::Colour`] and gives depths in the unit of the
-/// domain's pixel size, 0 where nothing touches.
 #[derive(Clone, Debug, PartialEq)]
-pub struct PhotometricStereo {
-    model: PhotometricModel,
-    reference: Blurred,
+pub struct GelSensor {
+    pub(crate) model: GelModel,
+    pub(crate) reference: Blurred,
 }
 
 /// What one frame shows.
@@ -80,7 +71,7 @@ pub struct PhotometricStereo {
 /// with z the depth in metres, x the column, y the row.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
-pub struct PhotometricReading {
+pub struct GelFrame {
     /// Gradients along x and y.
     pub gradient: [Array2<f32>; 2],
     /// Standard errors of the gradients.
@@ -93,7 +84,7 @@ pub struct PhotometricReading {
     pub depth_standard_error_m: f64,
 }
 
-impl PhotometricReading {
+impl GelFrame {
     /// How far the gel's face has moved, in metres, and where it is touched, for blocks of this
     /// many pixels a side. Incomplete blocks at the right and at the bottom are left out.
     ///
@@ -101,17 +92,17 @@ impl PhotometricReading {
     /// The median along the border is taken as its rest.
     ///
     /// # Errors
-    /// Those of [`CosinePoisson`], and [`SfsError::EmptyImage`] for a block of no pixel or larger
+    /// Those of [`CosinePoisson`], and [`GelError::EmptyImage`] for a block of no pixel or larger
     /// than the frame.
     pub fn displacement_m(
         &self,
         block: usize,
         pixel_size_m: f64,
-    ) -> Result<(Array2<f64>, Array2<bool>), SfsError> {
+    ) -> Result<(Array2<f64>, Array2<bool>), GelError> {
         let [rows, columns] =
             [self.contact.nrows(), self.contact.ncols()].map(|n| n.checked_div(block).unwrap_or(0));
         if rows == 0 || columns == 0 {
-            return Err(SfsError::EmptyImage { rows, columns });
+            return Err(GelError::EmptyImage { rows, columns });
         }
         let share = 1.0 / (block * block) as f64;
         let mean = |gradient: &Array2<f32>| {
@@ -151,14 +142,14 @@ impl PhotometricReading {
 /// slope itself has no end.
 const STEEPEST: f32 = 0.97;
 
-impl PhotometricStereo {
+impl GelSensor {
     /// A sensor from its model and its frame without contact, `[row, column, channel]`.
     ///
     /// # Errors
-    /// [`SfsError::EmptyImage`], [`SfsError::ShapeMismatch`] unless there are three channels and 60
-    /// coefficients, [`SfsError::InvalidOption`] for a pixel size that is not positive, a
+    /// [`GelError::EmptyImage`], [`GelError::ShapeMismatch`] unless there are three channels and 60
+    /// coefficients, [`GelError::InvalidOption`] for a pixel size that is not positive, a
     /// coefficient that is not finite or a negative error.
-    pub fn new(model: PhotometricModel, reference: ArrayView3<'_, u8>) -> Result<Self, SfsError> {
+    pub fn new(model: GelModel, reference: ArrayView3<'_, u8>) -> Result<Self, GelError> {
         Requirement::Positive.check("pixel size", model.pixel_size_m)?;
         Requirement::NonNegative.check("normal error", model.normal_standard_error)?;
         Requirement::NonNegative.check("depth error", model.depth_standard_error_m)?;
@@ -173,7 +164,7 @@ impl PhotometricStereo {
     }
 
     /// The numbers of the calibration.
-    pub fn model(&self) -> &PhotometricModel {
+    pub fn model(&self) -> &GelModel {
         &self.model
     }
 
@@ -185,15 +176,15 @@ impl PhotometricStereo {
     /// Gradients, contact and depth of a frame of the reference's size.
     ///
     /// # Errors
-    /// [`SfsError::ShapeMismatch`].
-    pub fn read(&self, frame: ArrayView3<'_, u8>) -> Result<PhotometricReading, SfsError> {
+    /// [`GelError::ShapeMismatch`].
+    pub fn read(&self, frame: ArrayView3<'_, u8>) -> Result<GelFrame, GelError> {
         let frame = colour_image(frame)?;
         let (rows, columns, _) = frame.dim();
         same_shape("frame", self.reference.dim(), (rows, columns))?;
         self.read_blurred(&Blurred::of(frame))
     }
 
-    fn read_blurred(&self, frame: &Blurred) -> Result<PhotometricReading, SfsError> {
+    pub(crate) fn read_blurred(&self, frame: &Blurred) -> Result<GelFrame, GelError> {
         let normals = normals(frame, &self.reference, &self.model.coefficients);
         let touched = contact(&normals);
         let [mut p, mut q] = normals;
@@ -206,7 +197,7 @@ impl PhotometricStereo {
             slopes([p, q], [error_p, error_q], sd);
         }
         let depth_m = self.depth([&p, &q], &touched)?;
-        Ok(PhotometricReading {
+        Ok(GelFrame {
             gradient: [p, q],
             gradient_error: errors,
             contact: touched,
@@ -220,7 +211,7 @@ impl PhotometricStereo {
         &self,
         slopes: [&Array2<f32>; 2],
         touched: &Array2<bool>,
-    ) -> Result<Array2<f64>, SfsError> {
+    ) -> Result<Array2<f64>, GelError> {
         let mut depth = Array2::zeros(touched.dim());
         let Some(area) = BoundingBox::of_mask(touched.view()) else {
             return Ok(depth);
@@ -284,34 +275,11 @@ fn slopes(normals: [&mut [f32]; 2], errors: [&mut [f32]; 2], sd: f32) {
     );
 }
 
-impl<T: PixelScalar> SurfaceReconstruction<T> for PhotometricStereo {
-    fn reconstruct(
-        &self,
-        frame: Frame<'_, T>,
-        domain: &Domain<'_, T>,
-    ) -> Result<Surface<T>, SfsError> {
-        let Frame::Colour(frame) = frame else {
-            return Err(SfsError::NoColour);
-        };
-        let reading = self.read(frame)?;
-        domain.bounding_box(reading.depth_m.dim())?;
-        // The model's depths are in metres of its own pixels. The domain may count in another unit.
-        let scale = domain.pixel_size_m[0].as_f64() / self.model.pixel_size_m;
-        let heights = Array2::from_shape_fn(reading.depth_m.dim(), |(row, column)| {
-            match domain.contains(row, column) {
-                true => T::of(scale * reading.depth_m[[row, column]]),
-                false => T::nan(),
-            }
-        });
-        Ok(Surface::from_heights(heights))
-    }
-}
-
 /// Refuses images without pixels or with other than three channels.
-fn colour_image(image: ArrayView3<'_, u8>) -> Result<ArrayView3<'_, u8>, SfsError> {
+pub(crate) fn colour_image(image: ArrayView3<'_, u8>) -> Result<ArrayView3<'_, u8>, GelError> {
     let (rows, columns, channels) = image.dim();
     if rows == 0 || columns == 0 {
-        return Err(SfsError::EmptyImage { rows, columns });
+        return Err(GelError::EmptyImage { rows, columns });
     }
     same_shape("channels", (1, 3), (1, channels))?;
     Ok(image)

@@ -4,11 +4,12 @@ use nalgebra::DMatrix;
 use ndarray::{Array2, ArrayView3};
 use tactile_core::Requirement;
 
-use super::colour::{Blurred, TERMS, normals, samples};
-use super::contact::contact;
-use super::{PhotometricModel, PhotometricStereo, colour_image};
-use crate::SfsError;
-use crate::domain::{parts, same_shape};
+use crate::GelError;
+use crate::contacts::contact;
+use crate::contacts::parts;
+use crate::error::same_shape;
+use crate::gradients::{Blurred, TERMS, normals, samples};
+use crate::sensor::{GelModel, GelSensor, colour_image};
 
 /// A frame of a ball pressed into the gel.
 #[derive(Clone, Copy, Debug)]
@@ -39,12 +40,10 @@ pub struct CircleFinding {
     pub wrong: bool,
 }
 
-/// A calibrated sensor, and how its presses were read.
+/// How the presses of a calibration were read.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
-pub struct PhotometricCalibration {
-    /// The sensor.
-    pub sensor: PhotometricStereo,
+pub struct CalibrationReport {
     /// Circles of the presses, in their order.
     pub circles: Vec<CircleFinding>,
     /// Median offset of the drawn circles from the found ones: x, y, radius, in pixels.
@@ -90,19 +89,19 @@ impl Sums {
 
     /// Ridge regression. The penalty of a ten-thousandth of the number of samples binds terms that
     /// the presses do not determine and moves the others by less than their errors.
-    fn solve(&self) -> Result<[Vec<f64>; 2], SfsError> {
+    fn solve(&self) -> Result<[Vec<f64>; 2], GelError> {
         let mut square = self.square.clone();
         for k in 0..TERMS {
             square[(k, k)] += 1e-4 * self.count;
         }
-        let factor = square.cholesky().ok_or(SfsError::EmptyMask)?;
+        let factor = square.cholesky().ok_or(GelError::NoSolution)?;
         let solved = factor.solve(&self.right);
         let column = |k: usize| solved.column(k).iter().copied().collect();
         Ok([column(0), column(1)])
     }
 }
 
-impl PhotometricStereo {
+impl GelSensor {
     /// Calibrates a sensor from its frame without contact and at least three presses of balls.
     ///
     /// Circles and polynomial are found in turn: the polynomial from the circles by ridge
@@ -119,13 +118,13 @@ impl PhotometricStereo {
     /// circles.
     ///
     /// # Errors
-    /// [`SfsError::TooFewPresses`], [`SfsError::ShapeMismatch`], [`SfsError::InvalidOption`] for
+    /// [`GelError::TooFewPresses`], [`GelError::ShapeMismatch`], [`GelError::InvalidOption`] for
     /// lengths that are not positive.
     pub fn calibrate(
         reference: ArrayView3<'_, u8>,
         pixel_size_m: f64,
         presses: &[BallPress<'_>],
-    ) -> Result<PhotometricCalibration, SfsError> {
+    ) -> Result<(Self, CalibrationReport), GelError> {
         Requirement::Positive.check("pixel size", pixel_size_m)?;
         let reference = Blurred::of(colour_image(reference)?);
         let presses = presses.iter().map(|press| {
@@ -143,7 +142,7 @@ impl PhotometricStereo {
                 drawn: press.circle_px,
             })
         });
-        let presses = presses.collect::<Result<Vec<_>, SfsError>>()?;
+        let presses = presses.collect::<Result<Vec<_>, GelError>>()?;
         let found = find_circles(&presses, &reference)?;
         let (circles, offset_px) = judged(&presses, &found);
         let used = circles
@@ -158,7 +157,7 @@ impl PhotometricStereo {
             .collect();
         let mut total = flat(&reference);
         sums.iter().for_each(|sums| total.add(sums, 1.0));
-        let model = PhotometricModel::new(pixel_size_m, total.solve()?);
+        let model = GelModel::new(pixel_size_m, total.solve()?);
         let mut sensor = Self { model, reference };
         let mut misses = Misses::default();
         for ((press, circle), sums) in presses.iter().zip(&circles).zip(&sums) {
@@ -167,11 +166,11 @@ impl PhotometricStereo {
                 let mut others = total.clone();
                 // Sums of the normal equations add over presses. Leaving one out is a subtraction.
                 others.add(sums, -1.0);
-                let model = PhotometricModel {
+                let model = GelModel {
                     // With an error of 1 the reading's errors are the factors from normals to
                     // gradients.
                     normal_standard_error: 1.0,
-                    ..PhotometricModel::new(pixel_size_m, others.solve()?)
+                    ..GelModel::new(pixel_size_m, others.solve()?)
                 };
                 let without = Self {
                     model,
@@ -182,19 +181,19 @@ impl PhotometricStereo {
         }
         sensor.model.normal_standard_error = quantile(&mut misses.gradients, 0.683);
         sensor.model.depth_standard_error_m = quantile(&mut misses.depths, 0.683);
-        Ok(PhotometricCalibration {
-            sensor,
+        let report = CalibrationReport {
             circles,
             offset_px,
             median_angle_deg: quantile(&mut misses.angles, 0.5),
-        })
+        };
+        Ok((sensor, report))
     }
 }
 
-fn enough(available: usize) -> Result<(), SfsError> {
+fn enough(available: usize) -> Result<(), GelError> {
     let needed = 3;
     if available < needed {
-        return Err(SfsError::TooFewPresses { needed, available });
+        return Err(GelError::TooFewPresses { needed, available });
     }
     Ok(())
 }
@@ -282,7 +281,7 @@ fn flat(reference: &Blurred) -> Sums {
 }
 
 /// Circles and polynomial in turn. `None` for presses in which no contact is found.
-fn find_circles(presses: &[Press], reference: &Blurred) -> Result<Vec<Option<[f64; 3]>>, SfsError> {
+fn find_circles(presses: &[Press], reference: &Blurred) -> Result<Vec<Option<[f64; 3]>>, GelError> {
     enough(presses.len())?;
     let flat = flat(reference);
     let starts = presses.iter().map(|press| {
@@ -364,10 +363,10 @@ struct Misses {
 impl Misses {
     fn add(
         &mut self,
-        without: &PhotometricStereo,
+        without: &GelSensor,
         press: &Press,
         [x0, y0, radius]: [f64; 3],
-    ) -> Result<(), SfsError> {
+    ) -> Result<(), GelError> {
         let reading = without.read_blurred(&press.frame)?;
         // Depth counts from the contact circle: the cap's height less that of its rim.
         let rim = (press.ball_px.powi(2) - radius * radius).sqrt();
