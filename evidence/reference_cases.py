@@ -248,7 +248,37 @@ def matching_cases():
         }
 
 
+# Uncertain numbers -----------------------------------------------------------------------------------------------------------
+
+def uncertain_cases():
+    """Parts of f(x, y, z) to first order: the gradient times the parts of a source, in squares for noise, the first of four."""
+    for number, (name, size) in enumerate([("ordinary", 0), ("scales apart", 9), ("near zero", -12)]):
+        stream = Stream(1200 + number)
+        inputs = [[stream.next() + 0.5] + stream.point(4, 0.01) for _ in range(3)]
+        inputs[1] = [x * 10.0 ** size for x in inputs[1]]
+        inputs[0][1:] = [part * inputs[0][0] for part in inputs[0][1:]]
+        exact = [[D(x) for x in row] for row in inputs]
+        (x, *_), (y, *_), (z, *_) = exact
+        power = D(-1.75)
+
+        def propagated(value, gradient):
+            moved = [[slope * row[k] for slope, row in zip(gradient, exact)] for k in range(1, 5)]
+            noise = sum(m * m for m in moved[0]).sqrt()
+            return [value, noise] + [sum(m) for m in moved[1:]]
+
+        raised = (power * x.ln()).exp()
+        results = {
+            "product": propagated(x * y, [y, x]),
+            "quotient": propagated(x / y, [1 / y, -x / y ** 2]),
+            "power": propagated(raised, [power * raised / x]),
+            "mean": propagated((x + y + z) / 3, [D(1) / 3] * 3),
+        }
+        covariance = sum(a * b for a, b in zip(results["product"][2:], results["quotient"][2:]))
+        yield {"name": name, "inputs": inputs, "exponent": -1.75, **results, "covariance": covariance}
+
+
 FILES = {
+    "tactile-core/tests/reference/uncertain.json": uncertain_cases,
     "tactile-tps/tests/reference/splines.json": tps_cases,
     "tactile-optics/tests/reference/angles.json": optics_cases,
     "tactile-elasticity/tests/reference/strain.json": strain_cases,

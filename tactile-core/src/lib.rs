@@ -7,6 +7,7 @@ mod estimate;
 mod option;
 mod report;
 pub mod statistics;
+mod uncertain;
 mod vectorised;
 
 pub use bounding_box::BoundingBox;
@@ -14,4 +15,5 @@ pub use error::CustomError;
 pub use estimate::{Estimate, Interval};
 pub use option::{InvalidOption, Requirement};
 pub use report::{Polarity, Progress, StopReason};
+pub use uncertain::{Source, Uncertain};
 pub use vectorised::{Loop, vectorised};
