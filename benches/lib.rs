@@ -96,7 +96,7 @@ impl Problem {
     }
 
     /// Root mean square error at the queries.
-    pub fn error<K: Kernel>(&self, spline: &ThinPlateSpline<f64, 3, K>) -> f64 {
+    pub fn error<K: Kernel>(&self, spline: &ThinPlateSpline<3, K>) -> f64 {
         let mut values = vec![Point3::origin(); self.queries.len()];
         spline
             .apply_into(&self.queries, &mut values)

@@ -25,9 +25,9 @@ fn problem(n: usize) -> Problem {
 /// Fits once, prints the error beside what the fit reports, and checks it.
 fn solved<K: Kernel + Default>(
     problem: &Problem,
-    options: &FitOptions<f64, K>,
+    options: &FitOptions<K>,
     name: &str,
-) -> ThinPlateSpline<f64, 3, K> {
+) -> ThinPlateSpline<3, K> {
     let spline =
         ThinPlateSpline::fit(&problem.sources, &problem.targets, options).expect("a spline");
     let error = problem.error(&spline);

@@ -10,7 +10,7 @@ struct Growth {
     scale: f64,
 }
 
-impl Warp<f64, 3> for Growth {
+impl Warp<3> for Growth {
     fn apply(&self, point: &Point3<f64>) -> Point3<f64> {
         Point3::from(self.to + (point.coords - self.from) * self.scale)
     }
@@ -21,13 +21,13 @@ impl Warp<f64, 3> for Growth {
 
 struct GrowthModel;
 
-impl WarpModel<f64, 3> for GrowthModel {
+impl WarpModel<3> for GrowthModel {
     fn fit(
         &self,
         sources: &[Point3<f64>],
         targets: &[Point3<f64>],
         _weights: Option<&[f64]>,
-    ) -> Result<Box<dyn Warp<f64, 3> + Send + Sync>, TpsError> {
+    ) -> Result<Box<dyn Warp<3> + Send + Sync>, TpsError> {
         let mean =
             |p: &[Point3<f64>]| p.iter().map(|p| p.coords).sum::<Vector3<f64>>() / p.len() as f64;
         let (from, to) = (mean(sources), mean(targets));

@@ -663,7 +663,7 @@ fn fit<const D: usize>(
 
 /// H = ∇f − I at every point, in three dimensions.
 fn gradients<const D: usize>(
-    spline: &ThinPlateSpline<f64, D>,
+    spline: &ThinPlateSpline<D>,
     points: &[Point<f64, D>],
 ) -> Result<Vec<Matrix3<f64>>, TpsError> {
     let mut jacobians = vec![SMatrix::zeros(); points.len()];

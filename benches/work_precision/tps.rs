@@ -1,7 +1,6 @@
 //! Splines: kernel, number of points, scalar type, way of solving, λ.
 
 use crate::study::Study;
-use nalgebra::Point3;
 use tactile_benches::Problem;
 use tactile_imaging::tps::{
     Factorization, FitOptions, Kernel, NegR, R2LogR, R3, Smoothing, Spline, SplineWorkspace,
@@ -18,7 +17,7 @@ fn fit<K: Kernel>(
     setting: &str,
     is_default: bool,
     p: &Problem,
-    options: &FitOptions<f64, K>,
+    options: &FitOptions<K>,
 ) {
     let job = || ThinPlateSpline::fit(&p.sources, &p.targets, options).expect("a spline");
     study.run(knob, setting, is_default, job, |s| p.error(s));
@@ -58,21 +57,7 @@ pub(crate) fn clean(study: &mut Study) {
         fit(study, "points", &log, false, &p, &FitOptions::new(R2LogR));
         fit(study, "points", &line, false, &p, &FitOptions::new(NegR));
     }
-    single(study, &p);
     refit(study, &p);
-}
-
-fn single(study: &mut Study, p: &Problem) {
-    let short = |points: &[Point3<f64>]| -> Vec<Point3<f32>> {
-        points.iter().map(|p| p.map(|x| x as f32)).collect()
-    };
-    let (sources, targets) = (short(&p.sources), short(&p.targets));
-    let job =
-        || ThinPlateSpline::fit(&sources, &targets, &FitOptions::new(NegR)).expect("a spline");
-    study.run("scalar", "−r, 200 points, f32", false, job, |spline| {
-        let value = |q: &Point3<f64>| spline.apply(&q.map(|x| x as f32)).map(f64::from);
-        p.error_of(&p.queries.iter().map(value).collect::<Vec<_>>())
-    });
 }
 
 fn refit(study: &mut Study, p: &Problem) {

@@ -67,7 +67,7 @@ pub struct Pipeline {
     /// None: the default for what the surface is read from.
     sampler: Option<Arc<dyn ControlPointSampler<f64> + Send + Sync>>,
     matcher: Arc<dyn PointMatcher<3> + Send + Sync>,
-    warp: Arc<dyn WarpModel<f64, 3> + Send + Sync>,
+    warp: Arc<dyn WarpModel<3> + Send + Sync>,
     strain: Arc<dyn StrainMeasure + Send + Sync>,
     estimator: EstimatorStage,
     settings: Settings,
@@ -433,7 +433,7 @@ impl Pipeline {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     #[must_use]
-    pub fn with_warp(mut self, warp: impl WarpModel<f64, 3> + Send + Sync + 'static) -> Self {
+    pub fn with_warp(mut self, warp: impl WarpModel<3> + Send + Sync + 'static) -> Self {
         self.warp = Arc::new(warp);
         self
     }
@@ -481,7 +481,7 @@ impl Pipeline {
         self.matcher.as_ref()
     }
 
-    pub(super) fn warp(&self) -> &dyn WarpModel<f64, 3> {
+    pub(super) fn warp(&self) -> &dyn WarpModel<3> {
         self.warp.as_ref()
     }
 

@@ -323,7 +323,7 @@ impl MatcherChoice {
 }
 
 impl WarpChoice {
-    pub(super) fn build(self) -> Result<Arc<dyn WarpModel<f64, 3> + Send + Sync>, PipelineError> {
+    pub(super) fn build(self) -> Result<Arc<dyn WarpModel<3> + Send + Sync>, PipelineError> {
         Ok(match self {
             Self::ThinPlateSpline => Arc::new(StrainSpline),
             Self::CubicSpline => {

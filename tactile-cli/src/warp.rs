@@ -39,7 +39,7 @@ pub struct WarpArguments {
     /// cross-validation.
     #[arg(long, value_name = "X|gcv", default_value = "0", value_parser = smoothing,
           allow_negative_numbers = true)]
-    lambda: Smoothing<f64>,
+    lambda: Smoothing,
     #[command(flatten)]
     repetition: Repetition,
 }
@@ -56,7 +56,7 @@ enum KernelName {
     R3,
 }
 
-fn smoothing(text: &str) -> Result<Smoothing<f64>, String> {
+fn smoothing(text: &str) -> Result<Smoothing, String> {
     if text.eq_ignore_ascii_case("gcv") {
         return Ok(Smoothing::Gcv);
     }
@@ -210,8 +210,8 @@ fn fit<const D: usize, K: Kernel>(
     context: &Context,
     sources: &[Point<f64, D>],
     targets: &[Point<f64, D>],
-    options: &FitOptions<f64, K>,
-) -> Result<ThinPlateSpline<f64, D, K>, TpsError> {
+    options: &FitOptions<K>,
+) -> Result<ThinPlateSpline<D, K>, TpsError> {
     let interrupt = &context.interrupt;
     let job = format!("fitting {}", count(sources.len(), "point"));
     // A direct solution does not report its progress.
@@ -247,7 +247,7 @@ fn fit<const D: usize, K: Kernel>(
 /// Values and Jacobians at the queries. After Ctrl-C it is the number of those done.
 fn evaluate<const D: usize, K: Kernel>(
     context: &Context,
-    spline: &ThinPlateSpline<f64, D, K>,
+    spline: &ThinPlateSpline<D, K>,
     queries: &[Point<f64, D>],
     values: &mut [Point<f64, D>],
     jacobians: &mut [SMatrix<f64, D, D>],

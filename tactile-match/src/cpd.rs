@@ -1013,7 +1013,7 @@ impl<const D: usize> Loop for Apply<'_, D> {
 /// `y ↦ A y + b`, and the memory to find it.
 #[derive(Clone, Debug, Default)]
 struct GlobalStep<const D: usize> {
-    map: Affine<f64, D>,
+    map: Affine<D>,
     sources: Vec<Point<f64, D>>,
     means: Vec<Point<f64, D>>,
     weights: Vec<f64>,
@@ -1075,7 +1075,7 @@ impl<const D: usize> GlobalStep<D> {
 struct DriftWarp<const D: usize> {
     model: Frame<D>,
     target: Frame<D>,
-    map: Affine<f64, D>,
+    map: Affine<D>,
     centres: Vec<SVector<f64, D>>,
     weights: Vec<SVector<f64, D>>,
     beta: f64,
@@ -1087,7 +1087,7 @@ impl<const D: usize> DriftWarp<D> {
     }
 }
 
-impl<const D: usize> Warp<f64, D> for DriftWarp<D> {
+impl<const D: usize> Warp<D> for DriftWarp<D> {
     fn apply(&self, point: &Point<f64, D>) -> Point<f64, D> {
         let y = self.model.inside(point);
         let mut image = self.map.linear * y + self.map.offset;

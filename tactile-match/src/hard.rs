@@ -126,8 +126,8 @@ fn through<const D: usize>(
     model: &[Point<f64, D>],
     sources: &[Point<f64, D>],
     images: &[Point<f64, D>],
-) -> (Box<dyn Warp<f64, D> + Send + Sync>, Vec<Point<f64, D>>) {
-    let finite = |warp: &dyn Warp<f64, D>| {
+) -> (Box<dyn Warp<D> + Send + Sync>, Vec<Point<f64, D>>) {
+    let finite = |warp: &dyn Warp<D>| {
         let warped: Vec<_> = model.iter().map(|p| warp.apply(p)).collect();
         warped
             .iter()
@@ -148,8 +148,8 @@ fn through<const D: usize>(
 /// The factorised thin-plate system of some sources: `r² ln r²` in the plane, `−r` in space.
 #[derive(Clone, Debug)]
 enum System<const D: usize> {
-    Plane(Box<Factorization<f64, D, R2LogR>>),
-    Space(Box<Factorization<f64, D, NegR>>),
+    Plane(Box<Factorization<D, R2LogR>>),
+    Space(Box<Factorization<D, NegR>>),
 }
 
 /// Interpolation between one set of sources and any images of them: factorised once.
@@ -158,20 +158,20 @@ pub(crate) struct Interpolation<const D: usize> {
     /// None where the sources determine no spline.
     system: Option<System<D>>,
     weights: Option<Vec<f64>>,
-    smoothing: Smoothing<f64>,
+    smoothing: Smoothing,
 }
 
 impl<const D: usize> Interpolation<D> {
     pub(crate) fn new(
         sources: &[Point<f64, D>],
         weights: Option<Vec<f64>>,
-        smoothing: Smoothing<f64>,
+        smoothing: Smoothing,
     ) -> Self {
         fn options<K>(
             kernel: K,
-            smoothing: Smoothing<f64>,
+            smoothing: Smoothing,
             weights: &Option<Vec<f64>>,
-        ) -> Result<FitOptions<f64, K>, TpsError> {
+        ) -> Result<FitOptions<K>, TpsError> {
             let options = FitOptions::new(kernel).with_smoothing(smoothing)?;
             match weights {
                 Some(weights) => options.with_weights(weights.clone()),
@@ -200,8 +200,8 @@ impl<const D: usize> Interpolation<D> {
         &self,
         sources: &[Point<f64, D>],
         images: &[Point<f64, D>],
-    ) -> Box<dyn Warp<f64, D> + Send + Sync> {
-        let spline: Option<Box<dyn Warp<f64, D> + Send + Sync>> = match &self.system {
+    ) -> Box<dyn Warp<D> + Send + Sync> {
+        let spline: Option<Box<dyn Warp<D> + Send + Sync>> = match &self.system {
             Some(System::Plane(plane)) => {
                 plane.fit(images).ok().map(|spline| Box::new(spline) as _)
             }
@@ -227,7 +227,7 @@ pub(crate) fn fitted<const D: usize>(
     sources: &[Point<f64, D>],
     images: &[Point<f64, D>],
     weights: Vec<f64>,
-) -> Box<dyn Warp<f64, D> + Send + Sync> {
+) -> Box<dyn Warp<D> + Send + Sync> {
     if sources.len() >= 3 * (D + 1) {
         return spline(sources, images, Some(weights), Smoothing::Gcv);
     }
@@ -244,15 +244,15 @@ pub(crate) fn spline<const D: usize>(
     sources: &[Point<f64, D>],
     images: &[Point<f64, D>],
     weights: Option<Vec<f64>>,
-    smoothing: Smoothing<f64>,
-) -> Box<dyn Warp<f64, D> + Send + Sync> {
+    smoothing: Smoothing,
+) -> Box<dyn Warp<D> + Send + Sync> {
     Interpolation::new(sources, weights, smoothing).through(sources, images)
 }
 
 /// Whether a warp takes the sources to these images, to a share of the size: where sources nearly
 /// coincide and their images do not, no digit is left in a spline.
 pub(crate) fn follows<const D: usize>(
-    warp: &(dyn Warp<f64, D> + Send + Sync),
+    warp: &(dyn Warp<D> + Send + Sync),
     sources: &[Point<f64, D>],
     images: &[Point<f64, D>],
     share: f64,

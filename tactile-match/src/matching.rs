@@ -297,7 +297,7 @@ pub struct MatchReport {
 pub struct Matching<const D: usize> {
     /// The warp. It takes the model points to [`warped`](Self::warped), of a model of four thousand
     /// points and more a sample of them.
-    pub warp: Box<dyn Warp<f64, D> + Send + Sync>,
+    pub warp: Box<dyn Warp<D> + Send + Sync>,
     /// The warped model points.
     pub warped: Vec<Point<f64, D>>,
     /// Target row of every model point. `None` for a point without a partner. No target row occurs

@@ -283,13 +283,13 @@ impl ModulusEstimator for OwnStage {
 
 /// `fit(sources, targets, weights)` returns an object that maps points to points when it is called
 /// and has a method `jacobian`: a `ThinPlateSpline` is one.
-impl WarpModel<f64, 3> for OwnStage {
+impl WarpModel<3> for OwnStage {
     fn fit(
         &self,
         sources: &[Point3<f64>],
         targets: &[Point3<f64>],
         weights: Option<&[f64]>,
-    ) -> Result<Box<dyn Warp<f64, 3> + Send + Sync>, TpsError> {
+    ) -> Result<Box<dyn Warp<3> + Send + Sync>, TpsError> {
         let fitted = Python::attach(|py| {
             let array = |points| PyArray2::from_owned_array(py, arrays::rows(points));
             let weights = weights.map(|weights| PyArray1::from_slice(py, weights));
@@ -336,7 +336,7 @@ impl OwnWarp {
 
 /// A warp was asked once when it was fitted. One that fails later has no way to say so but NaN,
 /// which the stages behind it refuse.
-impl Warp<f64, 3> for OwnWarp {
+impl Warp<3> for OwnWarp {
     fn apply(&self, point: &Point3<f64>) -> Point3<f64> {
         let image = Python::attach(|py| self.images(py, &[*point]));
         image.map_or(Point3::from([f64::NAN; 3]), |images| images[0])

@@ -16,7 +16,7 @@ trait Fitted: Send + Sync {
     fn lambda(&self) -> f64;
 }
 
-impl<const D: usize, K: Kernel + Send + Sync> Fitted for Spline<f64, D, 3, K> {
+impl<const D: usize, K: Kernel + Send + Sync> Fitted for Spline<D, 3, K> {
     fn values(&self, points: ArrayView2<'_, f64>) -> Vec<Point3<f64>> {
         let points: Vec<Point<f64, D>> = arrays::points(points);
         let mut values = vec![Point3::origin(); points.len()];
@@ -202,11 +202,11 @@ fn fit<const D: usize, K: Kernel + Send + Sync + 'static>(
     sources: ArrayView2<'_, f64>,
     targets: &[Point3<f64>],
     kernel: K,
-    smoothing: Smoothing<f64>,
+    smoothing: Smoothing,
 ) -> PyResult<Box<dyn Fitted>> {
     let options = FitOptions::new(kernel).with_smoothing(smoothing);
     let options = options.map_err(invalid)?;
     let sources: Vec<Point<f64, D>> = arrays::points(sources);
-    let spline = Spline::<f64, D, 3, K>::fit(&sources, targets, &options);
+    let spline = Spline::<D, 3, K>::fit(&sources, targets, &options);
     Ok(Box::new(spline.map_err(invalid)?))
 }

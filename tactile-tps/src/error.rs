@@ -4,7 +4,7 @@ use nalgebra::Point;
 use tactile_core::CustomError;
 use thiserror::Error;
 
-use crate::{Scalar, Smoothing};
+use crate::Smoothing;
 
 /// Everything that can go wrong in this crate.
 ///
@@ -120,11 +120,11 @@ impl TpsError {
 }
 
 /// Names the first point with a coordinate that is not finite.
-pub(crate) fn finite<T: Scalar, const D: usize>(
-    points: &[Point<T, D>],
+pub(crate) fn finite<const D: usize>(
+    points: &[Point<f64, D>],
     input: &'static str,
 ) -> Result<(), TpsError> {
-    let broken = |p: &Point<T, D>| p.iter().any(|x| !x.widen().is_finite());
+    let broken = |p: &Point<f64, D>| p.iter().any(|x| !x.is_finite());
     match points.iter().position(broken) {
         Some(index) => Err(TpsError::NotFinite { input, index }),
         None => Ok(()),
@@ -153,10 +153,10 @@ pub(crate) fn same_length(expected: usize, found: usize) -> Result<(), TpsError>
 }
 
 /// At least one pair, all finite, with weights that are valid where they are given.
-pub(crate) fn validate_pairs<T: Scalar, const D: usize>(
-    sources: &[Point<T, D>],
-    targets: &[Point<T, D>],
-    weights: Option<&[T]>,
+pub(crate) fn validate_pairs<const D: usize>(
+    sources: &[Point<f64, D>],
+    targets: &[Point<f64, D>],
+    weights: Option<&[f64]>,
 ) -> Result<(), TpsError> {
     if sources.is_empty() {
         return Err(TpsError::Empty("source points"));
@@ -168,25 +168,24 @@ pub(crate) fn validate_pairs<T: Scalar, const D: usize>(
 }
 
 /// One weight a point, finite and not negative, one of them positive.
-pub(crate) fn validate_weights<T: Scalar>(weights: &[T], points: usize) -> Result<(), TpsError> {
+pub(crate) fn validate_weights(weights: &[f64], points: usize) -> Result<(), TpsError> {
     same_count("weights", points, weights.len())?;
-    let valid = |w: &T| w.widen() >= 0.0 && w.widen().is_finite();
+    let valid = |&w: &f64| w >= 0.0 && w.is_finite();
     if let Some(index) = weights.iter().position(|w| !valid(w)) {
-        let value = weights[index].widen();
+        let value = weights[index];
         return Err(TpsError::Weight { index, value });
     }
-    if weights.iter().all(|w| w.widen() == 0.0) {
+    if weights.iter().all(|&w| w == 0.0) {
         return Err(TpsError::Empty("weights"));
     }
     Ok(())
 }
 
 /// A λ is finite and not negative.
-pub(crate) fn validate_smoothing<T: Scalar>(smoothing: &Smoothing<T>) -> Result<(), TpsError> {
-    match smoothing {
-        Smoothing::Lambda(lambda) if !(lambda.widen() >= 0.0 && lambda.widen().is_finite()) => {
-            let value = lambda.widen();
-            Err(TpsError::Lambda { value })
+pub(crate) fn validate_smoothing(smoothing: &Smoothing) -> Result<(), TpsError> {
+    match *smoothing {
+        Smoothing::Lambda(lambda) if !(lambda >= 0.0 && lambda.is_finite()) => {
+            Err(TpsError::Lambda { value: lambda })
         }
         _ => Ok(()),
     }

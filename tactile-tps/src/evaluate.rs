@@ -13,10 +13,9 @@ use nalgebra::{Point, SMatrix, SVector};
 use rayon::prelude::*;
 
 use crate::{
-    Factorization, FitOptions, FitReport, Kernel, KernelDerivatives, Progress, R2LogR, Scalar,
-    TpsError,
+    Factorization, FitOptions, FitReport, Kernel, KernelDerivatives, Progress, R2LogR, TpsError,
     error::same_length,
-    lanes::{Job, Lane, dispatch},
+    lanes::{Job, Lane, UNIT_ROUNDOFF, dispatch},
 };
 
 /// Queries in a full block: long enough for the compiler to vectorise, short enough for the
@@ -46,13 +45,13 @@ impl<const D: usize> Default for Frame<D> {
 impl<const D: usize> Frame<D> {
     /// Centre of the bounding box, and the power of two next to half its longest side (one without
     /// `rescale`).
-    pub(crate) fn around<T: Scalar>(points: &[Point<T, D>], rescale: bool) -> Self {
+    pub(crate) fn around(points: &[Point<f64, D>], rescale: bool) -> Self {
         let mut low = [f64::INFINITY; D];
         let mut high = [f64::NEG_INFINITY; D];
         for point in points {
             for k in 0..D {
-                low[k] = low[k].min(point[k].widen());
-                high[k] = high[k].max(point[k].widen());
+                low[k] = low[k].min(point[k]);
+                high[k] = high[k].max(point[k]);
             }
         }
         // Halved before the difference, which could overflow.
@@ -68,17 +67,17 @@ impl<const D: usize> Frame<D> {
     }
 
     #[inline(always)]
-    pub(crate) fn inside<T: Scalar>(&self, point: &Point<T, D>) -> [f64; D] {
+    pub(crate) fn inside(&self, point: &Point<f64, D>) -> [f64; D] {
         // Division by a power of two is exact.
-        core::array::from_fn(|k| (point[k].widen() - self.centre[k]) / self.scale)
+        core::array::from_fn(|k| (point[k] - self.centre[k]) / self.scale)
     }
 }
 
 /// The affine part of a spline in its frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct AffinePart<T, const D: usize, const M: usize> {
-    constant: [T; M],
-    gradient: [[T; D]; M],
+struct AffinePart<const D: usize, const M: usize> {
+    constant: [f64; M],
+    gradient: [[f64; D]; M],
 }
 
 /// A thin-plate spline from `D`-space to `M`-space: f(x) = a₀ + A x + Σᵢ wᵢ U(|x − xᵢ|).
@@ -87,14 +86,14 @@ struct AffinePart<T, const D: usize, const M: usize> {
 /// The weights satisfy Σ wᵢ = 0 and Σ wᵢ xᵢᵀ = 0 and minimise Σ weightᵢ |f(xᵢ) − yᵢ|² + λ wᵀKw
 /// (Wahba 1990).
 #[derive(Clone, Debug)]
-pub struct Spline<T: Scalar, const D: usize, const M: usize, K = R2LogR> {
+pub struct Spline<const D: usize, const M: usize, K = R2LogR> {
     kernel: K,
     frame: Frame<D>,
     /// Centres in the frame, axis by axis.
-    centres: Vec<T>,
+    centres: Vec<f64>,
     /// Weights in the frame, output by output.
-    weights: Vec<T>,
-    affine: AffinePart<T, D, M>,
+    weights: Vec<f64>,
+    affine: AffinePart<D, M>,
     /// Largest Σ |wᵢ| of an output.
     weight: f64,
     /// Largest target.
@@ -103,9 +102,7 @@ pub struct Spline<T: Scalar, const D: usize, const M: usize, K = R2LogR> {
     pub report: FitReport,
 }
 
-impl<T: Scalar, const D: usize, const M: usize, K: Kernel + Default> Default
-    for Spline<T, D, M, K>
-{
+impl<const D: usize, const M: usize, K: Kernel + Default> Default for Spline<D, M, K> {
     /// A spline that is zero everywhere, to be filled by [`Factorization::refit_with`].
     fn default() -> Self {
         Self::zero(K::default())
@@ -121,14 +118,14 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel + Default> Default
 /// let sources = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.3, 0.4,
 ///     0.2]].map(Point3::from);
 /// let targets = sources.map(|p| p * 2.0);
-/// let warp: ThinPlateSpline<f64, 3, NegR> = ThinPlateSpline::fit(&sources, &targets,
+/// let warp: ThinPlateSpline<3, NegR> = ThinPlateSpline::fit(&sources, &targets,
 ///     &FitOptions::new(NegR))?;
 /// assert!((warp.jacobian(&Point3::new(0.5, 0.5,
 ///     0.5)) - nalgebra::Matrix3::identity() * 2.0).norm() < 1e-13);
 /// # Ok(())
 /// # }
 /// ```
-pub type ThinPlateSpline<T, const D: usize, K = R2LogR> = Spline<T, D, D, K>;
+pub type ThinPlateSpline<const D: usize, K = R2LogR> = Spline<D, D, K>;
 
 /// A solution in the frame, as a spline takes it over.
 pub(crate) struct Solution<'a, const D: usize, const M: usize> {
@@ -143,7 +140,7 @@ pub(crate) struct Solution<'a, const D: usize, const M: usize> {
     pub(crate) level: f64,
 }
 
-impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
+impl<const D: usize, const M: usize, K: Kernel> Spline<D, M, K> {
     /// Fits the spline that takes `sources` to `targets`.
     ///
     /// ```
@@ -163,9 +160,9 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
     /// [`TpsError`] for invalid input, coinciding points with different targets, or a kernel that
     /// is not definite.
     pub fn fit(
-        sources: &[Point<T, D>],
-        targets: &[Point<T, M>],
-        options: &FitOptions<T, K>,
+        sources: &[Point<f64, D>],
+        targets: &[Point<f64, M>],
+        options: &FitOptions<K>,
     ) -> Result<Self, TpsError> {
         Factorization::new(sources, options)?.fit(targets)
     }
@@ -205,9 +202,9 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
     /// Those of [`fit`](Self::fit), and [`TpsError::Stopped`] if `watch` returns `Break` before
     /// there is a spline.
     pub fn fit_watched(
-        sources: &[Point<T, D>],
-        targets: &[Point<T, M>],
-        options: &FitOptions<T, K>,
+        sources: &[Point<f64, D>],
+        targets: &[Point<f64, M>],
+        options: &FitOptions<K>,
         mut watch: impl FnMut(&Progress) -> ControlFlow<()>,
     ) -> Result<Self, TpsError> {
         Factorization::without_points(options.kernel.clone())
@@ -223,8 +220,8 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
             centres: Vec::new(),
             weights: Vec::new(),
             affine: AffinePart {
-                constant: [T::zero(); M],
-                gradient: [[T::zero(); D]; M],
+                constant: [0.0; M],
+                gradient: [[0.0; D]; M],
             },
             weight: 0.0,
             level: 0.0,
@@ -238,22 +235,18 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
         self.frame = solution.frame;
         self.centres.clear();
         for axis in solution.axes {
-            self.centres.extend(axis.iter().map(|&x| T::narrow(x)));
+            self.centres.extend_from_slice(axis);
         }
         self.weights.clear();
-        let weights = solution.weights.iter().map(|&w| T::narrow(w));
-        self.weights.extend(weights);
+        self.weights.extend_from_slice(solution.weights);
         self.affine = AffinePart {
-            constant: solution.constant.map(T::narrow),
-            gradient: solution.gradient.map(|row| row.map(T::narrow)),
+            constant: solution.constant,
+            gradient: solution.gradient.map(|row| row),
         };
-        let sums = self
-            .columns()
-            .1
-            .map(|w| w.iter().map(|x| x.widen().abs()).sum());
+        let sums = self.columns().1.map(|w| w.iter().map(|x| x.abs()).sum());
         self.weight = sums.into_iter().fold(0.0, f64::max);
         self.level = solution.level;
-        self.report.digits = digits::<T>(if self.level > 0.0 {
+        self.report.digits = digits(if self.level > 0.0 {
             self.rounding(0.0) / self.level
         } else {
             0.0
@@ -266,7 +259,7 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
         // shrink.
         let distance = f64::max(s.sqrt() + 1.0, 2.0);
         let term = self.kernel.derivatives(distance * distance).value;
-        T::UNIT_ROUNDOFF * self.weight * term.abs()
+        UNIT_ROUNDOFF * self.weight * term.abs()
     }
 
     /// Decimal digits that the sum of the spline's terms keeps at a point.
@@ -290,13 +283,13 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
     /// # Ok(())
     /// # }
     /// ```
-    pub fn digits(&self, point: &Point<T, D>) -> f64 {
+    pub fn digits(&self, point: &Point<f64, D>) -> f64 {
         let size = self
             .apply(point)
             .iter()
-            .fold(0.0, |size, x| f64::max(size, x.widen().abs()));
+            .fold(0.0, |size, x| f64::max(size, x.abs()));
         let distance_squared = self.frame.inside(point).iter().map(|x| x * x).sum();
-        digits::<T>(self.rounding(distance_squared) / f64::max(size, self.level))
+        digits(self.rounding(distance_squared) / f64::max(size, self.level))
     }
 
     /// wᵀKw, summed over the outputs, in the kernel's own units. O(n²).
@@ -318,18 +311,15 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
     /// # }
     /// ```
     pub fn bending_energy(&self) -> f64 {
-        let wide = |values: &[T]| values.iter().map(|x| x.widen()).collect::<Vec<f64>>();
         let (centres, weights) = self.columns();
-        let (centres, weights) = (centres.map(wide), weights.map(wide));
-        let places = centres.each_ref().map(|x| &x[..]);
         let sum = KernelSum {
             kernel: &self.kernel,
-            centres: places,
-            weights: weights.each_ref().map(|w| &w[..]),
+            centres,
+            weights,
         };
         let mut negative = vec![0.0; M * self.count()];
-        sum.subtract(places, 0..self.count(), &mut negative);
-        let products = weights.iter().flatten().zip(&negative).map(|(w, r)| -w * r);
+        sum.subtract(centres, 0..self.count(), &mut negative);
+        let products = self.weights.iter().zip(&negative).map(|(w, r)| -w * r);
         // An affine spline has the energy 0, which rounding can make negative.
         f64::max(products.sum(), 0.0) / self.unit()
     }
@@ -359,14 +349,14 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
     /// # Ok(())
     /// # }
     /// ```
-    pub fn terms(&self) -> impl ExactSizeIterator<Item = (Point<T, D>, SVector<f64, M>)> + '_ {
+    pub fn terms(&self) -> impl ExactSizeIterator<Item = (Point<f64, D>, SVector<f64, M>)> + '_ {
         let (n, unit) = (self.count(), self.unit());
         (0..n).map(move |j| {
-            let inside = |k: usize| self.centres[k * n + j].widen();
+            let inside = |k: usize| self.centres[k * n + j];
             let centre = Point::from(SVector::from_fn(|k, _| {
-                T::narrow(inside(k) * self.frame.scale + self.frame.centre[k])
+                inside(k) * self.frame.scale + self.frame.centre[k]
             }));
-            let weight = SVector::from_fn(|k, _| self.weights[k * n + j].widen() / unit);
+            let weight = SVector::from_fn(|k, _| self.weights[k * n + j] / unit);
             (centre, weight)
         })
     }
@@ -397,25 +387,19 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
     /// ```
     pub fn affine(&self) -> (SMatrix<f64, M, D>, SVector<f64, M>) {
         let Frame { centre, scale } = self.frame;
-        let linear = SMatrix::from_fn(|i, j| self.affine.gradient[i][j].widen() / scale);
+        let linear = SMatrix::from_fn(|i, j| self.affine.gradient[i][j] / scale);
         let kernel = |s: f64| self.kernel.derivatives(s).value;
         // What the scaling of the kernel leaves, per r². For r² ln r it is the logarithm of the
         // scale.
         let square = kernel(scale * scale) / self.unit() - kernel(1.0);
         let n = self.count();
         let offset = SVector::from_fn(|i, _| {
-            let norm = |j: usize| {
-                (0..D)
-                    .map(|k| self.centres[k * n + j].widen().powi(2))
-                    .sum::<f64>()
-            };
-            let second: f64 = (0..n)
-                .map(|j| self.weights[i * n + j].widen() * norm(j))
-                .sum();
+            let norm = |j: usize| (0..D).map(|k| self.centres[k * n + j].powi(2)).sum::<f64>();
+            let second: f64 = (0..n).map(|j| self.weights[i * n + j] * norm(j)).sum();
             let shift: f64 = (0..D)
-                .map(|k| self.affine.gradient[i][k].widen() * (centre[k] / scale))
+                .map(|k| self.affine.gradient[i][k] * (centre[k] / scale))
                 .sum();
-            self.affine.constant[i].widen() - shift - square * second
+            self.affine.constant[i] - shift - square * second
         });
         (linear, offset)
     }
@@ -426,7 +410,7 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
     }
 
     /// Coordinates of the centres and their weights, column by column.
-    fn columns(&self) -> ([&[T]; D], [&[T]; M]) {
+    fn columns(&self) -> ([&[f64]; D], [&[f64]; M]) {
         let n = self.count();
         (
             core::array::from_fn(|k| &self.centres[k * n..(k + 1) * n]),
@@ -448,7 +432,7 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
     /// # Ok(())
     /// # }
     /// ```
-    pub fn apply(&self, point: &Point<T, D>) -> Point<T, M> {
+    pub fn apply(&self, point: &Point<f64, D>) -> Point<f64, M> {
         let mut value = [Point::origin()];
         self.evaluate::<0>(core::slice::from_ref(point), (&mut value, &mut [], &mut []));
         value[0]
@@ -471,7 +455,7 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
     /// # Ok(())
     /// # }
     /// ```
-    pub fn jacobian(&self, point: &Point<T, D>) -> SMatrix<T, M, D> {
+    pub fn jacobian(&self, point: &Point<f64, D>) -> SMatrix<f64, M, D> {
         let mut jacobian = [SMatrix::zeros()];
         self.evaluate::<1>(
             core::slice::from_ref(point),
@@ -497,7 +481,7 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
     /// # Ok(())
     /// # }
     /// ```
-    pub fn hessian(&self, point: &Point<T, D>) -> [SMatrix<T, D, D>; M] {
+    pub fn hessian(&self, point: &Point<f64, D>) -> [SMatrix<f64, D, D>; M] {
         let mut hessian = [[SMatrix::zeros(); M]];
         self.evaluate::<2>(
             core::slice::from_ref(point),
@@ -528,8 +512,8 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
     /// [`TpsError::Length`] if the slices differ in length.
     pub fn apply_into(
         &self,
-        points: &[Point<T, D>],
-        values: &mut [Point<T, M>],
+        points: &[Point<f64, D>],
+        values: &mut [Point<f64, M>],
     ) -> Result<(), TpsError> {
         same_length(points.len(), values.len())?;
         self.evaluate::<0>(points, (values, &mut [], &mut []));
@@ -557,8 +541,8 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
     /// [`TpsError::Length`] if the slices differ in length.
     pub fn jacobian_into(
         &self,
-        points: &[Point<T, D>],
-        jacobians: &mut [SMatrix<T, M, D>],
+        points: &[Point<f64, D>],
+        jacobians: &mut [SMatrix<f64, M, D>],
     ) -> Result<(), TpsError> {
         same_length(points.len(), jacobians.len())?;
         self.evaluate::<1>(points, (&mut [], jacobians, &mut []));
@@ -589,9 +573,9 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
     /// [`TpsError::Length`] if the slices differ in length.
     pub fn apply_and_jacobian_into(
         &self,
-        points: &[Point<T, D>],
-        values: &mut [Point<T, M>],
-        jacobians: &mut [SMatrix<T, M, D>],
+        points: &[Point<f64, D>],
+        values: &mut [Point<f64, M>],
+        jacobians: &mut [SMatrix<f64, M, D>],
     ) -> Result<(), TpsError> {
         same_length(points.len(), values.len())?;
         same_length(points.len(), jacobians.len())?;
@@ -600,9 +584,9 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
     }
 
     /// Values and derivatives up to `ORDER` at every point.
-    fn evaluate<const ORDER: usize>(&self, points: &[Point<T, D>], outputs: Outputs<'_, T, D, M>) {
+    fn evaluate<const ORDER: usize>(&self, points: &[Point<f64, D>], outputs: Outputs<'_, D, M>) {
         let (centres, weights) = self.columns();
-        dispatch(Evaluation::<_, _, D, M, ORDER> {
+        dispatch(Evaluation::<_, D, M, ORDER> {
             sum: KernelSum {
                 kernel: &self.kernel,
                 centres,
@@ -621,7 +605,7 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
 const THREAD_QUERIES: usize = 8 * BLOCK;
 
 #[cfg(feature = "rayon")]
-impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
+impl<const D: usize, const M: usize, K: Kernel> Spline<D, M, K> {
     /// As [`apply_into`](Self::apply_into), over the threads of the current rayon pool.
     ///
     /// ```
@@ -644,8 +628,8 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
     /// [`TpsError::Length`] if the slices differ in length.
     pub fn par_apply_into(
         &self,
-        points: &[Point<T, D>],
-        values: &mut [Point<T, M>],
+        points: &[Point<f64, D>],
+        values: &mut [Point<f64, M>],
     ) -> Result<(), TpsError> {
         same_length(points.len(), values.len())?;
         let chunks = points
@@ -678,9 +662,9 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
     /// [`TpsError::Length`] if the slices differ in length.
     pub fn par_apply_and_jacobian_into(
         &self,
-        points: &[Point<T, D>],
-        values: &mut [Point<T, M>],
-        jacobians: &mut [SMatrix<T, M, D>],
+        points: &[Point<f64, D>],
+        values: &mut [Point<f64, M>],
+        jacobians: &mut [SMatrix<f64, M, D>],
     ) -> Result<(), TpsError> {
         same_length(points.len(), values.len())?;
         same_length(points.len(), jacobians.len())?;
@@ -694,33 +678,33 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
 }
 
 /// Decimal digits of a number with this relative error, at most those of the type.
-fn digits<T: Scalar>(error: f64) -> f64 {
-    f64::max(error, T::UNIT_ROUNDOFF).log10().min(0.0).abs()
+fn digits(error: f64) -> f64 {
+    f64::max(error, UNIT_ROUNDOFF).log10().min(0.0).abs()
 }
 
 /// Where values, Jacobians and Hessians of the points go. An empty slice takes none.
-type Outputs<'a, T, const D: usize, const M: usize> = (
-    &'a mut [Point<T, M>],
-    &'a mut [SMatrix<T, M, D>],
-    &'a mut [[SMatrix<T, D, D>; M]],
+type Outputs<'a, const D: usize, const M: usize> = (
+    &'a mut [Point<f64, M>],
+    &'a mut [SMatrix<f64, M, D>],
+    &'a mut [[SMatrix<f64, D, D>; M]],
 );
 
 /// Values and derivatives at all points, block by block.
-struct Evaluation<'a, T: Scalar, K, const D: usize, const M: usize, const ORDER: usize> {
-    sum: KernelSum<'a, T, K, D, M>,
-    affine: &'a AffinePart<T, D, M>,
+struct Evaluation<'a, K, const D: usize, const M: usize, const ORDER: usize> {
+    sum: KernelSum<'a, K, D, M>,
+    affine: &'a AffinePart<D, M>,
     frame: Frame<D>,
-    points: &'a [Point<T, D>],
-    outputs: Outputs<'a, T, D, M>,
+    points: &'a [Point<f64, D>],
+    outputs: Outputs<'a, D, M>,
 }
 
-impl<T: Scalar, K: Kernel, const D: usize, const M: usize, const ORDER: usize> Job<T>
-    for Evaluation<'_, T, K, D, M, ORDER>
+impl<K: Kernel, const D: usize, const M: usize, const ORDER: usize> Job
+    for Evaluation<'_, K, D, M, ORDER>
 {
     type Output = ();
 
     #[inline(always)]
-    fn run<L: Lane<T>>(mut self) {
+    fn run<L: Lane>(mut self) {
         let full = self.points.len() / BLOCK * BLOCK;
         for start in (0..full).step_by(BLOCK) {
             self.chunk::<L, BLOCK>(start, BLOCK);
@@ -731,19 +715,17 @@ impl<T: Scalar, K: Kernel, const D: usize, const M: usize, const ORDER: usize> J
     }
 }
 
-impl<T: Scalar, K: Kernel, const D: usize, const M: usize, const ORDER: usize>
-    Evaluation<'_, T, K, D, M, ORDER>
-{
+impl<K: Kernel, const D: usize, const M: usize, const ORDER: usize> Evaluation<'_, K, D, M, ORDER> {
     /// Evaluates at `used` ≤ `W` points from `start` on.
     #[inline(always)]
-    fn chunk<L: Lane<T>, const W: usize>(&mut self, start: usize, used: usize) {
-        let mut x = [[T::zero(); W]; D];
+    fn chunk<L: Lane, const W: usize>(&mut self, start: usize, used: usize) {
+        let mut x = [[0.0; W]; D];
         for l in 0..W {
             // Lanes beyond the last point repeat it, so that the loop has a fixed length.
             let inside = self.frame.inside(&self.points[start + l.min(used - 1)]);
-            (0..D).for_each(|k| x[k][l] = T::narrow(inside[k]));
+            (0..D).for_each(|k| x[k][l] = inside[k]);
         }
-        let mut sums = Lanes::<T, D, M, W>::new();
+        let mut sums = Lanes::<D, M, W>::new();
         self.sum.block::<L, W, ORDER>(&x, &mut sums);
         for l in 0..used {
             let point = core::array::from_fn(|k| x[k][l]);
@@ -753,20 +735,21 @@ impl<T: Scalar, K: Kernel, const D: usize, const M: usize, const ORDER: usize>
 
     /// Adds the affine part and returns to the units of the points.
     #[inline(always)]
-    fn finish<L: Lane<T>, const W: usize>(
+    fn finish<L: Lane, const W: usize>(
         &mut self,
         at: usize,
-        x: &[T; D],
-        sums: &Lanes<T, D, M, W>,
+        x: &[f64; D],
+        sums: &Lanes<D, M, W>,
         l: usize,
     ) {
-        let (affine, scale) = (self.affine, T::narrow(self.frame.scale));
+        let (affine, scale) = (self.affine, (self.frame.scale));
         let (values, jacobians, hessians) = &mut self.outputs;
         if let Some(value) = values.get_mut(at) {
             for m in 0..M {
-                let start = L::new(sums.value[m][l]) + L::new(affine.constant[m]);
-                let along =
-                    |sum: L, k: usize| L::new(affine.gradient[m][k]).mul_add(L::new(x[k]), sum);
+                let start = L::from_f64(sums.value[m][l]) + L::from_f64(affine.constant[m]);
+                let along = |sum: L, k: usize| {
+                    L::from_f64(affine.gradient[m][k]).mul_add(L::from_f64(x[k]), sum)
+                };
                 value[m] = (0..D).fold(start, along).get();
             }
         }
@@ -794,25 +777,25 @@ impl<T: Scalar, K: Kernel, const D: usize, const M: usize, const ORDER: usize>
 
 /// The kernel sum of a spline, in its frame.
 #[derive(Clone, Copy)]
-pub(crate) struct KernelSum<'a, T, K, const D: usize, const M: usize> {
+pub(crate) struct KernelSum<'a, K, const D: usize, const M: usize> {
     pub(crate) kernel: &'a K,
     /// Coordinates of the centres, axis by axis.
-    pub(crate) centres: [&'a [T]; D],
+    pub(crate) centres: [&'a [f64]; D],
     /// Weights of the centres, output by output.
-    pub(crate) weights: [&'a [T]; M],
+    pub(crate) weights: [&'a [f64]; M],
 }
 
 /// Sums for `W` queries: U, its gradient and its Hessian, as far as the order asked for.
-struct Lanes<T, const D: usize, const M: usize, const W: usize> {
-    value: [[T; W]; M],
-    gradient: [[[T; W]; D]; M],
-    hessian: [[[[T; W]; D]; D]; M],
+struct Lanes<const D: usize, const M: usize, const W: usize> {
+    value: [[f64; W]; M],
+    gradient: [[[f64; W]; D]; M],
+    hessian: [[[[f64; W]; D]; D]; M],
 }
 
-impl<T: Scalar, const D: usize, const M: usize, const W: usize> Lanes<T, D, M, W> {
+impl<const D: usize, const M: usize, const W: usize> Lanes<D, M, W> {
     #[inline(always)]
     fn new() -> Self {
-        let zero = [T::zero(); W];
+        let zero = [0.0; W];
         Self {
             value: [zero; M],
             gradient: [[zero; D]; M],
@@ -821,7 +804,7 @@ impl<T: Scalar, const D: usize, const M: usize, const W: usize> Lanes<T, D, M, W
     }
 
     #[inline(always)]
-    fn add_value<L: Lane<T>>(&mut self, l: usize, weight: &[L; M], value: L) {
+    fn add_value<L: Lane>(&mut self, l: usize, weight: &[L; M], value: L) {
         for m in 0..M {
             add(&mut self.value[m][l], weight[m], value);
         }
@@ -830,7 +813,7 @@ impl<T: Scalar, const D: usize, const M: usize, const W: usize> Lanes<T, D, M, W
     /// Adds a term's value, gradient 2U'd and, at second order, Hessian 2U' I + 4U'' d dᵀ
     /// (derivatives by s = |d|²).
     #[inline(always)]
-    fn add_derivatives<L: Lane<T>, const ORDER: usize>(
+    fn add_derivatives<L: Lane, const ORDER: usize>(
         &mut self,
         l: usize,
         weight: &[L; M],
@@ -851,14 +834,7 @@ impl<T: Scalar, const D: usize, const M: usize, const W: usize> Lanes<T, D, M, W
     }
 
     #[inline(always)]
-    fn add_hessian<L: Lane<T>>(
-        &mut self,
-        l: usize,
-        weight: &[L; M],
-        d: &[L; D],
-        slope: L,
-        bend: L,
-    ) {
+    fn add_hessian<L: Lane>(&mut self, l: usize, weight: &[L; M], d: &[L; D], slope: L, bend: L) {
         for k in 0..D {
             for i in 0..=k {
                 let own = if i == k { slope } else { L::from_f64(0.0) };
@@ -873,27 +849,27 @@ impl<T: Scalar, const D: usize, const M: usize, const W: usize> Lanes<T, D, M, W
 
 /// An accumulator's next value.
 #[inline(always)]
-fn add<T: Scalar, L: Lane<T>>(sum: &mut T, a: L, b: L) {
-    *sum = a.mul_add(b, L::new(*sum)).get();
+fn add<L: Lane>(sum: &mut f64, a: L, b: L) {
+    *sum = a.mul_add(b, L::from_f64(*sum)).get();
 }
 
-impl<T: Scalar, K: Kernel, const D: usize, const M: usize> KernelSum<'_, T, K, D, M> {
+impl<K: Kernel, const D: usize, const M: usize> KernelSum<'_, K, D, M> {
     /// Sums up to derivatives of the given `ORDER` (0, 1 or 2) at the queries `x`, axis by axis.
     #[inline(always)]
-    fn block<L: Lane<T>, const W: usize, const ORDER: usize>(
+    fn block<L: Lane, const W: usize, const ORDER: usize>(
         &self,
-        x: &[[T; W]; D],
-        sums: &mut Lanes<T, D, M, W>,
+        x: &[[f64; W]; D],
+        sums: &mut Lanes<D, M, W>,
     ) {
         let n = self.centres[0].len();
         let centres = self.centres.map(|axis| &axis[..n]);
         let weights = self.weights.map(|output| &output[..n]);
         // The centre's numbers are read once for all queries of the block.
         for j in 0..n {
-            let centre: [L; D] = core::array::from_fn(|k| L::new(centres[k][j]));
-            let weight: [L; M] = core::array::from_fn(|m| L::new(weights[m][j]));
+            let centre: [L; D] = core::array::from_fn(|k| L::from_f64(centres[k][j]));
+            let weight: [L; M] = core::array::from_fn(|m| L::from_f64(weights[m][j]));
             for l in 0..W {
-                let d: [L; D] = core::array::from_fn(|k| L::new(x[k][l]) - centre[k]);
+                let d: [L; D] = core::array::from_fn(|k| L::from_f64(x[k][l]) - centre[k]);
                 let mut s = d[0] * d[0];
                 for k in 1..D {
                     s = d[k].mul_add(d[k], s);
@@ -908,7 +884,7 @@ impl<T: Scalar, K: Kernel, const D: usize, const M: usize> KernelSum<'_, T, K, D
     }
 }
 
-impl<K: Kernel, const D: usize, const M: usize> KernelSum<'_, f64, K, D, M> {
+impl<K: Kernel, const D: usize, const M: usize> KernelSum<'_, K, D, M> {
     /// Subtracts the sum at the places of a range, which begins at a multiple of [`BLOCK`], from
     /// `residuals`.
     ///
@@ -925,18 +901,18 @@ impl<K: Kernel, const D: usize, const M: usize> KernelSum<'_, f64, K, D, M> {
 
 /// Subtracts the kernel sum at the places of a range, which begins at a multiple of [`BLOCK`].
 struct Subtract<'a, K, const D: usize, const M: usize> {
-    sum: KernelSum<'a, f64, K, D, M>,
+    sum: KernelSum<'a, K, D, M>,
     places: [&'a [f64]; D],
     range: Range<usize>,
     /// Of all places, output by output.
     residuals: &'a mut [f64],
 }
 
-impl<K: Kernel, const D: usize, const M: usize> Job<f64> for Subtract<'_, K, D, M> {
+impl<K: Kernel, const D: usize, const M: usize> Job for Subtract<'_, K, D, M> {
     type Output = ();
 
     #[inline(always)]
-    fn run<L: Lane<f64>>(mut self) {
+    fn run<L: Lane>(mut self) {
         let Range { start: first, end } = self.range;
         let full = first + (end - first) / BLOCK * BLOCK;
         for start in (first..full).step_by(BLOCK) {
@@ -950,13 +926,13 @@ impl<K: Kernel, const D: usize, const M: usize> Job<f64> for Subtract<'_, K, D, 
 
 impl<K: Kernel, const D: usize, const M: usize> Subtract<'_, K, D, M> {
     #[inline(always)]
-    fn block<L: Lane<f64>, const W: usize>(&mut self, start: usize, used: usize) {
+    fn block<L: Lane, const W: usize>(&mut self, start: usize, used: usize) {
         let n = self.places[0].len();
         let mut x = [[0.0; W]; D];
         for k in 0..D {
             x[k][..used].copy_from_slice(&self.places[k][start..start + used]);
         }
-        let mut sums = Lanes::<f64, D, M, W>::new();
+        let mut sums = Lanes::<D, M, W>::new();
         self.sum.block::<L, W, 0>(&x, &mut sums);
         for m in 0..M {
             let residuals = &mut self.residuals[m * n + start..m * n + start + used];

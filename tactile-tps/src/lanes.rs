@@ -6,140 +6,84 @@
 
 use core::ops::{Add, Div, Mul, Neg, Sub};
 
-use nalgebra::RealField;
-
 use crate::KernelScalar;
 
-/// A [`KernelScalar`] that stands for the scalar `T` in a vectorised loop.
-pub trait Lane<T>: KernelScalar {
-    /// Wraps the scalar.
-    fn new(x: T) -> Self;
-    /// Unwraps it.
-    fn get(self) -> T;
+/// Unit roundoff, half the distance from one to the next number.
+pub(crate) const UNIT_ROUNDOFF: f64 = 0.5 * f64::EPSILON;
+
+/// A [`KernelScalar`] that stands for an `f64` in a vectorised loop.
+pub(crate) trait Lane: KernelScalar {
+    /// The number.
+    fn get(self) -> f64;
 }
 
-/// The scalar type of points: `f32` or `f64`.
-///
-/// Fits are always computed in `f64`. The type decides in which precision the spline is kept and
-/// evaluated.
-///
-/// ```
-/// use tactile_tps::Scalar;
-/// assert_eq!(<f64 as Scalar>::UNIT_ROUNDOFF, 0.5 * f64::EPSILON);
-/// ```
-pub trait Scalar: RealField + Copy + Default {
-    /// Unit roundoff, half the distance from one to the next number.
-    const UNIT_ROUNDOFF: f64;
-    /// Arithmetic without a hardware fused multiply-add.
-    #[doc(hidden)]
-    type Plain: Lane<Self>;
-    /// Arithmetic with it.
-    #[doc(hidden)]
-    type Fused: Lane<Self>;
-    /// The nearest number to `x`.
-    #[doc(hidden)]
-    fn narrow(x: f64) -> Self;
-    /// The same number as `f64`.
-    #[doc(hidden)]
-    fn widen(self) -> f64;
+impl Lane for f64 {
+    #[inline(always)]
+    fn get(self) -> f64 {
+        self
+    }
 }
 
-/// `f32` or `f64` whose `mul_add` is one hardware instruction.
+impl KernelScalar for f64 {
+    #[inline(always)]
+    fn from_f64(x: f64) -> Self {
+        x
+    }
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        f64::sqrt(self)
+    }
+    #[inline(always)]
+    fn ln(self) -> Self {
+        ln(self, |a, b, c| a * b + c)
+    }
+    #[inline(always)]
+    fn exp(self) -> Self {
+        f64::exp(self)
+    }
+    #[inline(always)]
+    fn mul_add(self, a: Self, b: Self) -> Self {
+        self * a + b
+    }
+}
+
+/// `f64` whose `mul_add` is one hardware instruction.
 #[derive(Clone, Copy, Debug, PartialEq, PartialOrd)]
-pub struct Fused<T>(T);
+struct Fused(f64);
 
-macro_rules! real {
-    ($t:ident, $unit:expr, $ln:path) => {
-        impl Scalar for $t {
-            const UNIT_ROUNDOFF: f64 = $unit;
-            type Plain = $t;
-            type Fused = Fused<$t>;
-            #[inline(always)]
-            fn narrow(x: f64) -> Self {
-                x as $t
-            }
-            #[inline(always)]
-            fn widen(self) -> f64 {
-                self as f64
-            }
-        }
-
-        impl Lane<$t> for $t {
-            #[inline(always)]
-            fn new(x: $t) -> Self {
-                x
-            }
-            #[inline(always)]
-            fn get(self) -> $t {
-                self
-            }
-        }
-
-        impl KernelScalar for $t {
-            #[inline(always)]
-            fn from_f64(x: f64) -> Self {
-                x as $t
-            }
-            #[inline(always)]
-            fn sqrt(self) -> Self {
-                <$t>::sqrt(self)
-            }
-            #[inline(always)]
-            fn ln(self) -> Self {
-                $ln(self, |a, b, c| a * b + c)
-            }
-            #[inline(always)]
-            fn exp(self) -> Self {
-                <$t>::exp(self)
-            }
-            #[inline(always)]
-            fn mul_add(self, a: Self, b: Self) -> Self {
-                self * a + b
-            }
-        }
-
-        impl Lane<$t> for Fused<$t> {
-            #[inline(always)]
-            fn new(x: $t) -> Self {
-                Self(x)
-            }
-            #[inline(always)]
-            fn get(self) -> $t {
-                self.0
-            }
-        }
-
-        impl KernelScalar for Fused<$t> {
-            #[inline(always)]
-            fn from_f64(x: f64) -> Self {
-                Self(x as $t)
-            }
-            #[inline(always)]
-            fn sqrt(self) -> Self {
-                Self(self.0.sqrt())
-            }
-            #[inline(always)]
-            fn ln(self) -> Self {
-                Self($ln(self.0, <$t>::mul_add))
-            }
-            #[inline(always)]
-            fn exp(self) -> Self {
-                Self(self.0.exp())
-            }
-            #[inline(always)]
-            fn mul_add(self, a: Self, b: Self) -> Self {
-                Self(self.0.mul_add(a.0, b.0))
-            }
-        }
-    };
+impl Lane for Fused {
+    #[inline(always)]
+    fn get(self) -> f64 {
+        self.0
+    }
 }
 
-real!(f32, 5.960_464_477_539_063e-8, ln_f32);
-real!(f64, 1.110_223_024_625_156_5e-16, ln_f64);
+impl KernelScalar for Fused {
+    #[inline(always)]
+    fn from_f64(x: f64) -> Self {
+        Self(x)
+    }
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        Self(self.0.sqrt())
+    }
+    #[inline(always)]
+    fn ln(self) -> Self {
+        Self(ln(self.0, f64::mul_add))
+    }
+    #[inline(always)]
+    fn exp(self) -> Self {
+        Self(self.0.exp())
+    }
+    #[inline(always)]
+    fn mul_add(self, a: Self, b: Self) -> Self {
+        Self(self.0.mul_add(a.0, b.0))
+    }
+}
 
 macro_rules! operator {
     ($($trait:ident $method:ident),*) => {$(
-        impl<T: $trait<Output = T>> $trait for Fused<T> {
+        impl $trait for Fused {
             type Output = Self;
             #[inline(always)]
             fn $method(self, other: Self) -> Self {
@@ -150,7 +94,7 @@ macro_rules! operator {
 }
 operator!(Add add, Sub sub, Mul mul, Div div);
 
-impl<T: Neg<Output = T>> Neg for Fused<T> {
+impl Neg for Fused {
     type Output = Self;
     #[inline(always)]
     fn neg(self) -> Self {
@@ -158,30 +102,30 @@ impl<T: Neg<Output = T>> Neg for Fused<T> {
     }
 }
 
-/// Work on lanes of `T`. Mark `run` and what it calls `#[inline(always)]`.
-pub(crate) trait Job<T: Scalar> {
+/// Work on lanes. Mark `run` and what it calls `#[inline(always)]`.
+pub(crate) trait Job {
     type Output;
-    fn run<L: Lane<T>>(self) -> Self::Output;
+    fn run<L: Lane>(self) -> Self::Output;
 }
 
-struct Dispatched<T, J>(J, core::marker::PhantomData<T>);
+struct Dispatched<J>(J);
 
-impl<T: Scalar, J: Job<T>> pulp::WithSimd for Dispatched<T, J> {
+impl<J: Job> pulp::WithSimd for Dispatched<J> {
     type Output = J::Output;
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) -> J::Output {
         // Without a fused instruction `mul_add` is a slow call of a library.
         if S::IS_SCALAR || cfg!(target_arch = "wasm32") {
-            self.0.run::<T::Plain>()
+            self.0.run::<f64>()
         } else {
-            self.0.run::<T::Fused>()
+            self.0.run::<Fused>()
         }
     }
 }
 
 /// Runs the job.
-pub(crate) fn dispatch<T: Scalar, J: Job<T>>(job: J) -> J::Output {
-    pulp::Arch::new().dispatch(Dispatched(job, core::marker::PhantomData))
+pub(crate) fn dispatch<J: Job>(job: J) -> J::Output {
+    pulp::Arch::new().dispatch(Dispatched(job))
 }
 
 /// Inner product in eight partial sums, which the compiler turns into vectors.
@@ -204,14 +148,14 @@ pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
 
 /// The squared distance of point `i`, of coordinates axis by axis, from a place.
 #[inline(always)]
-pub(crate) fn squared_distance<L: Lane<f64>, const D: usize>(
+pub(crate) fn squared_distance<L: Lane, const D: usize>(
     axes: [&[f64]; D],
     i: usize,
     place: [L; D],
 ) -> L {
     let mut s = L::from_f64(0.0);
     for k in 0..D {
-        let d = L::new(axes[k][i]) - place[k];
+        let d = L::from_f64(axes[k][i]) - place[k];
         s = d.mul_add(d, s);
     }
     s
@@ -223,9 +167,9 @@ pub(crate) fn squared_distance<L: Lane<f64>, const D: usize>(
 /// x = 2ᵏ m with m in [√½, √2), f = m − 1, t = f/(2 + f) and
 /// ln m = 2 artanh t = f − f²/2 + t (f²/2 + R(t²)).
 /// R is a minimax polynomial (coefficients of fdlibm, Sun Microsystems 1993).
-/// Its error is below 2⁻⁵⁸, in f32 below 2⁻³⁴.
+/// Its error is below 2⁻⁵⁸.
 #[inline(always)]
-fn ln_f64(x: f64, fma: impl Fn(f64, f64, f64) -> f64) -> f64 {
+fn ln(x: f64, fma: impl Fn(f64, f64, f64) -> f64) -> f64 {
     let root_half: u64 = 0x3fe6_a09e_667f_3bcd;
     let one: u64 = 0x3ff0_0000_0000_0000;
     let mantissa: u64 = 0x000f_ffff_ffff_ffff;
@@ -257,31 +201,9 @@ fn ln_f64(x: f64, fma: impl Fn(f64, f64, f64) -> f64) -> f64 {
     fma(k, ln2_high, f - (half_square - tail))
 }
 
-/// The same in single precision.
-#[inline(always)]
-fn ln_f32(x: f32, fma: impl Fn(f32, f32, f32) -> f32) -> f32 {
-    let root_half: u32 = 0x3f35_04f3;
-    let one: u32 = 0x3f80_0000;
-    let mantissa: u32 = 0x007f_ffff;
-    let two_23: u32 = 0x4b00_0000;
-    let ln2_high: f32 = 6.931_381e-1;
-    let ln2_low: f32 = 9.058_001e-6;
-    let shifted = x.to_bits().wrapping_add(one - root_half);
-    let k = f32::from_bits(two_23 | (shifted >> 23)) - (8_388_608.0 + 127.0);
-    let f = f32::from_bits((shifted & mantissa).wrapping_add(root_half)) - 1.0;
-    let t = f / (2.0 + f);
-    let z = t * t;
-    let w = z * z;
-    let even = fma(w, 0.242_790_79, 0.400_009_72) * w;
-    let odd = fma(w, 0.284_987_87, 0.666_666_6) * z;
-    let half_square = 0.5 * f * f;
-    let tail = fma(t, half_square + (odd + even), k * ln2_low);
-    fma(k, ln2_high, f - (half_square - tail))
-}
-
 #[cfg(test)]
 mod tests {
-    use super::{ln_f32, ln_f64};
+    use super::ln;
 
     /// Arguments over all exponents and close to one, by a fixed multiplicative sequence.
     fn arguments() -> impl Iterator<Item = f64> {
@@ -292,30 +214,15 @@ mod tests {
         wide.chain((0..200_000).map(|i| 0.5 + f64::from(i) * 1e-5))
     }
 
-    fn ulps(found: f64, expected: f64, epsilon: f64) -> f64 {
-        (found - expected).abs() / (expected.abs().max(f64::MIN_POSITIVE) * epsilon)
-    }
-
     /// fdlibm states less than one unit in the last place; the library's own logarithm may be half
     /// a unit off, and an ulp is up to twice epsilon relative.
     #[test]
-    fn logarithms_agree_with_the_library_to_an_ulp() {
-        let exact = (ln_f64(1.0, f64::mul_add), ln_f32(1.0, f32::mul_add));
-        assert_eq!(exact, (0.0, 0.0));
-        let single = f64::from(f32::EPSILON);
+    fn logarithm_agrees_with_the_library_to_an_ulp() {
+        assert_eq!(ln(1.0, f64::mul_add), 0.0);
         for x in arguments().filter(|&x| x != 1.0) {
-            for ln in [ln_f64(x, f64::mul_add), ln_f64(x, |a, b, c| a * b + c)] {
-                assert!(ulps(ln, x.ln(), f64::EPSILON) <= 1.5, "{x:e}");
-            }
-            let x = x as f32;
-            if !x.is_normal() || x == 1.0 {
-                continue;
-            }
-            for ln in [ln_f32(x, f32::mul_add), ln_f32(x, |a, b, c| a * b + c)] {
-                assert!(
-                    ulps(f64::from(ln), f64::from(x).ln(), single) <= 1.5,
-                    "{x:e}"
-                );
+            for found in [ln(x, f64::mul_add), ln(x, |a, b, c| a * b + c)] {
+                let size = x.ln().abs().max(f64::MIN_POSITIVE);
+                assert!((found - x.ln()).abs() <= 1.5 * f64::EPSILON * size, "{x:e}");
             }
         }
     }

@@ -7,7 +7,6 @@
 //! | fit once | [`Spline::fit`], as `ThinPlateSpline::fit` for D outputs |
 //! | fit repeatedly | [`Factorization`] with a [`SplineWorkspace`] |
 //! | choose kernel, smoothing, weights | [`FitOptions`], [`Smoothing`], [`Kernel`] |
-//! | propagate uncertainty to values | [`Factorization::influence_into`] |
 //! | propagate uncertainty to Jacobians | [`Factorization::jacobian_influence_into`] |
 //! | see condition, residual and iterations | [`FitReport`] |
 //! | strain from matches whose neighbours share errors | [`StrainSpline`] |
@@ -39,7 +38,6 @@ pub use error::TpsError;
 pub use evaluate::{Spline, ThinPlateSpline};
 pub use fit::{Factorization, LambdaPath, SplineWorkspace};
 pub use kernel::{Kernel, KernelDerivatives, KernelScalar, NegR, R2LogR, R3};
-pub use lanes::Scalar;
 pub use local::{LocalField, LocalValue, nearest_rows};
 pub use options::{FitOptions, FitReport, Solver};
 pub use smoothing::{RobustFit, RobustSpline, Smoothing, StrainSpline};

@@ -1,7 +1,7 @@
 //! Options of a fit (kernel, smoothing, weights, solver) and its report.
 
 use crate::{
-    R2LogR, Scalar, Smoothing, StopReason, TpsError,
+    R2LogR, Smoothing, StopReason, TpsError,
     error::{validate_smoothing, validate_weights},
 };
 
@@ -53,36 +53,36 @@ pub enum Solver {
 #[cfg_attr(
     feature = "serde",
     serde(
-        try_from = "Unchecked<T, K>",
-        bound(deserialize = "T: Scalar + serde::Deserialize<'de>, K: serde::Deserialize<'de>")
+        try_from = "Unchecked<K>",
+        bound(deserialize = "K: serde::Deserialize<'de>")
     )
 )]
-pub struct FitOptions<T, K = R2LogR> {
+pub struct FitOptions<K = R2LogR> {
     pub(crate) kernel: K,
-    pub(crate) smoothing: Smoothing<T>,
-    pub(crate) weights: Option<Vec<T>>,
-    pub(crate) rank_tolerance: T,
+    pub(crate) smoothing: Smoothing,
+    pub(crate) weights: Option<Vec<f64>>,
+    pub(crate) rank_tolerance: f64,
     pub(crate) solver: Solver,
-    pub(crate) tolerance: T,
+    pub(crate) tolerance: f64,
 }
 
 /// Options as they are read, before the setters have checked them.
 #[cfg(feature = "serde")]
 #[derive(serde::Deserialize)]
-struct Unchecked<T, K> {
+struct Unchecked<K> {
     kernel: K,
-    smoothing: Smoothing<T>,
-    weights: Option<Vec<T>>,
-    rank_tolerance: T,
+    smoothing: Smoothing,
+    weights: Option<Vec<f64>>,
+    rank_tolerance: f64,
     solver: Solver,
-    tolerance: T,
+    tolerance: f64,
 }
 
 #[cfg(feature = "serde")]
-impl<T: Scalar, K> TryFrom<Unchecked<T, K>> for FitOptions<T, K> {
+impl<K> TryFrom<Unchecked<K>> for FitOptions<K> {
     type Error = TpsError;
 
-    fn try_from(read: Unchecked<T, K>) -> Result<Self, TpsError> {
+    fn try_from(read: Unchecked<K>) -> Result<Self, TpsError> {
         let options = Self::new(read.kernel)
             .with_smoothing(read.smoothing)?
             .with_rank_tolerance(read.rank_tolerance)?
@@ -95,18 +95,18 @@ impl<T: Scalar, K> TryFrom<Unchecked<T, K>> for FitOptions<T, K> {
     }
 }
 
-impl<T: Scalar> Default for FitOptions<T, R2LogR> {
+impl Default for FitOptions<R2LogR> {
     fn default() -> Self {
         Self::new(R2LogR)
     }
 }
 
-impl<T: Scalar, K> FitOptions<T, K> {
+impl<K> FitOptions<K> {
     /// Interpolation with this kernel, all points alike.
     ///
     /// ```
     /// use tactile_tps::{FitOptions, R3};
-    /// let options = FitOptions::<f64, _>::new(R3);
+    /// let options = FitOptions::<_>::new(R3);
     /// let _ = options;
     /// ```
     pub fn new(kernel: K) -> Self {
@@ -114,9 +114,9 @@ impl<T: Scalar, K> FitOptions<T, K> {
             kernel,
             smoothing: Smoothing::None,
             weights: None,
-            rank_tolerance: T::zero(),
+            rank_tolerance: 0.0,
             solver: Solver::Automatic,
-            tolerance: T::narrow(1e-10),
+            tolerance: (1e-10),
         }
     }
 
@@ -138,7 +138,7 @@ impl<T: Scalar, K> FitOptions<T, K> {
     ///
     /// # Errors
     /// [`TpsError::Lambda`] for a λ that is negative, NaN or infinite.
-    pub fn with_smoothing(mut self, smoothing: Smoothing<T>) -> Result<Self, TpsError> {
+    pub fn with_smoothing(mut self, smoothing: Smoothing) -> Result<Self, TpsError> {
         validate_smoothing(&smoothing)?;
         self.smoothing = smoothing;
         Ok(self)
@@ -166,7 +166,7 @@ impl<T: Scalar, K> FitOptions<T, K> {
     /// # Errors
     /// [`TpsError::Weight`] for a weight that is negative, NaN or infinite, [`TpsError::Empty`] if
     /// none is positive. Whether there are as many weights as points is checked by the fit.
-    pub fn with_weights(mut self, weights: Vec<T>) -> Result<Self, TpsError> {
+    pub fn with_weights(mut self, weights: Vec<f64>) -> Result<Self, TpsError> {
         validate_weights(&weights, weights.len())?;
         self.weights = Some(weights);
         Ok(self)
@@ -185,7 +185,7 @@ impl<T: Scalar, K> FitOptions<T, K> {
     ///
     /// # Errors
     /// As [`with_weights`](Self::with_weights).
-    pub fn set_weights(&mut self, weights: &[T]) -> Result<(), TpsError> {
+    pub fn set_weights(&mut self, weights: &[f64]) -> Result<(), TpsError> {
         validate_weights(weights, weights.len())?;
         let kept = self.weights.get_or_insert_default();
         kept.clear();
@@ -215,8 +215,8 @@ impl<T: Scalar, K> FitOptions<T, K> {
     ///
     /// # Errors
     /// [`TpsError::RankTolerance`] unless in [0, 1).
-    pub fn with_rank_tolerance(mut self, tolerance: T) -> Result<Self, TpsError> {
-        let value = tolerance.widen();
+    pub fn with_rank_tolerance(mut self, tolerance: f64) -> Result<Self, TpsError> {
+        let value = tolerance;
         if !(0.0..1.0).contains(&value) {
             return Err(TpsError::RankTolerance { value });
         }
@@ -228,7 +228,7 @@ impl<T: Scalar, K> FitOptions<T, K> {
     ///
     /// ```
     /// use tactile_tps::{FitOptions, Solver};
-    /// let to_rounding = FitOptions::<f64>::default().with_solver(Solver::Direct);
+    /// let to_rounding = FitOptions::default().with_solver(Solver::Direct);
     /// assert_ne!(to_rounding, FitOptions::default());
     /// ```
     #[must_use]
@@ -260,8 +260,8 @@ impl<T: Scalar, K> FitOptions<T, K> {
     ///
     /// # Errors
     /// [`TpsError::Tolerance`] unless in (0, 1).
-    pub fn with_tolerance(mut self, tolerance: T) -> Result<Self, TpsError> {
-        let value = tolerance.widen();
+    pub fn with_tolerance(mut self, tolerance: f64) -> Result<Self, TpsError> {
+        let value = tolerance;
         if !(value > 0.0 && value < 1.0) {
             return Err(TpsError::Tolerance { value });
         }

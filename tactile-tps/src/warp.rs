@@ -5,26 +5,26 @@ use core::any::Any;
 use nalgebra::{DMatrix, Point, SMatrix, SVector};
 
 use crate::{
-    FitOptions, Kernel, Scalar, Spline, ThinPlateSpline, TpsError,
+    FitOptions, Kernel, Spline, ThinPlateSpline, TpsError,
     error::{same_length, validate_pairs},
 };
 
-/// A map of `D`-dimensional space onto itself. Object safe: a `Box<dyn Warp<f64, 3>>` is a warp.
+/// A map of `D`-dimensional space onto itself. Object safe: a `Box<dyn Warp<3>>` is a warp.
 ///
 /// ```
 /// use nalgebra::{Point2, Matrix2, Vector2};
 /// use tactile_tps::{Affine, Warp};
-/// let warp: Box<dyn Warp<f64, 2>> = Box::new(Affine { linear: Matrix2::identity() * 2.0,
+/// let warp: Box<dyn Warp<2>> = Box::new(Affine { linear: Matrix2::identity() * 2.0,
 ///     offset: Vector2::new(1.0, 0.0) });
 /// assert_eq!(warp.apply(&Point2::new(1.0, 3.0)), Point2::new(3.0, 6.0));
 /// ```
-pub trait Warp<T: Scalar, const D: usize> {
+pub trait Warp<const D: usize> {
     /// The image of a point.
-    fn apply(&self, point: &Point<T, D>) -> Point<T, D>;
+    fn apply(&self, point: &Point<f64, D>) -> Point<f64, D>;
 
     /// The Jacobian ∂fᵢ/∂xⱼ at a point (row i, column j). For a deformation this is the
     /// deformation gradient.
-    fn jacobian(&self, point: &Point<T, D>) -> SMatrix<T, D, D>;
+    fn jacobian(&self, point: &Point<f64, D>) -> SMatrix<f64, D, D>;
 
     /// The images of many points, into the caller's memory.
     ///
@@ -32,8 +32,8 @@ pub trait Warp<T: Scalar, const D: usize> {
     /// [`TpsError::Length`] if the slices differ in length.
     fn apply_into(
         &self,
-        points: &[Point<T, D>],
-        images: &mut [Point<T, D>],
+        points: &[Point<f64, D>],
+        images: &mut [Point<f64, D>],
     ) -> Result<(), TpsError> {
         same_length(points.len(), images.len())?;
         points
@@ -64,8 +64,8 @@ pub trait Warp<T: Scalar, const D: usize> {
     /// [`TpsError::Length`] if the slices differ in length.
     fn jacobian_into(
         &self,
-        points: &[Point<T, D>],
-        jacobians: &mut [SMatrix<T, D, D>],
+        points: &[Point<f64, D>],
+        jacobians: &mut [SMatrix<f64, D, D>],
     ) -> Result<(), TpsError> {
         same_length(points.len(), jacobians.len())?;
         points
@@ -78,7 +78,7 @@ pub trait Warp<T: Scalar, const D: usize> {
 
 /// A family of warps with a rule to choose one from weighted pairs of points.
 ///
-/// Object safe: a pipeline holds an `Arc<dyn WarpModel<f64, 3> + Send + Sync>`.
+/// Object safe: a pipeline holds an `Arc<dyn WarpModel<3> + Send + Sync>`.
 /// Where the kind of warp is fixed, fit it by its own type:
 /// [`Spline::fit`], [`Affine::fit`], [`Affine::fit_rigid`].
 ///
@@ -89,7 +89,7 @@ pub trait Warp<T: Scalar, const D: usize> {
 /// # fn main() -> Result<(), tactile_tps::TpsError> {
 /// let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
 /// let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
-/// let models: [Arc<dyn WarpModel<f64, 2> + Send + Sync>; 2] = [Arc::new(FitOptions::default()),
+/// let models: [Arc<dyn WarpModel<2> + Send + Sync>; 2] = [Arc::new(FitOptions::default()),
 ///     Arc::new(AffineModel::General)];
 /// let mut misfits = Vec::new();
 /// for model in models {
@@ -100,7 +100,7 @@ pub trait Warp<T: Scalar, const D: usize> {
 /// # Ok(())
 /// # }
 /// ```
-pub trait WarpModel<T: Scalar, const D: usize> {
+pub trait WarpModel<const D: usize> {
     /// The warp that takes each source to its target as nearly as the model allows. Without weights
     /// all count alike.
     ///
@@ -108,10 +108,10 @@ pub trait WarpModel<T: Scalar, const D: usize> {
     /// See [`TpsError`].
     fn fit(
         &self,
-        sources: &[Point<T, D>],
-        targets: &[Point<T, D>],
-        weights: Option<&[T]>,
-    ) -> Result<Box<dyn Warp<T, D> + Send + Sync>, TpsError>;
+        sources: &[Point<f64, D>],
+        targets: &[Point<f64, D>],
+        weights: Option<&[f64]>,
+    ) -> Result<Box<dyn Warp<D> + Send + Sync>, TpsError>;
 
     /// The Jacobians at `points` of the warp that [`fit`](Self::fit) finds, for one set of pairs of
     /// a series.
@@ -141,9 +141,9 @@ pub trait WarpModel<T: Scalar, const D: usize> {
     fn jacobians_through(
         &self,
         memory: &mut SeriesMemory,
-        pairs: Pairs<'_, T, D>,
-        points: &[Point<T, D>],
-        jacobians: &mut [SMatrix<T, D, D>],
+        pairs: Pairs<'_, D>,
+        points: &[Point<f64, D>],
+        jacobians: &mut [SMatrix<f64, D, D>],
     ) -> Result<(), TpsError> {
         let _ = memory;
         self.fit(pairs.sources, pairs.targets, pairs.weights)?
@@ -161,47 +161,47 @@ pub trait WarpModel<T: Scalar, const D: usize> {
 ///     Some(&[0.5][..]));
 /// ```
 #[derive(Clone, Copy, Debug)]
-pub struct Pairs<'a, T: Scalar, const D: usize> {
+pub struct Pairs<'a, const D: usize> {
     /// From where.
-    pub sources: &'a [Point<T, D>],
+    pub sources: &'a [Point<f64, D>],
     /// To where.
-    pub targets: &'a [Point<T, D>],
+    pub targets: &'a [Point<f64, D>],
     /// How much each pair counts. Without weights all count alike.
-    pub weights: Option<&'a [T]>,
+    pub weights: Option<&'a [f64]>,
 }
 
-impl<T: Scalar, const D: usize, K: Kernel> Warp<T, D> for Spline<T, D, D, K> {
-    fn apply(&self, point: &Point<T, D>) -> Point<T, D> {
+impl<const D: usize, K: Kernel> Warp<D> for Spline<D, D, K> {
+    fn apply(&self, point: &Point<f64, D>) -> Point<f64, D> {
         Spline::apply(self, point)
     }
-    fn jacobian(&self, point: &Point<T, D>) -> SMatrix<T, D, D> {
+    fn jacobian(&self, point: &Point<f64, D>) -> SMatrix<f64, D, D> {
         Spline::jacobian(self, point)
     }
     fn apply_into(
         &self,
-        points: &[Point<T, D>],
-        images: &mut [Point<T, D>],
+        points: &[Point<f64, D>],
+        images: &mut [Point<f64, D>],
     ) -> Result<(), TpsError> {
         Spline::apply_into(self, points, images)
     }
     fn jacobian_into(
         &self,
-        points: &[Point<T, D>],
-        jacobians: &mut [SMatrix<T, D, D>],
+        points: &[Point<f64, D>],
+        jacobians: &mut [SMatrix<f64, D, D>],
     ) -> Result<(), TpsError> {
         Spline::jacobian_into(self, points, jacobians)
     }
 }
 
-impl<T: Scalar, const D: usize, K: Kernel + 'static> WarpModel<T, D> for FitOptions<T, K> {
+impl<const D: usize, K: Kernel + 'static> WarpModel<D> for FitOptions<K> {
     /// `weights`, where given, replace those of the options.
     fn fit(
         &self,
-        sources: &[Point<T, D>],
-        targets: &[Point<T, D>],
-        weights: Option<&[T]>,
-    ) -> Result<Box<dyn Warp<T, D> + Send + Sync>, TpsError> {
-        let spline: ThinPlateSpline<T, D, K> = match weights {
+        sources: &[Point<f64, D>],
+        targets: &[Point<f64, D>],
+        weights: Option<&[f64]>,
+    ) -> Result<Box<dyn Warp<D> + Send + Sync>, TpsError> {
+        let spline: ThinPlateSpline<D, K> = match weights {
             None => Spline::fit(sources, targets, self),
             Some(weights) => {
                 let weighted = self.clone().with_weights(weights.to_vec())?;
@@ -263,18 +263,14 @@ impl core::fmt::Debug for SeriesMemory {
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(
-    feature = "serde",
-    serde(bound = "T: Scalar + serde::Serialize + serde::de::DeserializeOwned")
-)]
-pub struct Affine<T: Scalar, const D: usize> {
+pub struct Affine<const D: usize> {
     /// The Jacobian A.
-    pub linear: SMatrix<T, D, D>,
+    pub linear: SMatrix<f64, D, D>,
     /// The image b of the origin.
-    pub offset: SVector<T, D>,
+    pub offset: SVector<f64, D>,
 }
 
-impl<T: Scalar, const D: usize> Default for Affine<T, D> {
+impl<const D: usize> Default for Affine<D> {
     /// The map that leaves every point where it is.
     fn default() -> Self {
         Self {
@@ -284,7 +280,7 @@ impl<T: Scalar, const D: usize> Default for Affine<T, D> {
     }
 }
 
-impl<T: Scalar, const D: usize> Affine<T, D> {
+impl<const D: usize> Affine<D> {
     /// The map of least Σ wᵢ |A xᵢ + b − yᵢ|²: A = C S⁺ with S = Σ w x xᵀ and C = Σ w y xᵀ about
     /// the weighted means.
     ///
@@ -307,9 +303,9 @@ impl<T: Scalar, const D: usize> Affine<T, D> {
     /// # Errors
     /// [`TpsError`] for no points, lengths that differ, or numbers that are not finite.
     pub fn fit(
-        sources: &[Point<T, D>],
-        targets: &[Point<T, D>],
-        weights: Option<&[T]>,
+        sources: &[Point<f64, D>],
+        targets: &[Point<f64, D>],
+        weights: Option<&[f64]>,
     ) -> Result<Self, TpsError> {
         let moments = Moments::new(sources, targets, weights)?;
         let scatter = DMatrix::from_fn(D, D, |i, j| moments.scatter[(i, j)]).svd(true, true);
@@ -318,7 +314,7 @@ impl<T: Scalar, const D: usize> Affine<T, D> {
         let inverse = scatter.pseudo_inverse(rounding).map_err(TpsError::custom)?;
         let linear = moments.cross * SMatrix::from_fn(|i, j| inverse[(i, j)]);
         Ok(Self {
-            linear: linear.map(T::narrow),
+            linear,
             offset: moments.offset(&linear),
         })
     }
@@ -342,24 +338,24 @@ impl<T: Scalar, const D: usize> Affine<T, D> {
     /// # Errors
     /// [`TpsError`] for no points, lengths that differ, or numbers that are not finite.
     pub fn fit_rigid(
-        sources: &[Point<T, D>],
-        targets: &[Point<T, D>],
-        weights: Option<&[T]>,
+        sources: &[Point<f64, D>],
+        targets: &[Point<f64, D>],
+        weights: Option<&[f64]>,
     ) -> Result<Self, TpsError> {
         let moments = Moments::new(sources, targets, weights)?;
         let rotation = nearest_rotation(&moments.cross);
         Ok(Self {
-            linear: rotation.map(T::narrow),
+            linear: rotation,
             offset: moments.offset(&rotation),
         })
     }
 }
 
-impl<T: Scalar, const D: usize> Warp<T, D> for Affine<T, D> {
-    fn apply(&self, point: &Point<T, D>) -> Point<T, D> {
+impl<const D: usize> Warp<D> for Affine<D> {
+    fn apply(&self, point: &Point<f64, D>) -> Point<f64, D> {
         Point::from(self.linear * point.coords + self.offset)
     }
-    fn jacobian(&self, _: &Point<T, D>) -> SMatrix<T, D, D> {
+    fn jacobian(&self, _: &Point<f64, D>) -> SMatrix<f64, D, D> {
         self.linear
     }
 }
@@ -373,16 +369,16 @@ struct Moments<const D: usize> {
 }
 
 impl<const D: usize> Moments<D> {
-    fn new<T: Scalar>(
-        sources: &[Point<T, D>],
-        targets: &[Point<T, D>],
-        weights: Option<&[T]>,
+    fn new(
+        sources: &[Point<f64, D>],
+        targets: &[Point<f64, D>],
+        weights: Option<&[f64]>,
     ) -> Result<Self, TpsError> {
         validate_pairs(sources, targets, weights)?;
-        let weight = |i: usize| weights.map_or(1.0, |w| w[i].widen());
-        let vector = |p: &Point<T, D>| p.coords.map(T::widen);
+        let weight = |i: usize| weights.map_or(1.0, |w| w[i]);
+        let vector = |p: &Point<f64, D>| p.coords;
         let total: f64 = (0..sources.len()).map(weight).sum();
-        let mean = |points: &[Point<T, D>]| {
+        let mean = |points: &[Point<f64, D>]| {
             // Means of differences to a point keep their digits where all points lie far from the
             // origin.
             let origin = vector(&points[0]);
@@ -405,8 +401,8 @@ impl<const D: usize> Moments<D> {
         })
     }
 
-    fn offset<T: Scalar>(&self, linear: &SMatrix<f64, D, D>) -> SVector<T, D> {
-        (self.target_mean - linear * self.source_mean).map(T::narrow)
+    fn offset(&self, linear: &SMatrix<f64, D, D>) -> SVector<f64, D> {
+        self.target_mean - linear * self.source_mean
     }
 }
 
@@ -434,7 +430,7 @@ fn nearest_rotation<const D: usize>(cross: &SMatrix<f64, D, D>) -> SMatrix<f64, 
 /// # fn main() -> Result<(), tactile_tps::TpsError> {
 /// let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
 /// let doubled = sources.map(|p| p * 2.0 + Vector2::new(1.0, 2.0));
-/// let warp: Box<dyn Warp<f64, 2> + Send + Sync> = AffineModel::General.fit(&sources, &doubled,
+/// let warp: Box<dyn Warp<2> + Send + Sync> = AffineModel::General.fit(&sources, &doubled,
 ///     None)?;
 /// assert!((warp.apply(&Point2::new(5.0, 1.0)) - Point2::new(11.0, 4.0)).norm() < 1e-14);
 /// let motion = AffineModel::Rigid.fit(&sources, &doubled, None)?;
@@ -453,13 +449,13 @@ pub enum AffineModel {
     Rigid,
 }
 
-impl<T: Scalar, const D: usize> WarpModel<T, D> for AffineModel {
+impl<const D: usize> WarpModel<D> for AffineModel {
     fn fit(
         &self,
-        sources: &[Point<T, D>],
-        targets: &[Point<T, D>],
-        weights: Option<&[T]>,
-    ) -> Result<Box<dyn Warp<T, D> + Send + Sync>, TpsError> {
+        sources: &[Point<f64, D>],
+        targets: &[Point<f64, D>],
+        weights: Option<&[f64]>,
+    ) -> Result<Box<dyn Warp<D> + Send + Sync>, TpsError> {
         let fit = match self {
             Self::General => Affine::fit,
             Self::Rigid => Affine::fit_rigid,

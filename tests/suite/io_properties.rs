@@ -102,7 +102,7 @@ fn uses_of_tables(edits: &[Edit]) -> [Option<f64>; 3] {
     let spline = || {
         let sources = read_points::<2>(file(&mutated(POINTS, edits)).path()).ok()?;
         let targets: Vec<Point<f64, 2>> = sources.iter().map(|p| p * 1.01).collect();
-        let spline = ThinPlateSpline::<f64, 2>::fit(&sources, &targets, &Default::default());
+        let spline = ThinPlateSpline::<2>::fit(&sources, &targets, &Default::default());
         Some(spline.ok()?.apply(&sources[0]).x)
     };
     let line = || {

@@ -434,7 +434,7 @@ impl<const D: usize> Run<D> {
     }
 
     /// Fits the spline to the mean partners, moves the model, and returns the largest step.
-    fn fit(&mut self, smoothing: Smoothing<f64>) -> f64 {
+    fn fit(&mut self, smoothing: Smoothing) -> f64 {
         let (means, weights): (Vec<_>, Vec<_>) =
             (0..self.model.len()).map(|i| self.partner(i)).unzip();
         let kept: Vec<usize> = (0..weights.len()).filter(|&i| weights[i] > 1e-6).collect();

@@ -3,7 +3,6 @@
 use super::{Compatibility, LengthMaximum, Neighbourhood, RelaxationLabelling};
 use crate::ShapeContexts;
 use nalgebra::{Point, SVector};
-use tactile_tps::Scalar;
 
 /// Links that are kept between sweeps. Those of more are computed anew in every sweep.
 const MAX_STORED_LINKS: usize = 1 << 25;
@@ -476,7 +475,7 @@ fn slack_gain(support: &[f64], columns: usize, share: f64) -> f64 {
 /// hundred roundings.
 fn settled_on(row: &[f64]) -> Option<usize> {
     let sum: f64 = row.iter().sum();
-    let enough = sum * (1.0 - 100.0 * f64::UNIT_ROUNDOFF);
+    let enough = sum * (1.0 - 50.0 * f64::EPSILON);
     row[..row.len() - 1]
         .iter()
         .position(|&p| p > 0.0 && p >= enough)

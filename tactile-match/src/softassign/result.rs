@@ -12,7 +12,7 @@ use crate::{
 use nalgebra::{Point, SMatrix};
 use std::ops::ControlFlow;
 use std::sync::{Arc, OnceLock};
-use tactile_tps::{Scalar, Smoothing, TpsError, Warp};
+use tactile_tps::{Smoothing, TpsError, Warp};
 
 // What a run of the matcher has found, read from its workspace.
 
@@ -222,7 +222,7 @@ impl<const D: usize> ModelSpline<D> {
 
     /// The spline that takes the model, or its sample, to `warped`. Where none goes through these
     /// positions a smoothed one, and `warped`, unless that is of a sample, becomes what it gives.
-    fn through(&self, warped: &mut [Point<f64, D>]) -> Box<dyn Warp<f64, D> + Send + Sync> {
+    fn through(&self, warped: &mut [Point<f64, D>]) -> Box<dyn Warp<D> + Send + Sync> {
         let Sources { rows, apart, .. } = &*self.sources;
         let mut images = if rows.is_empty() {
             warped.to_vec()
@@ -249,17 +249,17 @@ impl<const D: usize> ModelSpline<D> {
 struct Lazy<const D: usize> {
     sources: Arc<Sources<D>>,
     images: Vec<Point<f64, D>>,
-    spline: OnceLock<Box<dyn Warp<f64, D> + Send + Sync>>,
+    spline: OnceLock<Box<dyn Warp<D> + Send + Sync>>,
 }
 
 impl<const D: usize> Lazy<D> {
-    fn spline(&self) -> &dyn Warp<f64, D> {
+    fn spline(&self) -> &dyn Warp<D> {
         let fit = || warp_through(&self.sources, &mut self.images.clone());
         &**self.spline.get_or_init(fit)
     }
 }
 
-impl<const D: usize> Warp<f64, D> for Lazy<D> {
+impl<const D: usize> Warp<D> for Lazy<D> {
     fn apply(&self, point: &Point<f64, D>) -> Point<f64, D> {
         self.spline().apply(point)
     }
@@ -308,11 +308,11 @@ fn are_apart<const D: usize>(points: &[Point<f64, D>]) -> bool {
 fn warp_through<const D: usize>(
     sources: &Sources<D>,
     warped: &mut [Point<f64, D>],
-) -> Box<dyn Warp<f64, D> + Send + Sync> {
+) -> Box<dyn Warp<D> + Send + Sync> {
     let model = &sources.points;
     let exact = sources.system().through(model, warped);
     // To half the digits.
-    if hard::follows(&*exact, model, warped, f64::UNIT_ROUNDOFF.sqrt()) {
+    if hard::follows(&*exact, model, warped, (0.5 * f64::EPSILON).sqrt()) {
         return exact;
     }
     // Smoothing of the spline where none goes through all positions.

@@ -9,24 +9,24 @@ use super::{
     largest, relative,
 };
 use crate::{
-    FitOptions, FitReport, Kernel, Progress, Scalar, Smoothing, Spline, StopReason, TpsError,
+    FitOptions, FitReport, Kernel, Progress, Smoothing, Spline, StopReason, TpsError,
     error::{same_length, validate_smoothing, validate_weights},
     evaluate::{BLOCK, KernelSum, Solution},
     lanes::{Job, Lane, dispatch},
 };
 
 /// A system with what is to be solved with it.
-struct Task<'a, T, const D: usize> {
+struct Task<'a, const D: usize> {
     system: &'a System<D>,
-    weights: Option<&'a [T]>,
-    smoothing: Smoothing<T>,
+    weights: Option<&'a [f64]>,
+    smoothing: Smoothing,
     /// Measure the residual and refine sooner.
     careful: bool,
     /// Where there is no factor.
     iterative: Option<&'a Iterative<D>>,
 }
 
-impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
+impl<const D: usize, K: Kernel> Factorization<D, K> {
     /// Factors `sources` for the kernel, weights and λ of `options`: O(n³/3) time, O(n²) memory.
     ///
     /// With [`Smoothing::Gcv`] the matrix is decomposed instead, at some twenty times the cost.
@@ -50,7 +50,7 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
     ///
     /// # Errors
     /// [`TpsError`] for bad input, or a kernel that is not definite on these points.
-    pub fn new(sources: &[Point<T, D>], options: &FitOptions<T, K>) -> Result<Self, TpsError> {
+    pub fn new(sources: &[Point<f64, D>], options: &FitOptions<K>) -> Result<Self, TpsError> {
         Self::without_points(options.kernel.clone()).refactor(sources, options)
     }
 
@@ -81,8 +81,8 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
     /// As [`new`](Self::new).
     pub fn refactor(
         self,
-        sources: &[Point<T, D>],
-        options: &FitOptions<T, K>,
+        sources: &[Point<f64, D>],
+        options: &FitOptions<K>,
     ) -> Result<Self, TpsError> {
         self.refactor_watched(sources, options, &mut |_| ControlFlow::Continue(()))
     }
@@ -91,8 +91,8 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
     /// to `watch`, which may stop it.
     pub(crate) fn refactor_watched(
         self,
-        sources: &[Point<T, D>],
-        options: &FitOptions<T, K>,
+        sources: &[Point<f64, D>],
+        options: &FitOptions<K>,
         watch: &mut Watch<'_>,
     ) -> Result<Self, TpsError> {
         let mut this = self.with_points(sources, options)?;
@@ -144,17 +144,17 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
     /// [`TpsError`] for invalid targets.
     pub fn fit<const M: usize>(
         &self,
-        targets: &[Point<T, M>],
-    ) -> Result<Spline<T, D, M, K>, TpsError> {
+        targets: &[Point<f64, M>],
+    ) -> Result<Spline<D, M, K>, TpsError> {
         self.fit_watched(targets, |_| ControlFlow::Continue(()))
     }
 
     /// As [`fit`](Self::fit), reporting the progress of an iterative solver to `watch`.
     pub(crate) fn fit_watched<const M: usize>(
         &self,
-        targets: &[Point<T, M>],
+        targets: &[Point<f64, M>],
         mut watch: impl FnMut(&Progress) -> ControlFlow<()>,
-    ) -> Result<Spline<T, D, M, K>, TpsError> {
+    ) -> Result<Spline<D, M, K>, TpsError> {
         let mut spline = Spline::zero(self.kernel.clone());
         let task = Task {
             careful: true,
@@ -171,7 +171,7 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
     }
 
     /// A quick fit with what the factorisation was made with.
-    fn own_task(&self) -> Task<'_, T, D> {
+    fn own_task(&self) -> Task<'_, D> {
         Task {
             system: &self.system,
             weights: self.weights.as_deref(),
@@ -221,10 +221,10 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
     pub fn refit_with<const M: usize>(
         &self,
         workspace: &mut SplineWorkspace<D>,
-        targets: &[Point<T, M>],
-        weights: Option<&[T]>,
-        smoothing: Option<Smoothing<T>>,
-        spline: &mut Spline<T, D, M, K>,
+        targets: &[Point<f64, M>],
+        weights: Option<&[f64]>,
+        smoothing: Option<Smoothing>,
+        spline: &mut Spline<D, M, K>,
     ) -> Result<(), TpsError> {
         let smoothing = smoothing.unwrap_or(self.smoothing);
         validate_smoothing(&smoothing)?;
@@ -274,7 +274,7 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
     /// Whether the system at hand serves a refit.
     ///
     /// An interpolating spline depends on its weights only in which of them are positive.
-    fn serves(&self, smoothing: Smoothing<T>, centre_weights: &[f64]) -> bool {
+    fn serves(&self, smoothing: Smoothing, centre_weights: &[f64]) -> bool {
         if smoothing == self.smoothing && centre_weights == self.centre_weights {
             return true;
         }
@@ -289,7 +289,7 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
     /// A new factor, spectrum or preconditioner.
     fn build(
         &self,
-        smoothing: Smoothing<T>,
+        smoothing: Smoothing,
         centre_weights: &[f64],
         iterates: bool,
         system: &mut System<D>,
@@ -313,10 +313,10 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
     /// Solves and fills the spline, reporting an iteration's progress to `watch`.
     fn finish<const M: usize>(
         &self,
-        task: &Task<'_, T, D>,
+        task: &Task<'_, D>,
         buffers: &mut Buffers,
-        targets: &[Point<T, M>],
-        spline: &mut Spline<T, D, M, K>,
+        targets: &[Point<f64, M>],
+        spline: &mut Spline<D, M, K>,
         watch: &mut Watch<'_>,
     ) -> Result<(), TpsError> {
         let (system, centres) = (task.system, &self.centres);
@@ -329,7 +329,7 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
         }
         // Targets far from zero lose digits. Differences to the first are exact where they are
         // close to it.
-        let origin: [f64; M] = core::array::from_fn(|k| targets[0][k].widen());
+        let origin: [f64; M] = core::array::from_fn(|k| targets[0][k]);
         centres.gather(targets, task.weights, &origin, buffers);
         if gcv {
             let (needed, found) = (system.affine.q, system.active.len());
@@ -376,66 +376,20 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
             weights: &buffers.weights,
             constant: core::array::from_fn(|k| origin[k] + affine[k][0]),
             gradient: affine.map(|a| system.span.gradient(&a)),
-            level: numbers.fold(0.0, |m, x| f64::max(m, x.widen().abs())),
+            level: numbers.fold(0.0, |m, x| f64::max(m, x.abs())),
         };
         spline.assign(&self.kernel, &solution);
         Ok(())
     }
 
-    /// Influence of each target on the spline's value at each point: aⱼ in f(x) = Σⱼ aⱼ yⱼ.
-    ///
-    /// Goes row by row into the caller's memory, `n` entries (one per source point) a point.
-    /// Allocates nothing once the workspace has grown.
-    ///
-    /// The same for every output and all targets, with the weights and λ of the factorisation. Σ aⱼ
-    /// = 1, and Σ aⱼ xⱼ = x where the points span space. Targets with covariances Cⱼ give f(x) the
-    /// covariance Σ aⱼ² Cⱼ. O(n²) a point.
-    ///
-    /// ```
-    /// use nalgebra::Point2;
-    /// use tactile_tps::{Factorization, FitOptions, SplineWorkspace};
-    /// # fn main() -> Result<(), tactile_tps::TpsError> {
-    /// let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4,
-    ///     0.6]].map(Point2::from);
-    /// let factorization = Factorization::<f64, 2>::new(&sources, &FitOptions::default())?;
-    /// let queries = [Point2::new(0.5, 0.5), sources[1]];
-    /// let mut influence = [0.0; 2 * 5];
-    /// factorization.influence_into(&mut SplineWorkspace::default(), &queries, &mut influence)?;
-    /// let standard_error = 0.01 * influence[..5].iter().map(|a| a * a).sum::<f64>().sqrt();
-    /// assert!((influence[..5].iter().sum::<f64>() - 1.0).abs() < 1e-14 && standard_error < 0.01);
-    /// // At a source point the spline follows its target alone.
-    /// assert!((influence[5 + 1] - 1.0).abs() < 1e-14 && influence[5 + 2].abs() < 1e-14);
-    /// # Ok(())
-    /// # }
-    /// ```
-    ///
-    /// # Errors
-    /// [`TpsError::DependsOnTargets`] if λ is left to cross-validation, [`TpsError::NoFactor`] if
-    /// the solver is iterative, [`TpsError::Length`] if `influence` is not of that length.
-    pub fn influence_into(
-        &self,
-        workspace: &mut SplineWorkspace<D>,
-        points: &[Point<T, D>],
-        influence: &mut [T],
-    ) -> Result<(), TpsError> {
-        self.linear(points.len(), influence.len())?;
-        // Four right-hand sides at a time read the factor once.
-        for (points, rows) in points.chunks(4).zip(influence.chunks_mut(4 * self.len())) {
-            let side = |r: usize| Side::new(self, &points[r.min(points.len() - 1)], None);
-            let sides: [Side<D>; 4] = core::array::from_fn(side);
-            self.follow(&sides, &mut workspace.buffers, |r, i, a| {
-                if r < points.len() {
-                    rows[r * self.len() + i] = a;
-                }
-            });
-        }
-        Ok(())
-    }
-
     /// Influence of each target on the Jacobian at each point: bⱼ in J(x) = Σⱼ yⱼ bⱼᵀ.
     ///
-    /// Goes row by row into the caller's memory, `n` entries (one per source point) a point.
-    /// Allocates nothing once the workspace has grown.
+    /// Goes row by row into the caller's memory, `n` entries (one per source point) per point.
+    /// Allocates nothing once the workspace has grown. O(n²) per point.
+    ///
+    /// The same for every output and all targets, with the weights and λ of the factorisation.
+    /// Σ bⱼ = 0, and Σ xⱼ bⱼᵀ = I where the points span space. Targets with covariances Cⱼ give J
+    /// the covariance Σ Cⱼ ⊗ bⱼbⱼᵀ.
     ///
     /// ```
     /// use nalgebra::{Matrix2, Point2, Vector2};
@@ -444,7 +398,7 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
     /// let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4,
     ///     0.6]].map(Point2::from);
     /// let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
-    /// let (factorization, x) = (Factorization::<f64, 2>::new(&sources, &FitOptions::default())?,
+    /// let (factorization, x) = (Factorization::<2>::new(&sources, &FitOptions::default())?,
     ///     Point2::new(0.5, 0.5));
     /// let mut influence = [Vector2::zeros(); 5];
     /// factorization.jacobian_influence_into(&mut SplineWorkspace::default(), &[x],
@@ -457,17 +411,17 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
     /// ```
     ///
     /// # Errors
-    /// As [`influence_into`](Self::influence_into).
+    /// [`TpsError::DependsOnTargets`] if λ is left to cross-validation, [`TpsError::NoFactor`] if
+    /// the solver is iterative, [`TpsError::Length`] if `influence` is not of that length.
     pub fn jacobian_influence_into(
         &self,
         workspace: &mut SplineWorkspace<D>,
-        points: &[Point<T, D>],
-        influence: &mut [SVector<T, D>],
+        points: &[Point<f64, D>],
+        influence: &mut [SVector<f64, D>],
     ) -> Result<(), TpsError> {
         self.linear(points.len(), influence.len())?;
         for (point, row) in points.iter().zip(influence.chunks_exact_mut(self.len())) {
-            let sides: [Side<D>; D] = core::array::from_fn(|k| Side::new(self, point, Some(k)));
-            self.follow(&sides, &mut workspace.buffers, |k, i, b| row[i][k] = b);
+            self.follow(point, &mut workspace.buffers, row);
         }
         Ok(())
     }
@@ -483,9 +437,9 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
     /// and systems without a factor.
     pub(crate) fn left_out<const M: usize>(
         &self,
-        targets: &[Point<T, M>],
+        targets: &[Point<f64, M>],
         parts: &[Vec<usize>],
-    ) -> Option<Vec<SVector<T, M>>> {
+    ) -> Option<Vec<SVector<f64, M>>> {
         let (n, system) = (self.centres.len(), &self.system);
         let lambda = self.inner_lambda(self.smoothing);
         // A row of a part must be a row of the system.
@@ -521,7 +475,7 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
             }
             let r = factor.solve(&DMatrix::from_fn(part.len(), M, |a, m| w[m * n + part[a]]));
             for (a, &i) in part.iter().enumerate() {
-                missed[i] = SVector::from_fn(|m, _| T::narrow(r[(a, m)]));
+                missed[i] = SVector::from_fn(|m, _| r[(a, m)]);
             }
         }
         Some(missed)
@@ -537,38 +491,38 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
         }
     }
 
-    /// Solves for the influence of every source point on each right-hand side, and hands each to
-    /// `sink`.
+    /// The influence of every source point on the Jacobian at `point`, into `row`.
     ///
     /// The value is f(x) = k(x)ᵀw + p(x)ᵀa with (w, a) from the symmetric system A(w, a) = (y, 0).
     /// So f(x) = α(x)ᵀy for the first part of A(α, β) = (k(x), p(x)): one solve, whatever the
     /// targets.
     /// Derivatives of k and p give those of f.
-    fn follow<const R: usize>(
-        &self,
-        sides: &[Side<D>; R],
-        buffers: &mut Buffers,
-        mut sink: impl FnMut(usize, usize, T),
-    ) {
-        let n = self.centres.len();
+    fn follow(&self, point: &Point<f64, D>, buffers: &mut Buffers, row: &mut [SVector<f64, D>]) {
+        let (n, span, frame) = (self.centres.len(), &self.system.span, &self.centres.frame);
         let Buffers { targets, work, .. } = buffers;
         targets.clear();
-        targets.resize(R * n, 0.0);
-        for (side, terms) in sides.iter().zip(targets.chunks_exact_mut(n)) {
-            dispatch(Fill {
-                kernel: &self.kernel,
-                axes: &self.centres.axes,
-                side,
-                terms,
-            });
-        }
-        let conditions = sides.each_ref().map(|side| &side.affine);
-        self.system.solve_adjoint(targets, conditions, work);
-        for (r, found) in targets.chunks_exact(n).enumerate() {
-            for i in 0..self.len() {
+        targets.resize(D * n, 0.0);
+        dispatch(Slopes {
+            kernel: &self.kernel,
+            axes: &self.centres.axes,
+            point: frame.inside(point),
+            slopes: targets,
+        });
+        let slope = |c: usize, axis: usize| {
+            if c > span.directions {
+                0.0
+            } else {
+                span.slope(c, axis)
+            }
+        };
+        let conditions: [Coefficients; D] =
+            core::array::from_fn(|axis| core::array::from_fn(|c| slope(c, axis)));
+        self.system
+            .solve_adjoint(targets, conditions.each_ref(), work);
+        for (axis, found) in targets.chunks_exact(n).enumerate() {
+            for (i, influence) in row.iter_mut().enumerate() {
                 // The target of a centre is the weighted mean of its points.
-                let influence = found[self.centres.centre(i)] * self.share(i);
-                sink(r, i, T::narrow(influence / sides[r].unit));
+                influence[axis] = found[self.centres.centre(i)] * self.share(i) / frame.scale;
             }
         }
     }
@@ -579,67 +533,34 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
             return 1.0;
         }
         let total = self.centre_weights[self.centres.centre(i)];
-        let weight = self.weights.as_ref().map_or(1.0, |w| w[i].widen());
+        let weight = self.weights.as_ref().map_or(1.0, |w| w[i]);
         if total > 0.0 { weight / total } else { 0.0 }
     }
 }
 
-/// One right-hand side: the kernels and affine functions at a point, or their derivative along an
-/// axis.
-struct Side<const D: usize> {
-    point: [f64; D],
-    axis: Option<usize>,
-    affine: Coefficients,
-    /// Length of the frame's unit for a derivative, else one.
-    unit: f64,
-}
-
-impl<const D: usize> Side<D> {
-    fn new<T: Scalar, K>(
-        factorization: &Factorization<T, D, K>,
-        point: &Point<T, D>,
-        axis: Option<usize>,
-    ) -> Self {
-        let (span, frame) = (&factorization.system.span, &factorization.centres.frame);
-        let point = frame.inside(point);
-        let function = |c: usize| match axis {
-            _ if c > span.directions => 0.0,
-            None => span.value(c, &point),
-            Some(axis) => span.slope(c, axis),
-        };
-        Self {
-            point,
-            axis,
-            affine: core::array::from_fn(function),
-            unit: axis.map_or(1.0, |_| frame.scale),
-        }
-    }
-}
-
-/// Writes a right-hand side's kernel about every centre.
-struct Fill<'a, K, const D: usize> {
+/// Writes the derivatives of the kernels about all centres at a point, axis by axis.
+struct Slopes<'a, K, const D: usize> {
     kernel: &'a K,
     axes: &'a [Vec<f64>; D],
-    side: &'a Side<D>,
-    terms: &'a mut [f64],
+    point: [f64; D],
+    slopes: &'a mut [f64],
 }
 
-impl<K: Kernel, const D: usize> Job<f64> for Fill<'_, K, D> {
+impl<K: Kernel, const D: usize> Job for Slopes<'_, K, D> {
     type Output = ();
 
     #[inline(always)]
-    fn run<L: Lane<f64>>(self) {
-        let n = self.terms.len();
+    fn run<L: Lane>(self) {
+        let n = self.slopes.len() / D;
         let axes = self.axes.each_ref().map(|axis| &axis[..n]);
-        let point = self.side.point.map(L::new);
-        for (i, term) in self.terms.iter_mut().enumerate() {
-            let d: [L; D] = core::array::from_fn(|k| point[k] - L::new(axes[k][i]));
-            let s = d.iter().fold(L::from_f64(0.0), |s, d| d.mul_add(*d, s));
-            *term = match self.side.axis {
-                None => self.kernel.derivatives(s).value.get(),
+        let point = self.point.map(L::from_f64);
+        for (axis, slopes) in self.slopes.chunks_exact_mut(n).enumerate() {
+            for (i, slope) in slopes.iter_mut().enumerate() {
+                let d: [L; D] = core::array::from_fn(|k| point[k] - L::from_f64(axes[k][i]));
+                let s = d.iter().fold(L::from_f64(0.0), |s, d| d.mul_add(*d, s));
                 // The gradient is 2 dU/ds d, s being the squared distance.
-                Some(axis) => (L::from_f64(2.0) * self.kernel.derivatives(s).first * d[axis]).get(),
-            };
+                *slope = (L::from_f64(2.0) * self.kernel.derivatives(s).first * d[axis]).get();
+            }
         }
     }
 }
@@ -796,7 +717,7 @@ impl<K: Kernel, const D: usize> Equations<'_, K, D> {
         smooth + self.system.span.polynomial(affine, &point)
     }
 
-    fn sum<'b, const M: usize>(&'b self, weights: &'b [f64]) -> KernelSum<'b, f64, K, D, M> {
+    fn sum<'b, const M: usize>(&'b self, weights: &'b [f64]) -> KernelSum<'b, K, D, M> {
         let n = self.centres.len();
         KernelSum {
             kernel: self.kernel,

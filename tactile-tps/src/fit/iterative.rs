@@ -359,13 +359,13 @@ struct Approach<'a, const D: usize> {
     near: &'a mut [f64],
 }
 
-impl<const D: usize> Job<f64> for Approach<'_, D> {
+impl<const D: usize> Job for Approach<'_, D> {
     type Output = f64;
 
     #[inline(always)]
-    fn run<L: Lane<f64>>(self) -> f64 {
+    fn run<L: Lane>(self) -> f64 {
         let n = self.near.len();
-        let (axes, place) = (self.axes.map(|axis| &axis[..n]), self.from.map(L::new));
+        let (axes, place) = (self.axes.map(|axis| &axis[..n]), self.from.map(L::from_f64));
         for i in 0..n {
             let s = squared_distance(axes, i, place).get();
             self.near[i] = if s < self.near[i] { s } else { self.near[i] };
@@ -396,13 +396,13 @@ struct Distances<'a, const D: usize> {
     distances: &'a mut [f64],
 }
 
-impl<const D: usize> Job<f64> for Distances<'_, D> {
+impl<const D: usize> Job for Distances<'_, D> {
     type Output = ();
 
     #[inline(always)]
-    fn run<L: Lane<f64>>(self) {
+    fn run<L: Lane>(self) {
         let n = self.distances.len();
-        let (axes, place) = (self.axes.map(|axis| &axis[..n]), self.from.map(L::new));
+        let (axes, place) = (self.axes.map(|axis| &axis[..n]), self.from.map(L::from_f64));
         for (i, distance) in self.distances.iter_mut().enumerate() {
             *distance = squared_distance(axes, i, place).get();
         }

@@ -28,10 +28,10 @@ use nalgebra::Point;
 pub use path::LambdaPath;
 
 use crate::{
-    FitOptions, Kernel, Progress, R2LogR, Scalar, Smoothing, TpsError,
+    FitOptions, Kernel, Progress, R2LogR, Smoothing, TpsError,
     error::{finite, same_count},
     evaluate::Frame,
-    lanes::{Job, Lane, dispatch, dot, squared_distance},
+    lanes::{Job, Lane, UNIT_ROUNDOFF, dispatch, dot, squared_distance},
     smoothing::least_gcv,
 };
 
@@ -53,20 +53,20 @@ type Watch<'a> = dyn FnMut(&Progress) -> ControlFlow<()> + 'a;
 /// let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
 /// let factorization = Factorization::new(&sources, &FitOptions::default())?;
 /// let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
-/// let spline: ThinPlateSpline<f64, 2> = factorization.fit(&targets)?;
+/// let spline: ThinPlateSpline<2> = factorization.fit(&targets)?;
 /// assert!((spline.apply(&sources[4]) - targets[4]).norm() < 1e-14);
 /// # Ok(())
 /// # }
 /// ```
 #[derive(Clone, Debug)]
-pub struct Factorization<T: Scalar, const D: usize, K = R2LogR> {
+pub struct Factorization<const D: usize, K = R2LogR> {
     kernel: K,
     centres: Centres<D>,
     system: System<D>,
-    weights: Option<Vec<T>>,
+    weights: Option<Vec<f64>>,
     /// Weight of every centre, empty if all weights are one.
     centre_weights: Vec<f64>,
-    smoothing: Smoothing<T>,
+    smoothing: Smoothing,
     rank_tolerance: f64,
     /// The preconditioner, if the solver iterates. The system is then without a factor.
     iterative: Option<Iterative<D>>,
@@ -100,7 +100,7 @@ pub struct SplineWorkspace<const D: usize> {
     centre_weights: Vec<f64>,
 }
 
-impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
+impl<const D: usize, K: Kernel> Factorization<D, K> {
     /// No points yet: memory for [`with_points`](Self::with_points).
     pub(crate) fn without_points(kernel: K) -> Self {
         const { assert!(D >= 1 && D < MAX, "splines have one to three dimensions") };
@@ -120,8 +120,8 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
     /// The distinct centres and the options, without a factor for them.
     fn with_points(
         mut self,
-        sources: &[Point<T, D>],
-        options: &FitOptions<T, K>,
+        sources: &[Point<f64, D>],
+        options: &FitOptions<K>,
     ) -> Result<Self, TpsError> {
         if let Some(weights) = &options.weights {
             same_count("weights", sources.len(), weights.len())?;
@@ -135,8 +135,8 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
         self.centres
             .weigh(self.weights.as_deref(), &mut self.centre_weights);
         self.smoothing = options.smoothing;
-        self.rank_tolerance = options.rank_tolerance.widen();
-        self.tolerance = options.tolerance.widen();
+        self.rank_tolerance = options.rank_tolerance;
+        self.tolerance = options.tolerance;
         Ok(self)
     }
 
@@ -149,9 +149,9 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
     }
 
     /// λ in the frame's units: the kernel scales as length to its degree.
-    fn inner_lambda(&self, smoothing: Smoothing<T>) -> f64 {
+    fn inner_lambda(&self, smoothing: Smoothing) -> f64 {
         match smoothing {
-            Smoothing::Lambda(lambda) => lambda.widen() / self.unit(),
+            Smoothing::Lambda(lambda) => lambda / self.unit(),
             _ => 0.0,
         }
     }
@@ -163,7 +163,7 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
     }
 
     /// One finite target for each source.
-    fn check<const M: usize>(&self, targets: &[Point<T, M>]) -> Result<(), TpsError> {
+    fn check<const M: usize>(&self, targets: &[Point<f64, M>]) -> Result<(), TpsError> {
         same_count("target points", self.centres.inputs, targets.len())?;
         finite(targets, "target points")
     }
@@ -234,7 +234,7 @@ impl<const D: usize> Default for Centres<D> {
 
 impl<const D: usize> Centres<D> {
     /// Takes over points, reusing memory where it suffices.
-    fn take<T: Scalar>(&mut self, points: &[Point<T, D>], rescale: bool) -> Result<(), TpsError> {
+    fn take(&mut self, points: &[Point<f64, D>], rescale: bool) -> Result<(), TpsError> {
         if points.is_empty() {
             return Err(TpsError::Empty("source points"));
         }
@@ -247,14 +247,14 @@ impl<const D: usize> Centres<D> {
             axis.extend(self.first.iter().map(|&i| self.frame.inside(&points[i])[k]));
         }
         let numbers = points.iter().flat_map(|p| p.iter());
-        let largest = numbers.fold(0.0, |m, x| f64::max(m, x.widen().abs()));
-        self.grain = largest / self.frame.scale * T::UNIT_ROUNDOFF;
+        let largest = numbers.fold(0.0, |m, x| f64::max(m, x.abs()));
+        self.grain = largest / self.frame.scale * UNIT_ROUNDOFF;
         self.inputs = points.len();
         Ok(())
     }
 
     /// Finds the first point of every group of equal ones, and the group of each point.
-    fn merge<T: Scalar>(&mut self, points: &[Point<T, D>]) {
+    fn merge(&mut self, points: &[Point<f64, D>]) {
         let Self {
             first,
             centre_of,
@@ -267,7 +267,7 @@ impl<const D: usize> Centres<D> {
         }
         centre_of.clear();
         let compare = |&i: &usize, &j: &usize| {
-            let differ = (0..D).map(|k| points[i][k].widen().partial_cmp(&points[j][k].widen()));
+            let differ = (0..D).map(|k| points[i][k].partial_cmp(&points[j][k]));
             differ.flatten().find(|o| o.is_ne()).unwrap_or(i.cmp(&j))
         };
         // Sorted by coordinates, equal points stand next to each other, the first one first.
@@ -309,12 +309,12 @@ impl<const D: usize> Centres<D> {
     }
 
     /// Coinciding points must have equal targets where the spline interpolates.
-    fn agree<T: Scalar, const M: usize>(
+    fn agree<const M: usize>(
         &self,
-        targets: &[Point<T, M>],
-        weights: Option<&[T]>,
+        targets: &[Point<f64, M>],
+        weights: Option<&[f64]>,
     ) -> Result<(), TpsError> {
-        let counts = |i: usize| weights.is_none_or(|w| w[i] > T::zero());
+        let counts = |i: usize| weights.is_none_or(|w| w[i] > 0.0);
         for second in (0..self.centre_of.len()).filter(|&i| counts(i)) {
             let centre = self.centre_of[second];
             let same = |&i: &usize| self.centre_of[i] == centre && counts(i);
@@ -329,10 +329,10 @@ impl<const D: usize> Centres<D> {
 
     /// Targets at the centres less `origin`, output by output: the weighted mean where points
     /// coincide.
-    fn gather<T: Scalar, const M: usize>(
+    fn gather<const M: usize>(
         &self,
-        targets: &[Point<T, M>],
-        weights: Option<&[T]>,
+        targets: &[Point<f64, M>],
+        weights: Option<&[f64]>,
         origin: &[f64; M],
         buffers: &mut Buffers,
     ) {
@@ -344,8 +344,8 @@ impl<const D: usize> Centres<D> {
             totals.clear();
             totals.resize(n, 0.0);
             for (i, target) in targets.iter().enumerate() {
-                let (centre, weight) = (self.centre(i), weights.map_or(1.0, |w| w[i].widen()));
-                let value = target[k].widen() - origin[k];
+                let (centre, weight) = (self.centre(i), weights.map_or(1.0, |w| w[i]));
+                let value = target[k] - origin[k];
                 totals[centre] += weight;
                 // Only points of weight 0 came before, whose targets do not count.
                 if totals[centre] == weight {
@@ -358,14 +358,14 @@ impl<const D: usize> Centres<D> {
     }
 
     /// Weight of every centre, none if all are one.
-    fn weigh<T: Scalar>(&self, weights: Option<&[T]>, sums: &mut Vec<f64>) {
+    fn weigh(&self, weights: Option<&[f64]>, sums: &mut Vec<f64>) {
         sums.clear();
         if weights.is_none() && self.centre_of.is_empty() {
             return;
         }
         sums.resize(self.len(), 0.0);
         for i in 0..self.inputs {
-            sums[self.centre(i)] += weights.map_or(1.0, |w| w[i].widen());
+            sums[self.centre(i)] += weights.map_or(1.0, |w| w[i]);
         }
     }
 }
@@ -1111,22 +1111,22 @@ struct Assemble<'a, K, const D: usize> {
     product: &'a mut [f64],
 }
 
-impl<K: Kernel, const D: usize> Job<f64> for Assemble<'_, K, D> {
+impl<K: Kernel, const D: usize> Job for Assemble<'_, K, D> {
     type Output = ();
 
     #[inline(always)]
-    fn run<L: Lane<f64>>(self) {
+    fn run<L: Lane>(self) {
         let n = self.matrix.n;
         for j in 0..n {
             let column = self.matrix.column(j);
             let axes: [&[f64]; D] =
                 core::array::from_fn(|k| &self.places[k * n + j..(k + 1) * n][..column.len()]);
             let scales = &self.places[D * n + j..(D + 1) * n][..column.len()];
-            let own: [L; D] = core::array::from_fn(|k| L::new(axes[k][0]));
-            let own_scale = L::new(scales[0]);
+            let own: [L; D] = core::array::from_fn(|k| L::from_f64(axes[k][0]));
+            let own_scale = L::from_f64(scales[0]);
             for (i, value) in column.iter_mut().enumerate() {
                 let s = squared_distance(axes, i, own);
-                let scale = L::new(scales[i]) * own_scale;
+                let scale = L::from_f64(scales[i]) * own_scale;
                 *value = (self.kernel.derivatives(s).value * scale).get();
             }
             add_column::<L>(column, j, self.basis, self.product);
@@ -1137,7 +1137,7 @@ impl<K: Kernel, const D: usize> Job<f64> for Assemble<'_, K, D> {
 /// What column `j` of a symmetric matrix, given from the diagonal on, adds to Y = SQ on both sides
 /// of the diagonal.
 #[inline(always)]
-fn add_column<L: Lane<f64>>(column: &[f64], j: usize, basis: &[f64], product: &mut [f64]) {
+fn add_column<L: Lane>(column: &[f64], j: usize, basis: &[f64], product: &mut [f64]) {
     let n = basis.len() / MAX;
     let mut sums = [[0.0; 8]; MAX];
     let whole = column.len() / 8 * 8;
@@ -1145,23 +1145,23 @@ fn add_column<L: Lane<f64>>(column: &[f64], j: usize, basis: &[f64], product: &m
         let mut a = [0.0; 8];
         a.copy_from_slice(&column[at..at + 8]);
         for c in 0..MAX {
-            let own = L::new(basis[c * n + j]);
+            let own = L::from_f64(basis[c * n + j]);
             let first = c * n + j + at;
             let (v, y) = (&basis[first..first + 8], &mut product[first..first + 8]);
             for l in 0..8 {
-                let sum = L::new(sums[c][l]);
-                sums[c][l] = L::new(a[l]).mul_add(L::new(v[l]), sum).get();
-                y[l] = own.mul_add(L::new(a[l]), L::new(y[l])).get();
+                let sum = L::from_f64(sums[c][l]);
+                sums[c][l] = L::from_f64(a[l]).mul_add(L::from_f64(v[l]), sum).get();
+                y[l] = own.mul_add(L::from_f64(a[l]), L::from_f64(y[l])).get();
             }
         }
     }
     for c in 0..MAX {
         let (v, y) = (&basis[c * n + j..], &mut product[c * n + j..]);
-        let own = L::new(v[0]);
+        let own = L::from_f64(v[0]);
         let mut tail = 0.0;
         for i in whole..column.len() {
             tail += column[i] * v[i];
-            y[i] = own.mul_add(L::new(column[i]), L::new(y[i])).get();
+            y[i] = own.mul_add(L::from_f64(column[i]), L::from_f64(y[i])).get();
         }
         // Both sums have counted the diagonal.
         y[0] += sums[c].iter().sum::<f64>() + tail - column[0] * v[0];
@@ -1175,11 +1175,11 @@ struct Update<'a> {
     matrix: &'a mut Triangle,
 }
 
-impl Job<f64> for Update<'_> {
+impl Job for Update<'_> {
     type Output = f64;
 
     #[inline(always)]
-    fn run<L: Lane<f64>>(self) -> f64 {
+    fn run<L: Lane>(self) -> f64 {
         let n = self.matrix.n;
         let mut squares = 0.0;
         for j in 0..n {
@@ -1191,11 +1191,11 @@ impl Job<f64> for Update<'_> {
                 a.copy_from_slice(&column[at..at + 8]);
                 for c in 0..MAX {
                     let (first, own) = (c * n + j + at, c * n + j);
-                    let (by_q, by_x) = (L::new(-self.basis[own]), L::new(-self.x[own]));
+                    let (by_q, by_x) = (L::from_f64(-self.basis[own]), L::from_f64(-self.x[own]));
                     let (q, x) = (&self.basis[first..first + 8], &self.x[first..first + 8]);
                     for l in 0..8 {
-                        let sum = by_x.mul_add(L::new(q[l]), L::new(a[l]));
-                        a[l] = by_q.mul_add(L::new(x[l]), sum).get();
+                        let sum = by_x.mul_add(L::from_f64(q[l]), L::from_f64(a[l]));
+                        a[l] = by_q.mul_add(L::from_f64(x[l]), sum).get();
                     }
                 }
                 column[at..at + 8].copy_from_slice(&a);
@@ -1203,9 +1203,10 @@ impl Job<f64> for Update<'_> {
             for i in whole..column.len() {
                 for c in 0..MAX {
                     let own = c * n + j;
-                    let (by_q, by_x) = (L::new(-self.basis[own]), L::new(-self.x[own]));
-                    let sum = by_x.mul_add(L::new(self.basis[own + i]), L::new(column[i]));
-                    column[i] = by_q.mul_add(L::new(self.x[own + i]), sum).get();
+                    let (by_q, by_x) = (L::from_f64(-self.basis[own]), L::from_f64(-self.x[own]));
+                    let sum =
+                        by_x.mul_add(L::from_f64(self.basis[own + i]), L::from_f64(column[i]));
+                    column[i] = by_q.mul_add(L::from_f64(self.x[own + i]), sum).get();
                 }
             }
             squares += 2.0 * dot(column, column) - column[0] * column[0];

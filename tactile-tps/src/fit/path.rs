@@ -4,7 +4,7 @@ use nalgebra::Point;
 
 use super::{Buffers, Coefficients, Factorization, System, Triangle};
 use crate::{
-    FitOptions, Kernel, R2LogR, Scalar, Smoothing, TpsError,
+    FitOptions, Kernel, R2LogR, Smoothing, TpsError,
     error::validate_smoothing,
     lanes::{Job, Lane, dispatch, squared_distance},
 };
@@ -33,9 +33,9 @@ use crate::{
 /// # }
 /// ```
 #[derive(Clone, Debug)]
-pub struct LambdaPath<T: Scalar, const D: usize, const M: usize, K = R2LogR> {
+pub struct LambdaPath<const D: usize, const M: usize, K = R2LogR> {
     /// Centres and options, without a factor.
-    points: Factorization<T, D, K>,
+    points: Factorization<D, K>,
     system: System<D>,
     /// The system with λ added, factored.
     factor: Triangle,
@@ -46,13 +46,13 @@ pub struct LambdaPath<T: Scalar, const D: usize, const M: usize, K = R2LogR> {
     affine: Vec<[Coefficients; M]>,
     kernels: Vec<f64>,
     sums: Vec<f64>,
-    values: Vec<Point<T, M>>,
+    values: Vec<Point<f64, M>>,
 }
 
 /// Columns of weights that are summed at once, in registers. Rows are padded to a multiple.
 const TOGETHER: usize = 8;
 
-impl<T: Scalar, const D: usize, const M: usize, K: Kernel> LambdaPath<T, D, M, K> {
+impl<const D: usize, const M: usize, K: Kernel> LambdaPath<D, M, K> {
     /// The splines of [`Spline::fit`](crate::Spline::fit) with [`Smoothing::Lambda`] of each of the
     /// `lambdas`, to rounding.
     ///
@@ -60,10 +60,10 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> LambdaPath<T, D, M, K
     /// Those of [`Spline::fit`](crate::Spline::fit), and [`TpsError::Lambda`] for a λ that is not
     /// positive and finite.
     pub fn fit(
-        sources: &[Point<T, D>],
-        targets: &[Point<T, M>],
-        options: &FitOptions<T, K>,
-        lambdas: &[T],
+        sources: &[Point<f64, D>],
+        targets: &[Point<f64, M>],
+        options: &FitOptions<K>,
+        lambdas: &[f64],
     ) -> Result<Self, TpsError> {
         let empty = Self {
             points: Factorization::without_points(options.kernel.clone()),
@@ -105,16 +105,16 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> LambdaPath<T, D, M, K
     /// As [`fit`](Self::fit).
     pub fn refit(
         mut self,
-        sources: &[Point<T, D>],
-        targets: &[Point<T, M>],
-        options: &FitOptions<T, K>,
-        lambdas: &[T],
+        sources: &[Point<f64, D>],
+        targets: &[Point<f64, M>],
+        options: &FitOptions<K>,
+        lambdas: &[f64],
     ) -> Result<Self, TpsError> {
         for &lambda in lambdas {
             validate_smoothing(&Smoothing::Lambda(lambda))?;
             // An interpolant needs targets that agree where points coincide, which is not checked
             // here.
-            if lambda.widen() == 0.0 {
+            if lambda == 0.0 {
                 return Err(TpsError::Lambda { value: 0.0 });
             }
         }
@@ -124,7 +124,7 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> LambdaPath<T, D, M, K
         let (setting, weights) = (points.setting(), &points.centre_weights);
         // Without λ, which is added to a copy for each of them.
         self.system.assemble(&setting, weights, true);
-        self.origin = core::array::from_fn(|k| targets[0][k].widen());
+        self.origin = core::array::from_fn(|k| targets[0][k]);
         let weights = points.weights.as_deref();
         let buffers = &mut self.buffers;
         points
@@ -160,7 +160,7 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> LambdaPath<T, D, M, K
     }
 
     /// The values at `point`, one for each λ, in the order of the λ. O(n) each.
-    pub fn values(&mut self, point: &Point<T, D>) -> &[Point<T, M>] {
+    pub fn values(&mut self, point: &Point<f64, D>) -> &[Point<f64, M>] {
         let place = self.points.centres.frame.inside(point);
         dispatch(Evaluate {
             kernel: &self.points.kernel,
@@ -174,7 +174,7 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> LambdaPath<T, D, M, K
         for (value, (sums, affine)) in self.values.iter_mut().zip(sums) {
             *value = Point::from(core::array::from_fn(|m| {
                 let affine = self.system.span.polynomial(&affine[m], &place);
-                T::narrow(self.origin[m] + sums[m] + affine)
+                self.origin[m] + sums[m] + affine
             }));
         }
         &self.values
@@ -191,15 +191,15 @@ struct Evaluate<'a, K, const D: usize> {
     sums: &'a mut [f64],
 }
 
-impl<K: Kernel, const D: usize> Job<f64> for Evaluate<'_, K, D> {
+impl<K: Kernel, const D: usize> Job for Evaluate<'_, K, D> {
     type Output = ();
 
     #[inline(always)]
-    fn run<L: Lane<f64>>(self) {
+    fn run<L: Lane>(self) {
         let n = self.kernels.len();
         let (axes, place) = (
             self.axes.each_ref().map(|axis| &axis[..n]),
-            self.place.map(L::new),
+            self.place.map(L::from_f64),
         );
         for (i, value) in self.kernels.iter_mut().enumerate() {
             let s = squared_distance(axes, i, place);
@@ -209,9 +209,11 @@ impl<K: Kernel, const D: usize> Job<f64> for Evaluate<'_, K, D> {
         for at in (0..width).step_by(TOGETHER) {
             let mut own = [0.0; TOGETHER];
             for (row, kernel) in self.weights.chunks_exact(width).zip(&*self.kernels) {
-                let (row, kernel) = (&row[at..at + TOGETHER], L::new(*kernel));
+                let (row, kernel) = (&row[at..at + TOGETHER], L::from_f64(*kernel));
                 for l in 0..TOGETHER {
-                    own[l] = kernel.mul_add(L::new(row[l]), L::new(own[l])).get();
+                    own[l] = kernel
+                        .mul_add(L::from_f64(row[l]), L::from_f64(own[l]))
+                        .get();
                 }
             }
             self.sums[at..at + TOGETHER].copy_from_slice(&own);

@@ -418,11 +418,11 @@ struct Factorise<'a> {
 /// Rows that are eliminated together: each pass over the rest then does four times the work.
 const TOGETHER: usize = 4;
 
-impl Job<f64> for Factorise<'_> {
+impl Job for Factorise<'_> {
     type Output = f64;
 
     #[inline(always)]
-    fn run<L: Lane<f64>>(self) -> f64 {
+    fn run<L: Lane>(self) -> f64 {
         let Self { matrix, n } = self;
         let mut log_det = 0.0;
         for first in (0..n).step_by(TOGETHER) {
@@ -468,11 +468,11 @@ struct Forward<'a, const C: usize> {
     columns: [&'a mut [f64]; C],
 }
 
-impl<const C: usize> Job<f64> for Forward<'_, C> {
+impl<const C: usize> Job for Forward<'_, C> {
     type Output = ();
 
     #[inline(always)]
-    fn run<L: Lane<f64>>(mut self) {
+    fn run<L: Lane>(mut self) {
         let n = self.columns.first().map_or(0, |column| column.len());
         for (k, row) in self.factor.chunks_exact(n.max(1)).enumerate() {
             for column in &mut self.columns {

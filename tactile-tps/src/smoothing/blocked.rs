@@ -11,7 +11,7 @@ use crate::{
 /// The powers go from nearly an interpolant to nearly affine.
 const POWERS: core::ops::RangeInclusive<i32> = -5..=2;
 
-type Spline = ThinPlateSpline<f64, 3, NegR>;
+type Spline = ThinPlateSpline<3, NegR>;
 
 /// The model of the spline whose gradient is the strain: kernel −r, as stiff as the matches allow.
 ///
@@ -56,13 +56,13 @@ impl StrainSpline {
     pub const RUN_LENGTH: usize = 10;
 }
 
-impl WarpModel<f64, 3> for StrainSpline {
+impl WarpModel<3> for StrainSpline {
     fn fit(
         &self,
         sources: &[Point3<f64>],
         targets: &[Point3<f64>],
         weights: Option<&[f64]>,
-    ) -> Result<Box<dyn Warp<f64, 3> + Send + Sync>, TpsError> {
+    ) -> Result<Box<dyn Warp<3> + Send + Sync>, TpsError> {
         let mut fitter = Fitter::default();
         fitter.fit(Pairs {
             sources,
@@ -75,7 +75,7 @@ impl WarpModel<f64, 3> for StrainSpline {
     fn jacobians_through(
         &self,
         memory: &mut SeriesMemory,
-        pairs: Pairs<'_, f64, 3>,
+        pairs: Pairs<'_, 3>,
         points: &[Point3<f64>],
         jacobians: &mut [Matrix3<f64>],
     ) -> Result<(), TpsError> {
@@ -95,13 +95,13 @@ struct Half {
 
 /// Fits splines one after the other in the same memory.
 struct Fitter {
-    options: FitOptions<f64, NegR>,
+    options: FitOptions<NegR>,
     halves: [Half; 2],
     lambdas: Vec<f64>,
-    path: Option<LambdaPath<f64, 3, 3, NegR>>,
+    path: Option<LambdaPath<3, 3, NegR>>,
     /// For each λ the squared errors of all predicted pairs.
     errors: Vec<Vec<f64>>,
-    factorization: Option<Factorization<f64, 3, NegR>>,
+    factorization: Option<Factorization<3, NegR>>,
     workspace: SplineWorkspace<3>,
     /// The last one fitted.
     spline: Spline,
@@ -123,7 +123,7 @@ impl Default for Fitter {
 }
 
 impl Fitter {
-    fn fit(&mut self, pairs: Pairs<'_, f64, 3>) -> Result<(), TpsError> {
+    fn fit(&mut self, pairs: Pairs<'_, 3>) -> Result<(), TpsError> {
         // λ is chosen on halves, the spline itself goes through all pairs.
         let smoothing = match self.one_standard_error_lambda(pairs) {
             Some(lambda) => Smoothing::Lambda(lambda),
@@ -150,7 +150,7 @@ impl Fitter {
 
     /// The greatest λ that predicts left-out runs as well as the best, to one standard error.
     /// `None` where too few pairs, or too badly placed ones, are there to be split.
-    fn one_standard_error_lambda(&mut self, pairs: Pairs<'_, f64, 3>) -> Option<f64> {
+    fn one_standard_error_lambda(&mut self, pairs: Pairs<'_, 3>) -> Option<f64> {
         let n = pairs.sources.len();
         // Lengths that differ are left to the fit, which names them in its error.
         let as_many = pairs.targets.len() == n && pairs.weights.is_none_or(|w| w.len() == n);
@@ -178,7 +178,7 @@ impl Fitter {
     }
 
     /// Deals runs of neighbours in turn to the two halves.
-    fn split(&mut self, pairs: Pairs<'_, f64, 3>) {
+    fn split(&mut self, pairs: Pairs<'_, 3>) {
         for half in &mut self.halves {
             half.sources.clear();
             half.targets.clear();
@@ -272,7 +272,7 @@ mod tests {
     }
 
     fn fit_spline(
-        smoothing: Smoothing<f64>,
+        smoothing: Smoothing,
         sources: &[Point3<f64>],
         targets: &[Point3<f64>],
     ) -> Spline {
@@ -309,7 +309,7 @@ mod tests {
         }
     }
 
-    fn mean_across(warp: &dyn Warp<f64, 3>, points: &[Point3<f64>]) -> f64 {
+    fn mean_across(warp: &dyn Warp<3>, points: &[Point3<f64>]) -> f64 {
         points.iter().map(|p| warp.jacobian(p)[(2, 2)]).sum::<f64>() / points.len() as f64 - 1.0
     }
 
@@ -320,7 +320,7 @@ mod tests {
             .fit(&sources, &targets, None)
             .expect("a spline");
         let loose = FitOptions::new(NegR).fit(&sources, &targets, None);
-        let error = |warp: &dyn Warp<f64, 3>| {
+        let error = |warp: &dyn Warp<3>| {
             let square = |p| (warp.jacobian(p)[(2, 2)] - 1.2).powi(2);
             (sources.iter().map(square).sum::<f64>() / sources.len() as f64).sqrt()
         };
@@ -336,7 +336,7 @@ mod tests {
         let (sources, _) = dome(0.0);
         let bend = |p: &Point3<f64>| Point3::new(p.x + 0.3 * p.x * p.x, p.y, p.z);
         let targets: Vec<_> = sources.iter().map(bend).collect();
-        let error = |warp: &dyn Warp<f64, 3>| {
+        let error = |warp: &dyn Warp<3>| {
             let inner = sources.iter().filter(|p| p.z > 0.5);
             inner
                 .map(|p| (warp.jacobian(p)[(0, 0)] - 1.0 - 0.6 * p.x).abs())

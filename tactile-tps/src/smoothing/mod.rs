@@ -28,13 +28,13 @@ pub use robust::{RobustFit, RobustSpline};
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
-pub enum Smoothing<T> {
+pub enum Smoothing {
     /// Interpolate: λ = 0.
     #[default]
     None,
     /// Minimise Σ weightᵢ |f(xᵢ) − yᵢ|² + λ wᵀKw for this λ ≥ 0, in the units of the points and the
     /// kernel.
-    Lambda(T),
+    Lambda(f64),
     /// The λ of least generalised cross-validation (Craven & Wahba 1979; Golub, Heath & Wahba
     /// 1979).
     Gcv,

@@ -29,13 +29,13 @@ const LAMBDAS: [f64; 9] = [1e-3, 1e-2, 1e-1, 1.0, 1e1, 1e2, 1e3, 1e4, 1e8];
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct RobustSpline;
 
-impl<const D: usize> WarpModel<f64, D> for RobustSpline {
+impl<const D: usize> WarpModel<D> for RobustSpline {
     fn fit(
         &self,
         sources: &[Point<f64, D>],
         targets: &[Point<f64, D>],
         weights: Option<&[f64]>,
-    ) -> Result<Box<dyn Warp<f64, D> + Send + Sync>, TpsError> {
+    ) -> Result<Box<dyn Warp<D> + Send + Sync>, TpsError> {
         Ok(Box::new(RobustFit::new(sources, targets, weights)?))
     }
 }
@@ -69,9 +69,9 @@ impl<const D: usize> WarpModel<f64, D> for RobustSpline {
 #[non_exhaustive]
 pub struct RobustFit<const D: usize> {
     /// The spline through all pairs with their weights.
-    pub spline: ThinPlateSpline<f64, D>,
+    pub spline: ThinPlateSpline<D>,
     /// Splines without one part of the pairs each, for the jackknife.
-    pub folds: Vec<ThinPlateSpline<f64, D>>,
+    pub folds: Vec<ThinPlateSpline<D>>,
     /// Factor from an error computed with fixed weights to that with weights that follow the data.
     pub response: f64,
     /// Weight of every pair, 0 to 1.
@@ -136,7 +136,7 @@ impl<const D: usize> RobustFit<D> {
     }
 }
 
-impl<const D: usize> Warp<f64, D> for RobustFit<D> {
+impl<const D: usize> Warp<D> for RobustFit<D> {
     fn apply(&self, point: &Point<f64, D>) -> Point<f64, D> {
         self.spline.apply(point)
     }
@@ -147,7 +147,7 @@ impl<const D: usize> Warp<f64, D> for RobustFit<D> {
 
 struct HeldOut<const D: usize> {
     distances: Vec<f64>,
-    splines: Vec<ThinPlateSpline<f64, D>>,
+    splines: Vec<ThinPlateSpline<D>>,
 }
 
 /// The largest λ whose loss exceeds the least by no more than one standard error of the difference.
@@ -306,7 +306,7 @@ impl<const D: usize> Kept<D> {
         }
     }
 
-    fn options(&self, lambda: f64) -> Result<FitOptions<f64>, TpsError> {
+    fn options(&self, lambda: f64) -> Result<FitOptions, TpsError> {
         let options = FitOptions::default().with_smoothing(Smoothing::Lambda(lambda))?;
         options.with_weights(self.weights.clone())
     }
@@ -318,7 +318,7 @@ fn weighted<const D: usize>(
     targets: &[Point<f64, D>],
     weights: &[f64],
     lambda: f64,
-) -> Result<ThinPlateSpline<f64, D>, TpsError> {
+) -> Result<ThinPlateSpline<D>, TpsError> {
     let kept = Kept::new(sources, targets, weights);
     ThinPlateSpline::fit(&kept.sources, &kept.targets, &kept.options(lambda)?)
 }

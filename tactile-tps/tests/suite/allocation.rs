@@ -15,10 +15,10 @@ fn refits_and_evaluation_allocate_nothing() {
     let weights: Vec<f64> = (0..105).map(|i| f64::from(i % 5)).collect();
     let near: Vec<f64> = (0..105).map(|i| 1.0 + 1e-4 * f64::from(i % 5)).collect();
     let factorization = Factorization::new(&sources, &FitOptions::new(NegR)).expect("a factor");
-    let (mut workspace, mut spline) = (SplineWorkspace::default(), Spline::<_, 3, 3, _>::default());
+    let (mut workspace, mut spline) = (SplineWorkspace::default(), Spline::<3, 3, _>::default());
     let (mut values, mut jacobians) = (vec![Point::origin(); 333], vec![Matrix3::zeros(); 333]);
     let mut hessian = [Matrix3::zeros(); 3];
-    let (mut influence, mut slopes) = (vec![0.0; 7 * 105], vec![SVector::zeros(); 7 * 105]);
+    let mut slopes = vec![SVector::zeros(); 7 * 105];
     let mut round = |lambda: f64| {
         factorization
             .refit_with(&mut workspace, &targets, None, None, &mut spline)
@@ -45,9 +45,6 @@ fn refits_and_evaluation_allocate_nothing() {
         hessian = spline.hessian(&queries[0]);
         values[0] = spline.apply(&queries[0]);
         factorization
-            .influence_into(&mut workspace, &queries[..7], &mut influence)
-            .expect("a linear map");
-        factorization
             .jacobian_influence_into(&mut workspace, &queries[..7], &mut slopes)
             .expect("a linear map");
     };
@@ -67,7 +64,7 @@ fn factors_of_other_points_allocate_nothing() {
     let lambdas = [0.01, 1.0, 100.0];
     let mut kept = Factorization::new(&sets[0], &options).ok();
     let mut path = LambdaPath::fit(&sets[0], &sets[0], &options, &lambdas).ok();
-    let (mut workspace, mut spline) = (SplineWorkspace::default(), Spline::<_, 3, 3, _>::default());
+    let (mut workspace, mut spline) = (SplineWorkspace::default(), Spline::<3, 3, _>::default());
     let mut sum = 0.0;
     let mut round = |sources: &[nalgebra::Point3<f64>]| {
         let weights: [f64; 205] = core::array::from_fn(|i| 0.1 + f64::from(i as u32 % 5));

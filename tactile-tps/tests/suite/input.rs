@@ -89,7 +89,7 @@ fn bad_input_is_named() {
             .expect_err("an error")
             .to_string()
     };
-    let plain = FitOptions::<f64>::default;
+    let plain = FitOptions::default;
     assert_eq!(fit(&[], &[], plain()), "no source points to fit");
     let mut bad = points.clone();
     bad[4].y = f64::NAN;

@@ -3,7 +3,7 @@
 use core::ops::ControlFlow;
 
 use crate::common::{Uniform, bend, largest, options};
-use nalgebra::{Point, Point3};
+use nalgebra::{Point, Point3, SVector};
 use tactile_tps::{
     Factorization, FitOptions, Kernel, NegR, R2LogR, R3, Smoothing, Solver, Spline,
     SplineWorkspace, ThinPlateSpline, TpsError,
@@ -14,7 +14,7 @@ const POINTS: usize = 900;
 /// Largest difference of values between the iterative and the direct spline, and the steps taken.
 fn compare<const D: usize, K: Kernel>(
     sources: &[Point<f64, D>],
-    options: &FitOptions<f64, K>,
+    options: &FitOptions<K>,
 ) -> (f64, usize) {
     let targets: Vec<_> = sources.iter().map(bend).collect();
     let fit = |solver| {
@@ -135,8 +135,8 @@ fn refits_are_fits() {
             .expect("a refit");
     });
     assert_eq!(again.count_total, 0);
-    let mut influence = vec![0.0; POINTS];
-    let refused = factorization.influence_into(&mut workspace, &[query], &mut influence);
+    let mut influence = vec![SVector::zeros(); POINTS];
+    let refused = factorization.jacobian_influence_into(&mut workspace, &[query], &mut influence);
     assert_eq!(refused, Err(TpsError::NoFactor));
 }
 

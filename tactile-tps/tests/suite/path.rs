@@ -24,7 +24,7 @@ fn moved(points: &[Point3<f64>]) -> Vec<Point3<f64>> {
 fn worst<const D: usize, const M: usize, K: Kernel>(
     sources: &[nalgebra::Point<f64, D>],
     targets: &[nalgebra::Point<f64, M>],
-    options: &FitOptions<f64, K>,
+    options: &FitOptions<K>,
     points: &[nalgebra::Point<f64, D>],
 ) -> f64 {
     let mut path = LambdaPath::fit(sources, targets, options, &LAMBDAS).unwrap();
@@ -106,7 +106,7 @@ fn what_was_fitted_before_leaves_no_trace() {
     let query = Point3::new(0.2, 0.1, 0.7);
     let weights = |n: usize| (0..n).map(|i| f64::from(i as u32 % 3)).collect::<Vec<_>>();
     let plain = FitOptions::new(NegR);
-    let path = |n: usize, lambdas: &[f64], options: &FitOptions<f64, NegR>| {
+    let path = |n: usize, lambdas: &[f64], options: &FitOptions<NegR>| {
         let sources = cloud(n, 1.0);
         LambdaPath::fit(&sources, &moved(&sources), options, lambdas).unwrap()
     };
@@ -136,16 +136,16 @@ fn what_was_fitted_before_leaves_no_trace() {
             &plain.clone().with_smoothing(Smoothing::Gcv).unwrap(),
         );
         let again = factored.unwrap().refactor(&sources, &smooth).unwrap();
-        let spline: Spline<_, 3, 3, _> = again.fit(&targets).unwrap();
-        let fresh: Spline<_, 3, 3, _> = Spline::fit(&sources, &targets, &smooth).unwrap();
+        let spline: Spline<3, 3, _> = again.fit(&targets).unwrap();
+        let fresh: Spline<3, 3, _> = Spline::fit(&sources, &targets, &smooth).unwrap();
         assert_eq!(spline.apply(&query), fresh.apply(&query), "{n}");
         let gcv = plain.clone().with_smoothing(Smoothing::Gcv).unwrap();
-        let validated: Spline<_, 3, 3, _> = again
+        let validated: Spline<3, 3, _> = again
             .refactor(&sources, &gcv)
             .unwrap()
             .fit(&targets)
             .unwrap();
-        let fresh: Spline<_, 3, 3, _> = Spline::fit(&sources, &targets, &gcv).unwrap();
+        let fresh: Spline<3, 3, _> = Spline::fit(&sources, &targets, &gcv).unwrap();
         assert_eq!(validated.apply(&query), fresh.apply(&query), "{n}");
     }
 }
@@ -163,8 +163,8 @@ fn a_factor_of_other_points_is_not_used() {
         plain.clone().with_smoothing(Smoothing::Gcv).unwrap(),
         plain.clone().with_solver(Solver::Iterative),
     ] {
-        let refitted = |factorization: Factorization<f64, 3, NegR>| {
-            let mut spline = Spline::<f64, 3, 3, NegR>::default();
+        let refitted = |factorization: Factorization<3, NegR>| {
+            let mut spline = Spline::<3, 3, NegR>::default();
             let (weights, none) = (Some(&weights[..]), Some(Smoothing::None));
             factorization
                 .refit_with(

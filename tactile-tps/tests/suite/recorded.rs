@@ -23,7 +23,7 @@ const SELECTED_TOLERANCE: f64 = 1e-7;
 fn spline<const D: usize, const M: usize, K: Kernel>(
     answers: &mut Answers,
     name: &str,
-    spline: &Spline<f64, D, M, K>,
+    spline: &Spline<D, M, K>,
 ) {
     let mut uniform = Uniform(77);
     for query in uniform.points::<D>(3) {
@@ -86,11 +86,6 @@ fn fits<const D: usize, K: Kernel + Default>(answers: &mut Answers, kernel: K, n
         spline(answers, &format!("{name}/{case}"), &refitted);
     }
     let query = uniform.point();
-    let mut influence = vec![0.0; sources.len()];
-    factorization
-        .influence_into(&mut workspace, &[query], &mut influence)
-        .expect("a linear map");
-    answers.add(format!("{name}/influence"), influence);
     let mut influence = vec![SVector::zeros(); sources.len()];
     factorization
         .jacobian_influence_into(&mut workspace, &[query], &mut influence)

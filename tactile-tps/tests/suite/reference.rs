@@ -11,7 +11,7 @@ use serde_json::Value;
 use tactile_tps::{FitOptions, Kernel, NegR, R2LogR, R3, Smoothing, Spline, TpsError};
 use test_support::{Worst, numbers};
 
-type Fitted<const D: usize, K> = Result<Spline<f64, D, D, K>, TpsError>;
+type Fitted<const D: usize, K> = Result<Spline<D, D, K>, TpsError>;
 
 /// Enters an error over its tolerance.
 fn enter(table: &mut Worst, case: &Value, quantity: &str, error: f64, tolerance: f64) {
@@ -42,7 +42,7 @@ fn points<const D: usize>(value: &Value) -> Vec<Point<f64, D>> {
     value.as_array().expect("rows").iter().map(point).collect()
 }
 
-fn options<K: Kernel>(case: &Value, kernel: K) -> FitOptions<f64, K> {
+fn options<K: Kernel>(case: &Value, kernel: K) -> FitOptions<K> {
     let smoothing = Smoothing::Lambda(number(&case["lambda"]));
     let weights = (!case["weights"].is_null()).then(|| numbers(&case["weights"]));
     crate::common::options(kernel, smoothing, weights.as_deref())
@@ -104,7 +104,7 @@ fn singular<const D: usize, K: Kernel>(
 fn queries<const D: usize, K: Kernel>(
     table: &mut Worst,
     case: &Value,
-    spline: &Spline<f64, D, D, K>,
+    spline: &Spline<D, D, K>,
     sources: &[Point<f64, D>],
     targets: &[Point<f64, D>],
 ) {
@@ -172,7 +172,7 @@ fn queries<const D: usize, K: Kernel>(
 fn coefficients<const D: usize, K: Kernel>(
     table: &mut Worst,
     case: &Value,
-    spline: &Spline<f64, D, D, K>,
+    spline: &Spline<D, D, K>,
     targets: &[Point<f64, D>],
 ) {
     let sensitivity = &case["sensitivity"]["w"];

@@ -1,12 +1,12 @@
 //! Scales from 1e-9 to 1e9, offsets of 1e6 diameters, nearly flat and nearly equal points, λ up to
-//! 1e12, single precision and singular systems: every error in units of what rounding the inputs
+//! 1e12 and singular systems: every error in units of what rounding the inputs
 //! alone does to the exact spline.
 #![allow(clippy::print_stdout)]
 
-use crate::common::{Uniform, bend, for_all, options};
+use crate::common::options;
 use nalgebra::Point;
 use serde_json::Value;
-use tactile_tps::{FitOptions, Kernel, NegR, R2LogR, R3, Smoothing, Spline, ThinPlateSpline};
+use tactile_tps::{Kernel, NegR, R2LogR, R3, Smoothing, Spline};
 use test_support::{Worst, cases, numbers, rows};
 
 fn points<const D: usize>(value: &Value) -> Vec<Point<f64, D>> {
@@ -25,7 +25,7 @@ fn check<const D: usize, K: Kernel>(table: &mut Worst, case: &Value, kernel: K) 
     let sources = points::<D>(&case["points"]);
     let values = numbers(&case["values"]);
     let targets: Vec<Point<f64, 1>> = values.iter().map(|&v| Point::from([v])).collect();
-    let spline: Spline<f64, D, 1, K> =
+    let spline: Spline<D, 1, K> =
         Spline::fit(&sources, &targets, &options(kernel, smoothing, None)).expect("a spline");
     let scale = values.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
     let condition = case["condition"].as_f64().unwrap();
@@ -55,33 +55,5 @@ fn splines_of_hard_points_are_as_good_as_their_inputs() {
             other => panic!("{other:?}"),
         }
     }
-    for_all!(single_precision, &mut table);
     table.finish();
-}
-
-/// f32 against f64 on the same numbers, in units of f32's rounding times the condition number that
-/// the fit itself reports.
-fn single_precision<const D: usize, K: Kernel>(kernel: K, table: &mut Worst) {
-    let narrow = |points: &[Point<f64, D>]| -> Vec<Point<f32, D>> {
-        points.iter().map(|p| p.map(|x| x as f32)).collect()
-    };
-    let wide = |points: &[Point<f32, D>]| -> Vec<Point<f64, D>> {
-        points.iter().map(|p| p.map(f64::from)).collect()
-    };
-    let sources = narrow(&Uniform(9).points(40));
-    let targets: Vec<_> = wide(&sources).iter().map(bend).collect();
-    let targets = narrow(&targets);
-    for scale in [1e-9_f32, 1.0, 1e9] {
-        let scaled: Vec<_> = sources.iter().map(|p| p * scale).collect();
-        let options = FitOptions::new(kernel.clone());
-        let short = ThinPlateSpline::fit(&scaled, &targets, &options).unwrap();
-        let options = FitOptions::new(kernel.clone());
-        let long = ThinPlateSpline::fit(&wide(&scaled), &wide(&targets), &options).unwrap();
-        for query in narrow(&Uniform(10).points(50)) {
-            let query = query * scale;
-            let error = short.apply(&query).map(f64::from) - long.apply(&query.map(f64::from));
-            let units = error.norm() / (f64::from(f32::EPSILON) * long.report.condition);
-            table.enter(&format!("{D}-D: f32 against f64"), units, 10.0);
-        }
-    }
 }

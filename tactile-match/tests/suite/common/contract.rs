@@ -6,7 +6,6 @@ use tactile_match::{
     AnnealedSoftassign, CoherentPointDrift, LinearAssignment, Matching, Motion, NearestNeighbour,
     PointMatcher, RelaxationLabelling, Rotation, Transformation,
 };
-use tactile_tps::Scalar;
 
 pub(crate) type Matchers<const D: usize> = Vec<(&'static str, Box<dyn PointMatcher<D>>)>;
 
@@ -118,7 +117,7 @@ pub(crate) fn assert_consistent<const D: usize>(
             .chain([point])
             .fold(0.0_f64, |m, p| m.max(p.coords.amax()));
         let step = (matching.warp.apply(point) - warped).norm();
-        let tolerance: f64 = 1e10 * f64::UNIT_ROUNDOFF;
+        let tolerance: f64 = 1e10 * (0.5 * f64::EPSILON);
         assert!(
             step <= tolerance.min(1e-3) * size,
             "{name}: the warp takes point {i} {step} astray"

@@ -37,17 +37,17 @@ pub(crate) fn largest(values: impl IntoIterator<Item = f64>) -> f64 {
 pub(crate) fn fit<const D: usize, K: Kernel>(
     sources: &[Point<f64, D>],
     targets: &[Point<f64, D>],
-    options: &FitOptions<f64, K>,
-) -> ThinPlateSpline<f64, D, K> {
+    options: &FitOptions<K>,
+) -> ThinPlateSpline<D, K> {
     ThinPlateSpline::fit(sources, targets, options).expect("a spline")
 }
 
 /// Options with this smoothing and, where given, these weights.
 pub(crate) fn options<K>(
     kernel: K,
-    smoothing: Smoothing<f64>,
+    smoothing: Smoothing,
     weights: Option<&[f64]>,
-) -> FitOptions<f64, K> {
+) -> FitOptions<K> {
     let smooth = FitOptions::new(kernel).with_smoothing(smoothing);
     let smooth = smooth.expect("a smoothing");
     match weights {
