@@ -12,9 +12,9 @@
 use std::error::Error;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
+use tactile_files::scene::{Scene, read_contact_table};
 use tactile_imaging::elasticity::contact::ContactTable;
 use tactile_imaging::pipeline::EstimatorChoice;
-use tactile_imaging::scene::{Scene, read_contact_table};
 use tactile_simulate::{
     CalibrationRun, Camera, ContactModel, Elastic, ElasticSphere, PressLoad, PressOptions,
     PressScene, write_folder,

@@ -33,8 +33,8 @@
 //!
 //! # Where to look
 //!
-//! - A sensor's frames to every result: [`pipeline`], with scene files [`scene`], calibrations
-//!   [`sensor`], images, tables and streams [`io`] (feature `scene`).
+//! - A sensor's frames to every result: [`pipeline`]. Images, tables, streams, scene files and
+//!   calibrated sensors are read and written by the crate `tactile-files`.
 //! - Two point sets to displacement and strain with an error: [`strain_between()`].
 //! - Printed markers: [`markers`]. A lump under a surface: [`inclusion`] (feature `inclusion`).
 //! - The stages alone: the crates below. A stage of one's own implements one trait of the
@@ -77,15 +77,8 @@ pub use tactile_fem as fem;
 
 #[cfg(feature = "inclusion")]
 pub mod inclusion;
-#[cfg(feature = "scene")]
-pub mod io;
 pub mod markers;
 pub mod pipeline;
-mod regions;
-#[cfg(feature = "scene")]
-pub mod scene;
-#[cfg(feature = "scene")]
-pub mod sensor;
 mod strain_between;
 mod strain_series;
 

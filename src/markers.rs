@@ -2,9 +2,9 @@
 //! torque that their displacements carry.
 
 use crate::core::Estimate;
+use crate::core::{otsu, regions};
 use crate::elasticity::strain::GreenLagrange;
 use crate::matching::{AnnealedSoftassign, Doubt, MatchError, PointMatcher};
-use crate::regions::{otsu, regions};
 use crate::strain_between::{StrainBetween, median, median_spacing, mutually_nearest};
 use crate::tps::nearest_rows;
 use nalgebra::{Matrix3, Matrix3x2, Point2, Vector2, Vector3};

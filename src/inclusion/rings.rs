@@ -1,6 +1,7 @@
 //! Mean pressure over the radius, from an image.
 
 use ndarray::{Array2, ArrayView2};
+use tactile_inclusion::PressureProfile;
 
 /// Mean pressure in rings around the face's centre.
 ///
@@ -195,8 +196,31 @@ fn harmonics(pixels: impl Iterator<Item = (f64, f64, f64, f64)>, noise: f64) -> 
     (squares.sum::<f64>().max(0.0) / count).sqrt() / (total / count)
 }
 
+impl RingMeans {
+    /// As a profile at other radii, linear between the rings' and the outermost beyond them: the
+    /// search compares frames ring by ring.
+    #[must_use]
+    pub fn profile(
+        &self,
+        radii_m: &[f64],
+        approach_m: f64,
+        force_n: Option<f64>,
+    ) -> PressureProfile {
+        let resampled = |values: &[f64]| -> Vec<f64> {
+            let at = |&radius| interpolated(&self.radii_m, values, radius);
+            radii_m.iter().map(at).collect()
+        };
+        PressureProfile {
+            approach_m,
+            force_n,
+            pressure_pa: resampled(&self.pressure_pa),
+            standard_error_pa: resampled(&self.standard_error_pa),
+        }
+    }
+}
+
 /// A value between those at ascending radii, the outermost beyond them.
-pub fn interpolated(radii: &[f64], values: &[f64], radius: f64) -> f64 {
+fn interpolated(radii: &[f64], values: &[f64], radius: f64) -> f64 {
     if radii.len() < 2 {
         return values.first().copied().unwrap_or(0.0);
     }
@@ -214,6 +238,16 @@ struct Ring {
 }
 
 /// Square cells of a face and their pixels.
+///
+/// ```
+/// use tactile_imaging::inclusion::FaceCells;
+/// // A face of 10 mm radius around the middle of the image, 0.5 mm a pixel, in cells of 2.5 mm.
+/// let cells = FaceCells::new((41, 41), [20.0; 2], [0.5e-3; 2], 10e-3, 2.5e-3);
+/// let tilted = ndarray::Array2::from_shape_fn((41, 41), |(_, x)| x as f64);
+/// let first = (cells.means(&tilted.view())[0], cells.positions_m[0][0]);
+/// assert!((first.0 - (20.0 + first.1 / 0.5e-3)).abs() < 1e-9);
+/// ```
+#[derive(Clone, Debug)]
 pub struct FaceCells {
     /// Middle (x, y) of each from the axis.
     pub positions_m: Vec<[f64; 2]>,

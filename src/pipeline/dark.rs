@@ -3,10 +3,10 @@
 //! Such a sensor measures shape, not force: a force must come from a gauge.
 use super::contact::{ContactReading, ContactStage, FrameContact};
 use super::error::PipelineError;
+use crate::core::regions;
 use crate::force::{
     BoundingBox, Estimate, ForceError, Polarity, ReferenceFrame, median_shift_outside,
 };
-use crate::regions::regions;
 use crate::sfs::DepthTable;
 use ndarray::{Array2, ArrayView2};
 

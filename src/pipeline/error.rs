@@ -299,9 +299,14 @@ pub enum PipelineError {
 }
 
 impl PipelineError {
-    /// The frame that the trouble comes from, counted from 0, where there is one.
-    #[cfg(feature = "scene")]
-    pub(crate) fn frame(&self) -> Option<usize> {
+    /// The frame that the trouble comes from, counted from 0. `None` if it comes from no single one.
+    ///
+    /// ```
+    /// use tactile_imaging::pipeline::PipelineError;
+    /// assert_eq!(PipelineError::NoContact { frame: 2 }.frame(), Some(2));
+    /// ```
+    #[must_use]
+    pub fn frame(&self) -> Option<usize> {
         match self {
             Self::NoSuchFrame { frame, .. }
             | Self::Unreadable { frame, .. }

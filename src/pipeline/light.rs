@@ -74,7 +74,10 @@ impl LightContact {
     }
 
     /// [`from_pairs`](Self::from_pairs) with options of the contact.
-    pub(crate) fn from_pairs_with(
+    ///
+    /// # Errors
+    /// [`PipelineError::Calibration`] and [`PipelineError::Sensor`].
+    pub fn from_pairs_with(
         pairs: &[CalibrationPair],
         pixel_size_m: [f64; 2],
         options: &ForceOptions,

@@ -62,8 +62,6 @@ pub use assumptions::{CheckedGain, CheckedGuide};
 pub use batch::contacts;
 pub use budget::{ErrorShare, ErrorSource};
 pub use check::{CheckPress, CheckedObject, KnownBall};
-#[cfg(feature = "scene")]
-pub(crate) use check::{PARABOLA_ERROR, slopes};
 pub use composition::Pipeline;
 pub use contact::{ContactReading, ContactStage, FrameContact};
 pub use dark::DarkContact;

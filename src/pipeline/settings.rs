@@ -144,7 +144,15 @@ impl Settings {
 
     /// Covariance of ln E, ln h and ν of all layers whose moduli are wrong by one factor with this
     /// relative error.
-    pub(crate) fn common_layer_covariance(layers: usize, error: f64) -> DMatrix<f64> {
+    ///
+    /// ```
+    /// use tactile_imaging::pipeline::Settings;
+    /// let covariance = Settings::common_layer_covariance(2, 0.05);
+    /// assert_eq!(covariance.shape(), (6, 6)); // ln E, ln h and ν of two layers
+    /// assert_eq!((covariance[(0, 1)], covariance[(2, 2)]), (0.05 * 0.05, 0.0));
+    /// ```
+    #[must_use]
+    pub fn common_layer_covariance(layers: usize, error: f64) -> DMatrix<f64> {
         let parameters = PARAMETERS_PER_LAYER * layers;
         // The logarithms of the moduli come first.
         let is_modulus = |parameter: usize| parameter < layers;

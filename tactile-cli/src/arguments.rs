@@ -6,7 +6,7 @@ use clap::{Args, ValueEnum};
 use ndarray::Array2;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
-use tactile_imaging::io::{
+use tactile_files::io::{
     Grey, InputQuantity, PointTable, read_grey_image, read_grid, read_point_table,
 };
 

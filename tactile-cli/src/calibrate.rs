@@ -6,15 +6,15 @@ use crate::plot::{Colour, Page, Panel};
 use clap::Args;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
+use tactile_files::io::read_columns;
+use tactile_files::scene::doubt_of_pairs;
+use tactile_files::sensor::{
+    CalibratedSensor, Indenter, LayerFinding, PhotometricPresses, PressFinding, SensorCalibration,
+    SensorError,
+};
 use tactile_imaging::force::{
     Branch, CalibrationOptions, CalibrationPair, LinearCalibration, LocalCalibration,
     StressCalibration,
-};
-use tactile_imaging::io::read_columns;
-use tactile_imaging::scene::doubt_of_pairs;
-use tactile_imaging::sensor::{
-    CalibratedSensor, Indenter, LayerFinding, PhotometricPresses, PressFinding, SensorCalibration,
-    SensorError,
 };
 
 /// Calibrate a sensor from frames of presses, or fit the line from pixel value to force

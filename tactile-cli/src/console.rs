@@ -11,8 +11,8 @@ use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, mpsc};
 use std::time::{Duration, Instant};
+use tactile_files::io::FileError;
 use tactile_imaging::force::Estimate;
-use tactile_imaging::io::FileError;
 use tactile_imaging::pipeline::{Flag, with_error};
 
 /// The exit codes, as the help of the program lists them.

@@ -10,12 +10,12 @@ use clap::{Args, ValueEnum};
 use ndarray::Array2;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
-use tactile_imaging::io::{Grey, read_columns};
+use tactile_files::io::{Grey, read_columns};
+use tactile_files::scene::doubt_of_depths;
 use tactile_imaging::pipeline::{
     BallFit, ContactReading, ContactSurface, DarkContact, Object, Pipeline, PipelineError,
     SurfaceInput,
 };
-use tactile_imaging::scene::doubt_of_depths;
 
 /// Find the contact and its depth in frames of a sensor that grows darker with depth
 ///

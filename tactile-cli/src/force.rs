@@ -9,9 +9,9 @@ use ndarray::Array2;
 use serde::Serialize;
 use serde_json::json;
 use std::path::PathBuf;
+use tactile_files::io::Grey;
 use tactile_imaging::Pipeline;
 use tactile_imaging::force::Estimate;
-use tactile_imaging::io::Grey;
 use tactile_imaging::pipeline::{ContactReading, Object, Session, Update};
 
 /// Measure force, contact radius, centroid and stress in frames of a sensor that grows brighter

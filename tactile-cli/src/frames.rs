@@ -4,7 +4,7 @@ use crate::console::{Context, Exit, Failure};
 use ndarray::{Array2, Array3, ArrayView3, Axis};
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
-use tactile_imaging::io::{FileError, FrameReader, Grey};
+use tactile_files::io::{FileError, FrameReader, Grey};
 use tactile_imaging::pipeline::FrameSource;
 
 /// Frames per second where neither stream nor argument states them: those of the paper's camera.

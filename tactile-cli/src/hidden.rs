@@ -3,8 +3,9 @@ use crate::console::Context;
 use crate::inclusion::reported;
 use crate::plot::{Colour, Panel, circle};
 use serde::Serialize;
+use tactile_files::scene::LoadedInclusion;
 use tactile_imaging::elasticity::ElasticityError;
-use tactile_imaging::inclusion::{InclusionSearch, LoadedInclusion, Specimen};
+use tactile_imaging::inclusion::{InclusionSearch, Specimen};
 
 /// The largest balls that searches miss, on a grid of places and depths.
 #[derive(Serialize)]

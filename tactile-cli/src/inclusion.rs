@@ -10,14 +10,14 @@ use rand_distr::StandardNormal;
 use serde_json::json;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
+use tactile_files::scene::{InclusionScene, LoadedInclusion};
 use tactile_imaging::elasticity::ElasticityError;
 use tactile_imaging::fem::{
     AppliedLoad, Block, FemScene, Guide, GuideLayer, Interface, Lump, Material,
 };
 use tactile_imaging::inclusion::{
-    AssumedInclusion, Estimated, Identifiable, Inclusion, InclusionEstimate, InclusionScene,
-    InclusionSearch, LoadedInclusion, PressureProfile, SearchProgress, Specimen, Verdict,
-    asymmetry_warnings,
+    AssumedInclusion, Estimated, Identifiable, Inclusion, InclusionEstimate, InclusionSearch,
+    PressureProfile, SearchProgress, Specimen, Verdict, asymmetry_warnings,
 };
 use tactile_imaging::pipeline::{interval_text, with_error};
 

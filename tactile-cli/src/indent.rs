@@ -7,6 +7,7 @@ use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
 use std::path::PathBuf;
 use std::sync::Arc;
+use tactile_files::io::read_table;
 use tactile_imaging::elasticity::ElasticityError;
 use tactile_imaging::elasticity::contact::{Bond, relative_radius_m, tangent_of_degrees};
 use tactile_imaging::elasticity::curve::{
@@ -14,7 +15,6 @@ use tactile_imaging::elasticity::curve::{
     Model, SelectionReason, select_model,
 };
 use tactile_imaging::elasticity::modulus::EstimatorKind;
-use tactile_imaging::io::read_table;
 use tactile_imaging::pipeline::{interval_text, with_error};
 
 /// Measure Young's modulus from a force–indentation curve

@@ -7,9 +7,9 @@ use ndarray::Array2;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use tactile_files::io::{Grey, image_size, read_grey_image};
 use tactile_imaging::PairsDoubt;
 use tactile_imaging::core::Estimate;
-use tactile_imaging::io::{Grey, image_size, read_grey_image};
 use tactile_imaging::markers::{MarkerField, find_markers, track_markers};
 
 /// Follow the markers of a gel from a reference to frames

@@ -7,8 +7,8 @@ use serde_json::{Value, json};
 use std::ffi::OsString;
 use std::io::Write as _;
 use std::path::PathBuf;
+use tactile_files::io::{CasePoints, read_cases, write_case_result};
 use tactile_imaging::PairsDoubt;
-use tactile_imaging::io::{CasePoints, read_cases, write_case_result};
 use tactile_imaging::matching::{
     AnnealedSoftassign, CoherentPointDrift, LinearAssignment, NearestNeighbour, Outliers,
     PointMatcher, RelaxationLabelling, Rotation, StopReason,

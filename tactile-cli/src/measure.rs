@@ -9,11 +9,11 @@ use serde::Serialize;
 use serde_json::{Value, json};
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
+use tactile_files::io::{Grey, image_size};
+use tactile_files::scene::{Scene, SceneData, SceneFrame};
+use tactile_files::sensor::PhotometricPresses;
 use tactile_imaging::Pipeline;
-use tactile_imaging::io::{Grey, image_size};
 use tactile_imaging::pipeline::{ContactReading, Measurement, PipelineError, Press, Stage};
-use tactile_imaging::scene::{Scene, SceneData, SceneFrame};
-use tactile_imaging::sensor::PhotometricPresses;
 use tactile_simulate::{
     CalibrationRun, Camera, ContactModel, Elastic, ElasticSphere, PressLoad, PressOptions,
     PressSimulation, PressTruth, SimulateError, Trial,

@@ -10,7 +10,7 @@ use std::fmt::Debug;
 use std::fs::Metadata;
 use std::io::{Cursor, Write};
 use std::path::{Path, PathBuf};
-use tactile_imaging::io::{image_size, write_bytes};
+use tactile_files::io::{image_size, write_bytes};
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, ZipWriter};
 

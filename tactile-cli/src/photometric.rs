@@ -9,10 +9,10 @@ use ndarray::Array3;
 use serde::Serialize;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
+use tactile_files::io::{Grey, read_bytes};
+use tactile_files::sensor::{PhotometricPresses, PhotometricSensor};
 use tactile_imaging::core::Estimate;
 use tactile_imaging::gel::{CalibrationReport, GelForce, GelFrame, GelSensor};
-use tactile_imaging::io::{Grey, read_bytes};
-use tactile_imaging::sensor::{PhotometricPresses, PhotometricSensor};
 
 /// An argument that a sensor file takes the place of. `filler` is parsed and not used.
 pub fn unless_sensor(arg: Arg, filler: &'static str) -> Arg {

@@ -10,8 +10,8 @@ use std::ffi::OsString;
 use std::fmt::Write;
 use std::io::Read;
 use std::path::{Path, PathBuf};
+use tactile_files::scene::Scene;
 use tactile_imaging::pipeline::{Flag, Measurement, Object, interval_text, with_error};
-use tactile_imaging::scene::Scene;
 
 /// The page of a measurement: the modulus with its interval, cautions and what to do about them,
 /// where the error comes from, and all numbers.

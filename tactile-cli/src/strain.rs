@@ -8,11 +8,11 @@ use clap::{Args, ValueEnum};
 use nalgebra::{Matrix3, Point, SVector};
 use serde_json::{Map, Value, json};
 use std::path::PathBuf;
+use tactile_files::io::PointTable;
 use tactile_imaging::elasticity::strain::{
     Biot, EulerAlmansi, GreenLagrange, Hencky, Infinitesimal, StrainMeasure,
 };
 use tactile_imaging::force::Estimate;
-use tactile_imaging::io::PointTable;
 use tactile_imaging::matching::PointMatcher;
 use tactile_imaging::pipeline::with_error;
 use tactile_imaging::{StrainAt, StrainBetween, StrainBetweenOptions};

@@ -19,12 +19,12 @@ use std::mem::discriminant;
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
+use tactile_files::io::Grey;
+use tactile_files::scene::Scene;
+use tactile_files::sensor::PhotometricPresses;
 use tactile_imaging::elasticity::modulus::ModulusEstimate;
 use tactile_imaging::force::{ChartState, Estimate};
-use tactile_imaging::io::Grey;
 use tactile_imaging::pipeline::{Flag, FrameSource, PipelineError, Session, with_error};
-use tactile_imaging::scene::Scene;
-use tactile_imaging::sensor::PhotometricPresses;
 use tactile_simulate::{CalibrationRun, Camera, Gain, LoadCycle, PressLoad, PressOptions, Trial};
 
 /// Measure frame after frame: force, contact and modulus live

@@ -10,7 +10,7 @@ use clap::{Args, ValueEnum};
 use ndarray::Array2;
 use serde_json::json;
 use std::path::PathBuf;
-use tactile_imaging::io::{Grey, read_grey_image, read_grid};
+use tactile_files::io::{Grey, read_grey_image, read_grid};
 use tactile_imaging::sfs::{
     BoundaryCondition, BrooksHorn, CosinePoisson, Domain, Eikonal, EikonalBranch, Frame,
     FrankotChellappa, Lighting, MaskedLeastSquares, SfsError, SlopeIntegrator, StopReason, Surface,

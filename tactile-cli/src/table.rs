@@ -5,8 +5,8 @@ use clap::Args;
 use serde_json::json;
 use std::path::PathBuf;
 use std::time::Instant;
+use tactile_files::scene::solve_contact_table;
 use tactile_imaging::fem::TableOptions;
-use tactile_imaging::scene::solve_contact_table;
 
 /// Compute the contact table of a ball and a waveguide
 ///

@@ -7,7 +7,7 @@ use nalgebra::{Point, SMatrix};
 use serde_json::json;
 use std::path::PathBuf;
 use std::time::Instant;
-use tactile_imaging::io::PointTable;
+use tactile_files::io::PointTable;
 use tactile_imaging::tps::{
     FitOptions, Kernel, NegR, R2LogR, R3, Smoothing, ThinPlateSpline, TpsError,
 };

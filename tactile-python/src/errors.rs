@@ -4,11 +4,11 @@ use pyo3::prelude::*;
 use std::error::Error;
 use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
+use tactile_files::io::FileError;
+use tactile_files::sensor::SensorError;
 use tactile_imaging::StrainBetweenError;
-use tactile_imaging::io::FileError;
 use tactile_imaging::matching::MatchError;
 use tactile_imaging::pipeline::PipelineError;
-use tactile_imaging::sensor::SensorError;
 
 pyo3::create_exception!(
     tactile_imaging,

@@ -5,11 +5,11 @@ use crate::pipeline::guide;
 use crate::results::{Estimate, Inclusion, Lump};
 use pyo3::prelude::*;
 use std::path::PathBuf;
+use tactile_files::scene::InclusionScene;
 use tactile_imaging::elasticity::ElasticityError;
 use tactile_imaging::fem::{Guide, GuideLayer, Interface, Material};
 use tactile_imaging::inclusion::{
-    Estimated, Identifiable, InclusionEstimate, InclusionScene, InclusionSearch, PressureProfile,
-    Specimen, Verdict,
+    Estimated, Identifiable, InclusionEstimate, InclusionSearch, PressureProfile, Specimen, Verdict,
 };
 use tactile_imaging::pipeline::with_error;
 

@@ -10,12 +10,12 @@ use pyo3::types::PyType;
 use std::path::PathBuf;
 use std::sync::Mutex;
 use std::thread::ThreadId;
+use tactile_files::io::FileError;
+use tactile_files::scene::Scene;
 use tactile_imaging as rust;
 use tactile_imaging::core::Estimate as CoreEstimate;
 use tactile_imaging::elasticity::modulus::ModulusEstimate;
-use tactile_imaging::io::FileError;
 use tactile_imaging::pipeline::{ContactReading, ContactSurface, Flag, PairStrain, PipelineError};
-use tactile_imaging::scene::Scene;
 
 /// Values and their standard errors.
 type ValuesAndErrors<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>);

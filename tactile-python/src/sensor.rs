@@ -4,10 +4,10 @@ use crate::errors::{self, invalid};
 use pyo3::prelude::*;
 use pyo3::types::PyType;
 use std::path::PathBuf;
+use tactile_files::scene::SceneLayer;
+use tactile_files::sensor as rust;
+use tactile_files::sensor::{Indenter, LayerInput, SensorCalibration, SensorPress};
 use tactile_imaging::force::Branch;
-use tactile_imaging::scene::SceneLayer;
-use tactile_imaging::sensor as rust;
-use tactile_imaging::sensor::{Indenter, LayerInput, SensorCalibration, SensorPress};
 
 /// A calibrated sensor: lens, light and layers with their errors.
 #[pyclass(frozen, module = "tactile_imaging")]

@@ -5,7 +5,7 @@ use crate::calibration::CalibrationSeries;
 use crate::contact::ContactModel;
 use crate::press::PressScene;
 use std::path::{Path, PathBuf};
-use tactile_imaging::io::{FileError, write_bytes, write_grey_image};
+use tactile_files::io::{FileError, write_bytes, write_grey_image};
 use toml::{Table, Value};
 
 /// Writes a scene and a calibration of its sensor as files: `reference.png`, `frame_1.png` …,
@@ -14,7 +14,7 @@ use toml::{Table, Value};
 ///
 /// ```
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
-/// use tactile_imaging::scene::Scene;
+/// use tactile_files::scene::Scene;
 /// use tactile_simulate::{CalibrationRun, Camera, PressOptions, PressScene, write_folder};
 /// let camera = Camera::default().coarser(16);
 /// let scene = PressScene::new(PressOptions { camera, ..PressOptions::default() })?;

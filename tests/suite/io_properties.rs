@@ -6,14 +6,14 @@ use crate::scene_files::{VALID, small_scene};
 use nalgebra::{Point, Point3};
 use proptest::prelude::*;
 use std::fmt::Write;
+use tactile_files::io::{read_columns, read_grid, read_points};
+use tactile_files::scene::Scene;
 use tactile_imaging::elasticity::curve::{
     CurveOptions, IndentationCurve, Indenter, Model, select_model,
 };
 use tactile_imaging::force::{
     CalibrationOptions, CalibrationPair, LinearCalibration, StressCalibration,
 };
-use tactile_imaging::io::{read_columns, read_grid, read_points};
-use tactile_imaging::scene::Scene;
 use tactile_imaging::tps::ThinPlateSpline;
 
 /// A file with this content.

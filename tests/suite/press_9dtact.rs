@@ -4,7 +4,7 @@
 use crate::common::press_of;
 use ndarray::Array2;
 use std::path::Path;
-use tactile_imaging::io::{Grey, read_columns, read_grey_image};
+use tactile_files::io::{Grey, read_columns, read_grey_image};
 use tactile_imaging::pipeline::{ContactSurface, DarkContact, Object, Pipeline, SurfaceInput};
 use test_support::published;
 

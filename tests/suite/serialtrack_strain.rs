@@ -3,8 +3,8 @@
 #![allow(clippy::print_stdout)]
 
 use nalgebra::{Matrix3, Point, Point3};
+use tactile_files::io::read_points;
 use tactile_imaging::elasticity::strain::GreenLagrange;
-use tactile_imaging::io::read_points;
 use tactile_imaging::{
     PairsDoubt, StrainBetween, StrainBetweenOptions, StrainSeries, strain_between,
 };

@@ -12,7 +12,8 @@
 use super::{KnownBall, is_known, is_positive};
 use crate::core::Estimate;
 use crate::elasticity::contact::{
-    Bond, Layer, Waveguide, guide_compliance_error, guide_log_stiffness, stepped_layers,
+    Bond, Layer, PARABOLA_ERROR, Waveguide, guide_compliance_error, guide_log_stiffness,
+    parameter_slopes, stepped_layers,
 };
 use crate::elasticity::modulus::{ContactLaw, LogForce, WaveguideLaw};
 use crate::pipeline::assumptions::CheckedGuide;
@@ -40,10 +41,6 @@ pub struct GuideCheck {
 
 /// Standard errors by which a press may contradict what was stated before it is refused.
 const LARGEST_DEVIATION: f64 = 4.0;
-
-/// Relative error of F at a/R = 1 from taking a rigid ball for a parabola and strains as small. It
-/// goes as (a/R)².
-pub(crate) const PARABOLA_ERROR: f64 = 0.1;
 
 /// Move of x below which the update has settled: a hundredth of any error that layers have.
 const SETTLED: f64 = 1e-5;
@@ -151,24 +148,6 @@ fn log_forces(checks: &[GuideCheck], layers: &[Layer]) -> Option<Vec<LogForce>> 
     forces.collect()
 }
 
-/// Derivatives by x of values that are `here` at x. Parameters that do not move have none.
-pub(crate) fn slopes(
-    here: &[f64],
-    x: &DVector<f64>,
-    moves: impl Fn(usize) -> bool,
-    values: impl Fn(&DVector<f64>) -> Option<Vec<f64>>,
-) -> Option<DMatrix<f64>> {
-    let mut slopes = DMatrix::zeros(here.len(), x.len());
-    for k in (0..x.len()).filter(|&k| moves(k)) {
-        let mut beside = x.clone();
-        beside[k] += STEP;
-        for (i, (there, here)) in values(&beside)?.iter().zip(here).enumerate() {
-            slopes[(i, k)] = (there - here) / STEP;
-        }
-    }
-    Some(slopes)
-}
-
 /// Covariance of ln F of all presses from all but the layers, at the stated layers.
 fn noise(
     checks: &[GuideCheck],
@@ -239,7 +218,7 @@ pub fn update(
     for round in 0..MOST_ROUNDS {
         let here = predicted(&x).ok_or(unsolved)?;
         let moves = |k: usize| prior[(k, k)] > 0.0;
-        let slopes = slopes(&here, &x, moves, predicted).ok_or(unsolved)?;
+        let slopes = parameter_slopes(&here, &x, moves, predicted).ok_or(unsolved)?;
         let gap = &log_known - DVector::from_vec(here);
         let whole = &slopes * &prior * slopes.transpose() + &noise;
         if round == 0 {

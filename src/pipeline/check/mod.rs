@@ -11,9 +11,6 @@ use gain::GainCheck;
 use guide::GuideCheck;
 use ndarray::ArrayView2;
 
-#[cfg(feature = "scene")]
-pub(crate) use guide::{PARABOLA_ERROR, slopes};
-
 /// A ball whose radius and modulus are known.
 ///
 /// ```

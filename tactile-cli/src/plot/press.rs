@@ -3,7 +3,7 @@ use super::{Colour, HeatMap, Page, Panel, PlotError, PlotPoint};
 use crate::console::in_unit;
 use ndarray::Array2;
 use std::path::{Path, PathBuf};
-use tactile_imaging::io::replace_file;
+use tactile_files::io::replace_file;
 use tactile_imaging::pipeline::{ContactSurface, Measurement, PipelineError, Press, with_error};
 
 /// Writes every page that the press has results for to `folder`, as SVG, and returns their paths.

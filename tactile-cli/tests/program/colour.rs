@@ -4,7 +4,7 @@ use super::json::assert_keeps_to_schema;
 use super::streams::piped;
 use serde_json::Value;
 use std::fs;
-use tactile_imaging::io::read_colour_levels;
+use tactile_files::io::read_colour_levels;
 
 #[test]
 fn a_calibrated_gel_gives_depth_and_gradients() {

@@ -5,7 +5,7 @@ use serde_json::Value;
 use std::fs;
 use std::path::Path;
 use std::process::Command;
-use tactile_imaging::io::{Grey, read_grey_image, write_grey_image};
+use tactile_files::io::{Grey, read_grey_image, write_grey_image};
 
 /// The frames of the examples' press: without contact, at the lower and at the higher load.
 const REFERENCE: &str = "examples/data/press/reference.png";

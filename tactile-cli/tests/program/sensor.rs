@@ -3,8 +3,8 @@ use super::harness::{printed, run, text, words};
 use super::json::assert_keeps_to_schema;
 use std::fs;
 use std::path::Path;
+use tactile_files::sensor::Sensor;
 use tactile_imaging::force::LocalCalibration;
-use tactile_imaging::sensor::Sensor;
 use tempfile::TempDir;
 
 /// The example's calibration under its own name, with one text replaced by another throughout.

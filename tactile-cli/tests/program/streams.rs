@@ -5,7 +5,7 @@ use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
 use std::path::Path;
 use std::process::{Output, Stdio};
-use tactile_imaging::io::{Grey, read_grey_image};
+use tactile_files::io::{Grey, read_grey_image};
 
 const SCENE: &str = "examples/data/press/scene.toml";
 const CALIBRATED: &str = "--reference examples/data/press/reference.png --pairs \

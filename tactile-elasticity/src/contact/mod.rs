@@ -28,8 +28,8 @@ pub use layers::{Bond, LayerContact, LayerEquation, LayerSeries};
 pub use plane::LayerPlane;
 pub use table::{ContactCurve, ContactTable};
 pub use waveguide::{
-    Layer, PARAMETERS_PER_LAYER, Waveguide, guide_compliance_covariance, guide_compliance_error,
-    guide_log_stiffness, stepped_layers,
+    Layer, PARABOLA_ERROR, PARAMETERS_PER_LAYER, Waveguide, guide_compliance_covariance,
+    guide_compliance_error, guide_log_stiffness, parameter_slopes, stepped_layers,
 };
 
 pub(crate) use hertz::Squeeze;

@@ -203,6 +203,40 @@ pub fn stepped_layers(layers: &[Layer], step: &DVector<f64>) -> Vec<Layer> {
     layers.iter().enumerate().map(layer).collect()
 }
 
+/// Relative error of F = 4/3 E_g a³/R at a/R = 1 from taking a rigid ball for a parabola and strains
+/// as small. It goes as (a/R)².
+pub const PARABOLA_ERROR: f64 = 0.1;
+
+/// Derivatives by parameters x of values that are `here` at x, as of forces by
+/// [`stepped_layers`]'s parameters: \[value, parameter\]. Steps are downwards, as ν is at most ½.
+/// Parameters that do not move have zeros. `None` if the values are.
+///
+/// ```
+/// use nalgebra::DVector;
+/// use tactile_elasticity::contact::parameter_slopes;
+/// let values = |x: &DVector<f64>| Some(vec![x[0].exp(), x[0] * x[1]]);
+/// let x = DVector::from_vec(vec![0.0, 2.0]);
+/// let slopes = parameter_slopes(&[1.0, 0.0], &x, |k| k == 0, values).unwrap();
+/// assert!((slopes[(0, 0)] - 1.0).abs() < 1e-3 && (slopes[(1, 0)] - 2.0).abs() < 1e-3);
+/// assert_eq!(slopes[(1, 1)], 0.0);
+/// ```
+pub fn parameter_slopes(
+    here: &[f64],
+    x: &DVector<f64>,
+    moves: impl Fn(usize) -> bool,
+    values: impl Fn(&DVector<f64>) -> Option<Vec<f64>>,
+) -> Option<DMatrix<f64>> {
+    let mut slopes = DMatrix::zeros(here.len(), x.len());
+    for k in (0..x.len()).filter(|&k| moves(k)) {
+        let mut beside = x.clone();
+        beside[k] -= STEP;
+        for (i, (there, here)) in values(&beside)?.iter().zip(here).enumerate() {
+            slopes[(i, k)] = (there - here) / -STEP;
+        }
+    }
+    Some(slopes)
+}
+
 /// Derivatives of [`guide_log_stiffness`] by ln E, ln h and ν of the layers, in this order.
 fn log_stiffness_gradient(layers: &[Layer], radius_m: f64) -> Option<DVector<f64>> {
     let count = PARAMETERS_PER_LAYER * layers.len();

@@ -6,13 +6,13 @@
 use ndarray::{Array, Dimension};
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
-use tactile_imaging::io::{
+use tactile_files::io::{
     CasePoints, FileError, FrameReader, Grey, read_cases, read_columns, read_grey_image, read_grid,
     read_points,
 };
+use tactile_files::scene::{Scene, read_contact_table};
+use tactile_files::sensor::{Sensor, SensorCalibration};
 use tactile_imaging::pipeline::FrameSource;
-use tactile_imaging::scene::{Scene, read_contact_table};
-use tactile_imaging::sensor::{Sensor, SensorCalibration};
 
 /// A CSV file, read in every way that CSV files are read.
 pub(crate) fn table(bytes: &[u8]) {

@@ -3,13 +3,13 @@ use super::Answers;
 use super::readings::{contact, estimates, modulus, press, tensor};
 use crate::common::press_of;
 use ndarray::Array2;
+use tactile_files::scene::Scene;
 use tactile_imaging::elasticity::modulus::{FlatPunch, HertzSphere, PaperRatio, StrainReference};
 use tactile_imaging::force::{CalibrationPair, Estimate};
 use tactile_imaging::pipeline::{
     DarkContact, EstimatorChoice, MatcherChoice, Object, Pipeline, ReconstructionChoice,
     SamplerChoice, Session, StagesConfig, StrainChoice, SurfaceInput, WarpChoice,
 };
-use tactile_imaging::scene::Scene;
 use tactile_simulate::{
     CalibrationRun, Camera, Elastic, ElasticSphere, Gain, PressOptions, PressScene, Trial,
     UniaxialOptions, UniaxialScene, write_folder,

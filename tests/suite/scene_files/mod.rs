@@ -4,12 +4,12 @@
 use ndarray::Array2;
 use std::fs;
 use std::path::Path;
+use tactile_files::io::write_grey_image;
+use tactile_files::scene::{LoadedCalibration, Scene};
 use tactile_imaging::Pipeline;
 use tactile_imaging::elasticity::modulus::{EstimatorKind, ModulusEstimator};
 use tactile_imaging::elasticity::strain::Hencky;
-use tactile_imaging::io::write_grey_image;
 use tactile_imaging::pipeline::{MatcherChoice, Measurement, PipelineError, StagesConfig};
-use tactile_imaging::scene::{LoadedCalibration, Scene};
 use tactile_imaging::sfs::CurvatureAdaptive;
 use tactile_imaging::tps::AffineModel;
 use tactile_simulate::{CalibrationRun, Camera, Elastic, PressOptions, PressScene, write_folder};

@@ -9,9 +9,9 @@ use sensors::{
     BALL_ERROR, Effects, POISSON_ERROR, SAMPLE_PA, SAMPLE_POISSON, SAMPLE_RADIUS_M, Simulated,
     estimator,
 };
+use tactile_files::sensor::{Indenter, Sensor, SensorCalibration, SensorError};
 use tactile_imaging::force::{ContactOptions, DriftCorrection, ForceOptions};
 use tactile_imaging::pipeline::{Object, Pipeline};
-use tactile_imaging::sensor::{Indenter, Sensor, SensorCalibration, SensorError};
 use tactile_simulate::Camera;
 
 /// Changes of the illumination are divided out where they can be told, as a sensor's own pipeline

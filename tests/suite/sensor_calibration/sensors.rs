@@ -6,13 +6,13 @@ use ndarray::Array2;
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 use rand_distr::{Distribution, StandardNormal};
 use std::f64::consts::PI;
+use tactile_files::scene::SceneLayer;
+use tactile_files::sensor::{Indenter, LayerInput, SensorCalibration, SensorPress};
 use tactile_imaging::elasticity::contact::{Bond, Layer, LayerEquation, Waveguide};
 use tactile_imaging::elasticity::modulus::{
     Estimate, LoadSeries, LoadState, ModulusEstimator, SphereOnWaveguide,
 };
 use tactile_imaging::force::Branch;
-use tactile_imaging::scene::SceneLayer;
-use tactile_imaging::sensor::{Indenter, LayerInput, SensorCalibration, SensorPress};
 use tactile_simulate::{
     Camera, ContactModel, ContactState, Elastic, ElasticSphere, PressLoad, PressOptions,
     PressScene, Response,

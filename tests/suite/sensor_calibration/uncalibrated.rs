@@ -7,10 +7,10 @@ use super::sensors::{
 };
 use crate::common::press_of;
 use std::collections::BTreeSet;
+use tactile_files::sensor::{Sensor, SensorCalibration, SensorError};
 use tactile_imaging::elasticity::modulus::ModulusEstimate;
 use tactile_imaging::force::{CalibrationPair, ForceOptions};
 use tactile_imaging::pipeline::{Flag, LightContact, Pipeline};
-use tactile_imaging::sensor::{Sensor, SensorCalibration, SensorError};
 use tactile_simulate::Camera;
 
 /// What is left out of the calibration.

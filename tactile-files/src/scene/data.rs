@@ -1,25 +1,27 @@
 //! The files of a scene, read and checked against each other, and a pipeline with its frames.
 use super::file::guide;
 use super::{CalibrationSource, Scene, read_contact_table};
-use crate::elasticity::ElasticityError;
-use crate::elasticity::contact::ContactTable;
-use crate::elasticity::modulus::TabulatedContact;
-use crate::force::{CalibrationPair, ContactOptions, DriftCorrection, Estimate, ForceOptions};
 use crate::io::{FileError, FilePlace, InputQuantity, read_columns, read_frame, read_grey_levels};
-use crate::pipeline::{
-    CheckPress, DarkContact, EstimatorChoice, LightContact, Measurement, Object, Pipeline,
-    PipelineError, Press, SurfaceInput,
-};
 use crate::sensor::Sensor;
 use ndarray::{Array2, ArrayView2};
 use std::error::Error;
 use std::path::Path;
+use tactile_imaging::elasticity::ElasticityError;
+use tactile_imaging::elasticity::contact::ContactTable;
+use tactile_imaging::elasticity::modulus::TabulatedContact;
+use tactile_imaging::force::{
+    CalibrationPair, ContactOptions, DriftCorrection, Estimate, ForceOptions,
+};
+use tactile_imaging::pipeline::{
+    CheckPress, DarkContact, EstimatorChoice, LightContact, Measurement, Object, Pipeline,
+    PipelineError, Press, SurfaceInput,
+};
 
 /// A scene's calibration, read.
 ///
 /// ```
 /// use tactile_imaging::force::CalibrationPair;
-/// use tactile_imaging::scene::LoadedCalibration;
+/// use tactile_files::scene::LoadedCalibration;
 /// let name = |calibration: &LoadedCalibration| match calibration {
 ///     LoadedCalibration::Pairs(pairs) => format!("pairs to {} N", pairs[1].force_n),
 ///     LoadedCalibration::Gauge => "a gauge's forces".into(),
@@ -48,7 +50,7 @@ pub enum LoadedCalibration {
 /// ```
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// use tactile_simulate::{CalibrationRun, Camera, PressOptions, PressScene, write_folder};
-/// use tactile_imaging::scene::{LoadedCalibration, Scene};
+/// use tactile_files::scene::{LoadedCalibration, Scene};
 /// let camera = Camera::default().coarser(16);
 /// let made = PressScene::new(PressOptions { camera, ..PressOptions::default() })?;
 /// let folder = tempfile::tempdir()?;
@@ -156,7 +158,7 @@ impl Scene {
     /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
     /// use tactile_simulate::{CalibrationRun, Camera, PressLoad, PressOptions, PressScene};
     /// use tactile_simulate::write_folder;
-    /// use tactile_imaging::scene::Scene;
+    /// use tactile_files::scene::Scene;
     /// let camera = Camera::default().coarser(16);
     /// let loads = vec![PressLoad::normal(0.7)];
     /// let made = PressScene::new(PressOptions { camera, loads, ..Default::default() })?;
@@ -190,7 +192,7 @@ impl Scene {
     /// ```
     /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
     /// use tactile_imaging::force::CalibrationPair;
-    /// use tactile_imaging::scene::{LoadedCalibration, Scene, SceneData};
+    /// use tactile_files::scene::{LoadedCalibration, Scene, SceneData};
     /// let scene = Scene::parse(r#"
     ///     reference = "reference.png"
     ///     pixel_size_m = [2e-5, 2e-5]
@@ -327,7 +329,7 @@ impl Scene {
                 } = self.object
                 else {
                     return Err(PipelineError::WrongEstimator {
-                        estimator: EstimatorChoice::TabulatedContact.name(),
+                        estimator: EstimatorChoice::TabulatedContact.into(),
                         needs: "a ball as the object",
                     });
                 };
@@ -392,7 +394,7 @@ pub fn force_pairs(path: &Path) -> Result<Vec<CalibrationPair>, FileError> {
 /// bits do not hold, or depths of no gel. `None` where they may be one.
 ///
 /// ```
-/// use tactile_imaging::scene::doubt_of_depths;
+/// use tactile_files::scene::doubt_of_depths;
 /// assert_eq!(doubt_of_depths(&[(0.0, 0.0), (60.0, 1.9e-3)]), None);
 /// assert!(doubt_of_depths(&[(0.0, 0.0), (1.9, 60e-3)]).is_some(), "swapped columns");
 /// ```
@@ -418,7 +420,7 @@ pub fn doubt_of_depths(rows: &[(f64, f64)]) -> Option<String> {
 ///
 /// ```
 /// use tactile_imaging::force::CalibrationPair;
-/// use tactile_imaging::scene::doubt_of_pairs;
+/// use tactile_files::scene::doubt_of_pairs;
 /// let pairs = |slope: f64| [1e5, 2e5, 3e5].map(|v| CalibrationPair::loading(v, slope * v));
 /// assert_eq!(doubt_of_pairs(&pairs(1e-6)), None);
 /// assert!(doubt_of_pairs(&pairs(-1e-6)).is_some_and(|reason| reason.contains("falls")));

@@ -2,6 +2,13 @@
 
 /// Otsu's threshold: it parts a histogram into two classes of the least variance, half way between
 /// their means. `None` for one class.
+///
+/// ```
+/// // Dark pixels of level 10, bright ones of level 90.
+/// let mut histogram = [0.0; 256];
+/// (histogram[10], histogram[90]) = (700.0, 300.0);
+/// assert_eq!(tactile_core::otsu(&histogram, |k| k as f64), Some(50.0));
+/// ```
 pub fn otsu(histogram: &[f64], level: impl Fn(usize) -> f64) -> Option<f64> {
     let total: f64 = histogram.iter().sum();
     let products = histogram.iter().enumerate().map(|(k, n)| n * level(k));
@@ -23,6 +30,13 @@ pub fn otsu(histogram: &[f64], level: impl Fn(usize) -> f64) -> Option<f64> {
 
 /// Regions of the pixels inside, row by row, that are connected by their sides: places of their
 /// pixels, the first in reading order first. What was given out is no longer inside. O(pixels).
+///
+/// ```
+/// // The second row's last two pixels touch the first row's by a corner alone.
+/// let mut inside = [true, false, false, false, true, true];
+/// let found: Vec<_> = tactile_core::regions(&mut inside, 3).collect();
+/// assert_eq!(found, [vec![0], vec![4, 5]]);
+/// ```
 pub fn regions(inside: &mut [bool], columns: usize) -> impl Iterator<Item = Vec<usize>> {
     let mut starts = 0..inside.len();
     std::iter::from_fn(move || {

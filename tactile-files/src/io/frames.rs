@@ -8,7 +8,6 @@ use self::npy::Arrays;
 use super::error::{FileError, FilePlace, quoted};
 use super::files::{LARGEST_FILE, open_file};
 use super::image::{Grey, colour_levels, decode, eight_bit_levels, header_words, largest_image};
-use crate::pipeline::FrameSource;
 use ::image::DynamicImage;
 use ndarray::{Array2, Array3};
 use std::collections::HashSet;
@@ -17,6 +16,7 @@ use std::io::{
 };
 use std::mem::take;
 use std::path::{Path, PathBuf};
+use tactile_imaging::pipeline::FrameSource;
 
 /// Longest line of a video's header and longest header of an image, in bytes. Longer ones are no
 /// video, and a line without an end would fill the memory.
@@ -204,7 +204,7 @@ impl FrameReader {
     /// counted from the first. Samples of 16 bits are rounded to 8.
     ///
     /// ```
-    /// use tactile_imaging::io::FrameReader;
+    /// use tactile_files::io::FrameReader;
     /// let video = b"P6\n1 1\n255\n\xf0\x10\x00P6\n1 1\n255\n\xf1\x11\x01";
     /// let mut camera = FrameReader::new(&video[..], "pipe", 25.0)?;
     /// let mut frame = ndarray::Array3::zeros((0, 0, 0));

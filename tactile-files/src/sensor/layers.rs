@@ -6,13 +6,13 @@
 //! as a prior. Parameters that the presses do not determine stay as they were stated.
 use super::calibration::{LayerFinding, PressFinding, SensorError};
 use super::input::{Indenter, LayerInput};
-use crate::elasticity::contact::{
-    Layer, PARAMETERS_PER_LAYER, guide_log_stiffness, stepped_layers,
-};
-use crate::force::Estimate;
-use crate::pipeline::{PARABOLA_ERROR, slopes};
 use crate::scene::{SceneLayer, elastic_layers};
 use nalgebra::{DMatrix, DVector};
+use tactile_imaging::elasticity::contact::{
+    Layer, PARABOLA_ERROR, PARAMETERS_PER_LAYER, guide_log_stiffness, parameter_slopes,
+    stepped_layers,
+};
+use tactile_imaging::force::Estimate;
 
 /// A contact of a rigid ball.
 #[derive(Clone, Copy, Debug)]
@@ -304,7 +304,8 @@ impl<'a> Problem<'a> {
             let here = self.predicted(layers, &parameters)?;
             // Parameters that are stated as exact do not move.
             let moves = |k: usize| self.prior[k] > EXACT;
-            let slopes = slopes(&here, &parameters, moves, |x| self.predicted(layers, x))?;
+            let slopes =
+                parameter_slopes(&here, &parameters, moves, |x| self.predicted(layers, x))?;
             // The priors keep the normal equations regular where the presses determine nothing.
             let mut normal = DMatrix::from_diagonal(&self.prior.map(|sd| (sd * sd).recip()));
             let mut right = -(&normal * &parameters);

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 /// A place in a file. Lines and columns are counted from 1.
 ///
 /// ```
-/// use tactile_imaging::io::FilePlace;
+/// use tactile_files::io::FilePlace;
 /// assert_eq!(FilePlace::Cell { line: 3, column: 2 }.to_string(), ", line 3, column 2");
 /// assert_eq!(FilePlace::Field("object.radius_m".into()).to_string(), ": field `object.radius_m`");
 /// ```
@@ -46,8 +46,8 @@ impl fmt::Display for FilePlace {
 ///
 /// ```
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
-/// use tactile_imaging::io::{FileError, FilePlace, read_grid};
-/// use tactile_imaging::scene::Scene;
+/// use tactile_files::io::{FileError, FilePlace, read_grid};
+/// use tactile_files::scene::Scene;
 /// let folder = tempfile::tempdir()?;
 /// let path = folder.path().join("depth.csv");
 /// std::fs::write(&path, "0.1,0.2\n0.3\n")?;

@@ -12,7 +12,7 @@ use std::path::Path;
 ///
 /// ```
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
-/// use tactile_imaging::io::{CasePoints, read_cases};
+/// use tactile_files::io::{CasePoints, read_cases};
 /// let folder = tempfile::tempdir()?;
 /// let path = folder.path().join("two.txt");
 /// let text = b"case flat 2 1 1\nm 0 1\nt 0.5 1\ncase solid 3 1 1\nm 0 1 2\nt 0 1 2.5\n";
@@ -46,7 +46,7 @@ pub enum CasePoints {
 ///
 /// ```
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
-/// use tactile_imaging::io::{CasePoints, MatchCase, read_cases};
+/// use tactile_files::io::{CasePoints, MatchCase, read_cases};
 /// let folder = tempfile::tempdir()?;
 /// let path = folder.path().join("shift.txt");
 /// std::fs::write(&path, "case shift 2 1 1\nm 0 1\nt 0.5 1\n")?;
@@ -70,7 +70,7 @@ pub struct MatchCase {
 ///
 /// ```
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
-/// use tactile_imaging::io::{CasePoints, read_cases};
+/// use tactile_files::io::{CasePoints, read_cases};
 /// let folder = tempfile::tempdir()?;
 /// let path = folder.path().join("cases.txt");
 /// std::fs::write(&path, "case shift 2 2 1\nm 0 1\nm 2 3\nt 0.5 1\n")?;

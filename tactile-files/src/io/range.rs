@@ -6,7 +6,7 @@ use serde::de::{self, Deserialize, Deserializer};
 /// can have.
 ///
 /// ```
-/// use tactile_imaging::io::InputQuantity;
+/// use tactile_files::io::InputQuantity;
 /// // 3 mm, and 3 m where metres are asked for.
 /// assert!(InputQuantity::Length.allows(3e-3) && !InputQuantity::Length.allows(3.0));
 /// assert!(InputQuantity::Modulus.allows(60e3) && !InputQuantity::Modulus.allows(f64::NAN));

@@ -1,23 +1,23 @@
 //! The sensor and its file.
-use crate::elasticity::contact::Waveguide;
-use crate::force::{
-    ContactOptions, DriftCorrection, ForceOptions, LensGeometry, NoiseModel, PressureCurve,
-    ShearCalibration,
-};
 use crate::io::{FileError, finite, not_negative, read_toml, write_bytes};
-use crate::pipeline::{LightContact, Object, Pipeline, PipelineError, ReferenceLight};
 use crate::scene::{SceneLayer, guide};
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
+use tactile_imaging::elasticity::contact::Waveguide;
+use tactile_imaging::force::{
+    ContactOptions, DriftCorrection, ForceOptions, LensGeometry, NoiseModel, PressureCurve,
+    ShearCalibration,
+};
+use tactile_imaging::pipeline::{LightContact, Object, Pipeline, PipelineError, ReferenceLight};
 
 /// The map from pixels to metres, with its errors.
 ///
 /// ```no_run
-/// use tactile_imaging::sensor::{Sensor, SensorGeometry};
+/// use tactile_files::sensor::{Sensor, SensorGeometry};
 /// let SensorGeometry { lens, covariance, .. } = Sensor::read("sensor.toml")?.geometry;
 /// println!("a pixel is {} ± {} m wide", lens.pixel_size_m()[0], covariance[0][0].sqrt());
-/// # Ok::<(), tactile_imaging::io::FileError>(())
+/// # Ok::<(), tactile_files::io::FileError>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -71,7 +71,7 @@ impl SensorGeometry {
 ///
 /// ```
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
-/// use tactile_imaging::sensor::Sensor;
+/// use tactile_files::sensor::Sensor;
 /// let folder = tempfile::tempdir()?;
 /// let path = folder.path().join("sensor.toml");
 /// std::fs::write(&path, "date = \"2026-11-22\"\nflat_field = 3\n")?;
@@ -98,7 +98,7 @@ pub struct Sensor {
     pub gauge_error: f64,
     /// Relative standard error of the light that an object couples beside what the calibrator
     /// coupled. Zero under a fixed diffusing skin. `None`: that of
-    /// [`Settings`](crate::pipeline::Settings::coupling_error) is assumed.
+    /// [`Settings`](tactile_imaging::pipeline::Settings::coupling_error) is assumed.
     #[serde(
         default,
         deserialize_with = "not_negative",

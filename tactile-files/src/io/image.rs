@@ -13,7 +13,7 @@ use std::path::Path;
 ///
 /// ```
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
-/// use tactile_imaging::io::{Grey, read_grey_image};
+/// use tactile_files::io::{Grey, read_grey_image};
 /// let folder = tempfile::tempdir()?;
 /// let path = folder.path().join("blue.ppm");
 /// std::fs::write(&path, b"P6\n1 1\n255\n\x00\x00\x5a")?; // 90 levels of blue
@@ -48,7 +48,7 @@ impl Grey {
 ///
 /// ```
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
-/// use tactile_imaging::io::{Grey, read_grey_image};
+/// use tactile_files::io::{Grey, read_grey_image};
 /// let folder = tempfile::tempdir()?;
 /// let path = folder.path().join("red_and_grey.ppm");
 /// std::fs::write(&path, b"P6\n2 1\n255\n\xff\x00\x00\x0a\x0a\x0a")?;
@@ -91,7 +91,7 @@ impl GreyImage {
 ///
 /// ```
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
-/// use tactile_imaging::io::{Grey, read_grey_image};
+/// use tactile_files::io::{Grey, read_grey_image};
 /// let folder = tempfile::tempdir()?;
 /// let path = folder.path().join("frame.ppm");
 /// std::fs::write(&path, b"P6\n1 1\n255\n\x1e\x3c\x00")?;
@@ -127,7 +127,7 @@ pub fn read_grey_image(
 ///
 /// ```
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
-/// use tactile_imaging::io::image_size;
+/// use tactile_files::io::image_size;
 /// let folder = tempfile::tempdir()?;
 /// let path = folder.path().join("frame.pgm");
 /// std::fs::write(&path, b"P5\n3 2\n255\n......")?;
@@ -178,7 +178,7 @@ pub fn eight_bit_levels(
 ///
 /// ```
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
-/// use tactile_imaging::io::read_colour_levels;
+/// use tactile_files::io::read_colour_levels;
 /// let folder = tempfile::tempdir()?;
 /// let path = folder.path().join("red.ppm");
 /// std::fs::write(&path, b"P6\n1 1\n255\n\xf0\x10\x00")?;
@@ -422,7 +422,7 @@ fn above_maximum(bytes: &[u8], (width, height): (u32, u32)) -> Option<String> {
 ///
 /// ```
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
-/// use tactile_imaging::io::write_grey_image;
+/// use tactile_files::io::write_grey_image;
 /// let folder = tempfile::tempdir()?;
 /// let path = folder.path().join("frame.pgm");
 /// write_grey_image(&path, ndarray::array![[10, 20, 30]].view())?;

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 ///
 /// ```
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
-/// use tactile_imaging::io::read_table;
+/// use tactile_files::io::read_table;
 /// let folder = tempfile::tempdir()?;
 /// let path = folder.path().join("pairs.csv");
 /// std::fs::write(&path, "force_mN,pixel\n1,2\n\n3,4\n")?;
@@ -115,7 +115,7 @@ impl Table {
 ///
 /// ```
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
-/// use tactile_imaging::io::{FileError, read_columns};
+/// use tactile_files::io::{FileError, read_columns};
 /// let folder = tempfile::tempdir()?;
 /// let path = folder.path().join("curve.csv");
 /// std::fs::write(&path, "# probe 3\ntime_s,indentation (µm),force_mN\n0,5,1.5\n0.1,10,4.2\n")?;
@@ -150,7 +150,7 @@ pub fn read_table(path: impl AsRef<Path>) -> Result<Table, FileError> {
 ///
 /// ```
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
-/// use tactile_imaging::io::read_grid;
+/// use tactile_files::io::read_grid;
 /// let folder = tempfile::tempdir()?;
 /// let path = folder.path().join("height_mm.csv");
 /// std::fs::write(&path, "0.1,0.2,0.3\n0.4,,nan\n")?;
@@ -227,7 +227,7 @@ pub fn read_point_table(path: impl AsRef<Path>) -> Result<(PointTable, bool), Fi
 ///
 /// ```
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
-/// use tactile_imaging::io::read_points;
+/// use tactile_files::io::read_points;
 /// let folder = tempfile::tempdir()?;
 /// let path = folder.path().join("points.csv");
 /// std::fs::write(&path, "id;x_mm;y_mm\n# rim\n7;500;1500\n8;2000;3\n")?;

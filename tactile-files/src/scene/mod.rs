@@ -103,12 +103,14 @@
 //! adhesion_error_j_per_m2 = 0.0005       # of a ball, 0.001 if absent
 //! ```
 //!
-//! The names of a stage are those of its choice in [`StagesConfig`](crate::pipeline::StagesConfig).
+//! The names of a stage are those of its choice in [`StagesConfig`](tactile_imaging::pipeline::StagesConfig).
 //! Images are PNG, PGM, JPEG or TIFF. Colour becomes grey by the luma of Rec. 601, see
 //! [`read_grey_image`](crate::io::read_grey_image). Relative paths are relative to the scene file.
 //! Fields counted in errors (`frames[2]`) start at 1.
 mod data;
 mod file;
+#[cfg(feature = "inclusion")]
+mod inclusion;
 
 pub use data::{LoadedCalibration, SceneData, doubt_of_depths, doubt_of_pairs};
 #[cfg(feature = "fem")]
@@ -116,7 +118,7 @@ pub use file::solve_contact_table;
 pub use file::{
     CalibrationSource, Scene, SceneCheck, SceneFrame, SceneLayer, StatedErrors, read_contact_table,
 };
-
 #[cfg(feature = "inclusion")]
-pub(crate) use data::force_pairs;
+pub use inclusion::{InclusionScene, LoadedInclusion};
+
 pub(crate) use file::{elastic_layers, guide, refractive_index};

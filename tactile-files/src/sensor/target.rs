@@ -1,8 +1,8 @@
 //! The dots of a target: found in its frame, and given their places on the grid.
 use super::calibration::SensorError;
-use crate::force::DotPair;
-use crate::regions::{otsu, regions};
 use ndarray::ArrayView2;
+use tactile_imaging::core::{otsu, regions};
+use tactile_imaging::force::DotPair;
 
 /// Finds the dots of a target, dark on bright or bright on dark, and pairs them with their places
 /// on a square grid.

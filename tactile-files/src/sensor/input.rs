@@ -1,5 +1,4 @@
 //! The input of a calibration: presses under known forces, a target, stated layers, and their file.
-use crate::force::{Branch, ShearCalibration};
 use crate::io::{
     FileError, beside, finite, length, modulus, not_negative, one_or_more, pixel_size,
     poisson_ratio, positive, positive_pair, read_frame, read_toml,
@@ -8,11 +7,12 @@ use crate::scene::{SceneLayer, refractive_index};
 use ndarray::Array2;
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
+use tactile_imaging::force::{Branch, ShearCalibration};
 
 /// What a calibration presses on the sensor.
 ///
 /// ```
-/// use tactile_imaging::sensor::Indenter;
+/// use tactile_files::sensor::Indenter;
 /// let ball = Indenter::Ball { radius_m: 4e-3, radius_error_m: 5e-6 };
 /// assert_ne!(ball, Indenter::Punch { radius_m: 4e-3 });
 /// ```
@@ -66,7 +66,7 @@ pub struct LayerInput {
 ///
 /// ```
 /// use tactile_imaging::force::Branch;
-/// use tactile_imaging::sensor::{Indenter, SensorPress};
+/// use tactile_files::sensor::{Indenter, SensorPress};
 /// let press = SensorPress {
 ///     frame: ndarray::Array2::zeros((1042, 1392)),
 ///     force_n: 0.5,
@@ -95,13 +95,13 @@ pub struct SensorPress {
 /// value and error.
 ///
 /// ```no_run
-/// use tactile_imaging::sensor::SensorCalibration;
+/// use tactile_files::sensor::SensorCalibration;
 /// let calibrated = SensorCalibration::read("calibration.toml")?.run()?;
 /// for layer in calibrated.layers.iter().filter(|layer| !layer.identified) {
 ///     println!("layer {}: its {} is not determined", layer.layer + 1, layer.parameter);
 /// }
 /// calibrated.sensor.write("sensor.toml")?;
-/// # Ok::<(), tactile_imaging::sensor::SensorError>(())
+/// # Ok::<(), tactile_files::sensor::SensorError>(())
 /// ```
 #[derive(Clone, Debug)]
 pub struct SensorCalibration {

@@ -1,16 +1,7 @@
 //! What a scene file may hold, and contact tables as files.
-use crate::core::Estimate;
-use crate::elasticity::ElasticityError;
-use crate::elasticity::contact::{ContactTable, Layer, Waveguide};
-#[cfg(feature = "fem")]
-use crate::fem::{TableOptions, TableProgress};
 use crate::io::{
     FileError, beside, force, length, modulus, not_negative, number, one_or_more, parse_toml,
     pixel_size, poisson_ratio, positive, read_bytes, read_toml,
-};
-use crate::pipeline::{
-    CheckPress, CheckedObject, EstimatorChoice, IntegratorChoice, KnownBall, MatcherChoice, Object,
-    ReconstructionChoice, SamplerChoice, Settings, StagesConfig, StrainChoice, WarpChoice,
 };
 use serde::de::value::MapAccessDeserializer;
 use serde::de::{self, Deserializer, MapAccess, Unexpected, Visitor};
@@ -19,11 +10,20 @@ use std::fmt;
 #[cfg(feature = "fem")]
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
+use tactile_imaging::core::Estimate;
+use tactile_imaging::elasticity::ElasticityError;
+use tactile_imaging::elasticity::contact::{ContactTable, Layer, Waveguide};
+#[cfg(feature = "fem")]
+use tactile_imaging::fem::{TableOptions, TableProgress};
+use tactile_imaging::pipeline::{
+    CheckPress, CheckedObject, EstimatorChoice, IntegratorChoice, KnownBall, MatcherChoice, Object,
+    ReconstructionChoice, SamplerChoice, Settings, StagesConfig, StrainChoice, WarpChoice,
+};
 
 /// The calibration of a scene.
 ///
 /// ```
-/// use tactile_imaging::scene::{CalibrationSource, Scene};
+/// use tactile_files::scene::{CalibrationSource, Scene};
 /// let rest = r#"
 ///     [[frames]]
 ///     image = "frame.png"
@@ -42,7 +42,7 @@ use std::path::{Path, PathBuf};
 /// assert_eq!(source("depth_table = \"depth.csv\"")?, depths);
 /// let both = "pairs = \"pairs.csv\"\ndepth_table = \"depth.csv\"";
 /// assert!(source(both).is_err(), "one of the two");
-/// # Ok::<(), tactile_imaging::io::FileError>(())
+/// # Ok::<(), tactile_files::io::FileError>(())
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub enum CalibrationSource {
@@ -59,7 +59,7 @@ pub enum CalibrationSource {
 /// A frame with contact.
 ///
 /// ```
-/// use tactile_imaging::scene::{Scene, SceneFrame};
+/// use tactile_files::scene::{Scene, SceneFrame};
 /// let rest = r#"
 ///     [calibration]
 ///     pairs = "pairs.csv"
@@ -75,7 +75,7 @@ pub enum CalibrationSource {
 /// let first = SceneFrame { image, force_n: Some(0.7), force_error_n: None, time_s: None };
 /// assert_eq!(scene.frames[0], first);
 /// assert_eq!(scene.frames[1].force_n, None, "no gauge: the calibration gives the force");
-/// # Ok::<(), tactile_imaging::io::FileError>(())
+/// # Ok::<(), tactile_files::io::FileError>(())
 /// ```
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -105,11 +105,11 @@ impl SceneFrame {
     }
 }
 
-/// A press of known force beside the frames ([`CheckPress`](crate::pipeline::CheckPress)).
+/// A press of known force beside the frames ([`CheckPress`](tactile_imaging::pipeline::CheckPress)).
 ///
 /// ```
 /// use tactile_imaging::pipeline::CheckedObject;
-/// use tactile_imaging::scene::Scene;
+/// use tactile_files::scene::Scene;
 /// let text = r#"
 ///     reference = "reference.png"
 ///     pixel_size_m = [2e-5, 2e-5]
@@ -125,7 +125,7 @@ impl SceneFrame {
 /// assert_eq!(check.image, std::path::Path::new("press/weight.png"));
 /// assert_eq!((check.known_n.value, check.object), (1.0, CheckedObject::Sample));
 /// assert_eq!(check.known_n.standard_error, 2e-3, "0.2 % are assumed");
-/// # Ok::<(), tactile_imaging::io::FileError>(())
+/// # Ok::<(), tactile_files::io::FileError>(())
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct SceneCheck {
@@ -216,7 +216,7 @@ impl CheckTable {
 /// A layer of the waveguide.
 ///
 /// ```
-/// use tactile_imaging::scene::Scene;
+/// use tactile_files::scene::Scene;
 /// let head = r#"
 ///     reference = "reference.png"
 ///     pixel_size_m = [2e-5, 2e-5]
@@ -241,7 +241,7 @@ impl CheckTable {
 /// let layers = Scene::parse(&format!("{head}\n{waveguide}"), "scene.toml")?.layers;
 /// assert_eq!(layers[0].youngs_modulus_pa, 136e3, "the layer that the object touches");
 /// assert_eq!(layers[1].poisson_ratio, 0.5, "incompressible where it is absent");
-/// # Ok::<(), tactile_imaging::io::FileError>(())
+/// # Ok::<(), tactile_files::io::FileError>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -284,7 +284,7 @@ pub fn elastic_layers(layers: &[SceneLayer]) -> Vec<Layer> {
 /// [`Settings`], and what is exact stands there as `"exact"`.
 ///
 /// ```
-/// use tactile_imaging::scene::{Scene, StatedErrors};
+/// use tactile_files::scene::{Scene, StatedErrors};
 /// let text = r#"
 ///     reference = "reference.png"
 ///     pixel_size_m = [2e-5, 2e-5]
@@ -297,7 +297,7 @@ pub fn elastic_layers(layers: &[SceneLayer]) -> Vec<Layer> {
 /// let errors: StatedErrors = Scene::parse(text, "scene.toml")?.errors;
 /// assert_eq!((errors.pixel_size, errors.radius_m), (Some(1e-3), Some(5e-6)));
 /// assert_eq!((errors.coupling, errors.gauge), (Some(0.0), None));
-/// # Ok::<(), tactile_imaging::io::FileError>(())
+/// # Ok::<(), tactile_files::io::FileError>(())
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct StatedErrors {
@@ -357,7 +357,7 @@ fn stated<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<f64>, D::
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// use tactile_simulate::{CalibrationRun, Camera, PressOptions, PressScene, write_folder};
 /// use tactile_simulate::{Elastic, ElasticSphere};
-/// use tactile_imaging::scene::Scene;
+/// use tactile_files::scene::Scene;
 /// let camera = Camera::default().coarser(16);
 /// let object = ElasticSphere { radius_m: 20e-3, material: Elastic::CL2000X };
 /// let made = PressScene::new(PressOptions { camera, object, ..PressOptions::default() })?;
@@ -433,7 +433,7 @@ impl Scene {
     /// let scene = Scene::parse(text, "press/scene.toml")?;
     /// assert_eq!(scene.object, Object::Sphere { radius_m: 3e-3, poisson_ratio: 0.5 });
     /// assert_eq!(scene.reference, std::path::Path::new("press/reference.png"));
-    /// # Ok::<(), tactile_imaging::io::FileError>(())
+    /// # Ok::<(), tactile_files::io::FileError>(())
     /// ```
     ///
     /// # Errors
@@ -792,7 +792,7 @@ impl StagesTable {
 /// ```
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// use tactile_imaging::elasticity::contact::{ContactCurve, ContactTable, Waveguide};
-/// use tactile_imaging::scene::read_contact_table;
+/// use tactile_files::scene::read_contact_table;
 ///
 /// let contact_radius_m: Vec<f64> = (1..=10).map(|k| 0.1e-3 * f64::from(k)).collect();
 /// let force_n = contact_radius_m.iter().map(|a| 4.0 / 3.0 * 80e3 * a.powi(3) / 3e-3).collect();
@@ -860,7 +860,13 @@ pub fn solve_contact_table(
     let layers = waveguide.map_or_else(Vec::new, |waveguide| waveguide.0);
     guide(&layers)
         .and_then(|guide| {
-            crate::fem::solve_contact_table(radius_m, poisson_ratio, &guide, options, progress)
+            tactile_imaging::fem::solve_contact_table(
+                radius_m,
+                poisson_ratio,
+                &guide,
+                options,
+                progress,
+            )
         })
         .map_err(|error| FileError::field(path, "waveguide", error))
 }

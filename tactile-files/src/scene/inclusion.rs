@@ -1,21 +1,20 @@
 //! Scene files of a block pressed by the sensor's guide.
-use super::rings::{FaceCells, RingMeans, interpolated, ring_means};
-use crate::elasticity::ElasticityError;
-use crate::force::{CalibrationOptions, LinearCalibration, StressCalibration};
+use super::data::force_pairs;
 use crate::io::{
     FileError, beside, force, length, modulus, not_negative, number, one_or_more, pixel_size,
     positive, read_frame, read_toml,
 };
-use crate::scene::force_pairs;
 use core::ops::ControlFlow;
 use ndarray::Array2;
 use serde::{Deserialize, Deserializer};
 use std::error::Error;
 use std::path::{Path, PathBuf};
-use tactile_fem::{Guide, GuideLayer, Interface, Material};
-use tactile_inclusion::{
-    InclusionEstimate, InclusionSearch, PressureProfile, Scan, ScanPress, SearchProgress, Specimen,
-    asymmetry_warnings,
+use tactile_imaging::elasticity::ElasticityError;
+use tactile_imaging::fem::{Guide, GuideLayer, Interface, Material};
+use tactile_imaging::force::{CalibrationOptions, LinearCalibration, StressCalibration};
+use tactile_imaging::inclusion::{
+    FaceCells, InclusionEstimate, InclusionSearch, PressureProfile, RingMeans, Scan, ScanPress,
+    SearchProgress, Specimen, asymmetry_warnings, ring_means,
 };
 
 /// A block of tissue, the guide pressed onto it, and the frames.
@@ -24,7 +23,7 @@ use tactile_inclusion::{
 /// `position_error_m` is the standard error of their places (0.2 mm where it is absent).
 ///
 /// ```
-/// use tactile_imaging::inclusion::InclusionScene;
+/// use tactile_files::scene::InclusionScene;
 ///
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// let folder = tempfile::tempdir()?;
@@ -89,10 +88,10 @@ struct Frame {
 /// The pressures of a scene's images.
 ///
 /// ```no_run
-/// use tactile_imaging::inclusion::{InclusionScene, LoadedInclusion};
+/// use tactile_files::scene::{InclusionScene, LoadedInclusion};
 /// let LoadedInclusion { rings, profiles, .. } = InclusionScene::read("press/scene.toml")?.load()?;
 /// println!("{} frames, the first one's centre at {:?}", profiles.len(), rings[0].centre_px);
-/// # Ok::<(), tactile_imaging::io::FileError>(())
+/// # Ok::<(), tactile_files::io::FileError>(())
 /// ```
 #[derive(Clone, Debug)]
 pub struct LoadedInclusion {
@@ -268,17 +267,9 @@ impl InclusionScene {
         let radii = first.unwrap_or_default();
         let profiles = self.presses[0].frames.iter().zip(&rings);
         let profiles = profiles.map(|(frame, means)| {
-            let resampled = |values: &[f64]| -> Vec<f64> {
-                let at = |&radius| interpolated(&means.radii_m, values, radius);
-                radii.iter().map(at).collect()
-            };
-            PressureProfile {
-                approach_m: frame.approach_m,
-                // A force that gave the scale is no measurement of its own.
-                force_n: frame.force_n.filter(|_| newtons_per_grey.is_some()),
-                pressure_pa: resampled(&means.pressure_pa),
-                standard_error_pa: resampled(&means.standard_error_pa),
-            }
+            // A force that gave the scale is no measurement of its own.
+            let force_n = frame.force_n.filter(|_| newtons_per_grey.is_some());
+            means.profile(&radii, frame.approach_m, force_n)
         });
         Ok(LoadedInclusion {
             profiles: profiles.collect(),

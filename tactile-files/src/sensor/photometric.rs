@@ -1,12 +1,12 @@
 //! Sensors with a gel that is lit in colours: calibration file and sensor file.
-use crate::core::Estimate;
-use crate::gel::{BallPress, CalibrationReport, GelError, GelLayer, GelModel, GelSensor};
 use crate::io::{
     FileError, beside, one_or_more, positive, read_bytes, read_colour_levels, read_toml,
 };
 use ndarray::Array3;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
+use tactile_imaging::core::Estimate;
+use tactile_imaging::gel::{BallPress, CalibrationReport, GelError, GelLayer, GelModel, GelSensor};
 
 /// Presses of balls on a gel that is lit in colours, as a calibration file names them.
 ///
@@ -22,7 +22,7 @@ use std::path::{Path, PathBuf};
 /// ```
 ///
 /// ```no_run
-/// use tactile_imaging::sensor::PhotometricPresses;
+/// use tactile_files::sensor::PhotometricPresses;
 /// let presses = PhotometricPresses::read("calibration.toml")?;
 /// let (sensor, found) = presses.calibrate()?;
 /// for (name, circle) in presses.names.iter().zip(&found.circles).filter(|(_, c)| c.wrong) {

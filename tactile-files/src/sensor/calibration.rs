@@ -3,20 +3,20 @@ use super::file::{Sensor, SensorGeometry};
 use super::input::{Indenter, SensorCalibration};
 use super::layers;
 use super::target::find_dots;
-use crate::force::{
+use crate::io::FileError;
+use ndarray::{Array2, ArrayView2};
+use tactile_imaging::force::{
     Branch, CalibrationFrame, ContactDetector, ContactOptions, Detection, DetectorWorkspace,
     DriftCorrection, Estimate, ForceError, ForceMeter, ForceWorkspace, LensFit, LensGeometry,
     PressureCurve, PressureCurveOptions, ReferenceFrame,
 };
-use crate::io::FileError;
-use crate::pipeline::{PipelineError, ReferenceLight};
-use ndarray::{Array2, ArrayView2};
+use tactile_imaging::pipeline::{PipelineError, ReferenceLight};
 
 /// Why a sensor could not be calibrated, in one sentence. Presses are counted from 1 in the
 /// sentences and from 0 in the fields.
 ///
 /// ```
-/// use tactile_imaging::sensor::SensorError;
+/// use tactile_files::sensor::SensorError;
 /// let few = SensorError::TooFewPresses { found: 3, expected: 5 };
 /// assert!(few.to_string().starts_with("3 presses with a contact and a force, at least 5 are"));
 /// ```
@@ -108,7 +108,7 @@ pub enum SensorError {
 ///
 /// ```
 /// use tactile_imaging::force::{Branch, Estimate};
-/// use tactile_imaging::sensor::{Indenter, PressFinding};
+/// use tactile_files::sensor::{Indenter, PressFinding};
 /// let finding = PressFinding {
 ///     indenter: Indenter::Punch { radius_m: 2e-3 },
 ///     branch: Branch::Loading,
@@ -169,11 +169,11 @@ pub struct LayerFinding {
 /// [`SensorCalibration::run`](super::SensorCalibration::run).
 ///
 /// ```no_run
-/// use tactile_imaging::sensor::{CalibratedSensor, SensorCalibration};
+/// use tactile_files::sensor::{CalibratedSensor, SensorCalibration};
 /// let found: CalibratedSensor = SensorCalibration::read("calibration.toml")?.run()?;
 /// println!("{} of {} layers' parameters were identified",
 ///     found.layers.iter().filter(|layer| layer.identified).count(), found.layers.len());
-/// # Ok::<(), tactile_imaging::sensor::SensorError>(())
+/// # Ok::<(), tactile_files::sensor::SensorError>(())
 /// ```
 #[derive(Clone, Debug)]
 pub struct CalibratedSensor {

@@ -1,9 +1,9 @@
 //! What the documentation and the properties of `tests/suite/io_properties` do not show.
 use super::*;
-use crate::pipeline::FrameSource;
 use ::image::{ImageBuffer, ImageFormat, Luma};
 use std::io::Cursor;
 use std::path::PathBuf;
+use tactile_imaging::pipeline::FrameSource;
 
 struct File {
     path: PathBuf,
@@ -306,16 +306,16 @@ fn pages(little_endian: bool) -> Vec<u8> {
 
 /// The same frames as NumPy and Pillow write them.
 const OF_OTHERS: [&[u8]; 6] = [
-    include_bytes!("../../tests/data/corpus/stream/stack.npy"),
-    include_bytes!("../../tests/data/corpus/stream/big_endian.npy"),
-    include_bytes!("../../tests/data/corpus/stream/one_by_one.npy"),
-    include_bytes!("../../tests/data/corpus/stream/stored.npz"),
-    include_bytes!("../../tests/data/corpus/stream/deflated.npz"),
-    include_bytes!("../../tests/data/corpus/stream/sixteen.tif"),
+    include_bytes!("../../../tests/data/corpus/stream/stack.npy"),
+    include_bytes!("../../../tests/data/corpus/stream/big_endian.npy"),
+    include_bytes!("../../../tests/data/corpus/stream/one_by_one.npy"),
+    include_bytes!("../../../tests/data/corpus/stream/stored.npz"),
+    include_bytes!("../../../tests/data/corpus/stream/deflated.npz"),
+    include_bytes!("../../../tests/data/corpus/stream/sixteen.tif"),
 ];
 
 /// Three frames of 16 × 12 pixels at 25 Hz, written by ffmpeg: grey 40 k + 3 row + 2 column.
-const CLIP: &[u8] = include_bytes!("../../tests/data/corpus/stream/clip.avi");
+const CLIP: &[u8] = include_bytes!("../../../tests/data/corpus/stream/clip.avi");
 
 #[test]
 fn jpeg_frames_of_a_video_are_those_that_were_recorded() {
