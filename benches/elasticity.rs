@@ -1,4 +1,4 @@
-//! Strain of many gradients, contacts on layers and curves: time, with the error printed beside it.
+//! Strain of many gradients, contacts on layers: time, with the error printed beside it.
 //! The bench `work_precision` has the laws of a ball.
 #![allow(clippy::print_stdout, missing_docs)]
 
@@ -7,9 +7,6 @@ use nalgebra::{Matrix3, Rotation3, Vector3};
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 use std::hint::black_box;
 use tactile_imaging::elasticity::contact::{Bond, LayerEquation};
-use tactile_imaging::elasticity::curve::{
-    CurveOptions, IndentationCurve, Indenter, Model, select_model,
-};
 use tactile_imaging::elasticity::strain::{
     Biot, EulerAlmansi, GreenLagrange, Hencky, StrainMeasure, green_lagrange_into,
 };
@@ -75,26 +72,5 @@ fn layers(c: &mut Criterion) {
     });
 }
 
-fn curve(c: &mut Criterion) {
-    let z: Vec<f64> = (0..200).map(|i| f64::from(i) * 2e-6).collect();
-    let f: Vec<f64> = z
-        .iter()
-        .map(|z| 4.0 / 3.0 * 80e3 * 4e-3f64.sqrt() * (z - 1e-4).max(0.0).powf(1.5))
-        .collect();
-    let curve = IndentationCurve::new(&z, &f).unwrap();
-    let sphere = Indenter::Sphere {
-        radius_m: 4e-3,
-        thickness_m: None,
-        bond: Bond::Bonded,
-    };
-    let fit = || select_model(&curve, &sphere, 0.5, Model::Auto, &CurveOptions::default()).unwrap();
-    let error = fit().chosen().youngs_modulus_pa / 60e3 - 1.0;
-    assert!(error.abs() < 1e-6);
-    println!("modulus from a curve of 200 points with contact-point search: off by {error:.1e}");
-    c.benchmark_group("curve")
-        .sample_size(10)
-        .bench_function("200 points", |b| b.iter(fit));
-}
-
-criterion_group!(benches, strain, layers, curve);
+criterion_group!(benches, strain, layers);
 criterion_main!(benches);

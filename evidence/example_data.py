@@ -65,16 +65,6 @@ def ball():
     return "P2\n48 48\n255\n" + "".join(" ".join(str(level(r, c)) for c in range(48)) + "\n" for r in range(48))
 
 
-def curve():
-    """A sphere of 5 mm radius on a deep sample of 30 kPa (Poisson's ratio 1/2), which it meets after 30 µm."""
-    rows = ["time_s,indentation_um,force_mN"]
-    for i in range(60):
-        z = 4.0 * i - 30.0
-        force = 4 / 3 * 40e3 * 5e-3**0.5 * (1e-6 * max(z, 0.0)) ** 1.5
-        rows.append(f"{0.05 * i:.2f},{4.0 * i:.1f},{1e3 * force + 0.05 * error(i, 0.618034):.4f}")
-    return "\n".join(rows) + "\n"
-
-
 # A sensor that grows darker where it is pressed: 60 grey levels for each millimetre. A ball of 4 mm radius, 0.6 mm deep,
 # on pixels of 100 µm.
 PIXEL_MM, BALL_MM, DEPTH_MM, LEVELS_PER_MM = 0.1, 4.0, 0.6, 60.0
@@ -368,7 +358,6 @@ FILES = {
     "slope_x.csv": lambda: slopes(True),
     "slope_y.csv": lambda: slopes(False),
     "ball.pgm": ball,
-    "curve.csv": curve,
     "dark_reference.pgm": lambda: dark(False),
     "dark_frame.pgm": lambda: dark(True),
     "depth_table.csv": depth_table,

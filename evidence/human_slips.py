@@ -19,10 +19,8 @@ import tempfile
 EXAMPLES = pathlib.Path(__file__).parent.parent / "examples" / "data"
 # The ball of the example, and the forces of its frames.
 MODULUS_PA, FORCES_N = 103e3, [0.01, 0.02]
-# A curve of a sphere of 5 mm, see evidence/example_data.py.
 FORCE = "force --reference press/reference.png --pairs press/calibration.csv --pixel-um 40 press/frame_1.png press/frame_2.png"
 DEPTH = "depth --reference dark_reference.pgm --table depth_table.csv --pixel-um 100 dark_frame.pgm --ball-radius-mm 4"
-INDENT = "indent curve.csv --shape sphere --radius 5e-3"
 
 
 def scene_slips():
@@ -85,12 +83,6 @@ def option_slips():
     for mm in ("4e-3", "8", "2", "40", "4000"):
         yield DEPTH.replace("--ball-radius-mm 4", f"--ball-radius-mm {mm}"), "depth"
     yield DEPTH.replace("dark_reference.pgm", "dark_frame.pgm").replace("100 dark_frame", "100 dark_reference"), "depth"
-    for radius in ("5", "10e-3", "2.5e-3", "5e-6", "50e-3"):
-        yield INDENT.replace("5e-3", radius), "indent"
-    for more in ("--poisson 0.3", "--thickness 2", "--thickness 2e-6", "--poisson 0.05", "--ball-radius 5"):
-        yield f"{INDENT} {more}", "indent"
-    yield INDENT.replace("sphere", "punch"), "indent"
-    yield "indent curve.csv --shape cone", "indent"
 
 
 def truths(command):
@@ -145,7 +137,7 @@ def main():
         folder = pathlib.Path(name) / "data"
         shutil.copytree(EXAMPLES, folder)
         measure, stream = "measure press/scene.toml --points 40", "stream press/scene.toml --allowed-late 100"
-        usual = {call.split()[0]: kinds(answered(program, folder, call)) for call in (measure, stream, FORCE, DEPTH, INDENT)}
+        usual = {call.split()[0]: kinds(answered(program, folder, call)) for call in (measure, stream, FORCE, DEPTH)}
         scene = folder / "press" / "scene.toml"
         good = scene.read_text()
         for before, after in scene_slips():

@@ -20,7 +20,7 @@ use tactile_simulate::{
     PressScene, write_folder,
 };
 
-const ESTIMATORS: [(EstimatorChoice, &str); 5] = [
+const ESTIMATORS: [(EstimatorChoice, &str); 3] = [
     (
         EstimatorChoice::PaperRatio,
         "the paper's ratio (31), apparent",
@@ -30,8 +30,6 @@ const ESTIMATORS: [(EstimatorChoice, &str); 5] = [
         EstimatorChoice::SphereOnWaveguide,
         "ball on layers, large strain (default)",
     ),
-    (EstimatorChoice::SphereBetweenPlates, "ball between plates"),
-    (EstimatorChoice::TataraSphere, "Tatara"),
 ];
 
 fn main() -> Result<(), Box<dyn Error>> {

@@ -34,7 +34,6 @@ CALLS = [
     ("reconstruct ball.pgm --light 0,0,1 --mask ball.pgm", "0,0,1", "0,0.1,1"),
     ("integrate slope_x.csv slope_y.csv --pixel-size 5e-5", "5e-5", "6e-5"),
     ("depth --reference dark_reference.pgm --table depth_table.csv --pixel-um 100 dark_frame.pgm", "100", "90"),
-    ("indent curve.csv --shape sphere --radius 5e-3", "5e-3", "4e-3"),
     ("stream press/scene.toml --allowed-late 100", "", ""),
     ("light --rays 20", "20", "10"),
     ("markers --reference markers_reference.png markers_frame.png", "", ""),

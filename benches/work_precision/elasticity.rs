@@ -3,8 +3,7 @@
 use crate::study::Study;
 use tactile_imaging::elasticity::contact::{Bond, Layer, Waveguide};
 use tactile_imaging::elasticity::modulus::{
-    Estimate, HertzSphere, LoadSeries, LoadState, ModulusEstimator, SphereBetweenPlates,
-    SphereOnWaveguide, TataraSphere,
+    Estimate, HertzSphere, LoadSeries, LoadState, ModulusEstimator, SphereOnWaveguide,
 };
 use tactile_simulate::{self, ContactModel, Elastic, ElasticSphere, PressOptions, PressScene};
 
@@ -21,32 +20,14 @@ pub(crate) fn laws(study: &mut Study) {
     });
     let guide = Waveguide::new(layers.collect()).expect("a guide");
     let hertz = HertzSphere::new(RADIUS_M, 0.5).expect("a ball");
-    let tatara = TataraSphere::new(RADIUS_M, 0.5).expect("a ball");
-    let two_contacts = SphereBetweenPlates::new(RADIUS_M, 0.5).expect("a ball");
     let layered = SphereOnWaveguide::new(RADIUS_M, 0.5, &guide, Bond::Bonded).expect("a ball");
     // Name, whether a pipeline for a ball on a known guide takes it by default, the law.
-    let laws: [(&str, bool, Box<dyn ModulusEstimator>); 8] = [
+    let laws: [(&str, bool, Box<dyn ModulusEstimator>); 4] = [
         ("Hertz, rigid guide", false, Box::new(hertz.clone())),
         (
             "Hertz, layers in series",
             false,
             Box::new(hertz.with_waveguide(&guide)),
-        ),
-        ("Tatara, rigid guide", false, Box::new(tatara.clone())),
-        (
-            "Tatara, layers in series",
-            false,
-            Box::new(tatara.with_waveguide(&guide)),
-        ),
-        (
-            "between plates, rigid",
-            false,
-            Box::new(two_contacts.clone()),
-        ),
-        (
-            "between plates, layers in series",
-            false,
-            Box::new(two_contacts.with_waveguide(&guide)),
         ),
         (
             "layered, small strain",

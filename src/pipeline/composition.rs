@@ -338,10 +338,10 @@ impl Pipeline {
     /// ```
     /// use tactile_simulate::Trial;
     /// let trial = Trial::coarser(8)?;
-    /// use tactile_imaging::elasticity::modulus::{EstimatorKind, TataraSphere};
-    /// let tatara = trial.pipeline()?.with_estimator(TataraSphere::new(3e-3, 0.5)?);
-    /// let modulus = trial.press(&tatara)?.modulus()?;
-    /// assert_eq!(modulus.estimator, EstimatorKind::TataraSphere);
+    /// use tactile_imaging::elasticity::modulus::{EstimatorKind, PaperRatio};
+    /// let ratio = trial.pipeline()?.with_estimator(PaperRatio::default());
+    /// let modulus = trial.press(&ratio)?.modulus()?;
+    /// assert_eq!(modulus.estimator, EstimatorKind::PaperRatio);
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     #[must_use]

@@ -5,8 +5,8 @@ use super::specimen::Object;
 use crate::elasticity::ElasticityError;
 use crate::elasticity::contact::{Body, Bond, Waveguide};
 use crate::elasticity::modulus::{
-    BestOf, BondedLayer, Cone, FlatPunch, HertzSphere, LayerTheory, ModulusEstimator, PaperRatio,
-    SphereBetweenPlates, SphereOnWaveguide, StrainReference, StressStrainRegression, TataraSphere,
+    BondedLayer, Cone, FlatPunch, HertzSphere, ModulusEstimator, PaperRatio, SphereOnWaveguide,
+    StrainReference, StressStrainRegression,
 };
 use std::sync::{Arc, OnceLock};
 
@@ -29,11 +29,7 @@ fn default_of(
             indenter_radius_m,
             thickness_m,
             ..
-        } => {
-            let (bond, theory) = (Bond::Bonded, LayerTheory::IntegralEquation);
-            let layer = BondedLayer::new(indenter_radius_m, thickness_m, nu, bond, theory);
-            layer.and_then(shared)
-        }
+        } => BondedLayer::new(indenter_radius_m, thickness_m, nu, Bond::Bonded).and_then(shared),
         Object::Cone { half_angle_rad, .. } => shared(Cone::new(half_angle_rad, nu)?),
         Object::Block { .. } | Object::Cylinder { .. } | Object::Unknown { .. } => {
             shared(StressStrainRegression::default())
@@ -81,9 +77,12 @@ fn named(
         estimator: choice.name(),
         needs,
     };
-    const BALL: &str = "a ball as the object";
     let nu = object.poisson_ratio();
-    let radius = || object.sphere_radius_m().ok_or(needs(BALL));
+    let radius = || {
+        object
+            .sphere_radius_m()
+            .ok_or(needs("a ball as the object"))
+    };
     let guide = pressed_on(waveguide);
     let built = match choice {
         EstimatorChoice::Best => default_of(object, waveguide),
@@ -97,12 +96,6 @@ fn named(
         }
         EstimatorChoice::TabulatedContact => {
             return Err(needs("a table of the ball's contacts"));
-        }
-        EstimatorChoice::SphereBetweenPlates => {
-            SphereBetweenPlates::new(radius()?, nu).and_then(|e| shared(e.with_other_body(guide)))
-        }
-        EstimatorChoice::TataraSphere => {
-            TataraSphere::new(radius()?, nu).and_then(|e| shared(e.with_other_body(guide)))
         }
         EstimatorChoice::FlatPunch => match object {
             Object::FlatPunch { radius_m, .. } => {
@@ -118,35 +111,8 @@ fn named(
             Object::Layer { .. } => default_of(object, waveguide),
             _ => return Err(needs("a layer as the object")),
         },
-        EstimatorChoice::LeastAkaike => return least_akaike(object, waveguide, needs(BALL)),
     };
     built.map_err(PipelineError::Material)
-}
-
-/// The object's contact laws, of which Akaike's criterion chooses.
-fn least_akaike(
-    object: Object,
-    waveguide: Option<&Waveguide>,
-    wrong_object: PipelineError,
-) -> Result<SharedEstimator, PipelineError> {
-    let nu = object.poisson_ratio();
-    let build = match object {
-        Object::Sphere { radius_m, .. } => match waveguide {
-            Some(waveguide) => BestOf::sphere_as_sample(radius_m, nu, waveguide),
-            None => TataraSphere::new(radius_m, nu).and_then(|tatara| {
-                Ok(BestOf::new(tatara)
-                    .or(SphereBetweenPlates::new(radius_m, nu)?)
-                    .or(HertzSphere::new(radius_m, nu)?))
-            }),
-        },
-        Object::Layer {
-            indenter_radius_m,
-            thickness_m,
-            ..
-        } => BestOf::sphere_on_sample(indenter_radius_m, nu, Some(thickness_m)),
-        _ => return Err(wrong_object),
-    };
-    build.and_then(shared).map_err(PipelineError::Material)
 }
 
 /// A ball on the layers of a waveguide. On a rigid flat where they are not known.

@@ -236,18 +236,11 @@ choice! {
     /// [`TabulatedContact`](crate::elasticity::modulus::TabulatedContact). A ball alone, and with a
     /// table of its contacts.
     TabulatedContact = "tabulated-contact",
-    /// [`SphereBetweenPlates`](crate::elasticity::modulus::SphereBetweenPlates). A ball alone.
-    SphereBetweenPlates = "sphere-between-plates",
-    /// [`TataraSphere`](crate::elasticity::modulus::TataraSphere). A ball alone.
-    TataraSphere = "tatara-sphere",
     /// [`BondedLayer`](crate::elasticity::modulus::BondedLayer) by its integral equation. A layer
     /// alone.
     BondedLayer = "bonded-layer",
     /// [`Cone`](crate::elasticity::modulus::Cone). A cone alone, and from depths.
     Cone = "cone",
-    /// [`BestOf`](crate::elasticity::modulus::BestOf): of all contact laws of a ball or a layer the
-    /// one with the least Akaike criterion.
-    LeastAkaike = "least-akaike",
     /// [`FlatPunch`](crate::elasticity::modulus::FlatPunch). A flat-ended cylinder alone, and from
     /// depths (a depth table's).
     FlatPunch = "flat-punch",

@@ -27,11 +27,6 @@ fn physical(text: &str, quantity: InputQuantity, scale: f64, unit: &str) -> Resu
     number(text, |v| quantity.allows(v * scale), &expected)
 }
 
-/// An argument that is a length in metres.
-pub fn length_m(text: &str) -> Result<f64, String> {
-    physical(text, InputQuantity::Length, 1.0, "m (3 mm are 3e-3)")
-}
-
 /// An argument that is a length in millimetres.
 pub fn length_mm(text: &str) -> Result<f64, String> {
     physical(text, InputQuantity::Length, 1e-3, "mm")
@@ -80,12 +75,6 @@ pub fn finite(text: &str) -> Result<f64, String> {
 /// An argument that is a finite number of at least zero.
 pub fn not_negative(text: &str) -> Result<f64, String> {
     number(text, |v| v >= 0.0, "a number of at least zero")
-}
-
-/// An argument that is a Poisson's ratio.
-pub fn poisson(text: &str) -> Result<f64, String> {
-    let fits = |v| v > -1.0 && v <= 0.5;
-    number(text, fits, "a number above -1 and at most 0.5")
 }
 
 /// An argument of three finite numbers between commas.

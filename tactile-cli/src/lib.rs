@@ -14,7 +14,6 @@ mod force;
 mod frames;
 mod hidden;
 mod inclusion;
-mod indent;
 mod light;
 mod markers;
 mod match_points;
@@ -87,7 +86,6 @@ Examples, one for each subcommand:
   tactile depth --reference examples/data/dark_reference.pgm --table examples/data/depth_table.csv \
                           --pixel-um 100 examples/data/dark_frame.pgm
   tactile inclusion --design examples/data/inclusion/scene.toml
-  tactile indent examples/data/curve.csv --shape sphere --radius 5e-3
   tactile stream --rate 20 --period 1 --allowed-late 100
   tactile light --rays 2000
   tactile markers --reference examples/data/markers_reference.png examples/data/markers_frame.png
@@ -113,7 +111,6 @@ enum Command {
     Integrate(surfaces::IntegrateArguments),
     Depth(depth::DepthArguments),
     Inclusion(inclusion::InclusionArguments),
-    Indent(indent::IndentArguments),
     Stream(stream::StreamArguments),
     Light(light::LightArguments),
     Markers(markers::MarkersArguments),
@@ -134,7 +131,6 @@ impl Command {
             Self::Integrate(arguments) => surfaces::integrate(arguments, context),
             Self::Depth(arguments) => depth::run(arguments, context),
             Self::Inclusion(arguments) => inclusion::run(arguments, context),
-            Self::Indent(arguments) => indent::run(arguments, context),
             Self::Stream(arguments) => stream::run(arguments, context),
             Self::Light(arguments) => light::run(arguments, context),
             Self::Markers(arguments) => markers::run(arguments, context),

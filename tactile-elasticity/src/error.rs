@@ -51,13 +51,6 @@ pub enum ElasticityError {
         /// det F.
         determinant: f64,
     },
-    /// The relative curvature of the two surfaces is zero or negative: they touch
-    /// over an area from the first moment and Hertz's contact does not apply.
-    #[error("the surfaces conform (relative curvature {curvature_per_m} 1/m): no Hertzian contact")]
-    Conforming {
-        /// 1/R₁ + 1/R₂.
-        curvature_per_m: f64,
-    },
     /// The contact is no softer than the other body alone: no compliance is left for the sample.
     #[error(
         "the sample is stiffer than can be resolved through this waveguide or indenter{}",

@@ -712,26 +712,6 @@ impl From<&Matrix3<f64>> for Invariants {
     }
 }
 
-/// A − ⅓ tr A I.
-pub fn deviator(a: &Matrix3<f64>) -> Matrix3<f64> {
-    // Differences of the diagonal: exact where its entries are close, and zero for c·I.
-    let (x, y, z) = (a[(0, 0)], a[(1, 1)], a[(2, 2)]);
-    let mut dev = *a;
-    dev[(0, 0)] = ((x - y) + (x - z)) * (1.0 / 3.0);
-    dev[(1, 1)] = ((y - x) + (y - z)) * (1.0 / 3.0);
-    dev[(2, 2)] = ((z - x) + (z - y)) * (1.0 / 3.0);
-    dev
-}
-
-/// √(factor · a:a), scaled so that squares neither underflow nor overflow.
-pub fn scaled_norm(a: &Matrix3<f64>, factor: f64) -> f64 {
-    let scale = a.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
-    if scale == 0.0 {
-        return scale;
-    }
-    (a / scale).norm() * factor.sqrt() * scale
-}
-
 /// The Green–Lagrange strain of every displacement gradient, written to `strains`. Allocates
 /// nothing.
 ///

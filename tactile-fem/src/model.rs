@@ -343,11 +343,6 @@ impl BondedInterface {
 pub enum RigidShape {
     /// A plane at right angles to the axis.
     Flat,
-    /// A sphere of this radius.
-    Sphere {
-        /// Its radius, in metres.
-        radius_m: f64,
-    },
     /// The paraboloid r² / 2R, of which Hertz's theory speaks.
     Paraboloid {
         /// Its radius of curvature at the pole, in metres.
@@ -371,15 +366,6 @@ impl RigidShape {
         match self {
             Self::Flat => Some([0.0; 3]),
             Self::Punch { radius_m } => (r <= radius_m).then_some([0.0; 3]),
-            Self::Sphere { radius_m } => {
-                let below = radius_m * radius_m - r * r;
-                if below <= 0.0 {
-                    return None;
-                }
-                let root = below.sqrt();
-                let height = r * r / (radius_m + root);
-                Some([height, r / root, radius_m * radius_m / (below * root)])
-            }
             Self::Paraboloid { radius_m } => {
                 Some([r * r / (2.0 * radius_m), r / radius_m, 1.0 / radius_m])
             }

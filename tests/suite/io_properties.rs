@@ -8,9 +8,6 @@ use proptest::prelude::*;
 use std::fmt::Write;
 use tactile_files::io::{read_columns, read_grid, read_points};
 use tactile_files::scene::Scene;
-use tactile_imaging::elasticity::curve::{
-    CurveOptions, IndentationCurve, Indenter, Model, select_model,
-};
 use tactile_imaging::force::{
     CalibrationOptions, CalibrationPair, LinearCalibration, StressCalibration,
 };
@@ -88,17 +85,14 @@ const POINTS: &[u8] = b"x,y\n1,2\n3.5,-4e-3\n0,7\n2,2\n5,1\n4,6\n";
 
 const PAIRS: &[u8] = b"value,force_N\n0,0\n50000,0.5\n100000,1.0\n150000,1.5\n";
 
-const CURVE: &[u8] = b"indentation_m,force_N\n0,0\n1e-5,1e-3\n2e-5,3e-3\n3e-5,5e-3\n\
-    4e-5,8e-3\n5e-5,1.1e-2\n6e-5,1.4e-2\n7e-5,1.8e-2\n";
-
 /// Two columns of a table.
 fn columns(bytes: &[u8], [first, second]: [(&str, &str); 2]) -> Option<[Vec<f64>; 2]> {
     let wanted: [(&[&str], &str); 2] = [(&[first.0], first.1), (&[second.0], second.1)];
     read_columns(file(bytes).path(), wanted).ok()
 }
 
-/// What a spline, a calibration and a curve's model, each of a table with these edits, say.
-fn uses_of_tables(edits: &[Edit]) -> [Option<f64>; 3] {
+/// A spline's and a calibration's answer, each of a table with these edits.
+fn uses_of_tables(edits: &[Edit]) -> [Option<f64>; 2] {
     let spline = || {
         let sources = read_points::<2>(file(&mutated(POINTS, edits)).path()).ok()?;
         let targets: Vec<Point<f64, 2>> = sources.iter().map(|p| p * 1.01).collect();
@@ -113,15 +107,7 @@ fn uses_of_tables(edits: &[Edit]) -> [Option<f64>; 3] {
         let line = LinearCalibration::fit(&pairs, &CalibrationOptions::default()).ok()?;
         Some(line.force_n(line.range()[0]))
     };
-    let modulus = || {
-        let wanted = [("indentation", "m"), ("force", "N")];
-        let [depths, forces] = columns(&mutated(CURVE, edits), wanted)?;
-        let curve = IndentationCurve::new(&depths, &forces).ok()?;
-        let punch = Indenter::Punch { radius_m: 1e-3 };
-        let found = select_model(&curve, &punch, 0.5, Model::Auto, &CurveOptions::default());
-        Some(found.ok()?.chosen().youngs_modulus_pa)
-    };
-    [spline(), line(), modulus()]
+    [spline(), line()]
 }
 
 proptest! {

@@ -67,11 +67,10 @@ fn the_first_help_shows_one_example_for_each_subcommand() {
     }
 }
 
-const OTHER_ANSWERS: [&str; 5] = [
+const OTHER_ANSWERS: [&str; 4] = [
     "measure --ideal-camera",
     "calibrate examples/data/press/calibration.csv --there-and-back",
     "stream examples/data/press/scene.toml --allowed-late 100",
-    "indent examples/data/curve.csv --shape cone --half-angle 70.3",
     "depth --reference examples/data/dark_reference.pgm --table examples/data/depth_table.csv \
      --pixel-um 100 examples/data/dark_frame.pgm --ball-radius-mm 4",
 ];

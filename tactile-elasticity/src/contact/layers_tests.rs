@@ -20,14 +20,6 @@ fn gauss_nodes_are_enough() {
     assert!((a.force_ratio / b.force_ratio - 1.0).abs() < 1e-8);
 }
 
-/// m₀ and m₂ of a bonded incompressible layer, computed at 60 digits.
-#[test]
-fn moments_of_a_bonded_incompressible_layer() {
-    let (m0, m2) = LayerKernel::new(Bond::Bonded, 0.5).unwrap().moments();
-    assert!((m0 - 1.770_216_773_37).abs() < 1e-11);
-    assert!((m2 - 3.831_077_155_59).abs() < 1e-11);
-}
-
 fn layer(thickness: f64, shear_modulus: f64, poisson_ratio: f64) -> StackLayer {
     StackLayer {
         thickness,
@@ -89,31 +81,6 @@ fn short_waves_see_the_top_and_a_stiff_base_is_rigid() {
 }
 
 use crate::contact::{Layer, Waveguide};
-
-#[test]
-fn the_table_agrees_with_the_equation_between_its_nodes() {
-    let equation = LayerEquation::new(Bond::Bonded, 0.5).unwrap();
-    let table = LayerTable::new(&equation);
-    for a in [3e-6, 0.0123, 0.3, 0.77, 2.3, 11.0] {
-        let exact = equation.solve(a).unwrap();
-        let (value, _) = table.of_chi(exact.chi).unwrap();
-        // Cubic interpolation with nodes 0.18 apart in ln a.
-        let gap = value - exact.force_ratio.ln();
-        assert!(gap.abs() < 2e-5, "{a}: {gap:e}");
-    }
-    assert!(table.of_chi(1e3).is_none());
-}
-
-#[test]
-fn the_slope_is_the_derivative() {
-    let table = LayerTable::new(&LayerEquation::new(Bond::Bonded, 0.4).unwrap());
-    let (high, low) = (
-        table.of_chi(0.5 * 1.001).unwrap().0,
-        table.of_chi(0.5 / 1.001).unwrap().0,
-    );
-    let slope = (high - low) / (2.0 * 1.001f64.ln());
-    assert!((table.of_chi(0.5).unwrap().1 - slope).abs() < 1e-5);
-}
 
 #[test]
 fn shares_and_radii_between_the_nodes() {

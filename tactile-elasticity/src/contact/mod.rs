@@ -3,12 +3,9 @@
 //! | item | contact |
 //! |---|---|
 //! | [`HertzContact`] | two spheres, small contact |
-//! | [`flat_punch`], [`cone`] | rigid punch and cone on a half-space |
 //! | [`depression_m`] | surface of layers under a ball's contact |
 //! | [`LayerEquation`] | sphere on one or more bonded layers: the solution by an integral equation |
 //! | [`LayerPlane`] | displacement of a layered surface under a contact of any shape, to pressure |
-//! | [`LayerSeries`] | sphere on one layer: series in χ = √(Rδ)/h |
-//! | [`tatara_indentation_m`] | sphere squeezed between two plates, large deformation |
 //! | [`ContactTable`] | soft ball on a guide, tabulated by finite elements |
 //! | [`Waveguide`] | the layers of a sensor |
 
@@ -20,11 +17,8 @@ mod table;
 mod waveguide;
 
 pub use depression::depression_m;
-pub use hertz::{
-    Body, ConeContact, HertzContact, PunchContact, cone, flat_punch, hertz_surface_displacement_m,
-    reduced_modulus_pa, relative_radius_m, tangent_of_degrees, tatara_indentation_m,
-};
-pub use layers::{Bond, LayerContact, LayerEquation, LayerSeries};
+pub use hertz::{Body, HertzContact, hertz_surface_displacement_m, reduced_modulus_pa};
+pub use layers::{Bond, LayerContact, LayerEquation};
 pub use plane::LayerPlane;
 pub use table::{ContactCurve, ContactTable};
 pub use waveguide::{
@@ -32,6 +26,5 @@ pub use waveguide::{
     guide_compliance_error, guide_log_stiffness, parameter_slopes, stepped_layers,
 };
 
-pub(crate) use hertz::Squeeze;
-pub(crate) use layers::{LayerKernel, LayerTable, SharedLayerTable};
+pub(crate) use layers::{LayerKernel, SharedLayerTable};
 pub(crate) use table::TabulatedForce;

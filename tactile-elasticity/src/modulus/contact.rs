@@ -8,47 +8,13 @@
 //! above where it reaches C.
 
 use super::estimate::{EstimatorKind, LoadDiagnostics, ModulusEstimate, ModulusEstimator, Warning};
-use super::law::{
-    ConeLaw, ContactLaw, HertzLaw, LayerLaw, LayerTheory, LogForce, PunchLaw, TataraLaw,
-    TwoContactsLaw,
-};
+use super::law::{ConeLaw, ContactLaw, HertzLaw, LayerLaw, LogForce, PunchLaw};
 use super::load::{LoadSeries, LoadState, validated};
 use super::statistics::{CommonMean, Covariance, LogErrors, common_mean, fewest, total};
 use super::waveguide_law::WaveguideLaw;
 use crate::contact::{Body, Bond, Waveguide};
 use crate::error::{ElasticityError, Quantity, poisson};
 use tactile_core::{Estimate, Interval, statistics::quantile_95};
-
-/// Which of the observations a contact estimator uses.
-///
-/// ```
-/// use tactile_elasticity::contact::HertzContact;
-/// use tactile_elasticity::modulus::*;
-///
-/// // The indentation was measured with a wrong zero: use the radius alone.
-/// let contact = HertzContact::from_force(1e-3_f64, 5e-3, 40e3)?;
-/// let load = LoadState {
-///     contact_radius_m: Some(Estimate::new(contact.contact_radius_m, 1e-6)),
-///     indentation_m: Some(Estimate::new(contact.indentation_m + 2e-5, 1e-6)),
-///     ..LoadState::new(Estimate::new(1e-3, 1e-5))
-/// };
-/// let modulus = HertzSphere::new(5e-3, 0.5)?
-///     .with_evidence(Evidence::ContactRadius)
-///     .estimate(&LoadSeries::new([load]))?;
-/// assert!((modulus.youngs_modulus_pa - 30e3).abs() < 1e-6);
-/// # Ok::<(), tactile_elasticity::ElasticityError>(())
-/// ```
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub enum Evidence {
-    /// Both, each where it was measured.
-    #[default]
-    All,
-    /// The contact radius alone.
-    ContactRadius,
-    /// The indentation alone.
-    Indentation,
-}
 
 /// Young's modulus by a law F = E* f(x). See [`HertzSphere`], [`FlatPunch`], [`Cone`].
 ///
@@ -95,7 +61,6 @@ pub struct ContactEstimator<L> {
     law: L,
     poisson_ratio: f64,
     other_compliance_per_pa: f64,
-    evidence: Evidence,
 }
 
 impl<L: ContactLaw> ContactEstimator<L> {
@@ -131,7 +96,6 @@ impl<L: ContactLaw> ContactEstimator<L> {
             law,
             poisson_ratio: poisson(poisson_ratio)?,
             other_compliance_per_pa: 0.0,
-            evidence: Evidence::All,
         })
     }
 
@@ -149,31 +113,6 @@ impl<L: ContactLaw> ContactEstimator<L> {
     pub fn with_waveguide(self, waveguide: &Waveguide) -> Self {
         self.with_other_body(waveguide.as_body())
     }
-
-    /// Which observations to use.
-    ///
-    /// ```
-    /// use tactile_elasticity::modulus::{
-    ///     Estimate, Evidence, HertzSphere, LoadSeries, LoadState, ModulusEstimator,
-    /// };
-    ///
-    /// // Only the radius was measured, and only the indentation is to be used.
-    /// let load = LoadState {
-    ///     contact_radius_m: Some(Estimate::new(0.45e-3_f64, 1e-6)),
-    ///     ..LoadState::new(Estimate::new(1e-3, 1e-5))
-    /// };
-    /// assert!(
-    ///     HertzSphere::new(5e-3, 0.5)?
-    ///         .with_evidence(Evidence::Indentation)
-    ///         .estimate(&LoadSeries::new([load]))
-    ///         .is_err()
-    /// );
-    /// # Ok::<(), tactile_elasticity::ElasticityError>(())
-    /// ```
-    pub fn with_evidence(mut self, evidence: Evidence) -> Self {
-        self.evidence = evidence;
-        self
-    }
 }
 
 impl<L: ContactLaw> ContactEstimator<L> {
@@ -186,12 +125,9 @@ impl<L: ContactLaw> ContactEstimator<L> {
         let mut all = Vec::new();
         for (load, state) in loads.iter().enumerate() {
             let force = validated(state.force_n, Quantity::Force)?;
-            let radius =
-                (state.contact_radius_m).filter(|_| self.evidence != Evidence::Indentation);
-            let depth = (state.indentation_m).filter(|_| self.evidence != Evidence::ContactRadius);
             let lengths = [
-                (radius, Quantity::ContactRadius),
-                (depth, Quantity::Indentation),
+                (state.contact_radius_m, Quantity::ContactRadius),
+                (state.indentation_m, Quantity::Indentation),
             ];
             for (length, quantity) in lengths {
                 let Some(length) = length else { continue };
@@ -568,13 +504,13 @@ pub type FlatPunch = ContactEstimator<PunchLaw>;
 /// A cone, F = (2/π)E* tan α δ².
 ///
 /// ```
-/// use tactile_elasticity::contact::cone;
 /// use tactile_elasticity::modulus::{Cone, Estimate, LoadSeries, LoadState, ModulusEstimator};
 ///
-/// let contact = cone(40e3_f64, 1.0, 0.2e-3)?;
+/// // F = (2/π)E* δ² with E* = 40 kPa, δ = 0.2 mm, at a half angle of 45°.
+/// let force = std::f64::consts::FRAC_2_PI * 40e3 * 0.2e-3_f64.powi(2);
 /// let load = LoadState {
 ///     indentation_m: Some(Estimate::new(0.2e-3, 1e-7)),
-///     ..LoadState::new(Estimate::new(contact.force_n, 1e-6))
+///     ..LoadState::new(Estimate::new(force, 1e-6))
 /// };
 /// let modulus = Cone::new(std::f64::consts::FRAC_PI_4, 0.5)?.estimate(&LoadSeries::new([load]))?;
 /// assert!((modulus.youngs_modulus_pa - 30e3).abs() < 1e-6);
@@ -593,8 +529,7 @@ pub type Cone = ContactEstimator<ConeLaw>;
 ///     indentation_m: Some(Estimate::new(contact.indentation_m, 1e-7)),
 ///     ..LoadState::new(Estimate::new(1e-3, 1e-5))
 /// }]);
-/// let layer = BondedLayer::new(5e-3, 1e-3, 0.5, Bond::Bonded, LayerTheory::IntegralEquation)?
-///     .estimate(&load)?;
+/// let layer = BondedLayer::new(5e-3, 1e-3, 0.5, Bond::Bonded)?.estimate(&load)?;
 /// assert!(
 ///     layer.youngs_modulus_pa
 ///         < 0.7
@@ -605,46 +540,6 @@ pub type Cone = ContactEstimator<ConeLaw>;
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
 /// ```
 pub type BondedLayer = ContactEstimator<LayerLaw>;
-/// Tatara's soft sphere: the extension of the far side counted. A/R up to 0.6.
-///
-/// ```
-/// use tactile_elasticity::contact::tatara_indentation_m;
-/// use tactile_elasticity::modulus::{
-///     Estimate, LoadSeries, LoadState, ModulusEstimator, TataraSphere,
-/// };
-///
-/// // A ball of 3 mm squeezed to a/R = 0.5: Hertz's force for E* = 40 kPa at that radius, and
-/// // Tatara's indentation.
-/// let (radius, a) = (3e-3_f64, 1.5e-3_f64);
-/// let force = 4.0 / 3.0 * 40e3 * a.powi(3) / radius;
-/// let load = LoadState {
-///     indentation_m: Some(Estimate::new(tatara_indentation_m(a, radius, 0.5)?, 1e-7)),
-///     ..LoadState::new(Estimate::new(force, 1e-5))
-/// };
-/// let modulus = TataraSphere::new(radius, 0.5)?.estimate(&LoadSeries::new([load]))?;
-/// assert!((modulus.youngs_modulus_pa / 30e3 - 1.0).abs() < 1e-6);
-/// # Ok::<(), tactile_elasticity::ElasticityError>(())
-/// ```
-pub type TataraSphere = ContactEstimator<TataraLaw>;
-/// A soft sphere squeezed between the other body and a rigid plate: both contacts flatten.
-///
-/// ```
-/// use tactile_elasticity::contact::HertzContact;
-/// use tactile_elasticity::modulus::{
-///     Estimate, LoadSeries, LoadState, ModulusEstimator, SphereBetweenPlates,
-/// };
-///
-/// // Between two rigid plates each contact takes half of the approach.
-/// let contact = HertzContact::from_force(1e-3_f64, 5e-3, 40e3)?;
-/// let load = LoadState {
-///     indentation_m: Some(Estimate::new(2.0 * contact.indentation_m, 1e-7)),
-///     ..LoadState::new(Estimate::new(1e-3, 1e-5))
-/// };
-/// let modulus = SphereBetweenPlates::new(5e-3, 0.5)?.estimate(&LoadSeries::new([load]))?;
-/// assert!((modulus.youngs_modulus_pa - 30e3).abs() < 1e-6);
-/// # Ok::<(), tactile_elasticity::ElasticityError>(())
-/// ```
-pub type SphereBetweenPlates = ContactEstimator<TwoContactsLaw>;
 /// A soft sphere on the layers of a waveguide, or on a [rigid](Waveguide::rigid) flat: the linear
 /// contact with N bonded layers ([`LayerEquation`](crate::contact::LayerEquation)), exact for thick
 /// and thin layers, with a correction for finite strain.
@@ -733,32 +628,9 @@ impl ContactEstimator<LayerLaw> {
         thickness_m: f64,
         poisson_ratio: f64,
         bond: Bond,
-        theory: LayerTheory,
     ) -> Result<Self, ElasticityError> {
-        Self::from_law(
-            LayerLaw::new(radius_m, thickness_m, poisson_ratio, bond, theory)?,
-            poisson_ratio,
-        )
-    }
-}
-
-impl ContactEstimator<TataraLaw> {
-    /// A soft sphere of radius R (m) and Poisson ratio ν.
-    ///
-    /// # Errors
-    /// [`ElasticityError::NotPositive`], [`ElasticityError::PoissonRatio`].
-    pub fn new(radius_m: f64, poisson_ratio: f64) -> Result<Self, ElasticityError> {
-        Self::from_law(TataraLaw::new(radius_m, poisson_ratio)?, poisson_ratio)
-    }
-}
-
-impl ContactEstimator<TwoContactsLaw> {
-    /// A soft sphere of radius R (m) and Poisson ratio ν between the other body and a rigid plate.
-    ///
-    /// # Errors
-    /// [`ElasticityError::NotPositive`], [`ElasticityError::PoissonRatio`].
-    pub fn new(radius_m: f64, poisson_ratio: f64) -> Result<Self, ElasticityError> {
-        Self::from_law(TwoContactsLaw::new(radius_m)?, poisson_ratio)
+        let law = LayerLaw::new(radius_m, thickness_m, poisson_ratio, bond)?;
+        Self::from_law(law, poisson_ratio)
     }
 }
 

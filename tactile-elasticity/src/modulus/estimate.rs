@@ -101,21 +101,10 @@ pub enum EstimatorKind {
     SphereOnFlat,
     /// A soft ball on what its table of contacts was made for.
     TabulatedContact,
-    SphereBetweenPlates,
-    TipOnBall,
     FlatPunch,
     Cone,
-    /// A sphere on a half-space. What touches sticks.
-    SphereWithoutSlip,
-    FlatPunchWithoutSlip,
-    ConeWithoutSlip,
-    LayerPublishedSeries,
-    LayerCorrectedSeries,
     LayerIntegralEquation,
     FreeLayerIntegralEquation,
-    TataraSphere,
-    /// The best of several by Akaike's criterion.
-    BestOf,
     /// An estimator from outside this crate, by its name.
     Other(&'static str),
 }
@@ -129,19 +118,10 @@ impl core::fmt::Display for EstimatorKind {
             Self::SphereOnWaveguide => "sphere on a layered waveguide",
             Self::SphereOnFlat => "sphere on a rigid flat, finite strain",
             Self::TabulatedContact => "sphere, tabulated contacts",
-            Self::TipOnBall => "rigid tip on a ball on a plate",
-            Self::SphereBetweenPlates => "Hertz sphere between two bodies",
             Self::FlatPunch => "flat punch",
             Self::Cone => "cone",
-            Self::SphereWithoutSlip => "sphere without slip",
-            Self::FlatPunchWithoutSlip => "flat punch without slip",
-            Self::ConeWithoutSlip => "cone without slip",
-            Self::LayerPublishedSeries => "sphere on a layer, published series",
-            Self::LayerCorrectedSeries => "sphere on a layer, corrected series",
             Self::LayerIntegralEquation => "sphere on a layer, integral equation",
             Self::FreeLayerIntegralEquation => "sphere on a sliding layer, integral equation",
-            Self::TataraSphere => "Tatara's sphere",
-            Self::BestOf => "best of several",
             Self::Other(name) => name,
         })
     }
@@ -210,7 +190,7 @@ impl ModulusEstimate {
             interval_95: Interval::new(interval.lower.max(0.0), interval.upper),
             estimator,
             loads: Vec::new(),
-            fit: FitStatistics::new(1, 1, 0.0, 0.0),
+            fit: FitStatistics::new(1, 1, 0.0),
             warnings: Vec::new(),
         }
     }
@@ -252,8 +232,7 @@ pub struct LoadDiagnostics {
     pub standardized_residual: Option<f64>,
 }
 
-/// How a law fits the data. Smaller information criteria are better. They compare laws on the same
-/// data only.
+/// How a law fits the data.
 ///
 /// ```
 /// use tactile_elasticity::contact::HertzContact;
@@ -289,39 +268,15 @@ pub struct FitStatistics {
     pub parameters: usize,
     /// Σ (residual/σ)², or the residuals' own sum where no σ was given.
     pub chi_squared: f64,
-    /// Akaike's criterion with the small-sample correction. Infinite with too few observations.
-    pub aicc: f64,
-    /// Schwarz's criterion.
-    pub bic: f64,
 }
 
 impl FitStatistics {
-    /// From the numbers of observations and parameters, χ² and −2 ln of the likelihood, both
-    /// criteria: AICc = −2 ln L + 2k + 2k(k + 1)/(n − k − 1) and BIC = −2 ln L + k ln n.
-    ///
-    /// ```
-    /// use tactile_elasticity::modulus::FitStatistics;
-    /// let fit = FitStatistics::new(5, 1, 4.2, 4.2);
-    /// assert!((fit.aicc - (4.2 + 2.0 + 4.0 / 3.0)).abs() < 1e-12);
-    /// ```
-    pub fn new(
-        observations: usize,
-        parameters: usize,
-        chi_squared: f64,
-        minus_two_log_likelihood: f64,
-    ) -> Self {
-        let (n, k) = (observations as f64, parameters as f64);
-        let correction = if n > k + 1.0 {
-            2.0 * k * (k + 1.0) / (n - k - 1.0)
-        } else {
-            f64::INFINITY
-        };
+    /// From the numbers of observations and parameters, and χ².
+    pub(crate) fn new(observations: usize, parameters: usize, chi_squared: f64) -> Self {
         Self {
             observations,
             parameters,
             chi_squared,
-            aicc: (minus_two_log_likelihood + 2.0 * k + correction),
-            bic: (minus_two_log_likelihood + k * n.ln()),
         }
     }
 }

@@ -6,27 +6,18 @@ mod law;
 mod load;
 mod ratio;
 mod regression;
-mod select;
 mod statistics;
 mod tabulated;
 mod waveguide_law;
 
-pub use contact::{
-    BondedLayer, Cone, ContactEstimator, Evidence, FlatPunch, HertzSphere, SphereBetweenPlates,
-    SphereOnWaveguide, TataraSphere,
-};
+pub use contact::{BondedLayer, Cone, ContactEstimator, FlatPunch, HertzSphere, SphereOnWaveguide};
 pub use estimate::{
     EstimatorKind, FitStatistics, LoadDiagnostics, ModulusEstimate, ModulusEstimator, Warning,
 };
-pub use law::{
-    ConeLaw, ContactLaw, HertzLaw, LayerLaw, LayerTheory, LogForce, NoSlipLaw, PunchLaw, TataraLaw,
-    TipOnBallLaw, TwoContactsLaw,
-};
+pub use law::{ConeLaw, ContactLaw, HertzLaw, LayerLaw, LogForce, PunchLaw};
 pub use load::{LoadSeries, LoadState, SharedErrors};
 pub use ratio::{PaperRatio, StrainReference};
 pub use regression::{StressStrainRegression, UniaxialLoads};
-pub use select::{BestOf, ModulusSelection, SelectionReason};
-pub(crate) use select::{akaike_weights, in_order, rank};
 pub use tabulated::TabulatedContact;
 pub use tactile_core::{Estimate, Interval};
 pub use waveguide_law::WaveguideLaw;

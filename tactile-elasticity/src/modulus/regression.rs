@@ -210,21 +210,6 @@ fn diagnostics(points: &[Point], line: &Line, known: bool, loads: usize) -> Vec<
     diagnostics
 }
 
-fn fit_statistics(points: &[Point], line: &Line, known: bool) -> FitStatistics {
-    let n = points.len() as f64;
-    let minus_two_log = if known {
-        line.chi_squared
-    } else {
-        n * (line.chi_squared / n).ln()
-    };
-    FitStatistics::new(
-        points.len(),
-        points.len() - line.degrees,
-        line.chi_squared,
-        minus_two_log,
-    )
-}
-
 impl ModulusEstimator for StressStrainRegression {
     fn estimate(&self, series: &LoadSeries) -> Result<ModulusEstimate, ElasticityError> {
         let loads = series.loads();
@@ -246,7 +231,7 @@ impl ModulusEstimator for StressStrainRegression {
             interval_95: Interval::new((line.slope - reach).max(0.0), Some(line.slope + reach)),
             estimator: EstimatorKind::StressStrainRegression,
             loads: diagnostics(&points, &line, known, loads.len()),
-            fit: fit_statistics(&points, &line, known),
+            fit: FitStatistics::new(points.len(), points.len() - line.degrees, line.chi_squared),
             warnings: self.warnings(loads, &line),
         })
     }

@@ -28,10 +28,6 @@ pub struct CommonMean {
     /// Standard error, scaled up where the scatter exceeds the covariance.
     pub standard_error: f64,
     chi_squared: f64,
-    /// Of the measured forces and lengths with their true values fitted to the law. Given errors
-    /// enter by χ² and a constant alone: the covariance of ln E* depends on the law's slope, and
-    /// would favour flat ones.
-    minus_two_log_likelihood: f64,
     /// Degrees of freedom where the error was learnt from the scatter. None where it was given.
     pub degrees: Option<f64>,
     /// χ²/ν where it was used to scale the error up.
@@ -45,8 +41,7 @@ impl CommonMean {
     /// Fit of one parameter, the mean.
     pub fn fit_statistics(&self) -> FitStatistics {
         let observations = self.standardized_residuals.len();
-        let minus_two_log = self.minus_two_log_likelihood;
-        FitStatistics::new(observations, 1, self.chi_squared, minus_two_log)
+        FitStatistics::new(observations, 1, self.chi_squared)
     }
 
     /// Cautions that follow from the scatter and the errors. `bounded` is whether the interval has
@@ -136,7 +131,6 @@ pub fn common_mean(z: &[f64], covariance: &Covariance) -> Result<CommonMean, Ela
             (unit * variance_of_mean).sqrt()
         },
         chi_squared,
-        minus_two_log_likelihood: minus_two_log_likelihood(chi_squared, n, known),
         degrees: (learnt && degrees > 0).then_some(degrees as f64),
         excess: excess.then_some(scale),
         standardized_residuals: standardized(z, mean, known.then_some(covariance), unit),
@@ -156,17 +150,6 @@ fn standardized(z: &[f64], mean: f64, covariance: Option<&Covariance>, unit: f64
         }
     };
     z.iter().enumerate().map(over_spread).collect()
-}
-
-/// Of a normal sample. Where the variance is unknown, at its most likely value.
-fn minus_two_log_likelihood(chi_squared: f64, n: usize, known: bool) -> f64 {
-    let n = n as f64;
-    let full = (2.0 * std::f64::consts::PI).ln() * n;
-    if known {
-        full + chi_squared
-    } else {
-        full + n * (1.0 + (chi_squared / n).ln())
-    }
 }
 
 /// The covariance Σ = diag(v) + Σ_load s sᵀ + U Uᵀ + G of n numbers.

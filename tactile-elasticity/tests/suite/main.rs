@@ -2,7 +2,6 @@
 //! them.
 
 mod common;
-mod curve;
 mod hertz_reference;
 mod modulus;
 mod recorded;

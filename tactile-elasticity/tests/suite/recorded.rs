@@ -8,13 +8,9 @@ use test_support as record;
 
 use nalgebra::{DMatrix, Matrix3};
 use tactile_elasticity::contact::*;
-use tactile_elasticity::curve::*;
 use tactile_elasticity::field::{Averaging, StrainField};
 use tactile_elasticity::modulus::*;
 use tactile_elasticity::strain::*;
-use tactile_elasticity::stress::{
-    StressMeasure, convert_stress, saint_venant_kirchhoff, von_mises_stress,
-};
 
 const FILE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/recorded.txt");
 
@@ -52,7 +48,6 @@ impl Answers {
                 ("error", e.standard_error_pa),
                 ("lower", e.interval_95.lower),
                 ("upper", e.interval_95.upper.unwrap_or(-1.0)),
-                ("aicc", e.fit.aicc),
                 ("warnings", e.warnings.len() as f64),
             ],
         );
@@ -80,18 +75,6 @@ fn strain_and_stress(answers: &mut Answers) {
         answers.tensor(measure.name(), &measure.of(&deformation).unwrap());
     }
     answers.add("volume change", deformation.volume_change());
-    let cauchy = Matrix3::new(10.0, 3.0, -2.0, 3.0, 40.0, 5.0, -2.0, 5.0, 900.0);
-    let second = convert_stress(
-        &cauchy,
-        StressMeasure::Cauchy,
-        StressMeasure::SecondPiolaKirchhoff,
-        &deformation,
-    );
-    answers.tensor("second Piola-Kirchhoff", &second.unwrap());
-    answers.add("von Mises", von_mises_stress(&cauchy));
-    let green = GreenLagrange.of(&deformation).unwrap();
-    let law = saint_venant_kirchhoff(&green, 60e3, 0.45).unwrap();
-    answers.tensor("Saint Venant-Kirchhoff", &law);
     let gradients: Vec<_> = (1..9).map(|k| h * f64::from(k * k) * 0.01).collect();
     let field = StrainField::from_gradients(&gradients, None, &GreenLagrange).unwrap();
     for averaging in [Averaging::Mean, Averaging::Median, Averaging::Huber] {
@@ -105,25 +88,21 @@ fn strain_and_stress(answers: &mut Answers) {
 fn contacts(answers: &mut Answers) {
     let hertz = HertzContact::from_force(0.05, 3e-3, 45e3).unwrap();
     for r in [0.0, 1e-3, 2.5e-3, 7e-3] {
-        answers.add(&format!("Hertz pressure {r}"), hertz.pressure_pa(r));
         let (a, p0) = (hertz.contact_radius_m, hertz.peak_pressure_pa);
         let u = hertz_surface_displacement_m(r, a, p0, hertz.reduced_modulus_pa);
         answers.add(&format!("Hertz displacement {r}"), u);
     }
-    answers.add("Tatara", tatara_indentation_m(1.4e-3, 3e-3, 0.47).unwrap());
     for (name, bond, nu) in [
         ("bonded", Bond::Bonded, 0.5),
         ("bonded 0.3", Bond::Bonded, 0.3),
         ("free", Bond::Free, 0.4),
     ] {
-        let series = LayerSeries::corrected(bond, nu, 0.7).unwrap();
         for ratio in [0.01, 0.4, 1.5, 7.0] {
             let equation = LayerEquation::new(bond, nu).unwrap().with_share(0.8);
             let contact = equation.solve(ratio).unwrap();
             let found = [
                 ("force", contact.force_ratio_same_radius),
                 ("indentation", contact.indentation_ratio),
-                ("series", series.force_ratio(ratio)),
             ];
             answers.all(&format!("layer {name} {ratio}"), found);
         }
@@ -183,26 +162,16 @@ fn estimators(answers: &mut Answers) {
     answers.estimate("Hertz on the guide", &on_guide, &uncertain);
     let correlated = series.clone().with_force_covariance(&covariance).unwrap();
     answers.estimate("Hertz with a covariance", &hertz, &correlated);
-    let indentation = HertzSphere::new(radius, nu)
-        .unwrap()
-        .with_evidence(Evidence::Indentation);
-    answers.estimate("Hertz from indentation", &indentation, &series);
-    let tatara = TataraSphere::new(radius, nu).unwrap().with_waveguide(&gel);
-    answers.estimate("Tatara", &tatara, &series);
-    let plates = SphereBetweenPlates::new(radius, nu)
-        .unwrap()
-        .with_waveguide(&gel);
-    answers.estimate("between plates", &plates, &series);
+    let by_depth = loads().into_iter().map(|load| LoadState {
+        contact_radius_m: None,
+        ..load
+    });
+    let by_depth = LoadSeries::new(by_depth.collect::<Vec<_>>());
+    answers.estimate("Hertz from indentation", &hertz, &by_depth);
     let layered = SphereOnWaveguide::new(radius, nu, &gel, Bond::Bonded).unwrap();
     answers.estimate("on the guide", &layered, &series);
-    for theory in [
-        LayerTheory::PublishedSeries,
-        LayerTheory::CorrectedSeries,
-        LayerTheory::IntegralEquation,
-    ] {
-        let layer = BondedLayer::new(radius, 9e-3, nu, Bond::Bonded, theory).unwrap();
-        answers.estimate(&format!("layer {theory:?}"), &layer, &series);
-    }
+    let layer = BondedLayer::new(radius, 9e-3, nu, Bond::Bonded).unwrap();
+    answers.estimate("layer IntegralEquation", &layer, &series);
     answers.estimate("punch", &FlatPunch::new(1e-3, nu).unwrap(), &series);
     answers.estimate("cone", &Cone::new(1.1, nu).unwrap(), &series);
     let strain_covariance = &covariance * 10.0;
@@ -214,45 +183,6 @@ fn estimators(answers: &mut Answers) {
     let line = StressStrainRegression::default();
     answers.estimate("regression Tested", &line, &scaled);
     answers.estimate("regression Zero", &line.with_zero_at_origin(), &scaled);
-    let selection = BestOf::sphere_as_sample(radius, nu, &gel)
-        .unwrap()
-        .select(&series)
-        .unwrap();
-    for (k, weight) in selection.weights.iter().enumerate() {
-        answers.add(&format!("selection weight {k}"), *weight);
-        answers.add(
-            &format!("selection E {k}"),
-            selection.estimates[k].youngs_modulus_pa,
-        );
-    }
-}
-
-fn curves(answers: &mut Answers) {
-    let z: Vec<f64> = (0..60).map(|i| f64::from(i) * 1e-5).collect();
-    let f: Vec<f64> = (z.iter().zip(0..))
-        .map(|(z, i)| {
-            1.2e4 * 5e-3_f64.sqrt() * (z - 1.3e-4).max(0.0).powf(1.6)
-                + 1e-7 * f64::from((i * 7) % 5)
-        })
-        .collect();
-    let curve = IndentationCurve::new(&z, &f).unwrap();
-    let sphere = Indenter::Sphere {
-        radius_m: 5e-3,
-        thickness_m: Some(3e-3),
-        bond: Bond::Bonded,
-    };
-    let selection =
-        select_model(&curve, &sphere, 0.48, Model::Auto, &CurveOptions::default()).unwrap();
-    for (k, fit) in selection.fits.iter().enumerate() {
-        let found = [
-            ("E", fit.youngs_modulus_pa),
-            ("error", fit.standard_error_pa),
-            ("contact", fit.contact_point_m),
-            ("offset", fit.offset_n),
-            ("aicc", fit.statistics.aicc),
-        ];
-        answers.all(&format!("curve {k}"), found);
-    }
 }
 
 #[test]
@@ -261,7 +191,6 @@ fn answers_are_those_recorded() {
     strain_and_stress(&mut answers);
     contacts(&mut answers);
     estimators(&mut answers);
-    curves(&mut answers);
     // Numbers that are zero but for rounding have no relative error.
     answers
         .0

@@ -6,7 +6,6 @@ use crate::*;
 
 mod contact;
 mod elements;
-mod indentation;
 mod phantoms;
 mod press;
 mod sparse;

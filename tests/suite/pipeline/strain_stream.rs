@@ -177,13 +177,10 @@ fn an_estimator_can_be_chosen_and_a_wrong_one_says_what_it_needs() {
         (PaperRatio, EstimatorKind::PaperRatio, 3),
         (Regression, EstimatorKind::StressStrainRegression, 3),
         (SphereOnWaveguide, EstimatorKind::SphereOnWaveguide, 0),
-        (SphereBetweenPlates, EstimatorKind::SphereBetweenPlates, 0),
-        (TataraSphere, EstimatorKind::TataraSphere, 0),
     ];
     for (choice, kind, surfaces) in laws {
         assert_eq!(modulus(choice), (Ok(kind), surfaces), "{choice}");
     }
-    assert!(modulus(LeastAkaike).0.is_ok());
     for choice in [BondedLayer, Cone, TabulatedContact] {
         let error = modulus(choice).0.unwrap_err();
         assert!(

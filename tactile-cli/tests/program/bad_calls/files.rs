@@ -47,9 +47,6 @@ pub(super) fn more_files(folder: &Path) {
     put("named.csv", "a,b\n0,0\n1,1\n");
     put("small.csv", "0,0\n0,0\n");
     put("holes.csv", &("nan,".repeat(31) + "1\n").repeat(24));
-    put("gramme.csv", "indentation_mm,force (gf)\n0,0\n1,1\n2,3\n");
-    put("three.csv", "0,0,0\n1,1,1\n2,3,4\n");
-    put("two_rows.csv", "indentation_m,force_N\n0,0\n1e-4,1e-3\n");
     put(
         "three_depths.csv",
         "darkness,depth_mm\n4,0.1\n20,0.5\n60,2\n",
@@ -115,13 +112,6 @@ pub(super) fn more_files(folder: &Path) {
         "swapped_depths.csv",
         "darkness,depth_mm\n0,0\n0.5,20\n1.9,60\n",
     );
-    let there = (0..40).map(|k| format!("{},{}\n", k, k * k));
-    let back = (0..40).rev().map(|k| format!("{},{}\n", k, k * k));
-    let both: String = there.chain(back).collect();
-    put(
-        "there_and_back.csv",
-        &format!("indentation_um,force_mN\n{both}"),
-    );
     let mut samples = b"P5\n48 48\n100\n".to_vec();
     samples.resize(samples.len() + 48 * 48, 200);
     fs::write(folder.join("above.pgm"), samples).unwrap();
@@ -129,10 +119,8 @@ pub(super) fn more_files(folder: &Path) {
     for name in ["pipes", "links", "links_in"] {
         fs::create_dir(folder.join(name)).unwrap();
     }
-    for name in ["pairs.csv", "fit.csv"] {
-        let pipe = folder.join("pipes").join(name);
-        assert!(Command::new("mkfifo").arg(pipe).status().unwrap().success());
-    }
+    let pipe = folder.join("pipes").join("pairs.csv");
+    assert!(Command::new("mkfifo").arg(pipe).status().unwrap().success());
     for name in ["pairs.csv", "light.svg"] {
         symlink("../plain.csv", folder.join("links").join(name)).unwrap();
     }

@@ -21,7 +21,7 @@ const IMAGES: [&str; 7] = [
 ];
 
 /// Places where a file stands that must be a table.
-const TABLES: [&str; 10] = [
+const TABLES: [&str; 9] = [
     "calibrate @",
     "match @",
     "warp @ after.csv before.csv",
@@ -29,7 +29,6 @@ const TABLES: [&str; 10] = [
     "warp before.csv before.csv @",
     "strain @ after.csv",
     "strain before.csv @",
-    "indent @ --shape sphere --radius 5e-3",
     "integrate @ slope_y.csv",
     "depth --reference dark_reference.pgm --table @ --pixel-um 100 dark_frame.pgm",
 ];

@@ -105,11 +105,9 @@ fn adhesion_is_as_wide_as_the_contact_it_makes() {
             adhesion_n,
             ..SharedErrors::default()
         };
-        let loads = hertz_loads(Body::rigid(), &[force_n]);
-        let series = LoadSeries::new(loads).with_shared_errors(shared).unwrap();
-        let estimator = HertzSphere::new(4e-3, NU)
-            .unwrap()
-            .with_evidence(Evidence::ContactRadius);
+        let load = by_radius(hertz_loads(Body::rigid(), &[force_n])[0]);
+        let series = LoadSeries::new([load]).with_shared_errors(shared).unwrap();
+        let estimator = HertzSphere::new(4e-3, NU).unwrap();
         let found = estimator.estimate(&series).unwrap();
         let stated = found.standard_error_pa / SAMPLE;
         // The missing rim takes off up to a third at 7 % of the force.
@@ -122,13 +120,11 @@ fn adhesion_is_as_wide_as_the_contact_it_makes() {
 
 #[test]
 fn a_force_covariance_says_the_same_as_a_shared_scale() {
-    let loads = hertz_loads(Body::rigid(), &[1e-3, 3e-3]);
     let f = [1e-3, 3e-3];
+    let loads = hertz_loads(Body::rigid(), &f).into_iter().map(by_radius);
     let covariance = DMatrix::from_fn(2, 2, |i, j| 1e-4 * f[i] * f[j]);
-    let plain = HertzSphere::new(4e-3, NU)
-        .unwrap()
-        .with_evidence(Evidence::ContactRadius);
-    let series = LoadSeries::new(loads);
+    let plain = HertzSphere::new(4e-3, NU).unwrap();
+    let series = LoadSeries::new(loads.collect::<Vec<_>>());
     let correlated = series.clone().with_force_covariance(&covariance).unwrap();
     let one = plain.estimate(&correlated).unwrap();
     let scaled = series.with_shared_errors(force_scale(0.01)).unwrap();
@@ -139,11 +135,10 @@ fn a_force_covariance_says_the_same_as_a_shared_scale() {
 
 #[test]
 fn one_load_without_errors_has_no_interval() {
-    let loads = hertz_loads(Body::rigid(), &[1e-3]);
+    let load = by_radius(hertz_loads(Body::rigid(), &[1e-3])[0]);
     let only = HertzSphere::new(4e-3, NU)
         .unwrap()
-        .with_evidence(Evidence::ContactRadius)
-        .estimate(&LoadSeries::new(loads))
+        .estimate(&LoadSeries::new([load]))
         .unwrap();
     assert!(only.warnings.contains(&Warning::NoErrorEstimate) && only.interval_95.upper.is_none());
 }

@@ -11,7 +11,7 @@ fn every_law_inverts_itself() {
     finds(&on_waveguide, &hertz_loads(waveguide().as_body(), &forces));
     let punch = |d: f64| LoadState {
         indentation_m: Some(exact(d)),
-        ..LoadState::new(exact(flat_punch(reduced(), 2e-3, d).unwrap().force_n))
+        ..LoadState::new(exact(2.0 * reduced() * 2e-3 * d))
     };
     finds(
         &FlatPunch::new(2e-3, NU).unwrap(),
@@ -19,31 +19,14 @@ fn every_law_inverts_itself() {
     );
     let angle = 1.2f64;
     let cone = |d: f64| {
-        let c = cone(reduced(), angle.tan(), d).unwrap();
+        let a = std::f64::consts::FRAC_2_PI * angle.tan() * d;
         LoadState {
             indentation_m: Some(exact(d)),
-            contact_radius_m: Some(exact(c.contact_radius_m)),
-            ..LoadState::new(exact(c.force_n))
+            contact_radius_m: Some(exact(a)),
+            ..LoadState::new(exact(reduced() * a * d))
         }
     };
     finds(&Cone::new(angle, NU).unwrap(), &[cone(1e-5), cone(3e-5)]);
-    let squeezed = |a: f64| {
-        let d = tatara_indentation_m(a, 3e-3, NU).unwrap();
-        LoadState {
-            indentation_m: Some(exact(d)),
-            ..LoadState::new(exact(4.0 / 3.0 * reduced() * a.powi(3) / 3e-3))
-        }
-    };
-    finds(
-        &TataraSphere::new(3e-3, NU).unwrap(),
-        &[squeezed(3e-4), squeezed(1.6e-3)],
-    );
-    finds(
-        &SphereBetweenPlates::new(4e-3, NU)
-            .unwrap()
-            .with_waveguide(&waveguide()),
-        &between_plates(&forces, 0.0),
-    );
 }
 
 #[test]
@@ -61,21 +44,7 @@ fn layers_invert_themselves_thick_or_thin() {
         }
     };
     let loads = [load(0.05), load(0.4), load(1.3)];
-    let theory = |t| BondedLayer::new(r, h, NU, Bond::Bonded, t).unwrap();
-    finds(&theory(LayerTheory::IntegralEquation), &loads);
-    // The published series errs as its authors' readers found; the corrected one only where χ is
-    // large.
-    let off = |t, i: usize| {
-        let found = theory(t).estimate(&LoadSeries::new(&loads[i..=i])).unwrap();
-        found.youngs_modulus_pa / SAMPLE - 1.0
-    };
-    assert!(off(LayerTheory::CorrectedSeries, 0).abs() < 1e-5);
-    assert!(off(LayerTheory::CorrectedSeries, 1).abs() < 5e-3);
-    assert!(off(LayerTheory::PublishedSeries, 1) > 0.03);
-    let published = theory(LayerTheory::PublishedSeries);
-    let thin = published.estimate(&LoadSeries::new(loads)).unwrap();
-    let is_thin = |w: &Warning| matches!(w, Warning::ThinLayer { load: 2, .. });
-    assert!(thin.warnings.iter().any(is_thin));
+    finds(&BondedLayer::new(r, h, NU, Bond::Bonded).unwrap(), &loads);
 }
 
 /// The linear contact of a ball with the layers of `guide`.
@@ -107,15 +76,12 @@ fn a_sphere_on_layers_inverts_itself() {
     assert!(gap.abs() < 3e-5, "{gap:e}");
     // In series the soft layers below count as if they were touched: half as much again, or twice
     // the modulus.
-    let deep = |evidence| {
-        let estimator = HertzSphere::new(4e-3, NU)
-            .unwrap()
-            .with_waveguide(&guide)
-            .with_evidence(evidence);
-        let series = LoadSeries::new(&loads[1..2]);
-        estimator.estimate(&series).unwrap().youngs_modulus_pa / SAMPLE - 1.0
+    let deep = |load| {
+        let estimator = HertzSphere::new(4e-3, NU).unwrap().with_waveguide(&guide);
+        let found = estimator.estimate(&LoadSeries::new([load])).unwrap();
+        found.youngs_modulus_pa / SAMPLE - 1.0
     };
-    assert!(deep(Evidence::ContactRadius) > 1.0 && deep(Evidence::Indentation) > 0.5);
+    assert!(deep(by_radius(loads[1])) > 1.0 && deep(by_depth(loads[1])) > 0.5);
 }
 
 #[test]
@@ -161,56 +127,6 @@ fn far_stiffer_samples_are_bounded_from_below_only() {
     );
 }
 
-#[test]
-fn loads_choose_their_law() {
-    let forces = [1e-3, 4e-3, 1.6e-2];
-    let candidates = BestOf::sphere_as_sample(4e-3, NU, &waveguide()).unwrap();
-    let series = LoadSeries::new(between_plates(&forces, 0.003));
-    let choice = candidates.select(&series).unwrap();
-    assert_eq!(
-        choice.chosen().estimator,
-        EstimatorKind::SphereBetweenPlates
-    );
-    assert!((choice.chosen().youngs_modulus_pa / SAMPLE - 1.0).abs() < 1e-9);
-    // Hertz with one contact takes the plate's approach for twice what it is: many standard errors
-    // off.
-    assert!(matches!(choice.reason, SelectionReason::BetterFit { margin } if margin > 10.0));
-    assert!((choice.weights.iter().sum::<f64>() - 1.0).abs() < 1e-12 && choice.weights[0] > 0.99);
-    assert_eq!(choice.estimates.len() + choice.left_out.len(), 4);
-
-    // A sliding layer differs from a bonded and from a deep one.
-    let equation = LayerEquation::new(Bond::Free, NU).unwrap();
-    let load = |ratio: f64| {
-        let (h, contact) = (2e-3, equation.solve(ratio).unwrap());
-        let hertz = 4.0 / 3.0 * reduced() * (ratio * h).powi(3) / 4e-3;
-        let depth = (contact.chi * h).powi(2) / 4e-3;
-        LoadState {
-            indentation_m: Some(Estimate::new(depth, 0.003 * depth)),
-            ..LoadState::new(exact(hertz * contact.force_ratio_same_radius))
-        }
-    };
-    let candidates = BestOf::sphere_on_sample(4e-3, NU, Some(2e-3)).unwrap();
-    let series = LoadSeries::new([0.2, 0.5, 0.9, 1.3].map(load));
-    let layer = candidates.select(&series).unwrap();
-    assert_eq!(
-        layer.chosen().estimator,
-        EstimatorKind::FreeLayerIntegralEquation
-    );
-    assert!((layer.chosen().youngs_modulus_pa / SAMPLE - 1.0).abs() < 1e-6);
-}
-
-#[test]
-fn one_load_is_answered_by_the_most_general_law() {
-    let mut loads = between_plates(&[1e-3], 0.01);
-    loads[0].indentation_m = None;
-    let candidates = BestOf::sphere_as_sample(4e-3, NU, &waveguide()).unwrap();
-    let choice = candidates.select(&LoadSeries::new(loads)).unwrap();
-    assert_eq!(choice.chosen().estimator, EstimatorKind::SphereOnWaveguide);
-    assert!(
-        matches!(choice.reason, SelectionReason::MostGeneral { behind } if behind.abs() < 1e-9)
-    );
-}
-
 /// Balls from softer to stiffer than the guide, larger and smaller than it is deep: the share of
 /// compliance that belongs to the answer is found everywhere.
 #[test]
@@ -219,7 +135,6 @@ fn balls_of_every_stiffness_and_size_invert_on_layers() {
         for radius in [3e-3, 10e-3, 20e-3] {
             let estimator = SphereOnWaveguide::new(radius, NU, guide, Bond::Bonded)
                 .unwrap()
-                .with_evidence(Evidence::ContactRadius)
                 .without_finite_strain();
             for modulus in [30e3, 100e3, 250e3] {
                 let radii = [0.1, 0.5, 1.2].map(|ratio| ratio * radius);
@@ -227,7 +142,7 @@ fn balls_of_every_stiffness_and_size_invert_on_layers() {
                     .into_iter()
                     .filter(|a| *a <= 1.6 * guide.thickness_m())
                 {
-                    let load = layered_load(guide, radius, modulus, a);
+                    let load = by_radius(layered_load(guide, radius, modulus, a));
                     let found = estimator.estimate(&LoadSeries::new([load])).unwrap();
                     let gap = found.youngs_modulus_pa / modulus - 1.0;
                     // The table's 5·10⁻⁶ in ln F, times what the guide's own compliance makes of

@@ -11,10 +11,8 @@ use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 use rand_distr::StandardNormal;
 use tactile_elasticity::ElasticityError;
 use tactile_elasticity::contact::{
-    Body, Bond, HertzContact, Layer, LayerEquation, Waveguide, cone, flat_punch,
-    reduced_modulus_pa, tatara_indentation_m,
+    Body, Bond, HertzContact, Layer, LayerEquation, Waveguide, reduced_modulus_pa,
 };
-use tactile_elasticity::curve::SelectionReason;
 use tactile_elasticity::modulus::*;
 
 const SAMPLE: f64 = 60e3;
@@ -59,26 +57,20 @@ fn hertz_loads(other: Body, forces: &[f64]) -> Vec<LoadState> {
         .collect()
 }
 
-/// The same, with the indentation that of both contacts: the waveguide's and a rigid plate's.
-/// Relative error as stated.
-fn between_plates(forces: &[f64], relative: f64) -> Vec<LoadState> {
-    let far = hertz_loads(Body::rigid(), forces);
-    (hertz_loads(waveguide().as_body(), forces)
-        .into_iter()
-        .zip(far))
-    .map(|(near, far)| {
-        let indentation = near.indentation_m.unwrap().value + far.indentation_m.unwrap().value;
-        let a = near.contact_radius_m.unwrap().value;
-        LoadState {
-            contact_radius_m: Some(Estimate::new(a, relative * a)),
-            indentation_m: Some(Estimate::new(indentation, relative * indentation)),
-            ..LoadState::new(Estimate::new(
-                near.force_n.value,
-                relative * near.force_n.value,
-            ))
-        }
-    })
-    .collect()
+/// A load without what was measured of its depth.
+fn by_radius(load: LoadState) -> LoadState {
+    LoadState {
+        indentation_m: None,
+        ..load
+    }
+}
+
+/// A load without its contact radius.
+fn by_depth(load: LoadState) -> LoadState {
+    LoadState {
+        contact_radius_m: None,
+        ..load
+    }
 }
 
 /// Only the forces' common scale is in doubt.
