@@ -7,8 +7,8 @@ use std::hint::black_box;
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use ndarray::Array2;
 use tactile_imaging::sfs::{
-    ControlPointSampler, CurvatureAdaptive, DepthTable, Domain, Eikonal, EikonalBranch,
-    EquallySpaced, Frame, Lighting, Random, Surface, SurfaceReconstruction, SurfaceWorkspace,
+    ControlPointSampler, DepthTable, Domain, Eikonal, EikonalBranch, EquallySpaced, Frame,
+    Lighting, Surface, SurfaceReconstruction, SurfaceWorkspace,
 };
 
 /// A contact of a given share of the frame against one that fills it.
@@ -60,22 +60,15 @@ fn points(criterion: &mut Criterion) {
     let z = Array2::from_shape_fn((300, 300), |(r, c)| {
         40.0 * (-((r as f64 - 150.0).powi(2) + (c as f64 - 140.0).powi(2)) / 8e3).exp()
     });
-    let samplers: [(&str, Box<dyn ControlPointSampler<f64>>); 3] = [
-        ("equal", Box::new(EquallySpaced)),
-        ("random", Box::new(Random { seed: 1 })),
-        ("adaptive", Box::new(CurvatureAdaptive::new(2.0).unwrap())),
-    ];
-    for (name, sampler) in samplers {
-        let sample = || {
-            sampler
-                .sample(black_box(z.view()), &Domain::default(), 200)
-                .unwrap()
-        };
-        assert_eq!(sample().len(), 200);
-        group.bench_function(BenchmarkId::new(name, "200/300x300"), |bencher| {
-            bencher.iter(sample)
-        });
-    }
+    let sample = || {
+        EquallySpaced
+            .sample(black_box(z.view()), &Domain::default(), 200)
+            .unwrap()
+    };
+    assert_eq!(sample().len(), 200);
+    group.bench_function(BenchmarkId::new("equal", "200/300x300"), |bencher| {
+        bencher.iter(sample)
+    });
     group.finish();
 }
 

@@ -31,7 +31,6 @@ CALLS = [
     ("match cases.txt", "cases.txt", "cases.txt --method nearest"),
     ("warp sources.csv targets.csv queries.csv", "queries", "sources"),
     ("strain before.csv after.csv", "before.csv after.csv", "after.csv before.csv"),
-    ("reconstruct ball.pgm --light 0,0,1 --mask ball.pgm", "0,0,1", "0,0.1,1"),
     ("integrate slope_x.csv slope_y.csv --pixel-size 5e-5", "5e-5", "6e-5"),
     ("depth --reference dark_reference.pgm --table depth_table.csv --pixel-um 100 dark_frame.pgm", "100", "90"),
     ("stream press/scene.toml --allowed-late 100", "", ""),

@@ -31,7 +31,6 @@ CALLS = [
     "match cases.txt",
     "warp sources.csv targets.csv queries.csv",
     "strain before.csv after.csv",
-    "reconstruct ball.pgm --light 0,0,1 --mask ball.pgm",
     "integrate slope_x.csv slope_y.csv --pixel-size 5e-5",
     "depth --reference dark_reference.pgm --table depth_table.csv --pixel-um 100 dark_frame.pgm --ball-radius-mm 4",
     "stream press/scene.toml --allowed-late 100 --rate 20",

@@ -38,12 +38,6 @@ pub enum PipelineError {
     /// The options of the warp are not usable.
     #[error("the options of the warp are not usable: {0}")]
     WarpOptions(#[source] TpsError),
-    /// An integrator was chosen, but the reconstruction has no slopes to integrate.
-    #[error(
-        "the reconstruction goes from the image to heights without slopes: it takes no integrator \
-         (Brooks and Horn's does)"
-    )]
-    NoSlopes,
     /// The depth table is not usable.
     #[error("the depth table is not usable: {0}")]
     DepthTable(#[source] SfsError),
@@ -274,12 +268,13 @@ pub enum PipelineError {
         /// Why.
         problem: ShapeProblem,
     },
-    /// A face shows no texture whose points could be matched.
+    /// A flat face has no points that could be matched.
     #[error(
-        "frames {} and {}: the face has no texture to match, its strain is that of its outline",
+        "frames {} and {}: the points of a flat face are not matched, its strain is that of its \
+         outline",
         from + 1, to + 1
     )]
-    NoTexture {
+    FlatFace {
         /// The first frame.
         from: usize,
         /// The second frame.
@@ -321,7 +316,7 @@ impl PipelineError {
             | Self::NotUniaxial { frame, .. }
             | Self::Surface { frame, .. } => Some(*frame),
             Self::Match { to, .. }
-            | Self::NoTexture { to, .. }
+            | Self::FlatFace { to, .. }
             | Self::TooFewMatches { to, .. }
             | Self::Warp { to, .. }
             | Self::Strain { to, .. } => Some(*to),

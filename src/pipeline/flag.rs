@@ -204,21 +204,6 @@ pub enum Flag {
         /// What the gauge said, in newtons.
         gauge_n: f64,
     },
-    /// The material points of a face and its outline stretch differently: the face slips, sticks or
-    /// bulges, and the modulus is off by as much as the strain.
-    #[error(
-        "frame {}: the outline has stretched by {:.3} % since the first frame, the texture by \
-         {:.3} %: the face slips or sticks",
-        frame + 1, 100.0 * outline_strain, 100.0 * texture_strain
-    )]
-    Slip {
-        /// The frame.
-        frame: usize,
-        /// Lateral strain of the outline since the first frame.
-        outline_strain: f64,
-        /// Lateral strain of the points.
-        texture_strain: f64,
-    },
     /// The pressure rises to the outline of a flat face, as where it sticks: it does not spread
     /// freely, and its strain is not that of its material.
     #[error(

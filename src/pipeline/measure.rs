@@ -196,7 +196,7 @@ impl Press<'_> {
     fn match_result(&self, flags: &mut Vec<Flag>) -> Result<MatchResult, PipelineError> {
         let last = self.last()?;
         if let Specimen::Flat(_) = self.stages.specimen {
-            return self.texture_result(last, flags);
+            return Err(PipelineError::FlatFace { from: 0, to: last });
         }
         let model = self.control_points(0)?;
         let matching = self.matching(last)?;
@@ -221,42 +221,6 @@ impl Press<'_> {
             });
         }
         Ok(result)
-    }
-
-    /// The match of a face's texture, and a caution where its points stretch otherwise than the
-    /// outline.
-    fn texture_result(
-        &self,
-        last: usize,
-        flags: &mut Vec<Flag>,
-    ) -> Result<MatchResult, PipelineError> {
-        let texture = self.texture(last)?;
-        let areas = [0, last].map(|frame| Some(self.reading(frame).ok()?.face?.area_m2));
-        if let [Some(first), Some(second)] = areas {
-            let outline = (second.value / first.value).sqrt();
-            let relative = |area: Estimate| area.standard_error / area.value;
-            let error = 0.5 * outline * relative(first).hypot(relative(second));
-            let apart = (outline - texture.stretch.value).abs();
-            // With one comparison a press, four standard errors flag one in some 10⁴ in vain. A
-            // fiftieth of the strain does no harm.
-            let allowed = 4.0 * error.hypot(texture.stretch.standard_error);
-            if apart > allowed && apart > 0.02 * (outline - 1.0).abs() {
-                flags.push(Flag::Slip {
-                    frame: last,
-                    outline_strain: outline - 1.0,
-                    texture_strain: texture.stretch.value - 1.0,
-                });
-            }
-        }
-        Ok(MatchResult {
-            points: texture.points,
-            matched: texture.pairs,
-            mean_confidence: texture.pairs as f64 / texture.points as f64,
-            residual_m: texture.residual_m,
-            mean_displacement_m: texture.displacement_m,
-            iterations: 1,
-            stop: StopReason::Converged,
-        })
     }
 
     /// The contact's radius in pixels.

@@ -69,8 +69,8 @@ pub use error::PipelineError;
 pub use flag::Flag;
 pub use light::LightContact;
 pub use named::{
-    EstimatorChoice, IntegratorChoice, MatcherChoice, ReconstructionChoice, SamplerChoice,
-    StagesConfig, StrainChoice, UnknownStage, WarpChoice,
+    EstimatorChoice, MatcherChoice, ReconstructionChoice, SamplerChoice, StagesConfig,
+    StrainChoice, UnknownStage, WarpChoice,
 };
 pub use press::Press;
 pub use reference_light::ReferenceLight;

@@ -9,9 +9,8 @@ use crate::matching::{
     RelaxationLabelling, Search,
 };
 use crate::sfs::{
-    BoundaryCondition, BrooksHorn, ContactSampler, ControlPointSampler, CosinePoisson,
-    CurvatureAdaptive, Eikonal, EquallySpaced, FrankotChellappa, Lighting, MaskedLeastSquares,
-    Random, SlopeIntegrator, SurfaceReconstruction, TsaiShah,
+    BoundaryCondition, ContactSampler, ControlPointSampler, Eikonal, EquallySpaced, Lighting,
+    SurfaceReconstruction, TsaiShah,
 };
 use crate::tps::{AffineModel, FitOptions, R2LogR, R3, Smoothing, StrainSpline, WarpModel};
 use std::fmt;
@@ -103,26 +102,6 @@ choice! {
     /// [`TsaiShah`](crate::sfs::TsaiShah): quick, and much too low on the fine frames of a whole
     /// contact.
     TsaiShah = "tsai-shah",
-    /// [`BrooksHorn`](crate::sfs::BrooksHorn), the rim of the contact occluding.
-    BrooksHorn = "brooks-horn",
-}
-
-choice! {
-    /// Slopes to heights, inside a reconstruction that goes through slopes.
-    ///
-    /// ```
-    /// use tactile_imaging::pipeline::IntegratorChoice;
-    /// assert_eq!("masked-least-squares".parse(), Ok(IntegratorChoice::MaskedLeastSquares));
-    /// ```
-    IntegratorChoice, "integrator":
-    /// The reconstruction's own.
-    OfReconstruction = "of-reconstruction",
-    /// [`FrankotChellappa`](crate::sfs::FrankotChellappa).
-    FrankotChellappa = "frankot-chellappa",
-    /// [`CosinePoisson`](crate::sfs::CosinePoisson).
-    CosinePoisson = "cosine-poisson",
-    /// [`MaskedLeastSquares`](crate::sfs::MaskedLeastSquares) with equal weights.
-    MaskedLeastSquares = "masked-least-squares",
 }
 
 choice! {
@@ -138,10 +117,6 @@ choice! {
     Contact = "contact",
     /// [`EquallySpaced`](crate::sfs::EquallySpaced).
     EquallySpaced = "equally-spaced",
-    /// [`CurvatureAdaptive`](crate::sfs::CurvatureAdaptive) of emphasis 4.
-    Curvature = "curvature",
-    /// [`Random`](crate::sfs::Random) from the seed 0.
-    Random = "random",
 }
 
 choice! {
@@ -263,35 +238,16 @@ impl ReconstructionChoice {
         Ok(match self {
             Self::Eikonal => Arc::new(eikonal()?),
             Self::TsaiShah => Arc::new(TsaiShah::new(light)),
-            Self::BrooksHorn => Arc::new(BrooksHorn::new(light).with_occluding_boundary(true)),
         })
-    }
-}
-
-impl IntegratorChoice {
-    /// The integrator of a name. `None` for the reconstruction's own.
-    pub(super) fn build(self) -> Option<Arc<dyn SlopeIntegrator<f64> + Send + Sync>> {
-        match self {
-            Self::OfReconstruction => None,
-            Self::FrankotChellappa => Some(Arc::new(FrankotChellappa)),
-            Self::CosinePoisson => Some(Arc::new(CosinePoisson)),
-            Self::MaskedLeastSquares => Some(Arc::new(MaskedLeastSquares::default())),
-        }
     }
 }
 
 impl SamplerChoice {
-    pub(super) fn build(
-        self,
-    ) -> Result<Arc<dyn ControlPointSampler<f64> + Send + Sync>, PipelineError> {
-        Ok(match self {
+    pub(super) fn build(self) -> Arc<dyn ControlPointSampler<f64> + Send + Sync> {
+        match self {
             Self::Contact => Arc::new(ContactSampler),
             Self::EquallySpaced => Arc::new(EquallySpaced),
-            Self::Curvature => {
-                Arc::new(CurvatureAdaptive::new(4.0).map_err(PipelineError::SurfaceOptions)?)
-            }
-            Self::Random => Arc::new(Random { seed: 0 }),
-        })
+        }
     }
 }
 
@@ -359,9 +315,6 @@ impl StrainChoice {
 pub struct StagesConfig {
     /// Image to surface.
     pub reconstruction: ReconstructionChoice,
-    /// Slopes to heights. Only a reconstruction that goes through slopes takes another than its
-    /// own.
-    pub integrator: IntegratorChoice,
     /// Surface to control points.
     pub sampler: SamplerChoice,
     /// Points to matches.
@@ -390,7 +343,6 @@ impl StagesConfig {
     pub fn as_printed() -> Self {
         Self {
             reconstruction: ReconstructionChoice::TsaiShah,
-            integrator: IntegratorChoice::OfReconstruction,
             sampler: SamplerChoice::EquallySpaced,
             matcher: MatcherChoice::PrintedLabelling,
             warp: WarpChoice::PrintedSpline,

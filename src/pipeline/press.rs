@@ -12,7 +12,7 @@ use super::stages::{Bench, MatchedPoints, Stages};
 use super::strain::PairStrain;
 use super::surface::{ContactSurface, ControlPoints};
 use crate::elasticity::modulus::{LoadSeries, ModulusEstimate};
-use crate::force::{Estimate, ReferenceFrame, TextureStretch, background_shift};
+use crate::force::{Estimate, ReferenceFrame, background_shift};
 use crate::matching::Matching;
 use nalgebra::Point3;
 use ndarray::{Array2, ArrayView2, CowArray, Ix2};
@@ -486,17 +486,6 @@ impl<'a> Press<'a> {
                 .map(Box::new)
         });
         matching.as_deref().map_err(Clone::clone)
-    }
-
-    /// The stretch of a face's material points from the first frame to a later one.
-    pub(super) fn texture(&self, frame: usize) -> Result<TextureStretch, PipelineError> {
-        self.reading(0)?;
-        self.reading(frame)?;
-        let (first_image, first) = self.masked(0)?;
-        let (image, contact) = self.masked(frame)?;
-        let images = [first_image.view(), image.view()];
-        self.stages
-            .texture(&mut self.bench(), [0, frame], images, [&first, &contact])
     }
 
     /// The strain between the first frame and a later one. Of an object with a flat face by the

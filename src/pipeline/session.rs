@@ -18,10 +18,7 @@ use super::stages::{Bench, MatchedPoints, Stages};
 use super::strain::PairStrain;
 use super::surface::{ContactSurface, ControlPoints};
 use crate::elasticity::modulus::ModulusEstimate;
-use crate::force::{
-    FrameCondition, HealthMonitor, HealthOptions, HealthReport, ShearCalibration, ShearMeasurement,
-    ShearTracker, StuckPixels,
-};
+use crate::force::{ShearCalibration, ShearMeasurement, ShearTracker};
 use crate::matching::{MatchReport, MatchedPairs, WarmStart};
 use ndarray::{Array2, ArrayView2};
 use std::sync::Arc;
@@ -102,40 +99,6 @@ impl DriftWatch {
     }
 }
 
-/// Charts of gain and noise, and the pixels that do not follow.
-struct SensorHealth {
-    monitor: HealthMonitor,
-    report: Option<HealthReport>,
-    stuck: Option<StuckPixels>,
-}
-
-impl SensorHealth {
-    fn new(options: HealthOptions) -> Self {
-        Self {
-            monitor: HealthMonitor::new(options),
-            report: None,
-            stuck: None,
-        }
-    }
-
-    fn watch(&mut self, number: u64, frame: ArrayView2<'_, u8>, condition: Option<FrameCondition>) {
-        let Some(condition) = condition else { return };
-        self.report = Some(self.monitor.update(&condition));
-        // A look reads the whole frame, so that it must be rare. Sixteen looks, the fewest that
-        // tell, are 13 seconds at 80 frames a second.
-        if !number.is_multiple_of(64) {
-            return;
-        }
-        if self.stuck.is_none() {
-            self.stuck = StuckPixels::new(frame.dim()).ok();
-        }
-        if let Some(stuck) = &mut self.stuck {
-            // All frames of a session have the reference's size, or they were refused before.
-            let _ = stuck.update(frame);
-        }
-    }
-}
-
 /// Follows a stream of frames from one sensor pressed on one object. `Send`: one session a thread.
 ///
 /// ```
@@ -173,7 +136,6 @@ pub struct Session {
     /// The first contact that a flat face's loads are compared with.
     first_contact: Option<ContactReading>,
     drift: DriftWatch,
-    health: SensorHealth,
     /// The surface that was last asked for.
     surface: ContactSurface,
 }
@@ -225,7 +187,6 @@ impl Session {
             strain: FollowedStrain::default(),
             first_contact: None,
             drift: DriftWatch::default(),
-            health: SensorHealth::new(HealthOptions::default()),
             surface: ContactSurface::default(),
         })
     }
@@ -260,37 +221,6 @@ impl Session {
     #[must_use]
     pub fn with_shear(mut self, calibration: ShearCalibration) -> Self {
         self.shear = Some(ShearTracker::new(calibration));
-        self
-    }
-
-    /// Sets what counts as a change of the sensor. [`health`](Self::health) starts anew. The
-    /// default is a change of the brightness by 2 % or of the noise by 20 %.
-    ///
-    /// ```
-    /// use tactile_imaging::force::{ChartState, HealthOptions};
-    /// use tactile_imaging::pipeline::{Object, Pipeline, Session};
-    /// use tactile_imaging::force::CalibrationPair;
-    /// let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
-    /// let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?;
-    /// let frame = |k: usize, grey: usize| ndarray::Array2::from_shape_fn((96, 96), |(r, c)| {
-    ///     (grey + (7 * r + 13 * c + 5 * k) % 4) as u8
-    /// });
-    /// let options = HealthOptions::default().with_baseline_frames(50)?;
-    /// let mut session = Session::new(&pipeline, &[frame(0, 40).view()])?.with_health(options);
-    /// for k in 0..60 {
-    ///     session.push(frame(k, 40).view())?;
-    /// }
-    /// assert_eq!(session.health().map(|h| h.brightness), Some(ChartState::Healthy));
-    /// // The light rises by a fortieth.
-    /// for k in 60..110 {
-    ///     session.push(frame(k, 41).view())?;
-    /// }
-    /// assert_eq!(session.health().map(|h| h.brightness), Some(ChartState::Changed));
-    /// # Ok::<(), Box<dyn std::error::Error>>(())
-    /// ```
-    #[must_use]
-    pub fn with_health(mut self, options: HealthOptions) -> Self {
-        self.health = SensorHealth::new(options);
         self
     }
 
@@ -346,8 +276,6 @@ impl Session {
         {
             self.drift.watch(grey);
         }
-        let condition = self.bench.force.detector.condition(&self.stages.reference);
-        self.health.watch(number, frame, condition);
         Ok(())
     }
 
@@ -445,36 +373,6 @@ impl Session {
     /// ```
     pub fn drift(&self) -> &DriftWatch {
         &self.drift
-    }
-
-    /// Gain and noise of the sensor as its background shows them, contacts or not, against the
-    /// session's first frames ([`HealthOptions::with_baseline_frames`]). `None` before a frame, and
-    /// where the contact stage does not look at the background.
-    pub fn health(&self) -> Option<HealthReport> {
-        self.health.report
-    }
-
-    /// Pixels (row, column) that have kept one grey level while their neighbours changed. Every
-    /// 64th frame is looked at, and none is named before sixteen looks. O(pixels).
-    ///
-    /// ```
-    /// use tactile_imaging::pipeline::{Object, Pipeline, Session};
-    /// use tactile_imaging::force::CalibrationPair;
-    /// let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
-    /// let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?;
-    /// let frame = |k: usize| ndarray::Array2::from_shape_fn((64, 64), |(r, c)| {
-    ///     if (r, c) == (12, 30) { 44 } else { (40 + (7 * r + 13 * c + k / 64) % 4) as u8 }
-    /// });
-    /// let mut session = Session::new(&pipeline, &[frame(0).view()])?;
-    /// for k in 0..1024 {
-    ///     session.push(frame(k).view())?;
-    /// }
-    /// assert_eq!(session.stuck_pixels(), [(12, 30)]);
-    /// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
-    /// ```
-    pub fn stuck_pixels(&self) -> Vec<(usize, usize)> {
-        let stuck = self.health.stuck.as_ref();
-        stuck.map_or_else(Vec::new, StuckPixels::pixels)
     }
 
     /// The stages that ran so far, and those that were skipped.

@@ -15,12 +15,12 @@ use crate::elasticity::modulus::{
     Estimate, LoadSeries, LoadState, ModulusEstimate, ModulusEstimator, Warning,
 };
 use crate::force::{
-    FaceReading, FaceWorkspace, ForceWorkspace, ReferenceFrame, TextureStretch, background_shift,
-    median_shift_outside, texture_spots,
+    FaceReading, FaceWorkspace, ForceWorkspace, ReferenceFrame, background_shift,
+    median_shift_outside,
 };
 use crate::matching::{MatchedPairs, Matching, WarmStart};
 use crate::tps::{Pairs, SeriesMemory, StrainSpline};
-use nalgebra::{Matrix3, Point2, Point3};
+use nalgebra::{Matrix3, Point3};
 use ndarray::ArrayView2;
 use std::sync::Arc;
 use std::time::Instant;
@@ -75,12 +75,6 @@ impl Stages {
             specimen,
             pipeline,
         }
-    }
-
-    /// The size of a pixel as the side of a square in metres.
-    pub fn pixel_m(&self) -> f64 {
-        let [hx, hy] = self.contact.pixel_size_m();
-        (hx * hy).sqrt()
     }
 
     /// Contact and force of a frame, into `contact`. A force that the stage does not know is the
@@ -352,36 +346,6 @@ impl Stages {
         bench.timed(Stage::Strain, |bench| {
             bench.strain.strain(&self.pipeline, frames, matched, strain)
         })
-    }
-
-    /// The stretch of a face between two frames from the material points of its texture.
-    pub fn texture(
-        &self,
-        bench: &mut Bench,
-        [from, to]: [usize; 2],
-        images: [ArrayView2<'_, u8>; 2],
-        contacts: [&FrameContact; 2],
-    ) -> Result<TextureStretch, PipelineError> {
-        bench
-            .timed(Stage::Match, |_| {
-                let (polarity, size) = (self.contact.polarity(), self.contact.pixel_size_m());
-                let one = |image, contact: &FrameContact| {
-                    let (reading, region) = (contact.reading?, contact.region?);
-                    let pair = [image, self.reference.image()];
-                    let spots = texture_spots(pair, region, contact.mask.view(), polarity, size);
-                    let [x, y] = reading.centroid_px.map(|c| c.value);
-                    let centre = Point2::new(x * size[0], y * size[1]);
-                    Some((spots, reading.face?.area_m2.value, centre))
-                };
-                let (model, before_m2, first) = one(images[0], contacts[0])?;
-                let (target, after_m2, last) = one(images[1], contacts[1])?;
-                let growth = (after_m2 / before_m2).sqrt();
-                let predict = |p: &Point2<f64>| last + growth * (p - first);
-                // Friction changes a stretch of 5 % by half: some pixels at the rim.
-                let reach_m = 4.0 * self.pixel_m();
-                TextureStretch::between([&model, &target], predict, reach_m)
-            })
-            .ok_or(PipelineError::NoTexture { from, to })
     }
 
     /// Young's modulus. An estimate that fails is timed too: it has looked at the data.

@@ -81,7 +81,6 @@ Examples, one for each subcommand:
   tactile match examples/data/cases.txt
   tactile warp examples/data/sources.csv examples/data/targets.csv examples/data/queries.csv
   tactile strain examples/data/before.csv examples/data/after.csv
-  tactile reconstruct examples/data/ball.pgm --light 0,0,1 --mask examples/data/ball.pgm
   tactile integrate examples/data/slope_x.csv examples/data/slope_y.csv
   tactile depth --reference examples/data/dark_reference.pgm --table examples/data/depth_table.csv \
                           --pixel-um 100 examples/data/dark_frame.pgm
@@ -107,7 +106,6 @@ enum Command {
     Match(match_points::MatchArguments),
     Warp(warp::WarpArguments),
     Strain(strain::StrainArguments),
-    Reconstruct(surfaces::ReconstructArguments),
     Integrate(surfaces::IntegrateArguments),
     Depth(depth::DepthArguments),
     Inclusion(inclusion::InclusionArguments),
@@ -127,7 +125,6 @@ impl Command {
             Self::Match(arguments) => match_points::run(arguments, context),
             Self::Warp(arguments) => warp::run(arguments, context),
             Self::Strain(arguments) => strain::run(arguments, context),
-            Self::Reconstruct(arguments) => surfaces::reconstruct(arguments, context),
             Self::Integrate(arguments) => surfaces::integrate(arguments, context),
             Self::Depth(arguments) => depth::run(arguments, context),
             Self::Inclusion(arguments) => inclusion::run(arguments, context),

@@ -346,7 +346,7 @@ fn remedy(flag: &Flag) -> &'static str {
         Flag::LightNotProportional { .. } => "Calibrate with more pairs, as a curve.",
         Flag::GaugeDisagrees { .. } => "Check the gauge's zero and the calibration.",
         Flag::UnlikelyStress { .. } => "Check the units of forces, light and pixels.",
-        Flag::Slip { .. } | Flag::FaceSticks { .. } => "Lubricate the face, or bond it.",
+        Flag::FaceSticks { .. } => "Lubricate the face, or bond it.",
         Flag::SampleRelaxes { .. } => "State the times of the frames, and hold the load.",
         Flag::SensorDrifts { .. } => "Take references between the frames.",
         _ => "Read the number with care: an assumption behind it does not hold.",

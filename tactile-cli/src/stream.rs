@@ -23,7 +23,7 @@ use tactile_files::io::Grey;
 use tactile_files::scene::Scene;
 use tactile_files::sensor::PhotometricPresses;
 use tactile_imaging::elasticity::modulus::ModulusEstimate;
-use tactile_imaging::force::{ChartState, Estimate};
+use tactile_imaging::force::Estimate;
 use tactile_imaging::pipeline::{Flag, FrameSource, PipelineError, Session, with_error};
 use tactile_simulate::{CalibrationRun, Camera, Gain, LoadCycle, PressLoad, PressOptions, Trial};
 
@@ -81,7 +81,7 @@ pub struct StreamArguments {
     /// gel is lit in colours.
     #[arg(long, value_name = "FILE.y4m")]
     record: Option<PathBuf>,
-    /// Show frame, force, modulus, surface and the sensor's health in browsers as they come. An
+    /// Show frame, force, modulus, and surface in browsers as they come. An
     /// address that other computers reach gets a token.
     #[arg(long, value_name = "ADDRESS:PORT", num_args = 0..=1,
           default_missing_value = "127.0.0.1:8642")]
@@ -263,10 +263,9 @@ impl Meter for Live {
     }
 
     fn surface(&mut self) -> Value {
-        let health = health_words(&self.session);
         // A frame without contact has no surface.
         let Ok(found) = self.session.surface() else {
-            return json!({ "health": health });
+            return json!({});
         };
         let name = match found.apparent {
             true => "apparent surface (the pressure, read as shading)",
@@ -274,7 +273,7 @@ impl Meter for Live {
         };
         let size = found.pixel_size_m.map(|m| 1e3 * m);
         let relief = HeightGrid::of(known_heights_mm(found).view(), size);
-        json!({ "name": name, "relief": relief, "health": health })
+        json!({ "name": name, "relief": relief })
     }
 }
 
@@ -341,29 +340,6 @@ fn finish(
         context.note(note);
     }
     Ok(exit)
-}
-
-/// The state of the sensor, as its background shows it.
-fn health_words(session: &Session) -> String {
-    let Some(health) = session.health() else {
-        return String::new();
-    };
-    let words = |state| match state {
-        ChartState::Learning => "not known yet",
-        ChartState::Healthy => "unchanged",
-        ChartState::Changed => "changed",
-        _ => "scatters too much to follow",
-    };
-    let stuck = match session.stuck_pixels().len() {
-        0 => String::new(),
-        count => format!(", {count} pixels stuck"),
-    };
-    format!(
-        "sensor: background {:.1} grey levels, brightness {}, noise {}{stuck}",
-        health.background_grey,
-        words(health.brightness),
-        words(health.noise),
-    )
 }
 
 /// Measures recorded frames: those of a scene, or images and folders of images.

@@ -17,7 +17,6 @@ use crate::error::ForceError;
 use crate::frame::{
     DifferenceNoise, FrameStatistics, PassWorkspace, ReferenceFrame, TILE_COLUMNS, Tiles,
 };
-use crate::health::FrameCondition;
 use crate::region::{Extent, NoiseWorkspace, Region, Run, Sums, gain, greatest};
 
 /// One contact. Its mask stays in the workspace.
@@ -230,33 +229,6 @@ impl DetectorWorkspace {
         let view =
             ArrayView2::from_shape((place.rows(), place.columns()), &self.region.pixels).ok()?;
         Some((place, view))
-    }
-
-    /// Brightness and noise of the last frame outside the contact, against the reference that it
-    /// was compared with. `None` if no frame of the reference's size was. From at most 1,500 tiles
-    /// of 8 × 32 pixels, evenly over the frame, or all of a smaller one: O(tiles).
-    ///
-    /// ```
-    /// use ndarray::Array2;
-    /// use tactile_force::{
-    ///     ContactDetector, ContactOptions, Detection, DetectorWorkspace, ReferenceFrame,
-    /// };
-    /// let reference = ReferenceFrame::new(Array2::from_elem((160, 160), 50_u8).view())?;
-    /// let mut workspace = DetectorWorkspace::default();
-    /// assert!(workspace.condition(&reference).is_none(), "no frame yet");
-    /// let dimmed = Array2::from_elem((160, 160), 49_u8);
-    /// let detector = ContactDetector::new(ContactOptions::default());
-    /// let _: Detection = detector.detect_with(&mut workspace, dimmed.view(), &reference)?;
-    /// let condition = workspace.condition(&reference).expect("a frame");
-    /// assert!((condition.brightness.value - 0.98).abs() < 1e-9);
-    /// # Ok::<(), tactile_force::ForceError>(())
-    /// ```
-    pub fn condition(&mut self, reference: &ReferenceFrame) -> Option<FrameCondition> {
-        let size = reference.image().dim();
-        let tiles = reference.tile_sums(&self.pass.tiles)?;
-        let step = FrameCondition::tile_step(self.pass.tiles.sums.len(), self.pass.tiles.columns);
-        let sd = reference.difference_variance().sqrt();
-        FrameCondition::of(size, tiles.step_by(step), sd, &mut self.drift)
     }
 
     /// The grey histogram of the last frame's contact over its aperture, each pixel covering

@@ -10,10 +10,9 @@
 //! | module | contents |
 //! |---|---|
 //! | `frame` | the pass over a frame, the reference, the noise of both, vignetting |
-//! | `face` | area and shape of flat faces, stretch of their texture |
+//! | `face` | area and shape of flat faces |
 //! | `drift` | drift of illumination and stray light since the reference was taken |
 //! | `contact` | detection, mask, aperture, sums over the aperture |
-//! | `health` | changes of a sensor since its calibration: brightness, noise, stuck pixels |
 //! | `profile` | the contact radius from the pressure profile |
 //! | `calibration` | pixel value to force and stress, (5) and (6): a line, a local curve f |
 //! | `measure`, `batch` | the force of one frame; of many |
@@ -43,7 +42,6 @@ mod drift;
 mod error;
 mod face;
 mod frame;
-mod health;
 mod lens;
 mod measure;
 mod profile;
@@ -60,11 +58,8 @@ pub use drift::{
     DriftCorrection, DriftOutcome, IlluminationDrift, background_shift, median_shift_outside,
 };
 pub use error::ForceError;
-pub use face::{FaceReading, FaceWorkspace, ShapeProblem, TextureStretch, texture_spots};
+pub use face::{FaceReading, FaceWorkspace, ShapeProblem};
 pub use frame::{DifferenceNoise, FlatField, FrameStatistics, NoiseModel, ReferenceFrame};
-pub use health::{
-    ChartState, FrameCondition, HealthMonitor, HealthOptions, HealthReport, StuckPixels,
-};
 pub use lens::{DotPair, LensFit, LensGeometry};
 pub use measure::{ForceMeasurement, ForceMeter, ForceOptions, ForceWorkspace, measure_force};
 pub use profile::{HertzFit, HertzFitOptions, ProfileShape};

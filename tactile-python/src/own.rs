@@ -164,31 +164,6 @@ impl SurfaceReconstruction<f64> for OwnStage {
     }
 }
 
-/// `integrate(slope_x, slope_y, mask, pixel_size)` returns heights in the unit of the pixel's size.
-impl SlopeIntegrator<f64> for OwnStage {
-    fn integrate(
-        &self,
-        p: ArrayView2<'_, f64>,
-        q: ArrayView2<'_, f64>,
-        domain: &Domain<'_, f64>,
-    ) -> Result<Surface<f64>, SfsError> {
-        let shape = p.dim();
-        let heights = Python::attach(|py| {
-            let answer = self.call(
-                py,
-                (
-                    PyArray2::from_array(py, &p),
-                    PyArray2::from_array(py, &q),
-                    PyArray2::from_owned_array(py, mask_of(domain, shape)),
-                    PyTuple::new(py, domain.pixel_size_m)?,
-                ),
-            )?;
-            self.heights(&answer, shape)
-        });
-        Ok(Surface::from_heights(heights.map_err(SfsError::custom)?))
-    }
-}
-
 /// `sample(heights, mask, pixel_size, count)` returns `count` points, (count, 3).
 impl ControlPointSampler<f64> for OwnStage {
     fn sample(

@@ -129,13 +129,9 @@ impl Object {
 /// control_points : int
 ///     Points that are matched.
 /// surface : str or object
-///     "eikonal", "tsai-shah", "brooks-horn", or `reconstruct(image, mask, pixel_size)`.
-/// integrator : str or object
-///     "of-reconstruction", "frankot-chellappa", "cosine-poisson", "masked-least-squares", or
-///     `integrate(slope_x, slope_y, mask, pixel_size)`.
+///     "eikonal", "tsai-shah", or `reconstruct(image, mask, pixel_size)`.
 /// sampler : str or object
-///     "contact", "equally-spaced", "curvature", "random", or
-///     `sample(heights, mask, pixel_size, count)`.
+///     "contact", "equally-spaced", or `sample(heights, mask, pixel_size, count)`.
 /// matcher, matcher_options : str or object, dict
 ///     As `match_points` takes them. The default search is that of near loads.
 /// warp : str or object
@@ -167,7 +163,7 @@ impl Pipeline {
     #[new]
     #[pyo3(signature = (
         object, *, pairs=None, sensor=None, depth_table=None, contact=None, pixel_size=None,
-        waveguide=None, control_points=200, surface=None, integrator=None, sampler=None,
+        waveguide=None, control_points=200, surface=None, sampler=None,
         matcher=None, matcher_options=None, warp=None, strain=None, estimator=None,
         flat_field=None, force_scale_error=None, coupling_error=None, length_scale_error=None,
         radius_error=None, poisson_ratio_error=None, adhesion_error=None
@@ -182,7 +178,6 @@ impl Pipeline {
         waveguide: Option<&Bound<'_, PyAny>>,
         control_points: usize,
         surface: Option<&Bound<'_, PyAny>>,
-        integrator: Option<&Bound<'_, PyAny>>,
         sampler: Option<&Bound<'_, PyAny>>,
         matcher: Option<&Bound<'_, PyAny>>,
         matcher_options: Option<&Bound<'_, PyDict>>,
@@ -198,13 +193,11 @@ impl Pipeline {
         adhesion_error: Option<f64>,
     ) -> PyResult<Self> {
         let (surface_name, own_surface) = stage("surface", "reconstruct", surface)?;
-        let (integrator_name, own_integrator) = stage("integrator", "integrate", integrator)?;
         let (sampler_name, own_sampler) = stage("sampler", "sample", sampler)?;
         let (warp_name, own_warp) = stage("warp", "fit", warp)?;
         let (estimator_name, own_estimator) = stage("estimator", "estimate", estimator)?;
         let config = StagesConfig {
             reconstruction: named(surface_name)?,
-            integrator: named(integrator_name)?,
             sampler: named(sampler_name)?,
             warp: named(warp_name)?,
             estimator: named::<EstimatorChoice>(estimator_name)?,
@@ -233,11 +226,6 @@ impl Pipeline {
         .with_matcher(matcher.boxed::<3>());
         if let Some(own) = own_surface {
             pipeline = pipeline.with_surface(own, SurfaceInput::Shading);
-        }
-        if let Some(own) = own_integrator {
-            pipeline = pipeline
-                .with_slope_integrator(own)
-                .map_err(errors::pipeline)?;
         }
         if let Some(own) = own_sampler {
             pipeline = pipeline.with_sampler(own);

@@ -11,7 +11,7 @@ use std::sync::{Arc, Mutex};
 use tactile_imaging as rust;
 use tactile_imaging::pipeline::{DarkContact, ReconstructionChoice, SurfaceInput};
 use tactile_imaging::sfs::{
-    BoundaryCondition, BrooksHorn, CosinePoisson, Domain, Eikonal, FrankotChellappa, Lighting,
+    BoundaryCondition, CosinePoisson, Domain, Eikonal, FrankotChellappa, Lighting,
     MaskedLeastSquares, SfsError, SlopeIntegrator, Surface, SurfaceReconstruction,
     SurfaceWorkspace, TsaiShah,
 };
@@ -28,8 +28,8 @@ use tactile_imaging::sfs::{
 ///     Direction to the light: x right, y down the image, z to the viewer. From the viewer where
 ///     it is None.
 /// method : str
-///     "eikonal", "tsai-shah" or "brooks-horn". By default "eikonal" under frontal light with a
-///     mask, else "brooks-horn".
+///     "eikonal" or "tsai-shah". By default "eikonal" under frontal light with a mask, else
+///     "tsai-shah".
 /// mask : (rows, columns) array of bool
 ///     True where there are heights. At its border they are zero ("eikonal").
 /// pixel_size : float or (x, y)
@@ -67,14 +67,11 @@ pub fn reconstruct<'py>(
     let frontal = (light.0, light.1) == (0.0, 0.0);
     let rimmed = frontal && mask.is_some();
     let choice = match method {
-        None if !rimmed => ReconstructionChoice::BrooksHorn,
+        None if !rimmed => ReconstructionChoice::TsaiShah,
         method => named(method)?,
     };
     let method: Box<dyn SurfaceReconstruction<f64> + Send + Sync> = match choice {
         ReconstructionChoice::TsaiShah => Box::new(TsaiShah::new(lighting)),
-        ReconstructionChoice::BrooksHorn => {
-            Box::new(BrooksHorn::new(lighting).with_occluding_boundary(rimmed))
-        }
         _ => {
             let rim = match mask.is_some() {
                 true => BoundaryCondition::Height(0.0),

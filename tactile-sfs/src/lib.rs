@@ -12,8 +12,6 @@
 //!
 //! - Lambert: $R = n \cdot s$ with $n = (-p, -q, 1)/\sqrt{1 + p^2 + q^2}$.
 //! - Eikonal, frontal light: $|\nabla z| = \sqrt{1/R^2 - 1}$. A few sweeps, O(N).
-//! - Brooks–Horn: least $\int (R - n \cdot s)^2 + \lambda |\nabla n|^2$ over unit normals. O(N log
-//!   N) a projection.
 //! - Slopes to heights, Poisson: $\Delta z = \partial p/\partial x + \partial q/\partial y$. By
 //!   cosine transform O(N log N), error $O(h^4)$.
 //! - Frankot–Chellappa: $\hat Z = -i (u \hat P + v \hat Q)/(u^2 + v^2)$, periodic. O(N log N).
@@ -30,10 +28,10 @@ mod error;
 mod frame;
 mod integrate;
 mod lighting;
-mod quality;
 mod reconstruct;
 mod sample;
 mod scalar;
+mod slopes;
 mod surface;
 mod workspace;
 
@@ -44,15 +42,12 @@ pub use error::SfsError;
 pub use frame::Frame;
 pub use integrate::{CosinePoisson, FrankotChellappa, MaskedLeastSquares, SlopeIntegrator};
 pub use lighting::Lighting;
-pub use quality::{
-    Alignment, ErrorSummary, HeightError, height_error, render, reprojection, slopes,
-};
 pub use reconstruct::{
-    BallCalibration, BoundaryCondition, BrooksHorn, DepthTable, Eikonal, EikonalBranch, Signal,
-    SurfaceReconstruction, TsaiShah,
+    BoundaryCondition, DepthTable, Eikonal, EikonalBranch, Signal, SurfaceReconstruction, TsaiShah,
 };
-pub use sample::{ContactSampler, ControlPointSampler, CurvatureAdaptive, EquallySpaced, Random};
+pub use sample::{ContactSampler, ControlPointSampler, EquallySpaced};
 pub use scalar::PixelScalar;
+pub use slopes::slopes;
 pub use surface::{Component, PixelFlags, Surface, SurfaceReport};
 pub use tactile_core::{BoundingBox, CustomError, InvalidOption, Progress, StopReason};
 pub use workspace::SurfaceWorkspace;

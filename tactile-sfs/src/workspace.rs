@@ -19,8 +19,8 @@ type Callback = Box<dyn FnMut(Progress) -> ControlFlow<()> + Send + Sync>;
 /// use core::ops::ControlFlow;
 /// use ndarray::Array2;
 /// use tactile_sfs::{
-///     BrooksHorn, Domain, Frame, Lighting, Progress, Surface, SurfaceReconstruction,
-///     SurfaceWorkspace,
+///     Domain, Frame, Lighting, Progress, Surface, SurfaceReconstruction, SurfaceWorkspace,
+///     TsaiShah,
 /// };
 /// let (send, receive) = std::sync::mpsc::channel();
 /// let mut workspace = SurfaceWorkspace::default();
@@ -29,7 +29,7 @@ type Callback = Box<dyn FnMut(Progress) -> ControlFlow<()> + Send + Sync>;
 ///     Err(_) => ControlFlow::Break(()), // the receiver is gone
 /// });
 /// let image = Array2::from_elem((8, 8), 0.9);
-/// let method = BrooksHorn::new(Lighting::default()).with_iterations(20, 5)?;
+/// let method = TsaiShah::new(Lighting::default()).with_iterations(20)?;
 /// method.reconstruct_with(
 ///     &mut workspace,
 ///     Frame::Real(image.view()),
@@ -45,7 +45,6 @@ pub struct SurfaceWorkspace<T> {
     pub(crate) eikonal: crate::reconstruct::EikonalBuffers<T>,
     pub(crate) profile: crate::reconstruct::ProfileBuffers<T>,
     pub(crate) field: crate::reconstruct::FieldBuffers<T>,
-    pub(crate) slopes: crate::reconstruct::SlopeBuffers<T>,
     pub(crate) poisson: crate::integrate::PoissonBuffers,
     pub(crate) fourier: crate::integrate::FourierBuffers,
     pub(crate) masked: crate::integrate::MaskedBuffers,

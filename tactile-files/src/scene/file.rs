@@ -16,7 +16,7 @@ use tactile_imaging::elasticity::contact::{ContactTable, Layer, Waveguide};
 #[cfg(feature = "fem")]
 use tactile_imaging::fem::{TableOptions, TableProgress};
 use tactile_imaging::pipeline::{
-    CheckPress, CheckedObject, EstimatorChoice, IntegratorChoice, KnownBall, MatcherChoice, Object,
+    CheckPress, CheckedObject, EstimatorChoice, KnownBall, MatcherChoice, Object,
     ReconstructionChoice, SamplerChoice, Settings, StagesConfig, StrainChoice, WarpChoice,
 };
 
@@ -582,7 +582,6 @@ struct StagesTable {
     #[serde(default)]
     as_printed: bool,
     reconstruction: Option<ReconstructionChoice>,
-    integrator: Option<IntegratorChoice>,
     sampler: Option<SamplerChoice>,
     matcher: Option<MatcherChoice>,
     warp: Option<WarpChoice>,
@@ -623,23 +622,10 @@ impl SceneFile {
         }
         let stages = self.stages.choices();
         // A stage that is named but would not run is a misunderstanding of the file.
-        let unused = match calibration {
-            CalibrationSource::DepthTable(_) if self.stages.reconstruction.is_some() => {
-                Some(("stages.reconstruction", "the depth table makes the surface"))
-            }
-            CalibrationSource::DepthTable(_) if self.stages.integrator.is_some() => {
-                Some(("stages.integrator", "the depth table makes the surface"))
-            }
-            _ if stages.integrator != IntegratorChoice::default()
-                && stages.reconstruction != ReconstructionChoice::BrooksHorn =>
-            {
-                let reason = "only the reconstruction \"brooks-horn\" integrates slopes";
-                Some(("stages.integrator", reason))
-            }
-            _ => None,
-        };
-        if let Some((field, reason)) = unused {
-            return Err(error(field, &format!("expected none: {reason}")));
+        let by_table = matches!(calibration, CalibrationSource::DepthTable(_));
+        if by_table && self.stages.reconstruction.is_some() {
+            let reason = "expected none: the depth table makes the surface";
+            return Err(error("stages.reconstruction", reason));
         }
         // The sensor file has the pixel size, and its curve allows for the drift of the lamps.
         let has_sensor = self.sensor.is_some();
@@ -777,7 +763,6 @@ impl StagesTable {
         };
         StagesConfig {
             reconstruction: self.reconstruction.unwrap_or(others.reconstruction),
-            integrator: self.integrator.unwrap_or(others.integrator),
             sampler: self.sampler.unwrap_or(others.sampler),
             matcher: self.matcher.unwrap_or(others.matcher),
             warp: self.warp.unwrap_or(others.warp),

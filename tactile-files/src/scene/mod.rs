@@ -58,7 +58,6 @@
 //!
 //! [stages]                               # each by name, here the defaults
 //! reconstruction = "eikonal"             # ReconstructionChoice, not with a depth table
-//! integrator = "of-reconstruction"       # IntegratorChoice, for "brooks-horn" alone
 //! sampler = "contact"                    # SamplerChoice
 //! matcher = "annealed-softassign"        # MatcherChoice
 //! warp = "thin-plate-spline"             # WarpChoice

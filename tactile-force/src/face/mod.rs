@@ -24,15 +24,12 @@
 //! pressure follows the material. Friction, slip and tilt change them.
 //!
 //! # Stretch
-//! The lateral stretch between two loads is √(A₂/A₁), from the outline. A textured face has
-//! material points, whose stretch is a second measurement ([`TextureStretch`]).
+//! The lateral stretch between two loads is √(A₂/A₁), from the outline.
 
 mod area;
-mod texture;
 
 pub use area::FaceWorkspace;
 use tactile_core::Estimate;
-pub use texture::{TextureStretch, texture_spots};
 
 /// The contact of a flat face in one frame.
 ///

@@ -5,7 +5,6 @@ mod batch;
 mod blob;
 mod calibration;
 mod frame_statistics;
-mod health;
 mod illumination;
 mod lens;
 mod no_allocation;

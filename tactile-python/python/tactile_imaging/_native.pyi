@@ -55,11 +55,6 @@ class _Matcher(Protocol):
 class _Reconstruction(Protocol):
     def reconstruct(self, image: _Floats, mask: _Mask, pixel_size: _PixelSize, /) -> ArrayLike: ...
 
-class _Integrator(Protocol):
-    def integrate(
-        self, slope_x: _Floats, slope_y: _Floats, mask: _Mask, pixel_size: _PixelSize, /
-    ) -> ArrayLike: ...
-
 class _Sampler(Protocol):
     def sample(
         self, heights: _Floats, mask: _Mask, pixel_size: _PixelSize, count: int, /
@@ -338,7 +333,6 @@ class Pipeline:
         waveguide: ArrayLike | None = None,
         control_points: int = 200,
         surface: str | _Reconstruction | None = None,
-        integrator: str | _Integrator | None = None,
         sampler: str | _Sampler | None = None,
         matcher: str | _Matcher | None = None,
         matcher_options: Mapping[str, Any] | None = None,

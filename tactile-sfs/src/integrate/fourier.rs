@@ -93,18 +93,6 @@ impl<T: PixelScalar> SlopeIntegrator<T> for FrankotChellappa {
 const LANES: usize = 8;
 
 impl FourierBuffers {
-    /// Heights, row by row, of a box of slopes `[p, q]`.
-    pub(crate) fn integrate_slopes(
-        &mut self,
-        shape: (usize, usize),
-        pixel_size: [f64; 2],
-        slopes: impl Iterator<Item = [f64; 2]>,
-    ) -> &[f64] {
-        self.field.clear();
-        self.field.extend(slopes.map(|[p, q]| Complex::new(p, q)));
-        self.integrate(shape, pixel_size)
-    }
-
     /// Integrates the field p + i q.
     fn integrate(&mut self, (rows, columns): (usize, usize), pixel_size: [f64; 2]) -> &[f64] {
         let planned = self.plans.take();

@@ -1,24 +1,18 @@
 //! One image to heights: the trait and its implementations.
 
-mod ball_calibration;
-mod brooks_horn;
 mod depth_table;
 mod eikonal;
 mod tsai_shah;
 
 use std::sync::Arc;
 
-pub use ball_calibration::BallCalibration;
-pub use brooks_horn::BrooksHorn;
-pub(crate) use brooks_horn::SlopeBuffers;
 pub use depth_table::{DepthTable, Signal};
 pub use eikonal::{BoundaryCondition, Eikonal, EikonalBranch};
 pub(crate) use eikonal::{EikonalBuffers, ProfileBuffers};
 pub use tsai_shah::TsaiShah;
 
 use crate::{
-    Domain, Frame, Lighting, PixelFlags, PixelScalar, SfsError, SlopeIntegrator, Surface,
-    SurfaceWorkspace,
+    Domain, Frame, Lighting, PixelFlags, PixelScalar, SfsError, Surface, SurfaceWorkspace,
 };
 
 /// A way from one image to a surface.
@@ -85,47 +79,6 @@ pub trait SurfaceReconstruction<T: PixelScalar> {
         *surface = self.reconstruct(frame, domain)?;
         Ok(())
     }
-
-    /// The same method with its slopes made into heights by `integrator`.
-    ///
-    /// `None`, the default, for a method that goes from the image to heights without slopes. Of the
-    /// methods here [`BrooksHorn`] has slopes.
-    ///
-    /// ```
-    /// use std::sync::Arc;
-    /// use ndarray::Array2;
-    /// use tactile_sfs::{
-    ///     BrooksHorn, Domain, Eikonal, Lighting, MaskedLeastSquares, SurfaceReconstruction,
-    /// };
-    /// // A hemisphere of radius 10 px. Least squares over the mask alone do not take its
-    /// // surroundings as flat.
-    /// let z = Array2::from_shape_fn((25, 25), |(r, c)| {
-    ///     (100.0 - (r as f64 - 12.0).powi(2) - (c as f64 - 12.0).powi(2)).max(0.0).sqrt()
-    /// });
-    /// let (image, mask) = (z.mapv(|z| z / 10.0), z.mapv(|z| z > 0.0));
-    /// let domain = Domain::default().with_mask(mask.view());
-    /// let fourier = BrooksHorn::new(Lighting::default()).with_occluding_boundary(true);
-    /// let integrator = Arc::new(MaskedLeastSquares::default());
-    /// let masked = fourier.with_slope_integrator(integrator).expect("slopes");
-    /// let rise = |heights: &Array2<f64>| heights[[12, 12]] - heights[[12, 5]];
-    /// let error = |heights: &Array2<f64>| (rise(heights) / rise(&z) - 1.0).abs();
-    /// let [periodic, least_squares] = [
-    ///     fourier.reconstruct(image.view().into(), &domain)?.heights,
-    ///     masked.reconstruct(image.view().into(), &domain)?.heights,
-    /// ];
-    /// assert!(error(&least_squares) < 0.1 && error(&least_squares) < error(&periodic));
-    /// // The eikonal equation is solved for heights: there are no slopes to integrate.
-    /// let eikonal = Eikonal::<f64>::new(Lighting::default());
-    /// assert!(eikonal.with_slope_integrator(Arc::new(MaskedLeastSquares::default())).is_none());
-    /// # Ok::<(), tactile_sfs::SfsError>(())
-    /// ```
-    fn with_slope_integrator(
-        &self,
-        integrator: Arc<dyn SlopeIntegrator<T> + Send + Sync>,
-    ) -> Option<Arc<dyn SurfaceReconstruction<T> + Send + Sync>> {
-        let _ = integrator;
-        None
-    }
 }
 
 /// A shared method is one, as trait objects need it.
@@ -147,13 +100,6 @@ impl<T: PixelScalar, M: SurfaceReconstruction<T> + ?Sized> SurfaceReconstruction
     ) -> Result<(), SfsError> {
         (**self).reconstruct_with(workspace, frame, domain, surface)
     }
-
-    fn with_slope_integrator(
-        &self,
-        integrator: Arc<dyn SlopeIntegrator<T> + Send + Sync>,
-    ) -> Option<Arc<dyn SurfaceReconstruction<T> + Send + Sync>> {
-        (**self).with_slope_integrator(integrator)
-    }
 }
 
 /// The image of a box as reflectance, and the fields that iterate over it.
@@ -165,9 +111,6 @@ pub(crate) struct FieldBuffers<T> {
     heights: Vec<T>,
     variance: Vec<T>,
     next_heights: Vec<T>,
-    /// Unit normals and their next values.
-    normals: Vec<[T; 3]>,
-    next: Vec<[T; 3]>,
     /// Heights to be written to the surface.
     written: Vec<f64>,
 }

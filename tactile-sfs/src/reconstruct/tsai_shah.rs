@@ -16,8 +16,7 @@
 //!   preferred.
 //!
 //! It is a local method: a few iterations write the fine relief on the start, and the large shape
-//! remains that of the start. The eikonal method is better wherever a height is known, Brooks–Horn
-//! where none is.
+//! remains that of the start. The eikonal method is better wherever a height is known.
 
 use super::FieldBuffers;
 use crate::integrate::write_levelled;

@@ -11,11 +11,10 @@ use std::sync::Arc;
 
 use nalgebra::Point3;
 use ndarray::ArrayView2;
-use tactile_core::Requirement;
 
 pub use contact::ContactSampler;
 
-use crate::quality::slopes_at;
+use crate::slopes::slopes_at;
 use crate::{BoundingBox, Domain, PixelScalar, SfsError, SurfaceWorkspace};
 
 /// A way to choose control points on a surface.
@@ -62,14 +61,14 @@ pub trait ControlPointSampler<T: PixelScalar> {
     ///
     /// ```
     /// use ndarray::Array2;
-    /// use tactile_sfs::{ControlPointSampler, Domain, Random, SurfaceWorkspace};
+    /// use tactile_sfs::{ControlPointSampler, Domain, EquallySpaced, SurfaceWorkspace};
     /// let (z, mut workspace, mut points) = (
     ///     Array2::<f64>::zeros((9, 9)),
     ///     SurfaceWorkspace::default(),
     ///     Vec::new(),
     /// );
     /// for count in [20, 5] {
-    ///     Random { seed: 1 }.sample_with(
+    ///     EquallySpaced.sample_with(
     ///         &mut workspace,
     ///         z.view(),
     ///         &Domain::default(),
@@ -137,10 +136,6 @@ pub(crate) struct SampleBuffers {
     squares: Vec<f64>,
     /// Weights of the lattice's nodes.
     weight: Vec<f64>,
-    /// The key of each node that is drawn.
-    keys: Vec<(f64, usize)>,
-    /// Curvature at the nodes.
-    curvatures: Vec<f64>,
     strips: Strips,
     pixels: Vec<[usize; 2]>,
 }
@@ -240,175 +235,6 @@ fn at_centroids<T: PixelScalar>(
     pixels.windows(2).all(|pair| pair[0] != pair[1])
 }
 
-/// Control points whose density grows with curvature: density ∝ 1 + emphasis · √(κ/κ̄). Here κ is
-/// the root of the sum of squares of the second derivatives and κ̄ its mean (the root because a
-/// linear interpolant's error goes as κ · spacing²).
-///
-/// ```
-/// use ndarray::Array2;
-/// use tactile_sfs::{ControlPointSampler, CurvatureAdaptive, Domain};
-/// // Flat on the left, wavy on the right.
-/// let z = Array2::from_shape_fn(
-///     (60, 80),
-///     |(_, c)| if c < 40 { 0.0 } else { (c as f64 * 0.5).sin() },
-/// );
-/// let points = CurvatureAdaptive::new(4.0)?.sample(z.view(), &Domain::default(), 60)?;
-/// let right = points.iter().filter(|p| p.x >= 40.0).count();
-/// assert!(right > 40);
-/// # Ok::<(), tactile_sfs::SfsError>(())
-/// ```
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct CurvatureAdaptive {
-    emphasis: f64,
-}
-
-impl CurvatureAdaptive {
-    /// The sampler. Emphasis 0 is equal spacing.
-    ///
-    /// # Errors
-    /// [`SfsError::InvalidOption`] unless finite and not negative.
-    pub fn new(emphasis: f64) -> Result<Self, SfsError> {
-        Requirement::NonNegative.check("emphasis", emphasis)?;
-        Ok(Self { emphasis })
-    }
-}
-
-impl<T: PixelScalar> ControlPointSampler<T> for CurvatureAdaptive {
-    fn sample(
-        &self,
-        heights: ArrayView2<'_, T>,
-        domain: &Domain<'_, T>,
-        count: usize,
-    ) -> Result<Vec<Point3<T>>, SfsError> {
-        made_by(|workspace, points| self.sample_with(workspace, heights, domain, count, points))
-    }
-
-    fn sample_with(
-        &self,
-        workspace: &mut SurfaceWorkspace<T>,
-        heights: ArrayView2<'_, T>,
-        domain: &Domain<'_, T>,
-        count: usize,
-        points: &mut Vec<Point3<T>>,
-    ) -> Result<(), SfsError> {
-        points.clear();
-        let buffers = &mut workspace.points;
-        let weight = core::mem::take(&mut buffers.weight);
-        let mut lattice = Lattice::sparse(heights, domain, count, weight)?;
-        let step = domain.pixel_size_m.map(T::as_f64);
-        let curvatures = &mut buffers.curvatures;
-        curvatures.clear();
-        curvatures.extend(
-            lattice
-                .nodes()
-                .map(|node| curvature(heights, lattice.pixel(node), step)),
-        );
-        let mean = curvatures.iter().sum::<f64>() / curvatures.len() as f64;
-        if mean > 0.0 {
-            let nodes = lattice.weight.iter_mut().filter(|weight| **weight > 0.0);
-            for (weight, curvature) in nodes.zip(curvatures) {
-                // Relative to the mean, so that the emphasis has no unit.
-                *weight *= 1.0 + self.emphasis * (*curvature / mean).sqrt();
-            }
-        }
-        spread(&lattice, count, buffers, points);
-        buffers.weight = lattice.weight;
-        Ok(())
-    }
-}
-
-/// Root of the sum of squares of the second derivatives that can be formed.
-fn curvature<T: PixelScalar>(
-    z: ArrayView2<'_, T>,
-    [row, column]: [usize; 2],
-    [hx, hy]: [f64; 2],
-) -> f64 {
-    let here = z[[row, column]].as_f64();
-    let second = |a: [usize; 2], b: [usize; 2], h: f64| -> f64 {
-        match (z.get(a), z.get(b)) {
-            (Some(a), Some(b)) if a.is_finite() && b.is_finite() => {
-                (a.as_f64() - 2.0 * here + b.as_f64()) / (h * h)
-            }
-            _ => 0.0,
-        }
-    };
-    let (left, above) = (column.wrapping_sub(1), row.wrapping_sub(1));
-    second([row, left], [row, column + 1], hx).hypot(second([above, column], [row + 1, column], hy))
-}
-
-/// Random control points: every pixel is drawn with a probability proportional to the surface area
-/// over it, without repetition. The same seed gives the same points on every platform and in every
-/// version of the library: the generator (SplitMix64) is part of this crate for that reason.
-/// O(pixels + count log count).
-///
-/// ```
-/// use ndarray::Array2;
-/// use tactile_sfs::{ControlPointSampler, Domain, Random};
-/// let flat = Array2::<f32>::zeros((20, 20));
-/// let a = Random { seed: 7 }.sample(flat.view(), &Domain::default(), 50)?;
-/// assert_eq!(a, Random { seed: 7 }.sample(flat.view(), &Domain::default(), 50)?);
-/// assert_ne!(a, Random { seed: 8 }.sample(flat.view(), &Domain::default(), 50)?);
-/// # Ok::<(), tactile_sfs::SfsError>(())
-/// ```
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Random {
-    /// The seed.
-    pub seed: u64,
-}
-
-impl<T: PixelScalar> ControlPointSampler<T> for Random {
-    fn sample(
-        &self,
-        heights: ArrayView2<'_, T>,
-        domain: &Domain<'_, T>,
-        count: usize,
-    ) -> Result<Vec<Point3<T>>, SfsError> {
-        made_by(|workspace, points| self.sample_with(workspace, heights, domain, count, points))
-    }
-
-    fn sample_with(
-        &self,
-        workspace: &mut SurfaceWorkspace<T>,
-        heights: ArrayView2<'_, T>,
-        domain: &Domain<'_, T>,
-        count: usize,
-        points: &mut Vec<Point3<T>>,
-    ) -> Result<(), SfsError> {
-        points.clear();
-        let buffers = &mut workspace.points;
-        let weight = core::mem::take(&mut buffers.weight);
-        let lattice = Lattice::dense(heights, domain, count, weight)?;
-        // The `count` least of exponential variates with rates = areas are a draw without
-        // repetition (Efraimidis & Spirakis 2006).
-        let mut state = self.seed;
-        let mut key = |node: usize| -(1.0 - unit(&mut state)).ln() / lattice.weight[node];
-        let keys = &mut buffers.keys;
-        keys.clear();
-        keys.extend(lattice.nodes().map(|node| (key(node), node)));
-        let order = |a: &(f64, usize), b: &(f64, usize)| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1));
-        if count < keys.len() {
-            keys.select_nth_unstable_by(count, order);
-            keys.truncate(count);
-        }
-        keys.sort_unstable_by(order);
-        points.extend(
-            keys.iter()
-                .map(|&(_, node)| lattice.point(lattice.pixel(node))),
-        );
-        buffers.weight = lattice.weight;
-        Ok(())
-    }
-}
-
-/// Uniform in [0, 1): SplitMix64 (Steele, Lea & Flood 2014), the upper 53 bits.
-fn unit(state: &mut u64) -> f64 {
-    *state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
-    let mut z = *state;
-    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
-}
-
 /// Nodes per point the areas are measured with, if the surface filled its box. With every pixel of
 /// most surfaces points follow a surface that grows or moves to a hundredth of a pixel, with every
 /// other pixel to a third.
@@ -430,27 +256,15 @@ struct Lattice<'s, 'd, T> {
     columns: usize,
     /// Rows of nodes.
     rows: usize,
-    /// Area of the surface over the node's pixels per area of the pixels, times any density. 0
-    /// where there is no node.
+    /// Area of the surface over the node's pixels per area of the pixels. 0 where there is no node.
     weight: Vec<f64>,
     /// Nodes that lie on the surface.
     count: usize,
 }
 
 impl<'s, 'd, T: PixelScalar> Lattice<'s, 'd, T> {
-    /// All pixels. `weight` is a buffer to be used again.
-    fn dense(
-        surface: ArrayView2<'s, T>,
-        domain: &Domain<'d, T>,
-        points: usize,
-        weight: Vec<f64>,
-    ) -> Result<Self, SfsError> {
-        let area = domain.bounding_box(surface.dim())?;
-        Self::with_stride(surface, *domain, area, 1, weight).enough_for(points)
-    }
-
     /// As few pixels as measure the spacing of `points` well, all of them if there is no room to
-    /// move.
+    /// move. `weight` is a buffer to be used again.
     fn sparse(
         surface: ArrayView2<'s, T>,
         domain: &Domain<'d, T>,

@@ -96,28 +96,6 @@ proptest! {
     }
 }
 
-#[test]
-fn errors_worked_out_by_hand() {
-    let (found, truth) = (array![[1.0, 2.0, f64::NAN]], array![[4.0, 2.0, 0.0]]);
-    let compare = |found: &Array2<f64>| {
-        height_error(found.view(), truth.view(), None, Alignment::None).map(|e| e.error)
-    };
-    let error = compare(&found).unwrap();
-    assert_eq!(
-        (error.pixels, error.mean_absolute, error.max),
-        (2, 1.5, 3.0)
-    );
-    assert!((error.rms - 4.5f64.sqrt()).abs() < 1e-15);
-    assert!(matches!(
-        compare(&Array2::zeros((2, 3))),
-        Err(SfsError::ShapeMismatch { .. })
-    ));
-    assert!(matches!(
-        compare(&array![[f64::NAN; 3]]),
-        Err(SfsError::EmptyMask)
-    ));
-}
-
 /// Exchanging rows and columns, and slopes and pixel sizes with them, exchanges those of the
 /// heights: also in lines of every short length, for most of which the transform needs no space of
 /// its own.

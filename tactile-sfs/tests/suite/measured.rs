@@ -2,7 +2,7 @@
 //! are not there.
 #![allow(clippy::print_stdout)]
 
-use crate::common::{errors, from_rim};
+use crate::common::{Alignment, errors, from_rim, height_error};
 use ndarray::Array2;
 use tactile_sfs::*;
 use test_support::published as data;
@@ -59,10 +59,10 @@ fn survey_vase_from_its_rim() {
     let domain = Domain::default().with_mask(mask.view());
     let surface = from_rim(light).reconstruct(image.view().into(), &domain);
     let heights = surface.unwrap().heights;
-    let error = height_error(heights.view(), z.view(), None, Alignment::None).unwrap();
+    let error = height_error(heights.view(), z.view(), Alignment::None);
     println!("vase, 8 bits, rim at 0: {error:?}");
     assert!((error.range - 36.2).abs() < 0.1 && error.constant_guess > 7.0);
-    assert!(error.error.mean_absolute < 0.6);
+    assert!(error.mean_absolute < 0.6);
 }
 
 #[test]
@@ -86,9 +86,6 @@ const PIXEL: f64 = 0.051_015_1e-3;
 const CENTRE: [f64; 2] = [243.9, 188.5];
 const CONTACT: f64 = 67.6 * PIXEL;
 const BALL: f64 = 4e-3;
-
-/// Centre in pixels and radius in metres.
-type Circle = ([f64; 2], f64);
 
 /// A ball pressed into the gel of 9DTact, and the cap that it makes.
 struct PressedBall {
@@ -118,55 +115,11 @@ impl PressedBall {
         })
     }
 
-    /// A table calibrated on the ball: on a known circle within a mask, or on the contact found at
-    /// a threshold.
-    fn calibrated(
-        &self,
-        known: Option<(&Array2<bool>, Circle)>,
-        threshold: f64,
-    ) -> BallCalibration<f64> {
-        let mut domain = Domain::new([PIXEL, PIXEL]).unwrap();
-        if let Some((mask, _)) = known {
-            domain = domain.with_mask(mask.view());
-        }
-        let circle = known.map(|(_, circle)| circle);
-        let frame = Frame::Real(self.pressed.view());
-        let signal = self.signal.clone();
-        DepthTable::from_ball(frame, signal, &domain, BALL, threshold, circle).unwrap()
-    }
-
-    /// Error of each half of the stated circle by a table of the other half, calibrated on the
-    /// circle found at a threshold: as it is, and zeroed.
-    fn held_out(&self, threshold: f64) -> [f64; 2] {
-        let found = self.calibrated(None, threshold);
-        let circle = (found.centre_px, found.contact_radius_m);
-        let halves = [0, 1].map(|half| {
-            let table = self
-                .calibrated(Some((&self.sectors(half), circle)), threshold)
-                .table
-                .with_contact_threshold(threshold)
-                .unwrap();
-            let zeroed = table.clone().zeroed().unwrap();
-            [table, zeroed].map(|table| self.error(&table, &self.sectors(1 - half)))
-        });
-        [0, 1].map(|table| 0.5 * (halves[0][table] + halves[1][table]))
-    }
-
     /// Mean absolute error of a table's surface within a mask, in metres.
     fn error(&self, table: &DepthTable<f64>, mask: &Array2<bool>) -> f64 {
         let domain = Domain::new([PIXEL, PIXEL]).unwrap().with_mask(mask.view());
         let surface = table.reconstruct(self.pressed.view().into(), &domain);
         errors(&surface.unwrap(), &self.cap, Alignment::None).mean_absolute
-    }
-
-    /// The contact circle's even or odd sixteenths.
-    fn sectors(&self, half: usize) -> Array2<bool> {
-        Array2::from_shape_fn(self.pressed.dim(), |(row, column)| {
-            let angle =
-                (row as f64 - CENTRE[1]).atan2(column as f64 - CENTRE[0]) / core::f64::consts::TAU;
-            let sector = (((angle + 0.5) * 16.0) as usize).min(15);
-            self.inside[(row, column)] && sector % 2 == half
-        })
     }
 }
 
@@ -183,56 +136,10 @@ fn makers_table() -> Option<DepthTable<f64>> {
 }
 
 #[test]
-fn ball_of_9dtact() {
+fn ball_of_9dtact_by_the_makers_table() {
     let (Some(ball), Some(makers)) = (PressedBall::read(), makers_table()) else {
         return;
     };
-    // Each sixteenth of the circle from a table calibrated on the others.
-    let mut sum = 0.0;
-    for half in 0..2 {
-        let fitted = ball.calibrated(Some((&ball.sectors(half), (CENTRE, CONTACT))), 3.0);
-        let held_out = ball.error(&fitted.table, &ball.sectors(1 - half));
-        println!(
-            "ball, calibrated on half {half}: {:.4} mm on the other",
-            1e3 * held_out
-        );
-        sum += 0.5 * held_out;
-    }
-    assert!(sum < 0.04e-3, "{sum}");
-
-    // For comparison: the makers' circle has 67 px, the stated one 67.6, which is 0.051 mm of
-    // depth.
-    let makers = makers.with_signal(ball.signal.clone());
-    println!(
-        "ball, makers' table: {:.4} mm",
-        1e3 * ball.error(&makers, &ball.inside)
-    );
-
-    let found = ball.calibrated(None, 3.0);
-    println!(
-        "ball, found: {:?} px, {:.3} mm",
-        found.centre_px,
-        1e3 * found.contact_radius_m
-    );
-}
-
-/// Nothing of the stated circle is known: the contact is found at a threshold, and the zero is that
-/// of the signal.
-#[test]
-fn ball_of_9dtact_found_at_any_threshold() {
-    let (Some(ball), Some(makers)) = (PressedBall::read(), makers_table()) else {
-        return;
-    };
-    for threshold in [2.0, 4.0, 8.0] {
-        let [raw, zeroed] = ball.held_out(threshold);
-        println!(
-            "ball, contact found at {threshold}: {:.4} mm, zeroed {:.4} mm",
-            1e3 * raw,
-            1e3 * zeroed
-        );
-        // The makers' published figure; noise alone, with the stated circle, is 0.030 mm.
-        assert!(zeroed < 0.0462e-3 && zeroed < raw, "{raw}, {zeroed}");
-    }
     // The makers measured theirs on this image, on a circle whose radius and centre they rounded
     // down to pixels.
     let zeroed = makers
@@ -241,7 +148,7 @@ fn ball_of_9dtact_found_at_any_threshold() {
         .and_then(DepthTable::zeroed)
         .unwrap();
     let error = ball.error(&zeroed, &ball.inside);
-    println!("ball, makers' table zeroed: {:.4} mm", 1e3 * error);
+    // The makers' published figure. Noise alone is 0.030 mm.
     assert!(error < 0.0462e-3, "{error}");
 }
 
@@ -261,9 +168,9 @@ fn tsai_shah_errors(
             .reconstruct(image.view().into(), &domain)
             .unwrap();
         let heights = surface.heights.view();
-        let error = |alignment| height_error(heights, z.view(), None, alignment).unwrap();
+        let error = |alignment| height_error(heights, z.view(), alignment);
         let (offset, affine) = (error(Alignment::Offset), error(Alignment::Affine));
-        let errors = [offset.error.mean_absolute, affine.error.mean_absolute];
+        let errors = [offset.mean_absolute, affine.mean_absolute];
         let [a, b] = errors;
         println!(
             "tsai-shah, {name}, {light:?}: {a:.2} px, scaled by {:.2} {b:.2} px",
@@ -366,8 +273,7 @@ fn surfaces_from_the_heights_of_their_singular_points() {
             };
             let informed = masked.with_known_heights(known.view());
             let eikonal = error(&Eikonal::new(lighting), &informed, Alignment::None);
-            let brooks_horn = error(&BrooksHorn::new(lighting), &masked, Alignment::Offset);
-            println!("{name}, {light:?}: eikonal {eikonal:.2} px, Brooks–Horn {brooks_horn:.2} px");
+            println!("{name}, {light:?}: eikonal {eikonal:.2} px");
             // Under frontal light: a constant has 7.4 px on the vase and more on the bust.
             assert!(light[0] > 0.0 || eikonal < 1.15, "{name}: {eikonal}");
         }

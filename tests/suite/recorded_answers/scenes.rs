@@ -152,15 +152,8 @@ fn stages_by_name(answers: &mut Answers) {
         set(&mut config);
         configs.push((name, config));
     };
-    for choice in [
-        ReconstructionChoice::TsaiShah,
-        ReconstructionChoice::BrooksHorn,
-    ] {
-        choose(choice.into(), &|config| config.reconstruction = choice);
-    }
-    for choice in [SamplerChoice::Curvature, SamplerChoice::Random] {
-        choose(choice.into(), &|config| config.sampler = choice);
-    }
+    let surface = ReconstructionChoice::TsaiShah;
+    choose(surface.into(), &|config| config.reconstruction = surface);
     for choice in [
         MatcherChoice::RelaxationLabelling,
         MatcherChoice::CoherentPointDrift,

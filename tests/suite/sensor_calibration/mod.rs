@@ -1,6 +1,5 @@
 //! A sensor calibrated from frames, and moduli measured with it.
 #![allow(clippy::print_stdout)]
-mod health;
 mod sensors;
 mod uncalibrated;
 

@@ -13,8 +13,6 @@ use std::path::Path;
 const IMAGES: [&str; 7] = [
     "force --reference @ --pairs calibration.csv --pixel-um 40 frame_1.png",
     "force --reference reference.png --pairs calibration.csv --pixel-um 40 frame_1.png @",
-    "reconstruct @ --light 0,0,1",
-    "reconstruct ball.pgm --light 0,0,1 --mask @",
     "depth --reference @ --table depth_table.csv --pixel-um 100 dark_frame.pgm",
     "depth --reference dark_reference.pgm --table depth_table.csv --pixel-um 100 dark_frame.pgm @",
     "integrate slope_x.csv slope_y.csv --mask @",

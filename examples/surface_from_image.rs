@@ -1,0 +1,27 @@
+//! A surface from one image under frontal light: `cargo run --example surface_from_image [IMAGE]`.
+//!
+//! Dark pixels are outside the object, whose rim has height zero. Heights are in pixels.
+#![allow(clippy::print_stdout)]
+use std::error::Error;
+use tactile_files::io::{Grey, read_grey_image};
+use tactile_imaging::sfs::{BoundaryCondition, Domain, Eikonal, Lighting, SurfaceReconstruction};
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let path = std::env::args().nth(1);
+    let path = path.unwrap_or_else(|| "examples/data/ball.pgm".to_owned());
+    let image = read_grey_image(path.as_ref(), Grey::default(), None)?.levels;
+    let mask = image.mapv(|level| level > 0.0);
+    let light = Lighting::new([0.0, 0.0, 1.0])?.with_normal_intensity(255.0)?;
+    let method = Eikonal::new(light).with_boundary(BoundaryCondition::Height(0.0))?;
+    let domain = Domain::default().with_mask(mask.view());
+    let surface = method.reconstruct(image.view().into(), &domain)?;
+    let heights = surface.heights.iter().copied().filter(|z| z.is_finite());
+    let top = heights.fold(0.0, f64::max);
+    let report = &surface.report;
+    println!(
+        "{} pixels, {} sweeps, the top is {top:.2} pixels high",
+        report.solved, report.iterations
+    );
+    assert!(top > 0.0);
+    Ok(())
+}
