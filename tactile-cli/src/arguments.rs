@@ -67,21 +67,9 @@ pub fn pixel_um(text: &str) -> Result<[f64; 2], String> {
     Ok([x, y])
 }
 
-/// An argument that is a finite number.
-pub fn finite(text: &str) -> Result<f64, String> {
-    number(text, |_| true, "a finite number")
-}
-
 /// An argument that is a finite number of at least zero.
 pub fn not_negative(text: &str) -> Result<f64, String> {
     number(text, |v| v >= 0.0, "a number of at least zero")
-}
-
-/// An argument of three finite numbers between commas.
-pub fn direction(text: &str) -> Result<[f64; 3], String> {
-    let numbers: Result<Vec<f64>, _> = text.split(',').map(|part| finite(part.trim())).collect();
-    let three = numbers.ok().and_then(|numbers| numbers.try_into().ok());
-    three.ok_or_else(|| "expected 3 finite numbers between commas".to_owned())
 }
 
 /// An argument that is one positive number, or two between commas: the size of a pixel along x and

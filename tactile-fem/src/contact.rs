@@ -26,6 +26,17 @@ use crate::material::Kinematics;
 use crate::model::{ElementModel, ModelFields, RigidShape};
 use crate::stick::Slip;
 
+/// Two ends of edges nearer than this part of a segment leave nothing to integrate between them.
+const SLIVER: f64 = 1e-6;
+
+/// Penalty of contact over the softer body's modulus and the edge's length: a pressure of a third
+/// of the modulus then leaves a thousandth of an element's penetration before the multipliers'
+/// update. Ten times less needs more updates, ten times more iterations; the Hertz test shows it.
+const PENALTY_LIMIT: f64 = 300.0;
+
+/// Part of a node's area that has something opposite to it, below which the node is open.
+const LEAST_SHARE: f64 = 0.25;
+
 /// What a surface may touch.
 #[derive(Debug, Clone)]
 pub enum Opposite {
@@ -106,9 +117,6 @@ impl ContactSegment {
 
     /// Parameters at which the ends of the opposite edges lie closest.
     fn cuts(&self, curve: &SurfaceCurve, placement: &Placement<'_>) -> Vec<f64> {
-        // Two ends of edges nearer than this part of a segment leave nothing to integrate between
-        // them.
-        let sliver = 1e-6;
         let at = |parameter: f64| {
             let (shape, derivative) = quadratic(parameter);
             let position = combine(&shape, self.nodes, |n| placement.current(n));
@@ -121,7 +129,7 @@ impl ContactSegment {
         let (a, b) = (at(start).0, at(end).0);
         let chord = [b[0] - a[0], b[1] - a[1]];
         let square = chord[0] * chord[0] + chord[1] * chord[1];
-        let margin = sliver * (end - start);
+        let margin = SLIVER * (end - start);
         let mut cuts = Vec::new();
         for edge in &curve.edges()[1..] {
             let corner = placement.current(edge[0]);
@@ -159,11 +167,6 @@ pub fn contact_segments(
     nodes: &[[f64; 2]],
     modulus: f64,
 ) -> (Vec<ContactSegment>, Vec<ContactNode>) {
-    // Penalty of contact over the softer body's modulus and the edge's length: a pressure of a
-    // third of the modulus then leaves a thousandth of an element's penetration before the
-    // multipliers' update. Ten times less needs more updates, ten times more iterations; the Hertz
-    // test shows it.
-    let penalty_limit = 300.0;
     let mut segments = Vec::new();
     let mut corners: Vec<ContactNode> = Vec::new();
     for &edge in edges {
@@ -199,7 +202,7 @@ pub fn contact_segments(
             for index in contact_nodes {
                 let corner = &mut corners[index - first_node];
                 corner.spacing = length.max(corner.spacing);
-                corner.penalty = corner.penalty.min(0.5 * penalty_limit * modulus / length);
+                corner.penalty = corner.penalty.min(0.5 * PENALTY_LIMIT * modulus / length);
             }
             segments.push(segment);
         }
@@ -640,8 +643,6 @@ impl ElementModel {
 
     /// Contact nodes that touch or are nearer than two spacings and `margin`.
     pub fn candidates(&self, fields: &ModelFields, margin: f64) -> Vec<Candidate> {
-        // Part of a node's area that has something opposite to it, below which the node is open.
-        let least_share = 0.25;
         let placement = self.placement(fields);
         let points = self.contact_points(fields);
         let mut around: Vec<Vec<(Gap, f64)>> = vec![Vec::new(); self.contact_nodes.len()];
@@ -657,7 +658,7 @@ impl ElementModel {
         for (index, (node, around)) in self.contact_nodes.iter().zip(&around).enumerate() {
             let total: f64 = around.iter().map(|(_, weight)| weight).sum();
             // A node at a punch's rim has half of its surroundings under it.
-            if total < least_share * node.weight {
+            if total < LEAST_SHARE * node.weight {
                 continue;
             }
             let weighted = around.iter().map(|(gap, weight)| gap.value * weight);

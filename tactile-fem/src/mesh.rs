@@ -6,6 +6,22 @@
 
 use std::collections::BTreeMap;
 
+/// Between a ball's core and the first shell, as a share of an element. With 0.02 the mesh of
+/// sixteen elements has one without area, with 0.05 and 0.2 all from 2 to 24 are sound (the test
+/// `a_ball_can_be_meshed_at_any_fineness`); more squeezes the core's corner instead.
+const CORNER_ROOM: f64 = 0.05;
+
+/// Elements along an eighth of the inclusion's circumference up to which they hold it: finer
+/// meshes have flatter elements at the rim, and with seven those of 0.045 turn over at some
+/// tenths of the height.
+const SLIDING_FINENESS: f64 = 5.0;
+
+/// Shortest element at the rim of a face that slides, over the face's radius. Shared
+/// displacements hold finer ones less and less as the face sinks in: of 0.02, they turn over at a
+/// tenth of the block's height, and the pressure within three quarters of the face jumps by 1 %.
+/// Until then it is that of the finer ones within 0.05 %.
+const SLIDING_RIM: f64 = 0.045;
+
 /// Parts of a body's boundary that conditions and contact refer to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Boundary {
@@ -419,11 +435,6 @@ impl Mesh {
     /// Around a core of quadrilaterals at the pole lie shells along circles that meet the axis and
     /// the ball's surface at right angles.
     pub fn half_ball(radius: f64, size: ContactMesh) -> Self {
-        // Between a ball's core and the first shell, as a share of an element. With 0.02 the mesh
-        // of sixteen elements has one without area, with 0.05 and 0.2 all from 2 to 24 are sound
-        // (the test `a_ball_can_be_meshed_at_any_fineness`); more squeezes the core's corner
-        // instead.
-        let corner_room = 0.05;
         let m = size.count;
         let first = size.inner / m as f64;
         // Angles of the shells along the surface; the first lies around the core.
@@ -452,7 +463,7 @@ impl Mesh {
         // The shells are nearer to the pole inside the ball than on its surface: on a fine mesh
         // they would cut the corner.
         let [r, z] = shell(start, 2 * m);
-        let corner = size.corner().min(r.hypot(z) - corner_room * first);
+        let corner = size.corner().min(r.hypot(z) - CORNER_ROOM * first);
         let pole = Pole {
             elements: m,
             core: size.inner / radius,
@@ -591,15 +602,6 @@ impl BlockMesh {
     }
 
     pub fn build(&self) -> BlockMeshes {
-        // Elements along an eighth of the inclusion's circumference up to which they hold it: finer
-        // meshes have flatter elements at the rim, and with seven those of 0.045 turn over at some
-        // tenths of the height.
-        let sliding_fineness = 5.0;
-        // Shortest element at the rim of a face that slides, over the face's radius. Shared
-        // displacements hold finer ones less and less as the face sinks in: of 0.02, they turn over
-        // at a tenth of the block's height, and the pressure within three quarters of the face
-        // jumps by 1 %. Until then it is that of the finer ones within 0.05 %.
-        let sliding_rim = 0.045;
         let cell = self.cell();
         // Elements of the guide's face from the axis to its rim, finest at the rim where the
         // traction is singular.
@@ -610,7 +612,7 @@ impl BlockMesh {
         let shortest = if self.bonded {
             0.0
         } else {
-            sliding_rim * (self.fineness as f64 / sliding_fineness).max(1.0)
+            SLIDING_RIM * (self.fineness as f64 / SLIDING_FINENESS).max(1.0)
         };
         let first = (0.25 * face).max(shortest * self.disc_radius);
         let mut rim = graded_up_to(self.disc_radius, inner, first, 1.35, face);

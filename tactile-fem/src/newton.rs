@@ -19,6 +19,41 @@ use crate::state::State;
 use crate::system::{Layout, Slot, Tangent};
 use std::sync::Arc;
 
+/// First step there, over the load's approach: what touches within it slides. With 0.02 a
+/// thirtieth of friction's part is lost.
+const STICK_FIRST_STEP: f64 = 0.002;
+
+/// Growth of the approach in one step where surfaces stick: where a node touches within a step is
+/// not known. With 1.2 the force of a ball depends on the loads before by a thousandth and its
+/// contact radius by four, with this by less than half of that (the test
+/// `more_loads_on_the_way_change_little`).
+const STICK_GROWTH: f64 = 1.1;
+
+/// Largest step of the approach there, over the bodies' height.
+const LARGEST_STEP: f64 = 0.08;
+
+/// Halvings of a load step before the solver stops.
+const MAX_HALVINGS: usize = 10;
+
+/// Imbalance at a guessed approach below which the force takes over.
+const SWITCH_TO_FORCE: f64 = 1e-2;
+
+/// Part of a Newton step below which it is given up, where elements are turned inside out before.
+const SHORTEST_STEP: f64 = 0.02;
+
+/// Iterations of a load step before it is halved. Steps that converge take three to ten.
+const MAX_ITERATIONS: usize = 25;
+
+/// Change of the approach, relative, up to which the last tangent is tried.
+const NEAR: f64 = 0.02;
+
+/// Tangents on the way to an equilibrium: those that are reached take one to three.
+const MAX_TANGENTS: usize = 7;
+
+/// Iterations that may be left at the rate of the last one: more take longer than a new tangent
+/// and the two that then do.
+const MOST_LEFT: f64 = 6.0;
+
 /// First step of a contact, over the bodies' height.
 const FIRST_STEP: f64 = 1e-3;
 /// Growth of the approach in one step where two deformable surfaces slide on each other.
@@ -127,18 +162,8 @@ impl Solver<'_> {
     /// take, or surfaces that stick: a contact that grows manyfold in one step does not settle, or
     /// slides where it should stick.
     fn walk(&mut self, target: impl Fn(&Self) -> f64) -> bool {
-        // First step there, over the load's approach: what touches within it slides. With 0.02 a
-        // thirtieth of friction's part is lost.
-        let stick_first_step = 0.002;
-        // Growth of the approach in one step where surfaces stick: where a node touches within a
-        // step is not known. With 1.2 the force of a ball depends on the loads before by a
-        // thousandth and its contact radius by four, with this by less than half of that (the test
-        // `more_loads_on_the_way_change_little`).
-        let stick_growth = 1.1;
-        // Largest step of the approach there, over the bodies' height.
-        let largest_step = 0.08;
         let (growth, first_part) = match (self.model.sticks, self.slides()) {
-            (true, _) => (stick_growth, stick_first_step),
+            (true, _) => (STICK_GROWTH, STICK_FIRST_STEP),
             (false, true) => (LARGEST_GROWTH, 1.0),
             (false, false) => return true,
         };
@@ -146,7 +171,7 @@ impl Solver<'_> {
         let mut first = (FIRST_STEP * height).min(first_part * target(self).abs());
         loop {
             let here = self.last.fields.approach;
-            let next = (growth * here).min(here + largest_step * height).max(first);
+            let next = (growth * here).min(here + LARGEST_STEP * height).max(first);
             if target(self) <= next {
                 return true;
             }
@@ -184,8 +209,6 @@ impl Solver<'_> {
     }
 
     fn advance(&mut self, goal: AppliedLoad) -> bool {
-        // Halvings of a load step before the solver stops.
-        let max_halvings: usize = 10;
         let mut fraction = 1.0;
         let mut halvings = 0;
         loop {
@@ -214,7 +237,7 @@ impl Solver<'_> {
                 None => {
                     self.report.rejected_steps += 1;
                     halvings += 1;
-                    if halvings > max_halvings {
+                    if halvings > MAX_HALVINGS {
                         return false;
                     }
                     fraction *= 0.5;
@@ -282,13 +305,6 @@ impl Solver<'_> {
     }
 
     fn full(&mut self, start: ModelFields, goal: AppliedLoad) -> Option<Equilibrium> {
-        // Imbalance at a guessed approach below which the force takes over.
-        let switch_to_force = 1e-2;
-        // Part of a Newton step below which it is given up, where elements are turned inside out
-        // before.
-        let shortest_step = 0.02;
-        // Iterations of a load step before it is halved. Steps that converge take three to ten.
-        let max_iterations: usize = 25;
         let model = self.model;
         let wanted = goal;
         let mut fields = start;
@@ -304,13 +320,13 @@ impl Solver<'_> {
         };
         let mut system = model.assemble(self.layout, &fields, margin(goal, &fields))?;
         let mut worst = f64::INFINITY;
-        for iteration in 0..max_iterations {
+        for iteration in 0..MAX_ITERATIONS {
             let there = match goal {
                 AppliedLoad::Approach(target) => fields.approach == target,
                 AppliedLoad::Force(_) => true,
             };
             let imbalance = system.imbalance(goal);
-            if there && goal != wanted && imbalance < switch_to_force {
+            if there && goal != wanted && imbalance < SWITCH_TO_FORCE {
                 goal = wanted;
             }
             if goal == wanted && there && (iteration > 0 || system.scale > 0.0) {
@@ -342,7 +358,7 @@ impl Solver<'_> {
                     break (trial, next);
                 }
                 length *= 0.5;
-                if length < shortest_step {
+                if length < SHORTEST_STEP {
                     return None;
                 }
             };
@@ -399,17 +415,13 @@ fn simplified(
     approach: f64,
     iterations: &mut usize,
 ) -> Option<Equilibrium> {
-    // Change of the approach, relative, up to which the last tangent is tried.
-    let near = 0.02;
-    // Tangents on the way to an equilibrium: those that are reached take one to three.
-    let max_tangents: usize = 7;
     let mut fields = start.clone();
-    let is_near = (approach - fields.approach).abs() <= near * approach.abs();
+    let is_near = (approach - fields.approach).abs() <= NEAR * approach.abs();
     let mut chord = layout.chord.take();
     if model.kinematics == Kinematics::Finite && !is_near {
         chord = None;
     }
-    for _ in 0..max_tangents {
+    for _ in 0..MAX_TANGENTS {
         let is_new = chord.is_none();
         let tried = match chord.take() {
             Some(chord) => chord,
@@ -492,9 +504,6 @@ impl Chord {
         is_new: bool,
         iterations: &mut usize,
     ) -> Ending {
-        // Iterations that may be left at the rate of the last one: more take longer than a new
-        // tangent and the two that then do.
-        let most_left = 6.0;
         let mut fields = start;
         // A full step of Newton's method may raise the imbalance on its way to the solution.
         let mut may_rise = is_new;
@@ -513,7 +522,7 @@ impl Chord {
                 may_rise = false;
                 // At this rate.
                 let left = (TOLERANCE / imbalance).ln() / rate.ln();
-                if !(rate < 1.0 && left < most_left) {
+                if !(rate < 1.0 && left < MOST_LEFT) {
                     return Ending::Slow(fields);
                 }
             }

@@ -16,25 +16,36 @@ use core::f64::consts::{PI, TAU};
 use nalgebra::DVector;
 use std::collections::BTreeMap;
 
+/// Intervals of Simpson's rule, which is then exact to nearly rounding.
+const SIMPSON_INTERVALS: i32 = 16;
+
+/// Outermost edge ends left out of the fit: the contact's edge lies somewhere within the last
+/// element, whose pressures and half of its neighbour's are bent by it.
+const LEFT_OUT_LIMIT: usize = 2;
+
+/// Fewest means that two constants are fitted to.
+const FEWEST_MEANS: usize = 4;
+
+/// Where the fit begins, over the outermost node's radius: further in, p² bends more than a
+/// parabola.
+const FIT_FROM: f64 = 0.35;
+
 /// Smooth pressures of a contact and its radius, from the pressures at all nodes in contact, those
 /// from the axis outwards, and the force they carry.
 pub fn contact_profile(
     points: Vec<PressurePoint>,
     force: f64,
 ) -> (Vec<PressurePoint>, Option<ContactRadius>) {
-    // Outermost edge ends left out of the fit: the contact's edge lies somewhere within the last
-    // element, whose pressures and half of its neighbour's are bent by it.
-    let left_out_limit: usize = 2;
     // A contact of few nodes, or one that does not reach the axis, keeps its pressures.
     if points.len() < 5 || points[0].r_m != 0.0 {
         return (points, None);
     }
     let means = means(&points);
     let fit = |left_out| Fit::new(&points, force, &means, left_out);
-    let fine = fit(left_out_limit);
+    let fine = fit(LEFT_OUT_LIMIT);
     let radius = fine.as_ref().map(|fine| ContactRadius {
         radius_m: fine.square.sqrt(),
-        uncertainty_m: match fit(left_out_limit + 1) {
+        uncertainty_m: match fit(LEFT_OUT_LIMIT + 1) {
             Some(coarse) => (fine.square.sqrt() - coarse.square.sqrt()).abs(),
             // Nothing to compare with: half the distance between the outermost nodes.
             None => 0.5 * (points[points.len() - 1].r_m - points[points.len() - 2].r_m),
@@ -123,18 +134,13 @@ impl Fit {
     /// the fit carries the same force outside as the elements do, which equilibrium makes accurate
     /// although their pressures are not. `None` with too few nodes in contact.
     fn new(points: &[PressurePoint], force: f64, means: &[Mean], left_out: usize) -> Option<Self> {
-        // Fewest means that two constants are fitted to.
-        let fewest_means: usize = 4;
-        // Where the fit begins, over the outermost node's radius: further in, p² bends more than a
-        // parabola.
-        let fit_from = 0.35;
         let last_end = (points.len() - 1) / 2;
         let from = last_end.checked_sub(left_out)?.min(means.len() - 1);
         let outermost = points[points.len() - 1].r_m;
         let fitted: Vec<&Mean> = (means[..=from].iter())
-            .filter(|mean| mean.square >= (fit_from * outermost).powi(2))
+            .filter(|mean| mean.square >= (FIT_FROM * outermost).powi(2))
             .collect();
-        if fitted.len() < fewest_means {
+        if fitted.len() < FEWEST_MEANS {
             return None;
         }
         // What the function carries that grows from zero at the end before to one at this end and
@@ -192,23 +198,22 @@ impl Fit {
     /// π ∫ p ds from `start` squared to a².
     fn outer_force(&self, start: f64) -> f64 {
         // With t = t₀ x², √(c₀ t + c₁ t²) dt = 2 t₀^{3/2} x² √(c₀ + c₁ t₀ x²) dx, smooth in x:
-        // Simpson's rule on 16 intervals is exact to rounding nearly.
+        // Simpson's rule.
         let t0 = 1.0 - start * start / self.square;
         let [c0, c1] = self.constants;
         let value = |x: f64| x * x * (c0 + c1 * t0 * x * x).max(0.0).sqrt();
-        let intervals = 16;
-        let sum: f64 = (0..=intervals)
+        let sum: f64 = (0..=SIMPSON_INTERVALS)
             .map(|k| {
                 let weight = match k {
                     0 => 1.0,
-                    k if k == intervals => 1.0,
+                    SIMPSON_INTERVALS => 1.0,
                     k if k % 2 == 1 => 4.0,
                     _ => 2.0,
                 };
-                weight * value(f64::from(k) / f64::from(intervals))
+                weight * value(f64::from(k) / f64::from(SIMPSON_INTERVALS))
             })
             .sum();
-        PI * self.square * 2.0 * t0.powf(1.5) * sum / (3.0 * f64::from(intervals))
+        PI * self.square * 2.0 * t0.powf(1.5) * sum / (3.0 * f64::from(SIMPSON_INTERVALS))
     }
 }
 

@@ -11,6 +11,10 @@ use crate::press::{Guide, ObjectPress, ObjectShape};
 use crate::state::{State, Stress};
 use tactile_elasticity::{ElasticityError, Quantity};
 
+/// Mesh fineness where nothing else is asked: elements along an eighth of an inclusion's
+/// circumference.
+const BLOCK_FINENESS: usize = 5;
+
 /// Whether two surfaces that are pressed together slide.
 ///
 /// ```
@@ -141,10 +145,7 @@ impl FemScene {
         guide: &Guide,
         interface: Interface,
     ) -> Result<Self, ElasticityError> {
-        // Mesh fineness where nothing else is asked: elements along an eighth of an inclusion's
-        // circumference.
-        let block_fineness: usize = 5;
-        Self::block_with_mesh(block, guide, interface, block_fineness, Kinematics::Finite)
+        Self::block_with_mesh(block, guide, interface, BLOCK_FINENESS, Kinematics::Finite)
     }
 
     /// [`Self::block_under_guide`] on a mesh with `fineness` elements along an eighth of the

@@ -17,6 +17,32 @@ use crate::scene::{AppliedLoad, FemScene};
 use crate::state::State;
 use crate::system::Layout;
 
+/// Distance of the rim's nodes over the face's radius at which they meet ([`MET`] elsewhere).
+const RIM_MET: f64 = 5e-5;
+
+/// Part of the face's radius beyond which nodes count as the rim's, and their distance there: at
+/// a tenth of the block's height rounds leave a half of it instead of a tenth, and the pressure
+/// within three quarters of the face changes by a hundredth of it.
+const RIM_LIMIT: f64 = 0.9;
+
+/// Distance of nodes over the face's radius at which they meet: pressures change by as large a
+/// part.
+const MET: f64 = 2e-6;
+
+/// Part of the distance that a round may leave. Beyond a tenth of the block's height the rim's
+/// nodes of a coarse mesh pass each other to and fro: moves are halved then. Left there, the
+/// pressure would depend on where the rounds began, by 0.3 % at three quarters of the radius.
+const STALLED: f64 = 0.8;
+
+/// Part of a distance below which a halved move is given up.
+const LEAST_MOVE: f64 = 0.1;
+
+/// Rounds of meshing and solving; each leaves about a tenth of the distance before.
+const MAX_ROUNDS: usize = 12;
+
+/// Least part of a distance that is moved.
+const LEAST_PART: f64 = 0.2;
+
 /// Largest change of a shift over the distance of two nodes. Inside the face it is below 0.1.
 const LARGEST_GROWTH: f64 = 0.9;
 
@@ -39,22 +65,6 @@ impl FemScene {
         depth_m: f64,
         near: Option<(&Self, &State)>,
     ) -> Option<(Self, State)> {
-        let rim_met = 5e-5;
-        // Part of the face's radius beyond which nodes count as the rim's, and their distance
-        // there: at a tenth of the block's height rounds leave a half of it instead of a tenth, and
-        // the pressure within three quarters of the face changes by a hundredth of it.
-        let rim_limit = 0.9;
-        // Distance of nodes over the face's radius at which they meet: pressures change by as large
-        // a part.
-        let met = 2e-6;
-        // Part of the distance that a round may leave. Beyond a tenth of the block's height the
-        // rim's nodes of a coarse mesh pass each other to and fro: moves are halved then. Left
-        // there, the pressure would depend on where the rounds began, by 0.3 % at three quarters of
-        // the radius.
-        let stalled = 0.8;
-        let least_move = 0.1;
-        // Rounds of meshing and solving; each leaves about a tenth of the distance before.
-        let max_rounds: usize = 12;
         let load = [AppliedLoad::Approach(approach_m)];
         let near = near.filter(|(scene, _)| scene.model.elements == self.model.elements);
         let mut scene = match near {
@@ -74,7 +84,7 @@ impl FemScene {
         let mut relaxation = Relaxation::default();
         let mut before = f64::INFINITY;
         let mut part_moved = 1.0;
-        for _ in 0..max_rounds {
+        for _ in 0..MAX_ROUNDS {
             let pairs = scene.model.pairs();
             let radius =
                 |node: usize| scene.model.nodes[node][0] + state.fields.displacement[2 * node];
@@ -84,14 +94,14 @@ impl FemScene {
                 .map(|pair| radius(pair.lower))
                 .fold(0.0, f64::max);
             let left = |pair: &Pair| {
-                let is_rim = radius(pair.lower) > rim_limit * face;
-                apart(pair).abs() / (if is_rim { rim_met } else { met } * face)
+                let is_rim = radius(pair.lower) > RIM_LIMIT * face;
+                apart(pair).abs() / (if is_rim { RIM_MET } else { MET } * face)
             };
             let left = pairs.iter().map(left).fold(0.0, f64::max);
-            if left > stalled * before {
+            if left > STALLED * before {
                 part_moved *= 0.5;
             }
-            if left <= 1.0 || part_moved < least_move {
+            if left <= 1.0 || part_moved < LEAST_MOVE {
                 break;
             }
             before = left;
@@ -193,15 +203,13 @@ pub struct Relaxation {
 impl Relaxation {
     /// The part of a distance by which a node is moved, from the last two distances.
     pub fn next(&mut self, distances: impl Iterator<Item = f64>) -> Vec<f64> {
-        // Least part of a distance that is moved.
-        let least_part = 0.2;
         let mut last = core::mem::take(&mut self.last).into_iter();
         for now in distances {
             let part = last.next().map_or(1.0, |(before, part)| {
                 let secant = part * before / (before - now);
                 // Distances that are rounding alone say nothing.
                 if secant.is_finite() {
-                    secant.clamp(least_part, 1.0)
+                    secant.clamp(LEAST_PART, 1.0)
                 } else {
                     1.0
                 }

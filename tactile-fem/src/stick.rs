@@ -17,6 +17,10 @@ use crate::contact::{ContactNode, DRIVER, Opposite, Placement};
 use crate::material::Kinematics;
 use crate::model::{ElementModel, ModelFields};
 
+/// Part of the nodes' spacing within which two unloaded surfaces count as touching: rounding of
+/// coordinates leaves 1e-16 of it.
+const TOUCHING: f64 = 1e-9;
+
 /// Where a contact node is held.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Anchor {
@@ -81,13 +85,10 @@ impl Anchor {
 impl ElementModel {
     /// Anchors of the nodes that touch without load.
     pub fn first_anchors(&self, unloaded: &ModelFields) -> Vec<Option<Anchor>> {
-        // Part of the nodes' spacing within which two unloaded surfaces count as touching: rounding
-        // of coordinates leaves 1e-16 of it.
-        let touching = 1e-9;
         let mut anchors = vec![None; self.contact_nodes.len()];
         for candidate in self.candidates(unloaded, 0.0) {
             let contact = &self.contact_nodes[candidate.index];
-            if candidate.gap.value <= touching * contact.spacing {
+            if candidate.gap.value <= TOUCHING * contact.spacing {
                 anchors[candidate.index] = self.anchor(contact, unloaded);
             }
         }

@@ -15,6 +15,10 @@ use crate::sparse::{Factors, Pattern, Singular, Symmetric};
 use crate::stick::Slip;
 use std::sync::Arc;
 
+/// Changes of the active set within a Newton iteration; more are rounding's toss between two
+/// sets.
+const MAX_CHANGES: usize = 15;
+
 /// Where a displacement component's share of the system goes.
 #[derive(Debug, Clone, Copy)]
 pub enum Slot {
@@ -408,9 +412,6 @@ impl System<'_> {
 
     /// The Newton step from `fields` towards the goal.
     pub fn step(&self, fields: &ModelFields, goal: AppliedLoad) -> Result<NewtonStep, Singular> {
-        // Changes of the active set within a Newton iteration; more are rounding's toss between two
-        // sets.
-        let max_changes: usize = 15;
         let mut active: Vec<bool> = self.candidates.iter().map(|c| c.pressure > 0.0).collect();
         let mut changes = 0;
         loop {
@@ -458,7 +459,7 @@ impl System<'_> {
                 step.contact[candidate.index] = pressure.max(0.0);
             }
             changes += 1;
-            if settled || changes > max_changes {
+            if settled || changes > MAX_CHANGES {
                 return Ok(step);
             }
         }

@@ -6,6 +6,21 @@ use tactile_elasticity::contact::{Bond, ContactCurve, ContactTable, Waveguide};
 use tactile_elasticity::modulus::{ContactLaw, WaveguideLaw};
 use tactile_elasticity::{ElasticityError, Quantity};
 
+/// A contact whose force has grown with a higher power of the radius than this since the one
+/// before is the last of its curve: the ball has sunk in to its equator, and polynomials that
+/// follow the bend there miss 2 % of the force everywhere instead of 0.6 %.
+const STEEPEST: f64 = 6.0;
+
+/// The smallest a/R that is computed: at 0.1 the elements leave 0.5 % of the contact radius.
+const SMALLEST_RATIO: f64 = 0.15;
+
+/// Contacts a modulus.
+const CONTACTS: usize = 16;
+
+/// A contact radius less certain than this is left out: it would miss the force by three times as
+/// much.
+const LARGEST_UNCERTAINTY: f64 = 5e-3;
+
 /// What a table is to cover.
 ///
 /// ```
@@ -193,10 +208,6 @@ impl Ball {
         law: &WaveguideLaw,
         options: &TableOptions,
     ) -> Result<ContactCurve, ElasticityError> {
-        // A contact whose force has grown with a higher power of the radius than this since the one
-        // before is the last of its curve: the ball has sunk in to its equator, and polynomials
-        // that follow the bend there miss 2 % of the force everywhere instead of 0.6 %.
-        let steepest = 6.0;
         let solution = self.scene(guide)?.solve(&self.loads(guide, law, options));
         let mut curve = ContactCurve {
             youngs_modulus_pa: self.youngs_modulus_pa,
@@ -210,7 +221,7 @@ impl Ball {
             let force = state.force_n();
             if let (Some(before), Some(smaller)) =
                 (curve.force_n.last(), curve.contact_radius_m.last())
-                && (force / before).ln() > steepest * (radius / smaller).ln()
+                && (force / before).ln() > STEEPEST * (radius / smaller).ln()
             {
                 break;
             }
@@ -254,20 +265,16 @@ impl Ball {
         law: &WaveguideLaw,
         options: &TableOptions,
     ) -> Vec<AppliedLoad> {
-        // The smallest a/R that is computed: at 0.1 the elements leave 0.5 % of the contact radius.
-        let smallest_ratio = 0.15;
-        // Contacts a modulus.
-        let contacts: usize = 16;
         let compliance = |e: f64, nu: f64| (1.0 - nu * nu) / e;
         let own = compliance(self.youngs_modulus_pa, self.poisson_ratio);
         let touched = guide.layers().iter().find(|l| l.thickness_m > 0.0);
         let other = touched.map_or(0.0, |l| compliance(l.youngs_modulus_pa, l.poisson_ratio));
         let reduced = 1.0 / (own + other);
-        let last = (contacts - 1) as f64;
-        (0..contacts)
+        let last = (CONTACTS - 1) as f64;
+        (0..CONTACTS)
             .map(|k| {
-                let step = (options.largest_ratio - smallest_ratio) * k as f64 / last;
-                (smallest_ratio + step) * self.radius_m
+                let step = (options.largest_ratio - SMALLEST_RATIO) * k as f64 / last;
+                (SMALLEST_RATIO + step) * self.radius_m
             })
             .filter_map(|a| law.log_force_at_radius(a, other * reduced))
             .map(|force| AppliedLoad::Force(reduced * force.value.exp()))
@@ -277,9 +284,6 @@ impl Ball {
 
 /// The contact radius, if the mesh tells it well enough.
 fn certain_radius(state: &State) -> Option<f64> {
-    // A contact radius less certain than this is left out: it would miss the force by three times
-    // as much.
-    let largest_uncertainty = 5e-3;
     let radius = state.contact_radius()?;
-    (radius.uncertainty_m <= largest_uncertainty * radius.radius_m).then_some(radius.radius_m)
+    (radius.uncertainty_m <= LARGEST_UNCERTAINTY * radius.radius_m).then_some(radius.radius_m)
 }

@@ -7,6 +7,10 @@ use nalgebra::DMatrix;
 use std::sync::Arc;
 use tactile_fem::Interface;
 
+/// Points of the half circle that a kernel is averaged over. The integrand is periodic and smooth but
+/// for a kink of the third derivative: four digits.
+const RING_POINTS: i32 = 48;
+
 /// How far the finite elements are from another code's pressure within three quarters of the face,
 /// relative.
 #[derive(Debug, Clone, Copy)]
@@ -115,16 +119,13 @@ impl ModelErrors {
 
 /// Matérn's kernel of order 3/2 between points of two rings, averaged over their angle.
 fn ring_kernel(a: f64, b: f64, length: f64) -> f64 {
-    // The integrand is periodic and smooth but for a kink of the third derivative: 48 points of the
-    // half circle give four digits.
-    let count = 48;
     let mut sum = 0.0;
-    for k in 0..count {
-        let angle = core::f64::consts::PI * (f64::from(k) + 0.5) / f64::from(count);
+    for k in 0..RING_POINTS {
+        let angle = core::f64::consts::PI * (f64::from(k) + 0.5) / f64::from(RING_POINTS);
         let squared = (a * a + b * b - 2.0 * a * b * angle.cos()).max(0.0);
         sum += kernel(squared.sqrt(), length);
     }
-    sum / f64::from(count)
+    sum / f64::from(RING_POINTS)
 }
 
 /// Values of all frames: the pressures of one after the other, then the forces.

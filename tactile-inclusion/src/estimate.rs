@@ -3,6 +3,20 @@
 use std::fmt;
 use tactile_fem::Interface;
 
+/// Relative standard error above which a parameter is not identified, on the side where its
+/// interval reaches further: a modulus that may be far higher is not identified by being bounded
+/// from below. On 162 scenes of `evidence/inclusion_scenes.py`, none of 60 parameters that a
+/// sensor cannot know within 30 % was told (`inclusion_study`); the price is that some it could
+/// know within 20 to 30 % are left open.
+const OPEN: f64 = 0.25;
+
+/// 1 % of asymmetry is harmless, 6 % is not.
+const LARGEST_ASYMMETRY: f64 = 0.03;
+
+/// Smooth errors of a sensor (0.3 % over 3 mm) reach 0.4 % in one picture of 100. An ellipsoid of
+/// 14 × 10 × 8 mm has 1.9 %.
+const LARGEST_HARMONICS: f64 = 0.006;
+
 /// A value with its standard error and its 95 % interval.
 ///
 /// ```
@@ -82,15 +96,9 @@ pub enum Identifiable {
 
 impl Identifiable {
     pub(crate) fn new(estimated: Estimated, is_reliable: bool) -> Self {
-        // Relative standard error above which a parameter is not identified, on the side where its
-        // interval reaches further: a modulus that may be far higher is not identified by being
-        // bounded from below. On 162 scenes of `evidence/inclusion_scenes.py`, none of 60
-        // parameters that a sensor cannot know within 30 % was told (`inclusion_study`); the price
-        // is that some it could know within 20 to 30 % are left open.
-        let open = 0.25;
         let [low, high] = estimated.interval;
         let reach = (estimated.value / low).max(high / estimated.value).ln();
-        if is_reliable && reach < TWO_SIDED_95 * open {
+        if is_reliable && reach < TWO_SIDED_95 * OPEN {
             Self::Yes(estimated)
         } else {
             Self::No(estimated)
@@ -253,16 +261,11 @@ impl fmt::Display for InclusionWarning {
 /// assert_eq!(asymmetry_warnings(0.06, 0.02).len(), 2);
 /// ```
 pub fn asymmetry_warnings(asymmetry: f64, harmonics: f64) -> Vec<InclusionWarning> {
-    // 1 % of asymmetry is harmless, 6 % is not.
-    let largest_asymmetry = 0.03;
-    // Smooth errors of a sensor (0.3 % over 3 mm) reach 0.4 % in one picture of 100. An ellipsoid
-    // of 14 × 10 × 8 mm has 1.9 %.
-    let largest_harmonics = 0.006;
     let first = InclusionWarning::Asymmetric { asymmetry };
     let higher = InclusionWarning::NotRound { harmonics };
     let both = [
-        (asymmetry > largest_asymmetry, first),
-        (harmonics > largest_harmonics, higher),
+        (asymmetry > LARGEST_ASYMMETRY, first),
+        (harmonics > LARGEST_HARMONICS, higher),
     ];
     both.into_iter()
         .filter_map(|(is, warning)| is.then_some(warning))

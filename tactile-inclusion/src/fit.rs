@@ -3,6 +3,22 @@
 use crate::forward::{Coordinate, Forward, LARGEST_POISSON_RATIO, Parameters, Solved};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
+/// Distance of the optimum in standard errors that the solutions' tolerance may hide.
+const UNRESOLVED: f64 = 1.0;
+
+/// Gain of the objective that a fit may still bring over that of its quadratic model: along a
+/// flat valley steps gain more than the model at their start says.
+const PREDICTED_GAIN: f64 = 4.0;
+
+/// Levenberg's damping at first, over the normal matrix's diagonal.
+const FIRST_DAMPING: f64 = 1e-3;
+
+/// Its upper bound, beyond which no step lowers the objective.
+const LARGEST_DAMPING: f64 = 10.0;
+
+/// Its lower bound: of less, steps are Newton's to six digits.
+const LEAST_DAMPING: f64 = 1e-6;
+
 /// What is known of a coordinate beforehand: a Gaussian.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Prior {
@@ -237,31 +253,21 @@ impl Problem {
         ending: Ending,
         mut go_on: impl FnMut() -> bool,
     ) -> Option<Fit> {
-        // Distance of the optimum in standard errors that the solutions' tolerance may hide.
-        let unresolved = 1.0;
-        // Gain of the objective that a fit may still bring over that of its quadratic model:
-        // along a flat valley steps gain more than the model at their start says.
-        let predicted_gain = 4.0;
-        let largest_damping = 10.0;
-        let least_damping = 1e-6;
-        // Levenberg's damping: at first, and its bounds. Beyond the largest no step lowers the
-        // objective.
-        let first_damping = 1e-3;
         let mut parameters = start.clone();
         let mut normal = self.normal(&parameters, None)?;
-        let mut damping = first_damping;
+        let mut damping = FIRST_DAMPING;
         let mut evaluations = 1;
         let converged = loop {
             // How far the quadratic model's optimum is; steps cut short by damping say nothing of
             // it.
             let left = self.step(&parameters, &normal, 0.0, None)?.size;
-            let reachable = normal.misfit + normal.penalty - predicted_gain * left.powi(2);
+            let reachable = normal.misfit + normal.penalty - PREDICTED_GAIN * left.powi(2);
             if left < ending.step || reachable > ending.needed {
                 break true;
             }
-            if damping > largest_damping {
+            if damping > LARGEST_DAMPING {
                 // No step lowers the objective: what is left is the solutions' tolerance.
-                break left < unresolved;
+                break left < UNRESOLVED;
             }
             if evaluations == ending.evaluations || !go_on() {
                 break false;
@@ -279,7 +285,7 @@ impl Problem {
                 Some(found) => {
                     let gain = now - found.misfit - found.penalty;
                     let is_undamped = damping < 1e-2;
-                    damping = (0.1 * damping).max(least_damping);
+                    damping = (0.1 * damping).max(LEAST_DAMPING);
                     (parameters, normal) = (next, found);
                     if is_undamped && gain < ending.step.powi(2) {
                         break true;

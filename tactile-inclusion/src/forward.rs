@@ -11,6 +11,13 @@ use tactile_fem::{
     Block, FemScene, FrameResponse, Guide, Interface, Kinematics, Lump, Material, SolvedFrames,
 };
 
+/// Relative step of the difference quotients: the truncation error is about as large as the step,
+/// rounding and the unbalanced force of 1e-8 stay a hundred times below.
+const STEP: f64 = 1e-5;
+
+/// Largest change of the logarithm of a length by which a mesh is moved.
+const LARGEST_MESH_CHANGE: f64 = 0.3;
+
 /// A block's unknowns.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Parameters {
@@ -227,12 +234,9 @@ impl Parameters {
     ///
     /// By Poisson's ratio it is small against 1 − 2ν: the bulk modulus grows as its reciprocal.
     pub fn small_step(&self, coordinate: Coordinate) -> f64 {
-        // Relative step of the difference quotients: the truncation error is about as large as the
-        // step, rounding and the unbalanced force of 1e-8 stay a hundred times below.
-        let step = 1e-5;
         match coordinate {
-            Coordinate::PoissonRatio => -step * (1.0 - 2.0 * self.poisson_ratio),
-            _ => step * coordinate.unit(),
+            Coordinate::PoissonRatio => -STEP * (1.0 - 2.0 * self.poisson_ratio),
+            _ => STEP * coordinate.unit(),
         }
     }
 
@@ -402,9 +406,7 @@ fn sliding_depth(parameters: &Parameters) -> f64 {
 }
 
 fn is_near(from: f64, to: f64) -> bool {
-    // Largest change of the logarithm of a length by which a mesh is moved.
-    let largest_mesh_change = 0.3;
-    (to / from).ln().abs() < largest_mesh_change
+    (to / from).ln().abs() < LARGEST_MESH_CHANGE
 }
 
 impl Forward {

@@ -25,17 +25,43 @@ use crate::search::GridStart;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix2, Vector2};
 use tactile_fem::Interface;
 
+/// Standard deviations by which χ² may exceed its mean: above, 1 chance in 1000, a fit counts as
+/// poor.
+const POOR: f64 = 3.1;
+
+/// Least contrast either way, E₁/E₀ or E₀/E₁: an inclusion nearer to the tissue explains no more
+/// than what its mesh differs by from a homogeneous block's (a contrast of 1.02 to 1.04 in
+/// homogeneous blocks by CalculiX).
+const LEAST_CONTRAST: f64 = 1.2;
+
+/// Least probability for that.
+const LEAST_PROBABILITY: f64 = 0.99;
+
+/// Least fall of χ² for an inclusion to count as found, that of six standard errors: what finite
+/// elements err by brings it to 25 in one of 38 homogeneous blocks by CalculiX, 161 of 162
+/// inclusions there to 60 or more and the last, hardly to be found, to 33 (`inclusion_study`).
+const LEAST_FALL: f64 = 36.0;
+
+/// χ² over its degrees of freedom above which the model is not that of the block pressed, and a
+/// lump in it explains nothing. One that touches the surface brings it to some ten.
+const LARGEST_MISFIT: f64 = 50.0;
+
+/// That of χ² with two degrees of freedom.
+const LARGEST: f64 = 13.8;
+
+/// Fall of the objective that a grid's inclusion must be predicted to bring for inclusions to be
+/// fitted. One that is found lowers χ² by 36; its neighbour in the grid brings half of that or
+/// more.
+const LEAST_PROMISE: f64 = 18.0;
+
 /// Fall of the objective without which an inclusion is not that probable, 2 ln(p / (1 − p)). The
 /// parameters it adds are known better afterwards than before, which lowers the evidence further.
 pub const LEAST_GAIN: f64 = 9.2;
 
 /// Whether a fit leaves more than the errors explain.
 pub fn is_poor(misfit: f64, observed: &Observed) -> bool {
-    // Standard deviations by which χ² may exceed its mean: above, 1 chance in 1000, a fit counts as
-    // poor.
-    let poor = 3.1;
     let freedom = observed.values.len() as f64;
-    misfit > freedom + poor * (2.0 * freedom).sqrt()
+    misfit > freedom + POOR * (2.0 * freedom).sqrt()
 }
 
 /// The fit with more evidence, of one without an inclusion and one with it.
@@ -109,31 +135,16 @@ impl Hypothesis {
 
     /// The fit with an inclusion, where it counts as found at these odds.
     fn found(&self, log_odds: f64) -> Option<&Fit> {
-        // Least contrast either way, E₁/E₀ or E₀/E₁: an inclusion nearer to the tissue explains no
-        // more than what its mesh differs by from a homogeneous block's (a contrast of 1.02 to 1.04
-        // in homogeneous blocks by CalculiX).
-        let least_contrast = 1.2;
-        // Least probability for that.
-        let least_probability = 0.99;
-        // Least fall of χ² for an inclusion to count as found, that of six standard errors: what
-        // finite elements err by brings it to 25 in one of 38 homogeneous blocks by CalculiX, 161
-        // of 162 inclusions there to 60 or more and the last, hardly to be found, to 33
-        // (`inclusion_study`).
-        let least_fall = 36.0;
-        // χ² over its degrees of freedom above which the model is not that of the block pressed,
-        // and a lump in it explains nothing. One that touches the surface brings it to some
-        // ten.
-        let largest_misfit = 50.0;
         let values = self.problem.measured.len() as f64;
         self.lump.as_ref().filter(|fit| {
             let parameters = &fit.parameters;
             let lowest = (parameters.lump).map_or(0.0, |lump| lump.depth_m + lump.axes_m()[1]);
             let modulus = |coordinate| fit.parameters.get(coordinate);
             let contrast = modulus(Coordinate::LumpModulus) - modulus(Coordinate::BlockModulus);
-            probability(log_odds) > least_probability
-                && self.homogeneous.misfit - fit.misfit > least_fall
-                && contrast.abs() > f64::ln(least_contrast)
-                && fit.misfit < largest_misfit * values
+            probability(log_odds) > LEAST_PROBABILITY
+                && self.homogeneous.misfit - fit.misfit > LEAST_FALL
+                && contrast.abs() > f64::ln(LEAST_CONTRAST)
+                && fit.misfit < LARGEST_MISFIT * values
                 && lowest < parameters.height_m
         })
     }
@@ -167,8 +178,6 @@ impl Hypothesis {
 
     /// Whether an inclusion's outline is not round, but for 1 chance in 1000.
     fn is_elongated(&self, fit: &Fit) -> bool {
-        // That of χ² with two degrees of freedom.
-        let largest = 13.8;
         let Some(first) = self.index(Coordinate::Elongation(0)) else {
             return false;
         };
@@ -178,7 +187,7 @@ impl Hypothesis {
         let covariance = fit.covariance.fixed_view::<2, 2>(first, first) + of_model;
         let elongation = Vector2::from(fit.parameters.place.elongation);
         let inverse = covariance.try_inverse();
-        inverse.is_some_and(|inverse| elongation.dot(&(inverse * elongation)) > largest)
+        inverse.is_some_and(|inverse| elongation.dot(&(inverse * elongation)) > LARGEST)
     }
 
     /// Whether a sixth of an inclusion lies beyond the used part of every press's face. Two presses
@@ -415,10 +424,6 @@ impl Score {
 
     /// Whether an inclusion can be ruled out.
     pub fn is_homogeneous(&self) -> bool {
-        // Fall of the objective that a grid's inclusion must be predicted to bring for inclusions
-        // to be fitted. One that is found lowers χ² by 36; its neighbour in the grid brings half of
-        // that or more.
-        let least_promise = 18.0;
-        self.predicted_gain < least_promise
+        self.predicted_gain < LEAST_PROMISE
     }
 }

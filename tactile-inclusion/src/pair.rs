@@ -17,6 +17,19 @@ use crate::search::{CLEAR_EVIDENCE, Counter, DEPTHS, DIAMETERS, InclusionSearch}
 use nalgebra::DVector;
 use tactile_fem::Kinematics;
 
+/// Log evidence by which two must exceed one: far more than what ellipsoids and the model's own
+/// error bring.
+const LEAST_GAIN: f64 = 100.0;
+
+/// Modulus of a trial inclusion over that around it, from which logarithms of pressures are scaled.
+const CONTRAST: f64 = 8.0;
+
+/// Multiples of an inclusion's logarithm that a contrast can bring.
+const POSSIBLE: core::ops::Range<f64> = 0.15..2.5;
+
+/// Fineness of the meshes of the map of places, in small strain.
+const FINENESS: usize = 2;
+
 /// Error of the product of ratios, over the pressure, where two shallow inclusions touch of which
 /// each doubles it. It falls with their distance, and grows with the root of the product of what
 /// they add, and with their depth over their distance ([`side_by_side`]).
@@ -98,9 +111,6 @@ impl InclusionSearch {
         ones: &[Hypothesis],
         counter: &mut Counter<'_>,
     ) -> Option<InclusionEstimate> {
-        // Log evidence by which two must exceed one: far more than what ellipsoids and the model's
-        // own error bring.
-        let least_gain = 100.0;
         let one = ones.first()?.better();
         if observed.cells.is_none() || !is_poor(one.misfit, observed) {
             return None;
@@ -115,7 +125,7 @@ impl InclusionSearch {
         pairs.sort_by(|a, b| b.evidence().total_cmp(&a.evidence()));
         let best = pairs.first()?.evidence();
         pairs.retain(|pair| pair.evidence() > best - CLEAR_EVIDENCE);
-        if best < ones[0].evidence() + least_gain
+        if best < ones[0].evidence() + LEAST_GAIN
             || !pairs.iter().all(|pair| pair.is_possible(observed))
         {
             return None;
@@ -225,13 +235,9 @@ impl InclusionSearch {
     /// Logarithms of ratios add. Those of small strain under the axis are laid around each place of
     /// a grid; for each two places the multiples that fit best are found.
     fn pair_start(&self, observed: &Observed, one: &Hypothesis) -> Option<Parameters> {
-        let contrast: f64 = 8.0;
-        // Multiples of an inclusion's logarithm that a contrast can bring.
-        let possible = 0.15..2.5;
-        let fineness: usize = 2;
         let forward = Forward {
             kinematics: Kinematics::Linear,
-            fineness,
+            fineness: FINENESS,
             ..one.problem.forward.clone()
         };
         // A fit of one is bent out of what is known of the block.
@@ -285,13 +291,13 @@ impl InclusionSearch {
                 parameters.place.elongation = [0.0; 2];
                 parameters
             };
-            let Some((_, solved)) = forward.predict_near(&at(middle, contrast), None) else {
+            let Some((_, solved)) = forward.predict_near(&at(middle, CONTRAST), None) else {
                 continue;
             };
             let axial = |radius: f64| solved.pressure_at(frame, radius);
             let (columns, means): (Vec<DVector<f64>>, Vec<f64>) = (places.iter())
                 .map(|place| {
-                    relative(&cells.pressures(frame, &at(*place, contrast), &axial, &axial))
+                    relative(&cells.pressures(frame, &at(*place, CONTRAST), &axial, &axial))
                 })
                 .unzip();
             let along: Vec<f64> = columns.iter().map(|column| column.dot(&measured)).collect();
@@ -309,14 +315,14 @@ impl InclusionSearch {
                         (squares[i] * along[k] - shared * along[i]) / determinant,
                     ];
                     let explained = multiples[0] * along[i] + multiples[1] * along[k];
-                    if multiples.iter().all(|multiple| possible.contains(multiple))
+                    if multiples.iter().all(|multiple| POSSIBLE.contains(multiple))
                         && best.as_ref().is_none_or(|(most, _)| explained > *most)
                     {
                         let [first, second] = multiples;
                         // Pressures are proportional to the moduli.
                         let scale = level - first * means[i] - second * means[k];
                         let start = |place, multiple: f64| {
-                            let mut start = at(place, contrast.powf(multiple) * scale.exp());
+                            let mut start = at(place, CONTRAST.powf(multiple) * scale.exp());
                             start.block_modulus_pa *= scale.exp();
                             start
                         };

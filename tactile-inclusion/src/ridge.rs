@@ -19,6 +19,38 @@ use crate::forward::{Coordinate, Parameters, Solved};
 use nalgebra::{DMatrix, DVector};
 use statrs::function::erf::erfc;
 
+/// Steps along a side, halved ones too; reached where E₁ is open and the prior alone ends it.
+const MAX_NODES: usize = 8;
+
+/// Fall of ln p in one step beyond which it was too long, and is halved: a Gaussian falls by 2.2
+/// in the second.
+const CLIFF: f64 = 3.0;
+
+/// Fall of ln p at which a side ends: that of 2.4 standard errors. Beyond, its slope goes on.
+const SIDE_FALL: f64 = 2.9;
+
+/// Largest step along ln E₁: mesh and tangent follow the ridge that far.
+const LARGEST_RIDGE_STEP: f64 = 1.0;
+
+/// Step along ln E₁ in its local standard error.
+const RIDGE_STEP: f64 = 1.2;
+
+/// Fits to a side of the ridge, at most.
+const MAX_STEPS: usize = 4;
+
+/// Distance from the ridge in standard errors above which one step to it does not do, and steps
+/// there.
+const LONG: f64 = 1.0;
+
+/// Fall of ln p beyond the last node up to which its slope is followed.
+const TAIL: f64 = 4.0;
+
+/// Largest rise of ln p between nodes: parabolas through uneven ones overshoot.
+const RISE: f64 = 0.3;
+
+/// Points of the quadrature over u.
+const POINTS_LIMIT: usize = 200;
+
 /// The ridge at one E₁.
 #[derive(Debug, Clone)]
 pub struct Node {
@@ -57,19 +89,6 @@ impl Problem {
     /// The posterior along ln E₁ through an optimum with an inclusion. `None` where it has no
     /// curvature there.
     pub fn ridge(&self, fit: &Fit, mut go_on: impl FnMut() -> bool) -> Option<Ridge> {
-        // Steps along a side, halved ones too; reached where E₁ is open and the prior alone ends
-        // it.
-        let max_nodes: usize = 8;
-        // Fall of ln p in one step beyond which it was too long, and is halved: a Gaussian falls by
-        // 2.2 in the second.
-        let cliff = 3.0;
-        // Fall of ln p at which a side ends: that of 2.4 standard errors. Beyond, its slope goes
-        // on.
-        let side_fall = 2.9;
-        let largest_ridge_step = 1.0;
-        // Step along ln E₁ in its local standard error, and the largest: mesh and tangent follow
-        // the ridge that far.
-        let ridge_step = 1.2;
         let index = (self.coordinates().iter()).position(|c| *c == Coordinate::LumpModulus)?;
         let normal = self.normal(&fit.parameters, Some(&fit.solved))?;
         let (node, start) = self.node(&fit.parameters, normal, index)?;
@@ -84,15 +103,15 @@ impl Problem {
             };
             let mut part = 1.0;
             let mut before = top;
-            for _ in 0..max_nodes {
-                let step = part * (ridge_step * place.error).min(largest_ridge_step);
+            for _ in 0..MAX_NODES {
+                let step = part * (RIDGE_STEP * place.error).min(LARGEST_RIDGE_STEP);
                 let at = self.stepped(&place.parameters, &(sign * step * &place.tangent));
                 let near = &place.solved;
                 let Some((node, next)) = self.settled_node(&at, near, index, &mut go_on) else {
                     break;
                 };
                 let density = node.density;
-                if density < before - cliff {
+                if density < before - CLIFF {
                     // The ridge bends or ends on the way: an inclusion as soft as the tissue is
                     // none.
                     part *= 0.5;
@@ -106,7 +125,7 @@ impl Problem {
                     nodes.push(node);
                 }
                 place = next;
-                if density < top - side_fall {
+                if density < top - SIDE_FALL {
                     break;
                 }
             }
@@ -128,16 +147,12 @@ impl Problem {
         index: usize,
         go_on: &mut impl FnMut() -> bool,
     ) -> Option<(Node, Place)> {
-        let max_steps: usize = 4;
-        // Distance from the ridge in standard errors above which one step to it does not do, and
-        // steps there.
-        let long = 1.0;
         let mut solve =
             |at: &Parameters, near: &Solved| go_on().then(|| self.normal(at, Some(near))).flatten();
         let mut found = self.node(at, solve(at, near)?, index)?;
-        for _ in 1..max_steps {
+        for _ in 1..MAX_STEPS {
             let place = &found.1;
-            if place.away < long {
+            if place.away < LONG {
                 break;
             }
             let normal = solve(&place.parameters, &place.solved)?;
@@ -256,19 +271,15 @@ impl Curve<'_> {
 
     /// How far that slope is followed.
     fn tail(&self, is_first: bool) -> f64 {
-        // Fall of ln p beyond the last node up to which its slope is followed.
-        let tail = 4.0;
         let last = self.xs.len() - 1;
         let [outer, inner] = if is_first { [0, 1] } else { [last, last - 1] };
         let step = (self.xs[outer] - self.xs[inner]).abs();
         // A side that ended before p fell is followed as far as its last step.
-        (tail / self.slope(is_first).max(1e-9)).clamp(step, 4.0 * step)
+        (TAIL / self.slope(is_first).max(1e-9)).clamp(step, 4.0 * step)
     }
 
     /// The ridge at ln E₁.
     fn at(&self, x: f64) -> Node {
-        // Largest rise of ln p between nodes: parabolas through uneven ones overshoot.
-        let rise = 0.3;
         let last = self.xs.len() - 1;
         let k = self.xs.partition_point(|node| *node < x).clamp(1, last) - 1;
         let (a, b) = (&self.nodes[k], &self.nodes[k + 1]);
@@ -292,7 +303,7 @@ impl Curve<'_> {
         };
         let (low, high) = (a.density.min(b.density), a.density.max(b.density));
         Node {
-            density: value(&|node| node.density).clamp(low, high + rise),
+            density: value(&|node| node.density).clamp(low, high + RISE),
             at: DVector::from_fn(a.at.len(), |c, _| value(&|node| node.at[c])),
             covariance: &a.covariance * (1.0 - part) + &b.covariance * part,
         }
@@ -307,8 +318,6 @@ impl Marginal {
     /// beforehand, and the posterior is the mixture of both. With κ that logarithm, the odds of a
     /// ball are p(κ = 0 | y) / p(κ = 0) (J. M. Dickey, Ann. Math. Stat. 42 (1971) 204).
     pub fn new(ridge: &Ridge, shape: Option<(usize, f64)>) -> Option<Self> {
-        // Points of the quadrature over u.
-        let points_limit: usize = 200;
         let (nodes, index) = (&ridge.nodes, ridge.index);
         let xs: Vec<f64> = nodes.iter().map(|node| node.at[index]).collect();
         if xs.len() < 3 || xs.windows(2).any(|pair| pair[1] <= pair[0]) {
@@ -318,8 +327,8 @@ impl Marginal {
         let curve = Curve { nodes, xs };
         let from = curve.xs[0] - curve.tail(true);
         let to = curve.xs[last] + curve.tail(false);
-        let step = (to - from) / points_limit as f64;
-        let mut points: Vec<Node> = (0..points_limit)
+        let step = (to - from) / POINTS_LIMIT as f64;
+        let mut points: Vec<Node> = (0..POINTS_LIMIT)
             .map(|point| curve.at(from + (point as f64 + 0.5) * step))
             .collect();
         for point in &mut points {

@@ -21,6 +21,45 @@ use std::sync::Arc;
 use tactile_elasticity::{ElasticityError, Quantity};
 use tactile_fem::{Guide, Interface, Kinematics};
 
+/// Difference of log evidence beyond which another assumption about the face is not fitted to the
+/// end.
+const RIVAL_EVIDENCE: f64 = 16.0;
+
+/// Prior standard deviation of an inclusion's elongations, as logarithms.
+const ELONGATION: f64 = 0.2;
+
+/// Fewer rings do not show an inclusion's shape.
+const MIN_RINGS: usize = 8;
+
+/// χ² of the first fit over its degrees of freedom up to which the block may be plain. The
+/// meshes' errors bring homogeneous blocks by CalculiX to 1.5, under the wrong assumption about
+/// the face to 2.2; what an inclusion adds above 2 needs no test.
+const DOUBTFUL: f64 = 2.0;
+
+/// Elements along an eighth of the inclusion's circumference, of a homogeneous block's first fit
+/// and of the grid.
+const HOMOGENEOUS_FINENESS: usize = 2;
+
+/// Part of the block's height that an inclusion may reach down to.
+const DEEPEST: f64 = 0.95;
+
+/// The part of the better misfit in [`HOPELESS_EVIDENCE`].
+const HOPELESS_MISFIT: f64 = 0.05;
+
+/// Difference of the first fits' log evidence beyond which an assumption about the face is given
+/// up: this and a part of the better one's misfit, most of which is the mesh's.
+const HOPELESS_EVIDENCE: f64 = 25.0;
+
+/// Starts that are fitted. With tempered errors most end in one optimum; a third adds a quarter
+/// of the time.
+const FITTED_STARTS: usize = 2;
+
+/// Elements along an eighth of the inclusion's circumference in the first fits with an inclusion.
+const FIRST_FINENESS: usize = 3;
+
+/// Difference of the first fits' log evidence beyond which a block is not plain.
+const CERTAIN_EVIDENCE: f64 = 50.0;
+
 /// Part of the guide's radius within which pressures are used: further out the singular rim rules,
 /// where meshes disagree by percents.
 pub const USED_FACE: f64 = 0.75;
@@ -217,9 +256,6 @@ impl InclusionSearch {
         approaches_m: &[f64],
         progress: &mut dyn FnMut(SearchProgress) -> ControlFlow<()>,
     ) -> Result<InclusionEstimate, ElasticityError> {
-        // Difference of log evidence beyond which another assumption about the face is not fitted
-        // to the end.
-        let rival_evidence = 16.0;
         let interfaces = self.specimen.interfaces();
         // Per interface: a homogeneous fit, the grid, two first fits, the answer's.
         let mut counter = Counter::new(interfaces.len() * 55, progress);
@@ -253,7 +289,7 @@ impl InclusionSearch {
         let mut is_unsolved = false;
         for first_fits in candidates {
             let needed = (hypotheses.first())
-                .map_or(f64::NEG_INFINITY, |best| best.evidence() - rival_evidence);
+                .map_or(f64::NEG_INFINITY, |best| best.evidence() - RIVAL_EVIDENCE);
             let found = self.hypothesis(observed, approaches_m, first_fits, needed, &mut counter);
             is_unsolved |= found.is_none();
             hypotheses.extend(found);
@@ -264,7 +300,7 @@ impl InclusionSearch {
             return Ok(pair);
         }
         let best = (hypotheses.iter()).map(Hypothesis::evidence);
-        let needed = best.fold(f64::NEG_INFINITY, f64::max) - rival_evidence;
+        let needed = best.fold(f64::NEG_INFINITY, f64::max) - RIVAL_EVIDENCE;
         for hypothesis in &mut hypotheses {
             if hypothesis.evidence() > needed {
                 hypothesis.follow(|| counter.step());
@@ -421,12 +457,11 @@ impl InclusionSearch {
         let axes_m = &cells.positions.axes_m;
         let ([x, y], half_width) = extent(axes_m);
         let centre = 0.4 * self.guide.radius_m() + half_width;
-        let elongation = 0.2;
         let mut known = vec![
             Prior::new(Coordinate::Centre(0), (x, centre)),
             Prior::new(Coordinate::Centre(1), (y, centre)),
-            Prior::new(Coordinate::Elongation(0), (0.0, elongation)),
-            Prior::new(Coordinate::Elongation(1), (0.0, elongation)),
+            Prior::new(Coordinate::Elongation(0), (0.0, ELONGATION)),
+            Prior::new(Coordinate::Elongation(1), (0.0, ELONGATION)),
             Prior::new(Coordinate::Carried, CARRIED),
             Prior::new(Coordinate::Spread, SPREAD),
         ];
@@ -452,13 +487,11 @@ impl InclusionSearch {
         &self,
         radii_m: &[f64],
     ) -> Result<Vec<usize>, ElasticityError> {
-        // Fewer rings do not show an inclusion's shape.
-        let min_rings: usize = 8;
         let limit = USED_FACE * self.guide.radius_m();
         let used: Vec<usize> = (0..radii_m.len())
             .filter(|&k| radii_m[k] <= limit)
             .collect();
-        Quantity::Samples.at_least(used.len(), min_rings)?;
+        Quantity::Samples.at_least(used.len(), MIN_RINGS)?;
         Ok(used)
     }
 }
@@ -565,15 +598,8 @@ impl InclusionSearch {
         interface: Interface,
         counter: &mut Counter<'_>,
     ) -> Option<HomogeneousFit> {
-        // χ² of the first fit over its degrees of freedom up to which the block may be plain. The
-        // meshes' errors bring homogeneous blocks by CalculiX to 1.5, under the wrong assumption
-        // about the face to 2.2; what an inclusion adds above 2 needs no test.
-        let doubtful = 2.0;
-        // Elements along an eighth of the inclusion's circumference, of a homogeneous block's first
-        // fit and of the grid.
-        let homogeneous_fineness: usize = 2;
         let guess = self.stiffness(observed, approaches_m);
-        let forward = self.forward(observed, approaches_m, interface, homogeneous_fineness);
+        let forward = self.forward(observed, approaches_m, interface, HOMOGENEOUS_FINENESS);
         let mut problem = Problem {
             forward: forward.clone(),
             measured: observed.values.clone(),
@@ -598,7 +624,7 @@ impl InclusionSearch {
         };
         let linear = linear.with_plain(&known)?;
         let grid = starts(&linear, &known, counter)?;
-        let settled = if fit.misfit < doubtful * observed.values.len() as f64 {
+        let settled = if fit.misfit < DOUBTFUL * observed.values.len() as f64 {
             self.settled(&problem, &fit, observed, &grid, counter)
         } else {
             None
@@ -682,13 +708,11 @@ pub fn starts(
     homogeneous: &Parameters,
     counter: &mut Counter<'_>,
 ) -> Option<Vec<GridStart>> {
-    // Part of the block's height that an inclusion may reach down to.
-    let deepest = 0.95;
     let face_radius_m = forward.guide.radius_m();
     let mut starts = Vec::new();
     for diameter in DIAMETERS {
         for depth in DEPTHS {
-            if (diameter + depth) * face_radius_m >= deepest * homogeneous.height_m {
+            if (diameter + depth) * face_radius_m >= DEEPEST * homogeneous.height_m {
                 continue;
             }
             let with = |contrast: f64| Parameters {
@@ -764,11 +788,7 @@ impl FirstFits {
 
     /// Log evidence of the first fits below which another assumption about the face is given up.
     fn hopeless(&self) -> f64 {
-        let hopeless_misfit = 0.05;
-        // Difference of the first fits' log evidence beyond which an assumption about the face is
-        // given up: this and a part of the better one's misfit, most of which is the mesh's.
-        let hopeless_evidence = 25.0;
-        self.evidence() - hopeless_evidence - hopeless_misfit * self.better().misfit
+        self.evidence() - HOPELESS_EVIDENCE - HOPELESS_MISFIT * self.better().misfit
     }
 }
 
@@ -783,19 +803,13 @@ impl InclusionSearch {
         another: Option<&FirstFits>,
         counter: &mut Counter<'_>,
     ) -> FirstFits {
-        // Starts that are fitted. With tempered errors most end in one optimum; a third adds a
-        // quarter of the time.
-        let fitted_starts: usize = 2;
-        // Elements along an eighth of the inclusion's circumference in the first fits with an
-        // inclusion.
-        let first_fineness: usize = 3;
         let starts = homogeneous.starts();
         let mut first_fits = FirstFits::homogeneous(homogeneous);
         let modulus = first_fits.homogeneous.parameters.block_modulus_pa;
         let problem = &mut first_fits.problem;
         problem.priors.extend(self.lump_priors(modulus));
         problem.priors.extend(self.place_priors(observed));
-        let forward = self.forward(observed, approaches_m, first_fits.interface, first_fineness);
+        let forward = self.forward(observed, approaches_m, first_fits.interface, FIRST_FINENESS);
         problem.forward = Forward {
             cells: problem.forward.cells.clone(),
             ..forward
@@ -805,7 +819,7 @@ impl InclusionSearch {
             FIRST_FIT_ENDING.below(problem.objective_at(another.hopeless(), lump.volume))
         });
         let best = best.map(|(_, lump)| &lump.parameters);
-        first_fits.lump = (best.into_iter().chain(&starts).take(fitted_starts))
+        first_fits.lump = (best.into_iter().chain(&starts).take(FITTED_STARTS))
             .filter_map(|start| problem.fit(start, ending, || counter.step()))
             .max_by(|a, b| a.evidence.total_cmp(&b.evidence));
         first_fits
@@ -821,8 +835,6 @@ impl InclusionSearch {
         needed: f64,
         counter: &mut Counter<'_>,
     ) -> Option<Hypothesis> {
-        // Difference of the first fits' log evidence beyond which a block is not plain.
-        let certain_evidence = 50.0;
         let FirstFits {
             mut problem,
             interface,
@@ -835,7 +847,7 @@ impl InclusionSearch {
         let gain = (lump.as_ref()).map_or(f64::NEG_INFINITY, |lump| {
             lump.evidence - homogeneous.evidence
         });
-        let is_certain = gain > certain_evidence;
+        let is_certain = gain > CERTAIN_EVIDENCE;
         let fineness = answer_fineness(is_certain);
         let forward = self.forward(observed, approaches_m, interface, fineness);
         problem.forward = forward

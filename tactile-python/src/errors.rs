@@ -61,7 +61,6 @@ pub fn pipeline(error: PipelineError) -> PyErr {
         | E::Calibration(_)
         | E::SurfaceOptions(_)
         | E::WarpOptions(_)
-        | E::NoSlopes
         | E::DepthTable(_)
         | E::Material(_)
         | E::Check { .. }

@@ -19,7 +19,7 @@ use tactile_imaging::force::{ForceError, ReferenceFrame};
 use tactile_imaging::matching::{MatchError, Matching, PointMatcher};
 use tactile_imaging::pipeline::{ContactReading, ContactStage, FrameContact};
 use tactile_imaging::sfs::{
-    ControlPointSampler, Domain, Frame, SfsError, SlopeIntegrator, Surface, SurfaceReconstruction,
+    ControlPointSampler, Domain, Frame, SfsError, Surface, SurfaceReconstruction,
 };
 use tactile_imaging::tps::{TpsError, Warp, WarpModel};
 

@@ -10,6 +10,13 @@ use ndarray::Array2;
 use rand_distr::{Distribution, StandardNormal};
 use tactile_imaging::force::{Branch, CalibrationPair};
 
+/// An indenter is doubled so many times at most: sixteen times the radius is a sixth of the
+/// pressure.
+const DOUBLINGS: usize = 4;
+
+/// The camera's largest grey level.
+const BRIGHTEST: f64 = 255.0;
+
 /// How a calibration is run.
 ///
 /// ```
@@ -175,13 +182,10 @@ impl PressScene {
         &self,
         mut options: CalibrationRun,
     ) -> Result<CalibrationRun, SimulateError> {
-        // An indenter is doubled so many times at most: sixteen times the radius is a sixth of the
-        // pressure.
-        let doublings: usize = 4;
         options.validate()?;
         // Light grows with the force on both branches.
         let force_n = options.largest_force_n;
-        for _ in 0..=doublings {
+        for _ in 0..=DOUBLINGS {
             if !is_beyond_range(&self.calibration_light(options.indenter, force_n)?) {
                 return Ok(options);
             }
@@ -207,9 +211,7 @@ impl PressScene {
 }
 
 fn is_beyond_range(light: &Array2<f64>) -> bool {
-    // The camera's largest grey level.
-    let brightest = 255.0;
-    light.iter().any(|&grey| grey > brightest)
+    light.iter().any(|&grey| grey > BRIGHTEST)
 }
 
 impl CalibrationRun {

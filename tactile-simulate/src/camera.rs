@@ -11,6 +11,10 @@ use rand::SeedableRng;
 use rand::rngs::ChaCha8Rng;
 use rand_distr::{Distribution, Poisson, StandardNormal};
 
+/// From this many electrons on, Poisson noise is drawn from the normal law (skewness 1/√256 =
+/// 0.06).
+const NORMAL_FROM_ELECTRONS: f64 = 256.0;
+
 /// The camera's noise in grey levels.
 #[derive(Debug, Clone, Copy)]
 struct NoiseLaw {
@@ -188,13 +192,10 @@ impl Camera {
     }
 
     fn noise_law(&self) -> NoiseLaw {
-        // From this many electrons on, Poisson noise is drawn from the normal law (skewness 1/√256
-        // = 0.06).
-        let normal_from_electrons = 256.0;
         NoiseLaw {
             variance_per_grey: self.electrons_per_grey().recip(),
             read_variance: self.read_noise_grey * self.read_noise_grey,
-            normal_from_grey: normal_from_electrons / self.electrons_per_grey(),
+            normal_from_grey: NORMAL_FROM_ELECTRONS / self.electrons_per_grey(),
         }
     }
 

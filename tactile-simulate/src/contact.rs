@@ -9,6 +9,14 @@ use crate::press::{Elastic, ElasticSphere, LightGuide};
 use std::borrow::Cow;
 use std::f64::consts::{FRAC_PI_2, PI};
 
+/// Largest relative difference allowed between a state's force and the integral of its pressure.
+/// Finite-element pressures recovered at nodes miss the force by up to some percent where the
+/// mesh is coarse. A wrong unit misses it by far more.
+const LARGEST_FORCE_MISMATCH: f64 = 0.05;
+
+/// R of the balls.
+const RADIUS_M_LIMIT: f64 = 3e-3;
+
 /// The contact at one load.
 ///
 /// ```
@@ -388,10 +396,6 @@ pub struct ContactState {
 
 impl ContactState {
     pub(crate) fn validate(&self) -> Result<(), SimulateError> {
-        // Largest relative difference allowed between a state's force and the integral of its
-        // pressure. Finite-element pressures recovered at nodes miss the force by up to some
-        // percent where the mesh is coarse. A wrong unit misses it by far more.
-        let largest_force_mismatch = 0.05;
         positive("force_n", self.force_n)?;
         positive("contact_radius_m", self.contact_radius_m)?;
         finite("indentation_m", self.indentation_m)?;
@@ -430,8 +434,8 @@ impl ContactState {
         within(
             "force_n",
             self.force_n,
-            carried_n * (1.0 - largest_force_mismatch),
-            carried_n * (1.0 + largest_force_mismatch),
+            carried_n * (1.0 - LARGEST_FORCE_MISMATCH),
+            carried_n * (1.0 + LARGEST_FORCE_MISMATCH),
         )
     }
 
@@ -596,8 +600,6 @@ pub fn finite_element_states(
     sphere: &ElasticSphere,
     waveguide: &LightGuide,
 ) -> Option<Vec<ContactState>> {
-    // R of the balls.
-    let radius_m_limit = 3e-3;
     // Compared exactly: a body that differs at all is one that was not computed.
     let known = [Elastic::CL2000X, Elastic::CL2003X].contains(&sphere.material);
     let elastic = |w: &LightGuide| -> Vec<(f64, Elastic)> {
@@ -607,7 +609,7 @@ pub fn finite_element_states(
             .collect()
     };
     let same_guide = elastic(waveguide) == elastic(&LightGuide::default());
-    if !known || !same_guide || sphere.radius_m != radius_m_limit {
+    if !known || !same_guide || sphere.radius_m != RADIUS_M_LIMIT {
         return None;
     }
     let mut states: Vec<ContactState> = Vec::new();

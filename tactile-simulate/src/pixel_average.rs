@@ -19,6 +19,27 @@
 use ndarray::Array2;
 use std::f64::consts::{PI, TAU};
 
+/// Bound on the steps a side, for contacts far below a pixel, whose light is negligible.
+const MOST_STEPS: f64 = 512.0;
+
+/// Least steps in the contact's radius, for contacts below a pixel.
+const STEPS_IN_RADIUS: f64 = 24.0;
+
+/// Steps a side in a pixel at the rim. Twice as many change the light of a contact of 20 pixels
+/// by 2e-5.
+const RIM_STEPS: f64 = 16.0;
+
+/// Pixels this close to the rim, in pixels, are averaged over a fine grid: pressures fall to zero
+/// there as a square root.
+const RIM_ZONE: f64 = 3.0;
+
+/// Pixels this close to the rim, in pixels, are averaged over the fine grid.
+const BENT_RIM_ZONE: f64 = 2.0;
+
+/// Steps a side in a pixel near the rim. Twice as many change the light by some 10⁻⁴ of the rim's
+/// pixels.
+const BENT_RIM_STEPS: usize = 8;
+
 /// Rows and columns of the image plane: the first and one past the last of each.
 pub type Window = [[isize; 2]; 2];
 
@@ -299,21 +320,11 @@ impl Disc {
     /// Four by four Gauss nodes inside. At the rim 16 by 16 midpoints, with an error of some 1e-5
     /// of the light.
     pub fn average_radial(&self, window: Window, value: impl Fn(f64) -> f64) -> Patch {
-        // Bound on the steps a side, for contacts far below a pixel, whose light is negligible.
-        let most_steps = 512.0;
-        // Least steps in the contact's radius, for contacts below a pixel.
-        let steps_in_radius = 24.0;
-        // Steps a side in a pixel at the rim. Twice as many change the light of a contact of 20
-        // pixels by 2e-5.
-        let rim_steps = 16.0;
-        // Pixels this close to the rim, in pixels, are averaged over a fine grid: pressures fall to
-        // zero there as a square root.
-        let rim_zone = 3.0;
         let [[row0, row1], [col0, col1]] = window;
         let [width, height] = self.pixel_size_m;
-        let smooth_below = self.radius_m - rim_zone * width.max(height);
-        let least = (steps_in_radius * width.max(height) / self.radius_m).ceil();
-        let steps = least.clamp(rim_steps, most_steps) as usize;
+        let smooth_below = self.radius_m - RIM_ZONE * width.max(height);
+        let least = (STEPS_IN_RADIUS * width.max(height) / self.radius_m).ceil();
+        let steps = least.clamp(RIM_STEPS, MOST_STEPS) as usize;
         let midpoints = midpoints(steps);
         let shape = ((row1 - row0) as usize, (col1 - col0) as usize);
         let values = Array2::from_shape_fn(shape, |(r, c)| {
@@ -413,19 +424,14 @@ impl Disc {
 
     /// [`average_radial`](Self::average_radial) behind a lens that distorts.
     pub fn average_bent(&self, plane: Plane, window: Window, value: impl Fn(f64) -> f64) -> Patch {
-        // Pixels this close to the rim, in pixels, are averaged over the fine grid.
-        let bent_rim_zone = 2.0;
-        // Steps a side in a pixel near the rim. Twice as many change the light by some 10⁻⁴ of the
-        // rim's pixels.
-        let bent_rim_steps: usize = 8;
         let [[row0, row1], [col0, col1]] = window;
         let centre = self.place(plane);
         let distance = |pixel: [f64; 2]| {
             let place = plane.to_metres(pixel);
             (place[0] - centre[0]).hypot(place[1] - centre[1])
         };
-        let reach = bent_rim_zone * self.pixel_size_m[0].max(self.pixel_size_m[1]);
-        let fine = midpoints(bent_rim_steps);
+        let reach = BENT_RIM_ZONE * self.pixel_size_m[0].max(self.pixel_size_m[1]);
+        let fine = midpoints(BENT_RIM_STEPS);
         let shape = ((row1 - row0) as usize, (col1 - col0) as usize);
         let values = Array2::from_shape_fn(shape, |(r, c)| {
             let pixel = [(col0 + c as isize) as f64, (row0 + r as isize) as f64];

@@ -5,6 +5,10 @@ use crate::error::{SimulateError, at_least, positive};
 use crate::press::Elastic;
 use tactile_imaging::fem::{AppliedLoad, FemScene, Interface, Material, State};
 
+/// ν = ½ has no finite bulk modulus. At this one the volume of a squeezed block changes by (1 −
+/// 2ν) σ/E, which is 2e-4 of the stress over E.
+const LARGEST_POISSON_RATIO: f64 = 0.4999;
+
 impl ContactState {
     /// A state that the solver of `tactile-elasticity` found of a ball, a cone or another object
     /// with a free rim. `None` without contact.
@@ -91,9 +95,6 @@ impl ContactState {
         faces: Interface,
         forces_n: &[f64],
     ) -> Result<Vec<Self>, SimulateError> {
-        // ν = ½ has no finite bulk modulus. At this one the volume of a squeezed block changes by
-        // (1 − 2ν) σ/E, which is 2e-4 of the stress over E.
-        let largest_poisson_ratio = 0.4999;
         positive("radius_m", radius_m)?;
         positive("height_m", height_m)?;
         material.validate()?;
@@ -104,7 +105,7 @@ impl ContactState {
             positive("force_n", force_n - last_n)?;
             last_n = force_n;
         }
-        let poisson_ratio = material.poisson_ratio.min(largest_poisson_ratio);
+        let poisson_ratio = material.poisson_ratio.min(LARGEST_POISSON_RATIO);
         let unsolved = |limit_n: f64| SimulateError::Overload {
             force_n: last_n,
             limit_n,

@@ -1,6 +1,6 @@
 //! Input that is hard or wrong: bad pixels, noise at the rim, domains one pixel wide, options and
 //! shapes that make no sense.
-use crate::common::{Sampled, errors, from_rim, integrators, reconstructions, sphere};
+use crate::common::{Alignment, Sampled, errors, from_rim, integrators, reconstructions, sphere};
 use ndarray::Array2;
 use tactile_sfs::*;
 

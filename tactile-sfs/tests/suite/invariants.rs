@@ -2,7 +2,7 @@
 //! not matter; and the estimates and error functions against cases worked out by hand.
 
 use crate::common::{integrators, reconstructions};
-use ndarray::{Array2, array, s};
+use ndarray::{Array2, s};
 use proptest::prelude::*;
 use tactile_sfs::*;
 

@@ -2,7 +2,8 @@
 #![allow(clippy::print_stdout)]
 
 use crate::common::{
-    Sampled, Shape, ellipsoid, errors, from_rim, gaussian, integrators, paraboloid, sphere, waves,
+    Alignment, Sampled, Shape, ellipsoid, errors, from_rim, gaussian, integrators, paraboloid,
+    sphere, waves,
 };
 use ndarray::Array2;
 use tactile_sfs::*;

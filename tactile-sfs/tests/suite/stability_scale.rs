@@ -1,7 +1,7 @@
 //! Heights in every unit and both precisions; saturated, black and constant images.
 #![allow(clippy::print_stdout)]
 
-use crate::common::{Sampled, errors, gaussian, integrators, reconstructions, sphere};
+use crate::common::{Alignment, Sampled, errors, gaussian, integrators, reconstructions, sphere};
 use ndarray::Array2;
 use tactile_sfs::*;
 use test_support::Worst;

@@ -7,8 +7,8 @@ use tactile_files::scene::Scene;
 use tactile_imaging::elasticity::modulus::{FlatPunch, HertzSphere, PaperRatio, StrainReference};
 use tactile_imaging::force::{CalibrationPair, Estimate};
 use tactile_imaging::pipeline::{
-    DarkContact, EstimatorChoice, MatcherChoice, Object, Pipeline, ReconstructionChoice,
-    SamplerChoice, Session, StagesConfig, StrainChoice, SurfaceInput, WarpChoice,
+    DarkContact, EstimatorChoice, MatcherChoice, Object, Pipeline, ReconstructionChoice, Session,
+    StagesConfig, StrainChoice, SurfaceInput, WarpChoice,
 };
 use tactile_simulate::{
     CalibrationRun, Camera, Elastic, ElasticSphere, Gain, PressOptions, PressScene, Trial,

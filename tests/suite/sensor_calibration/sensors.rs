@@ -243,16 +243,6 @@ impl Simulated {
         self.scene.reference(0)
     }
 
-    /// A frame under the first ball at its largest force, in the light of the lamps times a gain.
-    pub(super) fn pressed_frame(&mut self, gain: f64, repeat: u32) -> Array2<u8> {
-        let mut load = self.load(BALLS[0].1);
-        load.illumination.level *= gain;
-        let law = self.scene.options().law.clone();
-        let ball = rigid(self.balls[0]);
-        let scene = self.scene.with_object(ball, law, vec![load]).unwrap();
-        scene.frame(0, repeat)
-    }
-
     /// The frames of a calibration, with the forces of a gauge.
     pub(super) fn calibration(&mut self) -> SensorCalibration {
         let mut presses = Vec::new();

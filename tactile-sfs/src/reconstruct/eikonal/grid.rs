@@ -7,6 +7,12 @@
 use super::{BoundaryCondition, Eikonal, EikonalBuffers, Node};
 use crate::{Domain, Frame, PixelFlags, PixelScalar, SfsError, Surface};
 
+/// Pixels over which the boundary's kind and curvature are taken to be the same.
+const WINDOW: usize = 4;
+
+/// The boundary is at most one pixel away, the rest is slack for the error of the extrapolation.
+const REACH: f64 = 1.25;
+
 impl<T: PixelScalar> EikonalBuffers<T> {
     /// Fills the grid and flags the pixels the model does not explain. Returns whether heights are
     /// known inside the mask.
@@ -305,14 +311,9 @@ impl<T: PixelScalar> EikonalBuffers<T> {
     /// Mean |∇ sin θ| of the boundary pixels around one, and whether most of them lie at an
     /// occluding contour.
     fn around(&self, i: usize) -> (T, bool) {
-        // Over as many pixels the boundary's kind and curvature are taken to be the same.
-        let window = 4;
-        // The boundary is at most one pixel away, the rest is slack for the error of the
-        // extrapolation.
-        let reach = 1.25;
         let (width, rows) = (self.width, self.node.len() / self.width);
         let span = |middle: usize, length: usize| {
-            middle.saturating_sub(window)..(middle + window + 1).min(length)
+            middle.saturating_sub(WINDOW)..(middle + WINDOW + 1).min(length)
         };
         let (mut sum, mut count, mut votes) = (T::zero(), 0usize, 0usize);
         for row in span(i / width, rows) {
@@ -321,7 +322,7 @@ impl<T: PixelScalar> EikonalBuffers<T> {
                     let [gradient, step] = self.edges[j];
                     sum += gradient;
                     count += 1;
-                    votes += usize::from(T::one() - self.sine[j] < T::of(reach) * step * gradient);
+                    votes += usize::from(T::one() - self.sine[j] < T::of(REACH) * step * gradient);
                 }
             }
         }
