@@ -146,6 +146,17 @@ pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     sums.iter().sum::<f64>() + tail
 }
 
+/// Largest magnitude.
+pub(crate) fn largest(values: &[f64]) -> f64 {
+    values.iter().fold(0.0, |m, x| f64::max(m, x.abs()))
+}
+
+/// `size` relative to the largest target.
+pub(crate) fn relative(size: f64, targets: &[f64]) -> f64 {
+    let target = largest(targets);
+    if target > 0.0 { size / target } else { size }
+}
+
 /// The squared distance of point `i`, of coordinates axis by axis, from a place.
 #[inline(always)]
 pub(crate) fn squared_distance<L: Lane, const D: usize>(

@@ -5,15 +5,75 @@ use core::ops::ControlFlow;
 use nalgebra::{DMatrix, Point, SVector};
 
 use super::{
-    Buffers, Centres, Coefficients, Factorization, Iterative, Run, SplineWorkspace, System, Watch,
-    largest, relative,
+    affine::{Coefficients, MAX},
+    buffers::Buffers,
+    centres::Centres,
+    equations::Equations,
+    iterative::{Iterative, Run, Watch},
+    system::{Setting, System},
 };
 use crate::{
-    FitOptions, FitReport, Kernel, Progress, Smoothing, Spline, StopReason, TpsError,
-    error::{same_length, validate_smoothing, validate_weights},
-    evaluate::{BLOCK, KernelSum, Solution},
+    FitOptions, Kernel, Progress, R2LogR, Smoothing, Spline, TpsError,
+    error::{finite, same_count, same_length, validate_smoothing, validate_weights},
+    evaluate::Solution,
     lanes::{Job, Lane, dispatch},
 };
+
+/// Source points with their kernel matrix factored: splines to any targets follow in O(n²).
+///
+/// ```
+/// use nalgebra::Point2;
+/// use tactile_tps::{Factorization, FitOptions, ThinPlateSpline};
+/// # fn main() -> Result<(), tactile_tps::TpsError> {
+/// let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
+/// let factorization = Factorization::new(&sources, &FitOptions::default())?;
+/// let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
+/// let spline: ThinPlateSpline<2> = factorization.fit(&targets)?;
+/// assert!((spline.apply(&sources[4]) - targets[4]).norm() < 1e-14);
+/// # Ok(())
+/// # }
+/// ```
+#[derive(Clone, Debug)]
+pub struct Factorization<const D: usize, K = R2LogR> {
+    pub(super) kernel: K,
+    pub(super) centres: Centres<D>,
+    system: System<D>,
+    pub(super) weights: Option<Vec<f64>>,
+    /// Weight of every centre, empty if all weights are one.
+    pub(super) centre_weights: Vec<f64>,
+    smoothing: Smoothing,
+    rank_tolerance: f64,
+    /// The preconditioner, if the solver iterates. The system is then without a factor.
+    iterative: Option<Iterative<D>>,
+    /// Residual at which iteration stops.
+    tolerance: f64,
+}
+
+/// Buffers that refits reuse.
+///
+/// ```
+/// use nalgebra::Point2;
+/// use tactile_tps::{Factorization, FitOptions, Spline, SplineWorkspace};
+/// # fn main() -> Result<(), tactile_tps::TpsError> {
+/// let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
+/// let factorization = Factorization::new(&sources, &FitOptions::default())?;
+/// let (mut workspace, mut spline) = (SplineWorkspace::default(), Spline::default());
+/// for step in 1..=3 {
+///     // No allocation from the second round on.
+///     let targets = sources.map(|p| Point2::new(p.x, p.y * f64::from(step)));
+///     factorization.refit_with(&mut workspace, &targets, None, None, &mut spline)?;
+///     assert!((spline.apply(&sources[4]) - targets[4]).norm() < 1e-14);
+/// }
+/// # Ok(())
+/// # }
+/// ```
+#[derive(Clone, Debug, Default)]
+pub struct SplineWorkspace<const D: usize> {
+    buffers: Buffers,
+    system: System<D>,
+    iterative: Iterative<D>,
+    centre_weights: Vec<f64>,
+}
 
 /// A system with what is to be solved with it.
 struct Task<'a, const D: usize> {
@@ -24,6 +84,75 @@ struct Task<'a, const D: usize> {
     careful: bool,
     /// Where there is no factor.
     iterative: Option<&'a Iterative<D>>,
+}
+
+impl<const D: usize, K: Kernel> Factorization<D, K> {
+    /// No points yet: memory for [`with_points`](Self::with_points).
+    pub(crate) fn without_points(kernel: K) -> Self {
+        const { assert!(D >= 1 && D < MAX, "splines have one to three dimensions") };
+        Self {
+            kernel,
+            centres: Centres::default(),
+            system: System::default(),
+            weights: None,
+            centre_weights: Vec::new(),
+            smoothing: Smoothing::None,
+            rank_tolerance: 0.0,
+            iterative: None,
+            tolerance: 0.0,
+        }
+    }
+
+    /// The distinct centres and the options, without a factor for them.
+    pub(super) fn with_points(
+        mut self,
+        sources: &[Point<f64, D>],
+        options: &FitOptions<K>,
+    ) -> Result<Self, TpsError> {
+        if let Some(weights) = &options.weights {
+            same_count("weights", sources.len(), weights.len())?;
+            self.weights.get_or_insert_default().clone_from(weights);
+        } else {
+            self.weights = None;
+        }
+        self.kernel.clone_from(&options.kernel);
+        // A kernel with a length of its own would become another one under a change of scale.
+        self.centres.take(sources, self.kernel.degree().is_some())?;
+        self.centres
+            .weigh(self.weights.as_deref(), &mut self.centre_weights);
+        self.smoothing = options.smoothing;
+        self.rank_tolerance = options.rank_tolerance;
+        self.tolerance = options.tolerance;
+        Ok(self)
+    }
+
+    pub(super) fn setting(&self) -> Setting<'_, K, D> {
+        Setting {
+            kernel: &self.kernel,
+            centres: &self.centres,
+            rank_tolerance: self.rank_tolerance,
+        }
+    }
+
+    /// λ in the frame's units: the kernel scales as length to its degree.
+    pub(super) fn inner_lambda(&self, smoothing: Smoothing) -> f64 {
+        match smoothing {
+            Smoothing::Lambda(lambda) => lambda / self.unit(),
+            _ => 0.0,
+        }
+    }
+
+    /// How much larger the kernel is outside than in the frame.
+    pub(super) fn unit(&self) -> f64 {
+        let degree = self.kernel.degree().unwrap_or(0);
+        self.centres.frame.scale.powi(degree)
+    }
+
+    /// One finite target for each source.
+    pub(super) fn check<const M: usize>(&self, targets: &[Point<f64, M>]) -> Result<(), TpsError> {
+        same_count("target points", self.centres.inputs, targets.len())?;
+        finite(targets, "target points")
+    }
 }
 
 impl<const D: usize, K: Kernel> Factorization<D, K> {
@@ -561,168 +690,6 @@ impl<K: Kernel, const D: usize> Job for Slopes<'_, K, D> {
                 // The gradient is 2 dU/ds d, s being the squared distance.
                 *slope = (L::from_f64(2.0) * self.kernel.derivatives(s).first * d[axis]).get();
             }
-        }
-    }
-}
-
-/// A spline's equations: everything but the targets.
-struct Equations<'a, K, const D: usize> {
-    kernel: &'a K,
-    centres: &'a Centres<D>,
-    system: &'a System<D>,
-    /// λ in the frame's units.
-    lambda: f64,
-}
-
-impl<K: Kernel, const D: usize> Equations<'_, K, D> {
-    /// Solves for the targets in `buffers`, and refines where the condition number is large.
-    ///
-    /// `careful` measures the residual and refines from a lower condition number on.
-    fn solve<const M: usize>(
-        &self,
-        buffers: &mut Buffers,
-        report: &mut FitReport,
-        careful: bool,
-    ) -> [Coefficients; M] {
-        let Buffers {
-            targets,
-            weights,
-            work,
-            spare,
-            ..
-        } = &mut *buffers;
-        // The solver works in place, and refinement needs the targets again.
-        weights.clone_from(targets);
-        let mut affine = self.system.solve(weights, self.lambda, work, spare);
-        report.condition = self.system.condition(self.lambda);
-        (report.residual, report.refinements) = (None, 0);
-        (report.iterations, report.stop) = (0, StopReason::Direct);
-        let n = self.centres.len();
-        // For a few points a step of refinement costs next to nothing, and is taken sooner.
-        let threshold = match careful {
-            true if n <= 128 => 10.0 * n as f64,
-            true => 1e6,
-            false => 1e8,
-        };
-        if report.condition > threshold {
-            self.refine(buffers, &mut affine, report);
-        }
-        if careful && report.refinements == 0 {
-            report.residual = Some(self.sampled_residual(&affine, buffers));
-        }
-        affine
-    }
-
-    /// Iterative refinement, in at most four steps.
-    fn refine<const M: usize>(
-        &self,
-        buffers: &mut Buffers,
-        affine: &mut [Coefficients; M],
-        report: &mut FitReport,
-    ) {
-        let mut last = f64::INFINITY;
-        for _ in 0..4 {
-            report.residual = Some(self.residual(affine, buffers));
-            let Buffers {
-                weights,
-                residuals,
-                work,
-                spare,
-                ..
-            } = &mut *buffers;
-            let more: [Coefficients; M] = self.system.solve(residuals, self.lambda, work, spare);
-            let step = largest(residuals) / largest(weights).max(f64::MIN_POSITIVE);
-            // A step that is no shorter than half the one before is rounding.
-            if step.is_nan() || step > 0.5 * last {
-                return;
-            }
-            let pairs = weights.iter_mut().zip(residuals.iter());
-            pairs.for_each(|(w, r)| *w += r);
-            let pairs = affine.iter_mut().flatten().zip(more.iter().flatten());
-            pairs.for_each(|(a, d)| *a += d);
-            report.refinements += 1;
-            if step < 1e-8 {
-                return;
-            }
-            last = step;
-        }
-    }
-
-    /// y − K w − λ W⁻¹ w − P a at the centres. Gives its largest entry relative to the largest
-    /// target.
-    fn residual<const M: usize>(&self, affine: &[Coefficients; M], buffers: &mut Buffers) -> f64 {
-        let n = self.centres.len();
-        let Buffers {
-            targets,
-            weights,
-            residuals,
-            ..
-        } = buffers;
-        residuals.clone_from(targets);
-        let sum = self.sum::<M>(weights);
-        let places = sum.centres;
-        sum.subtract(places, 0..n, residuals);
-        let mut size = 0.0;
-        for (i, &centre) in self.system.active.iter().enumerate() {
-            for m in 0..M {
-                let residual = &mut residuals[m * n + centre];
-                *residual -= self.rest(&affine[m], &weights[m * n..], i);
-                size = f64::max(size, residual.abs());
-            }
-        }
-        relative(size, targets)
-    }
-
-    /// The largest residual at up to one block of centres, spread evenly.
-    fn sampled_residual<const M: usize>(
-        &self,
-        affine: &[Coefficients; M],
-        buffers: &mut Buffers,
-    ) -> f64 {
-        let (n, active) = (self.centres.len(), &self.system.active);
-        let count = active.len().min(BLOCK);
-        // All residuals would cost O(n²), as much as the solve. One block of them costs O(n).
-        let pick = |i: usize| i * active.len() / count;
-        let Buffers {
-            targets,
-            weights,
-            residuals,
-            ..
-        } = buffers;
-        residuals.clear();
-        residuals.resize(M * count, 0.0);
-        let mut places = [[0.0; BLOCK]; D];
-        for (k, axis) in places.iter_mut().enumerate() {
-            (0..count).for_each(|i| axis[i] = self.centres.axes[k][active[pick(i)]]);
-        }
-        let places = places.each_ref().map(|axis| &axis[..count]);
-        self.sum::<M>(weights).subtract(places, 0..count, residuals);
-        let mut size = 0.0;
-        for i in 0..count {
-            for m in 0..M {
-                let target = targets[m * n + active[pick(i)]];
-                let rest = self.rest(&affine[m], &weights[m * n..], pick(i));
-                size = f64::max(size, (target - rest + residuals[m * count + i]).abs());
-            }
-        }
-        relative(size, targets)
-    }
-
-    /// λ W⁻¹ w + P a at an active centre.
-    fn rest(&self, affine: &Coefficients, weights: &[f64], i: usize) -> f64 {
-        let centre = self.system.active[i];
-        let scale = self.system.scales.get(i).copied().unwrap_or(1.0);
-        let point = core::array::from_fn(|k| self.centres.axes[k][centre]);
-        let smooth = self.lambda * (weights[centre] / scale / scale);
-        smooth + self.system.span.polynomial(affine, &point)
-    }
-
-    fn sum<'b, const M: usize>(&'b self, weights: &'b [f64]) -> KernelSum<'b, K, D, M> {
-        let n = self.centres.len();
-        KernelSum {
-            kernel: self.kernel,
-            centres: self.centres.axes.each_ref().map(|axis| &axis[..]),
-            weights: core::array::from_fn(|m| &weights[m * n..(m + 1) * n]),
         }
     }
 }

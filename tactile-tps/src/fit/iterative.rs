@@ -10,13 +10,15 @@
 use core::ops::ControlFlow;
 
 use super::{
-    AffineBasis, Buffers, Centres, Coefficients, Iterative, MAX, Run, Setting, System, Vectors,
-    Watch, largest, relative,
+    affine::{AffineBasis, Coefficients, MAX},
+    buffers::{Buffers, Vectors},
+    centres::Centres,
+    system::{Setting, System},
 };
 use crate::{
     FitReport, Kernel, Progress, StopReason,
     evaluate::{BLOCK, KernelSum},
-    lanes::{Job, Lane, dispatch, dot, squared_distance},
+    lanes::{Job, Lane, dispatch, dot, largest, relative, squared_distance},
 };
 
 /// Earlier points that a point is predicted from. With more the set-up costs more, with fewer there
@@ -28,6 +30,28 @@ const COARSE_POINTS: usize = 512;
 
 /// Steps at most.
 const STEPS: usize = 200;
+
+/// A callback that receives a fit's progress and may stop it.
+pub(super) type Watch<'a> = dyn FnMut(&Progress) -> ControlFlow<()> + 'a;
+
+/// Points from coarse to fine with their preconditioner.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Iterative<const D: usize> {
+    /// Coordinates of the active centres in order, axis by axis.
+    pub(super) axes: Vec<Vec<f64>>,
+    /// λ/weight of each, empty without λ.
+    pub(super) diagonal: Vec<f64>,
+    pub(super) preconditioner: Preconditioner<D>,
+}
+
+/// One run: its system and its stopping rule.
+pub(super) struct Run<'a, K, const D: usize> {
+    pub(super) kernel: &'a K,
+    pub(super) system: &'a System<D>,
+    pub(super) iterative: &'a Iterative<D>,
+    /// Largest residual at a point, relative to the largest target, to stop at.
+    pub(super) tolerance: f64,
+}
 
 impl<const D: usize> Iterative<D> {
     /// Orders the points of positive weight in `system` and builds the preconditioner: O(n²) time,

@@ -2,7 +2,10 @@
 
 use nalgebra::Point;
 
-use super::{Buffers, Coefficients, Factorization, System, Triangle};
+use super::{
+    affine::Coefficients, buffers::Buffers, factorization::Factorization, system::System,
+    triangle::Triangle,
+};
 use crate::{
     FitOptions, Kernel, R2LogR, Smoothing, TpsError,
     error::validate_smoothing,

@@ -1,0 +1,175 @@
+//! Distinct points in their frame.
+
+use nalgebra::Point;
+
+use super::buffers::Buffers;
+use crate::{TpsError, error::finite, evaluate::Frame, lanes::UNIT_ROUNDOFF};
+
+/// Distinct points in their frame, and which input point went where.
+#[derive(Clone, Debug)]
+pub(super) struct Centres<const D: usize> {
+    pub(super) frame: Frame<D>,
+    /// Coordinates in the frame, axis by axis.
+    pub(super) axes: [Vec<f64>; D],
+    /// First input point of every centre, ascending.
+    pub(super) first: Vec<usize>,
+    /// Centre of every input point. Empty if they are the same.
+    pub(super) centre_of: Vec<usize>,
+    /// Rounding of the coordinates, relative to the frame.
+    pub(super) grain: f64,
+    pub(super) inputs: usize,
+    /// The input points in the order of their coordinates.
+    pub(super) order: Vec<usize>,
+}
+
+impl<const D: usize> Default for Centres<D> {
+    fn default() -> Self {
+        Self {
+            frame: Frame::default(),
+            axes: [const { Vec::new() }; D],
+            first: Vec::new(),
+            centre_of: Vec::new(),
+            grain: 0.0,
+            inputs: 0,
+            order: Vec::new(),
+        }
+    }
+}
+
+impl<const D: usize> Centres<D> {
+    /// Takes over points, reusing memory where it suffices.
+    pub(super) fn take(&mut self, points: &[Point<f64, D>], rescale: bool) -> Result<(), TpsError> {
+        if points.is_empty() {
+            return Err(TpsError::Empty("source points"));
+        }
+        finite(points, "source points")?;
+        // The frame first: grain and coordinates are relative to it.
+        self.frame = Frame::around(points, rescale);
+        self.merge(points);
+        for (k, axis) in self.axes.iter_mut().enumerate() {
+            axis.clear();
+            axis.extend(self.first.iter().map(|&i| self.frame.inside(&points[i])[k]));
+        }
+        let numbers = points.iter().flat_map(|p| p.iter());
+        let largest = numbers.fold(0.0, |m, x| f64::max(m, x.abs()));
+        self.grain = largest / self.frame.scale * UNIT_ROUNDOFF;
+        self.inputs = points.len();
+        Ok(())
+    }
+
+    /// Finds the first point of every group of equal ones, and the group of each point.
+    pub(super) fn merge(&mut self, points: &[Point<f64, D>]) {
+        let Self {
+            first,
+            centre_of,
+            order,
+            ..
+        } = self;
+        for list in [&mut *first, &mut *order] {
+            list.clear();
+            list.extend(0..points.len());
+        }
+        centre_of.clear();
+        let compare = |&i: &usize, &j: &usize| {
+            let differ = (0..D).map(|k| points[i][k].partial_cmp(&points[j][k]));
+            differ.flatten().find(|o| o.is_ne()).unwrap_or(i.cmp(&j))
+        };
+        // Sorted by coordinates, equal points stand next to each other, the first one first.
+        order.sort_unstable_by(compare);
+        if order.windows(2).all(|w| points[w[0]] != points[w[1]]) {
+            return;
+        }
+        // The first point of every point's group, then the group's number.
+        centre_of.extend(0..points.len());
+        for pair in order.windows(2) {
+            if points[pair[0]] == points[pair[1]] {
+                centre_of[pair[1]] = centre_of[pair[0]];
+            }
+        }
+        first.retain(|&i| centre_of[i] == i);
+        for leader in centre_of {
+            *leader = first.partition_point(|&i| i < *leader);
+        }
+    }
+
+    /// Replaces `local` by these centres alone, in the same frame.
+    pub(super) fn select(&self, centres: impl Iterator<Item = usize> + Clone, local: &mut Self) {
+        for (axis, all) in local.axes.iter_mut().zip(&self.axes) {
+            axis.clear();
+            axis.extend(centres.clone().map(|i| all[i]));
+        }
+        local.first.clear();
+        local.first.extend(centres.map(|i| self.first[i]));
+    }
+
+    /// Number of distinct points.
+    pub(super) fn len(&self) -> usize {
+        self.first.len()
+    }
+
+    /// Centre of input point `i`.
+    pub(super) fn centre(&self, i: usize) -> usize {
+        self.centre_of.get(i).copied().unwrap_or(i)
+    }
+
+    /// Coinciding points must have equal targets where the spline interpolates.
+    pub(super) fn agree<const M: usize>(
+        &self,
+        targets: &[Point<f64, M>],
+        weights: Option<&[f64]>,
+    ) -> Result<(), TpsError> {
+        let counts = |i: usize| weights.is_none_or(|w| w[i] > 0.0);
+        for second in (0..self.centre_of.len()).filter(|&i| counts(i)) {
+            let centre = self.centre_of[second];
+            let same = |&i: &usize| self.centre_of[i] == centre && counts(i);
+            // Points of weight 0 are passed over. They may disagree with the others.
+            let first = (self.first[centre]..second).find(same).unwrap_or(second);
+            if targets[first] != targets[second] {
+                return Err(TpsError::Conflict { first, second });
+            }
+        }
+        Ok(())
+    }
+
+    /// Targets at the centres less `origin`, output by output: the weighted mean where points
+    /// coincide.
+    pub(super) fn gather<const M: usize>(
+        &self,
+        targets: &[Point<f64, M>],
+        weights: Option<&[f64]>,
+        origin: &[f64; M],
+        buffers: &mut Buffers,
+    ) {
+        let n = self.len();
+        buffers.targets.clear();
+        buffers.targets.resize(n * M, 0.0);
+        for (k, column) in buffers.targets.chunks_exact_mut(n).enumerate() {
+            let totals = &mut buffers.work;
+            totals.clear();
+            totals.resize(n, 0.0);
+            for (i, target) in targets.iter().enumerate() {
+                let (centre, weight) = (self.centre(i), weights.map_or(1.0, |w| w[i]));
+                let value = target[k] - origin[k];
+                totals[centre] += weight;
+                // Only points of weight 0 came before, whose targets do not count.
+                if totals[centre] == weight {
+                    column[centre] = value;
+                } else if weight > 0.0 {
+                    column[centre] += (value - column[centre]) * (weight / totals[centre]);
+                }
+            }
+        }
+    }
+
+    /// Weight of every centre, none if all are one.
+    pub(super) fn weigh(&self, weights: Option<&[f64]>, sums: &mut Vec<f64>) {
+        sums.clear();
+        if weights.is_none() && self.centre_of.is_empty() {
+            return;
+        }
+        sums.resize(self.len(), 0.0);
+        for i in 0..self.inputs {
+            sums[self.centre(i)] += weights.map_or(1.0, |w| w[i]);
+        }
+    }
+}

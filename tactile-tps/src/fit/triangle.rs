@@ -1,0 +1,136 @@
+//! The lower triangle of a symmetric matrix and its Cholesky factor.
+
+use core::mem::MaybeUninit;
+
+use faer::{
+    Mat, MatMut, MatRef, Par, Spec,
+    dyn_stack::{MemStack, StackReq},
+    linalg::{cholesky::llt, triangular_inverse},
+};
+
+use crate::{TpsError, lanes::dot};
+
+/// The lower triangle of a symmetric matrix, column by column, and its Cholesky factor in the same
+/// place.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Triangle {
+    pub(super) n: usize,
+    /// Places from one column to the next.
+    pub(super) stride: usize,
+    pub(super) data: Vec<f64>,
+    pub(super) stack: Vec<MaybeUninit<u8>>,
+}
+
+impl Triangle {
+    /// Makes room for a matrix of order n.
+    pub(super) fn resize(&mut self, n: usize) {
+        self.n = n;
+        self.stride = n.next_multiple_of(8);
+        // Columns a multiple of 512 bytes apart would crowd into the same few sets of the cache.
+        if self.stride.is_multiple_of(64) {
+            self.stride += 8;
+        }
+        let length = n * self.stride;
+        if self.data.capacity() < length {
+            // A new allocation comes zeroed from the system, page by page as it is touched.
+            self.data = vec![0.0; length];
+        } else {
+            self.data.resize(length, 0.0);
+        }
+    }
+
+    /// Takes over another matrix, without its memory.
+    pub(super) fn copy_from(&mut self, other: &Self) {
+        (self.n, self.stride) = (other.n, other.stride);
+        self.data.clone_from(&other.data);
+    }
+
+    pub(super) fn trace(&self) -> f64 {
+        (0..self.n).map(|j| self.data[j * self.stride + j]).sum()
+    }
+
+    pub(super) fn add_to_diagonal(&mut self, lambda: f64) {
+        (0..self.n).for_each(|j| self.data[j * self.stride + j] += lambda);
+    }
+
+    /// The entries of column `j` from the diagonal on.
+    #[inline(always)]
+    pub(super) fn column(&mut self, j: usize) -> &mut [f64] {
+        &mut self.data[j * self.stride + j..j * self.stride + self.n]
+    }
+
+    pub(super) fn view(&self) -> MatRef<'_, f64> {
+        MatRef::from_column_major_slice_with_stride(&self.data, self.n, self.n, self.stride)
+    }
+
+    /// Factors in place. Fails with the column whose pivot is not positive.
+    pub(super) fn factor(&mut self) -> Result<(), TpsError> {
+        let Self {
+            n,
+            stride,
+            data,
+            stack,
+        } = self;
+        let scratch = llt::factor::cholesky_in_place_scratch::<f64>(*n, Par::Seq, Spec::default());
+        let view = MatMut::from_column_major_slice_with_stride_mut(data, *n, *n, *stride);
+        let factored = llt::factor::cholesky_in_place(
+            view,
+            Default::default(),
+            Par::Seq,
+            memory(stack, scratch),
+            Spec::default(),
+        );
+        match factored {
+            Err(llt::factor::LltError::NonPositivePivot { index }) => {
+                Err(TpsError::NotDefinite { column: index })
+            }
+            Ok(_) => {
+                // An infinite entry gives pivots that are not numbers.
+                let bad = (0..self.n).find(|&j| !self.data[j * self.stride + j].is_finite());
+                bad.map_or(Ok(()), |column| Err(TpsError::NotDefinite { column }))
+            }
+        }
+    }
+
+    /// b ← A⁻¹b for columns of n entries, by the factor.
+    pub(super) fn solve(&self, b: &mut [f64]) {
+        let columns = b.len() / self.n;
+        let b = MatMut::from_column_major_slice_mut(b, self.n, columns);
+        llt::solve::solve_in_place(self.view(), b, Par::Seq, MemStack::new(&mut []));
+    }
+
+    /// The inverse of the Cholesky factor.
+    pub(super) fn inverse_factor(&self) -> Mat<f64> {
+        let mut inverse = Mat::zeros(self.n, self.n);
+        triangular_inverse::invert_lower_triangular(inverse.as_mut(), self.view(), Par::Seq);
+        inverse
+    }
+
+    /// An estimate of the 2-norm of A⁻¹: two steps of inverse iteration from the column of the
+    /// least pivot.
+    pub(super) fn inverse_norm(&self, x: &mut Vec<f64>) -> f64 {
+        let pivot = |j: usize| self.data[j * self.stride + j];
+        // The column of the least pivot tends to be close to the direction that the inverse
+        // enlarges most.
+        let start = (1..self.n).fold(
+            0,
+            |least, j| if pivot(j) < pivot(least) { j } else { least },
+        );
+        x.clear();
+        x.resize(self.n, 0.0);
+        x[start] = 1.0;
+        let mut norm = 1.0;
+        for _ in 0..2 {
+            self.solve(x);
+            norm = dot(x, x).sqrt();
+            x.iter_mut().for_each(|x| *x /= norm);
+        }
+        norm
+    }
+}
+
+/// A stack of at least the size asked for, in memory that is kept.
+pub(super) fn memory(kept: &mut Vec<MaybeUninit<u8>>, size: StackReq) -> &mut MemStack {
+    kept.resize(size.unaligned_bytes_required(), MaybeUninit::uninit());
+    MemStack::new(kept)
+}
