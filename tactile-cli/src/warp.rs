@@ -150,6 +150,17 @@ fn warp<const D: usize, K: Kernel>(
         let _clock = Bar::clock("computing the bending energy");
         spline.bending_energy()
     });
+    if report.rank <= D {
+        let spanned = report.rank - 1;
+        context.warn(
+            "undetermined_directions",
+            json!({ "spanned": spanned, "of": D }),
+            format_args!(
+                "the sources span {spanned} of {D} directions; displacements are interpolated \
+                 along these, and lengths across stay as they are"
+            ),
+        );
+    }
     context.value(&json!({
         "points": report.points, "queries": warped, "lambda": report.lambda,
         "bending_energy": bending_energy, "condition": report.condition, "rank": report.rank,
@@ -180,12 +191,6 @@ fn warp<const D: usize, K: Kernel>(
     let evaluations = count(warped, "evaluation");
     let text = format!("fit {fit_ms:.2} ms, {evaluations} {evaluate_ms:.2} ms");
     context.row("time", text);
-    if report.rank <= D {
-        let spanned = report.rank - 1;
-        context.note(format_args!(
-            "the sources span {spanned} of {D} directions; the spline bends along these alone"
-        ));
-    }
     context
         .outputs
         .add("warped.csv", table(&values[..warped], &jacobians[..warped]));

@@ -1035,10 +1035,8 @@ impl<const D: usize> GlobalStep<D> {
             Affine::fit(sources, means, Some(weights)).ok()
         } else {
             let scaled = motion == Motion::Similarity;
-            BestMotion::of(sources, means, weights, scaled).map(|fit| Affine {
-                linear: fit.linear,
-                offset: fit.to - fit.linear * fit.from,
-            })
+            BestMotion::of(sources, means, weights, scaled)
+                .map(|fit| Affine::new(fit.linear, fit.to - fit.linear * fit.from))
         };
         self.map = found.unwrap_or(self.map);
         for m in 0..model[0].len() {

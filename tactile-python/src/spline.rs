@@ -1,33 +1,34 @@
 //! Splines through scattered values.
 use crate::arrays;
 use crate::errors::invalid;
-use nalgebra::{Point, Point3, SMatrix};
+use nalgebra::{Point, SMatrix};
 use ndarray::{Array2, Array3, ArrayView2};
 use numpy::{PyArray1, PyArray2, PyArray3, PyReadonlyArray2};
 use pyo3::prelude::*;
 use tactile_imaging::tps::{FitOptions, Kernel, NegR, R2LogR, R3, Smoothing, Spline};
 
-/// A spline of any kernel in the plane or in space. It has three outputs, of which the caller's are
-/// the first and the others zero.
+/// A spline of any kernel in the plane or in space, of which the caller's outputs are the first and
+/// the others zero.
 trait Fitted: Send + Sync {
-    fn values(&self, points: ArrayView2<'_, f64>) -> Vec<Point3<f64>>;
+    /// (points, outputs).
+    fn values(&self, points: ArrayView2<'_, f64>, outputs: usize) -> Array2<f64>;
     /// ∂f_m/∂x_k of each point, (points, outputs, axes).
     fn jacobians(&self, points: ArrayView2<'_, f64>, outputs: usize) -> Array3<f64>;
     fn lambda(&self) -> f64;
 }
 
-impl<const D: usize, K: Kernel + Send + Sync> Fitted for Spline<D, 3, K> {
-    fn values(&self, points: ArrayView2<'_, f64>) -> Vec<Point3<f64>> {
+impl<const D: usize, const M: usize, K: Kernel + Send + Sync> Fitted for Spline<D, M, K> {
+    fn values(&self, points: ArrayView2<'_, f64>, outputs: usize) -> Array2<f64> {
         let points: Vec<Point<f64, D>> = arrays::points(points);
-        let mut values = vec![Point3::origin(); points.len()];
+        let mut values = vec![Point::<f64, M>::origin(); points.len()];
         self.apply_into(&points, &mut values)
             .expect("as many values as points");
-        values
+        Array2::from_shape_fn((points.len(), outputs), |(n, m)| values[n][m])
     }
 
     fn jacobians(&self, points: ArrayView2<'_, f64>, outputs: usize) -> Array3<f64> {
         let points: Vec<Point<f64, D>> = arrays::points(points);
-        let mut jacobians = vec![SMatrix::<f64, 3, D>::zeros(); points.len()];
+        let mut jacobians = vec![SMatrix::<f64, M, D>::zeros(); points.len()];
         self.jacobian_into(&points, &mut jacobians)
             .expect("as many Jacobians as points");
         Array3::from_shape_fn((points.len(), outputs, D), |(n, m, k)| jacobians[n][(m, k)])
@@ -43,7 +44,7 @@ impl<const D: usize, K: Kernel + Send + Sync> Fitted for Spline<D, 3, K> {
 /// Parameters
 /// ----------
 /// sources : (n, 2) or (n, 3) array
-///     Distinct points, not all on one line.
+///     Distinct points.
 /// targets : (n,) or (n, m) array
 ///     Up to three columns.
 /// smoothing : float or "gcv"
@@ -60,6 +61,10 @@ impl<const D: usize, K: Kernel + Send + Sync> Fitted for Spline<D, 3, K> {
 /// Notes
 /// -----
 /// A fit of n points takes O(n³) time and O(n²) memory.
+///
+/// Where the sources lie on a line or in a plane, directions across them are undetermined: with as
+/// many outputs as axes the spline is a map of space and keeps the identity there, else its slope
+/// there is zero.
 #[pyclass(frozen, module = "tactile_imaging")]
 pub(crate) struct ThinPlateSpline {
     fitted: Box<dyn Fitted>,
@@ -111,10 +116,6 @@ impl ThinPlateSpline {
                 Err(_) => return Err(invalid("smoothing must be a number or \"gcv\"")),
             },
         };
-        let output = |i: usize, k: usize| if k < outputs { targets[[i, k]] } else { 0.0 };
-        let targets: Vec<_> = (0..targets.nrows())
-            .map(|i| Point3::from(std::array::from_fn(|k| output(i, k))))
-            .collect();
         let fitted = py.detach(|| match (kernel, axes) {
             ("thin_plate_spline", 2) => fit::<2, _>(view, &targets, R2LogR, smoothing),
             ("thin_plate_spline", _) => fit::<3, _>(view, &targets, R2LogR, smoothing),
@@ -143,13 +144,10 @@ impl ThinPlateSpline {
     ) -> PyResult<Bound<'py, PyAny>> {
         let points = self.queries(points)?;
         let view = points.as_array();
-        let values = py.detach(|| self.fitted.values(view));
+        let values = py.detach(|| self.fitted.values(view, self.outputs));
         if self.flat {
-            let values = values.iter().map(|value| value.x);
-            return Ok(PyArray1::from_iter(py, values).into_any());
+            return Ok(PyArray1::from_iter(py, values.iter().copied()).into_any());
         }
-        let shape = (values.len(), self.outputs);
-        let values = Array2::from_shape_fn(shape, |(n, m)| values[n][m]);
         Ok(PyArray2::from_owned_array(py, values).into_any())
     }
 
@@ -198,15 +196,34 @@ impl ThinPlateSpline {
     }
 }
 
+/// A map of space where there are as many outputs as axes, else a function.
 fn fit<const D: usize, K: Kernel + Send + Sync + 'static>(
     sources: ArrayView2<'_, f64>,
-    targets: &[Point3<f64>],
+    targets: &Array2<f64>,
+    kernel: K,
+    smoothing: Smoothing,
+) -> PyResult<Box<dyn Fitted>> {
+    if targets.ncols() == D {
+        fit_to::<D, D, K>(sources, targets, kernel, smoothing)
+    } else {
+        // More outputs than axes, so that the spline is no map.
+        fit_to::<D, 4, K>(sources, targets, kernel, smoothing)
+    }
+}
+
+fn fit_to<const D: usize, const M: usize, K: Kernel + Send + Sync + 'static>(
+    sources: ArrayView2<'_, f64>,
+    targets: &Array2<f64>,
     kernel: K,
     smoothing: Smoothing,
 ) -> PyResult<Box<dyn Fitted>> {
     let options = FitOptions::new(kernel).with_smoothing(smoothing);
     let options = options.map_err(invalid)?;
     let sources: Vec<Point<f64, D>> = arrays::points(sources);
-    let spline = Spline::<D, 3, K>::fit(&sources, targets, &options);
+    let target = |row: usize, k: usize| targets.get([row, k]).copied().unwrap_or(0.0);
+    let targets: Vec<_> = (0..targets.nrows())
+        .map(|row| Point::from(std::array::from_fn::<f64, M, _>(|k| target(row, k))))
+        .collect();
+    let spline = Spline::<D, M, K>::fit(&sources, &targets, &options);
     Ok(Box::new(spline.map_err(invalid)?))
 }

@@ -1,77 +1,19 @@
 //! The fitted spline: values, Jacobians and Hessians at one point or many, its parts and its
 //! energy.
-//!
-//! Queries are the lanes of vectorised loops and centres the outer loop.
-//! Every query's sum runs over the centres in the same order, whether it comes alone or among
-//! thousands.
-//! So the bits are the same.
 
-use core::ops::{ControlFlow, Range};
+use core::ops::ControlFlow;
 
 use nalgebra::{Point, SMatrix, SVector};
 #[cfg(feature = "rayon")]
 use rayon::prelude::*;
 
 use crate::{
-    Factorization, FitOptions, FitReport, Kernel, KernelDerivatives, Progress, R2LogR, TpsError,
+    Factorization, FitOptions, FitReport, Kernel, Progress, R2LogR, TpsError,
     error::same_length,
+    frame::Frame,
+    kernel_sum::{BLOCK, KernelSum, Lanes, TAIL},
     lanes::{Job, Lane, UNIT_ROUNDOFF, dispatch},
 };
-
-/// Queries in a full block: long enough for the compiler to vectorise, short enough for the
-/// first-level cache.
-pub(crate) const BLOCK: usize = 64;
-
-/// Queries in the smaller blocks that take the remainder.
-const TAIL: usize = 8;
-
-/// The shift and the scale that bring points to unit size: x̂ = (x − centre) / scale, scale a power
-/// of two.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Frame<const D: usize> {
-    centre: [f64; D],
-    pub(crate) scale: f64,
-}
-
-impl<const D: usize> Default for Frame<D> {
-    fn default() -> Self {
-        Self {
-            centre: [0.0; D],
-            scale: 1.0,
-        }
-    }
-}
-
-impl<const D: usize> Frame<D> {
-    /// Centre of the bounding box, and the power of two next to half its longest side (one without
-    /// `rescale`).
-    pub(crate) fn around(points: &[Point<f64, D>], rescale: bool) -> Self {
-        let mut low = [f64::INFINITY; D];
-        let mut high = [f64::NEG_INFINITY; D];
-        for point in points {
-            for k in 0..D {
-                low[k] = low[k].min(point[k]);
-                high[k] = high[k].max(point[k]);
-            }
-        }
-        // Halved before the difference, which could overflow.
-        let halves = (0..D).map(|k| 0.5 * high[k] - 0.5 * low[k]);
-        let half = halves.fold(0.0, f64::max);
-        // The bits of the exponent alone: the power of two that brings `half` into [1, 2).
-        let power = f64::from_bits(half.to_bits() & 0x7ff0_0000_0000_0000);
-        let usable = rescale && power > 0.0 && power.is_finite();
-        Self {
-            centre: core::array::from_fn(|k| 0.5 * low[k] + 0.5 * high[k]),
-            scale: if usable { power } else { 1.0 },
-        }
-    }
-
-    #[inline(always)]
-    pub(crate) fn inside(&self, point: &Point<f64, D>) -> [f64; D] {
-        // Division by a power of two is exact.
-        core::array::from_fn(|k| (point[k] - self.centre[k]) / self.scale)
-    }
-}
 
 /// The affine part of a spline in its frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -85,6 +27,10 @@ struct AffinePart<const D: usize, const M: usize> {
 /// [`Default`] is the spline that is zero everywhere.
 /// The weights satisfy Σ wᵢ = 0 and Σ wᵢ xᵢᵀ = 0 and minimise Σ weightᵢ |f(xᵢ) − yᵢ|² + λ wᵀKw
 /// (Wahba 1990).
+///
+/// With as many outputs as axes it is a map of space: along directions that the source points do
+/// not span it keeps the identity ([`Warp::rank`](crate::Warp::rank)). Another function is constant
+/// along them.
 #[derive(Clone, Debug)]
 pub struct Spline<const D: usize, const M: usize, K = R2LogR> {
     kernel: K,
@@ -771,175 +717,6 @@ impl<K: Kernel, const D: usize, const M: usize, const ORDER: usize> Evaluation<'
                     }
                 }
             }
-        }
-    }
-}
-
-/// The kernel sum of a spline, in its frame.
-#[derive(Clone, Copy)]
-pub(crate) struct KernelSum<'a, K, const D: usize, const M: usize> {
-    pub(crate) kernel: &'a K,
-    /// Coordinates of the centres, axis by axis.
-    pub(crate) centres: [&'a [f64]; D],
-    /// Weights of the centres, output by output.
-    pub(crate) weights: [&'a [f64]; M],
-}
-
-/// Sums for `W` queries: U, its gradient and its Hessian, as far as the order asked for.
-struct Lanes<const D: usize, const M: usize, const W: usize> {
-    value: [[f64; W]; M],
-    gradient: [[[f64; W]; D]; M],
-    hessian: [[[[f64; W]; D]; D]; M],
-}
-
-impl<const D: usize, const M: usize, const W: usize> Lanes<D, M, W> {
-    #[inline(always)]
-    fn new() -> Self {
-        let zero = [0.0; W];
-        Self {
-            value: [zero; M],
-            gradient: [[zero; D]; M],
-            hessian: [[[zero; D]; D]; M],
-        }
-    }
-
-    #[inline(always)]
-    fn add_value<L: Lane>(&mut self, l: usize, weight: &[L; M], value: L) {
-        for m in 0..M {
-            add(&mut self.value[m][l], weight[m], value);
-        }
-    }
-
-    /// Adds a term's value, gradient 2U'd and, at second order, Hessian 2U' I + 4U'' d dᵀ
-    /// (derivatives by s = |d|²).
-    #[inline(always)]
-    fn add_derivatives<L: Lane, const ORDER: usize>(
-        &mut self,
-        l: usize,
-        weight: &[L; M],
-        d: &[L; D],
-        term: KernelDerivatives<L>,
-    ) {
-        self.add_value(l, weight, term.value);
-        let slope = L::from_f64(2.0) * term.first;
-        for k in 0..D {
-            let along = slope * d[k];
-            for m in 0..M {
-                add(&mut self.gradient[m][k][l], weight[m], along);
-            }
-        }
-        if ORDER == 2 {
-            self.add_hessian(l, weight, d, slope, L::from_f64(4.0) * term.second);
-        }
-    }
-
-    #[inline(always)]
-    fn add_hessian<L: Lane>(&mut self, l: usize, weight: &[L; M], d: &[L; D], slope: L, bend: L) {
-        for k in 0..D {
-            for i in 0..=k {
-                let own = if i == k { slope } else { L::from_f64(0.0) };
-                let curve = (bend * d[k]).mul_add(d[i], own);
-                for m in 0..M {
-                    add(&mut self.hessian[m][k][i][l], weight[m], curve);
-                }
-            }
-        }
-    }
-}
-
-/// An accumulator's next value.
-#[inline(always)]
-fn add<L: Lane>(sum: &mut f64, a: L, b: L) {
-    *sum = a.mul_add(b, L::from_f64(*sum)).get();
-}
-
-impl<K: Kernel, const D: usize, const M: usize> KernelSum<'_, K, D, M> {
-    /// Sums up to derivatives of the given `ORDER` (0, 1 or 2) at the queries `x`, axis by axis.
-    #[inline(always)]
-    fn block<L: Lane, const W: usize, const ORDER: usize>(
-        &self,
-        x: &[[f64; W]; D],
-        sums: &mut Lanes<D, M, W>,
-    ) {
-        let n = self.centres[0].len();
-        let centres = self.centres.map(|axis| &axis[..n]);
-        let weights = self.weights.map(|output| &output[..n]);
-        // The centre's numbers are read once for all queries of the block.
-        for j in 0..n {
-            let centre: [L; D] = core::array::from_fn(|k| L::from_f64(centres[k][j]));
-            let weight: [L; M] = core::array::from_fn(|m| L::from_f64(weights[m][j]));
-            for l in 0..W {
-                let d: [L; D] = core::array::from_fn(|k| L::from_f64(x[k][l]) - centre[k]);
-                let mut s = d[0] * d[0];
-                for k in 1..D {
-                    s = d[k].mul_add(d[k], s);
-                }
-                if ORDER == 0 {
-                    sums.add_value(l, &weight, self.kernel.derivatives(s).value);
-                } else {
-                    sums.add_derivatives::<L, ORDER>(l, &weight, &d, self.kernel.derivatives(s));
-                }
-            }
-        }
-    }
-}
-
-impl<K: Kernel, const D: usize, const M: usize> KernelSum<'_, K, D, M> {
-    /// Subtracts the sum at the places of a range, which begins at a multiple of [`BLOCK`], from
-    /// `residuals`.
-    ///
-    /// `residuals` holds those of all places, output by output.
-    pub(crate) fn subtract(self, places: [&[f64]; D], range: Range<usize>, residuals: &mut [f64]) {
-        dispatch(Subtract {
-            sum: self,
-            places,
-            range,
-            residuals,
-        });
-    }
-}
-
-/// Subtracts the kernel sum at the places of a range, which begins at a multiple of [`BLOCK`].
-struct Subtract<'a, K, const D: usize, const M: usize> {
-    sum: KernelSum<'a, K, D, M>,
-    places: [&'a [f64]; D],
-    range: Range<usize>,
-    /// Of all places, output by output.
-    residuals: &'a mut [f64],
-}
-
-impl<K: Kernel, const D: usize, const M: usize> Job for Subtract<'_, K, D, M> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run<L: Lane>(mut self) {
-        let Range { start: first, end } = self.range;
-        let full = first + (end - first) / BLOCK * BLOCK;
-        for start in (first..full).step_by(BLOCK) {
-            self.block::<L, BLOCK>(start, BLOCK);
-        }
-        for start in (full..end).step_by(TAIL) {
-            self.block::<L, TAIL>(start, TAIL.min(end - start));
-        }
-    }
-}
-
-impl<K: Kernel, const D: usize, const M: usize> Subtract<'_, K, D, M> {
-    #[inline(always)]
-    fn block<L: Lane, const W: usize>(&mut self, start: usize, used: usize) {
-        let n = self.places[0].len();
-        let mut x = [[0.0; W]; D];
-        for k in 0..D {
-            x[k][..used].copy_from_slice(&self.places[k][start..start + used]);
-        }
-        let mut sums = Lanes::<D, M, W>::new();
-        self.sum.block::<L, W, 0>(&x, &mut sums);
-        for m in 0..M {
-            let residuals = &mut self.residuals[m * n + start..m * n + start + used];
-            residuals
-                .iter_mut()
-                .zip(&sums.value[m])
-                .for_each(|(r, sum)| *r -= sum);
         }
     }
 }

@@ -21,19 +21,24 @@
 // Several arrays share one index in dense linear algebra: zipping them hides it.
 #![allow(clippy::needless_range_loop)]
 
+mod affine;
 mod error;
 mod evaluate;
 mod fit;
+mod frame;
 mod kernel;
+mod kernel_sum;
 mod lanes;
 mod local;
 mod options;
 mod smoothing;
+mod span;
 mod warp;
 
 pub use nalgebra;
 pub use tactile_core::{CustomError, Progress, StopReason};
 
+pub use affine::{Affine, AffineModel};
 pub use error::TpsError;
 pub use evaluate::{Spline, ThinPlateSpline};
 pub use fit::{Factorization, LambdaPath, SplineWorkspace};
@@ -41,4 +46,4 @@ pub use kernel::{Kernel, KernelDerivatives, KernelScalar, NegR, R2LogR, R3};
 pub use local::{LocalField, LocalValue, nearest_rows};
 pub use options::{FitOptions, FitReport, Solver};
 pub use smoothing::{RobustFit, RobustSpline, Smoothing, StrainSpline};
-pub use warp::{Affine, AffineModel, Pairs, SeriesMemory, Warp, WarpModel};
+pub use warp::{Pairs, SeriesMemory, Warp, WarpModel};

@@ -1,21 +1,18 @@
-//! Maps of space onto itself, models that find one from pairs of points, and the affine ones.
+//! Maps of space onto itself, and models that find one from pairs of points.
 
 use core::any::Any;
 
-use nalgebra::{DMatrix, Point, SMatrix, SVector};
+use nalgebra::{Point, SMatrix};
 
-use crate::{
-    FitOptions, Kernel, Spline, ThinPlateSpline, TpsError,
-    error::{same_length, validate_pairs},
-};
+use crate::{FitOptions, Kernel, Spline, ThinPlateSpline, TpsError, error::same_length};
 
 /// A map of `D`-dimensional space onto itself. Object safe: a `Box<dyn Warp<3>>` is a warp.
 ///
 /// ```
 /// use nalgebra::{Point2, Matrix2, Vector2};
 /// use tactile_tps::{Affine, Warp};
-/// let warp: Box<dyn Warp<2>> = Box::new(Affine { linear: Matrix2::identity() * 2.0,
-///     offset: Vector2::new(1.0, 0.0) });
+/// let warp: Box<dyn Warp<2>> = Box::new(Affine::new(Matrix2::identity() * 2.0,
+///     Vector2::new(1.0, 0.0)));
 /// assert_eq!(warp.apply(&Point2::new(1.0, 3.0)), Point2::new(3.0, 6.0));
 /// ```
 pub trait Warp<const D: usize> {
@@ -25,6 +22,26 @@ pub trait Warp<const D: usize> {
     /// The Jacobian ∂fᵢ/∂xⱼ at a point (row i, column j). For a deformation this is the
     /// deformation gradient.
     fn jacobian(&self, point: &Point<f64, D>) -> SMatrix<f64, D, D>;
+
+    /// Rank of [1 X] of the points that the warp was fitted to: one more than the number of
+    /// directions they span. `D + 1` if they span space, which is the default.
+    ///
+    /// Along other directions the points determine nothing. The crate's warps move the whole line
+    /// (or plane) across the points with its foot and leave lengths across as they are.
+    ///
+    /// ```
+    /// use nalgebra::Point2;
+    /// use tactile_tps::{FitOptions, ThinPlateSpline, Warp};
+    /// // Landmarks on a diagonal: the identity there is the identity everywhere.
+    /// let line = [[0.0, 0.0], [1.0, 1.0], [3.0, 3.0]].map(Point2::from);
+    /// let warp = ThinPlateSpline::fit(&line, &line, &FitOptions::default())?;
+    /// assert_eq!(warp.rank(), 2);
+    /// assert!((warp.apply(&Point2::new(0.0, 1.0)) - Point2::new(0.0, 1.0)).norm() < 1e-14);
+    /// # Ok::<(), tactile_tps::TpsError>(())
+    /// ```
+    fn rank(&self) -> usize {
+        D + 1
+    }
 
     /// The images of many points, into the caller's memory.
     ///
@@ -48,7 +65,7 @@ pub trait Warp<const D: usize> {
     /// ```
     /// use nalgebra::{Matrix2, Point2, Vector2};
     /// use tactile_tps::{Affine, Warp};
-    /// let shear = Affine { linear: Matrix2::new(1.0, 0.2, 0.0, 1.0), offset: Vector2::zeros() };
+    /// let shear = Affine::new(Matrix2::new(1.0, 0.2, 0.0, 1.0), Vector2::zeros());
     /// let points = [[0.0, 0.0], [1.0, 2.0], [3.0, 1.0]].map(Point2::from);
     /// let (mut images, mut jacobians) = (points, [Matrix2::zeros(); 3]);
     /// shear.apply_into(&points, &mut images)?;
@@ -177,6 +194,9 @@ impl<const D: usize, K: Kernel> Warp<D> for Spline<D, D, K> {
     fn jacobian(&self, point: &Point<f64, D>) -> SMatrix<f64, D, D> {
         Spline::jacobian(self, point)
     }
+    fn rank(&self) -> usize {
+        self.report.rank
+    }
     fn apply_into(
         &self,
         points: &[Point<f64, D>],
@@ -248,218 +268,5 @@ impl core::fmt::Debug for SeriesMemory {
         f.debug_struct("SeriesMemory")
             .field("is_empty", &self.state.is_none())
             .finish()
-    }
-}
-
-/// The affine map f(x) = A x + b. A rigid motion where A is a rotation. [`Default`] is the
-/// identity.
-///
-/// ```
-/// use nalgebra::{Matrix2, Point2, Vector2};
-/// use tactile_tps::{Affine, Warp};
-/// let shear = Affine { linear: Matrix2::new(1.0, 0.5, 0.0, 1.0), offset: Vector2::new(0.0, 2.0) };
-/// assert_eq!(shear.apply(&Point2::new(1.0, 4.0)), Point2::new(3.0, 6.0));
-/// assert_eq!(shear.jacobian(&Point2::origin()), shear.linear);
-/// ```
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Affine<const D: usize> {
-    /// The Jacobian A.
-    pub linear: SMatrix<f64, D, D>,
-    /// The image b of the origin.
-    pub offset: SVector<f64, D>,
-}
-
-impl<const D: usize> Default for Affine<D> {
-    /// The map that leaves every point where it is.
-    fn default() -> Self {
-        Self {
-            linear: SMatrix::identity(),
-            offset: SVector::zeros(),
-        }
-    }
-}
-
-impl<const D: usize> Affine<D> {
-    /// The map of least Σ wᵢ |A xᵢ + b − yᵢ|²: A = C S⁺ with S = Σ w x xᵀ and C = Σ w y xᵀ about
-    /// the weighted means.
-    ///
-    /// Along directions that the points do not span the map moves points with their mean (the
-    /// pseudo-inverse S⁺). O(n).
-    ///
-    /// ```
-    /// use nalgebra::Point2;
-    /// use tactile_tps::{Affine, Warp};
-    /// # fn main() -> Result<(), tactile_tps::TpsError> {
-    /// let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4,
-    ///     0.6]].map(Point2::from);
-    /// let targets = sources.map(|p| Point2::new(2.0 * p.x - p.y, p.y + 3.0));
-    /// let map = Affine::fit(&sources, &targets, None)?;
-    /// assert!((map.apply(&Point2::new(5.0, 1.0)) - Point2::new(9.0, 4.0)).norm() < 1e-14);
-    /// # Ok(())
-    /// # }
-    /// ```
-    ///
-    /// # Errors
-    /// [`TpsError`] for no points, lengths that differ, or numbers that are not finite.
-    pub fn fit(
-        sources: &[Point<f64, D>],
-        targets: &[Point<f64, D>],
-        weights: Option<&[f64]>,
-    ) -> Result<Self, TpsError> {
-        let moments = Moments::new(sources, targets, weights)?;
-        let scatter = DMatrix::from_fn(D, D, |i, j| moments.scatter[(i, j)]).svd(true, true);
-        // Below this the extent is the rounding of the moments.
-        let rounding = 1e-13 * scatter.singular_values.max();
-        let inverse = scatter.pseudo_inverse(rounding).map_err(TpsError::custom)?;
-        let linear = moments.cross * SMatrix::from_fn(|i, j| inverse[(i, j)]);
-        Ok(Self {
-            linear,
-            offset: moments.offset(&linear),
-        })
-    }
-
-    /// The rigid motion of least Σ wᵢ |R xᵢ + b − yᵢ|², R a rotation (no reflection): the one
-    /// nearest to C = Σ w y xᵀ (Kabsch 1976; Umeyama 1991). O(n).
-    ///
-    /// ```
-    /// use nalgebra::{Point2, Rotation2};
-    /// use tactile_tps::Affine;
-    /// # fn main() -> Result<(), tactile_tps::TpsError> {
-    /// let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4,
-    ///     0.6]].map(Point2::from);
-    /// let turn = Rotation2::new(0.3);
-    /// let motion = Affine::fit_rigid(&sources, &sources.map(|p| turn * p), None)?;
-    /// assert!((motion.linear - turn.matrix()).norm() < 1e-15);
-    /// # Ok(())
-    /// # }
-    /// ```
-    ///
-    /// # Errors
-    /// [`TpsError`] for no points, lengths that differ, or numbers that are not finite.
-    pub fn fit_rigid(
-        sources: &[Point<f64, D>],
-        targets: &[Point<f64, D>],
-        weights: Option<&[f64]>,
-    ) -> Result<Self, TpsError> {
-        let moments = Moments::new(sources, targets, weights)?;
-        let rotation = nearest_rotation(&moments.cross);
-        Ok(Self {
-            linear: rotation,
-            offset: moments.offset(&rotation),
-        })
-    }
-}
-
-impl<const D: usize> Warp<D> for Affine<D> {
-    fn apply(&self, point: &Point<f64, D>) -> Point<f64, D> {
-        Point::from(self.linear * point.coords + self.offset)
-    }
-    fn jacobian(&self, _: &Point<f64, D>) -> SMatrix<f64, D, D> {
-        self.linear
-    }
-}
-
-/// Weighted moments of pairs about their means, in `f64`.
-struct Moments<const D: usize> {
-    source_mean: SVector<f64, D>,
-    target_mean: SVector<f64, D>,
-    cross: SMatrix<f64, D, D>,
-    scatter: SMatrix<f64, D, D>,
-}
-
-impl<const D: usize> Moments<D> {
-    fn new(
-        sources: &[Point<f64, D>],
-        targets: &[Point<f64, D>],
-        weights: Option<&[f64]>,
-    ) -> Result<Self, TpsError> {
-        validate_pairs(sources, targets, weights)?;
-        let weight = |i: usize| weights.map_or(1.0, |w| w[i]);
-        let vector = |p: &Point<f64, D>| p.coords;
-        let total: f64 = (0..sources.len()).map(weight).sum();
-        let mean = |points: &[Point<f64, D>]| {
-            // Means of differences to a point keep their digits where all points lie far from the
-            // origin.
-            let origin = vector(&points[0]);
-            let sum =
-                |sum: SVector<f64, D>, (i, p)| sum + (vector(p) - origin) * (weight(i) / total);
-            origin + points.iter().enumerate().fold(SVector::zeros(), sum)
-        };
-        let (source_mean, target_mean) = (mean(sources), mean(targets));
-        let (mut cross, mut scatter) = (SMatrix::zeros(), SMatrix::zeros());
-        for (i, (x, y)) in sources.iter().zip(targets).enumerate() {
-            let (x, y) = (vector(x) - source_mean, vector(y) - target_mean);
-            cross += y * x.transpose() * (weight(i) / total);
-            scatter += x * x.transpose() * (weight(i) / total);
-        }
-        Ok(Self {
-            source_mean,
-            target_mean,
-            cross,
-            scatter,
-        })
-    }
-
-    fn offset(&self, linear: &SMatrix<f64, D, D>) -> SVector<f64, D> {
-        self.target_mean - linear * self.source_mean
-    }
-}
-
-/// The rotation R that maximises tr(Rᵀ C): U diag(1, …, det(U Vᵀ)) Vᵀ of the singular value
-/// decomposition.
-fn nearest_rotation<const D: usize>(cross: &SMatrix<f64, D, D>) -> SMatrix<f64, D, D> {
-    let svd = DMatrix::from_fn(D, D, |i, j| cross[(i, j)]).svd(true, true);
-    let (Some(mut u), Some(vt)) = (svd.u, svd.v_t) else {
-        return SMatrix::identity();
-    };
-    // A reflection would be nearer. Turning the weakest direction costs the least.
-    if (&u * &vt).determinant() < 0.0 {
-        let smallest = svd.singular_values.imin();
-        u.column_mut(smallest).neg_mut();
-    }
-    let rotation = u * vt;
-    SMatrix::from_fn(|i, j| rotation[(i, j)])
-}
-
-/// The [`WarpModel`] of affine maps: all of them, or rotations and translations alone.
-///
-/// ```
-/// use nalgebra::{Point2, Vector2};
-/// use tactile_tps::{AffineModel, Warp, WarpModel};
-/// # fn main() -> Result<(), tactile_tps::TpsError> {
-/// let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
-/// let doubled = sources.map(|p| p * 2.0 + Vector2::new(1.0, 2.0));
-/// let warp: Box<dyn Warp<2> + Send + Sync> = AffineModel::General.fit(&sources, &doubled,
-///     None)?;
-/// assert!((warp.apply(&Point2::new(5.0, 1.0)) - Point2::new(11.0, 4.0)).norm() < 1e-14);
-/// let motion = AffineModel::Rigid.fit(&sources, &doubled, None)?;
-/// assert!((motion.jacobian(&Point2::origin()).determinant() - 1.0_f64).abs() < 1e-14);
-/// # Ok(())
-/// # }
-/// ```
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[non_exhaustive]
-pub enum AffineModel {
-    /// Any affine map: [`Affine::fit`].
-    #[default]
-    General,
-    /// A rotation and a translation: [`Affine::fit_rigid`].
-    Rigid,
-}
-
-impl<const D: usize> WarpModel<D> for AffineModel {
-    fn fit(
-        &self,
-        sources: &[Point<f64, D>],
-        targets: &[Point<f64, D>],
-        weights: Option<&[f64]>,
-    ) -> Result<Box<dyn Warp<D> + Send + Sync>, TpsError> {
-        let fit = match self {
-            Self::General => Affine::fit,
-            Self::Rigid => Affine::fit_rigid,
-        };
-        Ok(Box::new(fit(sources, targets, weights)?))
     }
 }

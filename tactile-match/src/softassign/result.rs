@@ -268,6 +268,10 @@ impl<const D: usize> Warp<D> for Lazy<D> {
         self.spline().jacobian(point)
     }
 
+    fn rank(&self) -> usize {
+        self.spline().rank()
+    }
+
     fn apply_into(
         &self,
         points: &[Point<f64, D>],

@@ -3,7 +3,7 @@
 use nalgebra::Point;
 
 use super::buffers::Buffers;
-use crate::{TpsError, error::finite, evaluate::Frame, lanes::UNIT_ROUNDOFF};
+use crate::{TpsError, error::finite, frame::Frame};
 
 /// Distinct points in their frame, and which input point went where.
 #[derive(Clone, Debug)]
@@ -50,9 +50,7 @@ impl<const D: usize> Centres<D> {
             axis.clear();
             axis.extend(self.first.iter().map(|&i| self.frame.inside(&points[i])[k]));
         }
-        let numbers = points.iter().flat_map(|p| p.iter());
-        let largest = numbers.fold(0.0, |m, x| f64::max(m, x.abs()));
-        self.grain = largest / self.frame.scale * UNIT_ROUNDOFF;
+        self.grain = self.frame.grain(points);
         self.inputs = points.len();
         Ok(())
     }

@@ -1,10 +1,11 @@
 //! The dense solution of a spline's equations, its residual and its refinement.
 
-use super::{affine::Coefficients, buffers::Buffers, centres::Centres, system::System};
+use super::{buffers::Buffers, centres::Centres, system::System};
 use crate::{
     FitReport, Kernel, StopReason,
-    evaluate::{BLOCK, KernelSum},
+    kernel_sum::{BLOCK, KernelSum},
     lanes::{largest, relative},
+    span::Coefficients,
 };
 
 /// A spline's equations: everything but the targets.

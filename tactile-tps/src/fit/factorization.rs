@@ -5,7 +5,6 @@ use core::ops::ControlFlow;
 use nalgebra::{DMatrix, Point, SVector};
 
 use super::{
-    affine::{Coefficients, MAX},
     buffers::Buffers,
     centres::Centres,
     equations::Equations,
@@ -17,6 +16,7 @@ use crate::{
     error::{finite, same_count, same_length, validate_smoothing, validate_weights},
     evaluate::Solution,
     lanes::{Job, Lane, dispatch},
+    span::{Coefficients, MAX},
 };
 
 /// Source points with their kernel matrix factored: splines to any targets follow in O(n²).
@@ -74,6 +74,10 @@ pub struct SplineWorkspace<const D: usize> {
     iterative: Iterative<D>,
     centre_weights: Vec<f64>,
 }
+
+/// Largest λ in the frame's units. The spline has long been the affine fit, to rounding; an infinite
+/// λ would leave no system.
+const LARGEST_LAMBDA: f64 = 1e200;
 
 /// A system with what is to be solved with it.
 struct Task<'a, const D: usize> {
@@ -137,7 +141,7 @@ impl<const D: usize, K: Kernel> Factorization<D, K> {
     /// λ in the frame's units: the kernel scales as length to its degree.
     pub(super) fn inner_lambda(&self, smoothing: Smoothing) -> f64 {
         match smoothing {
-            Smoothing::Lambda(lambda) => lambda / self.unit(),
+            Smoothing::Lambda(lambda) => f64::min(lambda / self.unit(), LARGEST_LAMBDA),
             _ => 0.0,
         }
     }
@@ -499,16 +503,40 @@ impl<const D: usize, K: Kernel> Factorization<D, K> {
             .solve(buffers, report, task.careful),
         };
         let numbers = targets.iter().flat_map(|t| t.iter());
+        let mut constant = core::array::from_fn(|k| origin[k] + affine[k][0]);
+        let mut gradient = affine.map(|a| system.span.gradient(&a));
+        if M == D && system.span.directions < D {
+            self.keep_across(system, &mut constant, &mut gradient);
+        }
         let solution = Solution {
             frame: centres.frame,
             axes: &centres.axes,
             weights: &buffers.weights,
-            constant: core::array::from_fn(|k| origin[k] + affine[k][0]),
-            gradient: affine.map(|a| system.span.gradient(&a)),
+            constant,
+            gradient,
             level: numbers.fold(0.0, |m, x| f64::max(m, x.abs())),
         };
         spline.assign(&self.kernel, &solution);
         Ok(())
+    }
+
+    /// Adds N (x − x₀) to a map of space: along the directions that the points do not span the
+    /// identity stands. x₀ is one of them.
+    fn keep_across<const M: usize>(
+        &self,
+        system: &System<D>,
+        constant: &mut [f64; M],
+        gradient: &mut [[f64; D]; M],
+    ) {
+        let Centres { frame, axes, .. } = &self.centres;
+        let across = system.span.across();
+        for (m, row) in across.iter().enumerate().take(M) {
+            for k in 0..D {
+                let slope = row[k] * frame.scale;
+                gradient[m][k] += slope;
+                constant[m] -= slope * axes[k][system.active[0]];
+            }
+        }
     }
 
     /// Influence of each target on the Jacobian at each point: bⱼ in J(x) = Σⱼ yⱼ bⱼᵀ.
@@ -517,7 +545,8 @@ impl<const D: usize, K: Kernel> Factorization<D, K> {
     /// Allocates nothing once the workspace has grown. O(n²) per point.
     ///
     /// The same for every output and all targets, with the weights and λ of the factorisation.
-    /// Σ bⱼ = 0, and Σ xⱼ bⱼᵀ = I where the points span space. Targets with covariances Cⱼ give J
+    /// Σ bⱼ = 0, and Σ xⱼ bⱼᵀ = I where the points span space. Where they do not, the Jacobian of a
+    /// map of space has the identity across them besides, which no target changes. Targets with covariances Cⱼ give J
     /// the covariance Σ Cⱼ ⊗ bⱼbⱼᵀ.
     ///
     /// ```

@@ -10,15 +10,16 @@
 use core::ops::ControlFlow;
 
 use super::{
-    affine::{AffineBasis, Coefficients, MAX},
+    affine_basis::AffineBasis,
     buffers::{Buffers, Vectors},
     centres::Centres,
     system::{Setting, System},
 };
 use crate::{
     FitReport, Kernel, Progress, StopReason,
-    evaluate::{BLOCK, KernelSum},
+    kernel_sum::{BLOCK, KernelSum},
     lanes::{Job, Lane, dispatch, dot, largest, relative, squared_distance},
+    span::{Coefficients, MAX},
 };
 
 /// Earlier points that a point is predicted from. With more the set-up costs more, with fewer there

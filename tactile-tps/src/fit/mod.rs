@@ -11,14 +11,13 @@
 //! Adding σQQᵀ makes it definite everywhere without touching the solution.
 //! With σ the mean eigenvalue on the range of Π the condition number stays what it is.
 
-mod affine;
+mod affine_basis;
 mod buffers;
 mod centres;
 mod equations;
 mod factorization;
 mod iterative;
 mod path;
-mod span;
 mod spectrum;
 mod system;
 mod triangle;

@@ -2,14 +2,12 @@
 
 use nalgebra::Point;
 
-use super::{
-    affine::Coefficients, buffers::Buffers, factorization::Factorization, system::System,
-    triangle::Triangle,
-};
+use super::{buffers::Buffers, factorization::Factorization, system::System, triangle::Triangle};
 use crate::{
     FitOptions, Kernel, R2LogR, Smoothing, TpsError,
     error::validate_smoothing,
     lanes::{Job, Lane, dispatch, squared_distance},
+    span::Coefficients,
 };
 
 /// The splines through the same pairs for several λ, as cross-validation over left-out points needs

@@ -1,9 +1,8 @@
 //! The projected matrix of a spline's equations: assembled, factored or decomposed, and solved.
 
 use super::{
-    affine::{AffineBasis, Coefficients, MAX, subtract},
+    affine_basis::{AffineBasis, subtract},
     centres::Centres,
-    span::Span,
     spectrum::Spectrum,
     triangle::Triangle,
 };
@@ -11,6 +10,7 @@ use crate::{
     Kernel, TpsError,
     lanes::{Job, Lane, dispatch, dot, squared_distance},
     smoothing::least_gcv,
+    span::{Coefficients, MAX, Span},
 };
 use faer::Mat;
 

@@ -2,6 +2,7 @@
 
 mod allocation;
 mod common;
+mod degenerate;
 mod evaluation;
 mod influence;
 mod input;

@@ -1,9 +1,9 @@
 //! Values for many λ against one fit after the other.
 
 use crate::common::{Uniform, bend};
-use nalgebra::{Point2, Point3};
+use nalgebra::Point3;
 use tactile_tps::{
-    Factorization, FitOptions, Kernel, LambdaPath, NegR, R2LogR, Smoothing, Solver, Spline,
+    Factorization, FitOptions, Kernel, LambdaPath, NegR, Smoothing, Solver, Spline,
     SplineWorkspace, TpsError,
 };
 
@@ -64,17 +64,6 @@ fn values_are_those_of_one_fit_after_the_other() {
     twice.extend_from_slice(&sources[..7]);
     both.extend(targets[..7].iter().map(|t| t * 1.1));
     assert!(worst(&twice, &both, &plain, &points) < ROUNDING);
-}
-
-#[test]
-fn so_are_those_in_the_plane_and_of_few_points() {
-    for n in [1, 2, 3, 4, 9, 30] {
-        let sources = Uniform(n).points::<2>(n as usize);
-        let targets: Vec<_> = sources.iter().map(bend).collect();
-        let points = [Point2::new(0.2, 0.1), Point2::new(-3.0, 1.0)];
-        let error = worst(&sources, &targets, &FitOptions::new(R2LogR), &points);
-        assert!(error < ROUNDING, "{n}: {error}");
-    }
 }
 
 #[test]

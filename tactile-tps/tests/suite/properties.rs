@@ -26,10 +26,8 @@ fn reproduces_affine_maps<const D: usize, K: Kernel>(kernel: K, seed: u64) {
     let mut random = Uniform(seed);
     let sources = random.points::<D>(30);
     let linear = SMatrix::<f64, D, D>::from_fn(|_, _| random.next());
-    let map = Affine {
-        linear,
-        offset: SVector::from_fn(|_, _| 10.0 * random.next()),
-    };
+    let offset = SVector::from_fn(|_, _| 10.0 * random.next());
+    let map = Affine::new(linear, offset);
     let targets: Vec<_> = sources.iter().map(|x| map.apply(x)).collect();
     for smoothing in [
         Smoothing::None,
@@ -217,10 +215,8 @@ fn cross_validation_finds_the_noise() {
 fn rigid_motions_are_found_and_never_reflect() {
     let mut random = Uniform(9);
     let sources = random.points::<3>(10);
-    let truth = Affine {
-        linear: *Rotation3::from_euler_angles(0.4, -1.0, 2.0).matrix(),
-        offset: SVector::from([1.0, 2.0, 3.0]),
-    };
+    let turn = Rotation3::from_euler_angles(0.4, -1.0, 2.0);
+    let truth = Affine::new(*turn.matrix(), SVector::from([1.0, 2.0, 3.0]));
     let targets: Vec<_> = sources.iter().map(|x| truth.apply(x)).collect();
     let found = Affine::fit_rigid(&sources, &targets, None).expect("a motion");
     assert!(

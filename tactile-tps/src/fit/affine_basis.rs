@@ -1,12 +1,9 @@
 //! The affine functions at the points, as an orthonormal basis.
 
-use crate::lanes::dot;
-
-/// Affine functions in three dimensions: 1, x, y and z.
-pub(super) const MAX: usize = 4;
-
-/// Coefficients of an affine function.
-pub(super) type Coefficients = [f64; MAX];
+use crate::{
+    lanes::dot,
+    span::{Coefficients, MAX},
+};
 
 /// The affine functions at n points: P = QR with orthonormal Q.
 #[derive(Clone, Debug, Default)]

@@ -1,17 +1,25 @@
 //! The directions that points span.
 
-use super::affine::Coefficients;
 use crate::lanes::dot;
+
+/// Affine functions in three dimensions: 1, x, y and z.
+pub(crate) const MAX: usize = 4;
+
+/// Coefficients of an affine function.
+pub(crate) type Coefficients = [f64; MAX];
+
+/// Sweeps of rotations at most. Three columns need a handful: convergence is quadratic.
+const SWEEPS: usize = 20;
 
 /// The directions in which points extend, from the singular values of their centred coordinates.
 #[derive(Clone, Debug)]
-pub(super) struct Span<const D: usize> {
+pub(crate) struct Span<const D: usize> {
     /// Number of spanned directions.
-    pub(super) directions: usize,
+    pub(crate) directions: usize,
     /// Orthonormal directions, spanned ones first. The coordinate axes if all are spanned.
-    pub(super) basis: [[f64; D]; D],
+    pub(crate) basis: [[f64; D]; D],
     /// Root mean square extent along each direction relative to the largest, falling.
-    pub(super) extents: [f64; D],
+    pub(crate) extents: [f64; D],
 }
 
 impl<const D: usize> Default for Span<D> {
@@ -28,31 +36,16 @@ impl<const D: usize> Span<D> {
     /// The span of n points, whose coordinates stand in `columns`, axis by axis, and are
     /// overwritten.
     ///
-    /// One-sided rotations (Hestenes 1958) keep small singular values to their own relative
-    /// precision.
     /// A direction counts if its extent exceeds the rounding `grain` and the share `tolerance` of
     /// the largest.
-    pub(super) fn new(columns: &mut [f64], grain: f64, tolerance: f64) -> Self {
+    pub(crate) fn new(columns: &mut [f64], grain: f64, tolerance: f64) -> Self {
         let n = columns.len() / D;
         // Centred, so that an offset of all points is no extent.
         for column in columns.chunks_exact_mut(n) {
             let mean = column.iter().sum::<f64>() / n as f64;
             column.iter_mut().for_each(|x| *x -= mean);
         }
-        let axes = core::array::from_fn(|j| core::array::from_fn(|i| f64::from(i == j)));
-        let mut vectors: [[f64; D]; D] = axes;
-        // Three columns need a handful of sweeps: convergence is quadratic.
-        for _ in 0..20 {
-            let mut turned = false;
-            for q in 1..D {
-                for p in 0..q {
-                    turned |= orthogonalise(columns, n, p, q, &mut vectors);
-                }
-            }
-            if !turned {
-                break;
-            }
-        }
+        let vectors = principal_axes::<D>(columns);
         let size = |k: usize| {
             let column = &columns[k * n..(k + 1) * n];
             dot(column, column).sqrt()
@@ -60,9 +53,7 @@ impl<const D: usize> Span<D> {
         let mut order: [usize; D] = core::array::from_fn(|k| k);
         order.sort_unstable_by(|&i, &j| size(j).total_cmp(&size(i)));
         let sizes = order.map(size);
-        // Rounding of n coordinates adds up to √n of that of one.
-        let rounding = 8.0 * (grain + f64::EPSILON) * (n as f64).sqrt();
-        let noise = f64::max(rounding, tolerance * sizes[0]);
+        let noise = f64::max(rounding(n, grain), tolerance * sizes[0]);
         let directions = sizes.iter().filter(|size| **size > noise).count();
         Self {
             directions,
@@ -71,14 +62,14 @@ impl<const D: usize> Span<D> {
             basis: if directions < D {
                 order.map(|k| vectors[k])
             } else {
-                axes
+                core::array::from_fn(|j| core::array::from_fn(|i| f64::from(i == j)))
             },
             extents: sizes.map(|size| if sizes[0] > 0.0 { size / sizes[0] } else { 0.0 }),
         }
     }
 
     /// Affine function `c` of [1, x·b₁, …] at a point.
-    pub(super) fn value(&self, c: usize, point: &[f64; D]) -> f64 {
+    pub(crate) fn value(&self, c: usize, point: &[f64; D]) -> f64 {
         if c == 0 {
             return 1.0;
         }
@@ -86,21 +77,57 @@ impl<const D: usize> Span<D> {
     }
 
     /// Derivative of affine function `c` along an axis.
-    pub(super) fn slope(&self, c: usize, axis: usize) -> f64 {
+    pub(crate) fn slope(&self, c: usize, axis: usize) -> f64 {
         if c == 0 { 0.0 } else { self.basis[c - 1][axis] }
     }
 
     /// The affine function with coefficients `a` at a point.
-    pub(super) fn polynomial(&self, a: &Coefficients, point: &[f64; D]) -> f64 {
+    pub(crate) fn polynomial(&self, a: &Coefficients, point: &[f64; D]) -> f64 {
         (0..=self.directions)
             .map(|c| a[c] * self.value(c, point))
             .sum()
     }
 
+    /// The identity across the spanned directions: N = Σ b bᵀ over the others.
+    pub(crate) fn across(&self) -> [[f64; D]; D] {
+        let entry = |i: usize, k: usize| {
+            let others = &self.basis[self.directions..];
+            others.iter().map(|b| b[i] * b[k]).sum()
+        };
+        core::array::from_fn(|i| core::array::from_fn(|k| entry(i, k)))
+    }
+
     /// The gradient in coordinates of an affine function.
-    pub(super) fn gradient(&self, a: &Coefficients) -> [f64; D] {
+    pub(crate) fn gradient(&self, a: &Coefficients) -> [f64; D] {
         core::array::from_fn(|k| (1..=self.directions).map(|c| a[c] * self.slope(c, k)).sum())
     }
+}
+
+/// Size of a column of n coordinates that rounding alone, `grain` each, could have made.
+pub(crate) fn rounding(n: usize, grain: f64) -> f64 {
+    // Rounding of n coordinates adds up to √n of that of one. 8: several such sums.
+    8.0 * (grain + f64::EPSILON) * (n as f64).sqrt()
+}
+
+/// Turns the `D` columns until they are orthogonal, and returns the directions along which they
+/// then stand: the right singular vectors, in no order.
+///
+/// One-sided rotations (Hestenes 1958) keep small singular values to their own relative precision.
+pub(crate) fn principal_axes<const D: usize>(columns: &mut [f64]) -> [[f64; D]; D] {
+    let n = columns.len() / D;
+    let mut vectors = core::array::from_fn(|j| core::array::from_fn(|i| f64::from(i == j)));
+    for _ in 0..SWEEPS {
+        let mut turned = false;
+        for q in 1..D {
+            for p in 0..q {
+                turned |= orthogonalise(columns, n, p, q, &mut vectors);
+            }
+        }
+        if !turned {
+            break;
+        }
+    }
+    vectors
 }
 
 /// Rotates columns `p` and `q` of length `n` until they are orthogonal, and `vectors` with them.
