@@ -1,5 +1,5 @@
 //! `tactile match`: the point sets of case files.
-use crate::arguments::Repetition;
+use crate::arguments::{Repetition, positive};
 use crate::console::{Context, Exit, Failure, count, four_digits, printable};
 use clap::{Args, ValueEnum};
 use nalgebra::Point;
@@ -44,6 +44,10 @@ pub struct Expectations {
     /// Which set has points without a partner in the other.
     #[arg(long, value_enum, default_value_t = Unmatched::Both)]
     outliers: Unmatched,
+    /// The largest motion of a point, in the points' unit. It tells the answers of a lattice that
+    /// goes on beyond the view apart.
+    #[arg(long, value_name = "LENGTH", value_parser = positive)]
+    largest_motion: Option<f64>,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -89,9 +93,15 @@ impl Expectations {
             Unmatched::Target => Outliers::Target,
             Unmatched::None => Outliers::None,
         };
-        AnnealedSoftassign::default()
+        let matcher = AnnealedSoftassign::default()
             .with_rotation(rotation)
-            .with_outliers(outliers)
+            .with_outliers(outliers);
+        match self.largest_motion {
+            Some(motion) => matcher
+                .with_largest_motion(motion)
+                .expect("a positive length"),
+            None => matcher,
+        }
     }
 }
 
@@ -127,12 +137,17 @@ pub fn allow(context: &Context, model: usize, target: usize, remedy: &str) -> Re
 }
 
 pub fn run(arguments: &MatchArguments, context: &mut Context) -> Result<Exit, Failure> {
-    let Expectations { rotation, outliers } = arguments.expectations;
-    let expected = rotation != Turn::Limited || outliers != Unmatched::Both;
+    let Expectations {
+        rotation,
+        outliers,
+        largest_motion,
+    } = arguments.expectations;
+    let expected =
+        rotation != Turn::Limited || outliers != Unmatched::Both || largest_motion.is_some();
     if arguments.method != Method::Softassign && expected {
         return Err(Failure::input(
-            "--rotation and --outliers apply to the method softassign alone: leave out --method \
-             or them",
+            "--rotation, --outliers and --largest-motion apply to the method softassign alone: leave \
+             out --method or them",
         ));
     }
     let name = |path: &PathBuf| path.file_name().unwrap_or_default().to_owned();

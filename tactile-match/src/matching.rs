@@ -197,7 +197,7 @@ impl<const D: usize, M: PointMatcher<D> + ?Sized> PointMatcher<D> for Box<M> {
 /// ));
 /// # Ok::<(), tactile_match::MatchError>(())
 /// ```
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 #[cfg_attr(
     feature = "serde",
@@ -218,6 +218,13 @@ pub enum Doubt {
     /// angle about an axis of the coordinates, takes the model onto itself: the answer may be
     /// turned by it.
     Symmetric,
+    /// The points are those of a lattice that may go on beyond the view. Moved by one of its steps
+    /// they explain the targets as well, with a motion that is not much larger: state the largest
+    /// motion ([`AnnealedSoftassign::with_largest_motion`](crate::AnnealedSoftassign)).
+    Repeats {
+        /// The step, in the units of the points. In the plane the last number is zero.
+        step: [f64; 3],
+    },
     /// The model turned by a large angle explains the targets better, and such turns are excluded.
     Turned,
     /// A mirror image of the model explains the targets better: columns may be exchanged, or a sign
@@ -228,6 +235,7 @@ pub enum Doubt {
 impl std::fmt::Display for Doubt {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str(match self {
+            Self::Repeats { step } => return write_repeats(f, step),
             Self::FewPairs => "the matched points are so few that they may have met by chance",
             Self::LargeResiduals => {
                 "the residuals of the match are as large as those of scattered points"
@@ -241,6 +249,24 @@ impl std::fmt::Display for Doubt {
             }
         })
     }
+}
+
+/// The step of a lattice, along an axis where it lies within three degrees of one.
+fn write_repeats(f: &mut std::fmt::Formatter<'_>, step: &[f64; 3]) -> std::fmt::Result {
+    let length = step.iter().map(|s| s * s).sum::<f64>().sqrt();
+    let [x, y, z] = step.map(|s| s / length);
+    let axes = ["x", "y", "z"].into_iter().zip([x, y, z]);
+    let along = match axes.into_iter().find(|(_, c)| c.abs() > 0.9986) {
+        Some((axis, _)) => axis.to_owned(),
+        None if z == 0.0 => format!("({x:.2}, {y:.2})"),
+        None => format!("({x:.2}, {y:.2}, {z:.2})"),
+    };
+    write!(
+        f,
+        "the points repeat every {length:.4} along {along}: motions beyond {:.4} cannot be told \
+         without a largest motion",
+        0.5 * length
+    )
 }
 
 /// How a match went.

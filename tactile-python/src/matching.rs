@@ -175,6 +175,9 @@ fn softassign(
     if let Some(limit) = options.count("max_iterations")? {
         matcher = matcher.with_max_iterations(limit).map_err(invalid)?;
     }
+    if let Some(motion) = options.number("largest_motion")? {
+        matcher = matcher.with_largest_motion(motion).map_err(invalid)?;
+    }
     Ok(matcher)
 }
 

@@ -178,7 +178,8 @@ impl<const D: usize> Annealer<D> {
     /// The lowest temperature: the schedule's, or the least error of the targets where that is
     /// known.
     fn floor(&self, schedule: &Schedule) -> f64 {
-        schedule.floor.max(self.soft.errors.floor())
+        let floor = schedule.floor.max(self.least_sigma);
+        floor.max(self.soft.errors.floor())
     }
 
     /// One soft assignment and one fit. The residual variance that is left.

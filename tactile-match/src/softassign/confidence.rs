@@ -3,17 +3,29 @@
 
 use super::{Annealer, Answer, Mechanism, Slack, SoftAssignment, State};
 use super::{difference, dot, squared, squared_distance};
-use crate::Doubt;
+use crate::{Doubt, Outliers, linear_assignment};
 use std::f64::consts::TAU;
 
-/// Residuals below this (radii of the model) are what the prior's factor leaves out: the data are
-/// clean.
-pub(super) const CLEAN_SIGMA: f64 = 3e-3;
-/// The lowest temperature of a run.
-pub(super) const MIN_SIGMA: f64 = 1e-3;
+/// Residuals below this, in radii of the model and in spacings, are what the prior's factor leaves
+/// out: the data are clean.
+const CLEAN_SIGMA: [f64; 2] = [3e-3, 0.05];
+/// The same for the lowest temperature of a run: partners a twentieth of a spacing apart are told.
+const MIN_SIGMA: [f64; 2] = [1e-3, 1.0 / 60.0];
+/// An answer is read at so many times the lowest temperature at least: what the prior's factor
+/// leaves out must not cost a clean pair its match.
+const READ: f64 = 1.4;
 /// Least logarithm, a point, of how much more likely an answer makes the targets than chance does:
 /// wrong basins come to less than nothing.
 pub(super) const MIN_TELLING_GAIN: f64 = 0.2;
+
+impl<const D: usize> Annealer<D> {
+    /// Sets what noise is told from what the prior leaves out, for points this far apart.
+    pub(super) fn set_resolution(&mut self, spacing: f64) {
+        let least = |[radii, spacings]: [f64; 2]| radii.min(spacings * spacing);
+        self.clean_sigma = least(CLEAN_SIGMA);
+        self.least_sigma = least(MIN_SIGMA);
+    }
+}
 
 /// Whether parts of one set are out of sight or strewn about.
 pub(super) fn are_unequal(model: usize, target: usize) -> bool {
@@ -23,6 +35,9 @@ pub(super) fn are_unequal(model: usize, target: usize) -> bool {
     // more of such shifts, more costs noisy scenes further starts (`--example confidence`).
     (model.min(target) as f64) < 0.95 * model.max(target) as f64
 }
+
+/// Most costs of a completion: 8 MB, and a tenth of a second.
+const MAX_COMPLETED: usize = 1_000_000;
 
 impl<const D: usize> Answer<D> {
     /// Why the pairs are not to be relied on. `smaller` points could have a partner, `share` of
@@ -94,11 +109,10 @@ impl<const D: usize> Answer<D> {
             // right all the same.
             Doubt::Turned | Doubt::Mirrored => (0.02, 1.0),
             // Two answers or more are as good.
-            Doubt::Symmetric => (0.5, 1.0),
+            Doubt::Symmetric | Doubt::Repeats { .. } => (0.5, 1.0),
             Doubt::FewPairs | Doubt::Undecided | Doubt::LargeResiduals => (logistic, 1.42),
         };
-        let paired = self.assignment.iter().zip(&mut self.confidence);
-        for (_, confidence) in paired.filter(|(partner, _)| partner.is_some()) {
+        for confidence in &mut self.confidence {
             *confidence = whole * confidence.powf(power);
         }
     }
@@ -116,10 +130,13 @@ impl<const D: usize> Answer<D> {
         without: Option<Mechanism>,
     ) {
         let n = state.warped.len();
-        let noisy = state.noisy || state.sigma > CLEAN_SIGMA || annealer.soft.errors.differ();
-        // What the prior's factor leaves out must not cost a clean pair its match. The answer is
-        // read at no lower temperature.
-        let least = if state.noisy { 0.0 } else { 1.4e-3 };
+        let clean = annealer.clean_sigma;
+        let noisy = state.noisy || state.sigma > clean || annealer.soft.errors.differ();
+        let least = if state.noisy {
+            0.0
+        } else {
+            READ * annealer.least_sigma
+        };
         let variance = state.sigma.max(least).powi(2);
         // Soft matches are read with weights raised to this power. Scaling rows and columns tells
         // two points that may be swapped apart by half the logarithm of the odds that the whole
@@ -151,6 +168,57 @@ impl<const D: usize> Answer<D> {
             // A point that was put onto its target shares the target's error.
             let on_target = snaps && self.assignment[i].is_some();
             self.variance.push(if on_target { fit } else { of_warp });
+        }
+    }
+
+    /// Takes out pairs that moved farther than is allowed, and completes the pairs where every point
+    /// of the smaller set, or of one side, has a partner.
+    pub(super) fn finish(
+        &mut self,
+        outliers: Outliers,
+        targets: &[[f64; D]],
+        model: &[[f64; D]],
+        (still, farthest): ([f64; D], f64),
+    ) {
+        if farthest.is_finite() {
+            for (i, partner) in self.assignment.iter_mut().enumerate() {
+                let place = std::array::from_fn(|k| model[i][k] + still[k]);
+                let near =
+                    |&j: &usize| squared_distance(&targets[j], &place) <= farthest * farthest;
+                if partner.is_some() && partner.filter(near).is_none() {
+                    (*partner, self.confidence[i]) = (None, 0.5);
+                }
+            }
+        }
+        if outliers == Outliers::Both {
+            return;
+        }
+        let left: Vec<usize> = (0..model.len())
+            .filter(|&i| self.assignment[i].is_none())
+            .collect();
+        let mut taken = vec![false; targets.len()];
+        self.assignment
+            .iter()
+            .flatten()
+            .for_each(|&j| taken[j] = true);
+        let open: Vec<usize> = (0..targets.len()).filter(|&j| !taken[j]).collect();
+        if left.len().min(open.len()) == 0 || left.len() * open.len() > MAX_COMPLETED {
+            return;
+        }
+        let cost = |&i: &usize| {
+            let warped = self.warped[i];
+            open.iter()
+                .map(move |&j| squared_distance(&warped, &targets[j]))
+        };
+        let costs: Vec<f64> = left.iter().flat_map(cost).collect();
+        let Ok(pairs) = linear_assignment(&costs, left.len(), open.len()) else {
+            return;
+        };
+        for (&i, column) in left.iter().zip(pairs) {
+            if let Some(column) = column {
+                // The likeliest of what is left, which the soft matches do not prefer.
+                (self.assignment[i], self.confidence[i]) = (Some(open[column]), 0.5);
+            }
         }
     }
 

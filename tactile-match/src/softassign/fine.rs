@@ -1,10 +1,9 @@
 //! Residuals below what the annealing resolves: are they noise, and where do the points go then?
 
 use super::anneal::median_of_chi_squared;
-use super::confidence::CLEAN_SIGMA;
 use super::model::cholesky;
 use super::search::is_cold;
-use super::{AnnealedSoftassign, Search, SoftassignWorkspace, State, Transformation};
+use super::{AnnealedSoftassign, Mechanism, Search, SoftassignWorkspace, State, Transformation};
 use super::{difference, in_space, squared, squared_distance};
 use crate::hard;
 use nalgebra::{Matrix4, Matrix4x3, RowVector4, SVector};
@@ -83,9 +82,10 @@ impl AnnealedSoftassign {
         // A dense fit takes many times as long as the one run of a search near by.
         let thorough = matches!(self.search, Search::Thorough);
         let bends = thorough && self.transformation == Transformation::NonRigid;
-        let plain = ws.known.is_empty() && !ws.annealer.soft.errors.differ();
+        let plain =
+            self.has(Mechanism::Fine) && ws.known.is_empty() && !ws.annealer.soft.errors.differ();
         let smaller = ws.model.len().min(ws.target.len()) as f64;
-        if !bends || !plain || !(ws.best.sigma <= CLEAN_SIGMA || is_cold(ws)) {
+        if !bends || !plain || !(ws.best.sigma <= ws.annealer.clean_sigma || is_cold(ws)) {
             return false;
         }
         // Those lie this far from their targets at most.
@@ -107,7 +107,7 @@ impl AnnealedSoftassign {
             return false;
         }
         fine.place(&ws.model, &mut ws.best);
-        if ws.best.sigma > CLEAN_SIGMA {
+        if ws.best.sigma > ws.annealer.clean_sigma {
             // The annealing resolves it, and its average over scales errs less.
             ws.best.noisy = false;
             fine.forget();
@@ -217,6 +217,9 @@ impl<const D: usize> FineFit<D> {
             // What is clean under the first shape is clean, by a few λ.
             if shape == SHAPES[0] {
                 let rough = [least, -17, -11, -2].map(|k| self.system.energy(lambda(k)));
+                if !rough[0].is_finite() {
+                    return None; // all on a line or a plane
+                }
                 if rough.is_sorted() {
                     self.sigma = Some(self.system.scale(lambda(least)));
                     return None;

@@ -1,7 +1,6 @@
 //! Large sets, coarse to fine.
 
 use super::assign::Blocks;
-use super::confidence::CLEAN_SIGMA;
 use super::model::Prior;
 use super::search::{ENERGY_RESOLUTION, FAST, MAX_PATTERN_REACH, SCALES};
 use super::{
@@ -51,7 +50,33 @@ impl AnnealedSoftassign {
         let mut levels = std::mem::take(&mut ws.levels);
         levels.model_order.build(&ws.model);
         levels.target_order.build(&ws.target);
-        let mut flow = self.coarsest(ws, &mut levels, stride, observe);
+        let mut flow = ControlFlow::Continue(());
+        if self.has(Mechanism::Motions) {
+            levels.base.clone_from(&ws.model);
+            self.enter(ws, &mut levels, 1);
+            std::mem::swap(&mut ws.levels, &mut levels);
+            let follows = self.place_by_motions(ws);
+            std::mem::swap(&mut ws.levels, &mut levels);
+            if follows {
+                let run = self.schedule(Cooling {
+                    sigma: 0.4 * ws.mean_spacing(),
+                    least: 1.0,
+                    still: STILL,
+                    ..FAST
+                });
+                flow = refine(ws, run, flow, observe);
+                ws.state.tail = ws.annealer.tail(0.1 * ws.spacing);
+                ws.best.copy_from(&ws.state);
+                ws.annealer
+                    .evaluate(&mut ws.best, self.share, ENERGY_RESOLUTION, 1.0);
+                if ws.is_likely() {
+                    stride = 0;
+                }
+            }
+        }
+        if stride > 0 {
+            flow = self.coarsest(ws, &mut levels, stride, observe);
+        }
         while stride > 1 {
             // First temperature of a level in spacings of the coarser one.
             let sigma = 1.0 * ws.spacing;
@@ -82,7 +107,9 @@ impl AnnealedSoftassign {
             flow = refine(ws, run, flow, observe);
         }
         // A run colder than the noise has lost pairs: again, as far as the residuals let it cool.
-        if ws.state.sigma <= CLEAN_SIGMA && ws.state.matched < 0.98 * smaller as f64 {
+        let cold =
+            ws.state.sigma <= ws.annealer.clean_sigma && ws.state.matched < 0.98 * smaller as f64;
+        if cold && stride > 0 {
             let run = self.schedule(Cooling {
                 sigma: 0.4 * ws.spacing,
                 least: 1.0,
@@ -92,7 +119,7 @@ impl AnnealedSoftassign {
             flow = refine(ws, run, flow, observe);
         }
         let schedule = self.schedule(FAST);
-        let noisy = ws.state.sigma > CLEAN_SIGMA || ws.annealer.soft.errors.differ();
+        let noisy = ws.state.sigma > ws.annealer.clean_sigma || ws.annealer.soft.errors.differ();
         if flow.is_continue() && noisy {
             // Rounds in which warp and noise level follow each other at the end of noisy sets.
             ws.annealer.settle(&mut ws.state, &schedule, 4);
@@ -108,7 +135,7 @@ impl AnnealedSoftassign {
             ws.best.copy_from(&ws.state);
         }
         if flow.is_continue() {
-            self.look_for_twins(ws);
+            self.look_for_rivals(ws);
         }
         flow
     }
@@ -175,7 +202,7 @@ impl AnnealedSoftassign {
         for rotation in std::iter::once(None).chain(rotations) {
             let sets = (&*ws.model, &*ws.target);
             match rotation {
-                None => starts::centred(sets.0, sets.1, &mut levels.base),
+                None => levels.base.clone_from(&ws.model),
                 Some(turn) => starts::moments(sets.0, sets.1, &turn, &mut levels.base),
             }
             self.enter(ws, levels, stride);
@@ -293,7 +320,7 @@ const STEP: usize = 8;
 /// Samples of both sets, and where the coarser level put its points.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Levels<const D: usize> {
-    model_order: Blocks<D>,
+    pub(super) model_order: Blocks<D>,
     target_order: Blocks<D>,
     model: Vec<[f64; D]>,
     target: Vec<[f64; D]>,

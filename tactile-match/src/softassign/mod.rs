@@ -35,12 +35,13 @@ mod correspond;
 mod fine;
 mod large;
 mod model;
+mod motion;
 mod options;
 mod patterns;
 mod result;
+mod rivals;
 mod search;
 mod starts;
-mod twins;
 
 pub use options::{
     AnnealedSoftassign, Landmark, Mechanism, Outliers, Rotation, Search, Transformation,
@@ -55,6 +56,7 @@ use correspond::Correspondence;
 use fine::FineFit;
 use large::Levels;
 use model::{Prior, RigidFit, ScaleAverage};
+use motion::Motions;
 use nalgebra::{Point, SVector, Vector3};
 use patterns::{Candidate, Cells, Consensus, GatedNearest};
 use result::Series;
@@ -104,11 +106,16 @@ pub struct SoftassignWorkspace<const D: usize> {
     scales: ScaleAverage<D>,
     fine: FineFit<D>,
     levels: Levels<D>,
+    motions: Motions<D>,
+    /// From a point of the model to those about it.
+    steps: Vec<SVector<f64, D>>,
     known: Vec<Known<D>>,
     /// Standard deviations of the targets. Empty where the caller did not tell them.
     deviations: Vec<f64>,
-    /// Typical distance of a target from the next, once the search asks for it.
+    /// Typical distance of a target from the next.
     spacing: f64,
+    /// Largest motion that is allowed.
+    farthest: f64,
     /// Share of points without a partner that the caller expects.
     expected_share: f64,
     /// Rows of a set, sorted by their coordinates.
@@ -120,6 +127,8 @@ pub struct SoftassignWorkspace<const D: usize> {
     /// What explains the targets better than the answer and may not take its place, and by how
     /// much.
     twin: Option<(f64, Doubt)>,
+    /// A step by which the model repeats, where the answer may be off by it.
+    repeats: Option<Doubt>,
     /// Points that the best run before the last had matched.
     matched_before: f64,
     /// Why the answer is not to be relied on.
@@ -136,7 +145,7 @@ impl<const D: usize> SoftassignWorkspace<D> {
         let doubt = self.answer.doubt(smaller, share, gain, self.best.tail);
         let symmetric = self.symmetric.then_some(Doubt::Symmetric);
         let twin = self.twin.map(|(_, doubt)| doubt);
-        self.doubt = twin.or(doubt).or(symmetric);
+        self.doubt = twin.or(self.repeats).or(doubt).or(symmetric);
         if let Some(doubt) = self.doubt {
             self.answer.lower_confidences(doubt, gain);
         }
@@ -336,6 +345,8 @@ struct State<const D: usize> {
     settled: bool,
     /// Whether the residuals are noise, however small.
     noisy: bool,
+    /// Whether many points move farther than is allowed.
+    far: bool,
     /// Share of the matched points whose residual the noise of the others does not explain, see
     /// [`Annealer::tail`].
     tail: f64,
@@ -352,7 +363,7 @@ impl<const D: usize> State<D> {
         (self.sigma, self.iterations) = (other.sigma, other.iterations);
         (self.energy, self.settled, self.matched) = (other.energy, other.settled, other.matched);
         (self.tail, self.ambiguity) = (other.tail, other.ambiguity);
-        self.noisy = other.noisy;
+        (self.noisy, self.far) = (other.noisy, other.far);
     }
 }
 
@@ -366,6 +377,8 @@ struct Frame<const D: usize> {
     model: SVector<f64, D>,
     target: SVector<f64, D>,
     scale: f64,
+    /// Radius of the target, over the scale.
+    target_radius: f64,
 }
 
 impl<const D: usize> Default for Frame<D> {
@@ -374,6 +387,7 @@ impl<const D: usize> Default for Frame<D> {
             model: SVector::zeros(),
             target: SVector::zeros(),
             scale: 1.0,
+            target_radius: 1.0,
         }
     }
 }
@@ -382,7 +396,7 @@ impl<const D: usize> Frame<D> {
     /// The frame of two sets. The radius of `target` stands in for a model without extent, 1 if
     /// that has none either.
     fn new(model: &[Point<f64, D>], target: &[Point<f64, D>]) -> Self {
-        let sets = [model, target].map(centre_and_radius);
+        let sets = [model, target].map(bulk);
         // Below the rounding of the coordinates the radius is noise: such a set is one point.
         let extended = |(centre, radius): &(SVector<f64, D>, f64)| {
             *radius > 8.0 * f64::EPSILON * centre.amax()
@@ -395,7 +409,13 @@ impl<const D: usize> Frame<D> {
             model: sets[0].0,
             target: sets[1].0,
             scale,
+            target_radius: sets[1].1 / scale,
         }
+    }
+
+    /// From a model point in the frame to where it lies among the targets.
+    fn still(&self) -> [f64; D] {
+        self.inward(self.model - self.target)
     }
 
     /// A model point in the frame.
@@ -418,6 +438,31 @@ impl<const D: usize> Frame<D> {
             point[k] * self.scale + self.target[k]
         }))
     }
+}
+
+/// Points farther from the centre than so many times the median are not of the bulk of a set: of
+/// points that fill a ball, a box or their rim, none is.
+const BULK: f64 = 6.0;
+
+/// Centroid and root mean square radius of the bulk of a set: a point at a thousand times the size
+/// of the others decides neither.
+fn bulk<const D: usize>(points: &[Point<f64, D>]) -> (SVector<f64, D>, f64) {
+    let (mut centre, mut radius) = centre_and_radius(points);
+    let mut kept: Vec<Point<f64, D>> = Vec::new();
+    // Rounds, as what lies farthest hides what lies far.
+    for _ in 0..4 {
+        let within = |p: &&Point<f64, D>, limit: f64| (p.coords - centre).norm() <= limit;
+        // As many lie farther as nearer, but for ties.
+        let limit = BULK * radius / 4.0;
+        let near = points.iter().filter(|p| within(p, limit / BULK)).count();
+        if !(radius.is_finite() && 2 * near > points.len()) {
+            break; // the bulk reaches farther than a quarter of the radius
+        }
+        kept.clear();
+        kept.extend(points.iter().filter(|p| within(p, limit)));
+        (centre, radius) = centre_and_radius(&kept);
+    }
+    (centre, radius)
 }
 
 /// Mean of points already in the frame.
@@ -500,6 +545,10 @@ struct Annealer<const D: usize> {
     known: Vec<Known<D>>,
     /// Volume of the targets' bounding box.
     volume: f64,
+    /// Residuals up to this are what the prior's factor leaves out.
+    clean_sigma: f64,
+    /// The lowest temperature.
+    least_sigma: f64,
     weights: Vec<f64>,
     residuals: Axes<D>,
     predicted: Vec<[f64; D]>,

@@ -16,6 +16,12 @@ use tactile_core::vectorised;
 /// Largest number of columns kept.
 const MAX_RANK: usize = 64;
 
+/// Variance that the factor leaves out of sets of up to [`DENSE`] points, relative to the largest:
+/// a thousandth of a radius.
+const LEFT_OUT: f64 = 1e-6;
+/// Denser sets resolve less than that: a sixtieth of their spacing.
+const DENSE: f64 = 1700.0;
+
 /// Columns are padded with zeros to a multiple of this, so that they are whole vectors.
 const LANES: usize = 8;
 
@@ -62,8 +68,9 @@ impl Prior {
         self.columns.reserve(MAX_RANK.min(n) * self.stride);
         self.pivots.clear();
         self.left.clear();
-        // Variance left out, relative to the largest.
-        let floor = 1e-6 * self.diagonal.iter().fold(0.0_f64, |m, &d| m.max(d));
+        // Variance left out, relative to the largest: less as the points are denser.
+        let denser = (DENSE / n as f64).powf(2.0 / D as f64).min(1.0);
+        let floor = LEFT_OUT * denser * self.diagonal.iter().fold(0.0_f64, |m, &d| m.max(d));
         while self.pivots.len() < MAX_RANK.min(n) {
             let pivot = largest(&self.diagonal);
             if self.diagonal[pivot] <= floor {

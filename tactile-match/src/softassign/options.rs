@@ -2,7 +2,7 @@
 
 use super::Annealer;
 use super::Known;
-use super::{Slack, SoftassignMatch, SoftassignWorkspace, confidence};
+use super::{Slack, SoftassignMatch, SoftassignWorkspace};
 use crate::error::{at_least_one, option_within};
 use crate::{MatchError, Matching};
 use nalgebra::Point;
@@ -28,11 +28,16 @@ pub enum Mechanism {
     Scales,
     PairOdds,
     LargePatterns,
+    Motions,
+    Rivals,
+    Open,
+    Fine,
+    Amplitudes,
 }
 
 #[allow(missing_docs)]
 impl Mechanism {
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 15] = [
         Self::Patterns,
         Self::Reheat,
         Self::Slow,
@@ -43,6 +48,11 @@ impl Mechanism {
         Self::Scales,
         Self::PairOdds,
         Self::LargePatterns,
+        Self::Motions,
+        Self::Rivals,
+        Self::Open,
+        Self::Fine,
+        Self::Amplitudes,
     ];
 }
 
@@ -252,6 +262,8 @@ pub struct AnnealedSoftassign {
     pub(super) search: Search,
     pub(super) transformation: Transformation,
     pub(super) share: f64,
+    /// In the units of the points.
+    pub(super) largest_motion: f64,
     pub(super) max_iterations: usize,
 }
 
@@ -264,6 +276,7 @@ impl Default for AnnealedSoftassign {
             search: Search::Thorough,
             transformation: Transformation::NonRigid,
             share: 0.1,
+            largest_motion: f64::INFINITY,
             max_iterations: 200,
         }
     }
@@ -307,6 +320,37 @@ impl AnnealedSoftassign {
     pub fn with_outlier_ratio(mut self, share: f64) -> Result<Self, MatchError> {
         option_within("outlier_ratio", share, 1e-6, 0.9, "[1e-6, 0.9]")?;
         self.share = share;
+        Ok(self)
+    }
+
+    /// Sets the largest motion of a point from the model to the target, in the units of the points
+    /// (default: none). It bounds the search: pairs that are farther apart are no pairs, and an
+    /// answer of a lattice that repeats beyond it is no rival.
+    ///
+    /// ```
+    /// use nalgebra::Point2;
+    /// use tactile_match::{AnnealedSoftassign, Doubt, PointMatcher};
+    /// // Part of a lattice of spacing 10, moved by 4: or by −6, which shows the same points.
+    /// let lattice = |shift: f64| -> Vec<Point2<f64>> {
+    ///     (0..144)
+    ///         .map(|k| Point2::new(f64::from(k % 12) * 10.0 + shift, f64::from(k / 12) * 10.0))
+    ///         .collect()
+    /// };
+    /// let matcher = AnnealedSoftassign::default();
+    /// let found = matcher.match_points(&lattice(0.0), &lattice(4.0))?;
+    /// assert!(matches!(found.report.doubt, Some(Doubt::Repeats { .. })));
+    /// let bounded = matcher.with_largest_motion(5.0)?;
+    /// let found = bounded.match_points(&lattice(0.0), &lattice(4.0))?;
+    /// assert_eq!((found.report.doubt, found.assignment[50]), (None, Some(50)));
+    /// # Ok::<(), tactile_match::MatchError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`MatchError::InvalidOption`] for a motion that is not positive and finite.
+    pub fn with_largest_motion(mut self, motion: f64) -> Result<Self, MatchError> {
+        let (least, most) = (f64::MIN_POSITIVE, f64::MAX);
+        option_within("largest_motion", motion, least, most, "(0, ∞)")?;
+        self.largest_motion = motion;
         Ok(self)
     }
 
@@ -448,7 +492,7 @@ impl AnnealedSoftassign {
                 row: known.row,
                 position: frame.target(&known.position),
                 variance: (known.deviation / frame.scale)
-                    .max(confidence::MIN_SIGMA)
+                    .max(workspace.annealer.least_sigma.max(1e-4))
                     .powi(2),
             }
         }));

@@ -71,11 +71,18 @@ impl<const D: usize> LocalPatterns<D> {
             self.distances.push((nearest, i));
         }
         let middle = self.distances.len() / 2;
-        self.distances
-            .select_nth_unstable_by(middle, |a, b| a.0.total_cmp(&b.0))
+        let by_distance = |a: &(f64, usize), b: &(f64, usize)| a.0.total_cmp(&b.0);
+        let spacing = self
+            .distances
+            .select_nth_unstable_by(middle, by_distance)
             .1
-            .0
-            .sqrt()
+            .0;
+        // A point alone has no neighbour.
+        if spacing.is_finite() {
+            spacing.sqrt()
+        } else {
+            0.0
+        }
     }
 
     /// The nearest neighbours of model point `i`, as offsets from it.

@@ -1,7 +1,6 @@
 //! The result of a match: its warp, and what is kept along a series of targets.
 
 use super::assign::Blocks;
-use super::confidence::{self, CLEAN_SIGMA};
 use super::large::LARGE;
 use super::{AnnealedSoftassign, Frame, SoftassignWorkspace, mean, squared_distance};
 use crate::centre_and_radius;
@@ -145,7 +144,7 @@ fn stop_reason<const D: usize>(workspace: &SoftassignWorkspace<D>) -> StopReason
     match () {
         () if workspace.stopped => StopReason::Cancelled,
         // The floor is reached to rounding.
-        () if workspace.best.sigma <= 1.000_001 * confidence::MIN_SIGMA
+        () if workspace.best.sigma <= 1.000_001 * workspace.annealer.least_sigma
             && !workspace.annealer.soft.errors.differ()
             && !workspace.fine.found
             && workspace.doubt.is_none() =>
@@ -437,7 +436,7 @@ impl AnnealedSoftassign {
         // The first temperature is so many times what the sets differ by in place and size.
         let warmth = 2.0 * apart(start, &workspace.target);
         self.solve_from(workspace, start, warmth);
-        let noise = (2.0 * *sigma / frame.scale).max(CLEAN_SIGMA);
+        let noise = (2.0 * *sigma / frame.scale).max(workspace.annealer.clean_sigma);
         let found = workspace.answer.assignment.iter().flatten().count();
         // A match that finds partners for less than this share of what the last one found, or
         // leaves so many times its residuals, is made anew.

@@ -6,13 +6,13 @@
 //! expensive. The answer of least energy wins. Noisy scenes then average over the scales of the
 //! prior.
 
-use super::confidence::{self, CLEAN_SIGMA, MIN_TELLING_GAIN};
+use super::confidence::{self, MIN_TELLING_GAIN};
 use super::model::AMPLITUDES;
 use super::{
-    AnnealedSoftassign, Cooling, Mechanism, PriorScales, Rotation, Schedule, Search,
+    AnnealedSoftassign, BULK, Cooling, Mechanism, PriorScales, Rotation, Schedule, Search,
     SoftassignWorkspace, Transformation, starts,
 };
-use nalgebra::SMatrix;
+use nalgebra::{SMatrix, SVector};
 use std::ops::ControlFlow;
 
 /// Scales of the prior in the search.
@@ -63,6 +63,22 @@ const REHEAT: Cooling = Cooling {
     rate: 0.9,
     ..SLOW
 };
+/// From the motions of blocks: as warm as those leave points aside, in mean spacings.
+const MOVED: Cooling = Cooling {
+    sigma: 0.4,
+    rate: FAST.rate,
+    still: 1e-3,
+    sweeps: FAST.sweeps,
+    ..SLOW
+};
+/// Share of the points in view that an answer from the motions of blocks matches: more may be
+/// missing on either side.
+const FOLLOWED: f64 = 0.75;
+/// A larger share of residuals that noise does not explain is of a part that lies aside: it explains
+/// one in a thousand, and trades of random points a few.
+const LEAST_ASIDE: f64 = 0.02;
+/// Error of a block's motion, in spacings.
+const MOTION_ERROR: f64 = 0.15;
 /// After relaxation labelling, whose pairs are trusted more than a first guess.
 const LABELLED: Cooling = Cooling {
     sigma: 0.15,
@@ -78,6 +94,15 @@ const NEAR: Cooling = Cooling {
     ..FAST
 };
 
+/// From the patterns or tuples of points. Warmer, the edges of a cropped set would draw it together
+/// again.
+fn seeded(spacing: f64) -> Cooling {
+    Cooling {
+        sigma: 0.3 * spacing,
+        ..REHEAT
+    }
+}
+
 /// Where a run starts.
 #[derive(Clone, Copy, Debug)]
 enum Start<const D: usize> {
@@ -89,6 +114,8 @@ enum Start<const D: usize> {
     Patterns,
     /// The pairs of relaxation labelling.
     Labelling,
+    /// The sets as they lie, corrected by the motions of blocks.
+    Moved,
     /// The second moments on each other, after a rotation.
     Moments(SMatrix<f64, D, D>),
     /// The affine map that local tuples of points agree on.
@@ -127,7 +154,7 @@ impl AnnealedSoftassign {
     ) {
         self.begin(ws);
         self.prepare(ws);
-        starts::centred(&ws.model, &ws.target, &mut ws.state.base);
+        ws.state.base.clone_from(&ws.model);
         ws.state.warped.clear();
         ws.state.warped.extend_from_slice(start);
         let cooling = Cooling {
@@ -142,11 +169,18 @@ impl AnnealedSoftassign {
     /// Nothing is found yet.
     fn begin<const D: usize>(&self, ws: &mut SoftassignWorkspace<D>) {
         ws.annealer.soft.faintest = 1e-6;
-        ws.annealer.volume = bounding_volume(&ws.target);
-        ws.spacing = 0.0;
-        (ws.best.matched, ws.twin) = (0.0, None);
+        ws.annealer.volume = bounding_volume(&ws.target, ws.frame.target_radius);
+        let sparser = if ws.model.len() < ws.target.len() {
+            mean_spacing(ws.annealer.volume, &ws.model)
+        } else {
+            mean_spacing(ws.annealer.volume, &ws.target)
+        };
+        ws.annealer.set_resolution(sparser);
+        ws.spacing = ws.patterns.typical_spacing(&ws.target);
+        ws.farthest = self.largest_motion / ws.frame.scale;
+        (ws.best.matched, ws.twin, ws.repeats) = (0.0, None, None);
         ws.scales.spread.clear();
-        ws.best.noisy = false;
+        (ws.best.noisy, ws.best.far) = (false, false);
         (ws.starts, ws.stopped) = (0, false);
         ws.best.energy = f64::INFINITY;
     }
@@ -182,6 +216,12 @@ impl AnnealedSoftassign {
             spread,
             self.without,
         );
+        ws.answer.finish(
+            self.outliers,
+            &ws.target,
+            &ws.model,
+            (ws.frame.still(), ws.farthest),
+        );
         if ws.best.noisy {
             ws.answer.variance.clone_from(&ws.fine.variance);
         }
@@ -195,17 +235,57 @@ impl AnnealedSoftassign {
         ws: &mut SoftassignWorkspace<D>,
         observe: Observer<'_>,
     ) -> ControlFlow<()> {
+        let moved = Cooling {
+            sigma: MOVED.sigma * mean_spacing(ws.annealer.volume, &ws.target),
+            ..MOVED
+        };
+        let follows = self.has(Mechanism::Motions) && self.place(ws, Start::Moved);
+        if follows {
+            self.anneal(ws, moved, observe)?;
+        }
+        if !(follows && (self.is_done(ws) || self.is_followed(ws, observe)?)) {
+            self.try_starts(ws, observe)?;
+        }
+        self.look_for_rivals(ws);
+        let noisy = ws.best.sigma > ws.annealer.clean_sigma || ws.annealer.soft.errors.differ();
+        if noisy && !ws.best.noisy && self.has(Mechanism::Scales) && !ws.annealer.rigid.is_active()
+        {
+            self.average_scales(ws);
+        }
+        ControlFlow::Continue(())
+    }
+
+    /// Whether a run from the motions of blocks is the answer: it is likely, and the local patterns
+    /// of the points do not lead to a better one.
+    fn is_followed<const D: usize>(
+        &self,
+        ws: &mut SoftassignWorkspace<D>,
+        observe: Observer<'_>,
+    ) -> ControlFlow<(), bool> {
+        if !ws.is_likely() {
+            return ControlFlow::Continue(false);
+        }
+        let energy = ws.best.energy;
+        let seeded = seeded(ws.spacing);
+        self.run(ws, Start::Patterns, seeded, observe)?;
+        // Trades of a few near points change it by less than this for every point.
+        let least = energy - 0.01 * ws.model.len() as f64;
+        ControlFlow::Continue(ws.best.energy >= least && ws.is_likely())
+    }
+
+    /// The starts that do not take the sets as they lie, until an answer leaves no doubt.
+    fn try_starts<const D: usize>(
+        &self,
+        ws: &mut SoftassignWorkspace<D>,
+        observe: Observer<'_>,
+    ) -> ControlFlow<()> {
         self.run(ws, Start::Centred, FAST, observe)?;
         if !ws.best.settled && ws.best.iterations >= self.max_iterations {
             return ControlFlow::Continue(()); // the limit would cut every further start as well
         }
         let dense = ws.model.len().min(ws.target.len()) >= MIN_DENSE_POINTS;
         let limited = self.rotation == Rotation::Limited;
-        // Warmer, the edges of a cropped set would draw it together again.
-        let seeded = Cooling {
-            sigma: 0.3 * ws.spacing,
-            ..REHEAT
-        };
+        let seeded = seeded(ws.spacing);
         let patterns =
             (dense && self.has(Mechanism::Patterns)).then_some((Start::Patterns, seeded));
         // Each time they start from a better field, as long as more points are matched.
@@ -230,14 +310,16 @@ impl AnnealedSoftassign {
             }
             self.run(ws, start, cooling, observe)?;
         }
-        if !dense && is_cold(ws) && !self.is_done(ws) && !self.resolve(ws) {
-            self.run(ws, Start::Centred, OPEN, observe)?;
-        }
-        self.look_for_twins(ws);
-        let noisy = ws.best.sigma > CLEAN_SIGMA || ws.annealer.soft.errors.differ();
-        if noisy && !ws.best.noisy && self.has(Mechanism::Scales) && !ws.annealer.rigid.is_active()
-        {
-            self.average_scales(ws);
+        let open = !dense && self.has(Mechanism::Open);
+        if open && is_cold(ws) && !self.is_done(ws) && !self.resolve(ws) {
+            let near = Cooling {
+                sigma: 0.3 * ws.spacing,
+                ..OPEN
+            };
+            self.run(ws, Start::Best, near, observe)?;
+            if is_cold(ws) {
+                self.run(ws, Start::Centred, OPEN, observe)?;
+            }
         }
         ControlFlow::Continue(())
     }
@@ -281,14 +363,24 @@ impl AnnealedSoftassign {
                     .fit(&mut ws.annealer, SCALES, (model, target), pairs, state);
                 return true;
             }
-            Start::Centred => starts::centred(model, target, &mut state.base),
+            Start::Moved => {
+                if model.len() >= MIN_DENSE_POINTS {
+                    ws.levels.model_order.build(model);
+                }
+                return self.place_by_motions(ws);
+            }
+            Start::Centred => state.base.clone_from(&ws.model),
             Start::Moments(rotation) => {
                 starts::moments(model, target, &rotation, &mut state.base);
             }
             Start::Tuples => {
                 let limited = self.rotation == Rotation::Limited;
                 let base = &mut state.base;
-                if !ws.tuples.find(model, target, ws.spacing, limited, base) {
+                let still = ws.frame.still();
+                if !ws
+                    .tuples
+                    .find(model, target, ws.spacing, limited, &still, base)
+                {
                     return false;
                 }
             }
@@ -298,7 +390,7 @@ impl AnnealedSoftassign {
                 if hidden && !ws.annealer.rigid.is_active() {
                     return false;
                 }
-                starts::centred(model, target, &mut state.base);
+                state.base.clone_from(&ws.model);
                 ws.correspondence.find(&state.base, target);
                 let pairs = &ws.correspondence.pairs;
                 ws.consensus
@@ -307,6 +399,58 @@ impl AnnealedSoftassign {
             }
         }
         state.warped.clone_from(&state.base);
+        true
+    }
+
+    /// Puts `ws.state` where the motions of the blocks take the model from where it lies. False
+    /// where they do not agree on a field.
+    pub(super) fn place_by_motions<const D: usize>(&self, ws: &mut SoftassignWorkspace<D>) -> bool {
+        let still = ws.frame.still();
+        let state = &mut ws.state;
+        let as_it_lies = |p: &[f64; D]| std::array::from_fn(|k| p[k] + still[k]);
+        state.base.clear();
+        state.base.extend(ws.model.iter().map(as_it_lies));
+        let spacing = mean_spacing(ws.annealer.volume, &ws.target);
+        let sets = (&*state.base, &*ws.target);
+        let order = &ws.levels.model_order.order;
+        if !ws.motions.find(sets, order, spacing, ws.farthest) {
+            return false;
+        }
+        let seeds = &ws.motions.seeds;
+        let mean = SVector::from(ws.motions.mean());
+        for p in &mut state.base {
+            *p = (SVector::from(*p) + mean).into();
+        }
+        let annealer = &mut ws.annealer;
+        let stride = annealer.prior.stride;
+        annealer.weights.clear();
+        annealer.weights.resize(stride, 0.0);
+        let nothing = state.base.iter().map(|_| [0.0; D]);
+        annealer.residuals.fill(stride, nothing);
+        for (row, motion) in seeds
+            .iter()
+            .filter_map(|seed| Some((seed.row, seed.motion?)))
+        {
+            annealer.weights[row] = 1.0;
+            for k in 0..D {
+                annealer.residuals.0[k][row] = motion[k] - mean[k];
+            }
+        }
+        let (weights, wanted) = (&annealer.weights, &annealer.residuals);
+        let variance = (MOTION_ERROR * spacing).powi(2);
+        let (regression, prior) = (&mut annealer.regression, &annealer.prior);
+        if annealer.rigid.is_active() {
+            annealer
+                .rigid
+                .fit(weights, &state.base, wanted, variance, regression);
+        } else {
+            regression.fit(prior, weights, wanted, variance);
+        }
+        let field = &regression.displacement.0;
+        state.warped.clear();
+        let rows = state.base.iter().enumerate();
+        let moved = rows.map(|(i, b)| std::array::from_fn(|k| b[k] + field[k][i]));
+        state.warped.extend(moved);
         true
     }
 
@@ -320,16 +464,19 @@ impl AnnealedSoftassign {
         ws.matched_before = ws.best.matched;
         (ws.state.energy, ws.state.tail) = (f64::INFINITY, 0.0);
         let flow = self.anneal_only(ws, cooling, observe);
+        ws.state.far = ws.is_far(&ws.state);
         if ws.starts == 1 {
             ws.best.copy_from(&ws.state);
             if self.is_exact(ws) {
                 return flow; // there will be nothing to compare it with
             }
-            ws.spacing = ws.patterns.typical_spacing(&ws.target);
         }
         ws.state.tail = ws.annealer.tail(0.1 * ws.spacing);
         ws.annealer
             .evaluate(&mut ws.state, self.share, ENERGY_RESOLUTION, 1.0);
+        if ws.state.far {
+            ws.state.energy = f64::INFINITY;
+        }
         if ws.state.energy < ws.best.energy || ws.starts == 1 {
             ws.best.copy_from(&ws.state);
         }
@@ -366,7 +513,9 @@ impl AnnealedSoftassign {
         // Soft partners that spread more than this hide the evidence of a warp behind that of its
         // matches.
         if ambiguity > 0.3 {
-            self.average_amplitudes(ws, &schedule);
+            if self.has(Mechanism::Amplitudes) {
+                self.average_amplitudes(ws, &schedule);
+            }
             return;
         }
         let average = |ws: &mut SoftassignWorkspace<D>, likely: bool| {
@@ -424,7 +573,7 @@ impl AnnealedSoftassign {
         }
         Schedule {
             cooling,
-            floor: confidence::MIN_SIGMA,
+            floor: 0.0,
             limit: self.max_iterations,
             collapse: 0.0,
             partners: f64::INFINITY,
@@ -438,6 +587,9 @@ impl AnnealedSoftassign {
     fn is_done<const D: usize>(&self, ws: &SoftassignWorkspace<D>) -> bool {
         let points = ws.model.len().min(ws.target.len());
         let (best, matched) = (&ws.best, ws.best.matched / points as f64);
+        if best.far {
+            return false;
+        }
         if self.is_exact(ws) {
             return true;
         }
@@ -459,10 +611,37 @@ impl AnnealedSoftassign {
     pub(super) fn is_exact<const D: usize>(&self, ws: &SoftassignWorkspace<D>) -> bool {
         let points = ws.model.len().min(ws.target.len());
         let dense = points >= MIN_DENSE_POINTS;
-        ws.best.sigma <= CLEAN_SIGMA
+        !ws.best.far
+            && ws.best.sigma <= ws.annealer.clean_sigma
             && ws.best.matched >= wanted_share(ws) * points as f64
             && (ws.best.tail <= 0.01 || !dense)
     }
+}
+
+impl<const D: usize> SoftassignWorkspace<D> {
+    /// Whether a run from the motions of blocks kept what they showed: nearly all points that lie
+    /// within the targets' box have a partner, and the pairs make the targets likelier than chance.
+    pub(super) fn is_likely(&self) -> bool {
+        let dense = self.model.len().min(self.target.len()) >= MIN_DENSE_POINTS;
+        let sides: [_; D] = std::array::from_fn(|k| {
+            let values = self.target.iter().map(|t| t[k]);
+            values.fold((f64::MAX, f64::MIN), |(l, h), v| (l.min(v), h.max(v)))
+        });
+        let inside = |w: &&[f64; D]| (0..D).all(|k| sides[k].0 <= w[k] && w[k] <= sides[k].1);
+        let inside = self.best.warped.iter().filter(inside).count() as f64;
+        let gain = self.gain().unwrap_or(f64::INFINITY);
+        dense
+            && !self.best.far
+            && self.best.matched >= FOLLOWED * inside
+            && 2.0 * inside > self.model.len().min(self.target.len()) as f64
+            && gain >= MIN_TELLING_GAIN
+            && self.best.tail <= LEAST_ASIDE
+    }
+}
+
+/// Mean distance of neighbours of points that fill a volume.
+fn mean_spacing<const D: usize>(volume: f64, points: &[[f64; D]]) -> f64 {
+    (volume / points.len() as f64).powf(1.0 / D as f64)
 }
 
 /// Whether the best run so far ended below the noise: so it lost some of its pairs.
@@ -485,12 +664,13 @@ fn wanted_share<const D: usize>(ws: &SoftassignWorkspace<D>) -> f64 {
     }
 }
 
-/// Volume of the bounding box. Thin sides count as a tenth of the model's radius.
-pub(super) fn bounding_volume<const D: usize>(points: &[[f64; D]]) -> f64 {
+/// Volume of the bounding box of the bulk of points of this radius. Thin sides count as a tenth of
+/// the model's radius.
+pub(super) fn bounding_volume<const D: usize>(points: &[[f64; D]], radius: f64) -> f64 {
+    let limit = (BULK * radius).max(f64::MIN_POSITIVE);
     let side = |k: usize| {
-        let (low, high) = points
-            .iter()
-            .fold((f64::MAX, f64::MIN), |(l, h), p| (l.min(p[k]), h.max(p[k])));
+        let bulk = points.iter().filter(|p| p.iter().all(|c| c.abs() <= limit));
+        let (low, high) = bulk.fold((f64::MAX, f64::MIN), |(l, h), p| (l.min(p[k]), h.max(p[k])));
         (high - low).max(0.1)
     };
     (0..D).map(side).product()

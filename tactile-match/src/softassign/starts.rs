@@ -4,21 +4,6 @@ use super::patterns::Cells;
 use super::{Rotation, mean, squared_distance};
 use nalgebra::{Matrix3, SMatrix, SVector, SymmetricEigen};
 
-/// The model moved so that the centroids meet.
-pub(super) fn centred<const D: usize>(
-    model: &[[f64; D]],
-    target: &[[f64; D]],
-    base: &mut Vec<[f64; D]>,
-) {
-    let (from, to) = (mean(model), mean(target));
-    base.clear();
-    base.extend(
-        model
-            .iter()
-            .map(|x| std::array::from_fn(|k| x[k] - from[k] + to[k])),
-    );
-}
-
 /// The model stretched so that centroid and covariance are the target's, and turned by `rotation`
 /// before the stretch.
 ///
@@ -155,6 +140,7 @@ impl<const D: usize> Tuples<D> {
         target: &[[f64; D]],
         spacing: f64,
         limited: bool,
+        still: &[f64; D],
         base: &mut Vec<[f64; D]>,
     ) -> bool {
         let is_degenerate = spacing.is_nan() || spacing <= 0.0;
@@ -166,7 +152,8 @@ impl<const D: usize> Tuples<D> {
         let mut best: Option<(f64, Local<D>)> = None;
         for s in 0..self.seeds.len() {
             let seed = self.seeds[s];
-            let Some(map) = self.best_tuple(model, target, seed, spacing, limited) else {
+            let tuple = self.best_tuple(model, target, seed, spacing, limited, still);
+            let Some(map) = tuple else {
                 continue;
             };
             let Some((grown, map)) = self.grow(model, target, seed, map, spacing) else {
@@ -229,6 +216,7 @@ impl<const D: usize> Tuples<D> {
         seed: usize,
         spacing: f64,
         limited: bool,
+        still: &[f64; D],
     ) -> Option<Local<D>> {
         let from = SVector::from(model[seed]);
         self.nearest(model, &model[seed], TESTED * D + 1);
@@ -239,7 +227,9 @@ impl<const D: usize> Tuples<D> {
         let (basis, inverse) = best_basis(&self.offsets)?;
         // Shares of hits: of the neighbours tested, and of a larger neighbourhood after a refit.
         let wanted = (0.7 * self.offsets.len() as f64) as usize;
-        let mut best = (wanted, f64::INFINITY, None);
+        let mut best = Best::new(wanted);
+        // Misfits are told apart no finer than a tenth of a spacing a point.
+        let equal = 0.01 * spacing * spacing * self.offsets.len() as f64;
         for j in 0..target.len() {
             let to = SVector::from(target[j]);
             self.near.clear();
@@ -288,13 +278,13 @@ impl<const D: usize> Tuples<D> {
                 if !plausible(&linear, limited) {
                     continue;
                 }
-                let (hits, misfit) = self.hits(&linear, &to, &basis, best.0, spacing);
-                if hits > best.0 || (hits == best.0 && misfit < best.1) {
-                    best = (hits, misfit, Some(Local { linear, from, to }));
+                let (hits, misfit) = self.hits(&linear, &to, &basis, best.hits, spacing);
+                if hits > best.hits || (hits == best.hits && misfit < best.misfit + equal) {
+                    best.consider(hits, misfit, Local { linear, from, to }, still, equal);
                 }
             }
         }
-        best.2
+        best.map
     }
 
     /// Neighbours that a map puts onto a target, with the sum of their squared distances. Given up
@@ -403,9 +393,55 @@ struct Local<const D: usize> {
 }
 
 impl<const D: usize> Local<D> {
+    /// Mean square motion of a model of radius one about its centre, which `still` puts among the
+    /// targets.
+    fn motion(&self, still: &[f64; D]) -> f64 {
+        let turned = (self.linear - SMatrix::identity()).norm_squared() / D as f64;
+        let centre = self.to - self.linear * self.from - SVector::from(*still);
+        turned + centre.norm_squared()
+    }
+
     /// The image of a point.
     fn apply(&self, p: &[f64; D]) -> [f64; D] {
         (self.linear * (SVector::from(*p) - self.from) + self.to).into()
+    }
+}
+
+/// The best local map so far: the one that hits most, of those the one of least misfit, and of those
+/// that differ by rounding, as of a lattice, the one of least motion.
+struct Best<const D: usize> {
+    hits: usize,
+    misfit: f64,
+    motion: f64,
+    map: Option<Local<D>>,
+}
+
+impl<const D: usize> Best<D> {
+    fn new(hits: usize) -> Self {
+        Self {
+            hits,
+            misfit: f64::INFINITY,
+            motion: f64::INFINITY,
+            map: None,
+        }
+    }
+
+    fn consider(&mut self, hits: usize, misfit: f64, map: Local<D>, still: &[f64; D], equal: f64) {
+        let motion = map.motion(still);
+        let clearly = hits > self.hits || misfit < self.misfit - equal;
+        if clearly || motion < self.motion {
+            let least = if clearly {
+                misfit
+            } else {
+                misfit.min(self.misfit)
+            };
+            *self = Self {
+                hits,
+                misfit: least,
+                motion,
+                map: Some(map),
+            };
+        }
     }
 }
 

@@ -7,6 +7,7 @@ mod conformance;
 mod corpus;
 mod dense_sets;
 mod drift;
+mod first_tries;
 mod hostile;
 mod large_sets;
 mod nearest;

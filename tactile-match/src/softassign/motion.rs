@@ -1,0 +1,345 @@
+//! How the parts of a set move as it lies: peaks of the differences between blocks and targets.
+
+use super::patterns::Cells;
+use super::{difference, squared_distance};
+use nalgebra::{SMatrix, SVector};
+use std::f64::consts::PI;
+
+// Of all differences `tⱼ − xᵢ` between a block of neighbours and the targets those of true pairs
+// crowd about one place, the motion of the block. All others are spread as evenly as the targets.
+// The first blocks look far, every further one about what the motions of its neighbours predict, so
+// that a field that moves points by many spacings is followed from block to block [as image
+// velocimetry does: Scarano, *Iterative image deformation methods in PIV*, Meas. Sci. Technol. 13
+// (2002)]. Of equal peaks, as of a lattice, the one of least motion is taken.
+
+/// Points of a block, of sets of six blocks and more: so many that a true peak stands out of the
+/// differences to other points by ten of their standard deviations, and so few that a strain of a
+/// tenth does not smear it.
+const BLOCK: usize = 320;
+const BLOCKS: usize = 6;
+/// Blocks that hold a point: their motions support a field that bends within a block.
+const OVERLAP: usize = 4;
+/// Fewest points whose common motion is looked for.
+const FEWEST: usize = 12;
+/// Sets up to this size are one block.
+const ONE_BLOCK: usize = 500;
+/// Blocks that look far: the chance that all of them lie where a field bends most is small.
+const PROBES: usize = 12;
+/// How far those look, in radii of the model and, for time, in spacings of the plane and of space.
+const FAR: f64 = 0.35;
+const FAR_SPACINGS: [f64; 2] = [45.0, 10.0];
+/// How far a block looks from what its neighbours predict, in spacings.
+const NEAR: f64 = 3.0;
+/// Cells of the histogram for a spacing. Three cells, a spacing, are summed.
+const CELLS: f64 = 3.0;
+/// Heights of peaks above all differences, in standard deviations of counts: ten thousand places
+/// exceed four by chance.
+const FAR_HEIGHT: f64 = 6.5;
+const NEAR_HEIGHT: f64 = 4.5;
+/// Share of the smaller set that a common motion of all points pairs.
+const COMMON: f64 = 0.6;
+/// Peaks that reach this share of the highest are as high: of a lattice of 400 points the next one
+/// has 95 %.
+const EQUAL: f64 = 0.97;
+/// Share of the blocks that agree on a field.
+const AGREEING: f64 = 0.6;
+/// Times that a block without a peak is tried again, with more neighbours.
+const TRIES: u8 = 3;
+
+/// The centre of a block, and how it moves.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Seed<const D: usize> {
+    /// The model row at the centre.
+    pub(super) row: usize,
+    /// From where it lies.
+    pub(super) motion: Option<[f64; D]>,
+    /// Squared distance from the nearest block that has a motion.
+    distance: f64,
+    tries: u8,
+}
+
+/// Memory of the motions.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Motions<const D: usize> {
+    /// Blocks with their motions.
+    pub(super) seeds: Vec<Seed<D>>,
+    model: Cells<D>,
+    targets: Cells<D>,
+    /// Rows of the present block.
+    block: Vec<usize>,
+    differences: Vec<[f64; D]>,
+    counts: Vec<u32>,
+    sums: Vec<u32>,
+    /// Points of a block, and the radius of the last one.
+    wanted: usize,
+    radius: f64,
+}
+
+/// A field about a place: its value there and its gradient.
+#[derive(Clone, Copy)]
+struct Local<const D: usize> {
+    at: SVector<f64, D>,
+    value: SVector<f64, D>,
+    gradient: SMatrix<f64, D, D>,
+}
+
+impl<const D: usize> Local<D> {
+    fn still(at: &[f64; D]) -> Self {
+        Self {
+            at: SVector::from(*at),
+            value: SVector::zeros(),
+            gradient: SMatrix::zeros(),
+        }
+    }
+
+    fn move_point(&self, p: &[f64; D]) -> [f64; D] {
+        let p = SVector::from(*p);
+        (p + self.value + self.gradient * (p - self.at)).into()
+    }
+}
+
+impl<const D: usize> Motions<D> {
+    /// Finds the motions of blocks of `still`, the model as it lies, whose rows `order` sorts so
+    /// that any stride of them is spread well. `spacing` is the mean distance of neighbours,
+    /// `farthest` bounds the motions. False where the blocks do not agree on a field.
+    pub(super) fn find(
+        &mut self,
+        (still, target): (&[[f64; D]], &[[f64; D]]),
+        order: &[usize],
+        spacing: f64,
+        farthest: f64,
+    ) -> bool {
+        self.seeds.clear();
+        let smaller = still.len().min(target.len());
+        if smaller < FEWEST || !(spacing > 0.0 && spacing.is_finite()) {
+            return false;
+        }
+        let most = FAR_SPACINGS[usize::from(D > 2)] * spacing;
+        let far = FAR.min(most).min(farthest).max(1.5 * spacing);
+        self.targets.build(target, 1.5 * spacing);
+        let seed = |row| Seed {
+            row,
+            motion: None,
+            distance: f64::INFINITY,
+            tries: 0,
+        };
+        if smaller < ONE_BLOCK {
+            self.block.clear();
+            self.block.extend(0..still.len());
+            let here = Local::still(&still[0]);
+            let peak = self.peak(still, target, &here, far, spacing);
+            let Some((motion, _)) = peak.filter(|(_, peak)| peak.pairs >= COMMON * smaller as f64)
+            else {
+                return false;
+            };
+            self.seeds.push(seed(0));
+            self.seeds[0].motion = Some(motion);
+            return true;
+        }
+        self.model.build(still, 1.5 * spacing);
+        self.wanted = BLOCK.min(still.len() / BLOCKS);
+        self.radius = spacing * (self.wanted as f64 / PI).powf(1.0 / D as f64);
+        let rows = order.iter().step_by(self.wanted / OVERLAP);
+        self.seeds.extend(rows.map(|&row| seed(row)));
+        let step = (self.seeds.len() / PROBES).max(1);
+        let mut best = (FAR_HEIGHT, None);
+        for k in (0..self.seeds.len()).step_by(step) {
+            let row = self.seeds[k].row;
+            self.gather(still, row);
+            let here = Local::still(&still[row]);
+            let found = self.peak(still, target, &here, far, spacing);
+            if let Some((motion, peak)) = found.filter(|(_, peak)| peak.height > best.0) {
+                best = (peak.height, Some((k, motion)));
+            }
+        }
+        let Some((k, motion)) = best.1 else {
+            return false;
+        };
+        self.settle(still, k, motion);
+        while let Some(k) = self.next() {
+            let row = self.seeds[k].row;
+            self.gather(still, row);
+            let here = self.predict(still, row);
+            let found = self.peak(still, target, &here, NEAR * spacing, spacing);
+            match found.filter(|(_, peak)| peak.height > NEAR_HEIGHT) {
+                Some((motion, _)) => self.settle(still, k, motion),
+                None => self.seeds[k].tries += 1,
+            }
+        }
+        let total = self.seeds.len();
+        self.seeds.retain(|seed| seed.motion.is_some());
+        self.seeds.len() as f64 >= AGREEING * total as f64
+    }
+
+    /// Mean of the motions.
+    pub(super) fn mean(&self) -> [f64; D] {
+        let motions = self.seeds.iter().filter_map(|seed| seed.motion);
+        let sum: SVector<f64, D> = motions.map(SVector::from).sum();
+        (sum / self.seeds.len().max(1) as f64).into()
+    }
+
+    /// The block without a motion that is nearest to one with.
+    fn next(&self) -> Option<usize> {
+        let open = self.seeds.iter().enumerate();
+        let open = open.filter(|(_, seed)| seed.motion.is_none() && seed.tries < TRIES);
+        // A block that failed waits until others lie as near.
+        let place = |seed: &Seed<D>| seed.distance * f64::from(1 + 8 * u32::from(seed.tries));
+        open.min_by(|a, b| place(a.1).total_cmp(&place(b.1)))
+            .map(|(k, _)| k)
+    }
+
+    fn settle(&mut self, still: &[[f64; D]], k: usize, motion: [f64; D]) {
+        self.seeds[k].motion = Some(motion);
+        let place = still[self.seeds[k].row];
+        for seed in &mut self.seeds {
+            let distance = squared_distance(&still[seed.row], &place);
+            seed.distance = seed.distance.min(distance);
+        }
+    }
+
+    /// The rows of the block about a model point.
+    fn gather(&mut self, still: &[[f64; D]], row: usize) {
+        // Rounds in which the radius follows the density.
+        for _ in 0..6 {
+            self.block.clear();
+            let block = &mut self.block;
+            self.model
+                .within(&still[row], self.radius, |i, _| block.push(i));
+            self.block.sort_unstable();
+            self.block.dedup();
+            let wanted = self.wanted as f64 / self.block.len().max(1) as f64;
+            if (0.7..1.4).contains(&wanted) || self.block.len() == still.len() {
+                return;
+            }
+            self.radius *= wanted.powf(1.0 / D as f64).clamp(0.5, 2.0);
+        }
+    }
+
+    /// What the nearest blocks predict at a model point: an affine field, shrunk to a shift.
+    fn predict(&self, still: &[[f64; D]], row: usize) -> Local<D> {
+        let at = &still[row];
+        // As many as surround it.
+        let mut near = [(f64::INFINITY, 0); 8];
+        for (k, seed) in self.seeds.iter().enumerate() {
+            let square = squared_distance(&still[seed.row], at);
+            if seed.motion.is_some() && square < near[7].0 {
+                let place = near.partition_point(|&(other, _)| other <= square);
+                near[place..].rotate_right(1);
+                near[place] = (square, k);
+            }
+        }
+        let near = near.iter().filter(|(square, _)| square.is_finite());
+        let rows = near.map(|&(_, k)| {
+            let seed = &self.seeds[k];
+            let motion = SVector::from(seed.motion.unwrap_or([0.0; D]));
+            (SVector::from(still[seed.row]), motion)
+        });
+        let count = rows.clone().count().max(1) as f64;
+        let mean: SVector<f64, D> = rows.clone().map(|(p, _)| p).sum::<SVector<f64, D>>() / count;
+        let value: SVector<f64, D> = rows.clone().map(|(_, u)| u).sum::<SVector<f64, D>>() / count;
+        let ridge = 0.2 * self.radius * self.radius;
+        let mut gram = SMatrix::<f64, D, D>::identity() * ridge;
+        let mut outer = SMatrix::<f64, D, D>::zeros();
+        for (p, u) in rows {
+            gram += (p - mean) * (p - mean).transpose();
+            outer += (u - value) * (p - mean).transpose();
+        }
+        let gradient = outer * gram.try_inverse().unwrap_or_else(SMatrix::zeros);
+        let at = SVector::from(*at);
+        Local {
+            at,
+            value: value + gradient * (at - mean),
+            gradient,
+        }
+    }
+
+    /// The motion of the present block at the place of `here`, within `reach` of what that
+    /// predicts, and how its peak stands out.
+    fn peak(
+        &mut self,
+        still: &[[f64; D]],
+        target: &[[f64; D]],
+        here: &Local<D>,
+        reach: f64,
+        spacing: f64,
+    ) -> Option<([f64; D], Peak)> {
+        let per_cell = CELLS / spacing;
+        let half = (reach * per_cell).ceil() as usize + 1;
+        let side = 2 * half + 1;
+        let (counts, differences) = (&mut self.counts, &mut self.differences);
+        counts.clear();
+        counts.resize(side.pow(D as u32), 0);
+        differences.clear();
+        let centre = half as f64 + 0.5;
+        for &i in &self.block {
+            let place = here.move_point(&still[i]);
+            self.targets.within(&place, reach, |j, _| {
+                let step = difference(&target[j], &place);
+                let mut index = 0;
+                for k in (0..D).rev() {
+                    index = index * side + (step[k] * per_cell + centre) as usize;
+                }
+                counts[index] += 1;
+                differences.push(step);
+            });
+        }
+        self.sum_neighbours(side);
+        let &highest = self.sums.iter().max()?;
+        // Of a box that holds a ball.
+        let ball = self.sums.len() as f64 * [PI / 4.0, PI / 6.0][usize::from(D > 2)];
+        let mean = self.differences.len() as f64 * CELLS.powi(D as i32) / ball;
+        let place = |index: usize| -> [f64; D] {
+            std::array::from_fn(|k| {
+                let cell = index / side.pow(k as u32) % side;
+                (cell as f64 - half as f64) / per_cell
+            })
+        };
+        let high = self.sums.iter().enumerate();
+        let high = high.filter(|&(_, &sum)| f64::from(sum) >= EQUAL * f64::from(highest));
+        let motion = |index: usize| {
+            let moved = SVector::from(place(index)) + here.value;
+            moved.norm_squared()
+        };
+        let (least, _) = high
+            .map(|(index, _)| (index, motion(index)))
+            .min_by(|a, b| a.1.total_cmp(&b.1))?;
+        let (mut step, mut pairs) = (SVector::from(place(least)), 0.0);
+        // Rounds in which the place follows the mean of what lies within half a spacing.
+        for _ in 0..4 {
+            let near = self.differences.iter().map(|d| SVector::from(*d) - step);
+            let near = near.filter(|d| d.norm_squared() < 0.25 * spacing * spacing);
+            let (sum, count) = near.fold((SVector::zeros(), 0.0), |(sum, n), d| (sum + d, n + 1.0));
+            if count > 0.0 {
+                step += sum / count;
+            }
+            pairs = count;
+        }
+        let height = (f64::from(highest) - mean) / (mean + 1.0).sqrt();
+        Some(((here.value + step).into(), Peak { height, pairs }))
+    }
+
+    /// Sums over three cells an axis, into `sums`.
+    fn sum_neighbours(&mut self, side: usize) {
+        let Self { counts, sums, .. } = self;
+        for k in 0..D {
+            let stride = side.pow(k as u32);
+            sums.clone_from(counts);
+            for (i, &count) in counts.iter().enumerate().filter(|(_, count)| **count > 0) {
+                // The outermost cells are empty.
+                sums[i - stride] += count;
+                sums[i + stride] += count;
+            }
+            std::mem::swap(counts, sums);
+        }
+        std::mem::swap(counts, sums);
+    }
+}
+
+/// How a peak stands out.
+#[derive(Clone, Copy, Debug)]
+struct Peak {
+    /// Above the mean of all differences, in standard deviations.
+    height: f64,
+    /// Differences within half a spacing of it.
+    pairs: f64,
+}
