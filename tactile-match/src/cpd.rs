@@ -1,5 +1,4 @@
-//! Coherent point drift: rigid, similarity, affine and non-rigid registration by maximum
-//! likelihood.
+//! Coherent point drift: non-rigid registration by maximum likelihood.
 //!
 //! The model points `y_m` (`M` of them) are the centres of a Gaussian mixture of one variance `σ²`,
 //! with a uniform component of weight `w` for outliers. The target points `x_n` (`N`) are its
@@ -8,85 +7,31 @@
 //!
 //! ```text
 //! P_mn = exp(−|x_n − T(y_m)|²/2σ²) / (Σ_k exp(−|x_n − T(y_k)|²/2σ²) + (2πσ²)^{D/2} w M / ((1−w) N))
-//! T    = the rigid, similarity, affine or non-rigid motion that minimises Σ P_mn |x_n − T(y_m)|² / 2σ² (+ ½ λ |T|²)
+//! T    = the motion that minimises Σ P_mn |x_n − T(y_m)|² / 2σ² + ½ λ |T|²
 //! σ²   = Σ P_mn |x_n − T(y_m)|² / (D Σ P_mn)
 //! ```
 //!
-//! Non-rigid motion is `T(y) = y + Σ_k w_k exp(−|y − y_k|²/2β²)`, neighbours moving coherently. All
+//! The motion is `T(y) = y + Σ_k w_k exp(−|y − y_k|²/2β²)`, neighbours moving coherently. All
 //! parameters refer to sets of root mean square radius one ([`Normalization`]): the same settings
 //! mean the same in every unit. Two things differ from the usual programs, neither in the answer:
 //! `P` is never stored while iterating, and the Gaussian kernel is factorised once, to the rank it
 //! numerically has, instead of solving an `M × M` system in every iteration.
 
 use crate::error::{at_least_one, option_within, point_sets};
-use crate::{Axes, BestMotion, Frame, spread};
+use crate::{Axes, Frame, spread};
 use crate::{
     MatchError, MatchReport, Matching, PointMatcher, SoftMatches, StopReason, linear_assignment,
     unmatched_rows,
 };
 use nalgebra::{Cholesky, DMatrix, Dyn, Point, SMatrix, SVector, VecStorage};
 use tactile_core::{Loop, vectorised};
-use tactile_tps::{Affine, Warp};
-
-/// How the model may move.
-///
-/// ```
-/// use nalgebra::{Point2, Vector2};
-/// use tactile_match::{CoherentPointDrift, Motion, PointMatcher};
-/// let model: Vec<_> = (0..20)
-///     .map(f64::from)
-///     .map(|k| Point2::new(k.cos() * k, (1.3 * k).sin() * k))
-///     .collect();
-/// let target: Vec<_> = model
-///     .iter()
-///     .map(|p| p * 1.2 + Vector2::new(0.0, 3.0))
-///     .collect(); // swollen by a fifth
-/// let residual = |motion| {
-///     let matcher = CoherentPointDrift::default().with_motion(motion)?;
-///     Ok::<_, tactile_match::MatchError>(
-///         matcher.match_points(&model, &target)?.report.residual,
-///     )
-/// };
-/// assert!(residual(Motion::Similarity)? < 1e-6);
-/// assert!(residual(Motion::Rigid)? > 0.1); // has no scale to offer
-/// # Ok::<(), tactile_match::MatchError>(())
-/// ```
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[non_exhaustive]
-pub enum Motion {
-    /// Rotation and translation.
-    Rigid,
-    /// Rotation, translation and one scale.
-    Similarity,
-    /// Any affine map.
-    Affine,
-    /// Smooth displacement.
-    NonRigid {
-        /// Width β of the Gaussian kernel, in root mean square radii: how far neighbours move
-        /// together.
-        beta: f64,
-        /// Weight λ of smoothness against likelihood.
-        lambda: f64,
-        /// Greatest rank of the kernel. `None` for the rank it numerically has. Thirty is customary
-        /// for speed.
-        rank: Option<usize>,
-    },
-}
-
-impl Motion {
-    /// Non-rigid with the customary β = 2, λ = 3, and no bound on the rank.
-    pub const NON_RIGID: Self = Self::NonRigid {
-        beta: 2.0,
-        lambda: 3.0,
-        rank: None,
-    };
-}
+use tactile_tps::Warp;
 
 /// How the two sets are brought to size one.
 ///
 /// ```
 /// use nalgebra::Point2;
-/// use tactile_match::{CoherentPointDrift, Motion, Normalization, PointMatcher};
+/// use tactile_match::{CoherentPointDrift, Normalization, PointMatcher};
 /// let model: Vec<_> = (0..24)
 ///     .map(f64::from)
 ///     .map(|k| Point2::new(k % 6.0 + 0.2 * k.sin(), (k / 6.0).floor()))
@@ -95,10 +40,7 @@ impl Motion {
 ///     .iter()
 ///     .map(|p| Point2::new(p.x + 0.1, p.y))
 ///     .collect(); // the last row is out of sight
-/// let (motion, normalization) = (Motion::Rigid, Normalization::Model);
-/// let options = CoherentPointDrift::default()
-///     .with_motion(motion)?
-///     .with_normalization(normalization);
+/// let options = CoherentPointDrift::default().with_normalization(Normalization::Model);
 /// let matching = options.match_points(&model, &target)?;
 /// assert!((0..18).all(|i| matching.assignment[i] == Some(i)));
 /// assert_eq!(matching.unmatched_model, [18, 19, 20, 21, 22, 23]);
@@ -109,9 +51,6 @@ impl Motion {
 pub enum Normalization {
     /// Each set by its own centre and root mean square radius: customary in coherent point drift,
     /// and right whatever lies between the sets.
-    ///
-    /// [`Rigid`](Motion::Rigid) motion, which has no scale to give back, takes the model's radius
-    /// for both.
     #[default]
     Each,
     /// Both by the centre and the root mean square radius of the model: for sets that nearly lie on
@@ -179,29 +118,27 @@ impl<const D: usize> PointMatcher<D> for CoherentPointDrift {
 /// does. The time is `O((M N + M r²) · iterations)`, with `r` the rank of the kernel.
 ///
 /// ```
-/// use nalgebra::{Point2, Rotation2, Vector2};
-/// use tactile_match::{CoherentPointDrift, Motion, PointMatcher};
+/// use nalgebra::{Point2, Vector2};
+/// use tactile_match::{CoherentPointDrift, PointMatcher};
 ///
 /// let model: Vec<_> = (0..40)
 ///     .map(|k| f64::from(k))
 ///     .map(|k| Point2::new(k.cos() * k, (1.3 * k).sin() * k))
 ///     .collect();
-/// let motion = Rotation2::new(0.2);
 /// let target: Vec<_> = model
 ///     .iter()
 ///     .rev()
-///     .map(|p| motion * p + Vector2::new(7.0, -2.0))
+///     .map(|p| p + Vector2::new(7.0 + 0.02 * p.y, -2.0))
 ///     .collect();
 ///
-/// let matcher = CoherentPointDrift::default().with_motion(Motion::Rigid)?;
-/// let matching = matcher.match_points(&model, &target)?;
+/// let matching = CoherentPointDrift::default().match_points(&model, &target)?;
 /// assert!((0..40).all(|m| matching.assignment[m] == Some(39 - m)));
 /// assert!(
 ///     matching
 ///         .warped
 ///         .iter()
 ///         .zip(target.iter().rev())
-///         .all(|(w, t)| (w - t).norm() < 1e-6)
+///         .all(|(w, t)| (w - t).norm() < 0.5)
 /// );
 /// # Ok::<(), tactile_match::MatchError>(())
 /// ```
@@ -211,15 +148,11 @@ impl<const D: usize> PointMatcher<D> for CoherentPointDrift {
 ///
 /// ```
 /// use nalgebra::Point2;
-/// use tactile_match::{CoherentPointDrift, MatchError, Motion, Normalization, PointMatcher};
+/// use tactile_match::{CoherentPointDrift, MatchError, Normalization, PointMatcher};
 /// // About a fifth of the target points are outliers, and the object may bend, but gently.
-/// let motion = Motion::NonRigid {
-///     beta: 2.0,
-///     lambda: 10.0,
-///     rank: Some(30),
-/// };
 /// let options = CoherentPointDrift::default()
-///     .with_motion(motion)?
+///     .with_field(2.0, 10.0)?
+///     .with_rank(30)?
 ///     .with_normalization(Normalization::Model)
 ///     .with_outlier_weight(0.2)?
 ///     .with_tolerance(1e-6)?
@@ -239,7 +172,12 @@ impl<const D: usize> PointMatcher<D> for CoherentPointDrift {
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CoherentPointDrift {
-    motion: Motion,
+    /// Width of the Gaussian kernel, in root mean square radii: how far neighbours move together.
+    beta: f64,
+    /// Weight of smoothness against likelihood.
+    lambda: f64,
+    /// Greatest rank of the kernel. `None` for the rank it numerically has.
+    rank: Option<usize>,
     outlier_weight: f64,
     tolerance: f64,
     max_iterations: usize,
@@ -249,7 +187,9 @@ pub struct CoherentPointDrift {
 impl Default for CoherentPointDrift {
     fn default() -> Self {
         Self {
-            motion: Motion::NON_RIGID,
+            beta: 2.0,
+            lambda: 3.0,
+            rank: None,
             outlier_weight: 0.1,
             tolerance: 1e-5,
             max_iterations: 150,
@@ -259,18 +199,26 @@ impl Default for CoherentPointDrift {
 }
 
 impl CoherentPointDrift {
-    /// Sets how the model may move (default [`Motion::NON_RIGID`]).
+    /// Sets the width β of the kernel, in root mean square radii of the model: how far neighbours
+    /// move together (default 2), and the weight λ of smoothness against likelihood (default 3).
     ///
     /// # Errors
-    /// [`MatchError::InvalidOption`] unless β and λ are positive and finite and the rank is at
-    /// least one.
-    pub fn with_motion(mut self, motion: Motion) -> Result<Self, MatchError> {
-        if let Motion::NonRigid { beta, lambda, rank } = motion {
-            option_within("beta", beta, f64::MIN_POSITIVE, f64::MAX, "(0, ∞)")?;
-            option_within("lambda", lambda, f64::MIN_POSITIVE, f64::MAX, "(0, ∞)")?;
-            at_least_one("rank", rank.unwrap_or(1))?;
-        }
-        self.motion = motion;
+    /// [`MatchError::InvalidOption`] unless both are positive and finite.
+    pub fn with_field(mut self, beta: f64, lambda: f64) -> Result<Self, MatchError> {
+        option_within("beta", beta, f64::MIN_POSITIVE, f64::MAX, "(0, ∞)")?;
+        option_within("lambda", lambda, f64::MIN_POSITIVE, f64::MAX, "(0, ∞)")?;
+        (self.beta, self.lambda) = (beta, lambda);
+        Ok(self)
+    }
+
+    /// Sets the greatest rank of the kernel (default: the rank it numerically has). Thirty is
+    /// customary for speed.
+    ///
+    /// # Errors
+    /// [`MatchError::InvalidOption`] for 0.
+    pub fn with_rank(mut self, rank: usize) -> Result<Self, MatchError> {
+        at_least_one("rank", rank)?;
+        self.rank = Some(rank);
         Ok(self)
     }
 
@@ -350,7 +298,6 @@ pub struct DriftWorkspace<const D: usize> {
     stop: StopReason,
     kernel: KernelFactor,
     non_rigid: NonRigidStep,
-    global: GlobalStep<D>,
 }
 
 impl<const D: usize> DriftWorkspace<D> {
@@ -363,17 +310,14 @@ impl<const D: usize> DriftWorkspace<D> {
     ) {
         self.options = *options;
         self.enter_frames(model, target);
-        self.global.map = Affine::default();
-        if let Motion::NonRigid { beta, rank, .. } = options.motion {
-            self.kernel.build(
-                &self.model.0,
-                beta,
-                rank.unwrap_or(model.len()),
-                // What is left of the kernel's diagonal when its factorisation ends: far below what
-                // the ridge `λσ²` lets through.
-                1e-12,
-            );
-        }
+        self.kernel.build(
+            &self.model.0,
+            options.beta,
+            options.rank.unwrap_or(model.len()),
+            // What is left of the kernel's diagonal when its factorisation ends: far below what the
+            // ridge `λσ²` lets through.
+            1e-12,
+        );
         self.energy.clear();
         self.sigma2 = self.initial_variance();
         self.stop = StopReason::Exact;
@@ -401,11 +345,6 @@ impl<const D: usize> DriftWorkspace<D> {
         };
         if options.normalization == Normalization::Off {
             self.model_frame = Frame::default();
-        } else if options.motion == Motion::Rigid {
-            // Rigid motion knows one unit: that of the larger set, or squares of the other could
-            // overflow.
-            let scale = self.model_frame.scale.max(self.target_frame.scale);
-            (self.model_frame.scale, self.target_frame.scale) = (scale, scale);
         }
         self.model_frame.enter(model, &mut self.model);
         self.target_frame.enter(target, &mut self.target);
@@ -436,14 +375,9 @@ impl<const D: usize> DriftWorkspace<D> {
             .update(&self.moved.0, &self.target.0, self.sigma2, uniform);
         self.energy.push(self.posterior.energy);
         let (posterior, model, moved) = (&self.posterior, &self.model.0, &mut self.moved.0);
-        match self.options.motion {
-            Motion::NonRigid { lambda, .. } => {
-                let ridge = lambda * self.sigma2;
-                self.non_rigid
-                    .solve(&self.kernel, posterior, model, ridge, moved);
-            }
-            motion => self.global.solve(motion, posterior, model, moved),
-        }
+        let ridge = self.options.lambda * self.sigma2;
+        self.non_rigid
+            .solve(&self.kernel, posterior, model, ridge, moved);
         self.update_variance();
     }
 
@@ -504,14 +438,12 @@ impl<const D: usize> DriftWorkspace<D> {
         let mut warp = DriftWarp {
             model: self.model_frame,
             target: self.target_frame,
-            map: self.global.map,
             centres: Vec::new(),
             weights: Vec::new(),
             beta: 1.0,
         };
-        let motion = self.options.motion;
-        if let (Motion::NonRigid { beta, .. }, false) = (motion, self.energy.is_empty()) {
-            warp.beta = beta;
+        if !self.energy.is_empty() {
+            warp.beta = self.options.beta;
             let coefficients: Vec<_> = (0..self.kernel.rank())
                 .map(|k| self.non_rigid.coefficient(k))
                 .collect();
@@ -1005,75 +937,15 @@ impl<const D: usize> Loop for Apply<'_, D> {
     }
 }
 
-// The M-step of rigid, similarity and affine motion.
-//
-// The posterior pulls model point `y_m` with weight `(P1)_m` to the mean `(P X)_m / (P1)_m`, so
-// that the step is the weighted fit to these means: Myronenko & Song (2010), figures 2 and 3.
-
-/// `y ↦ A y + b`, and the memory to find it.
-#[derive(Clone, Debug, Default)]
-struct GlobalStep<const D: usize> {
-    map: Affine<D>,
-    sources: Vec<Point<f64, D>>,
-    means: Vec<Point<f64, D>>,
-    weights: Vec<f64>,
-}
-
-impl<const D: usize> GlobalStep<D> {
-    /// Fits `motion` and moves `model` into `moved`. `O(M)`. A posterior without mass leaves the
-    /// last motion.
-    fn solve(
-        &mut self,
-        motion: Motion,
-        posterior: &Posterior<D>,
-        model: &Columns<D>,
-        moved: &mut Columns<D>,
-    ) {
-        self.collect(posterior, model);
-        let (sources, means, weights) = (&self.sources, &self.means, &self.weights);
-        let found = if motion == Motion::Affine {
-            Affine::fit(sources, means, Some(weights)).ok()
-        } else {
-            let scaled = motion == Motion::Similarity;
-            BestMotion::of(sources, means, weights, scaled)
-                .map(|fit| Affine::new(fit.linear, fit.to - fit.linear * fit.from))
-        };
-        self.map = found.unwrap_or(self.map);
-        for m in 0..model[0].len() {
-            let image = self.map.apply(&Point::from(at(model, m)));
-            (0..D).for_each(|d| moved[d][m] = image[d]);
-        }
-    }
-
-    fn collect(&mut self, posterior: &Posterior<D>, model: &Columns<D>) {
-        self.sources.clear();
-        self.means.clear();
-        self.weights.clear();
-        for (m, &mass) in posterior
-            .model_mass
-            .iter()
-            .enumerate()
-            .filter(|(_, mass)| **mass > f64::MIN_POSITIVE)
-        {
-            self.sources.push(Point::from(at(model, m)));
-            let mean = at(&posterior.weighted.0, m) / mass;
-            self.means.push(Point::from(mean));
-            self.weights.push(mass);
-        }
-    }
-}
-
 // The map a registration found, for any point of space.
 
 /// The map found by [`CoherentPointDrift`](super::CoherentPointDrift): in the frame of the
-/// registration `y ↦ A y + b + Σ_k w_k exp(−|y − p_k|² / 2β²)`, with no Gaussians for rigid,
-/// similarity and affine motion, and `A = I`, `b = 0` for non-rigid. It takes the model points to
+/// registration `y ↦ y + Σ_k w_k exp(−|y − p_k|² / 2β²)`. It takes the model points to
 /// where the registration left them, and any other point along.
 #[derive(Clone, Debug, PartialEq)]
 struct DriftWarp<const D: usize> {
     model: Frame<D>,
     target: Frame<D>,
-    map: Affine<D>,
     centres: Vec<SVector<f64, D>>,
     weights: Vec<SVector<f64, D>>,
     beta: f64,
@@ -1088,7 +960,7 @@ impl<const D: usize> DriftWarp<D> {
 impl<const D: usize> Warp<D> for DriftWarp<D> {
     fn apply(&self, point: &Point<f64, D>) -> Point<f64, D> {
         let y = self.model.inside(point);
-        let mut image = self.map.linear * y + self.map.offset;
+        let mut image = y;
         for (centre, weight) in self.centres.iter().zip(&self.weights) {
             image += weight * self.gaussian(&(y - centre));
         }
@@ -1097,7 +969,7 @@ impl<const D: usize> Warp<D> for DriftWarp<D> {
 
     fn jacobian(&self, point: &Point<f64, D>) -> SMatrix<f64, D, D> {
         let y = self.model.inside(point);
-        let mut jacobian = self.map.linear;
+        let mut jacobian = SMatrix::identity();
         for (centre, weight) in self.centres.iter().zip(&self.weights) {
             let step = y - centre;
             jacobian -=

@@ -83,20 +83,6 @@ pub enum MatchError {
         /// Its column.
         column: usize,
     },
-    /// A landmark belongs to a point that the model does not have.
-    #[error("a landmark of model point {row}, but the model has {points} points")]
-    LandmarkRow {
-        /// The landmark's row.
-        row: usize,
-        /// Points of the model.
-        points: usize,
-    },
-    /// The position of a landmark is not finite.
-    #[error("the position of the landmark of model point {row} is not finite")]
-    LandmarkPosition {
-        /// The landmark's row.
-        row: usize,
-    },
     /// A pair has a row that its set does not have, or a row that an earlier pair has.
     #[error("pair {pair} has row {row} of the {set}, which does not exist or is taken")]
     PairRow {
@@ -106,14 +92,6 @@ pub enum MatchError {
         set: &'static str,
         /// The row in that set.
         row: usize,
-    },
-    /// The standard deviation of a target is not positive and finite.
-    #[error("the standard deviation of target {row} is {value}, not positive and finite")]
-    TargetDeviation {
-        /// The target's row.
-        row: usize,
-        /// The value found.
-        value: f64,
     },
     /// The failure of a matcher of the user's own.
     #[error(transparent)]

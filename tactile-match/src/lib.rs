@@ -46,7 +46,7 @@ mod softassign;
 extern crate self as tactile_match;
 
 pub use assignment::{AssignmentWorkspace, linear_assignment};
-pub use cpd::{CoherentPointDrift, DriftWorkspace, Motion, Normalization};
+pub use cpd::{CoherentPointDrift, DriftWorkspace, Normalization};
 pub use error::MatchError;
 pub use hard::{LinearAssignment, NearestNeighbour};
 pub use labelling::RelaxationLabelling;
@@ -57,7 +57,7 @@ pub use matching::{
 pub use nalgebra;
 pub use shape_context::ShapeContexts;
 pub use softassign::{
-    AnnealedSoftassign, Landmark, Mechanism, Outliers, Rotation, Search, SoftassignMatch,
+    AnnealedSoftassign, Mechanism, Outliers, Rotation, Search, SoftassignMatch,
     SoftassignWorkspace, Transformation,
 };
 pub use tactile_core::{CustomError, StopReason};

@@ -273,13 +273,13 @@ fn write_repeats(f: &mut std::fmt::Formatter<'_>, step: &[f64; 3]) -> std::fmt::
 ///
 /// ```
 /// use nalgebra::Point2;
-/// use tactile_match::{CoherentPointDrift, Motion, PointMatcher};
+/// use tactile_match::{AnnealedSoftassign, PointMatcher, Transformation};
 /// let model = [[0.0, 0.0], [3.0, 0.0], [0.0, 3.0], [3.0, 3.0]].map(Point2::from);
 /// // One corner is drawn out.
 /// let target = [[0.0, 0.0], [3.0, 0.0], [0.0, 3.0], [3.2, 3.2]].map(Point2::from);
-/// let options = CoherentPointDrift::default().with_motion(Motion::Rigid)?;
+/// let options = AnnealedSoftassign::default().with_transformation(Transformation::Rigid);
 /// let report = options.match_points(&model, &target)?.report;
-/// assert!(report.iterations > 0 && report.starts == 1);
+/// assert!(report.iterations > 0);
 /// // What no rigid motion explains, in units of the points.
 /// assert!(report.residual > 0.05 && report.residual < 0.2);
 /// # Ok::<(), tactile_match::MatchError>(())

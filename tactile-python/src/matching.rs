@@ -12,7 +12,7 @@ use std::str::FromStr;
 use tactile_imaging::core::statistics::quantile_95;
 use tactile_imaging::matching::labelling::{Compatibility, LengthMaximum, Neighbourhood};
 use tactile_imaging::matching::{
-    AnnealedSoftassign, CoherentPointDrift, LinearAssignment, MatchError, Matching, Motion,
+    AnnealedSoftassign, CoherentPointDrift, LinearAssignment, MatchError, Matching,
     NearestNeighbour, Normalization, Outliers, PointMatcher, RelaxationLabelling, Rotation,
     SoftassignWorkspace, Transformation,
 };
@@ -162,7 +162,8 @@ fn softassign(
         matcher = matcher.with_outliers(outliers);
     }
     let transformations = [
-        ("non-rigid", Transformation::NonRigid),
+        ("smooth", Transformation::Smooth),
+        ("affine", Transformation::Affine),
         ("similarity", Transformation::Similarity),
         ("rigid", Transformation::Rigid),
     ];
@@ -183,21 +184,12 @@ fn softassign(
 
 fn drift(options: &mut Options<'_>) -> PyResult<CoherentPointDrift> {
     let mut matcher = CoherentPointDrift::default();
-    let motions = [
-        ("rigid", Motion::Rigid),
-        ("similarity", Motion::Similarity),
-        ("affine", Motion::Affine),
-        ("non-rigid", Motion::NON_RIGID),
-    ];
-    let mut motion = options
-        .choice("motion", &motions)?
-        .unwrap_or(Motion::NON_RIGID);
-    if let Motion::NonRigid { beta, lambda, rank } = &mut motion {
-        *beta = options.number("beta")?.unwrap_or(*beta);
-        *lambda = options.number("lambda_")?.unwrap_or(*lambda);
-        *rank = options.count("rank")?.or(*rank);
+    let beta = options.number("beta")?.unwrap_or(2.0);
+    let lambda = options.number("lambda_")?.unwrap_or(3.0);
+    matcher = matcher.with_field(beta, lambda).map_err(invalid)?;
+    if let Some(rank) = options.count("rank")? {
+        matcher = matcher.with_rank(rank).map_err(invalid)?;
     }
-    matcher = matcher.with_motion(motion).map_err(invalid)?;
     if let Some(weight) = options.number("outlier_weight")? {
         matcher = matcher.with_outlier_weight(weight).map_err(invalid)?;
     }

@@ -1,19 +1,9 @@
 //! One annealing run: soft assignment at a falling temperature, then the warp that it asks for.
 
-use super::{Annealer, Gaussian, Known, Request, Schedule, Slack, State};
+use super::{Annealer, Gaussian, Request, Schedule, Slack, State};
 use super::{difference, squared_distance};
 use std::f64::consts::TAU;
 use std::ops::ControlFlow;
-
-// Landmarks as the annealing sees them.
-
-impl<const D: usize> Known<D> {
-    /// Energy of a model point that was put there: minus the logarithm of its density, but for a
-    /// constant.
-    fn energy(&self, warped: &[f64; D]) -> f64 {
-        0.5 * squared_distance(warped, &self.position) / self.variance
-    }
-}
 
 // The alternation: soft assignment at a falling temperature, then the warp that it asks for.
 
@@ -168,18 +158,15 @@ impl<const D: usize> Annealer<D> {
 
     /// Mean variance, along an axis, of where the last fit puts the matched points.
     fn open(&self) -> f64 {
-        let moments = &self.soft.moments;
-        let weights = &moments.by_squared_precision().weight;
+        let weights = &self.soft.moments.weight;
         let variances = weights.iter().zip(&self.regression.variance);
-        let total: f64 = moments.by_precision().weight.iter().sum();
+        let total: f64 = weights.iter().sum();
         variances.map(|(w, v)| w * v).sum::<f64>() / total.max(1e-9)
     }
 
-    /// The lowest temperature: the schedule's, or the least error of the targets where that is
-    /// known.
+    /// The lowest temperature.
     fn floor(&self, schedule: &Schedule) -> f64 {
-        let floor = schedule.floor.max(self.least_sigma);
-        floor.max(self.soft.errors.floor())
+        schedule.floor.max(self.least_sigma)
     }
 
     /// One soft assignment and one fit. The residual variance that is left.
@@ -198,27 +185,26 @@ impl<const D: usize> Annealer<D> {
         self.predicted = predicted;
         self.fit(state, variance);
         let moments = &self.soft.moments;
-        let (fitted, noise) = (moments.by_precision(), moments.by_squared_precision());
         let (mut total, mut squares, mut within) = (0.0, 0.0, 0.0);
         for i in 0..state.warped.len() {
-            let w = fitted.weight[i];
-            let shifts = noise.shift[i].iter().map(|s| s * s);
-            within += noise.spread[i] - noise.weight[i] * shifts.sum::<f64>();
+            let w = moments.weight[i];
+            let shifts = moments.shift[i].iter().map(|s| s * s);
+            within += moments.spread[i] - moments.weight[i] * shifts.sum::<f64>();
             // A point whose own match decides its position is not left out altogether.
             let leverage = (w * self.regression.variance[i] / variance).min(0.95);
-            let mut square = noise.spread[i];
+            let mut square = moments.spread[i];
             for k in 0..D {
                 let (u, z) = (self.regression.displacement.0[k][i], self.residuals.0[k][i]);
                 let moved = state.base[i][k] + u;
                 let step = moved - self.predicted[i][k];
-                square += noise.weight[i] * step * (step - 2.0 * noise.shift[i][k]);
+                square += moments.weight[i] * step * (step - 2.0 * moments.shift[i][k]);
                 state.warped[i][k] = moved;
                 self.predicted[i][k] = state.base[i][k] + (u - leverage * z) / (1.0 - leverage);
             }
             total += w;
             squares += square.max(0.0);
         }
-        state.matched = moments.plain().weight.iter().sum();
+        state.matched = moments.weight.iter().sum();
         self.ambiguity = within / (D as f64 * total.max(1e-9) * variance);
         if total > 0.0 {
             squares / (D as f64 * total)
@@ -234,15 +220,14 @@ impl<const D: usize> Annealer<D> {
             .predicted
             .iter()
             .zip(&state.base)
-            .zip(&self.soft.moments.by_precision().shift);
+            .zip(&self.soft.moments.shift);
         let target = |((p, b), s): ((&[f64; D], &[f64; D]), &[f64; D])| {
             std::array::from_fn(|k| p[k] + s[k] - b[k])
         };
         self.residuals.fill(stride, rows.map(target));
-        let soft = self.soft.moments.by_precision();
+        let soft = &self.soft.moments;
         self.weights.clone_from(&soft.weight);
         self.weights.resize(stride, 0.0);
-        self.add_landmarks(&state.base, variance);
         if self.rigid.is_active() {
             let (weights, residuals) = (&self.weights, &self.residuals);
             self.rigid.fit(
@@ -262,7 +247,7 @@ impl<const D: usize> Annealer<D> {
     /// The annealed energy: distances under M, over the temperature, plus the warp's penalty, a
     /// model point.
     fn free_energy(&self, state: &State<D>, variance: f64) -> f64 {
-        let spread = &self.soft.moments.by_precision().spread;
+        let spread = &self.soft.moments.spread;
         let data = spread.iter().sum::<f64>() / (2.0 * variance);
         (data + 0.5 * self.regression.penalty()) / state.warped.len() as f64
     }
@@ -305,11 +290,7 @@ impl<const D: usize> Annealer<D> {
             share = (outliers.sum::<f64>() / m as f64).clamp(LEAST_SHARE, 0.95);
         }
         let (gauss, outlier) = ((1.0 - share) * density, share / self.volume);
-        let mut data: f64 = sums.iter().map(|s| -(gauss * s + outlier).ln()).sum();
-        let known = self.known.iter();
-        data += known
-            .map(|known| known.energy(&state.warped[known.row]))
-            .sum::<f64>();
+        let data: f64 = sums.iter().map(|s| -(gauss * s + outlier).ln()).sum();
         if self.rigid.is_active() {
             // All motions are equally likely, and as precisely known from one start as from
             // another.
@@ -319,7 +300,6 @@ impl<const D: usize> Annealer<D> {
         self.sums
             .iter_mut()
             .for_each(|s| *s = gauss / (gauss * *s + outlier));
-        self.soft.errors.weigh(&mut self.sums);
         self.soft.row_totals(&self.sums, &mut self.weights);
         self.weights.iter_mut().for_each(|w| *w *= decided);
         self.weights.resize(self.prior.stride, 0.0);
@@ -344,8 +324,8 @@ impl<const D: usize> Annealer<D> {
     pub(super) fn tail(&mut self, least: f64) -> f64 {
         self.sums.clear();
         let moments = &self.soft.moments;
-        let spread = &moments.by_precision().spread;
-        let rows = moments.plain().weight.iter().zip(spread);
+        let spread = &moments.spread;
+        let rows = moments.weight.iter().zip(spread);
         let matched = rows.filter(|&(&weight, _)| weight > 0.5);
         self.sums
             .extend(matched.map(|(weight, spread)| spread / weight));

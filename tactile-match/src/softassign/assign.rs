@@ -1,7 +1,7 @@
 //! Soft assignment: affinities, Sinkhorn normalisation and the moments of the rows, over blocks of
 //! near targets.
 
-use super::{AllMoments, Gaussian, RowMoments, SoftAssignment};
+use super::{Gaussian, SoftAssignment};
 use tactile_core::vectorised;
 
 // Soft assignment: the match matrix M from distances, made doubly stochastic with slack (Sinkhorn).
@@ -15,10 +15,9 @@ use tactile_core::vectorised;
 // blocks within reach of its Gaussian are kept. At a low temperature that is a small part of `I J`.
 
 impl<const D: usize> SoftAssignment<D> {
-    /// Takes the target points and their standard deviations, where those are known.
-    pub(super) fn set_targets(&mut self, targets: &[[f64; D]], deviations: &[f64]) {
+    /// Takes the target points.
+    pub(super) fn set_targets(&mut self, targets: &[[f64; D]]) {
         self.blocks.build(targets);
-        self.errors.set(deviations);
     }
 
     /// Number of target points.
@@ -33,16 +32,10 @@ impl<const D: usize> SoftAssignment<D> {
             variance,
             sharpness,
         } = gaussian;
-        let Self { blocks, errors, .. } = self;
-        errors.prepare(&blocks.order, variance, 0.5 * D as f64 * sharpness);
-        let widest = errors.widest(variance) / sharpness;
+        let blocks = &self.blocks;
         let (scale, cut) = (
             (-0.5 / (variance / sharpness)) as f32,
-            (-2.0 * widest * least.min(self.faintest).ln()) as f32,
-        );
-        let (precision, height) = (
-            errors.precision.as_chunks::<LANES>().0,
-            errors.height.as_chunks::<LANES>().0,
+            (-2.0 * variance / sharpness * least.min(self.faintest).ln()) as f32,
         );
         self.starts.clear();
         self.starts.push(0);
@@ -67,13 +60,7 @@ impl<const D: usize> SoftAssignment<D> {
                     let y = single(y);
                     let range = range[0]..range[1];
                     for (row, &block) in rows[range.clone()].iter_mut().zip(&self.active[range]) {
-                        let targets = blocks.at(block);
-                        let Some(precision) = precision.get(block as usize) else {
-                            gaussians(row, targets, &y, scale);
-                            continue;
-                        };
-                        let height = &height[block as usize];
-                        gaussians_of(row, targets, &y, scale, (precision, height));
+                        gaussians(row, blocks.at(block), &y, scale);
                     }
                 }
             },
@@ -213,56 +200,22 @@ fn refill<V: Clone>(values: &mut Vec<V>, len: usize, value: V) {
     values.resize(len, value);
 }
 
-// Moments of the rows of the match matrix: how much of a point is matched, and where its soft
-// partners lie.
-
-impl<const D: usize> AllMoments<D> {
-    /// As they are: how much of each point is matched.
-    pub(super) fn plain(&self) -> &RowMoments<D> {
-        &self.powers[0]
-    }
-
-    /// By precision: what the warp is fitted to.
-    pub(super) fn by_precision(&self) -> &RowMoments<D> {
-        &self.powers[usize::from(self.differ)]
-    }
-
-    /// By squared precision: what the noise is estimated from.
-    pub(super) fn by_squared_precision(&self) -> &RowMoments<D> {
-        &self.powers[2 * usize::from(self.differ)]
-    }
-}
-
 // The moments of the rows of a match matrix in factored form.
 
 impl<const D: usize> SoftAssignment<D> {
-    /// Sets the moments of M about `warped`.
+    /// Sets the moments of M about `warped`: how much of a point is matched, and where its soft
+    /// partners lie.
     pub(super) fn sum_moments(&mut self, warped: &[[f64; D]]) {
         let mut moments = std::mem::take(&mut self.moments);
-        moments.differ = self.errors.differ();
-        self.sum(warped, &self.column_scale, &mut moments.powers[0]);
-        if moments.differ {
-            moments.factors.clone_from(&self.column_scale);
-            for power in 1..=2 {
-                let factors = moments.factors.iter_mut().zip(&self.errors.precision);
-                factors.for_each(|(factor, precision)| *factor *= precision);
-                self.sum(warped, &moments.factors, &mut moments.powers[power]);
-            }
-        }
-        self.moments = moments;
-    }
-
-    /// The moments with these factors of the columns.
-    fn sum(&self, warped: &[[f64; D]], factors: &[f32], moments: &mut RowMoments<D>) {
         let RowMoments {
             weight,
             shift,
             spread,
-        } = moments;
+        } = &mut moments;
         weight.clear();
         shift.clear();
         spread.clear();
-        let columns = factors.as_chunks::<LANES>().0;
+        let columns = self.column_scale.as_chunks::<LANES>().0;
         vectorised(
             #[inline(always)]
             || {
@@ -285,106 +238,18 @@ impl<const D: usize> SoftAssignment<D> {
                 }
             },
         );
+        self.moments = moments;
     }
 
     /// Makes rows that the last column normalisation left above one sum to one: where points
     /// coincide, a few sweeps do not converge.
     pub(super) fn cap_rows(&mut self) {
-        let [plain, weighed @ ..] = &mut self.moments.powers;
-        for (i, scale) in self.row_scale.iter_mut().enumerate() {
-            let excess = plain.weight[i].max(1.0);
+        let weights = self.moments.weight.iter_mut();
+        for (scale, weight) in self.row_scale.iter_mut().zip(weights) {
+            let excess = weight.max(1.0);
             *scale /= excess as f32;
-            plain.weight[i] /= excess;
-            for power in weighed.iter_mut().filter(|_| self.moments.differ) {
-                power.weight[i] /= excess;
-            }
+            *weight /= excess;
         }
-    }
-}
-
-// Errors of the targets: how precisely each of them was measured.
-//
-// A target j with the standard deviation `sⱼ` lies about the warped point of its partner with the
-// variance `σ² + eⱼ`, `eⱼ = sⱼ² − min s²`: the annealed variance σ² is common to all targets, and
-// what it comes to is what the most precise ones leave. With the relative precision
-// `ρⱼ = σ²/(σ² + eⱼ)` the affinities are `ρⱼ^{d/2} exp(−ρⱼ |yᵢ − tⱼ|²/2σ²)`, the regression's
-// weights are `wᵢ = Σⱼ mᵢⱼ ρⱼ` and its targets the means under `mᵢⱼ ρⱼ`, and the likelihood of the
-// noise is largest at `σ² = Σ mᵢⱼ ρⱼ² |yᵢ − tⱼ|² / d Σ mᵢⱼ ρⱼ`, which is iterated along with the
-// matches.
-
-/// The excess variances of the targets, and what they are at one temperature.
-#[derive(Clone, Debug, Default)]
-pub(super) struct TargetErrors {
-    /// `eⱼ` of every target row. Empty where all are equal.
-    excess: Vec<f64>,
-    largest: f64,
-    /// Standard deviation of the most precise targets. Zero where all are equal.
-    least: f64,
-    /// `ρⱼ` in the order of the blocks, padded with ones.
-    precision: Vec<f32>,
-    /// `ρⱼ^{d/2}`, sharpened, in the same order.
-    height: Vec<f32>,
-}
-
-impl TargetErrors {
-    /// Takes the standard deviations of the targets, which say nothing where all are equal or there
-    /// are none.
-    fn set(&mut self, deviations: &[f64]) {
-        let least = deviations.iter().copied().fold(f64::MAX, f64::min);
-        let largest = deviations.iter().copied().fold(0.0, f64::max);
-        self.excess.clear();
-        self.least = 0.0;
-        self.largest = 0.0;
-        if largest > least {
-            self.least = least;
-            self.largest = (largest - least) * (largest + least);
-            let excess = deviations.iter().map(|s| (s - least) * (s + least));
-            self.excess.extend(excess);
-        }
-    }
-
-    /// The lowest temperature: the deviation of the most precise targets. Residuals alone say
-    /// little about it where few targets are precise, since the warp passes through those.
-    pub(super) fn floor(&self) -> f64 {
-        self.least
-    }
-
-    /// Whether targets differ in their errors.
-    pub(super) fn differ(&self) -> bool {
-        !self.excess.is_empty()
-    }
-
-    /// Largest variance of a target at the temperature `variance`.
-    fn widest(&self, variance: f64) -> f64 {
-        variance + self.largest
-    }
-
-    /// Variance of a target over that of the most precise ones, `1/ρⱼ`.
-    pub(super) fn width(&self, row: usize, variance: f64) -> f64 {
-        self.excess.get(row).map_or(1.0, |e| 1.0 + e / variance)
-    }
-
-    /// Precisions and heights at a temperature, for targets in this order.
-    fn prepare(&mut self, order: &[usize], variance: f64, power: f64) {
-        self.precision.clear();
-        self.height.clear();
-        if !self.differ() {
-            return;
-        }
-        for &j in order {
-            let precision = self.width(j, variance).recip();
-            self.precision.push(precision as f32);
-            self.height.push(precision.powf(power) as f32);
-        }
-        let padded = order.len().next_multiple_of(LANES);
-        self.precision.resize(padded, 1.0);
-        self.height.resize(padded, 1.0);
-    }
-
-    /// Multiplies values in the order of the blocks by the precisions.
-    pub(super) fn weigh(&self, values: &mut [f64]) {
-        let weighed = values.iter_mut().zip(&self.precision);
-        weighed.for_each(|(value, &precision)| *value *= f64::from(precision));
     }
 }
 
@@ -564,21 +429,6 @@ fn gaussians<const D: usize>(row: &mut Lanes, targets: [&Lanes; D], y: &[f32; D]
     *row = squared_distances(targets, y);
     for value in row {
         *value = exp(*value * scale);
-    }
-}
-
-/// The same for targets of different precision, times their heights.
-#[inline(always)]
-fn gaussians_of<const D: usize>(
-    row: &mut Lanes,
-    targets: [&Lanes; D],
-    y: &[f32; D],
-    scale: f32,
-    (precision, height): (&Lanes, &Lanes),
-) {
-    *row = squared_distances(targets, y);
-    for l in 0..LANES {
-        row[l] = height[l] * exp(row[l] * scale * precision[l]);
     }
 }
 

@@ -131,7 +131,7 @@ impl<const D: usize> Answer<D> {
     ) {
         let n = state.warped.len();
         let clean = annealer.clean_sigma;
-        let noisy = state.noisy || state.sigma > clean || annealer.soft.errors.differ();
+        let noisy = state.noisy || state.sigma > clean;
         let least = if state.noisy {
             0.0
         } else {
@@ -236,8 +236,8 @@ impl<const D: usize> Answer<D> {
                     self.column_best[j] = (p, i);
                 }
             }
-            let free = (1.0 - soft.moments.plain().weight[i]).max(0.0);
-            let matched = best.1 != usize::MAX && soft.moments.plain().weight[i] > 0.5;
+            let free = (1.0 - soft.moments.weight[i]).max(0.0);
+            let matched = best.1 != usize::MAX && soft.moments.weight[i] > 0.5;
             self.assignment.push(matched.then_some(best.1));
             self.confidence
                 .push(if matched { best.0.min(1.0) } else { free });
@@ -280,8 +280,7 @@ impl<const D: usize> Answer<D> {
 // `ΔEᵢ(δ) = [δ·rᵢ + ½ |δ|²]/σ²(1 + oᵢ)`;
 //
 // where i and k exchange targets that are δ apart, `ΔE = ΔEᵢ(δ) + ΔE_k(−δ) + |δ|² c_ik/σ⁴` with the
-// posterior covariance `c_ik` of their positions. Targets of their own errors have `1/ρⱼ + oᵢ` in
-// place of `1 + oᵢ` ([`target_errors`](super::target_errors)). The changes exclude each other, and
+// posterior covariance `c_ik` of their positions. The changes exclude each other, and
 // what they share with changes elsewhere cancels to first order: the pair is right with the
 // probability `1/(1 + Σ exp(−ΔE))`. Unlike the entries of the doubly stochastic matrix, which tell
 // two points that may be exchanged apart by half their odds, these are shares of right pairs
@@ -382,7 +381,7 @@ impl PairOdds {
                 self.owners[j] = Some(i);
             }
         }
-        let soft = &fitted.annealer.soft.moments.by_precision().weight;
+        let soft = &fitted.annealer.soft.moments.weight;
         let variances = &fitted.annealer.regression.variance;
         self.leverages.clear();
         self.leverages
@@ -406,7 +405,7 @@ impl PairOdds {
             }
             let others = self.leverages[i].others;
             for j in fitted.candidates(i) {
-                let limit = MAX_SQUARED_RESIDUAL * fitted.variance * (fitted.width(j) + others);
+                let limit = MAX_SQUARED_RESIDUAL * fitted.variance * (1.0 + others);
                 let square = squared(&fitted.offset(i, j));
                 if self.owners[j].is_none() && square < limit {
                     self.open.push((square, i, j));
@@ -503,14 +502,14 @@ impl PairOdds {
     }
 
     /// Variance of that, over the noise's.
-    fn variance<const D: usize>(&self, fitted: Fitted<'_, D>, (i, j): (usize, usize)) -> f64 {
-        fitted.width(j) + self.leverages[i].others.min(MOST_OTHERS)
+    fn variance(&self, i: usize) -> f64 {
+        1.0 + self.leverages[i].others.min(MOST_OTHERS)
     }
 
     /// Minus the logarithm of a target's density about where the others put its point, beside that
     /// of a point without noise.
     fn misfit<const D: usize>(&self, fitted: Fitted<'_, D>, pair: (usize, usize)) -> f64 {
-        let variance = self.variance(fitted, pair);
+        let variance = self.variance(pair.0);
         let square = squared(&self.residual(fitted, pair)) / (fitted.variance * variance);
         0.5 * (square.min(MAX_SQUARED_RESIDUAL) + D as f64 * variance.ln())
     }
@@ -524,13 +523,8 @@ impl PairOdds {
     ) -> f64 {
         let step = fitted.step(own, j);
         let residual = self.residual(fitted, (i, own));
-        let [before, after] = [own, j].map(|j| self.variance(fitted, (i, j)));
-        let moved = (dot(&step, &residual) + 0.5 * squared(&step)) / (after * fitted.variance);
-        if after == before {
-            return moved; // targets of equal error, by far the most calls: no logarithm
-        }
-        let precision = 0.5 * squared(&residual) * (1.0 / after - 1.0 / before);
-        moved + precision / fitted.variance + 0.5 * D as f64 * (after / before).ln()
+        let variance = self.variance(i) * fitted.variance;
+        (dot(&step, &residual) + 0.5 * squared(&step)) / variance
     }
 
     /// Change of the energy where two pairs exchange their targets.
@@ -545,8 +539,7 @@ impl PairOdds {
         if least > -1e-4_f64.ln() {
             return least; // neighbours move together, so that there is more to come
         }
-        let widths = fitted.width(own) * fitted.width(theirs);
-        let together = fitted.annealer.regression.covariance(i, k) / (fitted.variance * widths);
+        let together = fitted.annealer.regression.covariance(i, k) / fitted.variance;
         least + squared(&fitted.step(own, theirs)) * together / fitted.variance
     }
 
@@ -557,7 +550,7 @@ impl PairOdds {
         i: usize,
         (k, j): (usize, usize),
     ) -> f64 {
-        let others = fitted.width(j) + self.leverages[i].others;
+        let others = 1.0 + self.leverages[i].others;
         let square = squared(&fitted.offset(i, j)) / (fitted.variance * others);
         0.5 * (square + D as f64 * others.ln()) - self.misfit(fitted, (k, j))
     }
@@ -569,18 +562,13 @@ impl<const D: usize> Fitted<'_, D> {
         difference(&self.targets[j], &self.warped[i])
     }
 
-    /// Variance of a target over the noise's.
-    fn width(&self, j: usize) -> f64 {
-        self.annealer.soft.errors.width(j, self.variance)
-    }
-
     /// Whether point i has a partner that nothing tells from others.
     fn is_hopeless(&self, i: usize) -> bool {
         let soft = &self.annealer.soft;
         // A point whose likeliest target has less than one chance in fifty has no partner that
         // could be told: its confidence would be far below 0.3. Of large sets whose noise exceeds
         // their spacing these are nearly all points, with hundreds of candidates each.
-        soft.moments.plain().weight[i] > 0.5 && soft.entries(i).all(|(_, p)| p < 0.02)
+        soft.moments.weight[i] > 0.5 && soft.entries(i).all(|(_, p)| p < 0.02)
     }
 
     /// Targets that point i could belong to.

@@ -81,11 +81,10 @@ impl AnnealedSoftassign {
         ws.fine.forget();
         // A dense fit takes many times as long as the one run of a search near by.
         let thorough = matches!(self.search, Search::Thorough);
-        let bends = thorough && self.transformation == Transformation::NonRigid;
-        let plain =
-            self.has(Mechanism::Fine) && ws.known.is_empty() && !ws.annealer.soft.errors.differ();
+        let bends = thorough && self.transformation == Transformation::Smooth;
+        let allowed = self.has(Mechanism::Fine);
         let smaller = ws.model.len().min(ws.target.len()) as f64;
-        if !bends || !plain || !(ws.best.sigma <= ws.annealer.clean_sigma || is_cold(ws)) {
+        if !bends || !allowed || !(ws.best.sigma <= ws.annealer.clean_sigma || is_cold(ws)) {
             return false;
         }
         // Those lie this far from their targets at most.

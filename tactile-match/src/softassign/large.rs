@@ -119,7 +119,7 @@ impl AnnealedSoftassign {
             flow = refine(ws, run, flow, observe);
         }
         let schedule = self.schedule(FAST);
-        let noisy = ws.state.sigma > ws.annealer.clean_sigma || ws.annealer.soft.errors.differ();
+        let noisy = ws.state.sigma > ws.annealer.clean_sigma;
         if flow.is_continue() && noisy {
             // Rounds in which warp and noise level follow each other at the end of noisy sets.
             ws.annealer.settle(&mut ws.state, &schedule, 4);
@@ -169,22 +169,10 @@ impl AnnealedSoftassign {
         levels: &mut Levels<D>,
         stride: usize,
     ) {
-        levels.sample(
-            &ws.model,
-            (&ws.target, &ws.deviations),
-            stride,
-            &mut ws.state,
-        );
+        levels.sample(&ws.model, &ws.target, stride, &mut ws.state);
         ws.annealer.prior.build(&levels.model, SCALES);
-        ws.annealer
-            .soft
-            .set_targets(&levels.target, &levels.deviations);
+        ws.annealer.soft.set_targets(&levels.target);
         ws.annealer.rigid.set(self.transformation, &levels.model);
-        // Rows of samples are others: landmarks count at all points alone.
-        ws.annealer.known.clear();
-        if stride == 1 {
-            ws.annealer.known.extend_from_slice(&ws.known);
-        }
         ws.spacing = ws.patterns.typical_spacing(&levels.target);
     }
 
@@ -324,8 +312,6 @@ pub(super) struct Levels<const D: usize> {
     target_order: Blocks<D>,
     model: Vec<[f64; D]>,
     target: Vec<[f64; D]>,
-    /// Standard deviations of the targets. Empty where the caller did not tell them.
-    deviations: Vec<f64>,
     /// Where the start puts all model points.
     base: Vec<[f64; D]>,
     coarse: State<D>,
@@ -341,29 +327,24 @@ impl<const D: usize> Levels<D> {
     fn sample(
         &mut self,
         model: &[[f64; D]],
-        (target, deviations): (&[[f64; D]], &[f64]),
+        target: &[[f64; D]],
         stride: usize,
         state: &mut State<D>,
     ) {
         state.base.clear();
         self.model.clear();
         self.target.clear();
-        self.deviations.clear();
         if stride == 1 {
             state.base.extend_from_slice(&self.base);
             self.model.extend_from_slice(model);
             self.target.extend_from_slice(target);
-            self.deviations.extend_from_slice(deviations);
             return;
         }
         let rows = self.model_order.order.iter().step_by(stride);
         state.base.extend(rows.clone().map(|&i| self.base[i]));
         self.model.extend(rows.map(|&i| model[i]));
         let rows = self.target_order.order.iter().step_by(stride);
-        self.target.extend(rows.clone().map(|&j| target[j]));
-        if !deviations.is_empty() {
-            self.deviations.extend(rows.map(|&j| deviations[j]));
-        }
+        self.target.extend(rows.map(|&j| target[j]));
     }
 
     /// The field of `coarse`, every `step`-th point of the level of this stride, at all points of

@@ -43,14 +43,12 @@ mod rivals;
 mod search;
 mod starts;
 
-pub use options::{
-    AnnealedSoftassign, Landmark, Mechanism, Outliers, Rotation, Search, Transformation,
-};
+pub use options::{AnnealedSoftassign, Mechanism, Outliers, Rotation, Search, Transformation};
 pub use result::SoftassignMatch;
 
 use crate::{Axes, centre_and_radius};
 use crate::{Doubt, MatchError, MatchedPairs, Matching, WarmStart, error};
-use assign::{Blocks, TargetErrors};
+use assign::Blocks;
 use confidence::PairOdds;
 use correspond::Correspondence;
 use fine::FineFit;
@@ -109,9 +107,6 @@ pub struct SoftassignWorkspace<const D: usize> {
     motions: Motions<D>,
     /// From a point of the model to those about it.
     steps: Vec<SVector<f64, D>>,
-    known: Vec<Known<D>>,
-    /// Standard deviations of the targets. Empty where the caller did not tell them.
-    deviations: Vec<f64>,
     /// Typical distance of a target from the next.
     spacing: f64,
     /// Largest motion that is allowed.
@@ -178,8 +173,6 @@ impl<const D: usize> SoftassignWorkspace<D> {
         self.model.extend(model.iter().map(|p| frame.model(p)));
         self.target.clear();
         self.target.extend(target.iter().map(|p| frame.target(p)));
-        self.known.clear();
-        self.deviations.clear();
         Ok(())
     }
 }
@@ -514,23 +507,13 @@ struct Request<'a, const D: usize> {
     displacements: &'a Axes<D>,
 }
 
-/// What the affinities are: `exp(−s |yᵢ − tⱼ|²/2σ²)`, wider and lower for targets that are less
-/// precise than others.
+/// What the affinities are: `exp(−s |yᵢ − tⱼ|²/2σ²)`.
 #[derive(Clone, Copy, Debug)]
 struct Gaussian {
-    /// The variance σ² of the most precise targets.
+    /// The variance σ².
     variance: f64,
     /// The power s that they are raised to.
     sharpness: f64,
-}
-
-/// A landmark in the units of the frame.
-#[derive(Clone, Copy, Debug)]
-struct Known<const D: usize> {
-    row: usize,
-    position: [f64; D],
-    /// Variance along an axis.
-    variance: f64,
 }
 
 /// Shared machinery of the runs: targets, prior, scratch.
@@ -541,8 +524,6 @@ struct Annealer<const D: usize> {
     regression: Regression<D>,
     /// Takes the regression's place where the warp may not bend.
     rigid: RigidFit<D>,
-    /// What the caller knows of some model points.
-    known: Vec<Known<D>>,
     /// Volume of the targets' bounding box.
     volume: f64,
     /// Residuals up to this are what the prior's factor leaves out.
@@ -571,7 +552,7 @@ struct Answer<const D: usize> {
     odds: PairOdds,
 }
 
-/// Sums over the rows of M, each entry times a power of its target's precision.
+/// Sums over the rows of M.
 #[derive(Clone, Debug, Default)]
 struct RowMoments<const D: usize> {
     /// Row sums without the slack.
@@ -582,23 +563,11 @@ struct RowMoments<const D: usize> {
     spread: Vec<f64>,
 }
 
-/// Moments with the entries times the precisions of their targets to the power of 0, 1 and 2.
-#[derive(Clone, Debug, Default)]
-struct AllMoments<const D: usize> {
-    powers: [RowMoments<D>; 3],
-    /// Column scales times precisions.
-    factors: Vec<f32>,
-    /// Whether the powers differ. Otherwise there is the first alone.
-    differ: bool,
-}
-
 /// The match matrix in factored form, with the moments of its rows. Columns stand in the order of
 /// the blocks.
 #[derive(Clone, Debug, Default)]
 struct SoftAssignment<const D: usize> {
     blocks: Blocks<D>,
-    /// How precise the targets are.
-    errors: TargetErrors,
     /// Affinities so much fainter than the largest there can be are left out.
     faintest: f64,
     /// Where the blocks of every row begin in `active`, and one past the last.
@@ -610,7 +579,7 @@ struct SoftAssignment<const D: usize> {
     column_scale: Vec<f32>,
     column_sum: Vec<f32>,
     /// Moments of the rows.
-    moments: AllMoments<D>,
+    moments: RowMoments<D>,
 }
 
 /// Memory and answer of a regression.

@@ -3,8 +3,9 @@
 
 use super::{Axes, FARTHEST, PriorScales, Regression, Request, State, Transformation, in_space};
 use crate::BestMotion;
-use nalgebra::{Matrix3, Point, SVector, SymmetricEigen, Vector3};
+use nalgebra::{Matrix3, Point, SMatrix, SVector, SymmetricEigen, Vector3};
 use tactile_core::vectorised;
+use tactile_tps::{Affine, Warp};
 
 // The prior on warps: a Gaussian process, kept as a low-rank factor.
 //
@@ -837,7 +838,7 @@ impl<const D: usize> RigidFit<D> {
     }
 
     pub(super) fn is_active(&self) -> bool {
-        self.transformation != Transformation::NonRigid
+        self.transformation != Transformation::Smooth
     }
 
     /// The displacements from `base` and their variances that the motion of least squares gives,
@@ -857,6 +858,9 @@ impl<const D: usize> RigidFit<D> {
                 .map(|(i, b)| Point::from(SVector::from_fn(|k, _| b[k] + displacements.0[k][i]))),
         );
         let weights = &weights[..base.len()];
+        if self.transformation == Transformation::Affine {
+            return self.fit_affine(weights, base, noise, displacements.0[0].len(), regression);
+        }
         let scaled = self.transformation == Transformation::Similarity;
         // Nothing matched, or nothing finite: the model stays where it is.
         let Some(fit) = BestMotion::of(&self.model, &self.wanted, weights, scaled) else {
@@ -887,6 +891,44 @@ impl<const D: usize> RigidFit<D> {
             let variance = noise * (1.0 / total + (turned + grown) / D as f64);
             let variance = variance.min(FARTHEST); // hardly anything is matched
             (std::array::from_fn(|k| image[k] - base[i][k]), variance)
+        });
+    }
+}
+
+impl<const D: usize> RigidFit<D> {
+    /// The affine map of least squares. An image at the offset `r` from the weighted centroid has
+    /// the variance `σ² (1/W + rᵀ S⁻¹ r)` along each axis, `S = Σ wᵢ rᵢ rᵢᵀ`.
+    fn fit_affine(
+        &self,
+        weights: &[f64],
+        base: &[[f64; D]],
+        noise: f64,
+        padded: usize,
+        regression: &mut Regression<D>,
+    ) {
+        let total: f64 = weights.iter().sum();
+        let fit = Affine::fit(&self.model, &self.wanted, Some(weights)).ok();
+        let Some(fit) = fit.filter(|_| total > 0.0) else {
+            regression.set(padded, |_| ([0.0; D], 0.0));
+            return;
+        };
+        let rows = self.model.iter().zip(weights);
+        let centre: SVector<f64, D> = rows.clone().map(|(p, w)| p.coords * (w / total)).sum();
+        let mut scatter = SMatrix::<f64, D, D>::zeros();
+        for (p, w) in rows {
+            let r = p.coords - centre;
+            scatter += r * r.transpose() * *w;
+        }
+        let inverse = scatter.try_inverse().unwrap_or_else(SMatrix::zeros);
+        regression.set(padded, |i| {
+            let Some(p) = self.model.get(i) else {
+                return ([0.0; D], 0.0);
+            };
+            let image = fit.apply(p);
+            let r = p.coords - centre;
+            let variance = noise * (1.0 / total + r.dot(&(inverse * r)).max(0.0));
+            let displacement = std::array::from_fn(|k| image[k] - base[i][k]);
+            (displacement, variance.min(FARTHEST))
         });
     }
 }

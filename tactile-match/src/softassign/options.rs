@@ -1,7 +1,5 @@
-//! What a caller knows of a scene: options, landmarks, errors of the targets.
+//! What a caller knows of a scene: the options of the matcher.
 
-use super::Annealer;
-use super::Known;
 use super::{Slack, SoftassignMatch, SoftassignWorkspace};
 use crate::error::{at_least_one, option_within};
 use crate::{MatchError, Matching};
@@ -194,7 +192,9 @@ pub enum Search {
 pub enum Transformation {
     /// Bend smoothly.
     #[default]
-    NonRigid,
+    Smooth,
+    /// Follow any affine map: `x ↦ A x + b`.
+    Affine,
     /// Turn, move and change its size: `x ↦ s R x + b`.
     Similarity,
     /// Turn and move: `x ↦ R x + b`.
@@ -274,7 +274,7 @@ impl Default for AnnealedSoftassign {
             rotation: Rotation::Limited,
             outliers: Outliers::Both,
             search: Search::Thorough,
-            transformation: Transformation::NonRigid,
+            transformation: Transformation::Smooth,
             share: 0.1,
             largest_motion: f64::INFINITY,
             max_iterations: 200,
@@ -304,7 +304,7 @@ impl AnnealedSoftassign {
         self
     }
 
-    /// Says what the model may do: bend (the default), or only move rigidly or as a similarity.
+    /// Says what the model may do: bend (the default), or only move rigidly, as a similarity or as an affine map.
     /// Those leave residuals where the pairs do not fit to rounding, and no warped point is put
     /// onto its partner.
     #[must_use]
@@ -389,229 +389,6 @@ impl AnnealedSoftassign {
             model,
             target,
         }
-    }
-}
-
-/// Where a model point is known to go, as a normal distribution: the fit counts it beside the soft
-/// matches, with the weight σ²/s² of its standard deviation s at the temperature σ.
-///
-/// ```
-/// use nalgebra::Point2;
-/// use tactile_match::{AnnealedSoftassign, Landmark, Transformation};
-/// // Twelve points of a regular ring: only landmarks can tell that it was turned.
-/// let ring = |turn: f64| -> Vec<Point2<f64>> {
-///     (0..12)
-///         .map(|k| f64::from(k).mul_add(30.0, turn).to_radians())
-///         .map(|a| Point2::new(a.cos(), a.sin()))
-///         .collect()
-/// };
-/// let (model, target) = (ring(0.0), ring(30.0));
-/// let landmarks = [0, 4].map(|row| Landmark {
-///     row,
-///     position: target[row],
-///     deviation: 0.0,
-/// }); // two known pairs
-/// let options = AnnealedSoftassign::default().with_transformation(Transformation::Rigid);
-/// let found = options.match_with_landmarks(&model, &target, &landmarks)?;
-/// assert!((0..12).all(|i| found.assignment[i] == Some(i)));
-/// # Ok::<(), tactile_match::MatchError>(())
-/// ```
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Landmark<const D: usize> {
-    /// Row of the model point.
-    pub row: usize,
-    /// Where it goes.
-    pub position: Point<f64, D>,
-    /// Standard deviation along an axis, in the units of the points. 0 for a hard landmark, which
-    /// is kept to a thousandth of the model's radius, and where its position is a target exactly.
-    pub deviation: f64,
-}
-
-impl<const D: usize> Landmark<D> {
-    fn check(&self, points: usize) -> Result<(), MatchError> {
-        let row = self.row;
-        if row >= points {
-            return Err(MatchError::LandmarkRow { row, points });
-        }
-        let deviation = self.deviation;
-        option_within("deviation", deviation, 0.0, f64::MAX, "[0, ∞)")?;
-        if !self.position.iter().all(|c| c.is_finite()) {
-            return Err(MatchError::LandmarkPosition { row });
-        }
-        Ok(())
-    }
-}
-
-impl AnnealedSoftassign {
-    /// As [`match_points`](crate::PointMatcher::match_points), with what is known of some model
-    /// points. Several landmarks of one point count together.
-    ///
-    /// ```
-    /// use nalgebra::Point2;
-    /// use tactile_match::{AnnealedSoftassign, Landmark};
-    /// let model = [
-    ///     [0.0, 0.0],
-    ///     [1.0, 0.1],
-    ///     [0.2, 1.0],
-    ///     [1.1, 1.2],
-    ///     [0.5, 0.4],
-    ///     [1.8, 0.3],
-    /// ]
-    /// .map(Point2::from);
-    /// let target = model.map(|p| Point2::new(1.1 * p.x + 0.1 * p.y, p.y));
-    /// let known = Landmark {
-    ///     row: 2,
-    ///     position: target[2],
-    ///     deviation: 0.01,
-    /// };
-    /// let found =
-    ///     AnnealedSoftassign::default().match_with_landmarks(&model, &target, &[known])?;
-    /// assert_eq!(found.assignment[2], Some(2));
-    /// # Ok::<(), tactile_match::MatchError>(())
-    /// ```
-    ///
-    /// # Errors
-    /// As [`match_points`](crate::PointMatcher::match_points), [`MatchError::LandmarkRow`] for a
-    /// landmark of a point that the model does not have, [`MatchError::LandmarkPosition`] for a
-    /// position that is not finite, and [`MatchError::InvalidOption`] for a deviation that is
-    /// negative or not finite.
-    pub fn match_with_landmarks<const D: usize>(
-        &self,
-        model: &[Point<f64, D>],
-        target: &[Point<f64, D>],
-        landmarks: &[Landmark<D>],
-    ) -> Result<Matching<D>, MatchError> {
-        for landmark in landmarks {
-            landmark.check(model.len())?;
-        }
-        let mut workspace = SoftassignWorkspace::default();
-        workspace.take(model, target)?;
-        let frame = workspace.frame;
-        workspace.known.extend(landmarks.iter().map(|known| {
-            Known {
-                row: known.row,
-                position: frame.target(&known.position),
-                variance: (known.deviation / frame.scale)
-                    .max(workspace.annealer.least_sigma.max(1e-4))
-                    .powi(2),
-            }
-        }));
-        self.solve(&mut workspace, &mut |_, _| ControlFlow::Continue(()));
-        Ok(SoftassignMatch::of(&workspace).to_matching(model))
-    }
-}
-
-impl<const D: usize> Annealer<D> {
-    /// Adds what the landmarks say to the request of the soft matches: precisions add up,
-    /// displacements are averaged by them.
-    pub(super) fn add_landmarks(&mut self, base: &[[f64; D]], variance: f64) {
-        for known in &self.known {
-            let (row, precision) = (known.row, variance / known.variance);
-            let total = self.weights[row] + precision;
-            for (k, axis) in self.residuals.0.iter_mut().enumerate() {
-                let displacement = known.position[k] - base[row][k];
-                axis[row] = (self.weights[row] * axis[row] + precision * displacement) / total;
-            }
-            self.weights[row] = total;
-        }
-    }
-}
-
-impl AnnealedSoftassign {
-    /// As [`match_points`](crate::PointMatcher::match_points), where the targets were measured with
-    /// different precision: `deviations[j]` is the standard deviation of target j along an axis, in
-    /// the units of the points.
-    ///
-    /// A precise target counts for more than an uncertain one in the soft matches, in the warp and
-    /// in its covariances: the pair of target j has the noise variance `σ² + sⱼ² − min s²`. The σ²
-    /// of the most precise targets is estimated from the residuals, since it also holds what the
-    /// warp does not explain, and is at least `min s²`
-    /// ([`MatchReport::sigma`](crate::MatchReport)). Equal deviations say nothing that the
-    /// residuals do not: they give the answer of
-    /// [`match_points`](crate::PointMatcher::match_points) to the bit. Where they differ, no point
-    /// is put onto its partner exactly.
-    ///
-    /// ```
-    /// use nalgebra::{Point2, Vector2};
-    /// use tactile_match::{AnnealedSoftassign, MatchError};
-    /// let model: Vec<_> = (0..60)
-    ///     .map(|i| {
-    ///         Point2::new(
-    ///             f64::from(i % 10) + 0.03 * f64::from(i * i % 7),
-    ///             f64::from(i / 10),
-    ///         )
-    ///     })
-    ///     .collect();
-    /// // Every other point was seen in shadow, with an error of about 0.2 instead of 0.002.
-    /// let deviations: Vec<f64> = (0..60)
-    ///     .map(|i| if i % 2 == 0 { 0.002 } else { 0.2 })
-    ///     .collect();
-    /// let truth = |p: &Point2<f64>| Point2::new(1.05 * p.x, p.y + 0.01 * p.x * p.x);
-    /// let target: Vec<_> = model
-    ///     .iter()
-    ///     .zip(&deviations)
-    ///     .enumerate()
-    ///     .map(|(i, (p, s))| {
-    ///         truth(p) + Vector2::new((2.1 * i as f64).sin(), (3.7 * i as f64).cos()) * 1.4 * *s
-    ///     })
-    ///     .collect();
-    /// let matcher = AnnealedSoftassign::default();
-    /// let found = matcher.match_with_target_errors(&model, &target, &deviations)?;
-    /// let rms = |warped: &[Point2<f64>]| {
-    ///     let squares = warped
-    ///         .iter()
-    ///         .zip(&model)
-    ///         .map(|(w, p)| (w - truth(p)).norm_squared());
-    ///     (squares.sum::<f64>() / 60.0).sqrt()
-    /// };
-    /// assert!(rms(&found.warped) < 0.02);
-    /// let wrong = matcher.match_with_target_errors(&model, &target, &deviations[1..]);
-    /// assert!(matches!(
-    ///     wrong,
-    ///     Err(MatchError::Shape {
-    ///         what: "deviations of the targets",
-    ///         expected: 60,
-    ///         found: 59
-    ///     })
-    /// ));
-    /// # Ok::<(), MatchError>(())
-    /// ```
-    ///
-    /// # Errors
-    /// As [`match_points`](crate::PointMatcher::match_points), [`MatchError::Shape`] where there is
-    /// not one deviation a target, and [`MatchError::TargetDeviation`] for one that is not positive
-    /// and finite.
-    pub fn match_with_target_errors<const D: usize>(
-        &self,
-        model: &[Point<f64, D>],
-        target: &[Point<f64, D>],
-        deviations: &[f64],
-    ) -> Result<Matching<D>, MatchError> {
-        let mut workspace = SoftassignWorkspace::default();
-        workspace.take(model, target)?;
-        workspace.take_deviations(deviations)?;
-        self.solve(&mut workspace, &mut |_, _| ControlFlow::Continue(()));
-        Ok(SoftassignMatch::of(&workspace).to_matching(model))
-    }
-}
-
-impl<const D: usize> SoftassignWorkspace<D> {
-    fn take_deviations(&mut self, deviations: &[f64]) -> Result<(), MatchError> {
-        if deviations.len() != self.target.len() {
-            return Err(MatchError::Shape {
-                what: "deviations of the targets",
-                expected: self.target.len(),
-                found: deviations.len(),
-            });
-        }
-        let positive = |s: f64| s > 0.0 && s.is_finite();
-        if let Some(row) = deviations.iter().position(|&s| !positive(s)) {
-            let value = deviations[row];
-            return Err(MatchError::TargetDeviation { row, value });
-        }
-        let scale = self.frame.scale;
-        self.deviations.extend(deviations.iter().map(|s| s / scale));
-        Ok(())
     }
 }
 

@@ -145,7 +145,6 @@ fn stop_reason<const D: usize>(workspace: &SoftassignWorkspace<D>) -> StopReason
         () if workspace.stopped => StopReason::Cancelled,
         // The floor is reached to rounding.
         () if workspace.best.sigma <= 1.000_001 * workspace.annealer.least_sigma
-            && !workspace.annealer.soft.errors.differ()
             && !workspace.fine.found
             && workspace.doubt.is_none() =>
         {

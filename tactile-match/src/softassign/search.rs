@@ -185,12 +185,11 @@ impl AnnealedSoftassign {
         ws.best.energy = f64::INFINITY;
     }
 
-    /// Sets up prior, targets and landmarks for all points.
+    /// Sets up prior and targets for all points.
     fn prepare<const D: usize>(&self, ws: &mut SoftassignWorkspace<D>) {
         ws.annealer.prior.build(&ws.model, SCALES);
-        ws.annealer.soft.set_targets(&ws.target, &ws.deviations);
+        ws.annealer.soft.set_targets(&ws.target);
         ws.annealer.rigid.set(self.transformation, &ws.model);
-        ws.annealer.known.clone_from(&ws.known);
     }
 
     /// Reads the answer from the best run.
@@ -247,7 +246,7 @@ impl AnnealedSoftassign {
             self.try_starts(ws, observe)?;
         }
         self.look_for_rivals(ws);
-        let noisy = ws.best.sigma > ws.annealer.clean_sigma || ws.annealer.soft.errors.differ();
+        let noisy = ws.best.sigma > ws.annealer.clean_sigma;
         if noisy && !ws.best.noisy && self.has(Mechanism::Scales) && !ws.annealer.rigid.is_active()
         {
             self.average_scales(ws);
@@ -567,7 +566,7 @@ impl AnnealedSoftassign {
     }
 
     pub(super) fn schedule(&self, mut cooling: Cooling) -> Schedule {
-        if self.transformation != Transformation::NonRigid {
+        if self.transformation != Transformation::Smooth {
             // A motion without bending stands still while it turns into place.
             cooling.stuck = cooling.patience;
         }

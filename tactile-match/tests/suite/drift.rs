@@ -5,7 +5,7 @@ use crate::common::{Stream, bend, largest_step, reordered, rotation, scattered};
 use nalgebra::{DMatrix, Point, Point2, Point3, SVector, Vector3};
 use proptest::prelude::*;
 use tactile_match::{
-    CoherentPointDrift, DriftWorkspace, MatchError, Matching, Motion, Normalization, PointMatcher,
+    CoherentPointDrift, DriftWorkspace, MatchError, Matching, Normalization, PointMatcher,
     StopReason,
 };
 
@@ -87,13 +87,8 @@ fn check_against_slow<const D: usize>(
         &bend(&scattered::<D>(columns, seed), 0.1),
         &Stream::new(seed).permutation(columns),
     );
-    let motion = Motion::NonRigid {
-        beta,
-        lambda,
-        rank: None,
-    };
     let options = CoherentPointDrift::default()
-        .with_motion(motion)
+        .with_field(beta, lambda)
         .and_then(|options| options.with_outlier_weight(w))
         .and_then(|options| options.with_tolerance(0.0))
         .expect("valid options")
@@ -122,11 +117,10 @@ proptest! {
 
     #[test]
     fn units_and_origin_do_not_matter(
-        seed in 0..1000_u64, exponent in -9..=9_i32, offset in -1e3..1e3_f64, each in any::<bool>(), motion in 0..4_usize,
+        seed in 0..1000_u64, exponent in -9..=9_i32, offset in -1e3..1e3_f64, each in any::<bool>(),
     ) {
-        let motion = [Motion::Rigid, Motion::Similarity, Motion::Affine, Motion::NON_RIGID][motion];
         let normalization = if each { Normalization::Each } else { Normalization::Model };
-        let options = CoherentPointDrift::default().with_motion(motion).unwrap().with_normalization(normalization);
+        let options = CoherentPointDrift::default().with_normalization(normalization);
         let model = scattered::<3>(30, seed);
         let target = bend(&model, 0.05);
         let scale = 10_f64.powi(exponent);
@@ -140,9 +134,8 @@ proptest! {
     }
 
     #[test]
-    fn a_common_rotation_turns_the_answer(seed in 0..1000_u64, angle in -3.0..3.0_f64, motion in 0..4_usize) {
-        let motion = [Motion::Rigid, Motion::Similarity, Motion::Affine, Motion::NON_RIGID][motion];
-        let options = CoherentPointDrift::default().with_motion(motion).unwrap();
+    fn a_common_rotation_turns_the_answer(seed in 0..1000_u64, angle in -3.0..3.0_f64) {
+        let options = CoherentPointDrift::default();
         let model = scattered::<2>(30, seed);
         let target = bend(&model, 0.05);
         let turn = rotation::<2>(angle);
@@ -151,41 +144,15 @@ proptest! {
         prop_assert_eq!(&other.assignment, &plain.assignment);
         prop_assert!(largest_step(&other.warped, &turned(&plain.warped)) <= 1e-8);
     }
-
-    #[test]
-    fn rigid_similar_and_affine_motions_are_recovered(seed in 0..1000_u64, angle in -0.3..0.3_f64, size in 0.5..2.0_f64) {
-        let model = scattered::<3>(40, seed);
-        let turn = rotation::<3>(angle);
-        let shear = nalgebra::Matrix3::new(1.0, 0.2, 0.0, 0.0, 0.9, 0.1, 0.1, 0.0, 1.1);
-        for (motion, map) in [(Motion::Rigid, turn), (Motion::Similarity, turn * size), (Motion::Affine, shear)] {
-            let target: Vec<_> = model.iter().map(|p| map * p + Vector3::new(3.0, -1.0, 0.5)).collect();
-            let options = CoherentPointDrift::default().with_motion(motion).unwrap().with_tolerance(1e-12).unwrap();
-            let order = Stream::new(seed).permutation(40);
-            let found = drift(options, &model, &reordered(&target, &order));
-            prop_assert!(largest_step(&found.warped, &target) <= 1e-5, "{:?}: {}", motion, largest_step(&found.warped, &target));
-            prop_assert!((0..40).all(|i| found.assignment[i].map(|j| order[j]) == Some(i)));
-        }
-    }
 }
 
 #[test]
 fn a_low_rank_kernel_is_close() {
     let model = scattered::<2>(100, 2);
     let target = bend(&model, 0.05);
-    let motion = |rank| Motion::NonRigid {
-        beta: 2.0,
-        lambda: 3.0,
-        rank,
-    };
-    let [whole, thirty] = [None, Some(30)].map(|rank| {
-        drift(
-            CoherentPointDrift::default()
-                .with_motion(motion(rank))
-                .unwrap(),
-            &model,
-            &target,
-        )
-    });
+    let options = CoherentPointDrift::default();
+    let whole = drift(options, &model, &target);
+    let thirty = drift(options.with_rank(30).unwrap(), &model, &target);
     assert_eq!(whole.assignment, thirty.assignment);
     assert!(
         largest_step(&whole.warped, &thirty.warped) < 1e-4,
@@ -218,21 +185,15 @@ fn the_warp_takes_the_model_along_and_its_jacobian_is_its_derivative() {
     let model = scattered::<3>(40, 9);
     let target = bend(&model, 0.05);
     let mut workspace = DriftWorkspace::default();
-    for motion in [
-        Motion::Rigid,
-        Motion::Similarity,
-        Motion::Affine,
-        Motion::NON_RIGID,
-    ] {
-        let options = CoherentPointDrift::default().with_motion(motion).unwrap();
-        let matcher = options;
+    {
+        let matcher = CoherentPointDrift::default();
         let found = matcher.match_with(&mut workspace, &model, &target).unwrap();
         let warp = &found.warp;
         let images: Vec<_> = model.iter().map(|p| warp.apply(p)).collect();
         // The pivots' triangular system has about the square root of the kernel's condition, 1e6.
         assert!(
             largest_step(&images, &found.warped) < 1e-9,
-            "{motion:?} {}",
+            "{}",
             largest_step(&images, &found.warped)
         );
         let (at, h) = (Point3::new(0.4, 0.3, 0.6), 1e-5);
@@ -251,7 +212,6 @@ fn the_warp_takes_the_model_along_and_its_jacobian_is_its_derivative() {
 #[test]
 fn options_out_of_range_are_typed_errors() {
     let good = CoherentPointDrift::default();
-    let non_rigid = |beta, lambda, rank| good.with_motion(Motion::NonRigid { beta, lambda, rank });
     let refused = |set: Result<CoherentPointDrift, MatchError>, name| {
         let error = set.unwrap_err();
         assert!(
@@ -262,14 +222,14 @@ fn options_out_of_range_are_typed_errors() {
     for bad in [f64::NAN, f64::INFINITY, -1.0] {
         refused(good.with_outlier_weight(bad), "outlier_weight");
         refused(good.with_tolerance(bad), "tolerance");
-        refused(non_rigid(bad, 1.0, None), "beta");
-        refused(non_rigid(1.0, bad, None), "lambda");
+        refused(good.with_field(bad, 1.0), "beta");
+        refused(good.with_field(1.0, bad), "lambda");
     }
     refused(good.with_outlier_weight(1.0), "outlier_weight");
     refused(good.with_max_iterations(0), "max_iterations");
-    refused(non_rigid(1.0, 1.0, Some(0)), "rank");
-    refused(non_rigid(0.0, 1.0, None), "beta");
-    refused(non_rigid(1.0, 0.0, None), "lambda");
+    refused(good.with_rank(0), "rank");
+    refused(good.with_field(0.0, 1.0), "beta");
+    refused(good.with_field(1.0, 0.0), "lambda");
 }
 
 #[test]

@@ -19,5 +19,4 @@ mod serialtrack;
 mod series;
 mod softassign;
 mod stability;
-mod target_errors;
 mod trust;

@@ -9,8 +9,8 @@ use crate::common::{Stream, bend, reordered, rotation, scattered};
 use nalgebra::{Point, Point2, SVector};
 use tactile_match::labelling::Neighbourhood;
 use tactile_match::{
-    AnnealedSoftassign, CoherentPointDrift, LinearAssignment, Matching, Motion, NearestNeighbour,
-    Outliers, PointMatcher, RelaxationLabelling, Rotation, Search, WarmStart,
+    AnnealedSoftassign, CoherentPointDrift, LinearAssignment, Matching, NearestNeighbour, Outliers,
+    PointMatcher, RelaxationLabelling, Rotation, Search, WarmStart,
 };
 use test_support::Answers;
 
@@ -106,17 +106,13 @@ fn digest<const D: usize>(answers: &mut Answers, name: &str, found: &Matching<D>
 fn of_dimension<const D: usize>(answers: &mut Answers) {
     let options = AnnealedSoftassign::default();
     let fast = |options| Box::new(options);
-    let drift = |motion| {
-        let options = CoherentPointDrift::default().with_motion(motion);
-        Box::new(options.expect("a valid motion"))
-    };
     let few = RelaxationLabelling::default()
         .with_neighbourhood(Neighbourhood::Nearest(6))
         .expect("neighbours");
     let dense = few;
     let sparse = few.with_candidates(10).expect("candidates");
     let share = options.with_outlier_ratio(0.2).expect("valid share");
-    let matchers: [(&str, Box<dyn PointMatcher<D>>); 12] = [
+    let matchers: [(&str, Box<dyn PointMatcher<D>>); 10] = [
         ("default", fast(options)),
         ("near", fast(options.with_search(Search::Near))),
         ("any rotation", fast(options.with_rotation(Rotation::Any))),
@@ -127,9 +123,7 @@ fn of_dimension<const D: usize>(answers: &mut Answers) {
         ),
         ("dense relaxation", Box::new(dense)),
         ("sparse relaxation", Box::new(sparse)),
-        ("drift", drift(Motion::NON_RIGID)),
-        ("rigid drift", drift(Motion::Rigid)),
-        ("affine drift", drift(Motion::Affine)),
+        ("drift", Box::new(CoherentPointDrift::default())),
         ("assignment", Box::new(LinearAssignment::default())),
         ("nearest", Box::new(NearestNeighbour::default())),
     ];

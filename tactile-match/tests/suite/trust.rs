@@ -221,7 +221,7 @@ fn a_lattice_that_may_be_turned_is_doubtful() {
         .collect();
     let mut marked = lattice.clone();
     marked.push(Point2::new(7.5, 5.0));
-    for transformation in [Transformation::Rigid, Transformation::NonRigid] {
+    for transformation in [Transformation::Rigid, Transformation::Smooth] {
         let matcher = AnnealedSoftassign::default().with_transformation(transformation);
         let any = matcher.with_rotation(Rotation::Any);
         let turned: Vec<_> = lattice

@@ -3,7 +3,7 @@
 use nalgebra::Point;
 use tactile_match::labelling::Neighbourhood;
 use tactile_match::{
-    AnnealedSoftassign, CoherentPointDrift, LinearAssignment, Matching, Motion, NearestNeighbour,
+    AnnealedSoftassign, CoherentPointDrift, LinearAssignment, Matching, NearestNeighbour,
     PointMatcher, RelaxationLabelling, Rotation, Transformation,
 };
 
@@ -11,10 +11,6 @@ pub(crate) type Matchers<const D: usize> = Vec<(&'static str, Box<dyn PointMatch
 
 /// The matchers that every test file runs. A new one is added here and nowhere else.
 pub(crate) fn matchers<const D: usize>() -> Matchers<D> {
-    let drift = |motion| {
-        let options = CoherentPointDrift::default().with_motion(motion);
-        options.expect("a valid motion")
-    };
     // Eight neighbours instead of half of all points: what is checked here does not need the time
     // of the latter.
     let options = RelaxationLabelling::default().with_neighbourhood(Neighbourhood::Nearest(8));
@@ -35,18 +31,6 @@ pub(crate) fn matchers<const D: usize>() -> Matchers<D> {
         (
             "coherent point drift",
             Box::new(CoherentPointDrift::default()),
-        ),
-        (
-            "coherent point drift, rigid",
-            Box::new(drift(Motion::Rigid)),
-        ),
-        (
-            "coherent point drift, similarity",
-            Box::new(drift(Motion::Similarity)),
-        ),
-        (
-            "coherent point drift, affine",
-            Box::new(drift(Motion::Affine)),
         ),
     ]
 }
