@@ -1,5 +1,5 @@
 //! `tactile match`: the point sets of case files.
-use crate::arguments::{Repetition, positive};
+use crate::arguments::{Repetition, positive, read_points};
 use crate::console::{Context, Exit, Failure, count, four_digits, printable};
 use clap::{Args, ValueEnum};
 use nalgebra::Point;
@@ -7,23 +7,30 @@ use serde_json::{Value, json};
 use std::ffi::OsString;
 use std::io::Write as _;
 use std::path::PathBuf;
-use tactile_files::io::{CasePoints, read_cases, write_case_result};
+use tactile_files::io::{CasePoints, MatchCase, PointTable, read_cases, write_case_result};
 use tactile_imaging::PairsDoubt;
 use tactile_imaging::matching::{
-    AnnealedSoftassign, CoherentPointDrift, LinearAssignment, NearestNeighbour, Outliers,
-    PointMatcher, RelaxationLabelling, Rotation, StopReason,
+    AnnealedSoftassign, CoherentPointDrift, FittedTransformation, LinearAssignment,
+    NearestNeighbour, Outliers, PointMatcher, RelaxationLabelling, Rotation, StopReason,
+    Transformation,
 };
 
 /// Match the points of two sets, in the plane or in space
+///
+/// Two tables of points (columns x, y and z if there is one) are one case. Any other file is a case
+/// file.
 ///
 /// A case file holds one or more cases: a line `case NAME D n_model n_target`, then rows `m` (a
 /// model point) and `t` (a target point) with D coordinates. The answers go to --out, a file for
 /// each case file under the same name: `case NAME time_ms`, then for every model row its warped
 /// position (`w`) and the target row assigned to it (`a`, -1 for none).
 #[derive(Args)]
-#[command(after_help = "Example:\n  tactile match examples/data/cases.txt --out target/match")]
+#[command(
+    after_help = "Examples:\n  tactile match examples/data/cases.txt --out target/match\n  \
+                        tactile match before.csv after.csv"
+)]
 pub struct MatchArguments {
-    /// Case files.
+    /// Case files, or two tables of points.
     #[arg(required = true)]
     cases: Vec<PathBuf>,
     #[command(flatten)]
@@ -44,6 +51,9 @@ pub struct Expectations {
     /// Which set has points without a partner in the other.
     #[arg(long, value_enum, default_value_t = Unmatched::Both)]
     outliers: Unmatched,
+    /// What the points may do: bend smoothly, or follow one map, whose parameters are printed.
+    #[arg(long, value_enum, default_value_t = Change::Smooth)]
+    transformation: Change,
     /// The largest motion of a point, in the points' unit. It tells the answers of a lattice that
     /// goes on beyond the view apart.
     #[arg(long, value_name = "LENGTH", value_parser = positive)]
@@ -54,6 +64,18 @@ pub struct Expectations {
 enum Turn {
     Limited,
     Any,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Change {
+    /// Turn and move.
+    Rigid,
+    /// Turn, move and change the size.
+    Similarity,
+    /// Follow any affine map.
+    Affine,
+    /// Bend smoothly.
+    Smooth,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -93,9 +115,16 @@ impl Expectations {
             Unmatched::Target => Outliers::Target,
             Unmatched::None => Outliers::None,
         };
+        let transformation = match self.transformation {
+            Change::Rigid => Transformation::Rigid,
+            Change::Similarity => Transformation::Similarity,
+            Change::Affine => Transformation::Affine,
+            Change::Smooth => Transformation::Smooth,
+        };
         let matcher = AnnealedSoftassign::default()
             .with_rotation(rotation)
-            .with_outliers(outliers);
+            .with_outliers(outliers)
+            .with_transformation(transformation);
         match self.largest_motion {
             Some(motion) => matcher
                 .with_largest_motion(motion)
@@ -140,24 +169,36 @@ pub fn run(arguments: &MatchArguments, context: &mut Context) -> Result<Exit, Fa
     let Expectations {
         rotation,
         outliers,
+        transformation,
         largest_motion,
     } = arguments.expectations;
-    let expected =
-        rotation != Turn::Limited || outliers != Unmatched::Both || largest_motion.is_some();
+    let expected = rotation != Turn::Limited
+        || outliers != Unmatched::Both
+        || transformation != Change::Smooth
+        || largest_motion.is_some();
     if arguments.method != Method::Softassign && expected {
         return Err(Failure::input(
-            "--rotation, --outliers and --largest-motion apply to the method softassign alone: leave \
+            "--rotation, --outliers, --transformation and --largest-motion apply to the method softassign alone: leave \
              out --method or them",
         ));
     }
     let name = |path: &PathBuf| path.file_name().unwrap_or_default().to_owned();
-    let names: Vec<OsString> = arguments.cases.iter().map(name).collect();
+    let tables = are_tables(&arguments.cases);
+    let mut names: Vec<OsString> = arguments.cases.iter().map(name).collect();
+    if tables {
+        names = vec![OsString::from(TABLES_ANSWER)];
+    }
     context.outputs.plan(&names, &arguments.cases)?;
     // All files are read before the first case is matched, so that a mistake in the last costs no
     // time.
     let mut files = Vec::new();
-    for path in &arguments.cases {
-        let cases = read_cases(path)?;
+    let read = if tables {
+        vec![vec![case_of_tables(&arguments.cases)?]]
+    } else {
+        let cases = arguments.cases.iter().map(read_cases);
+        cases.collect::<Result<Vec<_>, _>>()?
+    };
+    for cases in read {
         for case in &cases {
             let (model, target) = match &case.points {
                 CasePoints::Plane { model, target } => (model.len(), target.len()),
@@ -259,14 +300,96 @@ fn solve<const D: usize>(
         report.residual
     );
     let _ = write_case_result(text, case, ms, &matching.warped, &matching.assignment);
-    let value = json!({
+    let transformation = matching.transformation.as_ref().map(|found| {
+        context.aside(format_args!("{name}: {}", described(found)));
+        parameters(found)
+    });
+    let mut value = json!({
         "model_points": points, "target_points": targets, "matched": matched,
         "assignment": matching.assignment, "confidence": matching.confidence,
         "unmatched_share": 1.0 - matched as f64 / points as f64,
         "residual": report.residual, "noise": report.sigma, "stop": stop, "doubt": doubt,
         "iterations": iterations, "starts": starts, "time_ms": ms,
     });
+    if let Some(transformation) = transformation {
+        value["transformation"] = transformation;
+    }
     Some(json!({ "case": case, "match": value }))
+}
+
+/// Rotation, scale and shift of a map with their standard errors, in words.
+fn described<const D: usize>(found: &FittedTransformation<D>) -> String {
+    let pair = |value: f64, error: f64| format!("{} ± {}", four_digits(value), four_digits(error));
+    let degrees = |k: usize| {
+        pair(
+            found.rotation[k].to_degrees(),
+            found.rotation_error[k].to_degrees(),
+        )
+    };
+    let turn: Vec<_> = (if D == 2 { 2..3 } else { 0..3 }).map(degrees).collect();
+    let shift: Vec<_> = (0..D)
+        .map(|k| pair(found.shift[k], found.shift_error[k]))
+        .collect();
+    format!(
+        "turned by ({}) degrees, scale {}, shift ({})",
+        turn.join(", "),
+        pair(found.scale, found.scale_error),
+        shift.join(", ")
+    )
+}
+
+/// The same as JSON, with the matrix by rows.
+fn parameters<const D: usize>(found: &FittedTransformation<D>) -> Value {
+    let row = |r: usize| (0..D).map(|c| found.linear[(r, c)]).collect::<Vec<_>>();
+    let matrix: Vec<_> = (0..D).map(row).collect();
+    json!({
+        "matrix": matrix,
+        "shift": found.shift.as_slice(), "shift_error": found.shift_error.as_slice(),
+        "scale": found.scale, "scale_error": found.scale_error,
+        "rotation_deg": found.rotation.map(f64::to_degrees).as_slice(),
+        "rotation_error_deg": found.rotation_error.map(f64::to_degrees).as_slice(),
+    })
+}
+
+/// The file of answers of two tables.
+const TABLES_ANSWER: &str = "match.txt";
+
+/// Whether these are two tables of points: their names end as tables' do.
+fn are_tables(paths: &[PathBuf]) -> bool {
+    let is_table = |path: &PathBuf| {
+        let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
+        ["csv", "tsv", "pts", "fcsv"]
+            .iter()
+            .any(|kind| extension == *kind)
+    };
+    paths.len() == 2 && paths.iter().all(is_table)
+}
+
+/// One case of two tables.
+fn case_of_tables(paths: &[PathBuf]) -> Result<MatchCase, Failure> {
+    let (mut tables, _) = read_points(paths)?;
+    let (target, model) = (tables.pop(), tables.pop());
+    let points = match (model, target) {
+        (Some(PointTable::Plane(model)), Some(PointTable::Plane(target))) => {
+            CasePoints::Plane { model, target }
+        }
+        (Some(PointTable::Space(model)), Some(PointTable::Space(target))) => {
+            CasePoints::Space { model, target }
+        }
+        _ => {
+            return Err(Failure::input(
+                "both tables must have two coordinates a point, or both three",
+            ));
+        }
+    };
+    let name = |path: &PathBuf| {
+        path.file_stem()
+            .unwrap_or_default()
+            .to_string_lossy()
+            .into_owned()
+    };
+    let name = format!("{}-{}", name(&paths[0]), name(&paths[1])).replace(' ', "_");
+    Ok(MatchCase { name, points })
 }
 
 fn stop_reason(stop: StopReason) -> &'static str {

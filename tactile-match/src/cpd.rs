@@ -1052,6 +1052,7 @@ fn matching<const D: usize>(workspace: &DriftWorkspace<D>) -> Matching<D> {
         unmatched_model,
         unmatched_target,
         displacement_covariance: covariance,
+        transformation: None,
         energy: workspace.energy.to_vec(),
         report: report(workspace, &assignment),
         assignment,

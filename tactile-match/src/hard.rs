@@ -108,6 +108,7 @@ fn matching<const D: usize>(
         unmatched_model,
         unmatched_target,
         displacement_covariance: covariance,
+        transformation: None,
         energy: vec![total * scale * scale],
         report: MatchReport {
             stop: StopReason::Converged,

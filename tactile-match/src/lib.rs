@@ -40,6 +40,7 @@ pub mod labelling;
 mod matching;
 mod shape_context;
 mod softassign;
+mod transformation;
 
 // The shared tests name the crate from outside.
 #[cfg(test)]
@@ -61,6 +62,7 @@ pub use softassign::{
     SoftassignWorkspace, Transformation,
 };
 pub use tactile_core::{CustomError, StopReason};
+pub use transformation::FittedTransformation;
 
 use ::nalgebra::{Point, SMatrix, SVector};
 use tactile_tps::Affine;

@@ -1,7 +1,7 @@
 //! What every matcher takes and returns: [`PointMatcher`], [`Matching`] and its [`MatchReport`].
 
 use crate::error::{option_within, point_sets};
-use crate::{MatchError, hard};
+use crate::{FittedTransformation, MatchError, hard};
 use nalgebra::{Point, SMatrix};
 use tactile_core::StopReason;
 use tactile_tps::{SeriesMemory, Warp};
@@ -344,6 +344,8 @@ pub struct Matching<const D: usize> {
     /// the default matcher it is the posterior covariance given that the pairs are right: about 68
     /// % of the true positions lie within one standard deviation along an axis.
     pub displacement_covariance: Vec<SMatrix<f64, D, D>>,
+    /// The map that was found, of a matcher that was asked for one of a few parameters.
+    pub transformation: Option<FittedTransformation<D>>,
     /// The matcher's energy after every outer iteration.
     pub energy: Vec<f64>,
     /// How it went.
@@ -421,6 +423,7 @@ impl<const D: usize> Matching<D> {
             unmatched_model,
             unmatched_target,
             displacement_covariance: vec![covariance; model.len()],
+            transformation: None,
             energy: Vec::new(),
             report: MatchReport {
                 stop: StopReason::Direct,

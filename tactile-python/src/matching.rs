@@ -272,7 +272,7 @@ impl<const D: usize> PointMatcher<D> for Interruptible {
 pub fn answer<const D: usize>(py: Python<'_>, found: &Matching<D>) -> Match {
     let row = |row: &Option<usize>| row.map_or(-1, |row| row as i64);
     let pairs: Vec<_> = found.pairs().map(|(i, j, _)| (i, j)).collect();
-    let report = &found.report;
+    let (report, map) = (&found.report, found.transformation.as_ref());
     let (matched, points) = (pairs.len(), found.assignment.len());
     let flags: Vec<String> = report.doubt.iter().map(ToString::to_string).collect();
     let caution = flags
@@ -290,6 +290,12 @@ pub fn answer<const D: usize>(py: Python<'_>, found: &Matching<D>) -> Match {
         sigma: report.sigma,
         residual: report.residual,
         iterations: report.iterations,
+        rotation: map.map(|map| map.rotation.as_slice().to_vec()),
+        rotation_error: map.map(|map| map.rotation_error.as_slice().to_vec()),
+        scale: map.map(|map| map.scale),
+        scale_error: map.map(|map| map.scale_error),
+        shift: map.map(|map| map.shift.as_slice().to_vec()),
+        shift_error: map.map(|map| map.shift_error.as_slice().to_vec()),
         flags,
     }
 }

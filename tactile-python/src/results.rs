@@ -230,6 +230,16 @@ result! {
         residual: f64,
         /// Iterations.
         iterations: usize,
+        /// Of a matcher with a `transformation`: the rotation vector in radians, in the plane its
+        /// last number, and the standard errors.
+        rotation: Option<Vec<f64>>,
+        rotation_error: Option<Vec<f64>>,
+        /// The growth of lengths, and its standard error.
+        scale: Option<f64>,
+        scale_error: Option<f64>,
+        /// Where the origin goes, and the standard errors.
+        shift: Option<Vec<f64>>,
+        shift_error: Option<Vec<f64>>,
         /// Why the pairs are not to be relied on, where the matcher can tell, a sentence each.
         flags: Vec<String>,
     }

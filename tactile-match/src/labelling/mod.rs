@@ -524,6 +524,7 @@ impl<const D: usize> Run<D> {
             unmatched_model,
             unmatched_target,
             displacement_covariance: covariance,
+            transformation: None,
             energy: self.energy,
             report,
         }

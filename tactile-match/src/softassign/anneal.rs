@@ -1,7 +1,7 @@
 //! One annealing run: soft assignment at a falling temperature, then the warp that it asks for.
 
+use super::difference;
 use super::{Annealer, Gaussian, Request, Schedule, Slack, State};
-use super::{difference, squared_distance};
 use std::f64::consts::TAU;
 use std::ops::ControlFlow;
 

@@ -1,7 +1,7 @@
 //! Soft assignment: affinities, Sinkhorn normalisation and the moments of the rows, over blocks of
 //! near targets.
 
-use super::{Gaussian, SoftAssignment};
+use super::{Gaussian, RowMoments, SoftAssignment};
 use tactile_core::vectorised;
 
 // Soft assignment: the match matrix M from distances, made doubly stochastic with slack (Sinkhorn).

@@ -841,6 +841,11 @@ impl<const D: usize> RigidFit<D> {
         self.transformation != Transformation::Smooth
     }
 
+    /// Whether lengths may change.
+    pub(super) fn grows(&self) -> bool {
+        self.transformation != Transformation::Rigid
+    }
+
     /// The displacements from `base` and their variances that the motion of least squares gives,
     /// into `regression`: `O(I)`.
     pub(super) fn fit(

@@ -1,11 +1,15 @@
 //! What a caller knows of a scene: the options of the matcher.
 
-use super::{Slack, SoftassignMatch, SoftassignWorkspace};
+use super::Slack;
+use crate::MatchError;
 use crate::error::{at_least_one, option_within};
-use crate::{MatchError, Matching};
+#[cfg(feature = "rayon")]
+use crate::{Matching, SoftassignWorkspace};
+#[cfg(feature = "rayon")]
 use nalgebra::Point;
 #[cfg(feature = "rayon")]
 use rayon::prelude::*;
+#[cfg(feature = "rayon")]
 use std::ops::ControlFlow;
 
 /// Weight of the slack on a side where no outliers are expected.

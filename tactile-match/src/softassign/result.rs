@@ -6,7 +6,8 @@ use super::{AnnealedSoftassign, Frame, SoftassignWorkspace, mean, squared_distan
 use crate::centre_and_radius;
 use crate::hard::{self, Interpolation};
 use crate::{
-    MatchError, MatchReport, MatchedPairs, Matching, SoftMatches, StopReason, error, unmatched_rows,
+    FittedTransformation, MatchError, MatchReport, MatchedPairs, Matching, SoftMatches, StopReason,
+    error, unmatched_rows,
 };
 use nalgebra::{Point, SMatrix};
 use std::ops::ControlFlow;
@@ -121,6 +122,13 @@ impl<'w, const D: usize> SoftassignMatch<'w, D> {
             row.sort_unstable_by_key(|entry| entry.0);
             soft.push_row(row.iter().copied());
         }
+        let rigid = &workspace.annealer.rigid;
+        let matched = (0..model.len()).filter(|&i| answer.assignment[i].is_some());
+        let sigma = self.report.sigma;
+        let transformation = rigid
+            .is_active()
+            .then(|| FittedTransformation::of(model, &warped, matched, sigma, rigid.grows()))
+            .flatten();
         let square = frame.scale * frame.scale;
         let covariance = |v: &f64| SMatrix::from_diagonal_element(v * square);
         let (unmatched_model, unmatched_target) =
@@ -134,6 +142,7 @@ impl<'w, const D: usize> SoftassignMatch<'w, D> {
             unmatched_model,
             unmatched_target,
             displacement_covariance: answer.variance.iter().map(covariance).collect(),
+            transformation,
             energy: workspace.best.trace.clone(),
             report: self.report.clone(),
         }
