@@ -298,6 +298,64 @@ impl<const D: usize> StrainBetween<D> {
         options.allow(found)
     }
 
+    /// Strain from pairs that are known, as of finite elements, image correlation or a tracker: row
+    /// i of `before` is row i of `after`. Nothing is matched.
+    ///
+    /// Rows with a coordinate that is not finite are skipped: [`rows`](Self::rows) has the others.
+    ///
+    /// ```
+    /// use nalgebra::Point2;
+    /// use tactile_imaging::{StrainBetween, StrainBetweenOptions};
+    /// let mut before: Vec<_> = (0..64)
+    ///     .map(|k| Point2::new(f64::from(k % 8), f64::from(k / 8)))
+    ///     .collect();
+    /// let after: Vec<_> = before
+    ///     .iter()
+    ///     .map(|p| Point2::new(1.5 * p.x + 20.0, p.y))
+    ///     .collect();
+    /// before[5].x = f64::NAN;
+    /// let options = StrainBetweenOptions::default();
+    /// let found = StrainBetween::of_known_pairs(&before, &after, &options)?;
+    /// assert_eq!((found.rows.len(), found.rows[5]), (63, (6, 6)));
+    /// assert!((found.summary.mean[(0, 0)] - 0.625).abs() < 1e-6);
+    /// # Ok::<(), tactile_imaging::StrainBetweenError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`StrainBetweenError`], among others for sets of different lengths.
+    pub fn of_known_pairs(
+        before: &[Point<f64, D>],
+        after: &[Point<f64, D>],
+        options: &StrainBetweenOptions<D>,
+    ) -> Result<Self, StrainBetweenError> {
+        if before.len() != after.len() {
+            let (expected, found) = (before.len(), after.len());
+            let input = "points after";
+            return Err(TpsError::Length {
+                input,
+                expected,
+                found,
+            }
+            .into());
+        }
+        let finite = |p: &Point<f64, D>| p.iter().all(|x| x.is_finite());
+        let known = |&i: &usize| finite(&before[i]) && finite(&after[i]);
+        let known: Vec<usize> = (0..before.len()).filter(known).collect();
+        let [from, to] = [before, after].map(|set| -> Vec<_> {
+            let places = known.iter().map(|&i| set[i]);
+            places.collect()
+        });
+        let pairs: Vec<_> = (0..known.len()).map(|k| (k, k)).collect();
+        let mut found = Self::of_pairs(&from, &to, &pairs, options.measure.as_ref())?;
+        for (i, j) in &mut found.rows {
+            (*i, *j) = (known[*i], known[*j]);
+        }
+        // No point can be taken for its neighbour.
+        let doubt = found.doubt;
+        found.doubt = doubt.filter(|d| !matches!(d, PairsDoubt::LargeResiduals { .. }));
+        options.allow(found)
+    }
+
     /// Strain from pairs, rows of both sets. A [`doubt`](Self::doubt) is no error here.
     ///
     /// # Errors

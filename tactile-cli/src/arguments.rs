@@ -7,7 +7,8 @@ use ndarray::Array2;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 use tactile_files::io::{
-    Grey, InputQuantity, PointTable, read_grey_image, read_grid, read_point_table,
+    FileError, Grey, InputQuantity, PointTable, read_grey_image, read_grid, read_point_rows,
+    read_point_table,
 };
 
 fn number(text: &str, fits: impl Fn(f64) -> bool, expected: &str) -> Result<f64, String> {
@@ -165,9 +166,21 @@ impl SensorFrames {
 
 /// Tables of points, and whether their coordinates have a unit: those of all files or of none.
 pub fn read_points(paths: &[impl AsRef<Path>]) -> Result<(Vec<PointTable>, bool), Failure> {
+    read_points_by(paths, |path| read_point_table(path))
+}
+
+/// As [`read_points`], where row i of a file is row i of the others and gaps are NaN.
+pub fn read_paired_points(paths: &[impl AsRef<Path>]) -> Result<(Vec<PointTable>, bool), Failure> {
+    read_points_by(paths, |path| read_point_rows(path))
+}
+
+fn read_points_by(
+    paths: &[impl AsRef<Path>],
+    read: impl Fn(&Path) -> Result<(PointTable, bool), FileError>,
+) -> Result<(Vec<PointTable>, bool), Failure> {
     let (mut tables, mut units) = (Vec::new(), Vec::new());
     for path in paths {
-        let (table, unit) = read_point_table(path)?;
+        let (table, unit) = read(path.as_ref())?;
         tables.push(table);
         units.push(unit);
         if unit != units[0] {

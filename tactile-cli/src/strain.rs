@@ -1,6 +1,6 @@
 //! `tactile strain`: from two sets of points, before and after a deformation.
-use crate::arguments::read_points;
-use crate::console::{Context, Exit, Failure, digits, four_digits};
+use crate::arguments::{read_paired_points, read_points};
+use crate::console::{Context, Exit, Failure, count, digits, four_digits};
 use crate::match_points::{self, Expectations};
 use crate::outputs::{Csv, Npz};
 use crate::plot::{Colour, Page, Panel};
@@ -8,7 +8,7 @@ use clap::{Args, ValueEnum};
 use nalgebra::{Matrix3, Point, SVector};
 use serde_json::{Map, Value, json};
 use std::path::PathBuf;
-use tactile_files::io::PointTable;
+use tactile_files::io::{PointTable, read_displaced_points};
 use tactile_imaging::elasticity::strain::{
     Biot, EulerAlmansi, GreenLagrange, Hencky, Infinitesimal, StrainMeasure,
 };
@@ -21,7 +21,7 @@ mod series;
 
 /// Match the points of two frames or more and measure the strain between them
 ///
-/// The files are CSV, a point a row: columns x, y and, in space, z, found by name where there is a
+/// The files are CSV, a point per row: columns x, y and, in space, z, found by name where there is a
 /// header. Points may come and go. A smoothing spline whose smoothing is chosen by cross-validation
 /// gives the strain. Misplaced points are found and left out. Pairs that are not to be relied on
 /// give no strain.
@@ -32,6 +32,10 @@ mod series;
 /// volume over the middle of z). With --grid there are also grid.csv, grid.vtk (for ParaView) and
 /// grid.npz (axes z, y, x): displacement, strain and standard error on a grid over the box of the
 /// points before. Far from the pairs the errors grow.
+///
+/// Known pairs, as of finite elements, image correlation or a tracker, are not matched: with --paired
+/// row i of one file is row i of the other, and one file alone has displacements u, v (and w) beside
+/// x, y (and z). Rows with nan or an empty cell are skipped.
 ///
 /// Three files and more are followed from frame to frame. The strain is then that of the last frame
 /// since the first, found where a direct match is not, and --out also gets tracks.csv (every point
@@ -44,14 +48,19 @@ Examples:
   tactile strain examples/data/before.csv examples/data/after.csv --measure hencky --rotation any \
                         --out target/strain
   tactile strain examples/data/before.csv examples/data/after.csv examples/data/before.csv \
-      --out target/series")]
+      --out target/series
+  tactile strain --paired examples/data/sources.csv examples/data/targets.csv")]
 pub struct StrainArguments {
-    /// Points of the frames in their order: before and after, or more.
-    #[arg(required = true, num_args = 2.., value_name = "FRAMES")]
+    /// Points of the frames in their order: before and after, or more. Or one table with
+    /// displacements.
+    #[arg(required = true, num_args = 1.., value_name = "FRAMES")]
     frames: Vec<PathBuf>,
     /// Measure of strain.
     #[arg(long, value_enum, default_value_t = Measure::GreenLagrange)]
     measure: Measure,
+    /// Row i of the second file is row i of the first: no matching.
+    #[arg(long)]
+    paired: bool,
     /// Spacing of a grid to write displacement and strain on, in the points' unit.
     #[arg(long, value_name = "SPACING")]
     grid: Option<f64>,
@@ -101,9 +110,21 @@ pub fn run(arguments: &StrainArguments, context: &mut Context) -> Result<Exit, F
     let of_series = &SERIES_FILES[..if paths.len() > 2 { 2 } else { 0 }];
     let files = [&FILES, of_grid, of_series].concat();
     context.outputs.plan(&files, paths)?;
-    let (tables, metric) = read_points(paths)?;
+    let (tables, metric) = if let [table] = &paths[..] {
+        let (tables, metric) = read_displaced_points(table)?;
+        (tables.into(), metric)
+    } else if arguments.paired {
+        read_paired_points(paths)?
+    } else {
+        read_points(paths)?
+    };
     let (mut plane, mut space) = (Vec::new(), Vec::new());
-    for (path, table) in paths.iter().zip(tables) {
+    if arguments.paired && paths.len() > 2 {
+        return Err(Failure::input(
+            "--paired takes two files, or one with displacements",
+        ));
+    }
+    for (path, table) in paths.iter().cycle().zip(tables) {
         match table {
             PointTable::Plane(points) => plane.push(points),
             PointTable::Space(points) => space.push(points),
@@ -144,10 +165,14 @@ fn answer<const D: usize>(
     context: &mut Context,
 ) -> Result<Exit, Failure> {
     let remedy = "take every tenth point, or cut the sets into parts";
-    for pair in frames.windows(2) {
+    let known = arguments.paired || arguments.frames.len() == 1;
+    for pair in frames.windows(2).filter(|_| !known) {
         match_points::allow(context, pair[0].len(), pair[1].len(), remedy)?;
     }
-    let measured = if frames.len() > 2 {
+    let measured = if known {
+        let after = frames.pop().unwrap_or_default();
+        of_known_pairs(frames.remove(0), after, unit, arguments, context)?
+    } else if frames.len() > 2 {
         series::follow(&frames, unit, arguments, context)
     } else {
         let after = frames.pop().unwrap_or_default();
@@ -246,6 +271,51 @@ fn between<const D: usize>(
     }))
 }
 
+/// The strain of pairs that are known, row by row. None after Ctrl-C.
+fn of_known_pairs<const D: usize>(
+    before: Vec<Point<f64, D>>,
+    after: Vec<Point<f64, D>>,
+    unit: &'static str,
+    arguments: &StrainArguments,
+    context: &mut Context,
+) -> Result<Option<StrainReport<D>>, Failure> {
+    if before.len() != after.len() {
+        let [first, second] = [0, 1].map(|k| arguments.frames[k].display());
+        let (rows, others) = (count(before.len(), "row"), after.len());
+        return Err(Failure::input(format!(
+            "{first} has {rows} and {second} {others}: with --paired row i of one file is row i of \
+             the other"
+        )));
+    }
+    let finite = |p: &Point<f64, D>| p.iter().all(|x| x.is_finite());
+    let rows = 0..before.len();
+    let known = rows.filter(|&i| finite(&before[i]) && finite(&after[i]));
+    let matched: Vec<_> = known.map(|i| (i, i)).collect();
+    let skipped = before.len() - matched.len();
+    if skipped > 0 {
+        context.warn(
+            "skipped_rows",
+            json!({ "rows": skipped }),
+            format_args!("{} without numbers are left out", count(skipped, "row")),
+        );
+    }
+    let job = format!("fitting {} pairs", matched.len());
+    let (from, to, options) = (before.clone(), after.clone(), arguments.options());
+    let found = context.wait(job, move || {
+        StrainBetween::of_known_pairs(&from, &to, &options).map_err(|error| error.to_string())
+    });
+    Ok(Some(StrainReport {
+        before,
+        after,
+        matched,
+        strain: found.unwrap_or_else(|| Err("stopped by Ctrl-C".to_owned())),
+        frames: None,
+        complete: true,
+        measure: arguments.measure.strain().name(),
+        unit,
+    }))
+}
+
 /// Points on equal distances over a box, x fastest.
 struct Grid<const D: usize> {
     origin: Point<f64, D>,
@@ -255,7 +325,8 @@ struct Grid<const D: usize> {
 
 impl<const D: usize> Grid<D> {
     fn over(points: &[Point<f64, D>], spacing: f64) -> Result<Self, Failure> {
-        let start = points.first().copied().unwrap_or_else(Point::origin);
+        let mut points = points.iter().filter(|p| p.iter().all(|x| x.is_finite()));
+        let start = points.next().copied().unwrap_or_else(Point::origin);
         let (mut low, mut high) = (start, start);
         for p in points {
             (low, high) = (low.inf(p), high.sup(p));

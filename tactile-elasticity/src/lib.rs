@@ -33,6 +33,7 @@
 pub mod contact;
 mod error;
 pub mod field;
+pub mod kinematics;
 pub mod modulus;
 mod numerics;
 pub mod relaxation;

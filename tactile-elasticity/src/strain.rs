@@ -605,7 +605,7 @@ fn jacobi_rotation(app: f64, aqq: f64, apq: f64) -> (f64, f64, f64) {
 }
 
 /// Eigenvalues (largest first) and eigenvectors of a symmetric matrix by cyclic Jacobi rotations.
-fn symmetric_eigen(m: &Matrix3<f64>) -> ([f64; 3], Matrix3<f64>) {
+pub(crate) fn symmetric_eigen(m: &Matrix3<f64>) -> ([f64; 3], Matrix3<f64>) {
     let mut a = *m;
     let mut v = Matrix3::identity();
     for _ in 0..32 {

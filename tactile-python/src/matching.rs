@@ -386,6 +386,9 @@ fn matched<const D: usize>(
 /// measure : str or object
 ///     "green-lagrange", "euler-almansi", "hencky", "biot", "infinitesimal", or an object with a
 ///     method `strain(deformation_gradient)` that returns a 3 × 3 tensor.
+/// paired : bool
+///     Whether row i of `after` is row i of `before`, as of finite elements, image correlation or a
+///     tracker. Nothing is matched, and rows with NaN are skipped.
 /// with_doubtful_pairs : bool
 ///     Whether pairs that are not to be relied on give a strain with a flag instead of an error.
 ///
@@ -402,17 +405,24 @@ fn matched<const D: usize>(
 ///     Doubtful pairs, or no smooth deformation.
 #[pyfunction]
 #[pyo3(signature = (
-    before, after, matcher=None, *, measure=None, with_doubtful_pairs=false, **options
+    before, after, matcher=None, *, measure=None, paired=false, with_doubtful_pairs=false, **options
 ))]
+#[expect(clippy::too_many_arguments, reason = "keywords of Python")]
 pub fn strain_between(
     py: Python<'_>,
     before: &Bound<'_, PyAny>,
     after: &Bound<'_, PyAny>,
     matcher: Option<&Bound<'_, PyAny>>,
     measure: Option<&Bound<'_, PyAny>>,
+    paired: bool,
     with_doubtful_pairs: bool,
     options: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<StrainBetween> {
+    if paired && (matcher.is_some() || options.is_some_and(|options| !options.is_empty())) {
+        return Err(invalid(
+            "paired points take no matcher and no options of one",
+        ));
+    }
     let sets = [
         arrays::matrix("before", before)?,
         arrays::matrix("after", after)?,
@@ -420,8 +430,8 @@ pub fn strain_between(
     let sets = sets.each_ref().map(|set| set.as_array());
     let matcher = Matcher::new(matcher, options, AnnealedSoftassign::default())?;
     match arrays::dimension(["before", "after"], sets)? {
-        2 => strained::<2>(py, sets, matcher, measure, with_doubtful_pairs),
-        _ => strained::<3>(py, sets, matcher, measure, with_doubtful_pairs),
+        2 => strained::<2>(py, sets, matcher, measure, [paired, with_doubtful_pairs]),
+        _ => strained::<3>(py, sets, matcher, measure, [paired, with_doubtful_pairs]),
     }
 }
 
@@ -430,7 +440,7 @@ fn strained<const D: usize>(
     sets: [ArrayView2<'_, f64>; 2],
     matcher: Matcher,
     measure: Option<&Bound<'_, PyAny>>,
-    with_doubtful_pairs: bool,
+    [paired, with_doubtful_pairs]: [bool; 2],
 ) -> PyResult<StrainBetween> {
     let matcher = matcher.interruptible::<D>();
     let mut options = StrainBetweenOptions::<D>::default().with_matcher(matcher);
@@ -442,7 +452,11 @@ fn strained<const D: usize>(
     }
     let found = py.detach(|| {
         let [before, after] = sets.map(arrays::points);
-        strain_of_sets(&before, &after, &options)
+        if paired {
+            tactile_imaging::StrainBetween::of_known_pairs(&before, &after, &options)
+        } else {
+            strain_of_sets(&before, &after, &options)
+        }
     });
     let found = found.map_err(errors::strain_between)?;
     let (mean, error) = (found.summary.mean, found.standard_error);

@@ -159,6 +159,56 @@ fn tables_of_a_strain_name_units_and_whole_rows() {
     }
 }
 
+/// A deformation that no matcher takes, in two files and as displacements, with a gap.
+#[test]
+fn known_pairs_are_not_matched() {
+    let folder = tempfile::tempdir().unwrap();
+    let [mut before, mut after, mut both] = ["x,y\n", "x,y\n", "x,y,u,v\n"].map(str::to_owned);
+    for k in 0..36 {
+        let (x, y) = (f64::from(k % 6), f64::from(k / 6));
+        // Stretched by half and shifted beyond all neighbours.
+        let u = 0.5 * x + 100.0;
+        let image = if k == 7 {
+            "nan".into()
+        } else {
+            (x + u).to_string()
+        };
+        before += &format!("{x},{y}\n");
+        after += &format!("{image},{y}\n");
+        let u = if k == 7 { String::new() } else { u.to_string() };
+        both += &format!("{x},{y},{u},0\n");
+    }
+    for (name, text) in [
+        ("before.csv", before),
+        ("after.csv", after),
+        ("both.csv", both),
+    ] {
+        fs::write(folder.path().join(name), text).unwrap();
+    }
+    for call in ["strain --paired before.csv after.csv", "strain both.csv"] {
+        let call = format!("{call} --grid 1 --out results --json");
+        let value = value(&run(folder.path(), &words(&call)));
+        let mean = value["strain"]["components"]["e_xx"]["value"]
+            .as_f64()
+            .unwrap();
+        // ½ (1.5² − 1), and coordinates that are exact.
+        assert!((mean - 0.625).abs() < 1e-6, "{value}");
+        assert_eq!(value["match"]["pairs"], 35);
+        assert_eq!(value["cautions"][0]["kind"], "skipped_rows", "{value}");
+        let table = fs::read_to_string(folder.path().join("results/pairs.csv")).unwrap();
+        assert!(table.lines().nth(8).unwrap().starts_with("8,8,"), "{table}");
+        fs::remove_dir_all(folder.path().join("results")).unwrap();
+    }
+    let few = "x,y\n0,0\n";
+    fs::write(folder.path().join("few.csv"), few).unwrap();
+    let output = run(folder.path(), &words("strain --paired before.csv few.csv"));
+    assert!(
+        text(&output.stderr).contains("36 rows"),
+        "{}",
+        text(&output.stderr)
+    );
+}
+
 /// Three files and more are followed: tracks, the strain of every step and since the first frame.
 #[test]
 fn frames_of_a_series_give_tracks_and_strains() {

@@ -3,6 +3,7 @@
 
 mod common;
 mod hertz_reference;
+mod kinematics;
 mod modulus;
 mod recorded;
 mod relaxation;

@@ -38,7 +38,8 @@ pub use image::{
 };
 pub use range::InputQuantity;
 pub use table::{
-    PointTable, Table, read_columns, read_grid, read_point_table, read_points, read_table,
+    PointTable, Table, read_columns, read_displaced_points, read_grid, read_point_rows,
+    read_point_table, read_points, read_table,
 };
 
 pub(crate) use files::{

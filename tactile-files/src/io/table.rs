@@ -163,12 +163,8 @@ pub fn read_table(path: impl AsRef<Path>) -> Result<Table, FileError> {
 /// # Errors
 /// [`FileError`], see the [module](super).
 pub fn read_grid(path: impl AsRef<Path>) -> Result<Array2<f64>, FileError> {
-    let number_or_nan = |field: &str| match field {
-        "" => Some(f64::NAN),
-        field => field.parse().ok().filter(|v: &f64| !v.is_infinite()),
-    };
-    let expected = "a number, `nan` or an empty cell";
-    let table = parse_table(path.as_ref(), expected, number_or_nan)?;
+    let expected = NUMBER_OR_GAP;
+    let table = parse_table(path.as_ref(), expected, number_or_gap)?;
     // A matrix has no names. A line of words is the header of another kind of table.
     match table.header.first() {
         None => Ok(table.values),
@@ -176,6 +172,16 @@ pub fn read_grid(path: impl AsRef<Path>) -> Result<Array2<f64>, FileError> {
             let place = FilePlace::Cell { line: 1, column: 1 };
             Err(table.error(place, expected.into(), format!("`{word}`")))
         }
+    }
+}
+
+/// A field of a table that may have gaps.
+const NUMBER_OR_GAP: &str = "a number, `nan` or an empty cell";
+
+fn number_or_gap(field: &str) -> Option<f64> {
+    match field {
+        "" => Some(f64::NAN),
+        field => field.parse().ok().filter(|v: &f64| !v.is_infinite()),
     }
 }
 
@@ -194,7 +200,98 @@ pub enum PointTable {
 /// # Errors
 /// [`FileError`], see the [module](super).
 pub fn read_point_table(path: impl AsRef<Path>) -> Result<(PointTable, bool), FileError> {
-    let table = read_table(path)?;
+    point_table(&read_table(path)?)
+}
+
+/// As [`read_point_table`], with empty cells and `nan` as NaN: a row then is a row of other files.
+///
+/// # Errors
+/// [`FileError`], see the [module](super).
+pub fn read_point_rows(path: impl AsRef<Path>) -> Result<(PointTable, bool), FileError> {
+    point_table(&parse_table(path.as_ref(), NUMBER_OR_GAP, number_or_gap)?)
+}
+
+/// Reads points and where they go: columns `x`, `y` and, in space, `z` with the displacements `u`,
+/// `v` and `w` (also `u_x`, `u_y`, `u_z`), in one unit. Empty cells and `nan` are NaN. Gives points
+/// before and after, and whether the file names the unit.
+///
+/// ```
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// use tactile_files::io::{PointTable, read_displaced_points};
+/// let folder = tempfile::tempdir()?;
+/// let path = folder.path().join("piv.csv");
+/// std::fs::write(&path, "x,y,u,v\n1,2,0.5,0\n3,4,nan,\n")?;
+/// let ([PointTable::Plane(before), PointTable::Plane(after)], false) =
+///     read_displaced_points(&path)?
+/// else {
+///     panic!("points of the plane, without a unit");
+/// };
+/// assert_eq!((before[0], after[0]), ([1.0, 2.0].into(), [1.5, 2.0].into()));
+/// assert!(after[1].x.is_nan());
+/// # Ok(()) }
+/// ```
+///
+/// # Errors
+/// [`FileError`], among others where a displacement has no column or another unit.
+pub fn read_displaced_points(path: impl AsRef<Path>) -> Result<([PointTable; 2], bool), FileError> {
+    let table = parse_table(path.as_ref(), NUMBER_OR_GAP, number_or_gap)?;
+    let headings = table.headings();
+    let unit = |name: &str| {
+        let named = headings.iter().find(|h| h.name == name);
+        named.map(|h| h.unit.as_deref())
+    };
+    let names: [&[&str]; 3] = [
+        &["u", "u_x", "ux"],
+        &["v", "u_y", "uy"],
+        &["w", "u_z", "uz"],
+    ];
+    let (before, has_unit) = point_table(&table)?;
+    let axes = if matches!(before, PointTable::Plane(_)) {
+        2
+    } else {
+        3
+    };
+    for names in &names[..axes] {
+        let Some(found) = names.iter().find_map(|name| unit(name)) else {
+            let expected = format!("a column named `{}` beside the coordinates", names[0]);
+            let found = format!("`{}`", table.header.join("`, `"));
+            return Err(table.error(FilePlace::Line(1), expected, found));
+        };
+        if found.is_some() != unit("x").flatten().is_some() {
+            let expected = format!("the unit of `{}` beside that of `x`, or none", names[0]);
+            let found = found.unwrap_or("none").to_owned();
+            return Err(table.error(FilePlace::Line(1), expected, found));
+        }
+    }
+    let base = if unit("x").flatten() == Some("px") {
+        "px"
+    } else {
+        "m"
+    };
+    let after = match &before {
+        PointTable::Plane(points) => {
+            let columns = table.columns([(names[0], base), (names[1], base)])?;
+            PointTable::Plane(displaced(points, &columns))
+        }
+        PointTable::Space(points) => {
+            let columns = table.columns(names.map(|names| (names, base)))?;
+            PointTable::Space(displaced(points, &columns))
+        }
+    };
+    Ok(([before, after], has_unit))
+}
+
+/// Points, each moved by its row of displacements.
+fn displaced<const D: usize>(
+    points: &[Point<f64, D>],
+    columns: &[Vec<f64>; D],
+) -> Vec<Point<f64, D>> {
+    let rows = points.iter().enumerate();
+    rows.map(|(row, p)| Point::from(std::array::from_fn(|k| p[k] + columns[k][row])))
+        .collect()
+}
+
+fn point_table(table: &Table) -> Result<(PointTable, bool), FileError> {
     let headings = table.headings();
     let mut has_z = headings.iter().any(|h| h.name == "z");
     if headings.is_empty() {
@@ -212,9 +309,9 @@ pub fn read_point_table(path: impl AsRef<Path>) -> Result<(PointTable, bool), Fi
         .find(|h| h.name == "x")
         .and_then(|h| h.unit);
     let points = if has_z {
-        PointTable::Space(to_points(&table)?)
+        PointTable::Space(to_points(table)?)
     } else {
-        PointTable::Plane(to_points(&table)?)
+        PointTable::Plane(to_points(table)?)
     };
     Ok((points, unit.is_some_and(|unit| unit != "px")))
 }

@@ -515,6 +515,7 @@ def strain_between(
     matcher: str | _Matcher | None = None,
     *,
     measure: str | _StrainMeasure | None = None,
+    paired: bool = False,
     with_doubtful_pairs: bool = False,
     **options: Any,
 ) -> StrainBetween: ...
