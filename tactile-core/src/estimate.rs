@@ -1,6 +1,7 @@
 //! A number with its standard error, and the interval that follows from both.
 
 use crate::statistics::quantile_95;
+use crate::{InvalidOption, Requirement};
 use std::fmt::{self, Display};
 use std::ops::Mul;
 
@@ -16,7 +17,11 @@ use std::ops::Mul;
 /// assert_eq!((force_n * 1e3).standard_error, 3.0);
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Deserialize))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Deserialize),
+    serde(try_from = "StoredEstimate")
+)]
 #[non_exhaustive]
 pub struct Estimate {
     /// The value.
@@ -25,8 +30,31 @@ pub struct Estimate {
     pub standard_error: f64,
     /// Degrees of freedom of a standard error that was itself estimated: pairs less parameters of a
     /// calibration, parts of a jackknife less one. `None` where the error is known.
-    #[cfg_attr(feature = "serde", serde(default))]
     pub degrees_of_freedom: Option<f64>,
+}
+
+/// An estimate as a file holds it, before it is validated.
+#[cfg(feature = "serde")]
+#[derive(serde::Deserialize)]
+struct StoredEstimate {
+    value: f64,
+    standard_error: f64,
+    #[serde(default)]
+    degrees_of_freedom: Option<f64>,
+}
+
+#[cfg(feature = "serde")]
+impl TryFrom<StoredEstimate> for Estimate {
+    type Error = InvalidOption;
+
+    fn try_from(stored: StoredEstimate) -> Result<Self, InvalidOption> {
+        let estimate = Self {
+            value: stored.value,
+            standard_error: stored.standard_error,
+            degrees_of_freedom: stored.degrees_of_freedom,
+        };
+        estimate.validated()
+    }
 }
 
 impl Estimate {
@@ -88,18 +116,48 @@ impl Estimate {
         self.standard_error / self.value.abs()
     }
 
+    /// Itself, if its error is one.
+    ///
+    /// # Errors
+    /// [`InvalidOption`] for a value or an error that is not finite, an error below zero, and
+    /// degrees of freedom that are not above zero.
+    ///
+    /// ```
+    /// use tactile_core::Estimate;
+    /// assert!(Estimate::new(1.2, 0.003).validated().is_ok());
+    /// assert!(Estimate::new(1.2, -0.003).validated().is_err());
+    /// assert!(Estimate::new(1.2, 0.003).with_degrees_of_freedom(0.0).validated().is_err());
+    /// ```
+    pub fn validated(self) -> Result<Self, InvalidOption> {
+        Requirement::Finite.check("value", self.value)?;
+        Requirement::NonNegative.check("standard_error", self.standard_error)?;
+        let degrees = self.degrees_of_freedom.filter(|n| *n != f64::INFINITY);
+        if let Some(degrees) = degrees {
+            Requirement::Positive.check("degrees_of_freedom", degrees)?;
+        }
+        Ok(self)
+    }
+
     /// The symmetric 95 % interval, value ± t·standard error, with t of Student's distribution
-    /// where the degrees of freedom are known and of the normal distribution otherwise.
+    /// where the degrees of freedom are known and of the normal distribution otherwise. Without
+    /// bounds where the error is none: below zero, NaN, or of no degree of freedom.
     ///
     /// ```
     /// use tactile_core::Estimate;
     /// let interval = Estimate::new(10.0, 1.0).interval_95();
     /// assert!(interval.contains(11.9) && !interval.contains(12.0));
+    /// // Two pairs leave a line no degree of freedom, and its error is not known.
+    /// let line = Estimate::new(10.0, 1.0).with_degrees_of_freedom(0.0);
+    /// assert_eq!(line.interval_95().upper, None);
     /// ```
     #[must_use]
     pub fn interval_95(self) -> Interval {
         let half = quantile_95(self.degrees_of_freedom) * self.standard_error;
-        Interval::new(self.value - half, Some(self.value + half))
+        if half >= 0.0 && half < f64::INFINITY {
+            Interval::new(self.value - half, Some(self.value + half))
+        } else {
+            Interval::new(f64::NEG_INFINITY, None)
+        }
     }
 }
 

@@ -9,13 +9,14 @@ use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
 /// use tactile_core::statistics::quantile_95;
 /// assert!((quantile_95(Some(4.0)) - 2.776).abs() < 1e-3);
 /// assert!((quantile_95(None) - 1.960).abs() < 1e-3);
+/// // No repetition at all.
+/// assert_eq!(quantile_95(Some(0.0)), f64::INFINITY);
 /// ```
 #[must_use]
 pub fn quantile_95(degrees: Option<f64>) -> f64 {
     const UPPER_TAIL: f64 = 0.975;
     let z = Normal::standard().inverse_cdf(UPPER_TAIL);
-    // A count that is NaN, zero or negative has no distribution. The normal quantile stands in for
-    // it.
+    // A count that is NaN, zero or negative has no distribution: nothing bounds the value.
     match degrees.and_then(|n| Some((n, StudentsT::new(0.0, 1.0, n).ok()?))) {
         // The iteration behind the inverse loses digits with the degrees of freedom, and does not
         // end for millions of them, as where a calibration is free of scatter. The expansion about
@@ -28,6 +29,7 @@ pub fn quantile_95(degrees: Option<f64>) -> f64 {
             z + (first + (second + third / n) / n) / n
         }
         Some((_, t)) => t.inverse_cdf(UPPER_TAIL),
+        None if degrees.is_some() => f64::INFINITY,
         None => z,
     }
 }
