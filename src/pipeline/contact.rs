@@ -6,6 +6,7 @@ use crate::force::{
 };
 use ndarray::{Array2, ArrayView2};
 use std::f64::consts::PI;
+use std::ops::Deref;
 use std::sync::Arc;
 use tactile_core::statistics::effective_degrees_of_freedom;
 
@@ -112,6 +113,47 @@ pub trait ContactStage: Send + Sync {
     /// ```
     fn for_flat_faces(&self) -> Option<Arc<dyn ContactStage>> {
         None
+    }
+}
+
+/// Boxed, shared and borrowed stages.
+impl<P: Deref<Target: ContactStage> + Send + Sync> ContactStage for P {
+    fn measure(
+        &self,
+        frame: ArrayView2<'_, u8>,
+        reference: &ReferenceFrame,
+    ) -> Result<FrameContact, ForceError> {
+        (**self).measure(frame, reference)
+    }
+
+    fn pixel_size_m(&self) -> [f64; 2] {
+        (**self).pixel_size_m()
+    }
+
+    fn measure_into(
+        &self,
+        workspace: &mut ForceWorkspace,
+        frame: ArrayView2<'_, u8>,
+        reference: &ReferenceFrame,
+        contact: &mut FrameContact,
+    ) -> Result<(), ForceError> {
+        (**self).measure_into(workspace, frame, reference, contact)
+    }
+
+    fn polarity(&self) -> Polarity {
+        (**self).polarity()
+    }
+
+    fn lens(&self) -> Option<&LensGeometry> {
+        (**self).lens()
+    }
+
+    fn pressure_curve(&self) -> Option<&dyn LocalCalibration> {
+        (**self).pressure_curve()
+    }
+
+    fn for_flat_faces(&self) -> Option<Arc<dyn ContactStage>> {
+        (**self).for_flat_faces()
     }
 }
 

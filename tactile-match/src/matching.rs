@@ -3,6 +3,7 @@
 use crate::error::{option_within, point_sets};
 use crate::{FittedTransformation, MatchError, hard};
 use nalgebra::{Point, SMatrix};
+use std::ops::Deref;
 use tactile_core::StopReason;
 use tactile_tps::{SeriesMemory, Warp};
 
@@ -38,7 +39,7 @@ use tactile_tps::{SeriesMemory, Warp};
 /// }
 /// # Ok::<(), tactile_match::MatchError>(())
 /// ```
-pub trait PointMatcher<const D: usize> {
+pub trait PointMatcher<const D: usize>: Send + Sync {
     /// Matches `model` (I points) to `target` (J points). I and J may differ and either may be 1.
     ///
     /// # Errors
@@ -145,8 +146,8 @@ pub struct MatchedPairs {
     pub report: MatchReport,
 }
 
-/// A matcher chosen at run time is a matcher.
-impl<const D: usize, M: PointMatcher<D> + ?Sized> PointMatcher<D> for Box<M> {
+/// Boxed, shared and borrowed matchers.
+impl<const D: usize, P: Deref<Target: PointMatcher<D>> + Send + Sync> PointMatcher<D> for P {
     fn match_points(
         &self,
         model: &[Point<f64, D>],

@@ -1,6 +1,7 @@
 //! Maps of space onto itself, and models that find one from pairs of points.
 
 use core::any::Any;
+use core::ops::Deref;
 
 use nalgebra::{Point, SMatrix};
 
@@ -15,7 +16,7 @@ use crate::{FitOptions, Kernel, Spline, ThinPlateSpline, TpsError, error::same_l
 ///     Vector2::new(1.0, 0.0)));
 /// assert_eq!(warp.apply(&Point2::new(1.0, 3.0)), Point2::new(3.0, 6.0));
 /// ```
-pub trait Warp<const D: usize> {
+pub trait Warp<const D: usize>: Send + Sync {
     /// The image of a point.
     fn apply(&self, point: &Point<f64, D>) -> Point<f64, D>;
 
@@ -93,6 +94,33 @@ pub trait Warp<const D: usize> {
     }
 }
 
+/// Boxed, shared and borrowed warps.
+impl<const D: usize, P: Deref<Target: Warp<D>> + Send + Sync> Warp<D> for P {
+    fn apply(&self, point: &Point<f64, D>) -> Point<f64, D> {
+        (**self).apply(point)
+    }
+
+    fn jacobian(&self, point: &Point<f64, D>) -> SMatrix<f64, D, D> {
+        (**self).jacobian(point)
+    }
+
+    fn apply_into(
+        &self,
+        points: &[Point<f64, D>],
+        images: &mut [Point<f64, D>],
+    ) -> Result<(), TpsError> {
+        (**self).apply_into(points, images)
+    }
+
+    fn jacobian_into(
+        &self,
+        points: &[Point<f64, D>],
+        jacobians: &mut [SMatrix<f64, D, D>],
+    ) -> Result<(), TpsError> {
+        (**self).jacobian_into(points, jacobians)
+    }
+}
+
 /// A family of warps with a rule to choose one from weighted pairs of points.
 ///
 /// Object safe: a pipeline holds an `Arc<dyn WarpModel<3> + Send + Sync>`.
@@ -117,7 +145,7 @@ pub trait Warp<const D: usize> {
 /// # Ok(())
 /// # }
 /// ```
-pub trait WarpModel<const D: usize> {
+pub trait WarpModel<const D: usize>: Send + Sync {
     /// The warp that takes each source to its target as nearly as the model allows. Without weights
     /// all count alike.
     ///
@@ -165,6 +193,28 @@ pub trait WarpModel<const D: usize> {
         let _ = memory;
         self.fit(pairs.sources, pairs.targets, pairs.weights)?
             .jacobian_into(points, jacobians)
+    }
+}
+
+/// Boxed, shared and borrowed models.
+impl<const D: usize, P: Deref<Target: WarpModel<D>> + Send + Sync> WarpModel<D> for P {
+    fn fit(
+        &self,
+        sources: &[Point<f64, D>],
+        targets: &[Point<f64, D>],
+        weights: Option<&[f64]>,
+    ) -> Result<Box<dyn Warp<D> + Send + Sync>, TpsError> {
+        (**self).fit(sources, targets, weights)
+    }
+
+    fn jacobians_through(
+        &self,
+        memory: &mut SeriesMemory,
+        pairs: Pairs<'_, D>,
+        points: &[Point<f64, D>],
+        jacobians: &mut [SMatrix<f64, D, D>],
+    ) -> Result<(), TpsError> {
+        (**self).jacobians_through(memory, pairs, points, jacobians)
     }
 }
 

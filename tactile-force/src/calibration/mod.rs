@@ -20,6 +20,7 @@ pub use curve::{
 pub use line::{CalibrationReport, Hysteresis, LinearCalibration};
 
 use ndarray::Array2;
+use std::ops::Deref;
 use tactile_core::Estimate;
 use tactile_core::statistics::effective_degrees_of_freedom;
 
@@ -207,6 +208,49 @@ pub trait StressCalibration: Send + Sync {
     }
 }
 
+/// Boxed, shared and borrowed calibrations.
+impl<P: Deref<Target: StressCalibration> + Send + Sync> StressCalibration for P {
+    fn force_n(&self, integrated_pixel_value: f64) -> f64 {
+        (**self).force_n(integrated_pixel_value)
+    }
+
+    fn sensitivity_n(&self, integrated_pixel_value: f64) -> f64 {
+        (**self).sensitivity_n(integrated_pixel_value)
+    }
+
+    fn standard_error_n(&self, integrated_pixel_value: f64) -> f64 {
+        (**self).standard_error_n(integrated_pixel_value)
+    }
+
+    fn degrees_of_freedom(&self) -> Option<f64> {
+        (**self).degrees_of_freedom()
+    }
+
+    fn error_covariance_n2(&self, a: f64, b: f64) -> f64 {
+        (**self).error_covariance_n2(a, b)
+    }
+
+    fn force_covariance_n2(&self, integrated_pixel_values: &[Estimate]) -> Array2<f64> {
+        (**self).force_covariance_n2(integrated_pixel_values)
+    }
+
+    fn range(&self) -> [f64; 2] {
+        (**self).range()
+    }
+
+    fn local(&self) -> Option<&dyn LocalCalibration> {
+        (**self).local()
+    }
+
+    fn read(&self, integrated_pixel_value: Estimate) -> Result<ForceReading, ForceError> {
+        (**self).read(integrated_pixel_value)
+    }
+
+    fn stress_per_grey_level_pa(&self, integrated_pixel_value: f64, pixel_area_m2: f64) -> f64 {
+        (**self).stress_per_grey_level_pa(integrated_pixel_value, pixel_area_m2)
+    }
+}
+
 /// Grey level to pressure pixel by pixel: f of (5) itself, not only its integral over a contact.
 ///
 /// A [`StressCalibration`] returns one from [`local`](StressCalibration::local). A
@@ -261,6 +305,25 @@ pub trait LocalCalibration: Send + Sync {
         let force_n = histogram.integral(|grey| self.value_pa(grey));
         let degrees = self.pressure_pa(histogram.greatest()).degrees_of_freedom;
         Ok(ForceReading::new(force_n, noise_n, error, degrees))
+    }
+}
+
+/// Boxed, shared and borrowed calibrations.
+impl<P: Deref<Target: LocalCalibration> + Send + Sync> LocalCalibration for P {
+    fn pressure_pa(&self, grey: f64) -> Estimate {
+        (**self).pressure_pa(grey)
+    }
+
+    fn value_pa(&self, grey: f64) -> f64 {
+        (**self).value_pa(grey)
+    }
+
+    fn read(
+        &self,
+        histogram: &GreyHistogram,
+        noise: &DifferenceNoise,
+    ) -> Result<ForceReading, ForceError> {
+        (**self).read(histogram, noise)
     }
 }
 

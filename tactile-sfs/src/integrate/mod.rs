@@ -7,7 +7,7 @@ mod fourier;
 mod masked;
 mod poisson;
 
-use std::sync::Arc;
+use std::ops::Deref;
 
 use ndarray::ArrayView2;
 
@@ -37,7 +37,7 @@ use crate::{BoundingBox, Domain, PixelScalar, SfsError, Surface, SurfaceWorkspac
 /// assert!((z[[1, 0]] - z[[0, 0]] + 0.2).abs() < 1e-12);
 /// # Ok::<(), tactile_sfs::SfsError>(())
 /// ```
-pub trait SlopeIntegrator<T: PixelScalar> {
+pub trait SlopeIntegrator<T: PixelScalar>: Send + Sync {
     /// Integrates slopes p along x and q along y.
     ///
     /// # Errors
@@ -88,8 +88,8 @@ pub trait SlopeIntegrator<T: PixelScalar> {
     }
 }
 
-/// A shared integrator is one, as trait objects need it.
-impl<T: PixelScalar, M: SlopeIntegrator<T> + ?Sized> SlopeIntegrator<T> for Arc<M> {
+/// Boxed, shared and borrowed integrators.
+impl<T: PixelScalar, P: Deref<Target: SlopeIntegrator<T>> + Send + Sync> SlopeIntegrator<T> for P {
     fn integrate(
         &self,
         p: ArrayView2<'_, T>,

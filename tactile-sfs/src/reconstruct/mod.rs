@@ -4,7 +4,7 @@ mod depth_table;
 mod eikonal;
 mod tsai_shah;
 
-use std::sync::Arc;
+use std::ops::Deref;
 
 pub use depth_table::{DepthTable, Signal};
 pub use eikonal::{BoundaryCondition, Eikonal, EikonalBranch};
@@ -37,7 +37,7 @@ use crate::{
 /// assert!((surface.heights[[20, 20]] - radius).abs() < 1.5);
 /// # Ok::<(), tactile_sfs::SfsError>(())
 /// ```
-pub trait SurfaceReconstruction<T: PixelScalar> {
+pub trait SurfaceReconstruction<T: PixelScalar>: Send + Sync {
     /// Reconstructs from an image: real intensities, or the grey levels of an 8-bit camera.
     ///
     /// # Errors
@@ -81,8 +81,10 @@ pub trait SurfaceReconstruction<T: PixelScalar> {
     }
 }
 
-/// A shared method is one, as trait objects need it.
-impl<T: PixelScalar, M: SurfaceReconstruction<T> + ?Sized> SurfaceReconstruction<T> for Arc<M> {
+/// Boxed, shared and borrowed methods.
+impl<T: PixelScalar, P: Deref<Target: SurfaceReconstruction<T>> + Send + Sync>
+    SurfaceReconstruction<T> for P
+{
     fn reconstruct(
         &self,
         frame: Frame<'_, T>,

@@ -7,7 +7,7 @@
 
 mod contact;
 
-use std::sync::Arc;
+use std::ops::Deref;
 
 use nalgebra::Point3;
 use ndarray::ArrayView2;
@@ -33,7 +33,7 @@ use crate::{BoundingBox, Domain, PixelScalar, SfsError, SurfaceWorkspace};
 /// assert_eq!(points.len(), 48);
 /// # Ok::<(), tactile_sfs::SfsError>(())
 /// ```
-pub trait ControlPointSampler<T: PixelScalar> {
+pub trait ControlPointSampler<T: PixelScalar>: Send + Sync {
     /// Chooses `count` points on `heights` inside the mask of `domain`. Its known heights play no
     /// part.
     ///
@@ -97,8 +97,10 @@ pub trait ControlPointSampler<T: PixelScalar> {
     }
 }
 
-/// A shared sampler is one, as trait objects need it.
-impl<T: PixelScalar, S: ControlPointSampler<T> + ?Sized> ControlPointSampler<T> for Arc<S> {
+/// Boxed, shared and borrowed samplers.
+impl<T: PixelScalar, P: Deref<Target: ControlPointSampler<T>> + Send + Sync> ControlPointSampler<T>
+    for P
+{
     fn sample(
         &self,
         heights: ArrayView2<'_, T>,
