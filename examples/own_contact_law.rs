@@ -1,40 +1,42 @@
 //! A contact law of one's own inside an estimator inside the pipeline: the pipeline measures force
-//! and contact, the law turns them into a modulus with an error.
+//! and contact and states the guide, the law turns them into a modulus with an error.
 #![allow(clippy::print_stdout)]
 use std::error::Error;
-use tactile_imaging::elasticity::modulus::{ContactEstimator, ContactLaw, EstimatorKind, LogForce};
+use tactile_imaging::elasticity::laws::{ContactLaw, ContactLength, Limits, LogForce, Reach};
+use tactile_imaging::elasticity::modulus::ContactEstimator;
 use tactile_simulate::{CalibrationRun, PressOptions, Trial};
 
-/// Hertz with F = 4/3 E* a³/R and a factor 1 + 0.3 (a/R)² for contacts that are not small beside
-/// the ball, as if the ball grew stiffer while it is squeezed.
-struct Stiffening {
+/// A small contact of a ball, from its radius: F = 4/3 E* a³/R.
+struct Ball {
     radius_m: f64,
 }
 
-impl ContactLaw for Stiffening {
-    fn log_force_at_radius(&self, a: f64, _compliance_fraction: f64) -> Option<LogForce> {
-        let square = 0.3 * (a / self.radius_m).powi(2);
-        let force_over_modulus = 4.0 / 3.0 * a.powi(3) / self.radius_m * (1.0 + square);
-        let stiffening_slope = 2.0 * square / (1.0 + square);
-        Some(LogForce {
-            value: force_over_modulus.ln(),
-            // By ln a and by ln R: from these the errors of both lengths reach the modulus.
-            slope: 3.0 + stiffening_slope,
-            size_slope: -1.0 - stiffening_slope,
-        })
+impl ContactLaw for Ball {
+    fn log_force(&self, length: ContactLength, _share: f64) -> Reach {
+        match length {
+            ContactLength::Radius(a) if a > 1.5 * self.radius_m => Reach::Beyond,
+            ContactLength::Radius(a) => {
+                let force_over_modulus = 4.0 / 3.0 * a.powi(3) / self.radius_m;
+                Reach::At(LogForce::new(force_over_modulus.ln()))
+            }
+            ContactLength::Indentation(_) => Reach::NotMine,
+        }
     }
 
-    fn kind(&self) -> EstimatorKind {
-        EstimatorKind::Other("stiffening ball")
+    fn limits(&self) -> Limits {
+        Limits::of_ball(self.radius_m, 0.3)
     }
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
     let trial = Trial::new(PressOptions::default(), &CalibrationRun::default())?;
-    let radius_m = trial.scene.options().object.radius_m;
+    let ball = trial.scene.options().object;
+    let law = Ball {
+        radius_m: ball.radius_m,
+    };
+    let own = ContactEstimator::from_law(law, ball.material.poisson_ratio)?.named("my ball");
     let pipeline = trial.pipeline()?;
-    let own = ContactEstimator::from_law(Stiffening { radius_m }, 0.5)?;
-    for pipeline in [trial.pipeline()?.with_estimator(own), pipeline] {
+    for pipeline in [pipeline.clone().with_estimator(own), pipeline] {
         let modulus = trial.press(&pipeline)?.modulus()?;
         println!(
             "{}: {:.1} ± {:.1} kPa",

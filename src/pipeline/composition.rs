@@ -98,7 +98,7 @@ impl Pipeline {
             warp: Arc::new(StrainSpline),
             strain: Arc::new(GreenLagrange),
             estimator: EstimatorStage::named(EstimatorChoice::default()),
-            settings: Settings::new(object.checked()?),
+            settings: Settings::new(object.validated().map_err(PipelineError::Material)?),
         })
     }
 
@@ -280,7 +280,10 @@ impl Pipeline {
         self
     }
 
-    /// Takes another estimator of the modulus. Strains of the loads are counted from the first.
+    /// Takes another estimator of the modulus. Strains of the loads are counted from the first. The
+    /// loads come with the [object and the guide](crate::elasticity::modulus::LoadSeries::bodies).
+    /// An answer from contacts alone that does not count a guide that yields has the caution
+    /// [`GuideIgnored`](crate::elasticity::modulus::Warning::GuideIgnored).
     ///
     /// ```
     /// use tactile_simulate::Trial;
@@ -296,7 +299,7 @@ impl Pipeline {
         mut self,
         estimator: impl ModulusEstimator + Send + Sync + 'static,
     ) -> Self {
-        self.estimator = EstimatorStage::Given(Arc::new(estimator));
+        self.estimator = EstimatorStage::given(Arc::new(estimator));
         self
     }
 

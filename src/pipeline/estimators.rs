@@ -3,10 +3,11 @@ use super::error::PipelineError;
 use super::named::EstimatorChoice;
 use super::specimen::Object;
 use crate::elasticity::ElasticityError;
-use crate::elasticity::contact::{Body, Bond, Waveguide};
+use crate::elasticity::contact::{Bond, Waveguide};
 use crate::elasticity::modulus::{
-    BondedLayer, Cone, FlatPunch, HertzSphere, ModulusEstimator, PaperRatio, SphereOnWaveguide,
-    StrainReference, StressStrainRegression,
+    Bodies, BondedLayer, Cone, EstimatorKind, FlatPunch, HertzSphere, LoadSeries, ModulusEstimate,
+    ModulusEstimator, PaperRatio, SphereOnWaveguide, StrainReference, StressStrainRegression,
+    Warning,
 };
 use std::sync::{Arc, OnceLock};
 
@@ -49,12 +50,10 @@ pub fn that_fit(
         let mut estimators = vec![shared(paper_ratio(object)?)?];
         match object {
             Object::FlatPunch { radius_m, .. } => {
-                let punch = FlatPunch::new(radius_m, nu)?;
-                estimators.push(shared(punch.with_other_body(pressed_on(waveguide)))?);
+                estimators.push(shared(FlatPunch::new(radius_m, nu)?)?);
             }
             Object::Sphere { radius_m, .. } => {
-                let ball = HertzSphere::new(radius_m, nu)?;
-                estimators.push(shared(ball.with_other_body(pressed_on(waveguide)))?);
+                estimators.push(shared(HertzSphere::new(radius_m, nu)?)?);
             }
             Object::Layer { .. } | Object::Cone { .. } => {
                 estimators.push(default_of(object, waveguide)?);
@@ -64,7 +63,10 @@ pub fn that_fit(
         estimators.push(shared(StressStrainRegression::default())?);
         Ok(estimators)
     };
-    build().map_err(PipelineError::Material)
+    let bodies = Arc::new(Bodies::new(object, waveguide.cloned()));
+    let estimators = build().map_err(PipelineError::Material)?;
+    let completed = |estimator| Completed::of(estimator, Arc::clone(&bodies));
+    Ok(estimators.into_iter().map(completed).collect())
 }
 
 /// The estimator of a name.
@@ -83,14 +85,11 @@ fn named(
             .sphere_radius_m()
             .ok_or(needs("a ball as the object"))
     };
-    let guide = pressed_on(waveguide);
     let built = match choice {
         EstimatorChoice::Best => default_of(object, waveguide),
         EstimatorChoice::PaperRatio => paper_ratio(object).and_then(shared),
         EstimatorChoice::Regression => shared(StressStrainRegression::default()),
-        EstimatorChoice::Sphere => {
-            HertzSphere::new(radius()?, nu).and_then(|e| shared(e.with_other_body(guide)))
-        }
+        EstimatorChoice::Sphere => HertzSphere::new(radius()?, nu).and_then(shared),
         EstimatorChoice::SphereOnWaveguide => {
             on_waveguide(radius()?, nu, waveguide).and_then(shared)
         }
@@ -98,9 +97,7 @@ fn named(
             return Err(needs("a table of the ball's contacts"));
         }
         EstimatorChoice::FlatPunch => match object {
-            Object::FlatPunch { radius_m, .. } => {
-                FlatPunch::new(radius_m, nu).and_then(|e| shared(e.with_other_body(guide)))
-            }
+            Object::FlatPunch { radius_m, .. } => FlatPunch::new(radius_m, nu).and_then(shared),
             _ => return Err(needs("a flat punch as the object")),
         },
         EstimatorChoice::Cone => match object {
@@ -135,42 +132,92 @@ fn paper_ratio(object: Object) -> Result<PaperRatio, ElasticityError> {
     }
 }
 
-/// What the sample is pressed on: the waveguide's layers in series, rigid without layers.
-fn pressed_on(waveguide: Option<&Waveguide>) -> Body {
-    waveguide.map_or_else(Body::rigid, Waveguide::as_body)
-}
-
 fn shared(
     estimator: impl ModulusEstimator + Send + Sync + 'static,
 ) -> Result<SharedEstimator, ElasticityError> {
     Ok(Arc::new(estimator))
 }
 
-/// A pipeline's estimator: given as a value, or by a name and then built from object and waveguide
-/// when it is first needed.
+/// An estimator to whose loads the object and the guide are added.
+struct Completed {
+    estimator: SharedEstimator,
+    bodies: Arc<Bodies>,
+}
+
+impl Completed {
+    fn of(estimator: SharedEstimator, bodies: Arc<Bodies>) -> SharedEstimator {
+        Arc::new(Self { estimator, bodies })
+    }
+
+    /// The answer is from contacts alone, with a guide that yields, and does not count it.
+    fn ignores_guide(&self) -> bool {
+        let counted = self.estimator.needs_strain() || self.estimator.counts_guide();
+        self.bodies.guide().is_some() && !counted
+    }
+}
+
+impl ModulusEstimator for Completed {
+    fn estimate(&self, series: &LoadSeries) -> Result<ModulusEstimate, ElasticityError> {
+        let series = series.clone().with_bodies(Arc::clone(&self.bodies));
+        let mut estimate = self.estimator.estimate(&series)?;
+        if self.ignores_guide() {
+            estimate.warnings.push(Warning::GuideIgnored);
+            estimate.estimator = self.kind();
+        }
+        Ok(estimate)
+    }
+
+    /// Its own. A law of this crate without the guide has not the name of one with it.
+    fn kind(&self) -> EstimatorKind {
+        match self.estimator.kind() {
+            EstimatorKind::Other(name) => EstimatorKind::Other(name),
+            _ if self.ignores_guide() => EstimatorKind::GuideIgnored,
+            kind => kind,
+        }
+    }
+
+    fn needs_strain(&self) -> bool {
+        self.estimator.needs_strain()
+    }
+
+    fn counts_guide(&self) -> bool {
+        self.estimator.counts_guide()
+    }
+}
+
+/// A pipeline's estimator: given as a value, or by a name. It is completed by the object and the
+/// guide when it is first needed.
 #[derive(Clone)]
-pub enum EstimatorStage {
+pub struct EstimatorStage {
+    chosen: Chosen,
+    /// Clones share what is built: a law may hold tables.
+    built: Arc<OnceLock<Result<SharedEstimator, PipelineError>>>,
+}
+
+#[derive(Clone)]
+enum Chosen {
     Given(SharedEstimator),
-    Named {
-        choice: EstimatorChoice,
-        /// Clones share what is built: a law may hold tables.
-        built: Arc<OnceLock<Result<SharedEstimator, PipelineError>>>,
-    },
+    Named(EstimatorChoice),
 }
 
 impl EstimatorStage {
-    pub fn named(choice: EstimatorChoice) -> Self {
-        Self::Named {
-            choice,
+    pub fn given(estimator: SharedEstimator) -> Self {
+        Self {
+            chosen: Chosen::Given(estimator),
             built: Arc::default(),
         }
     }
 
-    /// The object or the waveguide has changed: a named estimator is built anew.
-    pub fn renew(&mut self) {
-        if let Self::Named { choice, .. } = *self {
-            *self = Self::named(choice);
+    pub fn named(choice: EstimatorChoice) -> Self {
+        Self {
+            chosen: Chosen::Named(choice),
+            built: Arc::default(),
         }
+    }
+
+    /// The object or the waveguide has changed: it is completed anew.
+    pub fn renew(&mut self) {
+        self.built = Arc::default();
     }
 
     pub fn get(
@@ -178,11 +225,14 @@ impl EstimatorStage {
         object: Object,
         waveguide: Option<&Waveguide>,
     ) -> Result<SharedEstimator, PipelineError> {
-        match self {
-            Self::Given(estimator) => Ok(Arc::clone(estimator)),
-            Self::Named { choice, built } => built
-                .get_or_init(|| named(*choice, object, waveguide))
-                .clone(),
-        }
+        let build = || {
+            let estimator = match &self.chosen {
+                Chosen::Given(estimator) => Arc::clone(estimator),
+                Chosen::Named(choice) => named(*choice, object, waveguide)?,
+            };
+            let bodies = Arc::new(Bodies::new(object, waveguide.cloned()));
+            Ok(Completed::of(estimator, bodies))
+        };
+        self.built.get_or_init(build).clone()
     }
 }

@@ -229,6 +229,16 @@ pub enum Flag {
         /// By how much stress over strain there exceeds the modulus of a neo-Hookean sample.
         excess: f64,
     },
+    /// No stress is conjugate to the strain measure, so that the sample's law at large strain was
+    /// not judged.
+    #[error(
+        "strain {strain:.3}: no stress is conjugate to the strain measure, the material's law at \
+         this strain was not judged"
+    )]
+    MaterialLawNotJudged {
+        /// The largest strain e_zz, of the pipeline's measure.
+        strain: f64,
+    },
     /// The sample relaxes: the modulus is a mean over the time of the frames.
     #[error(
         "the sample relaxes from {:.1} to {:.1} kPa with {time_constant_s:.2} s: the modulus is a \

@@ -119,7 +119,7 @@ impl Press<'_> {
         let largest = strains
             .map(|e| e.value)
             .max_by(|a, b| a.abs().total_cmp(&b.abs()))?;
-        let measure = self.pipeline().strain().name();
+        let measure = self.pipeline().strain();
         // Loads count a squeeze as positive.
         material_law(measure, -largest.abs())
     }

@@ -272,7 +272,7 @@ impl Settings {
 
     /// Refuses what has no meaning.
     pub(super) fn check(&self) -> Result<(), PipelineError> {
-        self.object.checked()?;
+        self.object.validated().map_err(PipelineError::Material)?;
         if self.smoothing_px.is_multiple_of(2) {
             return Err(PipelineError::EvenSmoothing {
                 found: self.smoothing_px,

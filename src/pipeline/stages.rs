@@ -59,7 +59,7 @@ impl Bench {
 
 impl Stages {
     pub fn new(pipeline: Pipeline, reference: Arc<ReferenceFrame>) -> Self {
-        let specimen = pipeline.settings().object.specimen();
+        let specimen = Specimen::of(pipeline.settings().object);
         let contact = match specimen {
             Specimen::Flat(flat) if flat.stated => pipeline.contact().for_flat_faces(),
             _ => None,

@@ -61,6 +61,19 @@ pub enum ElasticityError {
         /// contact is stiffer than any sample could make it.
         lower_bound_pa: Option<f64>,
     },
+    /// The contact of a load is beyond what the law describes, and no other load is within it.
+    #[error("load {}: the contact is beyond what the law describes", load + 1)]
+    BeyondLaw {
+        /// Index of the load.
+        load: usize,
+    },
+    /// A measure of strain whose value along an axis depends on the stretches across it: no stress
+    /// along the axis does its work.
+    #[error("no stress is conjugate to the strain measure {measure}")]
+    NoConjugateStress {
+        /// The measure's name.
+        measure: &'static str,
+    },
     /// Fewer usable loads than the estimator needs.
     #[error("{found} usable loads, at least {expected} are needed")]
     TooFewLoads {

@@ -34,6 +34,7 @@ pub mod contact;
 mod error;
 pub mod field;
 pub mod kinematics;
+pub mod laws;
 pub mod modulus;
 mod numerics;
 pub mod relaxation;

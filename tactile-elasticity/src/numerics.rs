@@ -5,7 +5,7 @@
 ///
 /// Every section takes one evaluation and leaves 0.62 of the bracket. `sections` of them, fewer
 /// where the bracket is down to rounding.
-pub fn golden_section(
+pub(crate) fn golden_section(
     mut low: f64,
     mut high: f64,
     sections: usize,
@@ -33,7 +33,7 @@ pub fn golden_section(
 }
 
 /// Nodes and weights on [0, 1], by Newton's method on P_n from the cosine guess.
-pub fn gauss_legendre(n: usize) -> Vec<(f64, f64)> {
+pub(crate) fn gauss_legendre(n: usize) -> Vec<(f64, f64)> {
     (0..n)
         .map(|i| {
             let mut x = (std::f64::consts::PI * (i as f64 + 0.75) / (n as f64 + 0.5)).cos();
@@ -64,7 +64,7 @@ fn legendre(n: usize, x: f64) -> (f64, f64) {
 
 /// Edges from 0 to `end`: panels of width `first` at the origin, growing by half of what lies
 /// before, none above `widest`.
-pub fn panel_edges(end: f64, first: f64, widest: f64) -> Vec<f64> {
+pub(crate) fn panel_edges(end: f64, first: f64, widest: f64) -> Vec<f64> {
     let mut edges = vec![0.0];
     let mut last = 0.0;
     while last < end {
@@ -75,7 +75,7 @@ pub fn panel_edges(end: f64, first: f64, widest: f64) -> Vec<f64> {
 }
 
 /// Nodes and weights between the edges, 16 points a panel.
-pub fn gauss_panels(edges: &[f64]) -> Vec<(f64, f64)> {
+pub(crate) fn gauss_panels(edges: &[f64]) -> Vec<(f64, f64)> {
     let unit = gauss_legendre(16);
     edges
         .windows(2)
@@ -88,7 +88,7 @@ pub fn gauss_panels(edges: &[f64]) -> Vec<(f64, f64)> {
 }
 
 /// The value and slope at `at` of the cubic through four points (Lagrange).
-pub fn cubic(points: [(f64, f64); 4], at: f64) -> (f64, f64) {
+pub(crate) fn cubic(points: [(f64, f64); 4], at: f64) -> (f64, f64) {
     let (mut value, mut slope) = (0.0, 0.0);
     for (i, point) in points.iter().enumerate() {
         let (mut basis, mut derivative) = (1.0, 0.0);
@@ -105,17 +105,17 @@ pub fn cubic(points: [(f64, f64); 4], at: f64) -> (f64, f64) {
 
 /// A Chebyshev interpolant on [0, 1].
 #[derive(Debug, Clone, PartialEq)]
-pub struct Chebyshev<const N: usize> {
+pub(crate) struct Chebyshev<const N: usize> {
     coefficients: [f64; N],
 }
 
 impl<const N: usize> Chebyshev<N> {
     /// The nodes at which [`through`](Self::through) wants values.
-    pub fn nodes() -> [f64; N] {
+    pub(crate) fn nodes() -> [f64; N] {
         std::array::from_fn(|j| 0.5 + 0.5 * Self::angle(j).cos())
     }
 
-    pub fn through(values: &[f64; N]) -> Self {
+    pub(crate) fn through(values: &[f64; N]) -> Self {
         let coefficients = std::array::from_fn(|m| {
             let projected = values.iter().enumerate();
             let sum: f64 = projected
@@ -128,7 +128,7 @@ impl<const N: usize> Chebyshev<N> {
     }
 
     /// By Clenshaw's recurrence.
-    pub fn value(&self, x: f64) -> f64 {
+    pub(crate) fn value(&self, x: f64) -> f64 {
         let t = 2.0 * x - 1.0;
         let (mut next, mut after) = (0.0, 0.0);
         for c in self.coefficients[1..].iter().rev() {

@@ -31,7 +31,7 @@ use std::ops::Deref;
 /// assert!((exx[0] - 0.05125).abs() < 1e-15);
 /// assert!((exx[1] - 1.05f64.ln()).abs() < 1e-15);
 /// ```
-pub trait StrainMeasure {
+pub trait StrainMeasure: Send + Sync {
     /// The strain of a deformation.
     ///
     /// # Errors
@@ -63,10 +63,52 @@ pub trait StrainMeasure {
     fn strain(&self, h: &Matrix3<f64>) -> Result<Matrix3<f64>, ElasticityError> {
         self.of(&Deformation::from_displacement_gradient(*h))
     }
+
+    /// The stress that does the work of a nominal stress P on this measure, along an axis that is
+    /// stretched by λ: S de = P dλ. The second Piola–Kirchhoff stress for Green–Lagrange.
+    ///
+    /// dλ/de is found by differences, to 10⁻¹¹.
+    ///
+    /// # Errors
+    /// [`ElasticityError::NoConjugateStress`] if the strain along the axis depends on the stretches
+    /// across it or does not grow with λ, and those of [`of`](Self::of).
+    ///
+    /// ```
+    /// use tactile_elasticity::strain::{GreenLagrange, Hencky, StrainMeasure};
+    ///
+    /// // ½(λ² − 1) grows by λ dλ, ln λ by dλ/λ.
+    /// let measures: [&dyn StrainMeasure; 2] = [&GreenLagrange, &Hencky];
+    /// let stress = measures.map(|m| m.conjugate_stress(1e3, 0.8).unwrap());
+    /// assert!((stress[0] / 1250.0 - 1.0).abs() < 1e-10);
+    /// assert!((stress[1] / 800.0 - 1.0).abs() < 1e-10);
+    /// ```
+    fn conjugate_stress(&self, nominal: f64, stretch: f64) -> Result<f64, ElasticityError> {
+        let along = |lateral: f64, axial: f64| {
+            let h = Matrix3::from_diagonal(&[lateral - 1.0, lateral - 1.0, axial - 1.0].into());
+            self.strain(&h).map(|strain| strain[(2, 2)])
+        };
+        let here = along(1.0, stretch)?;
+        let coupling = along(1.0 + LATERAL_STEP, stretch)? - here;
+        let slope = (along(1.0, stretch + AXIAL_STEP)? - along(1.0, stretch - AXIAL_STEP)?)
+            / (2.0 * AXIAL_STEP);
+        // NaN has no conjugate stress either.
+        let conjugate = coupling.abs() <= LATERAL_COUPLING * here.abs().max(1.0) && slope > 0.0;
+        if !conjugate {
+            let measure = self.name();
+            return Err(ElasticityError::NoConjugateStress { measure });
+        }
+        Ok(nominal / slope)
+    }
 }
 
+// Half the step of a stretch for dλ/de: the third derivative times its square is left.
+const AXIAL_STEP: f64 = 1e-5;
+// A stretch across the axis, and the strain along it that is more than rounding.
+const LATERAL_STEP: f64 = 0.01;
+const LATERAL_COUPLING: f64 = 1e-9;
+
 /// Boxed, shared and borrowed measures.
-impl<P: Deref<Target: StrainMeasure>> StrainMeasure for P {
+impl<P: Deref<Target: StrainMeasure> + Send + Sync> StrainMeasure for P {
     fn of(&self, deformation: &Deformation) -> Result<Matrix3<f64>, ElasticityError> {
         (**self).of(deformation)
     }
@@ -77,6 +119,10 @@ impl<P: Deref<Target: StrainMeasure>> StrainMeasure for P {
 
     fn strain(&self, h: &Matrix3<f64>) -> Result<Matrix3<f64>, ElasticityError> {
         (**self).strain(h)
+    }
+
+    fn conjugate_stress(&self, nominal: f64, stretch: f64) -> Result<f64, ElasticityError> {
+        (**self).conjugate_stress(nominal, stretch)
     }
 }
 
@@ -235,7 +281,7 @@ fn finite(deformation: &Deformation) -> Result<&Deformation, ElasticityError> {
 }
 
 /// Refuses det F ≤ 0.
-pub fn upright(deformation: &Deformation) -> Result<(), ElasticityError> {
+fn upright(deformation: &Deformation) -> Result<(), ElasticityError> {
     let determinant = finite(deformation)?.jacobian();
     if determinant > 0.0 {
         Ok(())

@@ -3,7 +3,7 @@
 use crate::{AppliedLoad, FemScene, Guide, GuideLayer, Material, ObjectPress, ObjectShape, State};
 use core::ops::ControlFlow;
 use tactile_elasticity::contact::{Bond, ContactCurve, ContactTable, Waveguide};
-use tactile_elasticity::modulus::{ContactLaw, WaveguideLaw};
+use tactile_elasticity::laws::{ContactLaw, ContactLength, WaveguideLaw};
 use tactile_elasticity::{ElasticityError, Quantity};
 
 /// A contact whose force has grown with a higher power of the radius than this since the one
@@ -276,8 +276,11 @@ impl Ball {
                 let step = (options.largest_ratio - SMALLEST_RATIO) * k as f64 / last;
                 (SMALLEST_RATIO + step) * self.radius_m
             })
-            .filter_map(|a| law.log_force_at_radius(a, other * reduced))
-            .map(|force| AppliedLoad::Force(reduced * force.value.exp()))
+            .filter_map(|a| {
+                law.log_force(ContactLength::Radius(a), other * reduced)
+                    .at()
+            })
+            .map(|force| AppliedLoad::Force(reduced * force.value().exp()))
             .collect()
     }
 }

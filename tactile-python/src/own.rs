@@ -220,13 +220,19 @@ impl StrainMeasure for OwnStage {
     }
 }
 
-/// `estimate(loads)` returns Young's modulus in pascals and its standard error.
+/// `estimate(loads)` returns Young's modulus in pascals and its standard error. With a true
+/// attribute `counts_guide` it is `estimate(loads, layers)`: the guide's layers as `Pipeline` takes
+/// them, none where it is rigid.
 impl ModulusEstimator for OwnStage {
     fn estimate(&self, series: &LoadSeries) -> Result<ModulusEstimate, ElasticityError> {
         let estimate = Python::attach(|py| {
             let loads = series.loads().iter().map(|load| Load::of(py, load));
             let loads = loads.collect::<PyResult<Vec<_>>>()?;
-            let answer = self.call(py, (loads,))?;
+            let answer = if self.truth("counts_guide", false) {
+                self.call(py, (loads, layers(py, series)))?
+            } else {
+                self.call(py, (loads,))?
+            };
             let (value, error): (f64, f64) = answer.extract().map_err(|_| {
                 invalid("estimate must return a modulus in pascals and its standard error")
             })?;
@@ -249,11 +255,40 @@ impl ModulusEstimator for OwnStage {
 
     /// The attribute `needs_strain`, true where there is none.
     fn needs_strain(&self) -> bool {
+        self.truth("needs_strain", true)
+    }
+
+    /// The attribute `counts_guide`, false where there is none.
+    fn counts_guide(&self) -> bool {
+        self.truth("counts_guide", false)
+    }
+}
+
+impl OwnStage {
+    /// The truth of an attribute.
+    fn truth(&self, attribute: &str, otherwise: bool) -> bool {
         Python::attach(|py| {
-            let given = self.object.bind(py).getattr("needs_strain");
-            given.and_then(|given| given.is_truthy()).unwrap_or(true)
+            let given = self.object.bind(py).getattr(attribute);
+            given
+                .and_then(|given| given.is_truthy())
+                .unwrap_or(otherwise)
         })
     }
+}
+
+/// Thickness, modulus and Poisson's ratio of the guide's layers, a row each.
+fn layers<'py>(py: Python<'py>, series: &LoadSeries) -> Bound<'py, PyArray2<f64>> {
+    let guide = series.bodies().and_then(|bodies| bodies.guide());
+    let layers = guide.map_or(&[][..], |guide| guide.layers());
+    let values = Array2::from_shape_fn((layers.len(), 3), |(k, column)| {
+        let layer = &layers[k];
+        [
+            layer.thickness_m,
+            layer.youngs_modulus_pa,
+            layer.poisson_ratio,
+        ][column]
+    });
+    PyArray2::from_owned_array(py, values)
 }
 
 /// `fit(sources, targets, weights)` returns an object that maps points to points when it is called

@@ -143,7 +143,9 @@ impl Object {
 /// estimator : str or object
 ///     "best", "paper-ratio", "regression", "sphere", "sphere-on-waveguide", "flat-punch", "cone"
 ///     and others, or `estimate(loads)` that returns pascals and their standard error. Its
-///     attribute `needs_strain` says whether loads have strains.
+///     attribute `needs_strain` says whether loads have strains. With a true attribute
+///     `counts_guide` it is `estimate(loads, layers)`, the layers as `waveguide`; without it a
+///     guide that yields is a warning of the modulus.
 /// flat_field : bool
 ///     Whether frames are divided by the reference's own brightness.
 /// force_scale_error, coupling_error, length_scale_error, radius_error, poisson_ratio_error,

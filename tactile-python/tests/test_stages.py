@@ -48,6 +48,16 @@ class Hertz:
         return np.mean(moduli), np.std(moduli)
 
 
+class HertzOnGuide(Hertz):
+    counts_guide = True
+
+    def estimate(self, loads, layers):
+        thickness, modulus, nu = layers.T
+        guide = np.sum(thickness * (1 - nu**2) / modulus) / np.sum(thickness)
+        reduced = np.mean([0.75 * x.force.value * self.radius / x.radius.value**3 for x in loads])
+        return 0.75 / (1 / reduced - guide), 1.0
+
+
 class Bright:
     def measure(self, frame, reference):
         mask = frame > reference.astype(int) + 10
@@ -74,6 +84,11 @@ def test_every_stage_of_ones_own_is_called(scene):
     assert np.isfinite(warped.strain(1).value).all()
     estimated = ti.press_of(scene, estimator=Hertz(scene.radius)).modulus()
     assert estimated.estimator == "own estimator" and estimated.value > 0
+    assert any("guide" in flag for flag in estimated.flags)
+    counted = ti.press_of(scene, estimator=HertzOnGuide(scene.radius)).modulus()
+    by_name = ti.press_of(scene, estimator="sphere").modulus()
+    assert abs(counted.value / by_name.value - 1) < 0.05
+    assert not any("guide" in flag for flag in counted.flags)
     contact = ti.press_of(scene, pairs=None, contact=Bright()).contact(0)
     assert contact.force.value == 0.7
     assert ti.match_points(np.eye(3), np.eye(3), Nearest()).assignment.tolist() == [0, 1, 2]

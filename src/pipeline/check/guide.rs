@@ -15,7 +15,7 @@ use crate::elasticity::contact::{
     Bond, Layer, PARABOLA_ERROR, Waveguide, guide_compliance_error, guide_log_stiffness,
     parameter_slopes, stepped_layers,
 };
-use crate::elasticity::modulus::{ContactLaw, LogForce, WaveguideLaw};
+use crate::elasticity::laws::{ContactLaw, ContactLength, WaveguideLaw};
 use crate::pipeline::assumptions::CheckedGuide;
 use crate::pipeline::contact::ContactReading;
 use crate::pipeline::settings::Settings;
@@ -72,7 +72,7 @@ impl GuideCheck {
     }
 
     /// ln F at the measured radius on these layers.
-    fn log_force(&self, layers: &[Layer]) -> Option<LogForce> {
+    fn log_force(&self, layers: &[Layer]) -> Option<PressForce> {
         self.ball.log_force(layers, self.radius_m.value)
     }
 
@@ -80,13 +80,13 @@ impl GuideCheck {
     fn law_error(&self, layers: &[Layer]) -> Option<f64> {
         let a = self.radius_m.value;
         match self.ball.youngs_modulus_pa {
-            Some(_) => Some(self.ball.law(layers)?.model_error(Some(a), None)),
+            Some(_) => Some(self.log_force(layers)?.law_error),
             None => Some(PARABOLA_ERROR * (a / self.ball.radius_m.value).powi(2)),
         }
     }
 
     /// Errors of ln F: those that presses of this ball share.
-    fn ball_errors(&self, layers: &[Layer], here: &LogForce) -> Option<[f64; 3]> {
+    fn ball_errors(&self, layers: &[Layer], here: &PressForce) -> Option<[f64; 3]> {
         let beside = |ball: KnownBall| {
             let there = ball.log_force(layers, self.radius_m.value)?;
             Some((there.value - here.value) / STEP)
@@ -123,27 +123,49 @@ impl KnownBall {
     }
 
     /// ln F of a contact of radius a (m), with its slopes in ln a and ln R.
-    fn log_force(&self, layers: &[Layer], a: f64) -> Option<LogForce> {
+    fn log_force(&self, layers: &[Layer], a: f64) -> Option<PressForce> {
         let Some(modulus) = self.youngs_modulus_pa else {
             let stiffness = |a: f64| guide_log_stiffness(layers, a);
             let here = stiffness(a)?;
             let slope = (stiffness(a * STEP.exp())? - here) / STEP;
             let hertz = (4.0 / 3.0_f64).ln() + 3.0 * a.ln() - self.radius_m.value.ln();
-            return Some(LogForce::new(hertz + here, 3.0 + slope, -1.0));
+            return Some(PressForce {
+                value: hertz + here,
+                slope: 3.0 + slope,
+                size_slope: -1.0,
+                law_error: 0.0,
+            });
         };
         let compliance = |modulus: f64, poisson: f64| (1.0 - poisson * poisson) / modulus;
         let own = compliance(modulus.value, self.poisson_ratio.value);
         let top = layers.first()?;
         let touched = compliance(top.youngs_modulus_pa, top.poisson_ratio);
         let share = touched / (touched + own);
-        let mut force = self.law(layers)?.log_force_at_radius(a, share)?;
-        force.value -= (touched + own).ln();
-        Some(force)
+        let law = self.law(layers)?;
+        let force = law.log_force(ContactLength::Radius(a), share).at()?;
+        let [slope, size_slope] = force.slopes()?;
+        Some(PressForce {
+            value: force.value() - (touched + own).ln(),
+            slope,
+            size_slope,
+            law_error: force.error(),
+        })
     }
 }
 
+/// ln F of a press as a law gives it.
+struct PressForce {
+    value: f64,
+    /// In ln a.
+    slope: f64,
+    /// In ln R.
+    size_slope: f64,
+    /// Standard error of ln F from the law itself.
+    law_error: f64,
+}
+
 /// ln F of all presses on these layers.
-fn log_forces(checks: &[GuideCheck], layers: &[Layer]) -> Option<Vec<LogForce>> {
+fn log_forces(checks: &[GuideCheck], layers: &[Layer]) -> Option<Vec<PressForce>> {
     let forces = checks.iter().map(|check| check.log_force(layers));
     forces.collect()
 }
@@ -152,7 +174,7 @@ fn log_forces(checks: &[GuideCheck], layers: &[Layer]) -> Option<Vec<LogForce>> 
 fn noise(
     checks: &[GuideCheck],
     layers: &[Layer],
-    forces: &[LogForce],
+    forces: &[PressForce],
     length_scale: f64,
 ) -> Option<DMatrix<f64>> {
     let mut noise = DMatrix::zeros(checks.len(), checks.len());

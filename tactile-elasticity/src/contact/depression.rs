@@ -46,7 +46,7 @@ pub fn depression_m(
         Quantity::Distance.finite(distance)?;
     }
     let h = guide.thickness_m();
-    let plane_strain = guide.touched_plane_strain_pa();
+    let plane_strain = 1.0 / guide.touched().compliance_per_pa();
     let peak = 1.5 * force / (core::f64::consts::PI * a * a);
     let farthest = distances_m.iter().fold(0.0, |far: f64, r| far.max(r.abs()));
     let stiffened: Vec<(f64, f64)> = kernel

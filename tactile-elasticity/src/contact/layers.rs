@@ -240,7 +240,7 @@ pub enum Bond {
 
 /// The deficit 1 − L(s) of layers on a rigid base, s = ξh with h their total thickness.
 #[derive(Debug, Clone, PartialEq)]
-pub struct LayerKernel {
+pub(crate) struct LayerKernel {
     /// The touched one first. Never empty.
     layers: Vec<StackLayer>,
     bond: Bond,
@@ -251,7 +251,7 @@ impl LayerKernel {
     ///
     /// # Errors
     /// [`ElasticityError::PoissonRatio`].
-    pub fn new(bond: Bond, poisson_ratio: f64) -> Result<Self, ElasticityError> {
+    pub(crate) fn new(bond: Bond, poisson_ratio: f64) -> Result<Self, ElasticityError> {
         let layer = StackLayer {
             thickness: 1.0,
             shear_modulus: 1.0,
@@ -268,7 +268,7 @@ impl LayerKernel {
     ///
     /// # Errors
     /// [`ElasticityError::NotPositive`] thickness: a rigid waveguide has no layers.
-    pub fn of_layers(waveguide: &Waveguide, bond: Bond) -> Result<Self, ElasticityError> {
+    pub(crate) fn of_layers(waveguide: &Waveguide, bond: Bond) -> Result<Self, ElasticityError> {
         let total = Quantity::Thickness.positive(waveguide.thickness_m())?;
         let layers: Vec<_> = waveguide
             .layers()
@@ -488,17 +488,17 @@ fn inverse(matrix: Matrix2<f64>) -> Matrix2<f64> {
 
 /// What a contact of given a/h is beside Hertz's of the same radius, with slopes in ln a.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SharedContact {
+pub(crate) struct SharedContact {
     /// ln of the force over Hertz's, and its slope.
-    pub force: [f64; 2],
+    pub(crate) force: [f64; 2],
     /// ln of the indentation over Hertz's, and its slope.
-    pub indentation: [f64; 2],
+    pub(crate) indentation: [f64; 2],
 }
 
 /// Contacts of a sphere that yields with the layers: cubic in ln(a/h), Chebyshev in the touched
 /// layer's share of 1/E*.
 #[derive(Debug, Clone, PartialEq)]
-pub struct SharedLayerTable {
+pub(crate) struct SharedLayerTable {
     first: f64,
     rows: Vec<Row>,
 }
@@ -518,7 +518,7 @@ struct Row {
 impl SharedLayerTable {
     /// For a/h in `range`, the upper end at most [`LARGEST_A_OVER_H`]. None where a row cannot be
     /// solved.
-    pub fn new(kernel: &LayerKernel, range: (f64, f64)) -> Option<Self> {
+    pub(crate) fn new(kernel: &LayerKernel, range: (f64, f64)) -> Option<Self> {
         let (first, last) = (range.0.ln(), range.1.min(LARGEST_A_OVER_H).ln());
         let count = ((last - first) / STEP).ceil().max(3.0) as usize + 1;
         let at = |k: usize| (first + STEP * k as f64).exp().min(LARGEST_A_OVER_H);
@@ -527,7 +527,7 @@ impl SharedLayerTable {
     }
 
     /// At a/h and a share in [0, 1]. None beyond the table.
-    pub fn at(&self, a_over_h: f64, share: f64) -> Option<SharedContact> {
+    pub(crate) fn at(&self, a_over_h: f64, share: f64) -> Option<SharedContact> {
         let (rows, at) = (&self.rows, a_over_h.ln());
         let place = (at - self.first) / STEP;
         if place > (rows.len() - 1) as f64 {

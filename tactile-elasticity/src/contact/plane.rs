@@ -58,7 +58,7 @@ impl LayerPlane {
         Quantity::Elements.positive(shape[0].min(shape[1]) as f64)?;
         let kernel = LayerKernel::of_layers(waveguide, bond)?;
         let thickness = waveguide.thickness_m();
-        let plane_strain = waveguide.touched_plane_strain_pa();
+        let plane_strain = 1.0 / waveguide.touched().compliance_per_pa();
         // Beyond four thicknesses a bonded layer is at rest. The room is bounded for layers that
         // are much thicker than the grid is wide.
         let reach = (4.0 * thickness / cell_m).ceil() as usize;

@@ -75,12 +75,12 @@ impl Limits {
 
 /// ln F of a contact and its slopes.
 #[derive(Debug, Clone, Copy)]
-pub struct TabulatedForce {
-    pub log_force: f64,
+pub(crate) struct TabulatedForce {
+    pub(crate) log_force: f64,
     /// ∂ln F/∂ln a.
-    pub radius_slope: f64,
+    pub(crate) radius_slope: f64,
     /// ∂ln F/∂ln E.
-    pub modulus_slope: f64,
+    pub(crate) modulus_slope: f64,
 }
 
 // Limits are met by numbers that rounding moved by this.

@@ -116,11 +116,20 @@ impl Waveguide {
         Body::from_compliance(compliance / self.thickness_m())
     }
 
-    /// E/(1 − ν²) of the layer that is touched. Infinite where there is none.
-    pub(crate) fn touched_plane_strain_pa(&self) -> f64 {
+    /// The layer that is touched, as a half-space. Rigid where there is none.
+    ///
+    /// ```
+    /// use tactile_elasticity::contact::{Body, Layer, Waveguide};
+    ///
+    /// let gel = Layer { thickness_m: 2e-3, youngs_modulus_pa: 75e3, poisson_ratio: 0.5 };
+    /// assert_eq!(Waveguide::new(vec![gel])?.touched(), Body::elastic(75e3, 0.5)?);
+    /// # Ok::<(), tactile_elasticity::ElasticityError>(())
+    /// ```
+    pub fn touched(&self) -> Body {
         let touched = self.layers.iter().find(|layer| layer.thickness_m > 0.0);
-        touched.map_or(f64::INFINITY, |layer| {
-            layer.youngs_modulus_pa / (1.0 - layer.poisson_ratio.powi(2))
+        touched.map_or_else(Body::rigid, |layer| {
+            let nu = layer.poisson_ratio;
+            Body::from_compliance((1.0 - nu) * (1.0 + nu) / layer.youngs_modulus_pa)
         })
     }
 

@@ -1,6 +1,8 @@
 //! Estimators and their results.
 
+use super::kind::EstimatorKind;
 use super::load::LoadSeries;
+use super::warning::Warning;
 use crate::error::ElasticityError;
 use std::ops::Deref;
 use tactile_core::{Estimate, Interval};
@@ -31,7 +33,7 @@ use tactile_core::{Estimate, Interval};
 /// assert!(modulus.interval_95.contains(30e3));
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
 /// ```
-pub trait ModulusEstimator {
+pub trait ModulusEstimator: Send + Sync {
     /// Young's modulus of the sample with its error.
     ///
     /// # Errors
@@ -64,10 +66,27 @@ pub trait ModulusEstimator {
     fn needs_strain(&self) -> bool {
         true
     }
+
+    /// Whether the answer counts the guide of the series' [bodies](LoadSeries::bodies). A pipeline
+    /// adds the caution [`Warning::GuideIgnored`] to an answer from contacts alone that does not.
+    /// An estimator of one's own that takes the guide from the series returns true.
+    ///
+    /// ```
+    /// use tactile_elasticity::contact::Body;
+    /// use tactile_elasticity::modulus::{HertzSphere, ModulusEstimator};
+    ///
+    /// let completed = HertzSphere::new(3e-3, 0.5)?;
+    /// let on_steel = completed.clone().with_other_body(Body::rigid());
+    /// assert!(completed.counts_guide() && !on_steel.counts_guide());
+    /// # Ok::<(), tactile_elasticity::ElasticityError>(())
+    /// ```
+    fn counts_guide(&self) -> bool {
+        false
+    }
 }
 
 /// Boxed, shared and borrowed estimators.
-impl<P: Deref<Target: ModulusEstimator>> ModulusEstimator for P {
+impl<P: Deref<Target: ModulusEstimator> + Send + Sync> ModulusEstimator for P {
     fn estimate(&self, series: &LoadSeries) -> Result<ModulusEstimate, ElasticityError> {
         (**self).estimate(series)
     }
@@ -79,51 +98,9 @@ impl<P: Deref<Target: ModulusEstimator>> ModulusEstimator for P {
     fn needs_strain(&self) -> bool {
         (**self).needs_strain()
     }
-}
 
-/// The estimators, by name.
-///
-/// ```
-/// use tactile_elasticity::modulus::EstimatorKind;
-///
-/// assert_eq!(EstimatorKind::PaperRatio.to_string(), "stress over mean strain");
-/// ```
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize))]
-#[non_exhaustive]
-#[allow(missing_docs)]
-pub enum EstimatorKind {
-    PaperRatio,
-    StressStrainRegression,
-    HertzSphere,
-    SphereOnWaveguide,
-    /// A soft ball on a rigid flat, at finite strain.
-    SphereOnFlat,
-    /// A soft ball on what its table of contacts was made for.
-    TabulatedContact,
-    FlatPunch,
-    Cone,
-    LayerIntegralEquation,
-    FreeLayerIntegralEquation,
-    /// An estimator from outside this crate, by its name.
-    Other(&'static str),
-}
-
-impl core::fmt::Display for EstimatorKind {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        f.write_str(match self {
-            Self::PaperRatio => "stress over mean strain",
-            Self::StressStrainRegression => "regression of stress on strain",
-            Self::HertzSphere => "Hertz sphere",
-            Self::SphereOnWaveguide => "sphere on a layered waveguide",
-            Self::SphereOnFlat => "sphere on a rigid flat, finite strain",
-            Self::TabulatedContact => "sphere, tabulated contacts",
-            Self::FlatPunch => "flat punch",
-            Self::Cone => "cone",
-            Self::LayerIntegralEquation => "sphere on a layer, integral equation",
-            Self::FreeLayerIntegralEquation => "sphere on a sliding layer, integral equation",
-            Self::Other(name) => name,
-        })
+    fn counts_guide(&self) -> bool {
+        (**self).counts_guide()
     }
 }
 
@@ -277,157 +254,6 @@ impl FitStatistics {
             observations,
             parameters,
             chi_squared,
-        }
-    }
-}
-
-/// A typed caution. The estimate stands, but not unconditionally.
-///
-/// ```
-/// use tactile_elasticity::modulus::Warning;
-///
-/// let warning = Warning::LargeContact { load: 1, ratio: 0.5, limit: 0.3 };
-/// assert!(warning.to_string().contains("0.5"));
-/// ```
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize))]
-#[non_exhaustive]
-pub enum Warning {
-    /// a/R is beyond the reach of small-contact theory.
-    LargeContact {
-        /// Index of the load.
-        load: usize,
-        /// a/R.
-        ratio: f64,
-        /// The limit of the law.
-        limit: f64,
-    },
-    /// The layer is thin beside the contact for this law.
-    ThinLayer {
-        /// Index of the load.
-        load: usize,
-        /// χ = √(Rδ)/h, or a/h.
-        ratio: f64,
-        /// The limit of the law.
-        limit: f64,
-    },
-    /// The strain is too large for a linear law.
-    LargeStrain {
-        /// Index of the load.
-        load: usize,
-        /// The strain.
-        strain: f64,
-        /// The limit.
-        limit: f64,
-    },
-    /// The residuals are larger than the standard errors say. These were scaled up by the square
-    /// root of this.
-    ExcessScatter {
-        /// χ² over degrees of freedom.
-        reduced_chi_squared: f64,
-    },
-    /// The data do not bound the modulus from above.
-    UnboundedAbove,
-    /// The intercept of the regression differs from zero at the 95 % level.
-    Intercept {
-        /// Stress at zero strain, Pa.
-        intercept_pa: f64,
-        /// Its probability under a zero intercept.
-        p_value: f64,
-    },
-    /// One load and no standard errors: the interval is not known.
-    NoErrorEstimate,
-    /// For a sphere the ratio of stress to strain is not the modulus: it depends on load and
-    /// radius.
-    RatioOnSphere {
-        /// Index of the load.
-        load: usize,
-        /// a/R.
-        ratio: f64,
-    },
-    /// The modulus is far from that of every layer of the guide, so that it is badly determined, or
-    /// one of the inputs is in another unit.
-    UnlikeGuide {
-        /// Modulus over that of the layer that is most like it.
-        ratio: f64,
-    },
-    /// Poisson's ratio is negative, which no rubber, gel or tissue has.
-    NegativePoissonRatio {
-        /// As it was stated.
-        poisson_ratio: f64,
-    },
-}
-
-impl Warning {
-    /// From this ratio of moduli on a sample is [unlike](Self::UnlikeGuide) its guide.
-    pub const UNLIKE_GUIDE: f64 = 10.0;
-}
-
-impl core::fmt::Display for Warning {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        match self {
-            Self::LargeContact { load, ratio, limit } => write!(
-                f,
-                "load {}: a/R = {ratio:.3} is beyond {limit:.2}, \
-                     small-contact theory does not hold",
-                load + 1
-            ),
-            Self::ThinLayer { load, ratio, limit } => write!(
-                f,
-                "load {}: contact over layer thickness = {ratio:.3} \
-                     is beyond {limit:.2} for this law",
-                load + 1
-            ),
-            Self::LargeStrain {
-                load,
-                strain,
-                limit,
-            } => write!(
-                f,
-                "load {}: strain {strain:.3} is beyond {limit:.2}, \
-                     the linear law does not hold",
-                load + 1
-            ),
-            Self::ExcessScatter {
-                reduced_chi_squared,
-            } => write!(
-                f,
-                "scatter exceeds the stated errors \
-                     (reduced chi-squared {reduced_chi_squared:.2})"
-            ),
-            Self::UnboundedAbove => write!(f, "the data do not bound the modulus from above"),
-            Self::Intercept {
-                intercept_pa,
-                p_value,
-            } => write!(
-                f,
-                "the stress at zero strain is {intercept_pa:.1} Pa (p = {p_value:.4}), not zero"
-            ),
-            Self::NoErrorEstimate => write!(
-                f,
-                "no standard errors and no repetition: the interval is unknown"
-            ),
-            Self::RatioOnSphere { load, ratio } => write!(
-                f,
-                "load {}: stress over strain is biased on a sphere (a/R = {ratio:.3})",
-                load + 1
-            ),
-            Self::UnlikeGuide { ratio } => {
-                let (times, word) = match *ratio < 1.0 {
-                    true => (1.0 / ratio, "softer"),
-                    false => (*ratio, "stiffer"),
-                };
-                write!(
-                    f,
-                    "the sample is {times:.0} times {word} than the guide: are its layers, the \
-                     forces, the radius and the size of a pixel in the units asked for?"
-                )
-            }
-            Self::NegativePoissonRatio { poisson_ratio } => write!(
-                f,
-                "no rubber, gel or tissue has a Poisson's ratio of {poisson_ratio}: soft samples \
-                 have 0.3 to 0.5"
-            ),
         }
     }
 }

@@ -1,11 +1,16 @@
 //! What was measured at one load.
 
+use super::bodies::Bodies;
 use crate::error::{ElasticityError, Quantity};
 use nalgebra::DMatrix;
+use std::sync::Arc;
 use tactile_core::Estimate;
 
 /// The estimate, if it is a finite number with an error and degrees of freedom that can be.
-pub fn validated(estimate: Estimate, quantity: Quantity) -> Result<Estimate, ElasticityError> {
+pub(crate) fn validated(
+    estimate: Estimate,
+    quantity: Quantity,
+) -> Result<Estimate, ElasticityError> {
     quantity.finite(estimate.value)?;
     Quantity::StandardError.not_negative(estimate.standard_error)?;
     if let Some(degrees) = estimate.degrees_of_freedom {
@@ -15,7 +20,7 @@ pub fn validated(estimate: Estimate, quantity: Quantity) -> Result<Estimate, Ela
 }
 
 /// Another value in place of an estimate's, of the same origin: the degrees of freedom stay.
-pub fn derived(from: Estimate, value: f64, standard_error: f64) -> Estimate {
+pub(crate) fn derived(from: Estimate, value: f64, standard_error: f64) -> Estimate {
     let mut estimate = from;
     (estimate.value, estimate.standard_error) = (value, standard_error);
     estimate
@@ -184,6 +189,7 @@ pub struct LoadSeries {
     /// Poisson's ratio, where the strains were derived from lateral stretches by it: all are in
     /// inverse proportion to it.
     strained_by: Option<f64>,
+    bodies: Option<Arc<Bodies>>,
 }
 
 impl LoadSeries {
@@ -195,7 +201,29 @@ impl LoadSeries {
             force_covariance: None,
             strain_covariance: None,
             strained_by: None,
+            bodies: None,
         }
+    }
+
+    /// With the sample and the guide it is pressed on. A pipeline's series has them.
+    #[must_use]
+    pub fn with_bodies(mut self, bodies: impl Into<Arc<Bodies>>) -> Self {
+        self.bodies = Some(bodies.into());
+        self
+    }
+
+    /// The sample and the guide it is pressed on. `None` if they were not given.
+    ///
+    /// ```
+    /// use tactile_elasticity::modulus::{Bodies, Estimate, LoadSeries, LoadState, Object};
+    ///
+    /// let series = LoadSeries::new([LoadState::new(Estimate::exact(0.7))]);
+    /// assert!(series.bodies().is_none());
+    /// let series = series.with_bodies(Bodies::new(Object::sphere(3e-3), None));
+    /// assert_eq!(series.bodies().and_then(|b| b.object().sphere_radius_m()), Some(3e-3));
+    /// ```
+    pub fn bodies(&self) -> Option<&Bodies> {
+        self.bodies.as_deref()
     }
 
     /// With the errors that all loads share.

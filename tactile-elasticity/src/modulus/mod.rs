@@ -1,23 +1,26 @@
 //! Young's modulus from what was measured at one or more loads.
 
+mod bodies;
 mod contact;
+mod contact_fit;
 mod estimate;
-mod law;
+mod kind;
 mod load;
 mod ratio;
 mod regression;
 mod statistics;
 mod tabulated;
-mod waveguide_law;
+mod uniaxial;
+mod warning;
 
+pub use bodies::{Bodies, Object};
 pub use contact::{BondedLayer, Cone, ContactEstimator, FlatPunch, HertzSphere, SphereOnWaveguide};
-pub use estimate::{
-    EstimatorKind, FitStatistics, LoadDiagnostics, ModulusEstimate, ModulusEstimator, Warning,
-};
-pub use law::{ConeLaw, ContactLaw, HertzLaw, LayerLaw, LogForce, PunchLaw};
+pub use estimate::{FitStatistics, LoadDiagnostics, ModulusEstimate, ModulusEstimator};
+pub use kind::EstimatorKind;
 pub use load::{LoadSeries, LoadState, SharedErrors};
 pub use ratio::{PaperRatio, StrainReference};
-pub use regression::{StressStrainRegression, UniaxialLoads};
+pub use regression::StressStrainRegression;
 pub use tabulated::TabulatedContact;
 pub use tactile_core::{Estimate, Interval};
-pub use waveguide_law::WaveguideLaw;
+pub use uniaxial::{UniaxialLoads, neo_hookean_excess};
+pub use warning::Warning;

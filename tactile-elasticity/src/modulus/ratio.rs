@@ -1,8 +1,10 @@
 //! The paper's modulus: stress over mean strain, equation (31).
 
-use super::estimate::{EstimatorKind, LoadDiagnostics, ModulusEstimate, ModulusEstimator, Warning};
+use super::estimate::{LoadDiagnostics, ModulusEstimate, ModulusEstimator};
+use super::kind::EstimatorKind;
 use super::load::{LoadSeries, LoadState, validated};
 use super::statistics::{CommonMean, Covariance, LogErrors, common_mean, fewest, total};
+use super::warning::Warning;
 use crate::error::{ElasticityError, Quantity};
 use tactile_core::statistics::{effective_degrees_of_freedom, quantile_95};
 use tactile_core::{Estimate, Interval};

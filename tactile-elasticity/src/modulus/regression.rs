@@ -1,14 +1,12 @@
 //! Young's modulus as the slope of stress over strain.
 
-use super::estimate::{
-    EstimatorKind, FitStatistics, LoadDiagnostics, ModulusEstimate, ModulusEstimator, Warning,
-};
-use super::load::{LoadSeries, LoadState, derived, validated};
-use super::ratio::{LINEAR_STRAIN, strain_warnings, stress};
+use super::estimate::{FitStatistics, LoadDiagnostics, ModulusEstimate, ModulusEstimator};
+use super::kind::EstimatorKind;
+use super::load::{LoadSeries, LoadState, validated};
+use super::ratio::{strain_warnings, stress};
 use super::statistics::{chi_squared_tail, fewest, t_tail};
+use super::warning::Warning;
 use crate::error::{ElasticityError, Quantity};
-use crate::strain::StrainMeasure;
-use nalgebra::Matrix3;
 use tactile_core::statistics::{effective_degrees_of_freedom, quantile_95};
 use tactile_core::{Estimate, Interval};
 
@@ -71,7 +69,7 @@ impl StressStrainRegression {
         self
     }
 
-    fn points(loads: &[LoadState]) -> Result<Vec<Point>, ElasticityError> {
+    pub(super) fn points(loads: &[LoadState]) -> Result<Vec<Point>, ElasticityError> {
         let mut points = Vec::new();
         for (load, state) in loads.iter().enumerate() {
             if let Some(strain) = state.mean_strain {
@@ -86,7 +84,7 @@ impl StressStrainRegression {
     }
 
     /// The line with a slope above zero.
-    fn line(&self, points: &[Point]) -> Result<Line, ElasticityError> {
+    pub(super) fn line(&self, points: &[Point]) -> Result<Line, ElasticityError> {
         let known = Self::known(points);
         self.check(points, known)?;
         let line = Line::fit(points, !self.zero_at_origin, known);
@@ -243,9 +241,9 @@ impl ModulusEstimator for StressStrainRegression {
 
 /// A straight line with its errors.
 #[derive(Debug, Clone, Copy)]
-struct Line {
-    slope: f64,
-    intercept: f64,
+pub(super) struct Line {
+    pub(super) slope: f64,
+    pub(super) intercept: f64,
     slope_error: f64,
     intercept_error: f64,
     chi_squared: f64,
@@ -254,7 +252,7 @@ struct Line {
     excess: Option<f64>,
 }
 
-struct Point {
+pub(super) struct Point {
     load: usize,
     strain: Estimate,
     stress: Estimate,
@@ -319,203 +317,5 @@ impl Line {
             learnt,
             excess,
         }
-    }
-}
-
-// Specimens with a flat face, pressed without friction: strain and conjugate stress from the face's
-// area.
-//
-// Under uniaxial load a block or a cylinder of any outline deforms homogeneously: the face
-// stretches by λ_t in its plane and by λ_z across it, and its area is A = A₀ λ_t². With a measure
-// of strain f (Green–Lagrange: f(λ) = ½(λ² − 1)) and Poisson's ratio defined by the same measure,
-// f(λ_t) = −ν f(λ_z), which for Hencky's measure and ν = ½ is incompressibility, λ_z λ_t² = 1. The
-// stress conjugate to the measure does the work of the force: S df = (F/A₀) dλ_z, hence
-//
-// S = F / (A₀ f′(λ_z)),
-//
-// the second Piola–Kirchhoff stress for Green–Lagrange, F/A₀ (engineering stress) for Biot's
-// measure and J times the true stress F/A for Hencky's. Material law: S = E f(λ_z), equation (31).
-//
-// Frames show pressed faces only, so that A₀ is not measured. It is the area for which the line S
-// over e passes through the origin: n loads determine the two unknowns E and A₀ from n ≥ 2. To
-// first order E = 2ν ΔF/ΔA, which does not hold A₀ at all. The error of A₀ is of the order of that
-// of E times the strain and is neglected.
-//
-// Range: no friction. A face that sticks to the plate stretches less than the material above it,
-// and E comes out too large.
-
-// Steps to the unloaded area: the error falls by about the strain each time, to rounding for
-// strains up to a third.
-const AREA_STEPS: usize = 60;
-// Axial stretches that are considered: beyond them no law with one modulus holds.
-const STRETCHES: [f64; 2] = [0.05, 4.0];
-
-/// The loads of a specimen with a flat face, its areas turned into strains and conjugate stresses.
-///
-/// ```
-/// use tactile_elasticity::modulus::{
-///     Estimate, LoadSeries, LoadState, ModulusEstimator, StressStrainRegression, UniaxialLoads,
-/// };
-/// use tactile_elasticity::strain::GreenLagrange;
-///
-/// // A face of 1 cm² of 100 kPa and ν = ½, squeezed by e = 2 % and 5 %: λ_z = √(1 − 2e), A = A₀(1
-/// // + e), F = E e λ_z A₀.
-/// let load = |e: f64| LoadState {
-///     contact_area_m2: Some(Estimate::new(1e-4 * (1.0 + e), 1e-9)),
-///     ..LoadState::new(Estimate::new(
-///         100e3 * e * (1.0 - 2.0 * e).sqrt() * 1e-4,
-///         1e-4,
-///     ))
-/// };
-/// let uniaxial = UniaxialLoads::new(
-///     &LoadSeries::new([load(0.02), load(0.05)]),
-///     0.5,
-///     &GreenLagrange,
-/// )?;
-/// assert!((uniaxial.unloaded_area_m2 / 1e-4 - 1.0).abs() < 1e-9);
-/// let [_lateral, axial] = uniaxial.stretches[1];
-/// assert!((axial - 0.9f64.sqrt()).abs() < 1e-9);
-/// let modulus = StressStrainRegression::default().estimate(&uniaxial.series)?;
-/// assert!((modulus.youngs_modulus_pa / 100e3 - 1.0).abs() < 1e-9);
-/// # Ok::<(), tactile_elasticity::ElasticityError>(())
-/// ```
-#[derive(Debug, Clone, PartialEq)]
-#[non_exhaustive]
-pub struct UniaxialLoads {
-    /// The loads with their strains, for a [`StressStrainRegression`].
-    pub series: LoadSeries,
-    /// Stretches of the face in its plane and across it, λ_t and λ_z, of every load.
-    pub stretches: Vec<[f64; 2]>,
-    /// Area of the unloaded face in m².
-    pub unloaded_area_m2: f64,
-}
-
-impl UniaxialLoads {
-    /// Finds A₀ and the state of every load that has a contact area. The others have a force alone.
-    /// O(loads).
-    ///
-    /// # Errors
-    /// [`ElasticityError::NotPositive`] for a Poisson ratio, from which there is no way back to the
-    /// axial strain, or an area. [`ElasticityError::TooFewLoads`] for fewer than two areas,
-    /// [`ElasticityError::EqualLoads`] and [`ElasticityError::ZeroStrain`] where they are all one,
-    /// [`ElasticityError::OppositeSigns`] where the face does not grow with the force.
-    pub fn new(
-        series: &LoadSeries,
-        poisson_ratio: f64,
-        measure: &dyn StrainMeasure,
-    ) -> Result<Self, ElasticityError> {
-        let law = LateralLaw {
-            poisson_ratio: Quantity::PoissonRatio.positive(poisson_ratio)?,
-            measure,
-        };
-        let faces = series.loads().iter().filter_map(|l| l.contact_area_m2);
-        let mut unloaded = f64::INFINITY;
-        for face in faces {
-            let area =
-                Quantity::ContactArea.positive(validated(face, Quantity::ContactArea)?.value)?;
-            unloaded = unloaded.min(area);
-        }
-        let regression = StressStrainRegression::default();
-        for _ in 0..AREA_STEPS {
-            let line = regression.line(&StressStrainRegression::points(
-                &law.strained(series, unloaded)?.0,
-            )?)?;
-            // The strain at which the line has no stress is that of the unloaded face.
-            let strain = -line.intercept / line.slope;
-            let ratio = (1.0
-                - 2.0 * law.poisson_ratio * strain.clamp(-LINEAR_STRAIN, LINEAR_STRAIN))
-            .recip();
-            unloaded *= ratio;
-            if (ratio - 1.0).abs() < 1e-14 {
-                break;
-            }
-        }
-        let (loads, stretches) = law.strained(series, unloaded)?;
-        Ok(Self {
-            series: series.uniaxial(loads, poisson_ratio),
-            stretches,
-            unloaded_area_m2: unloaded,
-        })
-    }
-}
-
-/// f(λ_t) = −ν f(λ_z).
-struct LateralLaw<'a> {
-    poisson_ratio: f64,
-    measure: &'a dyn StrainMeasure,
-}
-
-impl LateralLaw<'_> {
-    /// f of a stretch.
-    fn strain(&self, stretch: f64) -> Result<f64, ElasticityError> {
-        let gradient = Matrix3::from_diagonal(&[0.0, 0.0, stretch - 1.0].into());
-        Ok(self.measure.strain(&gradient)?[(2, 2)])
-    }
-
-    /// f′ of a stretch, by a central difference: exact to 1e-11, its third derivative times the
-    /// step squared.
-    fn slope(&self, stretch: f64) -> Result<f64, ElasticityError> {
-        const STEP: f64 = 1e-5;
-        Ok((self.strain(stretch + STEP)? - self.strain(stretch - STEP)?) / (2.0 * STEP))
-    }
-
-    /// λ_z of a face that has stretched by λ_t, by bisection: f rises with the stretch, whatever
-    /// the measure.
-    fn axial(&self, lateral: f64) -> Result<f64, ElasticityError> {
-        let wanted = -self.strain(lateral)? / self.poisson_ratio;
-        let [mut low, mut high] = STRETCHES;
-        if !(self.strain(low)? < wanted && wanted < self.strain(high)?) {
-            return Err(ElasticityError::SingularDeformation);
-        }
-        while high - low > 4.0 * f64::EPSILON {
-            let middle = 0.5 * (low + high);
-            if self.strain(middle)? < wanted {
-                low = middle;
-            } else {
-                high = middle;
-            }
-            if middle == 0.5 * (low + high) {
-                break;
-            }
-        }
-        Ok(0.5 * (low + high))
-    }
-
-    /// The loads with their strains, and the stretches of each.
-    fn strained(
-        &self,
-        series: &LoadSeries,
-        unloaded_m2: f64,
-    ) -> Result<(Vec<LoadState>, Vec<[f64; 2]>), ElasticityError> {
-        let mut loads = Vec::with_capacity(series.loads().len());
-        let mut stretches = Vec::with_capacity(series.loads().len());
-        for state in series.loads() {
-            let Some(face) = state.contact_area_m2 else {
-                loads.push(LoadState {
-                    mean_strain: None,
-                    contact_radius_m: None,
-                    ..*state
-                });
-                stretches.push([1.0; 2]);
-                continue;
-            };
-            let lateral = (face.value / unloaded_m2).sqrt();
-            let axial = self.axial(lateral)?;
-            let axial_slope = self.slope(axial)?;
-            // de_zz/d ln A = −f′(λ_t) λ_t / 2ν.
-            let per_relative_area = self.slope(lateral)? * lateral / (2.0 * self.poisson_ratio);
-            loads.push(LoadState {
-                contact_area_m2: Some(Estimate::exact(unloaded_m2 * axial_slope)),
-                contact_radius_m: None,
-                mean_strain: Some(derived(
-                    face,
-                    -self.strain(axial)?,
-                    per_relative_area * face.relative_error(),
-                )),
-                ..*state
-            });
-            stretches.push([lateral, axial]);
-        }
-        Ok((loads, stretches))
     }
 }

@@ -1,52 +1,53 @@
 //! Quantiles, and the generalised least squares mean.
 
-use super::estimate::{FitStatistics, Warning};
+use super::estimate::FitStatistics;
+use super::warning::Warning;
 use crate::error::{ElasticityError, Quantity};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use statrs::distribution::{ChiSquared, ContinuousCDF, StudentsT};
 use tactile_core::statistics::effective_degrees_of_freedom;
 
 /// The smallest of the degrees of freedom that are not infinite.
-pub fn fewest(degrees: impl Iterator<Item = Option<f64>>) -> Option<f64> {
+pub(crate) fn fewest(degrees: impl Iterator<Item = Option<f64>>) -> Option<f64> {
     degrees.flatten().reduce(f64::min)
 }
 
 /// P(χ²_degrees > x).
-pub fn chi_squared_tail(x: f64, degrees: usize) -> f64 {
+pub(crate) fn chi_squared_tail(x: f64, degrees: usize) -> f64 {
     ChiSquared::new(degrees as f64).map_or(1.0, |d| d.sf(x.max(0.0)))
 }
 
 /// P(|t| > |x|), two-sided.
-pub fn t_tail(x: f64, degrees: usize) -> f64 {
+pub(crate) fn t_tail(x: f64, degrees: usize) -> f64 {
     StudentsT::new(0.0, 1.0, degrees as f64).map_or(1.0, |d| 2.0 * d.sf(x.abs()))
 }
 
 /// The best common mean of correlated numbers.
 #[derive(Debug, Clone)]
-pub struct CommonMean {
-    pub mean: f64,
+pub(crate) struct CommonMean {
+    pub(crate) mean: f64,
     /// Standard error, scaled up where the scatter exceeds the covariance.
-    pub standard_error: f64,
+    pub(crate) standard_error: f64,
     chi_squared: f64,
     /// Degrees of freedom where the error was learnt from the scatter. None where it was given.
-    pub degrees: Option<f64>,
+    pub(crate) degrees: Option<f64>,
     /// χ²/ν where it was used to scale the error up.
     excess: Option<f64>,
-    pub standardized_residuals: Vec<f64>,
+    pub(crate) standardized_residuals: Vec<f64>,
     /// Of every number in the mean. Their sum is one.
-    pub weights: DVector<f64>,
+    pub(crate) weights: DVector<f64>,
 }
 
 impl CommonMean {
     /// Fit of one parameter, the mean.
-    pub fn fit_statistics(&self) -> FitStatistics {
+    pub(crate) fn fit_statistics(&self) -> FitStatistics {
         let observations = self.standardized_residuals.len();
         FitStatistics::new(observations, 1, self.chi_squared)
     }
 
     /// Cautions that follow from the scatter and the errors. `bounded` is whether the interval has
     /// an upper end.
-    pub fn warnings(&self, bounded: bool) -> Vec<Warning> {
+    pub(crate) fn warnings(&self, bounded: bool) -> Vec<Warning> {
         let excess = self.excess;
         let mut warnings: Vec<_> = excess
             .map(|reduced_chi_squared| Warning::ExcessScatter {
@@ -64,7 +65,7 @@ impl CommonMean {
 
     /// Degrees of freedom of the standard error. Those of its independent sources, each with its
     /// covariance, where the scatter did not tell it.
-    pub fn degrees_from(&self, sources: &[LogErrors]) -> Option<f64> {
+    pub(crate) fn degrees_from(&self, sources: &[LogErrors]) -> Option<f64> {
         let parts: Vec<_> = sources
             .iter()
             .map(|(covariance, degrees)| (covariance.variance_of_sum(&self.weights), *degrees))
@@ -84,7 +85,10 @@ const EXCESS_PROBABILITY: f64 = 1e-3;
 /// weighted mean ū and the rest Ũ, ŝ = (1 + ŨᵀŨ)⁻¹Ũᵀz, θ = z̄ − ū·ŝ and var θ = 1/Σw + ūᵀ(1 +
 /// ŨᵀŨ)⁻¹ū: the Woodbury identity, written so that nothing cancels where a shared error is much
 /// larger than the others. O(n k²) with k shared errors.
-pub fn common_mean(z: &[f64], covariance: &Covariance) -> Result<CommonMean, ElasticityError> {
+pub(crate) fn common_mean(
+    z: &[f64],
+    covariance: &Covariance,
+) -> Result<CommonMean, ElasticityError> {
     let n = z.len();
     let known = covariance.is_known();
     let factor = if known {
@@ -159,7 +163,7 @@ fn standardized(z: &[f64], mean: f64, covariance: Option<&Covariance>, unit: f64
 /// was given. Without G, products and solutions take O(n k²) time and O(n k) memory with k columns.
 /// A given matrix is factorised in O(n³).
 #[derive(Debug, Clone)]
-pub struct Covariance {
+pub(crate) struct Covariance {
     /// The load that each number belongs to. Numbers of one load are neighbours.
     loads: Vec<usize>,
     own: DVector<f64>,
@@ -170,7 +174,7 @@ pub struct Covariance {
 
 impl Covariance {
     /// No errors at all, of numbers that belong to these loads.
-    pub fn none(loads: impl Iterator<Item = usize>) -> Self {
+    pub(crate) fn none(loads: impl Iterator<Item = usize>) -> Self {
         let loads: Vec<usize> = loads.collect();
         Self {
             own: DVector::zeros(loads.len()),
@@ -182,7 +186,7 @@ impl Covariance {
     }
 
     /// With the standard error that each number has for itself.
-    pub fn with_own(mut self, standard_error: impl Fn(usize) -> f64) -> Self {
+    pub(crate) fn with_own(mut self, standard_error: impl Fn(usize) -> f64) -> Self {
         self.own
             .iter_mut()
             .enumerate()
@@ -191,14 +195,14 @@ impl Covariance {
     }
 
     /// With standard errors that the numbers of one load have in common.
-    pub fn with_shared_in_load(mut self, standard_error: impl Fn(usize) -> f64) -> Self {
+    pub(crate) fn with_shared_in_load(mut self, standard_error: impl Fn(usize) -> f64) -> Self {
         self.within_loads.push(self.column(standard_error));
         self
     }
 
     /// With standard errors that all numbers have in common: what one standard error of the cause
     /// does to each.
-    pub fn with_shared(mut self, standard_error: impl Fn(usize) -> f64) -> Self {
+    pub(crate) fn with_shared(mut self, standard_error: impl Fn(usize) -> f64) -> Self {
         let column = self.column(standard_error);
         if column.iter().any(|&u| u != 0.0) {
             self.shared.push(column);
@@ -209,7 +213,7 @@ impl Covariance {
     /// With standard errors of a law or a table that err the same way at all loads as far as the
     /// smallest goes. What they err beyond that at the others is not known to be in proportion:
     /// counted as common, the weighted mean would extrapolate it away.
-    pub fn with_model_errors(self, standard_error: impl Fn(usize) -> f64) -> Self {
+    pub(crate) fn with_model_errors(self, standard_error: impl Fn(usize) -> f64) -> Self {
         let least = (0..self.len())
             .map(&standard_error)
             .fold(f64::INFINITY, f64::min);
@@ -218,7 +222,7 @@ impl Covariance {
     }
 
     /// With a matrix of all pairs.
-    pub fn with_given(mut self, entry: impl FnMut(usize, usize) -> f64) -> Self {
+    pub(crate) fn with_given(mut self, entry: impl FnMut(usize, usize) -> f64) -> Self {
         let matrix = DMatrix::from_fn(self.len(), self.len(), entry);
         self.given = Some(match self.given.take() {
             Some(given) => given + matrix,
@@ -390,10 +394,10 @@ fn ridged_cholesky(sigma: DMatrix<f64>, ridge: f64) -> Result<Cholesky<f64, Dyn>
 /// The covariance of logarithms of moduli from one source of error, and its degrees of freedom:
 /// those of the least known error, for repetition does not improve a standard error that all loads
 /// take from one calibration.
-pub type LogErrors = (Covariance, Option<f64>);
+pub(crate) type LogErrors = (Covariance, Option<f64>);
 
 /// The covariance of all sources together, which are independent of one another.
-pub fn total(sources: &[LogErrors]) -> Covariance {
+pub(crate) fn total(sources: &[LogErrors]) -> Covariance {
     let [first, rest @ ..] = sources else {
         return Covariance::none(std::iter::empty());
     };

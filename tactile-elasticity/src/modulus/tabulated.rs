@@ -1,7 +1,8 @@
 //! Young's modulus of a ball from a table of its contacts.
 
-use super::contact::large_contacts;
-use super::estimate::{EstimatorKind, LoadDiagnostics, ModulusEstimate, ModulusEstimator};
+use super::contact_fit::large_contacts;
+use super::estimate::{LoadDiagnostics, ModulusEstimate, ModulusEstimator};
+use super::kind::EstimatorKind;
 use super::load::{LoadSeries, LoadState, validated};
 use super::statistics::{CommonMean, Covariance, LogErrors, common_mean, fewest, total};
 use crate::contact::{ContactTable, TabulatedForce, Waveguide};
@@ -355,5 +356,9 @@ impl ModulusEstimator for TabulatedContact {
 
     fn needs_strain(&self) -> bool {
         false
+    }
+
+    fn counts_guide(&self) -> bool {
+        true
     }
 }

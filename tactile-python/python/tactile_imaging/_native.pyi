@@ -73,6 +73,10 @@ class _StrainMeasure(Protocol):
 class _Estimator(Protocol):
     def estimate(self, loads: list[Load], /) -> tuple[float, float]: ...
 
+class _GuideEstimator(Protocol):
+    counts_guide: bool
+    def estimate(self, loads: list[Load], layers: _Floats, /) -> tuple[float, float]: ...
+
 class _ContactStage(Protocol):
     def measure(self, frame: _Frame, reference: _Frame, /) -> dict[str, Any] | None: ...
 
@@ -350,7 +354,7 @@ class Pipeline:
         matcher_options: Mapping[str, Any] | None = None,
         warp: str | _WarpModel | None = None,
         strain: str | _StrainMeasure | None = None,
-        estimator: str | _Estimator | None = None,
+        estimator: str | _Estimator | _GuideEstimator | None = None,
         flat_field: bool | None = None,
         force_scale_error: float | None = None,
         coupling_error: float | None = None,

@@ -3,6 +3,7 @@ mod blocks;
 mod hostile;
 mod on_demand;
 mod own_contact_stage;
+mod own_estimators;
 mod repeated;
 mod results;
 mod sources;

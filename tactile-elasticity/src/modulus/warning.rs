@@ -1,0 +1,170 @@
+//! What weakens a modulus without forbidding it.
+
+/// A typed caution. The estimate stands, but not unconditionally.
+///
+/// ```
+/// use tactile_elasticity::modulus::Warning;
+///
+/// let warning = Warning::LargeContact { load: 1, ratio: 0.5, limit: 0.3 };
+/// assert!(warning.to_string().contains("0.5"));
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[non_exhaustive]
+pub enum Warning {
+    /// a/R is beyond the reach of small-contact theory.
+    LargeContact {
+        /// Index of the load.
+        load: usize,
+        /// a/R.
+        ratio: f64,
+        /// The limit of the law.
+        limit: f64,
+    },
+    /// The layer is thin beside the contact for this law.
+    ThinLayer {
+        /// Index of the load.
+        load: usize,
+        /// χ = √(Rδ)/h, or a/h.
+        ratio: f64,
+        /// The limit of the law.
+        limit: f64,
+    },
+    /// The strain is too large for a linear law.
+    LargeStrain {
+        /// Index of the load.
+        load: usize,
+        /// The strain.
+        strain: f64,
+        /// The limit.
+        limit: f64,
+    },
+    /// The residuals are larger than the standard errors say. These were scaled up by the square
+    /// root of this.
+    ExcessScatter {
+        /// χ² over degrees of freedom.
+        reduced_chi_squared: f64,
+    },
+    /// The data do not bound the modulus from above.
+    UnboundedAbove,
+    /// The intercept of the regression differs from zero at the 95 % level.
+    Intercept {
+        /// Stress at zero strain, Pa.
+        intercept_pa: f64,
+        /// Its probability under a zero intercept.
+        p_value: f64,
+    },
+    /// One load and no standard errors: the interval is not known.
+    NoErrorEstimate,
+    /// For a sphere the ratio of stress to strain is not the modulus: it depends on load and
+    /// radius.
+    RatioOnSphere {
+        /// Index of the load.
+        load: usize,
+        /// a/R.
+        ratio: f64,
+    },
+    /// The modulus is far from that of every layer of the guide, so that it is badly determined, or
+    /// one of the inputs is in another unit.
+    UnlikeGuide {
+        /// Modulus over that of the layer that is most like it.
+        ratio: f64,
+    },
+    /// A contact is beyond what the law describes, and was not used.
+    OutOfReach {
+        /// Index of the load.
+        load: usize,
+    },
+    /// The sample is pressed on a guide that yields, and the estimator takes it for rigid: the
+    /// modulus is that of sample and guide together.
+    GuideIgnored,
+    /// Poisson's ratio is negative, which no rubber, gel or tissue has.
+    NegativePoissonRatio {
+        /// As it was stated.
+        poisson_ratio: f64,
+    },
+}
+
+impl Warning {
+    /// From this ratio of moduli on a sample is [unlike](Self::UnlikeGuide) its guide.
+    pub const UNLIKE_GUIDE: f64 = 10.0;
+}
+
+impl core::fmt::Display for Warning {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::LargeContact { load, ratio, limit } => write!(
+                f,
+                "load {}: a/R = {ratio:.3} is beyond {limit:.2}, \
+                     small-contact theory does not hold",
+                load + 1
+            ),
+            Self::ThinLayer { load, ratio, limit } => write!(
+                f,
+                "load {}: contact over layer thickness = {ratio:.3} \
+                     is beyond {limit:.2} for this law",
+                load + 1
+            ),
+            Self::LargeStrain {
+                load,
+                strain,
+                limit,
+            } => write!(
+                f,
+                "load {}: strain {strain:.3} is beyond {limit:.2}, \
+                     the linear law does not hold",
+                load + 1
+            ),
+            Self::ExcessScatter {
+                reduced_chi_squared,
+            } => write!(
+                f,
+                "scatter exceeds the stated errors \
+                     (reduced chi-squared {reduced_chi_squared:.2})"
+            ),
+            Self::UnboundedAbove => write!(f, "the data do not bound the modulus from above"),
+            Self::Intercept {
+                intercept_pa,
+                p_value,
+            } => write!(
+                f,
+                "the stress at zero strain is {intercept_pa:.1} Pa (p = {p_value:.4}), not zero"
+            ),
+            Self::NoErrorEstimate => write!(
+                f,
+                "no standard errors and no repetition: the interval is unknown"
+            ),
+            Self::RatioOnSphere { load, ratio } => write!(
+                f,
+                "load {}: stress over strain is biased on a sphere (a/R = {ratio:.3})",
+                load + 1
+            ),
+            Self::UnlikeGuide { ratio } => {
+                let (times, word) = match *ratio < 1.0 {
+                    true => (1.0 / ratio, "softer"),
+                    false => (*ratio, "stiffer"),
+                };
+                write!(
+                    f,
+                    "the sample is {times:.0} times {word} than the guide: are its layers, the \
+                     forces, the radius and the size of a pixel in the units asked for?"
+                )
+            }
+            Self::OutOfReach { load } => write!(
+                f,
+                "load {}: the contact is beyond what the law describes, and was not used",
+                load + 1
+            ),
+            Self::GuideIgnored => write!(
+                f,
+                "the estimator takes the guide for rigid: the modulus is that of sample and guide \
+                 together"
+            ),
+            Self::NegativePoissonRatio { poisson_ratio } => write!(
+                f,
+                "no rubber, gel or tissue has a Poisson's ratio of {poisson_ratio}: soft samples \
+                 have 0.3 to 0.5"
+            ),
+        }
+    }
+}

@@ -1,0 +1,126 @@
+//! Estimators and laws of one's own count the guide that the pipeline states.
+use super::trial;
+use crate::common;
+use tactile_imaging::elasticity::ElasticityError;
+use tactile_imaging::elasticity::contact::Body;
+use tactile_imaging::elasticity::laws::{ContactLaw, ContactLength, LogForce, Reach};
+use tactile_imaging::elasticity::modulus::{
+    ContactEstimator, Estimate, EstimatorKind, HertzSphere, LoadSeries, ModulusEstimate,
+    ModulusEstimator, Warning,
+};
+use tactile_simulate::Camera;
+
+/// Hertz's law of a contact radius, without slopes.
+struct OwnLaw {
+    radius_m: f64,
+}
+
+impl ContactLaw for OwnLaw {
+    fn log_force(&self, length: ContactLength, _share: f64) -> Reach {
+        match length {
+            ContactLength::Radius(a) => {
+                Reach::At(LogForce::new((4.0 / 3.0 * a.powi(3) / self.radius_m).ln()))
+            }
+            ContactLength::Indentation(_) => Reach::NotMine,
+        }
+    }
+}
+
+/// The weighted mean of Hertz's E*, less the guide's compliance.
+struct OwnEstimator;
+
+impl ModulusEstimator for OwnEstimator {
+    fn estimate(&self, series: &LoadSeries) -> Result<ModulusEstimate, ElasticityError> {
+        let bodies = series.bodies().expect("the pipeline's bodies");
+        let radius_m = bodies.object().sphere_radius_m().expect("a ball");
+        let (mut sum, mut weights) = (0.0, 0.0);
+        for load in series.loads() {
+            let (f, a) = (load.force_n, load.contact_radius_m.expect("a radius"));
+            let weight = f.relative_error().hypot(3.0 * a.relative_error()).powi(-2);
+            sum += weight * (0.75 * f.value * radius_m / a.value.powi(3)).ln();
+            weights += weight;
+        }
+        let reduced = (sum / weights).exp();
+        let part = 1.0 - reduced * bodies.in_series().compliance_per_pa();
+        let nu = bodies.object().poisson_ratio();
+        let modulus = (1.0 - nu * nu) * reduced / part;
+        let shared = series.shared_errors();
+        let relative = (weights.powf(-0.5).hypot(shared.force_scale))
+            .hypot(3.0 * shared.length_scale)
+            .hypot(shared.size)
+            .hypot((1.0 - part) * shared.other_body);
+        let modulus = Estimate::new(modulus, relative / part * modulus);
+        Ok(ModulusEstimate::new(self.kind(), modulus))
+    }
+
+    fn kind(&self) -> EstimatorKind {
+        EstimatorKind::Other("own")
+    }
+
+    fn needs_strain(&self) -> bool {
+        false
+    }
+
+    fn counts_guide(&self) -> bool {
+        true
+    }
+}
+
+/// Forty presses under other forces and noise: an own law and an own estimator of the physics of a
+/// built-in one give its modulus and its error.
+#[test]
+fn own_physics_gives_what_the_same_built_in_physics_gives() {
+    for seed in 0..40 {
+        let scale = 0.5 + 0.025 * seed as f64;
+        let trial = common::trial(
+            Camera::default().coarser(8),
+            &[0.4 * scale, 0.7 * scale],
+            seed,
+        );
+        let ball = trial.scene.options().object;
+        let (radius_m, nu) = (ball.radius_m, ball.material.poisson_ratio);
+        let built_in = trial.pipeline().unwrap();
+        let given = HertzSphere::new(radius_m, nu).unwrap();
+        let own_law = ContactEstimator::from_law(OwnLaw { radius_m }, nu).unwrap();
+        let pipelines = [
+            built_in.clone().with_estimator(given),
+            built_in.clone().with_estimator(own_law),
+            built_in.clone().with_estimator(OwnEstimator),
+        ];
+        let expected = trial.press(&built_in).unwrap().modulus().unwrap();
+        for pipeline in pipelines {
+            let found = trial.press(&pipeline).unwrap().modulus().unwrap();
+            let ratios = [
+                found.youngs_modulus_pa / expected.youngs_modulus_pa,
+                found.standard_error_pa / expected.standard_error_pa,
+            ];
+            for ratio in ratios {
+                // The weights of the loads differ by what the law adds to their errors.
+                let estimator = found.estimator;
+                assert!((ratio - 1.0).abs() < 0.01, "{seed} {estimator}: {ratios:?}");
+            }
+            assert!(!found.warnings.contains(&Warning::GuideIgnored));
+        }
+    }
+}
+
+/// What takes the guide for rigid says so, and has not the name of what counts it.
+#[test]
+fn an_estimator_that_ignores_the_guide_has_a_caution_and_another_name() {
+    let trial = trial(&[0.7, 1.2], 3);
+    let ball = trial.scene.options().object;
+    let hertz = HertzSphere::new(ball.radius_m, ball.material.poisson_ratio).unwrap();
+    let pipeline = trial.pipeline().unwrap();
+    let modulus = |estimator: Box<dyn ModulusEstimator + Send + Sync>| {
+        let pipeline = pipeline.clone().with_estimator(estimator);
+        trial.press(&pipeline).unwrap().modulus().unwrap()
+    };
+    let counted = modulus(Box::new(hertz.clone()));
+    let truth = ball.material.youngs_modulus_pa;
+    assert!((counted.youngs_modulus_pa / truth - 1.0).abs() < 0.05);
+    assert_eq!(counted.estimator, EstimatorKind::HertzSphere);
+    let rigid = modulus(Box::new(hertz.with_other_body(Body::rigid())));
+    assert!(rigid.youngs_modulus_pa < 0.5 * truth);
+    assert!(rigid.warnings.contains(&Warning::GuideIgnored));
+    assert_eq!(rigid.estimator, EstimatorKind::GuideIgnored);
+}
