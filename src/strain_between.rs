@@ -42,14 +42,14 @@ where
 impl<const D: usize> StrainBetweenOptions<D> {
     /// With another matcher.
     #[must_use]
-    pub fn with_matcher(mut self, matcher: impl PointMatcher<D> + Send + Sync + 'static) -> Self {
+    pub fn with_matcher(mut self, matcher: impl PointMatcher<D> + 'static) -> Self {
         self.matcher = Arc::new(matcher);
         self
     }
 
     /// With another measure of strain.
     #[must_use]
-    pub fn with_measure(mut self, measure: impl StrainMeasure + Send + Sync + 'static) -> Self {
+    pub fn with_measure(mut self, measure: impl StrainMeasure + 'static) -> Self {
         self.measure = Arc::new(measure);
         self
     }

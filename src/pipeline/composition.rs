@@ -268,7 +268,7 @@ impl Pipeline {
     #[must_use]
     pub fn with_surface(
         mut self,
-        surface: impl SurfaceReconstruction<f64> + Send + Sync + 'static,
+        surface: impl SurfaceReconstruction<f64> + 'static,
         input: SurfaceInput,
     ) -> Self {
         self.surface = Arc::new(surface);
@@ -297,7 +297,7 @@ impl Pipeline {
     #[must_use]
     pub fn with_estimator(
         mut self,
-        estimator: impl ModulusEstimator + Send + Sync + 'static,
+        estimator: impl ModulusEstimator + 'static,
     ) -> Self {
         self.estimator = EstimatorStage::given(Arc::new(estimator));
         self
@@ -316,7 +316,7 @@ impl Pipeline {
     #[must_use]
     pub fn with_sampler(
         mut self,
-        sampler: impl ControlPointSampler<f64> + Send + Sync + 'static,
+        sampler: impl ControlPointSampler<f64> + 'static,
     ) -> Self {
         self.sampler = Some(Arc::new(sampler));
         self
@@ -342,7 +342,7 @@ impl Pipeline {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     #[must_use]
-    pub fn with_matcher(mut self, matcher: impl PointMatcher<3> + Send + Sync + 'static) -> Self {
+    pub fn with_matcher(mut self, matcher: impl PointMatcher<3> + 'static) -> Self {
         self.matcher = Arc::new(matcher);
         self
     }
@@ -362,7 +362,7 @@ impl Pipeline {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     #[must_use]
-    pub fn with_strain(mut self, strain: impl StrainMeasure + Send + Sync + 'static) -> Self {
+    pub fn with_strain(mut self, strain: impl StrainMeasure + 'static) -> Self {
         self.strain = Arc::new(strain);
         self
     }
@@ -380,7 +380,7 @@ impl Pipeline {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     #[must_use]
-    pub fn with_warp(mut self, warp: impl WarpModel<3> + Send + Sync + 'static) -> Self {
+    pub fn with_warp(mut self, warp: impl WarpModel<3> + 'static) -> Self {
         self.warp = Arc::new(warp);
         self
     }

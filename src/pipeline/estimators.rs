@@ -133,7 +133,7 @@ fn paper_ratio(object: Object) -> Result<PaperRatio, ElasticityError> {
 }
 
 fn shared(
-    estimator: impl ModulusEstimator + Send + Sync + 'static,
+    estimator: impl ModulusEstimator + 'static,
 ) -> Result<SharedEstimator, ElasticityError> {
     Ok(Arc::new(estimator))
 }

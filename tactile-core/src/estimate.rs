@@ -153,7 +153,7 @@ impl Estimate {
     #[must_use]
     pub fn interval_95(self) -> Interval {
         let half = quantile_95(self.degrees_of_freedom) * self.standard_error;
-        if half >= 0.0 && half < f64::INFINITY {
+        if (0.0..f64::INFINITY).contains(&half) {
             Interval::new(self.value - half, Some(self.value + half))
         } else {
             Interval::new(f64::NEG_INFINITY, None)

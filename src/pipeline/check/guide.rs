@@ -154,6 +154,7 @@ impl KnownBall {
 }
 
 /// ln F of a press as a law gives it.
+#[derive(Debug)]
 struct PressForce {
     value: f64,
     /// In ln a.
