@@ -23,7 +23,7 @@ fn fit<K: Kernel>(
     study.run(knob, setting, is_default, job, |s| p.error(s));
 }
 
-/// Interpolation of exact data; the kernel of the pipeline's warp in space, −r, is the default.
+/// Interpolation of exact data in space, where r³ is the default.
 pub(crate) fn clean(study: &mut Study) {
     study.error_label = "rms error at 2000 queries, cube of side 2";
     let p = problem(200, 0.0);
@@ -31,7 +31,7 @@ pub(crate) fn clean(study: &mut Study) {
         study,
         "kernel",
         "r² ln r, 200 points",
-        true,
+        false,
         &p,
         &FitOptions::new(R2LogR),
     );
@@ -39,7 +39,7 @@ pub(crate) fn clean(study: &mut Study) {
         study,
         "kernel",
         "−r, 200 points",
-        true,
+        false,
         &p,
         &FitOptions::new(NegR),
     );
@@ -47,21 +47,21 @@ pub(crate) fn clean(study: &mut Study) {
         study,
         "kernel",
         "r³, 200 points",
-        false,
+        true,
         &p,
         &FitOptions::new(R3),
     );
     for n in study.choose(vec![50, 105, 400], vec![50, 105, 400, 800, 1600]) {
         let p = problem(n, 0.0);
-        let [log, line] = ["r² ln r", "−r"].map(|kernel| format!("{kernel}, {n} points"));
+        let [log, cube] = ["r² ln r", "r³"].map(|kernel| format!("{kernel}, {n} points"));
         fit(study, "points", &log, false, &p, &FitOptions::new(R2LogR));
-        fit(study, "points", &line, false, &p, &FitOptions::new(NegR));
+        fit(study, "points", &cube, false, &p, &FitOptions::new(R3));
     }
     refit(study, &p);
 }
 
 fn refit(study: &mut Study, p: &Problem) {
-    let factorization = Factorization::new(&p.sources, &FitOptions::new(NegR)).expect("a factor");
+    let factorization = Factorization::new(&p.sources, &FitOptions::new(R3)).expect("a factor");
     let (mut workspace, mut spline) = (SplineWorkspace::default(), Spline::default());
     let job = || {
         factorization
@@ -69,13 +69,9 @@ fn refit(study: &mut Study, p: &Problem) {
             .expect("a fit");
         spline.clone()
     };
-    study.run(
-        "solver",
-        "−r, 200 points, factors kept",
-        false,
-        job,
-        |s| p.error(s),
-    );
+    study.run("solver", "r³, 200 points, factors kept", false, job, |s| {
+        p.error(s)
+    });
 }
 
 /// Noise of ±0.02 on the targets: λ and its choice by cross-validation.
@@ -83,7 +79,7 @@ pub(crate) fn noisy(study: &mut Study) {
     study.error_label = "rms error at 2000 queries, noise ±0.02";
     let p = problem(200, 0.02);
     let smoothed = |smoothing| {
-        FitOptions::new(NegR)
+        FitOptions::new(R3)
             .with_smoothing(smoothing)
             .expect("a rule")
     };
@@ -93,7 +89,7 @@ pub(crate) fn noisy(study: &mut Study) {
         "interpolation (default)",
         true,
         &p,
-        &FitOptions::new(NegR),
+        &FitOptions::new(R3),
     );
     for lambda in study.choose(
         vec![1e-3, 1e-2, 1e-1, 1.0, 10.0],

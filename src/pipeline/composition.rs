@@ -295,10 +295,7 @@ impl Pipeline {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     #[must_use]
-    pub fn with_estimator(
-        mut self,
-        estimator: impl ModulusEstimator + 'static,
-    ) -> Self {
+    pub fn with_estimator(mut self, estimator: impl ModulusEstimator + 'static) -> Self {
         self.estimator = EstimatorStage::given(Arc::new(estimator));
         self
     }
@@ -314,10 +311,7 @@ impl Pipeline {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     #[must_use]
-    pub fn with_sampler(
-        mut self,
-        sampler: impl ControlPointSampler<f64> + 'static,
-    ) -> Self {
+    pub fn with_sampler(mut self, sampler: impl ControlPointSampler<f64> + 'static) -> Self {
         self.sampler = Some(Arc::new(sampler));
         self
     }

@@ -132,9 +132,7 @@ fn paper_ratio(object: Object) -> Result<PaperRatio, ElasticityError> {
     }
 }
 
-fn shared(
-    estimator: impl ModulusEstimator + 'static,
-) -> Result<SharedEstimator, ElasticityError> {
+fn shared(estimator: impl ModulusEstimator + 'static) -> Result<SharedEstimator, ElasticityError> {
     Ok(Arc::new(estimator))
 }
 

@@ -32,9 +32,10 @@ pub struct WarpArguments {
     targets: PathBuf,
     /// Points to warp.
     queries: PathBuf,
-    /// U(r): r² ln r (the thin plate of the plane), −r (of space) or r³.
-    #[arg(long, value_enum, default_value = "r2logr")]
-    kernel: KernelName,
+    /// U(r): r² ln r (the thin plate of the plane, the default there), r³ (the default in space) or
+    /// −r (the thin plate of space).
+    #[arg(long, value_enum)]
+    kernel: Option<KernelName>,
     /// Smoothing parameter, a number of at least zero, or gcv for the one of least generalised
     /// cross-validation.
     #[arg(long, value_name = "X|gcv", default_value = "0", value_parser = smoothing,
@@ -104,7 +105,14 @@ fn with_kernel<const D: usize>(
     context: &mut Context,
     sets: Sets<'_, D>,
 ) -> Result<Exit, Failure> {
-    match arguments.kernel {
+    // In space the gradient of −r has cusps, and r³ is nearer to smooth maps by a factor of three to
+    // five (`cargo bench -p tactile-benches --bench work_precision`).
+    let usual = if D == 2 {
+        KernelName::R2logr
+    } else {
+        KernelName::R3
+    };
+    match arguments.kernel.unwrap_or(usual) {
         KernelName::R2logr => warp(arguments, context, R2LogR, sets),
         KernelName::R => warp(arguments, context, NegR, sets),
         KernelName::R3 => warp(arguments, context, R3, sets),

@@ -143,7 +143,8 @@ pub struct R2LogR;
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct NegR;
 
-/// U(r) = r³: one derivative smoother than −r (m = 3 in space, with an affine polynomial).
+/// U(r) = r³: one derivative smoother than −r (m = 3 in space, with an affine polynomial), and the
+/// kernel to take for smooth maps of space.
 ///
 /// ```
 /// use tactile_tps::{Kernel, R3};
