@@ -1,7 +1,9 @@
 //! What several subcommands ask for: numbers, repetitions, frames of a sensor, masks and known
 //! heights.
-use crate::console::{Failure, Interrupt, four_digits, median_ms};
+use crate::console::{Interrupt, median_ms};
+use crate::failure::Failure;
 use crate::frames::Reading;
+use crate::text::four_digits;
 use clap::{Args, ValueEnum};
 use ndarray::Array2;
 use std::path::{Path, PathBuf};

@@ -1,8 +1,10 @@
 //! `tactile calibrate`: a sensor from presses under known forces, or the line from integrated pixel
 //! value to force.
-use crate::console::{Context, Exit, Failure, digits, four_digits, in_unit};
+use crate::console::Context;
+use crate::failure::{Exit, Failure};
 use crate::photometric;
 use crate::plot::{Colour, Page, Panel};
+use crate::text::{digits, four_digits, in_unit};
 use clap::Args;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};

@@ -1,121 +1,17 @@
-//! What every subcommand has at hand: the standard streams, exit codes, Ctrl-C, the limit of
-//! memory, bars, and numbers as text.
+//! What every subcommand has at hand: the standard streams, Ctrl-C, the limit of memory and bars.
+use crate::failure::{Exit, Failure};
 use crate::outputs::Outputs;
+use crate::text::printable;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde::Serialize;
 use serde_json::{Value, json};
-use std::fmt::{self, Display};
+use std::fmt::Display;
 use std::io::{BufWriter, ErrorKind, Write, stderr, stdout};
 use std::ops::ControlFlow;
-use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, mpsc};
 use std::time::{Duration, Instant};
-use tactile_files::io::FileError;
-use tactile_imaging::force::Estimate;
-use tactile_imaging::pipeline::{Flag, with_error};
-
-/// The exit codes, as the help of the program lists them.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Exit {
-    /// All that was asked for is there.
-    Complete,
-    /// Something is there, but a stage has no answer. It is printed with its reason.
-    Partial,
-    /// Arguments or input that cannot be used: nothing was computed.
-    Input,
-    /// The answer could not be written.
-    Output,
-    /// Stopped by Ctrl-C or a signal of its kind, after the results at that time were printed.
-    Interrupted,
-}
-
-impl Exit {
-    pub fn code(self) -> u8 {
-        match self {
-            Self::Complete => 0,
-            Self::Partial => 1,
-            Self::Input => 2,
-            Self::Output => 3,
-            Self::Interrupted => 130,
-        }
-    }
-
-    /// Complete or, where something is missing, partial.
-    pub fn complete_if(complete: bool) -> Self {
-        if complete {
-            Self::Complete
-        } else {
-            Self::Partial
-        }
-    }
-}
-
-/// Why a call came to nothing, in one sentence.
-#[derive(Debug)]
-pub struct Failure {
-    pub exit: Exit,
-    sentence: String,
-}
-
-impl Failure {
-    fn new(exit: Exit, sentence: impl Display) -> Self {
-        let sentence = sentence.to_string();
-        Self { exit, sentence }
-    }
-
-    /// The input cannot be used.
-    pub fn input(sentence: impl Display) -> Self {
-        Self::new(Exit::Input, sentence)
-    }
-
-    /// This file cannot be used.
-    pub fn in_file(path: &Path, error: impl Display) -> Self {
-        Self::input(format!("{}: {error}", path.display()))
-    }
-
-    /// The input is fine, but there is no answer.
-    pub fn no_answer(sentence: impl Display) -> Self {
-        Self::new(Exit::Partial, sentence)
-    }
-
-    /// The answer could not be written.
-    pub fn output(sentence: impl Display) -> Self {
-        Self::new(Exit::Output, sentence)
-    }
-}
-
-impl Display for Failure {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        // Decoders of images say what is wrong in several lines, and go on with their own data.
-        let own = self.sentence.split(" while decoding ChunkType").next();
-        let words: Vec<&str> = own.unwrap_or_default().split_whitespace().collect();
-        f.write_str(&printable(&words.join(" ")))
-    }
-}
-
-impl From<FileError> for Failure {
-    fn from(error: FileError) -> Self {
-        match error {
-            FileError::Write { .. } => Self::output(error),
-            _ => Self::input(error),
-        }
-    }
-}
-
-/// Text of others for terminals and pictures: control characters and marks that turn the direction
-/// of writing are replaced.
-///
-/// Without this a file's name could clear the screen, forge a line of the answer, or make an SVG
-/// file unreadable.
-pub fn printable(text: &str) -> String {
-    let hidden = |c: char| {
-        c.is_control()
-            || matches!(c, '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
-    };
-    let seen = |c| if hidden(c) { '\u{fffd}' } else { c };
-    text.chars().map(seen).collect()
-}
+use tactile_imaging::pipeline::Flag;
 
 /// The standard streams, Ctrl-C, the limit of memory and the files to write.
 pub struct Context {
@@ -132,7 +28,7 @@ pub struct Context {
 }
 
 /// The version of the JSON objects that `docs/json.md` describes.
-const SCHEMA: &str = "tactile-1";
+const SCHEMA: &str = "tactile-2";
 
 /// What `--json` prints: the answer of a subcommand, and what all have in common.
 #[derive(Serialize)]
@@ -498,42 +394,9 @@ impl Drop for Bar {
     }
 }
 
-/// Four significant digits, for numbers whose error is not known.
-pub fn four_digits(value: f64) -> String {
-    digits(value, 4)
-}
-
-/// A number of significant digits, plain where the value is neither tiny nor huge.
-pub fn digits(value: f64, significant: usize) -> String {
-    if value == 0.0 || !value.is_finite() {
-        return format!("{value}");
-    }
-    let power = value.abs().log10().floor() as i32;
-    let last = significant as i32 - 1;
-    if (-4..=last.max(5)).contains(&power) {
-        format!("{value:.*}", (last - power).max(0) as usize)
-    } else {
-        format!("{value:.*e}", last.max(0) as usize)
-    }
-}
-
-/// A value with its standard error in a unit of which one is `1 / scale`.
-pub fn in_unit(estimate: Estimate, scale: f64) -> String {
-    with_error(estimate.value, estimate.standard_error, scale)
-}
-
-/// `1 point`, `2 points`.
-pub fn count(n: usize, noun: &str) -> String {
-    format!("{n} {noun}{}", if n == 1 { "" } else { "s" })
-}
-
 /// The median of repeated times in milliseconds.
 pub fn median_ms(mut times: Vec<Duration>) -> f64 {
     times.sort_unstable();
     let middle = times.get(times.len() / 2);
     middle.map_or(0.0, |t| t.as_secs_f64() * 1e3)
 }
-
-#[cfg(test)]
-#[path = "console_tests.rs"]
-mod tests;

@@ -1,11 +1,13 @@
 //! `tactile depth`: contact and depth of a sensor that grows darker where it is pressed.
 use crate::arguments::SensorFrames;
-use crate::console::{Context, Exit, Failure, four_digits, in_unit};
+use crate::console::Context;
+use crate::failure::{Exit, Failure};
 use crate::frames::NamedFrame;
 use crate::outputs::Csv;
 use crate::photometric::{self, unless_sensor};
 use crate::plot::{Colour, HeatMap, Page, Panel, circle, known_heights_mm};
 use crate::surfaces::span;
+use crate::text::{four_digits, in_unit};
 use clap::{Args, ValueEnum};
 use ndarray::Array2;
 use serde_json::{Value, json};

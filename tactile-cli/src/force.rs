@@ -1,9 +1,11 @@
 //! `tactile force`: normal force, contact and stress from frames.
 use crate::arguments::SensorFrames;
 use crate::calibrate::PairLine;
-use crate::console::{Bar, Context, Exit, Failure, in_unit};
+use crate::console::{Bar, Context};
+use crate::failure::{Exit, Failure};
 use crate::frames::NamedFrame;
 use crate::outputs::Csv;
+use crate::text::in_unit;
 use clap::Args;
 use ndarray::Array2;
 use serde::Serialize;

@@ -1,6 +1,7 @@
 //! The frames of images, stacks, videos and pipes, as several subcommands measure them.
 use crate::arguments::same_shape;
-use crate::console::{Context, Exit, Failure};
+use crate::console::Context;
+use crate::failure::{Exit, Failure};
 use ndarray::{Array2, Array3, ArrayView3, Axis};
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};

@@ -1,6 +1,7 @@
 //! `tactile inclusion`: size, depth and stiffness of a lump under the surface of a block.
 use crate::arguments::{contrast, lump_mm, modulus_kpa};
-use crate::console::{Bar, Context, Exit, Failure};
+use crate::console::{Bar, Context};
+use crate::failure::{Exit, Failure};
 use crate::hidden::Hidden;
 use crate::outputs::Csv;
 use crate::plot::{Colour, Page, Panel, circle};

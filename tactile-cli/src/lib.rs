@@ -10,6 +10,7 @@ mod arguments;
 mod calibrate;
 mod console;
 mod depth;
+mod failure;
 mod force;
 mod frames;
 mod hidden;
@@ -30,19 +31,20 @@ mod strain;
 mod stream;
 mod surfaces;
 mod table;
+mod text;
 mod warp;
-
-pub use plot::{PlotError, save_press_pages};
 
 use clap::error::ErrorKind;
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
-use console::{Context, Exit, Failure, printable};
+use console::Context;
+use failure::{Exit, Failure};
 use outputs::Outputs;
 use report::Report;
 use std::ffi::OsString;
 use std::io::Write;
 use std::path::PathBuf;
 use std::process::ExitCode;
+use text::printable;
 
 /// Force, shape, strain and Young's modulus from the frames of an optical tactile sensor.
 ///

@@ -1,5 +1,6 @@
 //! `tactile light`: why an optical tactile sensor sees a press.
-use crate::console::{Bar, Context, Exit, Failure};
+use crate::console::{Bar, Context};
+use crate::failure::{Exit, Failure};
 use crate::plot::{Colour, Page, Panel};
 use clap::Args;
 use serde_json::{Map, Value, json};

@@ -1,7 +1,9 @@
 //! `tactile markers`: printed markers followed from a reference.
 use crate::arguments::positive;
-use crate::console::{Context, Exit, Failure, four_digits, in_unit};
+use crate::console::Context;
+use crate::failure::{Exit, Failure};
 use crate::outputs::{Csv, beside};
+use crate::text::{four_digits, in_unit};
 use clap::Args;
 use ndarray::Array2;
 use serde_json::{Value, json};

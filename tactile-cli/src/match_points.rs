@@ -1,6 +1,8 @@
 //! `tactile match`: the point sets of case files.
 use crate::arguments::{Repetition, positive, read_points};
-use crate::console::{Context, Exit, Failure, count, four_digits, printable};
+use crate::console::Context;
+use crate::failure::{Exit, Failure};
+use crate::text::{count, four_digits, printable};
 use clap::{Args, ValueEnum};
 use nalgebra::Point;
 use serde_json::{Value, json};

@@ -1,9 +1,11 @@
 //! `tactile measure`: everything, of a simulated press or of a user's own frames.
 use crate::arguments::{Repetition, force_n, length_mm, modulus_kpa};
-use crate::console::{Bar, Context, Exit, Failure, four_digits, in_unit};
+use crate::console::{Bar, Context};
+use crate::failure::{Exit, Failure};
 use crate::frames::{NamedFrame, Reading};
 use crate::photometric;
 use crate::plot::{PlotError, known_heights_mm, press_pages, summary_lines};
+use crate::text::{four_digits, in_unit};
 use clap::{Args, ValueEnum};
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -176,8 +178,7 @@ impl Simulation {
                      up to 2 N: give larger ones"
                         .to_owned()
                 }
-                // The library names its field, a user has written --forces.
-                error => error.to_string().replace("force_n", "the force in N"),
+                error => error.to_string(),
             };
             Failure::input(format!("the press cannot be simulated: {error}{hint}"))
         })?;
@@ -347,23 +348,18 @@ pub fn run(arguments: &MeasureArguments, context: &mut Context) -> Result<Exit, 
     ];
     let names = stages.map(|name| format!("{name}.svg"));
     context.outputs.plan(&names, arguments.scene.as_slice())?;
-    // It lives as long as the program, so that Ctrl-C can leave work on it undone.
-    let frames: &'static Frames = Box::leak(Box::new(Frames::open(arguments, context)?));
+    let frames = Frames::open(arguments, context)?;
     let pipeline = frames.pipeline(arguments.points as usize)?;
     let mut press = frames.press(&pipeline)?;
     // The contact of a frame needs nothing of the others: these are there if Ctrl-C ends the rest.
     let Some(contacts) = contacts(&mut press, context) else {
         return Ok(Exit::Interrupted);
     };
-    let job = format!("measuring {} frames", press.frames());
-    let measured = context.wait(job, move || {
-        let measurement = press.measure();
-        (press, measurement)
-    });
-    let Some((mut press, mut measurement)) = measured else {
+    if !long_stages(&press, context) {
         print_contacts(&contacts, context);
         return Ok(Exit::Interrupted);
-    };
+    }
+    let mut measurement = press.measure();
     let timing = timing(&press, arguments.repetition.repeat, context);
     let truth = frames.truth();
     print(&measurement, truth, &timing, context);
@@ -387,7 +383,7 @@ pub fn run(arguments: &MeasureArguments, context: &mut Context) -> Result<Exit, 
     if let Some(report) = &mut context.outputs.report {
         report.measurement(&measurement);
         report.inputs(arguments.frames.iter().cloned());
-        if let Frames::Scene(own) = frames {
+        if let Frames::Scene(own) = &frames {
             report.assumptions(&own.0);
         }
     }
@@ -443,6 +439,25 @@ fn contacts(press: &mut Press<'_>, context: &mut Context) -> Option<Vec<Contact>
         bar.done(frame + 1);
     }
     Some(contacts)
+}
+
+/// Runs the long stages one by one, so that Ctrl-C ends the work between two of them. False if it
+/// did. The press keeps the answers and the errors of its stages.
+fn long_stages(press: &Press<'_>, context: &Context) -> bool {
+    let mut bar = Bar::of(press.frames() + 1, "measuring surfaces and strain");
+    for frame in 0..press.frames() {
+        if context.interrupt.requested() {
+            return false;
+        }
+        let _ = press.surface(frame);
+        bar.done(frame + 1);
+    }
+    if let last @ 1.. = press.frames().saturating_sub(1)
+        && !context.interrupt.requested()
+    {
+        let _ = press.strain(last);
+    }
+    !context.interrupt.requested()
 }
 
 /// The contacts alone, of a measurement that Ctrl-C stopped.

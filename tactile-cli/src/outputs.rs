@@ -1,6 +1,6 @@
 //! The files of a call: named and checked before the work starts, written after the answer is
 //! printed.
-use crate::console::Failure;
+use crate::failure::Failure;
 use crate::plot::Page;
 use crate::report::Report;
 use ndarray::Array2;

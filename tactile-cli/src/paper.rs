@@ -1,6 +1,8 @@
 //! `tactile paper`: the experiments of the paper's section 5 on the simulated sensor.
-use crate::console::{Bar, Context, Exit, Failure, digits, in_unit, median_ms};
+use crate::console::{Bar, Context, median_ms};
+use crate::failure::{Exit, Failure};
 use crate::plot::{Colour, Page, Panel};
+use crate::text::{digits, in_unit};
 use clap::Args;
 use nalgebra::Point3;
 use serde_json::{Map, Value, json};

@@ -1,8 +1,10 @@
 //! Sensors with a gel that is lit in colours: `tactile calibrate` and `tactile depth` for them.
-use crate::console::{Context, Exit, Failure, four_digits, in_unit};
+use crate::console::Context;
+use crate::failure::{Exit, Failure};
 use crate::frames::{NamedFrame, Reading};
 use crate::outputs::{Csv, beside};
 use crate::plot::{HeatMap, Page, Panel};
+use crate::text::{four_digits, in_unit};
 use clap::Arg;
 use clap::builder::ArgPredicate;
 use ndarray::Array3;

@@ -1,5 +1,5 @@
 //! `tactile stream --record FILE`: the frames as they came, with their answers beside them.
-use crate::console::Failure;
+use crate::failure::Failure;
 use ndarray::{ArrayView3, Axis};
 use std::fs::File;
 use std::io::{BufWriter, Result as IoResult, Write};

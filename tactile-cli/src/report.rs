@@ -1,6 +1,6 @@
 //! Answers as pages for people: one HTML file that needs nothing else.
-use crate::console::{four_digits, printable};
 use crate::relief::HeightGrid;
+use crate::text::{four_digits, printable};
 use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
 use hmac_sha256::Hash;

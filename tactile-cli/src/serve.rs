@@ -1,5 +1,5 @@
 //! `tactile stream --serve`: the measurement as it runs, on a page for browsers.
-use crate::console::Failure;
+use crate::failure::Failure;
 use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
 use ndarray::{ArrayView3, Axis, Slice};

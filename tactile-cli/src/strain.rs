@@ -1,9 +1,11 @@
 //! `tactile strain`: from two sets of points, before and after a deformation.
 use crate::arguments::{read_paired_points, read_points};
-use crate::console::{Context, Exit, Failure, count, digits, four_digits};
+use crate::console::Context;
+use crate::failure::{Exit, Failure};
 use crate::match_points::{self, Expectations};
 use crate::outputs::{Csv, Npz};
 use crate::plot::{Colour, Page, Panel};
+use crate::text::{count, digits, four_digits};
 use clap::{Args, ValueEnum};
 use nalgebra::{Matrix3, Point, SVector};
 use serde_json::{Map, Value, json};

@@ -1,8 +1,10 @@
 //! `tactile integrate`: heights from slopes.
 use crate::arguments::{HeightRegion, Repetition, name, one_or_two, same_shape};
-use crate::console::{Bar, Context, Exit, Failure, four_digits};
+use crate::console::{Bar, Context};
+use crate::failure::{Exit, Failure};
 use crate::outputs::Csv;
 use crate::plot::{HeatMap, Page, Panel};
+use crate::text::four_digits;
 use clap::{Args, ValueEnum};
 use ndarray::Array2;
 use serde_json::json;

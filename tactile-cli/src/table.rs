@@ -1,6 +1,7 @@
 //! `tactile table`: the contacts of a ball with a sensor's guide, computed once by finite elements.
 use crate::arguments::{modulus_kpa, positive};
-use crate::console::{Bar, Context, Exit, Failure};
+use crate::console::{Bar, Context};
+use crate::failure::{Exit, Failure};
 use clap::Args;
 use serde_json::json;
 use std::path::PathBuf;

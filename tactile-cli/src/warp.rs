@@ -1,7 +1,9 @@
 //! `tactile warp`: a thin-plate spline through pairs of points.
 use crate::arguments::{Repetition, read_points};
-use crate::console::{Bar, Context, Exit, Failure, count, four_digits, median_ms};
+use crate::console::{Bar, Context, median_ms};
+use crate::failure::{Exit, Failure};
 use crate::outputs::Csv;
+use crate::text::{count, four_digits};
 use clap::{Args, ValueEnum};
 use nalgebra::{Point, SMatrix};
 use serde_json::json;

@@ -39,7 +39,7 @@ const LEAST_SHARE: f64 = 0.25;
 
 /// What a surface may touch.
 #[derive(Debug, Clone)]
-pub enum Opposite {
+pub(crate) enum Opposite {
     /// Another body's surface.
     Surface(SurfaceCurve),
     /// A rigid shape above (+1) or below (−1) the surface, whose pole is at z = 0 in the reference
@@ -49,7 +49,7 @@ pub enum Opposite {
 
 /// Half of an edge of a contact surface, between two of its nodes.
 #[derive(Debug, Clone)]
-pub struct ContactSegment {
+pub(crate) struct ContactSegment {
     pub pair: usize,
     pub nodes: [usize; 3],
     /// Parameters of its ends on the edge.
@@ -60,7 +60,7 @@ pub struct ContactSegment {
 
 /// A Gauss point of a surface at which a gap is measured.
 #[derive(Debug, Clone)]
-pub struct GapPoint {
+pub(crate) struct GapPoint {
     pub pair: usize,
     pub nodes: [usize; 3],
     pub shape: [f64; 3],
@@ -72,7 +72,7 @@ pub struct GapPoint {
 
 /// A node of a contact surface, which carries a pressure.
 #[derive(Debug, Clone)]
-pub struct ContactNode {
+pub(crate) struct ContactNode {
     pub pair: usize,
     pub node: usize,
     /// Reference area of the hat function.
@@ -85,7 +85,7 @@ pub struct ContactNode {
 
 impl ContactSegment {
     /// Gauss points between the cuts, which are parameters on the edge in ascending order.
-    pub fn points(&self, cuts: &[f64], nodes: &[[f64; 2]]) -> Vec<GapPoint> {
+    pub(crate) fn points(&self, cuts: &[f64], nodes: &[[f64; 2]]) -> Vec<GapPoint> {
         let [start, end] = self.ends;
         let mut bounds = vec![start];
         bounds.extend(cuts);
@@ -160,7 +160,7 @@ impl ContactSegment {
 }
 
 /// The segments of a surface's edges and their nodes, numbered from `first_node`.
-pub fn contact_segments(
+pub(crate) fn contact_segments(
     pair: usize,
     first_node: usize,
     edges: &[[usize; 3]],
@@ -212,7 +212,7 @@ pub fn contact_segments(
 
 /// Edges of a surface from the axis outwards.
 #[derive(Debug, Clone)]
-pub struct SurfaceCurve {
+pub(crate) struct SurfaceCurve {
     /// Nodes (inner end, middle, outer end).
     edges: Vec<[usize; 3]>,
     /// +1 where the body is on the left of the way outwards: its outward normal is (z', −r').
@@ -224,7 +224,7 @@ type Weights = [f64; 3];
 
 /// An edge's nodes, and their weights in position, first and second derivative at one parameter.
 #[derive(Debug, Clone, Copy)]
-pub struct CurvePoint {
+pub(crate) struct CurvePoint {
     pub nodes: [usize; 3],
     pub position: Weights,
     pub first: Weights,
@@ -235,14 +235,14 @@ const BEND: Weights = [1.0, -2.0, 1.0];
 
 impl CurvePoint {
     /// Weighted sum over the nodes.
-    pub fn sum(&self, weights: &Weights, at: impl Fn(usize) -> [f64; 2]) -> [f64; 2] {
+    pub(crate) fn sum(&self, weights: &Weights, at: impl Fn(usize) -> [f64; 2]) -> [f64; 2] {
         combine(weights, self.nodes, at)
     }
 }
 
 impl SurfaceCurve {
     /// From edges ordered along a surface whose radius grows along it.
-    pub fn new(edges: &[[usize; 3]], coordinates: &[[f64; 2]]) -> Self {
+    pub(crate) fn new(edges: &[[usize; 3]], coordinates: &[[f64; 2]]) -> Self {
         let outwards = |edge: &[usize; 3]| coordinates[edge[2]][0] > coordinates[edge[0]][0];
         Self {
             side: if edges.first().is_some_and(outwards) {
@@ -263,12 +263,12 @@ impl SurfaceCurve {
         }
     }
 
-    pub fn edges(&self) -> &[[usize; 3]] {
+    pub(crate) fn edges(&self) -> &[[usize; 3]] {
         &self.edges
     }
 
     /// The point of an edge at ξ in [−1, 1].
-    pub fn at(&self, edge: usize, xi: f64) -> CurvePoint {
+    pub(crate) fn at(&self, edge: usize, xi: f64) -> CurvePoint {
         let (position, first) = quadratic(xi);
         CurvePoint {
             nodes: self.edges[edge],
@@ -280,7 +280,7 @@ impl SurfaceCurve {
 
 /// Where contact is judged: reference coordinates and displacements.
 #[derive(Clone, Copy)]
-pub struct Placement<'a> {
+pub(crate) struct Placement<'a> {
     pub kinematics: Kinematics,
     pub nodes: &'a [[f64; 2]],
     pub displacement: &'a [f64],
@@ -289,7 +289,7 @@ pub struct Placement<'a> {
 
 impl Placement<'_> {
     /// Where a node is: in linear kinematics at its undeformed radius, as gaps are.
-    pub fn current(&self, node: usize) -> [f64; 2] {
+    pub(crate) fn current(&self, node: usize) -> [f64; 2] {
         let [r, z] = self.nodes[node];
         let [u, w] = self.moved(node);
         match self.kinematics {
@@ -298,13 +298,18 @@ impl Placement<'_> {
         }
     }
 
-    pub fn moved(&self, node: usize) -> [f64; 2] {
+    pub(crate) fn moved(&self, node: usize) -> [f64; 2] {
         [self.displacement[2 * node], self.displacement[2 * node + 1]]
     }
 
     /// Deformed area over reference area at a point of an edge with these shape functions (one in
     /// linear kinematics).
-    pub fn stretch(&self, shape: &[f64; 3], derivative: &[f64; 3], nodes: [usize; 3]) -> f64 {
+    pub(crate) fn stretch(
+        &self,
+        shape: &[f64; 3],
+        derivative: &[f64; 3],
+        nodes: [usize; 3],
+    ) -> f64 {
         if self.kinematics == Kinematics::Linear {
             return 1.0;
         }
@@ -329,11 +334,11 @@ fn combine(shape: &[f64; 3], nodes: [usize; 3], at: impl Fn(usize) -> [f64; 2]) 
 }
 
 /// Stands for the approach among the displacement components of a [`Gap`].
-pub const DRIVER: usize = usize::MAX;
+pub(crate) const DRIVER: usize = usize::MAX;
 
 /// A gap and its derivatives by the displacement components `dofs`.
 #[derive(Debug, Clone)]
-pub struct Gap {
+pub(crate) struct Gap {
     pub value: f64,
     pub dofs: Vec<usize>,
     pub first: Vec<f64>,
@@ -344,7 +349,7 @@ pub struct Gap {
 }
 
 /// The point of a surface that is closest to another.
-pub struct Nearest {
+pub(crate) struct Nearest {
     pub at: CurvePoint,
     /// Parameter on its edge.
     xi: f64,
@@ -386,7 +391,7 @@ fn averaged(gaps: &[(Gap, f64)], total: f64) -> Gap {
 
 impl Placement<'_> {
     /// The gap of a point, `None` where there is nothing opposite to it.
-    pub fn gap(&self, point: &GapPoint, opposite: &Opposite) -> Option<Gap> {
+    pub(crate) fn gap(&self, point: &GapPoint, opposite: &Opposite) -> Option<Gap> {
         match opposite {
             Opposite::Rigid { shape, side } => self.rigid_gap(point, *shape, *side),
             Opposite::Surface(curve) => match self.kinematics {
@@ -434,7 +439,7 @@ impl Placement<'_> {
     }
 
     /// The closest point of a deformed surface. `None` beyond its outer end.
-    pub fn nearest(&self, curve: &SurfaceCurve, position: [f64; 2]) -> Option<Nearest> {
+    pub(crate) fn nearest(&self, curve: &SurfaceCurve, position: [f64; 2]) -> Option<Nearest> {
         let mut best: Option<(f64, Nearest, bool)> = None;
         for (index, edge) in curve.edges().iter().enumerate() {
             let [a, _, b] = edge.map(|node| self.current(node));
@@ -523,7 +528,7 @@ impl Placement<'_> {
     }
 
     /// Edge and parameter of a surface's point at a reference radius.
-    pub fn opposite(&self, curve: &SurfaceCurve, radius: f64) -> Option<(usize, f64)> {
+    pub(crate) fn opposite(&self, curve: &SurfaceCurve, radius: f64) -> Option<(usize, f64)> {
         let edge = curve.edges().iter().position(|edge| {
             let [a, _, b] = edge.map(|node| self.nodes[node][0]);
             a <= radius && radius <= b
@@ -620,7 +625,7 @@ impl Relative {
 
 /// A node of a contact surface that is in contact or may come into it.
 #[derive(Debug, Clone)]
-pub struct Candidate {
+pub(crate) struct Candidate {
     /// Index of the contact node.
     pub index: usize,
     pub gap: Gap,
@@ -632,7 +637,7 @@ pub struct Candidate {
 
 impl ElementModel {
     /// Where contact is judged at a state.
-    pub fn placement<'a>(&'a self, fields: &'a ModelFields) -> Placement<'a> {
+    pub(crate) fn placement<'a>(&'a self, fields: &'a ModelFields) -> Placement<'a> {
         Placement {
             kinematics: self.kinematics,
             nodes: &self.nodes,
@@ -642,7 +647,7 @@ impl ElementModel {
     }
 
     /// Contact nodes that touch or are nearer than two spacings and `margin`.
-    pub fn candidates(&self, fields: &ModelFields, margin: f64) -> Vec<Candidate> {
+    pub(crate) fn candidates(&self, fields: &ModelFields, margin: f64) -> Vec<Candidate> {
         let placement = self.placement(fields);
         let points = self.contact_points(fields);
         let mut around: Vec<Vec<(Gap, f64)>> = vec![Vec::new(); self.contact_nodes.len()];
@@ -680,7 +685,7 @@ impl ElementModel {
     }
 
     /// The points at which gaps are measured at a state.
-    pub fn contact_points(&self, fields: &ModelFields) -> Vec<GapPoint> {
+    pub(crate) fn contact_points(&self, fields: &ModelFields) -> Vec<GapPoint> {
         let placement = self.placement(fields);
         let mut points = Vec::with_capacity(3 * self.segments.len());
         for segment in &self.segments {

@@ -9,19 +9,19 @@
 use crate::material::{Gradient, Kinematics, Material, PointDeformation, StressResponse};
 
 /// Displacement components of the outer nodes (r, z of each).
-pub const OUTER: usize = 16;
+pub(crate) const OUTER: usize = 16;
 /// Displacement components of all nodes.
-pub const ALL: usize = 18;
+pub(crate) const ALL: usize = 18;
 
 /// Three-point Gauss rule on [−1, 1].
-pub const GAUSS3: [(f64, f64); 3] = [
+pub(crate) const GAUSS3: [(f64, f64); 3] = [
     (-0.774_596_669_241_483_4, 5.0 / 9.0),
     (0.0, 8.0 / 9.0),
     (0.774_596_669_241_483_4, 5.0 / 9.0),
 ];
 
 /// Quadratic shape functions at x = −1, 0, 1 and their derivatives, for x in [−1, 1].
-pub fn quadratic(x: f64) -> ([f64; 3], [f64; 3]) {
+pub(crate) fn quadratic(x: f64) -> ([f64; 3], [f64; 3]) {
     (
         [0.5 * x * (x - 1.0), 1.0 - x * x, 0.5 * x * (x + 1.0)],
         [x - 0.5, -2.0 * x, x + 0.5],
@@ -42,7 +42,7 @@ const GRID: [[usize; 2]; 9] = [
 ];
 
 /// Shape functions and their derivatives by ξ and η.
-pub fn shape(xi: f64, eta: f64) -> [[f64; 3]; 9] {
+pub(crate) fn shape(xi: f64, eta: f64) -> [[f64; 3]; 9] {
     let (a, da) = quadratic(xi);
     let (b, db) = quadratic(eta);
     GRID.map(|[i, j]| [a[i] * b[j], da[i] * b[j], a[i] * db[j]])
@@ -50,7 +50,7 @@ pub fn shape(xi: f64, eta: f64) -> [[f64; 3]; 9] {
 
 /// Shape values at a Gauss point in the reference configuration.
 #[derive(Debug, Clone, Default)]
-pub struct GaussPoint {
+pub(crate) struct GaussPoint {
     /// ∂N/∂r of each node.
     by_r: [f64; 9],
     /// ∂N/∂z.
@@ -65,7 +65,7 @@ pub struct GaussPoint {
 
 /// The reference configuration of an element.
 #[derive(Debug, Clone)]
-pub struct ElementGeometry {
+pub(crate) struct ElementGeometry {
     pub points: [GaussPoint; 9],
     /// Inverse of the pressures' mass matrix.
     inverse_mass: [[f64; 3]; 3],
@@ -73,7 +73,10 @@ pub struct ElementGeometry {
 
 /// Where shape functions put the point of an element, the derivatives of that by ξ and η, and their
 /// determinant.
-pub fn position(nodes: &[[f64; 2]; 9], shapes: &[[f64; 3]; 9]) -> ([f64; 2], [[f64; 2]; 2], f64) {
+pub(crate) fn position(
+    nodes: &[[f64; 2]; 9],
+    shapes: &[[f64; 3]; 9],
+) -> ([f64; 2], [[f64; 2]; 2], f64) {
     let mut position = [0.0; 2];
     let mut jacobian = [[0.0; 2]; 2];
     for (node, [n, by_xi, by_eta]) in nodes.iter().zip(shapes) {
@@ -88,7 +91,7 @@ pub fn position(nodes: &[[f64; 2]; 9], shapes: &[[f64; 3]; 9]) -> ([f64; 2], [[f
 }
 
 /// The point ξ, η of an element: position, gradients, Jacobian's determinant.
-pub fn map(nodes: &[[f64; 2]; 9], xi: f64, eta: f64) -> ([f64; 2], [[f64; 3]; 9], f64) {
+pub(crate) fn map(nodes: &[[f64; 2]; 9], xi: f64, eta: f64) -> ([f64; 2], [[f64; 3]; 9], f64) {
     let shapes = shape(xi, eta);
     let (position, jacobian, determinant) = position(nodes, &shapes);
     let gradients = shapes.map(|[n, by_xi, by_eta]| {
@@ -102,7 +105,7 @@ pub fn map(nodes: &[[f64; 2]; 9], xi: f64, eta: f64) -> ([f64; 2], [[f64; 3]; 9]
 }
 
 /// Pressure shape functions 1, (r − r₀)/h, (z − z₀)/h of an element at a reference position.
-pub fn pressure_functions(nodes: &[[f64; 2]; 9], position: [f64; 2]) -> [f64; 3] {
+pub(crate) fn pressure_functions(nodes: &[[f64; 2]; 9], position: [f64; 2]) -> [f64; 3] {
     let centre = nodes[8];
     let size = (nodes[0][0] - nodes[2][0]).hypot(nodes[0][1] - nodes[2][1]);
     [
@@ -114,7 +117,7 @@ pub fn pressure_functions(nodes: &[[f64; 2]; 9], position: [f64; 2]) -> [f64; 3]
 
 impl ElementGeometry {
     /// `None` where the element is turned inside out or degenerate at a Gauss point.
-    pub fn new(nodes: &[[f64; 2]; 9]) -> Option<Self> {
+    pub(crate) fn new(nodes: &[[f64; 2]; 9]) -> Option<Self> {
         let mut points: [GaussPoint; 9] = Default::default();
         let mut mass = nalgebra::Matrix3::<f64>::zeros();
         for (row, (eta, eta_weight)) in GAUSS3.into_iter().enumerate() {
@@ -175,7 +178,7 @@ impl GaussPoint {
 }
 
 /// What an element contributes before elimination.
-pub struct Forces {
+pub(crate) struct Forces {
     /// Derivative of the deviatoric energy by the nodal displacements.
     deviatoric: [f64; ALL],
     /// ∫ψⱼ ∂J/∂u.
@@ -186,7 +189,7 @@ pub struct Forces {
 
 impl Forces {
     /// Derivative of the energy by the nodal displacements at given pressures.
-    pub fn internal(&self, pressures: &[f64; 3]) -> [f64; ALL] {
+    pub(crate) fn internal(&self, pressures: &[f64; 3]) -> [f64; ALL] {
         with_pressures(&self.deviatoric, &self.volume_by_displacement, pressures)
     }
 }
@@ -305,7 +308,12 @@ impl Stiffness {
 
 impl ElementGeometry {
     /// Forces at given displacements. `None` where the element is turned inside out.
-    pub fn forces(&self, kinematics: Kinematics, shear: f64, u: &[f64; ALL]) -> Option<Forces> {
+    pub(crate) fn forces(
+        &self,
+        kinematics: Kinematics,
+        shear: f64,
+        u: &[f64; ALL],
+    ) -> Option<Forces> {
         let mut forces = Sums::default();
         for point in &self.points {
             let deformation = PointDeformation::new(kinematics, shear, &point.gradient(u))?;
@@ -343,7 +351,7 @@ impl ElementGeometry {
 
 /// An element's contribution to the global system, and what recovers its eliminated unknowns.
 #[derive(Debug, Clone)]
-pub struct Condensed {
+pub(crate) struct Condensed {
     /// Stiffness of the outer nodes, lower half.
     pub stiffness: [[f64; OUTER]; OUTER],
     /// Residual of the outer nodes after elimination.
@@ -353,7 +361,7 @@ pub struct Condensed {
 
 /// What recovers the centre's displacement and the pressures from the outer nodes' increments.
 #[derive(Debug, Clone)]
-pub struct Elimination {
+pub(crate) struct Elimination {
     centre_inverse: [[f64; 2]; 2],
     centre_row: [[f64; OUTER]; 2],
     centre_residual: [f64; 2],
@@ -368,7 +376,7 @@ pub struct Elimination {
 
 impl ElementGeometry {
     /// Stiffness and residual with pressures and centre eliminated. `None` where turned inside out.
-    pub fn condensed(
+    pub(crate) fn condensed(
         &self,
         kinematics: Kinematics,
         material: &Material,
@@ -384,7 +392,7 @@ impl ElementGeometry {
     /// Outer residual and elimination after a slight change of shape and material, by the forces
     /// there and the stiffness `before`: right to first order in the change. `None` where turned
     /// inside out.
-    pub fn nearby(
+    pub(crate) fn nearby(
         &self,
         kinematics: Kinematics,
         material: &Material,
@@ -403,7 +411,7 @@ impl ElementGeometry {
     }
 
     /// As [`Self::nearby`] of the same shape: forces are proportional to the moduli.
-    pub fn of_material(
+    pub(crate) fn of_material(
         &self,
         [from, to]: [&Material; 2],
         before: &Elimination,
@@ -422,7 +430,7 @@ impl ElementGeometry {
     ///
     /// The pressures stay unknowns of their own: with $\partial J/\partial u$ of here in their
     /// elimination, a tangent of elsewhere would be wrong by κ/μ times the difference.
-    pub fn balance(
+    pub(crate) fn balance(
         &self,
         kinematics: Kinematics,
         material: &Material,
@@ -517,7 +525,7 @@ impl Elimination {
     }
 
     /// Outer residual before the step that this is for.
-    pub fn outer_residual_before(&self) -> [f64; OUTER] {
+    pub(crate) fn outer_residual_before(&self) -> [f64; OUTER] {
         self.outer_residual(&self.residual())
     }
 
@@ -532,7 +540,7 @@ impl Elimination {
     }
 
     /// Residual of the outer nodes with the centre eliminated.
-    pub fn outer_residual(&self, residual: &[f64; ALL]) -> [f64; OUTER] {
+    pub(crate) fn outer_residual(&self, residual: &[f64; ALL]) -> [f64; OUTER] {
         core::array::from_fn(|i| {
             let gain = self.gain(i);
             residual[i] - gain[0] * residual[OUTER] - gain[1] * residual[OUTER + 1]
@@ -540,7 +548,7 @@ impl Elimination {
     }
 
     /// Increments of the centre's displacement, from its residual and the outer increments.
-    pub fn centre(&self, residual: [f64; 2], outer: &[f64; OUTER]) -> [f64; 2] {
+    pub(crate) fn centre(&self, residual: [f64; 2], outer: &[f64; OUTER]) -> [f64; 2] {
         let right: [f64; 2] = core::array::from_fn(|i| {
             let coupled: f64 = (self.centre_row[i].iter().zip(outer))
                 .map(|(a, b)| a * b)
@@ -553,7 +561,7 @@ impl Elimination {
     }
 
     /// Increments of the centre's displacement and the new pressures, from the outer increments.
-    pub fn recover(&self, outer: &[f64; OUTER]) -> ([f64; 2], [f64; 3]) {
+    pub(crate) fn recover(&self, outer: &[f64; OUTER]) -> ([f64; 2], [f64; 3]) {
         let centre = self.centre(self.centre_residual, outer);
         let before = product(&self.compliance_inverse, &self.volume);
         let change = self.pressure_change(outer, centre);
@@ -561,7 +569,7 @@ impl Elimination {
     }
 
     /// Change of κM⁻¹∫ψ(J − 1) by increments.
-    pub fn pressure_change(&self, outer: &[f64; OUTER], centre: [f64; 2]) -> [f64; 3] {
+    pub(crate) fn pressure_change(&self, outer: &[f64; OUTER], centre: [f64; 2]) -> [f64; 3] {
         let volume = self.volume_by_displacement.map(|row| {
             let by_outer: f64 = row.iter().zip(outer).map(|(a, b)| a * b).sum();
             by_outer + row[OUTER] * centre[0] + row[OUTER + 1] * centre[1]

@@ -40,6 +40,7 @@
 //! *Computational Contact Mechanics* (2006). M. Hintermüller, K. Ito & K. Kunisch, SIAM J. Optim.
 //! 13 (2003) 865. B. Yang, T. A. Laursen & X. Meng, Int. J. Numer. Meth. Eng. 62 (2005) 1183.
 #![forbid(unsafe_code)]
+#![warn(unreachable_pub)]
 
 mod contact;
 mod element;
@@ -52,6 +53,7 @@ mod press;
 mod recovery;
 mod scene;
 mod slide;
+mod spacing;
 mod sparse;
 mod state;
 mod stick;

@@ -91,10 +91,10 @@ pub enum Kinematics {
 }
 
 /// The components of the deformation gradient: rr, rz, zr, zz, θθ.
-pub type Gradient = [f64; 5];
+pub(crate) type Gradient = [f64; 5];
 
 /// Stress without its pressure part, and volume change.
-pub struct StressResponse {
+pub(crate) struct StressResponse {
     /// Deviatoric first Piola–Kirchhoff stress.
     pub stress: Gradient,
     /// Volume change J − 1 (the strain's trace in linear kinematics).
@@ -105,7 +105,7 @@ pub struct StressResponse {
 
 /// (1 + v)^(−1/3) to rounding.
 #[inline]
-pub fn inverse_cube_root(v: f64) -> f64 {
+pub(crate) fn inverse_cube_root(v: f64) -> f64 {
     // The series' error is below 0.15 v⁴, and twice its square after a step of Newton's method.
     const SERIES: f64 = 0.1;
     let j = 1.0 + v;
@@ -120,7 +120,7 @@ pub fn inverse_cube_root(v: f64) -> f64 {
 }
 
 /// A material point as deformed: what stress and tangent have in common.
-pub enum PointDeformation {
+pub(crate) enum PointDeformation {
     Linear {
         shear: f64,
         /// Displacement gradient.
@@ -141,7 +141,7 @@ pub enum PointDeformation {
 impl PointDeformation {
     /// At displacement gradient `h`. `None` where J ≤ 0.
     #[inline]
-    pub fn new(kinematics: Kinematics, shear: f64, h: &Gradient) -> Option<Self> {
+    pub(crate) fn new(kinematics: Kinematics, shear: f64, h: &Gradient) -> Option<Self> {
         if kinematics == Kinematics::Linear {
             return Some(Self::Linear { shear, h: *h });
         }
@@ -169,7 +169,7 @@ impl PointDeformation {
     }
 
     #[inline]
-    pub fn response(&self) -> StressResponse {
+    pub(crate) fn response(&self) -> StressResponse {
         match *self {
             Self::Linear { shear, h } => {
                 let trace = h[0] + h[3] + h[4];
@@ -207,7 +207,7 @@ impl PointDeformation {
 
     /// Derivative of the first Piola–Kirchhoff stress by F at a given pressure (tension positive).
     #[inline]
-    pub fn tangent(&self, pressure: f64) -> [Gradient; 5] {
+    pub(crate) fn tangent(&self, pressure: f64) -> [Gradient; 5] {
         match *self {
             Self::Linear { shear, .. } => {
                 let (a, b) = (4.0 / 3.0 * shear, -2.0 / 3.0 * shear);

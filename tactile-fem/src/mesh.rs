@@ -1,9 +1,7 @@
-//! Meshes of nine-node quadrilaterals in the half plane (r, z).
-//!
-//! Mapped meshes of the bodies a sensor meets.
-//!
-//! Mesh of a tissue block with a spherical inclusion under a guide's flat face.
+//! Meshes of nine-node quadrilaterals in the half plane (r, z): mapped meshes of the bodies that a
+//! sensor meets, and of a tissue block with a spherical inclusion under a guide's flat face.
 
+use crate::spacing::{arc_fractions, graded, graded_up_to, grow, with_middles};
 use std::collections::BTreeMap;
 
 /// Between a ball's core and the first shell, as a share of an element. With 0.02 the mesh of
@@ -24,7 +22,7 @@ const SLIDING_RIM: f64 = 0.045;
 
 /// Parts of a body's boundary that conditions and contact refer to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum Boundary {
+pub(crate) enum Boundary {
     /// The surface that may touch another body.
     Contact,
     /// The axis of revolution, r = 0.
@@ -44,7 +42,7 @@ pub enum Boundary {
 /// Each element belongs to a region, numbered from zero, that has one material. Edges of a boundary
 /// run with the body on their left.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Mesh {
+pub(crate) struct Mesh {
     /// Reference coordinates (r, z) of the nodes, in metres.
     pub nodes: Vec<[f64; 2]>,
     /// Nodes of each element: corners counter-clockwise, then the middles of the edges in the same
@@ -59,7 +57,7 @@ const EDGES: [[usize; 3]; 4] = [[0, 4, 1], [1, 5, 2], [2, 6, 3], [3, 7, 0]];
 
 impl Mesh {
     /// Number of regions.
-    pub fn region_count(&self) -> usize {
+    pub(crate) fn region_count(&self) -> usize {
         self.regions.iter().max().map_or(0, |last| last + 1)
     }
 
@@ -129,7 +127,7 @@ struct MeshBuilder {
 impl MeshBuilder {
     /// Adds a block of `columns` by `rows` elements whose node (i, j), i ≤ 2 columns, j ≤ 2 rows,
     /// is at `position(i, j)`. I then j must turn counter-clockwise.
-    pub fn block(
+    pub(crate) fn block(
         &mut self,
         columns: usize,
         rows: usize,
@@ -164,7 +162,7 @@ impl MeshBuilder {
     }
 
     /// Adds a rectangle with elements between the lines.
-    pub fn rectangle(&mut self, r_lines: &[f64], z_lines: &[f64], region: usize) {
+    pub(crate) fn rectangle(&mut self, r_lines: &[f64], z_lines: &[f64], region: usize) {
         let (r, z) = (with_middles(r_lines), with_middles(z_lines));
         self.block(r_lines.len() - 1, z_lines.len() - 1, region, |i, j| {
             [r[i], z[j]]
@@ -204,7 +202,7 @@ impl MeshBuilder {
     }
 
     /// The mesh, without boundaries.
-    pub fn build(self) -> Mesh {
+    pub(crate) fn build(self) -> Mesh {
         // Coincident nodes of neighbouring blocks differ by rounding alone, distinct ones by a
         // fraction of an element: a ten-millionth of the extent tells them apart.
         let extent = (self.nodes.iter()).fold(0.0_f64, |m, p| m.max(p[0].abs()).max(p[1].abs()));
@@ -241,101 +239,9 @@ impl MeshBuilder {
     }
 }
 
-/// Lines with the middle of each interval between them.
-fn with_middles(lines: &[f64]) -> Vec<f64> {
-    let mut all = vec![lines[0]];
-    for pair in lines.windows(2) {
-        all.push(0.5 * (pair[0] + pair[1]));
-        all.push(pair[1]);
-    }
-    all
-}
-
-/// Distance along a polyline over its length.
-fn arc_fractions(points: &[[f64; 2]]) -> Vec<f64> {
-    let mut lengths = vec![0.0];
-    for pair in points.windows(2) {
-        let step = (pair[1][0] - pair[0][0]).hypot(pair[1][1] - pair[0][1]);
-        lengths.push(lengths[lengths.len() - 1] + step);
-    }
-    let total = lengths[lengths.len() - 1];
-    lengths.into_iter().map(|length| length / total).collect()
-}
-
-/// Lines from `start` to `end`: steps begin at `first` and grow by `growth`, scaled to fit.
-pub fn graded(start: f64, end: f64, first: f64, growth: f64) -> Vec<f64> {
-    let length = (end - start).abs();
-    // Steps that sum to the length: n from the geometric series, at least one.
-    let count = if (growth - 1.0).abs() < 1e-9 {
-        length / first
-    } else {
-        (1.0 + length / first * (growth - 1.0)).max(1.0).ln() / growth.ln()
-    };
-    let count = (count.round() as usize).max(1);
-    let mut offsets = vec![0.0];
-    let mut step = 1.0;
-    for _ in 0..count {
-        offsets.push(offsets[offsets.len() - 1] + step);
-        step *= growth;
-    }
-    let total = offsets[count];
-    let scaled = offsets
-        .iter()
-        .map(|offset| start + (end - start) * offset / total);
-    let mut lines: Vec<f64> = scaled.collect();
-    lines[count] = end;
-    lines
-}
-
-/// As [`graded`], with steps of about `largest` where they would be longer.
-fn graded_up_to(start: f64, end: f64, first: f64, growth: f64, largest: f64) -> Vec<f64> {
-    let length = (end - start).abs();
-    let mut offsets = vec![0.0];
-    let (mut step, mut reached) = (first, 0.0);
-    while reached + 0.5 * step < length {
-        reached += step;
-        offsets.push(reached);
-        step = (growth * step).min(largest);
-    }
-    let mut lines: Vec<f64> = (offsets.iter())
-        .map(|offset| start + (end - start) * offset / reached)
-        .collect();
-    if let Some(last) = lines.last_mut() {
-        *last = end;
-    }
-    lines
-}
-
-/// Lines that resolve a contact around the axis at every size from `inner` outwards: `count`
-/// uniform steps up to `inner`, then growing by `growth` up to steps of `largest`, to `end`.
-pub fn contact_lines(inner: f64, count: usize, growth: f64, largest: f64, end: f64) -> Vec<f64> {
-    let mut lines: Vec<f64> = (0..=count)
-        .map(|k| inner * k as f64 / count as f64)
-        .collect();
-    grow(&mut lines, inner / count as f64, growth, largest, end);
-    lines
-}
-
-/// Lines after the last up to `end`: each step is `growth` times the one before, at most `largest`.
-fn grow(lines: &mut Vec<f64>, mut step: f64, growth: f64, largest: f64, end: f64) {
-    loop {
-        step = (step * growth).min(largest);
-        let last = lines[lines.len() - 1];
-        let left = end - last;
-        // The last two steps share what is left rather than leave a sliver.
-        if left <= 1.5 * step {
-            if left > 0.0 {
-                lines.push(end);
-            }
-            return;
-        }
-        lines.push(last + step);
-    }
-}
-
 /// Size of the elements of a body with a contact around its axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ContactMesh {
+pub(crate) struct ContactMesh {
     /// Radius of the core with uniform elements, about half the smallest contact radius.
     pub inner: f64,
     /// Elements across the core.
@@ -354,7 +260,7 @@ impl ContactMesh {
 
 /// A spheroidal inclusion on the axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct InclusionSize {
+pub(crate) struct InclusionSize {
     /// Across the axis and along it.
     pub half_axes: [f64; 2],
     /// From the block's surface to the inclusion's top.
@@ -434,7 +340,7 @@ impl Mesh {
     ///
     /// Around a core of quadrilaterals at the pole lie shells along circles that meet the axis and
     /// the ball's surface at right angles.
-    pub fn half_ball(radius: f64, size: ContactMesh) -> Self {
+    pub(crate) fn half_ball(radius: f64, size: ContactMesh) -> Self {
         let m = size.count;
         let first = size.inner / m as f64;
         // Angles of the shells along the surface; the first lies around the core.
@@ -480,7 +386,7 @@ impl Mesh {
     }
 
     /// A cylinder of one region, its lower end [`Boundary::Contact`], its upper [`Boundary::Base`].
-    pub fn cylinder(r_lines: &[f64], z_lines: &[f64]) -> Self {
+    pub(crate) fn cylinder(r_lines: &[f64], z_lines: &[f64]) -> Self {
         let mut builder = MeshBuilder::default();
         builder.rectangle(r_lines, z_lines, 0);
         let mut mesh = builder.build();
@@ -502,7 +408,7 @@ impl Mesh {
     ///
     /// Around a core of quadrilaterals at the tip lie shells that meet the axis at right angles and
     /// flatten towards the base.
-    pub fn cone(half_angle: f64, height: f64, size: ContactMesh) -> Self {
+    pub(crate) fn cone(half_angle: f64, height: f64, size: ContactMesh) -> Self {
         let m = size.count;
         let (sin, cos) = half_angle.sin_cos();
         let side = height / cos;
@@ -537,7 +443,12 @@ impl Mesh {
 
     /// Bonded layers below z = 0, the first on top, of thicknesses `thickness` and radius `radius`.
     /// a region each.
-    pub fn layered_disc(thickness: &[f64], r_lines: &[f64], first: f64, growth: f64) -> Self {
+    pub(crate) fn layered_disc(
+        thickness: &[f64],
+        r_lines: &[f64],
+        first: f64,
+        growth: f64,
+    ) -> Self {
         let mut builder = MeshBuilder::default();
         let mut top = 0.0;
         let mut step = first;
@@ -566,7 +477,7 @@ impl Mesh {
 
 /// Lines of the cross-section: where its elements end.
 #[derive(Debug, Clone, PartialEq)]
-pub struct BlockMesh {
+pub(crate) struct BlockMesh {
     pub block_height: f64,
     pub block_radius: f64,
     pub disc_radius: f64,
@@ -580,7 +491,7 @@ pub struct BlockMesh {
 }
 
 /// The guide's mesh and the block's. Bonded, both in the first.
-pub struct BlockMeshes {
+pub(crate) struct BlockMeshes {
     pub guide: Mesh,
     pub block: Option<Mesh>,
 }
@@ -601,7 +512,7 @@ impl BlockMesh {
         Some((inclusion, cell))
     }
 
-    pub fn build(&self) -> BlockMeshes {
+    pub(crate) fn build(&self) -> BlockMeshes {
         let cell = self.cell();
         // Elements of the guide's face from the axis to its rim, finest at the rim where the
         // traction is singular.

@@ -17,11 +17,11 @@ use tactile_elasticity::{ElasticityError, Quantity};
 
 /// A body of an [`ElementModel`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct BodyIndex(usize);
+pub(crate) struct BodyIndex(usize);
 
 /// How a boundary is held.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Support {
+pub(crate) enum Support {
     /// No displacement but the support's own: glued to glass or to a stage.
     Bonded,
     /// Free to slide along r: a lubricated stage, or a plane of symmetry.
@@ -30,7 +30,7 @@ pub enum Support {
 
 /// What a displacement component does.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum DofMotion {
+pub(crate) enum DofMotion {
     Free,
     Zero,
     /// Moves by the approach times this.
@@ -38,7 +38,7 @@ pub enum DofMotion {
 }
 
 #[derive(Debug, Clone)]
-pub struct Part {
+pub(crate) struct Part {
     pub regions: core::ops::Range<usize>,
     pub boundaries: BTreeMap<Boundary, Vec<[usize; 3]>>,
 }
@@ -48,7 +48,7 @@ pub struct Part {
 /// The approach δ, one number, moves every boundary that is [driven](Self::drive) by δ along +z. SI
 /// units. The axis of revolution is r = 0. Guides lie below z = 0 and objects above.
 #[derive(Debug, Clone, Default)]
-pub struct ElementModel {
+pub(crate) struct ElementModel {
     pub kinematics: Kinematics,
     pub nodes: Vec<[f64; 2]>,
     pub elements: Vec<[usize; 9]>,
@@ -75,7 +75,7 @@ pub struct ElementModel {
 
 impl ElementModel {
     /// An empty model.
-    pub fn new(kinematics: Kinematics) -> Self {
+    pub(crate) fn new(kinematics: Kinematics) -> Self {
         Self {
             kinematics,
             ..Self::default()
@@ -86,7 +86,7 @@ impl ElementModel {
     ///
     /// # Errors
     /// Materials that are not one a region. An element that is degenerate or turned inside out.
-    pub fn add(
+    pub(crate) fn add(
         &mut self,
         mesh: &Mesh,
         materials: &[Material],
@@ -132,12 +132,12 @@ impl ElementModel {
     }
 
     /// Materials of a body, by region.
-    pub fn materials(&self, body: BodyIndex) -> &[Material] {
+    pub(crate) fn materials(&self, body: BodyIndex) -> &[Material] {
         &self.materials[self.parts[body.0].regions.clone()]
     }
 
     /// Edges of a body's boundary, by the model's node numbers.
-    pub fn edges(&self, body: BodyIndex, boundary: Boundary) -> &[[usize; 3]] {
+    pub(crate) fn edges(&self, body: BodyIndex, boundary: Boundary) -> &[[usize; 3]] {
         self.parts[body.0]
             .boundaries
             .get(&boundary)
@@ -150,12 +150,12 @@ impl ElementModel {
     }
 
     /// Holds a boundary in its place.
-    pub fn hold(&mut self, body: BodyIndex, boundary: Boundary, support: Support) {
+    pub(crate) fn hold(&mut self, body: BodyIndex, boundary: Boundary, support: Support) {
         self.support(body, boundary, support, DofMotion::Zero);
     }
 
     /// Moves a boundary by the approach along +z.
-    pub fn drive(&mut self, body: BodyIndex, boundary: Boundary, support: Support) {
+    pub(crate) fn drive(&mut self, body: BodyIndex, boundary: Boundary, support: Support) {
         self.support(body, boundary, support, DofMotion::Driven(1.0));
     }
 
@@ -174,7 +174,7 @@ impl ElementModel {
     ///
     /// Gaps are measured from `first`, which had better be the one with the finer mesh or the more
     /// convex of the two.
-    pub fn contact(&mut self, first: BodyIndex, second: BodyIndex) {
+    pub(crate) fn contact(&mut self, first: BodyIndex, second: BodyIndex) {
         let curve = SurfaceCurve::new(self.edges(second, Boundary::Contact), &self.nodes);
         let softer = self.softest(first).min(self.softest(second));
         self.add_points(first, Opposite::Surface(curve), softer);
@@ -187,7 +187,7 @@ impl ElementModel {
     /// The nodes of one place do not stay at one radius: where the second body spreads more, the
     /// first feels its pressure somewhat further in, which matters little where the first is the
     /// stiffer. The surfaces are not let part.
-    pub fn slide(&mut self, first: BodyIndex, second: BodyIndex) {
+    pub(crate) fn slide(&mut self, first: BodyIndex, second: BodyIndex) {
         let nodes: Vec<usize> = self
             .edges(first, Boundary::Contact)
             .iter()
@@ -217,7 +217,7 @@ impl ElementModel {
     /// Lets a body's [`Boundary::Contact`] touch a rigid body without friction, whose pole is at
     /// z = 0: above it (`side` +1) one that does not move, below it (−1) one that moves by the
     /// approach.
-    pub fn contact_rigid(&mut self, body: BodyIndex, shape: RigidShape, side: f64) {
+    pub(crate) fn contact_rigid(&mut self, body: BodyIndex, shape: RigidShape, side: f64) {
         let softer = self.softest(body);
         self.add_points(body, Opposite::Rigid { shape, side }, softer);
     }
@@ -228,13 +228,13 @@ impl ElementModel {
     /// Loads are then followed in steps that let the approach grow by a tenth: forces hold to a
     /// thousandth and contact radii to two, whatever loads are asked for on the way. At ν near 0
     /// the radius is up to 1.5 % low: the pressure near the rim is not that of sliding.
-    pub fn forbid_slip(&mut self) {
+    pub(crate) fn forbid_slip(&mut self) {
         self.sticks = true;
     }
 
     /// Makes the pressure on a body's [`Boundary::Interface`], above its first `lower` regions, the
     /// pressure of the states.
-    pub fn bond(&mut self, body: BodyIndex, lower: usize) {
+    pub(crate) fn bond(&mut self, body: BodyIndex, lower: usize) {
         let first = self.body_regions(body).start;
         let edges = self.edges(body, Boundary::Interface);
         let is_lower = |index: usize| (first..first + lower).contains(&self.regions[index]);
@@ -259,7 +259,7 @@ impl ElementModel {
 
 /// The unknowns: displacements, element pressures and the approach.
 #[derive(Debug, Clone, PartialEq)]
-pub struct ModelFields {
+pub(crate) struct ModelFields {
     /// Component 2 node + (0 for r, 1 for z).
     pub displacement: Vec<f64>,
     pub pressures: Vec<[f64; 3]>,
@@ -273,7 +273,7 @@ pub struct ModelFields {
 }
 
 impl ModelFields {
-    pub fn zero(model: &ElementModel) -> Self {
+    pub(crate) fn zero(model: &ElementModel) -> Self {
         Self {
             displacement: vec![0.0; 2 * model.nodes.len()],
             pressures: vec![[0.0; 3]; model.elements.len()],
@@ -288,20 +288,20 @@ impl ModelFields {
         }
     }
 
-    pub fn element(&self, nodes: &[usize; 9]) -> [f64; ALL] {
+    pub(crate) fn element(&self, nodes: &[usize; 9]) -> [f64; ALL] {
         core::array::from_fn(|k| self.displacement[2 * nodes[k / 2] + k % 2])
     }
 }
 
 /// An equilibrium.
-pub struct Equilibrium {
+pub(crate) struct Equilibrium {
     pub fields: ModelFields,
     pub force: f64,
 }
 
 /// Edges between bonded bodies and the elements on one of its sides.
 #[derive(Debug, Clone)]
-pub struct BondedInterface {
+pub(crate) struct BondedInterface {
     /// Nodes from the axis outwards.
     pub nodes: Vec<usize>,
     pub edges: Vec<[usize; 3]>,
@@ -312,7 +312,7 @@ pub struct BondedInterface {
 }
 
 impl BondedInterface {
-    pub fn new(
+    pub(crate) fn new(
         edges: &[[usize; 3]],
         elements: &[[usize; 9]],
         is_inside: impl Fn(usize) -> bool,
@@ -340,7 +340,7 @@ impl BondedInterface {
 #[derive(Debug, Clone, Copy, PartialEq)]
 // A flat alone is pressed on objects; the others have the closed forms that tests compare with.
 #[cfg_attr(not(test), allow(dead_code))]
-pub enum RigidShape {
+pub(crate) enum RigidShape {
     /// A plane at right angles to the axis.
     Flat,
     /// The paraboloid r² / 2R, of which Hertz's theory speaks.
@@ -362,7 +362,7 @@ pub enum RigidShape {
 
 impl RigidShape {
     /// Height at radius r, its slope and second derivative. `None` beyond the shape.
-    pub fn profile(self, r: f64) -> Option<[f64; 3]> {
+    pub(crate) fn profile(self, r: f64) -> Option<[f64; 3]> {
         match self {
             Self::Flat => Some([0.0; 3]),
             Self::Punch { radius_m } => (r <= radius_m).then_some([0.0; 3]),

@@ -334,7 +334,7 @@ impl ElementModel {
     ///
     /// # Errors
     /// An element would be turned inside out.
-    pub fn move_nodes(
+    pub(crate) fn move_nodes(
         &mut self,
         moved: impl Fn(usize, [f64; 2]) -> [f64; 2],
     ) -> Result<(), ElasticityError> {

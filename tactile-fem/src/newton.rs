@@ -73,14 +73,14 @@ impl ElementModel {
     ///
     /// A load that is not reached ends the solution: its [`SolverReport`] says so. O(n b²) for each
     /// Newton iteration with n unknowns in a system of half-width b.
-    pub fn solve(&self, loads: &[AppliedLoad]) -> Solution {
+    pub(crate) fn solve(&self, loads: &[AppliedLoad]) -> Solution {
         self.solve_near(&mut Layout::new(self), loads, &[])
     }
 
     /// [`Self::solve`] that first tries, for each load, to go there from a guess: the state of a
     /// model with the same elements at about that load. `layout` is this model's or one's with
     /// the same elements and supports: its analysis is used again.
-    pub fn solve_near(
+    pub(crate) fn solve_near(
         &self,
         layout: &mut Layout,
         loads: &[AppliedLoad],
@@ -448,7 +448,7 @@ const TOLERANCE: f64 = 1e-8;
 
 /// A factorised tangent of a model without contacts.
 #[derive(Debug)]
-pub struct Chord {
+pub(crate) struct Chord {
     slots: Arc<[Slot]>,
     eliminations: Vec<Elimination>,
     factors: Factors,
@@ -479,7 +479,7 @@ struct Unbalanced {
 
 impl Chord {
     /// `None` where the tangent is singular.
-    pub fn new(
+    pub(crate) fn new(
         tangent: Tangent,
         slots: Arc<[Slot]>,
         eliminations: Vec<Elimination>,

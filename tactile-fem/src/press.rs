@@ -3,9 +3,10 @@
 //! Objects pressed on a guide or on a rigid flat.
 
 use crate::material::{Kinematics, Material};
-use crate::mesh::{Boundary, ContactMesh, Mesh, contact_lines, graded};
+use crate::mesh::{Boundary, ContactMesh, Mesh};
 use crate::model::{ElementModel, RigidShape, Support};
 use crate::scene::{FemScene, Interface};
+use crate::spacing::{contact_lines, graded};
 use tactile_elasticity::{ElasticityError, Quantity};
 
 /// A layer of a [`Guide`].

@@ -32,7 +32,7 @@ const FIT_FROM: f64 = 0.35;
 
 /// Smooth pressures of a contact and its radius, from the pressures at all nodes in contact, those
 /// from the axis outwards, and the force they carry.
-pub fn contact_profile(
+pub(crate) fn contact_profile(
     points: Vec<PressurePoint>,
     force: f64,
 ) -> (Vec<PressurePoint>, Option<ContactRadius>) {
@@ -261,7 +261,7 @@ fn smooth(points: &[PressurePoint], means: &[Mean], fit: Option<&Fit>) -> Vec<Pr
 impl ElementModel {
     /// Force per deformed area at the contact's nodes from the axis outwards, and their axial
     /// forces.
-    pub fn contact_pressure(&self, fields: &ModelFields) -> (Vec<PressurePoint>, Vec<f64>) {
+    pub(crate) fn contact_pressure(&self, fields: &ModelFields) -> (Vec<PressurePoint>, Vec<f64>) {
         let placement = self.placement(fields);
         let candidates = self.candidates(fields, 0.0);
         let mut deformed = vec![0.0; self.contact_nodes.len()];
@@ -291,7 +291,7 @@ impl ElementModel {
     }
 
     /// Axial forces that press the bodies together at the interface's nodes.
-    pub fn interface_forces(
+    pub(crate) fn interface_forces(
         &self,
         interface: &BondedInterface,
         fields: &ModelFields,
@@ -326,7 +326,7 @@ impl ElementModel {
     ///
     /// with the mean and the variance of r under φ. The second term is taken off by the second
     /// difference of neighbouring means.
-    pub fn interface_pressure(
+    pub(crate) fn interface_pressure(
         &self,
         interface: &BondedInterface,
         fields: &ModelFields,

@@ -30,7 +30,11 @@ const BLOCK_FINENESS: usize = 5;
 /// assert!(force(Interface::Bonded) > force(Interface::Frictionless));
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(rename_all = "snake_case")
+)]
 pub enum Interface {
     /// The two move together, from the start or from where they first touch.
     Bonded,

@@ -195,14 +195,14 @@ impl FemScene {
 /// move changes, the change is larger, at a tenth of the block's height twice as large: full steps
 /// would never end.
 #[derive(Debug, Clone, Default)]
-pub struct Relaxation {
+pub(crate) struct Relaxation {
     /// Distance before the last move, and the part of it that was moved.
     last: Vec<(f64, f64)>,
 }
 
 impl Relaxation {
     /// The part of a distance by which a node is moved, from the last two distances.
-    pub fn next(&mut self, distances: impl Iterator<Item = f64>) -> Vec<f64> {
+    pub(crate) fn next(&mut self, distances: impl Iterator<Item = f64>) -> Vec<f64> {
         let mut last = core::mem::take(&mut self.last).into_iter();
         for now in distances {
             let part = last.next().map_or(1.0, |(before, part)| {

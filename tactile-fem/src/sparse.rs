@@ -16,11 +16,11 @@ use std::sync::Arc;
 
 /// The system cannot be solved: a pivot vanished, or there is no memory for the factors.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Singular;
+pub(crate) struct Singular;
 
 /// Where a symmetric matrix has entries, and how it is factorised.
 #[derive(Debug)]
-pub struct Pattern {
+pub(crate) struct Pattern {
     /// Lower half: rows of each column, ascending from the diagonal.
     entries: SymbolicSparseColMat<usize>,
     analysis: SymbolicCholesky<usize>,
@@ -28,7 +28,7 @@ pub struct Pattern {
 
 impl Pattern {
     /// The pattern of `size` equations that couples each group's with each other.
-    pub fn new<'a>(
+    pub(crate) fn new<'a>(
         size: usize,
         groups: impl Iterator<Item = &'a [usize]>,
     ) -> Result<Self, Singular> {
@@ -64,7 +64,7 @@ impl Pattern {
     }
 
     /// Place of the entry (i, j), which is that of (j, i) too.
-    pub fn place(&self, i: usize, j: usize) -> Option<usize> {
+    pub(crate) fn place(&self, i: usize, j: usize) -> Option<usize> {
         let (row, column) = (i.max(j), i.min(j));
         let range = self.entries.col_range(column);
         let rows = &self.entries.row_idx()[range.clone()];
@@ -72,7 +72,7 @@ impl Pattern {
     }
 
     /// Whether the pattern couples all equations of a group.
-    pub fn couples(&self, group: &[usize]) -> bool {
+    pub(crate) fn couples(&self, group: &[usize]) -> bool {
         let mut pairs =
             (group.iter().enumerate()).flat_map(|(k, &i)| group[..k].iter().map(move |&j| (i, j)));
         pairs.all(|(i, j)| self.place(i, j).is_some())
@@ -81,13 +81,13 @@ impl Pattern {
 
 /// A symmetric matrix.
 #[derive(Debug, Clone)]
-pub struct Symmetric {
+pub(crate) struct Symmetric {
     pattern: Arc<Pattern>,
     values: Vec<f64>,
 }
 
 impl Symmetric {
-    pub fn zero(pattern: Arc<Pattern>) -> Self {
+    pub(crate) fn zero(pattern: Arc<Pattern>) -> Self {
         Self {
             values: vec![0.0; pattern.entries.row_idx().len()],
             pattern,
@@ -95,7 +95,7 @@ impl Symmetric {
     }
 
     /// Adds to the entry (i, j) and so to (j, i), which the pattern must have.
-    pub fn add(&mut self, i: usize, j: usize, value: f64) {
+    pub(crate) fn add(&mut self, i: usize, j: usize, value: f64) {
         let place = self.pattern.place(i, j);
         debug_assert!(place.is_some(), "no entry ({i}, {j})");
         if let Some(place) = place {
@@ -104,7 +104,7 @@ impl Symmetric {
     }
 
     /// Adds to the entry at a place of the pattern.
-    pub fn add_at(&mut self, place: usize, value: f64) {
+    pub(crate) fn add_at(&mut self, place: usize, value: f64) {
         self.values[place] += value;
     }
 
@@ -112,7 +112,7 @@ impl Symmetric {
     ///
     /// Without pivoting: a stable equilibrium's tangent is positive definite. Where it is not, the
     /// step that Newton's method then takes is judged by its residual.
-    pub fn factorise(&self) -> Result<Factors, Singular> {
+    pub(crate) fn factorise(&self) -> Result<Factors, Singular> {
         let analysis = &self.pattern.analysis;
         let mut values = vec![0.0; analysis.len_val()];
         let scratch = analysis.factorize_numeric_ldlt_scratch::<f64>(Par::Seq, Default::default());
@@ -136,14 +136,14 @@ impl Symmetric {
 
 /// LDLᵀ factors of a [`Symmetric`] matrix.
 #[derive(Debug)]
-pub struct Factors {
+pub(crate) struct Factors {
     pattern: Arc<Pattern>,
     values: Vec<f64>,
 }
 
 impl Factors {
     /// Solves in place for right-hand sides that follow each other in `x`.
-    pub fn solve(&self, x: &mut [f64]) -> Result<(), Singular> {
+    pub(crate) fn solve(&self, x: &mut [f64]) -> Result<(), Singular> {
         let analysis = &self.pattern.analysis;
         let size = analysis.nrows();
         let count = x.len().checked_div(size).unwrap_or(0);

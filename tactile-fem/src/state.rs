@@ -144,7 +144,7 @@ pub struct ContactRadius {
 /// [slopes](slope_at) there. Constant beyond the last.
 ///
 /// The slope is continuous: a fit that moves an inclusion sees no kinks.
-pub fn pressure_at(points: &[PressurePoint], radius: f64) -> f64 {
+pub(crate) fn pressure_at(points: &[PressurePoint], radius: f64) -> f64 {
     let after = points.partition_point(|point| point.r_m < radius);
     let Some(last) = points.last() else {
         return 0.0;
@@ -214,7 +214,7 @@ pub struct Stress {
 impl ElementModel {
     /// Cauchy stress at the material point with reference coordinates (r, z) in metres. Hooke's
     /// stress in linear kinematics. `None` outside the bodies, or for a state of another model.
-    pub fn stress(&self, state: &State, point: [f64; 2]) -> Option<Stress> {
+    pub(crate) fn stress(&self, state: &State, point: [f64; 2]) -> Option<Stress> {
         let fields = &state.fields;
         if fields.displacement.len() != 2 * self.nodes.len() {
             return None;

@@ -23,7 +23,7 @@ const TOUCHING: f64 = 1e-9;
 
 /// Where a contact node is held.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Anchor {
+pub(crate) struct Anchor {
     /// The node and those of the opposite edge, with their weights in the relative displacement.
     pub weights: Vec<(usize, f64)>,
     /// Whether what is opposite moves by the approach.
@@ -36,7 +36,7 @@ pub struct Anchor {
 
 /// A distance along the surface and its derivatives by the displacement components `dofs`.
 #[derive(Debug, Clone)]
-pub struct Slip {
+pub(crate) struct Slip {
     pub value: f64,
     pub dofs: Vec<usize>,
     pub first: Vec<f64>,
@@ -44,7 +44,7 @@ pub struct Slip {
 
 impl Anchor {
     /// Its relative displacement, from the displacements of all nodes and the approach.
-    pub fn displacement(&self, displacement: &[f64], approach: f64) -> [f64; 2] {
+    pub(crate) fn displacement(&self, displacement: &[f64], approach: f64) -> [f64; 2] {
         let mut sum = [0.0, if self.driven { -approach } else { 0.0 }];
         for &(node, weight) in &self.weights {
             sum[0] += weight * displacement[2 * node];
@@ -54,7 +54,7 @@ impl Anchor {
     }
 
     /// The same place on a surface that has turned.
-    pub fn turned(&self, direction: [f64; 2]) -> Self {
+    pub(crate) fn turned(&self, direction: [f64; 2]) -> Self {
         Self {
             direction,
             ..self.clone()
@@ -62,7 +62,7 @@ impl Anchor {
     }
 
     /// How far the node has slipped from its anchor.
-    pub fn slip(&self, displacement: &[f64], approach: f64) -> Slip {
+    pub(crate) fn slip(&self, displacement: &[f64], approach: f64) -> Slip {
         let [r, z] = self.displacement(displacement, approach);
         let [along_r, along_z] = self.direction;
         let mut slip = Slip {
@@ -84,7 +84,7 @@ impl Anchor {
 
 impl ElementModel {
     /// Anchors of the nodes that touch without load.
-    pub fn first_anchors(&self, unloaded: &ModelFields) -> Vec<Option<Anchor>> {
+    pub(crate) fn first_anchors(&self, unloaded: &ModelFields) -> Vec<Option<Anchor>> {
         let mut anchors = vec![None; self.contact_nodes.len()];
         for candidate in self.candidates(unloaded, 0.0) {
             let contact = &self.contact_nodes[candidate.index];
@@ -97,7 +97,11 @@ impl ElementModel {
 
     /// Anchors after a load step: those of nodes that still press, turned with the surface, and new
     /// ones where nodes have come into contact.
-    pub fn next_anchors(&self, before: &ModelFields, after: &ModelFields) -> Vec<Option<Anchor>> {
+    pub(crate) fn next_anchors(
+        &self,
+        before: &ModelFields,
+        after: &ModelFields,
+    ) -> Vec<Option<Anchor>> {
         let anchors = after.contact.iter().zip(&after.anchors);
         let contacts = self.contact_nodes.iter().zip(anchors);
         contacts

@@ -21,7 +21,7 @@ const MAX_CHANGES: usize = 15;
 
 /// Where a displacement component's share of the system goes.
 #[derive(Debug, Clone, Copy)]
-pub enum Slot {
+pub(crate) enum Slot {
     Nowhere,
     Driver(f64),
     Equation(usize),
@@ -35,7 +35,7 @@ type Places = [u32; OUTER * (OUTER + 1) / 2];
 const NO_PLACE: u32 = u32::MAX;
 
 /// The slot of a displacement component of a [`Gap`](super::gap::Gap).
-pub fn slot(slots: &[Slot], dof: usize) -> Slot {
+pub(crate) fn slot(slots: &[Slot], dof: usize) -> Slot {
     if dof == DRIVER {
         Slot::Driver(1.0)
     } else {
@@ -45,7 +45,7 @@ pub fn slot(slots: &[Slot], dof: usize) -> Slot {
 
 /// Equations of a model, and the tangent's pattern as far as contacts have needed it.
 #[derive(Debug, Clone)]
-pub struct Layout {
+pub(crate) struct Layout {
     slots: Arc<[Slot]>,
     pub(crate) equations: usize,
     /// Equations that are coupled with each other by an element or by a contact.
@@ -170,7 +170,7 @@ impl Layout {
 
 /// A symmetric linear system with one more unknown, the approach.
 #[derive(Debug, Clone)]
-pub struct Tangent {
+pub(crate) struct Tangent {
     pub matrix: Symmetric,
     /// Negative residual.
     pub right: Vec<f64>,
@@ -219,7 +219,7 @@ impl Tangent {
     }
 
     /// Adds a symmetric contribution of which the lower half is asked.
-    pub fn scatter(
+    pub(crate) fn scatter(
         &mut self,
         slots: &[Slot],
         residual: &[f64],
@@ -252,7 +252,7 @@ impl Tangent {
     }
 
     /// Solution for a goal: the equations' unknowns and the approach's step.
-    pub fn solve(
+    pub(crate) fn solve(
         &self,
         factors: &Factors,
         goal: AppliedLoad,
@@ -284,7 +284,7 @@ impl Tangent {
 /// Contact enters each Newton iteration as a linear complementarity problem: gaps are linear in the
 /// step, and which nodes are in contact is found for the step (primal–dual active set) rather than
 /// for the state before it.
-pub struct System<'a> {
+pub(crate) struct System<'a> {
     model: &'a ElementModel,
     slots: Arc<[Slot]>,
     /// Elements' share and the turning of surfaces under their present pressure.
@@ -300,7 +300,7 @@ pub struct System<'a> {
 }
 
 /// Increments of a Newton step.
-pub struct NewtonStep {
+pub(crate) struct NewtonStep {
     displacement: Vec<f64>,
     pressures: Vec<[f64; 3]>,
     approach: f64,
@@ -310,7 +310,7 @@ pub struct NewtonStep {
 impl ElementModel {
     /// The system at a state from which the approach may change by `margin`. `None` where an
     /// element is turned inside out.
-    pub fn assemble(
+    pub(crate) fn assemble(
         &self,
         layout: &mut Layout,
         fields: &ModelFields,
@@ -398,7 +398,7 @@ impl ElementModel {
 
 impl System<'_> {
     /// Unbalanced force over the scale of the forces.
-    pub fn imbalance(&self, goal: AppliedLoad) -> f64 {
+    pub(crate) fn imbalance(&self, goal: AppliedLoad) -> f64 {
         let squares: f64 = self.unbalanced.iter().map(|f| f * f).sum();
         let driver = match goal {
             AppliedLoad::Approach(_) => 0.0,
@@ -411,7 +411,11 @@ impl System<'_> {
     }
 
     /// The Newton step from `fields` towards the goal.
-    pub fn step(&self, fields: &ModelFields, goal: AppliedLoad) -> Result<NewtonStep, Singular> {
+    pub(crate) fn step(
+        &self,
+        fields: &ModelFields,
+        goal: AppliedLoad,
+    ) -> Result<NewtonStep, Singular> {
         let mut active: Vec<bool> = self.candidates.iter().map(|c| c.pressure > 0.0).collect();
         let mut changes = 0;
         loop {
@@ -466,7 +470,7 @@ impl System<'_> {
     }
 
     /// The tangent without contacts, and what the elements eliminated.
-    pub fn into_parts(self) -> (Tangent, Arc<[Slot]>, Vec<Elimination>) {
+    pub(crate) fn into_parts(self) -> (Tangent, Arc<[Slot]>, Vec<Elimination>) {
         (self.base, self.slots, self.eliminations)
     }
 
@@ -501,7 +505,7 @@ impl System<'_> {
 
 impl NewtonStep {
     /// The fields after the fraction `length` of the step.
-    pub fn apply(&self, fields: &ModelFields, length: f64) -> ModelFields {
+    pub(crate) fn apply(&self, fields: &ModelFields, length: f64) -> ModelFields {
         let along =
             |a: &[f64; 3], b: &[f64; 3]| core::array::from_fn(|k| a[k] + length * (b[k] - a[k]));
         let displacement = fields.displacement.iter().zip(&self.displacement);

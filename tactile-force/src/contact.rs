@@ -14,10 +14,15 @@ use tactile_core::{BoundingBox, Estimate, Polarity, Requirement};
 use crate::calibration::GreyHistogram;
 use crate::drift::{self, DriftCorrection, FitWorkspace, IlluminationDrift};
 use crate::error::ForceError;
-use crate::frame::{
-    DifferenceNoise, FrameStatistics, PassWorkspace, ReferenceFrame, TILE_COLUMNS, Tiles,
-};
-use crate::region::{Extent, NoiseWorkspace, Region, Run, Sums, gain, greatest};
+use crate::frame::{FrameStatistics, PassWorkspace, ReferenceFrame};
+use crate::noise::DifferenceNoise;
+use crate::region::{Extent, NoiseWorkspace, Region, Sums, gain, greatest};
+use crate::runs::Run;
+use crate::tiles::{TILE_COLUMNS, Tiles};
+
+/// Pixels by which the mask grows to the aperture that is summed. Beyond 4 the blurred edge of a
+/// sharp lens is below the noise, and more adds noise to the force alone.
+const MARGIN_PX: usize = 4;
 
 /// One contact. Its mask stays in the workspace.
 ///
@@ -97,7 +102,6 @@ pub struct Detection {
 /// let options = ContactOptions::default()
 ///     .with_polarity(Polarity::Brighter)
 ///     .with_drift(DriftCorrection::Offset)
-///     .with_margin_px(6)
 ///     .with_saturation_limit(0.05)?
 ///     .with_false_alarm_rate(1e-6)?;
 /// assert_ne!(options, ContactOptions::default());
@@ -110,22 +114,18 @@ pub struct ContactOptions {
     pub(crate) polarity: Polarity,
     #[cfg_attr(feature = "serde", serde(deserialize_with = "read::false_alarm_rate"))]
     false_alarm_rate: f64,
-    margin_px: usize,
     drift: DriftCorrection,
     #[cfg_attr(feature = "serde", serde(deserialize_with = "read::saturation_limit"))]
     saturation_limit: f64,
 }
 
 impl Default for ContactOptions {
-    /// Brighter contact, one false alarm in a thousand frames, a margin of 4 pixels, drift corrected
-    /// where the frame shows it, at most 1 % of the contact saturated.
+    /// Brighter contact, one false alarm in a thousand frames, drift corrected where the frame shows
+    /// it, at most 1 % of the contact saturated.
     fn default() -> Self {
         Self {
             polarity: Polarity::Brighter,
             false_alarm_rate: 1e-3,
-            // Beyond 4 pixels the blurred edge of a sharp lens is below the noise. More adds noise
-            // to the force alone.
-            margin_px: 4,
             drift: DriftCorrection::Automatic,
             saturation_limit: 0.01,
         }
@@ -146,12 +146,6 @@ impl ContactOptions {
     pub fn with_false_alarm_rate(mut self, rate: f64) -> Result<Self, ForceError> {
         self.false_alarm_rate = Requirement::OpenUnitInterval.check("false_alarm_rate", rate)?;
         Ok(self)
-    }
-
-    /// Grows the mask by this number of pixels to the aperture that is summed.
-    pub fn with_margin_px(mut self, margin: usize) -> Self {
-        self.margin_px = margin;
-        self
     }
 
     /// Corrects this change of illumination or stray light.
@@ -401,10 +395,10 @@ impl ContactDetector {
             if extent.area < MINIMUM_AREA_PX {
                 return None;
             }
-            region.finish(self.options.margin_px);
+            region.finish(MARGIN_PX);
             let needed = region
                 .bounds(&region.mask)?
-                .grown(self.options.margin_px + 1, frame.dim());
+                .grown(MARGIN_PX + 1, frame.dim());
             // The mask and its margin lie inside: the region's border has cut nothing off.
             if needed.union(place) == place {
                 return Some(extent);

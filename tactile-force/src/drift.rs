@@ -5,7 +5,7 @@ use nalgebra::{Matrix3, Vector3};
 use ndarray::{ArrayView2, Axis, AxisDescription, Slice};
 use tactile_core::{BoundingBox, Estimate};
 
-use crate::frame::{TILE_COLUMNS, TILE_ROWS, TileSum};
+use crate::tiles::{TILE_COLUMNS, TILE_ROWS, TileSum};
 
 /// The change of illumination or stray light that is corrected. Detection takes
 /// [`Automatic`](Self::Automatic) by default.

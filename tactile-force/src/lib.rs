@@ -41,12 +41,17 @@ mod contact;
 mod drift;
 mod error;
 mod face;
+mod flat_field;
 mod frame;
 mod lens;
 mod measure;
+mod noise;
+mod outline_box;
 mod profile;
 mod region;
+mod runs;
 mod shear;
+mod tiles;
 
 pub use calibration::{
     Branch, CalibrationFrame, CalibrationOptions, CalibrationPair, CalibrationReport,
@@ -59,9 +64,11 @@ pub use drift::{
 };
 pub use error::ForceError;
 pub use face::{FaceReading, FaceWorkspace, ShapeProblem};
-pub use frame::{DifferenceNoise, FlatField, FrameStatistics, NoiseModel, ReferenceFrame};
+pub use flat_field::FlatField;
+pub use frame::{FrameStatistics, ReferenceFrame};
 pub use lens::{DotPair, LensFit, LensGeometry};
 pub use measure::{ForceMeasurement, ForceMeter, ForceOptions, ForceWorkspace, measure_force};
+pub use noise::{DifferenceNoise, NoiseModel};
 pub use profile::{HertzFit, HertzFitOptions, ProfileShape};
 pub use shear::{ShearCalibration, ShearMeasurement, ShearPair, ShearTracker};
 pub use tactile_core::{BoundingBox, CustomError, Estimate, InvalidOption, Polarity, StopReason};

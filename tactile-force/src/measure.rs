@@ -8,12 +8,14 @@ use crate::calibration::{ForceReading, GreyHistogram, LocalCalibration, StressCa
 use crate::contact::{Contact, ContactDetector, ContactOptions, Detection, DetectorWorkspace};
 use crate::drift::IlluminationDrift;
 use crate::error::ForceError;
-use crate::frame::{DifferenceNoise, FrameStatistics, ReferenceFrame};
+use crate::frame::{FrameStatistics, ReferenceFrame};
 use crate::lens::LensGeometry;
+use crate::noise::DifferenceNoise;
 use crate::profile::{
     HertzFit, HertzFitOptions, HertzFitter, PixelVariance, Rings, Start, VARIANCE_LEVELS,
 };
-use crate::region::{Region, Run};
+use crate::region::Region;
+use crate::runs::Run;
 
 /// Measures forces with one sensor: options checked and tables built once.
 ///

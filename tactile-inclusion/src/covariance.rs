@@ -80,7 +80,7 @@ const FRICTIONLESS: ModelErrors = ModelErrors {
 
 /// Which mesh a covariance is for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Resolution {
+pub(crate) enum Resolution {
     /// The answer's.
     Answer,
     /// That of the first fits.
@@ -130,7 +130,7 @@ fn ring_kernel(a: f64, b: f64, length: f64) -> f64 {
 
 /// Values of all frames: the pressures of one after the other, then the forces.
 #[derive(Debug, Clone)]
-pub struct Observed {
+pub(crate) struct Observed {
     pub radii_m: Vec<f64>,
     pub values: Vec<f64>,
     /// White errors. Infinite for a force that is not known.
@@ -142,7 +142,7 @@ pub struct Observed {
 
 /// Cells of a face on which pressures were measured.
 #[derive(Debug, Clone)]
-pub struct ObservedCells {
+pub(crate) struct ObservedCells {
     pub positions: Arc<CellPositions>,
     /// Standard error of a press's place, each way.
     pub place_error_m: f64,
@@ -179,7 +179,7 @@ fn kernel(distance: f64, length: f64) -> f64 {
 impl ObservedCells {
     /// Cells with their values, one frame after the other. `zero_error_m` is the standard error of
     /// the zero of a press's approaches, which presses of a scan have each.
-    pub fn new(
+    pub(crate) fn new(
         positions: CellPositions,
         [place_error_m, zero_error_m]: [f64; 2],
         values: &[f64],
@@ -232,7 +232,7 @@ impl Observed {
 
     /// These values with a relative error of the pressure that two inclusions have together, in
     /// quadrature with that of each.
-    pub fn with_neighbours(mut self, error: f64) -> Self {
+    pub(crate) fn with_neighbours(mut self, error: f64) -> Self {
         let aside = self.cells.iter_mut().flat_map(|cells| &mut cells.aside);
         aside.for_each(|aside| *aside = aside.hypot(error));
         self
@@ -241,7 +241,7 @@ impl Observed {
     /// These values with the error of the pressure of an inclusion off the axis that lifts the
     /// pressure by this part, in quadrature with that of another. Far from a face it fades with
     /// what the inclusion adds there.
-    pub fn with_lump_aside(&self, centre_m: [f64; 2], forward: &Forward, lift: f64) -> Self {
+    pub(crate) fn with_lump_aside(&self, centre_m: [f64; 2], forward: &Forward, lift: f64) -> Self {
         let mut observed = self.clone();
         if let (Some(cells), Some(face)) = (&mut observed.cells, &forward.cells) {
             let CellPositions {
@@ -279,7 +279,7 @@ impl Observed {
     }
 
     /// Covariance of the values. Relative errors are of the values observed.
-    pub fn covariance(
+    pub(crate) fn covariance(
         &self,
         sensor: &SensorErrors,
         interface: Interface,

@@ -73,7 +73,7 @@ impl Estimated {
 }
 
 /// Standard deviations that 95 % of a Gaussian lie within.
-pub const TWO_SIDED_95: f64 = 1.959_963_984_540_054;
+pub(crate) const TWO_SIDED_95: f64 = 1.959_963_984_540_054;
 
 /// A parameter of an inclusion: identified, or left open.
 ///
@@ -86,7 +86,6 @@ pub const TWO_SIDED_95: f64 = 1.959_963_984_540_054;
 /// assert_eq!(Identifiable::No(range).estimate().interval, [15e3, 200e3]);
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub enum Identifiable {
     /// Known within 25 % (one standard error) both ways.
     Yes(Estimated),
@@ -118,6 +117,21 @@ impl Identifiable {
         match self {
             Self::Yes(estimated) | Self::No(estimated) => estimated,
         }
+    }
+}
+
+/// The estimate, and `told`: whether it is identified.
+#[cfg(feature = "serde")]
+impl serde::Serialize for Identifiable {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        #[derive(serde::Serialize)]
+        struct Flat<'a> {
+            told: bool,
+            #[serde(flatten)]
+            estimated: &'a Estimated,
+        }
+        let (told, estimated) = (matches!(self, Self::Yes(_)), self.estimate());
+        Flat { told, estimated }.serialize(serializer)
     }
 }
 
@@ -279,7 +293,11 @@ pub fn asymmetry_warnings(asymmetry: f64, harmonics: f64) -> Vec<InclusionWarnin
 /// assert_ne!(Verdict::Absent, Verdict::Uncertain);
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize),
+    serde(rename_all = "snake_case")
+)]
 pub enum Verdict {
     /// One was found.
     Found,

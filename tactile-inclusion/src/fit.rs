@@ -21,14 +21,14 @@ const LEAST_DAMPING: f64 = 1e-6;
 
 /// What is known of a coordinate beforehand: a Gaussian.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Prior {
+pub(crate) struct Prior {
     pub coordinate: Coordinate,
     pub mean: f64,
     pub standard_error: f64,
 }
 
 impl Prior {
-    pub fn new(coordinate: Coordinate, (mean, standard_error): (f64, f64)) -> Self {
+    pub(crate) fn new(coordinate: Coordinate, (mean, standard_error): (f64, f64)) -> Self {
         Self {
             coordinate,
             mean,
@@ -39,7 +39,7 @@ impl Prior {
 
 /// Measured values with their covariance, and what is known beforehand.
 #[derive(Clone)]
-pub struct Problem {
+pub(crate) struct Problem {
     pub forward: Forward,
     pub measured: Vec<f64>,
     pub factor: Cholesky<f64, Dyn>,
@@ -48,7 +48,7 @@ pub struct Problem {
 
 /// A local optimum.
 #[derive(Debug, Clone)]
-pub struct Fit {
+pub(crate) struct Fit {
     pub parameters: Parameters,
     /// Of the coordinates, in the order of the priors.
     pub covariance: DMatrix<f64>,
@@ -67,7 +67,7 @@ pub struct Fit {
 
 /// When a fit ends.
 #[derive(Debug, Clone, Copy)]
-pub struct Ending {
+pub(crate) struct Ending {
     /// Distance of the optimum in standard errors below which it has settled. An undamped step that
     /// gains less than its square is the last.
     step: f64,
@@ -79,7 +79,7 @@ pub struct Ending {
 
 impl Ending {
     /// This ending for a fit that is of use below an objective alone.
-    pub fn below(self, objective: f64) -> Self {
+    pub(crate) fn below(self, objective: f64) -> Self {
         Self {
             needed: objective.min(self.needed),
             ..self
@@ -88,7 +88,7 @@ impl Ending {
 }
 
 /// Of an answer: what is left is far below what the data tell.
-pub const ANSWER_ENDING: Ending = Ending {
+pub(crate) const ANSWER_ENDING: Ending = Ending {
     step: 0.2,
     evaluations: 20,
     needed: f64::INFINITY,
@@ -96,14 +96,14 @@ pub const ANSWER_ENDING: Ending = Ending {
 
 /// Of two inclusions: 0.2 standard errors of each of some 22 coordinates, below which the objective
 /// of moved meshes is rough.
-pub const PAIR_ENDING: Ending = Ending {
+pub(crate) const PAIR_ENDING: Ending = Ending {
     step: 1.0,
     ..ANSWER_ENDING
 };
 
 /// Of the first fits, which a finer mesh moves by more. From a start of the grid, four to eight
 /// evaluations are taken, under the wrong assumption about the face any number.
-pub const FIRST_FIT_ENDING: Ending = Ending {
+pub(crate) const FIRST_FIT_ENDING: Ending = Ending {
     step: 0.5,
     evaluations: 12,
     needed: f64::INFINITY,
@@ -113,14 +113,14 @@ pub const FIRST_FIT_ENDING: Ending = Ending {
 const LARGEST_STEP: f64 = 0.5;
 
 /// A change of the coordinates.
-pub struct FitStep {
+pub(crate) struct FitStep {
     pub by: DVector<f64>,
     /// In standard errors, before it is cut to [`LARGEST_STEP`].
     pub size: f64,
 }
 
 /// The quadratic model of the objective at some parameters.
-pub struct Normal {
+pub(crate) struct Normal {
     pub matrix: DMatrix<f64>,
     pub gradient: DVector<f64>,
     pub misfit: f64,
@@ -142,24 +142,24 @@ fn fix(matrix: &mut DMatrix<f64>, gradient: &mut DVector<f64>, k: usize, step: f
 
 impl Fit {
     /// −2 ln of the posterior, up to a constant.
-    pub fn objective(&self) -> f64 {
+    pub(crate) fn objective(&self) -> f64 {
         self.misfit + self.penalty
     }
 }
 
 impl Problem {
-    pub fn coordinates(&self) -> Vec<Coordinate> {
+    pub(crate) fn coordinates(&self) -> Vec<Coordinate> {
         self.priors.iter().map(|prior| prior.coordinate).collect()
     }
 
-    pub fn residual(&self, predicted: &[f64]) -> DVector<f64> {
+    pub(crate) fn residual(&self, predicted: &[f64]) -> DVector<f64> {
         DVector::from_iterator(
             self.measured.len(),
             self.measured.iter().zip(predicted).map(|(a, b)| a - b),
         )
     }
 
-    pub fn penalty(&self, parameters: &Parameters) -> f64 {
+    pub(crate) fn penalty(&self, parameters: &Parameters) -> f64 {
         let squares = self.priors.iter().map(|prior| {
             let distance = parameters.get(prior.coordinate) - prior.mean;
             (distance / prior.standard_error).powi(2)
@@ -179,7 +179,11 @@ impl Problem {
     ///
     /// Pressures are nearly proportional to the moduli of block and inclusion as long as the guide
     /// is stiffer than they are.
-    pub fn scaled_start(&self, start: &Parameters, predicted: &[f64]) -> Option<(f64, Parameters)> {
+    pub(crate) fn scaled_start(
+        &self,
+        start: &Parameters,
+        predicted: &[f64],
+    ) -> Option<(f64, Parameters)> {
         let measured = self.measured.iter().zip(predicted);
         let factor = measured.map(|(y, m)| y * m).sum::<f64>()
             / predicted.iter().map(|m| m * m).sum::<f64>();
@@ -196,13 +200,13 @@ impl Problem {
         Some((misfit + self.penalty(&parameters), parameters))
     }
 
-    pub fn whitened(&self, vector: DVector<f64>) -> DVector<f64> {
+    pub(crate) fn whitened(&self, vector: DVector<f64>) -> DVector<f64> {
         let solved = self.factor.l_dirty().solve_lower_triangular(&vector);
         // A Cholesky factor has a positive diagonal.
         solved.unwrap_or(vector)
     }
 
-    pub fn normal(&self, parameters: &Parameters, near: Option<&Solved>) -> Option<Normal> {
+    pub(crate) fn normal(&self, parameters: &Parameters, near: Option<&Solved>) -> Option<Normal> {
         let (predicted, solved) = self.forward.predict_near(parameters, near)?;
         self.normal_at(parameters, predicted, solved)
     }
@@ -240,14 +244,14 @@ impl Problem {
     }
 
     /// Standard errors of the coordinates at some parameters. `None` where there is no solution.
-    pub fn errors(&self, parameters: &Parameters) -> Option<Vec<f64>> {
+    pub(crate) fn errors(&self, parameters: &Parameters) -> Option<Vec<f64>> {
         let covariance = self.normal(parameters, None)?.matrix.cholesky()?.inverse();
         Some(covariance.diagonal().iter().map(|v| v.sqrt()).collect())
     }
 
     /// Levenberg–Marquardt from a start. `None` where the start itself has no solution. `go_on` is
     /// asked before each evaluation.
-    pub fn fit(
+    pub(crate) fn fit(
         &self,
         start: &Parameters,
         ending: Ending,
@@ -299,7 +303,7 @@ impl Problem {
 
     /// The damped step towards the quadratic model's optimum, that of a coordinate that is held
     /// left out.
-    pub fn step(
+    pub(crate) fn step(
         &self,
         parameters: &Parameters,
         normal: &Normal,
@@ -335,7 +339,7 @@ impl Problem {
         Some(FitStep { by, size })
     }
 
-    pub fn stepped(&self, parameters: &Parameters, step: &DVector<f64>) -> Parameters {
+    pub(crate) fn stepped(&self, parameters: &Parameters, step: &DVector<f64>) -> Parameters {
         let steps = self.priors.iter().zip(step.iter());
         steps.fold(parameters.clone(), |moved, (prior, &by)| {
             moved.moved(prior.coordinate, by)
@@ -372,7 +376,7 @@ impl Problem {
     }
 
     /// Objective that goes with an evidence, for a posterior of this volume.
-    pub fn objective_at(&self, evidence: f64, volume: f64) -> f64 {
+    pub(crate) fn objective_at(&self, evidence: f64, volume: f64) -> f64 {
         2.0 * (volume - self.noise() - evidence)
     }
 }

@@ -20,7 +20,7 @@ const LARGEST_MESH_CHANGE: f64 = 0.3;
 
 /// A block's unknowns.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Parameters {
+pub(crate) struct Parameters {
     pub block_modulus_pa: f64,
     pub lump: Option<LumpParameters>,
     /// Where the inclusion is, which pressures of cells depend on.
@@ -39,7 +39,7 @@ pub struct Parameters {
 
 /// An inclusion's unknowns.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct LumpParameters {
+pub(crate) struct LumpParameters {
     /// Of the ball of equal volume.
     pub diameter_m: f64,
     pub depth_m: f64,
@@ -49,7 +49,7 @@ pub struct LumpParameters {
 }
 
 impl LumpParameters {
-    pub fn ball(diameter_m: f64, depth_m: f64, youngs_modulus_pa: f64) -> Self {
+    pub(crate) fn ball(diameter_m: f64, depth_m: f64, youngs_modulus_pa: f64) -> Self {
         Self {
             diameter_m,
             depth_m,
@@ -59,7 +59,7 @@ impl LumpParameters {
     }
 
     /// Its width across the axis and its height along it.
-    pub fn axes_m(&self) -> [f64; 2] {
+    pub(crate) fn axes_m(&self) -> [f64; 2] {
         let root = self.aspect.cbrt();
         [self.diameter_m / root, self.diameter_m * root * root]
     }
@@ -68,7 +68,7 @@ impl LumpParameters {
 /// An unknown as the fit sees it: logarithms of lengths and moduli, where errors are nearly
 /// Gaussian.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Coordinate {
+pub(crate) enum Coordinate {
     /// ln E₀.
     BlockModulus,
     /// ln D.
@@ -101,7 +101,7 @@ pub enum Coordinate {
 
 impl Coordinate {
     /// A change of this coordinate that matters about as much as one of a logarithm by 1.
-    pub fn unit(self) -> f64 {
+    pub(crate) fn unit(self) -> f64 {
         match self {
             Self::Zero => 1e-3,
             Self::Centre(_) | Self::Strayed(..) => 1e-2,
@@ -112,7 +112,7 @@ impl Coordinate {
     }
 
     /// The same coordinate of the second inclusion, where it is one of an inclusion's.
-    pub fn of_second(self) -> Option<Self> {
+    pub(crate) fn of_second(self) -> Option<Self> {
         OF_LUMP.iter().find(|c| **c == self).map(Self::OfSecond)
     }
 
@@ -153,10 +153,10 @@ static OF_LUMP: [Coordinate; 10] = [
 
 /// Largest Poisson ratio of a fit: the pressure differs from an incompressible block's by 0.1 %,
 /// and beyond it the derivatives by sizes lose digits as the bulk modulus grows.
-pub const LARGEST_POISSON_RATIO: f64 = 0.499;
+pub(crate) const LARGEST_POISSON_RATIO: f64 = 0.499;
 
 impl Parameters {
-    pub fn get(&self, coordinate: Coordinate) -> f64 {
+    pub(crate) fn get(&self, coordinate: Coordinate) -> f64 {
         let lump = |value: fn(&LumpParameters) -> f64| {
             self.lump.as_ref().map_or(0.0, |lump| value(lump).ln())
         };
@@ -182,7 +182,7 @@ impl Parameters {
     }
 
     /// These parameters with the second inclusion first.
-    pub fn swapped(&self) -> Self {
+    pub(crate) fn swapped(&self) -> Self {
         let mut swapped = self.clone();
         if let Some((lump, place)) = self.second {
             swapped.second = self.lump.map(|first| (first, self.place));
@@ -192,7 +192,7 @@ impl Parameters {
     }
 
     /// These parameters with one coordinate changed by `step`.
-    pub fn moved(&self, coordinate: Coordinate, step: f64) -> Self {
+    pub(crate) fn moved(&self, coordinate: Coordinate, step: f64) -> Self {
         if let Coordinate::OfSecond(coordinate) = coordinate {
             return self.swapped().moved(*coordinate, step).swapped();
         }
@@ -233,7 +233,7 @@ impl Parameters {
     /// Step of a difference quotient.
     ///
     /// By Poisson's ratio it is small against 1 − 2ν: the bulk modulus grows as its reciprocal.
-    pub fn small_step(&self, coordinate: Coordinate) -> f64 {
+    pub(crate) fn small_step(&self, coordinate: Coordinate) -> f64 {
         match coordinate {
             Coordinate::PoissonRatio => -STEP * (1.0 - 2.0 * self.poisson_ratio),
             _ => STEP * coordinate.unit(),
@@ -242,7 +242,7 @@ impl Parameters {
 
     /// Whether an inclusion comes nearer to the surface or the stage than a fiftieth of its
     /// diameter, or is as tall as the block allows.
-    pub fn is_at_boundary(&self) -> bool {
+    pub(crate) fn is_at_boundary(&self) -> bool {
         self.lump.is_some_and(|lump| {
             let height = lump.axes_m()[1];
             let room = self.height_m - lump.depth_m - height;
@@ -266,7 +266,7 @@ struct MeshMotion {
 }
 
 impl MeshMotion {
-    pub fn new(from: &Parameters, to: &Parameters, face_radius: f64) -> Self {
+    pub(crate) fn new(from: &Parameters, to: &Parameters, face_radius: f64) -> Self {
         let ellipse = |parameters: &Parameters| {
             let lump = parameters.lump.map(sizes);
             lump.map_or(([0.0; 2], 0.0), |[width, height, depth]| {
@@ -285,7 +285,7 @@ impl MeshMotion {
         }
     }
 
-    pub fn moved(&self, [r, z]: [f64; 2]) -> [f64; 2] {
+    pub(crate) fn moved(&self, [r, z]: [f64; 2]) -> [f64; 2] {
         if z <= 0.0 {
             return [r, z];
         }
@@ -343,7 +343,7 @@ fn sizes(lump: LumpParameters) -> [f64; 3] {
 
 /// A block of given size under a guide, and where its pressure is wanted.
 #[derive(Debug, Clone)]
-pub struct Forward {
+pub(crate) struct Forward {
     pub guide: Guide,
     pub block_radius_m: f64,
     pub interface: Interface,
@@ -361,7 +361,7 @@ pub struct Forward {
 
 /// A solved scene, from which scenes nearby are solved in fewer iterations.
 #[derive(Debug, Clone)]
-pub struct Solved {
+pub(crate) struct Solved {
     meshed: Arc<Meshed>,
     frames: SolvedFrames,
     /// With the second inclusion in place of the first, where there are two.
@@ -370,7 +370,7 @@ pub struct Solved {
 
 impl Solved {
     /// Pressure of a frame at a distance from the axis.
-    pub fn pressure_at(&self, frame: usize, radius_m: f64) -> f64 {
+    pub(crate) fn pressure_at(&self, frame: usize, radius_m: f64) -> f64 {
         self.frames.states()[frame].pressure_at(radius_m)
     }
 }
@@ -423,7 +423,7 @@ impl Forward {
     ///
     /// # Errors
     /// A lump that the block does not hold, or one too small to be meshed.
-    pub fn scene(&self, parameters: &Parameters) -> Result<FemScene, ElasticityError> {
+    pub(crate) fn scene(&self, parameters: &Parameters) -> Result<FemScene, ElasticityError> {
         let material = |modulus| Material::new(modulus, parameters.poisson_ratio);
         let lump = match parameters.lump {
             None => None,
@@ -450,12 +450,12 @@ impl Forward {
     }
 
     /// The frames' pressures and forces. `None` where the block cannot be meshed or solved.
-    pub fn predict(&self, parameters: &Parameters) -> Option<Vec<f64>> {
+    pub(crate) fn predict(&self, parameters: &Parameters) -> Option<Vec<f64>> {
         Some(self.predict_near(parameters, None)?.0)
     }
 
     /// As [`Self::predict`], from a scene solved nearby. And this one, solved.
-    pub fn predict_near(
+    pub(crate) fn predict_near(
         &self,
         parameters: &Parameters,
         near: Option<&Solved>,
@@ -471,7 +471,7 @@ impl Forward {
 
     /// The pressures and forces of a block solved with its inclusions under the axis, at the places
     /// that `parameters` have for them.
-    pub fn of_solved(&self, parameters: &Parameters, solved: &Solved) -> Vec<f64> {
+    pub(crate) fn of_solved(&self, parameters: &Parameters, solved: &Solved) -> Vec<f64> {
         let states = solved.frames.states();
         let of_second = (solved.second.as_ref()).map_or(states, |second| second.frames.states());
         self.collect(
@@ -510,7 +510,7 @@ impl Forward {
 
     /// This forward model with the plain block that carries the pressure of one with an inclusion
     /// to the cells of a face. `None` where that cannot be solved.
-    pub fn with_plain(mut self, parameters: &Parameters) -> Option<Self> {
+    pub(crate) fn with_plain(mut self, parameters: &Parameters) -> Option<Self> {
         let plain = Parameters {
             lump: None,
             second: None,
@@ -535,7 +535,7 @@ impl Forward {
     }
 
     /// How much an inclusion lifts the pressure above it, relative.
-    pub fn lift(&self, solved: &Solved) -> f64 {
+    pub(crate) fn lift(&self, solved: &Solved) -> f64 {
         (self.cells.as_ref()).map_or(0.0, |cells| cells.lift(&solved.frames))
     }
 
@@ -607,7 +607,7 @@ impl Forward {
     /// block itself, both from the solution with its tangent. It takes one factorisation a frame
     /// and one residual for each coordinate and frame. The iteration on the block itself takes out
     /// what the solution leaves unbalanced.
-    pub fn derivatives(
+    pub(crate) fn derivatives(
         &self,
         parameters: &Parameters,
         coordinates: &[Coordinate],

@@ -21,7 +21,7 @@ use crate::estimate::{
 use crate::fit::{Fit, Problem};
 use crate::forward::{Coordinate, Parameters};
 use crate::ridge::Marginal;
-use crate::search::GridStart;
+use crate::starts::GridStart;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix2, Vector2};
 use tactile_fem::Interface;
 
@@ -56,25 +56,25 @@ const LEAST_PROMISE: f64 = 18.0;
 
 /// Fall of the objective without which an inclusion is not that probable, 2 ln(p / (1 − p)). The
 /// parameters it adds are known better afterwards than before, which lowers the evidence further.
-pub const LEAST_GAIN: f64 = 9.2;
+pub(crate) const LEAST_GAIN: f64 = 9.2;
 
 /// Whether a fit leaves more than the errors explain.
-pub fn is_poor(misfit: f64, observed: &Observed) -> bool {
+pub(crate) fn is_poor(misfit: f64, observed: &Observed) -> bool {
     let freedom = observed.values.len() as f64;
     misfit > freedom + POOR * (2.0 * freedom).sqrt()
 }
 
 /// The fit with more evidence, of one without an inclusion and one with it.
-pub fn better<'a>(homogeneous: &'a Fit, lump: Option<&'a Fit>) -> &'a Fit {
+pub(crate) fn better<'a>(homogeneous: &'a Fit, lump: Option<&'a Fit>) -> &'a Fit {
     lump.filter(|lump| lump.evidence > homogeneous.evidence)
         .unwrap_or(homogeneous)
 }
 
 /// Number of coordinates of the block. They stand first, and ln D, ln d and ln E₁ follow.
-pub const BLOCK_COORDINATES: usize = 4;
+pub(crate) const BLOCK_COORDINATES: usize = 4;
 
 /// The best fits under one assumption about the face.
-pub struct Hypothesis {
+pub(crate) struct Hypothesis {
     pub problem: Problem,
     pub interface: Interface,
     pub homogeneous: Fit,
@@ -87,7 +87,7 @@ pub struct Hypothesis {
 
 impl Hypothesis {
     /// Follows the ridge of the fit with an inclusion, where there is more for one than against.
-    pub fn follow(&mut self, go_on: impl FnMut() -> bool) {
+    pub(crate) fn follow(&mut self, go_on: impl FnMut() -> bool) {
         if let Some(fit) = self
             .lump
             .as_ref()
@@ -101,18 +101,18 @@ impl Hypothesis {
         }
     }
 
-    pub fn evidence(&self) -> f64 {
+    pub(crate) fn evidence(&self) -> f64 {
         self.homogeneous.evidence.max(self.evidence_with())
     }
 
     /// The fit with more evidence.
-    pub fn better(&self) -> &Fit {
+    pub(crate) fn better(&self) -> &Fit {
         better(&self.homogeneous, self.lump.as_ref())
     }
 
     /// χ² over its degrees of freedom, where that is more than one: what differences of log
     /// evidence are too large by.
-    pub fn inflation(&self, observed: &Observed) -> f64 {
+    pub(crate) fn inflation(&self, observed: &Observed) -> f64 {
         (self.better().misfit / observed.values.len() as f64).max(1.0)
     }
 
@@ -233,7 +233,7 @@ impl Hypothesis {
 
     /// The answer. `rival` explains the frames about as well, `is_unsolved` that one could not be
     /// solved which may have.
-    pub fn estimate(
+    pub(crate) fn estimate(
         self,
         observed: &Observed,
         rival: Option<&Self>,
@@ -349,7 +349,7 @@ fn hull(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
 }
 
 /// A homogeneous fit and its derivatives, to weigh changes of its pressures by.
-pub struct PlainFit {
+pub(crate) struct PlainFit {
     predicted: Vec<f64>,
     /// Whitened derivatives by the block's parameters.
     columns: DMatrix<f64>,
@@ -359,7 +359,7 @@ pub struct PlainFit {
 
 impl PlainFit {
     /// `None` where the fit has no derivatives.
-    pub fn new(problem: &Problem, fit: &Fit) -> Option<Self> {
+    pub(crate) fn new(problem: &Problem, fit: &Fit) -> Option<Self> {
         let normal = problem.normal(&fit.parameters, Some(&fit.solved))?;
         Some(Self {
             columns: DMatrix::from_columns(&normal.columns),
@@ -370,7 +370,7 @@ impl PlainFit {
     }
 
     /// The whitened change of the values by relative changes.
-    pub fn added(&self, problem: &Problem, relative: &[f64]) -> DVector<f64> {
+    pub(crate) fn added(&self, problem: &Problem, relative: &[f64]) -> DVector<f64> {
         let added = relative
             .iter()
             .zip(&self.predicted)
@@ -380,7 +380,7 @@ impl PlainFit {
 
     /// Fall of χ² by a whitened change where it is there, less what the block's own parameters take
     /// up of it: sᵀ Q s.
-    pub fn gain(&self, added: &DVector<f64>) -> f64 {
+    pub(crate) fn gain(&self, added: &DVector<f64>) -> f64 {
         let shared = self.columns.tr_mul(added);
         added.norm_squared() - shared.dot(&self.precision.solve(&shared))
     }
@@ -388,7 +388,7 @@ impl PlainFit {
 
 /// What a grid of inclusions would change of a homogeneous fit.
 #[derive(Debug, Clone, Copy)]
-pub struct Score {
+pub(crate) struct Score {
     /// Largest fall of the objective.
     pub predicted_gain: f64,
     /// Logarithm of the odds of an inclusion, those of the grid being equally likely.
@@ -397,7 +397,7 @@ pub struct Score {
 
 impl Score {
     /// Of a fit without inclusion. `None` where it has no derivatives.
-    pub fn new(problem: &Problem, homogeneous: &Fit, grid: &[GridStart]) -> Option<Self> {
+    pub(crate) fn new(problem: &Problem, homogeneous: &Fit, grid: &[GridStart]) -> Option<Self> {
         let plain = PlainFit::new(problem, homogeneous)?;
         let residual = problem.whitened(problem.residual(&plain.predicted));
         // What the homogeneous block's own parameters cannot take up.
@@ -423,7 +423,7 @@ impl Score {
     }
 
     /// Whether an inclusion can be ruled out.
-    pub fn is_homogeneous(&self) -> bool {
+    pub(crate) fn is_homogeneous(&self) -> bool {
         self.predicted_gain < LEAST_PROMISE
     }
 }

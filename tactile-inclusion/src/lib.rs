@@ -29,6 +29,7 @@
 //! Raftery, J. Am. Stat. Assoc. 90 (1995) 773. H. Rue, S. Martino & N. Chopin, J. R. Stat. Soc. B
 //! 71 (2009) 319.
 #![forbid(unsafe_code)]
+#![warn(unreachable_pub)]
 
 mod covariance;
 mod design;
@@ -39,18 +40,21 @@ mod hypothesis;
 mod limits;
 mod pair;
 mod picture;
+mod progress;
 mod ridge;
 mod scan;
 mod search;
 mod specimen;
+mod starts;
 
 pub use design::{AssumedInclusion, ExpectedErrors};
 pub use estimate::{
     Estimated, Identifiable, Inclusion, InclusionEstimate, InclusionWarning, Verdict,
     asymmetry_warnings,
 };
+pub use progress::SearchProgress;
 pub use scan::{Scan, ScanPress};
-pub use search::{InclusionSearch, SearchProgress};
+pub use search::InclusionSearch;
 pub use specimen::{PressureProfile, SensorErrors, Specimen};
 
 #[cfg(test)]

@@ -2,8 +2,9 @@
 
 use crate::forward::{Forward, LumpParameters, Parameters, Solved};
 use crate::hypothesis::PlainFit;
+use crate::progress::{Counter, SearchProgress};
 use crate::scan::Scan;
-use crate::search::{Counter, HomogeneousFit, InclusionSearch, SearchProgress, USED_FACE};
+use crate::search::{HomogeneousFit, InclusionSearch, USED_FACE};
 use core::ops::ControlFlow;
 use tactile_elasticity::{ElasticityError, Quantity};
 

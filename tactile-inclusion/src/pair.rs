@@ -13,7 +13,9 @@ use crate::fit::{FIRST_FIT_ENDING, Fit, PAIR_ENDING, Prior, Problem};
 use crate::forward::{Coordinate, Forward, LumpParameters, Parameters};
 use crate::hypothesis::{BLOCK_COORDINATES, Hypothesis, is_poor};
 use crate::picture::extent;
-use crate::search::{CLEAR_EVIDENCE, Counter, DEPTHS, DIAMETERS, InclusionSearch};
+use crate::progress::Counter;
+use crate::search::{CLEAR_EVIDENCE, InclusionSearch};
+use crate::starts::{DEPTHS, DIAMETERS};
 use nalgebra::DVector;
 use tactile_fem::Kinematics;
 

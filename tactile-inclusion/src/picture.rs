@@ -18,7 +18,7 @@ use tactile_fem::{FrameResponse, SolvedFrames};
 
 /// Where an inclusion is, seen from above, and how far its outline there is from a circle.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Place {
+pub(crate) struct Place {
     /// Its middle (x, y) from the face's axis.
     pub centre_m: [f64; 2],
     /// Half the logarithm of the ratio of its axes, times cosine and sine of twice the angle from x
@@ -52,7 +52,7 @@ impl Place {
 
     /// The distance from an inclusion under the axis at which the ratio is that at (x, y): in a
     /// plane that is stretched so that the outline is round.
-    pub fn distance(&self, [x, y]: [f64; 2], squeezed: f64, depth: f64, face_m: f64) -> f64 {
+    pub(crate) fn distance(&self, [x, y]: [f64; 2], squeezed: f64, depth: f64, face_m: f64) -> f64 {
         let shown = self.shown(squeezed, depth);
         let [dx, dy] = [x - shown * self.centre_m[0], y - shown * self.centre_m[1]];
         // Further out no lump was solved.
@@ -73,14 +73,14 @@ impl Place {
     }
 
     /// Distance of the middle from the axis.
-    pub fn aside_m(&self) -> f64 {
+    pub(crate) fn aside_m(&self) -> f64 {
         self.centre_m[0].hypot(self.centre_m[1])
     }
 }
 
 /// Middles of a face's cells, or of the cells of the same face pressed at several places.
 #[derive(Debug, Clone, PartialEq)]
-pub struct CellPositions {
+pub(crate) struct CellPositions {
     /// (x, y) from the face's axis.
     pub positions_m: Vec<[f64; 2]>,
     /// The press each cell belongs to.
@@ -91,7 +91,7 @@ pub struct CellPositions {
 
 /// A block without a lump.
 #[derive(Debug, Clone)]
-pub struct PlainBlock {
+pub(crate) struct PlainBlock {
     pub frames: SolvedFrames,
     /// Its pressures by the tangent, which those after a change are compared with.
     pub unchanged: Vec<FrameResponse>,
@@ -116,7 +116,7 @@ impl PlainBlock {
 
 /// Cells and the plain block that carries a lump's pressure to them.
 #[derive(Debug, Clone)]
-pub struct Cells {
+pub(crate) struct Cells {
     pub positions: Arc<CellPositions>,
     /// The block without a lump, where it is solved.
     pub plain: Option<Arc<PlainBlock>>,
@@ -129,7 +129,7 @@ pub struct Cells {
 }
 
 /// Middle of the least box around points, and half its longer side.
-pub fn extent(points: &[[f64; 2]]) -> ([f64; 2], f64) {
+pub(crate) fn extent(points: &[[f64; 2]]) -> ([f64; 2], f64) {
     let range = |k: usize| {
         let values = points.iter().map(|point| point[k]);
         values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| {
@@ -144,7 +144,7 @@ pub fn extent(points: &[[f64; 2]]) -> ([f64; 2], f64) {
 impl Cells {
     /// Pressures of a frame from those of a block with its lump under the axis, or without one, and
     /// from those with a second lump there.
-    pub fn pressures(
+    pub(crate) fn pressures(
         &self,
         frame: usize,
         parameters: &Parameters,
@@ -211,7 +211,7 @@ impl Cells {
 
     /// What is left of a lump's share at a distance from it, where it is so far from the axis: with
     /// the third power of the distance, as that of a force pair under the surface.
-    pub fn fade(&self, aside_m: f64, distance_m: f64) -> f64 {
+    pub(crate) fn fade(&self, aside_m: f64, distance_m: f64) -> f64 {
         // From the used part's edge to twice as far out a lump passes from under the face.
         let beyond = (aside_m / self.reach_m - 1.0).clamp(0.0, 1.0);
         let far = (self.reach_m / distance_m.max(self.reach_m)).powi(3);
@@ -220,7 +220,7 @@ impl Cells {
 
     /// How much more than a plain block's the pressure above the lump is, in the last frame,
     /// relative.
-    pub fn lift(&self, with_lump: &SolvedFrames) -> f64 {
+    pub(crate) fn lift(&self, with_lump: &SolvedFrames) -> f64 {
         let last = |frames: &SolvedFrames| frames.states().last().map(|s| s.pressure_at(0.0));
         let plain = self.plain.as_ref().and_then(|plain| last(&plain.frames));
         match (last(with_lump), plain) {
@@ -231,7 +231,7 @@ impl Cells {
 
     /// The place about which the measured pressures over the plain block's are most nearly
     /// symmetric: within half a cell of a lump's middle, where there is one.
-    pub fn most_symmetric(&self, measured: &[f64]) -> [f64; 2] {
+    pub(crate) fn most_symmetric(&self, measured: &[f64]) -> [f64; 2] {
         let Some(plain) = &self.plain else {
             return [0.0; 2];
         };

@@ -53,7 +53,7 @@ const POINTS_LIMIT: usize = 200;
 
 /// The ridge at one E₁.
 #[derive(Debug, Clone)]
-pub struct Node {
+pub(crate) struct Node {
     /// Logarithm of p(u), up to a constant.
     pub density: f64,
     /// Values of all coordinates.
@@ -64,7 +64,7 @@ pub struct Node {
 
 /// The posterior along ln E₁.
 #[derive(Debug, Clone)]
-pub struct Ridge {
+pub(crate) struct Ridge {
     /// By ascending E₁.
     pub nodes: Vec<Node>,
     /// Of ln E₁ among the coordinates.
@@ -88,7 +88,7 @@ struct Place {
 impl Problem {
     /// The posterior along ln E₁ through an optimum with an inclusion. `None` where it has no
     /// curvature there.
-    pub fn ridge(&self, fit: &Fit, mut go_on: impl FnMut() -> bool) -> Option<Ridge> {
+    pub(crate) fn ridge(&self, fit: &Fit, mut go_on: impl FnMut() -> bool) -> Option<Ridge> {
         let index = (self.coordinates().iter()).position(|c| *c == Coordinate::LumpModulus)?;
         let normal = self.normal(&fit.parameters, Some(&fit.solved))?;
         let (node, start) = self.node(&fit.parameters, normal, index)?;
@@ -201,7 +201,7 @@ impl Problem {
 
 /// Marginal posteriors of all coordinates: a mixture of Gaussians.
 #[derive(Debug, Clone)]
-pub struct Marginal {
+pub(crate) struct Marginal {
     weights: Vec<f64>,
     points: Vec<Node>,
     /// Logarithm of the evidence over that by the curvature at the optimum.
@@ -317,7 +317,7 @@ impl Marginal {
     /// standard error it is known with beforehand. A ball and a spheroid are equally likely
     /// beforehand, and the posterior is the mixture of both. With κ that logarithm, the odds of a
     /// ball are p(κ = 0 | y) / p(κ = 0) (J. M. Dickey, Ann. Math. Stat. 42 (1971) 204).
-    pub fn new(ridge: &Ridge, shape: Option<(usize, f64)>) -> Option<Self> {
+    pub(crate) fn new(ridge: &Ridge, shape: Option<(usize, f64)>) -> Option<Self> {
         let (nodes, index) = (&ridge.nodes, ridge.index);
         let xs: Vec<f64> = nodes.iter().map(|node| node.at[index]).collect();
         if xs.len() < 3 || xs.windows(2).any(|pair| pair[1] <= pair[0]) {
@@ -372,14 +372,14 @@ impl Marginal {
 
     /// The value that a coordinate is as probably above as below: the optimum of a skewed posterior
     /// lies at an end of its interval.
-    pub fn median(&self, coordinate: usize) -> f64 {
+    pub(crate) fn median(&self, coordinate: usize) -> f64 {
         self.quantile(coordinate, 0.5)
     }
 
     /// The 95 % interval of a coordinate, with equal tails. It holds 96, 98 and 97 % of 161
     /// inclusions' D, d and E₁ by CalculiX, the likelihood ratio's 96, 98 and 98
     /// (`inclusion_study`).
-    pub fn interval(&self, coordinate: usize) -> [f64; 2] {
+    pub(crate) fn interval(&self, coordinate: usize) -> [f64; 2] {
         [0.025, 0.975].map(|probability| self.quantile(coordinate, probability))
     }
 
@@ -413,7 +413,7 @@ impl Marginal {
     }
 
     /// Covariance of the coordinates.
-    pub fn covariance(&self) -> DMatrix<f64> {
+    pub(crate) fn covariance(&self) -> DMatrix<f64> {
         let count = self.points[0].at.len();
         let mut mean = DVector::zeros(count);
         for (weight, point) in self.weights.iter().zip(&self.points) {

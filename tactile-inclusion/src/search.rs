@@ -1,21 +1,16 @@
-//! Search for an inclusion.
-//!
-//! Progress of a search.
-//!
-//! First fits without an inclusion, and whether one can be ruled out.
-//!
-//! Inclusions that fits start from.
-//!
-//! First fits under one assumption about the face, and the answer's from them.
+//! Search for an inclusion: first fits without one, first fits under each assumption about the face,
+//! and the answer's from them.
 
 use crate::covariance::{Observed, ObservedCells, Resolution};
 use crate::estimate::InclusionEstimate;
 use crate::fit::{ANSWER_ENDING, FIRST_FIT_ENDING, Fit, Prior, Problem};
-use crate::forward::{Coordinate, Forward, LARGEST_POISSON_RATIO, LumpParameters, Parameters};
+use crate::forward::{Coordinate, Forward, LARGEST_POISSON_RATIO, Parameters};
 use crate::hypothesis::{BLOCK_COORDINATES, Hypothesis, LEAST_GAIN, Score, better};
 use crate::picture::{Cells, Place, extent};
+use crate::progress::{Counter, SearchProgress};
 use crate::scan::{Scan, ScanPress};
 use crate::specimen::{PressureProfile, SensorErrors, Specimen, check};
+use crate::starts::{GridStart, starts};
 use core::ops::ControlFlow;
 use std::sync::Arc;
 use tactile_elasticity::{ElasticityError, Quantity};
@@ -40,9 +35,6 @@ const DOUBTFUL: f64 = 2.0;
 /// and of the grid.
 const HOMOGENEOUS_FINENESS: usize = 2;
 
-/// Part of the block's height that an inclusion may reach down to.
-const DEEPEST: f64 = 0.95;
-
 /// The part of the better misfit in [`HOPELESS_EVIDENCE`].
 const HOPELESS_MISFIT: f64 = 0.05;
 
@@ -62,7 +54,7 @@ const CERTAIN_EVIDENCE: f64 = 50.0;
 
 /// Part of the guide's radius within which pressures are used: further out the singular rim rules,
 /// where meshes disagree by percents.
-pub const USED_FACE: f64 = 0.75;
+pub(crate) const USED_FACE: f64 = 0.75;
 
 /// Radial displacement of tissue under a face over the radius and the mean strain of the block, and
 /// its standard error. Of incompressible tissue it is half the strain at its depth, which is larger
@@ -131,7 +123,7 @@ pub struct InclusionSearch {
 /// leads by less. Where the better one leaves more than the errors explain, differences count as
 /// much less (K. P. Burnham & D. R. Anderson, *Model Selection and Multimodel Inference* (2002),
 /// §2.5).
-pub const CLEAR_EVIDENCE: f64 = 12.0;
+pub(crate) const CLEAR_EVIDENCE: f64 = 12.0;
 
 /// Standard error of the logarithm of an inclusion's height over its width, where nothing is said:
 /// 1.75 to one and one to 1.75 are at its 95 % range's ends.
@@ -496,70 +488,17 @@ impl InclusionSearch {
     }
 }
 
-/// What a search is doing.
-///
-/// ```
-/// use tactile_inclusion::SearchProgress;
-///
-/// let progress = SearchProgress { done: 3, expected: 30 };
-/// assert!(progress.done < progress.expected);
-/// ```
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct SearchProgress {
-    /// Solutions so far.
-    pub done: usize,
-    /// About how many there will be.
-    pub expected: usize,
-}
-
-/// Counts solutions, reports each and hears whether to go on.
-pub struct Counter<'a> {
-    pub done: usize,
-    pub expected: usize,
-    pub progress: &'a mut dyn FnMut(SearchProgress) -> ControlFlow<()>,
-    pub cancelled: bool,
-}
-
-impl<'a> Counter<'a> {
-    pub fn new(
-        expected: usize,
-        progress: &'a mut dyn FnMut(SearchProgress) -> ControlFlow<()>,
-    ) -> Self {
-        Self {
-            done: 0,
-            expected,
-            progress,
-            cancelled: false,
-        }
-    }
-
-    /// Reports a solution. `false` where the search is to end.
-    pub fn step(&mut self) -> bool {
-        if self.cancelled {
-            return false;
-        }
-        self.done += 1;
-        self.expected = self.expected.max(self.done);
-        let progress = SearchProgress {
-            done: self.done,
-            expected: self.expected,
-        };
-        self.cancelled |= (self.progress)(progress).is_break();
-        !self.cancelled
-    }
-}
-
 /// Elements along an eighth of the inclusion's circumference for the answer. Of bonded blocks the
 /// pressure is within 0.05 % of a mesh of ten. Five leave waves of 0.1 % above a wide shallow
 /// inclusion, which move its size and depth by one bound. Where the face slides they move χ² by up
 /// to ten, enough to take it for one that sticks. On an inclusion that hardly shows the noise errs
 /// by more than five elements do.
-pub fn answer_fineness(is_certain: bool) -> usize {
+pub(crate) fn answer_fineness(is_certain: bool) -> usize {
     if is_certain { 7 } else { 5 }
 }
 
 /// A homogeneous block under one assumption about the face.
-pub struct HomogeneousFit {
+pub(crate) struct HomogeneousFit {
     /// Of the first fits.
     pub problem: Problem,
     pub interface: Interface,
@@ -575,12 +514,12 @@ pub struct HomogeneousFit {
 
 impl HomogeneousFit {
     /// Whether inclusions can be ruled out, were the face as assumed.
-    pub fn is_homogeneous(&self) -> bool {
+    pub(crate) fn is_homogeneous(&self) -> bool {
         (self.settled.as_ref()).is_some_and(|(_, score)| score.is_homogeneous())
     }
 
     /// Starts with their pressures scaled to those observed, the best first.
-    pub fn starts(&self) -> Vec<Parameters> {
+    pub(crate) fn starts(&self) -> Vec<Parameters> {
         let mut scaled: Vec<(f64, Parameters)> = (self.grid.iter())
             .filter_map(|start| (self.problem).scaled_start(&start.parameters, &start.predicted))
             .collect();
@@ -687,73 +626,11 @@ impl InclusionSearch {
     }
 }
 
-/// Diameters and depths over the face's radius, and contrasts E₁/E₀, that a face can see.
-pub const DIAMETERS: [f64; 3] = [0.35, 0.65, 1.05];
-pub const DEPTHS: [f64; 3] = [0.15, 0.3, 0.55];
-const CONTRASTS: [f64; 2] = [2.5, 8.0];
-
-/// An inclusion in a block, and its pressures.
-#[derive(Debug, Clone)]
-pub struct GridStart {
-    pub parameters: Parameters,
-    pub predicted: Vec<f64>,
-    /// Part by which each value exceeds that of a homogeneous block on the same mesh.
-    pub added: Vec<f64>,
-}
-
-/// The grid of inclusions in a homogeneous block under a face of this radius. `None` where the
-/// search is to end.
-pub fn starts(
-    forward: &Forward,
-    homogeneous: &Parameters,
-    counter: &mut Counter<'_>,
-) -> Option<Vec<GridStart>> {
-    let face_radius_m = forward.guide.radius_m();
-    let mut starts = Vec::new();
-    for diameter in DIAMETERS {
-        for depth in DEPTHS {
-            if (diameter + depth) * face_radius_m >= DEEPEST * homogeneous.height_m {
-                continue;
-            }
-            let with = |contrast: f64| Parameters {
-                lump: Some(LumpParameters::ball(
-                    diameter * face_radius_m,
-                    depth * face_radius_m,
-                    contrast * homogeneous.block_modulus_pa,
-                )),
-                ..homogeneous.clone()
-            };
-            if !counter.step() {
-                return None;
-            }
-            let Some(none) = forward.predict(&with(1.0)) else {
-                continue;
-            };
-            for contrast in CONTRASTS {
-                if !counter.step() {
-                    return None;
-                }
-                let parameters = with(contrast);
-                let Some(predicted) = forward.predict(&parameters) else {
-                    continue;
-                };
-                let added = predicted.iter().zip(&none);
-                starts.push(GridStart {
-                    parameters,
-                    added: added.map(|(with, none)| with / none - 1.0).collect(),
-                    predicted,
-                });
-            }
-        }
-    }
-    Some(starts)
-}
-
 /// The best first fits under one assumption about the face.
 ///
 /// Their covariance has the coarse mesh's error in it: without, the objective is as rough as that,
 /// and fits end far from the truth.
-pub struct FirstFits {
+pub(crate) struct FirstFits {
     problem: Problem,
     interface: Interface,
     homogeneous: Fit,
@@ -765,7 +642,7 @@ pub struct FirstFits {
 
 impl FirstFits {
     /// Without an inclusion.
-    pub fn homogeneous(homogeneous: HomogeneousFit) -> Self {
+    pub(crate) fn homogeneous(homogeneous: HomogeneousFit) -> Self {
         let (settled, score) = homogeneous.settled.unzip();
         Self {
             problem: homogeneous.problem,
@@ -782,7 +659,7 @@ impl FirstFits {
     }
 
     /// Log evidence of the better fit.
-    pub fn evidence(&self) -> f64 {
+    pub(crate) fn evidence(&self) -> f64 {
         self.better().evidence
     }
 

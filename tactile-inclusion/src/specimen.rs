@@ -217,7 +217,9 @@ pub struct PressureProfile {
 }
 
 /// Checks that there are approaches, positive and growing.
-pub fn check_approaches(approaches_m: impl Iterator<Item = f64>) -> Result<(), ElasticityError> {
+pub(crate) fn check_approaches(
+    approaches_m: impl Iterator<Item = f64>,
+) -> Result<(), ElasticityError> {
     let mut approaches_m = approaches_m.peekable();
     if approaches_m.peek().is_none() {
         return Err(ElasticityError::TooFewLoads {
@@ -229,7 +231,7 @@ pub fn check_approaches(approaches_m: impl Iterator<Item = f64>) -> Result<(), E
 }
 
 /// Checks frames against the rings' radii.
-pub fn check(radii_m: &[f64], frames: &[PressureProfile]) -> Result<(), ElasticityError> {
+pub(crate) fn check(radii_m: &[f64], frames: &[PressureProfile]) -> Result<(), ElasticityError> {
     check_approaches(frames.iter().map(|frame| frame.approach_m))?;
     for &radius in radii_m {
         Quantity::Radius.positive(radius)?;

@@ -48,6 +48,7 @@ mod error;
 mod fresnel;
 mod led;
 mod sensor;
+mod spread_points;
 mod stack;
 pub mod surface;
 pub mod trace;

@@ -80,7 +80,7 @@ impl SimulatedContact {
         force_n: f64,
     ) -> Result<Self, SimulateError> {
         let largest = law.largest_force_n(sphere, waveguide)?;
-        within("force_n", force_n, 0.0, largest)?;
+        within("the force in N", force_n, 0.0, largest)?;
         let hertz = Self::hertz(sphere, waveguide, force_n);
         if let Some(states) = law.states(sphere, waveguide)? {
             // Without force there is no state to scale down to: the contact then is Hertz's of
@@ -282,7 +282,7 @@ impl ContactModel {
         // Equal forces would leave no interval to interpolate in.
         for pair in states.windows(2) {
             within(
-                "force_n",
+                "the force in N",
                 pair[1].force_n,
                 pair[0].force_n * (1.0 + EQUAL_FORCES),
                 f64::MAX,
@@ -396,7 +396,7 @@ pub struct ContactState {
 
 impl ContactState {
     pub(crate) fn validate(&self) -> Result<(), SimulateError> {
-        positive("force_n", self.force_n)?;
+        positive("the force in N", self.force_n)?;
         positive("contact_radius_m", self.contact_radius_m)?;
         finite("indentation_m", self.indentation_m)?;
         let samples = self.radius_m.len();
@@ -432,7 +432,7 @@ impl ContactState {
         }
         let carried_n = self.carried_force_n();
         within(
-            "force_n",
+            "the force in N",
             self.force_n,
             carried_n * (1.0 - LARGEST_FORCE_MISMATCH),
             carried_n * (1.0 + LARGEST_FORCE_MISMATCH),

@@ -575,7 +575,7 @@ impl PressOptions {
         // A load's number takes 16 bits of its noise stream's number, 0 being the reference frame.
         within("loads", self.loads.len() as f64, 1.0, 65534.0)?;
         for load in &self.loads {
-            not_negative("force_n", load.force_n)?;
+            not_negative("the force in N", load.force_n)?;
             load.illumination.validate()?;
             for k in 0..2 {
                 finite("shear_n", load.shear_n[k])?;

@@ -102,7 +102,7 @@ impl ContactState {
         at_least("forces_n", forces_n.len(), 1)?;
         let mut last_n = 0.0;
         for &force_n in forces_n {
-            positive("force_n", force_n - last_n)?;
+            positive("the force in N", force_n - last_n)?;
             last_n = force_n;
         }
         let poisson_ratio = material.poisson_ratio.min(LARGEST_POISSON_RATIO);

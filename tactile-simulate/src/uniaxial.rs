@@ -384,7 +384,7 @@ impl UniaxialOptions {
         self.camera.validate()?;
         at_least("forces_n", self.forces_n.len(), 1)?;
         for &force in &self.forces_n {
-            not_negative("force_n", force)?;
+            not_negative("the force in N", force)?;
         }
         for k in 0..2 {
             positive("face_m", self.face_m[k])?;

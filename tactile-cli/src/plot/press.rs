@@ -1,61 +1,8 @@
 //! The pages of a press: frames, surfaces, matches, displacement, strain, summary.
-use super::{Colour, HeatMap, Page, Panel, PlotError, PlotPoint};
-use crate::console::in_unit;
+use super::page::{Colour, HeatMap, Page, Panel, PlotError, PlotPoint};
+use crate::text::in_unit;
 use ndarray::Array2;
-use std::path::{Path, PathBuf};
-use tactile_files::io::replace_file;
 use tactile_imaging::pipeline::{ContactSurface, Measurement, PipelineError, Press, with_error};
-
-/// Writes every page that the press has results for to `folder`, as SVG, and returns their paths.
-///
-/// The pages are frames, surfaces, and a summary of [`Press::measure`]. Of two frames or more there
-/// are also matches, displacement and strain between the first and the last.
-///
-/// ```
-/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
-/// use tactile_cli::save_press_pages;
-/// use tactile_imaging::{Object, Pipeline};
-/// use tactile_simulate::{CalibrationRun, Camera, PressLoad, PressOptions, PressScene};
-/// let camera = Camera::default().coarser(16);
-/// let scene = PressScene::new(PressOptions {
-///     camera,
-///     loads: vec![PressLoad::normal(0.7)],
-///     ..Default::default()
-/// })?;
-/// let calibration = scene.calibrate(&CalibrationRun { steps: 8, ..Default::default() })?;
-/// let made = scene.simulate();
-/// let pipeline =
-///     Pipeline::from_pairs(&calibration.pairs, made.pixel_size_m, Object::sphere(3e-3))?
-///         .with_control_points(40);
-/// let mut press = pipeline.press(made.reference.view())?;
-/// press.add_frame(made.frames[0].view());
-/// let folder = tempfile::tempdir()?;
-/// let paths = save_press_pages(&mut press, folder.path())?;
-/// let names: Vec<_> = paths.iter().filter_map(|p| p.file_name()).collect();
-/// assert_eq!(names, ["frames.svg", "surfaces.svg", "summary.svg"], "strain takes two frames");
-/// let summary = std::fs::read_to_string(folder.path().join("summary.svg"))?;
-/// assert!(summary.contains("Young") && summary.contains("force 1"));
-/// # Ok(()) }
-/// ```
-///
-/// # Errors
-/// [`PlotError`].
-pub fn save_press_pages(
-    press: &mut Press<'_>,
-    folder: impl AsRef<Path>,
-) -> Result<Vec<PathBuf>, PlotError> {
-    let summary = summary_lines(&press.measure());
-    let mut paths = Vec::new();
-    for (name, page) in press_pages(press, summary)? {
-        let path = folder.as_ref().join(format!("{name}.svg"));
-        replace_file(&path, page.to_svg()?.as_bytes()).map_err(|source| PlotError::Write {
-            path: path.clone(),
-            source,
-        })?;
-        paths.push(path);
-    }
-    Ok(paths)
-}
 
 /// Names and pages. In the lines of the summary a tab stands between name and value.
 pub fn press_pages(

@@ -1,6 +1,8 @@
 //! What is drawn is in the file.
+use super::super::axis::label;
 use super::*;
 use ndarray::array;
+use plotters::coord::ranged1d::ValueFormatter;
 
 fn svg(panel: Panel) -> String {
     Page::new("", 1, vec![panel]).to_svg().unwrap()

@@ -2,8 +2,9 @@
 use super::{
     SERIES_FILES, StrainArguments, StrainReport, components_json, strain_cells, strain_headings,
 };
-use crate::console::{Context, printable};
+use crate::console::Context;
 use crate::outputs::Csv;
+use crate::text::printable;
 use nalgebra::{Matrix3, Point};
 use serde_json::{Value, json};
 use tactile_imaging::pipeline::with_error;

@@ -1,7 +1,8 @@
 //! `tactile stream` with a gel that is lit in colours: force, contact and depth live.
 use super::StreamArguments;
 use super::watch::{Meter, Watch, listed, watch};
-use crate::console::{Context, Exit, Failure};
+use crate::console::Context;
+use crate::failure::{Exit, Failure};
 use crate::photometric::{GelContact, NO_FRAMES, Reader, number_or_error};
 use crate::relief::HeightGrid;
 use ndarray::{Array2, Array3};

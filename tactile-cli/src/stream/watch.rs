@@ -1,6 +1,7 @@
 //! The frames of a stream one after the other: from images, folders, videos and pipes.
 use super::StreamArguments;
-use crate::console::{Bar, Context, Exit, Failure};
+use crate::console::{Bar, Context};
+use crate::failure::{Exit, Failure};
 use crate::frames::{DEFAULT_RATE_HZ, Pixels, Reading};
 use crate::outputs::Csv;
 use crate::record::FrameRecorder;

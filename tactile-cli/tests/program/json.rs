@@ -103,11 +103,11 @@ fn what_is_not_as_the_schema_has_it_is_named() {
         let value = serde_json::from_str(text).unwrap();
         check(&value, &schema, &schema, "").unwrap_err()
     };
-    assert!(reason(r#"{"schema":"tactile-1","command":"paper"}"#).contains("cautions"));
-    let old = r#"{"schema":"tactile-1","command":"force","cautions":[],"frames":[
+    assert!(reason(r#"{"schema":"tactile-2","command":"paper"}"#).contains("cautions"));
+    let old = r#"{"schema":"tactile-2","command":"force","cautions":[],"frames":[
         {"frame":"a.png","contact":{"force_n":[1.0,0.1],"contact_radius_m":[1.0,0.1]}}]}"#;
     assert!(!reason(old).is_empty());
-    let silent = r#"{"schema":"tactile-1","command":"light","cautions":[{"kind":"x"}],
+    let silent = r#"{"schema":"tactile-2","command":"light","cautions":[{"kind":"x"}],
         "rays":1,"acceptance":[]}"#;
     assert!(reason(silent).contains("text"));
 }

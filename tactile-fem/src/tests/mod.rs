@@ -1,7 +1,8 @@
 //! Convergence of the elements and of contact, against exact solutions.
 
-use crate::mesh::{Boundary, Mesh, contact_lines, graded};
+use crate::mesh::{Boundary, Mesh};
 use crate::model::{ElementModel, RigidShape, Support};
+use crate::spacing::{contact_lines, graded};
 use crate::*;
 
 mod contact;

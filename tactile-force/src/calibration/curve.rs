@@ -19,7 +19,7 @@ use super::{
     LocalCalibration, StressCalibration,
 };
 use crate::error::ForceError;
-use crate::frame::DifferenceNoise;
+use crate::noise::DifferenceNoise;
 
 /// The grey histogram of a contact under a known force.
 ///

@@ -378,7 +378,7 @@ impl Fit {
         let columns = if options.through_origin { 1 } else { 2 };
         let freedom = (x.len() - columns) as f64;
         let even = Self::solve(x, forces, &vec![1.0; x.len()], options.through_origin)?;
-        if options.constant_noise || largest == 0.0 {
+        if largest == 0.0 {
             return Some(even);
         }
         let mut best = (f64::NEG_INFINITY, None);

@@ -25,7 +25,7 @@ use tactile_core::Estimate;
 use tactile_core::statistics::effective_degrees_of_freedom;
 
 use crate::error::ForceError;
-use crate::frame::DifferenceNoise;
+use crate::noise::DifferenceNoise;
 
 /// A force read from a calibration.
 ///
@@ -492,7 +492,7 @@ impl CalibrationPair {
 /// };
 ///
 /// let pairs = [1.0, 2.0, 3.0].map(|v| CalibrationPair::loading(v, 2.0 * v + 0.1));
-/// let options = CalibrationOptions::default().with_zero_at_origin().with_constant_noise();
+/// let options = CalibrationOptions::default().with_zero_at_origin();
 /// let line = LinearCalibration::fit(&pairs, &options)?;
 /// assert_eq!(line.force_n(0.0), 0.0);
 /// assert!((line.sensitivity_n(1.0) - (2.0 + 0.1 * 6.0 / 14.0)).abs() < 1e-12);
@@ -502,8 +502,6 @@ impl CalibrationPair {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct CalibrationOptions {
     through_origin: bool,
-    #[cfg_attr(feature = "serde", serde(default))]
-    constant_noise: bool,
 }
 
 impl CalibrationOptions {
@@ -511,15 +509,6 @@ impl CalibrationOptions {
     #[must_use]
     pub fn with_zero_at_origin(mut self) -> Self {
         self.through_origin = true;
-        self
-    }
-
-    /// States that the gauge's noise is the same at all forces: all pairs count alike. By default
-    /// noise may grow with the force as the pairs show it, as that of a gauge of so many per cent
-    /// of its reading.
-    #[must_use]
-    pub fn with_constant_noise(mut self) -> Self {
-        self.constant_noise = true;
         self
     }
 }

@@ -7,7 +7,7 @@ use tactile_core::{Estimate, Requirement, StopReason};
 use super::model::{BlurredEdge, Level, Shape, level};
 use super::rings::{Ring, Rings};
 use crate::error::ForceError;
-use crate::frame::DifferenceNoise;
+use crate::noise::DifferenceNoise;
 use crate::region::Region;
 
 /// The parameters of the profile that are known, and the length of the fit.

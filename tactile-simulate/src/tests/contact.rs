@@ -120,8 +120,8 @@ fn a_table_without_meaning_is_refused() {
     };
     type Change = fn(&mut ContactState);
     let cases: [(Change, &str); 8] = [
-        (|s| s.force_n = 1.0, "force_n"),
-        (|s| s.force_n = f64::NAN, "force_n"),
+        (|s| s.force_n = 1.0, "the force in N"),
+        (|s| s.force_n = f64::NAN, "the force in N"),
         (|s| s.radius_m[0] = 1e-6, "radius_m"),
         (|s| s.radius_m.swap(3, 4), "radius_m"),
         (|s| s.pressure_pa[2] = -1.0, "pressure_pa"),

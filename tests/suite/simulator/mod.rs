@@ -203,7 +203,9 @@ fn every_meaningless_value_is_named() {
     named("refractive_index", &[0.9], |o, v| {
         o.waveguide.layers[1].refractive_index = v;
     });
-    named("force_n", &[-0.1, INF], |o, v| o.loads[1].force_n = v);
+    named("the force in N", &[-0.1, INF], |o, v| {
+        o.loads[1].force_n = v
+    });
     named("shear_n", &[INF], |o, v| o.loads[0].shear_n[1] = v);
     named("shear_stiffness_n_per_m", &[0.0], |o, v| {
         o.shear_stiffness_n_per_m[0] = v;

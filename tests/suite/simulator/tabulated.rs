@@ -72,7 +72,7 @@ fn a_tabulated_contact_refuses_loads_beyond_its_last_state() {
     let reaches = |maximum: f64| (maximum / 0.7 - 1.0).abs() < 1e-8;
     assert!(matches!(
         with(0.71),
-        Err(SimulateError::OutOfRange { field: "force_n", maximum, .. }) if reaches(maximum)
+        Err(SimulateError::OutOfRange { field: "the force in N", maximum, .. }) if reaches(maximum)
     ));
     let scene = with(0.7).unwrap();
     let mut cycle = LoadCycle::default();

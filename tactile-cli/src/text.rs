@@ -1,0 +1,64 @@
+//! Numbers and the text of others, as terminals and pictures show them.
+use tactile_imaging::core::Estimate;
+use tactile_imaging::pipeline::with_error;
+
+/// Text of others for terminals and pictures: control characters and marks that turn the direction
+/// of writing are replaced.
+///
+/// Without this a file's name could clear the screen, forge a line of the answer, or make an SVG
+/// file unreadable.
+pub fn printable(text: &str) -> String {
+    let hidden = |c: char| {
+        c.is_control()
+            || matches!(c, '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
+    };
+    let seen = |c| if hidden(c) { '\u{fffd}' } else { c };
+    text.chars().map(seen).collect()
+}
+
+/// Four significant digits, for numbers whose error is not known.
+pub fn four_digits(value: f64) -> String {
+    digits(value, 4)
+}
+
+/// A number of significant digits, plain where the value is neither tiny nor huge.
+pub fn digits(value: f64, significant: usize) -> String {
+    if value == 0.0 || !value.is_finite() {
+        return format!("{value}");
+    }
+    let power = value.abs().log10().floor() as i32;
+    let last = significant as i32 - 1;
+    if (-4..=last.max(5)).contains(&power) {
+        format!("{value:.*}", (last - power).max(0) as usize)
+    } else {
+        format!("{value:.*e}", last.max(0) as usize)
+    }
+}
+
+/// A value with its standard error in a unit of which one is `1 / scale`.
+pub fn in_unit(estimate: Estimate, scale: f64) -> String {
+    with_error(estimate.value, estimate.standard_error, scale)
+}
+
+/// `1 point`, `2 points`.
+pub fn count(n: usize, noun: &str) -> String {
+    format!("{n} {noun}{}", if n == 1 { "" } else { "s" })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn digits_are_significant_ones() {
+        let texts = [1234.56, 0.012_345_6, 1.5e-7, 0.0, -2.0, f64::NAN].map(four_digits);
+        let expected = ["1235", "0.01235", "1.500e-7", "0", "-2.000", "NaN"];
+        assert_eq!(texts, expected);
+    }
+
+    #[test]
+    fn names_of_files_cannot_write_to_the_terminal() {
+        let name = "a\u{1b}[2J\nb\u{202e}c.png µ";
+        assert_eq!(printable(name), "a\u{fffd}[2J\u{fffd}b\u{fffd}c.png µ");
+    }
+}

@@ -1,0 +1,124 @@
+//! The flat field of a lens that vignettes, from the reference's own brightness.
+
+use nalgebra::{SMatrix, SVector};
+
+use crate::tiles::TileSum;
+
+/// Brightness relative to the frame's middle: a quadratic L(x, y) in x and y, least squares over
+/// the tiles of a reference frame.
+///
+/// Where stray light reaches the camera through the same lens as the signal, the reference shows
+/// the vignetting of both.
+///
+/// ```
+/// use ndarray::Array2;
+/// use tactile_force::ReferenceFrame;
+///
+/// // Darker towards the corners, by a fifth.
+/// let image = Array2::from_shape_fn((240, 320), |(y, x)| {
+///     let (u, v) = ((x as f64 - 159.5) / 159.5, (y as f64 - 119.5) / 119.5);
+///     (200.0 * (1.0 - 0.1 * (u * u + v * v))).round() as u8
+/// });
+/// let flat = ReferenceFrame::new(image.view())?
+///     .with_flat_field()?
+///     .flat_field()
+///     .expect("asked for");
+/// // L = Σ c_k (1, u, v, u², uv, v²)_k: 0.8 in the corner u = v = −1.
+/// let [c, u, v, uu, uv, vv] = flat.coefficients;
+/// assert!((c - u - v + uu + uv + vv - 0.8).abs() < 3e-3 && c == 1.0);
+/// # Ok::<(), tactile_force::ForceError>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct FlatField {
+    /// Coefficients of 1, u, v, u², uv, v², with u and v running from −1 to 1 over the frame. The
+    /// first is 1.
+    pub coefficients: [f64; 6],
+    middle: [f64; 2],
+    /// Covariance of the unscaled coefficients over the square of the first.
+    covariance: [[f64; 6]; 6],
+}
+
+/// The relative brightness along one row, a parabola.
+#[derive(Clone, Copy, Debug)]
+pub struct FlatLine([f64; 3]);
+
+impl FlatLine {
+    /// At `x` columns from the line's start.
+    #[inline(always)]
+    pub fn at(&self, x: usize) -> f32 {
+        // Frames are narrower than 2³¹, and this conversion has wide instructions.
+        let x = f64::from(x as i32);
+        (self.0[0] + x * (self.0[1] + x * self.0[2])) as f32
+    }
+}
+
+impl FlatField {
+    /// `None` if the reference is black or has too few tiles for six coefficients. `variance` is
+    /// that of one pixel of the reference.
+    pub(crate) fn fit(
+        (rows, columns): (usize, usize),
+        tiles: impl Iterator<Item = TileSum>,
+        variance: f64,
+    ) -> Option<Self> {
+        let middle = [0.5 * (columns as f64 - 1.0), 0.5 * (rows as f64 - 1.0)];
+        let (mut normal, mut right) = (SMatrix::<f64, 6, 6>::zeros(), SVector::<f64, 6>::zeros());
+        for tile in tiles {
+            let terms = SVector::<f64, 6>::from(terms(middle, tile.x, tile.y));
+            normal += terms * terms.transpose() * tile.pixels;
+            right += terms * tile.reference;
+        }
+        let cholesky = normal.cholesky()?;
+        let (found, inverse) = (cholesky.solve(&right), cholesky.inverse());
+        // Relative to the frame's middle, where u and v are zero.
+        let level = found[0];
+        (level > 0.0).then(|| Self {
+            coefficients: std::array::from_fn(|k| found[k] / level),
+            middle,
+            covariance: std::array::from_fn(|i| {
+                std::array::from_fn(|j| inverse[(i, j)] * variance / (level * level))
+            }),
+        })
+    }
+
+    /// Variance of the relative brightness at a pixel: the ratio of two correlated levels.
+    pub(crate) fn variance_at(&self, x: f64, y: f64) -> f64 {
+        let mut by = terms(self.middle, x, y);
+        // The level in the middle appears in numerator and denominator of the ratio.
+        by[0] -= self.at(x, y);
+        let row = |i: usize| {
+            by.iter()
+                .zip(&self.covariance[i])
+                .map(|(b, c)| b * c)
+                .sum::<f64>()
+        };
+        by.iter().enumerate().map(|(i, b)| b * row(i)).sum()
+    }
+
+    /// Relative brightness at a pixel.
+    pub(crate) fn at(&self, x: f64, y: f64) -> f64 {
+        terms(self.middle, x, y)
+            .iter()
+            .zip(&self.coefficients)
+            .map(|(t, c)| t * c)
+            .sum()
+    }
+
+    pub(crate) fn line(&self, row: usize, first_column: usize) -> FlatLine {
+        let (x, y, wide) = (first_column as f64, row as f64, self.middle[0].max(1.0));
+        let bend = self.coefficients[3] / (wide * wide);
+        let slope = self.at(x + 1.0, y) - self.at(x, y) - bend;
+        FlatLine([self.at(x, y), slope, bend])
+    }
+}
+
+pub(crate) fn terms(middle: [f64; 2], x: f64, y: f64) -> [f64; 6] {
+    let (u, v) = (
+        (x - middle[0]) / middle[0].max(1.0),
+        (y - middle[1]) / middle[1].max(1.0),
+    );
+    [1.0, u, v, u * u, u * v, v * v]
+}
+
+/// Longest side for which every integer sum of the pass fits its type: 16384⁴/3 · 255 < 2⁶³.
+pub(crate) const LONGEST_SIDE: usize = 16_384;

@@ -1,0 +1,69 @@
+//! Inclusions that fits start from.
+
+use crate::forward::{Forward, LumpParameters, Parameters};
+use crate::progress::Counter;
+
+/// Part of the block's height that an inclusion may reach down to.
+const DEEPEST: f64 = 0.95;
+
+/// Diameters and depths over the face's radius, and contrasts E₁/E₀, that a face can see.
+pub(crate) const DIAMETERS: [f64; 3] = [0.35, 0.65, 1.05];
+pub(crate) const DEPTHS: [f64; 3] = [0.15, 0.3, 0.55];
+const CONTRASTS: [f64; 2] = [2.5, 8.0];
+
+/// An inclusion in a block, and its pressures.
+#[derive(Debug, Clone)]
+pub(crate) struct GridStart {
+    pub parameters: Parameters,
+    pub predicted: Vec<f64>,
+    /// Part by which each value exceeds that of a homogeneous block on the same mesh.
+    pub added: Vec<f64>,
+}
+
+/// The grid of inclusions in a homogeneous block under a face of this radius. `None` where the
+/// search is to end.
+pub(crate) fn starts(
+    forward: &Forward,
+    homogeneous: &Parameters,
+    counter: &mut Counter<'_>,
+) -> Option<Vec<GridStart>> {
+    let face_radius_m = forward.guide.radius_m();
+    let mut starts = Vec::new();
+    for diameter in DIAMETERS {
+        for depth in DEPTHS {
+            if (diameter + depth) * face_radius_m >= DEEPEST * homogeneous.height_m {
+                continue;
+            }
+            let with = |contrast: f64| Parameters {
+                lump: Some(LumpParameters::ball(
+                    diameter * face_radius_m,
+                    depth * face_radius_m,
+                    contrast * homogeneous.block_modulus_pa,
+                )),
+                ..homogeneous.clone()
+            };
+            if !counter.step() {
+                return None;
+            }
+            let Some(none) = forward.predict(&with(1.0)) else {
+                continue;
+            };
+            for contrast in CONTRASTS {
+                if !counter.step() {
+                    return None;
+                }
+                let parameters = with(contrast);
+                let Some(predicted) = forward.predict(&parameters) else {
+                    continue;
+                };
+                let added = predicted.iter().zip(&none);
+                starts.push(GridStart {
+                    parameters,
+                    added: added.map(|(with, none)| with / none - 1.0).collect(),
+                    predicted,
+                });
+            }
+        }
+    }
+    Some(starts)
+}
