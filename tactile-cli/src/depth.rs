@@ -14,6 +14,7 @@ use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use tactile_files::io::{Grey, read_columns};
 use tactile_files::scene::doubt_of_depths;
+use tactile_imaging::gel::{DarkFrame, DarkGel};
 use tactile_imaging::pipeline::{
     BallFit, ContactReading, ContactSurface, DarkContact, Object, Pipeline, PipelineError,
     SurfaceInput,
@@ -24,15 +25,16 @@ use tactile_imaging::pipeline::{
 /// TABLE.csv says how deep a darkness is: columns darkness (grey levels below the reference, of the
 /// same --grey) and depth (m, mm, µm, by its heading, mm without one). With --ball-radius-mm a ball
 /// of this radius is fitted to the depth, with --ball one of any. --out gets NAME_depth.csv (m, NaN
-/// outside the contact, of the whole frame) and NAME_depth.svg for every frame NAME.
+/// outside the contacts, of the whole frame) and NAME_depth.svg for every frame NAME.
 ///
 /// No darkness is no depth. A table with the row 0, 0 is read as it stands. Another counts from a
 /// contact circle that was found at some darkness, as those of 9DTact do: it is shifted.
 ///
 /// --sensor names a gel that is lit in colours, as `tactile calibrate` wrote it. It takes the place
-/// of reference, table and pixel size. --out gets NAME_depth.csv (m, of the whole frame, zero where
-/// nothing touches), NAME_gradient_x.csv and NAME_gradient_y.csv (of the depth, along columns and
-/// rows, also of the free gel around a contact) and NAME_depth.svg.
+/// of reference, table and pixel size. --out gets NAME_depth.csv (how far the face has moved, m, of
+/// the whole frame, zero far away), NAME_gradient_x.csv and NAME_gradient_y.csv (of the depth, along
+/// columns and rows), NAME_contact.csv (the contact of every pixel, from 1; 0 where nothing touches),
+/// NAME.ply (a mesh, mm), NAME.npz and NAME_depth.svg.
 #[derive(Args)]
 #[command(
     mut_arg("reference", |arg| unless_sensor(arg, ".")),
@@ -86,7 +88,7 @@ enum GreyOf {
 }
 
 impl DepthArguments {
-    fn pipeline(&self) -> Result<Pipeline, Failure> {
+    fn pipeline(&self) -> Result<(Pipeline, DarkGel), Failure> {
         let columns = [(&["darkness"][..], "grey_levels"), (&["depth"][..], "mm")];
         let [darkness, depth] = read_columns(&self.table, columns)?;
         let mut entries: Vec<_> = darkness.into_iter().zip(depth).collect();
@@ -110,7 +112,10 @@ impl DepthArguments {
         let ball = |mm| Object::sphere(1e-3 * mm);
         let object = self.ball_radius_mm.map_or(unknown, ball);
         let pipeline = Pipeline::new(contact, object).map_err(Failure::input)?;
-        Ok(pipeline.with_surface(table, SurfaceInput::Signal))
+        let threshold = DarkContact::DEFAULT_THRESHOLD_GREY;
+        let gel = DarkGel::new(table.clone(), threshold, self.frames.pixel_m());
+        let gel = gel.map_err(Failure::input)?;
+        Ok((pipeline.with_surface(table, SurfaceInput::Signal), gel))
     }
 
     /// The ball that was asked for.
@@ -136,7 +141,7 @@ pub fn run(arguments: &DepthArguments, context: &mut Context) -> Result<Exit, Fa
     if let Some(sensor) = &arguments.sensor {
         return photometric::depth(sensor, &frames.frames, false, context);
     }
-    let pipeline = arguments.pipeline()?;
+    let (pipeline, gel) = arguments.pipeline()?;
     let grey = match arguments.grey {
         GreyOf::Rec601 => Grey::Rec601,
         GreyOf::Rec709 => Grey::Rec709,
@@ -179,7 +184,12 @@ pub fn run(arguments: &DepthArguments, context: &mut Context) -> Result<Exit, Fa
             context.line("no contact");
         }
         context.warn_of_frame(&press.cautions(k).unwrap_or_default());
-        values.push(json!({ "frame": name, "contact": value }));
+        let all = gel.read(pixels.view(), reference.view());
+        let all = all.map_err(|error| Failure::in_file(Path::new(name), error))?;
+        if all.contacts.len() > 1 {
+            print_all(&all, context);
+        }
+        values.push(json!({ "frame": name, "contact": value, "contacts": all.contacts }));
         let Some(found) = found else {
             continue;
         };
@@ -190,7 +200,7 @@ pub fn run(arguments: &DepthArguments, context: &mut Context) -> Result<Exit, Fa
         if matches!(found.ball, Some(Err(_))) {
             exit = Exit::Partial;
         }
-        let depth = Csv::of_grid(&whole(surface, pixels.dim()));
+        let depth = Csv::of_grid(&all.depth_m);
         context.outputs.add(&names[2 * k], depth);
         let size = surface.pixel_size_m.map(|m| 1e3 * m);
         let frame = HeatMap::of_frame(pixels.view(), size);
@@ -209,17 +219,23 @@ pub fn run(arguments: &DepthArguments, context: &mut Context) -> Result<Exit, Fa
     Ok(exit)
 }
 
-/// The depth of every pixel of the frame, NaN around the contact's window.
-fn whole(surface: &ContactSurface, shape: (usize, usize)) -> Array2<f64> {
-    let mut depth = Array2::from_elem(shape, f64::NAN);
-    let [left, top] = [0, 1].map(|k: usize| surface.origin_m[k] / surface.pixel_size_m[k]);
-    for ((row, column), z) in surface.surface.heights.indexed_iter() {
-        let at = [top.round() as usize + row, left.round() as usize + column];
-        if let Some(to) = depth.get_mut(at) {
-            *to = *z;
-        }
+/// Prints every contact of a frame with several. What stands above them is the widest's.
+fn print_all(frame: &DarkFrame, context: &mut Context) {
+    let count = frame.contacts.len();
+    for (k, contact) in frame.contacts.iter().enumerate() {
+        let [x, y] = contact.centroid_px.map(four_digits);
+        let area = four_digits(1e6 * contact.area_m2);
+        let depth = in_unit(contact.depth_m, 1e3);
+        let beyond = if contact.beyond_table {
+            ", beyond the table"
+        } else {
+            ""
+        };
+        context.line(format_args!(
+            "contact {} of {count}: at ({x}, {y}) px, {area} mm², {depth} mm deep{beyond}",
+            k + 1
+        ));
     }
-    depth
 }
 
 /// Prints a contact and returns it as JSON.

@@ -19,6 +19,7 @@ mod light;
 mod markers;
 mod match_points;
 mod measure;
+mod mesh;
 mod outputs;
 mod paper;
 mod photometric;

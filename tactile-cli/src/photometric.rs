@@ -2,8 +2,9 @@
 use crate::console::Context;
 use crate::failure::{Exit, Failure};
 use crate::frames::{NamedFrame, Reading};
-use crate::outputs::{Csv, beside};
-use crate::plot::{HeatMap, Page, Panel};
+use crate::mesh;
+use crate::outputs::{Csv, Npz, beside};
+use crate::plot::{Colour, HeatMap, Page, Panel};
 use crate::text::{four_digits, in_unit};
 use clap::Arg;
 use clap::builder::ArgPredicate;
@@ -14,7 +15,9 @@ use std::path::{Path, PathBuf};
 use tactile_files::io::{Grey, read_bytes};
 use tactile_files::sensor::{PhotometricPresses, PhotometricSensor};
 use tactile_imaging::core::Estimate;
-use tactile_imaging::gel::{CalibrationReport, GelForce, GelFrame, GelSensor};
+use tactile_imaging::gel::{
+    BallFace, CalibrationReport, GelContact, GelForce, GelFrame, GelSensor,
+};
 
 /// An argument that a sensor file takes the place of. `filler` is parsed and not used.
 pub fn unless_sensor(arg: Arg, filler: &'static str) -> Arg {
@@ -34,6 +37,9 @@ pub fn calibrate(path: &Path, sensor: &Path, context: &mut Context) -> Result<Ex
     let found = presses.calibrate();
     let (calibrated, found) = found.map_err(|error| Failure::in_file(path, error))?;
     print(&presses.names, &calibrated, &found, context);
+    for doubt in &found.doubts {
+        context.warn(doubt.kind(), json!({}), doubt);
+    }
     let gel = presses.gel(&calibrated);
     let gel = gel.map_err(|error| Failure::in_file(path, error))?;
     if let Some(gel) = &gel {
@@ -51,7 +57,8 @@ pub fn calibrate(path: &Path, sensor: &Path, context: &mut Context) -> Result<Ex
         "presses": circles, "offset_px": found.offset_px,
         "median_angle_deg": found.median_angle_deg,
         "normal_standard_error": model.normal_standard_error,
-        "depth_standard_error_m": model.depth_standard_error_m, "gel": gel,
+        "depth_standard_error_m": model.depth_standard_error_m,
+        "slope_standard_error": model.slope_standard_error, "face": found.face, "gel": gel,
     }));
     if context.outputs.folder().is_some() {
         let text = PhotometricSensor::new(&reference, model)
@@ -91,8 +98,19 @@ fn print(names: &[PathBuf], sensor: &GelSensor, found: &CalibrationReport, conte
     let depth = four_digits(1e3 * model.depth_standard_error_m);
     context.row(
         "depth",
-        format_args!("{depth} mm, standard error of presses left out"),
+        format_args!("{depth} mm, standard error of a pixel of presses left out"),
     );
+    let slope = four_digits(1e2 * model.slope_standard_error);
+    context.row(
+        "slopes",
+        format_args!("{slope} %, standard error of all slopes of a press left out"),
+    );
+    if found.face == BallFace::Paraboloid {
+        context.row(
+            "face",
+            "a paraboloid, as of Hertz's law, fits the light better than a ball",
+        );
+    }
     let [x, y, radius] = found.offset_px.map(four_digits);
     if found.circles.iter().any(|circle| circle.drawn_px.is_some()) {
         let text = format!("x {x}, y {y}, radius {radius} px from those found, in the median");
@@ -148,10 +166,18 @@ impl Reader {
         }
     }
 
-    /// The force of a frame with contact, none without, or why it has none.
+    /// The force of all contacts of a frame, none without contact, or why it has none.
     pub fn force(&self, reading: &GelFrame) -> Result<Option<Estimate>, String> {
         let law = self.law.as_ref().map_err(String::clone)?;
-        law.force(reading).map_err(|error| error.to_string())
+        Ok(law.force(reading))
+    }
+
+    /// The force of each contact, where the sensor has a law.
+    fn forces(&self, reading: &GelFrame) -> Vec<Option<Estimate>> {
+        match &self.law {
+            Ok(law) => law.forces(reading).into_iter().map(Some).collect(),
+            Err(_) => vec![None; reading.contacts.len()],
+        }
     }
 }
 
@@ -171,7 +197,19 @@ pub fn measure(sensor: &Path, frames: &[PathBuf], context: &mut Context) -> Resu
     depth(sensor, frames, true, context)
 }
 
-/// Reads gradients and depth of frames with a sensor file, and their forces where `forces` is set.
+/// Files of a frame, by their suffixes.
+const SUFFIXES: [&str; 7] = [
+    "_depth.csv",
+    "_gradient_x.csv",
+    "_gradient_y.csv",
+    "_contact.csv",
+    ".ply",
+    ".npz",
+    "_depth.svg",
+];
+
+/// Reads gradients, face and contacts of frames with a sensor file, and their forces where `forces`
+/// is set.
 pub fn depth(
     sensor: &Path,
     frames: &[PathBuf],
@@ -182,35 +220,37 @@ pub fn depth(
     let stereo = &reader.stereo;
     let size = stereo.model().pixel_size_m;
     let source = reader.reading(sensor);
-    let (images, exit) = source.all::<Array3<u8>>(frames, context)?;
-    let suffixes = [
-        "_depth.csv",
-        "_gradient_x.csv",
-        "_gradient_y.csv",
-        "_depth.svg",
-    ];
+    let (images, mut exit) = source.all::<Array3<u8>>(frames, context)?;
     let names = images
         .iter()
-        .flat_map(|image| suffixes.map(|suffix| image.file(suffix)));
+        .flat_map(|image| SUFFIXES.map(|suffix| image.file(suffix)));
     let names: Vec<_> = names.collect();
     let inputs: Vec<&Path> = (frames.iter().map(PathBuf::as_path).chain([sensor])).collect();
     context.outputs.plan(&names, &inputs)?;
     let mut values = Vec::new();
-    for (k, NamedFrame { name, pixels, .. }) in images.iter().enumerate() {
+    for (image, names) in images.iter().zip(names.chunks(SUFFIXES.len())) {
+        let NamedFrame { name, pixels, .. } = image;
         let reading = stereo.read(pixels.view());
         let reading = reading.map_err(|error| Failure::in_file(Path::new(name), error))?;
         context.line(format_args!("{name}:"));
-        let contact = GelContact::of(&reading, size);
-        match &contact {
-            Some(contact) => contact.print(context),
-            None => context.line("no contact"),
+        let contacts = contacts(&reading, &reader.forces(&reading), forces);
+        match contacts.as_slice() {
+            [] if reading.is_refused() => context.line("not read"),
+            [] => context.line("no contact"),
+            all => print_contacts(&reading, &reader.forces(&reading), all.len(), context),
         }
-        let mut value = json!({ "frame": name, "contact": contact });
-        if forces && contact.is_some() {
+        warn(&reading, name, context);
+        let mut value = json!({
+            "frame": name, "contact": contacts.first(), "contacts": contacts,
+        });
+        if reading.is_refused() {
+            exit = Exit::Partial;
+        }
+        if forces && !contacts.is_empty() {
             let force = reader.force(&reading);
             match &force {
                 Ok(Some(force)) => context.row("force", in_unit(*force, 1.0) + " N"),
-                Ok(None) => context.row("force", "none: the contact is smaller than a cell"),
+                Ok(None) => {}
                 Err(reason) => context.row("force", format_args!("none: {reason}")),
             }
             value["force_n"] = number_or_error(&force);
@@ -218,63 +258,119 @@ pub fn depth(
             value["force_n"] = Value::Null;
         }
         values.push(value);
-        if context.outputs.folder().is_none() {
+        if context.outputs.folder().is_none() || reading.is_refused() {
             continue;
         }
         let [x, y] = [0, 1].map(|axis: usize| reading.gradient[axis].mapv(f64::from));
-        let tables = [&reading.depth_m, &x, &y].map(Csv::of_grid);
-        for (name, table) in names[4 * k..].iter().zip(tables) {
+        let labels = reading.labels.mapv(f64::from);
+        let tables = [&reading.depth_m, &x, &y, &labels].map(Csv::of_grid);
+        for (name, table) in names.iter().zip(tables) {
             context.outputs.add(name, table);
         }
         context
             .outputs
-            .page(&names[4 * k + 3], || page(&reading, size))?;
+            .add(&names[4], mesh::ply(&reading.depth_m, size));
+        let mut arrays = Npz::new();
+        for (name, grid) in [
+            ("depth_m", &reading.depth_m),
+            ("gradient_x", &x),
+            ("gradient_y", &y),
+            ("contact", &labels),
+        ] {
+            let shape = [grid.nrows(), grid.ncols()];
+            arrays.add(name, "<f8", &shape, grid.iter().map(|v| v.to_le_bytes()))?;
+        }
+        context.outputs.add(&names[5], arrays.into_bytes()?);
+        context.outputs.page(&names[6], || page(&reading, size))?;
     }
     context.value(&json!({ "frames": values }));
     Ok(exit)
 }
 
-/// What a frame's contact is printed by.
-#[derive(Serialize)]
-pub struct GelContact {
-    pub centroid: [f64; 2],
-    pub area_m2: f64,
-    pub largest_depth_m: Estimate,
+/// The cautions of a frame.
+pub fn warn(reading: &GelFrame, name: &str, context: &mut Context) {
+    for doubt in &reading.doubts {
+        context.warn(doubt.kind(), json!({ "frame": name }), doubt);
+    }
 }
 
-impl GelContact {
-    pub fn of(reading: &GelFrame, size: f64) -> Option<Self> {
-        let mut sums = [0.0; 3];
-        let touched = reading
-            .contact
-            .indexed_iter()
-            .filter(|(_, inside)| **inside);
-        for ((row, column), _) in touched {
-            let more = [1.0, column as f64, row as f64];
-            sums = [0, 1, 2].map(|k: usize| sums[k] + more[k]);
+/// A contact as JSON has it.
+fn contacts(reading: &GelFrame, forces: &[Option<Estimate>], wanted: bool) -> Vec<Value> {
+    let value = |(contact, force): (&GelContact, &Option<Estimate>)| {
+        let mut value = GelReading::of_contact(contact).value();
+        value["outline_px"] = json!(contact.outline_px);
+        value["touches_border"] = json!(contact.touches_border);
+        if let Some(force) = force.filter(|_| wanted) {
+            value["force_n"] = json!(force);
         }
-        let [pixels, x, y] = sums;
-        let deepest = reading.depth_m.iter().copied().fold(0.0, f64::max);
-        (pixels > 0.0).then(|| Self {
-            centroid: [x / pixels, y / pixels],
-            area_m2: pixels * size * size,
-            largest_depth_m: Estimate::new(deepest, reading.depth_standard_error_m),
-        })
+        value
+    };
+    reading.contacts.iter().zip(forces).map(value).collect()
+}
+
+fn print_contacts(
+    reading: &GelFrame,
+    forces: &[Option<Estimate>],
+    count: usize,
+    context: &mut Context,
+) {
+    for (k, (contact, force)) in reading.contacts.iter().zip(forces).enumerate() {
+        if count > 1 {
+            context.line(format_args!("contact {} of {count}", k + 1));
+        }
+        let [x, y] = contact.centroid_px.map(|at| in_unit(at, 1.0));
+        context.row("centroid", format_args!("({x}, {y}) px"));
+        context.row("area", in_unit(contact.area_m2, 1e6) + " mm²");
+        let depth = in_unit(contact.depth_m, 1e3);
+        context.row("depth", depth + " mm below the contact's rim");
+        let depth = in_unit(contact.depth_below_far_m, 1e3);
+        context.row("", depth + " mm below the gel far away");
+        if let (Some(force), true) = (force, count > 1) {
+            context.row("force", in_unit(*force, 1.0) + " N");
+        }
+    }
+}
+
+/// What a frame's first contact is kept and printed by.
+#[derive(Clone, Copy, Serialize)]
+pub struct GelReading {
+    pub centroid: [f64; 2],
+    pub area_m2: f64,
+    pub area_error_m2: f64,
+    /// Below the contact's own rim.
+    pub largest_depth_m: Estimate,
+    pub depth_below_far_m: Estimate,
+}
+
+impl GelReading {
+    pub fn of(reading: &GelFrame) -> Option<Self> {
+        reading.contacts.first().map(Self::of_contact)
     }
 
-    fn print(&self, context: &mut Context) {
-        let [x, y] = self.centroid.map(four_digits);
-        context.row("centroid", format_args!("({x}, {y}) px"));
-        let area = four_digits(1e6 * self.area_m2);
-        context.row("area", format_args!("{area} mm²"));
-        let depth = in_unit(self.largest_depth_m, 1e3);
-        context.row("depth", depth + " mm at the deepest pixel");
+    fn of_contact(contact: &GelContact) -> Self {
+        Self {
+            centroid: contact.centroid_px.map(|at| at.value),
+            area_m2: contact.area_m2.value,
+            area_error_m2: contact.area_m2.standard_error,
+            largest_depth_m: contact.depth_m,
+            depth_below_far_m: contact.depth_below_far_m,
+        }
+    }
+
+    fn value(&self) -> Value {
+        json!(self)
     }
 }
 
 fn page(reading: &GelFrame, size: f64) -> Page {
     let depth = reading.depth_m.mapv(|z| 1e3 * z);
     let map = HeatMap::of_pixels(depth.view(), [1e3 * size; 2], "depth (mm)");
-    let panel = Panel::new("Depth", "x (mm)", "y (mm)").heat_map(map);
-    Page::new("Depth of the contact", 1, vec![panel])
+    let mut panel = Panel::new("Face", "x (mm)", "y (mm)").heat_map(map);
+    for (k, contact) in reading.contacts.iter().enumerate() {
+        let line = contact.outline_px.iter().chain(contact.outline_px.first());
+        let line: Vec<[f64; 2]> = line.map(|at| at.map(|v| 1e3 * size * v as f64)).collect();
+        let name = if k == 0 { "contact" } else { "" };
+        panel = panel.line(line, Colour::Orange, name);
+    }
+    Page::new("Face of the gel", 1, vec![panel])
 }

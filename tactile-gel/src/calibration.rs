@@ -1,15 +1,34 @@
-//! A photometric sensor from presses of balls of known radius, with or without drawn circles.
+//! A gel's sensor from presses of balls of known radius, with or without drawn circles.
 
 use nalgebra::DMatrix;
 use ndarray::{Array2, ArrayView3};
 use tactile_core::Requirement;
 
 use crate::GelError;
-use crate::contacts::contact;
-use crate::contacts::parts;
+use crate::ball::{BallFace, Evidence};
 use crate::error::same_shape;
-use crate::gradients::{Blurred, TERMS, normals, samples};
+use crate::frame_check::FrameDoubt;
+use crate::gradients::{Blurred, TERMS, samples};
 use crate::sensor::{GelModel, GelSensor, colour_image};
+
+/// Pixels inside of the contact's edge that the polynomial is not fitted in: the blur of the frames
+/// mixes them with the free gel.
+const RIM_PX: f64 = 1.5;
+/// Relative error of slopes that all presses of a calibration share, and their scatter cannot show:
+/// that of gels whose faces are known.
+const COMMON_ERROR: f64 = 0.012;
+/// Share of the contact's radius whose normals give its middle.
+const MIDDLE: f64 = 0.7;
+/// Fewer used presses leave much of the frame and of the slopes unseen.
+const ENOUGH_PRESSES: usize = 5;
+/// Median angle in degrees beyond which lamps, pixel size or circles are in doubt.
+const LARGE_ANGLE_DEG: f64 = 10.0;
+/// A ball whose contacts reach to a smaller share of its radius is hardly pressed, or stated in
+/// another unit.
+const SMALL_SHARE: f64 = 0.02;
+/// Sizes in metres beyond which a pixel or a ball is likely in another unit.
+const LARGE_PIXEL_M: f64 = 1e-3;
+const LARGE_BALL_M: f64 = 0.2;
 
 /// A frame of a ball pressed into the gel.
 #[derive(Clone, Copy, Debug)]
@@ -50,6 +69,86 @@ pub struct CalibrationReport {
     pub offset_px: [f64; 3],
     /// Median angle in degrees between the normals of a press and those found without it.
     pub median_angle_deg: f64,
+    /// The shape that the light shows of the pressed faces.
+    pub face: BallFace,
+    /// Why the sensor may be wrong.
+    pub doubts: Vec<CalibrationDoubt>,
+}
+
+/// Why a calibrated sensor may be wrong.
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[non_exhaustive]
+pub enum CalibrationDoubt {
+    /// Presses used, of those given.
+    FewPresses {
+        /// Presses used.
+        used: usize,
+        /// Presses given.
+        given: usize,
+    },
+    /// The median angle between the normals of a press and those found without it, in degrees.
+    LargeAngle(f64),
+    /// The light fits a ball that is smaller than stated by this factor.
+    BallSize(f64),
+    /// Contacts reach to this share of the ball's radius.
+    FlatBall(f64),
+    /// A length in metres that is likely stated in another unit.
+    LargeLength(f64),
+    /// A press, counted from 0, is no frame of the reference's sensor.
+    OtherFrame {
+        /// The press.
+        press: usize,
+        /// What differs.
+        doubt: FrameDoubt,
+    },
+}
+
+impl CalibrationDoubt {
+    /// A word that programs recognise it by.
+    pub fn kind(&self) -> &'static str {
+        match self {
+            Self::FewPresses { .. } => "few_presses",
+            Self::LargeAngle(_) => "large_angle",
+            Self::BallSize(_) => "doubtful_ball",
+            Self::FlatBall(_) => "flat_ball",
+            Self::LargeLength(_) => "doubtful_unit",
+            Self::OtherFrame { doubt, .. } => doubt.kind(),
+        }
+    }
+}
+
+impl core::fmt::Display for CalibrationDoubt {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::FewPresses { used, given } => write!(
+                f,
+                "{used} of {given} presses were used: five to twenty at many places are needed"
+            ),
+            Self::LargeAngle(angle) => write!(
+                f,
+                "normals of presses left out are {angle:.1}° off in the median: look for a lamp that \
+                 changed, a wrong reference or wrong circles"
+            ),
+            Self::BallSize(factor) => write!(
+                f,
+                "the light fits a ball of {:.2} times the stated radius: is the diameter given for \
+                 the radius, or the pixel's size wrong?",
+                factor.recip()
+            ),
+            Self::FlatBall(share) => write!(
+                f,
+                "contacts reach to {share:.1e} of the ball's radius: is it in metres?"
+            ),
+            Self::LargeLength(length) => {
+                write!(
+                    f,
+                    "a length of {length} m is large for a gel: is it in metres?"
+                )
+            }
+            Self::OtherFrame { press, doubt } => write!(f, "press {}: {doubt}", press + 1),
+        }
+    }
 }
 
 /// Sums of the normal equations: terms by terms and terms by (n_x, n_y).
@@ -114,80 +213,79 @@ impl GelSensor {
     /// the median misfit and more than a tenth of the ball's radius.
     ///
     /// Errors are those of presses left out in turn: the quantile of 68.3 % of the differences to
-    /// the sphere through the circle, drawn where it is not wrong. They include the errors of the
-    /// circles.
+    /// the ball in the circle, drawn where it is not wrong. That of all slopes together has the
+    /// scatter of the presses, for few of them by Student's distribution.
     ///
     /// # Errors
     /// [`GelError::TooFewPresses`], [`GelError::ShapeMismatch`], [`GelError::InvalidOption`] for
-    /// lengths that are not positive.
+    /// lengths that are not positive, [`GelError::OtherFrames`] if most presses are no frames of the
+    /// reference's sensor.
     pub fn calibrate(
         reference: ArrayView3<'_, u8>,
         pixel_size_m: f64,
         presses: &[BallPress<'_>],
     ) -> Result<(Self, CalibrationReport), GelError> {
         Requirement::Positive.check("pixel size", pixel_size_m)?;
-        let reference = Blurred::of(colour_image(reference)?);
-        let presses = presses.iter().map(|press| {
-            Requirement::Positive.check("ball radius", press.ball_radius_m)?;
-            let (rows, columns, _) = colour_image(press.frame)?.dim();
-            same_shape("frame of a press", reference.dim(), (rows, columns))?;
-            if let Some([x, y, radius]) = press.circle_px {
-                Requirement::Finite.check("circle's x", x)?;
-                Requirement::Finite.check("circle's y", y)?;
-                Requirement::Positive.check("circle's radius", radius)?;
-            }
-            Ok(Press {
-                frame: Blurred::of(press.frame),
-                ball_px: press.ball_radius_m / pixel_size_m,
-                drawn: press.circle_px,
-            })
+        let model = GelModel::new(pixel_size_m, [vec![0.0; TERMS], vec![0.0; TERMS]]);
+        let blank = Self::of_blurred(model, Blurred::of(colour_image(reference)?));
+        let mut doubts = Vec::new();
+        let mut read = Vec::new();
+        for (k, press) in presses.iter().enumerate() {
+            let (press, found) = Press::of(press, &blank)?;
+            let other = found
+                .into_iter()
+                .map(|doubt| CalibrationDoubt::OtherFrame { press: k, doubt });
+            doubts.extend(other);
+            read.push(press);
+        }
+        let refused = doubts.iter().filter_map(|doubt| match doubt {
+            CalibrationDoubt::OtherFrame { doubt, .. } if doubt.refuses() => Some(*doubt),
+            _ => None,
         });
-        let presses = presses.collect::<Result<Vec<_>, GelError>>()?;
-        let found = find_circles(&presses, &reference)?;
-        let (circles, offset_px) = judged(&presses, &found);
-        let used = circles
-            .iter()
-            .filter(|circle| circle.used_px.is_some())
-            .count();
-        enough(used)?;
-        let sums: Vec<Sums> = presses
-            .iter()
-            .zip(&circles)
-            .map(|(press, circle)| press.sums(&reference, circle.used_px))
-            .collect();
-        let mut total = flat(&reference);
-        sums.iter().for_each(|sums| total.add(sums, 1.0));
-        let model = GelModel::new(pixel_size_m, total.solve()?);
-        let mut sensor = Self { model, reference };
-        let mut misses = Misses::default();
-        for ((press, circle), sums) in presses.iter().zip(&circles).zip(&sums) {
-            let kept = circle.drawn_px.filter(|_| !circle.wrong).or(circle.used_px);
-            if let Some(circle) = kept {
-                let mut others = total.clone();
-                // Sums of the normal equations add over presses. Leaving one out is a subtraction.
-                others.add(sums, -1.0);
-                let model = GelModel {
-                    // With an error of 1 the reading's errors are the factors from normals to
-                    // gradients.
-                    normal_standard_error: 1.0,
-                    ..GelModel::new(pixel_size_m, others.solve()?)
-                };
-                let without = Self {
-                    model,
-                    reference: sensor.reference.clone(),
-                };
-                misses.add(&without, press, press.within(circle))?;
+        let refused: Vec<FrameDoubt> = refused.collect();
+        if let (Some(doubt), true) = (refused.first(), 2 * refused.len() > presses.len()) {
+            return Err(GelError::OtherFrames {
+                presses: refused.len(),
+                given: presses.len(),
+                doubt: *doubt,
+            });
+        }
+        doubts.extend(lengths(pixel_size_m, presses));
+        let presses = read;
+        let mut fit = Fitted::of(&blank, &presses, BallFace::Sphere)?;
+        let mut evidence = Evidence::new();
+        for (press, circle) in presses.iter().zip(&fit.circles) {
+            if let Some(circle) = circle.used_px {
+                evidence.add(&press.frame, &blank.reference, circle, press.ball_px);
             }
         }
-        sensor.model.normal_standard_error = quantile(&mut misses.gradients, 0.683);
-        sensor.model.depth_standard_error_m = quantile(&mut misses.depths, 0.683);
+        let verdict = evidence.verdict();
+        if verdict.face != fit.face {
+            fit = Fitted::of(&blank, &presses, verdict.face)?;
+        }
+        let (model, median_angle_deg) = fit.judged(&blank, &presses)?;
+        let sensor = blank.with_model(model);
+        doubts.extend(verdict.factor.map(CalibrationDoubt::BallSize));
+        doubts.extend(fit.doubts(&presses, median_angle_deg));
         let report = CalibrationReport {
-            circles,
-            offset_px,
-            median_angle_deg: quantile(&mut misses.angles, 0.5),
+            circles: fit.circles,
+            offset_px: fit.offset_px,
+            median_angle_deg,
+            face: fit.face,
+            doubts,
         };
         Ok((sensor, report))
     }
+}
+
+fn lengths(pixel_size_m: f64, presses: &[BallPress<'_>]) -> Vec<CalibrationDoubt> {
+    let ball = presses.iter().map(|press| press.ball_radius_m);
+    let ball = ball.fold(0.0, f64::max);
+    let large = [(pixel_size_m, LARGE_PIXEL_M), (ball, LARGE_BALL_M)];
+    let large = large.iter().filter(|(length, limit)| length > limit);
+    large
+        .map(|(length, _)| CalibrationDoubt::LargeLength(*length))
+        .collect()
 }
 
 fn enough(available: usize) -> Result<(), GelError> {
@@ -198,37 +296,147 @@ fn enough(available: usize) -> Result<(), GelError> {
     Ok(())
 }
 
+/// Circles, and the sums of the polynomial within them.
+struct Fitted {
+    face: BallFace,
+    circles: Vec<CircleFinding>,
+    offset_px: [f64; 3],
+    sums: Vec<Sums>,
+    total: Sums,
+}
+
+impl Fitted {
+    fn of(blank: &GelSensor, presses: &[Press], face: BallFace) -> Result<Self, GelError> {
+        let found = find_circles(blank, presses, face)?;
+        let (circles, offset_px) = judged(presses, &found);
+        let used = circles.iter().filter(|circle| circle.used_px.is_some());
+        enough(used.count())?;
+        let sums: Vec<Sums> = presses
+            .iter()
+            .zip(&circles)
+            .map(|(press, circle)| press.sums(&blank.reference, circle.used_px, face))
+            .collect();
+        let mut total = flat(&blank.reference);
+        sums.iter().for_each(|sums| total.add(sums, 1.0));
+        Ok(Self {
+            face,
+            circles,
+            offset_px,
+            sums,
+            total,
+        })
+    }
+
+    /// The model with its errors, and the median angle in degrees, from presses left out in turn.
+    fn judged(&self, blank: &GelSensor, presses: &[Press]) -> Result<(GelModel, f64), GelError> {
+        let pixel_size_m = blank.model.pixel_size_m;
+        let mut misses = Misses::default();
+        for ((press, circle), sums) in presses.iter().zip(&self.circles).zip(&self.sums) {
+            let kept = circle.drawn_px.filter(|_| !circle.wrong).or(circle.used_px);
+            if let Some(circle) = kept {
+                let mut others = self.total.clone();
+                // Sums of the normal equations add over presses. Leaving one out is a subtraction.
+                others.add(sums, -1.0);
+                let model = GelModel {
+                    // With an error of 1 the reading's errors are the factors from normals to
+                    // gradients.
+                    normal_standard_error: 1.0,
+                    ..GelModel::new(pixel_size_m, others.solve()?)
+                };
+                let without = blank.with_model(model);
+                misses.add(&without, press, press.within(circle), self.face)?;
+            }
+        }
+        let angle = quantile(&mut misses.angles, 0.5);
+        let model = GelModel {
+            normal_standard_error: quantile(&mut misses.gradients, 0.683),
+            depth_standard_error_m: quantile(&mut misses.depths, 0.683),
+            slope_standard_error: scatter(&misses.scales),
+            ..GelModel::new(pixel_size_m, self.total.solve()?)
+        };
+        Ok((model, angle))
+    }
+
+    fn doubts(&self, presses: &[Press], angle_deg: f64) -> Vec<CalibrationDoubt> {
+        let mut doubts = Vec::new();
+        let given = presses.len();
+        let used = self.circles.iter().filter(|c| c.used_px.is_some()).count();
+        if used < ENOUGH_PRESSES || 10 * used < 7 * given {
+            doubts.push(CalibrationDoubt::FewPresses { used, given });
+        }
+        if angle_deg > LARGE_ANGLE_DEG {
+            doubts.push(CalibrationDoubt::LargeAngle(angle_deg));
+        }
+        let pairs = presses.iter().zip(&self.circles);
+        let share = pairs.filter_map(|(press, circle)| Some(circle.used_px?[2] / press.ball_px));
+        let share = share.fold(0.0, f64::max);
+        if share < SMALL_SHARE {
+            doubts.push(CalibrationDoubt::FlatBall(share));
+        }
+        doubts
+    }
+}
+
+/// Standard error of a scale of 1 from its values in presses: their root mean square from 1, wider
+/// for few of them as Student's distribution is.
+fn scatter(scales: &[f64]) -> f64 {
+    let n = scales.len() as f64;
+    if n < 2.0 {
+        return 1.0;
+    }
+    let square = scales.iter().map(|s| (s - 1.0).powi(2)).sum::<f64>() / n;
+    // Within 4 % of its quantiles of 97.5 % over the normal one's, from two degrees of freedom on.
+    let student = 1.0 + 1.35 / (n - 1.0) + 2.2 / (n - 1.0).powi(2);
+    (square.sqrt() * (1.0 + 1.0 / n).sqrt() * student).hypot(COMMON_ERROR)
+}
+
 /// A press as it is computed with, lengths in pixels.
 struct Press {
     frame: Blurred,
     ball_px: f64,
     drawn: Option<[f64; 3]>,
+    /// Whether it is a frame of the reference's sensor.
+    own: bool,
 }
 
 impl Press {
+    fn of(press: &BallPress<'_>, blank: &GelSensor) -> Result<(Self, Vec<FrameDoubt>), GelError> {
+        Requirement::Positive.check("ball radius", press.ball_radius_m)?;
+        let (rows, columns, _) = colour_image(press.frame)?.dim();
+        same_shape("frame of a press", blank.shape(), (rows, columns))?;
+        if let Some([x, y, radius]) = press.circle_px {
+            Requirement::Finite.check("circle's x", x)?;
+            Requirement::Finite.check("circle's y", y)?;
+            Requirement::Positive.check("circle's radius", radius)?;
+        }
+        let (frame, doubts) = blank.checked(Blurred::of(press.frame));
+        let press = Self {
+            frame,
+            ball_px: press.ball_radius_m / blank.model.pixel_size_m,
+            drawn: press.circle_px,
+            own: !doubts.iter().any(FrameDoubt::refuses),
+        };
+        Ok((press, doubts))
+    }
+
     /// A circle that a ball can make. Beyond 76° from the axis light shows no slope.
     fn within(&self, [x, y, radius]: [f64; 3]) -> [f64; 3] {
         [x, y, radius.min(0.97 * self.ball_px)]
     }
 
-    /// Every third pixel of the contact, and one in 31 of those far from it, which are flat.
-    fn sums(&self, reference: &Blurred, circle: Option<[f64; 3]>) -> Sums {
-        let Some([x0, y0, radius]) = circle else {
+    /// Every third pixel of the inner contact.
+    fn sums(&self, reference: &Blurred, circle: Option<[f64; 3]>, face: BallFace) -> Sums {
+        let Some([x0, y0, radius]) = circle.filter(|_| self.own) else {
             return Sums::new();
         };
         let mut rows = Vec::new();
         samples(&self.frame, reference, |row, column, terms| {
             let [x, y] = [column as f64 - x0, row as f64 - y0];
-            let square = x * x + y * y;
             // Neighbours share most of their noise after the blur, so that fewer pixels lose
             // little.
-            if square < radius * radius && (column + 7 * row).is_multiple_of(3) {
+            if x.hypot(y) < radius - RIM_PX && (column + 7 * row).is_multiple_of(3) {
                 rows.extend(terms());
-                rows.extend([x / self.ball_px, y / self.ball_px]);
-            // Nearer to the contact the free gel is not flat: it hangs from the rim.
-            } else if square > 9.0 * radius * radius && (5 * column + 7 * row).is_multiple_of(31) {
-                rows.extend(terms());
-                rows.extend([0.0; 2]);
+                rows.extend(face.normal([x / self.ball_px, y / self.ball_px]));
             }
         });
         Sums::of(&rows)
@@ -256,15 +464,27 @@ impl Press {
         [x / weight, y / weight, radius.min(0.8 * self.ball_px)]
     }
 
-    /// Centroid and radius of equal area of the largest patch of contact.
-    fn found(&self, reference: &Blurred, coefficients: &[Vec<f64>; 2]) -> Option<[f64; 3]> {
-        let touched = contact(&normals(&self.frame, reference, coefficients));
-        let patch = parts(touched.view(), true)
-            .into_iter()
-            .max_by_key(Vec::len)?;
-        let n = patch.len() as f64;
-        let mean = |axis: usize| patch.iter().map(|at| at[axis] as f64).sum::<f64>() / n;
-        Some(self.within([mean(1), mean(0), (n / core::f64::consts::PI).sqrt()]))
+    /// Middle and radius of equal area of the largest contact.
+    ///
+    /// The middle is where the ball's normals point to: the outline of a deep contact is less even.
+    fn found(&self, sensor: &GelSensor, face: BallFace) -> Option<[f64; 3]> {
+        let (patches, [p, q]) = sensor.patches(&self.frame);
+        let largest = patches.iter().max_by(|a, b| a.area.total_cmp(&b.area))?;
+        let n = largest.pixels.len() as f64;
+        let mean = |axis: usize| largest.pixels.iter().map(|at| at[axis] as f64).sum::<f64>() / n;
+        let (x0, y0) = (mean(1), mean(0));
+        let (mut middle, mut count) = ([0.0; 2], 0.0);
+        for &at in &largest.pixels {
+            let [x, y] = [at[1] as f64, at[0] as f64];
+            if (x - x0).hypot(y - y0) < MIDDLE * largest.radius {
+                let place = face.place([p[at], q[at]].map(f64::from));
+                middle[0] += x - self.ball_px * place[0];
+                middle[1] += y - self.ball_px * place[1];
+                count += 1.0;
+            }
+        }
+        let [x, y] = middle.map(|sum| sum / count);
+        Some(self.within([x, y, largest.radius])).filter(|circle| circle[0].is_finite())
     }
 }
 
@@ -281,23 +501,30 @@ fn flat(reference: &Blurred) -> Sums {
 }
 
 /// Circles and polynomial in turn. `None` for presses in which no contact is found.
-fn find_circles(presses: &[Press], reference: &Blurred) -> Result<Vec<Option<[f64; 3]>>, GelError> {
-    enough(presses.len())?;
-    let flat = flat(reference);
+fn find_circles(
+    blank: &GelSensor,
+    presses: &[Press],
+    face: BallFace,
+) -> Result<Vec<Option<[f64; 3]>>, GelError> {
+    let own = presses.iter().filter(|press| press.own).count();
+    enough(own)?;
+    let flat = flat(&blank.reference);
     let starts = presses.iter().map(|press| {
-        let circle = press.drawn.unwrap_or_else(|| press.start(reference));
-        Some(press.within(circle)).filter(|circle| circle.iter().all(|v| v.is_finite()))
+        let circle = press.drawn.unwrap_or_else(|| press.start(&blank.reference));
+        let finite = |circle: &[f64; 3]| circle.iter().all(|v| v.is_finite());
+        Some(press.within(circle)).filter(|circle| press.own && finite(circle))
     });
     let mut circles: Vec<_> = starts.collect();
-    for _ in 0..12 {
+    for _ in 0..10 {
         let mut total = flat.clone();
         for (press, circle) in presses.iter().zip(&circles) {
-            total.add(&press.sums(reference, *circle), 1.0);
+            total.add(&press.sums(&blank.reference, *circle, face), 1.0);
         }
-        let coefficients = total.solve()?;
+        let model = GelModel::new(blank.model.pixel_size_m, total.solve()?);
+        let sensor = blank.with_model(model);
         let found = presses
             .iter()
-            .map(|press| press.found(reference, &coefficients));
+            .map(|press| press.found(&sensor, face).filter(|_| press.own));
         let found: Vec<_> = found.collect();
         let moved = circles.iter().zip(&found).map(|pair| match pair {
             (Some(old), Some(new)) => (0..3).map(|k| (old[k] - new[k]).abs()).fold(0.0, f64::max),
@@ -343,7 +570,10 @@ fn judged(presses: &[Press], found: &[Option<[f64; 3]>]) -> (Vec<CircleFinding>,
             drawn_px: press.drawn,
             found_px: *found,
             // A press without a contact found still counts with the circle that the user drew.
-            used_px: shifted.or(press.drawn).map(|circle| press.within(circle)),
+            used_px: shifted
+                .or(press.drawn)
+                .filter(|_| press.own)
+                .map(|circle| press.within(circle)),
             misfit_px,
             wrong: misfit_px.is_some_and(|misfit| misfit > limit),
         }
@@ -351,13 +581,15 @@ fn judged(presses: &[Press], found: &[Option<[f64; 3]>]) -> (Vec<CircleFinding>,
     (pairs.map(judge).collect(), offset)
 }
 
-/// Differences between spheres and what is found without their press.
+/// Differences between balls and what is found without their press.
 #[derive(Default)]
 struct Misses {
     /// Of gradients, in units of their errors for a normal's error of 1.
     gradients: Vec<f64>,
     depths: Vec<f64>,
     angles: Vec<f64>,
+    /// Slopes over those of the ball, one number a press.
+    scales: Vec<f64>,
 }
 
 impl Misses {
@@ -366,30 +598,52 @@ impl Misses {
         without: &GelSensor,
         press: &Press,
         [x0, y0, radius]: [f64; 3],
+        face: BallFace,
     ) -> Result<(), GelError> {
-        let reading = without.read_blurred(&press.frame)?;
-        // Depth counts from the contact circle: the cap's height less that of its rim.
-        let rim = (press.ball_px.powi(2) - radius * radius).sqrt();
+        let reading = without.read_blurred(&press.frame, Vec::new())?;
+        let ball = press.ball_px;
+        // Depth counts from the contact circle.
+        let (mut rim, mut ring) = (0.0, 0.0);
+        for ((row, column), depth) in reading.depth_m.indexed_iter() {
+            let distance = (column as f64 - x0).hypot(row as f64 - y0);
+            if (distance - radius).abs() < 0.7 {
+                (rim, ring) = (rim + depth, ring + 1.0);
+            }
+        }
+        let rim = rim / f64::max(ring, 1.0);
+        let (mut product, mut square) = (0.0, 0.0);
         for ((row, column), depth) in reading.depth_m.indexed_iter() {
             let [x, y] = [column as f64 - x0, row as f64 - y0];
-            if x * x + y * y >= radius * radius {
+            let distance = x.hypot(y);
+            if distance >= radius {
                 continue;
             }
-            let up = (press.ball_px.powi(2) - x * x - y * y).sqrt();
-            let truth = [-x / up, -y / up];
+            let normal = face.normal([x / ball, y / ball]);
+            let up = (1.0 - normal[0].powi(2) - normal[1].powi(2))
+                .max(1e-3)
+                .sqrt();
+            let truth = normal.map(|n| -n / up);
             let found = [0, 1].map(|k: usize| f64::from(reading.gradient[k][[row, column]]));
             let parts = reading.gradient_error.iter().zip(found.iter().zip(truth));
             for (error, (found, truth)) in parts {
                 let unit = f64::from(error[[row, column]]);
                 self.gradients.push((found - truth).abs() / unit);
             }
+            let cap = face.depth(distance / ball, radius / ball) * ball;
             self.depths
-                .push((depth - without.model.pixel_size_m * (up - rim)).abs());
+                .push((depth - rim - without.model.pixel_size_m * cap).abs());
+            if distance < radius - RIM_PX {
+                product += found[0] * truth[0] + found[1] * truth[1];
+                square += truth[0].powi(2) + truth[1].powi(2);
+            }
             let length = |[p, q]: [f64; 2]| (1.0 + p * p + q * q).sqrt();
             let cosine =
                 (1.0 + found[0] * truth[0] + found[1] * truth[1]) / (length(found) * length(truth));
             // Rounding can take the cosine of equal normals above 1.
             self.angles.push(cosine.min(1.0).acos().to_degrees());
+        }
+        if square > 0.0 {
+            self.scales.push(product / square);
         }
         Ok(())
     }

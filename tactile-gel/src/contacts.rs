@@ -1,87 +1,75 @@
-//! Where something touches: the pixels over which the normals turn outwards.
+//! Where something touches: patches of pressure, and the edge that a model of the pressure puts
+//! around each.
+//!
+//! The pressure comes from the slopes by the linear law of the face ([`Plane`]). Outside of
+//! a contact it vanishes. Inside it ends as √(distance to the edge): the face of a smooth object
+//! leaves it without a kink. The mean pressure at every distance from a patch's half height is
+//! fitted with that root, blurred as the frame is, so that neither blur nor threshold moves the edge.
+//! Where it does not fit, the face has a kink (a sharp rim, steep walls), and the edge is where the
+//! slope is largest.
 
-use ndarray::{Array2, ArrayView2, Axis, Zip};
-
+use ndarray::{Array2, ArrayView2, Zip};
 use tactile_core::BoundingBox;
 
-/// Pixels of an object in contact.
-///
-/// The divergence of the normals is twice the mean curvature. An object's face bulges towards the
-/// gel, while the free gel around it hangs from the rim with almost none. The divergence is taken
-/// of means over 2 × 2 pixels, blurred. The threshold lies half way between the means of the two
-/// classes (Ridler & Calvard, IEEE Trans. SMC 8, 630–632, 1978). Patches are opened, filled and
-/// smoothed. All are `false` where the two classes are those of noise.
-pub fn contact(normals: &[Array2<f32>; 2]) -> Array2<bool> {
-    let (rows, columns) = normals[0].dim();
-    let (high, wide) = (rows / 2, columns / 2);
-    let mut mask = Array2::from_elem((rows, columns), false);
-    if high < 8 || wide < 8 {
-        return mask;
-    }
-    let coarse = |n: &Array2<f32>| {
-        let mut mean = Array2::zeros((high, wide));
-        let mut two = vec![0.0; columns];
-        for (r, mut to) in mean.outer_iter_mut().enumerate() {
-            let rows = n.row(2 * r).into_iter().zip(n.row(2 * r + 1));
-            two.iter_mut()
-                .zip(rows)
-                .for_each(|(two, (a, b))| *two = a + b);
-            let pairs = to.iter_mut().zip(two.chunks_exact(2));
-            pairs.for_each(|(to, two)| *to = 0.25 * (two[0] + two[1]));
-        }
-        blurred(&mean, 1)
-    };
-    let [nx, ny] = [coarse(&normals[0]), coarse(&normals[1])];
-    let mut divergence = Array2::zeros((high, wide));
-    for (r, mut to) in divergence.outer_iter_mut().enumerate() {
-        // The border has the values beside it.
-        let r = r.clamp(1, high - 2);
-        let x = nx.row(r).into_iter().zip(nx.row(r).into_iter().skip(2));
-        let y = ny.row(r - 1).into_iter().zip(ny.row(r + 1)).skip(1);
-        let inner = to.iter_mut().skip(1).zip(x.zip(y));
-        inner.for_each(|(to, ((left, right), (above, below)))| {
-            *to = 0.5 * (right - left + below - above);
-        });
-        (to[0], to[wide - 1]) = (to[1], to[wide - 2]);
-    }
-    let Some(threshold) = threshold(&divergence) else {
-        return mask;
-    };
-    let above = divergence.mapv(|d| d > threshold);
-    // Shrinking before growing removes specks of noise and keeps the size of patches.
-    let opened = grown(&grown(&above, false), true);
-    let Some(patches) = filled(&opened) else {
-        return mask;
-    };
-    // A blur of the patches and half of it straighten the rim. A blur of deviation σ takes σ²/2a
-    // off the radius a of a circle: with σ² of 8 px² a tenth of a pixel at 40 px.
-    let smooth = blurred(&patches.mapv(|inside| f32::from(u8::from(inside))), 2);
-    // Values of pixels are linear between those of the means over 2 × 2.
-    let split = |k: usize, n: usize| {
-        let at = (0.5 * (k as f32 - 0.5)).clamp(0.0, (n - 1) as f32);
-        let low = (at as usize).min(n - 2);
-        (low, at - low as f32)
-    };
-    let across: Vec<(usize, f32)> = (0..columns).map(|column| split(column, wide)).collect();
-    let mut line = vec![0.0; wide];
-    for (row, mut to) in mask.outer_iter_mut().enumerate() {
-        let (r, v) = split(row, high);
-        let ends = smooth.row(r).into_iter().zip(smooth.row(r + 1));
-        for (line, (above, below)) in line.iter_mut().zip(ends) {
-            *line = (1.0 - v) * above + v * below;
-        }
-        // Most rows do not meet the contact, and their interpolation is spared.
-        if line.iter().any(|value| *value > 0.5) {
-            for (inside, &(c, u)) in to.iter_mut().zip(&across) {
-                *inside = (1.0 - u) * line[c] + u * line[c + 1] > 0.5;
+/// Patches peak above this multiple of the smoothed pressure's noise. One in 10⁹ cells of noise
+/// does, and a frame has some 10⁴.
+const LEAST_EVIDENCE: f32 = 6.0;
+/// Patches peak above this share of the strongest: the polynomial's error leaves some per cent of a
+/// deep contact beside it.
+const LEAST_SHARE: f32 = 0.06;
+/// Patches have as many cells of 2 × 2 pixels: a contact of 3 pixels in radius.
+const LEAST_CELLS: usize = 8;
+/// Two peaks are two contacts if the pressure between them falls below this share of the lower.
+const SADDLE: f32 = 0.5;
+/// Standard deviation in cells of the blur by frame, cell and bin.
+const BLUR: f64 = 0.65;
+/// A larger misfit of the root than this share of the pressure, root mean square, is another edge.
+const ROOT_MISFIT: f64 = 0.04;
+/// Error of an edge in cells that remains without noise, from worlds whose edge is known.
+const EDGE_ERROR: f64 = 0.12;
+/// Steps of the grid move the fitted root inwards by this many cells, in worlds of 10 to 50 px
+/// (`WORLDS=200 cargo test --release -p tactile-gel --test suite worlds`).
+const ROOT_SHIFT: f64 = 0.09;
+/// Blur moves the largest slope at a kink inwards by this many cells.
+const KINK_SHIFT: f64 = 0.15;
+
+/// A patch of pressure with its edge, in pixels of the frame.
+#[derive(Clone, Debug)]
+pub struct Patch {
+    /// Pixels inside, row by row.
+    pub pixels: Vec<[usize; 2]>,
+    /// Pixels on the edge, by which the rim's level is taken.
+    pub rim: Vec<[usize; 2]>,
+    /// Area in pixels.
+    pub area: f64,
+    /// Radius of the circle of this area, and the standard error of an edge, in pixels.
+    pub radius: f64,
+    pub edge_error: f64,
+}
+
+/// Pressure and slopes on cells of 2 × 2 pixels.
+pub struct Cells {
+    pub pressure: Array2<f32>,
+    pub slope: Array2<f32>,
+}
+
+/// Means over blocks of `size` pixels a side. Incomplete blocks are left out.
+pub fn block_means(values: ArrayView2<'_, f32>, size: usize) -> Array2<f32> {
+    let (rows, columns) = (values.nrows() / size, values.ncols() / size);
+    let mut means = Array2::zeros((rows, columns));
+    let share = 1.0 / (size * size) as f32;
+    for (r, mut to) in means.outer_iter_mut().enumerate() {
+        for row in values.outer_iter().skip(r * size).take(size) {
+            for (c, to) in to.iter_mut().enumerate() {
+                *to += (0..size).map(|k| row[c * size + k]).sum::<f32>() * share;
             }
         }
     }
-    mask
+    means
 }
 
 /// Blurs by (1, 4, 6, 4, 1)/16 along both axes, so many times. The border is continued.
-fn blurred(image: &Array2<f32>, times: usize) -> Array2<f32> {
+pub fn blurred(image: &Array2<f32>, times: usize) -> Array2<f32> {
     let (rows, columns) = image.dim();
     let tap = |at: [f32; 5]| (at[0] + at[4] + 4.0 * (at[1] + at[3]) + 6.0 * at[2]) / 16.0;
     let near = |k: usize, n: usize| [0, 1, 2, 3, 4].map(|j| (k + j).saturating_sub(2).min(n - 1));
@@ -113,117 +101,433 @@ fn blurred(image: &Array2<f32>, times: usize) -> Array2<f32> {
     image
 }
 
-/// The threshold between free gel and contact, to a bin of a histogram. `None` where there is one
-/// class alone.
-fn threshold(divergence: &Array2<f32>) -> Option<f32> {
-    const BINS: usize = 4096;
-    let low = divergence.iter().copied().fold(f32::MAX, f32::min);
-    // Contacts have positive divergence, so that the largest value is at least 0.
-    let high = divergence.iter().copied().fold(0.0, f32::max);
-    let scale = BINS as f32 / (high - low);
-    if !(scale > 0.0 && scale.is_finite()) {
-        return None;
+/// A quantile of values, 0 without any.
+pub fn quantile(values: &mut [f32], share: f64) -> f32 {
+    if values.is_empty() {
+        return 0.0;
     }
-    let bin = |d: f32| (((d - low) * scale) as usize).min(BINS - 1);
-    // Number, sum and sum of squares of the pixels up to every bin.
-    let mut below = vec![[0.0_f64; 3]; BINS];
-    for &divergence in divergence {
-        let d = f64::from(divergence);
-        let sums = below[bin(divergence)].iter_mut().zip([1.0, d, d * d]);
-        sums.for_each(|(sum, d)| *sum += d);
+    let at = ((share * values.len() as f64) as usize).min(values.len() - 1);
+    *values.select_nth_unstable_by(at, f32::total_cmp).1
+}
+
+/// Standard deviation of most of a field, from its median absolute deviation.
+pub fn spread(field: &Array2<f32>) -> f32 {
+    // Every third cell is enough for a median.
+    let mut values: Vec<f32> = field.iter().step_by(3).copied().collect();
+    let middle = quantile(&mut values, 0.5);
+    let mut away: Vec<f32> = values.iter().map(|v| (v - middle).abs()).collect();
+    1.4826 * quantile(&mut away, 0.5)
+}
+
+/// The patches of a frame of `shape`, the strongest first. `noise_floor` is the least standard
+/// deviation that the smoothed pressure can have.
+pub fn patches(cells: &Cells, shape: (usize, usize), noise_floor: f32) -> Vec<Patch> {
+    if cells.pressure.nrows() < 8 || cells.pressure.ncols() < 8 {
+        return Vec::new();
     }
-    let mut all = [0.0; 3];
-    // Running sums give the moments of both classes at any threshold without another pass.
-    for sums in &mut below {
-        all = [0, 1, 2].map(|k| all[k] + sums[k]);
-        *sums = all;
+    let smooth = blurred(&cells.pressure, 2);
+    let noise = spread(&smooth).max(noise_floor);
+    let strongest = smooth.iter().copied().fold(0.0, f32::max);
+    let threshold = (LEAST_EVIDENCE * noise).max(LEAST_SHARE * strongest);
+    let (regions, peaks) = regions(&smooth, threshold);
+    // The noise of one cell before the blur that smooths by this factor.
+    let cell_noise = f64::from(spread(&(&cells.pressure - &blurred(&cells.pressure, 1))));
+    let mut taken = Array2::from_elem(shape, false);
+    let mut order: Vec<usize> = (0..peaks.len()).collect();
+    order.sort_by(|a, b| peaks[*b].total_cmp(&peaks[*a]));
+    let edged = order.into_iter().filter_map(|name| {
+        let region = Region {
+            regions: &regions,
+            name: name as u32 + 1,
+            level: SADDLE * peaks[name],
+        };
+        region.edged(cells, &smooth, cell_noise, &mut taken)
+    });
+    edged.collect()
+}
+
+/// Regions above a threshold, each around one peak, named from 1, and their peaks.
+///
+/// Cells are taken from the highest downwards. Where two regions meet, the lower is a contact of its
+/// own if the saddle is below half of its peak.
+fn regions(smooth: &Array2<f32>, threshold: f32) -> (Array2<u32>, Vec<f32>) {
+    let (rows, columns) = smooth.dim();
+    let mut cells: Vec<(f32, usize)> = smooth
+        .iter()
+        .enumerate()
+        .filter(|(_, v)| **v > threshold)
+        .map(|(at, v)| (*v, at))
+        .collect();
+    cells.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+    // Peak, cells and the region that each has become a part of.
+    let mut found: Vec<(f32, usize, usize)> = Vec::new();
+    let mut owner = vec![0_usize; rows * columns];
+    let root = |found: &[(f32, usize, usize)], mut name: usize| {
+        while found[name].2 != name {
+            name = found[name].2;
+        }
+        name
+    };
+    for (value, at) in cells {
+        let (r, c) = (at / columns, at % columns);
+        let near = (r.saturating_sub(1)..(r + 2).min(rows))
+            .flat_map(|r| (c.saturating_sub(1)..(c + 2).min(columns)).map(move |c| (r, c)));
+        let mut beside: Vec<usize> = near
+            .map(|(r, c)| owner[r * columns + c])
+            .filter(|name| *name > 0)
+            .map(|name| root(&found, name - 1))
+            .collect();
+        beside.sort_by(|a, b| found[*b].0.total_cmp(&found[*a].0).then(a.cmp(b)));
+        beside.dedup();
+        let Some((&main, others)) = beside.split_first() else {
+            found.push((value, 1, found.len()));
+            owner[at] = found.len();
+            continue;
+        };
+        for &other in others {
+            let (peak, count, _) = found[other];
+            if value > SADDLE * peak || count < LEAST_CELLS {
+                found[other].2 = main;
+                found[main].1 += count;
+            }
+        }
+        found[main].1 += 1;
+        owner[at] = main + 1;
     }
-    let mut threshold = 0.5 * high;
-    for _ in 0..50 {
-        let free = below[bin(threshold)];
-        let touched = [0, 1].map(|k| all[k] - free[k]);
-        // An empty class has no mean.
-        if free[0] < 1.0 || touched[0] < 1.0 {
+    let mut names = vec![0; found.len()];
+    let mut peaks = Vec::new();
+    for (k, (peak, count, part)) in found.iter().enumerate() {
+        if *part == k && *count >= LEAST_CELLS {
+            peaks.push(*peak);
+            names[k] = peaks.len() as u32;
+        }
+    }
+    let owners = owner.iter().map(|name| match name.checked_sub(1) {
+        Some(name) => names[root(&found, name)],
+        None => 0,
+    });
+    let owners: Vec<u32> = owners.collect();
+    let regions = Array2::from_shape_fn((rows, columns), |(r, c)| owners[r * columns + c]);
+    (regions, peaks)
+}
+
+/// One region and the level that its core lies above.
+struct Region<'a> {
+    regions: &'a Array2<u32>,
+    name: u32,
+    level: f32,
+}
+
+/// Means over the cells at every distance from a core's outline, negative inside.
+struct Profile {
+    distance: Vec<f64>,
+    count: Vec<f64>,
+    pressure: Vec<f64>,
+    slope: Vec<f64>,
+}
+
+impl Region<'_> {
+    fn edged(
+        &self,
+        cells: &Cells,
+        smooth: &Array2<f32>,
+        cell_noise: f64,
+        taken: &mut Array2<bool>,
+    ) -> Option<Patch> {
+        let inside = |at: (usize, usize)| self.regions[at] == self.name && smooth[at] > self.level;
+        let core = Array2::from_shape_fn(smooth.dim(), inside);
+        let area = core.iter().filter(|inside| **inside).count() as f64;
+        let around = BoundingBox::of_mask(core.view())?;
+        let radius = (area / core::f64::consts::PI).sqrt();
+        let reach = (0.7 * radius).ceil() as usize + 4;
+        let around = around.grown(reach + 2, smooth.dim());
+        let core = around.of(core.view());
+        let distance = signed_distance(core);
+        let regions = around.of(self.regions.view());
+        let own = |at: (usize, usize)| regions[at] == 0 || regions[at] == self.name;
+        let profile = Profile::of(
+            &distance,
+            own,
+            [
+                around.of(cells.pressure.view()),
+                around.of(cells.slope.view()),
+            ],
+            [0.6 * radius, reach as f64],
+        );
+        let (edge, error) = profile.edge(radius, cell_noise)?;
+        // Steiner: an outline moved outwards by `edge`.
+        let perimeter = perimeter(core);
+        let area = area + perimeter * edge + core::f64::consts::PI * edge * edge;
+        if !(area > 1.0) {
             return None;
         }
-        let (below, above) = (free[1] / free[0], touched[1] / touched[0]);
-        let next = (0.5 * (below + above)) as f32;
-        if (next - threshold).abs() < 1e-4 * high {
-            let sd = (free[2] / free[0] - below * below).max(0.0).sqrt();
-            // The halves of one normal distribution are 2.6 deviations of the lower half apart.
-            return (above - below > 4.0 * sd).then_some(next);
-        }
-        threshold = next;
+        self.filled(&around, &distance, [4.0 * area, edge, error], taken)
     }
-    None
+
+    /// The pixels nearest to the core, as many as the area has, and those at the edge.
+    fn filled(
+        &self,
+        around: &BoundingBox,
+        distance: &Array2<f32>,
+        [area, edge, error]: [f64; 3],
+        taken: &mut Array2<bool>,
+    ) -> Option<Patch> {
+        let (rows, columns) = distance.dim();
+        // Distances of pixels are linear between those of the cells.
+        let split = |k: usize, n: usize| {
+            let at = (0.5 * (k as f32 - 0.5)).clamp(0.0, (n - 1) as f32);
+            let low = (at as usize).min(n.saturating_sub(2));
+            (low, at - low as f32)
+        };
+        let mut near: Vec<(f32, [usize; 2])> = Vec::new();
+        for row in 0..2 * rows {
+            let (r, v) = split(row, rows);
+            for column in 0..2 * columns {
+                let (c, u) = split(column, columns);
+                let at = |r: usize, c: usize| distance[[r.min(rows - 1), c.min(columns - 1)]];
+                let above = (1.0 - u) * at(r, c) + u * at(r, c + 1);
+                let below = (1.0 - u) * at(r + 1, c) + u * at(r + 1, c + 1);
+                let value = (1.0 - v) * above + v * below;
+                if f64::from(value) < edge + 2.0 {
+                    let at = [2 * around.row_start + row, 2 * around.column_start + column];
+                    near.push((value, at));
+                }
+            }
+        }
+        near.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        let count = (area.round() as usize).min(near.len());
+        let limit = near.get(count.checked_sub(1)?)?.0;
+        let rim = near.iter().filter(|(d, _)| (d - limit).abs() < 0.4);
+        let rim = rim.map(|(_, at)| *at).collect();
+        let mut pixels = Vec::with_capacity(count);
+        for (_, at) in &near[..count] {
+            if !core::mem::replace(&mut taken[*at], true) {
+                pixels.push(*at);
+            }
+        }
+        pixels.sort_unstable();
+        (!pixels.is_empty()).then(|| Patch {
+            pixels,
+            rim,
+            area,
+            radius: (area / core::f64::consts::PI).sqrt(),
+            edge_error: 2.0 * error,
+        })
+    }
 }
 
-/// Grows the pixels of this `value` by one in the four directions.
-fn grown(mask: &Array2<bool>, value: bool) -> Array2<bool> {
-    let mut grown = mask.clone();
-    for axis in [Axis(0), Axis(1)] {
-        let n = mask.len_of(axis);
-        for (to, from) in [(0..n - 1, 1..n), (1..n, 0..n - 1)] {
-            let from = mask.slice_axis(axis, from.into());
-            let mut to = grown.slice_axis_mut(axis, to.into());
-            to.zip_mut_with(&from, |to, from| {
-                *to = if *from == value { value } else { *to }
-            });
+impl Profile {
+    fn of(
+        distance: &Array2<f32>,
+        own: impl Fn((usize, usize)) -> bool,
+        fields: [ArrayView2<'_, f32>; 2],
+        [inwards, outwards]: [f64; 2],
+    ) -> Self {
+        let low = inwards.ceil();
+        let bins = (low + outwards.ceil()) as usize + 1;
+        let mut sums = vec![[0.0; 4]; bins];
+        for (at, d) in distance.indexed_iter() {
+            let bin = (f64::from(*d) + low).round();
+            if bin >= 0.0 && own(at) {
+                if let Some(sums) = sums.get_mut(bin as usize) {
+                    let more = [1.0, fields[0][at], fields[1][at], *d];
+                    sums.iter_mut()
+                        .zip(more)
+                        .for_each(|(s, v)| *s += f64::from(v));
+                }
+            }
+        }
+        sums.retain(|sums| sums[0] > 0.0);
+        let mean = |k: usize| sums.iter().map(|s| s[k] / s[0]).collect();
+        Self {
+            distance: mean(3),
+            count: sums.iter().map(|sums| sums[0]).collect(),
+            pressure: mean(1),
+            slope: mean(2),
         }
     }
-    grown
+
+    /// Distance of the edge from the core's outline, and its standard error. `None` if the pressure
+    /// does not fall outwards.
+    fn edge(&self, radius: f64, noise: f64) -> Option<(f64, f64)> {
+        let last = *self.distance.last()?;
+        let fit = |edge: f64| self.root(radius + edge, edge);
+        let coarse = (0..).map(|k| -1.0 + 0.25 * f64::from(k));
+        let coarse = coarse.take_while(|edge| *edge < last);
+        let best = coarse.min_by(|a, b| fit(*a).0.total_cmp(&fit(*b).0))?;
+        // A parabola through three misfits around the least of the steps.
+        let step = 0.25;
+        let [left, middle, right] = [best - step, best, best + step].map(|edge| fit(edge).0);
+        let bend = left + right - 2.0 * middle;
+        let shift = match bend > 0.0 {
+            true => (0.5 * step * (left - right) / bend).clamp(-step, step),
+            false => 0.0,
+        };
+        let edge = best + shift;
+        let (misfit, height) = fit(edge);
+        if !(height > 0.0) {
+            return None;
+        }
+        let bins = self.distance.len() as f64;
+        let pixels: f64 = self.count.iter().sum();
+        let excess = (misfit - 2.0 * bins * noise * noise).max(0.0) / pixels;
+        // χ² grows by 1 at one standard error. Neighbouring cells share some of their noise.
+        let curvature = bend / (step * step);
+        let spread = match curvature > 0.0 {
+            true => (2.0 * (misfit / bins).max(noise * noise) / curvature).sqrt(),
+            false => 1.0,
+        };
+        if excess.sqrt() < ROOT_MISFIT * height {
+            return Some((edge + ROOT_SHIFT, spread.hypot(EDGE_ERROR)));
+        }
+        let kink = self.kink()?;
+        // Which of the two is right is open by a share of their distance.
+        Some((kink, (0.25 * (kink - edge)).hypot(2.0 * EDGE_ERROR)))
+    }
+
+    /// Weighted misfit of c √(1 − (r/a)²), blurred, over a level, and c.
+    fn root(&self, radius: f64, edge: f64) -> (f64, f64) {
+        // Gauss–Hermite of five places.
+        const NODES: [(f64, f64); 5] = [
+            (-2.856_97, 0.011_257),
+            (-1.355_626, 0.222_076),
+            (0.0, 0.533_333),
+            (1.355_626, 0.222_076),
+            (2.856_97, 0.011_257),
+        ];
+        let radius = radius.max(1.0);
+        let height = |distance: f64| {
+            let inwards = (edge - distance).min(radius);
+            match inwards > 0.0 {
+                true => (inwards * (2.0 * radius - inwards)).sqrt() / radius,
+                false => 0.0,
+            }
+        };
+        let mut sums = [0.0; 6];
+        for ((distance, count), pressure) in
+            self.distance.iter().zip(&self.count).zip(&self.pressure)
+        {
+            let model: f64 = NODES
+                .iter()
+                .map(|(node, weight)| weight * height(distance + BLUR * node))
+                .sum();
+            let more = [
+                1.0,
+                model,
+                *pressure,
+                model * model,
+                model * pressure,
+                pressure * pressure,
+            ];
+            sums.iter_mut()
+                .zip(more)
+                .for_each(|(sum, v)| *sum += count * v);
+        }
+        let [n, m, p, mm, mp, pp] = sums;
+        let (spread, product) = (mm - m * m / n, mp - m * p / n);
+        if !(spread > 0.0) {
+            return (f64::INFINITY, 0.0);
+        }
+        let height = product / spread;
+        (pp - p * p / n - height * product, height)
+    }
+
+    /// Where the slope is largest, or falls by half at once.
+    fn kink(&self) -> Option<f64> {
+        let all = || self.slope.iter().enumerate();
+        let (at, top) = all().max_by(|a, b| a.1.total_cmp(b.1))?;
+        let far = self.distance.get(at + 3);
+        let fallen = (at + 1..self.slope.len()).find(|k| self.slope[*k] < 0.5 * top);
+        if let (Some(k), Some(far)) = (fallen, far) {
+            if self.distance[k] <= *far {
+                let [high, low] = [self.slope[k - 1], self.slope[k]];
+                let share = (high - 0.5 * top) / (high - low);
+                return Some(
+                    self.distance[k - 1] + share * (self.distance[k] - self.distance[k - 1]),
+                );
+            }
+        }
+        let beside = |k: usize| self.slope.get(k).copied();
+        let shift = match (at.checked_sub(1).and_then(beside), beside(at + 1)) {
+            (Some(left), Some(right)) if left + right < 2.0 * top => {
+                0.5 * (left - right) / (left + right - 2.0 * top)
+            }
+            _ => 0.0,
+        };
+        Some(self.distance[at] + shift + KINK_SHIFT)
+    }
 }
 
-/// Patches of at least a tenth of the largest, with their holes. `None` without a patch of 25
-/// pixels, below which noise makes them.
-fn filled(mask: &Array2<bool>) -> Option<Array2<bool>> {
-    let patches = parts(mask.view(), true);
-    let largest = patches.iter().map(Vec::len).max()?;
-    if largest < 25 {
-        return None;
+/// Length of a mask's outline in cells: that along the cells' sides, times π/4, which is right in
+/// the mean over all directions.
+fn perimeter(mask: ArrayView2<'_, bool>) -> f64 {
+    let (rows, columns) = mask.dim();
+    let at = |r: usize, c: usize| r < rows && c < columns && mask[[r, c]];
+    let mut sides = 0_usize;
+    for ((r, c), inside) in mask.indexed_iter() {
+        let other = [
+            at(r, c + 1),
+            at(r + 1, c),
+            c > 0 && at(r, c - 1),
+            r > 0 && at(r - 1, c),
+        ];
+        sides += usize::from(*inside) * other.iter().filter(|inside| !**inside).count();
     }
-    let mut kept = Array2::from_elem(mask.dim(), false);
-    // Several objects may touch at once. What is far smaller than the largest is noise.
-    let large = patches.iter().filter(|patch| 10 * patch.len() >= largest);
-    large.flatten().for_each(|&at| kept[at] = true);
-    // A part of the box around all patches that reaches its border is outside of them.
-    let mut window = BoundingBox::of_mask(kept.view())?.of_mut(kept.view_mut());
-    let (rows, columns) = window.dim();
-    let border = |&[r, c]: &[usize; 2]| r == 0 || c == 0 || r + 1 == rows || c + 1 == columns;
-    let holes = parts(window.view(), false);
-    let inner = holes.iter().filter(|hole| !hole.iter().any(border));
-    inner.flatten().for_each(|&at| window[at] = true);
-    Some(kept)
+    core::f64::consts::FRAC_PI_4 * sides as f64
 }
 
-/// The parts of a mask of this `value` that are connected by their sides, as `[row, column]`.
-pub(crate) fn parts(mask: ArrayView2<'_, bool>, value: bool) -> Vec<Vec<[usize; 2]>> {
-    let columns = mask.ncols();
-    let mut open: Vec<bool> = mask.iter().map(|m| *m == value).collect();
-    let mut parts = Vec::new();
-    for start in 0..open.len() {
-        if !core::mem::take(&mut open[start]) {
-            continue;
+/// Distance of every cell from a mask's outline, negative inside.
+fn signed_distance(mask: ArrayView2<'_, bool>) -> Array2<f32> {
+    let [inside, outside] = [false, true].map(|to| distances(mask.mapv(|m| m == to)));
+    Zip::from(&inside)
+        .and(&outside)
+        .map_collect(|inside, outside| {
+            // Cells are half a side from the outline beside them.
+            match *inside > 0.0 {
+                true => 0.5 - inside.sqrt(),
+                false => outside.sqrt() - 0.5,
+            }
+        })
+}
+
+/// Square of the distance to the nearest `true` (Felzenszwalb & Huttenlocher, Theory of Computing
+/// 8, 415–428, 2012).
+fn distances(targets: Array2<bool>) -> Array2<f32> {
+    let far = 1e9_f32;
+    let mut square = targets.mapv(|target| if target { 0.0 } else { far });
+    for axis in [0, 1] {
+        for mut lane in square.lanes_mut(ndarray::Axis(axis)) {
+            let values: Vec<f32> = lane.iter().copied().collect();
+            // Parabolas of the lower envelope, and where each begins.
+            let mut envelope: Vec<(usize, f32)> = Vec::new();
+            for (q, value) in values.iter().enumerate() {
+                let meets = |p: usize| {
+                    let squares = (q * q) as f32 - (p * p) as f32;
+                    (value - values[p] + squares) / (2.0 * (q as f32 - p as f32))
+                };
+                while envelope.len() > 1
+                    && envelope.last().is_some_and(|(p, from)| meets(*p) <= *from)
+                {
+                    envelope.pop();
+                }
+                let from = match envelope.last() {
+                    Some((p, _)) => meets(*p),
+                    None => f32::NEG_INFINITY,
+                };
+                envelope.push((q, from));
+            }
+            let mut k = 0;
+            for (q, to) in lane.iter_mut().enumerate() {
+                while envelope
+                    .get(k + 1)
+                    .is_some_and(|(_, from)| *from <= q as f32)
+                {
+                    k += 1;
+                }
+                let (p, _) = envelope[k];
+                *to = (q as f32 - p as f32).powi(2) + values[p];
+            }
         }
-        let mut part = vec![[start / columns, start % columns]];
-        let mut next = 0;
-        while let Some(&[r, c]) = part.get(next) {
-            next += 1;
-            let at = r * columns + c;
-            if c > 0 && core::mem::take(&mut open[at - 1]) {
-                part.push([r, c - 1]);
-            }
-            if c + 1 < columns && core::mem::take(&mut open[at + 1]) {
-                part.push([r, c + 1]);
-            }
-            if r > 0 && core::mem::take(&mut open[at - columns]) {
-                part.push([r - 1, c]);
-            }
-            if open.get_mut(at + columns).is_some_and(core::mem::take) {
-                part.push([r + 1, c]);
-            }
-        }
-        parts.push(part);
     }
-    parts
+    square
 }

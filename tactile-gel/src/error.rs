@@ -5,6 +5,8 @@ use tactile_elasticity::ElasticityError;
 use tactile_sfs::SfsError;
 use thiserror::Error;
 
+use crate::frame_check::FrameDoubt;
+
 /// Why a gel's sensor has no answer.
 ///
 /// ```
@@ -44,6 +46,16 @@ pub enum GelError {
         needed: usize,
         /// Presses with a contact.
         available: usize,
+    },
+    /// Presses are no frames of the reference's sensor.
+    #[error("{presses} of {given} presses are no frames of the reference's sensor: {doubt}")]
+    OtherFrames {
+        /// Presses that are none.
+        presses: usize,
+        /// Presses given.
+        given: usize,
+        /// What the first of them shows.
+        doubt: FrameDoubt,
     },
     /// The presses do not determine the sensor.
     #[error("the presses do not determine the sensor")]

@@ -59,6 +59,25 @@ impl Blurred {
         (self.rows, self.columns)
     }
 
+    /// Levels of a pixel's channels.
+    #[inline(always)]
+    pub fn levels(&self, row: usize, column: usize) -> [f32; 3] {
+        let at = 3 * (row * self.columns + column);
+        [0, 1, 2].map(|k| f32::from(self.samples[at + k]) / 256.0)
+    }
+
+    /// The image at a `gain`-th of its exposure.
+    pub fn divided_by(mut self, gain: f64) -> Self {
+        if gain != 1.0 {
+            let factor = (1.0 / gain) as f32;
+            for sample in &mut self.samples {
+                // Levels above 255 are beyond those that calibrations see.
+                *sample = (f32::from(*sample) * factor).round().min(65535.0) as u16;
+            }
+        }
+        self
+    }
+
     /// Median difference to `reference` of each channel over the frame's border, in grey levels.
     ///
     /// Lamps and exposure change between frames. The border is the part that is touched least, and

@@ -1,15 +1,26 @@
 #![doc = include_str!("../README.md")]
 #![forbid(unsafe_code)]
 
+mod ball;
 mod calibration;
 mod contacts;
+mod darkness;
 mod error;
+mod face;
 mod force;
+mod frame_check;
 mod gradients;
+mod plane;
 mod sensor;
+#[cfg(feature = "simulate")]
+pub mod simulate;
 
-pub use calibration::{BallPress, CalibrationReport, CircleFinding};
+pub use ball::BallFace;
+pub use calibration::{BallPress, CalibrationDoubt, CalibrationReport, CircleFinding};
+pub use darkness::{DarkFrame, DarkGel, DarkPatch};
 pub use error::GelError;
+pub use face::{GelContact, GelFrame};
 pub use force::{GelForce, GelLayer};
-pub use sensor::{GelFrame, GelModel, GelSensor};
+pub use frame_check::{FrameDoubt, Turn};
+pub use sensor::{GelModel, GelSensor};
 pub use {nalgebra, ndarray};

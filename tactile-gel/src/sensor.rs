@@ -1,4 +1,4 @@
-//! A gel that is lit in colours: from a frame to gradients, contact and depth.
+//! A gel that is lit in colours: from a frame to gradients, face and contacts.
 //!
 //! The colour of a pixel, less that of the untouched gel, depends on the surface's normal and on
 //! the place in the image. A polynomial of third degree in the three colour differences, whose
@@ -6,16 +6,18 @@
 //! of one ball determine it: inside the contact circle n = (x − x₀, y − y₀)/R. Over presses left
 //! out in turn it was as good as polynomials of higher degree, with fewer numbers to determine.
 
-use ndarray::{Array2, ArrayView3, Zip};
+use std::sync::Arc;
+
+use ndarray::{Array2, ArrayView3};
 use tactile_core::{Requirement, vectorised};
 
-use tactile_core::BoundingBox;
-use tactile_sfs::{CosinePoisson, Domain, SlopeIntegrator};
-
 use crate::GelError;
-use crate::contacts::contact;
+use crate::contacts::{Cells, Patch, block_means, patches};
 use crate::error::same_shape;
+use crate::face::{self, GelFrame};
+use crate::frame_check::{Blocks, FrameDoubt, light};
 use crate::gradients::{Blurred, TERMS, normals};
+use crate::plane::Plane;
 
 /// The numbers that a calibration of [`GelSensor`] finds, as a file keeps them.
 ///
@@ -24,7 +26,8 @@ use crate::gradients::{Blurred, TERMS, normals};
 /// let model = GelModel::new(5e-5, [vec![0.0; 60], vec![0.0; 60]]);
 /// let flat = ndarray::Array3::from_elem((40, 60, 3), 90);
 /// let sensor = GelSensor::new(model, flat.view())?;
-/// assert!(sensor.read(flat.view())?.depth_m.iter().all(|z| *z == 0.0));
+/// let frame = sensor.read(flat.view())?;
+/// assert!(frame.contacts.is_empty() && frame.depth_m.iter().all(|z| *z == 0.0));
 /// # Ok::<(), tactile_gel::GelError>(())
 /// ```
 #[derive(Clone, Debug, PartialEq)]
@@ -38,8 +41,17 @@ pub struct GelModel {
     pub coefficients: [Vec<f64>; 2],
     /// Standard error of n_x and n_y, from presses left out in turn.
     pub normal_standard_error: f64,
-    /// Standard error of a depth in metres, from presses left out in turn.
+    /// Standard error of the depth of one pixel in metres, from presses left out in turn.
     pub depth_standard_error_m: f64,
+    /// Relative standard error of all slopes of a frame together, from presses left out in turn.
+    #[cfg_attr(feature = "serde", serde(default = "unknown_slope_error"))]
+    pub slope_standard_error: f64,
+}
+
+/// Of files that were written before slopes had an error of their own: that of usual calibrations.
+#[cfg(feature = "serde")]
+fn unknown_slope_error() -> f64 {
+    0.05
 }
 
 impl GelModel {
@@ -50,97 +62,45 @@ impl GelModel {
             coefficients,
             normal_standard_error: 0.0,
             depth_standard_error_m: 0.0,
+            slope_standard_error: 0.0,
         }
-    }
-}
-
-/// Surfaces from the colours of a gel that is lit from several sides.
-///
-/// Reads 8-bit frames of three channels. A shift of all levels of a channel between frames is
-/// taken off by the median over the frame's border. [`calibrate`](Self::calibrate) makes one from
-/// presses of a ball. O(pixels) a frame, and O(n log n) for the n pixels of the contact's box.
-#[derive(Clone, Debug, PartialEq)]
-pub struct GelSensor {
-    pub(crate) model: GelModel,
-    pub(crate) reference: Blurred,
-}
-
-/// What one frame shows.
-///
-/// Gradients are those of the gel's surface, inside the contact and around it: ∂z/∂x and ∂z/∂y
-/// with z the depth in metres, x the column, y the row.
-#[derive(Clone, Debug, PartialEq)]
-#[non_exhaustive]
-pub struct GelFrame {
-    /// Gradients along x and y.
-    pub gradient: [Array2<f32>; 2],
-    /// Standard errors of the gradients.
-    pub gradient_error: [Array2<f32>; 2],
-    /// Pixels where something touches.
-    pub contact: Array2<bool>,
-    /// Depth in metres, 0 where nothing touches.
-    pub depth_m: Array2<f64>,
-    /// Standard error of a depth inside the contact, in metres.
-    pub depth_standard_error_m: f64,
-}
-
-impl GelFrame {
-    /// How far the gel's face has moved, in metres, and where it is touched, for blocks of this
-    /// many pixels a side. Incomplete blocks at the right and at the bottom are left out.
-    ///
-    /// The gradients of the whole face are integrated, also those of the free gel around a contact.
-    /// The median along the border is taken as its rest.
-    ///
-    /// # Errors
-    /// Those of [`CosinePoisson`], and [`GelError::EmptyImage`] for a block of no pixel or larger
-    /// than the frame.
-    pub fn displacement_m(
-        &self,
-        block: usize,
-        pixel_size_m: f64,
-    ) -> Result<(Array2<f64>, Array2<bool>), GelError> {
-        let [rows, columns] =
-            [self.contact.nrows(), self.contact.ncols()].map(|n| n.checked_div(block).unwrap_or(0));
-        if rows == 0 || columns == 0 {
-            return Err(GelError::EmptyImage { rows, columns });
-        }
-        let share = 1.0 / (block * block) as f64;
-        let mean = |gradient: &Array2<f32>| {
-            let blocks = gradient.exact_chunks((block, block));
-            let means = blocks.into_iter().map(|b| f64::from(b.sum()) * share);
-            Array2::from_shape_fn((rows, columns), {
-                let means: Vec<f64> = means.collect();
-                move |(row, column)| means[row * columns + column]
-            })
-        };
-        let [p, q] = self.gradient.each_ref().map(mean);
-        let domain = Domain::new([block as f64 * pixel_size_m; 2])?;
-        let mut moved = CosinePoisson
-            .integrate(p.view(), q.view(), &domain)?
-            .heights;
-        let edge = |(row, column): (usize, usize)| {
-            row == 0 || column == 0 || row + 1 == rows || column + 1 == columns
-        };
-        let around = moved.indexed_iter().filter(|(at, _)| edge(*at));
-        let mut around: Vec<f64> = around.map(|(_, z)| *z).collect();
-        let middle = around.len() / 2;
-        // The median is not moved by a contact that reaches the border, as a mean would be.
-        let rest = *around.select_nth_unstable_by(middle, f64::total_cmp).1;
-        moved -= rest;
-        let blocks: Vec<bool> = self
-            .contact
-            .exact_chunks((block, block))
-            .into_iter()
-            .map(|b| 2 * b.iter().filter(|touched| **touched).count() > block * block)
-            .collect();
-        let touched = Array2::from_shape_fn((rows, columns), |(r, c)| blocks[r * columns + c]);
-        Ok((moved, touched))
     }
 }
 
 /// Largest sine of a slope. A steeper one is read as 76°: beyond it light hardly changes, and the
 /// slope itself has no end.
 const STEEPEST: f32 = 0.97;
+
+/// Noise in grey levels that two frames of eight bits have at least, of their rounding alone.
+const LEAST_NOISE_GREY: f64 = 0.41;
+/// Share of a pixel's noise that is left in the smoothed pressure: the blurs by frame, cells and
+/// smoothing add up to a variance of 9.25 px², and noise falls by √(4π · 9.25).
+const SMOOTHED: f64 = 0.093;
+/// Room beside the grid of the pressure, as a share of it. Copies of a contact fall off with the
+/// distance squared.
+const ROOM: f64 = 0.2;
+
+/// A gel's sensor: what its colours say about the face.
+///
+/// Reads 8-bit frames of three channels. A common exposure and a shift of all levels of a channel
+/// between frames are taken off by the frame's border. [`calibrate`](Self::calibrate) makes one
+/// from presses of a ball. O(n log n) for the n pixels of a frame.
+#[derive(Clone)]
+pub struct GelSensor {
+    pub(crate) model: GelModel,
+    pub(crate) reference: Blurred,
+    blocks: Blocks,
+    pub(crate) plane: Arc<Plane>,
+}
+
+impl core::fmt::Debug for GelSensor {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.debug_struct("GelSensor")
+            .field("model", &self.model)
+            .field("shape", &self.shape())
+            .finish_non_exhaustive()
+    }
+}
 
 impl GelSensor {
     /// A sensor from its model and its frame without contact, `[row, column, channel]`.
@@ -153,14 +113,35 @@ impl GelSensor {
         Requirement::Positive.check("pixel size", model.pixel_size_m)?;
         Requirement::NonNegative.check("normal error", model.normal_standard_error)?;
         Requirement::NonNegative.check("depth error", model.depth_standard_error_m)?;
+        Requirement::NonNegative.check("slope error", model.slope_standard_error)?;
         for component in &model.coefficients {
             same_shape("coefficients", (1, TERMS), (1, component.len()))?;
             for value in component {
                 Requirement::Finite.check("coefficient", *value)?;
             }
         }
-        let reference = Blurred::of(colour_image(reference)?);
-        Ok(Self { model, reference })
+        Ok(Self::of_blurred(
+            model,
+            Blurred::of(colour_image(reference)?),
+        ))
+    }
+
+    pub(crate) fn of_blurred(model: GelModel, reference: Blurred) -> Self {
+        let (rows, columns) = reference.dim();
+        Self {
+            blocks: Blocks::of(&reference),
+            plane: Arc::new(Plane::new((rows / 2, columns / 2), ROOM, None)),
+            model,
+            reference,
+        }
+    }
+
+    /// The same sensor with other numbers.
+    pub(crate) fn with_model(&self, model: GelModel) -> Self {
+        Self {
+            model,
+            ..self.clone()
+        }
     }
 
     /// The numbers of the calibration.
@@ -173,7 +154,10 @@ impl GelSensor {
         self.reference.dim()
     }
 
-    /// Gradients, contact and depth of a frame of the reference's size.
+    /// Gradients, face and contacts of a frame of the reference's size.
+    ///
+    /// A frame that is not this sensor's has [`doubts`](GelFrame::doubts). Where they
+    /// [refuse](FrameDoubt::refuses) it, it has no contact and its face is NaN.
     ///
     /// # Errors
     /// [`GelError::ShapeMismatch`].
@@ -181,13 +165,25 @@ impl GelSensor {
         let frame = colour_image(frame)?;
         let (rows, columns, _) = frame.dim();
         same_shape("frame", self.reference.dim(), (rows, columns))?;
-        self.read_blurred(&Blurred::of(frame))
+        let (frame, doubts) = self.checked(Blurred::of(frame));
+        if doubts.iter().any(FrameDoubt::refuses) {
+            return Ok(GelFrame::refused((rows, columns), doubts));
+        }
+        self.read_blurred(&frame, doubts)
     }
 
-    pub(crate) fn read_blurred(&self, frame: &Blurred) -> Result<GelFrame, GelError> {
-        let normals = normals(frame, &self.reference, &self.model.coefficients);
-        let touched = contact(&normals);
-        let [mut p, mut q] = normals;
+    /// A frame at the reference's exposure, and why it may not be this sensor's.
+    pub(crate) fn checked(&self, frame: Blurred) -> (Blurred, Vec<FrameDoubt>) {
+        let light = light(&Blocks::of(&frame), &self.blocks);
+        (frame.divided_by(light.gain), light.doubts)
+    }
+
+    pub(crate) fn read_blurred(
+        &self,
+        frame: &Blurred,
+        mut doubts: Vec<FrameDoubt>,
+    ) -> Result<GelFrame, GelError> {
+        let [mut p, mut q] = normals(frame, &self.reference, &self.model.coefficients);
         let mut errors = [Array2::zeros(p.dim()), Array2::zeros(p.dim())];
         let sd = self.model.normal_standard_error as f32;
         let [error_p, error_q] = &mut errors;
@@ -196,57 +192,44 @@ impl GelSensor {
         if let [Some(p), Some(q), Some(error_p), Some(error_q)] = all {
             slopes([p, q], [error_p, error_q], sd);
         }
-        let depth_m = self.depth([&p, &q], &touched)?;
-        Ok(GelFrame {
-            gradient: [p, q],
-            gradient_error: errors,
-            contact: touched,
-            depth_m,
-            depth_standard_error_m: self.model.depth_standard_error_m,
-        })
+        let cells = self.cells([&p, &q]);
+        if face::no_surface(&p, &q, self.noise_floor()) {
+            doubts.push(FrameDoubt::NoSurface);
+        }
+        let found = patches(&cells, p.dim(), self.noise_floor());
+        face::frame(&self.model, [p, q], errors, &cells.pressure, found, doubts)
     }
 
-    /// Integrates the slopes of the contact with none around it, and counts from around it.
-    fn depth(
-        &self,
-        slopes: [&Array2<f32>; 2],
-        touched: &Array2<bool>,
-    ) -> Result<Array2<f64>, GelError> {
-        let mut depth = Array2::zeros(touched.dim());
-        let Some(area) = BoundingBox::of_mask(touched.view()) else {
-            return Ok(depth);
-        };
-        // Room around the contact for slopes that do not add up to none around a loop.
-        let area = area.grown(16, touched.dim());
-        let inside = area.of(touched.view());
-        let [p, q] = slopes.map(|slope| {
-            let mut slope = area.of(slope.view()).mapv(f64::from);
-            slope.zip_mut_with(&inside, |slope, inside| {
-                // The free gel's slopes are left out: its sag around the contact is not the
-                // object's depth.
-                *slope *= f64::from(u8::from(*inside))
-            });
-            slope
+    /// The patches of contact of a frame, and its slopes.
+    pub(crate) fn patches(&self, frame: &Blurred) -> (Vec<Patch>, [Array2<f32>; 2]) {
+        let [mut p, mut q] = normals(frame, &self.reference, &self.model.coefficients);
+        ndarray::Zip::from(&mut p).and(&mut q).for_each(|p, q| {
+            let cut = STEEPEST / p.hypot(*q).max(STEEPEST);
+            let (x, y) = (*p * cut, *q * cut);
+            let up = (1.0 - x * x - y * y).sqrt();
+            (*p, *q) = (-x / up, -y / up);
         });
-        let domain = Domain::new([self.model.pixel_size_m; 2])?;
-        let heights = CosinePoisson
-            .integrate(p.view(), q.view(), &domain)?
-            .heights;
-        let around = heights.iter().zip(&inside).filter(|(_, inside)| !**inside);
-        let (sum, count) = around.fold((0.0, 0_usize), |(sum, n), (z, _)| (sum + z, n + 1));
-        // Integration leaves the height open to a constant. Around the contact the depth is 0.
-        let zero = sum / count.max(1) as f64;
-        let mut to = area.of_mut(depth.view_mut());
-        Zip::from(&mut to)
-            .and(&heights)
-            .and(&inside)
-            .for_each(|to, z, inside| {
-                if *inside {
-                    // A touched place cannot lie above the free face.
-                    *to = (z - zero).max(0.0);
-                }
-            });
-        Ok(depth)
+        let found = patches(&self.cells([&p, &q]), p.dim(), self.noise_floor());
+        (found, [p, q])
+    }
+
+    /// Pressure and slope on cells of 2 × 2 pixels.
+    fn cells(&self, slopes: [&Array2<f32>; 2]) -> Cells {
+        let [p, q] = slopes.map(|slope| block_means(slope.view(), 2));
+        let slope = ndarray::Zip::from(&p)
+            .and(&q)
+            .map_collect(|p, q| p.hypot(*q));
+        Cells {
+            pressure: self.plane.pressure(p.view(), q.view()),
+            slope,
+        }
+    }
+
+    /// The least noise of the smoothed pressure, from the rounding of levels.
+    fn noise_floor(&self) -> f32 {
+        let linear = self.model.coefficients.iter().flat_map(|c| &c[1..4]);
+        let square: f64 = linear.map(|c| c * c).sum();
+        (LEAST_NOISE_GREY * SMOOTHED / 50.0 * (0.5 * square).sqrt()) as f32
     }
 }
 

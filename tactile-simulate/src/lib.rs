@@ -37,7 +37,6 @@
 
 mod calibration;
 mod camera;
-mod colour;
 mod contact;
 mod error;
 #[cfg(feature = "scene")]
@@ -53,7 +52,6 @@ mod uniaxial;
 
 pub use calibration::{CalibrationRun, CalibrationSeries};
 pub use camera::Camera;
-pub use colour::{ColourGel, GelObject};
 pub use contact::{ContactModel, ContactState, SimulatedContact};
 pub use error::SimulateError;
 #[cfg(feature = "scene")]
@@ -64,6 +62,7 @@ pub use press::{
     PressTruth, SurfaceScaling, WaveguideLayer,
 };
 pub use stream::{FrameStream, LoadCycle, StreamedFrame};
+pub use tactile_gel::simulate::{ColourGel, ElasticFace, GelObject, HertzPress};
 pub use trial::Trial;
 pub use uniaxial::{FaceOutline, SurfacePattern, UniaxialOptions, UniaxialScene, UniaxialState};
 

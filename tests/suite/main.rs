@@ -5,7 +5,6 @@ mod architecture;
 mod assumptions;
 mod check_presses;
 mod circles;
-mod coloured_gels;
 mod common;
 mod corpus;
 mod few_pairs;

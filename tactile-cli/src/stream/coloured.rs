@@ -3,19 +3,21 @@ use super::StreamArguments;
 use super::watch::{Meter, Watch, listed, watch};
 use crate::console::Context;
 use crate::failure::{Exit, Failure};
-use crate::photometric::{GelContact, NO_FRAMES, Reader, number_or_error};
+use crate::photometric::{GelReading, NO_FRAMES, Reader, number_or_error};
 use crate::relief::HeightGrid;
 use ndarray::{Array2, Array3};
 use serde_json::{Value, json};
 use std::error::Error;
 use std::path::Path;
 use tactile_imaging::core::Estimate;
+use tactile_imaging::gel::FrameDoubt;
 
 /// The results of one frame.
 pub struct Row {
     /// None without contact, or why it has none.
     force_n: Result<Option<Estimate>, String>,
-    contact: Option<GelContact>,
+    contact: Option<GelReading>,
+    doubts: Vec<FrameDoubt>,
 }
 
 impl Row {
@@ -49,7 +51,8 @@ impl Meter for Gel {
         let reading = self.reader.stereo.read(frame.view())?;
         let row = Row {
             force_n: self.reader.force(&reading),
-            contact: GelContact::of(&reading, self.reader.stereo.model().pixel_size_m),
+            contact: GelReading::of(&reading),
+            doubts: reading.doubts,
         };
         self.depth_m = reading.depth_m;
         Ok(row)
@@ -75,13 +78,17 @@ impl Meter for Gel {
     }
 
     fn update(row: &Row) -> Value {
-        json!({ "force_n": number_or_error(&row.force_n), "contact": row.contact })
+        let doubts: Vec<String> = row.doubts.iter().map(ToString::to_string).collect();
+        json!({
+            "force_n": number_or_error(&row.force_n), "contact": row.contact, "cautions": doubts,
+        })
     }
 
     fn shown(&self, row: &Row, columns: f64) -> Value {
         let contact = row.contact.as_ref();
         json!({
-            "cautions": [], "force_n": row.force().map(pair),
+            "cautions": row.doubts.iter().map(ToString::to_string).collect::<Vec<_>>(),
+            "force_n": row.force().map(pair),
             "centre": contact.map(|contact| contact.centroid.map(|c| c / columns)),
             "depth_m": contact.map(|contact| pair(contact.largest_depth_m)),
         })
@@ -90,7 +97,7 @@ impl Meter for Gel {
     fn surface(&mut self) -> Value {
         let size = 1e3 * self.reader.stereo.model().pixel_size_m;
         let relief = HeightGrid::of(self.depth_m.mapv(|z| 1e3 * z).view(), [size; 2]);
-        json!({ "name": "depth", "relief": relief })
+        json!({ "name": "depth", "relief": relief, "health": "" })
     }
 }
 

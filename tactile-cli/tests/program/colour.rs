@@ -27,14 +27,37 @@ fn a_calibrated_gel_gives_depth_and_gradients() {
     for grid in [&depth, &x, &y] {
         assert!(grid.len() == 90 && grid.iter().all(|row| row.len() == 120));
     }
-    // A ball of 24 px in contact up to 16 px from (58, 30), pixels of 50 µm: a tenth of its depth.
+    // A ball of 24 px in contact up to 16 px from (58, 30), pixels of 50 µm. The free gel hangs from the
+    // rim with a kink, which moves the edge by a pixel, and a pixel of the steep rim is a seventh.
+    let value: Value = serde_json::from_str(&call(
+        "depth --sensor made/sensor.toml examples/data/colour/press_6.png --json",
+    ))
+    .unwrap();
+    assert_keeps_to_schema(&value, "depth");
+    let contacts = &value["frames"][0]["contacts"];
+    assert_eq!(contacts.as_array().map(Vec::len), Some(1), "{contacts}");
     let truth = 50e-6 * (24.0 - 320.0_f64.sqrt());
+    let found = contacts[0]["largest_depth_m"]["value"].as_f64().unwrap();
+    assert!((found / truth - 1.0).abs() < 0.2, "{found} {truth}");
+    let centre: Vec<f64> = serde_json::from_value(contacts[0]["centroid"].clone()).unwrap();
     assert!(
-        (depth[30][58] / truth - 1.0).abs() < 0.1,
-        "{}",
-        depth[30][58]
+        (centre[0] - 58.0).hypot(centre[1] - 30.0) < 1.0,
+        "{centre:?}"
     );
-    assert!(depth[80][110] == 0.0 && x[30][50] > 0.1 && y[38][58] < -0.1);
+    // The face counts from the gel far away.
+    assert!(depth[30][58] > found && depth[80][110].abs() < 0.2 * depth[30][58]);
+    assert!(x[30][50] > 0.1 && y[38][58] < -0.1);
+    let labels = table("press_6_contact.csv");
+    assert!(labels[30][58] == 1.0 && labels[80][110] == 0.0);
+    let mesh = fs::read(folder.path().join("made/press_6.ply")).unwrap();
+    let header = b"end_header\n";
+    let at = mesh
+        .windows(header.len())
+        .position(|w| w == header)
+        .unwrap()
+        + header.len();
+    assert_eq!(mesh.len() - at, 12 * 120 * 90 + 17 * 119 * 89);
+    assert!(folder.path().join("made/press_6.npz").exists());
     // A circle that is eight pixels off.
     let wrong = fs::read_to_string(folder.path().join(calibration)).unwrap();
     let wrong = wrong.replace("[86, 60, 15]", "[78, 60, 15]");
@@ -53,6 +76,33 @@ fn a_calibrated_gel_gives_depth_and_gradients() {
         matches!(named[..], [line] if line.contains("press_3.png")),
         "{printed}"
     );
+}
+
+/// Frames that are not this sensor's are named, and have no number.
+#[test]
+fn a_frame_of_others_is_not_read() {
+    let folder = folder_with_examples();
+    let sensor = "examples/data/colour/sensor.toml";
+    let press = folder.path().join("examples/data/colour/press_6.png");
+    let mut levels = read_colour_levels(press).unwrap();
+    levels.invert_axis(ndarray::Axis(2));
+    let mut exchanged = b"P6\n120 90\n255\n".to_vec();
+    exchanged.extend(&levels);
+    let mut black = b"P6\n120 90\n255\n".to_vec();
+    black.extend(vec![0; 3 * 120 * 90]);
+    for (bytes, kinds) in [
+        (exchanged, &["channels_exchanged", "no_surface"][..]),
+        (black, &["black_frame"][..]),
+    ] {
+        let output = piped(
+            folder.path(),
+            &format!("depth --sensor {sensor} --json -"),
+            &bytes,
+        );
+        let value = value(&output);
+        let kind = value["cautions"][0]["kind"].as_str().unwrap_or_default();
+        assert!(kinds.contains(&kind), "{value}");
+    }
 }
 
 /// The modulus is that of a known weight, and a press has the force of its depth.

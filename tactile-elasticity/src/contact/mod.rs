@@ -5,21 +5,18 @@
 //! | [`HertzContact`] | two spheres, small contact |
 //! | [`depression_m`] | surface of layers under a ball's contact |
 //! | [`LayerEquation`] | sphere on one or more bonded layers: the solution by an integral equation |
-//! | [`LayerPlane`] | displacement of a layered surface under a contact of any shape, to pressure |
 //! | [`ContactTable`] | soft ball on a guide, tabulated by finite elements |
 //! | [`Waveguide`] | the layers of a sensor |
 
 mod depression;
 mod hertz;
 mod layers;
-mod plane;
 mod table;
 mod waveguide;
 
 pub use depression::depression_m;
 pub use hertz::{Body, HertzContact, hertz_surface_displacement_m, reduced_modulus_pa};
 pub use layers::{Bond, LayerContact, LayerEquation};
-pub use plane::LayerPlane;
 pub use table::{ContactCurve, ContactTable};
 pub use waveguide::{
     Layer, PARABOLA_ERROR, PARAMETERS_PER_LAYER, Waveguide, guide_compliance_covariance,

@@ -198,9 +198,23 @@ pub fn read_colour_levels(path: impl AsRef<Path>) -> Result<Array3<u8>, FileErro
 }
 
 /// Red, green and blue in eight bits. `None` for a grey image.
+///
+/// Samples of 16 bits that do not exceed 10 or 12 bits are those of such a camera: they are divided
+/// by its range, not by that of 16 bits.
 pub fn colour_levels(image: DynamicImage) -> Option<Array3<u8>> {
     if !image.color().has_color() {
         return None;
+    }
+    if let DynamicImage::ImageRgb16(_) | DynamicImage::ImageRgba16(_) = image {
+        let image = image.into_rgb16();
+        let largest = image.iter().copied().max().unwrap_or(0);
+        let shift = [2, 4].into_iter().find(|shift| largest >> shift < 256);
+        let shape = (image.height() as usize, image.width() as usize, 3);
+        let levels = image
+            .into_raw()
+            .into_iter()
+            .map(|v| (v >> shift.unwrap_or(8)) as u8);
+        return Array3::from_shape_vec(shape, levels.collect()).ok();
     }
     let image = image.into_rgb8();
     let shape = (image.height() as usize, image.width() as usize, 3);

@@ -1,6 +1,6 @@
 //! Sensors with a gel that is lit in colours: calibration file and sensor file.
 use crate::io::{
-    FileError, beside, one_or_more, positive, read_bytes, read_colour_levels, read_toml,
+    FileError, beside, length, one_or_more, positive, read_bytes, read_colour_levels, read_toml,
 };
 use ndarray::Array3;
 use serde::{Deserialize, Serialize};
@@ -74,7 +74,7 @@ struct CalibrationFile {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct GelTable {
-    #[serde(deserialize_with = "positive")]
+    #[serde(deserialize_with = "length")]
     thickness_m: f64,
     poisson_ratio: Option<f64>,
     youngs_modulus_pa: Option<f64>,
@@ -97,7 +97,7 @@ struct WeightTable {
 #[serde(deny_unknown_fields)]
 struct PressTable {
     image: PathBuf,
-    #[serde(deserialize_with = "positive")]
+    #[serde(deserialize_with = "length")]
     ball_radius_m: f64,
     circle_px: Option<[f64; 3]>,
 }

@@ -1,4 +1,5 @@
-//! Frames of a gel that is lit in colours from three sides, with the truth at every pixel.
+//! Frames of a gel that is lit in colours from three sides, with the truth at every pixel, and exact
+//! faces: a ball on a half-space by Hertz's law, and pressures on a bonded layer.
 
 use ndarray::{Array2, Array3};
 use rand::SeedableRng;
@@ -13,7 +14,7 @@ use rand_distr::{Distribution, Normal};
 /// surroundings block, and light that other walls reflect, are left out.
 ///
 /// ```
-/// use tactile_simulate::{ColourGel, GelObject};
+/// use tactile_gel::simulate::{ColourGel, GelObject};
 /// let gel = ColourGel::default();
 /// let ball = GelObject::Ball { radius_px: 30.0, contact_px: 20.0 };
 /// let depth = gel.depth_px(&ball, [80.0, 60.0]);
@@ -34,6 +35,10 @@ pub struct ColourGel {
     pub noise: f64,
     /// Factor of all levels, as of an exposure that changes between frames.
     pub gain: f64,
+    /// Factors of the brightness of red, green and blue lamp: those of another unit are others.
+    pub lamps: [f64; 3],
+    /// Angle in radians by which all lamps are turned.
+    pub turn: f64,
     /// Length in pixels over which the free gel around a contact comes up to its rest.
     pub sag_px: f64,
 }
@@ -47,6 +52,8 @@ impl Default for ColourGel {
             fall_off: 0.4,
             noise: 1.0,
             gain: 1.0,
+            lamps: [1.0; 3],
+            turn: 0.0,
             sag_px: 12.0,
         }
     }
@@ -188,17 +195,187 @@ impl ColourGel {
             let p = 0.5 * (at(row, column + 1) - at(row, column.saturating_sub(1)));
             let q = 0.5 * (at(row + 1, column) - at(row.saturating_sub(1), column));
             // The offset keeps the lamps off the pixel axes.
-            let angle = core::f64::consts::TAU * (channel as f64 / 3.0 + 0.1);
+            let angle = core::f64::consts::TAU * (channel as f64 / 3.0 + 0.1) + self.turn;
             let (sin, cos) = angle.sin_cos();
             let across = (column as f64 / columns as f64 - 0.5) * cos
                 + (row as f64 / rows as f64 - 0.5) * sin;
             let (up, flat) = self.elevation.sin_cos();
             // The gel bulges towards the camera: its normal is (p, q, 1) seen from there.
             let lit = (flat * (p * cos + q * sin) + up) / (1.0 + p * p + q * q).sqrt();
-            let light = 40.0 + 170.0 * (1.0 + self.fall_off * across) * lit.max(0.0);
+            let lamp = 170.0 * self.lamps[channel] * (1.0 + self.fall_off * across);
+            let light = 40.0 + lamp * lit.max(0.0);
             let error = noise.map_or(0.0, |noise| noise.sample(&mut random));
             *level = (self.gain * light + error).round().clamp(0.0, 255.0) as u8;
         }
         frame
     }
+}
+
+/// A pressure p₀ √(1 − r²/a²) on an elastic face: that of a ball by Hertz's law.
+///
+/// ```
+/// use tactile_gel::simulate::{ElasticFace, HertzPress};
+/// // A ball of 40 px in contact up to 10 px sinks by a²/R below the free face, half of it below the
+/// // contact's rim.
+/// let press = HertzPress::ball([32.0, 24.0], 40.0, 10.0);
+/// let depth = ElasticFace::HALF_SPACE.depth_px([48, 64], &[press]);
+/// assert!((depth[[24, 32]] - 2.5).abs() < 1e-12 && (depth[[24, 42]] - 1.25).abs() < 1e-6);
+/// // A layer that is thin beside the contact yields less.
+/// let layer = ElasticFace { thickness_px: 20.0, poisson_ratio: 0.48 };
+/// assert!(layer.depth_px([48, 64], &[press])[[24, 32]] < 2.0);
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HertzPress {
+    /// Column and row of the middle.
+    pub at_px: [f64; 2],
+    /// Radius a of the contact.
+    pub contact_px: f64,
+    /// 2 p₀/E*, with the gel's plane strain modulus E*.
+    pub pressure: f64,
+}
+
+impl HertzPress {
+    /// A ball on a half-space: 2 p₀/E* = 4 a/(π R).
+    pub fn ball(at_px: [f64; 2], ball_px: f64, contact_px: f64) -> Self {
+        Self {
+            at_px,
+            contact_px,
+            pressure: 4.0 * contact_px / (core::f64::consts::PI * ball_px),
+        }
+    }
+
+    /// Its force ⅔ π a² p₀ in newtons.
+    pub fn force_n(&self, plane_strain_modulus_pa: f64, pixel_size_m: f64) -> f64 {
+        let area = core::f64::consts::PI * (self.contact_px * pixel_size_m).powi(2);
+        2.0 / 3.0 * area * 0.5 * self.pressure * plane_strain_modulus_pa
+    }
+}
+
+/// An elastic face: a half-space, or a layer bonded to a rigid plate.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ElasticFace {
+    /// Thickness in pixels. Infinite for a half-space.
+    pub thickness_px: f64,
+    /// Poisson's ratio.
+    pub poisson_ratio: f64,
+}
+
+impl ElasticFace {
+    /// A half-space.
+    pub const HALF_SPACE: Self = Self {
+        thickness_px: f64::INFINITY,
+        poisson_ratio: 0.5,
+    };
+
+    /// Linear displacement in pixels of rows and columns of pixels, of all presses together.
+    pub fn depth_px(&self, [rows, columns]: [usize; 2], presses: &[HertzPress]) -> Array2<f64> {
+        let mut depth = Array2::zeros((rows, columns));
+        for press in presses {
+            let reach = (rows as f64).hypot(columns as f64) + press.at_px[0].hypot(press.at_px[1]);
+            // The layer's part is smooth: values a pixel apart are enough.
+            let less: Vec<f64> = match self.thickness_px.is_finite() {
+                true => (0..reach as usize + 2)
+                    .map(|r| self.less(press, r as f64))
+                    .collect(),
+                false => Vec::new(),
+            };
+            for ((row, column), depth) in depth.indexed_iter_mut() {
+                let r = (column as f64 - press.at_px[0]).hypot(row as f64 - press.at_px[1]);
+                *depth += half_space(press, r);
+                if let Some(pair) = less.get(r as usize..r as usize + 2) {
+                    *depth += pair[0] + (r - r.floor()) * (pair[1] - pair[0]);
+                }
+            }
+        }
+        depth
+    }
+
+    /// What the layer takes off a half-space's displacement at a distance.
+    ///
+    /// With the transform 2π p₀ a² (sin ka − ka cos ka)/(ka)³ of the pressure the displacement is
+    /// ∫ p̄ L J₀(kr) dk/πE*. L − 1 falls off as e^(−2kh).
+    fn less(&self, press: &HertzPress, r: f64) -> f64 {
+        let (a, h) = (press.contact_px, self.thickness_px);
+        let kappa = 3.0 - 4.0 * self.poisson_ratio;
+        let integrand = |k: f64| {
+            let (s, x) = (k * h, k * a);
+            let transform = match x < 1e-2 {
+                true => 1.0 / 3.0 - x * x / 30.0,
+                false => (x.sin() - x * x.cos()) / x.powi(3),
+            };
+            let (sinh, cosh) = ((2.0 * s).sinh(), (2.0 * s).cosh());
+            let yields = (2.0 * kappa * sinh - 4.0 * s)
+                / (2.0 * kappa * cosh + 4.0 * s * s + 1.0 + kappa * kappa);
+            transform * (yields - 1.0) * bessel_j0(k * r)
+        };
+        // Simpson's rule with steps that follow the fastest wave over the frame.
+        let last = 12.0 / h;
+        let steps = 2 * (200 + (last * (r + a) * 2.0) as usize);
+        let step = last / steps as f64;
+        let weight = |i: usize| match i {
+            0 => 1.0,
+            i if i == steps => 1.0,
+            i if i.is_multiple_of(2) => 2.0,
+            _ => 4.0,
+        };
+        let sum: f64 = (0..=steps)
+            .map(|i| weight(i) * integrand(i as f64 * step))
+            .sum();
+        press.pressure * a * a * sum * step / 3.0
+    }
+}
+
+/// Displacement of a half-space: d − r²/2R inside with d = π a f/4 (Johnson, Contact Mechanics,
+/// section 3.4), and its continuation outside.
+fn half_space(press: &HertzPress, r: f64) -> f64 {
+    use core::f64::consts::PI;
+    let a = press.contact_px;
+    let depth = 0.25 * PI * a * press.pressure;
+    let rho = r / a;
+    match rho <= 1.0 {
+        true => depth * (1.0 - 0.5 * rho * rho),
+        false => {
+            let root = (rho * rho - 1.0).sqrt();
+            depth / PI * ((2.0 - rho * rho) * (1.0 / rho).asin() + root)
+        }
+    }
+}
+
+/// Bessel's function J₀ to 1e−7 (Abramowitz & Stegun, 9.4.1 and 9.4.3).
+fn bessel_j0(x: f64) -> f64 {
+    let x = x.abs();
+    let series =
+        |coefficients: &[f64], t: f64| coefficients.iter().rev().fold(0.0, |sum, c| sum * t + c);
+    if x <= 3.0 {
+        const NEAR: [f64; 7] = [
+            1.0,
+            -2.249_999_7,
+            1.265_620_8,
+            -0.316_386_6,
+            0.044_447_9,
+            -0.003_944_4,
+            0.000_21,
+        ];
+        return series(&NEAR, (x / 3.0).powi(2));
+    }
+    const HEIGHT: [f64; 7] = [
+        0.797_884_56,
+        -0.000_000_77,
+        -0.005_527_4,
+        -0.000_095_12,
+        0.001_372_37,
+        -0.000_728_05,
+        0.000_144_76,
+    ];
+    const PHASE: [f64; 7] = [
+        -0.785_398_16,
+        -0.041_663_97,
+        -0.000_039_54,
+        0.002_625_73,
+        -0.000_541_25,
+        -0.000_293_33,
+        0.000_135_58,
+    ];
+    let t = 3.0 / x;
+    series(&HEIGHT, t) / x.sqrt() * (x + series(&PHASE, t)).cos()
 }

@@ -1,0 +1,209 @@
+//! What the light itself says about the pressed ball: its size, and whether the face is a sphere or
+//! a paraboloid.
+//!
+//! Of a matt face far from shadows the level of a channel is linear in the unit normal, whose third
+//! component follows from the other two: 1 − n_z grows as (s r)²/2 + (s r)⁴/8 for a sphere, if s is
+//! the factor by which the ball is smaller than stated. The ratio of both terms gives s. A frame
+//! that was drawn from Hertz's law is a paraboloid. Real gels are not quite matt, so that the
+//! evidence counts only where the linear law leaves little.
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::gradients::Blurred;
+
+/// The shape of a face over a ball.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[non_exhaustive]
+pub enum BallFace {
+    /// The ball's own: slopes r/√(R² − r²).
+    Sphere,
+    /// That of Hertz's law: slopes r/R.
+    Paraboloid,
+}
+
+impl BallFace {
+    /// Components n_x and n_y of the unit normal at a place in radii of the ball.
+    pub fn normal(self, [x, y]: [f64; 2]) -> [f64; 2] {
+        match self {
+            Self::Sphere => [x, y],
+            Self::Paraboloid => [x, y].map(|v| v / (1.0 + x * x + y * y).sqrt()),
+        }
+    }
+
+    /// The place in radii of the ball whose face has these slopes of depth.
+    pub fn place(self, [p, q]: [f64; 2]) -> [f64; 2] {
+        let length = match self {
+            Self::Sphere => (1.0 + p * p + q * q).sqrt(),
+            Self::Paraboloid => 1.0,
+        };
+        [-p / length, -q / length]
+    }
+
+    /// Depth below a rim of radius `rim` at a distance, in radii of the ball.
+    pub fn depth(self, distance: f64, rim: f64) -> f64 {
+        let up = |r: f64| match self {
+            Self::Sphere => (1.0 - r * r).max(0.0).sqrt(),
+            Self::Paraboloid => 1.0 - 0.5 * r * r,
+        };
+        up(distance) - up(rim)
+    }
+}
+
+/// Factors by which the ball could be smaller than stated.
+const FACTORS: [f64; 11] = [0.4, 0.5, 0.63, 0.8, 0.9, 1.0, 1.1, 1.25, 1.6, 2.0, 2.5];
+/// Terms: three components of the normal less that of the flat face, times 1, x and y.
+const TERMS: usize = 9;
+/// The linear law holds if it leaves less than this multiple of the noise's variance.
+const LINEAR: f64 = 2.0;
+/// Another shape or size must leave this much less than the stated one.
+const EVIDENCE: f64 = 1.15;
+/// Factors within this of 1 are no doubt: light is not that linear.
+const SURE: [f64; 2] = [0.75, 1.3];
+
+/// Sums for one shape and factor.
+struct Fit {
+    face: BallFace,
+    factor: f64,
+    square: DMatrix<f64>,
+    right: [DVector<f64>; 3],
+}
+
+/// Evidence over the presses of a calibration.
+pub struct Evidence {
+    fits: Vec<Fit>,
+    levels: f64,
+    count: f64,
+    /// Squares of second differences of levels, for the noise.
+    rough: Vec<f32>,
+}
+
+/// The face of the balls, and a doubtful size: the factor by which they are smaller than stated.
+pub struct Verdict {
+    pub face: BallFace,
+    pub factor: Option<f64>,
+}
+
+impl Evidence {
+    pub fn new() -> Self {
+        let faces = [BallFace::Sphere, BallFace::Paraboloid];
+        let each = faces
+            .iter()
+            .flat_map(|face| FACTORS.map(|factor| (*face, factor)));
+        let fit = |(face, factor)| Fit {
+            face,
+            factor,
+            square: DMatrix::zeros(TERMS, TERMS),
+            right: core::array::from_fn(|_| DVector::zeros(TERMS)),
+        };
+        Self {
+            fits: each.map(fit).collect(),
+            levels: 0.0,
+            count: 0.0,
+            rough: Vec::new(),
+        }
+    }
+
+    /// Adds the press in a circle, lengths in pixels.
+    pub fn add(&mut self, frame: &Blurred, reference: &Blurred, circle: [f64; 3], ball_px: f64) {
+        let [x0, y0, radius] = circle;
+        let reach = 0.85 * radius.min(0.97 * ball_px);
+        let (rows, columns) = frame.dim();
+        let difference = |row: usize, column: usize| {
+            let [a, b] = [frame, reference].map(|image| image.levels(row, column));
+            [0, 1, 2].map(|k| f64::from(a[k] - b[k]))
+        };
+        let within = |v: f64, n: usize| (v.max(0.0) as usize).min(n);
+        let down = within(y0 - reach, rows)..within(y0 + reach + 1.0, rows);
+        for row in down {
+            let across = within(x0 - reach, columns)..within(x0 + reach + 1.0, columns);
+            for column in across {
+                let [x, y] = [column as f64 - x0, row as f64 - y0];
+                if x * x + y * y >= reach * reach || !(column + 2 * row).is_multiple_of(5) {
+                    continue;
+                }
+                let level = difference(row, column);
+                // Neighbours at this distance share no noise.
+                if column >= 5 && column + 5 < columns {
+                    let beside = [difference(row, column - 5), difference(row, column + 5)];
+                    let bend = |k: usize| beside[0][k] + beside[1][k] - 2.0 * level[k];
+                    self.rough.extend([0, 1, 2].map(|k| bend(k).abs() as f32));
+                }
+                self.levels += level.iter().map(|v| v * v).sum::<f64>();
+                self.count += 3.0;
+                let place = [
+                    1.0,
+                    2.0 * column as f64 / columns as f64 - 1.0,
+                    2.0 * row as f64 / rows as f64 - 1.0,
+                ];
+                for fit in &mut self.fits {
+                    fit.add([x / ball_px, y / ball_px], place, level);
+                }
+            }
+        }
+    }
+
+    pub fn verdict(mut self) -> Verdict {
+        let stated = Verdict {
+            face: BallFace::Sphere,
+            factor: None,
+        };
+        // Second differences of noise have six times its variance, and a face bends little.
+        let noise = f64::from(crate::contacts::quantile(&mut self.rough, 0.5)) * 1.4826;
+        let noise = (noise * noise / 6.0).max(0.01);
+        let left = |fit: &Fit| fit.left(self.levels).map(|left| left / self.count);
+        let all: Vec<(BallFace, f64, f64)> = self
+            .fits
+            .iter()
+            .filter_map(|fit| Some((fit.face, fit.factor, left(fit)?)))
+            .collect();
+        let least = |wanted: &dyn Fn(&(BallFace, f64, f64)) -> bool| {
+            let all = all.iter().copied().filter(|fit| wanted(fit));
+            all.min_by(|a, b| a.2.total_cmp(&b.2))
+        };
+        let (Some(best), Some(sphere)) = (
+            least(&|_| true),
+            least(&|fit| fit.0 == BallFace::Sphere && fit.1 == 1.0),
+        ) else {
+            return stated;
+        };
+        if best.2 > LINEAR * noise {
+            return stated;
+        }
+        let as_stated = least(&|fit| fit.1 == 1.0).unwrap_or(sphere);
+        let beyond = best.1 < SURE[0] || best.1 > SURE[1];
+        Verdict {
+            face: match sphere.2 > EVIDENCE * as_stated.2 {
+                true => as_stated.0,
+                false => BallFace::Sphere,
+            },
+            factor: (beyond && as_stated.2 > EVIDENCE * best.2).then_some(best.1),
+        }
+    }
+}
+
+impl Fit {
+    fn add(&mut self, [x, y]: [f64; 2], place: [f64; 3], level: [f64; 3]) {
+        let at = [self.factor * x, self.factor * y];
+        let [nx, ny] = self.face.normal(at);
+        let up = 1.0 - nx * nx - ny * ny;
+        // A ball of this size does not reach as far: the fit is worse for it.
+        let components = [nx, ny, up.max(0.0).sqrt() - 1.0];
+        let terms: [f64; TERMS] = core::array::from_fn(|k| components[k % 3] * place[k / 3]);
+        for (i, a) in terms.iter().enumerate() {
+            for (j, b) in terms.iter().enumerate() {
+                self.square[(i, j)] += a * b;
+            }
+            for (right, level) in self.right.iter_mut().zip(level) {
+                right[i] += a * level;
+            }
+        }
+    }
+
+    /// Sum of squares that the linear law leaves of those of the levels.
+    fn left(&self, levels: f64) -> Option<f64> {
+        let factor = self.square.clone().cholesky()?;
+        let explained: f64 = self.right.iter().map(|r| r.dot(&factor.solve(r))).sum();
+        Some((levels - explained).max(0.0))
+    }
+}

@@ -1,0 +1,371 @@
+//! The face of the gel: gradients integrated over the frame, its rest far away, and the contacts.
+
+use ndarray::{Array2, Axis};
+use tactile_core::Estimate;
+use tactile_sfs::{CosinePoisson, Domain, SlopeIntegrator};
+
+use crate::GelError;
+use crate::contacts::{Patch, block_means, quantile};
+use crate::frame_check::FrameDoubt;
+use crate::plane::Plane;
+use crate::sensor::GelModel;
+
+/// Cells of the coarse grid along the longer side of a frame.
+const COARSE: usize = 40;
+/// Standard error of the rest far away, as a share of a half-space's tail at the border: if the
+/// border follows that tail, and if it does not. A layer's falls off sooner, and turns its sign.
+const TAIL_ERRORS: [f64; 2] = [0.15, 0.55];
+/// The border follows the tail if it leaves less than this share of the border's variance.
+const FOLLOWS: f64 = 0.7;
+/// Variance in square pixels of the blur of the frames, which takes half of it times the face's
+/// Laplacian off its depth.
+const BLUR: f64 = 1.0;
+/// Error of the rest in pixels: the noise of the slopes adds up over the frame.
+const REST_NOISE: f64 = 0.03;
+/// Error of an integrated depth in pixels times slope, of noise that the calibration's scale does
+/// not hold.
+const DEPTH_NOISE: f64 = 0.01;
+/// Slopes whose curl exceeds this share of their divergence, root mean square, are of no surface.
+const CURL: f32 = 0.6;
+/// A face whose strong cells push outwards by this share of their weight is not pressed in.
+const OUTWARDS: f32 = -0.3;
+
+/// What one frame shows.
+///
+/// Gradients are those of the gel's surface, inside the contact and around it: ∂z/∂x and ∂z/∂y
+/// with z the depth in metres, x the column, y the row.
+#[derive(Clone, Debug)]
+#[non_exhaustive]
+pub struct GelFrame {
+    /// Gradients along x and y.
+    pub gradient: [Array2<f32>; 2],
+    /// Standard errors of the gradients.
+    pub gradient_error: [Array2<f32>; 2],
+    /// How far the face has moved into the gel, in metres, at every pixel. It is zero far away.
+    pub depth_m: Array2<f64>,
+    /// Standard error of the depth of a pixel, and that of the rest that all count from, in metres.
+    pub depth_standard_error_m: [f64; 2],
+    /// Relative standard error of all slopes together.
+    pub slope_standard_error: f64,
+    /// The contact of each pixel, counted from 1 in the order of [`contacts`](Self::contacts). 0
+    /// where nothing touches.
+    pub labels: Array2<u16>,
+    /// Contacts, that of the highest pressure first.
+    pub contacts: Vec<GelContact>,
+    /// Why the frame may not be this sensor's.
+    pub doubts: Vec<FrameDoubt>,
+}
+
+/// A place where something touches.
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[non_exhaustive]
+pub struct GelContact {
+    /// Column and row of the centroid.
+    pub centroid_px: [Estimate; 2],
+    /// Area in square metres.
+    pub area_m2: Estimate,
+    /// Greatest depth in metres below the contact's own rim.
+    pub depth_m: Estimate,
+    /// Greatest depth in metres below the gel far away.
+    pub depth_below_far_m: Estimate,
+    /// Column and row of the greatest depth.
+    pub deepest_px: [usize; 2],
+    /// Columns and rows of the outline, in order around the contact.
+    #[cfg_attr(feature = "serde", serde(skip))]
+    pub outline_px: Vec<[usize; 2]>,
+    /// Whether the contact reaches the frame's border.
+    pub touches_border: bool,
+}
+
+impl GelFrame {
+    /// A frame that is not this sensor's.
+    pub(crate) fn refused(shape: (usize, usize), doubts: Vec<FrameDoubt>) -> Self {
+        let none = || Array2::from_elem(shape, f32::NAN);
+        Self {
+            gradient: [none(), none()],
+            gradient_error: [none(), none()],
+            depth_m: Array2::from_elem(shape, f64::NAN),
+            depth_standard_error_m: [f64::NAN; 2],
+            slope_standard_error: f64::NAN,
+            labels: Array2::zeros(shape),
+            contacts: Vec::new(),
+            doubts,
+        }
+    }
+
+    /// Whether nothing was read because the frame is not this sensor's.
+    pub fn is_refused(&self) -> bool {
+        self.doubts.iter().any(FrameDoubt::refuses)
+    }
+}
+
+/// The face and the contacts of slopes.
+pub fn frame(
+    model: &GelModel,
+    gradient: [Array2<f32>; 2],
+    gradient_error: [Array2<f32>; 2],
+    pressure: &Array2<f32>,
+    patches: Vec<Patch>,
+    doubts: Vec<FrameDoubt>,
+) -> Result<GelFrame, GelError> {
+    let shape = gradient[0].dim();
+    let size = model.pixel_size_m;
+    let domain = Domain::new([size; 2])?;
+    let [p, q] = gradient.each_ref().map(|g| g.mapv(f64::from));
+    let mut depth = CosinePoisson
+        .integrate(p.view(), q.view(), &domain)?
+        .heights;
+    let mut labels = Array2::zeros(shape);
+    for (k, patch) in patches.iter().enumerate() {
+        for at in &patch.pixels {
+            labels[*at] = k as u16 + 1;
+        }
+    }
+    let (rest, rest_error) = rest(&depth, &labels, pressure, size);
+    depth -= rest;
+    let contacts = patches.iter().map(|patch| {
+        let face = Face {
+            model,
+            depth: &depth,
+            gradient: &gradient,
+            rest_error,
+        };
+        face.contact(patch)
+    });
+    let contacts = contacts.collect();
+    Ok(GelFrame {
+        contacts,
+        gradient,
+        gradient_error,
+        depth_m: depth,
+        depth_standard_error_m: [model.depth_standard_error_m, rest_error],
+        slope_standard_error: model.slope_standard_error,
+        labels,
+        doubts,
+    })
+}
+
+struct Face<'a> {
+    model: &'a GelModel,
+    depth: &'a Array2<f64>,
+    gradient: &'a [Array2<f32>; 2],
+    rest_error: f64,
+}
+
+impl Face<'_> {
+    /// What the blur of the frames takes off the depth at a place: by the slopes' divergence over
+    /// 5 × 5 pixels.
+    fn blurred_off(&self, [row, column]: [usize; 2]) -> f64 {
+        let (rows, columns) = self.depth.dim();
+        if row < 2 || column < 2 || row + 2 >= rows || column + 2 >= columns {
+            return 0.0;
+        }
+        let [p, q] = self.gradient;
+        let along = (0..5).map(|k| {
+            let (r, c) = (row + k - 2, column + k - 2);
+            f64::from(p[[r, column + 2]] - p[[r, column - 2]] + q[[row + 2, c]] - q[[row - 2, c]])
+        });
+        // Differences over four pixels, in five lines.
+        let divergence = along.sum::<f64>() / 20.0;
+        -0.5 * BLUR * divergence.min(0.0) * self.model.pixel_size_m
+    }
+
+    fn contact(&self, patch: &Patch) -> GelContact {
+        let (rows, columns) = self.depth.dim();
+        let size = self.model.pixel_size_m;
+        let n = patch.pixels.len() as f64;
+        let mean = |axis: usize| patch.pixels.iter().map(|at| at[axis] as f64).sum::<f64>() / n;
+        // An outline that is off by an error of its own in each of some ten directions.
+        let centroid_error = 0.3 * patch.edge_error;
+        let rim = patch
+            .rim
+            .iter()
+            .filter(|at| at[0] < rows && at[1] < columns);
+        let (sums, count) = rim.fold(([0.0; 2], 0.0_f64), |(sums, count), at| {
+            let [p, q] = self.gradient.each_ref().map(|g| f64::from(g[*at]));
+            (
+                [sums[0] + self.depth[*at], sums[1] + p.hypot(q)],
+                count + 1.0,
+            )
+        });
+        let [rim, slope] = sums.map(|sum| sum / count.max(1.0));
+        let deepest = patch
+            .pixels
+            .iter()
+            .max_by(|a, b| self.depth[**a].total_cmp(&self.depth[**b]));
+        let deepest = deepest.copied().unwrap_or_default();
+        let below_far = self.depth[deepest] + self.blurred_off(deepest);
+        let below_rim = (below_far - rim).max(0.0);
+        let scale = self.model.slope_standard_error;
+        let noise = DEPTH_NOISE * size * slope.max(0.1);
+        let own = (scale * below_rim)
+            .hypot(slope * patch.edge_error * size)
+            .hypot(noise);
+        let far = (scale * below_far).hypot(self.rest_error).hypot(noise);
+        let relative = 2.0 * patch.edge_error / patch.radius.max(1.0);
+        let edge =
+            |at: &[usize; 2]| at[0] == 0 || at[1] == 0 || at[0] + 1 == rows || at[1] + 1 == columns;
+        GelContact {
+            centroid_px: [mean(1), mean(0)].map(|v| Estimate::new(v, centroid_error)),
+            area_m2: Estimate::new(patch.area, relative * patch.area) * (size * size),
+            depth_m: Estimate::new(below_rim, own),
+            depth_below_far_m: Estimate::new(below_far, far),
+            deepest_px: [deepest[1], deepest[0]],
+            outline_px: outline(&patch.pixels),
+            touches_border: patch.pixels.iter().any(edge),
+        }
+    }
+}
+
+/// The level that the face has far away, and its standard error, in metres.
+///
+/// Along the border the face is not at rest: on a half-space it falls off as f dA/2πr around every
+/// contact, on a layer sooner. Whether the border shows that tail decides whether it is counted.
+fn rest(
+    depth: &Array2<f64>,
+    labels: &Array2<u16>,
+    pressure: &Array2<f32>,
+    size: f64,
+) -> (f64, f64) {
+    let (rows, columns) = depth.dim();
+    // Pressure of the contacts in blocks, with their places.
+    let mut sources: Vec<[f64; 3]> = Vec::new();
+    let block = rows.max(columns).div_ceil(2 * COARSE).max(1);
+    for top in (0..pressure.nrows()).step_by(block) {
+        for left in (0..pressure.ncols()).step_by(block) {
+            let mut sums = [0.0; 3];
+            for r in top..(top + block).min(pressure.nrows()) {
+                for c in left..(left + block).min(pressure.ncols()) {
+                    if labels[[2 * r, 2 * c]] > 0 {
+                        let f = f64::from(pressure[[r, c]].max(0.0));
+                        let more = [f, f * 2.0 * c as f64, f * 2.0 * r as f64];
+                        sums.iter_mut().zip(more).for_each(|(s, v)| *s += v);
+                    }
+                }
+            }
+            if sums[0] > 0.0 {
+                sources.push([4.0 * sums[0], sums[1] / sums[0], sums[2] / sums[0]]);
+            }
+        }
+    }
+    let tail = |row: f64, column: f64| {
+        let part = |[f, x, y]: &[f64; 3]| f / (column - x).hypot(row - y).max(1.0);
+        size * sources.iter().map(part).sum::<f64>() / core::f64::consts::TAU
+    };
+    // The border in some 150 places, in two rings.
+    let step = ((rows + columns) / 40).max(1);
+    let inset = (rows.min(columns) / 24).max(1);
+    let mut pairs: Vec<[f64; 2]> = Vec::new();
+    for ring in [0, inset] {
+        let (bottom, right) = (
+            rows.saturating_sub(ring + 1),
+            columns.saturating_sub(ring + 1),
+        );
+        let across = (ring..=right)
+            .step_by(step)
+            .flat_map(|c| [(ring, c), (bottom, c)]);
+        let down = (ring..=bottom)
+            .step_by(step)
+            .flat_map(|r| [(r, ring), (r, right)]);
+        for at in across.chain(down).filter(|at| labels.get(*at) == Some(&0)) {
+            pairs.push([tail(at.0 as f64, at.1 as f64), depth[at]]);
+        }
+    }
+    let n = pairs.len() as f64;
+    if pairs.is_empty() {
+        return (depth.iter().sum::<f64>() / depth.len() as f64, 0.0);
+    }
+    let [x, y] = [0, 1].map(|k: usize| pairs.iter().map(|pair| pair[k]).sum::<f64>() / n);
+    let left = |share: f64| {
+        let away = |pair: &[f64; 2]| (pair[1] - y - share * (pair[0] - x)).powi(2);
+        pairs.iter().map(away).sum::<f64>()
+    };
+    let follows = x > 0.0 && left(1.0) < FOLLOWS * left(0.0);
+    let (share, tail_error) = match follows {
+        true => (1.0, TAIL_ERRORS[0]),
+        false => (0.0, TAIL_ERRORS[1]),
+    };
+    let mut levels: Vec<f32> = pairs.iter().map(|[t, z]| (z - share * t) as f32).collect();
+    // The median is not moved by a contact that reaches the border, as a mean would be.
+    let rest = f64::from(quantile(&mut levels, 0.5));
+    let mut away: Vec<f32> = levels.iter().map(|z| (z - rest as f32).abs()).collect();
+    let noise = 1.4826 * f64::from(quantile(&mut away, 0.5));
+    // The border's places share most of their error.
+    let noise = (REST_NOISE * size).hypot(0.3 * noise);
+    (rest, (tail_error * x).hypot(noise))
+}
+
+/// Whether slopes are of no face that is pressed in: their curl is as large as their divergence, or
+/// the face comes out of the gel.
+pub fn no_surface(p: &Array2<f32>, q: &Array2<f32>, noise_floor: f32) -> bool {
+    let size = p.nrows().max(p.ncols()).div_ceil(COARSE).max(2);
+    let [p, q] = [p, q].map(|slope| block_means(slope.view(), size));
+    if p.nrows() < 6 || p.ncols() < 6 {
+        return false;
+    }
+    let plane = Plane::new(p.dim(), 0.2, None);
+    // Slopes end with the frame, which its outermost cells show.
+    let inner = |field: &Array2<f32>| {
+        let (rows, columns) = field.dim();
+        let field = field.slice_axis(Axis(0), (1..rows - 1).into());
+        field
+            .slice_axis(Axis(1), (1..columns - 1).into())
+            .to_owned()
+    };
+    let root = |field: &Array2<f32>| {
+        (field.iter().map(|v| v * v).sum::<f32>() / field.len() as f32).sqrt()
+    };
+    let pressure = inner(&plane.pressure(p.view(), q.view()));
+    let curl = inner(&plane.curl(p.view(), q.view()));
+    let (strength, turning) = (root(&pressure), root(&curl));
+    let largest = pressure.iter().fold(0.0_f32, |m, f| m.max(f.abs()));
+    // Noise has as much curl as divergence, and no cell far above the others.
+    if largest < 60.0 * noise_floor || largest < 4.0 * strength.min(turning) {
+        return false;
+    }
+    let square: f32 = pressure.iter().map(|f| f * f).sum();
+    let signed: f32 = pressure.iter().map(|f| f * f.abs()).sum();
+    turning > CURL * strength || signed < OUTWARDS * square
+}
+
+/// Pixels of a patch that have a neighbour outside, around it in order, as column and row.
+fn outline(pixels: &[[usize; 2]]) -> Vec<[usize; 2]> {
+    let Some(&start) = pixels.first() else {
+        return Vec::new();
+    };
+    let inside = |r: i64, c: i64| {
+        r >= 0 && c >= 0 && pixels.binary_search(&[r as usize, c as usize]).is_ok()
+    };
+    // Eight directions, clockwise from the left.
+    const AROUND: [(i64, i64); 8] = [
+        (0, -1),
+        (-1, -1),
+        (-1, 0),
+        (-1, 1),
+        (0, 1),
+        (1, 1),
+        (1, 0),
+        (1, -1),
+    ];
+    let (mut at, mut from) = ((start[0] as i64, start[1] as i64), 0);
+    let mut line = vec![[start[1], start[0]]];
+    // Moore's tracing: the next pixel clockwise from where the last came.
+    for _ in 0..4 * pixels.len() {
+        let next = (1..=8).map(|k| (from + k) % 8).find(|k| {
+            let (r, c) = AROUND[*k];
+            inside(at.0 + r, at.1 + c)
+        });
+        let Some(k) = next else {
+            break;
+        };
+        at = (at.0 + AROUND[k].0, at.1 + AROUND[k].1);
+        from = (k + 4) % 8;
+        let place = [at.1 as usize, at.0 as usize];
+        if place == line[0] {
+            break;
+        }
+        line.push(place);
+    }
+    line
+}

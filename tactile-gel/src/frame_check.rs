@@ -1,0 +1,313 @@
+//! Is a frame one of this sensor's? Its border against the reference's.
+//!
+//! The border is compared in blocks of pixels: a contact covers some of them, and medians bear it.
+//! Levels of a channel change with exposure and white balance, the pattern of the light does not.
+//! Where the pattern is another, the same frame with exchanged channels, turned or mirrored is
+//! compared too, and what fits is named.
+
+use ndarray::Array3;
+
+use crate::gradients::Blurred;
+
+/// Side in pixels of the blocks, at the least.
+const LEAST_BLOCK: usize = 4;
+/// Blocks along the longer side of a frame.
+const BLOCKS: usize = 32;
+/// Exposures beyond these shares of the reference's are outside of what a calibration covers: its
+/// polynomial is for differences of some levels, and clipping begins.
+const EXPOSURES: [f64; 2] = [0.8, 1.25];
+/// Channels whose ratios differ by more from their median have another white balance. A large contact
+/// tints the border of real frames by up to 0.12.
+const BALANCE: f64 = 0.13;
+/// Median difference of the border from the reference, as a share of its level, beyond which the
+/// light is another. Frames of one sensor have some 0.005, those of two units 0.05 and more.
+const PATTERN: f64 = 0.03;
+/// A transformed frame is named if it fits by less than this share of the misfit as it came.
+const FITS_BETTER: f64 = 0.45;
+/// Below this level a frame is black, above 255 less it is white.
+const DARK: f64 = 6.0;
+/// A frame whose neighbouring pixels differ by this many times as much as the reference's is noise.
+const NOISY: f64 = 12.0;
+
+/// How a frame was turned or mirrored.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[non_exhaustive]
+pub enum Turn {
+    /// By half a turn.
+    Half,
+    /// Left and right are exchanged.
+    LeftRight,
+    /// Top and bottom are exchanged.
+    TopBottom,
+    /// Rows and columns are exchanged, or a quarter turn.
+    Quarter,
+}
+
+/// Why a frame is not, or may not be, this sensor's as it was calibrated.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[non_exhaustive]
+pub enum FrameDoubt {
+    /// Nearly all of the frame is black.
+    Black,
+    /// Nearly all of the frame is white.
+    White,
+    /// Neighbouring pixels have nothing in common.
+    Noise,
+    /// The exposure is this many times the reference's.
+    Exposure(f64),
+    /// The channels are these many times as bright, beside a common factor.
+    Balance([f64; 3]),
+    /// Channels are exchanged: the frame's channels, 0 to 2, that red, green and blue are found in.
+    ChannelsExchanged([usize; 3]),
+    /// The frame is turned or mirrored.
+    Turned(Turn),
+    /// The light has another pattern: another unit, a lamp or the gel has changed. The median
+    /// difference along the border as a share of the reference's level.
+    AnotherPattern(f64),
+    /// The slopes belong to no face that is pressed in.
+    NoSurface,
+}
+
+impl FrameDoubt {
+    /// Whether nothing can be read from the frame.
+    pub fn refuses(&self) -> bool {
+        !matches!(self, Self::Exposure(_) | Self::Balance(_) | Self::NoSurface)
+    }
+
+    /// A word that programs recognise it by.
+    pub fn kind(&self) -> &'static str {
+        match self {
+            Self::Black => "black_frame",
+            Self::White => "white_frame",
+            Self::Noise => "noise_frame",
+            Self::Exposure(_) => "other_exposure",
+            Self::Balance(_) => "other_white_balance",
+            Self::ChannelsExchanged(_) => "channels_exchanged",
+            Self::Turned(_) => "frame_turned",
+            Self::AnotherPattern(_) => "another_unit",
+            Self::NoSurface => "no_surface",
+        }
+    }
+}
+
+impl core::fmt::Display for FrameDoubt {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::Black => write!(f, "the frame is black"),
+            Self::White => write!(f, "the frame is white: all of it is saturated"),
+            Self::Noise => write!(
+                f,
+                "the frame is noise: neighbouring pixels have nothing in common"
+            ),
+            Self::Exposure(factor) => write!(
+                f,
+                "the frame is {factor:.2} times as bright as the reference: set the exposure of the \
+                 calibration, or calibrate again"
+            ),
+            Self::Balance([r, g, b]) => write!(
+                f,
+                "the white balance is not the reference's: red {r:.2}, green {g:.2} and blue {b:.2} \
+                 times its level"
+            ),
+            Self::ChannelsExchanged([2, 1, 0]) => write!(
+                f,
+                "red and blue look exchanged: OpenCV hands out blue, green, red"
+            ),
+            Self::ChannelsExchanged(order) => {
+                write!(
+                    f,
+                    "the channels look exchanged: red, green, blue are {order:?}"
+                )
+            }
+            Self::Turned(Turn::Half) => write!(f, "the frame looks turned by 180°"),
+            Self::Turned(Turn::LeftRight) => write!(f, "the frame looks mirrored left to right"),
+            Self::Turned(Turn::TopBottom) => write!(f, "the frame looks mirrored top to bottom"),
+            Self::Turned(Turn::Quarter) => write!(f, "the frame looks turned by 90°"),
+            Self::AnotherPattern(share) => write!(
+                f,
+                "the light's pattern differs from the reference's by {:.0} % along the border: taken \
+                 by another unit, or lamps or gel have changed",
+                100.0 * share
+            ),
+            Self::NoSurface => write!(
+                f,
+                "the colours belong to no face that is pressed in: exchanged channels, a turned or \
+                 mirrored frame, or other lamps"
+            ),
+        }
+    }
+}
+
+/// What the border shows: factors of the channels, and doubts.
+pub struct FrameLight {
+    /// Factor of the exposure, common to all channels.
+    pub gain: f64,
+    pub doubts: Vec<FrameDoubt>,
+}
+
+/// Block means of one image, and how much neighbouring pixels differ.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Blocks {
+    means: Array3<f32>,
+    roughness: f64,
+}
+
+impl Blocks {
+    pub fn of(image: &Blurred) -> Self {
+        let (rows, columns) = image.dim();
+        let size = rows.max(columns).div_ceil(BLOCKS).max(LEAST_BLOCK);
+        let size = size.min(rows).min(columns);
+        let (high, wide) = (rows / size, columns / size);
+        let mut means = Array3::zeros((high, wide, 3));
+        let mut rough = (0.0, 0.0);
+        for r in 0..high {
+            for c in 0..wide {
+                // Every other pixel of every other row is enough for a mean.
+                let mut sums = [0.0_f32; 4];
+                for row in (r * size..(r + 1) * size).step_by(2) {
+                    for column in (c * size..(c + 1) * size).step_by(2) {
+                        let level = image.levels(row, column);
+                        (0..3).for_each(|k| sums[k] += level[k]);
+                        sums[3] += 1.0;
+                        if column >= 3 {
+                            let before = image.levels(row, column - 3);
+                            let step: f32 = (0..3).map(|k| (level[k] - before[k]).abs()).sum();
+                            rough = (rough.0 + f64::from(step), rough.1 + 1.0);
+                        }
+                    }
+                }
+                (0..3).for_each(|k| means[[r, c, k]] = sums[k] / sums[3]);
+            }
+        }
+        Self {
+            means,
+            roughness: rough.0 / f64::max(rough.1, 1.0),
+        }
+    }
+
+    /// Levels of the blocks along the border, for channels in this order, of the image turned so.
+    fn border(&self, order: [usize; 3], turn: Option<Turn>) -> Option<Vec<[f64; 3]>> {
+        let (high, wide, _) = self.means.dim();
+        if turn == Some(Turn::Quarter) && high != wide {
+            return None;
+        }
+        let edge = |r: usize, c: usize| r == 0 || c == 0 || r + 1 == high || c + 1 == wide;
+        let places = (0..high).flat_map(|r| (0..wide).map(move |c| (r, c)));
+        let places = places.filter(|&(r, c)| edge(r, c));
+        let level = places.map(|(r, c)| {
+            let (r, c) = match turn {
+                None => (r, c),
+                Some(Turn::Half) => (high - 1 - r, wide - 1 - c),
+                Some(Turn::LeftRight) => (r, wide - 1 - c),
+                Some(Turn::TopBottom) => (high - 1 - r, c),
+                Some(Turn::Quarter) => (c, high - 1 - r),
+            };
+            order.map(|k| f64::from(self.means[[r, c, k]]))
+        });
+        Some(level.collect())
+    }
+
+    fn mean(&self) -> f64 {
+        self.means.iter().map(|v| f64::from(*v)).sum::<f64>() / self.means.len() as f64
+    }
+}
+
+/// Median of values, 0 without any.
+fn median(values: &mut [f64]) -> f64 {
+    let middle = values.len() / 2;
+    if values.is_empty() {
+        return 0.0;
+    }
+    *values.select_nth_unstable_by(middle, f64::total_cmp).1
+}
+
+/// Ratios of the channels between two borders, each a median.
+fn ratios(frame: &[[f64; 3]], reference: &[[f64; 3]]) -> [f64; 3] {
+    [0, 1, 2].map(|k| {
+        let pairs = frame.iter().zip(reference);
+        let mut each: Vec<f64> = pairs.map(|(f, r)| f[k] / r[k].max(1.0)).collect();
+        median(&mut each)
+    })
+}
+
+/// Median misfit of a border times `gains`, as a share of the reference's level.
+fn misfit(frame: &[[f64; 3]], reference: &[[f64; 3]], gains: [f64; 3]) -> f64 {
+    let pairs = frame.iter().zip(reference);
+    let each = pairs.map(|(f, r)| {
+        let away: f64 = (0..3).map(|k| (f[k] - gains[k] * r[k]).abs()).sum();
+        away / (0..3).map(|k| gains[k] * r[k]).sum::<f64>().max(1.0)
+    });
+    median(&mut each.collect::<Vec<f64>>())
+}
+
+const AS_THEY_CAME: [usize; 3] = [0, 1, 2];
+const ORDERS: [[usize; 3]; 5] = [[2, 1, 0], [1, 0, 2], [0, 2, 1], [1, 2, 0], [2, 0, 1]];
+const TURNS: [Turn; 4] = [Turn::Half, Turn::LeftRight, Turn::TopBottom, Turn::Quarter];
+
+/// Compares a frame with the reference.
+pub fn light(frame: &Blocks, reference: &Blocks) -> FrameLight {
+    let same = |doubts| FrameLight { gain: 1.0, doubts };
+    let mean = frame.mean();
+    if mean < DARK {
+        return same(vec![FrameDoubt::Black]);
+    }
+    if mean > 255.0 - DARK {
+        return same(vec![FrameDoubt::White]);
+    }
+    if frame.roughness > NOISY * reference.roughness.max(0.5) {
+        return same(vec![FrameDoubt::Noise]);
+    }
+    let border = |of: &Blocks, order, turn| of.border(order, turn);
+    let (Some(own), Some(flat)) = (
+        border(frame, AS_THEY_CAME, None),
+        border(reference, AS_THEY_CAME, None),
+    ) else {
+        return same(Vec::new());
+    };
+    let channels = ratios(&own, &flat);
+    let gain = median(&mut channels.to_vec());
+    // With a common factor: exchanged channels would hide in factors of their own.
+    let common = |frame: &[[f64; 3]]| {
+        let gain = median(&mut ratios(frame, &flat).to_vec());
+        misfit(frame, &flat, [gain; 3])
+    };
+    let plain = common(&own);
+    if plain > PATTERN {
+        let exchanged = ORDERS.iter().filter_map(|order| {
+            let found = common(&border(frame, *order, None)?);
+            Some((found, FrameDoubt::ChannelsExchanged(*order)))
+        });
+        let turned = TURNS.iter().filter_map(|turn| {
+            let found = common(&border(frame, AS_THEY_CAME, Some(*turn))?);
+            Some((found, FrameDoubt::Turned(*turn)))
+        });
+        let best = exchanged.chain(turned).min_by(|a, b| a.0.total_cmp(&b.0));
+        if let Some((found, doubt)) = best {
+            if found < FITS_BETTER * plain && found < 2.0 * PATTERN {
+                return same(vec![doubt]);
+            }
+        }
+    }
+    let mut doubts = Vec::new();
+    let own_factors = misfit(&own, &flat, channels);
+    if own_factors > PATTERN {
+        doubts.push(FrameDoubt::AnotherPattern(own_factors));
+    }
+    let balance = channels.map(|ratio| ratio / gain);
+    if balance.iter().any(|b| (b - 1.0).abs() > BALANCE) {
+        doubts.push(FrameDoubt::Balance(channels));
+    } else if !(EXPOSURES[0]..=EXPOSURES[1]).contains(&gain) {
+        doubts.push(FrameDoubt::Exposure(gain));
+    }
+    // Small steps of the channels that do not agree are contacts at the border or lamps, not the
+    // exposure.
+    let agree = channels
+        .iter()
+        .all(|ratio| (ratio - gain).abs() < 0.5 * (gain - 1.0).abs());
+    FrameLight {
+        gain: if agree && gain > 0.0 { gain } else { 1.0 },
+        doubts,
+    }
+}

@@ -1,0 +1,6 @@
+//! The tests of `tactile-gel`, in one program.
+
+mod measured;
+mod other_frames;
+mod sensors;
+mod worlds;
