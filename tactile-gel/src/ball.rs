@@ -31,15 +31,6 @@ impl BallFace {
         }
     }
 
-    /// The place in radii of the ball whose face has these slopes of depth.
-    pub fn place(self, [p, q]: [f64; 2]) -> [f64; 2] {
-        let length = match self {
-            Self::Sphere => (1.0 + p * p + q * q).sqrt(),
-            Self::Paraboloid => 1.0,
-        };
-        [-p / length, -q / length]
-    }
-
     /// Depth below a rim of radius `rim` at a distance, in radii of the ball.
     pub fn depth(self, distance: f64, rim: f64) -> f64 {
         let up = |r: f64| match self {

@@ -17,8 +17,6 @@ const RIM_PX: f64 = 1.5;
 /// Relative error of slopes that all presses of a calibration share, and their scatter cannot show:
 /// that of gels whose faces are known.
 const COMMON_ERROR: f64 = 0.012;
-/// Share of the contact's radius whose normals give its middle.
-const MIDDLE: f64 = 0.7;
 /// Fewer used presses leave much of the frame and of the slopes unseen.
 const ENOUGH_PRESSES: usize = 5;
 /// Median angle in degrees beyond which lamps, pixel size or circles are in doubt.
@@ -464,27 +462,13 @@ impl Press {
         [x / weight, y / weight, radius.min(0.8 * self.ball_px)]
     }
 
-    /// Middle and radius of equal area of the largest contact.
-    ///
-    /// The middle is where the ball's normals point to: the outline of a deep contact is less even.
-    fn found(&self, sensor: &GelSensor, face: BallFace) -> Option<[f64; 3]> {
-        let (patches, [p, q]) = sensor.patches(&self.frame);
+    /// Centroid and radius of equal area of the largest contact.
+    fn found(&self, sensor: &GelSensor) -> Option<[f64; 3]> {
+        let patches = sensor.patches(&self.frame);
         let largest = patches.iter().max_by(|a, b| a.area.total_cmp(&b.area))?;
         let n = largest.pixels.len() as f64;
         let mean = |axis: usize| largest.pixels.iter().map(|at| at[axis] as f64).sum::<f64>() / n;
-        let (x0, y0) = (mean(1), mean(0));
-        let (mut middle, mut count) = ([0.0; 2], 0.0);
-        for &at in &largest.pixels {
-            let [x, y] = [at[1] as f64, at[0] as f64];
-            if (x - x0).hypot(y - y0) < MIDDLE * largest.radius {
-                let place = face.place([p[at], q[at]].map(f64::from));
-                middle[0] += x - self.ball_px * place[0];
-                middle[1] += y - self.ball_px * place[1];
-                count += 1.0;
-            }
-        }
-        let [x, y] = middle.map(|sum| sum / count);
-        Some(self.within([x, y, largest.radius])).filter(|circle| circle[0].is_finite())
+        Some(self.within([mean(1), mean(0), largest.radius]))
     }
 }
 
@@ -524,7 +508,7 @@ fn find_circles(
         let sensor = blank.with_model(model);
         let found = presses
             .iter()
-            .map(|press| press.found(&sensor, face).filter(|_| press.own));
+            .map(|press| press.found(&sensor).filter(|_| press.own));
         let found: Vec<_> = found.collect();
         let moved = circles.iter().zip(&found).map(|pair| match pair {
             (Some(old), Some(new)) => (0..3).map(|k| (old[k] - new[k]).abs()).fold(0.0, f64::max),

@@ -258,10 +258,11 @@ impl Region<'_> {
         // Steiner: an outline moved outwards by `edge`.
         let perimeter = perimeter(core);
         let area = area + perimeter * edge + core::f64::consts::PI * edge * edge;
-        if !(area > 1.0) {
-            return None;
+        if area > 1.0 {
+            self.filled(&around, &distance, [4.0 * area, edge, error], taken)
+        } else {
+            None
         }
-        self.filled(&around, &distance, [4.0 * area, edge, error], taken)
     }
 
     /// The pixels nearest to the core, as many as the area has, and those at the edge.
@@ -328,13 +329,12 @@ impl Profile {
         let mut sums = vec![[0.0; 4]; bins];
         for (at, d) in distance.indexed_iter() {
             let bin = (f64::from(*d) + low).round();
-            if bin >= 0.0 && own(at) {
-                if let Some(sums) = sums.get_mut(bin as usize) {
-                    let more = [1.0, fields[0][at], fields[1][at], *d];
-                    sums.iter_mut()
-                        .zip(more)
-                        .for_each(|(s, v)| *s += f64::from(v));
-                }
+            let inside = bin >= 0.0 && own(at);
+            if let Some(sums) = sums.get_mut(bin.max(0.0) as usize).filter(|_| inside) {
+                let more = [1.0, fields[0][at], fields[1][at], *d];
+                sums.iter_mut()
+                    .zip(more)
+                    .for_each(|(s, v)| *s += f64::from(v));
             }
         }
         sums.retain(|sums| sums[0] > 0.0);
@@ -365,7 +365,7 @@ impl Profile {
         };
         let edge = best + shift;
         let (misfit, height) = fit(edge);
-        if !(height > 0.0) {
+        if height <= 0.0 || height.is_nan() {
             return None;
         }
         let bins = self.distance.len() as f64;
@@ -425,7 +425,7 @@ impl Profile {
         }
         let [n, m, p, mm, mp, pp] = sums;
         let (spread, product) = (mm - m * m / n, mp - m * p / n);
-        if !(spread > 0.0) {
+        if spread <= 0.0 || spread.is_nan() {
             return (f64::INFINITY, 0.0);
         }
         let height = product / spread;
@@ -438,14 +438,12 @@ impl Profile {
         let (at, top) = all().max_by(|a, b| a.1.total_cmp(b.1))?;
         let far = self.distance.get(at + 3);
         let fallen = (at + 1..self.slope.len()).find(|k| self.slope[*k] < 0.5 * top);
-        if let (Some(k), Some(far)) = (fallen, far) {
-            if self.distance[k] <= *far {
-                let [high, low] = [self.slope[k - 1], self.slope[k]];
-                let share = (high - 0.5 * top) / (high - low);
-                return Some(
-                    self.distance[k - 1] + share * (self.distance[k] - self.distance[k - 1]),
-                );
-            }
+        if let (Some(k), Some(far)) = (fallen, far)
+            && self.distance[k] <= *far
+        {
+            let [high, low] = [self.slope[k - 1], self.slope[k]];
+            let share = (high - 0.5 * top) / (high - low);
+            return Some(self.distance[k - 1] + share * (self.distance[k] - self.distance[k - 1]));
         }
         let beside = |k: usize| self.slope.get(k).copied();
         let shift = match (at.checked_sub(1).and_then(beside), beside(at + 1)) {

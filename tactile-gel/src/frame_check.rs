@@ -284,10 +284,11 @@ pub fn light(frame: &Blocks, reference: &Blocks) -> FrameLight {
             Some((found, FrameDoubt::Turned(*turn)))
         });
         let best = exchanged.chain(turned).min_by(|a, b| a.0.total_cmp(&b.0));
-        if let Some((found, doubt)) = best {
-            if found < FITS_BETTER * plain && found < 2.0 * PATTERN {
-                return same(vec![doubt]);
-            }
+        if let Some((found, doubt)) = best
+            && found < FITS_BETTER * plain
+            && found < 2.0 * PATTERN
+        {
+            return same(vec![doubt]);
         }
     }
     let mut doubts = Vec::new();

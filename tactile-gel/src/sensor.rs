@@ -200,8 +200,8 @@ impl GelSensor {
         face::frame(&self.model, [p, q], errors, &cells.pressure, found, doubts)
     }
 
-    /// The patches of contact of a frame, and its slopes.
-    pub(crate) fn patches(&self, frame: &Blurred) -> (Vec<Patch>, [Array2<f32>; 2]) {
+    /// The patches of contact of a frame.
+    pub(crate) fn patches(&self, frame: &Blurred) -> Vec<Patch> {
         let [mut p, mut q] = normals(frame, &self.reference, &self.model.coefficients);
         ndarray::Zip::from(&mut p).and(&mut q).for_each(|p, q| {
             let cut = STEEPEST / p.hypot(*q).max(STEEPEST);
@@ -209,8 +209,7 @@ impl GelSensor {
             let up = (1.0 - x * x - y * y).sqrt();
             (*p, *q) = (-x / up, -y / up);
         });
-        let found = patches(&self.cells([&p, &q]), p.dim(), self.noise_floor());
-        (found, [p, q])
+        patches(&self.cells([&p, &q]), p.dim(), self.noise_floor())
     }
 
     /// Pressure and slope on cells of 2 × 2 pixels.
