@@ -93,8 +93,8 @@ fn presses_left_out_have_their_ball() {
         }
         println!(
             "{left}: {:.2}° height {height:.4} radius {:.3} found {:.1?} contacts {} doubts {:?} {} {:.3}",
-            angles[left],
-            radii[left],
+            angles[angles.len() - 1],
+            radii[radii.len() - 1],
             frame.contacts.first().map(|c| (
                 c.centroid_px[0].value - x0,
                 c.centroid_px[1].value - y0,
