@@ -288,10 +288,13 @@ impl Pipeline {
     /// ```
     /// use tactile_simulate::Trial;
     /// let trial = Trial::coarser(8)?;
-    /// use tactile_imaging::elasticity::modulus::{EstimatorKind, PaperRatio};
-    /// let ratio = trial.pipeline()?.with_estimator(PaperRatio::default());
-    /// let modulus = trial.press(&ratio)?.modulus()?;
-    /// assert_eq!(modulus.estimator, EstimatorKind::PaperRatio);
+    /// use tactile_imaging::elasticity::modulus::HertzSphere;
+    /// let ball = trial.scene.options().object;
+    /// let hertz = HertzSphere::new(ball.radius_m, ball.material.poisson_ratio)?;
+    /// let by_name = trial.pipeline()?;
+    /// let given = by_name.clone().with_estimator(hertz);
+    /// // The guide is the pipeline's, as for the estimator of that name.
+    /// assert_eq!(trial.press(&given)?.modulus()?, trial.press(&by_name)?.modulus()?);
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     #[must_use]
