@@ -7,6 +7,12 @@ use tactile_files::scene::LoadedInclusion;
 use tactile_imaging::elasticity::ElasticityError;
 use tactile_imaging::inclusion::{InclusionSearch, Specimen};
 
+/// Places across a face: the limits change little from one to the next.
+const PLACES: f64 = 16.0;
+
+/// The depth whose map is drawn, the second: lumps are mostly a few millimetres deep.
+const SHOWN_DEPTH: usize = 1;
+
 /// The largest balls that searches miss, on a grid of places and depths.
 #[derive(Serialize)]
 pub struct Hidden {
@@ -39,9 +45,7 @@ impl Hidden {
         let axes_m: Vec<[f64; 2]> = presses.iter().map(|press| press.axis_m).collect();
         let cells = presses.iter().flat_map(|press| &press.positions_m);
         let reach_m = cells.map(|[x, y]| x.hypot(*y)).fold(0.0, f64::max);
-        // Places across a face: the limits change little from one to the next.
-        let places = 16.0;
-        let step = 2.0 * reach_m / places;
+        let step = 2.0 * reach_m / PLACES;
         let steps = (block.radius_m() / step).floor() as i32;
         let line = (-steps..=steps).map(|k| f64::from(k) * step);
         let positions_m: Vec<[f64; 2]> = (line.clone())
@@ -110,10 +114,11 @@ impl Hidden {
     /// From above at one depth, and in section.
     pub fn panels(&self) -> [Panel; 2] {
         let label = "hidden up to (mm)";
-        // The second depth: lumps are mostly a few millimetres deep.
-        let depth = 1;
-        let title = format!("Could hide, top {:.1} mm deep", 1e3 * self.depths_m[depth]);
-        let shown = self.shown(depth, |_| true);
+        let title = format!(
+            "Could hide, top {:.1} mm deep",
+            1e3 * self.depths_m[SHOWN_DEPTH]
+        );
+        let shown = self.shown(SHOWN_DEPTH, |_| true);
         let (places, diameters): (Vec<_>, Vec<_>) = shown.unzip();
         let mut above = Panel::new(title, "x (mm)", "y (mm)")
             .equal_aspect()

@@ -19,6 +19,9 @@ use tactile_simulate::{
     PressScene, PressTruth, Trial,
 };
 
+/// Share of a punch's radius beyond which its pressure is level: at the rim it has no bound.
+const LEVEL_FROM: f64 = 0.98;
+
 /// Repeat the experiments of the paper's section 5 on the simulated sensor
 ///
 /// Prints what the paper reports beside what the simulated sensor gives: the calibration with a
@@ -205,10 +208,9 @@ fn loop_percent(line: &LinearCalibration) -> f64 {
 fn punch(force_n: f64, radius_m: f64) -> ContactState {
     let radii: Vec<f64> = (0..=100).map(|k| 1e-2 * f64::from(k) * radius_m).collect();
     let rim = |share: f64| (1.0 - share * share).sqrt();
-    let level_from = 0.98;
     let mean_pa = force_n / (std::f64::consts::PI * radius_m * radius_m);
-    let scale_pa = 0.5 * mean_pa / (1.0 - 0.5 * rim(level_from));
-    let pressure = |r: &f64| scale_pa / rim((r / radius_m).min(level_from));
+    let scale_pa = 0.5 * mean_pa / (1.0 - 0.5 * rim(LEVEL_FROM));
+    let pressure = |r: &f64| scale_pa / rim((r / radius_m).min(LEVEL_FROM));
     // The outermost layer of the guide, incompressible.
     let indentation_m = force_n * 0.75 / (2.0 * radius_m * 136e3);
     ContactState {

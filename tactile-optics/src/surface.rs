@@ -361,17 +361,25 @@ pub(crate) fn contact_gap(thickness: f64) -> f64 {
 mod tests {
     use super::*;
 
+    /// Step of the differences.
+    const H: f64 = 1e-6;
+
+    /// Steps of a scan.
+    const STEPS: i32 = 20_000;
+
+    /// Of a crossing's place.
+    const TOLERANCE: f64 = 1e-9;
+
     #[test]
     fn gradients_are_the_heights_differences_and_the_steepest_slope_bounds_them() {
         let dimple = Dimple::new([0.5, 0.1], 0.4, 0.2).unwrap();
-        let h = 1e-6;
         for i in 0..50 {
             for j in 0..50 {
                 let (x, y) = (0.02 * f64::from(i), 0.02 * f64::from(j) - 0.4);
                 let [gx, gy] = dimple.gradient(x, y);
-                let dx = (dimple.height(x + h, y) - dimple.height(x - h, y)) / (2.0 * h);
-                let dy = (dimple.height(x, y + h) - dimple.height(x, y - h)) / (2.0 * h);
-                // Second differences of a curvature that jumps by 12 at the edge: h times that.
+                let dx = (dimple.height(x + H, y) - dimple.height(x - H, y)) / (2.0 * H);
+                let dy = (dimple.height(x, y + H) - dimple.height(x, y - H)) / (2.0 * H);
+                // Second differences of a curvature that jumps by 12 at the edge: H times that.
                 assert!((gx - dx).abs() < 2e-5 && (gy - dy).abs() < 2e-5);
                 assert!(gx.hypot(gy) <= dimple.steepest() * (1.0 + 1e-15));
             }
@@ -381,11 +389,10 @@ mod tests {
     /// The first crossing by scanning in small steps and bisecting.
     fn scanned(surface: &Dimple, p: &[f64; 3], u: &[f64; 3], to: f64) -> Option<f64> {
         let gap = |t: f64| surface.height(p[0] + t * u[0], p[1] + t * u[1]) - (p[2] + t * u[2]);
-        let steps = 20_000;
-        let first = (1..=steps).find(|&k| gap(to * f64::from(k) / f64::from(steps)) <= 0.0)?;
+        let first = (1..=STEPS).find(|&k| gap(to * f64::from(k) / f64::from(STEPS)) <= 0.0)?;
         let (mut a, mut b) = (
-            to * f64::from(first - 1) / f64::from(steps),
-            to * f64::from(first) / f64::from(steps),
+            to * f64::from(first - 1) / f64::from(STEPS),
+            to * f64::from(first) / f64::from(STEPS),
         );
         for _ in 0..60 {
             let middle = 0.5 * (a + b);
@@ -401,7 +408,6 @@ mod tests {
     #[test]
     fn marching_finds_the_first_crossing_and_no_other() {
         let dimple = Dimple::new([0.5, 0.1], 0.4, 0.2).unwrap();
-        let tolerance = 1e-9;
         let (mut met, mut missed) = (0, 0);
         for i in 0..40 {
             for j in 0..10 {
@@ -413,7 +419,7 @@ mod tests {
                     angle.sin(),
                 ];
                 let p = [0.0, -0.05, -0.05 - 0.02 * f64::from(j)];
-                let found = march(&dimple, &p, &u, [0.0, 1.2], tolerance);
+                let found = march(&dimple, &p, &u, [0.0, 1.2], TOLERANCE);
                 match (found, scanned(&dimple, &p, &u, 1.2)) {
                     (Meeting::At(t), Some(expected)) => {
                         // Stopping at a gap of the tolerance is early by it over the closing speed,

@@ -7,6 +7,9 @@ use ndarray::ArrayView2;
 
 use crate::Domain;
 
+/// Ratio of the radii that are tried: sixty span a factor of a hundred.
+const RADIUS_STEP: f64 = 1.08;
+
 /// A spherical cap z = √(R² − ρ²) − √(R² − a²), ρ the distance from the centre, fitted to heights.
 ///
 /// ```
@@ -72,10 +75,9 @@ impl BallFit {
         let error = |radius: f64| {
             fit(&pixels, radius).map_or(f64::INFINITY, |fit| fit.mean_absolute_error_m)
         };
-        let step = 1.08_f64;
-        let radii = (0..60).map(|k| half_width * step.powi(k));
+        let radii = (0..60).map(|k| half_width * RADIUS_STEP.powi(k));
         let best = radii.min_by(|a, b| error(*a).total_cmp(&error(*b)))?;
-        let (mut low, mut high) = (best / step, best * step);
+        let (mut low, mut high) = (best / RADIUS_STEP, best * RADIUS_STEP);
         let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
         // 30 steps narrow the bracket of 16 % to a millionth of it.
         for _ in 0..30 {

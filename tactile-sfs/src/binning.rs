@@ -8,6 +8,10 @@ use ndarray::{Array2, ArrayView2, Axis, Slice, Zip, aview_mut1};
 
 use crate::surface::fill_shape;
 
+/// Distance from the contour within which a rim's cell is left out, in pixels. A whole ring less would
+/// cost the surface a quarter of its height, and more of a smaller contact's.
+const RIM_DISTANCE_PX: f64 = 0.25;
+
 /// How many pixels one node of the reconstruction's grid covers.
 ///
 /// ```
@@ -145,12 +149,9 @@ impl BinnedContact {
     /// assert_eq!(contact.mask, array![[false, true, true, true]]);
     /// ```
     pub fn trim_rim(&mut self) {
-        // A whole ring less would cost the surface a quarter of its height, and more of a smaller
-        // contact's.
-        let distance_px = 0.25;
         let pixels = self.mask.iter().filter(|inside| **inside).count();
         let radius_px = (pixels as f64 / core::f64::consts::PI).sqrt();
-        let least = (2.0 * distance_px / radius_px).sqrt();
+        let least = (2.0 * RIM_DISTANCE_PX / radius_px).sqrt();
         self.mask
             .zip_mut_with(&self.signal, |inside, &light| *inside &= light >= least);
     }

@@ -312,17 +312,16 @@ impl Grid<'_> {
     /// of the centre and in the rows' spans.
     #[inline(always)]
     pub fn columns<const SIDE: usize>(&self, row: isize, distance: f64) -> Range<usize> {
-        let none = 0..0;
         let Some(spans) = usize::try_from(row)
             .ok()
             .and_then(|row| self.spans.get(row..row + SIDE))
         else {
-            return none;
+            return 0..0;
         };
         let ends = [row, row + SIDE as isize - 1].map(|row| self.v(row as f64).abs());
         let farthest = ends[0].max(ends[1]);
         if farthest >= distance {
-            return none;
+            return 0..0;
         }
         let half = (distance * distance - farthest * farthest).sqrt();
         let mut start = (self.centre[0] - half).ceil() as isize;
@@ -333,7 +332,7 @@ impl Grid<'_> {
         }
         let first = self.first(0);
         if start > first || end < first {
-            return none;
+            return 0..0;
         }
         let whole = |columns: isize| columns - columns % SIDE as isize;
         let (left, right) = (first - whole(first - start), first + whole(end - first));
