@@ -1,5 +1,6 @@
 //! A rectangle of pixels.
 
+#[cfg(feature = "ndarray")]
 use ndarray::{ArrayView2, ArrayViewMut2, Axis, Slice};
 
 /// A rectangle of pixels, half open: rows `row_start..row_end`, columns `column_start..column_end`.
@@ -51,6 +52,7 @@ impl BoundingBox {
     /// assert_eq!((bounds.rows(), bounds.column_start, bounds.columns()), (2, 1, 2));
     /// ```
     #[must_use]
+    #[cfg(feature = "ndarray")]
     pub fn of_mask(mask: ArrayView2<'_, bool>) -> Option<Self> {
         let mut bounds: Option<Self> = None;
         for (row, line) in mask.outer_iter().enumerate() {
@@ -134,6 +136,7 @@ impl BoundingBox {
     /// assert_eq!(right.of(image.view())[[0, 0]], 406);
     /// ```
     #[must_use]
+    #[cfg(feature = "ndarray")]
     pub fn of<'a, P>(&self, mut image: ArrayView2<'a, P>) -> ArrayView2<'a, P> {
         image.slice_axis_inplace(Axis(0), Slice::from(self.row_start..self.row_end));
         image.slice_axis_inplace(Axis(1), Slice::from(self.column_start..self.column_end));
@@ -142,6 +145,7 @@ impl BoundingBox {
 
     /// The part of a mutable image inside the box.
     #[must_use]
+    #[cfg(feature = "ndarray")]
     pub fn of_mut<'a, P>(&self, mut image: ArrayViewMut2<'a, P>) -> ArrayViewMut2<'a, P> {
         image.slice_axis_inplace(Axis(0), Slice::from(self.row_start..self.row_end));
         image.slice_axis_inplace(Axis(1), Slice::from(self.column_start..self.column_end));

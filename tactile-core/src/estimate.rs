@@ -1,5 +1,6 @@
 //! A number with its standard error, and the interval that follows from both.
 
+#[cfg(feature = "intervals")]
 use crate::statistics::quantile_95;
 use crate::{InvalidOption, Requirement};
 use std::fmt::{self, Display};
@@ -151,6 +152,7 @@ impl Estimate {
     /// assert_eq!(line.interval_95().upper, None);
     /// ```
     #[must_use]
+    #[cfg(feature = "intervals")]
     pub fn interval_95(self) -> Interval {
         let half = quantile_95(self.degrees_of_freedom) * self.standard_error;
         if (0.0..f64::INFINITY).contains(&half) {

@@ -9,6 +9,7 @@ mod regions;
 mod report;
 pub mod statistics;
 mod uncertain;
+#[cfg(feature = "simd")]
 mod vectorised;
 
 pub use bounding_box::BoundingBox;
@@ -18,4 +19,5 @@ pub use option::{InvalidOption, Requirement};
 pub use regions::{otsu, regions};
 pub use report::{Polarity, Progress, StopReason};
 pub use uncertain::{Source, Uncertain};
+#[cfg(feature = "simd")]
 pub use vectorised::{Loop, vectorised};

@@ -1,5 +1,6 @@
 //! Quantiles and degrees of freedom.
 
+#[cfg(feature = "intervals")]
 use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
 
 /// Two-sided 95 % quantile of Student's t with so many degrees of freedom, of the normal
@@ -13,6 +14,7 @@ use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
 /// assert_eq!(quantile_95(Some(0.0)), f64::INFINITY);
 /// ```
 #[must_use]
+#[cfg(feature = "intervals")]
 pub fn quantile_95(degrees: Option<f64>) -> f64 {
     const UPPER_TAIL: f64 = 0.975;
     let z = Normal::standard().inverse_cdf(UPPER_TAIL);
