@@ -1,16 +1,16 @@
 //! What several subcommands ask for: numbers, repetitions, frames of a sensor, masks and known
 //! heights.
-use crate::console::{Interrupt, median_ms};
+use crate::console::{Context, Interrupt, median_ms};
 use crate::failure::Failure;
 use crate::frames::Reading;
 use crate::text::four_digits;
 use clap::{Args, ValueEnum};
 use ndarray::Array2;
+use serde_json::json;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 use tactile_files::io::{
-    FileError, Grey, InputQuantity, PointTable, read_grey_image, read_grid, read_point_rows,
-    read_point_table,
+    Gaps, Grey, InputQuantity, Points, TableOptions, read_grey_image, read_grid, read_point_frames,
 };
 
 fn number(text: &str, fits: impl Fn(f64) -> bool, expected: &str) -> Result<f64, String> {
@@ -166,35 +166,76 @@ impl SensorFrames {
     }
 }
 
-/// Tables of points, and whether their coordinates have a unit: those of all files or of none.
-pub fn read_points(paths: &[impl AsRef<Path>]) -> Result<(Vec<PointTable>, bool), Failure> {
-    read_points_by(paths, |path| read_point_table(path))
+/// How tables are read, if not as they show themselves.
+#[derive(Args)]
+pub struct TableArguments {
+    /// Columns that are read, in their order: by heading or by number from 1.
+    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
+    columns: Vec<String>,
+    /// Lines before each table, of an instrument's preamble.
+    #[arg(long, value_name = "LINES", default_value_t = 0)]
+    skip_lines: usize,
+    /// Refuse rows without a number, which are left out else.
+    #[arg(long)]
+    strict: bool,
 }
 
-/// As [`read_points`], where row i of a file is row i of the others and gaps are NaN.
-pub fn read_paired_points(paths: &[impl AsRef<Path>]) -> Result<(Vec<PointTable>, bool), Failure> {
-    read_points_by(paths, |path| read_point_rows(path))
-}
-
-fn read_points_by(
-    paths: &[impl AsRef<Path>],
-    read: impl Fn(&Path) -> Result<(PointTable, bool), FileError>,
-) -> Result<(Vec<PointTable>, bool), Failure> {
-    let (mut tables, mut units) = (Vec::new(), Vec::new());
-    for path in paths {
-        let (table, unit) = read(path.as_ref())?;
-        tables.push(table);
-        units.push(unit);
-        if unit != units[0] {
-            return Err(Failure::input(format!(
-                "only one of {} and {} names the unit of its coordinates: name it in both headers \
-                 or in none",
-                paths[0].as_ref().display(),
-                path.as_ref().display()
-            )));
+impl TableArguments {
+    pub fn options(&self) -> TableOptions {
+        TableOptions {
+            columns: self.columns.clone(),
+            skip_lines: self.skip_lines,
+            gaps: if self.strict {
+                Gaps::Refuse
+            } else {
+                Gaps::LeaveOut
+            },
         }
     }
-    Ok((tables, units.contains(&true)))
+
+    /// Tables of points, and whether their coordinates have a unit: those of all files or of none.
+    /// A table of tracked points gives one for each of its frames. Row i of one that is paired is row
+    /// i of the others, and NaN stands for numbers that are not there.
+    pub fn read_points(
+        &self,
+        paths: &[impl AsRef<Path>],
+        paired: bool,
+        context: &mut Context,
+    ) -> Result<(Vec<Points>, bool), Failure> {
+        let mut options = self.options();
+        if paired && !self.strict {
+            options.gaps = Gaps::Keep;
+        }
+        let mut tables = Vec::new();
+        for path in paths {
+            let path = path.as_ref();
+            let frames = read_point_frames(path, &options)?;
+            taken(path, &frames[0].notes, context);
+            tables.extend(frames);
+            if tables.last().map(|table| table.metric) != Some(tables[0].metric) {
+                return Err(Failure::input(format!(
+                    "only one of {} and {} names the unit of its coordinates: name it in both \
+                     headers or in none",
+                    paths[0].as_ref().display(),
+                    path.display()
+                )));
+            }
+        }
+        let metric = tables.first().is_some_and(|table| table.metric);
+        Ok((tables, metric))
+    }
+}
+
+/// Prints what was taken for granted of a table.
+pub fn taken(path: &Path, notes: &[String], context: &mut Context) {
+    for note in notes {
+        let sentence = format!("{}: {note}", path.display());
+        context.warn(
+            "table",
+            json!({ "file": path.display().to_string() }),
+            sentence,
+        );
+    }
 }
 
 /// Rows and columns of a file.

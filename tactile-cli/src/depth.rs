@@ -1,5 +1,5 @@
 //! `tactile depth`: contact and depth of a sensor that grows darker where it is pressed.
-use crate::arguments::SensorFrames;
+use crate::arguments::{SensorFrames, TableArguments, taken};
 use crate::console::Context;
 use crate::failure::{Exit, Failure};
 use crate::frames::NamedFrame;
@@ -12,7 +12,7 @@ use clap::{Args, ValueEnum};
 use ndarray::Array2;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
-use tactile_files::io::{Grey, read_columns};
+use tactile_files::io::{Grey, read_table_with};
 use tactile_files::scene::doubt_of_depths;
 use tactile_imaging::gel::{DarkFrame, DarkGel};
 use tactile_imaging::pipeline::{
@@ -73,6 +73,8 @@ pub struct DepthArguments {
     /// How the colours of a frame make its grey: as those of the table were made.
     #[arg(long, value_enum, default_value_t = GreyOf::Rec601)]
     grey: GreyOf,
+    #[command(flatten)]
+    reading: TableArguments,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -88,9 +90,11 @@ enum GreyOf {
 }
 
 impl DepthArguments {
-    fn pipeline(&self) -> Result<(Pipeline, DarkGel), Failure> {
+    fn pipeline(&self, context: &mut Context) -> Result<(Pipeline, DarkGel), Failure> {
         let columns = [(&["darkness"][..], "grey_levels"), (&["depth"][..], "mm")];
-        let [darkness, depth] = read_columns(&self.table, columns)?;
+        let mut table = read_table_with(&self.table, &self.reading.options())?;
+        let [darkness, depth] = table.columns(columns)?;
+        taken(&self.table, &table.notes, context);
         let mut entries: Vec<_> = darkness.into_iter().zip(depth).collect();
         if let Some(reason) = doubt_of_depths(&entries) {
             return Err(Failure::in_file(&self.table, reason));
@@ -141,7 +145,7 @@ pub fn run(arguments: &DepthArguments, context: &mut Context) -> Result<Exit, Fa
     if let Some(sensor) = &arguments.sensor {
         return photometric::depth(sensor, &frames.frames, false, context);
     }
-    let (pipeline, gel) = arguments.pipeline()?;
+    let (pipeline, gel) = arguments.pipeline(context)?;
     let grey = match arguments.grey {
         GreyOf::Rec601 => Grey::Rec601,
         GreyOf::Rec709 => Grey::Rec709,

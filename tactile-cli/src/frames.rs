@@ -2,6 +2,7 @@
 use crate::arguments::same_shape;
 use crate::console::Context;
 use crate::failure::{Exit, Failure};
+use crate::text::count;
 use ndarray::{Array2, Array3, ArrayView3, Axis};
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
@@ -96,7 +97,10 @@ impl Reading<'_> {
                 let mut frame = P::default();
                 let read = source.take()?.and_then(|mut reader| {
                     if frame.read_next(&mut reader)?.is_none() {
-                        return Ok(None);
+                        return match passed_over(path, &reader) {
+                            Some(sentence) => Err(Failure::no_answer(sentence)),
+                            None => Ok(None),
+                        };
                     }
                     self.fits(path, &frame)?;
                     Ok(Some(reader))
@@ -140,6 +144,19 @@ impl Reading<'_> {
         }
         Ok((frames, exit))
     }
+}
+
+/// A sentence on the damaged frames of a stream that were passed over. `None` without any.
+pub fn passed_over(path: &Path, reader: &FrameReader) -> Option<String> {
+    let (_, damaged, sentences) = reader.passed_over();
+    let [first, ..] = sentences else {
+        return None;
+    };
+    let frames = count(damaged as usize, "damaged frame");
+    Some(format!(
+        "{}: {frames} passed over, the first {first}",
+        path.display()
+    ))
 }
 
 /// A frame with its name.

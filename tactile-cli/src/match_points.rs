@@ -1,5 +1,5 @@
 //! `tactile match`: the point sets of case files.
-use crate::arguments::{Repetition, positive, read_points};
+use crate::arguments::{Repetition, TableArguments, positive};
 use crate::console::Context;
 use crate::failure::{Exit, Failure};
 use crate::text::{count, four_digits, printable};
@@ -42,6 +42,8 @@ pub struct MatchArguments {
     method: Method,
     #[command(flatten)]
     repetition: Repetition,
+    #[command(flatten)]
+    table: TableArguments,
 }
 
 /// The prior knowledge of the sets.
@@ -195,7 +197,7 @@ pub fn run(arguments: &MatchArguments, context: &mut Context) -> Result<Exit, Fa
     // time.
     let mut files = Vec::new();
     let read = if tables {
-        vec![vec![case_of_tables(&arguments.cases)?]]
+        vec![vec![case_of_tables(arguments, context)?]]
     } else {
         let cases = arguments.cases.iter().map(read_cases);
         cases.collect::<Result<Vec<_>, _>>()?
@@ -360,7 +362,7 @@ const TABLES_ANSWER: &str = "match.txt";
 fn are_tables(paths: &[PathBuf]) -> bool {
     let is_table = |path: &PathBuf| {
         let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
-        ["csv", "tsv", "pts", "fcsv"]
+        ["csv", "tsv", "pts", "fcsv", "npy", "npz", "mat"]
             .iter()
             .any(|kind| extension == *kind)
     };
@@ -368,9 +370,16 @@ fn are_tables(paths: &[PathBuf]) -> bool {
 }
 
 /// One case of two tables.
-fn case_of_tables(paths: &[PathBuf]) -> Result<MatchCase, Failure> {
-    let (mut tables, _) = read_points(paths)?;
-    let (target, model) = (tables.pop(), tables.pop());
+fn case_of_tables(arguments: &MatchArguments, context: &mut Context) -> Result<MatchCase, Failure> {
+    let paths = &arguments.cases;
+    let (mut tables, _) = arguments.table.read_points(paths, false, context)?;
+    if tables.len() > 2 {
+        return Err(Failure::input(
+            "a table holds several frames: `tactile strain` follows them",
+        ));
+    }
+    let mut next = || tables.pop().map(|table| table.points);
+    let (target, model) = (next(), next());
     let points = match (model, target) {
         (Some(PointTable::Plane(model)), Some(PointTable::Plane(target))) => {
             CasePoints::Plane { model, target }

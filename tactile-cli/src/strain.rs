@@ -1,5 +1,5 @@
 //! `tactile strain`: from two sets of points, before and after a deformation.
-use crate::arguments::{read_paired_points, read_points};
+use crate::arguments::TableArguments;
 use crate::console::Context;
 use crate::failure::{Exit, Failure};
 use crate::match_points::{self, Expectations};
@@ -53,8 +53,8 @@ Examples:
       --out target/series
   tactile strain --paired examples/data/sources.csv examples/data/targets.csv")]
 pub struct StrainArguments {
-    /// Points of the frames in their order: before and after, or more. Or one table with
-    /// displacements.
+    /// Points of the frames in their order: before and after, or more. Or one table, with
+    /// displacements or with a column of frames (TrackMate, trackpy).
     #[arg(required = true, num_args = 1.., value_name = "FRAMES")]
     frames: Vec<PathBuf>,
     /// Measure of strain.
@@ -71,6 +71,8 @@ pub struct StrainArguments {
     doubtful_pairs: bool,
     #[command(flatten)]
     expectations: Expectations,
+    #[command(flatten)]
+    table: TableArguments,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -112,38 +114,38 @@ pub fn run(arguments: &StrainArguments, context: &mut Context) -> Result<Exit, F
     let of_series = &SERIES_FILES[..if paths.len() > 2 { 2 } else { 0 }];
     let files = [&FILES, of_grid, of_series].concat();
     context.outputs.plan(&files, paths)?;
-    let (tables, metric) = if let [table] = &paths[..] {
-        let (tables, metric) = read_displaced_points(table)?;
-        (tables.into(), metric)
-    } else if arguments.paired {
-        read_paired_points(paths)?
-    } else {
-        read_points(paths)?
-    };
-    let (mut plane, mut space) = (Vec::new(), Vec::new());
     if arguments.paired && paths.len() > 2 {
         return Err(Failure::input(
             "--paired takes two files, or one with displacements",
         ));
     }
-    for (path, table) in paths.iter().cycle().zip(tables) {
+    let (tables, metric) = arguments
+        .table
+        .read_points(paths, arguments.paired, context)?;
+    let mut known = arguments.paired;
+    let mut tables: Vec<PointTable> = tables.into_iter().map(|table| table.points).collect();
+    if let [_] = tables[..] {
+        known = true;
+        tables = read_displaced_points(&paths[0])?.0.into();
+    }
+    let (mut plane, mut space) = (Vec::new(), Vec::new());
+    for table in tables {
         match table {
             PointTable::Plane(points) => plane.push(points),
             PointTable::Space(points) => space.push(points),
         }
         if !plane.is_empty() && !space.is_empty() {
             return Err(Failure::input(format!(
-                "{} and {} must both have two coordinates a point, or both three",
-                paths[0].display(),
-                path.display()
+                "{} and the frames after it must all have two coordinates a point, or three",
+                paths[0].display()
             )));
         }
     }
     let unit = if metric { METRES } else { "the points' unit" };
     if plane.is_empty() {
-        answer(space, unit, arguments, context)
+        answer(space, unit, known, arguments, context)
     } else {
-        answer(plane, unit, arguments, context)
+        answer(plane, unit, known, arguments, context)
     }
 }
 
@@ -163,11 +165,11 @@ impl StrainArguments {
 fn answer<const D: usize>(
     mut frames: Vec<Vec<Point<f64, D>>>,
     unit: &'static str,
+    known: bool,
     arguments: &StrainArguments,
     context: &mut Context,
 ) -> Result<Exit, Failure> {
     let remedy = "take every tenth point, or cut the sets into parts";
-    let known = arguments.paired || arguments.frames.len() == 1;
     for pair in frames.windows(2).filter(|_| !known) {
         match_points::allow(context, pair[0].len(), pair[1].len(), remedy)?;
     }

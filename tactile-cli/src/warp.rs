@@ -1,5 +1,5 @@
 //! `tactile warp`: a thin-plate spline through pairs of points.
-use crate::arguments::{Repetition, read_points};
+use crate::arguments::{Repetition, TableArguments};
 use crate::console::{Bar, Context, median_ms};
 use crate::failure::{Exit, Failure};
 use crate::outputs::Csv;
@@ -45,6 +45,8 @@ pub struct WarpArguments {
     lambda: Smoothing,
     #[command(flatten)]
     repetition: Repetition,
+    #[command(flatten)]
+    table: TableArguments,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -77,7 +79,16 @@ const TOLERANCE: f64 = 1e-10;
 pub fn run(arguments: &WarpArguments, context: &mut Context) -> Result<Exit, Failure> {
     let inputs = [&arguments.sources, &arguments.targets, &arguments.queries];
     context.outputs.plan(&["warped.csv"], &inputs)?;
-    let (tables, _) = read_points(&inputs)?;
+    let (mut tables, _) = arguments.table.read_points(&inputs, false, context)?;
+    let [sources, targets, queries] = inputs.map(|path| path.display());
+    if tables.len() != inputs.len() {
+        return Err(Failure::input(format!(
+            "one of {sources}, {targets} and {queries} holds several frames: give a table of one"
+        )));
+    }
+    let sets = tables.split_at_mut(1);
+    sets.0[0].keep_shared_rows(&mut sets.1[0]);
+    let tables: Vec<PointTable> = tables.into_iter().map(|table| table.points).collect();
     match &tables[..] {
         [
             PointTable::Plane(a),
@@ -89,13 +100,10 @@ pub fn run(arguments: &WarpArguments, context: &mut Context) -> Result<Exit, Fai
             PointTable::Space(b),
             PointTable::Space(q),
         ] => with_kernel(arguments, context, [a, b, q]),
-        _ => {
-            let [sources, targets, queries] = inputs.map(|path| path.display());
-            Err(Failure::input(format!(
-                "{sources}, {targets} and {queries} must all have two coordinates a point, or all \
+        _ => Err(Failure::input(format!(
+            "{sources}, {targets} and {queries} must all have two coordinates a point, or all \
                  three"
-            )))
-        }
+        ))),
     }
 }
 

@@ -2,10 +2,11 @@
 use super::StreamArguments;
 use crate::console::{Bar, Context};
 use crate::failure::{Exit, Failure};
-use crate::frames::{DEFAULT_RATE_HZ, Pixels, Reading};
+use crate::frames::{DEFAULT_RATE_HZ, Pixels, Reading, passed_over};
 use crate::outputs::Csv;
 use crate::record::FrameRecorder;
 use crate::serve::LivePage;
+use crate::text::count;
 use serde_json::{Value, json};
 use std::error::Error;
 use std::path::{Path, PathBuf};
@@ -245,11 +246,13 @@ fn file<M: Meter>(
     if let Some(rate_hz) = rate_hz.or(source.frame_rate_hz()) {
         watch.counts.rate_hz = rate_hz;
     }
+    let before = watch.counts.seen;
     while !context.interrupt.requested() && frame.read_next(&mut source)?.is_some() {
         reading.fits(path, frame)?;
         let rate_hz = watch.counts.rate_hz;
-        let time_s = watch.counts.seen as f64 / rate_hz;
-        watch.counts.seen += 1;
+        // Frames that the recorder dropped have their time, too.
+        watch.counts.seen = before + source.frames() as usize;
+        let time_s = (watch.counts.seen - 1) as f64 / rate_hz;
         // Reading the file is not part of the measurement.
         match watch.take(time_s, frame) {
             Ok(took) => {
@@ -266,6 +269,18 @@ fn file<M: Meter>(
             Err(failure) => return Err(failure),
         }
         watch.print_last(watch.rows.len() <= 32, context);
+    }
+    let (dropped, damaged, _) = source.passed_over();
+    if let Some(sentence) = passed_over(path, &source) {
+        context.warn("frames_damaged", json!({ "frames": damaged }), sentence);
+    }
+    if dropped > 0 {
+        let sentence = format!(
+            "{}: the recorder dropped {}, whose times are kept",
+            path.display(),
+            count(dropped as usize, "frame")
+        );
+        context.warn("frames_dropped", json!({ "frames": dropped }), sentence);
     }
     Ok(())
 }

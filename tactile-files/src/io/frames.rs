@@ -1,15 +1,19 @@
 //! Frames one after the other, from a video, concatenated images, a stack of pages, arrays or one
 //! image.
 mod avi;
+mod jpeg;
 mod npy;
 
 use self::avi::Avi;
+use self::jpeg::Images;
 use self::npy::Arrays;
 use super::error::{FileError, FilePlace, quoted};
 use super::files::{LARGEST_FILE, open_file};
 use super::image::{Grey, colour_levels, decode, eight_bit_levels, header_words, largest_image};
+use super::kinds::kind_of;
 use ::image::DynamicImage;
 use ndarray::{Array2, Array3};
+use std::borrow::Cow;
 use std::collections::HashSet;
 use std::io::{
     BufRead, BufReader, Cursor, Error, ErrorKind, Read, Result as IoResult, copy, sink, stdin,
@@ -22,6 +26,17 @@ use tactile_imaging::pipeline::FrameSource;
 /// video, and a line without an end would fill the memory.
 const LONGEST_HEADER: u64 = 4096;
 
+pub use self::npy::{header_fields, members};
+
+/// First bytes of an array of NumPy, and of an archive of them.
+pub const ARRAY_STARTS: [&[u8]; 2] = Arrays::START;
+
+/// What reads videos of other codecs.
+const PIPE: &str = "pipe it by ffmpeg -i VIDEO -f yuv4mpegpipe -pix_fmt gray - | tactile … -";
+
+/// Most damaged frames that are named.
+const MOST_NAMED: usize = 10;
+
 /// The frames of a stream of bytes: a pipe from a camera, a video, a file.
 ///
 /// The first bytes show the format.
@@ -29,13 +44,20 @@ const LONGEST_HEADER: u64 = 4096;
 /// - **YUV4MPEG2**, as `ffmpeg -f yuv4mpegpipe` writes it. The luma plane is the grey, as it is
 ///   stored. Samples have 8 to 16 bits.
 /// - **PGM and PPM**, of binary samples, any number one after the other.
-/// - **AVI** of JPEG frames (MJPG), as webcams record them.
+/// - **JPEG and PNG**, any number one after the other, as `ffmpeg -f image2pipe` writes them. JPEG
+///   frames without Huffman tables have the standard ones.
+/// - **AVI** of JPEG frames (MJPG), as webcams record them, or of uncompressed ones (I420, YUY2,
+///   Y800 and their kin, of which the luma is taken, and 24-bit colours). Frames that the recorder
+///   dropped keep their time.
 /// - **NPY and NPZ** of NumPy: arrays of `uint8` or `uint16` in C order, of shape (rows, columns)
 ///   or (frames, rows, columns), with 3 behind them for colours. Several arrays follow each other
 ///   in an archive, and in a pipe that `numpy.save` writes to. An archive's arrays of other numbers
 ///   are passed over.
 /// - **TIFF**, a frame a page.
 /// - Any other image of [`read_grey_image`](super::read_grey_image): one frame.
+///
+/// A frame of an AVI, or of JPEG and PNG images, that cannot be decoded or has another size than the
+/// first is passed over, and [`passed_over`](Self::passed_over) names it.
 ///
 /// As a [`FrameSource`] it gives grey frames. [`next_colour_frame`](Self::next_colour_frame) gives
 /// those of a gel that is lit in colours.
@@ -64,8 +86,13 @@ pub struct FrameReader {
     name: PathBuf,
     grey: Grey,
     bits: Option<u8>,
-    /// The number of frames that were read.
+    /// The number of frames that were read, those that were dropped or damaged included.
     frames: u64,
+    damaged: u64,
+    dropped: u64,
+    passed_over: Vec<String>,
+    /// That of the first damaged frame.
+    first_error: Option<FileError>,
     /// Rows and columns of the first frame, which the others have too.
     size: Option<(usize, usize)>,
     default_rate_hz: f64,
@@ -82,6 +109,7 @@ impl std::fmt::Debug for FrameReader {
 enum Format {
     Video(Video),
     Avi(Avi),
+    Images(Images),
     Arrays(Arrays),
     Anymaps,
     Pages(Pages),
@@ -149,6 +177,9 @@ impl FrameReader {
             }
             start if start.starts_with(Arrays::START[0]) => Format::Arrays(Arrays::new(false)),
             start if start.starts_with(Arrays::START[1]) => Format::Arrays(Arrays::new(true)),
+            start if jpeg::STARTS.iter().any(|image| start.starts_with(image)) => {
+                Format::Images(Images::default())
+            }
             [] => return Err(refused(Broken::new("a video or an image", "no bytes"))),
             _ => {
                 let mut bytes = Vec::new();
@@ -156,10 +187,13 @@ impl FrameReader {
                 whole.map_err(failed)?;
                 match Pages::of(&bytes) {
                     Some(pages) => Format::Pages(pages),
-                    None if image::guess_format(&bytes).is_ok() => Format::Image(bytes),
+                    None if is_image(&bytes) => Format::Image(bytes),
                     None => {
                         let expected = "a video or an image, known by its first bytes";
-                        let found = start.escape_ascii().to_string();
+                        let found = kind_of(&bytes).map_or_else(
+                            || format!("a text that begins with `{}`", start.escape_ascii()),
+                            str::to_owned,
+                        );
                         return Err(refused(Broken::new(expected, found)));
                     }
                 }
@@ -172,6 +206,10 @@ impl FrameReader {
             grey: Grey::default(),
             bits: None,
             frames: 0,
+            damaged: 0,
+            dropped: 0,
+            passed_over: Vec::new(),
+            first_error: None,
             size: None,
             default_rate_hz: frame_rate_hz,
         })
@@ -200,6 +238,29 @@ impl FrameReader {
         }
     }
 
+    /// Number of frames so far, those that were dropped or damaged included.
+    #[must_use]
+    pub fn frames(&self) -> u64 {
+        self.frames
+    }
+
+    /// The frames that were passed over so far: the number that the recorder dropped, that of damaged
+    /// ones, and a sentence on each of the first of these.
+    ///
+    /// ```
+    /// use tactile_files::io::FrameReader;
+    /// use tactile_imaging::pipeline::FrameSource;
+    /// // A JPEG image that ends in its header.
+    /// let mut camera = FrameReader::new(&b"\xff\xd8\xff\xe0\0\x10JFIF"[..], "pipe", 25.0)?;
+    /// assert!(camera.next_frame(&mut ndarray::Array2::zeros((0, 0))).is_err(), "no frame at all");
+    /// assert_eq!(camera.passed_over().1, 1);
+    /// # Ok::<(), tactile_files::io::FileError>(())
+    /// ```
+    #[must_use]
+    pub fn passed_over(&self) -> (u64, u64, &[String]) {
+        (self.dropped, self.damaged, &self.passed_over)
+    }
+
     /// The next frame in red, green and blue, `[row, column, channel]`, and its time in seconds,
     /// counted from the first. Samples of 16 bits are rounded to 8.
     ///
@@ -223,7 +284,7 @@ impl FrameReader {
         let convert = |encoded: Encoded<'_>, name: &Path| {
             let image = match encoded {
                 Encoded::Luma { .. } => return Err(colours("a video in luma and chroma")),
-                Encoded::File(bytes) => decode(bytes, name)?,
+                Encoded::File(bytes) => decode(&bytes, name)?,
                 Encoded::Decoded(image) => image,
             };
             colour_levels(image).ok_or_else(|| colours("a grey one"))
@@ -245,32 +306,59 @@ impl FrameReader {
     ) -> Result<Option<(f64, T)>, FileError> {
         let rate_hz = self.frame_rate_hz().unwrap_or(self.default_rate_hz);
         let name = self.name.clone();
-        let read = self.read(memory, |encoded| convert(encoded, &name));
-        let read = read.and_then(|next| {
-            let Some(next) = next else {
-                return Ok(None);
+        let mut memory = Some(memory);
+        loop {
+            let before = self.frames;
+            let read = self.read(memory.take().unwrap_or_default(), |encoded| {
+                convert(encoded, &name)
+            });
+            self.frames = match &self.format {
+                Format::Avi(avi) => avi.frames,
+                _ if matches!(read, Ok(None)) => before,
+                _ => before + 1,
             };
-            let found = size(&next);
-            let (rows, columns) = *self.size.get_or_insert(found);
-            if found == (rows, columns) {
-                return Ok(Some(next));
-            }
-            let expected = format!("{columns} × {rows} pixels as in the first");
-            let found = format!("{} × {}", found.1, found.0);
-            Err(Broken::new(expected, found))
-        });
-        let place = FilePlace::Frame(self.frames + 1);
-        let read = read.map_err(|broken| broken.at(&name, place));
-        match read {
-            Ok(Some(next)) => {
-                self.frames += 1;
-                Ok(Some(((self.frames - 1) as f64 / rate_hz, next)))
-            }
-            ended => {
-                self.format = Format::Ended;
-                ended.map(|_| None)
+            let got = u64::from(!matches!(read, Ok(None)));
+            self.dropped += (self.frames - before).saturating_sub(got);
+            let read = read.and_then(|next| next.map(|next| self.sized(next, &size)).transpose());
+            let place = FilePlace::Frame(self.frames.max(before + 1));
+            let goes_on = matches!(self.format, Format::Avi(_) | Format::Images(_));
+            let is_damaged = matches!(read, Err(Broken::File(_) | Broken::OtherSize { .. }));
+            let read = read.map_err(|broken| broken.at(&name, place));
+            match read {
+                Ok(Some(next)) => return Ok(Some(((self.frames - 1) as f64 / rate_hz, next))),
+                Err(error) if goes_on && is_damaged => {
+                    self.damaged += 1;
+                    if self.passed_over.len() < MOST_NAMED {
+                        self.passed_over.push(match &error {
+                            FileError::Image { reason, .. } => {
+                                format!("frame {}: {reason}", self.frames)
+                            }
+                            other => other.to_string(),
+                        });
+                    }
+                    self.first_error.get_or_insert(error);
+                }
+                ended => {
+                    // A stream of damaged frames alone has no frame.
+                    let error = self.first_error.take().filter(|_| self.size.is_none());
+                    self.format = Format::Ended;
+                    return match error {
+                        Some(error) => Err(error),
+                        None => ended.map(|_| None),
+                    };
+                }
             }
         }
+    }
+
+    /// A frame of the size of the first.
+    fn sized<T>(&mut self, frame: T, size: impl Fn(&T) -> (usize, usize)) -> Result<T, Broken> {
+        let found = size(&frame);
+        let first = *self.size.get_or_insert(found);
+        if found == first {
+            return Ok(frame);
+        }
+        Err(Broken::OtherSize { first, found })
     }
 
     /// The next frame as `convert` makes it, in the memory of an older one where the format allows
@@ -281,16 +369,23 @@ impl FrameReader {
         convert: impl Fn(Encoded<'_>) -> Result<T, Broken>,
     ) -> Result<Option<T>, Broken> {
         let input = &mut self.input;
-        let file = |bytes: &[u8]| convert(Encoded::File(bytes));
+        let file = |bytes: Cow<'_, [u8]>| convert(Encoded::File(bytes));
         Ok(match &mut self.format {
             Format::Ended => None,
             Format::Image(bytes) => {
                 let bytes = take(bytes);
                 self.format = Format::Ended;
-                Some(file(&bytes)?)
+                Some(file(bytes.into())?)
             }
-            Format::Pages(pages) => pages.turn().map(file).transpose()?,
-            Format::Avi(avi) => avi.next(input)?.map(|jpeg| file(&jpeg)).transpose()?,
+            Format::Pages(pages) => {
+                let page = pages.turn();
+                page.map(|bytes| file(bytes.into())).transpose()?
+            }
+            Format::Avi(avi) => avi.next(input)?.map(&convert).transpose()?,
+            Format::Images(images) => {
+                let image = images.next(input)?;
+                image.map(|bytes| file(bytes.into())).transpose()?
+            }
             Format::Arrays(arrays) => {
                 let image = arrays.next(input)?;
                 image
@@ -311,7 +406,7 @@ impl FrameReader {
                 if bytes.len() < header + samples {
                     return Err(Broken::cut(samples, bytes.len() - header));
                 }
-                Some(file(&bytes)?)
+                Some(file(bytes.into())?)
             }
             Format::Video(video) => {
                 let start = line(input)?;
@@ -341,7 +436,7 @@ impl FrameReader {
 /// A frame as its stream stores it.
 enum Encoded<'a> {
     /// An image with its header.
-    File(&'a [u8]),
+    File(Cow<'a, [u8]>),
     Decoded(DynamicImage),
     Luma {
         video: &'a Video,
@@ -364,7 +459,7 @@ impl FrameSource for FrameReader {
             let levels =
                 |bytes: &[u8]| eight_bit_levels(decode(bytes, name)?, bytes, name, grey, bits);
             Ok(match encoded {
-                Encoded::File(bytes) => levels(bytes)?,
+                Encoded::File(bytes) => levels(&bytes)?,
                 Encoded::Decoded(image) => eight_bit_levels(image, &[], name, grey, bits)?,
                 Encoded::Luma { video, samples } if video.depth > 8 => {
                     levels(&video.anymap(&samples))?
@@ -386,7 +481,15 @@ impl FrameSource for FrameReader {
 /// Why a stream does not go on.
 enum Broken {
     Read(Error),
-    Content { expected: String, found: String },
+    Content {
+        expected: String,
+        found: String,
+    },
+    /// Rows and columns that are not those of the first frame.
+    OtherSize {
+        first: (usize, usize),
+        found: (usize, usize),
+    },
     File(FileError),
 }
 
@@ -411,6 +514,10 @@ impl Broken {
                 source,
             },
             Self::Content { expected, found } => FileError::content(name, place, expected, found),
+            Self::OtherSize { first, found } => {
+                let expected = format!("{} × {} pixels as in the first", first.1, first.0);
+                FileError::content(name, place, expected, format!("{} × {}", found.1, found.0))
+            }
             Self::File(error) => error,
         }
     }
@@ -429,6 +536,11 @@ impl From<FileError> for Broken {
     fn from(error: FileError) -> Self {
         Self::File(error)
     }
+}
+
+/// Whether the first bytes are those of an image that is decoded.
+fn is_image(bytes: &[u8]) -> bool {
+    image::guess_format(bytes).is_ok_and(|format| format.reading_enabled())
 }
 
 /// A line with its end, without one where the stream ends or the line is too long.

@@ -1,6 +1,7 @@
 //! Grey images from PNG, PGM, JPEG and TIFF files.
 use super::error::FileError;
 use super::files::{read_bytes, write_bytes};
+use super::kinds::kind_of;
 use ::image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, Limits};
 use ndarray::{Array2, Array3, ArrayView2};
 use std::io::Cursor;
@@ -251,6 +252,10 @@ pub fn largest_image() -> (u32, u64) {
 }
 
 pub fn decode(bytes: &[u8], path: &Path) -> Result<DynamicImage, FileError> {
+    if !::image::guess_format(bytes).is_ok_and(|format| format.reading_enabled()) {
+        let kind = kind_of(bytes).unwrap_or("a text");
+        return Err(refused(path, format!("it is {kind}: an image is wanted")));
+    }
     let (side, pixels) = largest_image();
     let mut limits = Limits::default();
     limits.max_image_width = Some(side);
@@ -277,15 +282,28 @@ pub fn decode(bytes: &[u8], path: &Path) -> Result<DynamicImage, FileError> {
         let mut image = DynamicImage::from_decoder(decoder)?;
         // A camera that was turned notes it beside the pixels.
         image.apply_orientation(orientation);
+        if image.color().bytes_per_pixel() / image.color().channel_count() > 2 {
+            return Ok(Err(OTHER_SAMPLES.to_owned()));
+        }
         Ok(above_maximum(bytes, (width, height)).map_or(Ok(image), Err))
     };
     let decoded = decoded().unwrap_or_else(|error: ImageError| Err(in_words(&error)));
     decoded.map_err(|reason| refused(path, reason))
 }
 
+/// What is not decoded, or not to levels.
+const OTHER_SAMPLES: &str = "it is stored in a way that is not read: save it with whole numbers of 8 or 16 \
+     bits without sign, packed by LZW, Deflate or not at all";
+
 /// A decoder's error on one line. That of portable anymaps prints `Some(3)` and `None`.
 fn in_words(error: &ImageError) -> String {
+    if let ImageError::Unsupported(_) = error {
+        return OTHER_SAMPLES.into();
+    }
     let mut text = error.to_string();
+    if text.contains("decoding Jpeg") {
+        return "the JPEG image is damaged or cut short".into();
+    }
     while let Some(start) = text.find("Some(") {
         let inner = start + "Some(".len();
         let Some(length) = text[inner..].find(')') else {

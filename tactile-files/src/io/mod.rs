@@ -2,31 +2,37 @@
 //!
 //! | read by | what |
 //! |---|---|
-//! | [`read_points`] | CSV of points, columns by name or two or three without a header |
-//! | [`read_columns`] | CSV columns by name, in SI units |
-//! | [`read_grid`] | CSV matrices, empty cells and `nan` as NaN |
+//! | [`read_points`] | tables of points, columns by name or two or three without a header |
+//! | [`read_columns`] | columns of tables by name, in SI units |
+//! | [`read_grid`] | matrices, empty cells and `nan` as NaN |
 //! | [`read_cases`] | point-matching case files (`m` and `t` rows) |
 //! | [`read_grey_image`] | PNG, PGM, JPEG, TIFF, grey or colour, 8 or 16 bits |
 //! | [`read_colour_levels`] | PNG, PPM, JPEG, TIFF in colour, in 8 bits |
 //! | [`FrameReader`] | frames of videos, pipes, arrays and stacks of images, one after the other |
 //!
-//! In CSV, fields are separated by commas, semicolons or tabs, and may stand in double quotes. A
-//! first line without any number is a header. Empty lines and lines that start with `#` are passed
-//! over. Units in the headings of columns are converted to SI (m, N, Pa, s) or refused.
+//! Tables are text, or arrays of numbers in `.npy`, `.npz` and `.mat` (version 5). In text, cells are
+//! separated by commas, semicolons, tabs or blanks, and may stand in double quotes. Decimal commas
+//! are known where commas do not separate. A first line without any number is a heading, and so is
+//! the comment before the first row if it names the columns. Empty lines and lines that start with
+//! `#` or `%` are passed over. Units in headings are converted to SI (m, N, Pa, s) or refused.
 //!
 //! Whatever is wrong with a file is a [`FileError`]: one sentence with the file, the place, what
 //! was expected and what was found. No content makes a reader panic, and none makes it ask for more
 //! memory than a few times the size of the file. A file that is written takes the place of an older
 //! one only when it is complete.
 mod cases;
+mod columns;
 mod error;
 mod files;
 mod frames;
 mod image;
+mod kinds;
+mod numbers;
 mod range;
 mod table;
 #[cfg(test)]
 mod tests;
+mod text;
 
 pub use cases::{CasePoints, MatchCase, read_cases, write_case_result};
 pub use error::{FileError, FilePlace};
@@ -38,8 +44,8 @@ pub use image::{
 };
 pub use range::InputQuantity;
 pub use table::{
-    PointTable, Table, read_columns, read_displaced_points, read_grid, read_point_rows,
-    read_point_table, read_points, read_table,
+    Gaps, PointTable, Points, Table, TableOptions, read_columns, read_displaced_points, read_grid,
+    read_point_frames, read_points, read_table, read_table_with,
 };
 
 pub(crate) use files::{

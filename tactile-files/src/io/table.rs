@@ -1,9 +1,51 @@
-//! Tables of numbers in CSV: columns by name in SI units, points, grids.
+//! Tables of numbers, as text or arrays: columns by name in SI units, points, grids.
+use super::columns::{AXES, DISPLACEMENTS, FRAME, Heading, in_si};
 use super::error::{FileError, FilePlace, quoted};
 use super::files::read_bytes;
+use super::numbers;
+use super::text::{Cells, cells, columns_in_words};
 use nalgebra::{Point, Point2, Point3};
-use ndarray::Array2;
+use ndarray::{Array2, Axis};
 use std::path::{Path, PathBuf};
+
+/// What becomes of rows without a number.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Gaps {
+    /// They are left out and counted.
+    #[default]
+    LeaveOut,
+    /// The table is refused.
+    Refuse,
+    /// NaN stands for the number: a row then is a row of other tables.
+    Keep,
+}
+
+/// How a table is read, if not as it shows itself.
+///
+/// ```
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// use tactile_files::io::{TableOptions, read_table_with};
+/// let folder = tempfile::tempdir()?;
+/// let path = folder.path().join("export.txt");
+/// std::fs::write(&path, "Gauge 7\nZug;Weg;Kraft\n1;0,5;2\n2;;3\n")?;
+/// let mut options = TableOptions::default();
+/// (options.skip_lines, options.columns) = (1, vec!["Weg".into(), "3".into()]);
+/// let mut table = read_table_with(&path, &options)?;
+/// assert_eq!(table.columns([(&["depth"], "mm"), (&["force"], "N")])?, [[0.5e-3], [2.0]]);
+/// assert_eq!(table.notes[0], "its decimal points are commas");
+/// assert!(table.notes[1].contains("1 of 2 rows"), "the row without a way");
+/// # Ok(()) }
+/// ```
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct TableOptions {
+    /// The columns that are wanted, in their order, by heading or by number from 1. Empty: they are
+    /// found by their usual names.
+    pub columns: Vec<String>,
+    /// Lines before the table, of an instrument's preamble.
+    pub skip_lines: usize,
+    /// What becomes of rows without a number in a wanted column.
+    pub gaps: Gaps,
+}
 
 /// A rectangular table of numbers with the names of its columns, if it has a header.
 ///
@@ -13,7 +55,7 @@ use std::path::{Path, PathBuf};
 /// let folder = tempfile::tempdir()?;
 /// let path = folder.path().join("pairs.csv");
 /// std::fs::write(&path, "force_mN,pixel\n1,2\n\n3,4\n")?;
-/// let table = read_table(&path)?;
+/// let mut table = read_table(&path)?;
 /// assert_eq!((table.header[1].as_str(), table.values[[1, 1]]), ("pixel", 4.0));
 /// assert_eq!(table.columns([(&["load", "force"], "N")])?, [[1.0 * 1e-3, 3.0 * 1e-3]]);
 /// # Ok(()) }
@@ -23,40 +65,49 @@ use std::path::{Path, PathBuf};
 pub struct Table {
     /// Names of the columns, empty where the file has no header line.
     pub header: Vec<String>,
-    /// The numbers, `[row, column]`.
+    /// The numbers, `[row, column]`. NaN if a cell holds none.
     pub values: Array2<f64>,
+    /// What was taken for granted, a sentence each.
+    pub notes: Vec<String>,
+    /// The rows of the columns that were read last.
+    pub rows: Vec<usize>,
+    missing: Vec<Option<u64>>,
+    words: Vec<Option<(u64, String)>>,
+    options: TableOptions,
     path: PathBuf,
 }
 
-/// A heading cut into its name, in lower case, and its unit.
-struct Heading {
-    name: String,
-    unit: Option<String>,
-}
-
 impl Table {
-    /// Columns in SI units, as [`read_columns`] finds them.
+    /// Columns in SI units, as [`read_columns`] finds them, without the rows that have no number in
+    /// one of them.
     ///
     /// # Errors
-    /// [`FileError::Content`] for a column that is missing, there twice or in an unknown unit.
+    /// [`FileError::Content`] for a column that is missing, there twice or in an unknown unit, for a
+    /// word in place of a number, and for rows without a number if they are not left out.
     pub fn columns<const N: usize>(
-        &self,
+        &mut self,
         wanted: [(&[&str], &str); N],
     ) -> Result<[Vec<f64>; N], FileError> {
         let headings = self.headings();
-        if headings.is_empty() && self.values.ncols() != N {
+        let chosen = !self.options.columns.is_empty();
+        if headings.is_empty() && !chosen && self.values.ncols() != N {
             let found = self.values.ncols().to_string();
             return Err(self.error(FilePlace::Line(1), columns_in_words(N), found));
         }
+        let mut places = [0; N];
+        for (position, (names, _)) in wanted.iter().enumerate() {
+            places[position] = match (chosen, headings.is_empty()) {
+                (true, _) => self.chosen(position, N)?,
+                (false, true) => position,
+                (false, false) => self.find(names, &headings)?,
+            };
+        }
+        self.keep_rows(&places)?;
         let mut found = [const { Vec::new() }; N];
         for (position, (names, unit)) in wanted.into_iter().enumerate() {
             let name = names.first().copied().unwrap_or_default();
-            let mut at = position;
-            let mut given = None;
-            if !headings.is_empty() {
-                at = self.find(names, &headings)?;
-                given = headings[at].unit.as_deref();
-            }
+            let at = places[position];
+            let given = headings.get(at).and_then(|heading| heading.unit.as_deref());
             // The wanted unit stands for its quantity: any multiple of its base may stand in the
             // file.
             let (base, _) = in_si(unit).unwrap_or(("1", 1.0));
@@ -68,15 +119,79 @@ impl Table {
                     return Err(self.error(FilePlace::File, expected, found));
                 }
             };
-            let column = self.values.column(at);
-            found[position] = column.iter().map(|value| value * factor).collect();
-            let overflows = |(si, value): &(&f64, &f64)| value.is_finite() && !si.is_finite();
+            let column = self.rows.iter().map(|row| self.values[[*row, at]]);
+            found[position] = column.clone().map(|value| value * factor).collect();
+            let overflows = |(si, value): &(&f64, f64)| value.is_finite() && !si.is_finite();
             if let Some((_, value)) = found[position].iter().zip(column).find(overflows) {
                 let expected = format!("values of the column `{name}` that SI units can hold");
                 return Err(self.error(FilePlace::File, expected, format!("{value:e}")));
             }
         }
         Ok(found)
+    }
+
+    /// The column that the options name in this place.
+    fn chosen(&self, position: usize, count: usize) -> Result<usize, FileError> {
+        let names = &self.options.columns;
+        if names.len() != count {
+            let expected = format!("{} in the list of columns", columns_in_words(count));
+            return Err(self.error(FilePlace::File, expected, names.len().to_string()));
+        }
+        let name = &names[position];
+        let by_heading = self.header.iter().position(|heading| heading == name);
+        let by_name = || {
+            let mut names = self.headings().into_iter().map(|heading| heading.name);
+            names.position(|heading| heading == name.to_lowercase())
+        };
+        let number = name
+            .parse::<usize>()
+            .ok()
+            .and_then(|number| number.checked_sub(1));
+        let by_number = number.filter(|column| *column < self.values.ncols());
+        by_heading.or_else(by_name).or(by_number).ok_or_else(|| {
+            let found = format!("`{}`", self.header.join("`, `"));
+            self.error(
+                FilePlace::File,
+                format!("a column `{}`", quoted(name, 40)),
+                found,
+            )
+        })
+    }
+
+    /// Finds the rows with a number in each of these columns.
+    fn keep_rows(&mut self, columns: &[usize]) -> Result<(), FileError> {
+        let cell = |line: u64, column: usize| FilePlace::Cell {
+            line,
+            column: column + 1,
+        };
+        let expected = || "a finite number".to_owned();
+        for &column in columns {
+            if let Some((line, word)) = &self.words[column] {
+                return Err(self.error(cell(*line, column), expected(), format!("`{word}`")));
+            }
+            if let Some(line) = self.missing[column].filter(|_| self.options.gaps == Gaps::Refuse) {
+                return Err(self.error(cell(line, column), expected(), "none".into()));
+            }
+        }
+        if self.options.gaps == Gaps::Keep {
+            self.rows = (0..self.values.nrows()).collect();
+            return Ok(());
+        }
+        let whole = |row: &usize| columns.iter().all(|at| !self.values[[*row, *at]].is_nan());
+        self.rows = (0..self.values.nrows()).filter(whole).collect();
+        let (left, all) = (self.values.nrows() - self.rows.len(), self.values.nrows());
+        if self.rows.is_empty() {
+            let expected = "at least one row with a number in each column".into();
+            return Err(self.error(FilePlace::File, expected, "none".into()));
+        }
+        if left > 0 {
+            let note = format!(
+                "{left} of {all} rows have a cell without a number and are left out: rows are \
+                 counted without them"
+            );
+            self.notes.push(note);
+        }
+        Ok(())
     }
 
     /// The position of the first of `names` that occurs, which must not occur twice.
@@ -98,7 +213,7 @@ impl Table {
     }
 
     fn headings(&self) -> Vec<Heading> {
-        self.header.iter().map(|text| heading(text)).collect()
+        self.header.iter().map(|text| Heading::of(text)).collect()
     }
 
     fn error(&self, place: FilePlace, expected: String, found: String) -> FileError {
@@ -133,17 +248,60 @@ pub fn read_columns<const N: usize>(
     path: impl AsRef<Path>,
     wanted: [(&[&str], &str); N],
 ) -> Result<[Vec<f64>; N], FileError> {
-    read_table(path)?.columns(wanted)
+    read_table_with(path, &strict())?.columns(wanted)
 }
 
-/// Reads a table of finite numbers.
+/// Reads a table of numbers with rows of one length: text, `.npy`, `.npz` or `.mat`.
 ///
 /// # Errors
-/// [`FileError`] where the file cannot be read, a field is no finite number, rows differ in length,
-/// or there are none.
+/// [`FileError`] where the file cannot be read, is another kind of file, rows differ in length, or
+/// there are none.
 pub fn read_table(path: impl AsRef<Path>) -> Result<Table, FileError> {
-    let finite = |field: &str| field.parse().ok().filter(|v: &f64| v.is_finite());
-    parse_table(path.as_ref(), "a finite number", finite)
+    read_table_with(path, &TableOptions::default())
+}
+
+/// As [`read_table`], with options.
+///
+/// # Errors
+/// As [`read_table`].
+pub fn read_table_with(path: impl AsRef<Path>, options: &TableOptions) -> Result<Table, FileError> {
+    let path = path.as_ref();
+    let bytes = read_bytes(path)?;
+    let found = numbers::cells(&bytes, path);
+    let found = found.unwrap_or_else(|| cells(&bytes, path, options.skip_lines))?;
+    let Cells {
+        header,
+        values,
+        columns,
+        missing,
+        words,
+        notes,
+    } = found;
+    let rows = values.len() / columns.max(1);
+    let values = Array2::from_shape_vec((rows, columns), values).unwrap_or_default();
+    let table = Table {
+        header,
+        rows: (0..rows).collect(),
+        values,
+        notes,
+        missing,
+        words,
+        options: options.clone(),
+        path: path.into(),
+    };
+    if table.values.is_empty() {
+        let expected = "at least one row of numbers".into();
+        return Err(table.error(FilePlace::File, expected, "none".into()));
+    }
+    Ok(table)
+}
+
+/// Options of what a program's own code reads: no row is left out unseen.
+fn strict() -> TableOptions {
+    TableOptions {
+        gaps: Gaps::Refuse,
+        ..TableOptions::default()
+    }
 }
 
 /// Reads a matrix `[row, column]`. Empty cells and `nan` are NaN.
@@ -163,26 +321,38 @@ pub fn read_table(path: impl AsRef<Path>) -> Result<Table, FileError> {
 /// # Errors
 /// [`FileError`], see the [module](super).
 pub fn read_grid(path: impl AsRef<Path>) -> Result<Array2<f64>, FileError> {
-    let expected = NUMBER_OR_GAP;
-    let table = parse_table(path.as_ref(), expected, number_or_gap)?;
+    let mut table = read_table(path)?;
+    let expected = "a number, `nan` or an empty cell";
     // A matrix has no names. A line of words is the header of another kind of table.
-    match table.header.first() {
-        None => Ok(table.values),
-        Some(word) => {
-            let place = FilePlace::Cell { line: 1, column: 1 };
-            Err(table.error(place, expected.into(), format!("`{word}`")))
+    let word = table.header.first().map(|word| (1, word.clone()));
+    let words = table.words.iter().enumerate();
+    let words = words.filter_map(|(column, word)| Some((column + 1, word.clone()?)));
+    let first = words.min_by_key(|(_, (line, _))| *line);
+    if let Some((column, (line, word))) = word.map(|word| (1, word)).or(first) {
+        let place = FilePlace::Cell { line, column };
+        return Err(table.error(place, expected.into(), format!("`{word}`")));
+    }
+    // pandas writes the numbers of columns above and those of rows beside a matrix.
+    let (rows, columns) = table.values.dim();
+    let counts = |k: usize, value: &f64| {
+        if k == 0 {
+            value.is_nan()
+        } else {
+            *value == k as f64 - 1.0
         }
+    };
+    let is_counted = |line: ndarray::ArrayView1<'_, f64>| {
+        line.iter().enumerate().all(|(k, value)| counts(k, value))
+    };
+    if rows > 1
+        && columns > 1
+        && is_counted(table.values.row(0))
+        && is_counted(table.values.column(0))
+    {
+        let whole = table.values.slice_axis(Axis(0), (1..).into());
+        table.values = whole.slice_axis(Axis(1), (1..).into()).to_owned();
     }
-}
-
-/// A field of a table that may have gaps.
-const NUMBER_OR_GAP: &str = "a number, `nan` or an empty cell";
-
-fn number_or_gap(field: &str) -> Option<f64> {
-    match field {
-        "" => Some(f64::NAN),
-        field => field.parse().ok().filter(|v: &f64| !v.is_infinite()),
-    }
+    Ok(table.values)
 }
 
 /// Points of a file whose number of coordinates is not known beforehand.
@@ -194,26 +364,146 @@ pub enum PointTable {
     Space(Vec<Point3<f64>>),
 }
 
-/// Reads points with two or three coordinates, as many as the file has, and whether the file names
-/// the unit of its coordinates. They are in metres if it does, and in the file's own unit if not.
-///
-/// # Errors
-/// [`FileError`], see the [module](super).
-pub fn read_point_table(path: impl AsRef<Path>) -> Result<(PointTable, bool), FileError> {
-    point_table(&read_table(path)?)
+/// The points of a table.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct Points {
+    /// The points, in metres if the table names a unit of lengths, else in its own unit.
+    pub points: PointTable,
+    /// Whether they are in metres.
+    pub metric: bool,
+    /// The row of each in its table, from 0.
+    pub rows: Vec<usize>,
+    /// What was taken for granted, a sentence each.
+    pub notes: Vec<String>,
+    /// Rows of the table, those without numbers included.
+    table_rows: usize,
 }
 
-/// As [`read_point_table`], with empty cells and `nan` as NaN: a row then is a row of other files.
+impl Points {
+    /// Of two tables of as many rows, keeps the points whose row has numbers in both.
+    pub fn keep_shared_rows(&mut self, other: &mut Self) {
+        if self.table_rows != other.table_rows || self.rows == other.rows {
+            return;
+        }
+        let [own, others] = [&*self, &*other].map(|points| points.rows.clone());
+        self.keep(|row| others.binary_search(&row).is_ok());
+        other.keep(|row| own.binary_search(&row).is_ok());
+    }
+
+    fn keep(&mut self, is_kept: impl Fn(usize) -> bool) {
+        let rows = std::mem::take(&mut self.rows);
+        let kept: Vec<usize> = (0..rows.len()).filter(|k| is_kept(rows[*k])).collect();
+        self.points = match &self.points {
+            PointTable::Plane(all) => PointTable::Plane(kept.iter().map(|k| all[*k]).collect()),
+            PointTable::Space(all) => PointTable::Space(kept.iter().map(|k| all[*k]).collect()),
+        };
+        self.rows = kept.iter().map(|k| rows[*k]).collect();
+    }
+}
+
+/// Reads points with two or three coordinates, as many as the file has. A table of tracked points
+/// with a column of frames gives the points of each frame, in ascending order.
+///
+/// ```
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// use tactile_files::io::{PointTable, TableOptions, read_point_frames};
+/// let folder = tempfile::tempdir()?;
+/// let path = folder.path().join("trackpy.csv");
+/// std::fs::write(&path, ",y,x,mass,frame,particle\n0,2,1,9,0,0\n1,3,nan,9,0,1\n2,4,5,9,1,0\n")?;
+/// let frames = read_point_frames(&path, &TableOptions::default())?;
+/// assert_eq!(frames[0].points, PointTable::Plane(vec![[1.0, 2.0].into()]));
+/// assert_eq!((frames.len(), frames[1].rows[0]), (2, 2));
+/// # Ok(()) }
+/// ```
 ///
 /// # Errors
 /// [`FileError`], see the [module](super).
-pub fn read_point_rows(path: impl AsRef<Path>) -> Result<(PointTable, bool), FileError> {
-    point_table(&parse_table(path.as_ref(), NUMBER_OR_GAP, number_or_gap)?)
+pub fn read_point_frames(
+    path: impl AsRef<Path>,
+    options: &TableOptions,
+) -> Result<Vec<Points>, FileError> {
+    let mut table = read_table_with(path, options)?;
+    let (points, metric) = points_of(&mut table)?;
+    let whole = Points {
+        points,
+        metric,
+        rows: table.rows.clone(),
+        notes: table.notes.clone(),
+        table_rows: table.values.nrows(),
+    };
+    let headings = table.headings();
+    let place = |names: &[&str]| {
+        headings
+            .iter()
+            .position(|h| names.contains(&h.name.as_str()))
+    };
+    let Some(frame) = place(FRAME).filter(|_| place(AXES[0]).is_some()) else {
+        return Ok(vec![whole]);
+    };
+    let numbers = table.rows.iter().map(|row| table.values[[*row, frame]]);
+    let mut distinct: Vec<f64> = numbers.collect();
+    distinct.sort_by(f64::total_cmp);
+    distinct.dedup();
+    if distinct.len() < 2 {
+        return Ok(vec![whole]);
+    }
+    let of_frame = |number: &f64| {
+        let mut points = whole.clone();
+        points.keep(|row| table.values[[row, frame]].total_cmp(number).is_eq());
+        points
+    };
+    Ok(distinct.iter().map(of_frame).collect())
+}
+
+/// Points of a table, and whether they are in metres.
+fn points_of(table: &mut Table) -> Result<(PointTable, bool), FileError> {
+    let headings = table.headings();
+    let has_z = headings.iter().any(|h| AXES[2].contains(&h.name.as_str()));
+    let count = match (table.options.columns.len(), headings.is_empty()) {
+        (0, false) => 2 + usize::from(has_z),
+        (0, true) => table.values.ncols(),
+        (chosen, _) => chosen,
+    };
+    let points = match count {
+        2 => PointTable::Plane(to_points(table)?),
+        3 => PointTable::Space(to_points(table)?),
+        found => {
+            let expected = "2 or 3 columns".into();
+            return Err(table.error(FilePlace::Line(1), expected, found.to_string()));
+        }
+    };
+    let x = named(&headings, AXES[0]);
+    if x.is_some_and(|x| x.name != "x") && table.options.columns.is_empty() {
+        let taken = AXES[..count]
+            .iter()
+            .filter_map(|axis| named(&headings, axis));
+        let names: Vec<&str> = taken.map(|heading| heading.name.as_str()).collect();
+        let note = format!("the coordinates are the columns {}", names.join(", "));
+        table.notes.push(note);
+    }
+    Ok((
+        points,
+        x.is_some_and(|x| x.unit.is_some() && !x.is_in_pixels()),
+    ))
+}
+
+/// The heading of the first of these names that is there.
+fn named<'a>(headings: &'a [Heading], names: &[&str]) -> Option<&'a Heading> {
+    let mut names = names.iter();
+    names.find_map(|name| headings.iter().find(|heading| heading.name == *name))
+}
+
+fn with_gaps() -> TableOptions {
+    TableOptions {
+        gaps: Gaps::Keep,
+        ..TableOptions::default()
+    }
 }
 
 /// Reads points and where they go: columns `x`, `y` and, in space, `z` with the displacements `u`,
-/// `v` and `w` (also `u_x`, `u_y`, `u_z`), in one unit. Empty cells and `nan` are NaN. Gives points
-/// before and after, and whether the file names the unit.
+/// `v` and `w` (also `u_x` and `displacement_x`), in one unit. Empty cells and `nan` are NaN. Gives
+/// points before and after, and whether the file names the unit.
 ///
 /// ```
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -234,51 +524,44 @@ pub fn read_point_rows(path: impl AsRef<Path>) -> Result<(PointTable, bool), Fil
 /// # Errors
 /// [`FileError`], among others where a displacement has no column or another unit.
 pub fn read_displaced_points(path: impl AsRef<Path>) -> Result<([PointTable; 2], bool), FileError> {
-    let table = parse_table(path.as_ref(), NUMBER_OR_GAP, number_or_gap)?;
+    let mut table = read_table_with(path, &with_gaps())?;
+    let (before, metric) = points_of(&mut table)?;
     let headings = table.headings();
-    let unit = |name: &str| {
-        let named = headings.iter().find(|h| h.name == name);
-        named.map(|h| h.unit.as_deref())
-    };
-    let names: [&[&str]; 3] = [
-        &["u", "u_x", "ux"],
-        &["v", "u_y", "uy"],
-        &["w", "u_z", "uz"],
-    ];
-    let (before, has_unit) = point_table(&table)?;
+    let x = named(&headings, AXES[0]);
+    let has_unit = x.is_some_and(|x| x.unit.is_some());
     let axes = if matches!(before, PointTable::Plane(_)) {
         2
     } else {
         3
     };
-    for names in &names[..axes] {
-        let Some(found) = names.iter().find_map(|name| unit(name)) else {
+    for names in &DISPLACEMENTS[..axes] {
+        let Some(found) = named(&headings, names) else {
             let expected = format!("a column named `{}` beside the coordinates", names[0]);
             let found = format!("`{}`", table.header.join("`, `"));
             return Err(table.error(FilePlace::Line(1), expected, found));
         };
-        if found.is_some() != unit("x").flatten().is_some() {
+        if found.unit.is_some() != has_unit {
             let expected = format!("the unit of `{}` beside that of `x`, or none", names[0]);
-            let found = found.unwrap_or("none").to_owned();
+            let found = found.unit.clone().unwrap_or_else(|| "none".into());
             return Err(table.error(FilePlace::Line(1), expected, found));
         }
     }
-    let base = if unit("x").flatten() == Some("px") {
+    let base = if x.is_some_and(Heading::is_in_pixels) {
         "px"
     } else {
         "m"
     };
     let after = match &before {
         PointTable::Plane(points) => {
-            let columns = table.columns([(names[0], base), (names[1], base)])?;
-            PointTable::Plane(displaced(points, &columns))
+            let wanted = [DISPLACEMENTS[0], DISPLACEMENTS[1]].map(|names| (names, base));
+            PointTable::Plane(displaced(points, &table.columns(wanted)?))
         }
         PointTable::Space(points) => {
-            let columns = table.columns(names.map(|names| (names, base)))?;
-            PointTable::Space(displaced(points, &columns))
+            let wanted = DISPLACEMENTS.map(|names| (names, base));
+            PointTable::Space(displaced(points, &table.columns(wanted)?))
         }
     };
-    Ok(([before, after], has_unit))
+    Ok(([before, after], metric))
 }
 
 /// Points, each moved by its row of displacements.
@@ -289,31 +572,6 @@ fn displaced<const D: usize>(
     let rows = points.iter().enumerate();
     rows.map(|(row, p)| Point::from(std::array::from_fn(|k| p[k] + columns[k][row])))
         .collect()
-}
-
-fn point_table(table: &Table) -> Result<(PointTable, bool), FileError> {
-    let headings = table.headings();
-    let mut has_z = headings.iter().any(|h| h.name == "z");
-    if headings.is_empty() {
-        has_z = match table.values.ncols() {
-            2 => false,
-            3 => true,
-            found => {
-                let expected = "2 or 3 columns".into();
-                return Err(table.error(FilePlace::Line(1), expected, found.to_string()));
-            }
-        };
-    }
-    let unit = headings
-        .into_iter()
-        .find(|h| h.name == "x")
-        .and_then(|h| h.unit);
-    let points = if has_z {
-        PointTable::Space(to_points(table)?)
-    } else {
-        PointTable::Plane(to_points(table)?)
-    };
-    Ok((points, unit.is_some_and(|unit| unit != "px")))
 }
 
 /// Reads points with `D` coordinates, a row each.
@@ -340,182 +598,34 @@ fn point_table(table: &Table) -> Result<(PointTable, bool), FileError> {
 pub fn read_points<const D: usize>(
     path: impl AsRef<Path>,
 ) -> Result<Vec<Point<f64, D>>, FileError> {
-    to_points(&read_table(path)?)
+    to_points(&mut read_table_with(path, &strict())?)
 }
 
-fn to_points<const D: usize>(table: &Table) -> Result<Vec<Point<f64, D>>, FileError> {
+fn to_points<const D: usize>(table: &mut Table) -> Result<Vec<Point<f64, D>>, FileError> {
     let headings = table.headings();
-    let find = |axis: &str| headings.iter().find(|h| h.name == axis);
-    if D == 2 && find("z").is_some() {
+    let chosen = !table.options.columns.is_empty();
+    let find = |axis: usize| named(&headings, AXES[axis]);
+    if D == 2 && find(2).is_some() && !chosen {
         return Err(table.error(FilePlace::Line(1), columns_in_words(2), "3".into()));
     }
     // Positions of tracked points are often in pixels, which have no length here.
-    let in_pixels = find("x").is_some_and(|h| h.unit.as_deref() == Some("px"));
+    let in_pixels = find(0).is_some_and(Heading::is_in_pixels);
     let unit = if in_pixels { "px" } else { "m" };
-    let axes = [["x"], ["y"], ["z"]];
-    let columns = table.columns(std::array::from_fn::<_, D, _>(|i| (&axes[i][..], unit)))?;
-    let with_unit = |axis: &&[&str; 1]| find(axis[0]).is_some_and(|h| h.unit.is_some());
+    let columns = table.columns(std::array::from_fn::<_, D, _>(|i| (AXES[i], unit)))?;
+    let with_unit = |axis: usize| find(axis).is_some_and(|h| h.unit.is_some());
     // A unit beside one coordinate and none beside another leaves open what the other is in.
-    if axes[..D].iter().any(|axis| with_unit(&axis))
-        && !headings.is_empty()
-        && let Some(axis) = axes[..D].iter().find(|axis| !with_unit(axis))
+    if (0..D).any(with_unit)
+        && !chosen
+        && let Some(axis) = (0..D).find(|axis| !with_unit(*axis))
     {
-        let expected = format!("a unit of the column `{}`, as others have one", axis[0]);
+        let expected = format!(
+            "a unit of the column `{}`, as others have one",
+            AXES[axis][0]
+        );
         return Err(table.error(FilePlace::Line(1), expected, "none".into()));
     }
-    let rows = 0..table.values.nrows();
+    let rows = 0..columns.first().map_or(0, Vec::len);
     Ok(rows
         .map(|row| Point::from(std::array::from_fn(|i| columns[i][row])))
         .collect())
-}
-
-fn columns_in_words(count: usize) -> String {
-    format!("{count} column{}", if count == 1 { "" } else { "s" })
-}
-
-/// The base unit and the value in SI of a unit. Both signs for micro are `u`.
-fn in_si(unit: &str) -> Option<(&'static str, f64)> {
-    let unit = unit.replace(['µ', 'μ'], "u");
-    if ["px", "grey_levels", "1"].contains(&unit.as_str()) {
-        return Some(("1", 1.0));
-    }
-    ["m", "N", "Pa", "s"].into_iter().find_map(|base| {
-        let factor = match unit.strip_suffix(base)? {
-            "n" => 1e-9,
-            "u" => 1e-6,
-            "m" => 1e-3,
-            "c" => 1e-2,
-            "" => 1.0,
-            "k" => 1e3,
-            "M" => 1e6,
-            "G" => 1e9,
-            _ => return None,
-        };
-        Some((base, factor))
-    })
-}
-
-/// Cuts `Force (mN)`, `x [µm]`, `depth mm` or `indentation_um` into name and unit.
-fn heading(text: &str) -> Heading {
-    let bracketed = || {
-        let inside = text.strip_suffix([')', ']'])?;
-        inside.rsplit_once(['(', '['])
-    };
-    let suffixed = || {
-        let cuts = text.match_indices(['_', ' ']);
-        let mut parts = cuts.map(|(at, _)| (&text[..at], &text[at + 1..]));
-        parts.find(|(name, unit)| !name.is_empty() && in_si(unit).is_some())
-    };
-    // Whatever stands in brackets is meant as a unit, a word after a blank or a line only if it is
-    // one.
-    let (name, unit) = match bracketed().or_else(suffixed) {
-        Some((name, unit)) => (name, Some(unit.trim().to_owned())),
-        None => (text, None),
-    };
-    let name = name.trim().trim_end_matches('_').to_lowercase();
-    Heading { name, unit }
-}
-
-/// Parses a file whose fields are `expected` and read by `number`.
-///
-/// A field becomes a number at once, so that a file of any shape needs little more memory than its
-/// numbers.
-fn parse_table(
-    path: &Path,
-    expected: &str,
-    number: impl Fn(&str) -> Option<f64>,
-) -> Result<Table, FileError> {
-    let bytes = read_bytes(path)?;
-    let error =
-        |place, expected: &str, found: &str| FileError::content(path, place, expected, found);
-    if bytes.starts_with(b"\xff\xfe") || bytes.starts_with(b"\xfe\xff") {
-        return Err(error(FilePlace::File, "UTF-8 text", "UTF-16 text"));
-    }
-    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&bytes);
-    let is_passed_over = |line: &[u8]| line.is_empty() || line.starts_with(b"#");
-    // The first line that is not passed over decides for the whole file.
-    let mut lines = bytes.split(|b| *b == b'\n').map(<[u8]>::trim_ascii);
-    let first = lines.find(|line| !is_passed_over(line)).unwrap_or_default();
-    let separators = [b',', b';', b'\t'].into_iter();
-    let delimiter = separators
-        .clone()
-        .find(|separator| first.contains(separator));
-    let mut reader = csv::ReaderBuilder::new()
-        .has_headers(false)
-        .flexible(true)
-        .comment(Some(b'#'))
-        .delimiter(delimiter.unwrap_or(b','))
-        .from_reader(bytes);
-    let (mut header, mut values, mut columns) = (Vec::new(), Vec::new(), None);
-    let mut record = csv::ByteRecord::new();
-    loop {
-        let start = reader.position().clone();
-        let more = reader.read_byte_record(&mut record);
-        // Lines that are passed over belong to the record that follows them.
-        let line = || {
-            let lines = bytes[start.byte() as usize..].split(|b| *b == b'\n');
-            let before = lines.take_while(|line| is_passed_over(line.trim_ascii()));
-            start.line() + before.count() as u64
-        };
-        match more {
-            Ok(true) => {}
-            Ok(false) => break,
-            Err(error) => {
-                return Err(FileError::Rejected {
-                    path: path.into(),
-                    place: FilePlace::Line(line()),
-                    source: error.into(),
-                });
-            }
-        }
-        record.trim();
-        let field = |bytes| -> String {
-            let text = String::from_utf8_lossy(bytes);
-            text.trim_matches(|c: char| c == '"' || c.is_whitespace())
-                .into()
-        };
-        // Lines of blanks, and comments after blanks, are records to the parser.
-        if record.len() == 1 && record[0].is_empty() || record[0].starts_with(b"#") {
-            continue;
-        }
-        // A header is a first line with a word and without a number.
-        if columns.is_none() {
-            let fields: Vec<String> = record.iter().map(field).collect();
-            columns = Some(fields.len());
-            let no_number = fields.iter().all(|field| field.parse::<f64>().is_err());
-            if no_number && fields.iter().any(|field| !field.is_empty()) {
-                header = fields.iter().map(|field| quoted(field, 40)).collect();
-                continue;
-            }
-        }
-        for (column, bytes) in record.iter().enumerate() {
-            let text = field(bytes);
-            values.push(number(&text).ok_or_else(|| {
-                let (line, column) = (line(), column + 1);
-                let found = format!("`{}`", quoted(&text, 40));
-                error(FilePlace::Cell { line, column }, expected, &found)
-            })?);
-        }
-        if let Some(columns) = columns.filter(|columns| *columns != record.len()) {
-            let found = record.len().to_string();
-            return Err(error(
-                FilePlace::Line(line()),
-                &columns_in_words(columns),
-                &found,
-            ));
-        }
-    }
-    let columns = columns.unwrap_or(1);
-    match Array2::from_shape_vec((values.len() / columns, columns), values) {
-        Ok(values) if !values.is_empty() => Ok(Table {
-            header,
-            values,
-            path: path.into(),
-        }),
-        _ => Err(error(
-            FilePlace::File,
-            "at least one row of numbers",
-            "none",
-        )),
-    }
 }

@@ -343,8 +343,152 @@ fn jpeg_frames_of_a_video_are_those_that_were_recorded() {
         .rposition(|name| name == b"MJPG")
         .unwrap();
     another[codec..codec + 4].copy_from_slice(b"H264");
-    let says = "pipe: expected a video of JPEG frames (MJPG), found the codec `H264`";
-    assert_eq!(frames_of(&another).1.as_deref(), Some(says));
+    breaks_off(&another, 0, "found the codec `H264`: pipe it by ffmpeg -i");
+}
+
+#[test]
+fn jpeg_frames_follow_each_other_with_or_without_their_tables() {
+    let (mut whole, mut bare) = (Vec::new(), Vec::new());
+    for frame in three_frames() {
+        let image = ImageBuffer::<Luma<u8>, _>::from_raw(5, 3, frame.into_raw_vec_and_offset().0);
+        let mut bytes = Cursor::new(Vec::new());
+        image
+            .unwrap()
+            .write_to(&mut bytes, ImageFormat::Jpeg)
+            .unwrap();
+        let mut jpeg = bytes.into_inner();
+        whole.extend(&jpeg);
+        while let Some(at) = jpeg.windows(2).position(|marker| marker == [0xff, 0xc4]) {
+            let length = usize::from(jpeg[at + 2]) * 256 + usize::from(jpeg[at + 3]);
+            jpeg.drain(at..at + 2 + length);
+        }
+        bare.extend(jpeg);
+    }
+    let (frames, broken) = frames_of(&whole);
+    assert_eq!((frames.len(), broken), (3, None));
+    assert_eq!(frames_of(&bare), (frames, None));
+}
+
+#[test]
+fn dropped_and_damaged_frames_of_a_video_leave_the_others_their_times() {
+    let second = CLIP
+        .windows(4)
+        .enumerate()
+        .filter(|(_, name)| *name == b"00dc");
+    let second = second.map(|(at, _)| at).nth(2).unwrap();
+    let mut bytes = CLIP.to_vec();
+    // The table of quantisation is what a decoder cannot do without.
+    let damaged = second
+        + 8
+        + bytes[second..]
+            .windows(2)
+            .position(|m| m == [0xff, 0xdb])
+            .unwrap()
+        - 8;
+    bytes[damaged + 1] = 0xfe;
+    bytes.splice(second..second, *b"00dc\0\0\0\0");
+    let mut reader = FrameReader::new(Cursor::new(bytes), "clip", 80.0).unwrap();
+    let mut frame = ndarray::Array2::zeros((0, 0));
+    let mut times = Vec::new();
+    while let Some(time_s) = reader.next_frame(&mut frame).unwrap() {
+        times.push((time_s * 25.0).round());
+    }
+    // One dropped, then one damaged, at 25 frames a second.
+    assert_eq!(times, [0.0, 3.0]);
+    let (dropped, damaged, sentences) = reader.passed_over();
+    assert_eq!((dropped, damaged), (1, 1));
+    assert!(sentences[0].starts_with("frame 3: "), "{sentences:?}");
+}
+
+#[test]
+fn tables_of_other_programs_are_read() {
+    let pts = "point\n2\n1.5 2\n3 4\n";
+    let slicer = "# columns = id,x,y,label\n1,1.5,2,F-1\n2,3,4,F-2\n";
+    let trackmate = "LABEL,POSITION_X,POSITION_Y\nName,X,Y\n,(px),(px)\nID1,1.5,2\nID2,3,4\n";
+    for text in [
+        "x y\n1.5 2\n3 4\n",
+        "# x\ty\n1.5\t2\n3\t4\n",
+        "% y, x\n2,1.5\n4,3\n",
+        "# probe 3\n  1.5   2\n  3     4\n",
+        "x;y\n1,5;2\n3;4\n",
+        "1,5 2,0\n3,0 4,0\n",
+        "COORDINATE_X,COORDINATE_Y,SIGMA\n1.5,2,word\n3,4,0\n",
+        "label,\"Points:0\",\"Points:1\"\na,1.5,2,\nb,3,4,\n",
+        pts,
+        slicer,
+        trackmate,
+    ] {
+        let file = file(text);
+        let frames = read_point_frames(&file.path, &TableOptions::default()).unwrap();
+        let expected = vec![[1.5, 2.0].into(), [3.0, 4.0].into()];
+        assert_eq!(frames[0].points, PointTable::Plane(expected), "{text}");
+    }
+    // A heading that is a comment has units, and a row without a number is left out and counted.
+    let file = file("# depth_um, darkness\n5, 1\n-, 2\n7, 3\n");
+    let mut table = read_table(&file.path).unwrap();
+    let depth = table.columns([(&["depth"], "mm")]).unwrap();
+    assert_eq!(depth, [[5.0 * 1e-6, 7.0 * 1e-6]]);
+    assert!(
+        table.notes[1].starts_with("1 of 3 rows"),
+        "{:?}",
+        table.notes
+    );
+}
+
+#[test]
+fn arrays_of_numbers_are_tables() {
+    let header = "{'descr': '>i2', 'fortran_order': True, 'shape': (3, 2), }";
+    let mut npy = b"\x93NUMPY\x01\0".to_vec();
+    npy.extend((header.len() as u16).to_le_bytes());
+    npy.extend(
+        header
+            .bytes()
+            .chain([0, 1, 0, 2, 0, 3, 0xff, 0xfc, 0, 5, 0, 6]),
+    );
+    let read = |bytes: &[u8]| read_table(&file(bytes).path).map(|table| table.values);
+    assert_eq!(
+        read(&npy).unwrap(),
+        ndarray::array![[1.0, -4.0], [2.0, 5.0], [3.0, 6.0]]
+    );
+    let element = |kind: u8, content: &[u8]| {
+        let mut bytes = vec![kind, 0, 0, 0, content.len() as u8, 0, 0, 0];
+        bytes.extend(content);
+        bytes.resize(bytes.len().next_multiple_of(8), 0);
+        bytes
+    };
+    // A matrix of 1 × 2 doubles, which are stored as bytes: a column.
+    let sides = element(5, &[1, 0, 0, 0, 2, 0, 0, 0]);
+    let parts = [
+        element(6, &[6, 0, 0, 0, 0, 0, 0, 0]),
+        sides,
+        element(1, b"x"),
+        element(2, &[7, 9]),
+    ];
+    let mut mat = format!("{:<126}IM", "MATLAB 5.0 MAT-file").into_bytes();
+    mat.extend(element(14, &parts.concat()));
+    assert_eq!(read(&mat).unwrap(), ndarray::array![[7.0], [9.0]]);
+    assert!(sentence(read(&mat[..150])).contains("one array of numbers"));
+}
+
+#[test]
+fn what_is_no_table_is_named_with_its_remedy() {
+    let cases = [
+        (&b"\x89PNG\r\n\x1a\n"[..], "found a PNG image"),
+        (b"\x89HDF\r\n\x1a\n", "save .mat by `save -v7`"),
+        (&[7, 0, 1, 2], "a binary file of an unknown kind"),
+        (
+            b"Gauge: A\nGain 5\ndepth,force\n1,2\n3,4\n",
+            "--skip-lines 2",
+        ),
+        (
+            b"# x_mm, y_mm\n1,2,3\n4,5,6\n",
+            "a heading of 3 columns, found the comment",
+        ),
+    ];
+    for (bytes, words) in cases {
+        let text = sentence(read_table(&file(bytes).path));
+        assert!(text.contains(words), "{text} lacks {words}");
+    }
 }
 
 /// So many frames come of the bytes, then a sentence with these words.
@@ -457,7 +601,7 @@ fn what_is_no_stream_is_refused_in_a_sentence() {
         ("", "pipe: expected a video or an image, found no bytes"),
         (
             "no stream at all",
-            "known by its first bytes, found no stream",
+            "found a text that begins with `no stream ",
         ),
         ("P5\n0 0\n255\n", pgm),
         ("P5\n3 1\n70000\nabc", pgm),

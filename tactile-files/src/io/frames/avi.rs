@@ -1,5 +1,7 @@
-//! JPEG frames in AVI files, as webcams and microscopes record them.
-use super::{Broken, append, quoted};
+//! AVI files of JPEG or uncompressed frames, as webcams and microscopes record them.
+use super::jpeg::with_tables;
+use super::{Broken, Encoded, append, is_read, quoted};
+use ::image::{DynamicImage, ImageBuffer};
 use std::io::{BufRead, Read, Result as IoResult, copy, sink};
 
 /// The chunks of an AVI file up to its frames, and these.
@@ -13,11 +15,42 @@ pub struct Avi {
     video: Option<usize>,
     /// The number of frames that the header announces. It is none in a file that was left open.
     announced: u64,
-    frames: u64,
+    /// Frames so far, those that the recorder dropped included.
+    pub frames: u64,
+    pixels: Pixels,
+    columns: usize,
+    rows: usize,
+}
+
+/// How a frame is stored.
+#[derive(Clone, Copy, Default)]
+enum Pixels {
+    #[default]
+    Jpeg,
+    /// The luma of all pixels comes first.
+    Planar,
+    /// Luma and chroma by turns, the luma at this byte of two.
+    Packed(usize),
+    /// Blue, green and red, the lowest row first.
+    Bgr,
+}
+
+impl Pixels {
+    fn of(codec: &[u8], bits: u32) -> Option<Self> {
+        match codec.to_ascii_uppercase().as_slice() {
+            b"MJPG" | b"JPEG" | b"AVRN" | b"DMB1" => Some(Self::Jpeg),
+            b"I420" | b"IYUV" | b"YV12" | b"NV12" | b"NV21" | b"Y800" | b"Y8  " | b"GREY"
+            | b"GRAY" => Some(Self::Planar),
+            b"YUY2" | b"YUYV" | b"YUNV" | b"YVYU" => Some(Self::Packed(0)),
+            b"UYVY" | b"Y422" => Some(Self::Packed(1)),
+            [0, 0, 0, 0] | b"DIB " if bits == 24 => Some(Self::Bgr),
+            _ => None,
+        }
+    }
 }
 
 impl Avi {
-    const EXPECTED: &str = "a video of JPEG frames (MJPG)";
+    const EXPECTED: &str = "a video of JPEG frames (MJPG) or of uncompressed ones";
 
     /// Reads up to the first frame.
     pub fn open(input: &mut dyn BufRead) -> Result<Self, Broken> {
@@ -58,9 +91,17 @@ impl Avi {
             }
             b"strf" if self.video.is_some_and(|video| video + 1 == self.streams) => {
                 let codec = head.get(16..20).unwrap_or_default();
-                if ![&b"MJPG"[..], b"mjpg", b"JPEG", b"jpeg"].contains(&codec) {
+                let Some(pixels) = Pixels::of(codec, number(14) & 0xffff) else {
                     let codec = String::from_utf8_lossy(codec);
-                    let found = format!("the codec `{}`", quoted(&codec, 4));
+                    let found = format!("the codec `{}`: {}", quoted(&codec, 4), super::PIPE);
+                    return Err(Broken::new(Self::EXPECTED, found));
+                };
+                self.pixels = pixels;
+                // The height is negative if the highest row comes first.
+                let side = |at| (number(at) as i32).unsigned_abs() as usize;
+                (self.columns, self.rows) = (side(4), side(8));
+                if !matches!(pixels, Pixels::Jpeg) && !is_read(self.columns, self.rows) {
+                    let found = format!("{} × {} pixels", self.columns, self.rows);
                     return Err(Broken::new(Self::EXPECTED, found));
                 }
             }
@@ -69,9 +110,9 @@ impl Avi {
         Ok(())
     }
 
-    /// The next frame, a JPEG image. Empty chunks, which cameras write for frames that they
-    /// dropped, are passed over.
-    pub fn next(&mut self, input: &mut dyn BufRead) -> Result<Option<Vec<u8>>, Broken> {
+    /// The next frame. Empty chunks, which cameras write for frames that they dropped, are passed
+    /// over and counted.
+    pub fn next(&mut self, input: &mut dyn BufRead) -> Result<Option<Encoded<'_>>, Broken> {
         while let Some((name, size)) = chunk(input)? {
             if is_list(&name) {
                 pass_over(input, 4)?;
@@ -81,17 +122,18 @@ impl Avi {
             let number = number.and_then(|digits| digits.parse::<usize>().ok());
             let is_frame = number.is_some() && number == self.video && name[2] == b'd';
             if !is_frame || size == 0 {
+                self.frames += u64::from(is_frame);
                 pass_over(input, size + size % 2)?;
                 continue;
             }
-            let mut jpeg = Vec::new();
-            append(input, size, &mut jpeg)?;
-            if jpeg.len() < size {
-                return Err(Broken::cut(size, jpeg.len()));
+            let mut bytes = Vec::new();
+            append(input, size, &mut bytes)?;
+            self.frames += 1;
+            if bytes.len() < size {
+                return Err(Broken::cut(size, bytes.len()));
             }
             pass_over(input, size % 2)?;
-            self.frames += 1;
-            return Ok(Some(jpeg));
+            return self.frame(bytes).map(Some);
         }
         if self.frames < self.announced {
             let expected = format!("{} frames", self.announced);
@@ -101,6 +143,39 @@ impl Avi {
             ));
         }
         Ok(None)
+    }
+}
+
+impl Avi {
+    fn frame(&self, mut bytes: Vec<u8>) -> Result<Encoded<'static>, Broken> {
+        let (columns, rows) = (self.columns, self.rows);
+        let pixels = columns * rows;
+        // Rows of colours are filled up to a multiple of four bytes.
+        let width = (3 * columns).next_multiple_of(4);
+        let needed = match self.pixels {
+            Pixels::Jpeg => return Ok(Encoded::File(with_tables(bytes).into())),
+            Pixels::Planar => pixels,
+            Pixels::Packed(_) => 2 * pixels,
+            Pixels::Bgr => width * rows,
+        };
+        if bytes.len() < needed {
+            return Err(Broken::cut(needed, bytes.len()));
+        }
+        bytes.truncate(needed);
+        if let Pixels::Packed(first) = self.pixels {
+            bytes = bytes.into_iter().skip(first).step_by(2).collect();
+        }
+        let size = (columns as u32, rows as u32);
+        let image = if let Pixels::Bgr = self.pixels {
+            let lines = bytes.chunks_exact(width).rev();
+            let colours = lines.flat_map(|line| line[..3 * columns].chunks_exact(3));
+            let colours = colours.flat_map(|bgr| [bgr[2], bgr[1], bgr[0]]).collect();
+            ImageBuffer::from_raw(size.0, size.1, colours).map(DynamicImage::ImageRgb8)
+        } else {
+            ImageBuffer::from_raw(size.0, size.1, bytes).map(DynamicImage::ImageLuma8)
+        };
+        let image = image.ok_or_else(|| Broken::new(Self::EXPECTED, "another size"))?;
+        Ok(Encoded::Decoded(image))
     }
 }
 

@@ -6,6 +6,7 @@ use super::{Broken, LONGEST_HEADER, append, is_read, quoted};
 use ::image::{DynamicImage, ImageBuffer};
 use flate2::{Crc, Decompress, FlushDecompress, Status};
 use std::io::{BufRead, Error, ErrorKind, Read, Result as IoResult, copy, sink};
+use std::mem::take;
 
 /// The arrays of a stream, one after the other.
 pub struct Arrays {
@@ -118,19 +119,14 @@ impl Layout {
     }
 
     fn parse(header: &str) -> Option<Self> {
-        let after = |key: &str| Some(header.split_once(key)?.1.trim_start());
-        let kind = after("'descr':")?.strip_prefix('\'')?.split('\'').next()?;
+        let (kind, fortran, sides) = header_fields(header)?;
         let (wide, big_endian) = match kind {
             "|u1" => (false, false),
             "<u2" => (true, false),
             ">u2" => (true, true),
             _ => return None,
         };
-        let fortran = after("'fortran_order':")?.starts_with("True");
-        let shape = after("'shape':")?.strip_prefix('(')?.split_once(')')?.0;
-        let sides = shape.split(',').map(str::trim).filter(|s| !s.is_empty());
-        let sides = sides.map(str::parse).collect::<Result<Vec<usize>, _>>();
-        let (frames, rows, columns, channels) = match *sides.ok()?.as_slice() {
+        let (frames, rows, columns, channels) = match *sides.as_slice() {
             [rows, columns] => (1, rows, columns, 1),
             [rows, columns, 3] => (1, rows, columns, 3),
             [frames, rows, columns] => (frames, rows, columns, 1),
@@ -178,9 +174,39 @@ impl Layout {
     }
 }
 
+/// Kind of the numbers, whether columns come first, and shape, of an array's header.
+pub fn header_fields(header: &str) -> Option<(&str, bool, Vec<usize>)> {
+    let after = |key: &str| Some(header.split_once(key)?.1.trim_start());
+    let kind = after("'descr':")?.strip_prefix('\'')?.split('\'').next()?;
+    let fortran = after("'fortran_order':")?.starts_with("True");
+    let shape = after("'shape':")?.strip_prefix('(')?.split_once(')')?.0;
+    let sides = shape.split(',').map(str::trim).filter(|s| !s.is_empty());
+    let sides = sides.map(str::parse).collect::<Result<Vec<usize>, _>>();
+    Some((kind, fortran, sides.ok()?))
+}
+
+/// Names and contents of the files of an archive, of at most so many bytes together. `None` for one
+/// that cannot be read.
+pub fn members(mut input: &[u8], mut most: u64) -> Option<Vec<(String, Vec<u8>)>> {
+    let mut files = Vec::new();
+    while let Some(mut member) = Member::open(&mut input).ok()? {
+        let mut bytes = Vec::new();
+        let source = Source {
+            input: &mut input,
+            member: &mut member,
+        };
+        most -= source.take(most).read_to_end(&mut bytes).ok()? as u64;
+        let name = take(&mut member.name);
+        member.end(&mut input).ok()?;
+        files.push((name, bytes));
+    }
+    Some(files)
+}
+
 /// A file of an archive, as its local header announces it.
 #[derive(Default)]
 struct Member {
+    name: String,
     /// Bytes in the archive that were not read yet.
     left: u64,
     inflate: Option<Decompress>,
@@ -250,7 +276,9 @@ impl Member {
                 "another",
             ));
         }
+        let name = &names[..names.len().min(number(22, 2) as usize)];
         Ok(Some(Self {
+            name: String::from_utf8_lossy(name).into(),
             left,
             inflate,
             sum: Crc::new(),

@@ -1,0 +1,79 @@
+//! Kinds of files by their first bytes, as an error names what is there in place of what is wanted.
+
+pub const UTF_16: &str = "UTF-16 text";
+
+/// First bytes (where they stand, and what they are) and what such a file is, with the remedy.
+const KINDS: [(usize, &[u8], &str); 24] = [
+    (0, b"\xff\xfe", UTF_16),
+    (0, b"\xfe\xff", UTF_16),
+    (0, b"\x89PNG", "a PNG image"),
+    (0, b"\xff\xd8\xff", "a JPEG image"),
+    (0, b"II*\0", "a TIFF image"),
+    (0, b"MM\0*", "a TIFF image"),
+    (
+        0,
+        b"II+\0",
+        "a BigTIFF, which is not read: save it as TIFF (tifffile: bigtiff=False)",
+    ),
+    (
+        0,
+        b"MM\0+",
+        "a BigTIFF, which is not read: save it as TIFF (tifffile: bigtiff=False)",
+    ),
+    (0, b"BM", "a BMP image, which is not read: save it as PNG"),
+    (
+        0,
+        b"GIF8",
+        "a GIF, which is not read: save its frames as PNG",
+    ),
+    (0, b"P5", "a PGM image"),
+    (0, b"P6", "a PPM image"),
+    (0, b"YUV4MPEG2", "a YUV4MPEG2 video"),
+    (0, b"RIFF", "an AVI video"),
+    (4, b"ftyp", MPEG),
+    (0, b"\x1a\x45\xdf\xa3", MPEG),
+    (0, b"OggS", MPEG),
+    (0, b"\x00\x00\x01", MPEG),
+    (0, b"\x93NUMPY", "an array of NumPy"),
+    (
+        0,
+        b"PK\x03\x04",
+        "a ZIP archive: a spreadsheet is saved as CSV, arrays by numpy.savez",
+    ),
+    (
+        0,
+        b"\x89HDF",
+        "an HDF5 file: export CSV, or save .mat by `save -v7`",
+    ),
+    (0, b"MATLAB 5.0", "a .mat file of version 5"),
+    (0, b"%PDF", "a PDF"),
+    (0, b"\x1f\x8b", "a file packed by gzip: unpack it"),
+];
+
+const MPEG: &str = "a compressed video, which is not read: pipe it by \
+                    ffmpeg -i VIDEO -f yuv4mpegpipe -pix_fmt gray - | tactile … -";
+
+/// Bytes of a file that are looked at: text has no control characters among them.
+const LOOKED_AT: usize = 4096;
+
+/// What a file is that is no text. `None` for text.
+pub fn kind_of(bytes: &[u8]) -> Option<&'static str> {
+    let begins = |(at, magic, _): &&(usize, &[u8], &str)| {
+        let rest = bytes.get(*at..).unwrap_or_default();
+        // Two letters may begin a text as well.
+        rest.starts_with(magic) && (magic.len() > 2 || !is_text(bytes) || *at > 0)
+    };
+    let kind = KINDS.iter().find(begins).map(|(_, _, kind)| *kind);
+    kind.or((!is_text(bytes)).then_some(
+        "a binary file of an unknown kind: export it as CSV, or as PNG if it is an image",
+    ))
+}
+
+/// Whether a file is a text, as far as its beginning shows.
+pub fn is_text(bytes: &[u8]) -> bool {
+    let start = &bytes[..bytes.len().min(LOOKED_AT)];
+    let is_control = |byte: &&u8| byte.is_ascii_control() && !byte.is_ascii_whitespace();
+    // A stray control character is the reader's to name.
+    let controls = start.iter().filter(is_control).count();
+    !start.contains(&0) && 10 * controls <= start.len()
+}

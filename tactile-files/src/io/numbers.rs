@@ -1,0 +1,243 @@
+//! Arrays of numbers as tables: `.npy` and `.npz` of NumPy, and `.mat` of version 5.
+//!
+//! Own readers of small headers: `ndarray-npy` takes one type of numbers an array, known
+//! beforehand, and no well-kept crate reads `.mat`.
+use super::error::{FileError, FilePlace, quoted};
+use super::files::LARGEST_FILE;
+use super::frames::{ARRAY_STARTS, header_fields, members};
+use super::text::Cells;
+use flate2::read::ZlibDecoder;
+use std::io::Read;
+use std::path::Path;
+
+/// First bytes of a `.mat` file of version 5.
+const MAT_5: &[u8] = b"MATLAB 5.0";
+
+/// An array of two axes or one, which is a column, row by row.
+struct Array {
+    name: String,
+    rows: usize,
+    columns: usize,
+    values: Vec<f64>,
+}
+
+/// How numbers are stored: letter of the kind (`f`, `i`, `u`, `b`), bytes, and whether the highest
+/// byte comes first.
+type Kind = (u8, usize, bool);
+
+fn numbers(bytes: &[u8], (letter, size, big_endian): Kind) -> Option<Vec<f64>> {
+    let number = |digits: &[u8]| {
+        let mut eight = [0; 8];
+        for (to, from) in eight.iter_mut().zip(digits.iter().rev()) {
+            *to = *from;
+        }
+        if !big_endian {
+            eight[..size].reverse();
+        }
+        let whole = u64::from_le_bytes(eight);
+        let shift = 64 - 8 * size as u32;
+        Some(match (letter, size) {
+            (b'f', 8) => f64::from_bits(whole),
+            (b'f', 4) => f64::from(f32::from_bits(whole as u32)),
+            (b'u' | b'b', _) => whole as f64,
+            (b'i', _) => ((whole << shift) as i64 >> shift) as f64,
+            _ => return None,
+        })
+    };
+    if !matches!(size, 1 | 2 | 4 | 8) {
+        return None;
+    }
+    bytes.chunks_exact(size).map(number).collect()
+}
+
+/// An array of this shape, unless it has more than two axes or its numbers are not all there.
+fn array(name: &str, shape: &[usize], by_columns: bool, values: Vec<f64>) -> Option<Array> {
+    let (rows, columns) = match *shape {
+        [rows] => (rows, 1),
+        // A row vector of MATLAB is a column here.
+        [1, columns] if by_columns => (columns, 1),
+        [rows, columns] => (rows, columns),
+        _ => return None,
+    };
+    let name = quoted(name.strip_suffix(".npy").unwrap_or(name), 40);
+    let mut values = values;
+    if rows.checked_mul(columns)? != values.len() || values.is_empty() {
+        return None;
+    }
+    if by_columns && columns > 1 {
+        let at = |k: usize| values[(k % columns) * rows + k / columns];
+        values = (0..rows * columns).map(at).collect();
+    }
+    Some(Array {
+        name,
+        rows,
+        columns,
+        values,
+    })
+}
+
+/// The array of a `.npy` file, `None` for one of no numbers or of more than two axes.
+fn of_npy(name: &str, bytes: &[u8]) -> Option<Array> {
+    let wide = *bytes.get(6)? > 1;
+    let start = if wide { 12 } else { 10 };
+    let digits = bytes.get(8..start)?.iter().rev();
+    let length = digits.fold(0, |sum, digit| 256 * sum + usize::from(*digit));
+    let header = String::from_utf8_lossy(bytes.get(start..start.checked_add(length)?)?);
+    let (kind, by_columns, shape) = header_fields(&header)?;
+    let (order, rest) = kind.split_at_checked(1)?;
+    let (letter, size) = rest.split_at_checked(1)?;
+    let kind = (letter.as_bytes()[0], size.parse().ok()?, order == ">");
+    array(
+        name,
+        &shape,
+        by_columns,
+        numbers(&bytes[start + length..], kind)?,
+    )
+}
+
+/// The arrays of a `.mat` file, without those of other kinds.
+fn of_mat(bytes: &[u8]) -> Vec<Array> {
+    let big_endian = bytes.get(126) == Some(&b'M');
+    let mut rest = bytes.get(128..).unwrap_or_default();
+    let mut arrays = Vec::new();
+    while let Some((kind, element)) = element(&mut rest, big_endian) {
+        let mut unpacked = Vec::new();
+        let mut inside = element;
+        if kind == 15 {
+            let mut packed = ZlibDecoder::new(element).take(LARGEST_FILE);
+            // What can be unpacked of a damaged element shows that it is cut.
+            let _ = packed.read_to_end(&mut unpacked);
+            inside = &unpacked;
+            let Some((14, matrix)) = self::element(&mut inside, big_endian) else {
+                continue;
+            };
+            inside = matrix;
+        }
+        arrays.extend(matrix(inside, big_endian));
+    }
+    arrays
+}
+
+/// Kind and content of the next element.
+fn element<'a>(rest: &mut &'a [u8], big_endian: bool) -> Option<(u32, &'a [u8])> {
+    let all = *rest;
+    let word = |at: usize| {
+        let bytes = *all.get(at..)?.first_chunk()?;
+        Some(if big_endian {
+            u32::from_be_bytes(bytes)
+        } else {
+            u32::from_le_bytes(bytes)
+        })
+    };
+    let (kind, size) = (word(0)?, word(4)?);
+    // A small one has its size and kind in four bytes, its content in the next four.
+    let (kind, from, size, whole) = match kind >> 16 {
+        0 => (
+            kind,
+            8,
+            size as usize,
+            8 + (size as usize).next_multiple_of(8),
+        ),
+        small => (kind & 0xffff, 4, small as usize, 8),
+    };
+    let content = all.get(from..from + size)?;
+    // A compressed element is not filled up.
+    let whole = if kind == 15 { 8 + size } else { whole };
+    *rest = all.get(whole..).unwrap_or_default();
+    Some((kind, content))
+}
+
+fn matrix(mut rest: &[u8], big_endian: bool) -> Option<Array> {
+    let (_, flags) = element(&mut rest, big_endian)?;
+    let class = if big_endian {
+        flags.get(3)
+    } else {
+        flags.first()
+    };
+    // Cells, structures, objects, text and sparse matrices are no tables.
+    if !(6..=15).contains(class?) {
+        return None;
+    }
+    let (_, sides) = element(&mut rest, big_endian)?;
+    let sides = numbers(sides, (b'i', 4, big_endian))?;
+    let shape: Vec<usize> = sides.iter().map(|side| side.max(0.0) as usize).collect();
+    let (_, name) = element(&mut rest, big_endian)?;
+    let (kind, values) = element(&mut rest, big_endian)?;
+    let (letter, size) = match kind {
+        1 => (b'i', 1),
+        2 => (b'u', 1),
+        3 => (b'i', 2),
+        4 => (b'u', 2),
+        5 => (b'i', 4),
+        6 => (b'u', 4),
+        7 => (b'f', 4),
+        9 => (b'f', 8),
+        12 => (b'i', 8),
+        13 => (b'u', 8),
+        _ => return None,
+    };
+    let values = numbers(values, (letter, size, big_endian))?;
+    array(&String::from_utf8_lossy(name), &shape, true, values)
+}
+
+/// The cells of arrays: of one array, or of several columns of one length, each by its name. `None`
+/// for what holds no arrays.
+pub fn cells(bytes: &[u8], path: &Path) -> Option<Result<Cells, FileError>> {
+    let expected = "one array of numbers of two axes, or several of one axis and length";
+    let refused = |found: String| FileError::content(path, FilePlace::File, expected, found);
+    let arrays = if bytes.starts_with(ARRAY_STARTS[0]) {
+        of_npy("", bytes).into_iter().collect()
+    } else if bytes.starts_with(ARRAY_STARTS[1]) {
+        let files = members(bytes, LARGEST_FILE).unwrap_or_default();
+        let is_array = |(name, _): &&(String, _)| name.ends_with(".npy");
+        files
+            .iter()
+            .filter(is_array)
+            .filter_map(|(name, bytes)| of_npy(name, bytes))
+            .collect()
+    } else if bytes.starts_with(MAT_5) {
+        of_mat(bytes)
+    } else {
+        return None;
+    };
+    if bytes.starts_with(ARRAY_STARTS[1]) && arrays.is_empty() {
+        // A spreadsheet is an archive, too.
+        return None;
+    }
+    let mut table = Cells::default();
+    match arrays.as_slice() {
+        [] => return Some(Err(refused("none".into()))),
+        [one] => {
+            table.columns = one.columns;
+            table.values.clone_from(&one.values);
+            if one.columns == 1 {
+                table.header = vec![one.name.clone()];
+            }
+        }
+        [first, rest @ ..] => {
+            let fits = |array: &Array| array.columns == 1 && array.rows == first.rows;
+            if !(fits(first) && rest.iter().all(fits)) {
+                let names: Vec<&str> = arrays.iter().map(|array| array.name.as_str()).collect();
+                return Some(Err(refused(format!("`{}`: keep one", names.join("`, `")))));
+            }
+            table.columns = arrays.len();
+            table.header = arrays.iter().map(|array| array.name.clone()).collect();
+            let rows = 0..first.rows;
+            table.values = rows
+                .flat_map(|row| arrays.iter().map(move |a| a.values[row]))
+                .collect();
+        }
+    }
+    table.header.retain(|name| !name.is_empty());
+    table.words = vec![None; table.columns];
+    table.missing = vec![None; table.columns];
+    for (k, value) in table.values.iter_mut().enumerate() {
+        let column = k % table.columns;
+        if value.is_infinite() {
+            table.words[column].get_or_insert(((k / table.columns) as u64 + 1, "inf".into()));
+        } else if value.is_nan() {
+            table.missing[column].get_or_insert((k / table.columns) as u64 + 1);
+        }
+    }
+    Some(Ok(table))
+}
