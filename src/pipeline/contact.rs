@@ -2,13 +2,12 @@
 use super::error::PipelineError;
 use crate::force::{
     BoundingBox, Estimate, FaceReading, ForceError, ForceMeasurement, ForceWorkspace, LensGeometry,
-    LocalCalibration, Polarity, ProfileShape, ReferenceFrame, StopReason,
+    LocalCalibration, Polarity, ProfileShape, ReferenceFrame, StopReason, Uncertain,
 };
 use ndarray::{Array2, ArrayView2};
 use std::f64::consts::PI;
 use std::ops::Deref;
 use std::sync::Arc;
-use tactile_core::statistics::effective_degrees_of_freedom;
 
 /// One frame to contact and force.
 ///
@@ -34,7 +33,7 @@ use tactile_core::statistics::effective_degrees_of_freedom;
 ///     ) -> Result<FrameContact, ForceError> {
 ///         let mut contact = self.0.measure(frame, reference)?;
 ///         if let Some(reading) = &mut contact.reading {
-///             reading.force_n = Some(Estimate::new(0.98, 1e-3));
+///             reading.force_n = Some(Estimate::new(0.98, 1e-3).into());
 ///         }
 ///         Ok(contact)
 ///     }
@@ -184,16 +183,9 @@ impl<P: Deref<Target: ContactStage> + Send + Sync> ContactStage for P {
 #[non_exhaustive]
 pub struct ContactReading {
     /// Normal force in newtons. `None` where neither calibration nor gauge gives it.
-    pub force_n: Option<Estimate>,
-    /// The part of the force's error that comes from noise in the frames, in newtons.
-    pub force_noise_n: f64,
-    /// The part that comes from the calibration and is common to all frames, in newtons.
-    pub force_calibration_n: f64,
+    pub force_n: Option<Uncertain>,
     /// Contact radius in metres. Of a flat face √(A/π), that of a disc of its area.
-    pub contact_radius_m: Estimate,
-    /// The part of the radius's error that is common to frames of one load, in metres: the law of
-    /// the pressure's profile and the size of a pixel.
-    pub radius_common_m: f64,
+    pub contact_radius_m: Uncertain,
     /// Indentation in metres, where the sensor measures depth.
     pub indentation_m: Option<Estimate>,
     /// Centroid (x, y) in pixels.
@@ -203,7 +195,7 @@ pub struct ContactReading {
     /// Greatest signal: grey levels above (or below) the reference.
     pub peak_grey: f64,
     /// Stress at the contact's centre in pascals, where the sensor is calibrated.
-    pub peak_stress_pa: Option<Estimate>,
+    pub peak_stress_pa: Option<Uncertain>,
     /// Share of the contact's pixels that are saturated.
     pub saturated_share: f64,
     /// The signal lies outside the range of the calibration.
@@ -229,23 +221,22 @@ pub struct ContactReading {
 
 impl ContactReading {
     /// A round contact of this radius under this force, about which there is nothing to caution.
-    /// The error of the force counts as noise of the frame, the peak as one grey level.
+    /// The errors count as noise of the frame, the peak as one grey level.
     ///
     /// ```
-    /// use tactile_imaging::{force::Estimate, pipeline::ContactReading};
+    /// use tactile_imaging::force::{Estimate, Source};
+    /// use tactile_imaging::pipeline::ContactReading;
     /// let mut contact =
     ///     ContactReading::new(Some(Estimate::new(0.7, 2e-3)), Estimate::new(1e-3, 2e-6));
     /// contact.centroid_px = [Estimate::exact(120.0), Estimate::exact(80.0)];
-    /// assert_eq!((contact.force_noise_n, contact.touches_edge), (2e-3, false));
+    /// let force = contact.force_n.expect("as given");
+    /// assert_eq!((force.part(Source::Noise), contact.touches_edge), (2e-3, false));
     /// ```
     #[must_use]
     pub fn new(force_n: Option<Estimate>, contact_radius_m: Estimate) -> Self {
         Self {
-            force_n,
-            force_noise_n: force_n.map_or(0.0, |force| force.standard_error),
-            force_calibration_n: 0.0,
-            contact_radius_m,
-            radius_common_m: 0.0,
+            force_n: force_n.map(Uncertain::from),
+            contact_radius_m: contact_radius_m.into(),
             indentation_m: None,
             centroid_px: [Estimate::exact(0.0); 2],
             area_m2: PI * contact_radius_m.value.powi(2),
@@ -272,44 +263,8 @@ impl ContactReading {
     /// assert!((stress.value / 159_155.0 - 1.0).abs() < 1e-6);
     /// ```
     #[must_use]
-    pub fn mean_stress_pa(&self) -> Option<Estimate> {
-        let (force, radius) = (self.force_n?, self.contact_radius_m);
-        let value = force.value / (PI * radius.value * radius.value);
-        let relative =
-            (force.standard_error / force.value).hypot(2.0 * radius.standard_error / radius.value);
-        Some(Estimate::new(value, value.abs() * relative))
-    }
-
-    /// The force is the gauge's.
-    pub(super) fn take_gauge(&mut self, gauge: Option<Estimate>) {
-        self.force_n = gauge;
-        self.force_noise_n = gauge.map_or(0.0, |gauge| gauge.standard_error);
-        self.force_calibration_n = 0.0;
-        self.peak_stress_pa = None;
-    }
-
-    /// The light is by a factor brighter than that of the calibration.
-    pub(super) fn divide_by_gain(&mut self, gain: f64) {
-        self.force_n = self.force_n.map(|force| force * gain.recip());
-        self.force_noise_n /= gain;
-        self.force_calibration_n /= gain;
-    }
-
-    /// Adds relative errors that all forces and all lengths have in common.
-    pub(super) fn take_scales(&mut self, force_scale: f64, length_scale: f64) {
-        if let Some(force) = &mut self.force_n {
-            let scale = force_scale * force.value.abs();
-            let before = (force.standard_error.powi(2), force.degrees_of_freedom);
-            // Of a scale the error is stated, of a calibration it may be estimated from few pairs.
-            force.degrees_of_freedom =
-                effective_degrees_of_freedom(&[before, (scale * scale, None)]);
-            force.standard_error = force.standard_error.hypot(scale);
-            self.force_calibration_n = self.force_calibration_n.hypot(scale);
-        }
-        let scale = length_scale * self.contact_radius_m.value;
-        let radius = &mut self.contact_radius_m.standard_error;
-        *radius = radius.hypot(scale);
-        self.radius_common_m = self.radius_common_m.hypot(scale);
+    pub fn mean_stress_pa(&self) -> Option<Uncertain> {
+        Some(self.force_n? / (self.contact_radius_m.powf(2.0) * PI))
     }
 
     /// The relative error of lengths that a caution about the shape stands for. Pixels whose sides
@@ -325,11 +280,9 @@ impl ContactReading {
 
     /// The contact is a flat face of that area: the radius is that of a disc as large.
     pub(super) fn take_area(&mut self, area_m2: Estimate) {
-        let radius_m = (area_m2.value / PI).sqrt();
         self.area_m2 = area_m2.value;
-        let error_m = 0.5 * radius_m * area_m2.standard_error / area_m2.value;
-        self.contact_radius_m = Estimate::new(radius_m, error_m);
-        self.radius_common_m = 0.0;
+        let area = Uncertain::from(area_m2) * PI.recip();
+        self.contact_radius_m = area.powf(0.5);
     }
 
     /// The reading of a measured force. `None` without contact.
@@ -337,11 +290,9 @@ impl ContactReading {
         let (contact, reading, radius) = (force.contact?, force.reading?, force.contact_radius_m?);
         let profile = force.profile;
         let misfit = profile.filter(|p| p.shape == ProfileShape::NotHertz);
-        let law = profile.map_or(0.0, |p| p.radius_law_px / p.radius_px.value);
         Some(Self {
-            radius_common_m: law * radius.value,
-            force_noise_n: reading.noise_n,
-            force_calibration_n: reading.calibration_n,
+            force_n: Some(force.force_n),
+            contact_radius_m: radius,
             centroid_px: contact.centroid_px,
             area_m2: force.contact_area_m2?,
             peak_grey: profile.map_or(contact.peak, |p| p.peak.value),
@@ -353,7 +304,7 @@ impl ContactReading {
             converged: profile.is_none_or(|p| p.stop == StopReason::Converged),
             profile_misfit: misfit.map(|p| p.radial_misfit.hypot(p.azimuthal_misfit)),
             elongation: force.elongation,
-            ..Self::new(Some(force.force_n), radius)
+            ..Self::new(None, radius.total())
         })
     }
 }

@@ -317,8 +317,8 @@ impl ContactReading {
     pub fn flags(&self, frame: usize) -> impl Iterator<Item = Flag> {
         let (share, others) = (self.saturated_share, self.other_contacts);
         let numbers = [
-            ("force", self.force_n),
-            ("contact radius", Some(self.contact_radius_m)),
+            ("force", self.force_n.map(|force| force.total())),
+            ("contact radius", Some(self.contact_radius_m.total())),
             ("indentation", self.indentation_m),
         ];
         let unknown = numbers.into_iter().filter_map(move |(quantity, number)| {

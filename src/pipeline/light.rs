@@ -185,7 +185,7 @@ impl ContactStage for LightContact {
         if let Some(reading) = &mut contact.reading
             && self.force_from == ForceFrom::Gauge
         {
-            reading.take_gauge(None);
+            (reading.force_n, reading.peak_stress_pa) = (None, None);
             reading.out_of_calibration = false;
         }
         contact.region = None;

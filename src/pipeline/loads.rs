@@ -2,6 +2,7 @@
 use super::contact::ContactReading;
 use super::error::PipelineError;
 use super::settings::Settings;
+use crate::core::{Source, Uncertain};
 use crate::elasticity::modulus::{Estimate, LoadSeries, LoadState, SharedErrors};
 
 /// A contact as a load, before errors are split into its own and those that all loads share.
@@ -9,7 +10,7 @@ use crate::elasticity::modulus::{Estimate, LoadSeries, LoadState, SharedErrors};
 pub struct Load {
     pub contact: ContactReading,
     /// The force of `contact`, which is known.
-    pub force_n: Estimate,
+    pub force_n: Uncertain,
     /// Strain since the first load.
     pub mean_strain: Option<Estimate>,
     /// Whether estimators use the contact. Not of one that repeats an earlier one (what is counted
@@ -28,23 +29,15 @@ impl Load {
         })
     }
 
-    /// Error of the force from the calibration, relative.
+    /// Relative error of the force that frames have in common.
     fn calibration(&self) -> f64 {
-        (self.contact.force_calibration_n / self.force_n.value).abs()
+        self.force_n.without(Source::Noise).relative_error()
     }
 
-    /// Error of the radius that frames of one load have in common, relative.
+    /// Relative error of the radius that frames have in common.
     fn common_length(&self) -> f64 {
-        self.contact.radius_common_m / self.contact.contact_radius_m.value
-    }
-
-    /// The contact radius with the error that is its own, beside `common`.
-    fn radius_m(&self, common: f64) -> Estimate {
         let radius = self.contact.contact_radius_m;
-        Estimate::new(
-            radius.value,
-            beyond(radius.standard_error, common * radius.value),
-        )
+        radius.without(Source::Noise).relative_error()
     }
 
     /// The area of a face with a floor of its error that no outline goes below: a hundredth of a
@@ -59,21 +52,23 @@ impl Load {
     }
 
     fn state(&self, common: f64, common_length: f64, pixel_m: f64) -> LoadState {
-        let own = beyond(
-            self.contact.force_calibration_n,
-            common * self.force_n.value,
-        );
-        let mut force = Estimate::new(self.force_n.value, self.contact.force_noise_n.hypot(own));
-        force.degrees_of_freedom = self.force_n.degrees_of_freedom;
-        let mut load = LoadState::new(force);
+        let mut load = LoadState::new(beside(&self.force_n, common));
         if self.counts {
-            load.contact_radius_m = Some(self.radius_m(common_length));
+            load.contact_radius_m = Some(beside(&self.contact.contact_radius_m, common_length));
             load.indentation_m = self.contact.indentation_m;
             load.contact_area_m2 = self.face_m2(pixel_m);
             load.mean_strain = self.mean_strain;
         }
         load
     }
+}
+
+/// A number with the error that is its own, beside a relative one that all loads share.
+fn beside(number: &Uncertain, common: f64) -> Estimate {
+    let shared = number.without(Source::Noise).standard_error();
+    let mut own = number.total();
+    own.standard_error = (number.part(Source::Noise)).hypot(beyond(shared, common * own.value));
+    own
 }
 
 /// The part of an error beside another one.
@@ -187,48 +182,33 @@ impl SeenLoads {
     }
 }
 
-/// The mean of two loads, weighted with their frames. Radii are averaged as cubes, which grow in
-/// proportion to the force. Relative errors of the calibration are common to both.
+/// The mean of two loads, weighted with their frames: noise is averaged away, errors that both have
+/// in common are not. Radii are averaged as cubes, which grow in proportion to the force.
 fn merged((one, frames): (Load, f64), (other, more): (Load, f64)) -> (Load, f64) {
     let all = frames + more;
-    let (a, b) = (frames / all, more / all);
-    let error = |one: f64, other: f64| (a * one).hypot(b * other);
-    let mean = |one: Estimate, other: Estimate| {
-        let standard_error = error(one.standard_error, other.standard_error);
-        Estimate::new(a * one.value + b * other.value, standard_error)
+    let mean = |one: Uncertain, other: Uncertain| one * (frames / all) + other * (more / all);
+    let of_both = |one: Option<Estimate>, other: Option<Estimate>| {
+        Some(mean(one?.into(), other?.into()).total())
     };
     let (s, o) = (&one.contact, &other.contact);
-    let mut force_n = one.force_n;
-    force_n.value = a * one.force_n.value + b * other.force_n.value;
-    let radii = [s, o].map(|contact| contact.contact_radius_m);
-    let radius_m = (a * radii[0].value.powi(3) + b * radii[1].value.powi(3)).cbrt();
-    // Noise is averaged away, errors that both have in common are not.
-    let common_m = (a * one.common_length() + b * other.common_length()) * radius_m;
-    let noise = |c: &ContactReading| beyond(c.contact_radius_m.standard_error, c.radius_common_m);
-    let radius_error_m = error(noise(s), noise(o)).hypot(common_m);
-    let face = s.face.zip(o.face).map(|(mut face, other)| {
-        face.area_m2 = mean(face.area_m2, other.area_m2);
-        face
-    });
+    let force_n = mean(one.force_n, other.force_n);
+    let [cube, other_cube] = [s, o].map(|contact| contact.contact_radius_m.powf(3.0));
+    let area = |contact: &ContactReading| contact.face.map(|face| face.area_m2);
+    let area_m2 = of_both(area(s), area(o));
     let contact = ContactReading {
         force_n: Some(force_n),
-        force_noise_n: error(s.force_noise_n, o.force_noise_n),
-        force_calibration_n: (a * one.calibration() + b * other.calibration()) * force_n.value,
-        contact_radius_m: Estimate::new(radius_m, radius_error_m),
-        radius_common_m: common_m,
-        indentation_m: s
-            .indentation_m
-            .zip(o.indentation_m)
-            .map(|(s, o)| mean(s, o)),
-        face,
+        contact_radius_m: mean(cube, other_cube).powf(1.0 / 3.0),
+        indentation_m: of_both(s.indentation_m, o.indentation_m),
+        face: (s.face.zip(area_m2)).map(|(mut face, area_m2)| {
+            face.area_m2 = area_m2;
+            face
+        }),
         ..*s
     };
-    let strains = one.mean_strain.zip(other.mean_strain);
-    let mean_strain = strains.map(|(s, o)| mean(s, o));
     let load = Load {
         contact,
         force_n,
-        mean_strain,
+        mean_strain: of_both(one.mean_strain, other.mean_strain),
         counts: true,
     };
     (load, all)

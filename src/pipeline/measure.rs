@@ -8,6 +8,7 @@ use super::result::{FrameResult, MatchResult, Measurement, ModulusResult, Strain
 use super::settings::SurfaceInput;
 use super::specimen::{Specimen, material_law};
 use super::time::{self, TimeResult};
+use crate::core::Source;
 use crate::elasticity::modulus::{Estimate, LoadSeries, PaperRatio};
 use crate::elasticity::relaxation::TimeDependence;
 use crate::matching::StopReason;
@@ -138,13 +139,14 @@ impl Press<'_> {
         let radius = self.pipeline().settings().object.sphere_radius_m();
         let surface_height_m = self.surface_height(frame);
         Ok(FrameResult {
-            force_n: reading.force_n.ok_or(PipelineError::NoForce { frame }),
+            force_n: (reading.force_n.map(|force| force.total()))
+                .ok_or(PipelineError::NoForce { frame }),
             gauge_force_n,
-            contact_radius_m: reading.contact_radius_m,
+            contact_radius_m: reading.contact_radius_m.total(),
             contact_ratio: radius.map(|r| reading.contact_radius_m.value / r),
             centroid_px: reading.centroid_px,
             contact_area_m2: reading.area_m2,
-            mean_stress_pa: reading.mean_stress_pa(),
+            mean_stress_pa: reading.mean_stress_pa().map(|stress| stress.total()),
             surface_height_m,
             surface_apparent: self.apparent(),
             guide_depression_m: self
@@ -315,7 +317,8 @@ impl Press<'_> {
             };
             let gauge = self.gauge(frame)?;
             let reading = self.reading(frame).ok()?;
-            let light = Estimate::new(reading.force_n?.value, reading.force_noise_n);
+            let force = reading.force_n?;
+            let light = Estimate::new(force.value, force.part(Source::Noise).abs());
             // Without a calibration the reading is the gauge's.
             let is_gauge = light.value == gauge.value;
             if !is_gauge {

@@ -403,13 +403,13 @@ impl Display for Measurement {
 impl Display for ContactReading {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         match self.force_n {
-            Some(force) => write!(f, "force {} N", with_its_error(force, 1.0))?,
+            Some(force) => write!(f, "force {} N", with_its_error(force.total(), 1.0))?,
             None => f.write_str("force unknown")?,
         }
         write!(
             f,
             "   contact radius {} mm",
-            with_its_error(self.contact_radius_m, 1e3)
+            with_its_error(self.contact_radius_m.total(), 1e3)
         )?;
         if let Some(depth) = self.indentation_m {
             write!(f, "   indentation {} mm", with_its_error(depth, 1e3))?;

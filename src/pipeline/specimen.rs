@@ -98,7 +98,7 @@ impl FlatSpecimen {
         let mut loads = [LoadState::new(Estimate::exact(0.0)); 2];
         for ((load, contact), frame) in loads.iter_mut().zip(contacts).zip([from, to]) {
             let force = contact.force_n.ok_or(PipelineError::NoForce { frame })?;
-            load.force_n = force;
+            load.force_n = force.total();
             load.contact_area_m2 = contact.face.map(|face| face.area_m2);
         }
         let failed = |source| PipelineError::Strain { from, to, source };

@@ -4,7 +4,6 @@ use super::composition::Pipeline;
 use super::contact::{ContactReading, ContactStage, FrameContact};
 use super::error::PipelineError;
 use super::flag::Flag;
-use super::loads::beyond;
 use super::reference_light::LightChange;
 use super::report::{Report, SkipReason, Stage};
 use super::specimen::{Object, Specimen};
@@ -15,8 +14,8 @@ use crate::elasticity::modulus::{
     Estimate, LoadSeries, LoadState, ModulusEstimate, ModulusEstimator, Warning,
 };
 use crate::force::{
-    FaceReading, FaceWorkspace, ForceWorkspace, ReferenceFrame, background_shift,
-    median_shift_outside,
+    FaceReading, FaceWorkspace, ForceWorkspace, ReferenceFrame, Source, Uncertain,
+    background_shift, median_shift_outside,
 };
 use crate::matching::{MatchedPairs, Matching, WarmStart};
 use crate::tps::{Pairs, SeriesMemory, StrainSpline};
@@ -93,24 +92,6 @@ impl Stages {
                 .map_err(|source| PipelineError::Contact { frame, source })?;
             contact.check(frame, image.dim())?;
             let settings = self.pipeline.settings();
-            let mut force_scale = settings.force_scale();
-            if let Some(reading) = &mut contact.reading {
-                if reading.force_n.is_none() {
-                    reading.take_gauge(gauge);
-                } else {
-                    force_scale = force_scale.hypot(settings.coupling());
-                    if let Some(light) = self.light {
-                        reading.divide_by_gain(light.gain.value);
-                        // Presses of known force were read by the same factor.
-                        if settings.checked_gain.is_none() {
-                            force_scale = force_scale.hypot(light.gain.relative_error());
-                        }
-                    }
-                    if let Some(checked) = &settings.checked_gain {
-                        reading.divide_by_gain(checked.gain.value);
-                    }
-                }
-            }
             if contact.background_step_grey.is_none()
                 && let Some(bounds) = contact.bounds()
             {
@@ -134,11 +115,22 @@ impl Stages {
                 }
             }
             if let Some(reading) = &mut contact.reading {
+                let factor = match reading.force_n {
+                    Some(_) => self.of_light(),
+                    None => Uncertain::exact(1.0),
+                };
                 // Above its level of saturation a Hertz profile has less than this share of its
                 // force.
-                let force_scale = force_scale.hypot(reading.saturated_share);
-                let length_scale = settings.length_scale().hypot(self.shape_doubt(reading));
-                reading.take_scales(force_scale, length_scale);
+                let factor = factor
+                    .by_relative(Source::Gain, settings.force_scale())
+                    .by_relative(Source::Gain, reading.saturated_share);
+                let force = reading.force_n.or_else(|| gauge.map(Uncertain::from));
+                reading.force_n = force.map(|force| force * factor);
+                reading.peak_stress_pa = reading.peak_stress_pa.map(|stress| stress * factor);
+                reading.contact_radius_m = reading
+                    .contact_radius_m
+                    .by_relative(Source::PixelSize, settings.length_scale())
+                    .by_relative(Source::Profile, self.shape_doubt(reading));
             }
             Ok(())
         })?;
@@ -146,6 +138,24 @@ impl Stages {
             bench.report.skipped(Stage::Surface, SkipReason::NoContact);
         }
         Ok(())
+    }
+
+    /// By what a force that is read from light is multiplied: light that is brighter than that of
+    /// the calibration, and what presses of known force show.
+    fn of_light(&self) -> Uncertain {
+        let settings = self.pipeline.settings();
+        let mut factor = match settings.checked_gain {
+            Some(checked) => Uncertain::of(checked.gain, Source::Coupling).powf(-1.0),
+            None => Uncertain::exact(1.0).by(Source::Coupling, settings.coupling()),
+        };
+        if let Some(light) = self.light {
+            factor = factor * light.gain.value.recip();
+            // Presses of known force were read by the same light.
+            if settings.checked_gain.is_none() {
+                factor = factor.by_relative(Source::Gain, light.gain.relative_error());
+            }
+        }
+        factor
     }
 
     /// Whether the object is said to be a ball. What is said to be none need not look like one.
@@ -227,8 +237,8 @@ impl Stages {
             let (gauge_n, measured_n) = (gauge.value, force_n.value);
             let apart = (gauge_n - measured_n).abs();
             // What the object couples is what a gauge shows: its error excuses no difference.
-            let coupling = self.pipeline.settings().coupling() * measured_n;
-            if apart > 3.0 * beyond(force_n.standard_error, coupling) && apart > 0.02 * gauge_n {
+            let error_n = force_n.without(Source::Coupling).standard_error();
+            if apart > 3.0 * error_n && apart > 0.02 * gauge_n {
                 flags.push(Flag::GaugeDisagrees {
                     frame,
                     measured_n,

@@ -250,6 +250,7 @@ fn print(found: &Found, context: &mut Context) -> Value {
         indentation_m,
         ..
     } = found.reading;
+    let contact_radius_m = contact_radius_m.total();
     let [x, y] = centroid_px.map(|c| in_unit(c, 1.0));
     context.row("centroid", format_args!("({x}, {y}) px"));
     let radius = in_unit(contact_radius_m, 1e3);

@@ -119,11 +119,11 @@ impl Answer {
     fn new(contact: &ContactReading, pixel_m: [f64; 2]) -> Self {
         let [x, y] = contact.centroid_px;
         Self {
-            force_n: contact.force_n,
-            contact_radius_m: contact.contact_radius_m,
+            force_n: contact.force_n.map(|force| force.total()),
+            contact_radius_m: contact.contact_radius_m.total(),
             centroid_m: [x * pixel_m[0], y * pixel_m[1]],
-            mean_stress_pa: contact.mean_stress_pa(),
-            peak_stress_pa: contact.peak_stress_pa,
+            mean_stress_pa: contact.mean_stress_pa().map(|stress| stress.total()),
+            peak_stress_pa: contact.peak_stress_pa.map(|stress| stress.total()),
         }
     }
 }

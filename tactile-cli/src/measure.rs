@@ -467,9 +467,9 @@ fn print_contacts(contacts: &[Contact], context: &mut Context) {
         let name = format!("frame {}", k + 1);
         match contact {
             Ok(Some(contact)) => {
-                let force = contact.force_n.map(|f| in_unit(f, 1.0) + " N");
+                let force = contact.force_n.map(|f| in_unit(f.total(), 1.0) + " N");
                 let force = force.unwrap_or("unknown".to_owned());
-                let radius = in_unit(contact.contact_radius_m, 1e3);
+                let radius = in_unit(contact.contact_radius_m.total(), 1e3);
                 context.row(
                     &name,
                     format_args!("force {force}   contact radius {radius} mm"),

@@ -527,7 +527,7 @@ fn specification(trial: &Trial) -> Found<Experiment> {
         "4.65 µm (on the chip)",
         pixel,
     );
-    let radius = format!("{} mm", in_unit(contact.contact_radius_m, 1e3));
+    let radius = format!("{} mm", in_unit(contact.contact_radius_m.total(), 1e3));
     found.row("contact radius at 0.7 N", "", radius);
     found.value("force_resolution_n", force_n);
     found.value("hysteresis_percent", loop_percent);

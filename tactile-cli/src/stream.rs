@@ -200,7 +200,7 @@ impl Meter for Live {
 
     fn measure(&mut self, frame: &Array2<u8>) -> Result<Row, Box<dyn Error>> {
         let contact = self.session.push(frame.view())?.contact;
-        let force = contact.and_then(|c| c.force_n);
+        let force = contact.and_then(|c| c.force_n).map(|force| force.total());
         let least = self.strained_above_n;
         let strained = least.is_some_and(|least| force.is_some_and(|f| f.value > least));
         for flag in self.session.cautions() {
@@ -213,7 +213,7 @@ impl Meter for Live {
         let modulus = self.session.modulus().ok();
         Ok(Row {
             force_n: force,
-            radius_m: contact.map(|c| c.contact_radius_m),
+            radius_m: contact.map(|c| c.contact_radius_m.total()),
             modulus: modulus.as_ref().map(Modulus::from),
             strain_xx_zz: if strained { self.strain()? } else { None },
             centre_px: contact.map(|c| c.centroid_px.map(|c| c.value)),

@@ -71,5 +71,7 @@ pub use measure::{ForceMeasurement, ForceMeter, ForceOptions, ForceWorkspace, me
 pub use noise::{DifferenceNoise, NoiseModel};
 pub use profile::{HertzFit, HertzFitOptions, ProfileShape};
 pub use shear::{ShearCalibration, ShearMeasurement, ShearPair, ShearTracker};
-pub use tactile_core::{BoundingBox, CustomError, Estimate, InvalidOption, Polarity, StopReason};
+pub use tactile_core::{
+    BoundingBox, CustomError, Estimate, InvalidOption, Polarity, Source, StopReason, Uncertain,
+};
 pub use {nalgebra, ndarray};

@@ -1,8 +1,7 @@
 //! Measurement of force and contact in one frame.
 
 use ndarray::{Array2, ArrayView2};
-use tactile_core::statistics::effective_degrees_of_freedom;
-use tactile_core::{BoundingBox, Estimate, Polarity};
+use tactile_core::{BoundingBox, Estimate, Polarity, Source, Uncertain};
 
 use crate::calibration::{ForceReading, GreyHistogram, LocalCalibration, StressCalibration};
 use crate::contact::{Contact, ContactDetector, ContactOptions, Detection, DetectorWorkspace};
@@ -220,7 +219,7 @@ impl ForceMeter {
         // pixel for the peak, taken as good to a grey level.
         let side = pixel.area.sqrt();
         let of_mask = Estimate::new(contact.equivalent_radius_px * side, 0.5 * side);
-        let radius = profile.map_or(of_mask, |p| p.radius_m);
+        let radius = profile.map_or(of_mask.into(), |p| p.radius_m);
         let brightest = Estimate::new(contact.peak, 1.0);
         let peak = profile.map_or(brightest, |p| p.peak);
         let force_n = stress.reading.force_n;
@@ -230,8 +229,8 @@ impl ForceMeter {
             centroid_m: Some(centroid_m),
             contact_area_m2: Some((contact.area_px as f64) * pixel.area),
             contact_radius_m: Some(radius),
-            mean_stress_pa: Some(mean_stress(force_n, radius)),
-            peak_stress_pa: Some(peak * stress.per_grey_pa),
+            mean_stress_pa: Some(force_n / (radius.powf(2.0) * std::f64::consts::PI)),
+            peak_stress_pa: Some(Uncertain::from(peak) * stress.per_grey()),
             contact: Some(contact),
             profile,
             noise: found.noise,
@@ -368,9 +367,9 @@ impl ForceOptions {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ForceMeasurement {
     /// Normal force in newtons, equation (6). Zero without contact.
-    pub force_n: Estimate,
-    /// The parts of the force's error, and whether the calibration was used outside its range.
-    /// `None` without contact.
+    pub force_n: Uncertain,
+    /// The force as it was read, and whether the calibration was used outside its range. `None`
+    /// without contact.
     pub reading: Option<ForceReading>,
     /// The contact. `None` if the frame shows none.
     pub contact: Option<Contact>,
@@ -382,12 +381,12 @@ pub struct ForceMeasurement {
     pub contact_area_m2: Option<f64>,
     /// Contact radius in metres: the profile's, else the mask's equivalent radius with half a pixel
     /// as its error.
-    pub contact_radius_m: Option<Estimate>,
+    pub contact_radius_m: Option<Uncertain>,
     /// F/(π a²) in pascals.
-    pub mean_stress_pa: Option<Estimate>,
+    pub mean_stress_pa: Option<Uncertain>,
     /// Stress at the centre in pascals: the profile's peak, else the greatest difference, through
     /// the calibration.
-    pub peak_stress_pa: Option<Estimate>,
+    pub peak_stress_pa: Option<Uncertain>,
     /// Longer over shorter half axis of the contact's outline, less one, where that stands out of
     /// what whole pixels leave and exceeds 0.5 %: pixels that are not as stated, a lens that
     /// distorts, or an object that is not round.
@@ -403,7 +402,7 @@ pub struct ForceMeasurement {
 impl ForceMeasurement {
     fn without_contact(found: Detection) -> Self {
         Self {
-            force_n: Estimate::default(),
+            force_n: Uncertain::default(),
             reading: None,
             contact: None,
             profile: None,
@@ -418,24 +417,6 @@ impl ForceMeasurement {
             noise: None,
         }
     }
-}
-
-/// F/(π a²) with its standard error.
-fn mean_stress(force: Estimate, radius: Estimate) -> Estimate {
-    let pi = std::f64::consts::PI;
-    let value = force.value / (pi * radius.value * radius.value);
-    let parts = [
-        (force.relative_error().powi(2), force.degrees_of_freedom),
-        (
-            // The radius enters squared, so that its relative error counts twice.
-            4.0 * radius.relative_error().powi(2),
-            radius.degrees_of_freedom,
-        ),
-    ];
-    let variance = value * value * (parts[0].0 + parts[1].0);
-    let mut stress = Estimate::from_variance(value, variance);
-    stress.degrees_of_freedom = effective_degrees_of_freedom(&parts);
-    stress
 }
 
 /// Buffers that measurements reuse from frame to frame. After the first frames nothing is
@@ -538,6 +519,18 @@ const BLOCK: usize = 64;
 struct Stress {
     reading: ForceReading,
     per_grey_pa: f64,
+}
+
+impl Stress {
+    /// Pascals per grey level with the error that the calibration gives the force. The noise of the
+    /// sum is not that of the peak.
+    fn per_grey(&self) -> Uncertain {
+        let force_n = self.reading.force_n.without(Source::Noise);
+        if force_n.value == 0.0 {
+            return Uncertain::exact(self.per_grey_pa);
+        }
+        force_n.map(|_| self.per_grey_pa, |force_n| self.per_grey_pa / force_n)
+    }
 }
 
 /// Buffers of the conversion, and its result for the last contact.

@@ -302,8 +302,8 @@ fn contact(py: Python<'_>, frame: usize, reading: &ContactReading) -> PyResult<C
     let [x, y] = reading.centroid_px;
     Ok(Contact {
         text: reading.to_string(),
-        force: reading.force_n.map(estimate).transpose()?,
-        radius: estimate(reading.contact_radius_m)?,
+        force: (reading.force_n.map(|force| estimate(force.total()))).transpose()?,
+        radius: estimate(reading.contact_radius_m.total())?,
         indentation: reading.indentation_m.map(estimate).transpose()?,
         x: estimate(x)?,
         y: estimate(y)?,

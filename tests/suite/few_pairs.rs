@@ -24,7 +24,7 @@ fn measure(trial: &Trial) -> Result<Vec<(f64, f64, f64)>, PipelineError> {
     for frame in 0..trial.simulation.frames.len() {
         let force = press.contact(frame)?.and_then(|contact| contact.force_n);
         let force = force.expect("a calibrated contact");
-        let interval = force.interval_95();
+        let interval = force.total().interval_95();
         found.push((force.value, interval.lower, interval.upper.unwrap()));
     }
     let modulus = press.modulus()?;

@@ -36,11 +36,11 @@ fn numbers<const N: usize>(estimates: [Estimate; N]) -> Vec<f64> {
 
 fn contact(case: &str, contact: &ContactReading) {
     let [x, y] = contact.centroid_px;
-    let mut all = numbers([contact.contact_radius_m, x, y]);
+    let mut all = numbers([contact.contact_radius_m.total(), x, y]);
     all.extend(
         contact
             .force_n
-            .map(|force| numbers([force]))
+            .map(|force| numbers([force.total()]))
             .into_iter()
             .flatten(),
     );

@@ -20,7 +20,10 @@ impl GainCheck {
         known_n: Estimate,
         object: CheckedObject,
     ) -> Result<Self, &'static str> {
-        let measured_n = contact.force_n.ok_or("its force is not read from light")?;
+        let measured_n = contact
+            .force_n
+            .ok_or("its force is not read from light")?
+            .total();
         let check = Self {
             measured_n,
             known_n,

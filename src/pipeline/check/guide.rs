@@ -67,7 +67,7 @@ impl GuideCheck {
         Ok(Self {
             ball,
             known_n,
-            radius_m: contact.contact_radius_m,
+            radius_m: contact.contact_radius_m.total(),
         })
     }
 

@@ -72,7 +72,9 @@ pub fn summary_lines(measurement: &Measurement) -> Vec<String> {
 
 fn force_title(press: &mut Press<'_>, frame: usize) -> Result<String, PipelineError> {
     let force = press.contact(frame)?.and_then(|c| c.force_n);
-    let force = force.map_or(String::new(), |f| format!(": {} N", in_unit(f, 1.0)));
+    let force = force.map_or(String::new(), |f| {
+        format!(": {} N", in_unit(f.total(), 1.0))
+    });
     Ok(format!("frame {}{force}", frame + 1))
 }
 
@@ -253,7 +255,11 @@ fn summary_page(press: &mut Press<'_>, lines: Vec<String>) -> Result<Page, PlotE
             && let Some(force) = c.force_n
         {
             let radius = c.contact_radius_m;
-            readings.push([force.value, 1e3 * radius.value, 1e3 * radius.standard_error]);
+            readings.push([
+                force.value,
+                1e3 * radius.value,
+                1e3 * radius.standard_error(),
+            ]);
         }
     }
     let at = readings.iter().map(|[f, a, _]| [*f, *a]);

@@ -378,7 +378,7 @@ impl SensorCalibration {
                 branch: given.branch,
                 force_n: given.force_n,
                 read_force_n: found.contact.map(|_| found.force_n.value),
-                contact_radius_m: found.profile.map(|p| p.radius_m),
+                contact_radius_m: found.profile.map(|p| p.radius_m.total()),
                 layers_force_n: None,
             });
         }

@@ -21,8 +21,7 @@ pub use line::{CalibrationReport, Hysteresis, LinearCalibration};
 
 use ndarray::Array2;
 use std::ops::Deref;
-use tactile_core::Estimate;
-use tactile_core::statistics::effective_degrees_of_freedom;
+use tactile_core::{Estimate, Source, Uncertain};
 
 use crate::error::ForceError;
 use crate::noise::DifferenceNoise;
@@ -30,32 +29,27 @@ use crate::noise::DifferenceNoise;
 /// A force read from a calibration.
 ///
 /// ```
-/// use tactile_force::{CalibrationPair, Estimate, LinearCalibration, StressCalibration};
+/// use tactile_force::{
+///     CalibrationPair, Estimate, LinearCalibration, Source, StressCalibration,
+/// };
 ///
 /// let pairs = [(0.0, 0.01), (1e5, 0.49), (2e5, 1.01), (3e5, 1.49)];
 /// let pairs = pairs.map(|(v, f)| CalibrationPair::loading(v, f));
 /// let line = LinearCalibration::fit(&pairs, &Default::default())?;
 /// let reading = line.read(Estimate::new(2.5e5, 400.0))?;
-/// assert!(reading.noise_n < reading.calibration_n && !reading.out_of_range);
-/// let both = reading.noise_n.hypot(reading.calibration_n);
-/// assert!((reading.force_n.standard_error - both).abs() < 1e-15);
+/// let part = |source| reading.force_n.part(source).abs();
+/// assert!(part(Source::Noise) < part(Source::Calibration) && !reading.out_of_range);
 /// // Four pairs less two parameters, and a little more for the noise that is known.
-/// assert!((2.0..3.0).contains(&reading.force_n.degrees_of_freedom.unwrap()));
+/// assert!((2.0..3.0).contains(&reading.force_n.total().degrees_of_freedom.unwrap()));
 /// # Ok::<(), tactile_force::ForceError>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub struct ForceReading {
-    /// Force in newtons, its standard error from all sources and the degrees of freedom of that
-    /// error. The calibration's share was estimated from a few pairs, that of the frame is known
-    /// (Cochran and Cox).
-    pub force_n: Estimate,
-    /// The part of the standard error from noise in the frames, in newtons.
-    pub noise_n: f64,
-    /// The part of the standard error from the calibration, in newtons: common to all frames that
-    /// are read with it.
-    pub calibration_n: f64,
+    /// Force in newtons with the errors of the frame's noise and of the calibration. The latter was
+    /// estimated from a few pairs and is common to all frames that are read with it.
+    pub force_n: Uncertain,
     /// The pixel value lies outside the range of the calibration.
     pub out_of_range: bool,
 }
@@ -67,18 +61,19 @@ impl ForceReading {
     /// ```
     /// use tactile_force::ForceReading;
     /// let reading = ForceReading::new(1.2, 3e-3, 4e-3, Some(4.0));
-    /// assert!((reading.force_n.standard_error - 5e-3).abs() < 1e-15 && !reading.out_of_range);
-    /// assert!(reading.force_n.degrees_of_freedom > Some(4.0), "the noise is known");
+    /// assert!((reading.force_n.standard_error() - 5e-3).abs() < 1e-15 && !reading.out_of_range);
+    /// let total = reading.force_n.total();
+    /// assert!(total.degrees_of_freedom > Some(4.0), "the noise is known");
     /// ```
     #[must_use]
     pub fn new(force_n: f64, noise_n: f64, calibration_n: f64, degrees: Option<f64>) -> Self {
-        let parts = [(noise_n.powi(2), None), (calibration_n.powi(2), degrees)];
-        let mut estimate = Estimate::new(force_n, noise_n.hypot(calibration_n));
-        estimate.degrees_of_freedom = effective_degrees_of_freedom(&parts);
+        let exact = Uncertain::exact(force_n);
         Self {
-            force_n: estimate,
-            noise_n,
-            calibration_n,
+            force_n: exact.by(Source::Noise, noise_n).by_estimated(
+                Source::Calibration,
+                calibration_n,
+                degrees,
+            ),
             out_of_range: false,
         }
     }
@@ -91,7 +86,7 @@ impl ForceReading {
 /// whose own error is negligible.
 ///
 /// ```
-/// use tactile_force::{Estimate, StressCalibration};
+/// use tactile_force::{Estimate, Source, StressCalibration};
 ///
 /// /// Light that grows as the square of the force.
 /// struct Root;
@@ -103,9 +98,10 @@ impl ForceReading {
 /// }
 ///
 /// let reading = Root.read(Estimate::new(1e6, 2e3))?;
-/// assert_eq!((reading.force_n.value, reading.calibration_n), (1.0, 0.0));
+/// let force_n = reading.force_n;
+/// assert_eq!((force_n.value, force_n.part(Source::Calibration)), (1.0, 0.0));
 /// // dF/dV = ½ F/V.
-/// assert!((reading.noise_n - 1e-3).abs() < 1e-9);
+/// assert!((force_n.part(Source::Noise) - 1e-3).abs() < 1e-9);
 /// // Stress of one grey level on pixels of (20 µm)².
 /// assert!((Root.stress_per_grey_level_pa(1e6, 4e-10) - 2500.0).abs() < 1e-9);
 /// # Ok::<(), tactile_force::ForceError>(())
@@ -153,7 +149,7 @@ pub trait StressCalibration: Send + Sync {
     /// let line = LinearCalibration::fit(&pairs, &Default::default())?;
     /// let values = [1e5, 3e5].map(|value| Estimate::new(value, 300.0));
     /// let covariance = line.force_covariance_n2(&values);
-    /// let alone = line.read(values[1])?.force_n.standard_error;
+    /// let alone = line.read(values[1])?.force_n.standard_error();
     /// assert!((covariance[[1, 1]].sqrt() - alone).abs() < 1e-12);
     /// assert_eq!(covariance[[0, 1]], covariance[[1, 0]]);
     /// # Ok::<(), tactile_force::ForceError>(())
@@ -276,7 +272,7 @@ impl<P: Deref<Target: StressCalibration> + Send + Sync> StressCalibration for P 
 ///     Proportional { pa_per_grey: 100.0 }.read(&histogram, &DifferenceNoise::white(2.0))?;
 /// assert!((reading.force_n.value - 4e-4).abs() < 1e-15);
 /// // 200 pixels with √2 grey levels of noise each.
-/// assert!((reading.noise_n - 100.0 * 4e-10 * 400_f64.sqrt()).abs() < 1e-15);
+/// assert!((reading.force_n.standard_error() - 100.0 * 4e-10 * 400_f64.sqrt()).abs() < 1e-15);
 /// # Ok::<(), tactile_force::ForceError>(())
 /// ```
 pub trait LocalCalibration: Send + Sync {

@@ -2,7 +2,7 @@
 //! misfit beyond the noise.
 
 use nalgebra::{SMatrix, SVector};
-use tactile_core::{Estimate, Requirement, StopReason};
+use tactile_core::{Estimate, Requirement, Source, StopReason, Uncertain};
 
 use super::model::{BlurredEdge, Level, Shape, level};
 use super::rings::{Ring, Rings};
@@ -167,13 +167,11 @@ pub enum ProfileShape {
 pub struct HertzFit {
     /// Centre [x, y] in pixels.
     pub centre_px: [Estimate; 2],
-    /// Contact radius in units of the pixel's width. Its error is that of noise and of the law.
-    pub radius_px: Estimate,
+    /// Contact radius in units of the pixel's width, with the errors of noise and of the profile's
+    /// law: a hundredth of a pixel and 0.03 % of the radius, which repeated frames share.
+    pub radius_px: Uncertain,
     /// Contact radius in metres.
-    pub radius_m: Estimate,
-    /// The part of the radius's error that the profile's law has, in units of the pixel's width: a
-    /// hundredth of a pixel and 0.03 % of the radius. Repeated frames share it.
-    pub radius_law_px: f64,
+    pub radius_m: Uncertain,
     /// Grey-level difference at the centre.
     pub peak: Estimate,
     /// Grey-level difference far away. Zero if it was not fitted.
@@ -510,8 +508,8 @@ impl HertzFitter {
         // Balls by finite elements are read 0.00 to 0.05 % too small by cameras of 350 to 1,400
         // pixels. A rim of whole pixels and the blur add some hundredths of a pixel.
         let radius_law_px = 0.01_f64.hypot(3e-4 * s.radius);
-        let radius_variance = covariance[(2, 2)] + radius_law_px * radius_law_px;
-        let radius_px = Estimate::from_variance(s.radius, radius_variance);
+        let radius_px = Uncertain::from(Estimate::from_variance(s.radius, covariance[(2, 2)]))
+            .by(Source::Profile, radius_law_px);
         let centre = |k: usize| {
             Estimate::from_variance(origin[k] + state.centre[k], covariance[(4 + k, 4 + k)])
         };
@@ -519,7 +517,6 @@ impl HertzFitter {
             centre_px: [centre(0), centre(1)],
             radius_px,
             radius_m: radius_px * pixel_size_m[0],
-            radius_law_px,
             peak: Estimate::from_variance(s.peak, covariance[(0, 0)]),
             background: Estimate::from_variance(s.background, covariance[(1, 1)]),
             blur_px: (s.blur - PIXEL).max(0.0).sqrt(),

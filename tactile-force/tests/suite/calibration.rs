@@ -4,7 +4,8 @@ use proptest::prelude::*;
 use rand::{SeedableRng, rngs::ChaCha8Rng};
 use rand_distr::{Distribution, Normal};
 use tactile_force::{
-    CalibrationOptions, CalibrationPair, Estimate, ForceError, LinearCalibration, StressCalibration,
+    CalibrationOptions, CalibrationPair, Estimate, ForceError, ForceReading, LinearCalibration,
+    Source, StressCalibration,
 };
 
 type Pairs = Vec<CalibrationPair>;
@@ -171,15 +172,16 @@ fn forces_of_one_calibration_share_its_error() {
     let c = fitted(&cycle(20, 5e-3, 2, line));
     let values = [2e5, 2e6, 3.9e6].map(|value| Estimate::new(value, 4e3));
     let covariance = c.force_covariance_n2(&values);
+    let calibration = |reading: &ForceReading| reading.force_n.part(Source::Calibration);
     for (i, v) in values.iter().enumerate() {
         let reading = c.read(*v).unwrap();
         // One rounding per operation.
-        assert!((covariance[[i, i]].sqrt() / reading.force_n.standard_error - 1.0).abs() < 1e-12);
+        assert!((covariance[[i, i]].sqrt() / reading.force_n.standard_error() - 1.0).abs() < 1e-12);
         for (j, w) in values.iter().enumerate().filter(|(j, _)| *j != i) {
             assert_eq!(covariance[[i, j]], covariance[[j, i]]);
             assert!(
                 covariance[[i, j]].abs()
-                    <= reading.calibration_n * c.read(*w).unwrap().calibration_n
+                    <= calibration(&reading) * calibration(&c.read(*w).unwrap())
             );
         }
     }
@@ -189,10 +191,11 @@ fn forces_of_one_calibration_share_its_error() {
 fn reading_adds_both_errors_and_flags_extrapolation() {
     let c = fitted(&cycle(20, 5e-3, 2, line));
     let inside = c.read(Estimate::new(2e6, 1e4)).unwrap();
-    assert!((inside.noise_n / 5e-3 - 1.0).abs() < 0.01 && inside.calibration_n > 0.0);
+    let part = |source| inside.force_n.part(source);
+    assert!((part(Source::Noise) / 5e-3 - 1.0).abs() < 0.01 && part(Source::Calibration) > 0.0);
     assert_eq!(
-        inside.force_n.standard_error,
-        inside.noise_n.hypot(inside.calibration_n)
+        inside.force_n.standard_error(),
+        part(Source::Noise).hypot(part(Source::Calibration))
     );
     assert!(!inside.out_of_range);
     for value in [-1.0, 4.1e6, f64::NAN] {
@@ -220,7 +223,7 @@ fn intervals_of_forces_hold_with_few_pairs() {
             let line = fitted(&(1..=count).map(pair).collect::<Vec<_>>());
             let seen = 6e5 + noise_of_frame.sample(&mut rng);
             let reading = line.read(Estimate::new(seen, 120.0)).unwrap();
-            reading.force_n.interval_95().contains(0.6)
+            reading.force_n.total().interval_95().contains(0.6)
         });
         let share = held.count() as f64 / f64::from(draws);
         // Three standard deviations of 400 draws, √(0.95 · 0.05/400) = 1.1 %.

@@ -6,7 +6,8 @@
 use proptest::prelude::*;
 use tactile_force::{
     Branch, CalibrationFrame, CalibrationOptions, DriftCorrection, ForceError, GreyHistogram,
-    LinearCalibration, LocalCalibration, PressureCurve, PressureCurveOptions, StressCalibration,
+    LinearCalibration, LocalCalibration, PressureCurve, PressureCurveOptions, Source,
+    StressCalibration,
 };
 
 use crate::simulated::{AREA_M2, Sensor, contact_radius, measure};
@@ -80,7 +81,7 @@ fn stated_errors_cover_the_truth() {
         let curve = sensor.curve(&reference, seed);
         for (force, frame) in &frames {
             let found = measure(frame, &reference, &curve, DriftCorrection::Automatic).force_n;
-            inside += usize::from((found.value - force).abs() < 2.0 * found.standard_error);
+            inside += usize::from((found.value - force).abs() < 2.0 * found.standard_error());
             count += 1;
         }
     }
@@ -127,7 +128,10 @@ fn the_report_says_what_was_learned() {
     let reading = measure(&frame, &reference, &curve, DriftCorrection::Automatic)
         .reading
         .unwrap();
-    assert!(reading.calibration_n >= lag.width * reading.force_n.value && !reading.out_of_range);
+    assert!(
+        reading.force_n.part(Source::Calibration) >= lag.width * reading.force_n.value
+            && !reading.out_of_range
+    );
 }
 
 #[test]

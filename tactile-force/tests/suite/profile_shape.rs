@@ -79,12 +79,12 @@ fn radii_of_bent_profiles_are_right() {
     for (seed, bend) in [-0.3, -0.1, 0.08, 0.15].into_iter().enumerate() {
         let bent = |x: f64, y: f64| ball(x, y) * (1.0 - bend * radius2(x, y));
         let fit = fitted(bent, seed as u64);
-        let [radius, found] = [fit.radius_px, fit.bend];
+        let (radius, found) = (fit.radius_px, fit.bend);
         // Four standard errors and what 3 × 3 samples a pixel leave at the edge (0.01 px for a
         // Hertz profile).
         let off = (radius.value - 35.0).abs();
         assert!(
-            off < 4.0 * radius.standard_error + 0.01,
+            off < 4.0 * radius.standard_error() + 0.01,
             "{bend}: {radius:?}"
         );
         assert!(
@@ -98,7 +98,7 @@ fn radii_of_bent_profiles_are_right() {
             "{bend}: {peak:?}"
         );
         // The best Hertz profile is 0.9 % too wide at c = −0.3.
-        assert!(radius.standard_error < 0.03, "{bend}: {radius:?}");
+        assert!(radius.standard_error() < 0.03, "{bend}: {radius:?}");
     }
 }
 

@@ -10,7 +10,7 @@ use ndarray::Array2;
 use tactile_force::{
     CalibrationOptions, CalibrationPair, ContactOptions, DriftCorrection, Estimate,
     ForceMeasurement, ForceMeter, ForceOptions, ForceWorkspace, HertzFitOptions, LinearCalibration,
-    NoiseModel, Polarity, ReferenceFrame, ShearCalibration, ShearPair, StressCalibration,
+    NoiseModel, Polarity, ReferenceFrame, ShearCalibration, ShearPair, Source, StressCalibration,
 };
 
 use crate::blob::{hertz, noise};
@@ -118,7 +118,7 @@ fn calibrations(answers: &mut Answers) {
 }
 
 fn measurement(answers: &mut Answers, name: &str, m: &ForceMeasurement) {
-    answers.estimate(&format!("{name}.force"), m.force_n);
+    answers.estimate(&format!("{name}.force"), m.force_n.total());
     answers.add(&format!("{name}.sums"), m.statistics.sum as f64);
     for c in m.drift.coefficients {
         answers.add(&format!("{name}.drift"), c);
@@ -144,23 +144,32 @@ fn measurement(answers: &mut Answers, name: &str, m: &ForceMeasurement) {
         .centroid_px
         .iter()
         .for_each(|c| answers.estimate(&format!("{name}.centroid"), *c));
-    answers.add(&format!("{name}.reading.noise"), reading.noise_n);
+    answers.add(
+        &format!("{name}.reading.noise"),
+        reading.force_n.part(Source::Noise),
+    );
     answers.add(
         &format!("{name}.reading.calibration"),
-        reading.calibration_n,
+        reading.force_n.part(Source::Calibration),
     );
     answers.add(
         &format!("{name}.reading.freedom"),
-        m.force_n.degrees_of_freedom.unwrap(),
+        m.force_n.total().degrees_of_freedom.unwrap(),
     );
-    answers.estimate(&format!("{name}.radius"), m.contact_radius_m.unwrap());
-    answers.estimate(&format!("{name}.mean"), m.mean_stress_pa.unwrap());
-    answers.estimate(&format!("{name}.peak_stress"), m.peak_stress_pa.unwrap());
+    answers.estimate(
+        &format!("{name}.radius"),
+        m.contact_radius_m.unwrap().total(),
+    );
+    answers.estimate(&format!("{name}.mean"), m.mean_stress_pa.unwrap().total());
+    answers.estimate(
+        &format!("{name}.peak_stress"),
+        m.peak_stress_pa.unwrap().total(),
+    );
     if let Some(p) = m.profile {
         for e in [
             p.centre_px[0],
             p.centre_px[1],
-            p.radius_px,
+            p.radius_px.total(),
             p.peak,
             p.background,
             p.integrated_pixel_value,

@@ -1,7 +1,9 @@
 //! One scene measured under many seeds: errors, and whether their stated sizes are right.
 
 use super::{calibration, dark};
-use tactile_imaging::force::{Estimate, ForceMeter, ForceOptions, ForceWorkspace, ReferenceFrame};
+use tactile_imaging::force::{
+    Estimate, ForceMeter, ForceOptions, ForceWorkspace, ReferenceFrame, Source,
+};
 use tactile_simulate::PressScene;
 
 /// Errors of one quantity over many seeds.
@@ -93,15 +95,17 @@ pub(super) fn study_with(
             .measure_with(&mut workspace, frame.view(), &reference, &calibration)
             .unwrap();
         let (contact, fit) = (m.contact.expect("contact"), m.profile.expect("profile"));
-        s.force
-            .add(m.force_n, truth.contact.force_n, truth.contact.force_n);
+        s.force.add(
+            m.force_n.total(),
+            truth.contact.force_n,
+            truth.contact.force_n,
+        );
         for k in 0..2 {
             s.centroid[k].add(contact.centroid_px[k], truth.centroid_px[k], 1.0);
         }
         s.centre.add(fit.centre_px[0], truth.centre_px[0], 1.0);
         // These contacts are Hertz's: the radius's error is that of noise alone.
-        let law = fit.radius_law_px / fit.radius_px.value * fit.radius_m.value;
-        let noise = (fit.radius_m.standard_error.powi(2) - law * law).sqrt();
+        let noise = fit.radius_m.part(Source::Noise);
         s.radius.add(
             Estimate::new(fit.radius_m.value, noise),
             truth.contact.contact_radius_m,

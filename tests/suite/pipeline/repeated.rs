@@ -132,7 +132,7 @@ fn a_contact_that_is_not_the_punchs_has_no_sure_stress() {
         let said = |flag: &Flag| matches!(flag, Flag::NotThePunch { .. });
         let said = flags.iter().any(said);
         let radius = press.contact(0).unwrap().unwrap().contact_radius_m;
-        (said, radius.standard_error / radius.value, radius.value)
+        (said, radius.relative_error(), radius.value)
     };
     let (said, relative, radius_m) = punch(9e-3);
     // ln(9 mm / 2.7 mm)

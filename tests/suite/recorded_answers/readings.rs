@@ -2,16 +2,21 @@
 use super::Answers;
 use nalgebra::{Matrix3, Point3};
 use tactile_imaging::elasticity::modulus::ModulusEstimate;
-use tactile_imaging::force::Estimate;
+use tactile_imaging::force::{Estimate, Source};
 use tactile_imaging::pipeline::{ContactReading, Press};
 
 pub(super) fn contact(answers: &mut Answers, name: &str, reading: &ContactReading) {
     let both = |e: Estimate| [e.value, e.standard_error];
-    let force = reading.force_n.map_or([0.0; 2], both);
+    let force_n = reading.force_n.unwrap_or_default();
+    let force = both(force_n.total());
     answers.add(format!("{name}/force"), force);
-    let errors = [reading.force_noise_n, reading.force_calibration_n];
+    let common = force_n.without(Source::Noise).standard_error();
+    let errors = [force_n.part(Source::Noise).abs(), common];
     answers.add(format!("{name}/force errors"), errors);
-    answers.add(format!("{name}/radius"), both(reading.contact_radius_m));
+    answers.add(
+        format!("{name}/radius"),
+        both(reading.contact_radius_m.total()),
+    );
     let centroid = reading.centroid_px.map(both).concat();
     answers.add(format!("{name}/centroid"), centroid);
     answers.add(format!("{name}/area"), [reading.area_m2]);
