@@ -80,6 +80,7 @@ pub mod inclusion;
 pub mod markers;
 pub mod pipeline;
 mod strain_between;
+mod strain_kinematics;
 mod strain_series;
 
 pub use pipeline::{Measurement, Object, Pipeline, Press};

@@ -783,6 +783,46 @@ pub(crate) fn mutually_nearest<const D: usize>(
         .collect()
 }
 
+/// A displacement gradient and the covariance of each of its rows.
+type GradientAt = (Matrix3<f64>, Matrix3<f64>);
+
+impl<const D: usize> StrainBetween<D> {
+    /// Displacement gradient and the covariance of each of its rows at points.
+    pub(crate) fn gradients_at(
+        &self,
+        points: &[Point<f64, D>],
+    ) -> Result<Vec<GradientAt>, StrainBetweenError> {
+        let robust = match &self.fit {
+            Fit::Local(field) => {
+                let values = field.at(points, |_| {}).into_iter();
+                let resized = |value: LocalValue<D>| {
+                    let covariance = value.gradient_covariance.fixed_resize(0.0);
+                    (value.gradient.fixed_resize(0.0), covariance)
+                };
+                return Ok(values.map(resized).collect());
+            }
+            Fit::Spline(robust) => robust,
+        };
+        let centre = gradients(&robust.spline, points)?;
+        let folds = robust.folds.iter().map(|fold| gradients(fold, points));
+        let folds = folds.collect::<Result<Vec<_>, _>>()?;
+        // The jackknife's covariance over the folds, the mean of the rows'.
+        let parts = folds.len() as f64;
+        let factor = (parts - 1.0) / parts / D as f64 * robust.response * robust.response;
+        let covariance = |k: usize| {
+            let mean = folds.iter().map(|fold| fold[k]).sum::<Matrix3<f64>>() / parts;
+            let squares = folds
+                .iter()
+                .map(|fold| (fold[k] - mean).tr_mul(&(fold[k] - mean)));
+            squares.sum::<Matrix3<f64>>() * factor
+        };
+        let places = centre.into_iter().enumerate();
+        Ok(places
+            .map(|(k, gradient)| (gradient, covariance(k)))
+            .collect())
+    }
+}
+
 /// √((K − 1)/K Σ(θₖ − θ̄)²) of the means without one part each.
 fn jackknife(means: &[Matrix3<f64>]) -> Matrix3<f64> {
     let k = means.len() as f64;

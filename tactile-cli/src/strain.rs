@@ -11,6 +11,7 @@ use nalgebra::{Matrix3, Point, SVector};
 use serde_json::{Map, Value, json};
 use std::path::PathBuf;
 use tactile_files::io::{PointTable, read_displaced_points};
+use tactile_imaging::elasticity::kinematics::Kinematics;
 use tactile_imaging::elasticity::strain::{
     Biot, EulerAlmansi, GreenLagrange, Hencky, Infinitesimal, StrainMeasure,
 };
@@ -19,6 +20,7 @@ use tactile_imaging::matching::PointMatcher;
 use tactile_imaging::pipeline::with_error;
 use tactile_imaging::{StrainAt, StrainBetween, StrainBetweenOptions};
 
+mod quantities;
 mod series;
 
 /// Match the points of two frames or more and measure the strain between them
@@ -28,9 +30,10 @@ mod series;
 /// gives the strain. Misplaced points are found and left out. Pairs that are not to be relied on
 /// give no strain.
 ///
-/// --out gets pairs.csv (rows, positions and displacements of the pairs), strain.csv (the strain at
-/// every point with its standard error), strain.npz (the same for NumPy: row_before, points,
-/// displacement, strain and standard_error as tensors) and strain.svg (maps over the points, of a
+/// --out gets pairs.csv (rows, positions and displacements of the pairs), strain.csv (at every point
+/// the strain, displacement gradient, rotation, principal strains and their directions n1, n2, area
+/// or volume ratio and von Mises' equivalent strain, each with its standard error), strain.npz (the
+/// same for NumPy, with row_before, points and displacement) and strain.svg (maps over the points, of a
 /// volume over the middle of z). With --grid there are also grid.csv, grid.vtk (for ParaView) and
 /// grid.npz (axes z, y, x): displacement, strain and standard error on a grid over the box of the
 /// points before. Far from the pairs the errors grow.
@@ -187,6 +190,19 @@ fn answer<const D: usize>(
     };
     report.print(context);
     let mut value = report.json();
+    let measure = arguments.measure.strain();
+    let read = report
+        .strain
+        .as_ref()
+        .ok()
+        .map(|strain| strain.kinematics(&*measure));
+    let read = read
+        .transpose()
+        .map_err(|error| Failure::input(error.to_string()))?;
+    let read = read.unwrap_or_default();
+    if report.strain.is_ok() {
+        value["strain"]["medians"] = quantities::json::<D>(&read);
+    }
     if let Some(frames) = report.frames.take() {
         value["frames"] = frames;
     }
@@ -195,25 +211,26 @@ fn answer<const D: usize>(
     let Ok(strain) = &report.strain else {
         return Ok(Exit::complete_if(false));
     };
-    context.outputs.add(FILES[1], report.table(strain));
-    context.outputs.add(FILES[2], report.arrays(strain)?);
+    context.outputs.add(FILES[1], report.table(strain, &read));
+    context.outputs.add(FILES[2], report.arrays(strain, &read)?);
     context.outputs.page(FILES[3], || report.page(strain))?;
     if let Some(spacing) = arguments.grid {
         let grid = Grid::over(&report.before, spacing)?;
         let (strain, points) = (strain.clone(), grid.points());
-        let measure = arguments.measure.strain();
+        let measure_of_grid = arguments.measure.strain();
         let job = format!("strain at {} points of the grid", points.len());
-        let Some(found) = context.wait(job, move || strain.at(&points, &*measure)) else {
+        let Some(found) = context.wait(job, move || strain.at(&points, &*measure_of_grid)) else {
             return Ok(Exit::Interrupted);
         };
         let found = found.map_err(|error| Failure::input(error.to_string()))?;
         let known = |at: &StrainAt<D>| (at.displacement, at.strain, at.standard_error);
         let found: Vec<Known<D>> = found.iter().map(known).collect();
+        let read = report.kinematics_of(&grid, &*measure)?;
         let shape: Vec<usize> = grid.counts.iter().rev().copied().collect();
-        let table = report.grid_table(&grid, &found);
-        let arrays = arrays(Npz::new(), &shape, &grid.points(), &found)?;
+        let table = report.grid_table(&grid, &found, &read);
+        let arrays = arrays(Npz::new(), &shape, &grid.points(), &found, &read)?;
         context.outputs.add(GRID_FILES[0], table);
-        context.outputs.add(GRID_FILES[1], grid.vtk(&found));
+        context.outputs.add(GRID_FILES[1], grid.vtk(&found, &read));
         context.outputs.add(GRID_FILES[2], arrays);
     }
     Ok(Exit::complete_if(report.complete))
@@ -363,7 +380,7 @@ impl<const D: usize> Grid<D> {
     }
 
     /// The legacy format of VTK, as text.
-    fn vtk(&self, found: &[Known<D>]) -> Vec<u8> {
+    fn vtk(&self, found: &[Known<D>], read: &[Kinematics]) -> Vec<u8> {
         let three = |v: &[f64]| {
             let at = |a: usize| v.get(a).copied().unwrap_or(0.0);
             format!("{:e} {:e} {:e}", at(0), at(1), at(2))
@@ -396,6 +413,7 @@ impl<const D: usize> Grid<D> {
                 }
             }
         }
+        quantities::vtk::<D>(&mut text, read);
         text.into_bytes()
     }
 }
@@ -409,6 +427,7 @@ fn arrays<const D: usize>(
     shape: &[usize],
     points: &[Point<f64, D>],
     found: &[Known<D>],
+    read: &[Kinematics],
 ) -> Result<Vec<u8>, Failure> {
     let vector = |v: SVector<f64, D>| <[f64; D]>::from(v).map(f64::to_le_bytes);
     let places = || (0..D).flat_map(|i| (0..D).map(move |j| (i, j)));
@@ -422,6 +441,7 @@ fn arrays<const D: usize>(
     npz.add("strain", "<f8", &tensors, strains)?;
     let errors = found.iter().flat_map(|at| tensor(at.2));
     npz.add("standard_error", "<f8", &tensors, errors)?;
+    quantities::arrays::<D>(&mut npz, shape, read)?;
     npz.into_bytes()
 }
 
@@ -581,10 +601,11 @@ impl<const D: usize> StrainReport<D> {
     }
 
     /// The strain at every point, and its standard error.
-    fn table(&self, found: &StrainBetween<D>) -> Vec<u8> {
+    fn table(&self, found: &StrainBetween<D>, read: &[Kinematics]) -> Vec<u8> {
         let mut header = vec!["row_before".to_owned()];
         header.extend(self.headings("", ""));
         header.extend(strain_headings::<D>(""));
+        header.extend(quantities::headings::<D>());
         let mut csv = Csv::new(&header.join(","));
         for (k, pair) in found.pairs.iter().enumerate() {
             let mut row = vec![found.rows[k].0 as f64];
@@ -593,13 +614,14 @@ impl<const D: usize> StrainReport<D> {
                 &found.strains[k],
                 &found.standard_errors[k],
             ));
+            row.extend(quantities::cells::<D>(&read[k]));
             csv.row(row);
         }
         csv.into_bytes()
     }
 
     /// The strain at every point and its standard error, as arrays.
-    fn arrays(&self, found: &StrainBetween<D>) -> Result<Vec<u8>, Failure> {
+    fn arrays(&self, found: &StrainBetween<D>, read: &[Kinematics]) -> Result<Vec<u8>, Failure> {
         let shape = [found.pairs.len()];
         let rows = found.rows.iter().map(|row| (row.0 as i64).to_le_bytes());
         let mut npz = Npz::new();
@@ -613,18 +635,35 @@ impl<const D: usize> StrainReport<D> {
             )
         };
         let known: Vec<Known<D>> = (0..points.len()).map(known).collect();
-        arrays(npz, &shape, &points, &known)
+        arrays(npz, &shape, &points, &known, read)
+    }
+
+    /// What is read of the deformation on the grid.
+    fn kinematics_of(
+        &self,
+        grid: &Grid<D>,
+        measure: &dyn StrainMeasure,
+    ) -> Result<Vec<Kinematics>, Failure> {
+        let found = self.strain.as_ref().map_err(|_| String::new());
+        let found = found.and_then(|strain| {
+            let read = strain.kinematics_at(&grid.points(), measure);
+            read.map_err(|error| error.to_string())
+        });
+        found.map_err(Failure::input)
     }
 
     /// Displacement, strain and its standard error on the grid.
-    fn grid_table(&self, grid: &Grid<D>, found: &[Known<D>]) -> Vec<u8> {
+    fn grid_table(&self, grid: &Grid<D>, found: &[Known<D>], read: &[Kinematics]) -> Vec<u8> {
         let mut header = self.headings("", "");
         header.extend(self.headings("u_", ""));
         header.extend(strain_headings::<D>(""));
+        header.extend(quantities::headings::<D>());
         let mut csv = Csv::new(&header.join(","));
-        for (point, (displacement, strain, error)) in grid.points().iter().zip(found) {
+        let rows = grid.points().into_iter().zip(found).zip(read);
+        for ((point, (displacement, strain, error)), read) in rows {
             let places = point.iter().chain(displacement.iter()).copied();
-            csv.row(places.chain(strain_cells::<D>(strain, error)));
+            let strains = strain_cells::<D>(strain, error);
+            csv.row(places.chain(strains).chain(quantities::cells::<D>(read)));
         }
         csv.into_bytes()
     }

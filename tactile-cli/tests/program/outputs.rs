@@ -197,6 +197,27 @@ fn known_pairs_are_not_matched() {
         assert_eq!(value["cautions"][0]["kind"], "skipped_rows", "{value}");
         let table = fs::read_to_string(folder.path().join("results/pairs.csv")).unwrap();
         assert!(table.lines().nth(8).unwrap().starts_with("8,8,"), "{table}");
+        // Stretched by half along x: nothing turns, areas grow by half.
+        let medians = &value["strain"]["medians"];
+        let near = |name: &str, expected: f64| {
+            let found = medians[name]["value"].as_f64().unwrap();
+            assert!((found - expected).abs() < 1e-6, "{name}: {medians}");
+        };
+        near("rotation_rad", 0.0);
+        near("area_ratio", 1.5);
+        near("e_1", 0.625);
+        near("e_von_mises", 0.625 * 2.0 / 3.0);
+        for name in ["strain.csv", "grid.csv"] {
+            let table = fs::read_to_string(folder.path().join("results").join(name)).unwrap();
+            let columns = |line: &str| line.split(',').count();
+            let mut lines = table.lines();
+            let header = lines.next().unwrap();
+            assert!(header.contains(",dux_dx,") && header.ends_with(",se_n1_rad,se_n2_rad"));
+            assert!(
+                lines.all(|line| columns(line) == columns(header)),
+                "{table}"
+            );
+        }
         fs::remove_dir_all(folder.path().join("results")).unwrap();
     }
     let few = "x,y\n0,0\n";

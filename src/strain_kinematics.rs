@@ -1,0 +1,58 @@
+//! Rotation, principal strains, change of size and equivalent strain of the strain between sets.
+
+use crate::elasticity::kinematics::Kinematics;
+use crate::elasticity::strain::StrainMeasure;
+use crate::strain_between::{StrainBetween, StrainBetweenError};
+use nalgebra::Point;
+
+impl<const D: usize> StrainBetween<D> {
+    /// What is read of the deformation at any points of the first set's space, each quantity with
+    /// its standard error. NaN throughout where the deformation folds.
+    ///
+    /// ```
+    /// use nalgebra::Point2;
+    /// use tactile_imaging::{StrainBetween, StrainBetweenOptions, elasticity::strain::Biot};
+    /// // A sheet turns by 0.3 rad and grows by 10 % along its own x.
+    /// let before: Vec<_> = (0..64)
+    ///     .map(|k| Point2::new(f64::from(k % 8), f64::from(k / 8)))
+    ///     .collect();
+    /// let turn = nalgebra::Rotation2::new(0.3);
+    /// let after: Vec<_> = before
+    ///     .iter()
+    ///     .map(|p| turn * Point2::new(1.1 * p.x, p.y))
+    ///     .collect();
+    /// let options = StrainBetweenOptions::default();
+    /// let found = StrainBetween::of_known_pairs(&before, &after, &options)?;
+    /// let at = found.kinematics_at(&[Point2::new(3.5, 3.5)], &Biot)?[0];
+    /// assert!((at.rotation_rad - 0.3).abs() < 1e-6 && (at.size_ratio - 1.1).abs() < 1e-6);
+    /// assert!((at.principal[0] - 0.1).abs() < 1e-6);
+    /// # Ok::<(), tactile_imaging::StrainBetweenError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`StrainBetweenError`] of the field.
+    pub fn kinematics_at(
+        &self,
+        points: &[Point<f64, D>],
+        measure: &dyn StrainMeasure,
+    ) -> Result<Vec<Kinematics>, StrainBetweenError> {
+        let gradients = self.gradients_at(points)?.into_iter();
+        let read = gradients.map(|(gradient, covariance)| {
+            let found = Kinematics::of(&gradient, &covariance, D, measure);
+            found.unwrap_or_else(|_| Kinematics::undefined())
+        });
+        Ok(read.collect())
+    }
+
+    /// The same at every matched point of the first set.
+    ///
+    /// # Errors
+    /// [`StrainBetweenError`] of the field.
+    pub fn kinematics(
+        &self,
+        measure: &dyn StrainMeasure,
+    ) -> Result<Vec<Kinematics>, StrainBetweenError> {
+        let points: Vec<_> = self.pairs.iter().map(|pair| pair[0]).collect();
+        self.kinematics_at(&points, measure)
+    }
+}
