@@ -327,7 +327,7 @@ pub fn track_markers(reference: &[Marker], frame: &[Marker]) -> Result<MarkerFie
             let assignment = matching.assignment.iter().enumerate();
             (
                 assignment.filter_map(partner).collect(),
-                matching.report.doubt,
+                matching.report.doubt(),
             )
         }
     };

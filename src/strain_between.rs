@@ -287,7 +287,7 @@ impl<const D: usize> StrainBetween<D> {
         let partner = |(i, j): (usize, &Option<usize>)| j.map(|j| (i, j));
         let assignment = matching.assignment.iter().enumerate();
         let pairs: Vec<_> = assignment.filter_map(partner).collect();
-        let doubt = matching.report.doubt.map(PairsDoubt::Matcher);
+        let doubt = matching.report.doubt().map(PairsDoubt::Matcher);
         if let Some(doubt) = doubt
             && !options.doubtful_pairs
         {

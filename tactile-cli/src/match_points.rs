@@ -12,7 +12,7 @@ use std::path::PathBuf;
 use tactile_files::io::{CasePoints, MatchCase, PointTable, read_cases, write_case_result};
 use tactile_imaging::PairsDoubt;
 use tactile_imaging::matching::{
-    AnnealedSoftassign, CoherentPointDrift, FittedTransformation, LinearAssignment,
+    AnnealedSoftassign, CoherentPointDrift, FittedTransformation, Judgement, LinearAssignment,
     NearestNeighbour, Outliers, PointMatcher, RelaxationLabelling, Rotation, StopReason,
     Transformation,
 };
@@ -289,7 +289,7 @@ fn solve<const D: usize>(
         report.row(&name, &found);
     }
     let doubt = report
-        .doubt
+        .doubt()
         .map(|doubt| PairsDoubt::Matcher(doubt).to_string());
     if let Some(doubt) = &doubt {
         context.warn(
@@ -313,6 +313,7 @@ fn solve<const D: usize>(
         "assignment": matching.assignment, "confidence": matching.confidence,
         "unmatched_share": 1.0 - matched as f64 / points as f64,
         "residual": report.residual, "noise": report.sigma, "stop": stop, "doubt": doubt,
+        "judged": report.judgement != Judgement::NotJudged,
         "iterations": iterations, "starts": starts, "time_ms": ms,
     });
     if let Some(transformation) = transformation {

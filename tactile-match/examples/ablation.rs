@@ -119,7 +119,7 @@ impl<const D: usize> Scene<D> {
                 brier += (found.confidence[i] - own).powi(2);
             }
         }
-        let silent = right < 0.9 * pairs && found.report.doubt.is_none();
+        let silent = right < 0.9 * pairs && found.report.doubt().is_none();
         Ok([
             100.0 * error / paired,
             100.0 * right / paired,

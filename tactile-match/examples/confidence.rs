@@ -146,7 +146,7 @@ fn add<const D: usize>(
         pairs += 1.0;
         tenths.add(found.confidence[i], is_right);
     }
-    let doubted = found.report.doubt.is_some();
+    let doubted = found.report.doubt().is_some();
     tally.scenes += 1;
     tally.doubted += usize::from(doubted);
     if right < 0.9 * pairs {

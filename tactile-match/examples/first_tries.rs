@@ -52,7 +52,7 @@ fn judge<const D: usize>(
         .count() as f64;
     let pairs = found.assignment.iter().flatten().count() as f64;
     let share = right / partner.iter().flatten().count() as f64;
-    let doubt: Option<Doubt> = found.report.doubt;
+    let doubt: Option<Doubt> = found.report.doubt();
     tally.scenes += 1;
     tally.seconds += seconds;
     let doubted = doubt.is_some();

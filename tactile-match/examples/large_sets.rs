@@ -100,7 +100,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     );
     println!(
         "  {:?}, {} iterations, sigma {:.2e}, doubt {:?}",
-        report.stop, report.iterations, report.sigma, report.doubt
+        report.stop,
+        report.iterations,
+        report.sigma,
+        report.doubt()
     );
     let peak = || {
         let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();

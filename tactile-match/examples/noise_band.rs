@@ -93,7 +93,7 @@ impl Row {
             row.error += scene.error(&found) / noise / count;
             row.log_ratios
                 .push((scene.error(&found) / scene.error(&drift)).ln());
-            row.doubted += usize::from(found.report.doubt.is_some());
+            row.doubted += usize::from(found.report.doubt().is_some());
         }
         Ok(row)
     }

@@ -134,7 +134,7 @@ fn solve<const D: usize>(
         right: right / paired,
         milliseconds,
         starts: found.report.starts,
-        doubted: found.report.doubt.is_some(),
+        doubted: found.report.doubt().is_some(),
         wrong: right < 0.9 * found_pairs,
     })
 }

@@ -20,8 +20,8 @@
 use crate::error::{at_least_one, option_within, point_sets};
 use crate::{Axes, Frame, spread};
 use crate::{
-    MatchError, MatchReport, Matching, PointMatcher, SoftMatches, StopReason, linear_assignment,
-    unmatched_rows,
+    Judgement, MatchError, MatchReport, Matching, PointMatcher, SoftMatches, StopReason,
+    linear_assignment, unmatched_rows,
 };
 use nalgebra::{Cholesky, DMatrix, Dyn, Point, SMatrix, SVector, VecStorage};
 use tactile_core::{Loop, vectorised};
@@ -1076,7 +1076,7 @@ fn report<const D: usize>(
         starts: 1,
         residual: scale * (sum / count.max(1.0)).sqrt(),
         sigma: scale * workspace.sigma2.sqrt(),
-        doubt: None,
+        judgement: Judgement::NotJudged,
     }
 }
 

@@ -4,8 +4,8 @@
 use crate::error::{point_sets, valid_distance};
 use crate::{Frame, spread};
 use crate::{
-    MatchError, MatchReport, Matching, PointMatcher, SoftMatches, StopReason, linear_assignment,
-    unmatched_rows,
+    Judgement, MatchError, MatchReport, Matching, PointMatcher, SoftMatches, StopReason,
+    linear_assignment, unmatched_rows,
 };
 use nalgebra::{DMatrix, Point, SVector};
 use tactile_tps::{Affine, Factorization, FitOptions, NegR, R2LogR, Smoothing, TpsError, Warp};
@@ -116,7 +116,7 @@ fn matching<const D: usize>(
             starts: 1,
             residual,
             sigma: 0.0,
-            doubt: None,
+            judgement: Judgement::NotJudged,
         },
     }
 }

@@ -53,7 +53,7 @@ pub use hard::{LinearAssignment, NearestNeighbour};
 pub use labelling::RelaxationLabelling;
 use matching::unmatched_rows;
 pub use matching::{
-    Doubt, MatchReport, MatchedPairs, Matching, PointMatcher, SoftMatches, WarmStart,
+    Doubt, Judgement, MatchReport, MatchedPairs, Matching, PointMatcher, SoftMatches, WarmStart,
 };
 pub use nalgebra;
 pub use shape_context::ShapeContexts;

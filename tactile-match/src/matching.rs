@@ -189,11 +189,11 @@ impl<const D: usize, P: Deref<Target: PointMatcher<D>> + Send + Sync> PointMatch
 /// };
 /// let matcher = AnnealedSoftassign::default();
 /// let same = matcher.match_points(&scattered(0.1), &scattered(0.1))?;
-/// assert_eq!(same.report.doubt, None);
+/// assert_eq!(same.report.doubt(), None);
 /// // Two sets that have nothing to do with each other: some points coincide by chance.
 /// let other = matcher.match_points(&scattered(0.1), &scattered(0.37))?;
 /// assert!(matches!(
-///     other.report.doubt,
+///     other.report.doubt(),
 ///     Some(Doubt::FewPairs | Doubt::LargeResiduals | Doubt::Undecided)
 /// ));
 /// # Ok::<(), tactile_match::MatchError>(())
@@ -252,6 +252,35 @@ impl std::fmt::Display for Doubt {
     }
 }
 
+/// Whether the pairs of an answer are to be relied on.
+///
+/// ```
+/// use nalgebra::Point2;
+/// use tactile_match::{AnnealedSoftassign, Judgement, NearestNeighbour, PointMatcher};
+/// let model = [[0.0, 0.0], [1.0, 0.1], [0.2, 1.0], [1.1, 1.2], [0.5, 0.4]].map(Point2::from);
+/// let judged = AnnealedSoftassign::default().match_points(&model, &model)?;
+/// assert_eq!(judged.report.judgement, Judgement::Sure);
+/// // A nearest neighbour exists for any two sets.
+/// let paired = NearestNeighbour::default().match_points(&model, &model)?;
+/// assert_eq!(paired.report.judgement, Judgement::NotJudged);
+/// # Ok::<(), tactile_match::MatchError>(())
+/// ```
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(rename_all = "snake_case")
+)]
+pub enum Judgement {
+    /// The matcher does not look whether its pairs may be wrong.
+    #[default]
+    NotJudged,
+    /// Nothing speaks against the pairs.
+    Sure,
+    /// Something does.
+    Doubtful(Doubt),
+}
+
 /// The step of a lattice, along an axis where it lies within three degrees of one.
 fn write_repeats(f: &mut std::fmt::Formatter<'_>, step: &[f64; 3]) -> std::fmt::Result {
     let length = step.iter().map(|s| s * s).sum::<f64>().sqrt();
@@ -301,9 +330,21 @@ pub struct MatchReport {
     /// Estimated standard deviation of the position noise along one axis, in the units of the
     /// points.
     pub sigma: f64,
-    /// Why the pairs are not to be relied on, where the matcher can tell.
+    /// Whether the pairs are to be relied on.
     #[cfg_attr(feature = "serde", serde(default))]
-    pub doubt: Option<Doubt>,
+    pub judgement: Judgement,
+}
+
+impl MatchReport {
+    /// Why the pairs are not to be relied on. `None` if nothing speaks against them or the matcher
+    /// does not judge them: see [`judgement`](Self::judgement).
+    #[must_use]
+    pub fn doubt(&self) -> Option<Doubt> {
+        match self.judgement {
+            Judgement::Doubtful(doubt) => Some(doubt),
+            Judgement::NotJudged | Judgement::Sure => None,
+        }
+    }
 }
 
 /// The answer of a [`PointMatcher`].

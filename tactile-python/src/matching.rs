@@ -274,7 +274,7 @@ pub fn answer<const D: usize>(py: Python<'_>, found: &Matching<D>) -> Match {
     let pairs: Vec<_> = found.pairs().map(|(i, j, _)| (i, j)).collect();
     let (report, map) = (&found.report, found.transformation.as_ref());
     let (matched, points) = (pairs.len(), found.assignment.len());
-    let flags: Vec<String> = report.doubt.iter().map(ToString::to_string).collect();
+    let flags: Vec<String> = report.doubt().iter().map(ToString::to_string).collect();
     let caution = flags
         .first()
         .map_or(String::new(), |flag| format!(", {flag}"));

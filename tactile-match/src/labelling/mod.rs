@@ -36,7 +36,7 @@ mod relaxation;
 use crate::error::{at_least_one, option_within, point_sets};
 use crate::{Frame, spread};
 use crate::{
-    MatchError, MatchReport, Matching, SoftMatches, StopReason, hard, linear_assignment,
+    Judgement, MatchError, MatchReport, Matching, SoftMatches, StopReason, hard, linear_assignment,
     unmatched_rows,
 };
 use nalgebra::{Point, SVector};
@@ -513,7 +513,7 @@ impl<const D: usize> Run<D> {
             starts: 1,
             residual,
             sigma: residual / (D as f64).sqrt(),
-            doubt: None,
+            judgement: Judgement::NotJudged,
         };
         Matching {
             warp,

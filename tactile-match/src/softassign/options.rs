@@ -342,10 +342,10 @@ impl AnnealedSoftassign {
     /// };
     /// let matcher = AnnealedSoftassign::default();
     /// let found = matcher.match_points(&lattice(0.0), &lattice(4.0))?;
-    /// assert!(matches!(found.report.doubt, Some(Doubt::Repeats { .. })));
+    /// assert!(matches!(found.report.doubt(), Some(Doubt::Repeats { .. })));
     /// let bounded = matcher.with_largest_motion(5.0)?;
     /// let found = bounded.match_points(&lattice(0.0), &lattice(4.0))?;
-    /// assert_eq!((found.report.doubt, found.assignment[50]), (None, Some(50)));
+    /// assert_eq!((found.report.doubt(), found.assignment[50]), (None, Some(50)));
     /// # Ok::<(), tactile_match::MatchError>(())
     /// ```
     ///

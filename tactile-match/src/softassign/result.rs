@@ -6,8 +6,8 @@ use super::{AnnealedSoftassign, Frame, SoftassignWorkspace, mean, squared_distan
 use crate::centre_and_radius;
 use crate::hard::{self, Interpolation};
 use crate::{
-    FittedTransformation, MatchError, MatchReport, MatchedPairs, Matching, SoftMatches, StopReason,
-    error, unmatched_rows,
+    FittedTransformation, Judgement, MatchError, MatchReport, MatchedPairs, Matching, SoftMatches,
+    StopReason, error, unmatched_rows,
 };
 use nalgebra::{Point, SMatrix};
 use std::ops::ControlFlow;
@@ -80,7 +80,7 @@ impl<'w, const D: usize> SoftassignMatch<'w, D> {
                 starts: workspace.starts,
                 residual: workspace.answer.residual * scale,
                 sigma: workspace.fine.sigma.unwrap_or(workspace.best.sigma) * scale,
-                doubt: workspace.doubt,
+                judgement: workspace.doubt.map_or(Judgement::Sure, Judgement::Doubtful),
             },
         }
     }

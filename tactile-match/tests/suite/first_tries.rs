@@ -55,7 +55,7 @@ impl<const D: usize> Views<D> {
         let pairs = found.assignment.iter().zip(&self.partner);
         let right = pairs.filter(|(found, own)| own.is_some() && found == own);
         let possible = self.partner.iter().flatten().count();
-        (right.count() as f64 / possible as f64, found.report.doubt)
+        (right.count() as f64 / possible as f64, found.report.doubt())
     }
 }
 
@@ -265,7 +265,7 @@ fn points_on_a_line_are_matched() {
             found.report.sigma
         );
         let right = (0..n as usize).all(|i| found.assignment[i] == Some(i));
-        assert!(right || found.report.doubt.is_some(), "{n}");
+        assert!(right || found.report.doubt().is_some(), "{n}");
     }
 }
 

@@ -32,7 +32,7 @@ fn check_clean<const D: usize>() {
         let right = right(&scene, &found.assignment);
         // An outlier may take the place of a point that it nearly coincides with.
         assert!(right > 0.99, "{D}-D, {outliers} outliers: {right} right");
-        assert_eq!(found.report.doubt, None, "{D}-D, {outliers} outliers");
+        assert_eq!(found.report.doubt(), None, "{D}-D, {outliers} outliers");
         // The spline goes through one point in three; between them the field is smooth on the scale
         // of their spacing.
         let between = scene.model.iter().zip(&scene.truth);
@@ -77,7 +77,7 @@ fn noise_of_a_spacing_leaves_the_field() {
     let within = rows.filter(|(w, t)| (*w - *t).norm() < 3.0 * noise).count();
     assert!(within as f64 > 0.85 * POINTS as f64, "{within} within");
     // Pairs cannot be told, and the report says so.
-    assert!(found.report.doubt.is_some());
+    assert!(found.report.doubt().is_some());
 }
 
 /// Noise of a tenth of the spacing, which is below what the patterns of clean sets need: nearly all
@@ -98,7 +98,7 @@ fn noise_of_a_tenth_of_the_spacing_loses_no_pairs() {
         "{matched} matched, {right} right"
     );
     assert!((0.9..1.1).contains(&sigma), "{sigma}");
-    assert_eq!(found.report.doubt, None);
+    assert_eq!(found.report.doubt(), None);
 }
 
 #[test]

@@ -1,10 +1,13 @@
 //! What can be written can be read again, under stable names.
-use tactile_match::{Doubt, MatchReport, Outliers, Rotation, Search, SoftMatches, StopReason};
+use tactile_match::{
+    Doubt, Judgement, MatchReport, Outliers, Rotation, Search, SoftMatches, StopReason,
+};
 
 #[test]
 fn a_report_comes_back_as_it_was() {
     let mut report = MatchReport::default();
-    (report.stop, report.doubt) = (StopReason::IterationLimit, Some(Doubt::FewPairs));
+    report.stop = StopReason::IterationLimit;
+    report.judgement = Judgement::Doubtful(Doubt::FewPairs);
     (report.residual, report.sigma) = (0.1, 0.3);
     let text = serde_json::to_string(&report).unwrap();
     assert!(text.contains(r#""stop":"iteration_limit""#), "{text}");
