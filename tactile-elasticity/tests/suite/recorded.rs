@@ -16,7 +16,7 @@ const FILE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/recorded.txt");
 
 /// A reordered sum, or another way to the same zero of a function, may move the last digits.
 /// Nothing else may.
-const TOLERANCE: f64 = 1e-9;
+const TOLERANCE: f64 = 1e-12;
 
 /// Names with their numbers.
 #[derive(Default)]
