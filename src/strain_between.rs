@@ -1,9 +1,9 @@
-//! Two point sets in, strain with its error out: match, spline, strain.
+//! Two point sets in, strain with its error out: match, field, strain.
 use crate::elasticity::ElasticityError;
 use crate::elasticity::field::{StrainField, StrainSummary};
 use crate::elasticity::strain::{Deformation, GreenLagrange, StrainMeasure};
 use crate::matching::{AnnealedSoftassign, Doubt, MatchError, Matching, PointMatcher};
-use crate::tps::{LocalField, LocalValue, RobustFit, ThinPlateSpline, TpsError, nearest_rows};
+use crate::tps::{LocalField, LocalValue, TpsError, nearest_rows};
 use nalgebra::{Matrix3, Point, SMatrix, SVector};
 use std::sync::Arc;
 
@@ -147,7 +147,7 @@ impl std::fmt::Display for PairsDoubt {
 /// assert_eq!(
 ///     error,
 ///     StrainBetweenError::TooFewPairs {
-///         expected: 16,
+///         expected: 4,
 ///         found: 2
 ///     }
 /// );
@@ -156,10 +156,7 @@ impl std::fmt::Display for PairsDoubt {
 #[non_exhaustive]
 pub enum StrainBetweenError {
     /// Too few points have a partner.
-    #[error(
-        "{found} matched points are too few for a smoothing spline and its error, which need \
-         {expected}"
-    )]
+    #[error("{found} matched points are too few for a strain and its error, which need {expected}")]
     TooFewPairs {
         /// The least number.
         expected: usize,
@@ -175,9 +172,9 @@ pub enum StrainBetweenError {
     /// The points could not be matched.
     #[error(transparent)]
     Match(#[from] MatchError),
-    /// The spline could not be fitted.
+    /// The field could not be fitted.
     #[error(transparent)]
-    Spline(#[from] TpsError),
+    Field(#[from] TpsError),
     /// The strain does not exist.
     #[error(transparent)]
     Strain(#[from] ElasticityError),
@@ -191,9 +188,9 @@ pub struct StrainBetween<const D: usize> {
     pub rows: Vec<(usize, usize)>,
     /// Matched positions, before and after.
     pub pairs: Vec<[Point<f64, D>; 2]>,
-    /// Displacement of every matched point of the first set by the smoothed deformation.
+    /// Displacement of every matched point of the first set by the field.
     pub displacements: Vec<SVector<f64, D>>,
-    /// Weight of every pair in the spline.
+    /// Weight of every pair in the field, 0 if it was left out.
     pub weights: Vec<f64>,
     /// Strain at every matched point of the first set.
     pub strains: Vec<Matrix3<f64>>,
@@ -201,26 +198,18 @@ pub struct StrainBetween<const D: usize> {
     pub standard_errors: Vec<Matrix3<f64>>,
     /// Mean and spread of the strains.
     pub summary: StrainSummary,
-    /// Standard error of the mean: the jackknife over the spline's parts, and the response of the
-    /// spline's weights.
+    /// Standard error of the mean. Points of one patch are taken to share their errors.
     pub standard_error: Matrix3<f64>,
-    /// Degrees of freedom of the standard error: parts less one.
+    /// Degrees of freedom of the standard error.
     pub degrees_of_freedom: usize,
     /// Noise of one coordinate, in the points' unit.
     pub sigma: f64,
-    /// Smoothing λ over the squared radius of the points. `None` for large sets, whose patches have
-    /// their own.
-    pub relative_lambda: Option<f64>,
+    /// Points about which the noise is far above that elsewhere: short waves or jumps that the pairs
+    /// do not resolve. Their errors hold it.
+    pub unresolved: usize,
     /// Why the pairs may be wrong, where there is a reason.
     pub doubt: Option<PairsDoubt>,
-    fit: Fit<D>,
-}
-
-/// What the strain comes from.
-#[derive(Clone, Debug)]
-enum Fit<const D: usize> {
-    Spline(RobustFit<D>),
-    Local(LocalField<D>),
+    field: LocalField<D>,
 }
 
 /// Displacement and strain at a point of the first set's space.
@@ -237,11 +226,9 @@ pub struct StrainAt<const D: usize> {
 
 /// Strain of the first set on its way to the second.
 ///
-/// The points are matched, a smoothing spline is fitted robustly through the pairs, and its
-/// gradient is strained at every matched point. Wrong pairs get no weight, and pairs that the
-/// matcher missed are found by the spline. O(n³) time below [`StrainBetween::LARGE`] pairs. From
-/// there on [`LocalField`] takes the spline's place, in time and memory that grow as the number of
-/// pairs.
+/// The points are matched, a [`LocalField`] is fitted through the pairs, and its gradient is
+/// strained at every matched point. Wrong pairs have no weight, and pairs that the matcher missed
+/// are found where the field predicts them. Time and memory grow as the number of pairs.
 ///
 /// ```
 /// use nalgebra::Point2;
@@ -271,9 +258,6 @@ pub fn strain_between<const D: usize>(
 }
 
 impl<const D: usize> StrainBetween<D> {
-    /// So many pairs are fitted patch by patch: one spline takes some seconds for them.
-    pub const LARGE: usize = 1000;
-
     /// Strain from a match of two sets: the second half of [`strain_between`].
     ///
     /// # Errors
@@ -378,72 +362,19 @@ impl<const D: usize> StrainBetween<D> {
         measure: &dyn StrainMeasure,
         possible: usize,
     ) -> Result<Self, StrainBetweenError> {
-        // Fewer leave the parts of the jackknife empty.
-        let expected = 16;
+        // An affine field, and a pair more for its error.
+        let expected = D + 2;
         let found = matched.len();
         if found < expected {
             return Err(StrainBetweenError::TooFewPairs { expected, found });
         }
-        if found >= Self::LARGE {
-            return Self::of_many(before, after, matched, measure, possible);
-        }
-        let rough = fit(before, after, matched)?;
-        let spacing = median_spacing(after).unwrap_or(0.0);
-        // A point that lies where the spline predicts is a partner, whatever the matcher's answer.
-        let rows = partners(before, after, &rough, spacing);
+        let mut rows = among_matched(before, after, matched);
         if rows.len() < expected {
             return Err(StrainBetweenError::NotSmooth);
         }
-        // A fit to the same pairs is the same.
-        let robust = match rows == matched {
-            true => rough,
-            false => fit(before, after, &rows)?,
-        };
-        let sources: Vec<_> = rows.iter().map(|&(i, _)| before[i]).collect();
-        let strained = |spline| -> Result<_, StrainBetweenError> {
-            let gradients = gradients(spline, &sources)?;
-            Ok(StrainField::from_gradients(&gradients, None, measure)?)
-        };
-        let field = strained(&robust.spline)?;
-        let folds = (robust.folds.iter())
-            .map(strained)
-            .collect::<Result<Vec<_>, _>>()?;
-        let means: Vec<_> = folds.iter().map(|fold| fold.summary().mean).collect();
-        let errors_at = |k: usize| {
-            let without: Vec<_> = folds.iter().map(|fold| fold.strains[k]).collect();
-            jackknife(&without) * robust.response
-        };
-        let displacement = |p: &Point<f64, D>| robust.spline.apply(p) - p;
-        let share = rows.len() as f64 / possible as f64;
-        Ok(Self {
-            doubt: doubt(share, robust.sigma / spacing).or(shape_doubt(&sources, &field)),
-            pairs: rows.iter().map(|&(i, j)| [before[i], after[j]]).collect(),
-            displacements: sources.iter().map(displacement).collect(),
-            standard_errors: (0..rows.len()).map(errors_at).collect(),
-            rows,
-            strains: field.strains.to_vec(),
-            summary: field.summary(),
-            standard_error: jackknife(&means) * robust.response,
-            degrees_of_freedom: means.len() - 1,
-            weights: robust.weights.clone(),
-            sigma: robust.sigma,
-            relative_lambda: Some(robust.relative_lambda),
-            fit: Fit::Spline(robust),
-        })
-    }
-
-    /// Strain by local fits.
-    fn of_many(
-        before: &[Point<f64, D>],
-        after: &[Point<f64, D>],
-        matched: &[(usize, usize)],
-        measure: &dyn StrainMeasure,
-        possible: usize,
-    ) -> Result<Self, StrainBetweenError> {
-        let mut rows = among_matched(before, after, matched);
         let mut sources: Vec<_> = rows.iter().map(|&(i, _)| before[i]).collect();
         let targets: Vec<_> = rows.iter().map(|&(_, j)| after[j]).collect();
-        let field = LocalField::fit(&sources, &targets, |_| {})?;
+        let field = LocalField::fit(&sources, &targets)?;
         let mut values = field.values.clone();
         let mut weights: Vec<f64> = (field.kept.iter())
             .map(|&kept| f64::from(u8::from(kept)))
@@ -457,31 +388,27 @@ impl<const D: usize> StrainBetween<D> {
         let strained = StrainField::from_gradients(&gradients_of(&values), None, measure)?;
         let errors = |value: &LocalValue<D>| strain_error(value, measure);
         let standard_errors: Vec<_> = values.iter().map(errors).collect();
-        let finite = standard_errors
-            .iter()
-            .filter(|e| e.iter().all(|c| c.is_finite()));
-        let mean_square =
-            finite.map(|e| e.component_mul(e)).sum::<Matrix3<f64>>() / rows.len() as f64;
-        // Points of one patch share their errors. Those of neighbouring patches cancel in part, so
-        // that this is at least the error of the mean.
-        let patches = (rows.len() / LocalField::<D>::PATCH).max(2);
+        let centre = mean_value(&values, field.mean_gradient_covariance);
+        // Noise and what the pairs do not resolve. A rough field through wrong pairs has no noise.
+        let usual = [0.674_5, 1.177_4, 1.538_2][D - 1];
+        let miss = median(field.misses.iter().copied()).unwrap_or(0.0) / usual;
         let sigma = median(values.iter().map(|value| value.sigma)).unwrap_or(0.0);
         let kept = weights.iter().sum::<f64>();
         let share = kept / possible as f64;
         Ok(Self {
-            doubt: doubt(share, sigma / spacing).or(shape_doubt(&sources, &strained)),
+            doubt: doubt(share, miss / spacing).or(shape_doubt(&sources, &strained)),
             pairs: rows.iter().map(|&(i, j)| [before[i], after[j]]).collect(),
             displacements: values.iter().map(|value| value.displacement).collect(),
             rows,
             weights,
             strains: strained.strains.to_vec(),
             summary: strained.summary(),
-            fit: Fit::Local(field),
+            standard_error: centre.map_or(Matrix3::zeros(), |mean| strain_error(&mean, measure)),
+            degrees_of_freedom: field.degrees_of_freedom,
+            unresolved: values.iter().filter(|value| value.unresolved).count(),
+            field,
             standard_errors,
-            standard_error: mean_square.map(|square| (square / patches as f64).sqrt()),
-            degrees_of_freedom: patches - 1,
             sigma,
-            relative_lambda: None,
         })
     }
 
@@ -493,13 +420,8 @@ impl<const D: usize> StrainBetween<D> {
 
     /// Where the deformation takes points of the first set's space.
     pub(crate) fn images(&self, points: &[Point<f64, D>]) -> Vec<Point<f64, D>> {
-        match &self.fit {
-            Fit::Local(field) => {
-                let moved = field.at(points, |_| {}).into_iter().zip(points);
-                moved.map(|(value, p)| p + value.displacement).collect()
-            }
-            Fit::Spline(robust) => points.iter().map(|p| robust.spline.apply(p)).collect(),
-        }
+        let moved = self.field.at(points).into_iter().zip(points);
+        moved.map(|(value, p)| p + value.displacement).collect()
     }
 
     /// Displacement and strain at any points of the first set's space.
@@ -528,44 +450,17 @@ impl<const D: usize> StrainBetween<D> {
         points: &[Point<f64, D>],
         measure: &dyn StrainMeasure,
     ) -> Result<Vec<StrainAt<D>>, StrainBetweenError> {
-        let strained = |gradients: &[Matrix3<f64>]| {
-            let mut field = StrainField::from_gradients(gradients, None, measure)?;
-            for &folded in &field.folded {
-                field.strains[folded].fill(f64::NAN);
-            }
-            Ok::<_, ElasticityError>(field.strains)
-        };
-        match &self.fit {
-            Fit::Local(field) => {
-                let values = field.at(points, |_| {});
-                let at = |(value, strain): (&LocalValue<D>, Matrix3<f64>)| StrainAt {
-                    displacement: value.displacement,
-                    strain,
-                    standard_error: strain_error(value, measure),
-                };
-                Ok(values
-                    .iter()
-                    .zip(strained(&gradients_of(&values))?)
-                    .map(at)
-                    .collect())
-            }
-            Fit::Spline(robust) => {
-                let at = |spline| -> Result<_, StrainBetweenError> {
-                    Ok(strained(&gradients(spline, points)?)?)
-                };
-                let strains = at(&robust.spline)?;
-                let folds = (robust.folds.iter().map(at)).collect::<Result<Vec<_>, _>>()?;
-                let at = |(k, p): (usize, &Point<f64, D>)| {
-                    let without: Vec<_> = folds.iter().map(|fold| fold[k]).collect();
-                    StrainAt {
-                        displacement: robust.spline.apply(p) - p,
-                        strain: strains[k],
-                        standard_error: jackknife(&without) * robust.response,
-                    }
-                };
-                Ok(points.iter().enumerate().map(at).collect())
-            }
+        let values = self.field.at(points);
+        let mut strained = StrainField::from_gradients(&gradients_of(&values), None, measure)?;
+        for &folded in &strained.folded {
+            strained.strains[folded].fill(f64::NAN);
         }
+        let at = |(value, strain): (&LocalValue<D>, &Matrix3<f64>)| StrainAt {
+            displacement: value.displacement,
+            strain: *strain,
+            standard_error: strain_error(value, measure),
+        };
+        Ok(values.iter().zip(&strained.strains).map(at).collect())
     }
 }
 
@@ -575,7 +470,20 @@ fn gradients_of<const D: usize>(values: &[LocalValue<D>]) -> Vec<Matrix3<f64>> {
     gradients.collect()
 }
 
-/// Standard error of the strain, to first order in the gradient's.
+/// The mean of some values, its gradient with this covariance.
+fn mean_value<const D: usize>(
+    values: &[LocalValue<D>],
+    covariance: SMatrix<f64, D, D>,
+) -> Option<LocalValue<D>> {
+    let mut mean = *values.first()?;
+    let gradients = values.iter().map(|value| value.gradient);
+    mean.gradient = gradients.sum::<SMatrix<f64, D, D>>() / values.len() as f64;
+    mean.gradient_covariance = covariance;
+    Some(mean)
+}
+
+/// Standard error of the strain, to first order in the gradient's. Infinite where it follows a
+/// derivative along an axis that the points do not span.
 fn strain_error<const D: usize>(
     value: &LocalValue<D>,
     measure: &dyn StrainMeasure,
@@ -588,19 +496,34 @@ fn strain_error<const D: usize>(
     let Some(centre) = strain(&value.gradient) else {
         return undefined;
     };
-    let Some(root) = value.gradient_covariance.cholesky() else {
-        return Matrix3::zeros(); // exact to rounding
-    };
     let mut squares = Matrix3::zeros();
+    let mut add = |row: usize, direction: SVector<f64, D>, factor: f64| {
+        let mut moved = value.gradient;
+        (0..D).for_each(|a| moved[(row, a)] += direction[a]);
+        let change = strain(&moved).map(|strain| strain - centre);
+        squares += change.map_or(undefined, |change| {
+            change.map(|c| if c == 0.0 { 0.0 } else { factor * c * c })
+        });
+    };
+    let known = |a: usize| value.gradient_covariance[(a, a)].is_finite();
+    let finite = SMatrix::<f64, D, D>::from_fn(|a, b| match known(a) && known(b) {
+        true => value.gradient_covariance[(a, b)],
+        false => 0.0,
+    });
+    let eigen = nalgebra::SymmetricEigen::new(finite.fixed_resize::<3, 3>(0.0));
     for row in 0..D {
-        for direction in root.l().column_iter() {
-            let mut moved = value.gradient;
-            (0..D).for_each(|a| moved[(row, a)] += direction[a]);
-            let Some(strain) = strain(&moved) else {
-                return undefined;
-            };
-            let change = strain - centre;
-            squares += change.component_mul(&change);
+        for (size, direction) in eigen
+            .eigenvalues
+            .iter()
+            .zip(eigen.eigenvectors.column_iter())
+        {
+            let direction: SVector<f64, D> = direction.fixed_resize::<D, 1>(0.0);
+            add(row, direction * size.max(0.0).sqrt(), 1.0);
+        }
+        for axis in (0..D).filter(|&a| !known(a)) {
+            // Any step shows what follows this derivative.
+            let direction = SVector::from_fn(|a, _| if a == axis { 1e-3 } else { 0.0 });
+            add(row, direction, f64::INFINITY);
         }
     }
     squares.map(f64::sqrt)
@@ -615,7 +538,7 @@ fn among_matched<const D: usize>(
     matched: &[(usize, usize)],
 ) -> Vec<(usize, usize)> {
     // Half of the usual share in both sets: of random outliers 1 pair in 10⁴ has as few.
-    let neighbours: usize = 16;
+    let neighbours = 16.min(before.len()).min(after.len());
     let matched_nearby = |set: &[Point<f64, D>], rows: &[usize]| -> Vec<bool> {
         let mut has_partner = vec![false; set.len()];
         rows.iter().for_each(|&row| has_partner[row] = true);
@@ -650,7 +573,7 @@ fn missed_partners<const D: usize>(
     // Only points near along the first axis can be near.
     free.sort_unstable_by(|&a, &b| after[a][0].total_cmp(&after[b][0]));
     let places: Vec<_> = open.iter().map(|&i| before[i]).collect();
-    let values = field.at(&places, |_| {});
+    let values = field.at(&places);
     let mut meetings = Vec::new();
     for (k, value) in values.iter().enumerate() {
         // Four standard errors of the prediction and the point. Where they reach farther than a
@@ -709,28 +632,6 @@ fn shape_doubt<const D: usize>(
     (2 * field.folded.len() > sources.len()).then_some(PairsDoubt::Mirrored)
 }
 
-fn fit<const D: usize>(
-    before: &[Point<f64, D>],
-    after: &[Point<f64, D>],
-    pairs: &[(usize, usize)],
-) -> Result<RobustFit<D>, TpsError> {
-    let sources: Vec<_> = pairs.iter().map(|&(i, _)| before[i]).collect();
-    let targets: Vec<_> = pairs.iter().map(|&(_, j)| after[j]).collect();
-    RobustFit::new(&sources, &targets, None)
-}
-
-/// H = ∇f − I at every point, in three dimensions.
-fn gradients<const D: usize>(
-    spline: &ThinPlateSpline<D>,
-    points: &[Point<f64, D>],
-) -> Result<Vec<Matrix3<f64>>, TpsError> {
-    let mut jacobians = vec![SMatrix::zeros(); points.len()];
-    spline.jacobian_into(points, &mut jacobians)?;
-    let less_one =
-        |jacobian: &SMatrix<f64, D, D>| (jacobian - SMatrix::identity()).fixed_resize::<3, 3>(0.0);
-    Ok(jacobians.iter().map(less_one).collect())
-}
-
 /// Why a share of matched points or their residuals over the distance between neighbours cast doubt
 /// on the pairs.
 ///
@@ -755,21 +656,6 @@ pub(crate) fn median_spacing<const D: usize>(points: &[Point<f64, D>]) -> Option
     median(near.filter_map(distance))
 }
 
-/// Mutual nearest neighbours of prediction and target, within a third of the targets' usual
-/// spacing.
-fn partners<const D: usize>(
-    before: &[Point<f64, D>],
-    after: &[Point<f64, D>],
-    rough: &RobustFit<D>,
-    spacing: f64,
-) -> Vec<(usize, usize)> {
-    let predicted: Vec<_> = before.iter().map(|p| rough.spline.apply(p)).collect();
-    let reach = spacing / 3.0;
-    let mut pairs = mutually_nearest(&predicted, after);
-    pairs.retain(|&(i, j)| (after[j] - predicted[i]).norm() <= reach);
-    pairs
-}
-
 /// Pairs of rows whose points are each other's nearest.
 pub(crate) fn mutually_nearest<const D: usize>(
     own: &[Point<f64, D>],
@@ -792,44 +678,10 @@ impl<const D: usize> StrainBetween<D> {
         &self,
         points: &[Point<f64, D>],
     ) -> Result<Vec<GradientAt>, StrainBetweenError> {
-        let robust = match &self.fit {
-            Fit::Local(field) => {
-                let values = field.at(points, |_| {}).into_iter();
-                let resized = |value: LocalValue<D>| {
-                    let covariance = value.gradient_covariance.fixed_resize(0.0);
-                    (value.gradient.fixed_resize(0.0), covariance)
-                };
-                return Ok(values.map(resized).collect());
-            }
-            Fit::Spline(robust) => robust,
+        let resized = |value: LocalValue<D>| {
+            let covariance = value.gradient_covariance.fixed_resize(0.0);
+            (value.gradient.fixed_resize(0.0), covariance)
         };
-        let centre = gradients(&robust.spline, points)?;
-        let folds = robust.folds.iter().map(|fold| gradients(fold, points));
-        let folds = folds.collect::<Result<Vec<_>, _>>()?;
-        // The jackknife's covariance over the folds, the mean of the rows'.
-        let parts = folds.len() as f64;
-        let factor = (parts - 1.0) / parts / D as f64 * robust.response * robust.response;
-        let covariance = |k: usize| {
-            let mean = folds.iter().map(|fold| fold[k]).sum::<Matrix3<f64>>() / parts;
-            let squares = folds
-                .iter()
-                .map(|fold| (fold[k] - mean).tr_mul(&(fold[k] - mean)));
-            squares.sum::<Matrix3<f64>>() * factor
-        };
-        let places = centre.into_iter().enumerate();
-        Ok(places
-            .map(|(k, gradient)| (gradient, covariance(k)))
-            .collect())
+        Ok(self.field.at(points).into_iter().map(resized).collect())
     }
-}
-
-/// √((K − 1)/K Σ(θₖ − θ̄)²) of the means without one part each.
-fn jackknife(means: &[Matrix3<f64>]) -> Matrix3<f64> {
-    let k = means.len() as f64;
-    let centre: Matrix3<f64> = means.iter().sum::<Matrix3<f64>>() / k;
-    let squares = means
-        .iter()
-        .map(|m| (m - centre).component_mul(&(m - centre)))
-        .sum::<Matrix3<f64>>();
-    squares.map(|s| (s * (k - 1.0) / k).sqrt())
 }

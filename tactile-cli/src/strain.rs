@@ -26,8 +26,9 @@ mod series;
 /// Match the points of two frames or more and measure the strain between them
 ///
 /// The files are CSV, a point per row: columns x, y and, in space, z, found by name where there is a
-/// header. Points may come and go. A smoothing spline whose smoothing is chosen by cross-validation
-/// gives the strain. Misplaced points are found and left out. Pairs that are not to be relied on
+/// header. Points may come and go. An affine and a smooth field beside noise, weighed by their
+/// likelihood, give the strain. Misplaced points are found and left out. Pairs that are not to be
+/// relied on
 /// give no strain.
 ///
 /// --out gets pairs.csv (rows, positions and displacements of the pairs), strain.csv (at every point
@@ -526,14 +527,14 @@ impl<const D: usize> StrainReport<D> {
             "noise",
             format_args!("{noise} for each coordinate (in {})", self.unit),
         );
-        let smoothing = match found.relative_lambda {
-            None => "by likelihood in the neighbourhood of each point".into(),
-            Some(lambda) if lambda >= 1e8 => {
-                "homogeneous (nothing finer is supported by the data)".into()
-            }
-            Some(lambda) => format!("λ = {lambda:.0e} squared radii"),
-        };
-        context.row("smoothing", smoothing);
+        if found.unresolved > 0 {
+            let text = format!(
+                "the noise about {} points is far above that elsewhere: short waves or jumps that \
+                 the points do not resolve",
+                found.unresolved
+            );
+            context.warn("unresolved", json!({ "points": found.unresolved }), text);
+        }
         if let Some(doubt) = found.doubt {
             context.warn("doubtful_pairs", json!(null), doubt);
         }
@@ -565,7 +566,7 @@ impl<const D: usize> StrainReport<D> {
                 "measure": self.measure,
                 "left_out_as_misplaced": left_out(found),
                 "noise_per_coordinate": found.sigma,
-                "smoothing_over_squared_radius": found.relative_lambda,
+                "unresolved_points": found.unresolved,
                 "degrees_of_freedom": found.degrees_of_freedom,
                 "folded_points": found.summary.folded,
                 "doubt": found.doubt.map(|doubt| doubt.to_string()),

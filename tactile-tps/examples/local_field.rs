@@ -77,7 +77,7 @@ fn study<const D: usize>(
         targets.push(p + field(steep, p) + offset);
     }
     let start = Instant::now();
-    let found = LocalField::fit(&sources, &targets, |_| {})?;
+    let found = LocalField::fit(&sources, &targets)?;
     let seconds = start.elapsed().as_secs_f64();
     let (mut within, mut squares, mut all, mut sigma) = (0, 0.0, 0, 0.0);
     for (p, value) in sources.iter().zip(&found.values) {

@@ -9,8 +9,8 @@
 //! | choose kernel, smoothing, weights | [`FitOptions`], [`Smoothing`], [`Kernel`] |
 //! | propagate uncertainty to Jacobians | [`Factorization::jacobian_influence_into`] |
 //! | see condition, residual and iterations | [`FitReport`] |
+//! | displacement and gradient with errors, from pairs some of which are wrong | [`LocalField`] |
 //! | strain from matches whose neighbours share errors | [`StrainSpline`] |
-//! | warp by matches some of which are wrong | [`RobustSpline`], [`RobustFit`] |
 //! | accept any warp | the object-safe trait [`Warp`]: splines, [`Affine`] |
 //! | fit any kind of warp | the trait [`WarpModel`]: [`FitOptions`], [`AffineModel`] |
 //!
@@ -45,5 +45,5 @@ pub use fit::{Factorization, LambdaPath, SplineWorkspace};
 pub use kernel::{Kernel, KernelDerivatives, KernelScalar, NegR, R2LogR, R3};
 pub use local::{LocalField, LocalValue, nearest_rows};
 pub use options::{FitOptions, FitReport, Solver};
-pub use smoothing::{RobustFit, RobustSpline, Smoothing, StrainSpline};
+pub use smoothing::{Smoothing, StrainSpline};
 pub use warp::{Pairs, SeriesMemory, Warp, WarpModel};

@@ -29,7 +29,8 @@ fn particles_of_a_stretched_volume_have_their_local_strain() {
         let local = (squares.sum::<f64>() / found.strains.len() as f64).sqrt();
         let (pairs, errors) = (found.pairs.len(), found.standard_error.amax());
         println!("0 -> {k}: {pairs} pairs, errors {errors:.1e}, local rms {local:.1e}");
-        assert!(gap.amax() < 5e-4, "{gap}");
+        // Three standard errors of the mean, which are small themselves.
+        assert!(gap.amax() < 3.0 * errors && errors < 1e-3, "{gap}");
         assert!(local < 0.01, "{local}");
     }
 }

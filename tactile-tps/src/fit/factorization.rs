@@ -2,7 +2,7 @@
 
 use core::ops::ControlFlow;
 
-use nalgebra::{DMatrix, Point, SVector};
+use nalgebra::{Point, SVector};
 
 use super::{
     buffers::Buffers,
@@ -582,61 +582,6 @@ impl<const D: usize, K: Kernel> Factorization<D, K> {
             self.follow(point, &mut workspace.buffers, row);
         }
         Ok(())
-    }
-
-    /// For every target what it lies from the spline that is fitted without its part, rows of the
-    /// sources by `parts`.
-    ///
-    /// The weights are w = B y. The spline without the targets of part P goes through y − r in
-    /// their place, where r vanishes outside P and Br = w on P, for these weights vanish. So
-    /// B_PP r_P = w_P, one small system a part. O(n³/3) for B, the same as for the factor.
-    ///
-    /// `None` where a part is needed to span the plane, and for points that coincide, weights of 0
-    /// and systems without a factor.
-    pub(crate) fn left_out<const M: usize>(
-        &self,
-        targets: &[Point<f64, M>],
-        parts: &[Vec<usize>],
-    ) -> Option<Vec<SVector<f64, M>>> {
-        let (n, system) = (self.centres.len(), &self.system);
-        let lambda = self.inner_lambda(self.smoothing);
-        // A row of a part must be a row of the system.
-        let whole = n == self.centres.inputs && n == system.active.len() && n == targets.len();
-        if !whole || self.iterative.is_some() || lambda == 0.0 {
-            return None;
-        }
-        let mut buffers = Buffers::default();
-        let weights = self.weights.as_deref();
-        self.centres
-            .gather(targets, weights, &[0.0; M], &mut buffers);
-        let Buffers {
-            targets: w,
-            work,
-            spare,
-            ..
-        } = &mut buffers;
-        system.solve::<M>(w, lambda, work, spare);
-        let inverse = system.matrix.inverse_factor();
-        let mut missed = vec![SVector::zeros(); n];
-        for part in parts {
-            let entry = |a: usize, b: usize| system.entry(&inverse, lambda, part[a], part[b]);
-            let block = DMatrix::from_fn(part.len(), part.len(), entry);
-            let factor = block.cholesky()?;
-            // λB/weight is 1 less the influence of a target on its own value. Where it is rounding
-            // alone no other target determines this value.
-            let free = |a: usize| {
-                let scale = system.scales.get(part[a]).copied().unwrap_or(1.0);
-                lambda * (factor.l_dirty()[(a, a)] / scale).powi(2) > 1e-8
-            };
-            if !(0..part.len()).all(free) {
-                return None;
-            }
-            let r = factor.solve(&DMatrix::from_fn(part.len(), M, |a, m| w[m * n + part[a]]));
-            for (a, &i) in part.iter().enumerate() {
-                missed[i] = SVector::from_fn(|m, _| r[(a, m)]);
-            }
-        }
-        Some(missed)
     }
 
     /// Whether there is a linear map, and memory for it at these points.

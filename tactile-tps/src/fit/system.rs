@@ -12,7 +12,6 @@ use crate::{
     smoothing::least_gcv,
     span::{Coefficients, MAX, Span},
 };
-use faer::Mat;
 
 /// The inputs of a system.
 pub(super) struct Setting<'a, K, const D: usize> {
@@ -289,23 +288,6 @@ impl<const D: usize> System<D> {
             heads[m] = self.affine.remove(column);
         }
         heads
-    }
-
-    /// The derivative of one active centre's weight by another's value, from the inverse of the
-    /// factor.
-    pub(super) fn entry(&self, inverse: &Mat<f64>, lambda: f64, i: usize, j: usize) -> f64 {
-        let n = self.active.len();
-        // The inverse of the factor is a lower triangle.
-        let column = |k: usize| &inverse.col_as_slice(k)[i.max(j)..n];
-        let (a, b) = (column(i), column(j));
-        let affine = (0..self.affine.q).map(|c| {
-            let column = self.affine.column(c);
-            column[i] * column[j]
-        });
-        let scale = |i: usize| self.scales.get(i).copied().unwrap_or(1.0);
-        // The inverse has 1/(σ + λ) on the affine functions, where the map from values to weights
-        // has 0.
-        scale(i) * scale(j) * (dot(a, b) - affine.sum::<f64>() / (self.shift + lambda))
     }
 
     /// Spreads the columns of `work`, each entry times its scale, over the centres.

@@ -3,9 +3,9 @@
 use core::mem::MaybeUninit;
 
 use faer::{
-    Mat, MatMut, MatRef, Par, Spec,
+    MatMut, MatRef, Par, Spec,
     dyn_stack::{MemStack, StackReq},
-    linalg::{cholesky::llt, triangular_inverse},
+    linalg::cholesky::llt,
 };
 
 use crate::{TpsError, lanes::dot};
@@ -97,13 +97,6 @@ impl Triangle {
         let columns = b.len() / self.n;
         let b = MatMut::from_column_major_slice_mut(b, self.n, columns);
         llt::solve::solve_in_place(self.view(), b, Par::Seq, MemStack::new(&mut []));
-    }
-
-    /// The inverse of the Cholesky factor.
-    pub(super) fn inverse_factor(&self) -> Mat<f64> {
-        let mut inverse = Mat::zeros(self.n, self.n);
-        triangular_inverse::invert_lower_triangular(inverse.as_mut(), self.view(), Par::Seq);
-        inverse
     }
 
     /// An estimate of the 2-norm of A⁻¹: two steps of inverse iteration from the column of the

@@ -1,31 +1,62 @@
-//! Displacement and gradient from any number of pairs, patch by patch.
+//! Displacement and gradient from any number of pairs.
 
 use crate::TpsError;
 use crate::error::validate_pairs;
+use core::ops::ControlFlow;
 use nalgebra::{Matrix4, Matrix4x3, Point, RowVector4, SMatrix, SVector};
+use tactile_core::Progress;
 use tree::Tree;
 
+mod grain;
+mod judge;
 mod patch;
+mod process;
 mod tree;
 
-use patch::Patch;
+use judge::contradicted;
+use patch::{Pairs, Patch};
 
-/// A displacement field through many pairs, with its gradient and their errors, in time and memory
-/// that grow as the number of pairs.
+/// So many pairs have one patch. More are cut, as its time grows with the third power.
+const WHOLE: usize = 300;
+
+/// Pairs of the smallest patch. Twice as many halve the errors of smooth fields, and take four times
+/// as long.
+const fn smallest_patch(dimensions: usize) -> usize {
+    if dimensions == 2 { 70 } else { 110 }
+}
+
+/// Places of a block, neighbours that are judged together.
+const BLOCK: usize = 24;
+
+/// Places of a block over pairs of its patch, at most: those in its middle.
+const MIDDLE: usize = 3;
+
+/// Rounds in which wrong pairs are looked for: each judges without those of the last.
+const ROUNDS: usize = 4;
+
+/// Noise that is so many times the usual one may be deformation that the pairs do not resolve,
+const FAR_ABOVE: f64 = 3.0;
+
+/// if it is at least this share of the spacing.
+const NOTICEABLE: f64 = 0.02;
+
+/// A displacement field through pairs, with its gradient and their errors.
 ///
-/// The sources are cut into blocks of two dozen neighbours. Each block has a patch: the 70 pairs in
-/// the plane, 110 in space, that lie next to it. There the displacement is an affine field plus a
-/// Gaussian process (kriging), `cov zᵢ zⱼ = τ²(k(|xᵢ − xⱼ|) + λ δᵢⱼ)`. Shape and length of k and
-/// the noise λ are those of the largest restricted likelihood (Patterson & Thompson, Biometrika 58,
-/// 1971) in this patch, so that a steep zone has its own. The posterior gives displacement,
-/// gradient and covariances, which hold noise and what the pairs do not resolve.
+/// The displacement is an affine field plus a Gaussian process (kriging), `cov zᵢ zⱼ = τ²(k(|xᵢ −
+/// xⱼ|) + λ δᵢⱼ)`. Shapes and lengths of k and noises λ are weighed by their restricted likelihood
+/// (Patterson & Thompson, Biometrika 58, 1971), and the field is the average of those that are
+/// likely. Its errors hold noise, what the pairs do not resolve, and what the likely processes do
+/// not agree on. They are raised where pairs, each left out in turn, lie farther from the prediction
+/// than the likelihood allows.
 ///
-/// A pair is left out where it contradicts its neighbours: the distance from the prediction by the
-/// others exceeds six standard deviations of the patch and a seventh of the spacing. The standard
-/// deviation is robust and the patch's own.
+/// Up to 300 pairs are one patch. More are cut into patches of neighbours, which shrink to 70 pairs
+/// in the plane and 110 in space, in time and memory that grow as the number of pairs. Fewer than 16
+/// show an affine field. Directions that the points do not span have no gradient: its variance is
+/// infinite there.
 ///
-/// Against polynomials fitted by moving least squares the gradients of noisy fields err by half as
-/// much, and their errors hold the truth 93 to 99 times in 100 instead of 40 to 90.
+/// A pair is left out if it contradicts its neighbours, and no three of them moved along: the
+/// distance from the prediction by the others exceeds six standard deviations and a seventh of the
+/// spacing.
 ///
 /// ```
 /// use nalgebra::Point2;
@@ -42,9 +73,9 @@ use patch::Patch;
 /// let bend = |p: &Point2<f64>| Point2::new(p.x + (0.1 * p.y).sin(), p.y);
 /// let mut targets: Vec<_> = sources.iter().map(bend).collect();
 /// targets[777].y += 3.0; // a wrong match
-/// let field = LocalField::fit(&sources, &targets, |_| {})?;
+/// let field = LocalField::fit(&sources, &targets)?;
 /// assert!((0..2000).all(|i| field.kept[i] == (i != 777)));
-/// let found = &field.at(&[Point2::new(20.0, 10.0)], |_| {})[0];
+/// let found = &field.at(&[Point2::new(20.0, 10.0)])[0];
 /// // ∂u_x/∂y = 0.1 cos(0.1 y).
 /// assert!((found.gradient[(0, 1)] - 0.1 * 1_f64.cos()).abs() < 1e-5);
 /// # Ok(())
@@ -57,9 +88,19 @@ pub struct LocalField<const D: usize> {
     pub kept: Vec<bool>,
     /// The field at every source.
     pub values: Vec<LocalValue<D>>,
+    /// Distance of every pair from what the others predict.
+    pub misses: Vec<f64>,
+    /// Covariance of a row of the mean gradient over the sources.
+    pub mean_gradient_covariance: SMatrix<f64, D, D>,
+    /// Degrees of freedom of the noise and of the covariance of the mean.
+    pub degrees_of_freedom: usize,
     sources: Vec<Point<f64, D>>,
     displacements: Vec<SVector<f64, D>>,
+    floor: f64,
+    grain: f64,
     tree: Tree<D>,
+    /// The median of the values' noise.
+    usual: f64,
 }
 
 /// The field at a point.
@@ -72,144 +113,272 @@ pub struct LocalValue<const D: usize> {
     pub displacement_variance: f64,
     /// Gradient of the displacement: row i is ∇uᵢ.
     pub gradient: SMatrix<f64, D, D>,
-    /// Covariance of a row of the gradient. Rows are independent of each other.
+    /// Covariance of a row of the gradient. Rows are independent of each other. Infinite along axes
+    /// that have a part across what the points span.
     pub gradient_covariance: SMatrix<f64, D, D>,
+    /// Directions that the points hereabouts span: 1 for points on a line.
+    pub rank: usize,
     /// Standard deviation of a coordinate's noise hereabouts.
     pub sigma: f64,
+    /// By how much the pairs hereabouts, each left out in turn, lie farther from the prediction than
+    /// the likelihood allows: a ratio of variances, at least 1. The covariances hold it.
+    pub excess: f64,
     /// Distance between neighbours hereabouts.
     pub spacing: f64,
+    /// Whether the noise is far above that elsewhere: deformation that the pairs do not resolve, as
+    /// short waves and jumps. The errors hold it.
+    pub unresolved: bool,
 }
 
-/// Why the field is looked up.
-#[derive(Clone, Copy, PartialEq)]
-enum Walk {
-    /// To judge the pairs. Smaller patches are enough, and take a sixth of the time.
-    Judge,
-    /// To read values and errors.
-    Read,
-}
-
-/// A value and how far the pair there, if there is one, is from what the others predict.
+/// A value, and how far the pair there, if there is one, is from what the others predict.
+#[derive(Clone, Copy)]
 struct Found<const D: usize> {
     value: LocalValue<D>,
     /// Squared distance from the prediction over its variance, and the distance.
     misfit: f64,
     distance: f64,
+    /// Gradient of the affine field of the patch.
+    trend: SMatrix<f64, D, D>,
 }
 
 impl<const D: usize> LocalField<D> {
-    /// Pairs of a patch. Twice as many halve the errors of smooth fields, and take eight times as
-    /// long.
-    pub const PATCH: usize = if D == 2 { 70 } else { 110 };
+    /// Pairs of a patch in a set of many.
+    pub const PATCH: usize = smallest_patch(D);
 
-    /// Fits `sources` to `targets`. `progress` gets the share that is done. O(n) time after
-    /// O(n log n) for the neighbours.
+    /// Fits `sources` to `targets`. O(n³) time up to 300 pairs, O(n) beyond, after O(n log n) for
+    /// the neighbours.
     ///
     /// # Errors
     /// [`TpsError`] for no points, lengths that differ and numbers that are not finite.
-    pub fn fit(
+    pub fn fit(sources: &[Point<f64, D>], targets: &[Point<f64, D>]) -> Result<Self, TpsError> {
+        Self::fit_watched(sources, targets, |_| ControlFlow::Continue(()))
+    }
+
+    /// As [`fit`](Self::fit). `watch` sees the points that are done, and may stop the fit.
+    ///
+    /// # Errors
+    /// As [`fit`](Self::fit), and [`TpsError::Stopped`].
+    pub fn fit_watched(
         sources: &[Point<f64, D>],
         targets: &[Point<f64, D>],
-        mut progress: impl FnMut(f64),
+        mut watch: impl FnMut(&Progress) -> ControlFlow<()>,
     ) -> Result<Self, TpsError> {
-        validate_pairs(sources, targets, None)?;
-        let mut field = Self {
-            kept: vec![true; sources.len()],
-            values: Vec::new(),
-            sources: sources.to_vec(),
-            displacements: targets.iter().zip(sources).map(|(t, s)| t - s).collect(),
-            tree: Tree::default(),
-        };
-        // The first round judges with the wrong pairs among the others, the second without them.
-        for _ in 0..2 {
+        let mut field = Self::of(sources, targets)?;
+        let mut done = 0;
+        let mut found = Vec::new();
+        let mut patch = Patch::default();
+        for round in 1..=ROUNDS {
             field.plant();
-            let found = field.walk(sources, Walk::Judge, |_| {});
-            let wrong = contradicted(&found, sources);
-            // `kept` is the opposite of `wrong`: nothing has changed where they differ everywhere.
-            let same = (0..sources.len()).all(|i| field.kept[i] != wrong[i]);
-            field.kept = wrong.into_iter().map(|wrong| !wrong).collect();
-            if same {
+            found.clear();
+            field.walk(&mut patch, sources, true, &mut found, |points| {
+                // Most fields need one round, others two.
+                let total = sources.len() * round;
+                watch(&Progress::new(done + points, total))
+            })?;
+            done += sources.len();
+            if round == ROUNDS {
                 break;
             }
+            let wrong = contradicted(&found, &field.sources, &field.displacements);
+            // `kept` is the opposite of `wrong`: nothing has changed if they differ everywhere.
+            if field
+                .kept
+                .iter()
+                .zip(&wrong)
+                .all(|(kept, wrong)| kept != wrong)
+            {
+                break;
+            }
+            field.kept = wrong.into_iter().map(|wrong| !wrong).collect();
         }
-        field.plant();
-        let found = field.walk(sources, Walk::Read, &mut progress);
+        field.misses = found.iter().map(|found| found.distance).collect();
         field.values = found.into_iter().map(|found| found.value).collect();
+        field.mark();
+        field.take_mean(&mut patch);
         Ok(field)
+    }
+
+    /// The field before it is fitted.
+    fn of(sources: &[Point<f64, D>], targets: &[Point<f64, D>]) -> Result<Self, TpsError> {
+        validate_pairs(sources, targets, None)?;
+        let grain = grain::of_pairs(sources, targets);
+        Ok(Self {
+            kept: vec![true; sources.len()],
+            values: Vec::new(),
+            misses: Vec::new(),
+            mean_gradient_covariance: SMatrix::zeros(),
+            degrees_of_freedom: 0,
+            sources: sources.to_vec(),
+            displacements: targets.iter().zip(sources).map(|(t, s)| t - s).collect(),
+            floor: grain::least_noise(sources, targets, grain),
+            grain,
+            tree: Tree::default(),
+            usual: f64::INFINITY,
+        })
+    }
+
+    /// The covariance of the mean gradient.
+    fn take_mean(&mut self, patch: &mut Patch<D>) {
+        let (size, kept) = (self.sizes().0, self.tree.len());
+        if kept == size {
+            self.mean_gradient_covariance = patch.of_mean();
+            self.degrees_of_freedom = patch.degrees();
+            return;
+        }
+        // Points of one patch share their errors. Those of neighbouring patches cancel in part, so
+        // that this is at least the error of the mean.
+        let patches = kept / size;
+        let all = self.values.iter().map(|value| value.gradient_covariance);
+        let mean = all.sum::<SMatrix<f64, D, D>>() / self.values.len() as f64;
+        self.mean_gradient_covariance = mean / patches as f64;
+        self.degrees_of_freedom = patches.max(2) - 1;
+    }
+
+    fn pairs(&self) -> Pairs<'_, D> {
+        Pairs {
+            sources: &self.sources,
+            displacements: &self.displacements,
+            floor: self.floor,
+            grain: self.grain,
+        }
     }
 
     /// The tree of the pairs that are kept.
     fn plant(&mut self) {
         let rows = (0..self.sources.len()).filter(|&i| self.kept[i]);
-        self.tree = Tree::new(&self.sources, rows.collect());
+        self.tree = Tree::new(&self.sources, rows.collect(), BLOCK);
+    }
+
+    /// Marks values whose noise is far above the usual one.
+    fn mark(&mut self) {
+        let mut noises: Vec<f64> = self.values.iter().map(LocalValue::noise).collect();
+        let middle = noises.len() / 2;
+        if middle < noises.len() {
+            self.usual = *noises.select_nth_unstable_by(middle, f64::total_cmp).1;
+        }
+        let usual = self.usual;
+        self.values.iter_mut().for_each(|value| value.mark(usual));
     }
 
     /// The field at any points: O(1) time for each that has neighbours among them.
-    pub fn at(&self, points: &[Point<f64, D>], progress: impl FnMut(f64)) -> Vec<LocalValue<D>> {
-        let found = self.walk(points, Walk::Read, progress);
-        found.into_iter().map(|found| found.value).collect()
+    #[must_use]
+    pub fn at(&self, points: &[Point<f64, D>]) -> Vec<LocalValue<D>> {
+        let mut found = Vec::with_capacity(points.len());
+        // Nothing stops this walk.
+        let mut patch = Patch::default();
+        let _ = self.walk(&mut patch, points, false, &mut found, |_| {
+            ControlFlow::Continue(())
+        });
+        let value = |found: Found<D>| {
+            let mut value = found.value;
+            value.mark(self.usual);
+            value
+        };
+        found.into_iter().map(value).collect()
     }
 
-    /// The field at `points`, which are the sources where they are judged.
+    /// Pairs of a patch, and places that it serves.
+    fn sizes(&self) -> (usize, usize) {
+        let kept = self.tree.len();
+        if kept <= WHOLE {
+            return (kept, usize::MAX);
+        }
+        // As much time for each pair, until patches are as small as they may be.
+        let size = WHOLE as f64 * (WHOLE as f64 / kept as f64).sqrt();
+        let size = (size as usize).max(Self::PATCH);
+        (size, size.div_euclid(MIDDLE))
+    }
+
+    /// The field at `points`, which are the sources if they are judged.
     fn walk(
         &self,
+        patch: &mut Patch<D>,
         points: &[Point<f64, D>],
-        purpose: Walk,
-        mut progress: impl FnMut(f64),
-    ) -> Vec<Found<D>> {
-        let count = match purpose {
-            Walk::Judge => Self::PATCH / 2,
-            Walk::Read => Self::PATCH,
-        };
+        judge: bool,
+        found: &mut Vec<Found<D>>,
+        mut watch: impl FnMut(usize) -> ControlFlow<()>,
+    ) -> Result<(), TpsError> {
+        let (count, leaf) = self.sizes();
+        let pairs = self.pairs();
         // One patch serves all points of a block, which are neighbours.
-        let blocks = Tree::new(points, (0..points.len()).collect());
-        let mut patch = Patch::default();
-        let mut found: Vec<Option<Found<D>>> = points.iter().map(|_| None).collect();
-        let mut done = 0;
-        for block in blocks.leaves() {
-            let centre: SVector<f64, D> = block
-                .iter()
-                .map(|&i| points[i].coords)
-                .sum::<SVector<f64, D>>()
-                / block.len() as f64;
-            let mut near = self.tree.nearest(&self.sources, &centre.into(), count);
-            let reach = |near: &[(f64, usize)]| near.last().map_or(0.0, |last| last.0.sqrt());
-            let extent = |i: &usize| (points[*i].coords - centre).norm();
-            let extent = block.iter().map(extent).fold(0.0, f64::max);
-            // Sparse points beside dense pairs have patches of their own.
-            let together = extent <= 0.8 * reach(&near);
-            let take = |patch: &mut Patch<D>, place: &SVector<f64, D>, near: &[_]| {
-                patch.take(&self.sources, &self.displacements, place, near);
-                // Judging compares a pair with the median of its block, in which a common factor
-                // cancels.
-                if purpose == Walk::Read {
-                    patch.calibrate();
-                }
-            };
-            if together {
-                take(&mut patch, &centre, &near);
-            }
-            for &i in block {
-                if !together {
-                    near = self.tree.nearest(&self.sources, &points[i], count);
-                    take(&mut patch, &points[i].coords, &near);
-                }
-                let value = patch.value(&points[i]);
-                let (misfit, distance) = match (purpose, patch.row_of(i)) {
-                    (Walk::Read, _) => (0.0, 0.0),
-                    (Walk::Judge, Some(row)) => patch.left_out(row),
-                    (Walk::Judge, None) => value.beside(&self.displacements[i]),
+        let blocks = Tree::new(points, (0..points.len()).collect(), leaf);
+        patch.forget_last();
+        let (mut order, mut own, mut values) = (Vec::new(), Vec::new(), Vec::new());
+        let mut read = |patch: &mut Patch<D>, rows: &[usize]| {
+            own.clear();
+            own.extend(rows.iter().map(|&i| points[i]));
+            values.clear();
+            patch.values(&own, &mut values);
+            for (&i, value) in rows.iter().zip(&values) {
+                let (misfit, distance) = match judge.then(|| patch.row_of(i)) {
+                    None => (0.0, 0.0),
+                    Some(Some(row)) => patch.left_out(row),
+                    Some(None) => value.beside(&self.displacements[i]),
                 };
-                found[i] = Some(Found {
-                    value,
+                let found = Found {
+                    value: *value,
                     misfit,
                     distance,
-                });
+                    trend: patch.trend(),
+                };
+                order.push((i, found));
+            }
+        };
+        if leaf == usize::MAX {
+            patch.take(&pairs, self.tree.rows().iter().copied());
+        }
+        let mut done = 0;
+        for block in blocks.leaves() {
+            if leaf == usize::MAX {
+                read(patch, block);
+            } else {
+                let centre: SVector<f64, D> = block
+                    .iter()
+                    .map(|&i| points[i].coords)
+                    .sum::<SVector<f64, D>>()
+                    / block.len() as f64;
+                let near = self.tree.nearest(&self.sources, &centre.into(), count);
+                let reach = near.last().map_or(0.0, |last| last.0.sqrt());
+                let extent = |i: &usize| (points[*i].coords - centre).norm();
+                let extent = block.iter().map(extent).fold(0.0, f64::max);
+                // Sparse points beside dense pairs have patches of their own.
+                if extent <= 0.8 * reach {
+                    patch.take(&pairs, near.into_iter().map(|near| near.1));
+                    read(patch, block);
+                } else {
+                    for i in block {
+                        let near = self.tree.nearest(&self.sources, &points[*i], count);
+                        patch.take(&pairs, near.into_iter().map(|near| near.1));
+                        read(patch, &[*i]);
+                    }
+                }
             }
             done += block.len();
-            progress(done as f64 / points.len() as f64);
+            if watch(done).is_break() {
+                return Err(TpsError::Stopped);
+            }
         }
-        found.into_iter().flatten().collect()
+        order.sort_unstable_by_key(|found| found.0);
+        found.extend(order.into_iter().map(|found| found.1));
+        Ok(())
+    }
+}
+
+impl<const D: usize> LocalValue<D> {
+    /// What the pairs hereabouts have of noise, and of what the likelihood does not allow.
+    fn noise(&self) -> f64 {
+        self.sigma * self.excess.sqrt()
+    }
+
+    /// Noise far above the usual one may be deformation between the pairs: its gradient is of the
+    /// order of the noise over half of the spacing.
+    fn mark(&mut self, usual: f64) {
+        let noise = self.noise();
+        self.unresolved = noise > FAR_ABOVE * usual && noise > NOTICEABLE * self.spacing;
+        if self.unresolved {
+            let hidden = (2.0 * noise / self.spacing).powi(2);
+            (0..D).for_each(|a| self.gradient_covariance[(a, a)] += hidden);
+        }
     }
 }
 
@@ -227,30 +396,8 @@ pub fn nearest_rows<const D: usize>(
     places: &[Point<f64, D>],
     count: usize,
 ) -> Vec<Vec<usize>> {
-    let tree = Tree::new(points, (0..points.len()).collect());
+    let tree = Tree::new(points, (0..points.len()).collect(), BLOCK);
     let near = |place| tree.nearest(points, place, count);
     let rows = |place| near(place).into_iter().map(|(_, row)| row).collect();
     places.iter().map(rows).collect()
-}
-
-/// Whether each pair contradicts its neighbours.
-fn contradicted<const D: usize>(found: &[Found<D>], sources: &[Point<f64, D>]) -> Vec<bool> {
-    let mut wrong = vec![false; found.len()];
-    let blocks = Tree::new(sources, (0..sources.len()).collect());
-    for block in blocks.leaves() {
-        let mut misfits: Vec<f64> = block.iter().map(|&i| found[i].misfit).collect();
-        let middle = misfits.len() / 2;
-        let median = *misfits.select_nth_unstable_by(middle, f64::total_cmp).1;
-        // Median of χ² with D degrees, by Wilson and Hilferty.
-        let usual = D as f64 * (1.0 - 2.0 / (9.0 * D as f64)).powi(3);
-        // Six standard deviations: fewer drop the largest residuals of a steep field, whose noise
-        // is not Gaussian.
-        let limit = 36.0 * median / usual;
-        for &i in block {
-            // A pair that lies so near to its place does no harm, whatever its neighbours' noise.
-            let near = found[i].distance <= 0.15 * found[i].value.spacing;
-            wrong[i] = found[i].misfit > limit && !near;
-        }
-    }
-    wrong
 }

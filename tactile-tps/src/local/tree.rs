@@ -2,24 +2,32 @@
 
 use nalgebra::Point;
 
-/// Points of a leaf at most.
-const LEAF: usize = 24;
-
 /// Rows of points in the order of the tree, and where its inner nodes cut.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Tree<const D: usize> {
     order: Vec<usize>,
+    /// Points of a leaf at most.
+    leaf: usize,
     /// Axis and coordinate of the cut, as a heap. The halves of a range have its middle between
     /// them.
     cuts: Vec<(usize, f64)>,
 }
 
 impl<const D: usize> Tree<D> {
-    /// The tree of some rows of `points`.
-    pub(super) fn new(points: &[Point<f64, D>], mut order: Vec<usize>) -> Self {
+    /// The tree of some rows of `points`, with leaves of at most so many.
+    pub(super) fn new(points: &[Point<f64, D>], mut order: Vec<usize>, leaf: usize) -> Self {
         let mut cuts = Vec::new();
-        split(points, &mut order, 0, &mut cuts);
-        Self { order, cuts }
+        split(points, &mut order, leaf, 0, &mut cuts);
+        Self { order, leaf, cuts }
+    }
+
+    /// The rows, neighbours after each other.
+    pub(super) fn rows(&self) -> &[usize] {
+        &self.order
+    }
+
+    pub(super) fn len(&self) -> usize {
+        self.order.len()
     }
 
     /// The leaves, neighbours after each other.
@@ -27,7 +35,7 @@ impl<const D: usize> Tree<D> {
         let mut leaves = Vec::new();
         let mut open = vec![&self.order[..]];
         while let Some(rows) = open.pop() {
-            if rows.len() <= LEAF {
+            if rows.len() <= self.leaf {
                 leaves.push(rows);
             } else {
                 let (low, high) = rows.split_at(rows.len() / 2);
@@ -46,7 +54,7 @@ impl<const D: usize> Tree<D> {
         place: &Point<f64, D>,
         count: usize,
     ) -> Vec<(f64, usize)> {
-        let mut found = Vec::with_capacity(3 * count + LEAF);
+        let mut found = Vec::with_capacity(3 * count + self.leaf);
         let mut limit = f64::INFINITY;
         self.collect(
             points,
@@ -70,7 +78,7 @@ impl<const D: usize> Tree<D> {
         found: &mut Vec<(f64, usize)>,
         limit: &mut f64,
     ) {
-        if range.len() <= LEAF {
+        if range.len() <= self.leaf {
             let rows = self.order[range].iter();
             let distances = rows.map(|&i| ((points[i] - place).norm_squared(), i));
             found.extend(distances.filter(|near| near.0 <= *limit));
@@ -104,10 +112,11 @@ impl<const D: usize> Tree<D> {
 fn split<const D: usize>(
     points: &[Point<f64, D>],
     rows: &mut [usize],
+    leaf: usize,
     node: usize,
     cuts: &mut Vec<(usize, f64)>,
 ) {
-    if rows.len() <= LEAF {
+    if rows.len() <= leaf {
         return;
     }
     let extent = |axis: usize| {
@@ -129,8 +138,8 @@ fn split<const D: usize>(
     }
     cuts[node] = (axis, points[cut][axis]);
     let (low, high) = rows.split_at_mut(middle);
-    split(points, low, 2 * node + 1, cuts);
-    split(points, high, 2 * node + 2, cuts);
+    split(points, low, leaf, 2 * node + 1, cuts);
+    split(points, high, leaf, 2 * node + 2, cuts);
 }
 
 fn by_distance(a: &(f64, usize), b: &(f64, usize)) -> std::cmp::Ordering {

@@ -45,7 +45,7 @@ fn check<const D: usize>(count: usize, width: f64, noise: f64, wrong: f64) {
         targets.push(p + dimple(width, &p).0 + offset);
         is_wrong.push(misplaced && offset.norm() > spacing);
     }
-    let field = LocalField::fit(&sources, &targets, |_| {}).expect("finite points");
+    let field = LocalField::fit(&sources, &targets).expect("finite points");
     let (mut within, mut sigma) = (0, 0.0);
     for (p, value) in sources.iter().zip(&field.values) {
         let off = value.gradient - dimple(width, p).1;
@@ -100,9 +100,9 @@ fn an_affine_field_is_exact_at_any_point() {
             .collect();
         let linear = SMatrix::<f64, 3, 3>::new(0.1, 0.02, 0.0, -0.03, 0.2, 0.01, 0.0, 0.04, -0.1);
         let targets: Vec<_> = sources.iter().map(|p| p + linear * p.coords).collect();
-        let field = LocalField::fit(&sources, &targets, |_| {}).expect("finite points");
+        let field = LocalField::fit(&sources, &targets).expect("finite points");
         let places = [0.5, 1.2].map(|x| Point::from(SVector::repeat(unit * x)));
-        for value in field.at(&places, |_| {}).iter().chain(&field.values) {
+        for value in field.at(&places).iter().chain(&field.values) {
             // Displacements are rounded to sixteen digits, and a patch is a third of the set.
             assert!(
                 (value.gradient - linear).amax() < 1e-11,

@@ -1,10 +1,8 @@
 //! How closely a spline follows its targets.
 
 mod blocked;
-mod robust;
 
 pub use blocked::StrainSpline;
-pub use robust::{RobustFit, RobustSpline};
 
 /// How closely the spline follows its targets.
 ///

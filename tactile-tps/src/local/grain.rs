@@ -1,0 +1,47 @@
+//! The grain of numbers: whole pixels, thousandths of a millimetre.
+
+use nalgebra::Point;
+
+/// Grains from a thousand down, in powers of ten. Finer ones are no less than double precision.
+const POWERS: std::ops::RangeInclusive<i32> = -12..=3;
+
+/// Standard deviation of a number that is rounded to a grain of 1.
+const OF_ROUNDING: f64 = 0.288_675;
+
+/// The largest power of ten of which all coordinates are multiples. Zero if there is none.
+pub(super) fn of_pairs<const D: usize>(
+    sources: &[Point<f64, D>],
+    targets: &[Point<f64, D>],
+) -> f64 {
+    let multiple = |x: f64, grain: f64| {
+        let steps = x / grain;
+        // What decimals are rounded to in binary.
+        (steps - steps.round()).abs() <= 1e-15 * steps.abs() + 1e-9 && steps.abs() < 1e14
+    };
+    let mut power = *POWERS.end();
+    for x in sources.iter().chain(targets).flat_map(|p| p.iter()) {
+        while !multiple(*x, 10_f64.powi(power)) {
+            power -= 1;
+            if power < *POWERS.start() {
+                return 0.0;
+            }
+        }
+    }
+    10_f64.powi(power)
+}
+
+/// The least noise of a coordinate: its rounding.
+pub(super) fn least_noise<const D: usize>(
+    sources: &[Point<f64, D>],
+    targets: &[Point<f64, D>],
+    grain: f64,
+) -> f64 {
+    let largest = sources
+        .iter()
+        .chain(targets)
+        .map(|p| p.coords.amax())
+        .fold(0.0, f64::max);
+    (OF_ROUNDING * grain)
+        .max(f64::EPSILON * largest)
+        .max(f64::MIN_POSITIVE.sqrt())
+}
