@@ -32,10 +32,13 @@ const FAR_SPACINGS: [f64; 2] = [45.0, 10.0];
 const NEAR: f64 = 3.0;
 /// Cells of the histogram for a spacing. Three cells, a spacing, are summed.
 const CELLS: f64 = 3.0;
-/// Heights of peaks above all differences, in standard deviations of counts: ten thousand places
-/// exceed four by chance.
-const FAR_HEIGHT: f64 = 6.5;
-const NEAR_HEIGHT: f64 = 4.5;
+/// Heights of peaks above the next one, in standard deviations of its count: by chance one in three
+/// thousand places exceeds two, and one in a hundred 1.2. Of surfaces, whose differences crowd about
+/// a sheet, peaks are no higher than their neighbours.
+const FAR_HEIGHT: f64 = 2.0;
+const NEAR_HEIGHT: f64 = 1.2;
+/// Cells within which a peak is one: what it is summed over.
+const APART: usize = 3;
 /// Share of the smaller set that a common motion of all points pairs.
 const COMMON: f64 = 0.6;
 /// Peaks that reach this share of the highest are as high: of a lattice of 400 points the next one
@@ -284,15 +287,14 @@ impl<const D: usize> Motions<D> {
             });
         }
         self.sum_neighbours(side);
-        let &highest = self.sums.iter().max()?;
-        // Of a box that holds a ball.
-        let ball = self.sums.len() as f64 * [PI / 4.0, PI / 6.0][usize::from(D > 2)];
-        let mean = self.differences.len() as f64 * CELLS.powi(D as i32) / ball;
+        let rows = self.sums.iter().enumerate();
+        let (top, &highest) = rows.clone().max_by_key(|&(_, sum)| sum)?;
+        let cell = |index: usize, k: usize| index / side.pow(k as u32) % side;
+        let apart = |index: usize| (0..D).any(|k| cell(index, k).abs_diff(cell(top, k)) > APART);
+        let others = rows.filter(|&(index, &sum)| sum > 0 && apart(index));
+        let next = f64::from(others.map(|(_, &sum)| sum).max().unwrap_or(0));
         let place = |index: usize| -> [f64; D] {
-            std::array::from_fn(|k| {
-                let cell = index / side.pow(k as u32) % side;
-                (cell as f64 - half as f64) / per_cell
-            })
+            std::array::from_fn(|k| (cell(index, k) as f64 - half as f64) / per_cell)
         };
         let high = self.sums.iter().enumerate();
         let high = high.filter(|&(_, &sum)| f64::from(sum) >= EQUAL * f64::from(highest));
@@ -314,7 +316,7 @@ impl<const D: usize> Motions<D> {
             }
             pairs = count;
         }
-        let height = (f64::from(highest) - mean) / (mean + 1.0).sqrt();
+        let height = (f64::from(highest) - next) / (next + 1.0).sqrt();
         Some(((here.value + step).into(), Peak { height, pairs }))
     }
 
@@ -338,7 +340,7 @@ impl<const D: usize> Motions<D> {
 /// How a peak stands out.
 #[derive(Clone, Copy, Debug)]
 struct Peak {
-    /// Above the mean of all differences, in standard deviations.
+    /// Above the next one, in standard deviations.
     height: f64,
     /// Differences within half a spacing of it.
     pairs: f64,

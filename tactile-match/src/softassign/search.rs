@@ -242,7 +242,7 @@ impl AnnealedSoftassign {
         if follows {
             self.anneal(ws, moved, observe)?;
         }
-        if !(follows && (self.is_done(ws) || self.is_followed(ws, observe)?)) {
+        if !(follows && self.is_followed(ws, observe)?) {
             self.try_starts(ws, observe)?;
         }
         self.look_for_rivals(ws);
@@ -254,15 +254,15 @@ impl AnnealedSoftassign {
         ControlFlow::Continue(())
     }
 
-    /// Whether a run from the motions of blocks is the answer: it is likely, and the local patterns
-    /// of the points do not lead to a better one.
+    /// Whether a run from the motions of blocks is the answer: it is exact, or of a dense set,
+    /// likely, and the local patterns of the points do not lead to a better one.
     fn is_followed<const D: usize>(
         &self,
         ws: &mut SoftassignWorkspace<D>,
         observe: Observer<'_>,
     ) -> ControlFlow<(), bool> {
-        if !ws.is_likely() {
-            return ControlFlow::Continue(false);
+        if self.is_exact(ws) || !ws.is_likely() {
+            return ControlFlow::Continue(self.is_exact(ws));
         }
         let energy = ws.best.energy;
         let seeded = seeded(ws.spacing);
