@@ -104,6 +104,10 @@ impl<const D: usize, P: Deref<Target: Warp<D>> + Send + Sync> Warp<D> for P {
         (**self).jacobian(point)
     }
 
+    fn rank(&self) -> usize {
+        (**self).rank()
+    }
+
     fn apply_into(
         &self,
         points: &[Point<f64, D>],

@@ -60,14 +60,16 @@ impl Shape {
             }
         }
     }
-}
 
-impl Shape {
     /// Derivative of k'(r)/r over r, of which the covariance of gradients is made:
     /// `cov ∂ₐf(x) ∂ᵦf(y) = −δₐᵦ k'/r − dₐ dᵦ (k'/r)'/r` with `d = x − y`.
+    ///
+    /// Of Matérn's of one derivative it is infinite at r = 0, and its product with d dᵀ zero: the
+    /// value there is zero.
     pub(super) fn bend(self, square: f64) -> f64 {
         match self {
             Self::Affine => 0.0,
+            _ if square == 0.0 => 0.0,
             Self::Gaussian(length) => {
                 let s = 1.0 / (length * length);
                 s * s * (-0.5 * square * s).exp()
@@ -79,8 +81,7 @@ impl Shape {
             Self::Matern3(length) => {
                 let s = 3.0 / (length * length);
                 let a = (square * s).sqrt();
-                // Times d dᵀ it is zero at d = 0.
-                s * s * (-a).exp() / a.max(f64::MIN_POSITIVE)
+                s * s * (-a).exp() / a
             }
         }
     }
