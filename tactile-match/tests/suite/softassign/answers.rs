@@ -30,10 +30,10 @@ fn clean_warps_of_plane_and_space_are_found_exactly() {
 /// Where noise is well below the spacing, the first run ends at the noise: it does not fall below
 /// it, where points lose their partners and a second start has to find them again.
 #[test]
-fn noise_below_the_spacing_rarely_takes_a_second_start() {
+fn noise_below_the_spacing_rarely_takes_a_third_start() {
     /// A tenth of the spacing, (1/105)^⅓ of the cube's side, to either side.
     const NOISE: f64 = 0.02;
-    let mut of_one_start = 0;
+    let mut of_few_starts = 0;
     for seed in 0..8 {
         let mut stream = common::Stream::new(seed);
         let model = common::scattered::<3>(105, seed);
@@ -47,7 +47,7 @@ fn noise_below_the_spacing_rarely_takes_a_second_start() {
         let found = AnnealedSoftassign::default()
             .match_points(&model, &target)
             .unwrap();
-        of_one_start += usize::from(found.report.starts == 1);
+        of_few_starts += usize::from(found.report.starts <= 2);
         let right = (order.iter().enumerate())
             .filter(|&(j, &i)| found.assignment[i] == Some(j))
             .count();
@@ -58,9 +58,9 @@ fn noise_below_the_spacing_rarely_takes_a_second_start() {
         let error = (squares.sum::<f64>() / 105.0).sqrt();
         assert!(error < 0.8 * NOISE, "{seed}: {error}");
     }
-    // Where a point of the eight sets has strayed too far to be called matched, a second start
-    // looks for it; without a sign of noise all take two.
-    assert!(of_one_start >= 4, "{of_one_start}");
+    // The first start follows the sets as they lie. If a point of the eight sets has strayed too
+    // far to be called matched, a third start looks for it; without a sign of noise all take it.
+    assert!(of_few_starts >= 4, "{of_few_starts}");
 }
 
 /// Where no outliers are expected every point gets a partner. Where they are, a far point is left
