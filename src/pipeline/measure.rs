@@ -14,6 +14,10 @@ use crate::elasticity::relaxation::TimeDependence;
 use crate::matching::StopReason;
 use nalgebra::Matrix3;
 
+/// Presses of up to this many frames have the surface of each, for plots. Each surface takes some
+/// 30 kB and a millisecond.
+const PLOTTED_FRAMES: usize = 64;
+
 /// Error of the height of a surface from shading, in cells of its grid. This and the next are
 /// chosen on balls by finite elements of 6 to 150 pixels: smaller ones leave out more of them
 /// (`SEEDS=6 cargo test --test suite heights -- --nocapture`).
@@ -160,13 +164,39 @@ impl Press<'_> {
         self.pipeline().settings().surface_input == SurfaceInput::Shading
     }
 
+    /// Frames whose surface [`measure`](Self::measure) reconstructs: each of a press of up to 64
+    /// frames, which plots show, and the first and the last of more.
+    ///
+    /// ```
+    /// # use tactile_imaging::{Object, Pipeline, force::CalibrationPair};
+    /// let pairs: Vec<_> = (0..6)
+    ///     .map(|k| CalibrationPair::loading(2e4 * k as f64, 0.1 * k as f64))
+    ///     .collect();
+    /// let pipeline = Pipeline::from_pairs(&pairs, [86.2e-6, 86.2e-6], Object::sphere(3e-3))?;
+    /// let frame = ndarray::Array2::from_elem((120, 160), 12_u8);
+    /// let mut press = pipeline.press(frame.view())?;
+    /// (0..100).for_each(|_| {
+    ///     press.add_frame(frame.view());
+    /// });
+    /// assert_eq!(press.measured_surfaces().collect::<Vec<_>>(), [0, 99]);
+    /// # Ok::<(), tactile_imaging::PipelineError>(())
+    /// ```
+    pub fn measured_surfaces(&self) -> impl Iterator<Item = usize> + use<> {
+        let frames = self.frames();
+        let step = if frames <= PLOTTED_FRAMES {
+            1
+        } else {
+            frames - 1
+        };
+        (0..frames).step_by(step.max(1))
+    }
+
     /// The height of a frame's surface. Of a press with many frames only the first, the last and
     /// those whose strain is worked out have one: each takes some milliseconds and some hundred
     /// kilobytes.
     fn surface_height(&self, frame: usize) -> Result<Estimate, PipelineError> {
         let frames = self.frames();
-        // Plots show the surfaces of a press of some dozens of frames.
-        let wanted = frames <= 64 || frame == 0 || frame == frames - 1;
+        let wanted = self.measured_surfaces().any(|other| other == frame);
         if !wanted && !self.has_surface(frame) {
             self.skipped(Stage::Surface, SkipReason::NotAsked);
             return Err(PipelineError::NotReconstructed { frame, frames });

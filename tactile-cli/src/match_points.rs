@@ -29,7 +29,7 @@ use tactile_imaging::matching::{
 #[derive(Args)]
 #[command(
     after_help = "Examples:\n  tactile match examples/data/cases.txt --out target/match\n  \
-                        tactile match before.csv after.csv"
+                        tactile match examples/data/before.csv examples/data/after.csv"
 )]
 pub struct MatchArguments {
     /// Case files, or two tables of points.

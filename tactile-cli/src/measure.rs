@@ -444,13 +444,16 @@ fn contacts(press: &mut Press<'_>, context: &mut Context) -> Option<Vec<Contact>
 /// Runs the long stages one by one, so that Ctrl-C ends the work between two of them. False if it
 /// did. The press keeps the answers and the errors of its stages.
 fn long_stages(press: &Press<'_>, context: &Context) -> bool {
-    let mut bar = Bar::of(press.frames() + 1, "measuring surfaces and strain");
-    for frame in 0..press.frames() {
+    let mut bar = Bar::of(
+        press.measured_surfaces().count() + 1,
+        "measuring surfaces and strain",
+    );
+    for (done, frame) in press.measured_surfaces().enumerate() {
         if context.interrupt.requested() {
             return false;
         }
         let _ = press.surface(frame);
-        bar.done(frame + 1);
+        bar.done(done + 1);
     }
     if let last @ 1.. = press.frames().saturating_sub(1)
         && !context.interrupt.requested()

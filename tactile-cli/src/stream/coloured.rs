@@ -97,7 +97,7 @@ impl Meter for Gel {
     fn surface(&mut self) -> Value {
         let size = 1e3 * self.reader.stereo.model().pixel_size_m;
         let relief = HeightGrid::of(self.depth_m.mapv(|z| 1e3 * z).view(), [size; 2]);
-        json!({ "name": "depth", "relief": relief, "health": "" })
+        json!({ "name": "depth", "relief": relief })
     }
 }
 

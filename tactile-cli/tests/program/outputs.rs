@@ -113,7 +113,8 @@ fn what_ends_the_program_leaves_earlier_results_whole() {
 #[test]
 fn a_stage_without_an_answer_does_not_hide_the_others() {
     let folder = tempfile::tempdir().unwrap();
-    let rows: String = (0..9).map(|k| format!("{},{}\n", k % 3, k / 3)).collect();
+    // Three points show no error of an affine field.
+    let rows = "0,0\n1,0\n0,1\n";
     fs::write(folder.path().join("few.csv"), rows).unwrap();
     let output = run(
         folder.path(),
@@ -121,7 +122,7 @@ fn a_stage_without_an_answer_does_not_hide_the_others() {
     );
     assert_eq!(output.status.code(), Some(1), "{}", text(&output.stderr));
     let value = value(&output);
-    assert_eq!(value["match"]["pairs"], 9);
+    assert_eq!(value["match"]["pairs"], 3);
     assert!(
         value["strain"]["error"]
             .as_str()
