@@ -5,9 +5,8 @@ use crate::core::Estimate;
 use crate::core::{otsu, regions};
 use crate::elasticity::strain::GreenLagrange;
 use crate::matching::{AnnealedSoftassign, Doubt, MatchError, PointMatcher};
-use crate::strain_between::{StrainBetween, median, median_spacing, mutually_nearest};
-use crate::tps::nearest_rows;
-use nalgebra::{Matrix3, Matrix3x2, Point2, Vector2, Vector3};
+use crate::strain_between::{StrainBetween, median, median_spacing};
+use nalgebra::{Point2, Vector2};
 use ndarray::{Array2, ArrayView2, Zip};
 
 /// A dark marker.
@@ -274,7 +273,7 @@ pub struct MarkerField {
     /// Strain of the gel's surface, from smoothed displacements. `None` below 16 tracks or where
     /// they are not smooth.
     pub strain: Option<StrainBetween<2>>,
-    /// Why the pairs may be wrong, by the matcher. `None` where it was not asked.
+    /// Why the pairs may be wrong, by the matcher. `None` if nothing speaks against them.
     pub doubt: Option<Doubt>,
 }
 
@@ -291,9 +290,8 @@ pub struct MarkerShear {
 /// Follows markers from the reference to a frame: no order and no grid is assumed, markers may be
 /// missing in either.
 ///
-/// Markers that have moved by less than half their distance are paired with the nearest, where the
-/// displacements are smooth and nearly none is left over. All others are paired by
-/// [`AnnealedSoftassign`].
+/// [`AnnealedSoftassign`] pairs them. Markers on a lattice that has moved by more than a sixth of its
+/// step have a [`doubt`](MarkerField::doubt): the lattice may have moved by another step as well.
 ///
 /// ```
 /// use nalgebra::Point2;
@@ -319,18 +317,11 @@ pub struct MarkerShear {
 pub fn track_markers(reference: &[Marker], frame: &[Marker]) -> Result<MarkerField, MatchError> {
     let [before, after] =
         [reference, frame].map(|set| set.iter().map(|m| m.position_px).collect::<Vec<_>>());
-    let (mut pairs, doubt) = match nearest_pairs(&before, &after) {
-        Some(pairs) => (pairs, None),
-        None => {
-            let matching = AnnealedSoftassign::default().match_points(&before, &after)?;
-            let partner = |(i, j): (usize, &Option<usize>)| j.map(|j| (i, j));
-            let assignment = matching.assignment.iter().enumerate();
-            (
-                assignment.filter_map(partner).collect(),
-                matching.report.doubt(),
-            )
-        }
-    };
+    let matching = AnnealedSoftassign::default().match_points(&before, &after)?;
+    let partner = |(i, j): (usize, &Option<usize>)| j.map(|j| (i, j));
+    let assignment = matching.assignment.iter().enumerate();
+    let mut pairs: Vec<_> = assignment.filter_map(partner).collect();
+    let doubt = matching.report.doubt();
     // A smooth deformation drops wrong pairs and finds markers that the matcher missed.
     let strain = StrainBetween::of_pairs(&before, &after, &pairs, &GreenLagrange).ok();
     if let Some(strain) = &strain {
@@ -353,51 +344,6 @@ pub fn track_markers(reference: &[Marker], frame: &[Marker]) -> Result<MarkerFie
         strain,
         doubt,
     })
-}
-
-/// Pairs of markers that have hardly moved: mutual nearest neighbours, where nothing else is
-/// smooth.
-///
-/// Every displacement must be within a quarter of the spacing of the one that the eight pairs next
-/// to it predict, an affine function, so that no other partner fits. One marker in a hundred may be
-/// left over in both sets: a grid that has moved by its pitch leaves a row at each end. `None`
-/// otherwise. O(n²).
-fn nearest_pairs(before: &[Point2<f64>], after: &[Point2<f64>]) -> Option<Vec<(usize, usize)>> {
-    if !before
-        .iter()
-        .chain(after)
-        .all(|p| p.x.is_finite() && p.y.is_finite())
-    {
-        return None;
-    }
-    let spacing = median_spacing(before)?.min(median_spacing(after)?);
-    let mut pairs = mutually_nearest(before, after);
-    pairs.retain(|&(i, j)| (after[j] - before[i]).norm() < 0.5 * spacing);
-    let left_over = before.len().min(after.len()) - pairs.len();
-    if pairs.len() < 16 || 100 * left_over > pairs.len() {
-        return None;
-    }
-    let places: Vec<_> = pairs.iter().map(|&(i, _)| before[i]).collect();
-    let moved: Vec<_> = pairs.iter().map(|&(i, j)| after[j] - before[i]).collect();
-    let near = nearest_rows(&places, &places, 9);
-    let smooth = |k: usize| {
-        let steps = near[k]
-            .iter()
-            .map(|&row| (places[row] - places[k], moved[row]));
-        let others = steps.filter(|(step, _)| step.norm_squared() > 0.0);
-        let (mut square, mut right) = (Matrix3::zeros(), Matrix3x2::zeros());
-        for (step, u) in others {
-            let row = Vector3::new(1.0, step.x / spacing, step.y / spacing);
-            square += row * row.transpose();
-            right += row * u.transpose();
-        }
-        // Markers of one line do not determine the plane.
-        let predicted = square
-            .cholesky()
-            .map(|factor| factor.solve(&right).row(0).transpose());
-        predicted.is_some_and(|predicted| (predicted - moved[k]).norm() < 0.25 * spacing)
-    };
-    (0..pairs.len()).all(smooth).then_some(pairs)
 }
 
 impl MarkerField {

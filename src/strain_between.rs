@@ -656,19 +656,6 @@ pub(crate) fn median_spacing<const D: usize>(points: &[Point<f64, D>]) -> Option
     median(near.filter_map(distance))
 }
 
-/// Pairs of rows whose points are each other's nearest.
-pub(crate) fn mutually_nearest<const D: usize>(
-    own: &[Point<f64, D>],
-    other: &[Point<f64, D>],
-) -> Vec<(usize, usize)> {
-    let (there, back) = (nearest_rows(other, own, 1), nearest_rows(own, other, 1));
-    let pairs = there.iter().enumerate();
-    let pairs = pairs.filter_map(|(i, there)| Some((i, *there.first()?)));
-    pairs
-        .filter(|&(i, j)| back[j].first() == Some(&i))
-        .collect()
-}
-
 /// A displacement gradient and the covariance of each of its rows.
 type GradientAt = (Matrix3<f64>, Matrix3<f64>);
 

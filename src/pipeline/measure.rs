@@ -179,7 +179,7 @@ impl Press<'_> {
     ///     press.add_frame(frame.view());
     /// });
     /// assert_eq!(press.measured_surfaces().collect::<Vec<_>>(), [0, 99]);
-    /// # Ok::<(), tactile_imaging::PipelineError>(())
+    /// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
     /// ```
     pub fn measured_surfaces(&self) -> impl Iterator<Item = usize> + use<> {
         let frames = self.frames();

@@ -208,9 +208,9 @@ impl ElasticityError {
 /// The quantity that an error is about.
 ///
 /// ```
-/// use tactile_elasticity::{ElasticityError, Quantity, contact::flat_punch};
+/// use tactile_elasticity::{ElasticityError, Quantity, laws::HertzLaw};
 ///
-/// let error = flat_punch(1e5_f64, -2e-3, 1e-3).unwrap_err();
+/// let error = HertzLaw::new(-2e-3).unwrap_err();
 /// assert_eq!(error, ElasticityError::NotPositive { quantity: Quantity::Radius, found: -2e-3 });
 /// assert!(error.to_string().starts_with("radius"));
 /// ```

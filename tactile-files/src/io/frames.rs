@@ -66,7 +66,8 @@ const MOST_NAMED: usize = 10;
 ///
 /// ```
 /// use ndarray::{Array2, array};
-/// use tactile_imaging::{io::FrameReader, pipeline::FrameSource};
+/// use tactile_files::io::FrameReader;
+/// use tactile_imaging::pipeline::FrameSource;
 /// let video = b"YUV4MPEG2 W2 H1 F25:1 Cmono\nFRAME\n\x0a\x14FRAME\n\x0b\x15FRAME\n\x0c";
 /// let mut camera = FrameReader::new(&video[..], "pipe", 80.0)?;
 /// assert_eq!(camera.frame_rate_hz(), Some(25.0));

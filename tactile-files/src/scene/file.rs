@@ -420,7 +420,8 @@ impl Scene {
     /// Checks the text of a scene file. Relative paths are relative to the folder of `file`.
     ///
     /// ```
-    /// use tactile_imaging::{pipeline::Object, scene::Scene};
+    /// use tactile_files::scene::Scene;
+    /// use tactile_imaging::pipeline::Object;
     /// let text = r#"
     ///     reference = "reference.png"
     ///     pixel_size_m = [21.55e-6, 21.55e-6]

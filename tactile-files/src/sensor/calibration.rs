@@ -140,7 +140,8 @@ pub struct PressFinding {
 /// One parameter of a layer before and after the calibration.
 ///
 /// ```
-/// use tactile_imaging::{force::Estimate, sensor::LayerFinding};
+/// use tactile_files::sensor::LayerFinding;
+/// use tactile_imaging::force::Estimate;
 /// let modulus = LayerFinding {
 ///     layer: 0,
 ///     parameter: "youngs_modulus_pa",

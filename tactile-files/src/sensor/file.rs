@@ -54,7 +54,8 @@ impl SensorGeometry {
 ///
 /// ```no_run
 /// use tactile_imaging::force::{ForceOptions, LocalCalibration};
-/// use tactile_imaging::{pipeline::{Object, Pipeline}, sensor::Sensor};
+/// use tactile_files::sensor::Sensor;
+/// use tactile_imaging::pipeline::{Object, Pipeline};
 /// let sensor = Sensor::read("sensor.toml")?;
 /// let ball = Object::sphere(3e-3);
 /// let pipeline = sensor.pipeline(ball)?.with_settings(|s| s.object_radius_error_m = Some(5e-6))?;

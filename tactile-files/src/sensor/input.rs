@@ -35,7 +35,7 @@ pub enum Indenter {
 /// A layer as its maker states it, with standard errors. A calibration starts from these.
 ///
 /// ```
-/// use tactile_imaging::{scene::SceneLayer, sensor::LayerInput};
+/// use tactile_files::{scene::SceneLayer, sensor::LayerInput};
 /// let layer = SceneLayer {
 ///     refractive_index: 1.41,
 ///     thickness_m: 2e-3,
