@@ -129,7 +129,7 @@ impl<const D: usize, P: Deref<Target: Warp<D>> + Send + Sync> Warp<D> for P {
 ///
 /// Object safe: a pipeline holds an `Arc<dyn WarpModel<3> + Send + Sync>`.
 /// Where the kind of warp is fixed, fit it by its own type:
-/// [`Spline::fit`], [`Affine::fit`], [`Affine::fit_rigid`].
+/// [`Spline::fit`], [`Affine::fit`](crate::Affine::fit), [`Affine::fit_rigid`](crate::Affine::fit_rigid).
 ///
 /// ```
 /// use nalgebra::Point2;

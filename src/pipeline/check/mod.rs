@@ -118,8 +118,8 @@ impl<'a> CheckPress<'a> {
 
 impl Pipeline {
     /// Takes presses of known force into account: of the sample or the calibrator the gain of the
-    /// light ([`CheckedGain`]), of balls of known modulus the layers of the guide
-    /// ([`CheckedGuide`]). All have one reference. Of one call the errors that presses share (pixel
+    /// light ([`CheckedGain`](super::CheckedGain)), of balls of known modulus the layers of the guide
+    /// ([`CheckedGuide`](super::CheckedGuide)). All have one reference. Of one call the errors that presses share (pixel
     /// size, contact law, ball) are counted as shared. Presses of a later call are taken as
     /// independent of those before, but for the size of a pixel. A ball costs some dozen solutions
     /// of its contact.
