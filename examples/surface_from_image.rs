@@ -1,4 +1,4 @@
-//! A surface from one image under frontal light: `cargo run --example surface_from_image [IMAGE]`.
+//! A surface from one image under frontal light: `cargo run --example surface_from_image`.
 //!
 //! Dark pixels are outside the object, whose rim has height zero. Heights are in pixels.
 #![allow(clippy::print_stdout)]
@@ -8,9 +8,8 @@ use tactile_files::io::{Grey, read_grey_image};
 use tactile_imaging::sfs::{BoundaryCondition, Domain, Eikonal, Lighting, SurfaceReconstruction};
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let path = std::env::args().nth(1);
-    let path = path.unwrap_or_else(|| "examples/data/ball.pgm".to_owned());
-    let image = read_grey_image(Path::new(&path), Grey::default(), None)?.levels;
+    let path = Path::new("examples/data/ball.pgm");
+    let image = read_grey_image(path, Grey::default(), None)?.levels;
     let mask = image.mapv(|level| level > 0.0);
     let light = Lighting::new([0.0, 0.0, 1.0])?.with_normal_intensity(255.0)?;
     let method = Eikonal::new(light).with_boundary(BoundaryCondition::Height(0.0))?;
