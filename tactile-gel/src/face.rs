@@ -2,11 +2,11 @@
 
 use ndarray::{Array2, Axis};
 use tactile_core::Estimate;
-use tactile_sfs::{CosinePoisson, Domain, SlopeIntegrator};
 
 use crate::GelError;
 use crate::contacts::{Patch, block_means, quantile};
 use crate::frame_check::FrameDoubt;
+use crate::integration::integrated;
 use crate::plane::Plane;
 use crate::sensor::GelModel;
 
@@ -111,11 +111,7 @@ pub fn frame(
 ) -> Result<GelFrame, GelError> {
     let shape = gradient[0].dim();
     let size = model.pixel_size_m;
-    let domain = Domain::new([size; 2])?;
-    let [p, q] = gradient.each_ref().map(|g| g.mapv(f64::from));
-    let mut depth = CosinePoisson
-        .integrate(p.view(), q.view(), &domain)?
-        .heights;
+    let mut depth = integrated(gradient.each_ref(), size)?;
     let mut labels = Array2::zeros(shape);
     for (k, patch) in patches.iter().enumerate() {
         for at in &patch.pixels {

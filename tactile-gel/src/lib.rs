@@ -10,6 +10,7 @@ mod face;
 mod force;
 mod frame_check;
 mod gradients;
+mod integration;
 mod plane;
 mod sensor;
 #[cfg(feature = "simulate")]
