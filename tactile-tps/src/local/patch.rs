@@ -37,11 +37,14 @@ const LEAST_SHARE: f64 = 0.02;
 /// Processes that take part, at most.
 const MOST: usize = 6;
 
+/// Processes whose errors are averaged, at most.
+const HEARD: usize = 3;
+
 /// Every so many patches all shapes are tried, in the others those that took part in the last.
 const ROUND: usize = 4;
 
 /// Pairs about a place whose residuals calibrate the errors there.
-const NEARBY: f64 = 24.0;
+const NEARBY: f64 = 12.0;
 
 /// Places that are evaluated together.
 const TOGETHER: usize = 24;
@@ -77,6 +80,8 @@ pub(super) struct Patch<const D: usize> {
     seen: usize,
     /// Those that take part, with their shares, the likeliest first.
     mixture: Vec<(usize, f64)>,
+    /// The process whose factor was made last.
+    factored: usize,
     taken: usize,
     /// The λ and the share of every shape in the last patch.
     last: [i32; SHAPES.len()],
@@ -109,6 +114,7 @@ impl<const D: usize> Default for Patch<D> {
             processes: Vec::new(),
             seen: 0,
             mixture: Vec::new(),
+            factored: usize::MAX,
             taken: 0,
             last: [-7; SHAPES.len()],
             share: [1.0; SHAPES.len()],
@@ -269,7 +275,7 @@ impl<const D: usize> Patch<D> {
             before = Some((family, energy, last));
         }
         self.taken += 1;
-        let share = |process: &Process<D>| process.shape.prior() * (least - process.energy).exp();
+        let share = |process: &Process<D>| (least - process.energy).exp();
         let likely = self.processes[..self.seen].iter().map(share).enumerate();
         self.mixture
             .extend(likely.filter(|(_, share)| *share >= LEAST_SHARE));
@@ -290,10 +296,9 @@ impl<const D: usize> Patch<D> {
             }
         }
         // Others may have been weighed last.
+        self.factored = usize::MAX;
         if let Some(&(best, _)) = self.mixture.first() {
-            let process = &mut self.processes[best];
-            self.factor.cover(&self.data.points, process.shape);
-            self.factor.weigh(&self.data, process);
+            self.refactor(best);
         }
     }
 
@@ -436,6 +441,16 @@ impl<const D: usize> Patch<D> {
         }
     }
 
+    /// Displacement and gradient at a place.
+    fn mean_at(&self, place: &Point<f64, D>) -> (SVector<f64, D>, SMatrix<f64, D, D>) {
+        let x = self.inside(place);
+        average(
+            self.mixture
+                .iter()
+                .map(|&(k, share)| (share, self.mean(k, &x))),
+        )
+    }
+
     /// Displacement and gradient of a process at a place, and those of the trend.
     fn mean(&self, process: usize, x: &SVector<f64, D>) -> (SVector<f64, D>, SMatrix<f64, D, D>) {
         let process = &self.processes[process];
@@ -460,22 +475,87 @@ impl<const D: usize> Patch<D> {
 
     /// The field at some places: O(n²) for each.
     pub(super) fn values(&mut self, places: &[Point<f64, D>], found: &mut Vec<LocalValue<D>>) {
-        for places in places.chunks(TOGETHER) {
-            self.values_together(places, found);
-        }
-    }
-
-    fn values_together(&mut self, places: &[Point<f64, D>], found: &mut Vec<LocalValue<D>>) {
-        let n = self.rows.len();
         let Some(&(best, _)) = self.mixture.first() else {
             return found.extend(places.iter().map(|_| self.unknown()));
         };
-        let (shape, scale) = (self.processes[best].shape, self.processes[best].scale);
-        let inside = |place: &Point<f64, D>| (place.coords - self.centre) / self.radius;
+        let first = found.len();
+        let noise = self.processes[best].lambda * self.processes[best].scale;
+        for place in places {
+            let x = self.inside(place);
+            let (displacement, gradient) = self.mean_at(place);
+            let mut value = LocalValue {
+                displacement,
+                displacement_variance: 0.0,
+                gradient,
+                gradient_covariance: SMatrix::zeros(),
+                rank: self.data.rank,
+                sigma: noise.sqrt(),
+                excess: self.raised(&x),
+                spacing: self.spacing,
+                unresolved: false,
+            };
+            // What the likely processes do not agree on.
+            for &(k, share) in &self.mixture {
+                let (u, h) = self.mean(k, &x);
+                let off = h - gradient;
+                value.displacement_variance += share * (u - displacement).norm_squared() / D as f64;
+                value.gradient_covariance += off.transpose() * off * (share / D as f64);
+            }
+            found.push(value);
+        }
+        let found = &mut found[first..];
+        let heard: f64 = self
+            .mixture
+            .iter()
+            .take(HEARD)
+            .map(|(_, share)| share)
+            .sum();
+        for at in 0..self.mixture.len().min(HEARD) {
+            let (k, share) = self.mixture[at];
+            self.refactor(k);
+            for (places, values) in places.chunks(TOGETHER).zip(found.chunks_mut(TOGETHER)) {
+                self.add_errors(k, share / heard, places, values);
+            }
+        }
+        // Rounded numbers stand still over many spacings and then jump: their errors do not average
+        // out within a patch.
+        let steps = (0.5 * self.grain / self.radius).powi(2);
+        for (place, value) in places.iter().zip(found) {
+            let x = self.inside(place);
+            let covariance = &mut value.gradient_covariance;
+            (0..D).for_each(|a| covariance[(a, a)] = covariance[(a, a)].max(0.0) + steps);
+            self.forget(&x, &mut value.displacement_variance, covariance);
+        }
+    }
+
+    fn inside(&self, place: &Point<f64, D>) -> SVector<f64, D> {
+        (place.coords - self.centre) / self.radius
+    }
+
+    /// Makes the factor that of a process.
+    fn refactor(&mut self, k: usize) {
+        if self.factored != k {
+            let process = &mut self.processes[k];
+            self.factor.cover(&self.data.points, process.shape);
+            self.factor.weigh(&self.data, process);
+            self.factored = k;
+        }
+    }
+
+    /// Adds the errors of a process, of which `share` is the share.
+    fn add_errors(
+        &mut self,
+        k: usize,
+        share: f64,
+        places: &[Point<f64, D>],
+        values: &mut [LocalValue<D>],
+    ) {
+        let n = self.rows.len();
+        let (shape, scale) = (self.processes[k].shape, self.processes[k].scale);
         let mut columns = std::mem::take(&mut self.columns);
         columns.clear();
         for place in places {
-            let x = inside(place);
+            let x = self.inside(place);
             self.kernels.clear();
             self.kernels.extend(
                 self.data
@@ -489,16 +569,15 @@ impl<const D: usize> Patch<D> {
                 columns.extend(rows.map(|(p, k)| (x[a] - p[a]) * k.1));
             }
         }
-        self.factor.whiten(&mut columns);
+        if shape != Shape::Affine {
+            self.factor.whiten(&mut columns);
+        }
         let (at_zero, curvature) = shape.of(0.0);
         let rank = self.data.rank;
-        let noise = self.processes[best].lambda * scale;
-        let student = student(self.data.degrees());
-        // Rounded numbers stand still over many spacings and then jump: their errors do not average
-        // out within a patch.
-        let steps = (0.5 * self.grain / self.radius).powi(2);
-        for (place, columns) in places.iter().zip(columns.chunks_exact(n * (D + 1))) {
-            let x = inside(place);
+        let factor = share * scale * student(self.data.degrees());
+        let columns_of = columns.chunks_exact((n * (D + 1)).max(1));
+        for ((place, value), columns) in places.iter().zip(values).zip(columns_of) {
+            let x = self.inside(place);
             let column = |c: usize| &columns[c * n..(c + 1) * n];
             let dot = |a: usize, b: usize| -> f64 {
                 column(a).iter().zip(column(b)).map(|(a, b)| a * b).sum()
@@ -514,39 +593,14 @@ impl<const D: usize> Patch<D> {
             let rests: [RowVector4<f64>; 4] =
                 std::array::from_fn(|c| if c <= D { rest(c) } else { RowVector4::zeros() });
             let whole = at_zero - dot(0, 0) + self.factor.of_affine(&rests[0], &rests[0]);
-            let mut covariance = SMatrix::<f64, D, D>::from_fn(|a, b| {
+            let covariance = SMatrix::<f64, D, D>::from_fn(|a, b| {
                 let prior = if a == b { -curvature } else { 0.0 };
                 let affine = self.factor.of_affine(&rests[a + 1], &rests[b + 1]);
                 prior - dot(a + 1, b + 1) + affine
             });
-            let raised = self.raised(&x);
-            covariance *= scale * raised * student / (self.radius * self.radius);
-            let mut variance = scale * raised * student * whole.max(0.0);
-            // What the likely processes do not agree on.
-            let means = self
-                .mixture
-                .iter()
-                .map(|&(k, share)| (share, self.mean(k, &x)));
-            let means: Vec<_> = means.collect();
-            let (displacement, gradient) = average(means.iter().copied());
-            for &(share, (u, h)) in &means {
-                variance += share * (u - displacement).norm_squared() / D as f64;
-                let off = h - gradient;
-                covariance += off.transpose() * off * (share / D as f64);
-            }
-            (0..D).for_each(|a| covariance[(a, a)] = covariance[(a, a)].max(0.0) + steps);
-            self.forget(&x, &mut variance, &mut covariance);
-            found.push(LocalValue {
-                displacement,
-                displacement_variance: variance,
-                gradient,
-                gradient_covariance: covariance,
-                rank,
-                sigma: noise.sqrt(),
-                excess: raised,
-                spacing: self.spacing,
-                unresolved: false,
-            });
+            let factor = factor * value.excess;
+            value.gradient_covariance += covariance * (factor / (self.radius * self.radius));
+            value.displacement_variance += factor * whole.max(0.0);
         }
         self.columns = columns;
     }
@@ -558,6 +612,7 @@ impl<const D: usize> Patch<D> {
         let Some(&(best, _)) = self.mixture.first() else {
             return SMatrix::from_element(f64::INFINITY);
         };
+        self.refactor(best);
         let (shape, scale) = (self.processes[best].shape, self.processes[best].scale);
         let mut covariance = SMatrix::<f64, D, D>::zeros();
         self.columns.clear();

@@ -27,14 +27,6 @@ pub(super) enum Shape {
 }
 
 impl Shape {
-    /// How much a shape counts beside its likelihood: the affine field stands for many noises.
-    pub(super) fn prior(self) -> f64 {
-        match self {
-            Self::Affine => 2.0,
-            _ => 1.0,
-        }
-    }
-
     /// k(r) and k'(r)/r, which at r = 0 is k''(0).
     #[inline(always)]
     pub(super) fn of(self, square: f64) -> (f64, f64) {
