@@ -13,7 +13,7 @@ use crate::matching::PointMatcher;
 use crate::sfs::{
     Binning, ContactSampler, ControlPointSampler, EquallySpaced, SurfaceReconstruction,
 };
-use crate::tps::{StrainSpline, WarpModel};
+use crate::tps::{AffineModel, WarpModel};
 use ndarray::ArrayView2;
 use std::sync::Arc;
 
@@ -26,7 +26,7 @@ use std::sync::Arc;
 /// | image to surface | [`with_surface`](Self::with_surface) | [`Eikonal`](crate::sfs::Eikonal), frontal light, zero height at the rim |
 /// | surface to control points | [`with_sampler`](Self::with_sampler) | [`ContactSampler`]; [`EquallySpaced`] where the surface is read from a signal |
 /// | points to matches | [`with_matcher`](Self::with_matcher) | [`AnnealedSoftassign`](crate::matching::AnnealedSoftassign), searching near by |
-/// | weighted matches to the warp whose gradient is strained | [`with_warp`](Self::with_warp) | a [spline](crate::tps::ThinPlateSpline), thin-plate, kernel −r, smoothed by blocked cross-validation |
+/// | weighted matches to the warp whose gradient is strained | [`with_warp`](Self::with_warp) | [affine](crate::tps::AffineModel::General) |
 /// | displacement gradient to strain | [`with_strain`](Self::with_strain) | [`GreenLagrange`] |
 /// | loads to the modulus | [`with_estimator`](Self::with_estimator) | the layered law for a ball, else stress over strain; see [`EstimatorChoice::Best`] |
 ///
@@ -95,7 +95,7 @@ impl Pipeline {
             surface: Arc::new(named::eikonal()?),
             sampler: None,
             matcher: Arc::new(named::near_by()),
-            warp: Arc::new(StrainSpline),
+            warp: Arc::new(AffineModel::General),
             strain: Arc::new(GreenLagrange),
             estimator: EstimatorStage::named(EstimatorChoice::default()),
             settings: Settings::new(object.validated().map_err(PipelineError::Material)?),

@@ -12,7 +12,7 @@ use crate::sfs::{
     BoundaryCondition, ContactSampler, ControlPointSampler, Eikonal, EquallySpaced, Lighting,
     SurfaceReconstruction, TsaiShah,
 };
-use crate::tps::{AffineModel, FitOptions, R2LogR, R3, Smoothing, StrainSpline, WarpModel};
+use crate::tps::{AffineModel, FitOptions, Kernel, NegR, R2LogR, R3, Smoothing, WarpModel};
 use std::fmt;
 use std::sync::Arc;
 
@@ -150,15 +150,15 @@ choice! {
     /// assert_eq!(WarpChoice::Affine.to_string(), "affine");
     /// ```
     WarpChoice, "warp":
-    /// A [spline](crate::tps::ThinPlateSpline), thin-plate, kernel −r, smoothed by blocked
-    /// cross-validation.
+    /// [`AffineModel::General`](crate::tps::AffineModel::General): errors of reconstructed surfaces,
+    /// which neighbours share, pass for anything finer.
+    Affine = "affine",
+    /// The thin-plate spline in space, kernel −r, smoothed by generalised cross-validation.
     ThinPlateSpline = "thin-plate-spline",
     /// The spline of kernel r³, smoothed by cross-validation.
     CubicSpline = "cubic-spline",
     /// The interpolating spline of kernel r² log r, as (21) is printed.
     PrintedSpline = "printed-spline",
-    /// [`AffineModel::General`](crate::tps::AffineModel::General).
-    Affine = "affine",
     /// [`AffineModel::Rigid`](crate::tps::AffineModel::Rigid).
     Rigid = "rigid",
 }
@@ -271,14 +271,17 @@ impl MatcherChoice {
     }
 }
 
+/// A spline as smooth as generalised cross-validation finds it.
+fn smooth<K: Kernel>(kernel: K) -> Result<FitOptions<K>, PipelineError> {
+    let options = FitOptions::new(kernel).with_smoothing(Smoothing::Gcv);
+    options.map_err(PipelineError::WarpOptions)
+}
+
 impl WarpChoice {
     pub(super) fn build(self) -> Result<Arc<dyn WarpModel<3> + Send + Sync>, PipelineError> {
         Ok(match self {
-            Self::ThinPlateSpline => Arc::new(StrainSpline),
-            Self::CubicSpline => {
-                let options = FitOptions::new(R3).with_smoothing(Smoothing::Gcv);
-                Arc::new(options.map_err(PipelineError::WarpOptions)?)
-            }
+            Self::ThinPlateSpline => Arc::new(smooth(NegR)?),
+            Self::CubicSpline => Arc::new(smooth(R3)?),
             Self::PrintedSpline => Arc::new(FitOptions::new(R2LogR)),
             Self::Affine => Arc::new(AffineModel::General),
             Self::Rigid => Arc::new(AffineModel::Rigid),

@@ -18,11 +18,14 @@ use crate::force::{
     background_shift, median_shift_outside,
 };
 use crate::matching::{MatchedPairs, Matching, WarmStart};
-use crate::tps::{Pairs, SeriesMemory, StrainSpline};
+use crate::tps::{Pairs, SeriesMemory};
 use nalgebra::{Matrix3, Point3};
 use ndarray::ArrayView2;
 use std::sync::Arc;
 use std::time::Instant;
+
+/// Control points in a row that share the errors of a surface.
+const NEIGHBOURS: usize = 10;
 
 /// What a press or a session asks its stages of: nothing in it changes.
 #[derive(Clone)]
@@ -437,7 +440,8 @@ impl StrainWorkspace {
     /// their confidence.
     ///
     /// The matcher's own warp follows every point. Its gradient across a surface, where no two
-    /// points lie behind each other, would be noise. The warp fitted here is smooth.
+    /// points lie behind each other, would be noise. The default here is affine: errors of
+    /// reconstructed surfaces, which neighbours share, pass for anything finer.
     fn strain(
         &mut self,
         pipeline: &Pipeline,
@@ -482,7 +486,7 @@ impl StrainWorkspace {
             &self.sources,
             &self.targets,
             matched.model.grid_m,
-            StrainSpline::RUN_LENGTH,
+            NEIGHBOURS,
         );
         let errors = &mut strain.summary.standard_error;
         errors.zip_apply(&noise, |error, noise| *error = error.hypot(noise));

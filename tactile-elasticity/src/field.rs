@@ -2,7 +2,7 @@
 
 use crate::error::{ElasticityError, Quantity};
 use crate::strain::{Deformation, StrainMeasure};
-use nalgebra::{Matrix3, Matrix6, Point3, SMatrix, Vector3};
+use nalgebra::{Matrix3, Point3, Vector3};
 
 /// Averages of a strain field, component by component.
 ///
@@ -150,46 +150,6 @@ impl StrainField {
         Ok(())
     }
 
-    /// Mean, spread and standard error, robust if asked for.
-    ///
-    /// The robust standard error is that of the mean over the estimator's efficiency on normal
-    /// data: √(π/2) for the median, 1/√0.95 for Huber's mean.
-    ///
-    /// ```
-    /// use nalgebra::Matrix3;
-    /// use tactile_elasticity::field::{Averaging, StrainField};
-    /// use tactile_elasticity::strain::Infinitesimal;
-    ///
-    /// let gradients = [0.01_f64, 0.02, 0.9].map(Matrix3::from_diagonal_element);
-    /// let field = StrainField::from_gradients(&gradients, None, &Infinitesimal)?;
-    /// assert_eq!(field.summary_with(Averaging::Median).mean[(0, 0)], 0.02);
-    /// # Ok::<(), tactile_elasticity::ElasticityError>(())
-    /// ```
-    pub fn summary_with(&self, averaging: Averaging) -> StrainSummary {
-        let mut summary = self.summary();
-        let loss: f64 = match averaging {
-            Averaging::Mean => return summary,
-            Averaging::Huber => 1.0 / 0.95f64.sqrt(),
-            Averaging::Median => std::f64::consts::FRAC_PI_2.sqrt(),
-        };
-        let total = self.weights.iter().fold(0.0, |s, &w| s + w);
-        let squares = self.weights.iter().fold(0.0, |s, &w| s + w * w);
-        if squares == 0.0 {
-            return summary;
-        }
-        let root = total / squares.sqrt();
-        for i in 0..3 {
-            for j in 0..3 {
-                let values: Vec<f64> = self.strains.iter().map(|e| e[(i, j)]).collect();
-                let (centre, spread) = centre_and_spread(&values, &self.weights, averaging);
-                summary.mean[(i, j)] = centre;
-                summary.spread[(i, j)] = spread;
-                summary.standard_error[(i, j)] = spread / root * loss;
-            }
-        }
-        summary
-    }
-
     /// Weighted mean, spread and standard error.
     pub fn summary(&self) -> StrainSummary {
         let mut total = 0.0;
@@ -230,149 +190,6 @@ impl StrainField {
             folded: self.folded.clone(),
         }
     }
-}
-
-/// How a field is averaged.
-///
-/// ```
-/// use nalgebra::Matrix3;
-/// use tactile_elasticity::field::{Averaging, StrainField};
-/// use tactile_elasticity::strain::Infinitesimal;
-///
-/// // One mismatched point among ten.
-/// let mut gradients = vec![Matrix3::from_diagonal_element(0.01_f64); 10];
-/// gradients[4] *= 100.0;
-/// let field = StrainField::from_gradients(&gradients, None, &Infinitesimal)?;
-/// let mean = |averaging| field.summary_with(averaging).mean[(0, 0)];
-/// assert!((mean(Averaging::Mean) - 0.109).abs() < 1e-12);
-/// assert!((mean(Averaging::Median) - 0.01).abs() < 1e-12);
-/// # Ok::<(), tactile_elasticity::ElasticityError>(())
-/// ```
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub enum Averaging {
-    /// Weighted mean and standard deviation.
-    #[default]
-    Mean,
-    /// Huber's mean, k = 1.345 (95 % efficient on normal data). Spread from the median absolute
-    /// deviation.
-    Huber,
-    /// Weighted median. Spread from the median absolute deviation.
-    Median,
-}
-
-/// The value below which half of the weight lies.
-fn weighted_median(values: &[f64], weights: &[f64]) -> f64 {
-    let mut order: Vec<usize> = (0..values.len()).filter(|&i| weights[i] > 0.0).collect();
-    order.sort_by(|&i, &j| {
-        values[i]
-            .partial_cmp(&values[j])
-            .unwrap_or(core::cmp::Ordering::Equal)
-    });
-    let total = order.iter().fold(0.0, |s, &i| s + weights[i]);
-    let half = total * 0.5;
-    let mut below = 0.0;
-    for (k, &i) in order.iter().enumerate() {
-        below += weights[i];
-        if below > half {
-            return values[i];
-        }
-        if below == half {
-            let next = order.get(k + 1).map_or(values[i], |&j| values[j]);
-            return (values[i] + next) * 0.5;
-        }
-    }
-    0.0
-}
-
-/// Centre and spread of one component.
-fn centre_and_spread(values: &[f64], weights: &[f64], how: Averaging) -> (f64, f64) {
-    let median = weighted_median(values, weights);
-    let deviations: Vec<f64> = values.iter().map(|&v| (v - median).abs()).collect();
-    // The median absolute deviation of normal data is 0.674 of its standard deviation.
-    let spread = weighted_median(&deviations, weights) / 0.674_489_750_196_081_7;
-    if how == Averaging::Median || spread == 0.0 {
-        return (median, spread);
-    }
-    // Huber's constant, 95 % efficient on normal data.
-    let limit = spread * 1.345;
-    let mut centre = median;
-    for _ in 0..50 {
-        let (mut sum, mut total) = (0.0, 0.0);
-        for (&v, &w) in values.iter().zip(weights) {
-            let away = (v - centre).abs();
-            let w = if away > limit { w * limit / away } else { w };
-            sum += w * (v - centre);
-            total += w;
-        }
-        let step = sum / total;
-        centre += step;
-        if step.abs() <= spread * 1e-7 {
-            break;
-        }
-    }
-    (centre, spread)
-}
-
-// From the covariance of displacements to that of the mean Green–Lagrange strain.
-//
-// A smoothing spline is linear in its data: H(Xᵢ) = Σⱼ uⱼ aᵢⱼᵀ, with aᵢⱼ the gradient at Xᵢ of the
-// j-th point's share. To first order dE = sym(Fᵀ dH), so that the mean is linear in the data too,
-// and its covariance a sum over the points.
-
-// Order of the components in covariances of strain: xx, yy, zz, xy, xz, yz.
-const PAIRS: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)];
-
-/// Covariance of the weighted mean Green–Lagrange strain (xx, yy, zz, xy, xz, yz).
-///
-/// `gradients` and `weights` are those of the sample points i. `influence(i, j)` is aᵢⱼ, how the
-/// gradient at sample i follows data point j. `displacement_covariance[j]` is the covariance of
-/// data point j's displacement, independent of the others. O(samples · data).
-///
-/// # Errors
-/// [`ElasticityError::LengthMismatch`], [`ElasticityError::NotPositive`] where the weights add up
-/// to nothing.
-///
-/// ```
-/// use nalgebra::{Matrix3, Vector3};
-/// use tactile_elasticity::field::mean_strain_covariance;
-///
-/// // A bar of length 1 whose gradient is the difference of its two ends' displacements, each known
-/// // to 10⁻⁴.
-/// let influence = |_, end| Vector3::new(if end == 0 { -1.0 } else { 1.0 }, 0.0, 0.0);
-/// let ends = [Matrix3::from_diagonal_element(1e-8); 2];
-/// let covariance = mean_strain_covariance(&[Matrix3::zeros()], &[1.0], influence, &ends)?;
-/// assert!((covariance[(0, 0)] - 2e-8_f64).abs() < 1e-22);
-/// # Ok::<(), tactile_elasticity::ElasticityError>(())
-/// ```
-pub fn mean_strain_covariance(
-    gradients: &[Matrix3<f64>],
-    weights: &[f64],
-    influence: impl Fn(usize, usize) -> Vector3<f64>,
-    displacement_covariance: &[Matrix3<f64>],
-) -> Result<Matrix6<f64>, ElasticityError> {
-    Quantity::Weight.entries(weights.len(), gradients.len())?;
-    let total = weights.iter().fold(0.0, |s, &w| s + w);
-    Quantity::Weight.positive(total)?;
-    let half: f64 = 0.5;
-    let mut sum = Matrix6::zeros();
-    for (j, sigma) in displacement_covariance.iter().enumerate() {
-        // Row ab: what a displacement of point j adds to the mean E_ab.
-        let mut response = SMatrix::<f64, 6, 3>::zeros();
-        for (i, h) in gradients.iter().enumerate() {
-            let (f, a) = (
-                h + Matrix3::identity(),
-                influence(i, j) * (weights[i] / total),
-            );
-            for (row, &(p, q)) in PAIRS.iter().enumerate() {
-                for k in 0..3 {
-                    response[(row, k)] += (f[(k, p)] * a[q] + f[(k, q)] * a[p]) * half;
-                }
-            }
-        }
-        sum += response * sigma * response.transpose();
-    }
-    Ok(sum)
 }
 
 // Three errors go beyond the spread of the strain over the points. Those of a reconstructed surface

@@ -3,8 +3,8 @@
 use nalgebra::{DMatrix, Point, SMatrix, SVector};
 
 use crate::{
-    TpsError, Warp, WarpModel,
-    error::validate_pairs,
+    Pairs, SeriesMemory, TpsError, Warp, WarpModel,
+    error::{same_length, validate_pairs},
     frame::Frame,
     lanes::dot,
     span::{principal_axes, rounding},
@@ -83,21 +83,9 @@ impl<const D: usize> Affine<D> {
         targets: &[Point<f64, D>],
         weights: Option<&[f64]>,
     ) -> Result<Self, TpsError> {
-        validate_pairs(sources, targets, weights)?;
-        let (x, y) = (Cloud::new(sources, weights), Cloud::new(targets, weights));
-        let (mut linear, mut across) = (SMatrix::zeros(), SMatrix::identity());
-        for &(direction, size, k) in x.spanned() {
-            // The image of the direction, in the frames' units.
-            let column = x.column(k);
-            let image = SVector::from_fn(|i, _| dot(y.plain(i), column) / size / size);
-            linear += image * direction.transpose() * (y.frame.scale / x.frame.scale);
-            across -= direction * direction.transpose();
-        }
-        // Without the rounding of I − I.
-        if x.spanned().len() < D {
-            linear += across;
-        }
-        Ok(Self::about(&x, &y, linear))
+        let mut clouds = Clouds::default();
+        clouds.take(sources, targets, weights)?;
+        Ok(clouds.map(clouds.general()))
     }
 
     /// The rigid motion of least Σ wᵢ |R xᵢ + b − yᵢ|², R a rotation (no reflection): the one
@@ -125,19 +113,9 @@ impl<const D: usize> Affine<D> {
         targets: &[Point<f64, D>],
         weights: Option<&[f64]>,
     ) -> Result<Self, TpsError> {
-        validate_pairs(sources, targets, weights)?;
-        let (x, y) = (Cloud::new(sources, weights), Cloud::new(targets, weights));
-        let rotation = rotation(&x, &y);
-        Ok(Self::about(&x, &y, rotation))
-    }
-
-    /// The map with this Jacobian that takes the sources' mean to the targets'.
-    fn about(x: &Cloud<D>, y: &Cloud<D>, linear: SMatrix<f64, D, D>) -> Self {
-        Self {
-            linear,
-            offset: y.mean - linear * x.mean,
-            rank: 1 + x.spanned().len(),
-        }
+        let mut clouds = Clouds::default();
+        clouds.take(sources, targets, weights)?;
+        Ok(clouds.map(rotation(&clouds.sources, &clouds.targets)))
     }
 }
 
@@ -150,6 +128,55 @@ impl<const D: usize> Warp<D> for Affine<D> {
     }
     fn rank(&self) -> usize {
         self.rank
+    }
+}
+
+/// Sources and targets of a map.
+#[derive(Default)]
+struct Clouds<const D: usize> {
+    sources: Cloud<D>,
+    targets: Cloud<D>,
+}
+
+impl<const D: usize> Clouds<D> {
+    /// Takes pairs, in the memory of the last ones.
+    fn take(
+        &mut self,
+        sources: &[Point<f64, D>],
+        targets: &[Point<f64, D>],
+        weights: Option<&[f64]>,
+    ) -> Result<(), TpsError> {
+        validate_pairs(sources, targets, weights)?;
+        self.sources.take(sources, weights);
+        self.targets.take(targets, weights);
+        Ok(())
+    }
+
+    /// The Jacobian of least squares.
+    fn general(&self) -> SMatrix<f64, D, D> {
+        let (x, y) = (&self.sources, &self.targets);
+        let (mut linear, mut across) = (SMatrix::zeros(), SMatrix::identity());
+        for &(direction, size, k) in x.spanned() {
+            // The image of the direction, in the frames' units.
+            let column = x.column(k);
+            let image = SVector::from_fn(|i, _| dot(y.plain(i), column) / size / size);
+            linear += image * direction.transpose() * (y.frame.scale / x.frame.scale);
+            across -= direction * direction.transpose();
+        }
+        // Without the rounding of I − I.
+        if x.spanned().len() < D {
+            linear += across;
+        }
+        linear
+    }
+
+    /// The map with this Jacobian that takes the sources' mean to the targets'.
+    fn map(&self, linear: SMatrix<f64, D, D>) -> Affine<D> {
+        Affine {
+            linear,
+            offset: self.targets.mean - linear * self.sources.mean,
+            rank: 1 + self.sources.spanned().len(),
+        }
     }
 }
 
@@ -167,41 +194,47 @@ struct Cloud<const D: usize> {
     rank: usize,
 }
 
+impl<const D: usize> Default for Cloud<D> {
+    fn default() -> Self {
+        Self {
+            frame: Frame::default(),
+            mean: SVector::zeros(),
+            plain: Vec::new(),
+            turned: Vec::new(),
+            directions: [(SVector::zeros(), 0.0, 0); D],
+            rank: 0,
+        }
+    }
+}
+
 impl<const D: usize> Cloud<D> {
-    fn new(points: &[Point<f64, D>], weights: Option<&[f64]>) -> Self {
+    fn take(&mut self, points: &[Point<f64, D>], weights: Option<&[f64]>) {
         let n = points.len();
         let frame = Frame::around(points, true);
         let most = weights.map_or(1.0, |w| w.iter().fold(0.0, |m, &w| f64::max(m, w)));
         let weight = |i: usize| weights.map_or(1.0, |w| w[i] / most);
         let total: f64 = (0..n).map(weight).sum();
-        let mut plain = vec![0.0; D * n];
-        let mut mean = SVector::zeros();
-        for (k, column) in plain.chunks_exact_mut(n).enumerate() {
+        self.plain.clear();
+        self.plain.resize(D * n, 0.0);
+        for (k, column) in self.plain.chunks_exact_mut(n).enumerate() {
             let places = column.iter_mut().zip(points);
             places.for_each(|(x, p)| *x = frame.inside(p)[k]);
             let middle = (0..n).map(|i| column[i] * weight(i)).sum::<f64>() / total;
             let places = column.iter_mut().enumerate();
             places.for_each(|(i, x)| *x = (*x - middle) * weight(i).sqrt());
-            mean[k] = frame.centre[k] + frame.scale * middle;
+            self.mean[k] = frame.centre[k] + frame.scale * middle;
         }
-        let mut turned = plain.clone();
-        let axes = principal_axes::<D>(&mut turned);
+        self.turned.clone_from(&self.plain);
+        let axes = principal_axes::<D>(&mut self.turned);
         let size = |k: usize| {
-            let column = &turned[k * n..(k + 1) * n];
+            let column = &self.turned[k * n..(k + 1) * n];
             dot(column, column).sqrt()
         };
-        let mut directions = core::array::from_fn(|k| (SVector::from(axes[k]), size(k), k));
-        directions.sort_by(|a, b| b.1.total_cmp(&a.1));
+        self.directions = core::array::from_fn(|k| (SVector::from(axes[k]), size(k), k));
+        self.directions.sort_unstable_by(|a, b| b.1.total_cmp(&a.1));
         let noise = rounding(n, frame.grain(points));
-        let rank = directions.iter().filter(|d| d.1 > noise).count();
-        Self {
-            frame,
-            mean,
-            plain,
-            turned,
-            directions,
-            rank,
-        }
+        self.rank = self.directions.iter().filter(|d| d.1 > noise).count();
+        self.frame = frame;
     }
 
     fn spanned(&self) -> &[(SVector<f64, D>, f64, usize)] {
@@ -324,5 +357,22 @@ impl<const D: usize> WarpModel<D> for AffineModel {
             Self::Rigid => Affine::fit_rigid,
         };
         Ok(Box::new(fit(sources, targets, weights)?))
+    }
+
+    fn jacobians_through(
+        &self,
+        memory: &mut SeriesMemory,
+        pairs: Pairs<'_, D>,
+        points: &[Point<f64, D>],
+        jacobians: &mut [SMatrix<f64, D, D>],
+    ) -> Result<(), TpsError> {
+        same_length(points.len(), jacobians.len())?;
+        let clouds: &mut Clouds<D> = memory.state();
+        clouds.take(pairs.sources, pairs.targets, pairs.weights)?;
+        jacobians.fill(match self {
+            Self::General => clouds.general(),
+            Self::Rigid => rotation(&clouds.sources, &clouds.targets),
+        });
+        Ok(())
     }
 }

@@ -71,9 +71,6 @@ pub enum TpsError {
     /// The caller's callback stopped the fit before there was a spline.
     #[error("stopped by the caller")]
     Stopped,
-    /// Influences need a factor, and the iterative solver has none.
-    #[error("the iterative solver has no factor: use the direct one")]
-    NoFactor,
     /// Two source points coincide, their targets differ, and no smoothing was asked for.
     #[error(
         "source points {first} and {second} coincide but their targets differ: smooth, or drop one"
@@ -92,9 +89,6 @@ pub enum TpsError {
         /// Distinct points of positive weight.
         found: usize,
     },
-    /// The spline is no linear map of its targets: cross-validation chooses λ from them.
-    #[error("cross-validation lets λ follow the targets: hold λ at what it chose")]
-    DependsOnTargets,
     /// The kernel's matrix is not positive definite on the complement of the affine functions.
     #[error("kernel is not conditionally positive definite on these points (column {column})")]
     NotDefinite {

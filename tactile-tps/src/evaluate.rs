@@ -153,9 +153,7 @@ impl<const D: usize, const M: usize, K: Kernel> Spline<D, M, K> {
         options: &FitOptions<K>,
         mut watch: impl FnMut(&Progress) -> ControlFlow<()>,
     ) -> Result<Self, TpsError> {
-        Factorization::without_points(options.kernel.clone())
-            .refactor_watched(sources, options, &mut watch)?
-            .fit_watched(targets, watch)
+        Factorization::new_watched(sources, options, &mut watch)?.fit_watched(targets, watch)
     }
 
     /// A spline that is zero everywhere, to be filled by a fit.

@@ -7,10 +7,8 @@
 //! | fit once | [`Spline::fit`], as `ThinPlateSpline::fit` for D outputs |
 //! | fit repeatedly | [`Factorization`] with a [`SplineWorkspace`] |
 //! | choose kernel, smoothing, weights | [`FitOptions`], [`Smoothing`], [`Kernel`] |
-//! | propagate uncertainty to Jacobians | [`Factorization::jacobian_influence_into`] |
 //! | see condition, residual and iterations | [`FitReport`] |
 //! | displacement and gradient with errors, from pairs some of which are wrong | [`LocalField`] |
-//! | strain from matches whose neighbours share errors | [`StrainSpline`] |
 //! | accept any warp | the object-safe trait [`Warp`]: splines, [`Affine`] |
 //! | fit any kind of warp | the trait [`WarpModel`]: [`FitOptions`], [`AffineModel`] |
 //!
@@ -41,9 +39,9 @@ pub use tactile_core::{CustomError, Progress, StopReason};
 pub use affine::{Affine, AffineModel};
 pub use error::TpsError;
 pub use evaluate::{Spline, ThinPlateSpline};
-pub use fit::{Factorization, LambdaPath, SplineWorkspace};
+pub use fit::{Factorization, SplineWorkspace};
 pub use kernel::{Kernel, KernelDerivatives, KernelScalar, NegR, R2LogR, R3};
 pub use local::{LocalField, LocalValue, nearest_rows};
 pub use options::{FitOptions, FitReport, Solver};
-pub use smoothing::{Smoothing, StrainSpline};
+pub use smoothing::Smoothing;
 pub use warp::{Pairs, SeriesMemory, Warp, WarpModel};

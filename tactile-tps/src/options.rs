@@ -172,27 +172,6 @@ impl<K> FitOptions<K> {
         Ok(self)
     }
 
-    /// Other weights in place of those there are, in their memory: for fits one after the other.
-    ///
-    /// ```
-    /// use tactile_tps::{FitOptions, R2LogR, TpsError};
-    /// let mut options = FitOptions::new(R2LogR).with_weights(vec![1.0, 0.5])?;
-    /// options.set_weights(&[1.0, 0.2])?;
-    /// assert_eq!(options, FitOptions::new(R2LogR).with_weights(vec![1.0, 0.2])?);
-    /// assert!(options.set_weights(&[1.0, f64::NAN]).is_err(), "and left as they were");
-    /// # Ok::<(), TpsError>(())
-    /// ```
-    ///
-    /// # Errors
-    /// As [`with_weights`](Self::with_weights).
-    pub fn set_weights(&mut self, weights: &[f64]) -> Result<(), TpsError> {
-        validate_weights(weights, weights.len())?;
-        let kept = self.weights.get_or_insert_default();
-        kept.clear();
-        kept.extend_from_slice(weights);
-        Ok(())
-    }
-
     /// Drops directions in which the points extend less than this fraction of their largest extent.
     ///
     /// The default 0 drops those that rounding of the coordinates alone could have made. A nearly

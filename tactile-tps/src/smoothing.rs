@@ -1,9 +1,5 @@
 //! How closely a spline follows its targets.
 
-mod blocked;
-
-pub use blocked::StrainSpline;
-
 /// How closely the spline follows its targets.
 ///
 /// ```

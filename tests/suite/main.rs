@@ -24,5 +24,4 @@ mod simulator;
 mod sound;
 mod stability;
 mod stated_errors;
-mod strain_covariance;
 mod uniaxial;

@@ -4,6 +4,9 @@ use crate::text::in_unit;
 use ndarray::Array2;
 use tactile_imaging::pipeline::{ContactSurface, Measurement, PipelineError, Press, with_error};
 
+/// Strains that differ by less are equal to rounding.
+const LEAST_SPREAD: f64 = 1e-9;
+
 /// Names and pages. In the lines of the summary a tab stands between name and value.
 pub fn press_pages(
     press: &mut Press<'_>,
@@ -17,7 +20,10 @@ pub fn press_pages(
     if last > 0 && press.strain(last).is_ok() {
         pages.push(("matches", matches_page(press, last)?));
         pages.push(("displacement", displacement_page(press, last)?));
-        pages.push(("strain", strain_page(press, last)?));
+        // An affine warp has one strain for all points, which the summary states.
+        if press.strain(last)?.summary.spread.amax() > LEAST_SPREAD {
+            pages.push(("strain", strain_page(press, last)?));
+        }
     }
     pages.push(("summary", summary_page(press, summary)?));
     Ok(pages)

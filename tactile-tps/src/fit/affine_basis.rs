@@ -71,16 +71,6 @@ impl AffineBasis {
         }
         a
     }
-
-    /// Solves Rᵀ h = p: the part Qh of a solution with Pᵀv = p.
-    pub(super) fn conditions(&self, p: &Coefficients) -> Coefficients {
-        let mut h = [0.0; MAX];
-        for i in 0..self.q {
-            let rest: f64 = (0..i).map(|j| self.r[j][i] * h[j]).sum();
-            h[i] = (p[i] - rest) / self.r[i][i];
-        }
-        h
-    }
 }
 
 /// b ← b − factor · a.

@@ -2,7 +2,7 @@
 
 use core::ops::ControlFlow;
 
-use nalgebra::{Point, SVector};
+use nalgebra::Point;
 
 use super::{
     buffers::Buffers,
@@ -13,9 +13,8 @@ use super::{
 };
 use crate::{
     FitOptions, Kernel, Progress, R2LogR, Smoothing, Spline, TpsError,
-    error::{finite, same_count, same_length, validate_smoothing, validate_weights},
+    error::{finite, same_count, validate_smoothing, validate_weights},
     evaluate::Solution,
-    lanes::{Job, Lane, dispatch},
     span::{Coefficients, MAX},
 };
 
@@ -91,45 +90,6 @@ struct Task<'a, const D: usize> {
 }
 
 impl<const D: usize, K: Kernel> Factorization<D, K> {
-    /// No points yet: memory for [`with_points`](Self::with_points).
-    pub(crate) fn without_points(kernel: K) -> Self {
-        const { assert!(D >= 1 && D < MAX, "splines have one to three dimensions") };
-        Self {
-            kernel,
-            centres: Centres::default(),
-            system: System::default(),
-            weights: None,
-            centre_weights: Vec::new(),
-            smoothing: Smoothing::None,
-            rank_tolerance: 0.0,
-            iterative: None,
-            tolerance: 0.0,
-        }
-    }
-
-    /// The distinct centres and the options, without a factor for them.
-    pub(super) fn with_points(
-        mut self,
-        sources: &[Point<f64, D>],
-        options: &FitOptions<K>,
-    ) -> Result<Self, TpsError> {
-        if let Some(weights) = &options.weights {
-            same_count("weights", sources.len(), weights.len())?;
-            self.weights.get_or_insert_default().clone_from(weights);
-        } else {
-            self.weights = None;
-        }
-        self.kernel.clone_from(&options.kernel);
-        // A kernel with a length of its own would become another one under a change of scale.
-        self.centres.take(sources, self.kernel.degree().is_some())?;
-        self.centres
-            .weigh(self.weights.as_deref(), &mut self.centre_weights);
-        self.smoothing = options.smoothing;
-        self.rank_tolerance = options.rank_tolerance;
-        self.tolerance = options.tolerance;
-        Ok(self)
-    }
-
     pub(super) fn setting(&self) -> Setting<'_, K, D> {
         Setting {
             kernel: &self.kernel,
@@ -184,55 +144,39 @@ impl<const D: usize, K: Kernel> Factorization<D, K> {
     /// # Errors
     /// [`TpsError`] for bad input, or a kernel that is not definite on these points.
     pub fn new(sources: &[Point<f64, D>], options: &FitOptions<K>) -> Result<Self, TpsError> {
-        Self::without_points(options.kernel.clone()).refactor(sources, options)
+        Self::new_watched(sources, options, &mut |_| ControlFlow::Continue(()))
     }
 
-    /// As [`new`](Self::new), in the memory of this factorisation. O(n³/3).
-    ///
-    /// For points of the same number nothing is allocated.
-    ///
-    /// ```
-    /// use nalgebra::Point2;
-    /// use tactile_tps::{Factorization, FitOptions, Spline, TpsError, SplineWorkspace};
-    /// # fn main() -> Result<(), TpsError> {
-    /// let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4,
-    ///     0.6]].map(Point2::from);
-    /// let options = FitOptions::default();
-    /// let mut factorization = Factorization::new(&sources, &options)?;
-    /// let (mut workspace, mut spline) = (SplineWorkspace::default(), Spline::default());
-    /// for step in 1..=3 {
-    ///     let moved = sources.map(|p| p * f64::from(step));
-    ///     factorization = factorization.refactor(&moved, &options)?;
-    ///     factorization.refit_with(&mut workspace, &sources, None, None, &mut spline)?;
-    ///     assert!((spline.apply(&moved[4]) - sources[4]).norm() < 1e-14);
-    /// }
-    /// # Ok(())
-    /// # }
-    /// ```
-    ///
-    /// # Errors
-    /// As [`new`](Self::new).
-    pub fn refactor(
-        self,
-        sources: &[Point<f64, D>],
-        options: &FitOptions<K>,
-    ) -> Result<Self, TpsError> {
-        self.refactor_watched(sources, options, &mut |_| ControlFlow::Continue(()))
-    }
-
-    /// As [`refactor`](Self::refactor), reporting the progress of an iterative solver's preparation
+    /// As [`new`](Self::new), reporting the progress of an iterative solver's preparation
     /// to `watch`, which may stop it.
-    pub(crate) fn refactor_watched(
-        self,
+    pub(crate) fn new_watched(
         sources: &[Point<f64, D>],
         options: &FitOptions<K>,
         watch: &mut Watch<'_>,
     ) -> Result<Self, TpsError> {
-        let mut this = self.with_points(sources, options)?;
+        const { assert!(D >= 1 && D < MAX, "splines have one to three dimensions") };
+        if let Some(weights) = &options.weights {
+            same_count("weights", sources.len(), weights.len())?;
+        }
+        let kernel = options.kernel.clone();
+        let mut centres = Centres::default();
+        // A kernel with a length of its own would become another one under a change of scale.
+        centres.take(sources, kernel.degree().is_some())?;
+        let mut centre_weights = Vec::new();
+        centres.weigh(options.weights.as_deref(), &mut centre_weights);
+        let mut this = Self {
+            kernel,
+            centres,
+            system: System::default(),
+            weights: options.weights.clone(),
+            centre_weights,
+            smoothing: options.smoothing,
+            rank_tolerance: options.rank_tolerance,
+            iterative: None,
+            tolerance: options.tolerance,
+        };
         let iterates = options.iterates(this.centres.len());
-        // Taken out, because the rest is read.
-        let mut system = core::mem::take(&mut this.system);
-        let mut iterative = this.iterative.take().unwrap_or_default();
+        let (mut system, mut iterative) = (System::default(), Iterative::default());
         let (smoothing, weights) = (this.smoothing, &this.centre_weights);
         let built = this.build(
             smoothing,
@@ -535,134 +479,6 @@ impl<const D: usize, K: Kernel> Factorization<D, K> {
                 let slope = row[k] * frame.scale;
                 gradient[m][k] += slope;
                 constant[m] -= slope * axes[k][system.active[0]];
-            }
-        }
-    }
-
-    /// Influence of each target on the Jacobian at each point: bⱼ in J(x) = Σⱼ yⱼ bⱼᵀ.
-    ///
-    /// Goes row by row into the caller's memory, `n` entries (one per source point) per point.
-    /// Allocates nothing once the workspace has grown. O(n²) per point.
-    ///
-    /// The same for every output and all targets, with the weights and λ of the factorisation.
-    /// Σ bⱼ = 0, and Σ xⱼ bⱼᵀ = I where the points span space. Where they do not, the Jacobian of a
-    /// map of space has the identity across them besides, which no target changes. Targets with covariances Cⱼ give J
-    /// the covariance Σ Cⱼ ⊗ bⱼbⱼᵀ.
-    ///
-    /// ```
-    /// use nalgebra::{Matrix2, Point2, Vector2};
-    /// use tactile_tps::{Factorization, FitOptions, SplineWorkspace};
-    /// # fn main() -> Result<(), tactile_tps::TpsError> {
-    /// let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4,
-    ///     0.6]].map(Point2::from);
-    /// let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
-    /// let (factorization, x) = (Factorization::<2>::new(&sources, &FitOptions::default())?,
-    ///     Point2::new(0.5, 0.5));
-    /// let mut influence = [Vector2::zeros(); 5];
-    /// factorization.jacobian_influence_into(&mut SplineWorkspace::default(), &[x],
-    ///     &mut influence)?;
-    /// let sum = targets.iter().zip(&influence).fold(Matrix2::zeros(), |j, (y, b)| j
-    ///     + y.coords * b.transpose());
-    /// assert!((factorization.fit(&targets)?.jacobian(&x) - sum).norm() < 1e-14);
-    /// # Ok(())
-    /// # }
-    /// ```
-    ///
-    /// # Errors
-    /// [`TpsError::DependsOnTargets`] if λ is left to cross-validation, [`TpsError::NoFactor`] if
-    /// the solver is iterative, [`TpsError::Length`] if `influence` is not of that length.
-    pub fn jacobian_influence_into(
-        &self,
-        workspace: &mut SplineWorkspace<D>,
-        points: &[Point<f64, D>],
-        influence: &mut [SVector<f64, D>],
-    ) -> Result<(), TpsError> {
-        self.linear(points.len(), influence.len())?;
-        for (point, row) in points.iter().zip(influence.chunks_exact_mut(self.len())) {
-            self.follow(point, &mut workspace.buffers, row);
-        }
-        Ok(())
-    }
-
-    /// Whether there is a linear map, and memory for it at these points.
-    fn linear(&self, points: usize, found: usize) -> Result<(), TpsError> {
-        same_length(points * self.len(), found)?;
-        match self.smoothing {
-            Smoothing::Gcv => Err(TpsError::DependsOnTargets),
-            _ if self.iterative.is_some() => Err(TpsError::NoFactor),
-            _ => Ok(()),
-        }
-    }
-
-    /// The influence of every source point on the Jacobian at `point`, into `row`.
-    ///
-    /// The value is f(x) = k(x)ᵀw + p(x)ᵀa with (w, a) from the symmetric system A(w, a) = (y, 0).
-    /// So f(x) = α(x)ᵀy for the first part of A(α, β) = (k(x), p(x)): one solve, whatever the
-    /// targets.
-    /// Derivatives of k and p give those of f.
-    fn follow(&self, point: &Point<f64, D>, buffers: &mut Buffers, row: &mut [SVector<f64, D>]) {
-        let (n, span, frame) = (self.centres.len(), &self.system.span, &self.centres.frame);
-        let Buffers { targets, work, .. } = buffers;
-        targets.clear();
-        targets.resize(D * n, 0.0);
-        dispatch(Slopes {
-            kernel: &self.kernel,
-            axes: &self.centres.axes,
-            point: frame.inside(point),
-            slopes: targets,
-        });
-        let slope = |c: usize, axis: usize| {
-            if c > span.directions {
-                0.0
-            } else {
-                span.slope(c, axis)
-            }
-        };
-        let conditions: [Coefficients; D] =
-            core::array::from_fn(|axis| core::array::from_fn(|c| slope(c, axis)));
-        self.system
-            .solve_adjoint(targets, conditions.each_ref(), work);
-        for (axis, found) in targets.chunks_exact(n).enumerate() {
-            for (i, influence) in row.iter_mut().enumerate() {
-                // The target of a centre is the weighted mean of its points.
-                influence[axis] = found[self.centres.centre(i)] * self.share(i) / frame.scale;
-            }
-        }
-    }
-
-    /// The part of an input point in the target of its centre.
-    fn share(&self, i: usize) -> f64 {
-        if self.centres.centre_of.is_empty() {
-            return 1.0;
-        }
-        let total = self.centre_weights[self.centres.centre(i)];
-        let weight = self.weights.as_ref().map_or(1.0, |w| w[i]);
-        if total > 0.0 { weight / total } else { 0.0 }
-    }
-}
-
-/// Writes the derivatives of the kernels about all centres at a point, axis by axis.
-struct Slopes<'a, K, const D: usize> {
-    kernel: &'a K,
-    axes: &'a [Vec<f64>; D],
-    point: [f64; D],
-    slopes: &'a mut [f64],
-}
-
-impl<K: Kernel, const D: usize> Job for Slopes<'_, K, D> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run<L: Lane>(self) {
-        let n = self.slopes.len() / D;
-        let axes = self.axes.each_ref().map(|axis| &axis[..n]);
-        let point = self.point.map(L::from_f64);
-        for (axis, slopes) in self.slopes.chunks_exact_mut(n).enumerate() {
-            for (i, slope) in slopes.iter_mut().enumerate() {
-                let d: [L; D] = core::array::from_fn(|k| point[k] - L::from_f64(axes[k][i]));
-                let s = d.iter().fold(L::from_f64(0.0), |s, d| d.mul_add(*d, s));
-                // The gradient is 2 dU/ds d, s being the squared distance.
-                *slope = (L::from_f64(2.0) * self.kernel.derivatives(s).first * d[axis]).get();
             }
         }
     }

@@ -17,10 +17,8 @@ mod centres;
 mod equations;
 mod factorization;
 mod iterative;
-mod path;
 mod spectrum;
 mod system;
 mod triangle;
 
 pub use factorization::{Factorization, SplineWorkspace};
-pub use path::LambdaPath;

@@ -212,22 +212,12 @@ impl<const D: usize> System<D> {
         work: &mut Vec<f64>,
         spare: &mut Vec<f64>,
     ) -> [Coefficients; M] {
-        self.solve_by(y, work, |columns| match &self.spectrum {
-            Some(spectrum) => spectrum.solve(columns, lambda, spare),
-            None => self.matrix.solve(columns),
-        })
-    }
-
-    /// As [`solve`](Self::solve), with a solver for the columns of Π W^½y.
-    pub(super) fn solve_by<const M: usize>(
-        &self,
-        y: &mut [f64],
-        work: &mut Vec<f64>,
-        solver: impl FnOnce(&mut [f64]),
-    ) -> [Coefficients; M] {
         let n = self.active.len();
         let mut heads = self.reduce::<M>(y, work);
-        solver(work);
+        match &self.spectrum {
+            Some(spectrum) => spectrum.solve(work, lambda, spare),
+            None => self.matrix.solve(work),
+        }
         for (head, column) in heads.iter_mut().zip(work.chunks_exact_mut(n)) {
             // The exact solution lies in the range of Π. Rounding is taken off.
             self.affine.remove(column);
@@ -239,34 +229,6 @@ impl<const D: usize> System<D> {
         }
         self.scatter(work, y);
         heads
-    }
-
-    /// Solves for the weights alone: (K + λW⁻¹)w + P a = y, Pᵀw = p for each column of `y`. The
-    /// system must be factored.
-    ///
-    /// With W^-½w = Qh + z the conditions give h, which moves to the right-hand side of the
-    /// equations for z.
-    pub(super) fn solve_adjoint<const R: usize>(
-        &self,
-        y: &mut [f64],
-        p: [&Coefficients; R],
-        work: &mut Vec<f64>,
-    ) {
-        let n = self.active.len();
-        self.reduce::<R>(y, work);
-        let heads = p.map(|p| self.affine.conditions(p));
-        for (head, column) in heads.iter().zip(work.chunks_exact_mut(n)) {
-            for (head, coupling) in head.iter().zip(self.coupling.chunks_exact(n)) {
-                subtract(*head, coupling, column);
-            }
-            self.affine.remove(column);
-        }
-        self.matrix.solve(work);
-        for (head, column) in heads.iter().zip(work.chunks_exact_mut(n)) {
-            self.affine.remove(column);
-            (0..self.affine.q).for_each(|k| subtract(-head[k], self.affine.column(k), column));
-        }
-        self.scatter(work, y);
     }
 
     /// Π W^½ y in `work`. Returns QᵀW^½ y, output by output.

@@ -39,12 +39,6 @@ impl Triangle {
         }
     }
 
-    /// Takes over another matrix, without its memory.
-    pub(super) fn copy_from(&mut self, other: &Self) {
-        (self.n, self.stride) = (other.n, other.stride);
-        self.data.clone_from(&other.data);
-    }
-
     pub(super) fn trace(&self) -> f64 {
         (0..self.n).map(|j| self.data[j * self.stride + j]).sum()
     }

@@ -3,7 +3,7 @@
 use core::ops::ControlFlow;
 
 use crate::common::{Uniform, bend, largest, options};
-use nalgebra::{Point, Point3, SVector};
+use nalgebra::{Point, Point3};
 use tactile_tps::{
     Factorization, FitOptions, Kernel, NegR, R2LogR, R3, Smoothing, Solver, Spline,
     SplineWorkspace, ThinPlateSpline, TpsError,
@@ -135,9 +135,6 @@ fn refits_are_fits() {
             .expect("a refit");
     });
     assert_eq!(again.count_total, 0);
-    let mut influence = vec![SVector::zeros(); POINTS];
-    let refused = factorization.jacobian_influence_into(&mut workspace, &[query], &mut influence);
-    assert_eq!(refused, Err(TpsError::NoFactor));
 }
 
 /// The watch hears of both stages, and can stop either.

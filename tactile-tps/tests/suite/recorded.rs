@@ -4,7 +4,7 @@
 //! `RECORD_ANSWERS=1 cargo test -p tactile-tps --test suite recorded` writes the record anew; the
 //! commit says why numbers moved.
 
-use nalgebra::{Point, Point1, SVector};
+use nalgebra::{Point, Point1};
 use tactile_tps::{
     Affine, Factorization, FitOptions, Kernel, NegR, R2LogR, R3, Smoothing, Spline,
     SplineWorkspace, ThinPlateSpline, Warp,
@@ -85,13 +85,6 @@ fn fits<const D: usize, K: Kernel + Default>(answers: &mut Answers, kernel: K, n
             .expect("a spline");
         spline(answers, &format!("{name}/{case}"), &refitted);
     }
-    let query = uniform.point();
-    let mut influence = vec![SVector::zeros(); sources.len()];
-    factorization
-        .jacobian_influence_into(&mut workspace, &[query], &mut influence)
-        .expect("a linear map");
-    let columns = influence.iter().flat_map(|row| row.iter().copied());
-    answers.add(format!("{name}/jacobian_influence"), columns);
 }
 
 fn models<const D: usize>(answers: &mut Answers) {

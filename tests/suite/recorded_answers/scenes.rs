@@ -163,8 +163,8 @@ fn stages_by_name(answers: &mut Answers) {
         choose(choice.into(), &|config| config.matcher = choice);
     }
     for choice in [
+        WarpChoice::ThinPlateSpline,
         WarpChoice::CubicSpline,
-        WarpChoice::Affine,
         WarpChoice::Rigid,
     ] {
         choose(choice.into(), &|config| config.warp = choice);
