@@ -241,7 +241,7 @@ impl<const D: usize> Annealer<D> {
         }
         self.regression
             .fit(&self.prior, &self.weights, &self.residuals, variance);
-        self.regression.variances(&self.prior);
+        self.regression.variances(&self.prior, false);
     }
 
     /// The annealed energy: distances under M, over the temperature, plus the warp's penalty, a

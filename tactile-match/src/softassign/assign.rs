@@ -258,8 +258,10 @@ impl<const D: usize> SoftAssignment<D> {
 /// Points a block: one or two vectors of single precision.
 const LANES: usize = 16;
 
-/// Blocks a group: in large sets whole groups are passed over at once.
+/// Boxes in a box of the next level: in large sets whole groups are passed over at once.
 const GROUP: usize = 32;
+/// So many boxes are looked at one after the other faster than through a further level.
+const MOST_BOXES: usize = 256;
 
 /// Points in the order of their blocks, one array an axis, with the blocks' boxes.
 #[derive(Clone, Debug, Default)]
@@ -267,14 +269,15 @@ pub(super) struct Blocks<const D: usize> {
     /// Which point stands at every place.
     pub(super) order: Vec<usize>,
     axes: Vec<f32>,
-    low: Vec<f32>,
-    high: Vec<f32>,
-    groups: Groups,
+    /// The boxes of the blocks, then those of [`GROUP`] boxes of the level before.
+    levels: Vec<Boxes>,
+    /// The last level in use.
+    top: usize,
 }
 
-/// Boxes of [`GROUP`] consecutive blocks, one array an axis.
+/// Boxes by their sides, one array an axis.
 #[derive(Clone, Debug, Default)]
-struct Groups {
+struct Boxes {
     low: Vec<f32>,
     high: Vec<f32>,
 }
@@ -289,31 +292,29 @@ impl<const D: usize> Blocks<D> {
         let width = points.len().next_multiple_of(LANES);
         let (order, axes) = (&self.order, &mut self.axes);
         axes.clear();
-        self.low.clear();
-        self.high.clear();
+        self.levels.iter_mut().for_each(Boxes::clear);
+        if self.levels.is_empty() {
+            self.levels.push(Boxes::default());
+        }
         for k in 0..D {
             axes.extend(order.iter().map(|&j| points[j][k] as f32));
-            let real = axes[k * width..].chunks(LANES);
-            self.low.extend(
-                real.clone()
-                    .map(|block| block.iter().copied().fold(f32::MAX, f32::min)),
-            );
-            self.high
-                .extend(real.map(|block| block.iter().copied().fold(f32::MIN, f32::max)));
+            let real = &axes[k * width..];
+            self.levels[0].extend(real, real, LANES);
             // Where the padding lies: no Gaussian reaches it, and its square is finite.
             axes.resize((k + 1) * width, 1e15);
         }
-        let count = self.low.len() / D;
-        self.groups.low.clear();
-        self.groups.high.clear();
-        for k in 0..D {
-            let sides = k * count..(k + 1) * count;
-            let low = self.low[sides.clone()].chunks(GROUP);
-            let high = self.high[sides].chunks(GROUP);
-            let least = |group: &[f32]| group.iter().copied().fold(f32::MAX, f32::min);
-            let largest = |group: &[f32]| group.iter().copied().fold(f32::MIN, f32::max);
-            self.groups.low.extend(low.map(least));
-            self.groups.high.extend(high.map(largest));
+        self.top = 0;
+        while self.levels[self.top].low.len() > MOST_BOXES * D {
+            if self.levels.len() == self.top + 1 {
+                self.levels.push(Boxes::default());
+            }
+            let (below, above) = self.levels.split_at_mut(self.top + 1);
+            let below = &below[self.top];
+            let count = below.low.len() / D;
+            for sides in (0..D).map(|k| k * count..(k + 1) * count) {
+                above[0].extend(&below.low[sides.clone()], &below.high[sides], GROUP);
+            }
+            self.top += 1;
         }
     }
 
@@ -337,38 +338,52 @@ impl<const D: usize> Blocks<D> {
     /// Appends the blocks whose boxes lie within the squared distance `cut` of `y`, in ascending
     /// order. `squared` is scratch.
     ///
-    /// `O(J/16)` for small sets. In large ones `O(J/512)` and the blocks of the groups in reach.
+    /// `O(J/16)` for small sets, `O(log J)` and the blocks in reach for large ones.
     #[inline(always)]
     fn within(&self, y: &[f32; D], cut: f32, squared: &mut Vec<f32>, found: &mut Vec<u32>) {
-        let count = self.low.len() / D;
-        let groups = self.groups.low.len() / D;
-        // Fewer groups are not worth their own test.
-        if groups <= 4 {
-            box_distances(y, (&self.low, &self.high), count, squared);
-            for (block, &square) in squared.iter().enumerate() {
-                if square <= cut {
-                    found.push(block as u32);
-                }
+        let top = self.top;
+        let Boxes { low, high } = &self.levels[top];
+        box_distances(y, (low, high), low.len() / D, squared);
+        for (place, &square) in squared.iter().enumerate() {
+            if square <= cut {
+                self.descend(top, place, y, cut, found);
             }
+        }
+    }
+
+    /// Appends the blocks within reach of a box of a level.
+    fn descend(&self, level: usize, place: usize, y: &[f32; D], cut: f32, found: &mut Vec<u32>) {
+        let Some(below) = level.checked_sub(1) else {
+            found.push(place as u32);
             return;
-        }
-        let boxes = (&*self.groups.low, &*self.groups.high);
-        box_distances(y, boxes, groups, squared);
-        for group in 0..groups {
-            if squared[group] > cut {
-                continue;
-            }
-            for block in group * GROUP..((group + 1) * GROUP).min(count) {
-                let outside = |k: usize| {
-                    let side = k * count + block;
-                    (self.low[side] - y[k]).max(y[k] - self.high[side]).max(0.0)
-                };
-                let square: f32 = (0..D).map(|k| outside(k) * outside(k)).sum();
-                if square <= cut {
-                    found.push(block as u32);
-                }
+        };
+        let Boxes { low, high } = &self.levels[below];
+        let count = low.len() / D;
+        for inner in place * GROUP..((place + 1) * GROUP).min(count) {
+            let outside = |k: usize| {
+                let side = k * count + inner;
+                (low[side] - y[k]).max(y[k] - high[side]).max(0.0)
+            };
+            let square: f32 = (0..D).map(|k| outside(k) * outside(k)).sum();
+            if square <= cut {
+                self.descend(below, inner, y, cut, found);
             }
         }
+    }
+}
+
+impl Boxes {
+    fn clear(&mut self) {
+        self.low.clear();
+        self.high.clear();
+    }
+
+    /// Appends the boxes of so many consecutive members, given by their sides along one axis.
+    fn extend(&mut self, low: &[f32], high: &[f32], members: usize) {
+        let least = |sides: &[f32]| sides.iter().copied().fold(f32::MAX, f32::min);
+        let largest = |sides: &[f32]| sides.iter().copied().fold(f32::MIN, f32::max);
+        self.low.extend(low.chunks(members).map(least));
+        self.high.extend(high.chunks(members).map(largest));
     }
 }
 

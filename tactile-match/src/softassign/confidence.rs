@@ -11,6 +11,9 @@ use std::f64::consts::TAU;
 const CLEAN_SIGMA: [f64; 2] = [3e-3, 0.05];
 /// The same for the lowest temperature of a run: partners a twentieth of a spacing apart are told.
 const MIN_SIGMA: [f64; 2] = [1e-3, 1.0 / 60.0];
+/// Residuals are compared no finer than this. By the radius alone, a set of 20,000 points would be
+/// compared no finer than its spacing, at which no answer is likelier than chance.
+const ENERGY_RESOLUTION: [f64; 2] = [0.01, 0.2];
 /// An answer is read at so many times the lowest temperature at least: what the prior's factor
 /// leaves out must not cost a clean pair its match.
 const READ: f64 = 1.4;
@@ -24,6 +27,7 @@ impl<const D: usize> Annealer<D> {
         let least = |[radii, spacings]: [f64; 2]| radii.min(spacings * spacing);
         self.clean_sigma = least(CLEAN_SIGMA);
         self.least_sigma = least(MIN_SIGMA);
+        self.resolution = least(ENERGY_RESOLUTION);
     }
 }
 
@@ -150,7 +154,7 @@ impl<const D: usize> Answer<D> {
         let snaps = !noisy && !annealer.rigid.is_active();
         let fit = self.place(state, targets, snaps);
         if !annealer.rigid.is_active() {
-            annealer.regression.variances(&annealer.prior);
+            annealer.regression.variances(&annealer.prior, noisy);
         }
         if noisy && without != Some(Mechanism::PairOdds) {
             let fitted = Fitted {

@@ -53,7 +53,7 @@ use confidence::PairOdds;
 use correspond::Correspondence;
 use fine::FineFit;
 use large::Levels;
-use model::{Prior, RigidFit, ScaleAverage};
+use model::{Prior, RigidFit, ScaleAverage, Stripe};
 use motion::Motions;
 use nalgebra::{Point, SVector, Vector3};
 use patterns::{Candidate, Cells, Consensus, GatedNearest};
@@ -530,6 +530,8 @@ struct Annealer<const D: usize> {
     clean_sigma: f64,
     /// The lowest temperature.
     least_sigma: f64,
+    /// Runs are compared no finer than this.
+    resolution: f64,
     weights: Vec<f64>,
     residuals: Axes<D>,
     predicted: Vec<[f64; D]>,
@@ -588,7 +590,8 @@ struct Regression<const D: usize> {
     gram: Vec<f64>,
     solution: Vec<[f64; D]>,
     weighted: Vec<f64>,
-    whitened: Vec<f64>,
+    /// Stripe by stripe of rows, column by column.
+    whitened: Vec<Stripe>,
     /// `ln det(1 + LᵀWL/σ²)`.
     log_det: f64,
     /// Displacements, one array an axis, padded like the prior's columns.

@@ -27,7 +27,7 @@ const ONE_BLOCK: usize = 500;
 const PROBES: usize = 12;
 /// How far those look, in radii of the model and, for time, in spacings of the plane and of space.
 const FAR: f64 = 0.35;
-const FAR_SPACINGS: [f64; 2] = [45.0, 10.0];
+const FAR_SPACINGS: [f64; 2] = [150.0, 20.0];
 /// How far a block looks from what its neighbours predict, in spacings.
 const NEAR: f64 = 3.0;
 /// Cells of the histogram for a spacing. Three cells, a spacing, are summed.
@@ -44,6 +44,11 @@ const COMMON: f64 = 0.6;
 /// Peaks that reach this share of the highest are as high: of a lattice of 400 points the next one
 /// has 95 %.
 const EQUAL: f64 = 0.97;
+/// Rounds in which the motion of a block follows its pairs. Other targets among them hold it back:
+/// a round leaves half of the error.
+const ROUNDS: usize = 4;
+/// Weight of no gradient beside what the block's points determine, as a share of their spread.
+const RIDGE: f64 = 0.02;
 /// Share of the blocks that agree on a field.
 const AGREEING: f64 = 0.6;
 /// Times that a block without a peak is tried again, with more neighbours.
@@ -54,11 +59,18 @@ const TRIES: u8 = 3;
 pub(super) struct Seed<const D: usize> {
     /// The model row at the centre.
     pub(super) row: usize,
-    /// From where it lies.
-    pub(super) motion: Option<[f64; D]>,
+    /// The field about it, from where it lies.
+    motion: Option<Local<D>>,
     /// Squared distance from the nearest block that has a motion.
     distance: f64,
     tries: u8,
+}
+
+impl<const D: usize> Seed<D> {
+    /// Motion of the centre.
+    pub(super) fn value(&self) -> Option<SVector<f64, D>> {
+        self.motion.map(|motion| motion.value)
+    }
 }
 
 /// Memory of the motions.
@@ -70,7 +82,6 @@ pub(super) struct Motions<const D: usize> {
     targets: Cells<D>,
     /// Rows of the present block.
     block: Vec<usize>,
-    differences: Vec<[f64; D]>,
     counts: Vec<u32>,
     sums: Vec<u32>,
     /// Points of a block, and the radius of the last one.
@@ -79,7 +90,7 @@ pub(super) struct Motions<const D: usize> {
 }
 
 /// A field about a place: its value there and its gradient.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 struct Local<const D: usize> {
     at: SVector<f64, D>,
     value: SVector<f64, D>,
@@ -95,9 +106,13 @@ impl<const D: usize> Local<D> {
         }
     }
 
+    fn value_at(&self, p: &SVector<f64, D>) -> SVector<f64, D> {
+        self.value + self.gradient * (p - self.at)
+    }
+
     fn move_point(&self, p: &[f64; D]) -> [f64; D] {
         let p = SVector::from(*p);
-        (p + self.value + self.gradient * (p - self.at)).into()
+        (p + self.value_at(&p)).into()
     }
 }
 
@@ -176,8 +191,7 @@ impl<const D: usize> Motions<D> {
 
     /// Mean of the motions.
     pub(super) fn mean(&self) -> [f64; D] {
-        let motions = self.seeds.iter().filter_map(|seed| seed.motion);
-        let sum: SVector<f64, D> = motions.map(SVector::from).sum();
+        let sum: SVector<f64, D> = self.seeds.iter().filter_map(Seed::value).sum();
         (sum / self.seeds.len().max(1) as f64).into()
     }
 
@@ -191,7 +205,7 @@ impl<const D: usize> Motions<D> {
             .map(|(k, _)| k)
     }
 
-    fn settle(&mut self, still: &[[f64; D]], k: usize, motion: [f64; D]) {
+    fn settle(&mut self, still: &[[f64; D]], k: usize, motion: Local<D>) {
         self.seeds[k].motion = Some(motion);
         let place = still[self.seeds[k].row];
         for seed in &mut self.seeds {
@@ -218,46 +232,34 @@ impl<const D: usize> Motions<D> {
         }
     }
 
-    /// What the nearest blocks predict at a model point: an affine field, shrunk to a shift.
+    /// What the nearest blocks predict at a model point: the mean of their fields.
     fn predict(&self, still: &[[f64; D]], row: usize) -> Local<D> {
-        let at = &still[row];
+        let at = SVector::from(still[row]);
         // As many as surround it.
-        let mut near = [(f64::INFINITY, 0); 8];
-        for (k, seed) in self.seeds.iter().enumerate() {
-            let square = squared_distance(&still[seed.row], at);
-            if seed.motion.is_some() && square < near[7].0 {
+        let mut near = [(f64::INFINITY, None); 4];
+        for seed in &self.seeds {
+            let square = squared_distance(&still[seed.row], &still[row]);
+            if seed.motion.is_some() && square < near[3].0 {
                 let place = near.partition_point(|&(other, _)| other <= square);
                 near[place..].rotate_right(1);
-                near[place] = (square, k);
+                near[place] = (square, seed.motion);
             }
         }
-        let near = near.iter().filter(|(square, _)| square.is_finite());
-        let rows = near.map(|&(_, k)| {
-            let seed = &self.seeds[k];
-            let motion = SVector::from(seed.motion.unwrap_or([0.0; D]));
-            (SVector::from(still[seed.row]), motion)
-        });
-        let count = rows.clone().count().max(1) as f64;
-        let mean: SVector<f64, D> = rows.clone().map(|(p, _)| p).sum::<SVector<f64, D>>() / count;
-        let value: SVector<f64, D> = rows.clone().map(|(_, u)| u).sum::<SVector<f64, D>>() / count;
-        let ridge = 0.2 * self.radius * self.radius;
-        let mut gram = SMatrix::<f64, D, D>::identity() * ridge;
-        let mut outer = SMatrix::<f64, D, D>::zeros();
-        for (p, u) in rows {
-            gram += (p - mean) * (p - mean).transpose();
-            outer += (u - value) * (p - mean).transpose();
-        }
-        let gradient = outer * gram.try_inverse().unwrap_or_else(SMatrix::zeros);
-        let at = SVector::from(*at);
+        let motions = near.iter().filter_map(|(_, motion)| *motion);
+        let count = motions.clone().count().max(1) as f64;
         Local {
             at,
-            value: value + gradient * (at - mean),
-            gradient,
+            value: motions
+                .clone()
+                .map(|m| m.value_at(&at))
+                .sum::<SVector<f64, D>>()
+                / count,
+            gradient: motions.map(|m| m.gradient).sum::<SMatrix<f64, D, D>>() / count,
         }
     }
 
     /// The motion of the present block at the place of `here`, within `reach` of what that
-    /// predicts, and how its peak stands out.
+    /// predicts, and how its peak stands out. With its gradient, unless the sets are one block.
     fn peak(
         &mut self,
         still: &[[f64; D]],
@@ -265,14 +267,13 @@ impl<const D: usize> Motions<D> {
         here: &Local<D>,
         reach: f64,
         spacing: f64,
-    ) -> Option<([f64; D], Peak)> {
+    ) -> Option<(Local<D>, Peak)> {
         let per_cell = CELLS / spacing;
         let half = (reach * per_cell).ceil() as usize + 1;
         let side = 2 * half + 1;
-        let (counts, differences) = (&mut self.counts, &mut self.differences);
+        let counts = &mut self.counts;
         counts.clear();
         counts.resize(side.pow(D as u32), 0);
-        differences.clear();
         let centre = half as f64 + 0.5;
         for &i in &self.block {
             let place = here.move_point(&still[i]);
@@ -283,7 +284,6 @@ impl<const D: usize> Motions<D> {
                     index = index * side + (step[k] * per_cell + centre) as usize;
                 }
                 counts[index] += 1;
-                differences.push(step);
             });
         }
         self.sum_neighbours(side);
@@ -305,19 +305,54 @@ impl<const D: usize> Motions<D> {
         let (least, _) = high
             .map(|(index, _)| (index, motion(index)))
             .min_by(|a, b| a.1.total_cmp(&b.1))?;
-        let (mut step, mut pairs) = (SVector::from(place(least)), 0.0);
-        // Rounds in which the place follows the mean of what lies within half a spacing.
-        for _ in 0..4 {
-            let near = self.differences.iter().map(|d| SVector::from(*d) - step);
-            let near = near.filter(|d| d.norm_squared() < 0.25 * spacing * spacing);
-            let (sum, count) = near.fold((SVector::zeros(), 0.0), |(sum, n), d| (sum + d, n + 1.0));
-            if count > 0.0 {
-                step += sum / count;
-            }
-            pairs = count;
-        }
+        let mut motion = *here;
+        motion.value += SVector::from(place(least));
+        let bends = still.len() >= ONE_BLOCK;
+        let pairs = self.refine(still, target, &mut motion, bends, spacing);
         let height = (f64::from(highest) - next) / (next + 1.0).sqrt();
-        Some(((here.value + step).into(), Peak { height, pairs }))
+        Some((motion, Peak { height, pairs }))
+    }
+
+    /// Rounds in which a motion follows the targets within half a spacing of where it puts the
+    /// points of the block. Their number.
+    fn refine(
+        &self,
+        still: &[[f64; D]],
+        target: &[[f64; D]],
+        motion: &mut Local<D>,
+        bends: bool,
+        spacing: f64,
+    ) -> f64 {
+        let mut count = 0.0;
+        for _ in 0..ROUNDS {
+            let (mut arm, mut miss) = (SVector::zeros(), SVector::zeros());
+            let (mut gram, mut outer) = (SMatrix::zeros(), SMatrix::<f64, D, D>::zeros());
+            count = 0.0;
+            for &i in &self.block {
+                let place = motion.move_point(&still[i]);
+                let r = SVector::from(still[i]) - motion.at;
+                self.targets.within(&place, 0.5 * spacing, |j, _| {
+                    let e = SVector::from(difference(&target[j], &place));
+                    (arm, miss, count) = (arm + r, miss + e, count + 1.0);
+                    gram += r * r.transpose();
+                    outer += e * r.transpose();
+                });
+            }
+            if count == 0.0 {
+                break;
+            }
+            (arm, miss) = (arm / count, miss / count);
+            if bends {
+                gram = gram / count - arm * arm.transpose();
+                outer = outer / count - miss * arm.transpose();
+                gram += SMatrix::identity() * (RIDGE * gram.trace());
+                let change = outer * gram.try_inverse().unwrap_or_else(SMatrix::zeros);
+                motion.gradient += change;
+                miss -= change * arm;
+            }
+            motion.value += miss;
+        }
+        count
     }
 
     /// Sums over three cells an axis, into `sums`.

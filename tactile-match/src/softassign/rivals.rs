@@ -1,6 +1,6 @@
 //! Rivals of an answer: the model turned, mirrored or moved by a step of its lattice.
 
-use super::search::{ENERGY_RESOLUTION, FAST, bounding_volume};
+use super::search::{FAST, bounding_volume};
 use super::{AnnealedSoftassign, Cooling, Mechanism, Rotation, SoftassignWorkspace, State};
 use super::{difference, mean, squared, squared_distance, starts};
 use crate::Doubt;
@@ -212,7 +212,7 @@ impl AnnealedSoftassign {
     fn accept<const D: usize>(&self, ws: &mut SoftassignWorkspace<D>) {
         let state = &mut ws.state;
         ws.annealer
-            .evaluate(state, self.share, ENERGY_RESOLUTION, 1.0);
+            .evaluate(state, self.share, ws.annealer.resolution, 1.0);
         ws.best.copy_from(state);
     }
 }

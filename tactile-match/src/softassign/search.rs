@@ -21,8 +21,6 @@ pub(super) const SCALES: PriorScales = PriorScales {
     bending: 0.35,
     affine: 0.5,
 };
-/// Residuals are compared no finer than this.
-pub(super) const ENERGY_RESOLUTION: f64 = 0.01;
 /// A set of so many points is dense: an exact answer need not be complete, and local tuples are
 /// tried first.
 const MIN_DENSE_POINTS: usize = 500;
@@ -428,7 +426,7 @@ impl AnnealedSoftassign {
         annealer.residuals.fill(stride, nothing);
         for (row, motion) in seeds
             .iter()
-            .filter_map(|seed| Some((seed.row, seed.motion?)))
+            .filter_map(|seed| Some((seed.row, seed.value()?)))
         {
             annealer.weights[row] = 1.0;
             for k in 0..D {
@@ -472,7 +470,7 @@ impl AnnealedSoftassign {
         }
         ws.state.tail = ws.annealer.tail(0.1 * ws.spacing);
         ws.annealer
-            .evaluate(&mut ws.state, self.share, ENERGY_RESOLUTION, 1.0);
+            .evaluate(&mut ws.state, self.share, ws.annealer.resolution, 1.0);
         if ws.state.far {
             ws.state.energy = f64::INFINITY;
         }
@@ -555,7 +553,7 @@ impl AnnealedSoftassign {
                 ws.state.sigma = sigma;
             }
             ws.annealer
-                .evaluate(&mut ws.state, self.share, ENERGY_RESOLUTION, decided);
+                .evaluate(&mut ws.state, self.share, ws.annealer.resolution, decided);
             ws.scales.add_state(&ws.state);
             if ws.state.energy < likeliest.0 {
                 likeliest = (ws.state.energy, scales);

@@ -85,7 +85,12 @@ mod blocks {
         sorted.sort_unstable();
         assert_eq!(sorted, (0..101).collect::<Vec<_>>());
         let mut squared = Vec::new();
-        box_distances(&[20.0, 30.0], (&blocks.low, &blocks.high), 7, &mut squared);
+        box_distances(
+            &[20.0, 30.0],
+            (&blocks.levels[0].low, &blocks.levels[0].high),
+            7,
+            &mut squared,
+        );
         for (place, &j) in blocks.order.iter().enumerate() {
             let distance = (points[j][0] - 20.0).powi(2) + (points[j][1] - 30.0).powi(2);
             // Whole numbers below 2¹⁴ are exact in single precision.
@@ -96,18 +101,23 @@ mod blocks {
     /// In a set of many groups the blocks found are those found one by one.
     #[test]
     fn groups_leave_out_no_block_in_reach() {
-        let points: Vec<[f64; 2]> = (0..4003)
-            .map(|i| [f64::from(i * 37 % 4001), f64::from(i * 53 % 3989)])
+        let points: Vec<[f64; 2]> = (0..12_003)
+            .map(|i| [f64::from(i * 37 % 12_001), f64::from(i * 53 % 11_987)])
             .collect();
         let mut blocks = Blocks::default();
         blocks.build(&points);
-        let count = blocks.low.len() / 2;
+        let count = blocks.levels[0].low.len() / 2;
         let (mut scratch, mut found) = (Vec::new(), Vec::new());
         for cut in [0.0, 300.0, 90_000.0] {
             for y in [[700.0, 900.0], [-100.0, 4000.0]] {
                 found.clear();
                 blocks.within(&y, cut, &mut scratch, &mut found);
-                box_distances(&y, (&blocks.low, &blocks.high), count, &mut scratch);
+                box_distances(
+                    &y,
+                    (&blocks.levels[0].low, &blocks.levels[0].high),
+                    count,
+                    &mut scratch,
+                );
                 let near = (0..).zip(&scratch).filter(|&(_, &s)| s <= cut);
                 assert_eq!(found, near.map(|(block, _)| block).collect::<Vec<u32>>());
             }

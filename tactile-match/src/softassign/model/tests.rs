@@ -35,7 +35,7 @@ mod regression {
         let (prior, mut weights, targets) = scene();
         let mut regression = Regression::default();
         regression.fit(&prior, &weights, &targets, 0.01);
-        regression.variances(&prior);
+        regression.variances(&prior, true);
         let leverage = weights[7] * regression.variance[7] / 0.01;
         let predicted: [f64; 2] = std::array::from_fn(|k| {
             (regression.displacement.0[k][7] - leverage * targets.0[k][7]) / (1.0 - leverage)
