@@ -31,6 +31,9 @@ const BLOCK: usize = 24;
 /// Places of a block over pairs of its patch, at most: those in its middle.
 const MIDDLE: usize = 3;
 
+/// Places of a block are so near to its middle, in distances to the farthest pair of its patch.
+const INSIDE: f64 = 0.8;
+
 /// Rounds in which wrong pairs are looked for: each judges without those of the last.
 const ROUNDS: usize = 4;
 
@@ -328,29 +331,33 @@ impl<const D: usize> LocalField<D> {
             patch.take(&pairs, self.tree.rows().iter().copied());
         }
         let mut done = 0;
+        let mut waiting: Vec<Vec<usize>> = Vec::new();
         for block in blocks.leaves() {
             if leaf == usize::MAX {
                 read(patch, block);
             } else {
-                let centre: SVector<f64, D> = block
-                    .iter()
-                    .map(|&i| points[i].coords)
-                    .sum::<SVector<f64, D>>()
-                    / block.len() as f64;
+                waiting.push(block.to_vec());
+            }
+            while let Some(mut block) = waiting.pop() {
+                let offset = |i: usize, from: &SVector<f64, D>| points[i].coords - from;
+                let first = points[block[0]].coords;
+                let sum: SVector<f64, D> = block.iter().map(|&i| offset(i, &first)).sum();
+                let centre = first + sum / block.len() as f64;
                 let near = self.tree.nearest(&self.sources, &centre.into(), count);
                 let reach = near.last().map_or(0.0, |last| last.0.sqrt());
-                let extent = |i: &usize| (points[*i].coords - centre).norm();
-                let extent = block.iter().map(extent).fold(0.0, f64::max);
-                // Sparse points beside dense pairs have patches of their own.
-                if extent <= 0.8 * reach {
+                let extents = block.iter().map(|&i| offset(i, &centre).abs());
+                let extents = extents.fold(SVector::<f64, D>::zeros(), |e, o| e.sup(&o));
+                let extent = block.iter().map(|&i| offset(i, &centre).norm());
+                if block.len() == 1 || extent.fold(0.0, f64::max) <= INSIDE * reach {
                     patch.take(&pairs, near.into_iter().map(|near| near.1));
-                    read(patch, block);
+                    read(patch, &block);
                 } else {
-                    for i in block {
-                        let near = self.tree.nearest(&self.sources, &points[*i], count);
-                        patch.take(&pairs, near.into_iter().map(|near| near.1));
-                        read(patch, &[*i]);
-                    }
+                    // Sparse points beside dense pairs: smaller blocks have patches of their own.
+                    let axis = extents.imax();
+                    let along = |&i: &usize| points[i][axis];
+                    block.sort_unstable_by(|i, j| along(i).total_cmp(&along(j)).then(i.cmp(j)));
+                    let rest = block.split_off(block.len() / 2);
+                    waiting.extend([rest, block]);
                 }
             }
             done += block.len();

@@ -40,6 +40,9 @@ const MOST: usize = 6;
 /// Processes whose errors are averaged, at most.
 const HEARD: usize = 3;
 
+/// Smaller shares are not, but for that of the likeliest.
+const LEAST_HEARD: f64 = 0.1;
+
 /// Every so many patches all shapes are tried, in the others those that took part in the last.
 const ROUND: usize = 4;
 
@@ -504,13 +507,10 @@ impl<const D: usize> Patch<D> {
             found.push(value);
         }
         let found = &mut found[first..];
-        let heard: f64 = self
-            .mixture
-            .iter()
-            .take(HEARD)
-            .map(|(_, share)| share)
-            .sum();
-        for at in 0..self.mixture.len().min(HEARD) {
+        let count = self.mixture.iter().take(HEARD);
+        let count = count.take_while(|(_, share)| *share >= LEAST_HEARD).count();
+        let heard: f64 = self.mixture[..count].iter().map(|(_, share)| share).sum();
+        for at in 0..count {
             let (k, share) = self.mixture[at];
             self.refactor(k);
             for (places, values) in places.chunks(TOGETHER).zip(found.chunks_mut(TOGETHER)) {
