@@ -209,7 +209,9 @@ pub struct StrainBetween<const D: usize> {
     pub unresolved: usize,
     /// Why the pairs may be wrong, where there is a reason.
     pub doubt: Option<PairsDoubt>,
-    field: LocalField<D>,
+    pub(crate) field: LocalField<D>,
+    /// The field at every matched point.
+    pub(crate) values: Vec<LocalValue<D>>,
 }
 
 /// Displacement and strain at a point of the first set's space.
@@ -407,6 +409,7 @@ impl<const D: usize> StrainBetween<D> {
             degrees_of_freedom: field.degrees_of_freedom,
             unresolved: values.iter().filter(|value| value.unresolved).count(),
             field,
+            values,
             standard_errors,
             sigma,
         })
@@ -654,21 +657,4 @@ pub(crate) fn median_spacing<const D: usize>(points: &[Point<f64, D>]) -> Option
     let distance =
         |(near, p): (Vec<usize>, &Point<f64, D>)| Some((points[*near.get(1)?] - p).norm());
     median(near.filter_map(distance))
-}
-
-/// A displacement gradient and the covariance of each of its rows.
-type GradientAt = (Matrix3<f64>, Matrix3<f64>);
-
-impl<const D: usize> StrainBetween<D> {
-    /// Displacement gradient and the covariance of each of its rows at points.
-    pub(crate) fn gradients_at(
-        &self,
-        points: &[Point<f64, D>],
-    ) -> Result<Vec<GradientAt>, StrainBetweenError> {
-        let resized = |value: LocalValue<D>| {
-            let covariance = value.gradient_covariance.fixed_resize(0.0);
-            (value.gradient.fixed_resize(0.0), covariance)
-        };
-        Ok(self.field.at(points).into_iter().map(resized).collect())
-    }
 }

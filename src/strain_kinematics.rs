@@ -2,7 +2,8 @@
 
 use crate::elasticity::kinematics::Kinematics;
 use crate::elasticity::strain::StrainMeasure;
-use crate::strain_between::{StrainBetween, StrainBetweenError};
+use crate::strain_between::StrainBetween;
+use crate::tps::LocalValue;
 use nalgebra::Point;
 
 impl<const D: usize> StrainBetween<D> {
@@ -23,36 +24,33 @@ impl<const D: usize> StrainBetween<D> {
     ///     .collect();
     /// let options = StrainBetweenOptions::default();
     /// let found = StrainBetween::of_known_pairs(&before, &after, &options)?;
-    /// let at = found.kinematics_at(&[Point2::new(3.5, 3.5)], &Biot)?[0];
+    /// let at = found.kinematics_at(&[Point2::new(3.5, 3.5)], &Biot)[0];
     /// assert!((at.rotation_rad - 0.3).abs() < 1e-6 && (at.size_ratio - 1.1).abs() < 1e-6);
     /// assert!((at.principal[0] - 0.1).abs() < 1e-6);
     /// # Ok::<(), tactile_imaging::StrainBetweenError>(())
     /// ```
-    ///
-    /// # Errors
-    /// [`StrainBetweenError`] of the field.
+    #[must_use]
     pub fn kinematics_at(
         &self,
         points: &[Point<f64, D>],
         measure: &dyn StrainMeasure,
-    ) -> Result<Vec<Kinematics>, StrainBetweenError> {
-        let gradients = self.gradients_at(points)?.into_iter();
-        let read = gradients.map(|(gradient, covariance)| {
-            let found = Kinematics::of(&gradient, &covariance, D, measure);
-            found.unwrap_or_else(|_| Kinematics::undefined())
-        });
-        Ok(read.collect())
+    ) -> Vec<Kinematics> {
+        read(&self.field.at(points), measure)
     }
 
     /// The same at every matched point of the first set.
-    ///
-    /// # Errors
-    /// [`StrainBetweenError`] of the field.
-    pub fn kinematics(
-        &self,
-        measure: &dyn StrainMeasure,
-    ) -> Result<Vec<Kinematics>, StrainBetweenError> {
-        let points: Vec<_> = self.pairs.iter().map(|pair| pair[0]).collect();
-        self.kinematics_at(&points, measure)
+    #[must_use]
+    pub fn kinematics(&self, measure: &dyn StrainMeasure) -> Vec<Kinematics> {
+        read(&self.values, measure)
     }
+}
+
+fn read<const D: usize>(values: &[LocalValue<D>], measure: &dyn StrainMeasure) -> Vec<Kinematics> {
+    let read = values.iter().map(|value| {
+        let gradient = value.gradient.fixed_resize(0.0);
+        let covariance = value.gradient_covariance.fixed_resize(0.0);
+        let found = Kinematics::of(&gradient, &covariance, D, measure);
+        found.unwrap_or_else(|_| Kinematics::undefined())
+    });
+    read.collect()
 }

@@ -195,12 +195,7 @@ fn answer<const D: usize>(
     let read = report
         .strain
         .as_ref()
-        .ok()
-        .map(|strain| strain.kinematics(&*measure));
-    let read = read
-        .transpose()
-        .map_err(|error| Failure::input(error.to_string()))?;
-    let read = read.unwrap_or_default();
+        .map_or_else(|_| Vec::new(), |strain| strain.kinematics(&*measure));
     if report.strain.is_ok() {
         value["strain"]["medians"] = quantities::json::<D>(&read);
     }
@@ -220,13 +215,16 @@ fn answer<const D: usize>(
         let (strain, points) = (strain.clone(), grid.points());
         let measure_of_grid = arguments.measure.strain();
         let job = format!("strain at {} points of the grid", points.len());
-        let Some(found) = context.wait(job, move || strain.at(&points, &*measure_of_grid)) else {
+        let evaluate = move || {
+            let read = strain.kinematics_at(&points, &*measure_of_grid);
+            (strain.at(&points, &*measure_of_grid), read)
+        };
+        let Some((found, read)) = context.wait(job, evaluate) else {
             return Ok(Exit::Interrupted);
         };
         let found = found.map_err(|error| Failure::input(error.to_string()))?;
         let known = |at: &StrainAt<D>| (at.displacement, at.strain, at.standard_error);
         let found: Vec<Known<D>> = found.iter().map(known).collect();
-        let read = report.kinematics_of(&grid, &*measure)?;
         let shape: Vec<usize> = grid.counts.iter().rev().copied().collect();
         let table = report.grid_table(&grid, &found, &read);
         let arrays = arrays(Npz::new(), &shape, &grid.points(), &found, &read)?;
@@ -637,20 +635,6 @@ impl<const D: usize> StrainReport<D> {
         };
         let known: Vec<Known<D>> = (0..points.len()).map(known).collect();
         arrays(npz, &shape, &points, &known, read)
-    }
-
-    /// What is read of the deformation on the grid.
-    fn kinematics_of(
-        &self,
-        grid: &Grid<D>,
-        measure: &dyn StrainMeasure,
-    ) -> Result<Vec<Kinematics>, Failure> {
-        let found = self.strain.as_ref().map_err(|_| String::new());
-        let found = found.and_then(|strain| {
-            let read = strain.kinematics_at(&grid.points(), measure);
-            read.map_err(|error| error.to_string())
-        });
-        found.map_err(Failure::input)
     }
 
     /// Displacement, strain and its standard error on the grid.

@@ -9,7 +9,10 @@ use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::str::FromStr;
+use std::sync::Arc;
 use tactile_imaging::core::statistics::quantile_95;
+use tactile_imaging::elasticity::kinematics::Kinematics;
+use tactile_imaging::elasticity::strain::{GreenLagrange, StrainMeasure};
 use tactile_imaging::matching::labelling::{Compatibility, LengthMaximum, Neighbourhood};
 use tactile_imaging::matching::{
     AnnealedSoftassign, CoherentPointDrift, LinearAssignment, MatchError, Matching,
@@ -444,25 +447,44 @@ fn strained<const D: usize>(
 ) -> PyResult<StrainBetween> {
     let matcher = matcher.interruptible::<D>();
     let mut options = StrainBetweenOptions::<D>::default().with_matcher(matcher);
-    if let Some(given) = measure {
-        options = options.with_measure(crate::pipeline::strain_measure("measure", given)?);
-    }
+    let measure: Arc<dyn StrainMeasure + Send + Sync> = match measure {
+        Some(given) => Arc::from(crate::pipeline::strain_measure("measure", given)?),
+        None => Arc::new(GreenLagrange),
+    };
+    options = options.with_measure(Arc::clone(&measure));
     if with_doubtful_pairs {
         options = options.with_doubtful_pairs();
     }
     let found = py.detach(|| {
         let [before, after] = sets.map(arrays::points);
-        if paired {
+        let found = if paired {
             tactile_imaging::StrainBetween::of_known_pairs(&before, &after, &options)
         } else {
             strain_of_sets(&before, &after, &options)
-        }
+        }?;
+        let read = found.kinematics(&*measure);
+        Ok((found, read))
     });
-    let found = found.map_err(errors::strain_between)?;
+    let (found, read) = found.map_err(errors::strain_between)?;
     let (mean, error) = (found.summary.mean, found.standard_error);
     let half = error * quantile_95(Some(found.degrees_of_freedom as f64));
     let displaced = |(i, k): (usize, usize)| found.displacements[i][k];
     let count = found.rows.len();
+    let tensors = |of: fn(&Kinematics) -> Matrix3<f64>| {
+        arrays::kept_tensors(py, &read.iter().map(of).collect::<Vec<_>>())
+    };
+    let triples = |of: fn(&Kinematics) -> [f64; 3]| {
+        arrays::kept(
+            py,
+            Array2::from_shape_fn((count, 3), |(i, k)| of(&read[i])[k]),
+        )
+    };
+    let with_error = |of: fn(&Kinematics) -> [f64; 2]| {
+        arrays::kept(
+            py,
+            Array2::from_shape_fn((count, 2), |(i, k)| of(&read[i])[k]),
+        )
+    };
     Ok(StrainBetween {
         text: format!("{count} points, {}", tensor_text(&mean, &error)),
         value: arrays::kept_tensor(py, &mean),
@@ -475,6 +497,14 @@ fn strained<const D: usize>(
         displacements: arrays::kept(py, Array2::from_shape_fn((count, D), displaced)),
         strains: arrays::kept_tensors(py, &found.strains),
         standard_errors: arrays::kept_tensors(py, &found.standard_errors),
+        displacement_gradients: tensors(|at| at.gradient),
+        displacement_gradient_errors: tensors(|at| at.gradient_error),
+        rotations_rad: with_error(|at| [at.rotation_rad, at.rotation_error_rad]),
+        principal_strains: triples(|at| at.principal),
+        principal_strain_errors: triples(|at| at.principal_error),
+        principal_directions: tensors(|at| at.directions.transpose()),
+        size_ratios: with_error(|at| [at.size_ratio, at.size_ratio_error]),
+        von_mises: with_error(|at| [at.equivalent, at.equivalent_error]),
         sigma: found.sigma,
         flags: found.doubt.iter().map(ToString::to_string).collect(),
     })

@@ -206,6 +206,23 @@ result! {
         strains: Tensors,
         /// Standard error of the strain at every matched point, (n, 3, 3).
         standard_errors: Tensors,
+        /// Displacement gradient at every matched point, (n, 3, 3).
+        displacement_gradients: Tensors,
+        /// Its standard error, (n, 3, 3).
+        displacement_gradient_errors: Tensors,
+        /// Angle of the rotation at every matched point in radians, in the plane counter-clockwise,
+        /// and its standard error, (n, 2).
+        rotations_rad: Matrix<f64>,
+        /// Principal strains at every matched point, the largest first, (n, 3).
+        principal_strains: Matrix<f64>,
+        /// Their standard errors, (n, 3).
+        principal_strain_errors: Matrix<f64>,
+        /// Their directions, up to sign: row k of a point is direction k, (n, 3, 3).
+        principal_directions: Tensors,
+        /// Volume, in the plane area, over that before, and its standard error, (n, 2).
+        size_ratios: Matrix<f64>,
+        /// Von Mises' equivalent strain and its standard error, (n, 2).
+        von_mises: Matrix<f64>,
         /// Noise of one coordinate in the unit of the points.
         sigma: f64,
         /// Why the pairs are not to be relied on, a sentence each.

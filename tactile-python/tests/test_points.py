@@ -96,6 +96,11 @@ def test_strain_between_finds_a_stretch():
     # Green–Lagrange: (1.02² − 1)/2.
     assert abs(found.value[0, 0] - 0.0202) < 1e-6
     assert found.strains.shape == (64, 3, 3)
+    turn = np.array([[np.cos(0.3), -np.sin(0.3)], [np.sin(0.3), np.cos(0.3)]])
+    turned = ti.strain_between(before, (before * [1.1, 1.0]) @ turn.T, paired=True, measure="biot")
+    for values, right in [(turned.rotations_rad, 0.3), (turned.size_ratios, 1.1), (turned.principal_strains, 0.1)]:
+        assert np.allclose(values[:, 0], right, atol=1e-6)
+    assert np.allclose(turned.displacement_gradients[5, :2, :2], turn @ np.diag([1.1, 1.0]) - np.eye(2), atol=1e-6)
     hencky = ti.strain_between(before, before * [1.02, 1.0], measure="hencky")
     assert abs(hencky.value[0, 0] - np.log(1.02)) < 1e-6
 

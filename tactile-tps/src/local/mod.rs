@@ -14,7 +14,7 @@ mod process;
 mod tree;
 
 use judge::contradicted;
-use patch::{Pairs, Patch};
+use patch::{PairPatch, Pairs};
 
 /// So many pairs have one patch. More are cut, as its time grows with the third power.
 const WHOLE: usize = 300;
@@ -169,7 +169,7 @@ impl<const D: usize> LocalField<D> {
         let mut field = Self::of(sources, targets)?;
         let mut done = 0;
         let mut found = Vec::new();
-        let mut patch = Patch::default();
+        let mut patch = PairPatch::default();
         for round in 1..=ROUNDS {
             field.plant();
             found.clear();
@@ -221,7 +221,7 @@ impl<const D: usize> LocalField<D> {
     }
 
     /// The covariance of the mean gradient.
-    fn take_mean(&mut self, patch: &mut Patch<D>) {
+    fn take_mean(&mut self, patch: &mut PairPatch<D>) {
         let (size, kept) = (self.sizes().0, self.tree.len());
         if kept == size {
             self.mean_gradient_covariance = patch.of_mean();
@@ -268,7 +268,7 @@ impl<const D: usize> LocalField<D> {
     pub fn at(&self, points: &[Point<f64, D>]) -> Vec<LocalValue<D>> {
         let mut found = Vec::with_capacity(points.len());
         // Nothing stops this walk.
-        let mut patch = Patch::default();
+        let mut patch = PairPatch::default();
         let _ = self.walk(&mut patch, points, false, &mut found, |_| {
             ControlFlow::Continue(())
         });
@@ -295,7 +295,7 @@ impl<const D: usize> LocalField<D> {
     /// The field at `points`, which are the sources if they are judged.
     fn walk(
         &self,
-        patch: &mut Patch<D>,
+        patch: &mut PairPatch<D>,
         points: &[Point<f64, D>],
         judge: bool,
         found: &mut Vec<Found<D>>,
@@ -307,7 +307,7 @@ impl<const D: usize> LocalField<D> {
         let blocks = Tree::new(points, (0..points.len()).collect(), leaf);
         patch.forget_last();
         let (mut order, mut own, mut values) = (Vec::new(), Vec::new(), Vec::new());
-        let mut read = |patch: &mut Patch<D>, rows: &[usize]| {
+        let mut read = |patch: &mut PairPatch<D>, rows: &[usize]| {
             own.clear();
             own.extend(rows.iter().map(|&i| points[i]));
             values.clear();

@@ -67,7 +67,7 @@ pub(super) struct Pairs<'a, const D: usize> {
 }
 
 #[derive(Clone, Debug)]
-pub(super) struct Patch<const D: usize> {
+pub(super) struct PairPatch<const D: usize> {
     pub(super) rows: Vec<usize>,
     centre: SVector<f64, D>,
     radius: f64,
@@ -96,7 +96,7 @@ pub(super) struct Patch<const D: usize> {
     kernels: Vec<(f64, f64)>,
 }
 
-impl<const D: usize> Default for Patch<D> {
+impl<const D: usize> Default for PairPatch<D> {
     fn default() -> Self {
         Self {
             rows: Vec::new(),
@@ -129,7 +129,7 @@ impl<const D: usize> Default for Patch<D> {
     }
 }
 
-impl<const D: usize> Patch<D> {
+impl<const D: usize> PairPatch<D> {
     /// Takes pairs, and finds the processes that are likely.
     pub(super) fn take(&mut self, pairs: &Pairs<'_, D>, rows: impl Iterator<Item = usize>) {
         self.rows.clear();
@@ -705,7 +705,7 @@ fn student(degrees: usize) -> f64 {
 }
 
 impl<const D: usize> LocalValue<D> {
-    /// As [`Patch::left_out`], of a pair that is not in the patch.
+    /// As [`PairPatch::left_out`], of a pair that is not in the patch.
     pub(super) fn beside(&self, displacement: &SVector<f64, D>) -> (f64, f64) {
         let distance = (displacement - self.displacement).norm();
         let variance = self.displacement_variance + self.sigma * self.sigma;
