@@ -225,7 +225,7 @@ impl GelSensor {
     ) -> Result<(Self, CalibrationReport), GelError> {
         Requirement::Positive.check("pixel size", pixel_size_m)?;
         let model = GelModel::new(pixel_size_m, [vec![0.0; TERMS], vec![0.0; TERMS]]);
-        let blank = Self::of_blurred(model, Blurred::of(colour_image(reference)?));
+        let blank = Self::of_checked(model, colour_image(reference)?);
         let mut doubts = Vec::new();
         let mut read = Vec::new();
         for (k, press) in presses.iter().enumerate() {

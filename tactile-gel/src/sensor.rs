@@ -8,7 +8,7 @@
 
 use std::sync::Arc;
 
-use ndarray::{Array2, ArrayView3};
+use ndarray::{Array2, Array3, ArrayView3};
 use tactile_core::{Requirement, vectorised};
 
 use crate::GelError;
@@ -88,8 +88,9 @@ const ROOM: f64 = 0.2;
 #[derive(Clone)]
 pub struct GelSensor {
     pub(crate) model: GelModel,
-    pub(crate) reference: Blurred,
-    blocks: Blocks,
+    untouched: Arc<Array3<u8>>,
+    pub(crate) reference: Arc<Blurred>,
+    blocks: Arc<Blocks>,
     pub(crate) plane: Arc<Plane>,
 }
 
@@ -120,19 +121,18 @@ impl GelSensor {
                 Requirement::Finite.check("coefficient", *value)?;
             }
         }
-        Ok(Self::of_blurred(
-            model,
-            Blurred::of(colour_image(reference)?),
-        ))
+        Ok(Self::of_checked(model, colour_image(reference)?))
     }
 
-    pub(crate) fn of_blurred(model: GelModel, reference: Blurred) -> Self {
-        let (rows, columns) = reference.dim();
+    pub(crate) fn of_checked(model: GelModel, reference: ArrayView3<'_, u8>) -> Self {
+        let (rows, columns, _) = reference.dim();
+        let blurred = Blurred::of(reference);
         Self {
-            blocks: Blocks::of(&reference),
+            untouched: Arc::new(reference.to_owned()),
+            blocks: Arc::new(Blocks::of(&blurred)),
             plane: Arc::new(Plane::new((rows / 2, columns / 2), ROOM, None)),
             model,
-            reference,
+            reference: Arc::new(blurred),
         }
     }
 
@@ -147,6 +147,11 @@ impl GelSensor {
     /// The numbers of the calibration.
     pub fn model(&self) -> &GelModel {
         &self.model
+    }
+
+    /// The frame without contact.
+    pub fn reference(&self) -> ArrayView3<'_, u8> {
+        self.untouched.view()
     }
 
     /// Rows and columns of its frames.

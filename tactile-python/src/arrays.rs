@@ -82,6 +82,49 @@ pub fn frame<'py>(name: &str, given: &Bound<'py, PyAny>) -> PyResult<PyReadonlyA
     two_axes(name, given, "u", "uint8")
 }
 
+/// A frame of red, green and blue in some order: bytes, [row, column, channel].
+pub fn colours(name: &str, given: &Bound<'_, PyAny>) -> PyResult<Array3<u8>> {
+    let array = bytes(name, given)?;
+    let shape = array.shape().to_vec();
+    let wanted = "three axes (rows, columns, 3) of a gel that is lit in colours";
+    match *shape.as_slice() {
+        [_, _, 3] => array
+            .as_array()
+            .to_owned()
+            .into_dimensionality()
+            .map_err(invalid),
+        _ => Err(axes(name, wanted, &shape)),
+    }
+}
+
+/// Grey levels of a frame of bytes, the mean of its channels.
+pub fn grey(name: &str, given: &Bound<'_, PyAny>) -> PyResult<Array2<f64>> {
+    let array = bytes(name, given)?;
+    let levels = array.as_array().mapv(f64::from);
+    let shape = levels.shape().to_vec();
+    let levels = match *shape.as_slice() {
+        [_, _] => levels,
+        [_, _, 3] => levels.sum_axis(ndarray::Axis(2)) / 3.0,
+        _ => return Err(axes(name, "two axes, or three with three channels", &shape)),
+    };
+    levels.into_dimensionality().map_err(invalid)
+}
+
+fn bytes<'py>(name: &str, given: &Bound<'py, PyAny>) -> PyResult<PyReadonlyArrayDyn<'py, u8>> {
+    let found = given
+        .py()
+        .import("numpy")?
+        .call_method1("asarray", (given,));
+    let found = found.map_err(|error| invalid(format!("{name} is no array: {error}")))?;
+    let kind = found.getattr("dtype")?;
+    if kind.str()? != "uint8" {
+        return Err(invalid(format!(
+            "{name} must be a frame of uint8, found {kind}"
+        )));
+    }
+    read(name, &found, "u", "uint8")
+}
+
 /// A copy. ndarray refuses NumPy's strides of an array without elements.
 pub fn owned<T: Clone + Default>(view: ArrayView2<'_, T>) -> Array2<T> {
     match view.is_empty() {

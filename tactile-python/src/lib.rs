@@ -5,6 +5,7 @@
 mod arrays;
 mod check;
 mod errors;
+mod gels;
 mod inclusion;
 mod laws;
 mod matching;
@@ -33,6 +34,8 @@ mod _native {
     #[pymodule_export]
     use super::errors::TactileError;
     #[pymodule_export]
+    use super::gels::{GelFrame, GelSensor, markers};
+    #[pymodule_export]
     use super::inclusion::{inclusion, inclusion_of_scene};
     #[pymodule_export]
     use super::laws::{estimate_modulus, hertz};
@@ -44,8 +47,8 @@ mod _native {
     use super::press::{Press, Session};
     #[pymodule_export]
     use super::results::{
-        Contact, Estimate, HertzContact, Inclusion, Load, Lump, Match, Modulus, SimulatedPress,
-        Strain, StrainBetween, Surface,
+        Contact, Estimate, GelContact, GelReport, HertzContact, Inclusion, Load, Lump, Markers,
+        Match, Modulus, SimulatedPress, Strain, StrainBetween, Surface,
     };
     #[pymodule_export]
     use super::run_program;

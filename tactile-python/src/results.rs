@@ -139,6 +139,58 @@ result! {
 }
 
 result! {
+    /// A place where something touches a gel.
+    GelContact {
+        /// Centroid x in pixels.
+        x: Py<Estimate>,
+        /// Centroid y in pixels.
+        y: Py<Estimate>,
+        /// Area in square metres.
+        area: Py<Estimate>,
+        /// Greatest depth in metres below the contact's own rim.
+        depth: Py<Estimate>,
+        /// Greatest depth in metres below the gel far away.
+        depth_below_far: Py<Estimate>,
+        /// Normal force in newtons, of sensors with a layer.
+        force: Option<Py<Estimate>>,
+        /// Columns and rows of the outline in order, (n, 2).
+        outline: Matrix<i64>,
+        /// Whether the frame's edge cuts the contact.
+        touches_edge: bool,
+    }
+}
+
+result! {
+    /// How the presses of a gel's calibration were read.
+    GelReport {
+        /// x, y and radius of the contacts in pixels, (n, 3), NaN of presses that were left out.
+        circles: Matrix<f64>,
+        /// Median angle in degrees of normals of presses left out in turn.
+        median_angle: f64,
+        /// Relative standard error of all slopes of a frame together.
+        slope_error: f64,
+        /// Standard error of the depth of a pixel in metres.
+        depth_error: f64,
+        /// Why the sensor may be wrong, a sentence each.
+        flags: Vec<String>,
+    }
+}
+
+result! {
+    /// Markers of a gel, followed from a reference to a frame.
+    Markers {
+        /// Places in the reference in pixels, (n, 2).
+        positions: Matrix<f64>,
+        /// Displacements in pixels, (n, 2).
+        displacements: Matrix<f64>,
+        /// Standard errors of a coordinate of the place and of the displacement, (n, 2).
+        standard_errors: Matrix<f64>,
+        /// Why the pairs may be wrong, a sentence each.
+        flags: Vec<String>,
+    }
+}
+
+result! {
     /// Hertz's contact of a ball.
     HertzContact {
         /// Metres.

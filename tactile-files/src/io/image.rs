@@ -3,7 +3,7 @@ use super::error::FileError;
 use super::files::{read_bytes, write_bytes};
 use super::kinds::kind_of;
 use ::image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, Limits};
-use ndarray::{Array2, Array3, ArrayView2};
+use ndarray::{Array2, Array3, ArrayView2, ArrayView3};
 use std::io::Cursor;
 use std::path::Path;
 
@@ -476,11 +476,38 @@ pub fn write_grey_image(
         let header = format!("P5\n{columns} {rows}\n255\n").into_bytes();
         return write_bytes(path, &[header, samples].concat());
     }
+    write_png(
+        path,
+        &samples,
+        (rows, columns),
+        ::image::ExtendedColorType::L8,
+    )
+}
+
+/// Writes levels `[row, column, channel]` of red, green and blue as PNG.
+///
+/// # Errors
+/// [`FileError::Write`] and [`FileError::Image`].
+pub fn write_colour_image(
+    path: impl AsRef<Path>,
+    levels: ArrayView3<'_, u8>,
+) -> Result<(), FileError> {
+    let (rows, columns, _) = levels.dim();
+    let samples: Vec<u8> = levels.iter().copied().collect();
+    let colour = ::image::ExtendedColorType::Rgb8;
+    write_png(path.as_ref(), &samples, (rows, columns), colour)
+}
+
+fn write_png(
+    path: &Path,
+    samples: &[u8],
+    (rows, columns): (usize, usize),
+    colour: ::image::ExtendedColorType,
+) -> Result<(), FileError> {
     let mut png = Cursor::new(Vec::new());
     let (width, height) = (columns as u32, rows as u32);
-    let colour = ::image::ExtendedColorType::L8;
     let format = ImageFormat::Png;
-    ::image::write_buffer_with_format(&mut png, &samples, width, height, colour, format)
+    ::image::write_buffer_with_format(&mut png, samples, width, height, colour, format)
         .map_err(|error| refused(path, in_words(&error)))?;
     write_bytes(path, png.get_ref())
 }

@@ -40,7 +40,7 @@ pub use files::{read_bytes, replace_file, write_bytes};
 pub use frames::FrameReader;
 pub use image::{
     Grey, GreyImage, image_size, read_colour_levels, read_grey_image, read_grey_levels,
-    write_grey_image,
+    write_colour_image, write_grey_image,
 };
 pub use range::InputQuantity;
 pub use table::{

@@ -1,6 +1,7 @@
 //! Sensors with a gel that is lit in colours: calibration file and sensor file.
 use crate::io::{
     FileError, beside, length, one_or_more, positive, read_bytes, read_colour_levels, read_toml,
+    write_bytes, write_colour_image,
 };
 use ndarray::Array3;
 use serde::{Deserialize, Serialize};
@@ -282,6 +283,26 @@ impl PhotometricSensor {
     pub fn with_gel(mut self, gel: Option<GelLayer>) -> Self {
         self.gel = gel;
         self
+    }
+
+    /// Writes a sensor file, and the frame without contact beside it as `NAME_reference.png`.
+    ///
+    /// # Errors
+    /// [`FileError::Write`] and [`FileError::Image`].
+    pub fn write(
+        path: impl AsRef<Path>,
+        sensor: &GelSensor,
+        gel: Option<GelLayer>,
+    ) -> Result<(), FileError> {
+        let path = path.as_ref();
+        let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+        let reference = format!("{stem}_reference.png");
+        write_colour_image(path.with_file_name(&reference), sensor.reference())?;
+        let file = Self::new(reference, sensor.model().clone()).with_gel(gel);
+        let text = file
+            .to_toml()
+            .map_err(|error| FileError::field(path, "model", error))?;
+        write_bytes(path, text.as_bytes())
     }
 
     /// The file's text.

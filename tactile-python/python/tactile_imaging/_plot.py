@@ -6,21 +6,37 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ._native import Press, TactileError
+from ._native import GelFrame, Press, TactileError
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-def plot_press(press: Press, frame: int = -1) -> Figure:
-    """See `Press.plot`."""
+def _figure(width: float) -> Figure:
     try:
         from matplotlib.figure import Figure
     except ImportError as error:
         sentence = "plots need matplotlib: pip install matplotlib"
         raise ImportError(sentence) from error
+    return Figure(figsize=(width, 3.6), layout="constrained")
+
+
+def plot_gel(frame: GelFrame) -> Figure:
+    """See `GelFrame.plot`."""
+    figure = _figure(5)
+    axes = figure.subplots()
+    drawn = axes.imshow(frame.depth * 1e3)
+    figure.colorbar(drawn, label="depth (mm)")
+    for contact in frame.contacts:
+        axes.plot(*contact.outline.T, color="white")
+    axes.set(xlabel="x (px)", ylabel="y (px)")
+    return figure
+
+
+def plot_press(press: Press, frame: int = -1) -> Figure:
+    """See `Press.plot`."""
     frame = frame + len(press) if frame < 0 else frame
-    figure = Figure(figsize=(9, 3.6), layout="constrained")
+    figure = _figure(9)
     left, right = figure.subplots(1, 2)
     left.imshow(press.image(frame), cmap="gray")
     left.set(title=f"frame {frame}", xlabel="x (px)", ylabel="y (px)")

@@ -1,0 +1,481 @@
+//! Gels that are lit in colours, and markers printed on gels: from arrays.
+use crate::arrays::{self, Matrix, kept};
+use crate::errors::{self, TactileError, invalid};
+use crate::results::{Estimate, GelContact, GelReport, Markers, to_dict};
+use ndarray::{Array2, Array3, ArrayView3, s};
+use numpy::{PyArray2, PyArray3, PyArrayMethods};
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyType};
+use std::path::PathBuf;
+use tactile_files::sensor::{PhotometricPresses, PhotometricSensor};
+use tactile_imaging::gel::{
+    BallPress, CalibrationReport, FrameDoubt, GelForce, GelFrame as Frame, GelLayer,
+    GelSensor as Gel,
+};
+use tactile_imaging::markers::{find_markers, track_markers};
+use tactile_imaging::matching::MatchError;
+
+/// A gel that is lit in colours: from frames to the face, contacts and forces.
+#[pyclass(frozen, module = "tactile_imaging")]
+pub(crate) struct GelSensor {
+    sensor: Gel,
+    layer: Option<GelLayer>,
+    law: Option<GelForce>,
+    order: Order,
+    report: Option<Py<GelReport>>,
+}
+
+/// Order of a frame's channels.
+#[derive(Clone, Copy)]
+enum Order {
+    Rgb,
+    Bgr,
+}
+
+impl Order {
+    fn named(name: &str) -> PyResult<Self> {
+        match name {
+            "rgb" => Ok(Self::Rgb),
+            "bgr" => Ok(Self::Bgr),
+            _ => Err(invalid(format!(
+                "order must be \"rgb\" or \"bgr\" (OpenCV's), found {name:?}"
+            ))),
+        }
+    }
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::Rgb => "rgb",
+            Self::Bgr => "bgr",
+        }
+    }
+
+    /// Channels as red, green and blue.
+    fn rgb<'a>(self, frame: ArrayView3<'a, u8>) -> ArrayView3<'a, u8> {
+        match self {
+            Self::Rgb => frame,
+            Self::Bgr => frame.slice_move(s![.., .., ..;-1]),
+        }
+    }
+
+    /// What a doubt means for a caller, with the argument that mends it.
+    fn sentence(self, doubt: &FrameDoubt) -> String {
+        let other = match self {
+            Self::Rgb => "bgr",
+            Self::Bgr => "rgb",
+        };
+        match doubt {
+            FrameDoubt::ChannelsExchanged([2, 1, 0]) => {
+                format!("{doubt}: convert the frame, or make the sensor with order={other:?}")
+            }
+            _ => doubt.to_string(),
+        }
+    }
+}
+
+#[pymethods]
+impl GelSensor {
+    /// Calibrates by presses of a ball.
+    ///
+    /// Parameters
+    /// ----------
+    /// reference : (rows, columns, 3) array of uint8
+    ///     Frame without contact.
+    /// presses : sequence of (rows, columns, 3) arrays of uint8
+    ///     Five to twenty frames of the ball at many places.
+    /// ball_radius : float or (n,) array
+    ///     Metres.
+    /// pixel_size : float
+    ///     Size of a pixel on the gel in metres.
+    /// order : str
+    ///     "rgb", or "bgr" for frames of OpenCV, here and in `read`.
+    /// circles : (n, 3) array
+    ///     x, y and radius of the contacts in pixels, NaN where they are not known. They are found.
+    /// layer : (thickness, Poisson's ratio, Young's modulus, its standard error)
+    ///     The gel in metres and pascals, for forces.
+    #[classmethod]
+    #[pyo3(signature = (
+        reference, presses, *, ball_radius, pixel_size, order="rgb", circles=None, layer=None
+    ))]
+    fn calibrate(
+        _class: &Bound<'_, PyType>,
+        py: Python<'_>,
+        reference: &Bound<'_, PyAny>,
+        presses: Vec<Bound<'_, PyAny>>,
+        ball_radius: &Bound<'_, PyAny>,
+        pixel_size: f64,
+        order: &str,
+        circles: Option<&Bound<'_, PyAny>>,
+        layer: Option<(f64, f64, f64, f64)>,
+    ) -> PyResult<Self> {
+        let order = Order::named(order)?;
+        let reference = arrays::colours("reference", reference)?;
+        let frames = presses
+            .iter()
+            .map(|frame| arrays::colours("presses", frame));
+        let frames = frames.collect::<PyResult<Vec<_>>>()?;
+        let radii = match ball_radius.extract::<f64>() {
+            Ok(radius) => vec![radius; frames.len()],
+            Err(_) => arrays::vector("ball_radius", ball_radius)?,
+        };
+        let circles = circles.map(|given| arrays::columns::<3>("circles", given));
+        let circles = circles.transpose()?;
+        let lengths = [radii.len(), circles.as_ref().map_or(frames.len(), Vec::len)];
+        if lengths != [frames.len(); 2] {
+            let expected = frames.len();
+            return Err(invalid(format!(
+                "ball_radius and circles must have the length {expected} of presses, \
+                 found {lengths:?}"
+            )));
+        }
+        let layer = layer.map(|(thickness, ratio, modulus, error)| {
+            GelLayer::new(thickness, ratio, [modulus, error])
+        });
+        let found = py.detach(|| {
+            let press = |k: usize| BallPress {
+                frame: order.rgb(frames[k].view()),
+                ball_radius_m: radii[k],
+                circle_px: (circles.as_ref())
+                    .map(|circles| circles[k])
+                    .filter(|circle| circle.iter().all(|v| !v.is_nan())),
+            };
+            let presses: Vec<_> = (0..frames.len()).map(press).collect();
+            Gel::calibrate(order.rgb(reference.view()), pixel_size, &presses)
+        });
+        let (sensor, report) = found.map_err(errors::refused)?;
+        Self::new(py, sensor, layer, order, Some(report))
+    }
+
+    /// Calibrates by the presses that a calibration file names, as `tactile calibrate` does.
+    #[classmethod]
+    #[pyo3(signature = (path, *, order="rgb"))]
+    fn calibrate_file(
+        _class: &Bound<'_, PyType>,
+        py: Python<'_>,
+        path: PathBuf,
+        order: &str,
+    ) -> PyResult<Self> {
+        let order = Order::named(order)?;
+        let presses = PhotometricPresses::read(path).map_err(errors::file)?;
+        let found = py.detach(|| {
+            let (sensor, report) = presses.calibrate()?;
+            let layer = presses.gel(&sensor)?;
+            Ok((sensor, report, layer))
+        });
+        let found: Result<_, tactile_imaging::gel::GelError> = found;
+        let (sensor, report, layer) = found.map_err(errors::refused)?;
+        Self::new(py, sensor, layer, order, Some(report))
+    }
+
+    /// Reads a sensor file, as `save` and `tactile calibrate` write it.
+    #[classmethod]
+    #[pyo3(signature = (path, *, order="rgb"))]
+    fn load(
+        _class: &Bound<'_, PyType>,
+        py: Python<'_>,
+        path: PathBuf,
+        order: &str,
+    ) -> PyResult<Self> {
+        let order = Order::named(order)?;
+        let (sensor, layer) = PhotometricSensor::read(path).map_err(errors::file)?;
+        Self::new(py, sensor, layer, order, None)
+    }
+
+    /// Writes the sensor file, TOML, and the frame without contact beside it.
+    fn save(&self, path: PathBuf) -> PyResult<()> {
+        PhotometricSensor::write(path, &self.sensor, self.layer).map_err(errors::file)
+    }
+
+    /// The face, the contacts and the forces of a frame.
+    ///
+    /// Raises
+    /// ------
+    /// TactileError
+    ///     The frame is not this sensor's: black, white, noise, turned, of another unit, or with
+    ///     its channels in another order.
+    fn read(&self, py: Python<'_>, frame: &Bound<'_, PyAny>) -> PyResult<GelFrame> {
+        let frame = arrays::colours("frame", frame)?;
+        let found = py.detach(|| {
+            let frame = self.sensor.read(self.order.rgb(frame.view()))?;
+            let forces = self
+                .law
+                .as_ref()
+                .map(|law| (law.forces(&frame), law.force(&frame)));
+            Ok((frame, forces))
+        });
+        let found: Result<_, tactile_imaging::gel::GelError> = found;
+        let (frame, forces) = found.map_err(errors::refused)?;
+        let flags = frame.doubts.iter().map(|doubt| self.order.sentence(doubt));
+        if frame.is_refused() {
+            return Err(TactileError::new_err(flags.collect::<Vec<_>>().join("; ")));
+        }
+        let flags = flags.collect();
+        let (each, force) = forces.unwrap_or_default();
+        GelFrame::new(py, frame, flags, &each, force, self.pixel_size())
+    }
+
+    /// How the presses were read. None of a sensor that was loaded.
+    #[getter]
+    fn report(&self, py: Python<'_>) -> Option<Py<GelReport>> {
+        self.report.as_ref().map(|report| report.clone_ref(py))
+    }
+
+    /// Size of a pixel on the gel in metres.
+    #[getter]
+    fn pixel_size(&self) -> f64 {
+        self.sensor.model().pixel_size_m
+    }
+
+    /// Rows and columns of its frames.
+    #[getter]
+    fn shape(&self) -> (usize, usize) {
+        self.sensor.shape()
+    }
+
+    /// Order of the channels of its frames.
+    #[getter]
+    fn order(&self) -> &'static str {
+        self.order.name()
+    }
+
+    fn __repr__(&self) -> String {
+        let (rows, columns) = self.shape();
+        format!(
+            "GelSensor({columns} × {rows} pixels, order {:?})",
+            self.order()
+        )
+    }
+}
+
+impl GelSensor {
+    fn new(
+        py: Python<'_>,
+        sensor: Gel,
+        layer: Option<GelLayer>,
+        order: Order,
+        report: Option<CalibrationReport>,
+    ) -> PyResult<Self> {
+        let law = layer.as_ref().map(|layer| GelForce::new(layer, &sensor));
+        let law = law.transpose().map_err(errors::refused)?;
+        let report = report.map(|report| {
+            let circles = Array2::from_shape_fn((report.circles.len(), 3), |(n, k)| {
+                report.circles[n]
+                    .used_px
+                    .map_or(f64::NAN, |circle| circle[k])
+            });
+            let model = sensor.model();
+            let angle = report.median_angle_deg;
+            Py::new(
+                py,
+                GelReport {
+                    text: format!("normals of presses left out {angle:.2}° off in the median"),
+                    circles: kept(py, circles),
+                    median_angle: angle,
+                    slope_error: model.slope_standard_error,
+                    depth_error: model.depth_standard_error_m,
+                    flags: report.doubts.iter().map(ToString::to_string).collect(),
+                },
+            )
+        });
+        Ok(Self {
+            report: report.transpose()?,
+            sensor,
+            layer,
+            law,
+            order,
+        })
+    }
+}
+
+/// What one frame of a gel shows.
+#[pyclass(frozen, module = "tactile_imaging")]
+pub(crate) struct GelFrame {
+    /// How far the face has moved into the gel in metres, zero far away.
+    #[pyo3(get)]
+    depth: Matrix<f64>,
+    /// ∂depth/∂x along a row and ∂depth/∂y down the rows.
+    #[pyo3(get)]
+    gradient: (Matrix<f32>, Matrix<f32>),
+    /// Standard error of the depth of a pixel, and that of the level that all count from.
+    #[pyo3(get)]
+    depth_error: (f64, f64),
+    /// The contact of each pixel, from 1 in the order of `contacts`. 0 where nothing touches.
+    #[pyo3(get)]
+    labels: Matrix<u16>,
+    /// Places where something touches, that of the highest pressure first.
+    #[pyo3(get)]
+    contacts: Vec<Py<GelContact>>,
+    /// Normal force of all contacts in newtons, of sensors with a layer.
+    #[pyo3(get)]
+    force: Option<Py<Estimate>>,
+    /// What is doubtful about it, a sentence each.
+    #[pyo3(get)]
+    flags: Vec<String>,
+    pixel_size: f64,
+}
+
+const FIELDS: [&str; 7] = [
+    "depth",
+    "gradient",
+    "depth_error",
+    "labels",
+    "contacts",
+    "force",
+    "flags",
+];
+
+#[pymethods]
+impl GelFrame {
+    /// Unit normals of the face, (rows, columns, 3). z points to the object.
+    fn normals<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray3<f32>> {
+        let (p, q) = (
+            self.gradient.0.bind(py).readonly(),
+            self.gradient.1.bind(py).readonly(),
+        );
+        let (p, q) = (p.as_array(), q.as_array());
+        let (rows, columns) = p.dim();
+        let mut normals = Array3::zeros((rows, columns, 3));
+        for ((at, p), q) in p.indexed_iter().zip(&q) {
+            // The depth grows away from the object.
+            let length = (1.0 + p * p + q * q).sqrt();
+            for (k, part) in [*p, *q, 1.0].into_iter().enumerate() {
+                normals[[at.0, at.1, k]] = part / length;
+            }
+        }
+        PyArray3::from_owned_array(py, normals)
+    }
+
+    /// The face as points in metres, (rows × columns, 3): x, y, and z to the object.
+    fn points<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
+        let depth = self.depth.bind(py).readonly();
+        let depth = depth.as_array();
+        let mut points = Array2::zeros((depth.len(), 3));
+        for (mut point, ((row, column), z)) in points.outer_iter_mut().zip(depth.indexed_iter()) {
+            point[0] = column as f64 * self.pixel_size;
+            point[1] = row as f64 * self.pixel_size;
+            point[2] = -z;
+        }
+        PyArray2::from_owned_array(py, points)
+    }
+
+    /// The depth with the outlines of the contacts, as a figure of matplotlib.
+    fn plot<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        let plots = slf.py().import("tactile_imaging._plot")?;
+        plots.call_method1("plot_gel", (slf,))
+    }
+
+    /// The fields by name.
+    fn to_dict<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyDict>> {
+        to_dict(slf.as_any(), &FIELDS)
+    }
+
+    fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
+        let force = match &self.force {
+            Some(force) => format!(", force {} N", force.bind(py).str()?),
+            None => String::new(),
+        };
+        Ok(format!("GelFrame({} contacts{force})", self.contacts.len()))
+    }
+}
+
+impl GelFrame {
+    fn new(
+        py: Python<'_>,
+        frame: Frame,
+        flags: Vec<String>,
+        forces: &[tactile_imaging::core::Estimate],
+        force: Option<tactile_imaging::core::Estimate>,
+        pixel_size: f64,
+    ) -> PyResult<Self> {
+        let contacts = frame.contacts.iter().enumerate().map(|(k, contact)| {
+            let estimate = |estimate| Estimate::of(py, estimate);
+            let [x, y] = contact.centroid_px;
+            let outline = Array2::from_shape_fn((contact.outline_px.len(), 2), |(n, k)| {
+                contact.outline_px[n][k] as i64
+            });
+            Py::new(
+                py,
+                GelContact {
+                    text: format!(
+                        "at ({:.1}, {:.1}) px, {:.3} mm deep",
+                        x.value,
+                        y.value,
+                        1e3 * contact.depth_m.value
+                    ),
+                    x: estimate(x)?,
+                    y: estimate(y)?,
+                    area: estimate(contact.area_m2)?,
+                    depth: estimate(contact.depth_m)?,
+                    depth_below_far: estimate(contact.depth_below_far_m)?,
+                    force: forces.get(k).copied().map(estimate).transpose()?,
+                    outline: kept(py, outline),
+                    touches_edge: contact.touches_border,
+                },
+            )
+        });
+        let [pixel, rest] = frame.depth_standard_error_m;
+        let [p, q] = frame.gradient;
+        Ok(Self {
+            contacts: contacts.collect::<PyResult<_>>()?,
+            depth: kept(py, frame.depth_m),
+            gradient: (kept(py, p), kept(py, q)),
+            depth_error: (pixel, rest),
+            labels: kept(py, frame.labels),
+            force: force.map(|force| Estimate::of(py, force)).transpose()?,
+            flags,
+            pixel_size,
+        })
+    }
+}
+
+/// Markers printed on a gel, followed from a reference to a frame.
+///
+/// Parameters
+/// ----------
+/// reference, frame : (rows, columns) or (rows, columns, 3) arrays of uint8
+///
+/// Returns
+/// -------
+/// Markers
+///     Places and displacements of the markers that are seen in both.
+#[pyfunction]
+pub fn markers(
+    py: Python<'_>,
+    reference: &Bound<'_, PyAny>,
+    frame: &Bound<'_, PyAny>,
+) -> PyResult<Markers> {
+    let [reference, frame] = [
+        arrays::grey("reference", reference)?,
+        arrays::grey("frame", frame)?,
+    ];
+    if reference.dim() != frame.dim() {
+        let shapes = (reference.dim(), frame.dim());
+        return Err(invalid(format!(
+            "reference and frame must have one shape, found {shapes:?}"
+        )));
+    }
+    let found = py.detach(|| {
+        let [before, after] = [&reference, &frame].map(|image| find_markers(image.view()));
+        track_markers(&before, &after)
+    });
+    let field = found.map_err(|error| match error {
+        MatchError::Custom(_) => errors::failed(error),
+        _ => TactileError::new_err(format!("no markers to follow: {error}")),
+    })?;
+    let n = field.tracks.len();
+    let table = |value: &dyn Fn(usize, usize) -> f64| {
+        kept(py, Array2::from_shape_fn((n, 2), |(n, k)| value(n, k)))
+    };
+    let tracks = &field.tracks;
+    let largest = tracks.iter().map(|track| track.displacement_px.norm());
+    Ok(Markers {
+        text: format!(
+            "{n} followed, by {:.2} px at most",
+            largest.fold(0.0, f64::max)
+        ),
+        positions: table(&|n, k| tracks[n].position_px[k]),
+        displacements: table(&|n, k| tracks[n].displacement_px[k]),
+        standard_errors: table(&|n, k| tracks[n].standard_errors_px[k]),
+        flags: field.doubt.iter().map(ToString::to_string).collect(),
+    })
+}

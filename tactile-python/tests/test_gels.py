@@ -1,0 +1,150 @@
+"""Gels that are lit in colours, and markers: from arrays."""
+
+import numpy as np
+import pytest
+import tactile_imaging as ti
+from conftest import DATA
+
+PIXEL = 5e-5
+BALL = 40.0
+ROWS, COLUMNS = 160, 200
+
+
+def half_space(x, y, radius, ball=BALL):
+    """Hertz: how far a ball in contact up to `radius` moves the face of a half-space, in pixels."""
+    rows, columns = np.mgrid[:ROWS, :COLUMNS]
+    rho = np.maximum(np.hypot(columns - x, rows - y) / radius, 1e-9)
+    outside = np.maximum(rho, 1.0)
+    tail = (2 - outside**2) * np.arcsin(1 / outside) + np.sqrt(outside**2 - 1)
+    return radius**2 / ball * np.where(rho < 1, 1 - rho**2 / 2, tail / np.pi)
+
+
+def lit(depth, seed=0):
+    """A matt face under red, green and blue lamps from three sides, with noise of one level."""
+    q, p = np.gradient(depth)
+    across = np.mgrid[:ROWS, :COLUMNS] / np.reshape([ROWS, COLUMNS], (2, 1, 1)) - 0.5
+    frame = np.empty((ROWS, COLUMNS, 3))
+    for channel in range(3):
+        angle = 2 * np.pi * (channel / 3 + 0.1)
+        side, height = np.cos(np.radians(35)), np.sin(np.radians(35))
+        shade = side * (p * np.cos(angle) + q * np.sin(angle)) + height
+        shade = np.maximum(shade / np.sqrt(1 + p**2 + q**2), 0)
+        fall = 1 + 0.4 * (across[1] * np.cos(angle) + across[0] * np.sin(angle))
+        frame[..., channel] = 40 + 170 * fall * shade
+    noise = np.random.default_rng(seed).normal(0, 1, frame.shape)
+    return np.clip(np.round(frame + noise), 0, 255).astype(np.uint8)
+
+
+def presses():
+    places = np.random.default_rng(1).uniform([45, 45, 12], [155, 115, 20], (10, 3))
+    return [lit(half_space(*place), k + 1) for k, place in enumerate(places)]
+
+
+@pytest.fixture(scope="module")
+def sensor():
+    layer = (4e-3, 0.48, 1e5, 1e4)
+    return ti.GelSensor.calibrate(
+        lit(np.zeros((ROWS, COLUMNS))),
+        presses(),
+        ball_radius=BALL * PIXEL,
+        pixel_size=PIXEL,
+        layer=layer,
+    )
+
+
+def test_a_press_has_the_depth_and_area_of_hertz(sensor):
+    assert sensor.report.flags == [] and sensor.report.median_angle < 2
+    assert sensor.report.circles.shape == (10, 3) and sensor.shape == (ROWS, COLUMNS)
+    frame = sensor.read(lit(half_space(110, 70, 18, ball=60), 99))
+    (contact,) = frame.contacts
+    assert np.hypot(contact.x.value - 110, contact.y.value - 70) < 1
+    # Half of the depth lies below the rim.
+    truth = PIXEL * 18**2 / 60
+    assert contact.depth.value == pytest.approx(truth / 2, rel=0.1)
+    assert contact.depth_below_far.value == pytest.approx(truth, rel=0.15)
+    assert contact.area.value == pytest.approx(np.pi * (18 * PIXEL) ** 2, rel=0.1)
+    assert frame.force.value == contact.force.value > 0
+    assert frame.depth.shape == frame.labels.shape == (ROWS, COLUMNS) and frame.labels.max() == 1
+    normals = frame.normals()
+    assert np.allclose(np.linalg.norm(normals, axis=2), 1, atol=1e-5)
+    assert normals[70, 100, 0] > 0 > normals[70, 120, 0]
+    points = frame.points()
+    assert points.shape == (ROWS * COLUMNS, 3)
+    assert points[70 * COLUMNS + 110] == pytest.approx((110 * PIXEL, 70 * PIXEL, -frame.depth[70, 110]))
+    assert contact.outline.shape[1] == 2 and frame.to_dict()["contacts"][0]["touches_edge"] is False
+    assert frame.plot().axes
+
+
+def test_untouched_frames_have_no_contact(sensor):
+    frame = sensor.read(lit(np.zeros((ROWS, COLUMNS)), 7))
+    assert frame.contacts == [] and frame.force is None and frame.flags == []
+
+
+def test_frames_of_opencv_are_named_and_read_by_their_order(sensor):
+    press = lit(half_space(110, 70, 18), 99)
+    with pytest.raises(ti.TactileError, match='order="bgr"'):
+        sensor.read(press[..., ::-1])
+    swapped = ti.GelSensor.calibrate(
+        lit(np.zeros((ROWS, COLUMNS)))[..., ::-1],
+        [frame[..., ::-1] for frame in presses()],
+        ball_radius=np.full(10, BALL * PIXEL),
+        pixel_size=PIXEL,
+        order="bgr",
+    )
+    expected = sensor.read(press).depth
+    assert np.array_equal(swapped.read(np.ascontiguousarray(press[..., ::-1])).depth, expected)
+    with pytest.raises(ti.TactileError, match="black"):
+        sensor.read(np.zeros_like(press))
+
+
+def test_a_sensor_is_saved_and_loaded(sensor, tmp_path):
+    sensor.save(tmp_path / "gel.toml")
+    other = ti.GelSensor.load(tmp_path / "gel.toml")
+    press = lit(half_space(90, 80, 15), 5)
+    assert np.array_equal(other.read(press).depth, sensor.read(press).depth)
+    assert other.read(press).force.value == sensor.read(press).force.value
+    assert other.report is None
+    example = ti.GelSensor.calibrate_file(DATA / "colour" / "calibration.toml")
+    assert example.shape == (90, 120)
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        lambda s: s.read(np.zeros((ROWS, COLUMNS), np.uint8)),
+        lambda s: s.read(np.zeros((ROWS, COLUMNS, 3))),
+        lambda s: s.read(np.zeros((ROWS, COLUMNS + 1, 3), np.uint8)),
+        lambda s: ti.GelSensor.load(__file__),
+        lambda s: ti.GelSensor.calibrate(
+            np.zeros((9, 9, 3), np.uint8), [], ball_radius=1e-3, pixel_size=1e-4
+        ),
+        lambda s: ti.GelSensor.calibrate(
+            lit(np.zeros((ROWS, COLUMNS))), presses(), ball_radius=1e-3, pixel_size=-1.0
+        ),
+        lambda s: ti.GelSensor.load("absent.toml", order="rbg"),
+        lambda s: ti.markers(np.zeros((4, 4)), np.zeros((4, 4))),
+        lambda s: ti.markers(np.zeros((40, 40), np.uint8), np.zeros((40, 41), np.uint8)),
+    ],
+)
+def test_bad_calls_are_a_sentence(sensor, call):
+    with pytest.raises(ValueError, match=".{15}"):
+        call(sensor)
+
+
+def dots(shift):
+    rows, columns = np.mgrid[:120, :160]
+    x, y = columns - shift[0], rows - shift[1]
+    near = np.hypot((x + 10) % 20 - 10, (y + 10) % 20 - 10)
+    # The lattice ends within the view.
+    inside = (x > 15) & (x < 145) & (y > 15) & (y < 105)
+    return np.where(inside & (near < 4.5), 60, 180).astype(np.uint8)
+
+
+def test_markers_move_as_the_gel_does():
+    found = ti.markers(dots((0, 0)), dots((2, -1)))
+    assert found.positions.shape == found.displacements.shape and len(found.positions) > 20
+    assert np.allclose(found.displacements, (2, -1), atol=0.1)
+    colours = np.repeat(dots((0, 0))[..., None], 3, axis=2)
+    assert np.array_equal(ti.markers(colours, colours).positions, found.positions)
+    with pytest.raises(ti.TactileError, match="no markers"):
+        ti.markers(np.full((40, 40), 90, np.uint8), np.full((40, 40), 90, np.uint8))
