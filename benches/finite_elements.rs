@@ -110,10 +110,7 @@ fn table(is_test: bool) {
     );
     let load = |a: f64| {
         let force = table.force_n(a, 103e3).expect("a force");
-        LoadState {
-            contact_radius_m: Some(Estimate::new(a, 2e-6)),
-            ..LoadState::new(Estimate::new(force, 2e-3 * force))
-        }
+        LoadState::new(Estimate::new(force, 2e-3 * force)).with_radius(Estimate::new(a, 2e-6))
     };
     let loads = LoadSeries::new([load(0.6e-3), load(1.1e-3)]);
     let estimator =

@@ -5,7 +5,7 @@
 use std::error::Error;
 use tactile_imaging::elasticity::ElasticityError;
 use tactile_imaging::elasticity::modulus::{
-    Estimate, EstimatorKind, LoadSeries, ModulusEstimate, ModulusEstimator,
+    EstimatorKind, LoadSeries, ModulusEstimate, ModulusEstimator, Source, Uncertain,
 };
 use tactile_simulate::{CalibrationRun, PressOptions, Trial};
 
@@ -17,28 +17,28 @@ impl ModulusEstimator for MeanOfHertz {
         let no_ball = || ElasticityError::custom("the object is no ball");
         let bodies = series.bodies().ok_or_else(no_ball)?;
         let radius_m = bodies.object().sphere_radius_m().ok_or_else(no_ball)?;
-        let (mut sum, mut weights) = (0.0, 0.0);
+        let (mut sum, mut weights, mut radii) = (Uncertain::exact(0.0), 0.0, Vec::new());
         for load in series.loads() {
             let (f, Some(a)) = (load.force_n, load.contact_radius_m) else {
                 continue;
             };
-            let error = f.relative_error().hypot(3.0 * a.relative_error());
-            sum += (0.75 * f.value * radius_m / a.value.powi(3)).ln() / (error * error);
-            weights += 1.0 / (error * error);
+            // ln (¾ F/a³), weighted by its noise.
+            let log = (f * a.powf(-3.0) * 0.75).map(f64::ln, f64::recip);
+            let weight = log.part(Source::Noise).powi(-2);
+            sum = sum + log * weight;
+            weights += weight;
+            radii.push(a);
         }
-        let reduced = (sum / weights).exp();
-        // The ball's part of the compliance, by which errors of E* grow.
-        let part = 1.0 - reduced * bodies.in_series().compliance_per_pa();
-        let nu = bodies.object().poisson_ratio();
-        let modulus = (1.0 - nu * nu) * reduced / part;
-        // Errors that all loads share are not averaged away.
-        let shared = series.shared_errors();
-        let relative = (weights.recip().sqrt().hypot(shared.force_scale))
-            .hypot(3.0 * shared.length_scale)
-            .hypot(shared.size)
-            .hypot((1.0 - part) * shared.other_body);
-        let modulus = Estimate::new(modulus, relative / part * modulus);
-        Ok(ModulusEstimate::new(self.kind(), modulus))
+        let radius_m = bodies.size() * radius_m;
+        let reduced = (sum * f64::recip(weights)).map(f64::exp, f64::exp) * radius_m;
+        // Every source of error goes its own way from here to the modulus.
+        let mean_m = Uncertain::mean(&radii).value;
+        let compliance = bodies.guide_compliance(mean_m) * bodies.in_series().compliance_per_pa();
+        let lateral = bodies
+            .poisson_ratio()
+            .map(|nu| 1.0 - nu * nu, |nu| -2.0 * nu);
+        let modulus_pa = lateral / (reduced.powf(-1.0) - compliance);
+        Ok(ModulusEstimate::new(self.kind(), modulus_pa))
     }
 
     fn kind(&self) -> EstimatorKind {

@@ -50,10 +50,8 @@ pub(crate) fn laws(study: &mut Study) {
         let loads = [0, 1].map(|load| {
             let contact = scene.truth(load).contact;
             let radius = Estimate::new(contact.contact_radius_m, 1e-3 * contact.contact_radius_m);
-            LoadState {
-                contact_radius_m: Some(radius),
-                ..LoadState::new(Estimate::new(contact.force_n, 1e-3 * contact.force_n))
-            }
+            LoadState::new(Estimate::new(contact.force_n, 1e-3 * contact.force_n))
+                .with_radius(radius)
         });
         (material.youngs_modulus_pa, LoadSeries::new(loads))
     });

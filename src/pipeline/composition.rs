@@ -6,7 +6,7 @@ use super::light::LightContact;
 use super::named::{self, EstimatorChoice, StagesConfig};
 use super::settings::{Settings, SurfaceInput};
 use super::specimen::Object;
-use crate::elasticity::modulus::ModulusEstimator;
+use crate::elasticity::modulus::{Bodies, ModulusEstimator};
 use crate::elasticity::strain::{GreenLagrange, StrainMeasure};
 use crate::force::{CalibrationPair, ReferenceFrame};
 use crate::matching::PointMatcher;
@@ -69,6 +69,8 @@ pub struct Pipeline {
     strain: Arc<dyn StrainMeasure + Send + Sync>,
     estimator: EstimatorStage,
     settings: Settings,
+    /// The object and the guide of the settings.
+    bodies: Arc<Bodies>,
 }
 
 impl Pipeline {
@@ -90,6 +92,7 @@ impl Pipeline {
         contact: impl ContactStage + 'static,
         object: Object,
     ) -> Result<Self, PipelineError> {
+        let settings = Settings::new(object.validated().map_err(PipelineError::Material)?);
         Ok(Self {
             contact: Arc::new(contact),
             surface: Arc::new(named::eikonal()?),
@@ -98,7 +101,8 @@ impl Pipeline {
             warp: Arc::new(AffineModel::General),
             strain: Arc::new(GreenLagrange),
             estimator: EstimatorStage::named(EstimatorChoice::default()),
-            settings: Settings::new(object.validated().map_err(PipelineError::Material)?),
+            bodies: Arc::new(settings.bodies().map_err(PipelineError::Material)?),
+            settings,
         })
     }
 
@@ -183,6 +187,7 @@ impl Pipeline {
         let known = (self.settings.object, self.settings.waveguide.clone());
         change(&mut self.settings);
         self.settings.check()?;
+        self.bodies = Arc::new(self.settings.bodies().map_err(PipelineError::Material)?);
         if known != (self.settings.object, self.settings.waveguide.clone()) {
             self.estimator.renew();
         }
@@ -404,6 +409,11 @@ impl Pipeline {
     }
 
     /// The contact stage, to be held.
+    /// The object and the guide, with their errors.
+    pub(super) fn bodies(&self) -> &Arc<Bodies> {
+        &self.bodies
+    }
+
     pub(super) fn shared_contact(&self) -> Arc<dyn ContactStage> {
         Arc::clone(&self.contact)
     }

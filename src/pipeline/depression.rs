@@ -1,8 +1,8 @@
 //! The surface of the guide under a contact.
 use super::contact::ContactReading;
-use super::settings::Settings;
 use crate::core::Estimate;
 use crate::elasticity::contact::{Bond, Waveguide, depression_m};
+use crate::elasticity::modulus::Bodies;
 
 /// Relative standard error of the depth by large strain: this much of depth over contact radius,
 /// up to [`MOST_SLOPE`], and this much of depth over thickness. The law is for small strains.
@@ -22,10 +22,10 @@ const THIN_LAYER_ERROR: f64 = 0.025;
 /// The errors of force, contact radius and layers count, and that of the law.
 pub fn depths(
     contact: &ContactReading,
-    settings: &Settings,
+    bodies: &Bodies,
     distances_m: &[f64],
 ) -> Option<Vec<Estimate>> {
-    let guide = settings.waveguide.as_ref()?;
+    let guide = bodies.guide()?;
     let force = contact.force_n?;
     let radius = contact.contact_radius_m;
     let places: Vec<f64> = std::iter::once(0.0)
@@ -37,7 +37,7 @@ pub fn depths(
     let share = law_error(guide, radius.value, greatest)
         .hypot(force.relative_error())
         .hypot(radius.relative_error())
-        .hypot(settings.guide_error(radius.value));
+        .hypot(bodies.guide_compliance(radius.value).standard_error());
     // The law is off by a share of the greatest depth, at the rim too.
     let depth = |&depth_m: &f64| Estimate::new(depth_m, share * greatest);
     Some(asked.iter().map(depth).collect())

@@ -136,7 +136,7 @@ fn shared(estimator: impl ModulusEstimator + 'static) -> Result<SharedEstimator,
     Ok(Arc::new(estimator))
 }
 
-/// An estimator to whose loads the object and the guide are added.
+/// An estimator to whose loads the object and the guide are added if they come without.
 struct Completed {
     estimator: SharedEstimator,
     bodies: Arc<Bodies>,
@@ -156,8 +156,13 @@ impl Completed {
 
 impl ModulusEstimator for Completed {
     fn estimate(&self, series: &LoadSeries) -> Result<ModulusEstimate, ElasticityError> {
-        let series = series.clone().with_bodies(Arc::clone(&self.bodies));
-        let mut estimate = self.estimator.estimate(&series)?;
+        let mut estimate = match series.bodies() {
+            Some(_) => self.estimator.estimate(series)?,
+            None => {
+                let series = series.clone().with_bodies(Arc::clone(&self.bodies));
+                self.estimator.estimate(&series)?
+            }
+        };
         if self.ignores_guide() {
             estimate.warnings.push(Warning::GuideIgnored);
             estimate.estimator = self.kind();

@@ -1,11 +1,10 @@
-//! From contacts to the loads that estimators take, and the errors that all loads share.
+//! From contacts to the loads that estimators take.
 use super::contact::ContactReading;
-use super::error::PipelineError;
-use super::settings::Settings;
 use crate::core::{Source, Uncertain};
-use crate::elasticity::modulus::{Estimate, LoadSeries, LoadState, SharedErrors};
+use crate::elasticity::modulus::{Bodies, Estimate, LoadSeries, LoadState};
+use std::sync::Arc;
 
-/// A contact as a load, before errors are split into its own and those that all loads share.
+/// A contact as a load.
 #[derive(Clone, Copy, Debug)]
 pub struct Load {
     pub contact: ContactReading,
@@ -29,17 +28,6 @@ impl Load {
         })
     }
 
-    /// Relative error of the force that frames have in common.
-    fn calibration(&self) -> f64 {
-        self.force_n.without(Source::Noise).relative_error()
-    }
-
-    /// Relative error of the radius that frames have in common.
-    fn common_length(&self) -> f64 {
-        let radius = self.contact.contact_radius_m;
-        radius.without(Source::Noise).relative_error()
-    }
-
     /// The area of a face with a floor of its error that no outline goes below: a hundredth of a
     /// pixel all around it, by which speckles at the rim, blur and rounding shift the outline from
     /// one load to the next. Without it 88 % of the 95 % intervals hold, with it 97 % (`SCENES=400
@@ -51,75 +39,62 @@ impl Load {
         Some(Estimate::new(area.value, area.standard_error.hypot(floor)))
     }
 
-    fn state(&self, common: f64, common_length: f64, pixel_m: f64) -> LoadState {
-        let mut load = LoadState::new(beside(&self.force_n, common));
+    fn state(&self, forces: &InCommon, radii: &InCommon, pixel_m: f64) -> LoadState {
+        let mut load = LoadState::new(forces.of(self.force_n));
         if self.counts {
-            load.contact_radius_m = Some(beside(&self.contact.contact_radius_m, common_length));
-            load.indentation_m = self.contact.indentation_m;
-            load.contact_area_m2 = self.face_m2(pixel_m);
-            load.mean_strain = self.mean_strain;
+            let radius = radii.of(self.contact.contact_radius_m);
+            // What is common to lengths is common to areas twice. Tables of depths come from balls
+            // that the same pixels measured.
+            let length = radius.without(Source::Noise) * radius.value.recip();
+            let depth = self.contact.indentation_m.map(Uncertain::from);
+            let area = self.face_m2(pixel_m).map(Uncertain::from);
+            load.contact_radius_m = Some(radius);
+            load.indentation_m = depth.map(|depth| depth * length);
+            load.contact_area_m2 = area.map(|area| area * length.powf(2.0));
+            load.mean_strain = self.mean_strain.map(Uncertain::from);
         }
         load
     }
 }
 
-/// A number with the error that is its own, beside a relative one that all loads share.
-fn beside(number: &Uncertain, common: f64) -> Estimate {
-    let shared = number.without(Source::Noise).standard_error();
-    let mut own = number.total();
-    own.standard_error = (number.part(Source::Noise)).hypot(beyond(shared, common * own.value));
-    own
+/// The part of each source's relative error that loads have in common: the smallest of all (a
+/// calibration's slope, the size of a pixel). What exceeds it in a load (a calibration's offset) is
+/// the load's own: counted as common, a mean over loads would extrapolate it away.
+struct InCommon([f64; Source::ALL.len()]);
+
+impl InCommon {
+    fn to(numbers: impl Iterator<Item = Uncertain>) -> Self {
+        let least = [f64::INFINITY; Source::ALL.len()];
+        Self(numbers.fold(least, |mut least, number| {
+            for (least, source) in least.iter_mut().zip(Source::ALL) {
+                *least = least.min((number.part(source) / number.value).abs());
+            }
+            least
+        }))
+    }
+
+    fn of(&self, number: Uncertain) -> Uncertain {
+        let limits = Source::ALL.into_iter().zip(self.0);
+        limits.filter(|(source, _)| *source != Source::Noise).fold(
+            number,
+            |number, (source, relative)| {
+                number.with_excess_as_noise(source, relative * number.value.abs())
+            },
+        )
+    }
 }
 
-/// The part of an error beside another one.
-pub fn beyond(whole: f64, part: f64) -> f64 {
-    (whole * whole - part * part).max(0.0).sqrt()
-}
-
-/// Loads and the relative errors they share. Of the errors of forces and radii the smallest
-/// relative one is common to all loads (a calibration's slope, the size of a pixel). A load's error
-/// beyond that (a calibration's offset) is its own.
+/// The input of an estimator.
 pub fn series(
     loads: impl Iterator<Item = Load> + Clone,
-    settings: &Settings,
+    bodies: Arc<Bodies>,
     pixel_size_m: [f64; 2],
-) -> Result<LoadSeries, PipelineError> {
-    let smallest = |error: fn(&Load) -> f64, otherwise: f64| {
-        let errors = loads.clone().map(|load| error(&load));
-        let least = errors.fold(f64::INFINITY, f64::min);
-        if least.is_finite() { least } else { otherwise }
-    };
-    let common = smallest(Load::calibration, settings.force_scale());
-    let common_length = smallest(Load::common_length, settings.length_scale());
+) -> LoadSeries {
+    let forces = InCommon::to(loads.clone().map(|load| load.force_n));
+    let radii = InCommon::to(loads.clone().map(|load| load.contact.contact_radius_m));
     let pixel_m = (pixel_size_m[0] * pixel_size_m[1]).sqrt();
-    let counted = loads.clone().filter(|load| load.counts);
-    let radii: Vec<f64> = counted
-        .map(|load| load.contact.contact_radius_m.value)
-        .collect();
-    // NaN without a contact, which the guide's compliance refuses.
-    let radius_m = radii.iter().sum::<f64>() / radii.len() as f64;
-    let other_body = settings.guide_error(radius_m);
-    let errors = common_length * other_body;
-    let shared = SharedErrors {
-        force_scale: common,
-        length_scale: common_length,
-        size: settings.size_error(),
-        poisson_ratio: settings.poisson_error(),
-        other_body,
-        adhesion_n: settings.adhesion_n(),
-        length_with_other_body: if errors > 0.0 {
-            (settings.guide_with_length(radius_m) / errors).clamp(-1.0, 1.0)
-        } else {
-            0.0
-        },
-    };
-    LoadSeries::new(
-        loads
-            .map(|load| load.state(common, common_length, pixel_m))
-            .collect::<Vec<_>>(),
-    )
-    .with_shared_errors(shared)
-    .map_err(PipelineError::Modulus)
+    let states = loads.map(|load| load.state(&forces, &radii, pixel_m));
+    LoadSeries::new(states.collect::<Vec<_>>()).with_bodies(bodies)
 }
 
 /// Loads that a session keeps apart. More are merged.

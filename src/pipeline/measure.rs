@@ -1,5 +1,5 @@
 //! All answers of a press in one go, with cautions.
-use super::budget::{ErrorShare, error_budget};
+use super::budget::error_budget;
 use super::error::PipelineError;
 use super::flag::Flag;
 use super::press::Press;
@@ -8,7 +8,7 @@ use super::result::{FrameResult, MatchResult, Measurement, ModulusResult, Strain
 use super::settings::SurfaceInput;
 use super::specimen::{Specimen, material_law};
 use super::time::{self, TimeResult};
-use crate::core::Source;
+use crate::core::{Source, Uncertain};
 use crate::elasticity::modulus::{Estimate, LoadSeries, PaperRatio};
 use crate::elasticity::relaxation::TimeDependence;
 use crate::matching::StopReason;
@@ -57,7 +57,12 @@ impl Press<'_> {
     /// ```
     pub fn measure(&self) -> Measurement {
         let mut flags = Vec::new();
-        let youngs_modulus_pa = self.modulus().map(|m| ModulusResult::from(&m));
+        let modulus = self.modulus();
+        let error_budget = match &modulus {
+            Ok(found) => error_budget(&found.by_source, self.pipeline().settings()),
+            Err(_) => Vec::new(),
+        };
+        let youngs_modulus_pa = modulus.map(|m| ModulusResult::from(&m));
         let matching = self.match_result(&mut flags);
         let strain = self.strain_result(&mut flags);
         let estimates = self.estimates().unwrap_or_default();
@@ -71,10 +76,6 @@ impl Press<'_> {
             let warnings = modulus.warnings.iter().copied();
             flags.extend(warnings.map(|warning| Flag::Assumption { warning }));
         }
-        let error_budget = match youngs_modulus_pa {
-            Ok(_) => self.error_budget().unwrap_or_default(),
-            Err(_) => Vec::new(),
-        };
         flags.extend(self.material_law());
         let time = self.time_dependence().ok().flatten();
         flags.extend(self.time_flags(time.as_ref()));
@@ -100,18 +101,6 @@ impl Press<'_> {
             change: light.gain.value - 1.0,
             uneven: light.uneven,
         })
-    }
-
-    /// The relative error of [`modulus`](Self::modulus) by its inputs, the largest first.
-    fn error_budget(&self) -> Result<Vec<ErrorShare>, PipelineError> {
-        let estimator = self.pipeline().estimator()?;
-        let loads = self.loads(estimator.needs_strain())?;
-        let by_light = (0..self.frames()).any(|frame| {
-            let force = self.reading(frame).ok().and_then(|reading| reading.force_n);
-            force.map(|f| f.value) != self.gauge(frame).map(|gauge| gauge.value)
-        });
-        let settings = self.pipeline().settings();
-        Ok(error_budget(&estimator, &loads, settings, by_light))
     }
 
     /// A caution where a flat face is squeezed so far that the law of its material matters.
@@ -331,11 +320,11 @@ impl Press<'_> {
         for (frame, load) in loads.iter_mut().enumerate() {
             if self.time_s(frame).is_some() {
                 let gauge = self.gauge(frame)?;
-                load.force_n = gauge;
+                let scale = self.pipeline().settings().force_scale();
+                load.force_n = Uncertain::from(gauge).by_relative(Source::Gain, scale);
             }
         }
-        let shared = *series.shared_errors();
-        LoadSeries::new(loads).with_shared_errors(shared).ok()
+        Some(series.with_loads(loads))
     }
 
     /// How the light's force changed against the gauge's, where all frames with a time have both.

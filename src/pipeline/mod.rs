@@ -60,7 +60,7 @@ pub use crate::force::{FaceReading, ShapeProblem};
 pub use crate::sfs::{BallFit, Binning};
 pub use assumptions::{CheckedGain, CheckedGuide};
 pub use batch::contacts;
-pub use budget::{ErrorShare, ErrorSource};
+pub use budget::ErrorShare;
 pub use check::{CheckPress, CheckedObject, KnownBall};
 pub use composition::Pipeline;
 pub use contact::{ContactReading, ContactStage, FrameContact};

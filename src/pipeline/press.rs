@@ -310,10 +310,10 @@ impl<'a> Press<'a> {
         frame: usize,
         distances_m: &[f64],
     ) -> Result<Option<Vec<Estimate>>, PipelineError> {
-        let settings = self.pipeline().settings();
-        let is_ball = matches!(settings.object, Object::Sphere { .. });
+        let bodies = self.pipeline().bodies();
+        let is_ball = matches!(bodies.object(), Object::Sphere { .. });
         let contact = self.contact(frame)?.filter(|_| is_ball);
-        Ok(contact.and_then(|contact| depression::depths(contact, settings, distances_m)))
+        Ok(contact.and_then(|contact| depression::depths(contact, bodies, distances_m)))
     }
 
     /// The cautions about a frame's contact, or about a frame without one, which
@@ -613,7 +613,8 @@ impl<'a> Press<'a> {
         }
         let pipeline = self.pipeline();
         let size = pipeline.contact().pixel_size_m();
-        let series = loads::series(loads.iter().copied(), pipeline.settings(), size)?;
+        let bodies = Arc::clone(pipeline.bodies());
+        let series = loads::series(loads.iter().copied(), bodies, size);
         match self.stages.specimen {
             Specimen::Flat(flat) if with_strain => {
                 // Where all are cut the first is refused.

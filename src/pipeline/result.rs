@@ -23,10 +23,8 @@ use std::fmt::{self, Display, Formatter};
 /// };
 /// use tactile_imaging::pipeline::ModulusResult;
 /// // A ball of 3 mm radius under 10 mN, in contact up to 0.5 mm: E = (1 − ν²) 3FR/(4a³) = 135 kPa.
-/// let load = LoadState {
-///     contact_radius_m: Some(Estimate::new(0.5e-3, 1e-6)),
-///     ..LoadState::new(Estimate::new(10e-3, 0.1e-3))
-/// };
+/// let load = LoadState::new(Estimate::new(10e-3, 0.1e-3))
+///     .with_radius(Estimate::new(0.5e-3, 1e-6));
 /// let modulus =
 ///     ModulusResult::from(&HertzSphere::new(3e-3, 0.5)?.estimate(&LoadSeries::new([load]))?);
 /// assert!((modulus.value - 135e3).abs() < 1.0);

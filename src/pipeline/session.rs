@@ -509,19 +509,22 @@ impl Session {
     pub fn modulus(&mut self) -> Result<ModulusEstimate, PipelineError> {
         let pipeline = &self.stages.pipeline;
         let estimator = pipeline.estimator()?;
-        let (settings, size) = (pipeline.settings(), pipeline.contact().pixel_size_m());
+        let (bodies, size) = (
+            Arc::clone(pipeline.bodies()),
+            pipeline.contact().pixel_size_m(),
+        );
         let loads = match self.stages.specimen {
             Specimen::Curved if estimator.needs_strain() => {
-                loads::series(self.strain.loads(), settings, size)?
+                loads::series(self.strain.loads(), bodies, size)
             }
             Specimen::Flat(flat) if estimator.needs_strain() => {
                 if let Some(contact) = &self.contact.reading {
                     self.check_face(flat, contact)?;
                 }
-                let series = loads::series(self.loads.loads(), settings, size)?;
+                let series = loads::series(self.loads.loads(), bodies, size);
                 flat.strained(&series, pipeline.strain())?
             }
-            _ => loads::series(self.loads.loads(), settings, size)?,
+            _ => loads::series(self.loads.loads(), bodies, size),
         };
         self.stages
             .modulus(&mut self.bench, estimator.as_ref(), &loads)

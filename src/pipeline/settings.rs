@@ -3,9 +3,10 @@ use super::assumptions::{CheckedGain, CheckedGuide};
 use super::error::PipelineError;
 use super::reference_light::ReferenceLight;
 use super::specimen::Object;
-use crate::elasticity::contact::{
-    PARAMETERS_PER_LAYER, Waveguide, guide_compliance_covariance, guide_compliance_error,
-};
+use crate::core::{Source, Uncertain};
+use crate::elasticity::ElasticityError;
+use crate::elasticity::contact::{PARAMETERS_PER_LAYER, Waveguide};
+use crate::elasticity::modulus::Bodies;
 use crate::sfs::Binning;
 use nalgebra::{DMatrix, DVector};
 
@@ -218,44 +219,32 @@ impl Settings {
         self.length_scale_error.unwrap_or(0.3e-2)
     }
 
-    /// Relative error of the guide's compliance under a contact of this radius. Zero of a rigid
-    /// guide.
-    pub(super) fn guide_error(&self, contact_radius_m: f64) -> f64 {
-        let layers = self.waveguide.as_ref().map_or(&[][..], Waveguide::layers);
+    /// The object and the guide, with the errors that are stated or assumed of them.
+    pub(super) fn bodies(&self) -> Result<Bodies, ElasticityError> {
+        let poisson_error = self.poisson_ratio_error.unwrap_or(0.01);
+        let bodies = Bodies::new(self.object, self.waveguide.clone())
+            .with_size_error(self.size_error())?
+            .with_poisson_ratio_error(poisson_error)?
+            .with_adhesion_j_per_m2(self.adhesion_error_j_per_m2.unwrap_or(1e-3))?;
         match &self.layer_covariance {
-            _ if layers.is_empty() => 0.0,
-            None => Self::ASSUMED_LAYER_ERROR,
+            None => {
+                let error = Self::ASSUMED_LAYER_ERROR;
+                bodies.with_guide_error(Uncertain::exact(1.0).by(Source::Guide, error))
+            }
             Some(covariance) => {
-                guide_compliance_error(layers, covariance, contact_radius_m).unwrap_or(0.0)
+                let length_error = self.length_scale();
+                let by_length = |c: &DVector<f64>| c / length_error;
+                let lengths = self
+                    .layers_with_length
+                    .as_ref()
+                    .filter(|_| length_error > 0.0);
+                bodies.with_layer_errors(covariance.clone(), lengths.map(by_length))
             }
         }
     }
 
-    /// Covariance of the logarithms of measured lengths and of the guide's compliance under a
-    /// contact of this radius.
-    pub(super) fn guide_with_length(&self, contact_radius_m: f64) -> f64 {
-        let layers = self.waveguide.as_ref().map_or(&[][..], Waveguide::layers);
-        let covariances = self.layers_with_length.as_ref();
-        covariances
-            .and_then(|c| guide_compliance_covariance(layers, c, contact_radius_m))
-            .unwrap_or(0.0)
-    }
-
-    pub(super) fn poisson_error(&self) -> f64 {
-        self.poisson_ratio_error.unwrap_or(0.01)
-    }
-
-    /// 6πwR of the work of adhesion that a ball may have, in newtons. Zero of other objects.
-    pub(super) fn adhesion_n(&self) -> f64 {
-        let Object::Sphere { radius_m, .. } = self.object else {
-            return 0.0;
-        };
-        let work = self.adhesion_error_j_per_m2.unwrap_or(1e-3);
-        6.0 * std::f64::consts::PI * work * radius_m
-    }
-
     /// Relative error of the object's size.
-    pub(super) fn size_error(&self) -> f64 {
+    fn size_error(&self) -> f64 {
         let radius_m = match self.object {
             Object::Sphere { radius_m, .. } | Object::FlatPunch { radius_m, .. } => radius_m,
             Object::Layer {

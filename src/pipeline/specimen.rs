@@ -98,8 +98,8 @@ impl FlatSpecimen {
         let mut loads = [LoadState::new(Estimate::exact(0.0)); 2];
         for ((load, contact), frame) in loads.iter_mut().zip(contacts).zip([from, to]) {
             let force = contact.force_n.ok_or(PipelineError::NoForce { frame })?;
-            load.force_n = force.total();
-            load.contact_area_m2 = contact.face.map(|face| face.area_m2);
+            load.force_n = force;
+            load.contact_area_m2 = contact.face.map(|face| face.area_m2.into());
         }
         let failed = |source| PipelineError::Strain { from, to, source };
         let uniaxial = UniaxialLoads::new(&LoadSeries::new(loads), nu, measure).map_err(failed)?;
@@ -111,7 +111,7 @@ impl FlatSpecimen {
         let strains = uniaxial.series.loads().iter().map(|load| load.mean_strain);
         let error = strains
             .flatten()
-            .fold(0.0, |sum: f64, strain| sum.hypot(strain.standard_error));
+            .fold(0.0, |sum: f64, strain| sum.hypot(strain.standard_error()));
         summary.standard_error = Matrix3::from_diagonal(&[nu * error, nu * error, error].into());
         Ok(PairStrain {
             measure: measure.name(),

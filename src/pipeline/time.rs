@@ -1,9 +1,7 @@
 //! Whether the modulus changes over the time of a press.
-use super::loads::beyond;
 use super::text::{decimals_of, fixed, interval_text, with_error};
-use crate::elasticity::modulus::{
-    Estimate, Interval, LoadSeries, LoadState, ModulusEstimator, SharedErrors,
-};
+use crate::core::Source;
+use crate::elasticity::modulus::{Estimate, Interval, LoadSeries, ModulusEstimator};
 use crate::elasticity::relaxation::{TimeDependence, TimedModulus, time_dependence};
 use std::fmt::{self, Display, Formatter};
 
@@ -97,9 +95,6 @@ fn within(value: f64, interval: Interval, scale: f64, unit: &str) -> String {
     format!("{value} {unit} (95 %: {ends})")
 }
 
-/// An error that is taken out, relative: an estimator without any error gives no interval.
-pub const NEGLIGIBLE: f64 = 1e-9;
-
 /// What the moduli of single loads say of time. `times_s` has a place for each load. What has no
 /// time or alone gives no modulus is left out, and None is returned where fewer than two are left.
 pub fn of_moduli(
@@ -113,15 +108,22 @@ pub fn of_moduli(
         let Some(time_s) = *time_s else {
             continue;
         };
-        let Some((modulus_pa, law, scale)) = alone(estimator, load, series.shared_errors()) else {
+        // What the load alone says: its noise, and what is common to all loads.
+        let alone = series.with_loads([*load]);
+        let Ok(modulus_pa) = estimator.estimate(&alone).map(|found| found.by_source) else {
             continue;
         };
-        law_error = law_error.max(law);
-        scale_error = scale_error.max(scale);
+        if !modulus_pa.relative_error().is_finite() {
+            continue;
+        }
+        let common = modulus_pa.without(Source::Noise);
+        law_error = law_error.max((common.part(Source::Law) / common.value).abs());
+        scale_error = scale_error.max(common.relative_error());
+        let noise = modulus_pa.part(Source::Noise).abs();
         moduli.push(TimedModulus {
             time_s,
             force_n: load.force_n.value,
-            youngs_modulus_pa: modulus_pa,
+            youngs_modulus_pa: Estimate::new(modulus_pa.value, noise),
         });
     }
     result(&moduli, scale_error, law_error)
@@ -156,53 +158,4 @@ fn result(moduli: &[TimedModulus], scale_error: f64, law_error: f64) -> Option<T
         loads: moduli.len(),
         change,
     })
-}
-
-/// Modulus in pascals and its relative standard error, where both are known.
-pub fn with_relative_error(
-    estimator: &dyn ModulusEstimator,
-    series: &LoadSeries,
-) -> Option<(f64, f64)> {
-    let estimate = estimator.estimate(series).ok()?;
-    let relative = estimate.standard_error_pa / estimate.youngs_modulus_pa;
-    let found = (estimate.youngs_modulus_pa, relative);
-    relative.is_finite().then_some(found)
-}
-
-/// What one load alone says: the modulus with the load's own error, the relative error of the law,
-/// and that which is common to all loads, the law's among it.
-fn alone(
-    estimator: &dyn ModulusEstimator,
-    load: &LoadState,
-    shared: &SharedErrors,
-) -> Option<(Estimate, f64, f64)> {
-    let none = SharedErrors {
-        force_scale: NEGLIGIBLE,
-        ..SharedErrors::default()
-    };
-    let with = |load: LoadState, shared: &SharedErrors| {
-        let series = LoadSeries::new([load]).with_shared_errors(*shared).ok()?;
-        with_relative_error(estimator, &series)
-    };
-    let (value, all) = with(*load, shared)?;
-    let (_, own_and_law) = with(*load, &none)?;
-    let (_, law_error) = with(quiet(load), &none)?;
-    let own = beyond(own_and_law, law_error);
-    Some((
-        Estimate::new(value, own * value),
-        law_error,
-        beyond(all, own),
-    ))
-}
-
-/// The load without errors of its own.
-pub fn quiet(load: &LoadState) -> LoadState {
-    let quiet = |e: Estimate| Estimate::new(e.value, NEGLIGIBLE * e.value.abs());
-    LoadState {
-        force_n: quiet(load.force_n),
-        contact_radius_m: load.contact_radius_m.map(quiet),
-        contact_area_m2: load.contact_area_m2.map(quiet),
-        indentation_m: load.indentation_m.map(quiet),
-        mean_strain: load.mean_strain.map(quiet),
-    }
 }

@@ -157,7 +157,7 @@ impl Uncertain {
         }
     }
 
-    /// An estimate whose error comes from one source.
+    /// An estimate whose error comes from one source. A negative error, which none can be, is NaN.
     ///
     /// ```
     /// use tactile_core::{Estimate, Source, Uncertain};
@@ -166,8 +166,10 @@ impl Uncertain {
     /// ```
     #[must_use]
     pub fn of(estimate: Estimate, source: Source) -> Self {
+        let error = estimate.standard_error;
+        let error = if error < 0.0 { f64::NAN } else { error };
         let degrees = estimate.degrees_of_freedom;
-        Self::exact(estimate.value).by_estimated(source, estimate.standard_error, degrees)
+        Self::exact(estimate.value).by_estimated(source, error, degrees)
     }
 
     /// With a standard deviation from a source, its sign that of the change which a positive error
@@ -199,6 +201,45 @@ impl Uncertain {
     #[must_use]
     pub fn part(&self, source: Source) -> f64 {
         self.parts[source.place()]
+    }
+
+    /// The degrees of freedom of the part from a source. `None` if the part is known.
+    #[must_use]
+    pub fn degrees_of_freedom(&self, source: Source) -> Option<f64> {
+        Some(self.degrees[source.place()]).filter(|n| *n != f64::INFINITY)
+    }
+
+    /// The sources that give an error, with their signed standard deviations: the budget of the
+    /// number.
+    ///
+    /// ```
+    /// use tactile_core::{Source, Uncertain};
+    /// let force_n = Uncertain::exact(1.0).by(Source::Noise, 3e-3).by(Source::Gain, 4e-3);
+    /// let budget: Vec<_> = force_n.parts().collect();
+    /// assert_eq!(budget, [(Source::Noise, 3e-3), (Source::Gain, 4e-3)]);
+    /// ```
+    pub fn parts(&self) -> impl Iterator<Item = (Source, f64)> + use<> {
+        let all = Source::ALL.into_iter().zip(self.parts);
+        all.filter(|(_, part)| *part != 0.0)
+    }
+
+    /// With no more than this standard deviation from a source: what exceeds it counts as noise. So
+    /// a number states which part of an error it has in common with others.
+    ///
+    /// ```
+    /// use tactile_core::{Source, Uncertain};
+    /// let force_n = Uncertain::exact(1.0).by(Source::Calibration, 5e-3);
+    /// let apart = force_n.with_excess_as_noise(Source::Calibration, 3e-3);
+    /// assert_eq!(apart.part(Source::Calibration), 3e-3);
+    /// assert!((apart.part(Source::Noise) - 4e-3).abs() < 1e-15);
+    /// ```
+    #[must_use]
+    pub fn with_excess_as_noise(mut self, source: Source, limit: f64) -> Self {
+        let place = source.place();
+        let (part, degrees) = (self.parts[place], self.degrees_of_freedom(source));
+        let excess = (part * part - limit * limit).max(0.0).sqrt();
+        self.parts[place] = part.signum() * part.abs().min(limit);
+        self.by_estimated(Source::Noise, excess, degrees)
     }
 
     /// The same value without the error from a source.
@@ -233,8 +274,10 @@ impl Uncertain {
     /// ([`effective_degrees_of_freedom`]).
     #[must_use]
     pub fn total(&self) -> Estimate {
-        let degrees = |k: usize| Some(self.degrees[k]).filter(|n| n.is_finite());
-        let parts: [_; COUNT] = std::array::from_fn(|k| (self.parts[k].powi(2), degrees(k)));
+        let parts = Source::ALL.map(|source| {
+            let degrees = self.degrees_of_freedom(source);
+            (self.part(source).powi(2), degrees)
+        });
         let mut total = Estimate::new(self.value, self.standard_error());
         total.degrees_of_freedom = effective_degrees_of_freedom(&parts);
         total
@@ -428,15 +471,14 @@ mod with_serde {
 
     impl Serialize for Uncertain {
         fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-            let part = |source: Source| Part {
+            let part = |(source, standard_error)| Part {
                 source,
-                standard_error: self.part(source),
-                degrees_of_freedom: Some(self.degrees[source.place()]).filter(|n| n.is_finite()),
+                standard_error,
+                degrees_of_freedom: self.degrees_of_freedom(source),
             };
-            let parts = Source::ALL.into_iter().map(part);
             Written {
                 total: self.total(),
-                by_source: parts.filter(|part| part.standard_error != 0.0).collect(),
+                by_source: self.parts().map(part).collect(),
             }
             .serialize(serializer)
         }

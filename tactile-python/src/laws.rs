@@ -84,11 +84,7 @@ pub fn estimate_modulus(
         )));
     }
     let estimate = |[value, error]: [f64; 2]| Estimate::new(value, error);
-    let load = |(force, radius)| {
-        let mut load = LoadState::new(estimate(force));
-        load.contact_radius_m = Some(estimate(radius));
-        load
-    };
+    let load = |(force, radius)| LoadState::new(estimate(force)).with_radius(estimate(radius));
     let loads: Vec<_> = forces.into_iter().zip(radii).map(load).collect();
     let config = StagesConfig {
         estimator: crate::pipeline::named(estimator)?,

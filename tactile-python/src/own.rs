@@ -12,7 +12,7 @@ use std::sync::Arc;
 use tactile_imaging::core::Estimate as CoreEstimate;
 use tactile_imaging::elasticity::ElasticityError;
 use tactile_imaging::elasticity::modulus::{
-    EstimatorKind, LoadSeries, ModulusEstimate, ModulusEstimator,
+    EstimatorKind, LoadSeries, ModulusEstimate, ModulusEstimator, Uncertain,
 };
 use tactile_imaging::elasticity::strain::{Deformation, StrainMeasure};
 use tactile_imaging::force::{ForceError, ReferenceFrame};
@@ -467,12 +467,13 @@ impl Load {
         py: Python<'_>,
         load: &tactile_imaging::elasticity::modulus::LoadState,
     ) -> PyResult<Self> {
-        let estimate = |given: Option<CoreEstimate>| {
-            given.map(|estimate| Estimate::of(py, estimate)).transpose()
+        let estimate = |given: Option<Uncertain>| {
+            let given = given.map(|number| Estimate::of(py, number.total()));
+            given.transpose()
         };
         Ok(Self {
             text: format!("{} N", load.force_n.value),
-            force: Estimate::of(py, load.force_n)?,
+            force: Estimate::of(py, load.force_n.total())?,
             radius: estimate(load.contact_radius_m)?,
             area: estimate(load.contact_area_m2)?,
             indentation: estimate(load.indentation_m)?,

@@ -7,7 +7,6 @@ use std::path::{Path, PathBuf};
 const LEFT: &[&str] = &[
     "tactile-cli: arguments, frames",
     "tactile-cli: hidden, inclusion",
-    "tactile-elasticity: contact::layers, contact::waveguide",
     "tactile-fem: contact, model, stick",
     "tactile-fem: newton, system",
     "tactile-fem: press, scene",

@@ -12,7 +12,7 @@
 use super::{KnownBall, is_known, is_positive};
 use crate::core::Estimate;
 use crate::elasticity::contact::{
-    Bond, Layer, PARABOLA_ERROR, Waveguide, guide_compliance_error, guide_log_stiffness,
+    Bond, Layer, PARABOLA_ERROR, Waveguide, guide_compliance, guide_log_stiffness,
     parameter_slopes, stepped_layers,
 };
 use crate::elasticity::laws::{ContactLaw, ContactLength, WaveguideLaw};
@@ -275,17 +275,18 @@ pub fn update(
     let mean_m = sum / checks.len() as f64;
     let stiffness = |layers: &[Layer]| guide_log_stiffness(layers, mean_m).ok_or(unsolved);
     let ratio = (stiffness(&layers)? - stiffness(stated)?).exp();
-    let error = guide_compliance_error(&layers, &covariance, mean_m).ok_or(unsolved)?;
+    let layers = Waveguide::new(layers).map_err(|_| unsolved)?;
+    let factor = guide_compliance(&layers, &covariance, None, mean_m).ok_or(unsolved)?;
     // Earlier presses moved the layers from where they were stated.
     let earlier = settings.checked_guide;
     let ratio = ratio * earlier.map_or(1.0, |earlier| earlier.stiffness.value);
     let checked = CheckedGuide {
-        stiffness: Estimate::new(ratio, ratio * error),
+        stiffness: Estimate::new(ratio, ratio * factor.standard_error()),
         presses: checks.len() + earlier.map_or(0, |earlier| earlier.presses),
     };
     Ok(UpdatedGuide {
         checked,
-        layers: Waveguide::new(layers).map_err(|_| unsolved)?,
+        layers,
         covariance,
         with_length,
     })

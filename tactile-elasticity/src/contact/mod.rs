@@ -9,19 +9,21 @@
 //! | [`Waveguide`] | the layers of a sensor |
 
 mod depression;
+mod guide;
 mod hertz;
 mod layers;
 mod table;
 mod waveguide;
 
 pub use depression::depression_m;
+pub use guide::{
+    PARABOLA_ERROR, PARAMETERS_PER_LAYER, guide_compliance, guide_log_stiffness, parameter_slopes,
+    stepped_layers,
+};
 pub use hertz::{Body, HertzContact, hertz_surface_displacement_m, reduced_modulus_pa};
 pub use layers::{Bond, LayerContact, LayerEquation};
 pub use table::{ContactCurve, ContactTable};
-pub use waveguide::{
-    Layer, PARABOLA_ERROR, PARAMETERS_PER_LAYER, Waveguide, guide_compliance_covariance,
-    guide_compliance_error, guide_log_stiffness, parameter_slopes, stepped_layers,
-};
+pub use waveguide::{Layer, Waveguide};
 
 pub(crate) use layers::{LayerKernel, SharedLayerTable};
 pub(crate) use table::TabulatedForce;

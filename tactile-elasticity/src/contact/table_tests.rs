@@ -78,10 +78,7 @@ fn table() -> ContactTable {
 
 fn load(a: f64, e: f64) -> LoadState {
     let force = invented_force(a, e);
-    LoadState {
-        contact_radius_m: Some(Estimate::new(a, 1e-6)),
-        ..LoadState::new(Estimate::new(force, 1e-3 * force))
-    }
+    LoadState::new(Estimate::new(force, 1e-3 * force)).with_radius(Estimate::new(a, 1e-6))
 }
 
 #[test]
@@ -134,10 +131,7 @@ fn the_modulus_of_two_loads_lies_between_what_each_says() {
     let loads = [(0.6, 1.0), (0.9, 0.995)].map(|(ratio, off)| {
         let a = ratio * RADIUS;
         let force = off * stiffening(a, e);
-        LoadState {
-            contact_radius_m: Some(Estimate::new(a, 1e-8)),
-            ..LoadState::new(Estimate::new(force, 1e-4 * force))
-        }
+        LoadState::new(Estimate::new(force, 1e-4 * force)).with_radius(Estimate::new(a, 1e-8))
     });
     let estimate = estimator.estimate(&LoadSeries::new(loads)).unwrap();
     let [first, second] = [0, 1].map(|k| estimate.loads[k].youngs_modulus_pa.unwrap());

@@ -1,7 +1,9 @@
 //! The sample, and what it is pressed on.
 
-use crate::contact::{Body, Waveguide};
+use crate::contact::{Body, PARAMETERS_PER_LAYER, Waveguide, guide_compliance};
 use crate::error::{ElasticityError, Quantity, poisson};
+use nalgebra::{DMatrix, DVector};
+use tactile_core::{Source, Uncertain};
 
 /// The pressed object, as far as it is known.
 ///
@@ -151,8 +153,8 @@ pub(super) fn half_angle(angle_rad: f64) -> Result<f64, ElasticityError> {
     Ok(angle_rad)
 }
 
-/// The bodies of a press: the sample, and the guide it is pressed on. They stand beside the loads
-/// in the input of an estimator.
+/// The bodies of a press: the sample, and the guide it is pressed on, with the errors of what is
+/// known of them. They stand beside the loads in the input of an estimator.
 ///
 /// ```
 /// use tactile_elasticity::contact::{Layer, Waveguide};
@@ -171,12 +173,113 @@ pub(super) fn half_angle(angle_rad: f64) -> Result<f64, ElasticityError> {
 pub struct Bodies {
     object: Object,
     guide: Option<Waveguide>,
+    size_error: f64,
+    poisson_ratio_error: f64,
+    adhesion_n: f64,
+    guide_errors: GuideErrors,
+}
+
+#[derive(Clone, Debug, PartialEq)]
+enum GuideErrors {
+    /// Of the compliance, under every contact.
+    Common(Uncertain),
+    Layers {
+        covariance: DMatrix<f64>,
+        by_pixel_size: Option<DVector<f64>>,
+    },
 }
 
 impl Bodies {
-    /// Of the sample, and the layers of the guide where they are known.
+    /// Of the sample, and the layers of the guide where they are known. Both are exact.
     pub fn new(object: Object, guide: Option<Waveguide>) -> Self {
-        Self { object, guide }
+        Self {
+            object,
+            guide,
+            size_error: 0.0,
+            poisson_ratio_error: 0.0,
+            adhesion_n: 0.0,
+            guide_errors: GuideErrors::Common(Uncertain::exact(1.0)),
+        }
+    }
+
+    /// With a relative standard error of the object's size, [`Source::ObjectSize`]: of its radius,
+    /// or of the tangent of its half angle.
+    ///
+    /// # Errors
+    /// [`ElasticityError::Negative`].
+    pub fn with_size_error(mut self, relative: f64) -> Result<Self, ElasticityError> {
+        self.size_error = Quantity::StandardError.not_negative(relative)?;
+        Ok(self)
+    }
+
+    /// With a standard error of the sample's Poisson ratio, [`Source::PoissonRatio`].
+    ///
+    /// # Errors
+    /// [`ElasticityError::Negative`].
+    pub fn with_poisson_ratio_error(mut self, error: f64) -> Result<Self, ElasticityError> {
+        self.poisson_ratio_error = Quantity::StandardError.not_negative(error)?;
+        Ok(self)
+    }
+
+    /// With a work of adhesion w (J/m²) that a ball may have, [`Source::Adhesion`]. The contact of
+    /// a ball of radius R under a force F looks softer by ½ √(6πwR/F), to first order in √w
+    /// (Johnson, Kendall and Roberts 1971): the radius is that of F + √(6πwR F), and of the
+    /// pressure the rim is missing. Other objects have none.
+    ///
+    /// # Errors
+    /// [`ElasticityError::Negative`].
+    pub fn with_adhesion_j_per_m2(mut self, work: f64) -> Result<Self, ElasticityError> {
+        Quantity::StandardError.not_negative(work)?;
+        let radius_m = self.object.sphere_radius_m().unwrap_or(0.0);
+        self.adhesion_n = 6.0 * std::f64::consts::PI * work * radius_m;
+        Ok(self)
+    }
+
+    /// With the factor by which the guide's compliance may be another than stated, under every
+    /// contact: one with parts of [`Source::Guide`], and of [`Source::PixelSize`] where the guide
+    /// was checked by contact radii that the same pixels measured.
+    ///
+    /// # Errors
+    /// [`ElasticityError::Negative`].
+    ///
+    /// ```
+    /// use tactile_elasticity::modulus::{Bodies, Object, Source, Uncertain};
+    /// let factor = Uncertain::exact(1.0).by(Source::Guide, 0.05);
+    /// let bodies = Bodies::new(Object::sphere(3e-3), None).with_guide_error(factor)?;
+    /// assert_eq!(bodies.guide_compliance(1e-3), factor);
+    /// # Ok::<(), tactile_elasticity::ElasticityError>(())
+    /// ```
+    pub fn with_guide_error(mut self, factor: Uncertain) -> Result<Self, ElasticityError> {
+        Quantity::StandardError.not_negative(factor.standard_error())?;
+        self.guide_errors = GuideErrors::Common(factor);
+        Ok(self)
+    }
+
+    /// With the covariance of ln E of all layers, then of ln h, then of ν
+    /// ([`PARAMETERS_PER_LAYER`]), and what a standard deviation of the size of a pixel does to
+    /// each, where they are correlated.
+    ///
+    /// # Errors
+    /// [`ElasticityError::LengthMismatch`], [`ElasticityError::NotFinite`].
+    pub fn with_layer_errors(
+        mut self,
+        covariance: DMatrix<f64>,
+        by_pixel_size: Option<DVector<f64>>,
+    ) -> Result<Self, ElasticityError> {
+        let layers = self.guide.as_ref().map_or(0, |guide| guide.layers().len());
+        let expected = PARAMETERS_PER_LAYER * layers;
+        let sizes = by_pixel_size.as_ref().map_or(expected, |v| v.len());
+        for found in [covariance.nrows(), covariance.ncols(), sizes] {
+            Quantity::StandardError.entries(found, expected)?;
+        }
+        for &entry in covariance.iter().chain(by_pixel_size.iter().flatten()) {
+            Quantity::StandardError.finite(entry)?;
+        }
+        self.guide_errors = GuideErrors::Layers {
+            covariance,
+            by_pixel_size,
+        };
+        Ok(self)
     }
 
     /// The sample.
@@ -199,5 +302,39 @@ impl Bodies {
     /// The layer that the sample touches, as a half-space. Rigid where there is none.
     pub fn touched(&self) -> Body {
         self.guide().map_or_else(Body::rigid, Waveguide::touched)
+    }
+
+    /// The object's size over the size stated: one, with its error.
+    pub fn size(&self) -> Uncertain {
+        Uncertain::exact(1.0).by(Source::ObjectSize, self.size_error)
+    }
+
+    /// The sample's Poisson ratio with its error.
+    pub fn poisson_ratio(&self) -> Uncertain {
+        let ratio = Uncertain::exact(self.object.poisson_ratio());
+        ratio.by(Source::PoissonRatio, self.poisson_ratio_error)
+    }
+
+    /// The guide's compliance over the one stated, under a contact of this radius (m): one, with
+    /// its error. Exact where there is no guide or its contact cannot be solved.
+    pub fn guide_compliance(&self, contact_radius_m: f64) -> Uncertain {
+        let exact = Uncertain::exact(1.0);
+        match (&self.guide_errors, &self.guide) {
+            (GuideErrors::Common(factor), _) => *factor,
+            (GuideErrors::Layers { .. }, None) => exact,
+            (
+                GuideErrors::Layers {
+                    covariance,
+                    by_pixel_size,
+                },
+                Some(guide),
+            ) => guide_compliance(guide, covariance, by_pixel_size.as_ref(), contact_radius_m)
+                .unwrap_or(exact),
+        }
+    }
+
+    /// Relative error of E* from adhesion under a force (N).
+    pub(super) fn adhesion(&self, force_n: f64) -> f64 {
+        0.5 * (self.adhesion_n / force_n).max(0.0).sqrt()
     }
 }

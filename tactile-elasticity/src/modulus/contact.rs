@@ -17,10 +17,8 @@ use crate::laws::{ConeLaw, ContactLaw, HertzLaw, LayerLaw, PunchLaw, WaveguideLa
 /// use tactile_elasticity::modulus::*;
 ///
 /// let contact = HertzContact::from_force(1e-3_f64, 5e-3, 40e3)?;
-/// let load = LoadState {
-///     contact_radius_m: Some(Estimate::new(contact.contact_radius_m, 1e-6)),
-///     ..LoadState::new(Estimate::new(1e-3, 1e-5))
-/// };
+/// let load = LoadState::new(Estimate::new(1e-3, 1e-5))
+///     .with_radius(Estimate::new(contact.contact_radius_m, 1e-6));
 /// let loads = LoadSeries::new([load]);
 /// let rigid = HertzSphere::new(5e-3, 0.5)?;
 /// let plain = rigid.estimate(&loads)?;
@@ -39,15 +37,11 @@ use crate::laws::{ConeLaw, ContactLaw, HertzLaw, LayerLaw, PunchLaw, WaveguideLa
 /// assert!(steel.youngs_modulus_pa / plain.youngs_modulus_pa - 1.0 < 1e-6);
 /// assert!(on_gel.youngs_modulus_pa > 1.3 * plain.youngs_modulus_pa);
 ///
-/// // Errors that all loads share are not reduced by averaging.
-/// let shared = SharedErrors {
-///     force_scale: 0.01,
-///     length_scale: 0.005,
-///     size: 0.002,
-///     ..SharedErrors::default()
-/// };
-/// let careful = rigid.estimate(&loads.with_shared_errors(shared)?)?;
+/// // Errors of the ball stand beside the loads.
+/// let ball = Bodies::new(Object::sphere(5e-3), None).with_size_error(0.01)?;
+/// let careful = rigid.estimate(&loads.with_bodies(ball))?;
 /// assert!(careful.standard_error_pa > plain.standard_error_pa);
+/// assert!(careful.by_source.share(Source::ObjectSize) > 0.2);
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
 /// ```
 #[derive(Debug, Clone, PartialEq)]
@@ -84,10 +78,8 @@ impl<L: ContactLaw> ContactEstimator<L> {
     ///         }
     ///     }
     /// }
-    /// let load = LoadState {
-    ///     contact_radius_m: Some(Estimate::new(0.45e-3, 1e-6)),
-    ///     ..LoadState::new(Estimate::new(1e-3, 1e-5))
-    /// };
+    /// let load = LoadState::new(Estimate::new(1e-3, 1e-5))
+    ///     .with_radius(Estimate::new(0.45e-3, 1e-6));
     /// let loads = LoadSeries::new([load]);
     /// let own = ContactEstimator::from_law(Ball { radius_m: 5e-3 }, 0.5)?.estimate(&loads)?;
     /// let built_in = HertzSphere::new(5e-3, 0.5)?.estimate(&loads)?;
@@ -180,10 +172,8 @@ impl<L: ContactLaw> ModulusEstimator for ContactEstimator<L> {
 /// };
 ///
 /// // 1 mN on a 5 mm sphere makes a contact of 0.4543 mm: 30 kPa.
-/// let load = LoadState {
-///     contact_radius_m: Some(Estimate::new(0.4543e-3, 1e-6)),
-///     ..LoadState::new(Estimate::new(1e-3, 1e-5))
-/// };
+/// let load = LoadState::new(Estimate::new(1e-3, 1e-5))
+///     .with_radius(Estimate::new(0.4543e-3, 1e-6));
 /// let modulus = HertzSphere::new(5e-3, 0.5)?.estimate(&LoadSeries::new([load]))?;
 /// assert!((modulus.youngs_modulus_pa / 30e3 - 1.0_f64).abs() < 1e-3);
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
@@ -197,10 +187,8 @@ pub type HertzSphere = ContactEstimator<HertzLaw>;
 /// };
 ///
 /// // F = 2E*aδ with E* = 40 kPa, a = 1 mm, δ = 0.1 mm.
-/// let load = LoadState {
-///     indentation_m: Some(Estimate::new(0.1e-3, 1e-7)),
-///     ..LoadState::new(Estimate::new(8e-3, 1e-5))
-/// };
+/// let load = LoadState::new(Estimate::new(8e-3, 1e-5))
+///     .with_indentation(Estimate::new(0.1e-3, 1e-7));
 /// let modulus = FlatPunch::new(1e-3, 0.5)?.estimate(&LoadSeries::new([load]))?;
 /// assert!((modulus.youngs_modulus_pa - 30e3_f64).abs() < 1e-6);
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
@@ -213,10 +201,8 @@ pub type FlatPunch = ContactEstimator<PunchLaw>;
 ///
 /// // F = (2/π)E* δ² with E* = 40 kPa, δ = 0.2 mm, at a half angle of 45°.
 /// let force = std::f64::consts::FRAC_2_PI * 40e3 * 0.2e-3_f64.powi(2);
-/// let load = LoadState {
-///     indentation_m: Some(Estimate::new(0.2e-3, 1e-7)),
-///     ..LoadState::new(Estimate::new(force, 1e-6))
-/// };
+/// let load = LoadState::new(Estimate::new(force, 1e-6))
+///     .with_indentation(Estimate::new(0.2e-3, 1e-7));
 /// let modulus = Cone::new(std::f64::consts::FRAC_PI_4, 0.5)?.estimate(&LoadSeries::new([load]))?;
 /// assert!((modulus.youngs_modulus_pa - 30e3).abs() < 1e-6);
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
@@ -230,10 +216,8 @@ pub type Cone = ContactEstimator<ConeLaw>;
 ///
 /// // Read as a half-space, a sample 1 mm thin looks far too stiff.
 /// let contact = HertzContact::from_force(1e-3_f64, 5e-3, 40e3)?;
-/// let load = LoadSeries::new([LoadState {
-///     indentation_m: Some(Estimate::new(contact.indentation_m, 1e-7)),
-///     ..LoadState::new(Estimate::new(1e-3, 1e-5))
-/// }]);
+/// let load = LoadSeries::new([LoadState::new(Estimate::new(1e-3, 1e-5))
+///     .with_indentation(Estimate::new(contact.indentation_m, 1e-7))]);
 /// let layer = BondedLayer::new(5e-3, 1e-3, 0.5, Bond::Bonded)?.estimate(&load)?;
 /// assert!(
 ///     layer.youngs_modulus_pa
@@ -272,10 +256,8 @@ pub type BondedLayer = ContactEstimator<LayerLaw>;
 ///     youngs_modulus_pa: 100e3,
 ///     poisson_ratio: 0.5,
 /// }])?;
-/// let load = LoadSeries::new([LoadState {
-///     contact_radius_m: Some(Estimate::new(0.8e-3_f64, 1e-6)),
-///     ..LoadState::new(Estimate::new(5e-3, 1e-5))
-/// }]);
+/// let load = LoadSeries::new([LoadState::new(Estimate::new(5e-3, 1e-5))
+///     .with_radius(Estimate::new(0.8e-3_f64, 1e-6))]);
 /// let layered = SphereOnWaveguide::new(5e-3, 0.5, &gel, Bond::Bonded)?.estimate(&load)?;
 /// let deep = HertzSphere::new(5e-3, 0.5)?
 ///     .with_waveguide(&gel)
@@ -373,10 +355,8 @@ impl ContactEstimator<WaveguideLaw> {
     ///
     /// // On a rigid flat the linear contact is Hertz's.
     /// let contact = HertzContact::from_force(1e-3_f64, 5e-3, 40e3)?;
-    /// let load = LoadState {
-    ///     contact_radius_m: Some(Estimate::new(contact.contact_radius_m, 1e-6)),
-    ///     ..LoadState::new(Estimate::new(1e-3, 1e-5))
-    /// };
+    /// let load = LoadState::new(Estimate::new(1e-3, 1e-5))
+    ///     .with_radius(Estimate::new(contact.contact_radius_m, 1e-6));
     /// let estimator = SphereOnWaveguide::new(5e-3, 0.5, &Waveguide::rigid(), Bond::Bonded)?
     ///     .without_finite_strain();
     /// let modulus = estimator.estimate(&LoadSeries::new([load]))?;

@@ -7,15 +7,16 @@
 //! compliance of the waveguide or indenter. The interval is carried through that curve, and is open
 //! above where it reaches C.
 
+use super::bodies::Bodies;
 use super::estimate::{LoadDiagnostics, ModulusEstimate};
 use super::kind::EstimatorKind;
 use super::load::{LoadSeries, LoadState, validated};
-use super::statistics::{CommonMean, Covariance, LogErrors, common_mean, fewest, total};
+use super::statistics::{CommonMean, CommonTo, Covariance, common_mean, fewest};
 use super::warning::Warning;
 use crate::contact::Body;
 use crate::error::{ElasticityError, Quantity};
 use crate::laws::{self, ContactLaw, ContactLength, Limits, Reach};
-use tactile_core::{Estimate, Interval, statistics::quantile_95};
+use tactile_core::{Interval, Source, Uncertain, statistics::quantile_95};
 
 // The share from which the one that belongs to the answer is sought. A ball that yields alone may
 // not reach an indentation that it shares with the layers below.
@@ -36,6 +37,12 @@ pub(super) struct ContactFit<'a, L: ?Sized> {
     series: &'a LoadSeries,
     poisson_ratio: f64,
     other_compliance_per_pa: f64,
+    /// ln of the other body's compliance over the one stated, and the object's size over the one
+    /// stated: zero and one, with their errors.
+    log_compliance: Uncertain,
+    size: Uncertain,
+    /// ln of 1 − ν² over the one stated: zero, with its error.
+    log_lateral: Uncertain,
     /// Whether the law depends on the other body's part of 1/E*.
     feels_share: bool,
 }
@@ -50,24 +57,36 @@ impl<'a, L: ContactLaw + ?Sized> ContactFit<'a, L> {
         let lengths = series.loads().iter().flat_map(lengths);
         let positive = lengths.filter(|(length, _)| length.metres() > 0.0);
         let feels_share = other_compliance_per_pa > 0.0 && positive.map(|(x, _)| x).any(differs);
+        let limits = law.limits();
+        let bodies = series.bodies();
+        let log = |factor: Uncertain| factor.map(f64::ln, f64::recip);
+        let radius_m = || mean_radius(series, &limits).unwrap_or(f64::NAN);
+        let nu = bodies.map_or(Uncertain::exact(0.0), Bodies::poisson_ratio);
+        let per_ratio = -2.0 * poisson_ratio / (1.0 - poisson_ratio.powi(2));
         Self {
             law,
-            limits: law.limits(),
+            limits,
             series,
             poisson_ratio,
             other_compliance_per_pa,
+            log_compliance: bodies.map_or(Uncertain::exact(0.0), |bodies| {
+                log(bodies.guide_compliance(radius_m()))
+            }),
+            size: bodies.map_or(Uncertain::exact(1.0), Bodies::size),
+            log_lateral: nu.map(|_| 0.0, |_| per_ratio),
             feels_share,
         }
     }
 
     pub(super) fn estimate(&self, kind: EstimatorKind) -> Result<ModulusEstimate, ElasticityError> {
         let centre = self.consistent(0.0)?;
-        let (modulus, error, interval_95) = self.answer(&centre)?;
+        let (modulus_pa, interval_95) = self.answer(&centre)?;
         let diagnostics = self.diagnose(&centre);
         let bounded = interval_95.upper.is_some();
         Ok(ModulusEstimate {
-            youngs_modulus_pa: modulus,
-            standard_error_pa: error,
+            youngs_modulus_pa: modulus_pa.value,
+            standard_error_pa: modulus_pa.standard_error(),
+            by_source: modulus_pa,
             interval_95,
             estimator: kind,
             warnings: self.warnings(&diagnostics, &centre, bounded),
@@ -103,15 +122,15 @@ impl<'a, L: ContactLaw + ?Sized> ContactFit<'a, L> {
                     beyond.push(load);
                     continue;
                 };
+                let log = |number: Uncertain| number.map(f64::ln, f64::recip);
+                let of_lengths = log(measured) * slope + log(self.size) * size_slope;
+                let log_modulus = log(force.without(Source::Noise)) - of_lengths;
+                let value = force.value.ln() - log_force.value();
                 all.push(Observation {
                     load,
                     force,
                     length,
-                    relative_error: measured.relative_error(),
-                    degrees_of_freedom: measured.degrees_of_freedom,
-                    slope,
-                    size_slope,
-                    log_modulus: force.value.ln() - log_force.value(),
+                    log_modulus: log_modulus.map(|_| value, |_| 1.0),
                     law_error: log_force.error(),
                 });
             }
@@ -126,37 +145,19 @@ impl<'a, L: ContactLaw + ?Sized> ContactFit<'a, L> {
         }
     }
 
-    /// Covariances of the ln E* with their degrees of freedom: of forces, of lengths, of errors
-    /// that all have in common.
-    fn sources(&self, all: &[Observation]) -> [LogErrors; 3] {
-        let shared = self.series.shared_errors();
-        let none = Covariance::none(all.iter().map(|o| o.load));
-        let forces = match self.series.force_covariance() {
-            Some(given) => none.clone().with_given(|i, j| {
-                let loads = (all[i].load, all[j].load);
-                given[loads] / (all[i].force.value * all[j].force.value)
-            }),
-            None => none
-                .clone()
-                .with_shared_in_load(|i| all[i].force.relative_error()),
-        };
-        // The scale of the forces comes from the calibration that their own errors come from.
-        let forces = forces.with_shared(|_| shared.force_scale);
-        let lengths = none
-            .clone()
-            .with_own(|i| all[i].slope * all[i].relative_error);
-        let common = none
-            .with_shared(|i| all[i].slope * shared.length_scale)
-            .with_shared(|i| all[i].size_slope * shared.size)
-            .with_model_errors(|i| shared.adhesion(all[i].force.value))
-            .with_model_errors(|i| all[i].law_error);
-        let force_degrees = fewest(all.iter().map(|o| o.force.degrees_of_freedom));
-        let length_degrees = fewest(all.iter().map(|o| o.degrees_of_freedom));
-        [
-            (forces, force_degrees),
-            (lengths, length_degrees),
-            (common, None),
-        ]
+    /// The covariance of the ln E*. Radius and depth of one load share the noise of its force.
+    fn covariance(&self, all: &[Observation]) -> Covariance {
+        let numbers: Vec<_> = all.iter().map(|o| o.log_modulus).collect();
+        let forces = all
+            .iter()
+            .map(|o| o.force.degrees_of_freedom(Source::Noise));
+        let noise = |i: usize| all[i].force.part(Source::Noise) / all[i].force.value;
+        let bodies = self.series.bodies();
+        let adhesion = |i: usize| bodies.map_or(0.0, |b| b.adhesion(all[i].force.value));
+        Covariance::of(&numbers, all.iter().map(|o| o.load))
+            .with(Source::Noise, CommonTo::Load, fewest(forces), noise)
+            .with_model_errors(Source::Adhesion, adhesion)
+            .with_model_errors(Source::Law, |i| all[i].law_error)
     }
 
     /// E of the sample at a given ln E*. `None` where the other body leaves no compliance.
@@ -166,23 +167,13 @@ impl<'a, L: ContactLaw + ?Sized> ContactFit<'a, L> {
         (left > 0.0).then(|| (1.0 - self.poisson_ratio.powi(2)) * reduced / left)
     }
 
-    /// Standard error of ln E*: that of the mean with those of the other body's compliance C and of
-    /// ν.
+    /// ln E* with the errors of the other body's compliance C and of ν beside those of the mean.
     ///
     /// With p the sample's part of the compliance, 1 − C E* on a deep body, ln E moves by 1/p of ln
-    /// F, by 1 − 1/p of ln C and by 2ν/(1 − ν²) of ν. Beside ln E* an error of ln C counts 1 − p
-    /// times, one of ν p·2ν/(1 − ν²) times, and one of lengths minus the mean slope of ln F.
-    fn standard_error(&self, all: &[Observation], mean: &CommonMean, sample_part: f64) -> f64 {
-        let shared = self.series.shared_errors();
-        let nu_slope = 2.0 * self.poisson_ratio / (1.0 - self.poisson_ratio.powi(2));
-        let of_other_body = (1.0 - sample_part) * shared.other_body;
-        let of_poisson_ratio = sample_part * nu_slope * shared.poisson_ratio;
-        let slopes = mean.weights.iter().zip(all).map(|(w, o)| w * o.slope);
-        let of_lengths = -slopes.sum::<f64>() * shared.length_scale;
-        let together = 2.0 * shared.length_with_other_body * of_lengths * of_other_body;
-        let apart = mean.standard_error.powi(2) + of_other_body.powi(2) + of_poisson_ratio.powi(2);
-        // Of one cause both may cancel, but for rounding.
-        (apart + together).max(0.0).sqrt()
+    /// E*, by (1 − p)/p of ln C and by 1 of ln(1 − ν²). Beside ln E* an error of ln C counts 1 − p
+    /// times, one of ln(1 − ν²) p times.
+    fn with_bodies(&self, mean: &CommonMean, sample_part: f64) -> Uncertain {
+        mean.mean + self.log_compliance * (1.0 - sample_part) + self.log_lateral * sample_part
     }
 
     /// The sample's part of the compliance under the mean of the contacts.
@@ -209,21 +200,19 @@ impl<'a, L: ContactLaw + ?Sized> ContactFit<'a, L> {
     /// The mean with an assumed share of the other body, moved by `reach` times its 95 % quantile.
     fn mean_at(&self, share: f64, reach: f64) -> Result<Consistent, ElasticityError> {
         let (observations, beyond) = self.observe(share)?;
-        let logs: Vec<f64> = observations.iter().map(|o| o.log_modulus).collect();
-        let sources = self.sources(&observations);
-        let mut mean = common_mean(&logs, &total(&sources))?;
-        mean.degrees = mean.degrees_from(&sources);
-        let mut log_reduced = mean.mean;
+        let logs: Vec<f64> = observations.iter().map(|o| o.log_modulus.value).collect();
+        let mean = common_mean(&logs, &self.covariance(&observations))?;
+        let mut log_reduced = mean.mean.value;
         // Without a step an infinite error must not become NaN.
         if reach != 0.0 {
             // The assumed share is the one that follows only where the law feels it.
             let share = match self.feels_share {
                 true => share,
-                false => self.share_at(mean.mean),
+                false => self.share_at(mean.mean.value),
             };
             let part = self.sample_part(&observations, share);
-            let error = self.standard_error(&observations, &mean, part);
-            log_reduced += reach * quantile_95(mean.degrees) * error;
+            let log = self.with_bodies(&mean, part).total();
+            log_reduced += reach * quantile_95(log.degrees_of_freedom) * log.standard_error;
         }
         Ok(Consistent {
             observations,
@@ -286,9 +275,9 @@ impl<'a, L: ContactLaw + ?Sized> ContactFit<'a, L> {
         Ok(found)
     }
 
-    /// E, its standard error and its interval.
-    fn answer(&self, centre: &Consistent) -> Result<(f64, f64, Interval), ElasticityError> {
-        let known = centre.mean.standard_error.is_finite();
+    /// E and its interval.
+    fn answer(&self, centre: &Consistent) -> Result<(Uncertain, Interval), ElasticityError> {
+        let known = centre.mean.has_error();
         let limit = |reach: f64| -> Option<f64> {
             self.sample_modulus(self.consistent(reach).ok()?.log_reduced)
         };
@@ -303,10 +292,11 @@ impl<'a, L: ContactLaw + ?Sized> ContactFit<'a, L> {
         };
         let upper = if known { limit(1.0) } else { None };
         let part = self.sample_part(&centre.observations, self.share_at(centre.log_reduced));
-        let error = modulus / part * self.standard_error(&centre.observations, &centre.mean, part);
+        let log = self.with_bodies(&centre.mean, part);
+        let found = log.map(|_| modulus, |_| modulus / part);
         // Errors at rounding level may put an end on the wrong side of the estimate by a rounding.
         let upper = upper.map(|upper| upper.max(modulus));
-        Ok((modulus, error, Interval::new(lower.min(modulus), upper)))
+        Ok((found, Interval::new(lower.min(modulus), upper)))
     }
 
     fn diagnose(&self, centre: &Consistent) -> Vec<LoadDiagnostics> {
@@ -326,7 +316,7 @@ impl<'a, L: ContactLaw + ?Sized> ContactFit<'a, L> {
         for of_load in centre.observations.chunk_by(|a, b| a.load == b.load) {
             let (own, others) = rest.split_at(of_load.len());
             rest = others;
-            let log_sum: f64 = of_load.iter().map(|o| o.log_modulus).sum();
+            let log_sum: f64 = of_load.iter().map(|o| o.log_modulus.value).sum();
             let diagnostics = &mut all[of_load[0].load];
             diagnostics.used = true;
             diagnostics.youngs_modulus_pa = self.sample_modulus(log_sum / of_load.len() as f64);
@@ -367,10 +357,22 @@ impl<'a, L: ContactLaw + ?Sized> ContactFit<'a, L> {
 }
 
 /// What was measured of a load's contact.
-fn lengths(state: &LoadState) -> impl Iterator<Item = (ContactLength, Estimate)> + use<> {
+fn lengths(state: &LoadState) -> impl Iterator<Item = (ContactLength, Uncertain)> + use<> {
     let radius = (state.contact_radius_m).map(|a| (ContactLength::Radius(a.value), a));
     let depth = (state.indentation_m).map(|d| (ContactLength::Indentation(d.value), d));
     radius.into_iter().chain(depth)
+}
+
+/// The mean of the contact radii, measured or by the law from what was.
+fn mean_radius(series: &LoadSeries, limits: &Limits) -> Option<f64> {
+    let radius = |state: &LoadState| {
+        let measured = state.contact_radius_m.map(|a| a.value);
+        let depth = state.indentation_m.map(|d| d.value);
+        measured.or_else(|| Some(limits.ratio(None, depth)? * limits.radius_m?))
+    };
+    let radii = || series.loads().iter().filter_map(radius);
+    let count = radii().count();
+    (count > 0).then(|| radii().sum::<f64>() / count as f64)
 }
 
 /// Loads whose a/R is beyond the limit of a law.
@@ -393,15 +395,10 @@ struct Consistent {
 
 struct Observation {
     load: usize,
-    force: Estimate,
+    force: Uncertain,
     length: ContactLength,
-    /// Of the length.
-    relative_error: f64,
-    /// Of that error.
-    degrees_of_freedom: Option<f64>,
-    slope: f64,
-    size_slope: f64,
-    log_modulus: f64,
+    /// ln E*, but for the noise of the force and the errors of the law.
+    log_modulus: Uncertain,
     /// Standard error of ln F that is the law's.
     law_error: f64,
 }

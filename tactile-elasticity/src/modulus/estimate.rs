@@ -5,7 +5,7 @@ use super::load::LoadSeries;
 use super::warning::Warning;
 use crate::error::ElasticityError;
 use std::ops::Deref;
-use tactile_core::{Estimate, Interval};
+use tactile_core::{Interval, Uncertain};
 
 /// Estimates Young's modulus from a series of loads.
 ///
@@ -21,10 +21,7 @@ use tactile_core::{Estimate, Interval};
 /// let loads: Vec<_> = [0.01, 0.02, 0.04]
 ///     .map(|f| {
 ///         let a = (0.75 * f * 0.005 / (30e3 / 0.75f64)).cbrt();
-///         LoadState {
-///             contact_radius_m: Some(Estimate::new(a, 1e-6)),
-///             ..LoadState::new(Estimate::new(f, 1e-4))
-///         }
+///         LoadState::new(Estimate::new(f, 1e-4)).with_radius(Estimate::new(a, 1e-6))
 ///     })
 ///     .to_vec();
 /// let estimator: Box<dyn ModulusEstimator> = Box::new(HertzSphere::new(0.005, 0.5)?);
@@ -113,10 +110,8 @@ impl<P: Deref<Target: ModulusEstimator> + Send + Sync> ModulusEstimator for P {
 /// };
 ///
 /// let contact = HertzContact::from_force(0.05_f64, 3e-3, 40e3)?;
-/// let load = LoadState {
-///     contact_radius_m: Some(Estimate::new(contact.contact_radius_m, 1e-6)),
-///     ..LoadState::new(Estimate::new(0.05, 1e-4))
-/// };
+/// let load = LoadState::new(Estimate::new(0.05, 1e-4))
+///     .with_radius(Estimate::new(contact.contact_radius_m, 1e-6));
 /// let modulus: ModulusEstimate =
 ///     HertzSphere::new(3e-3, 0.5)?.estimate(&LoadSeries::new([load]))?;
 /// assert!(modulus.interval_95.contains(30e3));
@@ -134,6 +129,8 @@ pub struct ModulusEstimate {
     pub youngs_modulus_pa: f64,
     /// Its standard error, to first order.
     pub standard_error_pa: f64,
+    /// The same E with its error by source.
+    pub by_source: Uncertain,
     /// 95 % confidence interval, not symmetric where E depends on the data non-linearly.
     pub interval_95: Interval,
     /// Which estimator.
@@ -147,9 +144,9 @@ pub struct ModulusEstimate {
 }
 
 impl ModulusEstimate {
-    /// Of an estimator of one's own: E with its standard error, in pascals. The interval is
-    /// symmetric, by Student's t where the error has degrees of freedom. No lower end is below
-    /// zero.
+    /// Of an estimator of one's own: E in pascals, an [`Estimate`](tactile_core::Estimate) or a
+    /// number with its error by source. The interval is symmetric, by Student's t where the error
+    /// has degrees of freedom. No lower end is below zero.
     ///
     /// ```
     /// use tactile_elasticity::modulus::{Estimate, EstimatorKind, ModulusEstimate};
@@ -159,11 +156,14 @@ impl ModulusEstimate {
     /// assert!((estimate.interval_95.lower - (62e3 - 2.776 * 2e3)).abs() < 1.0);
     /// assert!(estimate.loads.is_empty() && estimate.warnings.is_empty());
     /// ```
-    pub fn new(estimator: EstimatorKind, youngs_modulus_pa: Estimate) -> Self {
-        let interval = youngs_modulus_pa.interval_95();
+    pub fn new(estimator: EstimatorKind, youngs_modulus_pa: impl Into<Uncertain>) -> Self {
+        let by_source = youngs_modulus_pa.into();
+        let total = by_source.total();
+        let interval = total.interval_95();
         Self {
-            youngs_modulus_pa: youngs_modulus_pa.value,
-            standard_error_pa: youngs_modulus_pa.standard_error,
+            youngs_modulus_pa: total.value,
+            standard_error_pa: total.standard_error,
+            by_source,
             interval_95: Interval::new(interval.lower.max(0.0), interval.upper),
             estimator,
             loads: Vec::new(),
@@ -185,10 +185,7 @@ impl ModulusEstimate {
 /// let contact = HertzContact::from_force(1e-3_f64, 5e-3, 40e3)?;
 /// let force = LoadState::new(Estimate::new(1e-3, 1e-5));
 /// let loads = [
-///     LoadState {
-///         contact_radius_m: Some(Estimate::new(contact.contact_radius_m, 1e-6)),
-///         ..force
-///     },
+///     force.with_radius(Estimate::new(contact.contact_radius_m, 1e-6)),
 ///     force,
 /// ];
 /// let modulus = HertzSphere::new(5e-3, 0.5)?.estimate(&LoadSeries::new(loads))?;
@@ -222,10 +219,7 @@ pub struct LoadDiagnostics {
 ///     .map(|force| {
 ///         let contact = HertzContact::from_force(force, 5e-3, 40e3)?;
 ///         let radius = Estimate::new(contact.contact_radius_m, 1e-6);
-///         Ok(LoadState {
-///             contact_radius_m: Some(radius),
-///             ..LoadState::new(Estimate::new(force, 1e-5))
-///         })
+///         Ok(LoadState::new(Estimate::new(force, 1e-5)).with_radius(radius))
 ///     })
 ///     .collect::<Result<_, tactile_elasticity::ElasticityError>>()?;
 /// let fit = HertzSphere::new(5e-3, 0.5)?

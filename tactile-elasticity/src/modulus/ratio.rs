@@ -3,11 +3,11 @@
 use super::estimate::{LoadDiagnostics, ModulusEstimate, ModulusEstimator};
 use super::kind::EstimatorKind;
 use super::load::{LoadSeries, LoadState, validated};
-use super::statistics::{CommonMean, Covariance, LogErrors, common_mean, fewest, total};
+use super::statistics::{CommonMean, CommonTo, Covariance, common_mean};
 use super::warning::Warning;
 use crate::error::{ElasticityError, Quantity};
-use tactile_core::statistics::{effective_degrees_of_freedom, quantile_95};
-use tactile_core::{Estimate, Interval};
+use tactile_core::statistics::quantile_95;
+use tactile_core::{Interval, Source, Uncertain};
 
 /// Strain beyond which one modulus no longer describes a rubber.
 pub(crate) const LINEAR_STRAIN: f64 = 0.1;
@@ -20,11 +20,9 @@ pub(crate) const LINEAR_STRAIN: f64 = 0.1;
 /// };
 ///
 /// // Two pressed frames: the strain between them belongs to the difference of their stresses.
-/// let load = |force, strain| LoadState {
-///     contact_area_m2: Some(Estimate::exact(1e-4)),
-///     mean_strain: Some(Estimate::exact(strain)),
-///     ..LoadState::new(Estimate::new(force, 1e-4))
-/// };
+/// let load = |force, strain| LoadState::new(Estimate::new(force, 1e-4))
+///     .with_area(Estimate::exact(1e-4))
+///     .with_strain(Estimate::exact(strain));
 /// let loads = LoadSeries::new([load(0.7, 0.0), load(1.2, 0.05)]);
 /// let modulus = PaperRatio::default()
 ///     .with_reference(StrainReference::FirstLoad)
@@ -55,37 +53,21 @@ pub enum StrainReference {
 ///
 /// ```
 /// use tactile_elasticity::modulus::{
-///     Estimate, LoadSeries, LoadState, ModulusEstimator, PaperRatio, SharedErrors,
-///     StrainReference, Warning,
+///     Estimate, LoadSeries, LoadState, ModulusEstimator, PaperRatio, Warning,
 /// };
 ///
-/// let load = LoadState {
-///     contact_area_m2: Some(Estimate::exact(1e-4)),
-///     contact_radius_m: Some(Estimate::exact(5.64e-3)),
-///     mean_strain: Some(Estimate::new(0.02, 1e-4)),
-///     ..LoadState::new(Estimate::new(0.12, 0.001))
-/// };
+/// let load = LoadState::new(Estimate::new(0.12, 0.001))
+///     .with_area(Estimate::exact(1e-4))
+///     .with_radius(Estimate::exact(5.64e-3))
+///     .with_strain(Estimate::new(0.02, 1e-4));
 /// let series = LoadSeries::new([load]);
-/// let plain = PaperRatio::default()
-///     .with_reference(StrainReference::Unloaded)
-///     .estimate(&series)?;
+/// let plain = PaperRatio::default().estimate(&series)?;
 /// assert!((plain.youngs_modulus_pa - 60e3_f64).abs() < 1e-6);
 ///
-/// // Errors that loads share come with the series; on a sphere the ratio is biased, and says so.
-/// let series = series.with_shared_errors(SharedErrors {
-///     force_scale: 0.01,
-///     ..SharedErrors::default()
-/// })?;
-/// let careful = PaperRatio::default()
-///     .with_sphere_radius(3e-3)?
-///     .estimate(&series)?;
-/// assert!(careful.standard_error_pa > plain.standard_error_pa);
-/// assert!(
-///     careful
-///         .warnings
-///         .iter()
-///         .any(|w| matches!(w, Warning::RatioOnSphere { .. }))
-/// );
+/// // On a sphere the ratio is biased, which is a warning.
+/// let on_sphere = PaperRatio::default().with_sphere_radius(3e-3)?.estimate(&series)?;
+/// let biased = |w: &Warning| matches!(w, Warning::RatioOnSphere { .. });
+/// assert!(on_sphere.warnings.iter().any(biased));
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -110,43 +92,41 @@ impl PaperRatio {
         Ok(self)
     }
 
-    /// The first load's own strain, where strains are counted from an earlier state but the ratio
-    /// from the first load.
-    fn first_strain(&self, loads: &[LoadState]) -> Estimate {
-        let first = loads.first().and_then(|load| load.mean_strain);
-        first
-            .filter(|_| self.reference == StrainReference::FirstLoad)
-            .unwrap_or(Estimate::exact(0.0))
-    }
-
-    fn ratios(&self, loads: &[LoadState]) -> Result<Vec<Ratio>, ElasticityError> {
+    fn ratios(&self, loads: &[LoadState]) -> Result<Ratios, ElasticityError> {
         let mut ratios = Vec::new();
         let from_first = self.reference == StrainReference::FirstLoad;
-        let base = if from_first {
-            loads.first().map(|l| stress(0, l)).transpose()?
-        } else {
-            None
-        };
-        let first_strain = self.first_strain(loads);
+        let (mut first_stress, mut first_strain) = (Uncertain::exact(0.0), Uncertain::exact(0.0));
+        if let (true, Some(first)) = (from_first, loads.first()) {
+            first_stress = stress(0, first)?;
+            // Its own strain, where strains are counted from an earlier state.
+            first_strain = first.mean_strain.unwrap_or(first_strain);
+        }
         for (load, state) in loads.iter().enumerate().skip(usize::from(from_first)) {
             let Some(strain) = state.mean_strain else {
                 continue;
             };
-            let strain = validated(strain, Quantity::Strain)?.value - first_strain.value;
-            let stress_pa = stress(load, state)?.value - base.map_or(0.0, |b| b.value);
+            // The noise of the first load is one in all ratios.
+            let own = |number: Uncertain| number.without(Source::Noise);
+            let strain = validated(strain, Quantity::Strain)? - own(first_strain);
+            let stress = stress(load, state)? - own(first_stress);
+            let (stress_pa, strain_value) = (stress.value, strain.value);
             if stress_pa == 0.0 && from_first {
                 return Err(ElasticityError::EqualLoads);
             }
-            if strain == 0.0 {
+            if strain_value == 0.0 {
                 return Err(ElasticityError::ZeroStrain);
             }
-            if stress_pa * strain <= 0.0 {
-                return Err(ElasticityError::OppositeSigns { stress_pa, strain });
+            if stress_pa * strain_value <= 0.0 {
+                return Err(ElasticityError::OppositeSigns {
+                    stress_pa,
+                    strain: strain_value,
+                });
             }
             ratios.push(Ratio {
                 load,
+                log_modulus: (stress / strain).map(f64::ln, f64::recip),
                 stress_pa,
-                strain,
+                strain: strain_value,
             });
         }
         if ratios.is_empty() {
@@ -156,81 +136,11 @@ impl PaperRatio {
                 found: loads.len().min(expected - 1),
             });
         }
-        Ok(ratios)
-    }
-
-    /// Covariances of the ln E, from forces, areas, strains and the scale of all stresses, each
-    /// with its degrees of freedom.
-    ///
-    /// d ln E = (dS_i − dS_0)/(S_i − S_0) − de_i/e_i with dS = dF/A − S dA/A. What the first load's
-    /// stress errs by, all ratios share.
-    fn sources(&self, series: &LoadSeries, ratios: &[Ratio]) -> [LogErrors; 4] {
-        let loads = series.loads();
-        let areas: Vec<_> = loads.iter().map(LoadState::area).collect();
-        let area_of = |k: usize| areas[k].map_or(1.0, |a| a.value);
-        let from_first = self.reference == StrainReference::FirstLoad;
-        let own = |i: usize| ratios[i].load;
-        let none = Covariance::none(ratios.iter().map(|r| r.load));
-
-        // Change of ln E of ratio i with the force, and with the area, of load k.
-        let by_force = |i: usize, k: usize| 1.0 / (ratios[i].stress_pa * area_of(k));
-        let by_area = |i: usize, k: usize| {
-            loads[k].force_n.value / (ratios[i].stress_pa * area_of(k).powi(2))
-        };
-        let force_error = |k: usize| loads[k].force_n.standard_error;
-        let area_error = |k: usize| areas[k].map_or(0.0, |a| a.standard_error);
-        let forces = match series.force_covariance() {
-            Some(given) => none.clone().with_given(|i, j| {
-                let (k, l) = (own(i), own(j));
-                let of_pair = |k: usize, l: usize| by_force(i, k) * by_force(j, l) * given[(k, l)];
-                let about_first = if from_first {
-                    of_pair(0, 0) - of_pair(k, 0) - of_pair(0, l)
-                } else {
-                    0.0
-                };
-                of_pair(k, l) + about_first
-            }),
-            None => {
-                let forces = none
-                    .clone()
-                    .with_own(|i| by_force(i, own(i)) * force_error(own(i)));
-                if from_first {
-                    forces.with_shared(|i| by_force(i, 0) * force_error(0))
-                } else {
-                    forces
-                }
-            }
-        };
-        // The scale of the forces comes from the calibration that their own errors come from.
-        let forces = forces.with_shared(|_| series.shared_errors().force_scale);
-        let mut of_areas = none
-            .clone()
-            .with_own(|i| by_area(i, own(i)) * area_error(own(i)));
-        if from_first {
-            of_areas = of_areas.with_shared(|i| by_area(i, 0) * area_error(0));
-        }
-        let scale = none.clone().with_shared(|_| series.size_scale_error());
-        let strains = match series.strain_covariance() {
-            Some(given) => none
-                .with_given(|i, j| given[(own(i), own(j))] / (ratios[i].strain * ratios[j].strain)),
-            None => {
-                let first = self.first_strain(loads).standard_error;
-                none.with_own(|i| {
-                    loads[own(i)].mean_strain.map_or(0.0, |e| e.standard_error) / ratios[i].strain
-                })
-                .with_shared(|i| first / ratios[i].strain)
-            }
-        };
-        let degrees = |of: &dyn Fn(usize) -> Option<Estimate>| {
-            let estimates = (0..loads.len()).filter_map(of);
-            fewest(estimates.map(|e| e.degrees_of_freedom))
-        };
-        [
-            (forces, degrees(&|k| Some(loads[k].force_n))),
-            (of_areas, degrees(&|k| areas[k])),
-            (strains, degrees(&|k| loads[k].mean_strain)),
-            (scale, None),
-        ]
+        Ok(Ratios {
+            ratios,
+            first_stress,
+            first_strain,
+        })
     }
 
     fn warnings(
@@ -267,7 +177,7 @@ impl PaperRatio {
         }
         for (r, &residual) in ratios.iter().zip(&mean.standardized_residuals) {
             diagnostics[r.load].used = true;
-            diagnostics[r.load].youngs_modulus_pa = Some(r.log().exp());
+            diagnostics[r.load].youngs_modulus_pa = Some(r.log_modulus.value.exp());
             diagnostics[r.load].standardized_residual = Some(residual);
         }
         diagnostics
@@ -276,18 +186,39 @@ impl PaperRatio {
 
 struct Ratio {
     load: usize,
+    /// ln E, but for the noise of the first load.
+    log_modulus: Uncertain,
     stress_pa: f64,
     strain: f64,
 }
 
-impl Ratio {
-    fn log(&self) -> f64 {
-        (self.stress_pa / self.strain).ln()
+/// Ratios, and what they are counted from.
+struct Ratios {
+    ratios: Vec<Ratio>,
+    first_stress: Uncertain,
+    first_strain: Uncertain,
+}
+
+impl Ratios {
+    /// d ln E = (dSᵢ − dS₀)/(Sᵢ − S₀) − (deᵢ − de₀)/(eᵢ − e₀).
+    fn mean(&self) -> Result<CommonMean, ElasticityError> {
+        let ratios = &self.ratios;
+        let numbers: Vec<_> = ratios.iter().map(|r| r.log_modulus).collect();
+        let logs: Vec<f64> = numbers.iter().map(|log| log.value).collect();
+        let first = |of: &Uncertain| (of.part(Source::Noise), of.degrees_of_freedom(Source::Noise));
+        let (stress, stress_degrees) = first(&self.first_stress);
+        let (strain, strain_degrees) = first(&self.first_strain);
+        let by_stress = |i: usize| stress / ratios[i].stress_pa;
+        let by_strain = |i: usize| strain / ratios[i].strain;
+        let covariance = Covariance::of(&numbers, ratios.iter().map(|r| r.load))
+            .with(Source::Noise, CommonTo::All, stress_degrees, by_stress)
+            .with(Source::Noise, CommonTo::All, strain_degrees, by_strain);
+        common_mean(&logs, &covariance)
     }
 }
 
 /// Mean stress of a load with its error. The area must be above zero.
-pub(crate) fn stress(load: usize, state: &LoadState) -> Result<Estimate, ElasticityError> {
+pub(crate) fn stress(load: usize, state: &LoadState) -> Result<Uncertain, ElasticityError> {
     let force = validated(state.force_n, Quantity::Force)?;
     let quantity = if state.contact_area_m2.is_some() {
         Quantity::ContactArea
@@ -306,30 +237,25 @@ pub(crate) fn stress(load: usize, state: &LoadState) -> Result<Estimate, Elastic
     };
     let area = validated(state.area().ok_or(missing)?, quantity)?;
     quantity.positive(area.value)?;
-    let value = force.value / area.value;
-    let standard_error = (force.standard_error / area.value).hypot(value * area.relative_error());
-    let parts = [force, area].map(|e| (e.relative_error().powi(2), e.degrees_of_freedom));
-    let mut stress = Estimate::new(value, standard_error);
-    stress.degrees_of_freedom = effective_degrees_of_freedom(&parts);
-    Ok(stress)
+    Ok(force / area)
 }
 
 impl ModulusEstimator for PaperRatio {
     fn estimate(&self, series: &LoadSeries) -> Result<ModulusEstimate, ElasticityError> {
         let loads = series.loads();
         let ratios = self.ratios(loads)?;
-        let sources = self.sources(series, &ratios);
-        let logs: Vec<f64> = ratios.iter().map(Ratio::log).collect();
-        let mean = common_mean(&logs, &total(&sources))?;
-        let reach = quantile_95(mean.degrees_from(&sources)) * mean.standard_error;
-        let modulus = mean.mean.exp();
-        let diagnostics = self.diagnose(loads, &ratios, &mean);
+        let mean = ratios.mean()?;
+        let log = mean.mean.total();
+        let reach = quantile_95(log.degrees_of_freedom) * log.standard_error;
+        let by_source = mean.mean.map(f64::exp, f64::exp);
+        let diagnostics = self.diagnose(loads, &ratios.ratios, &mean);
         Ok(ModulusEstimate {
-            youngs_modulus_pa: modulus,
-            standard_error_pa: (modulus * mean.standard_error),
+            youngs_modulus_pa: by_source.value,
+            standard_error_pa: by_source.standard_error(),
+            by_source,
             interval_95: Interval::new(
-                (mean.mean - reach).exp(),
-                reach.is_finite().then(|| (mean.mean + reach).exp()),
+                (log.value - reach).exp(),
+                reach.is_finite().then(|| (log.value + reach).exp()),
             ),
             estimator: EstimatorKind::PaperRatio,
             warnings: self.warnings(loads, &diagnostics, &mean),

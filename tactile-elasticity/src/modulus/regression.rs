@@ -8,7 +8,7 @@ use super::statistics::{chi_squared_tail, fewest, t_tail};
 use super::warning::Warning;
 use crate::error::{ElasticityError, Quantity};
 use tactile_core::statistics::{effective_degrees_of_freedom, quantile_95};
-use tactile_core::{Estimate, Interval};
+use tactile_core::{Interval, Source, Uncertain};
 
 /// S_i = S₀ + E e_i over many loads, with errors in both.
 ///
@@ -21,11 +21,9 @@ use tactile_core::{Estimate, Interval};
 ///     Estimate, LoadSeries, LoadState, ModulusEstimator, StressStrainRegression,
 /// };
 /// let load = |stress: f64, strain: f64| {
-///     LoadState {
-///         contact_area_m2: Some(Estimate::exact(1e-6)), // one square millimetre
-///         mean_strain: Some(Estimate::new(strain, 1e-4)),
-///         ..LoadState::new(Estimate::new(stress * 1e-6, 1e-5))
-///     }
+///     LoadState::new(Estimate::new(stress * 1e-6, 1e-5))
+///         .with_area(Estimate::exact(1e-6))
+///         .with_strain(Estimate::new(strain, 1e-4))
 /// };
 /// let loads = LoadSeries::new([load(600.0, 0.01), load(1200.0, 0.02), load(2400.0, 0.04)]);
 /// let modulus = StressStrainRegression::default().estimate(&loads)?;
@@ -47,11 +45,9 @@ impl StressStrainRegression {
     /// };
     ///
     /// // Stress that starts at 300 Pa: a gauge that was not tared.
-    /// let loads = [0.01, 0.02, 0.03, 0.04].map(|strain: f64| LoadState {
-    ///     contact_area_m2: Some(Estimate::exact(1e-4)),
-    ///     mean_strain: Some(Estimate::exact(strain)),
-    ///     ..LoadState::new(Estimate::new((300.0 + 60e3 * strain) * 1e-4, 1e-4))
-    /// });
+    /// let loads = [0.01, 0.02, 0.03, 0.04].map(|strain: f64| LoadState::new(Estimate::new((300.0 + 60e3 * strain) * 1e-4, 1e-4))
+    ///     .with_area(Estimate::exact(1e-4))
+    ///     .with_strain(Estimate::exact(strain)));
     /// let (loads, line) = (LoadSeries::new(loads), StressStrainRegression::default());
     /// let tested = line.estimate(&loads)?;
     /// assert!(
@@ -104,7 +100,7 @@ impl StressStrainRegression {
     fn known(points: &[Point]) -> bool {
         points
             .iter()
-            .any(|p| p.stress.standard_error > 0.0 || p.strain.standard_error > 0.0)
+            .any(|p| [p.stress, p.strain].iter().any(|x| noise(x) > 0.0))
     }
 
     fn check(&self, points: &[Point], known: bool) -> Result<(), ElasticityError> {
@@ -133,35 +129,32 @@ impl StressStrainRegression {
         Ok(())
     }
 
-    /// Degrees of freedom of the slope's error: those of the scatter, or of the sources, the
-    /// stresses counted as one. `scales` are the variances that all stresses share, with their
-    /// degrees of freedom.
-    fn degrees(points: &[Point], line: &Line, scales: [(f64, Option<f64>); 2]) -> Option<f64> {
-        if line.learnt {
-            return Some(line.degrees as f64);
-        }
-        let stress = points
-            .iter()
-            .map(|p| p.stress.standard_error.powi(2))
-            .sum::<f64>();
-        let strain = points
-            .iter()
-            .map(|p| (line.slope * p.strain.standard_error).powi(2))
-            .sum::<f64>();
-        // What the slope's error has of either, in proportion.
-        let unit = line.slope_error.powi(2) / (stress + strain);
-        effective_degrees_of_freedom(&[
-            (
-                unit * stress,
-                fewest(points.iter().map(|p| p.stress.degrees_of_freedom)),
-            ),
-            (
-                unit * strain,
-                fewest(points.iter().map(|p| p.strain.degrees_of_freedom)),
-            ),
-            scales[0],
-            scales[1],
-        ])
+    /// The slope with its error by source. What sources beside noise do to stresses and strains
+    /// moves the slope as they move the points: S by dS and e by de move it by
+    /// Σ w (e − ē)(dS − E de)/Σ w (e − ē)².
+    fn by_source(points: &[Point], line: &Line) -> Uncertain {
+        let noise = |of: fn(&Point) -> &Uncertain, scale: f64| {
+            let variance = points
+                .iter()
+                .map(|p| (scale * of(p).part(Source::Noise)).powi(2));
+            let degrees = points
+                .iter()
+                .map(|p| of(p).degrees_of_freedom(Source::Noise));
+            (variance.sum::<f64>(), fewest(degrees))
+        };
+        let parts = [noise(|p| &p.stress, 1.0), noise(|p| &p.strain, line.slope)];
+        let degrees = match line.learnt {
+            true => Some(line.degrees as f64),
+            false => effective_degrees_of_freedom(&parts),
+        };
+        let moved = |sum: Uncertain, (p, weight): (&Point, &f64)| {
+            let shift = p.stress - p.strain * line.slope;
+            sum + shift.without(Source::Noise) * *weight
+        };
+        let weighed = points.iter().zip(&line.weights);
+        let common = weighed.fold(Uncertain::exact(0.0), moved);
+        let slope = common.map(|_| line.slope, |_| 1.0);
+        slope.by_estimated(Source::Noise, line.slope_error, degrees)
     }
 
     fn warnings(&self, loads: &[LoadState], line: &Line) -> Vec<Warning> {
@@ -196,9 +189,7 @@ fn diagnostics(points: &[Point], line: &Line, known: bool, loads: usize) -> Vec<
     for p in points {
         let residual = p.stress.value - line.intercept - line.slope * p.strain.value;
         let spread = if known {
-            p.stress
-                .standard_error
-                .hypot(line.slope * p.strain.standard_error)
+            p.spread(line.slope)
         } else {
             (line.chi_squared / line.degrees.max(1) as f64).sqrt()
         };
@@ -214,18 +205,13 @@ impl ModulusEstimator for StressStrainRegression {
         let points = Self::points(loads)?;
         let known = Self::known(&points);
         let line = self.line(&points)?;
-        // The scale of the forces comes from the calibration that their own errors come from.
-        let forces = fewest(loads.iter().map(|load| load.force_n.degrees_of_freedom));
-        let scales = [
-            (series.shared_errors().force_scale, forces),
-            (series.size_scale_error(), None),
-        ]
-        .map(|(relative, degrees)| ((line.slope * relative).powi(2), degrees));
-        let error = (line.slope_error.powi(2) + scales[0].0 + scales[1].0).sqrt();
-        let reach = error * quantile_95(Self::degrees(&points, &line, scales));
+        let by_source = Self::by_source(&points, &line);
+        let total = by_source.total();
+        let reach = total.standard_error * quantile_95(total.degrees_of_freedom);
         Ok(ModulusEstimate {
             youngs_modulus_pa: line.slope,
-            standard_error_pa: error,
+            standard_error_pa: total.standard_error,
+            by_source,
             interval_95: Interval::new((line.slope - reach).max(0.0), Some(line.slope + reach)),
             estimator: EstimatorKind::StressStrainRegression,
             loads: diagnostics(&points, &line, known, loads.len()),
@@ -240,7 +226,7 @@ impl ModulusEstimator for StressStrainRegression {
 }
 
 /// A straight line with its errors.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub(super) struct Line {
     pub(super) slope: f64,
     pub(super) intercept: f64,
@@ -250,12 +236,25 @@ pub(super) struct Line {
     degrees: usize,
     learnt: bool,
     excess: Option<f64>,
+    /// What a change of each stress does to the slope.
+    weights: Vec<f64>,
 }
 
 pub(super) struct Point {
     load: usize,
-    strain: Estimate,
-    stress: Estimate,
+    strain: Uncertain,
+    stress: Uncertain,
+}
+
+impl Point {
+    /// Standard deviation of the stress from the line by noise.
+    fn spread(&self, slope: f64) -> f64 {
+        noise(&self.stress).hypot(slope * noise(&self.strain))
+    }
+}
+
+fn noise(number: &Uncertain) -> f64 {
+    number.part(Source::Noise).abs()
 }
 
 impl Line {
@@ -268,9 +267,7 @@ impl Line {
         }
         for _ in 0..50 {
             let slope = line.slope;
-            let variance = |p: &Point| {
-                p.stress.standard_error.powi(2) + (slope * p.strain.standard_error).powi(2)
-            };
+            let variance = |p: &Point| p.spread(slope).powi(2);
             let floor = points.iter().map(variance).fold(0.0, f64::max) * 1e-12;
             line = Self::weighted(points, |p| 1.0 / variance(p).max(floor), free, true);
             if (line.slope - slope).abs() <= 1e-12 * slope.abs() {
@@ -316,6 +313,9 @@ impl Line {
             degrees,
             learnt,
             excess,
+            weights: (points.iter())
+                .map(|p| weight(p) * (p.strain.value - cx) / sxx)
+                .collect(),
         }
     }
 }

@@ -5,7 +5,7 @@ use super::warning::Warning;
 use crate::error::{ElasticityError, Quantity};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use statrs::distribution::{ChiSquared, ContinuousCDF, StudentsT};
-use tactile_core::statistics::effective_degrees_of_freedom;
+use tactile_core::{Source, Uncertain};
 
 /// The smallest of the degrees of freedom that are not infinite.
 pub(crate) fn fewest(degrees: impl Iterator<Item = Option<f64>>) -> Option<f64> {
@@ -25,12 +25,10 @@ pub(crate) fn t_tail(x: f64, degrees: usize) -> f64 {
 /// The best common mean of correlated numbers.
 #[derive(Debug, Clone)]
 pub(crate) struct CommonMean {
-    pub(crate) mean: f64,
-    /// Standard error, scaled up where the scatter exceeds the covariance.
-    pub(crate) standard_error: f64,
+    /// The mean, its error by source, scaled up where the scatter exceeds the errors. All of it is
+    /// noise, with the scatter's degrees of freedom, where no error was given.
+    pub(crate) mean: Uncertain,
     chi_squared: f64,
-    /// Degrees of freedom where the error was learnt from the scatter. None where it was given.
-    pub(crate) degrees: Option<f64>,
     /// χ²/ν where it was used to scale the error up.
     excess: Option<f64>,
     pub(crate) standardized_residuals: Vec<f64>,
@@ -45,6 +43,11 @@ impl CommonMean {
         FitStatistics::new(observations, 1, self.chi_squared)
     }
 
+    /// Whether its error is known, or was learnt from the scatter.
+    pub(crate) fn has_error(&self) -> bool {
+        self.mean.standard_error().is_finite()
+    }
+
     /// Cautions that follow from the scatter and the errors. `bounded` is whether the interval has
     /// an upper end.
     pub(crate) fn warnings(&self, bounded: bool) -> Vec<Warning> {
@@ -55,23 +58,12 @@ impl CommonMean {
             })
             .into_iter()
             .collect();
-        if self.standard_error.is_infinite() {
+        if !self.has_error() {
             warnings.push(Warning::NoErrorEstimate);
         } else if !bounded {
             warnings.push(Warning::UnboundedAbove);
         }
         warnings
-    }
-
-    /// Degrees of freedom of the standard error. Those of its independent sources, each with its
-    /// covariance, where the scatter did not tell it.
-    pub(crate) fn degrees_from(&self, sources: &[LogErrors]) -> Option<f64> {
-        let parts: Vec<_> = sources
-            .iter()
-            .map(|(covariance, degrees)| (covariance.variance_of_sum(&self.weights), *degrees))
-            .collect();
-        self.degrees
-            .or_else(|| effective_degrees_of_freedom(&parts))
     }
 }
 
@@ -102,10 +94,10 @@ pub(crate) fn common_mean(
     let centre = ones.dot(&numbers) / weight;
     let about_centre = numbers - &ones * centre;
 
-    let k = covariance.shared().len();
+    let k = covariance.common().count();
     let mut shift = DVector::zeros(k);
     let mut beyond = DMatrix::zeros(n, k);
-    for (j, column) in covariance.shared().iter().enumerate() {
+    for (j, column) in covariance.common().enumerate() {
         let column = factor.whiten(column.clone());
         shift[j] = ones.dot(&column) / weight;
         beyond.set_column(j, &(column - &ones * shift[j]));
@@ -125,17 +117,19 @@ pub(crate) fn common_mean(
     let scale = chi_squared / degrees.max(1) as f64;
     let excess =
         degrees > 0 && known && chi_squared_tail(chi_squared, degrees) < EXCESS_PROBABILITY;
-    let learnt = !known || excess;
-    let unit = if learnt { scale } else { 1.0 };
+    let from_scatter = !known || excess;
+    let unit = if from_scatter { scale } else { 1.0 };
+    let standard_error = match !known && degrees == 0 {
+        true => f64::INFINITY,
+        false => (unit * variance_of_mean).sqrt(),
+    };
+    let learnt = (from_scatter && degrees > 0).then_some(degrees as f64);
     Ok(CommonMean {
-        mean,
-        standard_error: if !known && degrees == 0 {
-            f64::INFINITY
-        } else {
-            (unit * variance_of_mean).sqrt()
+        mean: match known {
+            true => covariance.of_mean(mean, &weights, standard_error, learnt),
+            false => Uncertain::exact(mean).by_estimated(Source::Noise, standard_error, learnt),
         },
         chi_squared,
-        degrees: (learnt && degrees > 0).then_some(degrees as f64),
         excess: excess.then_some(scale),
         standardized_residuals: standardized(z, mean, known.then_some(covariance), unit),
         weights,
@@ -156,137 +150,156 @@ fn standardized(z: &[f64], mean: f64, covariance: Option<&Covariance>, unit: f64
     z.iter().enumerate().map(over_spread).collect()
 }
 
-/// The covariance Σ = diag(v) + Σ_load s sᵀ + U Uᵀ + G of n numbers.
+/// Which numbers one error is common to.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum CommonTo {
+    /// Every number has another one.
+    None,
+    /// The numbers of one load.
+    Load,
+    /// All numbers.
+    All,
+}
+
+/// What one standard deviation of an error does to every number.
+#[derive(Debug, Clone)]
+struct ErrorOf {
+    source: Source,
+    common_to: CommonTo,
+    effects: DVector<f64>,
+    degrees_of_freedom: Option<f64>,
+}
+
+/// The covariance Σ = diag(v) + Σ_load s sᵀ + U Uᵀ of n numbers.
 ///
 /// v are variances of errors that each number has for itself, s standard errors that the numbers of
-/// one load have in common, the columns of U those that all have in common, and G is a matrix that
-/// was given. Without G, products and solutions take O(n k²) time and O(n k) memory with k columns.
-/// A given matrix is factorised in O(n³).
+/// one load have in common, the columns of U those that all have in common. Products and solutions
+/// take O(n k²) time and O(n k) memory with k columns.
 #[derive(Debug, Clone)]
 pub(crate) struct Covariance {
     /// The load that each number belongs to. Numbers of one load are neighbours.
     loads: Vec<usize>,
-    own: DVector<f64>,
-    within_loads: Vec<DVector<f64>>,
-    shared: Vec<DVector<f64>>,
-    given: Option<DMatrix<f64>>,
+    errors: Vec<ErrorOf>,
 }
 
 impl Covariance {
-    /// No errors at all, of numbers that belong to these loads.
-    pub(crate) fn none(loads: impl Iterator<Item = usize>) -> Self {
-        let loads: Vec<usize> = loads.collect();
-        Self {
-            own: DVector::zeros(loads.len()),
-            loads,
-            within_loads: Vec::new(),
-            shared: Vec::new(),
-            given: None,
+    /// Of numbers, each with the load it belongs to. A source is one error of all numbers, noise is
+    /// another one in each.
+    pub(crate) fn of(numbers: &[Uncertain], loads: impl Iterator<Item = usize>) -> Self {
+        let none = Self {
+            loads: loads.collect(),
+            errors: Vec::new(),
+        };
+        Source::ALL.into_iter().fold(none, |sum, source| {
+            let common_to = match source {
+                Source::Noise => CommonTo::None,
+                _ => CommonTo::All,
+            };
+            let degrees = fewest(numbers.iter().map(|x| x.degrees_of_freedom(source)));
+            sum.with(source, common_to, degrees, |i| numbers[i].part(source))
+        })
+    }
+
+    /// With another error beside these: what one standard deviation of it does to each number.
+    pub(crate) fn with(
+        mut self,
+        source: Source,
+        common_to: CommonTo,
+        degrees_of_freedom: Option<f64>,
+        effect: impl Fn(usize) -> f64,
+    ) -> Self {
+        let effects = DVector::from_fn(self.len(), |i, _| effect(i));
+        if effects.iter().any(|&u| u != 0.0) {
+            self.errors.push(ErrorOf {
+                source,
+                common_to,
+                effects,
+                degrees_of_freedom,
+            });
         }
-    }
-
-    /// With the standard error that each number has for itself.
-    pub(crate) fn with_own(mut self, standard_error: impl Fn(usize) -> f64) -> Self {
-        self.own
-            .iter_mut()
-            .enumerate()
-            .for_each(|(i, v)| *v += standard_error(i).powi(2));
         self
     }
 
-    /// With standard errors that the numbers of one load have in common.
-    pub(crate) fn with_shared_in_load(mut self, standard_error: impl Fn(usize) -> f64) -> Self {
-        self.within_loads.push(self.column(standard_error));
-        self
-    }
-
-    /// With standard errors that all numbers have in common: what one standard error of the cause
-    /// does to each.
-    pub(crate) fn with_shared(mut self, standard_error: impl Fn(usize) -> f64) -> Self {
-        let column = self.column(standard_error);
-        if column.iter().any(|&u| u != 0.0) {
-            self.shared.push(column);
-        }
-        self
-    }
-
-    /// With standard errors of a law or a table that err the same way at all loads as far as the
-    /// smallest goes. What they err beyond that at the others is not known to be in proportion:
-    /// counted as common, the weighted mean would extrapolate it away.
-    pub(crate) fn with_model_errors(self, standard_error: impl Fn(usize) -> f64) -> Self {
+    /// With errors of a law or a table that err the same way at all loads as far as the smallest
+    /// goes. What they err beyond that at the others is not known to be in proportion: counted as
+    /// common, the weighted mean would extrapolate it away.
+    pub(crate) fn with_model_errors(
+        self,
+        source: Source,
+        standard_error: impl Fn(usize) -> f64,
+    ) -> Self {
         let least = (0..self.len())
             .map(&standard_error)
             .fold(f64::INFINITY, f64::min);
-        self.with_shared(|_| least)
-            .with_own(|i| (standard_error(i).powi(2) - least.powi(2)).max(0.0).sqrt())
-    }
-
-    /// With a matrix of all pairs.
-    pub(crate) fn with_given(mut self, entry: impl FnMut(usize, usize) -> f64) -> Self {
-        let matrix = DMatrix::from_fn(self.len(), self.len(), entry);
-        self.given = Some(match self.given.take() {
-            Some(given) => given + matrix,
-            None => matrix,
-        });
-        self
-    }
-
-    /// The sum with the covariance of independent errors of the same numbers.
-    fn plus(mut self, other: &Self) -> Self {
-        self.own += &other.own;
-        self.within_loads.extend_from_slice(&other.within_loads);
-        self.shared.extend_from_slice(&other.shared);
-        match &other.given {
-            Some(given) => self.with_given(|i, j| given[(i, j)]),
-            None => self,
-        }
-    }
-
-    fn column(&self, entry: impl Fn(usize) -> f64) -> DVector<f64> {
-        DVector::from_fn(self.len(), |i, _| entry(i))
+        let beyond = |i| (standard_error(i).powi(2) - least.powi(2)).max(0.0).sqrt();
+        self.with(source, CommonTo::All, None, |_| least)
+            .with(source, CommonTo::None, None, beyond)
     }
 
     fn len(&self) -> usize {
         self.loads.len()
     }
 
-    /// What one standard error of each shared cause does to every number.
-    fn shared(&self) -> &[DVector<f64>] {
-        &self.shared
+    fn effects(&self, common_to: CommonTo) -> impl Iterator<Item = &DVector<f64>> {
+        let errors = self.errors.iter();
+        errors
+            .filter(move |error| error.common_to == common_to)
+            .map(|error| &error.effects)
+    }
+
+    /// The columns of U.
+    fn common(&self) -> impl Iterator<Item = &DVector<f64>> {
+        self.effects(CommonTo::All)
+    }
+
+    /// A weighted mean with this standard error, its parts in the proportion that the errors have
+    /// in it. `learnt` are the degrees of freedom of an error that was scaled up to the scatter.
+    fn of_mean(
+        &self,
+        value: f64,
+        weights: &DVector<f64>,
+        standard_error: f64,
+        learnt: Option<f64>,
+    ) -> Uncertain {
+        let mut mean = Uncertain::exact(value);
+        for error in &self.errors {
+            let degrees = learnt.or(error.degrees_of_freedom);
+            mean = mean.by_estimated(error.source, self.effect_on(weights, error), degrees);
+        }
+        match mean.standard_error() {
+            // Rounding alone is left of errors that cancel.
+            0.0 => mean.by(Source::Noise, standard_error),
+            total => mean.map(|value| value, |_| standard_error / total),
+        }
+    }
+
+    /// What one standard deviation of an error does to a weighted sum.
+    fn effect_on(&self, weights: &DVector<f64>, error: &ErrorOf) -> f64 {
+        let each = error.effects.component_mul(weights);
+        match error.common_to {
+            CommonTo::None => each.norm(),
+            CommonTo::All => each.sum(),
+            CommonTo::Load => (self.ranges())
+                .map(|load| each.rows_range(load).sum())
+                .fold(0.0, f64::hypot),
+        }
     }
 
     /// Σᵢᵢ.
     fn variance(&self, i: usize) -> f64 {
-        let shared = self.shared.iter().map(|u| u[i].powi(2));
-        self.unshared_variance(i) + shared.sum::<f64>()
+        let all = self.errors.iter().map(|error| error.effects[i].powi(2));
+        all.sum()
     }
 
     /// (Σ − U Uᵀ)ᵢᵢ.
     fn unshared_variance(&self, i: usize) -> f64 {
-        let given = self.given.as_ref().map_or(0.0, |g| g[(i, i)]);
-        let within = self.within_loads.iter().map(|u| u[i].powi(2));
-        self.own[i] + given + within.sum::<f64>()
+        let unshared = self.errors.iter().filter(|e| e.common_to != CommonTo::All);
+        unshared.map(|error| error.effects[i].powi(2)).sum()
     }
 
     /// Whether any error is above zero.
     fn is_known(&self) -> bool {
         (0..self.len()).any(|i| self.variance(i) > 0.0)
-    }
-
-    /// wᵀΣw, the variance of a weighted sum.
-    fn variance_of_sum(&self, weights: &DVector<f64>) -> f64 {
-        let own = self.own.component_mul(weights).dot(weights);
-        let shared: f64 = self.shared.iter().map(|u| u.dot(weights).powi(2)).sum();
-        let given = self
-            .given
-            .as_ref()
-            .map_or(0.0, |g| weights.dot(&(g * weights)));
-        let within = |u: &DVector<f64>| -> f64 {
-            let sum_of_load =
-                |load: std::ops::Range<usize>| load.map(|i| u[i] * weights[i]).sum::<f64>();
-            self.ranges().map(|load| sum_of_load(load).powi(2)).sum()
-        };
-        own + shared + given + self.within_loads.iter().map(within).sum::<f64>()
     }
 
     /// The ranges of numbers that belong to one load.
@@ -299,17 +312,15 @@ impl Covariance {
         })
     }
 
-    /// Σ − U Uᵀ over a range of numbers.
-    fn unshared(&self, range: &std::ops::Range<usize>) -> DMatrix<f64> {
-        let start = range.start;
-        let in_one_load = |i: usize, j: usize| self.loads[i] == self.loads[j];
-        DMatrix::from_fn(range.len(), range.len(), |r, c| {
-            let (i, j) = (start + r, start + c);
-            let own = if i == j { self.own[i] } else { 0.0 };
-            let given = self.given.as_ref().map_or(0.0, |g| g[(i, j)]);
-            let within = self.within_loads.iter().map(|u| u[i] * u[j]);
-            let within: f64 = if in_one_load(i, j) { within.sum() } else { 0.0 };
-            own + given + within
+    /// Σ − U Uᵀ over the numbers of one load.
+    fn unshared(&self, range: std::ops::Range<usize>) -> DMatrix<f64> {
+        let numbers = range.len();
+        DMatrix::from_fn(numbers, numbers, |r, c| {
+            let (i, j) = (range.start + r, range.start + c);
+            let within = self.effects(CommonTo::Load).map(|u| u[i] * u[j]);
+            let own = self.effects(CommonTo::None).map(|u| u[i] * u[j]);
+            let own: f64 = if i == j { own.sum() } else { 0.0 };
+            own + within.sum::<f64>()
         })
     }
 
@@ -328,14 +339,11 @@ impl Covariance {
         };
         let ridge = 1e-12 * scale;
         let block = |range: std::ops::Range<usize>| {
-            let lower = ridged_cholesky(self.unshared(&range), ridge)?.unpack();
-            Ok((range.start, lower))
+            let start = range.start;
+            let lower = ridged_cholesky(self.unshared(range), ridge)?.unpack();
+            Ok((start, lower))
         };
-        let blocks = if self.given.is_some() {
-            vec![block(0..self.len())?]
-        } else {
-            self.ranges().map(block).collect::<Result<_, _>>()?
-        };
+        let blocks = self.ranges().map(block).collect::<Result<_, _>>()?;
         Ok(Factor { blocks })
     }
 }
@@ -389,20 +397,6 @@ fn ridged_cholesky(sigma: DMatrix<f64>, ridge: f64) -> Result<Cholesky<f64, Dyn>
         .ok_or(ElasticityError::Covariance {
             quantity: Quantity::Force,
         })
-}
-
-/// The covariance of logarithms of moduli from one source of error, and its degrees of freedom:
-/// those of the least known error, for repetition does not improve a standard error that all loads
-/// take from one calibration.
-pub(crate) type LogErrors = (Covariance, Option<f64>);
-
-/// The covariance of all sources together, which are independent of one another.
-pub(crate) fn total(sources: &[LogErrors]) -> Covariance {
-    let [first, rest @ ..] = sources else {
-        return Covariance::none(std::iter::empty());
-    };
-    rest.iter()
-        .fold(first.0.clone(), |sum, source| sum.plus(&source.0))
 }
 
 #[cfg(test)]

@@ -12,11 +12,19 @@ fn shared_errors_give_what_the_matrix_of_all_pairs_gives() {
     let in_load = |i: usize| 0.2 - 0.02 * i as f64;
     let scale = |_: usize| 0.3;
     let slope = |i: usize| 0.05 * (i as f64 - 1.0);
-    let covariance = Covariance::none(loads.into_iter())
-        .with_own(own)
-        .with_shared_in_load(in_load)
-        .with_shared(scale)
-        .with_shared(slope);
+    let number = |i: usize| {
+        Uncertain::exact(z[i])
+            .by(Source::Noise, own(i))
+            .by(Source::Gain, scale(i))
+            .by(Source::PixelSize, slope(i))
+    };
+    let numbers: [_; 6] = std::array::from_fn(number);
+    let covariance = Covariance::of(&numbers, loads.into_iter()).with(
+        Source::Noise,
+        CommonTo::Load,
+        None,
+        in_load,
+    );
     let dense = DMatrix::from_fn(6, 6, |i, j| {
         let own = if i == j { own(i).powi(2) } else { 0.0 };
         let in_load = if loads[i] == loads[j] {
@@ -35,34 +43,31 @@ fn shared_errors_give_what_the_matrix_of_all_pairs_gives() {
 
     // Inverting a matrix of this condition (10²) costs three of sixteen digits.
     let found = common_mean(&z, &covariance).unwrap();
-    assert_relative_eq!(found.mean, mean, max_relative = 1e-12);
+    assert_relative_eq!(found.mean.value, mean, max_relative = 1e-12);
     assert_relative_eq!(
-        found.standard_error.powi(2),
+        found.mean.standard_error().powi(2),
         1.0 / information,
         max_relative = 1e-12
     );
     assert_relative_eq!(found.chi_squared, chi_squared, max_relative = 1e-11);
     assert_relative_eq!(found.weights, weights, max_relative = 1e-11);
-    let variance = weights.dot(&(&dense * &weights));
+    let of_scale: f64 = (0..6).map(|i| weights[i] * scale(i)).sum();
     assert_relative_eq!(
-        covariance.variance_of_sum(&weights),
-        variance,
-        max_relative = 1e-12
+        found.mean.part(Source::Gain),
+        of_scale,
+        max_relative = 1e-11
     );
-    let given = Covariance::none(loads.into_iter()).with_given(|i, j| dense[(i, j)]);
-    let of_matrix = common_mean(&z, &given).unwrap();
-    assert_relative_eq!(of_matrix.mean, mean, max_relative = 1e-12);
-    assert_relative_eq!(of_matrix.chi_squared, chi_squared, max_relative = 1e-11);
 }
 
 #[test]
 fn a_shared_error_far_above_all_others_costs_no_digits() {
-    let covariance = Covariance::none(0..3)
-        .with_own(|_| 1e-9)
-        .with_shared(|_| 1.0);
+    let number = Uncertain::exact(0.0)
+        .by(Source::Noise, 1e-9)
+        .by(Source::Gain, 1.0);
+    let covariance = Covariance::of(&[number; 3], 0..3);
     let found = common_mean(&[1.0, 1.0 + 1e-9, 1.0 - 1e-9], &covariance).unwrap();
-    assert_relative_eq!(found.mean, 1.0, max_relative = 1e-15);
-    assert_relative_eq!(found.standard_error, 1.0, max_relative = 1e-12);
+    assert_relative_eq!(found.mean.value, 1.0, max_relative = 1e-15);
+    assert_relative_eq!(found.mean.standard_error(), 1.0, max_relative = 1e-12);
     // Two residuals of one standard error each. z itself is rounded to 1e-16, a ten-millionth of
     // them.
     assert_relative_eq!(found.chi_squared, 2.0, max_relative = 1e-6);

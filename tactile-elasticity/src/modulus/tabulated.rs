@@ -1,14 +1,15 @@
 //! Young's modulus of a ball from a table of its contacts.
 
+use super::bodies::Bodies;
 use super::contact_fit::large_contacts;
 use super::estimate::{LoadDiagnostics, ModulusEstimate, ModulusEstimator};
 use super::kind::EstimatorKind;
 use super::load::{LoadSeries, LoadState, validated};
-use super::statistics::{CommonMean, Covariance, LogErrors, common_mean, fewest, total};
+use super::statistics::{CommonMean, Covariance, common_mean};
 use crate::contact::{ContactTable, TabulatedForce, Waveguide};
 use crate::error::{ElasticityError, Quantity};
 use std::sync::Arc;
-use tactile_core::{Estimate, Interval, statistics::quantile_95};
+use tactile_core::{Interval, Source, Uncertain, statistics::quantile_95};
 
 /// A soft ball on the guide, or the rigid flat, of a [`ContactTable`]: the E at which the tabulated
 /// forces at the measured contact radii fit the measured forces best, all loads at once.
@@ -16,8 +17,7 @@ use tactile_core::{Estimate, Interval, statistics::quantile_95};
 /// ln F(aᵢ, E) = ln Fᵢ is solved for ln E by generalised least squares (Gauss–Newton), with the
 /// covariance of forces and radii, the errors that all loads share, and the table's own error. The
 /// interval is carried through the table, and is open above where it leaves it. Loads outside the
-/// table are not used, with a warning. O(n) in the loads (O(n³) with a given covariance), some
-/// microseconds for two.
+/// table are not used, with a warning. O(n) in the loads, some microseconds for two.
 ///
 /// ```
 /// use tactile_elasticity::contact::{ContactCurve, ContactTable, Waveguide};
@@ -38,10 +38,7 @@ use tactile_core::{Estimate, Interval, statistics::quantile_95};
 /// let flat = Waveguide::rigid();
 /// let table = ContactTable::new(3e-3, 0.5, &flat, vec![curve])?;
 ///
-/// let load = LoadState {
-///     contact_radius_m: Some(Estimate::new(0.5e-3, 1e-6)),
-///     ..LoadState::new(Estimate::new(5e-3, 1e-5))
-/// };
+/// let load = LoadState::new(Estimate::new(5e-3, 1e-5)).with_radius(Estimate::new(0.5e-3, 1e-6));
 /// let estimate = TabulatedContact::new(table.clone(), 3e-3, 0.5, &flat)?
 ///     .estimate(&LoadSeries::new([load]))?;
 /// let relative_error: f64 = estimate.youngs_modulus_pa / 67.5e3 - 1.0;
@@ -144,18 +141,17 @@ impl TabulatedContact {
             let forces: Vec<TabulatedForce> = (contacts.iter())
                 .map(|c| self.table.at(c.radius.value, log_modulus))
                 .collect();
-            let sources = self.sources(contacts, &forces, series);
+            let covariance = self.covariance(contacts, &forces, series);
             // The ln E that each load asks for, along its tangent.
             let own: Vec<f64> = (contacts.iter().zip(&forces))
                 .map(|(c, f)| log_modulus + (c.force.value.ln() - f.log_force) / sensitivity(f))
                 .collect();
-            let mut mean = common_mean(&own, &total(&sources))?;
-            let next = mean.mean.clamp(lowest, highest);
+            let mean = common_mean(&own, &covariance)?;
+            let next = mean.mean.value.clamp(lowest, highest);
             let moved = (next - log_modulus).abs();
-            let at_limit = next != mean.mean;
+            let at_limit = next != mean.mean.value;
             log_modulus = next;
             if moved < SETTLED || step + 1 == STEPS {
-                mean.degrees = mean.degrees_from(&sources);
                 let sensitivity = (mean.weights.iter().zip(&forces))
                     .map(|(w, f)| w * sensitivity(f))
                     .sum();
@@ -172,64 +168,42 @@ impl TabulatedContact {
         unreachable!("the last step returns")
     }
 
-    /// Covariances of each load's ln E, with their degrees of freedom: of forces, of radii, of what
-    /// all have in common.
-    fn sources(
+    /// The covariance of each load's ln E.
+    fn covariance(
         &self,
         contacts: &[Contact],
         forces: &[TabulatedForce],
         series: &LoadSeries,
-    ) -> [LogErrors; 3] {
-        let shared = series.shared_errors();
-        let none = Covariance::none(contacts.iter().map(|c| c.load));
+    ) -> Covariance {
+        let bodies = series.bodies();
+        let log = |factor: Uncertain| factor.map(f64::ln, f64::recip);
+        let nu = self.table.poisson_ratio();
+        let [size, compliance] = match bodies {
+            Some(bodies) => {
+                let sum: f64 = contacts.iter().map(|c| c.radius.value).sum();
+                let guide = bodies.guide_compliance(sum / contacts.len() as f64);
+                [bodies.size(), guide].map(log)
+            }
+            None => [Uncertain::exact(0.0); 2],
+        };
+        let ratio = bodies.map_or(Uncertain::exact(nu), Bodies::poisson_ratio);
+        let lateral = ratio.map(|_| 0.0, |_| -2.0 * nu / (1.0 - nu * nu));
+        // F has the dimension E R²: what does not follow a follows R, what does not follow E
+        // follows the guide's moduli.
+        let log_modulus = |(c, f): (&Contact, &TabulatedForce)| {
+            let of_force = log(c.force) - log(c.radius) * f.radius_slope;
+            let of_bodies = compliance * (1.0 - f.modulus_slope) + lateral * f.modulus_slope
+                - size * (2.0 - f.radius_slope);
+            (of_force + of_bodies) * sensitivity(f).recip()
+        };
+        let numbers: Vec<_> = contacts.iter().zip(forces).map(log_modulus).collect();
         // What an error of ln F does to ln E.
         let over = |i: usize, of_log_force: f64| of_log_force / sensitivity(&forces[i]);
-        let of_forces = match series.force_covariance() {
-            Some(given) => none.clone().with_given(|i, j| {
-                let [p, q] = [&contacts[i], &contacts[j]];
-                let relative = given[(p.load, q.load)] / (p.force.value * q.force.value);
-                over(i, 1.0) * over(j, 1.0) * relative
-            }),
-            None => none
-                .clone()
-                .with_own(|i| over(i, contacts[i].force.relative_error())),
-        };
-        // The scale of the forces comes from the calibration that their own errors come from.
-        let of_forces = of_forces.with_shared(|i| over(i, shared.force_scale));
-        let of_radii = none.clone().with_own(|i| {
-            over(
-                i,
-                forces[i].radius_slope * contacts[i].radius.relative_error(),
-            )
-        });
+        let adhesion = |i: usize| bodies.map_or(0.0, |b| b.adhesion(contacts[i].force.value));
         let model = self.table.interpolation_error().hypot(ELEMENT_ERROR);
-        let nu = self.table.poisson_ratio();
-        let of_poisson_ratio = 2.0 * nu / (1.0 - nu * nu) * shared.poisson_ratio;
-        let of_other_body = |i: usize| over(i, (1.0 - forces[i].modulus_slope) * shared.other_body);
-        let correlation = shared.length_with_other_body;
-        let of_all = none
-            .with_shared(|i| {
-                let of_length = over(i, forces[i].radius_slope * shared.length_scale);
-                correlation * of_other_body(i) - of_length
-            })
-            // F has the dimension E R²: what does not follow a follows R, what does not follow E
-            // follows the guide's moduli.
-            .with_shared(|i| over(i, (2.0 - forces[i].radius_slope) * shared.size))
-            .with_shared(|i| (1.0 - correlation * correlation).sqrt() * of_other_body(i))
-            .with_shared(|i| over(i, forces[i].modulus_slope * of_poisson_ratio))
-            .with_model_errors(|i| over(i, shared.adhesion(contacts[i].force.value)))
-            .with_model_errors(|i| over(i, model));
-        [
-            (
-                of_forces,
-                fewest(contacts.iter().map(|c| c.force.degrees_of_freedom)),
-            ),
-            (
-                of_radii,
-                fewest(contacts.iter().map(|c| c.radius.degrees_of_freedom)),
-            ),
-            (of_all, None),
-        ]
+        Covariance::of(&numbers, contacts.iter().map(|c| c.load))
+            .with_model_errors(Source::Adhesion, |i| over(i, adhesion(i)))
+            .with_model_errors(Source::Law, |i| over(i, model))
     }
 
     /// ln E where the tabulated forces, weighted as in the mean, have changed by `step` in ln F.
@@ -293,8 +267,8 @@ fn sensitivity(force: &TabulatedForce) -> f64 {
 /// A load with a contact radius.
 struct Contact {
     load: usize,
-    force: Estimate,
-    radius: Estimate,
+    force: Uncertain,
+    radius: Uncertain,
 }
 
 struct Fit {
@@ -313,8 +287,9 @@ impl ModulusEstimator for TabulatedContact {
     fn estimate(&self, series: &LoadSeries) -> Result<ModulusEstimate, ElasticityError> {
         let contacts = self.contacts(series.loads())?;
         let (contacts, fit) = self.fit_covered(contacts, series)?;
-        let known = fit.mean.standard_error.is_finite();
-        let reach = quantile_95(fit.mean.degrees) * fit.mean.standard_error * fit.sensitivity;
+        let known = fit.mean.has_error();
+        let log = fit.mean.mean.total();
+        let reach = quantile_95(log.degrees_of_freedom) * log.standard_error * fit.sensitivity;
         let lower = if known {
             self.limit(&contacts, &fit, -reach)
         } else {
@@ -327,7 +302,7 @@ impl ModulusEstimator for TabulatedContact {
         }
         if fit.below {
             return Err(Quantity::YoungsModulus
-                .beyond(fit.mean.mean.exp(), self.table.log_moduli()[0].exp()));
+                .beyond(fit.mean.mean.value.exp(), self.table.log_moduli()[0].exp()));
         }
         let upper = if known {
             self.limit(&contacts, &fit, reach)
@@ -341,7 +316,8 @@ impl ModulusEstimator for TabulatedContact {
         warnings.extend(fit.mean.warnings(upper.is_some()));
         Ok(ModulusEstimate {
             youngs_modulus_pa: modulus,
-            standard_error_pa: (modulus * fit.mean.standard_error),
+            standard_error_pa: modulus * log.standard_error,
+            by_source: fit.mean.mean.map(|_| modulus, |_| modulus),
             interval_95: Interval::new(lower.map_or(0.0, f64::exp), upper.map(|u| u.exp())),
             estimator: EstimatorKind::TabulatedContact,
             loads,

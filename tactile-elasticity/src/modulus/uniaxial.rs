@@ -20,13 +20,14 @@
 //! Range: no friction. A face that sticks to the plate stretches less than the material above it,
 //! and E comes out too large.
 
-use super::load::{LoadSeries, LoadState, derived, validated};
+use super::bodies::Bodies;
+use super::load::{LoadSeries, LoadState, validated};
 use super::ratio::LINEAR_STRAIN;
 use super::regression::StressStrainRegression;
 use crate::error::{ElasticityError, Quantity};
 use crate::strain::StrainMeasure;
 use nalgebra::Matrix3;
-use tactile_core::Estimate;
+use tactile_core::{Source, Uncertain};
 
 // Steps to the unloaded area: the error falls by about the strain each time, to rounding for
 // strains up to a third.
@@ -44,13 +45,8 @@ const STRETCHES: [f64; 2] = [0.05, 4.0];
 ///
 /// // A face of 1 cm² of 100 kPa and ν = ½, squeezed by e = 2 % and 5 %: λ_z = √(1 − 2e), A = A₀(1
 /// // + e), F = E e λ_z A₀.
-/// let load = |e: f64| LoadState {
-///     contact_area_m2: Some(Estimate::new(1e-4 * (1.0 + e), 1e-9)),
-///     ..LoadState::new(Estimate::new(
-///         100e3 * e * (1.0 - 2.0 * e).sqrt() * 1e-4,
-///         1e-4,
-///     ))
-/// };
+/// let load = |e: f64| LoadState::new(Estimate::new(100e3 * e * (1.0 - 2.0 * e).sqrt() * 1e-4, 1e-4))
+///     .with_area(Estimate::new(1e-4 * (1.0 + e), 1e-9));
 /// let uniaxial = UniaxialLoads::new(
 ///     &LoadSeries::new([load(0.02), load(0.05)]),
 ///     0.5,
@@ -116,7 +112,7 @@ impl UniaxialLoads {
         }
         let (loads, stretches) = law.strained(series, unloaded)?;
         Ok(Self {
-            series: series.uniaxial(loads, poisson_ratio),
+            series: series.with_loads(loads),
             stretches,
             unloaded_area_m2: unloaded,
         })
@@ -147,6 +143,10 @@ impl LateralLaw<'_> {
         series: &LoadSeries,
         unloaded_m2: f64,
     ) -> Result<(Vec<LoadState>, Vec<[f64; 2]>), ElasticityError> {
+        // Strains that lateral stretches give are in inverse proportion to Poisson's ratio.
+        let ratio = series.bodies().map(Bodies::poisson_ratio);
+        let ratio_error = ratio.map_or(0.0, |ratio| ratio.part(Source::PoissonRatio));
+        let relative_ratio = ratio_error / self.poisson_ratio;
         let mut loads = Vec::with_capacity(series.loads().len());
         let mut stretches = Vec::with_capacity(series.loads().len());
         for state in series.loads() {
@@ -164,14 +164,19 @@ impl LateralLaw<'_> {
             let axial_slope = self.slope(axial)?;
             // de_zz/d ln A = −f′(λ_t) λ_t / 2ν.
             let per_relative_area = self.slope(lateral)? * lateral / (2.0 * self.poisson_ratio);
+            let strain = Uncertain::exact(-strain_of(self.measure, axial)?)
+                .by_estimated(
+                    Source::Noise,
+                    per_relative_area * face.part(Source::Noise) / face.value,
+                    face.degrees_of_freedom(Source::Noise),
+                )
+                .by_relative(Source::PoissonRatio, -relative_ratio);
+            // What all faces have in common is in A₀, which is fitted to them, and not in strains.
+            let common = face.without(Source::Noise) * face.value.recip();
             loads.push(LoadState {
-                contact_area_m2: Some(Estimate::exact(unloaded_m2 * axial_slope)),
+                contact_area_m2: Some(common * (unloaded_m2 * axial_slope)),
                 contact_radius_m: None,
-                mean_strain: Some(derived(
-                    face,
-                    -strain_of(self.measure, axial)?,
-                    per_relative_area * face.relative_error(),
-                )),
+                mean_strain: Some(strain),
                 ..*state
             });
             stretches.push([lateral, axial]);

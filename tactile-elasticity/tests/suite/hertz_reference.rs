@@ -4,7 +4,9 @@ use crate::common::{number, optional, reference};
 use serde_json::Value;
 use tactile_elasticity::ElasticityError;
 use tactile_elasticity::contact::*;
-use tactile_elasticity::modulus::{Estimate, HertzSphere, LoadSeries, LoadState, ModulusEstimator};
+use tactile_elasticity::modulus::{
+    Estimate, HertzSphere, LoadSeries, LoadState, ModulusEstimator, Uncertain,
+};
 
 fn of_kind(kind: &str) -> Vec<Value> {
     reference("hertz.json")
@@ -75,7 +77,7 @@ fn inverses() {
         let (force, radius, nu) = (number(&case["F"]), number(&case["R"]), number(&case["nu2"]));
         let other = body(&case["E1"], &case["nu1"]);
         let estimator = HertzSphere::new(radius, nu).unwrap().with_other_body(other);
-        let exact = |key: &str| case[key].as_f64().map(Estimate::exact);
+        let exact = |key: &str| case[key].as_f64().map(Uncertain::exact);
         let bare = LoadState::new(Estimate::exact(force));
         let by_radius = LoadState {
             contact_radius_m: exact("a"),

@@ -6,7 +6,7 @@
 
 use test_support as record;
 
-use nalgebra::{DMatrix, Matrix3};
+use nalgebra::Matrix3;
 use tactile_elasticity::contact::*;
 use tactile_elasticity::field::StrainField;
 use tactile_elasticity::modulus::*;
@@ -127,12 +127,10 @@ fn loads() -> Vec<LoadState> {
                 contact.contact_radius_m * factor,
                 contact.indentation_m / factor,
             );
-            LoadState {
-                contact_radius_m: Some(Estimate::new(a, 0.003 * a)),
-                indentation_m: Some(Estimate::new(d, 0.005 * d)),
-                mean_strain: Some(Estimate::new(0.6 * force * factor, 1e-4)),
-                ..LoadState::new(Estimate::new(force, 0.004 * force).with_degrees_of_freedom(9.0))
-            }
+            LoadState::new(Estimate::new(force, 0.004 * force).with_degrees_of_freedom(9.0))
+                .with_radius(Estimate::new(a, 0.003 * a))
+                .with_indentation(Estimate::new(d, 0.005 * d))
+                .with_strain(Estimate::new(0.6 * force * factor, 1e-4))
         })
         .to_vec()
 }
@@ -140,23 +138,30 @@ fn loads() -> Vec<LoadState> {
 fn estimators(answers: &mut Answers) {
     let (radius, nu, gel) = (4e-3, 0.48, gel());
     let series = LoadSeries::new(loads());
-    let shared = SharedErrors {
-        force_scale: 0.01,
-        ..SharedErrors::default()
-    };
-    let scaled = series.clone().with_shared_errors(shared).unwrap();
-    let covariance = DMatrix::from_fn(3, 3, |i, j| 1e-10 * (1.0 + 4.0 * f64::from(i == j)));
+    // One gauge is behind all forces, and its error was estimated with them.
+    let scaled: Vec<_> = (loads().into_iter())
+        .map(|mut load| {
+            let scale = 0.01 * load.force_n.value;
+            load.force_n = (load.force_n).by_estimated(Source::Gain, scale, Some(9.0));
+            load
+        })
+        .collect();
     let hertz = HertzSphere::new(radius, nu).unwrap();
-    let uncertain = SharedErrors {
-        length_scale: 0.004,
-        size: 0.002,
-        ..shared
-    };
-    let uncertain = series.clone().with_shared_errors(uncertain).unwrap();
+    let uncertain: Vec<_> = (scaled.iter())
+        .map(|load| {
+            let by_pixels = |number: Uncertain| number.by_relative(Source::PixelSize, 0.004);
+            LoadState {
+                contact_radius_m: load.contact_radius_m.map(by_pixels),
+                indentation_m: load.indentation_m.map(by_pixels),
+                ..*load
+            }
+        })
+        .collect();
+    let ball = Bodies::new(Object::sphere(radius), None).with_size_error(0.002);
+    let uncertain = LoadSeries::new(uncertain).with_bodies(ball.unwrap());
+    let scaled = LoadSeries::new(scaled);
     let on_guide = hertz.clone().with_waveguide(&gel);
     answers.estimate("Hertz on the guide", &on_guide, &uncertain);
-    let correlated = series.clone().with_force_covariance(&covariance).unwrap();
-    answers.estimate("Hertz with a covariance", &hertz, &correlated);
     let by_depth = loads().into_iter().map(|load| LoadState {
         contact_radius_m: None,
         ..load
@@ -169,10 +174,8 @@ fn estimators(answers: &mut Answers) {
     answers.estimate("layer IntegralEquation", &layer, &series);
     answers.estimate("punch", &FlatPunch::new(1e-3, nu).unwrap(), &series);
     answers.estimate("cone", &Cone::new(1.1, nu).unwrap(), &series);
-    let strain_covariance = &covariance * 10.0;
-    let strained = scaled.clone().with_strain_covariance(&strain_covariance);
     let ratio = PaperRatio::default().with_sphere_radius(radius).unwrap();
-    answers.estimate("stress over strain", &ratio, &strained.unwrap());
+    answers.estimate("stress over strain", &ratio, &scaled);
     let ratio = PaperRatio::default().with_reference(StrainReference::FirstLoad);
     answers.estimate("stress over strain from the first load", &ratio, &series);
     let line = StressStrainRegression::default();

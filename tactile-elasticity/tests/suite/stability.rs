@@ -107,7 +107,7 @@ proptest! {
         let modulus = 40e3 * f / (l * l);
         let reduced = reduced_modulus_pa(Body::rigid(), Body::elastic(modulus, 0.4).unwrap()).unwrap();
         let contact = HertzContact::from_force(1e-3 * f, 4e-3 * l, reduced).unwrap();
-        let load = LoadState { contact_radius_m: Some(Estimate::new(contact.contact_radius_m, 1e-3 * contact.contact_radius_m)), indentation_m: Some(Estimate::new(contact.indentation_m, 1e-3 * contact.indentation_m)), ..LoadState::new(Estimate::new(1e-3 * f, 1e-5 * f)) };
+        let load = LoadState::new(Estimate::new(1e-3 * f, 1e-5 * f)).with_radius(Estimate::new(contact.contact_radius_m, 1e-3 * contact.contact_radius_m)).with_indentation(Estimate::new(contact.indentation_m, 1e-3 * contact.indentation_m));
         let found = HertzSphere::new(4e-3 * l, 0.4).unwrap().estimate(&LoadSeries::new([load])).unwrap();
         prop_assert!((found.youngs_modulus_pa / modulus - 1.0).abs() < 1e-12);
         let outside = hertz_surface_displacement_m(3.0 * contact.contact_radius_m, contact.contact_radius_m, 1.0, 1.0);

@@ -5,8 +5,8 @@ use tactile_imaging::elasticity::ElasticityError;
 use tactile_imaging::elasticity::contact::Body;
 use tactile_imaging::elasticity::laws::{ContactLaw, ContactLength, LogForce, Reach};
 use tactile_imaging::elasticity::modulus::{
-    ContactEstimator, Estimate, EstimatorKind, HertzSphere, LoadSeries, ModulusEstimate,
-    ModulusEstimator, Warning,
+    ContactEstimator, EstimatorKind, HertzSphere, LoadSeries, ModulusEstimate, ModulusEstimator,
+    Source, Uncertain, Warning,
 };
 use tactile_simulate::Camera;
 
@@ -32,24 +32,22 @@ struct OwnEstimator;
 impl ModulusEstimator for OwnEstimator {
     fn estimate(&self, series: &LoadSeries) -> Result<ModulusEstimate, ElasticityError> {
         let bodies = series.bodies().expect("the pipeline's bodies");
-        let radius_m = bodies.object().sphere_radius_m().expect("a ball");
-        let (mut sum, mut weights) = (0.0, 0.0);
+        let radius_m = bodies.size() * bodies.object().sphere_radius_m().expect("a ball");
+        let (mut sum, mut weights) = (Uncertain::exact(0.0), 0.0);
+        let mut mean_m = 0.0;
         for load in series.loads() {
             let (f, a) = (load.force_n, load.contact_radius_m.expect("a radius"));
-            let weight = f.relative_error().hypot(3.0 * a.relative_error()).powi(-2);
-            sum += weight * (0.75 * f.value * radius_m / a.value.powi(3)).ln();
+            let log = (f * a.powf(-3.0) * 0.75).map(f64::ln, f64::recip);
+            let weight = log.part(Source::Noise).powi(-2);
+            sum = sum + log * weight;
             weights += weight;
+            mean_m += a.value / series.loads().len() as f64;
         }
-        let reduced = (sum / weights).exp();
-        let part = 1.0 - reduced * bodies.in_series().compliance_per_pa();
-        let nu = bodies.object().poisson_ratio();
-        let modulus = (1.0 - nu * nu) * reduced / part;
-        let shared = series.shared_errors();
-        let relative = (weights.powf(-0.5).hypot(shared.force_scale))
-            .hypot(3.0 * shared.length_scale)
-            .hypot(shared.size)
-            .hypot((1.0 - part) * shared.other_body);
-        let modulus = Estimate::new(modulus, relative / part * modulus);
+        let reduced = (sum * f64::recip(weights)).map(f64::exp, f64::exp) * radius_m;
+        let compliance = bodies.guide_compliance(mean_m) * bodies.in_series().compliance_per_pa();
+        let nu = bodies.poisson_ratio();
+        let lateral = nu.map(|nu| 1.0 - nu * nu, |nu| -2.0 * nu);
+        let modulus = lateral / (reduced.powf(-1.0) - compliance);
         Ok(ModulusEstimate::new(self.kind(), modulus))
     }
 

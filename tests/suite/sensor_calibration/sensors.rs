@@ -137,10 +137,8 @@ fn soft_states(layers: &[Layer], radius_m: f64, poisson: f64, forces: &[f64]) ->
     let guide = Waveguide::new(layers.to_vec()).unwrap();
     let estimator = estimator(radius_m, poisson, &guide);
     let above = |force: f64, a: f64| {
-        let load = LoadState {
-            contact_radius_m: Some(Estimate::new(a, 1e-9 * a)),
-            ..LoadState::new(Estimate::new(force, 1e-9 * force))
-        };
+        let load = LoadState::new(Estimate::new(force, 1e-9 * force))
+            .with_radius(Estimate::new(a, 1e-9 * a));
         match estimator.estimate(&LoadSeries::new([load])) {
             Ok(found) => found.youngs_modulus_pa / SAMPLE_PA - 1.0,
             Err(_) => 1.0,

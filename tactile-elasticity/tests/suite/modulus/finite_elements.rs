@@ -36,11 +36,9 @@ fn scenes() -> Vec<Scene> {
             youngs_modulus_pa: l["youngs_modulus_pa"].as_f64().unwrap(),
             poisson_ratio: l["poisson_ratio"].as_f64().unwrap(),
         };
-        let load = LoadState {
-            indentation_m: Some(exact(number(after[2]))),
-            contact_radius_m: Some(Estimate::new(number(after[3]), number(after[4]))),
-            ..LoadState::new(exact(number(after[1])))
-        };
+        let load = LoadState::new(exact(number(after[1])))
+            .with_indentation(exact(number(after[2])))
+            .with_radius(Estimate::new(number(after[3]), number(after[4])));
         match scenes.last_mut().filter(|s| s.name == before[0]) {
             Some(scene) => scene.loads.push(load),
             None => scenes.push(Scene {

@@ -17,19 +17,17 @@ fn intervals_cover_what_they_promise() {
         let loads: Vec<_> = (clean.iter())
             .map(|l| {
                 let (f, a) = (l.force_n.value, l.contact_radius_m.unwrap().value);
-                LoadState {
-                    contact_radius_m: Some(Estimate::new(a * (1.0 + 0.004 * normal()), 0.004 * a)),
-                    ..LoadState::new(Estimate::new(
-                        f * scale * (1.0 + 0.005 * normal()),
-                        0.005 * f,
-                    ))
-                }
+                LoadState::new(Estimate::new(
+                    f * scale * (1.0 + 0.005 * normal()),
+                    0.005 * f,
+                ))
+                .with_radius(Estimate::new(a * (1.0 + 0.004 * normal()), 0.004 * a))
             })
             .collect();
-        let series = LoadSeries::new(loads).with_shared_errors(force_scale(0.01));
+        let series = gauged(loads, 0.01);
         covered += usize::from(
             estimator
-                .estimate(&series.unwrap())
+                .estimate(&series)
                 .unwrap()
                 .interval_95
                 .contains(SAMPLE),
@@ -44,19 +42,19 @@ fn intervals_cover_what_they_promise() {
 fn intervals_cover_where_lengths_and_the_guide_err_together() {
     let loads = hertz_loads(waveguide().as_body(), &[2e-3, 6e-3]);
     let (length_scale, other_body) = (0.01, 0.05);
-    for correlation in [0.9, -0.9] {
-        let shared = SharedErrors {
-            length_scale,
-            other_body,
-            length_with_other_body: correlation,
-            ..SharedErrors::default()
-        };
+    for correlation in [0.9_f64, -0.9] {
+        let alone = (1.0 - correlation * correlation).sqrt();
+        let factor = Uncertain::exact(1.0)
+            .by(Source::PixelSize, correlation * other_body)
+            .by(Source::Guide, alone * other_body);
+        let ball = Bodies::new(Object::sphere(4e-3), None);
+        let bodies = std::sync::Arc::new(ball.with_guide_error(factor).unwrap());
         let mut rng = ChaCha8Rng::seed_from_u64(11);
         let mut covered = 0;
         for _ in 0..2000 {
             let mut normal = || rng.sample::<f64, _>(StandardNormal);
             let (both, own) = (normal(), normal());
-            let of_guide = correlation * both + (1.0 - correlation * correlation).sqrt() * own;
+            let of_guide = correlation * both + alone * own;
             let guide = waveguide();
             let layers = guide.layers().iter().map(|layer| Layer {
                 youngs_modulus_pa: layer.youngs_modulus_pa / (1.0 + other_body * of_guide),
@@ -66,13 +64,15 @@ fn intervals_cover_where_lengths_and_the_guide_err_together() {
             let measured = loads.iter().map(|load| {
                 let a = load.contact_radius_m.unwrap().value * (1.0 + length_scale * both);
                 LoadState {
-                    contact_radius_m: Some(exact(a)),
+                    contact_radius_m: Some(
+                        Uncertain::exact(a).by_relative(Source::PixelSize, length_scale),
+                    ),
                     indentation_m: None,
                     ..*load
                 }
             });
             let series = LoadSeries::new(measured.collect::<Vec<_>>());
-            let series = series.with_shared_errors(shared).unwrap();
+            let series = series.with_bodies(std::sync::Arc::clone(&bodies));
             let estimator = HertzSphere::new(4e-3, NU).unwrap();
             let found = estimator.with_waveguide(&stated).estimate(&series).unwrap();
             covered += usize::from(found.interval_95.contains(SAMPLE));
@@ -82,11 +82,6 @@ fn intervals_cover_where_lengths_and_the_guide_err_together() {
             "{correlation}: {covered} of 2000"
         );
     }
-    let wrong = SharedErrors {
-        length_with_other_body: 1.1,
-        ..SharedErrors::default()
-    };
-    assert!(LoadSeries::new(loads).with_shared_errors(wrong).is_err());
 }
 
 /// Johnson, Kendall and Roberts: with Q² = 6πwR P₁ and P₁ = F + Q the contact's radius is that of
@@ -101,12 +96,11 @@ fn adhesion_is_as_wide_as_the_contact_it_makes() {
         let rim = (attracted_n - force_n) / (3.0 * attracted_n);
         let seen_n = attracted_n * (1.0 - 3.0 * rim + 2.0 * rim.powf(1.5));
         let softer = 1.0 - seen_n / attracted_n / (1.0 - rim).powf(1.5);
-        let shared = SharedErrors {
-            adhesion_n,
-            ..SharedErrors::default()
-        };
+        let work = adhesion_n / (6.0 * std::f64::consts::PI * 4e-3);
+        let ball = Bodies::new(Object::sphere(4e-3), None);
+        let ball = ball.with_adhesion_j_per_m2(work).unwrap();
         let load = by_radius(hertz_loads(Body::rigid(), &[force_n])[0]);
-        let series = LoadSeries::new([load]).with_shared_errors(shared).unwrap();
+        let series = LoadSeries::new([load]).with_bodies(ball);
         let estimator = HertzSphere::new(4e-3, NU).unwrap();
         let found = estimator.estimate(&series).unwrap();
         let stated = found.standard_error_pa / SAMPLE;
@@ -119,18 +113,24 @@ fn adhesion_is_as_wide_as_the_contact_it_makes() {
 }
 
 #[test]
-fn a_force_covariance_says_the_same_as_a_shared_scale() {
-    let f = [1e-3, 3e-3];
-    let loads = hertz_loads(Body::rigid(), &f).into_iter().map(by_radius);
-    let covariance = DMatrix::from_fn(2, 2, |i, j| 1e-4 * f[i] * f[j]);
+fn a_source_is_one_error_in_all_loads() {
+    let loads: Vec<_> = hertz_loads(Body::rigid(), &[1e-3, 3e-3])
+        .into_iter()
+        .map(by_radius)
+        .collect();
     let plain = HertzSphere::new(4e-3, NU).unwrap();
-    let series = LoadSeries::new(loads.collect::<Vec<_>>());
-    let correlated = series.clone().with_force_covariance(&covariance).unwrap();
-    let one = plain.estimate(&correlated).unwrap();
-    let scaled = series.with_shared_errors(force_scale(0.01)).unwrap();
-    let other = plain.estimate(&scaled).unwrap();
-    assert!((one.standard_error_pa / other.standard_error_pa - 1.0).abs() < 1e-6);
-    assert!((one.standard_error_pa / SAMPLE - 0.01).abs() < 1e-6);
+    let found = plain.estimate(&gauged(loads.clone(), 0.01)).unwrap();
+    assert!((found.standard_error_pa / SAMPLE - 0.01).abs() < 1e-9);
+    assert!((found.by_source.share(Source::Gain) - 1.0).abs() < 1e-9);
+    // As noise it is another one in each, and their mean is better known.
+    let noisy: Vec<_> = (loads.iter())
+        .map(|load| LoadState {
+            force_n: load.force_n.by_relative(Source::Noise, 0.01),
+            ..*load
+        })
+        .collect();
+    let noisy = plain.estimate(&LoadSeries::new(noisy)).unwrap();
+    assert!((noisy.standard_error_pa / SAMPLE - 0.01 / 2f64.sqrt()).abs() < 1e-9);
 }
 
 #[test]
@@ -145,39 +145,35 @@ fn one_load_without_errors_has_no_interval() {
 
 #[test]
 fn forces_that_share_an_error_cancel_in_their_ratio_not_in_their_mean() {
-    let load = |force: f64, strain: f64| LoadState {
-        contact_area_m2: Some(exact(1e-4)),
-        mean_strain: Some(exact(strain)),
-        ..LoadState::new(Estimate::new(force, 0.01 * force))
+    let strained = |force: f64, strain: f64| {
+        LoadState::new(exact(force))
+            .with_area(exact(1e-4))
+            .with_strain(exact(strain))
+    };
+    let load = |force: f64, strain: f64| {
+        LoadState::new(Estimate::new(force, 0.01 * force))
+            .with_area(exact(1e-4))
+            .with_strain(exact(strain))
     };
     let loads = LoadSeries::new([load(0.02, 0.0), load(0.08, 0.01)]);
     let ratio = PaperRatio::default().with_reference(StrainReference::FirstLoad);
-    let shared = DMatrix::from_fn(2, 2, |i, j| {
-        (0.01f64).powi(2) * [0.02, 0.08][i] * [0.02, 0.08][j]
-    });
-    let correlated = loads.clone().with_force_covariance(&shared).unwrap();
-    let common = ratio.estimate(&correlated).unwrap();
+    let exactly = [strained(0.02, 0.0), strained(0.08, 0.01)].to_vec();
+    let common = ratio.estimate(&gauged(exactly, 0.01)).unwrap();
     // One factor on both forces is one factor on their difference: 1 %.
     assert!((common.standard_error_pa / common.youngs_modulus_pa - 0.01).abs() < 1e-12);
     // Independent errors of 1 % of 20 and 80 mN on a difference of 60 mN.
     let apart = ratio.estimate(&loads).unwrap();
     let expected = 0.01 * 0.02f64.hypot(0.08) / 0.06;
     assert!((apart.standard_error_pa / apart.youngs_modulus_pa - expected).abs() < 1e-12);
-    let wrong = LoadSeries::new([load(0.08, 0.01)]);
-    let mismatch = wrong.with_force_covariance(&DMatrix::zeros(3, 3));
-    let message = "force: expected 1 entries, found 3";
-    assert_eq!(mismatch.unwrap_err().to_string(), message);
 }
 
 /// Student's t, and the mean quantile of Cochran and Cox, against quantiles from tables.
 #[test]
 fn errors_learnt_from_few_repetitions_widen_the_interval() {
     let load = |force: Estimate, strain: Estimate| {
-        LoadSeries::new([LoadState {
-            contact_area_m2: Some(exact(1e-4)),
-            mean_strain: Some(strain),
-            ..LoadState::new(force)
-        }])
+        LoadSeries::new([LoadState::new(force)
+            .with_area(exact(1e-4))
+            .with_strain(strain)])
     };
     let half_width = |loads: &LoadSeries| {
         let found = PaperRatio::default().estimate(loads).unwrap();
@@ -209,20 +205,16 @@ fn twenty_thousand_loads_are_one_linear_regression() {
         .map(|l| {
             let (f, a) = (l.force_n.value, l.contact_radius_m.unwrap().value);
             let d = l.indentation_m.unwrap().value;
-            LoadState {
-                contact_radius_m: Some(Estimate::new(a * (1.0 + 0.004 * normal()), 0.004 * a)),
-                indentation_m: Some(Estimate::new(d * (1.0 + 0.01 * normal()), 0.01 * d)),
-                mean_strain: Some(Estimate::new(
+            LoadState::new(Estimate::new(f * (1.0 + 0.005 * normal()), 0.005 * f))
+                .with_radius(Estimate::new(a * (1.0 + 0.004 * normal()), 0.004 * a))
+                .with_indentation(Estimate::new(d * (1.0 + 0.01 * normal()), 0.01 * d))
+                .with_strain(Estimate::new(
                     f / (std::f64::consts::PI * a * a) / SAMPLE,
                     1e-4,
-                )),
-                ..LoadState::new(Estimate::new(f * (1.0 + 0.005 * normal()), 0.005 * f))
-            }
+                ))
         })
         .collect();
-    let series = LoadSeries::new(loads)
-        .with_shared_errors(force_scale(1e-4))
-        .unwrap();
+    let series = gauged(loads, 1e-4);
     let hertz = HertzSphere::new(4e-3, NU)
         .unwrap()
         .estimate(&series)
@@ -250,10 +242,8 @@ fn a_thin_layer_on_a_stiff_base_has_an_interval_around_its_estimate() {
     let ball = SphereOnWaveguide::new(6e-3, 0.495, &guide, Bond::Bonded).unwrap();
     for radius in [1.5e-3, 2e-3, 3e-3, 4e-3] {
         for force in [0.05, 0.2, 1.0] {
-            let load = LoadState {
-                contact_radius_m: Some(Estimate::new(radius, 0.005 * radius)),
-                ..LoadState::new(Estimate::new(force, 0.01 * force))
-            };
+            let load = LoadState::new(Estimate::new(force, 0.01 * force))
+                .with_radius(Estimate::new(radius, 0.005 * radius));
             if let Ok(found) = ball.estimate(&LoadSeries::new([load])) {
                 holds_its_estimate(&found);
             }
@@ -304,10 +294,7 @@ proptest! {
             .map(|ratio| {
                 let a = ratio * radius;
                 let force = 4.0 / 3.0 * reduced * a.powi(3) / radius;
-                LoadState {
-                    contact_radius_m: Some(Estimate::new(a, 0.003 * a)),
-                    ..LoadState::new(Estimate::new(force, 0.005 * force))
-                }
+                LoadState::new(Estimate::new(force, 0.005 * force)).with_radius(Estimate::new(a, 0.003 * a))
             })
             .collect();
         if let Ok(found) = ball.estimate(&LoadSeries::new(loads)) {

@@ -9,10 +9,8 @@ fn every_law_inverts_itself() {
         .unwrap()
         .with_waveguide(&waveguide());
     finds(&on_waveguide, &hertz_loads(waveguide().as_body(), &forces));
-    let punch = |d: f64| LoadState {
-        indentation_m: Some(exact(d)),
-        ..LoadState::new(exact(2.0 * reduced() * 2e-3 * d))
-    };
+    let punch =
+        |d: f64| LoadState::new(exact(2.0 * reduced() * 2e-3 * d)).with_indentation(exact(d));
     finds(
         &FlatPunch::new(2e-3, NU).unwrap(),
         &[punch(1e-5), punch(3e-5)],
@@ -20,11 +18,9 @@ fn every_law_inverts_itself() {
     let angle = 1.2f64;
     let cone = |d: f64| {
         let a = std::f64::consts::FRAC_2_PI * angle.tan() * d;
-        LoadState {
-            indentation_m: Some(exact(d)),
-            contact_radius_m: Some(exact(a)),
-            ..LoadState::new(exact(reduced() * a * d))
-        }
+        LoadState::new(exact(reduced() * a * d))
+            .with_indentation(exact(d))
+            .with_radius(exact(a))
     };
     finds(&Cone::new(angle, NU).unwrap(), &[cone(1e-5), cone(3e-5)]);
 }
@@ -37,11 +33,9 @@ fn layers_invert_themselves_thick_or_thin() {
         let c = layer.solve(a_over_h).unwrap();
         let (a, d) = (a_over_h * h, (c.chi * h).powi(2) / r);
         let force = 4.0 / 3.0 * reduced() * r.sqrt() * d.powf(1.5) * c.force_ratio;
-        LoadState {
-            contact_radius_m: Some(exact(a)),
-            indentation_m: Some(exact(d)),
-            ..LoadState::new(exact(force))
-        }
+        LoadState::new(exact(force))
+            .with_radius(exact(a))
+            .with_indentation(exact(d))
     };
     let loads = [load(0.05), load(0.4), load(1.3)];
     finds(&BondedLayer::new(r, h, NU, Bond::Bonded).unwrap(), &loads);
@@ -56,11 +50,9 @@ fn layered_load(guide: &Waveguide, r: f64, modulus: f64, a: f64) -> LoadState {
     let layers = layers.with_share(top.compliance_per_pa() / total);
     let contact = layers.solve(a / guide.thickness_m()).unwrap();
     let force = 4.0 / 3.0 / total * a.powi(3) / r * contact.force_ratio_same_radius;
-    LoadState {
-        contact_radius_m: Some(exact(a)),
-        indentation_m: Some(exact(a * a / r * contact.indentation_ratio)),
-        ..LoadState::new(exact(force))
-    }
+    LoadState::new(exact(force))
+        .with_radius(exact(a))
+        .with_indentation(exact(a * a / r * contact.indentation_ratio))
 }
 
 #[test]
@@ -110,10 +102,7 @@ fn far_stiffer_samples_are_bounded_from_below_only() {
             .unwrap()
             .contact_radius_m
             * (1.0 + error);
-        LoadState {
-            contact_radius_m: Some(Estimate::new(a, 0.01 * a)),
-            ..LoadState::new(exact(f))
-        }
+        LoadState::new(exact(f)).with_radius(Estimate::new(a, 0.01 * a))
     };
     let estimator = HertzSphere::new(4e-3, NU).unwrap().with_waveguide(&guide);
     let found = estimator

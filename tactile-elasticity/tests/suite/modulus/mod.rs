@@ -5,7 +5,6 @@ mod intervals;
 mod laws;
 mod stress_over_strain;
 
-use nalgebra::DMatrix;
 use proptest::prelude::*;
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 use rand_distr::StandardNormal;
@@ -48,11 +47,9 @@ fn hertz_loads(other: Body, forces: &[f64]) -> Vec<LoadState> {
     (forces.iter())
         .map(|&f| {
             let c = HertzContact::from_force(f, 4e-3, e).unwrap();
-            LoadState {
-                contact_radius_m: Some(exact(c.contact_radius_m)),
-                indentation_m: Some(exact(c.indentation_m)),
-                ..LoadState::new(exact(f))
-            }
+            LoadState::new(exact(f))
+                .with_radius(exact(c.contact_radius_m))
+                .with_indentation(exact(c.indentation_m))
         })
         .collect()
 }
@@ -73,12 +70,12 @@ fn by_depth(load: LoadState) -> LoadState {
     }
 }
 
-/// Only the forces' common scale is in doubt.
-fn force_scale(relative: f64) -> SharedErrors {
-    SharedErrors {
-        force_scale: relative,
-        ..SharedErrors::default()
+/// Loads whose forces are all wrong by one factor, known to this.
+fn gauged(mut loads: Vec<LoadState>, relative: f64) -> LoadSeries {
+    for load in &mut loads {
+        load.force_n = load.force_n.by_relative(Source::Gain, relative);
     }
+    LoadSeries::new(loads)
 }
 
 fn finds(estimator: &dyn ModulusEstimator, loads: &[LoadState]) {

@@ -3,11 +3,9 @@
 use super::*;
 
 fn strained(stress: f64, strain: f64) -> LoadState {
-    LoadState {
-        contact_area_m2: Some(exact(1e-4)),
-        mean_strain: Some(exact(strain)),
-        ..LoadState::new(exact(stress * 1e-4))
-    }
+    LoadState::new(exact(stress * 1e-4))
+        .with_area(exact(1e-4))
+        .with_strain(exact(strain))
 }
 
 #[test]
@@ -69,18 +67,10 @@ fn refuses(estimator: &dyn ModulusEstimator, loads: &[LoadState], message: &str)
 
 #[test]
 fn bad_input_is_named() {
-    let with_radius = |force: f64, radius: f64| LoadState {
-        contact_radius_m: Some(exact(radius)),
-        ..LoadState::new(exact(force))
-    };
-    let with_area = |area: f64| LoadState {
-        contact_area_m2: Some(exact(area)),
-        ..strained(100.0, 0.1)
-    };
-    let bare = LoadState {
-        mean_strain: Some(exact(0.1)),
-        ..LoadState::new(exact(1.0))
-    };
+    let with_radius =
+        |force: f64, radius: f64| LoadState::new(exact(force)).with_radius(exact(radius));
+    let with_area = |area: f64| strained(100.0, 0.1).with_area(exact(area));
+    let bare = LoadState::new(exact(1.0)).with_strain(exact(0.1));
     let ratio = PaperRatio::default();
     let line = StressStrainRegression::default();
     let sphere = HertzSphere::new(4e-3, NU).unwrap();
@@ -106,19 +96,19 @@ fn bad_input_is_named() {
         let error = HertzSphere::new(radius, 0.3).unwrap_err();
         assert!(error.to_string().starts_with("radius must be greater"));
     }
-    let wrong: [fn(&mut SharedErrors, f64); 5] = [
-        |shared, error| shared.force_scale = error,
-        |shared, error| shared.length_scale = error,
-        |shared, error| shared.size = error,
-        |shared, error| shared.poisson_ratio = error,
-        |shared, error| shared.other_body = error,
-    ];
-    for set in wrong {
-        for error in [-0.1, f64::NAN, f64::INFINITY] {
-            let mut shared = SharedErrors::default();
-            set(&mut shared, error);
-            let refused = LoadSeries::new([bare]).with_shared_errors(shared);
+    let ball = || Bodies::new(Object::sphere(3e-3), None);
+    for error in [-0.1, f64::NAN, f64::INFINITY] {
+        let factor = Uncertain::exact(1.0).by(Source::Guide, error);
+        for refused in [
+            ball().with_size_error(error),
+            ball().with_poisson_ratio_error(error),
+            ball().with_adhesion_j_per_m2(error),
+        ] {
             assert!(matches!(refused, Err(ElasticityError::Negative { .. })));
         }
+        let unknown = error.is_nan() || error.is_infinite();
+        assert_eq!(ball().with_guide_error(factor).is_err(), unknown);
+        let noisy = LoadState::new(Estimate::new(1.0, error)).with_radius(exact(1e-3));
+        refuses(&sphere, &[noisy], "standard error");
     }
 }
