@@ -21,118 +21,48 @@
 //!
 //! Contact nodes that touch, or may do so within a load step.
 
-use crate::element::{GAUSS3, quadratic};
+use crate::element::quadratic;
 use crate::material::Kinematics;
-use crate::model::{ElementModel, ModelFields, RigidShape};
-use crate::stick::Slip;
+use crate::model::{ElementModel, ModelFields};
+use crate::surface::{
+    BEND, ContactSegment, CurvePoint, DRIVER, GapPoint, Opposite, RigidShape, Slip, SurfaceCurve,
+    combine,
+};
 
 /// Two ends of edges nearer than this part of a segment leave nothing to integrate between them.
 const SLIVER: f64 = 1e-6;
 
-/// Penalty of contact over the softer body's modulus and the edge's length: a pressure of a third
-/// of the modulus then leaves a thousandth of an element's penetration before the multipliers'
-/// update. Ten times less needs more updates, ten times more iterations; the Hertz test shows it.
-const PENALTY_LIMIT: f64 = 300.0;
-
 /// Part of a node's area that has something opposite to it, below which the node is open.
 const LEAST_SHARE: f64 = 0.25;
 
-/// What a surface may touch.
-#[derive(Debug, Clone)]
-pub(crate) enum Opposite {
-    /// Another body's surface.
-    Surface(SurfaceCurve),
-    /// A rigid shape above (+1) or below (−1) the surface, whose pole is at z = 0 in the reference
-    /// configuration. One below moves by the approach.
-    Rigid { shape: RigidShape, side: f64 },
+/// Where contact is judged: reference coordinates and displacements.
+#[derive(Clone, Copy)]
+pub(crate) struct Placement<'a> {
+    pub kinematics: Kinematics,
+    pub nodes: &'a [[f64; 2]],
+    pub displacement: &'a [f64],
+    pub approach: f64,
 }
 
-/// Half of an edge of a contact surface, between two of its nodes.
-#[derive(Debug, Clone)]
-pub(crate) struct ContactSegment {
-    pub pair: usize,
-    pub nodes: [usize; 3],
-    /// Parameters of its ends on the edge.
-    ends: [f64; 2],
-    /// Indices of the contact nodes at its ends.
-    contact_nodes: [usize; 2],
-}
-
-/// A Gauss point of a surface at which a gap is measured.
-#[derive(Debug, Clone)]
-pub(crate) struct GapPoint {
-    pub pair: usize,
-    pub nodes: [usize; 3],
-    pub shape: [f64; 3],
-    pub derivative: [f64; 3],
-    /// Contact nodes whose hat functions reach here, with the functions times the point's reference
-    /// area.
-    pub shares: [(usize, f64); 2],
-}
-
-/// A node of a contact surface, which carries a pressure.
-#[derive(Debug, Clone)]
-pub(crate) struct ContactNode {
-    pub pair: usize,
-    pub node: usize,
-    /// Reference area of the hat function.
-    pub weight: f64,
-    /// Penalty ε: pressure per penetration, Pa/m.
-    pub penalty: f64,
-    /// Distance to its neighbours.
-    pub spacing: f64,
-}
-
-impl ContactSegment {
-    /// Gauss points between the cuts, which are parameters on the edge in ascending order.
-    pub(crate) fn points(&self, cuts: &[f64], nodes: &[[f64; 2]]) -> Vec<GapPoint> {
-        let [start, end] = self.ends;
-        let mut bounds = vec![start];
-        bounds.extend(cuts);
-        bounds.push(end);
-        let mut points = Vec::with_capacity(3 * (bounds.len() - 1));
-        for piece in bounds.windows(2) {
-            let (middle, half) = (0.5 * (piece[0] + piece[1]), 0.5 * (piece[1] - piece[0]));
-            for (x, gauss) in GAUSS3 {
-                let parameter = middle + half * x;
-                let (shape, derivative) = quadratic(parameter);
-                let [r, _] = combine(&shape, self.nodes, |n| nodes[n]);
-                let [dr, dz] = combine(&derivative, self.nodes, |n| nodes[n]);
-                let area = core::f64::consts::TAU * r * half * gauss * dr.hypot(dz);
-                let hat = (parameter - start) / (end - start);
-                points.push(GapPoint {
-                    pair: self.pair,
-                    nodes: self.nodes,
-                    shape,
-                    derivative,
-                    shares: [
-                        (self.contact_nodes[0], (1.0 - hat) * area),
-                        (self.contact_nodes[1], hat * area),
-                    ],
-                });
-            }
-        }
-        points
-    }
-
-    /// Parameters at which the ends of the opposite edges lie closest.
-    fn cuts(&self, curve: &SurfaceCurve, placement: &Placement<'_>) -> Vec<f64> {
+impl Placement<'_> {
+    /// Parameters on a segment at which the ends of the opposite edges lie closest.
+    fn cuts(&self, segment: &ContactSegment, curve: &SurfaceCurve) -> Vec<f64> {
         let at = |parameter: f64| {
             let (shape, derivative) = quadratic(parameter);
-            let position = combine(&shape, self.nodes, |n| placement.current(n));
+            let position = combine(&shape, segment.nodes, |n| self.current(n));
             (
                 position,
-                combine(&derivative, self.nodes, |n| placement.current(n)),
+                combine(&derivative, segment.nodes, |n| self.current(n)),
             )
         };
-        let [start, end] = self.ends;
+        let [start, end] = segment.ends;
         let (a, b) = (at(start).0, at(end).0);
         let chord = [b[0] - a[0], b[1] - a[1]];
         let square = chord[0] * chord[0] + chord[1] * chord[1];
         let margin = SLIVER * (end - start);
         let mut cuts = Vec::new();
         for edge in &curve.edges()[1..] {
-            let corner = placement.current(edge[0]);
+            let corner = self.current(edge[0]);
             let offset = [corner[0] - a[0], corner[1] - a[1]];
             let along = (offset[0] * chord[0] + offset[1] * chord[1]) / square;
             let across = (offset[1] * chord[0] - offset[0] * chord[1]) / square;
@@ -157,137 +87,7 @@ impl ContactSegment {
         cuts.dedup_by(|next, kept| *next - *kept < margin);
         cuts
     }
-}
 
-/// The segments of a surface's edges and their nodes, numbered from `first_node`.
-pub(crate) fn contact_segments(
-    pair: usize,
-    first_node: usize,
-    edges: &[[usize; 3]],
-    nodes: &[[f64; 2]],
-    modulus: f64,
-) -> (Vec<ContactSegment>, Vec<ContactNode>) {
-    let mut segments = Vec::new();
-    let mut corners: Vec<ContactNode> = Vec::new();
-    for &edge in edges {
-        for half in [0, 1] {
-            let contact_nodes = [edge[half], edge[half + 1]].map(|node| {
-                let known = corners.iter().position(|corner| corner.node == node);
-                let index = known.unwrap_or_else(|| {
-                    corners.push(ContactNode {
-                        pair,
-                        node,
-                        weight: 0.0,
-                        penalty: f64::INFINITY,
-                        spacing: 0.0,
-                    });
-                    corners.len() - 1
-                });
-                first_node + index
-            });
-            let start = half as f64 - 1.0;
-            let segment = ContactSegment {
-                pair,
-                nodes: edge,
-                ends: [start, start + 1.0],
-                contact_nodes,
-            };
-            let [a, b] = [edge[half], edge[half + 1]].map(|node| nodes[node]);
-            let length = (b[0] - a[0]).hypot(b[1] - a[1]);
-            for point in segment.points(&[], nodes) {
-                for (index, weight) in point.shares {
-                    corners[index - first_node].weight += weight;
-                }
-            }
-            for index in contact_nodes {
-                let corner = &mut corners[index - first_node];
-                corner.spacing = length.max(corner.spacing);
-                corner.penalty = corner.penalty.min(0.5 * PENALTY_LIMIT * modulus / length);
-            }
-            segments.push(segment);
-        }
-    }
-    (segments, corners)
-}
-
-/// Edges of a surface from the axis outwards.
-#[derive(Debug, Clone)]
-pub(crate) struct SurfaceCurve {
-    /// Nodes (inner end, middle, outer end).
-    edges: Vec<[usize; 3]>,
-    /// +1 where the body is on the left of the way outwards: its outward normal is (z', −r').
-    pub side: f64,
-}
-
-/// Weights of an edge's nodes.
-type Weights = [f64; 3];
-
-/// An edge's nodes, and their weights in position, first and second derivative at one parameter.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct CurvePoint {
-    pub nodes: [usize; 3],
-    pub position: Weights,
-    pub first: Weights,
-}
-
-/// Weights of the second derivative, the same everywhere on an edge.
-const BEND: Weights = [1.0, -2.0, 1.0];
-
-impl CurvePoint {
-    /// Weighted sum over the nodes.
-    pub(crate) fn sum(&self, weights: &Weights, at: impl Fn(usize) -> [f64; 2]) -> [f64; 2] {
-        combine(weights, self.nodes, at)
-    }
-}
-
-impl SurfaceCurve {
-    /// From edges ordered along a surface whose radius grows along it.
-    pub(crate) fn new(edges: &[[usize; 3]], coordinates: &[[f64; 2]]) -> Self {
-        let outwards = |edge: &[usize; 3]| coordinates[edge[2]][0] > coordinates[edge[0]][0];
-        Self {
-            side: if edges.first().is_some_and(outwards) {
-                1.0
-            } else {
-                -1.0
-            },
-            edges: edges
-                .iter()
-                .map(|edge| {
-                    if outwards(edge) {
-                        *edge
-                    } else {
-                        [edge[2], edge[1], edge[0]]
-                    }
-                })
-                .collect(),
-        }
-    }
-
-    pub(crate) fn edges(&self) -> &[[usize; 3]] {
-        &self.edges
-    }
-
-    /// The point of an edge at ξ in [−1, 1].
-    pub(crate) fn at(&self, edge: usize, xi: f64) -> CurvePoint {
-        let (position, first) = quadratic(xi);
-        CurvePoint {
-            nodes: self.edges[edge],
-            position,
-            first,
-        }
-    }
-}
-
-/// Where contact is judged: reference coordinates and displacements.
-#[derive(Clone, Copy)]
-pub(crate) struct Placement<'a> {
-    pub kinematics: Kinematics,
-    pub nodes: &'a [[f64; 2]],
-    pub displacement: &'a [f64],
-    pub approach: f64,
-}
-
-impl Placement<'_> {
     /// Where a node is: in linear kinematics at its undeformed radius, as gaps are.
     pub(crate) fn current(&self, node: usize) -> [f64; 2] {
         let [r, z] = self.nodes[node];
@@ -321,20 +121,6 @@ impl Placement<'_> {
         area(&|n| self.current(n)) / area(&|n| self.nodes[n])
     }
 }
-
-/// Weighted sum over an edge's nodes.
-fn combine(shape: &[f64; 3], nodes: [usize; 3], at: impl Fn(usize) -> [f64; 2]) -> [f64; 2] {
-    let mut sum = [0.0; 2];
-    for (n, node) in shape.iter().zip(nodes) {
-        let point = at(node);
-        sum[0] += n * point[0];
-        sum[1] += n * point[1];
-    }
-    sum
-}
-
-/// Stands for the approach among the displacement components of a [`Gap`].
-pub(crate) const DRIVER: usize = usize::MAX;
 
 /// A gap and its derivatives by the displacement components `dofs`.
 #[derive(Debug, Clone)]
@@ -690,7 +476,7 @@ impl ElementModel {
         let mut points = Vec::with_capacity(3 * self.segments.len());
         for segment in &self.segments {
             let cuts = match (&self.opposites[segment.pair], self.kinematics) {
-                (Opposite::Surface(curve), Kinematics::Finite) => segment.cuts(curve, &placement),
+                (Opposite::Surface(curve), Kinematics::Finite) => placement.cuts(segment, curve),
                 _ => Vec::new(),
             };
             points.extend(segment.points(&cuts, &self.nodes));

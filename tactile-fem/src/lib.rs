@@ -57,14 +57,16 @@ mod spacing;
 mod sparse;
 mod state;
 mod stick;
+mod surface;
 mod system;
 mod table;
 
 pub use material::{Kinematics, Material};
 pub use nearby::{FrameResponse, SolvedFrames};
-pub use press::{Guide, GuideLayer, ObjectPress, ObjectShape};
-pub use scene::{AppliedLoad, Block, FemScene, Interface, Lump, Outcome, Solution, SolverReport};
-pub use state::{ContactRadius, PressurePoint, State, Stress};
+pub use press::{Guide, GuideLayer, Interface, ObjectPress, ObjectShape};
+pub use recovery::{ContactRadius, PressurePoint};
+pub use scene::{AppliedLoad, Block, FemScene, Lump, Outcome, Solution, SolverReport};
+pub use state::{State, Stress};
 pub use table::{TableOptions, TableProgress, solve_contact_table};
 
 #[cfg(test)]

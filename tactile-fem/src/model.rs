@@ -6,11 +6,12 @@
 //!
 //! Rigid bodies of revolution.
 
-use crate::contact::{ContactNode, ContactSegment, Opposite, SurfaceCurve, contact_segments};
 use crate::element::{ALL, ElementGeometry};
 use crate::material::{Kinematics, Material};
 use crate::mesh::{Boundary, Mesh};
-use crate::stick::Anchor;
+use crate::surface::{
+    Anchor, ContactNode, ContactSegment, Opposite, RigidShape, SurfaceCurve, contact_segments,
+};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use tactile_elasticity::{ElasticityError, Quantity};
@@ -332,47 +333,6 @@ impl BondedInterface {
             sign,
             elements: touching.collect(),
             nodes,
-        }
-    }
-}
-
-/// The shape of a rigid body of revolution, with its lowest point at height zero.
-#[derive(Debug, Clone, Copy, PartialEq)]
-// A flat alone is pressed on objects; the others have the closed forms that tests compare with.
-#[cfg_attr(not(test), allow(dead_code))]
-pub(crate) enum RigidShape {
-    /// A plane at right angles to the axis.
-    Flat,
-    /// The paraboloid r² / 2R, of which Hertz's theory speaks.
-    Paraboloid {
-        /// Its radius of curvature at the pole, in metres.
-        radius_m: f64,
-    },
-    /// The flat end of a cylinder.
-    Punch {
-        /// Its radius, in metres.
-        radius_m: f64,
-    },
-    /// A cone.
-    Cone {
-        /// Between its axis and its surface, in radians.
-        half_angle_rad: f64,
-    },
-}
-
-impl RigidShape {
-    /// Height at radius r, its slope and second derivative. `None` beyond the shape.
-    pub(crate) fn profile(self, r: f64) -> Option<[f64; 3]> {
-        match self {
-            Self::Flat => Some([0.0; 3]),
-            Self::Punch { radius_m } => (r <= radius_m).then_some([0.0; 3]),
-            Self::Paraboloid { radius_m } => {
-                Some([r * r / (2.0 * radius_m), r / radius_m, 1.0 / radius_m])
-            }
-            Self::Cone { half_angle_rad } => {
-                let slope = 1.0 / half_angle_rad.tan();
-                Some([r * slope, slope, 0.0])
-            }
         }
     }
 }

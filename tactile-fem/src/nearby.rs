@@ -3,10 +3,11 @@
 use crate::element::{ElementGeometry, Elimination};
 use crate::material::Material;
 use crate::model::{ElementModel, ModelFields};
+use crate::recovery::PressurePoint;
 use crate::scene::{AppliedLoad, FemScene, Outcome};
 use crate::slide::Relaxation;
 use crate::sparse::Factors;
-use crate::state::{PressurePoint, State, pressure_at};
+use crate::state::{State, pressure_at};
 use crate::system::{Layout, Slot, Tangent};
 use std::sync::Arc;
 use tactile_elasticity::ElasticityError;

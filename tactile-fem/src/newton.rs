@@ -9,14 +9,13 @@
 //! the distance from where the tangent was taken (P. Deuflhard, *Newton Methods for Nonlinear
 //! Problems* (2004), §2.1.2), which for scenes near a solved one is small.
 
-use crate::contact::Opposite;
-use crate::element::{Elimination, OUTER};
+use crate::element::OUTER;
 use crate::material::Kinematics;
 use crate::model::{ElementModel, Equilibrium, ModelFields};
 use crate::scene::{AppliedLoad, Outcome, Solution, SolverReport};
-use crate::sparse::Factors;
 use crate::state::State;
-use crate::system::{Layout, Slot, Tangent};
+use crate::surface::Opposite;
+use crate::system::{Chord, Layout, Slot};
 use std::sync::Arc;
 
 /// First step there, over the load's approach: what touches within it slides. With 0.02 a
@@ -446,16 +445,6 @@ fn simplified(
 /// below what the forces are wanted to, and well above rounding.
 const TOLERANCE: f64 = 1e-8;
 
-/// A factorised tangent of a model without contacts.
-#[derive(Debug)]
-pub(crate) struct Chord {
-    slots: Arc<[Slot]>,
-    eliminations: Vec<Elimination>,
-    factors: Factors,
-    /// Change of the equations' unknowns by a unit approach.
-    by_approach: Vec<f64>,
-}
-
 /// How iterations with one tangent end.
 enum Ending {
     Balanced(Equilibrium),
@@ -478,23 +467,6 @@ struct Unbalanced {
 }
 
 impl Chord {
-    /// `None` where the tangent is singular.
-    pub(crate) fn new(
-        tangent: Tangent,
-        slots: Arc<[Slot]>,
-        eliminations: Vec<Elimination>,
-    ) -> Option<Self> {
-        let factors = tangent.matrix.factorise().ok()?;
-        let mut by_approach = tangent.driver_column;
-        factors.solve(&mut by_approach).ok()?;
-        Some(Self {
-            slots,
-            eliminations,
-            factors,
-            by_approach,
-        })
-    }
-
     /// Iterates from `start` at an approach as long as that converges fast.
     fn iterate(
         &self,

@@ -4,9 +4,9 @@
 
 use crate::material::{Kinematics, Material};
 use crate::mesh::{Boundary, ContactMesh, Mesh};
-use crate::model::{ElementModel, RigidShape, Support};
-use crate::scene::{FemScene, Interface};
+use crate::model::{ElementModel, Support};
 use crate::spacing::{contact_lines, graded};
+use crate::surface::RigidShape;
 use tactile_elasticity::{ElasticityError, Quantity};
 
 /// A layer of a [`Guide`].
@@ -137,6 +137,30 @@ pub enum ObjectShape {
         /// From its tip to its base, in metres.
         height_m: f64,
     },
+}
+
+/// Whether two surfaces that are pressed together slide.
+///
+/// ```
+/// use tactile_fem::{Block, Guide, Interface, GuideLayer, AppliedLoad, Material, FemScene};
+///
+/// let material = Material::new(1e4, 0.49).unwrap();
+/// let block = Block { height_m: 20e-3, radius_m: 30e-3, material, lump: None };
+/// let guide = Guide::new(vec![GuideLayer { thickness_m: 5e-3, material }], 10e-3).unwrap();
+/// let force = |interface| {
+///     let scene = FemScene::block_under_guide(&block, &guide, interface).unwrap();
+///     scene.solve(&[AppliedLoad::Approach(0.2e-3)]).states[0].force_n()
+/// };
+/// assert!(force(Interface::Bonded) > force(Interface::Frictionless));
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum Interface {
+    /// The two move together, from the start or from where they first touch.
+    Bonded,
+    /// They slide on each other. A guide and a block are not let part: the pressure is positive
+    /// where they press.
+    Frictionless,
 }
 
 /// An [`ObjectShape`] pressed on a rigid flat or on a [`Guide`], without friction unless asked for,
@@ -275,10 +299,7 @@ impl ObjectPress {
     }
 
     /// The model of it: the object's far side stays, the glass or the flat moves by the approach.
-    ///
-    /// # Errors
-    /// [`ElasticityError::DegenerateElement`] where the proportions leave an element without area.
-    pub fn scene(&self) -> Result<FemScene, ElasticityError> {
+    pub(crate) fn model(&self) -> Result<ElementModel, ElasticityError> {
         let mut model = ElementModel::new(Kinematics::Finite);
         let object = model.add(&self.object_mesh(), &[self.material])?;
         let far_side = match self.object {
@@ -302,7 +323,7 @@ impl ObjectPress {
         if self.interface == Interface::Bonded {
             model.forbid_slip();
         }
-        Ok(FemScene { model })
+        Ok(model)
     }
 
     fn size(&self) -> ContactMesh {

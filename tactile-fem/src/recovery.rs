@@ -11,7 +11,6 @@
 
 use crate::element::{GAUSS3, quadratic};
 use crate::model::{BondedInterface, ElementModel, ModelFields};
-use crate::state::{ContactRadius, PressurePoint};
 use core::f64::consts::{PI, TAU};
 use nalgebra::DVector;
 use std::collections::BTreeMap;
@@ -29,6 +28,55 @@ const FEWEST_MEANS: usize = 4;
 /// Where the fit begins, over the outermost node's radius: further in, p² bends more than a
 /// parabola.
 const FIT_FROM: f64 = 0.35;
+
+/// Pressure at a point of a contact or of a bonded interface.
+///
+/// ```
+/// use tactile_fem::{AppliedLoad, Material, ObjectShape, ObjectPress};
+///
+/// let scene = ObjectPress::new(
+///     ObjectShape::Ball { radius_m: 3e-3 },
+///     Material::new(1e5, 0.495).unwrap(),
+/// )
+/// .and_then(|press| press.scene())
+/// .unwrap();
+/// let state = &scene.solve(&[AppliedLoad::Approach(0.3e-3)]).states[0];
+/// assert!(state.pressure()[0].pressure_pa > state.pressure()[5].pressure_pa);
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub struct PressurePoint {
+    /// Deformed distance from the axis, in metres.
+    pub r_m: f64,
+    /// Deformed height, in metres.
+    pub z_m: f64,
+    /// Force per deformed area, in pascals.
+    pub pressure_pa: f64,
+}
+
+/// A contact radius and how far the mesh leaves it open.
+///
+/// ```
+/// use tactile_fem::{AppliedLoad, Material, ObjectShape, ObjectPress};
+///
+/// let scene = ObjectPress::new(
+///     ObjectShape::Ball { radius_m: 3e-3 },
+///     Material::new(1e5, 0.495).unwrap(),
+/// )
+/// .and_then(|press| press.scene())
+/// .unwrap();
+/// let state = &scene.solve(&[AppliedLoad::Approach(0.3e-3)]).states[0];
+/// let radius = state.contact_radius().unwrap();
+/// assert!(radius.uncertainty_m < 0.01 * radius.radius_m);
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub struct ContactRadius {
+    /// The radius, in metres.
+    pub radius_m: f64,
+    /// Numerical uncertainty: the difference between two extrapolations of the pressure to zero.
+    pub uncertainty_m: f64,
+}
 
 /// Smooth pressures of a contact and its radius, from the pressures at all nodes in contact, those
 /// from the axis outwards, and the force they carry.

@@ -7,41 +7,13 @@
 use crate::material::{Kinematics, Material};
 use crate::mesh::{BlockMesh, Boundary, InclusionSize};
 use crate::model::{BondedInterface, ElementModel, Support};
-use crate::press::{Guide, ObjectPress, ObjectShape};
+use crate::press::{Guide, Interface, ObjectPress, ObjectShape};
 use crate::state::{State, Stress};
 use tactile_elasticity::{ElasticityError, Quantity};
 
 /// Mesh fineness where nothing else is asked: elements along an eighth of an inclusion's
 /// circumference.
 const BLOCK_FINENESS: usize = 5;
-
-/// Whether two surfaces that are pressed together slide.
-///
-/// ```
-/// use tactile_fem::{Block, Guide, Interface, GuideLayer, AppliedLoad, Material, FemScene};
-///
-/// let material = Material::new(1e4, 0.49).unwrap();
-/// let block = Block { height_m: 20e-3, radius_m: 30e-3, material, lump: None };
-/// let guide = Guide::new(vec![GuideLayer { thickness_m: 5e-3, material }], 10e-3).unwrap();
-/// let force = |interface| {
-///     let scene = FemScene::block_under_guide(&block, &guide, interface).unwrap();
-///     scene.solve(&[AppliedLoad::Approach(0.2e-3)]).states[0].force_n()
-/// };
-/// assert!(force(Interface::Bonded) > force(Interface::Frictionless));
-/// ```
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(
-    feature = "serde",
-    derive(serde::Serialize, serde::Deserialize),
-    serde(rename_all = "snake_case")
-)]
-pub enum Interface {
-    /// The two move together, from the start or from where they first touch.
-    Bonded,
-    /// They slide on each other. A guide and a block are not let part: the pressure is positive
-    /// where they press.
-    Frictionless,
-}
 
 /// A spheroid of another material within a block, on its axis: a ball where it is as tall as wide.
 ///
@@ -269,6 +241,18 @@ impl FemScene {
     /// ```
     pub fn stress(&self, state: &State, point: [f64; 2]) -> Option<Stress> {
         self.model.stress(state, point)
+    }
+}
+
+impl ObjectPress {
+    /// The scene of it: the object's far side stays, the glass or the flat moves by the approach.
+    ///
+    /// # Errors
+    /// [`ElasticityError::DegenerateElement`] where the proportions leave an element without area.
+    pub fn scene(&self) -> Result<FemScene, ElasticityError> {
+        Ok(FemScene {
+            model: self.model()?,
+        })
     }
 }
 

@@ -6,13 +6,12 @@
 //!
 //! The linear system of one Newton iteration.
 
-use crate::contact::{Candidate, DRIVER};
+use crate::contact::Candidate;
 use crate::element::{Elimination, OUTER};
 use crate::model::{DofMotion, ElementModel, ModelFields};
-use crate::newton::Chord;
 use crate::scene::AppliedLoad;
 use crate::sparse::{Factors, Pattern, Singular, Symmetric};
-use crate::stick::Slip;
+use crate::surface::{DRIVER, Slip};
 use std::sync::Arc;
 
 /// Changes of the active set within a Newton iteration; more are rounding's toss between two
@@ -40,6 +39,35 @@ pub(crate) fn slot(slots: &[Slot], dof: usize) -> Slot {
         Slot::Driver(1.0)
     } else {
         slots[dof]
+    }
+}
+
+/// A factorised tangent of a model without contacts.
+#[derive(Debug)]
+pub(crate) struct Chord {
+    pub slots: Arc<[Slot]>,
+    pub eliminations: Vec<Elimination>,
+    pub factors: Factors,
+    /// Change of the equations' unknowns by a unit approach.
+    pub by_approach: Vec<f64>,
+}
+
+impl Chord {
+    /// `None` where the tangent is singular.
+    pub(crate) fn new(
+        tangent: Tangent,
+        slots: Arc<[Slot]>,
+        eliminations: Vec<Elimination>,
+    ) -> Option<Self> {
+        let factors = tangent.matrix.factorise().ok()?;
+        let mut by_approach = tangent.driver_column;
+        factors.solve(&mut by_approach).ok()?;
+        Some(Self {
+            slots,
+            eliminations,
+            factors,
+            by_approach,
+        })
     }
 }
 

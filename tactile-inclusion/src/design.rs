@@ -2,8 +2,8 @@
 
 use crate::covariance::{Observed, Resolution};
 use crate::fit::Problem;
-use crate::forward::LumpParameters;
 use crate::hypothesis::BLOCK_COORDINATES;
+use crate::parameters::LumpParameters;
 use crate::search::InclusionSearch;
 use crate::specimen::check_approaches;
 use tactile_elasticity::{ElasticityError, Quantity};

@@ -1,6 +1,7 @@
 //! Maximum a posteriori fit of a block's parameters to measured profiles.
 
-use crate::forward::{Coordinate, Forward, LARGEST_POISSON_RATIO, Parameters, Solved};
+use crate::forward::{Forward, Solved};
+use crate::parameters::{Coordinate, LARGEST_POISSON_RATIO, Parameters};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 /// Distance of the optimum in standard errors that the solutions' tolerance may hide.

@@ -19,7 +19,7 @@ use crate::estimate::{
     Estimated, Identifiable, Inclusion, InclusionEstimate, InclusionWarning, TWO_SIDED_95,
 };
 use crate::fit::{Fit, Problem};
-use crate::forward::{Coordinate, Parameters};
+use crate::parameters::{Coordinate, Parameters};
 use crate::ridge::Marginal;
 use crate::starts::GridStart;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix2, Vector2};

@@ -39,6 +39,7 @@ mod forward;
 mod hypothesis;
 mod limits;
 mod pair;
+mod parameters;
 mod picture;
 mod progress;
 mod ridge;

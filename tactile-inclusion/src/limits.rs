@@ -1,7 +1,8 @@
 //! How small an inclusion can be and still be found, place by place.
 
-use crate::forward::{Forward, LumpParameters, Parameters, Solved};
+use crate::forward::{Forward, Solved};
 use crate::hypothesis::PlainFit;
+use crate::parameters::{LumpParameters, Parameters};
 use crate::progress::{Counter, SearchProgress};
 use crate::scan::Scan;
 use crate::search::{HomogeneousFit, InclusionSearch, USED_FACE};

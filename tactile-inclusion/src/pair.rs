@@ -10,8 +10,9 @@
 use crate::covariance::{Observed, Resolution};
 use crate::estimate::InclusionEstimate;
 use crate::fit::{FIRST_FIT_ENDING, Fit, PAIR_ENDING, Prior, Problem};
-use crate::forward::{Coordinate, Forward, LumpParameters, Parameters};
+use crate::forward::Forward;
 use crate::hypothesis::{BLOCK_COORDINATES, Hypothesis, is_poor};
+use crate::parameters::{Coordinate, LumpParameters, Parameters};
 use crate::picture::extent;
 use crate::progress::Counter;
 use crate::search::{CLEAR_EVIDENCE, InclusionSearch};

@@ -12,25 +12,9 @@
 //! a lump that were solved in three dimensions. What they leave grows as the rim comes nearer to
 //! the lump, and is part of the errors' covariance.
 
-use crate::forward::{Coordinate, Parameters};
+use crate::parameters::{Coordinate, Parameters, Place};
 use std::sync::Arc;
 use tactile_fem::{FrameResponse, SolvedFrames};
-
-/// Where an inclusion is, seen from above, and how far its outline there is from a circle.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(crate) struct Place {
-    /// Its middle (x, y) from the face's axis.
-    pub centre_m: [f64; 2],
-    /// Half the logarithm of the ratio of its axes, times cosine and sine of twice the angle from x
-    /// to the longer one.
-    pub elongation: [f64; 2],
-    /// How far tissue that is pressed flows away from the axis and carries the inclusion with it,
-    /// over its distance from the axis and the approach over the block's height.
-    pub carried: f64,
-    /// How far the load spreads from the axis below the face, over its distance from the axis and
-    /// the cube of the depth in radii of the face.
-    pub spread: f64,
-}
 
 /// How much faster the ratio falls outwards than inwards, over the product of the middle's depth z,
 /// its distance x from the axis and the distance from it, in radii of the face, and over 1 − 3 x²:

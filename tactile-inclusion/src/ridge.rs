@@ -15,7 +15,8 @@
 //! gives evidence, covariance and quantiles.
 
 use crate::fit::{Fit, FitStep, Normal, Problem};
-use crate::forward::{Coordinate, Parameters, Solved};
+use crate::forward::Solved;
+use crate::parameters::{Coordinate, Parameters};
 use nalgebra::{DMatrix, DVector};
 use statrs::function::erf::erfc;
 

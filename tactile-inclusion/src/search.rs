@@ -4,9 +4,10 @@
 use crate::covariance::{Observed, ObservedCells, Resolution};
 use crate::estimate::InclusionEstimate;
 use crate::fit::{ANSWER_ENDING, FIRST_FIT_ENDING, Fit, Prior, Problem};
-use crate::forward::{Coordinate, Forward, LARGEST_POISSON_RATIO, Parameters};
+use crate::forward::Forward;
 use crate::hypothesis::{BLOCK_COORDINATES, Hypothesis, LEAST_GAIN, Score, better};
-use crate::picture::{Cells, Place, extent};
+use crate::parameters::{Coordinate, LARGEST_POISSON_RATIO, Parameters, Place};
+use crate::picture::{Cells, extent};
 use crate::progress::{Counter, SearchProgress};
 use crate::scan::{Scan, ScanPress};
 use crate::specimen::{PressureProfile, SensorErrors, Specimen, check};

@@ -1,6 +1,7 @@
 //! Inclusions that fits start from.
 
-use crate::forward::{Forward, LumpParameters, Parameters};
+use crate::forward::Forward;
+use crate::parameters::{LumpParameters, Parameters};
 use crate::progress::Counter;
 
 /// Part of the block's height that an inclusion may reach down to.

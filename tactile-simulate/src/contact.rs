@@ -5,7 +5,7 @@
 //! numbers over the radius. States by finite elements for two balls come with the crate.
 
 use crate::error::{SimulateError, at_least, finite, not_negative, positive, within};
-use crate::press::{Elastic, ElasticSphere, LightGuide};
+use crate::materials::{Elastic, ElasticSphere, LightGuide};
 use std::borrow::Cow;
 use std::f64::consts::{FRAC_PI_2, PI};
 

@@ -107,7 +107,7 @@ fn table<const N: usize>(entries: [(&str, Value); N]) -> Table {
 }
 
 /// A layer of the waveguide.
-fn layer(l: &crate::press::WaveguideLayer) -> Value {
+fn layer(l: &crate::materials::WaveguideLayer) -> Value {
     Value::Table(table([
         ("refractive_index", Value::Float(l.refractive_index)),
         ("thickness_m", Value::Float(l.thickness_m)),

@@ -42,6 +42,7 @@ mod error;
 #[cfg(feature = "scene")]
 mod folder;
 mod light;
+mod materials;
 mod pixel_average;
 mod press;
 #[cfg(feature = "fem")]
@@ -57,9 +58,9 @@ pub use error::SimulateError;
 #[cfg(feature = "scene")]
 pub use folder::write_folder;
 pub use light::{Illumination, Response};
+pub use materials::{Elastic, ElasticSphere, LightGuide, WaveguideLayer};
 pub use press::{
-    Elastic, ElasticSphere, Gain, LightGuide, PressLoad, PressOptions, PressScene, PressSimulation,
-    PressTruth, SurfaceScaling, WaveguideLayer,
+    Gain, PressLoad, PressOptions, PressScene, PressSimulation, PressTruth, SurfaceScaling,
 };
 pub use stream::{FrameStream, LoadCycle, StreamedFrame};
 pub use tactile_gel::simulate::{ColourGel, ElasticFace, GelObject, HertzPress};

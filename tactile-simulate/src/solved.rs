@@ -2,7 +2,7 @@
 
 use crate::contact::ContactState;
 use crate::error::{SimulateError, at_least, positive};
-use crate::press::Elastic;
+use crate::materials::Elastic;
 use tactile_imaging::fem::{AppliedLoad, FemScene, Interface, Material, State};
 
 /// ν = ½ has no finite bulk modulus. At this one the volume of a squeezed block changes by (1 −

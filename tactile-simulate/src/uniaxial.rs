@@ -24,8 +24,9 @@
 use crate::camera::{Camera, Purpose, row_stream};
 use crate::error::{SimulateError, at_least, finite, not_negative, positive, within};
 use crate::light::Illumination;
+use crate::materials::Elastic;
 use crate::pixel_average::{Patch, touched};
-use crate::press::{Elastic, Gain};
+use crate::press::Gain;
 use nalgebra::Point3;
 use ndarray::Array2;
 use rand_distr::{Distribution, Uniform};

@@ -7,17 +7,10 @@ use std::path::{Path, PathBuf};
 const LEFT: &[&str] = &[
     "tactile-cli: arguments, frames",
     "tactile-cli: hidden, inclusion",
-    "tactile-fem: contact, model, stick",
-    "tactile-fem: newton, system",
-    "tactile-fem: press, scene",
-    "tactile-fem: recovery, state",
     "tactile-files: sensor::calibration, sensor::layers, sensor::target",
     "tactile-gel: face, sensor",
-    "tactile-inclusion: forward, picture",
     "tactile-match: hard, matching",
     "tactile-python: pipeline, press",
-    "tactile-simulate: camera, contact, light, press",
-    "tactile-tps: evaluate, fit::factorization",
 ];
 
 /// A path of modules below the root of a crate.

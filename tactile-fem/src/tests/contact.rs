@@ -113,7 +113,7 @@ fn a_ball_on_a_bonded_layer_follows_the_linear_theory() {
 
 #[test]
 fn gaps_and_their_derivatives_agree_with_differences() {
-    use crate::contact::DRIVER;
+    use crate::surface::DRIVER;
     let material = Material::new(1.0, 0.45).unwrap();
     let scene = ball_on_guide(1.0, material, &layer(1.0, material, 4.0));
     let model = &scene.model;

@@ -1,8 +1,9 @@
 //! Convergence of the elements and of contact, against exact solutions.
 
 use crate::mesh::{Boundary, Mesh};
-use crate::model::{ElementModel, RigidShape, Support};
+use crate::model::{ElementModel, Support};
 use crate::spacing::{contact_lines, graded};
+use crate::surface::RigidShape;
 use crate::*;
 
 mod contact;

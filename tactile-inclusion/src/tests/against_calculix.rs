@@ -5,8 +5,9 @@
 #![allow(clippy::print_stdout)]
 
 use super::{block, forward, lump, search};
-use crate::forward::{Forward, Parameters};
-use crate::picture::{CellPositions, Cells, Place};
+use crate::forward::Forward;
+use crate::parameters::{Parameters, Place};
+use crate::picture::{CellPositions, Cells};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use tactile_fem::{Guide, GuideLayer, Interface, Material};

@@ -1,7 +1,8 @@
 //! Blocks that are not as the model assumes: an answer with its flag, never a confident wrong one.
 
 use super::{block, forward, guide, is_poor, lump, search, specimen};
-use crate::forward::{Forward, LumpParameters, Parameters};
+use crate::forward::Forward;
+use crate::parameters::{LumpParameters, Parameters};
 use crate::{
     Identifiable, InclusionEstimate, InclusionSearch, InclusionWarning, PressureProfile, Specimen,
     Verdict,

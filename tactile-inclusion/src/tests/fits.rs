@@ -4,7 +4,7 @@ use super::{block, forward, lump};
 use crate::SensorErrors;
 use crate::covariance::{Observed, Resolution};
 use crate::fit::{ANSWER_ENDING, Prior, Problem};
-use crate::forward::{Coordinate, LARGEST_POISSON_RATIO, Parameters};
+use crate::parameters::{Coordinate, LARGEST_POISSON_RATIO, Parameters};
 use tactile_fem::Interface;
 
 /// Values without noise from a finer mesh than the fit's, with the errors of a first fit.

@@ -1,7 +1,8 @@
 //! The forward model and its derivatives, and what a search refuses.
 
-use crate::forward::{Coordinate, Forward, LARGEST_POISSON_RATIO, LumpParameters, Parameters};
-use crate::picture::Place;
+use crate::forward::Forward;
+use crate::parameters::Place;
+use crate::parameters::{Coordinate, LARGEST_POISSON_RATIO, LumpParameters, Parameters};
 use crate::{
     AssumedInclusion, Identifiable, InclusionEstimate, InclusionSearch, InclusionWarning,
     PressureProfile, Specimen, Verdict,

@@ -1,8 +1,9 @@
 //! Searches from the whole face: a lump off the axis, and what no single ball explains.
 
 use super::{is_poor, lump, search};
-use crate::forward::{Coordinate, Forward, LumpParameters, Parameters};
-use crate::picture::{CellPositions, Cells, Place};
+use crate::forward::Forward;
+use crate::parameters::{Coordinate, LumpParameters, Parameters, Place};
+use crate::picture::{CellPositions, Cells};
 use crate::{
     Inclusion, InclusionEstimate, InclusionWarning, PressureProfile, Scan, ScanPress,
     SearchProgress, Verdict,

@@ -18,6 +18,77 @@ use crate::{
     span::{Coefficients, MAX},
 };
 
+impl<const D: usize, const M: usize, K: Kernel> Spline<D, M, K> {
+    /// Fits the spline that takes `sources` to `targets`.
+    ///
+    /// ```
+    /// use nalgebra::Point2;
+    /// use tactile_tps::{FitOptions, ThinPlateSpline};
+    /// # fn main() -> Result<(), tactile_tps::TpsError> {
+    /// let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4,
+    ///     0.6]].map(Point2::from);
+    /// let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
+    /// let warp = ThinPlateSpline::fit(&sources, &targets, &FitOptions::default())?;
+    /// assert!((warp.apply(&sources[4]) - targets[4]).norm() < 1e-14);
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
+    /// # Errors
+    /// [`TpsError`] for invalid input, coinciding points with different targets, or a kernel that
+    /// is not definite.
+    pub fn fit(
+        sources: &[Point<f64, D>],
+        targets: &[Point<f64, M>],
+        options: &FitOptions<K>,
+    ) -> Result<Self, TpsError> {
+        Factorization::new(sources, options)?.fit(targets)
+    }
+
+    /// As [`fit`](Self::fit), reporting the progress of an iterative solver to `watch`, which may
+    /// stop it.
+    ///
+    /// A direct solver does not report. Stopped while it iterates, the fit returns the best spline
+    /// so far.
+    /// Its report has the residual.
+    ///
+    /// ```
+    /// use core::ops::ControlFlow;
+    /// use nalgebra::Point2;
+    /// use tactile_tps::{FitOptions, Solver, ThinPlateSpline, TpsError};
+    /// # fn main() -> Result<(), tactile_tps::TpsError> {
+    /// let sources: Vec<Point2<f64>> =
+    ///     (0..900).map(|i| Point2::new(f64::from(i % 30), f64::from(i / 30)
+    ///         + 0.3 * f64::from(i % 7))).collect();
+    /// let targets: Vec<_> = sources.iter().map(|p| Point2::new(p.x.sin(), p.y.cos())).collect();
+    /// let options = FitOptions::default().with_solver(Solver::Iterative);
+    /// let spline = ThinPlateSpline::fit_watched(&sources, &targets, &options,
+    ///     |progress| match progress.residual {
+    ///     // Good enough for a first look.
+    ///     Some(residual) if residual < 1e-3 => ControlFlow::Break(()),
+    ///     _ => ControlFlow::Continue(()),
+    /// })?;
+    /// assert!(!spline.report.converged() && spline.report.residual < Some(1e-2));
+    /// let stopped = ThinPlateSpline::fit_watched(&sources, &targets, &options,
+    ///     |_| ControlFlow::Break(()));
+    /// assert_eq!(stopped.err(), Some(TpsError::Stopped));
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
+    /// # Errors
+    /// Those of [`fit`](Self::fit), and [`TpsError::Stopped`] if `watch` returns `Break` before
+    /// there is a spline.
+    pub fn fit_watched(
+        sources: &[Point<f64, D>],
+        targets: &[Point<f64, M>],
+        options: &FitOptions<K>,
+        mut watch: impl FnMut(&Progress) -> ControlFlow<()>,
+    ) -> Result<Self, TpsError> {
+        Factorization::new_watched(sources, options, &mut watch)?.fit_watched(targets, watch)
+    }
+}
+
 /// Source points with their kernel matrix factored: splines to any targets follow in O(n²).
 ///
 /// ```
