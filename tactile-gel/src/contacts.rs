@@ -28,7 +28,7 @@ const ROOT_MISFIT: f64 = 0.04;
 /// Error of an edge in cells that remains without noise, from worlds whose edge is known.
 const EDGE_ERROR: f64 = 0.12;
 /// Steps of the grid move the fitted root inwards by this many cells, in worlds of 10 to 50 px
-/// (`WORLDS=200 cargo test --release -p tactile-gel --test suite worlds`).
+/// (`cargo run --release -p tactile-gel --example exact_worlds`).
 const ROOT_SHIFT: f64 = 0.09;
 /// Blur moves the largest slope at a kink inwards by this many cells.
 const KINK_SHIFT: f64 = 0.15;

@@ -4,24 +4,18 @@ use ndarray::{Array2, Axis};
 use tactile_core::Estimate;
 
 use crate::GelError;
-use crate::contacts::{Patch, block_means, quantile};
+use crate::contacts::{Patch, block_means};
 use crate::frame_check::FrameDoubt;
 use crate::integration::integrated;
 use crate::plane::Plane;
+use crate::rest::{Tails, rest};
 use crate::sensor::GelModel;
 
 /// Cells of the coarse grid along the longer side of a frame.
 const COARSE: usize = 40;
-/// Standard error of the rest far away, as a share of a half-space's tail at the border: if the
-/// border follows that tail, and if it does not. A layer's falls off sooner, and turns its sign.
-const TAIL_ERRORS: [f64; 2] = [0.15, 0.55];
-/// The border follows the tail if it leaves less than this share of the border's variance.
-const FOLLOWS: f64 = 0.7;
 /// Variance in square pixels of the blur of the frames, which takes half of it times the face's
 /// Laplacian off its depth.
 const BLUR: f64 = 1.0;
-/// Error of the rest in pixels: the noise of the slopes adds up over the frame.
-const REST_NOISE: f64 = 0.03;
 /// Error of an integrated depth in pixels times slope, of noise that the calibration's scale does
 /// not hold.
 const DEPTH_NOISE: f64 = 0.01;
@@ -102,7 +96,7 @@ impl GelFrame {
 
 /// The face and the contacts of slopes.
 pub fn frame(
-    model: &GelModel,
+    (model, tails): (&GelModel, &Tails),
     gradient: [Array2<f32>; 2],
     gradient_error: [Array2<f32>; 2],
     pressure: &Array2<f32>,
@@ -118,7 +112,7 @@ pub fn frame(
             labels[*at] = k as u16 + 1;
         }
     }
-    let (rest, rest_error) = rest(&depth, &labels, pressure, size);
+    let (rest, rest_error) = rest(tails, &depth, &labels, pressure, size);
     depth -= rest;
     let contacts = patches.iter().map(|patch| {
         let face = Face {
@@ -212,84 +206,6 @@ impl Face<'_> {
             touches_border: patch.pixels.iter().any(edge),
         }
     }
-}
-
-/// The level that the face has far away, and its standard error, in metres.
-///
-/// Along the border the face is not at rest: on a half-space it falls off as f dA/2πr around every
-/// contact, on a layer sooner. Whether the border shows that tail decides whether it is counted.
-fn rest(
-    depth: &Array2<f64>,
-    labels: &Array2<u16>,
-    pressure: &Array2<f32>,
-    size: f64,
-) -> (f64, f64) {
-    let (rows, columns) = depth.dim();
-    // Pressure of the contacts in blocks, with their places.
-    let mut sources: Vec<[f64; 3]> = Vec::new();
-    let block = rows.max(columns).div_ceil(2 * COARSE).max(1);
-    for top in (0..pressure.nrows()).step_by(block) {
-        for left in (0..pressure.ncols()).step_by(block) {
-            let mut sums = [0.0; 3];
-            for r in top..(top + block).min(pressure.nrows()) {
-                for c in left..(left + block).min(pressure.ncols()) {
-                    if labels[[2 * r, 2 * c]] > 0 {
-                        let f = f64::from(pressure[[r, c]].max(0.0));
-                        let more = [f, f * 2.0 * c as f64, f * 2.0 * r as f64];
-                        sums.iter_mut().zip(more).for_each(|(s, v)| *s += v);
-                    }
-                }
-            }
-            if sums[0] > 0.0 {
-                sources.push([4.0 * sums[0], sums[1] / sums[0], sums[2] / sums[0]]);
-            }
-        }
-    }
-    let tail = |row: f64, column: f64| {
-        let part = |[f, x, y]: &[f64; 3]| f / (column - x).hypot(row - y).max(1.0);
-        size * sources.iter().map(part).sum::<f64>() / core::f64::consts::TAU
-    };
-    // The border in some 150 places, in two rings.
-    let step = ((rows + columns) / 40).max(1);
-    let inset = (rows.min(columns) / 24).max(1);
-    let mut pairs: Vec<[f64; 2]> = Vec::new();
-    for ring in [0, inset] {
-        let (bottom, right) = (
-            rows.saturating_sub(ring + 1),
-            columns.saturating_sub(ring + 1),
-        );
-        let across = (ring..=right)
-            .step_by(step)
-            .flat_map(|c| [(ring, c), (bottom, c)]);
-        let down = (ring..=bottom)
-            .step_by(step)
-            .flat_map(|r| [(r, ring), (r, right)]);
-        for at in across.chain(down).filter(|at| labels.get(*at) == Some(&0)) {
-            pairs.push([tail(at.0 as f64, at.1 as f64), depth[at]]);
-        }
-    }
-    let n = pairs.len() as f64;
-    if pairs.is_empty() {
-        return (depth.iter().sum::<f64>() / depth.len() as f64, 0.0);
-    }
-    let [x, y] = [0, 1].map(|k: usize| pairs.iter().map(|pair| pair[k]).sum::<f64>() / n);
-    let left = |share: f64| {
-        let away = |pair: &[f64; 2]| (pair[1] - y - share * (pair[0] - x)).powi(2);
-        pairs.iter().map(away).sum::<f64>()
-    };
-    let follows = x > 0.0 && left(1.0) < FOLLOWS * left(0.0);
-    let (share, tail_error) = match follows {
-        true => (1.0, TAIL_ERRORS[0]),
-        false => (0.0, TAIL_ERRORS[1]),
-    };
-    let mut levels: Vec<f32> = pairs.iter().map(|[t, z]| (z - share * t) as f32).collect();
-    // The median is not moved by a contact that reaches the border, as a mean would be.
-    let rest = f64::from(quantile(&mut levels, 0.5));
-    let mut away: Vec<f32> = levels.iter().map(|z| (z - rest as f32).abs()).collect();
-    let noise = 1.4826 * f64::from(quantile(&mut away, 0.5));
-    // The border's places share most of their error.
-    let noise = (REST_NOISE * size).hypot(0.3 * noise);
-    (rest, (tail_error * x).hypot(noise))
 }
 
 /// Whether slopes are of no face that is pressed in: their curl is as large as their divergence, or

@@ -60,7 +60,7 @@ const BLOCKS: usize = 64;
 /// Rounds of pressure from what is left of the slopes. Each leaves a tenth of the last's error.
 const ROUNDS: usize = 5;
 /// Relative error of a force beside those of slopes and modulus, from layers under known pressures
-/// (`WORLDS=200 cargo test --release -p tactile-gel --test suite worlds`).
+/// (`cargo run --release -p tactile-gel --example exact_worlds`).
 const LAW_ERROR: f64 = 0.025;
 
 /// Forces from the shape of a gel's face, by the linear law of its layer.

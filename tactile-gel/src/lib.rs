@@ -12,6 +12,7 @@ mod frame_check;
 mod gradients;
 mod integration;
 mod plane;
+mod rest;
 mod sensor;
 #[cfg(feature = "simulate")]
 pub mod simulate;

@@ -28,7 +28,7 @@ pub struct LayerShape {
 
 impl LayerShape {
     /// L(s) of the module's documentation.
-    fn yields(self, wavenumber: f64) -> f64 {
+    pub fn yields(self, wavenumber: f64) -> f64 {
         // Beyond 20 both hyperbolic functions are the same exponential.
         let s = (wavenumber * self.thickness).clamp(1e-4, 20.0);
         let kappa = 3.0 - 4.0 * self.poisson_ratio;
@@ -240,6 +240,45 @@ fn transposed(field: &[Complex<f32>], width: usize) -> Vec<Complex<f32>> {
         }
     }
     turned
+}
+
+/// Bessel's function J₀ to 1e−7 (Abramowitz & Stegun, 9.4.1 and 9.4.3).
+pub fn bessel_j0(x: f64) -> f64 {
+    let x = x.abs();
+    let series =
+        |coefficients: &[f64], t: f64| coefficients.iter().rev().fold(0.0, |sum, c| sum * t + c);
+    if x <= 3.0 {
+        const NEAR: [f64; 7] = [
+            1.0,
+            -2.249_999_7,
+            1.265_620_8,
+            -0.316_386_6,
+            0.044_447_9,
+            -0.003_944_4,
+            0.000_21,
+        ];
+        return series(&NEAR, (x / 3.0).powi(2));
+    }
+    const HEIGHT: [f64; 7] = [
+        0.797_884_56,
+        -0.000_000_77,
+        -0.005_527_4,
+        -0.000_095_12,
+        0.001_372_37,
+        -0.000_728_05,
+        0.000_144_76,
+    ];
+    const PHASE: [f64; 7] = [
+        -core::f64::consts::FRAC_PI_4,
+        -0.041_663_97,
+        -0.000_039_54,
+        0.002_625_73,
+        -0.000_541_25,
+        -0.000_293_33,
+        0.000_135_58,
+    ];
+    let t = 3.0 / x;
+    series(&HEIGHT, t) / x.sqrt() * (x + series(&PHASE, t)).cos()
 }
 
 #[cfg(test)]

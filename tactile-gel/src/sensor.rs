@@ -18,6 +18,7 @@ use crate::face::{self, GelFrame};
 use crate::frame_check::{Blocks, FrameDoubt, light};
 use crate::gradients::{Blurred, TERMS, normals};
 use crate::plane::Plane;
+use crate::rest::Tails;
 
 /// The numbers that a calibration of [`GelSensor`] finds, as a file keeps them.
 ///
@@ -92,6 +93,7 @@ pub struct GelSensor {
     pub(crate) reference: Arc<Blurred>,
     blocks: Arc<Blocks>,
     pub(crate) plane: Arc<Plane>,
+    tails: Arc<Tails>,
 }
 
 impl core::fmt::Debug for GelSensor {
@@ -131,6 +133,7 @@ impl GelSensor {
             untouched: Arc::new(reference.to_owned()),
             blocks: Arc::new(Blocks::of(&blurred)),
             plane: Arc::new(Plane::new((rows / 2, columns / 2), ROOM, None)),
+            tails: Arc::new(Tails::new()),
             model,
             reference: Arc::new(blurred),
         }
@@ -202,7 +205,14 @@ impl GelSensor {
             doubts.push(FrameDoubt::NoSurface);
         }
         let found = patches(&cells, p.dim(), self.noise_floor());
-        face::frame(&self.model, [p, q], errors, &cells.pressure, found, doubts)
+        face::frame(
+            (&self.model, &self.tails),
+            [p, q],
+            errors,
+            &cells.pressure,
+            found,
+            doubts,
+        )
     }
 
     /// The patches of contact of a frame.

@@ -23,7 +23,7 @@ fn median(mut values: Vec<f64>) -> f64 {
 
 /// Contacts of 10 to 50 px, slopes from 0.04 to 0.5, on a half-space and on a bonded layer:
 /// areas within a tenth, depths and forces within their errors.
-/// `WORLDS=200 cargo test --release -p tactile-gel --test suite worlds -- --nocapture`.
+/// `cargo run --release -p tactile-gel --example exact_worlds` draws more of them, under other lamps.
 #[test]
 fn areas_depths_and_forces_are_those_of_exact_worlds() {
     let gel = gel();
