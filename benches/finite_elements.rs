@@ -12,7 +12,7 @@ use tactile_imaging::elasticity::modulus::{
     Estimate, LoadSeries, LoadState, ModulusEstimator, TabulatedContact,
 };
 use tactile_imaging::fem::{
-    self, AppliedLoad, Material, ObjectPress, ObjectShape, Outcome, TableOptions,
+    self, AppliedLoad, ContactTableOptions, Material, ObjectPress, ObjectShape, Outcome,
 };
 
 const NU: f64 = 0.495;
@@ -86,7 +86,7 @@ fn table(is_test: bool) {
         poisson_ratio: NU,
     };
     let (guide, options) = if is_test {
-        let short = TableOptions::default()
+        let short = ContactTableOptions::default()
             .with_largest_ratio(0.4)
             .expect("a ratio");
         (Waveguide::rigid(), short)
@@ -94,7 +94,7 @@ fn table(is_test: bool) {
         let layers = PAPER_LAYERS.map(layer).to_vec();
         (
             Waveguide::new(layers).expect("a guide"),
-            TableOptions::default(),
+            ContactTableOptions::default(),
         )
     };
     let (table, seconds) = timed(|| {

@@ -2,7 +2,7 @@
 #![allow(clippy::print_stdout)]
 use std::error::Error;
 use tactile_imaging::fem::{Guide, GuideLayer, Interface, Material};
-use tactile_imaging::inclusion::{AssumedInclusion, InclusionSearch, Specimen};
+use tactile_imaging::inclusion::{AssumedInclusion, InclusionSearch, TissueBlock};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let layer = |thickness_m, youngs_modulus_pa| {
@@ -12,7 +12,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         })
     };
     let guide = Guide::new(vec![layer(4e-3, 120e3)?, layer(6e-3, 40e3)?], 16e-3)?;
-    let block = Specimen::new(30e-3, 40e-3)?.with_interface(Interface::Bonded);
+    let block = TissueBlock::new(30e-3, 40e-3)?.with_interface(Interface::Bonded);
     let search = InclusionSearch::new(block, guide)?;
     let lump = AssumedInclusion {
         diameter_m: 10e-3,

@@ -5,7 +5,7 @@ use crate::plot::{Colour, Panel, circle};
 use serde::Serialize;
 use tactile_files::scene::LoadedInclusion;
 use tactile_imaging::elasticity::ElasticityError;
-use tactile_imaging::inclusion::{InclusionSearch, Specimen};
+use tactile_imaging::inclusion::{InclusionSearch, TissueBlock};
 
 /// Places across a face: the limits change little from one to the next.
 const PLACES: f64 = 16.0;
@@ -36,7 +36,7 @@ impl Hidden {
     pub fn new(
         search: &InclusionSearch,
         loaded: &LoadedInclusion,
-        block: &Specimen,
+        block: &TissueBlock,
         face_m: f64,
         contrast: f64,
         context: &Context,

@@ -18,7 +18,7 @@ use tactile_imaging::fem::{
 };
 use tactile_imaging::inclusion::{
     AssumedInclusion, Estimated, Identifiable, Inclusion, InclusionEstimate, InclusionSearch,
-    PressureProfile, SearchProgress, Specimen, Verdict, asymmetry_warnings,
+    PressureProfile, SearchProgress, SearchVerdict, TissueBlock, asymmetry_warnings,
 };
 use tactile_imaging::pipeline::{interval_text, with_error};
 
@@ -98,7 +98,7 @@ pub struct InclusionArguments {
 
 /// The input of a search, and the truth where it is known.
 struct Scan {
-    specimen: Specimen,
+    specimen: TissueBlock,
     guide: Guide,
     radii_m: Vec<f64>,
     profiles: Vec<PressureProfile>,
@@ -212,7 +212,7 @@ fn side_by_side(scan: &tactile_imaging::inclusion::Scan) -> Vec<PressureProfile>
 
 /// A block of tissue as high as two faces, and a guide of three layers, the stiffest towards the
 /// tissue.
-fn simulated_block() -> Result<(Specimen, Guide), ElasticityError> {
+fn simulated_block() -> Result<(TissueBlock, Guide), ElasticityError> {
     let layer = |(thickness_m, modulus)| {
         Ok(GuideLayer {
             thickness_m,
@@ -221,7 +221,7 @@ fn simulated_block() -> Result<(Specimen, Guide), ElasticityError> {
     };
     let layers = [(2e-3, 136e3), (3e-3, 80e3), (5e-3, 34e3)].map(layer);
     let layers: Result<Vec<GuideLayer>, ElasticityError> = layers.into_iter().collect();
-    let specimen = Specimen::new(30e-3, 40e-3)?.with_interface(Interface::Bonded);
+    let specimen = TissueBlock::new(30e-3, 40e-3)?.with_interface(Interface::Bonded);
     Ok((specimen, Guide::new(layers?, 16e-3)?))
 }
 
@@ -420,11 +420,15 @@ fn parameter(parameter: &Identifiable, scale: f64, unit: &str) -> String {
 fn print(estimate: &InclusionEstimate, scan: &Scan, context: &mut Context) {
     let lumps = estimate.inclusions();
     let verdict = match (estimate.verdict(), estimate.probability) {
-        (Verdict::Found, _) if lumps.len() > 1 => "two lumps".to_owned(),
-        (Verdict::Found, _) => "a lump".to_owned(),
-        (Verdict::Absent, _) => "no lump that these frames show".to_owned(),
-        (Verdict::Uncertain, p) if p > 0.5 => format!("uncertain: a lump with probability {p:.2}"),
-        (Verdict::Uncertain, _) => "uncertain: the model does not explain the frames".to_owned(),
+        (SearchVerdict::Found, _) if lumps.len() > 1 => "two lumps".to_owned(),
+        (SearchVerdict::Found, _) => "a lump".to_owned(),
+        (SearchVerdict::Absent, _) => "no lump that these frames show".to_owned(),
+        (SearchVerdict::Uncertain, p) if p > 0.5 => {
+            format!("uncertain: a lump with probability {p:.2}")
+        }
+        (SearchVerdict::Uncertain, _) => {
+            "uncertain: the model does not explain the frames".to_owned()
+        }
     };
     context.answer("found", verdict);
     for (index, lump) in lumps.iter().enumerate() {

@@ -115,7 +115,7 @@ enum Command {
     Stream(stream::StreamArguments),
     Light(light::LightArguments),
     Markers(markers::MarkersArguments),
-    Table(table::TableArguments),
+    Table(table::ContactTableArguments),
     Paper(paper::PaperArguments),
 }
 

@@ -7,7 +7,7 @@ use serde_json::json;
 use std::path::PathBuf;
 use std::time::Instant;
 use tactile_files::scene::solve_contact_table;
-use tactile_imaging::fem::TableOptions;
+use tactile_imaging::fem::ContactTableOptions;
 
 /// Compute the contact table of a ball and a waveguide
 ///
@@ -20,7 +20,7 @@ use tactile_imaging::fem::TableOptions;
     after_help = "Example:\n  tactile table examples/data/press/scene.toml --moduli 2 \
                   --largest-ratio 0.5 --out target/table"
 )]
-pub struct TableArguments {
+pub struct ContactTableArguments {
     /// Scene file, or a file with its tables `object` and `waveguide`.
     scene: PathBuf,
     /// Smallest modulus of the ball, in kPa.
@@ -37,11 +37,11 @@ pub struct TableArguments {
     largest_ratio: f64,
 }
 
-pub fn run(arguments: &TableArguments, context: &mut Context) -> Result<Exit, Failure> {
+pub fn run(arguments: &ContactTableArguments, context: &mut Context) -> Result<Exit, Failure> {
     let path = arguments.scene.as_path();
     context.outputs.plan(&["table.toml"], &[path])?;
     let [from, to] = [arguments.from_kpa, arguments.to_kpa].map(|kpa| 1e3 * kpa);
-    let options = TableOptions::default()
+    let options = ContactTableOptions::default()
         .with_moduli_pa(from, to, arguments.moduli.into())
         .and_then(|options| options.with_largest_ratio(arguments.largest_ratio))
         .map_err(Failure::input)?;

@@ -67,7 +67,7 @@ pub use press::{Guide, GuideLayer, Interface, ObjectPress, ObjectShape};
 pub use recovery::{ContactRadius, PressurePoint};
 pub use scene::{AppliedLoad, Block, FemScene, Lump, Outcome, Solution, SolverReport};
 pub use state::{State, Stress};
-pub use table::{TableOptions, TableProgress, solve_contact_table};
+pub use table::{ContactTableOptions, TableProgress, solve_contact_table};
 
 #[cfg(test)]
 mod tests;

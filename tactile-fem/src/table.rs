@@ -24,22 +24,22 @@ const LARGEST_UNCERTAINTY: f64 = 5e-3;
 /// What a table is to cover.
 ///
 /// ```
-/// use tactile_fem::TableOptions;
+/// use tactile_fem::ContactTableOptions;
 ///
-/// let options = TableOptions::default().with_moduli_pa(20e3, 400e3, 10)?;
-/// assert!(TableOptions::default().with_moduli_pa(400e3, 20e3, 10).is_err());
+/// let options = ContactTableOptions::default().with_moduli_pa(20e3, 400e3, 10)?;
+/// assert!(ContactTableOptions::default().with_moduli_pa(400e3, 20e3, 10).is_err());
 /// # let _ = options;
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct TableOptions {
+pub struct ContactTableOptions {
     lowest_pa: f64,
     highest_pa: f64,
     moduli: usize,
     largest_ratio: f64,
 }
 
-impl Default for TableOptions {
+impl Default for ContactTableOptions {
     /// Seven moduli from 25 to 400 kPa, contact radii up to 1.25 ball radii.
     ///
     /// Seven moduli leave less in the interpolation than the elements' own scatter of the contact
@@ -55,7 +55,7 @@ impl Default for TableOptions {
     }
 }
 
-impl TableOptions {
+impl ContactTableOptions {
     /// The smallest and the largest modulus of the ball (Pa), and how many in equal ratios. A rigid
     /// flat needs one and takes no other.
     ///
@@ -81,10 +81,10 @@ impl TableOptions {
     /// The largest contact radius over the ball's (default 1.25).
     ///
     /// ```
-    /// use tactile_fem::TableOptions;
+    /// use tactile_fem::ContactTableOptions;
     ///
-    /// assert!(TableOptions::default().with_largest_ratio(0.6).is_ok());
-    /// assert!(TableOptions::default().with_largest_ratio(f64::NAN).is_err());
+    /// assert!(ContactTableOptions::default().with_largest_ratio(0.6).is_ok());
+    /// assert!(ContactTableOptions::default().with_largest_ratio(f64::NAN).is_err());
     /// ```
     ///
     /// # Errors
@@ -141,9 +141,9 @@ const LARGEST_POISSON_RATIO: f64 = 0.499;
 /// ```
 /// use core::ops::ControlFlow;
 /// use tactile_elasticity::contact::Waveguide;
-/// use tactile_fem::{TableOptions, solve_contact_table};
+/// use tactile_fem::{ContactTableOptions, solve_contact_table};
 ///
-/// let options = TableOptions::default().with_largest_ratio(0.5)?;
+/// let options = ContactTableOptions::default().with_largest_ratio(0.5)?;
 /// let mut steps = 0;
 /// let table = solve_contact_table(3e-3, 0.495, &Waveguide::rigid(), &options, |progress| {
 ///     steps = progress.total;
@@ -168,7 +168,7 @@ pub fn solve_contact_table(
     radius_m: f64,
     poisson_ratio: f64,
     guide: &Waveguide,
-    options: &TableOptions,
+    options: &ContactTableOptions,
     mut progress: impl FnMut(TableProgress) -> ControlFlow<()>,
 ) -> Result<ContactTable, ElasticityError> {
     let law = WaveguideLaw::new(radius_m, poisson_ratio, guide, Bond::Bonded)?;
@@ -206,7 +206,7 @@ impl Ball {
         &self,
         guide: &Waveguide,
         law: &WaveguideLaw,
-        options: &TableOptions,
+        options: &ContactTableOptions,
     ) -> Result<ContactCurve, ElasticityError> {
         let solution = self.scene(guide)?.solve(&self.loads(guide, law, options));
         let mut curve = ContactCurve {
@@ -263,7 +263,7 @@ impl Ball {
         &self,
         guide: &Waveguide,
         law: &WaveguideLaw,
-        options: &TableOptions,
+        options: &ContactTableOptions,
     ) -> Vec<AppliedLoad> {
         let compliance = |e: f64, nu: f64| (1.0 - nu * nu) / e;
         let own = compliance(self.youngs_modulus_pa, self.poisson_ratio);

@@ -54,9 +54,9 @@ mod shear;
 mod tiles;
 
 pub use calibration::{
-    Branch, CalibrationFrame, CalibrationOptions, CalibrationPair, CalibrationReport,
-    CurveHysteresis, ForceReading, GreyHistogram, Hysteresis, LinearCalibration, LocalCalibration,
-    PressureCurve, PressureCurveOptions, PressureCurveReport, StressCalibration,
+    Branch, CalibrationFrame, CalibrationOptions, CalibrationPair, CurveHysteresis, ForceReading,
+    GreyHistogram, Hysteresis, LineReport, LinearCalibration, LocalCalibration, PressureCurve,
+    PressureCurveOptions, PressureCurveReport, StressCalibration,
 };
 pub use contact::{Contact, ContactDetector, ContactOptions, Detection, DetectorWorkspace};
 pub use drift::{

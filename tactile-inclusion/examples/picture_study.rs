@@ -22,7 +22,7 @@ use std::error::Error;
 use std::path::Path;
 use tactile_fem::Interface;
 use tactile_inclusion::{
-    Identifiable, Inclusion, InclusionSearch, PressureProfile, SensorErrors, Specimen,
+    Identifiable, Inclusion, InclusionSearch, PressureProfile, SensorErrors, TissueBlock,
 };
 
 /// Pressures of each load on cells of 1 mm, whose middles are given.
@@ -203,7 +203,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             let height = number(row, "block_height_m")? * (0.02 * normal(&mut rng)).exp();
             let zero_m = 20e-6 * normal(&mut rng);
             let frames = measured(&picture, &approaches_m, zero_m, &mut rng);
-            let specimen = Specimen::new(height, number(row, "block_radius_m")?)?;
+            let specimen = TissueBlock::new(height, number(row, "block_radius_m")?)?;
             let specimen = match row.get("contact").map(String::as_str) {
                 Some("bonded") => specimen.with_interface(Interface::Bonded),
                 _ => specimen.with_interface(Interface::Frictionless),

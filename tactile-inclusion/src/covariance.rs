@@ -2,7 +2,7 @@
 
 use crate::forward::Forward;
 use crate::picture::CellPositions;
-use crate::specimen::SensorErrors;
+use crate::tissue_block::SensorErrors;
 use nalgebra::DMatrix;
 use std::sync::Arc;
 use tactile_fem::Interface;

@@ -5,7 +5,7 @@ use crate::fit::Problem;
 use crate::hypothesis::BLOCK_COORDINATES;
 use crate::parameters::LumpParameters;
 use crate::search::InclusionSearch;
-use crate::specimen::check_approaches;
+use crate::tissue_block::check_approaches;
 use tactile_elasticity::{ElasticityError, Quantity};
 
 /// Elements along an eighth of the inclusion's circumference: errors within 2 % of those of a

@@ -289,8 +289,8 @@ pub fn asymmetry_warnings(asymmetry: f64, harmonics: f64) -> Vec<InclusionWarnin
 /// Whether there is an inclusion.
 ///
 /// ```
-/// use tactile_inclusion::Verdict;
-/// assert_ne!(Verdict::Absent, Verdict::Uncertain);
+/// use tactile_inclusion::SearchVerdict;
+/// assert_ne!(SearchVerdict::Absent, SearchVerdict::Uncertain);
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(
@@ -298,7 +298,7 @@ pub fn asymmetry_warnings(asymmetry: f64, harmonics: f64) -> Vec<InclusionWarnin
     derive(serde::Serialize),
     serde(rename_all = "snake_case")
 )]
-pub enum Verdict {
+pub enum SearchVerdict {
     /// One was found.
     Found,
     /// The frames show none.
@@ -353,7 +353,7 @@ impl InclusionEstimate {
 
     /// Whether there is an inclusion. That there is none is certain only where the model explains
     /// the frames: beside a poor fit or one that did not settle it is not.
-    pub fn verdict(&self) -> Verdict {
+    pub fn verdict(&self) -> SearchVerdict {
         let is_model_in_doubt = self.warnings.iter().any(|warning| {
             matches!(
                 warning,
@@ -361,11 +361,11 @@ impl InclusionEstimate {
             )
         });
         if self.found {
-            Verdict::Found
+            SearchVerdict::Found
         } else if is_model_in_doubt || self.probability > 0.5 {
-            Verdict::Uncertain
+            SearchVerdict::Uncertain
         } else {
-            Verdict::Absent
+            SearchVerdict::Absent
         }
     }
 }

@@ -45,18 +45,18 @@ mod progress;
 mod ridge;
 mod scan;
 mod search;
-mod specimen;
 mod starts;
+mod tissue_block;
 
 pub use design::{AssumedInclusion, ExpectedErrors};
 pub use estimate::{
-    Estimated, Identifiable, Inclusion, InclusionEstimate, InclusionWarning, Verdict,
+    Estimated, Identifiable, Inclusion, InclusionEstimate, InclusionWarning, SearchVerdict,
     asymmetry_warnings,
 };
 pub use progress::SearchProgress;
 pub use scan::{Scan, ScanPress};
 pub use search::InclusionSearch;
-pub use specimen::{PressureProfile, SensorErrors, Specimen};
+pub use tissue_block::{PressureProfile, SensorErrors, TissueBlock};
 
 #[cfg(test)]
 mod tests;

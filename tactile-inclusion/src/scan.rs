@@ -1,7 +1,7 @@
 //! Several presses at stated places of one block.
 
 use crate::picture::CellPositions;
-use crate::specimen::{PressureProfile, check};
+use crate::tissue_block::{PressureProfile, check};
 use tactile_elasticity::{ElasticityError, Quantity};
 
 /// Presses at stated places of a block that is far wider than the guide.

@@ -10,8 +10,8 @@ use crate::parameters::{Coordinate, LARGEST_POISSON_RATIO, Parameters, Place};
 use crate::picture::{Cells, extent};
 use crate::progress::{Counter, SearchProgress};
 use crate::scan::{Scan, ScanPress};
-use crate::specimen::{PressureProfile, SensorErrors, Specimen, check};
 use crate::starts::{GridStart, starts};
+use crate::tissue_block::{PressureProfile, SensorErrors, TissueBlock, check};
 use core::ops::ControlFlow;
 use std::sync::Arc;
 use tactile_elasticity::{ElasticityError, Quantity};
@@ -78,13 +78,13 @@ const SPREAD: (f64, f64) = (0.13, 0.07);
 /// use core::ops::ControlFlow;
 /// use tactile_fem::{Guide, GuideLayer, Material};
 /// use tactile_inclusion::{
-///     AssumedInclusion, InclusionSearch, PressureProfile, SensorErrors, Specimen,
+///     AssumedInclusion, InclusionSearch, PressureProfile, SensorErrors, TissueBlock,
 /// };
 ///
 /// # fn example(radii_m: Vec<f64>, frames: Vec<PressureProfile>) -> Result<(), tactile_elasticity::ElasticityError> {
 /// let layer = GuideLayer { thickness_m: 10e-3, material: Material::new(60e3, 0.495)? };
 /// let guide = Guide::new(vec![layer], 16e-3)?;
-/// let search = InclusionSearch::new(Specimen::new(30e-3, 40e-3)?, guide)?;
+/// let search = InclusionSearch::new(TissueBlock::new(30e-3, 40e-3)?, guide)?;
 /// // A sensor whose calibration is twice as good as usual.
 /// let search =
 ///     search.with_sensor_errors(SensorErrors { common: 1.5e-3, ..SensorErrors::default() })?;
@@ -110,7 +110,7 @@ const SPREAD: (f64, f64) = (0.13, 0.07);
 /// ```
 #[derive(Debug, Clone)]
 pub struct InclusionSearch {
-    specimen: Specimen,
+    specimen: TissueBlock,
     pub(crate) guide: Guide,
     sensor: SensorErrors,
     shape_error: f64,
@@ -135,7 +135,7 @@ impl InclusionSearch {
     ///
     /// # Errors
     /// A block that is no wider than the guide.
-    pub fn new(specimen: Specimen, guide: Guide) -> Result<Self, ElasticityError> {
+    pub fn new(specimen: TissueBlock, guide: Guide) -> Result<Self, ElasticityError> {
         if specimen.radius_m() <= guide.radius_m() {
             return Err(Quantity::Radius.beyond(specimen.radius_m(), guide.radius_m()));
         }
@@ -471,7 +471,7 @@ impl InclusionSearch {
         &self.sensor
     }
 
-    pub(crate) fn specimen(&self) -> &Specimen {
+    pub(crate) fn specimen(&self) -> &TissueBlock {
         &self.specimen
     }
 

@@ -9,7 +9,8 @@ use tactile_files::scene::InclusionScene;
 use tactile_imaging::elasticity::ElasticityError;
 use tactile_imaging::fem::{Guide, GuideLayer, Interface, Material};
 use tactile_imaging::inclusion::{
-    Estimated, Identifiable, InclusionEstimate, InclusionSearch, PressureProfile, Specimen, Verdict,
+    Estimated, Identifiable, InclusionEstimate, InclusionSearch, PressureProfile, SearchVerdict,
+    TissueBlock,
 };
 use tactile_imaging::pipeline::with_error;
 
@@ -100,7 +101,7 @@ pub fn inclusion(
         standard_error_pa: errors.as_array().row(k).to_vec(),
     };
     let profiles: Vec<_> = (0..approaches.len()).map(profile).collect();
-    let mut specimen = Specimen::new(block_height, block_radius).map_err(invalid)?;
+    let mut specimen = TissueBlock::new(block_height, block_radius).map_err(invalid)?;
     if let Some((value, error)) = youngs_modulus {
         specimen = specimen
             .with_youngs_modulus(value, error)
@@ -137,9 +138,9 @@ pub fn inclusion(
 
 fn result(py: Python<'_>, found: &InclusionEstimate) -> PyResult<Inclusion> {
     let verdict = match found.verdict() {
-        Verdict::Found => "found",
-        Verdict::Absent => "absent",
-        Verdict::Uncertain => "uncertain",
+        SearchVerdict::Found => "found",
+        SearchVerdict::Absent => "absent",
+        SearchVerdict::Uncertain => "uncertain",
     };
     Ok(Inclusion {
         text: format!("{verdict}, probability {:.3}", found.probability),

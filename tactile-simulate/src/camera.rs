@@ -5,7 +5,7 @@
 
 use crate::error::{SimulateError, at_least, not_negative, positive, within};
 use crate::light::Illumination;
-use crate::pixel_average::{Patch, Plane};
+use crate::pixel_average::{PixelPatch, PixelPlane};
 use ndarray::{Array2, ArrayView2, Axis};
 use rand::SeedableRng;
 use rand::rngs::ChaCha8Rng;
@@ -125,11 +125,11 @@ impl Camera {
     }
 
     /// Lens and pixels, as the image plane of a contact.
-    pub(crate) fn plane(&self) -> Plane {
+    pub(crate) fn plane(&self) -> PixelPlane {
         let middle = self.middle_px();
         let [width, height] = self.pixel_size_m;
         let corner = (middle[0] * width).hypot(middle[1] * height);
-        Plane {
+        PixelPlane {
             middle_px: middle,
             pixel_size_m: self.pixel_size_m,
             // A frame of one pixel has no corner to refer to.
@@ -206,7 +206,7 @@ impl Camera {
     }
 
     /// Blurs a patch in place. Light that leaves the patch is lost.
-    pub(crate) fn blur(&self, patch: &mut Patch) {
+    pub(crate) fn blur(&self, patch: &mut PixelPatch) {
         let reach = self.blur_reach();
         if reach == 0 {
             return;
@@ -244,7 +244,7 @@ impl Camera {
     /// lens.
     pub(crate) fn compose(
         &self,
-        leaked_grey: &[Patch],
+        leaked_grey: &[PixelPatch],
         illumination: &Illumination,
     ) -> Array2<f64> {
         let [rows, cols] = self.shape;
@@ -300,7 +300,7 @@ impl Camera {
                 .map(|k| lit([c as f64 + offset(k % STEPS), r as f64 + offset(k / STEPS)]));
             parts.sum::<f64>() / f64::from(STEPS * STEPS)
         };
-        let mut patch = Patch {
+        let mut patch = PixelPatch {
             origin: [0, 0],
             values: Array2::from_shape_fn((rows, cols), |at| LIGHT_GREY * share(at)),
         };

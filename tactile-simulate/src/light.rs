@@ -4,7 +4,7 @@
 
 use crate::contact::SimulatedContact;
 use crate::error::{SimulateError, finite, not_negative, within};
-use crate::pixel_average::{Disc, Patch, Plane, Profile, Window};
+use crate::pixel_average::{Disc, PixelPatch, PixelPlane, Profile, Window};
 
 /// Light that leaks under pressure p, relative to the gain g in grey levels per pascal. All are
 /// monotone up to the largest peak pressure p_max of the scene. Hertz's pressure under the first
@@ -151,16 +151,16 @@ impl LightLaw {
         &self,
         contact: &SimulatedContact,
         disc: &Disc,
-        plane: Plane,
+        plane: PixelPlane,
         window: Window,
-    ) -> Patch {
+    ) -> PixelPatch {
         disc.average_bent(plane, window, |r_m| self.grey_at(contact.pressure_pa(r_m)))
     }
 
     /// Unblurred light of a contact over `window`, in grey levels above the background.
-    pub fn patch(&self, contact: &SimulatedContact, disc: &Disc, window: Window) -> Patch {
+    pub fn patch(&self, contact: &SimulatedContact, disc: &Disc, window: Window) -> PixelPatch {
         if self.largest_pressure_pa == 0.0 {
-            return Patch::zeros(window);
+            return PixelPatch::zeros(window);
         }
         let exact = contact.is_hertzian() && !matches!(self.response, Response::Power { .. });
         if !exact {
@@ -185,7 +185,7 @@ impl LightLaw {
 }
 
 /// Pressure of a contact over `window` in pascal.
-pub fn pressure_patch(contact: &SimulatedContact, disc: &Disc, window: Window) -> Patch {
+pub fn pressure_patch(contact: &SimulatedContact, disc: &Disc, window: Window) -> PixelPatch {
     if !contact.is_hertzian() {
         return disc.average_radial(window, |r_m| contact.pressure_pa(r_m));
     }

@@ -45,14 +45,14 @@ pub type Window = [[isize; 2]; 2];
 
 /// A patch of the image plane, which may reach beyond the frame.
 #[derive(Debug, Clone)]
-pub struct Patch {
+pub struct PixelPatch {
     /// Row and column of the first value.
     pub origin: [isize; 2],
     /// Values `[row, column]`.
     pub values: Array2<f64>,
 }
 
-impl Patch {
+impl PixelPatch {
     /// Zeros over `window`.
     pub fn zeros([[row0, row1], [col0, col1]]: Window) -> Self {
         Self {
@@ -111,7 +111,7 @@ impl Disc {
     }
 
     /// Pixel averages of `profile` over `window`.
-    pub fn average(&self, profile: Profile, window: Window) -> Patch {
+    pub fn average(&self, profile: Profile, window: Window) -> PixelPatch {
         let [[row0, row1], [col0, col1]] = window;
         let (rows, cols) = ((row1 - row0) as usize, (col1 - col0) as usize);
         let mut values = Array2::zeros((rows, cols));
@@ -139,7 +139,7 @@ impl Disc {
                 };
             }
         }
-        Patch {
+        PixelPatch {
             origin: [row0, col0],
             values,
         }
@@ -319,7 +319,7 @@ impl Disc {
     ///
     /// Four by four Gauss nodes inside. At the rim 16 by 16 midpoints, with an error of some 1e-5
     /// of the light.
-    pub fn average_radial(&self, window: Window, value: impl Fn(f64) -> f64) -> Patch {
+    pub fn average_radial(&self, window: Window, value: impl Fn(f64) -> f64) -> PixelPatch {
         let [[row0, row1], [col0, col1]] = window;
         let [width, height] = self.pixel_size_m;
         let smooth_below = self.radius_m - RIM_ZONE * width.max(height);
@@ -346,7 +346,7 @@ impl Disc {
                 value(((x + u * width).powi(2) + (y + v * height).powi(2)).sqrt())
             })
         });
-        Patch {
+        PixelPatch {
             origin: [row0, col0],
             values,
         }
@@ -355,7 +355,7 @@ impl Disc {
 
 /// Pixels of any size behind a lens that distorts about the frame's middle.
 #[derive(Debug, Clone, Copy)]
-pub struct Plane {
+pub struct PixelPlane {
     pub middle_px: [f64; 2],
     pub pixel_size_m: [f64; 2],
     /// d = e (1 + bend e²), e the distance at which a place is seen, in metres of the frame's
@@ -363,7 +363,7 @@ pub struct Plane {
     pub bend: f64,
 }
 
-impl Plane {
+impl PixelPlane {
     pub fn is_flat(&self) -> bool {
         self.bend == 0.0
     }
@@ -393,12 +393,12 @@ impl Plane {
 impl Disc {
     /// Metres from the frame's middle to the contact's: `centre_px` is where it would be seen
     /// without distortion.
-    fn place(&self, plane: Plane) -> [f64; 2] {
+    fn place(&self, plane: PixelPlane) -> [f64; 2] {
         std::array::from_fn(|k| (self.centre_px[k] - plane.middle_px[k]) * self.pixel_size_m[k])
     }
 
     /// [`window`](Self::window) behind a lens that distorts.
-    pub fn bent_window(&self, plane: Plane, shape: [usize; 2], margin: usize) -> Window {
+    pub fn bent_window(&self, plane: PixelPlane, shape: [usize; 2], margin: usize) -> Window {
         let centre = self.place(plane);
         let rim = (0..64).map(|k| {
             let (sin, cos) = (TAU * f64::from(k) / 64.0).sin_cos();
@@ -423,7 +423,12 @@ impl Disc {
     }
 
     /// [`average_radial`](Self::average_radial) behind a lens that distorts.
-    pub fn average_bent(&self, plane: Plane, window: Window, value: impl Fn(f64) -> f64) -> Patch {
+    pub fn average_bent(
+        &self,
+        plane: PixelPlane,
+        window: Window,
+        value: impl Fn(f64) -> f64,
+    ) -> PixelPatch {
         let [[row0, row1], [col0, col1]] = window;
         let centre = self.place(plane);
         let distance = |pixel: [f64; 2]| {
@@ -442,7 +447,7 @@ impl Disc {
             let nodes = if from_rim < -reach { &GAUSS[..] } else { &fine };
             mean_over(nodes, |u, v| value(distance([pixel[0] + u, pixel[1] + v])))
         });
-        Patch {
+        PixelPatch {
             origin: [row0, col0],
             values,
         }

@@ -6,7 +6,7 @@ use crate::contact::{ContactModel, SimulatedContact};
 use crate::error::{SimulateError, at_least, finite, not_negative, positive, within};
 use crate::light::{Illumination, LightLaw, Response, pressure_patch};
 use crate::materials::{Elastic, ElasticSphere, LightGuide};
-use crate::pixel_average::{Disc, Patch};
+use crate::pixel_average::{Disc, PixelPatch};
 use nalgebra::{Matrix3, Point3};
 use ndarray::Array2;
 
@@ -174,7 +174,7 @@ impl PressScene {
     }
 
     /// Blurred light of the contact in grey levels above the background. None without force.
-    fn leaked_light(&self, load: usize) -> Option<Patch> {
+    fn leaked_light(&self, load: usize) -> Option<PixelPatch> {
         let (disc, camera) = (self.disc(load), &self.options.camera);
         if disc.radius_m == 0.0 {
             return None;

@@ -25,7 +25,7 @@ use crate::camera::{Camera, Purpose, row_stream};
 use crate::error::{SimulateError, at_least, finite, not_negative, positive, within};
 use crate::light::Illumination;
 use crate::materials::Elastic;
-use crate::pixel_average::{Patch, touched};
+use crate::pixel_average::{PixelPatch, touched};
 use crate::press::Gain;
 use nalgebra::Point3;
 use ndarray::Array2;
@@ -254,7 +254,7 @@ impl UniaxialScene {
     }
 
     /// Pixel averages of the pressure over the face and the blur's reach.
-    fn pressure(&self, load: usize) -> Patch {
+    fn pressure(&self, load: usize) -> PixelPatch {
         let (s, camera, relief) = (&self.states[load], &self.options.camera, &self.relief);
         let centre = self.centre_px();
         // A pixel's size in material coordinates: the face spreads while the pixel keeps its size.
@@ -294,7 +294,7 @@ impl UniaxialScene {
         // The deformed face is larger by λ_t². The pixels' pressures then add up to the force.
         let scale = s.force_n / (relief.volume_m3() * s.stretch_lateral * s.stretch_lateral);
         values.map_inplace(|v| *v *= scale);
-        Patch {
+        PixelPatch {
             origin: [spans[1].0, spans[0].0],
             values,
         }

@@ -5,7 +5,7 @@
 use super::error::{FileError, FilePlace, quoted};
 use super::files::LARGEST_FILE;
 use super::frames::{ARRAY_STARTS, header_fields, members};
-use super::text::Cells;
+use super::text::TextCells;
 use flate2::read::ZlibDecoder;
 use std::io::Read;
 use std::path::Path;
@@ -182,7 +182,7 @@ fn matrix(mut rest: &[u8], big_endian: bool) -> Option<Array> {
 
 /// The cells of arrays: of one array, or of several columns of one length, each by its name. `None`
 /// for what holds no arrays.
-pub fn cells(bytes: &[u8], path: &Path) -> Option<Result<Cells, FileError>> {
+pub fn cells(bytes: &[u8], path: &Path) -> Option<Result<TextCells, FileError>> {
     let expected = "one array of numbers of two axes, or several of one axis and length";
     let refused = |found: String| FileError::content(path, FilePlace::File, expected, found);
     let arrays = if bytes.starts_with(ARRAY_STARTS[0]) {
@@ -204,7 +204,7 @@ pub fn cells(bytes: &[u8], path: &Path) -> Option<Result<Cells, FileError>> {
         // A spreadsheet is an archive, too.
         return None;
     }
-    let mut table = Cells::default();
+    let mut table = TextCells::default();
     match arrays.as_slice() {
         [] => return Some(Err(refused("none".into()))),
         [one] => {

@@ -3,7 +3,7 @@ use super::columns::{AXES, DISPLACEMENTS, FRAME, Heading, in_si};
 use super::error::{FileError, FilePlace, quoted};
 use super::files::read_bytes;
 use super::numbers;
-use super::text::{Cells, cells, columns_in_words};
+use super::text::{TextCells, cells, columns_in_words};
 use nalgebra::{Point, Point2, Point3};
 use ndarray::{Array2, Axis};
 use std::path::{Path, PathBuf};
@@ -269,7 +269,7 @@ pub fn read_table_with(path: impl AsRef<Path>, options: &TableOptions) -> Result
     let bytes = read_bytes(path)?;
     let found = numbers::cells(&bytes, path);
     let found = found.unwrap_or_else(|| cells(&bytes, path, options.skip_lines))?;
-    let Cells {
+    let TextCells {
         header,
         values,
         columns,

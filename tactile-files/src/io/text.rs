@@ -17,7 +17,7 @@ const MISSING: [&str; 9] = [
 
 /// The cells of a table, row by row.
 #[derive(Default)]
-pub struct Cells {
+pub struct TextCells {
     pub header: Vec<String>,
     /// NaN if a cell holds no number.
     pub values: Vec<f64>,
@@ -156,7 +156,7 @@ fn names_columns(text: &str) -> [bool; 2] {
 ///
 /// # Errors
 /// [`FileError::Content`] for what is no text, and for rows of another length than the others.
-pub fn cells(bytes: &[u8], path: &Path, skip_lines: usize) -> Result<Cells, FileError> {
+pub fn cells(bytes: &[u8], path: &Path, skip_lines: usize) -> Result<TextCells, FileError> {
     let error =
         |place, expected: &str, found: &str| FileError::content(path, place, expected, found);
     if let Some(kind) = kind_of(bytes) {
@@ -211,7 +211,7 @@ pub fn cells(bytes: &[u8], path: &Path, skip_lines: usize) -> Result<Cells, File
     if cells.last() == Some(&"") && separator.count(first_line) + 1 == columns {
         columns -= 1;
     }
-    let mut table = Cells::default();
+    let mut table = TextCells::default();
     // Elastix begins with the kind of its points and their number.
     let mut rows = content().peekable();
     if ["point", "index"].contains(&first_line.trim()) {

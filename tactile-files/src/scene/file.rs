@@ -14,7 +14,7 @@ use tactile_imaging::core::Estimate;
 use tactile_imaging::elasticity::ElasticityError;
 use tactile_imaging::elasticity::contact::{ContactTable, Layer, Waveguide};
 #[cfg(feature = "fem")]
-use tactile_imaging::fem::{TableOptions, TableProgress};
+use tactile_imaging::fem::{ContactTableOptions, TableProgress};
 use tactile_imaging::pipeline::{
     CheckPress, CheckedObject, EstimatorChoice, KnownBall, MatcherChoice, Object,
     ReconstructionChoice, SamplerChoice, Settings, StagesConfig, StrainChoice, WarpChoice,
@@ -813,7 +813,7 @@ pub fn read_contact_table(path: impl AsRef<Path>) -> Result<ContactTable, FileEr
 #[cfg(feature = "fem")]
 pub fn solve_contact_table(
     path: impl AsRef<Path>,
-    options: &TableOptions,
+    options: &ContactTableOptions,
     progress: impl FnMut(TableProgress) -> ControlFlow<()>,
 ) -> Result<ContactTable, FileError> {
     #[derive(Deserialize)]

@@ -14,7 +14,7 @@ use tactile_imaging::fem::{Guide, GuideLayer, Interface, Material};
 use tactile_imaging::force::{CalibrationOptions, LinearCalibration, StressCalibration};
 use tactile_imaging::inclusion::{
     FaceCells, InclusionEstimate, InclusionSearch, PressureProfile, RingMeans, Scan, ScanPress,
-    SearchProgress, Specimen, asymmetry_warnings, ring_means,
+    SearchProgress, TissueBlock, asymmetry_warnings, ring_means,
 };
 
 /// A block of tissue, the guide pressed onto it, and the frames.
@@ -55,7 +55,7 @@ use tactile_imaging::inclusion::{
 #[derive(Clone, Debug)]
 pub struct InclusionScene {
     /// The block, with the errors of its sizes.
-    pub specimen: Specimen,
+    pub specimen: TissueBlock,
     /// The guide.
     pub guide: Guide,
     file: PathBuf,
@@ -407,8 +407,8 @@ fn compressible<'de, D: Deserializer<'de>, T: From<f64>>(d: D) -> Result<T, D::E
 }
 
 impl BlockTable {
-    fn specimen(&self) -> Result<Specimen, ElasticityError> {
-        let mut specimen = Specimen::new(self.height_m, self.radius_m)?;
+    fn specimen(&self) -> Result<TissueBlock, ElasticityError> {
+        let mut specimen = TissueBlock::new(self.height_m, self.radius_m)?;
         if let Some(error) = self.height_error_m {
             specimen = specimen.with_height_error_m(error)?;
         }

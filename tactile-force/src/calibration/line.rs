@@ -32,7 +32,7 @@ pub struct LinearCalibration {
     slope_n: Estimate,
     covariance: f64,
     range: [f64; 2],
-    report: CalibrationReport,
+    report: LineReport,
 }
 
 impl LinearCalibration {
@@ -83,7 +83,7 @@ impl LinearCalibration {
             (estimate(level, variance), covariance, vec![offset, slope_n])
         };
         let curve = |v: f64| level_n.value + slope_n.value * (v - centre);
-        let mut report = CalibrationReport::new(pairs, curve, columns);
+        let mut report = LineReport::new(pairs, curve, columns);
         report.parameters = parameters;
         report.smallest_force_n = 3.0 * fit.residual_sd;
         Ok(Self {
@@ -98,7 +98,7 @@ impl LinearCalibration {
 
     /// How well the line fits its pairs.
     #[must_use]
-    pub fn report(&self) -> &CalibrationReport {
+    pub fn report(&self) -> &LineReport {
         &self.report
     }
 
@@ -204,7 +204,7 @@ pub struct Hysteresis {
 /// Quality of a calibration.
 ///
 /// ```
-/// use tactile_force::{CalibrationPair, CalibrationReport, LinearCalibration};
+/// use tactile_force::{CalibrationPair, LineReport, LinearCalibration};
 ///
 /// let pairs = [(0.0, 0.01), (1e5, 0.49), (2e5, 1.01), (3e5, 1.49)];
 /// let pairs = pairs.map(|(v, f)| CalibrationPair::loading(v, f));
@@ -219,14 +219,14 @@ pub struct Hysteresis {
 ///         && interval.upper.unwrap() > 5e-6 + 2.0 * report.parameters[1].standard_error
 /// );
 /// // The report of a curve of one's own, with one parameter.
-/// let own = CalibrationReport::new(&pairs, |v| 4.98e-6 * v, 1);
+/// let own = LineReport::new(&pairs, |v| 4.98e-6 * v, 1);
 /// assert!(own.residual_sd_n < 0.02 && own.degrees_of_freedom == 3);
 /// # Ok::<(), tactile_force::ForceError>(())
 /// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
-pub struct CalibrationReport {
+pub struct LineReport {
     /// Number of pairs.
     pub pairs: usize,
     /// Parameters with their standard errors and degrees of freedom: [offset, slope] of a line,
@@ -254,7 +254,7 @@ pub struct CalibrationReport {
     pub monotone: bool,
 }
 
-impl CalibrationReport {
+impl LineReport {
     /// The report of a curve F(V) with this number of fitted parameters, by its residuals from the
     /// pairs. The parameters themselves are not known to it. O(pairs · log pairs).
     #[must_use]

@@ -17,7 +17,7 @@ mod line;
 pub use curve::{
     CalibrationFrame, CurveHysteresis, PressureCurve, PressureCurveOptions, PressureCurveReport,
 };
-pub use line::{CalibrationReport, Hysteresis, LinearCalibration};
+pub use line::{Hysteresis, LineReport, LinearCalibration};
 
 use ndarray::Array2;
 use std::ops::Deref;

@@ -27,7 +27,7 @@ use shared::{guide, normal, wave};
 use std::error::Error;
 use std::path::Path;
 use tactile_inclusion::{
-    AssumedInclusion, ExpectedErrors, InclusionSearch, PressureProfile, SensorErrors, Specimen,
+    AssumedInclusion, ExpectedErrors, InclusionSearch, PressureProfile, SensorErrors, TissueBlock,
 };
 use tally::{Tally, parameters};
 
@@ -117,12 +117,12 @@ fn measured(
     scene: &SolvedScene,
     seed: u64,
     kernel: Kernel,
-) -> Result<(Specimen, Vec<PressureProfile>), Box<dyn Error>> {
+) -> Result<(TissueBlock, Vec<PressureProfile>), Box<dyn Error>> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let sensor = SensorErrors::default();
     let said_height = scene.height_m * (0.02 * normal(&mut rng)).exp();
     let zero = 20e-6 * normal(&mut rng);
-    let specimen = Specimen::new(said_height, scene.radius_m)?;
+    let specimen = TissueBlock::new(said_height, scene.radius_m)?;
     let common = kernel.draw(&scene.radii_m, &mut rng);
     let white = white_errors(scene);
     let mut frames = Vec::new();
@@ -146,7 +146,8 @@ fn measured(
 /// Cramér–Rao bounds of ln D, ln d and ln E₁ at the truth, of the sensor's errors alone, for a ball
 /// that is known to be one.
 fn bounds(scene: &SolvedScene, lump: [f64; 4]) -> Result<ExpectedErrors, Box<dyn Error>> {
-    let specimen = Specimen::new(scene.height_m, scene.radius_m)?.with_interface(scene.interface);
+    let specimen =
+        TissueBlock::new(scene.height_m, scene.radius_m)?.with_interface(scene.interface);
     let errors = SensorErrors {
         model: 0.0,
         ..SensorErrors::default()

@@ -4,8 +4,8 @@ use super::{block, forward, guide, is_poor, lump, search, specimen};
 use crate::forward::Forward;
 use crate::parameters::{LumpParameters, Parameters};
 use crate::{
-    Identifiable, InclusionEstimate, InclusionSearch, InclusionWarning, PressureProfile, Specimen,
-    Verdict,
+    Identifiable, InclusionEstimate, InclusionSearch, InclusionWarning, PressureProfile,
+    SearchVerdict, TissueBlock,
 };
 use core::ops::ControlFlow;
 use tactile_fem::{Guide, GuideLayer, Interface, Material};
@@ -85,7 +85,7 @@ fn searched(frames: &[PressureProfile]) -> InclusionEstimate {
     search().search(&ring_radii(), frames).unwrap()
 }
 
-fn searched_in(specimen: &Specimen, frames: &[PressureProfile]) -> InclusionEstimate {
+fn searched_in(specimen: &TissueBlock, frames: &[PressureProfile]) -> InclusionEstimate {
     let search = InclusionSearch::new(*specimen, guide()).unwrap();
     search.search(&ring_radii(), frames).unwrap()
 }
@@ -224,13 +224,13 @@ fn a_stiffer_skin_is_no_lump_and_hides_none() {
     for (thickness_m, times) in [(1e-3, 3.0), (1e-3, 10.0), (2e-3, 3.0), (2e-3, 10.0)] {
         let skin = times * block().block_modulus_pa;
         let estimate = searched(&frames(&under_a_skin(thickness_m, skin, None)));
-        assert_ne!(estimate.verdict(), Verdict::Found, "{estimate:?}");
+        assert_ne!(estimate.verdict(), SearchVerdict::Found, "{estimate:?}");
     }
     // The depth of a lump counts from under the skin.
     let truth = lump(10e-3, 2.5e-3, 40e3);
     let estimate = searched(&frames(&under_a_skin(1.5e-3, 25e3, Some(truth))));
     assert!(
-        estimate.verdict() == Verdict::Found && told_is_right(&estimate, truth),
+        estimate.verdict() == SearchVerdict::Found && told_is_right(&estimate, truth),
         "{estimate:?}"
     );
 }
@@ -270,7 +270,7 @@ fn of_an_inclusion_that_touches_the_surface_nothing_is_told() {
     let estimate = searched(&frames(&bonded(Some(truth))));
     // Its best fit leaves so much that even a lump is uncertain.
     assert!(
-        estimate.verdict() != Verdict::Absent && is_poor(&estimate),
+        estimate.verdict() != SearchVerdict::Absent && is_poor(&estimate),
         "{estimate:?}"
     );
     let told = estimate.inclusion.is_some_and(|found| {

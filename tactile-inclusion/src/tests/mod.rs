@@ -5,7 +5,7 @@ use crate::parameters::Place;
 use crate::parameters::{Coordinate, LARGEST_POISSON_RATIO, LumpParameters, Parameters};
 use crate::{
     AssumedInclusion, Identifiable, InclusionEstimate, InclusionSearch, InclusionWarning,
-    PressureProfile, Specimen, Verdict,
+    PressureProfile, SearchVerdict, TissueBlock,
 };
 use core::ops::ControlFlow;
 use tactile_elasticity::ElasticityError;
@@ -25,8 +25,8 @@ fn guide() -> Guide {
     Guide::new(vec![layer(4e-3, 120e3), layer(6e-3, 40e3)], 16e-3).unwrap()
 }
 
-fn specimen() -> Specimen {
-    Specimen::new(30e-3, 40e-3).unwrap()
+fn specimen() -> TissueBlock {
+    TissueBlock::new(30e-3, 40e-3).unwrap()
 }
 
 /// A search of a block that the face sticks to.
@@ -291,8 +291,8 @@ fn that_there_is_none_is_certain_only_where_the_model_explains_the_frames() {
         fitted_pa: vec![],
         homogeneous_pa: vec![],
     };
-    assert_eq!(estimate(1e-3, &[]).verdict(), Verdict::Absent);
-    assert_eq!(estimate(0.7, &[]).verdict(), Verdict::Uncertain);
+    assert_eq!(estimate(1e-3, &[]).verdict(), SearchVerdict::Absent);
+    assert_eq!(estimate(0.7, &[]).verdict(), SearchVerdict::Uncertain);
     let poor = InclusionWarning::PoorFit { excess: 9.0 };
-    assert_eq!(estimate(1e-3, &[poor]).verdict(), Verdict::Uncertain);
+    assert_eq!(estimate(1e-3, &[poor]).verdict(), SearchVerdict::Uncertain);
 }

@@ -6,7 +6,7 @@ use crate::parameters::{Coordinate, LumpParameters, Parameters, Place};
 use crate::picture::{CellPositions, Cells};
 use crate::{
     Inclusion, InclusionEstimate, InclusionWarning, PressureProfile, Scan, ScanPress,
-    SearchProgress, Verdict,
+    SearchProgress, SearchVerdict,
 };
 use core::ops::ControlFlow;
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
@@ -224,7 +224,7 @@ fn a_scan_finds_an_inclusion_between_its_presses() {
         position_error_m,
     };
     let alone = search().search_scan(&with(&whole.presses[2..], 0.2e-3), &mut go_on);
-    assert_eq!(alone.unwrap().verdict(), Verdict::Absent);
+    assert_eq!(alone.unwrap().verdict(), SearchVerdict::Absent);
 
     // Approaches that differ, and a place that is nowhere.
     let refused = |scan: &Scan| assert!(search().search_scan(scan, &mut go_on).is_err());
@@ -291,7 +291,7 @@ fn two_balls_off_the_axis_are_told_apart_and_three_are_not_explained() {
         found.inclusions().is_empty() && is_poor(&found),
         "{found:?}"
     );
-    assert_ne!(found.verdict(), Verdict::Absent);
+    assert_ne!(found.verdict(), SearchVerdict::Absent);
 
     // A plain block under a tilted face.
     let tilted = plain[..count].iter().enumerate().map(|(k, pressure)| {
@@ -300,7 +300,7 @@ fn two_balls_off_the_axis_are_told_apart_and_three_are_not_explained() {
         pressure * (1.0 + slope * positions()[cell][0])
     });
     let tilted: Vec<f64> = tilted.collect();
-    assert_eq!(searched(&tilted).verdict(), Verdict::Absent);
+    assert_eq!(searched(&tilted).verdict(), SearchVerdict::Absent);
 }
 
 #[test]
@@ -374,7 +374,7 @@ fn balls_above_the_detection_limit_are_found_and_those_below_are_not() {
     assert!(limits(&plain, 2.0 * contrast).unwrap()[0][0] < limit);
     // The fall of χ² grows as the sixth power of the diameter: at 1.1 times the limit it is 266,
     // far above what searches find, and at 0.65 times 11, far below.
-    for (part, verdict) in [(1.1, Verdict::Found), (0.65, Verdict::Absent)] {
+    for (part, verdict) in [(1.1, SearchVerdict::Found), (0.65, SearchVerdict::Absent)] {
         let ball = lump(part * limit, depth_m, contrast * 5e3);
         for _ in 0..2 {
             let found = search()

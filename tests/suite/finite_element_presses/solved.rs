@@ -5,7 +5,9 @@ use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 use std::ops::ControlFlow;
 use std::sync::Arc;
 use tactile_imaging::elasticity::contact::ContactTable;
-use tactile_imaging::fem::{self, AppliedLoad, Material, ObjectPress, ObjectShape, TableOptions};
+use tactile_imaging::fem::{
+    self, AppliedLoad, ContactTableOptions, Material, ObjectPress, ObjectShape,
+};
 use tactile_simulate::ContactState;
 
 /// A ball's radius and the layers (thickness, modulus) that it is pressed on; none is a rigid flat.
@@ -33,7 +35,7 @@ const POISSON_RATIO: f64 = 0.4999;
 
 pub(super) fn table((radius_m, layers): &Sensor) -> Arc<ContactTable> {
     let guide = guide(layers);
-    let options = TableOptions::default();
+    let options = ContactTableOptions::default();
     let table = fem::solve_contact_table(*radius_m, 0.5, &guide, &options, |_| {
         ControlFlow::Continue(())
     });

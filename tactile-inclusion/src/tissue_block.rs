@@ -10,20 +10,20 @@ use tactile_fem::{Interface, Material};
 ///
 /// ```
 /// use tactile_fem::Interface;
-/// use tactile_inclusion::Specimen;
+/// use tactile_inclusion::TissueBlock;
 ///
-/// let block = Specimen::new(30e-3, 40e-3)?
+/// let block = TissueBlock::new(30e-3, 40e-3)?
 ///     .with_height_error_m(0.3e-3)?
 ///     .with_poisson_ratio(0.49, 0.005)?
 ///     .with_youngs_modulus(5e3, 1e3)?
 ///     .with_approach_error_m(10e-6)?
 ///     .with_interface(Interface::Bonded);
 /// assert_eq!((block.height_m(), block.radius_m()), (30e-3, 40e-3));
-/// assert!(Specimen::new(f64::NAN, 40e-3).is_err());
+/// assert!(TissueBlock::new(f64::NAN, 40e-3).is_err());
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Specimen {
+pub struct TissueBlock {
     height_m: f64,
     height_error_m: f64,
     radius_m: f64,
@@ -35,7 +35,7 @@ pub struct Specimen {
     interface: Option<Interface>,
 }
 
-impl Specimen {
+impl TissueBlock {
     /// Height and radius in metres. The height's standard error is 2 %, Poisson's ratio 0.495 ±
     /// 0.005, and the zero of the approaches is known to 20 µm, until set. Whether the face sticks
     /// or slides is not known.
