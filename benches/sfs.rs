@@ -7,7 +7,7 @@ use std::hint::black_box;
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use ndarray::Array2;
 use tactile_imaging::sfs::{
-    ControlPointSampler, DepthTable, Domain, Eikonal, EikonalBranch, EquallySpaced, Frame,
+    ControlPointSampler, DepthTable, Domain, Eikonal, EikonalBranch, EquallySpaced, Frame, Image,
     Lighting, Surface, SurfaceReconstruction, SurfaceWorkspace,
 };
 
@@ -46,7 +46,7 @@ fn contact_share(criterion: &mut Criterion) {
                 bencher.iter(|| {
                     let frame = Frame::Bytes(black_box(image.view()));
                     method
-                        .reconstruct_with(&mut workspace, frame, &domain, &mut surface)
+                        .reconstruct_with(&mut workspace, Image::new(frame, domain), &mut surface)
                         .unwrap();
                 });
             },
@@ -84,7 +84,7 @@ fn depth_table(criterion: &mut Criterion) {
         bencher.iter(|| {
             let frame = Frame::Bytes(black_box(image.view()));
             table
-                .reconstruct_with(&mut workspace, frame, &domain, &mut surface)
+                .reconstruct_with(&mut workspace, Image::new(frame, domain), &mut surface)
                 .unwrap();
         });
     });

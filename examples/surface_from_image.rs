@@ -5,7 +5,9 @@
 use std::error::Error;
 use std::path::Path;
 use tactile_files::io::{Grey, read_grey_image};
-use tactile_imaging::sfs::{BoundaryCondition, Domain, Eikonal, Lighting, SurfaceReconstruction};
+use tactile_imaging::sfs::{
+    BoundaryCondition, Domain, Eikonal, Image, Lighting, SurfaceReconstruction,
+};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let path = Path::new("examples/data/ball.pgm");
@@ -14,7 +16,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let light = Lighting::new([0.0, 0.0, 1.0])?.with_normal_intensity(255.0)?;
     let method = Eikonal::new(light).with_boundary(BoundaryCondition::Height(0.0))?;
     let domain = Domain::default().with_mask(mask.view());
-    let surface = method.reconstruct(image.view().into(), &domain)?;
+    let surface = method.reconstruct(Image::new(image.view(), domain))?;
     let heights = surface.heights.iter().copied().filter(|z| z.is_finite());
     let top = heights.fold(0.0, f64::max);
     let report = &surface.report;

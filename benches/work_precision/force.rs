@@ -2,7 +2,7 @@
 
 use crate::study::Study;
 use tactile_imaging::force::{
-    CalibrationOptions, CalibrationPair, ForceMeter, ForceOptions, ForceWorkspace, HertzFitOptions,
+    CalibrationOptions, CalibrationPair, ForceMeter, ForceOptions, ForceWorkspace,
     LinearCalibration, ReferenceFrame,
 };
 use tactile_simulate::{
@@ -36,10 +36,6 @@ pub(crate) fn frame(study: &mut Study) {
     let reference = ReferenceFrame::new(scene.reference(0).view()).expect("a frame");
     let frames: Vec<_> = (0..SEEDS).map(|seed| scene.frame(0, seed)).collect();
     let truth = scene.truth(0);
-    let fit = HertzFitOptions::default();
-    let with = |hertz| ForceOptions::default().with_hertz(hertz);
-    let steps = |n| with(fit.with_max_iterations(n).expect("valid"));
-    let blur = |sd| with(fit.with_blur_px(sd).expect("valid"));
     for (knob, setting, is_default, options) in [
         ("profile", "default", true, ForceOptions::default()),
         (
@@ -48,17 +44,6 @@ pub(crate) fn frame(study: &mut Study) {
             false,
             ForceOptions::default().without_profile(),
         ),
-        ("iterations", "1", false, steps(1)),
-        ("iterations", "2", false, steps(2)),
-        ("iterations", "5", false, steps(5)),
-        (
-            "background",
-            "fitted",
-            false,
-            with(fit.with_fitted_background()),
-        ),
-        ("blur", "none", false, blur(0.0)),
-        ("blur", "1 px", false, blur(1.0)),
     ] {
         let meter = ForceMeter::new(truth.pixel_size_m, &options).expect("valid");
         let mut workspace = ForceWorkspace::default();

@@ -3,7 +3,7 @@
 use crate::study::{Effort, Study};
 use ndarray::Array2;
 use tactile_imaging::sfs::{
-    BoundaryCondition, CosinePoisson, Domain, Eikonal, FrankotChellappa, Lighting,
+    BoundaryCondition, CosinePoisson, Domain, Eikonal, FrankotChellappa, Image, Lighting,
     MaskedLeastSquares, PixelScalar, SlopeIntegrator, SurfaceReconstruction, TsaiShah,
 };
 
@@ -83,7 +83,7 @@ fn surface(
         .with_mask(mask.view());
     let job = || {
         method
-            .reconstruct(image.view().into(), &domain)
+            .reconstruct(Image::new(image.view(), domain))
             .expect("a surface")
             .heights
     };

@@ -3,6 +3,9 @@
 use ndarray::{Array2, ArrayView2};
 use tactile_inclusion::PressureProfile;
 
+/// Rings over a face, as narrow as a pixel of common scenes, in which the profile hardly bends.
+const RINGS: usize = 60;
+
 /// Mean pressure in rings around the face's centre.
 ///
 /// ```
@@ -113,12 +116,10 @@ pub fn ring_means(
             radius_px: face_radius_m / sx,
         });
     }
-    // Rings as narrow as a pixel of common scenes, in which the profile hardly bends.
-    let count = 60;
-    let width = face_radius_m / count as f64;
+    let width = face_radius_m / RINGS as f64;
     // Beyond, the pressure rises steeply to the rim, and a search does not use it.
     let used_radius_m = 0.75 * face_radius_m;
-    let mut rings = vec![Ring::default(); count];
+    let mut rings = vec![Ring::default(); RINGS];
     let mut harmonic = [0.0; 2];
     let mut mean = 0.0;
     let offset = |y: usize, x: usize| {

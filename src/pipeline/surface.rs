@@ -3,7 +3,7 @@ use super::composition::Pipeline;
 use super::contact::FrameContact;
 use super::settings::{Settings, SurfaceInput};
 use crate::force::{BoundingBox, LensGeometry, LocalCalibration};
-use crate::sfs::{self, BallFit, BinnedContact, Domain, Frame, SfsError, Surface};
+use crate::sfs::{self, BallFit, BinnedContact, Domain, Frame, Image, SfsError, Surface};
 use nalgebra::Point3;
 use ndarray::ArrayView2;
 
@@ -244,8 +244,7 @@ pub fn reconstruct(
     let frame = Frame::Real(workspace.grid.signal.view());
     pipeline.surface().reconstruct_with(
         &mut workspace.sfs,
-        frame,
-        &domain,
+        Image::new(frame, domain),
         &mut surface.surface,
     )?;
     surface.origin_m = origin_m(&region, side, pixel_size_m);

@@ -1,8 +1,6 @@
-//! What several subcommands ask for: numbers, repetitions, frames of a sensor, masks and known
-//! heights.
+//! Arguments of several subcommands: numbers, repetitions, tables, masks and known heights.
 use crate::console::{Context, Interrupt, median_ms};
 use crate::failure::Failure;
-use crate::frames::Reading;
 use crate::text::four_digits;
 use clap::{Args, ValueEnum};
 use ndarray::Array2;
@@ -20,7 +18,7 @@ fn number(text: &str, fits: impl Fn(f64) -> bool, expected: &str) -> Result<f64,
 }
 
 /// An argument that is a positive, finite number.
-pub fn positive(text: &str) -> Result<f64, String> {
+pub(crate) fn positive(text: &str) -> Result<f64, String> {
     number(text, |v| v > 0.0, "a number above zero")
 }
 
@@ -31,35 +29,35 @@ fn physical(text: &str, quantity: InputQuantity, scale: f64, unit: &str) -> Resu
 }
 
 /// An argument that is a length in millimetres.
-pub fn length_mm(text: &str) -> Result<f64, String> {
+pub(crate) fn length_mm(text: &str) -> Result<f64, String> {
     physical(text, InputQuantity::Length, 1e-3, "mm")
 }
 
 /// An argument that is a size of a lump in millimetres. The mesh of a smaller one has no end.
-pub fn lump_mm(text: &str) -> Result<f64, String> {
+pub(crate) fn lump_mm(text: &str) -> Result<f64, String> {
     let expected = "a number from 0.5 to 200 mm";
     number(text, |mm| (0.5..=200.0).contains(&mm), expected)
 }
 
 /// An argument that is an inclusion's modulus over that around it. Within a tenth of one it does
 /// not show.
-pub fn contrast(text: &str) -> Result<f64, String> {
+pub(crate) fn contrast(text: &str) -> Result<f64, String> {
     let fits = |ratio: f64| (1.1..=1e3).contains(&ratio) || (1e-3..=0.9).contains(&ratio);
     number(text, fits, "a ratio from 1.1 to 1000, or from 0.001 to 0.9")
 }
 
 /// An argument that is a modulus in kilopascals.
-pub fn modulus_kpa(text: &str) -> Result<f64, String> {
+pub(crate) fn modulus_kpa(text: &str) -> Result<f64, String> {
     physical(text, InputQuantity::Modulus, 1e3, "kPa")
 }
 
 /// An argument that is a force in newtons.
-pub fn force_n(text: &str) -> Result<f64, String> {
+pub(crate) fn force_n(text: &str) -> Result<f64, String> {
     physical(text, InputQuantity::Force, 1.0, "N")
 }
 
 /// An argument that is the size of a pixel on the sensor in micrometres, one or width and height.
-pub fn pixel_um(text: &str) -> Result<[f64; 2], String> {
+pub(crate) fn pixel_um(text: &str) -> Result<[f64; 2], String> {
     let [x, y] = one_or_two(text)?;
     for side in [x, y] {
         physical(&side.to_string(), InputQuantity::PixelSide, 1e-6, "µm")?;
@@ -71,13 +69,13 @@ pub fn pixel_um(text: &str) -> Result<[f64; 2], String> {
 }
 
 /// An argument that is a finite number of at least zero.
-pub fn not_negative(text: &str) -> Result<f64, String> {
+pub(crate) fn not_negative(text: &str) -> Result<f64, String> {
     number(text, |v| v >= 0.0, "a number of at least zero")
 }
 
 /// An argument that is one positive number, or two between commas: the size of a pixel along x and
 /// y.
-pub fn one_or_two(text: &str) -> Result<[f64; 2], String> {
+pub(crate) fn one_or_two(text: &str) -> Result<[f64; 2], String> {
     let numbers: Result<Vec<f64>, _> = text.split(',').map(|part| positive(part.trim())).collect();
     match numbers.as_deref() {
         Ok(&[both]) => Ok([both; 2]),
@@ -87,14 +85,14 @@ pub fn one_or_two(text: &str) -> Result<[f64; 2], String> {
 }
 
 /// The name of a value as it is written on the command line.
-pub fn name(value: impl ValueEnum) -> String {
+pub(crate) fn name(value: impl ValueEnum) -> String {
     let value = value.to_possible_value();
     value.map_or(String::new(), |v| v.get_name().to_owned())
 }
 
 /// How often the work is done.
 #[derive(Args, Clone, Copy)]
-pub struct Repetition {
+pub(crate) struct Repetition {
     /// Do the work N times. The median of the times is given.
     #[arg(long, value_name = "N", default_value_t = 1,
           value_parser = clap::value_parser!(u32).range(1..), allow_negative_numbers = true)]
@@ -104,7 +102,7 @@ pub struct Repetition {
 impl Repetition {
     /// The result of the last repetition, and the median of the times in milliseconds. Ctrl-C ends
     /// the repetitions.
-    pub fn timed<T, E>(
+    pub(crate) fn timed<T, E>(
         self,
         interrupt: &Interrupt,
         mut work: impl FnMut() -> Result<T, E>,
@@ -121,54 +119,9 @@ impl Repetition {
     }
 }
 
-/// Pressed frames and the frame without contact.
-#[derive(Args)]
-pub struct SensorFrames {
-    /// Pressed frames: images (PNG, PGM, JPEG, TIFF), videos (YUV4MPEG2, AVI of JPEG), arrays (NPY,
-    /// NPZ), `-` for a pipe of any of them.
-    #[arg(required = true)]
-    pub frames: Vec<PathBuf>,
-    /// Frame of the sensor without contact.
-    #[arg(long, value_name = "IMAGE")]
-    pub reference: PathBuf,
-    /// Size of a pixel on the sensor's surface in micrometres, or its width and height.
-    #[arg(long, value_name = "X[,Y]", value_parser = pixel_um, allow_negative_numbers = true)]
-    pixel_um: [f64; 2],
-    /// Bits of the camera, for images of 16 bits whose file does not say.
-    #[arg(long, value_parser = clap::value_parser!(u8).range(8..=16))]
-    bits: Option<u8>,
-}
-
-impl SensorFrames {
-    /// Reference, a table and the frames: the files that are read.
-    pub fn files<'a>(&'a self, table: &'a Path) -> Vec<&'a Path> {
-        let frames = self.frames.iter().map(PathBuf::as_path);
-        frames.chain([self.reference.as_path(), table]).collect()
-    }
-
-    pub fn pixel_m(&self) -> [f64; 2] {
-        self.pixel_um.map(|um| um * 1e-6)
-    }
-
-    /// The frame without contact, in eight bits.
-    pub fn read_reference(&self, grey: Grey) -> Result<Array2<u8>, Failure> {
-        Ok(read_grey_image(&self.reference, grey, self.bits)?.to_u8())
-    }
-
-    /// How the pressed frames are read.
-    pub fn reading(&self, grey: Grey, reference: &Array2<u8>) -> Reading<'_> {
-        Reading {
-            grey,
-            bits: self.bits,
-            reference: &self.reference,
-            size: reference.dim(),
-        }
-    }
-}
-
 /// How tables are read, if not as they show themselves.
 #[derive(Args)]
-pub struct TableArguments {
+pub(crate) struct TableArguments {
     /// Columns that are read, in their order: by heading or by number from 1.
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     columns: Vec<String>,
@@ -181,7 +134,7 @@ pub struct TableArguments {
 }
 
 impl TableArguments {
-    pub fn options(&self) -> TableOptions {
+    pub(crate) fn options(&self) -> TableOptions {
         TableOptions {
             columns: self.columns.clone(),
             skip_lines: self.skip_lines,
@@ -196,7 +149,7 @@ impl TableArguments {
     /// Tables of points, and whether their coordinates have a unit: those of all files or of none.
     /// A table of tracked points gives one for each of its frames. Row i of one that is paired is row
     /// i of the others, and NaN stands for numbers that are not there.
-    pub fn read_points(
+    pub(crate) fn read_points(
         &self,
         paths: &[impl AsRef<Path>],
         paired: bool,
@@ -227,7 +180,7 @@ impl TableArguments {
 }
 
 /// Prints what was taken for granted of a table.
-pub fn taken(path: &Path, notes: &[String], context: &mut Context) {
+pub(crate) fn taken(path: &Path, notes: &[String], context: &mut Context) {
     for note in notes {
         let sentence = format!("{}: {note}", path.display());
         context.warn(
@@ -239,10 +192,10 @@ pub fn taken(path: &Path, notes: &[String], context: &mut Context) {
 }
 
 /// Rows and columns of a file.
-pub type Shaped<'a> = (&'a Path, (usize, usize));
+pub(crate) type Shaped<'a> = (&'a Path, (usize, usize));
 
 /// Refuses a file of another shape than the first.
-pub fn same_shape(
+pub(crate) fn same_shape(
     (path, (rows, columns)): Shaped<'_>,
     (first, (first_rows, first_columns)): Shaped<'_>,
 ) -> Result<(), Failure> {
@@ -259,7 +212,7 @@ pub fn same_shape(
 
 /// The part of a surface that is wanted, and its known heights.
 #[derive(Args)]
-pub struct HeightRegion {
+pub(crate) struct HeightRegion {
     /// Image of the object: bright (above 127) pixels are solved for.
     #[arg(long, value_name = "IMAGE")]
     pub mask: Option<PathBuf>,
@@ -270,12 +223,12 @@ pub struct HeightRegion {
 
 impl HeightRegion {
     /// The files beside the first, which gives the shape.
-    pub fn files<'a>(&'a self, first: &'a [&'a Path]) -> Vec<&'a Path> {
+    pub(crate) fn files<'a>(&'a self, first: &'a [&'a Path]) -> Vec<&'a Path> {
         let own = self.mask.iter().chain(&self.heights).map(PathBuf::as_path);
         first.iter().copied().chain(own).collect()
     }
 
-    pub fn known_heights(&self, first: Shaped<'_>) -> Result<Option<Array2<f64>>, Failure> {
+    pub(crate) fn known_heights(&self, first: Shaped<'_>) -> Result<Option<Array2<f64>>, Failure> {
         let Some(path) = &self.heights else {
             return Ok(None);
         };
@@ -284,7 +237,7 @@ impl HeightRegion {
         Ok(Some(grid))
     }
 
-    pub fn bright_pixels(&self, first: Shaped<'_>) -> Result<Option<Array2<bool>>, Failure> {
+    pub(crate) fn bright_pixels(&self, first: Shaped<'_>) -> Result<Option<Array2<bool>>, Failure> {
         let Some(path) = &self.mask else {
             return Ok(None);
         };

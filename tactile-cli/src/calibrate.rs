@@ -44,7 +44,7 @@ Examples:
   tactile calibrate examples/data/colour/calibration.toml --out target/colour/sensor.toml
   tactile calibrate examples/data/press/calibration.csv
   tactile calibrate examples/data/press/calibration.csv --there-and-back --out target/calibrate")]
-pub struct CalibrateArguments {
+pub(crate) struct CalibrateArguments {
     /// Calibration file of a sensor (.toml), or table of integrated pixel values and forces.
     #[arg(value_name = "CALIBRATION.toml | PAIRS.csv")]
     input: PathBuf,
@@ -54,7 +54,7 @@ pub struct CalibrateArguments {
     there_and_back: bool,
 }
 
-pub fn run(arguments: &CalibrateArguments, context: &mut Context) -> Result<Exit, Failure> {
+pub(crate) fn run(arguments: &CalibrateArguments, context: &mut Context) -> Result<Exit, Failure> {
     let input = arguments.input.as_path();
     let extension = input.extension();
     if extension.is_some_and(|e| e.eq_ignore_ascii_case("toml")) {
@@ -80,16 +80,16 @@ const BRANCHES: [(Branch, Colour, &str); 2] = [
 ];
 
 /// Pairs of integrated pixel value and force, and the line through them.
-pub struct PairLine {
+pub(crate) struct PairLine {
     pub pairs: Vec<CalibrationPair>,
     pub line: LinearCalibration,
 }
 
 impl PairLine {
     /// The name of its page.
-    pub const PAGE: &str = "calibration.svg";
+    pub(crate) const PAGE: &str = "calibration.svg";
 
-    pub fn read(path: &Path, there_and_back: bool) -> Result<Self, Failure> {
+    pub(crate) fn read(path: &Path, there_and_back: bool) -> Result<Self, Failure> {
         let value = (
             &["integrated_pixel_value", "pixel_value"][..],
             "grey_levels",
@@ -115,7 +115,7 @@ impl PairLine {
         Ok(Self { pairs, line })
     }
 
-    pub fn print(&self, context: &mut Context) {
+    pub(crate) fn print(&self, context: &mut Context) {
         let report = self.line.report();
         context.line(format_args!("calibration, {} pairs:", report.pairs));
         let parameters = report.parameters.iter();
@@ -152,7 +152,7 @@ impl PairLine {
         context.answer("range", range);
     }
 
-    pub fn value(&self) -> Value {
+    pub(crate) fn value(&self) -> Value {
         let report = self.line.report();
         let [offset, slope] = [0, 1].map(|k| report.parameters.get(k));
         json!({
@@ -170,7 +170,7 @@ impl PairLine {
     }
 
     /// Pairs and line above, residuals below.
-    pub fn page(&self) -> Page {
+    pub(crate) fn page(&self) -> Page {
         let residuals = &self.line.report().residuals_n;
         let x = "integrated pixel value (million grey levels)";
         let ends = self.line.range();

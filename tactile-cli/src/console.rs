@@ -11,10 +11,11 @@ use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, mpsc};
 use std::time::{Duration, Instant};
+use tactile_imaging::core::Progress;
 use tactile_imaging::pipeline::Flag;
 
 /// The standard streams, Ctrl-C, the limit of memory and the files to write.
-pub struct Context {
+pub(crate) struct Context {
     /// One JSON object instead of text.
     pub json: bool,
     pub interrupt: Interrupt,
@@ -41,7 +42,7 @@ struct Envelope<'a, T> {
 }
 
 impl Context {
-    pub fn new(command: String, json: bool, outputs: Outputs) -> Self {
+    pub(crate) fn new(command: String, json: bool, outputs: Outputs) -> Self {
         Self {
             command,
             cautions: Vec::new(),
@@ -55,7 +56,7 @@ impl Context {
 
     /// Prints a line of the result, unless JSON is wanted. A reader that goes away (`| head -1`)
     /// ends the printing, not the program.
-    pub fn line(&mut self, text: impl Display) {
+    pub(crate) fn line(&mut self, text: impl Display) {
         let text = text.to_string();
         if let Some(report) = &mut self.outputs.report {
             report.line(&text);
@@ -64,7 +65,7 @@ impl Context {
     }
 
     /// Prints what says how fast the work was, and does not belong on a report.
-    pub fn aside(&mut self, text: impl Display) {
+    pub(crate) fn aside(&mut self, text: impl Display) {
         if self.json || self.reader_left || self.error.is_some() {
             return;
         }
@@ -76,7 +77,7 @@ impl Context {
     }
 
     /// Prints a line of a name and its value.
-    pub fn row(&mut self, name: &str, value: impl Display) {
+    pub(crate) fn row(&mut self, name: &str, value: impl Display) {
         let value = value.to_string();
         if let Some(report) = &mut self.outputs.report {
             report.row(name, &value);
@@ -85,7 +86,7 @@ impl Context {
     }
 
     /// Prints a line of a name and its value, the answer of the call.
-    pub fn answer(&mut self, name: &str, value: impl Display) {
+    pub(crate) fn answer(&mut self, name: &str, value: impl Display) {
         let value = value.to_string();
         if let Some(report) = &mut self.outputs.report {
             report.answer(format!("{name}: {value}"));
@@ -94,7 +95,7 @@ impl Context {
     }
 
     /// A sentence about the input for the person at the terminal, and for the report.
-    pub fn caution(&mut self, text: impl Display) {
+    pub(crate) fn caution(&mut self, text: impl Display) {
         let text = text.to_string();
         if let Some(report) = &mut self.outputs.report {
             report.caution(&text, "");
@@ -104,7 +105,7 @@ impl Context {
 
     /// Prints a caution about the answer, and keeps it for the JSON object: a kind, its numbers (an
     /// object, or null) and its sentence.
-    pub fn warn(&mut self, kind: &str, numbers: Value, sentence: impl Display) {
+    pub(crate) fn warn(&mut self, kind: &str, numbers: Value, sentence: impl Display) {
         let sentence = sentence.to_string();
         self.row("caution", &sentence);
         let mut caution = json!({ "kind": kind, "text": sentence });
@@ -115,7 +116,7 @@ impl Context {
     }
 
     /// The cautions about a frame, in a line each. The frame's name stands above them.
-    pub fn warn_of_frame(&mut self, flags: &[Flag]) {
+    pub(crate) fn warn_of_frame(&mut self, flags: &[Flag]) {
         for flag in flags {
             let sentence = flag.to_string();
             let words = sentence.split_once(": ").and_then(|(before, words)| {
@@ -132,7 +133,7 @@ impl Context {
     }
 
     /// Keeps cautions that were printed for the JSON object. The first frame is frame 1.
-    pub fn keep_cautions(&mut self, flags: &[Flag]) {
+    pub(crate) fn keep_cautions(&mut self, flags: &[Flag]) {
         for flag in flags {
             if let Some(report) = &mut self.outputs.report {
                 report.flag(flag);
@@ -147,7 +148,7 @@ impl Context {
     }
 
     /// Prints the result as JSON, where it is wanted, with the cautions so far.
-    pub fn value(&mut self, answer: &impl Serialize) {
+    pub(crate) fn value(&mut self, answer: &impl Serialize) {
         if !self.json || self.reader_left || self.error.is_some() {
             return;
         }
@@ -170,20 +171,20 @@ impl Context {
     }
 
     /// A sentence for the person at the terminal, on standard error.
-    pub fn note(&self, text: impl Display) {
+    pub(crate) fn note(&self, text: impl Display) {
         // Nothing can be done about a standard error that is closed.
         let _ = writeln!(stderr(), "tactile: {}", printable(&text.to_string()));
     }
 
     /// Refuses a job that needs more memory than is allowed. `job` names it and its size, `remedy`
     /// the way out.
-    pub fn allow(&self, bytes: f64, job: &str, remedy: &str) -> Result<(), Failure> {
+    pub(crate) fn allow(&self, bytes: f64, job: &str, remedy: &str) -> Result<(), Failure> {
         self.outputs.allow(bytes, job, remedy)
     }
 
     /// Runs a job that can neither stop nor report its progress, with its time so far on the
     /// terminal. It is none after Ctrl-C, which leaves the job to end with the program.
-    pub fn wait<R: Send + 'static>(
+    pub(crate) fn wait<R: Send + 'static>(
         &self,
         job: impl Into<String>,
         work: impl FnOnce() -> R + Send + 'static,
@@ -223,8 +224,25 @@ impl Context {
         result
     }
 
+    /// Runs a search for inclusions with its progress, which Ctrl-C ends.
+    pub(crate) fn reported<T>(
+        &self,
+        name: &'static str,
+        search: impl FnOnce(&mut dyn FnMut(Progress) -> ControlFlow<()>) -> T,
+    ) -> T {
+        let mut progress: Option<Bar> = None;
+        self.interrupt.polled(true);
+        let found = search(&mut |now| {
+            let bar = progress.get_or_insert_with(|| Bar::of(now.total, name));
+            bar.done(now.done);
+            self.interrupt.flow()
+        });
+        self.interrupt.polled(false);
+        found
+    }
+
     /// Writes the files of a call that has its answer, and returns the exit code.
-    pub fn close(mut self, ended: Result<Exit, Failure>) -> Exit {
+    pub(crate) fn close(mut self, ended: Result<Exit, Failure>) -> Exit {
         // The answer is printed by now: a folder that cannot be written withholds nothing.
         let ended = ended.and_then(|exit| {
             self.outputs.finish_report();
@@ -272,7 +290,7 @@ impl Context {
 /// Ctrl-C, termination or a terminal that closes: work that polls it stops with its results so far,
 /// other work ends at once. A second one always ends.
 #[derive(Clone, Default)]
-pub struct Interrupt {
+pub(crate) struct Interrupt {
     requested: Arc<AtomicBool>,
     polled: Arc<AtomicBool>,
     /// Held while files get their names.
@@ -299,12 +317,12 @@ impl Interrupt {
         interrupt
     }
 
-    pub fn requested(&self) -> bool {
+    pub(crate) fn requested(&self) -> bool {
         self.requested.load(Ordering::SeqCst)
     }
 
     /// The answer to a job that asks whether to go on.
-    pub fn flow(&self) -> ControlFlow<()> {
+    pub(crate) fn flow(&self) -> ControlFlow<()> {
         if self.requested() {
             ControlFlow::Break(())
         } else {
@@ -314,7 +332,7 @@ impl Interrupt {
 
     /// Announces that the work from here on polls [`requested`](Self::requested), or no longer
     /// does.
-    pub fn polled(&self, polled: bool) {
+    pub(crate) fn polled(&self, polled: bool) {
         self.polled.store(polled, Ordering::SeqCst);
     }
 }
@@ -332,7 +350,7 @@ fn hang_up_is_ignored() -> bool {
 
 /// A bar on the terminal for a job that takes longer than a second. It is hidden where standard
 /// error is no terminal.
-pub struct Bar {
+pub(crate) struct Bar {
     bar: ProgressBar,
     started: Instant,
     shown: bool,
@@ -342,13 +360,13 @@ pub struct Bar {
 
 impl Bar {
     /// Of a job of `total` steps.
-    pub fn of(total: usize, job: impl Into<String>) -> Self {
+    pub(crate) fn of(total: usize, job: impl Into<String>) -> Self {
         let bar = ProgressBar::with_draw_target(Some(total as u64), ProgressDrawTarget::hidden());
         Self::styled(bar, "{msg} [{bar:32}] {percent} %, {eta} left", job)
     }
 
     /// Of a job that does not report its progress: a clock that runs by itself.
-    pub fn clock(job: impl Into<String>) -> Self {
+    pub(crate) fn clock(job: impl Into<String>) -> Self {
         let mut progress = Self::styled(ProgressBar::hidden(), "{spinner} {msg}, {elapsed}", job);
         let bar = progress.bar.clone();
         let (end, ended) = mpsc::channel::<()>();
@@ -378,7 +396,7 @@ impl Bar {
     }
 
     /// Shows that this many steps are done.
-    pub fn done(&mut self, steps: usize) {
+    pub(crate) fn done(&mut self, steps: usize) {
         self.bar.set_position(steps as u64);
         if !self.shown && self.started.elapsed() > Duration::from_secs(1) {
             self.shown = true;
@@ -395,7 +413,7 @@ impl Drop for Bar {
 }
 
 /// The median of repeated times in milliseconds.
-pub fn median_ms(mut times: Vec<Duration>) -> f64 {
+pub(crate) fn median_ms(mut times: Vec<Duration>) -> f64 {
     times.sort_unstable();
     let middle = times.get(times.len() / 2);
     middle.map_or(0.0, |t| t.as_secs_f64() * 1e3)

@@ -1,8 +1,8 @@
 //! `tactile depth`: contact and depth of a sensor that grows darker where it is pressed.
-use crate::arguments::{SensorFrames, TableArguments, taken};
+use crate::arguments::{TableArguments, taken};
 use crate::console::Context;
 use crate::failure::{Exit, Failure};
-use crate::frames::NamedFrame;
+use crate::frames::{NamedFrame, SensorFrames};
 use crate::outputs::Csv;
 use crate::photometric::{self, unless_sensor};
 use crate::plot::{Colour, HeatMap, Page, Panel, circle, known_heights_mm};
@@ -49,7 +49,7 @@ Examples:
                         --pixel-um 100 examples/data/dark_frame.pgm --ball --out target/depth
   tactile depth --sensor examples/data/colour/sensor.toml examples/data/colour/press_6.png --out \
                         target/depth")]
-pub struct DepthArguments {
+pub(crate) struct DepthArguments {
     #[command(flatten)]
     frames: SensorFrames,
     /// Sensor file of a gel that is lit in colours.
@@ -140,7 +140,7 @@ struct Found {
     ball: Option<Result<BallFit, &'static str>>,
 }
 
-pub fn run(arguments: &DepthArguments, context: &mut Context) -> Result<Exit, Failure> {
+pub(crate) fn run(arguments: &DepthArguments, context: &mut Context) -> Result<Exit, Failure> {
     let DepthArguments { frames, table, .. } = arguments;
     if let Some(sensor) = &arguments.sensor {
         return photometric::depth(sensor, &frames.frames, false, context);
@@ -153,7 +153,8 @@ pub fn run(arguments: &DepthArguments, context: &mut Context) -> Result<Exit, Fa
     };
     let reference = frames.read_reference(grey)?;
     let reading = frames.reading(grey, &reference);
-    let (images, mut exit) = reading.all::<Array2<u8>>(&frames.frames, context)?;
+    let (images, unreadable) = reading.all::<Array2<u8>>(&frames.frames, context)?;
+    let mut exit = Exit::complete_if(unreadable == 0);
     // Frames are held, and each has a surface with its plot.
     let pixels = (reference.len() * images.len()) as f64;
     let job = format!("the depth of {} frames", images.len());

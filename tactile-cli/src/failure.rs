@@ -6,7 +6,7 @@ use tactile_files::io::FileError;
 
 /// The exit codes, as the help of the program lists them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Exit {
+pub(crate) enum Exit {
     /// All that was asked for is there.
     Complete,
     /// Something is there, but a stage has no answer. It is printed with its reason.
@@ -20,7 +20,7 @@ pub enum Exit {
 }
 
 impl Exit {
-    pub fn code(self) -> u8 {
+    pub(crate) fn code(self) -> u8 {
         match self {
             Self::Complete => 0,
             Self::Partial => 1,
@@ -31,7 +31,7 @@ impl Exit {
     }
 
     /// Complete or, where something is missing, partial.
-    pub fn complete_if(complete: bool) -> Self {
+    pub(crate) fn complete_if(complete: bool) -> Self {
         if complete {
             Self::Complete
         } else {
@@ -42,7 +42,7 @@ impl Exit {
 
 /// Why a call came to nothing, in one sentence.
 #[derive(Debug)]
-pub struct Failure {
+pub(crate) struct Failure {
     pub exit: Exit,
     sentence: String,
 }
@@ -54,22 +54,22 @@ impl Failure {
     }
 
     /// The input cannot be used.
-    pub fn input(sentence: impl Display) -> Self {
+    pub(crate) fn input(sentence: impl Display) -> Self {
         Self::new(Exit::Input, sentence)
     }
 
     /// This file cannot be used.
-    pub fn in_file(path: &Path, error: impl Display) -> Self {
+    pub(crate) fn in_file(path: &Path, error: impl Display) -> Self {
         Self::input(format!("{}: {error}", path.display()))
     }
 
     /// The input is fine, but there is no answer.
-    pub fn no_answer(sentence: impl Display) -> Self {
+    pub(crate) fn no_answer(sentence: impl Display) -> Self {
         Self::new(Exit::Partial, sentence)
     }
 
     /// The answer could not be written.
-    pub fn output(sentence: impl Display) -> Self {
+    pub(crate) fn output(sentence: impl Display) -> Self {
         Self::new(Exit::Output, sentence)
     }
 }

@@ -1,9 +1,8 @@
 //! `tactile force`: normal force, contact and stress from frames.
-use crate::arguments::SensorFrames;
 use crate::calibrate::PairLine;
-use crate::console::{Bar, Context};
+use crate::console::Context;
 use crate::failure::{Exit, Failure};
-use crate::frames::NamedFrame;
+use crate::frames::{NamedFrame, SensorFrames};
 use crate::outputs::Csv;
 use crate::text::in_unit;
 use clap::Args;
@@ -30,7 +29,7 @@ Examples:
   tactile force --reference examples/data/press/reference.png --pairs \
                         examples/data/press/calibration.csv --pixel-um 40 \
                         examples/data/press/frame_1.png --out target/force")]
-pub struct ForceArguments {
+pub(crate) struct ForceArguments {
     #[command(flatten)]
     frames: SensorFrames,
     /// Calibration pairs: CSV with the columns integrated_pixel_value and force.
@@ -38,7 +37,7 @@ pub struct ForceArguments {
     pairs: PathBuf,
 }
 
-pub fn run(arguments: &ForceArguments, context: &mut Context) -> Result<Exit, Failure> {
+pub(crate) fn run(arguments: &ForceArguments, context: &mut Context) -> Result<Exit, Failure> {
     let ForceArguments { frames, pairs } = arguments;
     let table = "force.csv";
     context
@@ -65,31 +64,17 @@ pub fn run(arguments: &ForceArguments, context: &mut Context) -> Result<Exit, Fa
         "frame,force_N,se_force_N,radius_m,se_radius_m,x_m,se_x_m,y_m,se_y_m,mean_stress_Pa,\
          se_mean_stress_Pa",
     );
-    let mut bar = Bar::of(frames.frames.len(), "measuring");
-    context.interrupt.polled(true);
-    for (k, frame) in reading.frames::<Array2<u8>>(&frames.frames).enumerate() {
-        if context.interrupt.requested() {
-            break;
-        }
-        let NamedFrame { name, pixels, .. } = match frame {
-            Ok(frame) => frame,
-            Err(failure) if failure.exit == Exit::Partial => {
-                exit = Exit::Partial;
-                context.caution(failure);
-                continue;
-            }
-            Err(failure) => return Err(failure),
-        };
+    let unreadable = reading.each::<Array2<u8>>(&frames.frames, context, |frame, context| {
+        let NamedFrame { name, pixels, .. } = frame.named();
         let found = session.push(pixels.view());
-        bar.done(k + 1);
         context.line(format_args!("{name}:"));
         match found {
             Ok(Update { contact, .. }) => {
                 let answer = contact.map(|contact| Answer::new(&contact, frames.pixel_m()));
                 print(answer.as_ref(), context);
                 context.warn_of_frame(&session.cautions());
+                csv.row(row(values.len(), answer.as_ref()));
                 values.push(json!({ "frame": name, "contact": answer }));
-                csv.row(row(k, answer.as_ref()));
             }
             Err(error) => {
                 exit = Exit::Partial;
@@ -97,8 +82,11 @@ pub fn run(arguments: &ForceArguments, context: &mut Context) -> Result<Exit, Fa
                 values.push(json!({ "frame": name, "error": error.to_string() }));
             }
         }
+        Ok(())
+    })?;
+    if unreadable > 0 {
+        exit = Exit::Partial;
     }
-    drop(bar);
     context.value(&json!({ "calibration": line.value(), "frames": values }));
     context.outputs.add(table, csv.into_bytes());
     context.outputs.page(PairLine::PAGE, || line.page())?;

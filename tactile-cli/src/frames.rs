@@ -1,19 +1,22 @@
 //! The frames of images, stacks, videos and pipes, as several subcommands measure them.
-use crate::arguments::same_shape;
-use crate::console::Context;
-use crate::failure::{Exit, Failure};
+use crate::arguments::{pixel_um, same_shape};
+use crate::console::{Bar, Context};
+use crate::failure::Failure;
 use crate::text::count;
+use clap::Args;
 use ndarray::{Array2, Array3, ArrayView3, Axis};
+use serde_json::json;
 use std::ffi::OsString;
+use std::mem::take;
 use std::path::{Path, PathBuf};
-use tactile_files::io::{FileError, FrameReader, Grey};
+use tactile_files::io::{FileError, FrameReader, Grey, read_grey_image};
 use tactile_imaging::pipeline::FrameSource;
 
 /// Frames per second where neither stream nor argument states them: those of the paper's camera.
-pub const DEFAULT_RATE_HZ: f64 = 80.0;
+pub(crate) const DEFAULT_RATE_HZ: f64 = 80.0;
 
 /// The pixels of a frame, grey or in colours.
-pub trait Pixels: Default {
+pub(crate) trait Pixels: Default {
     /// Reads the next frame in place of this one, and returns its time in seconds.
     fn read_next(&mut self, reader: &mut FrameReader) -> Result<Option<f64>, FileError>;
 
@@ -52,115 +55,210 @@ impl Pixels for Array3<u8> {
     }
 }
 
+/// Pressed frames and the frame without contact.
+#[derive(Args)]
+pub(crate) struct SensorFrames {
+    /// Pressed frames: images (PNG, PGM, JPEG, TIFF), videos (YUV4MPEG2, AVI of JPEG), arrays (NPY,
+    /// NPZ), `-` for a pipe of any of them.
+    #[arg(required = true)]
+    pub frames: Vec<PathBuf>,
+    /// Frame of the sensor without contact.
+    #[arg(long, value_name = "IMAGE")]
+    pub reference: PathBuf,
+    /// Size of a pixel on the sensor's surface in micrometres, or its width and height.
+    #[arg(long, value_name = "X[,Y]", value_parser = pixel_um, allow_negative_numbers = true)]
+    pixel_um: [f64; 2],
+    /// Bits of the camera, for images of 16 bits whose file does not say.
+    #[arg(long, value_parser = clap::value_parser!(u8).range(8..=16))]
+    bits: Option<u8>,
+}
+
+impl SensorFrames {
+    /// Reference, a table and the frames: the files that are read.
+    pub(crate) fn files<'a>(&'a self, table: &'a Path) -> Vec<&'a Path> {
+        let frames = self.frames.iter().map(PathBuf::as_path);
+        frames.chain([self.reference.as_path(), table]).collect()
+    }
+
+    pub(crate) fn pixel_m(&self) -> [f64; 2] {
+        self.pixel_um.map(|um| um * 1e-6)
+    }
+
+    /// The frame without contact, in eight bits.
+    pub(crate) fn read_reference(&self, grey: Grey) -> Result<Array2<u8>, Failure> {
+        Ok(read_grey_image(&self.reference, grey, self.bits)?.to_u8())
+    }
+
+    /// How the pressed frames are read.
+    pub(crate) fn reading(&self, grey: Grey, reference: &Array2<u8>) -> Reading<'_> {
+        Reading {
+            grey,
+            bits: self.bits,
+            reference: &self.reference,
+            size: reference.dim(),
+            passes_over: false,
+        }
+    }
+}
+
 /// How frames are read: the colours' grey, the camera's bits and the reference they have to fit.
 #[derive(Clone, Copy)]
-pub struct Reading<'a> {
+pub(crate) struct Reading<'a> {
     pub grey: Grey,
     pub bits: Option<u8>,
     pub reference: &'a Path,
     /// Rows and columns of the reference.
     pub size: (usize, usize),
+    /// A file that cannot be read is passed over with a caution. Else it ends the call.
+    pub passes_over: bool,
 }
 
 impl Reading<'_> {
-    pub fn open(&self, path: &Path) -> Result<FrameReader, Failure> {
+    fn open(&self, path: &Path) -> Result<FrameReader, Failure> {
         let reader = FrameReader::open(path, DEFAULT_RATE_HZ)?;
         Ok(reader.with_grey(self.grey).with_bits(self.bits))
     }
 
-    /// Refuses a frame of another size than the reference.
-    pub fn fits(&self, path: &Path, frame: &impl Pixels) -> Result<(), Failure> {
-        same_shape((path, frame.size()), (self.reference, self.size))
+    /// Reads the next frame and refuses one of another size than the reference. False at the end.
+    fn next<P: Pixels>(
+        &self,
+        source: &mut FrameReader,
+        path: &Path,
+        frame: &mut P,
+    ) -> Result<bool, Failure> {
+        if frame.read_next(source)?.is_none() {
+            return Ok(false);
+        }
+        same_shape((path, frame.size()), (self.reference, self.size))?;
+        Ok(true)
     }
 
     /// Finds a file that cannot be read before the first one is measured. A pipe is read once.
-    pub fn check(&self, paths: &[PathBuf]) -> Result<(), Failure> {
+    pub(crate) fn check(&self, paths: &[PathBuf]) -> Result<(), Failure> {
         let files = paths.iter().filter(|path| *path != Path::new("-"));
         let mut frame = Array2::zeros((0, 0));
         for path in files {
-            self.open(path)?.next_frame(&mut frame)?;
-            self.fits(path, &frame)?;
+            self.next(&mut self.open(path)?, path, &mut frame)?;
         }
         Ok(())
     }
 
-    /// The frames of these files one after the other, each with its name. The failure of a stream
-    /// that breaks off after its first frame is a partial answer, that of any other file an input
-    /// that cannot be used.
-    pub fn frames<P: Pixels>(
-        &self,
-        paths: &[PathBuf],
-    ) -> impl Iterator<Item = Result<NamedFrame<P>, Failure>> {
-        paths.iter().flat_map(move |path| {
-            let (mut source, mut number) = (Some(self.open(path)), 0);
-            std::iter::from_fn(move || {
-                let mut frame = P::default();
-                let read = source.take()?.and_then(|mut reader| {
-                    if frame.read_next(&mut reader)?.is_none() {
-                        return match passed_over(path, &reader) {
-                            Some(sentence) => Err(Failure::no_answer(sentence)),
-                            None => Ok(None),
-                        };
-                    }
-                    self.fits(path, &frame)?;
-                    Ok(Some(reader))
-                });
-                match read {
-                    Ok(reader) => {
-                        source = Some(Ok(reader?));
-                        number += 1;
-                        Some(Ok(NamedFrame::new(path, number, frame)))
-                    }
-                    Err(failure) if number > 0 => Some(Err(Failure::no_answer(failure))),
-                    Err(failure) => Some(Err(failure)),
-                }
-            })
-        })
-    }
-
-    /// All frames of these files. A stream that breaks off leaves those before, and makes the
-    /// answer a partial one.
-    pub fn all<P: Pixels>(
+    /// Gives the frames of these files one after the other to `work`, in the memory of one frame,
+    /// until Ctrl-C. A stream that breaks off is a caution, and the next file follows. Returns how
+    /// many files and frames could not be read.
+    pub(crate) fn each<P: Pixels>(
         &self,
         paths: &[PathBuf],
         context: &mut Context,
-    ) -> Result<(Vec<NamedFrame<P>>, Exit), Failure> {
-        let (mut frames, mut exit) = (Vec::new(), Exit::Complete);
-        for frame in self.frames(paths) {
-            match frame {
-                Ok(frame) => frames.push(frame),
-                Err(failure) if failure.exit == Exit::Partial => {
-                    context.caution(failure);
-                    exit = Exit::Partial;
-                }
-                Err(failure) => return Err(failure),
-            }
-            let job = format!("a stream of {} frames or more", frames.len());
-            let bytes = frames.len() as f64 * (self.size.0 * self.size.1) as f64;
-            context.allow(bytes, &job, "give fewer or smaller frames")?;
+        mut work: impl FnMut(Arrived<'_, P>, &mut Context) -> Result<(), Failure>,
+    ) -> Result<usize, Failure> {
+        let mut bar = Bar::of(paths.len(), "measuring");
+        let (mut pixels, mut unreadable) = (P::default(), 0);
+        context.interrupt.polled(true);
+        for (file, path) in paths.iter().enumerate() {
             if context.interrupt.requested() {
                 break;
             }
+            let mut number = 0;
+            let mut read = |source: &mut FrameReader| -> Result<Result<(), Failure>, Failure> {
+                while !context.interrupt.requested() {
+                    match self.next(source, path, &mut pixels) {
+                        Ok(true) => number += 1,
+                        ended => return Ok(ended.map(|_| ())),
+                    }
+                    let frame = Arrived {
+                        path,
+                        file,
+                        number,
+                        place: source.frames() as usize,
+                        rate_hz: source.frame_rate_hz(),
+                        pixels: &mut pixels,
+                    };
+                    work(frame, context)?;
+                }
+                Ok(Ok(()))
+            };
+            let ended = match self.open(path) {
+                Ok(mut source) => {
+                    let ended = read(&mut source)?;
+                    if ended.is_ok() {
+                        unreadable += passed_over(path, &source, context);
+                    }
+                    ended
+                }
+                Err(failure) => Err(failure),
+            };
+            if let Err(failure) = ended {
+                if number == 0 && !self.passes_over {
+                    return Err(failure);
+                }
+                unreadable += 1;
+                context.caution(failure);
+            }
+            bar.done(file + 1);
         }
-        Ok((frames, exit))
+        context.interrupt.polled(false);
+        Ok(unreadable)
+    }
+
+    /// All frames of these files, and how many files and frames could not be read.
+    pub(crate) fn all<P: Pixels>(
+        &self,
+        paths: &[PathBuf],
+        context: &mut Context,
+    ) -> Result<(Vec<NamedFrame<P>>, usize), Failure> {
+        let mut frames = Vec::new();
+        let unreadable = self.each(paths, context, |frame, context| {
+            frames.push(frame.named());
+            let job = format!("a stream of {} frames or more", frames.len());
+            let bytes = frames.len() as f64 * (self.size.0 * self.size.1) as f64;
+            context.allow(bytes, &job, "give fewer or smaller frames")
+        })?;
+        Ok((frames, unreadable))
     }
 }
 
-/// A sentence on the damaged frames of a stream that were passed over. `None` without any.
-pub fn passed_over(path: &Path, reader: &FrameReader) -> Option<String> {
-    let (_, damaged, sentences) = reader.passed_over();
-    let [first, ..] = sentences else {
-        return None;
-    };
-    let frames = count(damaged as usize, "damaged frame");
-    Some(format!(
-        "{}: {frames} passed over, the first {first}",
-        path.display()
-    ))
+/// Cautions on the damaged frames of a stream and on those that its recorder dropped. Returns the
+/// number of damaged ones.
+fn passed_over(path: &Path, source: &FrameReader, context: &mut Context) -> usize {
+    let (dropped, damaged, sentences) = source.passed_over();
+    let path = path.display();
+    if let [first, ..] = sentences {
+        let frames = count(damaged as usize, "damaged frame");
+        let sentence = format!("{path}: {frames} passed over, the first {first}");
+        context.warn("frames_damaged", json!({ "frames": damaged }), sentence);
+    }
+    if dropped > 0 {
+        let frames = count(dropped as usize, "frame");
+        let sentence = format!("{path}: the recorder dropped {frames}, whose times are kept");
+        context.warn("frames_dropped", json!({ "frames": dropped }), sentence);
+    }
+    damaged as usize
+}
+
+/// A frame as it comes.
+pub(crate) struct Arrived<'a, P> {
+    pub path: &'a Path,
+    /// The index of its file.
+    pub file: usize,
+    /// Among the frames that were read from its file, from 1.
+    pub number: usize,
+    /// Among all frames of its file, those that were dropped or damaged too, from 1.
+    pub place: usize,
+    /// Frames per second that its file states.
+    pub rate_hz: Option<f64>,
+    pub pixels: &'a mut P,
+}
+
+impl<P: Default> Arrived<'_, P> {
+    /// Takes the frame's pixels.
+    pub(crate) fn named(self) -> NamedFrame<P> {
+        NamedFrame::new(self.path, self.number, take(self.pixels))
+    }
 }
 
 /// A frame with its name.
-pub struct NamedFrame<P = Array2<u8>> {
+pub(crate) struct NamedFrame<P = Array2<u8>> {
     pub name: String,
     /// What the files of its results begin with.
     pub stem: OsString,
@@ -184,7 +282,7 @@ impl<P> NamedFrame<P> {
     }
 
     /// The name of a result.
-    pub fn file(&self, suffix: &str) -> OsString {
+    pub(crate) fn file(&self, suffix: &str) -> OsString {
         let mut name = self.stem.clone();
         name.push(suffix);
         name

@@ -1,6 +1,5 @@
 //! Where a lump could be without being found.
 use crate::console::Context;
-use crate::inclusion::reported;
 use crate::plot::{Colour, Panel, circle};
 use serde::Serialize;
 use tactile_files::scene::LoadedInclusion;
@@ -15,7 +14,7 @@ const SHOWN_DEPTH: usize = 1;
 
 /// The largest balls that searches miss, on a grid of places and depths.
 #[derive(Serialize)]
-pub struct Hidden {
+pub(crate) struct Hidden {
     /// Modulus of the ball over the tissue's.
     contrast: f64,
     positions_m: Vec<[f64; 2]>,
@@ -33,7 +32,7 @@ pub struct Hidden {
 
 impl Hidden {
     /// With its progress, which Ctrl-C ends.
-    pub fn new(
+    pub(crate) fn new(
         search: &InclusionSearch,
         loaded: &LoadedInclusion,
         block: &TissueBlock,
@@ -54,7 +53,7 @@ impl Hidden {
             .collect();
         // Down to the radius of the searched part of a face.
         let depths_m: Vec<f64> = (1..=6).map(|k| f64::from(k) * reach_m / 6.0).collect();
-        let diameters_m = reported(context, "what could hide", |report| {
+        let diameters_m = context.reported("what could hide", |report| {
             search.detection_limits(&loaded.scan, contrast, &positions_m, &depths_m, report)
         })?;
         // A press is solved as if it were in the middle of the block: a block's height away from
@@ -82,7 +81,7 @@ impl Hidden {
     }
 
     /// Prints the range over all places that are searched, depth by depth.
-    pub fn print(&self, context: &mut Context) {
+    pub(crate) fn print(&self, context: &mut Context) {
         context.line(format_args!(
             "could hide: a ball of {} times the tissue's modulus",
             self.contrast
@@ -112,7 +111,7 @@ impl Hidden {
     }
 
     /// From above at one depth, and in section.
-    pub fn panels(&self) -> [Panel; 2] {
+    pub(crate) fn panels(&self) -> [Panel; 2] {
         let label = "hidden up to (mm)";
         let title = format!(
             "Could hide, top {:.1} mm deep",

@@ -9,7 +9,6 @@ use clap::Args;
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 use rand_distr::StandardNormal;
 use serde_json::json;
-use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use tactile_files::scene::{InclusionScene, LoadedInclusion};
 use tactile_imaging::elasticity::ElasticityError;
@@ -18,7 +17,7 @@ use tactile_imaging::fem::{
 };
 use tactile_imaging::inclusion::{
     AssumedInclusion, Estimated, Identifiable, Inclusion, InclusionEstimate, InclusionSearch,
-    PressureProfile, SearchProgress, SearchVerdict, TissueBlock, asymmetry_warnings,
+    PressureProfile, SearchVerdict, TissueBlock, asymmetry_warnings,
 };
 use tactile_imaging::pipeline::{interval_text, with_error};
 
@@ -57,7 +56,7 @@ The scene file:
   [waveguide]
   radius_m; layers = [{ thickness_m, youngs_modulus_pa, poisson_ratio }], from the block's side to \
                         the glass")]
-pub struct InclusionArguments {
+pub(crate) struct InclusionArguments {
     /// Scene file.
     #[arg(value_name = "SCENE.toml")]
     scene: Option<PathBuf>,
@@ -225,7 +224,7 @@ fn simulated_block() -> Result<(TissueBlock, Guide), ElasticityError> {
     Ok((specimen, Guide::new(layers?, 16e-3)?))
 }
 
-pub fn run(arguments: &InclusionArguments, context: &mut Context) -> Result<Exit, Failure> {
+pub(crate) fn run(arguments: &InclusionArguments, context: &mut Context) -> Result<Exit, Failure> {
     if arguments.design && context.outputs.folder().is_some() {
         return Err(Failure::input(
             "--out has no use with --design, which writes no files",
@@ -303,28 +302,10 @@ fn found(
     scan: &Scan,
     context: &Context,
 ) -> Result<InclusionEstimate, ElasticityError> {
-    reported(context, "searching", |report| match &scan.loaded {
+    context.reported("searching", |report| match &scan.loaded {
         Some(loaded) => loaded.search(search, report),
         None => search.search_with_progress(&scan.radii_m, &scan.profiles, report),
     })
-}
-
-/// Runs a search with its progress, which Ctrl-C ends.
-pub fn reported<T>(
-    context: &Context,
-    name: &'static str,
-    search: impl FnOnce(&mut dyn FnMut(SearchProgress) -> ControlFlow<()>) -> T,
-) -> T {
-    let mut progress: Option<Bar> = None;
-    let interrupt = &context.interrupt;
-    interrupt.polled(true);
-    let found = search(&mut |now| {
-        let bar = progress.get_or_insert_with(|| Bar::of(now.expected, name));
-        bar.done(now.done);
-        interrupt.flow()
-    });
-    interrupt.polled(false);
-    found
 }
 
 /// Prints the errors that scans of this block would leave, were the assumed lump in it.

@@ -5,6 +5,7 @@
 //! cargo run --release -p tactile-cli -- measure
 //! ```
 #![forbid(unsafe_code)]
+#![warn(unreachable_pub)]
 
 mod arguments;
 mod calibrate;
@@ -28,6 +29,7 @@ mod record;
 mod relief;
 pub mod report;
 mod serve;
+mod simulation;
 mod strain;
 mod stream;
 mod surfaces;

@@ -16,7 +16,7 @@ use tactile_imaging::optics::{Dispersion, Geometry, Led, OpticsError, acceptance
 /// object's index, and how fast the answer settles with the number of rays.
 #[derive(Args)]
 #[command(after_help = "Example:\n  tactile light --rays 2000 --out target/light")]
-pub struct LightArguments {
+pub(crate) struct LightArguments {
     /// Rays for each point of a curve.
     #[arg(long, default_value_t = 8000,
           value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
@@ -28,7 +28,7 @@ const CENTRE_M: [f64; 2] = [15e-3, 0.0];
 /// Half width of the dimple.
 const HALF_WIDTH_M: f64 = 5e-3;
 
-pub fn run(arguments: &LightArguments, context: &mut Context) -> Result<Exit, Failure> {
+pub(crate) fn run(arguments: &LightArguments, context: &mut Context) -> Result<Exit, Failure> {
     context.outputs.plan(&["light.svg"], &[""; 0])?;
     let page = traced(arguments, context).map_err(Failure::no_answer)?;
     if let Some(page) = page {

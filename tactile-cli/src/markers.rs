@@ -28,7 +28,7 @@ Examples:
   tactile markers --reference examples/data/markers_reference.png examples/data/markers_frame.png \
                         --pixel-um 100 --shear-modulus-kpa 40 --thickness-mm 4 --out \
                         target/markers")]
-pub struct MarkersArguments {
+pub(crate) struct MarkersArguments {
     /// Frames (PNG, PGM, PPM or JPEG).
     #[arg(required = true)]
     frames: Vec<PathBuf>,
@@ -46,7 +46,7 @@ pub struct MarkersArguments {
     thickness_mm: Option<f64>,
 }
 
-pub fn run(arguments: &MarkersArguments, context: &mut Context) -> Result<Exit, Failure> {
+pub(crate) fn run(arguments: &MarkersArguments, context: &mut Context) -> Result<Exit, Failure> {
     let MarkersArguments {
         frames, reference, ..
     } = arguments;

@@ -31,7 +31,7 @@ use tactile_imaging::matching::{
     after_help = "Examples:\n  tactile match examples/data/cases.txt --out target/match\n  \
                         tactile match examples/data/before.csv examples/data/after.csv"
 )]
-pub struct MatchArguments {
+pub(crate) struct MatchArguments {
     /// Case files, or two tables of points.
     #[arg(required = true)]
     cases: Vec<PathBuf>,
@@ -48,7 +48,7 @@ pub struct MatchArguments {
 
 /// The prior knowledge of the sets.
 #[derive(Args, Clone, Copy)]
-pub struct Expectations {
+pub(crate) struct Expectations {
     /// How far the target may be turned against the model.
     #[arg(long, value_enum, default_value_t = Turn::Limited)]
     rotation: Turn,
@@ -108,7 +108,7 @@ enum Method {
 
 impl Expectations {
     /// The default matcher with these.
-    pub fn matcher(self) -> AnnealedSoftassign {
+    pub(crate) fn matcher(self) -> AnnealedSoftassign {
         let rotation = match self.rotation {
             Turn::Limited => Rotation::Limited,
             Turn::Any => Rotation::Any,
@@ -155,7 +155,12 @@ impl Method {
 }
 
 /// Refuses sets whose table of candidates does not fit into memory.
-pub fn allow(context: &Context, model: usize, target: usize, remedy: &str) -> Result<(), Failure> {
+pub(crate) fn allow(
+    context: &Context,
+    model: usize,
+    target: usize,
+    remedy: &str,
+) -> Result<(), Failure> {
     let (model_points, targets) = (model as f64, target as f64);
     // The scores of all candidates take 4.5 bytes for every pair of a model and a target point.
     // Sets of four thousand points and more are matched coarse to fine, where 3 to 8 kilobytes a
@@ -169,7 +174,7 @@ pub fn allow(context: &Context, model: usize, target: usize, remedy: &str) -> Re
     context.allow(bytes, &job, remedy)
 }
 
-pub fn run(arguments: &MatchArguments, context: &mut Context) -> Result<Exit, Failure> {
+pub(crate) fn run(arguments: &MatchArguments, context: &mut Context) -> Result<Exit, Failure> {
     let Expectations {
         rotation,
         outliers,
@@ -182,8 +187,8 @@ pub fn run(arguments: &MatchArguments, context: &mut Context) -> Result<Exit, Fa
         || largest_motion.is_some();
     if arguments.method != Method::Softassign && expected {
         return Err(Failure::input(
-            "--rotation, --outliers, --transformation and --largest-motion apply to the method softassign alone: leave \
-             out --method or them",
+            "--rotation, --outliers, --transformation and --largest-motion apply to the method \
+             softassign alone: leave out --method or them",
         ));
     }
     let name = |path: &PathBuf| path.file_name().unwrap_or_default().to_owned();

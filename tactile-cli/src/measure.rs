@@ -1,12 +1,13 @@
 //! `tactile measure`: everything, of a simulated press or of a user's own frames.
-use crate::arguments::{Repetition, force_n, length_mm, modulus_kpa};
+use crate::arguments::{Repetition, force_n};
 use crate::console::{Bar, Context};
 use crate::failure::{Exit, Failure};
 use crate::frames::{NamedFrame, Reading};
 use crate::photometric;
 use crate::plot::{PlotError, known_heights_mm, press_pages, summary_lines};
-use crate::text::{four_digits, in_unit};
-use clap::{Args, ValueEnum};
+use crate::simulation::{Physics, Simulation};
+use crate::text::in_unit;
+use clap::Args;
 use serde::Serialize;
 use serde_json::{Value, json};
 use std::path::PathBuf;
@@ -16,10 +17,7 @@ use tactile_files::scene::{Scene, SceneData, SceneFrame};
 use tactile_files::sensor::PhotometricPresses;
 use tactile_imaging::Pipeline;
 use tactile_imaging::pipeline::{ContactReading, Measurement, PipelineError, Press, Stage};
-use tactile_simulate::{
-    CalibrationRun, Camera, ContactModel, Elastic, ElasticSphere, PressLoad, PressOptions,
-    PressSimulation, PressTruth, SimulateError, Trial,
-};
+use tactile_simulate::{PressLoad, PressOptions, PressSimulation, PressTruth, Trial};
 
 /// Measure the Young's modulus of an object from frames at two or more loads
 ///
@@ -60,7 +58,7 @@ SCENE.toml (paths are relative to it; PNG, PGM, JPEG or TIFF; colour becomes gre
   [waveguide]                            # from the object's side to the glass
   layers = [{ refractive_index = 1.38, thickness_m = 2e-3, youngs_modulus_pa = 1.36e5, \
                         poisson_ratio = 0.5 }]")]
-pub struct MeasureArguments {
+pub(crate) struct MeasureArguments {
     /// Scene file with your own frames. See below. Without it a press is simulated.
     #[arg(value_name = "SCENE.toml")]
     scene: Option<PathBuf>,
@@ -76,128 +74,10 @@ pub struct MeasureArguments {
     points: u32,
     #[command(flatten)]
     simulation: Simulation,
-}
-
-/// The press that is simulated where no scene is given.
-#[derive(Args)]
-struct Simulation {
-    /// Simulation: the ball's material.
-    #[arg(long, value_enum, default_value_t = Polymer::Cl2000x, conflicts_with = "scene")]
-    polymer: Polymer,
-    /// Simulation: the ball's Young's modulus in kPa, instead of a polymer's.
-    #[arg(long, value_name = "KPA", value_parser = modulus_kpa,
-          conflicts_with_all = ["scene", "polymer"])]
-    modulus_kpa: Option<f64>,
-    /// Simulation: the ball's radius in mm.
-    #[arg(long, value_name = "MM", default_value_t = 3.0, value_parser = length_mm,
-          conflicts_with = "scene")]
-    radius_mm: f64,
     /// Simulation: the loads in newtons.
     #[arg(long, value_name = "N,N,...", value_delimiter = ',', default_values_t = [0.7, 1.2],
           value_parser = force_n, conflicts_with = "scene")]
     forces: Vec<f64>,
-    /// Simulation: where the contacts come from. Finite elements are there for the two polymers, 3
-    /// mm, up to 1.3 N.
-    #[arg(long, value_enum, default_value_t = Physics::FiniteElements, conflicts_with = "scene")]
-    physics: Physics,
-    /// Simulation: seed of the camera's noise.
-    #[arg(
-        long,
-        default_value_t = 1,
-        allow_negative_numbers = true,
-        conflicts_with = "scene"
-    )]
-    seed: u64,
-    /// Simulation: no noise, blur, vignetting or background.
-    #[arg(long, conflicts_with = "scene")]
-    ideal_camera: bool,
-}
-
-/// The law of the simulated contacts.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum Physics {
-    /// Finite elements at finite strain, on the layers. Read by the default estimator.
-    FiniteElements,
-    /// Hertz with the layers in series. Read by the same law.
-    Hertz,
-}
-
-/// The paper's two polymers.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum Polymer {
-    /// Versaflex CL2000X, 103 kPa.
-    Cl2000x,
-    /// Versaflex CL2003X, 62 kPa.
-    Cl2003x,
-}
-
-impl Simulation {
-    fn options(&self) -> PressOptions {
-        let polymer = match self.polymer {
-            Polymer::Cl2000x => Elastic::CL2000X,
-            Polymer::Cl2003x => Elastic::CL2003X,
-        };
-        let own_pa = self.modulus_kpa.map(|kpa| kpa * 1e3);
-        let material = Elastic {
-            youngs_modulus_pa: own_pa.unwrap_or(polymer.youngs_modulus_pa),
-            ..polymer
-        };
-        let camera = Camera::default();
-        let mut options = PressOptions {
-            object: ElasticSphere {
-                radius_m: self.radius_mm * 1e-3,
-                material,
-            },
-            loads: self.forces.iter().map(|&f| PressLoad::normal(f)).collect(),
-            camera: if self.ideal_camera {
-                camera.ideal()
-            } else {
-                camera
-            },
-            seed: self.seed,
-            ..PressOptions::default()
-        };
-        if self.physics == Physics::FiniteElements {
-            options.law = ContactModel::FiniteElements;
-        }
-        options
-    }
-
-    fn run(&self) -> Result<Trial, Failure> {
-        let clock = Bar::clock(format!("simulating {} frames", self.forces.len()));
-        let trial = Trial::new(self.options(), &CalibrationRun::default());
-        drop(clock);
-        let trial = trial.map_err(|error| {
-            let hint = match self.physics {
-                Physics::FiniteElements => ", or try --physics hertz",
-                Physics::Hertz => "",
-            };
-            let error = match error {
-                SimulateError::CalibrationSaturates { .. } => {
-                    "the gain that suits so small --forces saturates the camera in the calibration \
-                     up to 2 N: give larger ones"
-                        .to_owned()
-                }
-                error => error.to_string(),
-            };
-            Failure::input(format!("the press cannot be simulated: {error}{hint}"))
-        })?;
-        // A contact that reaches beyond the corners leaves the camera nothing of the sensor to see.
-        let camera = trial.scene.options().camera;
-        let [rows, columns] = camera.shape.map(|pixels| pixels as f64);
-        let [width, height] = camera.pixel_size_m;
-        let corner_m = 0.5 * (columns * width).hypot(rows * height);
-        let contacts = trial.simulation.truth.iter().map(|truth| &truth.contact);
-        match contacts.max_by(|a, b| a.contact_radius_m.total_cmp(&b.contact_radius_m)) {
-            Some(largest) if largest.contact_radius_m > corner_m => Err(Failure::input(format!(
-                "at {} N the contact has a radius of {} mm and covers the whole frame: give \
-                 smaller --forces",
-                four_digits(largest.force_n),
-                four_digits(1e3 * largest.contact_radius_m),
-            ))),
-            _ => Ok(trial),
-        }
-    }
 }
 
 /// Frames with everything that their measurement needs.
@@ -211,7 +91,13 @@ enum Frames {
 impl Frames {
     fn open(arguments: &MeasureArguments, context: &mut Context) -> Result<Self, Failure> {
         let Some(path) = &arguments.scene else {
-            return Ok(Self::Simulated(Box::new(arguments.simulation.run()?)));
+            let loads = arguments.forces.iter().map(|&f| PressLoad::normal(f));
+            let options = arguments.simulation.options(Physics::FiniteElements);
+            let trial = arguments.simulation.trial(PressOptions {
+                loads: loads.collect(),
+                ..options
+            });
+            return Ok(Self::Simulated(Box::new(trial?)));
         };
         let mut scene = Scene::read(path).map_err(Failure::input)?;
         if !arguments.frames.is_empty() {
@@ -221,12 +107,14 @@ impl Frames {
                 bits: scene.bits,
                 reference: &scene.reference,
                 size: data.reference.dim(),
+                passes_over: false,
             };
-            let (frames, exit) = reading.all(&arguments.frames, context)?;
+            let (frames, unreadable) = reading.all(&arguments.frames, context)?;
             let named = |frame: &NamedFrame| SceneFrame::new(&frame.name);
             let named = frames.iter().map(named).collect();
             data.frames = frames.into_iter().map(|frame| frame.pixels).collect();
             scene.frames = named;
+            let exit = Exit::complete_if(unreadable == 0);
             return Ok(Self::Scene(Box::new((scene, data, exit))));
         }
         let frames = scene.frames.len();
@@ -330,7 +218,7 @@ struct Answer<'a> {
 /// The reading of a frame by the first stage, none without contact.
 type Contact = Result<Option<ContactReading>, PipelineError>;
 
-pub fn run(arguments: &MeasureArguments, context: &mut Context) -> Result<Exit, Failure> {
+pub(crate) fn run(arguments: &MeasureArguments, context: &mut Context) -> Result<Exit, Failure> {
     if let Some(sensor) = arguments
         .scene
         .as_deref()

@@ -3,7 +3,7 @@ use ndarray::Array2;
 
 /// A binary PLY of square pixels. Places and depths are in millimetres, x along columns, y along
 /// rows, and z the depth into the gel.
-pub fn ply(depth_m: &Array2<f64>, pixel_size_m: f64) -> Vec<u8> {
+pub(crate) fn ply(depth_m: &Array2<f64>, pixel_size_m: f64) -> Vec<u8> {
     let (rows, columns) = depth_m.dim();
     let faces = rows.saturating_sub(1) * columns.saturating_sub(1);
     let mut file = format!(

@@ -14,8 +14,11 @@ use tactile_files::io::{image_size, write_bytes};
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, ZipWriter};
 
+/// Extensions of videos and arrays, whose frames are read one by one.
+const STREAMED: [&str; 4] = ["y4m", "avi", "npy", "npz"];
+
 /// The folder of the results, if one is wanted, and the files for it.
-pub struct Outputs {
+pub(crate) struct Outputs {
     folder: Option<PathBuf>,
     limit_bytes: f64,
     planned: Vec<PathBuf>,
@@ -25,7 +28,7 @@ pub struct Outputs {
 }
 
 impl Outputs {
-    pub fn new(folder: Option<PathBuf>, limit_gb: f64) -> Self {
+    pub(crate) fn new(folder: Option<PathBuf>, limit_gb: f64) -> Self {
         Self {
             folder,
             limit_bytes: 1e9 * limit_gb,
@@ -36,14 +39,14 @@ impl Outputs {
     }
 
     /// The argument of `--out`.
-    pub fn folder(&self) -> Option<&Path> {
+    pub(crate) fn folder(&self) -> Option<&Path> {
         self.folder.as_deref()
     }
 
     /// Announces the names of the files to be written and the inputs. No result may replace an
     /// input, also none that a scene or calibration file names, no two may have one name, the
     /// folder must allow writing, and every input must fit into the memory that is allowed.
-    pub fn plan(
+    pub(crate) fn plan(
         &mut self,
         names: &[impl AsRef<OsStr>],
         inputs: &[impl AsRef<Path>],
@@ -63,7 +66,7 @@ impl Outputs {
 
     /// Refuses a job that needs more memory than is allowed. `job` names it and its size, `remedy`
     /// the way out.
-    pub fn allow(&self, bytes: f64, job: &str, remedy: &str) -> Result<(), Failure> {
+    pub(crate) fn allow(&self, bytes: f64, job: &str, remedy: &str) -> Result<(), Failure> {
         let size = |bytes: f64| match bytes {
             b if b >= 1e12 => format!("{:.1} TB", b * 1e-12),
             b if b >= 1e9 => format!("{:.1} GB", b * 1e-9),
@@ -94,8 +97,9 @@ impl Outputs {
                 self.allow(bytes, &job, "give smaller images")?;
             } else if let Ok(file) = path.metadata()
                 && file.is_file()
-                // Videos and arrays of frames are read frame by frame.
-                && path.extension().is_none_or(|name| !["y4m", "avi", "npy", "npz"].iter().any(|v| name == *v))
+                && path
+                    .extension()
+                    .is_none_or(|name| STREAMED.iter().all(|streamed| name != *streamed))
             {
                 // Text, and its numbers of eight bytes for one or two characters and a comma.
                 let bytes = 6.0 * file.len() as f64;
@@ -106,7 +110,7 @@ impl Outputs {
     }
 
     /// Whether pictures are wanted.
-    pub fn draws(&self) -> bool {
+    pub(crate) fn draws(&self) -> bool {
         self.folder.is_some() || self.report.is_some()
     }
 
@@ -127,7 +131,7 @@ impl Outputs {
     }
 
     /// Completes the page for people.
-    pub fn finish_report(&mut self) {
+    pub(crate) fn finish_report(&mut self) {
         if let Some(report) = self.report.take() {
             self.ready
                 .push((report.path.clone(), report.html().into_bytes()));
@@ -135,7 +139,7 @@ impl Outputs {
     }
 
     /// As [`plan`](Self::plan), where `--out` names a file in this folder.
-    pub fn plan_in(
+    pub(crate) fn plan_in(
         &mut self,
         folder: &Path,
         names: &[impl AsRef<OsStr>],
@@ -173,7 +177,7 @@ impl Outputs {
     }
 
     /// Refuses more inputs that one of the results would replace.
-    pub fn protect(&self, inputs: &[impl AsRef<Path>]) -> Result<(), Failure> {
+    pub(crate) fn protect(&self, inputs: &[impl AsRef<Path>]) -> Result<(), Failure> {
         for path in &self.planned {
             let mut inputs = inputs.iter().map(AsRef::as_ref);
             if let Some(input) = inputs.find(|input| same_file(input, path)) {
@@ -188,14 +192,14 @@ impl Outputs {
     }
 
     /// Adds a file, if files are wanted.
-    pub fn add(&mut self, name: impl AsRef<Path>, bytes: Vec<u8>) {
+    pub(crate) fn add(&mut self, name: impl AsRef<Path>, bytes: Vec<u8>) {
         if let Some(folder) = &self.folder {
             self.ready.push((folder.join(name), bytes));
         }
     }
 
     /// Adds a page of plots, if files are wanted.
-    pub fn page(
+    pub(crate) fn page(
         &mut self,
         name: impl AsRef<Path>,
         page: impl FnOnce() -> Page,
@@ -212,7 +216,7 @@ impl Outputs {
 
     /// Writes the files, each whole or not at all. Results of a run that was stopped are in part:
     /// they replace no earlier ones. Returns the paths of what was written, and of what was kept.
-    pub fn write(&mut self, stopped: bool) -> Result<[Vec<String>; 2], Failure> {
+    pub(crate) fn write(&mut self, stopped: bool) -> Result<[Vec<String>; 2], Failure> {
         let [mut written, mut kept] = [Vec::new(), Vec::new()];
         for (path, bytes) in self.ready.drain(..) {
             let name = path.display().to_string();
@@ -311,7 +315,7 @@ fn identity(_: &Metadata) -> Option<(u64, u64)> {
 }
 
 /// `STEM_suffix`, the name of a result for an input.
-pub fn beside(input: &Path, suffix: &str) -> OsString {
+pub(crate) fn beside(input: &Path, suffix: &str) -> OsString {
     let mut name = input.file_stem().unwrap_or_default().to_owned();
     name.push(suffix);
     name
@@ -319,29 +323,29 @@ pub fn beside(input: &Path, suffix: &str) -> OsString {
 
 /// CSV text: a header, and rows of numbers with the digits that give them back.
 #[derive(Default)]
-pub struct Csv {
+pub(crate) struct Csv {
     text: String,
 }
 
 impl Csv {
-    pub fn new(header: &str) -> Self {
+    pub(crate) fn new(header: &str) -> Self {
         let text = format!("{header}\n");
         Self { text }
     }
 
     /// A matrix without a header, a row a line.
-    pub fn of_grid(values: &Array2<f64>) -> Vec<u8> {
+    pub(crate) fn of_grid(values: &Array2<f64>) -> Vec<u8> {
         let mut csv = Self::default();
         values.rows().into_iter().for_each(|row| csv.row(row));
         csv.into_bytes()
     }
 
-    pub fn row(&mut self, values: impl IntoIterator<Item = impl Debug>) {
+    pub(crate) fn row(&mut self, values: impl IntoIterator<Item = impl Debug>) {
         self.cells(values.into_iter().map(Some));
     }
 
     /// A row in which unknown values are empty cells.
-    pub fn cells(&mut self, values: impl IntoIterator<Item = Option<impl Debug>>) {
+    pub(crate) fn cells(&mut self, values: impl IntoIterator<Item = Option<impl Debug>>) {
         let cell = |value: Option<_>| {
             let text = value.map_or(String::new(), |value| format!("{value:?}"));
             // A whole number is written as one.
@@ -352,24 +356,24 @@ impl Csv {
         self.text.push('\n');
     }
 
-    pub fn into_bytes(self) -> Vec<u8> {
+    pub(crate) fn into_bytes(self) -> Vec<u8> {
         self.text.into_bytes()
     }
 }
 
 /// Named arrays as `numpy.load` reads them.
-pub struct Npz {
+pub(crate) struct Npz {
     archive: ZipWriter<Cursor<Vec<u8>>>,
 }
 
 impl Npz {
-    pub fn new() -> Self {
+    pub(crate) fn new() -> Self {
         let archive = ZipWriter::new(Cursor::new(Vec::new()));
         Self { archive }
     }
 
     /// Adds an array in C order. `kind` is NumPy's name of its elements, `<f8` or `<i8`.
-    pub fn add(
+    pub(crate) fn add(
         &mut self,
         name: &str,
         kind: &str,
@@ -394,7 +398,7 @@ impl Npz {
         self.archive.write_all(&bytes).map_err(Failure::output)
     }
 
-    pub fn into_bytes(self) -> Result<Vec<u8>, Failure> {
+    pub(crate) fn into_bytes(self) -> Result<Vec<u8>, Failure> {
         let archive = self.archive.finish().map_err(Failure::output)?;
         Ok(archive.into_inner())
     }

@@ -41,7 +41,7 @@ Every part has a command of its own:
   modulus by the default stages      tactile measure
   a match of 105 to 105 points       tactile match examples/data/cases.txt
   light and angles                   tactile light")]
-pub struct PaperArguments {
+pub(crate) struct PaperArguments {
     /// Run the labelling over all candidates too. Without it, over the 12 likeliest of each point.
     #[arg(long)]
     dense: bool,
@@ -82,7 +82,7 @@ impl Experiment {
 
 type Found<T> = Result<T, Box<dyn Error>>;
 
-pub fn run(arguments: &PaperArguments, context: &mut Context) -> Result<Exit, Failure> {
+pub(crate) fn run(arguments: &PaperArguments, context: &mut Context) -> Result<Exit, Failure> {
     context.outputs.plan(&["paper.svg"], &[""; 0])?;
     let mut bar = Bar::of(6, "repeating the paper's experiments");
     let polymers = [("CL2000X", Elastic::CL2000X), ("CL2003X", Elastic::CL2003X)];

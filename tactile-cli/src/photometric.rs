@@ -20,7 +20,7 @@ use tactile_imaging::gel::{
 };
 
 /// An argument that a sensor file takes the place of. `filler` is parsed and not used.
-pub fn unless_sensor(arg: Arg, filler: &'static str) -> Arg {
+pub(crate) fn unless_sensor(arg: Arg, filler: &'static str) -> Arg {
     arg.required(false)
         .required_unless_present("sensor")
         .default_value_if("sensor", ArgPredicate::IsPresent, filler)
@@ -28,7 +28,11 @@ pub fn unless_sensor(arg: Arg, filler: &'static str) -> Arg {
 
 /// Calibrates from the presses that the file names. `sensor` is the name of the sensor file in the
 /// folder of the results. The frame without contact is written beside it.
-pub fn calibrate(path: &Path, sensor: &Path, context: &mut Context) -> Result<Exit, Failure> {
+pub(crate) fn calibrate(
+    path: &Path,
+    sensor: &Path,
+    context: &mut Context,
+) -> Result<Exit, Failure> {
     let presses = PhotometricPresses::read(path)?;
     let reference = reference_name(sensor, &presses.reference_path);
     if let Some(folder) = context.outputs.folder().map(Path::to_path_buf) {
@@ -139,17 +143,17 @@ const NO_GEL: &str = "the sensor file has no [gel]: give its calibration the gel
     and modulus, or a frame under a known weight";
 
 /// Why nothing is measured.
-pub const NO_FRAMES: &str =
+pub(crate) const NO_FRAMES: &str =
     "a sensor file names no frames: give images, a video or - for a pipe after it";
 
 /// A sensor with its law of forces, or why there is none.
-pub struct Reader {
+pub(crate) struct Reader {
     pub stereo: GelSensor,
     pub law: Result<GelForce, String>,
 }
 
 impl Reader {
-    pub fn open(sensor: &Path) -> Result<Self, Failure> {
+    pub(crate) fn open(sensor: &Path) -> Result<Self, Failure> {
         let (stereo, gel) = PhotometricSensor::read(sensor)?;
         let law = gel.ok_or_else(|| NO_GEL.to_owned());
         let law = law.and_then(|gel| GelForce::new(&gel, &stereo).map_err(|e| e.to_string()));
@@ -157,17 +161,18 @@ impl Reader {
     }
 
     /// How its frames are read.
-    pub fn reading<'a>(&self, sensor: &'a Path) -> Reading<'a> {
+    pub(crate) fn reading<'a>(&self, sensor: &'a Path) -> Reading<'a> {
         Reading {
             grey: Grey::default(),
             bits: None,
             reference: sensor,
             size: self.stereo.shape(),
+            passes_over: false,
         }
     }
 
     /// The force of all contacts of a frame, none without contact, or why it has none.
-    pub fn force(&self, reading: &GelFrame) -> Result<Option<Estimate>, String> {
+    pub(crate) fn force(&self, reading: &GelFrame) -> Result<Option<Estimate>, String> {
         let law = self.law.as_ref().map_err(String::clone)?;
         Ok(law.force(reading))
     }
@@ -182,7 +187,7 @@ impl Reader {
 }
 
 /// A force, null without contact, or an object with the reason why there is none.
-pub fn number_or_error(force: &Result<Option<Estimate>, String>) -> Value {
+pub(crate) fn number_or_error(force: &Result<Option<Estimate>, String>) -> Value {
     match force {
         Ok(force) => json!(force),
         Err(reason) => json!({ "error": reason }),
@@ -190,7 +195,11 @@ pub fn number_or_error(force: &Result<Option<Estimate>, String>) -> Value {
 }
 
 /// Reads depth, contact and force of frames with a sensor file, and gives the tables of `depth`.
-pub fn measure(sensor: &Path, frames: &[PathBuf], context: &mut Context) -> Result<Exit, Failure> {
+pub(crate) fn measure(
+    sensor: &Path,
+    frames: &[PathBuf],
+    context: &mut Context,
+) -> Result<Exit, Failure> {
     if frames.is_empty() {
         return Err(Failure::in_file(sensor, NO_FRAMES));
     }
@@ -210,7 +219,7 @@ const SUFFIXES: [&str; 7] = [
 
 /// Reads gradients, face and contacts of frames with a sensor file, and their forces where `forces`
 /// is set.
-pub fn depth(
+pub(crate) fn depth(
     sensor: &Path,
     frames: &[PathBuf],
     forces: bool,
@@ -220,7 +229,8 @@ pub fn depth(
     let stereo = &reader.stereo;
     let size = stereo.model().pixel_size_m;
     let source = reader.reading(sensor);
-    let (images, mut exit) = source.all::<Array3<u8>>(frames, context)?;
+    let (images, unreadable) = source.all::<Array3<u8>>(frames, context)?;
+    let mut exit = Exit::complete_if(unreadable == 0);
     let names = images
         .iter()
         .flat_map(|image| SUFFIXES.map(|suffix| image.file(suffix)));
@@ -288,7 +298,7 @@ pub fn depth(
 }
 
 /// The cautions of a frame.
-pub fn warn(reading: &GelFrame, name: &str, context: &mut Context) {
+pub(crate) fn warn(reading: &GelFrame, name: &str, context: &mut Context) {
     for doubt in &reading.doubts {
         context.warn(doubt.kind(), json!({ "frame": name }), doubt);
     }
@@ -333,7 +343,7 @@ fn print_contacts(
 
 /// What a frame's first contact is kept and printed by.
 #[derive(Clone, Copy, Serialize)]
-pub struct GelReading {
+pub(crate) struct GelReading {
     pub centroid: [f64; 2],
     pub area_m2: f64,
     pub area_error_m2: f64,
@@ -343,7 +353,7 @@ pub struct GelReading {
 }
 
 impl GelReading {
-    pub fn of(reading: &GelFrame) -> Option<Self> {
+    pub(crate) fn of(reading: &GelFrame) -> Option<Self> {
         reading.contacts.first().map(Self::of_contact)
     }
 

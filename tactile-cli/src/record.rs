@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 /// video of grey frames, or PPM images one after the other, for the colours of a video are coarser.
 ///
 /// Both grow frame by frame: a run that is killed leaves all frames but perhaps the last.
-pub struct FrameRecorder {
+pub(crate) struct FrameRecorder {
     path: PathBuf,
     video: BufWriter<File>,
     answers: File,
@@ -18,7 +18,7 @@ pub struct FrameRecorder {
 
 impl FrameRecorder {
     /// Makes both files. They replace none.
-    pub fn create(path: &Path) -> Result<Self, Failure> {
+    pub(crate) fn create(path: &Path) -> Result<Self, Failure> {
         let create = |path: &Path| {
             File::create_new(path).map_err(|error| {
                 Failure::input(format!("cannot record to {}: {error}", path.display()))
@@ -35,7 +35,7 @@ impl FrameRecorder {
     }
 
     /// Adds a frame of one or three channels, `[row, column, channel]`.
-    pub fn frame(&mut self, frame: ArrayView3<'_, u8>, rate_hz: f64) -> Result<(), Failure> {
+    pub(crate) fn frame(&mut self, frame: ArrayView3<'_, u8>, rate_hz: f64) -> Result<(), Failure> {
         self.written(|recorder| {
             let video = &mut recorder.video;
             let (rows, columns, channels) = frame.dim();
@@ -66,7 +66,7 @@ impl FrameRecorder {
     }
 
     /// Adds lines to the table of answers.
-    pub fn answers(&mut self, lines: &[u8]) -> Result<(), Failure> {
+    pub(crate) fn answers(&mut self, lines: &[u8]) -> Result<(), Failure> {
         self.written(|recorder| recorder.answers.write_all(lines))
     }
 

@@ -7,7 +7,7 @@ const POINTS: usize = 80;
 
 /// Heights on a grid, as `relief.js` draws them.
 #[derive(Serialize)]
-pub struct HeightGrid {
+pub(crate) struct HeightGrid {
     columns: usize,
     /// Size of a grid cell along x and y and of a step of height, in millimetres.
     steps_mm: [f64; 3],
@@ -20,7 +20,7 @@ pub struct HeightGrid {
 impl HeightGrid {
     /// The part of `heights` that is not NaN, thinned. Heights and pixels are in millimetres.
     /// `None` where there is no part, or a level one.
-    pub fn of(heights: ArrayView2<'_, f64>, pixel: [f64; 2]) -> Option<Self> {
+    pub(crate) fn of(heights: ArrayView2<'_, f64>, pixel: [f64; 2]) -> Option<Self> {
         let known = heights
             .indexed_iter()
             .filter(|(_, height)| height.is_finite());

@@ -66,7 +66,7 @@ pub(crate) struct Report {
 }
 
 impl Report {
-    pub fn new(path: PathBuf, call: &[OsString], question: String) -> Self {
+    pub(crate) fn new(path: PathBuf, call: &[OsString], question: String) -> Self {
         let words: Vec<String> = call
             .iter()
             .map(|word| quoted(&word.to_string_lossy()))
@@ -86,12 +86,12 @@ impl Report {
     }
 
     /// Adds what is printed too.
-    pub fn line(&mut self, text: &str) {
+    pub(crate) fn line(&mut self, text: &str) {
         self.printed.push(Printed::Line(text.to_owned()));
     }
 
     /// Adds a name and its value, which are printed too.
-    pub fn row(&mut self, name: &str, value: &str) {
+    pub(crate) fn row(&mut self, name: &str, value: &str) {
         if ["warning", "caution"].contains(&name) {
             self.caution(value, "");
         } else {
@@ -101,33 +101,33 @@ impl Report {
     }
 
     /// Adds a sentence to the answer at the top.
-    pub fn answer(&mut self, text: impl Into<String>) {
+    pub(crate) fn answer(&mut self, text: impl Into<String>) {
         self.answers.push(text.into());
     }
 
     /// Adds a caution and what to do about it, which may be empty.
-    pub fn caution(&mut self, text: impl Into<String>, remedy: &str) {
+    pub(crate) fn caution(&mut self, text: impl Into<String>, remedy: &str) {
         self.cautions.push([text.into(), remedy.into()]);
     }
 
     /// Adds a caution of the library.
-    pub fn flag(&mut self, flag: &Flag) {
+    pub(crate) fn flag(&mut self, flag: &Flag) {
         self.caution(flag.to_string(), remedy(flag));
     }
 
     /// Adds a table of names and values.
-    pub fn table(&mut self, title: &'static str, rows: Vec<[String; 2]>) {
+    pub(crate) fn table(&mut self, title: &'static str, rows: Vec<[String; 2]>) {
         self.tables.push((title, rows));
     }
 
     /// Adds a picture, SVG of this program.
-    pub fn picture(&mut self, svg: String) {
+    pub(crate) fn picture(&mut self, svg: String) {
         self.pictures.push(svg);
     }
 
     /// Adds heights that the mouse turns, NaN where there is no surface. Heights and pixels are in
     /// millimetres.
-    pub fn surface(&mut self, title: &str, heights: ArrayView2<'_, f64>, pixel: [f64; 2]) {
+    pub(crate) fn surface(&mut self, title: &str, heights: ArrayView2<'_, f64>, pixel: [f64; 2]) {
         let Some(relief) = HeightGrid::of(heights, pixel) else {
             return;
         };
@@ -141,7 +141,7 @@ impl Report {
     }
 
     /// Adds files that the answer depends on.
-    pub fn inputs(&mut self, files: impl IntoIterator<Item = PathBuf>) {
+    pub(crate) fn inputs(&mut self, files: impl IntoIterator<Item = PathBuf>) {
         for file in files {
             if !self.inputs.contains(&file) {
                 self.inputs.push(file);
@@ -150,7 +150,7 @@ impl Report {
     }
 
     /// Adds the answer of a measurement, its cautions and its error budget.
-    pub fn measurement(&mut self, measurement: &Measurement) {
+    pub(crate) fn measurement(&mut self, measurement: &Measurement) {
         match &measurement.youngs_modulus_pa {
             Ok(found) => {
                 let value = with_error(found.value, found.standard_error, 1e-3);
@@ -173,7 +173,7 @@ impl Report {
     }
 
     /// Adds what a scene states with and without an error.
-    pub fn assumptions(&mut self, scene: &Scene) {
+    pub(crate) fn assumptions(&mut self, scene: &Scene) {
         let stated = |value: f64, error: Option<f64>, scale: f64, unit: &str| match error {
             Some(error) if error > 0.0 => format!("{}{unit}", with_error(value, error, scale)),
             Some(_) => format!("{}{unit}, taken as exact", four_digits(scale * value)),
@@ -223,7 +223,7 @@ impl Report {
     }
 
     /// The page.
-    pub fn html(&self) -> String {
+    pub(crate) fn html(&self) -> String {
         let mut page = String::new();
         // Writing to a string cannot fail.
         let _ = self.write(&mut page);

@@ -73,7 +73,7 @@ impl Shared {
 
 /// A server of the page. It never holds up the measurement: viewers get the latest answer, and
 /// those between are dropped.
-pub struct LivePage {
+pub(crate) struct LivePage {
     shared: Arc<Shared>,
     /// When a picture and a surface were shown last.
     shown: [Option<Instant>; 2],
@@ -84,7 +84,7 @@ pub struct LivePage {
 impl LivePage {
     /// Listens on an address. One that other computers reach needs the token in the page's
     /// address.
-    pub fn serve(address: SocketAddr) -> Result<Self, Failure> {
+    pub(crate) fn serve(address: SocketAddr) -> Result<Self, Failure> {
         let refused = |error: Box<dyn Error + Send + Sync>| {
             Failure::input(format!("cannot serve on {address}: {error}"))
         };
@@ -123,7 +123,7 @@ impl LivePage {
 
     /// Shows the numbers of a frame of one or three channels, `[row, column, channel]`, and its
     /// picture and its surface where the last ones are old enough and somebody looks.
-    pub fn show(
+    pub(crate) fn show(
         &mut self,
         numbers: Value,
         frame: ArrayView3<'_, u8>,

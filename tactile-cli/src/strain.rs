@@ -1,4 +1,5 @@
 //! `tactile strain`: from two sets of points, before and after a deformation.
+use self::grid::{Known, StrainGrid, arrays};
 use crate::arguments::TableArguments;
 use crate::console::Context;
 use crate::failure::{Exit, Failure};
@@ -7,7 +8,7 @@ use crate::outputs::{Csv, Npz};
 use crate::plot::{Colour, Page, Panel};
 use crate::text::{count, digits, four_digits};
 use clap::{Args, ValueEnum};
-use nalgebra::{Matrix3, Point, SVector};
+use nalgebra::{Matrix3, Point};
 use serde_json::{Map, Value, json};
 use std::path::PathBuf;
 use tactile_files::io::{PointTable, read_displaced_points};
@@ -20,6 +21,7 @@ use tactile_imaging::matching::PointMatcher;
 use tactile_imaging::pipeline::with_error;
 use tactile_imaging::{StrainAt, StrainBetween, StrainBetweenOptions};
 
+mod grid;
 mod quantities;
 mod series;
 
@@ -56,7 +58,7 @@ Examples:
   tactile strain examples/data/before.csv examples/data/after.csv examples/data/before.csv \
       --out target/series
   tactile strain --paired examples/data/sources.csv examples/data/targets.csv")]
-pub struct StrainArguments {
+pub(crate) struct StrainArguments {
     /// Points of the frames in their order: before and after, or more. Or one table, with
     /// displacements or with a column of frames (TrackMate, trackpy).
     #[arg(required = true, num_args = 1.., value_name = "FRAMES")]
@@ -107,7 +109,7 @@ const FILES: [&str; 4] = ["pairs.csv", "strain.csv", "strain.npz", "strain.svg"]
 const GRID_FILES: [&str; 3] = ["grid.csv", "grid.vtk", "grid.npz"];
 const SERIES_FILES: [&str; 2] = ["tracks.csv", "series.csv"];
 
-pub fn run(arguments: &StrainArguments, context: &mut Context) -> Result<Exit, Failure> {
+pub(crate) fn run(arguments: &StrainArguments, context: &mut Context) -> Result<Exit, Failure> {
     let paths = &arguments.frames;
     if let Some(spacing) = arguments.grid.filter(|s| !(*s > 0.0 && s.is_finite())) {
         return Err(Failure::input(format!(
@@ -211,7 +213,7 @@ fn answer<const D: usize>(
     context.outputs.add(FILES[2], report.arrays(strain, &read)?);
     context.outputs.page(FILES[3], || report.page(strain))?;
     if let Some(spacing) = arguments.grid {
-        let grid = Grid::over(&report.before, spacing)?;
+        let grid = StrainGrid::over(&report.before, spacing)?;
         let (strain, points) = (strain.clone(), grid.points());
         let measure_of_grid = arguments.measure.strain();
         let job = format!("strain at {} points of the grid", points.len());
@@ -284,10 +286,7 @@ fn between<const D: usize>(
         after,
         matched,
         strain: found.unwrap_or_else(|| Err("stopped by Ctrl-C".to_owned())),
-        frames: None,
-        complete: true,
-        measure: arguments.measure.strain().name(),
-        unit,
+        ..StrainReport::new(unit, arguments)
     }))
 }
 
@@ -329,119 +328,8 @@ fn of_known_pairs<const D: usize>(
         after,
         matched,
         strain: found.unwrap_or_else(|| Err("stopped by Ctrl-C".to_owned())),
-        frames: None,
-        complete: true,
-        measure: arguments.measure.strain().name(),
-        unit,
+        ..StrainReport::new(unit, arguments)
     }))
-}
-
-/// Points on equal distances over a box, x fastest.
-struct Grid<const D: usize> {
-    origin: Point<f64, D>,
-    spacing: f64,
-    counts: [usize; D],
-}
-
-impl<const D: usize> Grid<D> {
-    fn over(points: &[Point<f64, D>], spacing: f64) -> Result<Self, Failure> {
-        let mut points = points.iter().filter(|p| p.iter().all(|x| x.is_finite()));
-        let start = points.next().copied().unwrap_or_else(Point::origin);
-        let (mut low, mut high) = (start, start);
-        for p in points {
-            (low, high) = (low.inf(p), high.sup(p));
-        }
-        let count = |a: usize| ((high[a] - low[a]) / spacing).floor() + 1.0;
-        // The files have some 300 bytes for a point.
-        if (0..D).map(count).product::<f64>() > 4e6 {
-            return Err(Failure::input(format!(
-                "--grid {spacing} gives more than four million points: give a larger spacing"
-            )));
-        }
-        Ok(Self {
-            origin: low,
-            spacing,
-            counts: std::array::from_fn(|a| count(a) as usize),
-        })
-    }
-
-    fn points(&self) -> Vec<Point<f64, D>> {
-        let place = |k: usize| {
-            let mut rest = k;
-            let mut place = self.origin;
-            for a in 0..D {
-                place[a] += self.spacing * (rest % self.counts[a]) as f64;
-                rest /= self.counts[a];
-            }
-            place
-        };
-        (0..self.counts.iter().product()).map(place).collect()
-    }
-
-    /// The legacy format of VTK, as text.
-    fn vtk(&self, found: &[Known<D>], read: &[Kinematics]) -> Vec<u8> {
-        let three = |v: &[f64]| {
-            let at = |a: usize| v.get(a).copied().unwrap_or(0.0);
-            format!("{:e} {:e} {:e}", at(0), at(1), at(2))
-        };
-        let counts: Vec<f64> = self.counts.iter().map(|&c| c as f64).collect();
-        let depth = if D == 2 { 1.0 } else { counts[D - 1] };
-        let mut text = format!(
-            "# vtk DataFile Version 3.0\ndisplacement and strain\nASCII\nDATASET \
-             STRUCTURED_POINTS\nDIMENSIONS {} {} {depth}\nORIGIN {}\nSPACING {}\nPOINT_DATA {}\n",
-            counts[0],
-            counts[1],
-            three(self.origin.coords.as_slice()),
-            three(&[self.spacing; 3]),
-            found.len()
-        );
-        text.push_str("VECTORS displacement double\n");
-        for (displacement, ..) in found {
-            text.push_str(&three(displacement.as_slice()));
-            text.push('\n');
-        }
-        let strains: Vec<_> = found.iter().map(|at| at.1).collect();
-        let errors: Vec<_> = found.iter().map(|at| at.2).collect();
-        for (name, tensors) in [("strain", strains), ("standard_error", errors)] {
-            text.push_str(&format!("TENSORS {name} double\n"));
-            for tensor in tensors {
-                // Symmetric: columns are rows.
-                for column in tensor.column_iter() {
-                    text.push_str(&three(&[column[0], column[1], column[2]]));
-                    text.push('\n');
-                }
-            }
-        }
-        quantities::vtk::<D>(&mut text, read);
-        text.into_bytes()
-    }
-}
-
-/// Displacement, strain and its standard error at a place.
-type Known<const D: usize> = (SVector<f64, D>, Matrix3<f64>, Matrix3<f64>);
-
-/// Completes arrays with places and what is known there, tensors of the plane or of space.
-fn arrays<const D: usize>(
-    mut npz: Npz,
-    shape: &[usize],
-    points: &[Point<f64, D>],
-    found: &[Known<D>],
-    read: &[Kinematics],
-) -> Result<Vec<u8>, Failure> {
-    let vector = |v: SVector<f64, D>| <[f64; D]>::from(v).map(f64::to_le_bytes);
-    let places = || (0..D).flat_map(|i| (0..D).map(move |j| (i, j)));
-    let tensor = |m: Matrix3<f64>| places().map(move |at| m[at].to_le_bytes());
-    let [vectors, tensors] = [&[D][..], &[D, D]].map(|axes| [shape, axes].concat());
-    let points = points.iter().flat_map(|point| vector(point.coords));
-    npz.add("points", "<f8", &vectors, points)?;
-    let displacements = found.iter().flat_map(|at| vector(at.0));
-    npz.add("displacement", "<f8", &vectors, displacements)?;
-    let strains = found.iter().flat_map(|at| tensor(at.1));
-    npz.add("strain", "<f8", &tensors, strains)?;
-    let errors = found.iter().flat_map(|at| tensor(at.2));
-    npz.add("standard_error", "<f8", &tensors, errors)?;
-    quantities::arrays::<D>(&mut npz, shape, read)?;
-    npz.into_bytes()
 }
 
 /// Name and indices of a component of the strain.
@@ -494,6 +382,19 @@ fn components_json<const D: usize>(found: &StrainBetween<D>) -> Map<String, Valu
 }
 
 impl<const D: usize> StrainReport<D> {
+    fn new(unit: &'static str, arguments: &StrainArguments) -> Self {
+        Self {
+            before: Vec::new(),
+            after: Vec::new(),
+            matched: Vec::new(),
+            strain: Err("no frame could be followed".to_owned()),
+            frames: None,
+            complete: true,
+            measure: arguments.measure.strain().name(),
+            unit,
+        }
+    }
+
     /// The pairs that the strain comes from, those of the matcher where there is no strain.
     fn rows(&self) -> &[(usize, usize)] {
         self.strain.as_ref().map_or(&self.matched, |s| &s.rows)
@@ -638,7 +539,7 @@ impl<const D: usize> StrainReport<D> {
     }
 
     /// Displacement, strain and its standard error on the grid.
-    fn grid_table(&self, grid: &Grid<D>, found: &[Known<D>], read: &[Kinematics]) -> Vec<u8> {
+    fn grid_table(&self, grid: &StrainGrid<D>, found: &[Known<D>], read: &[Kinematics]) -> Vec<u8> {
         let mut header = self.headings("", "");
         header.extend(self.headings("u_", ""));
         header.extend(strain_headings::<D>(""));

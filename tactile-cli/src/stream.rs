@@ -11,6 +11,7 @@ use crate::failure::{Exit, Failure};
 use crate::frames::{DEFAULT_RATE_HZ, Reading};
 use crate::plot::known_heights_mm;
 use crate::relief::HeightGrid;
+use crate::simulation::{Physics, Simulation};
 use clap::Args;
 use ndarray::Array2;
 use serde::Serialize;
@@ -26,7 +27,7 @@ use tactile_files::sensor::PhotometricPresses;
 use tactile_imaging::elasticity::modulus::ModulusEstimate;
 use tactile_imaging::force::Estimate;
 use tactile_imaging::pipeline::{Flag, FrameSource, PipelineError, Session, with_error};
-use tactile_simulate::{CalibrationRun, Camera, Gain, LoadCycle, PressLoad, PressOptions, Trial};
+use tactile_simulate::{LoadCycle, PressLoad, PressOptions, Trial};
 
 /// Measure frame after frame: force, contact and modulus live
 ///
@@ -55,7 +56,7 @@ A camera or a video, by a pipe (ffmpeg has names for the cameras of every system
 
 Frames on the pipe are YUV4MPEG2 of 8 to 16 bits, binary PGM and PPM one after the other, arrays of
 numpy.save, or an AVI of JPEG frames. `-` works in the same way in measure, force and depth.")]
-pub struct StreamArguments {
+pub(crate) struct StreamArguments {
     /// Scene file of the sensor and the object, whose recorded frames are measured.
     #[arg(value_name = "SCENE.toml")]
     scene: Option<PathBuf>,
@@ -89,11 +90,13 @@ pub struct StreamArguments {
     serve: Option<SocketAddr>,
     #[command(flatten)]
     simulation: Simulation,
+    #[command(flatten)]
+    series: Series,
 }
 
-/// The series that is simulated where no scene is given.
+/// The loads of the series that is simulated where no scene is given.
 #[derive(Args)]
-struct Simulation {
+struct Series {
     /// Simulation: seconds of one load and unload.
     #[arg(long, value_name = "S", default_value_t = 2.0, value_parser = positive,
           conflicts_with = "scene")]
@@ -111,7 +114,7 @@ struct Simulation {
     tolerance: f64,
 }
 
-pub fn run(arguments: &StreamArguments, context: &mut Context) -> Result<Exit, Failure> {
+pub(crate) fn run(arguments: &StreamArguments, context: &mut Context) -> Result<Exit, Failure> {
     let outputs = &mut context.outputs;
     outputs.plan(&["stream.csv"], arguments.scene.as_slice())?;
     match &arguments.scene {
@@ -328,7 +331,7 @@ fn finish(
     }
     context.value(&value);
     let mut exit = live.close(arguments.allowed_late, context);
-    let tolerance = arguments.simulation.tolerance;
+    let tolerance = arguments.series.tolerance;
     let failed = match &modulus {
         Err(reason) => Some(format!("there is no modulus: {reason}")),
         Ok(m) => {
@@ -386,6 +389,7 @@ fn recorded(
         bits: scene.bits,
         reference: &scene.reference,
         size: data.reference.dim(),
+        passes_over: true,
     };
     watch(&mut live, &frames, reading, arguments.rate, context)?;
     let unusable = live.counts.unusable;
@@ -398,30 +402,31 @@ const SIMULATED_FORCE_N: f64 = 1.5;
 
 /// Plays a simulated loading–unloading series at camera rate.
 fn simulated(arguments: &StreamArguments, context: &mut Context) -> Result<Exit, Failure> {
-    let simulation = &arguments.simulation;
+    let StreamArguments {
+        simulation, series, ..
+    } = arguments;
     let force_n = arguments.force.unwrap_or(SIMULATED_FORCE_N);
-    let factor = if simulation.full_size { 1 } else { 4 };
+    let factor = if series.full_size { 1 } else { 4 };
+    let options = simulation.options(Physics::Hertz);
     let options = PressOptions {
-        camera: Camera::default().coarser(factor),
+        camera: options.camera.coarser(factor),
         loads: vec![PressLoad::normal(force_n)],
-        gain: Gain::PeakGrey(200.0),
-        ..PressOptions::default()
+        ..options
     };
     let pixels = options.camera.shape.iter().product::<usize>() as f64;
     let rate_hz = arguments.rate.unwrap_or(DEFAULT_RATE_HZ);
-    let frames = rate_hz * simulation.period * f64::from(simulation.cycles);
+    let frames = rate_hz * series.period * f64::from(series.cycles);
     let job = format!("a stream of {frames:.0} frames");
     context.allow(
         frames * pixels,
         &job,
         "ask for fewer cycles or a lower rate",
     )?;
-    let trial = Trial::new(options, &CalibrationRun::default())
-        .map_err(|error| Failure::input(format!("the press cannot be simulated: {error}")))?;
+    let trial = simulation.trial(options)?;
     let cycle = LoadCycle {
         largest_force_n: force_n,
-        period_s: simulation.period,
-        cycles: simulation.cycles as usize,
+        period_s: series.period,
+        cycles: series.cycles as usize,
         frame_rate_hz: rate_hz,
         ..LoadCycle::default()
     };

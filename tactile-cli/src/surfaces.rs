@@ -43,7 +43,7 @@ Examples:
                         target/integrate
 Without --method: poisson, or least-squares where there is a mask, known heights or a slope that \
                         is NaN.")]
-pub struct IntegrateArguments {
+pub(crate) struct IntegrateArguments {
     /// Slopes along x.
     p: PathBuf,
     /// Slopes along y.
@@ -68,7 +68,10 @@ enum Integration {
     LeastSquares,
 }
 
-pub fn integrate(arguments: &IntegrateArguments, context: &mut Context) -> Result<Exit, Failure> {
+pub(crate) fn integrate(
+    arguments: &IntegrateArguments,
+    context: &mut Context,
+) -> Result<Exit, Failure> {
     let IntegrateArguments {
         p: path,
         q,
@@ -212,7 +215,7 @@ fn watch(workspace: &mut SurfaceWorkspace<f64>, context: &Context, job: &'static
 }
 
 /// Lowest and highest value in a unit of which one is `1 / scale`, in words.
-pub fn span(values: &Array2<f64>, scale: f64, unit: &str) -> String {
+pub(crate) fn span(values: &Array2<f64>, scale: f64, unit: &str) -> String {
     let finite = || values.iter().copied().filter(|v| v.is_finite());
     let pixels = finite().count();
     if pixels == 0 {

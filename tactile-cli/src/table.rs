@@ -20,7 +20,7 @@ use tactile_imaging::fem::ContactTableOptions;
     after_help = "Example:\n  tactile table examples/data/press/scene.toml --moduli 2 \
                   --largest-ratio 0.5 --out target/table"
 )]
-pub struct ContactTableArguments {
+pub(crate) struct ContactTableArguments {
     /// Scene file, or a file with its tables `object` and `waveguide`.
     scene: PathBuf,
     /// Smallest modulus of the ball, in kPa.
@@ -37,7 +37,10 @@ pub struct ContactTableArguments {
     largest_ratio: f64,
 }
 
-pub fn run(arguments: &ContactTableArguments, context: &mut Context) -> Result<Exit, Failure> {
+pub(crate) fn run(
+    arguments: &ContactTableArguments,
+    context: &mut Context,
+) -> Result<Exit, Failure> {
     let path = arguments.scene.as_path();
     context.outputs.plan(&["table.toml"], &[path])?;
     let [from, to] = [arguments.from_kpa, arguments.to_kpa].map(|kpa| 1e3 * kpa);

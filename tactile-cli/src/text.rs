@@ -7,22 +7,23 @@ use tactile_imaging::pipeline::with_error;
 ///
 /// Without this a file's name could clear the screen, forge a line of the answer, or make an SVG
 /// file unreadable.
-pub fn printable(text: &str) -> String {
+pub(crate) fn printable(text: &str) -> String {
     let hidden = |c: char| {
         c.is_control()
-            || matches!(c, '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
+            || matches!(c, '\u{200e}' | '\u{200f}')
+            || matches!(c, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
     };
     let seen = |c| if hidden(c) { '\u{fffd}' } else { c };
     text.chars().map(seen).collect()
 }
 
 /// Four significant digits, for numbers whose error is not known.
-pub fn four_digits(value: f64) -> String {
+pub(crate) fn four_digits(value: f64) -> String {
     digits(value, 4)
 }
 
 /// A number of significant digits, plain where the value is neither tiny nor huge.
-pub fn digits(value: f64, significant: usize) -> String {
+pub(crate) fn digits(value: f64, significant: usize) -> String {
     if value == 0.0 || !value.is_finite() {
         return format!("{value}");
     }
@@ -36,12 +37,12 @@ pub fn digits(value: f64, significant: usize) -> String {
 }
 
 /// A value with its standard error in a unit of which one is `1 / scale`.
-pub fn in_unit(estimate: Estimate, scale: f64) -> String {
+pub(crate) fn in_unit(estimate: Estimate, scale: f64) -> String {
     with_error(estimate.value, estimate.standard_error, scale)
 }
 
 /// `1 point`, `2 points`.
-pub fn count(n: usize, noun: &str) -> String {
+pub(crate) fn count(n: usize, noun: &str) -> String {
     format!("{n} {noun}{}", if n == 1 { "" } else { "s" })
 }
 

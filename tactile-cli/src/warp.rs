@@ -27,7 +27,7 @@ Examples:
                         --lambda gcv
   tactile warp examples/data/sources.csv examples/data/targets.csv examples/data/queries.csv \
                         --kernel r --out target/warp")]
-pub struct WarpArguments {
+pub(crate) struct WarpArguments {
     /// Where points are.
     sources: PathBuf,
     /// Where they go.
@@ -76,7 +76,7 @@ fn smoothing(text: &str) -> Result<Smoothing, String> {
 /// hardly change.
 const TOLERANCE: f64 = 1e-10;
 
-pub fn run(arguments: &WarpArguments, context: &mut Context) -> Result<Exit, Failure> {
+pub(crate) fn run(arguments: &WarpArguments, context: &mut Context) -> Result<Exit, Failure> {
     let inputs = [&arguments.sources, &arguments.targets, &arguments.queries];
     context.outputs.plan(&["warped.csv"], &inputs)?;
     let (mut tables, _) = arguments.table.read_points(&inputs, false, context)?;

@@ -1,4 +1,4 @@
-//! Quantiles and degrees of freedom.
+//! Quantiles, of distributions and of values, and degrees of freedom.
 
 #[cfg(feature = "intervals")]
 use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
@@ -34,6 +34,32 @@ pub fn quantile_95(degrees: Option<f64>) -> f64 {
         None if degrees.is_some() => f64::INFINITY,
         None => z,
     }
+}
+
+/// The value that exceeds a `share` of the values, ordered by [`f64::total_cmp`], in O(n). Without
+/// values it is 0. The values are left in another order.
+///
+/// ```
+/// use tactile_core::statistics::{median, quantile};
+/// let mut values = [3.0, 1.0, 2.0, 5.0, 4.0];
+/// assert_eq!((median(&mut values), quantile(&mut values, 0.9)), (3.0, 5.0));
+/// assert_eq!((median(&mut [1.0, 2.0]), median(&mut [])), (2.0, 0.0));
+/// ```
+#[must_use]
+pub fn quantile(values: &mut [f64], share: f64) -> f64 {
+    let Some(last) = values.len().checked_sub(1) else {
+        return 0.0;
+    };
+    let at = (share * values.len() as f64) as usize;
+    *values
+        .select_nth_unstable_by(at.min(last), f64::total_cmp)
+        .1
+}
+
+/// The middle of the values, the upper one of two. See [`quantile`].
+#[must_use]
+pub fn median(values: &mut [f64]) -> f64 {
+    quantile(values, 0.5)
 }
 
 /// Degrees of freedom of a sum of independent variances vᵢ, each estimated with νᵢ degrees of

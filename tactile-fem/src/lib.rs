@@ -67,7 +67,8 @@ pub use press::{Guide, GuideLayer, Interface, ObjectPress, ObjectShape};
 pub use recovery::{ContactRadius, PressurePoint};
 pub use scene::{AppliedLoad, Block, FemScene, Lump, Outcome, Solution, SolverReport};
 pub use state::{State, Stress};
-pub use table::{ContactTableOptions, TableProgress, solve_contact_table};
+pub use table::{ContactTableOptions, solve_contact_table};
+pub use tactile_core::Progress;
 
 #[cfg(test)]
 mod tests;

@@ -2,6 +2,7 @@
 
 use crate::{AppliedLoad, FemScene, Guide, GuideLayer, Material, ObjectPress, ObjectShape, State};
 use core::ops::ControlFlow;
+use tactile_core::Progress;
 use tactile_elasticity::contact::{Bond, ContactCurve, ContactTable, Waveguide};
 use tactile_elasticity::laws::{ContactLaw, ContactLength, WaveguideLaw};
 use tactile_elasticity::{ElasticityError, Quantity};
@@ -107,21 +108,6 @@ impl ContactTableOptions {
     }
 }
 
-/// How far [`solve_contact_table`] is.
-///
-/// ```
-/// use tactile_fem::TableProgress;
-/// let progress = TableProgress { done: 3, total: 7 };
-/// assert!(progress.done < progress.total);
-/// ```
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct TableProgress {
-    /// Moduli done.
-    pub done: usize,
-    /// Moduli in all.
-    pub total: usize,
-}
-
 /// Radius of the guide over the ball's and over its own thickness: beyond, its rim is not felt at
 /// the contact (`the_rim_of_the_guide_is_not_felt`).
 const GUIDE_RADIUS: [f64; 2] = [4.0, 2.5];
@@ -169,14 +155,11 @@ pub fn solve_contact_table(
     poisson_ratio: f64,
     guide: &Waveguide,
     options: &ContactTableOptions,
-    mut progress: impl FnMut(TableProgress) -> ControlFlow<()>,
+    mut progress: impl FnMut(Progress) -> ControlFlow<()>,
 ) -> Result<ContactTable, ElasticityError> {
     let law = WaveguideLaw::new(radius_m, poisson_ratio, guide, Bond::Bonded)?;
     let moduli = options.moduli(guide.layers().is_empty());
-    let mut report = |done| match progress(TableProgress {
-        done,
-        total: moduli.len(),
-    }) {
+    let mut report = |done| match progress(Progress::new(done, moduli.len())) {
         ControlFlow::Continue(()) => Ok(()),
         ControlFlow::Break(()) => Err(ElasticityError::Cancelled),
     };

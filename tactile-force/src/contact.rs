@@ -8,7 +8,6 @@
 //! is below the noise, is not cut off.
 
 use ndarray::{ArrayView2, Axis, Slice};
-use statrs::function::erf::erfc_inv;
 use tactile_core::{BoundingBox, Estimate, Polarity, Requirement};
 
 use crate::calibration::GreyHistogram;
@@ -171,14 +170,14 @@ mod read {
 
     use super::ContactOptions;
 
-    pub fn false_alarm_rate<'de, D: Deserializer<'de>>(d: D) -> Result<f64, D::Error> {
+    pub(super) fn false_alarm_rate<'de, D: Deserializer<'de>>(d: D) -> Result<f64, D::Error> {
         let options = ContactOptions::default().with_false_alarm_rate(f64::deserialize(d)?);
         options
             .map(|o| o.false_alarm_rate)
             .map_err(D::Error::custom)
     }
 
-    pub fn saturation_limit<'de, D: Deserializer<'de>>(d: D) -> Result<f64, D::Error> {
+    pub(super) fn saturation_limit<'de, D: Deserializer<'de>>(d: D) -> Result<f64, D::Error> {
         let options = ContactOptions::default().with_saturation_limit(f64::deserialize(d)?);
         options
             .map(|o| o.saturation_limit)
@@ -425,13 +424,9 @@ impl ContactDetector {
         let flat_field = uncertain / (light * light);
         let background = reference.difference_variance() / (light * light);
         let [common, scale] = drift.variances(x, y);
-        let gain = match reference.known_gain() {
-            Some(gain) => gain / light,
-            None => gain(region, noise, background, peak),
-        };
         DifferenceNoise {
             background,
-            gain,
+            gain: gain(region, noise, background, peak),
             common: common / (light * light),
             scale,
             flat_field,
@@ -578,5 +573,17 @@ impl ContactDetector {
 /// it with probability at most `rate`.
 fn quantile(rate: f64, trials: usize) -> f64 {
     let tail = rate / trials.max(1) as f64;
-    std::f64::consts::SQRT_2 * erfc_inv(2.0 * tail)
+    // Above the quantile, from where Newton's steps on the logarithm of the tail fall to it: that
+    // is concave.
+    let mut z = (-2.0 * tail.ln()).sqrt();
+    for _ in 0..60 {
+        let upper = 0.5 * libm::erfc(z * std::f64::consts::FRAC_1_SQRT_2);
+        let density = (-0.5 * z * z).exp() / std::f64::consts::TAU.sqrt();
+        let step = upper * (upper / tail).ln() / density;
+        z += step;
+        if step.abs() <= f64::EPSILON * z.abs() {
+            break;
+        }
+    }
+    z
 }

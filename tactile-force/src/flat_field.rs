@@ -41,12 +41,12 @@ pub struct FlatField {
 
 /// The relative brightness along one row, a parabola.
 #[derive(Clone, Copy, Debug)]
-pub struct FlatLine([f64; 3]);
+pub(crate) struct FlatLine([f64; 3]);
 
 impl FlatLine {
     /// At `x` columns from the line's start.
     #[inline(always)]
-    pub fn at(&self, x: usize) -> f32 {
+    pub(crate) fn at(&self, x: usize) -> f32 {
         // Frames are narrower than 2³¹, and this conversion has wide instructions.
         let x = f64::from(x as i32);
         (self.0[0] + x * (self.0[1] + x * self.0[2])) as f32

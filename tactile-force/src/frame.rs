@@ -48,15 +48,13 @@ pub struct FrameStatistics {
 ///
 /// ```
 /// use ndarray::Array2;
-/// use tactile_force::{NoiseModel, ReferenceFrame};
+/// use tactile_force::ReferenceFrame;
 ///
 /// let frames = [20_u8, 21, 22].map(|grey| Array2::from_elem((40, 50), grey));
 /// let reference = ReferenceFrame::from_frames(&frames.each_ref().map(|f| f.view()))?;
 /// assert_eq!(reference.image()[[0, 0]], 21);
 /// // Each pixel changed by one grey level from frame to frame.
 /// assert!((reference.noise().read_variance - 1.0).abs() < 1e-9);
-/// let known = reference.with_noise(NoiseModel::new(1.2, 0.01)?);
-/// assert_eq!(known.noise().gain, 0.01);
 /// # Ok::<(), tactile_force::ForceError>(())
 /// ```
 #[derive(Clone, Debug)]
@@ -66,8 +64,6 @@ pub struct ReferenceFrame {
     mean: Option<Array2<f32>>,
     frames: usize,
     noise: NoiseModel,
-    /// Whether the gain was given, and not only the noise at the reference's own level measured.
-    gain_known: bool,
     flat: Option<FlatField>,
     /// Σ of the image.
     sum: i64,
@@ -78,7 +74,7 @@ pub struct ReferenceFrame {
 
 /// Buffers of the pass.
 #[derive(Clone, Debug, Default)]
-pub struct PassWorkspace {
+pub(crate) struct PassWorkspace {
     /// Σ (frame − reference) of every tile.
     pub tiles: Tiles,
     /// A copy of frames that are not in standard layout.
@@ -128,19 +124,11 @@ impl ReferenceFrame {
             mean,
             frames: frames.len(),
             noise,
-            gain_known: false,
             flat: None,
             sum,
             blank: blank.collect(),
             tiles,
         })
-    }
-
-    /// The same reference with a known noise instead of the estimated one.
-    pub fn with_noise(mut self, noise: NoiseModel) -> Self {
-        self.noise = noise;
-        self.gain_known = true;
-        self
     }
 
     /// Corrects every difference for vignetting: divides it by the brightness that the reference
@@ -289,11 +277,6 @@ impl ReferenceFrame {
         self.noise.variance(self.mean_grey()) / self.frames as f64
     }
 
-    /// The gain, if it was given.
-    pub(crate) fn known_gain(&self) -> Option<f64> {
-        self.gain_known.then_some(self.noise.gain)
-    }
-
     /// Every tile of the last pass. `None` if that was of a frame of another size, or none.
     pub(crate) fn tile_sums<'a>(
         &'a self,
@@ -330,7 +313,7 @@ impl ReferenceFrame {
 
 /// The grey levels of a reference: those of one frame, or the mean of several.
 #[derive(Clone, Copy, Debug)]
-pub enum Levels<'a> {
+pub(crate) enum Levels<'a> {
     Whole(ArrayView2<'a, u8>),
     Fine(ArrayView2<'a, f32>),
 }

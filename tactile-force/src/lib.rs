@@ -33,9 +33,8 @@
 //! - Noise of a difference: $\sigma^2 = \sigma_0^2 + g d$; of the force: $\sigma_F^2 = (dF/dV)^2
 //!   \sigma_V^2 + \sigma_{cal}^2$.
 #![forbid(unsafe_code)]
+#![warn(unreachable_pub)]
 
-#[cfg(feature = "rayon")]
-mod batch;
 mod calibration;
 mod contact;
 mod drift;
@@ -69,7 +68,7 @@ pub use frame::{FrameStatistics, ReferenceFrame};
 pub use lens::{DotPair, LensFit, LensGeometry};
 pub use measure::{ForceMeasurement, ForceMeter, ForceOptions, ForceWorkspace, measure_force};
 pub use noise::{DifferenceNoise, NoiseModel};
-pub use profile::{HertzFit, HertzFitOptions, ProfileShape};
+pub use profile::{HertzFit, ProfileShape};
 pub use shear::{ShearCalibration, ShearMeasurement, ShearPair, ShearTracker};
 pub use tactile_core::{
     BoundingBox, CustomError, Estimate, InvalidOption, Polarity, Source, StopReason, Uncertain,

@@ -10,9 +10,7 @@ use crate::error::ForceError;
 use crate::frame::{FrameStatistics, ReferenceFrame};
 use crate::lens::LensGeometry;
 use crate::noise::DifferenceNoise;
-use crate::profile::{
-    HertzFit, HertzFitOptions, HertzFitter, PixelVariance, Rings, Start, VARIANCE_LEVELS,
-};
+use crate::profile::{HertzFit, HertzFitter, PixelVariance, Rings, Start, VARIANCE_LEVELS};
 use crate::region::Region;
 use crate::runs::Run;
 
@@ -55,7 +53,7 @@ impl ForceMeter {
     pub fn new(pixel_size_m: [f64; 2], options: &ForceOptions) -> Result<Self, ForceError> {
         Ok(Self {
             detector: ContactDetector::new(options.contact),
-            fitter: HertzFitter::new(options.hertz),
+            fitter: HertzFitter::new(),
             skip_profile: options.skip_profile,
             lens: LensGeometry::new(pixel_size_m)?,
         })
@@ -298,23 +296,19 @@ pub fn measure_force(
 /// The options of a force measurement.
 ///
 /// ```
-/// use tactile_force::{ContactOptions, ForceMeter, ForceOptions, HertzFitOptions, Polarity};
+/// use tactile_force::{ContactOptions, ForceMeter, ForceOptions, Polarity};
 ///
 /// // Force and centroid only, at one false alarm in a million frames.
 /// let contact = ContactOptions::default().with_false_alarm_rate(1e-6)?;
 /// let options = ForceOptions::default().with_contact(contact).without_profile();
 /// assert_eq!(options.polarity(), Polarity::Brighter);
 /// assert!(ForceMeter::new([20e-6; 2], &options).is_ok());
-/// // The profile over a background that is fitted too.
-/// let hertz = HertzFitOptions::default().with_fitted_background();
-/// assert_ne!(ForceOptions::default().with_hertz(hertz), ForceOptions::default());
 /// # Ok::<(), tactile_force::ForceError>(())
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ForceOptions {
     contact: ContactOptions,
-    hertz: HertzFitOptions,
     skip_profile: bool,
 }
 
@@ -322,12 +316,6 @@ impl ForceOptions {
     /// Finds the contact with these options.
     pub fn with_contact(mut self, contact: ContactOptions) -> Self {
         self.contact = contact;
-        self
-    }
-
-    /// Fits the profile with these options.
-    pub fn with_hertz(mut self, hertz: HertzFitOptions) -> Self {
-        self.hertz = hertz;
         self
     }
 

@@ -75,7 +75,7 @@ impl DifferenceNoise {
 }
 
 /// Variance of rounding to whole numbers.
-pub const QUANTISATION: f64 = 1.0 / 12.0;
+pub(crate) const QUANTISATION: f64 = 1.0 / 12.0;
 
 impl NoiseModel {
     /// From the standard deviation of the read noise (rounding excluded) and the gain.
@@ -220,7 +220,7 @@ impl Counts {
 
 /// Variance of a normal sample given as a histogram of absolute values, with everything beyond 3 sd
 /// left out.
-pub fn trimmed_variance(histogram: &[u64]) -> f64 {
+pub(crate) fn trimmed_variance(histogram: &[u64]) -> f64 {
     // Variance of a standard normal cut at ±3: 1 − 6 φ(3)/(2Φ(3) − 1).
     const CUT: f64 = 0.973_336_950_7;
     let mut variance = f64::INFINITY;

@@ -16,7 +16,7 @@ use crate::runs::{Components, Run, grow, push_runs};
 
 /// Differences over one box, row-major, and the contact in it as runs.
 #[derive(Clone, Debug, Default)]
-pub struct Region {
+pub(crate) struct Region {
     pub place: Option<BoundingBox>,
     /// Corrected frame − reference, sign turned so that contact is positive.
     pub difference: Vec<f32>,
@@ -34,7 +34,7 @@ pub struct Region {
 
 /// A mask's size.
 #[derive(Clone, Copy, Debug)]
-pub struct Extent {
+pub(crate) struct Extent {
     pub area: usize,
     /// Other components that are not small.
     pub others: usize,
@@ -42,13 +42,13 @@ pub struct Extent {
 
 impl Region {
     /// Number of columns.
-    pub fn columns(&self) -> usize {
+    pub(crate) fn columns(&self) -> usize {
         self.place.map_or(1, |p| p.columns())
     }
 
     /// Takes the differences inside a box, corrected for drift and vignetting, and returns the
     /// greatest of them, zero if none is positive.
-    pub fn load(
+    pub(crate) fn load(
         &mut self,
         frame: ArrayView2<'_, u8>,
         reference: &ReferenceFrame,
@@ -74,7 +74,7 @@ impl Region {
 
     /// Thresholds the mean over a box of `width` pixels, keeps the largest component and fills its
     /// holes.
-    pub fn segment(&mut self, width: usize, limit: f32, notable: usize) -> Extent {
+    pub(crate) fn segment(&mut self, width: usize, limit: f32, notable: usize) -> Extent {
         let columns = self.columns();
         let rows = self.difference.len() / columns;
         // Compared with sums instead of means, which spares a division a pixel.
@@ -112,7 +112,7 @@ impl Region {
     }
 
     /// Grows the mask to the aperture and paints the pixels.
-    pub fn finish(&mut self, margin: usize) {
+    pub(crate) fn finish(&mut self, margin: usize) {
         let columns = self.columns();
         grow(
             &self.mask,
@@ -129,7 +129,7 @@ impl Region {
     }
 
     /// Every n-th row and column of the pixels of some runs.
-    pub fn every_nth(&self, runs: &[Run], step: usize) -> [EveryNth; 2] {
+    pub(crate) fn every_nth(&self, runs: &[Run], step: usize) -> [EveryNth; 2] {
         let start = runs.iter().map(|run| run.start).min().unwrap_or(0) as usize;
         let end = runs.iter().map(|run| run.end).max().unwrap_or(1) as usize;
         let first = runs.first().map_or(0, |run| run.row) as usize;
@@ -141,7 +141,7 @@ impl Region {
     }
 
     /// Box of runs in frame coordinates.
-    pub fn bounds(&self, runs: &[Run]) -> Option<BoundingBox> {
+    pub(crate) fn bounds(&self, runs: &[Run]) -> Option<BoundingBox> {
         let place = self.place?;
         let boxes = runs.iter().map(|r| BoundingBox {
             row_start: place.row_start + r.row as usize,
@@ -271,7 +271,7 @@ impl<P: Copy + Into<f32>> Loop for Row<'_, P> {
 }
 
 /// Greatest of the values, zero if none is positive.
-pub fn greatest(values: &[f32]) -> f32 {
+pub(crate) fn greatest(values: &[f32]) -> f32 {
     vectorised(
         #[inline(always)]
         || greatest_of(values),
@@ -296,7 +296,7 @@ fn larger(a: f32, b: f32) -> f32 {
 
 /// Buffers of the estimate.
 #[derive(Clone, Debug, Default)]
-pub struct NoiseWorkspace {
+pub(crate) struct NoiseWorkspace {
     histogram: Vec<u64>,
     bends: Vec<f32>,
 }
@@ -309,7 +309,12 @@ const RESPONSES: usize = 4081;
 /// the background's, over their mean. The edge, where the signal itself bends, is darker. Of a
 /// large contact every n-th row and column is enough: 8 000 pixels give a variance to 2 %, a
 /// standard error to half of that.
-pub fn gain(region: &Region, workspace: &mut NoiseWorkspace, background: f64, peak: f32) -> f64 {
+pub(crate) fn gain(
+    region: &Region,
+    workspace: &mut NoiseWorkspace,
+    background: f64,
+    peak: f32,
+) -> f64 {
     let NoiseWorkspace { histogram, bends } = workspace;
     histogram.clear();
     histogram.resize(RESPONSES, 0);
@@ -373,7 +378,7 @@ pub fn gain(region: &Region, workspace: &mut NoiseWorkspace, background: f64, pe
 /// Every n-th number of a range, counted from its middle to both sides: the same rows and columns
 /// of a contact whichever way the image is mirrored, turned or moved.
 #[derive(Clone, Copy, Debug)]
-pub struct EveryNth {
+pub(crate) struct EveryNth {
     /// The middle of the range, rounded down and up.
     low: usize,
     high: usize,
@@ -382,7 +387,7 @@ pub struct EveryNth {
 
 impl EveryNth {
     /// Of a range that is not empty.
-    pub fn of(range: Range<usize>, step: usize) -> Self {
+    pub(crate) fn of(range: Range<usize>, step: usize) -> Self {
         let ends = range.start + range.end.saturating_sub(1);
         Self {
             low: ends / 2,
@@ -392,7 +397,7 @@ impl EveryNth {
     }
 
     /// Whether a number is one of them.
-    pub fn contains(&self, at: usize) -> bool {
+    pub(crate) fn contains(&self, at: usize) -> bool {
         let away = if at <= self.low {
             self.low - at
         } else {
@@ -403,7 +408,7 @@ impl EveryNth {
 
     /// Those within a range, in order.
     #[inline]
-    pub fn within(&self, range: Range<usize>) -> impl Iterator<Item = usize> {
+    pub(crate) fn within(&self, range: Range<usize>) -> impl Iterator<Item = usize> {
         let step = self.step;
         let first = range.start + self.low.saturating_sub(range.start) % step;
         let down = (first..range.end.min(self.low + 1)).step_by(step);
@@ -420,7 +425,7 @@ impl EveryNth {
 
 /// Sums over the aperture. Coordinates are relative to the region's first pixel.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Sums {
+pub(crate) struct Sums {
     /// Number of pixels and their moments: 1, x, y, x², y².
     pub plain: [f64; 5],
     /// The same weighted with the difference.
@@ -429,7 +434,7 @@ pub struct Sums {
 
 impl Sums {
     /// `columns` is scratch.
-    pub fn over(region: &Region, columns: &mut Vec<f64>) -> Self {
+    pub(crate) fn over(region: &Region, columns: &mut Vec<f64>) -> Self {
         let mut plain = [0.0; 5];
         for run in &region.aperture {
             let (y, n) = (f64::from(run.row), run.len() as f64);
@@ -462,11 +467,11 @@ impl Sums {
         }
     }
 
-    pub fn sum(&self) -> f64 {
+    pub(crate) fn sum(&self) -> f64 {
         self.weighted[0]
     }
 
-    pub fn centroid(&self) -> [f64; 2] {
+    pub(crate) fn centroid(&self) -> [f64; 2] {
         [
             self.weighted[1] / self.weighted[0],
             self.weighted[2] / self.weighted[0],
@@ -475,7 +480,7 @@ impl Sums {
 
     /// Variance of Σ d: every pixel's, and that of errors of background and scale common to all,
     /// which go together.
-    pub fn variance(&self, noise: &DifferenceNoise) -> f64 {
+    pub(crate) fn variance(&self, noise: &DifferenceNoise) -> f64 {
         // Own noise adds by squares. Errors of background and scale have one cause and add before
         // squaring.
         noise.background * self.plain[0]
@@ -486,7 +491,7 @@ impl Sums {
 
     /// Variance of the centroid along x (0) or y (1): Σ var(d) (x − x̄)²/(Σ d)², and the common
     /// error's lever.
-    pub fn centroid_variance(&self, axis: usize, noise: &DifferenceNoise) -> f64 {
+    pub(crate) fn centroid_variance(&self, axis: usize, noise: &DifferenceNoise) -> f64 {
         let at = self.centroid()[axis];
         let about = |s: &[f64; 5]| s[3 + axis] - 2.0 * at * s[1 + axis] + at * at * s[0];
         let lever = self.plain[1 + axis] - at * self.plain[0];

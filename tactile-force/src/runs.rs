@@ -4,19 +4,19 @@ use std::ops::Range;
 
 /// Pixels `start..end` of a row, relative to a region.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Run {
+pub(crate) struct Run {
     pub row: u32,
     pub start: u32,
     pub end: u32,
 }
 
 impl Run {
-    pub fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         (self.end - self.start) as usize
     }
 
     /// Position of its pixels in a row-major region of the given width.
-    pub fn span(&self, columns: usize) -> Range<usize> {
+    pub(crate) fn span(&self, columns: usize) -> Range<usize> {
         let first = self.row as usize * columns;
         first + self.start as usize..first + self.end as usize
     }
@@ -27,7 +27,12 @@ const BLOCK: usize = 32;
 
 /// Appends the runs of a row where `inside` holds.
 #[inline(always)]
-pub fn push_runs<P>(runs: &mut Vec<Run>, row: usize, pixels: &[P], inside: impl Fn(&P) -> bool) {
+pub(crate) fn push_runs<P>(
+    runs: &mut Vec<Run>,
+    row: usize,
+    pixels: &[P],
+    inside: impl Fn(&P) -> bool,
+) {
     let mut start = None;
     for (block, pixels) in pixels.chunks(BLOCK).enumerate() {
         // Most blocks lie wholly inside or outside. Counting takes SIMD instructions, pixels of an
@@ -66,7 +71,7 @@ pub fn push_runs<P>(runs: &mut Vec<Run>, row: usize, pixels: &[P], inside: impl 
 
 /// Connected components of a list of runs, by union–find.
 #[derive(Clone, Debug, Default)]
-pub struct Components {
+pub(crate) struct Components {
     parent: Vec<u32>,
     area: Vec<usize>,
 }
@@ -111,7 +116,7 @@ impl Components {
 
     /// Keeps the runs of the largest 8-connected component. Returns its area and the number of
     /// other components of at least `notable` pixels and a hundredth of its area.
-    pub fn keep_largest(&mut self, runs: &mut Vec<Run>, notable: usize) -> (usize, usize) {
+    pub(crate) fn keep_largest(&mut self, runs: &mut Vec<Run>, notable: usize) -> (usize, usize) {
         self.join(runs, true);
         self.area.clear();
         self.area.resize(runs.len(), 0);
@@ -145,7 +150,7 @@ impl Components {
 
     /// Adds everything the runs enclose: the background that no 4-path joins to the border. Returns
     /// the area filled.
-    pub fn fill_holes(
+    pub(crate) fn fill_holes(
         &mut self,
         runs: &mut Vec<Run>,
         background: &mut Vec<Run>,
@@ -226,7 +231,7 @@ fn merge(runs: &mut Vec<Run>) {
 
 /// The runs, sorted by row and start, grown by a square of half width `margin` and clipped to the
 /// region.
-pub fn grow(runs: &[Run], grown: &mut Vec<Run>, margin: usize, rows: usize, columns: usize) {
+pub(crate) fn grow(runs: &[Run], grown: &mut Vec<Run>, margin: usize, rows: usize, columns: usize) {
     grown.clear();
     let (Some(top), Some(bottom)) = (runs.first(), runs.last()) else {
         return;

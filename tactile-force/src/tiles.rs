@@ -3,13 +3,13 @@
 use tactile_core::BoundingBox;
 
 /// Rows of a tile.
-pub const TILE_ROWS: usize = 8;
+pub(crate) const TILE_ROWS: usize = 8;
 /// Columns of a tile.
-pub const TILE_COLUMNS: usize = 32;
+pub(crate) const TILE_COLUMNS: usize = 32;
 
 /// The sums of all tiles of a frame, and their darkest and brightest pixels.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Tiles {
+pub(crate) struct Tiles {
     pub rows: usize,
     pub columns: usize,
     pub sums: Vec<i32>,
@@ -35,7 +35,7 @@ impl Tiles {
     }
 
     /// Greatest sum of a band, each times `sign`.
-    pub fn greatest(&self, band: usize, sign: i32) -> i32 {
+    pub(crate) fn greatest(&self, band: usize, sign: i32) -> i32 {
         let sums = &self.sums[band * self.columns..(band + 1) * self.columns];
         sums.iter().map(|s| sign * s).max().unwrap_or(0)
     }
@@ -53,7 +53,7 @@ impl Tiles {
     }
 
     /// The pixels of a tile.
-    pub fn pixels(&self, tile: usize, (rows, columns): (usize, usize)) -> BoundingBox {
+    pub(crate) fn pixels(&self, tile: usize, (rows, columns): (usize, usize)) -> BoundingBox {
         let (row, column) = (tile / self.columns, tile % self.columns);
         BoundingBox {
             row_start: row * TILE_ROWS,
@@ -66,7 +66,7 @@ impl Tiles {
 
 /// One tile: its centre, its number of pixels, the reference's sum and the summed difference.
 #[derive(Clone, Copy, Debug)]
-pub struct TileSum {
+pub(crate) struct TileSum {
     pub x: f64,
     pub y: f64,
     pub pixels: f64,
@@ -223,7 +223,7 @@ mod avx2 {
 
     use super::{OfTiles, Rows, Summarise, each};
 
-    pub struct Strip<'a> {
+    pub(super) struct Strip<'a> {
         pub simd: V3,
         pub rows: Rows<'a>,
         pub tiles: OfTiles<'a>,

@@ -3,6 +3,7 @@
 use nalgebra::DMatrix;
 use ndarray::{Array2, ArrayView3};
 use tactile_core::Requirement;
+use tactile_core::statistics::quantile;
 
 use crate::GelError;
 use crate::ball::{BallFace, Evidence};
@@ -631,15 +632,4 @@ impl Misses {
         }
         Ok(())
     }
-}
-
-/// A quantile of values, 0 without any.
-fn quantile(values: &mut [f64], share: f64) -> f64 {
-    let at = (share * values.len() as f64) as usize;
-    if values.is_empty() {
-        return 0.0;
-    }
-    *values
-        .select_nth_unstable_by(at.min(values.len() - 1), f64::total_cmp)
-        .1
 }

@@ -6,6 +6,7 @@
 //! compared too, and what fits is named.
 
 use ndarray::Array3;
+use tactile_core::statistics::median;
 
 use crate::gradients::Blurred;
 
@@ -212,15 +213,6 @@ impl Blocks {
     fn mean(&self) -> f64 {
         self.means.iter().map(|v| f64::from(*v)).sum::<f64>() / self.means.len() as f64
     }
-}
-
-/// Median of values, 0 without any.
-fn median(values: &mut [f64]) -> f64 {
-    let middle = values.len() / 2;
-    if values.is_empty() {
-        return 0.0;
-    }
-    *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
 /// Ratios of the channels between two borders, each a median.

@@ -22,7 +22,8 @@ use std::error::Error;
 use std::path::Path;
 use tactile_fem::Interface;
 use tactile_inclusion::{
-    Identifiable, Inclusion, InclusionSearch, PressureProfile, SensorErrors, TissueBlock,
+    Identifiable, Inclusion, InclusionSearch, PressureProfile, Scan, ScanPress, SensorErrors,
+    TissueBlock,
 };
 
 /// Pressures of each load on cells of 1 mm, whose middles are given.
@@ -211,7 +212,16 @@ fn main() -> Result<(), Box<dyn Error>> {
             let search = InclusionSearch::new(specimen, guide(number(row, "disc_radius_m")?)?)?;
             let begun = std::time::Instant::now();
             let progress = &mut |_| ControlFlow::Continue(());
-            let estimate = search.search_picture(&positions, &frames, progress)?;
+            let press = ScanPress {
+                axis_m: [0.0; 2],
+                positions_m: positions,
+                frames,
+            };
+            let scan = Scan {
+                presses: vec![press],
+                position_error_m: 0.0,
+            };
+            let estimate = search.search_scan(&scan, progress)?;
             print!(
                 "{name} {seed}: {:.0} s, {:?}, p {:.3}, misfit {:.2}",
                 begun.elapsed().as_secs_f64(),

@@ -53,9 +53,9 @@ pub use estimate::{
     Estimated, Identifiable, Inclusion, InclusionEstimate, InclusionWarning, SearchVerdict,
     asymmetry_warnings,
 };
-pub use progress::SearchProgress;
 pub use scan::{Scan, ScanPress};
 pub use search::InclusionSearch;
+pub use tactile_core::Progress;
 pub use tissue_block::{PressureProfile, SensorErrors, TissueBlock};
 
 #[cfg(test)]

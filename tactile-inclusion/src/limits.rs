@@ -3,10 +3,11 @@
 use crate::forward::{Forward, Solved};
 use crate::hypothesis::PlainFit;
 use crate::parameters::{LumpParameters, Parameters};
-use crate::progress::{Counter, SearchProgress};
+use crate::progress::Counter;
 use crate::scan::Scan;
 use crate::search::{HomogeneousFit, InclusionSearch, USED_FACE};
 use core::ops::ControlFlow;
+use tactile_core::Progress;
 use tactile_elasticity::{ElasticityError, Quantity};
 
 /// Diameters over the face's radius that are solved. Smaller ones count as large as the first.
@@ -63,7 +64,7 @@ impl InclusionSearch {
         contrast: f64,
         places_m: &[[f64; 2]],
         depths_m: &[f64],
-        progress: &mut dyn FnMut(SearchProgress) -> ControlFlow<()>,
+        progress: &mut dyn FnMut(Progress) -> ControlFlow<()>,
     ) -> Result<Vec<Vec<f64>>, ElasticityError> {
         Quantity::YoungsModulus.positive(contrast)?;
         for depth in depths_m {

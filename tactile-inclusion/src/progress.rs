@@ -1,35 +1,20 @@
 //! Progress of a search, and its cancellation.
 
 use core::ops::ControlFlow;
+use tactile_core::Progress;
 
-/// What a search is doing.
-///
-/// ```
-/// use tactile_inclusion::SearchProgress;
-///
-/// let progress = SearchProgress { done: 3, expected: 30 };
-/// assert!(progress.done < progress.expected);
-/// ```
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct SearchProgress {
-    /// Solutions so far.
-    pub done: usize,
-    /// About how many there will be.
-    pub expected: usize,
-}
-
-/// Counts solutions, reports each and hears whether to go on.
+/// Counts solutions, reports each, and ends where the callback asks to.
 pub(crate) struct Counter<'a> {
     pub done: usize,
     pub expected: usize,
-    pub progress: &'a mut dyn FnMut(SearchProgress) -> ControlFlow<()>,
+    pub progress: &'a mut dyn FnMut(Progress) -> ControlFlow<()>,
     pub cancelled: bool,
 }
 
 impl<'a> Counter<'a> {
     pub(crate) fn new(
         expected: usize,
-        progress: &'a mut dyn FnMut(SearchProgress) -> ControlFlow<()>,
+        progress: &'a mut dyn FnMut(Progress) -> ControlFlow<()>,
     ) -> Self {
         Self {
             done: 0,
@@ -46,10 +31,7 @@ impl<'a> Counter<'a> {
         }
         self.done += 1;
         self.expected = self.expected.max(self.done);
-        let progress = SearchProgress {
-            done: self.done,
-            expected: self.expected,
-        };
+        let progress = Progress::new(self.done, self.expected);
         self.cancelled |= (self.progress)(progress).is_break();
         !self.cancelled
     }

@@ -8,12 +8,13 @@ use crate::forward::Forward;
 use crate::hypothesis::{BLOCK_COORDINATES, Hypothesis, LEAST_GAIN, Score, better};
 use crate::parameters::{Coordinate, LARGEST_POISSON_RATIO, Parameters, Place};
 use crate::picture::{Cells, extent};
-use crate::progress::{Counter, SearchProgress};
-use crate::scan::{Scan, ScanPress};
+use crate::progress::Counter;
+use crate::scan::Scan;
 use crate::starts::{GridStart, starts};
 use crate::tissue_block::{PressureProfile, SensorErrors, TissueBlock, check};
 use core::ops::ControlFlow;
 use std::sync::Arc;
+use tactile_core::Progress;
 use tactile_elasticity::{ElasticityError, Quantity};
 use tactile_fem::{Guide, Interface, Kinematics};
 
@@ -99,7 +100,7 @@ const SPREAD: (f64, f64) = (0.13, 0.07);
 ///     search.expected_errors(&lump, &[1.5e-3, 3e-3], &radii_m, &vec![1.0; radii_m.len()])?;
 /// println!("its diameter would be known within {:.0} %", 100.0 * errors.diameter);
 /// let estimate = search.search_with_progress(&radii_m, &frames, &mut |progress| {
-///     println!("{} of {}", progress.done, progress.expected);
+///     println!("{} of {}", progress.done, progress.total);
 ///     ControlFlow::Continue(())
 /// })?;
 /// if let (true, Some(inclusion)) = (estimate.found, &estimate.inclusion) {
@@ -190,7 +191,7 @@ impl InclusionSearch {
         &self,
         radii_m: &[f64],
         frames: &[PressureProfile],
-        progress: &mut dyn FnMut(SearchProgress) -> ControlFlow<()>,
+        progress: &mut dyn FnMut(Progress) -> ControlFlow<()>,
     ) -> Result<InclusionEstimate, ElasticityError> {
         check(radii_m, frames)?;
         let observed = self.observed(radii_m, frames)?;
@@ -198,46 +199,23 @@ impl InclusionSearch {
         self.search_observed(&observed, &approaches_m, progress)
     }
 
-    /// As [`Self::search_with_progress`], from the whole face: the inclusion may lie off the axis.
-    /// `positions_m` are the middles (x, y) of cells, from the axis, and `frames` have a pressure
-    /// for each. Cells of a fifteenth of the face's radius resolve what shows, and the time grows
-    /// as the third power of their number. The force is not used.
-    ///
-    /// # Errors
-    /// Those of [`Self::search_with_progress`].
-    pub fn search_picture(
-        &self,
-        positions_m: &[[f64; 2]],
-        frames: &[PressureProfile],
-        progress: &mut dyn FnMut(SearchProgress) -> ControlFlow<()>,
-    ) -> Result<InclusionEstimate, ElasticityError> {
-        let press = ScanPress {
-            axis_m: [0.0; 2],
-            positions_m: positions_m.to_vec(),
-            frames: frames.to_vec(),
-        };
-        let scan = Scan {
-            presses: vec![press],
-            position_error_m: 0.0,
-        };
-        self.search_scan(&scan, progress)
-    }
-
-    /// As [`Self::search_picture`], from presses at several places of a block that is far wider
-    /// than the guide: one posterior over all of them, with one inclusion or two. How far each
+    /// As [`Self::search_with_progress`], from whole faces: the inclusion may lie off the axis. The
+    /// presses, one or several, are at places of a block that is far wider than the guide: one
+    /// posterior over all of them, with one inclusion or two. How far each
     /// press was from where it is said to have been is fitted along, and each has an error of its
     /// own of the approaches' zero. The inclusion's place is given in the presses' coordinates.
     /// Only places under the used part of some press's face are searched. Two are told where one
     /// leaves more than the errors explain and two do not. The time grows as the third power of
-    /// the number of all cells: an eighth of the face's radius is narrow enough for five presses.
+    /// the number of all cells: a fifteenth of the face's radius resolves what one press shows, an
+    /// eighth is narrow enough for five presses. The force is not used.
     ///
     /// # Errors
-    /// Those of [`Self::search_picture`]. No press. Approaches that differ between presses. An
+    /// Those of [`Self::search_with_progress`]. No press. Approaches that differ between presses. An
     /// error of place that is negative or NaN.
     pub fn search_scan(
         &self,
         scan: &Scan,
-        progress: &mut dyn FnMut(SearchProgress) -> ControlFlow<()>,
+        progress: &mut dyn FnMut(Progress) -> ControlFlow<()>,
     ) -> Result<InclusionEstimate, ElasticityError> {
         let (observed, approaches_m) = self.observed_scan(scan)?;
         self.search_observed(&observed, &approaches_m, progress)
@@ -247,7 +225,7 @@ impl InclusionSearch {
         &self,
         observed: &Observed,
         approaches_m: &[f64],
-        progress: &mut dyn FnMut(SearchProgress) -> ControlFlow<()>,
+        progress: &mut dyn FnMut(Progress) -> ControlFlow<()>,
     ) -> Result<InclusionEstimate, ElasticityError> {
         let interfaces = self.specimen.interfaces();
         // Per interface: a homogeneous fit, the grid, two first fits, the answer's.

@@ -19,7 +19,7 @@ use tactile_imaging::force::{ForceError, ReferenceFrame};
 use tactile_imaging::matching::{MatchError, Matching, PointMatcher};
 use tactile_imaging::pipeline::{ContactReading, ContactStage, FrameContact};
 use tactile_imaging::sfs::{
-    ControlPointSampler, Domain, Frame, SfsError, Surface, SurfaceReconstruction,
+    ControlPointSampler, Domain, Image, SfsError, Surface, SurfaceReconstruction,
 };
 use tactile_imaging::tps::{TpsError, Warp, WarpModel};
 
@@ -142,19 +142,16 @@ fn mask_of(domain: &Domain<'_, f64>, shape: (usize, usize)) -> Array2<bool> {
 
 /// `reconstruct(image, mask, pixel_size)` returns heights in the unit of the pixel's size.
 impl SurfaceReconstruction<f64> for OwnStage {
-    fn reconstruct(
-        &self,
-        frame: Frame<'_, f64>,
-        domain: &Domain<'_, f64>,
-    ) -> Result<Surface<f64>, SfsError> {
-        let shape = frame.dim();
+    fn reconstruct(&self, image: Image<'_, '_, f64>) -> Result<Surface<f64>, SfsError> {
+        let Image { values, domain } = image;
+        let shape = values.dim();
         let heights = Python::attach(|py| {
-            let image = Array2::from_shape_fn(shape, |(row, column)| frame.at(row, column));
+            let image = Array2::from_shape_fn(shape, |(row, column)| values.at(row, column));
             let answer = self.call(
                 py,
                 (
                     PyArray2::from_owned_array(py, image),
-                    PyArray2::from_owned_array(py, mask_of(domain, shape)),
+                    PyArray2::from_owned_array(py, mask_of(&domain, shape)),
                     PyTuple::new(py, domain.pixel_size_m)?,
                 ),
             )?;

@@ -4,7 +4,6 @@ use crate::check::CheckPress;
 use crate::errors::{self, invalid};
 use crate::matching::Matcher;
 use crate::own::{OwnContact, OwnStage};
-use crate::press::Press;
 use crate::sensor::Sensor;
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
@@ -245,8 +244,13 @@ impl Pipeline {
     }
 
     /// A press on this pipeline, with the frame without contact.
-    fn press(&self, py: Python<'_>, reference: &Bound<'_, PyAny>) -> PyResult<Press> {
-        Press::on(py, self, reference)
+    fn press<'py>(
+        slf: &Bound<'py, Self>,
+        reference: &Bound<'py, PyAny>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        // By its name: a press is built on a pipeline, not the other way round.
+        let module = slf.py().import("tactile_imaging._native")?;
+        module.getattr("Press")?.call1((slf, reference))
     }
 
     /// A pipeline that takes presses of known force into account.

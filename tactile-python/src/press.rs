@@ -49,13 +49,6 @@ impl Drop for Busy<'_> {
 }
 
 impl Press {
-    pub fn on(py: Python<'_>, pipeline: &Pipeline, reference: &Bound<'_, PyAny>) -> PyResult<Self> {
-        let reference = arrays::frame("reference", reference)?;
-        let view = reference.as_array();
-        let press = py.detach(|| pipeline.0.press(view));
-        Ok(Self::new_on(press.map_err(errors::pipeline)?))
-    }
-
     fn new_on(press: rust::Press<'static>) -> Self {
         Self {
             press,
@@ -93,7 +86,10 @@ impl Press {
 impl Press {
     #[new]
     fn new(py: Python<'_>, pipeline: &Pipeline, reference: &Bound<'_, PyAny>) -> PyResult<Self> {
-        Self::on(py, pipeline, reference)
+        let reference = arrays::frame("reference", reference)?;
+        let view = reference.as_array();
+        let press = py.detach(|| pipeline.0.press(view));
+        Ok(Self::new_on(press.map_err(errors::pipeline)?))
     }
 
     /// The press of a scene file, as the program `tactile measure` reads it.

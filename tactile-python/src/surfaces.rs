@@ -11,7 +11,7 @@ use std::sync::{Arc, Mutex};
 use tactile_imaging as rust;
 use tactile_imaging::pipeline::{DarkContact, ReconstructionChoice, SurfaceInput};
 use tactile_imaging::sfs::{
-    BoundaryCondition, CosinePoisson, Domain, Eikonal, FrankotChellappa, Lighting,
+    BoundaryCondition, CosinePoisson, Domain, Eikonal, FrankotChellappa, Image, Lighting,
     MaskedLeastSquares, SfsError, SlopeIntegrator, Surface, SurfaceReconstruction,
     SurfaceWorkspace, TsaiShah,
 };
@@ -82,7 +82,7 @@ pub fn reconstruct<'py>(
     };
     let view = image.as_array();
     let heights = heights(py, size, mask.as_ref(), |workspace, domain, surface| {
-        method.reconstruct_with(workspace, view.into(), domain, surface)
+        method.reconstruct_with(workspace, Image::new(view, *domain), surface)
     });
     Ok(PyArray2::from_owned_array(py, heights?))
 }

@@ -20,12 +20,13 @@
 //!
 //! Errors are [`SfsError`]. Not converging is a [`SurfaceReport`].
 #![forbid(unsafe_code)]
+#![warn(unreachable_pub)]
 
 mod ball;
 mod binning;
 mod domain;
 mod error;
-mod frame;
+mod image;
 mod integrate;
 mod lighting;
 mod reconstruct;
@@ -39,11 +40,11 @@ pub use ball::BallFit;
 pub use binning::{BinnedContact, Binning};
 pub use domain::Domain;
 pub use error::SfsError;
-pub use frame::Frame;
+pub use image::{Frame, Image};
 pub use integrate::{CosinePoisson, FrankotChellappa, MaskedLeastSquares, SlopeIntegrator};
 pub use lighting::Lighting;
 pub use reconstruct::{
-    BoundaryCondition, DepthTable, Eikonal, EikonalBranch, Signal, SurfaceReconstruction, TsaiShah,
+    BoundaryCondition, DepthTable, Eikonal, EikonalBranch, SurfaceReconstruction, TsaiShah,
 };
 pub use sample::{ContactSampler, ControlPointSampler, EquallySpaced};
 pub use scalar::PixelScalar;

@@ -12,11 +12,10 @@ use crate::{BoundingBox, Domain, PixelScalar, SfsError, SurfaceWorkspace};
 ///
 /// ```
 /// use ndarray::array;
-/// use tactile_sfs::{DepthTable, Domain, PixelFlags, SurfaceReconstruction};
+/// use tactile_sfs::{DepthTable, Domain, Image, PixelFlags, SurfaceReconstruction};
 /// let table = DepthTable::new(&[(0.0, 0.0), (10.0, 1e-3)])?;
 /// let surface = table.reconstruct(
-///     array![[5.0, 12.0, f64::NAN]].view().into(),
-///     &Domain::new([1e-4, 1e-4])?,
+///     Image::new(array![[5.0, 12.0, f64::NAN]].view(), Domain::new([1e-4, 1e-4])?)
 /// )?;
 /// assert_eq!(surface.flags[[0, 0]], PixelFlags::NONE);
 /// assert!(surface.flags[[0, 1]].contains(PixelFlags::OUT_OF_RANGE)); // the last depth was taken
@@ -106,10 +105,10 @@ pub struct Component<T> {
 ///
 /// ```
 /// use ndarray::array;
-/// use tactile_sfs::{DepthTable, Domain, StopReason, SurfaceReconstruction};
+/// use tactile_sfs::{DepthTable, Domain, Image, StopReason, SurfaceReconstruction};
 /// let table = DepthTable::new(&[(0.0, 0.0), (10.0, 1e-3)])?;
 /// let (image, domain) = (array![[5.0, 12.0, f64::NAN]], Domain::new([1e-4, 1e-4])?);
-/// let report = table.reconstruct(image.view().into(), &domain)?.report;
+/// let report = table.reconstruct(Image::new(image.view(), domain))?.report;
 /// assert_eq!((report.stop, report.iterations), (StopReason::Direct, 0));
 /// // One pixel is out of range, one has no height.
 /// assert_eq!((report.solved, report.flagged), (2, 2));

@@ -19,7 +19,7 @@ type Callback = Box<dyn FnMut(Progress) -> ControlFlow<()> + Send + Sync>;
 /// use core::ops::ControlFlow;
 /// use ndarray::Array2;
 /// use tactile_sfs::{
-///     Domain, Frame, Lighting, Progress, Surface, SurfaceReconstruction, SurfaceWorkspace,
+///     Domain, Frame, Image, Lighting, Progress, Surface, SurfaceReconstruction, SurfaceWorkspace,
 ///     TsaiShah,
 /// };
 /// let (send, receive) = std::sync::mpsc::channel();
@@ -32,8 +32,7 @@ type Callback = Box<dyn FnMut(Progress) -> ControlFlow<()> + Send + Sync>;
 /// let method = TsaiShah::new(Lighting::default()).with_iterations(20)?;
 /// method.reconstruct_with(
 ///     &mut workspace,
-///     Frame::Real(image.view()),
-///     &Domain::default(),
+///     Image::new(Frame::Real(image.view()), Domain::default()),
 ///     &mut Surface::default(),
 /// )?;
 /// let received: Vec<Progress> = receive.try_iter().collect();

@@ -355,7 +355,7 @@ impl Camera {
 /// What a stream is used for. Streams of different uses never meet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u8)]
-pub enum Purpose {
+pub(crate) enum Purpose {
     /// Noise of the frames of a scene.
     Frames = 0,
     /// Noise of the force gauge of a calibration.
@@ -367,7 +367,7 @@ pub enum Purpose {
 }
 
 /// The stream of row `row` of frame `frame`. `frame` must stay below 2⁴⁸, `row` below 2¹⁶.
-pub fn row_stream(seed: u64, purpose: Purpose, frame: u64, row: usize) -> ChaCha8Rng {
+pub(crate) fn row_stream(seed: u64, purpose: Purpose, frame: u64, row: usize) -> ChaCha8Rng {
     let mut key = [0_u8; 32];
     key[..8].copy_from_slice(&seed.to_le_bytes());
     key[8] = purpose as u8;

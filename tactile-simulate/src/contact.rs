@@ -596,7 +596,7 @@ impl ContactState {
 const POINTS: &str = include_str!("finite_elements.csv");
 
 /// The states of a ball on a waveguide, of growing force. None for bodies that were not computed.
-pub fn finite_element_states(
+pub(crate) fn finite_element_states(
     sphere: &ElasticSphere,
     waveguide: &LightGuide,
 ) -> Option<Vec<ContactState>> {

@@ -116,7 +116,7 @@ impl fmt::Display for Short {
 }
 
 /// `found` if it lies in `minimum..=maximum`.
-pub fn within(
+pub(crate) fn within(
     field: &'static str,
     found: f64,
     minimum: f64,
@@ -136,24 +136,28 @@ pub fn within(
 }
 
 /// Positive and finite.
-pub fn positive(field: &'static str, found: f64) -> Result<(), SimulateError> {
+pub(crate) fn positive(field: &'static str, found: f64) -> Result<(), SimulateError> {
     // Smallest value called positive: far below any length, modulus or count in use.
     let tiny = f64::MIN_POSITIVE;
     within(field, found, tiny, f64::MAX)
 }
 
 /// Zero or positive, and finite.
-pub fn not_negative(field: &'static str, found: f64) -> Result<(), SimulateError> {
+pub(crate) fn not_negative(field: &'static str, found: f64) -> Result<(), SimulateError> {
     within(field, found, 0.0, f64::MAX)
 }
 
 /// Any finite number.
-pub fn finite(field: &'static str, found: f64) -> Result<(), SimulateError> {
+pub(crate) fn finite(field: &'static str, found: f64) -> Result<(), SimulateError> {
     within(field, found, f64::MIN, f64::MAX)
 }
 
 /// At least `expected` entries.
-pub fn at_least(field: &'static str, found: usize, expected: usize) -> Result<(), SimulateError> {
+pub(crate) fn at_least(
+    field: &'static str,
+    found: usize,
+    expected: usize,
+) -> Result<(), SimulateError> {
     if found >= expected {
         Ok(())
     } else {

@@ -127,7 +127,7 @@ impl Illumination {
 
 /// From pressure to light in one scene.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct LightLaw {
+pub(crate) struct LightLaw {
     pub response: Response,
     /// Grey levels per pascal, g.
     pub grey_per_pascal: f64,
@@ -137,7 +137,7 @@ pub struct LightLaw {
 
 impl LightLaw {
     /// Light at a pressure, in grey levels above the background.
-    pub fn grey_at(&self, pressure_pa: f64) -> f64 {
+    pub(crate) fn grey_at(&self, pressure_pa: f64) -> f64 {
         // A scene without any load has no peak to refer to.
         if self.largest_pressure_pa == 0.0 {
             return 0.0;
@@ -147,7 +147,7 @@ impl LightLaw {
     }
 
     /// Unblurred light of a contact as a lens that distorts shows it.
-    pub fn bent_patch(
+    pub(crate) fn bent_patch(
         &self,
         contact: &SimulatedContact,
         disc: &Disc,
@@ -158,7 +158,12 @@ impl LightLaw {
     }
 
     /// Unblurred light of a contact over `window`, in grey levels above the background.
-    pub fn patch(&self, contact: &SimulatedContact, disc: &Disc, window: Window) -> PixelPatch {
+    pub(crate) fn patch(
+        &self,
+        contact: &SimulatedContact,
+        disc: &Disc,
+        window: Window,
+    ) -> PixelPatch {
         if self.largest_pressure_pa == 0.0 {
             return PixelPatch::zeros(window);
         }
@@ -185,7 +190,11 @@ impl LightLaw {
 }
 
 /// Pressure of a contact over `window` in pascal.
-pub fn pressure_patch(contact: &SimulatedContact, disc: &Disc, window: Window) -> PixelPatch {
+pub(crate) fn pressure_patch(
+    contact: &SimulatedContact,
+    disc: &Disc,
+    window: Window,
+) -> PixelPatch {
     if !contact.is_hertzian() {
         return disc.average_radial(window, |r_m| contact.pressure_pa(r_m));
     }

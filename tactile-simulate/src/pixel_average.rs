@@ -41,11 +41,11 @@ const BENT_RIM_ZONE: f64 = 2.0;
 const BENT_RIM_STEPS: usize = 8;
 
 /// Rows and columns of the image plane: the first and one past the last of each.
-pub type Window = [[isize; 2]; 2];
+pub(crate) type Window = [[isize; 2]; 2];
 
 /// A patch of the image plane, which may reach beyond the frame.
 #[derive(Debug, Clone)]
-pub struct PixelPatch {
+pub(crate) struct PixelPatch {
     /// Row and column of the first value.
     pub origin: [isize; 2],
     /// Values `[row, column]`.
@@ -54,7 +54,7 @@ pub struct PixelPatch {
 
 impl PixelPatch {
     /// Zeros over `window`.
-    pub fn zeros([[row0, row1], [col0, col1]]: Window) -> Self {
+    pub(crate) fn zeros([[row0, row1], [col0, col1]]: Window) -> Self {
         Self {
             origin: [row0, col0],
             values: Array2::zeros(((row1 - row0) as usize, (col1 - col0) as usize)),
@@ -62,7 +62,7 @@ impl PixelPatch {
     }
 
     /// Adds the part of the patch that lies in `frame`.
-    pub fn add_to(&self, frame: &mut Array2<f64>) {
+    pub(crate) fn add_to(&self, frame: &mut Array2<f64>) {
         let [row0, col0] = self.origin;
         let (skip, first) = ((-col0).max(0) as usize, col0.max(0) as usize);
         for (r, line) in self.values.rows().into_iter().enumerate() {
@@ -84,7 +84,7 @@ impl PixelPatch {
 
 /// What is averaged over the pixels, with the value 1 at the centre and 0 at the rim.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Profile {
+pub(crate) enum Profile {
     /// √(1 − r²/a²): the pressure.
     Hemisphere,
     /// 1 − r²/a²: its square.
@@ -93,7 +93,7 @@ pub enum Profile {
 
 /// Where the contact lies and how large the pixels are.
 #[derive(Debug, Clone, Copy)]
-pub struct Disc {
+pub(crate) struct Disc {
     pub centre_px: [f64; 2],
     pub radius_m: f64,
     pub pixel_size_m: [f64; 2],
@@ -102,7 +102,7 @@ pub struct Disc {
 impl Disc {
     /// Rows and columns (first, one past the last) that the disc touches, widened by `margin`
     /// pixels and cut to what lies within `margin` of a frame of `shape`.
-    pub fn window(&self, shape: [usize; 2], margin: usize) -> Window {
+    pub(crate) fn window(&self, shape: [usize; 2], margin: usize) -> Window {
         let span = |axis: usize, length: usize| {
             let radius_px = self.radius_m / self.pixel_size_m[axis];
             touched(self.centre_px[axis], radius_px, length, margin)
@@ -111,7 +111,7 @@ impl Disc {
     }
 
     /// Pixel averages of `profile` over `window`.
-    pub fn average(&self, profile: Profile, window: Window) -> PixelPatch {
+    pub(crate) fn average(&self, profile: Profile, window: Window) -> PixelPatch {
         let [[row0, row1], [col0, col1]] = window;
         let (rows, cols) = ((row1 - row0) as usize, (col1 - col0) as usize);
         let mut values = Array2::zeros((rows, cols));
@@ -148,7 +148,7 @@ impl Disc {
 
 /// First and one past the last of the pixels along one axis that lie within `half` of `centre`,
 /// widened by `margin`. They are cut to those within `margin` of a frame of `length` pixels.
-pub fn touched(centre: f64, half: f64, length: usize, margin: usize) -> [isize; 2] {
+pub(crate) fn touched(centre: f64, half: f64, length: usize, margin: usize) -> [isize; 2] {
     let margin = margin as isize;
     let limit = length as isize + margin;
     let first = ((centre - half + 0.5).floor() as isize)
@@ -163,7 +163,7 @@ pub fn touched(centre: f64, half: f64, length: usize, margin: usize) -> [isize; 
 /// Where the pixel is smaller than this share of 1 − ρ², quadrature of order 8 is exact to
 /// rounding: its error falls as the eighth power of that ratio. It spares the corners'
 /// cancellation, which grows as (radius/pixel)², and their cost.
-pub const SMOOTH: f64 = 0.03;
+pub(crate) const SMOOTH: f64 = 0.03;
 
 /// Nodes and weights of the four-point Gauss–Legendre rule on (−½, ½).
 const GAUSS: [(f64, f64); 4] = [
@@ -266,7 +266,7 @@ impl<'a> Corners<'a> {
 }
 
 /// G(x, y), odd in x and in y.
-pub fn corner(profile: Profile, x: f64, y: f64) -> f64 {
+pub(crate) fn corner(profile: Profile, x: f64, y: f64) -> f64 {
     // Beyond the disc's extent G no longer grows.
     let (u, v) = (x.abs().min(1.0), y.abs().min(1.0));
     let outside = u * u + v * v >= 1.0;
@@ -319,7 +319,7 @@ impl Disc {
     ///
     /// Four by four Gauss nodes inside. At the rim 16 by 16 midpoints, with an error of some 1e-5
     /// of the light.
-    pub fn average_radial(&self, window: Window, value: impl Fn(f64) -> f64) -> PixelPatch {
+    pub(crate) fn average_radial(&self, window: Window, value: impl Fn(f64) -> f64) -> PixelPatch {
         let [[row0, row1], [col0, col1]] = window;
         let [width, height] = self.pixel_size_m;
         let smooth_below = self.radius_m - RIM_ZONE * width.max(height);
@@ -355,7 +355,7 @@ impl Disc {
 
 /// Pixels of any size behind a lens that distorts about the frame's middle.
 #[derive(Debug, Clone, Copy)]
-pub struct PixelPlane {
+pub(crate) struct PixelPlane {
     pub middle_px: [f64; 2],
     pub pixel_size_m: [f64; 2],
     /// d = e (1 + bend e²), e the distance at which a place is seen, in metres of the frame's
@@ -364,12 +364,12 @@ pub struct PixelPlane {
 }
 
 impl PixelPlane {
-    pub fn is_flat(&self) -> bool {
+    pub(crate) fn is_flat(&self) -> bool {
         self.bend == 0.0
     }
 
     /// Metres from the frame's middle that a pixel shows.
-    pub fn to_metres(self, pixel: [f64; 2]) -> [f64; 2] {
+    pub(crate) fn to_metres(self, pixel: [f64; 2]) -> [f64; 2] {
         let [x, y] = std::array::from_fn(|k| (pixel[k] - self.middle_px[k]) * self.pixel_size_m[k]);
         let stretch = 1.0 + self.bend * (x * x + y * y);
         [x * stretch, y * stretch]
@@ -398,7 +398,12 @@ impl Disc {
     }
 
     /// [`window`](Self::window) behind a lens that distorts.
-    pub fn bent_window(&self, plane: PixelPlane, shape: [usize; 2], margin: usize) -> Window {
+    pub(crate) fn bent_window(
+        &self,
+        plane: PixelPlane,
+        shape: [usize; 2],
+        margin: usize,
+    ) -> Window {
         let centre = self.place(plane);
         let rim = (0..64).map(|k| {
             let (sin, cos) = (TAU * f64::from(k) / 64.0).sin_cos();
@@ -423,7 +428,7 @@ impl Disc {
     }
 
     /// [`average_radial`](Self::average_radial) behind a lens that distorts.
-    pub fn average_bent(
+    pub(crate) fn average_bent(
         &self,
         plane: PixelPlane,
         window: Window,

@@ -5,5 +5,5 @@ mod canvas;
 mod page;
 mod press;
 
-pub use page::{Colour, HeatMap, Page, Panel, PlotError};
-pub use press::{circle, known_heights_mm, press_pages, summary_lines};
+pub(crate) use page::{Colour, HeatMap, Page, Panel, PlotError};
+pub(crate) use press::{circle, known_heights_mm, press_pages, summary_lines};

@@ -19,7 +19,7 @@ use tactile_imaging::pipeline::PipelineError;
 
 /// Why a page could not be drawn.
 #[derive(Debug, thiserror::Error)]
-pub enum PlotError {
+pub(crate) enum PlotError {
     /// A page could not be drawn.
     #[error("cannot draw the page `{title}`: {source}")]
     Draw {
@@ -34,20 +34,20 @@ pub enum PlotError {
 }
 
 /// A position in the units of the axes.
-pub type PlotPoint = [f64; 2];
+pub(super) type PlotPoint = [f64; 2];
 
 /// Positions in any kind of list.
-pub trait Places: IntoIterator<Item = PlotPoint> {}
+pub(crate) trait Places: IntoIterator<Item = PlotPoint> {}
 impl<T: IntoIterator<Item = PlotPoint>> Places for T {}
 
 /// Starts and ends in any kind of list.
-pub trait Ends: IntoIterator<Item = [PlotPoint; 2]> {}
+pub(crate) trait Ends: IntoIterator<Item = [PlotPoint; 2]> {}
 impl<T: IntoIterator<Item = [PlotPoint; 2]>> Ends for T {}
 
 /// Colours that people with any colour vision tell apart (Okabe and Ito 2008), and two neutral
 /// ones.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Colour {
+pub(crate) enum Colour {
     Blue,
     Orange,
     Green,
@@ -60,7 +60,7 @@ pub enum Colour {
 
 impl Colour {
     /// The colour of the `k`-th of several equal things.
-    pub fn category(k: usize) -> Self {
+    pub(crate) fn category(k: usize) -> Self {
         let order = [Self::Blue, Self::Orange, Self::Green, Self::Red];
         [&order[..], &[Self::Purple, Self::Sky]].concat()[k % 6]
     }
@@ -81,7 +81,7 @@ impl Colour {
 
 /// Values on a regular grid, `[row, column]`. A cell without a finite value is light grey.
 #[derive(Clone, Debug)]
-pub struct HeatMap {
+pub(crate) struct HeatMap {
     values: Array2<f64>,
     /// Outer edges of the first and the last cell along x and y.
     edges: [[f64; 2]; 2],
@@ -94,7 +94,11 @@ pub struct HeatMap {
 impl HeatMap {
     /// Cells of `pixel_size` (x, y). The centre of the first one is the origin, the label names the
     /// values with their unit.
-    pub fn of_pixels(values: ArrayView2<'_, f64>, pixel_size: [f64; 2], label: &str) -> Self {
+    pub(crate) fn of_pixels(
+        values: ArrayView2<'_, f64>,
+        pixel_size: [f64; 2],
+        label: &str,
+    ) -> Self {
         let (rows, columns) = values.dim();
         let span = |n: usize, size: f64| [-0.5 * size, (n as f64 - 0.5) * size];
         Self {
@@ -107,7 +111,7 @@ impl HeatMap {
     }
 
     /// An 8-bit frame in grey, black to white over the whole scale.
-    pub fn of_frame(frame: ArrayView2<'_, u8>, pixel_size: [f64; 2]) -> Self {
+    pub(crate) fn of_frame(frame: ArrayView2<'_, u8>, pixel_size: [f64; 2]) -> Self {
         let values = frame.mapv(f64::from);
         Self {
             range: [0.0, 255.0],
@@ -117,7 +121,7 @@ impl HeatMap {
     }
 
     /// Puts the centre of the first cell at `origin` instead of (0, 0).
-    pub fn origin(mut self, origin: PlotPoint) -> Self {
+    pub(crate) fn origin(mut self, origin: PlotPoint) -> Self {
         for (edges, shift) in self.edges.iter_mut().zip(origin) {
             *edges = edges.map(|edge| edge + shift);
         }
@@ -192,7 +196,7 @@ struct Layer {
 
 /// One set of axes and what is drawn in it.
 #[derive(Clone, Debug, Default)]
-pub struct Panel {
+pub(crate) struct Panel {
     title: String,
     labels: [String; 2],
     layers: Vec<Layer>,
@@ -204,7 +208,11 @@ pub struct Panel {
 
 impl Panel {
     /// Axes with their labels: write the units into them.
-    pub fn new(title: impl Into<String>, x: impl Into<String>, y: impl Into<String>) -> Self {
+    pub(crate) fn new(
+        title: impl Into<String>,
+        x: impl Into<String>,
+        y: impl Into<String>,
+    ) -> Self {
         Self {
             title: title.into(),
             labels: [x.into(), y.into()],
@@ -213,7 +221,7 @@ impl Panel {
     }
 
     /// A block of lines instead of axes. A tab in a line starts the second column.
-    pub fn of_text(title: &str, lines: impl IntoIterator<Item = String>) -> Self {
+    pub(crate) fn of_text(title: &str, lines: impl IntoIterator<Item = String>) -> Self {
         Self {
             text: lines.into_iter().collect(),
             ..Self::new(title, "", "")
@@ -221,50 +229,50 @@ impl Panel {
     }
 
     /// Gives both axes the same scale on the page.
-    pub fn equal_aspect(mut self) -> Self {
+    pub(crate) fn equal_aspect(mut self) -> Self {
         self.equal_aspect = true;
         self
     }
 
     /// Makes both axes logarithmic.
-    pub fn logarithmic(mut self) -> Self {
+    pub(crate) fn logarithmic(mut self) -> Self {
         self.logarithmic = true;
         self
     }
 
     /// Adds discs.
-    pub fn points(self, at: impl Places, colour: Colour, label: &str) -> Self {
+    pub(crate) fn points(self, at: impl Places, colour: Colour, label: &str) -> Self {
         self.layer(Marks::Discs(at.into_iter().collect()), colour, label)
     }
 
     /// Adds open circles.
-    pub fn rings(self, at: impl Places, colour: Colour, label: &str) -> Self {
+    pub(crate) fn rings(self, at: impl Places, colour: Colour, label: &str) -> Self {
         self.layer(Marks::Rings(at.into_iter().collect()), colour, label)
     }
 
     /// Adds a line.
-    pub fn line(self, at: impl Places, colour: Colour, label: &str) -> Self {
+    pub(crate) fn line(self, at: impl Places, colour: Colour, label: &str) -> Self {
         self.layer(Marks::Line(at.into_iter().collect()), colour, label)
     }
 
     /// Adds a dashed line.
-    pub fn dashed(self, at: impl Places, colour: Colour, label: &str) -> Self {
+    pub(crate) fn dashed(self, at: impl Places, colour: Colour, label: &str) -> Self {
         self.layer(Marks::Dashes(at.into_iter().collect()), colour, label)
     }
 
     /// Adds plain segments, such as error bars and the matches between two point sets.
-    pub fn segments(self, ends: impl Ends, colour: Colour, label: &str) -> Self {
+    pub(crate) fn segments(self, ends: impl Ends, colour: Colour, label: &str) -> Self {
         self.layer(Marks::Segments(ends.into_iter().collect()), colour, label)
     }
 
     /// Adds arrows from the first to the second position of every pair.
-    pub fn arrows(self, ends: impl Ends, colour: Colour, label: &str) -> Self {
+    pub(crate) fn arrows(self, ends: impl Ends, colour: Colour, label: &str) -> Self {
         self.layer(Marks::Arrows(ends.into_iter().collect()), colour, label)
     }
 
     /// Adds points coloured by a value. The label of the colour bar names the values with their
     /// unit.
-    pub fn valued_points(
+    pub(crate) fn valued_points(
         self,
         at: impl Places,
         values: impl IntoIterator<Item = f64>,
@@ -276,7 +284,7 @@ impl Panel {
 
     /// Adds a heat map and draws the panel like an image: y downwards, both axes with the same
     /// scale.
-    pub fn heat_map(mut self, map: HeatMap) -> Self {
+    pub(crate) fn heat_map(mut self, map: HeatMap) -> Self {
         self.y_down = true;
         let label = map.label.clone();
         self.equal_aspect()
@@ -335,7 +343,7 @@ impl Layer {
 
 /// Panels in rows and columns under one title.
 #[derive(Clone, Debug)]
-pub struct Page {
+pub(crate) struct Page {
     title: String,
     columns: usize,
     panels: Vec<Panel>,
@@ -343,7 +351,7 @@ pub struct Page {
 
 impl Page {
     /// A page of this many columns. Panels fill its rows from left to right.
-    pub fn new(title: impl Into<String>, columns: usize, panels: Vec<Panel>) -> Self {
+    pub(crate) fn new(title: impl Into<String>, columns: usize, panels: Vec<Panel>) -> Self {
         Self {
             title: title.into(),
             columns: columns.max(1),
@@ -352,7 +360,7 @@ impl Page {
     }
 
     /// The page as the text of an SVG file.
-    pub fn to_svg(&self) -> Result<String, PlotError> {
+    pub(crate) fn to_svg(&self) -> Result<String, PlotError> {
         self.draw().map_err(|source| PlotError::Draw {
             title: self.title.clone(),
             source,

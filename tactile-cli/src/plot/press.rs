@@ -8,7 +8,7 @@ use tactile_imaging::pipeline::{ContactSurface, Measurement, PipelineError, Pres
 const LEAST_SPREAD: f64 = 1e-9;
 
 /// Names and pages. In the lines of the summary a tab stands between name and value.
-pub fn press_pages(
+pub(crate) fn press_pages(
     press: &mut Press<'_>,
     summary: Vec<String>,
 ) -> Result<Vec<(&'static str, Page)>, PlotError> {
@@ -30,7 +30,7 @@ pub fn press_pages(
 }
 
 /// The results of a measurement, as lines for the summary page.
-pub fn summary_lines(measurement: &Measurement) -> Vec<String> {
+pub(crate) fn summary_lines(measurement: &Measurement) -> Vec<String> {
     let mut lines = Vec::new();
     match &measurement.youngs_modulus_pa {
         Ok(modulus) => {
@@ -115,7 +115,7 @@ fn frames_page(press: &mut Press<'_>) -> Result<Page, PlotError> {
 }
 
 /// The vertices of a circle.
-pub fn circle([x, y]: PlotPoint, radius: f64) -> Vec<PlotPoint> {
+pub(crate) fn circle([x, y]: PlotPoint, radius: f64) -> Vec<PlotPoint> {
     let angles = (0..=120).map(|i| f64::from(i) * std::f64::consts::TAU / 120.0);
     let at = |angle: f64| [x + radius * angle.cos(), y + radius * angle.sin()];
     angles.map(at).collect()
@@ -186,7 +186,7 @@ fn depressions(press: &Press<'_>) -> Result<Option<Panel>, PlotError> {
 }
 
 /// Heights in millimetres, NaN outside the surface.
-pub fn known_heights_mm(found: &ContactSurface) -> Array2<f64> {
+pub(crate) fn known_heights_mm(found: &ContactSurface) -> Array2<f64> {
     let (mask, heights) = (&found.surface.mask, &found.surface.heights);
     Array2::from_shape_fn(heights.dim(), |at| match mask[at] {
         true => 1e3 * heights[at],

@@ -12,7 +12,7 @@ use tactile_imaging::{SeriesStrain, StrainBetween, StrainSeries};
 
 /// Follows the points and returns the strain of the last frame that has one since the first. None
 /// after Ctrl-C.
-pub fn follow<const D: usize>(
+pub(super) fn follow<const D: usize>(
     frames: &[Vec<Point<f64, D>>],
     unit: &'static str,
     arguments: &StrainArguments,
@@ -24,13 +24,7 @@ pub fn follow<const D: usize>(
     let mut followed = vec![0];
     let mut measured = StrainReport {
         before: frames[0].clone(),
-        after: Vec::new(),
-        matched: Vec::new(),
-        strain: Err("no frame could be followed".to_owned()),
-        frames: None,
-        complete: true,
-        measure: arguments.measure.strain().name(),
-        unit,
+        ..StrainReport::new(unit, arguments)
     };
     for (k, next) in frames.iter().enumerate().skip(1) {
         let name = printable(&arguments.frames[k].display().to_string());

@@ -3,6 +3,7 @@ use super::StreamArguments;
 use super::watch::{Meter, Watch, listed, watch};
 use crate::console::Context;
 use crate::failure::{Exit, Failure};
+use crate::frames::Reading;
 use crate::photometric::{GelReading, NO_FRAMES, Reader, number_or_error};
 use crate::relief::HeightGrid;
 use ndarray::{Array2, Array3};
@@ -13,7 +14,7 @@ use tactile_imaging::core::Estimate;
 use tactile_imaging::gel::FrameDoubt;
 
 /// The results of one frame.
-pub struct Row {
+pub(super) struct Row {
     /// None without contact, or why it has none.
     force_n: Result<Option<Estimate>, String>,
     contact: Option<GelReading>,
@@ -102,7 +103,7 @@ impl Meter for Gel {
 }
 
 /// Measures frames of a gel that is lit in colours.
-pub fn coloured(
+pub(super) fn coloured(
     sensor: &Path,
     arguments: &StreamArguments,
     context: &mut Context,
@@ -120,7 +121,10 @@ pub fn coloured(
         report.inputs(frames.iter().cloned());
     }
     let reader = Reader::open(sensor)?;
-    let reading = reader.reading(sensor);
+    let reading = Reading {
+        passes_over: true,
+        ..reader.reading(sensor)
+    };
     let gel = Gel {
         reader,
         depth_m: Array2::default((0, 0)),

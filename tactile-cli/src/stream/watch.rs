@@ -1,19 +1,18 @@
 //! The frames of a stream one after the other: from images, folders, videos and pipes.
 use super::StreamArguments;
-use crate::console::{Bar, Context};
+use crate::console::Context;
 use crate::failure::{Exit, Failure};
-use crate::frames::{DEFAULT_RATE_HZ, Pixels, Reading, passed_over};
+use crate::frames::{DEFAULT_RATE_HZ, Pixels, Reading};
 use crate::outputs::Csv;
 use crate::record::FrameRecorder;
 use crate::serve::LivePage;
-use crate::text::count;
 use serde_json::{Value, json};
 use std::error::Error;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 /// What measures the frames of a stream.
-pub trait Meter {
+pub(super) trait Meter {
     /// Frames as it takes them.
     type Frame: Pixels;
     /// The answer of a frame.
@@ -42,7 +41,7 @@ pub trait Meter {
 }
 
 /// A meter with the results of every frame so far.
-pub struct Watch<M: Meter> {
+pub(super) struct Watch<M: Meter> {
     pub meter: M,
     /// Times in seconds and answers.
     pub rows: Vec<(f64, M::Row)>,
@@ -52,7 +51,11 @@ pub struct Watch<M: Meter> {
 }
 
 impl<M: Meter> Watch<M> {
-    pub fn new(meter: M, arguments: &StreamArguments, context: &Context) -> Result<Self, Failure> {
+    pub(super) fn new(
+        meter: M,
+        arguments: &StreamArguments,
+        context: &Context,
+    ) -> Result<Self, Failure> {
         let page = arguments.serve.map(LivePage::serve).transpose()?;
         if let Some(page) = &page {
             context.note(format_args!("the measurement is shown at {}", page.url));
@@ -68,7 +71,7 @@ impl<M: Meter> Watch<M> {
     }
 
     /// Measures a frame, shows and records it. Returns how long the measuring and showing took.
-    pub fn take(&mut self, time_s: f64, frame: &M::Frame) -> Result<Duration, Failure> {
+    pub(super) fn take(&mut self, time_s: f64, frame: &M::Frame) -> Result<Duration, Failure> {
         let FrameCounts { seen, late, .. } = self.counts;
         if let Some(recording) = &mut self.recording {
             recording.frame(frame.channels(), self.counts.rate_hz)?;
@@ -105,7 +108,7 @@ impl<M: Meter> Watch<M> {
     }
 
     /// Prints a line for every frame or, of a long series, for one out of sixteen.
-    pub fn print_last(&self, every_one: bool, context: &mut Context) {
+    pub(super) fn print_last(&self, every_one: bool, context: &mut Context) {
         if let Some((time_s, row)) = self.rows.last()
             && (every_one || (self.rows.len() - 1).is_multiple_of(16))
         {
@@ -115,7 +118,7 @@ impl<M: Meter> Watch<M> {
     }
 
     /// What the answer has whatever is measured.
-    pub fn value(&self) -> Value {
+    pub(super) fn value(&self) -> Value {
         let update = |(time_s, row): &(f64, M::Row)| {
             let mut value = M::update(row);
             value["time_s"] = json!(time_s);
@@ -129,7 +132,7 @@ impl<M: Meter> Watch<M> {
 
     /// Adds the table of the series to the files. Complete if no more frames came late than allowed
     /// in per cent.
-    pub fn close(&self, allowed_late: f64, context: &mut Context) -> Exit {
+    pub(super) fn close(&self, allowed_late: f64, context: &mut Context) -> Exit {
         context
             .outputs
             .add("stream.csv", Self::table(&self.rows, true));
@@ -145,7 +148,7 @@ impl<M: Meter> Watch<M> {
 
 /// Counts of a stream's frames.
 #[derive(Clone, Copy)]
-pub struct FrameCounts {
+pub(super) struct FrameCounts {
     pub rate_hz: f64,
     /// The number of frames that came, measured or not.
     pub seen: usize,
@@ -156,7 +159,7 @@ pub struct FrameCounts {
 }
 
 impl FrameCounts {
-    pub fn new(rate_hz: f64) -> Self {
+    pub(super) fn new(rate_hz: f64) -> Self {
         Self {
             rate_hz,
             seen: 0,
@@ -165,12 +168,12 @@ impl FrameCounts {
         }
     }
 
-    pub fn late_percent(&self, measured: usize) -> f64 {
+    pub(super) fn late_percent(&self, measured: usize) -> f64 {
         100.0 * self.late as f64 / measured.max(1) as f64
     }
 
     /// Prints how many came late.
-    pub fn print(&self, measured: usize, context: &mut Context) {
+    pub(super) fn print(&self, measured: usize, context: &mut Context) {
         let (rate, late, percent) = (self.rate_hz, self.late, self.late_percent(measured));
         context.line(format_args!(
             "{measured} frames at {rate} Hz, {late} late ({percent:.1} %)"
@@ -180,7 +183,7 @@ impl FrameCounts {
 
 /// Measures the frames of these files as they come. A file that breaks off or cannot be read is a
 /// caution, and the next one follows.
-pub fn watch<M: Meter>(
+pub(super) fn watch<M: Meter>(
     watch: &mut Watch<M>,
     frames: &[PathBuf],
     reading: Reading<'_>,
@@ -192,28 +195,40 @@ pub fn watch<M: Meter>(
     let numbers = numbers(frames);
     let last = numbers.as_deref().and_then(<[_]>::last);
     let missing = last.map_or(0, |&last| last + 1 - frames.len() as u64);
-    let mut bar = Bar::of(frames.len(), "measuring");
-    let mut frame = M::Frame::default();
-    context.interrupt.polled(true);
-    for (k, path) in frames.iter().enumerate() {
-        if context.interrupt.requested() {
-            break;
+    let mut before = 0;
+    let unreadable = reading.each::<M::Frame>(frames, context, |frame, context| {
+        if frame.number == 1 {
+            // A file that could not be read counts as one frame.
+            before = match &numbers {
+                Some(numbers) => numbers[frame.file] as usize,
+                None => watch.counts.seen.max(frame.file),
+            };
         }
-        if let Some(numbers) = &numbers {
-            watch.counts.seen = numbers[k] as usize;
-        }
-        // A torn frame does not end a recording. Of a stream it ends what comes from there.
-        if let Err(failure) = file(watch, path, reading, rate_hz, &mut frame, context) {
-            if failure.exit == Exit::Output {
-                return Err(failure);
+        let stated = rate_hz.or(frame.rate_hz);
+        let rate_hz = stated.unwrap_or(watch.counts.rate_hz);
+        watch.counts.rate_hz = rate_hz;
+        // Frames that the recorder dropped have their time, too.
+        watch.counts.seen = before + frame.place;
+        let time_s = (watch.counts.seen - 1) as f64 / rate_hz;
+        // Reading the file is not part of the measurement.
+        match watch.take(time_s, frame.pixels) {
+            Ok(took) => {
+                watch.counts.late += usize::from(took.as_secs_f64() > 1.0 / rate_hz);
             }
-            watch.counts.unusable += 1;
-            watch.counts.seen = watch.counts.seen.max(k + 1);
-            context.caution(failure);
+            // A frame without an answer does not end a stream, and thousands of them are one
+            // trouble.
+            Err(failure) if failure.exit == Exit::Partial => {
+                watch.counts.unusable += 1;
+                if watch.counts.unusable <= 3 {
+                    context.caution(Failure::in_file(frame.path, failure));
+                }
+            }
+            Err(failure) => return Err(failure),
         }
-        bar.done(k + 1);
-    }
-    drop(bar);
+        watch.print_last(watch.rows.len() <= 32, context);
+        Ok(())
+    })?;
+    watch.counts.unusable += unreadable;
     let unusable = watch.counts.unusable;
     if watch.rows.is_empty() && unusable > 0 {
         return Err(Failure::input(format!(
@@ -229,58 +244,6 @@ pub fn watch<M: Meter>(
                  numbers"
             ),
         );
-    }
-    Ok(())
-}
-
-/// Measures the frames of a file or a pipe as they come, in the memory of `frame`.
-fn file<M: Meter>(
-    watch: &mut Watch<M>,
-    path: &Path,
-    reading: Reading<'_>,
-    rate_hz: Option<f64>,
-    frame: &mut M::Frame,
-    context: &mut Context,
-) -> Result<(), Failure> {
-    let mut source = reading.open(path)?;
-    if let Some(rate_hz) = rate_hz.or(source.frame_rate_hz()) {
-        watch.counts.rate_hz = rate_hz;
-    }
-    let before = watch.counts.seen;
-    while !context.interrupt.requested() && frame.read_next(&mut source)?.is_some() {
-        reading.fits(path, frame)?;
-        let rate_hz = watch.counts.rate_hz;
-        // Frames that the recorder dropped have their time, too.
-        watch.counts.seen = before + source.frames() as usize;
-        let time_s = (watch.counts.seen - 1) as f64 / rate_hz;
-        // Reading the file is not part of the measurement.
-        match watch.take(time_s, frame) {
-            Ok(took) => {
-                watch.counts.late += usize::from(took.as_secs_f64() > 1.0 / rate_hz);
-            }
-            // A frame without an answer does not end a stream, and thousands of them are one
-            // trouble.
-            Err(failure) if failure.exit == Exit::Partial => {
-                watch.counts.unusable += 1;
-                if watch.counts.unusable <= 3 {
-                    context.caution(Failure::in_file(path, failure));
-                }
-            }
-            Err(failure) => return Err(failure),
-        }
-        watch.print_last(watch.rows.len() <= 32, context);
-    }
-    let (dropped, damaged, _) = source.passed_over();
-    if let Some(sentence) = passed_over(path, &source) {
-        context.warn("frames_damaged", json!({ "frames": damaged }), sentence);
-    }
-    if dropped > 0 {
-        let sentence = format!(
-            "{}: the recorder dropped {}, whose times are kept",
-            path.display(),
-            count(dropped as usize, "frame")
-        );
-        context.warn("frames_dropped", json!({ "frames": dropped }), sentence);
     }
     Ok(())
 }
@@ -303,7 +266,7 @@ fn numbers(frames: &[PathBuf]) -> Option<Vec<u64>> {
 }
 
 /// The images that are named, and those of the folders that are named in the order of their names.
-pub fn listed(paths: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
+pub(super) fn listed(paths: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
     let mut frames = Vec::new();
     for path in paths {
         if !path.is_dir() {

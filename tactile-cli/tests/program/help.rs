@@ -1,6 +1,7 @@
-//! Every example in the help runs as it stands.
+//! Every example in the help runs, and its JSON keeps to the schema.
 use super::harness::{folder_with_examples, printed, words};
 use super::json::assert_keeps_to_schema;
+use serde_json::Value;
 use std::collections::BTreeSet;
 
 /// The commands of a help's examples, without what explains them.
@@ -33,10 +34,18 @@ fn subcommands() -> Vec<String> {
         .collect()
 }
 
+/// Runs an example for its JSON: lines of text are made too, and not printed.
 fn runs(example: &str) {
     let folder = folder_with_examples();
-    let printed = printed(folder.path(), example);
-    assert!(!printed.is_empty(), "tactile {example} prints nothing");
+    let json = if example.contains("--json") {
+        ""
+    } else {
+        " --json"
+    };
+    let printed = printed(folder.path(), &format!("{example}{json}"));
+    let value: Value =
+        serde_json::from_str(&printed).unwrap_or_else(|e| panic!("tactile {example}: {e}"));
+    assert_keeps_to_schema(&value, example);
     // Files go to --out and nowhere else.
     let entries = std::fs::read_dir(folder.path()).unwrap();
     let left: BTreeSet<_> = entries.map(|e| e.unwrap().file_name()).collect();
@@ -44,29 +53,7 @@ fn runs(example: &str) {
     assert_eq!(left.len(), expected, "tactile {example} leaves {left:?}");
 }
 
-#[test]
-fn every_example_of_every_subcommand_runs() {
-    let names = subcommands();
-    assert!(names.len() >= 12, "{names:?}");
-    for name in names {
-        let found = examples(&help(&format!("{name} --help")));
-        assert!(!found.is_empty(), "the help of {name} shows no example");
-        found.iter().for_each(|example| runs(example));
-    }
-}
-
-#[test]
-fn the_first_help_shows_one_example_for_each_subcommand() {
-    let shown = examples(&help("--help"));
-    let names: Vec<_> = shown.iter().map(|example| words(example)[0]).collect();
-    // The next test runs them.
-    let distinct: BTreeSet<_> = names.iter().copied().collect();
-    assert_eq!(distinct.len(), names.len(), "{names:?}");
-    for name in subcommands() {
-        assert!(distinct.contains(name.as_str()), "no example for {name}");
-    }
-}
-
+/// Other answers of the same subcommands.
 const OTHER_ANSWERS: [&str; 4] = [
     "measure --ideal-camera",
     "calibrate examples/data/press/calibration.csv --there-and-back",
@@ -76,15 +63,19 @@ const OTHER_ANSWERS: [&str; 4] = [
 ];
 
 #[test]
-fn json_of_every_example_keeps_to_the_schema() {
-    let folder = folder_with_examples();
-    let mut calls = examples(&help("--help"));
-    // Other answers of the same subcommands.
-    calls.extend(OTHER_ANSWERS.map(str::to_owned));
-    for example in calls {
-        let printed = printed(folder.path(), &format!("{example} --json"));
-        let value: serde_json::Value =
-            serde_json::from_str(&printed).unwrap_or_else(|e| panic!("tactile {example}: {e}"));
-        assert_keeps_to_schema(&value, &example);
+fn every_example_runs_and_its_json_keeps_to_the_schema() {
+    let names = subcommands();
+    assert!(names.len() >= 12, "{names:?}");
+    let first = examples(&help("--help"));
+    let shown: BTreeSet<_> = first.iter().map(|example| words(example)[0]).collect();
+    assert_eq!(shown.len(), first.len(), "one example for each: {first:?}");
+    let mut calls = BTreeSet::from(OTHER_ANSWERS.map(str::to_owned));
+    for name in &names {
+        assert!(shown.contains(name.as_str()), "no example for {name}");
+        let found = examples(&help(&format!("{name} --help")));
+        assert!(!found.is_empty(), "the help of {name} shows no example");
+        calls.extend(found);
     }
+    calls.extend(first.iter().cloned());
+    calls.iter().for_each(|example| runs(example));
 }

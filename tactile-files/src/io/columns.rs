@@ -1,7 +1,7 @@
 //! Headings of columns: their names, their units, and the names that programs give to coordinates.
 
 /// Names of x, y and z, the usual one first: DICe, TrackMate, ParaView, scikit-image.
-pub const AXES: [&[&str]; 3] = [
+pub(super) const AXES: [&[&str]; 3] = [
     &[
         "x",
         "coordinate_x",
@@ -22,14 +22,14 @@ pub const AXES: [&[&str]; 3] = [
 ];
 
 /// Names of displacements along x, y and z (OpenPIV, finite elements, DICe).
-pub const DISPLACEMENTS: [&[&str]; 3] = [
+pub(super) const DISPLACEMENTS: [&[&str]; 3] = [
     &["u", "u_x", "ux", "displacement_x"],
     &["v", "u_y", "uy", "displacement_y"],
     &["w", "u_z", "uz", "displacement_z"],
 ];
 
 /// Names of a frame's number in tables of tracked points (TrackMate, trackpy).
-pub const FRAME: &[&str] = &["frame", "t"];
+pub(super) const FRAME: &[&str] = &["frame", "t"];
 
 /// Other names by which a comment is known as a heading.
 const USUAL: [&str; 16] = [
@@ -52,14 +52,14 @@ const USUAL: [&str; 16] = [
 ];
 
 /// A heading cut into its name, in lower case, and its unit.
-pub struct Heading {
+pub(super) struct Heading {
     pub name: String,
     pub unit: Option<String>,
 }
 
 impl Heading {
     /// Cuts `Force (mN)`, `x [µm]`, `depth mm` or `indentation_um` into name and unit.
-    pub fn of(text: &str) -> Self {
+    pub(super) fn of(text: &str) -> Self {
         let bracketed = || {
             let inside = text.strip_suffix([')', ']'])?;
             inside.rsplit_once(['(', '['])
@@ -80,7 +80,7 @@ impl Heading {
     }
 
     /// Whether it is a usual name of a column, or has a known unit.
-    pub fn is_known(&self) -> bool {
+    pub(super) fn is_known(&self) -> bool {
         let mut names = AXES.iter().chain([&FRAME]).copied().flatten().chain(&USUAL);
         names.any(|name| *name == self.name)
             || self
@@ -89,14 +89,14 @@ impl Heading {
                 .is_some_and(|unit| in_si(unit).is_some())
     }
 
-    pub fn is_in_pixels(&self) -> bool {
+    pub(super) fn is_in_pixels(&self) -> bool {
         let unit = self.unit.as_deref().and_then(in_si);
         unit.is_some_and(|(base, _)| base == "1")
     }
 }
 
 /// The base unit and the value in SI of a unit. Both signs for micro are `u`.
-pub fn in_si(unit: &str) -> Option<(&'static str, f64)> {
+pub(super) fn in_si(unit: &str) -> Option<(&'static str, f64)> {
     let unit = unit.replace(['µ', 'μ'], "u");
     match unit.as_str() {
         "px" | "pixel" | "pixels" | "grey_levels" | "1" => return Some(("1", 1.0)),

@@ -142,7 +142,7 @@ impl FileError {
 }
 
 /// Text from a file as it can stand in a sentence: one line of at most `length` characters.
-pub fn quoted(text: &str, length: usize) -> String {
+pub(super) fn quoted(text: &str, length: usize) -> String {
     let visible = |c: char| if c.is_control() { ' ' } else { c };
     let clean: String = text.trim().chars().map(visible).collect();
     match clean.char_indices().nth(length) {

@@ -17,7 +17,7 @@ use {
 
 /// Largest file that is read, in bytes. No table, scene or frame needs more, and a device never
 /// ends.
-pub const LARGEST_FILE: u64 = 512 << 20;
+pub(super) const LARGEST_FILE: u64 = 512 << 20;
 
 /// Reads a whole file of at most 512 MiB.
 ///
@@ -47,7 +47,7 @@ pub fn read_bytes(path: &Path) -> Result<Vec<u8>, FileError> {
 }
 
 /// Opens a file, but no folder, pipe or device.
-pub fn open_file(path: &Path) -> std::io::Result<fs::File> {
+pub(super) fn open_file(path: &Path) -> std::io::Result<fs::File> {
     let metadata = fs::metadata(path)?;
     // Opening a pipe without a writer would wait for ever, and a device may never end.
     if metadata.is_dir() {
@@ -160,12 +160,12 @@ fn is_pipe(_: &Metadata) -> bool {
 }
 
 /// Reads a TOML file into a struct.
-pub fn read_toml<T: DeserializeOwned>(path: &Path) -> Result<T, FileError> {
+pub(crate) fn read_toml<T: DeserializeOwned>(path: &Path) -> Result<T, FileError> {
     parse_toml(&String::from_utf8_lossy(&read_bytes(path)?), path)
 }
 
 /// Reads a TOML text into a struct. The error names the field with its path, counted from 1.
-pub fn parse_toml<T: DeserializeOwned>(text: &str, path: &Path) -> Result<T, FileError> {
+pub(crate) fn parse_toml<T: DeserializeOwned>(text: &str, path: &Path) -> Result<T, FileError> {
     let rejected = |place: FilePlace, error: &toml::de::Error| FileError::Rejected {
         path: path.into(),
         place,
@@ -218,7 +218,7 @@ fn field_at(bytes: &Range<usize>, text: &str) -> Option<String> {
 }
 
 /// The path that a file names, relative to the folder of that file.
-pub fn beside(file: &Path, name: &Path) -> PathBuf {
+pub(crate) fn beside(file: &Path, name: &Path) -> PathBuf {
     file.parent().unwrap_or(Path::new("")).join(name)
 }
 
@@ -253,7 +253,7 @@ impl Visitor<'_> for Number {
 }
 
 /// A number, or an optional number, that passes a test. For `#[serde(deserialize_with = …)]`.
-pub fn number<'de, D: Deserializer<'de>, T: From<f64>>(
+pub(crate) fn number<'de, D: Deserializer<'de>, T: From<f64>>(
     deserializer: D,
     expected: &'static str,
     accepts: fn(f64) -> bool,
@@ -262,27 +262,27 @@ pub fn number<'de, D: Deserializer<'de>, T: From<f64>>(
     Ok(number.into())
 }
 
-pub fn finite<'de, D: Deserializer<'de>, T: From<f64>>(d: D) -> Result<T, D::Error> {
+pub(crate) fn finite<'de, D: Deserializer<'de>, T: From<f64>>(d: D) -> Result<T, D::Error> {
     number(d, "a finite number", f64::is_finite)
 }
 
-pub fn positive<'de, D: Deserializer<'de>, T: From<f64>>(d: D) -> Result<T, D::Error> {
+pub(crate) fn positive<'de, D: Deserializer<'de>, T: From<f64>>(d: D) -> Result<T, D::Error> {
     number(d, "a positive number", |v| v > 0.0 && v.is_finite())
 }
 
-pub fn not_negative<'de, D: Deserializer<'de>, T: From<f64>>(d: D) -> Result<T, D::Error> {
+pub(crate) fn not_negative<'de, D: Deserializer<'de>, T: From<f64>>(d: D) -> Result<T, D::Error> {
     let expected = "zero or a positive number";
     number(d, expected, |v| v >= 0.0 && v.is_finite())
 }
 
 /// A Poisson ratio at which an isotropic solid is stable.
-pub fn poisson_ratio<'de, D: Deserializer<'de>, T: From<f64>>(d: D) -> Result<T, D::Error> {
+pub(crate) fn poisson_ratio<'de, D: Deserializer<'de>, T: From<f64>>(d: D) -> Result<T, D::Error> {
     let expected = "a number above -1, at most 0.5";
     number(d, expected, |v| v > -1.0 && v <= 0.5)
 }
 
 /// Two positive numbers.
-pub fn positive_pair<'de, D: Deserializer<'de>, T: From<[f64; 2]>>(
+pub(crate) fn positive_pair<'de, D: Deserializer<'de>, T: From<[f64; 2]>>(
     deserializer: D,
 ) -> Result<T, D::Error> {
     #[derive(serde::Deserialize)]
@@ -292,7 +292,7 @@ pub fn positive_pair<'de, D: Deserializer<'de>, T: From<[f64; 2]>>(
 }
 
 /// An array of one or more.
-pub fn one_or_more<'de, D: Deserializer<'de>, T: Deserialize<'de>>(
+pub(crate) fn one_or_more<'de, D: Deserializer<'de>, T: Deserialize<'de>>(
     deserializer: D,
 ) -> Result<Vec<T>, D::Error> {
     let array = Vec::deserialize(deserializer)?;

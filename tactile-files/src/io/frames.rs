@@ -26,10 +26,10 @@ use tactile_imaging::pipeline::FrameSource;
 /// video, and a line without an end would fill the memory.
 const LONGEST_HEADER: u64 = 4096;
 
-pub use self::npy::{header_fields, members};
+pub(crate) use self::npy::{header_fields, members};
 
 /// First bytes of an array of NumPy, and of an archive of them.
-pub const ARRAY_STARTS: [&[u8]; 2] = Arrays::START;
+pub(super) const ARRAY_STARTS: [&[u8]; 2] = Arrays::START;
 
 /// What reads videos of other codecs.
 const PIPE: &str = "pipe it by ffmpeg -i VIDEO -f yuv4mpegpipe -pix_fmt gray - | tactile … -";

@@ -157,7 +157,7 @@ pub fn read_grey_levels(path: &Path, bits: Option<u8>) -> Result<Array2<u8>, Fil
 
 /// The levels of an image, whose encoded `bytes` may state the largest sample, in eight bits a
 /// pixel.
-pub fn eight_bit_levels(
+pub(super) fn eight_bit_levels(
     image: DynamicImage,
     bytes: &[u8],
     path: &Path,
@@ -202,7 +202,7 @@ pub fn read_colour_levels(path: impl AsRef<Path>) -> Result<Array3<u8>, FileErro
 ///
 /// Samples of 16 bits that do not exceed 10 or 12 bits are those of such a camera: they are divided
 /// by its range, not by that of 16 bits.
-pub fn colour_levels(image: DynamicImage) -> Option<Array3<u8>> {
+pub(super) fn colour_levels(image: DynamicImage) -> Option<Array3<u8>> {
     if !image.color().has_color() {
         return None;
     }
@@ -224,7 +224,7 @@ pub fn colour_levels(image: DynamicImage) -> Option<Array3<u8>> {
 
 /// Reads the image that a field of `file` names. It has to have the size of the reference, where
 /// that is known.
-pub fn read_frame(
+pub(crate) fn read_frame(
     file: &Path,
     field: &str,
     path: &Path,
@@ -247,11 +247,11 @@ pub fn read_frame(
 }
 
 /// Longest side and most pixels that are read. A header of some bytes can announce any size.
-pub fn largest_image() -> (u32, u64) {
+pub(super) fn largest_image() -> (u32, u64) {
     (30_000, 64_000_000)
 }
 
-pub fn decode(bytes: &[u8], path: &Path) -> Result<DynamicImage, FileError> {
+pub(super) fn decode(bytes: &[u8], path: &Path) -> Result<DynamicImage, FileError> {
     if !::image::guess_format(bytes).is_ok_and(|format| format.reading_enabled()) {
         let kind = kind_of(bytes).unwrap_or("a text");
         return Err(refused(path, format!("it is {kind}: an image is wanted")));
@@ -371,11 +371,10 @@ fn to_grey(
 /// The sample of 16 bits that stands for the level 255. The decoder stretches the samples of a PGM,
 /// PPM or PAM from the largest value that the header announces to the full range.
 fn white_of(samples: &[u16], bytes: &[u8], bits: Option<u8>) -> Result<f64, String> {
-    let full_range = 65_535.0;
     let brightest = samples.iter().copied().max().unwrap_or(u16::MAX);
     let announced = announced_maximum(bytes);
     if let Some(bits) = bits {
-        let stretch = announced.map_or(1.0, |maximum| full_range / f64::from(maximum));
+        let stretch = announced.map_or(1.0, |maximum| f64::from(u16::MAX) / f64::from(maximum));
         let white = stretch * f64::from((1_u32 << bits.clamp(1, 16)) - 1);
         // Half a sample for the decoder's rounding.
         if f64::from(brightest) <= white + 0.5 {
@@ -390,7 +389,7 @@ fn white_of(samples: &[u16], bytes: &[u8], bits: Option<u8>) -> Result<f64, Stri
     // with 12 bits or fewer do not pass 4095.
     let is_stretched = samples.iter().all(|sample| sample.is_multiple_of(257));
     if announced.is_some() || brightest > 4095 || is_stretched {
-        return Ok(full_range);
+        return Ok(f64::from(u16::MAX));
     }
     // Cameras of 10 bits do not pass 1023.
     let likely = if brightest > 1023 { 12 } else { 10 };
@@ -399,7 +398,7 @@ fn white_of(samples: &[u16], bytes: &[u8], bits: Option<u8>) -> Result<f64, Stri
 }
 
 /// The words of an anymap's header, comments left out.
-pub fn header_words(header: &str) -> impl Iterator<Item = &str> {
+pub(super) fn header_words(header: &str) -> impl Iterator<Item = &str> {
     let lines = header.lines();
     let lines = lines.map(|line| line.split('#').next().unwrap_or(""));
     lines.flat_map(str::split_ascii_whitespace)

@@ -1,6 +1,6 @@
 //! Kinds of files by their first bytes, as an error names what is there in place of what is wanted.
 
-pub const UTF_16: &str = "UTF-16 text";
+pub(super) const UTF_16: &str = "UTF-16 text";
 
 /// First bytes (where they stand, and what they are) and what such a file is, with the remedy.
 const KINDS: [(usize, &[u8], &str); 24] = [
@@ -57,7 +57,7 @@ const MPEG: &str = "a compressed video, which is not read: pipe it by \
 const LOOKED_AT: usize = 4096;
 
 /// What a file is that is no text. `None` for text.
-pub fn kind_of(bytes: &[u8]) -> Option<&'static str> {
+pub(super) fn kind_of(bytes: &[u8]) -> Option<&'static str> {
     let begins = |(at, magic, _): &&(usize, &[u8], &str)| {
         let rest = bytes.get(*at..).unwrap_or_default();
         // Two letters may begin a text as well.
@@ -70,7 +70,7 @@ pub fn kind_of(bytes: &[u8]) -> Option<&'static str> {
 }
 
 /// Whether a file is a text, as far as its beginning shows.
-pub fn is_text(bytes: &[u8]) -> bool {
+pub(super) fn is_text(bytes: &[u8]) -> bool {
     let start = &bytes[..bytes.len().min(LOOKED_AT)];
     let is_control = |byte: &&u8| byte.is_ascii_control() && !byte.is_ascii_whitespace();
     // A stray control character is the reader's to name.

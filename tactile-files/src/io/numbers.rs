@@ -182,7 +182,7 @@ fn matrix(mut rest: &[u8], big_endian: bool) -> Option<Array> {
 
 /// The cells of arrays: of one array, or of several columns of one length, each by its name. `None`
 /// for what holds no arrays.
-pub fn cells(bytes: &[u8], path: &Path) -> Option<Result<TextCells, FileError>> {
+pub(super) fn cells(bytes: &[u8], path: &Path) -> Option<Result<TextCells, FileError>> {
     let expected = "one array of numbers of two axes, or several of one axis and length";
     let refused = |found: String| FileError::content(path, FilePlace::File, expected, found);
     let arrays = if bytes.starts_with(ARRAY_STARTS[0]) {

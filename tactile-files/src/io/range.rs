@@ -61,26 +61,28 @@ impl InputQuantity {
     }
 }
 
-pub fn length<'de, D: Deserializer<'de>, T: From<f64>>(d: D) -> Result<T, D::Error> {
+pub(crate) fn length<'de, D: Deserializer<'de>, T: From<f64>>(d: D) -> Result<T, D::Error> {
     number(d, InputQuantity::Length.expected(), |v| {
         InputQuantity::Length.allows(v)
     })
 }
 
-pub fn modulus<'de, D: Deserializer<'de>, T: From<f64>>(d: D) -> Result<T, D::Error> {
+pub(crate) fn modulus<'de, D: Deserializer<'de>, T: From<f64>>(d: D) -> Result<T, D::Error> {
     number(d, InputQuantity::Modulus.expected(), |v| {
         InputQuantity::Modulus.allows(v)
     })
 }
 
-pub fn force<'de, D: Deserializer<'de>, T: From<f64>>(d: D) -> Result<T, D::Error> {
+pub(crate) fn force<'de, D: Deserializer<'de>, T: From<f64>>(d: D) -> Result<T, D::Error> {
     number(d, InputQuantity::Force.expected(), |v| {
         InputQuantity::Force.allows(v)
     })
 }
 
 /// Width and height of a pixel, of which neither is ten times the other.
-pub fn pixel_size<'de, D: Deserializer<'de>, T: From<[f64; 2]>>(d: D) -> Result<T, D::Error> {
+pub(crate) fn pixel_size<'de, D: Deserializer<'de>, T: From<[f64; 2]>>(
+    d: D,
+) -> Result<T, D::Error> {
     #[derive(serde::Deserialize)]
     struct Side(#[serde(deserialize_with = "side")] f64);
     let [width, height] = <[Side; 2]>::deserialize(d)?.map(|side| side.0);

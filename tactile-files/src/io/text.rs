@@ -17,7 +17,7 @@ const MISSING: [&str; 9] = [
 
 /// The cells of a table, row by row.
 #[derive(Default)]
-pub struct TextCells {
+pub(super) struct TextCells {
     pub header: Vec<String>,
     /// NaN if a cell holds no number.
     pub values: Vec<f64>,
@@ -156,7 +156,7 @@ fn names_columns(text: &str) -> [bool; 2] {
 ///
 /// # Errors
 /// [`FileError::Content`] for what is no text, and for rows of another length than the others.
-pub fn cells(bytes: &[u8], path: &Path, skip_lines: usize) -> Result<TextCells, FileError> {
+pub(super) fn cells(bytes: &[u8], path: &Path, skip_lines: usize) -> Result<TextCells, FileError> {
     let error =
         |place, expected: &str, found: &str| FileError::content(path, place, expected, found);
     if let Some(kind) = kind_of(bytes) {
@@ -333,6 +333,6 @@ pub fn cells(bytes: &[u8], path: &Path, skip_lines: usize) -> Result<TextCells, 
     Ok(table)
 }
 
-pub fn columns_in_words(count: usize) -> String {
+pub(super) fn columns_in_words(count: usize) -> String {
     format!("{count} column{}", if count == 1 { "" } else { "s" })
 }

@@ -375,7 +375,7 @@ impl Scene {
 }
 
 /// Pairs of integrated pixel value and force from a CSV file.
-pub fn force_pairs(path: &Path) -> Result<Vec<CalibrationPair>, FileError> {
+pub(super) fn force_pairs(path: &Path) -> Result<Vec<CalibrationPair>, FileError> {
     let value = (&["integrated_pixel_value"][..], "grey_levels");
     let [values, forces] = read_columns(path, [value, (&["force"], "N")])?;
     let pairs = values.into_iter().zip(forces);

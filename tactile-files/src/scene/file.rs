@@ -11,10 +11,11 @@ use std::fmt;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use tactile_imaging::core::Estimate;
+#[cfg(feature = "fem")]
+use tactile_imaging::core::Progress;
 use tactile_imaging::elasticity::ElasticityError;
 use tactile_imaging::elasticity::contact::{ContactTable, Layer, Waveguide};
-#[cfg(feature = "fem")]
-use tactile_imaging::fem::{ContactTableOptions, TableProgress};
+use tactile_imaging::fem::ContactTableOptions;
 use tactile_imaging::pipeline::{
     CheckPress, CheckedObject, EstimatorChoice, KnownBall, MatcherChoice, Object,
     ReconstructionChoice, SamplerChoice, Settings, StagesConfig, StrainChoice, WarpChoice,
@@ -265,13 +266,15 @@ fn incompressible() -> f64 {
 }
 
 /// A refractive index, for `#[serde(deserialize_with = …)]`.
-pub fn refractive_index<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
+pub(crate) fn refractive_index<'de, D: Deserializer<'de>>(
+    deserializer: D,
+) -> Result<f64, D::Error> {
     let accepts = |v: f64| v >= 1.0 && v.is_finite();
     number(deserializer, "a number of at least 1", accepts)
 }
 
 /// Layers as contact laws take them.
-pub fn elastic_layers(layers: &[SceneLayer]) -> Vec<Layer> {
+pub(crate) fn elastic_layers(layers: &[SceneLayer]) -> Vec<Layer> {
     let elastic = |layer: &SceneLayer| Layer {
         thickness_m: layer.thickness_m,
         youngs_modulus_pa: layer.youngs_modulus_pa,
@@ -814,7 +817,7 @@ pub fn read_contact_table(path: impl AsRef<Path>) -> Result<ContactTable, FileEr
 pub fn solve_contact_table(
     path: impl AsRef<Path>,
     options: &ContactTableOptions,
-    progress: impl FnMut(TableProgress) -> ControlFlow<()>,
+    progress: impl FnMut(Progress) -> ControlFlow<()>,
 ) -> Result<ContactTable, FileError> {
     #[derive(Deserialize)]
     #[serde(deny_unknown_fields)]
@@ -858,7 +861,7 @@ pub fn solve_contact_table(
 }
 
 /// The layers of a scene as a waveguide, rigid without any.
-pub fn guide(layers: &[SceneLayer]) -> Result<Waveguide, ElasticityError> {
+pub(crate) fn guide(layers: &[SceneLayer]) -> Result<Waveguide, ElasticityError> {
     if layers.is_empty() {
         return Ok(Waveguide::rigid());
     }

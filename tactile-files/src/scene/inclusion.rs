@@ -13,9 +13,13 @@ use tactile_imaging::elasticity::ElasticityError;
 use tactile_imaging::fem::{Guide, GuideLayer, Interface, Material};
 use tactile_imaging::force::{CalibrationOptions, LinearCalibration, StressCalibration};
 use tactile_imaging::inclusion::{
-    FaceCells, InclusionEstimate, InclusionSearch, PressureProfile, RingMeans, Scan, ScanPress,
-    SearchProgress, TissueBlock, asymmetry_warnings, ring_means,
+    FaceCells, InclusionEstimate, InclusionSearch, PressureProfile, Progress, RingMeans, Scan,
+    ScanPress, TissueBlock, asymmetry_warnings, ring_means,
 };
+
+/// Error of a press's place in metres if the file states none: of a hand that places the guide on
+/// lines drawn on the block, or of a simple robot.
+const USUAL_POSITION_ERROR_M: f64 = 0.2e-3;
 
 /// A block of tissue, the guide pressed onto it, and the frames.
 ///
@@ -130,7 +134,7 @@ impl LoadedInclusion {
     pub fn search(
         &self,
         search: &InclusionSearch,
-        progress: &mut dyn FnMut(SearchProgress) -> ControlFlow<()>,
+        progress: &mut dyn FnMut(Progress) -> ControlFlow<()>,
     ) -> Result<InclusionEstimate, ElasticityError> {
         if self.is_axial() {
             let radii_m = &self.rings[0].radii_m;
@@ -198,8 +202,6 @@ impl InclusionScene {
         }
         let specimen = file.object.specimen();
         let guide = file.waveguide.guide();
-        // Of a hand that places the guide on lines drawn on the block, or a simple robot.
-        let usual_position_error_m = 0.2e-3;
         Ok(Self {
             specimen: specimen.map_err(|error| FileError::field(path, "object", error))?,
             guide: guide.map_err(|error| FileError::field(path, "waveguide.layers", error))?,
@@ -208,7 +210,7 @@ impl InclusionScene {
             pixel_size_m: file.pixel_size_m,
             calibration: file.calibration.map(|table| beside(path, &table.pairs)),
             presses,
-            position_error_m: file.position_error_m.unwrap_or(usual_position_error_m),
+            position_error_m: file.position_error_m.unwrap_or(USUAL_POSITION_ERROR_M),
         })
     }
 

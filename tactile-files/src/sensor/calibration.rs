@@ -1,170 +1,16 @@
-//! The calibration of a sensor from presses under known forces, and its findings.
+//! The calibration of a sensor from presses under known forces.
 use super::file::{Sensor, SensorGeometry};
-use super::input::{Indenter, SensorCalibration};
+use super::findings::{LayerFinding, PressFinding, SensorError};
+use super::input::SensorCalibration;
 use super::layers;
 use super::target::find_dots;
-use crate::io::FileError;
 use ndarray::{Array2, ArrayView2};
 use tactile_imaging::force::{
-    Branch, CalibrationFrame, ContactDetector, ContactOptions, Detection, DetectorWorkspace,
-    DriftCorrection, Estimate, ForceError, ForceMeter, ForceWorkspace, LensFit, LensGeometry,
-    PressureCurve, PressureCurveOptions, ReferenceFrame,
+    CalibrationFrame, ContactDetector, ContactOptions, Detection, DetectorWorkspace,
+    DriftCorrection, ForceError, ForceMeter, ForceWorkspace, LensFit, LensGeometry, PressureCurve,
+    PressureCurveOptions, ReferenceFrame,
 };
-use tactile_imaging::pipeline::{PipelineError, ReferenceLight};
-
-/// Why a sensor could not be calibrated, in one sentence. Presses are counted from 1 in the
-/// sentences and from 0 in the fields.
-///
-/// ```
-/// use tactile_files::sensor::SensorError;
-/// let few = SensorError::TooFewPresses { found: 3, expected: 5 };
-/// assert!(few.to_string().starts_with("3 presses with a contact and a force, at least 5 are"));
-/// ```
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum SensorError {
-    /// A file cannot be read, used or written.
-    #[error(transparent)]
-    File(#[from] FileError),
-    /// Too few presses.
-    #[error(
-        "{found} presses with a contact and a force, at least {expected} are needed to fit the \
-         light-to-pressure curve"
-    )]
-    TooFewPresses {
-        /// Presses that can be used.
-        found: usize,
-        /// How many are needed.
-        expected: usize,
-    },
-    /// A press that should have one shows no contact, or cannot be measured.
-    #[error("press {}: {source}", press + 1)]
-    Press {
-        /// The press.
-        press: usize,
-        /// What is wrong with it.
-        source: ForceError,
-    },
-    /// A frame's reference cannot be used.
-    #[error("the reference: {0}")]
-    Reference(#[source] ForceError),
-    /// The presses do not determine the curve.
-    #[error("the presses do not determine the light-to-pressure curve: {0}")]
-    Curve(#[source] ForceError),
-    /// The curve leaves a scatter beyond what the gauge explains.
-    #[error(
-        "the forces scatter by {scatter:.1} times their stated error about the light-to-pressure \
-         curve: check press {}, the worst",
-        worst + 1
-    )]
-    Scatter {
-        /// Standard deviation of the residuals over the stated errors.
-        scatter: f64,
-        /// The press with the largest residual.
-        worst: usize,
-    },
-    /// The presses leave out forces that scenes will have.
-    #[error(
-        "the presses reach from {:.3} N to {:.3} N, but scenes will have {:.3} N to {:.3} N",
-        found[0],
-        found[1],
-        expected[0],
-        expected[1]
-    )]
-    NotCovered {
-        /// Least and greatest force of the presses.
-        found: [f64; 2],
-        /// Those of the scenes.
-        expected: [f64; 2],
-    },
-    /// The target's dots cannot be found or do not lie on a grid.
-    #[error("the target: {found} dots on a grid, at least {expected} are needed")]
-    Target {
-        /// Dots with a place on the grid.
-        found: usize,
-        /// How many are needed.
-        expected: usize,
-    },
-    /// The target's dots do not determine the lens.
-    #[error("the target does not determine the lens: {0}")]
-    Lens(#[source] ForceError),
-    /// The contact radii do not go with the forces of a ball on these layers.
-    #[error(
-        "the contact radii under the ball of {radius_m:e} m do not fit layers of the stated errors \
-         (off by {deviation:.1} standard errors): check the ball's radius and the forces"
-    )]
-    Radius {
-        /// The ball's stated radius.
-        radius_m: f64,
-        /// How far off, in standard errors.
-        deviation: f64,
-    },
-    /// Something cannot be built from what was fitted.
-    #[error(transparent)]
-    Pipeline(#[from] PipelineError),
-}
-
-/// What one press was found to be.
-///
-/// ```
-/// use tactile_imaging::force::{Branch, Estimate};
-/// use tactile_files::sensor::{Indenter, PressFinding};
-/// let finding = PressFinding {
-///     indenter: Indenter::Punch { radius_m: 2e-3 },
-///     branch: Branch::Loading,
-///     force_n: 0.5,
-///     read_force_n: Some(0.503),
-///     contact_radius_m: Some(Estimate::new(2.01e-3, 2e-6)),
-///     layers_force_n: None,
-/// };
-/// assert!(finding.read_force_n.is_some_and(|read| (read / finding.force_n - 1.0).abs() < 0.01));
-/// ```
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PressFinding {
-    /// What was pressed.
-    pub indenter: Indenter,
-    /// Rising or falling force.
-    pub branch: Branch,
-    /// The gauge's force in newtons.
-    pub force_n: f64,
-    /// The force read from the frame with the fitted curve. `None` where no contact is seen, and
-    /// the press was not used.
-    pub read_force_n: Option<f64>,
-    /// The fitted contact radius.
-    pub contact_radius_m: Option<Estimate>,
-    /// The force that the fitted layers have at that radius. `None` for presses that the layers
-    /// were not fitted to.
-    pub layers_force_n: Option<f64>,
-}
-
-/// One parameter of a layer before and after the calibration.
-///
-/// ```
-/// use tactile_files::sensor::LayerFinding;
-/// use tactile_imaging::force::Estimate;
-/// let modulus = LayerFinding {
-///     layer: 0,
-///     parameter: "youngs_modulus_pa",
-///     stated: Estimate::new(120e3, 15e3),
-///     fitted: Estimate::new(135e3, 3e3),
-///     identified: true,
-/// };
-/// assert!(modulus.fitted.standard_error < 0.7 * modulus.stated.standard_error);
-/// ```
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct LayerFinding {
-    /// The layer, counted from the object's side from 0.
-    pub layer: usize,
-    /// The field of the sensor file.
-    pub parameter: &'static str,
-    /// The user's statement.
-    pub stated: Estimate,
-    /// The estimate from the presses and the statement together.
-    pub fitted: Estimate,
-    /// Whether the presses determine it: its error fell below 0.7 times the stated one. A parameter
-    /// that is not identified keeps its statement.
-    pub identified: bool,
-}
+use tactile_imaging::pipeline::ReferenceLight;
 
 /// A calibrated sensor and how it was found. Made by
 /// [`SensorCalibration::run`](super::SensorCalibration::run).
@@ -191,6 +37,9 @@ pub struct CalibratedSensor {
 /// Relative error of a force beside the gauge's noise: the noise of the frames, and the smoothing
 /// of the curve.
 const CURVE_ERROR: f64 = 2e-3;
+
+/// The fewest presses that determine a curve.
+const FEWEST_PRESSES: usize = 5;
 
 /// A press that shows a contact.
 struct Seen {
@@ -302,12 +151,10 @@ impl SensorCalibration {
                 CalibrationFrame::new(histogram, given.force_n, given.branch).map_err(failed)?;
             seen.push(Seen { press, histogram });
         }
-        // The fewest presses that determine a curve.
-        let expected = 5;
-        if seen.len() < expected {
+        if seen.len() < FEWEST_PRESSES {
             return Err(SensorError::TooFewPresses {
                 found: seen.len(),
-                expected,
+                expected: FEWEST_PRESSES,
             });
         }
         self.covered(&seen)?;

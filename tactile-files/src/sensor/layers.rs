@@ -4,7 +4,7 @@
 //! E, ln h and ν of all layers, ln R of every ball, and one factor on all forces, because the
 //! parabola of the theory is not a ball. All start from their stated values, with the stated errors
 //! as a prior. Parameters that the presses do not determine stay as they were stated.
-use super::calibration::{LayerFinding, PressFinding, SensorError};
+use super::findings::{LayerFinding, PressFinding, SensorError};
 use super::input::{Indenter, LayerInput};
 use crate::scene::{SceneLayer, elastic_layers};
 use nalgebra::{DMatrix, DVector};
@@ -37,7 +37,7 @@ struct Ball {
 
 /// The layers with their errors.
 #[derive(Clone, Debug)]
-pub struct LayerFit {
+pub(super) struct LayerFit {
     /// Fitted, or as stated where no press could be used.
     pub layers: Vec<SceneLayer>,
     /// Of ln E, ln h and ν of all layers.
@@ -46,7 +46,7 @@ pub struct LayerFit {
 
 impl LayerFit {
     /// The covariance as a sensor file has it.
-    pub fn covariance_rows(&self) -> Vec<Vec<f64>> {
+    pub(super) fn covariance_rows(&self) -> Vec<Vec<f64>> {
         let rows = self.covariance.row_iter();
         rows.map(|row| row.iter().copied().collect()).collect()
     }
@@ -59,12 +59,15 @@ const NODES: usize = 5;
 const LARGEST_DEVIATION: f64 = 4.0;
 /// Standard error of a parameter that is stated as exact, far below any that presses determine.
 const EXACT: f64 = 1e-6;
+/// Relative error of a contact radius beside the frame's noise: the profile of a guide that ends is
+/// not quite Hertz's.
+const PROFILE_ERROR: f64 = 5e-4;
 
 /// Fits the layers to the contacts of balls, and notes the force that they have there.
 ///
 /// # Errors
 /// [`SensorError::Radius`] where the contacts contradict the statements.
-pub fn fit(
+pub(super) fn fit(
     stated: &[LayerInput],
     gauge_noise_n: f64,
     presses: &mut [PressFinding],
@@ -101,14 +104,12 @@ pub fn fit(
             });
             balls.len() - 1
         });
-        // The profile of a guide that ends is not quite Hertz's.
-        let profile_error = 5e-4;
         contacts.push(BallContact {
             ball,
             force_n: press.force_n,
             force_error: (gauge_noise_n / press.force_n).max(1e-4),
             radius_m: radius.value,
-            radius_error: (radius.standard_error / radius.value).hypot(profile_error),
+            radius_error: (radius.standard_error / radius.value).hypot(PROFILE_ERROR),
         });
         places.push(place);
     }
@@ -147,7 +148,7 @@ pub fn fit(
 }
 
 /// Every parameter of the layers before and after the fit.
-pub fn findings(stated: &[LayerInput], fit: &LayerFit) -> Vec<LayerFinding> {
+pub(super) fn findings(stated: &[LayerInput], fit: &LayerFit) -> Vec<LayerFinding> {
     let n = stated.len();
     let mut findings = Vec::with_capacity(3 * n);
     let values = |layer: &SceneLayer| {

@@ -37,12 +37,14 @@
 //! names it with `sensor = "sensor.toml"`.
 mod calibration;
 mod file;
+mod findings;
 mod input;
 mod layers;
 mod photometric;
 mod target;
 
-pub use calibration::{CalibratedSensor, LayerFinding, PressFinding, SensorError};
+pub use calibration::CalibratedSensor;
 pub use file::{Sensor, SensorGeometry};
+pub use findings::{LayerFinding, PressFinding, SensorError};
 pub use input::{Indenter, LayerInput, SensorCalibration, SensorPress};
 pub use photometric::{PhotometricPresses, PhotometricSensor};

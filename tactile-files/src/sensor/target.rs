@@ -1,8 +1,11 @@
 //! The dots of a target: found in its frame, and given their places on the grid.
-use super::calibration::SensorError;
+use super::findings::SensorError;
 use ndarray::ArrayView2;
 use tactile_imaging::core::{otsu, regions};
 use tactile_imaging::force::DotPair;
+
+/// Enough for six parameters of the lens with a residual.
+const FEWEST_DOTS: usize = 20;
 
 /// Finds the dots of a target, dark on bright or bright on dark, and pairs them with their places
 /// on a square grid.
@@ -14,15 +17,16 @@ use tactile_imaging::force::DotPair;
 ///
 /// # Errors
 /// [`SensorError::Target`] for fewer than twenty dots on the grid.
-pub fn find_dots(frame: ArrayView2<'_, u8>, pitch_m: f64) -> Result<Vec<DotPair>, SensorError> {
+pub(super) fn find_dots(
+    frame: ArrayView2<'_, u8>,
+    pitch_m: f64,
+) -> Result<Vec<DotPair>, SensorError> {
     let dots = centres(frame);
     let placed = on_grid(&dots, frame.dim());
-    // Enough for six parameters of the lens with a residual.
-    let expected = 20;
-    if placed.len() < expected {
+    if placed.len() < FEWEST_DOTS {
         return Err(SensorError::Target {
             found: placed.len(),
-            expected,
+            expected: FEWEST_DOTS,
         });
     }
     let pair = |(dot, place): &(usize, [i32; 2])| DotPair {

@@ -52,31 +52,28 @@ impl CalibrationFrame {
     }
 }
 
-/// The weights of the frames and the smoothness of the curve.
+/// The weights of the frames.
 ///
 /// ```
 /// use tactile_force::PressureCurveOptions;
 ///
 /// // A gauge good to 0.5 % of the force and 0.1 % of its range.
 /// let options = PressureCurveOptions::default().with_force_error(0.005, 0.001)?;
-/// // A curve as stiff as a straight line.
-/// assert!(options.with_smoothness(1e6).is_ok() && options.with_smoothness(f64::NAN).is_err());
+/// assert!(options.with_force_error(0.005, f64::NAN).is_err());
 /// # Ok::<(), tactile_force::ForceError>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PressureCurveOptions {
     relative_error: f64,
     range_error: f64,
-    smoothness: Option<f64>,
 }
 
 impl Default for PressureCurveOptions {
-    /// Errors of 1 % of the force and 0.2 % of the largest force, smoothness by cross-validation.
+    /// Errors of 1 % of the force and 0.2 % of the largest force.
     fn default() -> Self {
         Self {
             relative_error: 0.01,
             range_error: 0.002,
-            smoothness: None,
         }
     }
 }
@@ -92,16 +89,6 @@ impl PressureCurveOptions {
     pub fn with_force_error(mut self, of_force: f64, of_range: f64) -> Result<Self, ForceError> {
         self.relative_error = Requirement::NonNegative.check("of_force", of_force)?;
         self.range_error = Requirement::Positive.check("of_range", of_range)?;
-        Ok(self)
-    }
-
-    /// Weighs the second differences of the slopes by this factor, relative to the data, instead of
-    /// choosing it by cross-validation.
-    ///
-    /// # Errors
-    /// A factor that is not positive and finite.
-    pub fn with_smoothness(mut self, factor: f64) -> Result<Self, ForceError> {
-        self.smoothness = Some(Requirement::Positive.check("smoothness", factor)?);
         Ok(self)
     }
 }
@@ -157,8 +144,8 @@ pub struct PressureCurveReport {
     /// The smoothness used.
     pub smoothness: f64,
     /// Root mean square error of forces that were left out of the fit, relative to the assumed
-    /// errors. `None` if the smoothness was given.
-    pub cross_validation_error: Option<f64>,
+    /// errors.
+    pub cross_validation_error: f64,
     /// Least and greatest grey level between which f is known to 5 %. Zero to zero if nowhere.
     pub identified_grey: [f64; 2],
     /// Loading against unloading. `None` unless each has three frames.
@@ -251,10 +238,7 @@ impl PressureCurve {
         options: &PressureCurveOptions,
     ) -> Result<Self, ForceError> {
         let problem = Problem::new(frames, options)?;
-        let (smoothness, cross_validation_error) = match options.smoothness {
-            Some(given) => (given, None),
-            None => problem.cross_validated(),
-        };
+        let (smoothness, cross_validation_error) = problem.cross_validated();
         let solution = problem.solve(smoothness, |_| true);
         let residuals = (0..frames.len()).map(|i| problem.residual(i, &solution.slopes));
         let squares: f64 = residuals.clone().map(|r| r * r).sum();
@@ -572,7 +556,7 @@ impl Problem {
     }
 
     /// The smoothness with the least error on frames left out, and that error.
-    fn cross_validated(&self) -> (f64, Option<f64>) {
+    fn cross_validated(&self) -> (f64, f64) {
         let count = self.rows.len();
         // Parts that are left out in turn: each frame alone where there are few.
         let folds = count.min(10);
@@ -596,7 +580,7 @@ impl Problem {
                 best = (smoothness, here);
             }
         }
-        (best.0, Some(best.1))
+        best
     }
 
     /// Each branch's own scale of the common curve, by least squares.

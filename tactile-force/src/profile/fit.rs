@@ -2,99 +2,12 @@
 //! misfit beyond the noise.
 
 use nalgebra::{SMatrix, SVector};
-use tactile_core::{Estimate, Requirement, Source, StopReason, Uncertain};
+use tactile_core::{Estimate, Source, StopReason, Uncertain};
 
 use super::model::{BlurredEdge, Level, Shape, level};
 use super::rings::{Ring, Rings};
-use crate::error::ForceError;
 use crate::noise::DifferenceNoise;
 use crate::region::Region;
-
-/// The parameters of the profile that are known, and the length of the fit.
-///
-/// ```
-/// use tactile_force::{ForceMeter, ForceOptions, HertzFitOptions};
-///
-/// // A lens whose blur is known, over a background that is not.
-/// let hertz = HertzFitOptions::default()
-///     .with_blur_px(1.2)?
-///     .with_fitted_background()
-///     .with_max_iterations(20)?;
-/// assert!(ForceMeter::new([20e-6; 2], &ForceOptions::default().with_hertz(hertz)).is_ok());
-/// # Ok::<(), tactile_force::ForceError>(())
-/// ```
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct HertzFitOptions {
-    /// Standard deviation of the optical blur. `None` fits it.
-    #[cfg_attr(feature = "serde", serde(deserialize_with = "read::blur_px"))]
-    blur_px: Option<f64>,
-    fit_background: bool,
-    #[cfg_attr(feature = "serde", serde(deserialize_with = "read::max_iterations"))]
-    max_iterations: usize,
-}
-
-impl Default for HertzFitOptions {
-    /// Blur fitted, no background, at most 50 steps.
-    fn default() -> Self {
-        Self {
-            blur_px: None,
-            fit_background: false,
-            // A clean contact takes 5 to 8 steps: `cargo bench -p tactile-benches --bench
-            // work_precision` shows the error after 1, 2 and 5.
-            max_iterations: 50,
-        }
-    }
-}
-
-impl HertzFitOptions {
-    /// Takes the standard deviation of the optical blur, in pixels, as known. By default it is
-    /// fitted.
-    ///
-    /// # Errors
-    /// A blur that is negative or not finite.
-    pub fn with_blur_px(mut self, sd: f64) -> Result<Self, ForceError> {
-        self.blur_px = Some(Requirement::NonNegative.check("blur_px", sd)?);
-        Ok(self)
-    }
-
-    /// Fits a constant background under the profile as well.
-    pub fn with_fitted_background(mut self) -> Self {
-        self.fit_background = true;
-        self
-    }
-
-    /// Takes at most this number of steps.
-    ///
-    /// # Errors
-    /// Zero steps.
-    pub fn with_max_iterations(mut self, steps: usize) -> Result<Self, ForceError> {
-        Requirement::AtLeastOne.check("max_iterations", steps as f64)?;
-        self.max_iterations = steps;
-        Ok(self)
-    }
-}
-
-/// Values read from a file pass the same checks as values set in code.
-#[cfg(feature = "serde")]
-mod read {
-    use serde::{Deserialize, Deserializer, de::Error};
-
-    use super::HertzFitOptions;
-
-    pub fn blur_px<'de, D: Deserializer<'de>>(d: D) -> Result<Option<f64>, D::Error> {
-        let Some(sd) = Option::deserialize(d)? else {
-            return Ok(None);
-        };
-        let options = HertzFitOptions::default().with_blur_px(sd);
-        options.map(|o| o.blur_px).map_err(D::Error::custom)
-    }
-
-    pub fn max_iterations<'de, D: Deserializer<'de>>(d: D) -> Result<usize, D::Error> {
-        let options = HertzFitOptions::default().with_max_iterations(usize::deserialize(d)?);
-        options.map(|o| o.max_iterations).map_err(D::Error::custom)
-    }
-}
 
 /// Whether a fitted contact is that of a ball.
 ///
@@ -174,8 +87,6 @@ pub struct HertzFit {
     pub radius_m: Uncertain,
     /// Grey-level difference at the centre.
     pub peak: Estimate,
-    /// Grey-level difference far away. Zero if it was not fitted.
-    pub background: Estimate,
     /// Standard deviation of the blur, in pixels.
     pub blur_px: f64,
     /// c of p₀ √(1 − r²/a²) (1 − c r²/a²). Zero where the Hertz profile fits to within the noise.
@@ -184,8 +95,8 @@ pub struct HertzFit {
     pub bend: Estimate,
     /// Integral of the profile, 2π/3 A a² (1 − 2c/5) in grey levels × pixels.
     pub integrated_pixel_value: Estimate,
-    /// Covariance of [peak, background, radius, blur variance, x, y], in grey levels and pixels.
-    pub covariance: [[f64; 6]; 6],
+    /// Covariance of [peak, radius, blur variance, x, y], in grey levels and pixels.
+    pub covariance: [[f64; 5]; 5],
     /// Residual variance over the noise model's: near 1 if the contact is that of a ball.
     pub reduced_chi_squared: f64,
     /// Root mean square misfit of the mean level at each radius, the noise's share subtracted,
@@ -206,12 +117,9 @@ impl HertzFit {
     /// The fit of a profile in other units of its level, as pressures for grey levels.
     pub(crate) fn with_levels_scaled(mut self, factor: f64) -> Self {
         self.peak = self.peak * factor;
-        self.background = self.background * factor;
         self.integrated_pixel_value = self.integrated_pixel_value * factor;
-        for k in 0..2 {
-            self.covariance[k].iter_mut().for_each(|c| *c *= factor);
-            self.covariance.iter_mut().for_each(|row| row[k] *= factor);
-        }
+        self.covariance[0].iter_mut().for_each(|c| *c *= factor);
+        self.covariance.iter_mut().for_each(|row| row[0] *= factor);
         self
     }
 }
@@ -221,18 +129,19 @@ const PIXEL: f64 = 1.0 / 12.0;
 /// Greatest bend that is fitted. Balls on soft layers reach −0.3, balls flattened on glass +0.15.
 /// Beyond ±0.6 the profile is no ball's.
 const LARGEST_BEND: f64 = 0.6;
+/// Steps of a fit. A clean contact takes 5 to 8.
+const MAX_ITERATIONS: usize = 50;
 
 /// Fits Hertz profiles. Holds the table of the blurred edge.
 #[derive(Clone, Debug)]
-pub struct HertzFitter {
-    options: HertzFitOptions,
+pub(crate) struct HertzFitter {
     edge: BlurredEdge,
 }
 
 /// Where a fit starts: the contact's centroid, equivalent radius and integral, in pixels of its
 /// region.
 #[derive(Clone, Copy, Debug)]
-pub struct Start {
+pub(crate) struct Start {
     pub centre: [f64; 2],
     pub radius: f64,
     pub integral: f64,
@@ -260,15 +169,14 @@ struct State {
 }
 
 impl HertzFitter {
-    pub fn new(options: HertzFitOptions) -> Self {
+    pub(crate) fn new() -> Self {
         Self {
-            options,
             edge: BlurredEdge::new(),
         }
     }
 
     /// Fits the aperture's pixels. `None` if they do not determine the parameters.
-    pub fn fit_with(
+    pub(crate) fn fit_with(
         &self,
         rings: &mut Rings,
         region: &Region,
@@ -278,7 +186,6 @@ impl HertzFitter {
     ) -> Option<HertzFit> {
         let place = region.place?;
         let aspect = pixel_size_m[1] / pixel_size_m[0];
-        let blur = self.options.blur_px.map_or(0.5, |b| b * b) + PIXEL;
         // Of Hertz's profile with this integral, 2π/3 A a² over pixels `aspect` times as high as
         // wide.
         let peak =
@@ -286,9 +193,8 @@ impl HertzFitter {
         let mut state = State {
             shape: Shape {
                 peak,
-                background: 0.0,
                 radius: start.radius,
-                blur,
+                blur: 0.5 + PIXEL,
                 bend: 0.0,
             },
             centre: start.centre,
@@ -375,11 +281,11 @@ impl HertzFitter {
         let mut here = self.assemble(rings, state, variance);
         state.stop = StopReason::IterationLimit;
         let mut shift = [0.0; 2];
-        while state.iterations < self.options.max_iterations {
+        while state.iterations < MAX_ITERATIONS {
             state.iterations += 1;
             let step = here.normal.cholesky()?.solve(&here.gradient);
             // The centre enters linearly on fixed rings: its best shift belongs to the final shape.
-            shift = [step[4], step[5]];
+            shift = [step[X], step[Y]];
             let mut trial = self.stepped(state, &step);
             let mut there = self.assemble(rings, &trial, variance);
             for halving in 1..10 {
@@ -417,15 +323,10 @@ impl HertzFitter {
         let shape = &state.shape;
         let stepped = Shape {
             peak: shape.peak + step[0],
-            background: shape.background + step[1],
             // A full step from a poor start can leave the range in which the linear model holds.
-            radius: (shape.radius + step[2]).clamp(0.5 * shape.radius, 2.0 * shape.radius),
-            blur: if self.options.blur_px.is_some() {
-                shape.blur
-            } else {
-                // A pixel's own width is the least blur.
-                (shape.blur + step[3]).clamp(PIXEL, 4.0 * shape.blur)
-            },
+            radius: (shape.radius + step[RADIUS]).clamp(0.5 * shape.radius, 2.0 * shape.radius),
+            // A pixel's own width is the least blur.
+            blur: (shape.blur + step[BLUR]).clamp(PIXEL, 4.0 * shape.blur),
             bend: (shape.bend + step[BEND]).clamp(-LARGEST_BEND, LARGEST_BEND),
         };
         State {
@@ -434,8 +335,8 @@ impl HertzFitter {
         }
     }
 
-    /// Normal equations over all pixels of the rings. Rows of parameters that are not fitted are
-    /// those of the identity.
+    /// Normal equations over all pixels of the rings. The row of a bend that is not fitted is that
+    /// of the identity.
     fn assemble(&self, rings: &Rings, state: &State, variance: PixelVariance<'_>) -> Equations {
         let shape = &state.shape;
         let mut e = Equations::zeros();
@@ -450,25 +351,14 @@ impl HertzFitter {
             e.add(ring, &level, weight, r2, spread);
         }
         e.normal.fill_upper_triangle_with_lower_triangle();
-        for k in self.fixed(state) {
-            e.normal.fill_row(k, 0.0);
-            e.normal.fill_column(k, 0.0);
-            // The factorisation then exists, and the step of such a parameter is zero.
-            e.normal[(k, k)] = 1.0;
-            e.gradient[k] = 0.0;
+        if !state.bent {
+            e.normal.fill_row(BEND, 0.0);
+            e.normal.fill_column(BEND, 0.0);
+            // The factorisation then exists, and the step of the bend is zero.
+            e.normal[(BEND, BEND)] = 1.0;
+            e.gradient[BEND] = 0.0;
         }
         e
-    }
-
-    /// The parameters that are not fitted.
-    fn fixed(&self, state: &State) -> impl Iterator<Item = usize> + Clone {
-        [
-            (1, !self.options.fit_background),
-            (3, self.options.blur_px.is_some()),
-            (BEND, !state.bent),
-        ]
-        .into_iter()
-        .filter_map(|(parameter, fixed)| fixed.then_some(parameter))
     }
 
     /// The parameters' covariance, scaled by the residuals and in pixels along both axes, and the
@@ -480,17 +370,16 @@ impl HertzFitter {
         aspect: f64,
     ) -> Option<(Normal, f64)> {
         let mut covariance = equations.normal.cholesky()?.inverse();
-        let fixed = self.fixed(state);
-        for k in fixed.clone() {
-            covariance[(k, k)] = 0.0;
+        if !state.bent {
+            covariance[(BEND, BEND)] = 0.0;
         }
-        let fitted = 7 - fixed.count();
+        let fitted = if state.bent { PARAMETERS } else { BEND };
         let reduced = equations.chi2 / (equations.pixels - fitted as f64).max(1.0);
         // By the residuals: the noise model's own error and a misfit widen all errors alike.
         covariance *= reduced;
         // The fit counts rows in pixel widths, the report in rows.
-        covariance.row_mut(5).unscale_mut(aspect);
-        covariance.column_mut(5).unscale_mut(aspect);
+        covariance.row_mut(Y).unscale_mut(aspect);
+        covariance.column_mut(Y).unscale_mut(aspect);
         Some((covariance, reduced))
     }
 
@@ -508,17 +397,19 @@ impl HertzFitter {
         // Balls by finite elements are read 0.00 to 0.05 % too small by cameras of 350 to 1,400
         // pixels. A rim of whole pixels and the blur add some hundredths of a pixel.
         let radius_law_px = 0.01_f64.hypot(3e-4 * s.radius);
-        let radius_px = Uncertain::from(Estimate::from_variance(s.radius, covariance[(2, 2)]))
-            .by(Source::Profile, radius_law_px);
+        let radius_px = Uncertain::from(Estimate::from_variance(
+            s.radius,
+            covariance[(RADIUS, RADIUS)],
+        ))
+        .by(Source::Profile, radius_law_px);
         let centre = |k: usize| {
-            Estimate::from_variance(origin[k] + state.centre[k], covariance[(4 + k, 4 + k)])
+            Estimate::from_variance(origin[k] + state.centre[k], covariance[(X + k, X + k)])
         };
         Some(HertzFit {
             centre_px: [centre(0), centre(1)],
             radius_px,
             radius_m: radius_px * pixel_size_m[0],
             peak: Estimate::from_variance(s.peak, covariance[(0, 0)]),
-            background: Estimate::from_variance(s.background, covariance[(1, 1)]),
             blur_px: (s.blur - PIXEL).max(0.0).sqrt(),
             bend: Estimate::from_variance(s.bend, covariance[(BEND, BEND)]),
             integrated_pixel_value: integral(s, &covariance, aspect),
@@ -540,10 +431,12 @@ fn integral(s: &Shape, covariance: &Normal, aspect: f64) -> Estimate {
     let (by_peak, by_radius) = (volume * s.radius, 2.0 * volume * s.peak);
     let by_bend = -0.4 * hertz * s.radius * s.peak;
     let mut variance = by_peak * by_peak * covariance[(0, 0)]
-        + 2.0 * by_peak * by_radius * covariance[(0, 2)]
-        + by_radius * by_radius * covariance[(2, 2)];
+        + 2.0 * by_peak * by_radius * covariance[(0, RADIUS)]
+        + by_radius * by_radius * covariance[(RADIUS, RADIUS)];
     variance += by_bend * by_bend * covariance[(BEND, BEND)]
-        + 2.0 * by_bend * (by_peak * covariance[(0, BEND)] + by_radius * covariance[(2, BEND)]);
+        + 2.0
+            * by_bend
+            * (by_peak * covariance[(0, BEND)] + by_radius * covariance[(RADIUS, BEND)]);
     Estimate::from_variance(volume * s.radius * s.peak, variance)
 }
 
@@ -552,17 +445,21 @@ fn settled(before: &Shape, after: &Shape) -> bool {
     let close = |a: f64, b: f64, scale: f64| (a - b).abs() <= 1e-6 * scale.abs();
     close(before.radius, after.radius, after.radius)
         && close(before.peak, after.peak, after.peak)
-        && close(before.background, after.background, after.peak)
         && close(before.blur, after.blur, after.blur + after.radius)
         && close(before.bend, after.bend, 1.0)
 }
 
-/// Peak, background, radius, blur variance, centre's x and y, bend.
-type Normal = SMatrix<f64, 7, 7>;
-type Step = SVector<f64, 7>;
+/// Peak, radius, blur variance, centre's x and y, bend.
+const PARAMETERS: usize = 6;
+type Normal = SMatrix<f64, PARAMETERS, PARAMETERS>;
+type Step = SVector<f64, PARAMETERS>;
 
-/// Place of the bend among the parameters.
-const BEND: usize = 6;
+/// Places among the parameters.
+const RADIUS: usize = 1;
+const BLUR: usize = 2;
+const X: usize = 3;
+const Y: usize = 4;
+const BEND: usize = 5;
 
 struct Equations {
     normal: Normal,
@@ -594,9 +491,8 @@ impl Equations {
         let [d, du, dv, dd] = ring.difference;
         let radial = [
             (0, l.by_peak),
-            (1, 1.0),
-            (2, l.by_radius),
-            (3, l.by_blur),
+            (RADIUS, l.by_radius),
+            (BLUR, l.by_blur),
             (BEND, l.by_bend),
         ];
         let along = |place: f64, by_r2: f64| l.value * place + l.by_r2 * (by_r2 - r2 * place);
@@ -607,20 +503,20 @@ impl Equations {
                 self.normal[(i, j)] += a * b;
             }
             let (x, y) = if i == BEND {
-                ((BEND, 4), (BEND, 5))
+                ((BEND, X), (BEND, Y))
             } else {
-                ((4, i), (5, i))
+                ((X, i), (Y, i))
             };
             self.normal[x] += slope * by * u;
             self.normal[y] += slope * by * v;
             self.gradient[i] += weight * by * (d - n * l.value);
         }
         let square = -2.0 * slope * l.by_r2;
-        self.normal[(4, 4)] += square * uu;
-        self.normal[(5, 4)] += square * uv;
-        self.normal[(5, 5)] += square * (sum_r2 - uu);
-        self.gradient[4] += slope * (du - along(u, r2u));
-        self.gradient[5] += slope * (dv - along(v, r2v));
+        self.normal[(X, X)] += square * uu;
+        self.normal[(Y, X)] += square * uv;
+        self.normal[(Y, Y)] += square * (sum_r2 - uu);
+        self.gradient[X] += slope * (du - along(u, r2u));
+        self.gradient[Y] += slope * (dv - along(v, r2v));
         // Along a ring the model itself varies. That is no misfit.
         let within = n * l.by_r2 * l.by_r2 * spread;
         self.chi2 += weight * (dd - 2.0 * l.value * d + n * l.value * l.value - within);
@@ -703,11 +599,11 @@ impl Misfit {
 }
 
 /// Number of levels at which a tabulated variance is known.
-pub const VARIANCE_LEVELS: usize = 65;
+pub(crate) const VARIANCE_LEVELS: usize = 65;
 
 /// Variance of one pixel at a level of the profile.
 #[derive(Clone, Copy, Debug)]
-pub enum PixelVariance<'a> {
+pub(crate) enum PixelVariance<'a> {
     /// Grey levels: background + gain × level.
     Grey(&'a DifferenceNoise),
     /// Pressures: values at `VARIANCE_LEVELS` even steps from zero.

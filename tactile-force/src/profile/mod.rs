@@ -15,7 +15,6 @@ mod fit;
 mod model;
 mod rings;
 
-pub use fit::{
-    HertzFit, HertzFitOptions, HertzFitter, PixelVariance, ProfileShape, Start, VARIANCE_LEVELS,
-};
-pub use rings::Rings;
+pub use fit::{HertzFit, ProfileShape};
+pub(crate) use fit::{HertzFitter, PixelVariance, Start, VARIANCE_LEVELS};
+pub(crate) use rings::Rings;

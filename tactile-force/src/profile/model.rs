@@ -15,13 +15,13 @@ const TERMS: usize = 9;
 
 /// Taylor coefficients of h about every node.
 #[derive(Clone, Debug)]
-pub struct BlurredEdge {
+pub(super) struct BlurredEdge {
     table: Vec<[f64; TERMS]>,
 }
 
 impl BlurredEdge {
     /// Steps the differential equation away from zero in both directions.
-    pub fn new() -> Self {
+    pub(super) fn new() -> Self {
         const H0: f64 = 0.411_089_479_331_229_4;
         const D0: f64 = 0.430_019_993_662_259_85;
         let mut table = vec![[0.0; TERMS]; NODES];
@@ -51,7 +51,7 @@ impl BlurredEdge {
     }
 
     /// [h, h′, h″, h‴, h⁗, h⁽⁵⁾] at z.
-    pub fn derivatives(&self, z: f64) -> [f64; 6] {
+    pub(super) fn derivatives(&self, z: f64) -> [f64; 6] {
         if z >= HIGH - 0.5 * STEP {
             return far(z);
         }
@@ -107,9 +107,8 @@ fn horner_derivative(c: &[f64], t: f64) -> f64 {
 
 /// What the profile depends on, lengths in pixels.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Shape {
+pub(super) struct Shape {
     pub peak: f64,
-    pub background: f64,
     pub radius: f64,
     /// Variance of the blur along one axis, the 1/12 of the pixel included.
     pub blur: f64,
@@ -119,7 +118,7 @@ pub struct Shape {
 
 /// Grey level at a distance from the centre, and its derivatives.
 #[derive(Clone, Copy, Debug)]
-pub struct Level {
+pub(super) struct Level {
     pub value: f64,
     pub by_peak: f64,
     pub by_radius: f64,
@@ -152,14 +151,14 @@ impl Power {
     }
 }
 
-/// B + A E √x₊ (1 − c + c x) with x = 1 − |r + ε|²/a², ε normal with the blur's variance w along
+/// A E √x₊ (1 − c + c x) with x = 1 − |r + ε|²/a², ε normal with the blur's variance w along
 /// each axis.
 ///
 /// |r + ε|² is w times a noncentral χ² with two degrees of freedom: mean r² + 2w, variance 4r²w +
 /// 4w², third cumulant 24 r²w² + 16 w³. The mean of the root is that of a normal variable,
 /// corrected for the skewness (Edgeworth). The error is of order (blur/a)². `spread` is the
 /// variance of r² among the pixels that share this distance.
-pub fn level(edge: &BlurredEdge, shape: &Shape, r2: f64, spread: f64) -> Level {
+pub(super) fn level(edge: &BlurredEdge, shape: &Shape, r2: f64, spread: f64) -> Level {
     let (w, inverse) = (shape.blur, 1.0 / (shape.radius * shape.radius));
     let inverse2 = inverse * inverse;
     // Cumulants of x, which is one less a scaled noncentral χ².
@@ -196,7 +195,7 @@ pub fn level(edge: &BlurredEdge, shape: &Shape, r2: f64, spread: f64) -> Level {
     let by_r2 = -inverse * profile.by_mean + 4.0 * w * inverse2 * profile.by_variance
         - 24.0 * w * w * inverse2 * inverse * profile.by_skew;
     Level {
-        value: shape.background + shape.peak * profile.value,
+        value: shape.peak * profile.value,
         by_peak: profile.value,
         by_radius: shape.peak * by_radius,
         by_blur: shape.peak * by_blur,

@@ -51,7 +51,6 @@ fn derivatives_agree_with_differences() {
     for bend in [0.0, 0.15, -0.3] {
         let shape = Shape {
             peak: 120.0,
-            background: 3.0,
             radius: 40.0,
             blur: 0.6,
             bend,
@@ -93,7 +92,6 @@ fn level_is_the_blurred_profile() {
     let (radius, blur, bend) = (40.0_f64, 0.6_f64, 0.2);
     let shape = Shape {
         peak: 1.0,
-        background: 0.0,
         radius,
         blur,
         bend,

@@ -11,7 +11,7 @@ use tactile_core::{Loop, vectorised};
 /// Where rings are wide, pixels are added in blocks, with the sums over all pixels of a block: only
 /// the ring is that of the block's centre.
 #[derive(Clone, Debug, Default)]
-pub struct Rings {
+pub(crate) struct Rings {
     rings: Vec<Ring>,
     /// The longest run of the aperture in every row, and what of it was added in blocks: columns
     /// from and to.
@@ -24,14 +24,14 @@ const AT_ONCE: usize = 16;
 
 impl Rings {
     /// Every ring that has pixels.
-    pub fn filled(&self) -> impl Iterator<Item = &Ring> {
+    pub(crate) fn filled(&self) -> impl Iterator<Item = &Ring> {
         self.rings.iter().filter(|ring| ring.place[0] > 0.0)
     }
 
     /// Gathers the pixels of the aperture. The centre is relative to the region's first pixel.
     /// `aspect` is the pixel's height over its width, and distances are in pixel widths. `radius`
     /// is about that of the contact.
-    pub fn gather(&mut self, region: &Region, centre: [f64; 2], aspect: f64, radius: f64) {
+    pub(crate) fn gather(&mut self, region: &Region, centre: [f64; 2], aspect: f64, radius: f64) {
         let Self {
             rings,
             spans,
@@ -230,7 +230,7 @@ impl Loop for Gather<'_> {
 /// Sums over the pixels of one ring. (u, v) is a pixel's place relative to the centre, d its
 /// difference. Four by four, so that a pixel is added with a few wide instructions.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Ring {
+pub(crate) struct Ring {
     /// Σ 1, Σ u, Σ v, Σ r².
     pub place: [f64; 4],
     /// Σ u², Σ u v, Σ r² u, Σ r² v.
@@ -243,7 +243,7 @@ pub struct Ring {
 
 impl Ring {
     #[inline(always)]
-    pub fn add(&mut self, u: f64, v: f64, r2: f64, d: f64) {
+    pub(crate) fn add(&mut self, u: f64, v: f64, r2: f64, d: f64) {
         let place = [1.0, u, v, r2];
         let product = [u * u, u * v, r2 * u, r2 * v];
         let difference = [d, d * u, d * v, d * d];
@@ -256,7 +256,7 @@ impl Ring {
     }
 
     #[inline(always)]
-    pub fn merge(&mut self, other: &Self) {
+    pub(crate) fn merge(&mut self, other: &Self) {
         for k in 0..4 {
             self.place[k] += other.place[k];
             self.product[k] += other.product[k];
@@ -269,7 +269,7 @@ impl Ring {
 /// Where blocks lie: a corner of four of them is beside the centre, so that they are the same
 /// whichever way the image is mirrored, turned or moved.
 #[derive(Clone, Copy, Debug)]
-pub struct Grid<'a> {
+pub(super) struct Grid<'a> {
     /// Column and row of the centre.
     pub centre: [f64; 2],
     /// A pixel's height over its width.
@@ -281,25 +281,25 @@ pub struct Grid<'a> {
 impl Grid<'_> {
     /// A column relative to the centre.
     #[inline(always)]
-    pub fn u(&self, column: f64) -> f64 {
+    pub(super) fn u(&self, column: f64) -> f64 {
         column - self.centre[0]
     }
 
     /// A row relative to the centre, in pixel widths.
     #[inline(always)]
-    pub fn v(&self, row: f64) -> f64 {
+    pub(super) fn v(&self, row: f64) -> f64 {
         (row - self.centre[1]) * self.aspect
     }
 
     /// The first column (`axis` 0) or row (1) beyond the centre, where a block begins.
     #[inline(always)]
-    pub fn first(&self, axis: usize) -> isize {
+    pub(super) fn first(&self, axis: usize) -> isize {
         self.centre[axis].floor() as isize + 1
     }
 
     /// The number of a block counted from the centre to either side, by its first column or row.
     #[inline(always)]
-    pub fn number<const SIDE: usize>(&self, at: isize, axis: usize) -> usize {
+    pub(super) fn number<const SIDE: usize>(&self, at: isize, axis: usize) -> usize {
         let away = (at - self.first(axis)).div_euclid(SIDE as isize);
         if away < 0 {
             !away as usize
@@ -311,7 +311,7 @@ impl Grid<'_> {
     /// The columns of whole blocks in rows from `row` on, all of whose pixels lie within a distance
     /// of the centre and in the rows' spans.
     #[inline(always)]
-    pub fn columns<const SIDE: usize>(&self, row: isize, distance: f64) -> Range<usize> {
+    pub(super) fn columns<const SIDE: usize>(&self, row: isize, distance: f64) -> Range<usize> {
         let Some(spans) = usize::try_from(row)
             .ok()
             .and_then(|row| self.spans.get(row..row + SIDE))
@@ -343,7 +343,7 @@ impl Grid<'_> {
 /// A block of pixels: its differences, and where its centre is relative to that of the contact, in
 /// pixel widths.
 #[derive(Clone, Copy, Debug)]
-pub struct RingBlock<const SIDE: usize> {
+pub(super) struct RingBlock<const SIDE: usize> {
     pub pixels: [[f32; SIDE]; SIDE],
     pub u: f64,
     pub v: f64,
@@ -365,7 +365,7 @@ impl<const SIDE: usize> RingBlock<SIDE> {
     /// What the pixels one by one add to a ring. With u + p and v + q the place of a pixel, sums of
     /// odd powers of p and q vanish.
     #[inline(always)]
-    pub fn sums(&self) -> Ring {
+    pub(super) fn sums(&self) -> Ring {
         let (u, v, side) = (self.u, self.v, SIDE as f64);
         let n = side * side;
         let [pp, pppp] = Self::SQUARES;

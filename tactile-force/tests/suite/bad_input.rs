@@ -3,8 +3,8 @@
 use ndarray::Array2;
 use proptest::prelude::*;
 use tactile_force::{
-    ContactOptions, DriftCorrection, ForceError, ForceMeter, ForceOptions, HertzFitOptions,
-    NoiseModel, Polarity, ReferenceFrame, ShearCalibration, ShearPair, measure_force,
+    ContactOptions, DriftCorrection, ForceError, ForceMeter, ForceOptions, NoiseModel, Polarity,
+    ReferenceFrame, ShearCalibration, ShearPair, measure_force,
 };
 
 use crate::blob::{bytes, calibration};
@@ -25,11 +25,6 @@ fn options_outside_their_domain() {
     for share in [-0.1, 1.1, f64::NAN] {
         rejected(contact.with_saturation_limit(share), "saturation_limit");
     }
-    let hertz = HertzFitOptions::default();
-    for blur in [-1.0, f64::NAN, f64::INFINITY] {
-        rejected(hertz.with_blur_px(blur), "blur_px");
-    }
-    rejected(hertz.with_max_iterations(0), "max_iterations");
     for size in [0.0, -1.0, f64::NAN, f64::INFINITY] {
         rejected(
             ForceMeter::new([1e-5, size], &ForceOptions::default()),

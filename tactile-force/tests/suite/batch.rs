@@ -1,5 +1,4 @@
-//! Batches give what single frames give, whatever the workspace saw before and however many threads
-//! work.
+//! A reused workspace gives what a new one gives, whatever it saw before.
 
 use ndarray::{Array2, ArrayView2};
 use tactile_force::{
@@ -18,7 +17,7 @@ fn frame(radius: f64, x: f64) -> Array2<u8> {
 }
 
 #[test]
-fn the_same_bits_alone_in_series_and_in_parallel() {
+fn the_same_bits_alone_and_in_series() {
     let frames: Vec<_> = (0..12)
         .map(|k| frame([30.0, 0.5, 12.0][k % 3], 60.0 + k as f64))
         .collect();
@@ -40,14 +39,6 @@ fn the_same_bits_alone_in_series_and_in_parallel() {
         .map(Result::unwrap)
         .collect();
     assert_eq!(series, single);
-    #[cfg(feature = "rayon")]
-    {
-        let parallel = meter.measure_all_in_parallel(&views, &reference, &calibration);
-        assert_eq!(
-            parallel.into_iter().map(Result::unwrap).collect::<Vec<_>>(),
-            single
-        );
-    }
     #[cfg(feature = "serde")]
     {
         let text = serde_json::to_string(&single).unwrap();

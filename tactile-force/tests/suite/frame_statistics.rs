@@ -71,7 +71,8 @@ proptest! {
         let found = prepared.compare(frame.view(), threshold).unwrap();
         prop_assert_eq!(found, slow(frame.view(), reference.view(), threshold));
         // The same pixels, column after column in memory.
-        let [frame, reference] = [frame, reference].map(|i| i.t().as_standard_layout().into_owned());
+        let turned = |image: Array2<u8>| image.t().as_standard_layout().into_owned();
+        let [frame, reference] = [frame, reference].map(turned);
         let prepared = ReferenceFrame::new(reference.t()).unwrap();
         prop_assert_eq!(prepared.compare(frame.t(), threshold).unwrap(), found);
     }

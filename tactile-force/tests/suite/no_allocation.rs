@@ -2,7 +2,7 @@
 
 use ndarray::{Array2, ArrayView2};
 use tactile_force::{
-    Branch, ContactOptions, DriftCorrection, ForceMeter, ForceOptions, ForceWorkspace, NoiseModel,
+    Branch, ContactOptions, DriftCorrection, ForceMeter, ForceOptions, ForceWorkspace,
     ReferenceFrame, ShearCalibration, ShearPair, ShearTracker,
 };
 
@@ -52,11 +52,9 @@ fn measuring_with_a_workspace_allocates_nothing() {
         });
         assert_eq!(allocations, 0, "{drift:?}");
     }
-    // By a local curve, and with a noise that was stated.
+    // By a local curve.
     let sensor = Sensor::default();
-    let reference = sensor
-        .reference()
-        .with_noise(NoiseModel::new(0.5, 0.02).unwrap());
+    let reference = sensor.reference();
     let curve = sensor.curve(&reference, 5);
     let pressed = [sensor.frame(0.4, 2.5e-3, [121.3, 97.6], Branch::Loading, 8)];
     let meter = ForceMeter::new([PIXEL_M; 2], &ForceOptions::default()).unwrap();

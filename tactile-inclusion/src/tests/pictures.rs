@@ -5,8 +5,8 @@ use crate::forward::Forward;
 use crate::parameters::{Coordinate, LumpParameters, Parameters, Place};
 use crate::picture::{CellPositions, Cells};
 use crate::{
-    Inclusion, InclusionEstimate, InclusionWarning, PressureProfile, Scan, ScanPress,
-    SearchProgress, SearchVerdict,
+    Inclusion, InclusionEstimate, InclusionWarning, PressureProfile, Progress, Scan, ScanPress,
+    SearchVerdict,
 };
 use core::ops::ControlFlow;
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
@@ -137,14 +137,22 @@ fn frames(values: &[f64]) -> Vec<PressureProfile> {
         .collect()
 }
 
-fn go_on(_: SearchProgress) -> ControlFlow<()> {
+fn go_on(_: Progress) -> ControlFlow<()> {
     ControlFlow::Continue(())
 }
 
 /// What is found from these pressures of all frames.
 fn searched(values: &[f64]) -> InclusionEstimate {
-    let found = search().search_picture(&positions(), &frames(values), &mut go_on);
-    found.unwrap()
+    let press = ScanPress {
+        axis_m: [0.0; 2],
+        positions_m: positions(),
+        frames: frames(values),
+    };
+    let scan = Scan {
+        presses: vec![press],
+        position_error_m: 0.0,
+    };
+    search().search_scan(&scan, &mut go_on).unwrap()
 }
 
 /// Presses of a scan with an inclusion, the first two over it and the third far from it. They were

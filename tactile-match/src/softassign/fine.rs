@@ -7,7 +7,7 @@ use super::{AnnealedSoftassign, Mechanism, Search, SoftassignWorkspace, State, T
 use super::{difference, in_space, squared, squared_distance};
 use crate::hard;
 use nalgebra::{Matrix4, Matrix4x3, RowVector4, SVector};
-use tactile_core::vectorised;
+use tactile_core::{statistics::median, vectorised};
 
 // An annealing run ends at a thousandth of the radius, since the factor of its prior leaves out as
 // much. Pairs are decided there, and what is left is either the rounding of clean data or noise.
@@ -274,15 +274,6 @@ fn centre_first<const D: usize>(model: &[[f64; D]], pairs: &mut Vec<(usize, usiz
         });
         pairs.truncate(count);
     }
-}
-
-/// The median, 0 of nothing.
-fn median(values: &mut [f64]) -> f64 {
-    let middle = values.len() / 2;
-    if values.is_empty() {
-        return 0.0;
-    }
-    *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
 /// The dense system of some pairs.

@@ -1,7 +1,7 @@
 //! Calibrated intensity → depth: a table read off one known indenter.
 //!
-//! Each pixel's signal (its grey level, or its darkening or brightening against a reference image)
-//! is looked up in a calibrated table, linearly between the entries. No neighbour is involved, so
+//! Each pixel's signal (a grey level, or its darkening or brightening against a reference image) is
+//! looked up in a calibrated table, linearly between the entries. No neighbour is involved, so
 //! nothing accumulates. It needs a calibration and even illumination.
 //!
 //! A table calibrated on a ball counts depth from the contact circle. That circle is where the
@@ -12,58 +12,12 @@
 //! its zero lies.
 
 use nalgebra::{Matrix3, Vector3};
-use ndarray::Array2;
 use tactile_core::Requirement;
 
-use crate::domain::same_shape;
 use crate::{
-    Domain, Frame, PixelFlags, PixelScalar, SfsError, Surface, SurfaceReconstruction,
+    Frame, Image, PixelFlags, PixelScalar, SfsError, Surface, SurfaceReconstruction,
     SurfaceWorkspace,
 };
-
-/// What is looked up in a [`DepthTable`](crate::DepthTable).
-///
-/// ```
-/// use ndarray::{Array2, array};
-/// use tactile_sfs::{DepthTable, Domain, Signal, SurfaceReconstruction};
-/// let (reference, image) = (Array2::from_elem((1, 2), 200.0), array![[200.0, 180.0]]);
-/// // A millimetre darkens by 40 grey levels.
-/// let table = DepthTable::new(&[(0.0, 0.0), (40.0, 1e-3)])?;
-/// let method = table.with_signal(Signal::Darkening(reference));
-/// let depth = method.reconstruct(image.view().into(), &Domain::new([1e-4, 1e-4])?)?.heights;
-/// assert_eq!(depth, array![[0.0, 0.5e-3]]);
-/// # Ok::<(), tactile_sfs::SfsError>(())
-/// ```
-#[derive(Clone, Debug, PartialEq)]
-#[non_exhaustive]
-pub enum Signal<T> {
-    /// The intensity itself.
-    Intensity,
-    /// Reference minus image: sensors that grow darker with depth.
-    Darkening(Array2<T>),
-    /// Image minus reference: sensors that grow brighter with depth.
-    Brightening(Array2<T>),
-}
-
-impl<T: PixelScalar> Signal<T> {
-    pub(super) fn check_reference(&self, shape: (usize, usize)) -> Result<(), SfsError> {
-        match self {
-            Signal::Intensity => Ok(()),
-            Signal::Darkening(reference) | Signal::Brightening(reference) => {
-                same_shape("reference image", shape, reference.dim())
-            }
-        }
-    }
-
-    pub(super) fn of_pixel(&self, frame: &Frame<'_, T>, row: usize, column: usize) -> T {
-        let intensity = frame.at(row, column);
-        match self {
-            Signal::Intensity => intensity,
-            Signal::Darkening(reference) => reference[[row, column]] - intensity,
-            Signal::Brightening(reference) => intensity - reference[[row, column]],
-        }
-    }
-}
 
 /// Depth from a calibration table of (signal, depth) pairs.
 ///
@@ -73,11 +27,10 @@ impl<T: PixelScalar> Signal<T> {
 ///
 /// ```
 /// use ndarray::array;
-/// use tactile_sfs::{DepthTable, Domain, SurfaceReconstruction};
+/// use tactile_sfs::{DepthTable, Domain, Image, SurfaceReconstruction};
 /// let table = DepthTable::new(&[(0.0, 0.0), (10.0, 1e-3), (20.0, 1.5e-3)])?;
 /// let surface = table.reconstruct(
-///     array![[0.0, 5.0, 15.0]].view().into(),
-///     &Domain::new([1e-4, 1e-4])?,
+///     Image::new(array![[0.0, 5.0, 15.0]].view(), Domain::new([1e-4, 1e-4])?)
 /// )?;
 /// assert_eq!(surface.heights, array![[0.0, 0.5e-3, 1.25e-3]]);
 /// # Ok::<(), tactile_sfs::SfsError>(())
@@ -85,7 +38,6 @@ impl<T: PixelScalar> Signal<T> {
 #[derive(Clone, Debug, PartialEq)]
 pub struct DepthTable<T> {
     entries: Vec<(T, T)>,
-    signal: Signal<T>,
     contact_threshold: T,
 }
 
@@ -112,32 +64,21 @@ impl<T: PixelScalar> DepthTable<T> {
         let entries = entries.to_vec();
         Ok(Self {
             entries,
-            signal: Signal::Intensity,
             contact_threshold: T::zero(),
         })
-    }
-
-    /// What is looked up. The intensity itself by default.
-    pub fn with_signal(self, signal: Signal<T>) -> Self {
-        Self { signal, ..self }
     }
 
     /// Signals up to `threshold` mean no contact: depth 0.
     ///
     /// ```
     /// use ndarray::array;
-    /// use tactile_sfs::{DepthTable, Domain, Signal, SurfaceReconstruction};
-    /// let dark = array![[20.0, 20.0]];
+    /// use tactile_sfs::{DepthTable, Domain, Image, SurfaceReconstruction};
     /// let table = DepthTable::new(&[(0.0, 0.0), (10.0, 1e-3)])?
-    ///     .with_signal(Signal::Brightening(dark))
     ///     .with_contact_threshold(2.0)?; // the camera's noise
     /// let depth = table
-    ///     .reconstruct(
-    ///         array![[21.5, 25.0]].view().into(),
-    ///         &Domain::new([1e-4, 1e-4])?,
-    ///     )?
+    ///     .reconstruct(Image::new(array![[1.5, 5.0]].view(), Domain::new([1e-4, 1e-4])?))?
     ///     .heights;
-    /// assert_eq!(depth, array![[0.0, 0.5e-3]]); // 1.5 above the reference is no contact yet
+    /// assert_eq!(depth, array![[0.0, 0.5e-3]]); // 1.5 is no contact yet
     /// # Ok::<(), tactile_sfs::SfsError>(())
     /// ```
     ///
@@ -187,35 +128,21 @@ impl<T: PixelScalar> DepthTable<T> {
 }
 
 impl<T: PixelScalar> SurfaceReconstruction<T> for DepthTable<T> {
-    fn reconstruct(
-        &self,
-        frame: Frame<'_, T>,
-        domain: &Domain<'_, T>,
-    ) -> Result<Surface<T>, SfsError> {
-        Surface::made_by(|workspace, surface| {
-            self.reconstruct_with(workspace, frame, domain, surface)
-        })
+    fn reconstruct(&self, image: Image<'_, '_, T>) -> Result<Surface<T>, SfsError> {
+        Surface::made_by(|workspace, surface| self.reconstruct_with(workspace, image, surface))
     }
 
     fn reconstruct_with(
         &self,
         _workspace: &mut SurfaceWorkspace<T>,
-        frame: Frame<'_, T>,
-        domain: &Domain<'_, T>,
+        image: Image<'_, '_, T>,
         surface: &mut Surface<T>,
     ) -> Result<(), SfsError> {
-        self.signal.check_reference(frame.dim())?;
-        let area = surface.enter(frame.dim(), domain)?;
-        // The table at every whole signal of 8-bit frames, −255 to 255: looking it up takes a fifth
-        // of the time.
-        let levels = matches!(frame, Frame::Bytes(_)).then(|| {
-            core::array::from_fn::<_, 511, _>(|index| self.pixel(T::of(index as f64 - 255.0)))
-        });
-        let of_level = |signal: T| {
-            let level = signal.to_i32()?;
-            let entry = levels.as_ref()?.get(usize::try_from(level + 255).ok()?)?;
-            (T::from_i32(level)? == signal).then_some(*entry)
-        };
+        let Image { values, domain } = image;
+        let area = surface.enter(values.dim(), &domain)?;
+        // The table at every level of 8-bit frames: looking it up takes a fifth of the time.
+        let levels = matches!(values, Frame::Bytes(_))
+            .then(|| core::array::from_fn::<_, 256, _>(|level| self.pixel(T::of(level as f64))));
         for (row, column) in area.pixels() {
             if !domain.contains(row, column) {
                 continue;
@@ -224,12 +151,14 @@ impl<T: PixelScalar> SurfaceReconstruction<T> for DepthTable<T> {
                 surface.set(row, column, known);
                 continue;
             }
-            let signal = self.signal.of_pixel(&frame, row, column);
-            let (height, flags) = of_level(signal).unwrap_or_else(|| self.pixel(signal));
+            let (height, flags) = match (&values, &levels) {
+                (Frame::Bytes(bytes), Some(levels)) => levels[usize::from(bytes[[row, column]])],
+                _ => self.pixel(values.at(row, column)),
+            };
             surface.set(row, column, height);
             surface.flags[[row, column]] = flags;
         }
-        surface.finish(domain);
+        surface.finish(&domain);
         Ok(())
     }
 }
@@ -239,8 +168,8 @@ impl<T: PixelScalar> DepthTable<T> {
     ///
     /// A parabola d = c₀ + c₁ s + c₂ s² is fitted, by least squares, to the entries (s, d) above
     /// the threshold of contact. They become d − c₀ (or 0 where that is negative), and those at or
-    /// below it make way for (0, 0). For signals that are counted from a reference
-    /// ([`Signal::Darkening`](crate::Signal), `Brightening`). The threshold, to be set before
+    /// below it make way for (0, 0). For signals that are counted from a reference. The threshold,
+    /// to be set before
     /// ([`with_contact_threshold`](Self::with_contact_threshold)), should be a tenth of the largest
     /// signal or less: the parabola is extended from there to zero. Depth must be smooth in the
     /// signal there. Of light that goes as the power 0.8 or 1.2 of the depth the zero is off by 3

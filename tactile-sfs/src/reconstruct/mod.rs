@@ -6,13 +6,13 @@ mod tsai_shah;
 
 use std::ops::Deref;
 
-pub use depth_table::{DepthTable, Signal};
+pub use depth_table::DepthTable;
 pub use eikonal::{BoundaryCondition, Eikonal, EikonalBranch};
 pub(crate) use eikonal::{EikonalBuffers, ProfileBuffers};
 pub use tsai_shah::TsaiShah;
 
 use crate::{
-    Domain, Frame, Lighting, PixelFlags, PixelScalar, SfsError, Surface, SurfaceWorkspace,
+    Domain, Frame, Image, Lighting, PixelFlags, PixelScalar, SfsError, Surface, SurfaceWorkspace,
 };
 
 /// A way from one image to a surface.
@@ -22,7 +22,7 @@ use crate::{
 ///
 /// ```
 /// use ndarray::Array2;
-/// use tactile_sfs::{Domain, Eikonal, Lighting, BoundaryCondition, SurfaceReconstruction};
+/// use tactile_sfs::{BoundaryCondition, Domain, Eikonal, Image, Lighting, SurfaceReconstruction};
 ///
 /// // A cone of slope 1 has n·s = 1/√2 everywhere.
 /// let (size, radius) = (41, 15.0_f64);
@@ -31,8 +31,7 @@ use crate::{
 /// let image = Array2::from_elem((size, size), 0.5_f64.sqrt());
 /// let method = Eikonal::new(Lighting::default()).with_boundary(BoundaryCondition::Height(0.0))?;
 /// let surface = method.reconstruct(
-///     image.view().into(),
-///     &Domain::default().with_mask(mask.view()),
+///     Image::new(image.view(), Domain::default().with_mask(mask.view()))
 /// )?;
 /// assert!((surface.heights[[20, 20]] - radius).abs() < 1.5);
 /// # Ok::<(), tactile_sfs::SfsError>(())
@@ -42,11 +41,7 @@ pub trait SurfaceReconstruction<T: PixelScalar>: Send + Sync {
     ///
     /// # Errors
     /// Those of the method: mostly shapes that differ, an empty mask, or invalid options.
-    fn reconstruct(
-        &self,
-        frame: Frame<'_, T>,
-        domain: &Domain<'_, T>,
-    ) -> Result<Surface<T>, SfsError>;
+    fn reconstruct(&self, image: Image<'_, '_, T>) -> Result<Surface<T>, SfsError>;
 
     /// The same into `surface`, with its arrays and the buffers of `workspace` used again: the
     /// methods of this crate do not allocate after the first frame of a stream.
@@ -54,14 +49,18 @@ pub trait SurfaceReconstruction<T: PixelScalar>: Send + Sync {
     /// ```
     /// use ndarray::array;
     /// use tactile_sfs::{
-    ///     DepthTable, Domain, Frame, Surface, SurfaceReconstruction, SurfaceWorkspace,
+    ///     DepthTable, Domain, Frame, Image, Surface, SurfaceReconstruction, SurfaceWorkspace,
     /// };
     /// let table = DepthTable::new(&[(0.0, 0.0), (200.0, 1e-3)])?;
     /// let (image, domain) = (array![[0_u8, 50, 100]], Domain::new([1e-4, 1e-4])?);
-    /// let once = table.reconstruct(image.view().into(), &domain)?;
+    /// let once = table.reconstruct(Image::new(image.view(), domain))?;
     /// assert_eq!(once.heights, array![[0.0, 0.25e-3, 0.5e-3]]);
     /// let (mut workspace, mut surface) = (SurfaceWorkspace::default(), Surface::default());
-    /// table.reconstruct_with(&mut workspace, Frame::Bytes(image.view()), &domain, &mut surface)?;
+    /// table.reconstruct_with(
+    ///     &mut workspace,
+    ///     Image::new(Frame::Bytes(image.view()), domain),
+    ///     &mut surface,
+    /// )?;
     /// assert_eq!(surface, once);
     /// # Ok::<(), tactile_sfs::SfsError>(())
     /// ```
@@ -71,12 +70,11 @@ pub trait SurfaceReconstruction<T: PixelScalar>: Send + Sync {
     fn reconstruct_with(
         &self,
         workspace: &mut SurfaceWorkspace<T>,
-        frame: Frame<'_, T>,
-        domain: &Domain<'_, T>,
+        image: Image<'_, '_, T>,
         surface: &mut Surface<T>,
     ) -> Result<(), SfsError> {
         let _ = workspace;
-        *surface = self.reconstruct(frame, domain)?;
+        *surface = self.reconstruct(image)?;
         Ok(())
     }
 }
@@ -85,22 +83,17 @@ pub trait SurfaceReconstruction<T: PixelScalar>: Send + Sync {
 impl<T: PixelScalar, P: Deref<Target: SurfaceReconstruction<T>> + Send + Sync>
     SurfaceReconstruction<T> for P
 {
-    fn reconstruct(
-        &self,
-        frame: Frame<'_, T>,
-        domain: &Domain<'_, T>,
-    ) -> Result<Surface<T>, SfsError> {
-        (**self).reconstruct(frame, domain)
+    fn reconstruct(&self, image: Image<'_, '_, T>) -> Result<Surface<T>, SfsError> {
+        (**self).reconstruct(image)
     }
 
     fn reconstruct_with(
         &self,
         workspace: &mut SurfaceWorkspace<T>,
-        frame: Frame<'_, T>,
-        domain: &Domain<'_, T>,
+        image: Image<'_, '_, T>,
         surface: &mut Surface<T>,
     ) -> Result<(), SfsError> {
-        (**self).reconstruct_with(workspace, frame, domain, surface)
+        (**self).reconstruct_with(workspace, image, surface)
     }
 }
 

@@ -21,7 +21,7 @@
 use super::FieldBuffers;
 use crate::integrate::write_levelled;
 use crate::{
-    Domain, Frame, Lighting, PixelScalar, SfsError, StopReason, Surface, SurfaceReconstruction,
+    Domain, Image, Lighting, PixelScalar, SfsError, StopReason, Surface, SurfaceReconstruction,
     SurfaceWorkspace,
 };
 use tactile_core::Requirement;
@@ -42,10 +42,12 @@ const START_SLOPE: f64 = 0.5;
 ///
 /// ```
 /// use ndarray::Array2;
-/// use tactile_sfs::{Domain, Lighting, SurfaceReconstruction, TsaiShah};
+/// use tactile_sfs::{Domain, Image, Lighting, SurfaceReconstruction, TsaiShah};
 /// let image = Array2::from_shape_fn((32, 32), |(_, c)| if c < 16 { 0.6 } else { 0.8 });
 /// let method = TsaiShah::new(Lighting::new([1.0, 0.0, 1.0])?).with_iterations(5)?;
-/// assert_eq!(method.reconstruct(image.view().into(), &Domain::default())?.report.iterations, 5);
+/// assert_eq!(method.reconstruct(
+///     Image::new(image.view(), Domain::default())
+/// )?.report.iterations, 5);
 /// # Ok::<(), tactile_sfs::SfsError>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -126,34 +128,28 @@ struct Grid<T> {
 }
 
 impl<T: PixelScalar> SurfaceReconstruction<T> for TsaiShah<T> {
-    fn reconstruct(
-        &self,
-        frame: Frame<'_, T>,
-        domain: &Domain<'_, T>,
-    ) -> Result<Surface<T>, SfsError> {
-        Surface::made_by(|workspace, surface| {
-            self.reconstruct_with(workspace, frame, domain, surface)
-        })
+    fn reconstruct(&self, image: Image<'_, '_, T>) -> Result<Surface<T>, SfsError> {
+        Surface::made_by(|workspace, surface| self.reconstruct_with(workspace, image, surface))
     }
 
     fn reconstruct_with(
         &self,
         workspace: &mut SurfaceWorkspace<T>,
-        frame: Frame<'_, T>,
-        domain: &Domain<'_, T>,
+        image: Image<'_, '_, T>,
         surface: &mut Surface<T>,
     ) -> Result<(), SfsError> {
-        surface.enter(frame.dim(), domain)?;
+        let Image { values, domain } = image;
+        surface.enter(values.dim(), &domain)?;
         let mut field = core::mem::take(&mut workspace.field);
-        let loaded = field.load(&frame, domain, &self.lighting, surface);
+        let loaded = field.load(&values, &domain, &self.lighting, surface);
         if loaded.is_ok() {
-            self.solve(&mut field, workspace, domain, surface);
+            self.solve(&mut field, workspace, &domain, surface);
             field.written.clear();
             let hx = domain.pixel_size_m[0];
             let heights = field.heights.iter().map(|&z| (z * hx).as_f64());
             field.written.extend(heights);
-            write_levelled(&field.written, domain, surface);
-            surface.finish(domain);
+            write_levelled(&field.written, &domain, surface);
+            surface.finish(&domain);
         }
         workspace.field = field;
         loaded

@@ -21,11 +21,12 @@ fn a_reused_workspace_changes_nothing_and_does_not_allocate() {
     for (name, method) in reconstructions(Lighting::new([1.0, 0.0, 1.0]).unwrap()) {
         for case in [&large, &small, &large] {
             let (frame, domain) = (Frame::Real(case.image.view()), case.domain());
-            let mut run = || method.reconstruct_with(&mut workspace, frame, &domain, &mut surface);
+            let mut run =
+                || method.reconstruct_with(&mut workspace, Image::new(frame, domain), &mut surface);
             run().unwrap();
             let counted = allocation_counter::measure(|| run().unwrap());
             assert_eq!(counted.count_total, 0, "{name}");
-            let fresh = method.reconstruct(frame, &domain).unwrap();
+            let fresh = method.reconstruct(Image::new(frame, domain)).unwrap();
             assert!(same(&surface, &fresh), "{name}");
         }
     }
@@ -49,7 +50,11 @@ fn bytes_are_grey_levels() {
     let bytes = case.image.mapv(|v| (255.0 * v).round() as u8);
     let floats = bytes.mapv(f64::from);
     let method = from_rim(Lighting::default().with_normal_intensity(255.0).unwrap());
-    let solve = |frame: Frame<'_, f64>| method.reconstruct(frame, &case.domain()).unwrap();
+    let solve = |frame: Frame<'_, f64>| {
+        method
+            .reconstruct(Image::new(frame, case.domain()))
+            .unwrap()
+    };
     assert!(same(
         &solve(floats.view().into()),
         &solve(bytes.view().into())
@@ -62,10 +67,14 @@ fn single_precision_agrees() {
     let image = case.image.mapv(|v| v as f32);
     let wide = from_rim(Lighting::default());
     let domain = Domain::default().with_mask(case.mask.view());
-    let wide = wide.reconstruct(case.image.view().into(), &domain).unwrap();
+    let wide = wide
+        .reconstruct(Image::new(case.image.view(), domain))
+        .unwrap();
     let narrow = from_rim(Lighting::<f32>::default());
     let domain = Domain::default().with_mask(case.mask.view());
-    let narrow = narrow.reconstruct(image.view().into(), &domain).unwrap();
+    let narrow = narrow
+        .reconstruct(Image::new(image.view(), domain))
+        .unwrap();
     let error = errors(&narrow, &wide.heights, Alignment::None);
     // cos² loses half the digits of f32 near 1: 10⁻³ of slope at worst near the peak, over a few
     // pixels.
@@ -79,9 +88,13 @@ fn progress_can_stop_a_solve() {
     workspace.on_progress(|_| core::ops::ControlFlow::Break(()));
     let mut surface = Surface::default();
     let method = TsaiShah::new(Lighting::default());
-    let frame = case.image.view().into();
+    let frame = case.image.view();
     method
-        .reconstruct_with(&mut workspace, frame, &case.domain(), &mut surface)
+        .reconstruct_with(
+            &mut workspace,
+            Image::new(frame, case.domain()),
+            &mut surface,
+        )
         .unwrap();
     assert_eq!(surface.report.stop, StopReason::Cancelled);
     assert_eq!(surface.report.iterations, 1);

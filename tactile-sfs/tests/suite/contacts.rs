@@ -55,7 +55,7 @@ fn surface(method: &Eikonal<f64>, radius: f64, centre: [f64; 2]) -> Surface<f64>
     let (image, mask) = contact(radius, centre, 0.0);
     let domain = Domain::default().with_mask(mask.view());
     method
-        .reconstruct(image.view().into(), &domain)
+        .reconstruct(Image::new(image.view(), domain))
         .expect("a surface")
 }
 
@@ -111,7 +111,9 @@ fn a_bent_profile_keeps_the_height() {
         let (image, mask) = contact(radius, centre, bend);
         let domain = Domain::default().with_mask(mask.view());
         let surface = from_rim(Lighting::<f64>::default()).with_fitted_profile(true);
-        let surface = surface.reconstruct(image.view().into(), &domain).unwrap();
+        let surface = surface
+            .reconstruct(Image::new(image.view(), domain))
+            .unwrap();
         let height = surface.heights[[66, 66]] / middle_height(radius, bend);
         // Half a pixel of the blur, and half a grey level at the top: a slope of 0.07 over a tenth
         // of the radius and more where it is flat.
@@ -126,10 +128,12 @@ fn a_contact_that_is_no_ellipse_is_taken_as_it_is() {
     let image = mask.mapv(|inside| if inside { 0.8 } else { 0.0 });
     let domain = Domain::default().with_mask(mask.view());
     let plain = from_rim(Lighting::<f64>::default())
-        .reconstruct(image.view().into(), &domain)
+        .reconstruct(Image::new(image.view(), domain))
         .unwrap();
     let fitted = from_rim(Lighting::<f64>::default()).with_fitted_profile(true);
-    let fitted = fitted.reconstruct(image.view().into(), &domain).unwrap();
+    let fitted = fitted
+        .reconstruct(Image::new(image.view(), domain))
+        .unwrap();
     assert_eq!(plain.mask, fitted.mask);
     assert!(
         plain

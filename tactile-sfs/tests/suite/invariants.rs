@@ -63,7 +63,7 @@ impl Placed {
                 .to_owned()
         };
         let images = reconstructions(light).into_iter().map(|(name, method)| {
-            let surface = method.reconstruct(self.image.view().into(), &domain);
+            let surface = method.reconstruct(Image::new(self.image.view(), domain));
             (name, patch(surface.unwrap()))
         });
         let slopes = integrators().into_iter().map(|(name, method)| {

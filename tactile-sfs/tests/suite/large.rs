@@ -28,7 +28,9 @@ fn contacts_in_images_of_4096() {
         let (z, mask, image) = paraboloid(radius);
         let method = from_rim(Lighting::default().with_normal_intensity(255.0).unwrap());
         let domain = Domain::default().with_mask(mask.view());
-        let surface = method.reconstruct(image.view().into(), &domain).unwrap();
+        let surface = method
+            .reconstruct(Image::new(image.view(), domain))
+            .unwrap();
         assert_eq!(surface.mask, mask);
         let half = radius as usize / 2;
         let inside = s![2048 - half..2048 + half, 2048 - half..2048 + half];

@@ -57,7 +57,7 @@ fn survey_vase_from_its_rim() {
         }
     });
     let domain = Domain::default().with_mask(mask.view());
-    let surface = from_rim(light).reconstruct(image.view().into(), &domain);
+    let surface = from_rim(light).reconstruct(Image::new(image.view(), domain));
     let heights = surface.unwrap().heights;
     let error = height_error(heights.view(), z.view(), Alignment::None);
     println!("vase, 8 bits, rim at 0: {error:?}");
@@ -89,8 +89,8 @@ const BALL: f64 = 4e-3;
 
 /// A ball pressed into the gel of 9DTact, and the cap that it makes.
 struct PressedBall {
-    pressed: Array2<f64>,
-    signal: Signal<f64>,
+    /// Darkening against the reference.
+    signal: Array2<f64>,
     inside: Array2<bool>,
     cap: Array2<f64>,
 }
@@ -108,8 +108,7 @@ impl PressedBall {
             (BALL * BALL - r(at) * r(at)).max(0.0).sqrt() - rim
         });
         Some(Self {
-            pressed,
-            signal: Signal::Darkening(reference),
+            signal: reference - pressed,
             inside,
             cap,
         })
@@ -118,7 +117,7 @@ impl PressedBall {
     /// Mean absolute error of a table's surface within a mask, in metres.
     fn error(&self, table: &DepthTable<f64>, mask: &Array2<bool>) -> f64 {
         let domain = Domain::new([PIXEL, PIXEL]).unwrap().with_mask(mask.view());
-        let surface = table.reconstruct(self.pressed.view().into(), &domain);
+        let surface = table.reconstruct(Image::new(self.signal.view(), domain));
         errors(&surface.unwrap(), &self.cap, Alignment::None).mean_absolute
     }
 }
@@ -143,7 +142,6 @@ fn ball_of_9dtact_by_the_makers_table() {
     // The makers measured theirs on this image, on a circle whose radius and centre they rounded
     // down to pixels.
     let zeroed = makers
-        .with_signal(ball.signal.clone())
         .with_contact_threshold(3.0)
         .and_then(DepthTable::zeroed)
         .unwrap();
@@ -165,7 +163,7 @@ fn tsai_shah_errors(
         let image = Array2::from_shape_fn(z.dim(), |at| lighting.shade(p[at], q[at]));
         let domain = Domain::default().with_mask(mask.view());
         let surface = TsaiShah::new(lighting)
-            .reconstruct(image.view().into(), &domain)
+            .reconstruct(Image::new(image.view(), domain))
             .unwrap();
         let heights = surface.heights.view();
         let error = |alignment| height_error(heights, z.view(), alignment);
@@ -267,10 +265,13 @@ fn surfaces_from_the_heights_of_their_singular_points() {
             let image = Array2::from_shape_fn(z.dim(), |at| lighting.shade(p[at], q[at]));
             let known = singular_heights(z, mask, light);
             let masked = Domain::default().with_mask(mask.view());
-            let error = |method: &dyn SurfaceReconstruction<f64>, domain, alignment| {
-                let surface = method.reconstruct(image.view().into(), domain).unwrap();
-                errors(&surface, z, alignment).mean_absolute
-            };
+            let error =
+                |method: &dyn SurfaceReconstruction<f64>, domain: &Domain<'_, f64>, alignment| {
+                    let surface = method
+                        .reconstruct(Image::new(image.view(), *domain))
+                        .unwrap();
+                    errors(&surface, z, alignment).mean_absolute
+                };
             let informed = masked.with_known_heights(known.view());
             let eikonal = error(&Eikonal::new(lighting), &informed, Alignment::None);
             println!("{name}, {light:?}: eikonal {eikonal:.2} px");

@@ -19,7 +19,7 @@ fn orders(errors: &[f64]) -> Vec<f64> {
 }
 
 fn mean_error(sampled: &Sampled, method: &Eikonal<f64>, domain: &Domain<'_, f64>) -> f64 {
-    let surface = method.reconstruct(sampled.image.view().into(), domain);
+    let surface = method.reconstruct(Image::new(sampled.image.view(), *domain));
     errors(&surface.unwrap(), &sampled.z, Alignment::None).mean_absolute
 }
 
@@ -110,7 +110,7 @@ fn pixels_need_not_be_square() {
     let (mask, image) = (z.mapv(|z| z > 0.0), z.mapv(|z| z / 0.8));
     let domain = Domain::new([wide, high]).unwrap();
     let surface = from_rim(Lighting::default())
-        .reconstruct(image.view().into(), &domain.with_mask(mask.view()))
+        .reconstruct(Image::new(image.view(), domain.with_mask(mask.view())))
         .unwrap();
     let error = errors(&surface, &z, Alignment::None);
     // A hundredth of the radius, half a pixel: square pixels of this size reach the same.

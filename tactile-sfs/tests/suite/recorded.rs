@@ -7,7 +7,7 @@
 use ndarray::Array2;
 use tactile_sfs::{
     BoundaryCondition, ControlPointSampler, CosinePoisson, Domain, Eikonal, EikonalBranch,
-    EquallySpaced, FrankotChellappa, Lighting, MaskedLeastSquares, SlopeIntegrator, Surface,
+    EquallySpaced, FrankotChellappa, Image, Lighting, MaskedLeastSquares, SlopeIntegrator, Surface,
     SurfaceReconstruction, TsaiShah, slopes,
 };
 use test_support::Answers;
@@ -53,7 +53,7 @@ fn reconstructions(answers: &mut Answers) {
             ("tsai_shah", &TsaiShah::new(frontal), &scene.image),
         ];
         for (method_name, method, image) in methods {
-            let surface = method.reconstruct(image.view().into(), &domain);
+            let surface = method.reconstruct(Image::new(image.view(), domain));
             let surface = surface.expect("a surface");
             add_surface(answers, &format!("{method_name}/{name}"), &surface);
         }
@@ -75,7 +75,7 @@ fn both_branches(answers: &mut Answers, frontal: Lighting<f64>) {
     for (name, light, image) in [("frontal", frontal, &scene.image), ("oblique", lit, &image)] {
         let method = Eikonal::new(light).with_branch(EikonalBranch::Auto);
         let surface = method
-            .reconstruct(image.view().into(), &domain)
+            .reconstruct(Image::new(image.view(), domain))
             .expect("heights");
         add_surface(answers, &format!("eikonal_known/{name}"), &surface);
     }

@@ -57,7 +57,7 @@ fn saturated_and_constant_images_have_surfaces() {
     for (name, method) in reconstructions(Lighting::default()) {
         for (what, image) in &images {
             let domain = Domain::new([1e-5; 2]).unwrap().with_mask(scene.mask.view());
-            let Ok(surface) = method.reconstruct(image.view().into(), &domain) else {
+            let Ok(surface) = method.reconstruct(Image::new(image.view(), domain)) else {
                 continue;
             };
             let mut pixels = surface.heights.iter().zip(&surface.mask);

@@ -343,7 +343,13 @@ impl Stated {
         };
         let size = trial.simulation.pixel_size_m.map(|p| self.pixel_size * p);
         let pipeline = Pipeline::from_pairs(&trial.pairs, size, self.object).unwrap();
+        // The modulus of a ball needs no points, and its cautions are none of theirs.
+        let points = match self.object {
+            Object::Sphere { .. } => 8,
+            _ => 200,
+        };
         pipeline
+            .with_control_points(points)
             .with_settings(|settings| {
                 settings.waveguide = Some(guide);
                 settings.layer_covariance = covariance;

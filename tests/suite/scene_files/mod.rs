@@ -21,7 +21,10 @@ const PAPER_ERROR: f64 = 0.0538;
 fn a_simulated_scene_on_disk_gives_the_polymers_moduli() {
     for (material, seed) in [(Elastic::CL2000X, 3), (Elastic::CL2003X, 4)] {
         let folder = tempfile::tempdir().unwrap();
-        let mut options = PressOptions::default();
+        let mut options = PressOptions {
+            camera: Camera::default().coarser(4),
+            ..PressOptions::default()
+        };
         (options.object.material, options.seed) = (material, seed);
         let scene = PressScene::new(options).unwrap();
         let calibration = scene.calibrate(&CalibrationRun::default()).unwrap();

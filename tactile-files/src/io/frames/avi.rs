@@ -8,7 +8,7 @@ use std::io::{BufRead, Read, Result as IoResult, copy, sink};
 ///
 /// Lists are entered and their sizes are not asked for: a recorder that was killed left them open.
 #[derive(Default)]
-pub struct Avi {
+pub(super) struct Avi {
     pub rate_hz: Option<f64>,
     /// Streams that were announced, and which of them is the video.
     streams: usize,
@@ -53,7 +53,7 @@ impl Avi {
     const EXPECTED: &str = "a video of JPEG frames (MJPG) or of uncompressed ones";
 
     /// Reads up to the first frame.
-    pub fn open(input: &mut dyn BufRead) -> Result<Self, Broken> {
+    pub(super) fn open(input: &mut dyn BufRead) -> Result<Self, Broken> {
         let mut avi = Self::default();
         while let Some((name, size)) = chunk(input)? {
             if is_list(&name) {
@@ -112,7 +112,7 @@ impl Avi {
 
     /// The next frame. Empty chunks, which cameras write for frames that they dropped, are passed
     /// over and counted.
-    pub fn next(&mut self, input: &mut dyn BufRead) -> Result<Option<Encoded<'_>>, Broken> {
+    pub(super) fn next(&mut self, input: &mut dyn BufRead) -> Result<Option<Encoded<'_>>, Broken> {
         while let Some((name, size)) = chunk(input)? {
             if is_list(&name) {
                 pass_over(input, 4)?;

@@ -5,7 +5,7 @@ use super::{Broken, append};
 use std::io::{BufRead, Read, Result as IoResult};
 
 /// First bytes of a JPEG image and of a PNG image.
-pub const STARTS: [&[u8]; 2] = [b"\xff\xd8\xff", b"\x89PNG\r\n\x1a\n"];
+pub(super) const STARTS: [&[u8]; 2] = [b"\xff\xd8\xff", b"\x89PNG\r\n\x1a\n"];
 
 // Markers of JPEG: begin and end of an image, its samples, Huffman tables.
 const BEGIN: u8 = 0xd8;
@@ -37,14 +37,14 @@ const STANDARD: &[u8; 416] =
 
 /// The images of a stream.
 #[derive(Default)]
-pub struct Images {
+pub(super) struct Images {
     /// An image began inside the one before, which was cut.
     begun: bool,
 }
 
 impl Images {
     /// The next image, cut if the stream ends in it. Bytes between images are passed over.
-    pub fn next(&mut self, input: &mut dyn BufRead) -> Result<Option<Vec<u8>>, Broken> {
+    pub(super) fn next(&mut self, input: &mut dyn BufRead) -> Result<Option<Vec<u8>>, Broken> {
         let Some(start) = self.start(input)? else {
             return Ok(None);
         };
@@ -154,7 +154,7 @@ fn png(input: &mut dyn BufRead, bytes: &mut Vec<u8>) -> IoResult<()> {
 }
 
 /// A JPEG image with the standard tables, unless it has its own.
-pub fn with_tables(mut bytes: Vec<u8>) -> Vec<u8> {
+pub(super) fn with_tables(mut bytes: Vec<u8>) -> Vec<u8> {
     let mut at = 2;
     while let Some(&[0xff, marker, high, low]) = bytes.get(at..).and_then(<[u8]>::first_chunk) {
         match marker {

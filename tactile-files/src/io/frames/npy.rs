@@ -9,7 +9,7 @@ use std::io::{BufRead, Error, ErrorKind, Read, Result as IoResult, copy, sink};
 use std::mem::take;
 
 /// The arrays of a stream, one after the other.
-pub struct Arrays {
+pub(super) struct Arrays {
     archived: bool,
     member: Member,
     layout: Option<Layout>,
@@ -20,9 +20,9 @@ pub struct Arrays {
 
 impl Arrays {
     /// The first bytes of an array, or of an archive.
-    pub const START: [&[u8]; 2] = [b"\x93NUMPY", b"PK\x03\x04"];
+    pub(super) const START: [&[u8]; 2] = [b"\x93NUMPY", b"PK\x03\x04"];
 
-    pub fn new(archived: bool) -> Self {
+    pub(super) fn new(archived: bool) -> Self {
         Self {
             archived,
             member: Member::default(),
@@ -33,7 +33,7 @@ impl Arrays {
     }
 
     /// The next frame. Arrays of an archive that hold other numbers are passed over.
-    pub fn next(&mut self, input: &mut dyn BufRead) -> Result<Option<DynamicImage>, Broken> {
+    pub(super) fn next(&mut self, input: &mut dyn BufRead) -> Result<Option<DynamicImage>, Broken> {
         while self.left == 0 {
             if self.archived {
                 if self.layout.take().is_some() {
@@ -175,7 +175,7 @@ impl Layout {
 }
 
 /// Kind of the numbers, whether columns come first, and shape, of an array's header.
-pub fn header_fields(header: &str) -> Option<(&str, bool, Vec<usize>)> {
+pub(crate) fn header_fields(header: &str) -> Option<(&str, bool, Vec<usize>)> {
     let after = |key: &str| Some(header.split_once(key)?.1.trim_start());
     let kind = after("'descr':")?.strip_prefix('\'')?.split('\'').next()?;
     let fortran = after("'fortran_order':")?.starts_with("True");
@@ -187,7 +187,7 @@ pub fn header_fields(header: &str) -> Option<(&str, bool, Vec<usize>)> {
 
 /// Names and contents of the files of an archive, of at most so many bytes together. `None` for one
 /// that cannot be read.
-pub fn members(mut input: &[u8], mut most: u64) -> Option<Vec<(String, Vec<u8>)>> {
+pub(crate) fn members(mut input: &[u8], mut most: u64) -> Option<Vec<(String, Vec<u8>)>> {
     let mut files = Vec::new();
     while let Some(mut member) = Member::open(&mut input).ok()? {
         let mut bytes = Vec::new();

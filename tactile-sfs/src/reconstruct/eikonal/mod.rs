@@ -44,7 +44,7 @@ use tactile_core::{Requirement, StopReason};
 pub(crate) use profile::ProfileBuffers;
 
 use crate::{
-    Domain, Frame, Lighting, PixelScalar, SfsError, Surface, SurfaceReconstruction,
+    Domain, Frame, Image, Lighting, PixelScalar, SfsError, Surface, SurfaceReconstruction,
     SurfaceWorkspace,
 };
 use profile::Profile;
@@ -54,7 +54,7 @@ use profile::Profile;
 /// ```
 /// use ndarray::Array2;
 /// use tactile_sfs::{
-///     BoundaryCondition, Domain, Eikonal, Lighting, SfsError, SurfaceReconstruction,
+///     BoundaryCondition, Domain, Eikonal, Image, Lighting, SfsError, SurfaceReconstruction,
 /// };
 /// let mask = Array2::from_shape_fn((21, 21), |(r, c)| {
 ///     (r as f64 - 10.0).hypot(c as f64 - 10.0) < 8.0
@@ -66,12 +66,12 @@ use profile::Profile;
 /// let method = Eikonal::new(Lighting::default());
 /// let heights = method
 ///     .with_boundary(BoundaryCondition::Height(3.0))?
-///     .reconstruct(image.view().into(), &domain)?
+///     .reconstruct(Image::new(image.view(), domain))?
 ///     .heights;
 /// assert!((heights[[10, 10]] - 11.0).abs() < 1.0); // slope 1 from the boundary, 8 px away
 /// let free = method
 ///     .with_boundary(BoundaryCondition::Free)?
-///     .reconstruct(image.view().into(), &domain);
+///     .reconstruct(Image::new(image.view(), domain));
 /// assert_eq!(free, Err(SfsError::NoKnownHeight));
 /// # Ok::<(), SfsError>(())
 /// ```
@@ -89,15 +89,14 @@ pub enum BoundaryCondition<T> {
 ///
 /// ```
 /// use ndarray::Array2;
-/// use tactile_sfs::{EikonalBranch, Domain, Eikonal, Lighting, SurfaceReconstruction};
+/// use tactile_sfs::{Domain, Eikonal, EikonalBranch, Image, Lighting, SurfaceReconstruction};
 /// // n·s = 1/√2: slope 1 everywhere. The centre is known to be at 10.
 /// let image = Array2::from_elem((15, 15), 0.5_f64.sqrt());
 /// let known = Array2::from_shape_fn((15, 15), |at| if at == (7, 7) { 10.0 } else { f64::NAN });
 /// let border = |branch| {
 ///     let method = Eikonal::new(Lighting::default()).with_branch(branch);
 ///     let surface = method.reconstruct(
-///         image.view().into(),
-///         &Domain::default().with_known_heights(known.view()),
+///         Image::new(image.view(), Domain::default().with_known_heights(known.view()))
 ///     )?;
 ///     Ok::<_, tactile_sfs::SfsError>(surface.heights[[7, 12]])
 /// };
@@ -131,7 +130,7 @@ pub enum EikonalBranch {
 ///
 /// ```
 /// use ndarray::Array2;
-/// use tactile_sfs::{Domain, Eikonal, Lighting, BoundaryCondition, SurfaceReconstruction};
+/// use tactile_sfs::{BoundaryCondition, Domain, Eikonal, Image, Lighting, SurfaceReconstruction};
 /// // A hemisphere of radius 20 px: R = z/20, vertical at its boundary.
 /// let z = Array2::from_shape_fn((45, 45), |(r, c)| {
 ///     (400.0 - (r as f64 - 22.0).powi(2) - (c as f64 - 22.0).powi(2)).max(0.0).sqrt()
@@ -139,8 +138,7 @@ pub enum EikonalBranch {
 /// let (image, mask) = (z.mapv(|z| z / 20.0), z.mapv(|z| z > 0.0));
 /// let method = Eikonal::new(Lighting::default()).with_boundary(BoundaryCondition::Height(0.0))?;
 /// let surface = method.reconstruct(
-///     image.view().into(),
-///     &Domain::default().with_mask(mask.view()),
+///     Image::new(image.view(), Domain::default().with_mask(mask.view()))
 /// )?;
 /// assert!((surface.heights[[22, 22]] - 20.0).abs() < 0.3);
 /// # Ok::<(), tactile_sfs::SfsError>(())
@@ -195,7 +193,9 @@ impl<T: PixelScalar> Eikonal<T> {
     ///
     /// ```
     /// use ndarray::Array2;
-    /// use tactile_sfs::{BoundaryCondition, Domain, Eikonal, Lighting, SurfaceReconstruction};
+    /// use tactile_sfs::{
+    ///     BoundaryCondition, Domain, Eikonal, Image, Lighting, SurfaceReconstruction,
+    /// };
     /// // A hemisphere of radius 20 px in a frame that a lens blurs: each pixel is the mean of
     /// // those around it.
     /// let square = |r: usize, c: usize| (r as f64 - 25.3).powi(2) + (c as f64 - 24.6).powi(2);
@@ -208,7 +208,7 @@ impl<T: PixelScalar> Eikonal<T> {
     /// let rim = BoundaryCondition::Height(0.0);
     /// let plain = Eikonal::new(Lighting::default()).with_boundary(rim)?;
     /// let error = |method: Eikonal<f64>| {
-    ///     let surface = method.reconstruct(image.view().into(), &domain)?;
+    ///     let surface = method.reconstruct(Image::new(image.view(), domain))?;
     ///     Ok::<_, tactile_sfs::SfsError>((surface.heights[[24, 24]] - 20.0).abs())
     /// };
     /// let (fitted, plain) = (error(plain.with_fitted_profile(true))?, error(plain)?);
@@ -227,14 +227,14 @@ impl<T: PixelScalar> Eikonal<T> {
     /// ```
     /// use ndarray::array;
     /// use tactile_sfs::{
-    ///     Domain, Eikonal, EikonalBranch, Lighting, PixelFlags, SurfaceReconstruction,
+    ///     Domain, Eikonal, EikonalBranch, Image, Lighting, PixelFlags, SurfaceReconstruction,
     /// };
     /// let known = array![[0.0, f64::NAN, f64::NAN, f64::NAN]];
     /// let method = Eikonal::new(Lighting::default())
     ///     .with_branch(EikonalBranch::Convex)
     ///     .with_tolerance(1e-6)?;
     /// let domain = Domain::default().with_known_heights(known.view());
-    /// let surface = method.reconstruct(array![[1.0, 1.0, 0.0, 1.0]].view().into(), &domain)?;
+    /// let surface = method.reconstruct(Image::new(array![[1.0, 1.0, 0.0, 1.0]].view(), domain))?;
     /// // Black would be infinitely steep.
     /// assert!(surface.flags[[0, 2]].contains(PixelFlags::DARK));
     /// assert!(surface.heights[[0, 3]].is_finite());
@@ -250,31 +250,25 @@ impl<T: PixelScalar> Eikonal<T> {
 }
 
 impl<T: PixelScalar> SurfaceReconstruction<T> for Eikonal<T> {
-    fn reconstruct(
-        &self,
-        frame: Frame<'_, T>,
-        domain: &Domain<'_, T>,
-    ) -> Result<Surface<T>, SfsError> {
-        Surface::made_by(|workspace, surface| {
-            self.reconstruct_with(workspace, frame, domain, surface)
-        })
+    fn reconstruct(&self, image: Image<'_, '_, T>) -> Result<Surface<T>, SfsError> {
+        Surface::made_by(|workspace, surface| self.reconstruct_with(workspace, image, surface))
     }
 
     fn reconstruct_with(
         &self,
         workspace: &mut SurfaceWorkspace<T>,
-        frame: Frame<'_, T>,
-        domain: &Domain<'_, T>,
+        image: Image<'_, '_, T>,
         surface: &mut Surface<T>,
     ) -> Result<(), SfsError> {
+        let Image { values, domain } = image;
         let Some(mask) = domain.mask.filter(|_| self.fitted_profile) else {
-            return self.reconstruct_as_given(workspace, &frame, domain, None, surface);
+            return self.reconstruct_as_given(workspace, &values, &domain, None, surface);
         };
-        let area = domain.bounding_box(frame.dim())?;
+        let area = domain.bounding_box(values.dim())?;
         // Taken out, because the solve below borrows the whole workspace.
         let mut buffers = core::mem::take(&mut workspace.profile);
         let profile = if self.lighting.is_frontal() {
-            buffers.fill(&frame, mask, area, &self.lighting)
+            buffers.fill(&values, mask, area, &self.lighting)
         } else {
             None
         };
@@ -282,11 +276,11 @@ impl<T: PixelScalar> SurfaceReconstruction<T> for Eikonal<T> {
             let frame = Frame::Real(buffers.image.view());
             let domain = Domain {
                 mask: Some(buffers.mask.view()),
-                ..*domain
+                ..domain
             };
             self.reconstruct_as_given(workspace, &frame, &domain, profile.as_ref(), surface)
         } else {
-            self.reconstruct_as_given(workspace, &frame, domain, None, surface)
+            self.reconstruct_as_given(workspace, &values, &domain, None, surface)
         };
         workspace.profile = buffers;
         result

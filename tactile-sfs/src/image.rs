@@ -1,11 +1,40 @@
-//! Image input: floats, or the bytes of an 8-bit camera read in place.
+//! Image input: floats, or the bytes of an 8-bit camera read in place, and the domain.
 
-use ndarray::{ArrayView2, ArrayView3};
+use ndarray::ArrayView2;
 
-use crate::PixelScalar;
+use crate::{Domain, PixelScalar};
 
-/// An image as the reconstructions take it: real intensities or 8-bit grey levels (0 … 255, not
-/// rescaled).
+/// What a surface is reconstructed from: the values of the pixels, and where they lie.
+///
+/// ```
+/// use ndarray::array;
+/// use tactile_sfs::{DepthTable, Domain, Image, SurfaceReconstruction};
+/// let (bytes, mask) = (array![[0_u8, 50, 100]], array![[true, true, false]]);
+/// let domain = Domain::new([1e-4, 1e-4])?.with_mask(mask.view());
+/// let table = DepthTable::new(&[(0.0, 0.0), (200.0, 1e-3)])?;
+/// let heights = table.reconstruct(Image::new(bytes.view(), domain))?.heights;
+/// assert!(heights[[0, 1]] == 0.25e-3 && heights[[0, 2]].is_nan());
+/// # Ok::<(), tactile_sfs::SfsError>(())
+/// ```
+#[derive(Clone, Copy, Debug)]
+pub struct Image<'v, 'd, T> {
+    /// The values of the pixels.
+    pub values: Frame<'v, T>,
+    /// Pixel size, mask and known heights.
+    pub domain: Domain<'d, T>,
+}
+
+impl<'v, 'd, T> Image<'v, 'd, T> {
+    /// Values on a domain, whose shapes the reconstruction compares.
+    pub fn new(values: impl Into<Frame<'v, T>>, domain: Domain<'d, T>) -> Self {
+        Self {
+            values: values.into(),
+            domain,
+        }
+    }
+}
+
+/// The values of an image: real intensities or 8-bit grey levels (0 … 255, not rescaled).
 ///
 /// ```
 /// use ndarray::array;
@@ -22,9 +51,6 @@ pub enum Frame<'a, T> {
     Real(ArrayView2<'a, T>),
     /// Grey levels of an 8-bit camera.
     Bytes(ArrayView2<'a, u8>),
-    /// Levels of an 8-bit colour camera, `[row, column, channel]`. Methods of one channel read the
-    /// mean of the channels.
-    Colour(ArrayView3<'a, u8>),
 }
 
 impl<'a, T: PixelScalar> From<ArrayView2<'a, T>> for Frame<'a, T> {
@@ -36,12 +62,6 @@ impl<'a, T: PixelScalar> From<ArrayView2<'a, T>> for Frame<'a, T> {
 impl<'a, T: PixelScalar> From<ArrayView2<'a, u8>> for Frame<'a, T> {
     fn from(view: ArrayView2<'a, u8>) -> Self {
         Frame::Bytes(view)
-    }
-}
-
-impl<'a, T: PixelScalar> From<ArrayView3<'a, u8>> for Frame<'a, T> {
-    fn from(view: ArrayView3<'a, u8>) -> Self {
-        Frame::Colour(view)
     }
 }
 
@@ -59,7 +79,6 @@ impl<T: PixelScalar> Frame<'_, T> {
         match self {
             Frame::Real(view) => view.dim(),
             Frame::Bytes(view) => view.dim(),
-            Frame::Colour(view) => (view.dim().0, view.dim().1),
         }
     }
 
@@ -72,13 +91,6 @@ impl<T: PixelScalar> Frame<'_, T> {
         match self {
             Frame::Real(view) => view[[row, column]],
             Frame::Bytes(view) => T::of(f64::from(view[[row, column]])),
-            Frame::Colour(view) => {
-                let channels = view.dim().2;
-                let sum: f64 = (0..channels)
-                    .map(|k| f64::from(view[[row, column, k]]))
-                    .sum();
-                T::of(sum / channels as f64)
-            }
         }
     }
 }

@@ -1,0 +1,114 @@
+//! Displacement and strain at places of a grid or of the points, as files for other programs.
+use super::quantities;
+use crate::failure::Failure;
+use crate::outputs::Npz;
+use nalgebra::{Matrix3, Point, SVector};
+use tactile_imaging::elasticity::kinematics::Kinematics;
+
+/// Points on equal distances over a box, x fastest.
+pub(super) struct StrainGrid<const D: usize> {
+    origin: Point<f64, D>,
+    spacing: f64,
+    pub counts: [usize; D],
+}
+
+impl<const D: usize> StrainGrid<D> {
+    pub(super) fn over(points: &[Point<f64, D>], spacing: f64) -> Result<Self, Failure> {
+        let mut points = points.iter().filter(|p| p.iter().all(|x| x.is_finite()));
+        let start = points.next().copied().unwrap_or_else(Point::origin);
+        let (mut low, mut high) = (start, start);
+        for p in points {
+            (low, high) = (low.inf(p), high.sup(p));
+        }
+        let count = |a: usize| ((high[a] - low[a]) / spacing).floor() + 1.0;
+        // The files have some 300 bytes for a point.
+        if (0..D).map(count).product::<f64>() > 4e6 {
+            return Err(Failure::input(format!(
+                "--grid {spacing} gives more than four million points: give a larger spacing"
+            )));
+        }
+        Ok(Self {
+            origin: low,
+            spacing,
+            counts: std::array::from_fn(|a| count(a) as usize),
+        })
+    }
+
+    pub(super) fn points(&self) -> Vec<Point<f64, D>> {
+        let place = |k: usize| {
+            let mut rest = k;
+            let mut place = self.origin;
+            for a in 0..D {
+                place[a] += self.spacing * (rest % self.counts[a]) as f64;
+                rest /= self.counts[a];
+            }
+            place
+        };
+        (0..self.counts.iter().product()).map(place).collect()
+    }
+
+    /// The legacy format of VTK, as text.
+    pub(super) fn vtk(&self, found: &[Known<D>], read: &[Kinematics]) -> Vec<u8> {
+        let three = |v: &[f64]| {
+            let at = |a: usize| v.get(a).copied().unwrap_or(0.0);
+            format!("{:e} {:e} {:e}", at(0), at(1), at(2))
+        };
+        let counts: Vec<f64> = self.counts.iter().map(|&c| c as f64).collect();
+        let depth = if D == 2 { 1.0 } else { counts[D - 1] };
+        let mut text = format!(
+            "# vtk DataFile Version 3.0\ndisplacement and strain\nASCII\nDATASET \
+             STRUCTURED_POINTS\nDIMENSIONS {} {} {depth}\nORIGIN {}\nSPACING {}\nPOINT_DATA {}\n",
+            counts[0],
+            counts[1],
+            three(self.origin.coords.as_slice()),
+            three(&[self.spacing; 3]),
+            found.len()
+        );
+        text.push_str("VECTORS displacement double\n");
+        for (displacement, ..) in found {
+            text.push_str(&three(displacement.as_slice()));
+            text.push('\n');
+        }
+        let strains: Vec<_> = found.iter().map(|at| at.1).collect();
+        let errors: Vec<_> = found.iter().map(|at| at.2).collect();
+        for (name, tensors) in [("strain", strains), ("standard_error", errors)] {
+            text.push_str(&format!("TENSORS {name} double\n"));
+            for tensor in tensors {
+                // Symmetric: columns are rows.
+                for column in tensor.column_iter() {
+                    text.push_str(&three(&[column[0], column[1], column[2]]));
+                    text.push('\n');
+                }
+            }
+        }
+        quantities::vtk::<D>(&mut text, read);
+        text.into_bytes()
+    }
+}
+
+/// Displacement, strain and its standard error at a place.
+pub(super) type Known<const D: usize> = (SVector<f64, D>, Matrix3<f64>, Matrix3<f64>);
+
+/// Completes arrays with places and what is known there, tensors of the plane or of space.
+pub(super) fn arrays<const D: usize>(
+    mut npz: Npz,
+    shape: &[usize],
+    points: &[Point<f64, D>],
+    found: &[Known<D>],
+    read: &[Kinematics],
+) -> Result<Vec<u8>, Failure> {
+    let vector = |v: SVector<f64, D>| <[f64; D]>::from(v).map(f64::to_le_bytes);
+    let places = || (0..D).flat_map(|i| (0..D).map(move |j| (i, j)));
+    let tensor = |m: Matrix3<f64>| places().map(move |at| m[at].to_le_bytes());
+    let [vectors, tensors] = [&[D][..], &[D, D]].map(|axes| [shape, axes].concat());
+    let points = points.iter().flat_map(|point| vector(point.coords));
+    npz.add("points", "<f8", &vectors, points)?;
+    let displacements = found.iter().flat_map(|at| vector(at.0));
+    npz.add("displacement", "<f8", &vectors, displacements)?;
+    let strains = found.iter().flat_map(|at| tensor(at.1));
+    npz.add("strain", "<f8", &tensors, strains)?;
+    let errors = found.iter().flat_map(|at| tensor(at.2));
+    npz.add("standard_error", "<f8", &tensors, errors)?;
+    quantities::arrays::<D>(&mut npz, shape, read)?;
+    npz.into_bytes()
+}
