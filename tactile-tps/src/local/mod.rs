@@ -335,7 +335,7 @@ impl<const D: usize> LocalField<D> {
         for block in blocks.leaves() {
             if leaf == usize::MAX {
                 read(patch, block);
-            } else {
+            } else if !block.is_empty() {
                 waiting.push(block.to_vec());
             }
             while let Some(mut block) = waiting.pop() {

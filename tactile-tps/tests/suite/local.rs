@@ -101,6 +101,7 @@ fn an_affine_field_is_exact_at_any_point() {
         let linear = SMatrix::<f64, 3, 3>::new(0.1, 0.02, 0.0, -0.03, 0.2, 0.01, 0.0, 0.04, -0.1);
         let targets: Vec<_> = sources.iter().map(|p| p + linear * p.coords).collect();
         let field = LocalField::fit(&sources, &targets).expect("finite points");
+        assert_eq!(field.at(&[]), []);
         let places = [0.5, 1.2].map(|x| Point::from(SVector::repeat(unit * x)));
         for value in field.at(&places).iter().chain(&field.values) {
             // Displacements are rounded to sixteen digits, and a patch is a third of the set.
