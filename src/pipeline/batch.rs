@@ -1,8 +1,8 @@
 //! Many frames at once: serial, or over threads with the feature `rayon`. The bits are the same.
-use super::composition::Pipeline;
 use super::contact::{ContactReading, FrameContact};
 use super::error::PipelineError;
-use super::stages::{Bench, Stages};
+use super::pipeline::Pipeline;
+use super::stages::{Scratch, Stages};
 use ndarray::ArrayView2;
 use std::sync::Arc;
 
@@ -34,20 +34,20 @@ pub fn contacts(
 ) -> Result<Vec<Reading>, PipelineError> {
     let reference = Arc::new(pipeline.reference_frame(&[reference])?);
     let stages = Stages::new(pipeline.clone(), reference);
-    let one = |(bench, contact): &mut (Bench, FrameContact),
+    let one = |(scratch, contact): &mut (Scratch, FrameContact),
                (frame, image): (usize, &ArrayView2<'_, u8>)| {
-        stages.contact(bench, frame, *image, None, contact)?;
+        stages.contact(scratch, frame, *image, None, contact)?;
         Ok(contact.reading)
     };
     #[cfg(feature = "rayon")]
     {
         use rayon::prelude::*;
-        let start = || (Bench::default(), FrameContact::default());
+        let start = || (Scratch::default(), FrameContact::default());
         Ok(frames.par_iter().enumerate().map_init(start, one).collect())
     }
     #[cfg(not(feature = "rayon"))]
     {
-        let mut state = (Bench::default(), FrameContact::default());
+        let mut state = (Scratch::default(), FrameContact::default());
         Ok(frames
             .iter()
             .enumerate()

@@ -1,4 +1,5 @@
 //! Which inputs the error of a modulus comes from, and which of them were assumed.
+use super::assumptions::Assumption;
 use super::settings::Settings;
 use crate::core::{Source, Uncertain};
 use std::fmt::{self, Display, Formatter};
@@ -44,34 +45,13 @@ impl Display for ErrorShare {
 
 /// The least effort that makes a source's error smaller.
 fn remedy(source: Source) -> &'static str {
-    match source {
-        Source::Noise => "more frames of the same loads",
-        Source::Calibration => "more pairs of the calibration, by a better gauge",
-        Source::Gain => "a better gauge, or a flat field",
-        Source::Coupling => "a press of this object under a known weight ([[check]])",
-        Source::PixelSize => "a frame of a target of known pitch",
-        Source::Profile => "a rounder contact, lit evenly",
-        Source::ObjectSize => "a calliper on the object (radius_error_m)",
-        Source::PoissonRatio => "a statement of its error (poisson_ratio_error)",
-        Source::Adhesion => "larger forces, or talc and a statement of adhesion_error_j_per_m2",
-        Source::Guide => "a press of a ball of known radius and modulus ([[check]])",
-        Source::Law => "a contact table by finite elements",
+    match (Assumption::of(source), source) {
+        (Some(assumption), _) => assumption.remedy,
+        (None, Source::Noise) => "more frames of the same loads",
+        (None, Source::Calibration) => "more pairs of the calibration, by a better gauge",
+        (None, Source::Profile) => "a rounder contact, lit evenly",
+        (None, Source::Law) => "a contact table by finite elements",
         _ => "what the estimator's author states",
-    }
-}
-
-/// Whether nothing was stated of the input that is a source.
-fn is_assumed(source: Source, settings: &Settings) -> bool {
-    let checked = settings.checked_gain.map(|checked| checked.gain.value);
-    match source {
-        Source::Gain => settings.force_scale_error.is_none(),
-        Source::Coupling => settings.coupling_error.or(checked).is_none(),
-        Source::PixelSize => settings.length_scale_error.is_none(),
-        Source::ObjectSize => settings.object_radius_error_m.is_none(),
-        Source::PoissonRatio => settings.poisson_ratio_error.is_none(),
-        Source::Adhesion => settings.adhesion_error_j_per_m2.is_none(),
-        Source::Guide => settings.layer_covariance.is_none(),
-        _ => false,
     }
 }
 
@@ -100,7 +80,7 @@ pub fn error_budget(modulus_pa: &Uncertain, settings: &Settings) -> Vec<ErrorSha
     let share = |(source, part): (Source, f64)| ErrorShare {
         source,
         relative_error: (part / modulus_pa.value).abs(),
-        assumed: is_assumed(source, settings),
+        assumed: settings.assumes(source),
     };
     let mut shares: Vec<_> = modulus_pa.parts().map(share).collect();
     shares.sort_by(|a, b| b.relative_error.total_cmp(&a.relative_error));

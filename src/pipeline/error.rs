@@ -1,4 +1,5 @@
 //! Why a measurement could not be made.
+use crate::core::InvalidOption;
 use crate::elasticity::ElasticityError;
 use crate::force::{ForceError, ShapeProblem};
 use crate::matching::MatchError;
@@ -52,39 +53,9 @@ pub enum PipelineError {
         /// Why not.
         reason: &'static str,
     },
-    /// A relative error is negative or not finite.
-    #[error("a relative error must be finite and not negative, found {found}")]
-    ScaleError {
-        /// What was given.
-        found: f64,
-    },
-    /// The standard error of an input is negative or not finite.
-    #[error("the standard error of an input must be finite and not negative, found {found}")]
-    InputError {
-        /// What was given.
-        found: f64,
-    },
-    /// The covariance of the waveguide's layers has another size than they have parameters.
-    #[error(
-        "the covariance of the layers must have {expected} rows and columns, three a layer, found \
-         {} × {}",
-        found.0, found.1
-    )]
-    LayerCovariance {
-        /// Parameters of all layers.
-        expected: usize,
-        /// Rows and columns.
-        found: (usize, usize),
-    },
-    /// The smoothing has no middle pixel.
-    #[error("the smoothing must be an odd number of pixels wide, found {found}")]
-    EvenSmoothing {
-        /// What was given.
-        found: usize,
-    },
-    /// Blocks of no pixels.
-    #[error("a block must have a side of at least one pixel")]
-    EmptyBlocks,
+    /// A setting of the pipeline is outside its range.
+    #[error(transparent)]
+    Setting(#[from] InvalidOption),
     /// There is no frame of this number.
     #[error("there is no frame {}: the press has {frames}", frame + 1)]
     NoSuchFrame {
@@ -293,7 +264,88 @@ pub enum PipelineError {
     Modulus(#[source] ElasticityError),
 }
 
+/// What a caller can do about a [`PipelineError`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum PipelineErrorKind {
+    /// Settings, the calibration, the sensor's description or the object are not usable: state
+    /// others.
+    Options,
+    /// A frame, a time or a reading that was given is not usable: give another.
+    Input,
+    /// A frame of the press could not be read from where it is kept.
+    NotRead,
+    /// A frame shows no contact.
+    NoContact,
+    /// The frames do not determine the answer: more or other frames may.
+    NotDetermined,
+    /// A stage of the caller's own failed.
+    OwnStage,
+}
+
 impl PipelineError {
+    /// What a caller can do about it.
+    ///
+    /// ```
+    /// use tactile_imaging::pipeline::{PipelineError, PipelineErrorKind};
+    /// assert_eq!(PipelineError::NoContact { frame: 2 }.kind(), PipelineErrorKind::NoContact);
+    /// ```
+    #[must_use]
+    pub fn kind(&self) -> PipelineErrorKind {
+        use PipelineErrorKind as Kind;
+        match self {
+            Self::Contact {
+                source: ForceError::Custom(_),
+                ..
+            }
+            | Self::ContactMask { .. }
+            | Self::Surface {
+                source: SfsError::Custom(_),
+                ..
+            }
+            | Self::Match {
+                source: MatchError::Custom(_),
+                ..
+            }
+            | Self::Warp {
+                source: TpsError::Custom(_),
+                ..
+            }
+            | Self::Strain {
+                source: ElasticityError::Custom(_),
+                ..
+            }
+            | Self::Modulus(ElasticityError::Custom(_)) => Kind::OwnStage,
+            Self::Sensor(_)
+            | Self::Calibration(_)
+            | Self::SurfaceOptions(_)
+            | Self::WarpOptions(_)
+            | Self::DepthTable(_)
+            | Self::Material(_)
+            | Self::Setting(_)
+            | Self::WrongEstimator { .. } => Kind::Options,
+            Self::Check { .. }
+            | Self::NoSuchFrame { .. }
+            | Self::Contact { .. }
+            | Self::Time { .. }
+            | Self::TimeDecreases { .. } => Kind::Input,
+            Self::Unreadable { .. } => Kind::NotRead,
+            Self::NoContact { .. } | Self::OppositeSignal { .. } => Kind::NoContact,
+            Self::NotReconstructed { .. }
+            | Self::NoForce { .. }
+            | Self::NoWholeContact
+            | Self::TooFewFrames { .. }
+            | Self::Surface { .. }
+            | Self::Match { .. }
+            | Self::TooFewMatches { .. }
+            | Self::Warp { .. }
+            | Self::Strain { .. }
+            | Self::NotUniaxial { .. }
+            | Self::FlatFace { .. }
+            | Self::Modulus(_) => Kind::NotDetermined,
+        }
+    }
+
     /// The frame that the trouble comes from, counted from 0. `None` if it comes from no single one.
     ///
     /// ```

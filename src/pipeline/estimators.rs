@@ -1,7 +1,7 @@
 //! The modulus estimators: the default one, and those behind the names of a configuration.
 use super::error::PipelineError;
-use super::named::EstimatorChoice;
 use super::specimen::Object;
+use super::stage_names::EstimatorChoice;
 use crate::elasticity::ElasticityError;
 use crate::elasticity::contact::{Bond, Waveguide};
 use crate::elasticity::modulus::{

@@ -30,18 +30,18 @@
 mod assumptions;
 mod batch;
 mod budget;
-mod check;
-mod composition;
 mod contact;
 mod dark;
 mod depression;
 mod error;
 mod estimators;
 mod flag;
+mod known_presses;
 mod light;
 mod loads;
 mod measure;
-mod named;
+#[expect(clippy::module_inception, reason = "the type that the module is about")]
+mod pipeline;
 mod press;
 mod reference_light;
 mod report;
@@ -50,28 +50,25 @@ mod session;
 mod settings;
 mod source;
 mod specimen;
+mod stage_names;
 mod stages;
 mod strain;
 mod surface;
 mod text;
 mod time;
 
+pub use self::pipeline::Pipeline;
 pub use crate::force::{FaceReading, ShapeProblem};
 pub use crate::sfs::{BallFit, Binning};
-pub use assumptions::{CheckedGain, CheckedGuide};
+pub use assumptions::{Assumption, CheckedGain, CheckedGuide};
 pub use batch::contacts;
 pub use budget::ErrorShare;
-pub use check::{CheckPress, CheckedObject, KnownBall};
-pub use composition::Pipeline;
 pub use contact::{ContactReading, ContactStage, FrameContact};
 pub use dark::DarkContact;
-pub use error::PipelineError;
+pub use error::{PipelineError, PipelineErrorKind};
 pub use flag::Flag;
+pub use known_presses::{CheckPress, CheckedObject, KnownBall};
 pub use light::LightContact;
-pub use named::{
-    EstimatorChoice, MatcherChoice, ReconstructionChoice, SamplerChoice, StagesConfig,
-    StrainChoice, UnknownStage, WarpChoice,
-};
 pub use press::Press;
 pub use reference_light::ReferenceLight;
 pub use report::{Report, Skip, SkipReason, Stage, Work};
@@ -80,6 +77,10 @@ pub use session::{DriftWatch, Session, SessionStrain, Update};
 pub use settings::{Settings, SurfaceInput};
 pub use source::FrameSource;
 pub use specimen::Object;
+pub use stage_names::{
+    EstimatorChoice, MatcherChoice, ReconstructionChoice, SamplerChoice, StagesConfig,
+    StrainChoice, UnknownStage, WarpChoice,
+};
 pub use strain::PairStrain;
 pub use surface::ContactSurface;
 pub use text::{interval_text, with_error};

@@ -1,14 +1,14 @@
 //! A press: frames at one or more loads, of which nothing is computed before it is asked for.
-use super::composition::Pipeline;
 use super::contact::{ContactReading, FrameContact};
 use super::depression;
 use super::error::PipelineError;
 use super::estimators::that_fit;
 use super::flag::Flag;
 use super::loads::{self, Load};
+use super::pipeline::Pipeline;
 use super::report::{Report, SkipReason, Stage};
 use super::specimen::{Object, Specimen};
-use super::stages::{Bench, MatchedPoints, Stages};
+use super::stages::{MatchedPoints, Scratch, Stages};
 use super::strain::PairStrain;
 use super::surface::{ContactSurface, ControlPoints};
 use crate::elasticity::modulus::{LoadSeries, ModulusEstimate};
@@ -115,7 +115,7 @@ pub struct Press<'a> {
     pub(super) stages: Stages,
     frames: Vec<Loaded<'a>>,
     /// Locked while a stage runs.
-    bench: Mutex<Bench>,
+    scratch: Mutex<Scratch>,
 }
 
 impl Pipeline {
@@ -150,7 +150,7 @@ impl Pipeline {
         Press {
             stages: Stages::new(self.clone(), reference),
             frames: Vec::new(),
-            bench: Mutex::default(),
+            scratch: Mutex::default(),
         }
     }
 }
@@ -166,7 +166,7 @@ impl<'a> Press<'a> {
         Self {
             stages: self.stages.clone(),
             frames: self.frames.iter().map(renewed).collect(),
-            bench: Mutex::default(),
+            scratch: Mutex::default(),
         }
     }
 
@@ -253,7 +253,7 @@ impl<'a> Press<'a> {
 
     /// The stages that ran so far, and those that were skipped.
     pub fn report(&self) -> Report {
-        self.bench().report.clone()
+        self.scratch().report.clone()
     }
 
     /// The gauge's reading of a frame's force, if there was one.
@@ -261,8 +261,8 @@ impl<'a> Press<'a> {
         self.frames.get(frame)?.gauge
     }
 
-    fn bench(&self) -> MutexGuard<'_, Bench> {
-        self.bench.lock().unwrap_or_else(PoisonError::into_inner)
+    fn scratch(&self) -> MutexGuard<'_, Scratch> {
+        self.scratch.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     fn loaded(&self, frame: usize) -> Result<&Loaded<'a>, PipelineError> {
@@ -361,7 +361,7 @@ impl<'a> Press<'a> {
         let mut contact = FrameContact::default();
         let gauge = self.gauge(frame);
         self.stages
-            .contact(&mut self.bench(), frame, image, gauge, &mut contact)?;
+            .contact(&mut self.scratch(), frame, image, gauge, &mut contact)?;
         Ok(contact)
     }
 
@@ -419,9 +419,9 @@ impl<'a> Press<'a> {
             let pixels = self.known(0)?.pixels;
             let (image, contact) = self.masked(frame)?;
             let mut surface = Box::<ContactSurface>::default();
-            let bench = &mut self.bench();
+            let scratch = &mut self.scratch();
             self.stages
-                .surface(bench, frame, image.view(), &contact, pixels, &mut surface)?;
+                .surface(scratch, frame, image.view(), &contact, pixels, &mut surface)?;
             Ok(surface)
         });
         surface.as_deref().map_err(Clone::clone)
@@ -455,7 +455,7 @@ impl<'a> Press<'a> {
         let points = self.frames[frame].points.get_or_init(|| {
             let mut points = Box::<ControlPoints>::default();
             self.stages
-                .control_points(&mut self.bench(), frame, surface, &mut points)?;
+                .control_points(&mut self.scratch(), frame, surface, &mut points)?;
             Ok(points)
         });
         points.as_deref().map_err(Clone::clone)
@@ -482,7 +482,7 @@ impl<'a> Press<'a> {
         let target = self.control_points(frame)?;
         let matching = self.frames[frame].matching.get_or_init(|| {
             self.stages
-                .matching(&mut self.bench(), [0, frame], model, target)
+                .matching(&mut self.scratch(), [0, frame], model, target)
                 .map(Box::new)
         });
         matching.as_deref().map_err(Clone::clone)
@@ -502,7 +502,7 @@ impl<'a> Press<'a> {
                 Specimen::Flat(flat) => {
                     let contacts = [self.reading(0)?, self.reading(frame)?];
                     let measure = self.pipeline().strain();
-                    *strain = self.bench().timed(Stage::Strain, |_| {
+                    *strain = self.scratch().timed(Stage::Strain, |_| {
                         flat.strain([0, frame], contacts.each_ref(), measure)
                     })?;
                 }
@@ -514,9 +514,9 @@ impl<'a> Press<'a> {
                         assignment: &matching.assignment,
                         confidence: &matching.confidence,
                     };
-                    let bench = &mut self.bench();
+                    let scratch = &mut self.scratch();
                     self.stages
-                        .strain(bench, [0, frame], &matched, &mut strain)?;
+                        .strain(scratch, [0, frame], &matched, &mut strain)?;
                 }
             }
             Ok(strain)
@@ -533,7 +533,7 @@ impl<'a> Press<'a> {
         let estimator = self.pipeline().estimator()?;
         let loads = self.loads(estimator.needs_strain())?;
         self.stages
-            .modulus(&mut self.bench(), estimator.as_ref(), &loads)
+            .modulus(&mut self.scratch(), estimator.as_ref(), &loads)
     }
 
     /// The load of every frame, with the strain since the first (of at most 32 frames, evenly
@@ -590,10 +590,12 @@ impl<'a> Press<'a> {
         {
             estimators.push(chosen);
         }
-        let bench = &mut self.bench();
-        let estimates = estimators
-            .iter()
-            .filter_map(|estimator| self.stages.modulus(bench, estimator.as_ref(), &loads).ok());
+        let scratch = &mut self.scratch();
+        let estimates = estimators.iter().filter_map(|estimator| {
+            self.stages
+                .modulus(scratch, estimator.as_ref(), &loads)
+                .ok()
+        });
         Ok(estimates.collect())
     }
 
@@ -715,7 +717,7 @@ impl<'a> Press<'a> {
     }
 
     pub(super) fn skipped(&self, stage: Stage, reason: SkipReason) {
-        self.bench().report.skipped(stage, reason);
+        self.scratch().report.skipped(stage, reason);
     }
 
     /// When a frame was taken, where that is known.

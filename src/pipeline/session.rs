@@ -7,14 +7,14 @@
 //! and each match begins where the last one ended. Memory is constant: similar loads are merged.
 //! [`Session::push`] and, with the default stages, [`Session::strain`] allocate nothing once their
 //! buffers have their size.
-use super::composition::Pipeline;
 use super::contact::{ContactReading, FrameContact, resize};
 use super::error::PipelineError;
 use super::flag::Flag;
 use super::loads::{self, Load, MOST_LOADS, SeenLoads};
+use super::pipeline::Pipeline;
 use super::report::{Report, SkipReason, Stage};
 use super::specimen::{FlatSpecimen, Specimen};
-use super::stages::{Bench, MatchedPoints, Stages};
+use super::stages::{MatchedPoints, Scratch, Stages};
 use super::strain::PairStrain;
 use super::surface::{ContactSurface, ControlPoints};
 use crate::elasticity::modulus::ModulusEstimate;
@@ -123,7 +123,7 @@ impl DriftWatch {
 /// ```
 pub struct Session {
     stages: Stages,
-    bench: Bench,
+    scratch: Scratch,
     contact: FrameContact,
     last: Array2<u8>,
     /// Whether `contact` is that of `last`, and which frame that was.
@@ -176,7 +176,7 @@ impl Session {
         let reference = Arc::new(pipeline.reference_frame(references)?);
         Ok(Self {
             stages: Stages::new(pipeline.clone(), reference),
-            bench: Bench::default(),
+            scratch: Scratch::default(),
             contact: FrameContact::default(),
             last: Array2::default((0, 0)),
             measured: false,
@@ -252,9 +252,9 @@ impl Session {
         resize(&mut self.last, frame.dim());
         self.last.assign(&frame);
         let before = self.contact.reading;
-        let (bench, contact) = (&mut self.bench, &mut self.contact);
+        let (scratch, contact) = (&mut self.scratch, &mut self.contact);
         self.stages
-            .contact(bench, number as usize, frame, None, contact)?;
+            .contact(scratch, number as usize, frame, None, contact)?;
         self.measured = true;
         self.measured_frame = number;
         // Equal readings are those of one image, which noise moves: counted twice it would not be
@@ -392,7 +392,7 @@ impl Session {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn report(&self) -> &Report {
-        &self.bench.report
+        &self.scratch.report
     }
 
     /// The surface of the last frame's contact, on the grid that suits its size. Every call
@@ -417,7 +417,7 @@ impl Session {
     pub fn surface(&mut self) -> Result<&ContactSurface, PipelineError> {
         self.last_reading()?;
         self.stages.surface(
-            &mut self.bench,
+            &mut self.scratch,
             self.measured_frame as usize,
             self.last.view(),
             &self.contact,
@@ -479,7 +479,7 @@ impl Session {
             image: self.last.view(),
             contact: &self.contact,
         };
-        self.strain.follow(&self.stages, &mut self.bench, &frame)
+        self.strain.follow(&self.stages, &mut self.scratch, &frame)
     }
 
     /// Counts strain anew, from the next load that [`strain`](Self::strain) is asked for.
@@ -527,7 +527,7 @@ impl Session {
             _ => loads::series(self.loads.loads(), bodies, size),
         };
         self.stages
-            .modulus(&mut self.bench, estimator.as_ref(), &loads)
+            .modulus(&mut self.scratch, estimator.as_ref(), &loads)
     }
 }
 
@@ -593,20 +593,20 @@ impl Buffers {
     fn sample(
         &mut self,
         stages: &Stages,
-        bench: &mut Bench,
+        scratch: &mut Scratch,
         frame: &Frame<'_>,
         grid_pixels: usize,
     ) -> Result<(), PipelineError> {
         let (number, surface) = (frame.number as usize, &mut self.surface);
         stages.surface(
-            bench,
+            scratch,
             number,
             frame.image,
             frame.contact,
             grid_pixels,
             surface,
         )?;
-        stages.control_points(bench, number, surface, &mut self.points)
+        stages.control_points(scratch, number, surface, &mut self.points)
     }
 }
 
@@ -625,14 +625,14 @@ impl FollowedStrain {
     fn follow(
         &mut self,
         stages: &Stages,
-        bench: &mut Bench,
+        scratch: &mut Scratch,
         frame: &Frame<'_>,
     ) -> Result<Option<&SessionStrain>, PipelineError> {
         let Some(anchor) = &self.anchor else {
             let pixels = frame.contact.pixels();
             let points = match stages.specimen {
                 Specimen::Curved => {
-                    self.buffers.sample(stages, bench, frame, pixels)?;
+                    self.buffers.sample(stages, scratch, frame, pixels)?;
                     Some(std::mem::take(&mut self.buffers.points))
                 }
                 Specimen::Flat(_) => None,
@@ -654,7 +654,7 @@ impl FollowedStrain {
             let mut found = self.last.take().unwrap_or_default();
             (found.from, found.to) = (anchor.frame, frame.number);
             let (buffers, warm) = (&mut self.buffers, &mut self.warm);
-            strain_since(anchor, buffers, warm, stages, bench, frame, &mut found)?;
+            strain_since(anchor, buffers, warm, stages, scratch, frame, &mut found)?;
             let force_n = |reading: &ContactReading| reading.force_n.map_or(0.0, |f| f.value);
             let step = force_n(&frame.reading) - force_n(&anchor.reading);
             self.loads
@@ -679,7 +679,7 @@ fn strain_since(
     buffers: &mut Buffers,
     warm: &mut WarmStart,
     stages: &Stages,
-    bench: &mut Bench,
+    scratch: &mut Scratch,
     frame: &Frame<'_>,
     found: &mut SessionStrain,
 ) -> Result<(), PipelineError> {
@@ -687,30 +687,30 @@ fn strain_since(
     if let Specimen::Flat(flat) = stages.specimen {
         let contacts = [&anchor.reading, &frame.reading];
         let measure = stages.pipeline.strain();
-        found.strain = bench.timed(Stage::Strain, |_| flat.strain(frames, contacts, measure))?;
+        found.strain = scratch.timed(Stage::Strain, |_| flat.strain(frames, contacts, measure))?;
         return Ok(());
     }
     let Some(model) = &anchor.points else {
         return Err(PipelineError::NoContact { frame: frames[0] });
     };
-    buffers.sample(stages, bench, frame, anchor.pixels)?;
-    bench
+    buffers.sample(stages, scratch, frame, anchor.pixels)?;
+    scratch
         .report
         .skipped(Stage::Surface, SkipReason::KeptFromBefore);
     if found.report.iterations > 0 {
-        bench
+        scratch
             .report
             .skipped(Stage::Match, SkipReason::NearLastAnswer);
     }
     let (pairs, target) = (&mut buffers.pairs, &buffers.points.points);
-    stages.next_pairs(bench, frames, warm, [&model.points, target], pairs)?;
+    stages.next_pairs(scratch, frames, warm, [&model.points, target], pairs)?;
     let matched = MatchedPoints {
         model,
         target,
         assignment: &pairs.assignment,
         confidence: &pairs.confidence,
     };
-    stages.strain(bench, frames, &matched, &mut found.strain)?;
+    stages.strain(scratch, frames, &matched, &mut found.strain)?;
     found.matched = pairs.assignment.iter().flatten().count();
     found.report.clone_from(&pairs.report);
     Ok(())

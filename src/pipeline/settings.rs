@@ -1,9 +1,9 @@
 //! Settings of a pipeline beside its stages.
-use super::assumptions::{CheckedGain, CheckedGuide};
+use super::assumptions::{Assumption, CheckedGain, CheckedGuide};
 use super::error::PipelineError;
 use super::reference_light::ReferenceLight;
 use super::specimen::Object;
-use crate::core::{Source, Uncertain};
+use crate::core::{InvalidOption, Requirement, Source, Uncertain};
 use crate::elasticity::ElasticityError;
 use crate::elasticity::contact::{PARAMETERS_PER_LAYER, Waveguide};
 use crate::elasticity::modulus::Bodies;
@@ -12,6 +12,9 @@ use nalgebra::{DMatrix, DVector};
 
 /// Control points on each surface where nothing else is asked for: the paper's number.
 pub(crate) const DEFAULT_CONTROL_POINTS: usize = 200;
+
+/// What a covariance of layers must have.
+const THREE_PER_LAYER: &str = "as many rows and columns as the layers have ln E, ln h and ν";
 
 /// What of the frame the surface stage looks at.
 ///
@@ -140,9 +143,6 @@ impl Settings {
         }
     }
 
-    /// Relative error of the layers' moduli where none is stated.
-    pub(super) const ASSUMED_LAYER_ERROR: f64 = 0.05;
-
     /// Covariance of ln E, ln h and ν of all layers whose moduli are wrong by one factor with this
     /// relative error.
     ///
@@ -198,8 +198,39 @@ impl Settings {
             .get_or_insert_with(|| DMatrix::zeros(parameters, parameters));
     }
 
+    /// The standard error that is stated of a source's input. `None` if it is assumed, as that of
+    /// the layers is unless their covariance is stated.
+    fn stated(&self, source: Source) -> Option<f64> {
+        match source {
+            Source::Gain => self.force_scale_error,
+            Source::Coupling => self.coupling_error,
+            Source::PixelSize => self.length_scale_error,
+            Source::ObjectSize => self.object_radius_error_m,
+            Source::PoissonRatio => self.poisson_ratio_error,
+            Source::Adhesion => self.adhesion_error_j_per_m2,
+            _ => None,
+        }
+    }
+
+    /// The error of a source's input, stated or assumed.
+    fn error(&self, source: Source) -> f64 {
+        self.stated(source)
+            .unwrap_or_else(|| Assumption::default_of(source))
+    }
+
+    /// Whether the error of a source is assumed.
+    pub(super) fn assumes(&self, source: Source) -> bool {
+        let shown = match source {
+            Source::Coupling => self.checked_gain.is_some(),
+            Source::Guide => self.layer_covariance.is_some(),
+            _ => false,
+        };
+        let assumption = Assumption::of(source);
+        assumption.is_some() && !shown && self.stated(source).is_none()
+    }
+
     pub(super) fn force_scale(&self) -> f64 {
-        self.force_scale_error.unwrap_or(0.2e-2_f64.hypot(0.1e-2))
+        self.error(Source::Gain)
     }
 
     /// Relative error of the gain of the light, beside that of the calibration.
@@ -211,24 +242,34 @@ impl Settings {
     }
 
     /// That without presses of known force.
-    pub(crate) fn unchecked_coupling(&self) -> f64 {
-        self.coupling_error.unwrap_or(0.12)
+    pub(super) fn unchecked_coupling(&self) -> f64 {
+        self.error(Source::Coupling)
     }
 
     pub(super) fn length_scale(&self) -> f64 {
-        self.length_scale_error.unwrap_or(0.3e-2)
+        self.error(Source::PixelSize)
+    }
+
+    /// The covariance of the layers' parameters, stated or assumed.
+    pub(super) fn layer_covariance(&self) -> DMatrix<f64> {
+        let layers = self
+            .waveguide
+            .as_ref()
+            .map_or(0, |guide| guide.layers().len());
+        self.layer_covariance.clone().unwrap_or_else(|| {
+            Self::common_layer_covariance(layers, Assumption::default_of(Source::Guide))
+        })
     }
 
     /// The object and the guide, with the errors that are stated or assumed of them.
     pub(super) fn bodies(&self) -> Result<Bodies, ElasticityError> {
-        let poisson_error = self.poisson_ratio_error.unwrap_or(0.01);
         let bodies = Bodies::new(self.object, self.waveguide.clone())
             .with_size_error(self.size_error())?
-            .with_poisson_ratio_error(poisson_error)?
-            .with_adhesion_j_per_m2(self.adhesion_error_j_per_m2.unwrap_or(1e-3))?;
+            .with_poisson_ratio_error(self.error(Source::PoissonRatio))?
+            .with_adhesion_j_per_m2(self.error(Source::Adhesion))?;
         match &self.layer_covariance {
             None => {
-                let error = Self::ASSUMED_LAYER_ERROR;
+                let error = Assumption::default_of(Source::Guide);
                 bodies.with_guide_error(Uncertain::exact(1.0).by(Source::Guide, error))
             }
             Some(covariance) => {
@@ -255,65 +296,45 @@ impl Settings {
             | Object::Cylinder { .. }
             | Object::Unknown { .. } => return 0.0,
         };
-        self.object_radius_error_m
-            .map_or(0.5e-2, |error_m| error_m / radius_m)
+        let stated = self.object_radius_error_m;
+        let assumed = Assumption::default_of(Source::ObjectSize);
+        stated.map_or(assumed, |error_m| error_m / radius_m)
     }
 
     /// Refuses what has no meaning.
     pub(super) fn check(&self) -> Result<(), PipelineError> {
         self.object.validated().map_err(PipelineError::Material)?;
-        if self.smoothing_px.is_multiple_of(2) {
-            return Err(PipelineError::EvenSmoothing {
-                found: self.smoothing_px,
-            });
+        Requirement::Odd.check("smoothing_px", self.smoothing_px as f64)?;
+        if let Binning::Blocks(side) = self.binning {
+            Requirement::AtLeastOne.check("binning", side as f64)?;
         }
-        if self.binning == Binning::Blocks(0) {
-            return Err(PipelineError::EmptyBlocks);
-        }
-        let is_error = |found: &f64| *found >= 0.0 && found.is_finite();
-        let scales = [
-            self.force_scale_error,
-            self.coupling_error,
-            self.length_scale_error,
-        ];
-        if let Some(&found) = scales.iter().flatten().find(|e| !is_error(e)) {
-            return Err(PipelineError::ScaleError { found });
-        }
-        let inputs = [
-            self.object_radius_error_m,
-            self.poisson_ratio_error,
-            self.adhesion_error_j_per_m2,
-        ];
-        if let Some(&found) = inputs.iter().flatten().find(|e| !is_error(e)) {
-            return Err(PipelineError::InputError { found });
+        for assumption in Assumption::ALL {
+            if let Some(error) = self.stated(assumption.source) {
+                Requirement::NonNegative.check(assumption.setting, error)?;
+            }
         }
         let layers = self.waveguide.as_ref().map_or(0, |w| w.layers().len());
-        let expected = PARAMETERS_PER_LAYER * layers;
+        let parameters = PARAMETERS_PER_LAYER * layers;
+        let sized = |name, found: usize| match found == parameters {
+            true => Ok(()),
+            false => Err(InvalidOption::new(name, found as f64, THREE_PER_LAYER)),
+        };
         if let Some(covariances) = &self.layers_with_length {
-            if covariances.len() != expected {
-                let found = covariances.shape();
-                return Err(PipelineError::LayerCovariance { expected, found });
-            }
-            if let Some(&found) = covariances.iter().find(|c| !c.is_finite()) {
-                return Err(PipelineError::InputError { found });
+            sized("layers_with_length", covariances.len())?;
+            for entry in covariances {
+                Requirement::Finite.check("layers_with_length", *entry)?;
             }
         }
-        match &self.layer_covariance {
-            Some(covariance) => Self::check_covariance(covariance, expected),
-            None => Ok(()),
+        if let Some(covariance) = &self.layer_covariance {
+            sized("layer_covariance", covariance.nrows())?;
+            sized("layer_covariance", covariance.ncols())?;
+            for entry in covariance {
+                Requirement::Finite.check("layer_covariance", *entry)?;
+            }
+            for variance in &covariance.diagonal() {
+                Requirement::NonNegative.check("layer_covariance", *variance)?;
+            }
         }
-    }
-
-    fn check_covariance(covariance: &DMatrix<f64>, expected: usize) -> Result<(), PipelineError> {
-        let found = covariance.shape();
-        if found != (expected, expected) {
-            return Err(PipelineError::LayerCovariance { expected, found });
-        }
-        let broken = |c: &&f64| !c.is_finite();
-        let negative = covariance.diagonal().iter().copied().find(|v| *v < 0.0);
-        match covariance.iter().find(broken).copied().or(negative) {
-            Some(found) => Err(PipelineError::InputError { found }),
-            None => Ok(()),
-        }
+        Ok(())
     }
 }

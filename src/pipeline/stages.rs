@@ -1,9 +1,9 @@
 //! The stages as functions: values in, values out. A press keeps the answers, a session the memory
 //! they are written to.
-use super::composition::Pipeline;
 use super::contact::{ContactReading, ContactStage, FrameContact};
 use super::error::PipelineError;
 use super::flag::Flag;
+use super::pipeline::Pipeline;
 use super::reference_light::LightChange;
 use super::report::{Report, SkipReason, Stage};
 use super::specimen::{Object, Specimen};
@@ -41,7 +41,7 @@ pub struct Stages {
 
 /// Memory that stages reuse from frame to frame, and the record of their work.
 #[derive(Default)]
-pub struct Bench {
+pub struct Scratch {
     pub force: ForceWorkspace,
     face: FaceWorkspace,
     surface: ContactSurfaceWorkspace,
@@ -49,7 +49,7 @@ pub struct Bench {
     pub report: Report,
 }
 
-impl Bench {
+impl Scratch {
     /// The answer of a stage, its time recorded.
     pub fn timed<T>(&mut self, stage: Stage, run: impl FnOnce(&mut Self) -> T) -> T {
         let start = Instant::now();
@@ -83,15 +83,15 @@ impl Stages {
     /// gauge's.
     pub fn contact(
         &self,
-        bench: &mut Bench,
+        scratch: &mut Scratch,
         frame: usize,
         image: ArrayView2<'_, u8>,
         gauge: Option<Estimate>,
         contact: &mut FrameContact,
     ) -> Result<(), PipelineError> {
-        bench.timed(Stage::Contact, |bench| {
+        scratch.timed(Stage::Contact, |scratch| {
             self.contact
-                .measure_into(&mut bench.force, image, &self.reference, contact)
+                .measure_into(&mut scratch.force, image, &self.reference, contact)
                 .map_err(|source| PipelineError::Contact { frame, source })?;
             contact.check(frame, image.dim())?;
             let settings = self.pipeline.settings();
@@ -109,7 +109,7 @@ impl Stages {
                 contact.background_step_grey = step.map(beyond);
             }
             if let Specimen::Flat(_) = self.specimen {
-                let face = self.face(&mut bench.face, image, contact);
+                let face = self.face(&mut scratch.face, image, contact);
                 if let Some(reading) = &mut contact.reading {
                     reading.face = face;
                     if let Some(face) = face.filter(FaceReading::has_edge) {
@@ -135,10 +135,12 @@ impl Stages {
                     .by_relative(Source::PixelSize, settings.length_scale())
                     .by_relative(Source::Profile, self.shape_doubt(reading));
             }
-            Ok(())
+            Ok::<(), PipelineError>(())
         })?;
         if contact.reading.is_none() {
-            bench.report.skipped(Stage::Surface, SkipReason::NoContact);
+            scratch
+                .report
+                .skipped(Stage::Surface, SkipReason::NoContact);
         }
         Ok(())
     }
@@ -280,7 +282,7 @@ impl Stages {
     /// that the grid leaves no strain: that of a contact of `grid_pixels` pixels.
     pub fn surface(
         &self,
-        bench: &mut Bench,
+        scratch: &mut Scratch,
         frame: usize,
         image: ArrayView2<'_, u8>,
         contact: &FrameContact,
@@ -288,8 +290,8 @@ impl Stages {
         surface: &mut ContactSurface,
     ) -> Result<(), PipelineError> {
         let images = [image, self.reference.image()];
-        bench.timed(Stage::Surface, |bench| {
-            let workspace = &mut bench.surface;
+        scratch.timed(Stage::Surface, |scratch| {
+            let workspace = &mut scratch.surface;
             surface::reconstruct(
                 &self.pipeline,
                 workspace,
@@ -305,13 +307,13 @@ impl Stages {
     /// The control points of a surface, into `points`.
     pub fn control_points(
         &self,
-        bench: &mut Bench,
+        scratch: &mut Scratch,
         frame: usize,
         surface: &ContactSurface,
         points: &mut ControlPoints,
     ) -> Result<(), PipelineError> {
-        bench.timed(Stage::ControlPoints, |bench| {
-            surface::sample(&self.pipeline, &mut bench.surface, surface, points)
+        scratch.timed(Stage::ControlPoints, |scratch| {
+            surface::sample(&self.pipeline, &mut scratch.surface, surface, points)
                 .map_err(|source| PipelineError::Surface { frame, source })
         })
     }
@@ -319,13 +321,13 @@ impl Stages {
     /// The matches between the control points of two frames.
     pub fn matching(
         &self,
-        bench: &mut Bench,
+        scratch: &mut Scratch,
         [from, to]: [usize; 2],
         model: &[Point3<f64>],
         target: &[Point3<f64>],
     ) -> Result<Matching<3>, PipelineError> {
         let matcher = self.pipeline.matcher();
-        bench
+        scratch
             .timed(Stage::Match, |_| matcher.match_points(model, target))
             .map_err(|source| PipelineError::Match { from, to, source })
     }
@@ -333,7 +335,7 @@ impl Stages {
     /// The pairs of a match that begins where the last one ended, into `pairs`.
     pub fn next_pairs(
         &self,
-        bench: &mut Bench,
+        scratch: &mut Scratch,
         [from, to]: [usize; 2],
         warm: &mut WarmStart,
         points: [&[Point3<f64>]; 2],
@@ -341,7 +343,7 @@ impl Stages {
     ) -> Result<(), PipelineError> {
         let matcher = self.pipeline.matcher();
         let [model, target] = points;
-        bench
+        scratch
             .timed(Stage::Match, |_| {
                 matcher.match_next_pairs(warm, model, target, pairs)
             })
@@ -351,20 +353,22 @@ impl Stages {
     /// The strain between two frames from the matches of their control points, into `strain`.
     pub fn strain(
         &self,
-        bench: &mut Bench,
+        scratch: &mut Scratch,
         frames: [usize; 2],
         matched: &MatchedPoints<'_>,
         strain: &mut PairStrain,
     ) -> Result<(), PipelineError> {
-        bench.timed(Stage::Strain, |bench| {
-            bench.strain.strain(&self.pipeline, frames, matched, strain)
+        scratch.timed(Stage::Strain, |scratch| {
+            scratch
+                .strain
+                .strain(&self.pipeline, frames, matched, strain)
         })
     }
 
     /// Young's modulus. An estimate that fails is timed too: it has looked at the data.
     pub fn modulus(
         &self,
-        bench: &mut Bench,
+        scratch: &mut Scratch,
         estimator: &dyn ModulusEstimator,
         loads: &LoadSeries,
     ) -> Result<ModulusEstimate, PipelineError> {
@@ -374,7 +378,7 @@ impl Stages {
         if curved && !loads.loads().is_empty() && !loads.loads().iter().any(read) {
             return Err(PipelineError::NoWholeContact);
         }
-        let mut estimate = bench
+        let mut estimate = scratch
             .timed(Stage::Modulus, |_| estimator.estimate(loads))
             .map_err(PipelineError::Modulus)?;
         let slips = self.likely_slips(estimate.youngs_modulus_pa);

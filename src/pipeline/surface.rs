@@ -1,6 +1,6 @@
 //! From a frame's contact to its surface and the control points on it.
-use super::composition::Pipeline;
 use super::contact::FrameContact;
+use super::pipeline::Pipeline;
 use super::settings::{Settings, SurfaceInput};
 use crate::force::{BoundingBox, LensGeometry, LocalCalibration};
 use crate::sfs::{self, BallFit, BinnedContact, Domain, Frame, Image, SfsError, Surface};

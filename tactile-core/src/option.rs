@@ -1,11 +1,12 @@
 //! Validation of options.
 
+use crate::Readable;
 use thiserror::Error;
 
 /// An option outside its range.
 #[derive(Clone, Copy, Debug, PartialEq, Error)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
-#[error("`{name}` is {found}, expected {expected}")]
+#[error("`{name}` is {}, expected {expected}", Readable(*found))]
 #[non_exhaustive]
 pub struct InvalidOption {
     /// Name of the option.

@@ -1,6 +1,6 @@
 //! What can be wrong with the input, one variant each.
 
-use tactile_core::CustomError;
+use tactile_core::{CustomError, Readable};
 
 /// Why a strain, a stress or a modulus cannot be given.
 ///
@@ -21,7 +21,7 @@ pub enum ElasticityError {
         quantity: Quantity,
     },
     /// An input that must be greater than zero is not (NaN included).
-    #[error("{quantity} must be greater than zero and finite, found {found}")]
+    #[error("{quantity} must be greater than zero and finite, found {}", Readable(*found))]
     NotPositive {
         /// Which input.
         quantity: Quantity,
@@ -29,7 +29,7 @@ pub enum ElasticityError {
         found: f64,
     },
     /// An input that must not be negative is (NaN included).
-    #[error("{quantity} must not be negative, found {found}")]
+    #[error("{quantity} must not be negative, found {}", Readable(*found))]
     Negative {
         /// Which input.
         quantity: Quantity,
@@ -37,7 +37,7 @@ pub enum ElasticityError {
         found: f64,
     },
     /// A Poisson ratio outside (−1, ½], where an isotropic solid is stable.
-    #[error("Poisson ratio must lie in (-1, 1/2], found {found}")]
+    #[error("Poisson ratio must lie in (-1, 1/2], found {}", Readable(*found))]
     PoissonRatio {
         /// The value given.
         found: f64,
@@ -131,7 +131,7 @@ pub enum ElasticityError {
         quantity: Quantity,
     },
     /// The law does not reach this far (a contact radius beyond the sphere's own, say).
-    #[error("{quantity} = {found} is beyond the law's reach ({limit})")]
+    #[error("{quantity} = {} is beyond the law's reach ({})", Readable(*found), Readable(*limit))]
     OutOfRange {
         /// Which input.
         quantity: Quantity,

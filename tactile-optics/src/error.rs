@@ -1,5 +1,7 @@
 //! The errors of this crate.
 
+use core::fmt::{self, Display};
+
 /// The reason why an input was rejected.
 ///
 /// ```
@@ -15,7 +17,7 @@
 #[non_exhaustive]
 pub enum OpticsError {
     /// A quantity lies outside the range that has a meaning (NaN always does).
-    #[error("{quantity} is {found}, expected a number from {minimum} to {maximum}")]
+    #[error("{quantity} is {found}, expected {}", Between(*minimum, *maximum))]
     OutOfRange {
         /// Name of the quantity.
         quantity: &'static str,
@@ -32,6 +34,20 @@ pub enum OpticsError {
         /// Name of the list.
         quantity: &'static str,
     },
+}
+
+/// The numbers from one to another, in words where an end is the last of all numbers.
+struct Between(f64, f64);
+
+impl Display for Between {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            Self(f64::MIN_POSITIVE, f64::MAX) => f.write_str("a positive number"),
+            Self(f64::MIN_POSITIVE, most) => write!(f, "a positive number up to {most}"),
+            Self(least, f64::MAX) => write!(f, "a number of at least {least}"),
+            Self(least, most) => write!(f, "a number from {least} to {most}"),
+        }
+    }
 }
 
 /// `found` if it lies in `minimum..=maximum`.

@@ -8,7 +8,7 @@ use tactile_files::io::FileError;
 use tactile_files::sensor::SensorError;
 use tactile_imaging::StrainBetweenError;
 use tactile_imaging::matching::MatchError;
-use tactile_imaging::pipeline::PipelineError;
+use tactile_imaging::pipeline::{PipelineError, PipelineErrorKind};
 
 pyo3::create_exception!(
     tactile_imaging,
@@ -54,25 +54,9 @@ pub fn refused(error: impl Error + 'static) -> PyErr {
 }
 
 pub fn pipeline(error: PipelineError) -> PyErr {
-    use PipelineError as E;
-    match error {
-        E::NoSuchFrame { .. } => PyIndexError::new_err(error.to_string()),
-        E::Sensor(_)
-        | E::Calibration(_)
-        | E::SurfaceOptions(_)
-        | E::WarpOptions(_)
-        | E::DepthTable(_)
-        | E::Material(_)
-        | E::Check { .. }
-        | E::ScaleError { .. }
-        | E::InputError { .. }
-        | E::LayerCovariance { .. }
-        | E::EvenSmoothing { .. }
-        | E::EmptyBlocks
-        | E::Contact { .. }
-        | E::Time { .. }
-        | E::TimeDecreases { .. }
-        | E::WrongEstimator { .. } => refused(error),
+    match (&error, error.kind()) {
+        (PipelineError::NoSuchFrame { .. }, _) => PyIndexError::new_err(error.to_string()),
+        (_, PipelineErrorKind::Options | PipelineErrorKind::Input) => refused(error),
         _ => failed(error),
     }
 }

@@ -1,5 +1,6 @@
 //! The map of the workspace names files that exist and every equation of the paper.
 use std::path::Path;
+use tactile_imaging::pipeline::Assumption;
 
 #[test]
 fn every_path_of_the_map_exists() {
@@ -34,4 +35,21 @@ fn every_equation_of_the_paper_has_its_file() {
         assert!(row.contains(".rs`") || row.contains("/`"), "no file: {row}");
     }
     assert_eq!(found, (1..=31).collect::<Vec<_>>());
+}
+
+/// The documentation of scene files states every error that is assumed, with its default.
+#[test]
+fn every_assumption_is_documented_with_its_default() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let text = std::fs::read_to_string(root.join("tactile-files/src/scene/mod.rs")).unwrap();
+    let (_, table) = text.split_once("What is not stated is assumed").unwrap();
+    for assumption in Assumption::ALL {
+        let default = match assumption.unit.starts_with("of ") {
+            true => format!("{} %", (1000.0 * assumption.default).round() / 10.0),
+            false => assumption.default.to_string(),
+        };
+        let rest = table.split_once(assumption.scene_key).unwrap().1;
+        let said = rest.split_once("if absent").unwrap().0;
+        assert!(said.contains(&default), "{assumption:?}: {said}");
+    }
 }

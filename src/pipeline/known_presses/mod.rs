@@ -2,9 +2,9 @@
 mod gain;
 mod guide;
 
-use super::composition::Pipeline;
 use super::contact::ContactReading;
 use super::error::PipelineError;
+use super::pipeline::Pipeline;
 use super::specimen::Object;
 use crate::core::Estimate;
 use gain::GainCheck;

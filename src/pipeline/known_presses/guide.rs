@@ -218,10 +218,7 @@ pub fn update(
         0,
         "the contact of the ball with the stated layers cannot be solved",
     );
-    let prior = match &settings.layer_covariance {
-        Some(covariance) => covariance.clone(),
-        None => Settings::common_layer_covariance(stated.len(), Settings::ASSUMED_LAYER_ERROR),
-    };
+    let prior = settings.layer_covariance();
     let forces = log_forces(checks, stated).ok_or(unsolved)?;
     let noise = noise(checks, stated, &forces, settings.length_scale()).ok_or(unsolved)?;
     let known = checks.iter().map(|check| check.known_n.value.ln());

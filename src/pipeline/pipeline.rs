@@ -3,9 +3,9 @@ use super::contact::ContactStage;
 use super::error::PipelineError;
 use super::estimators::EstimatorStage;
 use super::light::LightContact;
-use super::named::{self, EstimatorChoice, StagesConfig};
 use super::settings::{Settings, SurfaceInput};
 use super::specimen::Object;
+use super::stage_names::{self, EstimatorChoice, StagesConfig};
 use crate::elasticity::modulus::{Bodies, ModulusEstimator};
 use crate::elasticity::strain::{GreenLagrange, StrainMeasure};
 use crate::force::{CalibrationPair, ReferenceFrame};
@@ -95,9 +95,9 @@ impl Pipeline {
         let settings = Settings::new(object.validated().map_err(PipelineError::Material)?);
         Ok(Self {
             contact: Arc::new(contact),
-            surface: Arc::new(named::eikonal()?),
+            surface: Arc::new(stage_names::eikonal()?),
             sampler: None,
-            matcher: Arc::new(named::near_by()),
+            matcher: Arc::new(stage_names::near_by()),
             warp: Arc::new(AffineModel::General),
             strain: Arc::new(GreenLagrange),
             estimator: EstimatorStage::named(EstimatorChoice::default()),
@@ -176,10 +176,8 @@ impl Pipeline {
     ///
     /// # Errors
     /// [`PipelineError::Material`] for an object that is not physical,
-    /// [`PipelineError::EvenSmoothing`], [`PipelineError::EmptyBlocks`],
-    /// [`PipelineError::ScaleError`] and [`PipelineError::InputError`] for an error that is
-    /// negative or not finite, and [`PipelineError::LayerCovariance`] for one that has not
-    /// three rows and columns for each layer of the waveguide.
+    /// [`PipelineError::Setting`] for a setting outside its range, an error that is negative or not
+    /// finite, and a covariance that has not three rows and columns for each layer of the waveguide.
     pub fn with_settings(
         mut self,
         change: impl FnOnce(&mut Settings),
