@@ -94,7 +94,9 @@ impl CoherentPointDrift {
     ) -> Result<Matching<D>, MatchError> {
         point_sets(model, target)?;
         workspace.register(self, model, target);
-        Ok(matching(workspace))
+        let mut found = matching(workspace);
+        found.report.judgement = Judgement::of_pairs(model, target, &found.assignment);
+        Ok(found)
     }
 }
 

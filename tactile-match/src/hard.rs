@@ -99,6 +99,7 @@ fn matching<const D: usize>(
         .map(|&(i, j)| (warped[i] - target[j]).norm_squared());
     let residual = (squares.sum::<f64>() / pairs.len().max(1) as f64).sqrt();
     let (unmatched_model, unmatched_target) = unmatched_rows(&assignment, target.len());
+    let judgement = Judgement::of_pairs(model, target, &assignment);
     Matching {
         warp,
         warped,
@@ -116,7 +117,7 @@ fn matching<const D: usize>(
             starts: 1,
             residual,
             sigma: 0.0,
-            judgement: Judgement::NotJudged,
+            judgement,
         },
     }
 }

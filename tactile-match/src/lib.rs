@@ -36,6 +36,7 @@ mod cpd;
 mod error;
 mod hard;
 mod instances;
+mod judgement;
 pub mod labelling;
 mod matching;
 mod shape_context;
@@ -50,11 +51,10 @@ pub use assignment::{AssignmentWorkspace, linear_assignment};
 pub use cpd::{CoherentPointDrift, DriftWorkspace, Normalization};
 pub use error::MatchError;
 pub use hard::{LinearAssignment, NearestNeighbour};
+pub use judgement::{Doubt, Judgement};
 pub use labelling::RelaxationLabelling;
 use matching::unmatched_rows;
-pub use matching::{
-    Doubt, Judgement, MatchReport, MatchedPairs, Matching, PointMatcher, SoftMatches, WarmStart,
-};
+pub use matching::{MatchReport, MatchedPairs, Matching, PointMatcher, SoftMatches, WarmStart};
 pub use nalgebra;
 pub use shape_context::ShapeContexts;
 pub use softassign::{

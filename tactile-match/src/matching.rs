@@ -1,7 +1,7 @@
 //! What every matcher takes and returns: [`PointMatcher`], [`Matching`] and its [`MatchReport`].
 
 use crate::error::{option_within, point_sets};
-use crate::{FittedTransformation, MatchError, hard};
+use crate::{Doubt, FittedTransformation, Judgement, MatchError, hard};
 use nalgebra::{Point, SMatrix};
 use std::ops::Deref;
 use tactile_core::StopReason;
@@ -174,129 +174,6 @@ impl<const D: usize, P: Deref<Target: PointMatcher<D>> + Send + Sync> PointMatch
     ) -> Result<(), MatchError> {
         (**self).match_next_pairs(warm, model, target, pairs)
     }
-}
-
-/// Why the pairs of an answer are not to be relied on.
-///
-/// ```
-/// use nalgebra::Point2;
-/// use tactile_match::{AnnealedSoftassign, Doubt, PointMatcher};
-/// let scattered = |seed: f64| -> Vec<Point2<f64>> {
-///     let place = |i: i32, k: f64| (f64::from(i * i) * k + seed * f64::from(i)).fract();
-///     (0..60)
-///         .map(|i| Point2::new(place(i, 0.618), place(i, 0.755)))
-///         .collect()
-/// };
-/// let matcher = AnnealedSoftassign::default();
-/// let same = matcher.match_points(&scattered(0.1), &scattered(0.1))?;
-/// assert_eq!(same.report.doubt(), None);
-/// // Two sets that have nothing to do with each other: some points coincide by chance.
-/// let other = matcher.match_points(&scattered(0.1), &scattered(0.37))?;
-/// assert!(matches!(
-///     other.report.doubt(),
-///     Some(Doubt::FewPairs | Doubt::LargeResiduals | Doubt::Undecided)
-/// ));
-/// # Ok::<(), tactile_match::MatchError>(())
-/// ```
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[non_exhaustive]
-#[cfg_attr(
-    feature = "serde",
-    derive(serde::Serialize, serde::Deserialize),
-    serde(rename_all = "snake_case")
-)]
-pub enum Doubt {
-    /// So few points of the smaller set have a partner that the pairs may have met by chance.
-    FewPairs,
-    /// The residuals are so large that points strewn at random would explain the targets nearly as
-    /// well. Or those of a part of the set are far larger than the others', which may lie a point
-    /// aside.
-    LargeResiduals,
-    /// More than one pair in ten may be wrong, by the pairs' confidences, by the points without a
-    /// partner, and by the residuals.
-    Undecided,
-    /// Any rotation is allowed, and one of a twelfth of a turn or a multiple, in space of a right
-    /// angle about an axis of the coordinates, takes the model onto itself: the answer may be
-    /// turned by it.
-    Symmetric,
-    /// The points are those of a lattice that may go on beyond the view. Moved by one of its steps
-    /// they explain the targets as well, with a motion that is not much larger: state the largest
-    /// motion ([`AnnealedSoftassign::with_largest_motion`](crate::AnnealedSoftassign)).
-    Repeats {
-        /// The step, in the units of the points. In the plane the last number is zero.
-        step: [f64; 3],
-    },
-    /// The model turned by a large angle explains the targets better, and such turns are excluded.
-    Turned,
-    /// A mirror image of the model explains the targets better: columns may be exchanged, or a sign
-    /// changed.
-    Mirrored,
-}
-
-impl std::fmt::Display for Doubt {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(match self {
-            Self::Repeats { step } => return write_repeats(f, step),
-            Self::FewPairs => "the matched points are so few that they may have met by chance",
-            Self::LargeResiduals => {
-                "the residuals of the match are as large as those of scattered points"
-            }
-            Self::Undecided => "more than one matched pair in ten may be wrong",
-            Self::Symmetric => "the points look the same after a turn, and any rotation is allowed",
-            Self::Turned => "turned by a large angle the points match better: allow any rotation",
-            Self::Mirrored => {
-                "a mirror image of the points matches better: are columns of the second set \
-                 exchanged, or a sign changed?"
-            }
-        })
-    }
-}
-
-/// Whether the pairs of an answer are to be relied on.
-///
-/// ```
-/// use nalgebra::Point2;
-/// use tactile_match::{AnnealedSoftassign, Judgement, NearestNeighbour, PointMatcher};
-/// let model = [[0.0, 0.0], [1.0, 0.1], [0.2, 1.0], [1.1, 1.2], [0.5, 0.4]].map(Point2::from);
-/// let judged = AnnealedSoftassign::default().match_points(&model, &model)?;
-/// assert_eq!(judged.report.judgement, Judgement::Sure);
-/// // A nearest neighbour exists for any two sets.
-/// let paired = NearestNeighbour::default().match_points(&model, &model)?;
-/// assert_eq!(paired.report.judgement, Judgement::NotJudged);
-/// # Ok::<(), tactile_match::MatchError>(())
-/// ```
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-#[cfg_attr(
-    feature = "serde",
-    derive(serde::Serialize, serde::Deserialize),
-    serde(rename_all = "snake_case")
-)]
-pub enum Judgement {
-    /// The matcher does not look whether its pairs may be wrong.
-    #[default]
-    NotJudged,
-    /// Nothing speaks against the pairs.
-    Sure,
-    /// Something does.
-    Doubtful(Doubt),
-}
-
-/// The step of a lattice, along an axis where it lies within three degrees of one.
-fn write_repeats(f: &mut std::fmt::Formatter<'_>, step: &[f64; 3]) -> std::fmt::Result {
-    let length = step.iter().map(|s| s * s).sum::<f64>().sqrt();
-    let [x, y, z] = step.map(|s| s / length);
-    let axes = ["x", "y", "z"].into_iter().zip([x, y, z]);
-    let along = match axes.into_iter().find(|(_, c)| c.abs() > 0.9986) {
-        Some((axis, _)) => axis.to_owned(),
-        None if z == 0.0 => format!("({x:.2}, {y:.2})"),
-        None => format!("({x:.2}, {y:.2}, {z:.2})"),
-    };
-    write!(
-        f,
-        "the points repeat every {length:.4} along {along}: motions beyond {:.4} cannot be told \
-         without a largest motion",
-        0.5 * length
-    )
 }
 
 /// How a match went.

@@ -513,7 +513,7 @@ impl<const D: usize> Run<D> {
             starts: 1,
             residual,
             sigma: residual / (D as f64).sqrt(),
-            judgement: Judgement::NotJudged,
+            judgement: Judgement::of_pairs(model, target, &assignment),
         };
         Matching {
             warp,

@@ -2,8 +2,10 @@
 
 use super::difference;
 use super::{Annealer, Gaussian, Request, Schedule, Slack, State};
+use crate::judgement::median_of_chi_squared;
 use std::f64::consts::TAU;
 use std::ops::ControlFlow;
+use tactile_core::statistics::median;
 
 // The alternation: soft assignment at a falling temperature, then the warp that it asks for.
 
@@ -332,19 +334,11 @@ impl<const D: usize> Annealer<D> {
         if self.sums.is_empty() {
             return 0.0;
         }
-        let middle = self.sums.len() / 2;
-        let median = *self.sums.select_nth_unstable_by(middle, f64::total_cmp).1;
+        let median = median(&mut self.sums);
         // Squared residuals beyond so many variances are not the noise's: one in a thousand
         // Gaussian ones is, in the plane and in space.
         let limit = (16.0 * median / median_of_chi_squared(D)).max(least * least);
         let beyond = self.sums.iter().filter(|&&square| square > limit);
         beyond.count() as f64 / self.sums.len() as f64
     }
-}
-
-/// Median of the sum of `dimension` squared standard normal deviates, by the approximation of
-/// Wilson and Hilferty (to 1 % from 2 on).
-pub(super) fn median_of_chi_squared(dimension: usize) -> f64 {
-    let n = dimension as f64;
-    n * (1.0 - 2.0 / (9.0 * n)).powi(3)
 }

@@ -1,11 +1,11 @@
 //! Residuals below what the annealing resolves: are they noise, and where do the points go then?
 
-use super::anneal::median_of_chi_squared;
 use super::model::cholesky;
 use super::search::is_cold;
 use super::{AnnealedSoftassign, Mechanism, Search, SoftassignWorkspace, State, Transformation};
 use super::{difference, in_space, squared, squared_distance};
 use crate::hard;
+use crate::judgement::median_of_chi_squared;
 use nalgebra::{Matrix4, Matrix4x3, RowVector4, SVector};
 use tactile_core::{statistics::median, vectorised};
 

@@ -1,8 +1,11 @@
-//! What the default matcher says about its own answers: standard deviations, confidences, doubts.
+//! What the matchers give beside their pairs: standard deviations, confidences, doubts.
 
 use crate::common::{Scene, Stream, bend, scattered};
 use nalgebra::{Point, Point2, SVector};
-use tactile_match::{AnnealedSoftassign, Doubt, Matching, PointMatcher, Rotation, Transformation};
+use tactile_match::{
+    AnnealedSoftassign, CoherentPointDrift, Doubt, Judgement, LinearAssignment, Matching,
+    NearestNeighbour, PointMatcher, RelaxationLabelling, Rotation, Transformation,
+};
 
 /// Adds Gaussian noise and a share of uniform outliers to the true positions of the points that are
 /// `seen`, and shuffles them.
@@ -274,4 +277,48 @@ fn a_jittered_grid_is_told_from_its_twins() {
             }
         }
     }
+}
+
+/// Pairs that come without a likelihood are judged by whether neighbours move together: sets a
+/// little bent are sure, sets that have nothing to do with each other are doubted.
+fn check_pairs<const D: usize>() {
+    let matchers: [&dyn PointMatcher<D>; 4] = [
+        &NearestNeighbour::default(),
+        &LinearAssignment::default(),
+        &CoherentPointDrift::default(),
+        &RelaxationLabelling::default()
+            .with_candidates(8)
+            .expect("eight"),
+    ];
+    for seed in 0..4 {
+        let model = scattered::<D>(60, seed);
+        let truth = bend(&model, 0.002);
+        let scene = scene(model.clone(), truth, |_| true, (0.0, 0.0), seed);
+        let mut stream = Stream::new(seed + 100);
+        let mut strewn = || Point::from(SVector::<f64, D>::from_fn(|_, _| stream.next()));
+        let other: Vec<_> = (0..60).map(|_| strewn()).collect();
+        for (k, matcher) in matchers.iter().enumerate() {
+            let judgement = |target: &[_]| {
+                let found = matcher.match_points(&model, target);
+                found.expect("good points").report.judgement
+            };
+            assert_eq!(judgement(&scene.target), Judgement::Sure, "{k} {seed}");
+            let unrelated = judgement(&other);
+            assert!(matches!(unrelated, Judgement::Doubtful(_)), "{k} {seed}");
+        }
+    }
+}
+
+#[test]
+fn pairs_alone_are_judged_by_the_motions_of_neighbours() {
+    check_pairs::<2>();
+    check_pairs::<3>();
+    // A lattice that moved by six tenths of a step: its nearest neighbours are the wrong ones.
+    let lattice = |shift: f64| -> Vec<Point2<f64>> {
+        let place = |k: u32| Point2::new(f64::from(k % 12) + shift, f64::from(k / 12));
+        (0..144).map(place).collect()
+    };
+    let found = NearestNeighbour::default().match_points(&lattice(0.0), &lattice(0.6));
+    let doubt = found.expect("good points").report.doubt();
+    assert!(matches!(doubt, Some(Doubt::Repeats { .. })), "{doubt:?}");
 }
