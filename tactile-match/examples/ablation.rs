@@ -2,7 +2,7 @@
 //! differences beside their standard errors.
 //!
 //! ```text
-//! TACTILE_DATA=../shared/data cargo run --release -p tactile-match --example ablation -- [FIRST_SEED SEEDS] [MECHANISM ...]
+//! TACTILE_DATA=FOLDER cargo run --release -p tactile-match --features ablation --example ablation -- [FIRST_SEED SEEDS] [MECHANISM ...]
 //! ```
 //!
 //! Scenes: the published benchmark of Chui and Rangarajan (where the data are), generated bells and

@@ -57,9 +57,11 @@ use matching::unmatched_rows;
 pub use matching::{MatchReport, MatchedPairs, Matching, PointMatcher, SoftMatches, WarmStart};
 pub use nalgebra;
 pub use shape_context::ShapeContexts;
+#[cfg(feature = "ablation")]
+pub use softassign::Mechanism;
 pub use softassign::{
-    AnnealedSoftassign, Mechanism, Outliers, Rotation, Search, SoftassignMatch,
-    SoftassignWorkspace, Transformation,
+    AnnealedSoftassign, Outliers, Rotation, Search, SoftassignMatch, SoftassignWorkspace,
+    Transformation,
 };
 pub use tactile_core::{CustomError, StopReason};
 pub use transformation::FittedTransformation;

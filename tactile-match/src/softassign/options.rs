@@ -37,6 +37,7 @@ pub enum Mechanism {
     Amplitudes,
 }
 
+#[cfg(feature = "ablation")]
 #[allow(missing_docs)]
 impl Mechanism {
     pub const ALL: [Self; 15] = [
@@ -370,6 +371,7 @@ impl AnnealedSoftassign {
     }
 
     /// Switches one mechanism off, for the ablation study.
+    #[cfg(feature = "ablation")]
     #[doc(hidden)]
     #[must_use]
     pub fn without(mut self, mechanism: Mechanism) -> Self {
