@@ -208,37 +208,51 @@ impl Face<'_> {
     }
 }
 
-/// Whether slopes are of no face that is pressed in: their curl is as large as their divergence, or
-/// the face comes out of the gel.
-pub fn no_surface(p: &Array2<f32>, q: &Array2<f32>, noise_floor: f32) -> bool {
-    let size = p.nrows().max(p.ncols()).div_ceil(COARSE).max(2);
-    let [p, q] = [p, q].map(|slope| block_means(slope.view(), size));
-    if p.nrows() < 6 || p.ncols() < 6 {
-        return false;
+/// Whether slopes are of no face that is pressed in, on blocks of a frame.
+pub struct SurfaceCheck {
+    block: usize,
+    plane: Plane,
+}
+
+impl SurfaceCheck {
+    pub fn new((rows, columns): (usize, usize)) -> Self {
+        let block = rows.max(columns).div_ceil(COARSE).max(2);
+        Self {
+            block,
+            plane: Plane::new((rows / block, columns / block), 0.2, None),
+        }
     }
-    let plane = Plane::new(p.dim(), 0.2, None);
-    // Slopes end with the frame, which its outermost cells show.
-    let inner = |field: &Array2<f32>| {
-        let (rows, columns) = field.dim();
-        let field = field.slice_axis(Axis(0), (1..rows - 1).into());
-        field
-            .slice_axis(Axis(1), (1..columns - 1).into())
-            .to_owned()
-    };
-    let root = |field: &Array2<f32>| {
-        (field.iter().map(|v| v * v).sum::<f32>() / field.len() as f32).sqrt()
-    };
-    let pressure = inner(&plane.pressure(p.view(), q.view()));
-    let curl = inner(&plane.curl(p.view(), q.view()));
-    let (strength, turning) = (root(&pressure), root(&curl));
-    let largest = pressure.iter().fold(0.0_f32, |m, f| m.max(f.abs()));
-    // Noise has as much curl as divergence, and no cell far above the others.
-    if largest < 60.0 * noise_floor || largest < 4.0 * strength.min(turning) {
-        return false;
+
+    /// Whether their curl is as large as their divergence, or the face comes out of the gel.
+    pub fn no_surface(&self, slopes: [&Array2<f32>; 2], noise_floor: f32) -> bool {
+        let [p, q] = slopes.map(|slope| block_means(slope.view(), self.block));
+        if p.nrows() < 6 || p.ncols() < 6 {
+            return false;
+        }
+        let plane = &self.plane;
+        // Slopes end with the frame, which its outermost cells show.
+        let inner = |field: &Array2<f32>| {
+            let (rows, columns) = field.dim();
+            let field = field.slice_axis(Axis(0), (1..rows - 1).into());
+            field
+                .slice_axis(Axis(1), (1..columns - 1).into())
+                .to_owned()
+        };
+        let root = |field: &Array2<f32>| {
+            (field.iter().map(|v| v * v).sum::<f32>() / field.len() as f32).sqrt()
+        };
+        let pressure = inner(&plane.pressure(p.view(), q.view()));
+        let curl = inner(&plane.curl(p.view(), q.view()));
+        let (strength, turning) = (root(&pressure), root(&curl));
+        let largest = pressure.iter().fold(0.0_f32, |m, f| m.max(f.abs()));
+        // Noise has as much curl as divergence, and no cell far above the others.
+        if largest < 60.0 * noise_floor || largest < 4.0 * strength.min(turning) {
+            return false;
+        }
+        let square: f32 = pressure.iter().map(|f| f * f).sum();
+        let signed: f32 = pressure.iter().map(|f| f * f.abs()).sum();
+        turning > CURL * strength || signed < OUTWARDS * square
     }
-    let square: f32 = pressure.iter().map(|f| f * f).sum();
-    let signed: f32 = pressure.iter().map(|f| f * f.abs()).sum();
-    turning > CURL * strength || signed < OUTWARDS * square
 }
 
 /// Pixels of a patch that have a neighbour outside, around it in order, as column and row.

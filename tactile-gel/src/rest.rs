@@ -100,7 +100,7 @@ pub fn rest(
         let (row, column) = (r * step, c * step);
         let mut tail = [0.0; THICKNESSES.len()];
         for [f, x, y] in &sources {
-            let r = (column as f64 - x).hypot(row as f64 - y);
+            let r = ((column as f64 - x).powi(2) + (row as f64 - y).powi(2)).sqrt();
             if r < near {
                 return None;
             }

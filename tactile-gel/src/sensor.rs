@@ -14,7 +14,7 @@ use tactile_core::{Requirement, vectorised};
 use crate::GelError;
 use crate::contacts::{Cells, Patch, block_means, patches};
 use crate::error::same_shape;
-use crate::face::{self, GelFrame};
+use crate::face::{self, GelFrame, SurfaceCheck};
 use crate::frame_check::{Blocks, FrameDoubt, light};
 use crate::gradients::{Blurred, TERMS, normals};
 use crate::plane::Plane;
@@ -93,6 +93,7 @@ pub struct GelSensor {
     pub(crate) reference: Arc<Blurred>,
     blocks: Arc<Blocks>,
     pub(crate) plane: Arc<Plane>,
+    check: Arc<SurfaceCheck>,
     tails: Arc<Tails>,
 }
 
@@ -133,6 +134,7 @@ impl GelSensor {
             untouched: Arc::new(reference.to_owned()),
             blocks: Arc::new(Blocks::of(&blurred)),
             plane: Arc::new(Plane::new((rows / 2, columns / 2), ROOM, None)),
+            check: Arc::new(SurfaceCheck::new((rows, columns))),
             tails: Arc::new(Tails::new()),
             model,
             reference: Arc::new(blurred),
@@ -201,7 +203,7 @@ impl GelSensor {
             slopes([p, q], [error_p, error_q], sd);
         }
         let cells = self.cells([&p, &q]);
-        if face::no_surface(&p, &q, self.noise_floor()) {
+        if self.check.no_surface([&p, &q], self.noise_floor()) {
             doubts.push(FrameDoubt::NoSurface);
         }
         let found = patches(&cells, p.dim(), self.noise_floor());
@@ -219,7 +221,7 @@ impl GelSensor {
     pub(crate) fn patches(&self, frame: &Blurred) -> Vec<Patch> {
         let [mut p, mut q] = normals(frame, &self.reference, &self.model.coefficients);
         ndarray::Zip::from(&mut p).and(&mut q).for_each(|p, q| {
-            let cut = STEEPEST / p.hypot(*q).max(STEEPEST);
+            let cut = STEEPEST / (*p * *p + *q * *q).sqrt().max(STEEPEST);
             let (x, y) = (*p * cut, *q * cut);
             let up = (1.0 - x * x - y * y).sqrt();
             (*p, *q) = (-x / up, -y / up);
@@ -232,7 +234,7 @@ impl GelSensor {
         let [p, q] = slopes.map(|slope| block_means(slope.view(), 2));
         let slope = ndarray::Zip::from(&p)
             .and(&q)
-            .map_collect(|p, q| p.hypot(*q));
+            .map_collect(|p, q| (p * p + q * q).sqrt());
         Cells {
             pressure: self.plane.pressure(p.view(), q.view()),
             slope,

@@ -3,7 +3,7 @@
 
 use crate::sensors::{BALL_PX, PIXEL_M, calibrated, flat, gel, presses, random};
 use tactile_gel::simulate::{ElasticFace, HertzPress};
-use tactile_gel::{BallPress, GelForce, GelLayer, GelSensor};
+use tactile_gel::{BallPress, GaugeForce, GelForce, GelFrame, GelLayer, GelSensor};
 
 const MODULUS_PA: f64 = 1e5;
 const LAYER_M: f64 = 4e-3;
@@ -200,4 +200,37 @@ fn a_wrong_circle_is_named() {
     assert_eq!(wrong, [4]);
     let [a, b] = [&sensor, &other].map(|s| s.model().normal_standard_error);
     assert!((a / b - 1.0).abs() < 0.5, "{a} {b}");
+}
+
+/// A gauge alone gives the forces of other presses of its ball: on a layer whose modulus nobody states.
+#[test]
+fn a_gauge_gives_forces_without_a_layer() {
+    let gel = gel();
+    let sensor = calibrated(&gel).0;
+    let face = ElasticFace {
+        thickness_px: LAYER_M / PIXEL_M,
+        poisson_ratio: RATIO,
+    };
+    let read = |k: usize, radius: f64| {
+        let at = [90.0 + 140.0 * random(k, 5), 80.0 + 80.0 * random(k, 6)];
+        let press = HertzPress::ball(at, 60.0, radius);
+        let frame = gel.frame(&face.depth_px(gel.shape, &[press]), 700 + k as u64);
+        let force = press.force_n(MODULUS_PA, PIXEL_M);
+        (sensor.read(frame.view()).unwrap(), force)
+    };
+    let given: Vec<_> = (0..12).map(|k| read(k, 10.0 + 1.8 * k as f64)).collect();
+    let readings: Vec<(&GelFrame, f64)> = given.iter().map(|(frame, f)| (frame, *f)).collect();
+    let law = GaugeForce::fit(&readings).unwrap();
+    let others = (20..40).map(|k| read(k, 11.0 + 18.0 * random(k, 7)));
+    let misses = others.map(|(frame, force)| {
+        let found = law.force(&frame).unwrap();
+        assert!(found.relative_error() < 0.15, "{found:?}");
+        (found.value - force) / found.standard_error
+    });
+    let misses: Vec<f64> = misses.collect();
+    // Of 20, 19 are expected within 2.2 errors by ten degrees of freedom.
+    let held = misses.iter().filter(|z| z.abs() < 2.2).count();
+    assert!(held >= 17, "{misses:?}");
+    assert!(law.at_volume(1.0).standard_error.is_infinite());
+    assert!(GaugeForce::fit(&readings[..3]).is_err());
 }

@@ -1,0 +1,148 @@
+//! Forces for those who have a gauge alone: readings under which frames were taken.
+//!
+//! Neither layer nor modulus is known. The volume V that the face gives way by is the integral of its
+//! displacement over the contacts. Of bodies of one shape on one gel the force follows F = c Vᵐ: with
+//! m = 3/5 for a ball on a half-space by Hertz's law, 1 for a flat punch. Exponent and factor are those
+//! of a line through ln V and ln F.
+
+use tactile_core::{Estimate, Requirement};
+
+use crate::{GelError, GelFrame};
+
+/// The line has two numbers, and its scatter needs some more.
+const LEAST_READINGS: usize = 4;
+/// Forces beyond the readings by this factor follow a law that was not seen there.
+const BEYOND: f64 = 1.5;
+
+/// Normal forces by a line from the volume of the contacts, for bodies of the shape that it was fitted
+/// with.
+///
+/// ```
+/// # use ndarray::Array2;
+/// # use tactile_gel::{GelModel, GelSensor};
+/// # use tactile_gel::GelError;
+/// use tactile_gel::GaugeForce;
+/// // Volumes in cubic metres and what the gauge read in newtons.
+/// let readings = [(1e-10, 0.1), (2e-10, 0.155), (4e-10, 0.228), (8e-10, 0.352), (16e-10, 0.528)];
+/// let law = GaugeForce::of_volumes(&readings)?;
+/// assert!((law.exponent() - 0.6).abs() < 0.01);
+/// let force = law.at_volume(5e-10);
+/// assert!((force.value - 0.1 * 5_f64.powf(0.6)).abs() < 2.0 * force.standard_error);
+/// # Ok::<(), GelError>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GaugeForce {
+    /// Means of ln V and ln F, and the slope.
+    mean: [f64; 2],
+    exponent: f64,
+    /// Sum of squares of ln V about its mean, and the residual variance of ln F.
+    spread: f64,
+    variance: f64,
+    count: f64,
+    range: [f64; 2],
+}
+
+impl GaugeForce {
+    /// From frames and what the gauge read under them in newtons. O(n) for n frames.
+    ///
+    /// # Errors
+    /// [`GelError::NoContact`] for a frame without contact, and those of
+    /// [`of_volumes`](Self::of_volumes).
+    pub fn fit(readings: &[(&GelFrame, f64)]) -> Result<Self, GelError> {
+        let volumes = readings.iter().map(|(frame, force)| {
+            let volume = frame.volume_m3().ok_or(GelError::NoContact)?;
+            Ok((volume, *force))
+        });
+        Self::of_volumes(&volumes.collect::<Result<Vec<_>, GelError>>()?)
+    }
+
+    /// From volumes in cubic metres and readings in newtons.
+    ///
+    /// # Errors
+    /// [`GelError::TooFewPresses`] below four, [`GelError::InvalidOption`] for one that is not
+    /// positive, [`GelError::NoSolution`] if all volumes are one, or the force does not grow.
+    pub fn of_volumes(readings: &[(f64, f64)]) -> Result<Self, GelError> {
+        if readings.len() < LEAST_READINGS {
+            return Err(GelError::TooFewPresses {
+                needed: LEAST_READINGS,
+                available: readings.len(),
+            });
+        }
+        for (volume, force) in readings {
+            Requirement::Positive.check("volume", *volume)?;
+            Requirement::Positive.check("gauge reading", *force)?;
+        }
+        let count = readings.len() as f64;
+        let logs = readings.iter().map(|(v, f)| [v.ln(), f.ln()]);
+        let mean = [0, 1].map(|k: usize| logs.clone().map(|log| log[k]).sum::<f64>() / count);
+        let about = logs.clone().map(|[v, f]| [v - mean[0], f - mean[1]]);
+        let spread: f64 = about.clone().map(|[v, _]| v * v).sum();
+        let exponent = about.clone().map(|[v, f]| v * f).sum::<f64>() / spread;
+        if spread.is_nan() || exponent.is_nan() || exponent <= 0.0 {
+            return Err(GelError::NoSolution);
+        }
+        let left: f64 = about.map(|[v, f]| (f - exponent * v).powi(2)).sum();
+        let volumes = readings.iter().map(|(volume, _)| *volume);
+        Ok(Self {
+            mean,
+            exponent,
+            spread,
+            variance: left / (count - 2.0),
+            count,
+            range: [
+                volumes.clone().fold(f64::INFINITY, f64::min),
+                volumes.fold(0.0, f64::max),
+            ],
+        })
+    }
+
+    /// The exponent m.
+    pub fn exponent(&self) -> f64 {
+        self.exponent
+    }
+
+    /// The normal force of a frame in newtons. `None` without contact.
+    pub fn force(&self, frame: &GelFrame) -> Option<Estimate> {
+        frame.volume_m3().map(|volume| self.at_volume(volume))
+    }
+
+    /// The force in newtons under a volume in cubic metres.
+    ///
+    /// The error is that of one more reading: the scatter of the readings, and that of the line. It
+    /// is infinite for volumes beyond those of the readings by half of them.
+    pub fn at_volume(&self, volume_m3: f64) -> Estimate {
+        let away = volume_m3.ln() - self.mean[0];
+        let force = (self.mean[1] + self.exponent * away).exp();
+        let share = self.variance * (1.0 + 1.0 / self.count + away * away / self.spread);
+        let [low, high] = self.range;
+        let seen = (low / BEYOND..=high * BEYOND).contains(&volume_m3);
+        let error = if seen {
+            force * share.sqrt()
+        } else {
+            f64::INFINITY
+        };
+        Estimate::new(force, error).with_degrees_of_freedom(self.count - 2.0)
+    }
+}
+
+impl GelFrame {
+    /// The volume in cubic metres that the contacts take from the gel, below the gel far away. `None`
+    /// without contact.
+    pub fn volume_m3(&self) -> Option<f64> {
+        let (mut area_px, mut area_m2) = (0.0, 0.0);
+        let mut depths = 0.0;
+        for (depth, _) in self
+            .depth_m
+            .iter()
+            .zip(&self.labels)
+            .filter(|(_, l)| **l > 0)
+        {
+            depths += depth.max(0.0);
+            area_px += 1.0;
+        }
+        self.contacts
+            .iter()
+            .for_each(|c| area_m2 += c.area_m2.value);
+        (depths > 0.0).then(|| depths * area_m2 / area_px)
+    }
+}
