@@ -39,6 +39,9 @@ const LEAST_SHARE: f64 = 0.02;
 /// Processes that take part, at most.
 const MOST: usize = 6;
 
+/// Every other one of so many pairs finds the shapes and noises to begin with.
+const MANY: usize = 100;
+
 /// Every so many patches all shapes are tried, in the others those that took part in the last.
 const ROUND: usize = 4;
 
@@ -124,10 +127,21 @@ impl<const D: usize> PairPatch<D> {
     pub(super) fn take(&mut self, pairs: &Pairs<'_, D>, rows: impl Iterator<Item = usize>) {
         self.rows.clear();
         self.rows.extend(rows);
+        if self.taken == 0 && self.rows.len() >= MANY {
+            let all = self.rows.clone();
+            self.rows.clear();
+            self.rows.extend(all.iter().step_by(2));
+            self.settle(pairs);
+            self.rows = all;
+        }
+        self.settle(pairs);
+        self.calibrate();
+    }
+
+    fn settle(&mut self, pairs: &Pairs<'_, D>) {
         self.gather(pairs);
         self.detrend();
         self.search();
-        self.calibrate();
     }
 
     /// Points about their mean, in radii, and the directions that they span.
