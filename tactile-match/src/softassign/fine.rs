@@ -1,6 +1,6 @@
 //! Residuals below what the annealing resolves: are they noise, and where do the points go then?
 
-use super::model::cholesky;
+use super::kernels::cholesky;
 use super::search::is_cold;
 use super::{AnnealedSoftassign, Mechanism, Search, SoftassignWorkspace, State, Transformation};
 use super::{difference, in_space, squared, squared_distance};

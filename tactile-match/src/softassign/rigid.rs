@@ -1,0 +1,148 @@
+//! Rigid motions, similarities and affine maps in place of a warp that bends.
+
+use super::{Axes, FARTHEST, Regression, Transformation, in_space};
+use crate::BestMotion;
+use nalgebra::{Matrix3, Point, SMatrix, SVector, SymmetricEigen, Vector3};
+use tactile_tps::{Affine, Warp};
+
+// Rigid motions and similarities in place of a warp that bends.
+//
+// The soft matches pull model point `xᵢ` with weight `wᵢ` to `zᵢ`; the motion of least
+// `Σ wᵢ |s R xᵢ + b − zᵢ|²` is closed-form ([`BestMotion`]). To first order in the noise σ² the image of the point at the offset `r` from the weighted centroid has the covariance
+// `σ² (1/W + [r]× Θ⁻¹ [r]×ᵀ)` with `W = Σ wᵢ` and the tensor of inertia
+// `Θ = Σ wᵢ (|rᵢ|² 1 − rᵢ rᵢᵀ)`, and where the size is free `σ² r rᵀ/Σ wᵢ|rᵢ|²` beside it.
+
+/// The fit, for a model that it keeps.
+#[derive(Clone, Debug, Default)]
+pub(super) struct RigidFit<const D: usize> {
+    transformation: Transformation,
+    model: Vec<Point<f64, D>>,
+    wanted: Vec<Point<f64, D>>,
+}
+
+impl<const D: usize> RigidFit<D> {
+    /// Takes the model. Idle where the warp may bend.
+    pub(super) fn set(&mut self, transformation: Transformation, model: &[[f64; D]]) {
+        self.transformation = transformation;
+        self.model.clear();
+        if self.is_active() {
+            self.model.extend(model.iter().map(|&p| Point::from(p)));
+        }
+    }
+
+    pub(super) fn is_active(&self) -> bool {
+        self.transformation != Transformation::Smooth
+    }
+
+    /// Whether lengths may change.
+    pub(super) fn grows(&self) -> bool {
+        self.transformation != Transformation::Rigid
+    }
+
+    /// The displacements from `base` and their variances that the motion of least squares gives,
+    /// into `regression`: `O(I)`.
+    pub(super) fn fit(
+        &mut self,
+        weights: &[f64],
+        base: &[[f64; D]],
+        displacements: &Axes<D>,
+        noise: f64,
+        regression: &mut Regression<D>,
+    ) {
+        self.wanted.clear();
+        self.wanted.extend(
+            base.iter()
+                .enumerate()
+                .map(|(i, b)| Point::from(SVector::from_fn(|k, _| b[k] + displacements.0[k][i]))),
+        );
+        let weights = &weights[..base.len()];
+        if self.transformation == Transformation::Affine {
+            return self.fit_affine(weights, base, noise, displacements.0[0].len(), regression);
+        }
+        let scaled = self.transformation == Transformation::Similarity;
+        // Nothing matched, or nothing finite: the model stays where it is.
+        let Some(fit) = BestMotion::of(&self.model, &self.wanted, weights, scaled) else {
+            regression.set(displacements.0[0].len(), |_| ([0.0; D], 0.0));
+            return;
+        };
+        let total: f64 = weights.iter().sum();
+        let mut inertia = Matrix3::zeros();
+        for (p, w) in self.model.iter().zip(weights) {
+            let r = in_space(&(p.coords - fit.from));
+            inertia += (Matrix3::identity() * r.norm_squared() - r * r.transpose()) * *w;
+        }
+        let turning = rotations_covariance::<D>(&inertia);
+        let model = &self.model;
+        regression.set(displacements.0[0].len(), |i| {
+            let Some(p) = model.get(i) else {
+                return ([0.0; D], 0.0);
+            };
+            let r = p.coords - fit.from;
+            let image = fit.linear * r + fit.to;
+            let arm = in_space(&r).cross_matrix();
+            let turned = (arm * turning * arm.transpose()).trace().max(0.0);
+            let grown = if scaled && fit.extent > 0.0 {
+                r.norm_squared() / fit.extent
+            } else {
+                0.0
+            };
+            let variance = noise * (1.0 / total + (turned + grown) / D as f64);
+            let variance = variance.min(FARTHEST); // hardly anything is matched
+            (std::array::from_fn(|k| image[k] - base[i][k]), variance)
+        });
+    }
+}
+
+impl<const D: usize> RigidFit<D> {
+    /// The affine map of least squares. An image at the offset `r` from the weighted centroid has
+    /// the variance `σ² (1/W + rᵀ S⁻¹ r)` along each axis, `S = Σ wᵢ rᵢ rᵢᵀ`.
+    fn fit_affine(
+        &self,
+        weights: &[f64],
+        base: &[[f64; D]],
+        noise: f64,
+        padded: usize,
+        regression: &mut Regression<D>,
+    ) {
+        let total: f64 = weights.iter().sum();
+        let fit = Affine::fit(&self.model, &self.wanted, Some(weights)).ok();
+        let Some(fit) = fit.filter(|_| total > 0.0) else {
+            regression.set(padded, |_| ([0.0; D], 0.0));
+            return;
+        };
+        let rows = self.model.iter().zip(weights);
+        let centre: SVector<f64, D> = rows.clone().map(|(p, w)| p.coords * (w / total)).sum();
+        let mut scatter = SMatrix::<f64, D, D>::zeros();
+        for (p, w) in rows {
+            let r = p.coords - centre;
+            scatter += r * r.transpose() * *w;
+        }
+        let inverse = scatter.try_inverse().unwrap_or_else(SMatrix::zeros);
+        regression.set(padded, |i| {
+            let Some(p) = self.model.get(i) else {
+                return ([0.0; D], 0.0);
+            };
+            let image = fit.apply(p);
+            let r = p.coords - centre;
+            let variance = noise * (1.0 / total + r.dot(&(inverse * r)).max(0.0));
+            let displacement = std::array::from_fn(|k| image[k] - base[i][k]);
+            (displacement, variance.min(FARTHEST))
+        });
+    }
+}
+
+/// Covariance of the rotation vector at unit noise: the inverse of the inertia, in the plane about
+/// its normal alone. Zero where the points lie on one line, about which no rotation is determined.
+fn rotations_covariance<const D: usize>(inertia: &Matrix3<f64>) -> Matrix3<f64> {
+    if D == 2 {
+        let about = inertia[(2, 2)];
+        let variance = if about > 0.0 { about.recip() } else { 0.0 };
+        return Matrix3::from_diagonal(&Vector3::new(0.0, 0.0, variance));
+    }
+    let axes = SymmetricEigen::new(*inertia);
+    // Moments below this share of the largest are rounding: of points that lie on one line.
+    let least = 1e-9 * axes.eigenvalues.max();
+    let inverse = |moment: f64| if moment > least { moment.recip() } else { 0.0 };
+    let turn = &axes.eigenvectors;
+    turn * Matrix3::from_diagonal(&axes.eigenvalues.map(inverse)) * turn.transpose()
+}
