@@ -10,7 +10,7 @@ use crate::{Domain, PixelScalar};
 /// use ndarray::array;
 /// use tactile_sfs::{DepthTable, Domain, Image, SurfaceReconstruction};
 /// let (bytes, mask) = (array![[0_u8, 50, 100]], array![[true, true, false]]);
-/// let domain = Domain::new([1e-4, 1e-4])?.with_mask(mask.view());
+/// let domain = Domain::<f64>::new([1e-4, 1e-4])?.with_mask(mask.view());
 /// let table = DepthTable::new(&[(0.0, 0.0), (200.0, 1e-3)])?;
 /// let heights = table.reconstruct(Image::new(bytes.view(), domain))?.heights;
 /// assert!(heights[[0, 1]] == 0.25e-3 && heights[[0, 2]].is_nan());

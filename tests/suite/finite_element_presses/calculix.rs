@@ -9,10 +9,16 @@ const FILE: &str = "calculix_presses.csv";
 /// That of its bodies.
 const POISSON_RATIO: f64 = 0.499;
 
-/// At one approach both programs find one force and one contact radius.
+/// At one approach both programs find one force and one contact radius. `ALL_LOADS=1` solves every
+/// ball, not one in three.
 #[test]
 fn contacts_are_those_of_another_program() {
-    for ball in balls_of(FILE) {
+    let step = if std::env::var_os("ALL_LOADS").is_some() {
+        1
+    } else {
+        3
+    };
+    for ball in balls_of(FILE).into_iter().step_by(step) {
         let approaches = ball.states.iter().map(|state| state.indentation_m);
         let loads = approaches.map(AppliedLoad::Approach);
         let modulus = ball.youngs_modulus_pa;
