@@ -259,9 +259,9 @@ impl Uncertain {
     /// The standard error from all sources.
     #[must_use]
     pub fn standard_error(&self) -> f64 {
-        self.parts
-            .iter()
-            .fold(0.0, |sum: f64, part| sum.hypot(*part))
+        // Most sources give no part, and `hypot` costs more than the test.
+        let parts = self.parts.iter().filter(|part| **part != 0.0);
+        parts.fold(0.0, |sum: f64, part| sum.hypot(*part))
     }
 
     /// The standard error as a share of the value's magnitude.
@@ -351,17 +351,16 @@ impl Uncertain {
 
     /// a x + b y, with a value of its own: the form of every operation on two numbers.
     fn combined(self, a: f64, other: Self, b: f64, value: f64) -> Self {
-        let mut sum = Self::exact(value);
-        for place in 0..COUNT {
-            let one = (a * self.parts[place], self.degrees[place]);
-            let other = (b * other.parts[place], other.degrees[place]);
-            (sum.parts[place], sum.degrees[place]) = if place == Source::Noise.place() {
-                beside(one, other)
-            } else {
-                // One error, known as well as the part of it that is known least.
-                (one.0 + other.0, one.1.min(other.1))
-            };
-        }
+        // One error, known as well as the part of it that is known least.
+        let mut sum = Self {
+            value,
+            parts: std::array::from_fn(|k| a * self.parts[k] + b * other.parts[k]),
+            degrees: std::array::from_fn(|k| self.degrees[k].min(other.degrees[k])),
+        };
+        let noise = Source::Noise.place();
+        let one = (a * self.parts[noise], self.degrees[noise]);
+        let other = (b * other.parts[noise], other.degrees[noise]);
+        (sum.parts[noise], sum.degrees[noise]) = beside(one, other);
         sum
     }
 }

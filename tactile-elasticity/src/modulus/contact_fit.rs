@@ -37,10 +37,10 @@ pub(super) struct ContactFit<'a, L: ?Sized> {
     series: &'a LoadSeries,
     poisson_ratio: f64,
     other_compliance_per_pa: f64,
-    /// ln of the other body's compliance over the one stated, and the object's size over the one
-    /// stated: zero and one, with their errors.
+    /// ln of the other body's compliance and of the object's size, over those stated: zero, with
+    /// their errors.
     log_compliance: Uncertain,
-    size: Uncertain,
+    log_size: Uncertain,
     /// ln of 1 − ν² over the one stated: zero, with its error.
     log_lateral: Uncertain,
     /// Whether the law depends on the other body's part of 1/E*.
@@ -72,7 +72,7 @@ impl<'a, L: ContactLaw + ?Sized> ContactFit<'a, L> {
             log_compliance: bodies.map_or(Uncertain::exact(0.0), |bodies| {
                 log(bodies.guide_compliance(radius_m()))
             }),
-            size: bodies.map_or(Uncertain::exact(1.0), Bodies::size),
+            log_size: bodies.map_or(Uncertain::exact(0.0), |bodies| log(bodies.size())),
             log_lateral: nu.map(|_| 0.0, |_| per_ratio),
             feels_share,
         }
@@ -98,7 +98,8 @@ impl<'a, L: ContactLaw + ?Sized> ContactFit<'a, L> {
     /// The observations that the law reaches with the other body's part of 1/E* given, and the
     /// loads beyond it.
     fn observe(&self, share: f64) -> Result<(Vec<Observation>, Vec<usize>), ElasticityError> {
-        let (mut all, mut beyond) = (Vec::new(), Vec::new());
+        let mut all = Vec::with_capacity(self.series.loads().len());
+        let mut beyond = Vec::new();
         for (load, state) in self.series.loads().iter().enumerate() {
             let force = validated(state.force_n, Quantity::Force)?;
             for (length, measured) in lengths(state) {
@@ -123,7 +124,7 @@ impl<'a, L: ContactLaw + ?Sized> ContactFit<'a, L> {
                     continue;
                 };
                 let log = |number: Uncertain| number.map(f64::ln, f64::recip);
-                let of_lengths = log(measured) * slope + log(self.size) * size_slope;
+                let of_lengths = log(measured) * slope + self.log_size * size_slope;
                 let log_modulus = log(force.without(Source::Noise)) - of_lengths;
                 let value = force.value.ln() - log_force.value();
                 all.push(Observation {

@@ -191,6 +191,9 @@ impl Covariance {
             errors: Vec::new(),
         };
         Source::ALL.into_iter().fold(none, |sum, source| {
+            if numbers.iter().all(|x| x.part(source) == 0.0) {
+                return sum;
+            }
             let common_to = match source {
                 Source::Noise => CommonTo::None,
                 _ => CommonTo::All,
