@@ -10,7 +10,8 @@ use crate::ball::{BallFace, Evidence};
 use crate::error::same_shape;
 use crate::frame_check::FrameDoubt;
 use crate::gradients::{Blurred, TERMS, samples};
-use crate::sensor::{GelModel, GelSensor, colour_image};
+use crate::model::GelModel;
+use crate::sensor::{GelSensor, colour_image};
 
 /// Pixels inside of the contact's edge that the polynomial is not fitted in: the blur of the frames
 /// mixes them with the free gel.

@@ -7,9 +7,9 @@ use crate::GelError;
 use crate::contacts::{Patch, block_means};
 use crate::frame_check::FrameDoubt;
 use crate::integration::integrated;
+use crate::model::GelModel;
 use crate::plane::Plane;
 use crate::rest::{Tails, rest};
-use crate::sensor::GelModel;
 
 /// Cells of the coarse grid along the longer side of a frame.
 const COARSE: usize = 40;

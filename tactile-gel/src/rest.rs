@@ -7,8 +7,8 @@
 
 use ndarray::Array2;
 
-use crate::GelLayer;
 use crate::contacts::quantile;
+use crate::layer::GelLayer;
 use crate::plane::{LayerShape, bessel_j0};
 
 /// Thicknesses in longer sides of the frame, and a half-space.
