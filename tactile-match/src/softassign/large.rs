@@ -2,7 +2,7 @@
 
 use super::assign::Blocks;
 use super::model::Prior;
-use super::search::{FAST, MAX_PATTERN_REACH, SCALES};
+use super::search::{FAST, MAX_PATTERN_REACH, SCALES, warmth};
 use super::{
     AnnealedSoftassign, Annealer, Axes, Cooling, Mechanism, Rotation, Schedule,
     SoftassignWorkspace, State, squared_distance, starts,
@@ -59,7 +59,7 @@ impl AnnealedSoftassign {
             std::mem::swap(&mut ws.levels, &mut levels);
             if follows {
                 let run = self.schedule(Cooling {
-                    sigma: 0.4 * ws.mean_spacing(),
+                    sigma: warmth(ws),
                     least: 1.0,
                     still: STILL,
                     ..FAST

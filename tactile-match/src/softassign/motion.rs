@@ -4,6 +4,7 @@ use super::patterns::Cells;
 use super::{difference, squared_distance};
 use nalgebra::{SMatrix, SVector};
 use std::f64::consts::PI;
+use tactile_core::statistics::quantile;
 
 // Of all differences `tⱼ − xᵢ` between a block of neighbours and the targets those of true pairs
 // crowd about one place, the motion of the block. All others are spread as evenly as the targets.
@@ -54,6 +55,14 @@ const AGREEING: f64 = 0.6;
 /// Times that a block without a peak is tried again, with more neighbours.
 const TRIES: u8 = 3;
 
+/// Sets lie on each other if four in five points have a target so near, in spacings: by chance one in
+/// eight has.
+const LIES: f64 = 0.2;
+/// Points whose distances from their nearest targets tell how well motions place the sets.
+const SAMPLE: usize = 2000;
+/// Share of the points that have a target, at least.
+const PRESENT: f64 = 0.8;
+
 /// The centre of a block, and how it moves.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Seed<const D: usize> {
@@ -84,6 +93,7 @@ pub(super) struct Motions<const D: usize> {
     block: Vec<usize>,
     counts: Vec<u32>,
     sums: Vec<u32>,
+    misses: Vec<f64>,
     /// Points of a block, and the radius of the last one.
     wanted: usize,
     radius: f64,
@@ -154,11 +164,18 @@ impl<const D: usize> Motions<D> {
             self.seeds[0].motion = Some(motion);
             return true;
         }
-        self.model.build(still, 1.5 * spacing);
         self.wanted = BLOCK.min(still.len() / BLOCKS);
         self.radius = spacing * (self.wanted as f64 / PI).powf(1.0 / D as f64);
         let rows = order.iter().step_by(self.wanted / OVERLAP);
         self.seeds.extend(rows.map(|&row| seed(row)));
+        if self.miss(still, target, spacing) <= LIES * spacing {
+            // Of a lattice no peak would stand out.
+            for seed in &mut self.seeds {
+                seed.motion = Some(Local::still(&still[seed.row]));
+            }
+            return true;
+        }
+        self.model.build(still, 1.5 * spacing);
         let step = (self.seeds.len() / PROBES).max(1);
         let mut best = (FAR_HEIGHT, None);
         for k in (0..self.seeds.len()).step_by(step) {
@@ -187,6 +204,24 @@ impl<const D: usize> Motions<D> {
         let total = self.seeds.len();
         self.seeds.retain(|seed| seed.motion.is_some());
         self.seeds.len() as f64 >= AGREEING * total as f64
+    }
+
+    /// Distance from their nearest targets that four in five of the moved points do not exceed, up to
+    /// half a spacing: a fifth may be missing.
+    pub(super) fn miss(&mut self, moved: &[[f64; D]], target: &[[f64; D]], spacing: f64) -> f64 {
+        let Self {
+            misses, targets, ..
+        } = self;
+        let step = moved.len().div_ceil(SAMPLE).max(1);
+        misses.clear();
+        misses.extend(moved.iter().step_by(step).map(|p| {
+            let mut least = 0.25 * spacing * spacing;
+            targets.within(p, 0.5 * spacing, |j, _| {
+                least = squared_distance(&target[j], p).min(least);
+            });
+            least.sqrt()
+        }));
+        quantile(misses, PRESENT)
     }
 
     /// Mean of the motions.

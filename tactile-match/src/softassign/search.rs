@@ -69,6 +69,11 @@ const MOVED: Cooling = Cooling {
     sweeps: FAST.sweeps,
     ..SLOW
 };
+/// So warm is a start from the motions, in distances that four in five points do not exceed: others
+/// are twice as far.
+const MISSES: f64 = 2.0;
+/// The coldest such start, in mean spacings: a field that bends between the blocks.
+const COLDEST: f64 = 0.1;
 /// Share of the points in view that an answer from the motions of blocks matches: more may be
 /// missing on either side.
 const FOLLOWED: f64 = 0.75;
@@ -232,13 +237,10 @@ impl AnnealedSoftassign {
         ws: &mut SoftassignWorkspace<D>,
         observe: Observer<'_>,
     ) -> ControlFlow<()> {
-        let moved = Cooling {
-            sigma: MOVED.sigma * mean_spacing(ws.annealer.volume, &ws.target),
-            ..MOVED
-        };
         let follows = self.has(Mechanism::Motions) && self.place(ws, Start::Moved);
         if follows {
-            self.anneal(ws, moved, observe)?;
+            let sigma = warmth(ws);
+            self.anneal(ws, Cooling { sigma, ..MOVED }, observe)?;
         }
         if !(follows && self.is_followed(ws, observe)?) {
             self.try_starts(ws, observe)?;
@@ -634,6 +636,14 @@ impl<const D: usize> SoftassignWorkspace<D> {
             && gain >= MIN_TELLING_GAIN
             && self.best.tail <= LEAST_ASIDE
     }
+}
+
+/// Temperature of a start from the motions of blocks: no warmer than they leave the points aside.
+/// Sets that lie on each other already would wander along a lattice.
+pub(super) fn warmth<const D: usize>(ws: &mut SoftassignWorkspace<D>) -> f64 {
+    let spacing = mean_spacing(ws.annealer.volume, &ws.target);
+    let miss = ws.motions.miss(&ws.state.warped, &ws.target, spacing);
+    (MISSES * miss).clamp(COLDEST * spacing, MOVED.sigma * spacing)
 }
 
 /// Mean distance of neighbours of points that fill a volume.

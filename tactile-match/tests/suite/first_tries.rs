@@ -286,3 +286,17 @@ fn sets_of_the_same_points_are_paired_completely() {
     let found = matcher.match_points(&views.model, &views.target).unwrap();
     assert!(found.unmatched_model.is_empty() && found.unmatched_target.is_empty());
 }
+
+/// The same file twice: leaves of a sunflower, next to which another lies in nearly the same way.
+#[test]
+fn the_same_points_twice_are_all_matched() {
+    let leaf = |k: usize| {
+        let (radius, angle) = ((k as f64).sqrt(), 2.4 * k as f64);
+        Point::from([radius * angle.cos(), 1.1 * radius * angle.sin()])
+    };
+    let leaves: Vec<Point<f64, 2>> = (0..2000).map(leaf).collect();
+    let found = AnnealedSoftassign::default()
+        .match_points(&leaves, &leaves)
+        .unwrap();
+    assert!((0..2000).all(|i| found.assignment[i] == Some(i)));
+}
