@@ -61,10 +61,15 @@ fn ended_by(
 /// moment before Ctrl-C. More than 30,000 are refused for want of memory.
 const LARGE: usize = 24_000;
 
-/// A spiral of points.
-fn points(n: usize, row: &str) -> String {
+/// Angles of spirals in radians.
+const TURN: f64 = 2.4;
+const OTHER_TURN: f64 = 2.5;
+
+/// A spiral of points, each turned by this angle from the last. Spirals of other angles have nothing
+/// in common, so that a match of them takes long.
+fn points(n: usize, turn: f64, row: &str) -> String {
     let point = |k: usize| {
-        let angle = 2.4 * k as f64;
+        let angle = turn * k as f64;
         let radius = (k as f64).sqrt();
         format!(
             "{row}{},{}\n",
@@ -78,10 +83,12 @@ fn points(n: usize, row: &str) -> String {
 #[test]
 fn matching_leaves_the_cases_that_are_done() {
     let folder = folder_with_examples();
-    let rows = |n: usize, kind: &str| points(n, &format!("{kind} ")).replace(',', " ");
-    let case =
-        |name: &str, n: usize| format!("case {name} 2 {n} {n}\n{}{}", rows(n, "m"), rows(n, "t"));
-    let cases = case("small", 40) + &case("large", LARGE);
+    let rows = |n: usize, turn, kind: &str| points(n, turn, &format!("{kind} ")).replace(',', " ");
+    let case = |name: &str, n: usize, turn| {
+        let [model, target] = [rows(n, TURN, "m"), rows(n, turn, "t")];
+        format!("case {name} 2 {n} {n}\n{model}{target}")
+    };
+    let cases = case("small", 40, TURN) + &case("large", LARGE, OTHER_TURN);
     fs::write(folder.path().join("both.txt"), cases).unwrap();
     let (printed, code) = ended_by("-INT", folder.path(), "match both.txt --out results", 1);
     assert_eq!(code, Some(130), "{printed}");
@@ -113,13 +120,12 @@ fn a_stream_ends_with_what_it_has_measured() {
 #[test]
 fn work_that_has_nothing_yet_ends_at_once() {
     let folder = folder_with_examples();
-    fs::write(
-        folder.path().join("many.csv"),
-        "x,y\n".to_owned() + &points(LARGE, ""),
-    )
-    .unwrap();
+    for (name, turn) in [("many.csv", TURN), ("others.csv", OTHER_TURN)] {
+        let table = "x,y\n".to_owned() + &points(LARGE, turn, "");
+        fs::write(folder.path().join(name), table).unwrap();
+    }
     for (call, lines) in [
-        ("strain many.csv many.csv --out results", 0),
+        ("strain many.csv others.csv --out results", 0),
         // The points are still being ordered.
         ("warp many.csv many.csv many.csv --out results", 0),
         ("light --rays 9000000", 1),
