@@ -1,6 +1,6 @@
 //! Rotation, principal strains, change of size and equivalent strain of the strain between sets.
 
-use crate::elasticity::kinematics::Kinematics;
+use crate::elasticity::kinematics::StrainQuantities;
 use crate::elasticity::strain::StrainMeasure;
 use crate::strain_between::StrainBetween;
 use crate::tps::LocalValue;
@@ -34,23 +34,26 @@ impl<const D: usize> StrainBetween<D> {
         &self,
         points: &[Point<f64, D>],
         measure: &dyn StrainMeasure,
-    ) -> Vec<Kinematics> {
+    ) -> Vec<StrainQuantities> {
         read(&self.field.at(points), measure)
     }
 
     /// The same at every matched point of the first set.
     #[must_use]
-    pub fn kinematics(&self, measure: &dyn StrainMeasure) -> Vec<Kinematics> {
+    pub fn kinematics(&self, measure: &dyn StrainMeasure) -> Vec<StrainQuantities> {
         read(&self.values, measure)
     }
 }
 
-fn read<const D: usize>(values: &[LocalValue<D>], measure: &dyn StrainMeasure) -> Vec<Kinematics> {
+fn read<const D: usize>(
+    values: &[LocalValue<D>],
+    measure: &dyn StrainMeasure,
+) -> Vec<StrainQuantities> {
     let read = values.iter().map(|value| {
         let gradient = value.gradient.fixed_resize(0.0);
         let covariance = value.gradient_covariance.fixed_resize(0.0);
-        let found = Kinematics::of(&gradient, &covariance, D, measure);
-        found.unwrap_or_else(|_| Kinematics::undefined())
+        let found = StrainQuantities::of(&gradient, &covariance, D, measure);
+        found.unwrap_or_else(|_| StrainQuantities::undefined())
     });
     read.collect()
 }

@@ -12,7 +12,7 @@ use nalgebra::{Matrix3, Point};
 use serde_json::{Map, Value, json};
 use std::path::PathBuf;
 use tactile_files::io::{PointTable, read_displaced_points};
-use tactile_imaging::elasticity::kinematics::Kinematics;
+use tactile_imaging::elasticity::kinematics::StrainQuantities;
 use tactile_imaging::elasticity::strain::{
     Biot, EulerAlmansi, GreenLagrange, Hencky, Infinitesimal, StrainMeasure,
 };
@@ -501,7 +501,7 @@ impl<const D: usize> StrainReport<D> {
     }
 
     /// The strain at every point, and its standard error.
-    fn table(&self, found: &StrainBetween<D>, read: &[Kinematics]) -> Vec<u8> {
+    fn table(&self, found: &StrainBetween<D>, read: &[StrainQuantities]) -> Vec<u8> {
         let mut header = vec!["row_before".to_owned()];
         header.extend(self.headings("", ""));
         header.extend(strain_headings::<D>(""));
@@ -521,7 +521,11 @@ impl<const D: usize> StrainReport<D> {
     }
 
     /// The strain at every point and its standard error, as arrays.
-    fn arrays(&self, found: &StrainBetween<D>, read: &[Kinematics]) -> Result<Vec<u8>, Failure> {
+    fn arrays(
+        &self,
+        found: &StrainBetween<D>,
+        read: &[StrainQuantities],
+    ) -> Result<Vec<u8>, Failure> {
         let shape = [found.pairs.len()];
         let rows = found.rows.iter().map(|row| (row.0 as i64).to_le_bytes());
         let mut npz = Npz::new();
@@ -539,7 +543,12 @@ impl<const D: usize> StrainReport<D> {
     }
 
     /// Displacement, strain and its standard error on the grid.
-    fn grid_table(&self, grid: &StrainGrid<D>, found: &[Known<D>], read: &[Kinematics]) -> Vec<u8> {
+    fn grid_table(
+        &self,
+        grid: &StrainGrid<D>,
+        found: &[Known<D>],
+        read: &[StrainQuantities],
+    ) -> Vec<u8> {
         let mut header = self.headings("", "");
         header.extend(self.headings("u_", ""));
         header.extend(strain_headings::<D>(""));

@@ -17,12 +17,12 @@ const UNKNOWN_STEP: f64 = 1e-3;
 ///
 /// ```
 /// use nalgebra::Matrix3;
-/// use tactile_elasticity::kinematics::Kinematics;
+/// use tactile_elasticity::kinematics::StrainQuantities;
 /// use tactile_elasticity::strain::GreenLagrange;
 /// // A sheet that shears: x moves by 2 % of y.
 /// let h = Matrix3::new(0.0, 0.02, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
 /// let variance = Matrix3::from_diagonal(&[1e-6, 1e-6, 0.0].into());
-/// let found = Kinematics::of(&h, &variance, 2, &GreenLagrange)?;
+/// let found = StrainQuantities::of(&h, &variance, 2, &GreenLagrange)?;
 /// // It turns clockwise by about half of that, with the error of half a sum of two derivatives.
 /// assert!((found.rotation_rad + 0.01).abs() < 1e-5);
 /// assert!((found.rotation_error_rad - 1e-3 / 2_f64.sqrt()).abs() < 1e-6);
@@ -33,7 +33,7 @@ const UNKNOWN_STEP: f64 = 1e-3;
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
-pub struct Kinematics {
+pub struct StrainQuantities {
     /// Displacement gradient H, row i of displacement i.
     pub gradient: Matrix3<f64>,
     /// Its standard errors.
@@ -71,7 +71,7 @@ struct Followers {
     equivalent: f64,
 }
 
-impl Kinematics {
+impl StrainQuantities {
     /// Of a displacement gradient, whose rows have this covariance each and are independent of each
     /// other, in the plane (`axes` 2) or in space (3). Strains are those of `measure`.
     ///
@@ -119,8 +119,8 @@ impl Kinematics {
     /// Nothing is known: NaN throughout, as where a deformation folds.
     ///
     /// ```
-    /// use tactile_elasticity::kinematics::Kinematics;
-    /// assert!(Kinematics::undefined().size_ratio.is_nan());
+    /// use tactile_elasticity::kinematics::StrainQuantities;
+    /// assert!(StrainQuantities::undefined().size_ratio.is_nan());
     /// ```
     #[must_use]
     pub fn undefined() -> Self {

@@ -11,7 +11,7 @@ use pyo3::types::PyDict;
 use std::str::FromStr;
 use std::sync::Arc;
 use tactile_imaging::core::statistics::quantile_95;
-use tactile_imaging::elasticity::kinematics::Kinematics;
+use tactile_imaging::elasticity::kinematics::StrainQuantities;
 use tactile_imaging::elasticity::strain::{GreenLagrange, StrainMeasure};
 use tactile_imaging::matching::labelling::{Compatibility, LengthMaximum, Neighbourhood};
 use tactile_imaging::matching::{
@@ -470,16 +470,16 @@ fn strained<const D: usize>(
     let half = error * quantile_95(Some(found.degrees_of_freedom as f64));
     let displaced = |(i, k): (usize, usize)| found.displacements[i][k];
     let count = found.rows.len();
-    let tensors = |of: fn(&Kinematics) -> Matrix3<f64>| {
+    let tensors = |of: fn(&StrainQuantities) -> Matrix3<f64>| {
         arrays::kept_tensors(py, &read.iter().map(of).collect::<Vec<_>>())
     };
-    let triples = |of: fn(&Kinematics) -> [f64; 3]| {
+    let triples = |of: fn(&StrainQuantities) -> [f64; 3]| {
         arrays::kept(
             py,
             Array2::from_shape_fn((count, 3), |(i, k)| of(&read[i])[k]),
         )
     };
-    let with_error = |of: fn(&Kinematics) -> [f64; 2]| {
+    let with_error = |of: fn(&StrainQuantities) -> [f64; 2]| {
         arrays::kept(
             py,
             Array2::from_shape_fn((count, 2), |(i, k)| of(&read[i])[k]),

@@ -3,7 +3,7 @@ use super::quantities;
 use crate::failure::Failure;
 use crate::outputs::Npz;
 use nalgebra::{Matrix3, Point, SVector};
-use tactile_imaging::elasticity::kinematics::Kinematics;
+use tactile_imaging::elasticity::kinematics::StrainQuantities;
 
 /// Points on equal distances over a box, x fastest.
 pub(super) struct StrainGrid<const D: usize> {
@@ -48,7 +48,7 @@ impl<const D: usize> StrainGrid<D> {
     }
 
     /// The legacy format of VTK, as text.
-    pub(super) fn vtk(&self, found: &[Known<D>], read: &[Kinematics]) -> Vec<u8> {
+    pub(super) fn vtk(&self, found: &[Known<D>], read: &[StrainQuantities]) -> Vec<u8> {
         let three = |v: &[f64]| {
             let at = |a: usize| v.get(a).copied().unwrap_or(0.0);
             format!("{:e} {:e} {:e}", at(0), at(1), at(2))
@@ -95,7 +95,7 @@ pub(super) fn arrays<const D: usize>(
     shape: &[usize],
     points: &[Point<f64, D>],
     found: &[Known<D>],
-    read: &[Kinematics],
+    read: &[StrainQuantities],
 ) -> Result<Vec<u8>, Failure> {
     let vector = |v: SVector<f64, D>| <[f64; D]>::from(v).map(f64::to_le_bytes);
     let places = || (0..D).flat_map(|i| (0..D).map(move |j| (i, j)));

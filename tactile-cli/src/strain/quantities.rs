@@ -3,7 +3,7 @@ use crate::failure::Failure;
 use crate::outputs::Npz;
 use serde_json::{Map, Value, json};
 use std::fmt::Write as _;
-use tactile_imaging::elasticity::kinematics::Kinematics;
+use tactile_imaging::elasticity::kinematics::StrainQuantities;
 use tactile_imaging::force::Estimate;
 
 const AXES: [&str; 3] = ["x", "y", "z"];
@@ -12,7 +12,7 @@ const AXES: [&str; 3] = ["x", "y", "z"];
 type Scalar = (String, f64, f64);
 
 /// A quantity and its standard error.
-type ValueAndError = fn(&Kinematics) -> [f64; 2];
+type ValueAndError = fn(&StrainQuantities) -> [f64; 2];
 
 /// The name of the change of size.
 fn ratio<const D: usize>() -> &'static str {
@@ -20,7 +20,7 @@ fn ratio<const D: usize>() -> &'static str {
 }
 
 /// The quantities without a direction.
-fn scalars<const D: usize>(at: &Kinematics) -> Vec<Scalar> {
+fn scalars<const D: usize>(at: &StrainQuantities) -> Vec<Scalar> {
     let principal = (0..D).map(|k| {
         let name = format!("e_{}", k + 1);
         (name, at.principal[k], at.principal_error[k])
@@ -45,7 +45,7 @@ fn entries<const D: usize>() -> impl Iterator<Item = (usize, usize)> {
 /// standard errors, of a direction that of its angle.
 pub(super) fn headings<const D: usize>() -> Vec<String> {
     let gradient = entries::<D>().map(|(i, j)| format!("du{}_d{}", AXES[i], AXES[j]));
-    let scalars = scalars::<D>(&Kinematics::undefined()).into_iter();
+    let scalars = scalars::<D>(&StrainQuantities::undefined()).into_iter();
     let known: Vec<String> = gradient.chain(scalars.map(|scalar| scalar.0)).collect();
     let directions = (0..D).flat_map(|k| (0..D).map(move |i| format!("n{}_{}", k + 1, AXES[i])));
     let errors = known.iter().map(|name| format!("se_{name}"));
@@ -55,7 +55,7 @@ pub(super) fn headings<const D: usize>() -> Vec<String> {
 }
 
 /// The cells below [`headings`].
-pub(super) fn cells<const D: usize>(at: &Kinematics) -> Vec<f64> {
+pub(super) fn cells<const D: usize>(at: &StrainQuantities) -> Vec<f64> {
     let scalars = scalars::<D>(at);
     let mut row: Vec<f64> = entries::<D>().map(|place| at.gradient[place]).collect();
     row.extend(scalars.iter().map(|scalar| scalar.1));
@@ -70,11 +70,11 @@ pub(super) fn cells<const D: usize>(at: &Kinematics) -> Vec<f64> {
 pub(super) fn arrays<const D: usize>(
     npz: &mut Npz,
     shape: &[usize],
-    found: &[Kinematics],
+    found: &[StrainQuantities],
 ) -> Result<(), Failure> {
     let tensors = [shape, &[D, D]].concat();
     let vectors = [shape, &[D]].concat();
-    let tensor = |of: fn(&Kinematics, (usize, usize)) -> f64| {
+    let tensor = |of: fn(&StrainQuantities, (usize, usize)) -> f64| {
         let places = found
             .iter()
             .flat_map(move |at| entries::<D>().map(move |place| of(at, place)));
@@ -91,7 +91,7 @@ pub(super) fn arrays<const D: usize>(
     // Row k is direction k.
     let directions = tensor(|at, (k, i)| at.directions[(i, k)]);
     npz.add("principal_direction", "<f8", &tensors, directions)?;
-    let vector = |of: fn(&Kinematics) -> [f64; 3]| {
+    let vector = |of: fn(&StrainQuantities) -> [f64; 3]| {
         let places = found.iter().flat_map(move |at| of(at).into_iter().take(D));
         places.map(f64::to_le_bytes)
     };
@@ -125,7 +125,7 @@ pub(super) fn arrays<const D: usize>(
 }
 
 /// The fields of a grid in the legacy format of VTK.
-pub(super) fn vtk<const D: usize>(text: &mut String, found: &[Kinematics]) {
+pub(super) fn vtk<const D: usize>(text: &mut String, found: &[StrainQuantities]) {
     text.push_str("TENSORS displacement_gradient double\n");
     for at in found {
         for row in at.gradient.row_iter() {
@@ -158,7 +158,7 @@ pub(super) fn vtk<const D: usize>(text: &mut String, found: &[Kinematics]) {
 }
 
 /// The median of every scalar over the places and its median standard error.
-pub(super) fn json<const D: usize>(found: &[Kinematics]) -> Value {
+pub(super) fn json<const D: usize>(found: &[StrainQuantities]) -> Value {
     let places: Vec<Vec<Scalar>> = found.iter().map(scalars::<D>).collect();
     let middle = |mut values: Vec<f64>| {
         values.retain(|value| !value.is_nan());

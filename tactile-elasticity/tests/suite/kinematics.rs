@@ -4,7 +4,7 @@
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 use rand_distr::StandardNormal;
-use tactile_elasticity::kinematics::Kinematics;
+use tactile_elasticity::kinematics::StrainQuantities;
 use tactile_elasticity::strain::{GreenLagrange, Hencky, Infinitesimal};
 
 const NONE: Matrix3<f64> = Matrix3::from_array_storage(nalgebra::ArrayStorage([[0.0; 3]; 3]));
@@ -19,7 +19,7 @@ fn a_constructed_deformation_is_taken_apart() {
     for angle in [0.0, 1e-9, 0.7, 3.0] {
         let turn = Rotation3::from_axis_angle(&about, angle);
         let h = turn.matrix() * u - Matrix3::identity();
-        let found = Kinematics::of(&h, &NONE, 3, &Hencky).unwrap();
+        let found = StrainQuantities::of(&h, &NONE, 3, &Hencky).unwrap();
         assert!((found.rotation_rad - angle).abs() < 1e-14, "{angle}");
         assert!((found.size_ratio - 1.2 * 1.05 * 0.9).abs() < 1e-14);
         for k in 0..3 {
@@ -46,7 +46,7 @@ fn the_plane_turns_either_way() {
         let u = Matrix3::new(1.1, 0.03, 0.0, 0.03, 0.95, 0.0, 0.0, 0.0, 1.0);
         let turn = Matrix3::new(c, -s, 0.0, s, c, 0.0, 0.0, 0.0, 1.0);
         let h = turn * u - Matrix3::identity();
-        let found = Kinematics::of(&h, &NONE, 2, &Infinitesimal).unwrap();
+        let found = StrainQuantities::of(&h, &NONE, 2, &Infinitesimal).unwrap();
         assert!((found.rotation_rad - angle).abs() < 1e-14);
         assert!((found.size_ratio - (1.1 * 0.95 - 9e-4)).abs() < 1e-14);
         assert_eq!(found.principal[2], 0.0);
@@ -57,7 +57,7 @@ fn the_plane_turns_either_way() {
 #[test]
 fn equivalent_strain_of_incompressible_tension_is_the_tension() {
     let h = Matrix3::from_diagonal(&Vector3::new(0.02, -0.01, -0.01));
-    let found = Kinematics::of(&h, &NONE, 3, &Infinitesimal).unwrap();
+    let found = StrainQuantities::of(&h, &NONE, 3, &Infinitesimal).unwrap();
     assert!((found.equivalent - 0.02).abs() < 1e-16);
 }
 
@@ -68,23 +68,23 @@ fn errors_are_those_of_gradients_drawn_anew() {
     let h = Matrix3::new(0.05, 0.02, 0.01, -0.03, -0.04, 0.02, 0.0, 0.01, 0.01);
     let root = Matrix3::new(3e-4, 0.0, 0.0, 1e-4, 2e-4, 0.0, -1e-4, 1e-4, 4e-4);
     let covariance = root * root.transpose();
-    let found = Kinematics::of(&h, &covariance, 3, &GreenLagrange).unwrap();
+    let found = StrainQuantities::of(&h, &covariance, 3, &GreenLagrange).unwrap();
     let mut rng = ChaCha8Rng::seed_from_u64(3);
-    let draws: Vec<Kinematics> = (0..4000)
+    let draws: Vec<StrainQuantities> = (0..4000)
         .map(|_| {
             let mut drawn = h;
             for row in 0..3 {
                 let noise = root * Vector3::from_fn(|_, _| rng.sample::<f64, _>(StandardNormal));
                 (0..3).for_each(|axis| drawn[(row, axis)] += noise[axis]);
             }
-            Kinematics::of(&drawn, &NONE, 3, &GreenLagrange).unwrap()
+            StrainQuantities::of(&drawn, &NONE, 3, &GreenLagrange).unwrap()
         })
         .collect();
-    let deviation = |of: &dyn Fn(&Kinematics) -> f64| {
+    let deviation = |of: &dyn Fn(&StrainQuantities) -> f64| {
         let squares = draws.iter().map(|draw| (of(draw) - of(&found)).powi(2));
         (squares.sum::<f64>() / draws.len() as f64).sqrt()
     };
-    let turned = |draw: &Kinematics| {
+    let turned = |draw: &StrainQuantities| {
         let (a, b) = (draw.directions.column(1), found.directions.column(1));
         a.cross(&b).norm()
     };
@@ -117,11 +117,11 @@ fn what_follows_an_unknown_derivative_is_unknown() {
     let h = Matrix3::from_diagonal(&Vector3::new(0.02, 0.01, 0.0));
     let mut covariance = Matrix3::from_diagonal(&Vector3::new(1e-8, 1e-8, f64::INFINITY));
     covariance[(0, 2)] = f64::NAN;
-    let found = Kinematics::of(&h, &covariance, 3, &GreenLagrange).unwrap();
+    let found = StrainQuantities::of(&h, &covariance, 3, &GreenLagrange).unwrap();
     assert_eq!(found.gradient_error[(1, 1)], 1e-4);
     assert!(found.gradient_error[(2, 2)].is_infinite());
     assert!(found.size_ratio_error.is_infinite() && found.equivalent_error.is_infinite());
     assert!(found.principal_error[0] > 0.0);
-    let none = Kinematics::undefined();
+    let none = StrainQuantities::undefined();
     assert!(none.rotation_rad.is_nan() && none.directions[(2, 2)].is_nan());
 }
