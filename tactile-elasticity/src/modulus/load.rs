@@ -25,7 +25,7 @@ pub(crate) fn validated(
 /// Pressing forces are positive. Strain is that between the unloaded state (or the first load, see
 /// the estimators) and this load, positive where the object is squeezed.
 ///
-/// Every number has its error by [`Source`]. One source is one error in all loads, which averaging
+/// Every number has its error by [`Source`](tactile_core::Source). One source is one error in all loads, which averaging
 /// does not reduce, and noise another one in each. The error of an [`Estimate`](tactile_core::Estimate)
 /// counts as noise.
 ///
