@@ -15,6 +15,7 @@ use tactile_imaging::core::Estimate;
 use tactile_imaging::core::Progress;
 use tactile_imaging::elasticity::ElasticityError;
 use tactile_imaging::elasticity::contact::{ContactTable, Layer, Waveguide};
+#[cfg(feature = "fem")]
 use tactile_imaging::fem::ContactTableOptions;
 use tactile_imaging::pipeline::{
     CheckPress, CheckedObject, EstimatorChoice, KnownBall, MatcherChoice, Object,
