@@ -52,16 +52,6 @@ impl<const D: usize> PairPatch<D> {
         }
     }
 
-    /// Displacement and gradient at a place.
-    fn mean_at(&self, place: &Point<f64, D>) -> (SVector<f64, D>, SMatrix<f64, D, D>) {
-        let x = self.inside(place);
-        average(
-            self.mixture
-                .iter()
-                .map(|&(k, share)| (share, self.mean(k, &x))),
-        )
-    }
-
     /// Displacement and gradient of a process at a place, and those of the trend.
     fn mean(&self, process: usize, x: &SVector<f64, D>) -> (SVector<f64, D>, SMatrix<f64, D, D>) {
         let process = &self.processes[process];
@@ -95,9 +85,13 @@ impl<const D: usize> PairPatch<D> {
         };
         let first = found.len();
         let noise = self.processes[best].lambda * self.processes[best].scale;
+        let mut means = Vec::with_capacity(self.mixture.len());
         for place in places {
             let x = self.inside(place);
-            let (displacement, gradient) = self.mean_at(place);
+            means.clear();
+            let parts = self.mixture.iter();
+            means.extend(parts.map(|&(k, share)| (share, self.mean(k, &x))));
+            let (displacement, gradient) = average(means.iter().copied());
             let mut value = LocalValue {
                 displacement,
                 displacement_variance: 0.0,
@@ -110,8 +104,7 @@ impl<const D: usize> PairPatch<D> {
                 unresolved: false,
             };
             // What the likely processes do not agree on.
-            for &(k, share) in &self.mixture {
-                let (u, h) = self.mean(k, &x);
+            for &(share, (u, h)) in &means {
                 let off = h - gradient;
                 value.displacement_variance += share * (u - displacement).norm_squared() / D as f64;
                 value.gradient_covariance += off.transpose() * off * (share / D as f64);
