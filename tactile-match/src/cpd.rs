@@ -18,13 +18,11 @@
 //! numerically has, instead of solving an `M × M` system in every iteration.
 
 use crate::error::{at_least_one, option_within, point_sets};
-use crate::{Axes, Frame, spread};
-use crate::{
-    Judgement, MatchError, MatchReport, Matching, PointMatcher, SoftMatches, StopReason,
-    linear_assignment, unmatched_rows,
-};
-use nalgebra::{Cholesky, DMatrix, Dyn, Point, SMatrix, SVector, VecStorage};
-use tactile_core::{Loop, vectorised};
+use crate::frame::{Frame, spread};
+use crate::gaussian_process::{Axes, Detail, Prior, PriorScales, Regression};
+use crate::{Judgement, MatchError, Matching, StopReason, linear_assignment};
+use nalgebra::{Point, SMatrix, SVector};
+use tactile_core::vectorised;
 use tactile_tps::Warp;
 
 /// How the two sets are brought to size one.
@@ -54,60 +52,6 @@ pub enum Normalization {
     Model,
     /// None: the parameters are in the units of the points.
     Off,
-}
-
-impl CoherentPointDrift {
-    /// [`PointMatcher::match_points`] with the memory of the iterations kept between calls.
-    ///
-    /// ```
-    /// use nalgebra::{Point2, Vector2};
-    /// use tactile_match::{CoherentPointDrift, DriftWorkspace};
-    /// let model: Vec<_> = (0..12)
-    ///     .map(f64::from)
-    ///     .map(|k| Point2::new(k % 4.0 + 0.2 * k.sin(), (k / 4.0).floor()))
-    ///     .collect();
-    /// let (matcher, mut workspace) = (CoherentPointDrift::default(), DriftWorkspace::default());
-    /// for shift in [0.5, 5.0] {
-    ///     let target: Vec<_> = model.iter().map(|p| p + Vector2::new(shift, 0.0)).collect();
-    ///     let matching = matcher.match_with(&mut workspace, &model, &target)?;
-    ///     assert!((0..12).all(|i| matching.assignment[i] == Some(i)));
-    /// }
-    /// # Ok::<(), tactile_match::MatchError>(())
-    /// ```
-    ///
-    /// # Errors
-    /// As [`PointMatcher::match_points`].
-    pub fn match_with<const D: usize>(
-        &self,
-        workspace: &mut DriftWorkspace<D>,
-        model: &[Point<f64, D>],
-        target: &[Point<f64, D>],
-    ) -> Result<Matching<D>, MatchError> {
-        self.register_in(workspace, model, target)
-    }
-
-    pub(crate) fn register<const D: usize>(
-        &self,
-        workspace: &mut DriftWorkspace<D>,
-        model: &[Point<f64, D>],
-        target: &[Point<f64, D>],
-    ) -> Result<Matching<D>, MatchError> {
-        point_sets(model, target)?;
-        workspace.register(self, model, target);
-        let mut found = matching(workspace);
-        found.report.judgement = Judgement::of_pairs(model, target, &found.assignment);
-        Ok(found)
-    }
-}
-
-impl<const D: usize> PointMatcher<D> for CoherentPointDrift {
-    fn match_points(
-        &self,
-        model: &[Point<f64, D>],
-        target: &[Point<f64, D>],
-    ) -> Result<Matching<D>, MatchError> {
-        self.match_with(&mut DriftWorkspace::default(), model, target)
-    }
 }
 
 /// Coherent point drift as a [`PointMatcher`](crate::PointMatcher).
@@ -259,137 +203,134 @@ impl CoherentPointDrift {
     }
 }
 
-// Expectation maximisation: the loop, and the memory it needs.
+// Expectation maximisation.
+//
+// With the posterior P fixed the motion is a regression under the prior covariance
+// `G_mk = exp(−|y_m − y_k|²/2β²)`: weights `P 1`, targets `P X / P 1 − Y`, noise variance λσ²
+// (Myronenko & Song, eq. 22–23: `(diag(P1) G + λσ² I) W = P X − diag(P1) Y`).
 
-/// Memory of [`CoherentPointDrift`](super::CoherentPointDrift), to be reused: the iterations do not
-/// allocate once it has seen the largest sets.
-///
-/// ```
-/// use nalgebra::Point2;
-/// use tactile_match::{CoherentPointDrift, DriftWorkspace};
-/// let model: Vec<_> = (0..12)
-///     .map(f64::from)
-///     .map(|k| Point2::new(k % 4.0 + 0.2 * k.sin(), (k / 4.0).floor()))
-///     .collect();
-/// let target: Vec<_> = model
-///     .iter()
-///     .map(|p| Point2::new(p.x + 0.1 * p.y, p.y + 2.0))
-///     .collect();
-/// let mut workspace = DriftWorkspace::default();
-/// let found = CoherentPointDrift::default().match_with(&mut workspace, &model, &target)?;
-/// assert!(found.report.iterations > 1 && found.report.sigma < 0.2); // in the units of the points
-/// assert!((found.warp.apply(&model[5]) - found.warped[5]).norm() < 1e-6);
-/// # Ok::<(), tactile_match::MatchError>(())
-/// ```
-#[derive(Clone, Debug, Default)]
-pub struct DriftWorkspace<const D: usize> {
-    /// Those of the last registration.
+/// What is left of the kernel's diagonal when its factorisation ends: far below what the ridge λσ²
+/// lets through.
+const LEFT_OUT: f64 = 1e-12;
+/// Soft matches below this weight are left out.
+const FAINTEST: f64 = 1e-4;
+
+/// A registration under way, in the frame of the sets.
+struct Registration<const D: usize> {
     options: CoherentPointDrift,
-    model_frame: Frame<D>,
-    target_frame: Frame<D>,
-    model: Axes<D>,
-    target: Axes<D>,
+    /// Of model and target.
+    frames: [Frame<D>; 2],
+    model: Vec<[f64; D]>,
+    target: Vec<[f64; D]>,
     moved: Axes<D>,
+    kernel: Prior,
+    motion: Regression<D>,
     posterior: Posterior<D>,
     sigma2: f64,
     energy: Vec<f64>,
     stop: StopReason,
-    kernel: KernelFactor,
-    non_rigid: NonRigidStep,
 }
 
-impl<const D: usize> DriftWorkspace<D> {
-    /// Registers `model` to `target`. Both have points and finite coordinates.
-    fn register(
-        &mut self,
+impl<const D: usize> Registration<D> {
+    fn new(
         options: &CoherentPointDrift,
         model: &[Point<f64, D>],
         target: &[Point<f64, D>],
-    ) {
-        self.options = *options;
-        self.enter_frames(model, target);
-        self.kernel.build(
-            &self.model.0,
-            options.beta,
-            options.rank.unwrap_or(model.len()),
-            // What is left of the kernel's diagonal when its factorisation ends: far below what the
-            // ridge `λσ²` lets through.
-            1e-12,
-        );
-        self.energy.clear();
-        self.sigma2 = self.initial_variance();
-        self.stop = StopReason::Exact;
-        if self.sigma2 <= 0.0 {
-            return; // all points of both sets coincide
+    ) -> Self {
+        let own = Frame::of(model);
+        let frames = match options.normalization {
+            Normalization::Each => [own, Frame::of(target)],
+            Normalization::Model => [own, own],
+            Normalization::Off => [Frame::default(); 2],
+        };
+        let inside = |frame: &Frame<D>, points: &[Point<f64, D>]| -> Vec<[f64; D]> {
+            points.iter().map(|p| frame.inside(p).into()).collect()
+        };
+        let (model, target) = (inside(&frames[0], model), inside(&frames[1], target));
+        let (mut kernel, mut moved) = (Prior::default(), Axes::default());
+        let scales = PriorScales {
+            length: options.beta,
+            bending: 1.0,
+            affine: 0.0,
+        };
+        let detail = Detail {
+            rank: options.rank.unwrap_or(model.len()),
+            left_out: LEFT_OUT,
+            hidden: 0.0,
+        };
+        kernel.factor(&model, scales, detail);
+        moved.fill(model.len(), model.iter().copied());
+        Self {
+            options: *options,
+            frames,
+            sigma2: mean_variance(&model, &target),
+            model,
+            target,
+            moved,
+            kernel,
+            motion: Regression::default(),
+            posterior: Posterior::default(),
+            energy: Vec::new(),
+            stop: StopReason::IterationLimit,
         }
-        self.stop = StopReason::IterationLimit;
-        for _ in 0..options.max_iterations {
-            let before = self.sigma2;
-            self.iterate();
-            if (self.sigma2 - before).abs() <= options.tolerance {
+    }
+
+    /// E-step and M-step in turn, until σ² stands still.
+    fn run(&mut self) {
+        if self.sigma2 <= 0.0 {
+            self.stop = StopReason::Exact; // all points of both sets coincide
+            return;
+        }
+        for _ in 0..self.options.max_iterations {
+            let (before, uniform) = (self.sigma2, self.uniform());
+            self.posterior
+                .update(&self.moved.0, &self.target, before, uniform);
+            self.energy.push(self.posterior.energy);
+            self.move_model();
+            self.update_variance();
+            if (self.sigma2 - before).abs() <= self.options.tolerance {
                 self.stop = StopReason::Converged;
-                break;
+                return;
             }
         }
     }
 
-    fn enter_frames(&mut self, model: &[Point<f64, D>], target: &[Point<f64, D>]) {
-        let options = &self.options;
-        self.model_frame = Frame::of(model);
-        self.target_frame = match options.normalization {
-            Normalization::Each => Frame::of(target),
-            Normalization::Model => self.model_frame,
-            Normalization::Off => Frame::default(),
-        };
-        if options.normalization == Normalization::Off {
-            self.model_frame = Frame::default();
+    /// The motion that the posterior asks for.
+    fn move_model(&mut self) {
+        let (stride, ridge) = (self.kernel.stride, self.options.lambda * self.sigma2);
+        let Posterior {
+            model_mass: mass,
+            weighted,
+            wanted,
+            ..
+        } = &mut self.posterior;
+        wanted.fill(
+            stride,
+            self.model.iter().enumerate().map(|(m, y)| {
+                let reached = mass[m] > f64::MIN_POSITIVE;
+                std::array::from_fn(|d| match reached {
+                    true => weighted.0[d][m] / mass[m] - y[d],
+                    false => 0.0,
+                })
+            }),
+        );
+        mass.resize(stride, 0.0);
+        self.motion.fit(&self.kernel, mass, wanted, ridge);
+        mass.truncate(self.model.len());
+        for d in 0..D {
+            let rows = self.moved.0[d].iter_mut().zip(&self.model);
+            for ((t, y), u) in rows.zip(&self.motion.displacement.0[d]) {
+                *t = y[d] + u;
+            }
         }
-        self.model_frame.enter(model, &mut self.model);
-        self.target_frame.enter(target, &mut self.target);
-        self.moved.0.clone_from(&self.model.0);
-    }
-
-    /// Mean squared distance of all pairs, per axis.
-    fn initial_variance(&self) -> f64 {
-        let mut sum = 0.0;
-        for (y, x) in self.model.0.iter().zip(&self.target.0) {
-            let moments = |v: &[f64]| {
-                let n = v.len() as f64;
-                (
-                    v.iter().sum::<f64>() / n,
-                    v.iter().map(|c| c * c).sum::<f64>() / n,
-                )
-            };
-            let ((mean_y, square_y), (mean_x, square_x)) = (moments(y), moments(x));
-            sum += square_y + square_x - 2.0 * mean_y * mean_x;
-        }
-        sum / D as f64
-    }
-
-    /// One E-step and one M-step.
-    fn iterate(&mut self) {
-        let uniform = self.uniform();
-        self.posterior
-            .update(&self.moved.0, &self.target.0, self.sigma2, uniform);
-        self.energy.push(self.posterior.energy);
-        let (posterior, model, moved) = (&self.posterior, &self.model.0, &mut self.moved.0);
-        let ridge = self.options.lambda * self.sigma2;
-        self.non_rigid
-            .solve(&self.kernel, posterior, model, ridge, moved);
-        self.update_variance();
     }
 
     /// Weight of the uniform component relative to one Gaussian's peak at the present variance,
     /// `(2πσ²)^{D/2} w M / ((1 − w) N)`.
     fn uniform(&self) -> f64 {
-        let (w, [m, n]) = (self.options.outlier_weight, self.lengths());
+        let w = self.options.outlier_weight;
         let volume = (std::f64::consts::TAU * self.sigma2).powf(0.5 * D as f64);
-        volume * w / (1.0 - w) * m as f64 / n as f64
-    }
-
-    /// Points of the model and of the target.
-    fn lengths(&self) -> [usize; 2] {
-        [self.model.0[0].len(), self.target.0[0].len()]
+        volume * w / (1.0 - w) * self.model.len() as f64 / self.target.len() as f64
     }
 
     /// `σ² = Σ P_mn |x_n − T(y_m)|² / (D Σ P_mn)`. A tenth of the tolerance where rounding makes it
@@ -399,19 +340,14 @@ impl<const D: usize> DriftWorkspace<D> {
         if mass <= f64::MIN_POSITIVE {
             return; // all are outliers: nothing to learn from
         }
-        let weighted = |w: &[f64], a: &[f64], b: &[f64]| -> f64 {
-            w.iter().zip(a).zip(b).map(|((w, a), b)| w * a * b).sum()
-        };
         let mut sum = 0.0;
         for d in 0..D {
-            let (x, t) = (&self.target.0[d], &self.moved.0[d]);
-            let cross: f64 = self.posterior.weighted.0[d]
-                .iter()
-                .zip(t)
-                .map(|(p, t)| p * t)
-                .sum();
-            sum += weighted(&self.posterior.target_mass, x, x) - 2.0 * cross
-                + weighted(&self.posterior.model_mass, t, t);
+            let moved = self.moved.0[d].iter().zip(&self.posterior.model_mass);
+            let crosses = self.moved.0[d].iter().zip(&self.posterior.weighted.0[d]);
+            let targets = self.target.iter().zip(&self.posterior.target_mass);
+            sum += targets.map(|(x, p)| p * x[d] * x[d]).sum::<f64>()
+                - 2.0 * crosses.map(|(t, p)| p * t).sum::<f64>()
+                + moved.map(|(t, p)| p * t * t).sum::<f64>();
         }
         // Coordinates of size one are not known better than ε, and 1/σ² must stay finite.
         let least = f64::EPSILON * f64::EPSILON;
@@ -424,52 +360,53 @@ impl<const D: usize> DriftWorkspace<D> {
         .max(least);
     }
 
-    /// The model points where the last registration left them.
-    fn warped(&self) -> Vec<Point<f64, D>> {
-        (0..self.lengths()[0])
-            .map(|m| self.target_frame.leave(at(&self.moved.0, m)))
-            .collect()
+    /// The map that was found, for any point: the identity before the first iteration.
+    fn warp(&self) -> DriftWarp<D> {
+        let pivots = &self.kernel.pivots[..self.motion.solution.len()];
+        DriftWarp {
+            frames: self.frames,
+            centres: pivots.iter().map(|&m| self.model[m].into()).collect(),
+            weights: self.pivot_weights(pivots),
+            beta: self.options.beta,
+        }
     }
 
-    /// The map the last registration found, for any point.
-    fn warp(&self) -> DriftWarp<D> {
-        let mut warp = DriftWarp {
-            model: self.model_frame,
-            target: self.target_frame,
-            centres: Vec::new(),
-            weights: Vec::new(),
-            beta: 1.0,
-        };
-        if !self.energy.is_empty() {
-            warp.beta = self.options.beta;
-            let coefficients: Vec<_> = (0..self.kernel.rank())
-                .map(|k| self.non_rigid.coefficient(k))
-                .collect();
-            warp.weights = self
-                .kernel
-                .pivot_weights(&coefficients)
-                .into_iter()
-                .map(SVector::from)
-                .collect();
-            let pivots = self.kernel.pivots.iter();
-            warp.centres = pivots.map(|&m| at(&self.model.0, m)).collect();
+    /// Weights `w` at the pivots with `Σ_k G(x, y_k) w_k = (L z)(x)`: solves `Cᵀ w = z`, `C` the
+    /// pivots' rows of `L`.
+    fn pivot_weights(&self, pivots: &[usize]) -> Vec<SVector<f64, D>> {
+        let solution = self.motion.solution.iter();
+        let mut weights: Vec<SVector<f64, D>> = solution.map(|&z| z.into()).collect();
+        for k in (0..weights.len()).rev() {
+            let column = self.kernel.column(k);
+            for later in k + 1..weights.len() {
+                let known = weights[later] * column[pivots[later]];
+                weights[k] -= known;
+            }
+            weights[k] /= column[pivots[k]];
         }
-        warp
+        weights
     }
+}
+
+/// Mean squared distance of all pairs, per axis.
+fn mean_variance<const D: usize>(model: &[[f64; D]], target: &[[f64; D]]) -> f64 {
+    let moments = |points: &[[f64; D]], d: usize| {
+        let n = points.len() as f64;
+        let sum: f64 = points.iter().map(|p| p[d]).sum();
+        let squares: f64 = points.iter().map(|p| p[d] * p[d]).sum();
+        (sum / n, squares / n)
+    };
+    let along = |d: usize| {
+        let ((mean_y, square_y), (mean_x, square_x)) = (moments(model, d), moments(target, d));
+        square_y + square_x - 2.0 * mean_y * mean_x
+    };
+    (0..D).map(along).sum::<f64>() / D as f64
 }
 
 // The E-step: which target point belongs to which model point, as sums over the posterior `P`
 // without storing it.
 
-/// `D` coordinates, each contiguous over the points.
-type Columns<const D: usize> = [Vec<f64>; D];
-
-/// Point `m` of these.
-fn at<const D: usize>(columns: &Columns<D>, m: usize) -> SVector<f64, D> {
-    SVector::from_fn(|d, _| columns[d][m])
-}
-
-/// The sums over the posterior that the M-steps need, for `M` model and `N` target points.
+/// The sums over the posterior that the M-step needs, for `M` model and `N` target points.
 #[derive(Clone, Debug, Default)]
 struct Posterior<const D: usize> {
     /// `P 1`: how much of the target every model point has.
@@ -478,6 +415,8 @@ struct Posterior<const D: usize> {
     target_mass: Vec<f64>,
     /// `P X`.
     weighted: Axes<D>,
+    /// `P X / P 1 − Y`.
+    wanted: Axes<D>,
     /// Negative log-likelihood, up to a constant that depends on the sizes alone.
     energy: f64,
     /// One column of `P`.
@@ -486,61 +425,36 @@ struct Posterior<const D: usize> {
 
 impl<const D: usize> Posterior<D> {
     /// All sums for model points that have moved to `moved`. `O(M N)`.
-    fn update(&mut self, moved: &Columns<D>, target: &Columns<D>, sigma2: f64, uniform: f64) {
-        let (model_len, target_len) = (moved[0].len(), target[0].len());
-        for sums in self
-            .weighted
-            .0
-            .iter_mut()
-            .chain([&mut self.model_mass, &mut self.column])
-        {
+    fn update(&mut self, moved: &[Vec<f64>; D], target: &[[f64; D]], sigma2: f64, uniform: f64) {
+        let vectors = [&mut self.model_mass, &mut self.column];
+        for sums in self.weighted.0.iter_mut().chain(vectors) {
             sums.clear();
-            sums.resize(model_len, 0.0);
+            sums.resize(moved[0].len(), 0.0);
         }
         self.target_mass.clear();
-        self.target_mass.resize(target_len, 0.0);
-        vectorised(Accumulate {
-            posterior: self,
-            moved,
-            target,
-            sigma2,
-            uniform,
-        });
-        self.energy += 0.5 * (D * target_len) as f64 * sigma2.ln();
-    }
-}
-
-/// The pass over all pairs.
-struct Accumulate<'a, const D: usize> {
-    posterior: &'a mut Posterior<D>,
-    moved: &'a Columns<D>,
-    target: &'a Columns<D>,
-    sigma2: f64,
-    uniform: f64,
-}
-
-impl<const D: usize> Loop for Accumulate<'_, D> {
-    type Output = ();
-    #[inline(always)]
-    fn run(self) {
-        let sums = self.posterior;
-        sums.energy = 0.0;
-        for n in 0..sums.target_mass.len() {
-            let x: [f64; D] = std::array::from_fn(|d| self.target[d][n]);
-            let sum = gaussians(&mut sums.column, self.moved, x, self.sigma2);
-            let total = sum + self.uniform;
-            if total <= 0.0 {
-                continue; // out of reach of every model point, and no outlier component to take it
-            }
-            sums.energy -= total.ln();
-            sums.target_mass[n] = sum / total;
-            scale_and_add(&mut sums.column, &mut sums.model_mass, 1.0 / total);
-            for (weighted, x) in sums.weighted.0.iter_mut().zip(x) {
-                for (sum, &p) in weighted.iter_mut().zip(&sums.column) {
-                    *sum += p * x;
+        self.energy = 0.5 * (D * target.len()) as f64 * sigma2.ln();
+        vectorised(
+            #[inline(always)]
+            || {
+                for x in target {
+                    let sum = gaussians(&mut self.column, moved, x, sigma2);
+                    let total = sum + uniform;
+                    if total <= 0.0 {
+                        // Out of reach of every model point, and no outlier component to take it.
+                        self.target_mass.push(0.0);
+                        continue;
+                    }
+                    self.energy -= total.ln();
+                    self.target_mass.push(sum / total);
+                    scale_and_add(&mut self.column, &mut self.model_mass, 1.0 / total);
+                    for (weighted, x) in self.weighted.0.iter_mut().zip(x) {
+                        for (sum, &p) in weighted.iter_mut().zip(&self.column) {
+                            *sum += p * x;
+                        }
+                    }
                 }
-            }
-        }
+            },
+        );
     }
 }
 
@@ -548,8 +462,8 @@ impl<const D: usize> Loop for Accumulate<'_, D> {
 #[inline(always)]
 fn gaussians<const D: usize>(
     column: &mut [f64],
-    moved: &Columns<D>,
-    x: [f64; D],
+    moved: &[Vec<f64>; D],
+    x: &[f64; D],
     sigma2: f64,
 ) -> f64 {
     let scale = -0.5 / sigma2;
@@ -632,318 +546,14 @@ fn taylor(r: f64) -> f64 {
     1.0 + (r + r * r * sum)
 }
 
-// The Gaussian kernel `G` of the non-rigid motion, as a product `L Lᵀ` of low rank.
-//
-// `G_mk = exp(−|y_m − y_k|² / 2β²)` of smooth motion (β about the size of the set) has few
-// eigenvalues above rounding, so that a pivoted Cholesky factor `L` of `r ≪ M` columns holds all of
-// it that double precision can use. With it one M-step costs `O(M r²)` instead of `O(M³)`, and
-// needs no difference of large terms.
-
-/// `G ≈ L Lᵀ`, and what evaluates the motion at other points.
-#[derive(Clone, Debug, Default)]
-struct KernelFactor {
-    /// `L`, column after column of `M` entries.
-    columns: Vec<f64>,
-    /// `L`, row after row of `r` entries.
-    rows: Vec<f64>,
-    /// The model points the columns stem from.
-    pivots: Vec<usize>,
-    /// What is left of the diagonal of `G − L Lᵀ`.
-    residual: Vec<f64>,
-    len: usize,
-}
-
-impl KernelFactor {
-    /// Rank of the factor.
-    #[inline(always)]
-    fn rank(&self) -> usize {
-        self.pivots.len()
-    }
-
-    /// Column `k` of `L`.
-    #[inline(always)]
-    fn column(&self, k: usize) -> &[f64] {
-        &self.columns[k * self.len..][..self.len]
-    }
-
-    /// Row `m` of `L`.
-    #[inline(always)]
-    fn row(&self, m: usize) -> &[f64] {
-        &self.rows[m * self.rank()..][..self.rank()]
-    }
-
-    /// Factorises the kernel of `model`: columns are added, largest remainder first, until none
-    /// exceeds `tolerance` or there are `rank` of them. `O(M r²)`.
-    fn build<const D: usize>(
-        &mut self,
-        model: &Columns<D>,
-        beta: f64,
-        rank: usize,
-        tolerance: f64,
-    ) {
-        self.len = model[0].len();
-        self.columns.clear();
-        self.pivots.clear();
-        self.residual.clear();
-        self.residual.resize(self.len, 1.0);
-        while self.rank() < rank.min(self.len) {
-            let (pivot, &largest) = match self
-                .residual
-                .iter()
-                .enumerate()
-                .max_by(|a, b| a.1.total_cmp(b.1).then(b.0.cmp(&a.0)))
-            {
-                Some(found) if *found.1 > tolerance => found,
-                _ => break,
-            };
-            self.append(model, beta, pivot, largest.sqrt());
-        }
-        self.rows.clear();
-        let (columns, len, rank) = (&self.columns, self.len, self.pivots.len());
-        self.rows
-            .extend((0..len).flat_map(|m| (0..rank).map(move |k| columns[k * len + m])));
-    }
-
-    fn append<const D: usize>(&mut self, model: &Columns<D>, beta: f64, pivot: usize, root: f64) {
-        let done = self.columns.len();
-        self.columns.resize(done + self.len, 0.0);
-        let (before, column) = self.columns.split_at_mut(done);
-        vectorised(NextColumn {
-            before,
-            column,
-            model,
-            beta,
-            pivot,
-            root,
-        });
-        for (rest, c) in self.residual.iter_mut().zip(column.iter()) {
-            *rest -= c * c;
-        }
-        for &earlier in &self.pivots {
-            column[earlier] = 0.0; // exactly, so that the pivots' rows are triangular
-        }
-        column[pivot] = root;
-        self.residual[pivot] = 0.0;
-        self.pivots.push(pivot);
-    }
-
-    /// Weights `w` at the pivots with `Σ_k G(x, y_k) w_k = (L z)(x)`: solves `Cᵀ w = z`, `C` the
-    /// pivots' rows of `L`.
-    fn pivot_weights<const D: usize>(&self, coefficients: &[[f64; D]]) -> Vec<[f64; D]> {
-        let mut weights = coefficients.to_vec();
-        for k in (0..self.rank()).rev() {
-            let column = self.column(k);
-            let mut w = weights[k];
-            for (later, weight) in weights.iter().enumerate().skip(k + 1) {
-                let factor = column[self.pivots[later]];
-                (0..D).for_each(|d| w[d] -= factor * weight[d]);
-            }
-            weights[k] = w.map(|w| w / column[self.pivots[k]]);
-        }
-        weights
-    }
-}
-
-/// A new column of the factor: that of the kernel, less what the columns before it hold.
-struct NextColumn<'a, const D: usize> {
-    before: &'a [f64],
-    column: &'a mut [f64],
-    model: &'a Columns<D>,
-    beta: f64,
-    pivot: usize,
-    root: f64,
-}
-
-impl<const D: usize> Loop for NextColumn<'_, D> {
-    type Output = ();
-    #[inline(always)]
-    fn run(self) {
-        let len = self.column.len();
-        let scale = -0.5 / (self.beta * self.beta);
-        let model: [&[f64]; D] = std::array::from_fn(|d| &self.model[d][..len]);
-        for m in 0..len {
-            let mut squared = 0.0;
-            for axis in model {
-                let step = axis[self.pivot] - axis[m];
-                squared += step * step;
-            }
-            self.column[m] = exp_of_negative(squared * scale);
-        }
-        for earlier in self.before.chunks_exact(len) {
-            let factor = earlier[self.pivot];
-            self.column
-                .iter_mut()
-                .zip(earlier)
-                .for_each(|(c, e)| *c -= factor * e);
-        }
-        self.column.iter_mut().for_each(|c| *c /= self.root);
-    }
-}
-
-// The M-step of non-rigid motion: `y ↦ y + (G W)(y)` with a smooth Gaussian kernel.
-//
-// Myronenko & Song (2010), eq. 22–23: `(diag(P1) G + λσ² I) W = P X − diag(P1) Y`. With `G = L Lᵀ`
-// the motion is `G W = L z`, `(Lᵀ diag(P1) L + λσ² I) z = Lᵀ (P X − diag(P1) Y)`: symmetric,
-// positive definite, `r × r`.
-
-/// The coefficients `z`, a row per column of `L`, and the memory of the step.
-#[derive(Clone, Debug, Default)]
-struct NonRigidStep {
-    /// `z`, column by column of `r` entries.
-    coefficients: Vec<f64>,
-    normal: Vec<f64>,
-}
-
-impl NonRigidStep {
-    /// Row `k` of `z`.
-    fn coefficient<const D: usize>(&self, k: usize) -> [f64; D] {
-        let rank = self.coefficients.len() / D;
-        std::array::from_fn(|d| self.coefficients[d * rank + k])
-    }
-
-    /// Solves for `z` and moves `model` into `moved`. `O(M r²)`.
-    fn solve<const D: usize>(
-        &mut self,
-        kernel: &KernelFactor,
-        posterior: &Posterior<D>,
-        model: &Columns<D>,
-        ridge: f64,
-        moved: &mut Columns<D>,
-    ) {
-        let rank = kernel.rank();
-        self.normal.clear();
-        self.normal.resize(rank * rank, 0.0);
-        self.coefficients.clear();
-        self.coefficients.resize(rank * D, 0.0);
-        vectorised(Assemble {
-            step: self,
-            kernel,
-            posterior,
-            model,
-            ridge,
-        });
-        let storage = VecStorage::new(Dyn(rank), Dyn(rank), std::mem::take(&mut self.normal));
-        // Positive definite by construction; were it not, z = 0 leaves the model where it was.
-        if let Some(factor) = Cholesky::new(DMatrix::from_data(storage)) {
-            let storage =
-                VecStorage::new(Dyn(rank), Dyn(D), std::mem::take(&mut self.coefficients));
-            let mut coefficients = DMatrix::from_data(storage);
-            factor.solve_mut(&mut coefficients);
-            self.coefficients = coefficients.data.into();
-            self.normal = factor.unpack_dirty().data.into();
-        } else {
-            self.coefficients.fill(0.0);
-        }
-        vectorised(Apply {
-            coefficients: &self.coefficients,
-            kernel,
-            model,
-            moved,
-        });
-    }
-}
-
-/// `Lᵀ diag(P1) L + ridge I` (lower half) and `Lᵀ (P X − diag(P1) Y)`.
-struct Assemble<'a, const D: usize> {
-    step: &'a mut NonRigidStep,
-    kernel: &'a KernelFactor,
-    posterior: &'a Posterior<D>,
-    model: &'a Columns<D>,
-    ridge: f64,
-}
-
-impl<const D: usize> Loop for Assemble<'_, D> {
-    type Output = ();
-    #[inline(always)]
-    fn run(self) {
-        let rank = self.kernel.rank();
-        let NonRigidStep {
-            coefficients,
-            normal,
-            ..
-        } = self.step;
-        let mass = &self.posterior.model_mass;
-        for (m, &p) in mass.iter().enumerate() {
-            let row = self.kernel.row(m);
-            for d in 0..D {
-                let residual = self.posterior.weighted.0[d][m] - p * self.model[d][m];
-                add_scaled(&mut coefficients[d * rank..][..rank], row, residual);
-            }
-        }
-        let (blocks, rest) = mass.as_chunks::<4>();
-        for (block, p) in blocks.iter().enumerate() {
-            let rows: [&[f64]; 4] = std::array::from_fn(|v| self.kernel.row(4 * block + v));
-            for k in 0..rank {
-                add_four(
-                    &mut normal[k * rank..][k..rank],
-                    rows.map(|row| &row[k..]),
-                    p,
-                );
-            }
-        }
-        for (at, p) in rest.iter().enumerate() {
-            let row = self.kernel.row(4 * blocks.len() + at);
-            for k in 0..rank {
-                add_scaled(&mut normal[k * rank..][k..rank], &row[k..], p * row[k]);
-            }
-        }
-        for k in 0..rank {
-            normal[k * rank + k] += self.ridge;
-        }
-    }
-}
-
-/// `sum += factor · row`.
-#[inline(always)]
-fn add_scaled(sum: &mut [f64], row: &[f64], factor: f64) {
-    sum.iter_mut().zip(row).for_each(|(s, r)| *s += factor * r);
-}
-
-/// `sum += Σ_v p_v row_v[0] · row_v`: four model points at a time, to load and store the sum less
-/// often.
-#[inline(always)]
-fn add_four(sum: &mut [f64], rows: [&[f64]; 4], p: &[f64; 4]) {
-    let [a, b, c, d] = rows.map(|row| &row[..sum.len()]);
-    let [pa, pb, pc, pd] = [p[0] * a[0], p[1] * b[0], p[2] * c[0], p[3] * d[0]];
-    for k in 0..sum.len() {
-        sum[k] += (pa * a[k] + pb * b[k]) + (pc * c[k] + pd * d[k]);
-    }
-}
-
-/// `moved = Y + L z`.
-struct Apply<'a, const D: usize> {
-    coefficients: &'a [f64],
-    kernel: &'a KernelFactor,
-    model: &'a Columns<D>,
-    moved: &'a mut Columns<D>,
-}
-
-impl<const D: usize> Loop for Apply<'_, D> {
-    type Output = ();
-    #[inline(always)]
-    fn run(self) {
-        let rank = self.kernel.rank();
-        for d in 0..D {
-            self.moved[d].copy_from_slice(&self.model[d]);
-            for (k, z) in self.coefficients[d * rank..][..rank].iter().enumerate() {
-                self.moved[d]
-                    .iter_mut()
-                    .zip(self.kernel.column(k))
-                    .for_each(|(t, l)| *t += l * z);
-            }
-        }
-    }
-}
-
 // The map a registration found, for any point of space.
 
-/// The map found by [`CoherentPointDrift`](super::CoherentPointDrift): in the frame of the
+/// The map found by [`CoherentPointDrift`]: in the frame of the
 /// registration `y ↦ y + Σ_k w_k exp(−|y − p_k|² / 2β²)`. It takes the model points to
 /// where the registration left them, and any other point along.
 #[derive(Clone, Debug, PartialEq)]
 struct DriftWarp<const D: usize> {
-    model: Frame<D>,
-    target: Frame<D>,
+    frames: [Frame<D>; 2],
     centres: Vec<SVector<f64, D>>,
     weights: Vec<SVector<f64, D>>,
     beta: f64,
@@ -957,42 +567,87 @@ impl<const D: usize> DriftWarp<D> {
 
 impl<const D: usize> Warp<D> for DriftWarp<D> {
     fn apply(&self, point: &Point<f64, D>) -> Point<f64, D> {
-        let y = self.model.inside(point);
+        let y = self.frames[0].inside(point);
         let mut image = y;
         for (centre, weight) in self.centres.iter().zip(&self.weights) {
             image += weight * self.gaussian(&(y - centre));
         }
-        self.target.leave(image)
+        self.frames[1].leave(image)
     }
 
     fn jacobian(&self, point: &Point<f64, D>) -> SMatrix<f64, D, D> {
-        let y = self.model.inside(point);
+        let y = self.frames[0].inside(point);
         let mut jacobian = SMatrix::identity();
         for (centre, weight) in self.centres.iter().zip(&self.weights) {
             let step = y - centre;
             jacobian -=
                 weight * step.transpose() * (self.gaussian(&step) / (self.beta * self.beta));
         }
-        jacobian * (self.target.scale / self.model.scale)
+        jacobian * (self.frames[1].scale / self.frames[0].scale)
     }
 }
 
 // From the mixture at its end to a [`Matching`]: posterior, pairs, confidences, covariances.
 
-/// The posterior `P` at the end, a row of `M` entries per target point.
-fn posterior<const D: usize>(workspace: &DriftWorkspace<D>) -> Vec<f64> {
-    let [model_len, target_len] = workspace.lengths();
-    let sigma2 = workspace.sigma2.max(f64::MIN_POSITIVE);
-    let uniform = workspace.uniform();
-    let mut rows = vec![0.0; model_len * target_len];
-    for (n, row) in rows.chunks_exact_mut(model_len).enumerate() {
-        let x = at(&workspace.target.0, n).into();
-        let total = gaussians(row, &workspace.moved.0, x, sigma2) + uniform;
-        if total > 0.0 {
-            row.iter_mut().for_each(|p| *p /= total);
-        }
+impl CoherentPointDrift {
+    /// [`PointMatcher::match_points`](crate::PointMatcher::match_points).
+    pub(crate) fn once<const D: usize>(
+        &self,
+        model: &[Point<f64, D>],
+        target: &[Point<f64, D>],
+    ) -> Result<Matching<D>, MatchError> {
+        point_sets(model, target)?;
+        let mut registration = Registration::new(self, model, target);
+        registration.run();
+        Ok(registration.matching(model, target))
     }
-    rows
+}
+
+impl<const D: usize> Registration<D> {
+    /// The posterior `P` at the end, a row of `M` entries per target point.
+    fn posterior(&self) -> Vec<f64> {
+        let sigma2 = self.sigma2.max(f64::MIN_POSITIVE);
+        let mut rows = vec![0.0; self.model.len() * self.target.len()];
+        for (row, x) in rows.chunks_exact_mut(self.model.len()).zip(&self.target) {
+            let total = gaussians(row, &self.moved.0, x, sigma2) + self.uniform();
+            if total > 0.0 {
+                row.iter_mut().for_each(|p| *p /= total);
+            }
+        }
+        rows
+    }
+
+    fn matching(&self, model: &[Point<f64, D>], target: &[Point<f64, D>]) -> Matching<D> {
+        let posterior = self.posterior();
+        let m_len = model.len();
+        let assignment = pairs(&posterior, m_len, target.len());
+        let scale = self.frames[1].scale;
+        let moved = |m: usize| SVector::<f64, D>::from_fn(|d, _| self.moved.0[d][m]);
+        let warped = (0..m_len).map(|m| self.frames[1].leave(moved(m))).collect();
+        let mut found = Matching::new(target, Box::new(self.warp()), warped, assignment);
+        for (m, partner) in found.assignment.iter().enumerate() {
+            let column = (0..target.len()).map(|n| (n, posterior[n * m_len + m]));
+            let row: Vec<(usize, f64)> = column.filter(|p| p.1 > FAINTEST).collect();
+            let mass = row.iter().map(|p| p.1).sum::<f64>();
+            // Many targets may have one model point; a row of M has sum one.
+            let share = |p: f64| p / mass.max(1.0);
+            found.soft.push_row(row.iter().map(|&(n, p)| (n, share(p))));
+            let sure = partner.map_or(1.0 - mass.min(1.0), |n| share(posterior[n * m_len + m]));
+            found.confidence.push(sure.clamp(0.0, 1.0));
+            // The spread of the soft matches about their mean, and the noise σ² of the mixture.
+            let spread = spread(row.iter().map(|&(n, p)| (self.target[n].into(), p)));
+            let covariance = spread + SMatrix::identity() * self.sigma2;
+            found
+                .displacement_covariance
+                .push(covariance * (scale * scale));
+        }
+        found.energy.clone_from(&self.energy);
+        found.report.judgement = Judgement::of_pairs(model, target, &found.assignment);
+        found.report.stop = self.stop;
+        found.report.iterations = self.energy.len();
+        found.report.sigma = scale * self.sigma2.sqrt();
+        found
+    }
 }
 
 /// Distinct targets for the model points with the most posterior in sum. A pair stays only if its
@@ -1002,11 +657,8 @@ fn pairs(posterior: &[f64], model_len: usize, target_len: usize) -> Vec<Option<u
     let mut assignment = vec![None; model_len];
     // The costs are probabilities: finite, and of the right number.
     let columns = linear_assignment(&costs, target_len, model_len).unwrap_or_default();
-    for (n, m) in columns
-        .iter()
-        .enumerate()
-        .filter_map(|(n, m)| m.map(|m| (n, m)))
-    {
+    for (n, m) in columns.iter().enumerate() {
+        let Some(m) = *m else { continue };
         let row = &posterior[n * model_len..][..model_len];
         let outlier = 1.0 - row.iter().sum::<f64>();
         if row[m] > 0.0 && row[m] >= outlier {
@@ -1014,68 +666,6 @@ fn pairs(posterior: &[f64], model_len: usize, target_len: usize) -> Vec<Option<u
         }
     }
     assignment
-}
-
-/// Assembles the result.
-fn matching<const D: usize>(workspace: &DriftWorkspace<D>) -> Matching<D> {
-    let [model_len, target_len] = workspace.lengths();
-    let posterior = posterior(workspace);
-    let assignment = pairs(&posterior, model_len, target_len);
-    let scale = workspace.target_frame.scale;
-    let (mut soft, mut confidence, mut covariance) =
-        (SoftMatches::default(), Vec::new(), Vec::new());
-    for (m, partner) in assignment.iter().enumerate() {
-        // Soft matches below this weight are left out.
-        let row: Vec<(usize, f64)> = (0..target_len)
-            .map(|n| (n, posterior[n * model_len + m]))
-            .filter(|p| p.1 > 1e-4)
-            .collect();
-        let mass = row.iter().map(|p| p.1).sum::<f64>();
-        // Many targets may have one model point; a row of M has sum one.
-        let share = |p: f64| p / mass.max(1.0);
-        soft.push_row(row.iter().map(|&(n, p)| (n, share(p))));
-        let sure = partner.map_or(1.0 - mass.min(1.0), |n| share(posterior[n * model_len + m]));
-        confidence.push(sure.clamp(0.0, 1.0));
-        // The spread of the soft matches about their mean, and the noise σ² of the mixture.
-        let spread = spread(row.iter().map(|&(n, p)| (at(&workspace.target.0, n), p)));
-        let noise = SMatrix::identity() * workspace.sigma2;
-        covariance.push((spread + noise) * (scale * scale));
-    }
-    let (unmatched_model, unmatched_target) = unmatched_rows(&assignment, target_len);
-    Matching {
-        warp: Box::new(workspace.warp()),
-        warped: workspace.warped(),
-        confidence,
-        soft,
-        unmatched_model,
-        unmatched_target,
-        displacement_covariance: covariance,
-        transformation: None,
-        energy: workspace.energy.to_vec(),
-        report: report(workspace, &assignment),
-        assignment,
-    }
-}
-
-fn report<const D: usize>(
-    workspace: &DriftWorkspace<D>,
-    assignment: &[Option<usize>],
-) -> MatchReport {
-    let squares = assignment
-        .iter()
-        .enumerate()
-        .filter_map(|(m, n)| n.map(|n| (m, n)))
-        .map(|(m, n)| (at(&workspace.moved.0, m) - at(&workspace.target.0, n)).norm_squared());
-    let (count, sum) = squares.fold((0.0_f64, 0.0), |(count, sum), s| (count + 1.0, sum + s));
-    let scale = workspace.target_frame.scale;
-    MatchReport {
-        stop: workspace.stop,
-        iterations: workspace.energy.len(),
-        starts: 1,
-        residual: scale * (sum / count.max(1.0)).sqrt(),
-        sigma: scale * workspace.sigma2.sqrt(),
-        judgement: Judgement::NotJudged,
-    }
 }
 
 #[cfg(test)]

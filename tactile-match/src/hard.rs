@@ -1,14 +1,11 @@
-//! From pairs alone to a [`Matching`]: what nearest neighbours and linear assignment have in
-//! common.
+//! Pairs by distance alone: nearest neighbours and linear assignment.
 
 use crate::error::{point_sets, valid_distance};
-use crate::{Frame, spread};
-use crate::{
-    Judgement, MatchError, MatchReport, Matching, PointMatcher, SoftMatches, StopReason,
-    linear_assignment, unmatched_rows,
-};
+use crate::frame::{Frame, spread};
+use crate::interpolation::spline;
+use crate::{Judgement, MatchError, Matching, PointMatcher, StopReason, linear_assignment};
 use nalgebra::{DMatrix, Point, SVector};
-use tactile_tps::{Affine, Factorization, FitOptions, NegR, R2LogR, Smoothing, TpsError, Warp};
+use tactile_tps::{Affine, Smoothing, Warp};
 
 /// Both sets in one frame, with all squared distances between them.
 struct Distances<const D: usize> {
@@ -77,49 +74,26 @@ fn matching<const D: usize>(
     let total: f64 = pairs.iter().map(|&(i, j)| distances.squared[(i, j)]).sum();
     let variance = total / (pairs.len().max(1) * D) as f64;
     let scale = distances.frame.scale;
-    let (mut soft, mut confidence, mut covariance) =
-        (SoftMatches::default(), Vec::new(), Vec::new());
-    for (i, partner) in assignment.iter().enumerate() {
-        let p = distances.posterior(i, variance);
-        confidence.push(partner.map_or(0.0, |j| p[j]));
-        let places = distances.target.iter().copied().zip(p.iter().copied());
-        covariance.push(spread(places) * (scale * scale));
-        // Soft matches below this weight are left out.
-        let kept = p
-            .iter()
-            .enumerate()
-            .filter(|(_, p)| partner.is_some() && **p > 1e-4);
-        soft.push_row(kept.map(|(j, &p)| (j, p)));
-    }
     let sources: Vec<_> = pairs.iter().map(|&(i, _)| model[i]).collect();
     let images: Vec<_> = pairs.iter().map(|&(_, j)| target[j]).collect();
     let (warp, warped) = through(model, &sources, &images);
-    let squares = pairs
-        .iter()
-        .map(|&(i, j)| (warped[i] - target[j]).norm_squared());
-    let residual = (squares.sum::<f64>() / pairs.len().max(1) as f64).sqrt();
-    let (unmatched_model, unmatched_target) = unmatched_rows(&assignment, target.len());
-    let judgement = Judgement::of_pairs(model, target, &assignment);
-    Matching {
-        warp,
-        warped,
-        assignment,
-        confidence,
-        soft,
-        unmatched_model,
-        unmatched_target,
-        displacement_covariance: covariance,
-        transformation: None,
-        energy: vec![total * scale * scale],
-        report: MatchReport {
-            stop: StopReason::Converged,
-            iterations: 1,
-            starts: 1,
-            residual,
-            sigma: 0.0,
-            judgement,
-        },
+    let mut found = Matching::new(target, warp, warped, assignment);
+    for (i, partner) in found.assignment.iter().enumerate() {
+        let p = distances.posterior(i, variance);
+        found.confidence.push(partner.map_or(0.0, |j| p[j]));
+        let places = distances.target.iter().copied().zip(p.iter().copied());
+        let covariance = spread(places) * (scale * scale);
+        found.displacement_covariance.push(covariance);
+        // Soft matches below this weight are left out.
+        let kept = p.iter().copied().enumerate();
+        let kept = kept.filter(|(_, p)| partner.is_some() && *p > 1e-4);
+        found.soft.push_row(kept);
     }
+    found.energy = vec![total * scale * scale];
+    found.report.judgement = Judgement::of_pairs(model, target, &found.assignment);
+    (found.report.stop, found.report.iterations) = (StopReason::Converged, 1);
+    found.report.sigma = 0.0;
+    found
 }
 
 /// The spline through these pairs and where it takes the model. Where that is beyond all numbers,
@@ -145,128 +119,6 @@ fn through<const D: usize>(
         return (Box::new(affine), warped);
     }
     (Box::new(Affine::default()), model.to_vec())
-}
-
-/// The factorised thin-plate system of some sources: `r² ln r²` in the plane, `−r` in space.
-#[derive(Clone, Debug)]
-enum System<const D: usize> {
-    Plane(Box<Factorization<D, R2LogR>>),
-    Space(Box<Factorization<D, NegR>>),
-}
-
-/// Interpolation between one set of sources and any images of them: factorised once.
-#[derive(Clone, Debug)]
-pub(crate) struct Interpolation<const D: usize> {
-    /// None where the sources determine no spline.
-    system: Option<System<D>>,
-    weights: Option<Vec<f64>>,
-    smoothing: Smoothing,
-}
-
-impl<const D: usize> Interpolation<D> {
-    pub(crate) fn new(
-        sources: &[Point<f64, D>],
-        weights: Option<Vec<f64>>,
-        smoothing: Smoothing,
-    ) -> Self {
-        fn options<K>(
-            kernel: K,
-            smoothing: Smoothing,
-            weights: &Option<Vec<f64>>,
-        ) -> Result<FitOptions<K>, TpsError> {
-            let options = FitOptions::new(kernel).with_smoothing(smoothing)?;
-            match weights {
-                Some(weights) => options.with_weights(weights.clone()),
-                None => Ok(options),
-            }
-        }
-        let system = if D == 2 {
-            let plane = options(R2LogR, smoothing, &weights)
-                .and_then(|options| Factorization::new(sources, &options));
-            plane.ok().map(|plane| System::Plane(Box::new(plane)))
-        } else {
-            let space = options(NegR, smoothing, &weights)
-                .and_then(|options| Factorization::new(sources, &options));
-            space.ok().map(|space| System::Space(Box::new(space)))
-        };
-        Self {
-            system,
-            weights,
-            smoothing,
-        }
-    }
-
-    /// The spline through these pairs. An affine map where they determine none, the identity where
-    /// there are none.
-    pub(crate) fn through(
-        &self,
-        sources: &[Point<f64, D>],
-        images: &[Point<f64, D>],
-    ) -> Box<dyn Warp<D> + Send + Sync> {
-        let spline: Option<Box<dyn Warp<D> + Send + Sync>> = match &self.system {
-            Some(System::Plane(plane)) => {
-                plane.fit(images).ok().map(|spline| Box::new(spline) as _)
-            }
-            Some(System::Space(space)) => {
-                space.fit(images).ok().map(|spline| Box::new(spline) as _)
-            }
-            None => None,
-        };
-        let exact = self.smoothing == Smoothing::None;
-        let share = if exact { 1e-3 } else { f64::INFINITY };
-        spline
-            .filter(|spline| follows(&**spline, sources, images, share))
-            .unwrap_or_else(|| {
-                let affine = Affine::fit(sources, images, self.weights.as_deref());
-                Box::new(affine.unwrap_or_else(|_| Affine::default()))
-            })
-    }
-}
-
-/// The warp of weighted pairs: a spline smoothed by cross-validation, an affine map for few of
-/// them, a rigid motion for fewer, the identity for none.
-pub(crate) fn fitted<const D: usize>(
-    sources: &[Point<f64, D>],
-    images: &[Point<f64, D>],
-    weights: Vec<f64>,
-) -> Box<dyn Warp<D> + Send + Sync> {
-    if sources.len() >= 3 * (D + 1) {
-        return spline(sources, images, Some(weights), Smoothing::Gcv);
-    }
-    let fit = if sources.len() > D {
-        Affine::fit
-    } else {
-        Affine::fit_rigid
-    };
-    Box::new(fit(sources, images, Some(&weights)).unwrap_or_default())
-}
-
-/// The thin-plate spline through these pairs. See [`Interpolation`].
-pub(crate) fn spline<const D: usize>(
-    sources: &[Point<f64, D>],
-    images: &[Point<f64, D>],
-    weights: Option<Vec<f64>>,
-    smoothing: Smoothing,
-) -> Box<dyn Warp<D> + Send + Sync> {
-    Interpolation::new(sources, weights, smoothing).through(sources, images)
-}
-
-/// Whether a warp takes the sources to these images, to a share of the size: where sources nearly
-/// coincide and their images do not, no digit is left in a spline.
-pub(crate) fn follows<const D: usize>(
-    warp: &(dyn Warp<D> + Send + Sync),
-    sources: &[Point<f64, D>],
-    images: &[Point<f64, D>],
-    share: f64,
-) -> bool {
-    let size = images.iter().fold(0.0_f64, |m, p| m.max(p.coords.amax()));
-    // All at once: a spline samples points several at a time.
-    let mut found = sources.to_vec();
-    warp.apply_into(sources, &mut found).is_ok()
-        && found.iter().zip(images).all(|(found, image)| {
-            let miss = (found - image).amax();
-            miss.is_finite() && (share.is_infinite() || miss <= size * share)
-        })
 }
 
 /// Gives every model point the target point nearest to it. Of several model points that want one

@@ -6,8 +6,8 @@
 
 use crate::softassign::SoftassignWorkspace;
 use crate::{
-    AnnealedSoftassign, CoherentPointDrift, DriftWorkspace, MatchError, MatchedPairs, Matching,
-    PointMatcher, RelaxationLabelling, WarmStart,
+    AnnealedSoftassign, CoherentPointDrift, MatchError, MatchedPairs, Matching, PointMatcher,
+    RelaxationLabelling, WarmStart,
 };
 use nalgebra::Point;
 use std::any::Any;
@@ -41,8 +41,6 @@ type Search<const D: usize> = fn(
     &mut SoftassignWorkspace<D>,
     &mut dyn FnMut(usize, f64) -> ControlFlow<()>,
 );
-type Register<const D: usize> =
-    fn(&CoherentPointDrift, &mut DriftWorkspace<D>, &[Point<f64, D>], &[Point<f64, D>]) -> Found<D>;
 
 type Both<M> = Instances<Once<M, 2>, Once<M, 3>>;
 static SOFTASSIGN: Both<AnnealedSoftassign> =
@@ -55,8 +53,8 @@ static NEXT_PAIRS: Instances<NextPairs<2>, NextPairs<3>> = Instances(
 );
 static SEARCH: Instances<Search<2>, Search<3>> =
     Instances(AnnealedSoftassign::solve, AnnealedSoftassign::solve);
-static DRIFT: Instances<Register<2>, Register<3>> =
-    Instances(CoherentPointDrift::register, CoherentPointDrift::register);
+static DRIFT: Both<CoherentPointDrift> =
+    Instances(CoherentPointDrift::once, CoherentPointDrift::once);
 static LABELLING: Both<RelaxationLabelling> =
     Instances(RelaxationLabelling::once, RelaxationLabelling::once);
 
@@ -97,15 +95,9 @@ impl<const D: usize> PointMatcher<D> for AnnealedSoftassign {
     }
 }
 
-impl CoherentPointDrift {
-    /// The registration, compiled with this crate.
-    pub(crate) fn register_in<const D: usize>(
-        &self,
-        workspace: &mut DriftWorkspace<D>,
-        model: &[Point<f64, D>],
-        target: &[Point<f64, D>],
-    ) -> Found<D> {
-        DRIFT.of::<Register<D>>(D)?(self, workspace, model, target)
+impl<const D: usize> PointMatcher<D> for CoherentPointDrift {
+    fn match_points(&self, model: &[Point<f64, D>], target: &[Point<f64, D>]) -> Found<D> {
+        DRIFT.of::<Once<Self, D>>(D)?(self, model, target)
     }
 }
 

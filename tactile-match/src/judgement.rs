@@ -1,7 +1,7 @@
 //! Whether the pairs of an answer are to be relied on: doubts with their names, and the judgement of
 //! pairs that come without a likelihood.
 
-use crate::centre_and_radius;
+use crate::frame::centre_and_radius;
 use nalgebra::{Point, SMatrix, SVector};
 use tactile_core::statistics::median;
 

@@ -1,7 +1,8 @@
 //! What every matcher takes and returns: [`PointMatcher`], [`Matching`] and its [`MatchReport`].
 
 use crate::error::{option_within, point_sets};
-use crate::{Doubt, FittedTransformation, Judgement, MatchError, hard};
+use crate::interpolation::fitted;
+use crate::{Doubt, FittedTransformation, Judgement, MatchError};
 use nalgebra::{Point, SMatrix};
 use std::ops::Deref;
 use tactile_core::StopReason;
@@ -269,6 +270,43 @@ pub struct Matching<const D: usize> {
 }
 
 impl<const D: usize> Matching<D> {
+    /// The match of an assignment, under a warp that takes the model to `warped`. No soft matches,
+    /// confidences and covariances yet.
+    pub(crate) fn new(
+        target: &[Point<f64, D>],
+        warp: Box<dyn Warp<D> + Send + Sync>,
+        warped: Vec<Point<f64, D>>,
+        assignment: Vec<Option<usize>>,
+    ) -> Self {
+        let mut taken = vec![false; target.len()];
+        let mut squares = Vec::new();
+        for (i, j) in assignment.iter().enumerate() {
+            let Some(j) = *j else { continue };
+            taken[j] = true;
+            squares.push((warped[i] - target[j]).norm_squared());
+        }
+        let residual = (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt();
+        let unmatched = (0..assignment.len()).filter(|&i| assignment[i].is_none());
+        Self {
+            warp,
+            warped,
+            confidence: Vec::new(),
+            soft: SoftMatches::default(),
+            unmatched_model: unmatched.collect(),
+            unmatched_target: (0..target.len()).filter(|&j| !taken[j]).collect(),
+            displacement_covariance: Vec::new(),
+            transformation: None,
+            energy: Vec::new(),
+            report: MatchReport {
+                starts: 1,
+                residual,
+                sigma: residual / (D as f64).sqrt(),
+                ..MatchReport::default()
+            },
+            assignment,
+        }
+    }
+
     /// The match of these pairs, each (model row, target row, confidence in [0, 1]), as a matcher
     /// of your own may return it.
     ///
@@ -319,36 +357,19 @@ impl<const D: usize> Matching<D> {
         let images: Vec<_> = pairs.iter().map(|&(_, j, _)| target[j]).collect();
         // A confidence of zero would take the pair out of the fit.
         let weights: Vec<f64> = pairs.iter().map(|&(_, _, c)| c.max(1e-3)).collect();
-        let warp = hard::fitted(&sources, &images, weights.clone());
+        let warp = fitted(&sources, &images, weights.clone());
         let warped: Vec<_> = model.iter().map(|p| warp.apply(p)).collect();
-        let residuals = pairs.iter().map(|&(i, j, _)| target[j] - warped[i]);
-        let (mut squares, mut scatter) = (0.0, SMatrix::zeros());
-        for (residual, weight) in residuals.zip(&weights) {
-            squares += residual.norm_squared();
+        let mut scatter = SMatrix::zeros();
+        for (&(i, j, _), weight) in pairs.iter().zip(&weights) {
+            let residual = target[j] - warped[i];
             scatter += residual * residual.transpose() * *weight;
         }
         let covariance = scatter / weights.iter().sum::<f64>().max(f64::MIN_POSITIVE);
-        let residual = (squares / pairs.len().max(1) as f64).sqrt();
-        let (unmatched_model, unmatched_target) = unmatched_rows(&assignment, target.len());
-        Ok(Self {
-            warp,
-            warped,
-            assignment,
-            confidence,
-            soft: rows.into_iter().collect(),
-            unmatched_model,
-            unmatched_target,
-            displacement_covariance: vec![covariance; model.len()],
-            transformation: None,
-            energy: Vec::new(),
-            report: MatchReport {
-                stop: StopReason::Direct,
-                starts: 1,
-                residual,
-                sigma: residual / (D as f64).sqrt(),
-                ..MatchReport::default()
-            },
-        })
+        let mut found = Self::new(target, warp, warped, assignment);
+        (found.confidence, found.soft) = (confidence, rows.into_iter().collect());
+        found.displacement_covariance = vec![covariance; model.len()];
+        found.report.stop = StopReason::Direct;
+        Ok(found)
     }
 
     /// The pairs, each (model row, target row, confidence), by rising model row.
@@ -365,22 +386,6 @@ impl<const D: usize> Matching<D> {
         let rows = self.assignment.iter().zip(&self.confidence).enumerate();
         rows.filter_map(|(i, (j, &confidence))| Some((i, (*j)?, confidence)))
     }
-}
-
-/// Rows without a partner on both sides, `(model, target)`, ascending, for `target_len` target
-/// points.
-pub(crate) fn unmatched_rows(
-    assignment: &[Option<usize>],
-    target_len: usize,
-) -> (Vec<usize>, Vec<usize>) {
-    let mut taken = vec![false; target_len];
-    for &row in assignment.iter().flatten() {
-        taken[row] = true;
-    }
-    let model = (0..assignment.len())
-        .filter(|&i| assignment[i].is_none())
-        .collect();
-    (model, (0..target_len).filter(|&j| !taken[j]).collect())
 }
 
 /// The match matrix `M` without its slack row and column, in compressed rows: for every model point

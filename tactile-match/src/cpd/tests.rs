@@ -1,29 +1,6 @@
 //! Tests of the building blocks.
 
 use super::*;
-use crate::common::{bend, scattered};
-
-#[test]
-fn a_used_workspace_forgets_the_last_match_and_registers_without_allocating() {
-    let options = CoherentPointDrift::default();
-    let mut workspace = DriftWorkspace::default();
-    let sets: Vec<_> = [(40, 5), (20, 6), (40, 7)]
-        .into_iter()
-        .map(|(n, seed)| scattered::<3>(n, seed))
-        .map(|model| (bend(&model, 0.05), model))
-        .collect();
-    for (target, model) in &sets {
-        let again = options.match_with(&mut workspace, model, target).unwrap();
-        let anew = options.match_points(model, target).unwrap();
-        assert_eq!(again.warped, anew.warped);
-    }
-    let counted = allocation_counter::measure(|| {
-        for (target, model) in &sets {
-            workspace.register(&options, model, target);
-        }
-    });
-    assert_eq!(counted.count_total, 0);
-}
 
 /// Two units in the last place: the polynomial's own rounding and that of the product with the
 /// power of two's reduction.

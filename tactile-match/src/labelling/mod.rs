@@ -34,11 +34,9 @@
 mod relaxation;
 
 use crate::error::{at_least_one, option_within, point_sets};
-use crate::{Frame, spread};
-use crate::{
-    Judgement, MatchError, MatchReport, Matching, SoftMatches, StopReason, hard, linear_assignment,
-    unmatched_rows,
-};
+use crate::frame::{Frame, spread};
+use crate::interpolation::spline;
+use crate::{Judgement, MatchError, Matching, StopReason, linear_assignment};
 use nalgebra::{Point, SVector};
 use relaxation::{MatchMatrix, NeighbourGraph, energy, relax};
 use tactile_tps::Smoothing;
@@ -443,7 +441,7 @@ impl<const D: usize> Run<D> {
         }
         let sources: Vec<_> = kept.iter().map(|&i| self.model[i]).collect();
         let images: Vec<_> = kept.iter().map(|&i| Point::from(means[i])).collect();
-        let warp = hard::spline(
+        let warp = spline(
             &sources,
             &images,
             Some(kept.iter().map(|&i| weights[i]).collect()),
@@ -485,48 +483,27 @@ impl<const D: usize> Run<D> {
             .collect();
         // The spline's values determine it: interpolating them gives it back in the units of the
         // caller.
-        let warp = hard::spline(model, &positions, None, Smoothing::None);
+        let warp = spline(model, &positions, None, Smoothing::None);
         let warped: Vec<_> = model.iter().map(|p| warp.apply(p)).collect();
-        let mut soft = SoftMatches::default();
-        let (mut confidence, mut covariance) = (Vec::new(), Vec::new());
-        for (i, partner) in assignment.iter().enumerate() {
+        let mut found = Matching::new(target, warp, warped, assignment);
+        for (i, partner) in found.assignment.iter().enumerate() {
             let row = &self.matches.row(i)[..target.len()];
             // Sinkhorn's normalisation ends with the columns: a row may sum to a little more than
             // one.
             let sum = self.matches.row(i).iter().sum::<f64>().max(1.0);
             // Soft matches below this weight are left out.
             let kept = row.iter().copied().enumerate().filter(|p| p.1 > 1e-4);
-            soft.push_row(kept.map(|(j, p)| (j, p / sum)));
-            confidence.push(partner.map_or(self.matches[(i, target.len())], |j| row[j]) / sum);
+            found.soft.push_row(kept.map(|(j, p)| (j, p / sum)));
+            let sure = partner.map_or(self.matches[(i, target.len())], |j| row[j]);
+            found.confidence.push(sure / sum);
             let places = target.iter().map(|y| y - target[0]);
-            covariance.push(spread(places.zip(row.iter().copied())));
+            let covariance = spread(places.zip(row.iter().copied()));
+            found.displacement_covariance.push(covariance);
         }
-        let pairs = assignment.iter().zip(&warped);
-        let squares: Vec<f64> = pairs
-            .filter_map(|(j, w)| Some((w - target[(*j)?]).norm_squared()))
-            .collect();
-        let residual = (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt();
-        let (unmatched_model, unmatched_target) = unmatched_rows(&assignment, target.len());
-        let report = MatchReport {
-            stop: self.stop,
-            iterations: self.energy.len(),
-            starts: 1,
-            residual,
-            sigma: residual / (D as f64).sqrt(),
-            judgement: Judgement::of_pairs(model, target, &assignment),
-        };
-        Matching {
-            warp,
-            warped,
-            assignment,
-            confidence,
-            soft,
-            unmatched_model,
-            unmatched_target,
-            displacement_covariance: covariance,
-            transformation: None,
-            energy: self.energy,
-            report,
-        }
+        found.report.judgement = Judgement::of_pairs(model, target, &found.assignment);
+        found.report.stop = self.stop;
+        found.report.iterations = self.energy.len();
+        found.energy = self.energy;
+        found
     }
 }

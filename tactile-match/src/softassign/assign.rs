@@ -1,8 +1,46 @@
 //! Soft assignment: affinities, Sinkhorn normalisation and the moments of the rows, over blocks of
 //! near targets.
 
-use super::{Gaussian, RowMoments, SoftAssignment};
 use tactile_core::vectorised;
+
+/// What the affinities are: `exp(−s |yᵢ − tⱼ|²/2σ²)`.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Gaussian {
+    /// The variance σ².
+    pub variance: f64,
+    /// The power s that they are raised to.
+    pub sharpness: f64,
+}
+
+/// Sums over the rows of M.
+#[derive(Clone, Debug, Default)]
+pub(super) struct RowMoments<const D: usize> {
+    /// Row sums without the slack.
+    pub weight: Vec<f64>,
+    /// Mean of `tⱼ − yᵢ` under row i.
+    pub shift: Vec<[f64; D]>,
+    /// Sum of `m_ij |tⱼ − yᵢ|²` over row i.
+    pub spread: Vec<f64>,
+}
+
+/// The match matrix in factored form, with the moments of its rows. Columns stand in the order of
+/// the blocks.
+#[derive(Clone, Debug, Default)]
+pub(super) struct SoftAssignment<const D: usize> {
+    pub blocks: Blocks<D>,
+    /// Affinities so much fainter than the largest there can be are left out.
+    pub faintest: f64,
+    /// Where the blocks of every row begin in `active`, and one past the last.
+    pub starts: Vec<usize>,
+    pub active: Vec<u32>,
+    pub reach: Vec<f32>,
+    pub kernel: Vec<f32>,
+    pub row_scale: Vec<f32>,
+    pub column_scale: Vec<f32>,
+    pub column_sum: Vec<f32>,
+    /// Moments of the rows.
+    pub moments: RowMoments<D>,
+}
 
 // Soft assignment: the match matrix M from distances, made doubly stochastic with slack (Sinkhorn).
 //
@@ -267,7 +305,7 @@ const MOST_BOXES: usize = 256;
 #[derive(Clone, Debug, Default)]
 pub(super) struct Blocks<const D: usize> {
     /// Which point stands at every place.
-    pub(super) order: Vec<usize>,
+    pub order: Vec<usize>,
     axes: Vec<f32>,
     /// The boxes of the blocks, then those of [`GROUP`] boxes of the level before.
     levels: Vec<Boxes>,

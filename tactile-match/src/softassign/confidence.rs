@@ -1,10 +1,26 @@
 //! From the last soft assignment to the answer: hard matches, confidences, positions and
 //! covariances.
 
-use super::{Annealer, Answer, Mechanism, Slack, SoftAssignment, State};
+use super::Mechanism;
+use super::assign::SoftAssignment;
+use super::options::Slack;
+use super::run::{Annealer, State};
 use super::{difference, dot, squared, squared_distance};
 use crate::{Doubt, Outliers, linear_assignment};
 use std::f64::consts::TAU;
+
+/// The answer in the frame's units.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Answer<const D: usize> {
+    pub warped: Vec<[f64; D]>,
+    pub assignment: Vec<Option<usize>>,
+    pub confidence: Vec<f64>,
+    /// Posterior variance of the positions, along one axis.
+    pub variance: Vec<f64>,
+    pub residual: f64,
+    pub column_best: Vec<(f64, usize)>,
+    pub odds: PairOdds,
+}
 
 /// Residuals below this, in radii of the model and in spacings, are what the prior's factor leaves
 /// out: the data are clean.

@@ -1,11 +1,12 @@
 //! Residuals below what the annealing resolves: are they noise, and where do the points go then?
 
-use super::kernels::cholesky;
+use super::run::State;
 use super::search::is_cold;
-use super::{AnnealedSoftassign, Mechanism, Search, SoftassignWorkspace, State, Transformation};
+use super::{AnnealedSoftassign, Mechanism, Search, SoftassignWorkspace, Transformation};
 use super::{difference, in_space, squared, squared_distance};
-use crate::hard;
+use crate::hard::nearest;
 use crate::judgement::median_of_chi_squared;
+use crate::kernels::cholesky;
 use nalgebra::{Matrix4, Matrix4x3, RowVector4, SVector};
 use tactile_core::{statistics::median, vectorised};
 
@@ -134,7 +135,7 @@ impl<const D: usize> FineFit<D> {
         }
         self.pairs.retain_mut(|pair| {
             let nearest = |place: &[f64; D], points: &[[f64; D]]| {
-                hard::nearest(points.iter().map(|p| squared_distance(place, p))).0
+                nearest(points.iter().map(|p| squared_distance(place, p))).0
             };
             pair.1 = nearest(&warped[pair.0], target);
             nearest(&target[pair.1], warped) == pair.0

@@ -1,12 +1,12 @@
 //! Large sets, coarse to fine.
 
 use super::assign::Blocks;
-use super::model::Prior;
+use super::run::{Annealer, Cooling, Schedule, State};
 use super::search::{FAST, MAX_PATTERN_REACH, SCALES, warmth};
 use super::{
-    AnnealedSoftassign, Annealer, Axes, Cooling, Mechanism, Rotation, Schedule,
-    SoftassignWorkspace, State, squared_distance, starts,
+    AnnealedSoftassign, Mechanism, Rotation, SoftassignWorkspace, squared_distance, starts,
 };
+use crate::gaussian_process::{Axes, Prior};
 use std::ops::ControlFlow;
 
 // Large sets, coarse to fine.

@@ -28,40 +28,37 @@
 //! pairs are a few hundred a point. Everything else is computed in double precision, whatever the
 //! type of the points.
 
-mod anneal;
 mod assign;
 mod confidence;
 mod correspond;
 mod fine;
-mod kernels;
 mod large;
-mod model;
 mod motion;
 mod options;
 mod patterns;
 mod result;
 mod rigid;
 mod rivals;
+mod run;
+mod scales;
 mod search;
 mod starts;
 
 pub use options::{AnnealedSoftassign, Mechanism, Outliers, Rotation, Search, Transformation};
 pub use result::SoftassignMatch;
 
-use crate::{Axes, centre_and_radius};
+use crate::frame::centre_and_radius;
 use crate::{Doubt, MatchError, MatchedPairs, Matching, WarmStart, error};
-use assign::Blocks;
-use confidence::PairOdds;
+use confidence::Answer;
 use correspond::Correspondence;
 use fine::FineFit;
-use kernels::Stripe;
 use large::Levels;
-use model::{Prior, ScaleAverage};
 use motion::Motions;
 use nalgebra::{Point, SVector, Vector3};
-use patterns::{Candidate, Cells, Consensus, GatedNearest};
+use patterns::{Consensus, LocalPatterns};
 use result::Series;
-use rigid::RigidFit;
+use run::{Annealer, State};
+use scales::ScaleAverage;
 use starts::Tuples;
 use std::ops::ControlFlow;
 
@@ -273,97 +270,6 @@ impl AnnealedSoftassign {
     }
 }
 
-/// Points without a partner: their expected share, and how far each side may have them.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Slack {
-    share: f64,
-    model: f64,
-    target: f64,
-}
-
-/// How the temperature of a run falls.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Cooling {
-    /// First temperature, as a standard deviation in radii of the model.
-    sigma: f64,
-    /// Largest fall of σ an iteration, as a factor.
-    rate: f64,
-    /// Smallest fall of σ an iteration, as a factor. With 1 the residuals decide.
-    least: f64,
-    /// Iterations after which a temperature that no longer falls is the last.
-    patience: usize,
-    /// The same for the first temperature: a start colder than the noise.
-    stuck: usize,
-    /// Sinkhorn sweeps an iteration.
-    sweeps: usize,
-    /// Undecided matches stand still when residuals and temperature, as variances, differ by less
-    /// than this share.
-    still: f64,
-    /// Whether residuals count what the posterior of the warp leaves open. Without it the warp of a
-    /// few points follows their noise, and the temperature falls below it.
-    open: bool,
-}
-
-/// One annealing run.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Schedule {
-    cooling: Cooling,
-    /// Lowest temperature.
-    floor: f64,
-    /// Most iterations.
-    limit: usize,
-    /// A cold run that matches fewer points has collapsed and ends.
-    collapse: f64,
-    /// So many points can have a partner: with nearly all of them matched, residuals that no longer
-    /// fall are noise.
-    partners: f64,
-    /// What is expected of points without a partner.
-    slack: Slack,
-}
-
-/// Where a run stands.
-#[derive(Clone, Debug, Default)]
-struct State<const D: usize> {
-    /// Where the run's prior puts the model points.
-    base: Vec<[f64; D]>,
-    /// Where the warp puts them.
-    warped: Vec<[f64; D]>,
-    /// Standard deviation of the residuals along one axis.
-    sigma: f64,
-    /// Model points matched, in all.
-    matched: f64,
-    /// Iterations made.
-    iterations: usize,
-    /// Energy per model point after every iteration.
-    trace: Vec<f64>,
-    /// What the run is judged by. Less is better.
-    energy: f64,
-    /// Whether the temperature stopped falling before the limit.
-    settled: bool,
-    /// Whether the residuals are noise, however small.
-    noisy: bool,
-    /// Whether many points move farther than is allowed.
-    far: bool,
-    /// Share of the matched points whose residual the noise of the others does not explain, see
-    /// [`Annealer::tail`].
-    tail: f64,
-    /// Spread of the soft partners within a row, relative to the temperature: 1 undecided, 0
-    /// decided.
-    ambiguity: f64,
-}
-
-impl<const D: usize> State<D> {
-    fn copy_from(&mut self, other: &Self) {
-        self.base.clone_from(&other.base);
-        self.warped.clone_from(&other.warped);
-        self.trace.clone_from(&other.trace);
-        (self.sigma, self.iterations) = (other.sigma, other.iterations);
-        (self.energy, self.settled, self.matched) = (other.energy, other.settled, other.matched);
-        (self.tail, self.ambiguity) = (other.tail, other.ambiguity);
-        (self.noisy, self.far) = (other.noisy, other.far);
-    }
-}
-
 /// Beyond this many radii a coordinate is as good as at infinity, and its square is still finite in
 /// single precision.
 const FARTHEST: f64 = 1e12;
@@ -490,134 +396,4 @@ fn squared_distance<const D: usize>(a: &[f64; D], b: &[f64; D]) -> f64 {
 /// The vector with zeros for the dimensions that it lacks.
 fn in_space<const D: usize>(v: &SVector<f64, D>) -> Vector3<f64> {
     Vector3::from_fn(|k, _| if k < D { v[k] } else { 0.0 })
-}
-
-/// Scales of the prior, in radii of the model.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-struct PriorScales {
-    /// Length ℓ over which the warp bends.
-    length: f64,
-    /// Standard deviation τ of the bending displacement.
-    bending: f64,
-    /// Standard deviation τₐ of the affine part's entries.
-    affine: f64,
-}
-
-/// Displacements that the model points should have, and how much each counts. Both padded with
-/// zeros.
-#[derive(Clone, Copy)]
-struct Request<'a, const D: usize> {
-    weights: &'a [f64],
-    displacements: &'a Axes<D>,
-}
-
-/// What the affinities are: `exp(−s |yᵢ − tⱼ|²/2σ²)`.
-#[derive(Clone, Copy, Debug)]
-struct Gaussian {
-    /// The variance σ².
-    variance: f64,
-    /// The power s that they are raised to.
-    sharpness: f64,
-}
-
-/// Shared machinery of the runs: targets, prior, scratch.
-#[derive(Clone, Debug, Default)]
-struct Annealer<const D: usize> {
-    soft: SoftAssignment<D>,
-    prior: Prior,
-    regression: Regression<D>,
-    /// Takes the regression's place where the warp may not bend.
-    rigid: RigidFit<D>,
-    /// Volume of the targets' bounding box.
-    volume: f64,
-    /// Residuals up to this are what the prior's factor leaves out.
-    clean_sigma: f64,
-    /// The lowest temperature.
-    least_sigma: f64,
-    /// Runs are compared no finer than this.
-    resolution: f64,
-    weights: Vec<f64>,
-    residuals: Axes<D>,
-    predicted: Vec<[f64; D]>,
-    sums: Vec<f64>,
-    /// Spread of the soft partners within a row, relative to the temperature: 1 undecided, 0
-    /// decided.
-    ambiguity: f64,
-}
-
-/// The answer in the frame's units.
-#[derive(Clone, Debug, Default)]
-struct Answer<const D: usize> {
-    warped: Vec<[f64; D]>,
-    assignment: Vec<Option<usize>>,
-    confidence: Vec<f64>,
-    /// Posterior variance of the positions, along one axis.
-    variance: Vec<f64>,
-    residual: f64,
-    column_best: Vec<(f64, usize)>,
-    odds: PairOdds,
-}
-
-/// Sums over the rows of M.
-#[derive(Clone, Debug, Default)]
-struct RowMoments<const D: usize> {
-    /// Row sums without the slack.
-    weight: Vec<f64>,
-    /// Mean of `tⱼ − yᵢ` under row i.
-    shift: Vec<[f64; D]>,
-    /// Sum of `m_ij |tⱼ − yᵢ|²` over row i.
-    spread: Vec<f64>,
-}
-
-/// The match matrix in factored form, with the moments of its rows. Columns stand in the order of
-/// the blocks.
-#[derive(Clone, Debug, Default)]
-struct SoftAssignment<const D: usize> {
-    blocks: Blocks<D>,
-    /// Affinities so much fainter than the largest there can be are left out.
-    faintest: f64,
-    /// Where the blocks of every row begin in `active`, and one past the last.
-    starts: Vec<usize>,
-    active: Vec<u32>,
-    reach: Vec<f32>,
-    kernel: Vec<f32>,
-    row_scale: Vec<f32>,
-    column_scale: Vec<f32>,
-    column_sum: Vec<f32>,
-    /// Moments of the rows.
-    moments: RowMoments<D>,
-}
-
-/// Memory and answer of a regression.
-#[derive(Clone, Debug, Default)]
-struct Regression<const D: usize> {
-    gram: Vec<f64>,
-    solution: Vec<[f64; D]>,
-    weighted: Vec<f64>,
-    /// Stripe by stripe of rows, column by column.
-    whitened: Vec<Stripe>,
-    /// `ln det(1 + LᵀWL/σ²)`.
-    log_det: f64,
-    /// Displacements, one array an axis, padded like the prior's columns.
-    displacement: Axes<D>,
-    /// Their variances along one axis, once [`variances`](Self::variances) has been called.
-    variance: Vec<f64>,
-    noise: f64,
-    rank: usize,
-}
-
-/// Memory of the start.
-#[derive(Clone, Debug, Default)]
-struct LocalPatterns<const D: usize> {
-    /// Where candidates and where neighbours' targets are looked up.
-    targets: Cells<D>,
-    gated: GatedNearest<D>,
-    model: Cells<D>,
-    offsets: Vec<[f64; D]>,
-    distances: Vec<(f64, usize)>,
-    candidates: Vec<usize>,
-    best: Vec<Candidate>,
-    /// The likeliest target of every model point, with the probability that it is right.
-    pairs: Vec<(usize, f64)>,
-    spacing: f64,
 }

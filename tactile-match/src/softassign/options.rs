@@ -1,6 +1,5 @@
 //! What a caller knows of a scene: the options of the matcher.
 
-use super::Slack;
 use crate::MatchError;
 use crate::error::{at_least_one, option_within};
 #[cfg(feature = "rayon")]
@@ -11,6 +10,14 @@ use nalgebra::Point;
 use rayon::prelude::*;
 #[cfg(feature = "rayon")]
 use std::ops::ControlFlow;
+
+/// Points without a partner: their expected share, and how far each side may have them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Slack {
+    pub share: f64,
+    pub model: f64,
+    pub target: f64,
+}
 
 /// Weight of the slack on a side where no outliers are expected.
 const RARE: f64 = 0.01;

@@ -1,10 +1,27 @@
 //! Local patterns: which target a point is follows from where its neighbours come to lie. With the
 //! robust fit of doubtful pairs.
 
-use super::model::Prior;
-use super::{Annealer, Axes, LocalPatterns, PriorScales, State, difference, squared_distance};
+use super::run::{Annealer, State};
+use super::{difference, squared_distance};
+use crate::gaussian_process::{Axes, Prior, PriorScales};
 use nalgebra::{SMatrix, SVector};
 use std::f64::consts::TAU;
+
+/// Memory of the start.
+#[derive(Clone, Debug, Default)]
+pub(super) struct LocalPatterns<const D: usize> {
+    /// Where candidates and where neighbours' targets are looked up.
+    pub targets: Cells<D>,
+    pub gated: GatedNearest<D>,
+    pub model: Cells<D>,
+    pub offsets: Vec<[f64; D]>,
+    pub distances: Vec<(f64, usize)>,
+    pub candidates: Vec<usize>,
+    pub best: Vec<Candidate>,
+    /// The likeliest target of every model point, with the probability that it is right.
+    pub pairs: Vec<(usize, f64)>,
+    pub spacing: f64,
+}
 
 // A start for dense sets: which target a point is, is told by where its neighbours come to lie.
 //

@@ -3,16 +3,19 @@
 use super::assign::Blocks;
 use super::large::LARGE;
 use super::{AnnealedSoftassign, Frame, SoftassignWorkspace, mean, squared_distance};
-use crate::centre_and_radius;
-use crate::hard::{self, Interpolation};
+use crate::frame::centre_and_radius;
+use crate::interpolation::{Interpolation, follows, spline};
 use crate::{
-    FittedTransformation, Judgement, MatchError, MatchReport, MatchedPairs, Matching, SoftMatches,
-    StopReason, error, unmatched_rows,
+    FittedTransformation, Judgement, MatchError, MatchReport, MatchedPairs, Matching, StopReason,
+    error,
 };
 use nalgebra::{Point, SMatrix};
 use std::ops::ControlFlow;
 use std::sync::{Arc, OnceLock};
 use tactile_tps::{Smoothing, TpsError, Warp};
+
+/// Soft matches below this are not reported.
+const FAINTEST: f64 = 1e-3;
 
 // What a run of the matcher has found, read from its workspace.
 
@@ -108,44 +111,39 @@ impl<'w, const D: usize> SoftassignMatch<'w, D> {
         let (answer, frame) = (&workspace.answer, &workspace.frame);
         let mut warped: Vec<Point<f64, D>> = self.warped().collect();
         let warp = spline.through(&mut warped);
-        let (mut soft, mut row) = (SoftMatches::default(), Vec::new());
-        for i in 0..model.len() {
-            row.clear();
-            // Soft matches below this are not reported.
-            row.extend(
-                workspace
-                    .annealer
-                    .soft
-                    .entries(i)
-                    .filter(|&(_, p)| p > 1e-3),
-            );
-            row.sort_unstable_by_key(|entry| entry.0);
-            soft.push_row(row.iter().copied());
-        }
-        let rigid = &workspace.annealer.rigid;
         let matched = (0..model.len()).filter(|&i| answer.assignment[i].is_some());
-        let sigma = self.report.sigma;
+        let (rigid, sigma) = (&workspace.annealer.rigid, self.report.sigma);
         let transformation = rigid
             .is_active()
             .then(|| FittedTransformation::of(model, &warped, matched, sigma, rigid.grows()))
             .flatten();
+        let mut taken = vec![false; workspace.target.len()];
+        let partners = answer.assignment.iter().flatten();
+        partners.for_each(|&j| taken[j] = true);
+        let unmatched = (0..model.len()).filter(|&i| answer.assignment[i].is_none());
         let square = frame.scale * frame.scale;
         let covariance = |v: &f64| SMatrix::from_diagonal_element(v * square);
-        let (unmatched_model, unmatched_target) =
-            unmatched_rows(&answer.assignment, workspace.target.len());
         Matching {
             warp,
             warped,
             assignment: answer.assignment.clone(),
             confidence: answer.confidence.clone(),
-            soft,
-            unmatched_model,
-            unmatched_target,
+            soft: (0..model.len()).map(|i| self.soft_row(i)).collect(),
+            unmatched_model: unmatched.collect(),
+            unmatched_target: (0..taken.len()).filter(|&j| !taken[j]).collect(),
             displacement_covariance: answer.variance.iter().map(covariance).collect(),
             transformation,
             energy: workspace.best.trace.clone(),
             report: self.report.clone(),
         }
+    }
+
+    /// Soft matches of a model point, by target row.
+    fn soft_row(&self, i: usize) -> Vec<(usize, f64)> {
+        let entries = self.workspace.annealer.soft.entries(i);
+        let mut row: Vec<_> = entries.filter(|&(_, p)| p > FAINTEST).collect();
+        row.sort_unstable_by_key(|entry| entry.0);
+        row
     }
 }
 
@@ -323,11 +321,11 @@ fn warp_through<const D: usize>(
     let model = &sources.points;
     let exact = sources.system().through(model, warped);
     // To half the digits.
-    if hard::follows(&*exact, model, warped, (0.5 * f64::EPSILON).sqrt()) {
+    if follows(&*exact, model, warped, (0.5 * f64::EPSILON).sqrt()) {
         return exact;
     }
     // Smoothing of the spline where none goes through all positions.
-    let warp = hard::spline(model, warped, None, Smoothing::Lambda(1e-6));
+    let warp = spline(model, warped, None, Smoothing::Lambda(1e-6));
     // As many points in as out.
     let _ = warp.apply_into(model, warped);
     warp

@@ -1,7 +1,7 @@
 //! Rigid motions, similarities and affine maps in place of a warp that bends.
 
-use super::{Axes, FARTHEST, Regression, Transformation, in_space};
-use crate::BestMotion;
+use super::{FARTHEST, Transformation, in_space};
+use crate::gaussian_process::{Axes, Regression};
 use nalgebra::{Matrix3, Point, SMatrix, SVector, SymmetricEigen, Vector3};
 use tactile_tps::{Affine, Warp};
 
@@ -128,6 +128,48 @@ impl<const D: usize> RigidFit<D> {
             let displacement = std::array::from_fn(|k| image[k] - base[i][k]);
             (displacement, variance.min(FARTHEST))
         });
+    }
+}
+
+/// The rigid motion or similarity `x ↦ A (x − from) + to` of least weighted squares (Kabsch 1976;
+/// Umeyama 1991).
+struct BestMotion<const D: usize> {
+    linear: SMatrix<f64, D, D>,
+    from: SVector<f64, D>,
+    to: SVector<f64, D>,
+    /// `Σ wᵢ |xᵢ − from|²`.
+    extent: f64,
+}
+
+impl<const D: usize> BestMotion<D> {
+    /// `O(I)`. None without any weight, or of numbers that are not finite.
+    fn of(
+        sources: &[Point<f64, D>],
+        images: &[Point<f64, D>],
+        weights: &[f64],
+        scaled: bool,
+    ) -> Option<Self> {
+        let total: f64 = weights.iter().sum();
+        let fit = Affine::fit_rigid(sources, images, Some(weights)).ok();
+        let rotation = fit.filter(|_| total > 0.0)?.linear;
+        let mean = |points: &[Point<f64, D>]| -> SVector<f64, D> {
+            let rows = points.iter().zip(weights);
+            rows.map(|(p, w)| p.coords * (w / total)).sum()
+        };
+        let (from, to) = (mean(sources), mean(images));
+        let (mut along, mut extent) = (0.0, 0.0);
+        for ((x, y), w) in sources.iter().zip(images).zip(weights) {
+            let arm = x.coords - from;
+            along += w * (y.coords - to).dot(&(rotation * arm));
+            extent += w * arm.norm_squared();
+        }
+        let grows = scaled && extent > 0.0;
+        Some(Self {
+            linear: rotation * if grows { along / extent } else { 1.0 },
+            from,
+            to,
+            extent,
+        })
     }
 }
 

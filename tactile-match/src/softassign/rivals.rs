@@ -1,7 +1,8 @@
 //! Rivals of an answer: the model turned, mirrored or moved by a step of its lattice.
 
+use super::run::{Cooling, State};
 use super::search::{FAST, bounding_volume};
-use super::{AnnealedSoftassign, Cooling, Mechanism, Rotation, SoftassignWorkspace, State};
+use super::{AnnealedSoftassign, Mechanism, Rotation, SoftassignWorkspace};
 use super::{difference, mean, squared, squared_distance, starts};
 use crate::Doubt;
 use nalgebra::{SMatrix, SVector};

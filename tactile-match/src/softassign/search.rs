@@ -7,11 +7,13 @@
 //! prior.
 
 use super::confidence::{self, MIN_TELLING_GAIN};
-use super::model::AMPLITUDES;
+use super::run::{Cooling, Schedule};
+use super::scales::AMPLITUDES;
 use super::{
-    AnnealedSoftassign, BULK, Cooling, Mechanism, PriorScales, Rotation, Schedule, Search,
-    SoftassignWorkspace, Transformation, starts,
+    AnnealedSoftassign, BULK, Mechanism, Rotation, Search, SoftassignWorkspace, Transformation,
+    starts,
 };
+use crate::gaussian_process::PriorScales;
 use nalgebra::{SMatrix, SVector};
 use std::ops::ControlFlow;
 

@@ -5,8 +5,7 @@ use crate::common::{Stream, bend, largest_step, reordered, rotation, scattered};
 use nalgebra::{DMatrix, Point, Point2, Point3, SVector, Vector3};
 use proptest::prelude::*;
 use tactile_match::{
-    CoherentPointDrift, DriftWorkspace, MatchError, Matching, Normalization, PointMatcher,
-    StopReason,
+    CoherentPointDrift, MatchError, Matching, Normalization, PointMatcher, StopReason,
 };
 
 fn drift<const D: usize>(
@@ -184,28 +183,24 @@ fn outliers_are_left_without_a_partner() {
 fn the_warp_takes_the_model_along_and_its_jacobian_is_its_derivative() {
     let model = scattered::<3>(40, 9);
     let target = bend(&model, 0.05);
-    let mut workspace = DriftWorkspace::default();
-    {
-        let matcher = CoherentPointDrift::default();
-        let found = matcher.match_with(&mut workspace, &model, &target).unwrap();
-        let warp = &found.warp;
-        let images: Vec<_> = model.iter().map(|p| warp.apply(p)).collect();
-        // The pivots' triangular system has about the square root of the kernel's condition, 1e6.
+    let found = drift(CoherentPointDrift::default(), &model, &target);
+    let warp = &found.warp;
+    let images: Vec<_> = model.iter().map(|p| warp.apply(p)).collect();
+    // The pivots' triangular system has about the square root of the kernel's condition, 1e6.
+    assert!(
+        largest_step(&images, &found.warped) < 1e-9,
+        "{}",
+        largest_step(&images, &found.warped)
+    );
+    let (at, h) = (Point3::new(0.4, 0.3, 0.6), 1e-5);
+    let jacobian = warp.jacobian(&at);
+    for axis in 0..3 {
+        let step = Vector3::ith(axis, h);
+        let slope = (warp.apply(&(at + step)) - warp.apply(&(at - step))) / (2.0 * h);
         assert!(
-            largest_step(&images, &found.warped) < 1e-9,
-            "{}",
-            largest_step(&images, &found.warped)
+            (slope - jacobian.column(axis)).norm() < 1e-7,
+            "central difference of order h², rounding 1e-16/h"
         );
-        let (at, h) = (Point3::new(0.4, 0.3, 0.6), 1e-5);
-        let jacobian = warp.jacobian(&at);
-        for axis in 0..3 {
-            let step = Vector3::ith(axis, h);
-            let slope = (warp.apply(&(at + step)) - warp.apply(&(at - step))) / (2.0 * h);
-            assert!(
-                (slope - jacobian.column(axis)).norm() < 1e-7,
-                "central difference of order h², rounding 1e-16/h"
-            );
-        }
     }
 }
 

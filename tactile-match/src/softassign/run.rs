@@ -1,11 +1,122 @@
 //! One annealing run: soft assignment at a falling temperature, then the warp that it asks for.
 
+use super::assign::{Gaussian, SoftAssignment};
 use super::difference;
-use super::{Annealer, Gaussian, Request, Schedule, Slack, State};
+use super::options::Slack;
+use super::rigid::RigidFit;
+use crate::gaussian_process::{Axes, Prior, Regression, Request};
 use crate::judgement::median_of_chi_squared;
 use std::f64::consts::TAU;
 use std::ops::ControlFlow;
 use tactile_core::statistics::median;
+
+/// How the temperature of a run falls.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Cooling {
+    /// First temperature, as a standard deviation in radii of the model.
+    pub sigma: f64,
+    /// Largest fall of σ an iteration, as a factor.
+    pub rate: f64,
+    /// Smallest fall of σ an iteration, as a factor. With 1 the residuals decide.
+    pub least: f64,
+    /// Iterations after which a temperature that no longer falls is the last.
+    pub patience: usize,
+    /// The same for the first temperature: a start colder than the noise.
+    pub stuck: usize,
+    /// Sinkhorn sweeps an iteration.
+    pub sweeps: usize,
+    /// Undecided matches stand still when residuals and temperature, as variances, differ by less
+    /// than this share.
+    pub still: f64,
+    /// Whether residuals count what the posterior of the warp leaves open. Without it the warp of a
+    /// few points follows their noise, and the temperature falls below it.
+    pub open: bool,
+}
+
+/// One annealing run.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Schedule {
+    pub cooling: Cooling,
+    /// Lowest temperature.
+    pub floor: f64,
+    /// Most iterations.
+    pub limit: usize,
+    /// A cold run that matches fewer points has collapsed and ends.
+    pub collapse: f64,
+    /// So many points can have a partner: with nearly all of them matched, residuals that no longer
+    /// fall are noise.
+    pub partners: f64,
+    /// What is expected of points without a partner.
+    pub slack: Slack,
+}
+
+/// Where a run stands.
+#[derive(Clone, Debug, Default)]
+pub(super) struct State<const D: usize> {
+    /// Where the run's prior puts the model points.
+    pub base: Vec<[f64; D]>,
+    /// Where the warp puts them.
+    pub warped: Vec<[f64; D]>,
+    /// Standard deviation of the residuals along one axis.
+    pub sigma: f64,
+    /// Model points matched, in all.
+    pub matched: f64,
+    /// Iterations made.
+    pub iterations: usize,
+    /// Energy per model point after every iteration.
+    pub trace: Vec<f64>,
+    /// What the run is judged by. Less is better.
+    pub energy: f64,
+    /// Whether the temperature stopped falling before the limit.
+    pub settled: bool,
+    /// Whether the residuals are noise, however small.
+    pub noisy: bool,
+    /// Whether many points move farther than is allowed.
+    pub far: bool,
+    /// Share of the matched points whose residual the noise of the others does not explain, see
+    /// [`Annealer::tail`].
+    pub tail: f64,
+    /// Spread of the soft partners within a row, relative to the temperature: 1 undecided, 0
+    /// decided.
+    pub ambiguity: f64,
+}
+
+impl<const D: usize> State<D> {
+    pub(super) fn copy_from(&mut self, other: &Self) {
+        self.base.clone_from(&other.base);
+        self.warped.clone_from(&other.warped);
+        self.trace.clone_from(&other.trace);
+        (self.sigma, self.iterations) = (other.sigma, other.iterations);
+        (self.energy, self.settled, self.matched) = (other.energy, other.settled, other.matched);
+        (self.tail, self.ambiguity) = (other.tail, other.ambiguity);
+        (self.noisy, self.far) = (other.noisy, other.far);
+    }
+}
+
+/// Shared machinery of the runs: targets, prior, scratch.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Annealer<const D: usize> {
+    pub soft: SoftAssignment<D>,
+    pub prior: Prior,
+    pub regression: Regression<D>,
+    /// Takes the regression's place where the warp may not bend.
+    pub rigid: RigidFit<D>,
+    /// Volume of the targets' bounding box.
+    pub volume: f64,
+    /// Residuals up to this are what the prior's factor leaves out.
+    pub clean_sigma: f64,
+    /// The lowest temperature.
+    pub least_sigma: f64,
+    /// Runs are compared no finer than this.
+    pub resolution: f64,
+    pub weights: Vec<f64>,
+    pub residuals: Axes<D>,
+    pub predicted: Vec<[f64; D]>,
+    pub sums: Vec<f64>,
+    /// Spread of the soft partners within a row, relative to the temperature: 1 undecided, 0
+    /// decided.
+    pub ambiguity: f64,
+}
 
 // The alternation: soft assignment at a falling temperature, then the warp that it asks for.
 

@@ -1,0 +1,100 @@
+//! A frame to work in: centre and size taken out, so that no parameter depends on the units of the
+//! points and no square under- or overflows.
+
+use nalgebra::{Point, SMatrix, SVector};
+
+/// `x ↦ (x − centre) / scale`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Frame<const D: usize> {
+    pub centre: SVector<f64, D>,
+    pub scale: f64,
+}
+
+impl<const D: usize> Default for Frame<D> {
+    fn default() -> Self {
+        Self {
+            centre: SVector::zeros(),
+            scale: 1.0,
+        }
+    }
+}
+
+impl<const D: usize> Frame<D> {
+    /// Centre and root mean square radius of a set. Scale one where all points coincide.
+    pub fn of(points: &[Point<f64, D>]) -> Self {
+        let (centre, radius) = centre_and_radius(points);
+        Self {
+            centre,
+            scale: if radius > 0.0 { radius } else { 1.0 },
+        }
+    }
+
+    /// The model's centre and the largest distance from it along an axis in either set: for sets
+    /// compared as they lie.
+    pub fn of_both(model: &[Point<f64, D>], target: &[Point<f64, D>]) -> Self {
+        let centre = Self::of(model).centre;
+        let largest = model
+            .iter()
+            .chain(target)
+            .map(|p| (p.coords - centre).amax())
+            .fold(0.0, f64::max);
+        Self {
+            centre,
+            scale: if largest > 0.0 { largest } else { 1.0 },
+        }
+    }
+
+    /// A point in this frame.
+    pub fn inside(&self, point: &Point<f64, D>) -> SVector<f64, D> {
+        (point.coords - self.centre) / self.scale
+    }
+
+    /// A point of this frame in the units of the caller.
+    pub fn leave(&self, inside: SVector<f64, D>) -> Point<f64, D> {
+        Point::from(inside * self.scale + self.centre)
+    }
+}
+
+/// Centroid of a set and its root mean square radius, zero where all points coincide.
+pub(crate) fn centre_and_radius<const D: usize>(
+    points: &[Point<f64, D>],
+) -> (SVector<f64, D>, f64) {
+    let n = points.len() as f64;
+    // Sums of differences keep the digits of sets far from the origin.
+    let origin = points[0].coords;
+    let centre = origin
+        + points
+            .iter()
+            .map(|p| p.coords - origin)
+            .sum::<SVector<f64, D>>()
+            / n;
+    // The largest radius taken out first: no square under- or overflows.
+    let largest = points
+        .iter()
+        .map(|p| (p.coords - centre).amax())
+        .fold(0.0, f64::max);
+    if !(largest > 0.0 && largest.is_finite()) {
+        return (centre, 0.0);
+    }
+    let squares: f64 = points
+        .iter()
+        .map(|p| ((p.coords - centre) / largest).norm_squared())
+        .sum();
+    (centre, largest * (squares / n).sqrt())
+}
+
+/// Covariance of a place drawn from these with their weights. Zero where there is no weight.
+pub(crate) fn spread<const D: usize>(
+    places: impl Iterator<Item = (SVector<f64, D>, f64)> + Clone,
+) -> SMatrix<f64, D, D> {
+    let mass: f64 = places.clone().map(|(_, weight)| weight).sum();
+    if mass <= 0.0 {
+        return SMatrix::zeros();
+    }
+    let shares = places.map(|(place, weight)| (place, weight / mass));
+    let mean: SVector<f64, D> = shares.clone().map(|(place, share)| place * share).sum();
+    shares.fold(SMatrix::zeros(), |sum, (place, share)| {
+        let step = place - mean;
+        sum + step * step.transpose() * share
+    })
+}

@@ -1,0 +1,126 @@
+//! The warp of given pairs: a thin-plate spline, or what takes its place if they determine none.
+
+use nalgebra::Point;
+use tactile_tps::{Affine, Factorization, FitOptions, NegR, R2LogR, Smoothing, TpsError, Warp};
+
+/// The factorised thin-plate system of some sources: `r² ln r²` in the plane, `−r` in space.
+#[derive(Clone, Debug)]
+enum System<const D: usize> {
+    Plane(Box<Factorization<D, R2LogR>>),
+    Space(Box<Factorization<D, NegR>>),
+}
+
+/// Interpolation between one set of sources and any images of them: factorised once.
+#[derive(Clone, Debug)]
+pub(crate) struct Interpolation<const D: usize> {
+    /// None where the sources determine no spline.
+    system: Option<System<D>>,
+    weights: Option<Vec<f64>>,
+    smoothing: Smoothing,
+}
+
+impl<const D: usize> Interpolation<D> {
+    pub(crate) fn new(
+        sources: &[Point<f64, D>],
+        weights: Option<Vec<f64>>,
+        smoothing: Smoothing,
+    ) -> Self {
+        fn options<K>(
+            kernel: K,
+            smoothing: Smoothing,
+            weights: &Option<Vec<f64>>,
+        ) -> Result<FitOptions<K>, TpsError> {
+            let options = FitOptions::new(kernel).with_smoothing(smoothing)?;
+            match weights {
+                Some(weights) => options.with_weights(weights.clone()),
+                None => Ok(options),
+            }
+        }
+        let system = if D == 2 {
+            let plane = options(R2LogR, smoothing, &weights)
+                .and_then(|options| Factorization::new(sources, &options));
+            plane.ok().map(|plane| System::Plane(Box::new(plane)))
+        } else {
+            let space = options(NegR, smoothing, &weights)
+                .and_then(|options| Factorization::new(sources, &options));
+            space.ok().map(|space| System::Space(Box::new(space)))
+        };
+        Self {
+            system,
+            weights,
+            smoothing,
+        }
+    }
+
+    /// The spline through these pairs. An affine map where they determine none, the identity where
+    /// there are none.
+    pub(crate) fn through(
+        &self,
+        sources: &[Point<f64, D>],
+        images: &[Point<f64, D>],
+    ) -> Box<dyn Warp<D> + Send + Sync> {
+        let spline: Option<Box<dyn Warp<D> + Send + Sync>> = match &self.system {
+            Some(System::Plane(plane)) => {
+                plane.fit(images).ok().map(|spline| Box::new(spline) as _)
+            }
+            Some(System::Space(space)) => {
+                space.fit(images).ok().map(|spline| Box::new(spline) as _)
+            }
+            None => None,
+        };
+        let exact = self.smoothing == Smoothing::None;
+        let share = if exact { 1e-3 } else { f64::INFINITY };
+        spline
+            .filter(|spline| follows(&**spline, sources, images, share))
+            .unwrap_or_else(|| {
+                let affine = Affine::fit(sources, images, self.weights.as_deref());
+                Box::new(affine.unwrap_or_else(|_| Affine::default()))
+            })
+    }
+}
+
+/// The warp of weighted pairs: a spline smoothed by cross-validation, an affine map for few of
+/// them, a rigid motion for fewer, the identity for none.
+pub(crate) fn fitted<const D: usize>(
+    sources: &[Point<f64, D>],
+    images: &[Point<f64, D>],
+    weights: Vec<f64>,
+) -> Box<dyn Warp<D> + Send + Sync> {
+    if sources.len() >= 3 * (D + 1) {
+        return spline(sources, images, Some(weights), Smoothing::Gcv);
+    }
+    let fit = if sources.len() > D {
+        Affine::fit
+    } else {
+        Affine::fit_rigid
+    };
+    Box::new(fit(sources, images, Some(&weights)).unwrap_or_default())
+}
+
+/// The thin-plate spline through these pairs. See [`Interpolation`].
+pub(crate) fn spline<const D: usize>(
+    sources: &[Point<f64, D>],
+    images: &[Point<f64, D>],
+    weights: Option<Vec<f64>>,
+    smoothing: Smoothing,
+) -> Box<dyn Warp<D> + Send + Sync> {
+    Interpolation::new(sources, weights, smoothing).through(sources, images)
+}
+
+/// Whether a warp takes the sources to these images, to a share of the size: where sources nearly
+/// coincide and their images do not, no digit is left in a spline.
+pub(crate) fn follows<const D: usize>(
+    warp: &(dyn Warp<D> + Send + Sync),
+    sources: &[Point<f64, D>],
+    images: &[Point<f64, D>],
+    share: f64,
+) -> bool {
+    let size = images.iter().fold(0.0_f64, |m, p| m.max(p.coords.amax()));
+    // All at once: a spline samples points several at a time.
+    let mut found = sources.to_vec();
+    warp.apply_into(sources, &mut found).is_ok()
+        && found.iter().zip(images).all(|(found, image)| {
+            let miss = (found - image).amax();
+            miss.is_finite() && (share.is_infinite() || miss <= size * share)
+        })
+}
