@@ -36,7 +36,8 @@
 //! - A sensor's frames to every result: [`pipeline`]. Images, tables, streams, scene files and
 //!   calibrated sensors are read and written by the crate `tactile-files`.
 //! - Two point sets to displacement and strain with an error: [`strain_between()`].
-//! - Printed markers: [`markers`]. A lump under a surface: [`inclusion`] (feature `inclusion`).
+//! - Gels lit in colours, gels that darken, printed markers: [`gel`]. A lump under a surface:
+//!   [`inclusion`] (feature `inclusion`).
 //! - The stages alone: the crates below. A stage of one's own implements one trait of the
 //!   [`prelude`].
 //!
@@ -77,7 +78,6 @@ pub use tactile_fem as fem;
 
 #[cfg(feature = "inclusion")]
 pub mod inclusion;
-pub mod markers;
 pub mod pipeline;
 mod strain_between;
 mod strain_kinematics;

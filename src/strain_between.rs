@@ -650,11 +650,3 @@ fn doubt(share: f64, ratio: f64) -> Option<PairsDoubt> {
         None
     }
 }
-
-/// Median distance to the nearest neighbour. `None` of fewer than two points.
-pub(crate) fn median_spacing<const D: usize>(points: &[Point<f64, D>]) -> Option<f64> {
-    let near = nearest_rows(points, points, 2).into_iter().zip(points);
-    let distance =
-        |(near, p): (Vec<usize>, &Point<f64, D>)| Some((points[*near.get(1)?] - p).norm());
-    median(near.filter_map(distance))
-}

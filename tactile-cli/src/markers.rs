@@ -2,25 +2,27 @@
 use crate::arguments::positive;
 use crate::console::Context;
 use crate::failure::{Exit, Failure};
-use crate::outputs::{Csv, beside};
-use crate::text::{four_digits, in_unit};
+use crate::frames::{NamedFrame, Reading};
+use crate::outputs::Csv;
+use crate::stream::listed;
+use crate::text::in_unit;
 use clap::Args;
 use ndarray::Array2;
 use serde_json::{Value, json};
-use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use tactile_files::io::{Grey, image_size, read_grey_image};
 use tactile_imaging::PairsDoubt;
-use tactile_imaging::core::Estimate;
-use tactile_imaging::markers::{MarkerField, find_markers, track_markers};
+use tactile_imaging::gel::{MarkerField, find_markers};
 
 /// Follow the markers of a gel from a reference to frames
 ///
 /// Dark dots of one size are found in colour or grey images, also under uneven light. The matcher
-/// pairs them, whatever their order, and bears missing ones. --out gets NAME_markers.csv for every
-/// frame NAME, a row a marker: its place in the reference and its displacement in pixels, and the
-/// standard error of a coordinate of both. With the gel's shear modulus and thickness the force
-/// along x and y and the torque about the markers' mean are printed.
+/// pairs them, whatever their order, and bears missing ones. Frames are followed one after the other,
+/// so that a grid may move by more than its step. --out gets NAME_markers.csv for every frame NAME, a
+/// row for every marker of the reference: its place and its displacement in pixels, the standard error
+/// of a coordinate of both, and whether it is seen (0: it is moved as those around it). With the gel's
+/// shear modulus and thickness the force along x and y and the torque about the markers' mean are
+/// printed.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -29,12 +31,15 @@ Examples:
                         --pixel-um 100 --shear-modulus-kpa 40 --thickness-mm 4 --out \
                         target/markers")]
 pub(crate) struct MarkersArguments {
-    /// Frames (PNG, PGM, PPM or JPEG).
+    /// Frames: images, folders, videos, arrays, or - for a pipe.
     #[arg(required = true)]
     frames: Vec<PathBuf>,
     /// Frame before the markers moved.
     #[arg(long, value_name = "IMAGE")]
     reference: PathBuf,
+    /// The largest motion of a marker from a frame to the next, in pixels.
+    #[arg(long, value_name = "PX", value_parser = positive)]
+    largest_motion_px: Option<f64>,
     /// Size of a pixel on the gel in micrometres.
     #[arg(long, value_name = "UM", value_parser = positive, requires = "shear_modulus_kpa")]
     pixel_um: Option<f64>,
@@ -50,33 +55,54 @@ pub(crate) fn run(arguments: &MarkersArguments, context: &mut Context) -> Result
     let MarkersArguments {
         frames, reference, ..
     } = arguments;
-    let names: Vec<_> = frames
-        .iter()
-        .map(|frame| beside(frame, "_markers.csv"))
-        .collect();
-    let inputs: Vec<_> = frames.iter().chain([reference]).collect();
-    context.outputs.plan(&names, &inputs)?;
     if let Some((rows, columns)) = image_size(reference) {
         // Grey levels as numbers, the light around them, and the passes that find the dots.
         let bytes = 80.0 * rows as f64 * columns as f64;
         context.allow(bytes, "finding the markers", "give smaller images")?;
     }
-    let before = find_markers(grey(reference)?.view());
+    let frames = listed(frames)?;
+    let rest = read_grey_image(reference, Grey::Mean, None)?.levels;
+    let reading = Reading {
+        grey: Grey::Mean,
+        bits: None,
+        reference,
+        size: rest.dim(),
+        passes_over: false,
+    };
+    let before = find_markers(rest.view());
+    let mut field = MarkerField::at_rest(&before);
+    if let Some(motion) = arguments.largest_motion_px {
+        field = field
+            .with_largest_motion_px(motion)
+            .map_err(Failure::input)?;
+    }
+    let (images, unreadable) = reading.all::<Array2<u8>>(&frames, context)?;
+    let mut exit = Exit::complete_if(unreadable == 0);
+    let names = images.iter().map(|image| image.file("_markers.csv"));
+    let names: Vec<_> = names.collect();
+    let inputs: Vec<_> = frames.iter().chain([reference]).collect();
+    context.outputs.plan(&names, &inputs)?;
     let mut values = Vec::new();
-    let mut exit = Exit::Complete;
-    for (path, name) in frames.iter().zip(&names) {
-        let after = find_markers(grey(path)?.view());
-        context.line(format_args!("{}:", path.display()));
-        let counts = format!(
-            "{} in the reference, {} in the frame",
-            before.len(),
-            after.len()
+    for (
+        NamedFrame {
+            name: frame,
+            pixels,
+            ..
+        },
+        name,
+    ) in images.iter().zip(&names)
+    {
+        let after = find_markers(pixels.mapv(f64::from).view());
+        context.line(format_args!("{frame}:"));
+        let (first, now) = (before.len(), after.len());
+        context.row(
+            "markers",
+            format_args!("{first} in the reference, {now} in the frame"),
         );
-        context.row("markers", counts);
-        let frame = path.display().to_string();
-        match track_markers(&before, &after) {
-            Ok(field) => {
-                values.push(arguments.print(&frame, &field, context));
+        match field.followed(&after) {
+            Ok(found) => {
+                field = found;
+                values.push(arguments.print(frame, &field, context));
                 context.outputs.add(name, table(&field));
             }
             Err(error) => {
@@ -90,47 +116,38 @@ pub(crate) fn run(arguments: &MarkersArguments, context: &mut Context) -> Result
     Ok(exit)
 }
 
-fn grey(path: &Path) -> Result<Array2<f64>, Failure> {
-    Ok(read_grey_image(path, Grey::Mean, None)?.levels)
-}
-
 fn table(field: &MarkerField) -> Vec<u8> {
-    let mut csv = Csv::new("x_px,y_px,dx_px,dy_px,x_error_px,y_error_px,dx_error_px,dy_error_px");
+    let mut csv =
+        Csv::new("x_px,y_px,dx_px,dy_px,x_error_px,y_error_px,dx_error_px,dy_error_px,seen");
     for track in &field.tracks {
         let (p, u, [own, moved]) = (
             track.position_px,
             track.displacement_px,
             track.standard_errors_px,
         );
-        csv.row([p.x, p.y, u.x, u.y, own, own, moved, moved]);
+        let seen = f64::from(u8::from(track.seen_row.is_some()));
+        csv.row([p.x, p.y, u.x, u.y, own, own, moved, moved, seen]);
     }
     csv.into_bytes()
 }
 
 impl MarkersArguments {
     fn print(&self, frame: &str, field: &MarkerField, context: &mut Context) -> Value {
-        let lengths = field
-            .tracks
-            .iter()
-            .map(|track| track.displacement_px.norm());
-        let largest = lengths.fold(0.0, f64::max);
-        let followed = field.tracks.len();
-        context.row(
-            "followed",
-            format_args!("{followed}, by {} px at most", four_digits(largest)),
-        );
+        let followed = field.seen().count();
+        let largest = field.largest_px();
+        let by = largest.map_or_else(|| "0".to_owned(), |px| in_unit(px, 1.0));
+        context.row("followed", format_args!("{followed}, by {by} px at most"));
         if let Some(doubt) = &field.doubt {
             let sentence = PairsDoubt::Matcher(*doubt);
             context.warn("doubtful_pairs", json!({ "frame": frame }), sentence);
         }
-        let strain = field.strain.as_ref().map(|strain| {
-            [("xx", (0, 0)), ("yy", (1, 1)), ("xy", (0, 1))].map(|(name, at)| {
-                let part = Estimate::new(strain.summary.mean[at], strain.standard_error[at]);
+        let strain = field.strain().map(|strain| {
+            for (name, part) in ["xx", "yy", "xy"].iter().zip(strain) {
                 context.row(&format!("strain {name}"), in_unit(part, 100.0) + " %");
-                (name, part)
-            })
+            }
+            let [xx, yy, xy] = strain;
+            json!({ "xx": xx, "yy": yy, "xy": xy })
         });
-        let strain: Option<BTreeMap<_, _>> = strain.map(BTreeMap::from);
         let shear = self
             .shear_modulus_kpa
             .zip(self.thickness_mm)
@@ -144,7 +161,7 @@ impl MarkersArguments {
             json!({ "force_n": shear.force_n, "torque_nm": shear.torque_nm })
         });
         json!({
-            "frame": frame, "followed": followed, "largest_displacement_px": largest,
+            "frame": frame, "followed": followed, "largest_displacement_px": largest.map_or(0.0, |px| px.value),
             "doubt": field.doubt.map(|doubt| PairsDoubt::Matcher(doubt).to_string()),
             "strain": strain, "shear": shear,
         })

@@ -4,7 +4,8 @@ mod coloured;
 mod watch;
 
 use self::coloured::coloured;
-use self::watch::{Meter, Watch, listed, watch};
+pub(crate) use self::watch::listed;
+use self::watch::{Meter, Watch, watch};
 use crate::arguments::{force_n, not_negative, positive};
 use crate::console::{Bar, Context};
 use crate::failure::{Exit, Failure};

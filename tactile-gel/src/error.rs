@@ -2,6 +2,7 @@
 
 use tactile_core::InvalidOption;
 use tactile_elasticity::ElasticityError;
+use tactile_match::MatchError;
 use tactile_sfs::SfsError;
 use thiserror::Error;
 
@@ -66,6 +67,9 @@ pub enum GelError {
     /// The face cannot be integrated.
     #[error(transparent)]
     Surface(#[from] SfsError),
+    /// Markers cannot be followed.
+    #[error("no markers to follow: {0}")]
+    Markers(#[from] MatchError),
     /// The law of the layer has no answer.
     #[error(transparent)]
     Law(#[from] ElasticityError),

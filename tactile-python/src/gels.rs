@@ -10,9 +10,8 @@ use std::path::PathBuf;
 use tactile_files::sensor::{PhotometricPresses, PhotometricSensor};
 use tactile_imaging::gel::{
     BallPress, CalibrationReport, FrameDoubt, GelForce, GelFrame as Frame, GelLayer,
-    GelSensor as Gel,
+    GelSensor as Gel, find_markers, track_markers,
 };
-use tactile_imaging::markers::{find_markers, track_markers};
 use tactile_imaging::matching::MatchError;
 
 /// A gel that is lit in colours: from frames to the face, contacts and forces.
@@ -462,17 +461,14 @@ pub fn markers(
         MatchError::Custom(_) => errors::failed(error),
         _ => TactileError::new_err(format!("no markers to follow: {error}")),
     })?;
-    let n = field.tracks.len();
+    let tracks: Vec<_> = field.seen().collect();
+    let n = tracks.len();
     let table = |value: &dyn Fn(usize, usize) -> f64| {
         kept(py, Array2::from_shape_fn((n, 2), |(n, k)| value(n, k)))
     };
-    let tracks = &field.tracks;
-    let largest = tracks.iter().map(|track| track.displacement_px.norm());
+    let largest = field.largest_px().map_or(0.0, |px| px.value);
     Ok(Markers {
-        text: format!(
-            "{n} followed, by {:.2} px at most",
-            largest.fold(0.0, f64::max)
-        ),
+        text: format!("{n} followed, by {largest:.2} px at most"),
         positions: table(&|n, k| tracks[n].position_px[k]),
         displacements: table(&|n, k| tracks[n].displacement_px[k]),
         standard_errors: table(&|n, k| tracks[n].standard_errors_px[k]),

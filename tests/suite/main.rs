@@ -13,7 +13,6 @@ mod force_on_simulated_frames;
 #[path = "../support/hostile.rs"]
 mod hostile;
 mod io_properties;
-mod markers;
 mod pipeline;
 mod press_9dtact;
 mod recorded_answers;

@@ -266,7 +266,7 @@ fn numbers(frames: &[PathBuf]) -> Option<Vec<u64>> {
 }
 
 /// The images that are named, and those of the folders that are named in the order of their names.
-pub(super) fn listed(paths: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
+pub(crate) fn listed(paths: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
     let mut frames = Vec::new();
     for path in paths {
         if !path.is_dir() {

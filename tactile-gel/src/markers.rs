@@ -1,13 +1,8 @@
-//! Markers printed on a gel: found in a frame, followed from the reference, and the shear and
-//! torque that their displacements carry.
+//! Markers printed on a gel, found in a frame.
 
-use crate::core::Estimate;
-use crate::core::{otsu, regions};
-use crate::elasticity::strain::GreenLagrange;
-use crate::matching::{AnnealedSoftassign, Doubt, MatchError, PointMatcher};
-use crate::strain_between::{StrainBetween, median, median_spacing};
-use nalgebra::{Point2, Vector2};
+use nalgebra::Point2;
 use ndarray::{Array2, ArrayView2, Zip};
+use tactile_core::{otsu, regions};
 
 /// A dark marker.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -41,7 +36,7 @@ impl Marker {
 ///
 /// ```
 /// use ndarray::Array2;
-/// use tactile_imaging::markers::find_markers;
+/// use tactile_gel::find_markers;
 /// // Twelve smooth dots, 20 px apart, on a gel that is brighter to the right.
 /// let near = |v: usize| (v as f64).rem_euclid(20.0) - 10.3;
 /// let frame = Array2::from_shape_fn((60, 80), |(r, c)| {
@@ -250,145 +245,8 @@ fn holes(patch: &[usize], owner: &[u32], k: usize, columns: usize) -> Vec<usize>
     inner.filter_map(place).collect()
 }
 
-/// A marker of the reference and where it went.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[non_exhaustive]
-pub struct MarkerTrack {
-    /// Row of the marker in the reference and in the frame.
-    pub rows: [usize; 2],
-    /// Centre in the reference, in pixels.
-    pub position_px: Point2<f64>,
-    /// Displacement in pixels.
-    pub displacement_px: Vector2<f64>,
-    /// Standard error of a coordinate of the position, and of the displacement.
-    pub standard_errors_px: [f64; 2],
-}
-
-/// Markers followed from the reference to a frame.
-#[derive(Clone, Debug)]
-#[non_exhaustive]
-pub struct MarkerField {
-    /// The markers that are seen in both.
-    pub tracks: Vec<MarkerTrack>,
-    /// Strain of the gel's surface, from smoothed displacements. `None` below 16 tracks or where
-    /// they are not smooth.
-    pub strain: Option<StrainBetween<2>>,
-    /// Why the pairs may be wrong, by the matcher. `None` if nothing speaks against them.
-    pub doubt: Option<Doubt>,
-}
-
-/// Shear force and torque, with the standard errors that the markers' give them.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[non_exhaustive]
-pub struct MarkerShear {
-    /// F_x and F_y in newtons.
-    pub force_n: [Estimate; 2],
-    /// M_z about the markers' mean in newton metres.
-    pub torque_nm: Estimate,
-}
-
-/// Follows markers from the reference to a frame: no order and no grid is assumed, markers may be
-/// missing in either.
-///
-/// [`AnnealedSoftassign`] pairs them. Markers on a lattice that has moved by more than a sixth of its
-/// step have a [`doubt`](MarkerField::doubt): the lattice may have moved by another step as well.
-///
-/// ```
-/// use nalgebra::Point2;
-/// use tactile_imaging::markers::{Marker, track_markers};
-/// let place = |k: usize| {
-///     Point2::new(
-///         10.0 * (k % 7) as f64,
-///         11.0 * (k / 7) as f64 + (k % 3) as f64,
-///     )
-/// };
-/// let reference: Vec<_> = (0..42).map(|k| Marker::new(place(k), 0.05, 60.0)).collect();
-/// // Sheared by 10 %, the last markers hidden.
-/// let sheared = |p: Point2<f64>| Point2::new(p.x + 0.1 * p.y, p.y);
-/// let frame: Vec<_> = (0..38).map(|k| Marker::new(sheared(place(k)), 0.05, 60.0)).collect();
-/// let field = track_markers(&reference, &frame)?;
-/// assert_eq!(field.tracks.len(), 38);
-/// assert!(field.tracks.iter().all(|track| track.rows[0] == track.rows[1]));
-/// # Ok::<(), tactile_imaging::matching::MatchError>(())
-/// ```
-///
-/// # Errors
-/// Those of the matcher: too few markers.
-pub fn track_markers(reference: &[Marker], frame: &[Marker]) -> Result<MarkerField, MatchError> {
-    let [before, after] =
-        [reference, frame].map(|set| set.iter().map(|m| m.position_px).collect::<Vec<_>>());
-    let matching = AnnealedSoftassign::default().match_points(&before, &after)?;
-    let partner = |(i, j): (usize, &Option<usize>)| j.map(|j| (i, j));
-    let assignment = matching.assignment.iter().enumerate();
-    let mut pairs: Vec<_> = assignment.filter_map(partner).collect();
-    let doubt = matching.report.doubt();
-    // A smooth deformation drops wrong pairs and finds markers that the matcher missed.
-    let strain = StrainBetween::of_pairs(&before, &after, &pairs, &GreenLagrange).ok();
-    if let Some(strain) = &strain {
-        pairs.clone_from(&strain.rows);
-    }
-    let track = |&(i, j): &(usize, usize)| {
-        let [own, there] = [&reference[i], &frame[j]];
-        MarkerTrack {
-            rows: [i, j],
-            position_px: own.position_px,
-            displacement_px: there.position_px - own.position_px,
-            standard_errors_px: [
-                own.standard_error_px,
-                own.standard_error_px.hypot(there.standard_error_px),
-            ],
-        }
-    };
-    Ok(MarkerField {
-        tracks: pairs.iter().map(track).collect(),
-        strain,
-        doubt,
-    })
-}
-
-impl MarkerField {
-    /// Shear force and torque of a gel whose surface resists displacement by k Pa per metre:
-    /// F = k A Σ u and M = k A Σ (r × u), A the area of a marker's cell, r from the markers' mean.
-    ///
-    /// A layer of shear modulus G and thickness h bonded to a rigid plate has k = G/h where it
-    /// moves over more than its thickness. Errors are those of the markers alone. `None` without a
-    /// track.
-    ///
-    /// ```
-    /// use nalgebra::Point2;
-    /// use tactile_imaging::markers::{Marker, track_markers};
-    /// let place = |k: usize| Point2::new(10.0 * (k % 6) as f64, 10.0 * (k / 6) as f64);
-    /// let all = |dx: f64| -> Vec<_> {
-    ///     (0..36)
-    ///         .map(|k| Marker::new(place(k) + nalgebra::Vector2::new(dx, 0.0), 0.05, 60.0))
-    ///         .collect()
-    /// };
-    /// let field = track_markers(&all(0.0), &all(1.0))?;
-    /// // 36 cells of 1 mm² move by 0.1 mm on a layer of 1e8 Pa/m.
-    /// let shear = field.shear(1e8, 1e-4).expect("tracks");
-    /// assert!((shear.force_n[0].value - 0.36).abs() < 1e-6 && shear.torque_nm.value.abs() < 1e-9);
-    /// # Ok::<(), tactile_imaging::matching::MatchError>(())
-    /// ```
-    pub fn shear(&self, stiffness_pa_per_m: f64, pixel_size_m: f64) -> Option<MarkerShear> {
-        let places: Vec<_> = self.tracks.iter().map(|track| track.position_px).collect();
-        let spacing = median_spacing(&places)?;
-        let scale = stiffness_pa_per_m * (spacing * pixel_size_m).powi(2) * pixel_size_m;
-        let n = self.tracks.len() as f64;
-        let mean = places.iter().map(|p| p.coords).sum::<Vector2<f64>>() / n;
-        let (mut force, mut torque, mut variances) = (Vector2::zeros(), 0.0, [0.0; 2]);
-        for track in &self.tracks {
-            let (r, u) = (track.position_px.coords - mean, track.displacement_px);
-            force += u;
-            torque += r.x * u.y - r.y * u.x;
-            let variance = track.standard_errors_px[1].powi(2);
-            variances[0] += variance;
-            variances[1] += variance * r.norm_squared();
-        }
-        let turn = scale * pixel_size_m;
-        Some(MarkerShear {
-            force_n: [force.x, force.y]
-                .map(|sum| Estimate::from_variance(scale * sum, scale * scale * variances[0])),
-            torque_nm: Estimate::from_variance(turn * torque, turn * turn * variances[1]),
-        })
-    }
+/// The middle value, the upper of two. `None` without any.
+fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
+    let mut values: Vec<f64> = values.collect();
+    (!values.is_empty()).then(|| tactile_core::statistics::median(&mut values))
 }
