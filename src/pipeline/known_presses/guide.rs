@@ -12,10 +12,10 @@
 use super::{KnownBall, is_known, is_positive};
 use crate::core::Estimate;
 use crate::elasticity::contact::{
-    Bond, Layer, PARABOLA_ERROR, Waveguide, guide_compliance, guide_log_stiffness,
-    parameter_slopes, stepped_layers,
+    Bond, Layer, PARABOLA_ERROR, Waveguide, guide_log_stiffness, parameter_slopes, stepped_layers,
 };
 use crate::elasticity::laws::{ContactLaw, ContactLength, WaveguideLaw};
+use crate::elasticity::modulus::Bodies;
 use crate::pipeline::assumptions::CheckedGuide;
 use crate::pipeline::contact::ContactReading;
 use crate::pipeline::settings::Settings;
@@ -273,7 +273,10 @@ pub fn update(
     let stiffness = |layers: &[Layer]| guide_log_stiffness(layers, mean_m).ok_or(unsolved);
     let ratio = (stiffness(&layers)? - stiffness(stated)?).exp();
     let layers = Waveguide::new(layers).map_err(|_| unsolved)?;
-    let factor = guide_compliance(&layers, &covariance, None, mean_m).ok_or(unsolved)?;
+    let bodies = Bodies::new(settings.object, Some(layers.clone()))
+        .with_layer_errors(covariance.clone(), None)
+        .map_err(|_| unsolved)?;
+    let factor = bodies.guide_compliance(mean_m);
     // Earlier presses moved the layers from where they were stated.
     let earlier = settings.checked_guide;
     let ratio = ratio * earlier.map_or(1.0, |earlier| earlier.stiffness.value);

@@ -50,13 +50,11 @@ pub fn depression_m(
     let peak = 1.5 * force / (core::f64::consts::PI * a * a);
     let farthest = distances_m.iter().fold(0.0, |far: f64, r| far.max(r.abs()));
     let stiffened: Vec<(f64, f64)> = kernel
-        .samples((a + farthest) / h)
+        .wavenumbers((a + farthest) / h)
         .into_iter()
         .map(|(s, weight)| {
-            (
-                s / h,
-                weight / h * peak * a * a * hertz_transform(s / h * a),
-            )
+            let deficit = weight * kernel.deficit(s) / h;
+            (s / h, deficit * peak * a * a * hertz_transform(s / h * a))
         })
         .collect();
     let depth = |&r: &f64| {

@@ -10,7 +10,7 @@
 //! layer's share of it. K is analytic, so that Nyström's method on Gauss nodes converges
 //! exponentially.
 
-use super::Waveguide;
+use super::{Layer, Waveguide};
 use crate::error::{ElasticityError, Quantity, poisson};
 use crate::numerics::{Chebyshev, cubic, gauss_legendre, gauss_panels, panel_edges};
 use nalgebra::{DMatrix, DVector, Matrix2, Matrix2x4, Matrix4, Matrix4x2, Vector4};
@@ -147,6 +147,10 @@ struct DiscreteKernel {
     a_over_h: f64,
     /// Gauss nodes on [0, 1] with their weights.
     rule: Vec<(f64, f64)>,
+    /// Wavenumbers s with the weights of an integral over them.
+    wavenumbers: Vec<(f64, f64)>,
+    /// cos(sρσ) at the nodes σ and the wavenumbers s. The last row is that of the rim, σ = 1.
+    cosines: DMatrix<f64>,
     /// ∫(1 − L) cos(uρσ) cos(uρτ) du at the nodes σ, τ. The last row is that of the rim, σ = 1.
     values: DMatrix<f64>,
 }
@@ -162,43 +166,62 @@ impl DiscreteKernel {
         // nodes.
         let per_top_layer = (a_over_h / kernel.top_thickness()).min(40.0);
         let rule = gauss_legendre(24 + (6.0 * per_top_layer) as usize);
-        let samples = kernel.samples(a_over_h);
+        let wavenumbers = kernel.wavenumbers(a_over_h);
+        let deficits: Vec<f64> = wavenumbers
+            .iter()
+            .map(|&(s, w)| w * kernel.deficit(s))
+            .collect();
         let node = |i: usize| rule.get(i).map_or(1.0, |r| r.0);
-        let cosines = DMatrix::from_fn(rule.len() + 1, samples.len(), |i, q| {
-            (samples[q].0 * a_over_h * node(i)).cos()
+        let cosines = DMatrix::from_fn(rule.len() + 1, wavenumbers.len(), |i, q| {
+            (wavenumbers[q].0 * a_over_h * node(i)).cos()
         });
-        let weighted = DMatrix::from_fn(samples.len(), rule.len(), |q, j| {
-            cosines[(j, q)] * samples[q].1
+        let weighted = DMatrix::from_fn(wavenumbers.len(), rule.len(), |q, j| {
+            cosines[(j, q)] * deficits[q]
         });
         Ok(Self {
             a_over_h,
             rule,
-            values: cosines * weighted,
+            values: &cosines * weighted,
+            wavenumbers,
+            cosines,
         })
     }
 
-    /// The contact with the touched layer's part of 1/E*.
-    fn contact(&self, share: f64) -> Result<LayerContact, ElasticityError> {
+    /// φ for the right sides 1, s² and K(1, s), a column each: a flat punch, the sphere's roundness,
+    /// and what moves the rim.
+    fn solutions(&self, share: f64) -> Result<Solutions, ElasticityError> {
         let (rule, kernel) = (&self.rule, &self.values);
         let n = rule.len();
         let scale = FRAC_2_PI * self.a_over_h * share;
         let matrix = DMatrix::from_fn(n, n, |i, j| {
             f64::from(i == j) - scale * kernel[(i, j)] * rule[j].1
         });
-        let lu = matrix.lu();
-        // φ for the right sides 1 and s², those of a flat punch and of the sphere's roundness.
-        let ones = DVector::from_element(n, 1.0);
-        let squares = DVector::from_fn(n, |i, _| rule[i].0 * rule[i].0);
-        let flat = lu.solve(&ones).ok_or(out_of_range(self.a_over_h))?;
-        let round = lu.solve(&squares).ok_or(out_of_range(self.a_over_h))?;
+        let right = DMatrix::from_fn(n, 3, |i, side| match side {
+            0 => 1.0,
+            1 => rule[i].0 * rule[i].0,
+            _ => scale * kernel[(n, i)],
+        });
+        let phi = matrix.lu().solve(&right);
+        let phi = phi.ok_or(out_of_range(self.a_over_h))?;
+        let integral = |side: usize| (0..n).map(|j| rule[j].1 * phi[(j, side)]).sum::<f64>();
         // φ at the rim by Nyström's own interpolation. The last row of the kernel belongs to s = a.
-        let rim = |phi: &DVector<f64>, rhs: f64| {
-            let integral = (0..n).map(|j| kernel[(n, j)] * rule[j].1 * phi[j]);
-            rhs + scale * integral.sum::<f64>()
+        let rim = |side: usize| {
+            let integral = (0..n).map(|j| kernel[(n, j)] * rule[j].1 * phi[(j, side)]);
+            1.0 + scale * integral.sum::<f64>()
         };
-        let ratio = rim(&round, 1.0) / rim(&flat, 1.0);
-        let integral = |phi: &DVector<f64>| (0..n).map(|j| rule[j].1 * phi[j]).sum::<f64>();
-        let same_radius = 1.5 * (ratio * integral(&flat) - integral(&round));
+        Ok(Solutions {
+            scale,
+            integrals: [integral(0), integral(1)],
+            rims: [rim(0), rim(1)],
+            phi,
+        })
+    }
+
+    /// The contact with the touched layer's part of 1/E*.
+    fn contact(&self, share: f64) -> Result<LayerContact, ElasticityError> {
+        let solutions = self.solutions(share)?;
+        let ratio = solutions.indentation_ratio();
+        let same_radius = solutions.force_ratio();
         Ok(LayerContact {
             a_over_h: self.a_over_h,
             chi: self.a_over_h * ratio.sqrt(),
@@ -207,6 +230,85 @@ impl DiscreteKernel {
             indentation_ratio: ratio,
         })
     }
+
+    /// What a change of the deficit by one at each wavenumber, with its weight, does to ln F at the
+    /// same contact radius, the sphere rigid.
+    ///
+    /// The kernel is symmetric. To first order a change dK of it moves ∫φ of a right side b by
+    /// ⟨g, dK φ⟩ with g the solution of a flat punch, and φ at the rim by ⟨K(1, ·)'s solution and
+    /// the rim itself, dK φ⟩. Together F moves by 1.5 ⟨g − p ∫g/g(1), dK (ρg − r)⟩, with ρg − r the
+    /// φ of the contact. By wavenumbers dK is diagonal.
+    fn log_force_by_deficit(&self) -> Result<Vec<f64>, ElasticityError> {
+        let solutions = self.solutions(1.0)?;
+        let n = self.rule.len();
+        let by_rim = solutions.integrals[0] / solutions.rims[0];
+        let ratio = solutions.indentation_ratio();
+        // Cosine transforms of both factors: weights of the nodes' cosines, then of the rim's.
+        let factor = |of: &dyn Fn(f64, f64, f64) -> f64, rim: f64| {
+            DVector::from_fn(n + 1, |i, _| match self.rule.get(i) {
+                Some((_, w)) => {
+                    let phi = solutions.phi.row(i);
+                    w * of(phi[0], phi[1], phi[2])
+                }
+                None => rim,
+            })
+        };
+        let contact = factor(&|flat, round, _| ratio * flat - round, 0.0);
+        let moved = factor(&|flat, _, rim| flat - by_rim * rim, -by_rim);
+        let [contact, moved] = [contact, moved].map(|factor| self.cosines.tr_mul(&factor));
+        let scale = 1.5 * solutions.scale / solutions.force_ratio();
+        let of = |(q, (_, w)): (usize, &(f64, f64))| scale * w * contact[q] * moved[q];
+        Ok(self.wavenumbers.iter().enumerate().map(of).collect())
+    }
+}
+
+/// Solutions of the integral equation, by [`DiscreteKernel::solutions`].
+struct Solutions {
+    /// (2/π) a/h times the share.
+    scale: f64,
+    phi: DMatrix<f64>,
+    /// Of the first two: integrals over \[0, 1\], and values at the rim.
+    integrals: [f64; 2],
+    rims: [f64; 2],
+}
+
+impl Solutions {
+    fn indentation_ratio(&self) -> f64 {
+        self.rims[1] / self.rims[0]
+    }
+
+    /// F over Hertz's force at the same contact radius.
+    fn force_ratio(&self) -> f64 {
+        let [flat, round] = self.integrals;
+        1.5 * (self.indentation_ratio() * flat - round)
+    }
+}
+
+/// Derivatives of ln F of a rigid sphere's contact of radius a (m), F over what the touched layer
+/// alone would bear as a half-space, by parameters of the layers. Each of `moved` holds the layers
+/// with one parameter lower and higher, and by how much these differ.
+///
+/// # Errors
+/// Those of [`LayerEquation::solve`].
+pub(super) fn log_force_slopes(
+    guide: &Waveguide,
+    radius_m: f64,
+    moved: impl IntoIterator<Item = ([Vec<Layer>; 2], f64)>,
+) -> Result<Vec<f64>, ElasticityError> {
+    let unit_m = guide.thickness_m();
+    let kernel = LayerKernel::of_layers(guide, Bond::Bonded)?;
+    let discrete = DiscreteKernel::new(&kernel, radius_m / unit_m)?;
+    let by_deficit = discrete.log_force_by_deficit()?;
+    let slope = |(layers, width): ([Vec<Layer>; 2], f64)| {
+        let kernels = layers.map(|layers| LayerKernel::in_units_of(unit_m, &layers, Bond::Bonded));
+        let wavenumbers = discrete.wavenumbers.iter().zip(&by_deficit);
+        let change = wavenumbers.map(|(&(s, _), by_deficit)| {
+            let [low, high] = kernels.each_ref().map(|kernel| kernel.deficit(s));
+            by_deficit * (high - low)
+        });
+        change.sum::<f64>() / width
+    };
+    Ok(moved.into_iter().map(slope).collect())
 }
 
 fn out_of_range(found: f64) -> ElasticityError {
@@ -270,11 +372,15 @@ impl LayerKernel {
     /// [`ElasticityError::NotPositive`] thickness: a rigid waveguide has no layers.
     pub(crate) fn of_layers(waveguide: &Waveguide, bond: Bond) -> Result<Self, ElasticityError> {
         let total = Quantity::Thickness.positive(waveguide.thickness_m())?;
-        let layers: Vec<_> = waveguide
-            .layers()
+        Ok(Self::in_units_of(total, waveguide.layers(), bond))
+    }
+
+    /// Of layers that are not all without thickness, s = ξ times this length.
+    fn in_units_of(unit_m: f64, layers: &[Layer], bond: Bond) -> Self {
+        let layers: Vec<_> = layers
             .iter()
             .map(|layer| StackLayer {
-                thickness: layer.thickness_m / total,
+                thickness: layer.thickness_m / unit_m,
                 shear_modulus: 0.5 * layer.youngs_modulus_pa / (1.0 + layer.poisson_ratio),
                 poisson_ratio: layer.poisson_ratio,
             })
@@ -286,7 +392,7 @@ impl LayerKernel {
             ..layer
         };
         let layers = layers.into_iter().map(in_units_of_top).collect();
-        Ok(Self { layers, bond })
+        Self { layers, bond }
     }
 
     /// 1 − L(s): how much less the surface yields at s = kh than a half-space of the touched layer,
@@ -314,16 +420,13 @@ impl LayerKernel {
         self.layers[0].thickness
     }
 
-    /// Nodes s and weights w·(1 − L(s)), for integrands that turn as fast as cos²(s·x).
-    pub(super) fn samples(&self, x: f64) -> Vec<(f64, f64)> {
+    /// Nodes s and weights of ∫(1 − L(s)) ds, for integrands that turn as fast as cos²(s·x).
+    pub(super) fn wavenumbers(&self, x: f64) -> Vec<(f64, f64)> {
         // The deficit falls as s²e^(−2s) in units of the touched layer: at 25 it is below 10⁻¹⁸.
         let end = 25.0 / self.top_thickness();
         // Sixteen Gauss points resolve a decay by e⁻⁵ and an argument of 16 to the last digits.
         let widest = (2.5 / self.top_thickness()).min(8.0 / x.max(f64::MIN_POSITIVE));
         gauss_panels(&panel_edges(end, 0.5, widest))
-            .into_iter()
-            .map(|(s, w)| (s, w * self.deficit(s)))
-            .collect()
     }
 }
 

@@ -17,13 +17,13 @@ mod waveguide;
 
 pub use depression::depression_m;
 pub use guide::{
-    PARABOLA_ERROR, PARAMETERS_PER_LAYER, guide_compliance, guide_log_stiffness, parameter_slopes,
-    stepped_layers,
+    PARABOLA_ERROR, PARAMETERS_PER_LAYER, guide_log_stiffness, parameter_slopes, stepped_layers,
 };
 pub use hertz::{Body, HertzContact, hertz_surface_displacement_m, reduced_modulus_pa};
 pub use layers::{Bond, LayerContact, LayerEquation};
 pub use table::{ContactCurve, ContactTable};
 pub use waveguide::{Layer, Waveguide};
 
+pub(crate) use guide::GuideErrors;
 pub(crate) use layers::{LayerKernel, SharedLayerTable};
 pub(crate) use table::TabulatedForce;

@@ -1,6 +1,6 @@
 //! The sample, and what it is pressed on.
 
-use crate::contact::{Body, PARAMETERS_PER_LAYER, Waveguide, guide_compliance};
+use crate::contact::{Body, GuideErrors, PARAMETERS_PER_LAYER, Waveguide};
 use crate::error::{ElasticityError, Quantity, poisson};
 use nalgebra::{DMatrix, DVector};
 use tactile_core::{Source, Uncertain};
@@ -176,17 +176,14 @@ pub struct Bodies {
     size_error: f64,
     poisson_ratio_error: f64,
     adhesion_n: f64,
-    guide_errors: GuideErrors,
+    guide_error: GuideError,
 }
 
 #[derive(Clone, Debug, PartialEq)]
-enum GuideErrors {
+enum GuideError {
     /// Of the compliance, under every contact.
     Common(Uncertain),
-    Layers {
-        covariance: DMatrix<f64>,
-        by_pixel_size: Option<DVector<f64>>,
-    },
+    OfLayers(GuideErrors),
 }
 
 impl Bodies {
@@ -198,7 +195,7 @@ impl Bodies {
             size_error: 0.0,
             poisson_ratio_error: 0.0,
             adhesion_n: 0.0,
-            guide_errors: GuideErrors::Common(Uncertain::exact(1.0)),
+            guide_error: GuideError::Common(Uncertain::exact(1.0)),
         }
     }
 
@@ -251,7 +248,7 @@ impl Bodies {
     /// ```
     pub fn with_guide_error(mut self, factor: Uncertain) -> Result<Self, ElasticityError> {
         Quantity::StandardError.not_negative(factor.standard_error())?;
-        self.guide_errors = GuideErrors::Common(factor);
+        self.guide_error = GuideError::Common(factor);
         Ok(self)
     }
 
@@ -261,6 +258,22 @@ impl Bodies {
     ///
     /// # Errors
     /// [`ElasticityError::LengthMismatch`], [`ElasticityError::NotFinite`].
+    ///
+    /// ```
+    /// use nalgebra::{DMatrix, DVector};
+    /// use tactile_elasticity::contact::{Layer, Waveguide};
+    /// use tactile_elasticity::modulus::{Bodies, Object, Source};
+    /// let gel = Layer { thickness_m: 10e-3, youngs_modulus_pa: 75e3, poisson_ratio: 0.5 };
+    /// let bodies = Bodies::new(Object::sphere(3e-3), Some(Waveguide::new(vec![gel])?));
+    /// // Two per cent of the modulus are two per cent of the compliance; a stiffer gel yields less.
+    /// let covariance = DMatrix::from_diagonal(&vec![4e-4, 0.0, 0.0].into());
+    /// let by_pixel_size = DVector::from_column_slice(&[0.01, 0.0, 0.0]);
+    /// let bodies = bodies.with_layer_errors(covariance, Some(by_pixel_size))?;
+    /// let factor = bodies.guide_compliance(1e-3);
+    /// assert!((factor.standard_error() - 0.02).abs() < 1e-6);
+    /// assert!((factor.part(Source::PixelSize) + 0.01).abs() < 1e-6);
+    /// # Ok::<(), tactile_elasticity::ElasticityError>(())
+    /// ```
     pub fn with_layer_errors(
         mut self,
         covariance: DMatrix<f64>,
@@ -275,9 +288,11 @@ impl Bodies {
         for &entry in covariance.iter().chain(by_pixel_size.iter().flatten()) {
             Quantity::StandardError.finite(entry)?;
         }
-        self.guide_errors = GuideErrors::Layers {
-            covariance,
-            by_pixel_size,
+        self.guide_error = match &self.guide {
+            None => GuideError::Common(Uncertain::exact(1.0)),
+            Some(guide) => {
+                GuideError::OfLayers(GuideErrors::new(guide.clone(), covariance, by_pixel_size))
+            }
         };
         Ok(self)
     }
@@ -318,18 +333,12 @@ impl Bodies {
     /// The guide's compliance over the one stated, under a contact of this radius (m): one, with
     /// its error. Exact where there is no guide or its contact cannot be solved.
     pub fn guide_compliance(&self, contact_radius_m: f64) -> Uncertain {
-        let exact = Uncertain::exact(1.0);
-        match (&self.guide_errors, &self.guide) {
-            (GuideErrors::Common(factor), _) => *factor,
-            (GuideErrors::Layers { .. }, None) => exact,
-            (
-                GuideErrors::Layers {
-                    covariance,
-                    by_pixel_size,
-                },
-                Some(guide),
-            ) => guide_compliance(guide, covariance, by_pixel_size.as_ref(), contact_radius_m)
-                .unwrap_or(exact),
+        match &self.guide_error {
+            GuideError::Common(factor) => *factor,
+            GuideError::OfLayers(errors) => {
+                let found = errors.compliance(contact_radius_m);
+                found.unwrap_or(Uncertain::exact(1.0))
+            }
         }
     }
 
