@@ -147,7 +147,7 @@ impl<L: ContactLaw> ContactEstimator<L> {
 impl<L: ContactLaw> ModulusEstimator for ContactEstimator<L> {
     fn estimate(&self, series: &LoadSeries) -> Result<ModulusEstimate, ElasticityError> {
         let other = self.other_body(series);
-        ContactFit::new(&self.law, series, self.poisson_ratio, other).estimate(self.kind)
+        ContactFit::new(&self.law, series, self.poisson_ratio, other)?.estimate(self.kind)
     }
 
     fn kind(&self) -> EstimatorKind {

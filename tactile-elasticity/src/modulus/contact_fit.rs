@@ -35,6 +35,7 @@ pub(super) struct ContactFit<'a, L: ?Sized> {
     law: &'a L,
     limits: Limits,
     series: &'a LoadSeries,
+    measured: Vec<Measured>,
     poisson_ratio: f64,
     other_compliance_per_pa: f64,
     /// ln of the other body's compliance and of the object's size, over those stated: zero, with
@@ -48,25 +49,30 @@ pub(super) struct ContactFit<'a, L: ?Sized> {
 }
 
 impl<'a, L: ContactLaw + ?Sized> ContactFit<'a, L> {
-    pub(super) fn new(law: &'a L, series: &'a LoadSeries, poisson_ratio: f64, other: Body) -> Self {
+    pub(super) fn new(
+        law: &'a L,
+        series: &'a LoadSeries,
+        poisson_ratio: f64,
+        other: Body,
+    ) -> Result<Self, ElasticityError> {
         let other_compliance_per_pa = other.compliance_per_pa();
-        let differs = |length: ContactLength| {
-            let [one, other] = OTHER_SHARES.map(|share| law.log_force(length, share));
+        let measured = Measured::all(series)?;
+        let differs = |of: &Measured| {
+            let [one, other] = OTHER_SHARES.map(|share| law.log_force(of.length, share));
             one != other
         };
-        let lengths = series.loads().iter().flat_map(lengths);
-        let positive = lengths.filter(|(length, _)| length.metres() > 0.0);
-        let feels_share = other_compliance_per_pa > 0.0 && positive.map(|(x, _)| x).any(differs);
+        let feels_share = other_compliance_per_pa > 0.0 && measured.iter().any(differs);
         let limits = law.limits();
         let bodies = series.bodies();
         let log = |factor: Uncertain| factor.map(f64::ln, f64::recip);
         let radius_m = || mean_radius(series, &limits).unwrap_or(f64::NAN);
         let nu = bodies.map_or(Uncertain::exact(0.0), Bodies::poisson_ratio);
         let per_ratio = -2.0 * poisson_ratio / (1.0 - poisson_ratio.powi(2));
-        Self {
+        Ok(Self {
             law,
             limits,
             series,
+            measured,
             poisson_ratio,
             other_compliance_per_pa,
             log_compliance: bodies.map_or(Uncertain::exact(0.0), |bodies| {
@@ -75,11 +81,11 @@ impl<'a, L: ContactLaw + ?Sized> ContactFit<'a, L> {
             log_size: bodies.map_or(Uncertain::exact(0.0), |bodies| log(bodies.size())),
             log_lateral: nu.map(|_| 0.0, |_| per_ratio),
             feels_share,
-        }
+        })
     }
 
     pub(super) fn estimate(&self, kind: EstimatorKind) -> Result<ModulusEstimate, ElasticityError> {
-        let centre = self.consistent(0.0)?;
+        let centre = self.consistent(0.0, FIRST_SHARE)?;
         let (modulus_pa, interval_95) = self.answer(&centre)?;
         let diagnostics = self.diagnose(&centre);
         let bounded = interval_95.upper.is_some();
@@ -98,43 +104,30 @@ impl<'a, L: ContactLaw + ?Sized> ContactFit<'a, L> {
     /// The observations that the law reaches with the other body's part of 1/E* given, and the
     /// loads beyond it.
     fn observe(&self, share: f64) -> Result<(Vec<Observation>, Vec<usize>), ElasticityError> {
-        let mut all = Vec::with_capacity(self.series.loads().len());
+        let mut all = Vec::with_capacity(self.measured.len());
         let mut beyond = Vec::new();
-        for (load, state) in self.series.loads().iter().enumerate() {
-            let force = validated(state.force_n, Quantity::Force)?;
-            for (length, measured) in lengths(state) {
-                let quantity = match length {
-                    ContactLength::Radius(_) => Quantity::ContactRadius,
-                    ContactLength::Indentation(_) => Quantity::Indentation,
-                };
-                let measured = validated(measured, quantity)?;
-                quantity.positive(measured.value)?;
-                Quantity::Force.positive(force.value)?;
-                let log_force = match self.law.log_force(length, share) {
-                    Reach::At(log_force) => log_force,
-                    Reach::Beyond => {
-                        beyond.push(load);
-                        continue;
-                    }
-                    Reach::NotMine => continue,
-                };
-                let Some([slope, size_slope]) = laws::slopes(self.law, length, share, &log_force)
-                else {
-                    beyond.push(load);
+        for (place, measured) in self.measured.iter().enumerate() {
+            let log_force = match self.law.log_force(measured.length, share) {
+                Reach::At(log_force) => log_force,
+                Reach::Beyond => {
+                    beyond.push(measured.load);
                     continue;
-                };
-                let log = |number: Uncertain| number.map(f64::ln, f64::recip);
-                let of_lengths = log(measured) * slope + self.log_size * size_slope;
-                let log_modulus = log(force.without(Source::Noise)) - of_lengths;
-                let value = force.value.ln() - log_force.value();
-                all.push(Observation {
-                    load,
-                    force,
-                    length,
-                    log_modulus: log_modulus.map(|_| value, |_| 1.0),
-                    law_error: log_force.error(),
-                });
-            }
+                }
+                Reach::NotMine => continue,
+            };
+            let slopes = laws::slopes(self.law, measured.length, share, &log_force);
+            let Some([slope, size_slope]) = slopes else {
+                beyond.push(measured.load);
+                continue;
+            };
+            let of_lengths = measured.log_length * slope + self.log_size * size_slope;
+            let mut log_modulus = measured.log_common_force - of_lengths;
+            log_modulus.value = measured.log_common_force.value - log_force.value();
+            all.push(Observation {
+                measured: place,
+                log_modulus,
+                law_error: log_force.error(),
+            });
         }
         match (all.is_empty(), beyond.first()) {
             (false, _) => Ok((all, beyond)),
@@ -149,14 +142,13 @@ impl<'a, L: ContactLaw + ?Sized> ContactFit<'a, L> {
     /// The covariance of the ln E*. Radius and depth of one load share the noise of its force.
     fn covariance(&self, all: &[Observation]) -> Covariance {
         let numbers: Vec<_> = all.iter().map(|o| o.log_modulus).collect();
-        let forces = all
-            .iter()
-            .map(|o| o.force.degrees_of_freedom(Source::Noise));
-        let noise = |i: usize| all[i].force.part(Source::Noise) / all[i].force.value;
+        let force = |i: usize| &self.measured[all[i].measured].force;
+        let degrees = (0..all.len()).map(|i| force(i).degrees_of_freedom(Source::Noise));
+        let noise = |i: usize| force(i).part(Source::Noise) / force(i).value;
         let bodies = self.series.bodies();
-        let adhesion = |i: usize| bodies.map_or(0.0, |b| b.adhesion(all[i].force.value));
-        Covariance::of(&numbers, all.iter().map(|o| o.load))
-            .with(Source::Noise, CommonTo::Load, fewest(forces), noise)
+        let adhesion = |i: usize| bodies.map_or(0.0, |b| b.adhesion(force(i).value));
+        Covariance::of(&numbers, all.iter().map(|o| self.measured[o.measured].load))
+            .with(Source::Noise, CommonTo::Load, fewest(degrees), noise)
             .with_model_errors(Source::Adhesion, adhesion)
             .with_model_errors(Source::Law, |i| all[i].law_error)
     }
@@ -179,7 +171,7 @@ impl<'a, L: ContactLaw + ?Sized> ContactFit<'a, L> {
 
     /// The sample's part of the compliance under the mean of the contacts.
     fn sample_part(&self, all: &[Observation], share: f64) -> f64 {
-        let radius = |o: &Observation| match o.length {
+        let radius = |o: &Observation| match self.measured[o.measured].length {
             ContactLength::Radius(a) => Some(a),
             ContactLength::Indentation(_) => None,
         };
@@ -229,12 +221,12 @@ impl<'a, L: ContactLaw + ?Sized> ContactFit<'a, L> {
     /// a stiff base, the stiffer the contact, and the softer the bodies that make it. Their
     /// difference has one zero between 0 and 1. It is sought by secants, and by bisection where
     /// these leave the bracket or are slow. The plain iteration swings for ever where a thin layer
-    /// takes most of the compliance.
-    fn consistent(&self, reach: f64) -> Result<Consistent, ElasticityError> {
+    /// takes most of the compliance. It begins at the share `from`.
+    fn consistent(&self, reach: f64, from: f64) -> Result<Consistent, ElasticityError> {
         if !self.feels_share {
             return self.mean_at(0.0, reach);
         }
-        let mut assumed = FIRST_SHARE;
+        let mut assumed = from;
         let mut found = self.mean_at(assumed, reach)?;
         let (mut low, mut high) = (0.0, 1.0);
         let mut before: Option<[f64; 2]> = None;
@@ -280,7 +272,10 @@ impl<'a, L: ContactLaw + ?Sized> ContactFit<'a, L> {
     fn answer(&self, centre: &Consistent) -> Result<(Uncertain, Interval), ElasticityError> {
         let known = centre.mean.has_error();
         let limit = |reach: f64| -> Option<f64> {
-            self.sample_modulus(self.consistent(reach).ok()?.log_reduced)
+            // Beside a share of one the law may not reach.
+            let share = self.share_at(centre.log_reduced);
+            let from = if share < 1.0 { share } else { FIRST_SHARE };
+            self.sample_modulus(self.consistent(reach, from).ok()?.log_reduced)
         };
         let lower = if known {
             limit(-1.0).unwrap_or(f64::INFINITY)
@@ -314,11 +309,12 @@ impl<'a, L: ContactLaw + ?Sized> ContactFit<'a, L> {
         // Observations come in the order of their loads.
         let residuals = &centre.mean.standardized_residuals;
         let mut rest = &residuals[..];
-        for of_load in centre.observations.chunk_by(|a, b| a.load == b.load) {
+        let load = |o: &Observation| self.measured[o.measured].load;
+        for of_load in (centre.observations).chunk_by(|a, b| load(a) == load(b)) {
             let (own, others) = rest.split_at(of_load.len());
             rest = others;
             let log_sum: f64 = of_load.iter().map(|o| o.log_modulus.value).sum();
-            let diagnostics = &mut all[of_load[0].load];
+            let diagnostics = &mut all[load(&of_load[0])];
             diagnostics.used = true;
             diagnostics.youngs_modulus_pa = self.sample_modulus(log_sum / of_load.len() as f64);
             diagnostics.standardized_residual = own
@@ -357,11 +353,47 @@ impl<'a, L: ContactLaw + ?Sized> ContactFit<'a, L> {
     }
 }
 
-/// What was measured of a load's contact.
-fn lengths(state: &LoadState) -> impl Iterator<Item = (ContactLength, Uncertain)> + use<> {
-    let radius = (state.contact_radius_m).map(|a| (ContactLength::Radius(a.value), a));
-    let depth = (state.indentation_m).map(|d| (ContactLength::Indentation(d.value), d));
-    radius.into_iter().chain(depth)
+/// A length of a contact, with the force of its load.
+struct Measured {
+    load: usize,
+    force: Uncertain,
+    length: ContactLength,
+    /// ln F but for its noise, and ln of the length.
+    log_common_force: Uncertain,
+    log_length: Uncertain,
+}
+
+impl Measured {
+    /// Of all loads, in their order. Forces and lengths must be above zero.
+    fn all(series: &LoadSeries) -> Result<Vec<Self>, ElasticityError> {
+        let log = |number: Uncertain| number.map(f64::ln, f64::recip);
+        let mut all = Vec::with_capacity(series.loads().len());
+        for (load, state) in series.loads().iter().enumerate() {
+            let force = validated(state.force_n, Quantity::Force)?;
+            let radius = (state.contact_radius_m)
+                .map(|a| (a, ContactLength::Radius(a.value), Quantity::ContactRadius));
+            let depth = (state.indentation_m).map(|d| {
+                (
+                    d,
+                    ContactLength::Indentation(d.value),
+                    Quantity::Indentation,
+                )
+            });
+            for (measured, length, quantity) in radius.into_iter().chain(depth) {
+                let measured = validated(measured, quantity)?;
+                quantity.positive(measured.value)?;
+                Quantity::Force.positive(force.value)?;
+                all.push(Self {
+                    load,
+                    force,
+                    length,
+                    log_common_force: log(force.without(Source::Noise)),
+                    log_length: log(measured),
+                });
+            }
+        }
+        Ok(all)
+    }
 }
 
 /// The mean of the contact radii, measured or by the law from what was.
@@ -395,9 +427,8 @@ struct Consistent {
 }
 
 struct Observation {
-    load: usize,
-    force: Uncertain,
-    length: ContactLength,
+    /// Its place among what was measured.
+    measured: usize,
     /// ln E*, but for the noise of the force and the errors of the law.
     log_modulus: Uncertain,
     /// Standard error of ln F that is the law's.

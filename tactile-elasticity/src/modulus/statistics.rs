@@ -3,7 +3,7 @@
 use super::estimate::FitStatistics;
 use super::warning::Warning;
 use crate::error::{ElasticityError, Quantity};
-use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use nalgebra::{Cholesky, DMatrix, DVector};
 use statrs::distribution::{ChiSquared, ContinuousCDF, StudentsT};
 use tactile_core::{Source, Uncertain};
 
@@ -177,7 +177,8 @@ struct ErrorOf {
 /// take O(n k²) time and O(n k) memory with k columns.
 #[derive(Debug, Clone)]
 pub(crate) struct Covariance {
-    /// The load that each number belongs to. Numbers of one load are neighbours.
+    /// The load that each number belongs to. Numbers of one load, at most two (its radius and its
+    /// indentation), are neighbours.
     loads: Vec<usize>,
     errors: Vec<ErrorOf>,
 }
@@ -282,9 +283,16 @@ impl Covariance {
         match error.common_to {
             CommonTo::None => each.norm(),
             CommonTo::All => each.sum(),
-            CommonTo::Load => (self.ranges())
-                .map(|load| each.rows_range(load).sum())
-                .fold(0.0, f64::hypot),
+            CommonTo::Load => {
+                let loads = self.loads.chunk_by(|a, b| a == b);
+                let mut rest = each.as_slice();
+                let of_load = loads.map(|load| {
+                    let (own, others) = rest.split_at(load.len());
+                    rest = others;
+                    own.iter().sum::<f64>().powi(2)
+                });
+                of_load.sum::<f64>().sqrt()
+            }
         }
     }
 
@@ -305,101 +313,96 @@ impl Covariance {
         (0..self.len()).any(|i| self.variance(i) > 0.0)
     }
 
-    /// The ranges of numbers that belong to one load.
-    fn ranges(&self) -> impl Iterator<Item = std::ops::Range<usize>> + '_ {
-        let mut next = 0;
-        self.loads.chunk_by(|a, b| a == b).map(move |chunk| {
-            let start = next;
-            next += chunk.len();
-            start..next
-        })
-    }
-
-    /// Σ − U Uᵀ over the numbers of one load.
-    fn unshared(&self, range: std::ops::Range<usize>) -> DMatrix<f64> {
-        let numbers = range.len();
-        DMatrix::from_fn(numbers, numbers, |r, c| {
-            let (i, j) = (range.start + r, range.start + c);
-            let within = self.effects(CommonTo::Load).map(|u| u[i] * u[j]);
-            let own = self.effects(CommonTo::None).map(|u| u[i] * u[j]);
-            let own: f64 = if i == j { own.sum() } else { 0.0 };
-            own + within.sum::<f64>()
-        })
+    /// Of number i and its neighbour before: (Σ − U Uᵀ)ᵢ,ᵢ₋₁. `None` if that is another load's.
+    fn within_load(&self, i: usize) -> Option<f64> {
+        let before = i.checked_sub(1)?;
+        let products = self.effects(CommonTo::Load).map(|u| u[i] * u[before]);
+        (self.loads[i] == self.loads[before]).then(|| products.sum())
     }
 
     /// The factor L of Σ − U Uᵀ = L Lᵀ. What is perfectly correlated or without error gets a ridge
     /// of 10⁻¹² of the mean variance (of Σ's, where all errors are shared): the answer then depends
     /// on it in the twelfth digit, and rounding (10⁻¹⁶) is still far below it.
     fn unshared_factor(&self) -> Result<Factor, ElasticityError> {
-        let mean_of = |variance: &dyn Fn(usize) -> f64| {
-            (0..self.len()).map(variance).sum::<f64>() / self.len() as f64
-        };
-        let unshared = mean_of(&|i| self.unshared_variance(i));
-        let scale = if unshared > 0.0 {
-            unshared
-        } else {
-            mean_of(&|i| self.variance(i))
+        let n = self.len();
+        let mean_of =
+            |variance: &dyn Fn(usize) -> f64| (0..n).map(variance).sum::<f64>() / n as f64;
+        let own = DVector::from_fn(n, |i, _| self.unshared_variance(i));
+        let unshared = own.mean();
+        let scale = match unshared > 0.0 {
+            true => unshared,
+            false => mean_of(&|i| self.variance(i)),
         };
         let ridge = 1e-12 * scale;
-        let block = |range: std::ops::Range<usize>| {
-            let start = range.start;
-            let lower = ridged_cholesky(self.unshared(range), ridge)?.unpack();
-            Ok((start, lower))
-        };
-        let blocks = self.ranges().map(block).collect::<Result<_, _>>()?;
-        Ok(Factor { blocks })
+        let mut factor = Factor::identity(n);
+        let mut i = 0;
+        while i < n {
+            let beside = (i + 1 < n).then(|| self.within_load(i + 1)).flatten();
+            let block = |ridge: f64| {
+                let first = own[i] + ridge;
+                let below = beside.map_or(0.0, |b| b / first.sqrt());
+                let second = beside.map(|_| own[i + 1] + ridge - below * below);
+                (first, below, second)
+            };
+            let above = |(first, _, second): (f64, f64, Option<f64>), limit: f64| {
+                first > limit && second.is_none_or(|second| second > limit)
+            };
+            let mut found = block(0.0);
+            if !above(found, ridge * 1e-3) {
+                found = block(ridge);
+            }
+            if !above(found, 0.0) {
+                return Err(ElasticityError::Covariance {
+                    quantity: Quantity::Force,
+                });
+            }
+            let (first, below, second) = found;
+            factor.diagonal[i] = first.sqrt();
+            if let Some(second) = second {
+                factor.below[i + 1] = below;
+                factor.diagonal[i + 1] = second.sqrt();
+            }
+            i += 1 + usize::from(second.is_some());
+        }
+        Ok(factor)
     }
 }
 
-/// A lower triangular matrix L of blocks on the diagonal.
+/// A lower triangular matrix L of blocks on the diagonal, of one or two numbers each.
 struct Factor {
-    /// First row, and the block.
-    blocks: Vec<(usize, DMatrix<f64>)>,
+    diagonal: Vec<f64>,
+    /// Lᵢ,ᵢ₋₁, zero at the first number of a block.
+    below: Vec<f64>,
 }
 
 impl Factor {
     /// The identity for n numbers, of which nothing is known.
     fn identity(n: usize) -> Self {
-        let one = DMatrix::identity(1, 1);
         Self {
-            blocks: (0..n).map(|i| (i, one.clone())).collect(),
+            diagonal: vec![1.0; n],
+            below: vec![0.0; n],
         }
     }
 
     /// L⁻¹v: numbers whose errors are independent and one.
     fn whiten(&self, mut v: DVector<f64>) -> DVector<f64> {
-        for (start, lower) in &self.blocks {
-            let mut part = v.rows_mut(*start, lower.nrows());
-            // A Cholesky factor has no zero on its diagonal.
-            lower.solve_lower_triangular_mut(&mut part);
+        let mut before = 0.0;
+        for (i, v) in v.iter_mut().enumerate() {
+            *v = (*v - self.below[i] * before) / self.diagonal[i];
+            before = *v;
         }
         v
     }
 
     /// L⁻ᵀv: weights of the numbers from those of the whitened ones.
     fn weights(&self, mut v: DVector<f64>) -> DVector<f64> {
-        for (start, lower) in &self.blocks {
-            let mut part = v.rows_mut(*start, lower.nrows());
-            lower.tr_solve_lower_triangular_mut(&mut part);
+        let mut carried = 0.0;
+        for (i, v) in v.iter_mut().enumerate().rev() {
+            *v = (*v - carried) / self.diagonal[i];
+            carried = self.below[i] * *v;
         }
         v
     }
-}
-
-/// Cholesky of a covariance, with the ridge where it is singular.
-fn ridged_cholesky(sigma: DMatrix<f64>, ridge: f64) -> Result<Cholesky<f64, Dyn>, ElasticityError> {
-    let n = sigma.nrows();
-    if let Some(factor) = sigma.clone().cholesky() {
-        let d = factor.l_dirty().diagonal();
-        if d.min() * d.min() > ridge * 1e-3 {
-            return Ok(factor);
-        }
-    }
-    (sigma + DMatrix::identity(n, n) * ridge)
-        .cholesky()
-        .ok_or(ElasticityError::Covariance {
-            quantity: Quantity::Force,
-        })
 }
 
 #[cfg(test)]
