@@ -158,7 +158,7 @@ fn combine_blocks<'a, const B: usize, const D: usize>(
 }
 
 /// `A L⁻ᵀ` of the rows of one stripe into `whitened`, for the lower Cholesky factor L of `count`
-/// columns: `O(count²)`. Blocks beyond the last are zero.
+/// columns: `O(count²)`. Blocks beyond the last are not set.
 #[inline(always)]
 pub fn whiten(
     columns: &[Block],
@@ -168,23 +168,44 @@ pub fn whiten(
     whitened: &mut [Stripe],
     start: usize,
 ) {
-    let here = (blocks - start).min(TOGETHER);
+    if start + TOGETHER <= blocks {
+        whiten_blocks::<TOGETHER>(columns, blocks, factor, count, whitened, (start, 0));
+        return;
+    }
+    for at in 0..blocks - start {
+        whiten_blocks::<1>(columns, blocks, factor, count, whitened, (start, at));
+    }
+}
+
+/// So many blocks of a stripe from the one at `at`. Their number is known to the compiler: it would
+/// else work them number by number.
+#[inline(always)]
+fn whiten_blocks<const B: usize>(
+    columns: &[Block],
+    blocks: usize,
+    factor: &[f64],
+    count: usize,
+    whitened: &mut [Stripe],
+    (start, at): (usize, usize),
+) {
     for p in 0..count {
         let row = &factor[p * count..=p * count + p];
-        let at = p * blocks + start;
-        let mut current = [[0.0; LANES]; TOGETHER];
-        current[..here].copy_from_slice(&columns[at..at + here]);
+        let place = p * blocks + start + at;
+        let mut current = [[0.0; LANES]; B];
+        current.copy_from_slice(&columns[place..place + B]);
         for (a, done) in row[..p].iter().zip(&*whitened) {
-            for b in 0..TOGETHER {
+            let done = &done[at..at + B];
+            for b in 0..B {
                 for l in 0..LANES {
                     current[b][l] -= a * done[b][l];
                 }
             }
         }
         let scale = 1.0 / row[p];
-        for b in 0..TOGETHER {
+        let set = &mut whitened[p][at..at + B];
+        for b in 0..B {
             for l in 0..LANES {
-                whitened[p][b][l] = current[b][l] * scale;
+                set[b][l] = current[b][l] * scale;
             }
         }
     }

@@ -68,7 +68,7 @@ impl AnnealedSoftassign {
                 ws.state.tail = ws.annealer.tail(0.1 * ws.spacing);
                 ws.best.copy_from(&ws.state);
                 ws.annealer
-                    .evaluate(&mut ws.best, self.share, ws.annealer.resolution, 1.0);
+                    .evaluate(&mut ws.best, self.share, ws.annealer.resolution);
                 if ws.is_likely() {
                     stride = 0;
                 }
@@ -131,7 +131,7 @@ impl AnnealedSoftassign {
         ws.best.copy_from(&ws.state);
         if !self.is_exact(ws) {
             ws.annealer
-                .evaluate(&mut ws.state, self.share, ws.annealer.resolution, 1.0);
+                .evaluate(&mut ws.state, self.share, ws.annealer.resolution);
             ws.best.copy_from(&ws.state);
         }
         if flow.is_continue() {
@@ -201,7 +201,7 @@ impl AnnealedSoftassign {
                 return ControlFlow::Continue(());
             }
             ws.annealer
-                .evaluate(&mut ws.state, self.share, ws.annealer.resolution, 1.0);
+                .evaluate(&mut ws.state, self.share, ws.annealer.resolution);
             if base.is_empty() || ws.state.energy < ws.best.energy {
                 ws.best.copy_from(&ws.state);
                 base.clone_from(&levels.base);

@@ -97,6 +97,8 @@ pub struct SoftassignWorkspace<const D: usize> {
     annealer: Annealer<D>,
     state: State<D>,
     best: State<D>,
+    /// The answer from the motions of blocks.
+    followed: State<D>,
     answer: Answer<D>,
     correspondence: Correspondence,
     patterns: LocalPatterns<D>,
@@ -138,7 +140,7 @@ impl<const D: usize> SoftassignWorkspace<D> {
         // An exact answer explains the targets as well as can be.
         let gain = self.gain().unwrap_or(f64::INFINITY);
         let share = self.expected_share;
-        let doubt = self.answer.doubt(smaller, share, gain, self.best.tail);
+        let doubt = self.answer.doubt(smaller, share, gain, &self.best);
         let symmetric = self.symmetric.then_some(Doubt::Symmetric);
         let twin = self.twin.map(|(_, doubt)| doubt);
         self.doubt = twin.or(self.repeats).or(doubt).or(symmetric);

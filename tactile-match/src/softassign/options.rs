@@ -41,13 +41,12 @@ pub enum Mechanism {
     Rivals,
     Open,
     Fine,
-    Amplitudes,
 }
 
 #[cfg(feature = "ablation")]
 #[allow(missing_docs)]
 impl Mechanism {
-    pub const ALL: [Self; 15] = [
+    pub const ALL: [Self; 14] = [
         Self::Patterns,
         Self::Reheat,
         Self::Slow,
@@ -62,7 +61,6 @@ impl Mechanism {
         Self::Rivals,
         Self::Open,
         Self::Fine,
-        Self::Amplitudes,
     ];
 }
 

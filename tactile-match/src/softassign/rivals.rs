@@ -201,7 +201,7 @@ impl AnnealedSoftassign {
             ws.annealer.least_sigma
         };
         for state in [&mut ws.state, &mut ws.best] {
-            ws.annealer.evaluate(state, self.share, resolution, 1.0);
+            ws.annealer.evaluate(state, self.share, resolution);
         }
         let gain = ws.best.energy - ws.state.energy;
         ws.best.energy = energy;
@@ -213,7 +213,7 @@ impl AnnealedSoftassign {
     fn accept<const D: usize>(&self, ws: &mut SoftassignWorkspace<D>) {
         let state = &mut ws.state;
         ws.annealer
-            .evaluate(state, self.share, ws.annealer.resolution, 1.0);
+            .evaluate(state, self.share, ws.annealer.resolution);
         ws.best.copy_from(state);
     }
 }

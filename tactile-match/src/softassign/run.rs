@@ -371,17 +371,7 @@ impl<const D: usize> Annealer<D> {
     /// The targets are a mixture of Gaussians about the warped points and of uniform outliers,
     /// whose share is estimated. Residuals under `resolution` count as that, so that an exact fit
     /// does not win by an infinite margin.
-    ///
-    /// Of the matches' information on the warp the share counts that is left where partners are
-    /// `decided` in part (Louis, J. R. Stat. Soc. B 44, 1982). The whole of it would let the
-    /// stiffest warp win.
-    pub(super) fn evaluate(
-        &mut self,
-        state: &mut State<D>,
-        mut share: f64,
-        resolution: f64,
-        decided: f64,
-    ) {
+    pub(super) fn evaluate(&mut self, state: &mut State<D>, mut share: f64, resolution: f64) {
         let variance = state.sigma.max(resolution).powi(2);
         let (n, m) = (state.warped.len(), self.soft.targets());
         let gaussian = n as f64 * (TAU * variance).powf(0.5 * D as f64);
@@ -414,7 +404,6 @@ impl<const D: usize> Annealer<D> {
             .iter_mut()
             .for_each(|s| *s = gauss / (gauss * *s + outlier));
         self.soft.row_totals(&self.sums, &mut self.weights);
-        self.weights.iter_mut().for_each(|w| *w *= decided);
         self.weights.resize(self.prior.stride, 0.0);
         let rows = state.warped.iter().zip(&state.base);
         self.residuals

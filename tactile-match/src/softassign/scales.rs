@@ -18,7 +18,7 @@ use tactile_core::vectorised;
 /// Lengths ℓ over which the warp may bend, in radii of the model, and amplitudes τ at the first of
 /// them: a factor √2 and 2 apart, about what the evidence of a hundred points tells apart.
 const LENGTHS: [f64; 4] = [1.2, 1.7, 2.4, 3.4];
-pub(super) const AMPLITUDES: [f64; 5] = [0.35, 0.2, 0.1, 0.05, 0.025];
+const AMPLITUDES: [f64; 5] = [0.35, 0.2, 0.1, 0.05, 0.025];
 
 /// Memory of the average.
 #[derive(Clone, Debug, Default)]
@@ -100,7 +100,7 @@ impl<const D: usize> ScaleAverage<D> {
     }
 
     /// Forgets all sums.
-    pub(super) fn clear(&mut self, points: usize) {
+    fn clear(&mut self, points: usize) {
         (self.total, self.least) = (0.0, f64::INFINITY);
         for axis in self.mean.0.iter_mut().chain([&mut self.square]) {
             axis.clear();
@@ -127,20 +127,8 @@ impl<const D: usize> ScaleAverage<D> {
         weight
     }
 
-    /// Adds the positions of a state to the sums, by its energy.
-    pub(super) fn add_state(&mut self, state: &State<D>) {
-        let weight = self.weigh(state.energy);
-        for (i, (warped, base)) in state.warped.iter().zip(&state.base).enumerate() {
-            for k in 0..D {
-                let moved = warped[k] - base[k];
-                self.mean.0[k][i] += weight * moved;
-                self.square[i] += weight * moved * moved;
-            }
-        }
-    }
-
     /// Puts the points at the mean of what was summed, and sets `spread`.
-    pub(super) fn place(&mut self, state: &mut State<D>) {
+    fn place(&mut self, state: &mut State<D>) {
         self.spread.clear();
         for (i, warped) in state.warped.iter_mut().enumerate() {
             let mut square = self.square[i] / self.total;

@@ -8,7 +8,6 @@
 
 use super::confidence::{self, MIN_TELLING_GAIN};
 use super::run::{Cooling, Schedule};
-use super::scales::AMPLITUDES;
 use super::{
     AnnealedSoftassign, BULK, Mechanism, Rotation, Search, SoftassignWorkspace, Transformation,
     starts,
@@ -82,6 +81,12 @@ const FOLLOWED: f64 = 0.75;
 /// A larger share of residuals that noise does not explain is of a part that lies aside: it explains
 /// one in a thousand, and trades of random points a few.
 const LEAST_ASIDE: f64 = 0.02;
+/// Soft partners that spread more than this, relative to the temperature, hide the evidence of a warp
+/// behind that of its matches.
+const MOST_SPREAD: f64 = 0.3;
+/// Residuals of an answer in space from the motions of blocks, in spacings, up to which it needs no
+/// other.
+const SLIPPED: f64 = 0.15;
 /// Error of a block's motion, in spacings.
 const MOTION_ERROR: f64 = 0.15;
 /// After relaxation labelling, whose pairs are trusted more than a first guess.
@@ -245,7 +250,15 @@ impl AnnealedSoftassign {
             self.anneal(ws, Cooling { sigma, ..MOVED }, observe)?;
         }
         if !(follows && self.is_followed(ws, observe)?) {
+            // The other starts would go on from it if it is wrong.
+            std::mem::swap(&mut ws.followed, &mut ws.best);
+            (ws.best.energy, ws.best.matched) = (f64::INFINITY, 0.0);
+            let runs = std::mem::take(&mut ws.starts);
             self.try_starts(ws, observe)?;
+            if follows && !self.is_exact(ws) && ws.followed.energy < ws.best.energy {
+                std::mem::swap(&mut ws.followed, &mut ws.best);
+            }
+            ws.starts += runs;
         }
         self.look_for_rivals(ws);
         let noisy = ws.best.sigma > ws.annealer.clean_sigma;
@@ -474,7 +487,7 @@ impl AnnealedSoftassign {
         }
         ws.state.tail = ws.annealer.tail(0.1 * ws.spacing);
         ws.annealer
-            .evaluate(&mut ws.state, self.share, ws.annealer.resolution, 1.0);
+            .evaluate(&mut ws.state, self.share, ws.annealer.resolution);
         if ws.state.far {
             ws.state.energy = f64::INFINITY;
         }
@@ -511,12 +524,7 @@ impl AnnealedSoftassign {
             ..SLOW
         });
         let ambiguity = ws.annealer.restore(&ws.best, &mut ws.state, &schedule);
-        // Soft partners that spread more than this hide the evidence of a warp behind that of its
-        // matches.
-        if ambiguity > 0.3 {
-            if self.has(Mechanism::Amplitudes) {
-                self.average_amplitudes(ws, &schedule);
-            }
+        if ambiguity > MOST_SPREAD {
             return;
         }
         let average = |ws: &mut SoftassignWorkspace<D>, likely: bool| {
@@ -533,38 +541,6 @@ impl AnnealedSoftassign {
         ws.annealer.settle(&mut ws.state, &schedule, 2);
         ws.best.sigma = ws.state.sigma;
         average(ws, true);
-    }
-
-    /// The mean over the amplitudes of the prior where soft partners spread over several points: a
-    /// noise wider than the spacing bends the search's warp to every cluster. Each amplitude is
-    /// weighted by its evidence, with the information that undecided partners leave.
-    fn average_amplitudes<const D: usize>(
-        &self,
-        ws: &mut SoftassignWorkspace<D>,
-        schedule: &Schedule,
-    ) {
-        let (sigma, decided) = (ws.best.sigma, (1.0 - ws.annealer.ambiguity).max(0.0));
-        let mut likeliest = (f64::INFINITY, SCALES);
-        ws.scales.clear(ws.model.len());
-        for bending in AMPLITUDES {
-            let scales = PriorScales { bending, ..SCALES };
-            ws.annealer.prior.build(&ws.model, scales);
-            ws.state.copy_from(&ws.best);
-            // More rounds do not change the errors of `--example noise_band`. Partners so wide would
-            // raise a free noise level in each of them.
-            for _ in 0..10 {
-                ws.annealer.settle(&mut ws.state, schedule, 1);
-                ws.state.sigma = sigma;
-            }
-            ws.annealer
-                .evaluate(&mut ws.state, self.share, ws.annealer.resolution, decided);
-            ws.scales.add_state(&ws.state);
-            if ws.state.energy < likeliest.0 {
-                likeliest = (ws.state.energy, scales);
-            }
-        }
-        ws.scales.place(&mut ws.best);
-        ws.annealer.prior.build(&ws.model, likeliest.1);
     }
 
     pub(super) fn schedule(&self, mut cooling: Cooling) -> Schedule {
@@ -631,7 +607,10 @@ impl<const D: usize> SoftassignWorkspace<D> {
         let inside = |w: &&[f64; D]| (0..D).all(|k| sides[k].0 <= w[k] && w[k] <= sides[k].1);
         let inside = self.best.warped.iter().filter(inside).count() as f64;
         let gain = self.gain().unwrap_or(f64::INFINITY);
+        // A surface that has slipped along itself leaves a fifth of a spacing, as noise does.
+        let near = D == 2 || self.best.sigma <= SLIPPED * self.spacing;
         dense
+            && near
             && !self.best.far
             && self.best.matched >= FOLLOWED * inside
             && 2.0 * inside > self.model.len().min(self.target.len()) as f64

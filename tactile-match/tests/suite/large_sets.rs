@@ -47,6 +47,42 @@ fn clean_sets_are_matched() {
     check_clean::<3>();
 }
 
+/// A bell over a nearly regular disc, moved by four broad bumps by a fifth of its radius: what slips
+/// along the surface explains it nearly as well.
+#[test]
+fn surfaces_in_space_do_not_slip() {
+    for n in [2000, 5000] {
+        let mut stream = Stream::new(41);
+        let model: Vec<_> = (0..n)
+            .map(|i| {
+                let (r, angle) = (((i as f64 + 0.5) / n as f64).sqrt(), 2.399_963 * i as f64);
+                let step = 0.15 * (std::f64::consts::PI / n as f64).sqrt();
+                let [x, y] = [angle.cos(), angle.sin()].map(|c| r * c + step * stream.normal());
+                Point::from([x, y, 0.6 * (-(x * x + y * y).min(1.0) / 0.405).exp()])
+            })
+            .collect();
+        let bump = |p: &Point<f64, 3>, x: f64, y: f64| {
+            (-((p[0] - x).powi(2) + (p[1] - y).powi(2) + p[2] * p[2]) / 1.28).exp()
+        };
+        let truth: Vec<_> = model
+            .iter()
+            .map(|p| {
+                let [a, b, c, d] = [(0.7, 0.2), (-0.5, 0.6), (0.1, -0.9), (-0.8, -0.5)]
+                    .map(|(x, y)| 0.3 * bump(p, x, y));
+                Point::from([p[0] + a - c, p[1] + b - d, p[2] + d - a])
+            })
+            .collect();
+        let order = stream.permutation(n);
+        let scene = Scene::new(model, truth, order, |_| 0.0, 0, &mut stream);
+        let found = AnnealedSoftassign::default()
+            .match_points(&scene.model, &scene.target)
+            .expect("good points");
+        let right = scene.right(&found.assignment) as f64 / n as f64;
+        assert!(right > 0.99, "{n} points: {right} right");
+        assert_eq!(found.report.doubt(), None, "{n} points");
+    }
+}
+
 /// Each of a heap is a candidate for each: a million would take terabytes.
 #[test]
 fn a_heap_in_one_place_is_refused() {
