@@ -101,8 +101,10 @@ impl Evidence {
         let reach = 0.85 * radius.min(0.97 * ball_px);
         let (rows, columns) = frame.dim();
         let difference = |row: usize, column: usize| {
-            let [a, b] = [frame, reference].map(|image| image.levels(row, column));
-            [0, 1, 2].map(|k| f64::from(a[k] - b[k]))
+            [0, 1, 2].map(|k| {
+                let [a, b] = [frame, reference].map(|image| image.line(k, row)[column]);
+                (f64::from(a) - f64::from(b)) / 256.0
+            })
         };
         let within = |v: f64, n: usize| (v.max(0.0) as usize).min(n);
         let down = within(y0 - reach, rows)..within(y0 + reach + 1.0, rows);

@@ -8,6 +8,7 @@ use tactile_core::statistics::quantile;
 use crate::GelError;
 use crate::ball::{BallFace, Evidence};
 use crate::error::same_shape;
+use crate::face::gradient_errors;
 use crate::frame_check::FrameDoubt;
 use crate::gradients::{Blurred, TERMS, samples};
 use crate::model::GelModel;
@@ -337,12 +338,7 @@ impl Fitted {
                 let mut others = self.total.clone();
                 // Sums of the normal equations add over presses. Leaving one out is a subtraction.
                 others.add(sums, -1.0);
-                let model = GelModel {
-                    // With an error of 1 the reading's errors are the factors from normals to
-                    // gradients.
-                    normal_standard_error: 1.0,
-                    ..GelModel::new(pixel_size_m, others.solve()?)
-                };
+                let model = GelModel::new(pixel_size_m, others.solve()?);
                 let without = blank.with_model(model);
                 misses.add(&without, press, press.within(circle), self.face)?;
             }
@@ -610,10 +606,9 @@ impl Misses {
                 .sqrt();
             let truth = normal.map(|n| -n / up);
             let found = [0, 1].map(|k: usize| f64::from(reading.gradient[k][[row, column]]));
-            let parts = reading.gradient_error.iter().zip(found.iter().zip(truth));
-            for (error, (found, truth)) in parts {
-                let unit = f64::from(error[[row, column]]);
-                self.gradients.push((found - truth).abs() / unit);
+            let units = gradient_errors(found.map(|slope| slope as f32));
+            for ((found, truth), unit) in found.iter().zip(truth).zip(units) {
+                self.gradients.push((found - truth).abs() / f64::from(unit));
             }
             let cap = face.depth(distance / ball, radius / ball) * ball;
             self.depths

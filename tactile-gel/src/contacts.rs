@@ -19,6 +19,8 @@ const LEAST_EVIDENCE: f32 = 6.0;
 const LEAST_SHARE: f32 = 0.06;
 /// Patches have as many cells of 2 × 2 pixels: a contact of 3 pixels in radius.
 const LEAST_CELLS: usize = 8;
+/// Cells, at the most, that the spread of a field is taken of.
+const SPREAD_CELLS: usize = 6400;
 /// Two peaks are two contacts if the pressure between them falls below this share of the lower.
 const SADDLE: f32 = 0.5;
 /// Standard deviation in cells of the blur by frame, cell and bin.
@@ -49,8 +51,9 @@ pub struct Patch {
 
 /// Pressure and slopes on cells of 2 × 2 pixels.
 pub struct Cells {
+    /// Along x and y.
+    pub slopes: [Array2<f32>; 2],
     pub pressure: Array2<f32>,
-    pub slope: Array2<f32>,
 }
 
 /// Means over blocks of `size` pixels a side. Incomplete blocks are left out.
@@ -58,10 +61,12 @@ pub fn block_means(values: ArrayView2<'_, f32>, size: usize) -> Array2<f32> {
     let (rows, columns) = (values.nrows() / size, values.ncols() / size);
     let mut means = Array2::zeros((rows, columns));
     let share = 1.0 / (size * size) as f32;
-    for (r, mut to) in means.outer_iter_mut().enumerate() {
-        for row in values.outer_iter().skip(r * size).take(size) {
-            for (c, to) in to.iter_mut().enumerate() {
-                *to += (0..size).map(|k| row[c * size + k]).sum::<f32>() * share;
+    for (row, line) in values.outer_iter().enumerate().take(rows * size) {
+        let mut to = means.row_mut(row / size);
+        // Arrays that were made here are slices.
+        if let (Some(line), Some(to)) = (line.as_slice(), to.as_slice_mut()) {
+            for (to, cell) in to.iter_mut().zip(line.chunks_exact(size)) {
+                *to += cell.iter().sum::<f32>() * share;
             }
         }
     }
@@ -112,11 +117,12 @@ pub fn quantile(values: &mut [f32], share: f64) -> f32 {
 
 /// Standard deviation of most of a field, from its median absolute deviation.
 pub fn spread(field: &Array2<f32>) -> f32 {
-    // Every third cell is enough for a median.
-    let mut values: Vec<f32> = field.iter().step_by(3).copied().collect();
+    // Every third cell is enough for a median, of large fields fewer.
+    let step = (field.len() / SPREAD_CELLS).max(3);
+    let mut values: Vec<f32> = field.iter().step_by(step).copied().collect();
     let middle = quantile(&mut values, 0.5);
-    let mut away: Vec<f32> = values.iter().map(|v| (v - middle).abs()).collect();
-    1.4826 * quantile(&mut away, 0.5)
+    values.iter_mut().for_each(|v| *v = (*v - middle).abs());
+    1.4826 * quantile(&mut values, 0.5)
 }
 
 /// The patches of a frame of `shape`, the strongest first. `noise_floor` is the least standard
@@ -162,6 +168,7 @@ fn regions(smooth: &Array2<f32>, threshold: f32) -> (Array2<u32>, Vec<f32>) {
     // Peak, cells and the region that each has become a part of.
     let mut found: Vec<(f32, usize, usize)> = Vec::new();
     let mut owner = vec![0_usize; rows * columns];
+    let mut beside: Vec<usize> = Vec::new();
     let root = |found: &[(f32, usize, usize)], mut name: usize| {
         while found[name].2 != name {
             name = found[name].2;
@@ -172,13 +179,14 @@ fn regions(smooth: &Array2<f32>, threshold: f32) -> (Array2<u32>, Vec<f32>) {
         let (r, c) = (at / columns, at % columns);
         let near = (r.saturating_sub(1)..(r + 2).min(rows))
             .flat_map(|r| (c.saturating_sub(1)..(c + 2).min(columns)).map(move |c| (r, c)));
-        let mut beside: Vec<usize> = near
-            .map(|(r, c)| owner[r * columns + c])
-            .filter(|name| *name > 0)
-            .map(|name| root(&found, name - 1))
-            .collect();
+        beside.clear();
+        for name in near.filter_map(|(r, c)| owner[r * columns + c].checked_sub(1)) {
+            let name = root(&found, name);
+            if !beside.contains(&name) {
+                beside.push(name);
+            }
+        }
         beside.sort_by(|a, b| found[*b].0.total_cmp(&found[*a].0).then(a.cmp(b)));
-        beside.dedup();
         let Some((&main, others)) = beside.split_first() else {
             found.push((value, 1, found.len()));
             owner[at] = found.len();
@@ -248,10 +256,8 @@ impl Region<'_> {
         let profile = Profile::of(
             &distance,
             own,
-            [
-                around.of(cells.pressure.view()),
-                around.of(cells.slope.view()),
-            ],
+            [&cells.pressure, &cells.slopes[0], &cells.slopes[1]]
+                .map(|field| around.of(field.view())),
             [0.6 * radius, reach as f64],
         );
         let (edge, error) = profile.edge(radius, cell_noise)?;
@@ -286,6 +292,10 @@ impl Region<'_> {
             for column in 0..2 * columns {
                 let (c, u) = split(column, columns);
                 let at = |r: usize, c: usize| distance[[r.min(rows - 1), c.min(columns - 1)]];
+                // Distances change by a cell from cell to cell.
+                if f64::from(at(r, c)) > edge + 4.0 {
+                    continue;
+                }
                 let above = (1.0 - u) * at(r, c) + u * at(r, c + 1);
                 let below = (1.0 - u) * at(r + 1, c) + u * at(r + 1, c + 1);
                 let value = (1.0 - v) * above + v * below;
@@ -295,18 +305,21 @@ impl Region<'_> {
                 }
             }
         }
-        near.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         let count = (area.round() as usize).min(near.len());
-        let limit = near.get(count.checked_sub(1)?)?.0;
-        let rim = near.iter().filter(|(d, _)| (d - limit).abs() < 0.4);
+        let nearer =
+            |a: &(f32, [usize; 2]), b: &(f32, [usize; 2])| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1));
+        let mut order = near.clone();
+        let last = *order
+            .select_nth_unstable_by(count.checked_sub(1)?, nearer)
+            .1;
+        let rim = near.iter().filter(|(d, _)| (d - last.0).abs() < 0.4);
         let rim = rim.map(|(_, at)| *at).collect();
         let mut pixels = Vec::with_capacity(count);
-        for (_, at) in &near[..count] {
-            if !core::mem::replace(&mut taken[*at], true) {
-                pixels.push(*at);
+        for pixel in near.iter().filter(|pixel| nearer(pixel, &last).is_le()) {
+            if !core::mem::replace(&mut taken[pixel.1], true) {
+                pixels.push(pixel.1);
             }
         }
-        pixels.sort_unstable();
         (!pixels.is_empty()).then(|| Patch {
             pixels,
             rim,
@@ -321,7 +334,7 @@ impl Profile {
     fn of(
         distance: &Array2<f32>,
         own: impl Fn((usize, usize)) -> bool,
-        fields: [ArrayView2<'_, f32>; 2],
+        [pressure, p, q]: [ArrayView2<'_, f32>; 3],
         [inwards, outwards]: [f64; 2],
     ) -> Self {
         let low = inwards.ceil();
@@ -331,7 +344,8 @@ impl Profile {
             let bin = (f64::from(*d) + low).round();
             let inside = bin >= 0.0 && own(at);
             if let Some(sums) = sums.get_mut(bin.max(0.0) as usize).filter(|_| inside) {
-                let more = [1.0, fields[0][at], fields[1][at], *d];
+                let slope = (p[at] * p[at] + q[at] * q[at]).sqrt();
+                let more = [1.0, pressure[at], slope, *d];
                 sums.iter_mut()
                     .zip(more)
                     .for_each(|(s, v)| *s += f64::from(v));
@@ -494,10 +508,12 @@ fn distances(targets: Array2<bool>) -> Array2<f32> {
     let far = 1e9_f32;
     let mut square = targets.mapv(|target| if target { 0.0 } else { far });
     for axis in [0, 1] {
+        // Parabolas of the lower envelope, and where each begins.
+        let (mut values, mut envelope): (Vec<f32>, Vec<(usize, f32)>) = Default::default();
         for mut lane in square.lanes_mut(ndarray::Axis(axis)) {
-            let values: Vec<f32> = lane.iter().copied().collect();
-            // Parabolas of the lower envelope, and where each begins.
-            let mut envelope: Vec<(usize, f32)> = Vec::new();
+            values.clear();
+            values.extend(&lane);
+            envelope.clear();
             for (q, value) in values.iter().enumerate() {
                 let meets = |p: usize| {
                     let squares = (q * q) as f32 - (p * p) as f32;

@@ -4,7 +4,7 @@ use ndarray::{Array2, Axis};
 use tactile_core::Estimate;
 
 use crate::GelError;
-use crate::contacts::{Patch, block_means};
+use crate::contacts::{Cells, Patch, block_means};
 use crate::frame_check::FrameDoubt;
 use crate::integration::integrated;
 use crate::model::GelModel;
@@ -33,8 +33,9 @@ const OUTWARDS: f32 = -0.3;
 pub struct GelFrame {
     /// Gradients along x and y.
     pub gradient: [Array2<f32>; 2],
-    /// Standard errors of the gradients.
-    pub gradient_error: [Array2<f32>; 2],
+    /// Standard error of the components of the unit normal: see
+    /// [`gradient_error`](Self::gradient_error).
+    pub normal_standard_error: f64,
     /// How far the face has moved into the gel, in metres, at every pixel. It is zero far away.
     pub depth_m: Array2<f64>,
     /// Standard error of the depth of a pixel, and that of the rest that all count from, in metres.
@@ -78,7 +79,7 @@ impl GelFrame {
         let none = || Array2::from_elem(shape, f32::NAN);
         Self {
             gradient: [none(), none()],
-            gradient_error: [none(), none()],
+            normal_standard_error: f64::NAN,
             depth_m: Array2::from_elem(shape, f64::NAN),
             depth_standard_error_m: [f64::NAN; 2],
             slope_standard_error: f64::NAN,
@@ -88,31 +89,47 @@ impl GelFrame {
         }
     }
 
+    /// Standard errors of the gradients: those of the normal times the derivative of the gradient by
+    /// it, (1 + g gᵀ) √(1 + g²).
+    pub fn gradient_error(&self) -> [Array2<f32>; 2] {
+        let sd = self.normal_standard_error as f32;
+        let [p, q] = &self.gradient;
+        [0, 1].map(|k: usize| {
+            let pairs = ndarray::Zip::from(p).and(q);
+            pairs.map_collect(|p, q| sd * gradient_errors([*p, *q])[k])
+        })
+    }
+
     /// Whether nothing was read because the frame is not this sensor's.
     pub fn is_refused(&self) -> bool {
         self.doubts.iter().any(FrameDoubt::refuses)
     }
 }
 
+/// Standard errors of a gradient for one of the normal.
+pub fn gradient_errors([p, q]: [f32; 2]) -> [f32; 2] {
+    let length = (1.0 + p * p + q * q).sqrt();
+    [p, q].map(|own| length * ((1.0 + own * own).powi(2) + (p * q).powi(2)).sqrt())
+}
+
 /// The face and the contacts of slopes.
 pub fn frame(
     (model, tails): (&GelModel, &Tails),
     gradient: [Array2<f32>; 2],
-    gradient_error: [Array2<f32>; 2],
-    pressure: &Array2<f32>,
+    cells: &Cells,
     patches: Vec<Patch>,
     doubts: Vec<FrameDoubt>,
 ) -> Result<GelFrame, GelError> {
     let shape = gradient[0].dim();
     let size = model.pixel_size_m;
-    let mut depth = integrated(gradient.each_ref(), size)?;
+    let mut depth = integrated(gradient.each_ref(), cells.slopes.each_ref(), size)?;
     let mut labels = Array2::zeros(shape);
     for (k, patch) in patches.iter().enumerate() {
         for at in &patch.pixels {
             labels[*at] = k as u16 + 1;
         }
     }
-    let (rest, rest_error) = rest(tails, &depth, &labels, pressure, size);
+    let (rest, rest_error) = rest(tails, &depth, &labels, &cells.pressure, size);
     depth -= rest;
     let contacts = patches.iter().map(|patch| {
         let face = Face {
@@ -127,7 +144,7 @@ pub fn frame(
     Ok(GelFrame {
         contacts,
         gradient,
-        gradient_error,
+        normal_standard_error: model.normal_standard_error,
         depth_m: depth,
         depth_standard_error_m: [model.depth_standard_error_m, rest_error],
         slope_standard_error: model.slope_standard_error,
@@ -208,7 +225,7 @@ impl Face<'_> {
     }
 }
 
-/// Whether slopes are of no face that is pressed in, on blocks of a frame.
+/// Whether slopes are of no face that is pressed in, on blocks of cells.
 pub struct SurfaceCheck {
     block: usize,
     plane: Plane,
@@ -216,16 +233,21 @@ pub struct SurfaceCheck {
 
 impl SurfaceCheck {
     pub fn new((rows, columns): (usize, usize)) -> Self {
-        let block = rows.max(columns).div_ceil(COARSE).max(2);
+        let (rows, columns) = (rows / 2, columns / 2);
+        let block = rows.max(columns).div_ceil(COARSE).max(1);
         Self {
             block,
             plane: Plane::new((rows / block, columns / block), 0.2, None),
         }
     }
 
-    /// Whether their curl is as large as their divergence, or the face comes out of the gel.
-    pub fn no_surface(&self, slopes: [&Array2<f32>; 2], noise_floor: f32) -> bool {
-        let [p, q] = slopes.map(|slope| block_means(slope.view(), self.block));
+    /// Whether the curl of slopes on cells is as large as their divergence, or the face comes out of
+    /// the gel.
+    pub fn no_surface(&self, cells: &Cells, noise_floor: f32) -> bool {
+        let [p, q] = cells
+            .slopes
+            .each_ref()
+            .map(|slope| block_means(slope.view(), self.block));
         if p.nrows() < 6 || p.ncols() < 6 {
             return false;
         }

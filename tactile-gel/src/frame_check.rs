@@ -162,29 +162,31 @@ impl Blocks {
         let size = size.min(rows).min(columns);
         let (high, wide) = (rows / size, columns / size);
         let mut means = Array3::zeros((high, wide, 3));
-        let mut rough = (0.0, 0.0);
+        let (mut rough, mut steps) = (0_u64, 0_u64);
         for r in 0..high {
             for c in 0..wide {
-                // Every other pixel of every other row is enough for a mean.
-                let mut sums = [0.0_f32; 4];
-                for row in (r * size..(r + 1) * size).step_by(2) {
-                    for column in (c * size..(c + 1) * size).step_by(2) {
-                        let level = image.levels(row, column);
-                        (0..3).for_each(|k| sums[k] += level[k]);
-                        sums[3] += 1.0;
-                        if column >= 3 {
-                            let before = image.levels(row, column - 3);
-                            let step: f32 = (0..3).map(|k| (level[k] - before[k]).abs()).sum();
-                            rough = (rough.0 + f64::from(step), rough.1 + 1.0);
+                let (from, to) = (c * size, (c + 1) * size);
+                for k in 0..3 {
+                    // Every other pixel of every other row is enough for a mean.
+                    let (mut sum, mut count) = (0_u64, 0_u64);
+                    for row in (r * size..(r + 1) * size).step_by(2) {
+                        let line = image.line(k, row);
+                        for column in (from..to).step_by(2) {
+                            sum += u64::from(line[column]);
+                            count += 1;
+                            if column >= 3 {
+                                rough += u64::from(line[column].abs_diff(line[column - 3]));
+                                steps += u64::from(k == 0);
+                            }
                         }
                     }
+                    means[[r, c, k]] = sum as f32 / (256.0 * count as f32);
                 }
-                (0..3).for_each(|k| means[[r, c, k]] = sums[k] / sums[3]);
             }
         }
         Self {
             means,
-            roughness: rough.0 / f64::max(rough.1, 1.0),
+            roughness: rough as f64 / 256.0 / steps.max(1) as f64,
         }
     }
 

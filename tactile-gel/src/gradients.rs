@@ -1,6 +1,6 @@
 //! Colour differences against the reference, and the polynomial from them to normals.
 
-use ndarray::{Array2, ArrayView3};
+use ndarray::{Array2, ArrayView2, ArrayView3, Axis};
 use tactile_core::vectorised;
 
 /// Monomials up to the third degree of three colour differences.
@@ -12,7 +12,11 @@ pub const TERMS: usize = 3 * MONOMIALS;
 /// Columns that are computed together, so that the compiler uses wide instructions.
 const LANES: usize = 16;
 
-/// An 8-bit colour image blurred by the binomial kernel (1, 4, 6, 4, 1)/16 along both axes.
+/// Samples of the border, at the most, that a median is taken of. More hardly change it.
+const BORDER_SAMPLES: usize = 6400;
+
+/// An 8-bit colour image blurred by the binomial kernel (1, 4, 6, 4, 1)/16 along both axes, channel
+/// by channel.
 ///
 /// The kernel has a standard deviation of one pixel. Samples are kept as whole numbers of 1/256
 /// grey level, which 16 bits hold exactly. The border is continued by its last pixel.
@@ -20,38 +24,38 @@ const LANES: usize = 16;
 pub struct Blurred {
     rows: usize,
     columns: usize,
-    samples: Vec<u16>,
+    channels: [Vec<u16>; 3],
 }
 
 impl Blurred {
     pub fn of(image: ArrayView3<'_, u8>) -> Self {
         let (rows, columns, _) = image.dim();
-        let width = 3 * columns;
-        let mut across = vec![0_u16; rows * width];
-        let mut line = vec![0_u16; width + 12];
-        for (row, out) in image.outer_iter().zip(across.chunks_exact_mut(width)) {
-            for (to, from) in line[6..].iter_mut().zip(row.iter()) {
-                *to = u16::from(*from);
+        let mut channels = [(); 3].map(|()| vec![0_u16; rows * columns]);
+        // Rows that are blurred along themselves: five are needed at a time.
+        let mut ring = [(); 5].map(|()| [(); 3].map(|()| vec![0_u16; columns]));
+        let mut lines = [(); 3].map(|()| vec![0_u16; columns + 4]);
+        let mut ready = 0;
+        for row in 0..rows {
+            while ready < (row + 3).min(rows) {
+                parted(image.index_axis(Axis(0), ready), &mut lines);
+                for (line, out) in lines.iter_mut().zip(&mut ring[ready % 5]) {
+                    let (first, last) = (line[2], line[columns + 1]);
+                    line[..2].fill(first);
+                    line[columns + 2..].fill(last);
+                    binomial([0, 1, 2, 3, 4].map(|k| &line[k..][..columns]), out);
+                }
+                ready += 1;
             }
-            for k in 0..6 {
-                line[k] = line[6 + k % 3];
-                line[6 + width + k] = line[3 + width + k % 3];
+            let near = |k: usize| (row + k).saturating_sub(2).min(rows - 1) % 5;
+            for (channel, out) in channels.iter_mut().enumerate() {
+                let taps = [0, 1, 2, 3, 4].map(|k| &ring[near(k)][channel][..]);
+                binomial(taps, &mut out[row * columns..][..columns]);
             }
-            // Neighbours of one channel lie three samples apart.
-            binomial([0, 1, 2, 3, 4].map(|k| &line[3 * k..][..width]), out);
-        }
-        let mut samples = vec![0_u16; rows * width];
-        for (row, out) in samples.chunks_exact_mut(width).enumerate() {
-            let near = |k: usize| (row + k).saturating_sub(2).min(rows - 1);
-            binomial(
-                [0, 1, 2, 3, 4].map(|k| &across[near(k) * width..][..width]),
-                out,
-            );
         }
         Self {
             rows,
             columns,
-            samples,
+            channels,
         }
     }
 
@@ -59,18 +63,16 @@ impl Blurred {
         (self.rows, self.columns)
     }
 
-    /// Levels of a pixel's channels.
-    #[inline(always)]
-    pub fn levels(&self, row: usize, column: usize) -> [f32; 3] {
-        let at = 3 * (row * self.columns + column);
-        [0, 1, 2].map(|k| f32::from(self.samples[at + k]) / 256.0)
+    /// A row of a channel, in 1/256 grey level.
+    pub fn line(&self, channel: usize, row: usize) -> &[u16] {
+        &self.channels[channel][row * self.columns..][..self.columns]
     }
 
     /// The image at a `gain`-th of its exposure.
     pub fn divided_by(mut self, gain: f64) -> Self {
         if gain != 1.0 {
             let factor = (1.0 / gain) as f32;
-            for sample in &mut self.samples {
+            for sample in self.channels.iter_mut().flatten() {
                 // Levels above 255 are beyond those that calibrations see.
                 *sample = (f32::from(*sample) * factor).round().min(65535.0) as u16;
             }
@@ -85,21 +87,19 @@ impl Blurred {
     fn offset(&self, reference: &Self) -> [f32; 3] {
         // A strip of a thirteenth and a sixteenth at each side is a quarter of the pixels.
         let (high, wide) = (self.rows.div_ceil(13), self.columns.div_ceil(16));
-        let mut border: [Vec<i32>; 3] = Default::default();
-        for row in 0..self.rows {
-            let whole = row < high || row + high >= self.rows;
-            // Every third pixel is enough for a median.
-            for column in (row % 3..self.columns).step_by(3) {
-                if whole || column < wide || column + wide >= self.columns {
-                    let at = 3 * (row * self.columns + column);
-                    for (channel, differences) in border.iter_mut().enumerate() {
-                        let levels = [self, reference].map(|i| i32::from(i.samples[at + channel]));
-                        differences.push(levels[0] - levels[1]);
+        // Every third pixel is enough for a median, of large frames fewer.
+        let step = (self.rows * self.columns / (4 * BORDER_SAMPLES)).max(3);
+        [0, 1, 2].map(|channel| {
+            let mut differences = Vec::new();
+            for row in 0..self.rows {
+                let [own, flat] = [self, reference].map(|image| image.line(channel, row));
+                let whole = row < high || row + high >= self.rows;
+                for column in (row % step..self.columns).step_by(step) {
+                    if whole || column < wide || column + wide >= self.columns {
+                        differences.push(i32::from(own[column]) - i32::from(flat[column]));
                     }
                 }
             }
-        }
-        border.map(|mut differences| {
             let middle = differences.len() / 2;
             match differences.is_empty() {
                 true => 0.0,
@@ -111,14 +111,27 @@ impl Blurred {
     /// Differences to `reference` less the offset, in units of 50 grey levels, for one row.
     #[inline(always)]
     fn differences(&self, reference: &Self, offset: [f32; 3], row: usize, out: &mut [Vec<f32>; 3]) {
-        let width = 3 * self.columns;
-        let lines = [self, reference].map(|image| &image.samples[row * width..][..width]);
         for (channel, out) in out.iter_mut().enumerate() {
-            let pixels = lines[0].chunks_exact(3).zip(lines[1].chunks_exact(3));
-            for (out, (pixel, flat)) in out.iter_mut().zip(pixels) {
-                let difference = (f32::from(pixel[channel]) - f32::from(flat[channel])) / 256.0;
+            let [own, flat] = [self, reference].map(|image| image.line(channel, row));
+            for ((out, own), flat) in out.iter_mut().zip(own).zip(flat) {
+                let difference = (f32::from(*own) - f32::from(*flat)) / 256.0;
                 *out = (difference - offset[channel]) / 50.0;
             }
+        }
+    }
+}
+
+/// The channels of a row, with room for two samples before them and after them.
+fn parted(row: ArrayView2<'_, u8>, lines: &mut [Vec<u16>; 3]) {
+    let [a, b, c] = lines.each_mut().map(|line| &mut line[2..]);
+    let places = a.iter_mut().zip(b).zip(c);
+    if let Some(bytes) = row.as_slice() {
+        for (((a, b), c), pixel) in places.zip(bytes.chunks_exact(3)) {
+            (*a, *b, *c) = (pixel[0].into(), pixel[1].into(), pixel[2].into());
+        }
+    } else {
+        for (((a, b), c), pixel) in places.zip(row.outer_iter()) {
+            (*a, *b, *c) = (pixel[0].into(), pixel[1].into(), pixel[2].into());
         }
     }
 }

@@ -12,22 +12,58 @@ use tactile_sfs::{CosinePoisson, Domain, SlopeIntegrator};
 
 use crate::GelError;
 
-/// Blocks along the longer side of a frame that the added depth is found on. Twice as many change the
+/// Blocks along the longer side of the grid that the added depth is found on. Twice as many change the
 /// heights of real balls by less than a hundredth of their error.
-const BLOCKS: usize = 40;
+const BLOCKS: usize = 24;
+/// Frames of fewer cells are solved for pixel by pixel.
+const LEAST_CELLS: usize = 8;
 /// Rounds of conjugate gradients at most, and the share of the residual at which they end.
 const ROUNDS: usize = 60;
 const ENOUGH: f64 = 1e-3;
 
-/// Depth in the unit of `size`, that of a pixel, up to a constant.
-pub fn integrated(slopes: [&Array2<f32>; 2], size: f64) -> Result<Array2<f64>, GelError> {
+/// Depth in the unit of `size`, that of a pixel, up to a constant. `means` are the slopes on cells of
+/// 2 × 2 pixels, half of the frame's size. The blur of the frames is wider than a cell: depth is solved
+/// for on cells, and goes on from their middles to the pixels by the slopes of both.
+pub fn integrated(
+    slopes: [&Array2<f32>; 2],
+    means: [&Array2<f32>; 2],
+    size: f64,
+) -> Result<Array2<f64>, GelError> {
+    let shape = slopes[0].dim();
+    if shape.0.min(shape.1) < 2 * LEAST_CELLS {
+        return solved(slopes, size);
+    }
+    let cells = solved(means, 2.0 * size)?;
+    let (high, wide) = cells.dim();
+    let mut depth = Array2::zeros(shape);
+    for (row, mut line) in depth.outer_iter_mut().enumerate() {
+        // Odd last rows and columns go on from the last cells.
+        let r = (row / 2).min(high - 1);
+        let down = 0.5 * size * (row as f64 - 2.0 * r as f64 - 0.5);
+        let (cells, [p, q]) = (cells.row(r), means.map(|mean| mean.row(r)));
+        let own = slopes.map(|slope| slope.row(row));
+        let pixel = |c: usize, right: f64, own: [f32; 2]| {
+            let [p, q] = [own[0] + p[c], own[1] + q[c]].map(f64::from);
+            cells[c] + 0.5 * size * right * p + down * q
+        };
+        let pixels = line.iter_mut().zip(own[0]).zip(own[1]).enumerate();
+        for (column, ((depth, p), q)) in pixels {
+            let c = (column / 2).min(wide - 1);
+            *depth = pixel(c, column as f64 - 2.0 * c as f64 - 0.5, [*p, *q]);
+        }
+    }
+    Ok(depth)
+}
+
+/// Depth of slopes on a grid, each by what it is worth.
+fn solved(slopes: [&Array2<f32>; 2], size: f64) -> Result<Array2<f64>, GelError> {
     let [p, q] = slopes.map(|slope| slope.mapv(f64::from));
     let domain = Domain::new([size; 2])?;
     let mut depth = CosinePoisson
         .integrate(p.view(), q.view(), &domain)?
         .heights;
     let (rows, columns) = depth.dim();
-    let block = rows.max(columns).div_ceil(BLOCKS).max(4);
+    let block = rows.max(columns).div_ceil(BLOCKS).max(2);
     if rows.min(columns) >= 2 * block {
         let added = Coarse::of(slopes, &depth, size, block).depth();
         add_between(&mut depth, &added, block);
@@ -35,114 +71,118 @@ pub fn integrated(slopes: [&Array2<f32>; 2], size: f64) -> Result<Array2<f64>, G
     Ok(depth)
 }
 
-/// The weighted fit on blocks of pixels: what the edges between neighbours weigh, and the rises that
-/// are left along them.
+/// The weighted fit on blocks: what the edges between neighbours weigh, and the rises that are left
+/// along them. Row after row, the edge to the right and the one downwards of every block. Those at
+/// the border weigh nothing.
 struct Coarse {
-    /// Of the edges to the right and downwards from every block, zero at the border.
-    weights: [Array2<f64>; 2],
-    rises: [Array2<f64>; 2],
+    shape: (usize, usize),
+    weights: [Vec<f64>; 2],
+    rises: [Vec<f64>; 2],
 }
 
 impl Coarse {
     fn of(slopes: [&Array2<f32>; 2], depth: &Array2<f64>, size: f64, block: usize) -> Self {
         let (rows, columns) = depth.dim();
         let shape = (rows / block, columns / block);
-        let mut means = [(); 4].map(|()| Array2::<f64>::zeros(shape));
-        // Every other pixel of every other row is enough for a mean.
-        let last = [shape.0 * block, shape.1 * block];
-        for row in (1..last[0].min(rows - 1)).step_by(2) {
-            for column in (1..last[1].min(columns - 1)).step_by(2) {
-                let [p, q] = slopes.map(|slope| f64::from(slope[[row, column]]));
-                let [left, right] = [column - 1, column + 1].map(|c| depth[[row, c]]);
-                let [above, below] = [row - 1, row + 1].map(|r| depth[[r, column]]);
-                let [x, y] = [
-                    p - (right - left) / (2.0 * size),
-                    q - (below - above) / (2.0 * size),
-                ];
-                // The derivative of n/n_z by n is (1 + n nᵀ/n_z²)/n_z, and n/n_z are the slopes.
-                let up2 = 1.0 / (1.0 + p * p + q * q);
-                let across = (p * q).powi(2);
-                let [wx, wy] = [p, q].map(|s| up2 / ((1.0 + s * s).powi(2) + across));
-                let at = [row / block, column / block];
-                for (mean, more) in means.iter_mut().zip([wx, wy, wx * x, wy * y]) {
-                    mean[at] += more;
+        let mut means = vec![[0.0; 4]; shape.0 * shape.1];
+        for row in 1..(shape.0 * block).min(rows - 1) {
+            let [above, here, below] = [row - 1, row, row + 1].map(|r| depth.row(r));
+            let [p, q] = slopes.map(|slope| slope.row(row));
+            let blocks = &mut means[row / block * shape.1..][..shape.1];
+            for (b, mean) in blocks.iter_mut().enumerate() {
+                for column in (b * block).max(1)..((b + 1) * block).min(columns - 1) {
+                    let [p, q] = [p, q].map(|slope| f64::from(slope[column]));
+                    let x = p - (here[column + 1] - here[column - 1]) / (2.0 * size);
+                    let y = q - (below[column] - above[column]) / (2.0 * size);
+                    // The derivative of n/n_z by n is (1 + n nᵀ/n_z²)/n_z, and n/n_z are the slopes.
+                    let up2 = 1.0 / (1.0 + p * p + q * q);
+                    let across = (p * q).powi(2);
+                    let [wx, wy] = [p, q].map(|s| up2 / ((1.0 + s * s).powi(2) + across));
+                    let more = [wx, wy, wx * x, wy * y];
+                    mean.iter_mut()
+                        .zip(more)
+                        .for_each(|(mean, more)| *mean += more);
                 }
             }
         }
-        let [wx, wy, x, y] = means;
-        let share = 4.0 / (block * block) as f64;
+        let share = 1.0 / (block * block) as f64;
         let step = block as f64 * size;
-        let edges = |weights: &Array2<f64>, sums: &Array2<f64>, ahead: [usize; 2]| {
-            let mut edges = [(); 2].map(|()| Array2::<f64>::zeros(shape));
-            for ((r, c), a) in weights.indexed_iter() {
-                let there = [r + ahead[0], c + ahead[1]];
-                if let Some(b) = weights.get(there) {
-                    let slope = 0.5 * (sums[[r, c]] / a + sums[there] / b);
-                    edges[0][[r, c]] = 2.0 * share * a * b / (a + b);
-                    edges[1][[r, c]] = step * slope;
-                }
+        let (mut weights, mut rises) = ([(); 2].map(|()| Vec::new()), [(); 2].map(|()| Vec::new()));
+        for (i, a) in means.iter().enumerate() {
+            let inside = [(i + 1) % shape.1 != 0, i + shape.1 < means.len()];
+            for (axis, ahead) in [1, shape.1].into_iter().enumerate() {
+                let edge = means.get(i + ahead).filter(|_| inside[axis]).map(|b| {
+                    let slope = 0.5 * (a[axis + 2] / a[axis] + b[axis + 2] / b[axis]);
+                    (
+                        2.0 * share * a[axis] * b[axis] / (a[axis] + b[axis]),
+                        step * slope,
+                    )
+                });
+                let (weight, rise) = edge.unwrap_or_default();
+                weights[axis].push(weight);
+                rises[axis].push(rise);
             }
-            edges
-        };
-        let [across, down] = [edges(&wx, &x, [0, 1]), edges(&wy, &y, [1, 0])];
-        let ([wx, x], [wy, y]) = (across, down);
+        }
         Self {
-            weights: [wx, wy],
-            rises: [x, y],
+            shape,
+            weights,
+            rises,
         }
     }
 
-    /// Sums over each block of what flows in along its edges.
-    fn inflow(&self, flow: impl Fn(usize, [usize; 2], [usize; 2]) -> f64) -> Array2<f64> {
-        let (rows, columns) = self.weights[0].dim();
-        let mut sums = Array2::<f64>::zeros((rows, columns));
-        for r in 0..rows {
-            for c in 0..columns {
-                for (axis, there) in [[r, c + 1], [r + 1, c]].into_iter().enumerate() {
-                    if there[0] < rows && there[1] < columns {
-                        let flow = self.weights[axis][[r, c]] * flow(axis, [r, c], there);
-                        sums[[r, c]] -= flow;
-                        sums[there] += flow;
-                    }
-                }
+    /// Sums over each block of what flows in along its edges: weight times rise.
+    fn inflow(&self, rise: impl Fn(usize, usize, usize) -> f64, sums: &mut [f64]) {
+        sums.fill(0.0);
+        for (axis, ahead) in [1, self.shape.1].into_iter().enumerate() {
+            let weights = &self.weights[axis][..sums.len() - ahead];
+            for (i, weight) in weights.iter().enumerate() {
+                let flow = weight * rise(axis, i, i + ahead);
+                sums[i] -= flow;
+                sums[i + ahead] += flow;
             }
         }
-        sums
     }
 
     /// Conjugate gradients, with the diagonal as preconditioner.
     fn depth(&self) -> Array2<f64> {
-        let mut left = self.inflow(|axis, here, _| self.rises[axis][here]);
-        let mut diagonal = Array2::<f64>::zeros(left.dim());
-        for (r, c) in ndarray::indices(left.dim()) {
-            let [wx, wy] = self.weights.each_ref().map(|w| w[[r, c]]);
-            diagonal[[r, c]] += wx + wy;
-            if let Some(d) = diagonal.get_mut([r, c + 1]) {
-                *d += wx;
-            }
-            if let Some(d) = diagonal.get_mut([r + 1, c]) {
-                *d += wy;
+        let count = self.shape.0 * self.shape.1;
+        let [mut left, mut moved, mut diagonal] = [(); 3].map(|()| vec![0.0; count]);
+        self.inflow(|axis, i, _| self.rises[axis][i], &mut left);
+        for (weights, ahead) in self.weights.iter().zip([1, self.shape.1]) {
+            for (i, weight) in weights[..count - ahead].iter().enumerate() {
+                diagonal[i] += weight;
+                diagonal[i + ahead] += weight;
             }
         }
-        let mut depth = Array2::<f64>::zeros(left.dim());
-        let mut scaled = &left / &diagonal;
-        let mut along = scaled.clone();
-        let mut product = (&left * &scaled).sum();
+        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+        let over_diagonal = |left: &[f64]| -> Vec<f64> {
+            left.iter()
+                .zip(&diagonal)
+                .map(|(left, d)| left / d)
+                .collect()
+        };
+        let mut depth = vec![0.0; count];
+        let mut along = over_diagonal(&left);
+        let mut product = dot(&left, &along);
         let end = ENOUGH * ENOUGH * product;
         for _ in 0..ROUNDS {
             if product <= end {
                 break;
             }
-            let moved = self.inflow(|_, here, there| along[there] - along[here]);
-            let step = product / (&along * &moved).sum();
-            depth.scaled_add(step, &along);
-            left.scaled_add(-step, &moved);
-            scaled = &left / &diagonal;
-            let next = (&left * &scaled).sum();
-            along = &scaled + &(&along * (next / product));
+            self.inflow(|_, here, there| along[there] - along[here], &mut moved);
+            let step = product / dot(&along, &moved);
+            for i in 0..count {
+                depth[i] += step * along[i];
+                left[i] -= step * moved[i];
+            }
+            let scaled = over_diagonal(&left);
+            let next = dot(&left, &scaled);
+            for (along, scaled) in along.iter_mut().zip(scaled) {
+                *along = scaled + *along * (next / product);
+            }
             product = next;
         }
-        depth
+        Array2::from_shape_fn(self.shape, |(r, c)| depth[r * self.shape.1 + c])
     }
 }
 

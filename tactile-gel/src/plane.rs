@@ -95,7 +95,7 @@ impl Plane {
         let least = LEAST_YIELD as f32;
         let out = self.each(|at, mirrored, [x, y]| {
             let [p, q] = parts(spectrum[at], spectrum[mirrored]);
-            let over = x.hypot(y) * self.yields.get(at).map_or(1.0, |l| l.max(least));
+            let over = (x * x + y * y).sqrt() * self.yields.get(at).map_or(1.0, |l| l.max(least));
             if over > 0.0 {
                 // −i (x p + y q)/(k L)
                 let sum = p * x + q * y;
@@ -119,7 +119,7 @@ impl Plane {
     pub fn moved(&self, f: ArrayView2<'_, f32>) -> (Array2<f32>, [Array2<f32>; 2]) {
         let spectrum = self.spectrum(f, None);
         let face = |at: usize, [x, y]: [f32; 2]| {
-            let k = x.hypot(y);
+            let k = (x * x + y * y).sqrt();
             let yields = self.yields.get(at).copied().unwrap_or(1.0);
             if k > 0.0 {
                 spectrum[at] * (yields / k)

@@ -36,11 +36,37 @@ const UNEVEN: f64 = 0.3;
 /// Error of the level as a share of the tail, of what the family of layers does not hold.
 const SHAPE_ERROR: f64 = 0.15;
 
-/// ρ g(ρ) of a layer of Poisson's ratio 0.48.
-pub struct Tails(Vec<f64>);
+/// Steps of the distance along the longer side, and distances up to the frame's diagonal.
+const STEPS: usize = 1024;
+const DISTANCES: usize = 1450;
+
+/// The tails of layers of Poisson's ratio 0.48: r/h times g(r/h) of each thickness, at distances in
+/// steps of the frame's longer side.
+pub struct Tails(Vec<[f64; THICKNESSES.len()]>);
+
+/// ρ g(ρ) of a layer, tabulated.
+struct LayerTail(Vec<f64>);
 
 impl Tails {
     pub fn new() -> Self {
+        let tail = LayerTail::new();
+        let at = |k: usize| THICKNESSES.map(|h| tail.at(k as f64 / STEPS as f64 / h));
+        Self((0..=DISTANCES).map(at).collect())
+    }
+
+    /// Adds `strength` times the tails at a distance in longer sides.
+    fn add(&self, distance: f64, strength: f64, tails: &mut [f64; THICKNESSES.len()]) {
+        let at = distance * STEPS as f64;
+        let low = (at as usize).min(DISTANCES - 1);
+        let (far, [a, b]) = (at - low as f64, [&self.0[low], &self.0[low + 1]]);
+        for ((tail, a), b) in tails.iter_mut().zip(a).zip(b) {
+            *tail += strength * (a + far * (b - a));
+        }
+    }
+}
+
+impl LayerTail {
+    fn new() -> Self {
         let layer = LayerShape {
             thickness: 1.0,
             poisson_ratio: GelLayer::DEFAULT_POISSON_RATIO,
@@ -95,20 +121,21 @@ pub fn rest(
     let sources = sources(labels, pressure);
     let step = ((rows + columns) / PLACES).max(1);
     let near = 2.0 * rows.max(columns) as f64 / SOURCES as f64;
-    let thicknesses = THICKNESSES.map(|share| share * rows.max(columns) as f64);
+    let longer = rows.max(columns) as f64;
     let place = |(r, c): (usize, usize)| {
         let (row, column) = (r * step, c * step);
+        if labels[[row, column]] > 0 {
+            return None;
+        }
         let mut tail = [0.0; THICKNESSES.len()];
         for [f, x, y] in &sources {
             let r = ((column as f64 - x).powi(2) + (row as f64 - y).powi(2)).sqrt();
             if r < near {
                 return None;
             }
-            for (tail, h) in tail.iter_mut().zip(&thicknesses) {
-                *tail += size * f / r * tails.at(r / h);
-            }
+            tails.add(r / longer, size * f / r, &mut tail);
         }
-        (labels[[row, column]] == 0).then(|| Place {
+        Some(Place {
             depth: depth[[row, column]],
             tail,
         })
@@ -139,7 +166,7 @@ pub fn rest(
     // Likelihoods, with the variance that the best fit shows.
     let variance = least + FAMILY_ERROR * FAMILY_ERROR * all + f64::MIN_POSITIVE;
     let weight = |k: usize| {
-        let prior = if thicknesses[k].is_finite() {
+        let prior = if THICKNESSES[k].is_finite() {
             1.0
         } else {
             HALF_SPACES
@@ -237,7 +264,7 @@ mod tests {
     /// wave: 4(κ − 1)/(1 + κ)² thicknesses.
     #[test]
     fn tails_of_layers_begin_as_those_of_half_spaces() {
-        let tails = Tails::new();
+        let tails = LayerTail::new();
         assert!((tails.at(0.0) - 1.0 / core::f64::consts::TAU).abs() < 1e-12);
         let step = 1.0 / STEPS_PER_THICKNESS as f64;
         let rings = (0..tails.0.len()).map(|k| tails.at(k as f64 * step));

@@ -146,51 +146,40 @@ impl GelSensor {
         frame: &Blurred,
         mut doubts: Vec<FrameDoubt>,
     ) -> Result<GelFrame, GelError> {
-        let [mut p, mut q] = normals(frame, &self.reference, &self.model.coefficients);
-        let mut errors = [Array2::zeros(p.dim()), Array2::zeros(p.dim())];
-        let sd = self.model.normal_standard_error as f32;
-        let [error_p, error_q] = &mut errors;
-        // Arrays that were made here are slices.
-        let all = [&mut p, &mut q, error_p, error_q].map(|array| array.as_slice_mut());
-        if let [Some(p), Some(q), Some(error_p), Some(error_q)] = all {
-            slopes([p, q], [error_p, error_q], sd);
-        }
-        let cells = self.cells([&p, &q]);
-        if self.check.no_surface([&p, &q], self.noise_floor()) {
+        let slopes = self.slopes(frame);
+        let cells = self.cells(&slopes);
+        if self.check.no_surface(&cells, self.noise_floor()) {
             doubts.push(FrameDoubt::NoSurface);
         }
-        let found = patches(&cells, p.dim(), self.noise_floor());
-        face::frame(
-            (&self.model, &self.tails),
-            [p, q],
-            errors,
-            &cells.pressure,
-            found,
-            doubts,
-        )
+        let found = patches(&cells, self.shape(), self.noise_floor());
+        face::frame((&self.model, &self.tails), slopes, &cells, found, doubts)
     }
 
     /// The patches of contact of a frame.
     pub(crate) fn patches(&self, frame: &Blurred) -> Vec<Patch> {
-        let [mut p, mut q] = normals(frame, &self.reference, &self.model.coefficients);
-        ndarray::Zip::from(&mut p).and(&mut q).for_each(|p, q| {
-            let cut = STEEPEST / (*p * *p + *q * *q).sqrt().max(STEEPEST);
-            let (x, y) = (*p * cut, *q * cut);
-            let up = (1.0 - x * x - y * y).sqrt();
-            (*p, *q) = (-x / up, -y / up);
-        });
-        patches(&self.cells([&p, &q]), p.dim(), self.noise_floor())
+        patches(
+            &self.cells(&self.slopes(frame)),
+            self.shape(),
+            self.noise_floor(),
+        )
     }
 
-    /// Pressure and slope on cells of 2 × 2 pixels.
-    fn cells(&self, slopes: [&Array2<f32>; 2]) -> Cells {
-        let [p, q] = slopes.map(|slope| block_means(slope.view(), 2));
-        let slope = ndarray::Zip::from(&p)
-            .and(&q)
-            .map_collect(|p, q| (p * p + q * q).sqrt());
+    /// Slopes of the depth at every pixel.
+    fn slopes(&self, frame: &Blurred) -> [Array2<f32>; 2] {
+        let [mut p, mut q] = normals(frame, &self.reference, &self.model.coefficients);
+        // Arrays that were made here are slices.
+        if let (Some(p), Some(q)) = (p.as_slice_mut(), q.as_slice_mut()) {
+            slopes(p, q);
+        }
+        [p, q]
+    }
+
+    /// Slopes and pressure on cells of 2 × 2 pixels.
+    fn cells(&self, slopes: &[Array2<f32>; 2]) -> Cells {
+        let [p, q] = slopes.each_ref().map(|slope| block_means(slope.view(), 2));
         Cells {
             pressure: self.plane.pressure(p.view(), q.view()),
-            slope,
+            slopes: [p, q],
         }
     }
 
@@ -202,26 +191,19 @@ impl GelSensor {
     }
 }
 
-/// Turns normals into slopes, and gives the standard errors of both for one of the normals.
-fn slopes(normals: [&mut [f32]; 2], errors: [&mut [f32]; 2], sd: f32) {
-    let [p, q] = normals;
-    let (q, [error_p, error_q]) = (&mut q[..p.len()], errors.map(|e| &mut e[..p.len()]));
+/// Turns normals into slopes of the depth.
+fn slopes(p: &mut [f32], q: &mut [f32]) {
     vectorised(
         #[inline(always)]
         || {
-            for k in 0..p.len() {
-                let (nx, ny) = (p[k], q[k]);
-                let sine = (nx * nx + ny * ny).sqrt();
+            for (p, q) in p.iter_mut().zip(q.iter_mut()) {
+                let sine = (*p * *p + *q * *q).sqrt();
                 // Both components shrink alike, so that the direction of the slope is kept.
                 let cut = STEEPEST / sine.max(STEEPEST);
-                let (x, y) = (nx * cut, ny * cut);
-                let up2 = 1.0 - x * x - y * y;
-                let (up, [xx, xy, yy]) = (up2.sqrt(), [x * x, x * y, y * y].map(|v| v / up2));
-                // The derivative of n/n_z by n is (1 + n nᵀ/n_z²)/n_z.
-                error_p[k] = sd / up * ((1.0 + xx).powi(2) + xy * xy).sqrt();
-                error_q[k] = sd / up * ((1.0 + yy).powi(2) + xy * xy).sqrt();
+                let (x, y) = (*p * cut, *q * cut);
                 // Outward normals of the gel rise where depth falls.
-                (p[k], q[k]) = (-x / up, -y / up);
+                let up = -(1.0 - x * x - y * y).sqrt();
+                (*p, *q) = (x / up, y / up);
             }
         },
     );
