@@ -7,6 +7,20 @@ use tactile_core::{BoundingBox, Estimate};
 
 use crate::tiles::{TILE_COLUMNS, TILE_ROWS, TileSum};
 
+/// Reference in grey levels below which it is none.
+const LEAST_REFERENCE_GREY: f64 = 1e-3;
+
+/// Probability at which a change is taken for one of stray light: the lamps of a sensor drift more
+/// often than the light around it.
+const SURE: f64 = 0.9;
+
+/// Standard errors of the level within which the light has not changed.
+const CHANGED: f64 = 2.0;
+
+/// Squared standard errors between the background's structure and a change of light alone, and one of
+/// illumination alone, beyond which both have changed.
+const BOTH: f64 = 16.0;
+
 /// The change of illumination or stray light that is corrected. Detection takes
 /// [`Automatic`](Self::Automatic) by default.
 ///
@@ -45,8 +59,10 @@ pub enum DriftCorrection {
     /// Illumination that also changed its distribution, as when an LED moves: d = f/(g + gₓ x + g_y
     /// y) − r.
     TiltedIllumination,
-    /// [`Illumination`](Self::Illumination) where the frame shows it, nothing where it does not:
-    /// [`DriftOutcome`] states which.
+    /// Illumination g and stray light b together, d = (f − b)/g − r, where the frame shows its level
+    /// ([`DriftOutcome`]), else nothing. The background's structure shows which of them changed. A
+    /// flat background does not: the change is then taken for the illumination, and the error of the
+    /// signal's scale holds both.
     Automatic,
 }
 
@@ -153,6 +169,10 @@ pub struct IlluminationDrift {
     /// Offset (grey levels) or relative illumination (1 for unchanged) in the frame's middle, and
     /// its change per column and per row.
     pub coefficients: [f64; 3],
+    /// Stray light beside the illumination, in grey levels.
+    pub stray_grey: f64,
+    /// Variance of the signal's scale, of an illumination that is known worse than the background.
+    scale_variance: f64,
     /// Standard error of the first coefficient.
     pub standard_error: f64,
     /// Tiles of 8 × 32 pixels it was read from.
@@ -170,6 +190,7 @@ pub(crate) struct DriftLine {
     multiplicative: bool,
     start: f32,
     step: f32,
+    stray: f32,
 }
 
 impl DriftLine {
@@ -179,7 +200,7 @@ impl DriftLine {
         // Frames are narrower than 2³¹, and this conversion has wide instructions.
         let level = self.start + self.step * (x as i32) as f32;
         if self.multiplicative {
-            frame / level - reference
+            (frame - self.stray) / level - reference
         } else {
             frame - reference - level
         }
@@ -202,6 +223,7 @@ impl IlluminationDrift {
             multiplicative: self.correction.is_multiplicative(),
             start: start as f32,
             step: per_column as f32,
+            stray: self.stray_grey as f32,
         }
     }
 
@@ -216,7 +238,10 @@ impl IlluminationDrift {
             }
         }
         if self.correction.is_multiplicative() {
-            [variance * self.reference * self.reference, variance]
+            [
+                variance * self.reference * self.reference,
+                variance + self.scale_variance,
+            ]
         } else {
             [variance, 0.0]
         }
@@ -227,7 +252,7 @@ impl IlluminationDrift {
     fn level(&self, x: f64, y: f64, reference: f64) -> f64 {
         let at = self.at(x, y);
         if self.correction.is_multiplicative() {
-            reference * (at - 1.0)
+            reference * (at - 1.0) + self.stray_grey
         } else {
             at
         }
@@ -258,7 +283,7 @@ impl IlluminationDrift {
     pub(crate) fn residual(&self, tile: &TileSum) -> f64 {
         let at = self.at(tile.x, tile.y);
         let background = if self.correction.is_multiplicative() {
-            tile.reference * (at - 1.0)
+            tile.reference * (at - 1.0) + tile.pixels * self.stray_grey
         } else {
             tile.pixels * at
         };
@@ -299,7 +324,7 @@ impl IlluminationDrift {
         if share < 0.5 {
             return refused(DriftOutcome::TooLittleBackground { share });
         }
-        let ratio = self.coefficients[0];
+        let ratio = self.coefficients[0] + self.stray_grey / self.reference;
         if !(0.5..=2.0).contains(&ratio) {
             return refused(DriftOutcome::OtherLight { ratio });
         }
@@ -360,6 +385,81 @@ impl IlluminationDrift {
         count
     }
 
+    /// The illumination and the stray light of the tiles whose level per pixel is within a limit: a
+    /// line through their changes over the reference shows which of them changed, else it is taken for
+    /// the illumination. `sd` is the noise of a pixel, and the tiles scatter by so many times that of
+    /// a tile. Returns the number of tiles.
+    fn step_both(&mut self, tiles: &[TileSum], limit: f64, sd: f64, scatter: f64) -> usize {
+        let near = |tile: &&TileSum| (self.residual(tile) / tile.pixels).abs() <= limit;
+        let (mut count, mut pixels, mut sums) = (0, 0.0, [0.0; 8]);
+        // The tile before stands for the reference's structure: the noise of the tile's own
+        // reference is in its change, too, and would make a slope.
+        let mut before = None;
+        for tile in tiles.iter().filter(near) {
+            let (own, change) = (
+                self.weight(tile) / tile.pixels,
+                tile.difference / tile.pixels,
+            );
+            let other = before.replace(own).unwrap_or(own);
+            let products = [
+                own,
+                change,
+                other,
+                other * other,
+                other * own,
+                other * change,
+                own * own,
+                own * change,
+            ];
+            for (sum, product) in sums.iter_mut().zip(products) {
+                *sum += tile.pixels * product;
+            }
+            pixels += tile.pixels;
+            count += 1;
+        }
+        let pixels = f64::max(pixels, 1.0);
+        let [
+            reference,
+            change,
+            other,
+            square,
+            with_own,
+            with_change,
+            own,
+            moved,
+        ] = sums.map(|sum| sum / pixels);
+        let covariances = [with_own - other * reference, with_change - other * change];
+        let variance = (square - other * other).max(f64::MIN_POSITIVE);
+        let level_error = (sd / pixels.sqrt()).max(1e-6);
+        // All by illumination, and its error.
+        let own = own.max(LEAST_REFERENCE_GREY * LEAST_REFERENCE_GREY);
+        let (all, error) = (moved / own, level_error / own.sqrt());
+        let noise = variance * (scatter * level_error).powi(2);
+        let information = covariances[0] * covariances[0] / noise;
+        let misfit = |gain: f64| (covariances[1] - gain * covariances[0]).powi(2) / noise;
+        let [by_light, by_illumination] = [misfit(0.0), misfit(all)];
+        let both = by_light.min(by_illumination).min(information * all * all) > BOTH;
+        // The error holds the explanation that is not taken, by its probability, if there is a
+        // change beyond the noise.
+        let light = 1.0 / (1.0 + (0.5 * (by_light - by_illumination)).exp());
+        let apart = (all * all - (CHANGED * error).powi(2)).max(0.0);
+        let (gain, stray, open) = if both {
+            let slope = covariances[1] / covariances[0];
+            (slope, change - slope * reference, information.recip())
+        } else if light > SURE && apart > 0.0 {
+            (0.0, change, (1.0 - light) * apart / (1.0 + all).powi(2))
+        } else {
+            (all, 0.0, light * apart)
+        };
+        self.coefficients[0] = 1.0 + gain;
+        self.stray_grey = stray;
+        self.scale_variance = open;
+        self.reference = reference;
+        self.standard_error = error;
+        self.covariance[0][0] = self.standard_error.powi(2);
+        count
+    }
+
     /// Derivative of a tile's sum by the first coefficient.
     fn weight(&self, tile: &TileSum) -> f64 {
         if self.correction.is_multiplicative() {
@@ -402,6 +502,7 @@ pub(crate) fn fit(
     if correction.is_multiplicative() {
         drift.coefficients[0] = 1.0;
     }
+    let automatic = correction == DriftCorrection::Automatic;
     values.clear();
     values.extend(
         tiles
@@ -420,6 +521,7 @@ pub(crate) fn fit(
         let limit = 3.0 * (1.4826 * median(values, scratch)).max(noise);
         let before = drift.tiles;
         drift.tiles = match correction.terms() {
+            _ if automatic => drift.step_both(tiles, limit, sd, limit / (3.0 * noise)),
             1 => drift.step::<1>(tiles, limit, sd),
             _ => drift.step::<3>(tiles, limit, sd),
         };
@@ -428,7 +530,7 @@ pub(crate) fn fit(
             break;
         }
     }
-    if correction == DriftCorrection::Automatic {
+    if automatic {
         return drift.accepted(tiles, sd);
     }
     drift.outcome = DriftOutcome::Corrected;

@@ -80,3 +80,31 @@ fn what_cannot_be_told_is_said_and_left_alone() {
         found.drift
     );
 }
+
+/// Grey levels of stray light over a lit background and over one of even brightness.
+#[test]
+fn stray_light_is_taken_off_or_held_by_the_error() {
+    for vignetting in [Sensor::default().vignetting, 0.0] {
+        let sensor = Sensor {
+            vignetting,
+            ..Sensor::default()
+        };
+        let reference = sensor.reference();
+        let curve = sensor.curve(&reference, 1);
+        for stray in [-8_i16, 6, 12] {
+            let frame = sensor.frame(0.3, 2.5e-3, CENTRE, Branch::Loading, 7);
+            let frame = frame.mapv(|grey| (i16::from(grey) + stray).clamp(0, 255) as u8);
+            let found = measure(&frame, &reference, &curve, DriftCorrection::Automatic);
+            let force = found.force_n.total();
+            let off = (force.value - 0.3).abs();
+            assert!(
+                off < 2.0 * force.standard_error + 0.002,
+                "{vignetting} {stray}: {force:?}"
+            );
+            if vignetting > 0.0 {
+                assert!(off < 0.01 * 0.3, "{stray}: {force:?}");
+                assert!((found.drift.stray_grey - f64::from(stray)).abs() < 0.3);
+            }
+        }
+    }
+}
