@@ -128,6 +128,14 @@ impl SeenLoads {
         let trusted = trusted && contact.saturated_share == 0.0;
         let load = Load::of(contact).filter(|load| trusted && load.force_n.value > 0.0);
         let Some(load) = load else { return };
+        // A contact of the same bits is the same image, which noise moves.
+        if self
+            .0
+            .iter()
+            .any(|(known, _)| known.contact == load.contact)
+        {
+            return;
+        }
         let force = load.force_n.value;
         let at = self.0.partition_point(|(l, _)| l.force_n.value < force);
         self.0.insert(

@@ -8,7 +8,8 @@ use serde_json::json;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 use tactile_files::io::{
-    Gaps, Grey, InputQuantity, Points, TableOptions, read_grey_image, read_grid, read_point_frames,
+    Gaps, Grey, InputQuantity, Points, TableOptions, read_displaced_points, read_grey_image,
+    read_grid, read_point_frames, read_table_with,
 };
 
 fn number(text: &str, fits: impl Fn(f64) -> bool, expected: &str) -> Result<f64, String> {
@@ -134,7 +135,7 @@ pub(crate) struct TableArguments {
 }
 
 impl TableArguments {
-    pub(crate) fn options(&self) -> TableOptions {
+    fn options(&self) -> TableOptions {
         TableOptions {
             columns: self.columns.clone(),
             skip_lines: self.skip_lines,
@@ -146,8 +147,22 @@ impl TableArguments {
         }
     }
 
+    /// Columns of a table in SI units.
+    pub(crate) fn columns<const N: usize>(
+        &self,
+        path: &Path,
+        wanted: [(&[&str], &str); N],
+        context: &mut Context,
+    ) -> Result<[Vec<f64>; N], Failure> {
+        let mut table = read_table_with(path, &self.options())?;
+        let columns = table.columns(wanted)?;
+        taken(path, &table.notes, context);
+        Ok(columns)
+    }
+
     /// Tables of points, and whether their coordinates have a unit: those of all files or of none.
-    /// A table of tracked points gives one for each of its frames. Row i of one that is paired is row
+    /// A table of tracked points gives one for each of its frames, and one file alone of a single frame
+    /// has displacements beside its points. Row i of one that is paired is row
     /// i of the others, and NaN stands for numbers that are not there.
     pub(crate) fn read_points(
         &self,
@@ -162,7 +177,22 @@ impl TableArguments {
         let mut tables = Vec::new();
         for path in paths {
             let path = path.as_ref();
-            let frames = read_point_frames(path, &options)?;
+            let frames = match (paths.len(), options.columns.len()) {
+                (1, 4 | 6) => Vec::new(),
+                _ => read_point_frames(path, &options)?,
+            };
+            // One table alone, of one frame, has displacements beside its points.
+            let frames = match (paths.len(), frames.len()) {
+                (1, 0 | 1) => {
+                    options.gaps = if self.strict {
+                        Gaps::Refuse
+                    } else {
+                        Gaps::Keep
+                    };
+                    vec![read_displaced_points(path, &options)?]
+                }
+                _ => frames,
+            };
             taken(path, &frames[0].notes, context);
             tables.extend(frames);
             if tables.last().map(|table| table.metric) != Some(tables[0].metric) {
@@ -180,7 +210,7 @@ impl TableArguments {
 }
 
 /// Prints what was taken for granted of a table.
-pub(crate) fn taken(path: &Path, notes: &[String], context: &mut Context) {
+fn taken(path: &Path, notes: &[String], context: &mut Context) {
     for note in notes {
         let sentence = format!("{}: {note}", path.display());
         context.warn(

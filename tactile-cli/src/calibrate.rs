@@ -1,5 +1,6 @@
 //! `tactile calibrate`: a sensor from presses under known forces, or the line from integrated pixel
 //! value to force.
+use crate::arguments::TableArguments;
 use crate::console::Context;
 use crate::failure::{Exit, Failure};
 use crate::photometric;
@@ -8,7 +9,6 @@ use crate::text::{digits, four_digits, in_unit};
 use clap::Args;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
-use tactile_files::io::read_columns;
 use tactile_files::scene::doubt_of_pairs;
 use tactile_files::sensor::{
     CalibratedSensor, Indenter, LayerFinding, PhotometricPresses, PressFinding, SensorCalibration,
@@ -52,6 +52,8 @@ pub(crate) struct CalibrateArguments {
     /// is reported.
     #[arg(long)]
     there_and_back: bool,
+    #[command(flatten)]
+    reading: TableArguments,
 }
 
 pub(crate) fn run(arguments: &CalibrateArguments, context: &mut Context) -> Result<Exit, Failure> {
@@ -67,7 +69,7 @@ pub(crate) fn run(arguments: &CalibrateArguments, context: &mut Context) -> Resu
         return calibrate_sensor(input, context);
     }
     context.outputs.plan(&[PairLine::PAGE], &[input])?;
-    let line = PairLine::read(input, arguments.there_and_back)?;
+    let line = PairLine::read(input, arguments.there_and_back, &arguments.reading, context)?;
     line.print(context);
     context.value(&line.value());
     context.outputs.page(PairLine::PAGE, || line.page())?;
@@ -89,12 +91,18 @@ impl PairLine {
     /// The name of its page.
     pub(crate) const PAGE: &str = "calibration.svg";
 
-    pub(crate) fn read(path: &Path, there_and_back: bool) -> Result<Self, Failure> {
+    pub(crate) fn read(
+        path: &Path,
+        there_and_back: bool,
+        reading: &TableArguments,
+        context: &mut Context,
+    ) -> Result<Self, Failure> {
         let value = (
             &["integrated_pixel_value", "pixel_value"][..],
             "grey_levels",
         );
-        let [values, forces] = read_columns(path, [value, (&["force", "load"][..], "N")])?;
+        let columns = [value, (&["force", "load"][..], "N")];
+        let [values, forces] = reading.columns(path, columns, context)?;
         let largest = (0..forces.len()).max_by(|&a, &b| forces[a].total_cmp(&forces[b]));
         let pair = |(k, (value, force)): (usize, (&f64, &f64))| CalibrationPair {
             integrated_pixel_value: *value,

@@ -18,6 +18,8 @@ use tactile_imaging::pipeline::Flag;
 pub(crate) struct Context {
     /// One JSON object instead of text.
     pub json: bool,
+    /// JSON Lines: objects in a line each, that of the whole answer at the end.
+    pub lines: bool,
     pub interrupt: Interrupt,
     pub outputs: Outputs,
     /// The subcommand, for the JSON object.
@@ -47,6 +49,7 @@ impl Context {
             command,
             cautions: Vec::new(),
             json,
+            lines: false,
             interrupt: Interrupt::install(),
             outputs,
             reader_left: false,
@@ -149,18 +152,29 @@ impl Context {
 
     /// Prints the result as JSON, where it is wanted, with the cautions so far.
     pub(crate) fn value(&mut self, answer: &impl Serialize) {
+        let cautions = std::mem::take(&mut self.cautions);
+        let command = self.command.clone();
+        self.print_json(&Envelope {
+            schema: SCHEMA,
+            command: &command,
+            answer,
+            cautions: &cautions,
+        });
+        self.cautions = cautions;
+    }
+
+    /// Prints a value as JSON, where it is wanted.
+    pub(crate) fn print_json(&mut self, value: &impl Serialize) {
         if !self.json || self.reader_left || self.error.is_some() {
             return;
         }
         // Number by number: as one text the result of many frames would take as much memory again.
         let mut output = BufWriter::new(stdout().lock());
-        let value = Envelope {
-            schema: SCHEMA,
-            command: &self.command,
-            answer,
-            cautions: &self.cautions,
+        let written = match self.lines {
+            true => serde_json::to_writer(&mut output, value),
+            false => serde_json::to_writer_pretty(&mut output, value),
         };
-        let written = serde_json::to_writer_pretty(&mut output, &value)
+        let written = written
             .map_err(std::io::Error::from)
             .and_then(|()| writeln!(output))
             .and_then(|()| output.flush());

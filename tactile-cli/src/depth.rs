@@ -1,5 +1,5 @@
 //! `tactile depth`: contact and depth of a sensor that grows darker where it is pressed.
-use crate::arguments::{TableArguments, taken};
+use crate::arguments::TableArguments;
 use crate::console::Context;
 use crate::failure::{Exit, Failure};
 use crate::frames::{NamedFrame, SensorFrames};
@@ -12,7 +12,7 @@ use clap::{Args, ValueEnum};
 use ndarray::Array2;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
-use tactile_files::io::{Grey, read_table_with};
+use tactile_files::io::Grey;
 use tactile_files::scene::doubt_of_depths;
 use tactile_imaging::gel::{DarkFrame, DarkGel};
 use tactile_imaging::pipeline::{
@@ -92,9 +92,7 @@ enum GreyOf {
 impl DepthArguments {
     fn pipeline(&self, context: &mut Context) -> Result<(Pipeline, DarkGel), Failure> {
         let columns = [(&["darkness"][..], "grey_levels"), (&["depth"][..], "mm")];
-        let mut table = read_table_with(&self.table, &self.reading.options())?;
-        let [darkness, depth] = table.columns(columns)?;
-        taken(&self.table, &table.notes, context);
+        let [darkness, depth] = self.reading.columns(&self.table, columns, context)?;
         let mut entries: Vec<_> = darkness.into_iter().zip(depth).collect();
         if let Some(reason) = doubt_of_depths(&entries) {
             return Err(Failure::in_file(&self.table, reason));

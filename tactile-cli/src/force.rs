@@ -1,4 +1,5 @@
 //! `tactile force`: normal force, contact and stress from frames.
+use crate::arguments::TableArguments;
 use crate::calibrate::PairLine;
 use crate::console::Context;
 use crate::failure::{Exit, Failure};
@@ -35,15 +36,21 @@ pub(crate) struct ForceArguments {
     /// Calibration pairs: CSV with the columns integrated_pixel_value and force.
     #[arg(long, value_name = "PAIRS.csv")]
     pairs: PathBuf,
+    #[command(flatten)]
+    reading: TableArguments,
 }
 
 pub(crate) fn run(arguments: &ForceArguments, context: &mut Context) -> Result<Exit, Failure> {
-    let ForceArguments { frames, pairs } = arguments;
+    let ForceArguments {
+        frames,
+        pairs,
+        reading,
+    } = arguments;
     let table = "force.csv";
     context
         .outputs
         .plan(&[table, PairLine::PAGE], &frames.files(pairs))?;
-    let line = PairLine::read(pairs, false)?;
+    let line = PairLine::read(pairs, false, reading, context)?;
     let image = frames.read_reference(Grey::default())?;
     // Forces are read from the light whatever the object is.
     let object = Object::Unknown {
@@ -55,8 +62,8 @@ pub(crate) fn run(arguments: &ForceArguments, context: &mut Context) -> Result<E
         .map_err(|error| Failure::in_file(&frames.reference, error))?;
     // One frame is held at a time, but a file that cannot be read is found before the first is
     // measured.
-    let reading = frames.reading(Grey::default(), &image);
-    reading.check(&frames.frames)?;
+    let read_frames = frames.reading(Grey::default(), &image);
+    read_frames.check(&frames.frames)?;
     line.print(context);
     let mut exit = Exit::Complete;
     let mut values = Vec::new();
@@ -64,26 +71,27 @@ pub(crate) fn run(arguments: &ForceArguments, context: &mut Context) -> Result<E
         "frame,force_N,se_force_N,radius_m,se_radius_m,x_m,se_x_m,y_m,se_y_m,mean_stress_Pa,\
          se_mean_stress_Pa",
     );
-    let unreadable = reading.each::<Array2<u8>>(&frames.frames, context, |frame, context| {
-        let NamedFrame { name, pixels, .. } = frame.named();
-        let found = session.push(pixels.view());
-        context.line(format_args!("{name}:"));
-        match found {
-            Ok(Update { contact, .. }) => {
-                let answer = contact.map(|contact| Answer::new(&contact, frames.pixel_m()));
-                print(answer.as_ref(), context);
-                context.warn_of_frame(&session.cautions());
-                csv.row(row(values.len(), answer.as_ref()));
-                values.push(json!({ "frame": name, "contact": answer }));
+    let unreadable =
+        read_frames.each::<Array2<u8>>(&frames.frames, context, |frame, context| {
+            let NamedFrame { name, pixels, .. } = frame.named();
+            let found = session.push(pixels.view());
+            context.line(format_args!("{name}:"));
+            match found {
+                Ok(Update { contact, .. }) => {
+                    let answer = contact.map(|contact| Answer::new(&contact, frames.pixel_m()));
+                    print(answer.as_ref(), context);
+                    context.warn_of_frame(&session.cautions());
+                    csv.row(row(values.len(), answer.as_ref()));
+                    values.push(json!({ "frame": name, "contact": answer }));
+                }
+                Err(error) => {
+                    exit = Exit::Partial;
+                    context.line(format_args!("no answer: {error}"));
+                    values.push(json!({ "frame": name, "error": error.to_string() }));
+                }
             }
-            Err(error) => {
-                exit = Exit::Partial;
-                context.line(format_args!("no answer: {error}"));
-                values.push(json!({ "frame": name, "error": error.to_string() }));
-            }
-        }
-        Ok(())
-    })?;
+            Ok(())
+        })?;
     if unreadable > 0 {
         exit = Exit::Partial;
     }

@@ -55,12 +55,16 @@ impl Pixels for Array3<u8> {
     }
 }
 
+/// The help of an argument of frames.
+pub(crate) fn frames_help(what: &str) -> String {
+    let formats = tactile_files::io::frame_formats();
+    format!("{what}: {formats}, `-` for a pipe of any of them")
+}
+
 /// Pressed frames and the frame without contact.
 #[derive(Args)]
 pub(crate) struct SensorFrames {
-    /// Pressed frames: images (PNG, PGM, JPEG, TIFF), videos (YUV4MPEG2, AVI of JPEG), arrays (NPY,
-    /// NPZ), `-` for a pipe of any of them.
-    #[arg(required = true)]
+    #[arg(required = true, help = frames_help("Pressed frames"))]
     pub frames: Vec<PathBuf>,
     /// Frame of the sensor without contact.
     #[arg(long, value_name = "IMAGE")]

@@ -30,6 +30,7 @@ mod relief;
 pub mod report;
 mod serve;
 mod simulation;
+mod slopes;
 mod strain;
 mod stream;
 mod surfaces;

@@ -2,7 +2,7 @@
 use crate::arguments::{Repetition, force_n};
 use crate::console::{Bar, Context};
 use crate::failure::{Exit, Failure};
-use crate::frames::{NamedFrame, Reading};
+use crate::frames::{NamedFrame, Reading, frames_help};
 use crate::photometric;
 use crate::plot::{PlotError, known_heights_mm, press_pages, summary_lines};
 use crate::simulation::{Physics, Simulation};
@@ -62,9 +62,8 @@ pub(crate) struct MeasureArguments {
     /// Scene file with your own frames. See below. Without it a press is simulated.
     #[arg(value_name = "SCENE.toml")]
     scene: Option<PathBuf>,
-    /// Frames to measure instead of those of the scene: images, a video (YUV4MPEG2, AVI of
-    /// JPEG), an array (NPY, NPZ), `-` for a pipe of frames.
-    #[arg(value_name = "FRAMES", requires = "scene")]
+    #[arg(value_name = "FRAMES", requires = "scene",
+          help = frames_help("Frames to measure instead of those of the scene"))]
     frames: Vec<PathBuf>,
     #[command(flatten)]
     repetition: Repetition,

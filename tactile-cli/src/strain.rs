@@ -11,7 +11,7 @@ use clap::{Args, ValueEnum};
 use nalgebra::{Matrix3, Point};
 use serde_json::{Map, Value, json};
 use std::path::PathBuf;
-use tactile_files::io::{PointTable, read_displaced_points};
+use tactile_files::io::{PointTable, Points};
 use tactile_imaging::elasticity::kinematics::StrainQuantities;
 use tactile_imaging::elasticity::strain::{
     Biot, EulerAlmansi, GreenLagrange, Hencky, Infinitesimal, StrainMeasure,
@@ -129,11 +129,18 @@ pub(crate) fn run(arguments: &StrainArguments, context: &mut Context) -> Result<
         .table
         .read_points(paths, arguments.paired, context)?;
     let mut known = arguments.paired;
-    let mut tables: Vec<PointTable> = tables.into_iter().map(|table| table.points).collect();
-    if let [_] = tables[..] {
+    if let [
+        Points {
+            displaced: Some(_), ..
+        },
+    ] = tables[..]
+    {
         known = true;
-        tables = read_displaced_points(&paths[0])?.0.into();
     }
+    let both = tables
+        .into_iter()
+        .flat_map(|table| [Some(table.points), table.displaced]);
+    let tables: Vec<PointTable> = both.flatten().collect();
     let (mut plane, mut space) = (Vec::new(), Vec::new());
     for table in tables {
         match table {

@@ -9,7 +9,7 @@ use self::watch::{Meter, Watch, watch};
 use crate::arguments::{force_n, not_negative, positive};
 use crate::console::{Bar, Context};
 use crate::failure::{Exit, Failure};
-use crate::frames::{DEFAULT_RATE_HZ, Reading};
+use crate::frames::{DEFAULT_RATE_HZ, Reading, frames_help};
 use crate::plot::known_heights_mm;
 use crate::relief::HeightGrid;
 use crate::simulation::{Physics, Simulation};
@@ -38,6 +38,7 @@ use tactile_simulate::{LoadCycle, PressLoad, PressOptions, Trial};
 /// modulus ends outside the tolerance. With SCENE.toml (see `tactile measure`), which describes
 /// sensor and object, recorded frames are measured one after the other, as fast as they can be. One
 /// is late if that takes longer than a frame at --rate lasts. --out gets stream.csv, a row a frame.
+/// With --json each frame is a line as it comes, and the last line is the answer (JSON Lines).
 /// In place of the scene goes the sensor file of a gel that is lit in colours, with its frames:
 /// force, contact and depth.
 #[derive(Args)]
@@ -61,10 +62,8 @@ pub(crate) struct StreamArguments {
     /// Scene file of the sensor and the object, whose recorded frames are measured.
     #[arg(value_name = "SCENE.toml")]
     scene: Option<PathBuf>,
-    /// Recorded frames: images, folders whose images are taken in the order of their names, videos
-    /// (YUV4MPEG2, AVI of JPEG), arrays (NPY, NPZ), `-` for a pipe of frames. Those of the scene if
-    /// there is none here.
-    #[arg(value_name = "FRAMES", requires = "scene")]
+    #[arg(value_name = "FRAMES", requires = "scene",
+          help = frames_help("Recorded frames, or folders of them in the order of their names"))]
     frames: Vec<PathBuf>,
     /// Frames per second: those that a video states, or 80.
     #[arg(long, value_name = "HZ", value_parser = positive, allow_negative_numbers = true)]
@@ -116,6 +115,7 @@ struct Series {
 }
 
 pub(crate) fn run(arguments: &StreamArguments, context: &mut Context) -> Result<Exit, Failure> {
+    context.lines = true;
     let outputs = &mut context.outputs;
     outputs.plan(&["stream.csv"], arguments.scene.as_slice())?;
     match &arguments.scene {

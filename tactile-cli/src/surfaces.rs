@@ -1,18 +1,18 @@
 //! `tactile integrate`: heights from slopes.
-use crate::arguments::{HeightRegion, Repetition, name, one_or_two, same_shape};
+use crate::arguments::{HeightRegion, Repetition, name, one_or_two};
 use crate::console::{Bar, Context};
 use crate::failure::{Exit, Failure};
 use crate::outputs::Csv;
 use crate::plot::{HeatMap, Page, Panel};
+use crate::slopes;
 use crate::text::four_digits;
 use clap::{Args, ValueEnum};
-use ndarray::Array2;
+use ndarray::{Array2, Zip};
 use serde_json::json;
-use std::path::PathBuf;
-use tactile_files::io::read_grid;
+use std::path::{Path, PathBuf};
 use tactile_imaging::sfs::{
     CosinePoisson, Domain, FrankotChellappa, MaskedLeastSquares, SlopeIntegrator, StopReason,
-    Surface, SurfaceWorkspace, slopes,
+    Surface, SurfaceWorkspace, slopes as slopes_of,
 };
 
 /// The domain with a mask and known heights, where there are some.
@@ -32,8 +32,9 @@ fn within<'a>(
 
 /// Integrate slopes to heights
 ///
-/// P holds the slopes ∂z/∂x (along a row) and Q ∂z/∂y (down the rows), as CSV matrices of the
-/// image's shape without a header. The mean height is 0 unless heights are known. --out gets
+/// P holds the slopes ∂z/∂x (along a row) and Q ∂z/∂y (down the rows), as matrices of the image's
+/// shape (CSV without a header, NPY, NPZ, MAT). P alone is a normal map: an image of 8 or 16 bits, or
+/// an array of shape (rows, columns, 3). The mean height is 0 unless heights are known. --out gets
 /// heights.csv and heights.svg.
 #[derive(Args)]
 #[command(after_help = "\
@@ -44,10 +45,10 @@ Examples:
 Without --method: poisson, or least-squares where there is a mask, known heights or a slope that \
                         is NaN.")]
 pub(crate) struct IntegrateArguments {
-    /// Slopes along x.
+    /// Slopes along x, or a normal map.
     p: PathBuf,
     /// Slopes along y.
-    q: PathBuf,
+    q: Option<PathBuf>,
     /// How to integrate.
     #[arg(long, value_enum)]
     method: Option<Integration>,
@@ -80,12 +81,14 @@ pub(crate) fn integrate(
         ..
     } = arguments;
     let names = ["heights.csv", "heights.svg"];
-    context.outputs.plan(&names, &region.files(&[path, q]))?;
-    let p = read_grid(path)?;
+    let files: Vec<&Path> = [Some(path), q.as_ref()]
+        .into_iter()
+        .flatten()
+        .map(PathBuf::as_path)
+        .collect();
+    context.outputs.plan(&names, &region.files(&files))?;
+    let [p, q] = slopes::read(path, q.as_deref(), *pixel_size, context)?;
     let first = (path.as_path(), p.dim());
-    let q_path = q;
-    let q = read_grid(q_path)?;
-    same_shape((q_path, q.dim()), first)?;
     let known = region.known_heights(first)?;
     let mask = region.bright_pixels(first)?;
     if !p
@@ -94,9 +97,8 @@ pub(crate) fn integrate(
         .any(|(p, q)| p.is_finite() && q.is_finite())
     {
         return Err(Failure::input(format!(
-            "{} and {} have no pixel with both slopes: heights cannot be told",
-            path.display(),
-            q_path.display()
+            "no pixel of {} has both slopes: heights cannot be told",
+            path.display()
         )));
     }
     // The cosine transform takes whole rectangles of numbers alone.
@@ -123,7 +125,16 @@ pub(crate) fn integrate(
     }
     allow(context, p.dim(), "integrating")?;
     let domain = Domain::new(*pixel_size).map_err(Failure::input)?;
-    let domain = within(domain, &mask, &known);
+    // No heights where there are no slopes.
+    let sloped = Zip::from(&p)
+        .and(&q)
+        .map_collect(|p, q| p.is_finite() || q.is_finite());
+    let inside = match mask {
+        Some(mask) => Some(mask & sloped),
+        None if method == Integration::LeastSquares => Some(sloped),
+        None => None,
+    };
+    let domain = within(domain, &inside, &known);
     let integrator: Box<dyn SlopeIntegrator<f64>> = match method {
         Integration::Poisson => Box::new(CosinePoisson),
         Integration::FrankotChellappa => Box::new(FrankotChellappa),
@@ -183,7 +194,7 @@ pub(crate) fn integrate(
 
 /// Root mean square of the difference between the slopes of the heights and the given ones.
 fn slope_rms(surface: &Surface<f64>, p: &Array2<f64>, q: &Array2<f64>, size: [f64; 2]) -> f64 {
-    let (px, qy) = slopes(surface.heights.view(), size);
+    let (px, qy) = slopes_of(surface.heights.view(), size);
     let pairs = px.iter().zip(p).chain(qy.iter().zip(q));
     let differences = pairs.map(|(found, given)| found - given);
     let (sum, count) = differences

@@ -163,3 +163,11 @@ proptest! {
         prop_assert!(uses_of_tables(&edits).iter().flatten().all(|v| !v.is_nan()));
     }
 }
+
+#[test]
+fn the_guide_lists_every_format_of_frames() {
+    let guide = include_str!("../../docs/cameras.md");
+    for format in tactile_files::io::frame_formats().split(", ") {
+        assert!(guide.contains(format), "{format}");
+    }
+}

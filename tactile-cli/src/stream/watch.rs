@@ -107,11 +107,18 @@ impl<M: Meter> Watch<M> {
         csv.into_bytes()
     }
 
-    /// Prints a line for every frame or, of a long series, for one out of sixteen.
+    /// Prints the last frame: in JSON always, as text one out of sixteen of a long series.
     pub(super) fn print_last(&self, every_one: bool, context: &mut Context) {
-        if let Some((time_s, row)) = self.rows.last()
-            && (every_one || (self.rows.len() - 1).is_multiple_of(16))
-        {
+        let Some((time_s, row)) = self.rows.last() else {
+            return;
+        };
+        if context.json {
+            let mut value = M::update(row);
+            value["frame"] = json!(self.counts.seen);
+            value["time_s"] = json!(time_s);
+            context.print_json(&value);
+        }
+        if every_one || (self.rows.len() - 1).is_multiple_of(16) {
             let late = self.counts.late_percent(self.rows.len());
             context.line(M::line(row, *time_s, late).trim_end());
         }
@@ -119,14 +126,8 @@ impl<M: Meter> Watch<M> {
 
     /// What the answer has whatever is measured.
     pub(super) fn value(&self) -> Value {
-        let update = |(time_s, row): &(f64, M::Row)| {
-            let mut value = M::update(row);
-            value["time_s"] = json!(time_s);
-            value
-        };
         json!({
             "frames": self.rows.len(), "rate_hz": self.counts.rate_hz, "late": self.counts.late,
-            "updates": self.rows.iter().map(update).collect::<Vec<Value>>(),
         })
     }
 
@@ -214,18 +215,22 @@ pub(super) fn watch<M: Meter>(
         match watch.take(time_s, frame.pixels) {
             Ok(took) => {
                 watch.counts.late += usize::from(took.as_secs_f64() > 1.0 / rate_hz);
+                watch.print_last(watch.rows.len() <= 32, context);
             }
             // A frame without an answer does not end a stream, and thousands of them are one
             // trouble.
             Err(failure) if failure.exit == Exit::Partial => {
                 watch.counts.unusable += 1;
+                let frame_number = watch.counts.seen;
+                context.print_json(&json!({
+                    "frame": frame_number, "time_s": time_s, "error": failure.to_string(),
+                }));
                 if watch.counts.unusable <= 3 {
                     context.caution(Failure::in_file(frame.path, failure));
                 }
             }
             Err(failure) => return Err(failure),
         }
-        watch.print_last(watch.rows.len() <= 32, context);
         Ok(())
     })?;
     watch.counts.unusable += unreadable;

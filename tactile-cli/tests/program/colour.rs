@@ -1,5 +1,5 @@
 //! Gels that are lit in colours: calibrated, wrong circles named, and depth of the whole frame.
-use super::harness::{folder_with_examples, printed, text, value};
+use super::harness::{folder_with_examples, json, printed, text, value};
 use super::json::assert_keeps_to_schema;
 use super::streams::piped;
 use serde_json::Value;
@@ -168,8 +168,7 @@ fn a_pipe_of_colours_gives_the_answers_of_the_files() {
         camera.extend(b"P6\n120 90\n255\n");
         camera.extend(read_colour_levels(folder.path().join(name)).unwrap());
     }
-    let files =
-        |call: &str| -> Value { serde_json::from_str(&printed(folder.path(), call)).unwrap() };
+    let files = |call: &str| -> Value { json(&printed(folder.path(), call)).unwrap() };
     let stream = format!("stream {sensor} --rate 25 --allowed-late 100 --json");
     let measured = files(&format!("{stream} {}", names.join(" ")));
     assert_keeps_to_schema(&measured, "stream");

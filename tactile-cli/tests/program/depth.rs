@@ -56,3 +56,70 @@ fn the_grey_and_the_zero_are_those_of_the_table() {
         assert!((found - expected).abs() < 1e-9, "{options}: {found}");
     }
 }
+
+/// A saddle beside a dome: slopes with a wrong sign or exchanged are those of no surface.
+#[test]
+fn slopes_of_no_surface_are_named_and_normal_maps_integrated() {
+    let folder = tempfile::tempdir().unwrap();
+    let (rows, columns) = (40, 50);
+    let slope = |row: usize, column: usize| {
+        let (x, y) = (column as f64 / 10.0 - 2.0, row as f64 / 10.0 - 2.0);
+        [
+            0.2 * (x + 0.3 * y + y.cos() * x.cos()),
+            0.2 * (0.3 * x - y.sin() * x.sin()),
+        ]
+    };
+    let table = |axis: usize, sign: f64| {
+        let line = |row| {
+            (0..columns)
+                .map(|c| (sign * slope(row, c)[axis]).to_string())
+                .collect::<Vec<_>>()
+        };
+        (0..rows)
+            .map(|row| line(row).join(",") + "\n")
+            .collect::<String>()
+    };
+    for (name, axis, sign) in [("p", 0, 1.0), ("q", 1, 1.0), ("up", 1, -1.0)] {
+        std::fs::write(folder.path().join(format!("{name}.csv")), table(axis, sign)).unwrap();
+    }
+    for (call, kinds, words) in [
+        ("p.csv q.csv", 0, ""),
+        ("p.csv up.csv", 1, "the sign of Q changed"),
+        ("q.csv p.csv", 1, "P and Q exchanged"),
+    ] {
+        let value = value(&run(folder.path(), &words_of(call)));
+        let cautions = value["cautions"].as_array().unwrap();
+        assert_eq!(cautions.len(), kinds, "{call}");
+        let found = cautions
+            .first()
+            .map_or(String::new(), |caution| caution["text"].to_string());
+        assert!(found.contains(words), "{found}");
+    }
+    // The same as a normal map of 16 bits, its y up, with a margin of no normals.
+    let mut map = format!("P6\n{columns} {rows}\n65535\n").into_bytes();
+    for (row, column) in (0..rows).flat_map(|r| (0..columns).map(move |c| (r, c))) {
+        let [p, q] = slope(row, column);
+        let normal = [-p, q, 1.0].map(|n| n / (1.0 + p * p + q * q).sqrt());
+        let samples = normal.map(|n| ((n + 1.0) / 2.0 * 65535.0).round() as u16);
+        let inside = column > 2;
+        map.extend(
+            samples
+                .iter()
+                .flat_map(|s| (s * u16::from(inside)).to_be_bytes()),
+        );
+    }
+    std::fs::write(folder.path().join("normals.ppm"), map).unwrap();
+    let value = value(&run(folder.path(), &words_of("normals.ppm")));
+    assert_eq!(
+        (&value["cautions"][0]["y"], &value["solved"]),
+        (&"up".into(), &(40 * 47).into())
+    );
+    assert!(value["slope_rms"].as_f64().unwrap() < 0.01, "{value}");
+}
+
+fn words_of(call: &str) -> Vec<&str> {
+    ["integrate", "--json"]
+        .into_iter()
+        .chain(words(call))
+        .collect()
+}

@@ -35,8 +35,24 @@ pub(crate) fn printed(folder: &Path, call: &str) -> String {
 
 /// The JSON object of a call.
 pub(crate) fn value(output: &Output) -> Value {
-    serde_json::from_slice(&output.stdout)
-        .unwrap_or_else(|e| panic!("{e}: {}", text(&output.stderr)))
+    json(&text(&output.stdout)).unwrap_or_else(|e| panic!("{e}: {}", text(&output.stderr)))
+}
+
+/// What a call printed. Of JSON Lines the last is the answer, and those before it are its `updates`.
+pub(crate) fn json(printed: &str) -> serde_json::Result<Value> {
+    let mut lines: Vec<&str> = printed.lines().collect();
+    if !lines
+        .iter()
+        .all(|line| line.starts_with('{') && line.ends_with('}'))
+    {
+        return serde_json::from_str(printed);
+    }
+    let mut answer: Value = serde_json::from_str(lines.pop().unwrap_or_default())?;
+    if answer["command"] == "stream" {
+        let updates: Result<_, _> = lines.into_iter().map(serde_json::from_str).collect();
+        answer["updates"] = Value::Array(updates?);
+    }
+    Ok(answer)
 }
 
 /// The words of a line of a shell, without quotes.

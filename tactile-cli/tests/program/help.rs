@@ -1,7 +1,6 @@
 //! Every example in the help runs, and its JSON keeps to the schema.
-use super::harness::{folder_with_examples, printed, words};
+use super::harness::{folder_with_examples, json, printed, words};
 use super::json::assert_keeps_to_schema;
-use serde_json::Value;
 use std::collections::BTreeSet;
 
 /// The commands of a help's examples, without what explains them.
@@ -37,14 +36,13 @@ fn subcommands() -> Vec<String> {
 /// Runs an example for its JSON: lines of text are made too, and not printed.
 fn runs(example: &str) {
     let folder = folder_with_examples();
-    let json = if example.contains("--json") {
+    let option = if example.contains("--json") {
         ""
     } else {
         " --json"
     };
-    let printed = printed(folder.path(), &format!("{example}{json}"));
-    let value: Value =
-        serde_json::from_str(&printed).unwrap_or_else(|e| panic!("tactile {example}: {e}"));
+    let printed = printed(folder.path(), &format!("{example}{option}"));
+    let value = json(&printed).unwrap_or_else(|e| panic!("tactile {example}: {e}"));
     assert_keeps_to_schema(&value, example);
     // Files go to --out and nowhere else.
     let entries = std::fs::read_dir(folder.path()).unwrap();

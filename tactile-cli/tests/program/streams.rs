@@ -108,6 +108,17 @@ fn a_recording_is_measured_to_the_same_bits() {
         tactile(folder.path(), &words(&call)).output().unwrap()
     };
     let replayed = again("kept.y4m");
+    // A line of JSON for every frame, and the answer as the last.
+    let printed = text(&replayed.stdout);
+    let lines = printed
+        .lines()
+        .map(|line| serde_json::from_str::<Value>(line).unwrap());
+    let lines: Vec<Value> = lines.collect();
+    assert_eq!(lines.len(), 3, "{printed}");
+    assert_eq!(
+        (&lines[1]["frame"], &lines[2]["frames"]),
+        (&2.into(), &2.into())
+    );
     assert_eq!(value(&replayed)["updates"], value(&first)["updates"]);
     let answers = std::fs::read_to_string(folder.path().join("kept.csv")).unwrap();
     assert_eq!(answers.lines().count(), 3, "{answers}");

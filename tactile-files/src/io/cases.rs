@@ -4,6 +4,7 @@
 //! `a` (the target row assigned to it, −1 for none).
 use super::error::{FileError, FilePlace, quoted};
 use super::files::read_bytes;
+use super::kinds::kind_of;
 use nalgebra::{Point, Point2, Point3};
 use std::io::Write;
 use std::path::Path;
@@ -87,6 +88,10 @@ pub fn read_cases(path: impl AsRef<Path>) -> Result<Vec<MatchCase>, FileError> {
     let path = path.as_ref();
     let bytes = read_bytes(path)?;
     let header = "`case NAME D n_model n_target`";
+    if let Some(kind) = kind_of(&bytes) {
+        let expected = "a text of matching cases, or two tables of points";
+        return Err(FileError::content(path, FilePlace::File, expected, kind));
+    }
     let mut cases = Vec::new();
     let mut open: Option<OpenCase<'_>> = None;
     for (line, text) in (1..).zip(String::from_utf8_lossy(&bytes).lines()) {

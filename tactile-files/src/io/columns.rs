@@ -7,25 +7,38 @@ pub(super) const AXES: [&[&str]; 3] = [
         "coordinate_x",
         "position_x",
         "points:0",
-        "pos_x",
         "centroid-1",
+        "cx",
+        "xc",
+        "col",
+        "column",
     ],
     &[
         "y",
         "coordinate_y",
         "position_y",
         "points:1",
-        "pos_y",
         "centroid-0",
+        "cy",
+        "yc",
+        "row",
     ],
-    &["z", "coordinate_z", "position_z", "points:2", "pos_z"],
+    &[
+        "z",
+        "coordinate_z",
+        "position_z",
+        "points:2",
+        "centroid-2",
+        "cz",
+        "zc",
+    ],
 ];
 
 /// Names of displacements along x, y and z (OpenPIV, finite elements, DICe).
 pub(super) const DISPLACEMENTS: [&[&str]; 3] = [
-    &["u", "u_x", "ux", "displacement_x"],
-    &["v", "u_y", "uy", "displacement_y"],
-    &["w", "u_z", "uz", "displacement_z"],
+    &["u", "u_x", "ux", "dx", "displacement_x"],
+    &["v", "u_y", "uy", "dy", "displacement_y"],
+    &["w", "u_z", "uz", "dz", "displacement_z"],
 ];
 
 /// Names of a frame's number in tables of tracked points (TrackMate, trackpy).
@@ -65,7 +78,7 @@ impl Heading {
             inside.rsplit_once(['(', '['])
         };
         let suffixed = || {
-            let cuts = text.match_indices(['_', ' ']);
+            let cuts = text.match_indices(['_', ' ', '/']);
             let mut parts = cuts.map(|(at, _)| (&text[..at], &text[at + 1..]));
             parts.find(|(name, unit)| !name.is_empty() && in_si(unit).is_some())
         };
@@ -76,6 +89,7 @@ impl Heading {
             None => (text, None),
         };
         let name = name.trim().trim_end_matches('_').to_lowercase();
+        let name = name.strip_suffix(" in").unwrap_or(&name).into();
         Self { name, unit }
     }
 
@@ -97,7 +111,7 @@ impl Heading {
 
 /// The base unit and the value in SI of a unit. Both signs for micro are `u`.
 pub(super) fn in_si(unit: &str) -> Option<(&'static str, f64)> {
-    let unit = unit.replace(['µ', 'μ'], "u");
+    let unit = unit.replace(['µ', 'μ'], "u").replace("/frame", "");
     match unit.as_str() {
         "px" | "pixel" | "pixels" | "grey_levels" | "1" => return Some(("1", 1.0)),
         "micron" | "microns" => return Some(("m", 1e-6)),
@@ -117,4 +131,43 @@ pub(super) fn in_si(unit: &str) -> Option<(&'static str, f64)> {
         };
         Some((base, factor))
     })
+}
+
+/// The headings of x and y, and of z if it is there: by their usual names, or else the only ones that
+/// differ in the letter of their axis alone (`x coordinate`, `Pos. X`, `weighted_centroid_x`).
+pub(super) fn axes(headings: &[Heading]) -> Vec<&Heading> {
+    let usual = |names: &&[&str]| {
+        let mut names = names.iter();
+        names.find_map(|name| headings.iter().find(|heading| heading.name == *name))
+    };
+    let found: Vec<&Heading> = AXES.iter().map_while(usual).collect();
+    if found.len() > 1 {
+        return found;
+    }
+    // The words of a heading, with a mark in place of the axis. `None` for one without it.
+    let along = |heading: &Heading, axis: &str| {
+        let words = heading.name.split(|c: char| !c.is_alphanumeric());
+        let words: Vec<&str> = words
+            .map(|word| if word == axis { "*" } else { word })
+            .collect();
+        words.contains(&"*").then(|| words.join(" "))
+    };
+    let sets = headings.iter().filter_map(|first| {
+        let rest = along(first, "x")?;
+        let beside = |axis| {
+            headings
+                .iter()
+                .find(|h| along(h, axis).is_some_and(|r| r == rest))
+        };
+        let set: Vec<&Heading> = ["x", "y", "z"]
+            .iter()
+            .map_while(|axis| beside(axis))
+            .collect();
+        Some(set).filter(|set| set.len() > 1)
+    });
+    let mut sets = sets.collect::<Vec<_>>();
+    match sets.len() {
+        1 => sets.remove(0),
+        _ => Vec::new(),
+    }
 }

@@ -1,23 +1,18 @@
 //! Frames one after the other, from a video, concatenated images, a stack of pages, arrays or one
 //! image.
+mod anymap;
 mod avi;
 mod jpeg;
 mod npy;
+mod pages;
+mod y4m;
 
-use self::avi::Avi;
-use self::jpeg::Images;
-use self::npy::Arrays;
 use super::error::{FileError, FilePlace, quoted};
-use super::files::{LARGEST_FILE, open_file};
-use super::image::{Grey, colour_levels, decode, eight_bit_levels, header_words, largest_image};
-use super::kinds::kind_of;
+use super::files::open_file;
+use super::image::{Grey, colour_levels, decode, eight_bit_levels, largest_image};
 use ::image::DynamicImage;
 use ndarray::{Array2, Array3};
-use std::borrow::Cow;
-use std::collections::HashSet;
-use std::io::{
-    BufRead, BufReader, Cursor, Error, ErrorKind, Read, Result as IoResult, copy, sink, stdin,
-};
+use std::io::{BufRead, BufReader, Cursor, Error, ErrorKind, Read, Result as IoResult, stdin};
 use std::mem::take;
 use std::path::{Path, PathBuf};
 use tactile_imaging::pipeline::FrameSource;
@@ -29,7 +24,7 @@ const LONGEST_HEADER: u64 = 4096;
 pub(crate) use self::npy::{header_fields, members};
 
 /// First bytes of an array of NumPy, and of an archive of them.
-pub(super) const ARRAY_STARTS: [&[u8]; 2] = Arrays::START;
+pub(super) const ARRAY_STARTS: [&[u8]; 2] = npy::START;
 
 /// What reads videos of other codecs.
 const PIPE: &str = "pipe it by ffmpeg -i VIDEO -f yuv4mpegpipe -pix_fmt gray - | tactile … -";
@@ -83,7 +78,8 @@ const MOST_NAMED: usize = 10;
 /// ```
 pub struct FrameReader {
     input: Box<dyn BufRead + Send>,
-    format: Format,
+    /// None at the end.
+    decoder: Option<Box<dyn Decoder>>,
     name: PathBuf,
     grey: Grey,
     bits: Option<u8>,
@@ -107,15 +103,59 @@ impl std::fmt::Debug for FrameReader {
     }
 }
 
-enum Format {
-    Video(Video),
-    Avi(Avi),
-    Images(Images),
-    Arrays(Arrays),
-    Anymaps,
-    Pages(Pages),
-    Image(Vec<u8>),
-    Ended,
+/// How the frames of one format are found in a stream. A format is a file with its decoder, an entry
+/// in [`FORMATS`] and a row in `docs/cameras.md`.
+trait Decoder: Send {
+    /// The next frame as it is stored. The memory of an older one may be used.
+    fn next(&mut self, input: &mut dyn BufRead, memory: Vec<u8>)
+    -> Result<Option<Encoded>, Broken>;
+
+    /// The frame rate that the stream states.
+    fn rate_hz(&self) -> Option<f64> {
+        None
+    }
+
+    /// Frames so far that the recorder dropped.
+    fn dropped(&self) -> u64 {
+        0
+    }
+
+    /// Whether the frames after one that cannot be decoded are found.
+    fn goes_on(&self) -> bool {
+        false
+    }
+}
+
+type Opened = Result<Box<dyn Decoder>, Broken>;
+
+struct Format {
+    name: &'static str,
+    /// Whether a stream with these first bytes is of the format.
+    begins: fn(&[u8]) -> bool,
+    open: fn(&mut dyn BufRead) -> Opened,
+}
+
+/// All formats. The first that a stream begins as is taken.
+const FORMATS: [Format; 8] = [
+    y4m::FORMAT,
+    anymap::FORMAT,
+    avi::FORMAT,
+    npy::FORMAT,
+    npy::ARCHIVE,
+    jpeg::FORMAT,
+    pages::FORMAT,
+    pages::OTHERS,
+];
+
+/// The names of all formats of frames, as help and errors list them.
+///
+/// ```
+/// let formats = tactile_files::io::frame_formats();
+/// assert!(formats.starts_with("YUV4MPEG2, PGM, PPM, AVI"));
+/// ```
+#[must_use]
+pub fn frame_formats() -> String {
+    FORMATS.map(|format| format.name).join(", ")
 }
 
 impl FrameReader {
@@ -164,45 +204,12 @@ impl FrameReader {
             .read_to_end(&mut start)
             .map_err(failed)?;
         let mut input = Cursor::new(start.clone()).chain(input);
-        let refused = |broken: Broken| broken.at(&name, FilePlace::File);
-        let format = match start.as_slice() {
-            b"YUV4MPEG2 " => {
-                let header = line(&mut input).map_err(failed)?;
-                let expected = "the header of a YUV4MPEG2 video";
-                let video = Video::parse(&header).map_err(|found| Broken::new(expected, found));
-                Format::Video(video.map_err(refused)?)
-            }
-            [b'P', b'5' | b'6', ..] => Format::Anymaps,
-            [b'R', b'I', b'F', b'F', .., b'A', b'V'] => {
-                Format::Avi(Avi::open(&mut input).map_err(refused)?)
-            }
-            start if start.starts_with(Arrays::START[0]) => Format::Arrays(Arrays::new(false)),
-            start if start.starts_with(Arrays::START[1]) => Format::Arrays(Arrays::new(true)),
-            start if jpeg::STARTS.iter().any(|image| start.starts_with(image)) => {
-                Format::Images(Images::default())
-            }
-            [] => return Err(refused(Broken::new("a video or an image", "no bytes"))),
-            _ => {
-                let mut bytes = Vec::new();
-                let whole = input.by_ref().take(LARGEST_FILE).read_to_end(&mut bytes);
-                whole.map_err(failed)?;
-                match Pages::of(&bytes) {
-                    Some(pages) => Format::Pages(pages),
-                    None if is_image(&bytes) => Format::Image(bytes),
-                    None => {
-                        let expected = "a video or an image, known by its first bytes";
-                        let found = kind_of(&bytes).map_or_else(
-                            || format!("a text that begins with `{}`", start.escape_ascii()),
-                            str::to_owned,
-                        );
-                        return Err(refused(Broken::new(expected, found)));
-                    }
-                }
-            }
-        };
+        let format = FORMATS.into_iter().find(|format| (format.begins)(&start));
+        let decoder = format.map(|format| (format.open)(&mut input)).transpose();
+        let decoder = decoder.map_err(|broken| broken.at(&name, FilePlace::File))?;
         Ok(Self {
             input: Box::new(input),
-            format,
+            decoder,
             name,
             grey: Grey::default(),
             bits: None,
@@ -232,11 +239,7 @@ impl FrameReader {
 
     /// The frame rate that the stream itself states.
     pub fn frame_rate_hz(&self) -> Option<f64> {
-        match &self.format {
-            Format::Video(video) => video.rate_hz,
-            Format::Avi(avi) => avi.rate_hz,
-            _ => None,
-        }
+        self.decoder.as_ref()?.rate_hz()
     }
 
     /// Number of frames so far, those that were dropped or damaged included.
@@ -282,9 +285,11 @@ impl FrameReader {
     /// grey: most halve the resolution of colours.
     pub fn next_colour_frame(&mut self, frame: &mut Array3<u8>) -> Result<Option<f64>, FileError> {
         let colours = |found: &str| Broken::new("a frame in red, green and blue", found);
-        let convert = |encoded: Encoded<'_>, name: &Path| {
+        let convert = |encoded: Encoded, name: &Path| {
             let image = match encoded {
-                Encoded::Luma { .. } => return Err(colours("a video in luma and chroma")),
+                Encoded::Luma { .. } | Encoded::DeepLuma(_) => {
+                    return Err(colours("a video in luma and chroma"));
+                }
                 Encoded::File(bytes) => decode(&bytes, name)?,
                 Encoded::Decoded(image) => image,
             };
@@ -302,27 +307,24 @@ impl FrameReader {
     fn next_of<T>(
         &mut self,
         memory: Vec<u8>,
-        convert: impl Fn(Encoded<'_>, &Path) -> Result<T, Broken>,
+        convert: impl Fn(Encoded, &Path) -> Result<T, Broken>,
         size: impl Fn(&T) -> (usize, usize),
     ) -> Result<Option<(f64, T)>, FileError> {
         let rate_hz = self.frame_rate_hz().unwrap_or(self.default_rate_hz);
         let name = self.name.clone();
         let mut memory = Some(memory);
         loop {
-            let before = self.frames;
-            let read = self.read(memory.take().unwrap_or_default(), |encoded| {
-                convert(encoded, &name)
-            });
-            self.frames = match &self.format {
-                Format::Avi(avi) => avi.frames,
-                _ if matches!(read, Ok(None)) => before,
-                _ => before + 1,
+            let Some(decoder) = &mut self.decoder else {
+                return Ok(None);
             };
+            let read = decoder.next(&mut self.input, memory.take().unwrap_or_default());
+            let read = read.and_then(|next| next.map(|next| convert(next, &name)).transpose());
+            let (dropped, goes_on) = (decoder.dropped(), decoder.goes_on());
             let got = u64::from(!matches!(read, Ok(None)));
-            self.dropped += (self.frames - before).saturating_sub(got);
+            self.frames += got + dropped - self.dropped;
+            self.dropped = dropped;
             let read = read.and_then(|next| next.map(|next| self.sized(next, &size)).transpose());
-            let place = FilePlace::Frame(self.frames.max(before + 1));
-            let goes_on = matches!(self.format, Format::Avi(_) | Format::Images(_));
+            let place = FilePlace::Frame(self.frames + 1 - got);
             let is_damaged = matches!(read, Err(Broken::File(_) | Broken::OtherSize { .. }));
             let read = read.map_err(|broken| broken.at(&name, place));
             match read {
@@ -342,7 +344,7 @@ impl FrameReader {
                 ended => {
                     // A stream of damaged frames alone has no frame.
                     let error = self.first_error.take().filter(|_| self.size.is_none());
-                    self.format = Format::Ended;
+                    self.decoder = None;
                     return match error {
                         Some(error) => Err(error),
                         None => ended.map(|_| None),
@@ -361,88 +363,20 @@ impl FrameReader {
         }
         Err(Broken::OtherSize { first, found })
     }
-
-    /// The next frame as `convert` makes it, in the memory of an older one where the format allows
-    /// that.
-    fn read<T>(
-        &mut self,
-        memory: Vec<u8>,
-        convert: impl Fn(Encoded<'_>) -> Result<T, Broken>,
-    ) -> Result<Option<T>, Broken> {
-        let input = &mut self.input;
-        let file = |bytes: Cow<'_, [u8]>| convert(Encoded::File(bytes));
-        Ok(match &mut self.format {
-            Format::Ended => None,
-            Format::Image(bytes) => {
-                let bytes = take(bytes);
-                self.format = Format::Ended;
-                Some(file(bytes.into())?)
-            }
-            Format::Pages(pages) => {
-                let page = pages.turn();
-                page.map(|bytes| file(bytes.into())).transpose()?
-            }
-            Format::Avi(avi) => avi.next(input)?.map(&convert).transpose()?,
-            Format::Images(images) => {
-                let image = images.next(input)?;
-                image.map(|bytes| file(bytes.into())).transpose()?
-            }
-            Format::Arrays(arrays) => {
-                let image = arrays.next(input)?;
-                image
-                    .map(|image| convert(Encoded::Decoded(image)))
-                    .transpose()?
-            }
-            Format::Anymaps => {
-                let Some(mut bytes) = anymap_header(input)? else {
-                    return Ok(None);
-                };
-                let Some(samples) = anymap_samples(&bytes) else {
-                    let found = quoted(&String::from_utf8_lossy(&bytes), 40);
-                    let expected = "the header of a PGM or PPM image of at most 64 million pixels";
-                    return Err(Broken::new(expected, found));
-                };
-                let header = bytes.len();
-                append(input, samples, &mut bytes)?;
-                if bytes.len() < header + samples {
-                    return Err(Broken::cut(samples, bytes.len() - header));
-                }
-                Some(file(bytes.into())?)
-            }
-            Format::Video(video) => {
-                let start = line(input)?;
-                if start.is_empty() {
-                    return Ok(None);
-                }
-                if !(start.starts_with(b"FRAME") && start.ends_with(b"\n")) {
-                    let found = quoted(&String::from_utf8_lossy(&start), 40);
-                    return Err(Broken::new("the word FRAME", format!("`{found}`")));
-                }
-                let luma = video.rows * video.columns * video.bytes_per_sample();
-                let mut samples = memory;
-                samples.clear();
-                append(input, luma, &mut samples)?;
-                let rest = input.take(video.chroma_bytes as u64);
-                let skipped = copy(&mut { rest }, &mut sink())? as usize;
-                if samples.len() + skipped < luma + video.chroma_bytes {
-                    let found = samples.len() + skipped;
-                    return Err(Broken::cut(luma + video.chroma_bytes, found));
-                }
-                Some(convert(Encoded::Luma { video, samples })?)
-            }
-        })
-    }
 }
 
 /// A frame as its stream stores it.
-enum Encoded<'a> {
+enum Encoded {
     /// An image with its header.
-    File(Cow<'a, [u8]>),
+    File(Vec<u8>),
     Decoded(DynamicImage),
+    /// Grey levels of so many rows and columns.
     Luma {
-        video: &'a Video,
+        size: (usize, usize),
         samples: Vec<u8>,
     },
+    /// Luma of more than eight bits, as a PGM.
+    DeepLuma(Vec<u8>),
 }
 
 impl FrameSource for FrameReader {
@@ -456,18 +390,14 @@ impl FrameSource for FrameReader {
     fn next_frame(&mut self, frame: &mut Array2<u8>) -> Result<Option<f64>, Self::Error> {
         let memory = take(frame).into_raw_vec_and_offset().0;
         let (grey, bits) = (self.grey, self.bits);
-        let convert = |encoded: Encoded<'_>, name: &Path| {
-            let levels =
-                |bytes: &[u8]| eight_bit_levels(decode(bytes, name)?, bytes, name, grey, bits);
+        let convert = |encoded: Encoded, name: &Path| {
             Ok(match encoded {
-                Encoded::File(bytes) => levels(&bytes)?,
-                Encoded::Decoded(image) => eight_bit_levels(image, &[], name, grey, bits)?,
-                Encoded::Luma { video, samples } if video.depth > 8 => {
-                    levels(&video.anymap(&samples))?
+                Encoded::File(bytes) | Encoded::DeepLuma(bytes) => {
+                    eight_bit_levels(decode(&bytes, name)?, &bytes, name, grey, bits)?
                 }
-                Encoded::Luma { video, samples } => {
-                    let shape = (video.rows, video.columns);
-                    Array2::from_shape_vec(shape, samples).unwrap_or_else(|_| Array2::zeros(shape))
+                Encoded::Decoded(image) => eight_bit_levels(image, &[], name, grey, bits)?,
+                Encoded::Luma { size, samples } => {
+                    Array2::from_shape_vec(size, samples).unwrap_or_else(|_| Array2::zeros(size))
                 }
             })
         };
@@ -539,205 +469,14 @@ impl From<FileError> for Broken {
     }
 }
 
-/// Whether the first bytes are those of an image that is decoded.
-fn is_image(bytes: &[u8]) -> bool {
-    image::guess_format(bytes).is_ok_and(|format| format.reading_enabled())
-}
-
-/// A line with its end, without one where the stream ends or the line is too long.
-fn line(input: &mut dyn BufRead) -> IoResult<Vec<u8>> {
-    let mut line = Vec::new();
-    input.take(LONGEST_HEADER).read_until(b'\n', &mut line)?;
-    Ok(line)
-}
-
 /// Appends the next bytes, fewer at the end of the stream. Memory grows with what arrives, not with
 /// what a header announces.
 fn append(input: &mut dyn Read, length: usize, bytes: &mut Vec<u8>) -> IoResult<usize> {
     input.take(length as u64).read_to_end(bytes)
 }
 
-/// What the header of a YUV4MPEG2 video states.
-struct Video {
-    columns: usize,
-    rows: usize,
-    depth: u32,
-    /// Bytes of the planes after the luma.
-    chroma_bytes: usize,
-    rate_hz: Option<f64>,
-}
-
-impl Video {
-    /// The header, or the part of it that cannot be used.
-    fn parse(header: &[u8]) -> Result<Self, String> {
-        let text = String::from_utf8_lossy(header);
-        let Some(text) = text.strip_suffix('\n') else {
-            return Err(format!("a first line of more than {} bytes", header.len()));
-        };
-        let field = |name| {
-            text.split(' ')
-                .skip(1)
-                .find_map(|word| word.strip_prefix(name))
-        };
-        let side = |name: char| {
-            let digits = field(name).unwrap_or_default();
-            digits
-                .parse::<usize>()
-                .map_err(|_| format!("`{}`", quoted(text, 80)))
-        };
-        let (columns, rows) = (side('W')?, side('H')?);
-        if !is_read(columns, rows) {
-            return Err(format!("{columns} × {rows} pixels"));
-        }
-        let space = field('C').unwrap_or("420");
-        let halves = [columns, rows].map(|side| side.div_ceil(2));
-        let unknown = || format!("the colour space `{}`", quoted(space, 20));
-        let known = [
-            ("mono", 0),
-            ("420", 2 * halves[0] * halves[1]),
-            ("422", 2 * halves[0] * rows),
-            ("444alpha", 3 * columns * rows),
-            ("444", 2 * columns * rows),
-            ("411", 2 * columns.div_ceil(4) * rows),
-        ];
-        let found = known.iter().find(|(name, _)| space.starts_with(name));
-        let (name, chroma) = found.ok_or_else(unknown)?;
-        let depth = match space[name.len()..].trim_start_matches('p') {
-            // How the colours of 8 bits are placed.
-            "" | "jpeg" | "mpeg2" | "aldv" => 8,
-            digits => digits.parse().map_err(|_| unknown())?,
-        };
-        if !(8..=16).contains(&depth) {
-            return Err(unknown());
-        }
-        let rate = field('F').and_then(|rate| rate.split_once(':'));
-        let rate = rate.and_then(|(n, d)| Some(n.parse::<f64>().ok()? / d.parse::<f64>().ok()?));
-        let mut video = Self {
-            columns,
-            rows,
-            depth,
-            chroma_bytes: 0,
-            rate_hz: rate.filter(|rate| *rate > 0.0 && rate.is_finite()),
-        };
-        video.chroma_bytes = chroma * video.bytes_per_sample();
-        Ok(video)
-    }
-
-    fn bytes_per_sample(&self) -> usize {
-        if self.depth > 8 { 2 } else { 1 }
-    }
-
-    /// The luma as a PGM, whose header states the bits: one rule for deep samples of all formats.
-    fn anymap(&self, luma: &[u8]) -> Vec<u8> {
-        let largest = (1_u32 << self.depth) - 1;
-        let header = format!("P5\n{} {}\n{largest}\n", self.columns, self.rows);
-        let swapped = luma
-            .chunks_exact(2)
-            .flat_map(|sample| [sample[1], sample[0]]);
-        header.into_bytes().into_iter().chain(swapped).collect()
-    }
-}
-
 fn is_read(columns: usize, rows: usize) -> bool {
     let (side, pixels) = largest_image();
     let sides = [columns, rows];
     sides.iter().all(|&s| s > 0 && s <= side as usize) && columns * rows <= pixels as usize
-}
-
-/// The header of the next PGM or PPM up to the byte before its samples. None at the end.
-fn anymap_header(input: &mut dyn BufRead) -> IoResult<Option<Vec<u8>>> {
-    let mut header = Vec::new();
-    let (mut words, mut in_word, mut in_comment) = (0, false, false);
-    for byte in input.take(LONGEST_HEADER).bytes() {
-        let byte = byte?;
-        // Some writers end an image with a line's end.
-        if header.is_empty() && byte.is_ascii_whitespace() {
-            continue;
-        }
-        header.push(byte);
-        in_comment = byte != b'\n' && (in_comment || (byte == b'#' && !in_word));
-        let part_of_word = !in_comment && !byte.is_ascii_whitespace();
-        words += usize::from(in_word && !part_of_word);
-        in_word = part_of_word;
-        // Magic number, width, height, largest value, and one white space.
-        if words == 4 {
-            break;
-        }
-    }
-    Ok(Some(header).filter(|header| !header.is_empty()))
-}
-
-/// Bytes of the samples of an image with this header.
-fn anymap_samples(header: &[u8]) -> Option<usize> {
-    let words: Vec<&str> = header_words(std::str::from_utf8(header).ok()?).collect();
-    let &[magic, width, height, largest] = words.as_slice() else {
-        return None;
-    };
-    let channels = match magic {
-        "P5" => 1,
-        "P6" => 3,
-        _ => return None,
-    };
-    let (width, height) = (width.parse().ok()?, height.parse().ok()?);
-    let bytes = match largest.parse().ok()? {
-        1..=255 => 1,
-        256..=65_535_u32 => 2,
-        _ => return None,
-    };
-    is_read(width, height).then(|| width * height * channels * bytes)
-}
-
-/// The pages of a TIFF file.
-struct Pages {
-    bytes: Vec<u8>,
-    little_endian: bool,
-    /// Where the directory of the next page stands.
-    next: usize,
-    /// Directories that were read: a chain that returns to one of them would never end.
-    seen: HashSet<usize>,
-}
-
-impl Pages {
-    /// None where the bytes are no TIFF of 32-bit offsets.
-    fn of(bytes: &[u8]) -> Option<Self> {
-        let little_endian = match bytes.get(..4)? {
-            b"II*\0" => true,
-            b"MM\0*" => false,
-            _ => return None,
-        };
-        let mut pages = Self {
-            bytes: bytes.to_vec(),
-            little_endian,
-            next: 0,
-            seen: HashSet::new(),
-        };
-        pages.next = pages.number(4, 4)?;
-        Some(pages)
-    }
-
-    /// A whole number of so many bytes.
-    fn number(&self, at: usize, bytes: usize) -> Option<usize> {
-        let mut digits = self.bytes.get(at..at.checked_add(bytes)?)?.to_vec();
-        if self.little_endian {
-            digits.reverse();
-        }
-        Some((digits.iter()).fold(0, |sum, digit| 256 * sum + usize::from(*digit)))
-    }
-
-    /// The file with the next page as its first, which is the one that decoders of images read.
-    fn turn(&mut self) -> Option<&[u8]> {
-        let page = self.next;
-        // The first directory is the decoder's to judge, wherever it stands.
-        if !self.seen.is_empty() && page == 0 || !self.seen.insert(page) {
-            return None;
-        }
-        let entries = self.number(page, 2).unwrap_or(0);
-        self.next = self.number(page + 2 + 12 * entries, 4).unwrap_or(0);
-        let mut first = (page as u32).to_le_bytes();
-        if !self.little_endian {
-            first.reverse();
-        }
-        self.bytes[4..8].copy_from_slice(&first);
-        Some(&self.bytes)
-    }
 }

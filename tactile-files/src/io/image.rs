@@ -256,6 +256,9 @@ pub(super) fn decode(bytes: &[u8], path: &Path) -> Result<DynamicImage, FileErro
         let kind = kind_of(bytes).unwrap_or("a text");
         return Err(refused(path, format!("it is {kind}: an image is wanted")));
     }
+    if is_cut_jpeg(bytes) {
+        return Err(refused(path, CUT_JPEG));
+    }
     let (side, pixels) = largest_image();
     let mut limits = Limits::default();
     limits.max_image_width = Some(side);
@@ -291,6 +294,15 @@ pub(super) fn decode(bytes: &[u8], path: &Path) -> Result<DynamicImage, FileErro
     decoded.map_err(|reason| refused(path, reason))
 }
 
+const CUT_JPEG: &str = "the JPEG image is damaged or cut short";
+
+/// Whether the samples of a JPEG image have no end: a decoder makes up the rest.
+fn is_cut_jpeg(bytes: &[u8]) -> bool {
+    let last = |marker: u8| bytes.windows(2).rposition(|pair| pair == [0xff, marker]);
+    let (end, samples) = (0xd9, 0xda);
+    bytes.starts_with(b"\xff\xd8\xff") && last(end) < last(samples)
+}
+
 /// What is not decoded, or not to levels.
 const OTHER_SAMPLES: &str = "it is stored in a way that is not read: save it with whole numbers of 8 or 16 \
      bits without sign, packed by LZW, Deflate or not at all";
@@ -302,7 +314,7 @@ fn in_words(error: &ImageError) -> String {
     }
     let mut text = error.to_string();
     if text.contains("decoding Jpeg") {
-        return "the JPEG image is damaged or cut short".into();
+        return CUT_JPEG.into();
     }
     while let Some(start) = text.find("Some(") {
         let inner = start + "Some(".len();
@@ -316,7 +328,7 @@ fn in_words(error: &ImageError) -> String {
     text.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
-fn refused(path: &Path, reason: impl Into<String>) -> FileError {
+pub(super) fn refused(path: &Path, reason: impl Into<String>) -> FileError {
     FileError::Image {
         path: path.into(),
         reason: reason.into(),

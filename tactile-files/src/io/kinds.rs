@@ -3,7 +3,12 @@
 pub(super) const UTF_16: &str = "UTF-16 text";
 
 /// First bytes (where they stand, and what they are) and what such a file is, with the remedy.
-const KINDS: [(usize, &[u8], &str); 24] = [
+const KINDS: [(usize, &[u8], &str); 25] = [
+    (
+        8,
+        b"WEBP",
+        "a WebP image, which is not read: save it as PNG",
+    ),
     (0, b"\xff\xfe", UTF_16),
     (0, b"\xfe\xff", UTF_16),
     (0, b"\x89PNG", "a PNG image"),
@@ -26,8 +31,8 @@ const KINDS: [(usize, &[u8], &str); 24] = [
         b"GIF8",
         "a GIF, which is not read: save its frames as PNG",
     ),
-    (0, b"P5", "a PGM image"),
-    (0, b"P6", "a PPM image"),
+    (0, b"P5\n", "a PGM image"),
+    (0, b"P6\n", "a PPM image"),
     (0, b"YUV4MPEG2", "a YUV4MPEG2 video"),
     (0, b"RIFF", "an AVI video"),
     (4, b"ftyp", MPEG),
@@ -52,6 +57,28 @@ const KINDS: [(usize, &[u8], &str); 24] = [
 
 const MPEG: &str = "a compressed video, which is not read: pipe it by \
                     ffmpeg -i VIDEO -f yuv4mpegpipe -pix_fmt gray - | tactile … -";
+
+/// What begins a text that is no table, and what such a text is, with the remedy.
+const TEXTS: [(&str, &str); 7] = [
+    ("P2\n", "a PGM image"),
+    ("P3\n", "a PPM image"),
+    ("{", "a JSON text: export it as CSV"),
+    ("[[", "a JSON text: export it as CSV"),
+    ("[{", "a JSON text: export it as CSV"),
+    ("<", "an HTML or XML text: export it as CSV"),
+    (
+        "version https://git-lfs",
+        "a pointer of Git LFS in place of the file: git lfs pull",
+    ),
+];
+
+/// What a text is that is no table. `None` for one that may be.
+pub(super) fn kind_of_text(bytes: &[u8]) -> Option<&'static str> {
+    let text = bytes.trim_ascii_start();
+    let mut texts = TEXTS.iter();
+    let (_, kind) = texts.find(|(start, _)| text.starts_with(start.as_bytes()))?;
+    Some(kind)
+}
 
 /// Bytes of a file that are looked at: text has no control characters among them.
 const LOOKED_AT: usize = 4096;

@@ -8,6 +8,7 @@
 //! | [`read_cases`] | point-matching case files (`m` and `t` rows) |
 //! | [`read_grey_image`] | PNG, PGM, JPEG, TIFF, grey or colour, 8 or 16 bits |
 //! | [`read_colour_levels`] | PNG, PPM, JPEG, TIFF in colour, in 8 bits |
+//! | [`read_normal_map`] | normals of a surface, as images or arrays |
 //! | [`FrameReader`] | frames of videos, pipes, arrays and stacks of images, one after the other |
 //!
 //! Tables are text, or arrays of numbers in `.npy`, `.npz` and `.mat` (version 5). In text, cells are
@@ -27,6 +28,7 @@ mod files;
 mod frames;
 mod image;
 mod kinds;
+mod normals;
 mod numbers;
 mod range;
 mod table;
@@ -37,11 +39,12 @@ mod text;
 pub use cases::{CasePoints, MatchCase, read_cases, write_case_result};
 pub use error::{FileError, FilePlace};
 pub use files::{read_bytes, replace_file, write_bytes};
-pub use frames::FrameReader;
+pub use frames::{FrameReader, frame_formats};
 pub use image::{
     Grey, GreyImage, image_size, read_colour_levels, read_grey_image, read_grey_levels,
     write_colour_image, write_grey_image,
 };
+pub use normals::read_normal_map;
 pub use range::InputQuantity;
 pub use table::{
     Gaps, PointTable, Points, Table, TableOptions, read_columns, read_displaced_points, read_grid,

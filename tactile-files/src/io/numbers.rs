@@ -7,18 +7,29 @@ use super::files::LARGEST_FILE;
 use super::frames::{ARRAY_STARTS, header_fields, members};
 use super::text::TextCells;
 use flate2::read::ZlibDecoder;
+use ndarray::{Array3, ArrayD, IxDyn, ShapeBuilder};
 use std::io::Read;
 use std::path::Path;
 
 /// First bytes of a `.mat` file of version 5.
 const MAT_5: &[u8] = b"MATLAB 5.0";
 
-/// An array of two axes or one, which is a column, row by row.
+/// An array, its numbers in the order of C.
 struct Array {
     name: String,
-    rows: usize,
-    columns: usize,
+    shape: Vec<usize>,
     values: Vec<f64>,
+}
+
+impl Array {
+    /// Rows and columns: an array of one axis is a column.
+    fn sides(&self) -> Option<(usize, usize)> {
+        match *self.shape {
+            [rows] => Some((rows, 1)),
+            [rows, columns] => Some((rows, columns)),
+            _ => None,
+        }
+    }
 }
 
 /// How numbers are stored: letter of the kind (`f`, `i`, `u`, `b`), bytes, and whether the highest
@@ -50,33 +61,32 @@ fn numbers(bytes: &[u8], (letter, size, big_endian): Kind) -> Option<Vec<f64>> {
     bytes.chunks_exact(size).map(number).collect()
 }
 
-/// An array of this shape, unless it has more than two axes or its numbers are not all there.
+/// An array of this shape, unless its numbers are not all there.
 fn array(name: &str, shape: &[usize], by_columns: bool, values: Vec<f64>) -> Option<Array> {
-    let (rows, columns) = match *shape {
-        [rows] => (rows, 1),
-        // A row vector of MATLAB is a column here.
-        [1, columns] if by_columns => (columns, 1),
-        [rows, columns] => (rows, columns),
-        _ => return None,
-    };
     let name = quoted(name.strip_suffix(".npy").unwrap_or(name), 40);
-    let mut values = values;
-    if rows.checked_mul(columns)? != values.len() || values.is_empty() {
+    let length = shape
+        .iter()
+        .try_fold(1_usize, |all, side| all.checked_mul(*side))?;
+    if length != values.len() || values.is_empty() {
         return None;
     }
-    if by_columns && columns > 1 {
-        let at = |k: usize| values[(k % columns) * rows + k / columns];
-        values = (0..rows * columns).map(at).collect();
-    }
+    let values = match by_columns {
+        true => ArrayD::from_shape_vec(IxDyn(shape).f(), values)
+            .ok()?
+            .iter()
+            .copied()
+            .collect(),
+        false => values,
+    };
+    let shape = shape.to_vec();
     Some(Array {
         name,
-        rows,
-        columns,
+        shape,
         values,
     })
 }
 
-/// The array of a `.npy` file, `None` for one of no numbers or of more than two axes.
+/// The array of a `.npy` file, `None` for one of no numbers.
 fn of_npy(name: &str, bytes: &[u8]) -> Option<Array> {
     let wide = *bytes.get(6)? > 1;
     let start = if wide { 12 } else { 10 };
@@ -160,7 +170,11 @@ fn matrix(mut rest: &[u8], big_endian: bool) -> Option<Array> {
     }
     let (_, sides) = element(&mut rest, big_endian)?;
     let sides = numbers(sides, (b'i', 4, big_endian))?;
-    let shape: Vec<usize> = sides.iter().map(|side| side.max(0.0) as usize).collect();
+    let mut shape: Vec<usize> = sides.iter().map(|side| side.max(0.0) as usize).collect();
+    // A row vector of MATLAB is a column here.
+    if shape.len() == 2 && shape[0] == 1 {
+        shape.remove(0);
+    }
     let (_, name) = element(&mut rest, big_endian)?;
     let (kind, values) = element(&mut rest, big_endian)?;
     let (letter, size) = match kind {
@@ -180,49 +194,74 @@ fn matrix(mut rest: &[u8], big_endian: bool) -> Option<Array> {
     array(&String::from_utf8_lossy(name), &shape, true, values)
 }
 
+/// The arrays of a file of NumPy or MATLAB. `None` for what is neither.
+fn arrays(bytes: &[u8]) -> Option<Vec<Array>> {
+    if bytes.starts_with(ARRAY_STARTS[0]) {
+        return Some(of_npy("", bytes).into_iter().collect());
+    }
+    if bytes.starts_with(MAT_5) {
+        return Some(of_mat(bytes));
+    }
+    // A spreadsheet is an archive, too.
+    let files = bytes
+        .starts_with(ARRAY_STARTS[1])
+        .then(|| members(bytes, LARGEST_FILE))?;
+    let files = files.unwrap_or_default();
+    let mut files = files
+        .iter()
+        .filter(|(name, _)| name.ends_with(".npy"))
+        .peekable();
+    files.peek()?;
+    Some(
+        files
+            .filter_map(|(name, bytes)| of_npy(name, bytes))
+            .collect(),
+    )
+}
+
 /// The cells of arrays: of one array, or of several columns of one length, each by its name. `None`
 /// for what holds no arrays.
 pub(super) fn cells(bytes: &[u8], path: &Path) -> Option<Result<TextCells, FileError>> {
     let expected = "one array of numbers of two axes, or several of one axis and length";
     let refused = |found: String| FileError::content(path, FilePlace::File, expected, found);
-    let arrays = if bytes.starts_with(ARRAY_STARTS[0]) {
-        of_npy("", bytes).into_iter().collect()
-    } else if bytes.starts_with(ARRAY_STARTS[1]) {
-        let files = members(bytes, LARGEST_FILE).unwrap_or_default();
-        let is_array = |(name, _): &&(String, _)| name.ends_with(".npy");
-        files
-            .iter()
-            .filter(is_array)
-            .filter_map(|(name, bytes)| of_npy(name, bytes))
-            .collect()
-    } else if bytes.starts_with(MAT_5) {
-        of_mat(bytes)
-    } else {
-        return None;
-    };
-    if bytes.starts_with(ARRAY_STARTS[1]) && arrays.is_empty() {
-        // A spreadsheet is an archive, too.
-        return None;
+    let mut arrays = arrays(bytes)?;
+    arrays.retain(|array| array.sides().is_some());
+    // A frame rate or another setting beside a table is no part of it.
+    if arrays.iter().any(|array| array.values.len() > 1) {
+        arrays.retain(|array| array.values.len() > 1);
     }
     let mut table = TextCells::default();
     match arrays.as_slice() {
-        [] => return Some(Err(refused("none".into()))),
+        [] if bytes.starts_with(ARRAY_STARTS[0]) => {
+            let header = String::from_utf8_lossy(&bytes[..bytes.len().min(140)]);
+            let from = header.find('{').unwrap_or(0);
+            let found = format!(
+                "`{}`: save it by `astype(float)`",
+                quoted(&header[from..], 70)
+            );
+            return Some(Err(refused(found)));
+        }
+        [] => {
+            return Some(Err(refused(
+                "none: save arrays of numbers themselves".into(),
+            )));
+        }
         [one] => {
-            table.columns = one.columns;
+            table.columns = one.sides().map_or(1, |(_, columns)| columns);
             table.values.clone_from(&one.values);
-            if one.columns == 1 {
+            if table.columns == 1 {
                 table.header = vec![one.name.clone()];
             }
         }
         [first, rest @ ..] => {
-            let fits = |array: &Array| array.columns == 1 && array.rows == first.rows;
-            if !(fits(first) && rest.iter().all(fits)) {
+            let length = |array: &Array| array.sides().filter(|(_, columns)| *columns == 1);
+            if length(first).is_none() || rest.iter().any(|array| length(array) != length(first)) {
                 let names: Vec<&str> = arrays.iter().map(|array| array.name.as_str()).collect();
                 return Some(Err(refused(format!("`{}`: keep one", names.join("`, `")))));
             }
             table.columns = arrays.len();
             table.header = arrays.iter().map(|array| array.name.clone()).collect();
-            let rows = 0..first.rows;
+            let rows = 0..first.values.len();
             table.values = rows
                 .flat_map(|row| arrays.iter().map(move |a| a.values[row]))
                 .collect();
@@ -240,4 +279,20 @@ pub(super) fn cells(bytes: &[u8], path: &Path) -> Option<Result<TextCells, FileE
         }
     }
     Some(Ok(table))
+}
+
+/// The array of vectors in a file of arrays, `[row, column, axis]`. `None` for what holds no arrays.
+pub(super) fn vectors(bytes: &[u8], path: &Path) -> Option<Result<Array3<f64>, FileError>> {
+    let found = arrays(bytes)?
+        .into_iter()
+        .find_map(|array| match *array.shape {
+            [rows, columns, 3] => Array3::from_shape_vec((rows, columns, 3), array.values).ok(),
+            [3, rows, columns] => {
+                let by_axis = Array3::from_shape_vec((3, rows, columns), array.values).ok()?;
+                Some(by_axis.permuted_axes([1, 2, 0]))
+            }
+            _ => None,
+        });
+    let expected = "an array of normals of shape (rows, columns, 3)";
+    Some(found.ok_or_else(|| FileError::content(path, FilePlace::File, expected, "none")))
 }

@@ -1,11 +1,11 @@
 //! Tables of numbers, as text or arrays: columns by name in SI units, points, grids.
-use super::columns::{AXES, DISPLACEMENTS, FRAME, Heading, in_si};
+use super::columns::{AXES, DISPLACEMENTS, FRAME, Heading, axes, in_si};
 use super::error::{FileError, FilePlace, quoted};
 use super::files::read_bytes;
 use super::numbers;
 use super::text::{TextCells, cells, columns_in_words};
 use nalgebra::{Point, Point2, Point3};
-use ndarray::{Array2, Axis};
+use ndarray::Array2;
 use std::path::{Path, PathBuf};
 
 /// What becomes of rows without a number.
@@ -88,25 +88,30 @@ impl Table {
         &mut self,
         wanted: [(&[&str], &str); N],
     ) -> Result<[Vec<f64>; N], FileError> {
+        let mut found = self.columns_of(&wanted)?.into_iter();
+        Ok(std::array::from_fn(|_| found.next().unwrap_or_default()))
+    }
+
+    fn columns_of(&mut self, wanted: &[(&[&str], &str)]) -> Result<Vec<Vec<f64>>, FileError> {
+        let count = wanted.len();
         let headings = self.headings();
         let chosen = !self.options.columns.is_empty();
-        if headings.is_empty() && !chosen && self.values.ncols() != N {
+        if headings.is_empty() && !chosen && self.values.ncols() != count {
             let found = self.values.ncols().to_string();
-            return Err(self.error(FilePlace::Line(1), columns_in_words(N), found));
+            return Err(self.error(FilePlace::Line(1), columns_in_words(count), found));
         }
-        let mut places = [0; N];
-        for (position, (names, _)) in wanted.iter().enumerate() {
-            places[position] = match (chosen, headings.is_empty()) {
-                (true, _) => self.chosen(position, N)?,
-                (false, true) => position,
-                (false, false) => self.find(names, &headings)?,
-            };
-        }
+        let places = wanted.iter().enumerate().map(|(position, (names, _))| {
+            match (chosen, headings.is_empty()) {
+                (true, _) => self.chosen(position, count),
+                (false, true) => Ok(position),
+                (false, false) => self.find(names, &headings),
+            }
+        });
+        let places = places.collect::<Result<Vec<usize>, _>>()?;
         self.keep_rows(&places)?;
-        let mut found = [const { Vec::new() }; N];
-        for (position, (names, unit)) in wanted.into_iter().enumerate() {
+        let mut found = Vec::with_capacity(count);
+        for ((names, unit), at) in wanted.iter().zip(places) {
             let name = names.first().copied().unwrap_or_default();
-            let at = places[position];
             let given = headings.get(at).and_then(|heading| heading.unit.as_deref());
             // The wanted unit stands for its quantity: any multiple of its base may stand in the
             // file.
@@ -120,12 +125,13 @@ impl Table {
                 }
             };
             let column = self.rows.iter().map(|row| self.values[[*row, at]]);
-            found[position] = column.clone().map(|value| value * factor).collect();
+            let in_si: Vec<f64> = column.clone().map(|value| value * factor).collect();
             let overflows = |(si, value): &(&f64, f64)| value.is_finite() && !si.is_finite();
-            if let Some((_, value)) = found[position].iter().zip(column).find(overflows) {
+            if let Some((_, value)) = in_si.iter().zip(column).find(overflows) {
                 let expected = format!("values of the column `{name}` that SI units can hold");
                 return Err(self.error(FilePlace::File, expected, format!("{value:e}")));
             }
+            found.push(in_si);
         }
         Ok(found)
     }
@@ -208,7 +214,7 @@ impl Table {
             }
         }
         let expected = format!("a column named `{}`", names.first().unwrap_or(&""));
-        let found = format!("`{}`", self.header.join("`, `"));
+        let found = format!("`{}`", quoted(&self.header.join("`, `"), 200));
         Err(self.error(FilePlace::File, expected, found))
     }
 
@@ -321,7 +327,7 @@ fn strict() -> TableOptions {
 /// # Errors
 /// [`FileError`], see the [module](super).
 pub fn read_grid(path: impl AsRef<Path>) -> Result<Array2<f64>, FileError> {
-    let mut table = read_table(path)?;
+    let table = read_table(path)?;
     let expected = "a number, `nan` or an empty cell";
     // A matrix has no names. A line of words is the header of another kind of table.
     let word = table.header.first().map(|word| (1, word.clone()));
@@ -331,26 +337,6 @@ pub fn read_grid(path: impl AsRef<Path>) -> Result<Array2<f64>, FileError> {
     if let Some((column, (line, word))) = word.map(|word| (1, word)).or(first) {
         let place = FilePlace::Cell { line, column };
         return Err(table.error(place, expected.into(), format!("`{word}`")));
-    }
-    // pandas writes the numbers of columns above and those of rows beside a matrix.
-    let (rows, columns) = table.values.dim();
-    let counts = |k: usize, value: &f64| {
-        if k == 0 {
-            value.is_nan()
-        } else {
-            *value == k as f64 - 1.0
-        }
-    };
-    let is_counted = |line: ndarray::ArrayView1<'_, f64>| {
-        line.iter().enumerate().all(|(k, value)| counts(k, value))
-    };
-    if rows > 1
-        && columns > 1
-        && is_counted(table.values.row(0))
-        && is_counted(table.values.column(0))
-    {
-        let whole = table.values.slice_axis(Axis(0), (1..).into());
-        table.values = whole.slice_axis(Axis(1), (1..).into()).to_owned();
     }
     Ok(table.values)
 }
@@ -370,6 +356,8 @@ pub enum PointTable {
 pub struct Points {
     /// The points, in metres if the table names a unit of lengths, else in its own unit.
     pub points: PointTable,
+    /// Where they go, if displacements are read too.
+    pub displaced: Option<PointTable>,
     /// Whether they are in metres.
     pub metric: bool,
     /// The row of each in its table, from 0.
@@ -394,10 +382,11 @@ impl Points {
     fn keep(&mut self, is_kept: impl Fn(usize) -> bool) {
         let rows = std::mem::take(&mut self.rows);
         let kept: Vec<usize> = (0..rows.len()).filter(|k| is_kept(rows[*k])).collect();
-        self.points = match &self.points {
+        let of = |points: &PointTable| match points {
             PointTable::Plane(all) => PointTable::Plane(kept.iter().map(|k| all[*k]).collect()),
             PointTable::Space(all) => PointTable::Space(kept.iter().map(|k| all[*k]).collect()),
         };
+        (self.points, self.displaced) = (of(&self.points), self.displaced.as_ref().map(of));
         self.rows = kept.iter().map(|k| rows[*k]).collect();
     }
 }
@@ -424,21 +413,11 @@ pub fn read_point_frames(
     options: &TableOptions,
 ) -> Result<Vec<Points>, FileError> {
     let mut table = read_table_with(path, options)?;
-    let (points, metric) = points_of(&mut table)?;
-    let whole = Points {
-        points,
-        metric,
-        rows: table.rows.clone(),
-        notes: table.notes.clone(),
-        table_rows: table.values.nrows(),
-    };
+    let whole = points_of(&mut table, false)?;
     let headings = table.headings();
-    let place = |names: &[&str]| {
-        headings
-            .iter()
-            .position(|h| names.contains(&h.name.as_str()))
-    };
-    let Some(frame) = place(FRAME).filter(|_| place(AXES[0]).is_some()) else {
+    let is_frame = |heading: &Heading| FRAME.contains(&heading.name.as_str());
+    let frame = headings.iter().position(is_frame);
+    let Some(frame) = frame.filter(|_| !axes(&headings).is_empty()) else {
         return Ok(vec![whole]);
     };
     let numbers = table.rows.iter().map(|row| table.values[[*row, frame]]);
@@ -456,122 +435,117 @@ pub fn read_point_frames(
     Ok(distinct.iter().map(of_frame).collect())
 }
 
-/// Points of a table, and whether they are in metres.
-fn points_of(table: &mut Table) -> Result<(PointTable, bool), FileError> {
-    let headings = table.headings();
-    let has_z = headings.iter().any(|h| AXES[2].contains(&h.name.as_str()));
-    let count = match (table.options.columns.len(), headings.is_empty()) {
-        (0, false) => 2 + usize::from(has_z),
-        (0, true) => table.values.ncols(),
-        (chosen, _) => chosen,
-    };
-    let points = match count {
-        2 => PointTable::Plane(to_points(table)?),
-        3 => PointTable::Space(to_points(table)?),
-        found => {
-            let expected = "2 or 3 columns".into();
-            return Err(table.error(FilePlace::Line(1), expected, found.to_string()));
-        }
-    };
-    let x = named(&headings, AXES[0]);
-    if x.is_some_and(|x| x.name != "x") && table.options.columns.is_empty() {
-        let taken = AXES[..count]
-            .iter()
-            .filter_map(|axis| named(&headings, axis));
-        let names: Vec<&str> = taken.map(|heading| heading.name.as_str()).collect();
-        let note = format!("the coordinates are the columns {}", names.join(", "));
-        table.notes.push(note);
-    }
-    Ok((
-        points,
-        x.is_some_and(|x| x.unit.is_some() && !x.is_in_pixels()),
-    ))
-}
-
-/// The heading of the first of these names that is there.
-fn named<'a>(headings: &'a [Heading], names: &[&str]) -> Option<&'a Heading> {
-    let mut names = names.iter();
-    names.find_map(|name| headings.iter().find(|heading| heading.name == *name))
-}
-
-fn with_gaps() -> TableOptions {
-    TableOptions {
-        gaps: Gaps::Keep,
-        ..TableOptions::default()
-    }
-}
-
 /// Reads points and where they go: columns `x`, `y` and, in space, `z` with the displacements `u`,
-/// `v` and `w` (also `u_x` and `displacement_x`), in one unit. Empty cells and `nan` are NaN. Gives
-/// points before and after, and whether the file names the unit.
+/// `v` and `w` (also `u_x` and `displacement_x`), in one unit. Columns that are chosen are four, or
+/// six in space.
 ///
 /// ```
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
-/// use tactile_files::io::{PointTable, read_displaced_points};
+/// use tactile_files::io::{PointTable, TableOptions, read_displaced_points};
 /// let folder = tempfile::tempdir()?;
 /// let path = folder.path().join("piv.csv");
 /// std::fs::write(&path, "x,y,u,v\n1,2,0.5,0\n3,4,nan,\n")?;
-/// let ([PointTable::Plane(before), PointTable::Plane(after)], false) =
-///     read_displaced_points(&path)?
-/// else {
-///     panic!("points of the plane, without a unit");
-/// };
-/// assert_eq!((before[0], after[0]), ([1.0, 2.0].into(), [1.5, 2.0].into()));
-/// assert!(after[1].x.is_nan());
+/// let table = read_displaced_points(&path, &TableOptions::default())?;
+/// assert_eq!(table.displaced, Some(PointTable::Plane(vec![[1.5, 2.0].into()])));
+/// assert_eq!((table.rows.len(), table.metric), (1, false));
 /// # Ok(()) }
 /// ```
 ///
 /// # Errors
 /// [`FileError`], among others where a displacement has no column or another unit.
-pub fn read_displaced_points(path: impl AsRef<Path>) -> Result<([PointTable; 2], bool), FileError> {
-    let mut table = read_table_with(path, &with_gaps())?;
-    let (before, metric) = points_of(&mut table)?;
-    let headings = table.headings();
-    let x = named(&headings, AXES[0]);
-    let has_unit = x.is_some_and(|x| x.unit.is_some());
-    let axes = if matches!(before, PointTable::Plane(_)) {
-        2
-    } else {
-        3
-    };
-    for names in &DISPLACEMENTS[..axes] {
-        let Some(found) = named(&headings, names) else {
-            let expected = format!("a column named `{}` beside the coordinates", names[0]);
-            let found = format!("`{}`", table.header.join("`, `"));
-            return Err(table.error(FilePlace::Line(1), expected, found));
-        };
-        if found.unit.is_some() != has_unit {
-            let expected = format!("the unit of `{}` beside that of `x`, or none", names[0]);
-            let found = found.unit.clone().unwrap_or_else(|| "none".into());
-            return Err(table.error(FilePlace::Line(1), expected, found));
-        }
-    }
-    let base = if x.is_some_and(Heading::is_in_pixels) {
-        "px"
-    } else {
-        "m"
-    };
-    let after = match &before {
-        PointTable::Plane(points) => {
-            let wanted = [DISPLACEMENTS[0], DISPLACEMENTS[1]].map(|names| (names, base));
-            PointTable::Plane(displaced(points, &table.columns(wanted)?))
-        }
-        PointTable::Space(points) => {
-            let wanted = DISPLACEMENTS.map(|names| (names, base));
-            PointTable::Space(displaced(points, &table.columns(wanted)?))
-        }
-    };
-    Ok(([before, after], metric))
+pub fn read_displaced_points(
+    path: impl AsRef<Path>,
+    options: &TableOptions,
+) -> Result<Points, FileError> {
+    points_of(&mut read_table_with(path, options)?, true)
 }
 
-/// Points, each moved by its row of displacements.
-fn displaced<const D: usize>(
-    points: &[Point<f64, D>],
-    columns: &[Vec<f64>; D],
-) -> Vec<Point<f64, D>> {
-    let rows = points.iter().enumerate();
-    rows.map(|(row, p)| Point::from(std::array::from_fn(|k| p[k] + columns[k][row])))
-        .collect()
+/// Points of a table, with their displacements if these are wanted.
+fn points_of(table: &mut Table, displaced: bool) -> Result<Points, FileError> {
+    let (headings, chosen) = (table.headings(), table.options.columns.len());
+    let found = axes(&headings);
+    if chosen == 0 && !headings.is_empty() && found.is_empty() {
+        let expected = "columns named `x` and `y` (--columns chooses others)".into();
+        let found = format!("`{}`", quoted(&table.header.join("`, `"), 200));
+        return Err(table.error(FilePlace::File, expected, found));
+    }
+    let per_axis = 1 + usize::from(displaced);
+    let count = match (chosen, headings.is_empty()) {
+        (0, false) => per_axis * found.len(),
+        (0, true) => table.values.ncols(),
+        _ => chosen,
+    };
+    let axis_count = count / per_axis;
+    if !matches!(axis_count, 2 | 3) || count % per_axis > 0 {
+        let expected = format!(
+            "{} or {} (--columns chooses them)",
+            2 * per_axis,
+            columns_in_words(3 * per_axis)
+        );
+        return Err(table.error(FilePlace::Line(1), expected, count.to_string()));
+    }
+    // Positions of tracked points are often in pixels, which have no length here.
+    let first = found.first().copied();
+    let in_pixels = first.is_some_and(Heading::is_in_pixels);
+    let metric = first.is_some_and(|x| x.unit.is_some() && !in_pixels);
+    let unit = if in_pixels { "px" } else { "m" };
+    let names = |axis: usize| found.get(axis).map(|heading| heading.name.as_str());
+    let names: Vec<Vec<&str>> = (0..axis_count)
+        .map(|axis| vec![names(axis).unwrap_or(AXES[axis][0])])
+        .collect();
+    let displacements = DISPLACEMENTS
+        .iter()
+        .take(if displaced { axis_count } else { 0 });
+    let wanted = names
+        .iter()
+        .map(Vec::as_slice)
+        .chain(displacements.copied());
+    let wanted: Vec<(&[&str], &str)> = wanted.map(|names| (names, unit)).collect();
+    if chosen == 0 && !headings.is_empty() {
+        // A unit beside one number and none beside another leaves open what the other is in.
+        let with_unit = |(names, _): &(&[&str], &str)| {
+            let known = headings.iter().find(|h| names.contains(&h.name.as_str()));
+            known.map(|heading| heading.unit.is_some())
+        };
+        let without = wanted.iter().find(|of| with_unit(of) == Some(false));
+        if let Some((names, _)) = without
+            && wanted.iter().any(|of| with_unit(of) == Some(true))
+        {
+            let expected = format!("a unit of the column `{}`, as others have one", names[0]);
+            return Err(table.error(FilePlace::Line(1), expected, "none".into()));
+        }
+    }
+    let columns = table.columns_of(&wanted)?;
+    if chosen == 0 && first.is_some_and(|x| x.name != "x") {
+        let names: Vec<&str> = names.concat();
+        let note = format!("the coordinates are the columns {}", names.join(", "));
+        table.notes.push(note);
+    }
+    let (places, moves) = columns.split_at(axis_count);
+    let rows = 0..table.rows.len();
+    let point = |row: usize, axis: usize, moved: bool| {
+        places[axis][row] + moves.get(axis).filter(|_| moved).map_or(0.0, |by| by[row])
+    };
+    let of = |moved: bool| match axis_count {
+        2 => PointTable::Plane(
+            rows.clone()
+                .map(|row| [0, 1].map(|k| point(row, k, moved)).into())
+                .collect(),
+        ),
+        _ => PointTable::Space(
+            rows.clone()
+                .map(|row| [0, 1, 2].map(|k| point(row, k, moved)).into())
+                .collect(),
+        ),
+    };
+    Ok(Points {
+        points: of(false),
+        displaced: displaced.then(|| of(true)),
+        metric,
+        rows: table.rows.clone(),
+        notes: table.notes.clone(),
+        table_rows: table.values.nrows(),
+    })
 }
 
 /// Reads points with `D` coordinates, a row each.
@@ -598,34 +572,17 @@ fn displaced<const D: usize>(
 pub fn read_points<const D: usize>(
     path: impl AsRef<Path>,
 ) -> Result<Vec<Point<f64, D>>, FileError> {
-    to_points(&mut read_table_with(path, &strict())?)
-}
-
-fn to_points<const D: usize>(table: &mut Table) -> Result<Vec<Point<f64, D>>, FileError> {
-    let headings = table.headings();
-    let chosen = !table.options.columns.is_empty();
-    let find = |axis: usize| named(&headings, AXES[axis]);
-    if D == 2 && find(2).is_some() && !chosen {
-        return Err(table.error(FilePlace::Line(1), columns_in_words(2), "3".into()));
-    }
-    // Positions of tracked points are often in pixels, which have no length here.
-    let in_pixels = find(0).is_some_and(Heading::is_in_pixels);
-    let unit = if in_pixels { "px" } else { "m" };
-    let columns = table.columns(std::array::from_fn::<_, D, _>(|i| (AXES[i], unit)))?;
-    let with_unit = |axis: usize| find(axis).is_some_and(|h| h.unit.is_some());
-    // A unit beside one coordinate and none beside another leaves open what the other is in.
-    if (0..D).any(with_unit)
-        && !chosen
-        && let Some(axis) = (0..D).find(|axis| !with_unit(*axis))
-    {
-        let expected = format!(
-            "a unit of the column `{}`, as others have one",
-            AXES[axis][0]
-        );
-        return Err(table.error(FilePlace::Line(1), expected, "none".into()));
-    }
-    let rows = 0..columns.first().map_or(0, Vec::len);
-    Ok(rows
-        .map(|row| Point::from(std::array::from_fn(|i| columns[i][row])))
-        .collect())
+    let mut table = read_table_with(path, &strict())?;
+    let found = points_of(&mut table, false)?.points;
+    let coordinates: Vec<Vec<f64>> = match &found {
+        PointTable::Plane(all) => all.iter().map(|p| p.iter().copied().collect()).collect(),
+        PointTable::Space(all) => all.iter().map(|p| p.iter().copied().collect()).collect(),
+    };
+    let points = coordinates
+        .iter()
+        .map(|point| Some(Point::from(<[f64; D]>::try_from(point.as_slice()).ok()?)));
+    points.collect::<Option<_>>().ok_or_else(|| {
+        let found = if D == 2 { "3" } else { "2" };
+        table.error(FilePlace::Line(1), columns_in_words(D), found.into())
+    })
 }

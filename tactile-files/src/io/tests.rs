@@ -417,12 +417,34 @@ fn tables_of_other_programs_are_read() {
         pts,
         slicer,
         trackmate,
+        // Names of rows without a heading (R, pandas), numbers as headings, units in a line.
+        "\"x\" \"y\"\n\"a\" 1.5 2\n\"b\" 3 4\n",
+        ",0,1\n0,1.5,2\n1,3,4\n",
+        "0,1\n1.5,2.0\n3.0,4.0\n",
+        "x\ty\npx\tpx\nA\tB\n1.5\t2\n3\t4\n",
+        "sep=;\nx;y\n1,5;2\n3;4\n",
+        "x,y\r1.5,2\r3,4\r",
+        "1.5D+00  2\n 0.3D+01  4\n",
+        "*** DICe\nid,Pos. X [px],Pos. Y [px]\n1,1.5,2\n2,3,4\n",
+        "label,row,col\n1,2,1.5\n2,4,3\n",
+        "x/px,y/px\n1.5,2\n3,4\n",
     ] {
         let file = file(text);
         let frames = read_point_frames(&file.path, &TableOptions::default()).unwrap();
         let expected = vec![[1.5, 2.0].into(), [3.0, 4.0].into()];
         assert_eq!(frames[0].points, PointTable::Plane(expected), "{text}");
     }
+    // Columns that are chosen may have displacements beside them, and a first row of whole numbers
+    // in a matrix is one.
+    let chosen = TableOptions {
+        columns: ["b", "a", "3", "4"].map(String::from).into(),
+        ..TableOptions::default()
+    };
+    let moved = file("a,b,c,d\n2,1.5,0.5,0\n");
+    let moved = read_displaced_points(&moved.path, &chosen).unwrap();
+    let expected = PointTable::Plane(vec![[2.0, 2.0].into()]);
+    assert_eq!(moved.displaced, Some(expected));
+    assert_eq!(read_grid(&file("0,1\n0.5,2\n").path).unwrap().nrows(), 2);
     // A heading that is a comment has units, and a row without a number is left out and counted.
     let file = file("# depth_um, darkness\n5, 1\n-, 2\n7, 3\n");
     let mut table = read_table(&file.path).unwrap();
@@ -476,6 +498,8 @@ fn what_is_no_table_is_named_with_its_remedy() {
         (&b"\x89PNG\r\n\x1a\n"[..], "found a PNG image"),
         (b"\x89HDF\r\n\x1a\n", "save .mat by `save -v7`"),
         (&[7, 0, 1, 2], "a binary file of an unknown kind"),
+        (b"[[1, 2], [3, 4]]", "a JSON text: export it as CSV"),
+        (b"version https://git-lfs.github.com", "git lfs pull"),
         (
             b"Gauge: A\nGain 5\ndepth,force\n1,2\n3,4\n",
             "--skip-lines 2",
@@ -512,7 +536,13 @@ fn arrays_that_are_damaged_or_no_frames_are_refused() {
         ("|u1", "False", "2, 3", 1, ""),
         ("|u1", "False", "1, 2, 3", 1, ""),
         ("<u2", "False", "1, 3", 1, ""),
-        ("|u1", "True", "2, 1, 3", 0, "C order, found Fortran order"),
+        (
+            "|u1",
+            "True",
+            "2, 1, 3",
+            0,
+            "C order (numpy.ascontiguousarray), found Fortran order",
+        ),
         ("<f8", "False", "2, 1, 3", 0, none),
         ("|O", "False", "2, 1, 3", 0, none),
         ("|u1", "False", "0, 0", 0, none),

@@ -1,19 +1,26 @@
 //! Tables in text: what separates their cells, where their heading stands, and their numbers.
-use super::columns::Heading;
+use super::columns::{Heading, in_si};
 use super::error::{FileError, FilePlace, quoted};
-use super::kinds::{UTF_16, kind_of};
+use super::kinds::{UTF_16, kind_of, kind_of_text};
+use std::borrow::Cow;
 use std::path::Path;
 
-/// Lines among which the first row of numbers is looked for. Preambles of instruments are shorter.
+/// Lines among which the rows of a table are looked for. Preambles of instruments are shorter.
 const LONGEST_PREAMBLE: usize = 1000;
 
 /// Lines of names, long names and units below the first heading (TrackMate has three).
 const MOST_FURTHER_HEADINGS: usize = 3;
 
+/// Rows that show whether a program writes every number with its decimals.
+const ROWS_LOOKED_AT: usize = 20;
+
 /// Words for a number that is not there: of pandas, R, spreadsheets, Labview and Windows.
 const MISSING: [&str; 9] = [
     "", "na", "n/a", "#n/a", "null", "none", "-", "1.#qnan", "-1.#ind",
 ];
+
+/// What lines of comments begin with: numpy, MATLAB, C, DICe.
+const COMMENTS: [&str; 4] = ["#", "%", "//", "***"];
 
 /// The cells of a table, row by row.
 #[derive(Default)]
@@ -30,11 +37,50 @@ pub(super) struct TextCells {
     pub notes: Vec<String>,
 }
 
+/// A line with its number, from 1.
+type Line<'a> = (u64, &'a str);
+
+/// The lines of a text from some line on.
+struct Lines<'a> {
+    text: &'a str,
+    end: char,
+    skipped: usize,
+}
+
+impl<'a> Lines<'a> {
+    fn new(text: &'a str, skipped: usize) -> Self {
+        // Old spreadsheets end lines with a carriage return alone.
+        let end = if text.contains('\n') { '\n' } else { '\r' };
+        let text = text.trim_end_matches('\u{1a}');
+        Self { text, end, skipped }
+    }
+
+    fn all(&self) -> impl Iterator<Item = Line<'a>> + Clone + use<'a> {
+        let lines = self.text.split(self.end).enumerate().skip(self.skipped);
+        lines.map(|(at, line)| (at as u64 + 1, line.trim_end_matches('\r')))
+    }
+
+    /// Without empty lines, comments and a spreadsheet's note of its separator.
+    fn content(&self) -> impl Iterator<Item = Line<'a>> + Clone + use<'a> {
+        let passed_over =
+            |line: &str| line.trim().is_empty() || is_comment(line) || line.starts_with("sep=");
+        self.all().filter(move |(_, line)| !passed_over(line))
+    }
+}
+
+fn is_comment(line: &str) -> bool {
+    let line = line.trim_start();
+    COMMENTS.iter().any(|sign| line.starts_with(sign))
+}
+
 #[derive(Clone, Copy, PartialEq)]
 enum Separator {
     Sign(char),
     Blanks,
 }
+
+/// Signs that separate cells.
+const SIGNS: [char; 4] = [';', '\t', '|', ','];
 
 impl Separator {
     /// Cuts a line into its cells, without blanks and quotes around them.
@@ -44,7 +90,8 @@ impl Separator {
             Self::Sign(sign) => c == sign,
             Self::Blanks => c.is_whitespace(),
         };
-        let bare = |cell: &'a str| cell.trim_matches(|c: char| c == '"' || c.is_whitespace());
+        let bare =
+            |cell: &'a str| cell.trim_matches(|c: char| c == '"' || c == '\'' || c.is_whitespace());
         if line.contains('"') {
             let mut quoted = false;
             cells.extend(line.split(|c| {
@@ -60,96 +107,199 @@ impl Separator {
         }
     }
 
-    fn count(self, line: &str) -> usize {
+    fn cells(self, line: &str) -> Vec<&str> {
         let mut cells = Vec::new();
         self.split(line, &mut cells);
-        cells.len()
+        cells
     }
 
     /// That of a row of numbers, which may have decimal commas.
     fn of(row: &str) -> Self {
         let decimal = |word: &str| {
-            let number = word.replacen(',', ".", 1);
-            !word.starts_with(',') && !word.ends_with(',') && number.parse::<f64>().is_ok()
+            !word.starts_with(',') && !word.ends_with(',') && number(word, true).is_some()
         };
-        let between_blanks = || row.split_whitespace().count() > 1;
-        match row {
-            _ if row.contains(';') => Self::Sign(';'),
-            _ if row.contains('\t') => Self::Sign('\t'),
-            _ if row.contains(',') && between_blanks() && row.split_whitespace().all(decimal) => {
-                Self::Blanks
-            }
-            _ if !row.contains(',') && between_blanks() => Self::Blanks,
-            _ => Self::Sign(','),
+        let between_blanks = || row.split_whitespace().nth(1).is_some();
+        match SIGNS.into_iter().find(|sign| row.contains(*sign)) {
+            None if between_blanks() => Self::Blanks,
+            Some(',') if between_blanks() && row.split_whitespace().all(decimal) => Self::Blanks,
+            sign => Self::Sign(sign.unwrap_or(',')),
         }
     }
 }
 
 /// Number of the words of a line, if at least half of them are numbers.
 fn numbers(line: &str) -> Option<usize> {
-    let words = line
-        .split([',', ';', '\t', ' '])
-        .map(|w| w.trim_matches('"'));
-    let words: Vec<&str> = words.filter(|word| !word.is_empty()).collect();
-    let found = words
-        .iter()
-        .filter(|word| word.parse::<f64>().is_ok())
-        .count();
-    (found > 0 && 2 * found >= words.len()).then_some(words.len())
+    let words = line.split([',', ';', '\t', ' ', '|']);
+    let words = words.map(|word| word.trim_matches(['"', '\'']));
+    let (mut all, mut found) = (0, 0);
+    for word in words.filter(|word| !word.is_empty()) {
+        all += 1;
+        found += usize::from(parse(word).is_some());
+    }
+    (found > 0 && 2 * found >= all).then_some(all)
+}
+
+fn parse(cell: &str) -> Option<f64> {
+    cell.parse().ok().or_else(|| {
+        // Exponents of Fortran, and the minus sign of typeset text.
+        let plain = cell.replace(['D', 'd'], "e").replace('−', "-");
+        plain.parse().ok().filter(|_| plain != cell)
+    })
 }
 
 /// A number, NaN for one that is not there. `None` for a word, and for an infinite number.
 fn number(cell: &str, comma: bool) -> Option<f64> {
-    let value = match cell.parse::<f64>() {
-        Ok(value) => Some(value),
-        Err(_) if comma && cell.contains(',') => cell.replacen(',', ".", 1).parse().ok(),
-        Err(_) => {
-            let mut words = MISSING.iter();
-            let is_missing = words.any(|word| word.eq_ignore_ascii_case(cell));
-            is_missing.then_some(f64::NAN)
-        }
+    let with_point = || parse(&cell.replacen(',', ".", 1)).filter(|_| comma);
+    let missing = || {
+        let mut words = MISSING.iter();
+        let is_missing = words.any(|word| word.eq_ignore_ascii_case(cell));
+        is_missing.then_some(f64::NAN)
     };
+    let value = parse(cell).or_else(with_point).or_else(missing);
     value.filter(|value: &f64| !value.is_infinite())
 }
 
-fn is_comment(line: &str) -> bool {
-    line.trim_start().starts_with(['#', '%'])
+/// How the rows of a table lie in their lines.
+struct Layout {
+    separator: Separator,
+    /// Whether a decimal point may be a comma.
+    comma: bool,
+    columns: usize,
+    /// The first cell of each row is its name, which has no heading (R, pandas).
+    named_rows: bool,
 }
 
-/// Whether cells are a heading: words, and no number.
-fn is_heading(cells: &[&str], comma: bool) -> bool {
-    let is_word = |cell: &&str| !cell.is_empty() && number(cell, comma).is_none();
-    cells.iter().all(|cell| cell.is_empty() || is_word(cell)) && cells.iter().any(is_word)
-}
+impl Layout {
+    /// The most frequent number of words shows the rows: a preamble may have numbers, too.
+    fn of(lines: &Lines<'_>, first: &str) -> Self {
+        let rows: Vec<(&str, usize)> = lines
+            .content()
+            .take(LONGEST_PREAMBLE)
+            .filter_map(|(_, line)| Some((line, numbers(line)?)))
+            .collect();
+        let mut counts = std::collections::BTreeMap::new();
+        rows.iter()
+            .for_each(|(_, count)| *counts.entry(count).or_insert(0) += 1);
+        let usual = counts
+            .iter()
+            .max_by_key(|(_, times)| **times)
+            .map(|(count, _)| **count);
+        let row = rows.iter().rfind(|(_, count)| Some(*count) == usual);
+        let row = row.map_or(first, |(line, _)| line);
+        let separator = Separator::of(row.trim());
+        let cells = separator.cells(row);
+        let heading = separator.cells(first).len();
+        // Rows may end with a separator that their heading does not have.
+        let trails = cells.last() == Some(&"") && heading + 1 == cells.len();
+        Self {
+            separator,
+            comma: separator != Separator::Sign(','),
+            columns: cells.len() - usize::from(trails),
+            named_rows: false,
+        }
+    }
 
-/// The heading that a line holds for so many columns: it may be separated otherwise than the rows.
-fn heading(line: &str, separator: Separator, columns: usize) -> Option<Vec<String>> {
-    let signs = [',', ';', '\t'].map(Separator::Sign);
-    let separators = [separator]
-        .into_iter()
-        .chain(signs)
-        .chain([Separator::Blanks]);
-    let mut cells = Vec::new();
-    separators.into_iter().find_map(|separator| {
-        separator.split(line, &mut cells);
-        (cells.len() == columns).then(|| cells.iter().map(|cell| quoted(cell, 40)).collect())
-    })
+    /// Cuts a row into its cells.
+    fn split<'a>(&self, line: &'a str, cells: &mut Vec<&'a str>) {
+        self.separator.split(line, cells);
+        if self.named_rows && !cells.is_empty() {
+            cells.remove(0);
+        }
+        // A separator at the end of each line makes one more, empty cell.
+        if cells.len() == self.columns + 1 && cells.last() == Some(&"") {
+            cells.pop();
+        }
+    }
+
+    /// Whether cells are a heading: words, and no number.
+    fn is_heading(&self, cells: &[&str]) -> bool {
+        let is_word = |cell: &&str| !cell.is_empty() && number(cell, self.comma).is_none();
+        cells.iter().all(|cell| cell.is_empty() || is_word(cell)) && cells.iter().any(is_word)
+    }
+
+    /// The heading that a line holds: it may be separated otherwise than the rows.
+    fn heading(&self, line: &str) -> Option<Vec<String>> {
+        let signs = SIGNS.map(Separator::Sign);
+        let separators = [self.separator]
+            .into_iter()
+            .chain(signs)
+            .chain([Separator::Blanks]);
+        let mut cells = separators.map(|separator| separator.cells(line));
+        let cells = cells.find(|cells| cells.len() == self.columns)?;
+        Some(cells.iter().map(|cell| quoted(cell, 40)).collect())
+    }
+
+    /// Whether a first line numbers the columns from 0, as pandas does for arrays: below an empty cell
+    /// above the names of the rows, or above rows of which every number has its decimals.
+    fn numbers_columns<'a>(&self, cells: &[&str], below: impl Iterator<Item = &'a str>) -> bool {
+        let names = cells.strip_prefix(&[""]).unwrap_or(cells);
+        let counted = names
+            .iter()
+            .enumerate()
+            .all(|(k, name)| *name == k.to_string());
+        let decimal = |row: &str| {
+            self.separator
+                .cells(row)
+                .iter()
+                .all(|cell| cell.contains('.'))
+        };
+        let is_above = || names.len() < cells.len() || below.take(ROWS_LOOKED_AT).all(decimal);
+        names.len() > 1 && counted && is_above()
+    }
+
+    /// A sentence on the line where the table begins, if its rows begin later than its first line.
+    fn remedy(&self, lines: &Lines<'_>, first: u64) -> String {
+        let width = |line: &str| self.separator.cells(line).len();
+        let is_row = |line: &str| numbers(line).is_some() && width(line) == self.columns;
+        let mut before = None;
+        let mut pairs = lines.content().zip(lines.content().skip(1));
+        let start = pairs.find_map(|((at, line), (_, next))| {
+            let is_name =
+                |(_, line): &Line<'_>| width(line) == self.columns && numbers(line).is_none();
+            let heading = before.replace((at, line)).filter(is_name);
+            (is_row(line) && is_row(next)).then(|| heading.map_or(at, |(at, _)| at))
+        });
+        start
+            .filter(|start| *start > first)
+            .map_or(String::new(), |start| {
+                let skip = start - 1;
+                format!(" (the table seems to begin at line {start}: --skip-lines {skip})")
+            })
+    }
 }
 
 /// Whether a comment may be the heading of as many columns as it has words, and whether it is one
 /// even if their number differs.
 fn names_columns(text: &str) -> [bool; 2] {
-    let signs = [',', ';', '\t'];
-    let words: Vec<&str> = match text.contains(signs) {
-        true => text.split(signs).collect(),
+    let words: Vec<&str> = match text.contains(SIGNS) {
+        true => text.split(SIGNS).collect(),
         false => text.split_whitespace().collect(),
     };
     let known = words
         .iter()
-        .filter(|word| Heading::of(word.trim()).is_known())
-        .count();
-    let sentence = !text.contains(signs) && known < words.len();
+        .filter(|word| Heading::of(word.trim()).is_known());
+    let known = known.count();
+    let sentence = !text.contains(SIGNS) && known < words.len();
     [known > 1, known > 1 && !sentence]
+}
+
+/// A file as text. What is no UTF-8 is read as Latin-1, whose micro sign stands in many headings.
+fn decoded<'a>(bytes: &'a [u8], path: &Path, skip_lines: usize) -> Result<Cow<'a, str>, FileError> {
+    if let Some(kind) = kind_of(bytes).or_else(|| kind_of_text(bytes).filter(|_| skip_lines == 0)) {
+        let expected = match kind {
+            UTF_16 => "UTF-8 text",
+            _ => "a table of numbers",
+        };
+        return Err(FileError::content(path, FilePlace::File, expected, kind));
+    }
+    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+    let latin = || {
+        bytes
+            .iter()
+            .map(|byte| char::from(*byte))
+            .collect::<String>()
+    };
+    Ok(std::str::from_utf8(bytes).map_or_else(|_| latin().into(), Cow::from))
 }
 
 /// Reads the cells of a table from the line after `skip_lines`.
@@ -157,164 +307,80 @@ fn names_columns(text: &str) -> [bool; 2] {
 /// # Errors
 /// [`FileError::Content`] for what is no text, and for rows of another length than the others.
 pub(super) fn cells(bytes: &[u8], path: &Path, skip_lines: usize) -> Result<TextCells, FileError> {
-    let error =
-        |place, expected: &str, found: &str| FileError::content(path, place, expected, found);
-    if let Some(kind) = kind_of(bytes) {
-        let expected = if kind == UTF_16 {
-            "UTF-8 text"
-        } else {
-            "a table of numbers"
-        };
-        return Err(error(FilePlace::File, expected, kind));
-    }
-    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
-    // What is no UTF-8 is read as Latin-1, whose micro sign stands in many headings.
-    let latin = || {
-        bytes
-            .iter()
-            .map(|byte| char::from(*byte))
-            .collect::<String>()
-    };
-    let text = std::str::from_utf8(bytes).map_or_else(|_| latin().into(), std::borrow::Cow::from);
-    let lines = || {
-        let lines = text.split('\n').enumerate().skip(skip_lines);
-        lines.map(|(at, line)| (at as u64 + 1, line.trim_end_matches('\r')))
-    };
-    let content = || lines().filter(move |(_, line)| !line.trim().is_empty() && !is_comment(line));
-    let Some((first, first_line)) = content().next() else {
-        return Err(error(
-            FilePlace::File,
-            "at least one row of numbers",
-            "none",
-        ));
-    };
-    // The first of two rows of as many words shows how all are separated: a preamble may have a
-    // number here and there.
-    let counts = || {
-        content()
-            .take(LONGEST_PREAMBLE)
-            .map(|(_, line)| (line, numbers(line)))
-    };
-    let pair = counts()
-        .zip(counts().skip(1))
-        .find(|(a, b)| a.1.is_some() && a.1 == b.1);
-    let row = pair
-        .map(|(row, _)| row)
-        .or_else(|| counts().find(|row| row.1.is_some()));
-    let row = row.map_or(first_line, |(line, _)| line);
-    let separator = Separator::of(row.trim());
-    let comma = separator != Separator::Sign(',');
-    let mut cells = Vec::new();
-    let mut columns = separator.count(row);
-    // Rows may end with a separator that their heading does not have.
-    separator.split(row, &mut cells);
-    if cells.last() == Some(&"") && separator.count(first_line) + 1 == columns {
-        columns -= 1;
-    }
-    let mut table = TextCells::default();
-    // Elastix begins with the kind of its points and their number.
-    let mut rows = content().peekable();
-    if ["point", "index"].contains(&first_line.trim()) {
-        let is_count = |(_, line): &(u64, &str)| line.trim().parse::<usize>().is_ok();
-        rows.next();
-        rows.next_if(is_count);
-    }
-    let begin = || {
-        let width = |line: &str| numbers(line).is_some() && separator.count(line) == columns;
-        let mut before = None;
-        let start = content()
-            .zip(content().skip(1))
-            .find_map(|((at, line), (_, next))| {
-                let is_start = width(line) && width(next);
-                let heading = before.replace((at, line)).filter(|(_, line)| {
-                    separator.count(line) == columns && numbers(line).is_none()
-                });
-                is_start.then(|| heading.map_or(at, |(at, _)| at))
-            });
-        let start = start.filter(|start| *start > first);
-        start.map_or(String::new(), |start| {
-            let skip = start - 1;
-            format!(" (the table seems to begin at line {start}: --skip-lines {skip})")
-        })
-    };
-    let ragged = |line: u64, columns: usize, found: usize| {
-        let expected = columns_in_words(columns);
-        error(
+    let text = decoded(bytes, path, skip_lines)?;
+    let lines = Lines::new(&text, skip_lines);
+    let none = || FileError::content(path, FilePlace::File, "at least one row of numbers", "none");
+    let (first, first_line) = lines.content().next().ok_or_else(none)?;
+    let mut layout = Layout::of(&lines, first_line);
+    let ragged = |layout: &Layout, line: u64, found: usize| {
+        let found = found.to_string() + &layout.remedy(&lines, first);
+        FileError::content(
+            path,
             FilePlace::Line(line),
-            &expected,
-            &(found.to_string() + &begin()),
+            columns_in_words(layout.columns),
+            found,
         )
     };
-    if let Some(&(line, text)) = rows.peek() {
-        separator.split(text, &mut cells);
-        if is_heading(&cells, comma) {
-            rows.next();
-            if rows.peek().is_none() {
-                return Err(error(
-                    FilePlace::File,
-                    "at least one row of numbers",
-                    "none",
-                ));
-            }
-            match heading(text, separator, columns) {
-                Some(names) => table.header = names,
-                None => return Err(ragged(line, columns, cells.len())),
-            }
+    // Elastix begins with the kind of its points and their number.
+    let kind = ["point", "index"].contains(&first_line.trim());
+    let is_count = |line: &str| line.trim().parse::<usize>().is_ok();
+    let mut rows = lines.content().skip(usize::from(kind)).peekable();
+    rows.next_if(|(_, line)| kind && is_count(line));
+    let mut table = TextCells::default();
+    let &(line, text) = rows.peek().ok_or_else(none)?;
+    let mut cells = layout.separator.cells(text);
+    let numbered = layout.numbers_columns(&cells, rows.clone().skip(1).map(|(_, row)| row));
+    if numbered || layout.is_heading(&cells) {
+        rows.next();
+        rows.peek().ok_or_else(none)?;
+        let names = layout.heading(text).filter(|_| !numbered);
+        let is_row = |row: &[&str]| row.len() == layout.columns && !layout.is_heading(row);
+        let below = rows.peek().map(|(_, row)| layout.separator.cells(row));
+        let is_shorter = cells.len() > 1 && cells.len() + 1 == layout.columns;
+        let above_names = match numbered {
+            true => cells[0].is_empty(),
+            false => is_shorter && below.is_some_and(|row| is_row(&row)),
+        };
+        layout.named_rows = names.is_none() && above_names;
+        layout.columns -= usize::from(layout.named_rows);
+        if numbered {
+            table.notes.push(format!("line {line} numbers the columns"));
         } else {
-            let comments = lines().take_while(|(at, _)| *at < line);
-            if let Some((at, comment)) = comments.filter(|(_, line)| is_comment(line)).last() {
-                let comment = comment.trim_start().trim_start_matches(['#', '%']).trim();
-                let comment = comment.strip_prefix("columns =").unwrap_or(comment);
-                let [may_name, does_name] = names_columns(comment);
-                match heading(comment, separator, columns) {
-                    Some(names) if may_name => {
-                        table
-                            .notes
-                            .push(format!("the heading is the comment in line {at}"));
-                        table.header = names;
-                    }
-                    None if does_name => {
-                        let expected = format!("a heading of {}", columns_in_words(columns));
-                        let remedy = "name them all in the first line, or leave the comment out";
-                        let found = format!("the comment `{}`: {remedy}", quoted(comment, 60));
-                        return Err(error(FilePlace::Line(at), &expected, &found));
-                    }
-                    _ => {}
-                }
-            }
+            table.header = match names {
+                Some(names) => names,
+                None if above_names => cells.iter().map(|cell| quoted(cell, 40)).collect(),
+                None => return Err(ragged(&layout, line, cells.len())),
+            };
         }
+        if layout.named_rows {
+            table.notes.push("its first column names the rows".into());
+        }
+    } else {
+        let comments = lines.all().take_while(|(at, _)| *at < line);
+        table.heading_of_comment(&layout, comments, path)?;
     }
-    table.missing = vec![None; columns];
-    table.words = vec![None; columns];
+    (table.columns, table.missing) = (layout.columns, vec![None; layout.columns]);
+    table.words = vec![None; layout.columns];
     let (mut further, mut commas) = (0, false);
     for (line, text) in rows {
-        separator.split(text, &mut cells);
-        // A separator at the end of each line makes one more, empty cell.
-        if cells.len() == columns + 1 && cells.last().is_some_and(|cell| cell.is_empty()) {
-            cells.pop();
+        layout.split(text, &mut cells);
+        if cells.len() != layout.columns {
+            return Err(ragged(&layout, line, cells.len()));
         }
-        if cells.len() != columns {
-            return Err(ragged(line, columns, cells.len()));
-        }
-        let is_first = table.values.is_empty() && !table.header.is_empty();
-        if is_first && further < MOST_FURTHER_HEADINGS && columns > 2 && is_heading(&cells, comma) {
+        let above = table.values.is_empty() && further < MOST_FURTHER_HEADINGS;
+        if above && layout.is_heading(&cells) && table.further_heading(&cells, further > 0) {
             further += 1;
-            for (name, unit) in table.header.iter_mut().zip(&cells) {
-                if unit.starts_with('(') && Heading::of(name).unit.is_none() {
-                    *name = format!("{name} {}", quoted(unit, 20));
-                }
-            }
             continue;
         }
         for (column, cell) in cells.iter().enumerate() {
-            let value = number(cell, comma);
-            commas |= comma && value.is_some() && cell.contains(',');
+            let value = number(cell, layout.comma);
+            commas |= layout.comma && value.is_some() && cell.contains(',');
             match value {
                 None if table.words[column].is_none() => {
                     table.words[column] = Some((line, quoted(cell, 40)));
                 }
-                Some(value) if value.is_nan() && table.missing[column].is_none() => {
-                    table.missing[column] = Some(line);
+                Some(value) if value.is_nan() => {
+                    table.missing[column].get_or_insert(line);
                 }
                 _ => {}
             }
@@ -325,12 +391,68 @@ pub(super) fn cells(bytes: &[u8], path: &Path, skip_lines: usize) -> Result<Text
         table.notes.push("its decimal points are commas".into());
     }
     if further > 0 {
-        table.notes.push(format!(
-            "{further} further lines of headings are passed over"
-        ));
+        let note = format!("{further} further lines of headings are passed over");
+        table.notes.push(note);
     }
-    table.columns = columns;
     Ok(table)
+}
+
+impl TextCells {
+    /// Takes the last of these lines as the heading, if it is a comment that names the columns.
+    fn heading_of_comment<'a>(
+        &mut self,
+        layout: &Layout,
+        lines: impl Iterator<Item = Line<'a>>,
+        path: &Path,
+    ) -> Result<(), FileError> {
+        let Some((at, comment)) = lines.filter(|(_, line)| is_comment(line)).last() else {
+            return Ok(());
+        };
+        let comment = comment
+            .trim_start()
+            .trim_start_matches(['#', '%', '/', '*'])
+            .trim();
+        let comment = comment.strip_prefix("columns =").unwrap_or(comment);
+        let [may_name, does_name] = names_columns(comment);
+        match layout.heading(comment) {
+            Some(names) if may_name => {
+                self.notes
+                    .push(format!("the heading is the comment in line {at}"));
+                self.header = names;
+            }
+            None if does_name => {
+                let expected = format!("a heading of {}", columns_in_words(layout.columns));
+                let remedy = "name them all in the first line, or leave the comment out";
+                let found = format!("the comment `{}`: {remedy}", quoted(comment, 60));
+                return Err(FileError::content(
+                    path,
+                    FilePlace::Line(at),
+                    expected,
+                    found,
+                ));
+            }
+            _ => {}
+        }
+        Ok(())
+    }
+
+    /// Takes a line of words below the heading for units or longer names. False for words in place
+    /// of numbers.
+    fn further_heading(&mut self, cells: &[&str], below_others: bool) -> bool {
+        let bare = |cell: &str| cell.trim_matches(['(', ')', '[', ']']).trim().to_owned();
+        let is_unit = |cell: &&str| cell.is_empty() || in_si(&bare(cell)).is_some();
+        let units = cells.iter().all(is_unit);
+        if self.header.is_empty() || !units && !below_others && self.columns <= 2 {
+            return false;
+        }
+        for (name, unit) in self.header.iter_mut().zip(cells) {
+            let is_unit = units || unit.starts_with(['(', '[']);
+            if is_unit && !unit.is_empty() && Heading::of(name).unit.is_none() {
+                *name = format!("{name} ({})", quoted(&bare(unit), 20));
+            }
+        }
+        true
+    }
 }
 
 pub(super) fn columns_in_words(count: usize) -> String {

@@ -3,7 +3,7 @@ use super::trial;
 use crate::common::press_of;
 use ndarray::{Array2, Axis, s};
 use tactile_imaging::elasticity::modulus::{ModulusEstimator, PaperRatio};
-use tactile_imaging::pipeline::{Flag, Object, PipelineError};
+use tactile_imaging::pipeline::{Flag, Object, PipelineError, Session};
 
 #[test]
 fn a_frame_that_is_given_twice_counts_once() {
@@ -23,6 +23,14 @@ fn a_frame_that_is_given_twice_counts_once() {
     assert_eq!(loads.filter(|load| load.mean_strain.is_some()).count(), 1);
     let ratio = PaperRatio::default().estimate(&series).unwrap();
     assert_eq!(ratio.fit.observations, 1);
+    // So does a session.
+    let mut session = Session::new(&pipeline, &[trial.simulation.reference.view()]).unwrap();
+    for frame in trial.simulation.frames.iter().cycle().take(7) {
+        session.push(frame.view()).unwrap();
+    }
+    assert_eq!(session.loads(), 2);
+    let streamed = session.modulus().unwrap();
+    assert_eq!(streamed.loads.len(), 2);
 }
 
 #[test]

@@ -1,22 +1,29 @@
 //! AVI files of JPEG or uncompressed frames, as webcams and microscopes record them.
 use super::jpeg::with_tables;
-use super::{Broken, Encoded, append, is_read, quoted};
+use super::{Broken, Decoder, Encoded, Format, append, is_read, quoted};
 use ::image::{DynamicImage, ImageBuffer};
 use std::io::{BufRead, Read, Result as IoResult, copy, sink};
+
+pub(super) const FORMAT: Format = Format {
+    name: "AVI",
+    begins: |start| matches!(start, [b'R', b'I', b'F', b'F', .., b'A', b'V']),
+    open: |input| Ok(Box::new(Avi::open(input)?)),
+};
 
 /// The chunks of an AVI file up to its frames, and these.
 ///
 /// Lists are entered and their sizes are not asked for: a recorder that was killed left them open.
 #[derive(Default)]
-pub(super) struct Avi {
-    pub rate_hz: Option<f64>,
+struct Avi {
+    rate_hz: Option<f64>,
     /// Streams that were announced, and which of them is the video.
     streams: usize,
     video: Option<usize>,
     /// The number of frames that the header announces. It is none in a file that was left open.
     announced: u64,
-    /// Frames so far, those that the recorder dropped included.
-    pub frames: u64,
+    /// Frames so far, those that the recorder dropped included, and these.
+    frames: u64,
+    dropped: u64,
     pixels: Pixels,
     columns: usize,
     rows: usize,
@@ -53,7 +60,7 @@ impl Avi {
     const EXPECTED: &str = "a video of JPEG frames (MJPG) or of uncompressed ones";
 
     /// Reads up to the first frame.
-    pub(super) fn open(input: &mut dyn BufRead) -> Result<Self, Broken> {
+    fn open(input: &mut dyn BufRead) -> Result<Self, Broken> {
         let mut avi = Self::default();
         while let Some((name, size)) = chunk(input)? {
             if is_list(&name) {
@@ -109,51 +116,13 @@ impl Avi {
         }
         Ok(())
     }
-
-    /// The next frame. Empty chunks, which cameras write for frames that they dropped, are passed
-    /// over and counted.
-    pub(super) fn next(&mut self, input: &mut dyn BufRead) -> Result<Option<Encoded<'_>>, Broken> {
-        while let Some((name, size)) = chunk(input)? {
-            if is_list(&name) {
-                pass_over(input, 4)?;
-                continue;
-            }
-            let number = std::str::from_utf8(&name[..2]).ok();
-            let number = number.and_then(|digits| digits.parse::<usize>().ok());
-            let is_frame = number.is_some() && number == self.video && name[2] == b'd';
-            if !is_frame || size == 0 {
-                self.frames += u64::from(is_frame);
-                pass_over(input, size + size % 2)?;
-                continue;
-            }
-            let mut bytes = Vec::new();
-            append(input, size, &mut bytes)?;
-            self.frames += 1;
-            if bytes.len() < size {
-                return Err(Broken::cut(size, bytes.len()));
-            }
-            pass_over(input, size % 2)?;
-            return self.frame(bytes).map(Some);
-        }
-        if self.frames < self.announced {
-            let expected = format!("{} frames", self.announced);
-            return Err(Broken::new(
-                expected,
-                format!("the end after {}", self.frames),
-            ));
-        }
-        Ok(None)
-    }
-}
-
-impl Avi {
-    fn frame(&self, mut bytes: Vec<u8>) -> Result<Encoded<'static>, Broken> {
+    fn frame(&self, mut bytes: Vec<u8>) -> Result<Encoded, Broken> {
         let (columns, rows) = (self.columns, self.rows);
         let pixels = columns * rows;
         // Rows of colours are filled up to a multiple of four bytes.
         let width = (3 * columns).next_multiple_of(4);
         let needed = match self.pixels {
-            Pixels::Jpeg => return Ok(Encoded::File(with_tables(bytes).into())),
+            Pixels::Jpeg => return Ok(Encoded::File(with_tables(bytes))),
             Pixels::Planar => pixels,
             Pixels::Packed(_) => 2 * pixels,
             Pixels::Bgr => width * rows,
@@ -176,6 +145,55 @@ impl Avi {
         };
         let image = image.ok_or_else(|| Broken::new(Self::EXPECTED, "another size"))?;
         Ok(Encoded::Decoded(image))
+    }
+}
+
+impl Decoder for Avi {
+    /// Empty chunks, which cameras write for frames that they dropped, are passed over and counted.
+    fn next(&mut self, input: &mut dyn BufRead, _: Vec<u8>) -> Result<Option<Encoded>, Broken> {
+        while let Some((name, size)) = chunk(input)? {
+            if is_list(&name) {
+                pass_over(input, 4)?;
+                continue;
+            }
+            let number = std::str::from_utf8(&name[..2]).ok();
+            let number = number.and_then(|digits| digits.parse::<usize>().ok());
+            let is_frame = number.is_some() && number == self.video && name[2] == b'd';
+            if !is_frame || size == 0 {
+                self.frames += u64::from(is_frame);
+                self.dropped += u64::from(is_frame);
+                pass_over(input, size + size % 2)?;
+                continue;
+            }
+            let mut bytes = Vec::new();
+            append(input, size, &mut bytes)?;
+            self.frames += 1;
+            if bytes.len() < size {
+                return Err(Broken::cut(size, bytes.len()));
+            }
+            pass_over(input, size % 2)?;
+            return self.frame(bytes).map(Some);
+        }
+        if self.frames < self.announced {
+            let expected = format!("{} frames", self.announced);
+            return Err(Broken::new(
+                expected,
+                format!("the end after {}", self.frames),
+            ));
+        }
+        Ok(None)
+    }
+
+    fn rate_hz(&self) -> Option<f64> {
+        self.rate_hz
+    }
+
+    fn dropped(&self) -> u64 {
+        self.dropped
+    }
+
+    fn goes_on(&self) -> bool {
+        true
     }
 }
 

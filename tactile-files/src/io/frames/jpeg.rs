@@ -1,11 +1,17 @@
 //! JPEG and PNG images one after the other, as `ffmpeg -f image2pipe` and recorders of cameras write
 //! them, and the tables that JPEG frames of webcams leave out.
 use super::super::files::LARGEST_FILE;
-use super::{Broken, append};
+use super::{Broken, Decoder, Encoded, Format, append};
 use std::io::{BufRead, Read, Result as IoResult};
 
 /// First bytes of a JPEG image and of a PNG image.
-pub(super) const STARTS: [&[u8]; 2] = [b"\xff\xd8\xff", b"\x89PNG\r\n\x1a\n"];
+const STARTS: [&[u8]; 2] = [b"\xff\xd8\xff", b"\x89PNG\r\n\x1a\n"];
+
+pub(super) const FORMAT: Format = Format {
+    name: "PNG, JPEG",
+    begins: |start| STARTS.iter().any(|image| start.starts_with(image)),
+    open: |_| Ok(Box::new(Images::default())),
+};
 
 // Markers of JPEG: begin and end of an image, its samples, Huffman tables.
 const BEGIN: u8 = 0xd8;
@@ -37,26 +43,32 @@ const STANDARD: &[u8; 416] =
 
 /// The images of a stream.
 #[derive(Default)]
-pub(super) struct Images {
+struct Images {
     /// An image began inside the one before, which was cut.
     begun: bool,
 }
 
-impl Images {
+impl Decoder for Images {
     /// The next image, cut if the stream ends in it. Bytes between images are passed over.
-    pub(super) fn next(&mut self, input: &mut dyn BufRead) -> Result<Option<Vec<u8>>, Broken> {
+    fn next(&mut self, input: &mut dyn BufRead, _: Vec<u8>) -> Result<Option<Encoded>, Broken> {
         let Some(start) = self.start(input)? else {
             return Ok(None);
         };
         let mut bytes = start.to_vec();
         if start == STARTS[1] {
             png(input, &mut bytes)?;
-            return Ok(Some(bytes));
+            return Ok(Some(Encoded::File(bytes)));
         }
         self.jpeg(input, &mut bytes)?;
-        Ok(Some(with_tables(bytes)))
+        Ok(Some(Encoded::File(with_tables(bytes))))
     }
 
+    fn goes_on(&self) -> bool {
+        true
+    }
+}
+
+impl Images {
     fn start(&mut self, input: &mut dyn BufRead) -> IoResult<Option<&'static [u8]>> {
         if std::mem::take(&mut self.begun) {
             return Ok(Some(STARTS[0]));

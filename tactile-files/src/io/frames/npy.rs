@@ -2,14 +2,29 @@
 //!
 //! A reader of its own: those that exist find an archive's arrays from its end, where a pipe cannot
 //! go, and bring a parser of Python's literals for a header of three fields.
-use super::{Broken, LONGEST_HEADER, append, is_read, quoted};
+use super::{Broken, Decoder, Encoded, Format, LONGEST_HEADER, append, is_read, quoted};
 use ::image::{DynamicImage, ImageBuffer};
 use flate2::{Crc, Decompress, FlushDecompress, Status};
 use std::io::{BufRead, Error, ErrorKind, Read, Result as IoResult, copy, sink};
 use std::mem::take;
 
+/// The first bytes of an array, or of an archive.
+pub(super) const START: [&[u8]; 2] = [b"\x93NUMPY", b"PK\x03\x04"];
+
+pub(super) const FORMAT: Format = Format {
+    name: "NPY",
+    begins: |start| start.starts_with(START[0]),
+    open: |_| Ok(Box::new(Arrays::new(false))),
+};
+
+pub(super) const ARCHIVE: Format = Format {
+    name: "NPZ",
+    begins: |start| start.starts_with(START[1]),
+    open: |_| Ok(Box::new(Arrays::new(true))),
+};
+
 /// The arrays of a stream, one after the other.
-pub(super) struct Arrays {
+struct Arrays {
     archived: bool,
     member: Member,
     layout: Option<Layout>,
@@ -19,10 +34,7 @@ pub(super) struct Arrays {
 }
 
 impl Arrays {
-    /// The first bytes of an array, or of an archive.
-    pub(super) const START: [&[u8]; 2] = [b"\x93NUMPY", b"PK\x03\x04"];
-
-    pub(super) fn new(archived: bool) -> Self {
+    fn new(archived: bool) -> Self {
         Self {
             archived,
             member: Member::default(),
@@ -32,8 +44,20 @@ impl Arrays {
         }
     }
 
-    /// The next frame. Arrays of an archive that hold other numbers are passed over.
-    pub(super) fn next(&mut self, input: &mut dyn BufRead) -> Result<Option<DynamicImage>, Broken> {
+    fn source<'a>(&'a mut self, input: &'a mut dyn BufRead) -> Box<dyn Read + 'a> {
+        match self.archived {
+            true => Box::new(Source {
+                input,
+                member: &mut self.member,
+            }),
+            false => Box::new(input),
+        }
+    }
+}
+
+impl Decoder for Arrays {
+    /// Arrays of an archive that hold other numbers are passed over.
+    fn next(&mut self, input: &mut dyn BufRead, _: Vec<u8>) -> Result<Option<Encoded>, Broken> {
         while self.left == 0 {
             if self.archived {
                 if self.layout.take().is_some() {
@@ -60,7 +84,10 @@ impl Arrays {
             return Ok(None);
         };
         if layout.fortran {
-            return Err(Broken::new("frames in C order", "Fortran order"));
+            return Err(Broken::new(
+                "frames in C order (numpy.ascontiguousarray)",
+                "Fortran order",
+            ));
         }
         self.left -= 1;
         self.found_any = true;
@@ -69,17 +96,7 @@ impl Arrays {
         if samples.len() < layout.bytes() {
             return Err(Broken::cut(layout.bytes(), samples.len()));
         }
-        Ok(layout.image(samples))
-    }
-
-    fn source<'a>(&'a mut self, input: &'a mut dyn BufRead) -> Box<dyn Read + 'a> {
-        match self.archived {
-            true => Box::new(Source {
-                input,
-                member: &mut self.member,
-            }),
-            false => Box::new(input),
-        }
+        Ok(layout.image(samples).map(Encoded::Decoded))
     }
 }
 
@@ -108,7 +125,7 @@ impl Layout {
         let digits = if start[6] == 1 { 2 } else { 4 };
         input.read_exact(&mut length[..digits])?;
         let length = u64::from(u32::from_le_bytes(length));
-        if !start.starts_with(Arrays::START[0]) || length > LONGEST_HEADER {
+        if !start.starts_with(START[0]) || length > LONGEST_HEADER {
             return Err(Broken::new(Self::EXPECTED, "no header of an array"));
         }
         let mut header = Vec::new();

@@ -1,0 +1,119 @@
+//! TIFF files, a frame a page, and single images of any format that is decoded.
+use super::super::files::LARGEST_FILE;
+use super::super::kinds::{kind_of, kind_of_text};
+use super::{Broken, Decoder, Encoded, Format, frame_formats, quoted};
+use std::collections::HashSet;
+use std::io::{BufRead, Read, Result as IoResult};
+use std::mem::take;
+
+pub(super) const FORMAT: Format = Format {
+    name: "TIFF",
+    begins: |start| start.starts_with(b"II*\0") || start.starts_with(b"MM\0*"),
+    open: |input| {
+        let pages = Pages::of(whole(input)?);
+        let cut = || Broken::new("a TIFF file", "one that is cut short");
+        Ok(Box::new(pages.ok_or_else(cut)?))
+    },
+};
+
+/// Whatever has no format of its own: an image, or what is refused.
+pub(super) const OTHERS: Format = Format {
+    name: "single images",
+    begins: |_| true,
+    open: |input| {
+        let bytes = whole(input)?;
+        if ::image::guess_format(&bytes).is_ok_and(|format| format.reading_enabled()) {
+            return Ok(Box::new(Single(bytes)));
+        }
+        if bytes.is_empty() {
+            return Err(Broken::new("a video or an image", "no bytes"));
+        }
+        let text = || {
+            let start = String::from_utf8_lossy(&bytes[..bytes.len().min(40)]);
+            format!("a text that begins with `{}`", quoted(&start, 10))
+        };
+        let kind = kind_of(&bytes).or_else(|| kind_of_text(&bytes));
+        let found = kind.map_or_else(text, str::to_owned);
+        Err(Broken::new(
+            format!("a video or an image ({})", frame_formats()),
+            found,
+        ))
+    },
+};
+
+fn whole(input: &mut dyn BufRead) -> IoResult<Vec<u8>> {
+    let mut bytes = Vec::new();
+    input.take(LARGEST_FILE).read_to_end(&mut bytes)?;
+    Ok(bytes)
+}
+
+/// One image, until it is taken.
+struct Single(Vec<u8>);
+
+impl Decoder for Single {
+    fn next(&mut self, _: &mut dyn BufRead, _: Vec<u8>) -> Result<Option<Encoded>, Broken> {
+        let bytes = Some(take(&mut self.0)).filter(|bytes| !bytes.is_empty());
+        Ok(bytes.map(Encoded::File))
+    }
+}
+
+/// The pages of a TIFF file.
+struct Pages {
+    bytes: Vec<u8>,
+    little_endian: bool,
+    /// Where the directory of the next page stands.
+    next: usize,
+    /// Directories that were read: a chain that returns to one of them would never end.
+    seen: HashSet<usize>,
+}
+
+impl Pages {
+    /// None where the bytes are no TIFF of 32-bit offsets.
+    fn of(bytes: Vec<u8>) -> Option<Self> {
+        let little_endian = match bytes.get(..4)? {
+            b"II*\0" => true,
+            b"MM\0*" => false,
+            _ => return None,
+        };
+        let mut pages = Self {
+            bytes,
+            little_endian,
+            next: 0,
+            seen: HashSet::new(),
+        };
+        pages.next = pages.number(4, 4)?;
+        Some(pages)
+    }
+
+    /// A whole number of so many bytes.
+    fn number(&self, at: usize, bytes: usize) -> Option<usize> {
+        let mut digits = self.bytes.get(at..at.checked_add(bytes)?)?.to_vec();
+        if self.little_endian {
+            digits.reverse();
+        }
+        Some((digits.iter()).fold(0, |sum, digit| 256 * sum + usize::from(*digit)))
+    }
+
+    /// The file with the next page as its first, which is the one that decoders of images read.
+    fn turn(&mut self) -> Option<Vec<u8>> {
+        let page = self.next;
+        // The first directory is the decoder's to judge, wherever it stands.
+        if !self.seen.is_empty() && page == 0 || !self.seen.insert(page) {
+            return None;
+        }
+        let entries = self.number(page, 2).unwrap_or(0);
+        self.next = self.number(page + 2 + 12 * entries, 4).unwrap_or(0);
+        let mut first = (page as u32).to_le_bytes();
+        if !self.little_endian {
+            first.reverse();
+        }
+        self.bytes[4..8].copy_from_slice(&first);
+        Some(self.bytes.clone())
+    }
+}
+
+impl Decoder for Pages {
+    fn next(&mut self, _: &mut dyn BufRead, _: Vec<u8>) -> Result<Option<Encoded>, Broken> {
+        Ok(self.turn().map(Encoded::File))
+    }
+}
