@@ -1,6 +1,6 @@
 //! What is assumed where nothing is stated, and what presses of known force show of the sensor.
 use super::text::with_error;
-use crate::core::{Estimate, Source};
+use crate::core::{Estimate, InvalidOption, Requirement, Source};
 use std::fmt::{self, Display, Formatter};
 
 /// An input whose error is assumed where none is stated.
@@ -9,7 +9,7 @@ use std::fmt::{self, Display, Formatter};
 /// use tactile_imaging::force::Source;
 /// use tactile_imaging::pipeline::Assumption;
 /// let light = Assumption::of(Source::Coupling).expect("it has a default");
-/// assert_eq!((light.setting, light.default), ("coupling_error", 0.12));
+/// assert_eq!((light.key, light.default), ("coupling_error", 0.12));
 /// assert!(Assumption::of(Source::Noise).is_none(), "measured in the frames");
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -17,13 +17,11 @@ use std::fmt::{self, Display, Formatter};
 pub struct Assumption {
     /// The source that its error is.
     pub source: Source,
-    /// The field of [`Settings`](crate::pipeline::Settings) that states it.
-    pub setting: &'static str,
-    /// The key of a scene file that states it.
-    pub scene_key: &'static str,
+    /// The key of a scene file that states it, and but for units the keyword in Python.
+    pub key: &'static str,
     /// The standard error that is assumed.
     pub default: f64,
-    /// The unit of the default.
+    /// The unit of the default, and of [`Assumptions::state`].
     pub unit: &'static str,
     /// What makes it smaller.
     pub remedy: &'static str,
@@ -31,11 +29,18 @@ pub struct Assumption {
 
 impl Assumption {
     /// Every input with a default. This is the place to change one.
+    ///
+    /// [`Source::Gain`]: the gauge's scale, and light that is uneven over the frame, by which
+    /// contacts of another size than the calibration's are read with another gain.
+    /// [`Source::Coupling`]: a bare guide scatters by what touches it, and the object may reflect
+    /// otherwise than what it was calibrated with. Zero under a fixed diffusing skin, or for the
+    /// calibrator itself. [`Source::ObjectSize`] is of the radius of a ball, a punch or an
+    /// indenter. [`Source::Guide`] stands back behind a covariance of the layers
+    /// ([`Settings::layer_covariance`](crate::pipeline::Settings::layer_covariance)).
     pub const ALL: [Self; 7] = [
         Self {
             source: Source::Gain,
-            setting: "force_scale_error",
-            scene_key: "gauge_error",
+            key: "gauge_error",
             // A gauge to 0.2 %, and light that is uneven by 0.1 %: √(0.2² + 0.1²) %.
             default: 2.236_067_977_499_79e-3,
             unit: "of the force",
@@ -43,8 +48,7 @@ impl Assumption {
         },
         Self {
             source: Source::Coupling,
-            setting: "coupling_error",
-            scene_key: "coupling_error",
+            key: "coupling_error",
             // An object that reflects a fifth less than the calibrator is held.
             default: 0.12,
             unit: "of the force",
@@ -52,32 +56,28 @@ impl Assumption {
         },
         Self {
             source: Source::PixelSize,
-            setting: "length_scale_error",
-            scene_key: "pixel_size_error",
+            key: "pixel_size_error",
             default: 0.3e-2,
             unit: "of a length",
             remedy: "a frame of a target of known pitch",
         },
         Self {
             source: Source::ObjectSize,
-            setting: "object_radius_error_m",
-            scene_key: "radius_error_m",
+            key: "radius_error_m",
             default: 0.5e-2,
             unit: "of the radius",
             remedy: "a calliper on the object (radius_error_m)",
         },
         Self {
             source: Source::PoissonRatio,
-            setting: "poisson_ratio_error",
-            scene_key: "poisson_ratio_error",
+            key: "poisson_ratio_error",
             default: 0.01,
             unit: "",
             remedy: "a statement of its error (poisson_ratio_error)",
         },
         Self {
             source: Source::Adhesion,
-            setting: "adhesion_error_j_per_m2",
-            scene_key: "adhesion_error_j_per_m2",
+            key: "adhesion_error_j_per_m2",
             // A dusted ball. Clean dry silicone has some tens of mJ/m².
             default: 1e-3,
             unit: "J/m²",
@@ -85,8 +85,7 @@ impl Assumption {
         },
         Self {
             source: Source::Guide,
-            setting: "layer_covariance",
-            scene_key: "layer_error",
+            key: "layer_error",
             default: 0.05,
             unit: "of the moduli of all layers, by one factor",
             remedy: "a press of a ball of known radius and modulus ([[check]])",
@@ -99,16 +98,74 @@ impl Assumption {
         const ALL: &[Assumption] = &Assumption::ALL;
         ALL.iter().find(|assumption| assumption.source == source)
     }
+}
 
-    /// The error that is assumed of a source, zero of one that is measured.
-    pub(super) fn default_of(source: Source) -> f64 {
-        Self::of(source).map_or(0.0, |assumption| assumption.default)
+/// The standard errors of a pipeline's inputs: those that are stated, and for all others what
+/// [`Assumption::ALL`] assumes. Each in the unit of its [`Assumption`].
+///
+/// ```
+/// use tactile_imaging::force::Source;
+/// use tactile_imaging::pipeline::Assumptions;
+/// let mut errors = Assumptions::default();
+/// // A ball of 3 mm, known to 5 µm by a calliper.
+/// errors.state(Source::ObjectSize, 5e-6 / 3e-3);
+/// assert_eq!(errors.stated(Source::ObjectSize), Some(5e-6 / 3e-3));
+/// assert_eq!((errors.stated(Source::Coupling), errors.error(Source::Coupling)), (None, 0.12));
+/// assert_eq!(errors.error(Source::Noise), 0.0, "measured in the frames");
+/// ```
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Assumptions(Vec<(Source, f64)>);
+
+impl Assumptions {
+    /// States the standard error of a source. One that is negative, not finite, or of a source
+    /// that is measured, is refused by
+    /// [`Pipeline::with_settings`](crate::pipeline::Pipeline::with_settings).
+    pub fn state(&mut self, source: Source, error: f64) {
+        self.forget(source);
+        self.0.push((source, error));
+    }
+
+    /// The error of a source is assumed again.
+    pub fn forget(&mut self, source: Source) {
+        self.0.retain(|(stated, _)| *stated != source);
+    }
+
+    /// States all that `others` state.
+    pub fn state_all(&mut self, others: &Self) {
+        others
+            .0
+            .iter()
+            .for_each(|&(source, error)| self.state(source, error));
+    }
+
+    /// The error that is stated of a source. `None` if it is assumed.
+    #[must_use]
+    pub fn stated(&self, source: Source) -> Option<f64> {
+        let found = self.0.iter().find(|(stated, _)| *stated == source);
+        found.map(|&(_, error)| error)
+    }
+
+    /// The error of a source, stated or assumed. Zero of one that is measured.
+    #[must_use]
+    pub fn error(&self, source: Source) -> f64 {
+        let assumed = || Assumption::of(source).map_or(0.0, |assumption| assumption.default);
+        self.stated(source).unwrap_or_else(assumed)
+    }
+
+    pub(super) fn check(&self) -> Result<(), InvalidOption> {
+        for &(source, error) in &self.0 {
+            let Some(assumption) = Assumption::of(source) else {
+                let expected = "sources whose errors are not measured in the frames";
+                return Err(InvalidOption::new("assumptions", error, expected));
+            };
+            Requirement::NonNegative.check(assumption.key, error)?;
+        }
+        Ok(())
     }
 }
 
 /// The gain that presses of known force show. Forces that are read from light are divided by it,
-/// and its error stands in place of
-/// [`Settings::coupling_error`](crate::pipeline::Settings::coupling_error).
+/// and its error stands in place of that of [`Source::Coupling`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]

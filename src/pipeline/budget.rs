@@ -15,7 +15,7 @@ use std::fmt::{self, Display, Formatter};
 /// // A ball of 3 mm whose radius is known to 0.3 mm.
 /// let pipeline = trial
 ///     .pipeline()?
-///     .with_settings(|settings| settings.object_radius_error_m = Some(0.3e-3))?;
+///     .with_settings(|settings| settings.assumptions.state(Source::ObjectSize, 0.1))?;
 /// let budget: Vec<ErrorShare> = trial.press(&pipeline)?.measure().error_budget;
 /// assert_eq!(budget[0].source, Source::ObjectSize, "the largest first");
 /// assert!(

@@ -320,7 +320,7 @@ impl Press<'_> {
         for (frame, load) in loads.iter_mut().enumerate() {
             if self.time_s(frame).is_some() {
                 let gauge = self.gauge(frame)?;
-                let scale = self.pipeline().settings().force_scale();
+                let scale = self.pipeline().settings().assumptions.error(Source::Gain);
                 load.force_n = Uncertain::from(gauge).by_relative(Source::Gain, scale);
             }
         }

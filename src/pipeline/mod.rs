@@ -60,7 +60,7 @@ mod time;
 pub use self::pipeline::Pipeline;
 pub use crate::force::{FaceReading, ShapeProblem};
 pub use crate::sfs::{BallFit, Binning};
-pub use assumptions::{Assumption, CheckedGain, CheckedGuide};
+pub use assumptions::{Assumption, Assumptions, CheckedGain, CheckedGuide};
 pub use batch::contacts;
 pub use budget::ErrorShare;
 pub use contact::{ContactReading, ContactStage, FrameContact};

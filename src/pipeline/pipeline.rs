@@ -138,11 +138,11 @@ impl Pipeline {
     /// ```
     /// use tactile_simulate::Trial;
     /// let trial = Trial::coarser(8)?;
-    /// use tactile_imaging::pipeline::Binning;
+    /// use tactile_imaging::{force::Source, pipeline::Binning};
     /// let exact = trial.pipeline()?;
     /// let pipeline = exact.clone().with_settings(|settings| {
     ///     settings.binning = Binning::Blocks(2);
-    ///     settings.object_radius_error_m = Some(0.09e-3); // 3 % of the ball's radius
+    ///     settings.assumptions.state(Source::ObjectSize, 0.03); // of the ball's radius
     /// })?;
     /// let press = trial.press(&pipeline)?;
     /// let camera = trial.scene.options().camera;
@@ -169,7 +169,7 @@ impl Pipeline {
     ///     "no middle"
     /// );
     /// assert!(
-    ///     exact.with_settings(|settings| settings.force_scale_error = Some(f64::NAN)).is_err()
+    ///     exact.with_settings(|s| s.assumptions.state(Source::Gain, f64::NAN)).is_err()
     /// );
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```

@@ -176,7 +176,7 @@ impl<'a> Press<'a> {
     }
 
     /// Adds a frame with a gauge's reading of the force in newtons (standard error 0: exact but for
-    /// [`Settings::force_scale_error`](super::Settings::force_scale_error)). Returns its number.
+    /// [`Source::Gain`](crate::core::Source::Gain)). Returns its number.
     ///
     /// ```
     /// use tactile_imaging::force::Estimate;

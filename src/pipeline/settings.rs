@@ -1,5 +1,5 @@
 //! Settings of a pipeline beside its stages.
-use super::assumptions::{Assumption, CheckedGain, CheckedGuide};
+use super::assumptions::{Assumption, Assumptions, CheckedGain, CheckedGuide};
 use super::error::PipelineError;
 use super::reference_light::ReferenceLight;
 use super::specimen::Object;
@@ -79,28 +79,10 @@ pub struct Settings {
     /// then costs no force. Right where stray light and signal come through the same lens, and the
     /// calibration was taken in the frame's middle.
     pub flat_field: bool,
-    /// Relative standard error common to all forces beside the calibration's scatter: the gauge's
-    /// scale, and light that is uneven over the frame, by which contacts of another size than the
-    /// calibration's are read with another gain. `None`: a gauge to 0.2 % and 0.1 % of the light
-    /// are assumed.
-    pub force_scale_error: Option<f64>,
-    /// Relative standard error common to all forces read from light: a bare guide scatters by what
-    /// touches it, and the object may reflect otherwise than what it was calibrated with. Zero
-    /// under a fixed diffusing skin, or for the calibrator itself. `None`: 12 % are assumed, and
-    /// the force of an object that reflects a fifth less lies in the interval.
-    pub coupling_error: Option<f64>,
-    /// Relative standard error common to all lengths: that of the pixel size. `None`: 0.3 % are
-    /// assumed.
-    pub length_scale_error: Option<f64>,
-    /// Standard error of the object's radius in metres. `None`: 0.5 % of it are assumed.
-    pub object_radius_error_m: Option<f64>,
-    /// Standard error of the object's Poisson ratio. `None`: 0.01 is assumed.
-    pub poisson_ratio_error: Option<f64>,
-    /// Work of adhesion that a ball may have, in J/m², one standard deviation. `None`: 1 mJ/m² is
-    /// assumed, as of a dusted ball. Clean dry silicone has some tens.
-    pub adhesion_error_j_per_m2: Option<f64>,
+    /// The standard errors of the inputs: stated, or assumed.
+    pub assumptions: Assumptions,
     /// Covariance of ln E of all layers of the waveguide, then of ln h, then of ν. `None`: the
-    /// moduli of all layers are assumed to be wrong by one factor, of 5 %.
+    /// moduli of all layers are wrong by one factor, with the error of [`Source::Guide`].
     pub layer_covariance: Option<DMatrix<f64>>,
     /// Covariances of the same parameters with the logarithm of measured lengths: the pixels that
     /// measure the object have measured the contacts of the balls that checked the layers, too.
@@ -111,7 +93,7 @@ pub struct Settings {
     /// to be the same.
     pub calibrated_light: Option<ReferenceLight>,
     /// The gain that presses of known force show. Forces that are read from light are divided by
-    /// it, and its error stands in place of `coupling_error`.
+    /// it, and its error stands in place of that of [`Source::Coupling`].
     pub checked_gain: Option<CheckedGain>,
     /// What presses of balls of known modulus show of the waveguide. `waveguide` and
     /// `layer_covariance` are those after these presses.
@@ -129,12 +111,7 @@ impl Settings {
             smoothing_px: 5,
             binning: Binning::default(),
             flat_field: false,
-            force_scale_error: None,
-            coupling_error: None,
-            length_scale_error: None,
-            object_radius_error_m: None,
-            poisson_ratio_error: None,
-            adhesion_error_j_per_m2: None,
+            assumptions: Assumptions::default(),
             layer_covariance: None,
             layers_with_length: None,
             calibrated_light: None,
@@ -143,79 +120,30 @@ impl Settings {
         }
     }
 
-    /// Covariance of ln E, ln h and ν of all layers whose moduli are wrong by one factor with this
-    /// relative error.
-    ///
-    /// ```
-    /// use tactile_imaging::pipeline::Settings;
-    /// let covariance = Settings::common_layer_covariance(2, 0.05);
-    /// assert_eq!(covariance.shape(), (6, 6)); // ln E, ln h and ν of two layers
-    /// assert_eq!((covariance[(0, 1)], covariance[(2, 2)]), (0.05 * 0.05, 0.0));
-    /// ```
-    #[must_use]
-    pub fn common_layer_covariance(layers: usize, error: f64) -> DMatrix<f64> {
-        let parameters = PARAMETERS_PER_LAYER * layers;
-        // The logarithms of the moduli come first.
-        let is_modulus = |parameter: usize| parameter < layers;
-        DMatrix::from_fn(parameters, parameters, |i, j| {
-            match is_modulus(i) && is_modulus(j) {
-                true => error * error,
-                false => 0.0,
-            }
-        })
-    }
-
     /// States that every input which is not stated yet is exact, but for light that is uneven over
     /// the frame: for frames whose truth is known.
     ///
     /// ```
-    /// use tactile_imaging::{Object, Pipeline, force::CalibrationPair};
+    /// use tactile_imaging::{Object, Pipeline, force::CalibrationPair, force::Source};
     /// let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
     /// let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?
     ///     .with_settings(|settings| {
-    ///         settings.poisson_ratio_error = Some(0.005);
+    ///         settings.assumptions.state(Source::PoissonRatio, 0.005);
     ///         settings.state_exact();
     ///     })?;
-    /// let stated = pipeline.settings();
-    /// assert_eq!(stated.coupling_error, Some(0.0));
-    /// assert_eq!(stated.poisson_ratio_error, Some(0.005));
+    /// let errors = &pipeline.settings().assumptions;
+    /// assert_eq!(errors.stated(Source::Coupling), Some(0.0));
+    /// assert_eq!(errors.stated(Source::PoissonRatio), Some(0.005));
     /// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
     /// ```
     pub fn state_exact(&mut self) {
-        self.force_scale_error.get_or_insert(1e-3);
-        for error in [
-            &mut self.coupling_error,
-            &mut self.length_scale_error,
-            &mut self.object_radius_error_m,
-            &mut self.poisson_ratio_error,
-            &mut self.adhesion_error_j_per_m2,
-        ] {
-            error.get_or_insert(0.0);
+        for Assumption { source, .. } in Assumption::ALL {
+            // Light is never even.
+            let error = if source == Source::Gain { 1e-3 } else { 0.0 };
+            if self.assumptions.stated(source).is_none() {
+                self.assumptions.state(source, error);
+            }
         }
-        let layers = self.waveguide.as_ref().map_or(0, |w| w.layers().len());
-        let parameters = PARAMETERS_PER_LAYER * layers;
-        self.layer_covariance
-            .get_or_insert_with(|| DMatrix::zeros(parameters, parameters));
-    }
-
-    /// The standard error that is stated of a source's input. `None` if it is assumed, as that of
-    /// the layers is unless their covariance is stated.
-    fn stated(&self, source: Source) -> Option<f64> {
-        match source {
-            Source::Gain => self.force_scale_error,
-            Source::Coupling => self.coupling_error,
-            Source::PixelSize => self.length_scale_error,
-            Source::ObjectSize => self.object_radius_error_m,
-            Source::PoissonRatio => self.poisson_ratio_error,
-            Source::Adhesion => self.adhesion_error_j_per_m2,
-            _ => None,
-        }
-    }
-
-    /// The error of a source's input, stated or assumed.
-    fn error(&self, source: Source) -> f64 {
-        self.stated(source)
-            .unwrap_or_else(|| Assumption::default_of(source))
     }
 
     /// Whether the error of a source is assumed.
@@ -225,29 +153,16 @@ impl Settings {
             Source::Guide => self.layer_covariance.is_some(),
             _ => false,
         };
-        let assumption = Assumption::of(source);
-        assumption.is_some() && !shown && self.stated(source).is_none()
-    }
-
-    pub(super) fn force_scale(&self) -> f64 {
-        self.error(Source::Gain)
+        let assumed = Assumption::of(source).is_some();
+        assumed && !shown && self.assumptions.stated(source).is_none()
     }
 
     /// Relative error of the gain of the light, beside that of the calibration.
     pub(super) fn coupling(&self) -> f64 {
         match self.checked_gain {
             Some(checked) => checked.gain.relative_error(),
-            None => self.unchecked_coupling(),
+            None => self.assumptions.error(Source::Coupling),
         }
-    }
-
-    /// That without presses of known force.
-    pub(super) fn unchecked_coupling(&self) -> f64 {
-        self.error(Source::Coupling)
-    }
-
-    pub(super) fn length_scale(&self) -> f64 {
-        self.error(Source::PixelSize)
     }
 
     /// The covariance of the layers' parameters, stated or assumed.
@@ -257,48 +172,37 @@ impl Settings {
             .as_ref()
             .map_or(0, |guide| guide.layers().len());
         self.layer_covariance.clone().unwrap_or_else(|| {
-            Self::common_layer_covariance(layers, Assumption::default_of(Source::Guide))
+            // One factor of all moduli, whose logarithms come first.
+            let variance = self.assumptions.error(Source::Guide).powi(2);
+            let parameters = PARAMETERS_PER_LAYER * layers;
+            DMatrix::from_fn(parameters, parameters, |i, j| match i.max(j) < layers {
+                true => variance,
+                false => 0.0,
+            })
         })
     }
 
     /// The object and the guide, with the errors that are stated or assumed of them.
     pub(super) fn bodies(&self) -> Result<Bodies, ElasticityError> {
-        let bodies = Bodies::new(self.object, self.waveguide.clone())
-            .with_size_error(self.size_error())?
-            .with_poisson_ratio_error(self.error(Source::PoissonRatio))?
-            .with_adhesion_j_per_m2(self.error(Source::Adhesion))?;
-        match &self.layer_covariance {
-            None => {
-                let error = Assumption::default_of(Source::Guide);
-                bodies.with_guide_error(Uncertain::exact(1.0).by(Source::Guide, error))
-            }
-            Some(covariance) => {
-                let length_error = self.length_scale();
-                let by_length = |c: &DVector<f64>| c / length_error;
-                let lengths = self
-                    .layers_with_length
-                    .as_ref()
-                    .filter(|_| length_error > 0.0);
-                bodies.with_layer_errors(covariance.clone(), lengths.map(by_length))
-            }
-        }
-    }
-
-    /// Relative error of the object's size.
-    fn size_error(&self) -> f64 {
-        let radius_m = match self.object {
-            Object::Sphere { radius_m, .. } | Object::FlatPunch { radius_m, .. } => radius_m,
-            Object::Layer {
-                indenter_radius_m, ..
-            } => indenter_radius_m,
-            Object::Cone { .. }
-            | Object::Block { .. }
-            | Object::Cylinder { .. }
-            | Object::Unknown { .. } => return 0.0,
+        let errors = &self.assumptions;
+        let size_error = match (self.object.radius_m(), errors.stated(Source::ObjectSize)) {
+            // A block is not read by its size, nor is a cone assumed to be blunt.
+            (None, None) => 0.0,
+            _ => errors.error(Source::ObjectSize),
         };
-        let stated = self.object_radius_error_m;
-        let assumed = Assumption::default_of(Source::ObjectSize);
-        stated.map_or(assumed, |error_m| error_m / radius_m)
+        let bodies = Bodies::new(self.object, self.waveguide.clone())
+            .with_size_error(size_error)?
+            .with_poisson_ratio_error(errors.error(Source::PoissonRatio))?
+            .with_adhesion_j_per_m2(errors.error(Source::Adhesion))?;
+        let Some(covariance) = &self.layer_covariance else {
+            let error = errors.error(Source::Guide);
+            return bodies.with_guide_error(Uncertain::exact(1.0).by(Source::Guide, error));
+        };
+        let length_error = errors.error(Source::PixelSize);
+        let with_length = self.layers_with_length.as_ref();
+        let with_length = with_length.filter(|_| length_error > 0.0);
+        let by_length = |c: &DVector<f64>| c / length_error;
+        bodies.with_layer_errors(covariance.clone(), with_length.map(by_length))
     }
 
     /// Refuses what has no meaning.
@@ -308,11 +212,7 @@ impl Settings {
         if let Binning::Blocks(side) = self.binning {
             Requirement::AtLeastOne.check("binning", side as f64)?;
         }
-        for assumption in Assumption::ALL {
-            if let Some(error) = self.stated(assumption.source) {
-                Requirement::NonNegative.check(assumption.setting, error)?;
-            }
-        }
+        self.assumptions.check()?;
         let layers = self.waveguide.as_ref().map_or(0, |w| w.layers().len());
         let parameters = PARAMETERS_PER_LAYER * layers;
         let sized = |name, found: usize| match found == parameters {

@@ -125,14 +125,17 @@ impl Stages {
                 // Above its level of saturation a Hertz profile has less than this share of its
                 // force.
                 let factor = factor
-                    .by_relative(Source::Gain, settings.force_scale())
+                    .by_relative(Source::Gain, settings.assumptions.error(Source::Gain))
                     .by_relative(Source::Gain, reading.saturated_share);
                 let force = reading.force_n.or_else(|| gauge.map(Uncertain::from));
                 reading.force_n = force.map(|force| force * factor);
                 reading.peak_stress_pa = reading.peak_stress_pa.map(|stress| stress * factor);
                 reading.contact_radius_m = reading
                     .contact_radius_m
-                    .by_relative(Source::PixelSize, settings.length_scale())
+                    .by_relative(
+                        Source::PixelSize,
+                        settings.assumptions.error(Source::PixelSize),
+                    )
                     .by_relative(Source::Profile, self.shape_doubt(reading));
             }
             Ok::<(), PipelineError>(())

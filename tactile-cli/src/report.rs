@@ -11,6 +11,7 @@ use std::fmt::Write;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 use tactile_files::scene::Scene;
+use tactile_imaging::core::Source;
 use tactile_imaging::pipeline::{Flag, Measurement, Object, interval_text, with_error};
 
 /// The page of a measurement: the modulus with its interval, cautions and what to do about them,
@@ -186,11 +187,13 @@ impl Report {
             poisson_ratio,
         } = scene.object
         {
+            let relative = scene.errors.stated(Source::ObjectSize);
+            let radius_error_m = relative.map(|relative| relative * radius_m);
             add(
                 "radius of the ball",
-                stated(radius_m, scene.errors.radius_m, 1e3, " mm"),
+                stated(radius_m, radius_error_m, 1e3, " mm"),
             );
-            let error = scene.errors.poisson_ratio;
+            let error = scene.errors.stated(Source::PoissonRatio);
             add("Poisson's ratio", stated(poisson_ratio, error, 1.0, ""));
         } else {
             // Fields and numbers, as the scene has them.

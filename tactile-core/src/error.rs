@@ -6,7 +6,8 @@ use std::sync::Arc;
 
 /// The failure of a stage that a user has written, as the error types of the workspace carry it.
 ///
-/// Cheap to clone. Two are equal if their messages are. The source is the user's own error.
+/// Cheap to clone. Two are equal if their messages are. It stands for the user's own error in a
+/// chain of sources: its message is that error's, and its source is that error's source.
 ///
 /// ```
 /// use std::error::Error;
@@ -14,7 +15,8 @@ use std::sync::Arc;
 /// let failure = CustomError::new("the network has no weights");
 /// assert_eq!(failure.to_string(), "the network has no weights");
 /// let failure = CustomError::new("seven".parse::<u8>().unwrap_err());
-/// assert!(failure.source().is_some_and(|source| source.is::<std::num::ParseIntError>()));
+/// assert!(failure.get_ref().is::<std::num::ParseIntError>());
+/// assert!(failure.source().is_none(), "nothing stands behind it");
 /// ```
 #[derive(Clone, Debug)]
 pub struct CustomError(Arc<dyn Error + Send + Sync>);
@@ -23,6 +25,12 @@ impl CustomError {
     /// Carries an error, or a message.
     pub fn new(error: impl Into<Box<dyn Error + Send + Sync>>) -> Self {
         Self(Arc::from(error.into()))
+    }
+
+    /// The user's own error.
+    #[must_use]
+    pub fn get_ref(&self) -> &(dyn Error + Send + Sync + 'static) {
+        &*self.0
     }
 }
 
@@ -41,7 +49,7 @@ impl Display for CustomError {
 
 impl Error for CustomError {
     fn source(&self) -> Option<&(dyn Error + 'static)> {
-        Some(&*self.0)
+        self.0.source()
     }
 }
 

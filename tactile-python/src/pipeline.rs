@@ -14,7 +14,7 @@ use tactile_imaging::elasticity::contact::{Layer, Waveguide};
 use tactile_imaging::elasticity::strain::{
     Biot, EulerAlmansi, GreenLagrange, Hencky, Infinitesimal, StrainMeasure,
 };
-use tactile_imaging::force::{CalibrationPair, ForceOptions};
+use tactile_imaging::force::{CalibrationPair, ForceOptions, Source};
 use tactile_imaging::matching::{AnnealedSoftassign, Search};
 use tactile_imaging::pipeline::{
     DarkContact, EstimatorChoice, LightContact, StagesConfig, StrainChoice, SurfaceInput,
@@ -147,10 +147,11 @@ impl Object {
 ///     guide that yields is a warning of the modulus.
 /// flat_field : bool
 ///     Whether frames are divided by the reference's own brightness.
-/// force_scale_error, coupling_error, length_scale_error, radius_error, poisson_ratio_error,
-/// adhesion_error : float
-///     Standard errors that all loads share: three relative ones, in metres, absolute, in J/m².
-///     What is not given is assumed: 0.22 %, 12 %, 0.3 %, 0.5 % of the radius, 0.01, 0.001 J/m².
+/// gauge_error, coupling_error, pixel_size_error, layer_error, radius_error,
+/// poisson_ratio_error, adhesion_error : float
+///     Standard errors that all loads share, by the names of scene files: four relative ones, in
+///     metres, absolute, in J/m². What is not given is assumed: 0.22 %, 12 %, 0.3 %, 5 %, 0.5 % of
+///     the radius, 0.01, 0.001 J/m².
 ///
 /// Raises
 /// ------
@@ -166,8 +167,8 @@ impl Pipeline {
         object, *, pairs=None, sensor=None, depth_table=None, contact=None, pixel_size=None,
         waveguide=None, control_points=200, surface=None, sampler=None,
         matcher=None, matcher_options=None, warp=None, strain=None, estimator=None,
-        flat_field=None, force_scale_error=None, coupling_error=None, length_scale_error=None,
-        radius_error=None, poisson_ratio_error=None, adhesion_error=None
+        flat_field=None, gauge_error=None, coupling_error=None, pixel_size_error=None,
+        layer_error=None, radius_error=None, poisson_ratio_error=None, adhesion_error=None
     ))]
     fn new(
         object: &Object,
@@ -186,9 +187,10 @@ impl Pipeline {
         strain: Option<&Bound<'_, PyAny>>,
         estimator: Option<&Bound<'_, PyAny>>,
         flat_field: Option<bool>,
-        force_scale_error: Option<f64>,
+        gauge_error: Option<f64>,
         coupling_error: Option<f64>,
-        length_scale_error: Option<f64>,
+        pixel_size_error: Option<f64>,
+        layer_error: Option<f64>,
         radius_error: Option<f64>,
         poisson_ratio_error: Option<f64>,
         adhesion_error: Option<f64>,
@@ -213,14 +215,24 @@ impl Pipeline {
             if guide.is_some() {
                 settings.waveguide = guide;
             }
-            let set = |field: &mut Option<f64>, given: Option<f64>| *field = given.or(*field);
             settings.flat_field = flat_field.unwrap_or(settings.flat_field);
-            set(&mut settings.force_scale_error, force_scale_error);
-            set(&mut settings.coupling_error, coupling_error);
-            set(&mut settings.length_scale_error, length_scale_error);
-            set(&mut settings.object_radius_error_m, radius_error);
-            set(&mut settings.poisson_ratio_error, poisson_ratio_error);
-            set(&mut settings.adhesion_error_j_per_m2, adhesion_error);
+            let size_error = radius_error.zip(settings.object.radius_m());
+            for (source, stated) in [
+                (Source::Gain, gauge_error),
+                (Source::Coupling, coupling_error),
+                (Source::PixelSize, pixel_size_error),
+                (Source::Guide, layer_error),
+                (
+                    Source::ObjectSize,
+                    size_error.map(|(error, radius)| error / radius),
+                ),
+                (Source::PoissonRatio, poisson_ratio_error),
+                (Source::Adhesion, adhesion_error),
+            ] {
+                if let Some(error) = stated {
+                    settings.assumptions.state(source, error);
+                }
+            }
         }))
         .map_err(errors::pipeline)?
         .with_control_points(control_points)

@@ -48,7 +48,7 @@ fn every_assumption_is_documented_with_its_default() {
             true => format!("{} %", (1000.0 * assumption.default).round() / 10.0),
             false => assumption.default.to_string(),
         };
-        let rest = table.split_once(assumption.scene_key).unwrap().1;
+        let rest = table.split_once(assumption.key).unwrap().1;
         let said = rest.split_once("if absent").unwrap().0;
         assert!(said.contains(&default), "{assumption:?}: {said}");
     }

@@ -2,7 +2,7 @@
 //! assumption.
 use crate::common::{press_of, trial};
 use ndarray::Array2;
-use tactile_imaging::force::Estimate;
+use tactile_imaging::force::{Estimate, Source};
 use tactile_imaging::pipeline::{CheckPress, CheckedObject, Measurement};
 use tactile_simulate::{Camera, Trial};
 
@@ -26,7 +26,7 @@ fn press(seed: u64, light: f64) -> (Trial, Vec<Array2<u8>>) {
 fn measured(trial: &Trial, frames: &[Array2<u8>], object: Option<CheckedObject>) -> Measurement {
     let mut pipeline = trial.pipeline().unwrap();
     pipeline = pipeline
-        .with_settings(|settings| settings.coupling_error = None)
+        .with_settings(|settings| settings.assumptions.forget(Source::Coupling))
         .unwrap();
     let reference = trial.simulation.reference.view();
     if let Some(object) = object {

@@ -10,7 +10,7 @@
 //! updated, but its covariance with x is kept: with K the gain, s the derivatives of ln F by ln a
 //! and σ² the variance of the size, -K s σ² (Schmidt's filter: 1966, Adv. Control Syst. 3, 293).
 use super::{KnownBall, is_known, is_positive};
-use crate::core::Estimate;
+use crate::core::{Estimate, Source};
 use crate::elasticity::contact::{
     Bond, Layer, PARABOLA_ERROR, Waveguide, guide_log_stiffness, parameter_slopes, stepped_layers,
 };
@@ -220,7 +220,13 @@ pub fn update(
     );
     let prior = settings.layer_covariance();
     let forces = log_forces(checks, stated).ok_or(unsolved)?;
-    let noise = noise(checks, stated, &forces, settings.length_scale()).ok_or(unsolved)?;
+    let noise = noise(
+        checks,
+        stated,
+        &forces,
+        settings.assumptions.error(Source::PixelSize),
+    )
+    .ok_or(unsolved)?;
     let known = checks.iter().map(|check| check.known_n.value.ln());
     let log_known = DVector::from_iterator(checks.len(), known);
     let mut x = DVector::zeros(prior.nrows());
@@ -260,7 +266,8 @@ pub fn update(
         let (kept, moved_by_length) = (&left * &earlier, &gain * &by_length);
         let crossed = &kept * moved_by_length.transpose();
         covariance -= &crossed + crossed.transpose();
-        with_length = kept - moved_by_length * settings.length_scale().powi(2);
+        with_length =
+            kept - moved_by_length * settings.assumptions.error(Source::PixelSize).powi(2);
         let moved = (&next - &x).amax();
         x = next;
         if moved < SETTLED {

@@ -6,7 +6,7 @@ use super::contact::ContactReading;
 use super::error::PipelineError;
 use super::pipeline::Pipeline;
 use super::specimen::Object;
-use crate::core::Estimate;
+use crate::core::{Estimate, Source};
 use gain::GainCheck;
 use guide::GuideCheck;
 use ndarray::ArrayView2;
@@ -177,7 +177,7 @@ impl Pipeline {
         }
         let mut pipeline = self;
         if !gains.is_empty() {
-            let coupling = pipeline.settings().unchecked_coupling();
+            let coupling = pipeline.settings().assumptions.error(Source::Coupling);
             let checked = gain::checked(&gains, coupling);
             pipeline = pipeline.with_settings(|settings| settings.checked_gain = Some(checked))?;
         }
@@ -206,10 +206,10 @@ impl Pipeline {
         let pipeline = self.clone().with_settings(|settings| {
             settings.checked_gain = None;
             // Errors that all presses share are accounted for once, with what is checked.
-            settings.coupling_error = Some(0.0);
-            settings.force_scale_error = Some(0.0);
+            settings.assumptions.state(Source::Coupling, 0.0);
+            settings.assumptions.state(Source::Gain, 0.0);
             if let CheckedObject::Ball(ball) = check.object {
-                settings.length_scale_error = Some(0.0);
+                settings.assumptions.state(Source::PixelSize, 0.0);
                 settings.object = Object::Sphere {
                     radius_m: ball.radius_m.value,
                     poisson_ratio: ball.poisson_ratio.value,

@@ -96,6 +96,18 @@ impl Object {
         }
     }
 
+    /// The radius in metres of a ball, a punch or the ball that indents a layer. `None` of every
+    /// other object.
+    pub fn radius_m(&self) -> Option<f64> {
+        match *self {
+            Self::Sphere { radius_m, .. } | Self::FlatPunch { radius_m, .. } => Some(radius_m),
+            Self::Layer {
+                indenter_radius_m, ..
+            } => Some(indenter_radius_m),
+            _ => None,
+        }
+    }
+
     /// Its Poisson ratio.
     pub fn poisson_ratio(&self) -> f64 {
         match self {

@@ -10,16 +10,16 @@ use std::fmt;
 #[cfg(feature = "fem")]
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
-use tactile_imaging::core::Estimate;
 #[cfg(feature = "fem")]
 use tactile_imaging::core::Progress;
+use tactile_imaging::core::{Estimate, Source};
 use tactile_imaging::elasticity::ElasticityError;
 use tactile_imaging::elasticity::contact::{ContactTable, Layer, Waveguide};
 #[cfg(feature = "fem")]
 use tactile_imaging::fem::ContactTableOptions;
 use tactile_imaging::pipeline::{
-    CheckPress, CheckedObject, EstimatorChoice, KnownBall, MatcherChoice, Object,
-    ReconstructionChoice, SamplerChoice, Settings, StagesConfig, StrainChoice, WarpChoice,
+    Assumptions, CheckPress, CheckedObject, EstimatorChoice, KnownBall, MatcherChoice, Object,
+    ReconstructionChoice, SamplerChoice, StagesConfig, StrainChoice, WarpChoice,
 };
 
 /// The calibration of a scene.
@@ -284,61 +284,6 @@ pub(crate) fn elastic_layers(layers: &[SceneLayer]) -> Vec<Layer> {
     layers.iter().map(elastic).collect()
 }
 
-/// The standard errors that a scene file states. What is `None` is assumed, see
-/// [`Settings`], and what is exact stands there as `"exact"`.
-///
-/// ```
-/// use tactile_files::scene::{Scene, StatedErrors};
-/// let text = r#"
-///     reference = "reference.png"
-///     pixel_size_m = [2e-5, 2e-5]
-///     pixel_size_error = 1e-3
-///     coupling_error = "exact"
-///     calibration = { pairs = "pairs.csv" }
-///     frames = [{ image = "frame.png" }]
-///     object = { shape = "sphere", radius_m = 3e-3, radius_error_m = 5e-6 }
-/// "#;
-/// let errors: StatedErrors = Scene::parse(text, "scene.toml")?.errors;
-/// assert_eq!((errors.pixel_size, errors.radius_m), (Some(1e-3), Some(5e-6)));
-/// assert_eq!((errors.coupling, errors.gauge), (Some(0.0), None));
-/// # Ok::<(), tactile_files::io::FileError>(())
-/// ```
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct StatedErrors {
-    /// Of the gauge of all forces, relative.
-    pub gauge: Option<f64>,
-    /// Of the light that the object couples beside the calibrator's, relative.
-    pub coupling: Option<f64>,
-    /// Of the size of a pixel, relative.
-    pub pixel_size: Option<f64>,
-    /// Of the moduli of all layers by one factor, relative.
-    pub layers: Option<f64>,
-    /// Of the object's radius in metres.
-    pub radius_m: Option<f64>,
-    /// Of the object's Poisson ratio.
-    pub poisson_ratio: Option<f64>,
-    /// Of a ball's work of adhesion, in J/m².
-    pub adhesion_j_per_m2: Option<f64>,
-}
-
-impl StatedErrors {
-    /// Puts what is stated into a pipeline's settings, whose waveguide is known.
-    pub(super) fn state(&self, settings: &mut Settings) {
-        let set = |setting: &mut Option<f64>, stated: Option<f64>| *setting = stated.or(*setting);
-        set(&mut settings.force_scale_error, self.gauge);
-        set(&mut settings.coupling_error, self.coupling);
-        set(&mut settings.length_scale_error, self.pixel_size);
-        set(&mut settings.object_radius_error_m, self.radius_m);
-        set(&mut settings.poisson_ratio_error, self.poisson_ratio);
-        let adhesion = &mut settings.adhesion_error_j_per_m2;
-        set(adhesion, self.adhesion_j_per_m2);
-        if let (Some(error), Some(guide)) = (self.layers, &settings.waveguide) {
-            let covariance = Settings::common_layer_covariance(guide.layers().len(), error);
-            settings.layer_covariance = Some(covariance);
-        }
-    }
-}
-
 /// A standard error, or `"exact"`, for `#[serde(deserialize_with = …)]`.
 fn stated<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<f64>, D::Error> {
     #[derive(Deserialize)]
@@ -393,7 +338,7 @@ pub struct Scene {
     /// Whether changes of the lamps since the reference are divided out where they are detected.
     pub corrects_drift: bool,
     /// Standard errors of what the frames are measured with.
-    pub errors: StatedErrors,
+    pub errors: Assumptions,
     /// How grey levels become force or depth.
     pub calibration: CalibrationSource,
     /// The frames, in the order of the file.
@@ -655,6 +600,25 @@ impl SceneFile {
             let reason = "expected none beside checks by balls: it is of the layers as stated";
             return Err(error("contact_table", reason));
         }
+        let object = self.object.object(file)?;
+        let size_error = self.object.radius_error_m.zip(object.radius_m());
+        let mut errors = Assumptions::default();
+        for (source, stated) in [
+            (Source::Gain, self.gauge_error),
+            (Source::Coupling, self.coupling_error),
+            (Source::PixelSize, self.pixel_size_error),
+            (Source::Guide, self.layer_error),
+            (
+                Source::ObjectSize,
+                size_error.map(|(error_m, radius_m)| error_m / radius_m),
+            ),
+            (Source::PoissonRatio, self.object.poisson_ratio_error),
+            (Source::Adhesion, self.object.adhesion_error_j_per_m2),
+        ] {
+            if let Some(error) = stated {
+                errors.state(source, error);
+            }
+        }
         Ok(Scene {
             file: file.into(),
             reference: beside(file, &self.reference),
@@ -664,19 +628,11 @@ impl SceneFile {
             corrects_drift: self
                 .illumination_drift
                 .is_none_or(|d| d == Drift::Automatic),
-            errors: StatedErrors {
-                gauge: self.gauge_error,
-                coupling: self.coupling_error,
-                pixel_size: self.pixel_size_error,
-                layers: self.layer_error,
-                radius_m: self.object.radius_error_m,
-                poisson_ratio: self.object.poisson_ratio_error,
-                adhesion_j_per_m2: self.object.adhesion_error_j_per_m2,
-            },
+            errors,
             calibration,
             frames,
             checks,
-            object: self.object.object(file)?,
+            object,
             layers: self
                 .waveguide
                 .map_or_else(Vec::new, |waveguide| waveguide.0),

@@ -114,9 +114,7 @@ mod inclusion;
 pub use data::{LoadedCalibration, SceneData, doubt_of_depths, doubt_of_pairs};
 #[cfg(feature = "fem")]
 pub use file::solve_contact_table;
-pub use file::{
-    CalibrationSource, Scene, SceneCheck, SceneFrame, SceneLayer, StatedErrors, read_contact_table,
-};
+pub use file::{CalibrationSource, Scene, SceneCheck, SceneFrame, SceneLayer, read_contact_table};
 #[cfg(feature = "inclusion")]
 pub use inclusion::{InclusionScene, LoadedInclusion};
 

@@ -4,6 +4,7 @@ use crate::scene::{SceneLayer, guide};
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
+use tactile_imaging::core::Source;
 use tactile_imaging::elasticity::contact::Waveguide;
 use tactile_imaging::force::{
     ContactOptions, DriftCorrection, ForceOptions, LensGeometry, NoiseModel, PressureCurve,
@@ -53,12 +54,14 @@ impl SensorGeometry {
 /// A calibrated sensor.
 ///
 /// ```no_run
-/// use tactile_imaging::force::{ForceOptions, LocalCalibration};
+/// use tactile_imaging::force::{ForceOptions, LocalCalibration, Source};
 /// use tactile_files::sensor::Sensor;
 /// use tactile_imaging::pipeline::{Object, Pipeline};
 /// let sensor = Sensor::read("sensor.toml")?;
 /// let ball = Object::sphere(3e-3);
-/// let pipeline = sensor.pipeline(ball)?.with_settings(|s| s.object_radius_error_m = Some(5e-6))?;
+/// let pipeline = sensor
+///     .pipeline(ball)?
+///     .with_settings(|s| s.assumptions.state(Source::ObjectSize, 5e-6 / 3e-3))?;
 /// // Its parts, for a pipeline that is put together by hand.
 /// let (contact, guide) = (sensor.contact(&ForceOptions::default())?, sensor.waveguide()?);
 /// let by_hand = Pipeline::new(contact, ball)?.with_settings(|s| s.waveguide = Some(guide))?;
@@ -99,7 +102,7 @@ pub struct Sensor {
     pub gauge_error: f64,
     /// Relative standard error of the light that an object couples beside what the calibrator
     /// coupled. Zero under a fixed diffusing skin. `None`: that of
-    /// [`Settings`](tactile_imaging::pipeline::Settings::coupling_error) is assumed.
+    /// [`Assumption::ALL`](tactile_imaging::pipeline::Assumption::ALL) is assumed.
     #[serde(
         default,
         deserialize_with = "not_negative",
@@ -204,10 +207,13 @@ impl Sensor {
         let covariance = DMatrix::from_fn(n, n, |i, j| entry(i, j).unwrap_or(f64::NAN));
         pipeline.with_settings(|settings| {
             settings.flat_field = self.flat_field;
-            settings.force_scale_error = Some(self.gauge_error);
-            settings.coupling_error = self.coupling_error;
+            settings.assumptions.state(Source::Gain, self.gauge_error);
+            if let Some(error) = self.coupling_error {
+                settings.assumptions.state(Source::Coupling, error);
+            }
             settings.calibrated_light.clone_from(&self.light);
-            settings.length_scale_error = Some(self.geometry.length_scale_error());
+            let length_error = self.geometry.length_scale_error();
+            settings.assumptions.state(Source::PixelSize, length_error);
             // On a rigid guide the settings keep their default.
             if !self.layers.is_empty() {
                 settings.waveguide = Some(guide);

@@ -1,10 +1,9 @@
 //! A sensor and a press as they are, and as the user states them.
 use crate::finite_element_presses::recorded_balls;
-use nalgebra::DMatrix;
 use ndarray::Array2;
 use tactile_imaging::elasticity::contact::{Layer, Waveguide};
 use tactile_imaging::fem::{self, Guide, Interface, Material, ObjectPress};
-use tactile_imaging::force::{Estimate, ReferenceFrame};
+use tactile_imaging::force::{Estimate, ReferenceFrame, Source};
 use tactile_imaging::pipeline::{
     CheckPress, CheckedObject, EstimatorChoice, KnownBall, Measurement, Object, Pipeline,
     PipelineError, ReferenceLight, StagesConfig,
@@ -326,14 +325,6 @@ impl Stated {
             poisson_ratio: l.material.poisson_ratio,
         };
         let guide = Waveguide::new(layers.iter().map(layer).collect()).unwrap();
-        // The moduli of all layers have one error in common; ln E of the layers comes first.
-        let n = layers.len();
-        let covariance = self.layer_error.map(|error| {
-            DMatrix::from_fn(3 * n, 3 * n, |i, j| match i < n && j < n {
-                true => error.powi(2),
-                false => 0.0,
-            })
-        });
         let reference = ReferenceFrame::new(trial.simulation.reference.view()).unwrap();
         let mut light = ReferenceLight::of(&reference);
         light.grey.iter_mut().for_each(|grey| *grey /= lamps);
@@ -352,12 +343,18 @@ impl Stated {
             .with_control_points(points)
             .with_settings(|settings| {
                 settings.waveguide = Some(guide);
-                settings.layer_covariance = covariance;
-                settings.force_scale_error = self.force_error;
-                settings.coupling_error = self.coupling_error;
-                settings.length_scale_error = self.length_error;
-                settings.object_radius_error_m = self.radius_error.map(|e| e * RADIUS_M);
-                settings.poisson_ratio_error = self.poisson_error;
+                for (source, stated) in [
+                    (Source::Guide, self.layer_error),
+                    (Source::Gain, self.force_error),
+                    (Source::Coupling, self.coupling_error),
+                    (Source::PixelSize, self.length_error),
+                    (Source::ObjectSize, self.radius_error),
+                    (Source::PoissonRatio, self.poisson_error),
+                ] {
+                    if let Some(error) = stated {
+                        settings.assumptions.state(source, error);
+                    }
+                }
                 settings.calibrated_light = self.keeps_light.then_some(light);
             })
             .unwrap()

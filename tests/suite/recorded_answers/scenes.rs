@@ -5,7 +5,7 @@ use crate::common::press_of;
 use ndarray::Array2;
 use tactile_files::scene::Scene;
 use tactile_imaging::elasticity::modulus::{FlatPunch, HertzSphere, PaperRatio, StrainReference};
-use tactile_imaging::force::{CalibrationPair, Estimate};
+use tactile_imaging::force::{CalibrationPair, Estimate, Source};
 use tactile_imaging::pipeline::{
     DarkContact, EstimatorChoice, MatcherChoice, Object, Pipeline, ReconstructionChoice, Session,
     StagesConfig, StrainChoice, SurfaceInput, WarpChoice,
@@ -118,8 +118,8 @@ fn dark(answers: &mut Answers) {
             .expect("a pipeline")
             .with_surface(depths.clone(), SurfaceInput::Signal)
             .with_settings(|settings| {
-                settings.force_scale_error = Some(0.01);
-                settings.length_scale_error = Some(0.002);
+                settings.assumptions.state(Source::Gain, 0.01);
+                settings.assumptions.state(Source::PixelSize, 0.002);
             })
             .expect("errors")
             .with_control_points(80);

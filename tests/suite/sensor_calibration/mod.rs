@@ -9,8 +9,9 @@ use sensors::{
     estimator,
 };
 use tactile_files::sensor::{Indenter, Sensor, SensorCalibration, SensorError};
+use tactile_imaging::force::Source;
 use tactile_imaging::force::{ContactOptions, DriftCorrection, ForceOptions};
-use tactile_imaging::pipeline::{Object, Pipeline};
+use tactile_imaging::pipeline::{Assumptions, Object, Pipeline};
 use tactile_simulate::Camera;
 
 /// Changes of the illumination are divided out where they can be told, as a sensor's own pipeline
@@ -25,6 +26,12 @@ const SAMPLE: Object = Object::Sphere {
     poisson_ratio: SAMPLE_POISSON,
 };
 
+fn state_sample(errors: &mut Assumptions) {
+    errors.state(Source::ObjectSize, BALL_ERROR);
+    errors.state(Source::PoissonRatio, POISSON_ERROR);
+    errors.state(Source::Adhesion, 0.0);
+}
+
 /// The pipeline of the study: the estimator is the linear law that the contacts were made by.
 fn pipeline(sensor: &Sensor) -> Pipeline {
     let guide = sensor.waveguide().unwrap();
@@ -32,9 +39,7 @@ fn pipeline(sensor: &Sensor) -> Pipeline {
         .pipeline(SAMPLE)
         .unwrap()
         .with_settings(|settings| {
-            settings.object_radius_error_m = Some(BALL_ERROR * SAMPLE_RADIUS_M);
-            settings.poisson_ratio_error = Some(POISSON_ERROR);
-            settings.adhesion_error_j_per_m2 = Some(0.0);
+            state_sample(&mut settings.assumptions);
         })
         .unwrap()
         .with_estimator(estimator(SAMPLE_RADIUS_M, SAMPLE_POISSON, &guide))

@@ -2,9 +2,7 @@
 //! interval, or it is flagged.
 #![allow(clippy::print_stdout)]
 use super::SAMPLE;
-use super::sensors::{
-    BALL_ERROR, Effects, POISSON_ERROR, SAMPLE_POISSON, SAMPLE_RADIUS_M, Simulated, estimator,
-};
+use super::sensors::{Effects, SAMPLE_POISSON, SAMPLE_RADIUS_M, Simulated, estimator};
 use crate::common::press_of;
 use std::collections::BTreeSet;
 use tactile_files::sensor::{Sensor, SensorCalibration, SensorError};
@@ -80,13 +78,9 @@ fn pipeline(calibration: &SensorCalibration, sensor: &Sensor, left_out: LeftOut)
         .with_settings(|settings| {
             settings.waveguide = Some(guide.clone());
             settings.flat_field = sensor.flat_field;
-            settings.force_scale_error = Some(sensor.gauge_error);
-            settings.coupling_error = sensor.coupling_error;
-            settings.length_scale_error = whole.settings().length_scale_error;
+            settings.assumptions = whole.settings().assumptions.clone();
             settings.layer_covariance = Some(covariance);
-            settings.object_radius_error_m = Some(BALL_ERROR * SAMPLE_RADIUS_M);
-            settings.poisson_ratio_error = Some(POISSON_ERROR);
-            settings.adhesion_error_j_per_m2 = Some(0.0);
+            super::state_sample(&mut settings.assumptions);
         })
         .unwrap()
         .with_estimator(estimator(SAMPLE_RADIUS_M, SAMPLE_POISSON, &guide))

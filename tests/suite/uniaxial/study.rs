@@ -10,7 +10,7 @@ use tactile_imaging::{Object, Pipeline};
 use tactile_simulate::FaceOutline;
 
 /// Relative error that all readings of a gauge share: what a pipeline assumes unless told otherwise
-/// (`Settings::force_scale_error`).
+/// (`Source::Gain`).
 const GAUGE_SCALE: f64 = 1e-3;
 /// Error of each reading, of its range.
 const GAUGE_NOISE: f64 = 2e-3;
