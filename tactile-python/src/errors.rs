@@ -7,8 +7,13 @@ use std::time::{Duration, Instant};
 use tactile_files::io::FileError;
 use tactile_files::sensor::SensorError;
 use tactile_imaging::StrainBetweenError;
+use tactile_imaging::core::CustomError;
+use tactile_imaging::elasticity::ElasticityError;
+use tactile_imaging::force::ForceError;
 use tactile_imaging::matching::MatchError;
 use tactile_imaging::pipeline::{PipelineError, PipelineErrorKind};
+use tactile_imaging::sfs::SfsError;
+use tactile_imaging::tps::TpsError;
 
 pyo3::create_exception!(
     tactile_imaging,
@@ -27,7 +32,7 @@ pub fn invalid(sentence: impl ToString) -> PyErr {
 fn caused(error: &(dyn Error + 'static)) -> Option<PyErr> {
     let mut link = error;
     let cause = loop {
-        match link.downcast_ref::<PyErr>() {
+        match own_failure(link).and_then(|own| own.get_ref().downcast_ref::<PyErr>()) {
             Some(cause) => break cause,
             None => link = link.source()?,
         }
@@ -41,6 +46,19 @@ fn caused(error: &(dyn Error + 'static)) -> Option<PyErr> {
         raised.set_cause(py, Some(cause));
         raised
     }))
+}
+
+/// The failure of a caller's own stage that an error of a crate is.
+fn own_failure<'e>(error: &'e (dyn Error + 'static)) -> Option<&'e CustomError> {
+    macro_rules! of {
+        ($($kind:ident),*) => {
+            $(if let Some($kind::Custom(own)) = error.downcast_ref() {
+                return Some(own);
+            })*
+        };
+    }
+    of!(ForceError, SfsError, MatchError, TpsError, ElasticityError);
+    None
 }
 
 /// A failure of a measurement.
