@@ -25,7 +25,9 @@ const FIRST_SHARE: f64 = 0.5;
 const OTHER_SHARES: [f64; 2] = [0.25, 0.75];
 // A share moves ln E* by no more than itself over the sample's part: eleven digits of a modulus.
 const SETTLED_SHARE: f64 = 1e-11;
-// Secants take some five steps, bisection of every third forty.
+// A secant that leaves more of the gap than this is followed by halving the bracket.
+const SLOW: f64 = 0.5;
+// Secants take some five steps, bisection forty.
 const SHARE_STEPS: usize = 100;
 // Where a law does not reach, the bracket of shares is halved down to this.
 const SMALLEST_BRACKET: f64 = 1e-9;
@@ -230,7 +232,7 @@ impl<'a, L: ContactLaw + ?Sized> ContactFit<'a, L> {
         let mut found = self.mean_at(assumed, reach)?;
         let (mut low, mut high) = (0.0, 1.0);
         let mut before: Option<[f64; 2]> = None;
-        for step in 1..=SHARE_STEPS {
+        for _ in 0..SHARE_STEPS {
             let gap = self.share_at(found.log_reduced) - assumed;
             if gap.abs() < SETTLED_SHARE {
                 break;
@@ -243,10 +245,12 @@ impl<'a, L: ContactLaw + ?Sized> ContactFit<'a, L> {
             let secant = before.map_or(assumed + gap, |[x, y]| {
                 assumed - gap * (assumed - x) / (gap - y)
             });
+            let slow = before.is_some_and(|[_, y]| gap.abs() > SLOW * y.abs());
             before = Some([assumed, gap]);
-            // Every third step halves the bracket, so that it shrinks whatever the secants do.
-            let inside = secant >= low && secant <= high && secant != assumed;
-            let mut next = if inside && step % 3 != 0 {
+            // Near a share of one the gap of an end of the interval may have another zero, so that
+            // secants that are fast are left to themselves.
+            let inside = secant > low && secant < high && secant != assumed;
+            let mut next = if inside && !slow {
                 secant
             } else {
                 0.5 * (low + high)

@@ -2,6 +2,8 @@
 
 use super::*;
 
+use approx::assert_relative_eq;
+
 /// 2000 noisy experiments: 95 % ± four standard deviations of the count (0.5 %).
 #[test]
 fn intervals_cover_what_they_promise() {
@@ -300,5 +302,44 @@ proptest! {
         if let Ok(found) = ball.estimate(&LoadSeries::new(loads)) {
             holds_its_estimate(&found);
         }
+    }
+}
+
+/// Where the guide takes most of the compliance the interval is open only if its error reaches the
+/// whole: below, both ends are near those of the logarithm's normal distribution.
+#[test]
+fn both_ends_are_found_where_the_guide_takes_most_of_the_compliance() {
+    let layer = |thickness_m, youngs_modulus_pa| Layer {
+        thickness_m,
+        youngs_modulus_pa,
+        poisson_ratio: 0.48,
+    };
+    let guide = vec![layer(2e-3, 1.36e5), layer(3e-3, 8e4), layer(5e-3, 3.4e4)];
+    let guide = Waveguide::new(guide).unwrap();
+    let contacts = [(0.876, 2.7444e-3), (1.502, 3.2145e-3)];
+    let loads = contacts.map(|(force_n, radius_m)| {
+        let force = Estimate::new(force_n, 1e-3 * force_n);
+        LoadState::new(force).with_radius(Estimate::new(radius_m, 1e-3 * radius_m))
+    });
+    let loads = LoadSeries::new(loads);
+    let estimator = SphereOnWaveguide::new(3e-3, 0.5, &guide, Bond::Bonded).unwrap();
+    for error in [0.01, 0.03, 0.05] {
+        let factor = Uncertain::exact(1.0).by(Source::Guide, error);
+        let bodies = Bodies::new(Object::sphere(3e-3), Some(guide.clone()));
+        let bodies = bodies.with_guide_error(factor).unwrap();
+        let found = estimator
+            .estimate(&loads.clone().with_bodies(bodies))
+            .unwrap();
+        let end = |sign: f64| {
+            (sign * 1.96 * (found.standard_error_pa / found.youngs_modulus_pa)).exp()
+                * found.youngs_modulus_pa
+        };
+        // Compliances are subtracted, not logarithms: some per cent at these errors.
+        assert_relative_eq!(found.interval_95.lower, end(-1.0), max_relative = 0.05);
+        assert_relative_eq!(
+            found.interval_95.upper.unwrap(),
+            end(1.0),
+            max_relative = 0.05
+        );
     }
 }
