@@ -57,7 +57,7 @@ fn remedy(source: Source) -> &'static str {
 
 /// The budget in one sentence, shares below a tenth of the largest left out, and what would narrow
 /// the interval most.
-pub fn sentence(budget: &[ErrorShare]) -> Option<String> {
+pub(super) fn sentence(budget: &[ErrorShare]) -> Option<String> {
     let largest = budget.first()?;
     let counts = |share: &&ErrorShare| share.relative_error >= 0.1 * largest.relative_error;
     let shares: Vec<String> = budget
@@ -73,7 +73,7 @@ pub fn sentence(budget: &[ErrorShare]) -> Option<String> {
 }
 
 /// The sources of a modulus' error, the largest part first. None of an error that is not known.
-pub fn error_budget(modulus_pa: &Uncertain, settings: &Settings) -> Vec<ErrorShare> {
+pub(super) fn error_budget(modulus_pa: &Uncertain, settings: &Settings) -> Vec<ErrorShare> {
     if !modulus_pa.relative_error().is_finite() {
         return Vec::new();
     }

@@ -428,7 +428,7 @@ impl FrameContact {
 }
 
 /// Gives an array a shape, keeping its memory where it is large enough.
-pub fn resize<T: Clone + Default>(array: &mut Array2<T>, shape: (usize, usize)) {
+pub(super) fn resize<T: Clone + Default>(array: &mut Array2<T>, shape: (usize, usize)) {
     if array.dim() != shape {
         let (mut memory, _) = std::mem::take(array).into_raw_vec_and_offset();
         memory.clear();

@@ -20,7 +20,7 @@ const THIN_LAYER_ERROR: f64 = 0.025;
 /// the guide has no layers.
 ///
 /// The errors of force, contact radius and layers count, and that of the law.
-pub fn depths(
+pub(super) fn depths(
     contact: &ContactReading,
     bodies: &Bodies,
     distances_m: &[f64],

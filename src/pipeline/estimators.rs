@@ -12,7 +12,7 @@ use crate::elasticity::modulus::{
 use std::sync::{Arc, OnceLock};
 
 /// An estimator that pipelines and their clones share.
-pub type SharedEstimator = Arc<dyn ModulusEstimator + Send + Sync>;
+pub(super) type SharedEstimator = Arc<dyn ModulusEstimator + Send + Sync>;
 
 /// The estimator where none is chosen. This is the place to change the default.
 ///
@@ -41,7 +41,7 @@ fn default_of(
 
 /// Estimators to lay beside the chosen one, the paper's ratio first. For a ball Hertz with the
 /// layers in series.
-pub fn that_fit(
+pub(super) fn that_fit(
     object: Object,
     waveguide: Option<&Waveguide>,
 ) -> Result<Vec<SharedEstimator>, PipelineError> {
@@ -191,7 +191,7 @@ impl ModulusEstimator for Completed {
 /// A pipeline's estimator: given as a value, or by a name. It is completed by the object and the
 /// guide when it is first needed.
 #[derive(Clone)]
-pub struct EstimatorStage {
+pub(super) struct EstimatorStage {
     chosen: Chosen,
     /// Clones share what is built: a law may hold tables.
     built: Arc<OnceLock<Result<SharedEstimator, PipelineError>>>,
@@ -204,14 +204,14 @@ enum Chosen {
 }
 
 impl EstimatorStage {
-    pub fn given(estimator: SharedEstimator) -> Self {
+    pub(super) fn given(estimator: SharedEstimator) -> Self {
         Self {
             chosen: Chosen::Given(estimator),
             built: Arc::default(),
         }
     }
 
-    pub fn named(choice: EstimatorChoice) -> Self {
+    pub(super) fn named(choice: EstimatorChoice) -> Self {
         Self {
             chosen: Chosen::Named(choice),
             built: Arc::default(),
@@ -219,11 +219,11 @@ impl EstimatorStage {
     }
 
     /// The object or the waveguide has changed: it is completed anew.
-    pub fn renew(&mut self) {
+    pub(super) fn renew(&mut self) {
         self.built = Arc::default();
     }
 
-    pub fn get(
+    pub(super) fn get(
         &self,
         object: Object,
         waveguide: Option<&Waveguide>,

@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 /// A contact as a load.
 #[derive(Clone, Copy, Debug)]
-pub struct Load {
+pub(super) struct Load {
     pub contact: ContactReading,
     /// The force of `contact`, which is known.
     pub force_n: Uncertain,
@@ -19,7 +19,7 @@ pub struct Load {
 
 impl Load {
     /// The load of a contact. `None` where its force is not known.
-    pub fn of(contact: &ContactReading) -> Option<Self> {
+    pub(super) fn of(contact: &ContactReading) -> Option<Self> {
         Some(Self {
             contact: *contact,
             force_n: contact.force_n?,
@@ -85,7 +85,7 @@ impl InCommon {
 }
 
 /// The input of an estimator.
-pub fn series(
+pub(super) fn series(
     loads: impl Iterator<Item = Load> + Clone,
     bodies: Arc<Bodies>,
     pixel_size_m: [f64; 2],
@@ -98,29 +98,29 @@ pub fn series(
 }
 
 /// Loads that a session keeps apart. More are merged.
-pub const MOST_LOADS: usize = 32;
+pub(super) const MOST_LOADS: usize = 32;
 
 /// The loads of a stream in rising order of force, at most [`MOST_LOADS`]: similar ones are merged.
 /// Beside each load the number of its frames.
 #[derive(Clone, Debug)]
-pub struct SeenLoads(Vec<(Load, f64)>);
+pub(super) struct SeenLoads(Vec<(Load, f64)>);
 
 impl SeenLoads {
-    pub fn new() -> Self {
+    pub(super) fn new() -> Self {
         Self(Vec::with_capacity(MOST_LOADS + 1))
     }
 
-    pub fn len(&self) -> usize {
+    pub(super) fn len(&self) -> usize {
         self.0.len()
     }
 
-    pub fn loads(&self) -> impl Iterator<Item = Load> + Clone + '_ {
+    pub(super) fn loads(&self) -> impl Iterator<Item = Load> + Clone + '_ {
         self.0.iter().map(|(load, _)| *load)
     }
 
     /// Takes a contact that can be trusted: alone, whole, unsaturated, inside the calibration, its
     /// profile fitted.
-    pub fn learn(&mut self, contact: &ContactReading, mean_strain: Option<Estimate>) {
+    pub(super) fn learn(&mut self, contact: &ContactReading, mean_strain: Option<Estimate>) {
         let whole = !contact.touches_edge && contact.other_contacts == 0;
         // A flat face is not read by the fit of a profile.
         let read = contact.converged || contact.face.is_some();

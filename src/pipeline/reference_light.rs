@@ -95,7 +95,7 @@ impl ReferenceLight {
 
 /// The change of the light since the calibration.
 #[derive(Clone, Copy, Debug)]
-pub struct LightChange {
+pub(super) struct LightChange {
     /// The factor common to all of the frame.
     pub gain: Estimate,
     /// What is no common factor: root mean square over the blocks, relative.

@@ -14,7 +14,7 @@ use nalgebra::Matrix3;
 
 /// How an object is read, decided once where a press or a session begins.
 #[derive(Clone, Copy, Debug)]
-pub enum Specimen {
+pub(super) enum Specimen {
     /// Strain is that of the surface reconstructed from the light.
     Curved,
     /// Strain is that of the face's area.
@@ -22,7 +22,7 @@ pub enum Specimen {
 }
 
 impl Specimen {
-    pub fn of(object: Object) -> Self {
+    pub(super) fn of(object: Object) -> Self {
         match object {
             Object::Block { poisson_ratio }
             | Object::Cylinder { poisson_ratio }
@@ -40,7 +40,7 @@ impl Specimen {
 
 /// A specimen with a flat face under uniaxial load.
 #[derive(Clone, Copy, Debug)]
-pub struct FlatSpecimen {
+pub(super) struct FlatSpecimen {
     pub poisson_ratio: f64,
     /// Whether the user has stated that its face is flat. The statement is believed as far as the
     /// frame does not contradict it.
@@ -73,7 +73,7 @@ impl FlatSpecimen {
     ///
     /// # Errors
     /// [`PipelineError::NotUniaxial`] of the first contact that is not.
-    pub fn check<'a>(
+    pub(super) fn check<'a>(
         self,
         contacts: impl IntoIterator<Item = (usize, &'a ContactReading)>,
     ) -> Result<(), PipelineError> {
@@ -87,7 +87,7 @@ impl FlatSpecimen {
     }
 
     /// The strain between two loads: the same everywhere, from the growth of the face's area.
-    pub fn strain(
+    pub(super) fn strain(
         self,
         [from, to]: [usize; 2],
         contacts: [&ContactReading; 2],
@@ -121,7 +121,7 @@ impl FlatSpecimen {
     }
 
     /// Loads whose areas are turned into strains since the unloaded state.
-    pub fn strained(
+    pub(super) fn strained(
         self,
         series: &LoadSeries,
         measure: &dyn StrainMeasure,
@@ -139,7 +139,7 @@ const LARGEST_EXCESS: f64 = 0.025;
 /// A caution where a rubber-like sample, squeezed to this strain of a measure, would give a ratio
 /// that is off by more than 2.5 %, or a slope by 5 %, or where the measure has no conjugate stress
 /// to judge it by.
-pub fn material_law(measure: &dyn StrainMeasure, strain: f64) -> Option<Flag> {
+pub(super) fn material_law(measure: &dyn StrainMeasure, strain: f64) -> Option<Flag> {
     // Without a strain nothing is divided by it.
     if strain == 0.0 || strain.is_nan() {
         return None;

@@ -29,7 +29,7 @@ const NEIGHBOURS: usize = 10;
 
 /// What a press or a session asks its stages of: nothing in it changes.
 #[derive(Clone)]
-pub struct Stages {
+pub(super) struct Stages {
     pub pipeline: Pipeline,
     pub reference: Arc<ReferenceFrame>,
     pub specimen: Specimen,
@@ -41,7 +41,7 @@ pub struct Stages {
 
 /// Memory that stages reuse from frame to frame, and the record of their work.
 #[derive(Default)]
-pub struct Scratch {
+pub(super) struct Scratch {
     pub force: ForceWorkspace,
     face: FaceWorkspace,
     surface: ContactSurfaceWorkspace,
@@ -51,7 +51,7 @@ pub struct Scratch {
 
 impl Scratch {
     /// The answer of a stage, its time recorded.
-    pub fn timed<T>(&mut self, stage: Stage, run: impl FnOnce(&mut Self) -> T) -> T {
+    pub(super) fn timed<T>(&mut self, stage: Stage, run: impl FnOnce(&mut Self) -> T) -> T {
         let start = Instant::now();
         let answer = run(self);
         self.report.ran(stage, start.elapsed());
@@ -60,7 +60,7 @@ impl Scratch {
 }
 
 impl Stages {
-    pub fn new(pipeline: Pipeline, reference: Arc<ReferenceFrame>) -> Self {
+    pub(super) fn new(pipeline: Pipeline, reference: Arc<ReferenceFrame>) -> Self {
         let specimen = Specimen::of(pipeline.settings().object);
         let contact = match specimen {
             Specimen::Flat(flat) if flat.stated => pipeline.contact().for_flat_faces(),
@@ -81,7 +81,7 @@ impl Stages {
 
     /// Contact and force of a frame, into `contact`. A force that the stage does not know is the
     /// gauge's.
-    pub fn contact(
+    pub(super) fn contact(
         &self,
         scratch: &mut Scratch,
         frame: usize,
@@ -198,7 +198,7 @@ impl Stages {
 
     /// The cautions about a frame: about its contact, the light around it, the gauge's reading of
     /// its force, or why it may have no contact.
-    pub fn cautions(
+    pub(super) fn cautions(
         &self,
         frame: usize,
         image: ArrayView2<'_, u8>,
@@ -283,7 +283,7 @@ impl Stages {
 
     /// The surface of a contact, into `surface`. All surfaces that are compared have one grid, so
     /// that the grid leaves no strain: that of a contact of `grid_pixels` pixels.
-    pub fn surface(
+    pub(super) fn surface(
         &self,
         scratch: &mut Scratch,
         frame: usize,
@@ -308,7 +308,7 @@ impl Stages {
     }
 
     /// The control points of a surface, into `points`.
-    pub fn control_points(
+    pub(super) fn control_points(
         &self,
         scratch: &mut Scratch,
         frame: usize,
@@ -322,7 +322,7 @@ impl Stages {
     }
 
     /// The matches between the control points of two frames.
-    pub fn matching(
+    pub(super) fn matching(
         &self,
         scratch: &mut Scratch,
         [from, to]: [usize; 2],
@@ -336,7 +336,7 @@ impl Stages {
     }
 
     /// The pairs of a match that begins where the last one ended, into `pairs`.
-    pub fn next_pairs(
+    pub(super) fn next_pairs(
         &self,
         scratch: &mut Scratch,
         [from, to]: [usize; 2],
@@ -354,7 +354,7 @@ impl Stages {
     }
 
     /// The strain between two frames from the matches of their control points, into `strain`.
-    pub fn strain(
+    pub(super) fn strain(
         &self,
         scratch: &mut Scratch,
         frames: [usize; 2],
@@ -369,7 +369,7 @@ impl Stages {
     }
 
     /// Young's modulus. An estimate that fails is timed too: it has looked at the data.
-    pub fn modulus(
+    pub(super) fn modulus(
         &self,
         scratch: &mut Scratch,
         estimator: &dyn ModulusEstimator,
@@ -408,7 +408,7 @@ impl Stages {
 
 /// The pairs of a match between the control points of two frames.
 #[derive(Clone, Copy)]
-pub struct MatchedPoints<'a> {
+pub(super) struct MatchedPoints<'a> {
     pub model: &'a ControlPoints,
     pub target: &'a [Point3<f64>],
     /// For every point of the model.

@@ -121,7 +121,7 @@ fn origin_m(region: &BoundingBox, binning: usize, pixel_size_m: [f64; 2]) -> [f6
 
 /// Memory of the surface stage.
 #[derive(Debug, Default)]
-pub struct ContactSurfaceWorkspace {
+pub(super) struct ContactSurfaceWorkspace {
     sfs: sfs::SurfaceWorkspace<f64>,
     grid: BinnedContact,
 }
@@ -210,7 +210,7 @@ fn mask_over(contact: &FrameContact, part: BoundingBox) -> ArrayView2<'_, bool> 
 
 /// Reconstructs the surface of a contact on a grid as fine as a contact of `pixels` pixels asks
 /// for.
-pub fn reconstruct(
+pub(super) fn reconstruct(
     pipeline: &Pipeline,
     workspace: &mut ContactSurfaceWorkspace,
     images: [ArrayView2<'_, u8>; 2],
@@ -255,7 +255,7 @@ pub fn reconstruct(
 
 /// Control points on a surface.
 #[derive(Debug, Default)]
-pub struct ControlPoints {
+pub(super) struct ControlPoints {
     /// In metres from the frame's first pixel.
     pub points: Vec<Point3<f64>>,
     /// The longer side of the surface's pixel in metres.
@@ -263,7 +263,7 @@ pub struct ControlPoints {
 }
 
 /// Samples the control points of a surface.
-pub fn sample(
+pub(super) fn sample(
     pipeline: &Pipeline,
     workspace: &mut ContactSurfaceWorkspace,
     surface: &ContactSurface,

@@ -83,14 +83,14 @@ pub(super) mod outcome {
         }
     }
 
-    pub fn one<T: Serialize, E: Display, S: Serializer>(
+    pub(crate) fn one<T: Serialize, E: Display, S: Serializer>(
         result: &Result<T, E>,
         serializer: S,
     ) -> Result<S::Ok, S::Error> {
         Outcome::from(result).serialize(serializer)
     }
 
-    pub fn each<T: Serialize, E: Display, S: Serializer>(
+    pub(crate) fn each<T: Serialize, E: Display, S: Serializer>(
         results: &[Result<T, E>],
         serializer: S,
     ) -> Result<S::Ok, S::Error> {
@@ -98,11 +98,17 @@ pub(super) mod outcome {
     }
 
     /// What has a name or a sentence, as that.
-    pub fn text<S: Serializer>(value: &impl Display, serializer: S) -> Result<S::Ok, S::Error> {
+    pub(crate) fn text<S: Serializer>(
+        value: &impl Display,
+        serializer: S,
+    ) -> Result<S::Ok, S::Error> {
         serializer.collect_str(value)
     }
 
-    pub fn texts<S: Serializer>(values: &[impl Display], serializer: S) -> Result<S::Ok, S::Error> {
+    pub(crate) fn texts<S: Serializer>(
+        values: &[impl Display],
+        serializer: S,
+    ) -> Result<S::Ok, S::Error> {
         serializer.collect_seq(values.iter().map(ToString::to_string))
     }
 }

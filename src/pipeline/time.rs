@@ -97,7 +97,7 @@ fn within(value: f64, interval: Interval, scale: f64, unit: &str) -> String {
 
 /// What the moduli of single loads say of time. `times_s` has a place for each load. What has no
 /// time or alone gives no modulus is left out, and None is returned where fewer than two are left.
-pub fn of_moduli(
+pub(super) fn of_moduli(
     estimator: &dyn ModulusEstimator,
     series: &LoadSeries,
     times_s: &[Option<f64>],
@@ -130,7 +130,7 @@ pub fn of_moduli(
 }
 
 /// What forces by the light over those by a gauge say of the sensor's gain.
-pub fn of_gains(forces: &[(f64, Estimate, Estimate)]) -> Option<TimeResult> {
+pub(super) fn of_gains(forces: &[(f64, Estimate, Estimate)]) -> Option<TimeResult> {
     let ratios: Vec<TimedModulus> = (forces.iter())
         .map(|&(time_s, light, gauge)| {
             let relative = |force: Estimate| force.standard_error / force.value;

@@ -7,7 +7,7 @@ use crate::pipeline::contact::ContactReading;
 
 /// A force that was read, beside the one that is known.
 #[derive(Clone, Copy, Debug)]
-pub struct GainCheck {
+pub(super) struct GainCheck {
     /// With the error that is this press' own.
     measured_n: Estimate,
     known_n: Estimate,
@@ -15,7 +15,7 @@ pub struct GainCheck {
 }
 
 impl GainCheck {
-    pub fn new(
+    pub(super) fn new(
         contact: &ContactReading,
         known_n: Estimate,
         object: CheckedObject,
@@ -62,7 +62,7 @@ impl GainCheck {
 /// Of a sensor that drifts by 2 %, two presses let 88 of 100 intervals hold, and four 92.
 /// The calibrator lacks the object's own coupling: its mean has the variance
 /// `coupling_error`² besides. The means of both objects are weighted by their variances.
-pub fn checked(checks: &[GainCheck], coupling_error: f64) -> CheckedGain {
+pub(super) fn checked(checks: &[GainCheck], coupling_error: f64) -> CheckedGain {
     let groups = [CheckedObject::Sample, CheckedObject::Calibrator].map(|object| {
         let of_object = checks.iter().filter(move |check| check.object == object);
         of_object

@@ -22,7 +22,7 @@ use crate::pipeline::settings::Settings;
 use nalgebra::{DMatrix, DVector};
 
 /// The layers after the presses.
-pub struct UpdatedGuide {
+pub(super) struct UpdatedGuide {
     pub checked: CheckedGuide,
     pub layers: Waveguide,
     pub covariance: DMatrix<f64>,
@@ -32,7 +32,7 @@ pub struct UpdatedGuide {
 
 /// A contact radius of a known ball under a known force.
 #[derive(Clone, Copy, Debug)]
-pub struct GuideCheck {
+pub(super) struct GuideCheck {
     ball: KnownBall,
     known_n: Estimate,
     /// With the error that is this contact's own.
@@ -52,7 +52,7 @@ const MOST_ROUNDS: usize = 10;
 const STEP: f64 = -1e-3;
 
 impl GuideCheck {
-    pub fn new(
+    pub(super) fn new(
         contact: &ContactReading,
         known_n: Estimate,
         ball: KnownBall,
@@ -204,7 +204,7 @@ fn noise(
 }
 
 /// The layers and their covariance after the presses, or which press is not usable and why.
-pub fn update(
+pub(super) fn update(
     checks: &[GuideCheck],
     settings: &Settings,
 ) -> Result<UpdatedGuide, (usize, &'static str)> {

@@ -12,7 +12,7 @@ const CALIBRATED: &str = "--reference examples/data/press/reference.png --pairs 
                           examples/data/press/calibration.csv --pixel-um 40 --json";
 
 /// Runs the program with these bytes on its standard input.
-pub fn piped(folder: &Path, call: &str, bytes: &[u8]) -> Output {
+pub(crate) fn piped(folder: &Path, call: &str, bytes: &[u8]) -> Output {
     let mut command = tactile(folder, &words(call));
     let mut child = command
         .stdin(Stdio::piped())
