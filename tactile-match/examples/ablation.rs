@@ -29,6 +29,23 @@ use disc::disc;
 use points::{bend, cube, stretch, turn};
 use stream::Stream;
 
+const ALL: [Mechanism; 14] = [
+    Mechanism::Patterns,
+    Mechanism::Reheat,
+    Mechanism::Slow,
+    Mechanism::Tuples,
+    Mechanism::Labelling,
+    Mechanism::Moments,
+    Mechanism::LastReheat,
+    Mechanism::Scales,
+    Mechanism::PairOdds,
+    Mechanism::LargePatterns,
+    Mechanism::Motions,
+    Mechanism::Rivals,
+    Mechanism::Open,
+    Mechanism::Fine,
+];
+
 struct Scene<const D: usize> {
     family: &'static str,
     model: Vec<Point<f64, D>>,
@@ -421,7 +438,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             mean(4)
         );
     }
-    for mechanism in Mechanism::ALL {
+    for mechanism in ALL {
         let named = |word: &String| word != "large";
         if wanted.iter().any(named) && !wanted.contains(&format!("{mechanism:?}")) {
             continue;

@@ -123,6 +123,11 @@ pub(crate) fn point_sets<const D: usize>(
     point_set("target", target)
 }
 
+/// Whether a coordinate can be squared, with room for differences and for the sum of their squares.
+pub(crate) fn usable(coordinate: f64) -> bool {
+    (coordinate * coordinate * 16.0).is_finite()
+}
+
 /// The same for one set.
 pub(crate) fn point_set<const D: usize>(
     set: &'static str,
@@ -131,8 +136,6 @@ pub(crate) fn point_set<const D: usize>(
     if points.is_empty() {
         return Err(MatchError::Empty { set });
     }
-    // Sixteen: room for differences, and for the sum of their squares.
-    let usable = |c: f64| (c * c * 16.0).is_finite();
     match points.iter().position(|p| p.iter().any(|&c| !usable(c))) {
         Some(row) => Err(MatchError::NotFinite { set, row }),
         None => Ok(()),

@@ -2,10 +2,10 @@
 
 use crate::error::{point_sets, valid_distance};
 use crate::frame::{Frame, spread};
-use crate::interpolation::spline;
+use crate::interpolation::through;
 use crate::{Judgement, MatchError, Matching, PointMatcher, StopReason, linear_assignment};
 use nalgebra::{DMatrix, Point, SVector};
-use tactile_tps::{Affine, Smoothing, Warp};
+use tactile_tps::Smoothing;
 
 /// Both sets in one frame, with all squared distances between them.
 struct Distances<const D: usize> {
@@ -76,7 +76,7 @@ fn matching<const D: usize>(
     let scale = distances.frame.scale;
     let sources: Vec<_> = pairs.iter().map(|&(i, _)| model[i]).collect();
     let images: Vec<_> = pairs.iter().map(|&(_, j)| target[j]).collect();
-    let (warp, warped) = through(model, &sources, &images);
+    let (warp, warped) = through(model, &sources, &images, Smoothing::None);
     let mut found = Matching::new(target, warp, warped, assignment);
     for (i, partner) in found.assignment.iter().enumerate() {
         let p = distances.posterior(i, variance);
@@ -94,31 +94,6 @@ fn matching<const D: usize>(
     (found.report.stop, found.report.iterations) = (StopReason::Converged, 1);
     found.report.sigma = 0.0;
     found
-}
-
-/// The spline through these pairs and where it takes the model. Where that is beyond all numbers,
-/// the affine map, or none.
-fn through<const D: usize>(
-    model: &[Point<f64, D>],
-    sources: &[Point<f64, D>],
-    images: &[Point<f64, D>],
-) -> (Box<dyn Warp<D> + Send + Sync>, Vec<Point<f64, D>>) {
-    let finite = |warp: &dyn Warp<D>| {
-        let warped: Vec<_> = model.iter().map(|p| warp.apply(p)).collect();
-        warped
-            .iter()
-            .all(|p| p.iter().all(|c| c.is_finite()))
-            .then_some(warped)
-    };
-    let spline = spline(sources, images, None, Smoothing::None);
-    if let Some(warped) = finite(&*spline) {
-        return (spline, warped);
-    }
-    let affine = Affine::fit(sources, images, None).unwrap_or_else(|_| Affine::default());
-    if let Some(warped) = finite(&affine) {
-        return (Box::new(affine), warped);
-    }
-    (Box::new(Affine::default()), model.to_vec())
 }
 
 /// Gives every model point the target point nearest to it. Of several model points that want one

@@ -1,5 +1,6 @@
 //! The warp of given pairs: a thin-plate spline, or what takes its place if they determine none.
 
+use crate::error::usable;
 use nalgebra::Point;
 use tactile_tps::{Affine, Factorization, FitOptions, NegR, R2LogR, Smoothing, TpsError, Warp};
 
@@ -105,6 +106,32 @@ pub(crate) fn spline<const D: usize>(
     smoothing: Smoothing,
 ) -> Box<dyn Warp<D> + Send + Sync> {
     Interpolation::new(sources, weights, smoothing).through(sources, images)
+}
+
+/// The spline through these pairs and where it takes the model. Where that is beyond what can be
+/// squared, the affine map, or none.
+pub(crate) fn through<const D: usize>(
+    model: &[Point<f64, D>],
+    sources: &[Point<f64, D>],
+    images: &[Point<f64, D>],
+    smoothing: Smoothing,
+) -> (Box<dyn Warp<D> + Send + Sync>, Vec<Point<f64, D>>) {
+    let finite = |warp: &dyn Warp<D>| {
+        let warped: Vec<_> = model.iter().map(|p| warp.apply(p)).collect();
+        warped
+            .iter()
+            .all(|p| p.iter().all(|&c| usable(c)))
+            .then_some(warped)
+    };
+    let spline = spline(sources, images, None, smoothing);
+    if let Some(warped) = finite(&*spline) {
+        return (spline, warped);
+    }
+    let affine = Affine::fit(sources, images, None).unwrap_or_else(|_| Affine::default());
+    if let Some(warped) = finite(&affine) {
+        return (Box::new(affine), warped);
+    }
+    (Box::new(Affine::default()), model.to_vec())
 }
 
 /// Whether a warp takes the sources to these images, to a share of the size: where sources nearly

@@ -43,27 +43,6 @@ pub enum Mechanism {
     Fine,
 }
 
-#[cfg(feature = "ablation")]
-#[allow(missing_docs)]
-impl Mechanism {
-    pub const ALL: [Self; 14] = [
-        Self::Patterns,
-        Self::Reheat,
-        Self::Slow,
-        Self::Tuples,
-        Self::Labelling,
-        Self::Moments,
-        Self::LastReheat,
-        Self::Scales,
-        Self::PairOdds,
-        Self::LargePatterns,
-        Self::Motions,
-        Self::Rivals,
-        Self::Open,
-        Self::Fine,
-    ];
-}
-
 /// How far the target may be turned against the model.
 ///
 /// ```

@@ -12,7 +12,7 @@ use std::f64::consts::TAU;
 pub(super) struct LocalPatterns<const D: usize> {
     /// Where candidates and where neighbours' targets are looked up.
     pub targets: Cells<D>,
-    pub gated: GatedNearest<D>,
+    pub gated: Cells<D>,
     pub model: Cells<D>,
     pub offsets: Vec<[f64; D]>,
     pub distances: Vec<(f64, usize)>,
@@ -63,7 +63,7 @@ impl<const D: usize> LocalPatterns<D> {
         }
         // Side of the cells in which candidates are looked up, in spacings.
         self.targets.build(target, 2.0 * self.spacing);
-        self.gated.build(target, GATE * self.spacing);
+        self.gated.build(target, 2.0 * GATE * self.spacing);
         self.model.build(warped, 2.0 * self.spacing);
         self.best.clear();
         for i in rows {
@@ -194,7 +194,7 @@ impl<const D: usize> LocalPatterns<D> {
         for offset in &self.offsets {
             let offset = SVector::from(*offset);
             let place = SVector::from(*centre) + offset + bend * offset;
-            let Some(found) = self.gated.find(&place.into()) else {
+            let Some(found) = self.gated.nearest(&place.into(), gate) else {
                 misfit += gate * gate;
                 continue;
             };
@@ -236,60 +236,6 @@ impl<const D: usize> LocalPatterns<D> {
             (best.target, trust * fits)
         };
         self.pairs.extend(self.best.iter().map(pair));
-    }
-}
-
-// The point nearest to a place within a fixed gate, for many places: one look-up instead of one for
-// every cell that the gate touches.
-
-/// Chains of points by the hash of every cell, two gates wide, that a point's gate touches: at most
-/// two cells an axis, so that any place finds all points within the gate in the chain of its own
-/// cell. Cells that share a hash share a chain: distances tell them apart.
-#[derive(Clone, Debug, Default)]
-pub(super) struct GatedNearest<const D: usize> {
-    points: Vec<[f64; D]>,
-    grid: Grid,
-    gate: f64,
-    heads: Vec<u32>,
-    /// Row, and the entry that follows it in the chain.
-    entries: Vec<(u32, u32)>,
-}
-
-impl<const D: usize> GatedNearest<D> {
-    /// Takes points and a gate, which is positive and finite. `O(2ᴰ I)` time and memory.
-    fn build(&mut self, points: &[[f64; D]], gate: f64) {
-        self.points.clear();
-        self.points.extend_from_slice(points);
-        self.gate = gate;
-        self.grid = Grid::new(2.0 * gate);
-        self.heads.clear();
-        self.heads
-            .resize((points.len() << D).next_power_of_two(), NONE);
-        self.entries.clear();
-        let (heads, entries) = (&mut self.heads, &mut self.entries);
-        for (i, point) in points.iter().enumerate() {
-            self.grid.for_each_cell(point, gate, |cell| {
-                let chain = Grid::chain(cell, heads.len());
-                entries.push((i as u32, heads[chain]));
-                heads[chain] = (entries.len() - 1) as u32;
-            });
-        }
-    }
-
-    /// The point nearest to `place`, if one is within the gate.
-    fn find(&self, place: &[f64; D]) -> Option<usize> {
-        let cell = place.map(|c| self.grid.cell(c));
-        let mut entry = self.heads[Grid::chain(&cell, self.heads.len())];
-        let mut best = (self.gate * self.gate, None);
-        while entry != NONE {
-            let (row, next) = self.entries[entry as usize];
-            let square = squared_distance(&self.points[row as usize], place);
-            if square <= best.0 {
-                best = (square, Some(row as usize));
-            }
-            entry = next;
-        }
-        best.1
     }
 }
 

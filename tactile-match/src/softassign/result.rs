@@ -4,7 +4,7 @@ use super::assign::Blocks;
 use super::large::LARGE;
 use super::{AnnealedSoftassign, Frame, SoftassignWorkspace, mean, squared_distance};
 use crate::frame::centre_and_radius;
-use crate::interpolation::{Interpolation, follows, spline};
+use crate::interpolation::{Interpolation, follows, through};
 use crate::{
     FittedTransformation, Judgement, MatchError, MatchReport, MatchedPairs, Matching, StopReason,
     error,
@@ -325,9 +325,8 @@ fn warp_through<const D: usize>(
         return exact;
     }
     // Smoothing of the spline where none goes through all positions.
-    let warp = spline(model, warped, None, Smoothing::Lambda(1e-6));
-    // As many points in as out.
-    let _ = warp.apply_into(model, warped);
+    let (warp, places) = through(model, model, warped, Smoothing::Lambda(1e-6));
+    warped.copy_from_slice(&places);
     warp
 }
 

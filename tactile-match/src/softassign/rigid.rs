@@ -88,7 +88,7 @@ impl<const D: usize> RigidFit<D> {
             };
             let variance = noise * (1.0 / total + (turned + grown) / D as f64);
             let variance = variance.min(FARTHEST); // hardly anything is matched
-            (std::array::from_fn(|k| image[k] - base[i][k]), variance)
+            (displacement(&image.into(), &base[i]), variance)
         });
     }
 }
@@ -125,8 +125,7 @@ impl<const D: usize> RigidFit<D> {
             let image = fit.apply(p);
             let r = p.coords - centre;
             let variance = noise * (1.0 / total + r.dot(&(inverse * r)).max(0.0));
-            let displacement = std::array::from_fn(|k| image[k] - base[i][k]);
-            (displacement, variance.min(FARTHEST))
+            (displacement(&image, &base[i]), variance.min(FARTHEST))
         });
     }
 }
@@ -171,6 +170,11 @@ impl<const D: usize> BestMotion<D> {
             extent,
         })
     }
+}
+
+/// From where a point lies to its image. Where hardly anything is matched that may be anywhere.
+fn displacement<const D: usize>(image: &Point<f64, D>, base: &[f64; D]) -> [f64; D] {
+    std::array::from_fn(|k| (image[k] - base[k]).clamp(-FARTHEST, FARTHEST))
 }
 
 /// Covariance of the rotation vector at unit noise: the inverse of the inertia, in the plane about
