@@ -1,11 +1,11 @@
 //! Gels that are lit in colours, and markers printed on gels: from arrays.
 use crate::arrays::{self, Matrix, kept};
 use crate::errors::{self, TactileError, invalid};
-use crate::results::{Estimate, GelContact, GelReport, Markers, to_dict};
+use crate::results::{Estimate, GelContact, GelReport, Markers, of_values};
 use ndarray::{Array2, Array3, ArrayView3, s};
 use numpy::{PyArray2, PyArray3, PyArrayMethods};
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyType};
+use pyo3::types::PyType;
 use std::path::PathBuf;
 use tactile_files::sensor::{PhotometricPresses, PhotometricSensor};
 use tactile_imaging::gel::{
@@ -363,9 +363,10 @@ impl GelFrame {
         plots.call_method1("plot_gel", (slf,))
     }
 
-    /// The fields by name.
-    fn to_dict<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyDict>> {
-        to_dict(slf.as_any(), &FIELDS)
+    /// The fields by name. Plain ones are numbers, text and lists alone.
+    #[pyo3(signature = (*, plain=false))]
+    fn to_dict<'py>(slf: &Bound<'py, Self>, plain: bool) -> PyResult<Bound<'py, PyAny>> {
+        of_values(slf.py(), "to_dict", (slf, plain, FIELDS.to_vec()))
     }
 
     fn __repr__(&self, py: Python<'_>) -> PyResult<String> {

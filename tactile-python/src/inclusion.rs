@@ -151,8 +151,8 @@ fn result(py: Python<'_>, found: &InclusionEstimate) -> PyResult<Inclusion> {
             .map(|lump| Py::new(py, one(py, lump)?))
             .collect::<PyResult<_>>()?,
         interface: match found.interface {
-            Interface::Bonded => "bonded",
-            _ => "frictionless",
+            Interface::Bonded => "bonded".into(),
+            _ => "frictionless".into(),
         },
         flags: found.warnings.iter().map(ToString::to_string).collect(),
     })
@@ -190,6 +190,6 @@ fn one(py: Python<'_>, lump: &tactile_imaging::inclusion::Inclusion) -> PyResult
         youngs_modulus: part(&lump.youngs_modulus_pa)?,
         height_over_width: lump.height_over_width.as_ref().map(of).transpose()?,
         ball_probability: lump.ball_probability,
-        identified: identified.map(|(name, _)| *name).collect(),
+        identified: identified.map(|(name, _)| (*name).to_string()).collect(),
     })
 }

@@ -15,12 +15,16 @@ use tactile_imaging::elasticity::kinematics::StrainQuantities;
 use tactile_imaging::elasticity::strain::{GreenLagrange, StrainMeasure};
 use tactile_imaging::matching::labelling::{Compatibility, LengthMaximum, Neighbourhood};
 use tactile_imaging::matching::{
-    AnnealedSoftassign, CoherentPointDrift, LinearAssignment, MatchError, Matching,
-    NearestNeighbour, Normalization, Outliers, PointMatcher, RelaxationLabelling, Rotation,
-    SoftassignWorkspace, Transformation,
+    AnnealedSoftassign, CoherentPointDrift, FittedTransformation, LinearAssignment, MatchError,
+    Matching, NearestNeighbour, Normalization, Outliers, PointMatcher, RelaxationLabelling,
+    Rotation, SoftassignWorkspace, Transformation,
 };
 use tactile_imaging::pipeline::MatcherChoice;
+use tactile_imaging::tps::LocalField;
 use tactile_imaging::{StrainBetweenOptions, strain_between as strain_of_sets};
+
+/// Share of the noise below which warped points are the partners themselves.
+const SNAPPED: f64 = 1e-3;
 
 /// A matcher as the caller gave it: read once, made for the plane or for space.
 pub enum Matcher {
@@ -272,7 +276,46 @@ impl<const D: usize> PointMatcher<D> for Interruptible {
     }
 }
 
-pub fn answer<const D: usize>(py: Python<'_>, found: &Matching<D>) -> Match {
+/// Puts the warped points of a large set, which the matcher leaves on their noisy partners, where the
+/// smooth field of the pairs has them, as those of a small one are.
+fn smooth<const D: usize>(
+    found: &mut Matching<D>,
+    model: &[Point<f64, D>],
+    target: &[Point<f64, D>],
+) {
+    let report = &found.report;
+    if found.transformation.is_some() || report.residual > SNAPPED * report.sigma {
+        return;
+    }
+    let pairs = found.pairs().map(|(i, j, _)| (model[i], target[j]));
+    let (sources, images): (Vec<_>, Vec<_>) = pairs.unzip();
+    let Ok(field) = LocalField::fit(&sources, &images) else {
+        return;
+    };
+    let moved = model.iter().zip(field.at(model));
+    found.warped = moved.map(|(point, at)| point + at.displacement).collect();
+    let misses = found
+        .pairs()
+        .map(|(i, j, _)| (found.warped[i] - target[j]).norm_squared());
+    let (squares, count) = misses.fold((0.0, 0), |(sum, n), miss| (sum + miss, n + 1));
+    found.report.residual = (squares / f64::from(count.max(1))).sqrt();
+}
+
+fn homogeneous<const D: usize>(map: &FittedTransformation<D>) -> Array2<f64> {
+    Array2::from_shape_fn((D + 1, D + 1), |(row, column)| {
+        match (row < D, column < D) {
+            (true, true) => map.linear[(row, column)],
+            (true, false) => map.shift[row],
+            (false, inside) => f64::from(!inside),
+        }
+    })
+}
+
+pub fn answer<const D: usize>(
+    py: Python<'_>,
+    found: &Matching<D>,
+    [model, target]: [&[Point<f64, D>]; 2],
+) -> Match {
     let row = |row: &Option<usize>| row.map_or(-1, |row| row as i64);
     let pairs: Vec<_> = found.pairs().map(|(i, j, _)| (i, j)).collect();
     let (report, map) = (&found.report, found.transformation.as_ref());
@@ -297,9 +340,12 @@ pub fn answer<const D: usize>(py: Python<'_>, found: &Matching<D>) -> Match {
         rotation_error: map.map(|map| map.rotation_error.as_slice().to_vec()),
         scale: map.map(|map| map.scale),
         scale_error: map.map(|map| map.scale_error),
-        shift: map.map(|map| map.shift.as_slice().to_vec()),
-        shift_error: map.map(|map| map.shift_error.as_slice().to_vec()),
+        translation: map.map(|map| map.shift.as_slice().to_vec()),
+        translation_error: map.map(|map| map.shift_error.as_slice().to_vec()),
+        matrix: map.map(|map| arrays::kept(py, homogeneous(map))),
         flags,
+        model: arrays::kept(py, arrays::rows(model)),
+        target: arrays::kept(py, arrays::rows(target)),
     }
 }
 
@@ -369,11 +415,14 @@ fn matched<const D: usize>(
     matcher: Matcher,
 ) -> PyResult<Match> {
     let matcher = matcher.interruptible::<D>();
+    let [model, target] = sets.map(arrays::points);
     let found = py.detach(|| {
-        let [model, target] = sets.map(arrays::points);
-        matcher.match_points(&model, &target)
+        let mut found = matcher.match_points(&model, &target)?;
+        smooth(&mut found, &model, &target);
+        Ok::<_, MatchError>(found)
     });
-    Ok(answer(py, &found.map_err(errors::refused)?))
+    let found = found.map_err(errors::refused)?;
+    Ok(answer(py, &found, [&model, &target]))
 }
 
 /// Strain of a point set on its way to another: match, robust spline, Green-Lagrange strain.

@@ -7,7 +7,7 @@ use ndarray::{Array2, ArrayView2};
 use numpy::{PyArray1, PyArray2, PyArrayDyn, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyTuple};
+use pyo3::types::{PyDict, PyTuple, PyWeakrefMethods, PyWeakrefReference};
 use std::sync::Arc;
 use tactile_imaging::core::Estimate as CoreEstimate;
 use tactile_imaging::elasticity::ElasticityError;
@@ -24,10 +24,18 @@ use tactile_imaging::sfs::{
 use tactile_imaging::tps::{TpsError, Warp, WarpModel};
 
 /// An object with the one method of a stage.
+///
+/// It is held weakly, if it allows that: a pipeline or a press keeps it alive where the collector of
+/// cycles sees it, as an object that holds its own press makes one.
 #[derive(Clone)]
 pub struct OwnStage {
-    object: Arc<Py<PyAny>>,
+    object: Arc<Held>,
     method: &'static str,
+}
+
+enum Held {
+    Weakly(Py<PyWeakrefReference>),
+    Strongly(Py<PyAny>),
 }
 
 impl OwnStage {
@@ -39,8 +47,22 @@ impl OwnStage {
                 given.get_type().name()?
             )));
         }
-        let object = Arc::new(given.clone().unbind());
+        let held = match PyWeakrefReference::new(given) {
+            Ok(weak) => Held::Weakly(weak.unbind()),
+            Err(_) => Held::Strongly(given.clone().unbind()),
+        };
+        let object = Arc::new(held);
         Ok(Self { object, method })
+    }
+
+    fn object<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        match &*self.object {
+            Held::Strongly(object) => Ok(object.bind(py).clone()),
+            Held::Weakly(weak) => {
+                let gone = || invalid(format!("the stage with {} is gone", self.method));
+                weak.bind(py).upgrade().ok_or_else(gone)
+            }
+        }
     }
 
     fn call<'py>(
@@ -48,7 +70,7 @@ impl OwnStage {
         py: Python<'py>,
         arguments: impl pyo3::call::PyCallArgs<'py>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        self.object.bind(py).call_method1(self.method, arguments)
+        self.object(py)?.call_method1(self.method, arguments)
     }
 
     /// Heights of the shape that they were asked for.
@@ -265,7 +287,7 @@ impl OwnStage {
     /// The truth of an attribute.
     fn truth(&self, attribute: &str, otherwise: bool) -> bool {
         Python::attach(|py| {
-            let given = self.object.bind(py).getattr(attribute);
+            let given = self.object(py).and_then(|object| object.getattr(attribute));
             given
                 .and_then(|given| given.is_truthy())
                 .unwrap_or(otherwise)

@@ -8,6 +8,7 @@ use crate::sensor::Sensor;
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyType};
+use pyo3::{PyTraverseError, PyVisit};
 use std::str::FromStr;
 use tactile_imaging as rust;
 use tactile_imaging::elasticity::contact::{Layer, Waveguide};
@@ -158,7 +159,11 @@ impl Object {
 /// ValueError
 ///     A name that is none, or a value that is not physical.
 #[pyclass(frozen, module = "tactile_imaging")]
-pub(crate) struct Pipeline(pub rust::Pipeline);
+pub(crate) struct Pipeline {
+    pub pipeline: rust::Pipeline,
+    /// The stages in Python, which the collector of cycles has to see.
+    pub own: Vec<Py<PyAny>>,
+}
 
 #[pymethods]
 impl Pipeline {
@@ -195,6 +200,12 @@ impl Pipeline {
         poisson_ratio_error: Option<f64>,
         adhesion_error: Option<f64>,
     ) -> PyResult<Self> {
+        let stages = [contact, surface, sampler, matcher, warp, strain, estimator];
+        let own = stages
+            .into_iter()
+            .flatten()
+            .map(|given| given.clone().unbind());
+        let own = own.collect();
         let (surface_name, own_surface) = stage("surface", "reconstruct", surface)?;
         let (sampler_name, own_sampler) = stage("sampler", "sample", sampler)?;
         let (warp_name, own_warp) = stage("warp", "fit", warp)?;
@@ -252,7 +263,7 @@ impl Pipeline {
         if let Some(own) = own_estimator {
             pipeline = pipeline.with_estimator(own);
         }
-        Ok(Self(pipeline))
+        Ok(Self { pipeline, own })
     }
 
     /// A press on this pipeline, with the frame without contact.
@@ -292,12 +303,18 @@ impl Pipeline {
         let presses: Vec<_> = presses
             .map(|c| rust::pipeline::CheckPress::new(c.frame.view(), c.known_n, c.object))
             .collect();
-        let checked = py.detach(|| self.0.clone().with_checks(view, &presses));
-        checked.map(Self).map_err(errors::pipeline)
+        let checked = py.detach(|| self.pipeline.clone().with_checks(view, &presses));
+        let pipeline = checked.map_err(errors::pipeline)?;
+        let own = self.own.iter().map(|stage| stage.clone_ref(py)).collect();
+        Ok(Self { pipeline, own })
+    }
+
+    fn __traverse__(&self, visit: PyVisit<'_>) -> Result<(), PyTraverseError> {
+        self.own.iter().try_for_each(|stage| visit.call(stage))
     }
 
     fn __repr__(&self) -> String {
-        let settings = self.0.settings();
+        let settings = self.pipeline.settings();
         let points = settings.control_points;
         format!("Pipeline({:?}, {points} control points)", settings.object)
     }

@@ -7,8 +7,9 @@ use crate::results::{Contact, Estimate, Match, Modulus, Strain, Surface, ends};
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyType;
+use pyo3::{PyTraverseError, PyVisit};
 use std::path::PathBuf;
-use std::sync::Mutex;
+use std::sync::{Mutex, RwLock};
 use std::thread::ThreadId;
 use tactile_files::io::FileError;
 use tactile_files::scene::Scene;
@@ -23,16 +24,19 @@ type ValuesAndErrors<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>
 /// Frames at one or more loads. Nothing is computed before it is asked for, and all of it once.
 ///
 /// Frames are counted from zero. Threads may share a press, and the interpreter's lock is free
-/// while it computes.
+/// while it computes: a frame that another thread adds meanwhile waits.
 ///
 /// Parameters
 /// ----------
 /// pipeline : Pipeline
 /// reference : (rows, columns) array of uint8
 ///     The frame without contact.
-#[pyclass(module = "tactile_imaging")]
+#[pyclass(frozen, module = "tactile_imaging")]
 pub(crate) struct Press {
-    press: rust::Press<'static>,
+    /// A frame that comes meanwhile waits until what is computed is there.
+    press: RwLock<rust::Press<'static>>,
+    /// The stages in Python, which the collector of cycles has to see.
+    own: Vec<Py<PyAny>>,
     /// Threads that compute. A stage in Python that asks its own press would wait for itself.
     busy: Mutex<Vec<ThreadId>>,
 }
@@ -49,9 +53,10 @@ impl Drop for Busy<'_> {
 }
 
 impl Press {
-    fn new_on(press: rust::Press<'static>) -> Self {
+    fn new_on(press: rust::Press<'static>, own: Vec<Py<PyAny>>) -> Self {
         Self {
-            press,
+            press: RwLock::new(press),
+            own,
             busy: Mutex::default(),
         }
     }
@@ -61,6 +66,17 @@ impl Press {
         &self,
         py: Python<'_>,
         compute: impl Send + FnOnce(&rust::Press<'static>) -> Result<T, PipelineError>,
+    ) -> PyResult<T> {
+        self.alone(py, |press| {
+            compute(&press.read().unwrap_or_else(|broken| broken.into_inner()))
+        })
+    }
+
+    /// Works without the interpreter's lock, and not inside of the press's own work.
+    fn alone<T: Send>(
+        &self,
+        py: Python<'_>,
+        work: impl Send + FnOnce(&RwLock<rust::Press<'static>>) -> Result<T, PipelineError>,
     ) -> PyResult<T> {
         let here = std::thread::current().id();
         {
@@ -76,7 +92,7 @@ impl Press {
             busy.push(here);
         }
         let busy = Busy(&self.busy);
-        let found = py.detach(|| compute(&self.press));
+        let found = py.detach(|| work(&self.press));
         drop(busy);
         found.map_err(errors::pipeline)
     }
@@ -88,8 +104,13 @@ impl Press {
     fn new(py: Python<'_>, pipeline: &Pipeline, reference: &Bound<'_, PyAny>) -> PyResult<Self> {
         let reference = arrays::frame("reference", reference)?;
         let view = reference.as_array();
-        let press = py.detach(|| pipeline.0.press(view));
-        Ok(Self::new_on(press.map_err(errors::pipeline)?))
+        let press = py.detach(|| pipeline.pipeline.press(view));
+        let own = pipeline
+            .own
+            .iter()
+            .map(|stage| stage.clone_ref(py))
+            .collect();
+        Ok(Self::new_on(press.map_err(errors::pipeline)?, own))
     }
 
     /// The press of a scene file, as the program `tactile measure` reads it.
@@ -103,7 +124,7 @@ impl Press {
     #[classmethod]
     fn from_scene(_class: &Bound<'_, PyType>, py: Python<'_>, path: PathBuf) -> PyResult<Self> {
         let press = py.detach(|| press_of_scene(path));
-        Ok(Self::new_on(press.map_err(errors::file)?))
+        Ok(Self::new_on(press.map_err(errors::file)?, Vec::new()))
     }
 
     /// Adds a frame and returns its number.
@@ -123,7 +144,8 @@ impl Press {
     ///     then, without a time.
     #[pyo3(signature = (frame, *, gauge=None, gauge_error=0.0, time=None))]
     fn add_frame(
-        &mut self,
+        &self,
+        py: Python<'_>,
         frame: &Bound<'_, PyAny>,
         gauge: Option<f64>,
         gauge_error: f64,
@@ -131,16 +153,22 @@ impl Press {
     ) -> PyResult<usize> {
         let frame = arrays::owned(arrays::frame("frame", frame)?.as_array());
         let gauge = gauge.map(|force_n| CoreEstimate::new(force_n, gauge_error));
-        let number = self.press.add_gauged_frame(frame, gauge);
-        if let Some(time_s) = time {
-            let set = self.press.set_time_s(number, time_s);
-            set.map_err(errors::pipeline)?;
-        }
-        Ok(number)
+        self.alone(py, |press| {
+            let mut press = press.write().unwrap_or_else(|broken| broken.into_inner());
+            let number = press.add_gauged_frame(frame, gauge);
+            if let Some(time_s) = time {
+                press.set_time_s(number, time_s)?;
+            }
+            Ok(number)
+        })
     }
 
-    fn __len__(&self) -> usize {
-        self.press.frames()
+    fn __len__(&self, py: Python<'_>) -> PyResult<usize> {
+        self.ask(py, |press| Ok(press.frames()))
+    }
+
+    fn __traverse__(&self, visit: PyVisit<'_>) -> Result<(), PyTraverseError> {
+        self.own.iter().try_for_each(|stage| visit.call(stage))
     }
 
     /// A frame as it was given, (rows, columns) of uint8.
@@ -206,9 +234,9 @@ impl Press {
     /// The match of the first frame's control points with those of a frame.
     fn matching(&self, py: Python<'_>, frame: usize) -> PyResult<Match> {
         self.ask(py, |press| {
-            press
-                .matching(frame)
-                .map(|found| Python::attach(|py| answer(py, found)))
+            let sets = [press.control_points(0)?, press.control_points(frame)?];
+            let found = press.matching(frame)?;
+            Ok(Python::attach(|py| answer(py, found, sets)))
         })
     }
 
@@ -268,8 +296,8 @@ impl Press {
         plots.call_method1("plot_press", (slf, frame))
     }
 
-    fn __repr__(&self) -> String {
-        format!("Press({} frames)", self.press.frames())
+    fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
+        Ok(format!("Press({} frames)", self.__len__(py)?))
     }
 }
 
@@ -356,7 +384,11 @@ pub fn modulus(estimate: &ModulusEstimate) -> Modulus {
 /// references : sequence of (rows, columns) arrays of uint8
 ///     One frame or more without contact.
 #[pyclass(module = "tactile_imaging")]
-pub(crate) struct Session(rust::pipeline::Session);
+pub(crate) struct Session {
+    session: rust::pipeline::Session,
+    /// The stages in Python, which the collector of cycles has to see.
+    own: Vec<Py<PyAny>>,
+}
 
 #[pymethods]
 impl Session {
@@ -369,14 +401,20 @@ impl Session {
         let read = |frame| arrays::frame("references", frame);
         let frames: Vec<_> = references.iter().map(read).collect::<PyResult<_>>()?;
         let views: Vec<_> = frames.iter().map(|frame| frame.as_array()).collect();
-        let session = py.detach(|| rust::pipeline::Session::new(&pipeline.0, &views));
-        Ok(Self(session.map_err(errors::pipeline)?))
+        let session = py.detach(|| rust::pipeline::Session::new(&pipeline.pipeline, &views));
+        let session = session.map_err(errors::pipeline)?;
+        let own = pipeline
+            .own
+            .iter()
+            .map(|stage| stage.clone_ref(py))
+            .collect();
+        Ok(Self { session, own })
     }
 
     /// Measures the next frame: its contact, or None where nothing touches.
     fn push(&mut self, py: Python<'_>, frame: &Bound<'_, PyAny>) -> PyResult<Option<Contact>> {
         let frame = arrays::frame("frame", frame)?;
-        let (session, view) = (&mut self.0, frame.as_array());
+        let (session, view) = (&mut self.session, frame.as_array());
         let update = py.detach(|| session.push(view)).map_err(errors::pipeline)?;
         let number = update.frame as usize;
         let reading = update.contact;
@@ -386,12 +424,16 @@ impl Session {
     }
 
     fn __len__(&self) -> usize {
-        self.0.frames() as usize
+        self.session.frames() as usize
+    }
+
+    fn __traverse__(&self, visit: PyVisit<'_>) -> Result<(), PyTraverseError> {
+        self.own.iter().try_for_each(|stage| visit.call(stage))
     }
 
     /// Mean strain since the load at which it was asked for first, None there.
     fn strain(&mut self, py: Python<'_>) -> PyResult<Option<Strain>> {
-        let session = &mut self.0;
+        let session = &mut self.session;
         let strain = py.detach(|| Ok(session.strain()?.map(|followed| followed.strain.clone())));
         let strain = strain.map_err(errors::pipeline)?;
         Ok(strain.map(|strain| strain_result(py, &strain)))
@@ -399,12 +441,12 @@ impl Session {
 
     /// Young's modulus from all frames so far.
     fn modulus(&mut self, py: Python<'_>) -> PyResult<Modulus> {
-        let session = &mut self.0;
+        let session = &mut self.session;
         let estimate = py.detach(|| session.modulus());
         Ok(modulus(&estimate.map_err(errors::pipeline)?))
     }
 
     fn __repr__(&self) -> String {
-        format!("Session({} frames)", self.0.frames())
+        format!("Session({} frames)", self.session.frames())
     }
 }

@@ -1,28 +1,22 @@
 //! Frozen results: fields, a sentence, a table for notebooks, a dictionary.
-use crate::arrays::{Matrix, Tensors, Vector};
+use crate::arrays::{self, Matrix, Tensors, Vector};
+use crate::errors::{failed, invalid};
+use nalgebra::{Point, SMatrix, SVector};
+use ndarray::{Array2, ArrayView2};
+use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyList};
+use pyo3::types::{PyDict, PyType};
 use tactile_imaging::core::{Estimate as CoreEstimate, Interval};
+use tactile_imaging::tps::{LocalField, TpsError};
 
-/// The fields of a result by name. Results inside become dictionaries too.
-pub fn to_dict<'py>(result: &Bound<'py, PyAny>, names: &[&str]) -> PyResult<Bound<'py, PyDict>> {
-    let dict = PyDict::new(result.py());
-    for &name in names {
-        dict.set_item(name, plain(result.getattr(name)?)?)?;
-    }
-    Ok(dict)
-}
-
-/// A result, or a list of results, as dictionaries. Other values as they are.
-fn plain(value: Bound<'_, PyAny>) -> PyResult<Bound<'_, PyAny>> {
-    if let Ok(list) = value.cast::<PyList>() {
-        let values = list.iter().map(plain).collect::<PyResult<Vec<_>>>()?;
-        return Ok(PyList::new(value.py(), values)?.into_any());
-    }
-    match value.hasattr("to_dict")? {
-        true => value.call_method0("to_dict"),
-        false => Ok(value),
-    }
+/// What a result is as a value: written in Python, as it is made of Python's values.
+pub fn of_values<'py>(
+    py: Python<'py>,
+    function: &str,
+    arguments: impl pyo3::call::PyCallArgs<'py>,
+) -> PyResult<Bound<'py, PyAny>> {
+    py.import("tactile_imaging._values")?
+        .call_method1(function, arguments)
 }
 
 /// A table of two columns. Values are escaped: they may hold text of the caller. Of arrays larger
@@ -46,7 +40,10 @@ pub fn to_html(result: &Bound<'_, PyAny>, names: &[&str]) -> PyResult<String> {
 
 /// A frozen class of fields with what every result has.
 macro_rules! result {
-    ($(#[$meta:meta])* $name:ident { $($(#[$doc:meta])* $field:ident: $kind:ty,)+ }) => {
+    (
+        $(#[$meta:meta])* $name:ident { $($(#[$doc:meta])* $field:ident: $kind:ty,)+ }
+        $($methods:tt)*
+    ) => {
         $(#[$meta])*
         #[pyclass(frozen, module = "tactile_imaging")]
         pub(crate) struct $name {
@@ -64,10 +61,63 @@ macro_rules! result {
                 to_html(slf.as_any(), &[$(stringify!($field)),+])
             }
 
-            /// The fields by name.
-            fn to_dict<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyDict>> {
-                to_dict(slf.as_any(), &[$(stringify!($field)),+])
+            #[classattr]
+            fn _fields() -> Vec<&'static str> {
+                vec![$(stringify!($field)),+]
             }
+
+            #[getter]
+            fn _text(&self) -> &str {
+                &self.text
+            }
+
+            #[staticmethod]
+            fn _restored(text: String, fields: Vec<Bound<'_, PyAny>>) -> PyResult<Self> {
+                let mut fields = fields.into_iter();
+                let mut next = || fields.next().ok_or_else(|| invalid("a field is missing"));
+                Ok(Self { text, $($field: next()?.extract::<$kind>()?,)+ })
+            }
+
+            /// The fields by name. Plain ones are numbers, text and lists alone.
+            #[pyo3(signature = (*, plain=false))]
+            fn to_dict<'py>(slf: &Bound<'py, Self>, plain: bool) -> PyResult<Bound<'py, PyAny>> {
+                of_values(slf.py(), "to_dict", (slf, plain))
+            }
+
+            /// The result of these fields by name, as `to_dict` gives them.
+            #[classmethod]
+            fn from_dict<'py>(
+                class: &Bound<'py, PyType>,
+                fields: &Bound<'py, PyDict>,
+            ) -> PyResult<Bound<'py, PyAny>> {
+                of_values(class.py(), "from_dict", (class, fields))
+            }
+
+            /// A table of the fields that have a row for each point, or of one row.
+            fn to_dataframe<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+                of_values(slf.py(), "to_dataframe", (slf,))
+            }
+
+            fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+                of_values(slf.py(), "reduced", (slf,))
+            }
+
+            fn __eq__(slf: &Bound<'_, Self>, other: &Bound<'_, PyAny>) -> PyResult<bool> {
+                of_values(slf.py(), "equal", (slf, other))?.is_truthy()
+            }
+
+            fn __float__(slf: &Bound<'_, Self>) -> PyResult<f64> {
+                of_values(slf.py(), "number", (slf,))?.extract()
+            }
+
+            fn __format__<'py>(
+                slf: &Bound<'py, Self>,
+                format: &str,
+            ) -> PyResult<Bound<'py, PyAny>> {
+                of_values(slf.py(), "formatted", (slf, format))
+            }
+
+            $($methods)*
         }
     };
 }
@@ -282,6 +332,9 @@ result! {
     }
 }
 
+/// Places, (k, d), and the standard error of a coordinate of each.
+type PlacesAndErrors<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray1<f64>>);
+
 result! {
     /// Which model point is which target point.
     Match {
@@ -307,10 +360,61 @@ result! {
         scale: Option<f64>,
         scale_error: Option<f64>,
         /// Where the origin goes, and the standard errors.
-        shift: Option<Vec<f64>>,
-        shift_error: Option<Vec<f64>>,
+        translation: Option<Vec<f64>>,
+        translation_error: Option<Vec<f64>>,
+        /// The map of homogeneous coordinates, (d + 1, d + 1).
+        matrix: Option<Matrix<f64>>,
         /// Why the pairs are not to be relied on, where the matcher can tell, a sentence each.
         flags: Vec<String>,
+        /// The points that were matched, (n, d).
+        model: Matrix<f64>,
+        /// And those that they were matched to, (m, d).
+        target: Matrix<f64>,
+    }
+
+    /// Where points go: by the map of a `transformation`, else by the local field of the pairs.
+    ///
+    /// Parameters
+    /// ----------
+    /// points : (k, d) array
+    ///
+    /// Returns
+    /// -------
+    /// points, standard_errors : ndarray
+    ///     (k, d), and (k,) of a coordinate.
+    ///
+    /// Raises
+    /// ------
+    /// TactileError
+    ///     No pairs.
+    fn transform<'py>(
+        &self,
+        py: Python<'py>,
+        points: &Bound<'py, PyAny>,
+    ) -> PyResult<PlacesAndErrors<'py>> {
+        let points = arrays::matrix("points", points)?;
+        let sets = [&self.model, &self.target].map(|set| set.bind(py).readonly());
+        let [model, target] = sets.each_ref().map(|set| set.as_array());
+        let pairs = self.pairs.bind(py).readonly();
+        let matrix = self.matrix.as_ref().map(|matrix| matrix.bind(py).readonly());
+        let matrix = matrix.as_ref().map(|matrix| matrix.as_array());
+        let set = |set: ArrayView2<'_, f64>, side: usize| {
+            let rows = pairs.as_array();
+            let row = |k: usize| set.row(rows[[k, side]] as usize).to_vec();
+            let rows: Vec<f64> = (0..rows.nrows()).flat_map(row).collect();
+            Array2::from_shape_vec((pairs.as_array().nrows(), set.ncols()), rows)
+        };
+        let [sources, images] = [set(model, 0), set(target, 1)];
+        let (sources, images) = (sources.map_err(invalid)?, images.map_err(invalid)?);
+        let view = points.as_array();
+        arrays::dimension(["the model", "points"], [model, view])?;
+        let noise = self.sigma;
+        let found = py.detach(|| match model.ncols() {
+            2 => moved::<2>([sources.view(), images.view(), view], matrix, noise),
+            _ => moved::<3>([sources.view(), images.view(), view], matrix, noise),
+        });
+        let (places, errors) = found.map_err(failed)?;
+        Ok((PyArray2::from_owned_array(py, places), PyArray1::from_vec(py, errors)))
     }
 }
 
@@ -334,7 +438,7 @@ result! {
         ball_probability: f64,
         /// Names of those of diameter, depth and modulus that the frames determine. Of the others
         /// the interval alone is of use.
-        identified: Vec<&'static str>,
+        identified: Vec<String>,
     }
 }
 
@@ -351,7 +455,7 @@ result! {
         lumps: Vec<Py<Lump>>,
         /// "bonded" or "frictionless", whether the guide's face sticks to the block or slides on
         /// it.
-        interface: &'static str,
+        interface: String,
         /// What is doubtful about it, a sentence each.
         flags: Vec<String>,
     }
@@ -376,10 +480,52 @@ result! {
         /// Poisson's ratio of the ball.
         poisson_ratio: f64,
         /// The estimator that knows the simulated contacts.
-        estimator: &'static str,
+        estimator: String,
         /// The true Young's modulus, forces, contact radii and centres.
         truth: Py<PyDict>,
     }
+}
+
+/// Where points go and the standard error of a coordinate, from sources, their images and the points.
+fn moved<const D: usize>(
+    [sources, images, points]: [ArrayView2<'_, f64>; 3],
+    matrix: Option<ArrayView2<'_, f64>>,
+    noise: f64,
+) -> Result<(Array2<f64>, Vec<f64>), TpsError> {
+    let [sources, images, points] = [sources, images, points].map(arrays::points::<D>);
+    let Some(matrix) = matrix else {
+        let field = LocalField::fit(&sources, &images)?.at(&points);
+        let places: Vec<_> = points
+            .iter()
+            .zip(&field)
+            .map(|(point, at)| point + at.displacement)
+            .collect();
+        let errors = field
+            .iter()
+            .map(|at| at.displacement_variance.sqrt())
+            .collect();
+        return Ok((arrays::rows(&places), errors));
+    };
+    let linear = SMatrix::<f64, D, D>::from_fn(|i, k| matrix[[i, k]]);
+    let shift = SVector::<f64, D>::from_fn(|i, _| matrix[[i, D]]);
+    let places: Vec<_> = points
+        .iter()
+        .map(|p| Point::from(linear * p.coords + shift))
+        .collect();
+    // The error of the mean, and that of the map's other numbers, which grows with the distance from
+    // it: each of D directions has its share of the spread.
+    let count = sources.len().max(1) as f64;
+    let centre = sources.iter().map(|p| p.coords).sum::<SVector<f64, D>>() / count;
+    let spread: f64 = sources
+        .iter()
+        .map(|p| (p.coords - centre).norm_squared())
+        .sum();
+    let error = |point: &Point<f64, D>| {
+        let arm = (point.coords - centre).norm_squared();
+        noise * (count.recip() + D as f64 * arm / spread.max(f64::MIN_POSITIVE)).sqrt()
+    };
+    let errors = points.iter().map(error).collect();
+    Ok((arrays::rows(&places), errors))
 }
 
 impl Estimate {

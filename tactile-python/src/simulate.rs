@@ -103,7 +103,7 @@ pub fn simulate(
         waveguide: arrays::kept(py, Array2::from_shape_fn((layers.len(), 3), property)),
         radius,
         poisson_ratio,
-        estimator,
+        estimator: estimator.into(),
         truth: truth.unbind(),
     })
 }

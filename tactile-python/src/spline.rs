@@ -2,8 +2,8 @@
 use crate::arrays;
 use crate::errors::invalid;
 use nalgebra::{Point, SMatrix};
-use ndarray::{Array2, Array3, ArrayView2};
-use numpy::{PyArray1, PyArray2, PyArray3, PyReadonlyArray2};
+use ndarray::{Array2, Array3, ArrayView2, Axis};
+use numpy::{PyArray2, PyArray3, PyReadonlyArray2};
 use pyo3::prelude::*;
 use tactile_imaging::tps::{FitOptions, Kernel, NegR, R2LogR, R3, Smoothing, Spline};
 
@@ -15,11 +15,16 @@ trait Fitted: Send + Sync {
     /// ∂f_m/∂x_k of each point, (points, outputs, axes).
     fn jacobians(&self, points: ArrayView2<'_, f64>, outputs: usize) -> Array3<f64>;
     fn lambda(&self) -> f64;
+    /// Directions that the sources span.
+    fn spanned(&self) -> usize;
 }
+
+/// Outputs of one fit.
+const LANES: usize = 4;
 
 impl<const D: usize, const M: usize, K: Kernel + Send + Sync> Fitted for Spline<D, M, K> {
     fn values(&self, points: ArrayView2<'_, f64>, outputs: usize) -> Array2<f64> {
-        let points: Vec<Point<f64, D>> = arrays::points(points);
+        let points: Vec<Point<f64, D>> = filled_up(points);
         let mut values = vec![Point::<f64, M>::origin(); points.len()];
         self.apply_into(&points, &mut values)
             .expect("as many values as points");
@@ -27,7 +32,7 @@ impl<const D: usize, const M: usize, K: Kernel + Send + Sync> Fitted for Spline<
     }
 
     fn jacobians(&self, points: ArrayView2<'_, f64>, outputs: usize) -> Array3<f64> {
-        let points: Vec<Point<f64, D>> = arrays::points(points);
+        let points: Vec<Point<f64, D>> = filled_up(points);
         let mut jacobians = vec![SMatrix::<f64, M, D>::zeros(); points.len()];
         self.jacobian_into(&points, &mut jacobians)
             .expect("as many Jacobians as points");
@@ -37,16 +42,20 @@ impl<const D: usize, const M: usize, K: Kernel + Send + Sync> Fitted for Spline<
     fn lambda(&self) -> f64 {
         self.report.lambda
     }
+
+    fn spanned(&self) -> usize {
+        self.report.rank.saturating_sub(1)
+    }
 }
 
 /// A spline with an affine part: f(x) = a + A x + Σ w_i U(|x − x_i|).
 ///
 /// Parameters
 /// ----------
-/// sources : (n, 2) or (n, 3) array
+/// sources : (n, 1), (n, 2) or (n, 3) array
 ///     Distinct points.
-/// targets : (n,) or (n, m) array
-///     Up to three columns.
+/// targets : (n, ...) array
+///     Real or complex values of any shape at each point.
 /// smoothing : float or "gcv"
 ///     λ ≥ 0 of Σ|f(x_i) − y_i|² + λ wᵀKw, or that of generalised cross-validation. None is 0.
 /// kernel : str
@@ -56,22 +65,25 @@ impl<const D: usize, const M: usize, K: Kernel + Send + Sync> Fitted for Spline<
 /// Raises
 /// ------
 /// ValueError
-///     Lengths that differ, coordinates that are not finite, points that determine no spline.
+///     Lengths that differ, numbers that are not finite, points that determine no spline.
 ///
 /// Notes
 /// -----
-/// A fit of n points takes O(n³) time and O(n²) memory.
+/// A fit of n points takes O(n³) time and O(n²) memory, once for each four numbers of a target.
 ///
 /// Where the sources lie on a line or in a plane, directions across them are undetermined: with as
 /// many outputs as axes the spline is a map of space and keeps the identity there, else its slope
-/// there is zero.
+/// there is zero. `flags` says so.
 #[pyclass(frozen, module = "tactile_imaging")]
 pub(crate) struct ThinPlateSpline {
-    fitted: Box<dyn Fitted>,
+    /// Of up to four outputs each.
+    fitted: Vec<Box<dyn Fitted>>,
     axes: usize,
+    /// Real numbers of a target.
     outputs: usize,
-    /// Whether targets were a vector.
-    flat: bool,
+    /// The shape of a target.
+    shape: Vec<usize>,
+    complex: bool,
     /// Number of sources.
     points: usize,
 }
@@ -89,19 +101,30 @@ impl ThinPlateSpline {
     ) -> PyResult<Self> {
         let sources = arrays::matrix("sources", sources)?;
         let view = sources.as_array();
-        let flat = arrays::vector("targets", targets).ok();
-        let is_flat = flat.is_some();
-        let targets = match flat {
-            Some(values) => {
-                let shape = (values.len(), 1);
-                Array2::from_shape_vec(shape, values).map_err(invalid)?
-            }
-            None => arrays::owned(arrays::matrix("targets", targets)?.as_array()),
-        };
-        let (axes, outputs) = (view.ncols(), targets.ncols());
-        if !(2..=3).contains(&axes) || !(1..=3).contains(&outputs) {
+        let numpy = py.import("numpy")?;
+        let mut values = numpy.call_method1("asarray", (targets,))?;
+        let mut shape: Vec<usize> = values.getattr("shape")?.extract()?;
+        if shape.is_empty() {
+            return Err(invalid(
+                "targets must have a row for each source, found a number",
+            ));
+        }
+        let rows = shape.remove(0);
+        let complex = numpy
+            .call_method1("iscomplexobj", (&values,))?
+            .is_truthy()?;
+        if complex {
+            let parts = (values.getattr("real")?, values.getattr("imag")?);
+            values = numpy.call_method1("stack", (parts, -1))?;
+        }
+        let outputs = shape.iter().product::<usize>() * (1 + usize::from(complex));
+        let values = values.call_method1("reshape", (rows, outputs))?;
+        let targets = arrays::matrix("targets", &values)?;
+        let targets = targets.as_array();
+        let axes = view.ncols();
+        if !(1..=3).contains(&axes) || outputs == 0 {
             return Err(invalid(format!(
-                "sources must have two or three columns and targets up to three, \
+                "sources must have one to three columns and targets a number at least, \
                  found {axes} and {outputs}"
             )));
         }
@@ -116,57 +139,91 @@ impl ThinPlateSpline {
                 Err(_) => return Err(invalid("smoothing must be a number or \"gcv\"")),
             },
         };
-        let fitted = py.detach(|| match (kernel, axes) {
-            ("thin_plate_spline", 2) => fit::<2, _>(view, &targets, R2LogR, smoothing),
-            ("thin_plate_spline", _) => fit::<3, _>(view, &targets, R2LogR, smoothing),
-            ("linear", 2) => fit::<2, _>(view, &targets, NegR, smoothing),
-            ("linear", _) => fit::<3, _>(view, &targets, NegR, smoothing),
-            ("cubic", 2) => fit::<2, _>(view, &targets, R3, smoothing),
-            ("cubic", _) => fit::<3, _>(view, &targets, R3, smoothing),
+        let is_map = outputs == axes;
+        let fit = |columns: ArrayView2<'_, f64>| match (kernel, axes) {
+            // Points of a line are those of a plane with one axis of no extent.
+            ("thin_plate_spline", 1 | 2) => fit::<2, _>(view, columns, is_map, R2LogR, smoothing),
+            ("thin_plate_spline", _) => fit::<3, _>(view, columns, is_map, R2LogR, smoothing),
+            ("linear", 1 | 2) => fit::<2, _>(view, columns, is_map, NegR, smoothing),
+            ("linear", _) => fit::<3, _>(view, columns, is_map, NegR, smoothing),
+            ("cubic", 1 | 2) => fit::<2, _>(view, columns, is_map, R3, smoothing),
+            ("cubic", _) => fit::<3, _>(view, columns, is_map, R3, smoothing),
             _ => Err(invalid(format!(
                 "kernel must be \"thin_plate_spline\", \"linear\" or \"cubic\", found {kernel:?}"
             ))),
+        };
+        let fitted = py.detach(|| {
+            let parts = targets.axis_chunks_iter(Axis(1), LANES);
+            parts.map(fit).collect::<PyResult<Vec<_>>>()
         })?;
         Ok(Self {
             fitted,
             axes,
             outputs,
-            flat: is_flat,
+            shape,
+            complex,
             points: view.nrows(),
         })
     }
 
-    /// Values at points: (k, d) to (k, m), or (k,) where the targets were a vector.
+    /// Values at points of shape (..., d), each of the shape of a target.
     fn __call__<'py>(
         &self,
         py: Python<'py>,
         points: &Bound<'py, PyAny>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let points = self.queries(points)?;
+        let (points, mut shape) = self.queries(points)?;
         let view = points.as_array();
-        let values = py.detach(|| self.fitted.values(view, self.outputs));
-        if self.flat {
-            return Ok(PyArray1::from_iter(py, values.iter().copied()).into_any());
+        let values = py.detach(|| self.joined(view, |part, outputs| part.values(view, outputs)));
+        shape.extend(&self.shape);
+        let mut values = PyArray2::from_owned_array(py, values).into_any();
+        if self.complex {
+            let in_order = values.call_method1("copy", ("C",))?;
+            values = in_order.call_method1("view", ("complex128",))?;
         }
-        Ok(PyArray2::from_owned_array(py, values).into_any())
+        values.call_method1("reshape", (shape,))
     }
 
-    /// Jacobians at points, (k, m, d): [n, i, j] is ∂f_i/∂x_j.
+    /// Jacobians at points of shape (..., d): (..., m, d) for m real numbers of a target, ∂f_i/∂x_j.
     fn jacobian<'py>(
         &self,
         py: Python<'py>,
         points: &Bound<'py, PyAny>,
-    ) -> PyResult<Bound<'py, PyArray3<f64>>> {
-        let points = self.queries(points)?;
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let (points, mut shape) = self.queries(points)?;
         let view = points.as_array();
-        let jacobians = py.detach(|| self.fitted.jacobians(view, self.outputs));
-        Ok(PyArray3::from_owned_array(py, jacobians))
+        let jacobians = py.detach(|| {
+            let parts = self
+                .parts()
+                .map(|(part, outputs)| part.jacobians(view, outputs));
+            let parts: Vec<_> = parts.collect();
+            let views: Vec<_> = parts.iter().map(|part| part.view()).collect();
+            let all = ndarray::concatenate(Axis(1), &views).unwrap_or_default();
+            all.slice_axis(Axis(2), (..self.axes).into()).to_owned()
+        });
+        shape.extend([self.outputs, self.axes]);
+        let jacobians = PyArray3::from_owned_array(py, jacobians).into_any();
+        jacobians.call_method1("reshape", (shape,))
     }
 
-    /// The smoothing λ that was used.
+    /// The smoothing λ that was used, of more than four outputs the largest.
     #[getter]
     fn smoothing(&self) -> f64 {
-        self.fitted.lambda()
+        self.fitted
+            .iter()
+            .map(|part| part.lambda())
+            .fold(0.0, f64::max)
+    }
+
+    /// What is not determined, a sentence each.
+    #[getter]
+    fn flags(&self) -> Vec<String> {
+        let (axes, spanned) = (
+            self.axes,
+            self.fitted.first().map_or(0, |part| part.spanned()),
+        );
+        let sentence = || format!("the sources span {spanned} of {axes} directions");
+        (spanned < axes).then(sentence).into_iter().collect()
     }
 
     fn __repr__(&self) -> String {
@@ -176,7 +233,7 @@ impl ThinPlateSpline {
             outputs,
             ..
         } = self;
-        let lambda = self.fitted.lambda();
+        let lambda = self.smoothing();
         format!(
             "ThinPlateSpline({points} points, {axes} axes to {outputs}, smoothing {lambda:.3e})"
         )
@@ -184,42 +241,81 @@ impl ThinPlateSpline {
 }
 
 impl ThinPlateSpline {
-    fn queries<'py>(&self, points: &Bound<'py, PyAny>) -> PyResult<PyReadonlyArray2<'py, f64>> {
-        let points = arrays::matrix("points", points)?;
-        let (expected, found) = (self.axes, points.as_array().ncols());
+    /// Points, and the shape of the array of them.
+    fn queries<'py>(
+        &self,
+        points: &Bound<'py, PyAny>,
+    ) -> PyResult<(PyReadonlyArray2<'py, f64>, Vec<usize>)> {
+        let points = points
+            .py()
+            .import("numpy")?
+            .call_method1("asarray", (points,))?;
+        let mut shape: Vec<usize> = points.getattr("shape")?.extract()?;
+        let (expected, found) = (self.axes, shape.pop().unwrap_or(0));
         if found != expected {
             return Err(invalid(format!(
                 "points must have {expected} columns, found {found}"
             )));
         }
-        Ok(points)
+        let count: usize = shape.iter().product();
+        let flat = points.call_method1("reshape", (count, expected))?;
+        Ok((arrays::matrix("points", &flat)?, shape))
     }
+
+    /// The splines and the numbers of their outputs.
+    fn parts(&self) -> impl Iterator<Item = (&dyn Fitted, usize)> {
+        let left = |k: usize| (self.outputs - LANES * k).min(LANES);
+        let parts = self.fitted.iter().enumerate();
+        parts.map(move |(k, part)| (&**part, left(k)))
+    }
+
+    fn joined(
+        &self,
+        points: ArrayView2<'_, f64>,
+        of: impl Fn(&dyn Fitted, usize) -> Array2<f64>,
+    ) -> Array2<f64> {
+        let parts: Vec<_> = self
+            .parts()
+            .map(|(part, outputs)| of(part, outputs))
+            .collect();
+        let views: Vec<_> = parts.iter().map(|part| part.view()).collect();
+        let none = || Array2::zeros((points.nrows(), self.outputs));
+        ndarray::concatenate(Axis(1), &views).unwrap_or_else(|_| none())
+    }
+}
+
+/// Points, zero along axes that they lack.
+fn filled_up<const D: usize>(points: ArrayView2<'_, f64>) -> Vec<Point<f64, D>> {
+    let at = |row: usize, axis: usize| points.get([row, axis]).copied().unwrap_or(0.0);
+    let point = |row| Point::from(std::array::from_fn::<f64, D, _>(|axis| at(row, axis)));
+    (0..points.nrows()).map(point).collect()
 }
 
 /// A map of space where there are as many outputs as axes, else a function.
 fn fit<const D: usize, K: Kernel + Send + Sync + 'static>(
     sources: ArrayView2<'_, f64>,
-    targets: &Array2<f64>,
+    targets: ArrayView2<'_, f64>,
+    is_map: bool,
     kernel: K,
     smoothing: Smoothing,
 ) -> PyResult<Box<dyn Fitted>> {
-    if targets.ncols() == D {
+    if is_map && sources.ncols() == D {
         fit_to::<D, D, K>(sources, targets, kernel, smoothing)
     } else {
         // More outputs than axes, so that the spline is no map.
-        fit_to::<D, 4, K>(sources, targets, kernel, smoothing)
+        fit_to::<D, LANES, K>(sources, targets, kernel, smoothing)
     }
 }
 
 fn fit_to<const D: usize, const M: usize, K: Kernel + Send + Sync + 'static>(
     sources: ArrayView2<'_, f64>,
-    targets: &Array2<f64>,
+    targets: ArrayView2<'_, f64>,
     kernel: K,
     smoothing: Smoothing,
 ) -> PyResult<Box<dyn Fitted>> {
     let options = FitOptions::new(kernel).with_smoothing(smoothing);
     let options = options.map_err(invalid)?;
-    let sources: Vec<Point<f64, D>> = arrays::points(sources);
+    let sources: Vec<Point<f64, D>> = filled_up(sources);
     let target = |row: usize, k: usize| targets.get([row, k]).copied().unwrap_or(0.0);
     let targets: Vec<_> = (0..targets.nrows())
         .map(|row| Point::from(std::array::from_fn::<f64, M, _>(|k| target(row, k))))
