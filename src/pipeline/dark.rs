@@ -3,12 +3,10 @@
 //! Such a sensor measures shape, not force: a force must come from a gauge.
 use super::contact::{ContactReading, ContactStage, FrameContact};
 use super::error::PipelineError;
-use crate::core::regions;
-use crate::force::{
-    BoundingBox, Estimate, ForceError, Polarity, ReferenceFrame, median_shift_outside,
-};
+use crate::force::{Estimate, ForceError, Polarity, ReferenceFrame};
+use crate::gel::DarkGel;
 use crate::sfs::DepthTable;
-use ndarray::{Array2, ArrayView2};
+use ndarray::ArrayView2;
 
 /// Contact is the largest connected patch that is darker than the reference by more than a
 /// threshold.
@@ -36,8 +34,7 @@ use ndarray::{Array2, ArrayView2};
 #[derive(Clone, Debug)]
 pub struct DarkContact {
     pixel_size_m: [f64; 2],
-    threshold_grey: f64,
-    table: DepthTable<f64>,
+    gel: DarkGel,
 }
 
 impl DarkContact {
@@ -48,14 +45,18 @@ impl DarkContact {
     /// [`depth_table`](Self::depth_table).
     ///
     /// # Errors
-    /// [`PipelineError::DepthTable`].
+    /// [`PipelineError::DepthTable`], and [`PipelineError::Setting`] for sizes that are not positive.
     pub fn new(table: &[(f64, f64)], pixel_size_m: [f64; 2]) -> Result<Self, PipelineError> {
-        let depth_table = Self::depth_table(table)?;
+        let table = Self::depth_table(table)?;
         Ok(Self {
             pixel_size_m,
-            threshold_grey: Self::DEFAULT_THRESHOLD_GREY,
-            table: depth_table,
+            gel: DarkGel::new(table, Self::DEFAULT_THRESHOLD_GREY, pixel_size_m)?,
         })
+    }
+
+    /// The gel, which reads the other contacts too.
+    pub fn gel(&self) -> &DarkGel {
+        &self.gel
     }
 
     /// The table as a reconstruction, zero where there is no contact.
@@ -106,30 +107,36 @@ impl ContactStage for DarkContact {
                 found: frame.dim(),
             });
         }
-        let step_grey =
-            light_step_grey(frame, image).filter(|step| step.abs() > self.threshold_grey);
-        let step_grey = step_grey.unwrap_or(0.0);
-        let darkness = |at: [usize; 2]| f64::from(image[at]) - f64::from(frame[at]) + step_grey;
-        let patch = largest_patch(frame.dim(), |at| darkness(at) > self.threshold_grey);
-        if patch.is_empty() {
+        let found = self.gel.read(frame, image);
+        let found = found.map_err(ForceError::custom)?;
+        let background_step_grey = Some(found.background_step_grey);
+        let Some(patch) = found.contacts.first() else {
             return Ok(FrameContact {
-                background_step_grey: Some(step_grey),
+                background_step_grey,
                 ..FrameContact::default()
             });
-        }
-        let mut mask = Array2::from_elem(frame.dim(), false);
-        for &at in &patch {
-            mask[at] = true;
-        }
-        let peak = patch.iter().map(|&at| darkness(at)).fold(0.0, f64::max);
-        let saturated = patch.iter().filter(|&&at| frame[at] == 0).count();
-        let saturated_share = saturated as f64 / patch.len() as f64;
+        };
+        let mask = found.labels.mapv(|label| label == 1);
+        let pixels = mask.iter().zip(frame).filter(|(inside, _)| **inside);
+        let (count, black) = pixels.fold((0.0, 0.0), |(count, black), (_, level)| {
+            (count + 1.0, black + f64::from(u8::from(*level == 0)))
+        });
+        let [hx, hy] = self.pixel_size_m;
+        let pixel = (hx * hy).sqrt();
+        let radius_px = (count / std::f64::consts::PI).sqrt();
+        // Specks of noise are patches too: other contacts are not counted.
         let reading = ContactReading {
-            saturated_share,
-            ..self.reading(&patch, frame.dim(), peak)
+            saturated_share: black / count,
+            indentation_m: Some(patch.depth_m),
+            centroid_px: patch.centroid_px,
+            area_m2: patch.area_m2,
+            peak_grey: patch.darkness_grey,
+            out_of_calibration: patch.beyond_table,
+            touches_edge: patch.touches_border,
+            ..ContactReading::new(None, Estimate::new(radius_px * pixel, 0.5 * pixel))
         };
         Ok(FrameContact {
-            background_step_grey: Some(step_grey),
+            background_step_grey,
             ..FrameContact::new(reading, mask.view())
         })
     }
@@ -143,79 +150,10 @@ impl ContactStage for DarkContact {
     }
 }
 
-impl DarkContact {
-    fn reading(
-        &self,
-        patch: &[[usize; 2]],
-        (rows, columns): (usize, usize),
-        peak: f64,
-    ) -> ContactReading {
-        let n = patch.len() as f64;
-        let mean = |axis: usize| patch.iter().map(|p| p[axis] as f64).sum::<f64>() / n;
-        // An outline uncertain by half a pixel, pixel by pixel, moves the centroid of a disc by
-        // 1/√(2 a) of that.
-        let radius_px = (n / std::f64::consts::PI).sqrt();
-        let centroid_error = 0.5 / (2.0 * radius_px).sqrt();
-        let [hx, hy] = self.pixel_size_m;
-        let pixel = (hx * hy).sqrt();
-        let (depth, in_table) = self.table.depth(peak);
-        let (step, _) = self.table.depth(peak - 1.0);
-        let at_edge = |&[row, column]: &[usize; 2]| {
-            row == 0 || column == 0 || row + 1 == rows || column + 1 == columns
-        };
-        // Specks of noise are patches too: other contacts are not counted.
-        ContactReading {
-            indentation_m: Some(Estimate::new(depth, (depth - step).abs())),
-            centroid_px: [mean(1), mean(0)].map(|value| Estimate::new(value, centroid_error)),
-            area_m2: n * hx * hy,
-            peak_grey: peak,
-            out_of_calibration: !in_table,
-            touches_edge: patch.iter().any(at_edge),
-            ..ContactReading::new(None, Estimate::new(radius_px * pixel, 0.5 * pixel))
-        }
-    }
-}
-
-/// By how many grey levels all of the frame differs from the reference: the median of the
-/// difference along the frame's border. `None` where that is a contact's which reaches most of the
-/// border.
-///
-/// Half of the border is background unless the contact is larger than the frame. A step below the
-/// threshold of a contact is no light: a gel darkens as much beside a contact, and its table of
-/// depths was taken with that.
-fn light_step_grey(frame: ArrayView2<'_, u8>, reference: ArrayView2<'_, u8>) -> Option<f64> {
-    let (rows, columns) = frame.dim();
-    // A sixteenth of the frame on each side.
-    let (high, wide) = (rows.div_ceil(16), columns.div_ceil(16));
-    let middle = BoundingBox {
-        row_start: high,
-        row_end: rows.saturating_sub(high),
-        column_start: wide,
-        column_end: columns.saturating_sub(wide),
-    };
-    let step = median_shift_outside(frame, reference, middle)?;
-    Some(step.value)
-}
-
-/// The largest set of pixels `[row, column]` inside, connected by their sides. Empty where no pixel
-/// is inside. O(pixels).
-fn largest_patch(
-    (rows, columns): (usize, usize),
-    inside: impl Fn([usize; 2]) -> bool,
-) -> Vec<[usize; 2]> {
-    let place = |at: usize| [at / columns, at % columns];
-    let mut open: Vec<bool> = (0..rows * columns).map(|at| inside(place(at))).collect();
-    let larger = |first: Vec<usize>, other: Vec<usize>| match other.len() > first.len() {
-        true => other,
-        false => first,
-    };
-    let largest = regions(&mut open, columns).reduce(larger);
-    largest.into_iter().flatten().map(place).collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use ndarray::Array2;
 
     #[test]
     fn light_that_changes_everywhere_is_no_contact() {
@@ -237,14 +175,5 @@ mod tests {
                 .unwrap();
             assert!((depth.value - 0.5e-3).abs() < 1e-12, "{step}: {depth}");
         }
-    }
-
-    #[test]
-    fn the_largest_patch_wins_and_diagonals_do_not_connect() {
-        let image = ndarray::array![[1, 0, 0, 1], [0, 1, 1, 1], [0, 0, 0, 0], [1, 1, 0, 0]];
-        let patch = largest_patch(image.dim(), |at| image[at] == 1);
-        assert_eq!(patch.len(), 4);
-        assert!(patch.contains(&[0, 3]) && patch.contains(&[1, 1]));
-        assert!(largest_patch((3, 3), |_| false).is_empty());
     }
 }

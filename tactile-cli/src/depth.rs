@@ -113,10 +113,8 @@ impl DepthArguments {
         };
         let ball = |mm| Object::sphere(1e-3 * mm);
         let object = self.ball_radius_mm.map_or(unknown, ball);
+        let gel = contact.gel().clone();
         let pipeline = Pipeline::new(contact, object).map_err(Failure::input)?;
-        let threshold = DarkContact::DEFAULT_THRESHOLD_GREY;
-        let gel = DarkGel::new(table.clone(), threshold, self.frames.pixel_m());
-        let gel = gel.map_err(Failure::input)?;
         Ok((pipeline.with_surface(table, SurfaceInput::Signal), gel))
     }
 
@@ -226,7 +224,7 @@ pub(crate) fn run(arguments: &DepthArguments, context: &mut Context) -> Result<E
 fn print_all(frame: &DarkFrame, context: &mut Context) {
     let count = frame.contacts.len();
     for (k, contact) in frame.contacts.iter().enumerate() {
-        let [x, y] = contact.centroid_px.map(four_digits);
+        let [x, y] = contact.centroid_px.map(|at| in_unit(at, 1.0));
         let area = four_digits(1e6 * contact.area_m2);
         let depth = in_unit(contact.depth_m, 1e3);
         let beyond = if contact.beyond_table {

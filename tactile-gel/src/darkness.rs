@@ -1,7 +1,7 @@
 //! A gel that darkens where it is pressed: every contact, and the depth of each by a table.
 
 use ndarray::{Array2, ArrayView2};
-use tactile_core::{Estimate, Requirement};
+use tactile_core::{Estimate, InvalidOption, Requirement, regions};
 use tactile_sfs::DepthTable;
 
 use crate::GelError;
@@ -54,12 +54,17 @@ pub struct DarkFrame {
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
 pub struct DarkPatch {
-    /// Column and row of the centroid.
-    pub centroid_px: [f64; 2],
+    /// Column and row of the centroid. An outline that is uncertain by half a pixel, pixel by pixel,
+    /// moves that of a disc by 1/√(2 radius) of it.
+    pub centroid_px: [Estimate; 2],
     /// Area in square metres.
     pub area_m2: f64,
     /// Greatest depth in metres, with the error of a grey level.
     pub depth_m: Estimate,
+    /// Greatest darkness in grey levels.
+    pub darkness_grey: f64,
+    /// Whether the contact reaches the frame's border.
+    pub touches_border: bool,
     /// Whether the darkness lies beyond the table, which ends with its last depth.
     pub beyond_table: bool,
 }
@@ -69,12 +74,12 @@ impl DarkGel {
     /// contact, and the size of a pixel.
     ///
     /// # Errors
-    /// [`GelError::InvalidOption`] for a size or a threshold that is not positive.
+    /// For a size or a threshold that is not positive.
     pub fn new(
         table: DepthTable<f64>,
         threshold_grey: f64,
         pixel_size_m: [f64; 2],
-    ) -> Result<Self, GelError> {
+    ) -> Result<Self, InvalidOption> {
         Requirement::Positive.check("contact threshold", threshold_grey)?;
         for size in pixel_size_m {
             Requirement::Positive.check("pixel size", size)?;
@@ -111,8 +116,10 @@ impl DarkGel {
         let darkness = Array2::from_shape_fn(frame.dim(), |at| {
             f64::from(reference[at]) - f64::from(frame[at]) + step
         });
-        let mut patches = patches(&darkness.mapv(|d| d > self.threshold_grey));
-        patches.retain(|patch| patch.len() >= LEAST_PIXELS);
+        let mut dark: Vec<bool> = darkness.iter().map(|d| *d > self.threshold_grey).collect();
+        let patches = regions(&mut dark, columns).filter(|patch| patch.len() >= LEAST_PIXELS);
+        let places = patches.map(|patch| patch.into_iter().map(|at| [at / columns, at % columns]));
+        let mut patches: Vec<Vec<[usize; 2]>> = places.map(Iterator::collect).collect();
         patches.sort_by_key(|patch| core::cmp::Reverse(patch.len()));
         let mut depth_m = Array2::from_elem(frame.dim(), f64::NAN);
         let mut labels = Array2::zeros(frame.dim());
@@ -134,14 +141,21 @@ impl DarkGel {
     fn contact(&self, patch: &[[usize; 2]], darkness: &Array2<f64>) -> DarkPatch {
         let n = patch.len() as f64;
         let mean = |axis: usize| patch.iter().map(|at| at[axis] as f64).sum::<f64>() / n;
+        let radius_px = (n / core::f64::consts::PI).sqrt();
+        let centroid_error = 0.5 / (2.0 * radius_px).sqrt();
         let darkest = patch.iter().map(|at| darkness[*at]).fold(0.0, f64::max);
         let (depth, inside) = self.table.depth(darkest);
         let level = (depth - self.table.depth(darkest - 1.0).0).abs();
         let [width, height] = self.pixel_size_m;
+        let (rows, columns) = darkness.dim();
+        let at_border =
+            |&[r, c]: &[usize; 2]| r == 0 || c == 0 || r + 1 == rows || c + 1 == columns;
         DarkPatch {
-            centroid_px: [mean(1), mean(0)],
+            centroid_px: [mean(1), mean(0)].map(|value| Estimate::new(value, centroid_error)),
             area_m2: n * width * height,
             depth_m: Estimate::new(depth, level),
+            darkness_grey: darkest,
+            touches_border: patch.iter().any(at_border),
             beyond_table: !inside,
         }
     }
@@ -158,34 +172,4 @@ fn border_step(frame: ArrayView2<'_, u8>, reference: ArrayView2<'_, u8>) -> f64 
     let mut steps: Vec<i16> = steps.collect();
     let middle = steps.len() / 2;
     f64::from(*steps.select_nth_unstable(middle).1)
-}
-
-/// The parts of a mask that are connected by their sides, as `[row, column]`.
-fn patches(mask: &Array2<bool>) -> Vec<Vec<[usize; 2]>> {
-    let (rows, columns) = mask.dim();
-    let mut open = mask.clone();
-    let mut patches = Vec::new();
-    for start in (0..rows).flat_map(|r| (0..columns).map(move |c| [r, c])) {
-        if !core::mem::take(&mut open[start]) {
-            continue;
-        }
-        let mut patch = vec![start];
-        let mut next = 0;
-        while let Some(&[r, c]) = patch.get(next) {
-            next += 1;
-            let beside = [
-                [r.wrapping_sub(1), c],
-                [r + 1, c],
-                [r, c.wrapping_sub(1)],
-                [r, c + 1],
-            ];
-            for at in beside {
-                if open.get_mut(at).is_some_and(core::mem::take) {
-                    patch.push(at);
-                }
-            }
-        }
-        patches.push(patch);
-    }
-    patches
 }
