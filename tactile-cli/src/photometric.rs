@@ -15,9 +15,7 @@ use std::path::{Path, PathBuf};
 use tactile_files::io::{Grey, read_bytes};
 use tactile_files::sensor::{PhotometricPresses, PhotometricSensor};
 use tactile_imaging::core::Estimate;
-use tactile_imaging::gel::{
-    BallFace, CalibrationReport, GelContact, GelForce, GelFrame, GelSensor,
-};
+use tactile_imaging::gel::{BallFace, CalibrationReport, GelContact, GelFrame, GelLaw, GelSensor};
 
 /// An argument that a sensor file takes the place of. `filler` is parsed and not used.
 pub(crate) fn unless_sensor(arg: Arg, filler: &'static str) -> Arg {
@@ -40,17 +38,20 @@ pub(crate) fn calibrate(
     }
     let found = presses.calibrate();
     let (calibrated, found) = found.map_err(|error| Failure::in_file(path, error))?;
-    print(&presses.names, &calibrated, &found, context);
+    print(&presses.names, &calibrated.sensor, &found, context);
     for doubt in &found.doubts {
         context.warn(doubt.kind(), json!({}), doubt);
     }
-    let gel = presses.gel(&calibrated);
-    let gel = gel.map_err(|error| Failure::in_file(path, error))?;
-    if let Some(gel) = &gel {
+    if let Some(gel) = &calibrated.layer {
         let modulus = Estimate::new(gel.youngs_modulus_pa, gel.youngs_modulus_error_pa);
         context.row("gel", in_unit(modulus, 1e-3) + " kPa");
     }
-    let model = calibrated.model().clone();
+    if let Some(gauge) = &calibrated.gauge {
+        let [exponent, scatter] = [gauge.exponent(), 100.0 * gauge.scatter()].map(four_digits);
+        let law = format!("force as volume to the power {exponent}, readings off by {scatter} %");
+        context.row("gauge", law);
+    }
+    let model = calibrated.sensor.model();
     let circles: Vec<Value> = presses
         .names
         .iter()
@@ -62,12 +63,11 @@ pub(crate) fn calibrate(
         "median_angle_deg": found.median_angle_deg,
         "normal_standard_error": model.normal_standard_error,
         "depth_standard_error_m": model.depth_standard_error_m,
-        "slope_standard_error": model.slope_standard_error, "face": found.face, "gel": gel,
+        "slope_standard_error": model.slope_standard_error, "face": found.face, "gel": calibrated.layer,
+        "gauge": calibrated.gauge,
     }));
     if context.outputs.folder().is_some() {
-        let text = PhotometricSensor::new(&reference, model)
-            .with_gel(gel)
-            .to_toml();
+        let text = PhotometricSensor::of(&reference, &calibrated).to_toml();
         let text = text.map_err(Failure::output)?;
         context.outputs.add(sensor, text.into_bytes());
         context
@@ -140,7 +140,7 @@ fn print(names: &[PathBuf], sensor: &GelSensor, found: &CalibrationReport, conte
 
 /// Why a sensor without a gel's layer has no force.
 const NO_GEL: &str = "the sensor file has no [gel]: give its calibration the gel's thickness \
-    and modulus, or a frame under a known weight";
+    and modulus, a frame under a known weight, or readings of a gauge";
 
 /// Why nothing is measured.
 pub(crate) const NO_FRAMES: &str =
@@ -149,14 +149,15 @@ pub(crate) const NO_FRAMES: &str =
 /// A sensor with its law of forces, or why there is none.
 pub(crate) struct Reader {
     pub stereo: GelSensor,
-    pub law: Result<GelForce, String>,
+    pub law: Result<GelLaw, String>,
 }
 
 impl Reader {
     pub(crate) fn open(sensor: &Path) -> Result<Self, Failure> {
-        let (stereo, gel) = PhotometricSensor::read(sensor)?;
-        let law = gel.ok_or_else(|| NO_GEL.to_owned());
-        let law = law.and_then(|gel| GelForce::new(&gel, &stereo).map_err(|e| e.to_string()));
+        let gel = PhotometricSensor::read(sensor)?;
+        let law = gel.law().map_err(|error| error.to_string());
+        let law = law.and_then(|law| law.ok_or_else(|| NO_GEL.to_owned()));
+        let stereo = gel.sensor;
         Ok(Self { stereo, law })
     }
 

@@ -64,6 +64,9 @@ pub enum GelError {
     /// A frame of a known weight without contact.
     #[error("a frame of a known weight shows no contact that carries a force")]
     NoContact,
+    /// A frame under one reading of a gauge with several contacts.
+    #[error("a frame under one reading of a gauge shows several contacts")]
+    SeveralContacts,
     /// The face cannot be integrated.
     #[error(transparent)]
     Surface(#[from] SfsError),

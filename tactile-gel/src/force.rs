@@ -6,7 +6,7 @@ use tactile_core::Estimate;
 use crate::contacts::{block_means, quantile};
 use crate::layer::GelLayer;
 use crate::plane::{LayerShape, Plane};
-use crate::{GelError, GelFrame, GelSensor};
+use crate::{GaugeForce, GelError, GelFrame, GelSensor, MarkerField};
 
 /// Blocks of pixels along the longer side of a frame. The force is a sum, and finer ones change it
 /// little.
@@ -29,6 +29,62 @@ pub struct GelForce {
     /// Newtons of 1 in a cell.
     newtons: f64,
     modulus_error: f64,
+    pixel_size_m: f64,
+    /// Pascals per metre of a face that moves sideways: that of the longest wave.
+    shear_pa_per_m: f64,
+}
+
+/// Force and moments of all contacts of a frame, about the middle of the frame, along x, y and into the
+/// gel.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[non_exhaustive]
+pub struct GelWrench {
+    /// F_x, F_y and F_z in newtons. `None` along x and y without markers.
+    pub force_n: [Option<Estimate>; 3],
+    /// M_x, M_y and M_z in newton metres. `None` about z without markers.
+    pub torque_nm: [Option<Estimate>; 3],
+}
+
+/// How the forces of a sensor are found.
+pub enum GelLaw {
+    /// By the shape of the face and the gel's layer.
+    Layer(Box<GelForce>),
+    /// By the volume of the contacts, from a gauge's readings.
+    Gauge(GaugeForce),
+}
+
+impl GelLaw {
+    /// The normal force of each contact in newtons.
+    pub fn forces(&self, frame: &GelFrame) -> Vec<Estimate> {
+        match self {
+            Self::Layer(law) => law.forces(frame),
+            Self::Gauge(law) => law.forces(frame),
+        }
+    }
+
+    /// The normal force of all contacts together in newtons. `None` without contact.
+    pub fn force(&self, frame: &GelFrame) -> Option<Estimate> {
+        together(self.forces(frame))
+    }
+}
+
+/// The sum of forces, most of whose errors is common to all. `None` without any.
+fn together(forces: Vec<Estimate>) -> Option<Estimate> {
+    forces.into_iter().reduce(|mut sum, force| {
+        sum.value += force.value;
+        sum.standard_error += force.standard_error;
+        sum
+    })
+}
+
+/// Pressure under a frame's contacts, in blocks.
+struct Pressed {
+    pressure: Array2<f32>,
+    shares: Vec<Array2<f32>>,
+    noise: f64,
+    /// Relative error of all of it.
+    scale: f64,
 }
 
 impl GelForce {
@@ -51,13 +107,77 @@ impl GelForce {
             block,
             newtons: 0.5 * modulus * cell_m * cell_m,
             modulus_error: gel.youngs_modulus_error_pa / gel.youngs_modulus_pa,
+            pixel_size_m: sensor.model().pixel_size_m,
+            shear_pa_per_m: gel.shear_pa_per_m(),
         })
     }
 
     /// The normal force of each contact in newtons, with the errors of slopes and modulus.
     pub fn forces(&self, frame: &GelFrame) -> Vec<Estimate> {
-        if frame.contacts.is_empty() {
+        let Some(pressed) = self.pressed(frame) else {
             return Vec::new();
+        };
+        let each = pressed.shares.iter();
+        each.map(|share| pressed.moment(share, |_| 1.0) * self.newtons)
+            .collect()
+    }
+
+    /// The normal force of all contacts together in newtons. `None` without contact.
+    pub fn force(&self, frame: &GelFrame) -> Option<Estimate> {
+        together(self.forces(frame))
+    }
+
+    /// Force and moments of all contacts together. F_z = ∫p dA, M_x = ∫p y dA and M_y = −∫p x dA are those of
+    /// the face's shape, F_x, F_y and M_z those of the markers
+    /// ([`MarkerField::shear`], with G/h of the layer). `None` without contact.
+    pub fn wrench(&self, frame: &GelFrame, markers: Option<&MarkerField>) -> Option<GelWrench> {
+        let pressed = self.pressed(frame)?;
+        let all = pressed
+            .shares
+            .iter()
+            .fold(Array2::zeros(pressed.pressure.dim()), |a, b| a + b);
+        let (rows, columns) = frame.depth_m.dim();
+        // Metres from the middle of the frame to that of a block.
+        let arm = |block: usize, pixels: usize| {
+            let middle = (block as f64 + 0.5) * self.block as f64 - 0.5 * pixels as f64;
+            self.pixel_size_m * middle
+        };
+        let [normal, about_x, about_y] = [
+            pressed.moment(&all, |_| 1.0),
+            pressed.moment(&all, |(row, _)| arm(row, rows)),
+            pressed.moment(&all, |(_, column)| -arm(column, columns)),
+        ]
+        .map(|sum| Some(sum * self.newtons));
+        let shear = markers.and_then(|field| field.shear(self.shear_pa_per_m, self.pixel_size_m));
+        let with_modulus = |part: Estimate| {
+            let error = part.standard_error.hypot(self.modulus_error * part.value);
+            Some(Estimate::new(part.value, error))
+        };
+        let mut wrench = GelWrench {
+            force_n: [None, None, normal],
+            torque_nm: [about_x, about_y, None],
+        };
+        if let Some(shear) = shear {
+            let [fx, fy] = shear.force_n;
+            let middle = [columns, rows].map(|n| 0.5 * (n as f64 - 1.0));
+            let [x, y] = [0, 1].map(|k| self.pixel_size_m * (shear.about_px[k] - middle[k]));
+            let turn = shear.torque_nm;
+            let moved = turn.value + x * fy.value - y * fx.value;
+            let error = turn
+                .standard_error
+                .hypot(x * fy.standard_error)
+                .hypot(y * fx.standard_error);
+            wrench.force_n[0] = with_modulus(fx);
+            wrench.force_n[1] = with_modulus(fy);
+            wrench.torque_nm[2] = with_modulus(Estimate::new(moved, error));
+        }
+        Some(wrench)
+    }
+
+    /// `None` without contact.
+    fn pressed(&self, frame: &GelFrame) -> Option<Pressed> {
+        if frame.contacts.is_empty() {
+            return None;
         }
         let [p, q] = frame
             .gradient
@@ -85,25 +205,12 @@ impl GelForce {
             .slope_standard_error
             .hypot(self.modulus_error)
             .hypot(LAW_ERROR);
-        let force = |share: &Array2<f32>| {
-            let pairs = pressure.iter().zip(share);
-            let (sum, cells) = pairs.fold((0.0, 0.0), |(sum, n), (f, s)| {
-                (sum + f64::from(f * s), n + f64::from(*s))
-            });
-            // Neighbouring cells share some of their noise.
-            let error = (scale * sum).hypot(2.0 * noise * cells.sqrt());
-            Estimate::new(self.newtons * sum, self.newtons * error)
-        };
-        shares.iter().map(force).collect()
-    }
-
-    /// The normal force of all contacts together in newtons. `None` without contact.
-    pub fn force(&self, frame: &GelFrame) -> Option<Estimate> {
-        // Most of the errors is common to all contacts.
-        let add = |a: Estimate, b: Estimate| {
-            Estimate::new(a.value + b.value, a.standard_error + b.standard_error)
-        };
-        self.forces(frame).into_iter().reduce(add)
+        Some(Pressed {
+            pressure,
+            shares,
+            noise,
+            scale,
+        })
     }
 
     /// Each contact's share of the blocks: those with some of its pixels, by their number.
@@ -131,7 +238,28 @@ impl GelForce {
     }
 }
 
+impl Pressed {
+    /// The sum over the blocks of a share, each times its arm.
+    fn moment(&self, share: &Array2<f32>, arm: impl Fn((usize, usize)) -> f64) -> Estimate {
+        let (mut sum, mut square) = (0.0, 0.0);
+        for ((at, f), s) in self.pressure.indexed_iter().zip(share) {
+            let weight = f64::from(*s) * arm(at);
+            sum += f64::from(*f) * weight;
+            square += f64::from(*s) * arm(at).powi(2);
+        }
+        // Neighbouring cells share some of their noise.
+        let error = (self.scale * sum).hypot(2.0 * self.noise * square.sqrt());
+        Estimate::new(sum, error)
+    }
+}
+
 impl GelLayer {
+    /// G/h, by which the layer resists a face that moves sideways over more than its thickness, in
+    /// pascals per metre.
+    pub fn shear_pa_per_m(&self) -> f64 {
+        self.youngs_modulus_pa / (2.0 * (1.0 + self.poisson_ratio) * self.thickness_m)
+    }
+
     /// The layer with the modulus under which a calibrated sensor reads frames of known weights:
     /// frame and force in newtons.
     ///

@@ -31,6 +31,11 @@ const BEYOND: f64 = 1.5;
 /// # Ok::<(), GelError>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(
+    feature = "serde",
+    serde(try_from = "GaugeNumbers", into = "GaugeNumbers")
+)]
 pub struct GaugeForce {
     /// Means of ln V and ln F, and the slope.
     mean: [f64; 2],
@@ -46,13 +51,16 @@ impl GaugeForce {
     /// From frames and what the gauge read under them in newtons. O(n) for n frames.
     ///
     /// # Errors
-    /// [`GelError::NoContact`] for a frame without contact, and those of
-    /// [`of_volumes`](Self::of_volumes).
+    /// [`GelError::NoContact`] for a frame without contact, [`GelError::SeveralContacts`] for one whose
+    /// force is shared, and those of [`of_volumes`](Self::of_volumes).
     pub fn fit(readings: &[(&GelFrame, f64)]) -> Result<Self, GelError> {
-        let volumes = readings.iter().map(|(frame, force)| {
-            let volume = frame.volume_m3().ok_or(GelError::NoContact)?;
-            Ok((volume, *force))
-        });
+        let volumes = readings
+            .iter()
+            .map(|(frame, force)| match frame.volumes_m3()[..] {
+                [volume] => Ok((volume, *force)),
+                [] => Err(GelError::NoContact),
+                _ => Err(GelError::SeveralContacts),
+            });
         Self::of_volumes(&volumes.collect::<Result<Vec<_>, GelError>>()?)
     }
 
@@ -96,14 +104,20 @@ impl GaugeForce {
         })
     }
 
+    /// Standard deviation of the readings about the line, as a share of the force.
+    pub fn scatter(&self) -> f64 {
+        self.variance.sqrt()
+    }
+
     /// The exponent m.
     pub fn exponent(&self) -> f64 {
         self.exponent
     }
 
-    /// The normal force of a frame in newtons. `None` without contact.
-    pub fn force(&self, frame: &GelFrame) -> Option<Estimate> {
-        frame.volume_m3().map(|volume| self.at_volume(volume))
+    /// The normal force of each contact in newtons, as of a body of that shape.
+    pub fn forces(&self, frame: &GelFrame) -> Vec<Estimate> {
+        let volumes = frame.volumes_m3().into_iter();
+        volumes.map(|volume| self.at_volume(volume)).collect()
     }
 
     /// The force in newtons under a volume in cubic metres.
@@ -126,23 +140,75 @@ impl GaugeForce {
 }
 
 impl GelFrame {
-    /// The volume in cubic metres that the contacts take from the gel, below the gel far away. `None`
-    /// without contact.
-    pub fn volume_m3(&self) -> Option<f64> {
-        let (mut area_px, mut area_m2) = (0.0, 0.0);
-        let mut depths = 0.0;
-        for (depth, _) in self
-            .depth_m
-            .iter()
-            .zip(&self.labels)
-            .filter(|(_, l)| **l > 0)
-        {
-            depths += depth.max(0.0);
-            area_px += 1.0;
+    /// The volume in cubic metres that each contact takes from the gel, below the gel far away.
+    pub fn volumes_m3(&self) -> Vec<f64> {
+        let mut sums = vec![(0.0, 0.0); self.contacts.len()];
+        for (depth, label) in self.depth_m.iter().zip(&self.labels) {
+            let contact = usize::from(*label).checked_sub(1);
+            if let Some((depths, pixels)) = contact.and_then(|k| sums.get_mut(k)) {
+                *depths += depth.max(0.0);
+                *pixels += 1.0;
+            }
         }
-        self.contacts
-            .iter()
-            .for_each(|c| area_m2 += c.area_m2.value);
-        (depths > 0.0).then(|| depths * area_m2 / area_px)
+        let each = sums.iter().zip(&self.contacts);
+        each.map(|((depths, pixels), contact)| {
+            depths * contact.area_m2.value / f64::max(*pixels, 1.0)
+        })
+        .collect()
+    }
+}
+
+/// The numbers of a [`GaugeForce`] as files keep them.
+#[cfg(feature = "serde")]
+#[derive(serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+struct GaugeNumbers {
+    mean_log_volume_m3: f64,
+    mean_log_force_n: f64,
+    exponent: f64,
+    log_volume_spread: f64,
+    log_force_variance: f64,
+    readings: f64,
+    volumes_m3: [f64; 2],
+}
+
+#[cfg(feature = "serde")]
+impl From<GaugeForce> for GaugeNumbers {
+    fn from(law: GaugeForce) -> Self {
+        Self {
+            mean_log_volume_m3: law.mean[0],
+            mean_log_force_n: law.mean[1],
+            exponent: law.exponent,
+            log_volume_spread: law.spread,
+            log_force_variance: law.variance,
+            readings: law.count,
+            volumes_m3: law.range,
+        }
+    }
+}
+
+#[cfg(feature = "serde")]
+impl TryFrom<GaugeNumbers> for GaugeForce {
+    type Error = tactile_core::InvalidOption;
+
+    fn try_from(of: GaugeNumbers) -> Result<Self, Self::Error> {
+        Requirement::Finite.check("mean_log_volume_m3", of.mean_log_volume_m3)?;
+        Requirement::Finite.check("mean_log_force_n", of.mean_log_force_n)?;
+        Requirement::Positive.check("exponent", of.exponent)?;
+        Requirement::Positive.check("log_volume_spread", of.log_volume_spread)?;
+        Requirement::NonNegative.check("log_force_variance", of.log_force_variance)?;
+        // Two numbers of the line are fitted.
+        Requirement::Positive.check("readings - 2", of.readings - 2.0)?;
+        for volume in of.volumes_m3 {
+            Requirement::Positive.check("volumes_m3", volume)?;
+        }
+        Ok(Self {
+            mean: [of.mean_log_volume_m3, of.mean_log_force_n],
+            exponent: of.exponent,
+            spread: of.log_volume_spread,
+            variance: of.log_force_variance,
+            count: of.readings,
+            range: of.volumes_m3,
+        })
     }
 }

@@ -27,7 +27,7 @@ pub use calibration::{BallPress, CalibrationDoubt, CalibrationReport, CircleFind
 pub use darkness::{DarkFrame, DarkGel, DarkPatch};
 pub use error::GelError;
 pub use face::{GelContact, GelFrame};
-pub use force::GelForce;
+pub use force::{GelForce, GelLaw, GelWrench};
 pub use frame_check::{FrameDoubt, Turn};
 pub use gauge::GaugeForce;
 pub use layer::GelLayer;

@@ -7,19 +7,18 @@ use numpy::{PyArray2, PyArray3, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyType;
 use std::path::PathBuf;
-use tactile_files::sensor::{PhotometricPresses, PhotometricSensor};
+use tactile_files::sensor::{CalibratedGel, PhotometricPresses, PhotometricSensor};
 use tactile_imaging::gel::{
-    BallPress, CalibrationReport, FrameDoubt, GelForce, GelFrame as Frame, GelLayer,
-    GelSensor as Gel, find_markers, track_markers,
+    BallPress, CalibrationReport, FrameDoubt, GaugeForce, GelError, GelFrame as Frame, GelLaw,
+    GelLayer, GelSensor as Gel, find_markers, track_markers,
 };
 use tactile_imaging::matching::MatchError;
 
 /// A gel that is lit in colours: from frames to the face, contacts and forces.
 #[pyclass(frozen, module = "tactile_imaging")]
 pub(crate) struct GelSensor {
-    sensor: Gel,
-    layer: Option<GelLayer>,
-    law: Option<GelForce>,
+    gel: CalibratedGel,
+    law: Option<GelLaw>,
     order: Order,
     report: Option<Py<GelReport>>,
 }
@@ -92,9 +91,13 @@ impl GelSensor {
     ///     x, y and radius of the contacts in pixels, NaN where they are not known. They are found.
     /// layer : (thickness, Poisson's ratio, Young's modulus, its standard error)
     ///     The gel in metres and pascals, for forces.
+    /// gauge : sequence of (frame, force)
+    ///     Four or more frames of one body and what a gauge read under them in newtons, for forces
+    ///     where the layer is not known.
     #[classmethod]
     #[pyo3(signature = (
-        reference, presses, *, ball_radius, pixel_size, order="rgb", circles=None, layer=None
+        reference, presses, *, ball_radius, pixel_size, order="rgb", circles=None, layer=None,
+        gauge=None
     ))]
     fn calibrate(
         _class: &Bound<'_, PyType>,
@@ -106,8 +109,12 @@ impl GelSensor {
         order: &str,
         circles: Option<&Bound<'_, PyAny>>,
         layer: Option<(f64, f64, f64, f64)>,
+        gauge: Option<Vec<(Bound<'_, PyAny>, f64)>>,
     ) -> PyResult<Self> {
         let order = Order::named(order)?;
+        let gauge = gauge.unwrap_or_default().into_iter();
+        let gauge = gauge.map(|(frame, force)| Ok((arrays::colours("gauge", &frame)?, force)));
+        let gauge = gauge.collect::<PyResult<Vec<_>>>()?;
         let reference = arrays::colours("reference", reference)?;
         let frames = presses
             .iter()
@@ -139,10 +146,31 @@ impl GelSensor {
                     .filter(|circle| circle.iter().all(|v| !v.is_nan())),
             };
             let presses: Vec<_> = (0..frames.len()).map(press).collect();
-            Gel::calibrate(order.rgb(reference.view()), pixel_size, &presses)
+            let (sensor, report) =
+                Gel::calibrate(order.rgb(reference.view()), pixel_size, &presses)?;
+            let readings = gauge
+                .iter()
+                .map(|(frame, force)| Ok((sensor.read(order.rgb(frame.view()))?, *force)));
+            let readings = readings.collect::<Result<Vec<_>, GelError>>()?;
+            let pairs: Vec<_> = readings
+                .iter()
+                .map(|(frame, force)| (frame, *force))
+                .collect();
+            let gauge = (!pairs.is_empty())
+                .then(|| GaugeForce::fit(&pairs))
+                .transpose()?;
+            Ok((
+                CalibratedGel {
+                    sensor,
+                    layer,
+                    gauge,
+                },
+                report,
+            ))
         });
-        let (sensor, report) = found.map_err(errors::refused)?;
-        Self::new(py, sensor, layer, order, Some(report))
+        let found: Result<_, GelError> = found;
+        let (gel, report) = found.map_err(errors::refused)?;
+        Self::new(py, gel, order, Some(report))
     }
 
     /// Calibrates by the presses that a calibration file names, as `tactile calibrate` does.
@@ -156,14 +184,9 @@ impl GelSensor {
     ) -> PyResult<Self> {
         let order = Order::named(order)?;
         let presses = PhotometricPresses::read(path).map_err(errors::file)?;
-        let found = py.detach(|| {
-            let (sensor, report) = presses.calibrate()?;
-            let layer = presses.gel(&sensor)?;
-            Ok((sensor, report, layer))
-        });
-        let found: Result<_, tactile_imaging::gel::GelError> = found;
-        let (sensor, report, layer) = found.map_err(errors::refused)?;
-        Self::new(py, sensor, layer, order, Some(report))
+        let found = py.detach(|| presses.calibrate());
+        let (gel, report) = found.map_err(errors::refused)?;
+        Self::new(py, gel, order, Some(report))
     }
 
     /// Reads a sensor file, as `save` and `tactile calibrate` write it.
@@ -176,13 +199,13 @@ impl GelSensor {
         order: &str,
     ) -> PyResult<Self> {
         let order = Order::named(order)?;
-        let (sensor, layer) = PhotometricSensor::read(path).map_err(errors::file)?;
-        Self::new(py, sensor, layer, order, None)
+        let gel = PhotometricSensor::read(path).map_err(errors::file)?;
+        Self::new(py, gel, order, None)
     }
 
     /// Writes the sensor file, TOML, and the frame without contact beside it.
     fn save(&self, path: PathBuf) -> PyResult<()> {
-        PhotometricSensor::write(path, &self.sensor, self.layer).map_err(errors::file)
+        self.gel.write(path).map_err(errors::file)
     }
 
     /// The face, the contacts and the forces of a frame.
@@ -195,14 +218,14 @@ impl GelSensor {
     fn read(&self, py: Python<'_>, frame: &Bound<'_, PyAny>) -> PyResult<GelFrame> {
         let frame = arrays::colours("frame", frame)?;
         let found = py.detach(|| {
-            let frame = self.sensor.read(self.order.rgb(frame.view()))?;
+            let frame = self.gel.sensor.read(self.order.rgb(frame.view()))?;
             let forces = self
                 .law
                 .as_ref()
                 .map(|law| (law.forces(&frame), law.force(&frame)));
             Ok((frame, forces))
         });
-        let found: Result<_, tactile_imaging::gel::GelError> = found;
+        let found: Result<_, GelError> = found;
         let (frame, forces) = found.map_err(errors::refused)?;
         let flags = frame.doubts.iter().map(|doubt| self.order.sentence(doubt));
         if frame.is_refused() {
@@ -222,13 +245,13 @@ impl GelSensor {
     /// Size of a pixel on the gel in metres.
     #[getter]
     fn pixel_size(&self) -> f64 {
-        self.sensor.model().pixel_size_m
+        self.gel.sensor.model().pixel_size_m
     }
 
     /// Rows and columns of its frames.
     #[getter]
     fn shape(&self) -> (usize, usize) {
-        self.sensor.shape()
+        self.gel.sensor.shape()
     }
 
     /// Order of the channels of its frames.
@@ -249,20 +272,18 @@ impl GelSensor {
 impl GelSensor {
     fn new(
         py: Python<'_>,
-        sensor: Gel,
-        layer: Option<GelLayer>,
+        gel: CalibratedGel,
         order: Order,
         report: Option<CalibrationReport>,
     ) -> PyResult<Self> {
-        let law = layer.as_ref().map(|layer| GelForce::new(layer, &sensor));
-        let law = law.transpose().map_err(errors::refused)?;
+        let law = gel.law().map_err(errors::refused)?;
         let report = report.map(|report| {
             let circles = Array2::from_shape_fn((report.circles.len(), 3), |(n, k)| {
                 report.circles[n]
                     .used_px
                     .map_or(f64::NAN, |circle| circle[k])
             });
-            let model = sensor.model();
+            let model = gel.sensor.model();
             let angle = report.median_angle_deg;
             Py::new(
                 py,
@@ -278,8 +299,7 @@ impl GelSensor {
         });
         Ok(Self {
             report: report.transpose()?,
-            sensor,
-            layer,
+            gel,
             law,
             order,
         })

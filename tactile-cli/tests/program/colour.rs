@@ -227,3 +227,29 @@ fn frames_without_colours_are_refused() {
     assert_eq!(output.status.code(), Some(1), "{}", text(&output.stderr));
     assert_eq!(value(&output)["frames"], 1);
 }
+
+/// Neither layer nor modulus: forces of the same ball by what a gauge read, kept in the sensor file.
+#[test]
+fn a_gauge_gives_forces_without_a_layer() {
+    let folder = folder_with_examples();
+    let data = "examples/data/colour/";
+    let mut text = fs::read_to_string(folder.path().join(data).join("calibration.toml")).unwrap();
+    text = text.replace("= \"press", &format!("= \"{data}press"));
+    text = text.replace("\"reference.png\"", &format!("\"{data}reference.png\""));
+    // Contact radii in pixels: the force of a ball goes with their cube.
+    for (press, radius) in [(1, 16.0_f64), (3, 15.0), (4, 17.0), (5, 17.0)] {
+        let force = 0.1 * (radius / 16.0).powi(3);
+        text += &format!("\n[[gauge]]\nimage = \"{data}press_{press}.png\"\nforce_N = {force}\n");
+    }
+    fs::write(folder.path().join("gauge.toml"), text).unwrap();
+    printed(folder.path(), "calibrate gauge.toml --out made/gauge.toml");
+    let line = format!("measure made/gauge.toml {data}press_6.png --json");
+    let found: Value = serde_json::from_str(&printed(folder.path(), &line)).unwrap();
+    assert_keeps_to_schema(&found, "measure");
+    let part = |name: &str| found["frames"][0]["force_n"][name].as_f64().unwrap();
+    let miss = (part("value") - 0.1).abs();
+    assert!(
+        miss < 0.02 && miss < 3.0 * part("standard_error"),
+        "{found}"
+    );
+}

@@ -47,4 +47,4 @@ pub use calibration::CalibratedSensor;
 pub use file::{Sensor, SensorGeometry};
 pub use findings::{LayerFinding, PressFinding, SensorError};
 pub use input::{Indenter, LayerInput, SensorCalibration, SensorPress};
-pub use photometric::{PhotometricPresses, PhotometricSensor};
+pub use photometric::{CalibratedGel, PhotometricPresses, PhotometricSensor};

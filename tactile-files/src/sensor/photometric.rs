@@ -7,7 +7,10 @@ use ndarray::Array3;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use tactile_imaging::core::Estimate;
-use tactile_imaging::gel::{BallPress, CalibrationReport, GelError, GelLayer, GelModel, GelSensor};
+use tactile_imaging::gel::{
+    BallPress, CalibrationReport, GaugeForce, GelError, GelForce, GelLaw, GelLayer, GelModel,
+    GelSensor,
+};
 
 /// Presses of balls on a gel that is lit in colours, as a calibration file names them.
 ///
@@ -25,7 +28,7 @@ use tactile_imaging::gel::{BallPress, CalibrationReport, GelError, GelLayer, Gel
 /// ```no_run
 /// use tactile_files::sensor::PhotometricPresses;
 /// let presses = PhotometricPresses::read("calibration.toml")?;
-/// let (sensor, found) = presses.calibrate()?;
+/// let (gel, found) = presses.calibrate()?;
 /// for (name, circle) in presses.names.iter().zip(&found.circles).filter(|(_, c)| c.wrong) {
 ///     println!("{}: drawn {:?}, found {:?}", name.display(), circle.drawn_px, circle.found_px);
 /// }
@@ -44,6 +47,8 @@ pub struct PhotometricPresses {
     pub names: Vec<PathBuf>,
     /// The gel's layer, and what stands under known weights: frame and force.
     gel: Option<(GelLayer, Vec<KnownWeight>)>,
+    /// Frames of one body, and what a gauge read under them in newtons.
+    gauge: Vec<(Array3<u8>, f64)>,
     /// Frame, ball's radius in metres and drawn circle of each press.
     presses: Vec<(Array3<u8>, f64, Option<[f64; 3]>)>,
 }
@@ -70,6 +75,16 @@ struct CalibrationFile {
     #[serde(deserialize_with = "one_or_more")]
     presses: Vec<PressTable>,
     gel: Option<GelTable>,
+    #[serde(default)]
+    gauge: Vec<GaugeTable>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct GaugeTable {
+    image: PathBuf,
+    #[serde(rename = "force_N", deserialize_with = "positive")]
+    force_n: f64,
 }
 
 #[derive(Deserialize)]
@@ -137,8 +152,15 @@ impl PhotometricPresses {
             names.push(press.image);
         }
         let gel = file.gel.map(|table| table.read(path, &reference));
+        let mut gauge = Vec::new();
+        for (k, reading) in file.gauge.into_iter().enumerate() {
+            let field = format!("gauge[{}].image", k + 1);
+            let frame = frame(path, &field, &reading.image, Some(&reference))?;
+            gauge.push((frame, reading.force_n));
+        }
         Ok(Self {
             gel: gel.transpose()?,
+            gauge,
             reference_path,
             reference,
             pixel_size_m: file.pixel_size_m,
@@ -147,11 +169,13 @@ impl PhotometricPresses {
         })
     }
 
-    /// Calibrates the sensor.
+    /// Calibrates the sensor, and its forces. Where weights are given, the gel's modulus is that under
+    /// which the sensor reads them.
     ///
     /// # Errors
-    /// Those of [`GelSensor::calibrate`].
-    pub fn calibrate(&self) -> Result<(GelSensor, CalibrationReport), GelError> {
+    /// Those of [`GelSensor::calibrate`], and [`GelError::NoContact`] for a weight or a gauge's reading
+    /// without contact.
+    pub fn calibrate(&self) -> Result<(CalibratedGel, CalibrationReport), GelError> {
         let presses = self
             .presses
             .iter()
@@ -161,23 +185,85 @@ impl PhotometricPresses {
                 circle_px: *circle,
             });
         let presses: Vec<_> = presses.collect();
-        GelSensor::calibrate(self.reference.view(), self.pixel_size_m, &presses)
+        let (sensor, report) =
+            GelSensor::calibrate(self.reference.view(), self.pixel_size_m, &presses)?;
+        let layer = self.gel.as_ref().map(|(gel, weights)| {
+            let weights: Vec<_> = weights.iter().map(|(f, n)| (f.view(), *n)).collect();
+            match weights.is_empty() {
+                true => Ok(*gel),
+                false => gel.weighed(&sensor, &weights),
+            }
+        });
+        let (layer, gauge) = (layer.transpose()?, gauge_force(&sensor, &self.gauge)?);
+        Ok((
+            CalibratedGel {
+                sensor,
+                layer,
+                gauge,
+            },
+            report,
+        ))
     }
+}
 
-    /// The gel of the calibration file. Where weights are given, its modulus is that under which a
-    /// calibrated sensor reads them.
+/// The law of a gauge's readings. `None` without any.
+fn gauge_force(
+    sensor: &GelSensor,
+    readings: &[(Array3<u8>, f64)],
+) -> Result<Option<GaugeForce>, GelError> {
+    if readings.is_empty() {
+        return Ok(None);
+    }
+    let frames = readings
+        .iter()
+        .map(|(frame, force)| Ok((sensor.read(frame.view())?, *force)));
+    let frames = frames.collect::<Result<Vec<_>, GelError>>()?;
+    let pairs: Vec<_> = frames
+        .iter()
+        .map(|(frame, force)| (frame, *force))
+        .collect();
+    GaugeForce::fit(&pairs).map(Some)
+}
+
+/// A calibrated gel: its sensor, and where its forces come from.
+#[derive(Clone, Debug)]
+pub struct CalibratedGel {
+    /// The sensor.
+    pub sensor: GelSensor,
+    /// The gel's layer, where it is known.
+    pub layer: Option<GelLayer>,
+    /// Forces by a gauge's readings, where there are some.
+    pub gauge: Option<GaugeForce>,
+}
+
+impl CalibratedGel {
+    /// The law of the forces: that of the layer, or else that of the gauge. `None` without either.
     ///
     /// # Errors
-    /// [`GelError`]: [`GelError::NoContact`] for a weight without contact.
-    pub fn gel(&self, sensor: &GelSensor) -> Result<Option<GelLayer>, GelError> {
-        let Some((gel, weights)) = &self.gel else {
-            return Ok(None);
-        };
-        if weights.is_empty() {
-            return Ok(Some(*gel));
+    /// Those of [`GelForce::new`].
+    pub fn law(&self) -> Result<Option<GelLaw>, GelError> {
+        match (self.layer, self.gauge) {
+            (Some(layer), _) => {
+                let law = GelForce::new(&layer, &self.sensor)?;
+                Ok(Some(GelLaw::Layer(Box::new(law))))
+            }
+            (None, gauge) => Ok(gauge.map(GelLaw::Gauge)),
         }
-        let weights: Vec<_> = weights.iter().map(|(f, n)| (f.view(), *n)).collect();
-        gel.weighed(sensor, &weights).map(Some)
+    }
+
+    /// Writes a sensor file, and the frame without contact beside it as `NAME_reference.png`.
+    ///
+    /// # Errors
+    /// [`FileError::Write`] and [`FileError::Image`].
+    pub fn write(&self, path: impl AsRef<Path>) -> Result<(), FileError> {
+        let path = path.as_ref();
+        let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+        let reference = format!("{stem}_reference.png");
+        write_colour_image(path.with_file_name(&reference), self.sensor.reference())?;
+        let text = PhotometricSensor::of(reference, self)
+            .to_toml()
+            .map_err(|error| FileError::field(path, "model", error))?;
+        write_bytes(path, text.as_bytes())
     }
 }
 
@@ -266,43 +352,21 @@ pub struct PhotometricSensor {
     /// The gel's layer, for forces.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gel: Option<GelLayer>,
+    /// The law of a gauge's readings, for forces without a layer.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub gauge: Option<GaugeForce>,
 }
 
 impl PhotometricSensor {
-    /// A sensor file with this frame without contact, relative to the file.
-    pub fn new(reference: impl Into<PathBuf>, model: GelModel) -> Self {
+    /// The file of a calibrated gel, with its frame without contact relative to the file.
+    pub fn of(reference: impl Into<PathBuf>, gel: &CalibratedGel) -> Self {
         Self {
             kind: Kind::Photometric,
             reference: reference.into(),
-            model,
-            gel: None,
+            model: gel.sensor.model().clone(),
+            gel: gel.layer,
+            gauge: gel.gauge,
         }
-    }
-
-    /// With the gel's layer.
-    pub fn with_gel(mut self, gel: Option<GelLayer>) -> Self {
-        self.gel = gel;
-        self
-    }
-
-    /// Writes a sensor file, and the frame without contact beside it as `NAME_reference.png`.
-    ///
-    /// # Errors
-    /// [`FileError::Write`] and [`FileError::Image`].
-    pub fn write(
-        path: impl AsRef<Path>,
-        sensor: &GelSensor,
-        gel: Option<GelLayer>,
-    ) -> Result<(), FileError> {
-        let path = path.as_ref();
-        let stem = path.file_stem().unwrap_or_default().to_string_lossy();
-        let reference = format!("{stem}_reference.png");
-        write_colour_image(path.with_file_name(&reference), sensor.reference())?;
-        let file = Self::new(reference, sensor.model().clone()).with_gel(gel);
-        let text = file
-            .to_toml()
-            .map_err(|error| FileError::field(path, "model", error))?;
-        write_bytes(path, text.as_bytes())
     }
 
     /// The file's text.
@@ -313,17 +377,16 @@ impl PhotometricSensor {
         toml::to_string(self)
     }
 
-    /// Reads a sensor file and its frame without contact: the sensor, and its gel where the file
-    /// has one.
+    /// Reads a sensor file and its frame without contact.
     ///
     /// # Errors
     /// [`FileError`]: one sentence that names the file, the field and what was expected.
-    pub fn read(path: impl AsRef<Path>) -> Result<(GelSensor, Option<GelLayer>), FileError> {
+    pub fn read(path: impl AsRef<Path>) -> Result<CalibratedGel, FileError> {
         Self::from_file(path.as_ref())
     }
 
     /// Not generic, so that the parser is compiled once, not again in every crate that reads.
-    fn from_file(path: &Path) -> Result<(GelSensor, Option<GelLayer>), FileError> {
+    fn from_file(path: &Path) -> Result<CalibratedGel, FileError> {
         let file: Self = read_toml(path)?;
         if let Some(gel) = &file.gel {
             check(gel, path)?;
@@ -331,6 +394,10 @@ impl PhotometricSensor {
         let reference = frame(path, "reference", &file.reference, None)?;
         let stereo = GelSensor::new(file.model, reference.view());
         let stereo = stereo.map_err(|error| FileError::field(path, "model", error))?;
-        Ok((stereo, file.gel))
+        Ok(CalibratedGel {
+            sensor: stereo,
+            layer: file.gel,
+            gauge: file.gauge,
+        })
     }
 }

@@ -91,6 +91,17 @@ fn areas_depths_and_forces_are_those_of_exact_worlds() {
             let truth = press.force_n(stiff, PIXEL_M);
             force.push((found.value / truth - 1.0).abs());
             held[2] += within(found, truth);
+            // About the middle of the frame, without markers: the face's own three.
+            let wrench = law.wrench(&frame, None).unwrap();
+            let [x, y] = [at[0] - 159.5, at[1] - 119.5].map(|px| px * PIXEL_M);
+            for (moment, arm) in [(wrench.torque_nm[0], y), (wrench.torque_nm[1], -x)] {
+                // A centroid that is off by a pixel, and the force's own error.
+                let miss = (moment.unwrap().value - arm * truth).abs();
+                let bound = truth * PIXEL_M + 3.0 * found.standard_error * arm.abs();
+                assert!(miss < bound, "{k}: {wrench:?}, {arm} m times {truth} N");
+            }
+            assert_eq!(wrench.force_n[2].map(|f| f.value), Some(found.value));
+            assert!(wrench.force_n[0].is_none() && wrench.torque_nm[2].is_none());
             text = format!(
                 "force {:.3} ± {:.3}",
                 found.value / truth,
@@ -223,7 +234,7 @@ fn a_gauge_gives_forces_without_a_layer() {
     let law = GaugeForce::fit(&readings).unwrap();
     let others = (20..40).map(|k| read(k, 11.0 + 18.0 * random(k, 7)));
     let misses = others.map(|(frame, force)| {
-        let found = law.force(&frame).unwrap();
+        let found = law.forces(&frame)[0];
         assert!(found.relative_error() < 0.15, "{found:?}");
         (found.value - force) / found.standard_error
     });

@@ -218,6 +218,7 @@ class GelSensor:
         order: str = "rgb",
         circles: ArrayLike | None = None,
         layer: tuple[float, float, float, float] | None = None,
+        gauge: Sequence[tuple[ArrayLike, float]] | None = None,
     ) -> GelSensor: ...
     @classmethod
     def calibrate_file(cls, path: str | PathLike[str], *, order: str = "rgb") -> GelSensor: ...
