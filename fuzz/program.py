@@ -4,7 +4,7 @@
 
 What must hold of every call: it ends within ten seconds of the processor's time with one of the program's exit
 codes and without a panic, takes no more memory than its limit, prints what is wrong in one sentence, and with --json either
-nothing or one object of which no measured number lacks its value. A call that breaks a rule is kept with
+nothing or one object (a stream one a line) of which no measured number lacks its value. A call that breaks a rule is kept with
 its files in --found.
 """
 
@@ -115,7 +115,8 @@ def complaint(folder: pathlib.Path, program: pathlib.Path, words: list[str], lon
     if not ended.stdout:
         return None
     try:
-        answer = json.loads(ended.stdout)
+        # A stream prints a line of JSON for every frame before its answer.
+        answer = [json.loads(line) for line in ended.stdout.splitlines()] if words[0] == "stream" else json.loads(ended.stdout)
     except ValueError as error:
         return f"prints no JSON: {error}"
     return silent(answer, "") if ended.returncode == 0 else None
