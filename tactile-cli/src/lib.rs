@@ -5,7 +5,6 @@
 //! cargo run --release -p tactile-cli -- measure
 //! ```
 #![forbid(unsafe_code)]
-#![warn(unreachable_pub)]
 
 mod arguments;
 mod calibrate;

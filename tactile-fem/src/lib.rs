@@ -40,7 +40,6 @@
 //! *Computational Contact Mechanics* (2006). M. Hintermüller, K. Ito & K. Kunisch, SIAM J. Optim.
 //! 13 (2003) 865. B. Yang, T. A. Laursen & X. Meng, Int. J. Numer. Meth. Eng. 62 (2005) 1183.
 #![forbid(unsafe_code)]
-#![warn(unreachable_pub)]
 
 mod contact;
 mod element;

@@ -33,7 +33,6 @@
 //! - Noise of a difference: $\sigma^2 = \sigma_0^2 + g d$; of the force: $\sigma_F^2 = (dF/dV)^2
 //!   \sigma_V^2 + \sigma_{cal}^2$.
 #![forbid(unsafe_code)]
-#![warn(unreachable_pub)]
 
 mod calibration;
 mod contact;

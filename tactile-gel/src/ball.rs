@@ -61,7 +61,7 @@ struct Fit {
 }
 
 /// Evidence over the presses of a calibration.
-pub struct Evidence {
+pub(crate) struct Evidence {
     fits: Vec<Fit>,
     levels: f64,
     count: f64,
@@ -70,13 +70,13 @@ pub struct Evidence {
 }
 
 /// The face of the balls, and a doubtful size: the factor by which they are smaller than stated.
-pub struct Verdict {
+pub(crate) struct Verdict {
     pub face: BallFace,
     pub factor: Option<f64>,
 }
 
 impl Evidence {
-    pub fn new() -> Self {
+    pub(crate) fn new() -> Self {
         let faces = [BallFace::Sphere, BallFace::Paraboloid];
         let each = faces
             .iter()
@@ -96,7 +96,13 @@ impl Evidence {
     }
 
     /// Adds the press in a circle, lengths in pixels.
-    pub fn add(&mut self, frame: &Blurred, reference: &Blurred, circle: [f64; 3], ball_px: f64) {
+    pub(crate) fn add(
+        &mut self,
+        frame: &Blurred,
+        reference: &Blurred,
+        circle: [f64; 3],
+        ball_px: f64,
+    ) {
         let [x0, y0, radius] = circle;
         let reach = 0.85 * radius.min(0.97 * ball_px);
         let (rows, columns) = frame.dim();
@@ -136,7 +142,7 @@ impl Evidence {
         }
     }
 
-    pub fn verdict(mut self) -> Verdict {
+    pub(crate) fn verdict(mut self) -> Verdict {
         let stated = Verdict {
             face: BallFace::Sphere,
             factor: None,

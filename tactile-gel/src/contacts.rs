@@ -37,7 +37,7 @@ const KINK_SHIFT: f64 = 0.15;
 
 /// A patch of pressure with its edge, in pixels of the frame.
 #[derive(Clone, Debug)]
-pub struct Patch {
+pub(crate) struct Patch {
     /// Pixels inside, row by row.
     pub pixels: Vec<[usize; 2]>,
     /// Pixels on the edge, by which the rim's level is taken.
@@ -50,14 +50,14 @@ pub struct Patch {
 }
 
 /// Pressure and slopes on cells of 2 × 2 pixels.
-pub struct Cells {
+pub(crate) struct Cells {
     /// Along x and y.
     pub slopes: [Array2<f32>; 2],
     pub pressure: Array2<f32>,
 }
 
 /// Means over blocks of `size` pixels a side. Incomplete blocks are left out.
-pub fn block_means(values: ArrayView2<'_, f32>, size: usize) -> Array2<f32> {
+pub(crate) fn block_means(values: ArrayView2<'_, f32>, size: usize) -> Array2<f32> {
     let (rows, columns) = (values.nrows() / size, values.ncols() / size);
     let mut means = Array2::zeros((rows, columns));
     let share = 1.0 / (size * size) as f32;
@@ -74,7 +74,7 @@ pub fn block_means(values: ArrayView2<'_, f32>, size: usize) -> Array2<f32> {
 }
 
 /// Blurs by (1, 4, 6, 4, 1)/16 along both axes, so many times. The border is continued.
-pub fn blurred(image: &Array2<f32>, times: usize) -> Array2<f32> {
+pub(crate) fn blurred(image: &Array2<f32>, times: usize) -> Array2<f32> {
     let (rows, columns) = image.dim();
     let tap = |at: [f32; 5]| (at[0] + at[4] + 4.0 * (at[1] + at[3]) + 6.0 * at[2]) / 16.0;
     let near = |k: usize, n: usize| [0, 1, 2, 3, 4].map(|j| (k + j).saturating_sub(2).min(n - 1));
@@ -107,7 +107,7 @@ pub fn blurred(image: &Array2<f32>, times: usize) -> Array2<f32> {
 }
 
 /// A quantile of values, 0 without any.
-pub fn quantile(values: &mut [f32], share: f64) -> f32 {
+pub(crate) fn quantile(values: &mut [f32], share: f64) -> f32 {
     if values.is_empty() {
         return 0.0;
     }
@@ -116,7 +116,7 @@ pub fn quantile(values: &mut [f32], share: f64) -> f32 {
 }
 
 /// Standard deviation of most of a field, from its median absolute deviation.
-pub fn spread(field: &Array2<f32>) -> f32 {
+pub(crate) fn spread(field: &Array2<f32>) -> f32 {
     // Every third cell is enough for a median, of large fields fewer.
     let step = (field.len() / SPREAD_CELLS).max(3);
     let mut values: Vec<f32> = field.iter().step_by(step).copied().collect();
@@ -127,7 +127,7 @@ pub fn spread(field: &Array2<f32>) -> f32 {
 
 /// The patches of a frame of `shape`, the strongest first. `noise_floor` is the least standard
 /// deviation that the smoothed pressure can have.
-pub fn patches(cells: &Cells, shape: (usize, usize), noise_floor: f32) -> Vec<Patch> {
+pub(crate) fn patches(cells: &Cells, shape: (usize, usize), noise_floor: f32) -> Vec<Patch> {
     if cells.pressure.nrows() < 8 || cells.pressure.ncols() < 8 {
         return Vec::new();
     }

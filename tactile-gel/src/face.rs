@@ -107,13 +107,13 @@ impl GelFrame {
 }
 
 /// Standard errors of a gradient for one of the normal.
-pub fn gradient_errors([p, q]: [f32; 2]) -> [f32; 2] {
+pub(crate) fn gradient_errors([p, q]: [f32; 2]) -> [f32; 2] {
     let length = (1.0 + p * p + q * q).sqrt();
     [p, q].map(|own| length * ((1.0 + own * own).powi(2) + (p * q).powi(2)).sqrt())
 }
 
 /// The face and the contacts of slopes.
-pub fn frame(
+pub(crate) fn frame(
     (model, tails): (&GelModel, &Tails),
     gradient: [Array2<f32>; 2],
     cells: &Cells,
@@ -226,13 +226,13 @@ impl Face<'_> {
 }
 
 /// Whether slopes are of no face that is pressed in, on blocks of cells.
-pub struct SurfaceCheck {
+pub(crate) struct SurfaceCheck {
     block: usize,
     plane: Plane,
 }
 
 impl SurfaceCheck {
-    pub fn new((rows, columns): (usize, usize)) -> Self {
+    pub(crate) fn new((rows, columns): (usize, usize)) -> Self {
         let (rows, columns) = (rows / 2, columns / 2);
         let block = rows.max(columns).div_ceil(COARSE).max(1);
         Self {
@@ -243,7 +243,7 @@ impl SurfaceCheck {
 
     /// Whether the curl of slopes on cells is as large as their divergence, or the face comes out of
     /// the gel.
-    pub fn no_surface(&self, cells: &Cells, noise_floor: f32) -> bool {
+    pub(crate) fn no_surface(&self, cells: &Cells, noise_floor: f32) -> bool {
         let [p, q] = cells
             .slopes
             .each_ref()

@@ -145,7 +145,7 @@ impl core::fmt::Display for FrameDoubt {
 }
 
 /// What the border shows: factors of the channels, and doubts.
-pub struct FrameLight {
+pub(crate) struct FrameLight {
     /// Factor of the exposure, common to all channels.
     pub gain: f64,
     pub doubts: Vec<FrameDoubt>,
@@ -153,13 +153,13 @@ pub struct FrameLight {
 
 /// Block means of one image, and how much neighbouring pixels differ.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Blocks {
+pub(crate) struct Blocks {
     means: Array3<f32>,
     roughness: f64,
 }
 
 impl Blocks {
-    pub fn of(image: &Blurred) -> Self {
+    pub(crate) fn of(image: &Blurred) -> Self {
         let (rows, columns) = image.dim();
         let size = rows.max(columns).div_ceil(BLOCKS).max(LEAST_BLOCK);
         let size = size.min(rows).min(columns);
@@ -245,7 +245,7 @@ const ORDERS: [[usize; 3]; 5] = [[2, 1, 0], [1, 0, 2], [0, 2, 1], [1, 2, 0], [2,
 const TURNS: [Turn; 4] = [Turn::Half, Turn::LeftRight, Turn::TopBottom, Turn::Quarter];
 
 /// Compares a frame with the reference.
-pub fn light(frame: &Blocks, reference: &Blocks) -> FrameLight {
+pub(crate) fn light(frame: &Blocks, reference: &Blocks) -> FrameLight {
     let same = |doubts| FrameLight { gain: 1.0, doubts };
     let mean = frame.mean();
     if mean < DARK {

@@ -7,7 +7,7 @@ use tactile_core::vectorised;
 const MONOMIALS: usize = 20;
 
 /// Coefficients of one component of the normal: every monomial times 1, x and y.
-pub const TERMS: usize = 3 * MONOMIALS;
+pub(crate) const TERMS: usize = 3 * MONOMIALS;
 
 /// Columns that are computed together, so that the compiler uses wide instructions.
 const LANES: usize = 16;
@@ -21,14 +21,14 @@ const BORDER_SAMPLES: usize = 6400;
 /// The kernel has a standard deviation of one pixel. Samples are kept as whole numbers of 1/256
 /// grey level, which 16 bits hold exactly. The border is continued by its last pixel.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Blurred {
+pub(crate) struct Blurred {
     rows: usize,
     columns: usize,
     channels: [Vec<u16>; 3],
 }
 
 impl Blurred {
-    pub fn of(image: ArrayView3<'_, u8>) -> Self {
+    pub(crate) fn of(image: ArrayView3<'_, u8>) -> Self {
         let (rows, columns, _) = image.dim();
         let mut channels = [(); 3].map(|()| vec![0_u16; rows * columns]);
         // Rows that are blurred along themselves: five are needed at a time.
@@ -59,17 +59,17 @@ impl Blurred {
         }
     }
 
-    pub fn dim(&self) -> (usize, usize) {
+    pub(crate) fn dim(&self) -> (usize, usize) {
         (self.rows, self.columns)
     }
 
     /// A row of a channel, in 1/256 grey level.
-    pub fn line(&self, channel: usize, row: usize) -> &[u16] {
+    pub(crate) fn line(&self, channel: usize, row: usize) -> &[u16] {
         &self.channels[channel][row * self.columns..][..self.columns]
     }
 
     /// The image at a `gain`-th of its exposure.
-    pub fn divided_by(mut self, gain: f64) -> Self {
+    pub(crate) fn divided_by(mut self, gain: f64) -> Self {
         if gain != 1.0 {
             let factor = (1.0 / gain) as f32;
             for sample in self.channels.iter_mut().flatten() {
@@ -194,7 +194,7 @@ fn place(row: usize, column: usize, (rows, columns): (usize, usize)) -> [f32; 2]
 }
 
 /// Terms of the polynomial at the pixels that `wanted` takes, each given to `each`.
-pub fn samples(
+pub(crate) fn samples(
     frame: &Blurred,
     reference: &Blurred,
     mut each: impl FnMut(usize, usize, &dyn Fn() -> [f64; TERMS]),
@@ -213,7 +213,7 @@ pub fn samples(
 }
 
 /// The components n_x and n_y of the unit normal at every pixel.
-pub fn normals(
+pub(crate) fn normals(
     frame: &Blurred,
     reference: &Blurred,
     coefficients: &[Vec<f64>; 2],

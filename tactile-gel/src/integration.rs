@@ -24,7 +24,7 @@ const ENOUGH: f64 = 1e-3;
 /// Depth in the unit of `size`, that of a pixel, up to a constant. `means` are the slopes on cells of
 /// 2 × 2 pixels, half of the frame's size. The blur of the frames is wider than a cell: depth is solved
 /// for on cells, and goes on from their middles to the pixels by the slopes of both.
-pub fn integrated(
+pub(crate) fn integrated(
     slopes: [&Array2<f32>; 2],
     means: [&Array2<f32>; 2],
     size: f64,

@@ -21,14 +21,14 @@ const LEAST_YIELD: f64 = 0.05;
 
 /// A bonded layer: its thickness in cells and Poisson's ratio.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct LayerShape {
+pub(crate) struct LayerShape {
     pub thickness: f64,
     pub poisson_ratio: f64,
 }
 
 impl LayerShape {
     /// L(s) of the module's documentation.
-    pub fn yields(self, wavenumber: f64) -> f64 {
+    pub(crate) fn yields(self, wavenumber: f64) -> f64 {
         // Beyond 20 both hyperbolic functions are the same exponential.
         let s = (wavenumber * self.thickness).clamp(1e-4, 20.0);
         let kappa = 3.0 - 4.0 * self.poisson_ratio;
@@ -38,7 +38,7 @@ impl LayerShape {
 }
 
 /// Transforms for a grid of square cells. Lengths are in cells.
-pub struct Plane {
+pub(crate) struct Plane {
     shape: (usize, usize),
     padded: (usize, usize),
     /// L of every wavenumber of the transposed spectrum. Empty for a half-space.
@@ -65,7 +65,7 @@ fn smooth_size(cells: usize) -> usize {
 
 impl Plane {
     /// With room of `room` times the grid beside it, which keeps copies apart.
-    pub fn new(shape: (usize, usize), room: f64, layer: Option<LayerShape>) -> Self {
+    pub(crate) fn new(shape: (usize, usize), room: f64, layer: Option<LayerShape>) -> Self {
         let larger = |n: usize| smooth_size((n as f64 * (1.0 + room)).ceil() as usize);
         let padded = (larger(shape.0), larger(shape.1));
         let mut planner = FftPlanner::new();
@@ -90,7 +90,7 @@ impl Plane {
     }
 
     /// f from slopes along x and y of displacements into the gel.
-    pub fn pressure(&self, p: ArrayView2<'_, f32>, q: ArrayView2<'_, f32>) -> Array2<f32> {
+    pub(crate) fn pressure(&self, p: ArrayView2<'_, f32>, q: ArrayView2<'_, f32>) -> Array2<f32> {
         let spectrum = self.spectrum(p, Some(q));
         let least = LEAST_YIELD as f32;
         let out = self.each(|at, mirrored, [x, y]| {
@@ -109,14 +109,14 @@ impl Plane {
 
     /// The part of slopes that belongs to no surface: their curl, scaled as `pressure` scales their
     /// divergence.
-    pub fn curl(&self, p: ArrayView2<'_, f32>, q: ArrayView2<'_, f32>) -> Array2<f32> {
+    pub(crate) fn curl(&self, p: ArrayView2<'_, f32>, q: ArrayView2<'_, f32>) -> Array2<f32> {
         // A quarter turn of the slopes makes their curl a divergence.
         let turned = p.mapv(|p| -p);
         self.pressure(q, turned.view())
     }
 
     /// Displacement, and slopes along x and y, under f.
-    pub fn moved(&self, f: ArrayView2<'_, f32>) -> (Array2<f32>, [Array2<f32>; 2]) {
+    pub(crate) fn moved(&self, f: ArrayView2<'_, f32>) -> (Array2<f32>, [Array2<f32>; 2]) {
         let spectrum = self.spectrum(f, None);
         let face = |at: usize, [x, y]: [f32; 2]| {
             let k = (x * x + y * y).sqrt();
@@ -243,7 +243,7 @@ fn transposed(field: &[Complex<f32>], width: usize) -> Vec<Complex<f32>> {
 }
 
 /// Bessel's function J₀ to 1e−7 (Abramowitz & Stegun, 9.4.1 and 9.4.3).
-pub fn bessel_j0(x: f64) -> f64 {
+pub(crate) fn bessel_j0(x: f64) -> f64 {
     let x = x.abs();
     let series =
         |coefficients: &[f64], t: f64| coefficients.iter().rev().fold(0.0, |sum, c| sum * t + c);

@@ -42,13 +42,13 @@ const DISTANCES: usize = 1450;
 
 /// The tails of layers of Poisson's ratio 0.48: r/h times g(r/h) of each thickness, at distances in
 /// steps of the frame's longer side.
-pub struct Tails(Vec<[f64; THICKNESSES.len()]>);
+pub(crate) struct Tails(Vec<[f64; THICKNESSES.len()]>);
 
 /// ρ g(ρ) of a layer, tabulated.
 struct LayerTail(Vec<f64>);
 
 impl Tails {
-    pub fn new() -> Self {
+    pub(crate) fn new() -> Self {
         let tail = LayerTail::new();
         let at = |k: usize| THICKNESSES.map(|h| tail.at(k as f64 / STEPS as f64 / h));
         Self((0..=DISTANCES).map(at).collect())
@@ -110,7 +110,7 @@ impl LayerTail {
 }
 
 /// The level that the face has far away, and its standard error, in metres.
-pub fn rest(
+pub(crate) fn rest(
     tails: &Tails,
     depth: &Array2<f64>,
     labels: &Array2<u16>,

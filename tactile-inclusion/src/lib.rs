@@ -29,7 +29,6 @@
 //! Raftery, J. Am. Stat. Assoc. 90 (1995) 773. H. Rue, S. Martino & N. Chopin, J. R. Stat. Soc. B
 //! 71 (2009) 319.
 #![forbid(unsafe_code)]
-#![warn(unreachable_pub)]
 
 mod covariance;
 mod design;

@@ -21,7 +21,7 @@ impl<const D: usize> Default for Frame<D> {
 
 impl<const D: usize> Frame<D> {
     /// Centre and root mean square radius of a set. Scale one where all points coincide.
-    pub fn of(points: &[Point<f64, D>]) -> Self {
+    pub(crate) fn of(points: &[Point<f64, D>]) -> Self {
         let (centre, radius) = centre_and_radius(points);
         Self {
             centre,
@@ -31,7 +31,7 @@ impl<const D: usize> Frame<D> {
 
     /// The model's centre and the largest distance from it along an axis in either set: for sets
     /// compared as they lie.
-    pub fn of_both(model: &[Point<f64, D>], target: &[Point<f64, D>]) -> Self {
+    pub(crate) fn of_both(model: &[Point<f64, D>], target: &[Point<f64, D>]) -> Self {
         let centre = Self::of(model).centre;
         let largest = model
             .iter()
@@ -45,12 +45,12 @@ impl<const D: usize> Frame<D> {
     }
 
     /// A point in this frame.
-    pub fn inside(&self, point: &Point<f64, D>) -> SVector<f64, D> {
+    pub(crate) fn inside(&self, point: &Point<f64, D>) -> SVector<f64, D> {
         (point.coords - self.centre) / self.scale
     }
 
     /// A point of this frame in the units of the caller.
-    pub fn leave(&self, inside: SVector<f64, D>) -> Point<f64, D> {
+    pub(crate) fn leave(&self, inside: SVector<f64, D>) -> Point<f64, D> {
         Point::from(inside * self.scale + self.centre)
     }
 }

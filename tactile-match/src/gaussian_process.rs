@@ -62,7 +62,7 @@ pub(crate) struct Detail {
 impl Prior {
     /// Factors the covariance at `points` (in the frame's units), as far as it matters beside the
     /// points' distances: `O(I r²)`.
-    pub fn build<const D: usize>(&mut self, points: &[[f64; D]], scales: PriorScales) {
+    pub(crate) fn build<const D: usize>(&mut self, points: &[[f64; D]], scales: PriorScales) {
         let denser = (DENSE / points.len() as f64).powf(2.0 / D as f64).min(1.0);
         let detail = Detail {
             rank: MAX_RANK,
@@ -73,7 +73,7 @@ impl Prior {
     }
 
     /// Factors the covariance at `points`: `O(I r²)`.
-    pub fn factor<const D: usize>(
+    pub(crate) fn factor<const D: usize>(
         &mut self,
         points: &[[f64; D]],
         scales: PriorScales,
@@ -151,13 +151,13 @@ impl Prior {
     }
 
     /// Columns that matter beside noise of variance `noise`.
-    pub fn rank_beside(&self, noise: f64) -> usize {
+    pub(crate) fn rank_beside(&self, noise: f64) -> usize {
         self.left
             .partition_point(|&left| left > self.detail.hidden * noise)
     }
 
     /// Column `p` of the factor.
-    pub fn column(&self, p: usize) -> &[f64] {
+    pub(crate) fn column(&self, p: usize) -> &[f64] {
         &self.columns[p * self.stride..(p + 1) * self.stride]
     }
 }
@@ -181,7 +181,7 @@ impl<const D: usize> Default for Axes<D> {
 
 impl<const D: usize> Axes<D> {
     /// Takes `rows`, padded to `stride`.
-    pub fn fill(&mut self, stride: usize, rows: impl Iterator<Item = [f64; D]>) {
+    pub(crate) fn fill(&mut self, stride: usize, rows: impl Iterator<Item = [f64; D]>) {
         self.0.iter_mut().for_each(Vec::clear);
         for row in rows {
             self.0
@@ -229,7 +229,7 @@ pub(crate) struct Regression<const D: usize> {
 impl<const D: usize> Regression<D> {
     /// Fits `targets` (displacements, one array an axis) with `weights`, both padded with zeros, at
     /// noise variance `noise`, in the modes that are not lost in it: `O(I r² + r³)`.
-    pub fn fit(&mut self, prior: &Prior, weights: &[f64], targets: &Axes<D>, noise: f64) {
+    pub(crate) fn fit(&mut self, prior: &Prior, weights: &[f64], targets: &Axes<D>, noise: f64) {
         let r = prior.rank_beside(noise);
         (self.rank, self.noise) = (r, noise);
         self.gram.resize(r * r, 0.0);
@@ -266,7 +266,7 @@ impl<const D: usize> Regression<D> {
     }
 
     /// Sets displacement and variance of every padded row. No penalty, no determinant.
-    pub fn set(&mut self, padded: usize, row: impl Fn(usize) -> ([f64; D], f64)) {
+    pub(crate) fn set(&mut self, padded: usize, row: impl Fn(usize) -> ([f64; D], f64)) {
         self.solution.clear();
         self.whitened.clear();
         self.log_det = 0.0;
@@ -283,7 +283,7 @@ impl<const D: usize> Regression<D> {
 
     /// Computes the variances of the last fit: `O(I r²)`. Keeps what
     /// [`covariance`](Self::covariance) needs if `with_covariances`.
-    pub fn variances(&mut self, prior: &Prior, with_covariances: bool) {
+    pub(crate) fn variances(&mut self, prior: &Prior, with_covariances: bool) {
         let (r, stride, noise) = (self.rank, prior.stride, self.noise);
         let blocks = stride / LANES;
         let stripes = blocks.div_ceil(TOGETHER);
@@ -317,7 +317,7 @@ impl<const D: usize> Regression<D> {
 
     /// Covariance of the displacements of two points, along one axis, after
     /// [`variances`](Self::variances) with covariances: `O(r)`. None of rigid fits.
-    pub fn covariance(&self, a: usize, b: usize) -> f64 {
+    pub(crate) fn covariance(&self, a: usize, b: usize) -> f64 {
         let rows = |i: usize| {
             let first = i / (TOGETHER * LANES) * self.rank;
             let stripe = self.whitened.iter().skip(first).take(self.rank);
@@ -327,7 +327,7 @@ impl<const D: usize> Regression<D> {
     }
 
     /// `Σ |c|²`, twice the prior's energy of the warp.
-    pub fn penalty(&self) -> f64 {
+    pub(crate) fn penalty(&self) -> f64 {
         self.solution.iter().flatten().map(|c| c * c).sum()
     }
 }

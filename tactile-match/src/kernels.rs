@@ -1,7 +1,7 @@
 //! Dense kernels on padded columns: normal equations, Cholesky factors, combinations of columns.
 
 /// Columns are padded with zeros to a multiple of this, so that they are whole vectors.
-pub const LANES: usize = 8;
+pub(crate) const LANES: usize = 8;
 
 // Dense kernels on padded columns: normal equations, their Cholesky factor, combinations of the
 // columns, whitened columns.
@@ -9,12 +9,12 @@ pub const LANES: usize = 8;
 // All sum in the order of the plain loops: several columns or rows at a time only share the loads
 // and hide the latency of the additions.
 
-pub type Block = [f64; LANES];
+pub(crate) type Block = [f64; LANES];
 /// A column's values for the rows that are whitened together.
-pub type Stripe = [Block; TOGETHER];
+pub(crate) type Stripe = [Block; TOGETHER];
 
 /// Columns or rows worked at a time: their running sums stay in registers.
-pub const TOGETHER: usize = 4;
+pub(crate) const TOGETHER: usize = 4;
 
 /// Rows of all columns worked at a time: half a megabyte, so that they stay near the processor
 /// while every column meets every other. All at once, sets of 100,000 points take three times as
@@ -24,7 +24,7 @@ const TILE: usize = 1024;
 /// The lower triangle of `AᵀWA` into `gram`, row by row, and `AᵀWz` into `moments`, for `count`
 /// columns of A and the `D` columns of z: `O(I count²)`. `weighted` is memory for one column.
 #[inline(always)]
-pub fn normal_equations<'a, const D: usize>(
+pub(crate) fn normal_equations<'a, const D: usize>(
     column: impl Fn(usize) -> &'a [f64],
     count: usize,
     weights: &[f64],
@@ -115,7 +115,7 @@ fn totals<const L: usize, const N: usize>(sums: [[f64; L]; N]) -> [f64; N] {
 
 /// `u = Σ cₚ aₚ` for the columns `a` and one coefficient a column and axis.
 #[inline(always)]
-pub fn combine<'a, const D: usize>(
+pub(crate) fn combine<'a, const D: usize>(
     column: impl Fn(usize) -> &'a [f64],
     coefficients: &[[f64; D]],
     u: &mut [Vec<f64>; D],
@@ -160,7 +160,7 @@ fn combine_blocks<'a, const B: usize, const D: usize>(
 /// `A L⁻ᵀ` of the rows of one stripe into `whitened`, for the lower Cholesky factor L of `count`
 /// columns: `O(count²)`. Blocks beyond the last are not set.
 #[inline(always)]
-pub fn whiten(
+pub(crate) fn whiten(
     columns: &[Block],
     blocks: usize,
     factor: &[f64],
@@ -214,7 +214,7 @@ fn whiten_blocks<const B: usize>(
 /// Cholesky factor in place of the lower triangle. The diagonal carries σ², so that pivots stay
 /// positive. Rounding is caught by a floor.
 #[inline(always)]
-pub fn cholesky(a: &mut [f64], n: usize) {
+pub(crate) fn cholesky(a: &mut [f64], n: usize) {
     let mut first = 0;
     while first + TOGETHER <= n {
         eliminate::<TOGETHER>(a, n, first);
@@ -286,7 +286,7 @@ fn short_dots<const N: usize>(a: &[f64], b: [&[f64]; N]) -> [f64; N] {
 
 /// Solves `L Lᵀ x = b` in place, for the lower factor of [`cholesky`].
 #[inline(always)]
-pub fn solve<const D: usize>(factor: &[f64], n: usize, b: &mut [[f64; D]]) {
+pub(crate) fn solve<const D: usize>(factor: &[f64], n: usize, b: &mut [[f64; D]]) {
     for i in 0..n {
         let row = &factor[i * n..=i * n + i];
         let mut value = b[i];

@@ -38,7 +38,6 @@
 //!   add up to 1.
 #![no_std]
 #![forbid(unsafe_code)]
-#![warn(unreachable_pub)]
 
 #[cfg(test)]
 extern crate std;

@@ -59,18 +59,24 @@ fn two_axes<'py, T: Element>(
 }
 
 /// A matrix of floating-point numbers.
-pub fn matrix<'py>(name: &str, given: &Bound<'py, PyAny>) -> PyResult<PyReadonlyArray2<'py, f64>> {
+pub(crate) fn matrix<'py>(
+    name: &str,
+    given: &Bound<'py, PyAny>,
+) -> PyResult<PyReadonlyArray2<'py, f64>> {
     two_axes(name, given, "iufb", "float64")
 }
 
 /// A mask: a matrix of booleans.
-pub fn mask(name: &str, given: &Bound<'_, PyAny>) -> PyResult<Array2<bool>> {
+pub(crate) fn mask(name: &str, given: &Bound<'_, PyAny>) -> PyResult<Array2<bool>> {
     let array = two_axes::<bool>(name, given, "b", "bool")?;
     Ok(owned(array.as_array()))
 }
 
 /// A frame: a matrix of bytes, [row, column]. Other numbers are refused, because a cast would wrap.
-pub fn frame<'py>(name: &str, given: &Bound<'py, PyAny>) -> PyResult<PyReadonlyArray2<'py, u8>> {
+pub(crate) fn frame<'py>(
+    name: &str,
+    given: &Bound<'py, PyAny>,
+) -> PyResult<PyReadonlyArray2<'py, u8>> {
     if given.cast::<PyArray2<u8>>().is_err()
         && let Ok(found) = given.getattr("dtype")
         && found.str()? != "uint8"
@@ -83,7 +89,7 @@ pub fn frame<'py>(name: &str, given: &Bound<'py, PyAny>) -> PyResult<PyReadonlyA
 }
 
 /// A frame of red, green and blue in some order: bytes, [row, column, channel].
-pub fn colours(name: &str, given: &Bound<'_, PyAny>) -> PyResult<Array3<u8>> {
+pub(crate) fn colours(name: &str, given: &Bound<'_, PyAny>) -> PyResult<Array3<u8>> {
     let array = bytes(name, given)?;
     let shape = array.shape().to_vec();
     let wanted = "three axes (rows, columns, 3) of a gel that is lit in colours";
@@ -98,7 +104,7 @@ pub fn colours(name: &str, given: &Bound<'_, PyAny>) -> PyResult<Array3<u8>> {
 }
 
 /// Grey levels of a frame of bytes, the mean of its channels.
-pub fn grey(name: &str, given: &Bound<'_, PyAny>) -> PyResult<Array2<f64>> {
+pub(crate) fn grey(name: &str, given: &Bound<'_, PyAny>) -> PyResult<Array2<f64>> {
     let array = bytes(name, given)?;
     let levels = array.as_array().mapv(f64::from);
     let shape = levels.shape().to_vec();
@@ -126,7 +132,7 @@ fn bytes<'py>(name: &str, given: &Bound<'py, PyAny>) -> PyResult<PyReadonlyArray
 }
 
 /// A copy. ndarray refuses NumPy's strides of an array without elements.
-pub fn owned<T: Clone + Default>(view: ArrayView2<'_, T>) -> Array2<T> {
+pub(crate) fn owned<T: Clone + Default>(view: ArrayView2<'_, T>) -> Array2<T> {
     match view.is_empty() {
         true => Array2::default(view.dim()),
         false => view.to_owned(),
@@ -134,12 +140,12 @@ pub fn owned<T: Clone + Default>(view: ArrayView2<'_, T>) -> Array2<T> {
 }
 
 /// A vector of integers, as indices that may be −1.
-pub fn indices(name: &str, given: &Bound<'_, PyAny>) -> PyResult<Vec<i64>> {
+pub(crate) fn indices(name: &str, given: &Bound<'_, PyAny>) -> PyResult<Vec<i64>> {
     one_axis(name, given, "iu", "int64")
 }
 
 /// A vector of floating-point numbers.
-pub fn vector(name: &str, given: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
+pub(crate) fn vector(name: &str, given: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
     one_axis(name, given, "iufb", "float64")
 }
 
@@ -157,7 +163,7 @@ fn one_axis<T: Element + Copy>(
 }
 
 /// Pixel size along x and y: one number for both, or two.
-pub fn pixel_size(given: &Bound<'_, PyAny>) -> PyResult<[f64; 2]> {
+pub(crate) fn pixel_size(given: &Bound<'_, PyAny>) -> PyResult<[f64; 2]> {
     if let Ok(both) = given.extract::<f64>() {
         return Ok([both; 2]);
     }
@@ -166,7 +172,10 @@ pub fn pixel_size(given: &Bound<'_, PyAny>) -> PyResult<[f64; 2]> {
 }
 
 /// The rows of an array of N columns.
-pub fn columns<const N: usize>(name: &str, given: &Bound<'_, PyAny>) -> PyResult<Vec<[f64; N]>> {
+pub(crate) fn columns<const N: usize>(
+    name: &str,
+    given: &Bound<'_, PyAny>,
+) -> PyResult<Vec<[f64; N]>> {
     let array = matrix(name, given)?;
     let view = array.as_array();
     if view.ncols() != N {
@@ -177,7 +186,7 @@ pub fn columns<const N: usize>(name: &str, given: &Bound<'_, PyAny>) -> PyResult
 }
 
 /// Two sets of points in the plane or in space.
-pub fn dimension(names: [&str; 2], sets: [ArrayView2<'_, f64>; 2]) -> PyResult<usize> {
+pub(crate) fn dimension(names: [&str; 2], sets: [ArrayView2<'_, f64>; 2]) -> PyResult<usize> {
     let [first, second] = sets.map(|set| set.ncols());
     if first != second || !(2..=3).contains(&first) {
         let [a, b] = names;
@@ -188,21 +197,21 @@ pub fn dimension(names: [&str; 2], sets: [ArrayView2<'_, f64>; 2]) -> PyResult<u
     Ok(first)
 }
 
-pub fn points<const D: usize>(rows: ArrayView2<'_, f64>) -> Vec<Point<f64, D>> {
+pub(crate) fn points<const D: usize>(rows: ArrayView2<'_, f64>) -> Vec<Point<f64, D>> {
     let point = |row: ndarray::ArrayView1<'_, f64>| Point::from(std::array::from_fn(|k| row[k]));
     rows.rows().into_iter().map(point).collect()
 }
 
-pub fn rows<const D: usize>(points: &[Point<f64, D>]) -> Array2<f64> {
+pub(crate) fn rows<const D: usize>(points: &[Point<f64, D>]) -> Array2<f64> {
     Array2::from_shape_fn((points.len(), D), |(i, k)| points[i][k])
 }
 
-pub fn tensor(rows: ArrayView2<'_, f64>) -> Matrix3<f64> {
+pub(crate) fn tensor(rows: ArrayView2<'_, f64>) -> Matrix3<f64> {
     Matrix3::from_fn(|i, j| rows[[i, j]])
 }
 
 /// An array that nobody can change, as a part of a frozen result.
-pub fn kept<T: Element, D: Dimension>(
+pub(crate) fn kept<T: Element, D: Dimension>(
     py: Python<'_>,
     array: ndarray::Array<T, D>,
 ) -> Py<PyArray<T, D>> {
@@ -214,19 +223,19 @@ pub fn kept<T: Element, D: Dimension>(
     array.unbind()
 }
 
-pub type Vector<T> = Py<PyArray1<T>>;
-pub type Matrix<T> = Py<PyArray2<T>>;
-pub type Tensors = Py<PyArray3<f64>>;
+pub(crate) type Vector<T> = Py<PyArray1<T>>;
+pub(crate) type Matrix<T> = Py<PyArray2<T>>;
+pub(crate) type Tensors = Py<PyArray3<f64>>;
 
-pub fn kept_vector<T: Element>(py: Python<'_>, values: Vec<T>) -> Vector<T> {
+pub(crate) fn kept_vector<T: Element>(py: Python<'_>, values: Vec<T>) -> Vector<T> {
     kept(py, Array1::from_vec(values))
 }
 
-pub fn kept_tensor(py: Python<'_>, tensor: &Matrix3<f64>) -> Matrix<f64> {
+pub(crate) fn kept_tensor(py: Python<'_>, tensor: &Matrix3<f64>) -> Matrix<f64> {
     kept(py, Array2::from_shape_fn((3, 3), |(i, j)| tensor[(i, j)]))
 }
 
-pub fn kept_tensors(py: Python<'_>, tensors: &[Matrix3<f64>]) -> Tensors {
+pub(crate) fn kept_tensors(py: Python<'_>, tensors: &[Matrix3<f64>]) -> Tensors {
     let shape = (tensors.len(), 3, 3);
     kept(
         py,

@@ -23,7 +23,7 @@ pyo3::create_exception!(
 );
 
 /// An argument that a caller has to change.
-pub fn invalid(sentence: impl ToString) -> PyErr {
+pub(crate) fn invalid(sentence: impl ToString) -> PyErr {
     PyValueError::new_err(sentence.to_string())
 }
 
@@ -62,16 +62,16 @@ fn own_failure<'e>(error: &'e (dyn Error + 'static)) -> Option<&'e CustomError> 
 }
 
 /// A failure of a measurement.
-pub fn failed(error: impl Error + 'static) -> PyErr {
+pub(crate) fn failed(error: impl Error + 'static) -> PyErr {
     caused(&error).unwrap_or_else(|| TactileError::new_err(error.to_string()))
 }
 
 /// An error that a caller mends by other arguments, unless a stage in Python failed.
-pub fn refused(error: impl Error + 'static) -> PyErr {
+pub(crate) fn refused(error: impl Error + 'static) -> PyErr {
     caused(&error).unwrap_or_else(|| invalid(error))
 }
 
-pub fn pipeline(error: PipelineError) -> PyErr {
+pub(crate) fn pipeline(error: PipelineError) -> PyErr {
     match (&error, error.kind()) {
         (PipelineError::NoSuchFrame { .. }, _) => PyIndexError::new_err(error.to_string()),
         (_, PipelineErrorKind::Options | PipelineErrorKind::Input) => refused(error),
@@ -79,7 +79,7 @@ pub fn pipeline(error: PipelineError) -> PyErr {
     }
 }
 
-pub fn strain_between(error: StrainBetweenError) -> PyErr {
+pub(crate) fn strain_between(error: StrainBetweenError) -> PyErr {
     match error {
         StrainBetweenError::Match(MatchError::Custom(_))
         | StrainBetweenError::NotSmooth
@@ -88,14 +88,14 @@ pub fn strain_between(error: StrainBetweenError) -> PyErr {
     }
 }
 
-pub fn file(error: FileError) -> PyErr {
+pub(crate) fn file(error: FileError) -> PyErr {
     match error {
         FileError::Write { .. } | FileError::Read { .. } => PyOSError::new_err(error.to_string()),
         _ => invalid(error),
     }
 }
 
-pub fn sensor(error: SensorError) -> PyErr {
+pub(crate) fn sensor(error: SensorError) -> PyErr {
     match error {
         SensorError::File(error) => file(error),
         _ => refused(error),
@@ -103,13 +103,13 @@ pub fn sensor(error: SensorError) -> PyErr {
 }
 
 /// Lets `KeyboardInterrupt` end long work: asked at every step of it, which it looks for at times.
-pub struct Signals {
+pub(crate) struct Signals {
     looked: Instant,
     raised: Option<PyErr>,
 }
 
 impl Signals {
-    pub fn new() -> Self {
+    pub(crate) fn new() -> Self {
         Self {
             looked: Instant::now(),
             raised: None,
@@ -117,7 +117,7 @@ impl Signals {
     }
 
     /// Whether the work goes on.
-    pub fn check(&mut self) -> ControlFlow<()> {
+    pub(crate) fn check(&mut self) -> ControlFlow<()> {
         // Rare enough to cost nothing, often enough for a person.
         // What was raised once stays raised until `finish`, however often the work asks again.
         if self.raised.is_none() && self.looked.elapsed() > Duration::from_millis(50) {
@@ -130,7 +130,7 @@ impl Signals {
         }
     }
 
-    pub fn finish(&mut self) -> PyResult<()> {
+    pub(crate) fn finish(&mut self) -> PyResult<()> {
         self.raised.take().map_or(Ok(()), Err)
     }
 }

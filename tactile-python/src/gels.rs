@@ -459,7 +459,7 @@ impl GelFrame {
 /// Markers
 ///     Places and displacements of the markers that are seen in both.
 #[pyfunction]
-pub fn markers(
+pub(crate) fn markers(
     py: Python<'_>,
     reference: &Bound<'_, PyAny>,
     frame: &Bound<'_, PyAny>,

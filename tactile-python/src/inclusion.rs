@@ -21,7 +21,7 @@ use tactile_imaging::pipeline::with_error;
 /// OSError, ValueError
 ///     A file that cannot be read, or not be used.
 #[pyfunction]
-pub fn inclusion_of_scene(py: Python<'_>, path: PathBuf) -> PyResult<Inclusion> {
+pub(crate) fn inclusion_of_scene(py: Python<'_>, path: PathBuf) -> PyResult<Inclusion> {
     let scene = InclusionScene::read(path).map_err(errors::file)?;
     let loaded = py.detach(|| scene.load()).map_err(errors::file)?;
     let search = InclusionSearch::new(scene.specimen, scene.guide).map_err(invalid)?;
@@ -61,7 +61,7 @@ pub fn inclusion_of_scene(py: Python<'_>, path: PathBuf) -> PyResult<Inclusion> 
     radii, approaches, pressures, standard_errors, *, block_height, block_radius, guide_radius,
     waveguide, forces=None, interface=None, youngs_modulus=None
 ))]
-pub fn inclusion(
+pub(crate) fn inclusion(
     py: Python<'_>,
     radii: &Bound<'_, PyAny>,
     approaches: &Bound<'_, PyAny>,

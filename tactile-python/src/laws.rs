@@ -29,7 +29,7 @@ use tactile_imaging::pipeline::{LightContact, StagesConfig};
     force, radius, youngs_modulus, *, poisson_ratio=0.5, other_modulus=None,
     other_poisson_ratio=0.5
 ))]
-pub fn hertz(
+pub(crate) fn hertz(
     force: f64,
     radius: f64,
     youngs_modulus: f64,
@@ -67,7 +67,7 @@ pub fn hertz(
 ///     As that of `Pipeline`.
 #[pyfunction]
 #[pyo3(signature = (forces, radii, object, *, waveguide=None, estimator=None))]
-pub fn estimate_modulus(
+pub(crate) fn estimate_modulus(
     py: Python<'_>,
     forces: &Bound<'_, PyAny>,
     radii: &Bound<'_, PyAny>,

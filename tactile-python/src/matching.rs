@@ -27,7 +27,7 @@ use tactile_imaging::{StrainBetweenOptions, strain_between as strain_of_sets};
 const SNAPPED: f64 = 1e-3;
 
 /// A matcher as the caller gave it: read once, made for the plane or for space.
-pub enum Matcher {
+pub(crate) enum Matcher {
     Annealed(AnnealedSoftassign),
     Drift(CoherentPointDrift),
     Labelling(RelaxationLabelling),
@@ -90,7 +90,7 @@ impl Matcher {
     /// From a name with options, or from an object with a method `match_points`.
     ///
     /// `annealed` is what the default matcher starts from.
-    pub fn new(
+    pub(crate) fn new(
         given: Option<&Bound<'_, PyAny>>,
         options: Option<&Bound<'_, PyDict>>,
         annealed: AnnealedSoftassign,
@@ -131,7 +131,7 @@ impl Matcher {
     }
 
     /// For a stage of a pipeline.
-    pub fn boxed<const D: usize>(self) -> Box<dyn PointMatcher<D> + Send + Sync> {
+    pub(crate) fn boxed<const D: usize>(self) -> Box<dyn PointMatcher<D> + Send + Sync> {
         match self {
             Self::Annealed(matcher) => Box::new(matcher),
             Self::Drift(matcher) => Box::new(matcher),
@@ -311,7 +311,7 @@ fn homogeneous<const D: usize>(map: &FittedTransformation<D>) -> Array2<f64> {
     })
 }
 
-pub fn answer<const D: usize>(
+pub(crate) fn answer<const D: usize>(
     py: Python<'_>,
     found: &Matching<D>,
     [model, target]: [&[Point<f64, D>]; 2],
@@ -390,7 +390,7 @@ fn rows_of_pairs(pairs: &[(usize, usize)]) -> Array2<i64> {
 ///     A matcher of your own failed. Its exception is the cause.
 #[pyfunction]
 #[pyo3(signature = (model, target, matcher=None, **options))]
-pub fn match_points(
+pub(crate) fn match_points(
     py: Python<'_>,
     model: &Bound<'_, PyAny>,
     target: &Bound<'_, PyAny>,
@@ -460,7 +460,7 @@ fn matched<const D: usize>(
     before, after, matcher=None, *, measure=None, paired=false, with_doubtful_pairs=false, **options
 ))]
 #[expect(clippy::too_many_arguments, reason = "keywords of Python")]
-pub fn strain_between(
+pub(crate) fn strain_between(
     py: Python<'_>,
     before: &Bound<'_, PyAny>,
     after: &Bound<'_, PyAny>,
@@ -559,7 +559,7 @@ fn strained<const D: usize>(
     })
 }
 
-pub fn tensor_text(mean: &Matrix3<f64>, error: &Matrix3<f64>) -> String {
+pub(crate) fn tensor_text(mean: &Matrix3<f64>, error: &Matrix3<f64>) -> String {
     let one = |name: &str, k: usize| format!("{name} {:.5} ± {:.5}", mean[(k, k)], error[(k, k)]);
     format!("{}, {}, {}", one("e_xx", 0), one("e_yy", 1), one("e_zz", 2))
 }

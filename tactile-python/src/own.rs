@@ -28,7 +28,7 @@ use tactile_imaging::tps::{TpsError, Warp, WarpModel};
 /// It is held weakly, if it allows that: a pipeline or a press keeps it alive where the collector of
 /// cycles sees it, as an object that holds its own press makes one.
 #[derive(Clone)]
-pub struct OwnStage {
+pub(crate) struct OwnStage {
     object: Arc<Held>,
     method: &'static str,
 }
@@ -40,7 +40,11 @@ enum Held {
 
 impl OwnStage {
     /// The stage `name` by its method: a name of a built-in one is none.
-    pub fn new(name: &str, method: &'static str, given: &Bound<'_, PyAny>) -> PyResult<Self> {
+    pub(crate) fn new(
+        name: &str,
+        method: &'static str,
+        given: &Bound<'_, PyAny>,
+    ) -> PyResult<Self> {
         if !given.hasattr(method)? {
             return Err(PyTypeError::new_err(format!(
                 "{name} must be a name or an object with a method {method}, found {}",
@@ -414,7 +418,7 @@ fn same_length(input: &'static str, expected: usize, found: usize) -> Result<(),
 /// `measure(frame, reference)` returns None where nothing touches, else a dictionary: `radius` in
 /// metres and `force` in newtons or None, both as (value, standard error), `mask` of the frame's
 /// shape, and `centre` (x, y) in pixels.
-pub struct OwnContact {
+pub(crate) struct OwnContact {
     pub stage: OwnStage,
     pub pixel_size_m: [f64; 2],
 }

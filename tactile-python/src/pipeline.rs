@@ -391,14 +391,14 @@ fn stage(
 }
 
 /// A choice by its name, the default without one.
-pub fn named<T: FromStr<Err: ToString> + Default>(name: Option<String>) -> PyResult<T> {
+pub(crate) fn named<T: FromStr<Err: ToString> + Default>(name: Option<String>) -> PyResult<T> {
     name.map_or_else(|| Ok(T::default()), |name| name.parse().map_err(invalid))
 }
 
 type SharedMeasure = Box<dyn StrainMeasure + Send + Sync>;
 
 /// A measure of strain by its name, or an object with a method `strain`.
-pub fn strain_measure(name: &str, given: &Bound<'_, PyAny>) -> PyResult<SharedMeasure> {
+pub(crate) fn strain_measure(name: &str, given: &Bound<'_, PyAny>) -> PyResult<SharedMeasure> {
     let (text, own) = stage(name, "strain", Some(given))?;
     if let Some(own) = own {
         return Ok(Box::new(own));
@@ -413,7 +413,7 @@ pub fn strain_measure(name: &str, given: &Bound<'_, PyAny>) -> PyResult<SharedMe
 }
 
 /// A waveguide of layers: thickness in metres, Young's modulus in pascals, Poisson's ratio.
-pub fn guide(layers: &Bound<'_, PyAny>) -> PyResult<Waveguide> {
+pub(crate) fn guide(layers: &Bound<'_, PyAny>) -> PyResult<Waveguide> {
     let layer = |[thickness_m, youngs_modulus_pa, poisson_ratio]: [f64; 3]| Layer {
         thickness_m,
         youngs_modulus_pa,

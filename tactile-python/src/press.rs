@@ -337,7 +337,7 @@ fn contact(py: Python<'_>, frame: usize, reading: &ContactReading) -> PyResult<C
     })
 }
 
-pub fn surface_result(py: Python<'_>, surface: ContactSurface) -> Surface {
+pub(crate) fn surface_result(py: Python<'_>, surface: ContactSurface) -> Surface {
     let heights = surface.surface.heights;
     Surface {
         text: format!("{} × {} heights", heights.nrows(), heights.ncols()),
@@ -363,7 +363,7 @@ fn strain_result(py: Python<'_>, strain: &PairStrain) -> Strain {
     }
 }
 
-pub fn modulus(estimate: &ModulusEstimate) -> Modulus {
+pub(crate) fn modulus(estimate: &ModulusEstimate) -> Modulus {
     Modulus {
         text: rust::pipeline::ModulusResult::from(estimate).to_string(),
         value: estimate.youngs_modulus_pa,

@@ -10,7 +10,7 @@ use tactile_imaging::core::{Estimate as CoreEstimate, Interval};
 use tactile_imaging::tps::{LocalField, TpsError};
 
 /// What a result is as a value: written in Python, as it is made of Python's values.
-pub fn of_values<'py>(
+pub(crate) fn of_values<'py>(
     py: Python<'py>,
     function: &str,
     arguments: impl pyo3::call::PyCallArgs<'py>,
@@ -21,7 +21,7 @@ pub fn of_values<'py>(
 
 /// A table of two columns. Values are escaped: they may hold text of the caller. Of arrays larger
 /// than a tensor the shape is shown.
-pub fn to_html(result: &Bound<'_, PyAny>, names: &[&str]) -> PyResult<String> {
+pub(crate) fn to_html(result: &Bound<'_, PyAny>, names: &[&str]) -> PyResult<String> {
     let escaped = |text: String| text.replace('&', "&amp;").replace('<', "&lt;");
     let mut html = String::from("<table>");
     for name in names {
@@ -529,7 +529,7 @@ fn moved<const D: usize>(
 }
 
 impl Estimate {
-    pub fn of(py: Python<'_>, estimate: CoreEstimate) -> PyResult<Py<Self>> {
+    pub(crate) fn of(py: Python<'_>, estimate: CoreEstimate) -> PyResult<Py<Self>> {
         let CoreEstimate {
             value,
             standard_error,
@@ -538,7 +538,7 @@ impl Estimate {
         Self::within(py, value, standard_error, ends(estimate.interval_95()))
     }
 
-    pub fn within(
+    pub(crate) fn within(
         py: Python<'_>,
         value: f64,
         standard_error: f64,
@@ -557,6 +557,6 @@ impl Estimate {
     }
 }
 
-pub fn ends(interval: Interval) -> (f64, Option<f64>) {
+pub(crate) fn ends(interval: Interval) -> (f64, Option<f64>) {
     (interval.lower, interval.upper)
 }

@@ -33,7 +33,7 @@ use tactile_simulate::{CalibrationRun, Camera, ContactModel, PressLoad, PressOpt
     *, forces=None, radius=3e-3, youngs_modulus=103e3, poisson_ratio=0.5,
     physics="finite-elements", coarser=1, seed=1
 ))]
-pub fn simulate(
+pub(crate) fn simulate(
     py: Python<'_>,
     forces: Option<Vec<f64>>,
     radius: f64,

@@ -46,7 +46,7 @@ use tactile_imaging::sfs::{
     image, *, light=None, method=None, mask=None, pixel_size=None, intensity=1.0,
     ambient=0.0
 ))]
-pub fn reconstruct<'py>(
+pub(crate) fn reconstruct<'py>(
     py: Python<'py>,
     image: &Bound<'py, PyAny>,
     light: Option<(f64, f64, f64)>,
@@ -138,7 +138,7 @@ fn heights(
 ///     NaN where there is no height.
 #[pyfunction]
 #[pyo3(signature = (slope_x, slope_y, pixel_size=None, *, method=None, mask=None))]
-pub fn integrate<'py>(
+pub(crate) fn integrate<'py>(
     py: Python<'py>,
     slope_x: &Bound<'py, PyAny>,
     slope_y: &Bound<'py, PyAny>,
@@ -189,7 +189,7 @@ pub fn integrate<'py>(
 /// Surface or None
 ///     None where nothing touches.
 #[pyfunction]
-pub fn depth(
+pub(crate) fn depth(
     py: Python<'_>,
     frame: &Bound<'_, PyAny>,
     reference: &Bound<'_, PyAny>,

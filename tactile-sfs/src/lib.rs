@@ -20,7 +20,6 @@
 //!
 //! Errors are [`SfsError`]. Not converging is a [`SurfaceReport`].
 #![forbid(unsafe_code)]
-#![warn(unreachable_pub)]
 
 mod ball;
 mod binning;

@@ -34,7 +34,6 @@
 //! `rand_distr` turns them into normal deviates. Each row of each frame has its own stream, so
 //! frames can be made in any order, alone or in parallel, with the same bits.
 #![forbid(unsafe_code)]
-#![warn(unreachable_pub)]
 
 mod calibration;
 mod camera;
