@@ -15,6 +15,7 @@ use ndarray::{Array2, Array3};
 use std::io::{BufRead, BufReader, Cursor, Error, ErrorKind, Read, Result as IoResult, stdin};
 use std::mem::take;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use tactile_imaging::pipeline::FrameSource;
 
 /// Longest line of a video's header and longest header of an image, in bytes. Longer ones are no
@@ -290,6 +291,7 @@ impl FrameReader {
                 Encoded::Luma { .. } | Encoded::DeepLuma(_) => {
                     return Err(colours("a video in luma and chroma"));
                 }
+                Encoded::Page(bytes) => decode(&bytes, name)?,
                 Encoded::File(bytes) => decode(&bytes, name)?,
                 Encoded::Decoded(image) => image,
             };
@@ -369,6 +371,8 @@ impl FrameReader {
 enum Encoded {
     /// An image with its header.
     File(Vec<u8>),
+    /// A file whose first image is the frame.
+    Page(Arc<Vec<u8>>),
     Decoded(DynamicImage),
     /// Grey levels of so many rows and columns.
     Luma {
@@ -392,6 +396,9 @@ impl FrameSource for FrameReader {
         let (grey, bits) = (self.grey, self.bits);
         let convert = |encoded: Encoded, name: &Path| {
             Ok(match encoded {
+                Encoded::Page(bytes) => {
+                    eight_bit_levels(decode(&bytes, name)?, &bytes, name, grey, bits)?
+                }
                 Encoded::File(bytes) | Encoded::DeepLuma(bytes) => {
                     eight_bit_levels(decode(&bytes, name)?, &bytes, name, grey, bits)?
                 }

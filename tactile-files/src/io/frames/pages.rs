@@ -5,6 +5,7 @@ use super::{Broken, Decoder, Encoded, Format, frame_formats, quoted};
 use std::collections::HashSet;
 use std::io::{BufRead, Read, Result as IoResult};
 use std::mem::take;
+use std::sync::Arc;
 
 pub(super) const FORMAT: Format = Format {
     name: "TIFF",
@@ -59,7 +60,8 @@ impl Decoder for Single {
 
 /// The pages of a TIFF file.
 struct Pages {
-    bytes: Vec<u8>,
+    /// Shared with the page that was turned last, and changed in place when that is done with.
+    bytes: Arc<Vec<u8>>,
     little_endian: bool,
     /// Where the directory of the next page stands.
     next: usize,
@@ -76,7 +78,7 @@ impl Pages {
             _ => return None,
         };
         let mut pages = Self {
-            bytes,
+            bytes: Arc::new(bytes),
             little_endian,
             next: 0,
             seen: HashSet::new(),
@@ -95,7 +97,7 @@ impl Pages {
     }
 
     /// The file with the next page as its first, which is the one that decoders of images read.
-    fn turn(&mut self) -> Option<Vec<u8>> {
+    fn turn(&mut self) -> Option<Arc<Vec<u8>>> {
         let page = self.next;
         // The first directory is the decoder's to judge, wherever it stands.
         if !self.seen.is_empty() && page == 0 || !self.seen.insert(page) {
@@ -107,13 +109,13 @@ impl Pages {
         if !self.little_endian {
             first.reverse();
         }
-        self.bytes[4..8].copy_from_slice(&first);
-        Some(self.bytes.clone())
+        Arc::make_mut(&mut self.bytes)[4..8].copy_from_slice(&first);
+        Some(Arc::clone(&self.bytes))
     }
 }
 
 impl Decoder for Pages {
     fn next(&mut self, _: &mut dyn BufRead, _: Vec<u8>) -> Result<Option<Encoded>, Broken> {
-        Ok(self.turn().map(Encoded::File))
+        Ok(self.turn().map(Encoded::Page))
     }
 }
