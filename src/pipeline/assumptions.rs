@@ -36,7 +36,7 @@ impl Assumption {
     /// otherwise than what it was calibrated with. Zero under a fixed diffusing skin, or for the
     /// calibrator itself. [`Source::ObjectSize`] is of the radius of a ball, a punch or an
     /// indenter. [`Source::Guide`] stands back behind a covariance of the layers
-    /// ([`Settings::layer_covariance`](crate::pipeline::Settings::layer_covariance)).
+    /// ([`Settings::layer_covariance`](field@crate::pipeline::Settings::layer_covariance)).
     pub const ALL: [Self; 7] = [
         Self {
             source: Source::Gain,

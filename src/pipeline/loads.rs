@@ -128,7 +128,7 @@ impl SeenLoads {
         let trusted = trusted && contact.saturated_share == 0.0;
         let load = Load::of(contact).filter(|load| trusted && load.force_n.value > 0.0);
         let Some(load) = load else { return };
-        // A contact of the same bits is the same image, which noise moves.
+        // Noise moves two frames of one load apart: equal contacts are the same image again.
         if self
             .0
             .iter()

@@ -336,8 +336,8 @@ impl Session {
     /// }
     /// assert_eq!(
     ///     (session.frames(), session.loads()),
-    ///     (6, 3),
-    ///     "frames without contact are no load"
+    ///     (6, 2),
+    ///     "neither frames without contact nor an image that came before are a load"
     /// );
     /// for k in 0..40 {
     ///     session.push(hertz(100.0 + f64::from(k)).view())?;
