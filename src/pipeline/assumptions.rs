@@ -131,7 +131,7 @@ impl Assumptions {
     }
 
     /// States all that `others` state.
-    pub fn state_all(&mut self, others: &Self) {
+    pub(super) fn state_all(&mut self, others: &Self) {
         others
             .0
             .iter()

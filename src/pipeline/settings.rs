@@ -120,6 +120,30 @@ impl Settings {
         }
     }
 
+    /// States errors beside those that are stated. One of the layers' common factor
+    /// ([`Source::Guide`]) takes the place of a covariance of the layers, as of a calibrated sensor.
+    ///
+    /// ```
+    /// use tactile_imaging::force::Source;
+    /// use tactile_imaging::pipeline::Assumptions;
+    /// use tactile_simulate::Trial;
+    /// let mut errors = Assumptions::default();
+    /// errors.state(Source::Guide, 0.02);
+    /// let pipeline = Trial::coarser(8)?.pipeline()?.with_settings(|settings| {
+    ///     settings.layer_covariance = Some(nalgebra::DMatrix::zeros(9, 9)); // of three layers
+    ///     settings.state_errors(&errors);
+    /// })?;
+    /// assert_eq!(pipeline.settings().assumptions.stated(Source::Guide), Some(0.02));
+    /// assert!(pipeline.settings().layer_covariance.is_none());
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn state_errors(&mut self, errors: &Assumptions) {
+        self.assumptions.state_all(errors);
+        if errors.stated(Source::Guide).is_some() {
+            self.layer_covariance = None;
+        }
+    }
+
     /// States that every input which is not stated yet is exact, but for light that is uneven over
     /// the frame: for frames whose truth is known.
     ///

@@ -18,7 +18,8 @@ use tactile_imaging::elasticity::strain::{
 use tactile_imaging::force::{CalibrationPair, ForceOptions, Source};
 use tactile_imaging::matching::{AnnealedSoftassign, Search};
 use tactile_imaging::pipeline::{
-    DarkContact, EstimatorChoice, LightContact, StagesConfig, StrainChoice, SurfaceInput,
+    Assumptions, DarkContact, EstimatorChoice, LightContact, StagesConfig, StrainChoice,
+    SurfaceInput,
 };
 
 /// What is pressed on the sensor. Lengths in metres.
@@ -228,6 +229,7 @@ impl Pipeline {
             }
             settings.flat_field = flat_field.unwrap_or(settings.flat_field);
             let size_error = radius_error.zip(settings.object.radius_m());
+            let mut errors = Assumptions::default();
             for (source, stated) in [
                 (Source::Gain, gauge_error),
                 (Source::Coupling, coupling_error),
@@ -241,9 +243,10 @@ impl Pipeline {
                 (Source::Adhesion, adhesion_error),
             ] {
                 if let Some(error) = stated {
-                    settings.assumptions.state(source, error);
+                    errors.state(source, error);
                 }
             }
+            settings.state_errors(&errors);
         }))
         .map_err(errors::pipeline)?
         .with_control_points(control_points)

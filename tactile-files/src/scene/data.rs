@@ -6,7 +6,6 @@ use crate::sensor::Sensor;
 use ndarray::{Array2, ArrayView2};
 use std::error::Error;
 use std::path::Path;
-use tactile_imaging::core::Source;
 use tactile_imaging::elasticity::ElasticityError;
 use tactile_imaging::elasticity::contact::ContactTable;
 use tactile_imaging::elasticity::modulus::TabulatedContact;
@@ -15,7 +14,7 @@ use tactile_imaging::force::{
 };
 use tactile_imaging::pipeline::{
     CheckPress, DarkContact, EstimatorChoice, LightContact, Measurement, Object, Pipeline,
-    PipelineError, Press, Settings, SurfaceInput,
+    PipelineError, Press, SurfaceInput,
 };
 
 /// A scene's calibration, read.
@@ -291,14 +290,6 @@ impl Scene {
         ForceOptions::default().with_contact(ContactOptions::default().with_drift(drift))
     }
 
-    fn state_errors(&self, settings: &mut Settings) {
-        settings.assumptions.state_all(&self.errors);
-        if self.errors.stated(Source::Guide).is_some() {
-            // In place of a sensor's own.
-            settings.layer_covariance = None;
-        }
-    }
-
     fn build(&self, data: &SceneData) -> Result<Pipeline, PipelineError> {
         let pipeline = match &data.calibration {
             LoadedCalibration::Pairs(pairs) => {
@@ -316,7 +307,7 @@ impl Scene {
                 let pipeline = Pipeline::new(contact, self.object)?.with_stages(&self.stages)?;
                 return sensor
                     .configured(pipeline)?
-                    .with_settings(|settings| self.state_errors(settings));
+                    .with_settings(|settings| settings.state_errors(&self.errors));
             }
             LoadedCalibration::DepthTable(table) => {
                 let contact = DarkContact::new(table, self.pixel_size_m)?;
@@ -353,7 +344,7 @@ impl Scene {
             if !self.layers.is_empty() {
                 settings.waveguide = Some(guide);
             }
-            self.state_errors(settings);
+            settings.state_errors(&self.errors);
         })
     }
 
