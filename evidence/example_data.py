@@ -139,6 +139,21 @@ layers = [{{ refractive_index = 1.40, thickness_m = 10e-3, youngs_modulus_pa = 1
 """
 
 
+def skin_scene():
+    """The same press as under a fixed diffusing skin: the object's reflectance does not matter."""
+    return scene().replace("\n[calibration]", 'coupling_error = "exact"\n\n[calibration]')
+
+
+def weight_scene():
+    """The same press, of which one frame was taken under a known weight."""
+    return scene() + f"""
+[[check]]
+image = "frame_2.png"
+force_N = {LOADS_N[1]}
+object = "sample"
+"""
+
+
 # Calibration of the same kind of sensor: two rigid balls on one guide of 100 kPa, up and down again, in frames of 72 by 72 pixels.
 # (radius in metres, forces in newtons with the number of those while loading)
 BALLS = [(3e-3, [0.003, 0.006, 0.012, 0.02, 0.012, 0.006], 4), (6e-3, [0.005, 0.01, 0.02, 0.01], 3)]
@@ -155,6 +170,37 @@ def sensor_frame(ball_m, force, seed):
         noise = 2 * error(SMALL * r + c + seed, 0.7548776662)
         return round(10 + noise + peak * math.sqrt(max(1 - share, 0.0)))
     return png([[level(r, c) for c in range(SMALL)] for r in range(SMALL)])
+
+
+# A flat tip of 1 mm radius under weights of 0.4 to 1.2 g. Its pressure is not limited at the edge, so that a pixel has its mean.
+TIP_M, WEIGHTS_KG = 1e-3, [0.4e-3, 0.6e-3, 0.8e-3, 1.0e-3, 1.2e-3]
+
+
+def tip_frame(force, seed):
+    """Pressure of a rigid flat tip on a deep guide, F/(2 pi a sqrt(a^2 - r^2)), as the mean over 5 by 5 places of a pixel."""
+    def pressure(r, c):
+        share = PIXEL_M**2 * ((r - 35.2) ** 2 + (c - 35.8) ** 2) / TIP_M**2
+        return force / (2 * math.pi * TIP_M**2 * math.sqrt(1 - share)) if share < 1 else 0.0
+
+    def level(r, c):
+        mean = sum(pressure(r + (i - 2) / 5, c + (j - 2) / 5) for i in range(5) for j in range(5)) / 25
+        return min(255, round(10 + 2 * error(SMALL * r + c + seed, 0.7548776662) + GREY_PER_PA * mean))
+    return png([[level(r, c) for c in range(SMALL)] for r in range(SMALL)])
+
+
+def weights_calibration():
+    presses = "".join(f"""
+[[presses]]
+image = "weight_{k + 1}.png"
+force_N = {9.81 * mass + 1e-5 * error(k, 0.618034):.6f}
+branch = "loading"
+indenter = {{ shape = "punch", radius_m = {TIP_M} }}
+""" for k, mass in enumerate(WEIGHTS_KG))
+    head, _, tail = sensor_calibration().partition("\n[[presses]]")
+    head = head.replace("Two steel balls on a soft sensor of one layer: the layer has 100 kPa, its maker states 95 kPa.",
+                        "A flat tip of 1 mm radius under weights of 0.4 to 1.2 g, on the sensor of calibration.toml.")
+    head = head.replace("gauge_noise_N = 2e-5\ncovers_N = [0.003, 0.02]", "gauge_noise_N = 1e-5")
+    return head + presses + "\n" + tail[tail.index("[[layers]]"):]
 
 
 def sensor_presses():
@@ -342,11 +388,15 @@ FILES = {
     **{f"sensor/press_{k:02}.png": lambda k=k, ball=ball, force=force: sensor_frame(ball, force, 40_000 * k)
        for k, ball, force, _ in sensor_presses()},
     "sensor/calibration.toml": sensor_calibration,
+    **{f"sensor/weight_{k + 1}.png": lambda k=k, mass=mass: tip_frame(9.81 * mass, 40_000 * (k + 30)) for k, mass in enumerate(WEIGHTS_KG)},
+    "sensor/weights.toml": weights_calibration,
     "press/reference.png": lambda: frame(0.0, 0),
     "press/frame_1.png": lambda: frame(LOADS_N[0], 40_000),
     "press/frame_2.png": lambda: frame(LOADS_N[1], 80_000),
     "press/calibration.csv": calibration,
     "press/scene.toml": scene,
+    "press/skin.toml": skin_scene,
+    "press/weight.toml": weight_scene,
     "before.csv": lambda: points((k, place(k)) for k in range(120)),
     # In another order, and without every 17th.
     "after.csv": lambda: points((j, moved(j)) for j in (37 * k % 120 for k in range(120)) if j % 17),

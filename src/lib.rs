@@ -59,9 +59,10 @@
 //!   Hertz's $a^3 = 3FR/(4E^{\ast})$: [`elasticity`].
 #![forbid(unsafe_code)]
 
-// The examples of the README run with the documentation's. Its links are of the repository.
+// The examples of README and guide run with the documentation's. Their links are of the repository.
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]
+#[doc = include_str!("../docs/own_stage.md")]
 struct Readme;
 
 pub use tactile_core as core;

@@ -323,7 +323,7 @@ fn large(n: usize, seed: u64, scenes: &mut Vec<Scene<3>>) {
 
 /// The published benchmark, where its data are.
 fn published(scenes: &mut Vec<Scene<2>>) -> Result<(), Box<dyn std::error::Error>> {
-    let root = std::env::var("TACTILE_DATA").unwrap_or_else(|_| "../shared/data".into());
+    let root = std::env::var("TACTILE_DATA").unwrap_or_default();
     for kind in ["def", "noise", "outlier", "occlusion", "rot"] {
         let family = match kind {
             "def" => "published deformation",

@@ -1,19 +1,17 @@
-//! Published data that are not part of the repository: in the folder named by `TACTILE_DATA`, else
-//! beside the workspace. Where they are absent, a line says so.
+//! Published data that are not part of the repository, in the folder named by `TACTILE_DATA`
+//! (`docs/data.md`). A line is printed for each file that is absent.
 use serde_json::Value;
 use std::path::PathBuf;
 
 /// A file or folder of the data.
 pub fn published(name: &str) -> Option<PathBuf> {
-    let beside = concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/data");
-    let folder =
-        std::env::var_os("TACTILE_DATA").map_or_else(|| PathBuf::from(beside), PathBuf::from);
-    let path = folder.join(name);
-    if !path.exists() {
-        println!("skipped: no {} (set TACTILE_DATA)", path.display());
-        return None;
+    let folder = std::env::var_os("TACTILE_DATA").map(PathBuf::from);
+    let path = folder.map(|folder| folder.join(name));
+    let found = path.filter(|path| path.exists());
+    if found.is_none() {
+        println!("skipped: no {name} in the folder TACTILE_DATA");
     }
-    Some(path)
+    found
 }
 
 /// A file of reference numbers of many digits, after a check that the parser rounds correctly.

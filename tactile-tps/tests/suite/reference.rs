@@ -1,8 +1,7 @@
 //! Agreement with splines computed in 110-digit arithmetic, case by case, to the tolerance their
 //! authors state.
 //!
-//! The numbers lie outside the repository, in the folder named by `TACTILE_DATA` or in
-//! `../shared/data`.
+//! The numbers lie outside the repository, in the folder named by `TACTILE_DATA`.
 #![allow(clippy::print_stdout)]
 
 use crate::common::largest;
